@@ -1,0 +1,25 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Installs what OrbitFuse builds and runs with, from Debian 12 packages; does nothing when all are here.
+set -euo pipefail
+
+packages=(
+  g++ cmake ninja-build pkg-config git
+  libeigen3-dev libceres-dev libopencv-dev libtbb-dev
+  libcli11-dev nlohmann-json3-dev libtomlplusplus-dev libexpected-dev libfmt-dev libspdlog-dev
+  libtiff-dev libpng-dev libjpeg-dev libexiv2-dev libsqlite3-dev libxxhash-dev libnanoflann-dev
+  libgtest-dev libgmock-dev libbenchmark-dev
+  colmap
+)
+
+missing=()
+for package in "${packages[@]}"; do
+  dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' || missing+=("$package")
+done
+[ ${#missing[@]} -eq 0 ] && exit 0
+
+as_root=()
+[ "$(id -u)" -eq 0 ] || as_root=(sudo)
+export DEBIAN_FRONTEND=noninteractive
+"${as_root[@]}" apt-get update -qq
+"${as_root[@]}" apt-get install -y --no-install-recommends "${missing[@]}"

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <opencv2/core.hpp>
+
+#include "core/result.hpp"
+
+namespace orbitfuse {
+
+/// 8-bit BGR (CV_8UC3). EXIF orientation is applied. JPEG and PNG; truncated files, other content
+/// under the extension and 16-bit samples are input errors that name the file.
+Result<cv::Mat> read_visible(const std::filesystem::path& path);
+
+/// Kelvin (CV_32FC1, NaN = invalid) from a 16-bit TIFF or PNG. The scale comes from the file's own
+/// tag, else from its sidecar <file>.json, else centikelvin is assumed.
+Result<cv::Mat> read_thermal_k(const std::filesystem::path& path);
+
+/// Any image as stored: CV_8U or CV_16U, 1 or 3 channels (BGR). For metrics and fusion on files.
+Result<cv::Mat> read_image(const std::filesystem::path& path);
+
+/// Encoders; all writes are atomic.
+Status write_png(const std::filesystem::path& path, const cv::Mat& image);
+Status write_jpeg(const std::filesystem::path& path, const cv::Mat& image, int quality = 95);
+/// 16-bit centikelvin TIFF with the scale in ImageDescription, and its sidecar.
+Status write_thermal_tiff(const std::filesystem::path& path, const cv::Mat& kelvin);
+/// 32-bit float TIFF (depth, opacity).
+Status write_float_tiff(const std::filesystem::path& path, const cv::Mat& values);
+Result<cv::Mat> read_float_tiff(const std::filesystem::path& path);
+
+}  // namespace orbitfuse

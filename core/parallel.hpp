@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+
+namespace orbitfuse {
+
+/// Threads that parallel_for may use; 0 = all cores. Set once by main() or a test.
+void set_thread_count(int threads);
+int thread_count();
+
+/// fn(begin, end) over [0, count) in blocks of `block`. Block bounds do not depend on the thread
+/// count, so per-block results are the same for any number of threads.
+void parallel_blocks(int count, int block, const std::function<void(int begin, int end)>& fn);
+
+/// fn(i) for i in [0, count), one task each.
+void parallel_for(int count, const std::function<void(int)>& fn);
+
+}  // namespace orbitfuse
