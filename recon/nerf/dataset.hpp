@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "core/camera.hpp"
+#include "core/modality.hpp"
+#include "core/reconstruction.hpp"
+#include "core/result.hpp"
+#include "core/transform.hpp"
+
+namespace orbitfuse::nerf {
+
+/// One posed image to learn from. Lens distortion of `camera` is handled; nothing is resampled.
+struct TrainingView {
+  std::string name;  ///< names the file in errors
+  Camera camera;     ///< at the image's own size
+  Rigid3d cam_from_world;
+  /// Visible: CV_32FC3 in R, G, B order, 0..1 as stored (sRGB). Thermal: CV_32FC1 kelvin, NaN =
+  /// invalid pixel (never trained on). NaN in a visible image is an input error.
+  cv::Mat image;
+};
+
+/// Everything known of one modality. All views, points and depth maps share one world frame; the
+/// unit of length is free.
+struct Dataset {
+  Modality modality = Modality::visible;
+  /// Thermal samples are 8-bit intensities, not temperatures: only the output's label changes.
+  bool thermal_is_gray = false;
+  std::vector<TrainingView> views;
+  std::vector<SparsePoint> points;  ///< optional; Observation::view indexes `views`
+  std::vector<DepthMap> depth;      ///< optional; DepthMap::view indexes `views`
+
+  /// Names the view and the field that is malformed: sizes, types, cameras, poses, values.
+  Status validate() const;
+};
+
+/// 8-bit BGR (image_io) to the layout TrainingView wants, resized by area averaging if asked.
+cv::Mat rgb_of_bgr8(const cv::Mat& bgr8, cv::Size size = {});
+
+/// The view at another size: area-averaged image and matching camera.
+TrainingView resized(const TrainingView& view, int width, int height);
+
+}  // namespace orbitfuse::nerf

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/point_cloud.hpp"
+#include "core/progress.hpp"
+#include "core/reconstruction.hpp"
+#include "recon/nerf/dataset.hpp"
+#include "recon/nerf/field.hpp"
+#include "recon/nerf/options.hpp"
+
+// Radiance fields on the CPU: a multiresolution hash grid (Müller et al. 2022, "Instant neural
+// graphics primitives") with small MLPs, in contracted space (Barron et al. 2022, "Mip-NeRF 360").
+namespace orbitfuse::nerf {
+
+/// One point of the error-against-time curve.
+struct CurvePoint {
+  double cpu_s = 0, wall_s = 0;  ///< spent training, evaluation excluded
+  int step = 0;
+  double heldout_psnr = 0;  ///< dB; NaN without held-out views
+  double train_psnr = 0;    ///< dB, running mean over recent steps
+  double samples_per_ray = 0;
+};
+
+enum class StopReason { iterations, budget, target_psnr, plateau, cancelled };
+const char* name(StopReason reason);
+
+struct TrainReport {
+  int iterations = 0;
+  double cpu_s = 0, wall_s = 0;
+  StopReason stop = StopReason::iterations;
+  std::vector<CurvePoint> curve;
+  int best_step = 0;         ///< the step whose parameters the field holds
+  double best_psnr = 0;      ///< held-out, dB; NaN without held-out views
+  long rays = 0, samples = 0;
+  int skipped_steps = 0;     ///< steps dropped because a gradient was not finite
+  std::vector<std::string> heldout;  ///< names of the views that measured
+  std::vector<double> image_offsets_k;  ///< per training view (per_image_offset)
+  std::vector<Skip> skips;
+
+  /// "4000 steps, 62.1 CPU s, held-out 26.9 dB (step 3600), 17 samples a ray".
+  std::string brief() const;
+};
+
+/// Trains `field` from scratch, or on from its checkpoint (TrainOptions::resume), and leaves the
+/// best parameters in it. `guide` (same world frame) supplies geometry when
+/// options.shared_geometry is set. The same dataset, options and seed give the same field for any
+/// thread count on one instruction set, unless budget_s ends the run. Errors: usage (options),
+/// input (dataset, checkpoint), cancelled (a checkpoint is written first).
+Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
+                          const Progress& progress, Field& field, const Field* guide = nullptr);
+
+struct RenderOptions {
+  double stop_transmittance = 1e-3;  ///< a ray ends when less light than this is left
+  double step_px = 0;                ///< march step in pixel footprints; 0 = as trained
+  Status validate() const;
+};
+
+/// A rendered camera. Where opacity is below one half, depth is NaN (sky, background).
+struct RenderedView {
+  cv::Mat color;    ///< CV_32FC3 R, G, B in 0..1, or CV_32FC1 kelvin
+  cv::Mat depth;    ///< CV_32FC1, z along the optical axis, world units
+  cv::Mat opacity;  ///< CV_32FC1, 0..1
+};
+
+Result<RenderedView> render(const Field& field, const Camera& camera,
+                            const Rigid3d& cam_from_world, const RenderOptions& options,
+                            const Progress& progress);
+
+struct ExportOptions {
+  int max_width = 320;           ///< depth maps are rendered at this width
+  int min_consistent_views = 2;  ///< other views that must agree with a point's depth
+  double depth_tolerance = 0.01; ///< relative agreement
+  double max_distance = 3.0;     ///< from the field's centre, in field radii; sheds background
+  double voxel = 0.004;          ///< one point per cube of this size, in field radii; 0 = all
+  Status validate() const;
+};
+
+/// Points with normals from rendered depth, kept where other views agree; colours (visible) or
+/// temperatures (thermal).
+Result<PointCloud> export_point_cloud(const Field& field, const std::vector<PosedView>& views,
+                                      const ExportOptions& options, const Progress& progress);
+
+}  // namespace orbitfuse::nerf

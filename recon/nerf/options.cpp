@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/nerf/options.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <numeric>
+#include <sstream>
+#include <toml++/toml.h>
+#include <variant>
+
+namespace orbitfuse::nerf {
+namespace {
+
+using Member = std::variant<int TrainOptions::*, double TrainOptions::*, bool TrainOptions::*,
+                            std::uint64_t TrainOptions::*, std::string TrainOptions::*,
+                            std::filesystem::path TrainOptions::*, Sampling TrainOptions::*>;
+
+struct Entry {
+  const char* key;
+  Member member;
+  double low = 0, high = 1e30;
+};
+
+#define FIELD(member, ...) \
+  Entry { #member, &TrainOptions::member __VA_OPT__(, ) __VA_ARGS__ }
+
+const std::vector<Entry>& table() {
+  static const std::vector<Entry> entries = {
+      FIELD(preset),
+      FIELD(iterations, 1, 1e7),
+      FIELD(budget_s, 0),
+      FIELD(target_psnr, 0, 100),
+      FIELD(holdout_every, 0, 1e6),
+      FIELD(plateau_db, 0, 100),
+      FIELD(eval_count, 0, 10000),
+      FIELD(seed),
+      FIELD(checkpoint),
+      FIELD(checkpoint_every_s, 0),
+      FIELD(resume),
+      FIELD(levels, 1, 16),
+      FIELD(features_per_level, 2, 4),
+      FIELD(log2_table, 8, 22),
+      FIELD(base_resolution, 2, 1024),
+      FIELD(max_resolution, 4, 1 << 16),
+      FIELD(hidden, 16, 256),
+      FIELD(color_hidden, 16, 256),
+      FIELD(color_layers, 1, 2),
+      FIELD(sh_degree, 0, 4),
+      FIELD(sampling),
+      FIELD(samples_per_step, 256, 1 << 22),
+      FIELD(occupancy_resolution, 16, 256),
+      FIELD(occupancy_threshold, 0, 0.9),
+      FIELD(step_px, 0.1, 64),
+      FIELD(proposal_samples_1, 8, 1024),
+      FIELD(proposal_samples_2, 8, 1024),
+      FIELD(fine_samples, 4, 1024),
+      FIELD(learning_rate, 1e-6, 1),
+      FIELD(distortion_weight, 0, 100),
+      FIELD(depth_weight, 0, 1000),
+      FIELD(depth_end, 0, 1),
+      FIELD(depth_final_weight, 0, 1000),
+      FIELD(empty_weight, 0, 1000),
+      FIELD(opacity_entropy_weight, 0, 1000),
+      FIELD(near_gradient_m, 0, 1e9),
+      FIELD(min_views, 0, 1e6),
+      FIELD(carve),
+      FIELD(level_anneal_end, 0, 1),
+      FIELD(per_image_offset),
+      FIELD(shared_geometry),
+  };
+  return entries;
+}
+#undef FIELD
+
+std::size_t edit_distance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t above = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, diagonal + (a[i - 1] != b[j - 1])});
+      diagonal = above;
+    }
+  }
+  return row.back();
+}
+
+std::string nearest(const std::string& word, const std::vector<std::string>& known) {
+  return *std::min_element(known.begin(), known.end(), [&](const auto& a, const auto& b) {
+    return edit_distance(word, a) < edit_distance(word, b);
+  });
+}
+
+const Entry* find(const std::string& key) {
+  for (const Entry& entry : table())
+    if (key == entry.key) return &entry;
+  return nullptr;
+}
+
+template <class T>
+bool parse(const std::string& text, T& out) {
+  const char* end = text.data() + text.size();
+  const auto [ptr, error] = std::from_chars(text.data(), end, out);
+  return error == std::errc() && ptr == end;
+}
+
+bool assign(const std::string& text, bool& out) {
+  out = text == "true" || text == "1";
+  return out || text == "false" || text == "0";
+}
+bool assign(const std::string& text, int& out) { return parse(text, out); }
+bool assign(const std::string& text, double& out) { return parse(text, out); }
+bool assign(const std::string& text, std::uint64_t& out) { return parse(text, out); }
+bool assign(const std::string& text, std::string& out) { return out = text, true; }
+bool assign(const std::string& text, std::filesystem::path& out) { return out = text, true; }
+bool assign(const std::string& text, Sampling& out) {
+  out = text == "proposal" ? Sampling::proposal : Sampling::occupancy;
+  return text == "proposal" || text == "occupancy";
+}
+
+std::string text_of(bool value) { return value ? "true" : "false"; }
+std::string text_of(const std::filesystem::path& value) { return value.string(); }
+std::string text_of(Sampling value) { return value == Sampling::proposal ? "proposal" : "occupancy"; }
+template <class T>
+std::string text_of(const T& value) {
+  return fmt::format("{}", value);
+}
+
+}  // namespace
+
+Status TrainOptions::validate() const {
+  for (const Entry& entry : table()) {
+    double value = entry.low;
+    if (const auto* i = std::get_if<int TrainOptions::*>(&entry.member)) value = this->*(*i);
+    if (const auto* d = std::get_if<double TrainOptions::*>(&entry.member)) value = this->*(*d);
+    if (!(value >= entry.low && value <= entry.high))
+      return fail(ErrorKind::usage, fmt::format("nerf.{}", entry.key), fmt::format("{}", value),
+                  fmt::format("choose {}..{}", entry.low, entry.high));
+  }
+  if (features_per_level == 3)
+    return fail(ErrorKind::usage, "nerf.features_per_level", "3", "choose 2 or 4");
+  if (max_resolution < base_resolution)
+    return fail(ErrorKind::usage, "nerf.max_resolution", fmt::format("{}", max_resolution),
+                fmt::format("choose at least base_resolution ({})", base_resolution));
+  for (const int width : {hidden, color_hidden})
+    if (width % 16 != 0)
+      return fail(ErrorKind::usage, "nerf.hidden", fmt::format("{}", width),
+                  "choose a multiple of 16");
+  if (resume && checkpoint.empty())
+    return fail(ErrorKind::usage, "nerf.resume", "no checkpoint named", "set nerf.checkpoint");
+  return {};
+}
+
+Status TrainOptions::set(const std::string& key, const std::string& value) {
+  const Entry* entry = find(key);
+  if (!entry)
+    return fail(ErrorKind::usage, "nerf." + key, "unknown key",
+                "did you mean nerf." + nearest(key, keys()) + "?");
+  const bool ok = std::visit([&](auto member) { return assign(value, this->*member); },
+                             entry->member);
+  if (!ok) return fail(ErrorKind::usage, "nerf." + key, "'" + value + "'", "give a valid value");
+  return {};
+}
+
+std::string TrainOptions::get(const std::string& key) const {
+  const Entry* entry = find(key);
+  return entry ? std::visit([&](auto member) { return text_of(this->*member); }, entry->member)
+               : std::string();
+}
+
+std::vector<std::string> TrainOptions::keys() {
+  std::vector<std::string> out;
+  for (const Entry& entry : table()) out.emplace_back(entry.key);
+  return out;
+}
+
+std::string default_preset(Modality modality) {
+  return modality == Modality::visible ? "fast-visible" : "fast-thermal";
+}
+
+std::vector<std::string> preset_names() {
+  return {"fast-visible", "fast-thermal", "nerfacto", "nerf-rgb", "nerf-ir"};
+}
+
+Result<TrainOptions> preset(const std::string& name) {
+  TrainOptions o;
+  o.preset = name;
+  if (name == "fast-visible") return o;
+  if (name == "fast-thermal") {
+    // As published for NeRF-IR: a stronger distortion loss and a smaller output branch.
+    o.distortion_weight = 0.01;
+    o.color_hidden = 32;
+    o.sh_degree = 0;  // emitted heat hardly depends on the direction
+    o.per_image_offset = true;
+    return o;
+  }
+  // The published trainers: proposal sampling, 16 levels, 2^19 entries, a deeper colour network.
+  o.sampling = Sampling::proposal;
+  o.iterations = 30000;
+  o.levels = 16;
+  o.features_per_level = 2;
+  o.log2_table = 19;
+  o.max_resolution = 2048;
+  o.color_layers = 2;
+  o.sh_degree = 4;
+  o.samples_per_step = 4096 * 48;
+  o.depth_weight = 0;
+  o.carve = false;
+  o.min_views = 0;
+  if (name == "nerfacto") return o;
+  if (name == "nerf-rgb") {
+    o.hidden = 128;
+    o.color_hidden = 128;
+    o.features_per_level = 4;
+    o.proposal_samples_2 = 128;
+    o.fine_samples = 64;
+    o.samples_per_step = 4096 * 64;
+    return o;
+  }
+  if (name == "nerf-ir") {
+    o.color_hidden = 32;
+    o.proposal_samples_1 = 128;
+    o.proposal_samples_2 = 64;
+    o.fine_samples = 32;
+    o.distortion_weight = 0.01;
+    o.samples_per_step = 4096 * 32;
+    return o;
+  }
+  return fail(ErrorKind::usage, "nerf.preset", "'" + name + "'",
+              "did you mean " + nearest(name, preset_names()) + "?");
+}
+
+Result<TrainOptions> load_options(const std::filesystem::path& file) {
+  toml::table config;
+  try {
+    config = toml::parse_file(file.string());
+  } catch (const toml::parse_error& error) {
+    return fail(ErrorKind::usage, file.string(),
+                fmt::format("line {}: {}", error.source().begin.line, error.description()),
+                "correct the TOML");
+  }
+  ORBITFUSE_ASSIGN(TrainOptions options,
+                   preset(config["preset"].value_or(std::string("fast-visible"))));
+  for (const auto& [key, node] : config) {
+    std::ostringstream text;
+    if (const auto* string = node.as_string()) {
+      text << string->get();
+    } else {
+      node.visit([&](const auto& value) { text << value; });
+    }
+    ORBITFUSE_TRY(options.set(std::string(key.str()), text.str()));
+  }
+  ORBITFUSE_TRY(options.validate());
+  return options;
+}
+
+}  // namespace orbitfuse::nerf

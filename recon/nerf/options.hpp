@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/modality.hpp"
+#include "core/result.hpp"
+
+namespace orbitfuse::nerf {
+
+enum class Sampling { occupancy, proposal };
+
+/// How a field is trained. Start from preset(); change fields by name with set() or in TOML.
+struct TrainOptions {
+  std::string preset = "fast-visible";
+
+  // -- when to stop --------------------------------------------------------------------------
+  int iterations = 4000;     ///< hard end; the learning rate is annealed over these
+  double budget_s = 0;       ///< wall-clock limit, 0 = none; the schedule is fitted to it
+  double target_psnr = 0;    ///< stop when the held-out PSNR reaches it, 0 = never
+  int holdout_every = 0;     ///< every n-th view measures and does not train; 0 = none
+  double plateau_db = 0;     ///< stop when held-out PSNR is this far below its best; 0 = never
+  int eval_count = 8;        ///< held-out evaluations over the run (0 = only the last)
+
+  // -- determinism, checkpoints --------------------------------------------------------------
+  std::uint64_t seed = 1;
+  std::filesystem::path checkpoint;  ///< written atomically; empty = no checkpoints
+  double checkpoint_every_s = 60;    ///< also written on cancel and at the end
+  bool resume = false;               ///< go on from `checkpoint` if it exists
+
+  // -- field ---------------------------------------------------------------------------------
+  int levels = 8;              ///< hash-grid resolutions
+  int features_per_level = 4;  ///< 2 or 4
+  int log2_table = 15;         ///< entries per level; 15 stays in the L2 cache
+  int base_resolution = 16;
+  int max_resolution = 1024;   ///< cells over the contracted scene, finest level
+  int hidden = 64;             ///< width of the density network
+  int color_hidden = 64;       ///< width of the colour (temperature) network
+  int color_layers = 1;        ///< hidden layers of the colour network
+  int sh_degree = 3;           ///< direction encoding: 0 (none) to 4 bands
+
+  // -- sampling ------------------------------------------------------------------------------
+  Sampling sampling = Sampling::occupancy;
+  int samples_per_step = 1 << 15;        ///< rays per step adapt to this
+  int occupancy_resolution = 128;        ///< cells per axis of each cascade
+  double occupancy_threshold = 0.03;     ///< opacity of one step below which a cell is empty
+  double step_px = 2.0;                  ///< march step in pixel footprints
+  int proposal_samples_1 = 256, proposal_samples_2 = 96;  ///< per ray (Sampling::proposal)
+  int fine_samples = 48;
+
+  // -- losses --------------------------------------------------------------------------------
+  double learning_rate = 1e-2;
+  double distortion_weight = 0.002;  ///< Mip-NeRF 360, eq. 15
+  double depth_weight = 0.05;        ///< SfM and dense depth, annealed
+  double depth_end = 0.5;            ///< fraction of the run at which depth_weight reaches its end
+  double depth_final_weight = 0.0;   ///< what remains of depth_weight after depth_end
+  double empty_weight = 0.0;         ///< density between a camera and a known depth
+  double opacity_entropy_weight = 0; ///< pushes ray opacities to 0 or 1
+  double near_gradient_m = 0;        ///< Floaters No More: gradients fade below this fraction
+  double min_views = 2;              ///< cells seen by fewer training views are empty
+  bool carve = true;                 ///< cells in front of known depth start empty
+  double level_anneal_end = 0;       ///< fraction of the run by which the finest level is on; 0 = off
+  bool per_image_offset = false;     ///< thermal drift: one offset per frame, mean zero
+  bool shared_geometry = false;      ///< use the guide field's density (train()'s argument)
+
+  Status validate() const;
+  /// Sets one field from text, e.g. set("iterations", "2000"); an unknown key is a usage error
+  /// with the nearest known one.
+  Status set(const std::string& key, const std::string& value);
+  std::string get(const std::string& key) const;
+  static std::vector<std::string> keys();
+};
+
+/// "fast-visible", "fast-thermal", and as published: "nerfacto", "nerf-rgb", "nerf-ir".
+Result<TrainOptions> preset(const std::string& name);
+std::vector<std::string> preset_names();
+std::string default_preset(Modality modality);
+
+/// A TOML file: optional `preset = "..."`, then fields by name.
+Result<TrainOptions> load_options(const std::filesystem::path& toml);
+
+}  // namespace orbitfuse::nerf
