@@ -36,14 +36,18 @@ std::vector<Parameters*> FieldState::parameters() {
   return all;
 }
 
+std::vector<DensityNetwork*> FieldState::density_networks() {
+  std::vector<DensityNetwork*> all{&main};
+  for (DensityNetwork& p : proposals) all.push_back(&p);
+  return all;
+}
+
 void FieldState::refresh() {
-  main.grid.refresh_half();
-  main.mlp.refresh();
-  color.refresh();
-  for (DensityNetwork& p : proposals) {
-    p.grid.refresh_half();
-    p.mlp.refresh();
+  for (DensityNetwork* network : density_networks()) {
+    network->grid.refresh_half();
+    network->mlp.refresh();
   }
+  color.refresh();
 }
 
 Snapshot FieldState::snapshot(double psnr) {

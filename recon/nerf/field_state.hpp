@@ -50,6 +50,7 @@ struct FieldState {
 
   int step = 0;
   int rays_per_step = 0;
+  float stretch = 4;     ///< training steps are this much longer than cone says
   double train_psnr = 0, samples_per_ray = 0;
   double spent_cpu_s = 0, spent_wall_s = 0;
   Snapshot best;
@@ -58,6 +59,7 @@ struct FieldState {
   void create(const TrainOptions& with, Modality what, int view_count);
   /// All trainable sets in a fixed order.
   std::vector<Parameters*> parameters();
+  std::vector<DensityNetwork*> density_networks();  ///< the main one, then the proposals
   void refresh();  ///< derived layouts after parameters changed
   Snapshot snapshot(double psnr);
   void restore(const Snapshot& from);

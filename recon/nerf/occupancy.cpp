@@ -98,14 +98,18 @@ int march(const Occupancy& occupancy, const Ray& ray, const MarchSettings& setti
     t = std::max(t, gap * std::abs(inverse[d]) * 1.0001f);
   }
   while (count < settings.max_samples) {
-    const float dt = std::max(settings.dt_min, settings.cone * t);
+    float dt = std::max(settings.dt_min, settings.cone * t);
     const float middle = t + 0.5f * dt;
     float x[3];
     for (int d = 0; d < 3; ++d) x[d] = ray.origin[d] + middle * ray.direction[d];
     const int cascade = Occupancy::cascade_of(x);
     if (cascade >= occupancy.cascades) break;
-    if (Occupancy::test(occupancy.on, occupancy.cell_of(cascade, x))) {
-      t_out[count] = middle;
+    const std::int64_t cell = occupancy.cell_of(cascade, x);
+    if (Occupancy::test(occupancy.on, cell)) {
+      if (settings.stretch > 1 && occupancy.density[static_cast<std::size_t>(cell)] *
+                                          occupancy.cell_size(cascade) < surface_opacity)
+        dt *= settings.stretch;
+      t_out[count] = t + 0.5f * dt;
       dt_out[count++] = dt;
       t += dt;
       continue;

@@ -49,12 +49,16 @@ struct Occupancy {
 struct MarchSettings {
   float cone = 0.005f;     ///< step length per distance
   float dt_min = 0.001f;
-  float near = 0.01f;
+  float near = 0.1f;
+  float stretch = 1;       ///< steps are this much longer where no surface is expected
   int max_samples = 1024;
 };
 
-/// Steps along the ray through cells that are on. Calls nothing outside them; positions are
-/// normalised. Returns the number of samples written to t (midpoints) and dt.
+/// Opacity of a cell, as its best view sees it, from which a surface is expected in it.
+inline constexpr float surface_opacity = 0.05f;
+
+/// Steps along the ray through cells that are on: finely where a surface is expected, by
+/// `stretch` longer steps in haze. Returns the number of samples written to t (midpoints) and dt.
 int march(const Occupancy& occupancy, const Ray& ray, const MarchSettings& settings, float jitter,
           float* t, float* dt);
 

@@ -59,9 +59,7 @@ void Trainer::draw(Block& block, int begin, int end, double progress) {
   block.targets.clear();
   MarchSettings settings = field_.march_settings();
   // Adaptive step: while space is not carved yet, rays cross much of it in longer steps.
-  const float stretch = static_cast<float>(std::clamp(field_.samples_per_ray / 48.0, 1.0, 6.0));
-  settings.cone *= stretch;
-  settings.dt_min *= stretch;
+  settings.stretch = field_.stretch;
   settings.max_samples = 512;
   for (int i = begin; i < end; ++i) {
     for (int attempt = 0; attempt < 8; ++attempt) {
@@ -100,6 +98,8 @@ bool Trainer::step(double progress) {
   const int rays = field_.rays_per_step;
   const int count = (rays + rays_per_block - 1) / rays_per_block;
   if (static_cast<int>(blocks_.size()) < count) blocks_.resize(static_cast<std::size_t>(count));
+  for (std::size_t b = static_cast<std::size_t>(count); b < blocks_.size(); ++b)
+    blocks_[b].rays.clear();
   if (o.level_anneal_end > 0) {
     const double on = progress / o.level_anneal_end * o.levels;
     for (std::size_t l = 0; l < field_.main.grid.levels.size(); ++l)
@@ -148,6 +148,9 @@ bool Trainer::step(double progress) {
   const double per_ray = static_cast<double>(samples) / static_cast<double>(std::max(1l, drawn));
   field_.samples_per_ray =
       field_.step == 0 ? per_ray : 0.9 * field_.samples_per_ray + 0.1 * per_ray;
+  // Steps lengthen until a ray takes about samples_per_ray_target samples, and shorten again.
+  const double ratio = field_.samples_per_ray / 40.0;
+  field_.stretch = std::clamp(field_.stretch * static_cast<float>(std::pow(ratio, 0.1)), 1.0f, 16.0f);
   field_.rays_per_step = std::clamp(
       static_cast<int>(o.samples_per_step / std::max(1.0, field_.samples_per_ray)), 128, 16384);
   if (finite) update_occupancy(progress);
@@ -163,8 +166,6 @@ void Trainer::apply(const AdamStep& adam, const BlockGradients& gradients) {
     if (grid.level_weight[static_cast<std::size_t>(l)] <= 0) return;
     const auto offset = static_cast<std::size_t>(level.offset);
     float* grad = grid.table.grad.data() + offset;
-    const int count = (field_.rays_per_step + rays_per_block - 1) / rays_per_block;
-    static_cast<void>(count);
     for (const Block& block : blocks_) {
       const int n = block.rays.samples();
       if (n == 0) continue;
@@ -204,19 +205,21 @@ void Trainer::update_occupancy(double progress) {
   for (const Block& block : blocks_) {
     const RayBlock& b = block.rays;
     for (std::size_t r = 0; r < b.rays.size(); ++r)
-      for (int i = b.first[r]; i < b.first[r] + b.used[r]; ++i)
-        field_.occupancy.record(&b.position[static_cast<std::size_t>(3 * i)],
-                                b.sigma[static_cast<std::size_t>(i)]);
+      for (int i = b.first[r]; i < b.first[r] + b.used[r]; ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        const float before = i > b.first[r] ? b.light[k - 1] : 1.0f;
+        field_.occupancy.record(&b.position[3 * k], before * b.sigma[k]);
+      }
   }
   if (field_.step < occupancy_warmup || field_.step % occupancy_every != 0) return;
   // Relaxed late, so that nothing thin is lost once geometry has settled.
   const double threshold = field_.options.occupancy_threshold * (progress < 0.6 ? 1.0 : 0.3);
-  probe_cells(static_cast<float>(threshold));
+  probe_cells();
   field_.occupancy.update(0.95f, static_cast<float>(threshold), field_.march_settings().dt_min * 10);
 }
 
 /// Brings cells back: neighbours of occupied cells whose density is above the threshold.
-void Trainer::probe_cells(float) {
+void Trainer::probe_cells() {
   Occupancy& grid = field_.occupancy;
   constexpr int probes = 4096;
   std::vector<float> position, sigma(probes);

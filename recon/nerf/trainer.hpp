@@ -34,7 +34,7 @@ class Trainer {
   void draw(Block& block, int begin, int end, double progress);
   void apply(const AdamStep& adam, const BlockGradients& gradients);
   void update_occupancy(double progress);
-  void probe_cells(float decay_free_threshold);
+  void probe_cells();
 
   FieldState& field_;
   const std::vector<SceneView>& views_;
