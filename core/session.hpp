@@ -41,6 +41,13 @@ struct Station {
   double azimuth_sigma_deg = 5, elevation_sigma_deg = 5;
 };
 
+/// Measured when the frame was recorded; guides the operator and the choice of frames.
+struct FrameQuality {
+  double sharpness = 0;            ///< variance of the Laplacian over the variance of the image
+  double mean_level = 0;           ///< visible: 0..255; thermal: kelvin
+  double clipped_fraction = 0;     ///< of samples at either end of the range
+};
+
 struct FrameRecord {
   Modality modality = Modality::visible;
   std::string device;
@@ -56,6 +63,8 @@ struct FrameRecord {
   std::string content_hash;             ///< of the file's bytes
   std::optional<Rigid3d> cam_from_world;  ///< known pose; all of a session share one world
   std::optional<Camera> camera;           ///< known intrinsics of this frame
+  std::string source;                     ///< original file name of an imported frame
+  std::optional<FrameQuality> quality;
 
   bool has_flag(const std::string& flag) const;
 };
@@ -67,6 +76,22 @@ struct GapRecord {
   std::string reason;
 };
 
+/// What happened to every id of a device's stream in one recording:
+/// received + lost == last_sequence - first_sequence + 1, exactly.
+struct StreamRecord {
+  std::string device;
+  std::uint64_t first_sequence = 0, last_sequence = 0;
+  std::uint64_t received = 0;  ///< frames whose file is on disk
+  std::uint64_t lost = 0;      ///< in the network, rejected as damaged, or dropped by policy
+};
+
+/// Something worth knowing later: "nuc", "reconnected", "clock", "resumed".
+struct EventRecord {
+  std::string device;  ///< empty: the whole session
+  std::int64_t host_time_ns = 0;
+  std::string kind, detail;
+};
+
 struct Session {
   std::filesystem::path folder;
   std::string id, created;              ///< created: ISO 8601 UTC
@@ -74,6 +99,8 @@ struct Session {
   std::vector<DeviceInfo> devices;
   std::vector<FrameRecord> frames;      ///< in recording order
   std::vector<GapRecord> gaps;
+  std::vector<StreamRecord> streams;
+  std::vector<EventRecord> events;
   bool complete = false;                ///< the recorder closed it properly
   std::vector<std::string> warnings;    ///< e.g. a cut last manifest line, a missing file
 
@@ -91,6 +118,8 @@ std::string manifest_header_line(const Session& session);
 std::string manifest_line(const DeviceInfo& device);
 std::string manifest_line(const FrameRecord& frame);
 std::string manifest_line(const GapRecord& gap);
+std::string manifest_line(const StreamRecord& stream);
+std::string manifest_line(const EventRecord& event);
 std::string manifest_end_line(const Session& session);
 
 }  // namespace orbitfuse

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/camera.hpp"
+#include "core/result.hpp"
+#include "core/session.hpp"
+
+// The seam to hardware. A driver implements four functions: describe, start, next, stop.
+namespace orbitfuse {
+
+/// One frame as a driver delivers it. Either `encoded` holds a whole file (JPEG, PNG, TIFF),
+/// which is stored byte for byte, or `pixels` holds samples, which are stored without loss:
+/// CV_8UC3 BGR or CV_8UC1 for visible, CV_16UC1 centikelvin (0 = invalid) or CV_8UC1 for thermal.
+struct Frame {
+  std::uint64_t id = 0;             ///< the device's own count, unwrapped; a gap = lost frames
+  std::int64_t host_time_ns = 0;    ///< UTC epoch at arrival; 0 = unknown
+  std::int64_t device_time_ns = 0;  ///< device clock; 0 = unknown
+  std::string encoded, extension;   ///< extension with its dot, e.g. ".jpg"
+  cv::Mat pixels;
+  std::optional<Station> station;
+  bool tracking = false;
+  bool thermal_is_gray = false;     ///< 8-bit thermal: no temperatures
+  std::vector<std::string> flags;
+  std::optional<Rigid3d> cam_from_world;
+  std::optional<Camera> camera;
+  std::string source;               ///< original file name, if there was one
+};
+
+/// What next() brought.
+struct Delivery {
+  enum class Kind {
+    frame,     ///< a good frame
+    rejected,  ///< the frame with this id arrived damaged; `reason` says how
+    event,     ///< `reason` is the event's kind ("nuc", "reconnected"), `detail` its text
+    timeout,   ///< nothing within the time given; the stream goes on
+    end,       ///< the stream is over (replay, synthetic)
+  };
+  Kind kind = Kind::timeout;
+  Frame frame;          ///< kind frame; of a rejected one only the id
+  std::string reason;
+  std::string detail;
+};
+
+/// One camera. start, next and stop are called from one thread, describe from any thread after
+/// the constructor; stop is idempotent and is called even when start failed.
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+
+  virtual DeviceInfo describe() const = 0;
+  /// Opens the stream; device error naming what is wrong and what to do.
+  virtual Status start() = 0;
+  /// Waits at most `timeout`. An error ends the stream; damage to single frames is not an error
+  /// but a `rejected` delivery. Ids rise strictly.
+  virtual Result<Delivery> next(std::chrono::milliseconds timeout) = 0;
+  virtual void stop() = 0;
+};
+
+}  // namespace orbitfuse

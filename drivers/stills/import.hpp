@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/progress.hpp"
+#include "core/result.hpp"
+#include "core/session.hpp"
+
+// Makes a session from files that other cameras and tools left. docs/formats.md lists the sources.
+namespace orbitfuse {
+
+/// How thermal samples become temperatures.
+enum class ThermalScale {
+  automatic,    ///< radiometric JPEG; the TIFF's own tag or sidecar; else centikelvin if plausible,
+                ///< else raw counts; 8-bit images are grey
+  centikelvin,  ///< T[K] = 0.01 DN
+  linear,       ///< T[K] = kelvin_per_count DN + kelvin_offset
+  raw_counts,   ///< 16-bit without a known scale: kept as grey intensities, never as temperatures
+};
+
+/// Replaces object parameters written in FLIR radiometric JPEGs. Absent = as in the file.
+struct ObjectParameterOverrides {
+  std::optional<double> emissivity;              ///< 0 < e <= 1
+  std::optional<double> distance_m;              ///< >= 0
+  std::optional<double> reflected_temperature_k;
+  std::optional<double> atmospheric_temperature_k;
+  std::optional<double> relative_humidity;       ///< 0..1
+};
+
+/// The user's word that the frames, in capture order, were taken at nominal stations.
+/// Azimuths then start at 0 in each modality: where each orbit began is unknown.
+struct DeclaredStations {
+  double spacing_deg = 30;
+  int loops = 1;
+  std::vector<double> elevations_deg;   ///< one per loop; empty = unknown (wide sigma)
+  double azimuth_sigma_deg = 8;         ///< of a station about its nominal place
+};
+
+struct ImportOptions {
+  /// Folders or files. A folder is read without its sub-folders, sorted by time, then name.
+  std::vector<std::filesystem::path> visible, thermal;
+  /// Thermal (or visible) frames recorded between stations; stored with tracking = true.
+  std::vector<std::filesystem::path> visible_tracking, thermal_tracking;
+
+  /// Radiometric JPEGs given as `thermal` also bring their embedded photo as a visible frame.
+  bool embedded_visible = false;
+
+  /// Known poses and intrinsics; at most one per modality. The images named there are matched
+  /// with the frames by file name; with no `visible` given, transforms.json lists the images too.
+  std::optional<std::filesystem::path> transforms_json;
+  std::optional<std::filesystem::path> visible_colmap, thermal_colmap;
+  /// orbits/container/ground_truth.json: K and c2w of both modalities.
+  std::optional<std::filesystem::path> ground_truth;
+  /// From `ground_truth`: take stations (az, el) as what an operator would know, and the focal
+  /// length as a prior, but not the poses.
+  bool ground_truth_stations_only = false;
+
+  std::optional<DeclaredStations> visible_stations, thermal_stations;
+
+  ThermalScale thermal_scale = ThermalScale::automatic;
+  double kelvin_per_count = 0.01;  ///< for ThermalScale::linear
+  double kelvin_offset = 0;
+  ObjectParameterOverrides object;
+
+  /// Focal length priors in pixels where the files have none.
+  std::optional<double> visible_focal_px, thermal_focal_px;
+
+  Status validate() const;
+};
+
+struct ImportReport {
+  Session session;                    ///< as opened again from disk
+  int visible = 0, thermal = 0, tracking = 0;
+  int with_pose = 0, with_station = 0;
+  bool has_temperatures = false;
+  std::vector<std::string> warnings;  ///< files passed over and why, priors missing, ...
+};
+
+/// Imports into a new session folder (which must not exist or be empty). Photos are copied byte
+/// for byte; thermal images become 16-bit centikelvin TIFF (or stay 8-bit grey). A file that can't
+/// be read is left out with a warning; the import fails only when nothing is left.
+Result<ImportReport> import_session(const ImportOptions& options,
+                                    const std::filesystem::path& session_folder,
+                                    const Progress& progress = {});
+
+}  // namespace orbitfuse
