@@ -164,6 +164,13 @@ std::string Runner::why_run(const Stage& stage, const Key& key,
   return damage(options_.out / stage.name, *record);
 }
 
+StageContext Runner::context(fs::path folder, bool resume) const {
+  StageContext context{.out = options_.out, .folder = std::move(folder), .resume = resume,
+                       .progress = progress_, .finished = {}, .earlier = &statuses_};
+  for (const auto& [name, hash] : outputs_) context.finished.insert(name);
+  return context;
+}
+
 StageStatus Runner::visit(const Stage& stage) {
   StageStatus status;
   status.stage = stage.name;
@@ -173,9 +180,7 @@ StageStatus Runner::visit(const Stage& stage) {
     return is_done(name) && outputs_.at(name) == "planned";
   };
 
-  StageContext look{.out = options_.out, .folder = {}, .resume = false, .progress = progress_,
-                    .finished = {}};
-  for (const auto& [name, hash] : outputs_) look.finished.insert(name);
+  const StageContext look = context({}, false);
   bool unknown = false;
   for (const auto* list : {&stage.needs, &stage.uses})
     for (const std::string& name : *list) unknown = unknown || planned(name);
@@ -239,10 +244,7 @@ StageStatus Runner::execute(const Stage& stage, const Key& key, std::string why)
     if (!resume) ORBITFUSE_TRY(remove_tree(folder));
     ORBITFUSE_TRY(make_folder(folder));
     ORBITFUSE_TRY(write_attempt(attempt_path, attempt));
-    StageContext context{.out = options_.out, .folder = folder, .resume = resume,
-                         .progress = progress_, .finished = {}};
-    for (const auto& [name, hash] : outputs_) context.finished.insert(name);
-    return stage.run(context);
+    return stage.run(context(folder, resume));
   };
   auto result = work();
   attempt.cpu_s += clock.cpu_s();

@@ -36,9 +36,6 @@ class Runner {
 
   /// Called when a stage starts (state planned) and when its state is known.
   std::function<void(const StageStatus&)> on_status = [](const StageStatus&) {};
-  /// Statuses so far, for stages with `always` (the report).
-  const std::vector<StageStatus>& statuses() const { return statuses_; }
-
   RunSummary run();
 
  private:
@@ -49,6 +46,7 @@ class Runner {
 
   bool wanted(const std::string& stage) const;
   Key key_of(const Stage& stage) const;
+  StageContext context(std::filesystem::path folder, bool resume) const;
   StageStatus visit(const Stage& stage);
   StageStatus execute(const Stage& stage, const Key& key, std::string why);
   std::string why_run(const Stage& stage, const Key& key, const Result<StageRecord>& record) const;
