@@ -19,6 +19,9 @@ Result<std::string> read_file(const std::filesystem::path& path);
 /// free space found) when the disk is full; the old file is then intact.
 Status write_file_atomic(const std::filesystem::path& path, std::string_view bytes);
 
+/// Makes renames and new files in the folder survive a power cut.
+Status sync_folder(const std::filesystem::path& folder);
+
 /// 128-bit content hash (XXH3), hex. Not for security.
 std::string content_hash(std::string_view bytes);
 Result<std::string> file_hash(const std::filesystem::path& path);

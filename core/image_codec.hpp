@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "core/result.hpp"
+
+// Codecs on bytes; image_io.hpp works on files. `where` names the file in errors.
+namespace orbitfuse {
+
+enum class ImageFormat { jpeg, png, tiff, bmp, unknown };
+ImageFormat image_format(std::string_view bytes);
+const char* name(ImageFormat format);
+
+/// As stored, without EXIF orientation: CV_8U/CV_16U, 1 or 3 channels (BGR; alpha is dropped).
+/// A truncated or damaged file is an input error, even where a decoder would fill in grey.
+Result<cv::Mat> decode_image(std::string_view bytes, const std::string& where);
+
+/// Stored to upright for EXIF orientation 1..8.
+cv::Mat apply_orientation(const cv::Mat& image, int orientation);
+
+/// T[K] = scale DN + offset, from a TIFF's ImageDescription or a sidecar's text.
+struct ThermalScaleTag {
+  double scale = 0.01, offset = 0;
+};
+std::optional<ThermalScaleTag> thermal_scale_of_json(std::string_view json);
+
+/// First page: 8/16-bit unsigned or 32-bit float samples, one channel or RGB (returned as BGR).
+Result<cv::Mat> decode_tiff(std::string_view bytes, const std::string& where,
+                            std::string* image_description = nullptr);
+/// CV_16UC1 or CV_32FC1, deflate with the fitting predictor (lossless).
+Result<std::string> encode_tiff(const cv::Mat& image, const std::string& image_description);
+Result<cv::Mat> decode_jpeg(std::string_view bytes, const std::string& where);
+Result<std::string> encode_png(const cv::Mat& image);
+Result<std::string> encode_jpeg(const cv::Mat& image, int quality);
+
+/// The thermal TIFF of a session from CV_16UC1 centikelvin, and its sidecar's text.
+Result<std::string> encode_thermal_tiff(const cv::Mat& centikelvin);
+std::string thermal_sidecar_json();
+
+/// A bigger image is refused before memory is taken for it.
+inline constexpr long long max_image_samples = 400'000'000;
+
+}  // namespace orbitfuse
