@@ -109,6 +109,9 @@ Status Settings::read_toml(const std::filesystem::path& file) {
     return fail(ErrorKind::usage, fmt::format("{}:{}", file.string(), e.source().begin.line),
                 std::string(e.description()), "write it as TOML, e.g. budget_s = 60.0");
   }
+  // A preset sets many fields, which the other keys then change.
+  std::stable_partition(entries.begin(), entries.end(),
+                        [](const Entry& e) { return e.key.ends_with(".preset"); });
   for (const Entry& e : entries)
     ORBITFUSE_TRY(set(e.key, e.value, fmt::format("{}:{}", file.string(), e.line)));
   return {};
@@ -137,15 +140,19 @@ json Settings::to_json(const std::string& prefix) const {
 }
 
 std::string Settings::to_toml() const {
-  std::string text, table;
+  std::vector<std::pair<std::string, std::string>> tables;  // TOML wants each table once
   for (const Setting& s : list_) {
+    if (!s.listed) continue;
     const std::size_t dot = s.key.rfind('.');
-    const std::string in = dot == std::string::npos ? "" : s.key.substr(0, dot);
-    if (in != table) text += fmt::format("\n[{}]\n", in);
-    table = in;
-    text += fmt::format("# {} ({})\n{} = {}\n", s.doc, s.type, s.key.substr(in.empty() ? 0 : dot + 1),
-                        toml_text(s.get()));
+    const std::string table = dot == std::string::npos ? "" : s.key.substr(0, dot);
+    auto it = std::find_if(tables.begin(), tables.end(),
+                           [&](const auto& entry) { return entry.first == table; });
+    if (it == tables.end()) it = tables.insert(tables.end(), {table, ""});
+    it->second += fmt::format("# {} ({})\n{} = {}\n", s.doc, s.type,
+                              s.key.substr(table.empty() ? 0 : dot + 1), toml_text(s.get()));
   }
+  std::string text;
+  for (const auto& [table, lines] : tables) text += fmt::format("\n[{}]\n{}", table, lines);
   return text;
 }
 

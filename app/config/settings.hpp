@@ -22,6 +22,7 @@ struct Setting {
   std::string type; ///< "integer", "number", "true or false", "text", or the allowed words
   std::function<nlohmann::json()> get;
   std::function<bool(const nlohmann::json&)> set;  ///< false: not of the type
+  bool listed = true;  ///< in the TOML reference; a preset's fields are not
 };
 
 /// The configuration as a list of keys: read from TOML, overridden by --set, written into every
@@ -32,12 +33,14 @@ class Settings {
   void add(std::string key, T& field, std::string doc) {
     list_.push_back({std::move(key), std::move(doc), type_name<T>(),
                      [&field] { return value_of(field); },
-                     [&field](const nlohmann::json& j) { return assign(field, j); }});
+                     [&field](const nlohmann::json& j) { return assign(field, j); }, true});
   }
   /// An enum, written as one of `words` (value, word).
   template <class E>
   void add_choice(std::string key, E& field, std::vector<std::pair<E, std::string>> words,
                   std::string doc);
+
+  void add(Setting setting) { list_.push_back(std::move(setting)); }
 
   const std::vector<Setting>& list() const { return list_; }
 
@@ -104,7 +107,7 @@ void Settings::add_choice(std::string key, E& field, std::vector<std::pair<E, st
                          return true;
                        }
                      return false;
-                   }});
+                   }, true});
 }
 
 /// The known word that takes the fewest edits from `word`, when that is few enough to be a slip.

@@ -13,7 +13,7 @@ namespace orbitfuse::pipeline {
 
 struct RunOptions {
   std::filesystem::path out;         ///< holds one folder a stage
-  std::vector<std::string> targets;  ///< stages wanted, with all they read; empty = all
+  std::vector<std::string> targets = {}; ///< stages wanted, with all they read; empty = all
   bool force = false;                ///< run the targets although they are unchanged
   bool resume = false;               ///< go on from an interrupted attempt where its key matches
   bool dry_run = false;              ///< say what would run, write nothing

@@ -62,15 +62,15 @@ struct StageContext {
 struct Stage {
   std::string name;                ///< folder under out/
   int version = 1;                 ///< raised when the same inputs give another result
-  std::vector<std::string> needs;  ///< can't run without these
-  std::vector<std::string> uses;   ///< read when there; their absence changes the result
-  nlohmann::json options;          ///< every resolved option that the result depends on
-  std::string inputs_hash;         ///< of what it reads from outside out/ (session frames, files)
+  std::vector<std::string> needs = {};  ///< can't run without these
+  std::vector<std::string> uses = {};   ///< read when there; their absence changes the result
+  nlohmann::json options = {};         ///< every resolved option that the result depends on
+  std::string inputs_hash = {};        ///< of what it reads from outside out/ (session frames, files)
   /// Runs again although nothing changed (the report describes this very run).
   bool always = false;
   /// A reason why the data give this stage nothing to do ("the session has no thermal frames").
-  std::function<std::optional<std::string>(const StageContext&)> absent;
-  std::function<Result<StageOutput>(const StageContext&)> run;
+  std::function<std::optional<std::string>(const StageContext&)> absent = {};
+  std::function<Result<StageOutput>(const StageContext&)> run = {};
 };
 
 }  // namespace orbitfuse::pipeline
