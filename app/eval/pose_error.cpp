@@ -15,14 +15,14 @@ Result<Similarity3d> truth_from_estimate(const std::vector<PosePair>& pairs) {
   if (n < 3)
     return fail(ErrorKind::input, "ground truth", fmt::format("{} views in common", n),
                 "a similarity fit needs at least three posed views that the truth names");
-  Eigen::MatrixXd estimate(3, n), truth(3, n);  // fixed rows make GCC 12 warn inside Eigen
+  Eigen::Matrix3Xd estimate(3, n), truth(3, n);
   for (Eigen::Index i = 0; i < n; ++i) {
     estimate.col(i) = camera_center(pairs[static_cast<std::size_t>(i)].cam_from_estimate);
     truth.col(i) = camera_center(pairs[static_cast<std::size_t>(i)].cam_from_truth);
   }
-  for (const Eigen::MatrixXd* centers : {&estimate, &truth}) {
-    const Eigen::MatrixXd centered = centers->colwise() - centers->rowwise().mean();
-    const Eigen::VectorXd spread = centered.jacobiSvd().singularValues();
+  for (const Eigen::Matrix3Xd* centers : {&estimate, &truth}) {
+    const Eigen::Matrix3Xd centered = centers->colwise() - centers->rowwise().mean();
+    const Eigen::Vector3d spread = centered.jacobiSvd().singularValues();
     if (!(spread[1] > 1e-9 * spread[0]) || !(spread[0] > 0))
       return fail(ErrorKind::input, "ground truth", "camera centres on one line",
                   "a similarity fit needs cameras that span a plane");
