@@ -141,7 +141,7 @@ std::string SessionWriter::next_file_name(Modality modality, bool tracking, cons
   for (int& index = next_index_[stem];; ++index) {
     // Whatever the extension, and also when a crash left an image without its manifest line.
     bool taken = false;
-    for (const char* e : {".jpg", ".jpeg", ".png", ".tiff", ".tif"}) {
+    for (const char* e : {".jpg", ".jpeg", ".png", ".tiff", ".tif", ".bmp"}) {
       std::error_code ignored;
       taken = taken || fs::exists(folder_ / fmt::format("{}{:06}{}", stem, index, e), ignored);
     }
