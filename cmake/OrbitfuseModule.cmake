@@ -7,8 +7,8 @@ add_library(orbitfuse_flags INTERFACE)
 target_compile_options(orbitfuse_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wold-style-cast
   $<$<BOOL:${ORBITFUSE_WERROR}>:-Werror>
-  # g++ 12 reports these in inlined <string> and fmt code that is correct (GCC bug 105329).
-  -Wno-stringop-overflow -Wno-restrict
+  # g++ 12 reports these in inlined <string>, fmt and Eigen code that is correct (GCC bug 105329).
+  -Wno-stringop-overflow -Wno-restrict -Wno-array-bounds
   # AVX2 is the baseline; kernels that want more are dispatched at run time (orbitfuse_isa_sources).
   -march=x86-64-v3
   # a*b+c must round alike in every translation unit, or results depend on inlining.
