@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/cli/command_line.hpp"
+
+#include <algorithm>
+#include <cassert>
+
+#include "app/config/settings.hpp"
+#include "app/pipeline/runner.hpp"
+
+namespace orbitfuse::cli {
+namespace {
+
+/// Help that begins with a command to copy.
+class ExampleFirst : public CLI::Formatter {
+ public:
+  std::string make_description(const CLI::App* app) const override {
+    const std::string example = app->get_footer();
+    return (example.empty() ? "" : "Example:\n  " + example + "\n\n") +
+           Formatter::make_description(app);
+  }
+  std::string make_footer(const CLI::App*) const override { return {}; }
+};
+
+void add_common(CLI::App& app, CommonOptions& common) {
+  constexpr const char* group = "Common";
+  app.add_option("--config", common.config_file, "TOML file; config/orbitfuse.toml lists all keys")
+      ->group(group);
+  app.add_option("--set", common.overrides, "Override one key, e.g. render.views=12; repeatable")
+      ->type_name("KEY=VALUE")->allow_extra_args(false)->group(group);
+  app.add_flag("--print-config", common.print_config, "Print the resolved configuration and stop")
+      ->group(group);
+  app.add_flag("--json", common.json, "NDJSON events on stdout, the last line a result")->group(group);
+  app.add_flag("-v,--verbose", common.verbosity, "More messages")->group(group);
+  app.add_flag("-q,--quiet", common.quiet, "Errors only")->group(group);
+  app.add_option("--threads", common.threads, "Worker threads; 0 = all cores")
+      ->check(CLI::Range(0, 1024))->group(group);
+  app.add_option("--seed", common.seed, "Seed of everything random")->capture_default_str()->group(group);
+  app.add_option("--device", common.device, "Where to compute")
+      ->check(CLI::IsMember({"cpu", "cuda"}))->capture_default_str()->group(group);
+  app.add_flag("--force", common.force, "Run again although nothing changed")->group(group);
+  app.add_flag("--resume", common.resume, "Go on where an interrupted run stopped")->group(group);
+  app.add_flag("--dry-run", common.dry_run, "Say what would be done, write nothing")->group(group);
+}
+
+}  // namespace
+
+CommandLine::CommandLine() : app("Radiance fields of two camera orbits, fused from any view") {
+  app.name("orbitfuse");
+  app.formatter(std::make_shared<ExampleFirst>());
+  app.footer(verbs().front().example);
+  app.set_version_flag("--version", "orbitfuse " + pipeline::software_version());
+  app.require_subcommand(1);
+  for (const Verb& verb : verbs()) {
+    CLI::App* sub = app.add_subcommand(verb.name, verb.summary);
+    sub->footer(verb.example);
+    actions.emplace_back(&verb, verb.add(*sub));
+    add_common(*sub, common);
+  }
+}
+
+const std::pair<const Verb*, Action>& CommandLine::chosen() const {
+  const auto it = std::find_if(actions.begin(), actions.end(), [this](const auto& action) {
+    return app.got_subcommand(action.first->name);
+  });
+  assert(it != actions.end());
+  return *it;
+}
+
+Error usage_error(const CommandLine& line, const CLI::ParseError& error, int argc,
+                  const char* const* argv) {
+  std::vector<std::string> words, known;
+  for (int i = 1; i < argc; ++i) words.emplace_back(argv[i]);
+  const CLI::App* app = &line.app;
+  for (const auto& [verb, action] : line.actions) {
+    if (!words.empty() && words.front() == verb->name) app = line.app.get_subcommand(verb->name);
+    known.emplace_back(verb->name);
+  }
+  Error result{ErrorKind::usage, {}, error.what(),
+               app == &line.app ? "orbitfuse --help lists the verbs"
+                                : "orbitfuse " + app->get_name() + " --help lists the options"};
+  std::replace(result.found.begin(), result.found.end(), '\n', ' ');
+  const auto suggest = [&](const std::string& word, const std::vector<std::string>& names) {
+    const std::string guess = config::nearest(word, names);
+    if (!guess.empty()) result.remedy = "did you mean '" + guess + "'?";
+  };
+  if (app == &line.app) {
+    if (!words.empty() && words.front().front() != '-') {
+      result.found = "unknown verb '" + words.front() + "'";
+      suggest(words.front(), known);
+    }
+    return result;
+  }
+  known.clear();
+  for (const CLI::Option* option : app->get_options())
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+  for (const std::string& word : words) {
+    const std::string name = word.substr(0, word.find('='));
+    if (name.starts_with("--") && std::find(known.begin(), known.end(), name) == known.end()) {
+      result.found = "unknown option '" + name + "'";
+      suggest(name, known);
+      break;
+    }
+  }
+  return result;
+}
+
+}  // namespace orbitfuse::cli

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/cli/run_stages.hpp"
+
+#include <fmt/format.h>
+
+#include "app/pipeline/runner.hpp"
+#include "app/stages/build_stages.hpp"
+#include "core/file_io.hpp"
+
+namespace orbitfuse::cli {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+using pipeline::StageState;
+using pipeline::StageStatus;
+
+constexpr const char* run_file = "run.json";
+
+json status_json(const StageStatus& status) {
+  json j = {{"stage", status.stage}, {"state", name(status.state)}, {"why", status.why},
+            {"wall_s", status.wall_s}, {"cpu_s", status.cpu_s}, {"metrics", status.output.metrics}};
+  j["skips"] = json::array();
+  for (const Skip& skip : status.output.skips) j["skips"].push_back(to_json(skip));
+  j["warnings"] = status.output.warnings;
+  if (status.error) j["error"] = to_json(*status.error);
+  return j;
+}
+
+void announce(terminal::Console& console, const StageStatus& s) {
+  const std::string brief = s.output.metrics.value("brief", std::string());
+  switch (s.state) {
+    case StageState::planned:
+      console.detail(fmt::format("{:<14} starts: {}", s.stage, s.why));
+      break;
+    case StageState::ran:
+      console.info(fmt::format("{:<14} {:>6.1f} s  {}", s.stage, s.wall_s, brief));
+      for (const Skip& skip : s.output.skips)
+        console.detail(fmt::format("{:<14}   skipped {}: {}; {}", "", skip.what, skip.why, skip.effect));
+      for (const std::string& warning : s.output.warnings) console.warning(s.stage + ": " + warning);
+      break;
+    case StageState::unchanged:
+      console.info(fmt::format("{:<14} unchanged  {}", s.stage, brief));
+      break;
+    case StageState::absent:
+    case StageState::blocked:
+      console.info(fmt::format("{:<14} not run: {}", s.stage, s.why));
+      break;
+    case StageState::failed:
+      console.info(fmt::format("{:<14} failed: {}", s.stage, s.error->message()));
+      break;
+  }
+}
+
+}  // namespace
+
+void add_folders(CLI::App& app, StageFolders& folders) {
+  app.add_option("session", folders.session, "Session folder, or the --out folder of an earlier run");
+  app.add_option("--out", folders.out, "Folder of the results, one folder a stage")
+      ->capture_default_str();
+}
+
+Status resolve(StageFolders& folders) {
+  if (folders.session.empty())
+    return fail(ErrorKind::usage, "session", "none given",
+                "name a session folder, e.g. replay_data/container");
+  const fs::path record = fs::path(folders.session) / run_file;
+  if (!fs::exists(record)) return {};
+  ORBITFUSE_ASSIGN(const std::string text, read_file(record));
+  const json run = json::parse(text, nullptr, false);
+  if (!run.is_object() || !run.contains("session") || !run["session"].is_string())
+    return fail(ErrorKind::input, record.string(), "no session named in it",
+                "give the session folder and --out");
+  folders.out = folders.session;
+  folders.session = run["session"];
+  return {};
+}
+
+Status run_stages(Context& context, const StageFolders& given,
+                  const std::vector<std::string>& targets) {
+  StageFolders folders = given;
+  ORBITFUSE_TRY(resolve(folders));
+  ORBITFUSE_ASSIGN(stages::SessionInput input,
+                   stages::open_session_input(folders.session, context.progress));
+  for (const std::string& warning : input.session.warnings) context.console.warning(warning);
+  const pipeline::RunOptions options{.out = folders.out, .targets = targets,
+                                     .force = context.common.force,
+                                     .resume = context.common.resume,
+                                     .dry_run = context.common.dry_run};
+  pipeline::Runner runner(stages::build_stages(input, context.config), options, context.progress);
+  runner.on_status = [&](const StageStatus& status) {
+    announce(context.console, status);
+    json event = status_json(status);
+    event["event"] = "stage";
+    context.console.event(std::move(event));
+  };
+  const pipeline::RunSummary summary = runner.run();
+
+  json list = json::array();
+  for (const StageStatus& status : summary.stages) list.push_back(status_json(status));
+  context.result = {{"session", folders.session}, {"out", folders.out}, {"stages", list}};
+  if (!context.common.dry_run && !summary.stages.empty()) {
+    const json run = {{"schema", 1},
+                      {"session", fs::absolute(folders.session).lexically_normal().string()},
+                      {"orbitfuse", pipeline::software_version()},
+                      {"config", context.config.settings().to_json()},
+                      {"stages", list}};
+    const Status written = write_file_atomic(fs::path(folders.out) / run_file, run.dump(2) + "\n");
+    if (!written && !summary.error) return written;
+  }
+  if (summary.error) return tl::unexpected(*summary.error);
+  const StageStatus* report = summary.find("report");
+  if (report && report->done()) {
+    const std::string page = (fs::path(folders.out) / "report" / "report.html").string();
+    context.result["report"] = page;
+    context.console.data(page);
+  }
+  return {};
+}
+
+}  // namespace orbitfuse::cli

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "app/cli/verb.hpp"
+
+namespace orbitfuse::cli {
+
+/// Positional and option of every verb that runs stages.
+struct StageFolders {
+  std::string session;       ///< a session, or the --out folder of an earlier run
+  std::string out = "out";
+};
+
+void add_folders(CLI::App& app, StageFolders& folders);
+
+/// The session and the out folder meant; an out folder knows its session (run.json).
+Status resolve(StageFolders& folders);
+
+/// Runs the targets and all they read, says how each stage fared, and fills the --json result.
+/// Empty targets: every stage.
+Status run_stages(Context& context, const StageFolders& folders,
+                  const std::vector<std::string>& targets);
+
+}  // namespace orbitfuse::cli

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/cli/verb.hpp"
+
+namespace orbitfuse::cli {
+
+const std::vector<Verb>& verbs() {
+  static const std::vector<Verb> list = {
+      {"run", "Two recorded orbits to fused, aligned views and a report",
+       "orbitfuse run replay_data/container --out out/", add_run},
+      {"import", "Make a session from photos, thermal files, COLMAP models or transforms.json",
+       "orbitfuse import my_session --visible photos/ --thermal flir_jpegs/", add_import},
+      {"inspect", "Say what a session or a run folder holds",
+       "orbitfuse inspect replay_data/container", add_inspect},
+      {"poses", "Estimate the camera poses of both modalities",
+       "orbitfuse poses replay_data/container --out out/", add_poses},
+      {"train", "Train the visible and the thermal radiance field",
+       "orbitfuse train replay_data/container --out out/", add_train},
+      {"register", "Bring the thermal field, or a point cloud, into the visible frame",
+       "orbitfuse register --source thermal.ply --target visible.ply --json", add_register},
+      {"render", "Render both fields from the same new cameras",
+       "orbitfuse render replay_data/container --out out/ --views 12", add_render},
+      {"fuse", "Fuse rendered views, or two aligned images",
+       "orbitfuse fuse --visible a.png --thermal b.png --method ms-srif --out f.png", add_fuse},
+      {"metrics", "Score fused images",
+       "orbitfuse metrics --visible a.png --thermal b.png --fused f.png --json", add_metrics},
+      {"report", "Write report.html from what a run has left",
+       "orbitfuse report replay_data/container --out out/", add_report},
+      {"eval", "Measure a run against ground truth",
+       "orbitfuse eval out/ --ground-truth replay_data/container/ground_truth.json", add_eval},
+      {"replay", "Play a recorded session through the recorder, as hardware would",
+       "orbitfuse replay replay_data/container --to copy/ --speed full", add_replay},
+      {"synthesize", "Record a session of a rendered scene with exact ground truth",
+       "orbitfuse synthesize my_orbit/ --seed 7", add_synthesize},
+      {"doctor", "Check this machine for what OrbitFuse needs", "orbitfuse doctor", add_doctor},
+  };
+  return list;
+}
+
+}  // namespace orbitfuse::cli

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/config/settings.hpp"
+
+#define TOML_EXCEPTIONS 1
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "core/file_io.hpp"
+
+namespace orbitfuse::config {
+namespace {
+using nlohmann::json;
+
+json json_of(const toml::node& node) {
+  if (const auto* v = node.as_boolean()) return v->get();
+  if (const auto* v = node.as_integer()) return v->get();
+  if (const auto* v = node.as_floating_point()) return v->get();
+  if (const auto* v = node.as_string()) return v->get();
+  if (const auto* list = node.as_array()) {
+    json j = json::array();
+    for (const toml::node& item : *list) j.push_back(json_of(item));
+    return j;
+  }
+  return {};
+}
+
+struct Entry {
+  std::string key;
+  json value;
+  unsigned line = 0;
+};
+
+void flatten(const toml::table& table, const std::string& prefix, std::vector<Entry>& entries) {
+  for (const auto& [key, node] : table) {
+    const std::string path = prefix + std::string(key.str());
+    if (const toml::table* inner = node.as_table())
+      flatten(*inner, path + ".", entries);
+    else
+      entries.push_back({path, json_of(node), static_cast<unsigned>(node.source().begin.line)});
+  }
+}
+
+std::string toml_text(const json& value) {
+  std::string text = value.dump();
+  const bool whole = value.is_number_float() && text.find_first_of(".eE") == std::string::npos;
+  return whole ? text + ".0" : text;
+}
+
+/// Levenshtein distance.
+std::size_t edits(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t substituted = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, substituted});
+    }
+  }
+  return row[b.size()];
+}
+
+}  // namespace
+
+std::string nearest(const std::string& word, const std::vector<std::string>& known) {
+  std::string best;
+  std::size_t best_edits = std::max<std::size_t>(2, word.size() / 3) + 1;
+  for (const std::string& candidate : known) {
+    // A key given without its table is a slip too: "budget_s" for "train.visible.budget_s".
+    const bool tail = candidate.size() > word.size() && candidate.ends_with("." + word);
+    const std::size_t distance = tail ? 1 : edits(word, candidate);
+    if (distance < best_edits) {
+      best_edits = distance;
+      best = candidate;
+    }
+  }
+  return best;
+}
+
+Status Settings::set(const std::string& key, const json& value, const std::string& where) {
+  const auto it = std::find_if(list_.begin(), list_.end(),
+                               [&](const Setting& s) { return s.key == key; });
+  if (it == list_.end()) {
+    std::vector<std::string> known;
+    for (const Setting& s : list_) known.push_back(s.key);
+    const std::string guess = nearest(key, known);
+    return fail(ErrorKind::usage, where, "unknown key '" + key + "'",
+                guess.empty() ? "config/orbitfuse.toml lists every key"
+                              : "did you mean '" + guess + "'?");
+  }
+  if (!it->set(value))
+    return fail(ErrorKind::usage, where, fmt::format("{} = {}", key, value.dump()),
+                "it must be " + it->type);
+  return {};
+}
+
+Status Settings::read_toml(const std::filesystem::path& file) {
+  ORBITFUSE_ASSIGN(const std::string text, read_file(file));
+  std::vector<Entry> entries;
+  try {
+    const toml::table table = toml::parse(text, file.string());
+    flatten(table, "", entries);
+  } catch (const toml::parse_error& e) {
+    return fail(ErrorKind::usage, fmt::format("{}:{}", file.string(), e.source().begin.line),
+                std::string(e.description()), "write it as TOML, e.g. budget_s = 60.0");
+  }
+  // A preset sets many fields, which the other keys then change.
+  std::stable_partition(entries.begin(), entries.end(),
+                        [](const Entry& e) { return e.key.ends_with(".preset"); });
+  for (const Entry& e : entries)
+    ORBITFUSE_TRY(set(e.key, e.value, fmt::format("{}:{}", file.string(), e.line)));
+  return {};
+}
+
+Status Settings::apply(const std::string& assignment) {
+  const std::size_t equals = assignment.find('=');
+  if (equals == std::string::npos)
+    return fail(ErrorKind::usage, "--set " + assignment, "no '='", "write --set key=value");
+  const std::string key = assignment.substr(0, equals), text = assignment.substr(equals + 1);
+  const std::string where = "--set " + assignment;
+  json value = json::parse(text, nullptr, false);
+  if (value.is_discarded()) value = text;
+  return set(key, value, where);
+}
+
+json Settings::to_json(const std::string& prefix) const {
+  json result = json::object();
+  for (const Setting& s : list_) {
+    if (!prefix.empty() && !s.key.starts_with(prefix + ".")) continue;
+    std::string path = "/" + (prefix.empty() ? s.key : s.key.substr(prefix.size() + 1));
+    std::replace(path.begin(), path.end(), '.', '/');
+    result[json::json_pointer(path)] = s.get();
+  }
+  return result;
+}
+
+std::string Settings::to_toml() const {
+  std::vector<std::pair<std::string, std::string>> tables;  // TOML wants each table once
+  for (const Setting& s : list_) {
+    if (!s.listed) continue;
+    const std::size_t dot = s.key.rfind('.');
+    const std::string table = dot == std::string::npos ? "" : s.key.substr(0, dot);
+    auto it = std::find_if(tables.begin(), tables.end(),
+                           [&](const auto& entry) { return entry.first == table; });
+    if (it == tables.end()) it = tables.insert(tables.end(), {table, ""});
+    it->second += fmt::format("# {} ({})\n{} = {}\n", s.doc, s.type,
+                              s.key.substr(table.empty() ? 0 : dot + 1), toml_text(s.get()));
+  }
+  std::string text;
+  for (const auto& [table, lines] : tables) text += fmt::format("\n[{}]\n{}", table, lines);
+  return text;
+}
+
+}  // namespace orbitfuse::config

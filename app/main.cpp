@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <cstdio>
+#include <cstring>
+#include <exception>
+
+#include "app/cli/command_line.hpp"
+#include "app/terminal/exit_code.hpp"
+#include "app/terminal/interrupt.hpp"
+#include "core/cpu.hpp"
+#include "core/parallel.hpp"
+
+// The only place that turns errors into exit codes (docs/cli.md).
+namespace orbitfuse {
+namespace {
+
+using namespace terminal;
+
+void set_up_logging(int verbosity) {
+  spdlog::set_default_logger(spdlog::stderr_logger_mt("orbitfuse"));
+  spdlog::set_pattern("%v");
+  spdlog::set_level(verbosity > 0   ? spdlog::level::debug
+                    : verbosity < 0 ? spdlog::level::err
+                                    : spdlog::level::warn);
+}
+
+Status resolve_config(const cli::CommonOptions& common, stages::RunConfig& config) {
+  config::Settings settings = config.settings();
+  if (!common.config_file.empty()) ORBITFUSE_TRY(settings.read_toml(common.config_file));
+  for (const std::string& assignment : common.overrides) ORBITFUSE_TRY(settings.apply(assignment));
+  config.set_seed(common.seed);
+  return config.validate();
+}
+
+Status check_machine(const cli::CommonOptions& common) {
+  if (!has_baseline())
+    return fail(ErrorKind::unavailable, cpu_description(), "no AVX2", "use a processor with AVX2");
+  if (common.device == "cuda")
+    return fail(ErrorKind::unavailable, "--device cuda", "this build computes on the CPU only",
+                "use --device cpu");
+  return {};
+}
+
+int finish(const std::string& verb, Console& console, const Status& status, nlohmann::json body) {
+  const int code = status ? exit_ok : exit_code(status.error().kind);
+  if (!status) console.error(status.error());
+  body["ok"] = status.has_value();
+  body["exit_code"] = code;
+  if (!status) body["error"] = {{"where", status.error().where},
+                                {"found", status.error().found},
+                                {"remedy", status.error().remedy},
+                                {"message", status.error().message()}};
+  console.result(verb, std::move(body));
+  return code;
+}
+
+int run(int argc, char** argv) {
+  cli::CommandLine line;
+  try {
+    line.app.parse(argc, argv);
+  } catch (const CLI::Success& success) {  // --help, --version
+    return line.app.exit(success) == 0 ? exit_ok : exit_internal;
+  } catch (const CLI::ParseError& error) {
+    ConsoleOptions options = detect_terminal();
+    for (int i = 1; i < argc; ++i) options.json = options.json || std::strcmp(argv[i], "--json") == 0;
+    Console console(options);
+    return finish(argc > 1 ? argv[1] : "", console,
+                  tl::unexpected(cli::usage_error(line, error, argc, argv)), {});
+  }
+
+  ConsoleOptions options = detect_terminal();
+  options.json = line.common.json;
+  options.verbosity = line.common.quiet ? -1 : line.common.verbosity;
+  Console console(options);
+  set_up_logging(options.verbosity);
+  install_interrupt_handler();
+  set_thread_count(line.common.threads);
+
+  const auto& [verb, action] = line.chosen();
+  stages::RunConfig config;
+  cli::Context context{line.common, config, console, {}, {}};
+  context.progress.report = [&console](const ProgressEvent& event) { console.progress(event); };
+  context.progress.cancel = &interrupt_flag();
+
+  Status status = check_machine(line.common);
+  if (status) status = resolve_config(line.common, config);
+  if (status && line.common.print_config) {
+    console.data(config.settings().to_toml());
+    context.result = {{"config", config.settings().to_json()}};
+  } else if (status) {
+    status = action(context);
+  }
+  return finish(verb->name, console, status, std::move(context.result));
+}
+
+}  // namespace
+}  // namespace orbitfuse
+
+int main(int argc, char** argv) {
+  try {
+    return orbitfuse::run(argc, argv);
+  } catch (const std::exception& bug) {
+    std::fprintf(stderr, "internal error: %s; please report it with the command line\n", bug.what());
+  } catch (...) {
+    std::fputs("internal error; please report it with the command line\n", stderr);
+  }
+  return orbitfuse::terminal::exit_internal;
+}

@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/pipeline/runner.hpp"
+
+#include <fcntl.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+
+#include "app/pipeline/folder_lock.hpp"
+#include "app/pipeline/usage_clock.hpp"
+#include "core/file_io.hpp"
+
+namespace orbitfuse::pipeline {
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+fs::path partial_folder(const fs::path& out, const std::string& stage) {
+  return out / ".partial" / stage;
+}
+/// What an interrupted attempt was for and what it has cost so far.
+fs::path attempt_file(const fs::path& out, const std::string& stage) {
+  return out / ".partial" / (stage + ".json");
+}
+
+struct Attempt {
+  std::string key;
+  double cpu_s = 0, wall_s = 0;
+};
+
+Attempt read_attempt(const fs::path& file) {
+  const auto text = read_file(file);
+  const json j = text ? json::parse(*text, nullptr, false) : json();
+  if (!j.is_object()) return {};
+  return {j.value("key", std::string()), j.value("cpu_s", 0.0), j.value("wall_s", 0.0)};
+}
+
+Status write_attempt(const fs::path& file, const Attempt& attempt) {
+  return write_file_atomic(
+      file, json{{"key", attempt.key}, {"cpu_s", attempt.cpu_s}, {"wall_s", attempt.wall_s}}.dump());
+}
+
+Status device_error(const fs::path& path, const std::error_code& ec) {
+  if (!ec) return {};
+  return fail(ErrorKind::device, path.string(), ec.message(),
+              "check permissions and free space, then run again with --resume");
+}
+
+Status make_folder(const fs::path& folder) {
+  std::error_code ec;
+  fs::create_directories(folder, ec);
+  return device_error(folder, ec);
+}
+
+Status remove_tree(const fs::path& folder) {
+  std::error_code ec;
+  fs::remove_all(folder, ec);
+  return device_error(folder, ec);
+}
+
+/// Puts `from` in the place of `to`: one exchange, so that a crash leaves the old or the new.
+Status replace_folder(const fs::path& from, const fs::path& to) {
+  if (renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_EXCHANGE) == 0)
+    return remove_tree(from);
+  std::error_code ec;
+  fs::remove_all(to, ec);  // absent, or a file system that can't exchange
+  if (!ec) fs::rename(from, to, ec);
+  return device_error(to, ec);
+}
+
+std::string utc_now() {
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  std::tm utc{};
+  gmtime_r(&now, &utc);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
+  return text;
+}
+
+/// Later stages can't do better after these.
+bool stops_everything(ErrorKind kind) {
+  return kind == ErrorKind::cancelled || kind == ErrorKind::device || kind == ErrorKind::usage;
+}
+
+/// The first option whose value differs, for "why is this stage running again".
+std::string changed_option(const json& before, const json& now, const std::string& prefix = "") {
+  if (before.is_object() && now.is_object()) {
+    for (const auto& [key, value] : now.items()) {
+      const std::string path = prefix.empty() ? key : prefix + "." + key;
+      if (!before.contains(key)) return path;
+      if (const std::string inner = changed_option(before.at(key), value, path); !inner.empty())
+        return inner;
+    }
+    return before.size() > now.size() ? (prefix.empty() ? "options" : prefix) : "";
+  }
+  return before == now ? "" : prefix;
+}
+
+}  // namespace
+
+std::string software_version() { return ORBITFUSE_VERSION; }
+
+const StageStatus* RunSummary::find(const std::string& stage) const {
+  const auto it = std::find_if(stages.begin(), stages.end(),
+                               [&](const StageStatus& s) { return s.stage == stage; });
+  return it == stages.end() ? nullptr : &*it;
+}
+
+Runner::Runner(std::vector<Stage> stages, RunOptions options, Progress progress)
+    : stages_(std::move(stages)), options_(std::move(options)), progress_(std::move(progress)) {
+  for (auto it = stages_.rbegin(); it != stages_.rend(); ++it) {
+    const bool target = options_.targets.empty() ||
+                        std::count(options_.targets.begin(), options_.targets.end(), it->name) > 0;
+    if (!target && !wanted(it->name)) continue;
+    closure_.push_back(it->name);
+    closure_.insert(closure_.end(), it->needs.begin(), it->needs.end());
+    closure_.insert(closure_.end(), it->uses.begin(), it->uses.end());
+  }
+}
+
+bool Runner::wanted(const std::string& stage) const {
+  return std::find(closure_.begin(), closure_.end(), stage) != closure_.end();
+}
+
+Runner::Key Runner::key_of(const Stage& stage) const {
+  Key key;
+  key.inputs["outside"] = stage.inputs_hash;
+  for (const auto* list : {&stage.needs, &stage.uses})
+    for (const std::string& name : *list) {
+      const auto it = outputs_.find(name);
+      key.inputs[name] = it == outputs_.end() ? "none" : it->second;
+    }
+  key.hash = content_hash(json{{"stage", stage.name},
+                               {"version", stage.version},
+                               {"options", stage.options},
+                               {"inputs", key.inputs}}
+                              .dump());
+  return key;
+}
+
+std::string Runner::why_run(const Stage& stage, const Key& key,
+                            const Result<StageRecord>& record) const {
+  const bool forced = options_.force && (options_.targets.empty() ||
+                                         std::count(options_.targets.begin(),
+                                                    options_.targets.end(), stage.name) > 0);
+  if (forced) return "--force";
+  if (!fs::exists(options_.out / stage.name / stage_record_file)) return "not done yet";
+  if (!record) return "its done mark can't be read";
+  if (stage.always) return "describes this run";
+  if (record->key != key.hash) {
+    if (record->version != stage.version) return "the stage's method has a new version";
+    const std::string option = changed_option(record->options, stage.options);
+    if (!option.empty()) return "option " + option + " changed";
+    for (const auto& [name, hash] : key.inputs) {
+      const auto it = record->inputs.find(name);
+      if (it == record->inputs.end() || it->second != hash)
+        return name == "outside" ? "the session changed" : name + " changed";
+    }
+    return "its inputs changed";
+  }
+  return damage(options_.out / stage.name, *record);
+}
+
+StageContext Runner::context(fs::path folder, bool resume) const {
+  StageContext context{.out = options_.out, .folder = std::move(folder), .resume = resume,
+                       .progress = progress_, .finished = {}, .earlier = &statuses_};
+  for (const auto& [name, hash] : outputs_) context.finished.insert(name);
+  return context;
+}
+
+StageStatus Runner::visit(const Stage& stage) {
+  StageStatus status;
+  status.stage = stage.name;
+  status.options = stage.options;
+  const auto is_done = [&](const std::string& name) { return outputs_.count(name) > 0; };
+  const auto planned = [&](const std::string& name) {
+    return is_done(name) && outputs_.at(name) == "planned";
+  };
+
+  const StageContext look = context({}, false);
+  bool unknown = false;
+  for (const auto* list : {&stage.needs, &stage.uses})
+    for (const std::string& name : *list) unknown = unknown || planned(name);
+  if (!unknown && stage.absent) {
+    if (const auto reason = stage.absent(look)) {
+      status.state = StageState::absent;
+      status.why = *reason;
+      return status;
+    }
+  }
+  for (const std::string& name : stage.needs)
+    if (!is_done(name)) {
+      const auto it = std::find_if(statuses_.begin(), statuses_.end(),
+                                   [&](const StageStatus& s) { return s.stage == name; });
+      // The root cause reads better than a chain of blocked stages.
+      const bool chained = it != statuses_.end() && it->state == StageState::blocked;
+      status.state = it != statuses_.end() && it->state == StageState::absent ? StageState::absent
+                                                                              : StageState::blocked;
+      status.why = chained || status.state == StageState::absent ? it->why
+                                                                 : "needs " + name + ", which failed";
+      return status;
+    }
+
+  const Key key = key_of(stage);
+  const auto record = read_stage_record(options_.out / stage.name);
+  const std::string why = unknown ? "a stage it reads will run" : why_run(stage, key, record);
+  if (why.empty()) {
+    status.state = StageState::unchanged;
+    status.output = record->output;
+    status.cpu_s = record->cpu_s;
+    status.wall_s = record->wall_s;
+    outputs_[stage.name] = record->outputs_hash();
+    return status;
+  }
+  if (options_.dry_run) {
+    status.state = StageState::planned;
+    status.why = why;
+    outputs_[stage.name] = "planned";
+    return status;
+  }
+  return execute(stage, key, why);
+}
+
+StageStatus Runner::execute(const Stage& stage, const Key& key, std::string why) {
+  StageStatus status;
+  status.stage = stage.name;
+  status.options = stage.options;
+  status.state = StageState::planned;
+  status.why = std::move(why);
+  on_status(status);
+
+  const fs::path folder = partial_folder(options_.out, stage.name);
+  const fs::path attempt_path = attempt_file(options_.out, stage.name);
+  Attempt attempt = read_attempt(attempt_path);
+  const bool resume = options_.resume && attempt.key == key.hash && fs::exists(folder);
+  if (!resume) attempt = {key.hash, 0, 0};
+
+  const UsageClock clock;
+  const auto work = [&]() -> Result<StageOutput> {
+    ORBITFUSE_TRY(progress_.check(stage.name));
+    if (!resume) ORBITFUSE_TRY(remove_tree(folder));
+    ORBITFUSE_TRY(make_folder(folder));
+    ORBITFUSE_TRY(write_attempt(attempt_path, attempt));
+    return stage.run(context(folder, resume));
+  };
+  auto result = work();
+  attempt.cpu_s += clock.cpu_s();
+  attempt.wall_s += clock.wall_s();
+  status.cpu_s = attempt.cpu_s;
+  status.wall_s = attempt.wall_s;
+
+  const auto finish = [&]() -> Status {
+    StageRecord record{.stage = stage.name, .key = key.hash,
+                       .software_version = software_version(), .finished_utc = utc_now(),
+                       .version = stage.version, .options = stage.options, .inputs = key.inputs,
+                       .outputs = {}, .output = *result, .cpu_s = attempt.cpu_s,
+                       .wall_s = attempt.wall_s};
+    ORBITFUSE_ASSIGN(record.outputs, list_outputs(folder));
+    ORBITFUSE_TRY(write_stage_record(folder, record));
+    ORBITFUSE_TRY(replace_folder(folder, options_.out / stage.name));
+    ORBITFUSE_TRY(remove_tree(options_.out / (stage.name + ".failed")));
+    ORBITFUSE_TRY(remove_tree(attempt_path));
+    outputs_[stage.name] = record.outputs_hash();
+    return {};
+  };
+  Status finished = result ? finish() : tl::unexpected(result.error());
+  if (finished) {
+    status.state = StageState::ran;
+    status.output = *std::move(result);
+    return status;
+  }
+  status.state = StageState::failed;
+  status.error = finished.error();
+  // What was done so far helps --resume after Ctrl-C or a full disk, and a look after a missed
+  // gate; it never takes the place of an earlier result.
+  if (stops_everything(status.error->kind)) {
+    (void)write_attempt(attempt_path, attempt);
+  } else {
+    if (status.error->kind == ErrorKind::quality)
+      (void)replace_folder(folder, options_.out / (stage.name + ".failed"));
+    (void)remove_tree(folder);
+    (void)remove_tree(attempt_path);
+  }
+  return status;
+}
+
+RunSummary Runner::run() {
+  RunSummary summary;
+  FolderLock lock;
+  if (!options_.dry_run) {
+    Status locked = make_folder(options_.out);
+    if (locked) locked = lock.acquire(options_.out / ".lock");
+    if (!locked) {
+      summary.error = locked.error();
+      return summary;
+    }
+  }
+  for (const Stage& stage : stages_) {
+    if (!wanted(stage.name)) continue;
+    statuses_.push_back(visit(stage));
+    const StageStatus& status = statuses_.back();
+    on_status(status);
+    if (!status.error) continue;
+    if (!summary.error) summary.error = status.error;
+    if (stops_everything(status.error->kind)) {
+      summary.error = status.error;
+      break;
+    }
+  }
+  std::error_code ignored;
+  if (!options_.dry_run) fs::remove(options_.out / ".partial", ignored);  // only when empty
+  summary.stages = statuses_;
+  return summary;
+}
+
+}  // namespace orbitfuse::pipeline

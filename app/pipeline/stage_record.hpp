@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "app/pipeline/stage.hpp"
+
+namespace orbitfuse::pipeline {
+
+inline constexpr int stage_record_schema = 1;
+inline constexpr const char* stage_record_file = "stage.json";
+
+struct OutputFile {
+  std::string file;  ///< relative to the stage's folder
+  std::uint64_t bytes = 0;
+  std::string hash;
+  bool operator==(const OutputFile&) const = default;
+};
+
+/// stage.json: the done mark of a stage, written last. A folder without one was never finished.
+struct StageRecord {
+  std::string stage, key, software_version, finished_utc;
+  int version = 1;
+  nlohmann::json options;
+  std::map<std::string, std::string> inputs;  ///< name -> content hash
+  std::vector<OutputFile> outputs;
+  StageOutput output;
+  double cpu_s = 0, wall_s = 0;
+
+  /// Identity of what the stage made; what stages behind it depend on.
+  std::string outputs_hash() const;
+};
+
+nlohmann::json to_json(const StageRecord& record);
+Result<StageRecord> read_stage_record(const std::filesystem::path& folder);
+Status write_stage_record(const std::filesystem::path& folder, const StageRecord& record);
+
+/// Every file below the folder except the done mark, sorted by name.
+Result<std::vector<OutputFile>> list_outputs(const std::filesystem::path& folder);
+/// The first way in which the folder differs from the record; empty when it is intact.
+std::string damage(const std::filesystem::path& folder, const StageRecord& record);
+
+nlohmann::json to_json(const Skip& skip);
+nlohmann::json to_json(const Error& error);
+
+}  // namespace orbitfuse::pipeline

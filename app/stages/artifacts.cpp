@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/stages/artifacts.hpp"
+
+#include <fmt/format.h>
+
+#include "core/colmap_model.hpp"
+#include "core/file_io.hpp"
+#include "core/image_io.hpp"
+#include "core/temperature.hpp"
+#include "core/transforms_json.hpp"
+
+namespace orbitfuse::stages {
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+json camera_json(const Camera& c) {
+  return {{"width", c.width}, {"height", c.height}, {"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx},
+          {"cy", c.cy}};
+}
+
+Camera camera_of_json(const json& j) {
+  Camera c;
+  j.at("width").get_to(c.width);
+  j.at("height").get_to(c.height);
+  j.at("fx").get_to(c.fx);
+  j.at("fy").get_to(c.fy);
+  j.at("cx").get_to(c.cx);
+  j.at("cy").get_to(c.cy);
+  return c;
+}
+
+fs::path depth_file(const fs::path& folder, const DepthMap& map, const char* kind) {
+  return folder / fmt::format("{:03}_{}.tiff", map.view, kind);
+}
+
+constexpr const char* normal_kinds[] = {"normal_x", "normal_y", "normal_z"};
+
+}  // namespace
+
+Status write_json(const fs::path& file, const json& j) {
+  return write_file_atomic(file, j.dump(2) + "\n");
+}
+
+Result<json> read_json(const fs::path& file) {
+  ORBITFUSE_ASSIGN(const std::string text, read_file(file));
+  json j = json::parse(text, nullptr, false);
+  if (j.is_discarded())
+    return fail(ErrorKind::input, file.string(), "not JSON", "run the stage that writes it again");
+  return j;
+}
+
+Status save_poses(const fs::path& folder, const Reconstruction& model) {
+  ORBITFUSE_TRY(write_colmap_model(folder / "model", model, ColmapFormat::binary));
+  Transforms transforms;
+  for (const PosedView& view : model.views) {
+    TransformsFrame frame{view.name, {}, view.camera, view.cam_from_world};
+    if (model.modality == Modality::thermal) frame.thermal_file_path = view.name;
+    transforms.frames.push_back(std::move(frame));
+  }
+  return write_transforms_json(folder / "transforms.json", transforms);
+}
+
+Result<Reconstruction> load_poses(const fs::path& folder, Modality modality) {
+  return read_colmap_model(folder / "model", modality);
+}
+
+Status save_depth_maps(const fs::path& folder, const std::vector<DepthMap>& maps) {
+  json list = json::array();
+  for (const DepthMap& map : maps) {
+    ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, "depth"), map.depth));
+    ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, "confidence"), map.confidence));
+    std::vector<cv::Mat> axes;
+    if (!map.normal.empty()) cv::split(map.normal, axes);
+    for (std::size_t i = 0; i < axes.size(); ++i)
+      ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, normal_kinds[i]), axes[i]));
+    list.push_back({{"view", map.view}, {"camera", camera_json(map.camera)},
+                    {"normal", !map.normal.empty()}});
+  }
+  return write_json(folder / "depth.json", list);
+}
+
+Result<std::vector<DepthMap>> load_depth_maps(const fs::path& folder) {
+  ORBITFUSE_ASSIGN(const json list, read_json(folder / "depth.json"));
+  std::vector<DepthMap> maps;
+  try {
+    for (const json& j : list) {
+      DepthMap map;
+      j.at("view").get_to(map.view);
+      map.camera = camera_of_json(j.at("camera"));
+      ORBITFUSE_ASSIGN(map.depth, read_float_tiff(depth_file(folder, map, "depth")));
+      ORBITFUSE_ASSIGN(map.confidence, read_float_tiff(depth_file(folder, map, "confidence")));
+      if (j.at("normal").get<bool>()) {
+        cv::Mat axes[3];
+        for (int i = 0; i < 3; ++i) {
+          ORBITFUSE_ASSIGN(axes[i], read_float_tiff(depth_file(folder, map, normal_kinds[i])));
+        }
+        cv::merge(axes, 3, map.normal);
+      }
+      maps.push_back(std::move(map));
+    }
+  } catch (const json::exception& e) {
+    return fail(ErrorKind::input, (folder / "depth.json").string(), e.what(),
+                "run with --force to make it again");
+  }
+  return maps;
+}
+
+Status save_temperature_bounds(const fs::path& folder, double low_k, double high_k) {
+  return write_json(folder / "temperature_bounds.json",
+                    {{"absolute_min_temperature", celsius_from_kelvin(low_k)},
+                     {"absolute_max_temperature", celsius_from_kelvin(high_k)},
+                     {"unit", "degrees Celsius"}});
+}
+
+json to_json(const Similarity3d& s) {
+  return {{"scale", s.scale},
+          {"rotation_wxyz", {s.rotation.w(), s.rotation.x(), s.rotation.y(), s.rotation.z()}},
+          {"translation", {s.translation.x(), s.translation.y(), s.translation.z()}}};
+}
+
+Result<Similarity3d> similarity_of_json(const json& j, const std::string& where) {
+  try {
+    const auto q = j.at("rotation_wxyz").get<std::vector<double>>();
+    const auto t = j.at("translation").get<std::vector<double>>();
+    Similarity3d s;
+    j.at("scale").get_to(s.scale);
+    s.rotation = Eigen::Quaterniond(q.at(0), q.at(1), q.at(2), q.at(3)).normalized();
+    s.translation = {t.at(0), t.at(1), t.at(2)};
+    if (s.is_finite() && s.scale > 0) return s;
+  } catch (const std::exception&) {  // json's and std::out_of_range: reported below
+  }
+  return fail(ErrorKind::input, where, "no similarity in it", "run the register stage again");
+}
+
+}  // namespace orbitfuse::stages

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "core/reconstruction.hpp"
+#include "core/session.hpp"
+#include "core/transform.hpp"
+
+// What stages leave for each other, in formats that other tools read (docs/formats.md).
+namespace orbitfuse::stages {
+
+/// model/ (COLMAP, binary), transforms.json.
+Status save_poses(const std::filesystem::path& folder, const Reconstruction& model);
+Result<Reconstruction> load_poses(const std::filesystem::path& folder, Modality modality);
+
+/// NNN_depth.tiff, NNN_confidence.tiff, NNN_normal_{x,y,z}.tiff and depth.json with the cameras.
+Status save_depth_maps(const std::filesystem::path& folder, const std::vector<DepthMap>& maps);
+Result<std::vector<DepthMap>> load_depth_maps(const std::filesystem::path& folder);
+
+/// temperature_bounds.json as ThermoNeRF reads it (degrees Celsius).
+Status save_temperature_bounds(const std::filesystem::path& folder, double low_k, double high_k);
+
+nlohmann::json to_json(const Similarity3d& a_from_b);
+Result<Similarity3d> similarity_of_json(const nlohmann::json& j, const std::string& where);
+
+Status write_json(const std::filesystem::path& file, const nlohmann::json& j);
+Result<nlohmann::json> read_json(const std::filesystem::path& file);
+
+}  // namespace orbitfuse::stages

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/stages/build_stages.hpp"
+
+#include "app/stages/stage_list.hpp"
+
+namespace orbitfuse::stages {
+
+std::vector<pipeline::Stage> build_stages(const SessionInput& session, const RunConfig& config) {
+  const StageInputs in{std::make_shared<const SessionInput>(session),
+                       std::make_shared<RunConfig>(config)};
+  return {
+      poses_stage(in, Modality::visible),
+      depth_stage(in),
+      train_stage(in, Modality::visible),
+      poses_stage(in, Modality::thermal),
+      train_stage(in, Modality::thermal),
+      register_stage(in),
+      render_stage(in),
+      fuse_stage(in),
+      metrics_stage(in),
+      report_stage(in),
+  };
+}
+
+}  // namespace orbitfuse::stages

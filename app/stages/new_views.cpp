@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/stages/new_views.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+
+namespace orbitfuse::stages {
+namespace {
+
+constexpr double deg = std::numbers::pi / 180;
+/// Below this share of the circle a full orbit would show sides that no camera saw.
+constexpr double orbit_span_deg = 270;
+
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + static_cast<long>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+Eigen::Vector3d axis(const PosedView& view, int row) {
+  return view.cam_from_world.rotation.conjugate() * Eigen::Vector3d::Unit(row);
+}
+
+/// cam_from_world of a camera at `eye` that looks at `target`.
+Rigid3d look_at(const Eigen::Vector3d& eye, const Eigen::Vector3d& target, const Eigen::Vector3d& up) {
+  const Eigen::Vector3d z = (target - eye).normalized();
+  const Eigen::Vector3d x = z.cross(up).normalized();
+  Eigen::Matrix3d cam_from_world;
+  cam_from_world << x.transpose(), z.cross(x).transpose(), z.transpose();
+  const Eigen::Quaterniond q(cam_from_world);
+  return {q, -(q * eye)};
+}
+
+Camera render_camera(const std::vector<PosedView>& posed, int width_px) {
+  const Camera camera = posed[posed.size() / 2].camera.without_distortion();
+  const int height_px =
+      std::max(1, static_cast<int>(std::lround(1.0 * camera.height * width_px / camera.width)));
+  return camera.scaled_to(width_px, height_px);
+}
+
+NewViews along_orbit(const std::vector<PosedView>& posed, const OrbitGeometry& orbit,
+                     const NewViewOptions& options) {
+  const double elevation =
+      (options.elevation_deg < -89 ? orbit.elevation_deg : options.elevation_deg) * deg;
+  const double radius = orbit.radius * options.radius_scale;
+  const Eigen::Vector3d side = orbit.up.cross(orbit.first);
+  NewViews result;
+  for (int i = 0; i < options.views; ++i) {
+    const double azimuth = (options.azimuth_deg + 360.0 * i / options.views) * deg;
+    const Eigen::Vector3d out =
+        std::cos(elevation) * (std::cos(azimuth) * orbit.first + std::sin(azimuth) * side) +
+        std::sin(elevation) * orbit.up;
+    result.views.push_back({fmt::format("{:03}", i), render_camera(posed, options.width_px),
+                            look_at(orbit.center + radius * out, orbit.center, orbit.up)});
+  }
+  result.described = fmt::format("orbit of {} views, elevation {:.0f}°", options.views, elevation / deg);
+  return result;
+}
+
+NewViews along_path(const std::vector<PosedView>& posed, const NewViewOptions& options) {
+  NewViews result;
+  const double last = static_cast<double>(posed.size() - 1);
+  for (int i = 0; i < options.views; ++i) {
+    const double t = last * (i + 0.5) / options.views;
+    const auto k = std::min(static_cast<std::size_t>(t), posed.size() - 2);
+    const double share = t - static_cast<double>(k);
+    const Rigid3d &a = posed[k].cam_from_world, &b = posed[k + 1].cam_from_world;
+    const Eigen::Quaterniond q = a.rotation.slerp(share, b.rotation);
+    const Eigen::Vector3d eye = (1 - share) * camera_center(a) + share * camera_center(b);
+    result.views.push_back(
+        {fmt::format("{:03}", i), render_camera(posed, options.width_px), {q, -(q * eye)}});
+  }
+  result.described = fmt::format("{} views between the recorded cameras", options.views);
+  return result;
+}
+
+}  // namespace
+
+Status NewViewOptions::validate() const {
+  const auto bad = [](const char* field, double value, const char* rule) {
+    return fail(ErrorKind::usage, std::string("render.") + field, fmt::format("{}", value), rule);
+  };
+  if (views < 1 || views > 10000) return bad("views", views, "must be in 1..10000");
+  if (width_px < 16 || width_px > 8192) return bad("width_px", width_px, "must be in 16..8192");
+  if (!(std::abs(elevation_deg) <= 90))
+    return bad("elevation_deg", elevation_deg, "must be in -90..90");
+  if (!(radius_scale > 0.01 && radius_scale < 100))
+    return bad("radius_scale", radius_scale, "must be in 0.01..100");
+  if (!std::isfinite(azimuth_deg)) return bad("azimuth_deg", azimuth_deg, "must be finite");
+  return {};
+}
+
+Result<OrbitGeometry> orbit_geometry(const std::vector<PosedView>& views) {
+  if (views.size() < 2)
+    return fail(ErrorKind::input, "cameras", fmt::format("{} posed", views.size()),
+                "an orbit needs at least two");
+  // The point nearest to all optical axes: sum (I - d d^T) (p - c) = 0.
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d rhs = Eigen::Vector3d::Zero(), mean_up = Eigen::Vector3d::Zero();
+  for (const PosedView& v : views) {
+    const Eigen::Vector3d d = axis(v, 2);
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - d * d.transpose();
+    normal += across;
+    rhs += across * camera_center(v.cam_from_world);
+    mean_up -= axis(v, 1);
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(normal);
+  if (!(eigen.eigenvalues()[0] > 1e-6 * static_cast<double>(views.size())) || mean_up.norm() < 1e-9)
+    return fail(ErrorKind::input, "cameras", "all look in one direction: their axes meet nowhere",
+                "render along their path: --path path");
+  OrbitGeometry orbit;
+  orbit.center = eigen.eigenvectors() *
+                 eigen.eigenvalues().cwiseInverse().asDiagonal() *
+                 (eigen.eigenvectors().transpose() * rhs);
+  orbit.up = mean_up.normalized();
+
+  std::vector<double> radii, elevations, azimuths;
+  for (const PosedView& v : views) {
+    const Eigen::Vector3d out = camera_center(v.cam_from_world) - orbit.center;
+    const double height = out.dot(orbit.up);
+    const Eigen::Vector3d flat = out - height * orbit.up;
+    if (azimuths.empty()) orbit.first = flat.normalized();
+    radii.push_back(out.norm());
+    elevations.push_back(std::atan2(height, flat.norm()) / deg);
+    azimuths.push_back(std::atan2(flat.dot(orbit.up.cross(orbit.first)), flat.dot(orbit.first)) / deg);
+  }
+  orbit.radius = median(radii);
+  orbit.elevation_deg = median(elevations);
+  std::sort(azimuths.begin(), azimuths.end());
+  double largest_gap = azimuths.front() + 360 - azimuths.back();
+  for (std::size_t i = 1; i < azimuths.size(); ++i)
+    largest_gap = std::max(largest_gap, azimuths[i] - azimuths[i - 1]);
+  orbit.azimuth_span_deg = 360 - largest_gap;
+  return orbit;
+}
+
+Result<NewViews> new_views(const std::vector<PosedView>& posed, const NewViewOptions& options) {
+  ORBITFUSE_TRY(options.validate());
+  if (posed.size() < 2)
+    return fail(ErrorKind::input, "cameras", fmt::format("{} posed", posed.size()),
+                "new views need at least two");
+  const auto orbit = orbit_geometry(posed);
+  if (options.path == PathKind::orbit && !orbit) return tl::unexpected(orbit.error());
+  const bool surround = orbit && orbit->azimuth_span_deg >= orbit_span_deg;
+  if (options.path == PathKind::orbit || (options.path == PathKind::automatic && surround))
+    return along_orbit(posed, *orbit, options);
+  NewViews result = along_path(posed, options);
+  if (options.path == PathKind::automatic)
+    result.described += orbit ? fmt::format(": they cover only {:.0f}° of azimuth", orbit->azimuth_span_deg)
+                              : ": their axes meet nowhere";
+  return result;
+}
+
+}  // namespace orbitfuse::stages

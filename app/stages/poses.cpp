@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/estimate_poses.hpp"
+
+#include <fmt/format.h>
+
+
+#include "app/stages/artifacts.hpp"
+#include "app/stages/stage_list.hpp"
+#include "core/image_io.hpp"
+#include "core/palette.hpp"
+
+namespace orbitfuse::stages {
+namespace {
+using nlohmann::json;
+using pipeline::StageContext;
+using pipeline::StageOutput;
+
+json ladder_json(const std::vector<LadderStep>& ladder) {
+  json list = json::array();
+  for (const LadderStep& step : ladder)
+    list.push_back({{"rung", step.rung}, {"held", step.held}, {"why", step.why},
+                    {"posed", step.posed}, {"total", step.total}, {"seconds", step.seconds}});
+  return list;
+}
+
+std::string held_rung(const ModalityPoses& poses) {
+  for (const LadderStep& step : poses.ladder)
+    if (step.held) return step.rung;
+  return "no rung";
+}
+
+StageOutput describe(const ModalityPoses& poses, bool shared_frame) {
+  StageOutput output;
+  json dropped = json::array();
+  for (const DroppedView& view : poses.dropped) {
+    dropped.push_back({{"view", view.name}, {"why", view.why}});
+    output.warnings.push_back(view.name + " has no pose: " + view.why);
+  }
+  const std::size_t posed = poses.reconstruction.views.size();
+  output.skips = poses.skips;
+  output.metrics = {{"brief", fmt::format("{} of {} views posed by {}", posed, poses.frame_count,
+                                          held_rung(poses))},
+                    {"posed", posed},
+                    {"total", poses.frame_count},
+                    {"rung", held_rung(poses)},
+                    {"ladder", ladder_json(poses.ladder)},
+                    {"dropped", dropped},
+                    {"reprojection_rms_px", poses.reprojection_rms_px},
+                    {"points", poses.reconstruction.points.size()},
+                    {"shared_frame", shared_frame},
+                    {"gates", poses.gates}};
+  return output;
+}
+
+/// The thermal span of the session, for tools that read temperature_bounds.json.
+Status save_session_bounds(const StageContext& context, const SessionInput& input,
+                           const Reconstruction& model) {
+  if (!input.has_temperatures()) return {};
+  std::vector<cv::Mat> frames;
+  for (const PosedView& view : model.views) {
+    ORBITFUSE_ASSIGN(cv::Mat kelvin, read_thermal_k(input.session.folder / view.name));
+    frames.push_back(std::move(kelvin));
+  }
+  const TemperatureSpan span = common_span(frames, 0, 100);
+  return save_temperature_bounds(context.folder, span.low_k, span.high_k);
+}
+
+Result<StageOutput> finish(const StageContext& context, const ModalityPoses& poses, bool shared_frame) {
+  ORBITFUSE_TRY(save_poses(context.folder, poses.reconstruction));
+  ORBITFUSE_TRY(write_json(context.folder / "poses.json", {{"shared_frame", shared_frame}}));
+  std::error_code ignored;
+  std::filesystem::remove_all(context.folder / "work", ignored);
+  return describe(poses, shared_frame);
+}
+
+Result<StageOutput> pose_visible(const StageContext& context, const SessionInput& input,
+                                 const PoseOptions& options) {
+  ORBITFUSE_ASSIGN(const ModalityPoses poses,
+                   estimate_visible_poses(input.session, options, context.folder / "work",
+                                          context.progress));
+  return finish(context, poses, true);
+}
+
+Result<StageOutput> pose_thermal(const StageContext& context, const SessionInput& input,
+                                 const PoseOptions& options) {
+  VisibleScene scene;
+  const bool visible = context.has("poses_visible");
+  if (visible) {
+    ORBITFUSE_ASSIGN(scene.reconstruction, load_poses(context.of("poses_visible"), Modality::visible));
+    if (context.has("depth")) {
+      ORBITFUSE_ASSIGN(scene.depth, load_depth_maps(context.of("depth")));
+    }
+  }
+  ORBITFUSE_ASSIGN(const ThermalPoses poses,
+                   estimate_thermal_poses(input.session, visible ? &scene : nullptr, options,
+                                          context.folder / "work", context.progress));
+  ORBITFUSE_TRY(save_session_bounds(context, input, poses.reconstruction));
+  return finish(context, poses, poses.shares_visible_frame);
+}
+
+}  // namespace
+
+pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
+  const bool visible = modality == Modality::visible;
+  pipeline::Stage stage;
+  stage.name = "poses_" + std::string(name(modality));
+  if (!visible) stage.uses = {"poses_visible", "depth"};
+  stage.options = in.config->settings().to_json("poses");
+  stage.options["seed"] = in.config->seed;
+  stage.inputs_hash = in.session->content.at(modality);
+  stage.absent = [in, modality](const StageContext&) -> std::optional<std::string> {
+    if (in.session->has(modality)) return std::nullopt;
+    return fmt::format("the session has no {} frames", name(modality));
+  };
+  stage.run = [in, visible](const StageContext& context) {
+    return visible ? pose_visible(context, *in.session, in.config->poses)
+                   : pose_thermal(context, *in.session, in.config->poses);
+  };
+  return stage;
+}
+
+}  // namespace orbitfuse::stages

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+
+#include "app/pipeline/usage_clock.hpp"
+#include "app/stages/artifacts.hpp"
+#include "app/stages/rendered_views.hpp"
+#include "app/stages/stage_list.hpp"
+#include "core/file_io.hpp"
+#include "core/image_io.hpp"
+#include "core/palette.hpp"
+#include "core/transforms_json.hpp"
+#include "recon/nerf/nerf.hpp"
+
+namespace orbitfuse::stages {
+namespace {
+using nlohmann::json;
+using pipeline::StageContext;
+using pipeline::StageOutput;
+
+struct Fields {
+  nerf::Field visible, thermal;
+  Similarity3d visible_from_thermal;
+};
+
+Result<Fields> load_fields(const StageContext& context) {
+  Fields fields;
+  if (context.has("train_visible")) {
+    ORBITFUSE_ASSIGN(fields.visible, nerf::Field::load(context.of("train_visible") / field_file));
+  }
+  if (context.has("train_thermal")) {
+    ORBITFUSE_ASSIGN(fields.thermal, nerf::Field::load(context.of("train_thermal") / field_file));
+  }
+  if (!fields.visible.empty() && !fields.thermal.empty() && context.has("register")) {
+    ORBITFUSE_ASSIGN(const json j, read_json(context.of("register") / registration_file));
+    ORBITFUSE_ASSIGN(fields.visible_from_thermal,
+                     similarity_of_json(j.value("visible_from_thermal", json()), "register"));
+  }
+  // Two fields whose frames nobody could relate can't be shown by one camera.
+  if (!fields.visible.empty() && !context.has("register")) fields.thermal = nerf::Field();
+  return fields;
+}
+
+Result<NewViews> choose_views(const StageContext& context, const RenderConfig& config,
+                              Modality frame) {
+  if (config.cameras.empty()) {
+    ORBITFUSE_ASSIGN(const Reconstruction posed,
+                     load_poses(context.of("poses_" + std::string(name(frame))), frame));
+    return new_views(posed.views, config.path);
+  }
+  ORBITFUSE_ASSIGN(const Transforms given, read_transforms_json(config.cameras));
+  NewViews views;
+  for (const TransformsFrame& f : given.frames)
+    views.views.push_back({fmt::format("{:03}", views.views.size()), f.camera.without_distortion(),
+                           f.cam_from_world});
+  if (views.views.empty())
+    return fail(ErrorKind::input, config.cameras, "no frames", "list at least one camera");
+  views.described = fmt::format("{} given cameras", views.views.size());
+  return views;
+}
+
+cv::Mat bgr8_of_rgb(const cv::Mat& rgb) {
+  cv::Mat bytes, bgr;
+  rgb.convertTo(bytes, CV_8U, 255.0);
+  cv::cvtColor(bytes, bgr, cv::COLOR_RGB2BGR);
+  return bgr;
+}
+
+/// Where a ray met nothing the field knows, there is no temperature.
+cv::Mat masked(const cv::Mat& kelvin, const cv::Mat& opacity, double min_opacity) {
+  cv::Mat result = kelvin.clone();
+  result.setTo(std::numeric_limits<float>::quiet_NaN(), opacity < min_opacity);
+  return result;
+}
+
+Result<StageOutput> render(const StageContext& context, const SessionInput& input,
+                           const RenderConfig& config) {
+  ORBITFUSE_ASSIGN(const Fields fields, load_fields(context));
+  const Modality frame = fields.visible.empty() ? Modality::thermal : Modality::visible;
+  ORBITFUSE_ASSIGN(const NewViews chosen, choose_views(context, config, frame));
+  const bool gray = !input.has_temperatures();
+  const Similarity3d thermal_from_visible = fields.visible_from_thermal.inverse();
+
+  const pipeline::UsageClock clock;
+  std::vector<ViewFiles> files;
+  std::vector<cv::Mat> temperatures;
+  Transforms transforms;
+  for (const PosedView& view : chosen.views) {
+    ORBITFUSE_TRY(context.progress.check("render"));
+    const double done = static_cast<double>(files.size()), total = static_cast<double>(chosen.views.size());
+    context.progress.report({"render", done, total,
+                             done > 0 ? clock.wall_s() / done * (total - done) : -1, view.name});
+    ViewFiles f;
+    f.name = view.name;
+    if (!fields.visible.empty()) {
+      ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
+                       nerf::render(fields.visible, view.camera, view.cam_from_world,
+                                    config.quality, context.progress));
+      f.visible = "visible/" + view.name + ".png";
+      f.depth = "depth/" + view.name + ".tiff";
+      f.visible_opacity = "opacity/" + view.name + "_visible.tiff";
+      ORBITFUSE_TRY(write_png(context.folder / f.visible, bgr8_of_rgb(seen.color)));
+      ORBITFUSE_TRY(write_float_tiff(context.folder / f.depth, seen.depth));
+      ORBITFUSE_TRY(write_float_tiff(context.folder / f.visible_opacity, seen.opacity));
+    }
+    if (!fields.thermal.empty()) {
+      const Rigid3d cam_from_thermal = frame == Modality::thermal
+                                           ? view.cam_from_world
+                                           : rebase(view.cam_from_world, thermal_from_visible);
+      ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
+                       nerf::render(fields.thermal, view.camera, cam_from_thermal, config.quality,
+                                    context.progress));
+      f.thermal = "thermal/" + view.name + (gray ? ".png" : ".tiff");
+      f.thermal_opacity = "opacity/" + view.name + "_thermal.tiff";
+      temperatures.push_back(masked(seen.color, seen.opacity, config.min_opacity));
+      if (gray) {
+        cv::Mat levels;
+        seen.color.convertTo(levels, CV_8U);
+        ORBITFUSE_TRY(write_png(context.folder / f.thermal, levels));
+      } else {
+        ORBITFUSE_TRY(write_thermal_tiff(context.folder / f.thermal, temperatures.back()));
+      }
+      ORBITFUSE_TRY(write_float_tiff(context.folder / f.thermal_opacity, seen.opacity));
+      if (f.depth.empty()) {
+        f.depth = "depth/" + view.name + ".tiff";
+        ORBITFUSE_TRY(write_float_tiff(context.folder / f.depth, seen.depth));
+      }
+    }
+    TransformsFrame entry{f.visible.empty() ? f.thermal : f.visible, {}, view.camera, view.cam_from_world};
+    if (!f.thermal.empty()) entry.thermal_file_path = f.thermal;
+    transforms.frames.push_back(std::move(entry));
+    files.push_back(std::move(f));
+  }
+
+  StageOutput output;
+  output.metrics["brief"] = fmt::format(
+      "{}, {}, {:.2f} s a view", chosen.described,
+      fields.thermal.empty() ? "visible" : fields.visible.empty() ? "thermal" : "both modalities",
+      clock.wall_s() / static_cast<double>(files.size()));
+  output.metrics["views"] = files.size();
+  RenderedViews rendered;
+  rendered.thermal_is_gray = gray;
+  if (!temperatures.empty()) {
+    rendered.span = gray ? TemperatureSpan{0, 255} : common_span(temperatures);
+    ORBITFUSE_ASSIGN(const cv::Mat colors, palette(config.palette));
+    for (std::size_t i = 0; i < files.size(); ++i) {
+      files[i].palette = "palette/" + files[i].name + ".png";
+      ORBITFUSE_TRY(write_png(context.folder / files[i].palette,
+                              colorize(temperatures[i], rendered.span, colors)));
+    }
+    if (!gray)
+      ORBITFUSE_TRY(save_temperature_bounds(context.folder, rendered.span.low_k, rendered.span.high_k));
+  }
+  rendered.views = std::move(files);
+  ORBITFUSE_TRY(write_transforms_json(context.folder / "transforms.json", transforms));
+  ORBITFUSE_TRY(save_rendered_views(context.folder, rendered));
+  return output;
+}
+
+}  // namespace
+
+pipeline::Stage render_stage(const StageInputs& in) {
+  pipeline::Stage stage;
+  stage.name = "render";
+  stage.uses = {"poses_visible", "poses_thermal", "train_visible", "train_thermal", "register"};
+  stage.options = in.config->settings().to_json("render");
+  stage.options["cameras"] = in.config->render.cameras;
+  if (!in.config->render.cameras.empty())
+    stage.inputs_hash = file_hash(in.config->render.cameras).value_or("missing");
+  stage.absent = [](const StageContext& context) -> std::optional<std::string> {
+    if (context.has("train_visible") || context.has("train_thermal")) return std::nullopt;
+    return "no field was trained";
+  };
+  stage.run = [in](const StageContext& context) {
+    return render(context, *in.session, in.config->render);
+  };
+  return stage;
+}
+
+}  // namespace orbitfuse::stages

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/stages/rendered_views.hpp"
+
+#include "app/stages/artifacts.hpp"
+
+namespace orbitfuse::stages {
+using nlohmann::json;
+
+namespace {
+
+constexpr const char* views_file = "views.json";
+
+/// The file fields of a view by their JSON names.
+template <class View, class Visit>
+void visit_files(View& view, Visit visit) {
+  visit("name", view.name);
+  visit("visible", view.visible);
+  visit("thermal", view.thermal);
+  visit("palette", view.palette);
+  visit("depth", view.depth);
+  visit("visible_opacity", view.visible_opacity);
+  visit("thermal_opacity", view.thermal_opacity);
+}
+
+}  // namespace
+
+Status save_rendered_views(const std::filesystem::path& folder, const RenderedViews& rendered) {
+  json views = json::array();
+  for (const ViewFiles& view : rendered.views) {
+    json j = json::object();
+    visit_files(view, [&](const char* key, const std::string& value) {
+      if (!value.empty()) j[key] = value;
+    });
+    views.push_back(std::move(j));
+  }
+  return write_json(folder / views_file,
+                    {{"schema", 1},
+                     {"conventions", "thermal: 16-bit centikelvin; depth: along the optical axis, "
+                                     "units of the visible reconstruction; poses in transforms.json"},
+                     {"thermal_is_gray", rendered.thermal_is_gray},
+                     {"span_low", rendered.span.low_k},
+                     {"span_high", rendered.span.high_k},
+                     {"views", views}});
+}
+
+Result<RenderedViews> load_rendered_views(const std::filesystem::path& folder) {
+  ORBITFUSE_ASSIGN(const json j, read_json(folder / views_file));
+  RenderedViews rendered;
+  try {
+    j.at("thermal_is_gray").get_to(rendered.thermal_is_gray);
+    j.at("span_low").get_to(rendered.span.low_k);
+    j.at("span_high").get_to(rendered.span.high_k);
+    for (const json& v : j.at("views")) {
+      ViewFiles view;
+      visit_files(view, [&](const char* key, std::string& value) { value = v.value(key, std::string()); });
+      rendered.views.push_back(std::move(view));
+    }
+  } catch (const json::exception& e) {
+    return fail(ErrorKind::input, (folder / views_file).string(), e.what(), "run the render stage again");
+  }
+  return rendered;
+}
+
+}  // namespace orbitfuse::stages

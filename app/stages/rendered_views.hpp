@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/palette.hpp"
+#include "core/result.hpp"
+
+namespace orbitfuse::stages {
+
+inline constexpr const char* registration_file = "registration.json";
+
+/// Files of one new view, relative to the render stage's folder; empty = not rendered.
+struct ViewFiles {
+  std::string name;
+  std::string visible, thermal, palette, depth, visible_opacity, thermal_opacity;
+};
+
+struct RenderedViews {
+  std::vector<ViewFiles> views;
+  TemperatureSpan span;          ///< one for all views; gray levels when thermal_is_gray
+  bool thermal_is_gray = false;
+
+  bool has_both() const {
+    return !views.empty() && !views[0].visible.empty() && !views[0].thermal.empty();
+  }
+};
+
+Status save_rendered_views(const std::filesystem::path& folder, const RenderedViews& views);
+Result<RenderedViews> load_rendered_views(const std::filesystem::path& folder);
+
+}  // namespace orbitfuse::stages

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/stages/session_input.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <mutex>
+
+#include "core/file_io.hpp"
+#include "core/image_io.hpp"
+#include "core/parallel.hpp"
+
+namespace orbitfuse::stages {
+namespace {
+namespace fs = std::filesystem;
+
+Status check_size(const FrameRecord& frame, const fs::path& path, int width, int height) {
+  if (frame.width == 0 || (frame.width == width && frame.height == height)) return {};
+  return fail(ErrorKind::input, path.string(),
+              fmt::format("{}x{} pixels, the manifest says {}x{}", width, height, frame.width,
+                          frame.height),
+              "import the session again from the original files");
+}
+
+/// Reads a frame once as its stage will, so that damage is found before any work is spent.
+Status check_frame(const Session& session, const FrameRecord& frame, std::string& hash) {
+  const fs::path path = session.path_of(frame);
+  ORBITFUSE_ASSIGN(hash, file_hash(path));
+  if (!frame.content_hash.empty() && frame.content_hash == hash) return {};
+  // Not the recorded bytes: decoding says whether it is damaged or only edited.
+  cv::Mat image;
+  if (frame.modality == Modality::visible) {
+    ORBITFUSE_ASSIGN(image, read_visible(path));
+  } else if (frame.thermal_is_gray) {
+    ORBITFUSE_ASSIGN(image, read_image(path));
+  } else {
+    ORBITFUSE_ASSIGN(image, read_thermal_k(path));
+  }
+  return check_size(frame, path, image.cols, image.rows);
+}
+
+}  // namespace
+
+int SessionInput::count(Modality modality) const {
+  return static_cast<int>(session.frames_of(modality, false).size());
+}
+
+bool SessionInput::has_temperatures() const {
+  return std::any_of(session.frames.begin(), session.frames.end(), [](const FrameRecord& f) {
+    return f.modality == Modality::thermal && !f.thermal_is_gray;
+  });
+}
+
+Result<SessionInput> open_session_input(const fs::path& folder, const Progress& progress) {
+  SessionInput input;
+  ORBITFUSE_ASSIGN(input.session, open_session(folder));
+  const Session& session = input.session;
+  if (session.frames.empty())
+    return fail(ErrorKind::input, folder.string(), "the session has no frames",
+                "record or import some first");
+
+  std::vector<std::string> hashes(session.frames.size());
+  std::vector<Status> problems(session.frames.size());
+  parallel_for(static_cast<int>(session.frames.size()), [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (!progress.cancelled()) problems[k] = check_frame(session, session.frames[k], hashes[k]);
+  });
+  ORBITFUSE_TRY(progress.check("session"));
+  for (const Status& problem : problems) ORBITFUSE_TRY(problem);
+
+  for (const Modality modality : {Modality::visible, Modality::thermal}) {
+    std::string text;
+    for (const DeviceInfo& device : session.devices)
+      if (device.modality == modality) text += manifest_line(device) + "\n";
+    for (std::size_t i = 0; i < session.frames.size(); ++i)
+      if (session.frames[i].modality == modality)
+        text += manifest_line(session.frames[i]) + hashes[i] + "\n";
+    input.content[modality] = content_hash(text);
+  }
+  return input;
+}
+
+}  // namespace orbitfuse::stages

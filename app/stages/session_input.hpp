@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "core/progress.hpp"
+#include "core/session.hpp"
+
+namespace orbitfuse::stages {
+
+/// A session as the pipeline reads it: opened, every frame's file present and as recorded.
+struct SessionInput {
+  Session session;
+  std::map<Modality, std::string> content;  ///< hash of all a modality's frames and devices
+
+  int count(Modality modality) const;  ///< frames at stations (tracking frames excluded)
+  bool has(Modality modality) const { return count(modality) > 0; }
+  /// The thermal frames hold temperatures.
+  bool has_temperatures() const;
+};
+
+/// Input error that names the first frame whose file is missing, cut, or no image of the kind its
+/// modality needs, and what to do.
+Result<SessionInput> open_session_input(const std::filesystem::path& folder,
+                                        const Progress& progress);
+
+}  // namespace orbitfuse::stages

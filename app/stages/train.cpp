@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include "app/stages/artifacts.hpp"
+#include "app/stages/stage_list.hpp"
+#include "app/stages/training_data.hpp"
+#include "core/ply.hpp"
+#include "recon/nerf/nerf.hpp"
+
+namespace orbitfuse::stages {
+namespace {
+using nlohmann::json;
+using pipeline::StageContext;
+using pipeline::StageOutput;
+
+json curve_json(const nerf::TrainReport& report) {
+  json curve = json::array();
+  for (const nerf::CurvePoint& p : report.curve)
+    curve.push_back({{"cpu_s", p.cpu_s}, {"step", p.step}, {"heldout_psnr", p.heldout_psnr},
+                     {"train_psnr", p.train_psnr}, {"samples_per_ray", p.samples_per_ray}});
+  return curve;
+}
+
+/// The field that lends its geometry: the visible one, when thermal poses live in its frame.
+Result<nerf::Field> guide_field(const StageContext& context) {
+  if (!context.has("train_visible")) return nerf::Field();
+  ORBITFUSE_ASSIGN(const json poses, read_json(context.of("poses_thermal") / "poses.json"));
+  if (!poses.value("shared_frame", false)) return nerf::Field();
+  return nerf::Field::load(context.of("train_visible") / field_file);
+}
+
+Result<StageOutput> train(const StageContext& context, const SessionInput& input,
+                          const TrainConfig& config, Modality modality) {
+  const std::string poses = "poses_" + std::string(name(modality));
+  ORBITFUSE_ASSIGN(const Reconstruction model, load_poses(context.of(poses), modality));
+  ORBITFUSE_ASSIGN(nerf::Dataset data,
+                   training_data(input, model, config.max_width_px, context.progress));
+  if (modality == Modality::visible && context.has("depth")) {
+    ORBITFUSE_ASSIGN(data.depth, load_depth_maps(context.of("depth")));
+  }
+  nerf::TrainOptions options = config.options;
+  StageOutput output;
+  nerf::Field guide;
+  if (modality == Modality::thermal && options.shared_geometry) {
+    ORBITFUSE_ASSIGN(guide, guide_field(context));
+    if (guide.empty()) {
+      options.shared_geometry = false;
+      output.skips.push_back({"shared geometry", "no visible field in the same frame",
+                              "the thermal field learns its own density"});
+    }
+  }
+  options.checkpoint = context.folder / "checkpoint.bin";
+  options.resume = context.resume;
+
+  nerf::Field field;
+  ORBITFUSE_ASSIGN(const nerf::TrainReport report,
+                   nerf::train(data, options, context.progress, field, guide.empty() ? nullptr : &guide));
+  ORBITFUSE_TRY(field.save(context.folder / field_file));
+  ORBITFUSE_TRY(write_json(context.folder / "curve.json", curve_json(report)));
+  ORBITFUSE_ASSIGN(const PointCloud cloud,
+                   nerf::export_point_cloud(field, model.views, config.cloud, context.progress));
+  ORBITFUSE_TRY(write_ply(context.folder / "cloud.ply", cloud));
+  std::error_code ignored;
+  std::filesystem::remove(options.checkpoint, ignored);
+
+  output.skips.insert(output.skips.end(), report.skips.begin(), report.skips.end());
+  if (report.skipped_steps > 0)
+    output.warnings.push_back(fmt::format("{} training steps dropped: a gradient was not finite",
+                                          report.skipped_steps));
+  output.metrics = {{"brief", report.brief()},
+                    {"iterations", report.iterations},
+                    {"stop", nerf::name(report.stop)},
+                    {"best_step", report.best_step},
+                    {"heldout_psnr_db", report.best_psnr},
+                    {"heldout", report.heldout},
+                    {"cloud_points", cloud.size()},
+                    {"width_px", data.views.empty() ? 0 : data.views[0].camera.width},
+                    {"samples_per_ray",
+                     report.rays > 0 ? static_cast<double>(report.samples) / static_cast<double>(report.rays) : 0.0}};
+  return output;
+}
+
+}  // namespace
+
+pipeline::Stage train_stage(const StageInputs& in, Modality modality) {
+  const std::string modality_name(name(modality));
+  const bool visible = modality == Modality::visible;
+  pipeline::Stage stage;
+  stage.name = "train_" + modality_name;
+  stage.needs = {"poses_" + modality_name};
+  stage.uses = {visible ? "depth" : "train_visible"};
+  stage.options = in.config->settings().to_json("train." + modality_name);
+  stage.options["seed"] = in.config->seed;
+  stage.inputs_hash = in.session->content.at(modality);
+  stage.run = [in, modality](const StageContext& context) {
+    return train(context, *in.session, in.config->train(modality), modality);
+  };
+  return stage;
+}
+
+}  // namespace orbitfuse::stages

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/stages/training_data.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "core/image_io.hpp"
+#include "core/parallel.hpp"
+
+namespace orbitfuse::stages {
+
+Result<cv::Mat> field_image(const std::filesystem::path& file, Modality modality, bool gray) {
+  if (modality == Modality::visible) {
+    ORBITFUSE_ASSIGN(const cv::Mat bgr, read_visible(file));
+    return nerf::rgb_of_bgr8(bgr);
+  }
+  if (!gray) return read_thermal_k(file);
+  ORBITFUSE_ASSIGN(cv::Mat levels, read_image(file));
+  if (levels.channels() == 3) cv::cvtColor(levels, levels, cv::COLOR_BGR2GRAY);
+  levels.convertTo(levels, CV_32F);
+  return levels;
+}
+
+Result<nerf::Dataset> training_data(const SessionInput& input, const Reconstruction& model,
+                                    int max_width_px, const Progress& progress) {
+  nerf::Dataset data;
+  data.modality = model.modality;
+  data.thermal_is_gray = model.modality == Modality::thermal && !input.has_temperatures();
+  data.points = model.points;
+  data.views.resize(model.views.size());
+  std::vector<Status> problems(model.views.size());
+  parallel_for(static_cast<int>(model.views.size()), [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    const PosedView& view = model.views[k];
+    if (progress.cancelled()) return;
+    const auto path = input.session.folder / view.name;
+    auto image = field_image(path, model.modality, data.thermal_is_gray);
+    if (!image) {
+      problems[k] = tl::unexpected(image.error());
+      return;
+    }
+    if (image->cols != view.camera.width || image->rows != view.camera.height) {
+      problems[k] = fail(ErrorKind::input, path.string(),
+                         fmt::format("{}x{} pixels, its camera has {}x{}", image->cols, image->rows,
+                                     view.camera.width, view.camera.height),
+                         "frames of one camera must have one size; import the session again");
+      return;
+    }
+    nerf::TrainingView full{view.name, view.camera, view.cam_from_world, *image};
+    if (view.camera.width <= max_width_px) {
+      data.views[k] = std::move(full);
+    } else {
+      const double scale = static_cast<double>(max_width_px) / view.camera.width;
+      data.views[k] = nerf::resized(full, max_width_px,
+                                    std::max(1, static_cast<int>(std::lround(scale * view.camera.height))));
+    }
+  });
+  ORBITFUSE_TRY(progress.check("train"));
+  for (const Status& problem : problems) ORBITFUSE_TRY(problem);
+  for (SparsePoint& point : data.points)
+    for (Observation& seen : point.track) {
+      const auto k = static_cast<std::size_t>(seen.view);
+      const Camera &from = model.views[k].camera, &to = data.views[k].camera;
+      seen.pixel.x() *= static_cast<double>(to.width) / from.width;
+      seen.pixel.y() *= static_cast<double>(to.height) / from.height;
+    }
+  return data;
+}
+
+}  // namespace orbitfuse::stages

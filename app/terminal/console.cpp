@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/terminal/console.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+
+
+namespace orbitfuse::terminal {
+namespace {
+
+constexpr auto redraw_interval = std::chrono::milliseconds(100);
+constexpr int bar_width = 24;
+
+std::string bar_line(const ProgressEvent& e) {
+  const double share = e.total > 0 ? std::clamp(e.done / e.total, 0.0, 1.0) : 0.0;
+  const int filled = static_cast<int>(std::lround(share * bar_width));
+  std::string line = fmt::format("{:<14} [{}{}] {:3.0f} %", e.stage, std::string(filled, '='),
+                                 std::string(bar_width - filled, ' '), 100 * share);
+  if (e.eta_s >= 0) line += "  " + format_duration(e.eta_s) + " left";
+  if (!e.detail.empty()) line += "  " + e.detail;
+  return line.size() > 110 ? line.substr(0, 110) : line;
+}
+
+}  // namespace
+
+ConsoleOptions detect_terminal() {
+  const char* term = std::getenv("TERM");
+  ConsoleOptions options;
+  options.terminal = isatty(STDERR_FILENO) && term && std::string(term) != "dumb";
+  const char* no_color = std::getenv("NO_COLOR");
+  options.color = options.terminal && !(no_color && *no_color);
+  return options;
+}
+
+std::string format_duration(double seconds) {
+  const long s = std::lround(std::max(0.0, seconds));
+  return s >= 3600 ? fmt::format("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60)
+                   : fmt::format("{}:{:02}", s / 60, s % 60);
+}
+
+void Console::clear_bar() {
+  if (bar_drawn_) std::fputs("\r\033[K", stderr);
+  bar_drawn_ = false;
+}
+
+void Console::write_stdout(const std::string& line) {
+  std::fwrite(line.data(), 1, line.size(), stdout);
+  std::fputc('\n', stdout);
+  std::fflush(stdout);
+}
+
+void Console::message(const char* label, const char* color, const std::string& text) {
+  const std::lock_guard lock(mutex_);
+  clear_bar();
+  if (options_.color && *color)
+    fmt::print(stderr, "{}{}\033[0m{}\n", color, label, text);
+  else
+    fmt::print(stderr, "{}{}\n", label, text);
+}
+
+void Console::info(const std::string& text) {
+  if (options_.verbosity >= 0) message("", "", text);
+}
+
+void Console::detail(const std::string& text) {
+  if (options_.verbosity > 0) message("", "", text);
+}
+
+void Console::warning(const std::string& text) {
+  if (options_.verbosity >= 0) message("warning: ", "\033[33m", text);
+  event({{"event", "warning"}, {"message", text}});
+}
+
+void Console::error(const Error& error) {
+  message("error: ", "\033[31m", error.message());
+}
+
+void Console::progress(const ProgressEvent& e) {
+  const std::lock_guard lock(mutex_);
+  const auto now = std::chrono::steady_clock::now();
+  const bool due = now - last_progress_ >= redraw_interval || e.stage != last_stage_ ||
+                   e.done >= e.total;
+  if (!due) return;
+  last_progress_ = now;
+  last_stage_ = e.stage;
+  if (options_.json) {
+    nlohmann::json j = {{"event", "progress"}, {"stage", e.stage}, {"done", e.done},
+                        {"total", e.total}};
+    j["eta_s"] = e.eta_s >= 0 ? nlohmann::json(e.eta_s) : nlohmann::json(nullptr);
+    if (!e.detail.empty()) j["detail"] = e.detail;
+    write_stdout(j.dump());
+  } else if (options_.terminal && options_.verbosity >= 0) {
+    fmt::print(stderr, "\r\033[K{}", bar_line(e));
+    std::fflush(stderr);
+    bar_drawn_ = true;
+  }
+}
+
+void Console::data(const std::string& line) {
+  if (options_.json) return;
+  const std::lock_guard lock(mutex_);
+  clear_bar();
+  write_stdout(line);
+}
+
+void Console::event(nlohmann::json event) {
+  if (!options_.json) return;
+  const std::lock_guard lock(mutex_);
+  write_stdout(event.dump());
+}
+
+void Console::result(const std::string& verb, nlohmann::json body) {
+  body["event"] = "result";
+  body["schema"] = json_schema;
+  body["verb"] = verb;
+  event(std::move(body));
+}
+
+}  // namespace orbitfuse::terminal

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "core/progress.hpp"
+#include "core/result.hpp"
+
+namespace orbitfuse::terminal {
+
+/// Schema of the --json stream; raised when a field changes its meaning.
+inline constexpr int json_schema = 1;
+
+struct ConsoleOptions {
+  bool json = false;     ///< NDJSON events on stdout instead of text
+  int verbosity = 0;     ///< < 0: errors only; > 0: details
+  bool terminal = false; ///< stderr is one: draw bars
+  bool color = false;
+};
+
+/// Data goes to stdout, messages and the bar to stderr. Safe to call from worker threads.
+class Console {
+ public:
+  explicit Console(ConsoleOptions options) : options_(options) {}
+  ~Console() { clear_bar(); }
+
+  bool json() const { return options_.json; }
+  bool verbose() const { return options_.verbosity > 0; }
+  void info(const std::string& message);
+  void detail(const std::string& message);  ///< with -v only
+  void warning(const std::string& message);
+  void error(const Error& error);
+  void progress(const ProgressEvent& event);
+
+  /// A line of data for people; nothing with --json.
+  void data(const std::string& line);
+  /// An intermediate event; nothing without --json.
+  void event(nlohmann::json event);
+  /// The last line of --json: {"event":"result","schema":1,"verb":...,"ok":...}.
+  void result(const std::string& verb, nlohmann::json body);
+
+ private:
+  void message(const char* label, const char* color, const std::string& text);
+  void clear_bar();
+  void write_stdout(const std::string& line);
+
+  ConsoleOptions options_;
+  std::mutex mutex_;
+  bool bar_drawn_ = false;
+  std::string last_stage_;
+  std::chrono::steady_clock::time_point last_progress_{};
+};
+
+/// Reads NO_COLOR, TERM and isatty.
+ConsoleOptions detect_terminal();
+/// "1:05" or "2:03:04".
+std::string format_duration(double seconds);
+
+}  // namespace orbitfuse::terminal

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include "app/cli/verb.hpp"
+#include "core/temperature.hpp"
+#include "drivers/stills/import.hpp"
+
+namespace orbitfuse::cli {
+namespace {
+
+struct Options {
+  std::string session;
+  ImportOptions import;
+  std::string scale = "auto";
+  std::optional<double> kelvin_per_count, kelvin_offset;
+  std::optional<double> reflected_c, air_c, humidity_percent;
+  std::optional<double> spacing_deg;
+  int loops = 1;
+  std::vector<double> elevations_deg;
+};
+
+const std::vector<std::pair<std::string, ThermalScale>> scales = {
+    {"auto", ThermalScale::automatic},
+    {"centikelvin", ThermalScale::centikelvin},
+    {"linear", ThermalScale::linear},
+    {"raw", ThermalScale::raw_counts},
+};
+
+void add_sources(CLI::App& app, Options& o) {
+  constexpr const char* group = "Sources";
+  app.add_option("--visible", o.import.visible, "Photos: folders or files")->group(group);
+  app.add_option("--thermal", o.import.thermal,
+                 "Radiometric JPEG, 16-bit TIFF or PNG, 8-bit images: folders or files")->group(group);
+  app.add_option("--visible-tracking", o.import.visible_tracking, "Photos taken between stations")
+      ->group(group);
+  app.add_option("--thermal-tracking", o.import.thermal_tracking, "Thermal frames between stations")
+      ->group(group);
+  app.add_flag("--embedded-visible", o.import.embedded_visible,
+               "Also take the photos embedded in radiometric JPEGs")->group(group);
+}
+
+void add_poses_known(CLI::App& app, Options& o) {
+  constexpr const char* group = "Known poses and stations";
+  app.add_option("--transforms", o.import.transforms_json, "nerfstudio transforms.json")->group(group);
+  app.add_option("--visible-colmap", o.import.visible_colmap, "COLMAP model of the photos")->group(group);
+  app.add_option("--thermal-colmap", o.import.thermal_colmap, "COLMAP model of the thermal frames")
+      ->group(group);
+  app.add_option("--ground-truth", o.import.ground_truth, "Exact poses (docs/formats.md)")->group(group);
+  app.add_flag("--stations-only", o.import.ground_truth_stations_only,
+               "Of --ground-truth take stations and focal lengths, not the poses")->group(group);
+  app.add_option("--station-spacing-deg", o.spacing_deg,
+                 "The frames were taken in order at stations this far apart")->group(group);
+  app.add_option("--loops", o.loops, "Loops of stations in each modality")->group(group);
+  app.add_option("--elevations-deg", o.elevations_deg, "Elevation of each loop, if known")->group(group);
+  app.add_option("--visible-focal-px", o.import.visible_focal_px, "Where the files name none")->group(group);
+  app.add_option("--thermal-focal-px", o.import.thermal_focal_px, "Where the files name none")->group(group);
+}
+
+void add_radiometry(CLI::App& app, Options& o) {
+  constexpr const char* group = "Radiometry";
+  std::vector<std::string> words;
+  for (const auto& [word, scale] : scales) words.push_back(word);
+  app.add_option("--thermal-scale", o.scale, "How samples become temperatures")
+      ->check(CLI::IsMember(words))->capture_default_str()->group(group);
+  app.add_option("--kelvin-per-count", o.kelvin_per_count, "For --thermal-scale linear")->group(group);
+  app.add_option("--kelvin-offset", o.kelvin_offset, "For --thermal-scale linear")->group(group);
+  app.add_option("--emissivity", o.import.object.emissivity, "Instead of the files' own")->group(group);
+  app.add_option("--distance-m", o.import.object.distance_m, "Instead of the files' own")->group(group);
+  app.add_option("--reflected-c", o.reflected_c, "Reflected temperature")->group(group);
+  app.add_option("--air-c", o.air_c, "Air temperature")->group(group);
+  app.add_option("--humidity", o.humidity_percent, "Relative humidity in percent")->group(group);
+}
+
+/// Temperatures and percentages of the command line in the units of the library.
+void resolve(Options& o) {
+  for (const auto& [word, scale] : scales)
+    if (word == o.scale) o.import.thermal_scale = scale;
+  if (o.kelvin_per_count) o.import.kelvin_per_count = *o.kelvin_per_count;
+  if (o.kelvin_offset) o.import.kelvin_offset = *o.kelvin_offset;
+  if (o.reflected_c) o.import.object.reflected_temperature_k = kelvin_from_celsius(*o.reflected_c);
+  if (o.air_c) o.import.object.atmospheric_temperature_k = kelvin_from_celsius(*o.air_c);
+  if (o.humidity_percent) o.import.object.relative_humidity = *o.humidity_percent / 100;
+  if (o.spacing_deg) {
+    DeclaredStations stations;
+    stations.spacing_deg = *o.spacing_deg;
+    stations.loops = o.loops;
+    stations.elevations_deg = o.elevations_deg;
+    o.import.visible_stations = o.import.thermal_stations = stations;
+  }
+}
+
+Status run(Context& context, Options& o) {
+  resolve(o);
+  ORBITFUSE_TRY(o.import.validate());
+  if (context.common.dry_run) {
+    context.console.info("would import into " + o.session);
+    return {};
+  }
+  ORBITFUSE_ASSIGN(const ImportReport report, import_session(o.import, o.session, context.progress));
+  for (const std::string& warning : report.warnings) context.console.warning(warning);
+  context.console.data(fmt::format(
+      "{}: {} visible and {} thermal frames{}, {} tracking frames, {} with a pose, {} with a station",
+      o.session, report.visible, report.thermal,
+      report.thermal == 0 ? "" : report.has_temperatures ? " with temperatures" : " without temperatures",
+      report.tracking, report.with_pose, report.with_station));
+  context.result = {{"session", o.session},         {"visible", report.visible},
+                    {"thermal", report.thermal},    {"tracking", report.tracking},
+                    {"with_pose", report.with_pose}, {"with_station", report.with_station},
+                    {"has_temperatures", report.has_temperatures},
+                    {"warnings", report.warnings}};
+  return {};
+}
+
+}  // namespace
+
+Action add_import(CLI::App& app) {
+  const auto options = std::make_shared<Options>();
+  app.add_option("session", options->session, "New session folder")->required();
+  add_sources(app, *options);
+  add_poses_known(app, *options);
+  add_radiometry(app, *options);
+  return [options](Context& context) { return run(context, *options); };
+}
+
+}  // namespace orbitfuse::cli

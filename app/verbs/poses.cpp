@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/cli/run_stages.hpp"
+#include "app/cli/verb.hpp"
+
+namespace orbitfuse::cli {
+
+Action add_poses(CLI::App& app) {
+  const auto folders = std::make_shared<StageFolders>();
+  add_folders(app, *folders);
+  return [folders](Context& context) {
+    return run_stages(context, *folders, {"poses_visible", "poses_thermal"});
+  };
+}
+
+}  // namespace orbitfuse::cli

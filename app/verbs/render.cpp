@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/cli/run_stages.hpp"
+#include "app/cli/verb.hpp"
+
+namespace orbitfuse::cli {
+namespace {
+
+struct Options {
+  StageFolders folders;
+  std::string cameras, path;
+  std::optional<int> views, width;
+};
+
+}  // namespace
+
+Action add_render(CLI::App& app) {
+  const auto options = std::make_shared<Options>();
+  add_folders(app, options->folders);
+  app.add_option("--cameras", options->cameras, "transforms.json with the views, in the visible frame");
+  app.add_option("--path", options->path, "Where new cameras stand (render.path)")
+      ->check(CLI::IsMember({"auto", "orbit", "path"}));
+  app.add_option("--views", options->views, "New cameras (render.views)");
+  app.add_option("--width", options->width, "Pixels (render.width_px)");
+  return [options](Context& context) -> Status {
+    if (!options->cameras.empty()) context.config.render.cameras = options->cameras;
+    config::Settings settings = context.config.settings();
+    if (!options->path.empty()) ORBITFUSE_TRY(settings.apply("render.path=" + options->path));
+    if (options->views) context.config.render.path.views = *options->views;
+    if (options->width) context.config.render.path.width_px = *options->width;
+    ORBITFUSE_TRY(context.config.validate());
+    return run_stages(context, options->folders, {"render"});
+  };
+}
+
+}  // namespace orbitfuse::cli

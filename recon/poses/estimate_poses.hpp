@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/progress.hpp"
+#include "core/reconstruction.hpp"
+#include "core/result.hpp"
+#include "core/session.hpp"
+
+// Camera poses of each modality by a ladder of methods; the first rung whose result passes the
+// gates holds, and the result says which and why.
+namespace orbitfuse {
+
+struct PoseOptions {
+  /// COLMAP's command; a bare name is looked up on PATH.
+  std::string colmap = "colmap";
+  /// Poses that the session already carries (transforms.json, ground truth) replace the stage.
+  bool use_known_poses = true;
+  /// Thermal frames recorded between stations tie neighbouring stations together.
+  bool use_tracking_frames = true;
+  /// 0 = all cores.
+  int threads = 0;
+  std::uint64_t seed = 1;
+  /// Longest image side given to COLMAP. Features grow with the area and matching with their
+  /// square; 800 px poses an orbit of 24 views to 0.03 % of its extent (docs/benchmarks/poses.md).
+  int max_image_side_px = 800;
+  /// SIFT features per view, for the same reason.
+  int max_features = 3000;
+  /// Below this share of posed views a rung does not hold and the next one is tried.
+  double min_posed_ratio = 0.8;
+  /// Root mean square reprojection error above which a COLMAP model is not believed.
+  double max_reprojection_rms_px = 2.0;
+  /// A model whose camera centres leave the stations' orbit by more than this share of the orbit's
+  /// radius (median) contradicts the capture and is not believed; it catches a merged front and
+  /// back of a near-symmetric object.
+  double max_station_residual = 0.25;
+
+  /// Usage error naming the field.
+  Status validate() const;
+};
+
+/// One method tried, and how it ended.
+struct LadderStep {
+  std::string rung;  ///< "known poses", "COLMAP, default settings", "cross-modal", ...
+  bool held = false;
+  std::string why;  ///< figures behind the verdict, in words
+  int posed = 0, total = 0;
+  double seconds = 0;
+};
+
+/// A view without a supported pose, dropped rather than kept.
+struct DroppedView {
+  std::string name, why;
+};
+
+struct ModalityPoses {
+  Reconstruction reconstruction;
+  int frame_count = 0;  ///< views that could have been posed
+  std::vector<DroppedView> dropped;
+  std::vector<LadderStep> ladder;
+  /// Root mean square over all observations; 0 where the rung has none.
+  double reprojection_rms_px = 0;
+  /// Figures that need no ground truth, by name ("posed_ratio", "median_baseline_deg", ...).
+  std::map<std::string, double> gates;
+  std::vector<Skip> skips;
+
+  double posed_ratio() const {
+    return frame_count > 0 ? static_cast<double>(reconstruction.views.size()) / frame_count : 0.0;
+  }
+};
+
+/// Thermal poses, with the frame they live in.
+struct ThermalPoses : ModalityPoses {
+  /// True: the world is the visible reconstruction's, registration has nothing left to find.
+  /// False: a frame of its own, related to the visible one by an unknown similarity.
+  bool shares_visible_frame = false;
+};
+
+/// The visible world that thermal views are localised in; images come from the session's paths.
+struct VisibleScene {
+  Reconstruction reconstruction;
+  std::vector<DepthMap> depth;  ///< dense geometry of its views; may be empty (less accurate)
+};
+
+/// Visible views: known poses, else COLMAP with orbit-limited pairs and ever more relaxed
+/// settings, then bundle adjustment. World frame: z up, origin at the point the cameras look at,
+/// median camera distance 1 (unless poses are known: then theirs).
+/// Errors: input (no or one frame, unreadable file), unavailable (no COLMAP and no known poses),
+/// quality (no rung held; the message lists each rung and why), cancelled.
+Result<ModalityPoses> estimate_visible_poses(const Session& session, const PoseOptions& options,
+                                             const std::filesystem::path& workdir,
+                                             const Progress& progress);
+
+/// Thermal views: known poses; else localisation in `visible` (nullptr: none) from the orbit prior
+/// of capture order or stations; else COLMAP on the thermal views alone.
+/// Errors as above.
+Result<ThermalPoses> estimate_thermal_poses(const Session& session, const VisibleScene* visible,
+                                            const PoseOptions& options,
+                                            const std::filesystem::path& workdir,
+                                            const Progress& progress);
+
+}  // namespace orbitfuse

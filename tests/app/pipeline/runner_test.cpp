@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/pipeline/runner.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <fstream>
+
+#include "core/file_io.hpp"
+#include "tests/app/temp_folder.hpp"
+
+namespace orbitfuse::pipeline {
+namespace {
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+/// A chain of stages a -> b -> c and a -> d that write text files and count their runs.
+class RunnerTest : public testing::Test {
+ protected:
+  Stage text_stage(const std::string& name, std::vector<std::string> needs, nlohmann::json options) {
+    Stage stage{.name = name, .needs = needs, .options = options, .inputs_hash = session};
+    stage.run = [this, name, needs, options](const StageContext& context) -> Result<StageOutput> {
+      ++runs[name];
+      if (fail_in.count(name)) return tl::unexpected(fail_in.at(name));
+      std::string text = name + options.dump();
+      for (const std::string& need : needs) text += *read_file(context.of(need) / "text");
+      ORBITFUSE_TRY(write_file_atomic(context.folder / "text", text));
+      StageOutput output;
+      output.metrics["length"] = text.size();
+      output.skips.push_back({"nothing", "test", "none"});
+      return output;
+    };
+    return stage;
+  }
+
+  RunSummary run(RunOptions options = {}) {
+    options.out = temp.path / "out";
+    runs.clear();
+    Progress progress;
+    progress.cancel = &cancel;
+    Runner runner({text_stage("a", {}, {{"x", a_option}}), text_stage("b", {"a"}, {{"y", b_option}}),
+                   text_stage("c", {"b"}, {}), text_stage("d", {"a"}, {})},
+                  options, progress);
+    return runner.run();
+  }
+
+  std::vector<std::string> ran() const {
+    std::vector<std::string> names;
+    for (const auto& [name, count] : runs) names.push_back(name);
+    return names;
+  }
+  std::string text(const std::string& stage) { return *read_file(temp.path / "out" / stage / "text"); }
+
+  TempFolder temp;
+  std::string session = "session";
+  int a_option = 1, b_option = 1;
+  std::map<std::string, int> runs;
+  std::map<std::string, Error> fail_in;
+  std::atomic<bool> cancel{false};
+};
+
+TEST_F(RunnerTest, SecondRunIsUnchanged) {
+  ASSERT_FALSE(run().error);
+  EXPECT_THAT(ran(), ElementsAre("a", "b", "c", "d"));
+  const RunSummary again = run();
+  EXPECT_TRUE(runs.empty());
+  for (const StageStatus& s : again.stages) EXPECT_EQ(s.state, StageState::unchanged) << s.stage;
+  EXPECT_EQ(again.find("c")->output.skips.at(0).what, "nothing");
+  EXPECT_GT(again.find("c")->output.metrics.at("length"), 0);
+}
+
+TEST_F(RunnerTest, ChangedOptionRunsFromThere) {
+  run();
+  b_option = 2;
+  const RunSummary summary = run();
+  EXPECT_THAT(ran(), ElementsAre("b", "c"));
+  EXPECT_EQ(summary.find("b")->why, "option y changed");
+  EXPECT_EQ(summary.find("c")->why, "b changed");
+}
+
+TEST_F(RunnerTest, ChangedInputRunsAllThatReadsIt) {
+  run();
+  session = "other";
+  EXPECT_EQ(run().find("a")->why, "the session changed");
+  EXPECT_THAT(ran(), ElementsAre("a", "b", "c", "d"));
+}
+
+TEST_F(RunnerTest, SameOutputsCutTheChainShort) {
+  run();
+  RunOptions force;
+  force.targets = {"a"};
+  force.force = true;
+  run(force);
+  EXPECT_THAT(ran(), ElementsAre("a"));
+  run();
+  EXPECT_TRUE(runs.empty()) << "a wrote the same bytes, so nothing behind it changes";
+}
+
+TEST_F(RunnerTest, DamagedOutputRunsAgain) {
+  run();
+  std::ofstream(temp.path / "out/b/text") << "tampered";
+  EXPECT_EQ(run().find("b")->why, "text was changed");
+  EXPECT_THAT(ran(), ElementsAre("b"));
+  fs::remove(temp.path / "out/c/text");
+  EXPECT_EQ(run().find("c")->why, "text is missing");
+}
+
+TEST_F(RunnerTest, CutDoneMarkRunsAgain) {
+  run();
+  const fs::path mark = temp.path / "out/d/stage.json";
+  fs::resize_file(mark, fs::file_size(mark) / 2);
+  run();
+  EXPECT_THAT(ran(), ElementsAre("d"));
+}
+
+TEST_F(RunnerTest, TargetsBringWhatTheyRead) {
+  RunOptions options;
+  options.targets = {"c"};
+  run(options);
+  EXPECT_THAT(ran(), ElementsAre("a", "b", "c"));
+}
+
+TEST_F(RunnerTest, FailedGateKeepsTheEarlierResultAndTheOtherBranch) {
+  run();
+  const std::string before = text("b");
+  fail_in["b"] = {ErrorKind::quality, "b", "too few", "more"};
+  a_option = 2;
+  const RunSummary summary = run();
+  EXPECT_EQ(text("b"), before);
+  EXPECT_EQ(summary.error->kind, ErrorKind::quality);
+  EXPECT_EQ(summary.find("c")->state, StageState::blocked);
+  EXPECT_THAT(summary.find("c")->why, HasSubstr("b"));
+  EXPECT_EQ(summary.find("d")->state, StageState::ran);
+  EXPECT_TRUE(fs::exists(temp.path / "out/b.failed"));
+  fail_in.clear();
+  EXPECT_FALSE(run().error);
+  EXPECT_FALSE(fs::exists(temp.path / "out/b.failed"));
+}
+
+TEST_F(RunnerTest, DeviceErrorStopsAtOnce) {
+  fail_in["b"] = {ErrorKind::device, "b", "disk full", "free space"};
+  const RunSummary summary = run();
+  EXPECT_THAT(ran(), ElementsAre("a", "b"));
+  EXPECT_EQ(summary.error->kind, ErrorKind::device);
+}
+
+TEST_F(RunnerTest, DryRunWritesNothing) {
+  RunOptions options;
+  options.dry_run = true;
+  const RunSummary summary = run(options);
+  EXPECT_TRUE(runs.empty());
+  EXPECT_FALSE(fs::exists(temp.path / "out"));
+  for (const StageStatus& s : summary.stages) EXPECT_EQ(s.state, StageState::planned);
+}
+
+TEST_F(RunnerTest, CancelledBeforeAStageKeepsTheRest) {
+  cancel = true;
+  const RunSummary summary = run();
+  EXPECT_EQ(summary.error->kind, ErrorKind::cancelled);
+  EXPECT_TRUE(runs.empty());
+}
+
+TEST(Runner, ResumesAnInterruptedStageWithTheSameKeyOnly) {
+  const TempFolder temp;
+  int option = 1;
+  bool resumed = false;
+  const auto run = [&](bool interrupt, bool resume) {
+    Stage stage{.name = "long", .options = {{"x", option}}};
+    stage.run = [&](const StageContext& context) -> Result<StageOutput> {
+      resumed = context.resume;
+      const bool half_done = fs::exists(context.folder / "half");
+      EXPECT_EQ(half_done, context.resume);
+      if (interrupt) {
+        ORBITFUSE_TRY(write_file_atomic(context.folder / "half", "1"));
+        return fail(ErrorKind::cancelled, "long", "stopped", "resume");
+      }
+      std::error_code ignored;
+      fs::remove(context.folder / "half", ignored);
+      ORBITFUSE_TRY(write_file_atomic(context.folder / "whole", "2"));
+      return StageOutput{};
+    };
+    Runner runner({stage}, {.out = temp.path, .resume = resume}, {});
+    return runner.run();
+  };
+  EXPECT_EQ(run(true, false).error->kind, ErrorKind::cancelled);
+  EXPECT_FALSE(fs::exists(temp.path / "long"));
+  EXPECT_FALSE(run(false, true).error);
+  EXPECT_TRUE(resumed);
+  EXPECT_EQ(run(false, true).stages.at(0).state, StageState::unchanged);
+
+  option = 2;
+  run(true, false);
+  option = 3;
+  run(false, true);
+  EXPECT_FALSE(resumed) << "an attempt with other options must not be continued";
+}
+
+TEST(Runner, AbsentIsNotAFailure) {
+  const TempFolder temp;
+  Stage absent{.name = "thermal"};
+  absent.absent = [](const StageContext&) { return std::optional<std::string>("no thermal frames"); };
+  absent.run = [](const StageContext&) -> Result<StageOutput> {
+    ADD_FAILURE() << "must not run";
+    return StageOutput{};
+  };
+  Stage behind{.name = "behind", .needs = {"thermal"}};
+  behind.run = absent.run;
+  Stage beside{.name = "beside", .uses = {"thermal"}};
+  beside.run = [](const StageContext& c) -> Result<StageOutput> {
+    EXPECT_FALSE(c.has("thermal"));
+    return StageOutput{};
+  };
+  Runner runner({absent, behind, beside}, {.out = temp.path}, {});
+  const RunSummary summary = runner.run();
+  EXPECT_FALSE(summary.error);
+  EXPECT_EQ(summary.find("behind")->state, StageState::absent);
+  EXPECT_EQ(summary.find("behind")->why, "no thermal frames");
+  EXPECT_EQ(summary.find("beside")->state, StageState::ran);
+}
+
+TEST(Runner, TwoRunsInOneFolderAreRefused) {
+  const TempFolder temp;
+  Stage outer{.name = "outer"};
+  outer.run = [&](const StageContext&) -> Result<StageOutput> {
+    Runner inner({}, {.out = temp.path}, {});
+    const RunSummary summary = inner.run();
+    EXPECT_TRUE(summary.error && summary.error->kind == ErrorKind::usage);
+    return StageOutput{};
+  };
+  Runner runner({outer}, {.out = temp.path}, {});
+  EXPECT_FALSE(runner.run().error);
+}
+
+}  // namespace
+}  // namespace orbitfuse::pipeline
