@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/point_cloud.hpp"
+#include "core/progress.hpp"
+#include "core/result.hpp"
+#include "core/transform.hpp"
+
+// Registration of two clouds of one object by a similarity (scale, R, t). Every length in the
+// options is relative to the target's robust diameter, so that units do not matter.
+namespace orbitfuse {
+
+struct RegistrationOptions {
+  int points = 2500;                ///< per cloud after voxels; more costs time, gains little
+  double max_pair_distance = 0.06;  ///< of the diameter: where coarse scoring stops counting
+  double inlier_distance = 0.02;    ///< of the diameter: pairs that count as matched in the report
+  double min_scale = 0.2, max_scale = 5;  ///< of target over source, after size normalisation
+  double decisive_score = 0.75;     ///< the second initialiser is skipped above this two-sided score
+  double ambiguity_ratio = 0.94;    ///< a distinct runner-up this close makes the result ambiguous
+  bool filter_outliers = true;      ///< by neighbour distance, only where two populations are seen
+  int restarts = 3;                 ///< refinements from disturbed starts, for the spread
+  std::uint32_t seed = 1;
+
+  Status validate() const;
+};
+
+struct RegistrationAlternative {
+  Similarity3d target_from_source;
+  double score = 0;                 ///< two-sided, as RegistrationReport::score
+  double view_score = 0;            ///< of the ViewScore, if there is one
+  std::string origin;               ///< which initialiser found it
+};
+
+struct RegistrationReport {
+  Similarity3d target_from_source;
+  double score = 0;                 ///< 0..1, geometric mean of both sides' truncated agreement
+  double matching_ratio = 0;        ///< share of source points with a partner (as in the seed paper;
+                                    ///< one-sided: shrinking maximises it, so never read it alone)
+  double rmse = 0;                  ///< of matched pairs, target units
+  double rmse_percent_of_diameter = 0;
+  double overlap_source = 0, overlap_target = 0;  ///< share of each cloud near the other
+  double spread_rotation_deg = 0, spread_scale_percent = 0, spread_translation_percent = 0;
+  bool ambiguous = false;
+  std::string ambiguity;            ///< what geometry leaves open, in words
+  std::vector<RegistrationAlternative> alternatives;  ///< best first, the result not included
+  std::string initialiser;
+  std::vector<Skip> skips;
+  double cpu_s = 0;
+
+  std::string brief() const;
+};
+
+/// Judges a candidate by rendered views of both fields; higher is better. Decides flips.
+using ViewScore = std::function<double(const Similarity3d& target_from_source)>;
+
+/// Errors (input): fewer than 20 finite points, all points in one place, on one line or plane.
+/// Shapes that leave a direction open (sphere, cylinder) come back ambiguous.
+Result<RegistrationReport> register_clouds(const PointCloud& source, const PointCloud& target,
+                                           const RegistrationOptions& options, const Progress& progress,
+                                           const ViewScore& view_score = {});
+
+/// Refinement alone, from a start within a few degrees and percent.
+Result<RegistrationReport> refine_registration(const PointCloud& source, const PointCloud& target,
+                                               const Similarity3d& start, const RegistrationOptions& options);
+
+}  // namespace orbitfuse
