@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <atomic>
+#include <chrono>
 #include <functional>
 #include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "capture/frame_source.hpp"
@@ -49,8 +52,9 @@ class Recorder {
   Status run(const std::vector<FrameSource*>& sources, const Progress& progress = {});
   std::vector<StreamStatus> status() const;
 
+  struct Channel;  ///< one camera's queue, threads and counters (recorder.cpp)
+
  private:
-  struct Channel;
   SessionWriter& writer_;
   RecorderOptions options_;
   mutable std::mutex mutex_;

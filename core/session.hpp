@@ -35,6 +35,9 @@ struct DeviceInfo {
 
 /// Where the operator (or the guide) says a frame was taken on the orbit.
 /// Azimuth grows counter-clockwise seen from above; elevation is above the object's base plane.
+/// A sigma of 90 degrees or more marks an unknown origin: where the device's orbit began (azimuth)
+/// or its elevations are then unknown, and only differences between its stations hold, to several
+/// degrees.
 struct Station {
   int loop = 0, index = 0;
   double azimuth_deg = 0, elevation_deg = 0;
@@ -63,7 +66,7 @@ struct FrameRecord {
   std::string content_hash;             ///< of the file's bytes
   std::optional<Rigid3d> cam_from_world;  ///< known pose; all of a session share one world
   std::optional<Camera> camera;           ///< known intrinsics of this frame
-  std::string source;                     ///< original file name of an imported frame
+  std::string source;                     ///< imported frames: "folder/name" of the original file
   std::optional<FrameQuality> quality;
 
   bool has_flag(const std::string& flag) const;

@@ -36,8 +36,8 @@ struct ObjectParameterOverrides {
 struct DeclaredStations {
   double spacing_deg = 30;
   int loops = 1;
-  std::vector<double> elevations_deg;   ///< one per loop; empty = unknown (wide sigma)
-  double azimuth_sigma_deg = 8;         ///< of a station about its nominal place
+  std::vector<double> elevations_deg;   ///< one per loop; empty = unknown (sigma 90)
+  double elevation_sigma_deg = 5;       ///< of the elevations given
 };
 
 struct ImportOptions {
@@ -55,9 +55,9 @@ struct ImportOptions {
   std::optional<std::filesystem::path> visible_colmap, thermal_colmap;
   /// orbits/container/ground_truth.json: K and c2w of both modalities.
   std::optional<std::filesystem::path> ground_truth;
-  /// From `ground_truth`: take stations (az, el) as what an operator would know, and the focal
-  /// length as a prior, but not the poses.
-  bool ground_truth_stations_only = false;
+  /// From `ground_truth`: take only what an operator would know: the focal length as a prior to
+  /// 3 % and the loops' elevations; never the poses.
+  bool ground_truth_priors_only = false;
 
   std::optional<DeclaredStations> visible_stations, thermal_stations;
 

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "capture/frame_quality.hpp"
+
+#include <opencv2/imgproc.hpp>
+
+#include "core/temperature.hpp"
+
+namespace orbitfuse {
+namespace {
+
+double variance(const cv::Mat& image) {
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(image, mean, deviation);
+  return deviation[0] * deviation[0];
+}
+
+}  // namespace
+
+FrameQuality measure_quality(const cv::Mat& image) {
+  CV_Assert(image.type() == CV_8UC3 || image.type() == CV_8UC1 || image.type() == CV_16UC1);
+  FrameQuality quality;
+  if (image.empty()) return quality;
+  cv::Mat gray = image;
+  if (image.channels() == 3) cv::cvtColor(image, gray, cv::COLOR_BGR2GRAY);
+  const bool is_thermal = gray.depth() == CV_16U;
+  const double total = static_cast<double>(gray.total());
+  const double top = is_thermal ? 65535 : 255;
+  const int clipped = cv::countNonZero(gray == 0) + cv::countNonZero(gray == top);
+  quality.clipped_fraction = clipped / total;
+
+  const cv::Mat valid = is_thermal ? cv::Mat(gray != 0) : cv::Mat();
+  const double mean = cv::mean(gray, valid.empty() ? cv::noArray() : cv::InputArray(valid))[0];
+  quality.mean_level = is_thermal ? mean * kelvin_per_dn : mean;
+
+  cv::Mat small;
+  constexpr int max_width = 640;
+  const double scale = std::min(1.0, static_cast<double>(max_width) / gray.cols);
+  if (scale < 1.0) {
+    cv::resize(gray, small, {}, scale, scale, cv::INTER_AREA);
+  } else {
+    small = gray;
+  }
+  small.convertTo(small, CV_32F);
+  cv::Mat laplacian;
+  cv::Laplacian(small, laplacian, CV_32F);
+  const double spread = variance(small);
+  quality.sharpness = spread > 1e-9 ? variance(laplacian) / spread : 0.0;
+  return quality;
+}
+
+}  // namespace orbitfuse

@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "capture/recorder.hpp"
+
+#include <fmt/format.h>
+
+#include <condition_variable>
+#include <deque>
+#include <thread>
+
+#include "capture/stream_account.hpp"
+
+namespace orbitfuse {
+namespace {
+
+namespace fs = std::filesystem;
+using Loss = StreamAccount::Loss;
+
+std::int64_t now_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+Status check_disk(const fs::path& folder, std::uint64_t min_free_bytes) {
+  std::error_code error;
+  const auto space = fs::space(folder, error);
+  if (error || space.available >= min_free_bytes) return {};
+  return fail(ErrorKind::device, folder.string(),
+              fmt::format("{:.0f} MiB free on the disk", static_cast<double>(space.available) / 1048576.0),
+              "free disk space and resume the session; every frame acknowledged is safe");
+}
+
+}  // namespace
+
+/// One camera. The capture thread pushes, the writer thread pops; the queue bounds memory.
+struct Recorder::Channel {
+  Channel(FrameSource& s, SessionWriter& w, const RecorderOptions& o, const Progress& p,
+          const std::function<void(const FrameRecord&)>& f)
+      : source(s), writer(w), options(o), progress(p), on_frame(f), device(s.describe()), account(device.id) {}
+
+  FrameSource& source;
+  SessionWriter& writer;
+  const RecorderOptions& options;
+  const Progress& progress;
+  const std::function<void(const FrameRecord&)>& on_frame;
+  const DeviceInfo device;
+  StreamAccount account;
+
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::deque<Frame> queue;
+  bool capture_over = false;
+  bool writer_failed = false;
+  bool silent = false;
+  std::optional<Error> error;
+  std::optional<FrameRecord> latest;
+
+  bool stopping() {
+    const std::lock_guard lock(mutex);
+    return writer_failed || progress.cancelled();
+  }
+
+  void keep_first(const Error& e) {
+    const std::lock_guard lock(mutex);
+    if (!error) error = e;
+  }
+
+  void log_event(const std::string& kind, const std::string& detail) {
+    if (const Status s = writer.append(EventRecord{device.id, now_ns(), kind, detail}); !s) keep_first(s.error());
+  }
+
+  void push(Frame frame) {
+    std::unique_lock lock(mutex);
+    const auto has_room = [&] {
+      return queue.size() < static_cast<std::size_t>(options.queue_frames) || writer_failed;
+    };
+    if (options.backpressure == Backpressure::wait) {
+      while (!has_room() && !progress.cancelled()) changed.wait_for(lock, std::chrono::milliseconds(50));
+    }
+    if (!has_room() || writer_failed) {
+      account.lose(frame.id, Loss::dropped, writer_failed ? "not written" : "dropped: the disk is too slow");
+      return;
+    }
+    queue.push_back(std::move(frame));
+    changed.notify_all();
+  }
+
+  void take(Delivery delivery) {
+    switch (delivery.kind) {
+      case Delivery::Kind::frame:
+      case Delivery::Kind::rejected: {
+        const std::uint64_t id = delivery.frame.id;
+        if (!account.see(id)) {
+          log_event("out-of-order", fmt::format("frame {} after a later one", id));
+        } else if (delivery.kind == Delivery::Kind::frame) {
+          push(std::move(delivery.frame));
+        } else {
+          account.lose(id, Loss::rejected, "rejected: " + delivery.reason);
+        }
+        break;
+      }
+      case Delivery::Kind::event: log_event(delivery.reason, delivery.detail); break;
+      case Delivery::Kind::timeout:
+      case Delivery::Kind::end: break;
+    }
+  }
+
+  void capture() {
+    Status status = source.start();
+    while (status && !stopping()) {
+      Result<Delivery> delivery = source.next(options.next_timeout);
+      if (!delivery) {
+        status = tl::unexpected(delivery.error());
+        break;
+      }
+      {
+        const std::lock_guard lock(mutex);
+        silent = delivery->kind == Delivery::Kind::timeout;
+      }
+      if (delivery->kind == Delivery::Kind::end) break;
+      take(*std::move(delivery));
+    }
+    source.stop();
+    if (!status) {
+      keep_first(status.error());
+      log_event("stream-error", status.error().message());
+    }
+    const std::lock_guard lock(mutex);
+    capture_over = true;
+    changed.notify_all();
+  }
+
+  std::optional<Frame> pop() {
+    std::unique_lock lock(mutex);
+    changed.wait(lock, [&] { return !queue.empty() || capture_over; });
+    if (queue.empty()) return std::nullopt;
+    Frame frame = std::move(queue.front());
+    queue.pop_front();
+    changed.notify_all();
+    return frame;
+  }
+
+  void store(const Frame& frame) {
+    if (const Status space = check_disk(writer.folder(), options.min_free_bytes); !space) {
+      return give_up(frame, space.error());
+    }
+    const Result<FrameRecord> record = writer.append(device.id, frame);
+    if (!record && record.error().kind == ErrorKind::input) {
+      account.lose(frame.id, Loss::rejected, "rejected: " + record.error().found);
+      return;
+    }
+    if (!record) return give_up(frame, record.error());
+    account.receive();
+    {
+      const std::lock_guard lock(mutex);
+      latest = *record;
+    }
+    if (on_frame) on_frame(*record);
+  }
+
+  void give_up(const Frame& frame, const Error& cause) {
+    account.lose(frame.id, Loss::dropped, "not written");
+    keep_first(cause);
+    const std::lock_guard lock(mutex);
+    writer_failed = true;
+    changed.notify_all();
+  }
+
+  void write_gaps(bool all) {
+    for (const GapRecord& gap : account.take_gaps(all)) {
+      if (const Status s = writer.append(gap); !s) keep_first(s.error());
+    }
+  }
+
+  void write() {
+    while (std::optional<Frame> frame = pop()) {
+      if (writer_failed) {
+        account.lose(frame->id, Loss::dropped, "not written");
+      } else {
+        store(*frame);
+        write_gaps(false);
+      }
+    }
+    write_gaps(true);
+    if (!account.counts().any) return;
+    if (const Status s = writer.append(account.record()); !s) keep_first(s.error());
+  }
+
+  StreamStatus status() {
+    const StreamAccount::Counts c = account.counts();
+    const std::lock_guard lock(mutex);
+    return {device.id, c.received, c.lost(), c.first,  c.last,       c.missing,
+            c.rejected, c.dropped, silent,   capture_over && queue.empty(), latest};
+  }
+};
+
+Status RecorderOptions::validate() const {
+  if (queue_frames < 1 || queue_frames > 100000) {
+    return fail(ErrorKind::usage, "recorder.queue_frames", fmt::format("{}", queue_frames), "must be 1 to 100000");
+  }
+  if (next_timeout.count() < 1) {
+    return fail(ErrorKind::usage, "recorder.next_timeout", fmt::format("{} ms", next_timeout.count()), "must be > 0");
+  }
+  return {};
+}
+
+Recorder::Recorder(SessionWriter& writer, RecorderOptions options) : writer_(writer), options_(options) {}
+
+Status Recorder::run(const std::vector<FrameSource*>& sources, const Progress& progress) {
+  ORBITFUSE_TRY(options_.validate());
+  ORBITFUSE_TRY(check_disk(writer_.folder(), options_.min_free_bytes));
+  std::vector<std::shared_ptr<Channel>> channels;
+  for (FrameSource* source : sources) {
+    channels.push_back(std::make_shared<Channel>(*source, writer_, options_, progress, on_frame));
+    ORBITFUSE_TRY(writer_.add_device(channels.back()->device));
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    channels_ = channels;
+  }
+  {
+    std::vector<std::jthread> threads;
+    for (const auto& channel : channels) {
+      threads.emplace_back([channel] { channel->capture(); });
+      threads.emplace_back([channel] { channel->write(); });
+    }
+  }
+  for (const auto& channel : channels) {
+    if (channel->error) return tl::unexpected(*channel->error);
+  }
+  return progress.check("record");
+}
+
+std::vector<StreamStatus> Recorder::status() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<StreamStatus> out;
+  for (const auto& channel : channels_) out.push_back(channel->status());
+  return out;
+}
+
+}  // namespace orbitfuse

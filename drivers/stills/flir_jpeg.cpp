@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "drivers/stills/flir_jpeg.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <vector>
+
+#include "core/image_codec.hpp"
+#include "core/temperature.hpp"
+
+namespace orbitfuse {
+namespace {
+
+enum class Order { little, big };
+
+/// Numbers at fixed places of a block; a read outside it gives 0 and clears ok().
+class Block {
+ public:
+  Block(std::string_view bytes, Order order) : bytes_(bytes), order_(order) {}
+
+  std::uint16_t u16(std::size_t at) const { return static_cast<std::uint16_t>(number(at, 2)); }
+  std::uint32_t u32(std::size_t at) const { return static_cast<std::uint32_t>(number(at, 4)); }
+  double f32(std::size_t at) const {
+    const std::uint32_t bits = u32(at);
+    float value;
+    std::memcpy(&value, &bits, sizeof value);
+    return static_cast<double>(value);
+  }
+  std::string text(std::size_t at, std::size_t length) const {
+    if (at >= bytes_.size()) return {};
+    const std::string_view field = bytes_.substr(at, length);
+    return std::string(field.substr(0, std::min(field.find('\0'), field.size())));
+  }
+  std::size_t size() const { return bytes_.size(); }
+  std::string_view bytes() const { return bytes_; }
+
+ private:
+  std::uint64_t number(std::size_t at, std::size_t width) const {
+    if (at > bytes_.size() || bytes_.size() - at < width) return 0;
+    std::uint64_t value = 0;
+    for (std::size_t i = 0; i < width; ++i) {
+      const std::size_t k = order_ == Order::big ? i : width - 1 - i;
+      value = value << 8 | static_cast<unsigned char>(bytes_[at + k]);
+    }
+    return value;
+  }
+  std::string_view bytes_;
+  Order order_;
+};
+
+tl::unexpected<Error> broken(const std::string& where, const std::string& found) {
+  return fail(ErrorKind::input, where, found, "copy the file from the camera again");
+}
+
+/// The FLIR file: payloads of the "FLIR\0" APP1 segments, joined by their index.
+std::string join_segments(std::string_view jpeg) {
+  using namespace std::string_view_literals;
+  std::map<int, std::string_view> parts;
+  std::size_t at = 2;
+  while (at + 4 <= jpeg.size() && static_cast<unsigned char>(jpeg[at]) == 0xFF) {
+    const auto marker = static_cast<unsigned char>(jpeg[at + 1]);
+    if (marker == 0xFF) {
+      ++at;  // fill byte
+      continue;
+    }
+    if (marker == 0xDA || marker == 0xD9) break;  // image data: no more headers
+    const std::size_t length = static_cast<std::size_t>(static_cast<unsigned char>(jpeg[at + 2])) << 8 |
+                               static_cast<unsigned char>(jpeg[at + 3]);
+    if (length < 2 || at + 2 + length > jpeg.size()) break;
+    const std::string_view payload = jpeg.substr(at + 4, length - 2);
+    if (marker == 0xE1 && payload.size() > 8 && payload.substr(0, 5) == "FLIR\0"sv) {
+      parts.emplace(static_cast<unsigned char>(payload[6]), payload.substr(8));
+    }
+    at += 2 + length;
+  }
+  std::string joined;
+  for (const auto& [index, part] : parts) joined += part;
+  return joined;
+}
+
+struct Records {
+  std::map<int, std::string_view> by_type;
+};
+
+enum RecordType { raw_data = 0x01, camera_info = 0x20, embedded_image = 0x0e };
+
+Result<Records> read_directory(std::string_view file, const std::string& where) {
+  if (file.size() < 64 || (file.substr(0, 4) != std::string_view("FFF\0", 4) &&
+                           file.substr(0, 4) != std::string_view("AFF\0", 4))) {
+    return broken(where, "the FLIR data has no FFF header");
+  }
+  // The version, 100 to 199, tells the byte order.
+  const auto plausible = [](std::uint32_t version) { return version >= 100 && version < 200; };
+  Order order = Order::big;
+  if (!plausible(Block(file, Order::big).u32(0x14))) {
+    if (!plausible(Block(file, Order::little).u32(0x14))) return broken(where, "unknown FLIR version");
+    order = Order::little;
+  }
+  const Block header(file, order);
+  const std::uint64_t offset = header.u32(0x18), count = header.u32(0x1c);
+  if (offset > file.size() || count > (file.size() - offset) / 32) {
+    return broken(where, fmt::format("{} FLIR records announced in {} bytes", count, file.size()));
+  }
+  Records records;
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const Block entry(file.substr(offset + 32 * i, 32), order);
+    const std::uint64_t start = entry.u32(0x0c), length = entry.u32(0x10);
+    if (entry.u16(0) == 0) continue;
+    // A cut file keeps its directory: records beyond the end are as good as absent.
+    if (start > file.size() || length > file.size() - start) continue;
+    records.by_type.emplace(entry.u16(0), file.substr(start, length));
+  }
+  return records;
+}
+
+/// RawData and CameraInfo begin with a 2 in their own byte order.
+Order record_order(std::string_view record) {
+  return Block(record, Order::little).u16(0) == 2 ? Order::little : Order::big;
+}
+
+void read_camera_info(std::string_view record, FlirImage& image) {
+  const Block info(record, record_order(record));
+  ObjectParameters& o = image.calibration.object;
+  o.emissivity = info.f32(0x20);
+  o.distance_m = info.f32(0x24);
+  o.reflected_k = info.f32(0x28);
+  o.atmospheric_k = info.f32(0x2c);
+  o.window_k = info.f32(0x30);
+  o.window_transmission = info.f32(0x34);
+  o.relative_humidity = info.f32(0x3c);
+  if (o.relative_humidity > 2) o.relative_humidity /= 100;  // some cameras write percent
+  PlanckConstants& p = image.calibration.planck;
+  p.r1 = info.f32(0x58);
+  p.b = info.f32(0x5c);
+  p.f = info.f32(0x60);
+  p.r2 = info.f32(0x30c);
+  p.o = static_cast<std::int32_t>(info.u32(0x308));
+  AtmosphereConstants& a = image.calibration.atmosphere;
+  a.alpha1 = info.f32(0x70);
+  a.alpha2 = info.f32(0x74);
+  a.beta1 = info.f32(0x78);
+  a.beta2 = info.f32(0x7c);
+  a.x = info.f32(0x80);
+  image.camera_model = info.text(0xd4, 32);
+  image.camera_serial = info.text(0x104, 16);
+  const double fov = info.f32(0x1b4);
+  if (fov > 1 && fov < 170) image.horizontal_fov_deg = fov;
+  const std::int64_t seconds = info.u32(0x384);
+  if (seconds > 0) {
+    const std::int64_t milliseconds = info.u32(0x388) & 0xffff;
+    image.taken_ns = seconds * 1'000'000'000LL + std::min<std::int64_t>(milliseconds, 999) * 1'000'000LL;
+  }
+}
+
+double median_of(const cv::Mat& image) {
+  std::vector<std::uint16_t> samples(image.begin<std::uint16_t>(), image.end<std::uint16_t>());
+  auto middle = samples.begin() + static_cast<std::ptrdiff_t>(samples.size() / 2);
+  std::nth_element(samples.begin(), middle, samples.end());
+  return *middle;
+}
+
+/// Mean step between neighbours over the spread: noise of a wrong byte order steps everywhere.
+double roughness(const cv::Mat& image) {
+  cv::Mat values, difference;
+  image.convertTo(values, CV_32F);
+  cv::absdiff(values.colRange(1, values.cols), values.colRange(0, values.cols - 1), difference);
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(values, mean, deviation);
+  return cv::mean(difference)[0] / std::max(deviation[0], 1e-9);
+}
+
+/// PNGs hold samples in either byte order. CameraInfo's raw median decides; without one, smoothness.
+cv::Mat in_right_order(const cv::Mat& image, std::string_view camera_record) {
+  cv::Mat swapped(image.size(), CV_16UC1);
+  for (int y = 0; y < image.rows; ++y) {
+    for (int x = 0; x < image.cols; ++x) {
+      const std::uint16_t v = image.at<std::uint16_t>(y, x);
+      swapped.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(v << 8 | v >> 8);
+    }
+  }
+  const Block info(camera_record, record_order(camera_record));
+  const double median = info.u16(0x338);
+  const double low = info.u16(0x310), high = info.u16(0x312);
+  if (median > 0 && median >= low && median <= high) {
+    return std::abs(median_of(swapped) - median) < std::abs(median_of(image) - median) ? swapped : image;
+  }
+  return image.cols > 1 && roughness(swapped) < roughness(image) ? swapped : image;
+}
+
+Result<cv::Mat> read_raw_data(std::string_view record, std::string_view camera_record, const std::string& where) {
+  const Order order = record_order(record);
+  const Block raw(record, order);
+  const int width = raw.u16(0x02), height = raw.u16(0x04);
+  if (width == 0 || height == 0 || record.size() < 0x20) return broken(where, "no size in the raw thermal record");
+  const std::string_view pixels = record.substr(0x20);
+  if (image_format(pixels) == ImageFormat::png) {
+    ORBITFUSE_ASSIGN(const cv::Mat image, decode_image(pixels, where + " (raw thermal PNG)"));
+    if (image.type() != CV_16UC1) return broken(where, "the raw thermal PNG is not 16-bit grey");
+    return in_right_order(image, camera_record);
+  }
+  const std::size_t needed = 2ul * static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  if (pixels.size() < needed) {
+    return broken(where, fmt::format("raw thermal data of {} bytes, {}x{} needs {}", pixels.size(), width, height, needed));
+  }
+  cv::Mat image(height, width, CV_16UC1);
+  std::memcpy(image.data, pixels.data(), needed);  // always little-endian
+  return image;
+}
+
+}  // namespace
+
+bool is_flir_jpeg(std::string_view bytes) {
+  return image_format(bytes) == ImageFormat::jpeg && !join_segments(bytes).empty();
+}
+
+Result<FlirImage> read_flir_jpeg(std::string_view bytes, const std::string& where) {
+  if (image_format(bytes) != ImageFormat::jpeg) return broken(where, "not a JPEG");
+  const std::string file = join_segments(bytes);
+  if (file.empty()) return broken(where, "no FLIR data in the JPEG");
+  ORBITFUSE_ASSIGN(const Records records, read_directory(file, where));
+  const auto raw = records.by_type.find(raw_data);
+  const auto info = records.by_type.find(camera_info);
+  if (raw == records.by_type.end()) return broken(where, "no raw thermal record");
+  if (info == records.by_type.end() || info->second.size() < 0x310) {
+    return broken(where, "no camera calibration record");
+  }
+  FlirImage image;
+  read_camera_info(info->second, image);
+  ORBITFUSE_ASSIGN(image.signal, read_raw_data(raw->second, info->second, where));
+  if (const auto e = records.by_type.find(embedded_image); e != records.by_type.end() && e->second.size() > 0x20) {
+    image.embedded_visible = e->second.substr(0x20);
+  }
+  return image;
+}
+
+cv::Mat centikelvin_of(const FlirImage& image) {
+  const FlirThermometer thermometer(image.calibration);
+  // 65536 possible signals: a table costs less than a logarithm per pixel.
+  std::vector<std::uint16_t> table(65536);
+  for (std::size_t s = 0; s < table.size(); ++s) {
+    table[s] = centikelvin_from_kelvin(static_cast<float>(thermometer.kelvin(static_cast<std::uint16_t>(s))));
+  }
+  cv::Mat out(image.signal.size(), CV_16UC1);
+  std::transform(image.signal.begin<std::uint16_t>(), image.signal.end<std::uint16_t>(),
+                 out.begin<std::uint16_t>(), [&](std::uint16_t s) { return table[s]; });
+  return out;
+}
+
+}  // namespace orbitfuse

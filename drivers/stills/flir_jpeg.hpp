@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "core/result.hpp"
+#include "drivers/stills/flir_temperature.hpp"
+
+namespace orbitfuse {
+
+/// What a FLIR radiometric JPEG holds.
+struct FlirImage {
+  cv::Mat signal;                             ///< CV_16UC1, raw sensor counts
+  FlirCalibration calibration;
+  std::string camera_model, camera_serial;
+  std::optional<double> horizontal_fov_deg;
+  std::optional<std::int64_t> taken_ns;       ///< UTC
+  std::string embedded_visible;               ///< JPEG or PNG file, empty if absent
+};
+
+/// True when the JPEG carries FLIR segments (then read_flir_jpeg says what is in them).
+bool is_flir_jpeg(std::string_view bytes);
+
+/// Reads the FLIR file inside the JPEG's APP1 segments (layout as published by the ExifTool
+/// project). Any damage is an input error: every offset and length is checked.
+Result<FlirImage> read_flir_jpeg(std::string_view bytes, const std::string& where);
+
+/// CV_16UC1 centikelvin, 0 = no temperature.
+cv::Mat centikelvin_of(const FlirImage& image);
+
+}  // namespace orbitfuse

@@ -1,0 +1,382 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "drivers/stills/import.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "capture/session_writer.hpp"
+#include "core/exif.hpp"
+#include "core/file_io.hpp"
+#include "core/image_codec.hpp"
+#include "drivers/stills/image_list.hpp"
+#include "drivers/stills/known_poses.hpp"
+#include "drivers/stills/thermal_decoder.hpp"
+
+namespace orbitfuse {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Diagonal of the 36 x 24 mm frame that "35 mm equivalent" refers to.
+constexpr double full_frame_diagonal_mm = 43.2666;
+
+struct Source {
+  fs::path file;
+  std::optional<std::int64_t> taken_ns;
+  int position = 0;  ///< in capture order, counting files that turn out unreadable
+};
+
+/// Capture order: by time where every file has one (file name breaks ties of one-second clocks),
+/// else by name.
+std::vector<Source> in_capture_order(std::vector<Source> sources) {
+  const bool all_timed = std::all_of(sources.begin(), sources.end(), [](const Source& s) { return s.taken_ns.has_value(); });
+  if (all_timed) {
+    std::stable_sort(sources.begin(), sources.end(),
+                     [](const Source& a, const Source& b) { return *a.taken_ns < *b.taken_ns; });
+  }
+  for (std::size_t i = 0; i < sources.size(); ++i) sources[i].position = static_cast<int>(i);
+  return sources;
+}
+
+/// The camera of a source at the image's own size; nothing when the shapes differ.
+std::optional<Camera> fitted(const Camera& camera, cv::Size size) {
+  if (camera.width == size.width && camera.height == size.height) return camera;
+  const double aspect = static_cast<double>(camera.width) / camera.height;
+  if (std::abs(aspect * size.height / size.width - 1) > 0.01) return std::nullopt;
+  return camera.scaled_to(size.width, size.height);
+}
+
+/// Folder and file: enough to tell "visible/000.jpg" from "thermal/000.jpg" on any machine.
+std::string short_name(const fs::path& file) {
+  return (file.parent_path().filename() / file.filename()).string();
+}
+
+class Importer {
+ public:
+  Importer(const ImportOptions& options, SessionWriter& writer, const Progress& progress)
+      : options_(options), writer_(writer), progress_(progress), decoder_(options) {}
+
+  Status run() {
+    ORBITFUSE_ASSIGN(known_, read_known_poses(options_));
+    ORBITFUSE_ASSIGN(const auto visible, visible_sources());
+    ORBITFUSE_ASSIGN(const auto visible_tracking, listed(options_.visible_tracking));
+    ORBITFUSE_ASSIGN(auto thermal, thermal_sources());
+    ORBITFUSE_ASSIGN(auto thermal_tracking, listed(options_.thermal_tracking));
+    total_ = visible.size() + visible_tracking.size() + thermal.size() + thermal_tracking.size();
+    ORBITFUSE_TRY(add_visible(with_exif_times(visible), false));
+    ORBITFUSE_TRY(add_visible(with_exif_times(visible_tracking), true));
+    // First every thermal file is looked at: what 16-bit samples mean is decided for all of them.
+    std::vector<Source> stations = observed(thermal), tracking = observed(thermal_tracking);
+    ORBITFUSE_TRY(add_thermal(in_capture_order(std::move(stations)), false));
+    ORBITFUSE_TRY(add_thermal(in_capture_order(std::move(tracking)), true));
+    if (report_.visible + report_.thermal + report_.tracking == 0) {
+      return fail(ErrorKind::input, "import", first_failure_.empty() ? "no readable image" : first_failure_,
+                  "give folders with JPEG, PNG or TIFF images");
+    }
+    return finish();
+  }
+
+  ImportReport take_report() { return std::move(report_); }
+
+ private:
+  Result<std::vector<fs::path>> listed(const std::vector<fs::path>& paths) const {
+    if (paths.empty()) return std::vector<fs::path>{};
+    return list_images(paths);
+  }
+
+  Result<std::vector<fs::path>> visible_sources() const {
+    if (!options_.visible.empty()) return list_images(options_.visible);
+    return files_of_transforms(Modality::visible);
+  }
+  Result<std::vector<fs::path>> thermal_sources() const {
+    if (!options_.thermal.empty()) return list_images(options_.thermal);
+    return files_of_transforms(Modality::thermal);
+  }
+  std::vector<fs::path> files_of_transforms(Modality modality) const {
+    std::vector<fs::path> files;
+    if (!options_.transforms_json || !known_.count(modality)) return files;
+    for (const KnownView& view : known_.at(modality).all()) files.push_back(view.file);
+    return files;
+  }
+
+  std::vector<Source> with_exif_times(const std::vector<fs::path>& files) const {
+    std::vector<Source> sources;
+    for (const fs::path& file : files) {
+      const Result<std::string> bytes = read_file(file);
+      sources.push_back({file, bytes ? read_exif(*bytes).taken_ns : std::nullopt, 0});
+    }
+    return in_capture_order(std::move(sources));
+  }
+
+  std::vector<Source> observed(const std::vector<fs::path>& files) {
+    std::vector<Source> sources;
+    for (const fs::path& file : files) {
+      Source source{file, std::nullopt, 0};
+      if (const Result<ThermalFile> thermal = read_thermal_file(file)) {
+        decoder_.observe(*thermal);
+        source.taken_ns = thermal->flir ? thermal->flir->taken_ns : read_exif(thermal->bytes).taken_ns;
+      }
+      sources.push_back(source);
+    }
+    return sources;
+  }
+
+  void pass_over(const Error& error) {
+    if (first_failure_.empty()) first_failure_ = error.message();
+    report_.warnings.push_back("left out: " + error.message());
+  }
+
+  Status step() {
+    ++done_;
+    progress_.report({"import", static_cast<double>(done_), static_cast<double>(total_), -1, ""});
+    return progress_.check("import");
+  }
+
+  Status add_visible(const std::vector<Source>& sources, bool tracking) {
+    for (const Source& source : sources) {
+      ORBITFUSE_TRY(step());
+      const Result<std::string> bytes = read_file(source.file);
+      if (!bytes) {
+        pass_over(bytes.error());
+        continue;
+      }
+      Frame frame;
+      frame.encoded = *bytes;
+      frame.tracking = tracking;
+      frame.source = short_name(source.file);
+      ORBITFUSE_TRY(add_visible_frame(std::move(frame), source, options_.visible_stations));
+    }
+    return {};
+  }
+
+  Status add_visible_frame(Frame frame, const Source& source, const std::optional<DeclaredStations>& stations) {
+    const ExifInfo exif = read_exif(frame.encoded);
+    const Result<cv::Mat> decoded = decode_image(frame.encoded, source.file.string());
+    if (!decoded) {
+      pass_over(decoded.error());
+      return {};
+    }
+    const cv::Size size = apply_orientation(*decoded, exif.orientation).size();
+    frame.extension = extension_of(frame.encoded);
+    frame.host_time_ns = source.taken_ns.value_or(0);
+    DeviceInfo device;
+    device.modality = Modality::visible;
+    device.driver = "stills";
+    device.model = exif.make.empty() ? exif.model : exif.make + " " + exif.model;
+    device.serial = exif.serial;
+    if (exif.focal_35mm) {
+      device.lens.focal_px = *exif.focal_35mm * std::hypot(size.width, size.height) / full_frame_diagonal_mm;
+    }
+    if (options_.visible_focal_px) device.lens.focal_px = options_.visible_focal_px;
+    const std::string key = fmt::format("{}|{}|{}x{}", device.model, exif.focal_mm.value_or(0), size.width, size.height);
+    return add_frame(std::move(frame), device, key, size, source, stations);
+  }
+
+  Status add_thermal(const std::vector<Source>& sources, bool tracking) {
+    for (const Source& source : sources) {
+      ORBITFUSE_TRY(step());
+      Result<ThermalFile> file = read_thermal_file(source.file);
+      if (!file) {
+        pass_over(file.error());
+        continue;
+      }
+      Result<ThermalDecoder::Converted> converted = decoder_.convert(*file, source.file.string());
+      if (!converted) {
+        pass_over(converted.error());
+        continue;
+      }
+      ORBITFUSE_TRY(add_thermal_frame(*file, *converted, source, tracking));
+      if (options_.embedded_visible && file->flir && !file->flir->embedded_visible.empty()) {
+        Frame photo;
+        photo.encoded = file->flir->embedded_visible;
+        photo.source = short_name(source.file);
+        photo.tracking = tracking;
+        ORBITFUSE_TRY(add_visible_frame(std::move(photo), source, options_.thermal_stations));
+      }
+    }
+    return {};
+  }
+
+  Status add_thermal_frame(const ThermalFile& file, const ThermalDecoder::Converted& converted, const Source& source,
+                           bool tracking) {
+    Frame frame;
+    frame.source = short_name(source.file);
+    frame.tracking = tracking;
+    frame.host_time_ns = source.taken_ns.value_or(0);
+    frame.thermal_is_gray = converted.centikelvin.empty();
+    cv::Size size = file.image.size();
+    if (converted.keep_bytes) {
+      frame.encoded = file.bytes;
+      frame.extension = extension_of(file.bytes);
+    } else {
+      frame.pixels = frame.thermal_is_gray ? converted.gray : converted.centikelvin;
+      size = frame.pixels.size();
+    }
+    if (!converted.gray.empty()) {
+      frame.flags.push_back("raw-counts");
+      ORBITFUSE_TRY(keep_original(source.file, file.bytes));
+    }
+    DeviceInfo device;
+    device.modality = Modality::thermal;
+    device.driver = "stills";
+    if (file.flir) {
+      device.model = file.flir->camera_model;
+      device.serial = file.flir->camera_serial;
+      if (const auto fov = file.flir->horizontal_fov_deg) {
+        device.lens.focal_px = 0.5 * size.width / std::tan(0.5 * *fov * std::numbers::pi / 180);
+      }
+    }
+    if (options_.thermal_focal_px) device.lens.focal_px = options_.thermal_focal_px;
+    report_.has_temperatures = report_.has_temperatures || !frame.thermal_is_gray;
+    const std::string key = fmt::format("{}|{}x{}", device.model, size.width, size.height);
+    return add_frame(std::move(frame), device, key, size, source, options_.thermal_stations);
+  }
+
+  /// The 8-bit proxy of raw counts is what later stages see; the counts themselves stay with it.
+  Status keep_original(const fs::path& file, const std::string& bytes) {
+    return write_file_atomic(writer_.folder() / "thermal" / "originals" / file.filename(), bytes);
+  }
+
+  Status add_frame(Frame frame, DeviceInfo device, const std::string& key, cv::Size size, const Source& source,
+                   const std::optional<DeclaredStations>& stations) {
+    const KnownViews& known = known_[device.modality];
+    const KnownView* view = known.find(source.file);
+    if (view) apply_known(*view, size, frame, device);
+    if (known.shared_camera() && !options_.ground_truth_priors_only) {
+      device.lens.calibrated = fitted(*known.shared_camera(), size);
+    }
+    if (stations && !frame.tracking) frame.station = station_at(*stations, source.position, view);
+    ORBITFUSE_ASSIGN(const std::string id, device_id(std::move(device), key));
+    frame.id = next_id_[id];
+    const Result<FrameRecord> record = writer_.append(id, frame);
+    if (!record) {
+      if (record.error().kind != ErrorKind::input) return tl::unexpected(record.error());
+      pass_over(record.error());
+      return {};
+    }
+    ++next_id_[id];
+    count(*record);
+    return {};
+  }
+
+  void apply_known(const KnownView& view, cv::Size size, Frame& frame, DeviceInfo& device) {
+    const std::optional<Camera> camera = fitted(view.camera, size);
+    if (!camera) {
+      report_.warnings.push_back(fmt::format("{}: {}x{} does not fit its known camera of {}x{}; pose not used",
+                                             frame.source, size.width, size.height, view.camera.width,
+                                             view.camera.height));
+      return;
+    }
+    if (options_.ground_truth_priors_only) {
+      device.lens.focal_px = camera->fx;
+      return;
+    }
+    frame.camera = camera;
+    frame.cam_from_world = view.cam_from_world;
+  }
+
+  Station station_at(const DeclaredStations& declared, int position, const KnownView* view) const {
+    const int per_loop = std::max(1, static_cast<int>(std::lround(360 / declared.spacing_deg)));
+    Station station;
+    station.loop = position / per_loop;
+    station.index = position % per_loop;
+    station.azimuth_deg = station.index * declared.spacing_deg;
+    station.azimuth_sigma_deg = 180;  // where the orbit began is unknown
+    station.elevation_sigma_deg = 90;
+    if (station.loop < static_cast<int>(declared.elevations_deg.size())) {
+      station.elevation_deg = declared.elevations_deg[static_cast<std::size_t>(station.loop)];
+      station.elevation_sigma_deg = declared.elevation_sigma_deg;
+    } else if (options_.ground_truth_priors_only && view && view->elevation_deg) {
+      station.elevation_deg = *view->elevation_deg;
+      station.elevation_sigma_deg = declared.elevation_sigma_deg;
+    }
+    return station;
+  }
+
+  /// Photos of one camera, lens and size share a device, so that they may share intrinsics.
+  Result<std::string> device_id(DeviceInfo device, const std::string& key) {
+    const std::string full_key = std::string(name(device.modality)) + "|" + key;
+    if (const auto known = device_ids_.find(full_key); known != device_ids_.end()) return known->second;
+    const auto of_modality = std::count_if(device_ids_.begin(), device_ids_.end(), [&](const auto& entry) {
+      return entry.first.rfind(std::string(name(device.modality)) + "|", 0) == 0;
+    });
+    device.id = fmt::format("{}{}", name(device.modality), of_modality);
+    ORBITFUSE_TRY(writer_.add_device(device));
+    device_ids_.emplace(full_key, device.id);
+    return device.id;
+  }
+
+  void count(const FrameRecord& record) {
+    int& counter = record.tracking ? report_.tracking
+                   : record.modality == Modality::visible ? report_.visible
+                                                          : report_.thermal;
+    ++counter;
+    if (record.cam_from_world) ++report_.with_pose;
+    if (record.station) ++report_.with_station;
+  }
+
+  Status finish() {
+    for (const auto& [id, count] : next_id_) {
+      if (count > 0) ORBITFUSE_TRY(writer_.append(StreamRecord{id, 0, count - 1, count, 0}));
+    }
+    check_station_count(options_.visible_stations, report_.visible, "visible");
+    check_station_count(options_.thermal_stations, report_.thermal, "thermal");
+    if (decoder_.samples_are_raw_counts()) {
+      report_.warnings.push_back("thermal samples are raw counts without a known scale: kept as grey intensities, "
+                                 "no temperatures (give their scale if you know it)");
+    }
+    return writer_.close();
+  }
+
+  void check_station_count(const std::optional<DeclaredStations>& stations, int frames, const char* what) {
+    if (!stations) return;
+    const int expected = stations->loops * static_cast<int>(std::lround(360 / stations->spacing_deg));
+    if (frames != expected) {
+      report_.warnings.push_back(fmt::format("{}: {} frames, but {} stations declared", what, frames, expected));
+    }
+  }
+
+  static std::string extension_of(const std::string& bytes) {
+    switch (image_format(bytes)) {
+      case ImageFormat::jpeg: return ".jpg";
+      case ImageFormat::png: return ".png";
+      case ImageFormat::tiff: return ".tiff";
+      default: return ".bmp";
+    }
+  }
+
+  const ImportOptions& options_;
+  SessionWriter& writer_;
+  const Progress& progress_;
+  ThermalDecoder decoder_;
+  std::map<Modality, KnownViews> known_;
+  std::map<std::string, std::string> device_ids_;
+  std::map<std::string, std::uint64_t> next_id_;
+  std::size_t done_ = 0, total_ = 0;
+  std::string first_failure_;
+  ImportReport report_;
+};
+
+}  // namespace
+
+Result<ImportReport> import_session(const ImportOptions& options, const fs::path& session_folder,
+                                    const Progress& progress) {
+  ORBITFUSE_TRY(options.validate());
+  ORBITFUSE_ASSIGN(auto writer, SessionWriter::create(session_folder, {{"recorded_by", "import"}}));
+  Importer importer(options, *writer, progress);
+  if (const Status status = importer.run(); !status) {
+    // The sources are untouched; half a session would only be in the way of the next attempt.
+    std::error_code ignored;
+    writer.reset();
+    fs::remove_all(session_folder, ignored);
+    return tl::unexpected(status.error());
+  }
+  ImportReport report = importer.take_report();
+  ORBITFUSE_ASSIGN(report.session, open_session(session_folder));
+  return report;
+}
+
+}  // namespace orbitfuse
