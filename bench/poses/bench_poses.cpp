@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// bench_poses SCENE [--workdir F] : runs the pose ladder on a shared scene and prints success and
+// error against run time per rung. Scenes: container, tracking, fox, metu_cloudy_scene_7,
+// metu_sunny_scene_7, arco.
+#include <sys/resource.h>
+
+#include <cstdio>
+#include <fmt/format.h>
+
+#include "bench/poses/scenes.hpp"
+#include "core/cpu.hpp"
+#include "core/parallel.hpp"
+#include "recon/poses/estimate_poses.hpp"
+
+namespace {
+
+using namespace orbitfuse;
+
+double cpu_seconds() {
+  double total = 0;
+  for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
+    rusage usage{};
+    getrusage(who, &usage);
+    total += static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+             1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+  }
+  return total;
+}
+
+void print(const ModalityPoses& poses, const Reconstruction& anchor, const bench::Truth& truth,
+           double cpu_s) {
+  for (const LadderStep& step : poses.ladder)
+    fmt::print("  {} {}: {}/{} in {:.1f} s: {}\n", step.held ? "held " : "fell ", step.rung,
+               step.posed, step.total, step.seconds, step.why);
+  for (const DroppedView& view : poses.dropped)
+    fmt::print("  dropped {}: {}\n", view.name, view.why);
+  for (const auto& [gate, value] : poses.gates) fmt::print("  {} = {:.4g}\n", gate, value);
+  fmt::print("  posed {}/{}, {:.1f} CPU s, {:.2f} px\n", poses.reconstruction.views.size(),
+             poses.frame_count, cpu_s, poses.reprojection_rms_px);
+  const bench::PoseError error = bench::pose_error(poses.reconstruction, anchor, truth);
+  if (error.views > 0)
+    fmt::print("  against the truth: ATE {:.3f} %, median {:.3f} %, worst {:.3f} % of the extent; "
+               "rotation median {:.3f}, worst {:.3f} deg\n",
+               error.ate_percent, error.median_percent, error.worst_percent, error.rotation_deg,
+               error.worst_rotation_deg);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto data = bench::shared_data();
+  if (argc < 2 || !data) {
+    std::fputs("bench_poses SCENE [WORKDIR]; needs the shared data (ORBITFUSE_SHARED)\n", stderr);
+    return 2;
+  }
+  const std::string which = argv[1];
+  const std::filesystem::path workdir =
+      argc > 2 ? argv[2] : std::filesystem::temp_directory_path() / "orbitfuse_bench_poses";
+  bench::Scene scene;
+  if (which == "container" || which == "tracking") {
+    bench::ContainerOptions options;
+    options.tracking = which == "tracking";
+    options.thermal_focal_error = 0.03;
+    options.visible_focal_error = 0.03;
+    scene = bench::container_scene(*data, options);
+  } else if (which == "fox") {
+    scene = bench::fox_scene(*data);
+  } else {
+    scene = bench::folder_scene(*data / (which == "arco" ? "orbits" : "pairs") / which);
+  }
+  fmt::print("{}; {} threads\n", cpu_description(), thread_count());
+
+  const PoseOptions options;
+  Progress progress;
+  double start = cpu_seconds();
+  const auto visible = estimate_visible_poses(scene.session, options, workdir, progress);
+  fmt::print("visible\n");
+  VisibleScene seen;
+  if (visible) {
+    print(*visible, visible->reconstruction, scene.truth, cpu_seconds() - start);
+    seen.reconstruction = visible->reconstruction;
+  } else {
+    fmt::print("  {}\n", visible.error().message());
+  }
+  if (scene.session.frames_of(Modality::thermal).empty()) return 0;
+  start = cpu_seconds();
+  const auto thermal = estimate_thermal_poses(scene.session, visible ? &seen : nullptr, options,
+                                              workdir, progress);
+  fmt::print("thermal\n");
+  if (thermal) {
+    print(*thermal,
+          thermal->shares_visible_frame ? seen.reconstruction : thermal->reconstruction,
+          scene.truth, cpu_seconds() - start);
+  } else {
+    fmt::print("  {}\n", thermal.error().message());
+  }
+  return 0;
+}

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "recon/poses/estimate_poses.hpp"
+
+namespace orbitfuse {
+
+/// Structure from motion of one modality, step by step: orbit-limited pairs with the mapper's
+/// default, then relaxed settings; for thermal also stronger proxies; exhaustive pairs last. Each
+/// model goes through bundle adjustment and the gates; the first that passes holds.
+/// The ladder of a failure is in `steps` as well as in the error's message.
+/// Errors: input, unavailable (no COLMAP), quality (no rung held), cancelled.
+Result<ModalityPoses> structure_from_motion(const Session& session,
+                                            const std::vector<const FrameRecord*>& frames,
+                                            const PoseOptions& options,
+                                            const std::filesystem::path& workdir,
+                                            const Progress& progress,
+                                            std::vector<LadderStep>& steps);
+
+/// The gates a model must pass without ground truth; `why` says the figures either way.
+/// Fills poses.gates.
+bool passes_gates(ModalityPoses& poses, const Session& session, const PoseOptions& options,
+                  std::string& why);
+
+}  // namespace orbitfuse

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/world_frame.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+namespace orbitfuse {
+namespace {
+
+constexpr double degrees = 180.0 / 3.14159265358979323846;
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double wrapped_deg(double angle) { return std::remainder(angle, 360.0); }
+
+Eigen::Vector3d axis_in_world(const PosedView& view, const Eigen::Vector3d& axis_in_cam) {
+  return view.cam_from_world.rotation.conjugate() * axis_in_cam;
+}
+
+/// Offset minimising the sum of absolute wrapped residuals; candidates are the residuals.
+double robust_offset_deg(const std::vector<double>& differences) {
+  double best = 0, best_cost = std::numeric_limits<double>::infinity();
+  for (const double offset : differences) {
+    double cost = 0;
+    for (const double d : differences) cost += std::abs(wrapped_deg(d - offset));
+    if (cost < best_cost) best = offset, best_cost = cost;
+  }
+  return best;
+}
+
+}  // namespace
+
+Eigen::Vector3d look_at_point(const std::vector<PosedView>& views) {
+  Eigen::Vector3d point =
+      Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  std::vector<double> weight(views.size(), 1.0);
+  for (int pass = 0; pass < 10; ++pass) {
+    Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d b = Eigen::Vector3d::Zero();
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const Eigen::Vector3d d = axis_in_world(views[i], Eigen::Vector3d::UnitZ());
+      const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - d * d.transpose();
+      a += weight[i] * across;
+      b += weight[i] * across * camera_center(views[i].cam_from_world);
+    }
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(a);
+    if (!(solver.eigenvalues()(0) > 1e-6 * solver.eigenvalues()(2))) return point;
+    point = a.ldlt().solve(b);
+    std::vector<double> distance(views.size());
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const Eigen::Vector3d d = axis_in_world(views[i], Eigen::Vector3d::UnitZ());
+      const Eigen::Vector3d v = point - camera_center(views[i].cam_from_world);
+      distance[i] = (v - d * d.dot(v)).norm();
+    }
+    const double scale = std::max(median(distance), 1e-12);
+    for (std::size_t i = 0; i < views.size(); ++i)
+      weight[i] = 1.0 / std::max(1.0, distance[i] / scale);  // Huber
+  }
+  return point;
+}
+
+Eigen::Vector3d up_direction(const std::vector<PosedView>& views) {
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d mean_up = Eigen::Vector3d::Zero();
+  for (const PosedView& view : views) {
+    const Eigen::Vector3d right = axis_in_world(view, Eigen::Vector3d::UnitX());
+    spread += right * right.transpose() / static_cast<double>(views.size());
+    mean_up -= axis_in_world(view, Eigen::Vector3d::UnitY());
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);
+  if (solver.eigenvalues()(1) < 0.02) return mean_up.normalized();
+  const Eigen::Vector3d up = solver.eigenvectors().col(0);
+  return up.dot(mean_up) < 0 ? Eigen::Vector3d(-up) : up;
+}
+
+OrbitAngles orbit_angles(const Eigen::Vector3d& center) {
+  return {std::atan2(center.y(), center.x()) * degrees,
+          std::atan2(center.z(), center.head<2>().norm()) * degrees, center.norm()};
+}
+
+Similarity3d canonical_from_world(const std::vector<PosedView>& views,
+                                  const std::vector<const FrameRecord*>& frames) {
+  if (views.size() < 2) return {};
+  Eigen::Vector3d origin = look_at_point(views);
+  std::vector<double> distances;
+  Eigen::Vector3d mean_center = Eigen::Vector3d::Zero();
+  for (const PosedView& view : views)
+    mean_center += camera_center(view.cam_from_world) / static_cast<double>(views.size());
+  if (!origin.allFinite()) origin = mean_center;
+  for (const PosedView& view : views)
+    distances.push_back((camera_center(view.cam_from_world) - origin).norm());
+  const double scale = median(distances);
+  if (!(scale > 0)) return {};
+
+  const Eigen::Quaterniond z_up =
+      Eigen::Quaterniond::FromTwoVectors(up_direction(views), Eigen::Vector3d::UnitZ());
+  std::vector<double> offsets;  // azimuth in z_up minus the station's
+  std::map<std::string, const FrameRecord*> by_name;
+  for (const FrameRecord* frame : frames) by_name[frame->file] = frame;
+  double first_azimuth = 0;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const double azimuth =
+        orbit_angles(z_up * (camera_center(views[i].cam_from_world) - origin)).azimuth_deg;
+    if (i == 0) first_azimuth = azimuth;
+    const auto found = by_name.find(views[i].name);
+    if (found != by_name.end() && found->second->station)
+      offsets.push_back(azimuth - found->second->station->azimuth_deg);
+  }
+  const double turn = offsets.size() >= 3 ? robust_offset_deg(offsets) : first_azimuth;
+  const Eigen::Quaterniond rotation =
+      Eigen::Quaterniond(Eigen::AngleAxisd(-turn / degrees, Eigen::Vector3d::UnitZ())) * z_up;
+  return {1.0 / scale, rotation.normalized(), -(rotation * origin) / scale};
+}
+
+void move_world(Reconstruction& model, const Similarity3d& new_from_old) {
+  for (PosedView& view : model.views) view.cam_from_world = rebase(view.cam_from_world, new_from_old);
+  for (SparsePoint& point : model.points) point.position = new_from_old * point.position;
+}
+
+StationFit fit_stations(const std::vector<PosedView>& views, const Session& session) {
+  std::map<std::string, const FrameRecord*> by_name;
+  for (const FrameRecord& frame : session.frames) by_name[frame.file] = &frame;
+  const Similarity3d canonical = canonical_from_world(views, {});
+  std::vector<double> azimuth, station, sigma;
+  for (const PosedView& view : views) {
+    const auto found = by_name.find(view.name);
+    if (found == by_name.end() || !found->second->station) continue;
+    azimuth.push_back(orbit_angles(canonical * camera_center(view.cam_from_world)).azimuth_deg);
+    station.push_back(found->second->station->azimuth_deg);
+    sigma.push_back(found->second->station->azimuth_sigma_deg);
+  }
+  StationFit best;
+  if (azimuth.size() < 3) return best;
+  best.median_residual_deg = std::numeric_limits<double>::infinity();
+  for (const double sign : {1.0, -1.0}) {
+    std::vector<double> difference, residual;
+    for (std::size_t i = 0; i < azimuth.size(); ++i)
+      difference.push_back(azimuth[i] - sign * station[i]);
+    StationFit fit;
+    fit.views = static_cast<int>(azimuth.size());
+    fit.mirrored = sign < 0;
+    fit.offset_deg = robust_offset_deg(difference);
+    for (std::size_t i = 0; i < difference.size(); ++i) {
+      residual.push_back(std::abs(wrapped_deg(difference[i] - fit.offset_deg)));
+      fit.outliers += residual.back() > 20.0 + 3.0 * sigma[i] ? 1 : 0;
+    }
+    fit.median_residual_deg = median(residual);
+    fit.worst_residual_deg = *std::max_element(residual.begin(), residual.end());
+    if (fit.median_residual_deg < best.median_residual_deg) best = fit;
+  }
+  return best;
+}
+
+}  // namespace orbitfuse

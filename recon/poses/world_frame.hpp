@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "core/reconstruction.hpp"
+#include "core/result.hpp"
+#include "core/session.hpp"
+#include "core/transform.hpp"
+
+// The world of a reconstruction is free up to a similarity. Ours is chosen so that orbits, crops
+// and cameras mean something in it: z up, the origin where the cameras look, median distance 1.
+namespace orbitfuse {
+
+/// Point nearest to all optical axes (robust least squares). NaN when the axes are parallel.
+Eigen::Vector3d look_at_point(const std::vector<PosedView>& views);
+
+/// Unit vector most orthogonal to all camera x axes, on the side of the cameras' up: handheld and
+/// tripod cameras are level on average. Falls back to the mean up when the x axes are parallel.
+Eigen::Vector3d up_direction(const std::vector<PosedView>& views);
+
+/// Azimuth of the first view (or the stations' circular mean offset, where stations exist) becomes
+/// that of the world. Identity for fewer than two views.
+Similarity3d canonical_from_world(const std::vector<PosedView>& views,
+                                  const std::vector<const FrameRecord*>& frames);
+
+void move_world(Reconstruction& model, const Similarity3d& new_from_old);
+
+struct OrbitAngles {
+  double azimuth_deg = 0, elevation_deg = 0, radius = 0;
+};
+/// Of a camera centre in a canonical world.
+OrbitAngles orbit_angles(const Eigen::Vector3d& center);
+
+/// How well posed views agree with their stations, after the best offset in azimuth.
+struct StationFit {
+  int views = 0;
+  bool mirrored = false;          ///< the stations run clockwise against the poses
+  double offset_deg = 0;          ///< azimuth = +-station + offset
+  double median_residual_deg = 0;
+  double worst_residual_deg = 0;
+  int outliers = 0;               ///< residual above 20 deg + 3 sigma
+};
+/// nullopt-like: views = 0 when fewer than three views have stations. Azimuths are the views' in
+/// their own canonical frame, so nothing of the world has to be right.
+StationFit fit_stations(const std::vector<PosedView>& views, const Session& session);
+
+}  // namespace orbitfuse
