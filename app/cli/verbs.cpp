@@ -25,13 +25,11 @@ P*//*P      {"metrics", "Score fused images",
        "orbitfuse metrics --visible a.png --thermal b.png --fused f.png --json", add_metrics},
 P*/      {"report", "Write report.html from what a run has left",
        "orbitfuse report replay_data/container --out out/", add_report},
-/*P      {"eval", "Measure a run against ground truth",
+      {"eval", "Measure a run against ground truth",
        "orbitfuse eval out/ --ground-truth replay_data/container/ground_truth.json", add_eval},
-P*//*P      {"replay", "Play a recorded session through the recorder, as hardware would",
+      {"replay", "Play a recorded session through the recorder, as hardware would",
        "orbitfuse replay replay_data/container --to copy/ --speed full", add_replay},
-P*//*P      {"synthesize", "Record a session of a rendered scene with exact ground truth",
-       "orbitfuse synthesize my_orbit/ --seed 7", add_synthesize},
-P*/      {"doctor", "Check this machine for what OrbitFuse needs", "orbitfuse doctor", add_doctor},
+      {"doctor", "Check this machine for what OrbitFuse needs", "orbitfuse doctor", add_doctor},
   };
   return list;
 }

@@ -16,7 +16,6 @@
 #include "app/stages/stage_list.hpp"
 #include "app/stages/training_data.hpp"
 #include "core/temperature.hpp"
-#include "fusion/metrics/metrics.hpp"
 #include "recon/nerf/nerf.hpp"
 
 namespace orbitfuse::eval {
@@ -106,7 +105,7 @@ Status add_registration(Run& run, const std::vector<PosePair>& thermal) {
 }
 
 struct Sums {
-  double visible_psnr = 0, visible_ssim = 0, mae_k = 0, thermal_psnr = 0, covered = 0;
+  double visible_psnr = 0, mae_k = 0, thermal_psnr = 0, covered = 0;
   int visible = 0, thermal = 0;
 };
 
@@ -126,8 +125,6 @@ Status compare_visible(const nerf::Field& field, const TestView& view, const Cam
   resized(truth, camera).convertTo(truth8, CV_8U, 255);
   seen.color.convertTo(seen8, CV_8U, 255);
   sums.visible_psnr += psnr_db(seen8, truth8, 255);
-  ORBITFUSE_ASSIGN(const double similarity, metrics::ssim(seen8, truth8));
-  sums.visible_ssim += similarity;
   ++sums.visible;
   return {};
 }
@@ -175,7 +172,6 @@ Status add_test_views(Run& run, const GroundTruth& truth, const EvaluateOptions&
   json result = {{"views", truth.test.size()}};
   if (sums.visible > 0) {
     result["visible_psnr_db"] = sums.visible_psnr / sums.visible;
-    result["visible_ssim"] = sums.visible_ssim / sums.visible;
   }
   if (sums.thermal > 0) {
     result["temperature_mae_c"] = sums.mae_k / sums.thermal;

@@ -31,9 +31,8 @@ void print(terminal::Console& console, const json& result) {
   print_poses(console, result, "registration", "thermal, visible frame");
   if (const auto it = result.find("test_views"); it != result.end()) {
     if (it->contains("visible_psnr_db"))
-      console.data(fmt::format("{:<22} {:.2f} dB, SSIM {:.4f} on {} test views", "visible field",
-                               it->at("visible_psnr_db").get<double>(),
-                               it->at("visible_ssim").get<double>(), it->at("views").get<int>()));
+      console.data(fmt::format("{:<22} {:.2f} dB on {} test views", "visible field",
+                               it->at("visible_psnr_db").get<double>(), it->at("views").get<int>()));
     if (it->contains("temperature_mae_c"))
       console.data(fmt::format("{:<22} MAE {:.3f} degC, {:.2f} dB, {:.0f} % of the scene covered",
                                "thermal field", it->at("temperature_mae_c").get<double>(),
