@@ -19,10 +19,10 @@ struct Outcome {
 };
 
 struct RunOptions {
-  std::vector<std::string> environment;  ///< "NAME=value", on top of the present one
+  std::vector<std::string> environment = {};  ///< "NAME=value", on top of the present one
   std::filesystem::path folder = ".";
   /// Sends SIGINT once this text has appeared on stderr or stdout; empty = never.
-  std::string interrupt_after;
+  std::string interrupt_after = {};
 };
 
 /// Runs the built `orbitfuse` with the arguments.

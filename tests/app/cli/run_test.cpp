@@ -142,9 +142,12 @@ TEST_F(Run, InterruptedTrainingResumesToTheSameField) {
   resume.push_back("--resume");
   ASSERT_EQ(run(resume, {}, "train").code, 0);
   const auto resumed = file_hash(out / "train_visible/field.bin");
+  ASSERT_TRUE(resumed);
   fs::remove_all(out);
   ASSERT_EQ(run(longer, {}, "train").code, 0);
-  EXPECT_EQ(resumed, file_hash(out / "train_visible/field.bin"));
+  const auto unbroken = file_hash(out / "train_visible/field.bin");
+  ASSERT_TRUE(unbroken);
+  EXPECT_EQ(*resumed, *unbroken);
 }
 
 }  // namespace
