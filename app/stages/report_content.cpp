@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "app/pipeline/runner.hpp"
 #include "app/stages/artifacts.hpp"
 #include "app/stages/rendered_views.hpp"
@@ -24,18 +22,6 @@ using pipeline::StageStatus;
 
 /// More views would make the page too heavy to mail; the folders hold them all.
 constexpr std::size_t max_report_views = 16;
-
-const StageStatus* find(const StageContext& context, const std::string& stage) {
-  const auto& list = *context.earlier;
-  const auto it = std::find_if(list.begin(), list.end(),
-                               [&](const StageStatus& s) { return s.stage == stage; });
-  return it == list.end() ? nullptr : &*it;
-}
-
-const json* metrics_of(const StageContext& context, const std::string& stage) {
-  const StageStatus* status = find(context, stage);
-  return status && status->done() ? &status->output.metrics : nullptr;
-}
 
 Result<report::View> load_view(const StageContext& context, const ViewFiles& files, bool gray) {
   const fs::path folder = context.of("render");
@@ -64,7 +50,7 @@ Status add_views(const StageContext& context, const RenderConfig& config, report
   if (!context.has("render")) return {};
   ORBITFUSE_ASSIGN(const RenderedViews rendered, load_rendered_views(context.of("render")));
   std::vector<std::string> methods;
-  if (const json* fused = metrics_of(context, "fuse"))
+  if (const json* fused = context.metrics_of("fuse"))
     methods = fused->value("methods", methods);
   for (const ViewFiles& files : rendered.views) {
     if (model.views.size() == max_report_views) {
@@ -101,7 +87,7 @@ void add_poses(const StageContext& context, const SessionInput& input, report::M
     poses.modality = visible ? "Visible" : "Thermal";
     poses.total = input.count(modality);
     if (poses.total == 0) continue;
-    if (const json* m = metrics_of(context, "poses_" + std::string(name(modality)))) {
+    if (const json* m = context.metrics_of("poses_" + std::string(name(modality)))) {
       poses.posed = m->value("posed", 0);
       poses.total = m->value("total", poses.total);
       for (const json& rung : m->value("ladder", json::array()))
@@ -116,7 +102,7 @@ void add_poses(const StageContext& context, const SessionInput& input, report::M
 }
 
 void add_registration(const StageContext& context, report::Model& model) {
-  const json* m = metrics_of(context, "register");
+  const json* m = context.metrics_of("register");
   if (!m) return;
   model.registration_note = m->value("note", "");
   for (const json& fact : m->value("facts", json::array()))
@@ -133,7 +119,7 @@ void add_fields(const StageContext& context, report::Model& model) {
                        {"Cloud points", "Exported to cloud.ply"}},
                       {}};
   for (const char* stage : {"train_visible", "train_thermal"}) {
-    const json* m = metrics_of(context, stage);
+    const json* m = context.metrics_of(stage);
     if (!m) continue;
     const json psnr = m->value("heldout_psnr_db", json());
     table.rows.push_back({std::string(stage).substr(6),
@@ -147,7 +133,7 @@ void add_fields(const StageContext& context, report::Model& model) {
 }
 
 void add_metric_tables(const StageContext& context, report::Model& model) {
-  const json* m = metrics_of(context, "metrics");
+  const json* m = context.metrics_of("metrics");
   if (!m) return;
   for (const json& t : m->value("tables", json::array())) {
     report::Table table;
