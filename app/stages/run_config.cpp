@@ -50,6 +50,8 @@ void add_train(Settings& settings, const std::string& table, TrainConfig& config
                "Training images are reduced to this width; larger is slower");
   settings.add(table + ".cloud_width_px", config.cloud.max_width,
                "Width of the depth maps the point cloud is made from");
+  settings.add(table + ".cloud_tolerance", config.cloud.depth_tolerance,
+               "Relative depth agreement of two views on a point of the cloud");
   add_train_fields(settings, table, config.options);
 }
 

@@ -84,7 +84,7 @@ TEST(Cli, ConfigMistakesNameFileLineAndKey) {
   EXPECT_EQ(orbitfuse_program({"run", "x", "--config", "/none.toml"}).code, 3);
   const Outcome range = orbitfuse_program({"run", "x", "--set", "render.views=-3"});
   EXPECT_EQ(range.code, 2);
-  EXPECT_THAT(range.err, HasSubstr("render.views = -3: must be"));
+  EXPECT_THAT(range.err, HasSubstr("render.views: -3; must be"));
 }
 
 TEST(Cli, ShippedConfigHoldsTheBuiltInDefaults) {
@@ -113,7 +113,8 @@ TEST(Cli, DoctorSaysWhatIsMissing) {
       orbitfuse_program({"doctor", "--json"}, {.environment = {"PATH=/nowhere"}});
   EXPECT_EQ(outcome.code, 6);
   bool colmap = false;
-  for (const auto& finding : outcome.result().at("findings"))
+  const auto result = outcome.result();
+  for (const auto& finding : result.at("findings"))
     if (finding.at("what") == "COLMAP") colmap = finding.at("remedy") != "";
   EXPECT_TRUE(colmap);
 }

@@ -24,9 +24,10 @@ class Run : public testing::Test {
               const std::string& verb = "run") {
     std::vector<std::string> words = {verb, session.string(), "--out", out.string(), "--json"};
     for (const char* set :
-         {"train.visible.iterations=60", "train.thermal.iterations=60", "train.visible.eval_count=0",
+         {"train.visible.iterations=200", "train.thermal.iterations=200", "train.visible.eval_count=0",
           "train.thermal.eval_count=0", "train.visible.cloud_width_px=32",
-          "train.thermal.cloud_width_px=32", "render.views=2", "render.width_px=64"}) {
+          "train.thermal.cloud_width_px=32",
+          "train.visible.cloud_tolerance=0.2", "train.thermal.cloud_tolerance=0.2", "render.views=2", "render.width_px=64"}) {
       words.insert(words.end(), {"--set", set});
     }
     words.insert(words.end(), more.begin(), more.end());
@@ -34,7 +35,8 @@ class Run : public testing::Test {
   }
   static std::map<std::string, std::string> states(const Outcome& outcome) {
     std::map<std::string, std::string> result;
-    for (const auto& stage : outcome.result().at("stages"))
+    const auto outcome_result = outcome.result();
+    for (const auto& stage : outcome_result.at("stages"))
       result[stage.at("stage")] = stage.at("state");
     return result;
   }
@@ -131,7 +133,7 @@ TEST_F(Run, JsonStreamIsOneObjectALineAndEndsWithTheResult) {
 
 TEST_F(Run, InterruptedTrainingResumesToTheSameField) {
   write_fixture_session(session);
-  const std::vector<std::string> longer = {"--set", "train.visible.iterations=600", "--set",
+  const std::vector<std::string> longer = {"--set", "train.visible.iterations=2000", "--set",
                                            "train.visible.eval_count=4"};
   const Outcome stopped = run(longer, {.interrupt_after = "\"stage\":\"train.visible\""}, "train");
   if (stopped.code == 0) GTEST_SKIP() << "the training was over before the signal arrived";
