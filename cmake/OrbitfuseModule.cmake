@@ -41,10 +41,10 @@ function(orbitfuse_isa_sources target isa)
   set_property(SOURCE ${ARGN} APPEND PROPERTY COMPILE_OPTIONS ${flags_${isa}})
 endfunction()
 
-# orbitfuse_test(core_test SRCS x_test.cpp LINK core [LABEL fast|slow])
+# orbitfuse_test(core_test SRCS x_test.cpp LINK core [LABEL fast|slow] [LOCK resource])
 # fast: the README's test command; slow: has its own command (tests/run.sh --slow).
 function(orbitfuse_test name)
-  cmake_parse_arguments(ARG "" "LABEL" "SRCS;LINK" ${ARGN})
+  cmake_parse_arguments(ARG "" "LABEL;LOCK" "SRCS;LINK" ${ARGN})
   if(NOT ARG_LABEL)
     set(ARG_LABEL fast)
   endif()
@@ -52,7 +52,7 @@ function(orbitfuse_test name)
   target_link_libraries(${name} PRIVATE ${ARG_LINK} GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE
     ORBITFUSE_SOURCE_DIR="${CMAKE_SOURCE_DIR}" ORBITFUSE_BINARY_DIR="${CMAKE_BINARY_DIR}")
-  gtest_discover_tests(${name} PROPERTIES LABELS ${ARG_LABEL} DISCOVERY_TIMEOUT 60)
+  gtest_discover_tests(${name} PROPERTIES LABELS ${ARG_LABEL} RESOURCE_LOCK "${ARG_LOCK}" DISCOVERY_TIMEOUT 60)
 endfunction()
 
 function(orbitfuse_write_link_graph file)

@@ -8,6 +8,7 @@ packages=(
   libeigen3-dev libceres-dev libopencv-dev libtbb-dev
   libcli11-dev nlohmann-json3-dev libtomlplusplus-dev libexpected-dev libfmt-dev libspdlog-dev
   libtiff-dev libpng-dev libjpeg-dev libexiv2-dev libsqlite3-dev libxxhash-dev libnanoflann-dev
+  libaravis-dev
   libgtest-dev libgmock-dev libbenchmark-dev
   colmap
 )

@@ -21,6 +21,7 @@ struct TrainingView {
   /// Visible: CV_32FC3 in R, G, B order, 0..1 as stored (sRGB). Thermal: CV_32FC1 kelvin, NaN =
   /// invalid pixel (never trained on). NaN in a visible image is an input error.
   cv::Mat image;
+  bool measure_only = false;  ///< held out: measures, never trains
 };
 
 /// Everything known of one modality. All views, points and depth maps share one world frame; the

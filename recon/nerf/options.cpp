@@ -35,6 +35,7 @@ const std::vector<Entry>& table() {
       FIELD(target_psnr, 0, 100),
       FIELD(holdout_every, 0, 1e6),
       FIELD(plateau_db, 0, 100),
+      FIELD(keep_best),
       FIELD(eval_count, 0, 10000),
       FIELD(seed),
       FIELD(checkpoint),

@@ -23,6 +23,7 @@ struct TrainOptions {
   double target_psnr = 0;    ///< stop when the held-out PSNR reaches it, 0 = never
   int holdout_every = 0;     ///< every n-th view measures and does not train; 0 = none
   double plateau_db = 0;     ///< stop when held-out PSNR is this far below its best; 0 = never
+  bool keep_best = true;     ///< the field is that of the best held-out evaluation
   int eval_count = 8;        ///< held-out evaluations over the run (0 = only the last)
 
   // -- determinism, checkpoints --------------------------------------------------------------

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "capture/guide/coverage.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+namespace orbitfuse {
+namespace {
+
+std::size_t slot(Modality modality) { return modality == Modality::visible ? 0 : 1; }
+
+std::string sideways(double degrees) {
+  // Azimuth grows counter-clockwise seen from above; facing the object that is to the right.
+  return fmt::format("{:.0f}° further {}", std::abs(degrees), degrees > 0 ? "right" : "left");
+}
+
+std::string upwards(double degrees) {
+  const char* amount = std::abs(degrees) < 12 ? "a little " : "";
+  return fmt::format("{}{}", amount, degrees > 0 ? "higher" : "lower");
+}
+
+}  // namespace
+
+double angle_difference_deg(double a_deg, double b_deg) {
+  const double wrapped = std::fmod(a_deg - b_deg + 180.0, 360.0);
+  return (wrapped < 0 ? wrapped + 360.0 : wrapped) - 180.0;
+}
+
+int OrbitPlan::sectors_per_loop() const { return static_cast<int>(std::lround(360.0 / spacing_deg)); }
+
+Status OrbitPlan::validate() const {
+  const auto bad = [](const char* field, double found, const char* remedy) {
+    return fail(ErrorKind::usage, std::string("guide.") + field, fmt::format("{}", found), remedy);
+  };
+  const double count = 360.0 / spacing_deg;
+  if (!(spacing_deg >= 1 && spacing_deg <= 120) || std::abs(count - std::round(count)) > 1e-9) {
+    return bad("spacing_deg", spacing_deg, "must divide 360 and lie in 1..120");
+  }
+  if (!(azimuth_tolerance_deg > 0 && azimuth_tolerance_deg <= spacing_deg / 2)) {
+    return bad("azimuth_tolerance_deg", azimuth_tolerance_deg, "must be > 0 and at most half the spacing");
+  }
+  if (!(elevation_tolerance_deg > 0)) return bad("elevation_tolerance_deg", elevation_tolerance_deg, "must be > 0");
+  if (loop_elevations_deg.empty()) return bad("loop_elevations_deg", 0, "give at least one loop");
+  for (double elevation : loop_elevations_deg) {
+    if (!(elevation > -90 && elevation < 90)) return bad("loop_elevations_deg", elevation, "must lie in -90..90");
+  }
+  std::vector<double> sorted = loop_elevations_deg;
+  std::sort(sorted.begin(), sorted.end());
+  for (std::size_t i = 1; i < sorted.size(); ++i) {
+    if (sorted[i] - sorted[i - 1] < 2 * elevation_tolerance_deg) {
+      return bad("loop_elevations_deg", sorted[i], "loops must be two tolerances apart, or a frame fits both");
+    }
+  }
+  if (modalities.empty()) return bad("modalities", 0, "give at least one");
+  return {};
+}
+
+Status CoverageOptions::validate() const {
+  const auto bad = [](const char* field, double found) {
+    return fail(ErrorKind::usage, std::string("guide.") + field, fmt::format("{}", found), "must be > 0 (shares <= 1)");
+  };
+  if (!(min_sharpness > 0 && min_sharpness <= 1)) return bad("min_sharpness", min_sharpness);
+  if (!(max_clipped > 0 && max_clipped <= 1)) return bad("max_clipped", max_clipped);
+  if (!(rest_speed_deg_s > 0)) return bad("rest_speed_deg_s", rest_speed_deg_s);
+  if (!(max_sigma_deg > 0)) return bad("max_sigma_deg", max_sigma_deg);
+  return {};
+}
+
+std::string text(Refusal refusal) {
+  switch (refusal) {
+    case Refusal::none: return "good";
+    case Refusal::not_on_disk: return "not saved";
+    case Refusal::lost: return "the mat is out of sight";
+    case Refusal::nuc: return "the camera is correcting itself, wait";
+    case Refusal::moving: return "too fast, hold still";
+    case Refusal::blurred: return "blurred, hold still";
+    case Refusal::badly_exposed: return "too dark or too bright";
+    case Refusal::position_unsure: return "position unsure, look at the mat";
+    case Refusal::between_stations: return "between stations";
+    case Refusal::out_of_band: return "too high or too low";
+  }
+  return "";
+}
+
+Coverage::Coverage(OrbitPlan plan, CoverageOptions options)
+    : plan_(std::move(plan)), options_(options) {
+  assert(plan_.validate() && options_.validate());
+  for (std::size_t loop = 0; loop < plan_.loop_elevations_deg.size(); ++loop) {
+    for (int i = 0; i < plan_.sectors_per_loop(); ++i) {
+      sectors_.push_back({static_cast<int>(loop), i, i * plan_.spacing_deg, plan_.loop_elevations_deg[loop], {}, {}});
+    }
+  }
+}
+
+Refusal Coverage::add(const FrameAssessment& frame) {
+  if (frame.file.empty()) return Refusal::not_on_disk;
+  if (frame.nuc) return Refusal::nuc;
+  if (!frame.position) return Refusal::lost;
+  const OrbitPosition& p = *frame.position;
+  // Negated comparisons, so that NaN refuses.
+  if (!(p.sigma_deg <= options_.max_sigma_deg)) return Refusal::position_unsure;
+  if (!(std::abs(p.speed_deg_s) <= options_.rest_speed_deg_s)) return Refusal::moving;
+  if (!(frame.sharpness >= options_.min_sharpness)) return Refusal::blurred;
+  if (!(std::max(frame.overexposed, frame.underexposed) <= options_.max_clipped)) return Refusal::badly_exposed;
+  bool in_band = false;
+  for (Sector& sector : sectors_) {
+    if (!(std::abs(p.elevation_deg - sector.elevation_deg) <= plan_.elevation_tolerance_deg)) continue;
+    in_band = true;
+    if (!(std::abs(angle_difference_deg(p.azimuth_deg, sector.azimuth_deg)) <= plan_.azimuth_tolerance_deg)) continue;
+    const std::size_t s = slot(frame.modality);
+    if (sector.file[s].empty() || frame.sharpness > sector.sharpness[s]) {
+      sector.file[s] = frame.file;
+      sector.sharpness[s] = frame.sharpness;
+    }
+    return Refusal::none;
+  }
+  return in_band ? Refusal::between_stations : Refusal::out_of_band;
+}
+
+bool Coverage::done(const Sector& sector, Modality modality) const {
+  return !sector.file[slot(modality)].empty();
+}
+
+int Coverage::done_count(Modality modality) const {
+  return static_cast<int>(std::count_if(sectors_.begin(), sectors_.end(),
+                                        [&](const Sector& s) { return done(s, modality); }));
+}
+
+bool Coverage::complete() const {
+  return std::all_of(plan_.modalities.begin(), plan_.modalities.end(),
+                     [&](Modality m) { return missing(m).empty(); });
+}
+
+std::vector<const Sector*> Coverage::missing(Modality modality) const {
+  std::vector<const Sector*> list;
+  for (const Sector& sector : sectors_) {
+    if (!done(sector, modality)) list.push_back(&sector);
+  }
+  return list;
+}
+
+/// Nearest on foot: a change of loop costs the operator more than a few steps, so it counts double.
+const Sector* Coverage::nearest_missing(Modality modality, const OrbitPosition& now) const {
+  const Sector* best = nullptr;
+  double best_cost = 0;
+  for (const Sector* sector : missing(modality)) {
+    const double cost = std::abs(angle_difference_deg(sector->azimuth_deg, now.azimuth_deg)) +
+                        2 * std::max(0.0, std::abs(sector->elevation_deg - now.elevation_deg) -
+                                              plan_.elevation_tolerance_deg);
+    if (!best || cost < best_cost) {
+      best = sector;
+      best_cost = cost;
+    }
+  }
+  return best;
+}
+
+std::string Coverage::instruction(Modality modality, const std::optional<OrbitPosition>& now,
+                                  Refusal last) const {
+  const int left = static_cast<int>(missing(modality).size());
+  if (left == 0) return fmt::format("{}: done", name(modality));
+  if (!now) return "show the mat to the camera";
+  const Sector* target = nearest_missing(modality, *now);
+  const double turn = angle_difference_deg(target->azimuth_deg, now->azimuth_deg);
+  const double climb = target->elevation_deg - now->elevation_deg;
+  const bool there = std::abs(turn) <= plan_.azimuth_tolerance_deg;
+  const bool in_band = std::abs(climb) <= plan_.elevation_tolerance_deg;
+  if (there && in_band) {
+    const bool fixable = last != Refusal::none && last != Refusal::between_stations && last != Refusal::out_of_band;
+    return fixable ? text(last) : "hold still";
+  }
+  std::string words;
+  if (!there) words = sideways(turn);
+  if (!in_band) words += (words.empty() ? "" : ", ") + upwards(climb);
+  return words;
+}
+
+}  // namespace orbitfuse

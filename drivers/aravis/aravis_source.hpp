@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "capture/clock/clock_map.hpp"
+#include "capture/frame_source.hpp"
+#include "drivers/aravis/profile.hpp"
+
+namespace orbitfuse::aravis {
+
+struct AravisOptions {
+  std::string camera;                  ///< IP address, serial or Aravis id; empty: the first found
+  std::string device_id = "thermal0";  ///< key in the session
+  Modality modality = Modality::thermal;
+  std::filesystem::path profiles;      ///< folder of camera profiles (config/cameras)
+  std::string profile;                 ///< a profile by name; empty: by model
+  int buffers = 24;                    ///< 0.8 s at 30 Hz: rides over a slow moment of the host
+  std::chrono::milliseconds silence{400};  ///< told as "silent" after this long without a frame
+  std::chrono::milliseconds give_up{1000}; ///< and reopened after this long
+  std::chrono::milliseconds nuc_settle{500};  ///< frames right after a shutter freeze still drift
+
+  Status validate() const;
+};
+
+struct StreamStatistics {
+  std::uint64_t completed = 0, failures = 0, underruns = 0, resent = 0, missing_packets = 0, size_mismatches = 0;
+};
+
+/// A GigE Vision camera. Aravis calls some damaged frames good, so every frame is checked for its
+/// data size, width, height, pixel format and Aravis' own mismatch counter; ids are counted here
+/// (16 bits, never 0); silence is told within half a second; a lost camera is torn down on another
+/// thread, probed for, reopened, and its settings pushed and verified again. Frozen (bit-equal)
+/// frames are flagged "nuc".
+class AravisSource final : public FrameSource {
+ public:
+  explicit AravisSource(AravisOptions options);
+  ~AravisSource() override;
+
+  DeviceInfo describe() const override;
+  Status start() override;
+  Result<Delivery> next(std::chrono::milliseconds timeout) override;
+  void stop() override;
+
+  /// Asks the camera for a shutter correction now; frames until it settles are flagged.
+  Status correct_nonuniformity();
+  StreamStatistics statistics() const;
+  const ClockMap& clock() const { return clock_; }
+
+ private:
+  struct Link;
+  using Clock = std::chrono::steady_clock;
+
+  Status open();
+  Status push_settings();
+  Result<std::vector<std::uint16_t>> temperature_table();
+  void bury_link();
+  Delivery lose(const std::string& why);
+  Delivery event(std::string kind, std::string detail) const;
+  std::optional<Delivery> try_reopen();
+  Delivery inspect(void* buffer);
+  void mark_nuc(Frame& frame, const void* data, std::size_t size);
+
+  AravisOptions options_;
+  CameraProfile profile_;
+  std::shared_ptr<Link> link_;
+  std::vector<std::thread> graves_;
+  std::vector<std::uint16_t> table_;
+  std::vector<Delivery> pending_;
+  DeviceInfo info_;
+  std::string address_;
+  GvspFrameCounter counter_;
+  ClockMap clock_;
+  std::uint64_t base_id_ = 0, next_id_ = 0, mismatches_ = 0, last_hash_ = 0;
+  bool away_ = false, silent_told_ = false, frozen_ = false;
+  Clock::time_point last_frame_{}, last_attempt_{}, lost_at_{}, nuc_until_{};
+};
+
+struct FoundCamera {
+  std::string id, model, serial, address;
+};
+/// Cameras that answer on the local networks, loopback included.
+std::vector<FoundCamera> discover();
+
+}  // namespace orbitfuse::aravis

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "drivers/replay/replay_source.hpp"
+
+#include <algorithm>
+#include <thread>
+
+#include "core/file_io.hpp"
+
+namespace orbitfuse {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+class ReplaySource : public FrameSource {
+ public:
+  ReplaySource(const Session& session, const std::string& device, ReplaySpeed speed)
+      : session_(session), speed_(speed) {
+    if (const DeviceInfo* known = session.device(device)) device_ = *known;
+    for (const FrameRecord& frame : session_.frames) {
+      if (frame.device == device) records_.push_back(frame);
+    }
+    // The manifest has the order in which frames reached the disk; a stream has that of its ids.
+    std::stable_sort(records_.begin(), records_.end(),
+                     [](const FrameRecord& a, const FrameRecord& b) { return a.sequence < b.sequence; });
+    session_.frames.clear();
+  }
+
+  DeviceInfo describe() const override { return device_; }
+
+  Status start() override {
+    if (records_.empty()) {
+      return fail(ErrorKind::input, session_.folder.string(), "no frames of device \"" + device_.id + "\"",
+                  "choose a device of the session");
+    }
+    next_ = 0;
+    started_ = Clock::now();
+    return {};
+  }
+
+  Result<Delivery> next(std::chrono::milliseconds timeout) override {
+    Delivery delivery;
+    if (next_ >= records_.size()) {
+      delivery.kind = Delivery::Kind::end;
+      return delivery;
+    }
+    const FrameRecord& record = records_[next_];
+    if (!wait_for(record, timeout)) return delivery;  // kind timeout
+    ++next_;
+    ORBITFUSE_TRY(load(record, delivery));
+    return delivery;
+  }
+
+  void stop() override {}
+
+ private:
+  /// False when the frame's moment is further away than the timeout.
+  bool wait_for(const FrameRecord& record, std::chrono::milliseconds timeout) {
+    if (speed_ == ReplaySpeed::full || record.host_time_ns == 0) return true;
+    const auto due = started_ + std::chrono::nanoseconds(
+                                    std::max<std::int64_t>(0, record.host_time_ns - records_.front().host_time_ns));
+    const auto deadline = Clock::now() + timeout;
+    std::this_thread::sleep_until(std::min(due, deadline));
+    return due <= deadline;
+  }
+
+  Status load(const FrameRecord& record, Delivery& delivery) const {
+    Frame& frame = delivery.frame;
+    frame.id = record.sequence;
+    delivery.kind = Delivery::Kind::rejected;
+    Result<std::string> bytes = read_file(session_.path_of(record));
+    if (!bytes) {
+      delivery.reason = bytes.error().found;
+      return {};
+    }
+    if (!record.content_hash.empty() && content_hash(*bytes) != record.content_hash) {
+      delivery.reason = "the file changed since it was recorded";
+      return {};
+    }
+    delivery.kind = Delivery::Kind::frame;
+    frame.encoded = *std::move(bytes);
+    frame.extension = std::filesystem::path(record.file).extension().string();
+    frame.host_time_ns = record.host_time_ns;
+    frame.device_time_ns = record.device_time_ns;
+    frame.station = record.station;
+    frame.tracking = record.tracking;
+    frame.thermal_is_gray = record.thermal_is_gray;
+    frame.flags = record.flags;
+    frame.cam_from_world = record.cam_from_world;
+    frame.camera = record.camera;
+    frame.source = record.source;
+    return {};
+  }
+
+  Session session_;
+  DeviceInfo device_;
+  ReplaySpeed speed_;
+  std::vector<FrameRecord> records_;
+  std::size_t next_ = 0;
+  Clock::time_point started_;
+};
+
+}  // namespace
+
+std::unique_ptr<FrameSource> make_replay_source(const Session& session, const std::string& device, ReplaySpeed speed) {
+  return std::make_unique<ReplaySource>(session, device, speed);
+}
+
+std::vector<std::unique_ptr<FrameSource>> make_replay_sources(const Session& session, ReplaySpeed speed) {
+  std::vector<std::unique_ptr<FrameSource>> sources;
+  for (const DeviceInfo& device : session.devices) sources.push_back(make_replay_source(session, device.id, speed));
+  return sources;
+}
+
+}  // namespace orbitfuse

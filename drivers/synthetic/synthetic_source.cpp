@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/image_codec.hpp"
+#include "drivers/synthetic/orbit.hpp"
+#include "drivers/synthetic/renderer.hpp"
+#include "drivers/synthetic/sensor.hpp"
+#include "drivers/synthetic/stations.hpp"
+
+namespace orbitfuse {
+namespace {
+
+/// A date for the recording; the thermal walk follows the visible one by two hours, as in the field.
+constexpr std::int64_t visible_start_ns = 1'790'000'000'000'000'000;
+constexpr std::int64_t thermal_delay_ns = 7200ll * 1'000'000'000;
+
+class SyntheticSource : public FrameSource {
+ public:
+  SyntheticSource(const SyntheticOptions& options, Modality modality)
+      : options_(options), modality_(modality), camera_(synthetic::camera_of(synthetic::orbit_of(options, modality))),
+        scene_(options.seed) {}
+
+  DeviceInfo describe() const override {
+    DeviceInfo device;
+    device.id = std::string(name(modality_)) + "0";
+    device.modality = modality_;
+    device.driver = "synthetic";
+    device.model = modality_ == Modality::visible ? "rendered colour camera" : "rendered microbolometer";
+    device.serial = "seed " + std::to_string(options_.seed);
+    // The data sheet's focal length, as EXIF or a lens label would give it; not the distortion.
+    device.lens.focal_px = camera_.fx;
+    return device;
+  }
+
+  Status start() override {
+    ORBITFUSE_TRY(options_.validate());
+    walk_ = synthetic::walk(options_, modality_);
+    next_ = 0;
+    return {};
+  }
+
+  Result<Delivery> next(std::chrono::milliseconds) override {
+    Delivery delivery;
+    if (next_ >= walk_.size()) {
+      delivery.kind = Delivery::Kind::end;
+      return delivery;
+    }
+    const synthetic::Exposure& exposure = walk_[next_];
+    delivery.kind = Delivery::Kind::frame;
+    Frame& frame = delivery.frame;
+    frame.id = next_;
+    frame.device_time_ns = static_cast<std::int64_t>(exposure.time_s * 1e9);
+    frame.host_time_ns = visible_start_ns + frame.device_time_ns + (modality_ == Modality::thermal ? thermal_delay_ns : 0);
+    frame.tracking = exposure.tracking;
+    if (!exposure.tracking) frame.station = exposure.nominal;
+    ORBITFUSE_TRY(render(exposure.cam_from_world, frame));
+    ++next_;
+    return delivery;
+  }
+
+  void stop() override {}
+
+ private:
+  Status render(const Rigid3d& cam_from_world, Frame& frame) const {
+    const int samples = options_.samples_per_axis;
+    if (modality_ == Modality::thermal) {
+      frame.pixels = synthetic::spoil_thermal(synthetic::render_thermal(scene_, camera_, cam_from_world, samples),
+                                              options_.defects, options_.seed, frame.id);
+      return {};
+    }
+    cv::Mat image = synthetic::render_visible(scene_, camera_, cam_from_world, samples);
+    synthetic::spoil_visible(image, options_.visible_noise, options_.seed, frame.id);
+    // A camera that compresses by itself: its JPEG is what goes to disk, byte for byte.
+    ORBITFUSE_ASSIGN(frame.encoded, encode_jpeg(image, options_.jpeg_quality));
+    frame.extension = ".jpg";
+    return {};
+  }
+
+  SyntheticOptions options_;
+  Modality modality_;
+  Camera camera_;
+  synthetic::Scene scene_;
+  std::vector<synthetic::Exposure> walk_;
+  std::size_t next_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<FrameSource> make_synthetic_source(const SyntheticOptions& options, Modality modality) {
+  return std::make_unique<SyntheticSource>(options, modality);
+}
+
+}  // namespace orbitfuse

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "core/result.hpp"
+#include "drivers/v4l2/video_system.hpp"
+
+namespace orbitfuse::v4l2 {
+
+/// How the user names a camera: "/dev/video0", "serial:ABC", "usb:1-4.2" or "id:046d:0825".
+/// A node path names whatever is there now; the others survive unplugging and renumbering.
+struct CameraName {
+  enum class By { node, serial, usb_path, usb_id };
+  By by = By::node;
+  std::string value;
+};
+
+Result<CameraName> parse_camera_name(const std::string& text);
+
+/// The capture node (VIDEO_CAPTURE and STREAMING; a camera has metadata nodes too) of that camera;
+/// device error listing what is connected otherwise.
+Result<VideoSystem::Node> find_camera(VideoSystem& system, const CameraName& name);
+
+/// The steadiest name of a node: serial, else USB port, else the path.
+CameraName lasting_name(const VideoSystem::Node& node);
+std::string text(const CameraName& name);
+
+}  // namespace orbitfuse::v4l2

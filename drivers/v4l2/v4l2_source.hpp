@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "capture/frame_source.hpp"
+#include "drivers/v4l2/identity.hpp"
+#include "drivers/v4l2/pixels.hpp"
+#include "drivers/v4l2/video_system.hpp"
+
+namespace orbitfuse::v4l2 {
+
+struct V4l2Options {
+  std::string camera = "/dev/video0";  ///< see CameraName
+  std::string device_id = "visible0";  ///< key in the session
+  Modality modality = Modality::visible;
+  int width = 0, height = 0;           ///< 0: what the driver has set now
+  double rate_hz = 0;                  ///< 0: as above
+  std::string format;                  ///< "MJPG", "YUYV", "NV12", "GREY", "Y16 "; empty: the first
+                                       ///< of these that the camera has (Y16 first for thermal)
+  int buffers = 4;                     ///< fewer lose frames while one is stored
+  double kelvin_per_dn = 0;            ///< UVC thermal cameras with linear output, e.g. 0.01
+  /// Locked by default: a camera that adapts between stations changes colours between views.
+  bool lock_exposure = true, lock_focus = true, lock_white_balance = true;
+  std::optional<int> exposure_100us, focus, white_balance_k;  ///< absent: the value it had
+  std::chrono::milliseconds stall{2000};       ///< silence after which the stream is reopened
+  std::chrono::milliseconds reopen_every{250}; ///< while the camera is away
+
+  Status validate() const;
+};
+
+/// A UVC (or other V4L2 streaming) camera. Frames that the driver flags as damaged, or that are
+/// shorter than their format, are rejected deliveries; sequence gaps show as id gaps. When the
+/// camera is unplugged or stalls, everything is closed, and it is looked for under its lasting
+/// name (serial, else USB port) until it is back: events "disconnected", "stalled",
+/// "reconnected" tell, settings are pushed again and verified ("setting-lost" when one is not).
+class V4l2Source final : public FrameSource {
+ public:
+  V4l2Source(V4l2Options options, std::shared_ptr<VideoSystem> system = make_video_system());
+  ~V4l2Source() override;
+
+  DeviceInfo describe() const override;
+  Status start() override;
+  Result<Delivery> next(std::chrono::milliseconds timeout) override;
+  void stop() override;
+
+ private:
+  struct Mapping {
+    void* address = nullptr;
+    std::size_t length = 0;
+  };
+  using Clock = std::chrono::steady_clock;
+
+  Status open_and_stream();
+  Status choose_format();
+  Status set_rate();
+  Status apply_controls();
+  Status map_buffers();
+  void close_device();
+  Delivery lose(const std::string& event, const std::string& why);
+  std::optional<Delivery> try_reopen();
+  Result<Delivery> dequeue();
+  Delivery delivery_of(std::uint32_t index, std::uint32_t bytes, std::uint32_t flags);
+  std::uint64_t unwrap(std::uint32_t sequence);
+  int ioctl(unsigned long request, void* argument);
+
+  V4l2Options options_;
+  std::shared_ptr<VideoSystem> system_;
+  CameraName wanted_;
+  VideoSystem::Node node_;
+  Layout layout_;
+  int fd_ = -1;
+  bool away_ = false;
+  std::vector<Mapping> buffers_;
+  std::vector<Delivery> pending_;       ///< events to tell before the next frame
+  Clock::time_point last_frame_{}, last_attempt_{}, lost_at_{};
+  std::uint64_t next_id_ = 0, base_id_ = 0;
+  std::optional<std::uint32_t> last_sequence_;
+};
+
+}  // namespace orbitfuse::v4l2

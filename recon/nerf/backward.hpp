@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "recon/nerf/ray_block.hpp"
+
+namespace orbitfuse::nerf {
+
+/// What a ray should show.
+struct RayTarget {
+  float value[3] = {0, 0, 0};
+  int view = 0;
+  float distance = 0;      ///< known distance along the ray (normalised), 0 = unknown
+  float depth_weight = 0;  ///< of the depth loss on this ray
+};
+
+struct LossSettings {
+  float per_ray = 1;            ///< 1 / rays of the step
+  float distortion_weight = 0;
+  float huber = 0;              ///< errors beyond it count linearly; 0 = squared error
+  bool train_density = true;    ///< false: geometry comes from a guide field
+};
+
+/// Sums over a block; gradients are added, losses are means once divided by the rays.
+struct BlockGradients {
+  std::vector<float> mlp, color, offsets;
+  double squared_error = 0, distortion = 0, depth = 0;
+  long channels = 0;
+  bool finite = true;
+  void reset(const FieldState& field);
+  void add(const BlockGradients& other);
+};
+
+/// Gradients of the loss for a block that forward() has filled. `grid` receives the gradient of
+/// the encoded features, level after level, [level][sample][feature].
+void backward(const FieldState& field, const Kernels& kernels, const LossSettings& settings,
+              const std::vector<RayTarget>& targets, RayBlock& block, BlockGradients& gradients,
+              std::vector<float>& grid);
+
+}  // namespace orbitfuse::nerf

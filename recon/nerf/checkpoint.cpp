@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/nerf/checkpoint.hpp"
+
+#include <fmt/format.h>
+
+#include <cstring>
+
+#include "core/file_io.hpp"
+#include "recon/nerf/field.hpp"
+
+// Layout: magic, version, then tagless values in the order of `visit`, then the hash of all bytes
+// before it. Little-endian, as every machine this project runs on.
+namespace orbitfuse::nerf {
+namespace {
+
+constexpr char magic[8] = {'O', 'F', 'N', 'E', 'R', 'F', '0', '1'};
+constexpr std::size_t hash_length = 32;
+
+class Writer {
+ public:
+  static constexpr bool reading = false;
+  std::string bytes{magic, sizeof magic};
+  template <class T>
+    requires std::is_trivially_copyable_v<T>
+  void operator()(T& value) {
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  template <class T>
+  void operator()(std::vector<T>& values) {
+    std::uint64_t count = values.size();
+    (*this)(count);
+    bytes.append(reinterpret_cast<const char*>(values.data()), count * sizeof(T));
+  }
+  void operator()(std::string& text) {
+    std::uint64_t count = text.size();
+    (*this)(count);
+    bytes += text;
+  }
+};
+
+class Reader {
+ public:
+  static constexpr bool reading = true;
+  explicit Reader(std::string_view bytes) : bytes_(bytes) {}
+  bool ok = true;
+  template <class T>
+    requires std::is_trivially_copyable_v<T>
+  void operator()(T& value) {
+    take(&value, sizeof value);
+  }
+  template <class T>
+  void operator()(std::vector<T>& values) {
+    std::uint64_t count = 0;
+    (*this)(count);
+    if (!ok || count > bytes_.size() / sizeof(T)) return void(ok = false);
+    values.resize(count);
+    take(values.data(), count * sizeof(T));
+  }
+  void operator()(std::string& text) {
+    std::uint64_t count = 0;
+    (*this)(count);
+    if (!ok || count > bytes_.size()) return void(ok = false);
+    text.assign(bytes_.substr(0, count));
+    bytes_.remove_prefix(count);
+  }
+  bool at_end() const { return ok && bytes_.empty(); }
+
+ private:
+  void take(void* to, std::size_t size) {
+    if (!ok || bytes_.size() < size) return void(ok = false);
+    if (size > 0) std::memcpy(to, bytes_.data(), size);
+    bytes_.remove_prefix(size);
+  }
+  std::string_view bytes_;
+};
+
+template <class Archive>
+void visit_options(Archive& io, TrainOptions& options) {
+  for (const std::string& key : TrainOptions::keys()) {
+    std::string value = options.get(key);
+    io(value);
+    if constexpr (Archive::reading) io.ok = io.ok && options.set(key, value).has_value();
+  }
+}
+
+template <class Archive>
+void visit(Archive& io, Parameters& p) {
+  io(p.value);
+  io(p.first);
+  io(p.second);
+  if constexpr (Archive::reading) {
+    io.ok = io.ok && p.first.size() == p.value.size() && p.second.size() == p.value.size();
+    p.grad.assign(p.value.size(), 0);
+  }
+}
+
+/// The occupancy's densities matter only for cells that are on.
+template <class Archive>
+void visit(Archive& io, Occupancy& grid) {
+  io(grid.on);
+  io(grid.allowed);
+  std::vector<float> dense;
+  if constexpr (!Archive::reading) {
+    for (std::int64_t c = 0; c < grid.cell_count(); ++c)
+      if (grid.density[static_cast<std::size_t>(c)] > 0) dense.push_back(grid.density[static_cast<std::size_t>(c)]);
+  }
+  std::vector<std::uint64_t> set((grid.density.size() + 63) / 64);
+  if constexpr (!Archive::reading)
+    for (std::int64_t c = 0; c < grid.cell_count(); ++c)
+      if (grid.density[static_cast<std::size_t>(c)] > 0) Occupancy::put(set, c, true);
+  io(set);
+  io(dense);
+  io(grid.visited);
+  std::vector<float> window;
+  if constexpr (!Archive::reading)
+    for (const std::int64_t c : grid.visited) window.push_back(grid.window[static_cast<std::size_t>(c)]);
+  io(window);
+  if constexpr (Archive::reading) {
+    const std::size_t words = (grid.density.size() + 63) / 64;
+    io.ok = io.ok && set.size() == words && grid.on.size() == words && grid.allowed.size() == words &&
+            window.size() == grid.visited.size();
+    if (!io.ok) return;
+    std::size_t next = 0;
+    for (std::int64_t c = 0; c < grid.cell_count() && next < dense.size(); ++c)
+      if (Occupancy::test(set, c)) grid.density[static_cast<std::size_t>(c)] = dense[next++];
+    for (std::size_t i = 0; i < window.size(); ++i) {
+      if (grid.visited[i] < 0 || grid.visited[i] >= grid.cell_count()) return void(io.ok = false);
+      grid.window[static_cast<std::size_t>(grid.visited[i])] = window[i];
+    }
+  }
+}
+
+template <class Archive>
+void visit(Archive& io, Snapshot& best) {
+  io(best.step);
+  io(best.psnr);
+  io(best.occupied);
+  std::uint64_t count = best.values.size();
+  io(count);
+  if constexpr (Archive::reading) {
+    if (count > 64) return void(io.ok = false);
+    best.values.resize(count);
+  }
+  for (std::vector<float>& values : best.values) io(values);
+}
+
+template <class Archive>
+void visit(Archive& io, FieldState& state) {
+  visit_options(io, state.options);
+  std::uint64_t views = state.image_offsets.size();
+  io(state.modality);
+  io(views);
+  if constexpr (Archive::reading) {
+    if (!io.ok || views > 1000000 || !state.options.validate()) return void(io.ok = false);
+    state.create(state.options, state.modality, static_cast<int>(views));
+  }
+  io(state.thermal_is_gray);
+  double center[3] = {state.space.center.x(), state.space.center.y(), state.space.center.z()};
+  io(center);
+  state.space.center = {center[0], center[1], center[2]};
+  io(state.space.radius);
+  io(state.span);
+  io(state.cone);
+  io(state.step);
+  io(state.rays_per_step);
+  io(state.stretch);
+  io(state.train_psnr);
+  io(state.samples_per_ray);
+  io(state.spent_cpu_s);
+  io(state.spent_wall_s);
+  for (DensityNetwork* network : state.density_networks()) io(network->grid.level_weight);
+  std::vector<std::size_t> sizes;
+  for (const Parameters* p : state.parameters()) sizes.push_back(p->size());
+  std::size_t i = 0;
+  for (Parameters* p : state.parameters()) {
+    visit(io, *p);
+    if constexpr (Archive::reading) io.ok = io.ok && p->size() == sizes[i];
+    ++i;
+  }
+  visit(io, state.occupancy);
+  visit(io, state.best);
+}
+
+}  // namespace
+
+Status save_state(const FieldState& state, const std::filesystem::path& path) {
+  Writer writer;
+  visit(writer, const_cast<FieldState&>(state));  // the writing archive only reads
+  const std::string hash = content_hash(writer.bytes);
+  writer.bytes += hash;
+  return write_file_atomic(path, writer.bytes);
+}
+
+Result<FieldState> load_state(const std::filesystem::path& path) {
+  ORBITFUSE_ASSIGN(const std::string bytes, read_file(path));
+  const auto bad = [&](std::string found) {
+    return fail(ErrorKind::input, path.string(), std::move(found),
+                "delete it and train again, or restore a copy");
+  };
+  if (bytes.size() < sizeof magic + hash_length || std::memcmp(bytes.data(), magic, sizeof magic) != 0)
+    return bad("not a field of this version, or cut short");
+  const std::string_view body(bytes.data(), bytes.size() - hash_length);
+  if (content_hash(body) != bytes.substr(body.size())) return bad("checksum differs: cut or altered");
+  Reader reader(body.substr(sizeof magic));
+  FieldState state;
+  visit(reader, state);
+  if (!reader.at_end()) return bad("malformed content");
+  state.refresh();
+  return state;
+}
+
+Status check_resumable(const FieldState& state, const Dataset& dataset, const TrainOptions& options) {
+  const auto differs = [&](const std::string& what) {
+    return fail(ErrorKind::input, options.checkpoint.string(), "made with another " + what,
+                "resume with the same data and options, or delete it to start afresh");
+  };
+  if (state.modality != dataset.modality) return differs("modality");
+  if (state.image_offsets.size() != (dataset.views.size() + 7) / 8 * 8) return differs("number of views");
+  for (const char* key : {"levels", "features_per_level", "log2_table", "base_resolution", "seed",
+                          "max_resolution", "hidden", "color_hidden", "color_layers", "sampling",
+                          "occupancy_resolution"})
+    if (state.options.get(key) != options.get(key)) return differs(std::string("nerf.") + key);
+  return {};
+}
+
+Result<Field> Field::load(const std::filesystem::path& path) {
+  ORBITFUSE_ASSIGN(FieldState state, load_state(path));
+  return Field(std::make_unique<FieldState>(std::move(state)));
+}
+
+Status Field::save(const std::filesystem::path& path) const {
+  if (!state_) return fail(ErrorKind::input, "field", "it is empty", "train or load it first");
+  return save_state(*state_, path);
+}
+
+}  // namespace orbitfuse::nerf

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "recon/nerf/view_rays.hpp"
+
+namespace orbitfuse::nerf {
+
+/// Which cells of space may hold matter: nested cubes ("cascades") of half extent 1, 2, 4, ...
+/// normalised units, `resolution`^3 cells each. A cell outside `allowed` never comes on.
+struct Occupancy {
+  int resolution = 0, cascades = 0;
+  std::vector<std::uint64_t> on, allowed;  ///< bit per cell
+  std::vector<float> density;              ///< decaying maximum of what samples found
+  std::vector<float> window;               ///< maximum since the last update; -1 = not visited
+  std::vector<std::int64_t> visited;       ///< cells whose window is set
+
+  void create(int cells_per_axis, int cascade_count);
+  std::int64_t cell_count() const {
+    return static_cast<std::int64_t>(resolution) * resolution * resolution * cascades;
+  }
+  static bool test(const std::vector<std::uint64_t>& bits, std::int64_t cell) {
+    return bits[static_cast<std::size_t>(cell >> 6)] >> (cell & 63) & 1u;
+  }
+  static void put(std::vector<std::uint64_t>& bits, std::int64_t cell, bool value) {
+    const std::uint64_t bit = std::uint64_t{1} << (cell & 63);
+    auto& word = bits[static_cast<std::size_t>(cell >> 6)];
+    word = value ? word | bit : word & ~bit;
+  }
+  /// Cascade of a normalised point: the smallest cube that holds it (>= cascades: outside all).
+  static int cascade_of(const float x[3]);
+  std::int64_t cell_of(int cascade, const float x[3]) const;
+  float cell_size(int cascade) const {
+    return 2.0f * static_cast<float>(1 << cascade) / static_cast<float>(resolution);
+  }
+  void center_of(std::int64_t cell, float x[3]) const;
+  double fraction_on() const;
+
+  /// Notes a density found at a point.
+  void record(const float x[3], float sigma);
+  /// Applies the window: visited cells take max(old * decay, window) and stay on while
+  /// sigma * dt_min * 2^cascade >= min(threshold, half the mean).
+  void update(float decay, float threshold, float dt_min);
+};
+
+/// Samples of one ray: midpoints and lengths in normalised units.
+struct MarchSettings {
+  float cone = 0.005f;     ///< step length per distance
+  float dt_min = 0.001f;
+  float near = 0.1f;
+  float stretch = 1;       ///< steps are this much longer where no surface is expected
+  int max_samples = 1024;
+};
+
+/// Opacity of a cell, as its best view sees it, from which a surface is expected in it.
+inline constexpr float surface_opacity = 0.05f;
+
+/// Steps along the ray through cells that are on: finely where a surface is expected, by
+/// `stretch` longer steps in haze. Returns the number of samples written to t (midpoints) and dt.
+int march(const Occupancy& occupancy, const Ray& ray, const MarchSettings& settings, float jitter,
+          float* t, float* dt);
+
+}  // namespace orbitfuse::nerf

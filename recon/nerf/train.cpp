@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <sys/resource.h>
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "recon/nerf/checkpoint.hpp"
+#include "recon/nerf/nerf.hpp"
+#include "recon/nerf/render.hpp"
+#include "recon/nerf/trainer.hpp"
+
+namespace orbitfuse::nerf {
+namespace {
+
+double cpu_seconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+double wall_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+/// Time spent training, with evaluation and earlier runs accounted for.
+struct Stopwatch {
+  double cpu_s = 0, wall_s = 0;
+  double cpu_mark = cpu_seconds(), wall_mark = wall_seconds();
+  void pause() {
+    cpu_s += cpu_seconds() - cpu_mark;
+    wall_s += wall_seconds() - wall_mark;
+  }
+  void go_on() {
+    cpu_mark = cpu_seconds();
+    wall_mark = wall_seconds();
+  }
+  double wall_now() const { return wall_s + wall_seconds() - wall_mark; }
+};
+
+double heldout_psnr(const FieldState& field, const std::vector<SceneView>& views,
+                    const std::vector<bool>& heldout, int stride) {
+  double sum = 0;
+  int count = 0;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (!heldout[i]) continue;
+    sum += psnr_of(field, views[i], stride);
+    ++count;
+  }
+  return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
+}
+
+/// Steps between the rays' angles: one pixel at the view's own resolution times step_px.
+float cone_of(const std::vector<SceneView>& views, double step_px) {
+  double sum = 0;
+  for (const SceneView& view : views) sum += view.rays.pixel_angle();
+  return static_cast<float>(step_px * sum / static_cast<double>(views.size()));
+}
+
+}  // namespace
+
+const char* name(StopReason reason) {
+  switch (reason) {
+    case StopReason::iterations: return "iterations";
+    case StopReason::budget: return "budget";
+    case StopReason::target_psnr: return "target PSNR";
+    case StopReason::plateau: return "plateau";
+    case StopReason::cancelled: return "cancelled";
+  }
+  return "";
+}
+
+std::string TrainReport::brief() const {
+  std::string text = fmt::format("{} steps, {:.1f} CPU s", iterations, cpu_s);
+  if (std::isfinite(best_psnr))
+    text += fmt::format(", held-out {:.2f} dB (step {})", best_psnr, best_step);
+  text += fmt::format(", {:.1f} samples a ray, stopped by {}",
+                      rays > 0 ? static_cast<double>(samples) / static_cast<double>(rays) : 0.0,
+                      name(stop));
+  if (skipped_steps > 0) text += fmt::format(", {} steps skipped (not finite)", skipped_steps);
+  return text;
+}
+
+Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
+                          const Progress& progress, Field& out, const Field* guide) {
+  ORBITFUSE_TRY(options.validate());
+  ORBITFUSE_TRY(dataset.validate());
+  const std::string stage = fmt::format("train.{}", orbitfuse::name(dataset.modality));
+  if (options.shared_geometry && (!guide || guide->empty()))
+    return fail(ErrorKind::usage, "nerf.shared_geometry", "no guide field",
+                "train the visible field first");
+
+  TrainReport report;
+  std::vector<bool> heldout(dataset.views.size(), false);
+  for (std::size_t i = 0; i < heldout.size(); ++i) {
+    heldout[i] = dataset.views[i].measure_only ||
+                 (options.holdout_every > 0 && dataset.views.size() > 1 &&
+                  i % static_cast<std::size_t>(options.holdout_every) == 0);
+    if (heldout[i]) report.heldout.push_back(dataset.views[i].name);
+  }
+  if (report.heldout.size() == dataset.views.size())
+    return fail(ErrorKind::usage, "nerf.holdout_every", "no view is left to train on",
+                "hold out fewer views");
+
+  Stopwatch watch;
+  auto state = std::make_unique<FieldState>();
+  bool resumed = false;
+  if (options.resume && std::filesystem::exists(options.checkpoint)) {
+    ORBITFUSE_ASSIGN(Field loaded, Field::load(options.checkpoint));
+    *state = std::move(loaded.state());
+    ORBITFUSE_TRY(check_resumable(*state, dataset, options));
+    state->options = options;
+    resumed = true;
+  } else {
+    state->create(options, dataset.modality, static_cast<int>(dataset.views.size()));
+    state->thermal_is_gray = dataset.thermal_is_gray;
+    state->space = estimate_space(dataset);
+    state->span = estimate_span(dataset);
+  }
+  const std::vector<SceneView> views = prepare_views(dataset, state->space, state->span);
+  if (!resumed) {
+    state->cone = cone_of(views, options.step_px);
+    const double left = carve(dataset, state->space, views, options, state->occupancy);
+    report.skips.push_back({"empty space", fmt::format("{:.1f} % of the cells seen by enough views and "
+                                                       "not in front of known depth", 100 * left),
+                            "rays skip the rest from the first step"});
+  }
+  Trainer trainer(*state, views, heldout, options.shared_geometry ? &guide->state() : nullptr);
+  watch.cpu_s += state->spent_cpu_s;
+  watch.wall_s += state->spent_wall_s;
+
+  const int eval_every =
+      options.eval_count > 0 ? std::max(1, options.iterations / options.eval_count) : options.iterations;
+  double last_saved = wall_seconds();
+  const bool measuring = !report.heldout.empty();
+  report.best_psnr = std::numeric_limits<double>::quiet_NaN();
+  double next_eval_fraction = 1.0 / std::max(1, options.eval_count);
+  const auto save = [&]() -> Status {
+    if (options.checkpoint.empty()) return {};
+    state->spent_cpu_s = watch.cpu_s;
+    state->spent_wall_s = watch.wall_s;
+    last_saved = wall_seconds();
+    return save_state(*state, options.checkpoint);
+  };
+
+  const auto report_progress = [&](std::string detail, double fraction, double wall_s) {
+    progress.report({stage, static_cast<double>(state->step),
+                     static_cast<double>(options.iterations),
+                     wall_s / std::max(1e-9, fraction) * (1 - fraction), std::move(detail)});
+  };
+
+  report.stop = StopReason::iterations;
+  while (state->step < options.iterations) {
+    const double wall = watch.wall_now();
+    const double by_time = options.budget_s > 0 ? wall / options.budget_s : 0;
+    const double fraction = std::max(by_time, static_cast<double>(state->step) / options.iterations);
+    if (by_time >= 1) {
+      report.stop = StopReason::budget;
+      break;
+    }
+    if (progress.cancelled()) {
+      watch.pause();
+      ORBITFUSE_TRY(save());
+      return fail(ErrorKind::cancelled, stage, fmt::format("stopped by the user at step {}", state->step),
+                  options.checkpoint.empty() ? "run again" : "run again with --resume");
+    }
+    if (!trainer.step(fraction)) ++report.skipped_steps;
+
+    const bool by_step = state->step % eval_every == 0;
+    const bool by_budget = options.budget_s > 0 && fraction >= next_eval_fraction;
+    if (by_step || by_budget || state->step == options.iterations) {
+      watch.pause();
+      while (fraction >= next_eval_fraction) next_eval_fraction += 1.0 / std::max(1, options.eval_count);
+      CurvePoint point;
+      point.cpu_s = watch.cpu_s;
+      point.wall_s = watch.wall_s;
+      point.step = state->step;
+      point.train_psnr = state->train_psnr;
+      point.samples_per_ray = state->samples_per_ray;
+      point.heldout_psnr = heldout_psnr(*state, views, heldout, 4);
+      report.curve.push_back(point);
+      if (measuring && options.keep_best &&
+          (state->best.empty() || point.heldout_psnr > state->best.psnr))
+        state->best = state->snapshot(point.heldout_psnr);
+      report_progress(measuring ? fmt::format("held-out {:.2f} dB", point.heldout_psnr)
+                                : fmt::format("training views {:.2f} dB", point.train_psnr),
+                      fraction, watch.wall_s);
+      watch.go_on();
+      if (measuring && options.target_psnr > 0 && point.heldout_psnr >= options.target_psnr) {
+        report.stop = StopReason::target_psnr;
+        break;
+      }
+      if (measuring && options.plateau_db > 0 && !state->best.empty() &&
+          point.heldout_psnr < state->best.psnr - options.plateau_db) {
+        report.stop = StopReason::plateau;
+        break;
+      }
+    } else if (state->step % 50 == 0) {
+      report_progress(fmt::format("training views {:.2f} dB", state->train_psnr), fraction,
+                      watch.wall_now());
+    }
+    if (!options.checkpoint.empty() && wall_seconds() - last_saved > options.checkpoint_every_s) {
+      watch.pause();
+      ORBITFUSE_TRY(save());
+      watch.go_on();
+    }
+  }
+  watch.pause();
+  ORBITFUSE_TRY(save());
+  report.iterations = state->step;
+  report.cpu_s = watch.cpu_s;
+  report.wall_s = watch.wall_s;
+  report.rays = trainer.rays();
+  report.samples = trainer.samples();
+  report.best_step = state->step;
+  if (measuring && !report.curve.empty()) report.best_psnr = report.curve.back().heldout_psnr;
+  if (!state->best.empty()) {
+    report.best_step = state->best.step;
+    report.best_psnr = state->best.psnr;
+    state->restore(state->best);
+    state->best = {};
+  }
+  for (std::size_t i = 0; options.per_image_offset && i < dataset.views.size(); ++i)
+    report.image_offsets_k.push_back(state->image_offsets.value[i] * (state->span.high - state->span.low));
+  out = Field(std::move(state));
+  return report;
+}
+
+}  // namespace orbitfuse::nerf

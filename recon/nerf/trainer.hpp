@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "recon/nerf/backward.hpp"
+#include "recon/nerf/field_state.hpp"
+#include "recon/nerf/scene.hpp"
+
+namespace orbitfuse::nerf {
+
+/// The optimisation loop's one turn: draw rays, march, forward, backward, scatter, Adam.
+class Trainer {
+ public:
+  /// `heldout[i]` views are never drawn from.
+  Trainer(FieldState& field, const std::vector<SceneView>& views,
+          const std::vector<bool>& heldout, const FieldState* guide);
+
+  /// One step; `progress` in [0, 1] is the place in the schedule. False: a gradient was not
+  /// finite, nothing was changed.
+  bool step(double progress);
+
+  long rays() const { return rays_; }
+  long samples() const { return samples_; }
+
+ private:
+  struct Block {
+    RayBlock rays;
+    std::vector<RayTarget> targets;
+    std::vector<float> grid;  ///< [level][sample][feature]
+  };
+
+  void draw(Block& block, int begin, int end, double progress);
+  void apply(const AdamStep& adam, const BlockGradients& gradients);
+  void update_occupancy(double progress);
+  void probe_cells();
+
+  FieldState& field_;
+  const std::vector<SceneView>& views_;
+  const FieldState* guide_;
+  const Kernels& kernels_;
+  std::vector<int> training_;             ///< indices of the views that train
+  std::vector<std::int64_t> pixel_ends_;  ///< running pixel count over them
+  std::vector<std::int64_t> known_ends_;  ///< running count of pixels with known distance
+  std::vector<Block> blocks_;
+  std::vector<BlockGradients> shards_;
+  long rays_ = 0, samples_ = 0;
+};
+
+}  // namespace orbitfuse::nerf

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "core/camera.hpp"
+#include "core/transform.hpp"
+#include "recon/nerf/space.hpp"
+
+namespace orbitfuse::nerf {
+
+struct Ray {
+  float origin[3];     ///< normalised scene space
+  float direction[3];  ///< unit length
+  float forward;       ///< cosine to the optical axis: z depth = distance * forward
+};
+
+/// Rays of one camera. Lens distortion is inverted once on a lattice of pixels and interpolated:
+/// the inverse iterates, and over 8 px it is straight to about 0.01 px.
+class ViewRays {
+ public:
+  ViewRays() = default;
+  ViewRays(const Camera& camera, const Rigid3d& cam_from_world, const Space& space);
+
+  /// Through pixel coordinates (x, y), as in Camera. False outside the lens model's valid field.
+  bool ray(double x, double y, Ray& out) const;
+  /// Pixel and z depth (normalised units) of a normalised point; false behind the camera.
+  bool project(const float point[3], double& x, double& y, double& depth) const;
+  /// Angle of one pixel, radians.
+  float pixel_angle() const { return pixel_angle_; }
+  const Camera& camera() const { return camera_; }
+  const Eigen::Vector3d& origin() const { return origin_; }
+
+ private:
+  Camera camera_;
+  Eigen::Matrix3d world_from_cam_ = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+  float pixel_angle_ = 0;
+  int lattice_width_ = 0;
+  std::vector<Eigen::Vector2f> lattice_;  ///< normalised coordinates every 8 px; empty: no distortion
+};
+
+}  // namespace orbitfuse::nerf

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <unistd.h>
+
+#include "tests/drivers/aravis/stream_harness.hpp"
+#include "tests/support/gev_genicam_xml.hpp"
+
+namespace orbitfuse::aravis {
+namespace {
+
+using namespace std::chrono_literals;
+using orbitfuse::testing::GevFaults;
+using orbitfuse::testing::GevOptions;
+using orbitfuse::testing::GevSimulator;
+namespace registers = orbitfuse::testing::gev_registers;
+
+class AravisStream : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    // Another run's simulator may still hold the port.
+    bool up = false;
+    for (int i = 0; i < 100 && !(up = camera.start()); ++i) usleep(100'000);
+    if (!up) GTEST_SKIP() << "the GVCP port 3956 on loopback is in use";
+    options.camera = "127.0.0.1";
+    options.profiles = std::string(ORBITFUSE_SOURCE_DIR) + "/config/cameras";
+  }
+  static GevOptions small() {
+    GevOptions o;
+    o.width = 160;
+    o.height = 120;
+    o.rate_hz = 60;
+    return o;
+  }
+  static auto frames(std::uint64_t n) {
+    return [n](const Tally& t) { return t.frames + t.rejected >= n; };
+  }
+
+  GevSimulator camera{small()};
+  AravisOptions options;
+};
+
+TEST_F(AravisStream, CleanStreamIsBitExactAcrossTheIdWrap) {
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  EXPECT_EQ(source.describe().serial, "SIM0001");
+  EXPECT_EQ(camera.register_value(registers::ir_format), 2u);  // TemperatureLinear10mK, by the profile
+  const Tally tally = drain(source, 20s, frames(200));          // ids 65400 .. 65535, 1 ..
+  EXPECT_EQ(tally.frames, 200u);
+  EXPECT_EQ(tally.rejected + tally.wrong_bits + tally.not_rising, 0u);
+  EXPECT_EQ(tally.span(), 200u);
+  EXPECT_EQ(source.clock().jumps(), 0);
+}
+
+TEST_F(AravisStream, LostPacketsAreResentBitExact) {
+  GevFaults faults;
+  faults.packet_loss = 0.01;
+  faults.reorder = 0.01;
+  faults.duplicate = 0.01;
+  camera.set_faults(faults);
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  const Tally tally = drain(source, 20s, frames(200));
+  EXPECT_GT(camera.packets_dropped(), 20u);
+  EXPECT_EQ(tally.frames, 200u);
+  EXPECT_EQ(tally.rejected + tally.wrong_bits + tally.not_rising, 0u);
+}
+
+TEST_F(AravisStream, WithoutResendEveryBadFrameIsCountedNoneIsGood) {
+  GevFaults faults;
+  faults.packet_loss = 0.01;
+  faults.answer_resend = false;
+  camera.set_faults(faults);
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  const Tally tally = drain(source, 20s, frames(120));
+  EXPECT_GT(tally.span(), tally.frames);
+  EXPECT_EQ(tally.wrong_bits + tally.not_rising, 0u);
+}
+
+TEST_F(AravisStream, WrongFramesMidStreamAreAllRejected) {
+  for (int kind = 0; kind < 4; ++kind) {
+    SCOPED_TRACE(kind);
+    camera.kill();
+    ASSERT_TRUE(camera.start());
+    AravisSource source(options);
+    ASSERT_TRUE(source.start());
+    GevFaults faults;
+    if (kind == 0) faults.short_frame_every = 5;
+    if (kind == 1) faults.wrong_size_every = 5;
+    if (kind == 2) faults.too_large_every = 5;
+    if (kind == 3) faults.wrong_format_every = 5;
+    faults.answer_resend = false;
+    camera.set_faults(faults);
+    const Tally tally = drain(source, 15s, frames(60));
+    EXPECT_EQ(tally.wrong_bits, 0u);
+    EXPECT_GE(tally.span() - tally.frames, 10u);
+    EXPECT_LE(tally.span() - tally.frames, 14u);
+  }
+  camera.set_faults({});
+}
+
+TEST_F(AravisStream, KilledCameraIsToldAndComesBackWithItsSettings) {
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  drain(source, 10s, frames(20));
+  camera.kill();
+  const auto killed = testing_clock::now();
+  const Tally silent = drain(source, 5s, [](const Tally& t) { return t.has("silent") || t.has("disconnected"); });
+  EXPECT_FALSE(silent.events.empty());
+  EXPECT_LT(testing_clock::now() - killed, 2s);  // generous: the bench measures the 0.5 s bar
+  drain(source, 2s);
+  ASSERT_TRUE(camera.start());
+  const Tally back = drain(source, 20s, frames(20));
+  EXPECT_TRUE(back.has("reconnected"));
+  EXPECT_EQ(back.frames, 20u);
+  EXPECT_EQ(back.wrong_bits + back.not_rising, 0u);
+  EXPECT_EQ(camera.register_value(registers::ir_format), 2u);
+}
+
+TEST_F(AravisStream, LinkDownAndBack) {
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  drain(source, 10s, frames(20));
+  GevFaults faults;
+  faults.link_down = true;
+  camera.set_faults(faults);
+  const Tally down = drain(source, 3s);
+  EXPECT_TRUE(down.has("silent"));
+  EXPECT_TRUE(down.has("disconnected"));
+  camera.set_faults({});
+  const Tally back = drain(source, 20s, frames(20));
+  EXPECT_TRUE(back.has("reconnected"));
+  EXPECT_EQ(back.wrong_bits + back.not_rising, 0u);
+}
+
+TEST_F(AravisStream, MutedControlChannelIsToldAndRecovered) {
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  drain(source, 10s, frames(20));
+  GevFaults faults;
+  faults.mute_control = true;  // the stream runs on until the camera's heartbeat times out
+  camera.set_faults(faults);
+  EXPECT_TRUE(drain(source, 15s, [](const Tally& t) { return t.has("disconnected"); }).has("disconnected"));
+  camera.set_faults({});
+  const Tally back = drain(source, 20s, frames(20));
+  EXPECT_TRUE(back.has("reconnected"));
+  EXPECT_EQ(back.wrong_bits + back.not_rising, 0u);
+}
+
+TEST_F(AravisStream, ClockStepIsReportedAndHostTimeRises) {
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  drain(source, 10s, frames(60));
+  camera.step_clock(-7);
+  const Tally tally = drain(source, 20s, [](const Tally& t) { return t.has("clock") && t.frames > 30; });
+  EXPECT_TRUE(tally.has("clock"));
+  EXPECT_EQ(tally.not_rising, 0u);
+}
+
+TEST_F(AravisStream, SecondControllerIsRefusedWithAReason) {
+  AravisSource first(options), second(options);
+  ASSERT_TRUE(first.start());
+  const Status status = second.start();
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().kind, ErrorKind::device);
+  EXPECT_NE(status.error().message().find("another program"), std::string::npos) << status.error().message();
+  EXPECT_EQ(drain(first, 10s, frames(20)).frames, 20u);
+}
+
+TEST_F(AravisStream, NucIsCommandedAndFramesAreFlagged) {
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  drain(source, 10s, frames(5));
+  ASSERT_TRUE(source.correct_nonuniformity());
+  EXPECT_EQ(camera.nuc_count(), 1);
+  const Result<Delivery> delivery = source.next(500ms);
+  ASSERT_TRUE(delivery);
+  ASSERT_EQ(delivery->kind, Delivery::Kind::frame);
+  EXPECT_EQ(delivery->frame.flags, std::vector<std::string>{"nuc"});
+}
+
+TEST_F(AravisStream, UnknownFeatureInTheProfileIsNamed) {
+  options.profile = "flir-ax5";  // Mono14 and TemperatureLinearMode are not on this camera
+  AravisSource source(options);
+  const Status status = source.start();
+  ASSERT_FALSE(status);
+  EXPECT_NE(status.error().where.find("flir-ax5"), std::string::npos) << status.error().message();
+}
+
+TEST(AravisAbsent, NoCameraIsADeviceError) {
+  AravisOptions options;
+  options.camera = "127.0.0.99";
+  AravisSource source(options);
+  const Status status = source.start();
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().kind, ErrorKind::device);
+}
+
+}  // namespace
+}  // namespace orbitfuse::aravis

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "drivers/v4l2/v4l2_source.hpp"
+
+#include <gtest/gtest.h>
+#include <linux/videodev2.h>
+
+#include <cerrno>
+#include <thread>
+
+#include "tests/drivers/v4l2/fake_video_system.hpp"
+
+namespace orbitfuse::v4l2 {
+namespace {
+
+using namespace std::chrono_literals;
+using Kind = Delivery::Kind;
+
+class V4l2SourceTest : public testing::Test {
+ protected:
+  V4l2SourceTest() {
+    system->fourcc = V4L2_PIX_FMT_GREY;
+    options.stall = 20ms;
+    options.reopen_every = 1ms;
+  }
+  void shoot(std::uint32_t sequence, std::uint32_t flags = 0, std::size_t bytes = 32) {
+    system->shots.push_back({sequence, flags, std::vector<std::uint8_t>(bytes, static_cast<std::uint8_t>(sequence)), 0});
+  }
+  /// The next delivery that is not a timeout; at most a second.
+  Delivery deliver(V4l2Source& source) {
+    for (int i = 0; i < 1000; ++i) {
+      const Result<Delivery> delivery = source.next(1ms);
+      EXPECT_TRUE(delivery);
+      if (delivery->kind != Kind::timeout) return *delivery;
+      std::this_thread::sleep_for(1ms);
+    }
+    ADD_FAILURE() << "nothing came";
+    return {};
+  }
+
+  std::shared_ptr<FakeVideoSystem> system = std::make_shared<FakeVideoSystem>();
+  V4l2Options options;
+};
+
+TEST_F(V4l2SourceTest, SequenceGapsAreIdGaps) {
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  for (std::uint32_t sequence : {5u, 6u, 9u}) shoot(sequence);
+  EXPECT_EQ(deliver(source).frame.id, 0u);
+  EXPECT_EQ(deliver(source).frame.id, 1u);
+  const Delivery third = deliver(source);
+  EXPECT_EQ(third.frame.id, 4u);
+  EXPECT_EQ(third.frame.pixels.at<std::uint8_t>(3, 7), 9);
+}
+
+TEST_F(V4l2SourceTest, SequenceWrapsAt32Bits) {
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  for (std::uint32_t sequence : {0xfffffffeu, 0xffffffffu, 0u, 2u, 2u}) shoot(sequence);
+  for (std::uint64_t id : {0u, 1u, 2u, 4u, 5u}) EXPECT_EQ(deliver(source).frame.id, id);
+}
+
+TEST_F(V4l2SourceTest, DamagedFramesAreRejectedNeverStored) {
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  shoot(0, V4L2_BUF_FLAG_ERROR);
+  shoot(1, 0, 31);  // one byte short of 8x4
+  system->shots.push_back({2, 0, std::vector<std::uint8_t>(32), 5000});  // more than its buffer
+  shoot(3);
+  for (std::uint64_t id : {0u, 1u, 2u}) {
+    const Delivery delivery = deliver(source);
+    EXPECT_EQ(delivery.kind, Kind::rejected);
+    EXPECT_EQ(delivery.frame.id, id);
+    EXPECT_FALSE(delivery.reason.empty());
+  }
+  EXPECT_EQ(deliver(source).kind, Kind::frame);
+}
+
+TEST_F(V4l2SourceTest, UnpluggedAndBackUnderAnotherNode) {
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  shoot(0);
+  deliver(source);
+  system->plugged = false;
+  EXPECT_EQ(deliver(source).reason, "disconnected");
+  EXPECT_EQ(system->open_descriptors, 0);
+  EXPECT_EQ(system->mapped, 0);
+  EXPECT_EQ(source.next(1ms)->kind, Kind::timeout);
+  system->camera.path = "/dev/video6";
+  system->plugged = true;
+  const Delivery back = deliver(source);
+  EXPECT_EQ(back.reason, "reconnected");
+  EXPECT_NE(back.detail.find("/dev/video6"), std::string::npos);
+  shoot(0);  // the driver counts from 0 again
+  EXPECT_EQ(deliver(source).frame.id, 1u);
+}
+
+TEST_F(V4l2SourceTest, StallIsToldAndReopened) {
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  EXPECT_EQ(deliver(source).reason, "stalled");
+  EXPECT_EQ(deliver(source).reason, "reconnected");
+  EXPECT_EQ(system->streams_started, 2);
+  shoot(0);
+  EXPECT_EQ(deliver(source).kind, Kind::frame);
+}
+
+TEST_F(V4l2SourceTest, StartErrorsNameTheRemedyAndLeakNothing) {
+  struct Case {
+    int open_error, stream_on_error;
+    const char* remedy;
+  };
+  for (const Case& c : {Case{EBUSY, 0, "other program"}, Case{EACCES, 0, "group video"},
+                        Case{0, ENOSPC, "bandwidth"}}) {
+    system->open_error = c.open_error;
+    system->stream_on_error = c.stream_on_error;
+    V4l2Source source(options, system);
+    const Status status = source.start();
+    ASSERT_FALSE(status);
+    EXPECT_EQ(status.error().kind, ErrorKind::device);
+    EXPECT_NE(status.error().remedy.find(c.remedy), std::string::npos) << status.error().message();
+    EXPECT_EQ(system->open_descriptors, 0);
+    EXPECT_EQ(system->mapped, 0);
+  }
+}
+
+TEST_F(V4l2SourceTest, AnotherSizeThanAskedIsRefused) {
+  options.width = 640;
+  options.height = 480;
+  V4l2Source source(options, system);
+  const Status status = source.start();
+  ASSERT_FALSE(status);
+  EXPECT_NE(status.error().message().find("8x4"), std::string::npos);
+}
+
+TEST_F(V4l2SourceTest, LocksExposureAndTellsWhenItDoesNotHold) {
+  system->controls = {{V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_APERTURE_PRIORITY},
+                      {V4L2_CID_EXPOSURE_ABSOLUTE, 150}};
+  options.exposure_100us = 80;
+  {
+    V4l2Source source(options, system);
+    ASSERT_TRUE(source.start());
+    EXPECT_EQ(system->controls[V4L2_CID_EXPOSURE_AUTO], V4L2_EXPOSURE_MANUAL);
+    EXPECT_EQ(system->controls[V4L2_CID_EXPOSURE_ABSOLUTE], 80);
+  }
+  system->exposure_sticks = false;
+  options.exposure_100us = 40;
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  EXPECT_EQ(deliver(source).reason, "setting-lost");
+}
+
+TEST_F(V4l2SourceTest, OptionsAreValidatedByName) {
+  V4l2Options wrong = options;
+  wrong.buffers = 1;
+  EXPECT_NE(wrong.validate().error().where.find("buffers"), std::string::npos);
+  wrong = options;
+  wrong.format = "H264";
+  EXPECT_FALSE(wrong.validate());
+  wrong = options;
+  wrong.width = 640;
+  EXPECT_FALSE(wrong.validate());
+  wrong = options;
+  wrong.rate_hz = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(wrong.validate());
+}
+
+TEST_F(V4l2SourceTest, NextBeforeStartIsAnError) {
+  V4l2Source source(options, system);
+  EXPECT_FALSE(source.next(1ms));
+  source.stop();
+}
+
+}  // namespace
+}  // namespace orbitfuse::v4l2
