@@ -19,6 +19,7 @@ struct MemoryFile {
   std::string_view input;
   std::string output;
   bool writing = false;
+  bool tag_is_cut = false;  ///< a tag's value lies beyond the end of the file
   toff_t position = 0;
 
   toff_t size() const { return writing ? output.size() : input.size(); }
@@ -54,6 +55,11 @@ toff_t size_of(thandle_t handle) { return static_cast<MemoryFile*>(handle)->size
 int map_nothing(thandle_t, void**, toff_t*) { return 0; }
 void unmap_nothing(thandle_t, void*, toff_t) {}
 
+/// libtiff leaves out tags that it can't read and goes on; only its warning tells.
+void on_warning(thandle_t handle, const char*, const char* format, va_list) {
+  if (handle && std::strstr(format, "IO error")) static_cast<MemoryFile*>(handle)->tag_is_cut = true;
+}
+
 using TiffHandle = std::unique_ptr<TIFF, decltype(&TIFFClose)>;
 
 TiffHandle open(MemoryFile& file, const char* mode) {
@@ -61,6 +67,7 @@ TiffHandle open(MemoryFile& file, const char* mode) {
   static const bool quiet = [] {
     TIFFSetErrorHandler(nullptr);
     TIFFSetWarningHandler(nullptr);
+    TIFFSetWarningHandlerExt(on_warning);
     return true;
   }();
   (void)quiet;
@@ -162,7 +169,7 @@ Result<cv::Mat> decode_tiff(std::string_view bytes, const std::string& where,
   cv::Mat image(static_cast<int>(l.height), static_cast<int>(l.width), CV_MAKETYPE(depth, l.channels));
   const bool whole = TIFFIsTiled(tiff.get()) ? read_tiles(tiff.get(), l, image)
                                              : read_strips(tiff.get(), l, image);
-  if (!whole) {
+  if (!whole || file.tag_is_cut) {
     return fail(ErrorKind::input, where, "truncated or damaged TIFF", "copy the file again");
   }
   return to_bgr(image);

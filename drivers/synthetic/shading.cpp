@@ -57,6 +57,9 @@ bool is_window(const Vector3d& x, const Vector3d& n) {
   return std::abs(x.y()) < 0.60;
 }
 
+/// Stretches noise about its middle: octaves average out most of the contrast.
+double contrast(double noise, double gain) { return std::clamp(0.5 + gain * (noise - 0.5), 0.0, 1.0); }
+
 struct Surface {
   Vector3d albedo = Vector3d::Constant(0.5);
   double gloss = 0;    ///< weight of the sun's highlight
@@ -70,7 +73,8 @@ Surface surface_at(const Solid& solid, const Vector3d& x, const Vector3d& n) {
   const double fine = fractal_noise(x * 9, 4, seed), coarse = fractal_noise(x * 1.1, 3, mix(seed, 2));
   switch (solid.material) {
     case Material::ground: {
-      s.albedo = Vector3d(0.30, 0.29, 0.28) * (0.55 + 0.5 * fine + 0.4 * coarse);
+      const double stains = contrast(fractal_noise(x * 3.2, 4, mix(seed, 9)), 3.0);
+      s.albedo = Vector3d(0.42, 0.40, 0.37) * (0.25 + 0.55 * stains + 0.55 * contrast(fine, 2.5) + 0.2 * coarse);
       paste_decals(uv, 0.9, 0.35, face, s.albedo);
       paste_decals(uv + Vector2d(40, 40), 0.33, 0.20, mix(face, 5), s.albedo);
       const double line = std::min(std::abs(std::abs(x.y()) - 2.45), std::abs(std::abs(x.x() + 0.3) - 4.6));
@@ -79,8 +83,9 @@ Surface surface_at(const Solid& solid, const Vector3d& x, const Vector3d& n) {
     }
     case Material::paint:
     case Material::cabin:
-      s.albedo = Vector3d(0.10, 0.22, 0.42) * (0.75 + 0.5 * fine);
-      paste_decals(uv, 0.42, 0.55, face, s.albedo);
+      s.albedo = Vector3d(0.10, 0.22, 0.42) * (0.5 + contrast(fine, 2.0));
+      if (fractal_noise(x * 3.0, 4, mix(seed, 9)) > 0.52) s.albedo = Vector3d(0.42, 0.36, 0.22) * (0.5 + contrast(fine, 2.0));
+      paste_decals(uv, 0.42, 0.75, face, s.albedo);
       paste_decals(uv + Vector2d(9, 9), 0.15, 0.35, mix(face, 5), s.albedo);
       s.gloss = 0.35;
       s.mirror = 0.03;
@@ -98,12 +103,12 @@ Surface surface_at(const Solid& solid, const Vector3d& x, const Vector3d& n) {
     case Material::exhaust: s = {Vector3d::Constant(0.35), 0.3, 0.05}; break;
     case Material::crate:
     case Material::barrel:
-      s.albedo = random_color(seed) * (0.6 + 0.7 * fine);
+      s.albedo = random_color(seed) * (0.4 + contrast(fine, 2.5));
       paste_decals(uv, 0.16, 0.55, face, s.albedo);
       break;
-    case Material::brick: s.albedo = Vector3d(0.55, 0.38, 0.25) * (0.5 + 0.9 * fine); break;
+    case Material::brick: s.albedo = Vector3d(0.55, 0.38, 0.25) * (0.35 + 1.2 * contrast(fine, 2.5)); break;
     case Material::building:
-      s.albedo = (0.5 * random_color(seed) + Vector3d::Constant(0.2)) * (0.5 + 0.9 * coarse);
+      s.albedo = (0.5 * random_color(seed) + Vector3d::Constant(0.2)) * (0.3 + 1.2 * contrast(coarse, 2.5));
       paste_decals(uv, 2.0, 0.6, face, s.albedo);
       break;
   }

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "fusion/metrics/planes.hpp"
+
+// The measures on single planes of one size. A value that the published formula leaves undefined
+// (0/0 on constant images) is defined here, beside each.
+namespace orbitfuse::metrics {
+
+// statistics.cpp
+double mean(const Plane& f);
+double standard_deviation(const Plane& f);        ///< sqrt(sum (F-mean)^2 / N)
+double spatial_frequency(const Plane& f);         ///< Eskicioglu and Fisher 1995, N = all pixels
+double average_gradient(const Plane& f);          ///< Cui et al. 2015; / ((m-1)(n-1))
+double edge_intensity(const Plane& f);            ///< mean 3x3 Sobel magnitude, border repeated
+double mean_squared_error(const Plane& a, const Plane& b);
+double correlation(const Plane& a, const Plane& b);  ///< Pearson; 0 when one is constant
+double psnr_db(double mean_squared);              ///< peak 255, at most identical_psnr_db
+
+// information.cpp
+double entropy_bits(const Plane& f);              ///< 256 bins of the rounded samples, log2
+double mutual_information_nats(const Plane& a, const Plane& b);  ///< 256 bins each, of 0..255
+double cross_entropy_bits(const Plane& source, const Plane& f);  ///< bins that are empty in one: skipped
+double histogram_intersection(const Plane& a, const Plane& b);   ///< sum min(p, q), 256 bins
+
+// structure.cpp
+double structural_similarity(const Plane& a, const Plane& b);    ///< Wang 2004: 11x11, sigma 1.5, valid
+/// Xydeas and Petrovic 2000. Without any edge in the sources: 1 if the fused image has none, else 0.
+double edge_transfer(const Plane& visible, const Plane& thermal, const Plane& fused);
+
+// perception.cpp
+struct Perception {
+  double qcb = 0;  ///< Chen and Blum 2009; no contrast in source and fused counts as kept
+  double qcv = 0;  ///< Chen and Varshney 2007; lower is better; without edges all blocks weigh alike
+};
+Perception perception(const Plane& visible, const Plane& thermal, const Plane& fused);
+
+}  // namespace orbitfuse::metrics

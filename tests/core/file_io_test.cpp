@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/file_io.hpp"
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+
+#include "tests/core/temp_folder.hpp"
+
+namespace orbitfuse {
+namespace {
+
+using test::TempFolder;
+
+/// A disk that is full after `bytes`: writes beyond fail with EFBIG.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) {
+    signal(SIGXFSZ, SIG_IGN);
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileSizeLimit() { setrlimit(RLIMIT_FSIZE, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+TEST(FileIo, WritesAndReadsBack) {
+  const TempFolder folder;
+  const std::string bytes("a\0b\nc", 5);
+  ASSERT_TRUE(write_file_atomic(folder / "x/y/z.bin", bytes));
+  EXPECT_EQ(*read_file(folder / "x/y/z.bin"), bytes);
+  EXPECT_EQ(*file_hash(folder / "x/y/z.bin"), content_hash(bytes));
+  EXPECT_NE(content_hash(bytes), content_hash("other"));
+  EXPECT_EQ(content_hash("").size(), 32u);
+}
+
+TEST(FileIo, MissingFileAndFolderAreNamed) {
+  const TempFolder folder;
+  const auto missing = read_file(folder / "none.txt");
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().kind, ErrorKind::input);
+  EXPECT_NE(missing.error().message().find("none.txt"), std::string::npos);
+  EXPECT_FALSE(read_file(folder.path()));
+}
+
+TEST(FileIo, FullDiskKeepsTheOldFile) {
+  const TempFolder folder;
+  ASSERT_TRUE(write_file_atomic(folder / "a.txt", "old"));
+  {
+    const FileSizeLimit full(1000);
+    const Status status = write_file_atomic(folder / "a.txt", std::string(5000, 'x'));
+    ASSERT_FALSE(status);
+    EXPECT_EQ(status.error().kind, ErrorKind::device);
+    EXPECT_NE(status.error().message().find("free"), std::string::npos);
+  }
+  EXPECT_EQ(*read_file(folder / "a.txt"), "old");
+  // Nothing half-written is left beside it.
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
+}
+
+TEST(FileIo, TargetThatIsAFolderIsAnError) {
+  const TempFolder folder;
+  std::filesystem::create_directories(folder / "target/child");
+  EXPECT_FALSE(write_file_atomic(folder / "target", "x"));
+}
+
+}  // namespace
+}  // namespace orbitfuse

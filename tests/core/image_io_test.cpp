@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/image_io.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "core/file_io.hpp"
+#include "core/image_codec.hpp"
+#include "core/temperature.hpp"
+#include "tests/core/temp_folder.hpp"
+
+namespace orbitfuse {
+namespace {
+
+using test::get;
+using test::put;
+using test::TempFolder;
+
+cv::Mat gradient_bgr(int width = 64, int height = 48) {
+  cv::Mat image(height, width, CV_8UC3);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) image.at<cv::Vec3b>(y, x) = cv::Vec3b(static_cast<uchar>(3 * x), static_cast<uchar>(4 * y), 90);
+  }
+  return image;
+}
+
+double max_difference(const cv::Mat& a, const cv::Mat& b) {
+  return a.size() == b.size() && a.type() == b.type() ? cv::norm(a, b, cv::NORM_INF) : 1e9;
+}
+
+/// A JPEG with a minimal EXIF block that holds nothing but the orientation.
+std::string with_orientation(const std::string& jpeg, int orientation) {
+  std::string exif("Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0", 24);
+  exif += static_cast<char>(orientation);
+  exif += std::string("\0\0\0\0\0\0\0", 7);
+  std::string segment = "\xFF\xE1";
+  segment += static_cast<char>((exif.size() + 2) >> 8);
+  segment += static_cast<char>((exif.size() + 2) & 0xFF);
+  return jpeg.substr(0, 2) + segment + exif + jpeg.substr(2);
+}
+
+TEST(ImageIo, PngAndJpegRoundTrip) {
+  const TempFolder folder;
+  const cv::Mat image = gradient_bgr();
+  ASSERT_TRUE(write_png(folder / "a.png", image));
+  ASSERT_TRUE(write_jpeg(folder / "a.jpg", image, 98));
+  EXPECT_EQ(max_difference(*read_visible(folder / "a.png"), image), 0);
+  EXPECT_LT(max_difference(*read_visible(folder / "a.jpg"), image), 16);
+  EXPECT_LT(cv::norm(*read_visible(folder / "a.jpg"), image, cv::NORM_L1) / static_cast<double>(image.total()), 6);
+}
+
+TEST(ImageIo, GreyPhotoBecomesBgr) {
+  const TempFolder folder;
+  const cv::Mat grey(20, 30, CV_8UC1, cv::Scalar(77));
+  ASSERT_TRUE(write_jpeg(folder / "g.jpg", grey));
+  const auto image = read_visible(folder / "g.jpg");
+  ASSERT_TRUE(image);
+  EXPECT_EQ(image->type(), CV_8UC3);
+  EXPECT_EQ(read_image(folder / "g.jpg")->type(), CV_8UC1);
+}
+
+TEST(ImageIo, ExifOrientationIsAppliedOnce) {
+  const TempFolder folder;
+  cv::Mat stored(40, 64, CV_8UC3, cv::Scalar(0, 0, 0));
+  stored(cv::Rect(0, 0, 32, 20)).setTo(cv::Scalar(255, 255, 255));  // marks the stored top left
+  const std::string jpeg = *encode_jpeg(stored, 95);
+  // Where the stored top-left quarter appears upright, and whether sides swap (TIFF 6.0, tag 274).
+  const struct { int orientation; bool right, bottom, swapped; } cases[] = {
+      {1, false, false, false}, {2, true, false, false}, {3, true, true, false}, {4, false, true, false},
+      {5, false, false, true},  {6, true, false, true},  {7, true, true, true},  {8, false, true, true}};
+  for (const auto& c : cases) {
+    put(folder / "o.jpg", with_orientation(jpeg, c.orientation));
+    const auto image = read_visible(folder / "o.jpg");
+    ASSERT_TRUE(image) << image.error().message();
+    EXPECT_EQ(image->cols, c.swapped ? 40 : 64) << c.orientation;
+    const int x = c.right ? image->cols - 6 : 5, y = c.bottom ? image->rows - 6 : 5;
+    EXPECT_GT(image->at<cv::Vec3b>(y, x)[0], 200) << c.orientation;
+    EXPECT_LT(image->at<cv::Vec3b>(image->rows - 1 - y, image->cols - 1 - x)[0], 50) << c.orientation;
+  }
+  put(folder / "o.jpg", with_orientation(jpeg, 99));
+  EXPECT_EQ(read_visible(folder / "o.jpg")->cols, 64);
+}
+
+TEST(ImageIo, EveryTruncationIsAnErrorThatNamesTheFile) {
+  const TempFolder folder;
+  const cv::Mat thermal(48, 64, CV_16UC1, cv::Scalar(29315));
+  const cv::Mat noise = gradient_bgr();
+  for (const auto& [file, bytes] : {std::pair<std::string, std::string>{"t.jpg", *encode_jpeg(noise, 95)},
+                                    {"t.png", *encode_png(noise)},
+                                    {"t.tiff", *encode_thermal_tiff(thermal)}}) {
+    for (std::size_t keep = 0; keep + 3 < bytes.size(); keep += 1 + bytes.size() / 97) {
+      put(folder / file, bytes.substr(0, keep));
+      const auto image = read_image(folder / file);
+      ASSERT_FALSE(image) << file << " cut to " << keep << " of " << bytes.size();
+      EXPECT_EQ(image.error().kind, ErrorKind::input);
+      EXPECT_NE(image.error().message().find(file), std::string::npos);
+    }
+  }
+}
+
+TEST(ImageIo, DamagedBytesNeverCrash) {
+  const TempFolder folder;
+  const cv::Mat thermal(48, 64, CV_16UC1, cv::Scalar(29315));
+  std::uint32_t state = 12345;
+  for (const std::string& whole : {*encode_jpeg(gradient_bgr(), 90), *encode_png(gradient_bgr()), *encode_thermal_tiff(thermal)}) {
+    for (int round = 0; round < 150; ++round) {
+      std::string bytes = whole;
+      for (int k = 0; k < 4; ++k) {
+        state = state * 1664525u + 1013904223u;
+        bytes[(state >> 8) % bytes.size()] = static_cast<char>(state >> 3);
+      }
+      (void)decode_image(bytes, "damaged");  // an image or an error, within the sanitizers
+    }
+  }
+}
+
+TEST(ImageIo, OtherContentUnderTheNameIsToldApart) {
+  const TempFolder folder;
+  put(folder / "text.jpg", "this is not an image");
+  put(folder / "empty.png", "");
+  for (const char* file : {"text.jpg", "empty.png"}) EXPECT_FALSE(read_visible(folder / file));
+  // A PNG named .jpg is still an image.
+  put(folder / "png.jpg", *encode_png(gradient_bgr()));
+  EXPECT_TRUE(read_visible(folder / "png.jpg"));
+}
+
+TEST(ImageIo, SixteenBitWhereEightIsExpected) {
+  const TempFolder folder;
+  ASSERT_TRUE(write_png(folder / "deep.png", cv::Mat(8, 8, CV_16UC1, cv::Scalar(30000))));
+  const auto image = read_visible(folder / "deep.png");
+  ASSERT_FALSE(image);
+  EXPECT_NE(image.error().message().find("16-bit"), std::string::npos);
+  ASSERT_TRUE(write_png(folder / "flat.png", cv::Mat(8, 8, CV_8UC1, cv::Scalar(3))));
+  EXPECT_FALSE(read_thermal_k(folder / "flat.png"));
+}
+
+TEST(ImageIo, ThermalTiffKeepsEveryTemperature) {
+  const TempFolder folder;
+  cv::Mat kelvin(31, 47, CV_32FC1);
+  for (int i = 0; i < 31 * 47; ++i) kelvin.at<float>(i / 47, i % 47) = static_cast<float>(250 + 0.07 * i);
+  kelvin.at<float>(3, 5) = invalid_k;
+  kelvin.at<float>(3, 6) = -4;       // no such temperature
+  kelvin.at<float>(3, 7) = 1e9F;
+  ASSERT_TRUE(write_thermal_tiff(folder / "t.tiff", kelvin));
+  const auto back = read_thermal_k(folder / "t.tiff");
+  ASSERT_TRUE(back);
+  for (int y = 0; y < 31; ++y) {
+    for (int x = 0; x < 47; ++x) {
+      if (y == 3 && x >= 5 && x <= 7) {
+        EXPECT_TRUE(std::isnan(back->at<float>(y, x)));
+      } else {
+        EXPECT_NEAR(back->at<float>(y, x), kelvin.at<float>(y, x), 0.00502);
+      }
+    }
+  }
+  EXPECT_TRUE(std::filesystem::exists(folder / "t.tiff.json"));
+}
+
+TEST(ImageIo, ThermalScaleComesFromTagThenSidecarThenCentikelvin) {
+  const TempFolder folder;
+  const cv::Mat samples(4, 4, CV_16UC1, cv::Scalar(3000));
+  put(folder / "tag.tiff", *encode_tiff(samples, R"({"scale":0.04,"offset":100})"));
+  EXPECT_NEAR(read_thermal_k(folder / "tag.tiff")->at<float>(0, 0), 220, 1e-4);
+  put(folder / "plain.tiff", *encode_tiff(samples, ""));
+  EXPECT_NEAR(read_thermal_k(folder / "plain.tiff")->at<float>(0, 0), 30, 1e-4);
+  put(folder / "plain.tiff.json", R"({"scale":0.1})");
+  EXPECT_NEAR(read_thermal_k(folder / "plain.tiff")->at<float>(0, 0), 300, 1e-4);
+  put(folder / "plain.tiff.json", R"({"scale":)");
+  EXPECT_FALSE(read_thermal_k(folder / "plain.tiff"));
+  put(folder / "plain.tiff.json", R"({"scale":-1})");
+  EXPECT_FALSE(read_thermal_k(folder / "plain.tiff"));
+}
+
+TEST(ImageIo, FloatTiffKeepsNanAndExtremes) {
+  const TempFolder folder;
+  cv::Mat values(5, 7, CV_32FC1, cv::Scalar(1.5));
+  values.at<float>(0, 0) = invalid_k;
+  values.at<float>(0, 1) = 3.0e38F;
+  values.at<float>(0, 2) = -1e-38F;
+  ASSERT_TRUE(write_float_tiff(folder / "d.tiff", values));
+  const auto back = read_float_tiff(folder / "d.tiff");
+  ASSERT_TRUE(back);
+  EXPECT_TRUE(std::isnan(back->at<float>(0, 0)));
+  EXPECT_EQ(back->at<float>(0, 1), 3.0e38F);
+  EXPECT_EQ(back->at<float>(0, 2), -1e-38F);
+  EXPECT_EQ(back->at<float>(4, 6), 1.5F);
+  EXPECT_FALSE(read_image(folder / "d.tiff"));
+}
+
+}  // namespace
+}  // namespace orbitfuse

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/session.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/core/temp_folder.hpp"
+
+namespace orbitfuse {
+namespace {
+
+using test::put;
+using test::TempFolder;
+
+FrameRecord full_frame() {
+  FrameRecord f;
+  f.modality = Modality::thermal;
+  f.device = "thermal0";
+  f.file = "thermal/000000.tiff";
+  f.width = 640;
+  f.height = 480;
+  f.sequence = 18446744073709551615ull;
+  f.host_time_ns = 1790000000123456789;
+  f.device_time_ns = -5;
+  f.station = Station{1, 7, 210.5, 34.25, 180, 4};
+  f.tracking = true;
+  f.thermal_is_gray = true;
+  f.flags = {"nuc", "blurred"};
+  f.content_hash = "ab";
+  f.cam_from_world = Rigid3d{Eigen::Quaterniond(0.3, -0.5, 0.2, 0.7).normalized(), {1.0 / 3, -2, 3}};
+  f.camera = Camera::from_fov(640, 480, 25);
+  f.source = "thermal/x \"quoted\".tiff";
+  f.quality = FrameQuality{0.25, 295.5, 0.001};
+  return f;
+}
+
+std::string manifest() {
+  Session session;
+  session.id = "abc";
+  session.created = "2026-11-21T00:00:00Z";
+  session.notes = {{"operator", "A"}};
+  DeviceInfo device{"thermal0", Modality::thermal, "test", "M", "S", {}};
+  device.lens.focal_px = 1443.5;
+  device.lens.calibrated = Camera::from_fov(640, 480, 25);
+  return manifest_header_line(session) + "\n" + manifest_line(device) + "\n" + manifest_line(full_frame()) + "\n" +
+         manifest_line(GapRecord{"thermal0", 3, 9, "missing"}) + "\n" +
+         manifest_line(StreamRecord{"thermal0", 1, 20, 11, 9}) + "\n" +
+         manifest_line(EventRecord{"thermal0", 77, "nuc", "shutter"}) + "\n" + manifest_end_line(session) + "\n";
+}
+
+class SessionTest : public ::testing::Test {
+ protected:
+  SessionTest() { put(folder / "thermal/000000.tiff", "x"); }
+  Result<Session> open(const std::string& text) {
+    put(folder / "manifest.jsonl", text);
+    return open_session(folder.path());
+  }
+  TempFolder folder;
+};
+
+TEST_F(SessionTest, EveryFieldComesBack) {
+  const auto s = open(manifest());
+  ASSERT_TRUE(s) << s.error().message();
+  EXPECT_TRUE(s->complete);
+  EXPECT_TRUE(s->warnings.empty());
+  EXPECT_EQ(s->notes.at("operator"), "A");
+  ASSERT_EQ(s->devices.size(), 1u);
+  EXPECT_EQ(s->devices[0].lens.focal_px, 1443.5);
+  EXPECT_EQ(s->devices[0].lens.calibrated, Camera::from_fov(640, 480, 25));
+  ASSERT_EQ(s->frames.size(), 1u);
+  const FrameRecord &f = s->frames[0], e = full_frame();
+  EXPECT_EQ(manifest_line(f), manifest_line(e));
+  EXPECT_EQ(f.sequence, e.sequence);
+  EXPECT_EQ(f.host_time_ns, e.host_time_ns);
+  EXPECT_EQ(f.device_time_ns, -5);
+  EXPECT_EQ(f.station->azimuth_deg, 210.5);
+  EXPECT_EQ(f.station->loop, 1);
+  EXPECT_TRUE(f.tracking && f.thermal_is_gray && f.has_flag("nuc") && !f.has_flag("x"));
+  EXPECT_EQ(f.camera, e.camera);
+  EXPECT_EQ(f.cam_from_world->translation, e.cam_from_world->translation);
+  EXPECT_EQ(f.quality->sharpness, 0.25);
+  EXPECT_EQ(s->gaps[0].count, 9u);
+  EXPECT_EQ(s->streams[0].received + s->streams[0].lost, 20u);
+  EXPECT_EQ(s->events[0].kind, "nuc");
+  EXPECT_TRUE(s->frames_of(Modality::thermal, false).empty());
+  EXPECT_EQ(s->frames_of(Modality::thermal).size(), 1u);
+}
+
+TEST_F(SessionTest, CutAnywhereOpensAsIncompleteOrNamesTheLine) {
+  const std::string text = manifest();
+  const std::size_t header_end = text.find('\n');
+  for (std::size_t keep = 0; keep < text.size() - 1; ++keep) {
+    const auto s = open(text.substr(0, keep));
+    if (keep < header_end) {
+      ASSERT_FALSE(s) << keep;
+      EXPECT_NE(s.error().message().find("manifest"), std::string::npos);
+    } else if (s) {
+      const bool all_but_last_newline = keep == text.size() - 1;
+      EXPECT_EQ(s->complete, all_but_last_newline) << keep;
+      EXPECT_FALSE(s->warnings.empty());
+    } else {
+      ADD_FAILURE() << "cut at " << keep << ": " << s.error().message();
+    }
+  }
+}
+
+TEST_F(SessionTest, DamageInTheMiddleNamesTheLine) {
+  std::string text = manifest();
+  text.insert(text.find('\n') + 1, "{\"type\":\"dev\n");
+  const auto s = open(text);
+  ASSERT_FALSE(s);
+  EXPECT_NE(s.error().where.find("manifest.jsonl:2"), std::string::npos) << s.error().where;
+}
+
+TEST_F(SessionTest, WrongTypesNameTheField) {
+  const std::pair<const char*, const char*> edits[] = {
+      {"\"width\":640", "\"width\":\"640\""},   {"\"width\":640", "\"width\":-1"},
+      {"\"loop\":1", "\"loop\":1.5"},           {"\"modality\":\"thermal\",\"q", "\"modality\":\"x\",\"q"},
+      {"\"translation\":[", "\"translation\":[null,"}, {"\"azimuth_deg\":210.5", "\"azimuth_deg\":null"}};
+  for (const auto& [from, to] : edits) {
+    std::string text = manifest();
+    // The frame's line; the device's carries a width too.
+    const std::size_t frame_at = text.find("\"type\":\"frame\"");
+    const std::size_t line = text.rfind('\n', frame_at);
+    const std::size_t at = text.find(from, line);
+    if (at == std::string::npos) {
+      ADD_FAILURE() << from;
+      continue;
+    }
+    text.replace(at, std::string(from).size(), to);
+    const auto s = open(text);
+    ASSERT_FALSE(s) << to;
+    EXPECT_EQ(s.error().kind, ErrorKind::input);
+  }
+}
+
+TEST_F(SessionTest, PathsThatLeaveTheFolderAreRefused) {
+  for (const char* file : {"../secret", "/etc/passwd", "thermal/../../x", ""}) {
+    FrameRecord f = full_frame();
+    f.file = file;
+    std::string text = manifest();
+    text.insert(text.find('\n', text.find("\"device\"") == 0 ? 0 : text.find('\n') + 1) + 1, manifest_line(f) + "\n");
+    EXPECT_FALSE(open(text)) << file;
+  }
+}
+
+TEST_F(SessionTest, MissingImageIsAWarningAndTheFrameGoes) {
+  std::filesystem::remove(folder / "thermal/000000.tiff");
+  const auto s = open(manifest());
+  ASSERT_TRUE(s);
+  EXPECT_TRUE(s->frames.empty());
+  ASSERT_EQ(s->warnings.size(), 1u);
+  EXPECT_NE(s->warnings[0].find("thermal/000000.tiff"), std::string::npos);
+}
+
+TEST_F(SessionTest, UnknownLinesAreSkippedAndNewerFormatsRefused) {
+  std::string text = manifest();
+  text.insert(text.find('\n') + 1, "{\"type\":\"weather\",\"wind\":3}\n");
+  EXPECT_TRUE(open(text));
+  text = manifest();
+  text.replace(text.find("\"format\":1"), 10, "\"format\":2");
+  EXPECT_NE(open(text).error().message().find("update"), std::string::npos);
+}
+
+TEST_F(SessionTest, NoSession) {
+  EXPECT_FALSE(open_session(folder / "none"));
+  EXPECT_FALSE(open_session(folder.path()));
+  EXPECT_FALSE(open(""));
+  EXPECT_FALSE(open("\n"));
+}
+
+}  // namespace
+}  // namespace orbitfuse
