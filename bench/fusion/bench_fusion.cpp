@@ -157,9 +157,14 @@ int main(int argc, char** argv) {
     show(fmt::format("best, sharpness {}", sharpness), o);
   }
   o.best = {};
-  for (const double sharpness : {0.5, 2.0, 4.0}) {
-    o.best.base_sharpness = sharpness;
-    show(fmt::format("best, base sharpness {}", sharpness), o);
+  for (const int side : {5, 13, 17}) {
+    o.best.base_window = side;
+    show(fmt::format("best, base window {}", side), o);
+  }
+  o.best = {};
+  for (const int side : {5, 9, 25, 33}) {
+    o.best.base_vote = side;
+    show(fmt::format("best, base vote {}", side), o);
   }
   o.best = {};
   for (const int levels : {3, 5, 6}) {
@@ -167,7 +172,7 @@ int main(int argc, char** argv) {
     show(fmt::format("best, {} levels", levels), o);
   }
   o.best = {};
-  for (const int radius : {1, 3, 4}) {
+  for (const int radius : {1, 2, 3, 6}) {
     o.best.energy_radius_px = radius;
     show(fmt::format("best, energy radius {}", radius), o);
   }

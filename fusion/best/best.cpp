@@ -38,14 +38,24 @@ Plane mixed(const Plane& v, const Plane& t, const Plane& activity_v, const Plane
   return fused;
 }
 
-/// How much a base pixel stands out: squared distance from its surroundings.
-Plane saliency(const Plane& base) {
-  Plane around, energy;
-  const double sigma = std::max(2.0, std::min(base.rows, base.cols) / 6.0);
-  cv::GaussianBlur(base, around, {}, sigma, sigma, cv::BORDER_REFLECT_101);
-  around -= base;
-  cv::GaussianBlur(around.mul(around), energy, {}, 1.0, 1.0, cv::BORDER_REFLECT_101);
-  return energy;
+/// Local variance over a square window.
+Plane local_variance(const Plane& base, int side) {
+  Plane mean, square;
+  cv::boxFilter(base, mean, CV_32F, {side, side});
+  cv::boxFilter(base.mul(base), square, CV_32F, {side, side});
+  return cv::max(square - mean.mul(mean), 0.0F);
+}
+
+/// Each base pixel votes for the source that varies more round it; the votes are averaged widely,
+/// so that a region takes its level from one source and the border between two regions is a ramp.
+Plane fuse_base(const Plane& v, const Plane& t, const BestOptions& options) {
+  const int side = std::min({options.base_window, v.rows, v.cols}), reach = std::min({options.base_vote, v.rows, v.cols});
+  const Plane a = local_variance(v, side), b = local_variance(t, side);
+  Plane vote(v.size());
+  for (int y = 0; y < v.rows; ++y)
+    for (int x = 0; x < v.cols; ++x) vote(y, x) = a(y, x) > b(y, x) ? 1.0F : a(y, x) < b(y, x) ? 0.0F : 0.5F;
+  cv::boxFilter(vote, vote, CV_32F, {reach, reach});
+  return t + vote.mul(v - t);
 }
 
 }  // namespace
@@ -57,7 +67,8 @@ Status BestOptions::validate() const {
   if (levels < 0 || levels > 12) return bad("levels", levels, "must be in 0..12");
   if (energy_radius_px < 0 || energy_radius_px > 15) return bad("energy_radius_px", energy_radius_px, "must be in 0..15");
   if (!(sharpness > 0 && sharpness <= 64)) return bad("sharpness", sharpness, "must be in (0, 64]");
-  if (!(base_sharpness > 0 && base_sharpness <= 64)) return bad("base_sharpness", base_sharpness, "must be in (0, 64]");
+  if (base_window < 1 || base_window > 255) return bad("base_window", base_window, "must be in 1..255");
+  if (base_vote < 1 || base_vote > 255) return bad("base_vote", base_vote, "must be in 1..255");
   return {};
 }
 
@@ -79,7 +90,7 @@ Result<Plane> fuse_best(const Plane& visible, const Plane& thermal, const BestOp
   for (std::size_t i = 0; i < v.bands.size(); ++i)
     fused.bands.push_back(mixed(v.bands[i], t.bands[i], local_energy(v.bands[i], options.energy_radius_px),
                                 local_energy(t.bands[i], options.energy_radius_px), options.sharpness / 2));
-  fused.base = mixed(v.base, t.base, saliency(v.base), saliency(t.base), options.base_sharpness / 2);
+  fused.base = fuse_base(v.base, t.base, options);
   return collapse(fused);
 }
 

@@ -6,13 +6,14 @@
 namespace orbitfuse::fusion {
 
 /// The default method. Details: per band the source with the larger local energy, chosen softly
-/// so that the choice never flickers. Base: weighted by how much each source stands out from its
-/// surroundings. Every constant is measured in docs/benchmarks/fusion.md.
+/// so that the choice never flickers. Base: by a vote on which source varies more, averaged over a
+/// wide window. Every constant is measured in docs/benchmarks/fusion.md.
 struct BestOptions {
   int levels = 4;            ///< of the pyramid; fewer where the base would be below 8 px
-  double sharpness = 4;      ///< exponent of the energy ratio in the weights; larger: harder choice
-  int energy_radius_px = 2;  ///< of the window over which energies are averaged
-  double base_sharpness = 1; ///< the same for the base's saliency
+  double sharpness = 8;      ///< exponent of the energy ratio in the weights; larger: harder choice
+  int energy_radius_px = 4;  ///< of the window over which energies are averaged
+  int base_window = 9;       ///< base pixels over which a source's variance is taken
+  int base_vote = 17;        ///< base pixels over which votes are averaged
 
   Status validate() const;
 };

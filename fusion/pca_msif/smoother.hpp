@@ -14,7 +14,7 @@ enum class Stencil {
 double largest_stable_step(Stencil stencil);
 
 struct SmootherOptions {
-  int iterations = 15;    ///< T; more moves finer structure into the detail layer
+  int iterations = 36;    ///< T; more moves more structure into the detail layer; the paper has 15
   double time_step = 0.9; ///< dt
   double edge_scale = 4;  ///< k, gray levels: second differences above it are kept as edges
   Stencil stencil = Stencil::wide;
