@@ -20,9 +20,9 @@ json status_json(const StageStatus& status) {
   json j = {{"stage", status.stage}, {"state", name(status.state)}, {"why", status.why},
             {"wall_s", status.wall_s}, {"cpu_s", status.cpu_s}, {"metrics", status.output.metrics}};
   j["skips"] = json::array();
-  for (const Skip& skip : status.output.skips) j["skips"].push_back(to_json(skip));
+  for (const Skip& skip : status.output.skips) j["skips"].push_back(pipeline::to_json(skip));
   j["warnings"] = status.output.warnings;
-  if (status.error) j["error"] = to_json(*status.error);
+  if (status.error) j["error"] = pipeline::to_json(*status.error);
   return j;
 }
 

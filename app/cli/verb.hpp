@@ -62,7 +62,6 @@ Action add_metrics(CLI::App& app);
 Action add_report(CLI::App& app);
 Action add_eval(CLI::App& app);
 Action add_replay(CLI::App& app);
-Action add_synthesize(CLI::App& app);
 Action add_doctor(CLI::App& app);
 
 }  // namespace orbitfuse::cli

@@ -56,6 +56,12 @@ struct StageContext {
   bool has(const std::string& stage) const { return finished.count(stage) > 0; }
   /// Folder of a finished stage.
   std::filesystem::path of(const std::string& stage) const { return out / stage; }
+  /// What a finished stage of this run said; nullptr when it isn't finished.
+  const nlohmann::json* metrics_of(const std::string& stage) const {
+    for (const StageStatus& status : *earlier)
+      if (status.stage == stage && status.done()) return &status.output.metrics;
+    return nullptr;
+  }
 };
 
 /// One box of the data flow: reads finished stages, writes its own folder.

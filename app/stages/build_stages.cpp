@@ -10,13 +10,13 @@ std::vector<pipeline::Stage> build_stages(const SessionInput& session, const Run
                        std::make_shared<RunConfig>(config)};
   return {
       poses_stage(in, Modality::visible),
-      depth_stage(in),
+      // depth_stage(in),
       train_stage(in, Modality::visible),
       poses_stage(in, Modality::thermal),
       train_stage(in, Modality::thermal),
       register_stage(in),
       render_stage(in),
-      fuse_stage(in),
+      // fuse_stage(in),
       metrics_stage(in),
       report_stage(in),
   };

@@ -11,6 +11,7 @@
 namespace orbitfuse::stages {
 
 inline constexpr const char* field_file = "field.bin";
+inline constexpr const char* cloud_file = "cloud.ply";  ///< absent when no point was consistent
 
 /// What stages read besides each other's folders; shared, so that a stage outlives its maker.
 struct StageInputs {

@@ -57,9 +57,14 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
                    nerf::train(data, options, context.progress, field, guide.empty() ? nullptr : &guide));
   ORBITFUSE_TRY(field.save(context.folder / field_file));
   ORBITFUSE_TRY(write_json(context.folder / "curve.json", curve_json(report)));
-  ORBITFUSE_ASSIGN(const PointCloud cloud,
-                   nerf::export_point_cloud(field, model.views, config.cloud, context.progress));
-  ORBITFUSE_TRY(write_ply(context.folder / "cloud.ply", cloud));
+  auto cloud = nerf::export_point_cloud(field, model.views, config.cloud, context.progress);
+  if (cloud) {
+    ORBITFUSE_TRY(write_ply(context.folder / cloud_file, *cloud));
+  } else if (cloud.error().kind == ErrorKind::quality) {
+    output.warnings.push_back("no point cloud: " + cloud.error().message());
+  } else {
+    return tl::unexpected(cloud.error());
+  }
   std::error_code ignored;
   std::filesystem::remove(options.checkpoint, ignored);
 
@@ -73,7 +78,7 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
                     {"best_step", report.best_step},
                     {"heldout_psnr_db", report.best_psnr},
                     {"heldout", report.heldout},
-                    {"cloud_points", cloud.size()},
+                    {"cloud_points", cloud ? cloud->size() : 0},
                     {"width_px", data.views.empty() ? 0 : data.views[0].camera.width},
                     {"samples_per_ray",
                      report.rays > 0 ? static_cast<double>(report.samples) / static_cast<double>(report.rays) : 0.0}};

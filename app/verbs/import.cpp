@@ -46,8 +46,8 @@ void add_poses_known(CLI::App& app, Options& o) {
   app.add_option("--thermal-colmap", o.import.thermal_colmap, "COLMAP model of the thermal frames")
       ->group(group);
   app.add_option("--ground-truth", o.import.ground_truth, "Exact poses (docs/formats.md)")->group(group);
-  app.add_flag("--stations-only", o.import.ground_truth_stations_only,
-               "Of --ground-truth take stations and focal lengths, not the poses")->group(group);
+  app.add_flag("--priors-only", o.import.ground_truth_priors_only,
+               "Of --ground-truth take focal lengths and elevations, not the poses")->group(group);
   app.add_option("--station-spacing-deg", o.spacing_deg,
                  "The frames were taken in order at stations this far apart")->group(group);
   app.add_option("--loops", o.loops, "Loops of stations in each modality")->group(group);

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/eval/evaluate.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+#include "app/eval/image_error.hpp"
+#include "app/eval/pose_error.hpp"
+#include "app/pipeline/stage_record.hpp"
+#include "app/stages/artifacts.hpp"
+#include "app/stages/rendered_views.hpp"
+#include "app/stages/stage_list.hpp"
+#include "app/stages/training_data.hpp"
+#include "core/temperature.hpp"
+#include "recon/nerf/nerf.hpp"
+
+namespace orbitfuse::eval {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+/// The name the truth may know a frame by: its original file, else its place in the session.
+std::string base_name(const FrameRecord& frame) {
+  return fs::path(frame.source.empty() ? frame.file : frame.source).filename().string();
+}
+
+/// Pairs of estimated and true poses of one modality's station frames.
+std::vector<PosePair> match(const Session& session, const Reconstruction& model,
+                            const std::vector<PosedView>& truth) {
+  std::vector<PosePair> pairs;
+  for (const FrameRecord* frame : session.frames_of(model.modality, false)) {
+    const auto posed = std::find_if(model.views.begin(), model.views.end(),
+                                    [&](const PosedView& v) { return v.name == frame->file; });
+    const auto known = std::find_if(truth.begin(), truth.end(), [&](const PosedView& v) {
+      return fs::path(v.name).filename() == base_name(*frame);
+    });
+    if (posed != model.views.end() && known != truth.end())
+      pairs.push_back({posed->cam_from_world, known->cam_from_world});
+  }
+  return pairs;
+}
+
+json to_json(const PoseError& e, std::size_t total) {
+  return {{"posed", e.views}, {"total", total}, {"ate_percent", e.ate_percent},
+          {"ate_max_percent", e.ate_max_percent}, {"rotation_mean_deg", e.rotation_mean_deg},
+          {"rotation_median_deg", e.rotation_median_deg}, {"rotation_max_deg", e.rotation_max_deg}};
+}
+
+/// What a finished run left, loaded as far as it is there.
+struct Run {
+  fs::path out;
+  json result = json::object();
+  std::optional<Similarity3d> truth_from_visible, truth_from_thermal;
+  Similarity3d visible_from_thermal;
+  bool registered = false;
+
+  bool done(const std::string& stage) const {
+    return fs::exists(out / stage / pipeline::stage_record_file);
+  }
+  void note(const std::string& text) { result["notes"].push_back(text); }
+};
+
+Status add_poses(Run& run, const Session& session, const GroundTruth& truth, Modality modality,
+                 std::vector<PosePair>& pairs) {
+  const std::string stage = "poses_" + std::string(name(modality));
+  const auto views = truth.views.find(modality);
+  if (!run.done(stage) || views == truth.views.end()) {
+    run.note(fmt::format("{} is not finished, or the truth has no such views", stage));
+    return {};
+  }
+  ORBITFUSE_ASSIGN(const Reconstruction model, stages::load_poses(run.out / stage, modality));
+  pairs = match(session, model, views->second);
+  const auto fit = truth_from_estimate(pairs);
+  if (!fit) {
+    run.note(stage + ": " + fit.error().message());
+    return {};
+  }
+  run.result[stage] = to_json(pose_error(pairs, *fit), views->second.size());
+  (modality == Modality::visible ? run.truth_from_visible : run.truth_from_thermal) = *fit;
+  return {};
+}
+
+/// Thermal cameras in the visible frame: the error of the registration as a user meets it.
+Status add_registration(Run& run, const std::vector<PosePair>& thermal) {
+  if (!run.done("register") || !run.truth_from_visible || !run.truth_from_thermal) {
+    run.note("no registration to measure");
+    return {};
+  }
+  ORBITFUSE_ASSIGN(const json j, stages::read_json(run.out / "register" / stages::registration_file));
+  ORBITFUSE_ASSIGN(run.visible_from_thermal,
+                   stages::similarity_of_json(j.value("visible_from_thermal", json()), "register"));
+  run.registered = true;
+  const Similarity3d truth_from_thermal = *run.truth_from_visible * run.visible_from_thermal;
+  const Similarity3d error = run.truth_from_thermal->inverse() * truth_from_thermal;
+  json result = to_json(pose_error(thermal, truth_from_thermal), thermal.size());
+  result["similarity_rotation_deg"] =
+      rotation_angle_deg(error.rotation, Eigen::Quaterniond::Identity());
+  result["similarity_scale_percent"] = 100 * std::abs(error.scale - 1);
+  run.result["registration"] = result;
+  return {};
+}
+
+struct Sums {
+  double visible_psnr = 0, mae_k = 0, thermal_psnr = 0, covered = 0;
+  int visible = 0, thermal = 0;
+};
+
+cv::Mat resized(const cv::Mat& image, const Camera& camera) {
+  cv::Mat result = image;
+  if (image.cols != camera.width)
+    cv::resize(image, result, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
+  return result;
+}
+
+Status compare_visible(const nerf::Field& field, const TestView& view, const Camera& camera,
+                       const Rigid3d& cam_from_visible, const Progress& progress, Sums& sums) {
+  ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
+                   nerf::render(field, camera, cam_from_visible, {}, progress));
+  ORBITFUSE_ASSIGN(const cv::Mat truth, stages::field_image(view.visible, Modality::visible, false));
+  cv::Mat truth8, seen8;
+  resized(truth, camera).convertTo(truth8, CV_8U, 255);
+  seen.color.convertTo(seen8, CV_8U, 255);
+  sums.visible_psnr += psnr_db(seen8, truth8, 255);
+  ++sums.visible;
+  return {};
+}
+
+Status compare_thermal(const nerf::Field& field, const TestView& view, const Camera& camera,
+                       const Rigid3d& cam_from_thermal, const EvaluateOptions& options,
+                       const Progress& progress, Sums& sums) {
+  ORBITFUSE_ASSIGN(nerf::RenderedView seen, nerf::render(field, camera, cam_from_thermal, {}, progress));
+  ORBITFUSE_ASSIGN(const cv::Mat truth, stages::field_image(view.thermal, Modality::thermal, false));
+  seen.color.setTo(std::nanf(""), seen.opacity < options.min_opacity);
+  const TemperatureError error = temperature_error(seen.color, resized(truth, camera),
+                                                   kelvin_from_celsius(options.scene_above_c));
+  if (!std::isfinite(error.mae_k)) return {};
+  sums.mae_k += error.mae_k;
+  sums.covered += error.covered;
+  sums.thermal_psnr += error.psnr_db;
+  ++sums.thermal;
+  return {};
+}
+
+Status add_test_views(Run& run, const GroundTruth& truth, const EvaluateOptions& options,
+                      const Progress& progress) {
+  if (!run.truth_from_visible || truth.test.empty()) return {};
+  nerf::Field visible, thermal;
+  if (run.done("train_visible")) {
+    ORBITFUSE_ASSIGN(visible, nerf::Field::load(run.out / "train_visible" / stages::field_file));
+  }
+  if (run.done("train_thermal") && run.registered) {
+    ORBITFUSE_ASSIGN(thermal, nerf::Field::load(run.out / "train_thermal" / stages::field_file));
+  }
+  Sums sums;
+  for (std::size_t i = 0; i < truth.test.size(); ++i) {
+    const TestView& view = truth.test[i];
+    progress.report({"eval", static_cast<double>(i), static_cast<double>(truth.test.size()), -1, ""});
+    const int width = std::min(options.max_width_px, view.camera.width);
+    const Camera camera = view.camera.scaled_to(width, view.camera.height * width / view.camera.width);
+    const Rigid3d cam_from_visible = rebase(view.cam_from_world, run.truth_from_visible->inverse());
+    if (!visible.empty() && !view.visible.empty())
+      ORBITFUSE_TRY(compare_visible(visible, view, camera, cam_from_visible, progress, sums));
+    if (!thermal.empty() && !view.thermal.empty())
+      ORBITFUSE_TRY(compare_thermal(thermal, view, camera,
+                                    rebase(cam_from_visible, run.visible_from_thermal.inverse()),
+                                    options, progress, sums));
+  }
+  json result = {{"views", truth.test.size()}};
+  if (sums.visible > 0) {
+    result["visible_psnr_db"] = sums.visible_psnr / sums.visible;
+  }
+  if (sums.thermal > 0) {
+    result["temperature_mae_c"] = sums.mae_k / sums.thermal;
+    result["thermal_psnr_db"] = sums.thermal_psnr / sums.thermal;
+    result["thermal_covered"] = sums.covered / sums.thermal;
+  }
+  run.result["test_views"] = result;
+  return {};
+}
+
+}  // namespace
+
+Result<json> evaluate(const fs::path& out, const Session& session, const GroundTruth& truth,
+                      const EvaluateOptions& options, const Progress& progress) {
+  Run run;
+  run.out = out;
+  run.result["notes"] = json::array();
+  std::vector<PosePair> visible, thermal;
+  ORBITFUSE_TRY(add_poses(run, session, truth, Modality::visible, visible));
+  ORBITFUSE_TRY(add_poses(run, session, truth, Modality::thermal, thermal));
+  ORBITFUSE_TRY(add_registration(run, thermal));
+  ORBITFUSE_TRY(add_test_views(run, truth, options, progress));
+  json seconds = json::object();
+  for (const auto& entry : fs::directory_iterator(out)) {
+    if (!fs::exists(entry.path() / pipeline::stage_record_file)) continue;
+    const auto record = pipeline::read_stage_record(entry.path());
+    if (record) seconds[record->stage] = {{"wall_s", record->wall_s}, {"cpu_s", record->cpu_s}};
+  }
+  run.result["time"] = seconds;
+  return run.result;
+}
+
+}  // namespace orbitfuse::eval

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/eval/image_error.hpp"
+
+#include <cmath>
+#include <limits>
+
+namespace orbitfuse::eval {
+
+double psnr_db(const cv::Mat& a, const cv::Mat& b, double peak) {
+  CV_Assert(a.size() == b.size() && a.type() == b.type());
+  const double squared = std::pow(cv::norm(a, b, cv::NORM_L2), 2);
+  const double mse = squared / static_cast<double>(a.total() * static_cast<std::size_t>(a.channels()));
+  return mse > 0 ? 10 * std::log10(peak * peak / mse) : std::numeric_limits<double>::infinity();
+}
+
+TemperatureError temperature_error(const cv::Mat& rendered_k, const cv::Mat& truth_k,
+                                   double scene_above_k) {
+  CV_Assert(rendered_k.size() == truth_k.size());
+  double absolute = 0, squared = 0, low = 1e9, high = -1e9;
+  long scene = 0, covered = 0;
+  for (int y = 0; y < truth_k.rows; ++y)
+    for (int x = 0; x < truth_k.cols; ++x) {
+      const double t = truth_k.at<float>(y, x), r = rendered_k.at<float>(y, x);
+      if (!(t > scene_above_k)) continue;
+      ++scene;
+      low = std::min(low, t);
+      high = std::max(high, t);
+      if (!std::isfinite(r)) continue;
+      ++covered;
+      absolute += std::abs(r - t);
+      squared += (r - t) * (r - t);
+    }
+  TemperatureError error;
+  if (covered == 0) return {std::nan(""), 0, std::nan("")};
+  const auto n = static_cast<double>(covered);
+  error.mae_k = absolute / n;
+  error.covered = n / static_cast<double>(scene);
+  error.psnr_db = squared > 0 ? 10 * std::log10((high - low) * (high - low) * n / squared)
+                              : std::numeric_limits<double>::infinity();
+  return error;
+}
+
+}  // namespace orbitfuse::eval

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <opencv2/imgproc.hpp>
+
+#include "app/stages/artifacts.hpp"
+#include "app/stages/metric_tables.hpp"
+#include "app/stages/rendered_views.hpp"
+#include "app/stages/stage_list.hpp"
+#include "app/stages/training_data.hpp"
+#include "core/file_io.hpp"
+#include "core/image_io.hpp"
+#include "recon/nerf/nerf.hpp"
+
+namespace orbitfuse::stages {
+namespace {
+using nlohmann::json;
+using pipeline::StageContext;
+using pipeline::StageOutput;
+
+/// Rendered against recorded, on views that did not train (seed paper, Table 4).
+Status score_field(const StageContext& context, const SessionInput& input, const TrainConfig& config,
+                   Modality modality, MetricMeans& means) {
+  const std::string train = "train_" + std::string(name(modality));
+  if (!context.has(train)) return {};
+  const json* trained = context.metrics_of(train);
+  const auto heldout = trained ? trained->value("heldout", std::vector<std::string>()) : std::vector<std::string>();
+  if (heldout.empty()) return {};
+  ORBITFUSE_ASSIGN(Reconstruction model,
+                   load_poses(context.of("poses_" + std::string(name(modality))), modality));
+  model.points.clear();
+  std::erase_if(model.views, [&](const PosedView& v) {
+    return std::find(heldout.begin(), heldout.end(), v.name) == heldout.end();
+  });
+  ORBITFUSE_ASSIGN(const nerf::Dataset data,
+                   training_data(input, model, config.max_width_px, context.progress));
+  ORBITFUSE_ASSIGN(const nerf::Field field, nerf::Field::load(context.of(train) / field_file));
+  for (const nerf::TrainingView& view : data.views) {
+    ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
+                     nerf::render(field, view.camera, view.cam_from_world, {}, context.progress));
+    cv::Mat truth = view.image, rendered = seen.color;
+    if (modality == Modality::visible) {
+      truth.convertTo(truth, CV_8U, 255);
+      rendered.convertTo(rendered, CV_8U, 255);
+    } else {
+      const TemperatureSpan span = common_span({truth}, 0, 100);
+      truth = gray_of_kelvin(truth, span);
+      rendered = gray_of_kelvin(rendered, span);
+    }
+    ORBITFUSE_ASSIGN(const auto values, render_metrics(truth, rendered));
+    means.add(std::string(name(modality)), view.name, values);
+  }
+  return {};
+}
+
+/// Every fused view (Table 7).
+Status score_fused(const StageContext& context, MetricMeans& means) {
+  const json* fused = context.metrics_of("fuse");
+  if (!fused || !context.has("render")) return {};
+  const auto methods = fused->value("methods", std::vector<std::string>());
+  ORBITFUSE_ASSIGN(const RenderedViews rendered, load_rendered_views(context.of("render")));
+  for (std::size_t i = 0; i < rendered.views.size(); ++i) {
+    const ViewFiles& files = rendered.views[i];
+    ORBITFUSE_TRY(context.progress.check("metrics"));
+    context.progress.report({"metrics", static_cast<double>(i), static_cast<double>(rendered.views.size()),
+                             -1, files.name});
+    ORBITFUSE_ASSIGN(const cv::Mat visible, read_image(context.of("render") / files.visible));
+    ORBITFUSE_ASSIGN(const cv::Mat thermal, read_image(context.of("fuse") / "thermal" / (files.name + ".png")));
+    for (const std::string& method : methods) {
+      ORBITFUSE_ASSIGN(const cv::Mat image, read_image(context.of("fuse") / method / (files.name + ".png")));
+      ORBITFUSE_ASSIGN(const auto values, fusion_metrics(visible, thermal, image));
+      means.add(method, files.name, values);
+    }
+  }
+  return {};
+}
+
+Result<StageOutput> score(const StageContext& context, const SessionInput& input, const RunConfig& config) {
+  MetricMeans fields, fused;
+  for (const Modality modality : {Modality::visible, Modality::thermal})
+    ORBITFUSE_TRY(score_field(context, input, config.train(modality), modality, fields));
+  ORBITFUSE_TRY(score_fused(context, fused));
+  StageOutput output;
+  auto tables = json::array();
+  if (!fields.empty()) tables.push_back(fields.table("Rendered views against held-out frames", "field"));
+  if (!fused.empty()) tables.push_back(fused.table("Fused views, mean over the new cameras", "method"));
+  ORBITFUSE_TRY(write_file_atomic(context.folder / "metrics.csv",
+                                  MetricMeans::csv_header() + fields.csv() + fused.csv()));
+  ORBITFUSE_TRY(write_json(context.folder / "metrics.json",
+                           {{"schema", 1}, {"fields", fields.to_json()}, {"fused", fused.to_json()}}));
+  output.metrics = {{"brief", fmt::format("{} fused images, {} held-out views", fused.count(), fields.count())},
+                    {"tables", tables}, {"fields", fields.to_json()}, {"fused", fused.to_json()}};
+  return output;
+}
+
+}  // namespace
+
+pipeline::Stage metrics_stage(const StageInputs& in) {
+  pipeline::Stage stage;
+  stage.name = "metrics";
+  stage.uses = {"poses_visible", "poses_thermal", "train_visible", "train_thermal", "render", "fuse"};
+  stage.absent = [](const StageContext& context) -> std::optional<std::string> {
+    if (context.has("train_visible") || context.has("train_thermal")) return std::nullopt;
+    return "no field was trained";
+  };
+  stage.run = [in](const StageContext& context) { return score(context, *in.session, *in.config); };
+  return stage;
+}
+
+}  // namespace orbitfuse::stages

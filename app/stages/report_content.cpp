@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/stages/report_content.hpp"
+
+#include <fmt/format.h>
+
+#include "app/pipeline/runner.hpp"
+#include "app/stages/artifacts.hpp"
+#include "app/stages/rendered_views.hpp"
+#include "app/stages/training_data.hpp"
+#include "core/cpu.hpp"
+#include "core/image_io.hpp"
+#include "core/parallel.hpp"
+#include "core/temperature.hpp"
+
+namespace orbitfuse::stages {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+using pipeline::StageContext;
+using pipeline::StageState;
+using pipeline::StageStatus;
+
+/// More views would make the page too heavy to mail; the folders hold them all.
+constexpr std::size_t max_report_views = 16;
+
+Result<report::View> load_view(const StageContext& context, const ViewFiles& files, bool gray) {
+  const fs::path folder = context.of("render");
+  report::View view;
+  view.name = files.name;
+  if (!files.visible.empty()) {
+    ORBITFUSE_ASSIGN(view.visible, read_visible(folder / files.visible));
+  }
+  if (!files.palette.empty()) {
+    ORBITFUSE_ASSIGN(view.thermal, read_visible(folder / files.palette));
+    ORBITFUSE_ASSIGN(view.temperature_k, field_image(folder / files.thermal, Modality::thermal, gray));
+  }
+  return view;
+}
+
+Status add_fused(const StageContext& context, const std::vector<std::string>& methods,
+                 report::View& view) {
+  for (const std::string& method : methods) {
+    ORBITFUSE_ASSIGN(cv::Mat image, read_image(context.of("fuse") / method / (view.name + ".png")));
+    view.fused.push_back({method, std::move(image)});
+  }
+  return {};
+}
+
+Status add_views(const StageContext& context, const RenderConfig& config, report::Model& model) {
+  if (!context.has("render")) return {};
+  ORBITFUSE_ASSIGN(const RenderedViews rendered, load_rendered_views(context.of("render")));
+  std::vector<std::string> methods;
+  if (const json* fused = context.metrics_of("fuse"))
+    methods = fused->value("methods", methods);
+  for (const ViewFiles& files : rendered.views) {
+    if (model.views.size() == max_report_views) {
+      model.warnings.push_back(fmt::format("The report shows {} of {} views; render/ holds all.",
+                                           max_report_views, rendered.views.size()));
+      break;
+    }
+    ORBITFUSE_ASSIGN(report::View view, load_view(context, files, rendered.thermal_is_gray));
+    ORBITFUSE_TRY(add_fused(context, methods, view));
+    model.views.push_back(std::move(view));
+  }
+  model.span = rendered.span;
+  model.has_temperature = !rendered.thermal_is_gray && !model.views.empty() &&
+                          !model.views[0].thermal.empty();
+  if (!model.views.empty() && !model.views[0].thermal.empty()) {
+    ORBITFUSE_ASSIGN(model.palette_bgr, palette(config.palette));
+  }
+  return {};
+}
+
+std::string advice(const report::ModalityPoses& poses) {
+  if (poses.posed == poses.total) return {};
+  return poses.modality == "Visible"
+             ? "Views without a pose are left out. Record them again with more overlap, sharp and "
+               "without reflections, or add frames between the stations."
+             : "Views without a pose are left out. Frames recorded between stations and a warmer "
+               "object give thermal views more to hold on to.";
+}
+
+void add_poses(const StageContext& context, const SessionInput& input, report::Model& model) {
+  for (const Modality modality : {Modality::visible, Modality::thermal}) {
+    const bool visible = modality == Modality::visible;
+    report::ModalityPoses poses;
+    poses.modality = visible ? "Visible" : "Thermal";
+    poses.total = input.count(modality);
+    if (poses.total == 0) continue;
+    if (const json* m = context.metrics_of("poses_" + std::string(name(modality)))) {
+      poses.posed = m->value("posed", 0);
+      poses.total = m->value("total", poses.total);
+      for (const json& rung : m->value("ladder", json::array()))
+        poses.ladder.push_back({rung.value("rung", ""), rung.value("held", false) ? "held" : "did not hold",
+                                rung.value("why", "")});
+    }
+    poses.advice = advice(poses);
+    model.headline.emplace_back(fmt::format("{} views posed", name(modality)),
+                                fmt::format("{} of {}", poses.posed, poses.total));
+    model.poses.push_back(std::move(poses));
+  }
+}
+
+void add_registration(const StageContext& context, report::Model& model) {
+  const json* m = context.metrics_of("register");
+  if (!m) return;
+  model.registration_note = m->value("note", "");
+  for (const json& fact : m->value("facts", json::array()))
+    model.registration.emplace_back(fact.at(0), fact.at(1));
+}
+
+void add_fields(const StageContext& context, report::Model& model) {
+  report::Table table{"Radiance fields",
+                      {{"Field", ""},
+                       {"Held-out PSNR (dB)", "10 log10(peak² / MSE) on views that did not train; "
+                                              "thermal over the session's span"},
+                       {"Steps", "Of the parameters kept"},
+                       {"Samples a ray", "Mean over training"},
+                       {"Cloud points", "Exported to cloud.ply"}},
+                      {}};
+  for (const char* stage : {"train_visible", "train_thermal"}) {
+    const json* m = context.metrics_of(stage);
+    if (!m) continue;
+    const json psnr = m->value("heldout_psnr_db", json());
+    table.rows.push_back({std::string(stage).substr(6),
+                          psnr.is_number() ? fmt::format("{:.2f}", psnr.get<double>())
+                                           : "all views trained",
+                          fmt::format("{}", m->value("best_step", 0)),
+                          fmt::format("{:.1f}", m->value("samples_per_ray", 0.0)),
+                          fmt::format("{}", m->value("cloud_points", 0))});
+  }
+  if (!table.rows.empty()) model.tables.push_back(std::move(table));
+}
+
+void add_metric_tables(const StageContext& context, report::Model& model) {
+  const json* m = context.metrics_of("metrics");
+  if (!m) return;
+  for (const json& t : m->value("tables", json::array())) {
+    report::Table table;
+    table.title = t.value("title", "");
+    for (const json& c : t.at("columns")) table.columns.push_back({c.at(0), c.at(1)});
+    table.rows = t.at("rows").get<std::vector<std::vector<std::string>>>();
+    model.tables.push_back(std::move(table));
+  }
+}
+
+/// What the data did not allow, once per reason.
+void add_notices(const StageContext& context, const SessionInput& input, report::Model& model) {
+  for (const Modality modality : {Modality::visible, Modality::thermal})
+    if (!input.has(modality))
+      model.notices.push_back(fmt::format(
+          "This session has no {} frames: everything below is of the {} ones alone.", name(modality),
+          name(modality == Modality::visible ? Modality::thermal : Modality::visible)));
+  if (input.has(Modality::thermal) && !input.has_temperatures())
+    model.notices.push_back("The thermal frames hold gray levels, not temperatures.");
+  for (const StageStatus& s : *context.earlier)
+    if (s.state == StageState::blocked)
+      model.notices.push_back(fmt::format("{} was not run: {}.", s.stage, s.why));
+}
+
+}  // namespace
+
+Result<report::Model> report_content(const StageContext& context, const StageInputs& in) {
+  const SessionInput& input = *in.session;
+  report::Model model;
+  const std::string folder = input.session.folder.lexically_normal().filename().string();
+  model.title = folder.empty() ? input.session.id : folder;
+  model.subtitle = fmt::format("Session {}, recorded {}. Computed on {}, {} threads.", input.session.id,
+                               input.session.created, cpu_description(), thread_count());
+  ORBITFUSE_TRY(add_views(context, in.config->render, model));
+  add_poses(context, input, model);
+  add_registration(context, model);
+  add_fields(context, model);
+  add_metric_tables(context, model);
+  add_notices(context, input, model);
+  model.stages = *context.earlier;
+  double wall_s = 0;
+  for (const StageStatus& s : model.stages) wall_s += s.wall_s;
+  model.headline.emplace_back("new views", fmt::format("{}", model.views.size()));
+  if (model.has_temperature)
+    model.headline.emplace_back("temperatures shown",
+                                fmt::format("{:.0f} to {:.0f} °C", celsius_from_kelvin(model.span.low_k),
+                                            celsius_from_kelvin(model.span.high_k)));
+  model.headline.emplace_back("run time", fmt::format("{:.0f} s", wall_s));
+  model.warnings.insert(model.warnings.end(), input.session.warnings.begin(), input.session.warnings.end());
+  for (const StageStatus& s : model.stages)
+    for (const std::string& warning : s.output.warnings) model.warnings.push_back(s.stage + ": " + warning);
+  model.software = pipeline::software_version();
+  model.created = input.session.created;
+  model.configuration = in.config->settings().to_toml();
+  return model;
+}
+
+}  // namespace orbitfuse::stages

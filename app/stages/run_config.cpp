@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/stages/run_config.hpp"
+
+#include <algorithm>
+
+#include "core/palette.hpp"
+
+namespace orbitfuse::stages {
+namespace {
+using config::Setting;
+using config::Settings;
+using nlohmann::json;
+
+/// Set by the run, not by a preset's user.
+constexpr const char* run_owned[] = {"preset", "seed", "checkpoint", "resume"};
+
+/// Every field of the training recipe by its own name; listed in recon/nerf/options.hpp.
+void add_train_fields(Settings& settings, const std::string& table, nerf::TrainOptions& options) {
+  for (const std::string& key : nerf::TrainOptions::keys()) {
+    if (std::count(std::begin(run_owned), std::end(run_owned), key) > 0) continue;
+    Setting setting;
+    setting.key = table + "." + key;
+    setting.type = "as in recon/nerf/options.hpp";
+    setting.listed = false;
+    setting.get = [&options, key] {
+      const std::string text = options.get(key);
+      const json value = json::parse(text, nullptr, false);
+      return value.is_discarded() ? json(text) : value;
+    };
+    setting.set = [&options, key](const json& value) {
+      return options.set(key, value.is_string() ? value.get<std::string>() : value.dump()).has_value();
+    };
+    settings.add(std::move(setting));
+  }
+}
+
+void add_train(Settings& settings, const std::string& table, TrainConfig& config) {
+  std::string presets = "one of";
+  for (const std::string& name : nerf::preset_names()) presets += " " + name;
+  settings.add({table + ".preset", "Training recipe; its fields may follow, e.g. iterations = 8000",
+                presets, [&config] { return json(config.options.preset); },
+                [&config](const json& value) {
+                  if (!value.is_string()) return false;
+                  auto options = nerf::preset(value.get<std::string>());
+                  if (options) config.options = *std::move(options);
+                  return options.has_value();
+                },
+                true});
+  settings.add(table + ".max_width_px", config.max_width_px,
+               "Training images are reduced to this width; larger is slower");
+  settings.add(table + ".cloud_width_px", config.cloud.max_width,
+               "Width of the depth maps the point cloud is made from");
+  settings.add(table + ".cloud_tolerance", config.cloud.depth_tolerance,
+               "Relative depth agreement of two views on a point of the cloud");
+  add_train_fields(settings, table, config.options);
+}
+
+void add_poses(Settings& settings, PoseOptions& poses) {
+  settings.add("poses.colmap", poses.colmap, "COLMAP's command");
+  settings.add("poses.use_known_poses", poses.use_known_poses,
+               "Poses that the session carries replace the estimate");
+  settings.add("poses.use_tracking_frames", poses.use_tracking_frames,
+               "Thermal frames recorded between stations tie neighbours together");
+  settings.add("poses.max_image_side_px", poses.max_image_side_px, "Longest image side given to COLMAP");
+  settings.add("poses.max_features", poses.max_features, "SIFT features a view");
+  settings.add("poses.min_posed_ratio", poses.min_posed_ratio,
+               "Below this share of posed views the next method is tried");
+  settings.add("poses.max_reprojection_rms_px", poses.max_reprojection_rms_px,
+               "Above this error a model is not believed");
+  settings.add("poses.max_station_residual", poses.max_station_residual,
+               "A model that leaves the stations' orbit by more (share of the radius) is not believed");
+}
+
+void add_render(Settings& settings, RenderConfig& render) {
+  settings.add_choice("render.path", render.path.path,
+                      {{PathKind::automatic, "auto"}, {PathKind::orbit, "orbit"}, {PathKind::path, "path"}},
+                      "New cameras on an orbit, between the recorded ones, or whichever suits the scene");
+  settings.add("render.views", render.path.views, "New cameras along the path");
+  settings.add("render.width_px", render.path.width_px, "Width of a rendered image");
+  settings.add("render.azimuth_deg", render.path.azimuth_deg, "First new camera, from the first recorded one");
+  settings.add("render.elevation_deg", render.path.elevation_deg,
+               "Of an orbit; below -89: the median of the recorded cameras");
+  settings.add("render.radius_scale", render.path.radius_scale,
+               "Of an orbit, times the recorded cameras' median distance");
+  settings.add("render.palette", render.palette, "Colours of temperatures");
+  settings.add("render.min_opacity", render.min_opacity,
+               "Pixels less opaque than this have no temperature and are not fused");
+}
+
+}  // namespace
+
+RunConfig::RunConfig() {
+  train_visible.options = nerf::preset(nerf::default_preset(Modality::visible)).value();
+  train_thermal.options = nerf::preset(nerf::default_preset(Modality::thermal)).value();
+}
+
+void RunConfig::set_seed(std::uint64_t value) {
+  seed = poses.seed = train_visible.options.seed = train_thermal.options.seed = value;
+}
+
+Status RunConfig::validate() const {
+  ORBITFUSE_TRY(poses.validate());
+  for (const TrainConfig* train : {&train_visible, &train_thermal}) {
+    ORBITFUSE_TRY(train->options.validate());
+    ORBITFUSE_TRY(train->cloud.validate());
+    if (train->max_width_px < 16)
+      return fail(ErrorKind::usage, "train.max_width_px", std::to_string(train->max_width_px),
+                  "must be at least 16");
+  }
+  ORBITFUSE_TRY(render.path.validate());
+  ORBITFUSE_TRY(render.quality.validate());
+  ORBITFUSE_TRY(palette(render.palette));
+  if (!(render.min_opacity >= 0 && render.min_opacity <= 1))
+    return fail(ErrorKind::usage, "render.min_opacity", std::to_string(render.min_opacity),
+                "must be in 0..1");
+  return {};
+}
+
+Settings RunConfig::settings() {
+  Settings settings;
+  add_poses(settings, poses);
+  add_train(settings, "train.visible", train_visible);
+  add_train(settings, "train.thermal", train_thermal);
+  add_render(settings, render);
+  return settings;
+}
+
+}  // namespace orbitfuse::stages

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "app/config/settings.hpp"
+#include "app/stages/new_views.hpp"
+#include "core/modality.hpp"
+#include "recon/nerf/nerf.hpp"
+#include "recon/poses/estimate_poses.hpp"
+
+namespace orbitfuse::stages {
+
+/// How one modality's field is trained; the fields of `options` come from its preset.
+struct TrainConfig {
+  nerf::TrainOptions options;
+  int max_width_px = 400;  ///< training images; finer ones cost time that sparse orbits don't repay
+  nerf::ExportOptions cloud;
+};
+
+struct RenderConfig {
+  NewViewOptions path;
+  std::string cameras;             ///< transforms.json of given cameras; empty = `path`
+  std::string palette = "inferno";
+  double min_opacity = 0.5;        ///< below it a pixel has no temperature and isn't fused
+  nerf::RenderOptions quality;
+};
+
+/// Everything a run can be told; its defaults are those of config/orbitfuse.toml.
+struct RunConfig {
+  RunConfig();
+
+  std::uint64_t seed = 1;
+  PoseOptions poses;
+  TrainConfig train_visible, train_thermal;
+  RenderConfig render;
+
+  const TrainConfig& train(Modality modality) const {
+    return modality == Modality::visible ? train_visible : train_thermal;
+  }
+  void set_seed(std::uint64_t value);
+  Status validate() const;
+  /// The keys, bound to this object, which must outlive them.
+  config::Settings settings();
+};
+
+}  // namespace orbitfuse::stages

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include "app/cli/run_stages.hpp"
+#include "app/cli/verb.hpp"
+#include "app/eval/evaluate.hpp"
+
+namespace orbitfuse::cli {
+namespace {
+using nlohmann::json;
+
+struct Options {
+  StageFolders folders;
+  std::string truth;
+  eval::EvaluateOptions evaluate;
+};
+
+void print_poses(terminal::Console& console, const json& result, const char* key, const char* label) {
+  if (!result.contains(key)) return;
+  const json& j = result[key];
+  console.data(fmt::format("{:<22} {}/{} views, ATE {:.3f} % of the extent (max {:.3f}), rotation "
+                           "{:.3f} deg mean, {:.3f} max",
+                           label, j["posed"].get<int>(), j["total"].get<int>(),
+                           j["ate_percent"].get<double>(), j["ate_max_percent"].get<double>(),
+                           j["rotation_mean_deg"].get<double>(), j["rotation_max_deg"].get<double>()));
+}
+
+void print(terminal::Console& console, const json& result) {
+  print_poses(console, result, "poses_visible", "visible poses");
+  print_poses(console, result, "poses_thermal", "thermal poses");
+  print_poses(console, result, "registration", "thermal, visible frame");
+  if (const auto it = result.find("test_views"); it != result.end()) {
+    if (it->contains("visible_psnr_db"))
+      console.data(fmt::format("{:<22} {:.2f} dB on {} test views", "visible field",
+                               it->at("visible_psnr_db").get<double>(), it->at("views").get<int>()));
+    if (it->contains("temperature_mae_c"))
+      console.data(fmt::format("{:<22} MAE {:.3f} degC, {:.2f} dB, {:.0f} % of the scene covered",
+                               "thermal field", it->at("temperature_mae_c").get<double>(),
+                               it->at("thermal_psnr_db").get<double>(),
+                               100 * it->at("thermal_covered").get<double>()));
+  }
+  for (const json& note : result["notes"]) console.info("note: " + note.get<std::string>());
+}
+
+Status run(Context& context, Options& o) {
+  ORBITFUSE_TRY(resolve(o.folders));
+  ORBITFUSE_ASSIGN(const Session session, open_session(o.folders.session));
+  ORBITFUSE_ASSIGN(const eval::GroundTruth truth, eval::read_ground_truth(o.truth));
+  if (!std::filesystem::is_directory(o.folders.out))
+    return fail(ErrorKind::input, o.folders.out, "no such folder", "run the session first");
+  ORBITFUSE_ASSIGN(const json result, eval::evaluate(o.folders.out, session, truth, o.evaluate,
+                                                     context.progress));
+  print(context.console, result);
+  context.result = result;
+  return {};
+}
+
+}  // namespace
+
+Action add_eval(CLI::App& app) {
+  const auto options = std::make_shared<Options>();
+  add_folders(app, options->folders);
+  app.add_option("--ground-truth", options->truth, "Exact poses and test views (docs/formats.md)")
+      ->required();
+  app.add_option("--max-width", options->evaluate.max_width_px, "Test views are compared at this width")
+      ->check(CLI::Range(16, 8192))->capture_default_str();
+  return [options](Context& context) { return run(context, *options); };
+}
+
+}  // namespace orbitfuse::cli

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include "app/cli/run_stages.hpp"
+#include "app/cli/verb.hpp"
+#include "core/image_io.hpp"
+#include "fusion/metrics/metrics.hpp"
+
+namespace orbitfuse::cli {
+namespace {
+
+struct Options {
+  StageFolders folders;
+  std::string visible, thermal, fused;
+  bool on_files() const { return !visible.empty() || !thermal.empty() || !fused.empty(); }
+};
+
+Status score_files(Context& context, const Options& o) {
+  for (const auto& [option, value] :
+       {std::pair{"--visible", &o.visible}, {"--thermal", &o.thermal}, {"--fused", &o.fused}})
+    if (value->empty()) return fail(ErrorKind::usage, option, "not given", "name all three images");
+  ORBITFUSE_ASSIGN(const cv::Mat visible, read_image(o.visible));
+  ORBITFUSE_ASSIGN(const cv::Mat thermal, read_image(o.thermal));
+  ORBITFUSE_ASSIGN(const cv::Mat fused, read_image(o.fused));
+  ORBITFUSE_ASSIGN(const auto values, fusion_metrics(visible, thermal, fused));
+  nlohmann::json metrics = nlohmann::json::object(), definitions = metrics;
+  for (const MetricValue& v : values) {
+    context.console.data(fmt::format("{:<10} {:>14.6f}  {}", v.name, v.value, v.definition));
+    metrics[v.name] = v.value;
+    definitions[v.name] = v.definition;
+  }
+  context.result = {{"metrics", metrics}, {"definitions", definitions}};
+  return {};
+}
+
+}  // namespace
+
+Action add_metrics(CLI::App& app) {
+  const auto options = std::make_shared<Options>();
+  add_folders(app, options->folders);
+  app.add_option("--visible", options->visible, "Visible image; then --thermal and --fused too");
+  app.add_option("--thermal", options->thermal, "Thermal image of the same size");
+  app.add_option("--fused", options->fused, "Fused image of the same size");
+  return [options](Context& context) {
+    return options->on_files() ? score_files(context, *options)
+                               : run_stages(context, options->folders, {"metrics"});
+  };
+}
+
+}  // namespace orbitfuse::cli

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What every verb promises: help, exit codes, streams, --json, configuration.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <regex>
+
+#include "core/file_io.hpp"
+#include "tests/app/cli/program.hpp"
+#include "tests/app/temp_folder.hpp"
+
+namespace orbitfuse {
+namespace {
+using testing::HasSubstr;
+using testing::StartsWith;
+
+const std::vector<std::string> verbs = {"run",    "import", "inspect", "poses",  "train",
+                                        "register", "render", "fuse",    "metrics", "report",
+                                        "eval",   "replay", "doctor"};
+
+TEST(Cli, HelpBeginsWithAnExampleAndGoesToStdout) {
+  for (const std::string& verb : verbs) {
+    const Outcome help = orbitfuse_program({verb, "--help"});
+    EXPECT_EQ(help.code, 0) << verb;
+    EXPECT_THAT(help.out, StartsWith("Example:\n  orbitfuse " + verb));
+    EXPECT_EQ(help.err, "") << verb;
+    for (const char* common : {"--config", "--json", "--threads", "--seed", "--device", "--force",
+                               "--resume", "--dry-run", "--verbose", "--quiet"})
+      EXPECT_THAT(help.out, HasSubstr(common)) << verb;
+  }
+}
+
+TEST(Cli, TopLevelHelpListsEveryVerb) {
+  const Outcome help = orbitfuse_program({"--help"});
+  EXPECT_EQ(help.code, 0);
+  for (const std::string& verb : verbs) EXPECT_THAT(help.out, HasSubstr("\n  " + verb + " "));
+}
+
+TEST(Cli, Version) {
+  const Outcome version = orbitfuse_program({"--version"});
+  EXPECT_EQ(version.code, 0);
+  EXPECT_TRUE(std::regex_match(version.out, std::regex("orbitfuse \\d+\\.\\d+\\.\\d+\n")));
+}
+
+TEST(Cli, SlipsGetASuggestionAndExitCode2) {
+  const Outcome verb = orbitfuse_program({"trian", "x"});
+  EXPECT_EQ(verb.code, 2);
+  EXPECT_THAT(verb.err, HasSubstr("did you mean 'train'?"));
+  const Outcome option = orbitfuse_program({"run", "x", "--thread", "2"});
+  EXPECT_EQ(option.code, 2);
+  EXPECT_THAT(option.err, HasSubstr("did you mean '--threads'?"));
+  EXPECT_EQ(option.out, "");
+  EXPECT_EQ(orbitfuse_program({}).code, 2);
+  EXPECT_EQ(orbitfuse_program({"run"}).code, 2);
+  EXPECT_EQ(orbitfuse_program({"run", "x", "--threads", "many"}).code, 2);
+  EXPECT_EQ(orbitfuse_program({"run", "x", "--device", "tpu"}).code, 2);
+}
+
+TEST(Cli, UsageErrorsKeepTheJsonContract) {
+  const Outcome outcome = orbitfuse_program({"run", "x", "--nonsense", "--json"});
+  EXPECT_EQ(outcome.code, 2);
+  const auto result = outcome.result();
+  EXPECT_EQ(result.at("event"), "result");
+  EXPECT_EQ(result.at("ok"), false);
+  EXPECT_EQ(result.at("exit_code"), 2);
+  EXPECT_EQ(result.at("schema"), 1);
+}
+
+TEST(Cli, CudaIsUnavailable) {
+  const Outcome outcome = orbitfuse_program({"doctor", "--device", "cuda"});
+  EXPECT_EQ(outcome.code, 6);
+  EXPECT_THAT(outcome.err, HasSubstr("--device cpu"));
+}
+
+TEST(Cli, ConfigMistakesNameFileLineAndKey) {
+  const TempFolder temp;
+  const auto file = temp.path / "c.toml";
+  std::ofstream(file) << "[render]\nviewz = 3\n";
+  const Outcome outcome = orbitfuse_program({"run", "x", "--config", file.string()});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("c.toml:2"));
+  EXPECT_THAT(outcome.err, HasSubstr("did you mean 'render.views'?"));
+  EXPECT_EQ(orbitfuse_program({"run", "x", "--config", "/none.toml"}).code, 3);
+  const Outcome range = orbitfuse_program({"run", "x", "--set", "render.views=-3"});
+  EXPECT_EQ(range.code, 2);
+  EXPECT_THAT(range.err, HasSubstr("render.views: -3; must be"));
+}
+
+TEST(Cli, ShippedConfigHoldsTheBuiltInDefaults) {
+  const Outcome printed = orbitfuse_program({"run", "--print-config"});
+  ASSERT_EQ(printed.code, 0);
+  const auto shipped = read_file(ORBITFUSE_SOURCE_DIR "/config/orbitfuse.toml");
+  ASSERT_TRUE(shipped);
+  EXPECT_THAT(*shipped, HasSubstr(printed.out))
+      << "regenerate with: cmake/write_reference.sh";
+  const Outcome again = orbitfuse_program(
+      {"run", "--print-config", "--config", ORBITFUSE_SOURCE_DIR "/config/orbitfuse.toml"});
+  EXPECT_EQ(again.out, printed.out);
+}
+
+TEST(Cli, ReferenceMatchesHelp) {
+  const auto reference = read_file(ORBITFUSE_SOURCE_DIR "/docs/cli.md");
+  ASSERT_TRUE(reference);
+  EXPECT_THAT(*reference, HasSubstr(orbitfuse_program({"--help"}).out));
+  for (const std::string& verb : verbs)
+    EXPECT_THAT(*reference, HasSubstr(orbitfuse_program({verb, "--help"}).out))
+        << "regenerate with: cmake/write_reference.sh";
+}
+
+TEST(Cli, DoctorSaysWhatIsMissing) {
+  const Outcome outcome =
+      orbitfuse_program({"doctor", "--json"}, {.environment = {"PATH=/nowhere"}});
+  EXPECT_EQ(outcome.code, 6);
+  bool colmap = false;
+  const auto result = outcome.result();
+  for (const auto& finding : result.at("findings"))
+    if (finding.at("what") == "COLMAP") colmap = finding.at("remedy") != "";
+  EXPECT_TRUE(colmap);
+}
+
+TEST(Cli, NoColorAndNoBarWhenStderrIsAFile) {
+  const Outcome outcome = orbitfuse_program({"inspect", "/does/not/exist"});
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_EQ(outcome.err.find('\033'), std::string::npos);
+  EXPECT_EQ(outcome.out, "");
+}
+
+}  // namespace
+}  // namespace orbitfuse

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The whole road on a tiny session with known poses.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "core/file_io.hpp"
+#include "core/image_io.hpp"
+#include "core/ply.hpp"
+#include "core/transforms_json.hpp"
+#include "tests/app/cli/program.hpp"
+#include "tests/app/cli/session_fixture.hpp"
+#include "tests/app/temp_folder.hpp"
+
+namespace orbitfuse {
+namespace {
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+class Run : public testing::Test {
+ protected:
+  Outcome run(std::vector<std::string> more = {}, const RunOptions& options = {},
+              const std::string& verb = "run") {
+    std::vector<std::string> words = {verb, session.string(), "--out", out.string(), "--json"};
+    for (const char* set :
+         {"train.visible.iterations=200", "train.thermal.iterations=200", "train.visible.eval_count=0",
+          "train.thermal.eval_count=0", "train.visible.cloud_width_px=32",
+          "train.thermal.cloud_width_px=32",
+          "train.visible.cloud_tolerance=0.2", "train.thermal.cloud_tolerance=0.2", "render.views=2", "render.width_px=64"}) {
+      words.insert(words.end(), {"--set", set});
+    }
+    words.insert(words.end(), more.begin(), more.end());
+    return orbitfuse_program(words, options);
+  }
+  static std::map<std::string, std::string> states(const Outcome& outcome) {
+    std::map<std::string, std::string> result;
+    const auto outcome_result = outcome.result();
+    for (const auto& stage : outcome_result.at("stages"))
+      result[stage.at("stage")] = stage.at("state");
+    return result;
+  }
+
+  TempFolder temp;
+  fs::path session = temp.path / "session", out = temp.path / "out";
+};
+
+TEST_F(Run, BothModalitiesThenNothingThenWhatChanged) {
+  write_fixture_session(session);
+  const Outcome first = run();
+  ASSERT_EQ(first.code, 0) << first.err;
+  for (const char* file :
+       {"poses_visible/transforms.json", "poses_thermal/temperature_bounds.json",
+        "train_visible/cloud.ply", "register/registration.json", "render/visible/000.png",
+        "render/thermal/001.tiff", "render/palette/000.png", "render/depth/000.tiff",
+        "render/transforms.json", "report/report.html", "run.json"})
+    EXPECT_TRUE(fs::exists(out / file)) << file;
+  const auto thermal = read_thermal_k(out / "render/thermal/000.tiff");
+  ASSERT_TRUE(thermal);
+  EXPECT_EQ(thermal->cols, 64);
+  double low = 0, high = 0;
+  cv::minMaxLoc(*thermal, &low, &high, nullptr, nullptr, *thermal == *thermal);
+  EXPECT_GT(low, 270);  // the fixture holds 290 to 310 K
+  EXPECT_LT(high, 330);
+  EXPECT_TRUE(read_ply(out / "train_thermal/cloud.ply"));
+
+  const Outcome second = run();
+  ASSERT_EQ(second.code, 0) << second.err;
+  for (const auto& [stage, state] : states(second))
+    EXPECT_EQ(state, stage == "report" ? "ran" : "unchanged") << stage;
+
+  const auto changed = states(run({"--set", "render.views=1"}));
+  EXPECT_EQ(changed.at("train_visible"), "unchanged");
+  EXPECT_EQ(changed.at("render"), "ran");
+  EXPECT_FALSE(fs::exists(out / "render/visible/001.png"));
+}
+
+TEST_F(Run, VisibleOnlySaysSoAndSucceeds) {
+  write_fixture_session(session, {.thermal = 0});
+  const Outcome outcome = run();
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(states(outcome).at("poses_thermal"), "absent");
+  EXPECT_THAT(outcome.err, HasSubstr("no thermal frames"));
+  const auto page = read_file(out / "report/report.html");
+  ASSERT_TRUE(page);
+  EXPECT_THAT(*page, HasSubstr("no thermal frames"));
+}
+
+TEST_F(Run, ThermalOnlyToo) {
+  write_fixture_session(session, {.visible = 0});
+  const Outcome outcome = run();
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_TRUE(fs::exists(out / "render/thermal/000.tiff"));
+  EXPECT_FALSE(fs::exists(out / "render/visible"));
+}
+
+TEST_F(Run, DryRunWritesNothing) {
+  write_fixture_session(session);
+  const Outcome outcome = run({"--dry-run"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_FALSE(fs::exists(out));
+  EXPECT_EQ(states(outcome).at("poses_visible"), "planned");
+}
+
+TEST_F(Run, GivenCamerasAreRenderedAsGiven) {
+  write_fixture_session(session);
+  ASSERT_EQ(run({}, {}, "poses").code, 0);
+  auto cameras = read_transforms_json(out / "poses_visible/transforms.json");
+  ASSERT_TRUE(cameras);
+  cameras->frames.resize(1);
+  cameras->frames[0].camera = cameras->frames[0].camera.scaled_to(40, 30);
+  ASSERT_TRUE(write_transforms_json(temp.path / "cameras.json", *cameras));
+  const Outcome outcome = run({"--cameras", (temp.path / "cameras.json").string()}, {}, "render");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto image = read_visible(out / "render/visible/000.png");
+  ASSERT_TRUE(image);
+  EXPECT_EQ(image->cols, 40);
+  EXPECT_FALSE(fs::exists(out / "render/visible/001.png"));
+  EXPECT_EQ(run({"--cameras", "/none.json"}, {}, "render").code, 3);
+}
+
+TEST_F(Run, JsonStreamIsOneObjectALineAndEndsWithTheResult) {
+  write_fixture_session(session);
+  const Outcome outcome = run({}, {}, "poses");
+  const auto events = outcome.events();  // throws on a line that isn't JSON
+  ASSERT_FALSE(events.empty());
+  EXPECT_EQ(events.back().at("event"), "result");
+  EXPECT_EQ(events.back().at("ok"), true);
+  int stages = 0;
+  for (const auto& event : events) stages += event.at("event") == "stage";
+  EXPECT_GE(stages, 2);
+}
+
+TEST_F(Run, InterruptedTrainingResumesToTheSameField) {
+  write_fixture_session(session);
+  const std::vector<std::string> longer = {"--set", "train.visible.iterations=2000", "--set",
+                                           "train.visible.eval_count=4"};
+  const Outcome stopped = run(longer, {.interrupt_after = "\"stage\":\"train.visible\""}, "train");
+  if (stopped.code == 0) GTEST_SKIP() << "the training was over before the signal arrived";
+  EXPECT_EQ(stopped.code, 130) << stopped.err;
+  EXPECT_FALSE(fs::exists(out / "train_visible"));
+  EXPECT_TRUE(fs::exists(out / "poses_visible/stage.json"));
+  auto resume = longer;
+  resume.push_back("--resume");
+  ASSERT_EQ(run(resume, {}, "train").code, 0);
+  const auto resumed = file_hash(out / "train_visible/field.bin");
+  ASSERT_TRUE(resumed);
+  fs::remove_all(out);
+  ASSERT_EQ(run(longer, {}, "train").code, 0);
+  const auto unbroken = file_hash(out / "train_visible/field.bin");
+  ASSERT_TRUE(unbroken);
+  EXPECT_EQ(*resumed, *unbroken);
+}
+
+}  // namespace
+}  // namespace orbitfuse

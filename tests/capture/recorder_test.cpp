@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "capture/recorder.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+
+#include "core/image_io.hpp"
+#include "tests/capture/scripted_source.hpp"
+#include "tests/core/temp_folder.hpp"
+
+namespace orbitfuse {
+namespace {
+
+using test::frame_delivery;
+using test::rejected_delivery;
+using test::ScriptedSource;
+using test::TempFolder;
+using test::thermal_pixels;
+
+void expect_exact_accounts(const Session& session) {
+  for (const StreamRecord& s : session.streams) {
+    EXPECT_EQ(s.received + s.lost, s.last_sequence - s.first_sequence + 1) << s.device;
+    std::uint64_t gaps = 0, frames = 0;
+    for (const GapRecord& g : session.gaps) gaps += g.device == s.device ? g.count : 0;
+    for (const FrameRecord& f : session.frames) frames += f.device == s.device;
+    EXPECT_EQ(gaps, s.lost) << s.device;
+    EXPECT_EQ(frames, s.received) << s.device;
+  }
+}
+
+struct Recording {
+  TempFolder folder;
+  std::unique_ptr<SessionWriter> writer = *SessionWriter::create(folder / "s");
+  Session open() const { return *open_session(folder / "s"); }
+};
+
+TEST(Recorder, TwoCamerasEveryIdAccountedFor) {
+  Recording r;
+  std::deque<Delivery> script;
+  for (std::uint64_t id : {10, 11, 12, 15, 16}) script.push_back(frame_delivery(id, thermal_pixels()));
+  script.push_back(rejected_delivery(17, "short"));
+  script.push_back(rejected_delivery(18, "short"));
+  script.push_back(frame_delivery(20, thermal_pixels()));
+  script.push_back(frame_delivery(20, thermal_pixels()));              // a duplicate has no place
+  script.push_back(frame_delivery(21, cv::Mat(3, 3, CV_8UC3)));        // not a thermal image
+  ScriptedSource thermal("thermal0", Modality::thermal, script);
+  std::deque<Delivery> photos;
+  for (std::uint64_t id = 0; id < 8; ++id) photos.push_back(frame_delivery(id, cv::Mat(20, 20, CV_8UC3, cv::Scalar(4, 5, 6))));
+  ScriptedSource visible("visible0", Modality::visible, photos);
+
+  RecorderOptions options;
+  options.backpressure = Backpressure::wait;
+  Recorder recorder(*r.writer, options);
+  std::atomic<int> announced{0};
+  recorder.on_frame = [&](const FrameRecord&) { ++announced; };
+  const Status status = recorder.run({&thermal, &visible});
+  ASSERT_TRUE(status) << status.error().message();
+  ASSERT_TRUE(r.writer->close());
+  const Session session = r.open();
+  EXPECT_TRUE(session.complete);
+  expect_exact_accounts(session);
+  ASSERT_EQ(session.streams.size(), 2u);
+  for (const StreamStatus& s : recorder.status()) {
+    EXPECT_TRUE(s.ended);
+    if (s.device == "thermal0") {
+      EXPECT_EQ(s.received, 6u);
+      EXPECT_EQ(s.missing, 3u);   // 13, 14, 19
+      EXPECT_EQ(s.rejected, 3u);  // 17, 18, 21
+      EXPECT_EQ(s.dropped, 0u);
+    } else {
+      EXPECT_EQ(s.received, 8u);
+      EXPECT_EQ(s.lost, 0u);
+    }
+  }
+  EXPECT_EQ(announced, 14);
+  ASSERT_EQ(session.events.size(), 1u);
+  EXPECT_EQ(session.events[0].kind, "out-of-order");
+  EXPECT_EQ(thermal.stops, 1);
+  for (const FrameRecord& f : session.frames) {
+    ASSERT_TRUE(f.quality);
+    EXPECT_EQ(f.quality->sharpness > 0, f.modality == Modality::thermal);  // the photos are blank
+  }
+}
+
+TEST(Recorder, SlowDiskDropsByPolicyAndCounts) {
+  Recording r;
+  std::deque<Delivery> script;
+  for (std::uint64_t id = 1; id <= 200; ++id) script.push_back(frame_delivery(id, thermal_pixels(320, 240)));
+  ScriptedSource source("thermal0", Modality::thermal, script);
+  RecorderOptions options;
+  options.queue_frames = 2;
+  Recorder recorder(*r.writer, options);
+  recorder.on_frame = [](const FrameRecord&) { std::this_thread::sleep_for(std::chrono::milliseconds(5)); };
+  ASSERT_TRUE(recorder.run({&source}));
+  const Session session = r.open();
+  expect_exact_accounts(session);
+  const StreamStatus s = recorder.status()[0];
+  EXPECT_GT(s.dropped, 0u);
+  EXPECT_EQ(s.received + s.dropped, 200u);
+  EXPECT_FALSE(session.complete);  // the caller has not closed it
+}
+
+TEST(Recorder, WaitingLosesNothing) {
+  Recording r;
+  std::deque<Delivery> script;
+  for (std::uint64_t id = 1; id <= 40; ++id) script.push_back(frame_delivery(id, thermal_pixels()));
+  ScriptedSource source("thermal0", Modality::thermal, script);
+  RecorderOptions options;
+  options.queue_frames = 1;
+  options.backpressure = Backpressure::wait;
+  Recorder recorder(*r.writer, options);
+  ASSERT_TRUE(recorder.run({&source}));
+  EXPECT_EQ(recorder.status()[0].received, 40u);
+}
+
+TEST(Recorder, OneCameraFailsTheOtherGoesOn) {
+  Recording r;
+  ScriptedSource broken("thermal0", Modality::thermal, {frame_delivery(3, thermal_pixels())});
+  broken.fail_at_end = true;
+  std::deque<Delivery> photos;
+  for (std::uint64_t id = 0; id < 20; ++id) photos.push_back(frame_delivery(id, cv::Mat(20, 20, CV_8UC3, cv::Scalar(1, 2, 3))));
+  ScriptedSource visible("visible0", Modality::visible, photos);
+  visible.pause = std::chrono::milliseconds(2);
+  RecorderOptions options;
+  options.backpressure = Backpressure::wait;
+  Recorder recorder(*r.writer, options);
+  const Status status = recorder.run({&broken, &visible});
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().kind, ErrorKind::device);
+  const Session session = r.open();
+  expect_exact_accounts(session);
+  EXPECT_EQ(session.frames.size(), 21u);
+  ASSERT_EQ(session.events.size(), 1u);
+  EXPECT_EQ(session.events[0].kind, "stream-error");
+}
+
+TEST(Recorder, CameraThatDoesNotStart) {
+  Recording r;
+  ScriptedSource source("thermal0", Modality::thermal, {});
+  source.fail_start = true;
+  Recorder recorder(*r.writer, {});
+  EXPECT_FALSE(recorder.run({&source}));
+  EXPECT_EQ(source.stops, 1);
+  EXPECT_TRUE(r.open().streams.empty());
+}
+
+TEST(Recorder, CancelKeepsWhatWasQueued) {
+  Recording r;
+  std::deque<Delivery> script;
+  for (std::uint64_t id = 1; id <= 1000; ++id) script.push_back(frame_delivery(id, thermal_pixels()));
+  ScriptedSource source("thermal0", Modality::thermal, script);
+  source.pause = std::chrono::milliseconds(1);
+  std::atomic<bool> cancel{false};
+  Progress progress;
+  progress.cancel = &cancel;
+  Recorder recorder(*r.writer, {});
+  recorder.on_frame = [&](const FrameRecord& f) { cancel = f.sequence >= 5; };
+  const Status status = recorder.run({&source}, progress);
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().kind, ErrorKind::cancelled);
+  const Session session = r.open();
+  expect_exact_accounts(session);
+  EXPECT_GE(session.frames.size(), 5u);
+  EXPECT_LT(session.frames.size(), 1000u);
+}
+
+TEST(Recorder, TooLittleDiskIsToldBeforeTheFirstFrame) {
+  Recording r;
+  ScriptedSource source("thermal0", Modality::thermal, {});
+  RecorderOptions options;
+  options.min_free_bytes = ~0ull >> 1;
+  Recorder recorder(*r.writer, options);
+  const Status status = recorder.run({&source});
+  ASSERT_FALSE(status);
+  EXPECT_NE(status.error().message().find("free"), std::string::npos);
+}
+
+TEST(Recorder, OptionsNameTheField) {
+  RecorderOptions options;
+  options.queue_frames = 0;
+  EXPECT_NE(options.validate().error().where.find("queue_frames"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace orbitfuse

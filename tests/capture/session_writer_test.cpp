@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "capture/session_writer.hpp"
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "core/file_io.hpp"
+#include "core/image_codec.hpp"
+#include "core/image_io.hpp"
+#include "tests/capture/scripted_source.hpp"
+#include "tests/core/temp_folder.hpp"
+
+namespace orbitfuse {
+namespace {
+
+using test::TempFolder;
+using test::thermal_pixels;
+
+DeviceInfo thermal_device() { return {"thermal0", Modality::thermal, "test", "M", "1", {}}; }
+DeviceInfo visible_device() { return {"visible0", Modality::visible, "test", "M", "2", {}}; }
+
+Frame thermal_frame(std::uint64_t id) { return test::frame_delivery(id, thermal_pixels()).frame; }
+
+TEST(SessionWriter, ThermalAndVisibleComeBackBitExact) {
+  const TempFolder folder;
+  auto writer = SessionWriter::create(folder / "s", {{"operator", "A"}});
+  ASSERT_TRUE(writer) << writer.error().message();
+  ASSERT_TRUE((*writer)->add_device(thermal_device()));
+  ASSERT_TRUE((*writer)->add_device(visible_device()));
+  Frame thermal = thermal_frame(5);
+  thermal.station = Station{1, 2, 60, 30, 5, 5};
+  const auto t = (*writer)->append("thermal0", thermal);
+  ASSERT_TRUE(t) << t.error().message();
+  EXPECT_EQ(t->file, "thermal/000000.tiff");
+  Frame visible;
+  visible.id = 9;
+  visible.encoded = *encode_jpeg(cv::Mat(40, 60, CV_8UC3, cv::Scalar(1, 2, 3)), 90);
+  visible.extension = ".jpg";
+  const auto v = (*writer)->append("visible0", visible);
+  ASSERT_TRUE(v) << v.error().message();
+  visible.encoded.clear();
+  visible.pixels = cv::Mat(40, 60, CV_8UC3, cv::Scalar(9, 8, 7));
+  visible.tracking = true;
+  ASSERT_TRUE((*writer)->append("visible0", visible));
+  ASSERT_TRUE((*writer)->close());
+
+  const auto session = open_session(folder / "s");
+  ASSERT_TRUE(session) << session.error().message();
+  EXPECT_TRUE(session->complete);
+  EXPECT_TRUE(session->warnings.empty());
+  ASSERT_EQ(session->frames.size(), 3u);
+  EXPECT_EQ(session->frames[0].station->index, 2);
+  EXPECT_EQ(session->frames[0].sequence, 5u);
+  EXPECT_EQ(session->frames[1].width, 60);
+  EXPECT_EQ(session->frames[2].file, "visible/track_000000.png");
+  EXPECT_EQ(cv::norm(*read_image(folder / "s/thermal/000000.tiff"), thermal_pixels(), cv::NORM_INF), 0);
+  EXPECT_NEAR(read_thermal_k(folder / "s/thermal/000000.tiff")->at<float>(0, 0), 290.0, 1e-3);
+  EXPECT_EQ(content_hash(*read_file(folder / "s/visible/000000.jpg")), session->frames[1].content_hash);
+  EXPECT_EQ(cv::norm(*read_visible(folder / "s/visible/track_000000.png"), visible.pixels, cv::NORM_INF), 0);
+}
+
+TEST(SessionWriter, NeverIntoAFolderWithContent) {
+  const TempFolder folder;
+  test::put(folder / "s/precious.txt", "x");
+  const auto writer = SessionWriter::create(folder / "s");
+  ASSERT_FALSE(writer);
+  EXPECT_EQ(writer.error().kind, ErrorKind::input);
+  EXPECT_TRUE(std::filesystem::exists(folder / "s/precious.txt"));
+}
+
+TEST(SessionWriter, WrongFramesAreInputErrors) {
+  const TempFolder folder;
+  auto writer = *SessionWriter::create(folder / "s");
+  ASSERT_TRUE(writer->add_device(thermal_device()));
+  ASSERT_TRUE(writer->add_device(visible_device()));
+  Frame frame;
+  EXPECT_EQ(writer->append("thermal0", frame).error().kind, ErrorKind::input);
+  frame.pixels = cv::Mat(4, 4, CV_8UC1, cv::Scalar(1));
+  EXPECT_EQ(writer->append("thermal0", frame).error().kind, ErrorKind::input);
+  frame.pixels = thermal_pixels();
+  EXPECT_EQ(writer->append("visible0", frame).error().kind, ErrorKind::input);
+  EXPECT_EQ(writer->append("unknown", frame).error().kind, ErrorKind::input);
+  frame.encoded = "text, not a picture";
+  frame.extension = ".jpg";
+  EXPECT_EQ(writer->append("visible0", frame).error().kind, ErrorKind::input);
+  frame.thermal_is_gray = true;
+  frame.encoded.clear();
+  frame.pixels = cv::Mat(4, 4, CV_8UC1, cv::Scalar(1));
+  EXPECT_TRUE(writer->append("thermal0", frame));
+  EXPECT_EQ(open_session(folder / "s")->frames.size(), 1u);
+}
+
+TEST(SessionWriter, TwoWritersCannotShareASession) {
+  const TempFolder folder;
+  auto first = SessionWriter::create(folder / "s");
+  ASSERT_TRUE(first);
+  const auto second = SessionWriter::resume(folder / "s");
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().kind, ErrorKind::device);
+}
+
+TEST(SessionWriter, ResumeAfterACrashContinuesAndOverwritesNothing) {
+  const TempFolder folder;
+  {
+    auto writer = *SessionWriter::create(folder / "s");
+    ASSERT_TRUE(writer->add_device(thermal_device()));
+    ASSERT_TRUE(writer->append("thermal0", thermal_frame(0)));
+  }
+  // The crash: an image without its line, and half a line.
+  test::put(folder / "s/thermal/000001.tiff", "orphan");
+  test::put(folder / "s/manifest.jsonl", test::get(folder / "s/manifest.jsonl") + "{\"type\":\"fra");
+  {
+    auto writer = SessionWriter::resume(folder / "s");
+    ASSERT_TRUE(writer) << writer.error().message();
+    ASSERT_TRUE((*writer)->add_device(thermal_device()));
+    DeviceInfo other = thermal_device();
+    other.serial = "another";
+    EXPECT_FALSE((*writer)->add_device(other));
+    const auto record = (*writer)->append("thermal0", thermal_frame(7));
+    ASSERT_TRUE(record);
+    EXPECT_EQ(record->file, "thermal/000002.tiff");
+    ASSERT_TRUE((*writer)->close());
+  }
+  EXPECT_EQ(test::get(folder / "s/thermal/000001.tiff"), "orphan");
+  const auto session = open_session(folder / "s");
+  ASSERT_TRUE(session) << session.error().message();
+  EXPECT_TRUE(session->complete);
+  EXPECT_EQ(session->frames.size(), 2u);
+  EXPECT_EQ(session->devices.size(), 1u);
+  ASSERT_EQ(session->events.size(), 1u);
+  EXPECT_EQ(session->events[0].kind, "resumed");
+}
+
+TEST(SessionWriter, FullDiskKeepsEveryAcknowledgedFrame) {
+  const TempFolder folder;
+  auto writer = *SessionWriter::create(folder / "s");
+  ASSERT_TRUE(writer->add_device(thermal_device()));
+  ASSERT_TRUE(writer->append("thermal0", thermal_frame(0)));
+  signal(SIGXFSZ, SIG_IGN);
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  // First too small for an image, then so small that the manifest line is cut.
+  const rlim_t manifest_size = std::filesystem::file_size(folder / "s/manifest.jsonl");
+  for (const rlim_t bytes : {rlim_t{200}, manifest_size + 40}) {
+    const rlimit limit{bytes, before.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+    const Status gap = writer->append(GapRecord{"thermal0", 1, 1, std::string(80, 'x')});
+    const auto record = writer->append("thermal0", thermal_frame(1));
+    setrlimit(RLIMIT_FSIZE, &before);
+    ASSERT_FALSE(record);
+    EXPECT_EQ(record.error().kind, ErrorKind::device);
+    ASSERT_FALSE(gap);
+    const auto session = open_session(folder / "s");
+    ASSERT_TRUE(session) << session.error().message();
+    EXPECT_EQ(session->frames.size(), 1u);
+  }
+  ASSERT_TRUE(writer->append("thermal0", thermal_frame(2)));
+  ASSERT_TRUE(writer->close());
+  EXPECT_EQ(open_session(folder / "s")->frames.size(), 2u);
+}
+
+}  // namespace
+}  // namespace orbitfuse
