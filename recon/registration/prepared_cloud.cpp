@@ -6,20 +6,16 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <nanoflann.hpp>
-#include <unordered_map>
+#include <queue>
+
+#include "recon/registration/kd_tree.hpp"
+#include "recon/registration/outlier_filter.hpp"
+#include "recon/registration/thinning.hpp"
 
 namespace orbitfuse::registration {
 namespace {
 
-struct Adaptor {
-  const Points& points;
-  std::size_t kdtree_get_point_count() const { return points.size(); }
-  double kdtree_get_pt(std::size_t i, std::size_t d) const { return points[i][static_cast<Eigen::Index>(d)]; }
-  template <class Box>
-  bool kdtree_get_bbox(Box&) const { return false; }
-};
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Adaptor>, Adaptor, 3>;
+constexpr std::size_t kFewest = 20;
 
 double percentile(std::vector<double> values, double share) {
   const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
@@ -27,200 +23,160 @@ double percentile(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(at)];
 }
 
-Eigen::Vector3d median_of(const Points& points) {
-  Eigen::Vector3d median;
-  std::vector<double> axis(points.size());
-  for (int d = 0; d < 3; ++d) {
-    std::transform(points.begin(), points.end(), axis.begin(), [d](const auto& p) { return p[d]; });
-    median[d] = percentile(axis, 0.5);
-  }
-  return median;
-}
-
-/// Centre and size that neither density nor a few far points move: mean of the bounding values at
-/// 5 and 95 %, and the root mean square radius of the inner 90 %.
+/// Coordinate medians as the centre, 90 % of the points within radius 1: few far points move
+/// neither.
 Similarity3d unit_frame(const Points& points) {
-  const Eigen::Vector3d center = median_of(points);
-  std::vector<double> radii(points.size());
-  std::transform(points.begin(), points.end(), radii.begin(), [&](const auto& p) { return (p - center).norm(); });
-  const double radius = percentile(radii, 0.9);
+  Eigen::Vector3d center;
+  std::vector<double> values(points.size());
+  for (int d = 0; d < 3; ++d) {
+    std::transform(points.begin(), points.end(), values.begin(),
+                   [d](const auto& p) { return p[d]; });
+    center[d] = percentile(values, 0.5);
+  }
+  std::transform(points.begin(), points.end(), values.begin(),
+                 [&](const auto& p) { return (p - center).norm(); });
+  double radius = percentile(values, 0.9);
+  if (!(radius > 0)) radius = *std::max_element(values.begin(), values.end());
   Similarity3d unit;
   unit.scale = radius > 0 ? 1.0 / radius : 1.0;
   unit.translation = -unit.scale * center;
   return unit;
 }
 
-Points thinned(const Points& points, double voxel) {
-  struct Cell {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    double count = 0;
-    std::size_t order = 0;
-  };
-  std::unordered_map<std::uint64_t, Cell> cells;
-  cells.reserve(points.size());
-  for (const auto& p : points) {
-    const Eigen::Array3d c = (p.array() / voxel).floor() + 1048576.0;
-    const Eigen::Array3d k = c.min(2097151.0).max(0.0);
-    const auto key = static_cast<std::uint64_t>(k.x()) << 42 | static_cast<std::uint64_t>(k.y()) << 21 | static_cast<std::uint64_t>(k.z());
-    Cell& cell = cells[key];
-    if (cell.count == 0) cell.order = cells.size();
-    cell.sum += p;
-    cell.count += 1;
-  }
-  // In order of first appearance: hash order must not decide anything.
-  std::vector<const Cell*> sorted;
-  for (const auto& entry : cells) sorted.push_back(&entry.second);
-  std::sort(sorted.begin(), sorted.end(), [](const Cell* a, const Cell* b) { return a->order < b->order; });
-  Points out;
-  for (const Cell* cell : sorted) out.push_back(cell->sum / cell->count);
-  return out;
-}
-
-/// The finest voxel that leaves at most the wanted number of points.
-Points thinned_to(const Points& points, int wanted) {
-  if (static_cast<int>(points.size()) <= wanted) return thinned(points, 1e-6);
-  double low = 1e-4, high = 1.0;
-  Points best = thinned(points, high);
-  for (int i = 0; i < 12; ++i) {
-    const double voxel = std::sqrt(low * high);
-    Points candidate = thinned(points, voxel);
-    if (static_cast<int>(candidate.size()) > wanted) {
-      low = voxel;
-    } else {
-      high = voxel;
-      best = std::move(candidate);
-      if (static_cast<int>(best.size()) > 0.93 * wanted) break;
-    }
-  }
-  return best;
-}
-
-/// Splits the log distance to the 6th neighbour into two populations (Otsu). Only when they are far
-/// apart and the near one is a surface worth keeping are the far ones outliers.
-Points without_outliers(const Points& points) {
-  constexpr std::size_t k = 7;
-  if (points.size() < 200) return points;
-  const Adaptor adaptor{points};
-  Tree tree(3, adaptor, nanoflann::KDTreeSingleIndexAdaptorParams(12));
-  tree.buildIndex();
-  std::vector<double> logs(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    std::size_t index[k];
-    double d2[k];
-    tree.knnSearch(points[i].data(), k, index, d2);
-    logs[i] = 0.5 * std::log(std::max(d2[k - 1], 1e-18));
-  }
-  std::vector<double> sorted = logs;
-  std::sort(sorted.begin(), sorted.end());
-  std::vector<double> prefix(sorted.size() + 1, 0), squares(sorted.size() + 1, 0);
-  for (std::size_t i = 0; i < sorted.size(); ++i) {
-    prefix[i + 1] = prefix[i] + sorted[i];
-    squares[i + 1] = squares[i] + sorted[i] * sorted[i];
-  }
-  const auto stats = [&](std::size_t a, std::size_t b) {
-    const double n = static_cast<double>(b - a), m = (prefix[b] - prefix[a]) / n;
-    return std::pair(m, std::max(0.0, (squares[b] - squares[a]) / n - m * m));
-  };
-  const std::size_t n = sorted.size();
-  double best = INFINITY;
-  std::size_t split = n;
-  for (std::size_t i = n / 10; i < n - n / 50; ++i) {
-    const double within = static_cast<double>(i) * stats(0, i).second + static_cast<double>(n - i) * stats(i, n).second;
-    if (within < best) {
-      best = within;
-      split = i;
-    }
-  }
-  const auto [near_mean, near_var] = stats(0, split);
-  const auto [far_mean, far_var] = stats(split, n);
-  const double separation = (far_mean - near_mean) / std::sqrt(near_var + far_var + 1e-6);
-  if (!(separation > 2.2 && far_mean - near_mean > std::log(1.8))) return points;
-  const double limit = sorted[split];
-  Points kept;
-  for (std::size_t i = 0; i < n; ++i) {
-    if (logs[i] < limit) kept.push_back(points[i]);
-  }
-  return kept;
-}
-
+/// Normal and planarity from the scatter of the nearest neighbours.
 void estimate_normals(PreparedCloud& cloud) {
-  constexpr std::size_t k = 12;
-  const Adaptor adaptor{cloud.points};
-  Tree tree(3, adaptor, nanoflann::KDTreeSingleIndexAdaptorParams(12));
-  tree.buildIndex();
-  const std::size_t neighbours = std::min(k, cloud.points.size());
-  cloud.normals.resize(cloud.points.size());
-  cloud.planarity.resize(cloud.points.size());
-  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+  constexpr std::size_t k = PreparedCloud::kNeighbours + 1;  // and the point itself
+  const KdTree tree(cloud.points);
+  const std::size_t n = cloud.points.size();
+  cloud.normals.resize(n);
+  cloud.planarity.resize(n);
+  cloud.neighbours.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
     std::size_t index[k];
     double d2[k];
-    tree.knnSearch(cloud.points[i].data(), neighbours, index, d2);
+    const std::size_t found = tree.nearest(cloud.points[i], std::min(k, n), index, d2);
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-    for (std::size_t j = 0; j < neighbours; ++j) mean += cloud.points[index[j]];
-    mean /= static_cast<double>(neighbours);
+    for (std::size_t j = 0; j < found; ++j) mean += cloud.points[index[j]];
+    mean /= static_cast<double>(found);
     Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
-    for (std::size_t j = 0; j < neighbours; ++j) {
+    cloud.neighbours[i].fill(-1);
+    for (std::size_t j = 0, slot = 0; j < found; ++j) {
       const Eigen::Vector3d d = cloud.points[index[j]] - mean;
       scatter += d * d.transpose();
+      if (index[j] != i && slot < PreparedCloud::kNeighbours) {
+        cloud.neighbours[i][slot++] = static_cast<std::int32_t>(index[j]);
+      }
     }
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
     solver.computeDirect(scatter);
-    Eigen::Vector3d normal = solver.eigenvectors().col(0);
-    if (normal.dot(cloud.points[i]) < 0) normal = -normal;  // the centre is the origin
-    cloud.normals[i] = normal;
     const Eigen::Vector3d& e = solver.eigenvalues();
+    cloud.normals[i] = solver.eigenvectors().col(0);
     cloud.planarity[i] = e[1] > 0 ? std::clamp(1 - e[0] / e[1], 0.0, 1.0) : 0.0;
   }
 }
 
+/// Signs carried along the neighbour graph, flattest edges first (Hoppe et al. 1992); each
+/// connected part then points away from the cloud's centre as a whole.
+void orient_normals(PreparedCloud& cloud) {
+  struct Edge {
+    double cost;
+    int from, to;
+    bool operator<(const Edge& other) const {
+      return std::tie(cost, to, from) > std::tie(other.cost, other.to, other.from);
+    }
+  };
+  const std::size_t n = cloud.points.size();
+  std::vector<char> done(n, 0);
+  std::priority_queue<Edge> edges;
+  std::vector<std::size_t> part;
+  const auto visit = [&](std::size_t i) {
+    done[i] = 1;
+    part.push_back(i);
+    for (const std::int32_t j : cloud.neighbours[i]) {
+      if (j < 0) break;
+      const auto to = static_cast<std::size_t>(j);
+      if (!done[to]) {
+        edges.push({1 - std::abs(cloud.normals[i].dot(cloud.normals[to])), static_cast<int>(i), j});
+      }
+    }
+  };
+  for (std::size_t seed = 0; seed < n; ++seed) {
+    if (done[seed]) continue;
+    part.clear();
+    visit(seed);
+    while (!edges.empty()) {
+      const Edge edge = edges.top();
+      edges.pop();
+      const auto to = static_cast<std::size_t>(edge.to), from = static_cast<std::size_t>(edge.from);
+      if (done[to]) continue;
+      if (cloud.normals[to].dot(cloud.normals[from]) < 0) cloud.normals[to] = -cloud.normals[to];
+      visit(to);
+    }
+    double outward = 0;
+    for (const std::size_t i : part) outward += cloud.normals[i].dot(cloud.points[i]);
+    if (outward < 0) {
+      for (const std::size_t i : part) cloud.normals[i] = -cloud.normals[i];
+    }
+  }
+}
+
+/// "" when the points fill space.
+std::string flatness(const Points& points) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const auto& p : points) mean += p;
+  mean /= static_cast<double>(points.size());
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const auto& p : points) scatter += (p - mean) * (p - mean).transpose();
+  const Eigen::Vector3d extent =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues();
+  // A noisy wall of 1 % thickness is a plane still: nothing across it but noise.
+  constexpr double thin = 3e-4;
+  if (!(extent[2] > 0)) return "all points in one place";
+  if (extent[1] < thin * extent[2]) return "all points on one line";
+  if (extent[0] < thin * extent[2]) return "all points on one plane";
+  return {};
+}
+
 }  // namespace
 
-Result<PreparedCloud> prepare(const PointCloud& cloud, const RegistrationOptions& options, const std::string& name) {
+Result<PreparedCloud> prepare(const PointCloud& cloud, const RegistrationOptions& options,
+                              const std::string& name) {
   const auto unusable = [&](const std::string& found) {
-    return fail(ErrorKind::input, name, found, "registration needs a cloud that fills space: use views from more sides");
+    return fail(ErrorKind::input, name, found,
+                "registration needs a cloud that fills space: use views from more sides");
+  };
+  const auto too_few = [&](std::size_t count, const char* kind) {
+    return unusable(fmt::format("{} {} points, at least {} are needed", count, kind, kFewest));
   };
   PreparedCloud prepared;
-  Points finite;
+  Points points;
   for (const auto& p : cloud.positions) {
-    if (p.allFinite()) finite.push_back(p);
+    if (p.allFinite()) points.push_back(p);
   }
-  prepared.dropped_not_finite = cloud.size() - finite.size();
-  if (finite.size() < 20) return unusable(fmt::format("{} finite points, at least 20 are needed", finite.size()));
+  prepared.dropped_not_finite = cloud.size() - points.size();
+  if (points.size() < kFewest) return too_few(points.size(), "finite");
 
   // Coordinates near the origin first; a large offset would eat their digits.
-  const Eigen::Vector3d origin = finite[0];
-  for (auto& p : finite) p -= origin;
-  const Similarity3d rough = unit_frame(finite);
-  double spread = 0;
-  for (auto& p : finite) {
-    p = rough * p;
-    spread = std::max(spread, p.cwiseAbs().maxCoeff());
-  }
-  Points points = thinned_to(finite, 4 * options.points);
-  if (points.size() < 20) return unusable(fmt::format("{} distinct points, at least 20 are needed", points.size()));
+  Similarity3d from_origin;
+  from_origin.translation = -points[0];
+  for (auto& p : points) p += from_origin.translation;
+  const Similarity3d rough = unit_frame(points);
+  for (auto& p : points) p = rough * p;
+  points = thinned_to(points, 4 * options.points);
+  if (points.size() < kFewest) return too_few(points.size(), "distinct");
   const std::size_t before = points.size();
   if (options.filter_outliers) points = without_outliers(points);
   prepared.dropped_outliers = before - points.size();
+
   const Similarity3d fine = unit_frame(points);
   for (auto& p : points) p = fine * p;
   prepared.points = thinned_to(points, options.points);
-  if (prepared.points.size() < 20) return unusable(fmt::format("{} distinct points, at least 20 are needed", prepared.points.size()));
-
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const auto& p : prepared.points) mean += p;
-  mean /= static_cast<double>(prepared.points.size());
-  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
-  for (const auto& p : prepared.points) scatter += (p - mean) * (p - mean).transpose();
-  const Eigen::Vector3d extent = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues();
-  if (!(extent[2] > 0)) return unusable("all points in one place");
-  if (extent[1] < 1e-6 * extent[2]) return unusable("all points on one line");
-  if (extent[0] < 1e-6 * extent[2]) return unusable("all points on one plane");
-
-  Similarity3d from_origin;
-  from_origin.translation = -origin;
+  if (prepared.points.size() < kFewest) return too_few(prepared.points.size(), "distinct");
+  if (const std::string flat = flatness(prepared.points); !flat.empty()) return unusable(flat);
   prepared.unit_from_cloud = fine * rough * from_origin;
   estimate_normals(prepared);
-  prepared.nearest.build(prepared.points, 56, 0.35);
+  orient_normals(prepared);
+  prepared.nearest_table.build(prepared.points, 56, 0.35);
   return prepared;
 }
 

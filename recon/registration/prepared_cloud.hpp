@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <string>
 
 #include "core/point_cloud.hpp"
@@ -13,14 +14,36 @@ namespace orbitfuse::registration {
 /// A cloud as the search uses it: finite points only, outliers dropped, centred and scaled to a
 /// robust radius of 1 (unit_from_cloud), evenly thinned, with normals.
 struct PreparedCloud {
+  static constexpr std::size_t kNeighbours = 12;
+
   Similarity3d unit_from_cloud;
   Points points;
-  Points normals;              ///< unit length; away from the centre
+  Points normals;                 ///< unit length, signs consistent along the surface
   std::vector<double> planarity;  ///< 0..1: how far the normal can be trusted
-  NearestGrid nearest;
+  std::vector<std::array<std::int32_t, kNeighbours>> neighbours;  ///< -1 where there are fewer
+  NearestGrid nearest_table;
   std::size_t dropped_not_finite = 0, dropped_outliers = 0;
+
+  /// Index of the (all but always) nearest point; -1 far outside the cloud's box.
+  int nearest(const Eigen::Vector3d& x) const {
+    int best = nearest_table.lookup(x);
+    if (best < 0) return best;
+    double best_d2 = (points[static_cast<std::size_t>(best)] - x).squaredNorm();
+    // The table is exact to a cell; one greedy step to a neighbour makes up for it.
+    for (const std::int32_t j : neighbours[static_cast<std::size_t>(best)]) {
+      if (j < 0) break;
+      const double d2 = (points[static_cast<std::size_t>(j)] - x).squaredNorm();
+      if (d2 < best_d2) {
+        best_d2 = d2;
+        best = j;
+      }
+    }
+    return best;
+  }
 };
 
-Result<PreparedCloud> prepare(const PointCloud& cloud, const RegistrationOptions& options, const std::string& name);
+/// Input errors: fewer than 20 finite or distinct points; all in one place, on one line or plane.
+Result<PreparedCloud> prepare(const PointCloud& cloud, const RegistrationOptions& options,
+                              const std::string& name);
 
 }  // namespace orbitfuse::registration

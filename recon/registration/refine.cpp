@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/registration/refine.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace orbitfuse::registration {
+namespace {
+
+struct Equations {
+  Matrix7 hessian = Matrix7::Zero();
+  Vector7 gradient = Vector7::Zero();
+  double weight = 0;
+  std::vector<double> distances;  ///< |plane distance| of the pairs
+};
+
+struct Pair {
+  Eigen::Vector3d lever;   ///< the moved point, from the centre
+  Eigen::Vector3d normal;  ///< of the surface it is measured against
+  double residual;
+  double trust;
+};
+
+/// Where the source's centre, the origin of its unit frame, lies in the target.
+Eigen::Vector3d placed_center(const Similarity3d& target_from_source) {
+  return target_from_source.translation;
+}
+
+class Pairs {
+ public:
+  Pairs(const PreparedCloud& source, const PreparedCloud& target, const Similarity3d& placement,
+        double bound)
+      : source_(source), target_(target), placement_(placement), inverse_(placement.inverse()),
+        rotation_(placement.rotation.toRotationMatrix()), bound2_(bound * bound),
+        center_(placed_center(placement)) {}
+
+  bool forward(std::size_t i, Pair& pair) const {
+    const Eigen::Vector3d y = placement_.scale * (rotation_ * source_.points[i]) + placement_.translation;
+    const int found = target_.nearest(y);
+    if (found < 0) return false;
+    const auto j = static_cast<std::size_t>(found);
+    const Eigen::Vector3d d = y - target_.points[j];
+    if (d.squaredNorm() > bound2_) return false;
+    pair.normal = target_.normals[j];
+    pair.lever = y - center_;
+    return finish(pair, d, rotation_ * source_.normals[i],
+                  target_.planarity[j] * source_.planarity[i]);
+  }
+
+  /// The target's point z against the source's plane, which turns with the update: to first order
+  /// d r/d omega = (z - c) x n. The scale's derivative is taken at z as well, so that noise biases
+  /// the two directions oppositely and cancels.
+  bool backward(std::size_t j, Pair& pair) const {
+    const Eigen::Vector3d& z = target_.points[j];
+    const int found = source_.nearest(inverse_.scale * (rotation_.transpose() * z) + inverse_.translation);
+    if (found < 0) return false;
+    const auto i = static_cast<std::size_t>(found);
+    const Eigen::Vector3d y = placement_.scale * (rotation_ * source_.points[i]) + placement_.translation;
+    const Eigen::Vector3d d = y - z;
+    if (d.squaredNorm() > bound2_) return false;
+    pair.normal = rotation_ * source_.normals[i];
+    pair.lever = z - center_;
+    return finish(pair, d, target_.normals[j], target_.planarity[j] * source_.planarity[i]);
+  }
+
+ private:
+  static bool finish(Pair& pair, const Eigen::Vector3d& d, const Eigen::Vector3d& other, double planarity) {
+    const double cosine = pair.normal.dot(other);
+    if (cosine * cosine < 0.25) return false;
+    pair.residual = pair.normal.dot(d);
+    pair.trust = cosine * cosine * planarity;
+    return true;
+  }
+  const PreparedCloud& source_;
+  const PreparedCloud& target_;
+  const Similarity3d& placement_;
+  const Similarity3d inverse_;
+  const Eigen::Matrix3d rotation_;
+  const double bound2_;
+  const Eigen::Vector3d center_;
+};
+
+/// Tukey's biweight: 0 beyond the bound.
+double tukey(double residual, double bound) {
+  const double u = residual / bound, v = 1 - u * u;
+  return v > 0 ? v * v : 0;
+}
+
+void add(Equations& equations, const Pair& pair, double bound) {
+  const double w = pair.trust * tukey(pair.residual, bound);
+  equations.distances.push_back(std::abs(pair.residual));
+  if (w <= 0) return;
+  Vector7 j;
+  j << pair.lever.cross(pair.normal), pair.lever.dot(pair.normal), pair.normal;
+  equations.hessian.selfadjointView<Eigen::Lower>().rankUpdate(j, w);
+  equations.gradient += w * pair.residual * j;
+  equations.weight += w;
+}
+
+Equations equations_at(const PreparedCloud& source, const PreparedCloud& target,
+                       const std::vector<int>& source_subset, const std::vector<int>& target_subset,
+                       const Similarity3d& placement, double pair_bound, double plane_bound) {
+  Equations equations;
+  equations.distances.reserve(source_subset.size() + target_subset.size());
+  const Pairs pairs(source, target, placement, pair_bound);
+  Pair pair;
+  for (const int i : source_subset) {
+    if (pairs.forward(static_cast<std::size_t>(i), pair)) add(equations, pair, plane_bound);
+  }
+  for (const int j : target_subset) {
+    if (pairs.backward(static_cast<std::size_t>(j), pair)) add(equations, pair, plane_bound);
+  }
+  equations.hessian = equations.hessian.selfadjointView<Eigen::Lower>();
+  return equations;
+}
+
+double robust_sigma(std::vector<double>& distances) {
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return 1.4826 * *middle;
+}
+
+}  // namespace
+
+Similarity3d updated(const Similarity3d& target_from_source, const Eigen::Vector3d& center,
+                     const Vector7& update) {
+  const Eigen::Vector3d omega = update.head<3>();
+  const double angle = omega.norm();
+  const Eigen::Quaterniond turn = angle > 0 ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, omega / angle))
+                                            : Eigen::Quaterniond::Identity();
+  const double grow = std::exp(update[3]);
+  Similarity3d result;
+  result.scale = grow * target_from_source.scale;
+  result.rotation = (turn * target_from_source.rotation).normalized();
+  result.translation =
+      center + grow * (turn * (target_from_source.translation - center)) + update.tail<3>();
+  return result;
+}
+
+Refined refine(const PreparedCloud& source, const PreparedCloud& target,
+               const std::vector<int>& source_subset, const std::vector<int>& target_subset,
+               const Similarity3d& start, const RefineOptions& options) {
+  Refined refined{start, Matrix7::Zero(), 0, 0};
+  const double shrink = options.iterations > 1
+                            ? std::pow(options.end_bound / options.start_bound, 1.0 / (options.iterations - 1))
+                            : 1.0;
+  double bound = options.start_bound, sigma = bound;
+  for (int iteration = 0; iteration < options.iterations + options.polish; ++iteration) {
+    // 4.685 sigma: Tukey's 95 % efficiency; a floor, or exact data would leave no pair.
+    const double plane_bound = options.adapt_bound ? std::clamp(4.685 * sigma, 0.004, bound) : bound;
+    Equations equations = equations_at(source, target, source_subset, target_subset,
+                                       refined.target_from_source, bound, plane_bound);
+    if (equations.distances.size() < 10 || !(equations.weight > 0)) break;
+    sigma = robust_sigma(equations.distances);
+    refined.hessian = equations.hessian / equations.weight;
+    refined.residual_sigma = sigma;
+    refined.pairs = static_cast<int>(equations.distances.size());
+    Matrix7 damped = equations.hessian;
+    damped.diagonal().array() += 1e-4 * equations.weight;  // open directions stay where they are
+    Vector7 update = -damped.ldlt().solve(equations.gradient);
+    if (!update.allFinite()) break;
+    const double longest = std::max({update.head<3>().norm(), std::abs(update[3]), update.tail<3>().norm()});
+    if (longest > 0.3) update *= 0.3 / longest;
+    refined.target_from_source =
+        updated(refined.target_from_source, placed_center(refined.target_from_source), update);
+    if (iteration < options.iterations) bound = std::max(options.end_bound, bound * shrink);
+    if (iteration >= options.iterations && longest < 1e-6) break;
+  }
+  return refined;
+}
+
+}  // namespace orbitfuse::registration
