@@ -99,7 +99,7 @@ Result<StageOutput> pose_thermal(const StageContext& context, const SessionInput
     ORBITFUSE_ASSIGN(field, nerf::Field::load(context.of("train_visible") / field_file));
     // Edges need fewer samples a ray than pictures.
     nerf::RenderOptions coarse;
-    coarse.sample_factor = 0.35;
+    coarse.sample_factor = 0.5;
     scene.renderer = [&, coarse](const Camera& camera, const Rigid3d& cam_from_world) -> Result<SceneView> {
       ORBITFUSE_ASSIGN(const nerf::RenderedView seen, nerf::render(field, camera, cam_from_world, coarse, context.progress));
       SceneView view{{}, seen.depth};

@@ -47,8 +47,6 @@ struct FocalPrior {
 
 struct ViewMatches {
   std::vector<PatchMatch> matches;
-  double agreement = 0;
-  Status status;
 };
 
 using Correction = std::array<double, 6>;
@@ -130,16 +128,21 @@ Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer, const 
     const int width = std::min(round.width_px, full.width);
     Camera camera = full.scaled_to(width, std::max(1, full.height * width / full.width));
     const Camera seen_by = camera.without_distortion();
+    std::vector<SceneView> renders;
     for (std::size_t i = 0; i < views.size(); ++i) {
       ORBITFUSE_TRY(progress.check("poses.thermal"));
-      ORBITFUSE_ASSIGN(const SceneView render, renderer(seen_by, result.views[i].view.cam_from_world));
-      const cv::Mat edges = rendered_edges(render);
-      const cv::Mat field = orientation_field(reduced(images[i], camera), 1.0);
-      matched[i].matches = match_patches(render, edges, seen_by, field,
-                                         {round.search_px, round.patch_search_px, round.patch_radius_px,
-                                          options.patch_spacing_px, 0.35});
-      result.views[i].agreement = edge_agreement(edges, field);
+      ORBITFUSE_ASSIGN(SceneView render, renderer(seen_by, result.views[i].view.cam_from_world));
+      renders.push_back(std::move(render));
     }
+    const PatchMatchOptions matching{round.search_px, round.patch_search_px, round.patch_radius_px,
+                                     options.patch_spacing_px};
+    parallel_for(static_cast<int>(views.size()), [&](int index) {
+      const auto i = static_cast<std::size_t>(index);
+      const cv::Mat edges = rendered_edges(renders[i]);
+      const cv::Mat field = orientation_field(reduced(images[i], camera), 1.0);
+      matched[i].matches = match_patches(renders[i], edges, seen_by, field, matching);
+      result.views[i].agreement = edge_agreement(edges, field);
+    });
     std::vector<Correction> corrections(views.size(), Correction{});
     const double log_focal = solve(matched, seen_by, std::log(prior_focal / focal), options.focal_relative_sigma, corrections);
     focal *= std::exp(log_focal);
