@@ -3,9 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <numbers>
 #include <random>
 
 #include "recon/registration/ambiguity.hpp"
@@ -56,6 +58,11 @@ struct Search {
     fine = {2 * o.max_pair_distance, 4 * o.inlier_distance};
   }
 
+  /// As strict as the clouds are clean: residuals of the best placement are noise, and so nothing
+  /// beyond three sigma is agreement. Overlap alone must not outvote a contradiction.
+  ScoreBounds fine_bounds(double sigma) const {
+    return {fine.pair, std::clamp(3 * sigma, 0.015, fine.plane), 2.0};
+  }
   Refined refine_with(const Similarity3d& start, int points, const RefineOptions& how) const {
     return refine(source, target, strided_subset(source.points.size(), points),
                   strided_subset(target.points.size(), points), start, how);
@@ -78,12 +85,45 @@ Candidates narrowed(const Search& search, Candidates candidates) {
     c.target_from_source = search.refine_with(c.target_from_source, 250, brief_refinement).target_from_source;
     c.score = search.score(c.target_from_source, 500, search.coarse);
   }
-  candidates = best_distinct(std::move(candidates), 6);
+  candidates = best_distinct(std::move(candidates), 12);
+  double sigma = INFINITY;
   for (Candidate& c : candidates) {
-    c.target_from_source = search.refine_with(c.target_from_source, 800, full_refinement).target_from_source;
-    c.score = search.score(c.target_from_source, 1 << 30, search.fine);
+    const Refined refined = search.refine_with(c.target_from_source, 800, full_refinement);
+    c.target_from_source = refined.target_from_source;
+    if (refined.pairs > 400) sigma = std::min(sigma, refined.residual_sigma);
+  }
+  for (Candidate& c : candidates) {
+    c.score = search.score(c.target_from_source, 1 << 30, search.fine_bounds(sigma));
   }
   return best_distinct(std::move(candidates), 6);
+}
+
+/// The placements that a near-symmetric object could be mistaken for: quarter and half turns about
+/// the source's principal axes.
+Candidates turned(const Search& search, const Candidate& best) {
+  const Points& points = search.source.points;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const auto& p : points) mean += p / static_cast<double>(points.size());
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const auto& p : points) scatter += (p - mean) * (p - mean).transpose();
+  const Eigen::Matrix3d axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvectors();
+  Candidates all;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double quarters : {1.0, 2.0, 3.0}) {
+      Similarity3d turn;
+      turn.rotation = Eigen::AngleAxisd(quarters * std::numbers::pi / 2, axes.col(axis));
+      turn.translation = mean - turn.rotation * mean;
+      all.push_back({best.target_from_source * turn, 0, best.origin + ", turned"});
+    }
+  }
+  return all;
+}
+
+Candidates with_turns(const Search& search, Candidates ranked) {
+  if (ranked.empty()) return ranked;
+  const Candidates turns = turned(search, ranked[0]);
+  ranked.insert(ranked.end(), turns.begin(), turns.end());
+  return narrowed(search, std::move(ranked));
 }
 
 bool decisive(const Candidates& ranked, const RegistrationOptions& options) {
@@ -104,7 +144,7 @@ Candidates feature_candidates(const Search& search) {
     all = narrowed(search, std::move(all));
     if (decisive(all, search.options)) break;
   }
-  return all;
+  return with_turns(search, std::move(all));
 }
 
 struct Found {
@@ -124,7 +164,7 @@ Result<Found> search_all(const Search& search, const Progress& progress) {
   }
   Candidates grid = grid_candidates(search.source, search.target, search.options, 12);
   grid.insert(grid.end(), found.ranked.begin(), found.ranked.end());
-  found.ranked = narrowed(search, std::move(grid));
+  found.ranked = with_turns(search, narrowed(search, std::move(grid)));
   return found;
 }
 
@@ -160,7 +200,7 @@ RegistrationReport reported(const Search& search, const Similarity3d& start) {
   RegistrationReport report;
   const Similarity3d target_from_unit = search.target.unit_from_cloud.inverse();
   report.target_from_source = target_from_unit * best.target_from_source * search.source.unit_from_cloud;
-  report.score = search.score(best.target_from_source, 1 << 30, search.fine);
+  report.score = search.score(best.target_from_source, 1 << 30, search.fine_bounds(best.residual_sigma));
   const MatchFigures matched = match_figures(search.source, search.target, best.target_from_source,
                                              2 * search.options.inlier_distance);
   const MatchFigures near = match_figures(search.source, search.target, best.target_from_source,

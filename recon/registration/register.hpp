@@ -19,7 +19,8 @@ struct RegistrationOptions {
   double max_pair_distance = 0.06;  ///< of the diameter: where coarse scoring stops counting
   double inlier_distance = 0.02;    ///< of the diameter: pairs that count as matched in the report
   double min_scale = 0.2, max_scale = 5;  ///< of target over source, after size normalisation
-  double decisive_score = 0.75;     ///< the second initialiser is skipped above this two-sided score
+  double decisive_score = 0.62;     ///< the second initialiser is skipped above this two-sided score;
+                                    ///< wrong places of near-symmetric objects stay below
   double ambiguity_ratio = 0.94;    ///< a distinct runner-up this close makes the result ambiguous
   bool filter_outliers = true;      ///< by neighbour distance, only where two populations are seen
   int restarts = 3;                 ///< refinements from disturbed starts, for the spread
@@ -37,7 +38,8 @@ struct RegistrationAlternative {
 
 struct RegistrationReport {
   Similarity3d target_from_source;
-  double score = 0;                 ///< 0..1, geometric mean of both sides' truncated agreement
+  double score = 0;                 ///< 0..1, geometric mean of both sides' truncated agreement, less
+                                    ///< contradictions (near the other's surface, but off it)
   double matching_ratio = 0;        ///< share of source points with a partner (as in the seed paper;
                                     ///< one-sided: shrinking maximises it, so never read it alone)
   double rmse = 0;                  ///< of matched pairs, target units

@@ -10,7 +10,7 @@ namespace {
 
 /// Mean agreement of `from` moved into the frame of `to`; lengths in the units of `to`.
 double one_side(const PreparedCloud& from, const PreparedCloud& to, const std::vector<int>& subset,
-                const Similarity3d& to_from, double pair, double plane) {
+                const Similarity3d& to_from, double pair, double plane, double contradiction) {
   const Eigen::Matrix3d rotation = to_from.rotation.toRotationMatrix();
   const Eigen::Matrix3d linear = to_from.scale * rotation;
   double sum = 0;
@@ -23,12 +23,13 @@ double one_side(const PreparedCloud& from, const PreparedCloud& to, const std::v
     const Eigen::Vector3d d = y - to.points[partner];
     const double reach2 = d.squaredNorm() / (pair * pair);
     if (reach2 >= 1) continue;
-    const double off = to.normals[partner].dot(d) / plane;
+    const double off = std::abs(to.normals[partner].dot(d)) / plane;
     const double agree = 1 - std::max(off * off, reach2 * reach2);
     const double cosine = to.normals[partner].dot(rotation * from.normals[at]);
     if (agree > 0) sum += agree * cosine * cosine;
+    if (off > 1) sum -= contradiction * std::min(off - 1, 1.0) * (1 - reach2);
   }
-  return subset.empty() ? 0 : sum / static_cast<double>(subset.size());
+  return subset.empty() ? 0 : std::max(0.0, sum / static_cast<double>(subset.size()));
 }
 
 std::vector<int> all_of(const PreparedCloud& cloud) {
@@ -43,10 +44,10 @@ double two_sided_score(const PreparedCloud& source, const PreparedCloud& target,
                        const std::vector<int>& source_subset, const std::vector<int>& target_subset,
                        const Similarity3d& target_from_source, const ScoreBounds& bounds) {
   const double forward = one_side(source, target, source_subset, target_from_source, bounds.pair,
-                                  bounds.plane);
+                                  bounds.plane, bounds.contradiction);
   const double s = target_from_source.scale;
   const double backward = one_side(target, source, target_subset, target_from_source.inverse(),
-                                   bounds.pair / s, bounds.plane / s);
+                                   bounds.pair / s, bounds.plane / s, bounds.contradiction);
   return std::sqrt(forward * backward);
 }
 

@@ -12,12 +12,15 @@ namespace orbitfuse::registration {
 struct ScoreBounds {
   double pair = 0.12;   ///< partners further apart don't agree at all
   double plane = 0.12;  ///< nor do partners this far off each other's tangent plane
+  double contradiction = 0;  ///< weight of partners that are near but off
 };
 
 /// Geometric mean of the two sides' truncated agreement, 0..1. Each point of one cloud counts
 /// 1 - (plane distance / bound)^2, times the squared cosine between the normals, for its nearest
-/// partner in the other. Shrinking a cloud into the other raises its own side only, so the product
-/// falls: the one-way fitness of the usual pipelines is maximal there.
+/// partner in the other; minus `contradiction` when it hovers off the partner's plane although it
+/// is near. Points without a partner count 0: clouds may overlap in part. Shrinking a cloud into
+/// the other raises its own side only, so the product falls: the one-way fitness of the usual
+/// pipelines is maximal there.
 double two_sided_score(const PreparedCloud& source, const PreparedCloud& target,
                        const std::vector<int>& source_subset, const std::vector<int>& target_subset,
                        const Similarity3d& target_from_source, const ScoreBounds& bounds);
