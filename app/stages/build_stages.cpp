@@ -16,7 +16,7 @@ std::vector<pipeline::Stage> build_stages(const SessionInput& session, const Run
       train_stage(in, Modality::thermal),
       register_stage(in),
       render_stage(in),
-      // fuse_stage(in),
+      fuse_stage(in),
       metrics_stage(in),
       report_stage(in),
   };

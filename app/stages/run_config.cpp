@@ -87,7 +87,32 @@ void add_render(Settings& settings, RenderConfig& render) {
                "Pixels less opaque than this have no temperature and are not fused");
 }
 
+void add_fuse(Settings& settings, FuseConfig& fuse) {
+  settings.add("fuse.methods", fuse.methods, "Any of best, ms-srif, pca-msif, cnn-lpif");
+  settings.add("fuse.color", fuse.options.color, "Keep the visible colours; false: gray");
+  settings.add("fuse.best_levels", fuse.options.best.levels, "Pyramid levels of best");
+  settings.add("fuse.best_sharpness", fuse.options.best.sharpness, "How hard best chooses between details");
+  settings.add("fuse.ms_srif_stride_px", fuse.options.ms_srif.stride_px, "Between patches of MS-SRIF's base");
+  settings.add("fuse.ms_srif_relative_residual", fuse.options.ms_srif.relative_residual,
+               "Share of a patch's norm at which its code ends; 0 = the reference's stop");
+  settings.add("fuse.pca_msif_iterations", fuse.options.pca_msif.smoother.iterations, "Diffusion steps of PCA-MSIF");
+  settings.add("fuse.pca_msif_time_step", fuse.options.pca_msif.smoother.time_step,
+               "At most 1: beyond it the diffusion diverges");
+  settings.add("fuse.cnn_lpif_same_within", fuse.options.cnn_lpif.same_within,
+               "Gray levels up to which the sources count as equal and the network is not asked");
+}
+
 }  // namespace
+
+Result<std::vector<FusionMethod>> FuseConfig::chosen() const {
+  std::vector<FusionMethod> result;
+  for (const std::string& name : methods) {
+    ORBITFUSE_ASSIGN(const FusionMethod method, fusion_method(name));
+    result.push_back(method);
+  }
+  if (result.empty()) return fail(ErrorKind::usage, "fuse.methods", "empty", "name at least one method");
+  return result;
+}
 
 RunConfig::RunConfig() {
   train_visible.options = nerf::preset(nerf::default_preset(Modality::visible)).value();
@@ -110,6 +135,8 @@ Status RunConfig::validate() const {
   ORBITFUSE_TRY(render.path.validate());
   ORBITFUSE_TRY(render.quality.validate());
   ORBITFUSE_TRY(palette(render.palette));
+  ORBITFUSE_TRY(fuse.chosen());
+  ORBITFUSE_TRY(fuse.options.validate());
   if (!(render.min_opacity >= 0 && render.min_opacity <= 1))
     return fail(ErrorKind::usage, "render.min_opacity", std::to_string(render.min_opacity),
                 "must be in 0..1");
@@ -122,6 +149,7 @@ Settings RunConfig::settings() {
   add_train(settings, "train.visible", train_visible);
   add_train(settings, "train.thermal", train_thermal);
   add_render(settings, render);
+  add_fuse(settings, fuse);
   return settings;
 }
 

@@ -8,6 +8,7 @@
 #include "app/config/settings.hpp"
 #include "app/stages/new_views.hpp"
 #include "core/modality.hpp"
+#include "fusion/fuse/fuse.hpp"
 #include "recon/nerf/nerf.hpp"
 #include "recon/poses/estimate_poses.hpp"
 
@@ -28,6 +29,13 @@ struct RenderConfig {
   nerf::RenderOptions quality;
 };
 
+struct FuseConfig {
+  std::vector<std::string> methods = fusion_method_names();
+  FusionOptions options;  ///< its method is each of `methods` in turn
+
+  Result<std::vector<FusionMethod>> chosen() const;
+};
+
 /// Everything a run can be told; its defaults are those of config/orbitfuse.toml.
 struct RunConfig {
   RunConfig();
@@ -36,6 +44,7 @@ struct RunConfig {
   PoseOptions poses;
   TrainConfig train_visible, train_thermal;
   RenderConfig render;
+  FuseConfig fuse;
 
   const TrainConfig& train(Modality modality) const {
     return modality == Modality::visible ? train_visible : train_thermal;

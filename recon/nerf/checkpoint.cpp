@@ -160,10 +160,8 @@ void visit(Archive& io, FieldState& state) {
   state.space.center = {center[0], center[1], center[2]};
   io(state.space.radius);
   io(state.span);
-  io(state.cone);
   io(state.step);
   io(state.rays_per_step);
-  io(state.stretch);
   io(state.train_psnr);
   io(state.samples_per_ray);
   io(state.spent_cpu_s);

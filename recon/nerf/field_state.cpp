@@ -68,9 +68,8 @@ void FieldState::restore(const Snapshot& from) {
 
 MarchSettings FieldState::march_settings() const {
   MarchSettings settings;
-  settings.cone = cone;
-  // Closer to the camera than a tenth of the orbit's radius steps no longer shrink.
-  settings.dt_min = 0.1f * cone;
+  settings.surface = options.surface_samples;
+  settings.haze = options.haze_samples;
   return settings;
 }
 

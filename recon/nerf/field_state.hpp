@@ -40,7 +40,6 @@ struct FieldState {
   TrainOptions options;  ///< as trained: architecture and sampling
   Space space;
   ValueSpan span;
-  float cone = 0.005f;   ///< march step per distance, as trained
 
   DensityNetwork main;
   Mlp color;
@@ -50,7 +49,6 @@ struct FieldState {
 
   int step = 0;
   int rays_per_step = 0;
-  float stretch = 4;     ///< training steps are this much longer than cone says
   double train_psnr = 0, samples_per_ray = 0;
   double spent_cpu_s = 0, spent_wall_s = 0;
   Snapshot best;

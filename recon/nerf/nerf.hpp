@@ -54,7 +54,7 @@ Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
 
 struct RenderOptions {
   double stop_transmittance = 1e-3;  ///< a ray ends when less light than this is left
-  double step_px = 0;                ///< march step in pixel footprints; 0 = as trained
+  double sample_factor = 1;          ///< samples per ray, as a multiple of those in training
   Status validate() const;
 };
 

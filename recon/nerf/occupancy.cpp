@@ -59,11 +59,11 @@ void Occupancy::record(const float x[3], float sigma) {
   seen = std::max(seen, sigma);
 }
 
-void Occupancy::update(float decay, float threshold, float dt_min) {
+void Occupancy::update(float decay, float threshold) {
   const std::int64_t per_cascade = static_cast<std::int64_t>(resolution) * resolution * resolution;
   double sum = 0;
   const auto opacity = [&](std::int64_t cell, float sigma) {
-    return sigma * dt_min * static_cast<float>(1 << (cell / per_cascade));
+    return sigma * cell_size(static_cast<int>(cell / per_cascade));
   };
   for (const std::int64_t c : visited) {
     float& value = density[static_cast<std::size_t>(c)];
@@ -81,48 +81,101 @@ void Occupancy::update(float decay, float threshold, float dt_min) {
   visited.clear();
 }
 
-int march(const Occupancy& occupancy, const Ray& ray, const MarchSettings& settings, float jitter,
-          float* t_out, float* dt_out) {
+namespace {
+
+/// The stretch of a ray inside one occupied cell.
+struct Segment {
+  float begin, length;
+  float surface;  ///< opacity expected there
+  float haze;     ///< share of the samples that look everywhere
+};
+
+constexpr int max_segments = 1024;
+
+/// Occupied cells along the ray, nearest first.
+int segments_of(const Occupancy& occupancy, const Ray& ray, float near, Segment* out) {
   float inverse[3];
   for (int d = 0; d < 3; ++d)
-    inverse[d] = std::abs(ray.direction[d]) > 1e-9f ? 1.0f / ray.direction[d]
-                                                    : std::numeric_limits<float>::max();
+    inverse[d] = 1.0f / (std::abs(ray.direction[d]) > 1e-9f ? ray.direction[d]
+                                                            : std::copysign(1e-9f, ray.direction[d]));
   const float far_edge = static_cast<float>(1 << (occupancy.cascades - 1));
-  int count = 0;
-  float t = settings.near + jitter * std::max(settings.dt_min, settings.cone * settings.near);
-  // A camera far outside all cascades first advances to the largest cube.
+  float t = near;
+  // A camera outside all cascades first advances to the largest cube.
   for (int d = 0; d < 3; ++d) {
     const float gap = std::abs(ray.origin[d]) - far_edge;
     if (gap <= 0) continue;
     if (ray.origin[d] * ray.direction[d] >= 0) return 0;
     t = std::max(t, gap * std::abs(inverse[d]) * 1.0001f);
   }
-  while (count < settings.max_samples) {
-    float dt = std::max(settings.dt_min, settings.cone * t);
-    const float middle = t + 0.5f * dt;
+  int count = 0;
+  for (int guard = 0; guard < 8 * max_segments && count < max_segments; ++guard) {
     float x[3];
-    for (int d = 0; d < 3; ++d) x[d] = ray.origin[d] + middle * ray.direction[d];
+    for (int d = 0; d < 3; ++d) x[d] = ray.origin[d] + t * ray.direction[d];
     const int cascade = Occupancy::cascade_of(x);
     if (cascade >= occupancy.cascades) break;
-    const std::int64_t cell = occupancy.cell_of(cascade, x);
-    if (Occupancy::test(occupancy.on, cell)) {
-      if (settings.stretch > 1 && occupancy.density[static_cast<std::size_t>(cell)] *
-                                          occupancy.cell_size(cascade) < surface_opacity)
-        dt *= settings.stretch;
-      t_out[count] = t + 0.5f * dt;
-      dt_out[count++] = dt;
-      t += dt;
-      continue;
-    }
-    // To the far side of this empty cell, in steps of dt so that samples keep their jitter.
     const float size = occupancy.cell_size(cascade);
     float exit = std::numeric_limits<float>::max();
     for (int d = 0; d < 3; ++d) {
       const float edge = (std::floor(x[d] / size) + (ray.direction[d] > 0 ? 1.0f : 0.0f)) * size;
-      const float distance = (edge - x[d]) * inverse[d];
-      if (std::abs(ray.direction[d]) > 1e-9f) exit = std::min(exit, distance);
+      exit = std::min(exit, (edge - x[d]) * inverse[d]);
     }
-    t += std::max(1.0f, std::ceil(exit / dt)) * dt;
+    exit = std::max(exit, 0.0f) + 1e-3f * size;  // across the border in spite of rounding
+    const std::int64_t cell = occupancy.cell_of(cascade, x);
+    if (Occupancy::test(occupancy.on, cell)) {
+      // depth / (1 + depth) stands for 1 - exp(-depth): only relative sizes matter here.
+      const float depth = exit * occupancy.density[static_cast<std::size_t>(cell)];
+      out[count++] = {t, exit, depth / (1 + depth), exit / size};
+    }
+    t += exit;
+  }
+  return count;
+}
+
+}  // namespace
+
+int march(const Occupancy& occupancy, const Ray& ray, const MarchSettings& settings, float jitter,
+          float* t, float* dt) {
+  thread_local std::vector<Segment> segments(max_segments);
+  const int cells = segments_of(occupancy, ray, settings.near, segments.data());
+  if (cells == 0) return 0;
+  float surface = 0, haze = 0;
+  for (int i = 0; i < cells; ++i) {
+    surface += segments[static_cast<std::size_t>(i)].surface;
+    haze += segments[static_cast<std::size_t>(i)].haze;
+  }
+  const float for_surface = static_cast<float>(settings.surface) * std::min(1.0f, surface);
+  const float for_haze = std::clamp(haze, 2.0f, static_cast<float>(settings.haze));
+  const int count = std::min(max_ray_samples, static_cast<int>(std::ceil(for_surface + for_haze)));
+  const float surface_share = surface > 0 ? for_surface / surface : 0.0f, haze_share = for_haze / haze;
+
+  // Inverse transform sampling: `mass` runs to for_surface + for_haze in steps of one sample.
+  const float per_sample = (for_surface + for_haze) / static_cast<float>(count);
+  int cell = 0;
+  float mass_before = 0, length_before = 0;
+  const auto density_of_cell = [&](int i) {
+    const Segment& s = segments[static_cast<std::size_t>(i)];
+    return s.surface * surface_share + s.haze * haze_share;
+  };
+  const auto advance = [&](float mass) {  // occupied length and distance at this mass
+    float own = density_of_cell(cell);
+    while (cell + 1 < cells && mass_before + own < mass) {
+      mass_before += own;
+      length_before += segments[static_cast<std::size_t>(cell)].length;
+      own = density_of_cell(++cell);
+    }
+    const Segment& s = segments[static_cast<std::size_t>(cell)];
+    const float part = std::clamp((mass - mass_before) / std::max(own, 1e-12f), 0.0f, 1.0f);
+    return std::pair{length_before + part * s.length, s.begin + part * s.length};
+  };
+  float edge = 0;
+  const float shift = 0.5f * (jitter - 0.5f);  // samples keep to the middle half of their stratum
+  for (int k = 0; k < count; ++k) {
+    const auto [l_mid, at] = advance((static_cast<float>(k) + 0.5f + shift) * per_sample);
+    static_cast<void>(l_mid);
+    const float next = advance(static_cast<float>(k + 1) * per_sample).first;
+    t[k] = at;
+    dt[k] = std::max(0.0f, next - edge);
+    edge = next;
   }
   return count;
 }

@@ -13,7 +13,9 @@ namespace orbitfuse::nerf {
 struct Occupancy {
   int resolution = 0, cascades = 0;
   std::vector<std::uint64_t> on, allowed;  ///< bit per cell
-  std::vector<float> density;              ///< decaying maximum of what samples found
+  /// Decaying maximum of T * sigma: the density that the best of the rays through a cell sees. What
+  /// is hidden behind surfaces is not worth samples either.
+  std::vector<float> density;
   std::vector<float> window;               ///< maximum since the last update; -1 = not visited
   std::vector<std::int64_t> visited;       ///< cells whose window is set
 
@@ -38,27 +40,26 @@ struct Occupancy {
   void center_of(std::int64_t cell, float x[3]) const;
   double fraction_on() const;
 
-  /// Notes a density found at a point.
+  /// Notes a visible density found at a point.
   void record(const float x[3], float sigma);
   /// Applies the window: visited cells take max(old * decay, window) and stay on while
-  /// sigma * dt_min * 2^cascade >= min(threshold, half the mean).
-  void update(float decay, float threshold, float dt_min);
+  /// their opacity, density * cell size, is at least min(threshold, half the mean).
+  void update(float decay, float threshold);
 };
 
-/// Samples of one ray: midpoints and lengths in normalised units.
+/// How many samples a ray gets: `surface` of them where surfaces are expected, and one per
+/// occupied cell, up to `haze`, over everything that is not known to be empty.
 struct MarchSettings {
-  float cone = 0.005f;     ///< step length per distance
-  float dt_min = 0.001f;
-  float near = 0.1f;
-  float stretch = 1;       ///< steps are this much longer where no surface is expected
-  int max_samples = 1024;
+  float near = 0.1f;   ///< normalised units
+  int surface = 16;
+  int haze = 24;
 };
 
-/// Opacity of a cell, as its best view sees it, from which a surface is expected in it.
-inline constexpr float surface_opacity = 0.05f;
+inline constexpr int max_ray_samples = 256;
 
-/// Steps along the ray through cells that are on: finely where a surface is expected, by
-/// `stretch` longer steps in haze. Returns the number of samples written to t (midpoints) and dt.
+/// Samples along a ray: t (midpoints) and dt (the occupied length each stands for). The cells'
+/// densities are the proposal distribution, so no network is asked where to look. Returns the
+/// number of samples, at most max_ray_samples.
 int march(const Occupancy& occupancy, const Ray& ray, const MarchSettings& settings, float jitter,
           float* t, float* dt);
 

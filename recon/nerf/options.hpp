@@ -47,8 +47,9 @@ struct TrainOptions {
   Sampling sampling = Sampling::occupancy;
   int samples_per_step = 1 << 15;        ///< rays per step adapt to this
   int occupancy_resolution = 128;        ///< cells per axis of each cascade
-  double occupancy_threshold = 0.03;     ///< opacity of one step below which a cell is empty
-  double step_px = 2.0;                  ///< march step in pixel footprints
+  double occupancy_threshold = 0.02;     ///< visible opacity below which a cell is empty
+  int surface_samples = 16;              ///< per ray, where surfaces are expected
+  int haze_samples = 24;                 ///< per ray at most, over all that may not be empty
   int proposal_samples_1 = 256, proposal_samples_2 = 96;  ///< per ray (Sampling::proposal)
   int fine_samples = 48;
 

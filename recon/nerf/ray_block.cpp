@@ -54,8 +54,8 @@ void RayBlock::add(const Ray& ray, const float* t_mid, const float* dt_in, int c
 void RayBlock::add(const FieldState& field, const Ray& ray, const MarchSettings& settings,
                    float jitter) {
   thread_local std::vector<float> t_mid, length;
-  t_mid.resize(static_cast<std::size_t>(settings.max_samples));
-  length.resize(static_cast<std::size_t>(settings.max_samples));
+  t_mid.resize(max_ray_samples);
+  length.resize(max_ray_samples);
   const int count = march(field.occupancy, ray, settings, jitter, t_mid.data(), length.data());
   add(ray, t_mid.data(), length.data(), count);
 }

@@ -48,8 +48,9 @@ Status RenderOptions::validate() const {
   if (!(stop_transmittance > 0 && stop_transmittance < 0.5))
     return fail(ErrorKind::usage, "render.stop_transmittance", fmt::format("{}", stop_transmittance),
                 "choose above 0 and below 0.5");
-  if (!(step_px >= 0 && step_px <= 64))
-    return fail(ErrorKind::usage, "render.step_px", fmt::format("{}", step_px), "choose 0..64");
+  if (!(sample_factor >= 0.1 && sample_factor <= 16))
+    return fail(ErrorKind::usage, "render.sample_factor", fmt::format("{}", sample_factor),
+                "choose 0.1..16");
   return {};
 }
 
@@ -64,11 +65,8 @@ RenderedView render_strided(const FieldState& field, const ViewRays& rays, int s
   view.opacity.create(height, width, CV_32FC1);
   const Kernels& kernels = kernels_for(best_isa());
   MarchSettings settings = field.march_settings();
-  if (options.step_px > 0) {
-    const float scale = static_cast<float>(options.step_px / field.options.step_px);
-    settings.cone *= scale;
-    settings.dt_min *= scale;
-  }
+  settings.surface = static_cast<int>(std::lround(settings.surface * options.sample_factor));
+  settings.haze = static_cast<int>(std::lround(settings.haze * options.sample_factor));
   const ForwardSettings limits{static_cast<float>(options.stop_transmittance), 1e-4f};
   parallel_blocks(width * height, rays_per_block, [&](int begin, int end) {
     thread_local RayBlock block;

@@ -55,13 +55,6 @@ double heldout_psnr(const FieldState& field, const std::vector<SceneView>& views
   return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
 }
 
-/// Steps between the rays' angles: one pixel at the view's own resolution times step_px.
-float cone_of(const std::vector<SceneView>& views, double step_px) {
-  double sum = 0;
-  for (const SceneView& view : views) sum += view.rays.pixel_angle();
-  return static_cast<float>(step_px * sum / static_cast<double>(views.size()));
-}
-
 }  // namespace
 
 const char* name(StopReason reason) {
@@ -124,7 +117,6 @@ Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
   }
   const std::vector<SceneView> views = prepare_views(dataset, state->space, state->span);
   if (!resumed) {
-    state->cone = cone_of(views, options.step_px);
     const double left = carve(dataset, state->space, views, options, state->occupancy);
     report.skips.push_back({"empty space", fmt::format("{:.1f} % of the cells seen by enough views and "
                                                        "not in front of known depth", 100 * left),

@@ -57,10 +57,7 @@ void Trainer::draw(Block& block, int begin, int end, double progress) {
   const bool sparse = known_ends_.back() > 0 && known_ends_.back() < pixel_ends_.back() / 10;
   block.rays.clear();
   block.targets.clear();
-  MarchSettings settings = field_.march_settings();
-  // Adaptive step: while space is not carved yet, rays cross much of it in longer steps.
-  settings.stretch = field_.stretch;
-  settings.max_samples = 512;
+  const MarchSettings settings = field_.march_settings();
   for (int i = begin; i < end; ++i) {
     for (int attempt = 0; attempt < 8; ++attempt) {
       const std::uint64_t draw_key = key(i) * 8 + static_cast<unsigned>(attempt);
@@ -148,9 +145,6 @@ bool Trainer::step(double progress) {
   const double per_ray = static_cast<double>(samples) / static_cast<double>(std::max(1l, drawn));
   field_.samples_per_ray =
       field_.step == 0 ? per_ray : 0.9 * field_.samples_per_ray + 0.1 * per_ray;
-  // Steps lengthen until a ray takes about samples_per_ray_target samples, and shorten again.
-  const double ratio = field_.samples_per_ray / 40.0;
-  field_.stretch = std::clamp(field_.stretch * static_cast<float>(std::pow(ratio, 0.1)), 1.0f, 16.0f);
   field_.rays_per_step = std::clamp(
       static_cast<int>(o.samples_per_step / std::max(1.0, field_.samples_per_ray)), 128, 16384);
   if (finite) update_occupancy(progress);
@@ -215,7 +209,7 @@ void Trainer::update_occupancy(double progress) {
   // Relaxed late, so that nothing thin is lost once geometry has settled.
   const double threshold = field_.options.occupancy_threshold * (progress < 0.6 ? 1.0 : 0.3);
   probe_cells();
-  field_.occupancy.update(0.95f, static_cast<float>(threshold), field_.march_settings().dt_min * 10);
+  field_.occupancy.update(0.95f, static_cast<float>(threshold));
 }
 
 /// Brings cells back: neighbours of occupied cells whose density is above the threshold.

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "recon/poses/cross_modal.hpp"
 #include "recon/poses/known_poses.hpp"
 #include "recon/poses/sfm_ladder.hpp"
 
@@ -27,9 +28,22 @@ Result<ThermalPoses> estimate_thermal_poses(const Session& session, const Visibl
                 fmt::format("{} thermal frames, at least 2 are needed", frames.size()),
                 "record or import more views");
   std::vector<LadderStep> steps;
-  ORBITFUSE_ASSIGN(ModalityPoses poses, structure_from_motion(session, frames, options,
-                                                              workdir / "thermal", progress,
-                                                              steps));
+  if (visible != nullptr) {
+    auto localised = localise_in_visible(session, *visible, frames, options, progress, steps);
+    if (localised) {
+      localised->ladder = std::move(steps);
+      return localised;
+    }
+    if (localised.error().kind != ErrorKind::quality) return tl::unexpected(localised.error());
+    if (steps.empty())
+      steps.push_back({"cross-modal, orbit prior", false, localised.error().found, 0,
+                       static_cast<int>(frames.size()), 0});
+  }
+  auto alone = structure_from_motion(session, frames, options, workdir / "thermal", progress, steps);
+  if (!alone && visible != nullptr && alone.error().kind == ErrorKind::unavailable)
+    alone.error().found = steps.front().rung + ": " + steps.front().why + "; " + alone.error().found;
+  if (!alone) return tl::unexpected(std::move(alone.error()));
+  ModalityPoses poses = *std::move(alone);
   poses.ladder = std::move(steps);
   return ThermalPoses{std::move(poses), false};
 }

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/fusion_batch/fusion_batch.hpp"
+
+#include <fmt/format.h>
+
+#include <map>
+
+#include "core/file_io.hpp"
+#include "core/image_io.hpp"
+#include "fusion/metrics/metrics.hpp"
+
+namespace orbitfuse::batch {
+namespace {
+namespace fs = std::filesystem;
+
+std::map<std::string, fs::path> files_by_stem(const fs::path& folder) {
+  std::map<std::string, fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.is_regular_file()) files[entry.path().stem().string()] = entry.path();
+  return files;
+}
+
+/// One pair into the layout; its lines of the CSV.
+Result<std::string> fuse_one(const std::string& stem, const fs::path& visible_file, const fs::path& thermal_file,
+                             const fs::path& out, const FusionOptions& options) {
+  ORBITFUSE_ASSIGN(const cv::Mat visible, read_image(visible_file));
+  ORBITFUSE_ASSIGN(const cv::Mat thermal, read_image(thermal_file));
+  ORBITFUSE_ASSIGN(const cv::Mat fused, fuse(visible, thermal, {}, options));
+  ORBITFUSE_ASSIGN(const auto values, fusion_metrics(visible, thermal, fused));
+  ORBITFUSE_TRY(write_png(out / "vi" / (stem + ".png"), visible));
+  ORBITFUSE_TRY(write_png(out / "ir" / (stem + ".png"), thermal));
+  ORBITFUSE_TRY(write_png(out / "fused" / (stem + ".png"), fused));
+  std::string lines;
+  for (const MetricValue& v : values) lines += fmt::format("{},{},{},{}\n", stem, name(options.method), v.name, v.value);
+  return lines;
+}
+
+}  // namespace
+
+Result<Summary> fuse_folder(const fs::path& visible, const fs::path& thermal, const fs::path& out,
+                            const FusionOptions& options, const Progress& progress) {
+  for (const fs::path& folder : {visible, thermal})
+    if (!fs::is_directory(folder))
+      return fail(ErrorKind::input, folder.string(), "not a folder", "give two folders, or two images");
+  const auto thermal_files = files_by_stem(thermal);
+  const auto visible_files = files_by_stem(visible);
+  Summary summary;
+  std::string csv = "pair,method,metric,value\n";
+  int done = 0;
+  for (const auto& [stem, file] : visible_files) {
+    ORBITFUSE_TRY(progress.check("fuse"));
+    progress.report({"fuse", static_cast<double>(done++), static_cast<double>(visible_files.size()), -1, stem});
+    const auto partner = thermal_files.find(stem);
+    if (partner == thermal_files.end()) {
+      summary.problems.push_back(file.string() + ": no thermal image of that name");
+      continue;
+    }
+    const auto lines = fuse_one(stem, file, partner->second, out, options);
+    if (!lines) {
+      summary.problems.push_back(stem + ": " + lines.error().message());
+      continue;
+    }
+    csv += *lines;
+    ++summary.fused;
+  }
+  if (summary.fused == 0)
+    return fail(ErrorKind::input, visible.string(),
+                summary.problems.empty() ? "no images" : "no pair could be fused; " + summary.problems.front(),
+                "pairs need equal file names and sizes");
+  ORBITFUSE_TRY(write_file_atomic(out / metrics_file, csv));
+  return summary;
+}
+
+}  // namespace orbitfuse::batch

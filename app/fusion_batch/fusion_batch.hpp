@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/progress.hpp"
+#include "fusion/fuse/fuse.hpp"
+
+namespace orbitfuse::batch {
+
+inline constexpr const char* metrics_file = "metrics.csv";
+
+struct Summary {
+  int fused = 0;
+  std::vector<std::string> problems;  ///< pairs that could not be fused, and why
+};
+
+/// Fuses the images of equal stem in two folders into out/vi, out/ir and out/fused (all PNG, equal
+/// names: the aligned-pairs layout that fusion networks train on) and writes out/metrics.csv.
+/// A bad pair is told and left out. Input error when no pair could be fused.
+Result<Summary> fuse_folder(const std::filesystem::path& visible, const std::filesystem::path& thermal,
+                            const std::filesystem::path& out, const FusionOptions& options,
+                            const Progress& progress);
+
+}  // namespace orbitfuse::batch

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "fusion/fuse/fuse.hpp"
+
+#include <fmt/format.h>
+
+#include "app/stages/artifacts.hpp"
+#include "app/stages/metric_tables.hpp"
+#include "app/stages/rendered_views.hpp"
+#include "app/stages/stage_list.hpp"
+#include "app/stages/training_data.hpp"
+#include "core/image_io.hpp"
+
+namespace orbitfuse::stages {
+namespace {
+using nlohmann::json;
+using pipeline::StageContext;
+using pipeline::StageOutput;
+
+/// 255 where both fields have something to show.
+Result<cv::Mat> valid_pixels(const std::filesystem::path& folder, const ViewFiles& files,
+                             const cv::Mat& thermal, double min_opacity) {
+  ORBITFUSE_ASSIGN(const cv::Mat visible_opacity, read_float_tiff(folder / files.visible_opacity));
+  ORBITFUSE_ASSIGN(const cv::Mat thermal_opacity, read_float_tiff(folder / files.thermal_opacity));
+  cv::Mat valid = (thermal == thermal) & (visible_opacity >= min_opacity) & (thermal_opacity >= min_opacity);
+  return valid;
+}
+
+Result<StageOutput> fuse_views(const StageContext& context, const RunConfig& config) {
+  const auto folder = context.of("render");
+  ORBITFUSE_ASSIGN(const RenderedViews rendered, load_rendered_views(folder));
+  ORBITFUSE_ASSIGN(const auto methods, config.fuse.chosen());
+  StageOutput output;
+  std::map<std::string, double> wall_s;
+  int fused_images = 0;
+  for (const ViewFiles& files : rendered.views) {
+    ORBITFUSE_TRY(context.progress.check("fuse"));
+    context.progress.report({"fuse", static_cast<double>(fused_images),
+                             static_cast<double>(rendered.views.size() * methods.size()), -1, files.name});
+    ORBITFUSE_ASSIGN(const cv::Mat visible, read_visible(folder / files.visible));
+    ORBITFUSE_ASSIGN(const cv::Mat thermal,
+                     field_image(folder / files.thermal, Modality::thermal, rendered.thermal_is_gray));
+    ORBITFUSE_ASSIGN(const cv::Mat valid, valid_pixels(folder, files, thermal, config.render.min_opacity));
+    const cv::Mat gray = gray_of_kelvin(thermal, rendered.span);
+    ORBITFUSE_TRY(write_png(context.folder / "thermal" / (files.name + ".png"), gray));
+    for (const FusionMethod method : methods) {
+      FusionOptions options = config.fuse.options;
+      options.method = method;
+      FusionReport said;
+      const auto image = cv::countNonZero(valid) > 0 ? fuse(visible, gray, valid, options, &said)
+                                                     : Result<cv::Mat>(visible);
+      if (!image) return tl::unexpected(image.error());
+      ORBITFUSE_TRY(write_png(context.folder / name(method) / (files.name + ".png"), *image));
+      wall_s[name(method)] += said.wall_s;
+      ++fused_images;
+      if (&files == &rendered.views.front())
+        for (Skip& skip : said.skips) {
+          skip.what = std::string(name(method)) + ": " + skip.what + " (first view)";
+          output.skips.push_back(skip);
+        }
+    }
+    if (cv::countNonZero(valid) == 0)
+      output.warnings.push_back(files.name + ": the thermal field does not cover this view; the visible one is shown");
+  }
+  json list = json::array(), times = json::object();
+  for (const FusionMethod method : methods) {
+    list.push_back(name(method));
+    times[name(method)] = 1000 * wall_s[name(method)] / static_cast<double>(rendered.views.size());
+  }
+  output.metrics = {{"brief", fmt::format("{} images by {} methods", fused_images, methods.size())},
+                    {"methods", list}, {"milliseconds_a_view", times}};
+  return output;
+}
+
+}  // namespace
+
+pipeline::Stage fuse_stage(const StageInputs& in) {
+  pipeline::Stage stage;
+  stage.name = "fuse";
+  stage.needs = {"render"};
+  stage.options = in.config->settings().to_json("fuse");
+  stage.options["min_opacity"] = in.config->render.min_opacity;
+  stage.absent = [](const StageContext& context) -> std::optional<std::string> {
+    if (!context.has("render")) return "nothing was rendered";
+    const auto rendered = load_rendered_views(context.of("render"));
+    if (rendered && rendered->has_both()) return std::nullopt;
+    return "only one modality was rendered";
+  };
+  stage.run = [in](const StageContext& context) { return fuse_views(context, *in.config); };
+  return stage;
+}
+
+}  // namespace orbitfuse::stages

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "fusion/fuse/fuse.hpp"
+
+#include <fmt/format.h>
+
+#include "app/cli/run_stages.hpp"
+#include "app/cli/verb.hpp"
+#include "app/fusion_batch/fusion_batch.hpp"
+#include "core/image_io.hpp"
+
+namespace orbitfuse::cli {
+namespace {
+namespace fs = std::filesystem;
+
+struct Options {
+  StageFolders folders;
+  std::string visible, thermal, mask, method = "best";
+  bool gray = false;
+};
+
+Result<cv::Mat> read_optional(const std::string& file) {
+  return file.empty() ? Result<cv::Mat>(cv::Mat()) : read_image(file);
+}
+
+Status fuse_pair(Context& context, const Options& o, const FusionOptions& options) {
+  ORBITFUSE_ASSIGN(const cv::Mat visible, read_image(o.visible));
+  ORBITFUSE_ASSIGN(const cv::Mat thermal, read_image(o.thermal));
+  ORBITFUSE_ASSIGN(const cv::Mat mask, read_optional(o.mask));
+  FusionReport said;
+  ORBITFUSE_ASSIGN(const cv::Mat fused, fuse(visible, thermal, mask, options, &said));
+  ORBITFUSE_TRY(write_png(o.folders.out, fused));
+  context.console.data(o.folders.out);
+  context.result = {{"out", o.folders.out}, {"method", name(options.method)}, {"ms", 1000 * said.wall_s}};
+  context.result["skips"] = nlohmann::json::array();
+  for (const Skip& skip : said.skips) {
+    context.result["skips"].push_back({{"what", skip.what}, {"why", skip.why}, {"effect", skip.effect}});
+    context.console.detail(fmt::format("skipped {}: {}; {}", skip.what, skip.why, skip.effect));
+  }
+  return {};
+}
+
+Status fuse_folder(Context& context, const Options& o, const FusionOptions& options) {
+  ORBITFUSE_ASSIGN(const batch::Summary summary,
+                   batch::fuse_folder(o.visible, o.thermal, o.folders.out, options, context.progress));
+  for (const std::string& problem : summary.problems) context.console.warning(problem);
+  context.console.data(fmt::format("{} pairs fused, {} problems; {}", summary.fused, summary.problems.size(),
+                                   (fs::path(o.folders.out) / batch::metrics_file).string()));
+  context.result = {{"out", o.folders.out}, {"fused", summary.fused}, {"problems", summary.problems}};
+  return {};
+}
+
+Status run(Context& context, const Options& o) {
+  if (o.visible.empty() && o.thermal.empty()) return run_stages(context, o.folders, {"fuse"});
+  for (const auto& [option, value] : {std::pair{"--visible", &o.visible}, {"--thermal", &o.thermal}})
+    if (value->empty()) return fail(ErrorKind::usage, option, "not given", "name both images, or both folders");
+  FusionOptions options = context.config.fuse.options;
+  ORBITFUSE_ASSIGN(options.method, fusion_method(o.method));
+  options.color = !o.gray;
+  if (fs::is_directory(o.visible)) return fuse_folder(context, o, options);
+  return fuse_pair(context, o, options);
+}
+
+}  // namespace
+
+Action add_fuse(CLI::App& app) {
+  const auto options = std::make_shared<Options>();
+  add_folders(app, options->folders);
+  app.add_option("--visible", options->visible, "Visible image, or a folder of them");
+  app.add_option("--thermal", options->thermal, "Thermal image of the same size, or a folder with the same names");
+  app.add_option("--mask", options->mask, "Gray image, 0 where the thermal image holds nothing");
+  app.add_option("--method", options->method, "For files; a session fuses by fuse.methods")
+      ->check(CLI::IsMember(fusion_method_names()))->capture_default_str();
+  app.add_flag("--gray", options->gray, "Fuse to gray instead of keeping the visible colours");
+  return [options](Context& context) { return run(context, *options); };
+}
+
+}  // namespace orbitfuse::cli

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "fusion/cnn_lpif/network.hpp"
+#include "fusion/pyramid/image_pair.hpp"
+
+// CNN-LPIF (Liu, Chen, Cheng, Peng, Wang 2018): a network's weight map and local energies fuse the
+// bands of two Laplacian pyramids.
+namespace orbitfuse::fusion {
+
+struct CnnLpifOptions {
+  /// Band coefficients whose match 2 a b / (a^2 + b^2) over 3x3 is at least this are weighted by
+  /// the network; below it the larger local energy wins (paper, eq. 8 to 10).
+  double match_threshold = 0.6;
+  /// Gray levels up to which the sources count as the same; patches that don't differ are not sent
+  /// through the network, their weight is 1/2.
+  double same_within = 1;
+
+  Status validate() const;
+};
+
+struct CnnLpifReport {
+  double patches_skipped = 0;  ///< share of patches that did not differ
+  bool skipped = false;        ///< the images are identical: returned as they are
+};
+
+/// Weight of the thermal image, 0..1: the network's answer, overlapping patches averaged.
+Plane thermal_weight(const Plane& visible, const Plane& thermal, const CnnLpifOptions& options,
+                     CnnLpifReport& report, const cnn::Parameters& network = cnn::shipped_network());
+
+/// Errors: check_pair's, usage. Same bits for any thread count.
+Result<Plane> fuse_cnn_lpif(const Plane& visible, const Plane& thermal, const CnnLpifOptions& options,
+                            CnnLpifReport* report = nullptr,
+                            const cnn::Parameters& network = cnn::shipped_network());
+
+}  // namespace orbitfuse::fusion

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "fusion/ms_srif/ms_srif.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "core/parallel.hpp"
+#include "fusion/pyramid/bands.hpp"
+#include "fusion/pyramid/pyramid.hpp"
+
+namespace orbitfuse::fusion {
+namespace {
+
+/// Top-left corners 0, stride, ... and the last one that fits: every pixel is covered.
+std::vector<int> corners(int length, int stride) {
+  std::vector<int> list;
+  for (int i = 0; i + patch_side <= length; i += stride) list.push_back(i);
+  if (list.back() + patch_side < length) list.push_back(length - patch_side);
+  return list;
+}
+
+float cut(const Plane& image, int x, int y, Eigen::VectorXf& patch) {
+  for (int i = 0; i < patch_size; ++i) patch[i] = image(y + i / patch_side, x + i % patch_side);
+  const float mean = patch.mean();
+  patch.array() -= mean;
+  return mean;
+}
+
+struct Tally {
+  int patches = 0, flat = 0;
+  long atoms = 0;
+};
+
+/// Fused patches of one row of corners, in the order of `xs`.
+std::vector<Eigen::VectorXf> fuse_row(const Plane& visible, const Plane& thermal, const std::vector<int>& xs, int y,
+                                      const OmpStop& stop, const Dictionary& dictionary, Tally& tally) {
+  BatchOmp omp(dictionary);
+  Eigen::VectorXf v(patch_size), t(patch_size);
+  SparseCode code_v, code_t;
+  std::vector<Eigen::VectorXf> fused;
+  for (const int x : xs) {
+    const float mean_v = cut(visible, x, y, v), mean_t = cut(thermal, x, y, t);
+    omp.solve(v, stop, code_v);
+    omp.solve(t, stop, code_t);
+    const float activity_v = code_v.l1(), activity_t = code_t.l1();
+    // Two flat patches have no winner; their mean level doesn't flicker between the sources.
+    const float mean = activity_v > activity_t ? mean_v : activity_t > activity_v ? mean_t : (mean_v + mean_t) / 2;
+    const SparseCode& code = activity_v > activity_t ? code_v : code_t;
+    Eigen::VectorXf patch = Eigen::VectorXf::Constant(patch_size, mean);
+    for (std::size_t i = 0; i < code.atoms.size(); ++i)
+      patch += code.weights[i] * dictionary.atoms().col(code.atoms[i]);
+    fused.push_back(std::move(patch));
+    tally.patches += 2;
+    tally.flat += code_v.atoms.empty() + code_t.atoms.empty();
+    tally.atoms += static_cast<long>(code_v.atoms.size() + code_t.atoms.size());
+  }
+  return fused;
+}
+
+Plane fuse_base(const Plane& visible, const Plane& thermal, const MsSrifOptions& options,
+                const Dictionary& dictionary, MsSrifReport& report) {
+  const std::vector<int> xs = corners(visible.cols, options.stride_px), ys = corners(visible.rows, options.stride_px);
+  const OmpStop stop{options.max_atoms, static_cast<float>(options.residual * patch_side),
+                     static_cast<float>(options.relative_residual)};
+  std::vector<std::vector<Eigen::VectorXf>> rows(ys.size());
+  std::vector<Tally> tallies(ys.size());
+  parallel_for(static_cast<int>(ys.size()), [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    rows[k] = fuse_row(visible, thermal, xs, ys[k], stop, dictionary, tallies[k]);
+  });
+  Plane sum = Plane::zeros(visible.size()), count = Plane::zeros(visible.size());
+  long atoms = 0;
+  for (std::size_t j = 0; j < ys.size(); ++j) {
+    for (std::size_t i = 0; i < xs.size(); ++i)
+      for (int p = 0; p < patch_size; ++p) {
+        sum(ys[j] + p / patch_side, xs[i] + p % patch_side) += rows[j][i][p];
+        count(ys[j] + p / patch_side, xs[i] + p % patch_side) += 1;
+      }
+    report.patches += tallies[j].patches;
+    report.flat_patches += tallies[j].flat;
+    atoms += tallies[j].atoms;
+  }
+  report.atoms_per_patch = static_cast<double>(atoms) / report.patches;
+  return sum / count;
+}
+
+}  // namespace
+
+Status MsSrifOptions::validate() const {
+  const auto bad = [](const char* field, double value, const char* rule) {
+    return fail(ErrorKind::usage, std::string("ms_srif.") + field, fmt::format("{}", value), rule);
+  };
+  if (levels < 0 || levels > 12) return bad("levels", levels, "must be in 0..12");
+  if (stride_px < 1 || stride_px > patch_side) return bad("stride_px", stride_px, "must be in 1..8");
+  if (max_atoms < 1 || max_atoms > patch_size) return bad("max_atoms", max_atoms, "must be in 1..64");
+  if (!(residual >= 0 && residual <= 255)) return bad("residual", residual, "must be in 0..255");
+  if (!(relative_residual >= 0 && relative_residual < 1))
+    return bad("relative_residual", relative_residual, "must be in [0, 1)");
+  return {};
+}
+
+Result<Plane> fuse_ms_srif(const Plane& visible, const Plane& thermal, const MsSrifOptions& options,
+                           MsSrifReport* report, const Dictionary& dictionary) {
+  ORBITFUSE_TRY(options.validate());
+  ORBITFUSE_TRY(check_pair(visible, thermal));
+  MsSrifReport own;
+  MsSrifReport& said = report ? *report : own;
+  said = {};
+  if (differing_share(visible, thermal, 0) == 0) {
+    said.skipped = true;
+    return visible.clone();
+  }
+  const int levels = pyramid_levels(visible.size(), options.levels, patch_side);
+  LaplacianPyramid v, t;
+  parallel_for(2, [&](int i) {
+    (i == 0 ? v : t) = laplacian_pyramid(i == 0 ? visible : thermal, levels);
+  });
+  LaplacianPyramid fused;
+  for (std::size_t i = 0; i < v.bands.size(); ++i)
+    fused.bands.push_back(choose(v.bands[i], t.bands[i], choose_by_magnitude(v.bands[i], t.bands[i])));
+  fused.base = fuse_base(v.base, t.base, options, dictionary, said);
+  return collapse(fused);
+}
+
+}  // namespace orbitfuse::fusion

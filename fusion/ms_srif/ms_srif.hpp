@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "fusion/ms_srif/batch_omp.hpp"
+#include "fusion/pyramid/image_pair.hpp"
+
+// MS-SRIF: Laplacian pyramid whose base is fused by sparse representation (Liu, Liu, Wang 2015, "A
+// general framework for image fusion based on multi-scale transform and sparse representation").
+namespace orbitfuse::fusion {
+
+struct MsSrifOptions {
+  int levels = 4;         ///< of the pyramid; fewer where the base would be smaller than a patch
+  int stride_px = 2;      ///< between patches of the base
+  int max_atoms = 63;
+  double residual = 0.1;  ///< gray levels RMS at which a patch counts as coded; flat patches end here
+  /// A patch is coded when this share of its norm is left: textured patches need no finer code to
+  /// be compared. 0 = the reference's stop. See docs/benchmarks/fusion.md.
+  double relative_residual = 0.03;
+
+  Status validate() const;  ///< usage error naming the field
+};
+
+struct MsSrifReport {
+  int patches = 0, flat_patches = 0;  ///< per source: codes sought, of them without any atom
+  double atoms_per_patch = 0;
+  bool skipped = false;               ///< the images are identical: returned as they are
+};
+
+/// Errors: check_pair's, usage. Same bits for any thread count.
+Result<Plane> fuse_ms_srif(const Plane& visible, const Plane& thermal, const MsSrifOptions& options,
+                           MsSrifReport* report = nullptr,
+                           const Dictionary& dictionary = Dictionary::shipped());
+
+}  // namespace orbitfuse::fusion

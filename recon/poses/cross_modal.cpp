@@ -1,0 +1,264 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/cross_modal.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <fmt/format.h>
+
+#include "core/parallel.hpp"
+#include "recon/poses/edge_alignment.hpp"
+#include "recon/poses/edge_lines.hpp"
+#include "recon/poses/orbit_search.hpp"
+#include "recon/poses/proxy_images.hpp"
+#include "recon/poses/world_frame.hpp"
+
+namespace orbitfuse {
+namespace {
+
+/// Below this the best start angle is not told from the next one (standard errors).
+constexpr double min_decisiveness = -2.0;
+/// A view whose edges meet the lines worse than this share of the median view is not supported.
+constexpr double min_share_of_median = 0.55;
+
+struct LensGuess {
+  Camera camera;
+  double focal_relative_sigma = 0.03;
+  bool guessed = false;
+};
+
+LensGuess lens_of(const Session& session, const FrameRecord& frame) {
+  LensGuess guess;
+  const DeviceInfo* device = session.device(frame.device);
+  if (device != nullptr && device->lens.calibrated) {
+    guess.camera = device->lens.calibrated->scaled_to(frame.width, frame.height);
+    guess.focal_relative_sigma = 0;
+    return guess;
+  }
+  double focal = 0;
+  if (device != nullptr && device->lens.focal_px) {
+    focal = *device->lens.focal_px;
+    guess.focal_relative_sigma = device->lens.focal_relative_sigma;
+  } else {
+    focal = 1.7 * frame.width;  // 33 deg, between the usual thermal lenses
+    guess.focal_relative_sigma = 0.3;
+    guess.guessed = true;
+  }
+  guess.camera.width = frame.width, guess.camera.height = frame.height;
+  guess.camera.fx = guess.camera.fy = focal;
+  guess.camera.cx = frame.width / 2.0, guess.camera.cy = frame.height / 2.0;
+  return guess;
+}
+
+/// Lines that enough views confirm: as many witnesses as still leave a few hundred lines.
+std::vector<EdgeLine> confirmed(const std::vector<EdgeLine>& lines) {
+  for (const std::size_t views : {5u, 4u, 3u}) {
+    std::vector<EdgeLine> kept;
+    for (const EdgeLine& line : lines)
+      if (line.views.size() >= views) kept.push_back(line);
+    if (kept.size() >= 250 || views == 3) return kept;
+  }
+  return lines;
+}
+
+struct Work {
+  LensGuess lens;
+  LineModel lines;
+  std::vector<const FrameRecord*> frames;
+  std::vector<cv::Mat> images;
+};
+
+/// Pattern search from coarse to fine scales.
+OrbitPose refined(const Work& work, std::size_t i, OrbitPose pose) {
+  struct Level {
+    double sigma_px;
+    PatternSteps steps;
+  };
+  const double unit = work.lens.camera.width / 640.0;
+  for (const Level& level : {Level{6.0, {4.0, 0.08, 2.0, 16.0, 2}},
+                             Level{3.0, {1.5, 0.03, 1.0, 8.0, 3}}}) {
+    const cv::Mat field = orientation_field(work.images[i], level.sigma_px * unit);
+    const cv::Mat small = cell_field(field, std::max(1, field.cols / (level.sigma_px > 4 ? 4 : 2)),
+                                     std::max(1, field.rows / (level.sigma_px > 4 ? 4 : 2)));
+    PatternSteps steps = level.steps;
+    steps.shift_px *= unit;
+    pose = pattern_search(work.lines, work.lens.camera, small, pose, steps);
+  }
+  return pose;
+}
+
+/// One hypothesis taken to the end.
+struct Aligned {
+  OrbitHypothesis hypothesis;
+  std::vector<AlignmentView> views;
+  AlignmentReport report;
+  std::vector<double> support;  ///< agreement of each view's edges with the scene's lines
+
+  double mean_support() const {
+    double sum = 0;
+    for (const double s : support) sum += s;
+    return sum / static_cast<double>(std::max<std::size_t>(support.size(), 1));
+  }
+};
+
+Result<Aligned> align(const Work& work, const OrbitHypothesis& hypothesis,
+                      const PoseOptions& options, const Progress& progress) {
+  Aligned result{hypothesis, {}, {}, {}};
+  std::vector<OrbitPose>& poses = result.hypothesis.poses;
+  parallel_for(static_cast<int>(poses.size()), [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (!progress.cancelled()) poses[k] = refined(work, k, poses[k]);
+  });
+  ORBITFUSE_TRY(progress.check("poses.thermal"));
+  const double unit = work.lens.camera.width / 640.0;
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    result.views.push_back({orientation_field(work.images[i], 1.2 * unit),
+                            {work.frames[i]->file, work.lens.camera,
+                             cam_from_world_of(poses[i], work.lens.camera)}});
+  AlignmentOptions alignment;
+  alignment.focal_px = work.lens.camera.fx;
+  alignment.focal_relative_sigma = work.lens.focal_relative_sigma;
+  alignment.first_reach_px *= unit;
+  alignment.last_reach_px *= unit;
+  alignment.threads = options.threads;
+  ORBITFUSE_ASSIGN(result.report, align_edges(work.lines, result.views, alignment, progress));
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    result.support.push_back(alignment_score(work.lines, result.views[i].view.camera,
+                                             result.views[i].view.cam_from_world,
+                                             orientation_field(work.images[i], 2.0 * unit)));
+  return result;
+}
+
+/// Mean of the paired differences in their own standard error.
+double standard_errors_apart(const std::vector<double>& better, const std::vector<double>& worse) {
+  double sum = 0, squares = 0;
+  for (std::size_t i = 0; i < better.size(); ++i) {
+    const double d = better[i] - worse[i];
+    sum += d, squares += d * d;
+  }
+  const auto n = static_cast<double>(better.size());
+  const double variance = std::max(squares / n - (sum / n) * (sum / n), 1e-12);
+  return (sum / n) / std::sqrt(variance / n);
+}
+
+}  // namespace
+
+Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleScene& visible,
+                                         const std::vector<const FrameRecord*>& frames,
+                                         const PoseOptions& options, const Progress& progress,
+                                         std::vector<LadderStep>& steps) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto tell = [&](double done, const std::string& what) {
+    progress.report({"poses.thermal", done, 4, -1, what});
+  };
+  std::vector<const FrameRecord*> stations;
+  for (const FrameRecord* frame : frames)
+    if (frame->station && !frame->tracking) stations.push_back(frame);
+  if (stations.size() < 4)
+    return fail(ErrorKind::quality, "poses.thermal",
+                fmt::format("{} thermal frames carry stations, 4 are needed to place an orbit",
+                            stations.size()),
+                "declare the stations on import (spacing and number of loops)");
+
+  tell(0, "lines of the visible scene");
+  const Similarity3d canonical_from_visible =
+      canonical_from_world(visible.reconstruction.views, {});
+  Reconstruction canonical = visible.reconstruction;
+  move_world(canonical, canonical_from_visible);
+  ORBITFUSE_ASSIGN(const std::vector<EdgeLine> all_lines,
+                   visible_edge_lines(session, canonical, {}, progress));
+  const std::vector<EdgeLine> lines = confirmed(all_lines);
+  if (lines.size() < 30)
+    return fail(ErrorKind::quality, "poses.thermal",
+                fmt::format("{} edges of the visible scene are confirmed by three views",
+                            lines.size()),
+                "more visible views, or a scene with edges that both cameras see");
+  std::vector<Eigen::Vector3d> centers;
+  for (const PosedView& view : canonical.views) centers.push_back(camera_center(view.cam_from_world));
+
+  Work work{lens_of(session, *stations.front()), LineModel(lines, centers), stations, {}};
+  std::vector<SearchView> search;
+  for (const FrameRecord* frame : stations) {
+    ORBITFUSE_ASSIGN(cv::Mat values, read_luminance(session, *frame));
+    search.push_back({orientation_field(values, 2.0 * frame->width / 640.0), work.lens.camera,
+                      frame->station});
+    work.images.push_back(std::move(values));
+  }
+
+  tell(1, "search of the orbit");
+  OrbitSearchOptions orbit;
+  // At this distance the thermal image shows as much of the scene as the visible one did.
+  const Camera& seen = canonical.views.front().camera;
+  const double similar = work.lens.camera.fx / work.lens.camera.width * seen.width / seen.fx;
+  orbit.nearest = 0.4 * similar;
+  orbit.farthest = 1.8 * similar;
+  ORBITFUSE_ASSIGN(const std::vector<OrbitHypothesis> hypotheses,
+                   search_orbit(work.lines, search, orbit, progress));
+
+  std::vector<Aligned> aligned;
+  for (const OrbitHypothesis& hypothesis : hypotheses) {
+    tell(2, fmt::format("alignment from {:.0f} deg", hypothesis.offset_deg));
+    ORBITFUSE_ASSIGN(Aligned one, align(work, hypothesis, options, progress));
+    aligned.push_back(std::move(one));
+  }
+  std::stable_sort(aligned.begin(), aligned.end(), [](const Aligned& x, const Aligned& y) {
+    return x.mean_support() > y.mean_support();
+  });
+  const Aligned& best = aligned.front();
+  const double decisiveness =
+      aligned.size() > 1 ? standard_errors_apart(best.support, aligned[1].support) : 1e3;
+  LadderStep step{"cross-modal, orbit prior", false, "", 0, static_cast<int>(frames.size()), 0};
+  step.why = fmt::format("{} lines", lines.size());
+  for (const Aligned& one : aligned)
+    step.why += fmt::format("; start at {:.0f} deg{}: agreement {:.3f}", one.hypothesis.offset_deg,
+                            one.hypothesis.mirrored ? " clockwise" : "", one.mean_support());
+  step.why += fmt::format("; {:.1f} standard errors apart", decisiveness);
+  if (decisiveness < min_decisiveness) {
+    step.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    steps.push_back(step);
+    return fail(ErrorKind::quality, "poses.thermal", step.why + ": undecided",
+                "record more thermal stations, or thermal views whose edges show form");
+  }
+  const std::vector<AlignmentView>& views = best.views;
+  const std::vector<double>& support = best.support;
+  const AlignmentReport& report = best.report;
+
+  ThermalPoses result;
+  result.shares_visible_frame = true;
+  result.frame_count = static_cast<int>(frames.size());
+  result.reconstruction.modality = Modality::thermal;
+  std::vector<double> sorted = support;
+  std::sort(sorted.begin(), sorted.end());
+  const double typical = sorted[sorted.size() / 2];
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (!(support[i] >= min_share_of_median * typical)) {
+      result.dropped.push_back(
+          {views[i].view.name, fmt::format("its edges agree with the visible scene at {:.3f}, the "
+                                           "median view at {:.3f}", support[i], typical)});
+      continue;
+    }
+    result.reconstruction.views.push_back(views[i].view);
+  }
+  move_world(result.reconstruction, canonical_from_visible.inverse());
+  result.gates["posed_ratio"] = result.posed_ratio();
+  result.gates["edge_agreement"] = typical;
+  result.gates["orbit_decisiveness"] = decisiveness;
+  result.gates["focal_px"] = report.focal_px;
+  result.gates["focal_sigma_percent"] = 100 * report.focal_relative_sigma;
+  sorted = report.residual_px;
+  std::sort(sorted.begin(), sorted.end());
+  result.gates["edge_residual_px"] = sorted[sorted.size() / 2];
+  step.posed = static_cast<int>(result.reconstruction.views.size());
+  step.held = result.posed_ratio() >= options.min_posed_ratio;
+  step.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  steps.push_back(step);
+  if (!step.held)
+    return fail(ErrorKind::quality, "poses.thermal",
+                fmt::format("{} of {} thermal views aligned", step.posed, step.total),
+                "see the dropped views");
+  result.skips.push_back({"thermal COLMAP", "thermal views were placed in the visible scene",
+                          "no feature matching; one frame for both modalities"});
+  return result;
+}
+
+}  // namespace orbitfuse
