@@ -77,8 +77,8 @@ struct Search {
 
 /// Coarse scores for all, a short refinement for the best, full refinement for the best of those.
 Candidates narrowed(const Search& search, Candidates candidates) {
-  constexpr RefineOptions brief_refinement{0.25, 0.12, 6, 0, false};
-  constexpr RefineOptions full_refinement{0.15, 0.06, 8, 6, true};
+  constexpr RefineOptions brief_refinement{0.25, 0.12, 6, 0, false, false};
+  constexpr RefineOptions full_refinement{0.15, 0.06, 8, 6, true, true};
   for (Candidate& c : candidates) c.score = search.score(c.target_from_source, 200, {0.2, 0.2});
   candidates = best_distinct(std::move(candidates), 24);
   for (Candidate& c : candidates) {
@@ -130,21 +130,28 @@ bool decisive(const Candidates& ranked, const RegistrationOptions& options) {
   return !ranked.empty() && ranked[0].score >= options.decisive_score;
 }
 
+/// Candidates from descriptors, the likeliest ratio of sizes first: most pairs need no other.
 Candidates feature_candidates(const Search& search) {
   constexpr double kRadius = 0.35;
   const FeaturePoints source = feature_points(search.source, 1000);
   const FeaturePoints target = feature_points(search.target, 1000);
   const Descriptors target_descriptors = describe(target, kRadius);
-  Candidates all;
-  for (const double scale : {1.0, 0.8, 1.25, 0.64, 1.5625}) {
-    if (scale < search.options.min_scale || scale > search.options.max_scale) continue;
+  const auto at_scale = [&](double scale) -> Candidates {
+    if (scale < search.options.min_scale || scale > search.options.max_scale) return {};
     const auto matches = mutual_matches(describe(source, kRadius / scale), target_descriptors, 500);
-    Candidates found = consensus_candidates(source, target, matches, scale, 40);
-    all.insert(all.end(), found.begin(), found.end());
-    all = narrowed(search, std::move(all));
-    if (decisive(all, search.options)) break;
+    return consensus_candidates(source, target, matches, scale, 40);
+  };
+  Candidates all = narrowed(search, at_scale(1));
+  if (decisive(all, search.options)) {
+    all = with_turns(search, std::move(all));
+    if (decisive(all, search.options)) return all;
   }
-  return with_turns(search, std::move(all));
+  for (const double scale : {0.8, 1.25, 0.64, 1.5625}) {
+    const Candidates found = at_scale(scale);
+    all.insert(all.end(), found.begin(), found.end());
+  }
+  all = narrowed(search, std::move(all));
+  return decisive(all, search.options) ? with_turns(search, std::move(all)) : all;
 }
 
 struct Found {
@@ -175,7 +182,7 @@ void measure_spread(const Search& search, const Refined& best, RegistrationRepor
     Vector7 kick;
     for (int k = 0; k < 7; ++k) kick[k] = 0.035 * unit(random);
     const Similarity3d start = updated(best.target_from_source, best.target_from_source.translation, kick);
-    const Similarity3d end = search.refine_with(start, 600, {0.12, 0.06, 6, 4, true}).target_from_source;
+    const Similarity3d end = search.refine_with(start, 600, {0.12, 0.06, 6, 4, true, true}).target_from_source;
     report.spread_rotation_deg =
         std::max(report.spread_rotation_deg,
                  rotation_angle_deg(end.rotation, best.target_from_source.rotation));
@@ -195,7 +202,7 @@ void add_words(std::string& text, const std::string& words) {
 
 /// Last refinement on all points and everything the report says about the result.
 RegistrationReport reported(const Search& search, const Similarity3d& start) {
-  constexpr RefineOptions last{0.10, 0.06, 5, 20, true};
+  constexpr RefineOptions last{0.10, 0.06, 5, 20, true, true};
   const Refined best = search.refine_with(start, 1 << 30, last);
   RegistrationReport report;
   const Similarity3d target_from_unit = search.target.unit_from_cloud.inverse();
@@ -280,7 +287,7 @@ Result<RegistrationReport> refine_registration(const PointCloud& source_cloud, c
   ORBITFUSE_ASSIGN(const PreparedCloud target, prepare(target_cloud, options, "target cloud"));
   const Search search(source, target, options);
   const Similarity3d unit_start = target.unit_from_cloud * start * source.unit_from_cloud.inverse();
-  const Similarity3d closer = search.refine_with(unit_start, 800, {0.2, 0.06, 10, 4, true}).target_from_source;
+  const Similarity3d closer = search.refine_with(unit_start, 800, {0.2, 0.06, 10, 4, true, true}).target_from_source;
   RegistrationReport report = reported(search, closer);
   report.initialiser = "given start";
   report.cpu_s = cpu_seconds() - started;

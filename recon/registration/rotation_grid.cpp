@@ -44,7 +44,7 @@ Candidates grid_candidates(const PreparedCloud& source, const PreparedCloud& tar
   for (const Round& round : rounds) {
     const auto source_subset = strided_subset(source.points.size(), round.points);
     const auto target_subset = strided_subset(target.points.size(), round.points);
-    const RefineOptions coarse{round.start_bound, round.end_bound, round.iterations, 0, false};
+    const RefineOptions coarse{round.start_bound, round.end_bound, round.iterations, 0, false, false};
     const ScoreBounds bounds{round.end_bound, round.end_bound};
     for (Candidate& candidate : candidates) {
       candidate.target_from_source =
