@@ -38,6 +38,9 @@ Candidates best_distinct(Candidates candidates, std::size_t most) {
 
 namespace {
 
+// Right placements stay above these but for clouds that are mostly outliers.
+constexpr double kWeakScore = 0.25, kWeakEvidence = 0.04;
+
 double cpu_seconds() {
   timespec t{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
@@ -54,24 +57,23 @@ struct Search {
   Search(const PreparedCloud& s, const PreparedCloud& t, const RegistrationOptions& o)
       : source(s), target(t), options(o) {
     // Options speak of the diameter, the unit frames of the radius.
-    coarse = {2 * o.max_pair_distance, 2 * o.max_pair_distance};
-    fine = {2 * o.max_pair_distance, 4 * o.inlier_distance};
+    coarse = {2 * o.max_pair_distance, 2 * o.max_pair_distance, 0};
+    fine = {2 * o.max_pair_distance, 4 * o.inlier_distance, 0};
   }
 
-  /// As strict as the clouds are clean: residuals of the best placement are noise, and so nothing
-  /// beyond three sigma is agreement. Overlap alone must not outvote a contradiction.
-  ScoreBounds fine_bounds(double sigma) const {
-    return {fine.pair, std::clamp(3 * sigma, 0.015, fine.plane), 2.0};
+  /// As strict as the clouds are clean: the best placement's residuals are noise.
+  ScoreBounds strict(double sigma) const {
+    return {fine.pair, std::clamp(2 * sigma, 0.015, fine.plane), 2 * fine.pair};
   }
   Refined refine_with(const Similarity3d& start, int points, const RefineOptions& how) const {
     return refine(source, target, strided_subset(source.points.size(), points),
                   strided_subset(target.points.size(), points), start, how);
   }
-  double score(const Similarity3d& placement, int points, const ScoreBounds& bounds) const {
+  Agreement agree(const Similarity3d& placement, int points, const ScoreBounds& bounds) const {
     const double s = placement.scale;
-    if (!placement.is_finite() || s < options.min_scale || s > options.max_scale) return 0;
-    return two_sided_score(source, target, strided_subset(source.points.size(), points),
-                           strided_subset(target.points.size(), points), placement, bounds);
+    if (!placement.is_finite() || s < options.min_scale || s > options.max_scale) return {};
+    return agreement(source, target, strided_subset(source.points.size(), points),
+                     strided_subset(target.points.size(), points), placement, bounds);
   }
 };
 
@@ -79,11 +81,11 @@ struct Search {
 Candidates narrowed(const Search& search, Candidates candidates) {
   constexpr RefineOptions brief_refinement{0.25, 0.12, 6, 0, false, false};
   constexpr RefineOptions full_refinement{0.15, 0.06, 8, 6, true, true};
-  for (Candidate& c : candidates) c.score = search.score(c.target_from_source, 200, {0.2, 0.2});
+  for (Candidate& c : candidates) c.score = search.agree(c.target_from_source, 200, {0.2, 0.2, 0}).score;
   candidates = best_distinct(std::move(candidates), 24);
   for (Candidate& c : candidates) {
     c.target_from_source = search.refine_with(c.target_from_source, 250, brief_refinement).target_from_source;
-    c.score = search.score(c.target_from_source, 500, search.coarse);
+    c.score = search.agree(c.target_from_source, 500, search.coarse).score;
   }
   candidates = best_distinct(std::move(candidates), 12);
   double sigma = INFINITY;
@@ -93,7 +95,8 @@ Candidates narrowed(const Search& search, Candidates candidates) {
     if (refined.pairs > 400) sigma = std::min(sigma, refined.residual_sigma);
   }
   for (Candidate& c : candidates) {
-    c.score = search.score(c.target_from_source, 1 << 30, search.fine_bounds(sigma));
+    c.score = search.agree(c.target_from_source, 1 << 30, search.strict(sigma)).evidence;
+    c.agreement = search.agree(c.target_from_source, 1 << 30, search.fine).score;
   }
   return best_distinct(std::move(candidates), 6);
 }
@@ -113,7 +116,7 @@ Candidates turned(const Search& search, const Candidate& best) {
       Similarity3d turn;
       turn.rotation = Eigen::AngleAxisd(quarters * std::numbers::pi / 2, axes.col(axis));
       turn.translation = mean - turn.rotation * mean;
-      all.push_back({best.target_from_source * turn, 0, best.origin + ", turned"});
+      all.push_back({best.target_from_source * turn, 0, 0, best.origin + ", turned"});
     }
   }
   return all;
@@ -127,7 +130,10 @@ Candidates with_turns(const Search& search, Candidates ranked) {
 }
 
 bool decisive(const Candidates& ranked, const RegistrationOptions& options) {
-  return !ranked.empty() && ranked[0].score >= options.decisive_score;
+  constexpr double kBorneOut = 0.45, kRival = 0.7;
+  if (ranked.empty() || ranked[0].agreement < options.decisive_score) return false;
+  if (ranked[0].score < kBorneOut * ranked[0].agreement) return false;
+  return ranked.size() < 2 || ranked[1].score < kRival * ranked[0].score;
 }
 
 /// Candidates from descriptors, the likeliest ratio of sizes first: most pairs need no other.
@@ -165,7 +171,7 @@ Result<Found> search_all(const Search& search, const Progress& progress) {
   ORBITFUSE_TRY(progress.check("registration"));
   if (decisive(found.ranked, search.options)) {
     found.skips.push_back({"feature-free rotation grid",
-                           fmt::format("features gave a two-sided score of {:.2f}", found.ranked[0].score),
+                           fmt::format("features gave a two-sided score of {:.2f}", found.ranked[0].agreement),
                            "saved its search over SO(3) and scale"});
     return found;
   }
@@ -207,7 +213,8 @@ RegistrationReport reported(const Search& search, const Similarity3d& start) {
   RegistrationReport report;
   const Similarity3d target_from_unit = search.target.unit_from_cloud.inverse();
   report.target_from_source = target_from_unit * best.target_from_source * search.source.unit_from_cloud;
-  report.score = search.score(best.target_from_source, 1 << 30, search.fine_bounds(best.residual_sigma));
+  report.score = search.agree(best.target_from_source, 1 << 30, search.fine).score;
+  report.evidence = search.agree(best.target_from_source, 1 << 30, search.strict(best.residual_sigma)).evidence;
   const MatchFigures matched = match_figures(search.source, search.target, best.target_from_source,
                                              2 * search.options.inlier_distance);
   const MatchFigures near = match_figures(search.source, search.target, best.target_from_source,
@@ -221,6 +228,11 @@ RegistrationReport reported(const Search& search, const Similarity3d& start) {
   if (const std::string open = open_directions(best.hessian); !open.empty()) {
     report.ambiguous = true;
     add_words(report.ambiguity, "the shape leaves open: " + open);
+  }
+  if (report.score < kWeakScore || report.evidence < kWeakEvidence) {
+    report.ambiguous = true;
+    add_words(report.ambiguity, fmt::format("the clouds support it weakly (score {:.2f}, evidence {:.2f})",
+                                            report.score, report.evidence));
   }
   return report;
 }
@@ -248,13 +260,14 @@ Result<RegistrationReport> register_clouds(const PointCloud& source_cloud, const
   for (const Candidate& c : found.ranked) {
     RegistrationAlternative a;
     a.target_from_source = target.unit_from_cloud.inverse() * c.target_from_source * source.unit_from_cloud;
-    a.score = c.score;
+    a.score = c.agreement;
+    a.evidence = c.score;
     a.origin = c.origin;
     judged.push_back(std::move(a));
   }
-  const double best_score = judged[0].score;
+  const double most = judged[0].evidence;
   std::size_t rivals = 1;
-  while (rivals < judged.size() && judged[rivals].score >= options.ambiguity_ratio * best_score) ++rivals;
+  while (rivals < judged.size() && judged[rivals].evidence >= options.ambiguity_ratio * most) ++rivals;
   std::size_t chosen = 0;
   if (view_score && rivals > 1) {
     for (std::size_t i = 0; i < rivals; ++i) judged[i].view_score = view_score(judged[i].target_from_source);
@@ -267,8 +280,8 @@ Result<RegistrationReport> register_clouds(const PointCloud& source_cloud, const
   report.skips = std::move(found.skips);
   if (rivals > 1 && !view_score) {
     report.ambiguous = true;
-    add_words(report.ambiguity, fmt::format("{} placements score within {:.0f} % of the best", rivals,
-                                            100 * (1 - options.ambiguity_ratio)));
+    add_words(report.ambiguity, fmt::format("{} placements have {:.0f} % of the best one's evidence or more", rivals,
+                                            100 * options.ambiguity_ratio));
   }
   judged.erase(judged.begin() + static_cast<std::ptrdiff_t>(chosen));
   report.alternatives = std::move(judged);

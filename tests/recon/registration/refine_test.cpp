@@ -68,15 +68,15 @@ TEST(Score, ShrinkingTheSourceNeverWins) {
   const auto target = prepare(drawn(2500, 2, on_potato), {}, "target");
   ASSERT_TRUE(source && target);
   const Similarity3d truth = target->unit_from_cloud * source->unit_from_cloud.inverse();
-  const double right = two_sided_score(*source, *target, truth, {});
+  const double right = agreement(*source, *target, truth, {}).score;
   EXPECT_GT(right, 0.8);
   for (const double shrink : {0.9, 0.7, 0.4, 0.1, 0.01}) {
     Similarity3d small = truth;
     small.scale *= shrink;
     small.translation = target->points[0];
-    EXPECT_LT(two_sided_score(*source, *target, small, {}), 0.5 * right) << shrink;
+    EXPECT_LT(agreement(*source, *target, small, {}).score, 0.5 * right) << shrink;
     small.translation = truth.translation;
-    EXPECT_LT(two_sided_score(*source, *target, small, {}), 0.9 * right) << shrink;
+    EXPECT_LT(agreement(*source, *target, small, {}).score, 0.9 * right) << shrink;
   }
 }
 

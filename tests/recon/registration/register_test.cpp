@@ -81,7 +81,7 @@ TEST(Register, ViewsDecideBetweenPlacementsThatGeometryCannot) {
   ASSERT_TRUE(alone);
   ASSERT_TRUE(alone->ambiguous);
   ASSERT_FALSE(alone->alternatives.empty());
-  const Similarity3d wanted = alone->alternatives.back().score > 0.9 * alone->score
+  const Similarity3d wanted = alone->alternatives.back().evidence > 0.9 * alone->evidence
                                   ? alone->alternatives.back().target_from_source
                                   : alone->alternatives.front().target_from_source;
   const ViewScore views = [&](const Similarity3d& s) { return -rotation_angle_deg(s.rotation, wanted.rotation); };
