@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/registration/outlier_filter.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "recon/registration/kd_tree.hpp"
@@ -9,24 +11,73 @@
 namespace orbitfuse::registration {
 namespace {
 
-constexpr std::size_t kNeighbours = 7;  // the point itself and six
+constexpr std::size_t kNeighbours = 31;  // the point itself and thirty
+constexpr std::size_t kSpanning = 13;    // planes go through two of the nearest of these
+constexpr double kSlab = 0.03;           // half thickness in which points support a plane
 
-std::vector<double> log_neighbour_distances(const Points& points) {
-  const KdTree tree(points);
-  std::vector<double> logs(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    std::size_t index[kNeighbours];
-    double d2[kNeighbours];
-    tree.nearest(points[i], kNeighbours, index, d2);
-    logs[i] = 0.5 * std::log(std::max(d2[kNeighbours - 1], 1e-18));
+using Neighbourhood = std::array<std::size_t, kNeighbours>;
+
+/// 0 flat .. 1 round: root of smallest over largest variance.
+double thickness(const Points& points, const Neighbourhood& around, std::size_t count) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (std::size_t j = 0; j < count; ++j) mean += points[around[j]] / static_cast<double>(count);
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (std::size_t j = 0; j < count; ++j) {
+    scatter += (points[around[j]] - mean) * (points[around[j]] - mean).transpose();
   }
-  return logs;
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.computeDirect(scatter, Eigen::EigenvaluesOnly);
+  const Eigen::Vector3d& e = solver.eigenvalues();
+  return e[2] > 0 ? std::sqrt(std::max(0.0, e[0] / e[2])) : 0;
+}
+
+/// Most points near one plane through the first point, over planes through pairs of its neighbours.
+double best_plane_support(const Points& points, const Neighbourhood& around) {
+  std::array<Eigen::Vector3f, kNeighbours> d;
+  for (std::size_t j = 0; j < kNeighbours; ++j) {
+    d[j] = ((points[around[j]] - points[around[0]]) / kSlab).cast<float>();
+  }
+  float best = 0;
+  for (std::size_t a = 1; a <= kSpanning; ++a) {
+    for (std::size_t b = a + 1; b <= kSpanning; ++b) {
+      const Eigen::Vector3f normal = d[a].cross(d[b]);
+      const float length2 = normal.squaredNorm();
+      if (length2 < 0.09f * d[a].squaredNorm() * d[b].squaredNorm()) continue;
+      const float per_length2 = 1 / std::max(length2, 1e-12f);
+      float support = 0;
+      for (std::size_t j = 1; j < kNeighbours; ++j) {
+        const float h = normal.dot(d[j]);
+        support += std::max(0.0f, 1 - h * h * per_length2);
+      }
+      best = std::max(best, support);
+    }
+  }
+  return best;
+}
+
+/// Low for points on a surface: minus the log of the plane's support per area.
+struct Scatter {
+  std::vector<double> strangeness, thickness;
+};
+
+Scatter scatter_of(const Points& points) {
+  const KdTree tree(points);
+  Scatter scatter;
+  for (const auto& p : points) {
+    Neighbourhood around;
+    std::array<double, kNeighbours> d2;
+    tree.nearest(p, kNeighbours, around.data(), d2.data());
+    const double area = std::max(d2.back(), 1e-12);
+    scatter.strangeness.push_back(-std::log((best_plane_support(points, around) + 0.1) / area));
+    scatter.thickness.push_back(thickness(points, around, 16));
+  }
+  return scatter;
 }
 
 struct Split {
   double limit = INFINITY;
   double separation = 0;  ///< of the means in pooled standard deviations
-  double log_ratio = 0;   ///< of the mean distances
+  double step = 0;        ///< between the means
 };
 
 /// Two populations with the least variance inside (Otsu 1979) over exact order statistics.
@@ -56,21 +107,41 @@ Split otsu(std::vector<double> sorted) {
   const auto [far_mean, far_variance] = mean_variance(at, n);
   Split split;
   split.limit = sorted[at];
-  split.log_ratio = far_mean - near_mean;
-  split.separation = split.log_ratio / std::sqrt(near_variance + far_variance + 1e-6);
+  split.step = far_mean - near_mean;
+  split.separation = split.step / std::sqrt(near_variance + far_variance + 1e-6);
   return split;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
 }
 
 }  // namespace
 
 Points without_outliers(const Points& points) {
-  if (points.size() < 200) return points;
-  const std::vector<double> logs = log_neighbour_distances(points);
-  const Split split = otsu(logs);
-  if (!(split.separation > 2.2 && split.log_ratio > std::log(1.8))) return points;
-  Points kept;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (logs[i] < split.limit) kept.push_back(points[i]);
+  // A sparse part of a surface is flat and 1 % noise 0.4 thick; points that fill space are 0.55.
+  constexpr double kThick = 0.42, kVolume = 0.46;
+  Points kept = points;
+  for (int pass = 0; pass < 4 && kept.size() >= 200; ++pass) {
+    const Scatter scatter = scatter_of(kept);
+    const Split split = otsu(scatter.strangeness);
+    std::vector<double> far_thickness;
+    Points near;
+    for (std::size_t i = 0; i < kept.size(); ++i) {
+      if (scatter.strangeness[i] < split.limit) {
+        near.push_back(kept[i]);
+      } else {
+        far_thickness.push_back(scatter.thickness[i]);
+      }
+    }
+    const double thick = median(far_thickness);
+    const bool two_populations = split.separation > 2.0 && split.step > 0.7 && thick > kThick;
+    const bool drowned =
+        split.separation > 1.5 && split.step > (pass == 0 ? 0.5 : 0.65) && thick > kVolume;
+    if (!(two_populations || drowned) || near.size() < std::max<std::size_t>(20, points.size() / 12)) break;
+    kept = std::move(near);
   }
   return kept;
 }
