@@ -57,7 +57,7 @@ struct Search {
   Search(const PreparedCloud& s, const PreparedCloud& t, const RegistrationOptions& o)
       : source(s), target(t), options(o) {
     // Options speak of the diameter, the unit frames of the radius.
-    coarse = {2 * o.max_pair_distance, 2 * o.max_pair_distance, 0};
+    coarse = {2 * o.max_pair_distance, o.max_pair_distance, 4 * o.max_pair_distance};
     fine = {2 * o.max_pair_distance, 4 * o.inlier_distance, 0};
   }
 
@@ -82,12 +82,12 @@ Candidates narrowed(const Search& search, Candidates candidates) {
   constexpr RefineOptions brief_refinement{0.25, 0.12, 6, 0, false, false};
   constexpr RefineOptions full_refinement{0.15, 0.06, 8, 6, true, true};
   for (Candidate& c : candidates) c.score = search.agree(c.target_from_source, 200, {0.2, 0.2, 0}).score;
-  candidates = best_distinct(std::move(candidates), 24);
+  candidates = best_distinct(std::move(candidates), 30);
   for (Candidate& c : candidates) {
     c.target_from_source = search.refine_with(c.target_from_source, 250, brief_refinement).target_from_source;
-    c.score = search.agree(c.target_from_source, 500, search.coarse).score;
+    c.score = search.agree(c.target_from_source, 500, search.coarse).evidence;
   }
-  candidates = best_distinct(std::move(candidates), 12);
+  candidates = best_distinct(std::move(candidates), 14);
   double sigma = INFINITY;
   for (Candidate& c : candidates) {
     const Refined refined = search.refine_with(c.target_from_source, 800, full_refinement);
@@ -102,7 +102,8 @@ Candidates narrowed(const Search& search, Candidates candidates) {
 }
 
 /// The placements that a near-symmetric object could be mistaken for: quarter and half turns about
-/// the source's principal axes.
+/// the source's principal axes; and shifts along the longest one, as clouds that overlap in part
+/// fit better centre on centre than where they belong.
 Candidates turned(const Search& search, const Candidate& best) {
   const Points& points = search.source.points;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -112,11 +113,16 @@ Candidates turned(const Search& search, const Candidate& best) {
   const Eigen::Matrix3d axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvectors();
   Candidates all;
   for (int axis = 0; axis < 3; ++axis) {
-    for (const double quarters : {1.0, 2.0, 3.0}) {
-      Similarity3d turn;
-      turn.rotation = Eigen::AngleAxisd(quarters * std::numbers::pi / 2, axes.col(axis));
-      turn.translation = mean - turn.rotation * mean;
-      all.push_back({best.target_from_source * turn, 0, 0, best.origin + ", turned"});
+    for (const double quarters : {0.0, 1.0, 2.0, 3.0}) {
+      for (const double shift : {-0.5, 0.0, 0.5}) {
+        if (quarters == 0 && (shift == 0 || axis > 0)) continue;
+        Similarity3d turn;
+        turn.rotation = Eigen::AngleAxisd(quarters * std::numbers::pi / 2, axes.col(axis));
+        turn.translation = mean - turn.rotation * mean + shift * axes.col(2);
+        const Similarity3d start = best.target_from_source * turn;
+        all.push_back({search.refine_with(start, 150, {0.35, 0.2, 5, 0, false, false}).target_from_source,
+                       0, 0, best.origin + ", turned"});
+      }
     }
   }
   return all;
@@ -175,7 +181,7 @@ Result<Found> search_all(const Search& search, const Progress& progress) {
                            "saved its search over SO(3) and scale"});
     return found;
   }
-  Candidates grid = grid_candidates(search.source, search.target, search.options, 12);
+  Candidates grid = grid_candidates(search.source, search.target, search.options, 16);
   grid.insert(grid.end(), found.ranked.begin(), found.ranked.end());
   found.ranked = with_turns(search, narrowed(search, std::move(grid)));
   return found;
