@@ -83,9 +83,9 @@ void run_trial(const bench::CloudPair& pair, const Arguments& arguments, const s
       among |= rotation_angle_deg(a.target_from_source.rotation, truth.rotation) < 5 && scale_error_percent(a.target_from_source, truth) < 5;
     }
     const auto oracle = refine_registration(pair.source, pair.target, truth, options);
-    fmt::print("  {} seed {}: {:.1f} deg, {:.1f} %, {:.0f} ms; truth among alternatives: {}, truth's score {:.3f}; runner-up {:.3f}; {}\n", label, seed,
-               rotation, scale, 1000 * report->cpu_s, among, oracle ? oracle->score : -1,
-               report->alternatives.empty() ? 0 : report->alternatives[0].score, report->brief());
+    fmt::print("  {} seed {}: {:.1f} deg, {:.1f} %, {:.0f} ms; truth among alternatives: {}, truth's evidence {:.3f}; runner-up {:.3f}; {}\n", label, seed,
+               rotation, scale, 1000 * report->cpu_s, among, oracle ? oracle->evidence : -1,
+               report->alternatives.empty() ? 0 : report->alternatives[0].evidence, report->brief());
     std::fflush(stdout);
   }
 }

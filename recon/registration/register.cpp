@@ -38,6 +38,9 @@ Candidates best_distinct(Candidates candidates, std::size_t most) {
 
 namespace {
 
+// Right placements stay above these but for clouds that are mostly outliers.
+constexpr double kWeakScore = 0.25, kWeakEvidence = 0.04;
+
 double cpu_seconds() {
   timespec t{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
@@ -54,36 +57,35 @@ struct Search {
   Search(const PreparedCloud& s, const PreparedCloud& t, const RegistrationOptions& o)
       : source(s), target(t), options(o) {
     // Options speak of the diameter, the unit frames of the radius.
-    coarse = {2 * o.max_pair_distance, 2 * o.max_pair_distance};
-    fine = {2 * o.max_pair_distance, 4 * o.inlier_distance};
+    coarse = {2 * o.max_pair_distance, 2 * o.max_pair_distance, 0};
+    fine = {2 * o.max_pair_distance, 4 * o.inlier_distance, 0};
   }
 
-  /// As strict as the clouds are clean: residuals of the best placement are noise, and so nothing
-  /// beyond three sigma is agreement. Overlap alone must not outvote a contradiction.
-  ScoreBounds fine_bounds(double sigma) const {
-    return {fine.pair, std::clamp(3 * sigma, 0.015, fine.plane), 2.0};
+  /// As strict as the clouds are clean: the best placement's residuals are noise.
+  ScoreBounds strict(double sigma) const {
+    return {fine.pair, std::clamp(2 * sigma, 0.015, fine.plane), 2 * fine.pair};
   }
   Refined refine_with(const Similarity3d& start, int points, const RefineOptions& how) const {
     return refine(source, target, strided_subset(source.points.size(), points),
                   strided_subset(target.points.size(), points), start, how);
   }
-  double score(const Similarity3d& placement, int points, const ScoreBounds& bounds) const {
+  Agreement agree(const Similarity3d& placement, int points, const ScoreBounds& bounds) const {
     const double s = placement.scale;
-    if (!placement.is_finite() || s < options.min_scale || s > options.max_scale) return 0;
-    return two_sided_score(source, target, strided_subset(source.points.size(), points),
-                           strided_subset(target.points.size(), points), placement, bounds);
+    if (!placement.is_finite() || s < options.min_scale || s > options.max_scale) return {};
+    return agreement(source, target, strided_subset(source.points.size(), points),
+                     strided_subset(target.points.size(), points), placement, bounds);
   }
 };
 
 /// Coarse scores for all, a short refinement for the best, full refinement for the best of those.
 Candidates narrowed(const Search& search, Candidates candidates) {
-  constexpr RefineOptions brief_refinement{0.25, 0.12, 6, 0, false};
-  constexpr RefineOptions full_refinement{0.15, 0.06, 8, 6, true};
-  for (Candidate& c : candidates) c.score = search.score(c.target_from_source, 200, {0.2, 0.2});
+  constexpr RefineOptions brief_refinement{0.25, 0.12, 6, 0, false, false};
+  constexpr RefineOptions full_refinement{0.15, 0.06, 8, 6, true, true};
+  for (Candidate& c : candidates) c.score = search.agree(c.target_from_source, 200, {0.2, 0.2, 0}).score;
   candidates = best_distinct(std::move(candidates), 24);
   for (Candidate& c : candidates) {
     c.target_from_source = search.refine_with(c.target_from_source, 250, brief_refinement).target_from_source;
-    c.score = search.score(c.target_from_source, 500, search.coarse);
+    c.score = search.agree(c.target_from_source, 500, search.coarse).score;
   }
   candidates = best_distinct(std::move(candidates), 12);
   double sigma = INFINITY;
@@ -93,7 +95,8 @@ Candidates narrowed(const Search& search, Candidates candidates) {
     if (refined.pairs > 400) sigma = std::min(sigma, refined.residual_sigma);
   }
   for (Candidate& c : candidates) {
-    c.score = search.score(c.target_from_source, 1 << 30, search.fine_bounds(sigma));
+    c.score = search.agree(c.target_from_source, 1 << 30, search.strict(sigma)).evidence;
+    c.agreement = search.agree(c.target_from_source, 1 << 30, search.fine).score;
   }
   return best_distinct(std::move(candidates), 6);
 }
@@ -113,7 +116,7 @@ Candidates turned(const Search& search, const Candidate& best) {
       Similarity3d turn;
       turn.rotation = Eigen::AngleAxisd(quarters * std::numbers::pi / 2, axes.col(axis));
       turn.translation = mean - turn.rotation * mean;
-      all.push_back({best.target_from_source * turn, 0, best.origin + ", turned"});
+      all.push_back({best.target_from_source * turn, 0, 0, best.origin + ", turned"});
     }
   }
   return all;
@@ -127,24 +130,34 @@ Candidates with_turns(const Search& search, Candidates ranked) {
 }
 
 bool decisive(const Candidates& ranked, const RegistrationOptions& options) {
-  return !ranked.empty() && ranked[0].score >= options.decisive_score;
+  constexpr double kBorneOut = 0.45, kRival = 0.7;
+  if (ranked.empty() || ranked[0].agreement < options.decisive_score) return false;
+  if (ranked[0].score < kBorneOut * ranked[0].agreement) return false;
+  return ranked.size() < 2 || ranked[1].score < kRival * ranked[0].score;
 }
 
+/// Candidates from descriptors, the likeliest ratio of sizes first: most pairs need no other.
 Candidates feature_candidates(const Search& search) {
   constexpr double kRadius = 0.35;
   const FeaturePoints source = feature_points(search.source, 1000);
   const FeaturePoints target = feature_points(search.target, 1000);
   const Descriptors target_descriptors = describe(target, kRadius);
-  Candidates all;
-  for (const double scale : {1.0, 0.8, 1.25, 0.64, 1.5625}) {
-    if (scale < search.options.min_scale || scale > search.options.max_scale) continue;
+  const auto at_scale = [&](double scale) -> Candidates {
+    if (scale < search.options.min_scale || scale > search.options.max_scale) return {};
     const auto matches = mutual_matches(describe(source, kRadius / scale), target_descriptors, 500);
-    Candidates found = consensus_candidates(source, target, matches, scale, 40);
-    all.insert(all.end(), found.begin(), found.end());
-    all = narrowed(search, std::move(all));
-    if (decisive(all, search.options)) break;
+    return consensus_candidates(source, target, matches, scale, 40);
+  };
+  Candidates all = narrowed(search, at_scale(1));
+  if (decisive(all, search.options)) {
+    all = with_turns(search, std::move(all));
+    if (decisive(all, search.options)) return all;
   }
-  return with_turns(search, std::move(all));
+  for (const double scale : {0.8, 1.25, 0.64, 1.5625}) {
+    const Candidates found = at_scale(scale);
+    all.insert(all.end(), found.begin(), found.end());
+  }
+  all = narrowed(search, std::move(all));
+  return decisive(all, search.options) ? with_turns(search, std::move(all)) : all;
 }
 
 struct Found {
@@ -158,7 +171,7 @@ Result<Found> search_all(const Search& search, const Progress& progress) {
   ORBITFUSE_TRY(progress.check("registration"));
   if (decisive(found.ranked, search.options)) {
     found.skips.push_back({"feature-free rotation grid",
-                           fmt::format("features gave a two-sided score of {:.2f}", found.ranked[0].score),
+                           fmt::format("features gave a two-sided score of {:.2f}", found.ranked[0].agreement),
                            "saved its search over SO(3) and scale"});
     return found;
   }
@@ -175,7 +188,7 @@ void measure_spread(const Search& search, const Refined& best, RegistrationRepor
     Vector7 kick;
     for (int k = 0; k < 7; ++k) kick[k] = 0.035 * unit(random);
     const Similarity3d start = updated(best.target_from_source, best.target_from_source.translation, kick);
-    const Similarity3d end = search.refine_with(start, 600, {0.12, 0.06, 6, 4, true}).target_from_source;
+    const Similarity3d end = search.refine_with(start, 600, {0.12, 0.06, 6, 4, true, true}).target_from_source;
     report.spread_rotation_deg =
         std::max(report.spread_rotation_deg,
                  rotation_angle_deg(end.rotation, best.target_from_source.rotation));
@@ -195,12 +208,13 @@ void add_words(std::string& text, const std::string& words) {
 
 /// Last refinement on all points and everything the report says about the result.
 RegistrationReport reported(const Search& search, const Similarity3d& start) {
-  constexpr RefineOptions last{0.10, 0.06, 5, 20, true};
+  constexpr RefineOptions last{0.10, 0.06, 5, 20, true, true};
   const Refined best = search.refine_with(start, 1 << 30, last);
   RegistrationReport report;
   const Similarity3d target_from_unit = search.target.unit_from_cloud.inverse();
   report.target_from_source = target_from_unit * best.target_from_source * search.source.unit_from_cloud;
-  report.score = search.score(best.target_from_source, 1 << 30, search.fine_bounds(best.residual_sigma));
+  report.score = search.agree(best.target_from_source, 1 << 30, search.fine).score;
+  report.evidence = search.agree(best.target_from_source, 1 << 30, search.strict(best.residual_sigma)).evidence;
   const MatchFigures matched = match_figures(search.source, search.target, best.target_from_source,
                                              2 * search.options.inlier_distance);
   const MatchFigures near = match_figures(search.source, search.target, best.target_from_source,
@@ -214,6 +228,11 @@ RegistrationReport reported(const Search& search, const Similarity3d& start) {
   if (const std::string open = open_directions(best.hessian); !open.empty()) {
     report.ambiguous = true;
     add_words(report.ambiguity, "the shape leaves open: " + open);
+  }
+  if (report.score < kWeakScore || report.evidence < kWeakEvidence) {
+    report.ambiguous = true;
+    add_words(report.ambiguity, fmt::format("the clouds support it weakly (score {:.2f}, evidence {:.2f})",
+                                            report.score, report.evidence));
   }
   return report;
 }
@@ -241,13 +260,14 @@ Result<RegistrationReport> register_clouds(const PointCloud& source_cloud, const
   for (const Candidate& c : found.ranked) {
     RegistrationAlternative a;
     a.target_from_source = target.unit_from_cloud.inverse() * c.target_from_source * source.unit_from_cloud;
-    a.score = c.score;
+    a.score = c.agreement;
+    a.evidence = c.score;
     a.origin = c.origin;
     judged.push_back(std::move(a));
   }
-  const double best_score = judged[0].score;
+  const double most = judged[0].evidence;
   std::size_t rivals = 1;
-  while (rivals < judged.size() && judged[rivals].score >= options.ambiguity_ratio * best_score) ++rivals;
+  while (rivals < judged.size() && judged[rivals].evidence >= options.ambiguity_ratio * most) ++rivals;
   std::size_t chosen = 0;
   if (view_score && rivals > 1) {
     for (std::size_t i = 0; i < rivals; ++i) judged[i].view_score = view_score(judged[i].target_from_source);
@@ -260,8 +280,8 @@ Result<RegistrationReport> register_clouds(const PointCloud& source_cloud, const
   report.skips = std::move(found.skips);
   if (rivals > 1 && !view_score) {
     report.ambiguous = true;
-    add_words(report.ambiguity, fmt::format("{} placements score within {:.0f} % of the best", rivals,
-                                            100 * (1 - options.ambiguity_ratio)));
+    add_words(report.ambiguity, fmt::format("{} placements have {:.0f} % of the best one's evidence or more", rivals,
+                                            100 * options.ambiguity_ratio));
   }
   judged.erase(judged.begin() + static_cast<std::ptrdiff_t>(chosen));
   report.alternatives = std::move(judged);
@@ -280,7 +300,7 @@ Result<RegistrationReport> refine_registration(const PointCloud& source_cloud, c
   ORBITFUSE_ASSIGN(const PreparedCloud target, prepare(target_cloud, options, "target cloud"));
   const Search search(source, target, options);
   const Similarity3d unit_start = target.unit_from_cloud * start * source.unit_from_cloud.inverse();
-  const Similarity3d closer = search.refine_with(unit_start, 800, {0.2, 0.06, 10, 4, true}).target_from_source;
+  const Similarity3d closer = search.refine_with(unit_start, 800, {0.2, 0.06, 10, 4, true, true}).target_from_source;
   RegistrationReport report = reported(search, closer);
   report.initialiser = "given start";
   report.cpu_s = cpu_seconds() - started;

@@ -19,9 +19,10 @@ struct RegistrationOptions {
   double max_pair_distance = 0.06;  ///< of the diameter: where coarse scoring stops counting
   double inlier_distance = 0.02;    ///< of the diameter: pairs that count as matched in the report
   double min_scale = 0.2, max_scale = 5;  ///< of target over source, after size normalisation
-  double decisive_score = 0.62;     ///< the second initialiser is skipped above this two-sided score;
-                                    ///< wrong places of near-symmetric objects stay below
-  double ambiguity_ratio = 0.94;    ///< a distinct runner-up this close makes the result ambiguous
+  double decisive_score = 0.55;     ///< the second initialiser is skipped above this two-sided score,
+                                    ///< if hardly anything contradicts it and no rival comes near
+  double ambiguity_ratio = 0.85;    ///< a distinct runner-up with this share of the evidence makes the
+                                    ///< result ambiguous: half of the wrong 180 deg flips lie above 0.9
   bool filter_outliers = true;      ///< by neighbour distance, only where two populations are seen
   int restarts = 3;                 ///< refinements from disturbed starts, for the spread
   std::uint32_t seed = 1;
@@ -32,14 +33,16 @@ struct RegistrationOptions {
 struct RegistrationAlternative {
   Similarity3d target_from_source;
   double score = 0;                 ///< two-sided, as RegistrationReport::score
+  double evidence = 0;              ///< as RegistrationReport::evidence
   double view_score = 0;            ///< of the ViewScore, if there is one
   std::string origin;               ///< which initialiser found it
 };
 
 struct RegistrationReport {
   Similarity3d target_from_source;
-  double score = 0;                 ///< 0..1, geometric mean of both sides' truncated agreement, less
-                                    ///< contradictions (near the other's surface, but off it)
+  double score = 0;                 ///< 0..1, geometric mean of both sides' truncated agreement
+  double evidence = 0;              ///< 0..score: less where one cloud stands off the other's surface;
+                                    ///< ranks the placements, has no absolute scale
   double matching_ratio = 0;        ///< share of source points with a partner (as in the seed paper;
                                     ///< one-sided: shrinking maximises it, so never read it alone)
   double rmse = 0;                  ///< of matched pairs, target units
