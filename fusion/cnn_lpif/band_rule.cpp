@@ -17,14 +17,15 @@ Plane sum_of_products(const Plane& a, const Plane& b) {
   return sum;
 }
 
+/// A small network is surer than it should be: its answer never outweighs all evidence.
+constexpr float doubt = 0.01F;
+
 /// p et^2 / (p et^2 + (1 - p) ev^2), by shares of the sum so that nothing under- or overflows.
-float thermal_share(float ev, float et, float p) {
-  const float total = ev + et;
+float thermal_share(float ev, float et, float prior) {
+  const float p = doubt + (1 - 2 * doubt) * prior, total = ev + et;
   if (!(total > 0)) return p;
   const float t = et / total, v = ev / total;
-  const float for_thermal = p * t * t, for_visible = (1 - p) * v * v;
-  // Both vanish when a certain prior contradicts the only energy.
-  return for_thermal + for_visible > 0 ? for_thermal / (for_thermal + for_visible) : 0.5F;
+  return p * t * t / (p * t * t + (1 - p) * v * v);
 }
 
 }  // namespace
