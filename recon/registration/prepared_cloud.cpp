@@ -162,11 +162,15 @@ Result<PreparedCloud> prepare(const PointCloud& cloud, const RegistrationOptions
   for (auto& p : points) p += from_origin.translation;
   const Similarity3d rough = unit_frame(points);
   for (auto& p : points) p = rough * p;
+  // Nine points of ten lie within 1.
+  constexpr double kFar = 8;
+  prepared.dropped_outliers =
+      std::erase_if(points, [](const Eigen::Vector3d& p) { return p.norm() > kFar; });
   points = thinned_to(points, 4 * options.points);
   if (points.size() < kFewest) return too_few(points.size(), "distinct");
   const std::size_t before = points.size();
   if (options.filter_outliers) points = without_outliers(points);
-  prepared.dropped_outliers = before - points.size();
+  prepared.dropped_outliers += before - points.size();
 
   const Similarity3d fine = unit_frame(points);
   for (auto& p : points) p = fine * p;

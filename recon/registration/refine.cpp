@@ -30,14 +30,20 @@ Eigen::Vector3d placed_center(const Similarity3d& target_from_source) {
 class Pairs {
  public:
   Pairs(const PreparedCloud& source, const PreparedCloud& target, const Similarity3d& placement,
-        double bound)
-      : source_(source), target_(target), placement_(placement), inverse_(placement.inverse()),
-        rotation_(placement.rotation.toRotationMatrix()), bound2_(bound * bound),
+        double bound, bool exact)
+      : exact_(exact),
+        source_(source),
+        target_(target),
+        placement_(placement),
+        inverse_(placement.inverse()),
+        rotation_(placement.rotation.toRotationMatrix()),
+        bound2_(bound * bound),
         center_(placed_center(placement)) {}
 
   bool forward(std::size_t i, Pair& pair) const {
-    const Eigen::Vector3d y = placement_.scale * (rotation_ * source_.points[i]) + placement_.translation;
-    const int found = target_.nearest(y);
+    const Eigen::Vector3d y =
+        placement_.scale * (rotation_ * source_.points[i]) + placement_.translation;
+    const int found = partner(target_, y);
     if (found < 0) return false;
     const auto j = static_cast<std::size_t>(found);
     const Eigen::Vector3d d = y - target_.points[j];
@@ -48,15 +54,17 @@ class Pairs {
                   target_.planarity[j] * source_.planarity[i]);
   }
 
-  /// The target's point z against the source's plane, which turns with the update: to first order
-  /// d r/d omega = (z - c) x n. The scale's derivative is taken at z as well, so that noise biases
-  /// the two directions oppositely and cancels.
+  /// The target's point z against the source's plane. The scale's derivative is taken at z, as if
+  /// the target moved the other way, so that noise biases the two directions oppositely and
+  /// cancels.
   bool backward(std::size_t j, Pair& pair) const {
     const Eigen::Vector3d& z = target_.points[j];
-    const int found = source_.nearest(inverse_.scale * (rotation_.transpose() * z) + inverse_.translation);
+    const int found =
+        partner(source_, inverse_.scale * (rotation_.transpose() * z) + inverse_.translation);
     if (found < 0) return false;
     const auto i = static_cast<std::size_t>(found);
-    const Eigen::Vector3d y = placement_.scale * (rotation_ * source_.points[i]) + placement_.translation;
+    const Eigen::Vector3d y =
+        placement_.scale * (rotation_ * source_.points[i]) + placement_.translation;
     const Eigen::Vector3d d = y - z;
     if (d.squaredNorm() > bound2_) return false;
     pair.normal = rotation_ * source_.normals[i];
@@ -65,13 +73,18 @@ class Pairs {
   }
 
  private:
-  static bool finish(Pair& pair, const Eigen::Vector3d& d, const Eigen::Vector3d& other, double planarity) {
+  int partner(const PreparedCloud& cloud, const Eigen::Vector3d& x) const {
+    return exact_ ? cloud.nearest(x) : cloud.nearest_table.lookup(x);
+  }
+  static bool finish(Pair& pair, const Eigen::Vector3d& d, const Eigen::Vector3d& other,
+                     double planarity) {
     const double cosine = pair.normal.dot(other);
     if (cosine * cosine < 0.25) return false;
     pair.residual = pair.normal.dot(d);
     pair.trust = cosine * cosine * planarity;
     return true;
   }
+  const bool exact_;
   const PreparedCloud& source_;
   const PreparedCloud& target_;
   const Similarity3d& placement_;
@@ -91,8 +104,7 @@ void add(Equations& equations, const Pair& pair, double bound) {
   const double w = pair.trust * tukey(pair.residual, bound);
   equations.distances.push_back(std::abs(pair.residual));
   if (w <= 0) return;
-  Vector7 j;
-  j << pair.lever.cross(pair.normal), pair.lever.dot(pair.normal), pair.normal;
+  const Vector7 j = plane_jacobian(pair.lever, pair.normal);
   equations.hessian.selfadjointView<Eigen::Lower>().rankUpdate(j, w);
   equations.gradient += w * pair.residual * j;
   equations.weight += w;
@@ -100,10 +112,11 @@ void add(Equations& equations, const Pair& pair, double bound) {
 
 Equations equations_at(const PreparedCloud& source, const PreparedCloud& target,
                        const std::vector<int>& source_subset, const std::vector<int>& target_subset,
-                       const Similarity3d& placement, double pair_bound, double plane_bound) {
+                       const Similarity3d& placement, double pair_bound, double plane_bound,
+                       bool exact) {
   Equations equations;
   equations.distances.reserve(source_subset.size() + target_subset.size());
-  const Pairs pairs(source, target, placement, pair_bound);
+  const Pairs pairs(source, target, placement, pair_bound, exact);
   Pair pair;
   for (const int i : source_subset) {
     if (pairs.forward(static_cast<std::size_t>(i), pair)) add(equations, pair, plane_bound);
@@ -123,12 +136,19 @@ double robust_sigma(std::vector<double>& distances) {
 
 }  // namespace
 
+Vector7 plane_jacobian(const Eigen::Vector3d& lever, const Eigen::Vector3d& normal) {
+  Vector7 j;
+  j << lever.cross(normal), lever.dot(normal), normal;
+  return j;
+}
+
 Similarity3d updated(const Similarity3d& target_from_source, const Eigen::Vector3d& center,
                      const Vector7& update) {
   const Eigen::Vector3d omega = update.head<3>();
   const double angle = omega.norm();
-  const Eigen::Quaterniond turn = angle > 0 ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, omega / angle))
-                                            : Eigen::Quaterniond::Identity();
+  const Eigen::Quaterniond turn = angle > 0
+                                      ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, omega / angle))
+                                      : Eigen::Quaterniond::Identity();
   const double grow = std::exp(update[3]);
   Similarity3d result;
   result.scale = grow * target_from_source.scale;
@@ -142,15 +162,17 @@ Refined refine(const PreparedCloud& source, const PreparedCloud& target,
                const std::vector<int>& source_subset, const std::vector<int>& target_subset,
                const Similarity3d& start, const RefineOptions& options) {
   Refined refined{start, Matrix7::Zero(), 0, 0};
-  const double shrink = options.iterations > 1
-                            ? std::pow(options.end_bound / options.start_bound, 1.0 / (options.iterations - 1))
-                            : 1.0;
+  const double shrink = options.iterations > 1 ? std::pow(options.end_bound / options.start_bound,
+                                                          1.0 / (options.iterations - 1))
+                                               : 1.0;
   double bound = options.start_bound, sigma = bound;
   for (int iteration = 0; iteration < options.iterations + options.polish; ++iteration) {
     // 4.685 sigma: Tukey's 95 % efficiency; a floor, or exact data would leave no pair.
-    const double plane_bound = options.adapt_bound ? std::clamp(4.685 * sigma, 0.004, bound) : bound;
-    Equations equations = equations_at(source, target, source_subset, target_subset,
-                                       refined.target_from_source, bound, plane_bound);
+    const double plane_bound =
+        options.adapt_bound ? std::clamp(4.685 * sigma, 0.004, bound) : bound;
+    Equations equations =
+        equations_at(source, target, source_subset, target_subset, refined.target_from_source,
+                     bound, plane_bound, options.exact_partners);
     if (equations.distances.size() < 10 || !(equations.weight > 0)) break;
     sigma = robust_sigma(equations.distances);
     refined.hessian = equations.hessian / equations.weight;
@@ -160,7 +182,8 @@ Refined refine(const PreparedCloud& source, const PreparedCloud& target,
     damped.diagonal().array() += 1e-4 * equations.weight;  // open directions stay where they are
     Vector7 update = -damped.ldlt().solve(equations.gradient);
     if (!update.allFinite()) break;
-    const double longest = std::max({update.head<3>().norm(), std::abs(update[3]), update.tail<3>().norm()});
+    const double longest =
+        std::max({update.head<3>().norm(), std::abs(update[3]), update.tail<3>().norm()});
     if (longest > 0.3) update *= 0.3 / longest;
     refined.target_from_source =
         updated(refined.target_from_source, placed_center(refined.target_from_source), update);

@@ -15,12 +15,18 @@ using Matrix7 = Eigen::Matrix<double, 7, 7>;
 Similarity3d updated(const Similarity3d& target_from_source, const Eigen::Vector3d& center,
                      const Vector7& update);
 
+/// Derivative of the plane distance n (T x - q) by the update, at lever = point - centre: the moved
+/// source point against a target plane; or, against a source plane that turns with the update, the
+/// target point (d r/d omega = (z - c) x n to first order).
+Vector7 plane_jacobian(const Eigen::Vector3d& lever, const Eigen::Vector3d& normal);
+
 struct RefineOptions {
   double start_bound = 0.25;  ///< partners further apart (target unit lengths) don't pull, at first
   double end_bound = 0.08;    ///< and at last
   int iterations = 12;        ///< over which the bound shrinks
   int polish = 8;             ///< at the last bound, until the update vanishes
-  bool adapt_bound = true;    ///< Tukey bound from the residuals' spread, where that is smaller
+  bool exact_partners = true;  ///< false: a table cell's error is far below the bounds
+  bool adapt_bound = true;     ///< Tukey bound from the residuals' spread, where that is smaller
 };
 
 struct Refined {

@@ -8,12 +8,19 @@
 namespace orbitfuse::registration {
 namespace {
 
-/// Mean agreement of `from` moved into the frame of `to`; lengths in the units of `to`.
-double one_side(const PreparedCloud& from, const PreparedCloud& to, const std::vector<int>& subset,
-                const Similarity3d& to_from, double pair, double plane, double contradiction) {
+struct Side {
+  double agree = 0, against = 0;  ///< per point
+};
+
+/// `from` moved into the frame of `to`; lengths in the units of `to`.
+Side one_side(const PreparedCloud& from, const PreparedCloud& to, const std::vector<int>& subset,
+              const Similarity3d& to_from, const ScoreBounds& bounds, double unit) {
+  constexpr double kAbove = 0.7;  // height over distance: beside an edge or a cut says nothing
+  const double pair2 = unit * unit * bounds.pair * bounds.pair, plane = unit * bounds.plane;
+  const double reach2 = bounds.reach * bounds.reach * unit * unit;
   const Eigen::Matrix3d rotation = to_from.rotation.toRotationMatrix();
   const Eigen::Matrix3d linear = to_from.scale * rotation;
-  double sum = 0;
+  Side side;
   for (const int i : subset) {
     const auto at = static_cast<std::size_t>(i);
     const Eigen::Vector3d y = linear * from.points[at] + to_from.translation;
@@ -21,15 +28,18 @@ double one_side(const PreparedCloud& from, const PreparedCloud& to, const std::v
     if (j < 0) continue;
     const auto partner = static_cast<std::size_t>(j);
     const Eigen::Vector3d d = y - to.points[partner];
-    const double reach2 = d.squaredNorm() / (pair * pair);
-    if (reach2 >= 1) continue;
-    const double off = std::abs(to.normals[partner].dot(d)) / plane;
-    const double agree = 1 - std::max(off * off, reach2 * reach2);
+    const double d2 = d.squaredNorm(), height = std::abs(to.normals[partner].dot(d)),
+                 off = height / plane;
+    if (d2 < reach2 && off > 1 && height * height > kAbove * kAbove * d2) {
+      side.against += std::min(off - 1, 1.0) * (1 - d2 / reach2);
+    }
+    if (d2 >= pair2) continue;
+    const double agree = 1 - std::max(off * off, d2 * d2 / (pair2 * pair2));
     const double cosine = to.normals[partner].dot(rotation * from.normals[at]);
-    if (agree > 0) sum += agree * cosine * cosine;
-    if (off > 1) sum -= contradiction * std::min(off - 1, 1.0) * (1 - reach2);
+    if (agree > 0) side.agree += agree * cosine * cosine;
   }
-  return subset.empty() ? 0 : std::max(0.0, sum / static_cast<double>(subset.size()));
+  const double count = std::max<double>(1, static_cast<double>(subset.size()));
+  return {side.agree / count, side.against / count};
 }
 
 std::vector<int> all_of(const PreparedCloud& cloud) {
@@ -40,20 +50,27 @@ std::vector<int> all_of(const PreparedCloud& cloud) {
 
 }  // namespace
 
-double two_sided_score(const PreparedCloud& source, const PreparedCloud& target,
-                       const std::vector<int>& source_subset, const std::vector<int>& target_subset,
-                       const Similarity3d& target_from_source, const ScoreBounds& bounds) {
-  const double forward = one_side(source, target, source_subset, target_from_source, bounds.pair,
-                                  bounds.plane, bounds.contradiction);
-  const double s = target_from_source.scale;
-  const double backward = one_side(target, source, target_subset, target_from_source.inverse(),
-                                   bounds.pair / s, bounds.plane / s, bounds.contradiction);
-  return std::sqrt(forward * backward);
+Agreement agreement(const PreparedCloud& source, const PreparedCloud& target,
+                    const std::vector<int>& source_subset, const std::vector<int>& target_subset,
+                    const Similarity3d& target_from_source, const ScoreBounds& bounds) {
+  // A contradicted point weighs ten agreeing ones: overlap alone must not outvote it.
+  constexpr double kAgainst = 10;
+  const Side forward = one_side(source, target, source_subset, target_from_source, bounds, 1);
+  const Side backward = one_side(target, source, target_subset, target_from_source.inverse(),
+                                 bounds, 1 / target_from_source.scale);
+  Agreement result;
+  result.score = std::sqrt(forward.agree * backward.agree);
+  if (!(result.score > 0)) return {};
+  const auto borne_out = [&](const Side& side) {
+    return side.agree / (side.agree + kAgainst * side.against);
+  };
+  result.evidence = result.score * std::sqrt(borne_out(forward) * borne_out(backward));
+  return result;
 }
 
-double two_sided_score(const PreparedCloud& source, const PreparedCloud& target,
-                       const Similarity3d& target_from_source, const ScoreBounds& bounds) {
-  return two_sided_score(source, target, all_of(source), all_of(target), target_from_source, bounds);
+Agreement agreement(const PreparedCloud& source, const PreparedCloud& target,
+                    const Similarity3d& target_from_source, const ScoreBounds& bounds) {
+  return agreement(source, target, all_of(source), all_of(target), target_from_source, bounds);
 }
 
 MatchFigures match_figures(const PreparedCloud& source, const PreparedCloud& target,
@@ -76,7 +93,8 @@ MatchFigures match_figures(const PreparedCloud& source, const PreparedCloud& tar
   };
   MatchFigures figures;
   figures.source_share = side(source, target, target_from_source, 1);
-  figures.target_share = side(target, source, target_from_source.inverse(), target_from_source.scale);
+  figures.target_share =
+      side(target, source, target_from_source.inverse(), target_from_source.scale);
   figures.rmse = pairs > 0 ? std::sqrt(squares / pairs) : 0;
   return figures;
 }
