@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // bench_poses SCENE [--workdir F] : runs the pose ladder on a shared scene and prints success and
 // error against run time per rung. Scenes: container, tracking, fox, metu_cloudy_scene_7,
-// metu_sunny_scene_7, arco.
+// metu_sunny_scene_7, arco, car (the session recorded in replay_data).
 #include <sys/resource.h>
 
 #include <cstdio>
@@ -63,6 +63,8 @@ int main(int argc, char** argv) {
     options.thermal_focal_error = 0.03;
     options.visible_focal_error = 0.03;
     scene = bench::container_scene(*data, options);
+  } else if (which == "car") {
+    scene = bench::session_scene(std::filesystem::path(ORBITFUSE_SOURCE_DIR) / "replay_data/car");
   } else if (which == "fox") {
     scene = bench::fox_scene(*data);
   } else {
