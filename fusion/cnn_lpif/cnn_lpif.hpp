@@ -12,10 +12,9 @@ struct CnnLpifOptions {
   /// Band coefficients whose match 2 a b / (a^2 + b^2) over 3x3 is at least this are weighted by
   /// the network (paper, eq. 8 to 10); below it the energies decide, see fuse_band.
   double match_threshold = 0.8;
-  /// Finest bands in which the network also weighs the energies where the sources disagree. A
-  /// coefficient of the third band already reaches over a whole patch; coarser ones over more than
-  /// the network has seen.
-  int network_bands = 3;
+  /// Finest bands in which the network also weighs the energies where the sources disagree. A patch
+  /// is 16 = 2^4 px: what lies in coarser bands the network has not seen.
+  int network_bands = 4;
   /// Side of the square of coefficients over which those decisions are averaged; odd.
   int vote_px = 7;
   /// Gray levels up to which the sources count as the same; patches that don't differ are not sent
