@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // bench_fusion [FOLDER] : every method and knob on the reference pairs (default ../shared/data/fusion):
-// mean Qabf, Qcb, Qcv and SSIM against the three references, and milliseconds for a 640x480 pair.
+// mean Qabf, Qcb, Qcv and SSIM against the references, and milliseconds for a 640x480 pair.
 // bench_fusion --methods : the four methods at their defaults only.
+// bench_fusion --out DIR : also DIR/fusion.json (all rows) and DIR/fusion.svg (Qabf against CPU time).
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
+#include <cmath>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -14,6 +16,7 @@
 #include <sstream>
 
 #include "core/cpu.hpp"
+#include "core/file_io.hpp"
 #include "core/parallel.hpp"
 #include "fusion/fuse/fuse.hpp"
 #include "fusion/metrics/metrics.hpp"
@@ -82,49 +85,129 @@ Means our_means(const std::vector<Pair>& pairs, const FusionOptions& options) {
   return means;
 }
 
-/// Best of several runs on the first pair at 640x480.
-double milliseconds(const std::vector<Pair>& pairs, const FusionOptions& options) {
+double process_cpu_ms() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
+
+/// Least of several runs. CPU time of all threads holds on a machine with other work, wall time
+/// only on an idle one.
+struct Times {
+  double wall_ms = 1e9, cpu_ms = 1e9;
+};
+
+/// The first pair at 640x480.
+Times times(const std::vector<Pair>& pairs, const FusionOptions& options) {
   cv::Mat v, t;
   cv::resize(pairs[0].visible, v, {640, 480}, 0, 0, cv::INTER_AREA);
   cv::resize(pairs[0].thermal, t, {640, 480}, 0, 0, cv::INTER_AREA);
-  double best = 1e9;
-  for (int i = 0; i < 7; ++i) {
+  Times best;
+  for (int i = 0; i < 9; ++i) {
     FusionReport report;
+    const double start = process_cpu_ms();
     if (!fuse(v, t, {}, options, &report)) std::exit(3);
-    best = std::min(best, 1000 * report.wall_s);
+    best.cpu_ms = std::min(best.cpu_ms, process_cpu_ms() - start);
+    best.wall_ms = std::min(best.wall_ms, 1000 * report.wall_s);
   }
   return best;
 }
 
-void print(const std::string& what, const Means& means, double ms) {
-  fmt::print("| {} |", what);
-  for (const char* metric : shown) fmt::print(" {:.4f} |", means.at(metric));
-  if (ms > 0) fmt::print(" {:.1f} |\n", ms);
-  else fmt::print(" - |\n");
+struct Row {
+  std::string what;
+  Means means;
+  Times times;
+  bool timed = false;
+};
+
+void print(const Row& row) {
+  fmt::print("| {} |", row.what);
+  for (const char* metric : shown) fmt::print(" {:.4f} |", row.means.at(metric));
+  if (row.timed) fmt::print(" {:.1f} | {:.1f} |\n", row.times.wall_ms, row.times.cpu_ms);
+  else fmt::print(" - | - |\n");
+}
+
+std::string json(const std::vector<Row>& rows) {
+  std::string text = "[\n";
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    text += fmt::format("  {{\"method\": \"{}\"", rows[i].what);
+    for (const char* metric : shown) text += fmt::format(", \"{}\": {:.17g}", metric, rows[i].means.at(metric));
+    if (rows[i].timed)
+      text += fmt::format(", \"wall_ms\": {:.3f}, \"cpu_ms\": {:.3f}", rows[i].times.wall_ms, rows[i].times.cpu_ms);
+    text += i + 1 < rows.size() ? "},\n" : "}\n";
+  }
+  return text + "]\n";
+}
+
+/// Qabf and Qcb upwards, CPU time to the right on a logarithmic axis; the knob's name on hover.
+std::string svg(const std::vector<Row>& rows) {
+  std::string text = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"720\" height=\"420\" font-family=\"sans-serif\" "
+                     "font-size=\"12\">\n<rect width=\"720\" height=\"420\" fill=\"white\"/>\n"
+                     "<text x=\"20\" y=\"20\">640x480 pair: Qabf (filled) and Qcb (ring) against CPU ms</text>\n";
+  const auto x = [](double ms) { return 50 + 280 * std::log10(std::clamp(ms, 1.0, 200.0)); };
+  const auto y = [](double q) { return 380 - 1600 * (std::clamp(q, 0.45, 0.68) - 0.45); };
+  for (const double ms : {1, 2, 5, 10, 20, 50, 100, 200})
+    text += fmt::format("<text x=\"{:.0f}\" y=\"400\">{}</text>\n", x(ms), ms);
+  for (const double q : {0.45, 0.5, 0.55, 0.6, 0.65}) text += fmt::format("<text x=\"10\" y=\"{:.0f}\">{}</text>\n", y(q), q);
+  const std::map<std::string, std::string> colors = {
+      {"best", "#c0392b"}, {"ms-srif", "#2471a3"}, {"pca-msif", "#229954"}, {"cnn-lpif", "#b7950b"}};
+  double label = 40;
+  for (const auto& [method, color] : colors)
+    text += fmt::format("<text x=\"620\" y=\"{:.0f}\" fill=\"{}\">{}</text>\n", label += 16, color, method);
+  for (const Row& row : rows) {
+    if (!row.timed) continue;
+    const std::string color = colors.at(row.what.substr(0, row.what.find(',')));
+    for (const auto& [metric, fill] : {std::pair<const char*, std::string>{"Qabf", color}, {"Qcb", "none"}})
+      text += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\" fill=\"{}\" stroke=\"{}\"><title>{}: {} {:.4f}, {:.1f} ms</title></circle>\n",
+                          x(row.times.cpu_ms), y(row.means.at(metric)), fill, color, row.what, metric,
+                          row.means.at(metric), row.times.cpu_ms);
+  }
+  return text + "</svg>\n";
+}
+
+/// Exit status.
+int write_reports(const fs::path& folder, const std::vector<Row>& rows) {
+  for (const auto& [file, text] : {std::pair{"fusion.json", json(rows)}, {"fusion.svg", svg(rows)}})
+    if (const Status written = write_file_atomic(folder / file, text); !written) {
+      fmt::print(stderr, "{}\n", written.error().message());
+      return 4;
+    }
+  return 0;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  const bool only_methods = argc > 1 && std::string(argv[1]) == "--methods";
-  const fs::path folder = argc > 1 && !only_methods ? argv[1] : "../shared/data/fusion";
+  bool only_methods = false;
+  fs::path folder = "../shared/data/fusion", out;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (word == "--methods") only_methods = true;
+    else if (word == "--out" && i + 1 < argc) out = argv[++i];
+    else folder = word;
+  }
   if (!fs::exists(folder / "pairs")) {
     fmt::print(stderr, "{}: no pairs; give the folder of the reference pairs\n", folder.string());
     return 3;
   }
   const auto pairs = load_pairs(folder);
-  fmt::print("{}, {} threads, {} pairs\n\n| method | Qabf | Qcb | Qcv | SSIM | ms |\n|---|---|---|---|---|---|\n",
+  fmt::print("{}, {} threads, {} pairs\n\n| method | Qabf | Qcb | Qcv | SSIM | wall ms | CPU ms |\n|---|---|---|---|---|---|---|\n",
              cpu_description(), thread_count(), pairs.size());
-  for (const auto& [method, means] : reference_means(folder)) print("reference " + method, means, 0);
+  std::vector<Row> rows;
+  const auto add = [&](Row row) {
+    print(row);
+    rows.push_back(std::move(row));
+  };
+  for (const auto& [method, means] : reference_means(folder)) add({"reference " + method, means, {}});
   const auto show = [&](const std::string& what, const FusionOptions& options) {
-    print(what, our_means(pairs, options), milliseconds(pairs, options));
+    add({what, our_means(pairs, options), times(pairs, options), true});
   };
   for (const std::string& method : fusion_method_names()) {
     FusionOptions options;
     options.method = fusion_method(method).value();
     show(method, options);
   }
-  if (only_methods) return 0;
+  if (only_methods) return out.empty() ? 0 : write_reports(out, rows);
   FusionOptions o;
   o.method = FusionMethod::ms_srif;
   for (const double share : {0.0, 0.01, 0.03, 0.1, 0.3}) {
@@ -176,5 +259,5 @@ int main(int argc, char** argv) {
     o.best.energy_radius_px = radius;
     show(fmt::format("best, energy radius {}", radius), o);
   }
-  return 0;
+  return out.empty() ? 0 : write_reports(out, rows);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// bench_poses SCENE [--workdir F] : runs the pose ladder on a shared scene and prints success and
+// bench_poses SCENE [WORKDIR [--visible-truth]]: runs the pose ladder on a shared scene and prints success and
 // error against run time per rung. Scenes: container, tracking, fox, metu_cloudy_scene_7,
-// metu_sunny_scene_7, arco.
+// metu_sunny_scene_7, arco, car (the session recorded in replay_data).
 #include <sys/resource.h>
 
 #include <cstdio>
@@ -48,9 +48,10 @@ void print(const ModalityPoses& poses, const Reconstruction& anchor, const bench
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);  // a run that is cut short keeps its first rungs
   const auto data = bench::shared_data();
   if (argc < 2 || !data) {
-    std::fputs("bench_poses SCENE [WORKDIR]; needs the shared data (ORBITFUSE_SHARED)\n", stderr);
+    std::fputs("bench_poses SCENE [WORKDIR [--visible-truth]]; needs the shared data (ORBITFUSE_SHARED)\n", stderr);
     return 2;
   }
   const std::string which = argv[1];
@@ -63,6 +64,8 @@ int main(int argc, char** argv) {
     options.thermal_focal_error = 0.03;
     options.visible_focal_error = 0.03;
     scene = bench::container_scene(*data, options);
+  } else if (which == "car") {
+    scene = bench::session_scene(std::filesystem::path(ORBITFUSE_SOURCE_DIR) / "replay_data/car");
   } else if (which == "fox") {
     scene = bench::fox_scene(*data);
   } else {
@@ -73,7 +76,14 @@ int main(int argc, char** argv) {
   const PoseOptions options;
   Progress progress;
   double start = cpu_seconds();
-  const auto visible = estimate_visible_poses(scene.session, options, workdir, progress);
+  const bool from_truth = argc > 3 && std::string(argv[3]) == "--visible-truth";
+  Result<ModalityPoses> visible = ModalityPoses{};
+  if (from_truth) {
+    for (const FrameRecord* frame : scene.session.frames_of(Modality::visible))
+      visible->reconstruction.views.push_back(scene.truth.views.at(frame->file));
+  } else {
+    visible = estimate_visible_poses(scene.session, options, workdir, progress);
+  }
   fmt::print("visible\n");
   VisibleScene seen;
   if (visible) {

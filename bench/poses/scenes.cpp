@@ -121,6 +121,20 @@ Scene fox_scene(const fs::path& data) {
   return scene;
 }
 
+Scene session_scene(const fs::path& folder) {
+  Scene scene;
+  auto session = open_session(folder);
+  if (!session) return scene;
+  scene.session = *std::move(session);
+  const json truth = load(folder / "ground_truth.json");
+  for (const Modality modality : {Modality::visible, Modality::thermal}) {
+    const json& entry = truth.at(std::string(name(modality)));
+    for (const json& f : entry.at("frames"))
+      scene.truth.views[f.at("file")] = truth_view(f, entry.at("K"));
+  }
+  return scene;
+}
+
 Scene folder_scene(const fs::path& folder) {
   Scene scene;
   scene.session.folder = folder;

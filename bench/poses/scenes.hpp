@@ -35,6 +35,8 @@ struct ContainerOptions {
 Scene container_scene(const std::filesystem::path& data, const ContainerOptions& options);
 /// A folder of visible images, transforms.json as truth; no stations.
 Scene fox_scene(const std::filesystem::path& data);
+/// A recorded session with its ground_truth.json beside the manifest.
+Scene session_scene(const std::filesystem::path& folder);
 /// Folders visible/ and thermal/ of images without anything known; 8-bit or raw thermal.
 Scene folder_scene(const std::filesystem::path& folder);
 

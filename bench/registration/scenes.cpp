@@ -14,7 +14,8 @@ namespace {
 using Eigen::Vector3d;
 
 std::filesystem::path shared_data() {
-  if (const char* folder = std::getenv("ORBITFUSE_SHARED")) return std::filesystem::path(folder) / "data";
+  if (const char* folder = std::getenv("ORBITFUSE_SHARED"))
+    return std::filesystem::path(folder) / "data";
   return std::filesystem::path(ORBITFUSE_SOURCE_DIR).parent_path() / "shared" / "data";
 }
 
@@ -36,7 +37,8 @@ std::optional<Surface> read_bunny(const std::filesystem::path& path) {
   Surface surface;
   for (std::size_t f = 0; f < faces; ++f) {
     std::size_t corners, a, b, c;
-    if (!(in >> corners >> a >> b >> c) || corners != 3 || std::max({a, b, c}) >= vertices) return std::nullopt;
+    if (!(in >> corners >> a >> b >> c) || corners != 3 || std::max({a, b, c}) >= vertices)
+      return std::nullopt;
     surface.triangle(points[a], points[b], points[c]);
   }
   return surface;
@@ -70,16 +72,20 @@ Surface indoor() {
 /// back differ by a longer, lower bonnet only.
 Surface car() {
   Surface s;
-  const auto profile = [&](const std::vector<std::pair<double, double>>& outline, double half_low, double half_high) {
+  const auto profile = [&](const std::vector<std::pair<double, double>>& outline, double half_low,
+                           double half_high) {
     // (x, z) outline, closed; half width changes linearly with height.
     double low = 1e9, high = -1e9;
     for (const auto& [x, z] : outline) {
       low = std::min(low, z);
       high = std::max(high, z);
     }
-    const auto half = [&](double z) { return half_low + (half_high - half_low) * (z - low) / (high - low); };
+    const auto half = [&](double z) {
+      return half_low + (half_high - half_low) * (z - low) / (high - low);
+    };
     Vector3d left_center = Vector3d::Zero();
-    for (const auto& [x, z] : outline) left_center += Vector3d(x, half(z), z) / static_cast<double>(outline.size());
+    for (const auto& [x, z] : outline)
+      left_center += Vector3d(x, half(z), z) / static_cast<double>(outline.size());
     for (std::size_t i = 0; i < outline.size(); ++i) {
       const auto [x0, z0] = outline[i];
       const auto [x1, z1] = outline[(i + 1) % outline.size()];
@@ -90,7 +96,8 @@ Surface car() {
       s.triangle(am, bm, Vector3d(left_center.x(), -left_center.y(), left_center.z()));
     }
   };
-  profile({{-2.20, 0.35}, {2.25, 0.35}, {2.30, 0.62}, {2.15, 0.80}, {-2.10, 0.92}, {-2.25, 0.66}}, 0.88, 0.84);
+  profile({{-2.20, 0.35}, {2.25, 0.35}, {2.30, 0.62}, {2.15, 0.80}, {-2.10, 0.92}, {-2.25, 0.66}},
+          0.88, 0.84);
   profile({{-1.55, 0.90}, {1.05, 0.84}, {0.35, 1.40}, {-0.85, 1.42}}, 0.80, 0.58);
   for (const double x : {-1.35, 1.40}) {
     for (const double y : {-0.92, 0.72}) s.cylinder({x, y, 0.32}, {x, y + 0.2, 0.32}, 0.32);
@@ -109,14 +116,17 @@ Vector3d direction(std::mt19937& random) {
 
 /// Keeps the share of points that is lowest along an axis.
 void keep_lowest(Positions& points, const Vector3d& axis, double share) {
-  std::sort(points.begin(), points.end(), [&](const Vector3d& a, const Vector3d& b) { return a.dot(axis) < b.dot(axis); });
+  std::sort(points.begin(), points.end(),
+            [&](const Vector3d& a, const Vector3d& b) { return a.dot(axis) < b.dot(axis); });
   points.resize(static_cast<std::size_t>(share * static_cast<double>(points.size())));
 }
 
 void punch_holes(Positions& points, double share, double diameter, std::mt19937& random) {
-  const std::size_t wanted = static_cast<std::size_t>((1 - share) * static_cast<double>(points.size()));
+  const std::size_t wanted =
+      static_cast<std::size_t>((1 - share) * static_cast<double>(points.size()));
   while (points.size() > wanted) {
-    const Vector3d center = points[std::uniform_int_distribution<std::size_t>(0, points.size() - 1)(random)];
+    const Vector3d center =
+        points[std::uniform_int_distribution<std::size_t>(0, points.size() - 1)(random)];
     const double radius = diameter * std::uniform_real_distribution<double>(0.05, 0.12)(random);
     std::erase_if(points, [&](const Vector3d& p) { return (p - center).norm() < radius; });
   }
@@ -128,11 +138,15 @@ void add_floaters(Positions& points, double share, double diameter, std::mt19937
   auto left = static_cast<int>(share / (1 - share) * static_cast<double>(points.size()));
   const Positions surface = points;
   while (left > 0) {
-    const Vector3d anchor = surface[std::uniform_int_distribution<std::size_t>(0, surface.size() - 1)(random)];
-    const Vector3d center = anchor + diameter * std::uniform_real_distribution<double>(0.03, 0.20)(random) * direction(random);
+    const Vector3d anchor =
+        surface[std::uniform_int_distribution<std::size_t>(0, surface.size() - 1)(random)];
+    const Vector3d center =
+        anchor +
+        diameter * std::uniform_real_distribution<double>(0.03, 0.20)(random) * direction(random);
     const double size = diameter * std::uniform_real_distribution<double>(0.005, 0.03)(random);
     const int count = std::min(left, std::uniform_int_distribution<int>(5, 40)(random));
-    for (int i = 0; i < count; ++i) points.push_back(center + size * Vector3d(normal(random), normal(random), normal(random)));
+    for (int i = 0; i < count; ++i)
+      points.push_back(center + size * Vector3d(normal(random), normal(random), normal(random)));
     left -= count;
   }
 }
@@ -148,7 +162,8 @@ void add_outliers(Positions& points, double share, std::mt19937& random) {
   const auto count = static_cast<int>(share * static_cast<double>(points.size()));
   std::shuffle(points.begin(), points.end(), random);
   for (int i = 0; i < count; ++i) {
-    points[static_cast<std::size_t>(i)] = center + half.cwiseProduct(Vector3d(unit(random), unit(random), unit(random)));
+    points[static_cast<std::size_t>(i)] =
+        center + half.cwiseProduct(Vector3d(unit(random), unit(random), unit(random)));
   }
 }
 
@@ -157,7 +172,8 @@ void warp(Positions& points, double amplitude, double diameter, std::mt19937& ra
   for (int wave = 0; wave < 3; ++wave) {
     const Vector3d axis = direction(random), push = direction(random);
     const double shift = phase(random), k = 2 * std::numbers::pi / (0.8 * diameter);
-    for (auto& p : points) p += amplitude * diameter / std::numbers::sqrt3 * std::sin(k * p.dot(axis) + shift) * push;
+    for (auto& p : points)
+      p += amplitude * diameter / std::numbers::sqrt3 * std::sin(k * p.dot(axis) + shift) * push;
   }
 }
 
@@ -185,7 +201,8 @@ void Surface::cylinder(const Vector3d& from, const Vector3d& to, double radius) 
   constexpr int sides = 24;
   for (int i = 0; i < sides; ++i) {
     const double a = 2 * std::numbers::pi * i / sides, b = 2 * std::numbers::pi * (i + 1) / sides;
-    const Vector3d p = radius * (std::cos(a) * u + std::sin(a) * v), q = radius * (std::cos(b) * u + std::sin(b) * v);
+    const Vector3d p = radius * (std::cos(a) * u + std::sin(a) * v),
+                   q = radius * (std::cos(b) * u + std::sin(b) * v);
     quad(from + p, from + q, to + q, to + p);
     triangle(from, from + p, from + q);
     triangle(to, to + p, to + q);
@@ -195,8 +212,10 @@ Positions Surface::sample(int count, std::mt19937& random) const {
   std::uniform_real_distribution<double> unit(0, 1);
   Positions points;
   for (int i = 0; i < count; ++i) {
-    const auto at = std::lower_bound(area_until_.begin(), area_until_.end(), unit(random) * area_until_.back());
-    const auto& [a, b, c] = triangles_[std::min(static_cast<std::size_t>(at - area_until_.begin()), triangles_.size() - 1)];
+    const auto at =
+        std::lower_bound(area_until_.begin(), area_until_.end(), unit(random) * area_until_.back());
+    const auto& [a, b, c] = triangles_[std::min(static_cast<std::size_t>(at - area_until_.begin()),
+                                                triangles_.size() - 1)];
     double u = unit(random), v = unit(random);
     if (u + v > 1) {
       u = 1 - u;
@@ -266,9 +285,13 @@ CloudPair make_pair(const Surface& surface, const Level& level, std::uint32_t se
   pair.check = surface.sample(500, random);
   // With a share f of the points kept at opposite ends, 2 f - 1 of f is common.
   const double kept = 1 / (2 - level.overlap);
-  const auto grow = [&](int count) { return static_cast<int>(count / kept / (1 - (level.holes > 0 ? level.holes : 0))); };
+  const auto grow = [&](int count) {
+    return static_cast<int>(count / kept / (1 - (level.holes > 0 ? level.holes : 0)));
+  };
   Positions source = surface.sample(grow(level.source_points), random);
-  Positions target = surface.sample(level.overlap < 1 ? static_cast<int>(level.target_points / kept) : level.target_points, random);
+  Positions target = surface.sample(
+      level.overlap < 1 ? static_cast<int>(level.target_points / kept) : level.target_points,
+      random);
   if (level.overlap < 1) {
     const Vector3d axis = direction(random);
     keep_lowest(source, axis, kept);
@@ -281,14 +304,17 @@ CloudPair make_pair(const Surface& surface, const Level& level, std::uint32_t se
   for (Positions* cloud : {&source, &target}) {
     if (level.outliers > 0) add_outliers(*cloud, level.outliers, random);
     if (level.noise > 0) {
-      for (auto& p : *cloud) p += level.noise * diameter * Vector3d(normal(random), normal(random), normal(random));
+      for (auto& p : *cloud)
+        p += level.noise * diameter * Vector3d(normal(random), normal(random), normal(random));
     }
     std::shuffle(cloud->begin(), cloud->end(), random);
   }
   std::uniform_real_distribution<double> unit(-1, 1);
   Similarity3d& truth = pair.target_from_source;
   truth.scale = std::exp(std::log(0.3) + (unit(random) + 1) / 2 * std::log(10.0));
-  truth.rotation = Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random)).normalized();
+  truth.rotation =
+      Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random))
+          .normalized();
   truth.translation = 3 * diameter * Vector3d(unit(random), unit(random), unit(random));
   for (auto& p : target) p = truth * p;
   pair.diameter = truth.scale * diameter;
@@ -299,7 +325,8 @@ CloudPair make_pair(const Surface& surface, const Level& level, std::uint32_t se
 
 double surface_rmse_percent(const CloudPair& pair, const Similarity3d& estimate) {
   double sum = 0;
-  for (const auto& p : pair.check) sum += (estimate * p - pair.target_from_source * p).squaredNorm();
+  for (const auto& p : pair.check)
+    sum += (estimate * p - pair.target_from_source * p).squaredNorm();
   return 100 * std::sqrt(sum / static_cast<double>(pair.check.size())) / pair.diameter;
 }
 

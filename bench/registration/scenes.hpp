@@ -19,7 +19,8 @@ using Positions = std::vector<Eigen::Vector3d>;
 class Surface {
  public:
   void triangle(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c);
-  void quad(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c, const Eigen::Vector3d& d);
+  void quad(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+            const Eigen::Vector3d& d);
   void box(const Eigen::Vector3d& low, const Eigen::Vector3d& high);
   void cylinder(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double radius);
   Positions sample(int count, std::mt19937& random) const;
@@ -37,13 +38,13 @@ std::optional<Surface> surface(const std::string& name);
 struct Level {
   std::string name;
   int source_points = 3000, target_points = 3000;
-  double noise = 0;            ///< standard deviation, of the diameter
-  double overlap = 1;          ///< share of each cloud that the other has: cut from opposite ends
-  double outliers = 0;         ///< share of all points, uniform in the 1.2-fold bounding box
-  double holes = 0;            ///< share of the source's surface taken out in balls
-  double floaters = 0;         ///< share of the source's points in small clusters off the surface
-  double warp = 0;             ///< amplitude of a smooth deformation of the source, of the diameter
-  bool bars = true;            ///< has a bar in the suite
+  double noise = 0;     ///< standard deviation, of the diameter
+  double overlap = 1;   ///< share of each cloud that the other has: cut from opposite ends
+  double outliers = 0;  ///< share of all points, uniform in the 1.2-fold bounding box
+  double holes = 0;     ///< share of the source's surface taken out in balls
+  double floaters = 0;  ///< share of the source's points in small clusters off the surface
+  double warp = 0;      ///< amplitude of a smooth deformation of the source, of the diameter
+  bool bars = true;     ///< has a bar in the suite
   double success_bar = 1;
 };
 const std::vector<Level>& levels();

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/parallel.hpp"
+#include "fusion/cnn_lpif/band_rule.hpp"
 #include "fusion/cnn_lpif/score_map.hpp"
 #include "fusion/pyramid/pyramid.hpp"
 
@@ -39,22 +40,6 @@ Plane averaged_over_patches(const Plane& weights, cv::Size size) {
   return full;
 }
 
-Plane fuse_band(const Plane& v, const Plane& t, const Plane& weight, float threshold) {
-  Plane ev, et, both;
-  cv::boxFilter(v.mul(v), ev, CV_32F, {3, 3});
-  cv::boxFilter(t.mul(t), et, CV_32F, {3, 3});
-  cv::boxFilter(v.mul(t), both, CV_32F, {3, 3});
-  Plane fused(v.size());
-  for (int y = 0; y < v.rows; ++y)
-    for (int x = 0; x < v.cols; ++x) {
-      const float a = ev(y, x), b = et(y, x), w = weight(y, x);
-      // Without energy in either band there is nothing to choose between.
-      const bool alike = !(a + b > 0) || 2 * both(y, x) >= threshold * (a + b);
-      fused(y, x) = alike ? w * t(y, x) + (1 - w) * v(y, x) : b > a ? t(y, x) : v(y, x);
-    }
-  return fused;
-}
-
 }  // namespace
 
 Status CnnLpifOptions::validate() const {
@@ -62,6 +47,10 @@ Status CnnLpifOptions::validate() const {
     return fail(ErrorKind::usage, "cnn_lpif.match_threshold", fmt::format("{}", match_threshold), "must be in 0..1");
   if (!(same_within >= 0 && same_within <= 255))
     return fail(ErrorKind::usage, "cnn_lpif.same_within", fmt::format("{}", same_within), "must be in 0..255");
+  if (!(network_bands >= 0 && network_bands <= 32))
+    return fail(ErrorKind::usage, "cnn_lpif.network_bands", fmt::format("{}", network_bands), "must be in 0..32");
+  if (!(vote_px >= 1 && vote_px <= 255 && vote_px % 2 == 1))
+    return fail(ErrorKind::usage, "cnn_lpif.vote_px", fmt::format("{}", vote_px), "must be odd, in 1..255");
   return {};
 }
 
@@ -96,9 +85,12 @@ Result<Plane> fuse_cnn_lpif(const Plane& visible, const Plane& thermal, const Cn
     (i == 0 ? v : t) = laplacian_pyramid(i == 0 ? visible : thermal, levels);
   });
   const auto threshold = static_cast<float>(options.match_threshold);
-  for (std::size_t i = 0; i < v.bands.size(); ++i)
-    fused.bands.push_back(fuse_band(v.bands[i], t.bands[i], weights[i], threshold));
-  fused.base = fuse_band(v.base, t.base, weights.back(), threshold);
+  for (std::size_t i = 0; i < v.bands.size(); ++i) {
+    const bool asked = static_cast<int>(i) < options.network_bands;
+    const Plane prior = asked ? weights[i] : Plane(weights[i].size(), 0.5F);
+    fused.bands.push_back(fuse_band(v.bands[i], t.bands[i], weights[i], prior, {threshold, options.vote_px}));
+  }
+  fused.base = v.base + weights.back().mul(t.base - v.base);
   return collapse(fused);
 }
 

@@ -10,8 +10,13 @@ namespace orbitfuse::fusion {
 
 struct CnnLpifOptions {
   /// Band coefficients whose match 2 a b / (a^2 + b^2) over 3x3 is at least this are weighted by
-  /// the network; below it the larger local energy wins (paper, eq. 8 to 10).
-  double match_threshold = 0.6;
+  /// the network (paper, eq. 8 to 10); below it the energies decide, see fuse_band.
+  double match_threshold = 0.8;
+  /// Finest bands in which the network also weighs the energies where the sources disagree. A patch
+  /// is 16 = 2^4 px: what lies in coarser bands the network has not seen.
+  int network_bands = 4;
+  /// Side of the square of coefficients over which those decisions are averaged; odd.
+  int vote_px = 7;
   /// Gray levels up to which the sources count as the same; patches that don't differ are not sent
   /// through the network, their weight is 1/2.
   double same_within = 1;

@@ -2,85 +2,103 @@
 #include "fusion/cnn_lpif/score_map.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "core/parallel.hpp"
+#include "fusion/cnn_lpif/conv_row.hpp"
 
 namespace orbitfuse::fusion::cnn {
 namespace {
 
-/// to += weight * from over n samples; the compiler makes it one vector loop.
-inline void add_scaled(float* __restrict to, const float* __restrict from, float weight, int n) {
-  for (int i = 0; i < n; ++i) to[i] += weight * from[i];
-}
-
 /// Patches a strip works on at once: its feature rows stay in the second-level cache.
 constexpr int strip_rows = 8;
 
-struct Strip {
-  int columns, features;        ///< score columns, feature columns after pooling
-  std::vector<float> row[2];    ///< two rows of conv1 for one channel
-  std::vector<float> pooled1;   ///< [channel][row][column]
-  std::vector<float> conv2;     ///< [channel][row][column]
+/// [row][channel][column], columns padded as conv_row wants them.
+struct Features {
+  Features(int rows, int channels_, int columns)
+      : channels(channels_),
+        stride((columns + row_step - 1) / row_step * row_step + 2 * row_step),
+        data(static_cast<std::size_t>(rows * channels * stride)) {}
+  float* row(int y, int c) { return data.data() + (y * channels + c) * stride; }
+  int channels, stride;
+  std::vector<float> data;
 };
 
-void pooled_rows(const Plane& image, const Parameters& p, int first, int rows, Strip& s) {
-  const int wide = 2 * s.features;
-  for (int c = 0; c < width1; ++c)
-    for (int y = 0; y < rows; ++y) {
-      for (int half = 0; half < 2; ++half) {
-        float* out = s.row[half].data();
-        std::fill_n(out, wide, p[static_cast<std::size_t>(Layout::bias1 + c)]);
-        for (int k = 0; k < 9; ++k)
-          add_scaled(out, image.ptr<float>(2 * (first + y) + half + k / 3) + k % 3,
-                     p[static_cast<std::size_t>(Layout::conv1 + c * 9 + k)] / 255, wide);
-      }
-      float* out = s.pooled1.data() + (c * rows + y) * s.features;
-      const float *a = s.row[0].data(), *b = s.row[1].data();
-      for (int x = 0; x < s.features; ++x)
-        out[x] = std::max({0.0F, a[2 * x], a[2 * x + 1], b[2 * x], b[2 * x + 1]});
-    }
+/// Pointers to the k x k neighbourhood of row y in all channels: the order of the parameters.
+std::vector<const float*> taps_of(Features& from, int y, int k) {
+  std::vector<const float*> taps;
+  for (int c = 0; c < from.channels; ++c)
+    for (int i = 0; i < k * k; ++i) taps.push_back(from.row(y + i / k, c) + i % k);
+  return taps;
 }
 
-void conv2_rows(const Parameters& p, int rows, Strip& s) {
-  const int wide = s.features - 2, from_rows = rows + 2;
-  for (int c = 0; c < width2; ++c)
-    for (int y = 0; y < rows; ++y) {
-      float* out = s.conv2.data() + (c * rows + y) * wide;
-      std::fill_n(out, wide, p[static_cast<std::size_t>(Layout::bias2 + c)]);
-      for (int d = 0; d < width1; ++d)
-        for (int k = 0; k < 9; ++k)
-          add_scaled(out, s.pooled1.data() + (d * from_rows + y + k / 3) * s.features + k % 3,
-                     p[static_cast<std::size_t>(Layout::conv2 + (c * width1 + d) * 9 + k)], wide);
-      for (int x = 0; x < wide; ++x) out[x] = std::max(0.0F, out[x]);
-    }
+struct Layer {
+  int kernel, weights, bias;  ///< offsets into Parameters; bias < 0: none
+  float floor;
+};
+constexpr Layer layer1{kernel, Layout::conv1, Layout::bias1, 0}, layer2{kernel, Layout::conv2, Layout::bias2, 0},
+    head{side2, Layout::head, -1, -std::numeric_limits<float>::infinity()};
+
+void convolve_row(const Layer& layer, const Parameters& p, Features& from, int y, Features& to, int to_y, int wide, Isa isa) {
+  static constexpr float no_bias[1] = {0};
+  const auto taps = taps_of(from, y, layer.kernel);
+  const ConvRow row{taps.data(), static_cast<int>(taps.size()), p.data() + layer.weights,
+                    layer.bias < 0 ? no_bias : p.data() + layer.bias, to.channels, layer.floor, to.row(to_y, 0),
+                    to.stride, wide};
+  (isa >= Isa::avx512 ? conv_row_avx512 : conv_row_avx2)(row);
 }
 
-void head_rows(const Parameters& p, int first, int rows, const Strip& s, Plane& scores) {
-  const int wide = s.features - 2, from_rows = rows + side2 - 1;
-  for (int y = 0; y < rows; ++y) {
-    float* out = scores[first + y];
-    for (int c = 0; c < width2; ++c)
-      for (int k = 0; k < side2 * side2; ++k)
-        add_scaled(out, s.conv2.data() + (c * from_rows + y + k / side2) * wide + k % side2,
-                   p[static_cast<std::size_t>(Layout::head + c * side2 * side2 + k)], scores.cols);
+void max_pool_row(Features& from, Features& to, int to_y, int wide) {
+  for (int c = 0; c < to.channels; ++c) {
+    const float *a = from.row(0, c), *b = from.row(1, c);
+    float* out = to.row(to_y, c);
+    for (int x = 0; x < wide; ++x) out[x] = std::max(std::max(a[2 * x], a[2 * x + 1]), std::max(b[2 * x], b[2 * x + 1]));
   }
+}
+
+/// Scores [top, top + rows) x [left, left + columns) of the map.
+void score_tile(const Plane& image, const Parameters& p, const cv::Rect& tile, Plane& scores, Isa isa) {
+  const int pooled_rows = tile.height + side2 + 1, pooled_columns = tile.width + side2 + 1;
+  Features pixels(2 * pooled_rows + 2, 1, 2 * pooled_columns + 2);
+  for (int y = 0; y < 2 * pooled_rows + 2; ++y) {
+    const float* from = image[2 * tile.y + y] + 2 * tile.x;
+    std::transform(from, from + 2 * pooled_columns + 2, pixels.row(y, 0), [](float v) { return v / 255; });
+  }
+  Features two_rows(2, width1, 2 * pooled_columns), pooled1(pooled_rows, width1, pooled_columns);
+  for (int y = 0; y < pooled_rows; ++y) {
+    for (int half = 0; half < 2; ++half)
+      convolve_row(layer1, p, pixels, 2 * y + half, two_rows, half, 2 * pooled_columns, isa);
+    max_pool_row(two_rows, pooled1, y, pooled_columns);
+  }
+  Features features(pooled_rows - 2, width2, pooled_columns - 2);
+  for (int y = 0; y < pooled_rows - 2; ++y) convolve_row(layer2, p, pooled1, y, features, y, pooled_columns - 2, isa);
+  Features row(1, 1, tile.width);
+  for (int y = 0; y < tile.height; ++y) {
+    convolve_row(head, p, features, y, row, 0, tile.width, isa);
+    std::copy_n(row.row(0, 0), tile.width, scores[tile.y + y] + tile.x);
+  }
+}
+
+/// Columns of the strip in which any patch is needed.
+cv::Range needed_columns(const cv::Mat1b& needed) {
+  cv::Mat1b any;
+  cv::reduce(needed, any, 0, cv::REDUCE_MAX);
+  const auto is_set = [](uchar v) { return v != 0; };
+  const auto first = std::find_if(any.begin(), any.end(), is_set);
+  if (first == any.end()) return {0, 0};
+  int last = any.cols;
+  while (!any(0, last - 1)) --last;
+  return {static_cast<int>(first - any.begin()), last};
 }
 
 }  // namespace
 
-Plane score_map(const Plane& image, const Parameters& parameters, const cv::Mat1b& needed) {
+Plane score_map(const Plane& image, const Parameters& parameters, const cv::Mat1b& needed, Isa isa) {
   Plane scores = Plane::zeros((image.rows - patch) / 2 + 1, (image.cols - patch) / 2 + 1);
   parallel_blocks(scores.rows, strip_rows, [&](int begin, int end) {
-    if (!needed.empty() && cv::countNonZero(needed.rowRange(begin, end)) == 0) return;
-    const int rows = end - begin;
-    Strip s{scores.cols, scores.cols + side2 + 1, {}, {}, {}};
-    const auto features = static_cast<std::size_t>(s.features);
-    for (auto& row : s.row) row.resize(2 * features);
-    s.pooled1.resize(features * static_cast<std::size_t>(width1 * (rows + side2 + 1)));
-    s.conv2.resize(features * static_cast<std::size_t>(width2 * (rows + side2 - 1)));
-    pooled_rows(image, parameters, begin, rows + side2 + 1, s);
-    conv2_rows(parameters, rows + side2 - 1, s);
-    head_rows(parameters, begin, rows, s, scores);
+    const cv::Range columns = needed.empty() ? cv::Range(0, scores.cols) : needed_columns(needed.rowRange(begin, end));
+    if (columns.size() > 0)
+      score_tile(image, parameters, {columns.start, begin, columns.size(), end - begin}, scores, isa);
   });
   return scores;
 }

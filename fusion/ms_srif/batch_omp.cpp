@@ -21,39 +21,45 @@ void BatchOmp::solve(const Eigen::VectorXf& signal, const OmpStop& stop, SparseC
   if (energy <= bound) return;
 
   const int limit = std::min({stop.max_atoms, dictionary_.size(), patch_size});
-  if (cholesky_.rows() < limit) cholesky_.resize(limit, limit);
-  const Eigen::MatrixXf& gram = dictionary_.gram();
-  initial_.noalias() = dictionary_.atoms().transpose() * signal;
-  correlation_ = initial_;
-  for (int n = 0; n < limit; ++n) {
-    Eigen::Index atom = 0;
-    if (!(correlation_.cwiseAbs().maxCoeff(&atom) > 0)) break;
-    if (std::find(code.atoms.begin(), code.atoms.end(), static_cast<int>(atom)) != code.atoms.end()) break;
-    // Next row of the Cholesky factor.
-    column_.resize(n);
-    for (int i = 0; i < n; ++i) column_[i] = gram(code.atoms[static_cast<std::size_t>(i)], atom);
-    const auto factor = cholesky_.topLeftCorner(n, n).triangularView<Eigen::Lower>();
-    if (n > 0) factor.solveInPlace(column_);
-    const float pivot = 1 - column_.squaredNorm();
-    if (pivot < 1e-6F) break;
-    cholesky_.row(n).head(n) = column_.transpose();
-    cholesky_(n, n) = std::sqrt(pivot);
-    code.atoms.push_back(static_cast<int>(atom));
-
-    solution_.resize(n + 1);
-    for (int i = 0; i <= n; ++i) solution_[i] = initial_[code.atoms[static_cast<std::size_t>(i)]];
-    const auto grown = cholesky_.topLeftCorner(n + 1, n + 1).triangularView<Eigen::Lower>();
-    grown.solveInPlace(solution_);
-    const float explained = solution_.squaredNorm();  // of the signal's projection on the atoms
-    grown.transpose().solveInPlace(solution_);
-    code.weights.assign(solution_.data(), solution_.data() + n + 1);
-    const float left = std::max(0.0F, energy - explained);
-    code.residual = std::sqrt(left);
-    if (left <= bound || n + 1 == limit) break;
-    correlation_ = initial_;
-    for (int i = 0; i <= n; ++i)
-      correlation_.noalias() -= solution_[i] * gram.col(code.atoms[static_cast<std::size_t>(i)]);
+  if (limit <= 0) return;
+  if (directions_.cols() < limit) {
+    directions_.resize(dictionary_.size(), limit);
+    cholesky_.resize(limit, limit);
+    coefficients_.resize(limit);
   }
+  correlation_.noalias() = dictionary_.atoms().transpose() * signal;
+  float explained = 0;
+  int chosen = 0;
+  while (chosen < limit) {
+    const float largest = correlation_.cwiseAbs().maxCoeff();
+    if (!(largest > 0)) break;
+    int atom = 0;
+    while (std::abs(correlation_[atom]) != largest) ++atom;
+    if (std::find(code.atoms.begin(), code.atoms.end(), atom) != code.atoms.end()) break;
+    // What direction i has in common with the atom is the next row of the Cholesky factor: no
+    // triangular system is solved until the last atom is known.
+    const auto row = directions_.row(atom).head(chosen);
+    const float pivot = 1 - row.squaredNorm();
+    if (pivot < 1e-6F) break;
+    cholesky_.row(chosen).head(chosen) = row;
+    const float length = std::sqrt(pivot);
+    cholesky_(chosen, chosen) = length;
+    auto direction = directions_.col(chosen);
+    direction = dictionary_.gram().col(atom);
+    for (int i = 0; i < chosen; ++i) direction -= cholesky_(chosen, i) * directions_.col(i);
+    direction /= length;
+    const float coefficient = correlation_[atom] / length;
+    correlation_ -= coefficient * direction;
+    coefficients_[chosen] = coefficient;
+    explained += coefficient * coefficient;
+    code.atoms.push_back(atom);
+    ++chosen;
+    if (energy - explained <= bound) break;
+  }
+  auto weights = coefficients_.head(chosen);
+  cholesky_.topLeftCorner(chosen, chosen).triangularView<Eigen::Lower>().transpose().solveInPlace(weights);
+  code.weights.assign(weights.data(), weights.data() + chosen);
+  code.residual = std::sqrt(std::max(0.0F, energy - explained));
 }
 
 }  // namespace orbitfuse::fusion

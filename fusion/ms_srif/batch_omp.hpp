@@ -32,8 +32,10 @@ class BatchOmp {
 
  private:
   const Dictionary& dictionary_;
-  Eigen::VectorXf initial_, correlation_, solution_, column_;
-  Eigen::MatrixXf cholesky_;  ///< of the chosen atoms' Gram matrix, lower
+  Eigen::VectorXf correlation_;   ///< of every atom with what is left
+  Eigen::MatrixXf directions_;    ///< column i: of every atom with the i-th orthonormal direction
+  Eigen::VectorXf coefficients_;  ///< of the signal in those directions
+  Eigen::MatrixXf cholesky_;      ///< of the chosen atoms' Gram matrix, lower
 };
 
 }  // namespace orbitfuse::fusion

@@ -15,7 +15,7 @@ struct MsSrifOptions {
   double residual = 0.1;  ///< gray levels RMS at which a patch counts as coded; flat patches end here
   /// A patch is coded when this share of its norm is left: textured patches need no finer code to
   /// be compared. 0 = the reference's stop. See docs/benchmarks/fusion.md.
-  double relative_residual = 0.03;
+  double relative_residual = 0.01;
 
   Status validate() const;  ///< usage error naming the field
 };

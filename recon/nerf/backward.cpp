@@ -116,7 +116,6 @@ void backward(const FieldState& field, const Kernels& kernels, const LossSetting
       }
       b.dweight[static_cast<std::size_t>(sample)] = g;
     }
-    if (!settings.train_density) continue;
     int i_active = row - 1;
     for (int i = begin + used - 1; i >= begin; --i) {
       while (i_active >= first_row && b.active[static_cast<std::size_t>(i_active)] > i) {

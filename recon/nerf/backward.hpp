@@ -19,7 +19,6 @@ struct LossSettings {
   float per_ray = 1;            ///< 1 / rays of the step
   float distortion_weight = 0;
   float huber = 0;              ///< errors beyond it count linearly; 0 = squared error
-  bool train_density = true;    ///< false: geometry comes from a guide field
 };
 
 /// Sums over a block; gradients are added, losses are means once divided by the rays.

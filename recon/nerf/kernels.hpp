@@ -52,7 +52,7 @@ struct Kernels {
   /// dweights[in][out] += in^T * dout.
   void (*backward_weights)(const LayerView& layer, int rows, const float* in, const float* dout,
                            float* dweights);
-  /// Adam (Kingma & Ba 2015) on [0, count); entries whose gradient is exactly 0 keep their state,
+  /// Adam (Kingma & Ba 2015) on [0, count), count a multiple of 8; entries whose gradient is exactly 0 keep their state,
   /// as in instant-ngp. Clears the gradient; writes half-precision copies if `half` is not null.
   void (*adam)(const AdamStep& step, std::int64_t count, float* parameter, float* first,
                float* second, float* grad, std::uint16_t* half);

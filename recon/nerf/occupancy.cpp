@@ -116,7 +116,7 @@ int segments_of(const Occupancy& occupancy, const Ray& ray, float near, Segment*
     const float size = occupancy.cell_size(cascade);
     float exit = std::numeric_limits<float>::max();
     for (int d = 0; d < 3; ++d) {
-      const float edge = (std::floor(x[d] / size) + (ray.direction[d] > 0 ? 1.0f : 0.0f)) * size;
+      const float edge = (std::floor(x[d] / size) + (inverse[d] > 0 ? 1.0f : 0.0f)) * size;
       exit = std::min(exit, (edge - x[d]) * inverse[d]);
     }
     exit = std::max(exit, 0.0f) + 1e-3f * size;  // across the border in spite of rounding

@@ -59,14 +59,11 @@ struct TrainOptions {
   double depth_weight = 0.05;        ///< SfM and dense depth, annealed
   double depth_end = 0.5;            ///< fraction of the run at which depth_weight reaches its end
   double depth_final_weight = 0.0;   ///< what remains of depth_weight after depth_end
-  double empty_weight = 0.0;         ///< density between a camera and a known depth
-  double opacity_entropy_weight = 0; ///< pushes ray opacities to 0 or 1
-  double near_gradient_m = 0;        ///< Floaters No More: gradients fade below this fraction
   double min_views = 2;              ///< cells seen by fewer training views are empty
   bool carve = true;                 ///< cells in front of known depth start empty
   double level_anneal_end = 0;       ///< fraction of the run by which the finest level is on; 0 = off
   bool per_image_offset = false;     ///< thermal drift: one offset per frame, mean zero
-  bool shared_geometry = false;      ///< use the guide field's density (train()'s argument)
+  bool shared_geometry = false;      ///< start from the guide field's density (train()'s argument)
 
   Status validate() const;
   /// Sets one field from text, e.g. set("iterations", "2000"); an unknown key is a usage error

@@ -55,6 +55,28 @@ double heldout_psnr(const FieldState& field, const std::vector<SceneView>& views
   return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
 }
 
+/// Starts a field from another one's geometry: its space, density network and occupied cells. The
+/// density then trains on, because a warm surface need not end where the visible one does.
+Status inherit_geometry(const FieldState& guide, FieldState& state) {
+  const auto differs = [&](const char* key) {
+    return guide.options.get(key) != state.options.get(key);
+  };
+  for (const char* key : {"levels", "features_per_level", "log2_table", "base_resolution",
+                          "max_resolution", "hidden", "occupancy_resolution"})
+    if (differs(key))
+      return fail(ErrorKind::usage, fmt::format("nerf.{}", key),
+                  fmt::format("{}, the guide field has {}", state.options.get(key),
+                              guide.options.get(key)),
+                  "train both fields with one architecture or set shared_geometry = false");
+  state.space = guide.space;
+  state.main.grid.table.value = guide.main.grid.table.value;
+  state.main.mlp.weights.value = guide.main.mlp.weights.value;
+  state.occupancy.on = guide.occupancy.on;
+  state.occupancy.density = guide.occupancy.density;
+  state.refresh();
+  return {};
+}
+
 }  // namespace
 
 const char* name(StopReason reason) {
@@ -115,14 +137,22 @@ Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
     state->space = estimate_space(dataset);
     state->span = estimate_span(dataset);
   }
+  if (options.shared_geometry && !resumed) {
+    ORBITFUSE_TRY(inherit_geometry(guide->state(), *state));
+    report.skips.push_back({"density from nothing", "the visible field's geometry is given",
+                            "training starts from its density and empty space"});
+  }
+  if (options.sampling == Sampling::proposal)
+    report.skips.push_back({"proposal networks", "not implemented",
+                            "rays are sampled by occupancy; widths and weights are as published"});
   const std::vector<SceneView> views = prepare_views(dataset, state->space, state->span);
-  if (!resumed) {
+  if (!resumed && !options.shared_geometry) {
     const double left = carve(dataset, state->space, views, options, state->occupancy);
     report.skips.push_back({"empty space", fmt::format("{:.1f} % of the cells seen by enough views and "
                                                        "not in front of known depth", 100 * left),
                             "rays skip the rest from the first step"});
   }
-  Trainer trainer(*state, views, heldout, options.shared_geometry ? &guide->state() : nullptr);
+  Trainer trainer(*state, views, heldout);
   watch.cpu_s += state->spent_cpu_s;
   watch.wall_s += state->spent_wall_s;
 

@@ -32,8 +32,8 @@ double depth_weight(const TrainOptions& o, double progress) {
 }  // namespace
 
 Trainer::Trainer(FieldState& field, const std::vector<SceneView>& views,
-                 const std::vector<bool>& heldout, const FieldState* guide)
-    : field_(field), views_(views), guide_(guide), kernels_(kernels_for(best_isa())) {
+                 const std::vector<bool>& heldout)
+    : field_(field), views_(views), kernels_(kernels_for(best_isa())) {
   std::int64_t pixels = 0, known = 0;
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (heldout[i]) continue;
@@ -107,7 +107,6 @@ bool Trainer::step(double progress) {
   loss.per_ray = 1.0f / static_cast<float>(rays);
   loss.distortion_weight = static_cast<float>(o.distortion_weight);
   loss.huber = field_.modality == Modality::thermal ? 0.02f : 0.0f;
-  loss.train_density = guide_ == nullptr;
   parallel_for(shard_count, [&](int shard) {
     BlockGradients& gradients = shards_[static_cast<std::size_t>(shard)];
     gradients.reset(field_);

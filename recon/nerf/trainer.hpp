@@ -15,7 +15,7 @@ class Trainer {
  public:
   /// `heldout[i]` views are never drawn from.
   Trainer(FieldState& field, const std::vector<SceneView>& views,
-          const std::vector<bool>& heldout, const FieldState* guide);
+          const std::vector<bool>& heldout);
 
   /// One step; `progress` in [0, 1] is the place in the schedule. False: a gradient was not
   /// finite, nothing was changed.
@@ -38,7 +38,6 @@ class Trainer {
 
   FieldState& field_;
   const std::vector<SceneView>& views_;
-  const FieldState* guide_;
   const Kernels& kernels_;
   std::vector<int> training_;             ///< indices of the views that train
   std::vector<std::int64_t> pixel_ends_;  ///< running pixel count over them

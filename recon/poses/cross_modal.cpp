@@ -17,10 +17,17 @@
 namespace orbitfuse {
 namespace {
 
-/// Below this the best start angle is not told from the next one (standard errors).
-constexpr double min_decisiveness = -2.0;
+/// Below this the best start angle is not told from the next one (standard errors): refused.
+constexpr double min_decisiveness = 1.0;
+/// Below this the answer is given, with the rival named.
+constexpr double clear_decisiveness = 2.5;
+/// Stations are nominal to several degrees; beyond this a pose contradicts its station.
+constexpr double max_station_deviation_deg = 12;
 /// A view whose edges meet the lines worse than this share of the median view is not supported.
 constexpr double min_share_of_median = 0.55;
+
+/// Share of its distance that a view may leave the orbit's search by before it contradicts it.
+constexpr double max_move = 0.15;
 
 struct LensGuess {
   Camera camera;
@@ -69,23 +76,117 @@ struct Work {
   std::vector<cv::Mat> images;
 };
 
-/// Pattern search from coarse to fine scales.
-OrbitPose refined(const Work& work, std::size_t i, OrbitPose pose) {
-  struct Level {
-    double sigma_px;
-    PatternSteps steps;
-  };
+struct Refined {
+  OrbitPose pose;
+  double score = -2;
+};
+
+/// Fields of one view at the scales of the pattern search.
+struct Scales {
+  cv::Mat coarse, fine;
+};
+
+Scales scales_of(const Work& work, std::size_t i) {
   const double unit = work.lens.camera.width / 640.0;
-  for (const Level& level : {Level{6.0, {4.0, 0.08, 2.0, 16.0, 2}},
-                             Level{3.0, {1.5, 0.03, 1.0, 8.0, 3}}}) {
-    const cv::Mat field = orientation_field(work.images[i], level.sigma_px * unit);
-    const cv::Mat small = cell_field(field, std::max(1, field.cols / (level.sigma_px > 4 ? 4 : 2)),
-                                     std::max(1, field.rows / (level.sigma_px > 4 ? 4 : 2)));
-    PatternSteps steps = level.steps;
-    steps.shift_px *= unit;
-    pose = pattern_search(work.lines, work.lens.camera, small, pose, steps);
+  const auto shrunk = [](const cv::Mat& field, int by) {
+    return cell_field(field, std::max(1, field.cols / by), std::max(1, field.rows / by));
+  };
+  return {shrunk(orientation_field(work.images[i], 6.0 * unit), 4),
+          shrunk(orientation_field(work.images[i], 3.0 * unit), 2)};
+}
+
+/// The best of several starts: each searched at the coarse scale, the best few at the fine one.
+Refined refined(const Work& work, const Scales& fields, const std::vector<OrbitPose>& starts,
+                const OrbitPrior& prior) {
+  const double unit = work.lens.camera.width / 640.0;
+  std::vector<Refined> coarse;
+  for (const OrbitPose& start : starts) {
+    const OrbitPose pose = pattern_search(work.lines, work.lens.camera, fields.coarse, start,
+                                          {3.0, 0.06, 1.5, 16.0 * unit, 2}, prior);
+    coarse.push_back({pose, alignment_score(work.lines, work.lens.camera,
+                                            cam_from_world_of(pose, work.lens.camera),
+                                            fields.coarse) -
+                                prior.penalty(pose)});
   }
-  return pose;
+  std::stable_sort(coarse.begin(), coarse.end(),
+                   [](const Refined& x, const Refined& y) { return x.score > y.score; });
+  coarse.resize(std::min<std::size_t>(coarse.size(), 3));
+  Refined best;
+  for (const Refined& start : coarse) {
+    const OrbitPose pose = pattern_search(work.lines, work.lens.camera, fields.fine, start.pose,
+                                          {1.5, 0.03, 1.0, 8.0 * unit, 3}, prior);
+    const double score = alignment_score(
+        work.lines, work.lens.camera, cam_from_world_of(pose, work.lens.camera), fields.fine) -
+        prior.penalty(pose);
+    if (score > best.score) best = {pose, score};
+  }
+  return best;
+}
+
+double median_of(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Where a view should be if it kept to its loop: the operator's height and distance change little
+/// within one, and the azimuths follow the stations up to one offset.
+OrbitPrior loop_prior(const Work& work, const std::vector<OrbitPose>& poses,
+                      const OrbitHypothesis& hypothesis, std::size_t view) {
+  const double sign = hypothesis.mirrored ? -1 : 1;
+  const auto nominal = [&](std::size_t i) {
+    return hypothesis.offset_deg + sign * work.frames[i]->station->azimuth_deg;
+  };
+  std::vector<double> turn, elevation, radius, shift;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    turn.push_back(std::remainder(poses[i].azimuth_deg - nominal(i), 360));
+    if (work.frames[i]->station->loop != work.frames[view]->station->loop) continue;
+    elevation.push_back(poses[i].elevation_deg);
+    radius.push_back(poses[i].radius);
+    shift.push_back(poses[i].shift_y_px);
+  }
+  OrbitPrior prior;
+  prior.weight = 0.005;
+  prior.pose.azimuth_deg = nominal(view) + median_of(turn);
+  prior.pose.elevation_deg = median_of(elevation);
+  prior.pose.radius = median_of(radius);
+  prior.pose.shift_y_px = median_of(shift);
+  return prior;
+}
+
+std::vector<OrbitPose> poses_of(const std::vector<Refined>& found) {
+  std::vector<OrbitPose> poses;
+  for (const Refined& one : found) poses.push_back(one.pose);
+  return poses;
+}
+
+/// Every view on its own, then once more from where its loop says it should be.
+std::vector<OrbitPose> refined_views(const Work& work, const OrbitHypothesis& hypothesis,
+                                     const Progress& progress) {
+  std::vector<Refined> found(work.images.size());
+  std::vector<Scales> fields(work.images.size());
+  const auto each = [&](const auto& body) {
+    parallel_for(static_cast<int>(found.size()), [&](int i) {
+      if (!progress.cancelled()) body(static_cast<std::size_t>(i));
+    });
+  };
+  each([&](std::size_t i) {
+    fields[i] = scales_of(work, i);
+    found[i] = refined(work, fields[i], hypothesis.starts[i], {});
+  });
+  for (int round = 0; round < 2; ++round) {
+    const std::vector<OrbitPose> before = poses_of(found);
+    each([&](std::size_t i) {
+      const OrbitPrior prior = loop_prior(work, before, hypothesis, i);
+      std::vector<OrbitPose> starts = {before[i]};
+      for (const double azimuth : {-5.0, 0.0, 5.0}) {
+        starts.push_back(prior.pose);
+        starts.back().azimuth_deg += azimuth;
+      }
+      found[i] = refined(work, fields[i], starts, prior);
+    });
+  }
+  return poses_of(found);
 }
 
 /// One hypothesis taken to the end.
@@ -106,10 +207,7 @@ Result<Aligned> align(const Work& work, const OrbitHypothesis& hypothesis,
                       const PoseOptions& options, const Progress& progress) {
   Aligned result{hypothesis, {}, {}, {}};
   std::vector<OrbitPose>& poses = result.hypothesis.poses;
-  parallel_for(static_cast<int>(poses.size()), [&](int i) {
-    const auto k = static_cast<std::size_t>(i);
-    if (!progress.cancelled()) poses[k] = refined(work, k, poses[k]);
-  });
+  poses = refined_views(work, hypothesis, progress);
   ORBITFUSE_TRY(progress.check("poses.thermal"));
   const double unit = work.lens.camera.width / 640.0;
   for (std::size_t i = 0; i < poses.size(); ++i)
@@ -257,6 +355,8 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
     return fail(ErrorKind::quality, "poses.thermal", step.why + ": undecided",
                 "record more thermal stations, or thermal views whose edges show form");
   }
+  if (decisiveness < clear_decisiveness)
+    step.why += ": doubtful, check the start angle in the rendered pairs";
   std::vector<PosedView> views;
   std::vector<double> support = best.support;
   AlignmentReport report = best.report;
@@ -291,6 +391,29 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
           {views[i].name, fmt::format("its edges agree with the visible scene at {:.3f}, the "
                                            "median view at {:.3f}", support[i], typical)});
       continue;
+    }
+    // Lines alone can pull a view astray; against renders its agreement has been judged already.
+    if (!visible.renderer) {
+      const Rigid3d& lined_up = best.views[i].view.cam_from_world;
+      const Rigid3d expected = cam_from_world_of(best.hypothesis.poses[i], work.lens.camera);
+      const Eigen::Vector3d place = camera_center(expected);
+      const double moved =
+          (camera_center(lined_up) - place).norm() / place.norm();
+      if (!(moved < max_move)) {
+        result.dropped.push_back(
+            {views[i].name, fmt::format("its edges pull it {:.0f} % of its distance away from "
+                                             "where its loop says it is", 100 * moved)});
+        continue;
+      }
+      const OrbitPrior prior = loop_prior(work, best.hypothesis.poses, best.hypothesis, i);
+      const OrbitAngles angles = orbit_angles(camera_center(lined_up));
+      const double away = std::remainder(angles.azimuth_deg - prior.pose.azimuth_deg, 360);
+      if (!(std::abs(away) < max_station_deviation_deg)) {
+        result.dropped.push_back({views[i].name,
+                                  fmt::format("its edges fit best {:.0f} deg away from its station, "
+                                              "judged by its orbit", std::abs(away))});
+        continue;
+      }
     }
     result.reconstruction.views.push_back(views[i]);
   }

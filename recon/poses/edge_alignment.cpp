@@ -117,10 +117,19 @@ double alignment_score(const LineModel& lines, const Camera& camera, const Rigid
   return count > 0 ? sum / count : 0.0;
 }
 
+double OrbitPrior::penalty(const OrbitPose& at) const {
+  if (weight == 0) return 0;
+  const double azimuth = std::remainder(at.azimuth_deg - pose.azimuth_deg, 360) / azimuth_sigma_deg;
+  const double elevation = (at.elevation_deg - pose.elevation_deg) / elevation_sigma_deg;
+  const double radius = std::log(at.radius / pose.radius) / radius_relative_sigma;
+  return weight * (azimuth * azimuth + elevation * elevation + radius * radius);
+}
+
 OrbitPose pattern_search(const LineModel& lines, const Camera& camera, const cv::Mat& field,
-                         OrbitPose start, const PatternSteps& steps) {
+                         OrbitPose start, const PatternSteps& steps, const OrbitPrior& prior) {
   const auto score = [&](const OrbitPose& pose) {
-    return alignment_score(lines, camera, cam_from_world_of(pose, camera), field);
+    return alignment_score(lines, camera, cam_from_world_of(pose, camera), field) -
+           prior.penalty(pose);
   };
   double best = score(start);
   double scale = 1.0;

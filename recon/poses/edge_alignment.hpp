@@ -23,9 +23,19 @@ struct PatternSteps {
   double angle_deg = 3, radius = 0.06, roll_deg = 1.5, shift_px = 8;
   int halvings = 4;
 };
-/// Coordinate descent on azimuth, elevation, radius, roll and shifts from `start`.
+/// Where a view should be, by the other views of its loop; weight 0: not known.
+struct OrbitPrior {
+  OrbitPose pose;
+  double azimuth_sigma_deg = 6, elevation_sigma_deg = 3, radius_relative_sigma = 0.06;
+  double weight = 0;  ///< agreement lost per squared sigma
+
+  double penalty(const OrbitPose& at) const;
+};
+
+/// Coordinate descent on azimuth, elevation, radius, roll and shifts from `start`; maximises
+/// the agreement less the prior's penalty.
 OrbitPose pattern_search(const LineModel& lines, const Camera& camera, const cv::Mat& field,
-                         OrbitPose start, const PatternSteps& steps);
+                         OrbitPose start, const PatternSteps& steps, const OrbitPrior& prior = {});
 
 struct AlignmentView {
   cv::Mat field;  ///< at full resolution, sharp

@@ -76,16 +76,19 @@ Peak peak_of(const cv::Mat& view_spectrum, const cv::Mat& model_spectrum, float 
   return best;
 }
 
-/// Best of a view near a nominal azimuth, at one elevation and radius.
-int best_azimuth(const Table& table, std::size_t view, double azimuth_deg, double tolerance_deg,
+/// Best score of a view near a nominal azimuth, at one elevation and radius. Leaving the nominal
+/// place costs a little: without it all starts within the tolerance would score alike.
+double best_near(const Table& table, std::size_t view, double azimuth_deg, double tolerance_deg,
                  int e, int r, double step_deg) {
+  constexpr double cost_at_tolerance = 0.04;
   const int center = static_cast<int>(std::lround(azimuth_deg / step_deg));
   const int reach = std::max(1, static_cast<int>(std::floor(tolerance_deg / step_deg)));
-  int best = center;
-  for (int a = center - reach; a <= center + reach; ++a)
-    if (table.of_view[view][table.index(a, e, r)].score >
-        table.of_view[view][table.index(best, e, r)].score)
-      best = a;
+  double best = -1;
+  for (int a = center - reach; a <= center + reach; ++a) {
+    const double away = (a * step_deg - azimuth_deg) / tolerance_deg;
+    best = std::max(best, static_cast<double>(table.of_view[view][table.index(a, e, r)].score) -
+                              cost_at_tolerance * away * away);
+  }
   return best;
 }
 
@@ -112,9 +115,8 @@ Candidate evaluate(const Table& table, const std::vector<SearchView>& views,
         for (const std::size_t i : members) {
           const double nominal =
               offset_deg + (mirrored ? -1 : 1) * views[i].station->azimuth_deg;
-          const int a = best_azimuth(table, i, nominal, options.max_station_error_deg, e, r,
-                                     options.azimuth_step_deg);
-          sum += static_cast<double>(table.of_view[i][table.index(a, e, r)].score);
+          sum += best_near(table, i, nominal, options.max_station_error_deg, e, r,
+                           options.azimuth_step_deg);
         }
         if (sum > best_sum) {
           best_sum = sum;
@@ -126,31 +128,48 @@ Candidate evaluate(const Table& table, const std::vector<SearchView>& views,
   return h;
 }
 
-/// A hypothesis' best place for each view, which may be a step nearer or higher than its loop.
-std::vector<OrbitPose> start_poses(const Table& table, const std::vector<SearchView>& views,
+/// A view's best places near its loop's, which may be a step nearer or higher; neighbours of a
+/// better place are left out.
+std::vector<OrbitPose> start_poses(const Table& table, std::size_t view, const Station& station,
                                    const OrbitSearchOptions& options,
                                    const std::vector<double>& radii, double cell_px,
                                    const Candidate& candidate) {
-  std::vector<OrbitPose> poses;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    const auto [le, lr] = candidate.loop_place.at(views[i].station->loop);
-    const double nominal =
-        candidate.offset_deg + (candidate.mirrored ? -1 : 1) * views[i].station->azimuth_deg;
+  struct Place {
+    int a, e, r;
     Peak peak;
-    OrbitPose pose;
+  };
+  const auto [le, lr] = candidate.loop_place.at(station.loop);
+  const double nominal =
+      candidate.offset_deg + (candidate.mirrored ? -1 : 1) * station.azimuth_deg;
+  const int center = static_cast<int>(std::lround(nominal / options.azimuth_step_deg));
+  const int reach = std::max(
+      1, static_cast<int>(std::floor(options.max_station_error_deg / options.azimuth_step_deg)));
+  std::vector<Place> places;
+  for (int a = center - reach; a <= center + reach; ++a)
     for (int e = std::max(0, le - 1); e <= std::min(table.elevations - 1, le + 1); ++e)
-      for (int r = std::max(0, lr - 1); r <= std::min(table.radii - 1, lr + 1); ++r) {
-        const int a = best_azimuth(table, i, nominal, options.max_station_error_deg, e, r,
-                                   options.azimuth_step_deg);
-        const Peak& p = table.of_view[i][table.index(a, e, r)];
-        if (p.score <= peak.score) continue;
-        peak = p;
-        pose.azimuth_deg = a * options.azimuth_step_deg;
-        pose.elevation_deg = options.elevations_deg[static_cast<std::size_t>(e)];
-        pose.radius = radii[static_cast<std::size_t>(r)];
-      }
-    pose.shift_x_px = peak.dx * cell_px;
-    pose.shift_y_px = peak.dy * cell_px;
+      for (int r = std::max(0, lr - 1); r <= std::min(table.radii - 1, lr + 1); ++r)
+        places.push_back({a, e, r, table.of_view[view][table.index(a, e, r)]});
+  const auto value = [&](const Place& p) {
+    return p.peak.score - 0.01F * static_cast<float>((p.a - center) * (p.a - center));
+  };
+  std::stable_sort(places.begin(), places.end(),
+                   [&](const Place& x, const Place& y) { return value(x) > value(y); });
+  std::vector<Place> kept;
+  for (const Place& place : places) {
+    const bool near_better = std::any_of(kept.begin(), kept.end(), [&](const Place& k) {
+      return std::abs(k.a - place.a) <= 1 && k.e == place.e;
+    });
+    if (!near_better) kept.push_back(place);
+    if (static_cast<int>(kept.size()) >= options.starts) break;
+  }
+  std::vector<OrbitPose> poses;
+  for (const Place& place : kept) {
+    OrbitPose pose;
+    pose.azimuth_deg = place.a * options.azimuth_step_deg;
+    pose.elevation_deg = options.elevations_deg[static_cast<std::size_t>(place.e)];
+    pose.radius = radii[static_cast<std::size_t>(place.r)];
+    pose.shift_x_px = place.peak.dx * cell_px;
+    pose.shift_y_px = place.peak.dy * cell_px;
     poses.push_back(pose);
   }
   return poses;
@@ -243,8 +262,13 @@ Result<std::vector<OrbitHypothesis>> search_orbit(const LineModel& lines,
                  std::abs(std::remainder(h.offset_deg - candidate.offset_deg, 360)) >= 40;
         });
     if (!distinct) continue;
-    result.push_back({start_poses(table, views, options, radii, cell, candidate),
-                      candidate.offset_deg, candidate.mirrored, candidate.score});
+    OrbitHypothesis hypothesis{{}, {}, candidate.offset_deg, candidate.mirrored, candidate.score};
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      hypothesis.starts.push_back(
+          start_poses(table, i, *views[i].station, options, radii, cell, candidate));
+      hypothesis.poses.push_back(hypothesis.starts.back().front());
+    }
+    result.push_back(std::move(hypothesis));
     if (static_cast<int>(result.size()) >= options.hypotheses) break;
   }
   return result;

@@ -37,12 +37,15 @@ struct OrbitSearchOptions {
   int columns = 80;              ///< cells of the correlated fields
   double max_shift = 0.25;       ///< of the image's width
   double max_station_error_deg = 16;
-  int hypotheses = 3;            ///< returned at most
+  int hypotheses = 2;            ///< returned at most
+  int starts = 5;                ///< of a view, at most
 };
 
 /// One start angle and direction that the views may have been taken with.
 struct OrbitHypothesis {
   std::vector<OrbitPose> poses;  ///< one a view
+  /// Places of each view worth refining, best first: one peak of a coarse table is often wrong.
+  std::vector<std::vector<OrbitPose>> starts;
   double offset_deg = 0;         ///< world azimuth of station azimuth 0
   bool mirrored = false;         ///< stations run clockwise
   double score = 0;              ///< mean correlation, [-1, 1]

@@ -11,7 +11,7 @@ namespace orbitfuse::registration {
 /// A place the search proposes, between the unit frames of the two clouds.
 struct Candidate {
   Similarity3d target_from_source;
-  double score = 0;  ///< what ranks it: coarse agreement in the search, evidence at the end
+  double score = 0;      ///< what ranks it: coarse agreement in the search, evidence at the end
   double agreement = 0;  ///< at the end: Agreement::score with the report's bounds
   std::string origin;
 };

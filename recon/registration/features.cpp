@@ -146,7 +146,8 @@ std::vector<Match> mutual_matches(const Descriptors& source, const Descriptors& 
     Eigen::Index t = 0;
     const float value = similarity.col(s).maxCoeff(&t);
     if (value <= 0 || best_source[static_cast<std::size_t>(t)] != s) continue;
-    matches.push_back({static_cast<int>(s), static_cast<int>(t), std::sqrt(std::max(0.0f, 2 - 2 * value))});
+    matches.push_back(
+        {static_cast<int>(s), static_cast<int>(t), std::sqrt(std::max(0.0f, 2 - 2 * value))});
   }
   std::stable_sort(matches.begin(), matches.end(),
                    [](const Match& a, const Match& b) { return a.distance < b.distance; });

@@ -10,15 +10,16 @@
 namespace orbitfuse::registration {
 namespace {
 
-constexpr double kScaleSlack = 1.22;    // either way: the descriptor radii stand 1.25 apart
-constexpr double kNormalSlack = 0.30;   // of cosines
-constexpr double kShortest = 0.25;      // segments below say little about scale or direction
+constexpr double kScaleSlack = 1.22;   // either way: the descriptor radii stand 1.25 apart
+constexpr double kNormalSlack = 0.30;  // of cosines
+constexpr double kShortest = 0.25;     // segments below say little about scale or direction
 constexpr double kCliqueScaleSlack = 1.10;
 
 /// A square table of bits.
 class BitRows {
  public:
-  explicit BitRows(int n) : n_(n), words_((n + 63) / 64), bits_(static_cast<std::size_t>(n * words_), 0) {}
+  explicit BitRows(int n)
+      : n_(n), words_((n + 63) / 64), bits_(static_cast<std::size_t>(n * words_), 0) {}
   void set(int row, int column) { word(row, column / 64) |= std::uint64_t{1} << (column % 64); }
   bool get(int row, int column) const { return word(row, column / 64) >> (column % 64) & 1; }
   int common(int a, int b) const {
@@ -36,7 +37,9 @@ class BitRows {
 
  private:
   std::uint64_t& word(int row, int w) { return bits_[static_cast<std::size_t>(row * words_ + w)]; }
-  std::uint64_t word(int row, int w) const { return bits_[static_cast<std::size_t>(row * words_ + w)]; }
+  std::uint64_t word(int row, int w) const {
+    return bits_[static_cast<std::size_t>(row * words_ + w)];
+  }
   int n_, words_;
   std::vector<std::uint64_t> bits_;
 };

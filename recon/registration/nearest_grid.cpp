@@ -5,7 +5,8 @@
 
 namespace orbitfuse::registration {
 
-void NearestGrid::build(const std::vector<Eigen::Vector3d>& points, int cells_per_side, double margin) {
+void NearestGrid::build(const std::vector<Eigen::Vector3d>& points, int cells_per_side,
+                        double margin) {
   Eigen::Vector3d low = points[0], high = points[0];
   for (const auto& p : points) {
     low = low.cwiseMin(p);
@@ -26,7 +27,9 @@ void NearestGrid::build(const std::vector<Eigen::Vector3d>& points, int cells_pe
     if (candidate < 0) return;
     const auto at = static_cast<std::size_t>((z * side_ + y) * side_ + x);
     const Eigen::Vector3f& p = cell_points[static_cast<std::size_t>(candidate)];
-    const float dx = p.x() - (static_cast<float>(x) + 0.5f), dy = p.y() - (static_cast<float>(y) + 0.5f), dz = p.z() - (static_cast<float>(z) + 0.5f);
+    const float dx = p.x() - (static_cast<float>(x) + 0.5f),
+                dy = p.y() - (static_cast<float>(y) + 0.5f),
+                dz = p.z() - (static_cast<float>(z) + 0.5f);
     const float d = dx * dx + dy * dy + dz * dz;
     if (d < best[at]) {
       best[at] = d;
@@ -37,19 +40,27 @@ void NearestGrid::build(const std::vector<Eigen::Vector3d>& points, int cells_pe
     const Eigen::Vector3i c = cell_points[i].array().floor().cast<int>().min(side_ - 1).max(0);
     offer(c.x(), c.y(), c.z(), static_cast<std::int32_t>(i));
   }
-  const auto owner = [&](int x, int y, int z) { return index_[static_cast<std::size_t>((z * side_ + y) * side_ + x)]; };
+  const auto owner = [&](int x, int y, int z) {
+    return index_[static_cast<std::size_t>((z * side_ + y) * side_ + x)];
+  };
   // Two sweeps along each axis carry every point to all cells.
   for (int pass = 0; pass < 2; ++pass) {
     for (int z = 0; z < side_; ++z) {
-      if (z > 0) for (int y = 0; y < side_; ++y) for (int x = 0; x < side_; ++x) offer(x, y, z, owner(x, y, z - 1));
+      if (z > 0)
+        for (int y = 0; y < side_; ++y)
+          for (int x = 0; x < side_; ++x) offer(x, y, z, owner(x, y, z - 1));
       for (int y = 0; y < side_; ++y) {
-        if (y > 0) for (int x = 0; x < side_; ++x) offer(x, y, z, owner(x, y - 1, z));
+        if (y > 0)
+          for (int x = 0; x < side_; ++x) offer(x, y, z, owner(x, y - 1, z));
         for (int x = 1; x < side_; ++x) offer(x, y, z, owner(x - 1, y, z));
         for (int x = side_ - 2; x >= 0; --x) offer(x, y, z, owner(x + 1, y, z));
       }
-      for (int y = side_ - 2; y >= 0; --y) for (int x = 0; x < side_; ++x) offer(x, y, z, owner(x, y + 1, z));
+      for (int y = side_ - 2; y >= 0; --y)
+        for (int x = 0; x < side_; ++x) offer(x, y, z, owner(x, y + 1, z));
     }
-    for (int z = side_ - 2; z >= 0; --z) for (int y = 0; y < side_; ++y) for (int x = 0; x < side_; ++x) offer(x, y, z, owner(x, y, z + 1));
+    for (int z = side_ - 2; z >= 0; --z)
+      for (int y = 0; y < side_; ++y)
+        for (int x = 0; x < side_; ++x) offer(x, y, z, owner(x, y, z + 1));
   }
 }
 

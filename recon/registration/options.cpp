@@ -9,7 +9,8 @@ namespace orbitfuse {
 
 Status RegistrationOptions::validate() const {
   const auto wrong = [](const char* field, double value, const char* rule) {
-    return fail(ErrorKind::usage, fmt::format("registration.{}", field), fmt::format("{}", value), rule);
+    return fail(ErrorKind::usage, fmt::format("registration.{}", field), fmt::format("{}", value),
+                rule);
   };
   if (points < 100 || points > 100000) return wrong("points", points, "must be 100 to 100000");
   if (!(max_pair_distance > 0 && max_pair_distance <= 0.5)) {
@@ -27,6 +28,10 @@ Status RegistrationOptions::validate() const {
   }
   if (!(ambiguity_ratio > 0 && ambiguity_ratio <= 1)) {
     return wrong("ambiguity_ratio", ambiguity_ratio, "must be > 0 and <= 1");
+  }
+  if (!use_features && !use_grid) {
+    return fail(ErrorKind::usage, "registration.use_grid", "false, and use_features too",
+                "leave one initialiser on");
   }
   if (restarts < 0 || restarts > 100) return wrong("restarts", restarts, "must be 0 to 100");
   return {};

@@ -140,7 +140,9 @@ Points without_outliers(const Points& points) {
     const bool two_populations = split.separation > 2.0 && split.step > 0.7 && thick > kThick;
     const bool drowned =
         split.separation > 1.5 && split.step > (pass == 0 ? 0.5 : 0.65) && thick > kVolume;
-    if (!(two_populations || drowned) || near.size() < std::max<std::size_t>(20, points.size() / 12)) break;
+    if (!(two_populations || drowned) ||
+        near.size() < std::max<std::size_t>(20, points.size() / 12))
+      break;
     kept = std::move(near);
   }
   return kept;

@@ -164,7 +164,8 @@ Result<PreparedCloud> prepare(const PointCloud& cloud, const RegistrationOptions
   for (auto& p : points) p = rough * p;
   // Nine points of ten lie within 1.
   constexpr double kFar = 8;
-  prepared.dropped_outliers = std::erase_if(points, [](const Eigen::Vector3d& p) { return p.norm() > kFar; });
+  prepared.dropped_outliers =
+      std::erase_if(points, [](const Eigen::Vector3d& p) { return p.norm() > kFar; });
   points = thinned_to(points, 4 * options.points);
   if (points.size() < kFewest) return too_few(points.size(), "distinct");
   const std::size_t before = points.size();

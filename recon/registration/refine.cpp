@@ -31,12 +31,18 @@ class Pairs {
  public:
   Pairs(const PreparedCloud& source, const PreparedCloud& target, const Similarity3d& placement,
         double bound, bool exact)
-      : exact_(exact), source_(source), target_(target), placement_(placement), inverse_(placement.inverse()),
-        rotation_(placement.rotation.toRotationMatrix()), bound2_(bound * bound),
+      : exact_(exact),
+        source_(source),
+        target_(target),
+        placement_(placement),
+        inverse_(placement.inverse()),
+        rotation_(placement.rotation.toRotationMatrix()),
+        bound2_(bound * bound),
         center_(placed_center(placement)) {}
 
   bool forward(std::size_t i, Pair& pair) const {
-    const Eigen::Vector3d y = placement_.scale * (rotation_ * source_.points[i]) + placement_.translation;
+    const Eigen::Vector3d y =
+        placement_.scale * (rotation_ * source_.points[i]) + placement_.translation;
     const int found = partner(target_, y);
     if (found < 0) return false;
     const auto j = static_cast<std::size_t>(found);
@@ -49,13 +55,16 @@ class Pairs {
   }
 
   /// The target's point z against the source's plane. The scale's derivative is taken at z, as if
-  /// the target moved the other way, so that noise biases the two directions oppositely and cancels.
+  /// the target moved the other way, so that noise biases the two directions oppositely and
+  /// cancels.
   bool backward(std::size_t j, Pair& pair) const {
     const Eigen::Vector3d& z = target_.points[j];
-    const int found = partner(source_, inverse_.scale * (rotation_.transpose() * z) + inverse_.translation);
+    const int found =
+        partner(source_, inverse_.scale * (rotation_.transpose() * z) + inverse_.translation);
     if (found < 0) return false;
     const auto i = static_cast<std::size_t>(found);
-    const Eigen::Vector3d y = placement_.scale * (rotation_ * source_.points[i]) + placement_.translation;
+    const Eigen::Vector3d y =
+        placement_.scale * (rotation_ * source_.points[i]) + placement_.translation;
     const Eigen::Vector3d d = y - z;
     if (d.squaredNorm() > bound2_) return false;
     pair.normal = rotation_ * source_.normals[i];
@@ -67,7 +76,8 @@ class Pairs {
   int partner(const PreparedCloud& cloud, const Eigen::Vector3d& x) const {
     return exact_ ? cloud.nearest(x) : cloud.nearest_table.lookup(x);
   }
-  static bool finish(Pair& pair, const Eigen::Vector3d& d, const Eigen::Vector3d& other, double planarity) {
+  static bool finish(Pair& pair, const Eigen::Vector3d& d, const Eigen::Vector3d& other,
+                     double planarity) {
     const double cosine = pair.normal.dot(other);
     if (cosine * cosine < 0.25) return false;
     pair.residual = pair.normal.dot(d);
@@ -102,7 +112,8 @@ void add(Equations& equations, const Pair& pair, double bound) {
 
 Equations equations_at(const PreparedCloud& source, const PreparedCloud& target,
                        const std::vector<int>& source_subset, const std::vector<int>& target_subset,
-                       const Similarity3d& placement, double pair_bound, double plane_bound, bool exact) {
+                       const Similarity3d& placement, double pair_bound, double plane_bound,
+                       bool exact) {
   Equations equations;
   equations.distances.reserve(source_subset.size() + target_subset.size());
   const Pairs pairs(source, target, placement, pair_bound, exact);
@@ -135,8 +146,9 @@ Similarity3d updated(const Similarity3d& target_from_source, const Eigen::Vector
                      const Vector7& update) {
   const Eigen::Vector3d omega = update.head<3>();
   const double angle = omega.norm();
-  const Eigen::Quaterniond turn = angle > 0 ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, omega / angle))
-                                            : Eigen::Quaterniond::Identity();
+  const Eigen::Quaterniond turn = angle > 0
+                                      ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, omega / angle))
+                                      : Eigen::Quaterniond::Identity();
   const double grow = std::exp(update[3]);
   Similarity3d result;
   result.scale = grow * target_from_source.scale;
@@ -150,16 +162,17 @@ Refined refine(const PreparedCloud& source, const PreparedCloud& target,
                const std::vector<int>& source_subset, const std::vector<int>& target_subset,
                const Similarity3d& start, const RefineOptions& options) {
   Refined refined{start, Matrix7::Zero(), 0, 0};
-  const double shrink = options.iterations > 1
-                            ? std::pow(options.end_bound / options.start_bound, 1.0 / (options.iterations - 1))
-                            : 1.0;
+  const double shrink = options.iterations > 1 ? std::pow(options.end_bound / options.start_bound,
+                                                          1.0 / (options.iterations - 1))
+                                               : 1.0;
   double bound = options.start_bound, sigma = bound;
   for (int iteration = 0; iteration < options.iterations + options.polish; ++iteration) {
     // 4.685 sigma: Tukey's 95 % efficiency; a floor, or exact data would leave no pair.
-    const double plane_bound = options.adapt_bound ? std::clamp(4.685 * sigma, 0.004, bound) : bound;
-    Equations equations = equations_at(source, target, source_subset, target_subset,
-                                       refined.target_from_source, bound, plane_bound,
-                                       options.exact_partners);
+    const double plane_bound =
+        options.adapt_bound ? std::clamp(4.685 * sigma, 0.004, bound) : bound;
+    Equations equations =
+        equations_at(source, target, source_subset, target_subset, refined.target_from_source,
+                     bound, plane_bound, options.exact_partners);
     if (equations.distances.size() < 10 || !(equations.weight > 0)) break;
     sigma = robust_sigma(equations.distances);
     refined.hessian = equations.hessian / equations.weight;
@@ -169,7 +182,8 @@ Refined refine(const PreparedCloud& source, const PreparedCloud& target,
     damped.diagonal().array() += 1e-4 * equations.weight;  // open directions stay where they are
     Vector7 update = -damped.ldlt().solve(equations.gradient);
     if (!update.allFinite()) break;
-    const double longest = std::max({update.head<3>().norm(), std::abs(update[3]), update.tail<3>().norm()});
+    const double longest =
+        std::max({update.head<3>().norm(), std::abs(update[3]), update.tail<3>().norm()});
     if (longest > 0.3) update *= 0.3 / longest;
     refined.target_from_source =
         updated(refined.target_from_source, placed_center(refined.target_from_source), update);

@@ -26,7 +26,7 @@ struct RefineOptions {
   int iterations = 12;        ///< over which the bound shrinks
   int polish = 8;             ///< at the last bound, until the update vanishes
   bool exact_partners = true;  ///< false: a table cell's error is far below the bounds
-  bool adapt_bound = true;    ///< Tukey bound from the residuals' spread, where that is smaller
+  bool adapt_bound = true;     ///< Tukey bound from the residuals' spread, where that is smaller
 };
 
 struct Refined {

@@ -19,12 +19,14 @@ struct RegistrationOptions {
   double max_pair_distance = 0.06;  ///< of the diameter: where coarse scoring stops counting
   double inlier_distance = 0.02;    ///< of the diameter: pairs that count as matched in the report
   double min_scale = 0.2, max_scale = 5;  ///< of target over source, after size normalisation
-  double decisive_score = 0.55;     ///< the second initialiser is skipped above this two-sided score,
-                                    ///< if hardly anything contradicts it and no rival comes near
-  double ambiguity_ratio = 0.85;    ///< a distinct runner-up with this share of the evidence makes the
-                                    ///< result ambiguous: half of the wrong 180 deg flips lie above 0.9
-  bool filter_outliers = true;      ///< by neighbour distance, only where two populations are seen
-  int restarts = 3;                 ///< refinements from disturbed starts, for the spread
+  double decisive_score = 0.55;   ///< the second initialiser is skipped above this two-sided score,
+                                  ///< if hardly anything contradicts it and no rival comes near
+  double ambiguity_ratio = 0.85;  ///< a distinct runner-up with this share of the evidence makes
+                                  ///< the result ambiguous, and views decide, if there are any
+  bool use_features = true;     ///< the first initialiser: fast, and enough for most pairs
+  bool use_grid = true;         ///< the second: rotations x scales, where the first is not decisive
+  bool filter_outliers = true;  ///< by neighbour distance, only where two populations are seen
+  int restarts = 3;             ///< refinements from disturbed starts, for the spread
   std::uint32_t seed = 1;
 
   Status validate() const;
@@ -32,25 +34,25 @@ struct RegistrationOptions {
 
 struct RegistrationAlternative {
   Similarity3d target_from_source;
-  double score = 0;                 ///< two-sided, as RegistrationReport::score
-  double evidence = 0;              ///< as RegistrationReport::evidence
-  double view_score = 0;            ///< of the ViewScore, if there is one
-  std::string origin;               ///< which initialiser found it
+  double score = 0;       ///< two-sided, as RegistrationReport::score
+  double evidence = 0;    ///< as RegistrationReport::evidence
+  double view_score = 0;  ///< of the ViewScore, if there is one
+  std::string origin;     ///< which initialiser found it
 };
 
 struct RegistrationReport {
   Similarity3d target_from_source;
-  double score = 0;                 ///< 0..1, geometric mean of both sides' truncated agreement
-  double evidence = 0;              ///< 0..score: less where one cloud stands off the other's surface;
-                                    ///< ranks the placements, has no absolute scale
-  double matching_ratio = 0;        ///< share of source points with a partner (as in the seed paper;
-                                    ///< one-sided: shrinking maximises it, so never read it alone)
-  double rmse = 0;                  ///< of matched pairs, target units
+  double score = 0;           ///< 0..1, geometric mean of both sides' truncated agreement
+  double evidence = 0;        ///< 0..score: less where one cloud stands off the other's surface;
+                              ///< ranks the placements, has no absolute scale
+  double matching_ratio = 0;  ///< share of source points with a partner (as in the seed paper;
+                              ///< one-sided: shrinking maximises it, so never read it alone)
+  double rmse = 0;            ///< of matched pairs, target units
   double rmse_percent_of_diameter = 0;
   double overlap_source = 0, overlap_target = 0;  ///< share of each cloud near the other
   double spread_rotation_deg = 0, spread_scale_percent = 0, spread_translation_percent = 0;
   bool ambiguous = false;
-  std::string ambiguity;            ///< what geometry leaves open, in words
+  std::string ambiguity;                              ///< what geometry leaves open, in words
   std::vector<RegistrationAlternative> alternatives;  ///< best first, the result not included
   std::string initialiser;
   std::vector<Skip> skips;
@@ -65,11 +67,13 @@ using ViewScore = std::function<double(const Similarity3d& target_from_source)>;
 /// Errors (input): fewer than 20 finite points, all points in one place, on one line or plane.
 /// Shapes that leave a direction open (sphere, cylinder) come back ambiguous.
 Result<RegistrationReport> register_clouds(const PointCloud& source, const PointCloud& target,
-                                           const RegistrationOptions& options, const Progress& progress,
+                                           const RegistrationOptions& options,
+                                           const Progress& progress,
                                            const ViewScore& view_score = {});
 
 /// Refinement alone, from a start within a few degrees and percent.
 Result<RegistrationReport> refine_registration(const PointCloud& source, const PointCloud& target,
-                                               const Similarity3d& start, const RegistrationOptions& options);
+                                               const Similarity3d& start,
+                                               const RegistrationOptions& options);
 
 }  // namespace orbitfuse

@@ -7,10 +7,12 @@ namespace orbitfuse {
 
 std::string RegistrationReport::brief() const {
   std::string text = fmt::format(
-      "score {:.2f} (evidence {:.2f}) by {}; overlap {:.0f} % of the source, {:.0f} % of the target; rmse {:.2f} % of the "
+      "score {:.2f} (evidence {:.2f}) by {}; overlap {:.0f} % of the source, {:.0f} % of the "
+      "target; rmse {:.2f} % of the "
       "diameter; scale {:.5g}; spread {:.2f} deg, {:.2f} %",
-      score, evidence, initialiser, 100 * overlap_source, 100 * overlap_target, rmse_percent_of_diameter,
-      target_from_source.scale, spread_rotation_deg, spread_scale_percent);
+      score, evidence, initialiser, 100 * overlap_source, 100 * overlap_target,
+      rmse_percent_of_diameter, target_from_source.scale, spread_rotation_deg,
+      spread_scale_percent);
   if (ambiguous) text += "; AMBIGUOUS: " + ambiguity;
   return text;
 }

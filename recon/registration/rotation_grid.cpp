@@ -26,7 +26,8 @@ std::vector<Eigen::Quaterniond> rotation_spiral(int count) {
   for (int i = 0; i < count; ++i) {
     const double s = i + 0.5, r = std::sqrt(s / count), big_r = std::sqrt(1 - s / count);
     const double alpha = 2 * std::numbers::pi * s / phi, beta = 2 * std::numbers::pi * s / psi;
-    rotations.emplace_back(big_r * std::cos(beta), r * std::sin(alpha), r * std::cos(alpha), big_r * std::sin(beta));
+    rotations.emplace_back(big_r * std::cos(beta), r * std::sin(alpha), r * std::cos(alpha),
+                           big_r * std::sin(beta));
   }
   return rotations;
 }
@@ -40,11 +41,13 @@ Candidates grid_candidates(const PreparedCloud& source, const PreparedCloud& tar
       candidates.push_back({{scale, rotation, Eigen::Vector3d::Zero()}, 0, 0, "rotation grid"});
     }
   }
-  constexpr Round rounds[] = {{60, 3, 0.6, 0.4, 240}, {120, 4, 0.4, 0.25, 60}, {250, 5, 0.25, 0.15, 0}};
+  constexpr Round rounds[] = {
+      {60, 3, 0.6, 0.4, 240}, {120, 4, 0.4, 0.25, 60}, {250, 5, 0.25, 0.15, 0}};
   for (const Round& round : rounds) {
     const auto source_subset = strided_subset(source.points.size(), round.points);
     const auto target_subset = strided_subset(target.points.size(), round.points);
-    const RefineOptions coarse{round.start_bound, round.end_bound, round.iterations, 0, false, false};
+    const RefineOptions coarse{
+        round.start_bound, round.end_bound, round.iterations, 0, false, false};
     const ScoreBounds bounds{round.end_bound, round.end_bound};
     for (Candidate& candidate : candidates) {
       candidate.target_from_source =
@@ -57,7 +60,8 @@ Candidates grid_candidates(const PreparedCloud& source, const PreparedCloud& tar
                                         candidate.target_from_source, bounds)
                                   .score;
     }
-    candidates = best_distinct(std::move(candidates), round.keep ? round.keep : static_cast<std::size_t>(most));
+    candidates = best_distinct(std::move(candidates),
+                               round.keep ? round.keep : static_cast<std::size_t>(most));
   }
   return candidates;
 }

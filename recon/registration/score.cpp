@@ -28,7 +28,8 @@ Side one_side(const PreparedCloud& from, const PreparedCloud& to, const std::vec
     if (j < 0) continue;
     const auto partner = static_cast<std::size_t>(j);
     const Eigen::Vector3d d = y - to.points[partner];
-    const double d2 = d.squaredNorm(), height = std::abs(to.normals[partner].dot(d)), off = height / plane;
+    const double d2 = d.squaredNorm(), height = std::abs(to.normals[partner].dot(d)),
+                 off = height / plane;
     if (d2 < reach2 && off > 1 && height * height > kAbove * kAbove * d2) {
       side.against += std::min(off - 1, 1.0) * (1 - d2 / reach2);
     }
@@ -55,12 +56,14 @@ Agreement agreement(const PreparedCloud& source, const PreparedCloud& target,
   // A contradicted point weighs ten agreeing ones: overlap alone must not outvote it.
   constexpr double kAgainst = 10;
   const Side forward = one_side(source, target, source_subset, target_from_source, bounds, 1);
-  const Side backward = one_side(target, source, target_subset, target_from_source.inverse(), bounds,
-                                 1 / target_from_source.scale);
+  const Side backward = one_side(target, source, target_subset, target_from_source.inverse(),
+                                 bounds, 1 / target_from_source.scale);
   Agreement result;
   result.score = std::sqrt(forward.agree * backward.agree);
   if (!(result.score > 0)) return {};
-  const auto borne_out = [&](const Side& side) { return side.agree / (side.agree + kAgainst * side.against); };
+  const auto borne_out = [&](const Side& side) {
+    return side.agree / (side.agree + kAgainst * side.against);
+  };
   result.evidence = result.score * std::sqrt(borne_out(forward) * borne_out(backward));
   return result;
 }
@@ -90,7 +93,8 @@ MatchFigures match_figures(const PreparedCloud& source, const PreparedCloud& tar
   };
   MatchFigures figures;
   figures.source_share = side(source, target, target_from_source, 1);
-  figures.target_share = side(target, source, target_from_source.inverse(), target_from_source.scale);
+  figures.target_share =
+      side(target, source, target_from_source.inverse(), target_from_source.scale);
   figures.rmse = pairs > 0 ? std::sqrt(squares / pairs) : 0;
   return figures;
 }

@@ -14,7 +14,8 @@ using Points = std::vector<Eigen::Vector3d>;
 /// Least-squares similarity, target = s R source + t (Umeyama 1991, eq. 40-43, reflections
 /// excluded). Weights may be empty. Input errors: fewer than 3 pairs, different counts, values that
 /// are not finite, sources or targets in one place or on one line (R or s is not determined).
-Result<Similarity3d> umeyama(const Points& source, const Points& target, const std::vector<double>& weights = {});
+Result<Similarity3d> umeyama(const Points& source, const Points& target,
+                             const std::vector<double>& weights = {});
 
 struct RobustSimilarity {
   Similarity3d target_from_source;
@@ -23,6 +24,7 @@ struct RobustSimilarity {
 };
 /// Graduated non-convexity with truncated least squares (Yang et al. 2020) round umeyama; pairs
 /// further off than the bound (target units) end with weight 0.
-Result<RobustSimilarity> robust_umeyama(const Points& source, const Points& target, double inlier_bound);
+Result<RobustSimilarity> robust_umeyama(const Points& source, const Points& target,
+                                        double inlier_bound);
 
 }  // namespace orbitfuse::registration

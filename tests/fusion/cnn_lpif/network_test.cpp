@@ -53,6 +53,28 @@ TEST(ScoreMap, IsTheNetworkOnEveryPatch) {
     }
 }
 
+TEST(ScoreMap, InstructionSetsAgreeToTheBit) {
+  if (best_isa() < Isa::avx512) GTEST_SKIP() << "this processor has no AVX-512";
+  for (const cv::Size size : {cv::Size(16, 16), cv::Size(17, 31), cv::Size(130, 49), cv::Size(301, 77)}) {
+    const Plane image = dead_leaves(size, 4);
+    const auto& p = cnn::shipped_network();
+    EXPECT_EQ(cv::norm(cnn::score_map(image, p, {}, Isa::avx2), cnn::score_map(image, p, {}, Isa::avx512), cv::NORM_INF), 0);
+  }
+}
+
+TEST(ScoreMap, SkippedTilesDoNotChangeTheOthers) {
+  const Plane image = dead_leaves({200, 120}, 8);
+  const auto& p = cnn::shipped_network();
+  const Plane all = cnn::score_map(image, p);
+  cv::Mat1b needed = cv::Mat1b::zeros(all.size());
+  const cv::Rect part(31, 10, 22, 17);
+  needed(part) = 255;
+  const Plane some = cnn::score_map(image, p, needed);
+  EXPECT_EQ(cv::norm(all(part), some(part), cv::NORM_INF), 0);
+  EXPECT_EQ(some(50, 5), 0) << "what nobody needs is not computed";
+  EXPECT_EQ(some(12, 80), 0);
+}
+
 TEST(Network, PrefersTheSharpSideOfUnseenImages) {
   int right = 0, all = 0;
   for (const unsigned seed : {901U, 902U, 903U}) {

@@ -68,7 +68,8 @@ TEST(Degenerate, NoisyCylinder) { expect_flag_or_error(twice(on_cylinder, 2500, 
 TEST(Degenerate, Cube) { expect_flag_or_error(twice(on_cube)); }
 TEST(Degenerate, NoisyCube) { expect_flag_or_error(twice(on_cube, 2500, 0.01)); }
 TEST(Degenerate, UnrelatedShapes) {
-  expect_flag_or_error(registered(drawn(2500, 1, on_potato), moved(drawn(2500, 2, on_cube), some_move())));
+  expect_flag_or_error(
+      registered(drawn(2500, 1, on_potato), moved(drawn(2500, 2, on_cube), some_move())));
 }
 TEST(Degenerate, VolumeOfNoise) {
   expect_flag_or_error(registered(drawn(2500, 1, gaussian3), drawn(2500, 2, gaussian3)));
@@ -90,8 +91,10 @@ TEST(Degenerate, EmptyAndThreePoints) {
 
 TEST(Degenerate, ScarcePointsGiveAnAnswerOrAnError) {
   for (const int count : {20, 25, 40, 80}) {
-    const auto report = registered(drawn(count, 1, on_potato), moved(drawn(count, 2, on_potato), some_move()));
-    if (report && rotation_angle_deg(report->target_from_source.rotation, some_move().rotation) > 10) {
+    const auto report =
+        registered(drawn(count, 1, on_potato), moved(drawn(count, 2, on_potato), some_move()));
+    if (report &&
+        rotation_angle_deg(report->target_from_source.rotation, some_move().rotation) > 10) {
       EXPECT_TRUE(report->ambiguous) << count << ": " << report->brief();
     }
   }
@@ -99,8 +102,10 @@ TEST(Degenerate, ScarcePointsGiveAnAnswerOrAnError) {
 
 TEST(Degenerate, PointsThatAreNotFiniteAreDropped) {
   PointCloud source = drawn(2500, 1, on_potato);
-  const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < source.size(); i += 5) source.positions[i][static_cast<Eigen::Index>(i % 3)] = i % 2 ? nan : inf;
+  const double nan = std::numeric_limits<double>::quiet_NaN(),
+               inf = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < source.size(); i += 5)
+    source.positions[i][static_cast<Eigen::Index>(i % 3)] = i % 2 ? nan : inf;
   expect_right(registered(source, moved(drawn(2500, 2, on_potato), some_move())), some_move());
   for (auto& p : source.positions) p.setConstant(nan);
   expect_input_error(registered(source, source));
@@ -111,23 +116,27 @@ TEST(Degenerate, HugeSizesAtHugeOffsets) {
   far.scale = 1e6;
   far.translation = {4e8, -4e8, 4e8};
   const PointCloud source = moved(drawn(2500, 1, on_potato), far);
-  expect_right(registered(source, moved(moved(drawn(2500, 2, on_potato), far), some_move())), some_move());
+  expect_right(registered(source, moved(moved(drawn(2500, 2, on_potato), far), some_move())),
+               some_move());
 }
 
 TEST(Degenerate, TinySizes) {
   Similarity3d tiny;
   tiny.scale = 1e-6;
   const PointCloud source = moved(drawn(2500, 1, on_potato), tiny);
-  expect_right(registered(source, moved(moved(drawn(2500, 2, on_potato), tiny), some_move())), some_move());
+  expect_right(registered(source, moved(moved(drawn(2500, 2, on_potato), tiny), some_move())),
+               some_move());
 }
 
 TEST(Degenerate, PointsRepeatedTwentyTimes) {
   const auto repeated = [](const PointCloud& cloud) {
     PointCloud many;
-    for (int i = 0; i < 20; ++i) many.positions.insert(many.positions.end(), cloud.positions.begin(), cloud.positions.end());
+    for (int i = 0; i < 20; ++i)
+      many.positions.insert(many.positions.end(), cloud.positions.begin(), cloud.positions.end());
     return many;
   };
-  expect_right(registered(repeated(drawn(2000, 1, on_potato)), moved(repeated(drawn(2000, 2, on_potato)), some_move())),
+  expect_right(registered(repeated(drawn(2000, 1, on_potato)),
+                          moved(repeated(drawn(2000, 2, on_potato)), some_move())),
                some_move());
 }
 

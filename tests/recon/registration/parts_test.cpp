@@ -22,7 +22,8 @@ TEST(NearestTable, AgreesWithBruteForceNearTheSurface) {
   Random random(3);
   int exact = 0;
   for (int i = 0; i < 500; ++i) {
-    const auto& anchor = cloud->points[std::uniform_int_distribution<std::size_t>(0, cloud->points.size() - 1)(random)];
+    const auto& anchor = cloud->points[std::uniform_int_distribution<std::size_t>(
+        0, cloud->points.size() - 1)(random)];
     const Eigen::Vector3d x = anchor + 0.03 * gaussian3(random);
     double least = 1e9;
     for (const auto& p : cloud->points) least = std::min(least, (p - x).norm());
@@ -51,7 +52,8 @@ TEST(Thinning, KeepsAtMostTheWantedCountAndDropsDuplicates) {
   EXPECT_LE(some.size(), 1000u);
   EXPECT_GT(some.size(), 800u);
   Points repeated;
-  for (int i = 0; i < 20; ++i) repeated.insert(repeated.end(), points.begin(), points.begin() + 300);
+  for (int i = 0; i < 20; ++i)
+    repeated.insert(repeated.end(), points.begin(), points.begin() + 300);
   EXPECT_EQ(thinned_to(repeated, 1000).size(), 300u);
 }
 
@@ -77,12 +79,14 @@ TEST(OutlierFilter, DropsMostScatteredPoints) {
     Points points = drawn(1250, 4, on_potato).positions;
     for (auto& p : points) p *= 0.7;
     for (int k = 0; k < scattered; ++k) {
-      points.push_back({uniform(random, -1.5, 1.5), uniform(random, -1.2, 1.2), uniform(random, -1, 1)});
+      points.push_back(
+          {uniform(random, -1.5, 1.5), uniform(random, -1.2, 1.2), uniform(random, -1, 1)});
     }
     const Points kept = without_outliers(points);
     const Points surface(points.begin(), points.begin() + 1250);
     std::size_t right = 0;
-    for (const auto& p : kept) right += std::find(surface.begin(), surface.end(), p) != surface.end();
+    for (const auto& p : kept)
+      right += std::find(surface.begin(), surface.end(), p) != surface.end();
     EXPECT_GT(static_cast<double>(right), 0.8 * 1250) << scattered;
     EXPECT_GT(static_cast<double>(right), 0.5 * static_cast<double>(kept.size())) << scattered;
   }
@@ -114,7 +118,8 @@ TEST(Consensus, FindsTheSimilarityAmongWrongMatches) {
   for (auto& n : b.normals) n = truth.rotation * n;
   std::vector<Match> matches;
   for (int i = 0; i < 200; ++i) {
-    const int other = std::uniform_int_distribution<int>(0, static_cast<int>(b.points.size()) - 1)(random);
+    const int other =
+        std::uniform_int_distribution<int>(0, static_cast<int>(b.points.size()) - 1)(random);
     matches.push_back({i, i % 8 == 0 ? i : other, 0.1f});
   }
   const Candidates found = consensus_candidates(a, b, matches, 1.0, 5);

@@ -16,7 +16,8 @@ TEST(PlaneJacobian, ForwardMatchesFiniteDifferences) {
   Random random(1);
   for (int trial = 0; trial < 20; ++trial) {
     const Similarity3d placement = any_similarity(random);
-    const Eigen::Vector3d x = gaussian3(random), q = gaussian3(random), n = on_sphere(random), c = gaussian3(random);
+    const Eigen::Vector3d x = gaussian3(random), q = gaussian3(random), n = on_sphere(random),
+                          c = gaussian3(random);
     const Vector7 j = plane_jacobian(placement * x - c, n);
     for (int k = 0; k < 7; ++k) {
       const double h = 1e-6;

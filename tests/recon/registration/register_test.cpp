@@ -13,7 +13,8 @@ namespace {
 using namespace orbitfuse::testing;
 
 bool is_right(const Similarity3d& found, const Similarity3d& truth) {
-  return rotation_angle_deg(found.rotation, truth.rotation) < 5 && std::abs(found.scale / truth.scale - 1) < 0.05;
+  return rotation_angle_deg(found.rotation, truth.rotation) < 5 &&
+         std::abs(found.scale / truth.scale - 1) < 0.05;
 }
 
 /// A fast part of the suite in bench/registration: the levels whose bar is 100 %, other seeds.
@@ -28,7 +29,8 @@ TEST_P(Suite, FindsTheTruth) {
     const bench::CloudPair pair = bench::make_pair(*surface, level, ++seed);
     const auto report = register_clouds(pair.source, pair.target, {}, {});
     ASSERT_TRUE(report) << report.error().message();
-    EXPECT_TRUE(is_right(report->target_from_source, pair.target_from_source)) << level.name << ": " << report->brief();
+    EXPECT_TRUE(is_right(report->target_from_source, pair.target_from_source))
+        << level.name << ": " << report->brief();
     EXPECT_GT(report->score, 0.2) << level.name;
   }
 }
@@ -64,6 +66,19 @@ TEST(Register, SecondInitialiserIsSkippedWhenTheFirstIsDecisive) {
   EXPECT_TRUE(is_right(thorough->target_from_source, pair.target_from_source));
 }
 
+TEST(Register, EachInitialiserAloneFindsTheTruth) {
+  const bench::CloudPair pair = indoor_pair(11);
+  for (const bool features : {true, false}) {
+    RegistrationOptions options;
+    options.use_features = features;
+    options.use_grid = !features;
+    const auto report = register_clouds(pair.source, pair.target, options, {});
+    ASSERT_TRUE(report);
+    EXPECT_TRUE(is_right(report->target_from_source, pair.target_from_source)) << report->brief();
+    EXPECT_EQ(report->initialiser.find("features") == 0, features) << report->initialiser;
+  }
+}
+
 TEST(Register, TheReverseIsTheInverse) {
   const bench::CloudPair pair = indoor_pair(7);
   const auto back = register_clouds(pair.target, pair.source, {}, {});
@@ -84,7 +99,9 @@ TEST(Register, ViewsDecideBetweenPlacementsThatGeometryCannot) {
   const Similarity3d wanted = alone->alternatives.back().evidence > 0.9 * alone->evidence
                                   ? alone->alternatives.back().target_from_source
                                   : alone->alternatives.front().target_from_source;
-  const ViewScore views = [&](const Similarity3d& s) { return -rotation_angle_deg(s.rotation, wanted.rotation); };
+  const ViewScore views = [&](const Similarity3d& s) {
+    return -rotation_angle_deg(s.rotation, wanted.rotation);
+  };
   const auto decided = register_clouds(source, target, {}, {}, views);
   ASSERT_TRUE(decided);
   EXPECT_LT(rotation_angle_deg(decided->target_from_source.rotation, wanted.rotation), 2);
@@ -135,6 +152,7 @@ TEST(Options, NameTheWrongField) {
   EXPECT_EQ(where([](auto& o) { o.max_scale = std::nan(""); }), "registration.max_scale");
   EXPECT_EQ(where([](auto& o) { o.decisive_score = 2; }), "registration.decisive_score");
   EXPECT_EQ(where([](auto& o) { o.ambiguity_ratio = 0; }), "registration.ambiguity_ratio");
+  EXPECT_EQ(where([](auto& o) { o.use_features = o.use_grid = false; }), "registration.use_grid");
   EXPECT_EQ(where([](auto& o) { o.restarts = -1; }), "registration.restarts");
 }
 

@@ -22,7 +22,8 @@ inline Eigen::Vector3d gaussian3(Random& random) {
 }
 inline Eigen::Quaterniond any_rotation(Random& random) {
   const Eigen::Vector3d v = gaussian3(random);
-  return Eigen::Quaterniond(std::normal_distribution<double>()(random), v.x(), v.y(), v.z()).normalized();
+  return Eigen::Quaterniond(std::normal_distribution<double>()(random), v.x(), v.y(), v.z())
+      .normalized();
 }
 inline Similarity3d any_similarity(Random& random) {
   Similarity3d s;
@@ -33,7 +34,8 @@ inline Similarity3d any_similarity(Random& random) {
 }
 
 /// Points drawn one by one from a shape; count and seed fix them.
-inline PointCloud drawn(int count, std::uint32_t seed, const std::function<Eigen::Vector3d(Random&)>& draw) {
+inline PointCloud drawn(int count, std::uint32_t seed,
+                        const std::function<Eigen::Vector3d(Random&)>& draw) {
   Random random(seed);
   PointCloud cloud;
   for (int i = 0; i < count; ++i) cloud.positions.push_back(draw(random));
@@ -60,7 +62,8 @@ inline Eigen::Vector3d on_line(Random& random) {
 /// A lopsided potato: no symmetry, all directions held.
 inline Eigen::Vector3d on_potato(Random& random) {
   const Eigen::Vector3d u = on_sphere(random);
-  const double bumps = 1 + 0.25 * std::sin(3 * u.x() + 1) + 0.2 * std::cos(4 * u.y() * u.z()) + 0.15 * u.z() * u.x();
+  const double bumps =
+      1 + 0.25 * std::sin(3 * u.x() + 1) + 0.2 * std::cos(4 * u.y() * u.z()) + 0.15 * u.z() * u.x();
   return bumps * Eigen::Vector3d(1.6 * u.x(), 1.0 * u.y(), 0.8 * u.z());
 }
 

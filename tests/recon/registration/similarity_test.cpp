@@ -22,7 +22,8 @@ Points applied(const Similarity3d& s, const Points& points) {
   return out;
 }
 
-void expect_same(const Similarity3d& found, const Similarity3d& truth, double tolerance, double size = 1) {
+void expect_same(const Similarity3d& found, const Similarity3d& truth, double tolerance,
+                 double size = 1) {
   EXPECT_LT(rotation_angle_deg(found.rotation, truth.rotation), tolerance * 100);
   EXPECT_NEAR(found.scale / truth.scale, 1, tolerance);
   EXPECT_LT((found.translation - truth.translation).norm(), tolerance * size);
@@ -31,7 +32,8 @@ void expect_same(const Similarity3d& found, const Similarity3d& truth, double to
 TEST(Umeyama, IsExactOnExactPairs) {
   Random random(1);
   for (int trial = 0; trial < 20; ++trial) {
-    const Points source = drawn(3 + trial, 10 + static_cast<std::uint32_t>(trial), on_potato).positions;
+    const Points source =
+        drawn(3 + trial, 10 + static_cast<std::uint32_t>(trial), on_potato).positions;
     const Similarity3d truth = any_similarity(random);
     const auto found = umeyama(source, applied(truth, source));
     ASSERT_TRUE(found) << found.error().message();
@@ -49,14 +51,17 @@ TEST(Umeyama, IsStationaryOnNoisyPairs) {
   ASSERT_TRUE(found);
   const auto error = [&](const Similarity3d& s) {
     double sum = 0;
-    for (std::size_t i = 0; i < source.size(); ++i) sum += (s * source[i] - target[i]).squaredNorm();
+    for (std::size_t i = 0; i < source.size(); ++i)
+      sum += (s * source[i] - target[i]).squaredNorm();
     return sum;
   };
   const double least = error(*found), step = 1e-4;
   for (int axis = 0; axis < 3; ++axis) {
     for (const double sign : {-step, step}) {
       Similarity3d turned = *found, shifted = *found, grown = *found;
-      turned.rotation = (Eigen::Quaterniond(Eigen::AngleAxisd(sign, Eigen::Vector3d::Unit(axis))) * turned.rotation).normalized();
+      turned.rotation = (Eigen::Quaterniond(Eigen::AngleAxisd(sign, Eigen::Vector3d::Unit(axis))) *
+                         turned.rotation)
+                            .normalized();
       shifted.translation[axis] += sign;
       grown.scale *= 1 + sign;
       EXPECT_GE(error(turned), least);
@@ -128,7 +133,9 @@ TEST(Umeyama, DegeneratePairsAreErrors) {
   broken[7].y() = std::numeric_limits<double>::quiet_NaN();
   Points infinite = potato;
   infinite[3].x() = std::numeric_limits<double>::infinity();
-  const auto is_input_error = [](const auto& result) { return !result && result.error().kind == ErrorKind::input; };
+  const auto is_input_error = [](const auto& result) {
+    return !result && result.error().kind == ErrorKind::input;
+  };
   EXPECT_TRUE(is_input_error(umeyama({}, {})));
   EXPECT_TRUE(is_input_error(umeyama({potato[0], potato[1]}, {potato[0], potato[1]})));
   EXPECT_TRUE(is_input_error(umeyama(line, potato)));
@@ -194,9 +201,12 @@ TEST_P(TeaserData, GncFindsTheReference) {
   const Eigen::Quaterniond rotation(read_csv<3, 3>(folder / "R_ref.csv"));
   EXPECT_LT(rotation_angle_deg(found->target_from_source.rotation, rotation), 0.1);
   EXPECT_NEAR(found->target_from_source.scale, (read_csv<1, 1>(folder / "s_ref.csv")(0, 0)), 2e-3);
-  EXPECT_LT((found->target_from_source.translation - read_csv<3, 1>(folder / "t_ref.csv")).norm(), 5e-3);
+  EXPECT_LT((found->target_from_source.translation - read_csv<3, 1>(folder / "t_ref.csv")).norm(),
+            5e-3);
 }
-INSTANTIATE_TEST_SUITE_P(All, TeaserData, ::testing::Values("benchmark_1", "benchmark_2", "benchmark_3", "benchmark_4"));
+INSTANTIATE_TEST_SUITE_P(All, TeaserData,
+                         ::testing::Values("benchmark_1", "benchmark_2", "benchmark_3",
+                                           "benchmark_4"));
 
 }  // namespace
 }  // namespace orbitfuse::registration

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Analytic gradients against central differences.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "recon/nerf/backward.hpp"
+#include "recon/nerf/compositing.hpp"
+#include "recon/nerf/random.hpp"
+
+namespace orbitfuse::nerf {
+namespace {
+
+std::vector<double> noise(std::size_t count, std::uint64_t seed) {
+  std::vector<double> out(count);
+  for (std::size_t i = 0; i < count; ++i) out[i] = random_uniform(seed, 98, i);
+  return out;
+}
+
+TEST(Compositing, DensityGradientMatchesDifferencesInDouble) {
+  const int n = 24;
+  auto sigma = noise(n, 1), dt = noise(n, 2);
+  const auto g = noise(n, 3);
+  const double behind_value = 0.7;
+  std::vector<double> w(n), light(n), gradient(n);
+  const auto loss = [&] {
+    composite<double>(n, sigma.data(), dt.data(), 0.0, w.data(), light.data());
+    double sum = light.back() * behind_value;
+    for (int i = 0; i < n; ++i) sum += w[static_cast<std::size_t>(i)] * g[static_cast<std::size_t>(i)];
+    return sum;
+  };
+  loss();
+  composite_backward<double>(n, dt.data(), w.data(), light.data(), g.data(), light.back() * behind_value,
+                             gradient.data());
+  for (std::size_t i = 0; i < n; ++i) {
+    const double kept = sigma[i], h = 1e-6;
+    sigma[i] = kept + h;
+    const double up = loss();
+    sigma[i] = kept - h;
+    const double down = loss();
+    sigma[i] = kept;
+    EXPECT_NEAR(gradient[i], (up - down) / (2 * h), 1e-9);
+  }
+}
+
+TEST(Compositing, WeightsAndTransmittanceSumToOneAtEveryScale) {
+  for (const double scale : {0.0, 1e-12, 1e-3, 1.0, 1e3, 1e6}) {
+    const int n = 40;
+    std::vector<float> sigma(n), dt(n), w(n), light(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      sigma[i] = static_cast<float>(scale * random_uniform(4, 1, i));
+      dt[i] = i % 3 == 0 ? 1e-12f : 0.01f;
+    }
+    const int used = composite(n, sigma.data(), dt.data(), 1e-4f, w.data(), light.data());
+    double sum = light[static_cast<std::size_t>(used - 1)], reference = 1;
+    for (int i = 0; i < used; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      sum += w[k];
+      reference *= std::exp(-double{sigma[k]} * dt[k]);
+      EXPECT_NEAR(light[k], reference, 1e-6) << scale;
+    }
+    EXPECT_NEAR(sum, 1, 1e-6) << scale;
+  }
+}
+
+TEST(Distortion, IsTheDoubleSumOfEquation15AndItsGradient) {
+  const int n = 17;
+  auto w = noise(n, 5), s = noise(n, 6), ds = noise(n, 7);
+  std::sort(s.begin(), s.end());
+  const auto naive = [&] {
+    double sum = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      sum += w[i] * w[i] * ds[i] / 3;
+      for (std::size_t j = 0; j < n; ++j) sum += w[i] * w[j] * std::abs(s[i] - s[j]);
+    }
+    return sum;
+  };
+  std::vector<double> gradient(n);
+  EXPECT_NEAR(distortion<double>(n, w.data(), s.data(), ds.data(), 1.0, gradient.data()), naive(), 1e-12);
+  for (std::size_t i = 0; i < n; ++i) {
+    const double kept = w[i], h = 1e-6;
+    w[i] = kept + h;
+    const double up = naive();
+    w[i] = kept - h;
+    const double down = naive();
+    w[i] = kept;
+    EXPECT_NEAR(gradient[i], (up - down) / (2 * h), 1e-8);
+  }
+}
+
+/// A field with visible density, a few rays through it, and the whole loss.
+class FieldGradient : public ::testing::TestWithParam<Modality> {
+ protected:
+  void SetUp() override {
+    TrainOptions options;
+    options.log2_table = 10;
+    options.max_resolution = 64;
+    options.levels = 4;
+    options.occupancy_resolution = 16;
+    field_.create(options, GetParam(), 3);
+    for (std::size_t i = 0; i < field_.main.grid.table.size(); ++i)
+      field_.main.grid.table.value[i] = random_uniform(8, 1, i) - 0.5f;
+    field_.refresh();
+    for (int r = 0; r < 12; ++r) {
+      const float a = 0.5f * static_cast<float>(r);
+      Ray ray{{std::cos(a), std::sin(a), 0.1f}, {-std::cos(a + 0.1f), -std::sin(a + 0.1f), 0}, 1};
+      std::vector<float> t, dt;
+      for (int i = 0; i < 10; ++i) {
+        t.push_back(0.2f + 0.15f * static_cast<float>(i));
+        dt.push_back(0.15f);
+      }
+      if (r == 0) block_.clear();
+      block_.add(ray, t.data(), dt.data(), 10);
+      RayTarget target;
+      for (float& v : target.value) v = random_uniform(9, 2, static_cast<unsigned>(r));
+      target.view = r % 3;
+      target.distance = r % 2 ? 0.9f : 0.0f;
+      target.depth_weight = 0.3f;
+      targets_.push_back(target);
+    }
+    settings_.per_ray = 1.0f / 12;
+    settings_.distortion_weight = 0.1f;
+  }
+
+  double loss(BlockGradients& gradients) {
+    gradients.reset(field_);
+    forward(field_, kernels_, {1e-9f, 0.0f}, block_);
+    backward(field_, kernels_, settings_, targets_, block_, gradients, grid_);
+    return settings_.per_ray * (gradients.squared_error / field_.channels() +
+                                settings_.distortion_weight * gradients.distortion + gradients.depth);
+  }
+
+  /// Slope along the gradient itself, the best conditioned direction: must be its length.
+  void check(Parameters& parameters, const std::vector<float>& gradient) {
+    double length = 0;
+    for (const float g : gradient) length += double{g} * g;
+    length = std::sqrt(length);
+    ASSERT_GT(length, 1e-6);
+    const auto kept = parameters.value;
+    const double h = 3e-3;
+    double side[2];
+    for (int k = 0; k < 2; ++k) {
+      for (std::size_t i = 0; i < gradient.size(); ++i)
+        parameters.value[i] = kept[i] + static_cast<float>((k == 0 ? h : -h) * gradient[i] / length);
+      field_.refresh();
+      BlockGradients unused;
+      side[k] = loss(unused);
+    }
+    parameters.value = kept;
+    field_.refresh();
+    EXPECT_NEAR((side[0] - side[1]) / (2 * h), length, 0.01 * length);
+  }
+
+  const Kernels& kernels_ = kernels_for(Isa::avx2);
+  FieldState field_;
+  RayBlock block_;
+  std::vector<RayTarget> targets_;
+  LossSettings settings_;
+  std::vector<float> grid_;
+};
+
+TEST_P(FieldGradient, OfColourDistortionAndDepthLossMatchesDifferences) {
+  BlockGradients gradients;
+  loss(gradients);
+  ASSERT_TRUE(gradients.finite);
+  EXPECT_GT(gradients.distortion, 0);
+  EXPECT_NE(gradients.depth, 0);
+  check(field_.main.mlp.weights, gradients.mlp);
+  check(field_.color.weights, gradients.color);
+  check(field_.image_offsets, gradients.offsets);
+}
+
+TEST_P(FieldGradient, OfTheHashTableMatchesDifferences) {
+  BlockGradients gradients;
+  loss(gradients);
+  HashEncoding& grid = field_.main.grid;
+  const int n = block_.samples();
+  std::vector<float> table(grid.table.size());
+  for (std::size_t l = 0; l < grid.levels.size(); ++l)
+    kernels_.scatter(grid.levels[l], table.data() + grid.levels[l].offset, block_.position01.data(), n,
+                     grid_.data() + l * static_cast<std::size_t>(n * grid.features));
+  // The table is read in half precision, so the step must be large against 2^-11.
+  double length = 0;
+  for (const float g : table) length += double{g} * g;
+  length = std::sqrt(length);
+  ASSERT_GT(length, 1e-6);
+  const auto kept = grid.table.value;
+  const double h = 0.05;
+  double side[2];
+  for (int k = 0; k < 2; ++k) {
+    for (std::size_t i = 0; i < table.size(); ++i)
+      grid.table.value[i] = kept[i] + static_cast<float>((k == 0 ? h : -h) * table[i] / length);
+    field_.refresh();
+    BlockGradients unused;
+    side[k] = loss(unused);
+  }
+  EXPECT_NEAR((side[0] - side[1]) / (2 * h), length, 0.03 * length);
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryModality, FieldGradient,
+                         ::testing::Values(Modality::visible, Modality::thermal),
+                         [](const auto& instance) { return std::string(name(instance.param)); });
+
+}  // namespace
+}  // namespace orbitfuse::nerf

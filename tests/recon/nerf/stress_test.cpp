@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Inputs at the edge: each has a defined answer.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "recon/nerf/field_state.hpp"
+#include "tests/recon/nerf/toy_scene.hpp"
+
+namespace orbitfuse::nerf {
+namespace {
+
+using test::toy_options;
+using test::toy_scene;
+
+constexpr float nan_value = std::numeric_limits<float>::quiet_NaN();
+
+void expect_finite(Field& field) {
+  for (const Parameters* p : field.state().parameters())
+    for (const float v : p->value) ASSERT_TRUE(std::isfinite(v));
+}
+
+Error error_of(const Dataset& data) {
+  Field field;
+  const auto report = train(data, toy_options(data.modality, 5), {}, field);
+  EXPECT_FALSE(report);
+  return report ? Error{} : report.error();
+}
+
+TEST(Stress, NoViewsIsAnInputError) {
+  EXPECT_EQ(error_of({}).kind, ErrorKind::input);
+}
+
+TEST(Stress, MalformedViewIsNamed) {
+  Dataset data = toy_scene(Modality::visible, 4);
+  data.views[2].image.at<cv::Vec3f>(3, 3)[1] = nan_value;
+  EXPECT_EQ(error_of(data).where, "002.png");
+  data = toy_scene(Modality::visible, 4);
+  data.views[1].image = cv::Mat();
+  EXPECT_EQ(error_of(data).where, "001.png");
+  data = toy_scene(Modality::visible, 4);
+  data.views[3].camera.width += 1;
+  EXPECT_EQ(error_of(data).where, "003.png");
+  data = toy_scene(Modality::thermal, 4);
+  data.views[0].image.at<float>(0, 0) = std::numeric_limits<float>::infinity();
+  EXPECT_EQ(error_of(data).where, "000.png");
+  data = toy_scene(Modality::thermal, 4);
+  data.views[0].image = nan_value;
+  EXPECT_EQ(error_of(data).where, "000.png");
+  data = toy_scene(Modality::thermal, 4);
+  data.views[2].cam_from_world.translation.x() = nan_value;
+  EXPECT_EQ(error_of(data).where, "002.png");
+}
+
+TEST(Stress, InvalidThermalPixelsAreNotTrainedOn) {
+  Dataset data = toy_scene(Modality::thermal, 6);
+  for (TrainingView& view : data.views)
+    for (int x = 0; x < view.image.cols; x += 2) view.image.col(x) = nan_value;
+  Field field;
+  const auto report = train(data, toy_options(Modality::thermal, 40), {}, field);
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->skipped_steps, 0);
+  expect_finite(field);
+}
+
+TEST(Stress, OneViewAndTwoEqualViewsTrain) {
+  for (const bool twice : {false, true}) {
+    Dataset data = toy_scene(Modality::visible, 8);
+    data.views.resize(1);
+    if (twice) data.views.push_back(data.views[0]);
+    Field field;
+    const auto report = train(data, toy_options(Modality::visible, 40), {}, field);
+    ASSERT_TRUE(report) << report.error().message();
+    expect_finite(field);
+  }
+}
+
+TEST(Stress, ConstantImagesGiveTheConstant) {
+  Dataset data = toy_scene(Modality::thermal, 6);
+  for (TrainingView& view : data.views) view.image = 300.0f;
+  Field field;
+  ASSERT_TRUE(train(data, toy_options(Modality::thermal, 80), {}, field));
+  const auto view = render(field, data.views[0].camera, data.views[0].cam_from_world, {}, {});
+  ASSERT_TRUE(view);
+  EXPECT_LT(cv::norm(view->color, data.views[0].image, cv::NORM_INF), 0.5);
+}
+
+TEST(Stress, SceneSizeDoesNotMatter) {
+  double at_one = 0;
+  for (const double scale : {1.0, 1e-3, 1e4}) {
+    const Dataset data = toy_scene(Modality::visible, 12, scale);
+    Field field;
+    const auto report = train(data, toy_options(Modality::visible, 120), {}, field);
+    ASSERT_TRUE(report);
+    const double psnr = report->curve.back().train_psnr;
+    if (scale == 1.0) at_one = psnr;
+    EXPECT_GT(psnr, 12) << scale;
+    EXPECT_NEAR(psnr, at_one, 0.3) << scale;
+    const auto view = render(field, data.views[0].camera, data.views[0].cam_from_world, {}, {});
+    ASSERT_TRUE(view);
+    EXPECT_TRUE(cv::checkRange(view->color));
+  }
+}
+
+TEST(Stress, ExtremeTemperaturesStayFinite) {
+  Dataset data = toy_scene(Modality::thermal, 6);
+  data.views[0].image.at<float>(2, 2) = 0.0f;
+  data.views[1].image.at<float>(2, 2) = 65535.0f;
+  Field field;
+  ASSERT_TRUE(train(data, toy_options(Modality::thermal, 60), {}, field));
+  expect_finite(field);
+}
+
+TEST(Stress, CameraInsideTheObjectAndEmptySpaceRender) {
+  const Dataset data = toy_scene(Modality::visible, 8);
+  Field field;
+  ASSERT_TRUE(train(data, toy_options(Modality::visible, 60), {}, field));
+  Rigid3d inside = data.views[0].cam_from_world;
+  inside.translation.setZero();
+  auto view = render(field, data.views[0].camera, inside, {}, {});
+  ASSERT_TRUE(view);
+  EXPECT_TRUE(cv::checkRange(view->color));
+  std::fill(field.state().occupancy.on.begin(), field.state().occupancy.on.end(), 0);
+  view = render(field, data.views[0].camera, data.views[0].cam_from_world, {}, {});
+  ASSERT_TRUE(view);
+  EXPECT_TRUE(cv::checkRange(view->color));
+  EXPECT_EQ(cv::countNonZero(view->opacity > 0.5), 0);
+  EXPECT_EQ(cv::countNonZero(view->depth == view->depth), 0) << "no surface, no depth";
+  inside.translation.x() = nan_value;
+  EXPECT_FALSE(render(field, data.views[0].camera, inside, {}, {}));
+}
+
+TEST(Stress, AStepWithoutFiniteGradientIsSkippedAndCounted) {
+  const Dataset data = toy_scene(Modality::visible, 6);
+  Field guide;
+  ASSERT_TRUE(train(data, toy_options(Modality::visible, 5), {}, guide));
+  guide.state().main.mlp.weights.value[0] = nan_value;
+  TrainOptions options = toy_options(Modality::visible, 6);
+  options.shared_geometry = true;
+  Field field;
+  const auto report = train(data, options, {}, field, &guide);
+  ASSERT_TRUE(report);
+  EXPECT_EQ(report->skipped_steps, 6);
+}
+
+TEST(Occupancy, RaysThatMissAndDegenerateRaysGetNoSamples) {
+  Occupancy grid;
+  grid.create(16, 3);
+  float t[max_ray_samples], dt[max_ray_samples];
+  EXPECT_EQ(march(grid, {{100, 100, 100}, {0, 0, 1}, 1}, {}, 0.5f, t, dt), 0);
+  std::fill(grid.on.begin(), grid.on.end(), 0);
+  EXPECT_EQ(march(grid, {{0, 0, 0}, {0, 0, 1}, 1}, {}, 0.5f, t, dt), 0);
+}
+
+TEST(Occupancy, SamplesCoverTheOccupiedLengthInOrder) {
+  Occupancy grid;
+  grid.create(16, 3);
+  for (int k = 0; k < 50; ++k) {
+    const float a = 0.37f * static_cast<float>(k), b = 0.91f * static_cast<float>(k);
+    const Ray ray{{std::cos(a), std::sin(a), 0.2f}, {std::cos(b), std::sin(b), 0}, 1};
+    for (std::size_t c = 0; c < grid.density.size(); ++c)
+      grid.density[c] = static_cast<float>((c * 2654435761u) >> 8 & 31);
+    float t[max_ray_samples], dt[max_ray_samples];
+    const int count = march(grid, ray, {}, 0.5f, t, dt);
+    ASSERT_GT(count, 0);
+    double covered = 0;
+    for (int i = 0; i < count; ++i) {
+      if (i > 0) {
+        EXPECT_GE(t[i], t[i - 1]);
+      }
+      EXPECT_GE(dt[i], 0);
+      covered += dt[i];
+    }
+    // All cells are on, so the samples stand for everything up to the largest cube's edge.
+    double edge = 1e9;
+    for (int d = 0; d < 3; ++d)
+      if (std::abs(ray.direction[d]) > 1e-6f)
+        edge = std::min(edge, (4.0 - std::copysign(1.0, ray.direction[d]) * ray.origin[d]) / std::abs(ray.direction[d]));
+    EXPECT_NEAR(covered, edge - 0.1, 0.05 * edge);
+  }
+}
+
+}  // namespace
+}  // namespace orbitfuse::nerf

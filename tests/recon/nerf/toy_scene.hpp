@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "recon/nerf/nerf.hpp"
+
+namespace orbitfuse::nerf::test {
+
+/// A ball of radius 0.4 * `scale` with a smooth pattern before a plain background, seen by `views`
+/// cameras on a ring of radius `scale`. Thermal: 290 K background, the ball 295 to 305 K.
+Dataset toy_scene(Modality modality, int views, double scale = 1, int pixels = 32);
+
+/// A run short enough for a test.
+TrainOptions toy_options(Modality modality, int iterations);
+
+}  // namespace orbitfuse::nerf::test

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <atomic>
+
+#include "core/parallel.hpp"
+#include "recon/nerf/field_state.hpp"
+#include "tests/core/temp_folder.hpp"
+#include "tests/recon/nerf/toy_scene.hpp"
+
+namespace orbitfuse::nerf {
+namespace {
+
+using test::toy_options;
+using test::toy_scene;
+
+void expect_same_parameters(Field& a, Field& b) {
+  const auto left = a.state().parameters(), right = b.state().parameters();
+  ASSERT_EQ(left.size(), right.size());
+  for (std::size_t i = 0; i < left.size(); ++i) EXPECT_EQ(left[i]->value, right[i]->value) << "set " << i;
+  EXPECT_EQ(a.state().occupancy.on, b.state().occupancy.on);
+}
+
+TEST(Training, LearnsTheToySceneInBothModalities) {
+  for (const Modality modality : {Modality::visible, Modality::thermal}) {
+    TrainOptions options = toy_options(modality, 200);
+    options.holdout_every = 6;
+    options.samples_per_step = 1 << 14;
+    Field field;
+    const Dataset data = toy_scene(modality, 18);
+    const auto report = train(data, options, {}, field);
+    ASSERT_TRUE(report) << report.error().message();
+    EXPECT_GT(report->best_psnr, 15) << name(modality);
+    EXPECT_EQ(report->heldout.size(), 3u);
+    const auto view = render(field, data.views[0].camera, data.views[0].cam_from_world, {}, {});
+    ASSERT_TRUE(view);
+    const int middle = data.views[0].camera.width / 2;
+    if (modality == Modality::thermal) {
+      EXPECT_NEAR(view->color.at<float>(middle, middle),
+                  data.views[0].image.at<float>(middle, middle), 2.0f);
+    }
+  }
+}
+
+TEST(Training, IsTheSameForOneAndTwoThreads) {
+  const Dataset data = toy_scene(Modality::visible, 8);
+  Field fields[2];
+  for (int threads : {1, 2}) {
+    set_thread_count(threads);
+    ASSERT_TRUE(train(data, toy_options(Modality::visible, 100), {}, fields[threads - 1]));
+  }
+  set_thread_count(0);
+  expect_same_parameters(fields[0], fields[1]);
+  TrainOptions other = toy_options(Modality::visible, 100);
+  other.seed = 2;
+  Field different;
+  ASSERT_TRUE(train(data, other, {}, different));
+  EXPECT_NE(different.state().color.weights.value, fields[0].state().color.weights.value);
+}
+
+TEST(Training, ResumedAfterACancelEndsAsAnUnbrokenRun) {
+  const orbitfuse::test::TempFolder folder;
+  const Dataset data = toy_scene(Modality::thermal, 9);
+  TrainOptions options = toy_options(Modality::thermal, 160);
+  Field unbroken;
+  ASSERT_TRUE(train(data, options, {}, unbroken));
+
+  options.checkpoint = folder / "checkpoint.bin";
+  std::atomic<bool> cancel = false;
+  Progress progress;
+  progress.cancel = &cancel;
+  progress.report = [&](const ProgressEvent& event) { cancel = event.done >= 100; };
+  Field field;
+  const auto stopped = train(data, options, progress, field);
+  ASSERT_FALSE(stopped);
+  EXPECT_EQ(stopped.error().kind, ErrorKind::cancelled);
+  cancel = false;
+  options.resume = true;
+  progress.report = [](const ProgressEvent&) {};
+  const auto resumed = train(data, options, progress, field);
+  ASSERT_TRUE(resumed) << resumed.error().message();
+  EXPECT_EQ(resumed->iterations, 160);
+  expect_same_parameters(unbroken, field);
+}
+
+TEST(Training, SavedFieldRendersTheSameAndACutFileIsNamed) {
+  const orbitfuse::test::TempFolder folder;
+  const Dataset data = toy_scene(Modality::visible, 6);
+  Field field;
+  ASSERT_TRUE(train(data, toy_options(Modality::visible, 60), {}, field));
+  const auto file = folder / "field.bin";
+  ASSERT_TRUE(field.save(file));
+  auto loaded = Field::load(file);
+  ASSERT_TRUE(loaded);
+  const TrainingView& view = data.views[1];
+  const auto a = render(field, view.camera, view.cam_from_world, {}, {});
+  const auto b = render(*loaded, view.camera, view.cam_from_world, {}, {});
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(cv::norm(a->color, b->color, cv::NORM_INF), 0);
+
+  const auto size = std::filesystem::file_size(file);
+  for (const auto left : {size / 2, size - 1, std::uintmax_t{10}, std::uintmax_t{0}}) {
+    std::filesystem::resize_file(file, left);
+    const auto cut = Field::load(file);
+    ASSERT_FALSE(cut) << left;
+    EXPECT_EQ(cut.error().kind, ErrorKind::input);
+    EXPECT_NE(cut.error().message().find("field.bin"), std::string::npos);
+  }
+  EXPECT_FALSE(Field::load(folder / "absent.bin"));
+}
+
+TEST(Training, SharedGeometryStartsFromTheGuide) {
+  Field guide, with, without;
+  ASSERT_TRUE(train(toy_scene(Modality::visible, 12), toy_options(Modality::visible, 300), {}, guide));
+  const Dataset thermal = toy_scene(Modality::thermal, 12);
+  TrainOptions options = toy_options(Modality::thermal, 20);
+  ASSERT_TRUE(train(thermal, options, {}, without));
+  options.shared_geometry = true;
+  const auto error = train(thermal, options, {}, with, nullptr);
+  ASSERT_FALSE(error);
+  EXPECT_EQ(error.error().kind, ErrorKind::usage);
+  ASSERT_TRUE(train(thermal, options, {}, with, &guide));
+  const TrainingView& view = thermal.views[0];
+  const auto a = render(with, view.camera, view.cam_from_world, {}, {});
+  const auto b = render(without, view.camera, view.cam_from_world, {}, {});
+  ASSERT_TRUE(a && b);
+  EXPECT_LT(cv::norm(a->color, view.image), cv::norm(b->color, view.image));
+  options.levels = 4;
+  const auto mismatch = train(thermal, options, {}, with, &guide);
+  ASSERT_FALSE(mismatch);
+  EXPECT_NE(mismatch.error().message().find("nerf.levels"), std::string::npos);
+}
+
+TEST(Training, StopsAtATargetAndKeepsTheBestStep) {
+  TrainOptions options = toy_options(Modality::visible, 400);
+  options.holdout_every = 4;
+  options.eval_count = 8;
+  options.target_psnr = 13;
+  Field field;
+  const auto report = train(toy_scene(Modality::visible, 16), options, {}, field);
+  ASSERT_TRUE(report);
+  EXPECT_EQ(report->stop, StopReason::target_psnr);
+  EXPECT_LT(report->iterations, 400);
+  EXPECT_GE(report->best_psnr, 13);
+}
+
+TEST(Options, PresetsHoldThePublishedValues) {
+  struct Row {
+    const char* name;
+    int hidden, color_hidden, features, first, second, fine;
+    double distortion;
+  };
+  for (const Row& row : {Row{"nerfacto", 64, 64, 2, 256, 96, 48, 0.002}, Row{"nerf-rgb", 128, 128, 4, 256, 128, 64, 0.002},
+                         Row{"nerf-ir", 64, 32, 2, 128, 64, 32, 0.01}}) {
+    const TrainOptions o = preset(row.name).value();
+    EXPECT_TRUE(o.validate());
+    EXPECT_EQ(o.hidden, row.hidden) << row.name;
+    EXPECT_EQ(o.color_hidden, row.color_hidden) << row.name;
+    EXPECT_EQ(o.features_per_level, row.features) << row.name;
+    EXPECT_EQ(o.proposal_samples_1, row.first) << row.name;
+    EXPECT_EQ(o.proposal_samples_2, row.second) << row.name;
+    EXPECT_EQ(o.fine_samples, row.fine) << row.name;
+    EXPECT_EQ(o.distortion_weight, row.distortion) << row.name;
+  }
+  EXPECT_FALSE(preset("nerfactor"));
+  TrainOptions o;
+  const auto unknown = o.set("iteration", "3");
+  ASSERT_FALSE(unknown);
+  EXPECT_NE(unknown.error().remedy.find("nerf.iterations"), std::string::npos);
+  EXPECT_FALSE(o.set("iterations", "many"));
+  for (const std::string& key : TrainOptions::keys()) EXPECT_TRUE(o.set(key, o.get(key))) << key;
+}
+
+}  // namespace
+}  // namespace orbitfuse::nerf
