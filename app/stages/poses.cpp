@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <opencv2/imgproc.hpp>
 
 
@@ -114,13 +115,22 @@ Result<StageOutput> pose_thermal(const StageContext& context, const SessionInput
   return finish(context, poses, poses.shares_visible_frame);
 }
 
+bool all_posed(const Session& session) {
+  const auto frames = session.frames_of(Modality::thermal, false);
+  return std::all_of(frames.begin(), frames.end(), [](const FrameRecord* f) { return f->cam_from_world.has_value(); });
+}
+
 }  // namespace
 
 pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   const bool visible = modality == Modality::visible;
   pipeline::Stage stage;
   stage.name = "poses_" + std::string(name(modality));
-  if (!visible) stage.uses = {"poses_visible", "depth", "train_visible"};
+  if (!visible) {
+    stage.uses = {"poses_visible", "depth"};
+    // Thermal views are aligned with renders of the visible field; known poses need none.
+    if (!in.config->poses.use_known_poses || !all_posed(in.session->session)) stage.uses.push_back("train_visible");
+  }
   stage.options = in.config->settings().to_json("poses");
   stage.options["seed"] = in.config->seed;
   stage.inputs_hash = in.session->content.at(modality);

@@ -349,7 +349,8 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
     step.why += fmt::format("; start at {:.0f} deg{}: agreement {:.3f}", one.hypothesis.offset_deg,
                             one.hypothesis.mirrored ? " clockwise" : "", one.mean_support());
   step.why += fmt::format("; {:.1f} standard errors apart", decisiveness);
-  if (decisiveness < min_decisiveness) {
+  // Renders of the scene tell the starts apart where its lines cannot.
+  if (!visible.renderer && decisiveness < min_decisiveness) {
     step.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     steps.push_back(step);
     return fail(ErrorKind::quality, "poses.thermal", step.why + ": undecided",
