@@ -71,6 +71,17 @@ void add_poses(Settings& settings, PoseOptions& poses) {
                "A model that leaves the stations' orbit by more (share of the radius) is not believed");
 }
 
+void add_depth(Settings& settings, depth::DepthOptions& depth) {
+  settings.add("depth.width_px", depth.width_px, "Width of the visible views' depth maps");
+  settings.add("depth.neighbours", depth.neighbours, "Views each view is matched with");
+  settings.add("depth.best_neighbours", depth.best_neighbours, "Of these, the best so many count");
+  settings.add("depth.coarse_iterations", depth.coarse_iterations, "At half width, from random planes");
+  settings.add("depth.fine_iterations", depth.fine_iterations, "At full width");
+  settings.add("depth.max_cost", depth.max_cost, "1 - NCC above which a match is none");
+  settings.add("depth.agreement", depth.agreement, "Relative difference below which two views agree");
+  settings.add("depth.min_agreeing", depth.min_agreeing, "Views that must agree with a depth");
+}
+
 void add_render(Settings& settings, RenderConfig& render) {
   settings.add_choice("render.path", render.path.path,
                       {{PathKind::automatic, "auto"}, {PathKind::orbit, "orbit"}, {PathKind::path, "path"}},
@@ -119,16 +130,19 @@ RunConfig::RunConfig() {
   train_thermal.options = nerf::preset(nerf::default_preset(Modality::thermal)).value();
   // A run shows held-out error, and fits into a few minutes on two cores; docs/benchmarks/run.md.
   for (TrainConfig* train : {&train_visible, &train_thermal}) train->options.holdout_every = 12;
-  train_visible.options.iterations = 2500;
-  train_thermal.options.iterations = 2000;
+  train_visible.options.iterations = 1200;
+  train_thermal.options.iterations = 600;
+  // Thermal views have little texture: on their own they become fog.
+  train_thermal.options.shared_geometry = true;
 }
 
 void RunConfig::set_seed(std::uint64_t value) {
-  seed = poses.seed = train_visible.options.seed = train_thermal.options.seed = value;
+  seed = poses.seed = depth.seed = train_visible.options.seed = train_thermal.options.seed = value;
 }
 
 Status RunConfig::validate() const {
   ORBITFUSE_TRY(poses.validate());
+  ORBITFUSE_TRY(depth.validate());
   for (const TrainConfig* train : {&train_visible, &train_thermal}) {
     ORBITFUSE_TRY(train->options.validate());
     ORBITFUSE_TRY(train->cloud.validate());
@@ -150,6 +164,7 @@ Status RunConfig::validate() const {
 Settings RunConfig::settings() {
   Settings settings;
   add_poses(settings, poses);
+  add_depth(settings, depth);
   add_train(settings, "train.visible", train_visible);
   add_train(settings, "train.thermal", train_thermal);
   add_render(settings, render);

@@ -249,6 +249,10 @@ Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
   }
   for (std::size_t i = 0; options.per_image_offset && i < dataset.views.size(); ++i)
     report.image_offsets_k.push_back(state->image_offsets.value[i] * (state->span.high - state->span.low));
+  // How a field came about is the report's; equal fields are equal files.
+  state->spent_cpu_s = state->spent_wall_s = 0;
+  state->options.resume = false;
+  state->options.checkpoint.clear();
   out = Field(std::move(state));
   return report;
 }
