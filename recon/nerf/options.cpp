@@ -146,6 +146,9 @@ Status TrainOptions::validate() const {
   if (max_resolution < base_resolution)
     return fail(ErrorKind::usage, "nerf.max_resolution", fmt::format("{}", max_resolution),
                 fmt::format("choose at least base_resolution ({})", base_resolution));
+  if (occupancy_resolution % 16 != 0)
+    return fail(ErrorKind::usage, "nerf.occupancy_resolution", fmt::format("{}", occupancy_resolution),
+                "choose a multiple of 16");
   for (const int width : {hidden, color_hidden})
     if (width % 16 != 0)
       return fail(ErrorKind::usage, "nerf.hidden", fmt::format("{}", width),

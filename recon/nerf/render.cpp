@@ -67,7 +67,7 @@ RenderedView render_strided(const FieldState& field, const ViewRays& rays, int s
   MarchSettings settings = field.march_settings();
   settings.surface = static_cast<int>(std::lround(settings.surface * options.sample_factor));
   settings.haze = static_cast<int>(std::lround(settings.haze * options.sample_factor));
-  const ForwardSettings limits{static_cast<float>(options.stop_transmittance), 1e-4f};
+  const ForwardSettings limits{static_cast<float>(options.stop_transmittance), 1e-4f, false};
   parallel_blocks(width * height, rays_per_block, [&](int begin, int end) {
     thread_local RayBlock block;
     thread_local std::vector<int> pixels;

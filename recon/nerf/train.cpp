@@ -73,6 +73,7 @@ Status inherit_geometry(const FieldState& guide, FieldState& state) {
   state.main.mlp.weights.value = guide.main.mlp.weights.value;
   state.occupancy.on = guide.occupancy.on;
   state.occupancy.density = guide.occupancy.density;
+  state.occupancy.refresh();
   state.refresh();
   return {};
 }
