@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <ctime>
 
@@ -19,7 +21,7 @@ namespace {
 using namespace orbitfuse;
 
 struct Arguments {
-  std::string scene = "fox", preset, data = "../shared/data/orbits", model, images, field;
+  std::string scene = "fox", preset, data = "../shared/data/orbits", model, images, field, guide;
   std::vector<std::string> set;
   int threads = 0;
   bool quick = false, depth = false, train = true;
@@ -130,7 +132,13 @@ Status run(const Arguments& a) {
   if (a.depth) ORBITFUSE_TRY(add_depth(data, a.depth_options, a.images));
   if (!a.train) return {};
   nerf::Field field;
-  ORBITFUSE_ASSIGN(const nerf::TrainReport report, nerf::train(data, options, {}, field));
+  nerf::Field guide;
+  if (!a.guide.empty()) {
+    ORBITFUSE_ASSIGN(guide, nerf::Field::load(a.guide));
+    options.shared_geometry = true;
+  }
+  ORBITFUSE_ASSIGN(const nerf::TrainReport report,
+                   nerf::train(data, options, {}, field, guide.empty() ? nullptr : &guide));
   for (const auto& p : report.curve)
     fmt::print("step {:5d}  cpu {:7.1f} s  wall {:7.1f} s  held-out {:6.2f} dB  train {:6.2f} dB  {:6.1f} samples/ray\n",
                p.step, p.cpu_s, p.wall_s, p.heldout_psnr, p.train_psnr, p.samples_per_ray);
@@ -138,6 +146,17 @@ Status run(const Arguments& a) {
   for (const auto& skip : report.skips) fmt::print("skip {}: {}\n", skip.what, skip.why);
   if (a.quick) return {};
   ORBITFUSE_ASSIGN(const TestError error, test_error(field, data, a.images));
+  const auto view = std::find_if(data.views.begin(), data.views.end(), [](const auto& v) { return v.measure_only; });
+  if (view != data.views.end()) {
+    const auto start = std::chrono::steady_clock::now();
+    const std::clock_t cpu = std::clock();
+    ORBITFUSE_ASSIGN(const nerf::RenderedView out,
+                     nerf::render(field, view->camera.scaled_to(640, 640 * view->camera.height / view->camera.width),
+                                  view->cam_from_world, {}, {}));
+    fmt::print("render {}x{}: {:.2f} s wall, {:.2f} CPU s\n", out.color.cols, out.color.rows,
+               std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(),
+               static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC);
+  }
   fmt::print("full resolution: {:.2f} dB", error.psnr_db);
   if (data.modality == Modality::thermal) fmt::print(", MAE {:.3f} K", error.mae_k);
   fmt::print("\n");
@@ -163,6 +182,7 @@ int main(int argc, char** argv) {
   app.add_option("--depth-fine", a.depth_options.fine_iterations);
   app.add_option("--depth-neighbours", a.depth_options.neighbours);
   app.add_option("--depth-best", a.depth_options.best_neighbours);
+  app.add_option("--guide", a.guide, "field whose geometry this one starts from");
   app.add_flag("--quick", a.quick, "no full-resolution evaluation");
   app.add_option("--threads", a.threads);
   app.add_option("--set", a.set, "training option key=value");

@@ -55,7 +55,7 @@ const std::vector<Entry>& table() {
       FIELD(occupancy_resolution, 16, 256),
       FIELD(occupancy_threshold, 0, 0.9),
       FIELD(surface_samples, 1, 128),
-      FIELD(haze_samples, 2, 128),
+      FIELD(haze_samples, 0, 128),
       FIELD(proposal_samples_1, 8, 1024),
       FIELD(proposal_samples_2, 8, 1024),
       FIELD(fine_samples, 4, 1024),
@@ -69,6 +69,7 @@ const std::vector<Entry>& table() {
       FIELD(level_anneal_end, 0, 1),
       FIELD(per_image_offset),
       FIELD(shared_geometry),
+      FIELD(shared_geometry_rate, 0, 10),
   };
   return entries;
 }

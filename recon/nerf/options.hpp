@@ -49,7 +49,9 @@ struct TrainOptions {
   int occupancy_resolution = 128;        ///< cells per axis of each cascade
   double occupancy_threshold = 0.02;     ///< visible opacity below which a cell is empty
   int surface_samples = 16;              ///< per ray, where surfaces are expected
-  int haze_samples = 8;                  ///< per ray at most, over all that may not be empty
+  /// Per ray at most, over all that may not be empty; 0 = 8 where dense depth or a guide field tell
+  /// empty space from matter, else 24.
+  int haze_samples = 0;
   int proposal_samples_1 = 256, proposal_samples_2 = 96;  ///< per ray (Sampling::proposal)
   int fine_samples = 48;
 
@@ -63,6 +65,7 @@ struct TrainOptions {
   bool carve = true;                 ///< cells in front of known depth start empty
   double level_anneal_end = 0;       ///< fraction of the run by which the finest level is on; 0 = off
   bool per_image_offset = false;     ///< thermal drift: one offset per frame, mean zero
+  double shared_geometry_rate = 1.0;  ///< learning rate of inherited density, relative
   bool shared_geometry = false;      ///< start from the guide field's density (train()'s argument)
 
   Status validate() const;
