@@ -235,19 +235,24 @@ int main(int argc, char** argv) {
     show(fmt::format("cnn-lpif, same within {}", same), o);
   }
   o.method = FusionMethod::best;
-  for (const double sharpness : {1.0, 2.0, 8.0, 16.0}) {
+  for (const double sharpness : {2.0, 8.0, 16.0}) {
     o.best.sharpness = sharpness;
     show(fmt::format("best, sharpness {}", sharpness), o);
   }
   o.best = {};
-  for (const int side : {5, 13, 17}) {
-    o.best.base_window = side;
-    show(fmt::format("best, base window {}", side), o);
+  for (const double kept : {0.0, 0.2, 0.5, 1.0}) {
+    o.best.contrast_kept = kept;
+    show(fmt::format("best, contrast kept {}", kept), o);
   }
   o.best = {};
-  for (const int side : {5, 9, 25, 33}) {
-    o.best.base_vote = side;
-    show(fmt::format("best, base vote {}", side), o);
+  for (const double preference : {0.0, 1.0, 4.0}) {
+    o.best.visible_preference = preference;
+    show(fmt::format("best, visible preference {}", preference), o);
+  }
+  o.best = {};
+  for (const double weight : {0.0, 0.01, 0.04}) {
+    o.best.brightness_weight = weight;
+    show(fmt::format("best, brightness weight {}", weight), o);
   }
   o.best = {};
   for (const int levels : {3, 5, 6}) {
@@ -255,7 +260,7 @@ int main(int argc, char** argv) {
     show(fmt::format("best, {} levels", levels), o);
   }
   o.best = {};
-  for (const int radius : {1, 2, 3, 6}) {
+  for (const int radius : {1, 3, 8}) {
     o.best.energy_radius_px = radius;
     show(fmt::format("best, energy radius {}", radius), o);
   }

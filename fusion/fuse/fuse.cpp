@@ -80,8 +80,9 @@ Result<Plane> fuse_planes(const Plane& visible, const Plane& thermal, const Fusi
       auto fused = fusion::fuse_ms_srif(visible, thermal, options.ms_srif, &said);
       if (said.skipped) skips.push_back(identical_pair());
       else if (said.patches > 0)
-        skips.push_back({"sparse codes of flat patches",
-                         fmt::format("{} of {} patches are flat", said.flat_patches, said.patches),
+        skips.push_back({"sparse codes",
+                         fmt::format("{} of {} patches are decided by their DCT, {} are flat", said.certain_patches,
+                                     said.patches, said.flat_patches),
                          fmt::format("{:.1f} atoms a patch of at most {}", said.atoms_per_patch, options.ms_srif.max_atoms)});
       return fused;
     }
