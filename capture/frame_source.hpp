@@ -61,6 +61,8 @@ class FrameSource {
   /// but a `rejected` delivery. Ids rise strictly.
   virtual Result<Delivery> next(std::chrono::milliseconds timeout) = 0;
   virtual void stop() = 0;
+  /// Whether nothing is lost when the recorder takes its time (files): then it never drops.
+  virtual bool can_wait() const { return false; }
 };
 
 }  // namespace orbitfuse

@@ -29,6 +29,11 @@ const std::vector<Verb>& verbs() {
        "orbitfuse eval out/ --ground-truth replay_data/car/ground_truth.json", add_eval},
       {"replay", "Play a recorded session through the recorder, as hardware would",
        "orbitfuse replay replay_data/car --to copy/ --speed full", add_replay},
+      {"capture", "Record one or two cameras into a session, with a guide round the object",
+       "orbitfuse capture my_session --driver replay:replay_data/car", add_capture},
+      {"devices", "List the cameras that are connected", "orbitfuse devices", add_devices},
+      {"mat", "Print the mat that tells the guide where the cameras are",
+       "orbitfuse mat --out mat.pdf", add_mat},
       {"doctor", "Check this machine for what OrbitFuse needs", "orbitfuse doctor", add_doctor},
   };
   return list;

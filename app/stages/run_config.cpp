@@ -101,16 +101,35 @@ void add_render(Settings& settings, RenderConfig& render) {
 void add_fuse(Settings& settings, FuseConfig& fuse) {
   settings.add("fuse.methods", fuse.methods, "Any of best, ms-srif, pca-msif, cnn-lpif");
   settings.add("fuse.color", fuse.options.color, "Keep the visible colours; false: gray");
+  settings.add("fuse.overlay_palette", fuse.options.overlay.palette,
+               "Palette whose hue tells the temperature in the fused image; empty: none");
+  settings.add("fuse.overlay_strength", fuse.options.overlay.strength, "0..1: its colour against the visible one");
   settings.add("fuse.best_levels", fuse.options.best.levels, "Pyramid levels of best");
   settings.add("fuse.best_sharpness", fuse.options.best.sharpness, "How hard best chooses between details");
+  settings.add("fuse.best_contrast_kept", fuse.options.best.contrast_kept,
+               "0..1: how far a detail's strength follows the level it moves to");
+  settings.add("fuse.best_visible_preference", fuse.options.best.visible_preference,
+               "Gray levels of structure the visible image has for free where neither has any");
+  settings.add("fuse.best_brightness_weight", fuse.options.best.brightness_weight,
+               "Share of brightness that counts as structure; 0 for black-hot thermal images");
   settings.add("fuse.ms_srif_stride_px", fuse.options.ms_srif.stride_px, "Between patches of MS-SRIF's base");
   settings.add("fuse.ms_srif_relative_residual", fuse.options.ms_srif.relative_residual,
                "Share of a patch's norm at which its code ends; 0 = the reference's stop");
-  settings.add("fuse.pca_msif_iterations", fuse.options.pca_msif.smoother.iterations, "Diffusion steps of PCA-MSIF");
+  settings.add("fuse.ms_srif_certain_ratio", fuse.options.ms_srif.certain_ratio,
+               "Where one patch has so many times the other's structure no code is sought; 0: always sought");
+  settings.add("fuse.pca_msif_iterations", fuse.options.pca_msif.smoother.iterations, "Diffusion time of PCA-MSIF, in time steps");
   settings.add("fuse.pca_msif_time_step", fuse.options.pca_msif.smoother.time_step,
                "At most 1: beyond it the diffusion diverges");
+  settings.add("fuse.pca_msif_cycles", fuse.options.pca_msif.smoother.cycles,
+               "Cycles of fast explicit diffusion that reach that time; 0: plain steps");
+  settings.add("fuse.cnn_lpif_network_bands", fuse.options.cnn_lpif.network_bands,
+               "Finest bands in which the network also weighs where the sources disagree");
+  settings.add("fuse.cnn_lpif_vote_px", fuse.options.cnn_lpif.vote_px,
+               "Side of the square over which those decisions are averaged; odd");
   settings.add("fuse.cnn_lpif_same_within", fuse.options.cnn_lpif.same_within,
                "Gray levels up to which the sources count as equal and the network is not asked");
+  settings.add("fuse.cnn_lpif_flat_within", fuse.options.cnn_lpif.flat_within,
+               "Gray levels within which a patch is flat and the network is not asked; -1: always asked");
 }
 
 }  // namespace

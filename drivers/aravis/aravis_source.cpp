@@ -155,7 +155,7 @@ Status AravisSource::push_settings() {
     if (options_.profiles.empty()) {
       profile_.name = "generic";
     } else if (!options_.profile.empty()) {
-      ORBITFUSE_ASSIGN(profile_, read_profile(options_.profiles / (options_.profile + ".toml")));
+      ORBITFUSE_ASSIGN(profile_, named_profile(options_.profiles, options_.profile));
     } else {
       ORBITFUSE_ASSIGN(profile_, find_profile(options_.profiles, info_.model));
     }

@@ -34,6 +34,9 @@ struct CameraProfile {
 /// A profile file; an unknown key is an error that names it.
 Result<CameraProfile> read_profile(const std::filesystem::path& file);
 
+/// The profile called `name`; the usage error for an unknown one lists those in the folder.
+Result<CameraProfile> named_profile(const std::filesystem::path& folder, const std::string& name);
+
 /// The first profile in the folder (in name order) with a matching model, else the one called
 /// "generic".
 Result<CameraProfile> find_profile(const std::filesystem::path& folder, const std::string& model);

@@ -51,6 +51,7 @@ class ReplaySource : public FrameSource {
   }
 
   void stop() override {}
+  bool can_wait() const override { return speed_ == ReplaySpeed::full; }
 
  private:
   /// False when the frame's moment is further away than the timeout.

@@ -261,6 +261,14 @@ Delivery V4l2Source::lose(const std::string& event, const std::string& why) {
   return delivery;
 }
 
+Delivery V4l2Source::stall() {
+  Delivery event = lose("stalled", "no frame; reopening it");
+  if (++stalls_in_a_row_ < 2 || !options_.reset_port || node_.usb_path.empty()) return event;
+  const Status reset = options_.reset_port(node_.usb_path);
+  event.detail = reset ? "still no frame; its USB port was reset" : "still no frame; " + reset.error().message();
+  return event;
+}
+
 std::optional<Delivery> V4l2Source::try_reopen() {
   if (Clock::now() - last_attempt_ < options_.reopen_every) return std::nullopt;
   last_attempt_ = Clock::now();
@@ -293,7 +301,7 @@ Result<Delivery> V4l2Source::next(std::chrono::milliseconds timeout) {
   if (ready < 0 && errno != EINTR) return lose("disconnected", std::strerror(errno));
   if (ready > 0 && (waiter.revents & POLLIN)) return dequeue();
   if (ready > 0) return lose("disconnected", "the device reports an error");
-  if (Clock::now() - last_frame_ > options_.stall) return lose("stalled", "no frame; reopening it");
+  if (Clock::now() - last_frame_ > options_.stall) return stall();
   return Delivery{};
 }
 
@@ -307,6 +315,7 @@ Result<Delivery> V4l2Source::dequeue() {
   }
   if (buffer.index >= buffers_.size()) return lose("disconnected", "the driver answers nonsense");
   last_frame_ = Clock::now();
+  stalls_in_a_row_ = 0;
   const std::uint64_t id = unwrap(buffer.sequence);
   Delivery delivery = delivery_of(buffer.index, buffer.bytesused, buffer.flags);
   delivery.frame.id = id;

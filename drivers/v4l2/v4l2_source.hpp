@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -30,6 +31,8 @@ struct V4l2Options {
   std::optional<int> exposure_100us, focus, white_balance_k;  ///< absent: the value it had
   std::chrono::milliseconds stall{2000};       ///< silence after which the stream is reopened
   std::chrono::milliseconds reopen_every{250}; ///< while the camera is away
+  /// Resets the camera's USB port ("1-4.2"); called when reopening alone did not end a stall.
+  std::function<Status(const std::string& usb_path)> reset_port;
 
   Status validate() const;
 };
@@ -63,6 +66,7 @@ class V4l2Source final : public FrameSource {
   Status map_buffers();
   void close_device();
   Delivery lose(const std::string& event, const std::string& why);
+  Delivery stall();
   std::optional<Delivery> try_reopen();
   Result<Delivery> dequeue();
   Delivery delivery_of(std::uint32_t index, std::uint32_t bytes, std::uint32_t flags);
@@ -80,6 +84,7 @@ class V4l2Source final : public FrameSource {
   std::vector<Delivery> pending_;       ///< events to tell before the next frame
   Clock::time_point last_frame_{}, last_attempt_{}, lost_at_{};
   std::uint64_t next_id_ = 0, base_id_ = 0;
+  int stalls_in_a_row_ = 0;
   std::optional<std::uint32_t> last_sequence_;
 };
 

@@ -17,7 +17,7 @@ using testing::StartsWith;
 
 const std::vector<std::string> verbs = {"run",    "import", "inspect", "poses",  "train",
                                         "register", "render", "fuse",    "metrics", "report",
-                                        "eval",   "replay", "doctor"};
+                                        "eval",   "replay", "capture", "devices", "mat", "doctor"};
 
 TEST(Cli, HelpBeginsWithAnExampleAndGoesToStdout) {
   for (const std::string& verb : verbs) {
