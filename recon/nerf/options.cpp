@@ -69,7 +69,6 @@ const std::vector<Entry>& table() {
       FIELD(level_anneal_end, 0, 1),
       FIELD(per_image_offset),
       FIELD(shared_geometry),
-      FIELD(shared_geometry_rate, 0, 10),
   };
   return entries;
 }

@@ -65,7 +65,6 @@ struct TrainOptions {
   bool carve = true;                 ///< cells in front of known depth start empty
   double level_anneal_end = 0;       ///< fraction of the run by which the finest level is on; 0 = off
   bool per_image_offset = false;     ///< thermal drift: one offset per frame, mean zero
-  double shared_geometry_rate = 1.0;  ///< learning rate of inherited density, relative
   bool shared_geometry = false;      ///< start from the guide field's density (train()'s argument)
 
   Status validate() const;

@@ -158,10 +158,6 @@ bool Trainer::step(double progress) {
 
 void Trainer::apply(const AdamStep& adam, const BlockGradients& gradients) {
   HashEncoding& grid = field_.main.grid;
-  // Geometry that was given is refined, not learnt anew.
-  AdamStep geometry = adam;
-  if (field_.options.shared_geometry)
-    geometry.learning_rate *= static_cast<float>(field_.options.shared_geometry_rate);
   // Whole levels per task: no two threads write to one table.
   parallel_for(static_cast<int>(grid.levels.size()), [&](int l) {
     const GridLevel& level = grid.levels[static_cast<std::size_t>(l)];
@@ -175,7 +171,7 @@ void Trainer::apply(const AdamStep& adam, const BlockGradients& gradients) {
                        block.grid.data() + static_cast<std::size_t>(l) * static_cast<std::size_t>(n) *
                                                static_cast<std::size_t>(grid.features));
     }
-    kernels_.adam(geometry, static_cast<std::int64_t>(level.entries) * level.features,
+    kernels_.adam(adam, static_cast<std::int64_t>(level.entries) * level.features,
                   grid.table.value.data() + offset, grid.table.first.data() + offset,
                   grid.table.second.data() + offset, grad, grid.half.data() + offset);
   });
@@ -186,9 +182,7 @@ void Trainer::apply(const AdamStep& adam, const BlockGradients& gradients) {
   };
   AdamStep mlp = adam;
   mlp.weight_decay = 1e-6f;
-  mlp.learning_rate = geometry.learning_rate;
   update(field_.main.mlp.weights, gradients.mlp, mlp);
-  mlp.learning_rate = adam.learning_rate;
   update(field_.color.weights, gradients.color, mlp);
   field_.main.mlp.refresh();
   field_.color.refresh();
