@@ -90,6 +90,9 @@ void add_render(Settings& settings, RenderConfig& render) {
 void add_fuse(Settings& settings, FuseConfig& fuse) {
   settings.add("fuse.methods", fuse.methods, "Any of best, ms-srif, pca-msif, cnn-lpif");
   settings.add("fuse.color", fuse.options.color, "Keep the visible colours; false: gray");
+  settings.add("fuse.overlay_palette", fuse.options.overlay.palette,
+               "Palette whose hue tells the temperature in the fused image; empty: none");
+  settings.add("fuse.overlay_strength", fuse.options.overlay.strength, "0..1: its colour against the visible one");
   settings.add("fuse.best_levels", fuse.options.best.levels, "Pyramid levels of best");
   settings.add("fuse.best_sharpness", fuse.options.best.sharpness, "How hard best chooses between details");
   settings.add("fuse.best_contrast_kept", fuse.options.best.contrast_kept,
@@ -114,6 +117,8 @@ void add_fuse(Settings& settings, FuseConfig& fuse) {
                "Side of the square over which those decisions are averaged; odd");
   settings.add("fuse.cnn_lpif_same_within", fuse.options.cnn_lpif.same_within,
                "Gray levels up to which the sources count as equal and the network is not asked");
+  settings.add("fuse.cnn_lpif_flat_within", fuse.options.cnn_lpif.flat_within,
+               "Gray levels within which a patch is flat and the network is not asked; -1: always asked");
 }
 
 }  // namespace

@@ -9,19 +9,19 @@
 #include "core/parallel.hpp"
 #include "fusion/best/band_mix.hpp"
 #include "fusion/best/base_rule.hpp"
+#include "fusion/pyramid/bands.hpp"
 #include "fusion/pyramid/pyramid.hpp"
 
 namespace orbitfuse::fusion {
 namespace {
 
-/// Bands of one source, finest first, and its base.
+/// Bands of one source, finest first, still without their energies, and its base.
 struct Source {
   std::vector<BandSource> bands;
   Plane base;
 };
 
-Source source_of(const Plane& image, int levels, int energy_radius) {
-  const int window = 2 * energy_radius + 1;
+Source source_of(const Plane& image, int levels) {
   Source source{{}, image};
   for (int i = 0; i < levels; ++i) {
     Plane reduced;
@@ -29,11 +29,17 @@ Source source_of(const Plane& image, int levels, int energy_radius) {
     cv::pyrDown(source.base, reduced);
     cv::pyrUp(reduced, band.level, source.base.size());
     band.band = source.base - band.level;
-    cv::GaussianBlur(band.band.mul(band.band), band.energy, {window, window}, 0, 0, cv::BORDER_REFLECT_101);
     source.bands.push_back(std::move(band));
     source.base = reduced;
   }
   return source;
+}
+
+Plane energy_of(const Plane& band, int radius) {
+  const int window = 2 * radius + 1;
+  Plane energy;
+  cv::GaussianBlur(band.mul(band), energy, {window, window}, 0, 0, cv::BORDER_REFLECT_101);
+  return energy;
 }
 
 }  // namespace
@@ -66,16 +72,26 @@ Result<Plane> fuse_best(const Plane& visible, const Plane& thermal, const BestOp
   const int levels = pyramid_levels(visible.size(), options.levels, 8);
   std::array<Source, 2> sources;
   parallel_for(2, [&](int i) {
-    sources[static_cast<std::size_t>(i)] = source_of(i == 0 ? visible : thermal, levels, options.energy_radius_px);
+    sources[static_cast<std::size_t>(i)] = source_of(i == 0 ? visible : thermal, levels);
   });
-  const auto& [v, t] = sources;
+  auto& [v, t] = sources;
+  std::vector<bool> skip;
+  for (std::size_t i = 0; i < v.bands.size(); ++i) {
+    skip.push_back(silent(v.bands[i].band, t.bands[i].band));
+    if (skip[i]) said.levels_skipped += 1.0 / levels;
+  }
+  parallel_for(2, [&](int k) {
+    Source& source = sources[static_cast<std::size_t>(k)];
+    for (std::size_t i = 0; i < source.bands.size(); ++i)
+      if (!skip[i]) source.bands[i].energy = energy_of(source.bands[i].band, options.energy_radius_px);
+  });
   Plane fused = fuse_base(v.base, t.base, {static_cast<float>(options.visible_preference),
                                            static_cast<float>(options.brightness_weight)});
   const BandMix rule{static_cast<float>(options.sharpness / 2), static_cast<float>(options.contrast_kept)};
   for (std::size_t i = v.bands.size(); i-- > 0;) {
     Plane level;
     cv::pyrUp(fused, level, v.bands[i].band.size());
-    fused = mix_band(v.bands[i], t.bands[i], level, rule);
+    fused = skip[i] ? level : mix_band(v.bands[i], t.bands[i], level, rule);
   }
   return fused;
 }

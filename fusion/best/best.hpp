@@ -26,7 +26,8 @@ struct BestOptions {
 };
 
 struct BestReport {
-  bool skipped = false;  ///< the images are identical: returned as they are
+  double levels_skipped = 0;  ///< share of the pyramid's bands that hold nothing in both sources
+  bool skipped = false;       ///< the images are identical: returned as they are
 };
 
 /// Errors: check_pair's, usage. Same bits for any thread count.

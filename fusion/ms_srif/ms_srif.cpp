@@ -149,8 +149,12 @@ Result<Plane> fuse_ms_srif(const Plane& visible, const Plane& thermal, const MsS
     (i == 0 ? v : t) = laplacian_pyramid(i == 0 ? visible : thermal, levels);
   });
   LaplacianPyramid fused;
-  for (std::size_t i = 0; i < v.bands.size(); ++i)
-    fused.bands.push_back(t.bands[i] + share_by_magnitude(v.bands[i], t.bands[i]).mul(v.bands[i] - t.bands[i]));
+  for (std::size_t i = 0; i < v.bands.size(); ++i) {
+    const bool skip = silent(v.bands[i], t.bands[i]);
+    if (skip) said.levels_skipped += 1.0 / levels;
+    fused.bands.push_back(skip ? t.bands[i]
+                               : Plane(t.bands[i] + share_by_magnitude(v.bands[i], t.bands[i]).mul(v.bands[i] - t.bands[i])));
+  }
   fused.base = fuse_base(v.base, t.base, options, dictionary, said);
   return collapse(fused);
 }

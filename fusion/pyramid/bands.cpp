@@ -5,6 +5,11 @@
 
 namespace orbitfuse::fusion {
 
+bool silent(const Plane& visible, const Plane& thermal) {
+  constexpr double unseen = 0.25;
+  return cv::norm(visible, cv::NORM_INF) < unseen && cv::norm(thermal, cv::NORM_INF) < unseen;
+}
+
 Plane share_by_magnitude(const Plane& visible, const Plane& thermal) {
   const cv::Mat square = cv::Mat::ones(3, 3, CV_8U);
   cv::Mat v, t;
