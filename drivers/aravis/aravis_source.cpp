@@ -134,6 +134,8 @@ Status AravisSource::open() {
     }
     link->stream = arv_camera_create_stream(link->camera, nullptr, nullptr, &error);
     if (!link->stream) return fail(ErrorKind::device, where, take(error), "check the network (orbitfuse doctor)");
+    // Aravis gives a frame 200 ms for its resent packets; a loaded host needs longer now and then.
+    if (ARV_IS_GV_STREAM(link->stream)) g_object_set(link->stream, "frame-retention", 300'000u, nullptr);
     for (int i = 0; i < options_.buffers; ++i) arv_stream_push_buffer(link->stream, arv_buffer_new(link->payload, nullptr));
     arv_camera_start_acquisition(link->camera, &error);
     if (error) return fail(ErrorKind::device, where, take(error), "power-cycle the camera");
