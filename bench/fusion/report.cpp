@@ -30,7 +30,7 @@ std::string svg(const std::vector<Row>& rows) {
                      "font-size=\"12\">\n<rect width=\"720\" height=\"420\" fill=\"white\"/>\n"
                      "<text x=\"20\" y=\"20\">640x480 pair: Qabf (filled) and Qcb (ring) against CPU ms</text>\n";
   const auto x = [](double ms) { return 50 + 280 * std::log10(std::clamp(ms, 1.0, 200.0)); };
-  const auto y = [](double q) { return 380 - 1600 * (std::clamp(q, 0.45, 0.68) - 0.45); };
+  const auto y = [](double q) { return 380 - 1400 * (std::clamp(q, 0.45, 0.7) - 0.45); };
   for (const double ms : {1, 2, 5, 10, 20, 50, 100, 200})
     text += fmt::format("<text x=\"{:.0f}\" y=\"400\">{}</text>\n", x(ms), ms);
   for (const double q : {0.45, 0.5, 0.55, 0.6, 0.65}) text += fmt::format("<text x=\"10\" y=\"{:.0f}\">{}</text>\n", y(q), q);

@@ -23,10 +23,9 @@ void print_row(const std::string& what, const Times& times) {
   std::fflush(stdout);
 }
 
-/// This program again with AVX2 as the best instruction set, OpenCV's included; waits for it.
+/// This program again with AVX2 as the best instruction set; waits for it.
 int repeat_for_avx2(const std::filesystem::path& folder, const char* program) {
   setenv("ORBITFUSE_ISA", "avx2", 1);
-  setenv("OPENCV_CPU_DISABLE", "AVX512_SKX", 1);
   setenv(in_child, "1", 1);
   std::string self = program, mode = "--speed", data = folder.string();
   char* arguments[] = {self.data(), mode.data(), data.data(), nullptr};
