@@ -190,6 +190,11 @@ Result<FrameRecord> SessionWriter::append(const std::string& device_id, const Fr
   if (encoded.has_temperature) {
     ORBITFUSE_TRY(write_file_atomic(folder_ / (record.file + ".json"), thermal_sidecar_json() + "\n"));
   }
+  if (!frame.original.empty()) {
+    const fs::path file(record.file);
+    ORBITFUSE_ASSIGN(const std::string counts, encode_tiff(frame.original, "raw counts"));
+    ORBITFUSE_TRY(write_file_atomic(folder_ / file.parent_path() / "originals" / (file.stem().string() + ".tiff"), counts));
+  }
   ORBITFUSE_TRY(write_file_atomic(folder_ / record.file, encoded.bytes));
   ORBITFUSE_TRY(append_line(manifest_line(record)));
   return record;

@@ -98,7 +98,9 @@ Status rehearse(Context& context, const Options& o, const recording::Cameras& ca
 /// Says each instruction and each alarm once, and listens to the operator's keys.
 class Teller {
  public:
-  Teller(Context& context, recording::Recording& recording, bool view) : context_(context), recording_(recording), view_(view) {}
+  /// `live`: the operator is there to hear the instructions.
+  Teller(Context& context, recording::Recording& recording, bool live, bool view)
+      : context_(context), recording_(recording), live_(live), view_(view) {}
 
   void tick() {
     listen();
@@ -115,7 +117,8 @@ class Teller {
       std::string& last = said_[std::string(name(camera.modality))];
       if (words == last) continue;
       last = words;
-      context_.console.detail(words);
+      if (live_ && !view_) context_.console.info(words);
+      else context_.console.detail(words);
       context_.console.event({{"event", "guide"}, {"modality", name(camera.modality)}, {"done", done}, {"of", total},
                               {"instruction", camera.instruction}});
     }
@@ -147,7 +150,7 @@ class Teller {
 
   Context& context_;
   recording::Recording& recording_;
-  bool view_;
+  bool live_, view_;
   std::chrono::steady_clock::time_point drawn_{};
   std::map<std::string, std::string> said_;
 };
@@ -234,7 +237,7 @@ Status run(Context& context, const Options& o) {
     context.console.info(fmt::format("{}: {} {} {}", device.id, device.driver, device.model, device.serial));
   }
   if (options.live) context.console.info("recording; Enter: at the next station, q or Ctrl-C: stop");
-  Teller teller(context, recording, o.view);
+  Teller teller(context, recording, options.live, o.view);
   const auto ending = recording.run(context.progress.cancel, [&] { teller.tick(); });
   account(context, recording);
   if (!ending) return tl::unexpected(ending.error());

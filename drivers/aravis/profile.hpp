@@ -13,7 +13,7 @@ namespace orbitfuse::aravis {
 
 /// How samples become kelvin.
 enum class ThermalScale {
-  none,         ///< counts or gray levels; frames are flagged "not-radiometric"
+  none,         ///< counts or gray levels; no temperatures (RawCounts)
   linear,       ///< T[K] = kelvin_per_dn * DN
   radiometric,  ///< FLIR: nodes R, B, F, J0, J1 read from the camera
 };

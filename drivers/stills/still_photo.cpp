@@ -61,7 +61,10 @@ Result<StillPhoto> read_thermal_still(const std::filesystem::path& path, Thermal
     frame.pixels = frame.thermal_is_gray ? converted.gray : converted.centikelvin;
     size = frame.pixels.size();
   }
-  if (!converted.gray.empty()) frame.flags.push_back("raw-counts");
+  if (!converted.gray.empty()) {
+    frame.flags.push_back("raw-counts");
+    frame.original = file.image;
+  }
   frame.host_time_ns = (file.flir ? file.flir->taken_ns : read_exif(file.bytes).taken_ns).value_or(0);
   still.camera.modality = Modality::thermal;
   if (file.flir) {

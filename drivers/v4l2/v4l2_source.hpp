@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "capture/frame_source.hpp"
+#include "capture/raw_counts.hpp"
 #include "drivers/v4l2/identity.hpp"
 #include "drivers/v4l2/pixels.hpp"
 #include "drivers/v4l2/video_system.hpp"
@@ -81,10 +82,12 @@ class V4l2Source final : public FrameSource {
   int fd_ = -1;
   bool away_ = false;
   std::vector<Mapping> buffers_;
+  RawCounts raw_counts_;
   std::vector<Delivery> pending_;       ///< events to tell before the next frame
   Clock::time_point last_frame_{}, last_attempt_{}, lost_at_{};
   std::uint64_t next_id_ = 0, base_id_ = 0;
   int stalls_in_a_row_ = 0;
+  double interval_s_ = 0;               ///< between frames, smoothed; tells how many an outage cost
   std::optional<std::uint32_t> last_sequence_;
 };
 

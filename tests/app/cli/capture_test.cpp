@@ -51,6 +51,11 @@ TEST(Capture, TwoCameraSessionReplaysToTheSameFrames) {
   EXPECT_EQ(inspected.code, 0);
   EXPECT_EQ(inspected.result().at("visible").at("frames"), 12);
   EXPECT_EQ(inspected.result().at("thermal").at("has_temperatures"), true);
+  // The pipeline takes the copy as it takes the original.
+  for (const std::string& session : {first, second}) {
+    const Outcome planned = orbitfuse_program({"run", session, "--out", temp.path / "out", "--dry-run"});
+    EXPECT_EQ(planned.code, 0) << planned.err;
+  }
 }
 
 TEST(Capture, DryRunWritesNothing) {
