@@ -113,6 +113,8 @@ void add_fuse(Settings& settings, FuseConfig& fuse) {
                "Cycles of fast explicit diffusion that reach that time; 0: plain steps");
   settings.add("fuse.cnn_lpif_network_bands", fuse.options.cnn_lpif.network_bands,
                "Finest bands in which the network also weighs where the sources disagree");
+  settings.add("fuse.cnn_lpif_network_halvings", fuse.options.cnn_lpif.network_halvings,
+               "Times the images are halved for the network; each makes it four times faster");
   settings.add("fuse.cnn_lpif_vote_px", fuse.options.cnn_lpif.vote_px,
                "Side of the square over which those decisions are averaged; odd");
   settings.add("fuse.cnn_lpif_same_within", fuse.options.cnn_lpif.same_within,

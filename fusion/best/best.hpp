@@ -14,7 +14,7 @@ struct BestOptions {
   double sharpness = 12;     ///< exponent of the amplitude ratio in the weights; larger: harder choice
   int energy_radius_px = 5;  ///< of the window over which energies are averaged
   /// Share of the way to constant contrast that a detail's strength goes when its level changes.
-  double contrast_kept = 0.35;
+  double contrast_kept = 0.5;
   /// Gray levels of activity that the visible source has for free in the base: where neither source
   /// holds structure people expect the visible level (a bright sky, not a cold one).
   double visible_preference = 2;

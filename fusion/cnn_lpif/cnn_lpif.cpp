@@ -78,6 +78,8 @@ Status CnnLpifOptions::validate() const {
     return fail(ErrorKind::usage, "cnn_lpif.flat_within", fmt::format("{}", flat_within), "must be in -1..255");
   if (!(network_bands >= 0 && network_bands <= 32))
     return fail(ErrorKind::usage, "cnn_lpif.network_bands", fmt::format("{}", network_bands), "must be in 0..32");
+  if (!(network_halvings >= 0 && network_halvings <= 8))
+    return fail(ErrorKind::usage, "cnn_lpif.network_halvings", fmt::format("{}", network_halvings), "must be in 0..8");
   if (!(vote_px >= 1 && vote_px <= 255 && vote_px % 2 == 1))
     return fail(ErrorKind::usage, "cnn_lpif.vote_px", fmt::format("{}", vote_px), "must be odd, in 1..255");
   return {};
@@ -85,6 +87,15 @@ Status CnnLpifOptions::validate() const {
 
 Plane thermal_weight(const Plane& visible, const Plane& thermal, const CnnLpifOptions& options,
                      CnnLpifReport& report, const cnn::Parameters& network) {
+  if (const int halvings = pyramid_levels(visible.size(), options.network_halvings, cnn::patch); halvings > 0) {
+    CnnLpifOptions reduced = options;
+    reduced.network_halvings = 0;
+    const Plane weight = thermal_weight(gaussian_pyramid(visible, halvings).back(), gaussian_pyramid(thermal, halvings).back(),
+                                        reduced, report, network);
+    Plane full;
+    cv::resize(weight, full, visible.size(), 0, 0, cv::INTER_LINEAR);
+    return full;
+  }
   const cv::Mat1b kinds = patch_kinds(visible, thermal, options), needed = kinds == asked;
   report.patches_skipped = 1 - static_cast<double>(cv::countNonZero(needed)) / static_cast<double>(needed.total());
   const Plane v = cnn::score_map(visible, network, needed), t = cnn::score_map(thermal, network, needed);

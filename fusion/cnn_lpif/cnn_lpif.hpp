@@ -15,6 +15,9 @@ struct CnnLpifOptions {
   /// Finest bands in which the network also weighs the energies where the sources disagree. A patch
   /// is 16 = 2^4 px: what lies in coarser bands the network has not seen.
   int network_bands = 4;
+  /// Times that the images are halved for the network: each makes it four times faster and its
+  /// weights coarser. Not below one patch.
+  int network_halvings = 0;
   /// Side of the square of coefficients over which those decisions are averaged; odd.
   int vote_px = 7;
   /// Gray levels up to which the sources count as the same; patches that don't differ are not sent
