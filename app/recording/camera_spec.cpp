@@ -25,7 +25,8 @@ tl::unexpected<Error> wrong(const std::string& spec, std::string found, std::str
 std::optional<double> parse(std::string_view text) {
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+  if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value))
+    return std::nullopt;
   return value;
 }
 
@@ -47,18 +48,21 @@ Result<CameraSpec> parse_camera_spec(const std::string& text) {
   if (known == drivers.end()) {
     std::vector<std::string> names;
     for (const auto& entry : drivers) names.push_back(entry.first);
-    return wrong(text, "unknown driver \"" + spec.driver + "\"", fmt::format("use one of {}", fmt::join(names, ", ")));
+    return wrong(text, "unknown driver \"" + spec.driver + "\"",
+                 fmt::format("use one of {}", fmt::join(names, ", ")));
   }
   while (comma != std::string::npos) {
     const std::size_t next = text.find(',', comma + 1);
-    const std::string setting = text.substr(comma + 1, next == std::string::npos ? next : next - comma - 1);
+    const std::string setting =
+        text.substr(comma + 1, next == std::string::npos ? next : next - comma - 1);
     const std::size_t equals = setting.find('=');
     const std::string key = setting.substr(0, equals);
     const std::vector<std::string>& keys = known->second;
     if (equals == std::string::npos || std::find(keys.begin(), keys.end(), key) == keys.end()) {
       return wrong(text, "unknown setting \"" + setting + "\"",
                    keys.empty() ? spec.driver + " has none"
-                                : fmt::format("{} has {}, written key=value", spec.driver, fmt::join(keys, ", ")));
+                                : fmt::format("{} has {}, written key=value", spec.driver,
+                                              fmt::join(keys, ", ")));
     }
     spec.settings[key] = setting.substr(equals + 1);
     comma = next;

@@ -32,7 +32,8 @@ std::optional<OrbitPlan> plan_of(const Session& session) {
     sum += frame.station->elevation_deg;
     ++count;
     last_index = std::max(last_index, frame.station->index);
-    if (std::find(plan.modalities.begin(), plan.modalities.end(), frame.modality) == plan.modalities.end()) {
+    if (std::find(plan.modalities.begin(), plan.modalities.end(), frame.modality) ==
+        plan.modalities.end()) {
       plan.modalities.push_back(frame.modality);
     }
   }
@@ -48,17 +49,21 @@ Status add_replay(const CameraSpec& spec, Modality modality, Cameras& cameras) {
   if (!speed.empty() && speed != "full" && speed != "recorded") {
     return fail(ErrorKind::usage, "replay", "speed=" + speed, "use speed=full or speed=recorded");
   }
-  if (spec.camera.empty()) return fail(ErrorKind::usage, "replay", "no session named", "write replay:SESSION_FOLDER");
+  if (spec.camera.empty())
+    return fail(ErrorKind::usage, "replay", "no session named", "write replay:SESSION_FOLDER");
   ORBITFUSE_ASSIGN(const Session session, open_session(spec.camera));
   const std::size_t before = cameras.sources.size();
   for (const DeviceInfo& device : session.devices) {
-    const bool has_frames = std::any_of(session.frames.begin(), session.frames.end(),
-                                        [&](const FrameRecord& f) { return f.device == device.id; });
+    const bool has_frames =
+        std::any_of(session.frames.begin(), session.frames.end(),
+                    [&](const FrameRecord& f) { return f.device == device.id; });
     if (device.modality != modality || !has_frames) continue;
-    cameras.sources.push_back(make_replay_source(session, device.id, speed == "recorded" ? ReplaySpeed::recorded : ReplaySpeed::full));
+    cameras.sources.push_back(make_replay_source(
+        session, device.id, speed == "recorded" ? ReplaySpeed::recorded : ReplaySpeed::full));
   }
   if (cameras.sources.size() == before) {
-    return fail(ErrorKind::input, spec.camera, fmt::format("no {} frames", name(modality)), "replay another session");
+    return fail(ErrorKind::input, spec.camera, fmt::format("no {} frames", name(modality)),
+                "replay another session");
   }
   if (!cameras.plan) cameras.plan = plan_of(session);
   cameras.stations = cameras.plan.has_value();
@@ -84,14 +89,16 @@ Status add_synthetic(const CameraSpec& spec, Modality modality, Cameras& cameras
   return {};
 }
 
-Status add_aravis(const CameraSpec& spec, Modality modality, const fs::path& profiles, Cameras& cameras) {
+Status add_aravis(const CameraSpec& spec, Modality modality, const fs::path& profiles,
+                  Cameras& cameras) {
   aravis::AravisOptions options;
   options.camera = spec.camera;
   options.modality = modality;
   options.device_id = device_id(modality);
   options.profiles = profiles.empty() ? shipped_profiles() : profiles;
   options.profile = spec.value("profile");
-  if (!options.profile.empty()) ORBITFUSE_TRY(aravis::named_profile(options.profiles, options.profile));
+  if (!options.profile.empty())
+    ORBITFUSE_TRY(aravis::named_profile(options.profiles, options.profile));
   ORBITFUSE_TRY(options.validate());
   cameras.live = true;
   cameras.sources.push_back(std::make_unique<aravis::AravisSource>(options));
@@ -145,7 +152,8 @@ fs::path shipped_profiles() {
   return {};
 }
 
-Status add_cameras(const CameraSpec& spec, Modality modality, const fs::path& profiles, Cameras& cameras) {
+Status add_cameras(const CameraSpec& spec, Modality modality, const fs::path& profiles,
+                   Cameras& cameras) {
   if (spec.driver == "replay") return add_replay(spec, modality, cameras);
   if (spec.driver == "synthetic") return add_synthetic(spec, modality, cameras);
   if (spec.driver == "stills") return add_stills(spec, modality, cameras);

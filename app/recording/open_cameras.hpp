@@ -23,7 +23,8 @@ struct Cameras {
 
 /// Adds the camera of `spec` for a modality: one source, or for a replay one per device of it.
 /// `profiles`: folder of camera profiles; empty: the one that came with the program.
-Status add_cameras(const CameraSpec& spec, Modality modality, const std::filesystem::path& profiles, Cameras& cameras);
+Status add_cameras(const CameraSpec& spec, Modality modality, const std::filesystem::path& profiles,
+                   Cameras& cameras);
 
 /// config/cameras beside the program or in a parent folder of it; empty when there is none.
 std::filesystem::path shipped_profiles();

@@ -19,7 +19,8 @@ Status PreparedSource::start() {
 Result<Delivery> PreparedSource::next(std::chrono::milliseconds timeout) {
   Result<Delivery> delivery = source_->next(timeout);
   if (!delivery) return delivery;
-  if (delivery->kind != Delivery::Kind::frame && delivery->kind != Delivery::Kind::rejected) return delivery;
+  if (delivery->kind != Delivery::Kind::frame && delivery->kind != Delivery::Kind::rejected)
+    return delivery;
   std::uint64_t& id = delivery->frame.id;
   // Without an earlier recording ids stay the device's own.
   if (first_id_ > 0) {

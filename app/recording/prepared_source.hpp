@@ -9,8 +9,8 @@
 namespace orbitfuse::recording {
 
 /// A source made fit for a session. It is started before the session's folder is made, so that a
-/// camera that is absent, taken or forbidden leaves nothing behind, and so that its model and serial
-/// are known when it is announced. Ids go on where the device's earlier recording ended.
+/// camera that is absent, taken or forbidden leaves nothing behind, and so that its model and
+/// serial are known when it is announced. Ids go on where the device's earlier recording ended.
 class PreparedSource final : public FrameSource {
  public:
   explicit PreparedSource(std::unique_ptr<FrameSource> source) : source_(std::move(source)) {}

@@ -28,20 +28,25 @@ std::uint64_t next_id(const Session& session, const std::string& device) {
 }
 
 bool same_camera(const DeviceInfo& a, const DeviceInfo& b) {
-  return a.modality == b.modality && a.driver == b.driver && a.model == b.model && a.serial == b.serial;
+  return a.modality == b.modality && a.driver == b.driver && a.model == b.model &&
+         a.serial == b.serial;
 }
 
 }  // namespace
 
 Status RecordingOptions::validate() const {
-  if (session.empty()) return fail(ErrorKind::usage, "session", "empty", "name the session's folder");
-  if (!(seconds >= 0)) return fail(ErrorKind::usage, "seconds", fmt::format("{}", seconds), "must be >= 0");
+  if (session.empty())
+    return fail(ErrorKind::usage, "session", "empty", "name the session's folder");
+  if (!(seconds >= 0))
+    return fail(ErrorKind::usage, "seconds", fmt::format("{}", seconds), "must be >= 0");
   return guide ? guide->validate() : Status{};
 }
 
-Recording::Recording(std::vector<std::unique_ptr<FrameSource>> sources, RecordingOptions options, PositionFinder finder)
+Recording::Recording(std::vector<std::unique_ptr<FrameSource>> sources, RecordingOptions options,
+                     PositionFinder finder)
     : options_(std::move(options)), finder_(std::move(finder)) {
-  for (auto& source : sources) sources_.push_back(std::make_unique<PreparedSource>(std::move(source)));
+  for (auto& source : sources)
+    sources_.push_back(std::make_unique<PreparedSource>(std::move(source)));
 }
 
 Recording::~Recording() {
@@ -71,7 +76,8 @@ Status Recording::fit_into(const std::optional<Session>& earlier) {
 
 Status Recording::prepare() {
   ORBITFUSE_TRY(options_.validate());
-  if (sources_.empty()) return fail(ErrorKind::usage, "cameras", "none given", "give --visible or --thermal");
+  if (sources_.empty())
+    return fail(ErrorKind::usage, "cameras", "none given", "give --visible or --thermal");
   std::optional<Session> earlier;
   if (options_.resume) {
     ORBITFUSE_ASSIGN(earlier, open_session(options_.session));
@@ -139,7 +145,8 @@ Result<Ending> Recording::run(const std::atomic<bool>* cancel, const std::functi
   if (!status && status.error().kind != ErrorKind::cancelled) return tl::unexpected(status.error());
   if (guide_ && guide_->error()) return tl::unexpected(*guide_->error());
   // Ctrl-C is how a live recording ends, but it cuts a replay short.
-  if (cancel && *cancel && !options_.live) return fail(ErrorKind::cancelled, "capture", "stopped by the user", "capture it again");
+  if (cancel && *cancel && !options_.live)
+    return fail(ErrorKind::cancelled, "capture", "stopped by the user", "capture it again");
   ORBITFUSE_TRY(writer_->close());
   return ending;
 }
@@ -151,7 +158,8 @@ void Recording::measure_rates() {
   if (seconds < 1) return;
   for (const StreamStatus& s : recorder_->status()) {
     Rate& rate = rates_[s.device];
-    if (rates_measured_ != Clock::time_point{}) rate.hz = static_cast<double>(s.received - rate.received) / seconds;
+    if (rates_measured_ != Clock::time_point{})
+      rate.hz = static_cast<double>(s.received - rate.received) / seconds;
     rate.received = s.received;
   }
   rates_measured_ = now;
@@ -163,12 +171,15 @@ LiveState Recording::state() const {
   state.session = options_.session.string();
   state.running = running_;
   if (started_ != Clock::time_point{}) {
-    state.elapsed_s = std::chrono::duration<double>((running_ ? Clock::now() : ended_) - started_).count();
+    state.elapsed_s =
+        std::chrono::duration<double>((running_ ? Clock::now() : ended_) - started_).count();
   }
   // The session's folder is made last: until then its parent's disk counts.
   std::error_code error;
   std::filesystem::path folder = std::filesystem::absolute(options_.session);
-  while (!std::filesystem::exists(folder, error) && folder.has_parent_path() && folder != folder.parent_path()) folder = folder.parent_path();
+  while (!std::filesystem::exists(folder, error) && folder.has_parent_path() &&
+         folder != folder.parent_path())
+    folder = folder.parent_path();
   const auto space = std::filesystem::space(folder, error);
   if (!error) state.free_bytes = space.available;
   if (recorder_) state.streams = recorder_->status();
@@ -189,7 +200,9 @@ std::filesystem::path Recording::latest(Modality modality) const {
   const FrameRecord* newest = nullptr;
   const std::vector<StreamStatus> streams = status();
   for (const StreamStatus& s : streams) {
-    if (s.latest && s.latest->modality == modality && (!newest || s.latest->host_time_ns >= newest->host_time_ns)) newest = &*s.latest;
+    if (s.latest && s.latest->modality == modality &&
+        (!newest || s.latest->host_time_ns >= newest->host_time_ns))
+      newest = &*s.latest;
   }
   return newest ? options_.session / newest->file : std::filesystem::path();
 }

@@ -19,11 +19,11 @@ namespace orbitfuse::recording {
 
 struct RecordingOptions {
   std::filesystem::path session;
-  bool resume = false;             ///< go on with a session instead of making one
-  bool live = false;               ///< drop frames rather than wait when the disk is slow
-  bool choose_stations = false;    ///< frames are tracking frames until the guide chooses them
-  double seconds = 0;              ///< stop by itself after this long; 0: never
-  bool stop_when_complete = false; ///< stop by itself when every sector is done
+  bool resume = false;              ///< go on with a session instead of making one
+  bool live = false;                ///< drop frames rather than wait when the disk is slow
+  bool choose_stations = false;     ///< frames are tracking frames until the guide chooses them
+  double seconds = 0;               ///< stop by itself after this long; 0: never
+  bool stop_when_complete = false;  ///< stop by itself when every sector is done
   std::optional<LiveGuideOptions> guide;
   std::map<std::string, std::string> notes;
 
@@ -37,7 +37,8 @@ enum class Ending { source_over, time_over, complete, stopped };
 /// one thread; the others from any.
 class Recording {
  public:
-  Recording(std::vector<std::unique_ptr<FrameSource>> sources, RecordingOptions options, PositionFinder finder = {});
+  Recording(std::vector<std::unique_ptr<FrameSource>> sources, RecordingOptions options,
+            PositionFinder finder = {});
   ~Recording();
 
   /// Starts the cameras, then makes or reopens the session. Nothing is left behind on failure.
@@ -74,7 +75,7 @@ class Recording {
   std::unique_ptr<LiveGuide> guide_;
   std::unique_ptr<Recorder> recorder_;
   std::atomic<bool> stop_{false}, running_{false};
-  mutable std::mutex mutex_;             ///< guards what the page's threads see of a recording
+  mutable std::mutex mutex_;  ///< guards what the page's threads see of a recording
   std::chrono::steady_clock::time_point started_{}, ended_{}, rates_measured_{};
   std::map<std::string, Rate> rates_;
 };

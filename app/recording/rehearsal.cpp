@@ -13,7 +13,8 @@ using Clock = std::chrono::steady_clock;
 
 Status count(const Delivery& delivery, std::optional<std::uint64_t>& last_id, Rehearsal& out) {
   if (delivery.kind == Delivery::Kind::event) ++out.reasons[delivery.reason];
-  if (delivery.kind != Delivery::Kind::frame && delivery.kind != Delivery::Kind::rejected) return {};
+  if (delivery.kind != Delivery::Kind::frame && delivery.kind != Delivery::Kind::rejected)
+    return {};
   if (last_id && delivery.frame.id > *last_id + 1) out.missing += delivery.frame.id - *last_id - 1;
   last_id = delivery.frame.id;
   if (delivery.kind == Delivery::Kind::rejected) {
@@ -23,14 +24,16 @@ Status count(const Delivery& delivery, std::optional<std::uint64_t>& last_id, Re
   }
   ++out.frames;
   if (out.width == 0) {
-    ORBITFUSE_ASSIGN(const EncodedFrame encoded, encode_frame(delivery.frame, out.device.modality, out.device.id));
+    ORBITFUSE_ASSIGN(const EncodedFrame encoded,
+                     encode_frame(delivery.frame, out.device.modality, out.device.id));
     out.width = encoded.pixels.cols;
     out.height = encoded.pixels.rows;
   }
   return {};
 }
 
-Result<Rehearsal> rehearse_one(FrameSource& source, double seconds, const std::atomic<bool>* cancel) {
+Result<Rehearsal> rehearse_one(FrameSource& source, double seconds,
+                               const std::atomic<bool>* cancel) {
   ORBITFUSE_TRY(source.start());
   Rehearsal out;
   out.device = source.describe();
@@ -52,8 +55,8 @@ Result<Rehearsal> rehearse_one(FrameSource& source, double seconds, const std::a
 
 }  // namespace
 
-Result<std::vector<Rehearsal>> rehearse(const std::vector<std::unique_ptr<FrameSource>>& sources, double seconds,
-                                        const std::atomic<bool>* cancel) {
+Result<std::vector<Rehearsal>> rehearse(const std::vector<std::unique_ptr<FrameSource>>& sources,
+                                        double seconds, const std::atomic<bool>* cancel) {
   std::vector<Rehearsal> list;
   for (const auto& source : sources) {
     Result<Rehearsal> one = rehearse_one(*source, seconds, cancel);

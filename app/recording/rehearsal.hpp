@@ -16,14 +16,14 @@ namespace orbitfuse::recording {
 struct Rehearsal {
   DeviceInfo device;
   std::uint64_t frames = 0, rejected = 0, missing = 0;
-  double rate_hz = 0;                        ///< of live cameras, by arrival
+  double rate_hz = 0;  ///< of live cameras, by arrival
   int width = 0, height = 0;
-  std::map<std::string, int> reasons;        ///< of rejections, and events
+  std::map<std::string, int> reasons;  ///< of rejections, and events
 };
 
 /// Opens every camera and lets it deliver for some seconds (a finite source: at most to its end),
 /// one after the other, so that a shared bus or link problem of one does not hide behind another.
-Result<std::vector<Rehearsal>> rehearse(const std::vector<std::unique_ptr<FrameSource>>& sources, double seconds,
-                                        const std::atomic<bool>* cancel = nullptr);
+Result<std::vector<Rehearsal>> rehearse(const std::vector<std::unique_ptr<FrameSource>>& sources,
+                                        double seconds, const std::atomic<bool>* cancel = nullptr);
 
 }  // namespace orbitfuse::recording

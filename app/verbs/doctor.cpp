@@ -33,7 +33,8 @@ std::string on_path(const std::string& program) {
 Finding check_colmap() {
   const std::string colmap = on_path("colmap");
   if (colmap.empty())
-    return {"COLMAP", "not on PATH", "apt install colmap, or import sessions with known poses", true};
+    return {"COLMAP", "not on PATH", "apt install colmap, or import sessions with known poses",
+            true};
   return {"COLMAP", colmap, "", true};
 }
 
@@ -58,18 +59,24 @@ Action add_doctor(CLI::App& app) {
   const auto folder = std::make_shared<std::string>(".");
   app.add_option("--folder", *folder, "Where sessions and results will lie")->capture_default_str();
   return [folder](Context& context) -> Status {
-    std::vector<Finding> findings{check_cpu(), check_memory(), doctor::check_disk(*folder), check_colmap()};
+    std::vector<Finding> findings{check_cpu(), check_memory(), doctor::check_disk(*folder),
+                                  check_colmap()};
     const doctor::Machine machine;
-    for (const auto& more : {doctor::check_clocks(machine), doctor::check_network(machine), doctor::check_usb(machine)}) {
+    for (const auto& more : {doctor::check_clocks(machine), doctor::check_network(machine),
+                             doctor::check_usb(machine)}) {
       findings.insert(findings.end(), more.begin(), more.end());
     }
     auto list = nlohmann::json::array();
     int problems = 0;
     for (const Finding& f : findings) {
       const bool fine = f.remedy.empty();
-      context.console.data(fmt::format("{:<5}{:<15} {}{}", fine ? "ok" : f.needed ? "FIX" : "tip", f.what, f.found,
-                                       fine ? "" : "; " + f.remedy));
-      list.push_back({{"what", f.what}, {"found", f.found}, {"remedy", f.remedy}, {"needed", f.needed}});
+      context.console.data(fmt::format("{:<5}{:<15} {}{}",
+                                       fine       ? "ok"
+                                       : f.needed ? "FIX"
+                                                  : "tip",
+                                       f.what, f.found, fine ? "" : "; " + f.remedy));
+      list.push_back(
+          {{"what", f.what}, {"found", f.found}, {"remedy", f.remedy}, {"needed", f.needed}});
       problems += !fine && f.needed;
     }
     context.result = {{"findings", list}, {"threads", thread_count()}};

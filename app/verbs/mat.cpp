@@ -26,11 +26,17 @@ Status run(Context& context, const Options& o) {
     return {};
   }
   ORBITFUSE_TRY(write_file_atomic(o.out, pdf));
-  context.console.data(fmt::format("{}: {} x {} tags, each {:.0f} mm, on {:g} m", o.out, design.tags_per_side, design.tags_per_side,
+  context.console.data(fmt::format("{}: {} x {} tags, each {:.0f} mm, on {:g} m", o.out,
+                                   design.tags_per_side, design.tags_per_side,
                                    1000 * design.tag_m(), design.size_m));
-  if (o.thermal) context.console.info("transfer it to aluminium foil and paint what is black with matt paint");
-  context.console.info(fmt::format("capture with --mat {} --mat-tags {}", o.thermal ? "foil" : "paper", design.tags_per_side));
-  context.result = {{"file", o.out}, {"size_m", design.size_m}, {"tags_per_side", design.tags_per_side}, {"tag_m", design.tag_m()}};
+  if (o.thermal)
+    context.console.info("transfer it to aluminium foil and paint what is black with matt paint");
+  context.console.info(fmt::format("capture with --mat {} --mat-tags {}",
+                                   o.thermal ? "foil" : "paper", design.tags_per_side));
+  context.result = {{"file", o.out},
+                    {"size_m", design.size_m},
+                    {"tags_per_side", design.tags_per_side},
+                    {"tag_m", design.tag_m()}};
   return {};
 }
 
@@ -40,9 +46,12 @@ Action add_mat(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   app.add_option("--out", options->out, "PDF to write")->required();
   app.add_option("--size-m", options->size_m, "Side of the whole mat")->capture_default_str();
-  app.add_option("--paper", options->paper, "A4, A3, A1: tiles to glue together; one: a single page for a plotter")->capture_default_str();
+  app.add_option("--paper", options->paper,
+                 "A4, A3, A1: tiles to glue together; one: a single page for a plotter")
+      ->capture_default_str();
   app.add_option("--tags", options->tags, "Tags along a side; 9, or 5 with --thermal");
-  app.add_flag("--thermal", options->thermal, "For foil and paint, which thermal cameras see: inverted, wider quiet zones");
+  app.add_flag("--thermal", options->thermal,
+               "For foil and paint, which thermal cameras see: inverted, wider quiet zones");
   return [options](Context& context) { return run(context, *options); };
 }
 

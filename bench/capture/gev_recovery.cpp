@@ -32,8 +32,9 @@ Seen watch(AravisSource& source, std::chrono::milliseconds limit, const Until& u
   while (Clock::now() < end && !until(seen)) {
     const auto delivery = source.next(200ms);
     if (!delivery) break;
-    const bool alarm = delivery->kind == Delivery::Kind::event && (delivery->reason == "silent" || delivery->reason == "disconnected" ||
-                                                                     delivery->reason == "control-silent");
+    const bool alarm = delivery->kind == Delivery::Kind::event &&
+                       (delivery->reason == "silent" || delivery->reason == "disconnected" ||
+                        delivery->reason == "control-silent");
     if (alarm && seen.first_alarm == Clock::time_point{}) seen.first_alarm = Clock::now();
     if (delivery->kind != Delivery::Kind::frame) continue;
     if (seen.first_frame == Clock::time_point{}) seen.first_id = delivery->frame.id;
@@ -54,8 +55,10 @@ struct Case {
 }  // namespace
 
 int main() {
-  std::vector<Case> cases{{"killed, restarted after 3 s", 3, true, {}}, {"link down 3 s", 3, false, {}},
-                          {"link down 8 s", 8, false, {}}, {"GVCP mute 8 s", 8, false, {}}};
+  std::vector<Case> cases{{"killed, restarted after 3 s", 3, true, {}},
+                          {"link down 3 s", 3, false, {}},
+                          {"link down 8 s", 8, false, {}},
+                          {"GVCP mute 8 s", 8, false, {}}};
   cases[1].faults.link_down = cases[2].faults.link_down = true;
   cases[3].faults.mute_control = true;
   std::printf("%-28s %12s %16s %10s\n", "case", "flagged s", "streaming s", "id gap");
@@ -78,18 +81,27 @@ int main() {
       const auto delivery = source.next(200ms);
       if (delivery && delivery->kind == Delivery::Kind::frame) last_id = delivery->frame.id;
     }
-    if (c.kill) camera.kill();
-    else camera.set_faults(c.faults);
+    if (c.kill)
+      camera.kill();
+    else
+      camera.set_faults(c.faults);
     const auto fault = Clock::now();
-    const auto returns = fault + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(c.away_s));
-    Seen away = watch(source, std::chrono::milliseconds(static_cast<int>(1000 * c.away_s)), [&](const Seen&) { return Clock::now() >= returns; });
-    if (c.kill) camera.start();
-    else camera.set_faults({});
+    const auto returns = fault + std::chrono::duration_cast<Clock::duration>(
+                                     std::chrono::duration<double>(c.away_s));
+    Seen away = watch(source, std::chrono::milliseconds(static_cast<int>(1000 * c.away_s)),
+                      [&](const Seen&) { return Clock::now() >= returns; });
+    if (c.kill)
+      camera.start();
+    else
+      camera.set_faults({});
     const auto back = Clock::now();
-    const Seen after = watch(source, 20s, [](const Seen& s) { return s.first_frame != Clock::time_point{}; });
+    const Seen after =
+        watch(source, 20s, [](const Seen& s) { return s.first_frame != Clock::time_point{}; });
     const bool told = away.first_alarm != Clock::time_point{};
-    std::printf("%-28s %12s %16.2f %10lld\n", c.name, told ? std::to_string(seconds(away.first_alarm - fault)).substr(0, 5).c_str() : "never",
-                seconds(after.first_frame - back), static_cast<long long>(after.first_id - last_id) - 1);
+    std::printf(
+        "%-28s %12s %16.2f %10lld\n", c.name,
+        told ? std::to_string(seconds(away.first_alarm - fault)).substr(0, 5).c_str() : "never",
+        seconds(after.first_frame - back), static_cast<long long>(after.first_id - last_id) - 1);
   }
   return 0;
 }

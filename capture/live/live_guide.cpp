@@ -32,16 +32,21 @@ Status LiveGuideOptions::validate() const {
   ORBITFUSE_TRY(plan.validate());
   ORBITFUSE_TRY(coverage.validate());
   if (!(looks_per_second > 0 && looks_per_second <= 100)) {
-    return fail(ErrorKind::usage, "guide.looks_per_second", fmt::format("{}", looks_per_second), "must be > 0, at most 100");
+    return fail(ErrorKind::usage, "guide.looks_per_second", fmt::format("{}", looks_per_second),
+                "must be > 0, at most 100");
   }
   if (!(unseen_after_s > 0)) {
-    return fail(ErrorKind::usage, "guide.unseen_after_s", fmt::format("{}", unseen_after_s), "must be > 0");
+    return fail(ErrorKind::usage, "guide.unseen_after_s", fmt::format("{}", unseen_after_s),
+                "must be > 0");
   }
   return {};
 }
 
 LiveGuide::LiveGuide(SessionWriter& writer, LiveGuideOptions options, PositionFinder finder)
-    : writer_(writer), options_(std::move(options)), finder_(std::move(finder)), coverage_(options_.plan, options_.coverage) {
+    : writer_(writer),
+      options_(std::move(options)),
+      finder_(std::move(finder)),
+      coverage_(options_.plan, options_.coverage) {
   for (const Modality modality : options_.plan.modalities) {
     cameras_[modality].shown.modality = modality;
     cameras_[modality].shown.instruction = coverage_.instruction(modality, std::nullopt);
@@ -68,7 +73,8 @@ void LiveGuide::add(const FrameRecord& frame) {
   camera.shown.latest_file = frame.file;
   if (frame.station && !frame.tracking) {
     // The source's or the operator's word: there, and at rest.
-    set_position(camera, {frame.station->azimuth_deg, frame.station->elevation_deg, 0, 0}, frame.host_time_ns);
+    set_position(camera, {frame.station->azimuth_deg, frame.station->elevation_deg, 0, 0},
+                 frame.host_time_ns);
     camera.position->speed_deg_s = 0;
     judge(camera, frame, camera.position);
   } else if (camera.key_pressed) {
@@ -99,7 +105,8 @@ void LiveGuide::set_position(Camera& camera, OrbitPosition position, std::int64_
   const double seconds = 1e-9 * static_cast<double>(time_ns - camera.position_time_ns);
   if (camera.position && seconds > 0 && seconds <= options_.unseen_after_s) {
     const double across = angle_difference_deg(position.azimuth_deg, camera.position->azimuth_deg);
-    position.speed_deg_s = std::hypot(across, position.elevation_deg - camera.position->elevation_deg) / seconds;
+    position.speed_deg_s =
+        std::hypot(across, position.elevation_deg - camera.position->elevation_deg) / seconds;
   } else {
     // Whether it moves is known only from the second look on.
     position.speed_deg_s = std::numeric_limits<double>::infinity();
@@ -108,7 +115,8 @@ void LiveGuide::set_position(Camera& camera, OrbitPosition position, std::int64_
   camera.position_time_ns = time_ns;
 }
 
-void LiveGuide::judge(Camera& camera, const FrameRecord& frame, const std::optional<OrbitPosition>& position) {
+void LiveGuide::judge(Camera& camera, const FrameRecord& frame,
+                      const std::optional<OrbitPosition>& position) {
   FrameAssessment assessment;
   assessment.modality = frame.modality;
   assessment.file = frame.file;
@@ -116,7 +124,8 @@ void LiveGuide::judge(Camera& camera, const FrameRecord& frame, const std::optio
   assessment.rank = frame.quality ? frame.quality->sharpness : 0;
   assessment.sharpness = camera.sharpness.relative(assessment.rank, position);
   // Thermal frames clip where the scene leaves the sensor's range, which is no exposure fault.
-  if (frame.quality && frame.modality == Modality::visible) assessment.overexposed = frame.quality->clipped_fraction;
+  if (frame.quality && frame.modality == Modality::visible)
+    assessment.overexposed = frame.quality->clipped_fraction;
   assessment.nuc = frame.has_flag("nuc");
   // A photo was taken on purpose; whether the hand was still shows in its sharpness.
   if (assessment.position && frame.has_flag("still")) assessment.position->speed_deg_s = 0;
@@ -136,8 +145,13 @@ void LiveGuide::note_choice(Camera& camera, const FrameRecord& frame) {
     if (frame.station && !frame.tracking) return;  // written with its station
     FrameRecord chosen = frame;
     chosen.tracking = false;
-    chosen.station = Station{sectors[i].loop, sectors[i].index, camera.position ? camera.position->azimuth_deg : sectors[i].azimuth_deg,
-                             camera.position ? camera.position->elevation_deg : sectors[i].elevation_deg, 1, 1};
+    chosen.station =
+        Station{sectors[i].loop,
+                sectors[i].index,
+                camera.position ? camera.position->azimuth_deg : sectors[i].azimuth_deg,
+                camera.position ? camera.position->elevation_deg : sectors[i].elevation_deg,
+                1,
+                1};
     const auto before = camera.chosen.find(i);
     if (before != camera.chosen.end()) {
       FrameRecord replaced = before->second;
@@ -155,7 +169,8 @@ void LiveGuide::look() {
   const auto pause = std::chrono::duration<double>(1 / options_.looks_per_second);
   std::unique_lock lock(mutex_);
   const auto has_work = [this] {
-    return over_ || std::any_of(cameras_.begin(), cameras_.end(), [](const auto& c) { return c.second.waiting.has_value(); });
+    return over_ || std::any_of(cameras_.begin(), cameras_.end(),
+                                [](const auto& c) { return c.second.waiting.has_value(); });
   };
   while (true) {
     changed_.wait(lock, has_work);
@@ -172,12 +187,14 @@ void LiveGuide::look() {
       lock.lock();
       if (seen) {
         set_position(camera, *seen, frame.host_time_ns);
-      } else if (1e-9 * static_cast<double>(frame.host_time_ns - camera.position_time_ns) > options_.unseen_after_s) {
+      } else if (1e-9 * static_cast<double>(frame.host_time_ns - camera.position_time_ns) >
+                 options_.unseen_after_s) {
         camera.position.reset();
       }
       judge(camera, frame, seen ? camera.position : std::nullopt);
     }
-    changed_.wait_for(lock, pause - (std::chrono::steady_clock::now() - started), [this] { return over_; });
+    changed_.wait_for(lock, pause - (std::chrono::steady_clock::now() - started),
+                      [this] { return over_; });
   }
 }
 

@@ -24,8 +24,8 @@ using PositionFinder = std::function<std::optional<OrbitPosition>(const cv::Mat&
 struct LiveGuideOptions {
   OrbitPlan plan;
   CoverageOptions coverage;
-  double looks_per_second = 4;   ///< per camera; finding the mat costs 5-20 ms a look
-  double unseen_after_s = 1.0;   ///< a position older than this is no longer where the camera is
+  double looks_per_second = 4;  ///< per camera; finding the mat costs 5-20 ms a look
+  double unseen_after_s = 1.0;  ///< a position older than this is no longer where the camera is
 
   Status validate() const;
 };
@@ -34,8 +34,8 @@ struct LiveGuideOptions {
 struct LiveCamera {
   Modality modality = Modality::visible;
   std::optional<OrbitPosition> position;
-  Refusal refusal = Refusal::none;   ///< of the latest frame that was judged
-  std::string instruction;           ///< what to do next for this modality
+  Refusal refusal = Refusal::none;  ///< of the latest frame that was judged
+  std::string instruction;          ///< what to do next for this modality
   std::string latest_file, judged_file;
 };
 
@@ -73,12 +73,13 @@ class LiveGuide {
     SharpnessReference sharpness;
     std::optional<OrbitPosition> position;
     std::int64_t position_time_ns = 0;
-    std::optional<FrameRecord> waiting;      ///< newest frame not looked at yet
+    std::optional<FrameRecord> waiting;  ///< newest frame not looked at yet
     bool key_pressed = false;
     std::map<std::size_t, FrameRecord> chosen;  ///< by sector
   };
   void look();
-  void judge(Camera& camera, const FrameRecord& frame, const std::optional<OrbitPosition>& position);
+  void judge(Camera& camera, const FrameRecord& frame,
+             const std::optional<OrbitPosition>& position);
   void note_choice(Camera& camera, const FrameRecord& frame);
   std::optional<OrbitPosition> next_station(Modality modality) const;
   void set_position(Camera& camera, OrbitPosition position, std::int64_t time_ns);

@@ -15,12 +15,12 @@ struct LiveState {
   std::string session;
   bool running = false, complete = false;
   double elapsed_s = 0;
-  std::uint64_t free_bytes = 0;              ///< on the session's disk
+  std::uint64_t free_bytes = 0;  ///< on the session's disk
   std::vector<StreamStatus> streams;
-  std::vector<double> rates_hz;              ///< of `streams`
-  std::vector<LiveCamera> cameras;           ///< empty without a guide
+  std::vector<double> rates_hz;     ///< of `streams`
+  std::vector<LiveCamera> cameras;  ///< empty without a guide
   std::vector<Sector> sectors;
-  std::vector<std::string> warnings;         ///< what the operator should act on now
+  std::vector<std::string> warnings;  ///< what the operator should act on now
 };
 
 /// Warnings that follow from the figures: silence, drops, rejections, a nearly full disk.

@@ -12,7 +12,8 @@ constexpr double elevation_cell_deg = 15, weight_of_best_anywhere = 0.4;
 
 }  // namespace
 
-double SharpnessReference::relative(double sharpness, const std::optional<OrbitPosition>& position) {
+double SharpnessReference::relative(double sharpness,
+                                    const std::optional<OrbitPosition>& position) {
   if (!(sharpness > 0)) return 0;
   best_ = std::max(best_, sharpness);
   double reference = weight_of_best_anywhere * best_;

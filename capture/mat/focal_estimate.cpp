@@ -15,11 +15,12 @@ void FocalEstimate::add(const Eigen::Matrix3d& image_from_plane, double image_wi
   if (!(scale > 0) || !h.allFinite()) return;
   h /= scale;
   const auto add_equation = [this](double a, double b) {  // a / f^2 + b = 0
-    sum_bb_ += b * b;   // solved for f^2 = -a / b, which stays finite for frontal views (b = 0)
+    sum_bb_ += b * b;  // solved for f^2 = -a / b, which stays finite for frontal views (b = 0)
     sum_ab_ += a * b;
   };
   add_equation(h.col(0).head<2>().dot(h.col(1).head<2>()), h(2, 0) * h(2, 1));
-  add_equation(h.col(0).head<2>().squaredNorm() - h.col(1).head<2>().squaredNorm(), h(2, 0) * h(2, 0) - h(2, 1) * h(2, 1));
+  add_equation(h.col(0).head<2>().squaredNorm() - h.col(1).head<2>().squaredNorm(),
+               h(2, 0) * h(2, 0) - h(2, 1) * h(2, 1));
 }
 
 std::optional<double> FocalEstimate::focal_px() const {

@@ -20,19 +20,24 @@ Status MatDesign::validate() const {
   const auto bad = [](const char* field, const std::string& found, const char* remedy) {
     return fail(ErrorKind::usage, std::string("mat.") + field, found, remedy);
   };
-  if (!(size_m >= 0.05 && size_m <= 20)) return bad("size_m", fmt::format("{}", size_m), "must be 0.05 to 20");
-  if (tags_per_side < 2 || tags() > 250) return bad("tags_per_side", fmt::format("{}", tags_per_side), "must be 2 to 15");
+  if (!(size_m >= 0.05 && size_m <= 20))
+    return bad("size_m", fmt::format("{}", size_m), "must be 0.05 to 20");
+  if (tags_per_side < 2 || tags() > 250)
+    return bad("tags_per_side", fmt::format("{}", tags_per_side), "must be 2 to 15");
   if (!(tag_share >= 0.3 && tag_share <= 0.85)) {
-    return bad("tag_share", fmt::format("{}", tag_share), "must be 0.3 to 0.85: tags need a quiet zone");
+    return bad("tag_share", fmt::format("{}", tag_share),
+               "must be 0.3 to 0.85: tags need a quiet zone");
   }
   return {};
 }
 
 std::array<Eigen::Vector3d, 4> MatDesign::corners_m(int id) const {
   const int column = id % tags_per_side, row = id / tags_per_side;  // rows from the top of the page
-  const double x = (column + 0.5) * pitch_m() - 0.5 * size_m, y = 0.5 * size_m - (row + 0.5) * pitch_m();
+  const double x = (column + 0.5) * pitch_m() - 0.5 * size_m,
+               y = 0.5 * size_m - (row + 0.5) * pitch_m();
   const double h = 0.5 * tag_m();
-  return {Eigen::Vector3d{x - h, y + h, 0}, {x + h, y + h, 0}, {x + h, y - h, 0}, {x - h, y - h, 0}};
+  return {
+      Eigen::Vector3d{x - h, y + h, 0}, {x + h, y + h, 0}, {x + h, y - h, 0}, {x - h, y - h, 0}};
 }
 
 std::vector<MatRectangle> black_rectangles(const MatDesign& design) {
@@ -51,7 +56,8 @@ std::vector<MatRectangle> black_rectangles(const MatDesign& design) {
         int end = column;
         while (end < cells && bits.at<std::uint8_t>(row, end) == black) ++end;
         if (end > column) {
-          list.push_back({top_left.x() + column * cell_m, top_left.y() - (row + 1) * cell_m, (end - column) * cell_m, cell_m});
+          list.push_back({top_left.x() + column * cell_m, top_left.y() - (row + 1) * cell_m,
+                          (end - column) * cell_m, cell_m});
         }
         column = std::max(end, column + 1);
       }

@@ -13,9 +13,9 @@ namespace orbitfuse {
 /// x to the right and y to the top of the page, z up. Azimuth is counted from x towards y, so
 /// counter-clockwise seen from above.
 struct MatDesign {
-  double size_m = 0.6;       ///< side of the whole mat; a car wants several metres
-  int tags_per_side = 9;     ///< the object hides the middle ones; many small tags survive that
-  double tag_share = 0.75;   ///< of the pitch; the rest is the quiet zone
+  double size_m = 0.6;      ///< side of the whole mat; a car wants several metres
+  int tags_per_side = 9;    ///< the object hides the middle ones; many small tags survive that
+  double tag_share = 0.75;  ///< of the pitch; the rest is the quiet zone
   /// For foil and paint: fewer, larger tags with wider quiet zones, because thermal images are
   /// small and soft, and inverted, because paint (black on the page) is what looks bright.
   bool thermal = false;

@@ -15,6 +15,9 @@
 namespace orbitfuse {
 namespace {
 
+/// Above what Coverage accepts: a followed position steers, it proves no station.
+constexpr double followed_sigma_deg = 3;
+
 constexpr double deg = 180 / std::numbers::pi;
 
 /// 8-bit grey; thermal samples stretched between percentiles, so that one hot spot hides nothing.
@@ -33,7 +36,8 @@ cv::Mat gray_of(const cv::Mat& image) {
     }
     if (samples.empty()) return {};
     const auto percentile = [&](double share) {
-      const auto at = samples.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(samples.size() - 1));
+      const auto at = samples.begin() +
+                      static_cast<std::ptrdiff_t>(share * static_cast<double>(samples.size() - 1));
       std::nth_element(samples.begin(), at, samples.end());
       return static_cast<double>(*at);
     };
@@ -43,22 +47,22 @@ cv::Mat gray_of(const cv::Mat& image) {
   return gray;
 }
 
-struct Corners {
-  std::vector<cv::Point3d> mat;
-  std::vector<cv::Point2d> image;
-};
+using Corners = MatCorners;
 
 /// Corners of all tags of the design, in the image's own pixels.
 Corners detect(const cv::Mat& gray, const MatDesign& design, int largest_side_px) {
   const int side = std::max(gray.cols, gray.rows);
   // Seen at 10 degrees a tag is a few pixels high: interpolation lets the detector read its cells.
-  const double scale = 2 * side <= largest_side_px ? 2.0 : std::min(1.0, static_cast<double>(largest_side_px) / side);
+  const double scale = 2 * side <= largest_side_px
+                           ? 2.0
+                           : std::min(1.0, static_cast<double>(largest_side_px) / side);
   cv::Mat search = gray;
-  if (scale != 1) cv::resize(gray, search, {}, scale, scale, scale < 1 ? cv::INTER_AREA : cv::INTER_CUBIC);
+  if (scale != 1)
+    cv::resize(gray, search, {}, scale, scale, scale < 1 ? cv::INTER_AREA : cv::INTER_CUBIC);
   const auto parameters = cv::aruco::DetectorParameters::create();
   parameters->cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
-  parameters->cornerRefinementWinSize = 3;      // cells of distant tags have few pixels
-  parameters->minMarkerPerimeterRate = 0.015;   // many small tags
+  parameters->cornerRefinementWinSize = 3;     // cells of distant tags have few pixels
+  parameters->minMarkerPerimeterRate = 0.015;  // many small tags
   parameters->detectInvertedMarker = true;
   std::vector<std::vector<cv::Point2f>> tags;
   std::vector<int> ids;
@@ -70,19 +74,22 @@ Corners detect(const cv::Mat& gray, const MatDesign& design, int largest_side_px
     for (std::size_t c = 0; c < 4; ++c) {
       out.mat.emplace_back(corners[c].x(), corners[c].y(), corners[c].z());
       // Pixel centres: at scale s, x' + 0.5 = s (x + 0.5).
-      out.image.emplace_back((tags[i][c].x + 0.5) / scale - 0.5, (tags[i][c].y + 0.5) / scale - 0.5);
+      out.image.emplace_back((tags[i][c].x + 0.5) / scale - 0.5,
+                             (tags[i][c].y + 0.5) / scale - 0.5);
     }
   }
   return out;
 }
 
 /// Only tags that agree with one plane; false detections and bent paper go.
-std::optional<Eigen::Matrix3d> agree_on_plane(Corners& corners, double max_error_px, std::size_t min_corners) {
+std::optional<Eigen::Matrix3d> agree_on_plane(Corners& corners, double max_error_px,
+                                              std::size_t min_corners) {
   if (corners.image.size() < min_corners) return std::nullopt;
   std::vector<cv::Point2d> plane;
   for (const cv::Point3d& p : corners.mat) plane.emplace_back(p.x, p.y);
   std::vector<unsigned char> good;
-  const cv::Mat h = cv::findHomography(plane, corners.image, cv::RANSAC, max_error_px, good, 2000, 0.999);
+  const cv::Mat h =
+      cv::findHomography(plane, corners.image, cv::RANSAC, max_error_px, good, 2000, 0.999);
   if (h.empty()) return std::nullopt;
   Corners kept;
   for (std::size_t i = 0; i < good.size(); i += 4) {
@@ -115,14 +122,16 @@ Pose pose_of(const cv::Mat& r, const cv::Mat& t) {
 Rigid3d rigid_of(const Pose& pose) {
   const Eigen::Vector3d r = pose.head<3>();
   const double angle = r.norm();
-  const Eigen::AngleAxisd rotation(angle, angle > 0 ? Eigen::Vector3d(r / angle) : Eigen::Vector3d::UnitX());
+  const Eigen::AngleAxisd rotation(
+      angle, angle > 0 ? Eigen::Vector3d(r / angle) : Eigen::Vector3d::UnitX());
   return {Eigen::Quaterniond(rotation), pose.tail<3>()};
 }
 
 /// Azimuth and elevation in degrees.
 Eigen::Vector2d angles_of(const Pose& pose) {
   const Eigen::Vector3d eye = camera_center(rigid_of(pose));
-  return {std::atan2(eye.y(), eye.x()) * deg, std::atan2(eye.z(), std::hypot(eye.x(), eye.y())) * deg};
+  return {std::atan2(eye.y(), eye.x()) * deg,
+          std::atan2(eye.z(), std::hypot(eye.x(), eye.y())) * deg};
 }
 
 double rms(const Corners& corners, const cv::Matx33d& k, const cv::Mat& r, const cv::Mat& t) {
@@ -137,7 +146,8 @@ double rms(const Corners& corners, const cv::Matx33d& k, const cv::Mat& r, const
 }
 
 /// One standard deviation of the direction: corner noise through the fit's Jacobian.
-double sigma_deg(const Corners& corners, const cv::Matx33d& k, const cv::Mat& r, const cv::Mat& t, double error_px) {
+double sigma_deg(const Corners& corners, const cv::Matx33d& k, const cv::Mat& r, const cv::Mat& t,
+                 double error_px) {
   std::vector<cv::Point2d> projected;
   cv::Mat jacobian;
   cv::projectPoints(corners.mat, r, t, k, cv::noArray(), projected, jacobian);
@@ -148,7 +158,8 @@ double sigma_deg(const Corners& corners, const cv::Matx33d& k, const cv::Mat& r,
     information += j * j.transpose();
   }
   const Eigen::Matrix<double, 6, 6> covariance =
-      information.ldlt().solve(Eigen::Matrix<double, 6, 6>::Identity()) * std::pow(std::max(error_px, 0.1), 2);
+      information.ldlt().solve(Eigen::Matrix<double, 6, 6>::Identity()) *
+      std::pow(std::max(error_px, 0.1), 2);
   const Pose pose = pose_of(r, t);
   const Eigen::Vector2d here = angles_of(pose);
   double worst = 0;
@@ -168,18 +179,27 @@ double sigma_deg(const Corners& corners, const cv::Matx33d& k, const cv::Mat& r,
 }  // namespace
 
 Status MatFinderOptions::validate() const {
-  if (min_tags < 1) return fail(ErrorKind::usage, "mat.min_tags", fmt::format("{}", min_tags), "must be >= 1");
-  if (!(max_error_px > 0)) return fail(ErrorKind::usage, "mat.max_error_px", fmt::format("{}", max_error_px), "must be > 0");
-  if (largest_side_px < 320) return fail(ErrorKind::usage, "mat.largest_side_px", fmt::format("{}", largest_side_px), "must be >= 320");
+  if (min_tags < 1)
+    return fail(ErrorKind::usage, "mat.min_tags", fmt::format("{}", min_tags), "must be >= 1");
+  if (!(max_error_px > 0))
+    return fail(ErrorKind::usage, "mat.max_error_px", fmt::format("{}", max_error_px),
+                "must be > 0");
+  if (largest_side_px < 320)
+    return fail(ErrorKind::usage, "mat.largest_side_px", fmt::format("{}", largest_side_px),
+                "must be >= 320");
   return {};
 }
 
-MatFinder::MatFinder(const MatDesign& design, MatFinderOptions options) : design_(design), options_(options) {}
+MatFinder::MatFinder(const MatDesign& design, MatFinderOptions options)
+    : design_(design), options_(options) {}
 
-void MatFinder::set_focal_px(Modality modality, double focal_px) { known_focal_px_[modality] = focal_px; }
+void MatFinder::set_focal_px(Modality modality, double focal_px) {
+  known_focal_px_[modality] = focal_px;
+}
 
 std::optional<double> MatFinder::focal_px(Modality modality) const {
-  if (const auto known = known_focal_px_.find(modality); known != known_focal_px_.end()) return known->second;
+  if (const auto known = known_focal_px_.find(modality); known != known_focal_px_.end())
+    return known->second;
   const auto estimate = estimates_.find(modality);
   return estimate == estimates_.end() ? std::nullopt : estimate->second.focal_px();
 }
@@ -188,25 +208,38 @@ std::optional<MatSighting> MatFinder::find(const cv::Mat& image, Modality modali
   const cv::Mat gray = gray_of(image);
   if (gray.empty() || std::min(gray.cols, gray.rows) < 32) return std::nullopt;
   Corners corners = detect(gray, design_, options_.largest_side_px);
-  const double max_error_px = options_.max_error_px * std::max(1.0, static_cast<double>(gray.cols) / options_.largest_side_px);
-  const auto h = agree_on_plane(corners, max_error_px, 4 * static_cast<std::size_t>(options_.min_tags));
+  const double max_error_px = options_.max_error_px * std::max(1.0, static_cast<double>(gray.cols) /
+                                                                        options_.largest_side_px);
+  const auto min_corners = 4 * static_cast<std::size_t>(options_.min_tags);
+  auto h = agree_on_plane(corners, max_error_px, min_corners);
+  MatTracker& tracker = trackers_[modality];
+  const bool followed = !h;
+  if (h) {
+    tracker.remember(gray, corners);
+  } else if (std::optional<Corners> moved = tracker.follow(gray)) {
+    corners = *std::move(moved);
+    h = agree_on_plane(corners, max_error_px, min_corners);
+  }
   if (!h) return std::nullopt;
-  const double cx = 0.5 * (gray.cols - 1), cy = 0.5 * (gray.rows - 1);  // pixel centres are whole numbers here
+  const double cx = 0.5 * (gray.cols - 1),
+               cy = 0.5 * (gray.rows - 1);  // pixel centres are whole numbers here
   Eigen::Matrix3d centred = Eigen::Matrix3d::Identity();
   centred(0, 2) = -cx;
   centred(1, 2) = -cy;
   // The plane in units of its size, so that perspective terms compare between mats.
   const Eigen::Matrix3d unit = Eigen::Vector3d(design_.size_m, design_.size_m, 1).asDiagonal();
-  estimates_[modality].add(centred * *h * unit, gray.cols);
+  if (!followed) estimates_[modality].add(centred * *h * unit, gray.cols);
   const std::optional<double> focal = focal_px(modality);
   if (!focal) return std::nullopt;
 
   const cv::Matx33d k(*focal, 0, cx, 0, *focal, cy, 0, 0, 1);
   std::vector<cv::Mat> rotations, translations;
-  cv::solvePnPGeneric(corners.mat, corners.image, k, cv::noArray(), rotations, translations, false, cv::SOLVEPNP_IPPE);
+  cv::solvePnPGeneric(corners.mat, corners.image, k, cv::noArray(), rotations, translations, false,
+                      cv::SOLVEPNP_IPPE);
   std::vector<std::pair<double, std::size_t>> ranked;
   for (std::size_t i = 0; i < rotations.size(); ++i) {
-    cv::solvePnPRefineLM(corners.mat, corners.image, k, cv::noArray(), rotations[i], translations[i]);
+    cv::solvePnPRefineLM(corners.mat, corners.image, k, cv::noArray(), rotations[i],
+                         translations[i]);
     // The mat is printed on one side: a camera below it is the mirrored solution.
     if (angles_of(pose_of(rotations[i], translations[i]))[1] <= 0) continue;
     ranked.emplace_back(rms(corners, k, rotations[i], translations[i]), i);
@@ -222,11 +255,16 @@ std::optional<MatSighting> MatFinder::find(const cv::Mat& image, Modality modali
   sighting.error_px = ranked[0].first;
   const Eigen::Vector2d angles = angles_of(pose);
   sighting.position = {angles[0] < 0 ? angles[0] + 360 : angles[0], angles[1], 0, 0};
-  sighting.position.sigma_deg = sigma_deg(corners, k, rotations[best], translations[best], sighting.error_px);
+  sighting.position.sigma_deg =
+      sigma_deg(corners, k, rotations[best], translations[best], sighting.error_px);
   if (ranked.size() > 1 && ranked[1].first < 1.5 * ranked[0].first) {
-    const Eigen::Vector2d other = angles_of(pose_of(rotations[ranked[1].second], translations[ranked[1].second]));
-    sighting.position.sigma_deg += std::hypot(angle_difference_deg(other[0], angles[0]), other[1] - angles[1]) / 2;
+    const Eigen::Vector2d other =
+        angles_of(pose_of(rotations[ranked[1].second], translations[ranked[1].second]));
+    sighting.position.sigma_deg +=
+        std::hypot(angle_difference_deg(other[0], angles[0]), other[1] - angles[1]) / 2;
   }
+  sighting.followed = followed;
+  if (followed) sighting.position.sigma_deg += followed_sigma_deg;
   return sighting;
 }
 

@@ -8,26 +8,28 @@
 #include "capture/guide/coverage.hpp"
 #include "capture/mat/focal_estimate.hpp"
 #include "capture/mat/mat_design.hpp"
+#include "capture/mat/mat_tracker.hpp"
 #include "core/transform.hpp"
 
 namespace orbitfuse {
 
 struct MatFinderOptions {
-  int min_tags = 3;              ///< fewer prove nothing: one false tag could speak alone
-  double max_error_px = 2;       ///< tags further from the common plane are taken for false ones
-  int largest_side_px = 1600;    ///< larger images are reduced for the search; photos have 4000
+  int min_tags = 3;            ///< fewer prove nothing: one false tag could speak alone
+  double max_error_px = 2;     ///< tags further from the common plane are taken for false ones
+  int largest_side_px = 1600;  ///< larger images are reduced for the search; photos have 4000
 
   Status validate() const;
 };
 
 struct MatSighting {
-  OrbitPosition position;        ///< sigma from the fit; the speed is the caller's
+  OrbitPosition position;  ///< sigma from the fit; the speed is the caller's
   Rigid3d cam_from_mat;
   int tags = 0;
-  double error_px = 0;           ///< root mean square, at the image's own size
+  bool followed = false;         ///< by optical flow, not read: sigma is beyond what counts
+  double error_px = 0;  ///< root mean square, at the image's own size
 };
 
-/// Finds the mat in single images and says where the camera stands in the mat's frame. Tags may
+/// Finds the mat in images, given in their order, and says where the camera stands in the mat's frame. Tags may
 /// appear dark on bright or bright on dark (foil can be warmer or colder than paint). The pose is
 /// that of the plane with the least reprojection error (IPPE, Collins and Bartoli, IJCV 2014, then
 /// Levenberg-Marquardt); where the mirrored pose fits nearly as well the sigma says so. The camera
@@ -50,6 +52,7 @@ class MatFinder {
   MatFinderOptions options_;
   std::map<Modality, double> known_focal_px_;
   std::map<Modality, FocalEstimate> estimates_;
+  std::map<Modality, MatTracker> trackers_;
 };
 
 }  // namespace orbitfuse

@@ -14,18 +14,21 @@ namespace {
 struct Paper {
   double width_mm, height_mm;  // 0: as large as the mat
 };
-const std::map<std::string, Paper> papers{{"A4", {210, 297}}, {"A3", {297, 420}}, {"A1", {594, 841}}, {"one", {0, 0}}};
+const std::map<std::string, Paper> papers{
+    {"A4", {210, 297}}, {"A3", {297, 420}}, {"A1", {594, 841}}, {"one", {0, 0}}};
 
-constexpr double margin_mm = 12;   // most printers reach within 5 mm; the rest is for marks
-constexpr double mm = 1000;        // a metre
+constexpr double margin_mm = 12;  // most printers reach within 5 mm; the rest is for marks
+constexpr double mm = 1000;       // a metre
 constexpr int most_tiles = 400;
 
 void marks(PdfPage& page, double w, double h) {
   const double inner = margin_mm, length = 5;
   for (const double x : {inner, inner + w}) {
     for (const double y : {inner, inner + h}) {
-      page.line(x, y < page.height_mm() / 2 ? y - length : y, x, y < page.height_mm() / 2 ? y : y + length);
-      page.line(x < page.width_mm() / 2 ? x - length : x, y, x < page.width_mm() / 2 ? x : x + length, y);
+      page.line(x, y < page.height_mm() / 2 ? y - length : y, x,
+                y < page.height_mm() / 2 ? y : y + length);
+      page.line(x < page.width_mm() / 2 ? x - length : x, y,
+                x < page.width_mm() / 2 ? x : x + length, y);
     }
   }
 }
@@ -51,10 +54,13 @@ Result<std::string> mat_pdf(const MatDesign& design, const std::string& paper) {
   Paper sheet = papers.at(paper);
   if (paper == "one") sheet = {side + 2 * margin_mm, side + 2 * margin_mm};
   // Each tile shows as much of the mat as fits between its margins.
-  const double tile_w = std::min(side, sheet.width_mm - 2 * margin_mm), tile_h = std::min(side, sheet.height_mm - 2 * margin_mm);
-  const int columns = static_cast<int>(std::ceil(side / tile_w - 1e-9)), rows = static_cast<int>(std::ceil(side / tile_h - 1e-9));
+  const double tile_w = std::min(side, sheet.width_mm - 2 * margin_mm),
+               tile_h = std::min(side, sheet.height_mm - 2 * margin_mm);
+  const int columns = static_cast<int>(std::ceil(side / tile_w - 1e-9)),
+            rows = static_cast<int>(std::ceil(side / tile_h - 1e-9));
   if (columns * rows > most_tiles) {
-    return fail(ErrorKind::usage, "mat.paper", fmt::format("{} pages of {}", columns * rows, paper), "use larger paper or \"one\" for a plotter");
+    return fail(ErrorKind::usage, "mat.paper", fmt::format("{} pages of {}", columns * rows, paper),
+                "use larger paper or \"one\" for a plotter");
   }
   const std::vector<MatRectangle> black = black_rectangles(design);
   std::vector<PdfPage> pages;
@@ -73,9 +79,12 @@ Result<std::string> mat_pdf(const MatDesign& design, const std::string& paper) {
       marks(page, tile_w, tile_h);
       if (sheet.width_mm > 150) ruler(page, margin_mm + 8, margin_mm - 8);
       const double top = sheet.height_mm - margin_mm + 6;
-      page.text(margin_mm + 8, top, 3, fmt::format("OrbitFuse mat {:g} m, {} x {} tags{}; row {} of {}, column {} of {}; azimuth 0 is to the right",
-                                                  design.size_m, design.tags_per_side, design.tags_per_side,
-                                                  design.thermal ? ", black = matt paint on foil" : "", row + 1, rows, column + 1, columns));
+      page.text(margin_mm + 8, top, 3,
+                fmt::format("OrbitFuse mat {:g} m, {} x {} tags{}; row {} of {}, column {} of {}; "
+                            "azimuth 0 is to the right",
+                            design.size_m, design.tags_per_side, design.tags_per_side,
+                            design.thermal ? ", black = matt paint on foil" : "", row + 1, rows,
+                            column + 1, columns));
       pages.push_back(std::move(page));
     }
   }

@@ -11,10 +11,11 @@
 namespace orbitfuse {
 
 struct PageOptions {
-  std::string host = "127.0.0.1";  ///< the address to listen on; anything but loopback needs a token
-  int port = 8470;                 ///< 0: any free one
-  std::string token;               ///< empty off loopback: a random one is made
-  bool require_token = false;      ///< on loopback too
+  std::string host =
+      "127.0.0.1";             ///< the address to listen on; anything but loopback needs a token
+  int port = 8470;             ///< 0: any free one
+  std::string token;           ///< empty off loopback: a random one is made
+  bool require_token = false;  ///< on loopback too
 
   Status validate() const;
 };

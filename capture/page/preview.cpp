@@ -19,17 +19,21 @@ constexpr int widest_px = 640;
 cv::Mat reduced(const cv::Mat& image) {
   if (image.cols <= widest_px) return image;
   cv::Mat small;
-  cv::resize(image, small, {widest_px, std::max(1, image.rows * widest_px / image.cols)}, 0, 0, cv::INTER_AREA);
+  cv::resize(image, small, {widest_px, std::max(1, image.rows * widest_px / image.cols)}, 0, 0,
+             cv::INTER_AREA);
   return small;
 }
 
 }  // namespace
 
-Result<Preview> PreviewCache::get(const std::filesystem::path& file, Modality modality, const std::string& palette_name,
+Result<Preview> PreviewCache::get(const std::filesystem::path& file, Modality modality,
+                                  const std::string& palette_name,
                                   std::optional<TemperatureSpan> span) {
   const std::lock_guard lock(mutex_);
-  const std::string key = fmt::format("{} {} {:.2f} {:.2f}", name(modality), palette_name, span ? span->low_k : 0.0, span ? span->high_k : 0.0);
-  if (const auto known = entries_.find(key); known != entries_.end() && Clock::now() - known->second.made < shortest_life) {
+  const std::string key = fmt::format("{} {} {:.2f} {:.2f}", name(modality), palette_name,
+                                      span ? span->low_k : 0.0, span ? span->high_k : 0.0);
+  if (const auto known = entries_.find(key);
+      known != entries_.end() && Clock::now() - known->second.made < shortest_life) {
     return known->second.preview;
   }
   Preview preview;
@@ -49,15 +53,18 @@ Result<Preview> PreviewCache::get(const std::filesystem::path& file, Modality mo
   return preview;
 }
 
-std::optional<double> PreviewCache::kelvin_at(const std::filesystem::path& file, double u, double v) {
+std::optional<double> PreviewCache::kelvin_at(const std::filesystem::path& file, double u,
+                                              double v) {
   if (!(u >= 0 && u < 1 && v >= 0 && v < 1) || file.extension() != ".tiff") return std::nullopt;
   const std::lock_guard lock(mutex_);
-  if (kelvin_.image.empty() || (kelvin_.file != file && Clock::now() - kelvin_.made >= shortest_life)) {
+  if (kelvin_.image.empty() ||
+      (kelvin_.file != file && Clock::now() - kelvin_.made >= shortest_life)) {
     Result<cv::Mat> image = read_thermal_k(file);
     if (!image) return std::nullopt;
     kelvin_ = {file, *std::move(image), Clock::now()};
   }
-  const float value = kelvin_.image.at<float>(static_cast<int>(v * kelvin_.image.rows), static_cast<int>(u * kelvin_.image.cols));
+  const float value = kelvin_.image.at<float>(static_cast<int>(v * kelvin_.image.rows),
+                                              static_cast<int>(u * kelvin_.image.cols));
   return std::isfinite(value) ? std::optional<double>(value) : std::nullopt;
 }
 

@@ -16,7 +16,7 @@ namespace orbitfuse {
 
 struct Preview {
   std::string jpeg;
-  std::optional<TemperatureSpan> span;   ///< thermal with temperatures only
+  std::optional<TemperatureSpan> span;  ///< thermal with temperatures only
 };
 
 /// Small pictures of the newest frames, read back from disk. One camera's frame is read and encoded
@@ -24,8 +24,8 @@ struct Preview {
 class PreviewCache {
  public:
   /// `file`: a recorded frame. `span`: locked by the viewer; else this frame's own.
-  Result<Preview> get(const std::filesystem::path& file, Modality modality, const std::string& palette_name,
-                      std::optional<TemperatureSpan> span);
+  Result<Preview> get(const std::filesystem::path& file, Modality modality,
+                      const std::string& palette_name, std::optional<TemperatureSpan> span);
   /// At a place given as shares of width and height; nothing without a temperature there.
   std::optional<double> kelvin_at(const std::filesystem::path& file, double u, double v);
 

@@ -25,7 +25,8 @@ bool is_temporary(const std::string& name) {
 
 }  // namespace
 
-FolderWatch::FolderWatch(fs::path folder, std::chrono::milliseconds settle, std::chrono::milliseconds rescan)
+FolderWatch::FolderWatch(fs::path folder, std::chrono::milliseconds settle,
+                         std::chrono::milliseconds rescan)
     : folder_(std::move(folder)), settle_(settle), rescan_every_(rescan) {}
 
 FolderWatch::~FolderWatch() { close(); }
@@ -34,10 +35,12 @@ Status FolderWatch::open(bool existing) {
   close();
   std::error_code error;
   if (!fs::is_directory(folder_, error)) {
-    return fail(ErrorKind::input, folder_.string(), "no such folder", "create it, or name the folder where photos arrive");
+    return fail(ErrorKind::input, folder_.string(), "no such folder",
+                "create it, or name the folder where photos arrive");
   }
   fs::directory_iterator readable(folder_, error);
-  if (error) return fail(ErrorKind::input, folder_.string(), error.message(), "check its permissions");
+  if (error)
+    return fail(ErrorKind::input, folder_.string(), error.message(), "check its permissions");
   // Without inotify (none left, no support) the rescan alone still finds every file.
   fd_ = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
   watch();
@@ -47,7 +50,9 @@ Status FolderWatch::open(bool existing) {
 
 bool FolderWatch::watch() {
   if (fd_ < 0) return false;
-  watch_ = inotify_add_watch(fd_, folder_.c_str(), IN_CLOSE_WRITE | IN_MOVED_TO | IN_CREATE | IN_DELETE_SELF | IN_MOVE_SELF);
+  watch_ =
+      inotify_add_watch(fd_, folder_.c_str(),
+                        IN_CLOSE_WRITE | IN_MOVED_TO | IN_CREATE | IN_DELETE_SELF | IN_MOVE_SELF);
   return watch_ >= 0;
 }
 
@@ -64,7 +69,8 @@ void FolderWatch::close() {
 std::map<std::string, FolderWatch::State> FolderWatch::list() const {
   std::map<std::string, State> files;
   std::error_code error;
-  for (fs::directory_iterator entry(folder_, error), end; !error && entry != end; entry.increment(error)) {
+  for (fs::directory_iterator entry(folder_, error), end; !error && entry != end;
+       entry.increment(error)) {
     std::error_code vanished;
     const std::string name = entry->path().filename().string();
     if (is_temporary(name) || !entry->is_regular_file(vanished) || vanished) continue;
@@ -83,8 +89,10 @@ void FolderWatch::read_events() {
       if (event->mask & (IN_DELETE_SELF | IN_MOVE_SELF | IN_IGNORED)) watch_ = -1;
       if (event->len == 0) continue;
       // Somebody writes to it again: not whole until the next close.
-      if (event->mask & (IN_CLOSE_WRITE | IN_MOVED_TO)) closed_.insert(event->name);
-      else if (event->mask & IN_CREATE) closed_.erase(event->name);
+      if (event->mask & (IN_CLOSE_WRITE | IN_MOVED_TO))
+        closed_.insert(event->name);
+      else if (event->mask & IN_CREATE)
+        closed_.erase(event->name);
     }
   }
 }
@@ -103,9 +111,11 @@ std::vector<fs::path> FolderWatch::rescan() {
       continue;
     }
     Candidate& candidate = candidates_[name];
-    if (candidate.since == Clock::time_point{} || !(candidate.state == state)) candidate = {state, Clock::now(), false};
+    if (candidate.since == Clock::time_point{} || !(candidate.state == state))
+      candidate = {state, Clock::now(), false};
     candidate.closed = candidate.closed || closed;
-    if (state.size == 0 || !(candidate.closed || Clock::now() - candidate.since >= settle_)) continue;
+    if (state.size == 0 || !(candidate.closed || Clock::now() - candidate.since >= settle_))
+      continue;
     ready.push_back(folder_ / name);
     told_[name] = state;
     closed_.erase(name);
@@ -126,9 +136,13 @@ std::vector<fs::path> FolderWatch::wait(std::chrono::milliseconds timeout) {
     }
     const auto now = Clock::now();
     if (now >= deadline) return {};
-    const auto pause = std::min<Clock::duration>(deadline - now, std::max<Clock::duration>(last_scan_ + rescan_every_ - now, std::chrono::milliseconds(1)));
+    const auto pause = std::min<Clock::duration>(
+        deadline - now,
+        std::max<Clock::duration>(last_scan_ + rescan_every_ - now, std::chrono::milliseconds(1)));
     pollfd waiting{fd_, POLLIN, 0};
-    ::poll(&waiting, fd_ >= 0 ? 1 : 0, static_cast<int>(std::chrono::duration_cast<std::chrono::milliseconds>(pause).count()) + 1);
+    ::poll(
+        &waiting, fd_ >= 0 ? 1 : 0,
+        static_cast<int>(std::chrono::duration_cast<std::chrono::milliseconds>(pause).count()) + 1);
   }
 }
 

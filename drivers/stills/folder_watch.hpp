@@ -18,7 +18,8 @@ namespace orbitfuse {
 /// hidden or temporary by name ("IMG.jpg.part", ".IMG.jpg.swp") are left alone.
 class FolderWatch {
  public:
-  FolderWatch(std::filesystem::path folder, std::chrono::milliseconds settle, std::chrono::milliseconds rescan);
+  FolderWatch(std::filesystem::path folder, std::chrono::milliseconds settle,
+              std::chrono::milliseconds rescan);
   ~FolderWatch();
   FolderWatch(const FolderWatch&) = delete;
   FolderWatch& operator=(const FolderWatch&) = delete;
@@ -54,7 +55,7 @@ class FolderWatch {
   std::chrono::milliseconds settle_, rescan_every_;
   int fd_ = -1, watch_ = -1;
   bool gone_ = false;
-  std::set<std::string> closed_;             ///< names that the kernel says are whole
+  std::set<std::string> closed_;  ///< names that the kernel says are whole
   std::map<std::string, Candidate> candidates_;
   std::map<std::string, State> told_;
   Clock::time_point last_scan_{};

@@ -17,10 +17,14 @@ constexpr double full_frame_diagonal_mm = 43.2666;
 
 std::string extension_of(const std::string& bytes) {
   switch (image_format(bytes)) {
-    case ImageFormat::jpeg: return ".jpg";
-    case ImageFormat::png: return ".png";
-    case ImageFormat::tiff: return ".tiff";
-    default: return ".bmp";
+    case ImageFormat::jpeg:
+      return ".jpg";
+    case ImageFormat::png:
+      return ".png";
+    case ImageFormat::tiff:
+      return ".tiff";
+    default:
+      return ".bmp";
   }
 }
 
@@ -42,7 +46,8 @@ Result<StillPhoto> read_visible_still(const std::filesystem::path& file) {
   still.camera.model = exif.make.empty() ? exif.model : exif.make + " " + exif.model;
   still.camera.serial = exif.serial;
   if (exif.focal_35mm) still.camera.lens.focal_px = focal_px_of_35mm(*exif.focal_35mm, size);
-  still.key = fmt::format("{}|{}|{}x{}", still.camera.model, exif.focal_mm.value_or(0), size.width, size.height);
+  still.key = fmt::format("{}|{}|{}x{}", still.camera.model, exif.focal_mm.value_or(0), size.width,
+                          size.height);
   return still;
 }
 
@@ -65,7 +70,8 @@ Result<StillPhoto> read_thermal_still(const std::filesystem::path& path, Thermal
     frame.flags.push_back("raw-counts");
     frame.original = file.image;
   }
-  frame.host_time_ns = (file.flir ? file.flir->taken_ns : read_exif(file.bytes).taken_ns).value_or(0);
+  frame.host_time_ns =
+      (file.flir ? file.flir->taken_ns : read_exif(file.bytes).taken_ns).value_or(0);
   still.camera.modality = Modality::thermal;
   if (file.flir) {
     still.camera.model = file.flir->camera_model;
@@ -74,7 +80,8 @@ Result<StillPhoto> read_thermal_still(const std::filesystem::path& path, Thermal
       still.camera.lens.focal_px = 0.5 * size.width / std::tan(0.5 * *fov * std::numbers::pi / 180);
     }
   }
-  still.key = fmt::format("{}|{}x{}|{}", still.camera.model, size.width, size.height, frame.thermal_is_gray);
+  still.key = fmt::format("{}|{}x{}|{}", still.camera.model, size.width, size.height,
+                          frame.thermal_is_gray);
   return still;
 }
 

@@ -11,9 +11,9 @@ namespace orbitfuse {
 
 /// One file as a frame, and the camera that took it as far as the file says.
 struct StillPhoto {
-  Frame frame;          ///< host time from the file's own clock, 0 if it has none
+  Frame frame;  ///< host time from the file's own clock, 0 if it has none
   DeviceInfo camera;
-  std::string key;      ///< same key: same camera, lens and image size
+  std::string key;  ///< same key: same camera, lens and image size
 };
 
 /// Size of the upright image at 35 mm equivalent focal length, in pixels.

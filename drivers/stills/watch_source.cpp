@@ -37,21 +37,25 @@ std::int64_t written_ns(const fs::path& file) {
 }  // namespace
 
 struct WatchSource::Reader {
-  explicit Reader(const WatchOptions& options) : watch(options.folder, options.settle, options.rescan), decoder(import) {}
+  explicit Reader(const WatchOptions& options)
+      : watch(options.folder, options.settle, options.rescan), decoder(import) {}
   FolderWatch watch;
-  ImportOptions import;   ///< outlives the decoder, which refers to it
+  ImportOptions import;  ///< outlives the decoder, which refers to it
   ThermalDecoder decoder;
 };
 
 Status WatchOptions::validate() const {
-  if (folder.empty()) return fail(ErrorKind::usage, "stills.folder", "empty", "name the folder where photos arrive");
+  if (folder.empty())
+    return fail(ErrorKind::usage, "stills.folder", "empty", "name the folder where photos arrive");
   if (settle.count() <= 0 || rescan.count() <= 0 || give_up < settle) {
-    return fail(ErrorKind::usage, "stills.settle", "not positive, or longer than give_up", "must be > 0 and at most give_up");
+    return fail(ErrorKind::usage, "stills.settle", "not positive, or longer than give_up",
+                "must be > 0 and at most give_up");
   }
   return {};
 }
 
-WatchSource::WatchSource(WatchOptions options) : options_(std::move(options)), reader_(std::make_unique<Reader>(options_)) {
+WatchSource::WatchSource(WatchOptions options)
+    : options_(std::move(options)), reader_(std::make_unique<Reader>(options_)) {
   info_.id = options_.device_id;
   info_.modality = options_.modality;
   info_.driver = "stills";
@@ -82,14 +86,16 @@ Delivery WatchSource::event(std::string kind, std::string detail) const {
 Result<Delivery> WatchSource::next(std::chrono::milliseconds timeout) {
   const auto deadline = Clock::now() + timeout;
   while (true) {
-    const auto due = std::find_if(queue_.begin(), queue_.end(), [](const Attempt& a) { return a.next_try <= Clock::now(); });
+    const auto due = std::find_if(queue_.begin(), queue_.end(),
+                                  [](const Attempt& a) { return a.next_try <= Clock::now(); });
     if (due != queue_.end()) {
       Attempt attempt = std::move(*due);
       queue_.erase(due);
       if (std::optional<Delivery> delivery = take(std::move(attempt))) return std::move(*delivery);
       continue;
     }
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
+    const auto left =
+        std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
     if (left.count() <= 0) return Delivery{};
     const auto found = reader_->watch.wait(std::min(left, queue_.empty() ? left : retry_every));
     if (reader_->watch.folder_gone() != gone_told_) {
@@ -108,16 +114,19 @@ Result<Delivery> WatchSource::next(std::chrono::milliseconds timeout) {
 std::optional<Delivery> WatchSource::take(Attempt attempt) {
   const std::string name = attempt.file.filename().string();
   if (!has_image_name(attempt.file)) {
-    return event("ignored", name + ": not a JPEG, PNG, TIFF or BMP (set the camera to one of these)");
+    return event("ignored",
+                 name + ": not a JPEG, PNG, TIFF or BMP (set the camera to one of these)");
   }
   const bool thermal = options_.modality == Modality::thermal;
   const bool radiometric = is_radiometric(attempt.file);
   if (!thermal && radiometric) return event("ignored", name + ": a thermal image, not a photo");
-  Result<StillPhoto> still = thermal ? read_thermal_still(attempt.file, reader_->decoder) : read_visible_still(attempt.file);
+  Result<StillPhoto> still = thermal ? read_thermal_still(attempt.file, reader_->decoder)
+                                     : read_visible_still(attempt.file);
   Delivery delivery;
   if (!still) {
     std::error_code error;
-    if (!fs::exists(attempt.file, error)) return event("ignored", name + ": vanished before it was read");
+    if (!fs::exists(attempt.file, error))
+      return event("ignored", name + ": vanished before it was read");
     if (Clock::now() - attempt.first_try < options_.give_up) {
       attempt.next_try = Clock::now() + retry_every;
       queue_.push_back(std::move(attempt));
@@ -146,13 +155,16 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
       info_.lens = still->camera.lens;
     } else if (still->key != camera_key_) {
       delivery.kind = Delivery::Kind::rejected;
-      delivery.reason = name + ": another camera, lens or image size than the first (give it a folder of its own)";
+      delivery.reason =
+          name +
+          ": another camera, lens or image size than the first (give it a folder of its own)";
       return delivery;
     }
   }
   if (delivery.frame.host_time_ns == 0) delivery.frame.host_time_ns = written_ns(attempt.file);
   delivery.kind = Delivery::Kind::frame;
-  delivery.frame.source = (attempt.file.parent_path().filename() / attempt.file.filename()).string();
+  delivery.frame.source =
+      (attempt.file.parent_path().filename() / attempt.file.filename()).string();
   delivery.frame.flags.push_back("still");
   return delivery;
 }

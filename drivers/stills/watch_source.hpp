@@ -14,14 +14,16 @@
 namespace orbitfuse {
 
 struct WatchOptions {
-  std::filesystem::path folder;         ///< where photos appear: a card, a tether, a phone's sync
-  std::string device_id = "visible0";   ///< key in the session
+  std::filesystem::path folder;        ///< where photos appear: a card, a tether, a phone's sync
+  std::string device_id = "visible0";  ///< key in the session
   Modality modality = Modality::visible;
-  bool existing = false;                ///< also what is there already
-  bool accept_gray = false;             ///< thermal: also 8-bit images, which have no temperatures
-  std::chrono::milliseconds settle{1500};  ///< a file that nobody announces is whole after this calm
+  bool existing = false;     ///< also what is there already
+  bool accept_gray = false;  ///< thermal: also 8-bit images, which have no temperatures
+  std::chrono::milliseconds settle{
+      1500};  ///< a file that nobody announces is whole after this calm
   std::chrono::milliseconds rescan{500};
-  std::chrono::milliseconds give_up{15000};  ///< a file cut off stays unread this long before it is rejected
+  std::chrono::milliseconds give_up{
+      15000};  ///< a file cut off stays unread this long before it is rejected
 
   Status validate() const;
 };
@@ -57,7 +59,7 @@ class WatchSource final : public FrameSource {
   std::unique_ptr<Reader> reader_;
   mutable std::mutex mutex_;
   DeviceInfo info_;
-  std::string camera_key_;              ///< of the first photo; empty before
+  std::string camera_key_;  ///< of the first photo; empty before
   std::deque<Attempt> queue_;
   std::set<std::string> seen_hashes_;
   std::uint64_t next_id_ = 0;

@@ -26,12 +26,18 @@ std::string path_of(libusb_device* device) {
 
 int speed_of(libusb_device* device) {
   switch (libusb_get_device_speed(device)) {
-    case LIBUSB_SPEED_LOW: return 1;
-    case LIBUSB_SPEED_FULL: return 12;
-    case LIBUSB_SPEED_HIGH: return 480;
-    case LIBUSB_SPEED_SUPER: return 5000;
-    case LIBUSB_SPEED_SUPER_PLUS: return 10000;
-    default: return 0;
+    case LIBUSB_SPEED_LOW:
+      return 1;
+    case LIBUSB_SPEED_FULL:
+      return 12;
+    case LIBUSB_SPEED_HIGH:
+      return 480;
+    case LIBUSB_SPEED_SUPER:
+      return 5000;
+    case LIBUSB_SPEED_SUPER_PLUS:
+      return 10000;
+    default:
+      return 0;
   }
 }
 
@@ -43,7 +49,8 @@ bool has_camera_interface(libusb_device* device) {
     for (int a = 0; a < config->interface[i].num_altsetting; ++a) {
       const libusb_interface_descriptor& d = config->interface[i].altsetting[a];
       found = found || d.bInterfaceClass == class_video || d.bInterfaceClass == class_still_image ||
-              (d.bInterfaceClass == class_miscellaneous && d.bInterfaceSubClass == subclass_usb3_vision);
+              (d.bInterfaceClass == class_miscellaneous &&
+               d.bInterfaceSubClass == subclass_usb3_vision);
     }
   }
   libusb_free_config_descriptor(config);
@@ -55,8 +62,10 @@ class LibusbBus final : public UsbBus {
   explicit LibusbBus(libusb_context* context) : context_(context) {
     if (!libusb_has_capability(LIBUSB_CAP_HAS_HOTPLUG)) return;
     const int events = LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED | LIBUSB_HOTPLUG_EVENT_DEVICE_LEFT;
-    hotplug_ = libusb_hotplug_register_callback(context_, events, LIBUSB_HOTPLUG_NO_FLAGS, LIBUSB_HOTPLUG_MATCH_ANY,
-                                                LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY, on_change, this, &handle_) == 0;
+    hotplug_ =
+        libusb_hotplug_register_callback(context_, events, LIBUSB_HOTPLUG_NO_FLAGS,
+                                         LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY,
+                                         LIBUSB_HOTPLUG_MATCH_ANY, on_change, this, &handle_) == 0;
   }
   ~LibusbBus() override {
     if (hotplug_) libusb_hotplug_deregister_callback(context_, handle_);
@@ -100,9 +109,11 @@ class LibusbBus final : public UsbBus {
     }));
     // NOT_FOUND: it came back as another device, which is what a reset may do.
     if (result == 0 || result == LIBUSB_ERROR_NOT_FOUND) return {};
-    return fail(ErrorKind::device, "USB port " + path, libusb_error_name(result),
-                result == LIBUSB_ERROR_ACCESS ? "allow it with a udev rule (MODE=\"0664\", GROUP=\"plugdev\") or replug by hand"
-                                              : "unplug it and plug it in again");
+    return fail(
+        ErrorKind::device, "USB port " + path, libusb_error_name(result),
+        result == LIBUSB_ERROR_ACCESS
+            ? "allow it with a udev rule (MODE=\"0664\", GROUP=\"plugdev\") or replug by hand"
+            : "unplug it and plug it in again");
   }
 
  private:
@@ -111,7 +122,8 @@ class LibusbBus final : public UsbBus {
     libusb_device** devices = nullptr;
     const ssize_t count = libusb_get_device_list(context_, &devices);
     if (count < 0) {
-      return fail(ErrorKind::device, "USB", libusb_error_name(static_cast<int>(count)), "check that /dev/bus/usb exists");
+      return fail(ErrorKind::device, "USB", libusb_error_name(static_cast<int>(count)),
+                  "check that /dev/bus/usb exists");
     }
     for (ssize_t i = 0; i < count; ++i) {
       libusb_device_descriptor descriptor{};
@@ -121,7 +133,8 @@ class LibusbBus final : public UsbBus {
     return {};
   }
 
-  static int LIBUSB_CALL on_change(libusb_context*, libusb_device*, libusb_hotplug_event, void* self) {
+  static int LIBUSB_CALL on_change(libusb_context*, libusb_device*, libusb_hotplug_event,
+                                   void* self) {
     static_cast<LibusbBus*>(self)->changed_ = 1;
     return 0;  // stay registered
   }
@@ -157,7 +170,8 @@ void read_strings(const std::filesystem::path& root, UsbDevice& device) {
 Result<std::unique_ptr<UsbBus>> make_usb_bus() {
   libusb_context* context = nullptr;
   if (const int error = libusb_init(&context); error != 0) {
-    return fail(ErrorKind::unavailable, "USB", libusb_error_name(error), "run on a machine (not a container) with USB");
+    return fail(ErrorKind::unavailable, "USB", libusb_error_name(error),
+                "run on a machine (not a container) with USB");
   }
   return std::unique_ptr<UsbBus>(std::make_unique<LibusbBus>(context));
 }

@@ -16,8 +16,8 @@ namespace orbitfuse::usb {
 struct UsbDevice {
   std::uint16_t vendor = 0, product = 0;
   std::string manufacturer, model, serial;
-  std::string path;        ///< the port, "bus-port.port", e.g. "1-4.2"; stays when it is replugged there
-  int megabit_s = 0;       ///< negotiated speed; a USB 3 camera at 480 hangs on a bad cable
+  std::string path;   ///< the port, "bus-port.port", e.g. "1-4.2"; stays when it is replugged there
+  int megabit_s = 0;  ///< negotiated speed; a USB 3 camera at 480 hangs on a bad cable
   bool is_camera = false;  ///< has a video (UVC), USB3 Vision or still-image (PTP) interface
 
   std::string id() const;  ///< "046d:0825"

@@ -12,12 +12,13 @@ namespace orbitfuse::usb {
 struct UsbChange {
   enum class Kind { arrived, left, moved };  ///< moved: the same hardware in another port
   Kind kind = Kind::arrived;
-  UsbDevice device;          ///< as it is now; of `left` as it was
-  std::string former_path;   ///< of `moved`
+  UsbDevice device;         ///< as it is now; of `left` as it was
+  std::string former_path;  ///< of `moved`
 };
 
 /// What happened between two listings.
-std::vector<UsbChange> changes(const std::vector<UsbDevice>& before, const std::vector<UsbDevice>& after);
+std::vector<UsbChange> changes(const std::vector<UsbDevice>& before,
+                               const std::vector<UsbDevice>& after);
 
 /// Follows the bus by comparing listings, so that no event is missed when two fall together.
 class UsbWatch {

@@ -27,10 +27,12 @@ TEST(Capture, TwoCameraSessionReplaysToTheSameFrames) {
   const Outcome captured = orbitfuse_program({"capture", first, "--driver", tiny, "--json"});
   ASSERT_EQ(captured.code, 0) << captured.err;
   const auto result = captured.result();
-  EXPECT_EQ(result.at("stations").at("visible").at("done"), result.at("stations").at("visible").at("of"));
+  EXPECT_EQ(result.at("stations").at("visible").at("done"),
+            result.at("stations").at("visible").at("of"));
   for (const auto& stream : result.at("streams")) {
     EXPECT_EQ(stream.at("lost"), 0);
-    EXPECT_EQ(stream.at("received").get<int>(), stream.at("last_id").get<int>() - stream.at("first_id").get<int>() + 1);
+    EXPECT_EQ(stream.at("received").get<int>(),
+              stream.at("last_id").get<int>() - stream.at("first_id").get<int>() + 1);
   }
   const Outcome replayed = orbitfuse_program({"capture", second, "--driver", "replay:" + first});
   ASSERT_EQ(replayed.code, 0) << replayed.err;
@@ -53,15 +55,16 @@ TEST(Capture, TwoCameraSessionReplaysToTheSameFrames) {
   EXPECT_EQ(inspected.result().at("thermal").at("has_temperatures"), true);
   // The pipeline takes the copy as it takes the original.
   for (const std::string& session : {first, second}) {
-    const Outcome planned = orbitfuse_program({"run", session, "--out", temp.path / "out", "--dry-run"});
+    const Outcome planned =
+        orbitfuse_program({"run", session, "--out", temp.path / "out", "--dry-run"});
     EXPECT_EQ(planned.code, 0) << planned.err;
   }
 }
 
 TEST(Capture, DryRunWritesNothing) {
   const TempFolder temp;
-  const Outcome outcome =
-      orbitfuse_program({"capture", temp.path / "s", "--visible", tiny, "--dry-run", "--seconds", "0.5", "--json"});
+  const Outcome outcome = orbitfuse_program(
+      {"capture", temp.path / "s", "--visible", tiny, "--dry-run", "--seconds", "0.5", "--json"});
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_GT(outcome.result().at("streams").at(0).at("frames"), 0);
   EXPECT_FALSE(std::filesystem::exists(temp.path / "s"));
@@ -92,7 +95,8 @@ TEST(Capture, RefusesAForeignFolderAndResumesASession) {
 TEST(Mat, IsWrittenWholeOrNotAtAll) {
   const TempFolder temp;
   const std::string file = temp.path / "mat.pdf";
-  const Outcome outcome = orbitfuse_program({"mat", "--out", file, "--size-m", "0.5", "--thermal", "--json"});
+  const Outcome outcome =
+      orbitfuse_program({"mat", "--out", file, "--size-m", "0.5", "--thermal", "--json"});
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ(outcome.result().at("tags_per_side"), 5);
   EXPECT_GT(std::filesystem::file_size(file), 1000u);

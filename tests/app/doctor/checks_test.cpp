@@ -17,7 +17,8 @@ class DoctorTest : public ::testing::Test {
  protected:
   DoctorTest() { machine.root = folder.path(); }
 
-  void interface(const std::string& name, int mtu, int speed, const std::string& flags = "0x1003") const {
+  void interface(const std::string& name, int mtu, int speed,
+                 const std::string& flags = "0x1003") const {
     const std::string at = "sys/class/net/" + name + "/";
     put(folder / (at + "operstate"), "up\n");
     put(folder / (at + "mtu"), std::to_string(mtu) + "\n");
@@ -26,9 +27,11 @@ class DoctorTest : public ::testing::Test {
     put(folder / (at + "type"), "1\n");
   }
   void routes(const std::string& lines) const {
-    put(folder / "proc/net/route", "Iface\tDestination\tGateway \tFlags\tRefCnt\tUse\tMetric\tMask\n" + lines);
+    put(folder / "proc/net/route",
+        "Iface\tDestination\tGateway \tFlags\tRefCnt\tUse\tMetric\tMask\n" + lines);
   }
-  static std::string route(const std::string& name, const std::string& net, const std::string& mask) {
+  static std::string route(const std::string& name, const std::string& net,
+                           const std::string& mask) {
     return name + "\t" + net + "\t00000000\t0001\t0\t0\t0\t" + mask + "\t0\t0\t0\n";
   }
   static std::string remedy(const std::vector<Finding>& list, const std::string& what) {
@@ -60,7 +63,8 @@ TEST_F(DoctorTest, EachNetworkFaultHasItsRemedy) {
   put(folder / "proc/sys/net/core/rmem_max", "212992\n");
   const auto list = check_network(machine);
   const std::string words = remedy(list, "network eth1");
-  for (const char* part : {"169.254", "1000 Mbit/s", "mtu 9000", "multicast on", "rp_filter=2"}) EXPECT_THAT(words, HasSubstr(part));
+  for (const char* part : {"169.254", "1000 Mbit/s", "mtu 9000", "multicast on", "rp_filter=2"})
+    EXPECT_THAT(words, HasSubstr(part));
   EXPECT_THAT(remedy(list, "socket buffers"), HasSubstr("rmem_max=33554432"));
   for (const Finding& f : list) EXPECT_FALSE(f.needed) << f.what;
 }

@@ -24,7 +24,8 @@ TEST(CameraSpec, MistakesNameWhatExists) {
   EXPECT_NE(message("v4l2:/dev/video0,rat=15").find("rate"), std::string::npos);
   EXPECT_NE(message("replay:x,speed").find("key=value"), std::string::npos);
   EXPECT_EQ(parse_camera_spec("").error().kind, ErrorKind::usage);
-  for (const char* bad : {"v4l2,size=1280", "v4l2,size=ax7", "v4l2,size=0x0", "v4l2,size=1e9x1e9"}) {
+  for (const char* bad :
+       {"v4l2,size=1280", "v4l2,size=ax7", "v4l2,size=0x0", "v4l2,size=1e9x1e9"}) {
     EXPECT_FALSE(size(*parse_camera_spec(bad), {})) << bad;
   }
   for (const char* bad : {"v4l2,rate=fast", "v4l2,rate=-1", "v4l2,rate=nan", "v4l2,rate=15Hz"}) {
@@ -34,20 +35,24 @@ TEST(CameraSpec, MistakesNameWhatExists) {
 
 TEST(OpenCameras, WhatCannotBeOpenedIsSaidBeforeAnythingRuns) {
   Cameras cameras;
-  const auto add = [&](const char* text) { return add_cameras(*parse_camera_spec(text), Modality::thermal, {}, cameras); };
+  const auto add = [&](const char* text) {
+    return add_cameras(*parse_camera_spec(text), Modality::thermal, {}, cameras);
+  };
   EXPECT_EQ(add("replay:/does/not/exist").error().kind, ErrorKind::input);
   EXPECT_NE(add("replay").error().message().find("replay:SESSION_FOLDER"), std::string::npos);
   EXPECT_EQ(add("v4l2:video0").error().kind, ErrorKind::usage);
   const Status profile = add("aravis,profile=flir-t1000");
   ASSERT_FALSE(profile);
-  EXPECT_NE(profile.error().remedy.find("flir-ax5"), std::string::npos) << profile.error().message();
+  EXPECT_NE(profile.error().remedy.find("flir-ax5"), std::string::npos)
+      << profile.error().message();
   EXPECT_FALSE(add("synthetic,spacing=31"));
   EXPECT_TRUE(cameras.sources.empty());
 }
 
 TEST(OpenCameras, ReplayKnowsTheLoopsOfItsStations) {
   Cameras cameras;
-  const auto spec = parse_camera_spec(std::string("replay:") + ORBITFUSE_SOURCE_DIR "/replay_data/car");
+  const auto spec =
+      parse_camera_spec(std::string("replay:") + ORBITFUSE_SOURCE_DIR "/replay_data/car");
   ASSERT_TRUE(add_cameras(*spec, Modality::visible, {}, cameras));
   ASSERT_TRUE(cameras.plan);
   EXPECT_EQ(cameras.plan->sectors_per_loop(), 12);

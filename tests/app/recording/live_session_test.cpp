@@ -76,10 +76,13 @@ TEST(LiveSession, TenViewersCostNoFrame) {
   viewers.clear();
   ASSERT_TRUE(ending) << ending.error().message();
   const StreamStatus stream = recording.status().at(0);
-  std::printf("%.0f s: %llu received, %llu missing, %llu rejected, %llu dropped; %d states and %d previews served\n", options.seconds,
-              static_cast<unsigned long long>(stream.received), static_cast<unsigned long long>(stream.missing),
-              static_cast<unsigned long long>(stream.rejected), static_cast<unsigned long long>(stream.dropped), states.load(),
-              previews.load());
+  std::printf(
+      "%.0f s: %llu received, %llu missing, %llu rejected, %llu dropped; %d states and %d previews "
+      "served\n",
+      options.seconds, static_cast<unsigned long long>(stream.received),
+      static_cast<unsigned long long>(stream.missing),
+      static_cast<unsigned long long>(stream.rejected),
+      static_cast<unsigned long long>(stream.dropped), states.load(), previews.load());
   EXPECT_EQ(stream.lost, 0u);
   EXPECT_GT(static_cast<double>(stream.received), 25 * options.seconds);
   EXPECT_GT(previews, 10);
@@ -108,10 +111,12 @@ class WalkingCamera final : public FrameSource {
     std::this_thread::sleep_for(60ms);
     const auto station = static_cast<double>(id_ / 8), phase = static_cast<double>(id_ % 8);
     const double azimuth = 30 * station + (phase < 5 ? 0 : 8 * (phase - 4));
-    const cv::Mat view = test::view_of_mat(mat_, design_.size_m, camera_, test::orbit_pose(azimuth, 30, 1.0));
+    const cv::Mat view =
+        test::view_of_mat(mat_, design_.size_m, camera_, test::orbit_pose(azimuth, 30, 1.0));
     delivery.kind = Delivery::Kind::frame;
     delivery.frame.id = id_++;
-    delivery.frame.host_time_ns = static_cast<std::int64_t>(1.7e18) + static_cast<std::int64_t>(delivery.frame.id) * 250'000'000;
+    delivery.frame.host_time_ns = static_cast<std::int64_t>(1.7e18) +
+                                  static_cast<std::int64_t>(delivery.frame.id) * 250'000'000;
     cv::cvtColor(view, delivery.frame.pixels, cv::COLOR_GRAY2BGR);
     return delivery;
   }
@@ -136,11 +141,13 @@ TEST(LiveSession, GuidedWalkLeavesItsStationsInTheSession) {
   std::vector<std::unique_ptr<FrameSource>> sources;
   sources.push_back(std::make_unique<WalkingCamera>());
   const auto mat = std::make_shared<MatFinder>(MatDesign{});
-  Recording recording(std::move(sources), options, [mat](const cv::Mat& image, Modality modality) -> std::optional<OrbitPosition> {
-    const auto sighting = mat->find(image, modality);
-    if (!sighting) return std::nullopt;
-    return sighting->position;
-  });
+  Recording recording(
+      std::move(sources), options,
+      [mat](const cv::Mat& image, Modality modality) -> std::optional<OrbitPosition> {
+        const auto sighting = mat->find(image, modality);
+        if (!sighting) return std::nullopt;
+        return sighting->position;
+      });
   ASSERT_TRUE(recording.prepare());
   const auto ending = recording.run(nullptr);
   ASSERT_TRUE(ending) << ending.error().message();

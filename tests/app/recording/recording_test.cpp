@@ -12,15 +12,18 @@ namespace {
 
 using test::ScriptedSource;
 
-std::vector<std::unique_ptr<FrameSource>> one_camera(std::uint64_t first, std::uint64_t count, const char* id = "thermal0") {
+std::vector<std::unique_ptr<FrameSource>> one_camera(std::uint64_t first, std::uint64_t count,
+                                                     const char* id = "thermal0") {
   std::deque<Delivery> script;
-  for (std::uint64_t i = 0; i < count; ++i) script.push_back(test::frame_delivery(first + i, test::thermal_pixels()));
+  for (std::uint64_t i = 0; i < count; ++i)
+    script.push_back(test::frame_delivery(first + i, test::thermal_pixels()));
   std::vector<std::unique_ptr<FrameSource>> sources;
   sources.push_back(std::make_unique<ScriptedSource>(id, Modality::thermal, std::move(script)));
   return sources;
 }
 
-Result<Ending> record(std::vector<std::unique_ptr<FrameSource>> sources, const RecordingOptions& options) {
+Result<Ending> record(std::vector<std::unique_ptr<FrameSource>> sources,
+                      const RecordingOptions& options) {
   Recording recording(std::move(sources), options);
   ORBITFUSE_TRY(recording.prepare());
   return recording.run(nullptr);
@@ -41,7 +44,8 @@ TEST(Recording, ResumeGoesOnWithTheIdsOfTheSameCamera) {
   ASSERT_EQ(session->streams.size(), 2u);
   EXPECT_EQ(session->streams[0].last_sequence, 11u);
   EXPECT_EQ(session->streams[1].first_sequence, 12u);
-  for (const StreamRecord& s : session->streams) EXPECT_EQ(s.received + s.lost, s.last_sequence - s.first_sequence + 1);
+  for (const StreamRecord& s : session->streams)
+    EXPECT_EQ(s.received + s.lost, s.last_sequence - s.first_sequence + 1);
 }
 
 TEST(Recording, AnotherCameraGetsItsOwnName) {
@@ -50,7 +54,8 @@ TEST(Recording, AnotherCameraGetsItsOwnName) {
   options.session = folder / "s";
   ASSERT_TRUE(record(one_camera(0, 2), options));
   options.resume = true;
-  auto other = std::make_unique<ScriptedSource>("thermal0", Modality::visible, std::deque<Delivery>{});
+  auto other =
+      std::make_unique<ScriptedSource>("thermal0", Modality::visible, std::deque<Delivery>{});
   std::vector<std::unique_ptr<FrameSource>> sources;
   sources.push_back(std::move(other));
   ASSERT_TRUE(record(std::move(sources), options));
@@ -116,7 +121,8 @@ TEST(Rehearsal, CountsAndWritesNothing) {
   std::deque<Delivery> script;
   script.push_back(test::frame_delivery(10, test::thermal_pixels()));
   script.push_back(test::rejected_delivery(14, "short"));
-  sources.push_back(std::make_unique<ScriptedSource>("thermal1", Modality::thermal, std::move(script)));
+  sources.push_back(
+      std::make_unique<ScriptedSource>("thermal1", Modality::thermal, std::move(script)));
   const auto list = rehearse(sources, 5);
   ASSERT_TRUE(list) << list.error().message();
   EXPECT_EQ((*list)[0].frames, 3u);

@@ -34,10 +34,12 @@ class LiveGuideTest : public ::testing::Test {
     frame.host_time_ns = static_cast<std::int64_t>(1e18 + time_s * 1e9);
     frame.tracking = true;
     frame.pixels = cv::Mat(32, 32, CV_8UC1, cv::Scalar(level));
-    for (int i = 0; i < 32; ++i) frame.pixels.at<std::uint8_t>(i, i) = static_cast<std::uint8_t>(level + (blurred ? 0 : 60));
+    for (int i = 0; i < 32; ++i)
+      frame.pixels.at<std::uint8_t>(i, i) = static_cast<std::uint8_t>(level + (blurred ? 0 : 60));
     if (blurred) {
       for (int y = 0; y < 32; ++y) {
-        for (int x = 0; x < 32; ++x) frame.pixels.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(level + y);
+        for (int x = 0; x < 32; ++x)
+          frame.pixels.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(level + y);
       }
     }
     return *writer->append("visible0", frame);

@@ -23,7 +23,8 @@ cv::Mat mat_image() {
 }
 
 cv::Mat view(double azimuth_deg, double elevation_deg, double distance_m = 1.0) {
-  return view_of_mat(mat_image(), design.size_m, camera, orbit_pose(azimuth_deg, elevation_deg, distance_m));
+  return view_of_mat(mat_image(), design.size_m, camera,
+                     orbit_pose(azimuth_deg, elevation_deg, distance_m));
 }
 
 TEST(MatFinder, AzimuthAndElevationWithinADegree) {
@@ -33,7 +34,8 @@ TEST(MatFinder, AzimuthAndElevationWithinADegree) {
     for (const double azimuth : {3.0, 140.0, 275.0}) {
       const auto found = finder.find(view(azimuth, elevation), Modality::visible);
       ASSERT_TRUE(found) << azimuth << " " << elevation;
-      EXPECT_LE(std::abs(angle_difference_deg(found->position.azimuth_deg, azimuth)), 0.5) << azimuth << " " << elevation;
+      EXPECT_LE(std::abs(angle_difference_deg(found->position.azimuth_deg, azimuth)), 0.5)
+          << azimuth << " " << elevation;
       EXPECT_NEAR(found->position.elevation_deg, elevation, 1.0) << azimuth;
       EXPECT_LT(found->position.sigma_deg, 1);
       EXPECT_GT(found->position.sigma_deg, 0);
@@ -96,7 +98,8 @@ TEST(MatFinder, LargePhotosAreReducedNotMisread) {
   options.largest_side_px = 800;
   MatFinder finder(design, options);
   finder.set_focal_px(Modality::visible, photo.fx);
-  const auto found = finder.find(view_of_mat(mat_image(), design.size_m, photo, orbit_pose(310, 30, 1.0)), Modality::visible);
+  const auto found = finder.find(
+      view_of_mat(mat_image(), design.size_m, photo, orbit_pose(310, 30, 1.0)), Modality::visible);
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->position.azimuth_deg, 310, 0.5);
 }
@@ -121,6 +124,33 @@ TEST(MatFinder, MirroredMatIsNotTakenForTheMat) {
   cv::Mat mirrored;
   cv::flip(view(60, 40), mirrored, 1);
   EXPECT_FALSE(finder.find(mirrored, Modality::visible));
+}
+
+TEST(MatFinder, FollowsTheMatWhereItsTagsCannotBeRead) {
+  MatFinder finder(design);
+  finder.set_focal_px(Modality::visible, camera.fx);
+  ASSERT_TRUE(finder.find(view(50, 35), Modality::visible));
+  // Blurred just so far that nothing can be read.
+  cv::Mat soft;
+  for (double sigma = 1; sigma < 6; sigma += 0.25) {
+    cv::GaussianBlur(view(50.5, 35), soft, {}, sigma);
+    MatFinder fresh(design);
+    fresh.set_focal_px(Modality::visible, camera.fx);
+    if (!fresh.find(soft, Modality::visible)) break;
+  }
+  const auto followed = finder.find(soft, Modality::visible);
+  ASSERT_TRUE(followed);
+  EXPECT_TRUE(followed->followed);
+  EXPECT_NEAR(followed->position.azimuth_deg, 50.5, 2);
+  // It steers, but proves no station.
+  Coverage coverage(OrbitPlan{});
+  FrameAssessment frame;
+  frame.file = "x";
+  frame.sharpness = 1;
+  frame.position = followed->position;
+  EXPECT_EQ(coverage.add(frame), Refusal::position_unsure);
+  EXPECT_FALSE(finder.find(cv::Mat(480, 640, CV_8UC1, cv::Scalar(9)), Modality::visible));
+  EXPECT_FALSE(finder.find(soft, Modality::visible)) << "once lost it has to be read again";
 }
 
 TEST(FocalEstimate, FrontalViewsSayNothing) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The guide on a rendered walk of three loops: changing speed, motion blur, stations that are missed
-// and made up for later.
+// The guide on a rendered walk of three loops: changing speed, motion blur, stations that are
+// missed and made up for later.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -52,7 +52,8 @@ TEST(MatOrbit, EverySectorIsFoundAndNoneFalsely) {
   finder.set_focal_px(Modality::visible, camera.fx);
   std::vector<Step> steps;
   for (const double elevation : {10.0, 30.0, 55.0}) {
-    for (const std::set<int>& missed : {std::set<int>{2, 7, 8}, std::set<int>{0, 1, 3, 4, 5, 6, 9, 10, 11}}) {
+    for (const std::set<int>& missed :
+         {std::set<int>{2, 7, 8}, std::set<int>{0, 1, 3, 4, 5, 6, 9, 10, 11}}) {
       const auto loop = walk(elevation, missed, steps.empty() ? 0 : steps.back().time_s + 3);
       steps.insert(steps.end(), loop.begin(), loop.end());
     }
@@ -63,7 +64,8 @@ TEST(MatOrbit, EverySectorIsFoundAndNoneFalsely) {
   int found = 0, false_green = 0;
   for (std::size_t i = 0; i < steps.size(); ++i) {
     const Step& step = steps[i];
-    cv::Mat image = test::view_of_mat(mat, design.size_m, camera, test::orbit_pose(step.azimuth_deg, step.elevation_deg, 1.0));
+    cv::Mat image = test::view_of_mat(mat, design.size_m, camera,
+                                      test::orbit_pose(step.azimuth_deg, step.elevation_deg, 1.0));
     // 1/60 s of motion across the image.
     const int blur_px = static_cast<int>(step.speed_deg_s / 60 * camera.fx * 0.3 / 57.3);
     if (blur_px > 1) cv::blur(image, image, {blur_px, 1});
@@ -73,23 +75,28 @@ TEST(MatOrbit, EverySectorIsFoundAndNoneFalsely) {
     frame.rank = sharpness;
     if (const auto sighting = finder.find(image, Modality::visible)) {
       ++found;
-      worst_deg = std::max(worst_deg, std::abs(angle_difference_deg(sighting->position.azimuth_deg, step.azimuth_deg)));
+      worst_deg = std::max(worst_deg, std::abs(angle_difference_deg(sighting->position.azimuth_deg,
+                                                                    step.azimuth_deg)));
       frame.position = sighting->position;
       frame.position->speed_deg_s = std::numeric_limits<double>::infinity();
       if (before && step.time_s - before_s < 1) {
-        frame.position->speed_deg_s = angle_difference_deg(frame.position->azimuth_deg, before->azimuth_deg) / (step.time_s - before_s);
+        frame.position->speed_deg_s =
+            angle_difference_deg(frame.position->azimuth_deg, before->azimuth_deg) /
+            (step.time_s - before_s);
       }
       before = sighting->position;
       before_s = step.time_s;
     }
     frame.sharpness = reference.relative(sharpness, frame.position);
     if (coverage.add(frame) == Refusal::none) {
-      const double off = std::abs(angle_difference_deg(step.azimuth_deg, 30 * std::round(step.azimuth_deg / 30)));
+      const double off =
+          std::abs(angle_difference_deg(step.azimuth_deg, 30 * std::round(step.azimuth_deg / 30)));
       if (off > plan.azimuth_tolerance_deg || step.speed_deg_s > 2.5) ++false_green;
     }
   }
-  std::printf("%zu frames, mat found in %d, worst azimuth error %.3f deg, %d of 36 sectors, %d false\n", steps.size(), found, worst_deg,
-              coverage.done_count(Modality::visible), false_green);
+  std::printf(
+      "%zu frames, mat found in %d, worst azimuth error %.3f deg, %d of 36 sectors, %d false\n",
+      steps.size(), found, worst_deg, coverage.done_count(Modality::visible), false_green);
   EXPECT_LE(worst_deg, 1);
   EXPECT_EQ(coverage.done_count(Modality::visible), 36);
   EXPECT_EQ(false_green, 0);

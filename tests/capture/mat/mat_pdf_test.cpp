@@ -36,13 +36,15 @@ std::vector<Page> read_pdf(const std::string& file) {
     const std::string head = std::to_string(i) + " 0 obj";
     EXPECT_EQ(file.compare(std::stoul(offset), head.size(), head), 0) << i;
   }
-  const std::regex box(R"(MediaBox \[0 0 ([\d.]+) ([\d.]+)\])"), stream(R"(Length (\d+) >>\nstream\n)");
+  const std::regex box(R"(MediaBox \[0 0 ([\d.]+) ([\d.]+)\])"),
+      stream(R"(Length (\d+) >>\nstream\n)");
   for (std::sregex_iterator it(file.begin(), file.end(), box), end; it != end; ++it) {
     pages.push_back({std::stod((*it)[1]), std::stod((*it)[2]), {}});
   }
   std::size_t page = 0;
   for (std::sregex_iterator it(file.begin(), file.end(), stream), end; it != end; ++it, ++page) {
-    const auto at = static_cast<std::size_t>(it->position() + it->length()), length = std::stoul((*it)[1]);
+    const auto at = static_cast<std::size_t>(it->position() + it->length()),
+               length = std::stoul((*it)[1]);
     EXPECT_EQ(file.compare(at + length, 9, "endstream"), 0);
     std::istringstream lines(file.substr(at, length));
     for (std::string line; std::getline(lines, line);) {
@@ -73,7 +75,9 @@ TEST(MatPdf, OnePageHoldsTheMatAtItsTrueSize) {
   const Camera camera = Camera::from_fov(640, 480, 50);
   MatFinder finder(design);
   finder.set_focal_px(Modality::visible, camera.fx);
-  const auto found = finder.find(test::view_of_mat(page, design.size_m, camera, test::orbit_pose(40, 45, 1)), Modality::visible);
+  const auto found =
+      finder.find(test::view_of_mat(page, design.size_m, camera, test::orbit_pose(40, 45, 1)),
+                  Modality::visible);
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->position.azimuth_deg, 40, 0.5);
   EXPECT_NEAR(found->position.elevation_deg, 45, 1);

@@ -14,14 +14,16 @@ cv::Mat printed_mat(const std::vector<MatRectangle>& black, double size_m, doubl
   for (const MatRectangle& r : black) {
     const int left = px(r.left + size_m / 2), right = px(r.left + r.width + size_m / 2);
     const int top = px(size_m / 2 - r.bottom - r.height), bottom = px(size_m / 2 - r.bottom);
-    mat(cv::Range(std::max(0, top), std::min(side, bottom)), cv::Range(std::max(0, left), std::min(side, right))) = 25;
+    mat(cv::Range(std::max(0, top), std::min(side, bottom)),
+        cv::Range(std::max(0, left), std::min(side, right))) = 25;
   }
   return mat;
 }
 
 Rigid3d orbit_pose(double azimuth_deg, double elevation_deg, double distance_m) {
   const double a = azimuth_deg * std::numbers::pi / 180, e = elevation_deg * std::numbers::pi / 180;
-  const Eigen::Vector3d eye = distance_m * Eigen::Vector3d(std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e));
+  const Eigen::Vector3d eye = distance_m * Eigen::Vector3d(std::cos(e) * std::cos(a),
+                                                           std::cos(e) * std::sin(a), std::sin(e));
   const Eigen::Vector3d z = -eye.normalized(), x = z.cross(Eigen::Vector3d::UnitZ()).normalized();
   Eigen::Matrix3d r;
   r << x.transpose(), z.cross(x).transpose(), z.transpose();
@@ -29,7 +31,8 @@ Rigid3d orbit_pose(double azimuth_deg, double elevation_deg, double distance_m) 
   return {q, -(q * eye)};
 }
 
-cv::Mat view_of_mat(const cv::Mat& mat, double size_m, const Camera& camera, const Rigid3d& cam_from_mat) {
+cv::Mat view_of_mat(const cv::Mat& mat, double size_m, const Camera& camera,
+                    const Rigid3d& cam_from_mat) {
   // Each pixel is a mean of 3 x 3 rays cut with the mat's plane.
   constexpr int n = 3;
   const Eigen::Vector3d eye = camera_center(cam_from_mat);

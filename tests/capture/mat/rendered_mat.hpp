@@ -17,6 +17,7 @@ cv::Mat printed_mat(const std::vector<MatRectangle>& black, double size_m, doubl
 Rigid3d orbit_pose(double azimuth_deg, double elevation_deg, double distance_m);
 
 /// Antialiased view of the printed mat (side `size_m`) lying on grey ground, CV_8UC1.
-cv::Mat view_of_mat(const cv::Mat& mat, double size_m, const Camera& camera, const Rigid3d& cam_from_mat);
+cv::Mat view_of_mat(const cv::Mat& mat, double size_m, const Camera& camera,
+                    const Rigid3d& cam_from_mat);
 
 }  // namespace orbitfuse::test

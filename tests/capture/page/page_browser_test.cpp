@@ -19,15 +19,20 @@ struct Shown {
   int green = 0, magenta = 0;
 };
 
-/// A screenshot after two seconds of page time, and how many pixels have the colours of done sectors
-/// and of the picture.
-Shown screenshot(const std::string& url, const std::string& size, const std::filesystem::path& folder) {
+/// A screenshot after two seconds of page time, and how many pixels have the colours of done
+/// sectors and of the picture.
+Shown screenshot(const std::string& url, const std::string& size,
+                 const std::filesystem::path& folder) {
   const auto file = folder / "shot.png";
   std::filesystem::remove(file);
-  const std::string command = "timeout 60 chromium --headless --no-sandbox --disable-gpu --disable-dev-shm-usage --no-first-run "
-                              "--disable-background-networking --host-resolver-rules='MAP * ~NOTFOUND, EXCLUDE 127.0.0.1' "
-                              "--user-data-dir='" + (folder / "profile").string() + "' --hide-scrollbars --window-size=" + size +
-                              " --virtual-time-budget=3000 --screenshot='" + file.string() + "' '" + url + "' > /dev/null 2>&1";
+  const std::string command =
+      "timeout 60 chromium --headless --no-sandbox --disable-gpu --disable-dev-shm-usage "
+      "--no-first-run "
+      "--disable-background-networking --host-resolver-rules='MAP * ~NOTFOUND, EXCLUDE 127.0.0.1' "
+      "--user-data-dir='" +
+      (folder / "profile").string() + "' --hide-scrollbars --window-size=" + size +
+      " --virtual-time-budget=3000 --screenshot='" + file.string() + "' '" + url +
+      "' > /dev/null 2>&1";
   EXPECT_EQ(std::system(command.c_str()), 0);
   Shown shown;
   const auto image = read_visible(file);
@@ -63,7 +68,9 @@ class BrowserTest : public ::testing::Test {
       for (int i = 0; i < done; ++i) state.sectors[static_cast<std::size_t>(i)].file = {"v", "t"};
       return state;
     };
-    hooks.latest = [this](Modality modality) { return modality == Modality::visible ? picture : std::filesystem::path(); };
+    hooks.latest = [this](Modality modality) {
+      return modality == Modality::visible ? picture : std::filesystem::path();
+    };
     server = std::make_unique<PageServer>(options, hooks);
     ASSERT_TRUE(server->start());
   }

@@ -58,7 +58,9 @@ class PageTest : public ::testing::Test {
     options.port = 0;
     PageHooks hooks;
     hooks.state = some_state;
-    hooks.latest = [this](Modality modality) { return modality == Modality::visible ? visible : thermal; };
+    hooks.latest = [this](Modality modality) {
+      return modality == Modality::visible ? visible : thermal;
+    };
     hooks.stop = [this] { ++stops; };
     server = std::make_unique<PageServer>(options, hooks);
     const Status status = server->start();
@@ -76,7 +78,8 @@ TEST_F(PageTest, PageAsksNobodyElse) {
   const auto page = client().Get("/");
   ASSERT_TRUE(page);
   EXPECT_EQ(page->status, 200);
-  for (const char* outside : {"http:", "https:", "//cdn", "src=\"//", "url(", "@import", "ws:", "<link"}) {
+  for (const char* outside :
+       {"http:", "https:", "//cdn", "src=\"//", "url(", "@import", "ws:", "<link"}) {
     EXPECT_THAT(page->body, Not(HasSubstr(outside)));
   }
   EXPECT_THAT(page->get_header_value("Content-Security-Policy"), HasSubstr("default-src 'none'"));
@@ -108,8 +111,10 @@ TEST_F(PageTest, TokenIsAskedForEverything) {
   options.token = "right-token-1";
   options.require_token = true;
   serve(options);
-  const httplib::Headers wrong{{"X-Token", "wrong-token-1"}, {"X-OrbitFuse", "1"}}, right{{"X-Token", "right-token-1"}, {"X-OrbitFuse", "1"}};
-  for (const char* path : {"/", "/state", "/preview/visible", "/temperature?u=0&v=0", "/nonsense"}) {
+  const httplib::Headers wrong{{"X-Token", "wrong-token-1"}, {"X-OrbitFuse", "1"}},
+      right{{"X-Token", "right-token-1"}, {"X-OrbitFuse", "1"}};
+  for (const char* path :
+       {"/", "/state", "/preview/visible", "/temperature?u=0&v=0", "/nonsense"}) {
     EXPECT_EQ(client().Get(path)->status, 401) << path;
     EXPECT_EQ(client().Get(path, wrong)->status, 401) << path;
     EXPECT_NE(client().Get(path, right)->status, 401) << path;
@@ -142,7 +147,8 @@ TEST_F(PageTest, OtherSitesCannotPressItsButtons) {
   EXPECT_EQ(client().Get("/state", {{"Host", "evil.example:80"}})->status, 403);
   EXPECT_EQ(client().Get("/state", {{"Host", "localhost:80"}})->status, 200);
   EXPECT_EQ(client().Get("/state", {{"Host", "[::1]:80"}})->status, 200);
-  EXPECT_EQ(client().Post("/start", {{"X-OrbitFuse", "1"}}, "", "text/plain")->status, 404);  // no such hook
+  EXPECT_EQ(client().Post("/start", {{"X-OrbitFuse", "1"}}, "", "text/plain")->status,
+            404);  // no such hook
 }
 
 TEST_F(PageTest, PreviewsAndTemperatures) {
@@ -171,8 +177,12 @@ TEST_F(PageTest, PreviewsAndTemperatures) {
   EXPECT_GT(ramp.at<cv::Vec3b>(20, 62)[0], 225);
   const auto own_span = client().Get("/preview/thermal");
   EXPECT_NEAR(std::stod(own_span->get_header_value("X-Span-High")), 343, 2);
-  EXPECT_NEAR(nlohmann::json::parse(client().Get("/temperature?u=0.5&v=0.5")->body).at("kelvin").get<double>(), 312, 0.02);
-  for (const char* bad : {"/temperature", "/temperature?u=2&v=0", "/temperature?u=nan&v=0", "/temperature?u=x&v=0", "/preview/thermal?palette=mud"}) {
+  EXPECT_NEAR(nlohmann::json::parse(client().Get("/temperature?u=0.5&v=0.5")->body)
+                  .at("kelvin")
+                  .get<double>(),
+              312, 0.02);
+  for (const char* bad : {"/temperature", "/temperature?u=2&v=0", "/temperature?u=nan&v=0",
+                          "/temperature?u=x&v=0", "/preview/thermal?palette=mud"}) {
     EXPECT_EQ(client().Get(bad)->status, 400) << bad;
   }
   EXPECT_EQ(client().Get("/preview/../state")->status, 404);

@@ -36,7 +36,9 @@ class WatchTest : public ::testing::Test {
     options.give_up = 300ms;
   }
 
-  void put(const std::string& name, const std::string& bytes) const { std::ofstream(folder / name, std::ios::binary) << bytes; }
+  void put(const std::string& name, const std::string& bytes) const {
+    std::ofstream(folder / name, std::ios::binary) << bytes;
+  }
 
   /// The next frame, rejection or event.
   static Delivery soon(FrameSource& source) {
@@ -173,7 +175,8 @@ TEST_F(WatchTest, RadiometricJpegFromACameraBringsItsModel) {
   const fs::path files = testing::shared_data() / "rjpeg";
   fs::path sample;
   std::error_code none;
-  for (fs::recursive_directory_iterator entry(files, none), end; !none && entry != end; entry.increment(none)) {
+  for (fs::recursive_directory_iterator entry(files, none), end; !none && entry != end;
+       entry.increment(none)) {
     if (sample.empty() && entry->path().extension() == ".jpg") sample = entry->path();
   }
   if (sample.empty()) GTEST_SKIP() << "the shared radiometric JPEGs are not here";

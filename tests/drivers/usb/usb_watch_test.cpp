@@ -31,7 +31,8 @@ class FakeBus final : public UsbBus {
   }
   void wait(std::chrono::milliseconds) override { ++waits; }
   Status reset(const std::string& path) override {
-    if (forbidden) return fail(ErrorKind::device, "USB port " + path, "LIBUSB_ERROR_ACCESS", "udev rule");
+    if (forbidden)
+      return fail(ErrorKind::device, "USB port " + path, "LIBUSB_ERROR_ACCESS", "udev rule");
     resets.push_back(path);
     resetting = devices.front();
     devices.erase(devices.begin());
