@@ -33,11 +33,14 @@ DepthView prepare_view(const cv::Mat& image, const Camera& camera, const Rigid3d
   cv::Mat gray = image;
   if (image.channels() == 3) cv::cvtColor(image, gray, cv::COLOR_BGR2GRAY);
   DepthView view;
-  const int width = std::min(width_px, camera.width);
+  // As many pixels as a 4:3 map of that width: a portrait format isn't worth more.
+  const double even = width_px * std::sqrt(0.75 * camera.width / camera.height);
+  const int width = std::clamp(static_cast<int>(std::lround(std::min<double>(width_px, even))), 16,
+                               std::max(16, camera.width));
   const int height = std::max(
       1, static_cast<int>(std::lround(static_cast<double>(camera.height) * width / camera.width)));
   Camera from = camera;
-  if (width < camera.width) {
+  if (width != camera.width) {
     cv::resize(gray, gray, {width, height}, 0, 0, cv::INTER_AREA);
     from = camera.scaled_to(width, height);
   }

@@ -8,7 +8,7 @@
 namespace orbitfuse::depth {
 
 struct DepthOptions {
-  /// Width of the depth maps. Geometry is smoother than texture: beyond this it costs more than it
+  /// Width of the depth maps (4:3; other formats get as many pixels). Geometry is smoother than texture: beyond this it costs more than it
   /// gives.
   int width_px = 400;
   int neighbours = 5;  ///< views each view is matched with
