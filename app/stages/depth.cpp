@@ -12,8 +12,8 @@ namespace {
 using pipeline::StageContext;
 using pipeline::StageOutput;
 
-/// The views that train, and where they stand among all: held-out views must not shape the geometry
-/// they measure.
+/// The views that train, and where they stand among all: held-out views are not matched, so that
+/// the geometry they measure comes from the others (their poses and points come from all).
 struct TrainingViews {
   Reconstruction model;
   std::vector<int> index;

@@ -9,7 +9,7 @@
 namespace orbitfuse::depth {
 
 /// Keeps depths that match well and that other views confirm: there the same surface has the same
-/// depth and leads back to the same pixel. A depth that hides surfaces confirmed elsewhere is
+/// depth and leads back to the same pixel. A depth that hides surfaces matched elsewhere is
 /// dropped. Depths and confidences in the scene's units; NaN and 0 where nothing is known.
 std::vector<DepthMap> confirmed_depths(const std::vector<DepthView>& views,
                                        const std::vector<PlaneMap>& planes,

@@ -38,8 +38,18 @@ Scene scene_of(const Reconstruction& model) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(a);
   if (eigen.eigenvalues()(0) > 1e-3 * n) {
     scene.center = a.ldlt().solve(b);
+  } else if (model.points.empty()) {  // parallel axes: as far ahead as the cameras are apart
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero(), forward = mean;
+    for (const PosedView& view : model.views) {
+      mean += camera_center(view.cam_from_world) / n;
+      forward += view.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+    }
+    double spread = 0;
+    for (const PosedView& view : model.views)
+      spread = std::max(spread, (camera_center(view.cam_from_world) - mean).norm());
+    scene.center = mean + forward.normalized() * (spread > 0 ? 2 * spread : 1.0);
   } else {
-    std::vector<double> values(std::max<std::size_t>(1, model.points.size()), 0.0);
+    std::vector<double> values(model.points.size(), 0.0);
     for (int i = 0; i < 3; ++i) {
       for (std::size_t k = 0; k < model.points.size(); ++k) values[k] = model.points[k].position[i];
       const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -138,7 +148,7 @@ Result<DenseDepth> dense_depth(const Reconstruction& model, const std::vector<cv
     PlaneMap half = random_planes(coarse[k], range, seeds_of(model, i, coarse[k], scene), key);
     improve(half, coarse[k], sources_of(coarse, k, neighbours[k]), range, options.coarse_iterations,
             options, key + 1);
-    planes[k] = doubled(half, fine[k]);
+    planes[k] = doubled(half, fine[k], range);
     improve(planes[k], fine[k], sources_of(fine, k, neighbours[k]), range, options.fine_iterations,
             options, key + 2);
     const std::lock_guard lock(reporting);

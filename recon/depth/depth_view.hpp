@@ -20,7 +20,7 @@ struct DepthView {
   Eigen::Vector3f axis() const { return world_rotation.row(2).transpose(); }
 };
 
-inline constexpr int rows_padding = 1;
+inline constexpr int rows_padding = 2;
 
 /// Undistorts and shrinks (area average). `image`: 8-bit gray or BGR of the camera's size.
 DepthView prepare_view(const cv::Mat& image, const Camera& camera, const Rigid3d& cam_from_world,

@@ -21,7 +21,7 @@ Status DepthOptions::validate() const {
     return bad("coarse_iterations", coarse_iterations, "choose 0..100");
   if (fine_iterations < 0 || fine_iterations > 100)
     return bad("fine_iterations", fine_iterations, "choose 0..100");
-  if (!(max_cost > 0 && max_cost <= 2)) return bad("max_cost", max_cost, "choose above 0, up to 2");
+  if (!(max_cost > 0 && max_cost < 1)) return bad("max_cost", max_cost, "choose between 0 and 1");
   if (!(agreement > 0 && agreement < 1)) return bad("agreement", agreement, "choose 0..1");
   if (!(agreement_px > 0)) return bad("agreement_px", agreement_px, "choose above 0");
   if (min_agreeing < 1 || min_agreeing > neighbours)

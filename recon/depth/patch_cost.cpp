@@ -10,7 +10,7 @@ namespace orbitfuse::depth {
 namespace {
 
 struct Offsets {
-  alignas(32) float x[patch_samples], y[patch_samples], closeness[patch_samples];
+  alignas(32) float x[patch_samples]{}, y[patch_samples]{}, closeness[patch_samples]{};
   Offsets() {
     int i = 0;
     for (int dy = -3; dy <= 3; ++dy)
@@ -141,7 +141,9 @@ float patch_cost(const ReferencePatch& patch, const SourceView& s, const Eigen::
     };
     const __m256 above = mix(top), below = mix(low);
     const __m256 value = _mm256_fmadd_ps(fv, _mm256_sub_ps(below, above), above);
-    const __m256 inside = _mm256_and_ps(_mm256_cmp_ps(u, uc, _CMP_EQ_OQ), _mm256_cmp_ps(v, vc, _CMP_EQ_OQ));
+    const __m256 ahead = _mm256_cmp_ps(w, zero, _CMP_GT_OQ);
+    const __m256 inside = _mm256_and_ps(
+        ahead, _mm256_and_ps(_mm256_cmp_ps(u, uc, _CMP_EQ_OQ), _mm256_cmp_ps(v, vc, _CMP_EQ_OQ)));
     const __m256 weight = _mm256_load_ps(patch.weight + i);
     inside_weight = _mm256_add_ps(inside_weight, _mm256_and_ps(inside, weight));
     const __m256 weighted = _mm256_mul_ps(weight, value);

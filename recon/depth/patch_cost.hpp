@@ -14,7 +14,7 @@ struct Plane {
   Eigen::Vector3f normal;     ///< unit, camera axes, towards the camera
 };
 
-inline constexpr int patch_samples = 32;  ///< every other pixel of 9 x 7
+inline constexpr int patch_samples = 32;  ///< every other pixel of 9 x 7 is 31; the last has no weight
 inline constexpr float worst_cost = 2.0f;
 
 /// The patch round one reference pixel, sampled and weighed once for all hypotheses.

@@ -111,6 +111,7 @@ PlaneMap random_planes(const DepthView& view, DepthRange range, const std::vecto
   // A seed speaks for its surroundings: half of the pixels there start at its depth.
   constexpr int reach = 8;
   for (const Seed& s : seeds) {
+    if (!(s.depth >= range.near && s.depth <= range.far)) continue;
     const int sx = static_cast<int>(s.x), sy = static_cast<int>(s.y);
     for (int y = std::max(0, sy - reach); y <= std::min(map.height - 1, sy + reach); ++y)
       for (int x = std::max(0, sx - reach); x <= std::min(map.width - 1, sx + reach); ++x)
@@ -120,7 +121,7 @@ PlaneMap random_planes(const DepthView& view, DepthRange range, const std::vecto
   return map;
 }
 
-PlaneMap doubled(const PlaneMap& coarse, const DepthView& fine) {
+PlaneMap doubled(const PlaneMap& coarse, const DepthView& fine, DepthRange range) {
   PlaneMap map;
   map.width = fine.gray.cols;
   map.height = fine.gray.rows;
@@ -140,7 +141,7 @@ PlaneMap doubled(const PlaneMap& coarse, const DepthView& fine) {
               .ray_of({(cx + 0.5) * map.width / coarse.width, (cy + 0.5) * map.height / coarse.height})
               .cast<float>();
       const float depth = depth_on(from, own, ray_of(fine, x, y));
-      if (std::isfinite(depth)) to.depth = depth;
+      if (std::isfinite(depth)) to.depth = std::clamp(depth, range.near, range.far);
     }
   return map;
 }

@@ -32,7 +32,7 @@ PlaneMap random_planes(const DepthView& view, DepthRange range, const std::vecto
                        std::uint64_t seed);
 
 /// The planes of the view at half the size.
-PlaneMap doubled(const PlaneMap& coarse, const DepthView& fine);
+PlaneMap doubled(const PlaneMap& coarse, const DepthView& fine, DepthRange range);
 
 /// PatchMatch stereo (Bleyer et al. 2011) with red-black propagation (Galliani et al. 2015): each
 /// iteration offers a pixel the planes of eight neighbours and three random changes of its own.

@@ -87,7 +87,7 @@ double carve(const Dataset& dataset, const Space& space, const std::vector<Scene
     if (off[static_cast<std::size_t>((slab * half + i[1] / 2) * half + i[0] / 2)])
       Occupancy::put(occupancy.allowed, cell, false);
   }
-  if (options.carve && dataset.depth.empty())
+  if (options.carve && !dataset.has_dense_depth())
     for (const SceneView& view : views)
       for (const std::int32_t pixel : view.known) {
         const int width = view.rays.camera().width;

@@ -192,7 +192,7 @@ int march(const Occupancy& occupancy, const Ray& ray, const MarchSettings& setti
     haze += segments[static_cast<std::size_t>(i)].haze;
   }
   const float for_surface = static_cast<float>(settings.surface) * std::min(1.0f, surface);
-  const float for_haze = std::clamp(haze, 2.0f, static_cast<float>(settings.haze));
+  const float for_haze = std::clamp(haze, 2.0f, std::max(2.0f, static_cast<float>(settings.haze)));
   const int count = std::min(max_ray_samples, static_cast<int>(std::ceil(for_surface + for_haze)));
   const float surface_share = surface > 0 ? for_surface / surface : 0.0f, haze_share = for_haze / haze;
 

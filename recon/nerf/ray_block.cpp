@@ -100,7 +100,8 @@ void evaluate_front_to_back(const FieldState& field, const Kernels& kernels,
     background = b.round.empty();
     if (background)
       for (std::size_t r = 0; r < rays; ++r)
-        if (b.ray_light[r] >= settings.min_weight) b.round.push_back(b.first[r + 1] - 1);
+        // Half: composite() rounds differently, and decides what is coloured.
+        if (b.ray_light[r] >= 0.5f * settings.min_weight) b.round.push_back(b.first[r + 1] - 1);
     evaluate_round(field, kernels, b, done);
     const float* out = b.round_density.back().data();
     std::size_t at = 0;
@@ -108,7 +109,9 @@ void evaluate_front_to_back(const FieldState& field, const Kernels& kernels,
       float depth = 0;
       for (; at < b.round.size() && b.round[at] < b.first[r + 1]; ++at) {
         const auto row = static_cast<std::size_t>(done) + at;
-        depth += density_of(out[row * density_outputs]) * b.dt[static_cast<std::size_t>(b.round[at])];
+        // As composite(): what lies behind the sample that stops the ray doesn't count.
+        if (b.ray_light[r] * std::exp(-depth) >= settings.stop)
+          depth += density_of(out[row * density_outputs]) * b.dt[static_cast<std::size_t>(b.round[at])];
         b.next[r] = b.round[at] + 1;
       }
       b.ray_light[r] *= std::exp(-depth);
@@ -126,10 +129,12 @@ void drop_unseen(const FieldState& field, const ForwardSettings& settings, RayBl
   if (settings.gradients) reserve_floats(b.features, total * width);
   for (std::size_t l = settings.gradients ? 0 : b.density.size() - 1; l < b.density.size(); ++l)
     reserve_floats(b.density[l], total * static_cast<std::size_t>(field.main.mlp.layers[l].out));
+  b.background_known.assign(b.rays.size(), 0);
   std::size_t kept = 0;
   for (std::size_t r = 0; r < b.rays.size(); ++r) {
     const auto begin = static_cast<std::size_t>(b.first[r]), end = static_cast<std::size_t>(b.first[r + 1]);
     b.first[r] = static_cast<int>(kept);
+    b.background_known[r] = b.row_of[end - 1] >= 0;
     for (std::size_t i = begin; i < end; ++i) {
       const int row = b.row_of[i];
       if (row < 0 && i + 1 < end) continue;
@@ -180,7 +185,7 @@ void forward(const FieldState& field, const Kernels& kernels, const ForwardSetti
       if (b.weight[static_cast<std::size_t>(i)] >= settings.min_weight) b.active.push_back(i);
     const float left = used > 0 ? b.light[static_cast<std::size_t>(begin + used - 1)] : 1.0f;
     b.weight[static_cast<std::size_t>(end)] = left;
-    if (left >= settings.min_weight) b.active.push_back(end);
+    if (left >= settings.min_weight && b.background_known[r]) b.active.push_back(end);
   }
 
   const std::size_t rows = b.active.size();

@@ -24,6 +24,7 @@ struct RayBlock {
 
   // Scratch of the density pass: samples in the order of evaluation.
   std::vector<int> row_of, next, round;
+  std::vector<char> background_known;  ///< per ray: light reached it, so it was evaluated
   std::vector<float> round_position01, round_features, ray_light;
   Mlp::Activations round_density;
 

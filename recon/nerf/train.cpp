@@ -139,7 +139,7 @@ Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
     state->span = estimate_span(dataset);
   }
   if (state->options.haze_samples == 0)
-    state->options.haze_samples = dataset.depth.empty() && !options.shared_geometry ? 24 : 8;
+    state->options.haze_samples = !dataset.has_dense_depth() && !options.shared_geometry ? 24 : 8;
   if (options.shared_geometry && !resumed) {
     ORBITFUSE_TRY(inherit_geometry(guide->state(), *state));
     report.skips.push_back({"density from nothing", "the visible field's geometry is given",
