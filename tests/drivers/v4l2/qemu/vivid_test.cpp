@@ -72,5 +72,49 @@ TEST(Vivid, DroppedFramesAreGapsOfTheSequence) {
   EXPECT_GE(session.streams.at(0).lost, 3u);
 }
 
+TEST(Vivid, FlaggedFramesAreRejected) {
+  Recording recording(options_for("YUYV", Modality::visible));
+  EXPECT_TRUE(recording.wait_for_frames(2));
+  set_control("Inject V4L2_BUF_FLAG_ERROR", 1);
+  EXPECT_TRUE(recording.wait_until([](const StreamStatus& s) { return s.rejected == 1; }));
+  EXPECT_TRUE(recording.wait_for_frames(2));
+  EXPECT_EQ(recording.finish().streams.at(0).lost, 1u);
+}
+
+/// The driver's queue fails for good, as after a fault of the hardware; or the device goes away.
+class VividFailure : public testing::TestWithParam<const char*> {};
+
+TEST_P(VividFailure, IsFlaggedAndTheStreamResumed) {
+  Recording recording(options_for("GREY", Modality::visible));
+  EXPECT_TRUE(recording.wait_for_frames(2));
+  set_control(GetParam(), 1);
+  EXPECT_TRUE(recording.wait_for_frames(4));
+  const Session session = recording.finish();
+  EXPECT_EQ(count_events(session, "disconnected"), 1);
+  EXPECT_EQ(count_events(session, "reconnected"), 1);
+  EXPECT_EQ(session.gaps.size(), 1u);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, VividFailure, testing::Values("Inject Fatal Streaming Error", "Disconnect"),
+                         [](const auto& test) { return std::string(test.param[0] == 'D' ? "Disconnect" : "Queue"); });
+
+TEST(Vivid, HeldByAnotherProgramIsAnErrorWithARemedy) {
+  V4l2Source first(options_for("YUYV", Modality::visible)), second(options_for("YUYV", Modality::visible));
+  ASSERT_TRUE(first.start());
+  const Status status = second.start();
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().kind, ErrorKind::device);
+  EXPECT_NE(status.error().remedy.find("other program"), std::string::npos) << status.error().message();
+}
+
+TEST(Vivid, SizeThatItDoesNotHaveIsRefused) {
+  V4l2Options options = options_for("YUYV", Modality::visible);
+  options.width = 322;
+  V4l2Source source(options);
+  const Status status = source.start();
+  ASSERT_FALSE(status);
+  EXPECT_NE(status.error().message().find("322x180"), std::string::npos) << status.error().message();
+}
+
 }  // namespace
 }  // namespace orbitfuse::v4l2::guest
