@@ -24,9 +24,9 @@ Outcome run_car(const fs::path& out, const std::string& interrupt_after = {}) {
   return orbitfuse_program(words, {.interrupt_after = interrupt_after});
 }
 
-/// Hashes of all results; what tells of times (records of stages and run, the report) is left out.
+/// Hashes of all results; what tells of times (records of stages and run, training curves, the report) is left out.
 std::map<std::string, std::string> results(const fs::path& out) {
-  const std::set<std::string> timed = {"stage.json", "run.json", "report.html"};
+  const std::set<std::string> timed = {"stage.json", "run.json", "report.html", "curve.json"};
   std::map<std::string, std::string> hashes;
   for (const auto& entry : fs::recursive_directory_iterator(out)) {
     if (!entry.is_regular_file() || timed.contains(entry.path().filename())) continue;
