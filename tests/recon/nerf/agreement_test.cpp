@@ -158,7 +158,7 @@ double psnr_with(const Dataset& data, const Kernels& kernels) {
   state.space = estimate_space(data);
   state.span = estimate_span(data);
   const auto views = prepare_views(data, state.space, state.span);
-  carve(data, state.space, views, options, state.occupancy);
+  carve(data, views, options, state.occupancy);
   std::vector<bool> heldout(views.size(), false);
   heldout[0] = true;
   Trainer trainer(state, views, heldout, kernels);
