@@ -10,6 +10,7 @@
 #include "app/terminal/exit_code.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/cpu.hpp"
+#include "core/memory.hpp"
 #include "core/parallel.hpp"
 
 // The only place that turns errors into exit codes (docs/cli.md).
@@ -77,6 +78,7 @@ int run(int argc, char** argv) {
   set_up_logging(options.verbosity);
   install_interrupt_handler();
   set_thread_count(line.common.threads);
+  keep_freed_memory();
 
   const auto& [verb, action] = line.chosen();
   stages::RunConfig config;

@@ -24,6 +24,7 @@ struct Frame {
   std::int64_t device_time_ns = 0;  ///< device clock; 0 = unknown
   std::string encoded, extension;   ///< extension with its dot, e.g. ".jpg"
   cv::Mat pixels;
+  cv::Mat original;                 ///< 16-bit counts behind an 8-bit thermal picture (RawCounts)
   std::optional<Station> station;
   bool tracking = false;
   bool thermal_is_gray = false;     ///< 8-bit thermal: no temperatures
@@ -61,6 +62,8 @@ class FrameSource {
   /// but a `rejected` delivery. Ids rise strictly.
   virtual Result<Delivery> next(std::chrono::milliseconds timeout) = 0;
   virtual void stop() = 0;
+  /// Whether nothing is lost when the recorder takes its time (files): then it never drops.
+  virtual bool can_wait() const { return false; }
 };
 
 }  // namespace orbitfuse

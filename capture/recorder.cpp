@@ -43,7 +43,7 @@ struct Recorder::Channel {
   const RecorderOptions& options;
   const Progress& progress;
   const std::function<void(const FrameRecord&)>& on_frame;
-  const DeviceInfo device;
+  DeviceInfo device;  ///< changed by the writer thread only
   StreamAccount account;
 
   std::mutex mutex;
@@ -74,7 +74,7 @@ struct Recorder::Channel {
     const auto has_room = [&] {
       return queue.size() < static_cast<std::size_t>(options.queue_frames) || writer_failed;
     };
-    if (options.backpressure == Backpressure::wait) {
+    if (options.backpressure == Backpressure::wait || source.can_wait()) {
       while (!has_room() && !progress.cancelled()) changed.wait_for(lock, std::chrono::milliseconds(50));
     }
     if (!has_room() || writer_failed) {
@@ -140,10 +140,21 @@ struct Recorder::Channel {
     return frame;
   }
 
+  /// Some sources know their camera only from its first frame.
+  void tell_what_is_known() {
+    DeviceInfo now = source.describe();
+    if (now.model == device.model && now.serial == device.serial && now.lens.focal_px == device.lens.focal_px) return;
+    device.model = std::move(now.model);
+    device.serial = std::move(now.serial);
+    device.lens = now.lens;
+    if (const Status s = writer.update_device(device); !s) keep_first(s.error());
+  }
+
   void store(const Frame& frame) {
     if (const Status space = check_disk(writer.folder(), options.min_free_bytes); !space) {
       return give_up(frame, space.error());
     }
+    tell_what_is_known();
     const Result<FrameRecord> record = writer.append(device.id, frame);
     if (!record && record.error().kind == ErrorKind::input) {
       account.lose(frame.id, Loss::rejected, "rejected: " + record.error().found);

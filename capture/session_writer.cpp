@@ -71,8 +71,10 @@ Result<std::unique_ptr<SessionWriter>> SessionWriter::create(
     const fs::path& folder, const std::map<std::string, std::string>& notes) {
   std::error_code error;
   if (fs::exists(folder, error) && (!fs::is_directory(folder, error) || !fs::is_empty(folder, error))) {
-    return fail(ErrorKind::input, folder.string(), "exists and is not an empty folder",
-                "choose another folder, or resume the session");
+    const bool is_session = fs::exists(folder / "manifest.jsonl", error);
+    return fail(ErrorKind::input, folder.string(),
+                is_session ? "holds a session already" : "exists and is not an empty folder",
+                is_session ? "choose another folder, or go on with it: --resume" : "choose another folder");
   }
   fs::create_directories(folder, error);
   if (error) return fail(ErrorKind::device, folder.string(), error.message(), "check the permissions");
@@ -135,6 +137,15 @@ Status SessionWriter::add_device(const DeviceInfo& device) {
   return append_line(manifest_line(device));
 }
 
+Status SessionWriter::update_device(const DeviceInfo& device) {
+  {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(session_.devices, [&](const DeviceInfo& d) { return d.id == device.id; });
+    session_.devices.push_back(device);
+  }
+  return append_line(manifest_line(device));
+}
+
 std::string SessionWriter::next_file_name(Modality modality, bool tracking, const std::string& extension) {
   const std::string stem = std::string(name(modality)) + (tracking ? "/track_" : "/");
   const std::lock_guard lock(mutex_);
@@ -179,11 +190,17 @@ Result<FrameRecord> SessionWriter::append(const std::string& device_id, const Fr
   if (encoded.has_temperature) {
     ORBITFUSE_TRY(write_file_atomic(folder_ / (record.file + ".json"), thermal_sidecar_json() + "\n"));
   }
+  if (!frame.original.empty()) {
+    const fs::path file(record.file);
+    ORBITFUSE_ASSIGN(const std::string counts, encode_tiff(frame.original, "raw counts"));
+    ORBITFUSE_TRY(write_file_atomic(folder_ / file.parent_path() / "originals" / (file.stem().string() + ".tiff"), counts));
+  }
   ORBITFUSE_TRY(write_file_atomic(folder_ / record.file, encoded.bytes));
   ORBITFUSE_TRY(append_line(manifest_line(record)));
   return record;
 }
 
+Status SessionWriter::amend(const FrameRecord& record) { return append_line(manifest_line(record)); }
 Status SessionWriter::append(const GapRecord& gap) { return append_line(manifest_line(gap)); }
 Status SessionWriter::append(const StreamRecord& stream) { return append_line(manifest_line(stream)); }
 Status SessionWriter::append(const EventRecord& event) { return append_line(manifest_line(event)); }

@@ -30,8 +30,13 @@ class SessionWriter {
 
   /// Announces a device before its first frame; a known id with the same identity is accepted.
   Status add_device(const DeviceInfo& device);
+  /// More is known of an announced device: model, serial, lens.
+  Status update_device(const DeviceInfo& device);
   /// Stores the frame's image and its record; returns the record as written.
   Result<FrameRecord> append(const std::string& device, const Frame& frame);
+  /// Writes a stored frame's record again, e.g. with the station that it was found to show; the
+  /// last word about a file counts. Its image stays as it is.
+  Status amend(const FrameRecord& record);
   Status append(const GapRecord& gap);
   Status append(const StreamRecord& stream);
   Status append(const EventRecord& event);

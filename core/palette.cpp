@@ -46,7 +46,12 @@ std::vector<std::string> palette_names() {
 
 Result<cv::Mat> palette(const std::string& name) {
   if (name == "inferno") return opencv_map(cv::COLORMAP_INFERNO);
-  if (name == "rainbow") return opencv_map(cv::COLORMAP_RAINBOW);
+  if (name == "rainbow") {
+    // OpenCV's begins with red; thermal cameras show red where it is hot.
+    cv::Mat colors;
+    cv::flip(opencv_map(cv::COLORMAP_RAINBOW), colors, 1);
+    return colors;
+  }
   if (name == "white-hot") return interpolated({{0, {0, 0, 0}}, {1, {255, 255, 255}}});
   if (name == "black-hot") return interpolated({{0, {255, 255, 255}}, {1, {0, 0, 0}}});
   if (name == "ironbow") {

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <unordered_map>
 
 #include "core/file_io.hpp"
 #include "core/manifest_json.hpp"
@@ -13,8 +14,12 @@ namespace {
 
 using manifest::Json;
 
+using FrameIndex = std::unordered_map<std::string, std::size_t>;  ///< by file
+
 /// One parsed line applied to the session. Unknown types are skipped: newer writers may add some.
-Status apply(const Json& line, const std::string& where, Session& session) {
+/// A later frame line about the same file amends the earlier one: the guide chooses stations after
+/// the frames are on disk.
+Status apply(const Json& line, const std::string& where, Session& session, FrameIndex& index) {
   const manifest::Reader reader(line, where);
   ORBITFUSE_ASSIGN(const std::string type, reader.text("type"));
   session.complete = type == "end";
@@ -25,7 +30,9 @@ Status apply(const Json& line, const std::string& where, Session& session) {
     session.devices.push_back(std::move(device));
   } else if (type == "frame") {
     ORBITFUSE_ASSIGN(FrameRecord frame, manifest::read_frame(reader));
-    session.frames.push_back(std::move(frame));
+    const auto [known, is_new] = index.emplace(frame.file, session.frames.size());
+    if (is_new) session.frames.push_back(std::move(frame));
+    else session.frames[known->second] = std::move(frame);
   } else if (type == "gap") {
     ORBITFUSE_ASSIGN(GapRecord gap, manifest::read_gap(reader));
     session.gaps.push_back(std::move(gap));
@@ -82,6 +89,7 @@ Result<Session> open_session(const std::filesystem::path& folder) {
   ORBITFUSE_ASSIGN(const std::string text, read_file(file));
   Session session;
   session.folder = folder;
+  FrameIndex index;
   std::size_t at = 0;
   for (int number = 1; at < text.size(); ++number) {
     const std::size_t end = text.find('\n', at);
@@ -101,7 +109,7 @@ Result<Session> open_session(const std::filesystem::path& folder) {
       return fail(ErrorKind::input, where, "the first line is not a session header",
                   "restore the manifest from a backup");
     }
-    ORBITFUSE_TRY(apply(json, where, session));
+    ORBITFUSE_TRY(apply(json, where, session, index));
     if (is_last) break;
     at = end + 1;
   }

@@ -62,6 +62,9 @@ Action add_metrics(CLI::App& app);
 Action add_report(CLI::App& app);
 Action add_eval(CLI::App& app);
 Action add_replay(CLI::App& app);
+Action add_capture(CLI::App& app);
+Action add_devices(CLI::App& app);
+Action add_mat(CLI::App& app);
 Action add_doctor(CLI::App& app);
 
 }  // namespace orbitfuse::cli

@@ -24,8 +24,12 @@ std::map<std::string, fs::path> files_by_stem(const fs::path& folder) {
 Result<std::string> fuse_one(const std::string& stem, const fs::path& visible_file, const fs::path& thermal_file,
                              const fs::path& out, const FusionOptions& options) {
   ORBITFUSE_ASSIGN(const cv::Mat visible, read_image(visible_file));
-  ORBITFUSE_ASSIGN(const cv::Mat thermal, read_image(thermal_file));
+  ORBITFUSE_ASSIGN(cv::Mat thermal, read_thermal(thermal_file));
   ORBITFUSE_ASSIGN(const cv::Mat fused, fuse(visible, thermal, {}, options));
+  if (thermal.depth() == CV_32F) {
+    ORBITFUSE_ASSIGN(const ThermalGray gray, thermal_gray(thermal, options.span));
+    gray.gray.convertTo(thermal, CV_8U);
+  }
   ORBITFUSE_ASSIGN(const auto values, fusion_metrics(visible, thermal, fused));
   ORBITFUSE_TRY(write_png(out / "vi" / (stem + ".png"), visible));
   ORBITFUSE_TRY(write_png(out / "ir" / (stem + ".png"), thermal));
@@ -36,6 +40,11 @@ Result<std::string> fuse_one(const std::string& stem, const fs::path& visible_fi
 }
 
 }  // namespace
+
+Result<cv::Mat> read_thermal(const fs::path& file) {
+  ORBITFUSE_ASSIGN(const cv::Mat image, read_image(file));
+  return image.type() == CV_16UC1 ? read_thermal_k(file) : Result<cv::Mat>(image);
+}
 
 Result<Summary> fuse_folder(const fs::path& visible, const fs::path& thermal, const fs::path& out,
                             const FusionOptions& options, const Progress& progress) {

@@ -17,9 +17,14 @@ struct Summary {
   std::vector<std::string> problems;  ///< pairs that could not be fused, and why
 };
 
+/// Thermal image of a file: one channel of 16 bits is radiometric and becomes kelvin (NaN = invalid),
+/// anything else stays as stored.
+Result<cv::Mat> read_thermal(const std::filesystem::path& file);
+
 /// Fuses the images of equal stem in two folders into out/vi, out/ir and out/fused (all PNG, equal
 /// names: the aligned-pairs layout that fusion networks train on) and writes out/metrics.csv.
-/// A bad pair is told and left out. Input error when no pair could be fused.
+/// Thermal images in
+/// kelvin are written and scored as the gray images that were fused. A bad pair is told and left out. Input error when no pair could be fused.
 Result<Summary> fuse_folder(const std::filesystem::path& visible, const std::filesystem::path& thermal,
                             const std::filesystem::path& out, const FusionOptions& options,
                             const Progress& progress);

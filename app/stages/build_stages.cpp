@@ -10,7 +10,7 @@ std::vector<pipeline::Stage> build_stages(const SessionInput& session, const Run
                        std::make_shared<RunConfig>(config)};
   return {
       poses_stage(in, Modality::visible),
-      // depth_stage(in),
+      depth_stage(in),
       train_stage(in, Modality::visible),
       poses_stage(in, Modality::thermal),
       train_stage(in, Modality::thermal),

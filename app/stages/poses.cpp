@@ -3,11 +3,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
 
 #include "app/stages/artifacts.hpp"
 #include "app/stages/stage_list.hpp"
 #include "core/image_io.hpp"
 #include "core/palette.hpp"
+#include "recon/nerf/nerf.hpp"
 
 namespace orbitfuse::stages {
 namespace {
@@ -91,11 +95,29 @@ Result<StageOutput> pose_thermal(const StageContext& context, const SessionInput
       ORBITFUSE_ASSIGN(scene.depth, load_depth_maps(context.of("depth")));
     }
   }
+  nerf::Field field;
+  if (context.has("train_visible")) {
+    ORBITFUSE_ASSIGN(field, nerf::Field::load(context.of("train_visible") / field_file));
+    // Edges need fewer samples a ray than pictures.
+    nerf::RenderOptions coarse;
+    coarse.sample_factor = 0.5;
+    scene.renderer = [&, coarse](const Camera& camera, const Rigid3d& cam_from_world) -> Result<SceneView> {
+      ORBITFUSE_ASSIGN(const nerf::RenderedView seen, nerf::render(field, camera, cam_from_world, coarse, context.progress));
+      SceneView view{{}, seen.depth};
+      cv::cvtColor(seen.color, view.brightness, cv::COLOR_RGB2GRAY);
+      return view;
+    };
+  }
   ORBITFUSE_ASSIGN(const ThermalPoses poses,
                    estimate_thermal_poses(input.session, visible ? &scene : nullptr, options,
                                           context.folder / "work", context.progress));
   ORBITFUSE_TRY(save_session_bounds(context, input, poses.reconstruction));
   return finish(context, poses, poses.shares_visible_frame);
+}
+
+bool all_posed(const Session& session) {
+  const auto frames = session.frames_of(Modality::thermal, false);
+  return std::all_of(frames.begin(), frames.end(), [](const FrameRecord* f) { return f->cam_from_world.has_value(); });
 }
 
 }  // namespace
@@ -104,7 +126,11 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   const bool visible = modality == Modality::visible;
   pipeline::Stage stage;
   stage.name = "poses_" + std::string(name(modality));
-  if (!visible) stage.uses = {"poses_visible", "depth"};
+  if (!visible) {
+    stage.uses = {"poses_visible", "depth"};
+    // Thermal views are aligned with renders of the visible field; known poses need none.
+    if (!in.config->poses.use_known_poses || !all_posed(in.session->session)) stage.uses.push_back("train_visible");
+  }
   stage.options = in.config->settings().to_json("poses");
   stage.options["seed"] = in.config->seed;
   stage.inputs_hash = in.session->content.at(modality);

@@ -71,6 +71,17 @@ void add_poses(Settings& settings, PoseOptions& poses) {
                "A model that leaves the stations' orbit by more (share of the radius) is not believed");
 }
 
+void add_depth(Settings& settings, depth::DepthOptions& depth) {
+  settings.add("depth.width_px", depth.width_px, "Width of the visible views' depth maps");
+  settings.add("depth.neighbours", depth.neighbours, "Views each view is matched with");
+  settings.add("depth.best_neighbours", depth.best_neighbours, "Of these, the best so many count");
+  settings.add("depth.coarse_iterations", depth.coarse_iterations, "At half width, from random planes");
+  settings.add("depth.fine_iterations", depth.fine_iterations, "At full width");
+  settings.add("depth.max_cost", depth.max_cost, "1 - NCC above which a match is none");
+  settings.add("depth.agreement", depth.agreement, "Relative difference below which two views agree");
+  settings.add("depth.min_agreeing", depth.min_agreeing, "Views that must agree with a depth");
+}
+
 void add_render(Settings& settings, RenderConfig& render) {
   settings.add_choice("render.path", render.path.path,
                       {{PathKind::automatic, "auto"}, {PathKind::orbit, "orbit"}, {PathKind::path, "path"}},
@@ -90,16 +101,37 @@ void add_render(Settings& settings, RenderConfig& render) {
 void add_fuse(Settings& settings, FuseConfig& fuse) {
   settings.add("fuse.methods", fuse.methods, "Any of best, ms-srif, pca-msif, cnn-lpif");
   settings.add("fuse.color", fuse.options.color, "Keep the visible colours; false: gray");
+  settings.add("fuse.overlay_palette", fuse.options.overlay.palette,
+               "Palette whose hue tells the temperature in the fused image; empty: none");
+  settings.add("fuse.overlay_strength", fuse.options.overlay.strength, "0..1: its colour against the visible one");
   settings.add("fuse.best_levels", fuse.options.best.levels, "Pyramid levels of best");
   settings.add("fuse.best_sharpness", fuse.options.best.sharpness, "How hard best chooses between details");
+  settings.add("fuse.best_contrast_kept", fuse.options.best.contrast_kept,
+               "0..1: how far a detail's strength follows the level it moves to");
+  settings.add("fuse.best_visible_preference", fuse.options.best.visible_preference,
+               "Gray levels of structure the visible image has for free where neither has any");
+  settings.add("fuse.best_brightness_weight", fuse.options.best.brightness_weight,
+               "Share of brightness that counts as structure; 0 for black-hot thermal images");
   settings.add("fuse.ms_srif_stride_px", fuse.options.ms_srif.stride_px, "Between patches of MS-SRIF's base");
   settings.add("fuse.ms_srif_relative_residual", fuse.options.ms_srif.relative_residual,
                "Share of a patch's norm at which its code ends; 0 = the reference's stop");
-  settings.add("fuse.pca_msif_iterations", fuse.options.pca_msif.smoother.iterations, "Diffusion steps of PCA-MSIF");
+  settings.add("fuse.ms_srif_certain_ratio", fuse.options.ms_srif.certain_ratio,
+               "Where one patch has so many times the other's structure no code is sought; 0: always sought");
+  settings.add("fuse.pca_msif_iterations", fuse.options.pca_msif.smoother.iterations, "Diffusion time of PCA-MSIF, in time steps");
   settings.add("fuse.pca_msif_time_step", fuse.options.pca_msif.smoother.time_step,
                "At most 1: beyond it the diffusion diverges");
+  settings.add("fuse.pca_msif_cycles", fuse.options.pca_msif.smoother.cycles,
+               "Cycles of fast explicit diffusion that reach that time; 0: plain steps");
+  settings.add("fuse.cnn_lpif_network_bands", fuse.options.cnn_lpif.network_bands,
+               "Finest bands in which the network also weighs where the sources disagree");
+  settings.add("fuse.cnn_lpif_network_halvings", fuse.options.cnn_lpif.network_halvings,
+               "Times the images are halved for the network; each makes it four times faster");
+  settings.add("fuse.cnn_lpif_vote_px", fuse.options.cnn_lpif.vote_px,
+               "Side of the square over which those decisions are averaged; odd");
   settings.add("fuse.cnn_lpif_same_within", fuse.options.cnn_lpif.same_within,
                "Gray levels up to which the sources count as equal and the network is not asked");
+  settings.add("fuse.cnn_lpif_flat_within", fuse.options.cnn_lpif.flat_within,
+               "Gray levels within which a patch is flat and the network is not asked; -1: always asked");
 }
 
 }  // namespace
@@ -117,14 +149,21 @@ Result<std::vector<FusionMethod>> FuseConfig::chosen() const {
 RunConfig::RunConfig() {
   train_visible.options = nerf::preset(nerf::default_preset(Modality::visible)).value();
   train_thermal.options = nerf::preset(nerf::default_preset(Modality::thermal)).value();
+  // A run shows held-out error, and fits into a few minutes on two cores; docs/benchmarks/run.md.
+  for (TrainConfig* train : {&train_visible, &train_thermal}) train->options.holdout_every = 12;
+  train_visible.options.iterations = 1200;
+  train_thermal.options.iterations = 600;
+  // Thermal views have little texture: on their own they become fog.
+  train_thermal.options.shared_geometry = true;
 }
 
 void RunConfig::set_seed(std::uint64_t value) {
-  seed = poses.seed = train_visible.options.seed = train_thermal.options.seed = value;
+  seed = poses.seed = depth.seed = train_visible.options.seed = train_thermal.options.seed = value;
 }
 
 Status RunConfig::validate() const {
   ORBITFUSE_TRY(poses.validate());
+  ORBITFUSE_TRY(depth.validate());
   for (const TrainConfig* train : {&train_visible, &train_thermal}) {
     ORBITFUSE_TRY(train->options.validate());
     ORBITFUSE_TRY(train->cloud.validate());
@@ -146,6 +185,7 @@ Status RunConfig::validate() const {
 Settings RunConfig::settings() {
   Settings settings;
   add_poses(settings, poses);
+  add_depth(settings, depth);
   add_train(settings, "train.visible", train_visible);
   add_train(settings, "train.thermal", train_thermal);
   add_render(settings, render);

@@ -9,6 +9,7 @@
 #include "app/stages/new_views.hpp"
 #include "core/modality.hpp"
 #include "fusion/fuse/fuse.hpp"
+#include "recon/depth/options.hpp"
 #include "recon/nerf/nerf.hpp"
 #include "recon/poses/estimate_poses.hpp"
 
@@ -42,6 +43,7 @@ struct RunConfig {
 
   std::uint64_t seed = 1;
   PoseOptions poses;
+  depth::DepthOptions depth;
   TrainConfig train_visible, train_thermal;
   RenderConfig render;
   FuseConfig fuse;

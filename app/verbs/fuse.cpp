@@ -24,7 +24,7 @@ Result<cv::Mat> read_optional(const std::string& file) {
 
 Status fuse_pair(Context& context, const Options& o, const FusionOptions& options) {
   ORBITFUSE_ASSIGN(const cv::Mat visible, read_image(o.visible));
-  ORBITFUSE_ASSIGN(const cv::Mat thermal, read_image(o.thermal));
+  ORBITFUSE_ASSIGN(const cv::Mat thermal, batch::read_thermal(o.thermal));
   ORBITFUSE_ASSIGN(const cv::Mat mask, read_optional(o.mask));
   FusionReport said;
   ORBITFUSE_ASSIGN(const cv::Mat fused, fuse(visible, thermal, mask, options, &said));

@@ -79,39 +79,37 @@ std::int64_t ClockMap::host_of(double device_s) const {
 /// intercept that no arrival precedes.
 void ClockMap::fit() {
   const double first = samples_.front().device_s, span = samples_.back().device_s - first;
-  if (span < min_span_s) {
-    rate_ = 1;
-  } else {
-    constexpr int slices = 16;
-    std::optional<Sample> best[slices];
-    for (const Sample& s : samples_) {
-      auto& slot = best[std::min(slices - 1, static_cast<int>(slices * (s.device_s - first) / span))];
-      if (!slot || s.arrival_s - s.device_s < slot->arrival_s - slot->device_s) slot = s;
-    }
-    double n = 0, mean_x = 0, mean_y = 0, sxx = 0, sxy = 0;
-    for (const auto& s : best) {
-      if (!s) continue;
-      n += 1;
-      mean_x += s->device_s;
-      mean_y += s->arrival_s - s->device_s;
-    }
-    mean_x /= n;
-    mean_y /= n;
-    for (const auto& s : best) {
-      if (!s) continue;
-      sxx += (s->device_s - mean_x) * (s->device_s - mean_x);
-      sxy += (s->device_s - mean_x) * (s->arrival_s - s->device_s - mean_y);
-    }
-    rate_ = 1.0 + std::clamp(sxx > 0 ? sxy / sxx : 0.0, -max_drift, max_drift);
+  constexpr int slices = 16;
+  std::optional<Sample> best[slices];
+  for (const Sample& s : samples_) {
+    const int slice = span > 0 ? std::min(slices - 1, static_cast<int>(slices * (s.device_s - first) / span)) : 0;
+    if (!best[slice] || s.arrival_s - s.device_s < best[slice]->arrival_s - best[slice]->device_s) best[slice] = s;
   }
+  double n = 0, mean_x = 0, mean_y = 0, sxx = 0, sxy = 0;
+  for (const auto& s : best) {
+    if (!s) continue;
+    n += 1;
+    mean_x += s->device_s;
+    mean_y += s->arrival_s - s->device_s;
+  }
+  mean_x /= n;
+  mean_y /= n;
+  for (const auto& s : best) {
+    if (!s) continue;
+    sxx += (s->device_s - mean_x) * (s->device_s - mean_x);
+    sxy += (s->device_s - mean_x) * (s->arrival_s - s->device_s - mean_y);
+  }
+  rate_ = span < min_span_s ? 1.0 : 1.0 + std::clamp(sxx > 0 ? sxy / sxx : 0.0, -max_drift, max_drift);
   double earliest = INFINITY, squares = 0;
   for (const Sample& s : samples_) earliest = std::min(earliest, s.arrival_s - rate_ * s.device_s);
   intercept_s_ = earliest;
-  for (const Sample& s : samples_) {
-    const double late = s.arrival_s - predicted_s(s.device_s);
+  // Late arrivals say nothing of the clock, only the frames that the line rests on do.
+  for (const auto& s : best) {
+    if (!s) continue;
+    const double late = s->arrival_s - predicted_s(s->device_s);
     squares += late * late;
   }
-  residual_rms_s_ = std::sqrt(squares / static_cast<double>(samples_.size()));
+  residual_rms_s_ = std::sqrt(squares / n);
 }
 
 double ClockMap::offset_s() const {

@@ -111,9 +111,10 @@ Refusal Coverage::add(const FrameAssessment& frame) {
     in_band = true;
     if (!(std::abs(angle_difference_deg(p.azimuth_deg, sector.azimuth_deg)) <= plan_.azimuth_tolerance_deg)) continue;
     const std::size_t s = slot(frame.modality);
-    if (sector.file[s].empty() || frame.sharpness > sector.sharpness[s]) {
+    const double rank = frame.rank > 0 ? frame.rank : frame.sharpness;
+    if (sector.file[s].empty() || rank > sector.rank[s]) {
       sector.file[s] = frame.file;
-      sector.sharpness[s] = frame.sharpness;
+      sector.rank[s] = rank;
     }
     return Refusal::none;
   }

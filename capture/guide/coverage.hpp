@@ -37,13 +37,14 @@ struct FrameAssessment {
   Modality modality = Modality::visible;
   std::string file;                               ///< empty: not on disk
   std::optional<OrbitPosition> position;          ///< absent: the camera is lost
-  double sharpness = 0;                           ///< relative to the session's best so far, 0..1
+  double sharpness = 0;                           ///< relative to what this view can have, 0..1
+  double rank = 0;                                ///< of two good frames the higher stays; 0: sharpness
   double overexposed = 0, underexposed = 0;       ///< shares of pixels
   bool nuc = false;                               ///< during or right after a shutter correction
 };
 
 struct CoverageOptions {
-  double min_sharpness = 0.5;                     ///< of the best frame of this camera so far
+  double min_sharpness = 0.25;                    ///< a blur of one pixel costs nine tenths
   double max_clipped = 0.25;                      ///< share of over- or underexposed pixels
   double rest_speed_deg_s = 2;                    ///< at 1/100 s this blurs 0.3 px at 640 px, 25 deg
   double max_sigma_deg = 2;                       ///< a position less sure than this proves nothing
@@ -63,7 +64,7 @@ struct Sector {
   double azimuth_deg = 0, elevation_deg = 0;
   /// Per modality: the best frame so far that passed every test; empty = missing.
   std::array<std::string, 2> file;
-  std::array<double, 2> sharpness{};
+  std::array<double, 2> rank{};
 };
 
 /// Which sectors are done. A sector is done for a modality only by a frame that is on disk, at

@@ -6,6 +6,7 @@
 #include <xxhash.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <ctime>
 
@@ -133,6 +134,8 @@ Status AravisSource::open() {
     }
     link->stream = arv_camera_create_stream(link->camera, nullptr, nullptr, &error);
     if (!link->stream) return fail(ErrorKind::device, where, take(error), "check the network (orbitfuse doctor)");
+    // Aravis gives a frame 200 ms for its resent packets; a loaded host needs longer now and then.
+    if (ARV_IS_GV_STREAM(link->stream)) g_object_set(link->stream, "frame-retention", 300'000u, nullptr);
     for (int i = 0; i < options_.buffers; ++i) arv_stream_push_buffer(link->stream, arv_buffer_new(link->payload, nullptr));
     arv_camera_start_acquisition(link->camera, &error);
     if (error) return fail(ErrorKind::device, where, take(error), "power-cycle the camera");
@@ -142,12 +145,27 @@ Status AravisSource::open() {
     bury_link();
     return status;
   }
-  counter_.restart();
+  counter_ = {};
   base_id_ = next_id_;
   mismatches_ = 0;
   silent_told_ = false;
   last_frame_ = Clock::now();
+  watch_control();
   return {};
+}
+
+/// Frames go on for seconds after the control channel has died, until the camera's heartbeat ends;
+/// Aravis tells only then. Two unanswered questions in a row are an early word, not a verdict.
+void AravisSource::watch_control() {
+  control_mute_ = mute_told_ = false;
+  if (address_.empty()) return;
+  control_watch_ = std::jthread([this, address = address_](const std::stop_token& over) {
+    for (int unanswered = 0; !over.stop_requested();) {
+      unanswered = answers(address, std::chrono::milliseconds(80)) ? 0 : unanswered + 1;
+      control_mute_ = unanswered >= 2;
+      for (int i = 0; i < 4 && !over.stop_requested(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(25));
+    }
+  });
 }
 
 Status AravisSource::push_settings() {
@@ -155,7 +173,7 @@ Status AravisSource::push_settings() {
     if (options_.profiles.empty()) {
       profile_.name = "generic";
     } else if (!options_.profile.empty()) {
-      ORBITFUSE_ASSIGN(profile_, read_profile(options_.profiles / (options_.profile + ".toml")));
+      ORBITFUSE_ASSIGN(profile_, named_profile(options_.profiles, options_.profile));
     } else {
       ORBITFUSE_ASSIGN(profile_, find_profile(options_.profiles, info_.model));
     }
@@ -208,6 +226,7 @@ Result<std::vector<std::uint16_t>> AravisSource::temperature_table() {
 
 /// Destroying a connection can block for seconds while the camera does not answer.
 void AravisSource::bury_link() {
+  control_watch_ = {};
   if (!link_) return;
   graves_.emplace_back([link = std::move(link_)]() mutable { link.reset(); });
   link_ = nullptr;
@@ -242,8 +261,10 @@ std::optional<Delivery> AravisSource::try_reopen() {
   last_attempt_ = Clock::now();
   if (!answers(address_, 100ms) || !open()) return std::nullopt;
   away_ = false;
-  return event("reconnected", fmt::format("{} after {:.1f} s; settings pushed and verified", address_,
-                                          std::chrono::duration<double>(Clock::now() - lost_at_).count()));
+  const double outage_s = std::chrono::duration<double>(Clock::now() - lost_at_).count();
+  const auto cost = interval_s_ > 0 ? static_cast<std::uint64_t>(std::llround(outage_s / interval_s_)) : 1;
+  base_id_ += cost;
+  return event("reconnected", fmt::format("{} after {:.1f} s, about {} frames; settings pushed and verified", address_, outage_s, cost));
 }
 
 Result<Delivery> AravisSource::next(std::chrono::milliseconds timeout) {
@@ -259,6 +280,10 @@ Result<Delivery> AravisSource::next(std::chrono::milliseconds timeout) {
   }
   if (!link_) return fail(ErrorKind::device, "camera " + options_.camera, "not started", "call start() first");
   if (link_->control_lost) return lose("control lost");
+  if (control_mute_ != mute_told_) {
+    mute_told_ = control_mute_;
+    return event(mute_told_ ? "control-silent" : "control-back", address_);
+  }
   const auto wait = std::min(timeout, options_.silence / 2);
   ArvBuffer* buffer = arv_stream_timeout_pop_buffer(
       link_->stream, static_cast<guint64>(std::chrono::duration_cast<std::chrono::microseconds>(wait).count()));
@@ -300,6 +325,8 @@ Delivery AravisSource::inspect(void* handle) {
     if (mismatch) delivery.reason += ", larger than announced";
     return delivery;
   }
+  const double interval_s = std::chrono::duration<double>(Clock::now() - last_frame_).count();
+  if (interval_s < 1) interval_s_ = interval_s_ > 0 ? 0.9 * interval_s_ + 0.1 * interval_s : interval_s;
   last_frame_ = Clock::now();
   silent_told_ = false;
   const int width = arv_buffer_get_image_width(buffer), height = arv_buffer_get_image_height(buffer);
@@ -329,9 +356,10 @@ Delivery AravisSource::inspect(void* handle) {
   if (stamp.event) pending_.push_back(event("clock", *stamp.event));
   cv::Mat(height, width, format.cv_type, const_cast<void*>(data)).copyTo(frame.pixels);
   mark_nuc(frame, data, needed);
-  if (table_.empty() || format.bytes == 1) {
-    if (options_.modality == Modality::thermal) frame.flags.push_back("not-radiometric");
-    frame.thermal_is_gray = format.bytes == 1 && options_.modality == Modality::thermal;
+  if (format.bytes == 1) {
+    frame.thermal_is_gray = options_.modality == Modality::thermal;
+  } else if (table_.empty()) {
+    if (const auto stretch = raw_counts_.apply(frame)) pending_.push_back(event("raw-counts", *stretch));
   } else {
     frame.pixels.forEach<std::uint16_t>([this](std::uint16_t& dn, const int*) { dn = table_[dn]; });
   }

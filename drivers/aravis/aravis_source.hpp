@@ -11,6 +11,7 @@
 
 #include "capture/clock/clock_map.hpp"
 #include "capture/frame_source.hpp"
+#include "capture/raw_counts.hpp"
 #include "drivers/aravis/profile.hpp"
 
 namespace orbitfuse::aravis {
@@ -35,9 +36,11 @@ struct StreamStatistics {
 
 /// A GigE Vision camera. Aravis calls some damaged frames good, so every frame is checked for its
 /// data size, width, height, pixel format and Aravis' own mismatch counter; ids are counted here
-/// (16 bits, never 0); silence is told within half a second; a lost camera is torn down on another
+/// (16 bits, never 0); silence of the stream
+/// or of the control channel is told within half a second; a lost camera is torn down on another
 /// thread, probed for, reopened, and its settings pushed and verified again. Frozen (bit-equal)
-/// frames are flagged "nuc".
+/// frames are flagged "nuc". The ids leave room for the frames that an outage cost, as far as its
+/// length tells, so that they count as lost.
 class AravisSource final : public FrameSource {
  public:
   explicit AravisSource(AravisOptions options);
@@ -61,6 +64,7 @@ class AravisSource final : public FrameSource {
   Status push_settings();
   Result<std::vector<std::uint16_t>> temperature_table();
   void bury_link();
+  void watch_control();
   Delivery lose(const std::string& why);
   Delivery event(std::string kind, std::string detail) const;
   std::optional<Delivery> try_reopen();
@@ -71,14 +75,18 @@ class AravisSource final : public FrameSource {
   CameraProfile profile_;
   std::shared_ptr<Link> link_;
   std::vector<std::thread> graves_;
+  std::jthread control_watch_;
+  std::atomic<bool> control_mute_{false};
   std::vector<std::uint16_t> table_;
   std::vector<Delivery> pending_;
   DeviceInfo info_;
   std::string address_;
   GvspFrameCounter counter_;
   ClockMap clock_;
+  RawCounts raw_counts_;
   std::uint64_t base_id_ = 0, next_id_ = 0, mismatches_ = 0, last_hash_ = 0;
-  bool away_ = false, silent_told_ = false, frozen_ = false;
+  double interval_s_ = 0;              ///< between frames, smoothed; tells how many an outage cost
+  bool away_ = false, silent_told_ = false, mute_told_ = false, frozen_ = false;
   Clock::time_point last_frame_{}, last_attempt_{}, lost_at_{}, nuc_until_{};
 };
 

@@ -67,13 +67,32 @@ Result<CameraProfile> read_profile(const fs::path& file) {
   }
 }
 
-Result<CameraProfile> find_profile(const fs::path& folder, const std::string& model) {
+namespace {
+
+std::vector<fs::path> profile_files(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(folder, ignored)) {
     if (entry.path().extension() == ".toml") files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());
+  return files;
+}
+
+}  // namespace
+
+Result<CameraProfile> named_profile(const fs::path& folder, const std::string& name) {
+  std::string known;
+  for (const fs::path& file : profile_files(folder)) {
+    if (file.stem() == name) return read_profile(file);
+    known += (known.empty() ? "" : ", ") + file.stem().string();
+  }
+  return fail(ErrorKind::usage, "camera profile \"" + name + "\"", "not in " + folder.string(),
+              known.empty() ? "give the folder of camera profiles" : "use one of " + known);
+}
+
+Result<CameraProfile> find_profile(const fs::path& folder, const std::string& model) {
+  const std::vector<fs::path> files = profile_files(folder);
   Result<CameraProfile> generic = fail(ErrorKind::input, folder.string(), "no profile for \"" + model + "\" and no generic one",
                                        "restore config/cameras/generic.toml");
   for (const fs::path& file : files) {

@@ -13,7 +13,7 @@ namespace orbitfuse::aravis {
 
 /// How samples become kelvin.
 enum class ThermalScale {
-  none,         ///< counts or gray levels; frames are flagged "not-radiometric"
+  none,         ///< counts or gray levels; no temperatures (RawCounts)
   linear,       ///< T[K] = kelvin_per_dn * DN
   radiometric,  ///< FLIR: nodes R, B, F, J0, J1 read from the camera
 };
@@ -33,6 +33,9 @@ struct CameraProfile {
 
 /// A profile file; an unknown key is an error that names it.
 Result<CameraProfile> read_profile(const std::filesystem::path& file);
+
+/// The profile called `name`; the usage error for an unknown one lists those in the folder.
+Result<CameraProfile> named_profile(const std::filesystem::path& folder, const std::string& name);
 
 /// The first profile in the folder (in name order) with a matching model, else the one called
 /// "generic".

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "core/file_io.hpp"
+#include "core/image_codec.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -51,6 +52,7 @@ class ReplaySource : public FrameSource {
   }
 
   void stop() override {}
+  bool can_wait() const override { return speed_ == ReplaySpeed::full; }
 
  private:
   /// False when the frame's moment is further away than the timeout.
@@ -78,6 +80,13 @@ class ReplaySource : public FrameSource {
     }
     delivery.kind = Delivery::Kind::frame;
     frame.encoded = *std::move(bytes);
+    const std::filesystem::path file(record.file);
+    const auto counts = session_.folder / file.parent_path() / "originals" / (file.stem().string() + ".tiff");
+    if (record.has_flag("raw-counts")) {
+      if (const Result<std::string> tiff = read_file(counts)) {
+        if (const Result<cv::Mat> original = decode_tiff(*tiff, counts.string())) frame.original = *original;
+      }
+    }
     frame.extension = std::filesystem::path(record.file).extension().string();
     frame.host_time_ns = record.host_time_ns;
     frame.device_time_ns = record.device_time_ns;

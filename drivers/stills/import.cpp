@@ -13,15 +13,13 @@
 #include "core/image_codec.hpp"
 #include "drivers/stills/image_list.hpp"
 #include "drivers/stills/known_poses.hpp"
+#include "drivers/stills/still_photo.hpp"
 #include "drivers/stills/thermal_decoder.hpp"
 
 namespace orbitfuse {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Diagonal of the 36 x 24 mm frame that "35 mm equivalent" refers to.
-constexpr double full_frame_diagonal_mm = 43.2666;
 
 struct Source {
   fs::path file;
@@ -168,7 +166,7 @@ class Importer {
     device.model = exif.make.empty() ? exif.model : exif.make + " " + exif.model;
     device.serial = exif.serial;
     if (exif.focal_35mm) {
-      device.lens.focal_px = *exif.focal_35mm * std::hypot(size.width, size.height) / full_frame_diagonal_mm;
+      device.lens.focal_px = focal_px_of_35mm(*exif.focal_35mm, size);
     }
     if (options_.visible_focal_px) device.lens.focal_px = options_.visible_focal_px;
     const std::string key = fmt::format("{}|{}|{}x{}", device.model, exif.focal_mm.value_or(0), size.width, size.height);

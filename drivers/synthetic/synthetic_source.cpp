@@ -57,6 +57,7 @@ class SyntheticSource : public FrameSource {
   }
 
   void stop() override {}
+  bool can_wait() const override { return true; }
 
  private:
   Status render(const Rigid3d& cam_from_world, Frame& frame) const {

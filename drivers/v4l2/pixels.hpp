@@ -25,7 +25,7 @@ bool is_supported(std::uint32_t fourcc);
 /// Puts one buffer's bytes into frame.pixels or, for MJPEG, byte for byte into frame.encoded.
 /// The error says why the buffer is damaged: too short for its format, or a JPEG without its
 /// start or end marker. YUYV and NV12 become BGR (BT.601); Y16 becomes centikelvin, or stays raw
-/// counts scaled to nothing when the scale is unknown.
+/// counts with the flag "raw-counts" when the scale is unknown (RawCounts).
 Status unpack(std::span<const std::uint8_t> bytes, const Layout& layout, Frame& frame);
 
 }  // namespace orbitfuse::v4l2

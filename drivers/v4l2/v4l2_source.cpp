@@ -252,7 +252,7 @@ void V4l2Source::stop() {
 Delivery V4l2Source::lose(const std::string& event, const std::string& why) {
   close_device();
   away_ = true;
-  lost_at_ = Clock::now();
+  lost_at_ = last_frame_;
   last_attempt_ = {};
   Delivery delivery;
   delivery.kind = Delivery::Kind::event;
@@ -261,17 +261,28 @@ Delivery V4l2Source::lose(const std::string& event, const std::string& why) {
   return delivery;
 }
 
+Delivery V4l2Source::stall() {
+  Delivery event = lose("stalled", "no frame; reopening it");
+  if (++stalls_in_a_row_ < 2 || !options_.reset_port || node_.usb_path.empty()) return event;
+  const Status reset = options_.reset_port(node_.usb_path);
+  event.detail = reset ? "still no frame; its USB port was reset" : "still no frame; " + reset.error().message();
+  return event;
+}
+
 std::optional<Delivery> V4l2Source::try_reopen() {
   if (Clock::now() - last_attempt_ < options_.reopen_every) return std::nullopt;
   last_attempt_ = Clock::now();
   const Status status = open_and_stream();
   if (!status) return std::nullopt;  // still away: tried again, for as long as the user waits
   away_ = false;
+  const double outage_s = std::chrono::duration<double>(Clock::now() - lost_at_).count();
+  // Ids leave room for what the outage cost, so that it counts as lost.
+  const auto cost = interval_s_ > 0 ? static_cast<std::uint64_t>(std::llround(outage_s / interval_s_)) : 1;
+  base_id_ += cost;
   Delivery delivery;
   delivery.kind = Delivery::Kind::event;
   delivery.reason = "reconnected";
-  delivery.detail = fmt::format("{} after {:.1f} s", node_.path,
-                                std::chrono::duration<double>(Clock::now() - lost_at_).count());
+  delivery.detail = fmt::format("{} after {:.1f} s, about {} frames", node_.path, outage_s, cost);
   return delivery;
 }
 
@@ -293,7 +304,7 @@ Result<Delivery> V4l2Source::next(std::chrono::milliseconds timeout) {
   if (ready < 0 && errno != EINTR) return lose("disconnected", std::strerror(errno));
   if (ready > 0 && (waiter.revents & POLLIN)) return dequeue();
   if (ready > 0) return lose("disconnected", "the device reports an error");
-  if (Clock::now() - last_frame_ > options_.stall) return lose("stalled", "no frame; reopening it");
+  if (Clock::now() - last_frame_ > options_.stall) return stall();
   return Delivery{};
 }
 
@@ -306,7 +317,10 @@ Result<Delivery> V4l2Source::dequeue() {
     return lose("disconnected", std::strerror(errno));  // ENODEV: unplugged; EIO: the stream broke
   }
   if (buffer.index >= buffers_.size()) return lose("disconnected", "the driver answers nonsense");
+  const double interval_s = std::chrono::duration<double>(Clock::now() - last_frame_).count();
+  if (next_id_ > 0 && interval_s < 1) interval_s_ = interval_s_ > 0 ? 0.9 * interval_s_ + 0.1 * interval_s : interval_s;
   last_frame_ = Clock::now();
+  stalls_in_a_row_ = 0;
   const std::uint64_t id = unwrap(buffer.sequence);
   Delivery delivery = delivery_of(buffer.index, buffer.bytesused, buffer.flags);
   delivery.frame.id = id;
@@ -341,8 +355,17 @@ Delivery V4l2Source::delivery_of(std::uint32_t index, std::uint32_t bytes, std::
     return delivery;
   }
   delivery.kind = Delivery::Kind::frame;
-  delivery.frame.thermal_is_gray =
-      options_.modality == Modality::thermal && layout_.fourcc != V4L2_PIX_FMT_Y16;
+  const bool counts = layout_.fourcc == V4L2_PIX_FMT_Y16;
+  delivery.frame.thermal_is_gray = options_.modality == Modality::thermal && !counts;
+  if (counts && layout_.kelvin_per_dn <= 0) {
+    if (const auto stretch = raw_counts_.apply(delivery.frame)) {
+      Delivery event;
+      event.kind = Delivery::Kind::event;
+      event.reason = "raw-counts";
+      event.detail = *stretch;
+      pending_.push_back(std::move(event));
+    }
+  }
   return delivery;
 }
 

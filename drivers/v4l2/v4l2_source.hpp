@@ -3,12 +3,14 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "capture/frame_source.hpp"
+#include "capture/raw_counts.hpp"
 #include "drivers/v4l2/identity.hpp"
 #include "drivers/v4l2/pixels.hpp"
 #include "drivers/v4l2/video_system.hpp"
@@ -30,6 +32,8 @@ struct V4l2Options {
   std::optional<int> exposure_100us, focus, white_balance_k;  ///< absent: the value it had
   std::chrono::milliseconds stall{2000};       ///< silence after which the stream is reopened
   std::chrono::milliseconds reopen_every{250}; ///< while the camera is away
+  /// Resets the camera's USB port ("1-4.2"); called when reopening alone did not end a stall.
+  std::function<Status(const std::string& usb_path)> reset_port;
 
   Status validate() const;
 };
@@ -63,6 +67,7 @@ class V4l2Source final : public FrameSource {
   Status map_buffers();
   void close_device();
   Delivery lose(const std::string& event, const std::string& why);
+  Delivery stall();
   std::optional<Delivery> try_reopen();
   Result<Delivery> dequeue();
   Delivery delivery_of(std::uint32_t index, std::uint32_t bytes, std::uint32_t flags);
@@ -77,9 +82,12 @@ class V4l2Source final : public FrameSource {
   int fd_ = -1;
   bool away_ = false;
   std::vector<Mapping> buffers_;
+  RawCounts raw_counts_;
   std::vector<Delivery> pending_;       ///< events to tell before the next frame
   Clock::time_point last_frame_{}, last_attempt_{}, lost_at_{};
   std::uint64_t next_id_ = 0, base_id_ = 0;
+  int stalls_in_a_row_ = 0;
+  double interval_s_ = 0;               ///< between frames, smoothed; tells how many an outage cost
   std::optional<std::uint32_t> last_sequence_;
 };
 

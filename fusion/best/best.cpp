@@ -3,59 +3,43 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
+#include <array>
 #include <opencv2/imgproc.hpp>
 
 #include "core/parallel.hpp"
+#include "fusion/best/band_mix.hpp"
+#include "fusion/best/base_rule.hpp"
+#include "fusion/pyramid/bands.hpp"
 #include "fusion/pyramid/pyramid.hpp"
 
 namespace orbitfuse::fusion {
 namespace {
 
-Plane local_energy(const Plane& band, int radius) {
+/// Bands of one source, finest first, still without their energies, and its base.
+struct Source {
+  std::vector<BandSource> bands;
+  Plane base;
+};
+
+Source source_of(const Plane& image, int levels) {
+  Source source{{}, image};
+  for (int i = 0; i < levels; ++i) {
+    Plane reduced;
+    BandSource band;
+    cv::pyrDown(source.base, reduced);
+    cv::pyrUp(reduced, band.level, source.base.size());
+    band.band = source.base - band.level;
+    source.bands.push_back(std::move(band));
+    source.base = reduced;
+  }
+  return source;
+}
+
+Plane energy_of(const Plane& band, int radius) {
+  const int window = 2 * radius + 1;
   Plane energy;
-  const int side = 2 * radius + 1;
-  cv::GaussianBlur(band.mul(band), energy, {side, side}, 0, 0, cv::BORDER_REFLECT_101);
+  cv::GaussianBlur(band.mul(band), energy, {window, window}, 0, 0, cv::BORDER_REFLECT_101);
   return energy;
-}
-
-/// a^n / (a^n + b^n); 1/2 where both are nothing.
-float share(float a, float b, float exponent) {
-  constexpr float nothing = 1e-4F;  // gray levels squared; far below what a sensor resolves
-  return 1 / (1 + std::pow((b + nothing) / (a + nothing), exponent));
-}
-
-Plane mixed(const Plane& v, const Plane& t, const Plane& activity_v, const Plane& activity_t, double sharpness) {
-  const auto exponent = static_cast<float>(sharpness);
-  Plane fused(v.size());
-  parallel_blocks(v.rows, 32, [&](int begin, int end) {
-    for (int y = begin; y < end; ++y)
-      for (int x = 0; x < v.cols; ++x) {
-        const float w = share(activity_v(y, x), activity_t(y, x), exponent);
-        fused(y, x) = w * v(y, x) + (1 - w) * t(y, x);
-      }
-  });
-  return fused;
-}
-
-/// Local variance over a square window.
-Plane local_variance(const Plane& base, int side) {
-  Plane mean, square;
-  cv::boxFilter(base, mean, CV_32F, {side, side});
-  cv::boxFilter(base.mul(base), square, CV_32F, {side, side});
-  return cv::max(square - mean.mul(mean), 0.0F);
-}
-
-/// Each base pixel votes for the source that varies more round it; the votes are averaged widely,
-/// so that a region takes its level from one source and the border between two regions is a ramp.
-Plane fuse_base(const Plane& v, const Plane& t, const BestOptions& options) {
-  const int side = std::min({options.base_window, v.rows, v.cols}), reach = std::min({options.base_vote, v.rows, v.cols});
-  const Plane a = local_variance(v, side), b = local_variance(t, side);
-  Plane vote(v.size());
-  for (int y = 0; y < v.rows; ++y)
-    for (int x = 0; x < v.cols; ++x) vote(y, x) = a(y, x) > b(y, x) ? 1.0F : a(y, x) < b(y, x) ? 0.0F : 0.5F;
-  cv::boxFilter(vote, vote, CV_32F, {reach, reach});
-  return t + vote.mul(v - t);
 }
 
 }  // namespace
@@ -67,8 +51,11 @@ Status BestOptions::validate() const {
   if (levels < 0 || levels > 12) return bad("levels", levels, "must be in 0..12");
   if (energy_radius_px < 0 || energy_radius_px > 15) return bad("energy_radius_px", energy_radius_px, "must be in 0..15");
   if (!(sharpness > 0 && sharpness <= 64)) return bad("sharpness", sharpness, "must be in (0, 64]");
-  if (base_window < 1 || base_window > 255) return bad("base_window", base_window, "must be in 1..255");
-  if (base_vote < 1 || base_vote > 255) return bad("base_vote", base_vote, "must be in 1..255");
+  if (!(contrast_kept >= 0 && contrast_kept <= 1)) return bad("contrast_kept", contrast_kept, "must be in 0..1");
+  if (!(visible_preference >= 0 && visible_preference <= 255))
+    return bad("visible_preference", visible_preference, "must be in 0..255");
+  if (!(brightness_weight >= 0 && brightness_weight <= 1))
+    return bad("brightness_weight", brightness_weight, "must be in 0..1");
   return {};
 }
 
@@ -83,15 +70,30 @@ Result<Plane> fuse_best(const Plane& visible, const Plane& thermal, const BestOp
     return visible.clone();
   }
   const int levels = pyramid_levels(visible.size(), options.levels, 8);
-  LaplacianPyramid v, t, fused;
+  std::array<Source, 2> sources;
   parallel_for(2, [&](int i) {
-    (i == 0 ? v : t) = laplacian_pyramid(i == 0 ? visible : thermal, levels);
+    sources[static_cast<std::size_t>(i)] = source_of(i == 0 ? visible : thermal, levels);
   });
-  for (std::size_t i = 0; i < v.bands.size(); ++i)
-    fused.bands.push_back(mixed(v.bands[i], t.bands[i], local_energy(v.bands[i], options.energy_radius_px),
-                                local_energy(t.bands[i], options.energy_radius_px), options.sharpness / 2));
-  fused.base = fuse_base(v.base, t.base, options);
-  return collapse(fused);
+  auto& [v, t] = sources;
+  std::vector<bool> skip;
+  for (std::size_t i = 0; i < v.bands.size(); ++i) {
+    skip.push_back(silent(v.bands[i].band, t.bands[i].band));
+    if (skip[i]) said.levels_skipped += 1.0 / levels;
+  }
+  parallel_for(2, [&](int k) {
+    Source& source = sources[static_cast<std::size_t>(k)];
+    for (std::size_t i = 0; i < source.bands.size(); ++i)
+      if (!skip[i]) source.bands[i].energy = energy_of(source.bands[i].band, options.energy_radius_px);
+  });
+  Plane fused = fuse_base(v.base, t.base, {static_cast<float>(options.visible_preference),
+                                           static_cast<float>(options.brightness_weight)});
+  const BandMix rule{static_cast<float>(options.sharpness / 2), static_cast<float>(options.contrast_kept)};
+  for (std::size_t i = v.bands.size(); i-- > 0;) {
+    Plane level;
+    cv::pyrUp(fused, level, v.bands[i].band.size());
+    fused = skip[i] ? level : mix_band(v.bands[i], t.bands[i], level, rule);
+  }
+  return fused;
 }
 
 }  // namespace orbitfuse::fusion

@@ -6,20 +6,28 @@
 namespace orbitfuse::fusion {
 
 /// The default method. Details: per band the source with the larger local energy, chosen softly
-/// so that the choice never flickers. Base: by a vote on which source varies more, averaged over a
-/// wide window. Every constant is measured in docs/benchmarks/fusion.md.
+/// so that the choice never flickers, at a strength that keeps part of its contrast to the level it
+/// moves to. Base: by votes of patches on which source holds more. See docs/benchmarks/fusion.md
+/// for what each constant does to the scores.
 struct BestOptions {
   int levels = 4;            ///< of the pyramid; fewer where the base would be below 8 px
-  double sharpness = 8;      ///< exponent of the energy ratio in the weights; larger: harder choice
-  int energy_radius_px = 4;  ///< of the window over which energies are averaged
-  int base_window = 9;       ///< base pixels over which a source's variance is taken
-  int base_vote = 17;        ///< base pixels over which votes are averaged
+  double sharpness = 12;     ///< exponent of the amplitude ratio in the weights; larger: harder choice
+  int energy_radius_px = 5;  ///< of the window over which energies are averaged
+  /// Share of the way to constant contrast that a detail's strength goes when its level changes.
+  double contrast_kept = 0.5;
+  /// Gray levels of activity that the visible source has for free in the base: where neither source
+  /// holds structure people expect the visible level (a bright sky, not a cold one).
+  double visible_preference = 2;
+  /// Share of a patch's mean that counts as activity: lamps, and hot bodies in a white-hot thermal
+  /// image, are bright without structure. 0 for black-hot images.
+  double brightness_weight = 0.02;
 
   Status validate() const;
 };
 
 struct BestReport {
-  bool skipped = false;  ///< the images are identical: returned as they are
+  double levels_skipped = 0;  ///< share of the pyramid's bands that hold nothing in both sources
+  bool skipped = false;       ///< the images are identical: returned as they are
 };
 
 /// Errors: check_pair's, usage. Same bits for any thread count.

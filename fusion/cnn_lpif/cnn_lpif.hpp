@@ -15,17 +15,24 @@ struct CnnLpifOptions {
   /// Finest bands in which the network also weighs the energies where the sources disagree. A patch
   /// is 16 = 2^4 px: what lies in coarser bands the network has not seen.
   int network_bands = 4;
+  /// Times that the images are halved for the network: each makes it four times faster and its
+  /// weights coarser. Not below one patch.
+  int network_halvings = 0;
   /// Side of the square of coefficients over which those decisions are averaged; odd.
   int vote_px = 7;
   /// Gray levels up to which the sources count as the same; patches that don't differ are not sent
-  /// through the network, their weight is 1/2.
+  /// through the network, their weight is 1/2. -1 = off.
   double same_within = 1;
+  /// Gray levels between a patch's darkest and brightest pixel up to which it counts as flat: against
+  /// a flat patch the other source has all the weight, and the network is not asked. -1 = off.
+  double flat_within = 8;
 
   Status validate() const;
 };
 
 struct CnnLpifReport {
-  double patches_skipped = 0;  ///< share of patches that did not differ
+  double patches_skipped = 0;  ///< share of patches that the network was not asked for
+  double levels_skipped = 0;   ///< share of the bands that hold nothing in both sources
   bool skipped = false;        ///< the images are identical: returned as they are
 };
 

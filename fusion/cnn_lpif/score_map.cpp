@@ -79,16 +79,19 @@ void score_tile(const Plane& image, const Parameters& p, const cv::Rect& tile, P
   }
 }
 
-/// Columns of the strip in which any patch is needed.
-cv::Range needed_columns(const cv::Mat1b& needed) {
+/// Runs of columns of the strip in which any patch is needed. A tile computes side2 + 1 columns more
+/// than it answers, so gaps narrower than a few times that are not worth a new run.
+std::vector<cv::Range> needed_runs(const cv::Mat1b& needed) {
+  constexpr int narrow_gap = 24;
   cv::Mat1b any;
   cv::reduce(needed, any, 0, cv::REDUCE_MAX);
-  const auto is_set = [](uchar v) { return v != 0; };
-  const auto first = std::find_if(any.begin(), any.end(), is_set);
-  if (first == any.end()) return {0, 0};
-  int last = any.cols;
-  while (!any(0, last - 1)) --last;
-  return {static_cast<int>(first - any.begin()), last};
+  std::vector<cv::Range> runs;
+  for (int x = 0; x < any.cols; ++x) {
+    if (!any(0, x)) continue;
+    if (!runs.empty() && x - runs.back().end <= narrow_gap) runs.back().end = x + 1;
+    else runs.emplace_back(x, x + 1);
+  }
+  return runs;
 }
 
 }  // namespace
@@ -96,9 +99,9 @@ cv::Range needed_columns(const cv::Mat1b& needed) {
 Plane score_map(const Plane& image, const Parameters& parameters, const cv::Mat1b& needed, Isa isa) {
   Plane scores = Plane::zeros((image.rows - patch) / 2 + 1, (image.cols - patch) / 2 + 1);
   parallel_blocks(scores.rows, strip_rows, [&](int begin, int end) {
-    const cv::Range columns = needed.empty() ? cv::Range(0, scores.cols) : needed_columns(needed.rowRange(begin, end));
-    if (columns.size() > 0)
-      score_tile(image, parameters, {columns.start, begin, columns.size(), end - begin}, scores, isa);
+    const auto runs = needed.empty() ? std::vector{cv::Range(0, scores.cols)} : needed_runs(needed.rowRange(begin, end));
+    for (const cv::Range& run : runs)
+      score_tile(image, parameters, {run.start, begin, run.size(), end - begin}, scores, isa);
   });
   return scores;
 }

@@ -4,10 +4,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <chrono>
-#include <opencv2/imgproc.hpp>
 
-#include "fusion/pyramid/pyramid.hpp"
+#include "fusion/fuse/holes.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -19,101 +19,102 @@ constexpr std::pair<FusionMethod, const char*> methods[] = {{FusionMethod::best,
                                                             {FusionMethod::pca_msif, "pca-msif"},
                                                             {FusionMethod::cnn_lpif, "cnn-lpif"}};
 
-/// Floats in 0..255 with 1 or 3 channels.
-Result<cv::Mat> floats_of(const cv::Mat& image, const char* which) {
-  if ((image.depth() != CV_8U && image.depth() != CV_16U) || (image.channels() != 1 && image.channels() != 3))
-    return fail(ErrorKind::input, which, fmt::format("{} channels of OpenCV depth {}", image.channels(), image.depth()),
-                "give 8- or 16-bit samples, gray or BGR");
-  cv::Mat floats;
-  image.convertTo(floats, CV_32F, image.depth() == CV_16U ? 255.0 / 65535.0 : 1.0);
-  return floats;
+/// The options with everything that skips work switched off.
+FusionOptions without_skipping(FusionOptions options) {
+  options.ms_srif.certain_ratio = options.ms_srif.residual = options.ms_srif.relative_residual = 0;
+  options.cnn_lpif.same_within = options.cnn_lpif.flat_within = -1;
+  return options;
 }
 
-Plane luma(const cv::Mat& floats) {
-  if (floats.channels() == 1) return floats;
-  Plane gray;
-  cv::cvtColor(floats, gray, cv::COLOR_BGR2GRAY);
-  return gray;
+/// Percentages as the user reads them, where anything was skipped.
+void tell_levels(double share, FusionReport& said) {
+  said.skipped.levels = share;
+  if (share > 0)
+    said.skips.push_back({"pyramid levels", fmt::format("{:.0f} % hold nothing in both images", 100 * share),
+                          "their bands are not fused"});
 }
 
-/// Holes filled from the valid pixels round them, coarse to fine, so that filters across the edge
-/// of a hole see a smooth continuation instead of its contents.
-Plane filled(const Plane& image, const cv::Mat1b& valid) {
-  Plane weight, weighted;
-  valid.convertTo(weight, CV_32F, 1.0 / 255);
-  weighted = image.mul(weight);
-  weighted.setTo(0, ~valid);
-  const int levels = fusion::pyramid_levels(image.size(), 16, 1);
-  const auto weights = fusion::gaussian_pyramid(weight, levels), sums = fusion::gaussian_pyramid(weighted, levels);
-  Plane result;
-  for (int i = levels; i >= 0; --i) {
-    const auto k = static_cast<std::size_t>(i);
-    Plane mean = sums[k] / cv::max(weights[k], 1e-6F);
-    if (result.empty()) {
-      result = mean;
-      continue;
-    }
-    Plane coarse;
-    cv::pyrUp(result, coarse, mean.size());
-    const Plane w = i == 0 ? weights[k] : Plane(cv::min(weights[k] * 4, 1.0F));
-    result = coarse + w.mul(mean - coarse);
+Result<Plane> by_best(const Plane& visible, const Plane& thermal, const FusionOptions& options, FusionReport& said) {
+  fusion::BestReport report;
+  auto fused = fusion::fuse_best(visible, thermal, options.best, &report);
+  tell_levels(report.levels_skipped, said);
+  return fused;
+}
+
+Result<Plane> by_ms_srif(const Plane& visible, const Plane& thermal, const FusionOptions& options, FusionReport& said) {
+  fusion::MsSrifReport report;
+  auto fused = fusion::fuse_ms_srif(visible, thermal, options.ms_srif, &report);
+  const int spared = report.flat_patches + report.certain_patches;
+  if (report.patches > 0) said.skipped.patches = static_cast<double>(spared) / report.patches;
+  if (spared > 0)
+    said.skips.push_back({"sparse codes",
+                          fmt::format("{} of {} patches are decided by their DCT, {} are flat", report.certain_patches,
+                                      report.patches, report.flat_patches),
+                          fmt::format("{:.1f} atoms a patch of at most {}", report.atoms_per_patch, options.ms_srif.max_atoms)});
+  tell_levels(report.levels_skipped, said);
+  return fused;
+}
+
+Result<Plane> by_cnn_lpif(const Plane& visible, const Plane& thermal, const FusionOptions& options, FusionReport& said) {
+  fusion::CnnLpifReport report;
+  auto fused = fusion::fuse_cnn_lpif(visible, thermal, options.cnn_lpif, &report);
+  said.skipped.patches = report.patches_skipped;
+  if (report.patches_skipped > 0)
+    said.skips.push_back({"network", fmt::format("{:.1f} % of the patches are alike or flat in one image", 100 * report.patches_skipped),
+                          "their weights are known without it"});
+  tell_levels(report.levels_skipped, said);
+  return fused;
+}
+
+Result<Plane> fuse_planes(const Plane& visible, const Plane& thermal, const FusionOptions& options, FusionReport& said) {
+  ORBITFUSE_TRY(fusion::check_pair(visible, thermal));
+  if (fusion::differing_share(visible, thermal, 0) == 0) {
+    said.skipped = {1, 1, 1};
+    said.skips.push_back({"fusion", "the two images are identical", "the result is the image itself"});
+    return visible;
   }
-  image.copyTo(result, valid);
-  return result;
-}
-
-Skip identical_pair() {
-  return {"fusion", "the two images are identical", "the result is the image itself"};
-}
-
-Result<Plane> fuse_planes(const Plane& visible, const Plane& thermal, const FusionOptions& options,
-                          std::vector<Skip>& skips) {
-  switch (options.method) {
-    case FusionMethod::best: {
-      fusion::BestReport said;
-      auto fused = fusion::fuse_best(visible, thermal, options.best, &said);
-      if (said.skipped) skips.push_back(identical_pair());
-      return fused;
-    }
-    case FusionMethod::ms_srif: {
-      fusion::MsSrifReport said;
-      auto fused = fusion::fuse_ms_srif(visible, thermal, options.ms_srif, &said);
-      if (said.skipped) skips.push_back(identical_pair());
-      else if (said.patches > 0)
-        skips.push_back({"sparse codes of flat patches",
-                         fmt::format("{} of {} patches are flat", said.flat_patches, said.patches),
-                         fmt::format("{:.1f} atoms a patch of at most {}", said.atoms_per_patch, options.ms_srif.max_atoms)});
-      return fused;
-    }
-    case FusionMethod::pca_msif: {
-      fusion::PcaMsifReport said;
-      auto fused = fusion::fuse_pca_msif(visible, thermal, options.pca_msif, &said);
-      if (said.skipped) skips.push_back(identical_pair());
-      return fused;
-    }
-    case FusionMethod::cnn_lpif: {
-      fusion::CnnLpifReport said;
-      auto fused = fusion::fuse_cnn_lpif(visible, thermal, options.cnn_lpif, &said);
-      if (said.skipped) skips.push_back(identical_pair());
-      else if (said.patches_skipped > 0)
-        skips.push_back({"network on equal patches",
-                         fmt::format("{:.1f} % of the patches do not differ", 100 * said.patches_skipped),
-                         "their weight is 1/2"});
-      return fused;
-    }
+  const FusionOptions chosen = options.skip_unneeded ? options : without_skipping(options);
+  switch (chosen.method) {
+    case FusionMethod::best: return by_best(visible, thermal, chosen, said);
+    case FusionMethod::ms_srif: return by_ms_srif(visible, thermal, chosen, said);
+    case FusionMethod::pca_msif: return fusion::fuse_pca_msif(visible, thermal, chosen.pca_msif);
+    case FusionMethod::cnn_lpif: return by_cnn_lpif(visible, thermal, chosen, said);
   }
   return fail(ErrorKind::usage, "method", "unknown", "see fusion_method_names");
 }
 
-/// The fused luma with the visible image's colour differences.
-cv::Mat colored(const Plane& fused, const cv::Mat& visible) {
-  cv::Mat ycrcb;
-  cv::cvtColor(visible, ycrcb, cv::COLOR_BGR2YCrCb);
-  // Chroma of float images is centred on 0.5; shifted here by the same amount both ways.
-  cv::insertChannel(fused, ycrcb, 0);
-  cv::Mat bgr;
-  cv::cvtColor(ycrcb, bgr, cv::COLOR_YCrCb2BGR);
-  return bgr;
+/// Fuses what holes leave of the pair; elsewhere the visible image.
+Result<Plane> fuse_valid(const Plane& visible, const Plane& thermal, const cv::Mat1b& valid,
+                         const FusionOptions& options, FusionReport& said) {
+  if (valid.empty()) return fuse_planes(visible, thermal, options, said);
+  const cv::Rect part = options.skip_unneeded ? needed_part(valid) : cv::Rect({}, valid.size());
+  const double outside = 1 - static_cast<double>(part.area()) / static_cast<double>(valid.total());
+  if (outside > 0)
+    said.skips.push_back({"pixels far from any thermal one", fmt::format("{:.0f} % of the image", 100 * outside),
+                          "the visible image is shown there"});
+  const Plane filled_part = filled(thermal, valid)(part).clone();
+  ORBITFUSE_ASSIGN(const Plane fused, fuse_planes(visible(part).clone(), filled_part, options, said));
+  said.skipped.pixels = std::max(said.skipped.pixels, outside);
+  Plane result = visible.clone();
+  fused.copyTo(result(part), valid(part));
+  return result;
+}
+
+/// Both sources of validity in one mask, empty where everything is valid.
+Result<cv::Mat1b> joint_mask(const cv::Mat& given, const cv::Mat1b& finite, cv::Size size) {
+  cv::Mat1b mask = finite;
+  if (!given.empty()) {
+    if (given.type() != CV_8UC1 || given.size() != size)
+      return fail(ErrorKind::input, "mask", fmt::format("{}x{}, type {}", given.cols, given.rows, given.type()),
+                  "must be 8-bit gray of the images' size");
+    mask = given > 0;
+    if (!finite.empty()) mask &= finite;
+  }
+  if (mask.empty()) return mask;
+  const int count = cv::countNonZero(mask);
+  if (count == 0)
+    return fail(ErrorKind::input, "mask", "no valid pixel", "the thermal field does not cover this view");
+  return count == static_cast<int>(mask.total()) ? cv::Mat1b() : mask;
 }
 
 }  // namespace
@@ -141,6 +142,7 @@ Status FusionOptions::validate() const {
   ORBITFUSE_TRY(best.validate());
   ORBITFUSE_TRY(ms_srif.validate());
   ORBITFUSE_TRY(pca_msif.validate());
+  ORBITFUSE_TRY(overlay.validate());
   return cnn_lpif.validate();
 }
 
@@ -152,25 +154,15 @@ Result<cv::Mat> fuse(const cv::Mat& visible, const cv::Mat& thermal, const cv::M
   said = {};
   ORBITFUSE_TRY(options.validate());
   ORBITFUSE_ASSIGN(const cv::Mat v, floats_of(visible, "visible"));
-  ORBITFUSE_ASSIGN(const cv::Mat t, floats_of(thermal, "thermal"));
+  ORBITFUSE_ASSIGN(const ThermalGray t, thermal_gray(thermal, options.span));
   const Plane v_luma = luma(v);
-  Plane t_luma = luma(t);
-  ORBITFUSE_TRY(fusion::check_pair(v_luma, t_luma));
-  cv::Mat1b mask;
-  if (!valid.empty()) {
-    if (valid.type() != CV_8UC1 || valid.size() != visible.size())
-      return fail(ErrorKind::input, "mask", fmt::format("{}x{}, type {}", valid.cols, valid.rows, valid.type()),
-                  "must be 8-bit gray of the images' size");
-    mask = valid > 0;
-    const int count = cv::countNonZero(mask);
-    if (count == 0)
-      return fail(ErrorKind::input, "mask", "no valid pixel", "the thermal field does not cover this view");
-    if (count == static_cast<int>(mask.total())) mask.release();
+  ORBITFUSE_TRY(fusion::check_pair(v_luma, t.gray));
+  ORBITFUSE_ASSIGN(const cv::Mat1b mask, joint_mask(valid, t.valid, visible.size()));
+  ORBITFUSE_ASSIGN(cv::Mat result, fuse_valid(v_luma, t.gray, mask, options, said));
+  if (!options.overlay.palette.empty() || (options.color && v.channels() == 3)) {
+    ORBITFUSE_ASSIGN(result, colored(result, options.color ? v : cv::Mat(v_luma), t.gray, mask, options.overlay));
   }
-  if (!mask.empty()) t_luma = filled(t_luma, mask);
-  ORBITFUSE_ASSIGN(Plane fused, fuse_planes(v_luma, t_luma, options, said.skips));
-  if (!mask.empty()) v_luma.copyTo(fused, ~mask);
-  cv::Mat result = options.color && v.channels() == 3 ? colored(fused, v) : cv::Mat(fused), bytes;
+  cv::Mat bytes;
   result.convertTo(bytes, CV_8U);
   said.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return bytes;

@@ -40,22 +40,25 @@ constexpr Definition definitions[] = {
 constexpr std::size_t count = std::size(definitions);
 
 std::array<double, count> of_planes(const Plane& v, const Plane& i, const Plane& f) {
+  std::array<Plane, 3> wide;  // stretched to 0..255, as some measures are defined
+  parallel_for(3, [&](int k) { wide[static_cast<std::size_t>(k)] = stretched(k == 0 ? v : k == 1 ? i : f); });
   Perception eye;
-  double ssim_v = 0, ssim_i = 0, qabf = 0, en = 0, mi = 0, ce = 0, sf = 0, ag = 0, ei = 0, scd = 0, cc = 0;
+  double ssim_v = 0, ssim_i = 0, qabf = 0, en = 0, mi = 0, ce = 0, sf = 0, ag = 0, ei = 0, scd = 0, cc = 0, mse_v = 0, mse_i = 0;
   const std::vector<std::function<void()>> tasks{
-      [&] { eye = perception(v, i, f); },
+      [&] { eye = perception(wide[0], wide[1], wide[2]); },
       [&] { ssim_v = structural_similarity(v, f); },
       [&] { ssim_i = structural_similarity(i, f); },
       [&] { qabf = edge_transfer(v, i, f); },
       [&] {
-        const Plane sv = stretched(v), si = stretched(i), sf8 = stretched(f);
-        mi = mutual_information_nats(sv, sf8) + mutual_information_nats(si, sf8);
+        mi = mutual_information_nats(wide[0], wide[2]) + mutual_information_nats(wide[1], wide[2]);
       },
       [&] {
         en = entropy_bits(f);
         ce = (cross_entropy_bits(v, f) + cross_entropy_bits(i, f)) / 2;
       },
       [&] {
+        mse_v = mean_squared_error(v, f);
+        mse_i = mean_squared_error(i, f);
         sf = spatial_frequency(f);
         ag = average_gradient(f);
         ei = edge_intensity(f);
@@ -65,7 +68,6 @@ std::array<double, count> of_planes(const Plane& v, const Plane& i, const Plane&
         cc = (correlation(v, f) + correlation(i, f)) / 2;
       }};
   parallel_for(static_cast<int>(tasks.size()), [&](int t) { tasks[static_cast<std::size_t>(t)](); });
-  const double mse_v = mean_squared_error(v, f), mse_i = mean_squared_error(i, f);
   const double rmse = (std::sqrt(mse_v) + std::sqrt(mse_i)) / 2;
   const double rmse_vifb = rmse / std::sqrt(static_cast<double>(f.total()));
   return {mean(f), standard_deviation(f), en, sf, ag, ei, qabf, mi, psnr_db((mse_v + mse_i) / 2), rmse,

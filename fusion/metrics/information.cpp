@@ -13,7 +13,8 @@ int bin(double v) { return std::clamp(static_cast<int>(std::floor(v + 0.5)), 0, 
 
 std::array<double, 256> histogram(const Plane& f) {
   std::array<double, 256> h{};
-  for (double v : f) h[static_cast<std::size_t>(bin(v))] += 1;
+  for (int y = 0; y < f.rows; ++y)
+    for (int x = 0; x < f.cols; ++x) h[static_cast<std::size_t>(bin(f(y, x)))] += 1;
   for (double& v : h) v /= static_cast<double>(f.total());
   return h;
 }

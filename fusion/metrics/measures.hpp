@@ -33,6 +33,7 @@ struct Perception {
   double qcb = 0;  ///< Chen and Blum 2009; no contrast in source and fused counts as kept
   double qcv = 0;  ///< Chen and Varshney 2007; lower is better; without edges all blocks weigh alike
 };
+/// Of planes that went through `stretched`.
 Perception perception(const Plane& visible, const Plane& thermal, const Plane& fused);
 
 }  // namespace orbitfuse::metrics

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
 #include <complex>
-#include <functional>
 #include <opencv2/imgproc.hpp>
 
 #include "core/parallel.hpp"
+#include "fusion/metrics/blur.hpp"
 #include "fusion/metrics/measures.hpp"
 
 namespace orbitfuse::metrics {
@@ -17,12 +17,25 @@ Spectrum spectrum_of(const Plane& real, const Plane& imaginary) {
   cv::Mat packed, out;
   cv::merge(std::vector<cv::Mat>{real, imaginary}, packed);
   cv::dft(packed, out, cv::DFT_COMPLEX_OUTPUT);
-  return Spectrum(out.rows, out.cols, reinterpret_cast<std::complex<double>*>(out.data), out.step).clone();
+  return out;
+}
+
+Spectrum spectrum_of(const Plane& real) {
+  cv::Mat out;
+  cv::dft(real, out, cv::DFT_COMPLEX_OUTPUT);
+  return out;
+}
+
+/// Of a spectrum that spectrum_of(real) gave, filtered by what is real and even.
+Plane plane_from(const Spectrum& spectrum) {
+  cv::Mat out;
+  cv::dft(spectrum, out, cv::DFT_INVERSE | cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
+  return out;
 }
 
 std::pair<Plane, Plane> planes_from(const Spectrum& spectrum) {
-  cv::Mat view(spectrum.rows, spectrum.cols, CV_64FC2, spectrum.data, spectrum.step), out;
-  cv::dft(view, out, cv::DFT_INVERSE | cv::DFT_SCALE);
+  cv::Mat out;
+  cv::dft(spectrum, out, cv::DFT_INVERSE | cv::DFT_SCALE);
   std::vector<cv::Mat> parts;
   cv::split(out, parts);
   return {Plane(parts[0]), Plane(parts[1])};
@@ -36,15 +49,18 @@ double unit_frequency(int index, int count) {
 }
 
 /// S(r) with u = width/divisor * fx, v = height/divisor * fy, in cycles per degree by convention.
-Plane radial_filter(cv::Size size, double divisor, const std::function<double(double)>& response) {
+Plane radial_filter(cv::Size size, double divisor, double (*response)(double)) {
   Plane s(size);
-  for (int y = 0; y < size.height; ++y) {
+  // Frequency -f lies as far from the end as f from the start: one quadrant holds all answers.
+  for (int y = 0; y <= size.height / 2; ++y) {
     const double v = unit_frequency(y, size.height) * size.height / divisor;
-    for (int x = 0; x < size.width; ++x) {
+    for (int x = 0; x <= size.width / 2; ++x) {
       const double u = unit_frequency(x, size.width) * size.width / divisor;
       s(y, x) = response(std::sqrt(u * u + v * v));
     }
+    for (int x = size.width / 2 + 1; x < size.width; ++x) s(y, x) = s(y, size.width - x);
   }
+  for (int y = size.height / 2 + 1; y < size.height; ++y) s.row(size.height - y).copyTo(s.row(y));
   return s;
 }
 
@@ -69,17 +85,10 @@ double mannos_sakrison_response(double r) {
 
 /// Masked contrast: |blur_2 / blur_4 - 1| through C^3 / (C^2 + 0.0001).
 Plane masked_contrast(const Plane& f) {
-  const auto kernel = [](double sigma) {
-    cv::Mat1d k(31, 1);
-    for (int i = -15; i <= 15; ++i) {
-      k(i + 15, 0) = std::exp(-i * i / (2 * sigma * sigma)) / (std::sqrt(2 * M_PI) * sigma);
-    }
-    return k;
+  const auto smooth = [&](double sigma) {
+    return blurred(f, gaussian_half(sigma, 15, 1 / (std::sqrt(2 * M_PI) * sigma)));
   };
-  cv::Mat1d fine, coarse;
-  const cv::Mat1d k2 = kernel(2), k4 = kernel(4);
-  cv::sepFilter2D(f, fine, CV_64F, k2, k2, {-1, -1}, 0, cv::BORDER_CONSTANT);
-  cv::sepFilter2D(f, coarse, CV_64F, k4, k4, {-1, -1}, 0, cv::BORDER_CONSTANT);
+  const Plane fine = smooth(2), coarse = smooth(4);
   Plane out(f.size());
   for (int y = 0; y < f.rows; ++y) {
     for (int x = 0; x < f.cols; ++x) {
@@ -113,7 +122,8 @@ double chen_blum(const Plane& cv_, const Plane& ci, const Plane& cf) {
 }
 
 /// Sums over 16 x 16 blocks; blocks at the border are filled up with zeros, as blkproc does.
-Plane block_sums(const Plane& f, const std::function<double(double)>& of) {
+template <class Function>
+Plane block_sums(const Plane& f, const Function& of) {
   Plane out((f.rows + 15) / 16, (f.cols + 15) / 16, 0.0);
   for (int y = 0; y < f.rows; ++y) {
     for (int x = 0; x < f.cols; ++x) out(y / 16, x / 16) += of(f(y, x));
@@ -146,14 +156,12 @@ double chen_varshney(const Plane& visible, const Plane& thermal, const Plane& dv
 
 }  // namespace
 
-Perception perception(const Plane& visible, const Plane& thermal, const Plane& fused) {
-  const Plane v = stretched(visible), i = stretched(thermal), f = stretched(fused);
-  const Plane zero(f.size(), 0.0);
+Perception perception(const Plane& v, const Plane& i, const Plane& f) {
   Spectrum sources, single;
   Plane csf, sensitivity;
   parallel_for(4, [&](int task) {
     if (task == 0) sources = spectrum_of(v, i);
-    if (task == 1) single = spectrum_of(f, zero);
+    if (task == 1) single = spectrum_of(f);
     if (task == 2) csf = radial_filter(f.size(), 30, chen_blum_response);
     if (task == 3) sensitivity = radial_filter(f.size(), 8, mannos_sakrison_response);
   });
@@ -164,12 +172,15 @@ Perception perception(const Plane& visible, const Plane& thermal, const Plane& f
       cv_ = masked_contrast(a);
       ci = masked_contrast(b);
     } else if (task == 1) {
-      cf = masked_contrast(planes_from(times(single, csf)).first);
+      cf = masked_contrast(plane_from(times(single, csf)));
     } else {
       // (V - F) + i (I - F) in one transform.
       Spectrum difference(single.size());
       for (int y = 0; y < single.rows; ++y) {
-        for (int x = 0; x < single.cols; ++x) difference(y, x) = sources(y, x) - std::complex<double>(1, 1) * single(y, x);
+        for (int x = 0; x < single.cols; ++x) {
+          const std::complex<double> s = single(y, x);
+          difference(y, x) = sources(y, x) - std::complex<double>(s.real() - s.imag(), s.real() + s.imag());  // (1 + i) s
+        }
       }
       std::tie(dv, di) = planes_from(times(difference, sensitivity));
     }

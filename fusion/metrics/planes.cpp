@@ -25,7 +25,7 @@ Result<std::vector<Plane>> planes_of(const cv::Mat& image, const std::string& na
   cv::split(samples, channels);
   std::vector<Plane> planes(channels.begin(), channels.end());
   for (const Plane& plane : planes) {
-    if (!std::all_of(plane.begin(), plane.end(), [](double v) { return std::isfinite(v); })) {
+    if (!cv::checkRange(plane)) {
       return fail(ErrorKind::input, name, "samples that are not finite", "mask or fill them first");
     }
   }
@@ -55,11 +55,15 @@ Result<std::vector<std::vector<Plane>>> matched_planes(const std::vector<cv::Mat
 }
 
 Plane stretched(const Plane& plane) {
-  const auto [low, high] = std::minmax_element(plane.begin(), plane.end());
+  double low = 0, high = 0;
+  cv::minMaxLoc(plane, &low, &high);
   Plane out(plane.size(), 0.0);
-  if (*high == *low) return out;
-  const double from = *low, span = *high - *low;
-  std::transform(plane.begin(), plane.end(), out.begin(), [=](double v) { return std::floor((v - from) / span * 255 + 0.5); });
+  if (high == low) return out;
+  const double span = high - low;
+  for (int y = 0; y < plane.rows; ++y) {
+    const double* from = plane[y];
+    std::transform(from, from + plane.cols, out[y], [=](double v) { return std::floor((v - low) / span * 255 + 0.5); });
+  }
   return out;
 }
 

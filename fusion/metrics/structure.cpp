@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
 
 #include "core/parallel.hpp"
+#include "fusion/metrics/blur.hpp"
 #include "fusion/metrics/measures.hpp"
 
 namespace orbitfuse::metrics {
@@ -11,9 +13,11 @@ namespace {
 
 /// The inner part of a Gaussian-filtered plane, where the 11x11 window lies wholly inside.
 Plane windowed(const Plane& plane) {
-  cv::Mat out;
-  cv::GaussianBlur(plane, out, {11, 11}, 1.5, 1.5, cv::BORDER_REFLECT_101);
-  return Plane(out(cv::Rect(5, 5, plane.cols - 10, plane.rows - 10)));
+  static const std::vector<double> half = [] {
+    const auto raw = gaussian_half(1.5, 5, 1);
+    return gaussian_half(1.5, 5, 1 / (2 * std::accumulate(raw.begin(), raw.end(), 0.0) - raw[0]));
+  }();
+  return Plane(blurred(plane, half)(cv::Rect(5, 5, plane.cols - 10, plane.rows - 10)));
 }
 
 /// Sobel responses with zeros outside, in the signs of VIFB's code: they matter where gx == 0.

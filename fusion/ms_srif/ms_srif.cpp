@@ -7,6 +7,7 @@
 
 #include "core/parallel.hpp"
 #include "fusion/pyramid/bands.hpp"
+#include "fusion/pyramid/patch_dct.hpp"
 #include "fusion/pyramid/pyramid.hpp"
 
 namespace orbitfuse::fusion {
@@ -28,32 +29,61 @@ float cut(const Plane& image, int x, int y, Eigen::VectorXf& patch) {
 }
 
 struct Tally {
-  int patches = 0, flat = 0;
+  int patches = 0, flat = 0, certain = 0;
   long atoms = 0;
 };
 
-/// Fused patches of one row of corners, in the order of `xs`.
-std::vector<Eigen::VectorXf> fuse_row(const Plane& visible, const Plane& thermal, const std::vector<int>& xs, int y,
-                                      const OmpStop& stop, const Dictionary& dictionary, Tally& tally) {
-  BatchOmp omp(dictionary);
-  Eigen::VectorXf v(patch_size), t(patch_size);
-  SparseCode code_v, code_t;
-  std::vector<Eigen::VectorXf> fused;
-  for (const int x : xs) {
-    const float mean_v = cut(visible, x, y, v), mean_t = cut(thermal, x, y, t);
+/// Work space of one thread.
+struct Coder {
+  Coder(const MsSrifOptions& options, const Dictionary& dictionary_)
+      : certain_ratio(static_cast<float>(options.certain_ratio)),
+        stop{options.max_atoms, static_cast<float>(options.residual * patch_side),
+             static_cast<float>(options.relative_residual)},
+        dictionary(dictionary_), omp(dictionary_) {}
+
+  void fuse_coded(float mean_v, float mean_t, Tally& tally) {
     omp.solve(v, stop, code_v);
     omp.solve(t, stop, code_t);
+    tally.flat += code_v.atoms.empty() + code_t.atoms.empty();
+    tally.atoms += static_cast<long>(code_v.atoms.size() + code_t.atoms.size());
     const float activity_v = code_v.l1(), activity_t = code_t.l1();
     // Two flat patches have no winner; their mean level doesn't flicker between the sources.
     const float mean = activity_v > activity_t ? mean_v : activity_t > activity_v ? mean_t : (mean_v + mean_t) / 2;
     const SparseCode& code = activity_v > activity_t ? code_v : code_t;
-    Eigen::VectorXf patch = Eigen::VectorXf::Constant(patch_size, mean);
+    fused.setConstant(mean);
     for (std::size_t i = 0; i < code.atoms.size(); ++i)
-      patch += code.weights[i] * dictionary.atoms().col(code.atoms[i]);
-    fused.push_back(std::move(patch));
+      fused += code.weights[i] * dictionary.atoms().col(code.atoms[i]);
+  }
+
+  void fuse(const Plane& visible, const Plane& thermal, int x, int y, Tally& tally) {
+    const float mean_v = cut(visible, x, y, v), mean_t = cut(thermal, x, y, t);
     tally.patches += 2;
-    tally.flat += code_v.atoms.empty() + code_t.atoms.empty();
-    tally.atoms += static_cast<long>(code_v.atoms.size() + code_t.atoms.size());
+    if (certain_ratio > 0) {
+      const float a = patch_activity(visible, x, y).structure, b = patch_activity(thermal, x, y).structure;
+      if (std::max(a, b) > certain_ratio * std::min(a, b)) {
+        fused = a > b ? v.array() + mean_v : t.array() + mean_t;
+        tally.certain += 2;
+        return;
+      }
+    }
+    fuse_coded(mean_v, mean_t, tally);
+  }
+
+  float certain_ratio;
+  OmpStop stop;
+  const Dictionary& dictionary;
+  BatchOmp omp;
+  Eigen::VectorXf v{patch_size}, t{patch_size}, fused{patch_size};
+  SparseCode code_v, code_t;
+};
+
+/// Fused patches of one row of corners, in the order of `xs`.
+std::vector<Eigen::VectorXf> fuse_row(const Plane& visible, const Plane& thermal, const std::vector<int>& xs, int y,
+                                      Coder& coder, Tally& tally) {
+  std::vector<Eigen::VectorXf> fused;
+  for (const int x : xs) {
+    coder.fuse(visible, thermal, x, y, tally);
+    fused.push_back(coder.fused);
   }
   return fused;
 }
@@ -61,13 +91,12 @@ std::vector<Eigen::VectorXf> fuse_row(const Plane& visible, const Plane& thermal
 Plane fuse_base(const Plane& visible, const Plane& thermal, const MsSrifOptions& options,
                 const Dictionary& dictionary, MsSrifReport& report) {
   const std::vector<int> xs = corners(visible.cols, options.stride_px), ys = corners(visible.rows, options.stride_px);
-  const OmpStop stop{options.max_atoms, static_cast<float>(options.residual * patch_side),
-                     static_cast<float>(options.relative_residual)};
   std::vector<std::vector<Eigen::VectorXf>> rows(ys.size());
   std::vector<Tally> tallies(ys.size());
   parallel_for(static_cast<int>(ys.size()), [&](int i) {
     const auto k = static_cast<std::size_t>(i);
-    rows[k] = fuse_row(visible, thermal, xs, ys[k], stop, dictionary, tallies[k]);
+    Coder coder(options, dictionary);
+    rows[k] = fuse_row(visible, thermal, xs, ys[k], coder, tallies[k]);
   });
   Plane sum = Plane::zeros(visible.size()), count = Plane::zeros(visible.size());
   long atoms = 0;
@@ -79,6 +108,7 @@ Plane fuse_base(const Plane& visible, const Plane& thermal, const MsSrifOptions&
       }
     report.patches += tallies[j].patches;
     report.flat_patches += tallies[j].flat;
+    report.certain_patches += tallies[j].certain;
     atoms += tallies[j].atoms;
   }
   report.atoms_per_patch = static_cast<double>(atoms) / report.patches;
@@ -95,6 +125,8 @@ Status MsSrifOptions::validate() const {
   if (stride_px < 1 || stride_px > patch_side) return bad("stride_px", stride_px, "must be in 1..8");
   if (max_atoms < 1 || max_atoms > patch_size) return bad("max_atoms", max_atoms, "must be in 1..64");
   if (!(residual >= 0 && residual <= 255)) return bad("residual", residual, "must be in 0..255");
+  if (!(certain_ratio == 0 || (certain_ratio >= 1 && certain_ratio <= 1e6)))
+    return bad("certain_ratio", certain_ratio, "must be 0 (off) or in 1..1e6");
   if (!(relative_residual >= 0 && relative_residual < 1))
     return bad("relative_residual", relative_residual, "must be in [0, 1)");
   return {};
@@ -117,8 +149,12 @@ Result<Plane> fuse_ms_srif(const Plane& visible, const Plane& thermal, const MsS
     (i == 0 ? v : t) = laplacian_pyramid(i == 0 ? visible : thermal, levels);
   });
   LaplacianPyramid fused;
-  for (std::size_t i = 0; i < v.bands.size(); ++i)
-    fused.bands.push_back(choose(v.bands[i], t.bands[i], choose_by_magnitude(v.bands[i], t.bands[i])));
+  for (std::size_t i = 0; i < v.bands.size(); ++i) {
+    const bool skip = silent(v.bands[i], t.bands[i]);
+    if (skip) said.levels_skipped += 1.0 / levels;
+    fused.bands.push_back(skip ? t.bands[i]
+                               : Plane(t.bands[i] + share_by_magnitude(v.bands[i], t.bands[i]).mul(v.bands[i] - t.bands[i])));
+  }
   fused.base = fuse_base(v.base, t.base, options, dictionary, said);
   return collapse(fused);
 }

@@ -16,13 +16,18 @@ struct MsSrifOptions {
   /// A patch is coded when this share of its norm is left: textured patches need no finer code to
   /// be compared. 0 = the reference's stop. See docs/benchmarks/fusion.md.
   double relative_residual = 0.01;
+  /// No code is sought where the structure of one patch (L1 norm of its DCT) is this many times the
+  /// other's: the codes would agree, and the winner itself is what its code comes close to. 0 = off.
+  double certain_ratio = 1.5;
 
   Status validate() const;  ///< usage error naming the field
 };
 
 struct MsSrifReport {
-  int patches = 0, flat_patches = 0;  ///< per source: codes sought, of them without any atom
-  double atoms_per_patch = 0;
+  int patches = 0, flat_patches = 0;  ///< per source: all, and those whose code has no atom
+  int certain_patches = 0;            ///< whose code was not sought
+  double atoms_per_patch = 0;         ///< of all patches
+  double levels_skipped = 0;          ///< share of the bands that hold nothing in both sources
   bool skipped = false;               ///< the images are identical: returned as they are
 };
 

@@ -4,6 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "fusion/pca_msif/fast_explicit_diffusion.hpp"
 
 namespace orbitfuse::fusion {
 namespace {
@@ -11,76 +15,127 @@ namespace {
 /// Half-sample mirror: ... 1 0 | 0 1 2 ... n-1 | n-1 n-2 ...
 int mirrored(int i, int n) { return i < 0 ? -1 - i : i >= n ? 2 * n - 1 - i : i; }
 
-/// Rows of a padded copy, so that the inner loops have no border cases.
-struct Padded {
-  static constexpr int pad = 2;
-  Plane data;
-  int rows, cols;
+constexpr int pad = 2;  // columns beside a row, so that the inner loops have no border cases
 
-  explicit Padded(cv::Size size)
-      : data(size.height, size.width + 2 * pad), rows(size.height), cols(size.width) {}
-  float* row(int y) { return data.ptr<float>(y) + pad; }
-  const float* row_mirrored(int y) const { return data.ptr<float>(mirrored(y, rows)) + pad; }
+/// Rows of `cols` samples with mirrored ends; `count` rows, used in turn when there are fewer of
+/// them than of the image.
+class PaddedRows {
+ public:
+  PaddedRows(int count, int cols)
+      : count_(count), cols_(cols), data_(static_cast<std::size_t>(count) * static_cast<std::size_t>(cols + 2 * pad)) {}
+  float* row(int y) { return data_.data() + static_cast<std::ptrdiff_t>(y % count_) * (cols_ + 2 * pad) + pad; }
   void mirror_ends(int y) {
     float* r = row(y);
     for (int i = 1; i <= pad; ++i) {
-      r[-i] = r[mirrored(-i, cols)];
-      r[cols - 1 + i] = r[mirrored(cols - 1 + i, cols)];
+      r[-i] = r[mirrored(-i, cols_)];
+      r[cols_ - 1 + i] = r[mirrored(cols_ - 1 + i, cols_)];
     }
   }
+
+ private:
+  int count_, cols_;
+  std::vector<float> data_;
 };
 
-/// c D_xx I and c D_yy I of one row.
-template <int reach>
-void flux_row(const Padded& image, int y, float scale, float inverse_k2, float* xx, float* yy) {
-  const float* c = image.row_mirrored(y);
-  const float* up = image.row_mirrored(y - reach);
-  const float* down = image.row_mirrored(y + reach);
-  for (int x = 0; x < image.cols; ++x) {
-    const float dxx = scale * (c[x - reach] - 2 * c[x] + c[x + reach]);
-    const float dyy = scale * (up[x] - 2 * c[x] + down[x]);
-    const float conduct = 1 / (1 + (dxx * dxx + dyy * dyy) * inverse_k2);
-    xx[x] = conduct * dxx;
-    yy[x] = conduct * dyy;
-  }
-}
+/// Image, conductivities and stencil that all time steps share.
+struct Field {
+  PaddedRows image, conductivity;
+  cv::Size size;
+  float inverse_k2;
+};
 
+/// One time step on its way down the image. Row y of the flux needs image rows y -+ reach before the
+/// step, row y of the step needs flux rows y -+ reach; so the step follows `reach` rows behind the
+/// flux, and only 2 reach + 1 rows of flux are kept. The stencil's scale is in inverse_k2 and in dt.
 template <int reach>
-void step_row(const Padded& xx, const Padded& yy, int y, float scaled_step, float* image) {
-  const float* h = xx.row_mirrored(y);
-  const float* c = yy.row_mirrored(y);
-  const float* up = yy.row_mirrored(y - reach);
-  const float* down = yy.row_mirrored(y + reach);
-  for (int x = 0; x < xx.cols; ++x)
-    image[x] -= scaled_step * ((h[x - reach] - 2 * h[x] + h[x + reach]) + (up[x] - 2 * c[x] + down[x]));
+class TimeStep {
+ public:
+  /// new_conductivity: taken from the image before this step; otherwise the last taken one holds.
+  TimeStep(Field& field, float dt, bool new_conductivity)
+      : field_(&field), dt_(dt), new_conductivity_(new_conductivity),
+        xx_(2 * reach + 1, field.size.width), yy_(2 * reach + 1, field.size.width) {}
+
+  void advance(int y) {
+    const int rows = field_->size.height;
+    if (y >= 0 && y < rows) new_conductivity_ ? flux<true>(y) : flux<false>(y);
+    if (y >= reach && y < rows + reach) step(y - reach);
+  }
+
+ private:
+  /// c D_xx I and c D_yy I.
+  template <bool takes_conductivity>
+  void flux(int y) {
+    const cv::Size size = field_->size;
+    const float inverse_k2 = field_->inverse_k2;
+    const float *c = field_->image.row(y), *up = field_->image.row(mirrored(y - reach, size.height)),
+                *down = field_->image.row(mirrored(y + reach, size.height));
+    float *xx = xx_.row(y), *yy = yy_.row(y), *conductivity = field_->conductivity.row(y);
+#pragma GCC ivdep  // too many rows for the compiler's own overlap checks
+    for (int x = 0; x < size.width; ++x) {
+      const float dxx = std::fma(-2.0F, c[x], c[x - reach] + c[x + reach]);
+      const float dyy = std::fma(-2.0F, c[x], up[x] + down[x]);
+      if constexpr (takes_conductivity)
+        conductivity[x] = 1 / std::fma(std::fma(dxx, dxx, dyy * dyy), inverse_k2, 1.0F);
+      xx[x] = conductivity[x] * dxx;
+      yy[x] = conductivity[x] * dyy;
+    }
+    xx_.mirror_ends(y);
+  }
+
+  void step(int y) {
+    const cv::Size size = field_->size;
+    const float *h = xx_.row(y), *c = yy_.row(y), *up = yy_.row(mirrored(y - reach, size.height)),
+                *down = yy_.row(mirrored(y + reach, size.height));
+    float* image = field_->image.row(y);
+#pragma GCC ivdep
+    for (int x = 0; x < size.width; ++x) {
+      const float around = (h[x - reach] + h[x + reach]) + (up[x] + down[x]);
+      image[x] = std::fma(-dt_, std::fma(-2.0F, h[x] + c[x], around), image[x]);
+    }
+    field_->image.mirror_ends(y);
+  }
+
+  Field* field_;
+  float dt_;
+  bool new_conductivity_;
+  PaddedRows xx_, yy_;
+};
+
+/// Time steps that follow each other down the image at once: their rows stay in the second-level
+/// cache, where single steps would fetch the whole image from memory every time.
+constexpr std::size_t steps_at_once = 10;
+
+/// dt of every step in order; in a list of its own, what shares one conductivity.
+std::vector<std::vector<double>> schedule(const SmootherOptions& options) {
+  const auto count = static_cast<std::size_t>(options.iterations);
+  if (options.cycles == 0 || count == 0) return std::vector(count, std::vector{options.time_step});
+  const double limit = largest_stable_step(options.stencil), time = options.iterations * options.time_step;
+  const double cycles = std::max<double>(options.cycles, std::ceil(time / longest_cycle(limit)));
+  return std::vector(static_cast<std::size_t>(cycles), fast_explicit_steps(time / cycles, limit));
 }
 
 template <int reach>
 Plane diffused(const Plane& input, const SmootherOptions& options) {
-  const float scale = reach == 2 ? 0.25F : 1.0F;
-  const auto inverse_k2 = static_cast<float>(1 / (options.edge_scale * options.edge_scale));
-  const float scaled_step = static_cast<float>(options.time_step) * scale;
-  Padded image(input.size()), xx(input.size()), yy(input.size());
+  const double scale = reach == 2 ? 0.25 : 1.0;
+  Field field{PaddedRows(input.rows, input.cols), PaddedRows(input.rows, input.cols), input.size(),
+              static_cast<float>(scale * scale / (options.edge_scale * options.edge_scale))};
   for (int y = 0; y < input.rows; ++y) {
-    std::copy_n(input.ptr<float>(y), input.cols, image.row(y));
-    image.mirror_ends(y);
+    std::copy_n(input[y], input.cols, field.image.row(y));
+    field.image.mirror_ends(y);
   }
-  for (int t = 0; t < options.iterations; ++t) {
-    // The step of a row follows the flux by `reach` rows, so both work on rows in the cache; the
-    // flux above has read the row before it changes.
-    for (int y = 0; y < input.rows + 2 * reach; ++y) {
-      if (y < input.rows) {
-        flux_row<reach>(image, y, scale, inverse_k2, xx.row(y), yy.row(y));
-        xx.mirror_ends(y);
-      }
-      const int done = y - 2 * reach;
-      if (done >= 0 && done < input.rows) {
-        step_row<reach>(xx, yy, done, scaled_step, image.row(done));
-        image.mirror_ends(done);
-      }
-    }
+  std::vector<TimeStep<reach>> steps;
+  for (const std::vector<double>& cycle : schedule(options))
+    for (std::size_t i = 0; i < cycle.size(); ++i)
+      steps.emplace_back(field, static_cast<float>(cycle[i] * scale * scale), i == 0);
+  for (std::size_t first = 0; first < steps.size(); first += steps_at_once) {
+    const int count = static_cast<int>(std::min(steps_at_once, steps.size() - first));
+    // A step may work on row y once the one before has left row y + reach, 2 reach rows ahead.
+    for (int front = 0; front < input.rows + reach + 2 * reach * (count - 1); ++front)
+      for (int k = 0; k < count; ++k) steps[first + static_cast<std::size_t>(k)].advance(front - 2 * reach * k);
   }
-  return image.data.colRange(Padded::pad, Padded::pad + input.cols).clone();
+  Plane result(input.size());
+  for (int y = 0; y < input.rows; ++y) std::copy_n(field.image.row(y), input.cols, result[y]);
+  return result;
 }
 
 }  // namespace
@@ -92,6 +147,7 @@ Status SmootherOptions::validate() const {
     return fail(ErrorKind::usage, std::string("pca_msif.smoother.") + field, fmt::format("{}", value), rule);
   };
   if (iterations < 0 || iterations > 10000) return bad("iterations", iterations, "must be in 0..10000");
+  if (cycles < 0 || cycles > 10000) return bad("cycles", cycles, "must be in 0..10000");
   const double limit = largest_stable_step(stencil);
   if (!(time_step > 0 && time_step <= limit))
     return bad("time_step", time_step,

@@ -6,11 +6,12 @@
 // Which source gives a coefficient of a high-pass band.
 namespace orbitfuse::fusion {
 
-/// 255 where the visible coefficient is taken: the larger maximum of |.| over 3x3, then the
-/// majority of 3x3 (more than 4 of 9), which removes lone switches.
-cv::Mat1b choose_by_magnitude(const Plane& visible, const Plane& thermal);
+/// Neither band exceeds a quarter of a gray level anywhere: no choice between them can be seen.
+bool silent(const Plane& visible, const Plane& thermal);
 
-/// Coefficients taken by `take_visible`.
-Plane choose(const Plane& visible, const Plane& thermal, const cv::Mat1b& take_visible);
+/// Weight of the visible coefficient, 0..1: the larger maximum of |.| over 3x3 chooses, the majority
+/// of 5x5 choices holds (reference: 3x3), which removes lone switches, and choices are averaged over
+/// 3x3, so that a border between sources is a ramp instead of a seam.
+Plane share_by_magnitude(const Plane& visible, const Plane& thermal);
 
 }  // namespace orbitfuse::fusion

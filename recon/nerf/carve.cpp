@@ -82,12 +82,12 @@ double carve(const Dataset& dataset, const Space& space, const std::vector<Scene
       }
   });
   for (std::int64_t cell = 0; cell < occupancy.cell_count(); ++cell) {
-    const std::int64_t x = cell % n / 2, y = cell / n % n / 2, slab = cell / n / n;
-    const std::int64_t coarse = (slab / n * half + slab % n / 2);
-    if (off[static_cast<std::size_t>((coarse * half + y) * half + x)])
+    int i[3];
+    const std::int64_t slab = occupancy.coordinates_of(cell, i) * half + i[2] / 2;
+    if (off[static_cast<std::size_t>((slab * half + i[1] / 2) * half + i[0] / 2)])
       Occupancy::put(occupancy.allowed, cell, false);
   }
-  if (options.carve && dataset.depth.empty())
+  if (options.carve && !dataset.has_dense_depth())
     for (const SceneView& view : views)
       for (const std::int32_t pixel : view.known) {
         const int width = view.rays.camera().width;
@@ -97,6 +97,7 @@ double carve(const Dataset& dataset, const Space& space, const std::vector<Scene
         clear_segment(occupancy, ray, 0.96f * end - 0.02f, 0.03f);
       }
   occupancy.on = occupancy.allowed;
+  occupancy.refresh();
   static_cast<void>(space);
   return occupancy.fraction_on();
 }

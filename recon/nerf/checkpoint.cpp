@@ -13,7 +13,7 @@
 namespace orbitfuse::nerf {
 namespace {
 
-constexpr char magic[8] = {'O', 'F', 'N', 'E', 'R', 'F', '0', '1'};
+constexpr char magic[8] = {'O', 'F', 'N', 'E', 'R', 'F', '0', '2'};
 constexpr std::size_t hash_length = 32;
 
 class Writer {
@@ -127,6 +127,7 @@ void visit(Archive& io, Occupancy& grid) {
       if (grid.visited[i] < 0 || grid.visited[i] >= grid.cell_count()) return void(io.ok = false);
       grid.window[static_cast<std::size_t>(grid.visited[i])] = window[i];
     }
+    grid.refresh();
   }
 }
 

@@ -62,6 +62,16 @@ Status Dataset::validate() const {
   return {};
 }
 
+bool Dataset::has_dense_depth() const {
+  constexpr double least = 0.1;  // share of the pixels; below it maps are like sparse points
+  std::int64_t known = 0, all = 0;
+  for (const DepthMap& map : depth) {
+    known += cv::countNonZero(map.depth == map.depth);
+    all += static_cast<std::int64_t>(map.depth.total());
+  }
+  return all > 0 && static_cast<double>(known) > least * static_cast<double>(all);
+}
+
 cv::Mat rgb_of_bgr8(const cv::Mat& bgr8, cv::Size size) {
   cv::Mat small = bgr8, rgb, out;
   if (size.area() > 0 && size != bgr8.size()) cv::resize(bgr8, small, size, 0, 0, cv::INTER_AREA);

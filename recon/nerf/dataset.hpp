@@ -34,6 +34,8 @@ struct Dataset {
   std::vector<SparsePoint> points;  ///< optional; Observation::view indexes `views`
   std::vector<DepthMap> depth;      ///< optional; DepthMap::view indexes `views`
 
+  /// Depth maps know enough of the scene to say where it is empty.
+  bool has_dense_depth() const;
   /// Names the view and the field that is malformed: sizes, types, cameras, poses, values.
   Status validate() const;
 };

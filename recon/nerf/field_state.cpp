@@ -63,6 +63,7 @@ void FieldState::restore(const Snapshot& from) {
   const auto sets = parameters();
   for (std::size_t i = 0; i < sets.size(); ++i) sets[i]->value = from.values[i];
   occupancy.on = from.occupied;
+  occupancy.refresh();
   refresh();
 }
 

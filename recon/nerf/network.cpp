@@ -129,14 +129,17 @@ LayerView Mlp::view(int index) const {
           paired_t.data() + layer.offset};
 }
 
-void Mlp::forward(const Kernels& kernels, int rows, const float* in, Activations& a) const {
+void Mlp::forward(const Kernels& kernels, int rows, const float* in, Activations& a,
+                  int first_row) const {
   a.resize(layers.size());
   const float* from = in;
   for (std::size_t l = 0; l < layers.size(); ++l) {
-    const std::size_t need = static_cast<std::size_t>(rows) * static_cast<std::size_t>(layers[l].out);
-    if (a[l].size() < need) a[l].resize(need);
-    kernels.forward(view(static_cast<int>(l)), rows, from, a[l].data(), l + 1 < layers.size());
-    from = a[l].data();
+    const auto out = static_cast<std::size_t>(layers[l].out);
+    const std::size_t offset = static_cast<std::size_t>(first_row) * out;
+    const std::size_t need = offset + static_cast<std::size_t>(rows) * out;
+    if (a[l].size() < need) a[l].resize(need + need / 4);
+    kernels.forward(view(static_cast<int>(l)), rows, from, a[l].data() + offset, l + 1 < layers.size());
+    from = a[l].data() + offset;
   }
 }
 

@@ -50,7 +50,9 @@ struct Mlp {
 
   /// Activations of one batch: the output of every layer, [rows][out] each.
   using Activations = std::vector<std::vector<float>>;
-  void forward(const Kernels& kernels, int rows, const float* in, Activations& a) const;
+  /// Rows before `first_row` of `a` stay as they are: a batch may be computed in parts.
+  void forward(const Kernels& kernels, int rows, const float* in, Activations& a,
+               int first_row = 0) const;
   /// dout is [rows][out()]; din (may be null) gets dL/din; gradient is added to dweights.
   void backward(const Kernels& kernels, int rows, const float* in, const Activations& a,
                 const float* dout, float* din, std::vector<float>& scratch_a,

@@ -15,7 +15,9 @@ void Occupancy::create(int cells_per_axis, int cascade_count) {
   on.assign((cells + 63) / 64, ~std::uint64_t{0});
   allowed = on;
   density.assign(cells, 0);
+  code.assign(cells, 0);
   window.assign(cells, -1);
+  refresh();
 }
 
 int Occupancy::cascade_of(const float x[3]) {
@@ -25,23 +27,52 @@ int Occupancy::cascade_of(const float x[3]) {
   return static_cast<int>((std::bit_cast<std::uint32_t>(far) >> 23) & 0xFF) - 127 + 1;
 }
 
-std::int64_t Occupancy::cell_of(int cascade, const float x[3]) const {
-  const float scale = 0.5f * static_cast<float>(resolution) / static_cast<float>(1 << cascade);
-  const float half = 0.5f * static_cast<float>(resolution);
-  int i[3];
-  for (int d = 0; d < 3; ++d)
-    i[d] = std::clamp(static_cast<int>(x[d] * scale + half), 0, resolution - 1);
-  return ((static_cast<std::int64_t>(cascade) * resolution + i[2]) * resolution + i[1]) * resolution +
-         i[0];
+int Occupancy::coordinates_of(std::int64_t cell, int i[3]) const {
+  const std::int64_t blocks = resolution / 4, block = cell >> 6;
+  const int low[3] = {static_cast<int>(cell & 3), static_cast<int>(cell >> 2 & 3),
+                      static_cast<int>(cell >> 4 & 3)};
+  const std::int64_t high[3] = {block % blocks, block / blocks % blocks, block / (blocks * blocks) % blocks};
+  for (int d = 0; d < 3; ++d) i[d] = static_cast<int>(high[d]) * 4 + low[d];
+  return static_cast<int>(block / (blocks * blocks * blocks));
 }
 
 void Occupancy::center_of(std::int64_t cell, float x[3]) const {
-  const std::int64_t n = resolution;
-  const int cascade = static_cast<int>(cell / (n * n * n));
-  const std::int64_t local = cell % (n * n * n);
-  const std::int64_t i[3] = {local % n, local / n % n, local / (n * n)};
+  int i[3];
+  const int cascade = coordinates_of(cell, i);
   for (int d = 0; d < 3; ++d)
     x[d] = (static_cast<float>(i[d]) + 0.5f) * cell_size(cascade) - static_cast<float>(1 << cascade);
+}
+
+namespace {
+
+constexpr float codes_per_octave = 14.5f;  // 255 codes reach e^12, the highest density
+
+std::uint8_t code_of(float density) {
+  return static_cast<std::uint8_t>(
+      std::clamp(std::lround(codes_per_octave * std::log2(1 + density)), 0l, 255l));
+}
+
+struct Decoded {
+  float density[256];
+  Decoded() {
+    for (int i = 0; i < 256; ++i) density[i] = std::exp2(static_cast<float>(i) / codes_per_octave) - 1;
+  }
+};
+
+}  // namespace
+
+void Occupancy::refresh() {
+  code.resize(density.size());
+  march_words.assign(2 * on.size(), 0);
+  any.assign((on.size() + 63) / 64, 0);
+  for (std::size_t b = 0; b < on.size(); ++b) {
+    march_words[2 * b] = on[b];
+    put(any, static_cast<std::int64_t>(b), on[b] != 0);
+  }
+  for (std::size_t i = 0; i < density.size(); ++i) {
+    code[i] = density[i] > 0 ? code_of(density[i]) : std::uint8_t{0};
+    if (code[i] > 0) march_words[2 * (i >> 6) + 1] |= std::uint64_t{1} << (i & 63);
+  }
 }
 
 double Occupancy::fraction_on() const {
@@ -76,6 +107,10 @@ void Occupancy::update(float decay, float threshold) {
   for (const std::int64_t c : visited) {
     const auto i = static_cast<std::size_t>(c);
     put(on, c, test(allowed, c) && opacity(c, density[i]) >= limit);
+    code[i] = code_of(density[i]);
+    march_words[2 * (i >> 6)] = on[i >> 6];
+    put(any, c >> 6, on[i >> 6] != 0);
+    put(march_words, (c >> 6) * 128 + 64 + (c & 63), code[i] > 0);
     window[i] = -1;
   }
   visited.clear();
@@ -88,12 +123,13 @@ struct Segment {
   float begin, length;
   float surface;  ///< opacity expected there
   float haze;     ///< share of the samples that look everywhere
+  bool plain;     ///< nothing is known of it but that it may be occupied
 };
 
 constexpr int max_segments = 1024;
 
 /// Occupied cells along the ray, nearest first.
-int segments_of(const Occupancy& occupancy, const Ray& ray, float near, Segment* out) {
+int segments_of(const Occupancy& occupancy, const Ray& ray, float near, float far, Segment* out) {
   float inverse[3];
   for (int d = 0; d < 3; ++d)
     inverse[d] = 1.0f / (std::abs(ray.direction[d]) > 1e-9f ? ray.direction[d]
@@ -107,24 +143,36 @@ int segments_of(const Occupancy& occupancy, const Ray& ray, float near, Segment*
     if (ray.origin[d] * ray.direction[d] >= 0) return 0;
     t = std::max(t, gap * std::abs(inverse[d]) * 1.0001f);
   }
+  static const Decoded decoded;
   int count = 0;
-  for (int guard = 0; guard < 8 * max_segments && count < max_segments; ++guard) {
+  for (int guard = 0; t < far && guard < 8 * max_segments && count < max_segments; ++guard) {
     float x[3];
     for (int d = 0; d < 3; ++d) x[d] = ray.origin[d] + t * ray.direction[d];
     const int cascade = Occupancy::cascade_of(x);
     if (cascade >= occupancy.cascades) break;
     const float size = occupancy.cell_size(cascade);
+    const std::int64_t cell = occupancy.cell_of(cascade, x);
+    const bool empty = !Occupancy::test(occupancy.any, cell >> 6);
+    const float step = empty ? 4 * size : size;  // an empty block in one step
+    const float per_step = 1 / step;
     float exit = std::numeric_limits<float>::max();
     for (int d = 0; d < 3; ++d) {
-      const float edge = (std::floor(x[d] / size) + (inverse[d] > 0 ? 1.0f : 0.0f)) * size;
+      const float edge = (std::floor(x[d] * per_step) + (inverse[d] > 0 ? 1.0f : 0.0f)) * step;
       exit = std::min(exit, (edge - x[d]) * inverse[d]);
     }
     exit = std::max(exit, 0.0f) + 1e-3f * size;  // across the border in spite of rounding
-    const std::int64_t cell = occupancy.cell_of(cascade, x);
-    if (Occupancy::test(occupancy.on, cell)) {
-      // depth / (1 + depth) stands for 1 - exp(-depth): only relative sizes matter here.
-      const float depth = exit * occupancy.density[static_cast<std::size_t>(cell)];
-      out[count++] = {t, exit, depth / (1 + depth), exit / size};
+    const std::uint64_t* words = &occupancy.march_words[2 * static_cast<std::size_t>(cell >> 6)];
+    if (!empty && (words[0] >> (cell & 63) & 1u)) {
+      const int code = words[1] >> (cell & 63) & 1u ? occupancy.code[static_cast<std::size_t>(cell)] : 0;
+      Segment* last = count > 0 ? &out[count - 1] : nullptr;
+      if (code == 0 && last && last->plain && t <= last->begin + last->length + 1e-5f) {
+        last->length += exit;
+        last->haze += exit / size;
+      } else {
+        // depth / (1 + depth) stands for 1 - exp(-depth): only relative sizes matter here.
+        const float depth = exit * decoded.density[code];
+        out[count++] = {t, exit, depth / (1 + depth), exit / size, code == 0};
+      }
     }
     t += exit;
   }
@@ -136,7 +184,7 @@ int segments_of(const Occupancy& occupancy, const Ray& ray, float near, Segment*
 int march(const Occupancy& occupancy, const Ray& ray, const MarchSettings& settings, float jitter,
           float* t, float* dt) {
   thread_local std::vector<Segment> segments(max_segments);
-  const int cells = segments_of(occupancy, ray, settings.near, segments.data());
+  const int cells = segments_of(occupancy, ray, settings.near, settings.far, segments.data());
   if (cells == 0) return 0;
   float surface = 0, haze = 0;
   for (int i = 0; i < cells; ++i) {
@@ -144,7 +192,7 @@ int march(const Occupancy& occupancy, const Ray& ray, const MarchSettings& setti
     haze += segments[static_cast<std::size_t>(i)].haze;
   }
   const float for_surface = static_cast<float>(settings.surface) * std::min(1.0f, surface);
-  const float for_haze = std::clamp(haze, 2.0f, static_cast<float>(settings.haze));
+  const float for_haze = std::clamp(haze, 2.0f, std::max(2.0f, static_cast<float>(settings.haze)));
   const int count = std::min(max_ray_samples, static_cast<int>(std::ceil(for_surface + for_haze)));
   const float surface_share = surface > 0 ? for_surface / surface : 0.0f, haze_share = for_haze / haze;
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "recon/nerf/view_rays.hpp"
@@ -9,13 +11,16 @@
 namespace orbitfuse::nerf {
 
 /// Which cells of space may hold matter: nested cubes ("cascades") of half extent 1, 2, 4, ...
-/// normalised units, `resolution`^3 cells each. A cell outside `allowed` never comes on.
+/// normalised units, `resolution`^3 cells each (a multiple of 16). A cell outside `allowed` never
+/// comes on. Cells are stored in blocks of 4x4x4: a block's bits are one word and its codes one
+/// cache line, so that a ray that walks through reads each once, and skips an empty one in a step.
 struct Occupancy {
   int resolution = 0, cascades = 0;
   std::vector<std::uint64_t> on, allowed;  ///< bit per cell
   /// Decaying maximum of T * sigma: the density that the best of the rays through a cell sees. What
   /// is hidden behind surfaces is not worth samples either.
   std::vector<float> density;
+  std::vector<std::uint8_t> code;          ///< density in steps of 5 %, for marching
   std::vector<float> window;               ///< maximum since the last update; -1 = not visited
   std::vector<std::int64_t> visited;       ///< cells whose window is set
 
@@ -33,11 +38,32 @@ struct Occupancy {
   }
   /// Cascade of a normalised point: the smallest cube that holds it (>= cascades: outside all).
   static int cascade_of(const float x[3]);
-  std::int64_t cell_of(int cascade, const float x[3]) const;
+  std::int64_t cell_of(int cascade, const float x[3]) const {
+    const float scale = 0.5f * static_cast<float>(resolution) / static_cast<float>(1 << cascade);
+    const float half = 0.5f * static_cast<float>(resolution);
+    int i[3];
+    for (int d = 0; d < 3; ++d)
+      i[d] = std::clamp(static_cast<int>(x[d] * scale + half), 0, resolution - 1);
+    return index_of(cascade, i);
+  }
   float cell_size(int cascade) const {
     return 2.0f * static_cast<float>(1 << cascade) / static_cast<float>(resolution);
   }
   void center_of(std::int64_t cell, float x[3]) const;
+  /// Of whole-cell coordinates within a cascade, and back.
+  std::int64_t index_of(int cascade, const int i[3]) const {
+    const std::int64_t blocks = resolution / 4;
+    const std::int64_t block =
+        ((cascade * blocks + (i[2] >> 2)) * blocks + (i[1] >> 2)) * blocks + (i[0] >> 2);
+    return block * 64 + ((i[2] & 3) << 4 | (i[1] & 3) << 2 | (i[0] & 3));
+  }
+  int coordinates_of(std::int64_t cell, int i[3]) const;  ///< returns the cascade
+  /// Derived arrays, after `on` or `density` were set from outside.
+  void refresh();
+
+  /// Two words a block: `on`, and which cells have a code; marching reads codes only of those.
+  std::vector<std::uint64_t> march_words;
+  std::vector<std::uint64_t> any;  ///< bit per block: a cell of it is on; small enough for the L1 cache
   double fraction_on() const;
 
   /// Notes a visible density found at a point.
@@ -51,6 +77,7 @@ struct Occupancy {
 /// occupied cell, up to `haze`, over everything that is not known to be empty.
 struct MarchSettings {
   float near = 0.1f;   ///< normalised units
+  float far = std::numeric_limits<float>::max();  ///< nothing beyond it is seen
   int surface = 16;
   int haze = 24;
 };

@@ -55,7 +55,7 @@ const std::vector<Entry>& table() {
       FIELD(occupancy_resolution, 16, 256),
       FIELD(occupancy_threshold, 0, 0.9),
       FIELD(surface_samples, 1, 128),
-      FIELD(haze_samples, 2, 128),
+      FIELD(haze_samples, 0, 128),
       FIELD(proposal_samples_1, 8, 1024),
       FIELD(proposal_samples_2, 8, 1024),
       FIELD(fine_samples, 4, 1024),
@@ -146,6 +146,9 @@ Status TrainOptions::validate() const {
   if (max_resolution < base_resolution)
     return fail(ErrorKind::usage, "nerf.max_resolution", fmt::format("{}", max_resolution),
                 fmt::format("choose at least base_resolution ({})", base_resolution));
+  if (occupancy_resolution % 16 != 0)
+    return fail(ErrorKind::usage, "nerf.occupancy_resolution", fmt::format("{}", occupancy_resolution),
+                "choose a multiple of 16");
   for (const int width : {hidden, color_hidden})
     if (width % 16 != 0)
       return fail(ErrorKind::usage, "nerf.hidden", fmt::format("{}", width),

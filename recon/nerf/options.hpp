@@ -35,7 +35,7 @@ struct TrainOptions {
   // -- field ---------------------------------------------------------------------------------
   int levels = 8;              ///< hash-grid resolutions
   int features_per_level = 4;  ///< 2 or 4
-  int log2_table = 15;         ///< entries per level; 15 stays in the L2 cache
+  int log2_table = 17;         ///< entries per level; 15 is 10 % faster and 0.4 dB worse
   int base_resolution = 16;
   int max_resolution = 1024;   ///< cells over the contracted scene, finest level
   int hidden = 64;             ///< width of the density network
@@ -49,7 +49,9 @@ struct TrainOptions {
   int occupancy_resolution = 128;        ///< cells per axis of each cascade
   double occupancy_threshold = 0.02;     ///< visible opacity below which a cell is empty
   int surface_samples = 16;              ///< per ray, where surfaces are expected
-  int haze_samples = 24;                 ///< per ray at most, over all that may not be empty
+  /// Per ray at most, over all that may not be empty; 0 = 8 where dense depth or a guide field tell
+  /// empty space from matter, else 24.
+  int haze_samples = 0;
   int proposal_samples_1 = 256, proposal_samples_2 = 96;  ///< per ray (Sampling::proposal)
   int fine_samples = 48;
 

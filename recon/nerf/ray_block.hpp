@@ -22,6 +22,12 @@ struct RayBlock {
   std::vector<float> color_in;
   std::vector<float> value;                 ///< [active][channels], activated
 
+  // Scratch of the density pass: samples in the order of evaluation.
+  std::vector<int> row_of, next, round;
+  std::vector<char> background_known;  ///< per ray: light reached it, so it was evaluated
+  std::vector<float> round_position01, round_features, ray_light;
+  Mlp::Activations round_density;
+
   // Scratch of the backward pass.
   std::vector<float> dweight, dsigma, dcolor, dcolor_in, ddensity, dfeatures, scratch_a, scratch_b;
   std::vector<float> s, ds;
@@ -37,9 +43,11 @@ struct RayBlock {
 struct ForwardSettings {
   float stop = 1e-4f;        ///< transmittance below which a ray is finished
   float min_weight = 1e-4f;  ///< samples that contribute less get no colour
+  bool gradients = true;     ///< keep what backward() reads
 };
 
-/// Density, weights and colours of a block.
+/// Density, weights and colours of a block. Rays are followed front to back; samples behind what
+/// stops them are removed from the block.
 void forward(const FieldState& field, const Kernels& kernels, const ForwardSettings& settings,
              RayBlock& block);
 

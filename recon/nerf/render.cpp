@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <opencv2/imgproc.hpp>
 
 #include "core/parallel.hpp"
 #include "recon/nerf/ray_block.hpp"
@@ -54,48 +55,124 @@ Status RenderOptions::validate() const {
   return {};
 }
 
+namespace {
+
+constexpr int limit_stride = 4;          // one ray of 16 looks ahead for its neighbours
+constexpr float limit_margin = 1.03f;
+constexpr float no_limit = std::numeric_limits<float>::max();
+
+/// Renders the pixels of one image, block by block.
+class ImageRenderer {
+ public:
+  ImageRenderer(const FieldState& field, const ViewRays& rays, int stride, const RenderOptions& options)
+      : field_(field), rays_(rays), stride_(stride), kernels_(kernels_for(best_isa())),
+        march_(field.march_settings()),
+        limits_{static_cast<float>(options.stop_transmittance), 1e-4f, false} {
+    const Camera& camera = rays.camera();
+    width_ = (camera.width + stride - 1) / stride;
+    height_ = (camera.height + stride - 1) / stride;
+    march_.surface = static_cast<int>(std::lround(march_.surface * options.sample_factor));
+    march_.haze = static_cast<int>(std::lround(march_.haze * options.sample_factor));
+  }
+
+  /// Where each ray has met what stops it; no_limit where nothing did.
+  cv::Mat ends() {
+    cv::Mat out(height_, width_, CV_32FC1, cv::Scalar(no_limit));
+    parallel_blocks(width_ * height_, rays_per_block, [&](int begin, int end) {
+      thread_local RayBlock block;
+      thread_local std::vector<int> pixels;
+      block.clear();
+      pixels.clear();
+      for (int p = begin; p < end; ++p) add(p, no_limit, block, pixels);
+      forward(field_, kernels_, limits_, block);
+      for (std::size_t r = 0; r < pixels.size(); ++r)
+        if (stopped(block, static_cast<int>(r))) {
+          const auto last = static_cast<std::size_t>(block.first[r] + block.used[r] - 1);
+          out.at<float>(pixels[r] / width_, pixels[r] % width_) = block.t[last] + block.dt[last];
+        }
+    });
+    return out;
+  }
+
+  /// `far`: per pixel how far to look first; a ray that isn't stopped by then looks on to the end.
+  RenderedView image(const cv::Mat& far) {
+    const int channels = field_.channels();
+    RenderedView view;
+    view.color.create(height_, width_, CV_32FC(channels));
+    view.color.setTo(cv::Scalar::all(nan));  // stays outside the lens model's field of view
+    view.depth.create(height_, width_, CV_32FC1);
+    view.depth.setTo(nan);
+    view.opacity = cv::Mat::zeros(height_, width_, CV_32FC1);
+    parallel_blocks(width_ * height_, rays_per_block, [&](int begin, int end) {
+      thread_local RayBlock block;
+      thread_local std::vector<int> pixels, again;
+      again.clear();
+      for (const bool limited : {true, false}) {
+        block.clear();
+        pixels.clear();
+        if (limited)
+          for (int p = begin; p < end; ++p) add(p, far.at<float>(p / width_, p % width_), block, pixels);
+        else
+          for (const int p : again) add(p, no_limit, block, pixels);
+        if (pixels.empty()) continue;
+        forward(field_, kernels_, limits_, block);
+        int row = 0;
+        for (std::size_t r = 0; r < pixels.size(); ++r) {
+          const int x = pixels[r] % width_, y = pixels[r] / width_;
+          write_ray(field_, block, static_cast<int>(r), row,
+                    {view.color.ptr<float>(y) + x * channels, view.depth.ptr<float>(y) + x,
+                     view.opacity.ptr<float>(y) + x});
+          if (limited && far.at<float>(y, x) < no_limit && !stopped(block, static_cast<int>(r)))
+            again.push_back(pixels[r]);
+        }
+      }
+    });
+    return view;
+  }
+
+ private:
+  void add(int pixel, float far, RayBlock& block, std::vector<int>& pixels) const {
+    const Camera& camera = rays_.camera();
+    const int x = pixel % width_ * stride_ + stride_ / 2, y = pixel / width_ * stride_ + stride_ / 2;
+    Ray ray;
+    if (!rays_.ray(std::min(camera.width - 1, x) + 0.5, std::min(camera.height - 1, y) + 0.5, ray)) return;
+    MarchSettings settings = march_;
+    settings.far = far;
+    block.add(field_, ray, settings, 0.5f);
+    pixels.push_back(pixel);
+  }
+  bool stopped(const RayBlock& block, int ray) const {
+    const auto r = static_cast<std::size_t>(ray);
+    return block.used[r] > 0 &&
+           block.light[static_cast<std::size_t>(block.first[r] + block.used[r] - 1)] < limits_.stop;
+  }
+
+  const FieldState& field_;
+  const ViewRays& rays_;
+  int stride_, width_ = 0, height_ = 0;
+  const Kernels& kernels_;
+  MarchSettings march_;
+  ForwardSettings limits_;
+};
+
+}  // namespace
+
 RenderedView render_strided(const FieldState& field, const ViewRays& rays, int stride,
                             const RenderOptions& options) {
-  const Camera& camera = rays.camera();
-  const int width = (camera.width + stride - 1) / stride, height = (camera.height + stride - 1) / stride;
-  const int channels = field.channels();
-  RenderedView view;
-  view.color.create(height, width, CV_32FC(channels));
-  view.depth.create(height, width, CV_32FC1);
-  view.opacity.create(height, width, CV_32FC1);
-  const Kernels& kernels = kernels_for(best_isa());
-  MarchSettings settings = field.march_settings();
-  settings.surface = static_cast<int>(std::lround(settings.surface * options.sample_factor));
-  settings.haze = static_cast<int>(std::lround(settings.haze * options.sample_factor));
-  const ForwardSettings limits{static_cast<float>(options.stop_transmittance), 1e-4f};
-  parallel_blocks(width * height, rays_per_block, [&](int begin, int end) {
-    thread_local RayBlock block;
-    thread_local std::vector<int> pixels;
-    block.clear();
-    pixels.clear();
-    for (int p = begin; p < end; ++p) {
-      const int x = p % width, y = p / width;
-      Ray ray;
-      if (rays.ray(std::min(camera.width - 1, x * stride + stride / 2) + 0.5,
-                   std::min(camera.height - 1, y * stride + stride / 2) + 0.5, ray)) {
-        pixels.push_back(p);
-        block.add(field, ray, settings, 0.5f);
-      } else {  // outside the lens model's field of view
-        std::fill_n(view.color.ptr<float>(y) + x * channels, channels, nan);
-        view.depth.at<float>(y, x) = nan;
-        view.opacity.at<float>(y, x) = 0;
-      }
-    }
-    forward(field, kernels, limits, block);
-    int row = 0;
-    for (std::size_t r = 0; r < pixels.size(); ++r) {
-      const int x = pixels[r] % width, y = pixels[r] / width;
-      write_ray(field, block, static_cast<int>(r), row,
-                {view.color.ptr<float>(y) + x * channels, view.depth.ptr<float>(y) + x,
-                 view.opacity.ptr<float>(y) + x});
-    }
-  });
-  return view;
+  ImageRenderer renderer(field, rays, stride, options);
+  const int width = (rays.camera().width + stride - 1) / stride, height = (rays.camera().height + stride - 1) / stride;
+  if (std::min(width, height) < 8 * limit_stride)
+    return renderer.image(cv::Mat(height, width, CV_32FC1, cv::Scalar(no_limit)));
+  // What lies behind opaque surfaces is half of most rays. Look where they are at a sixteenth of
+  // the pixels; the farthest of the neighbours is the limit.
+  const cv::Mat ends = ImageRenderer(field, rays, stride * limit_stride, options).ends();
+  cv::Mat farthest, far;
+  cv::dilate(ends, farthest, cv::Mat::ones(3, 3, CV_8U));
+  cv::resize(farthest, far, {width, height}, 0, 0, cv::INTER_NEAREST);
+  for (int y = 0; y < height; ++y)
+    for (float *f = far.ptr<float>(y), *e = f + width; f != e; ++f)
+      if (*f < no_limit) *f *= limit_margin;
+  return renderer.image(far);
 }
 
 double psnr_of(const FieldState& field, const SceneView& view, int stride) {

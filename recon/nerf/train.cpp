@@ -73,6 +73,7 @@ Status inherit_geometry(const FieldState& guide, FieldState& state) {
   state.main.mlp.weights.value = guide.main.mlp.weights.value;
   state.occupancy.on = guide.occupancy.on;
   state.occupancy.density = guide.occupancy.density;
+  state.occupancy.refresh();
   state.refresh();
   return {};
 }
@@ -137,6 +138,8 @@ Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
     state->space = estimate_space(dataset);
     state->span = estimate_span(dataset);
   }
+  if (state->options.haze_samples == 0)
+    state->options.haze_samples = !dataset.has_dense_depth() && !options.shared_geometry ? 24 : 8;
   if (options.shared_geometry && !resumed) {
     ORBITFUSE_TRY(inherit_geometry(guide->state(), *state));
     report.skips.push_back({"density from nothing", "the visible field's geometry is given",
@@ -249,6 +252,10 @@ Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
   }
   for (std::size_t i = 0; options.per_image_offset && i < dataset.views.size(); ++i)
     report.image_offsets_k.push_back(state->image_offsets.value[i] * (state->span.high - state->span.low));
+  // How a field came about is the report's; equal fields are equal files.
+  state->spent_cpu_s = state->spent_wall_s = 0;
+  state->options.resume = false;
+  state->options.checkpoint.clear();
   out = Field(std::move(state));
   return report;
 }

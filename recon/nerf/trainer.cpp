@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/parallel.hpp"
 #include "recon/nerf/random.hpp"
@@ -14,6 +15,7 @@ constexpr int rays_per_block = 32;
 constexpr int shard_count = 16;  ///< of weight gradients; fixed, so sums do not depend on threads
 constexpr int occupancy_every = 16;
 constexpr int occupancy_warmup = 64;
+constexpr float known_depth_margin = 1.08f;  ///< a wrong depth must be able to move
 
 enum Stream : std::uint64_t { pixel_stream = 1, jitter_stream, known_stream, probe_stream };
 
@@ -57,7 +59,7 @@ void Trainer::draw(Block& block, int begin, int end, double progress) {
   const bool sparse = known_ends_.back() > 0 && known_ends_.back() < pixel_ends_.back() / 10;
   block.rays.clear();
   block.targets.clear();
-  const MarchSettings settings = field_.march_settings();
+  MarchSettings settings = field_.march_settings();
   for (int i = begin; i < end; ++i) {
     for (int attempt = 0; attempt < 8; ++attempt) {
       const std::uint64_t draw_key = key(i) * 8 + static_cast<unsigned>(attempt);
@@ -79,7 +81,10 @@ void Trainer::draw(Block& block, int begin, int end, double progress) {
       std::copy_n(stored, field_.channels(), target.value);
       target.view = index;
       const float distance = view.distance.at<float>(y, x);
+      settings.far = std::numeric_limits<float>::max();
       if (std::isfinite(distance)) {
+        // What lies behind a known surface isn't seen. Sparse points are too few to gain from it.
+        if (!sparse) settings.far = distance * known_depth_margin;
         target.distance = distance;
         target.depth_weight = supervision;
       }

@@ -11,6 +11,7 @@
 #include "recon/poses/edge_lines.hpp"
 #include "recon/poses/orbit_search.hpp"
 #include "recon/poses/proxy_images.hpp"
+#include "recon/poses/orbit_rescue.hpp"
 #include "recon/poses/world_frame.hpp"
 
 namespace orbitfuse {
@@ -239,6 +240,43 @@ double standard_errors_apart(const std::vector<double>& better, const std::vecto
   return (sum / n) / std::sqrt(variance / n);
 }
 
+/// The likelier hypotheses refined against renders; the best one's views in the visible frame.
+Result<RenderAlignment> refined_by_renders(const Work& work, const std::vector<Aligned>& aligned,
+                                           const Similarity3d& canonical_from_visible,
+                                           const SceneRenderer& renderer, LadderStep& step,
+                                           const Progress& progress) {
+  OrbitViews orbit{work.images, {}, canonical_from_visible, false};
+  for (const FrameRecord* frame : work.frames) orbit.stations.push_back(*frame->station);
+  RenderAlignmentOptions options;
+  options.focal_relative_sigma = std::max(1e-4, work.lens.focal_relative_sigma);
+  RenderAlignment best;
+  for (std::size_t i = 0; i < std::min<std::size_t>(2, aligned.size()); ++i) {
+    Reconstruction model;
+    for (const AlignmentView& v : aligned[i].views) model.views.push_back(v.view);
+    move_world(model, canonical_from_visible.inverse());
+    // The first round and a look at its result tell a wrong start; the right one gets the rest.
+    options.rounds = coarse_rounds();
+    options.rounds.resize(2);
+    ORBITFUSE_ASSIGN(RenderAlignment one, align_with_renders(renderer, work.images, model.views, options, progress));
+    step.why += fmt::format("; against renders from {:.0f} deg: {:.3f}", aligned[i].hypothesis.offset_deg,
+                            one.mean_agreement());
+    if (!best.views.empty() && one.mean_agreement() <= best.mean_agreement()) continue;
+    best = std::move(one);
+    orbit.clockwise = aligned[i].hypothesis.mirrored;
+  }
+  {
+    std::vector<PosedView> views;
+    for (const RenderAlignedView& v : best.views) views.push_back(v.view);
+    options.rounds = {coarse_rounds().back()};
+    ORBITFUSE_ASSIGN(best, align_with_renders(renderer, work.images, views, options, progress));
+  }
+  ORBITFUSE_TRY(rescue_views(renderer, orbit, best, progress));
+  options.rounds = fine_rounds();
+  std::vector<PosedView> views;
+  for (const RenderAlignedView& v : best.views) views.push_back(v.view);
+  return align_with_renders(renderer, work.images, views, options, progress);
+}
+
 }  // namespace
 
 Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleScene& visible,
@@ -311,7 +349,8 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
     step.why += fmt::format("; start at {:.0f} deg{}: agreement {:.3f}", one.hypothesis.offset_deg,
                             one.hypothesis.mirrored ? " clockwise" : "", one.mean_support());
   step.why += fmt::format("; {:.1f} standard errors apart", decisiveness);
-  if (decisiveness < min_decisiveness) {
+  // Renders of the scene tell the starts apart where its lines cannot.
+  if (!visible.renderer && decisiveness < min_decisiveness) {
     step.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     steps.push_back(step);
     return fail(ErrorKind::quality, "poses.thermal", step.why + ": undecided",
@@ -319,9 +358,26 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
   }
   if (decisiveness < clear_decisiveness)
     step.why += ": doubtful, check the start angle in the rendered pairs";
-  const std::vector<AlignmentView>& views = best.views;
-  const std::vector<double>& support = best.support;
-  const AlignmentReport& report = best.report;
+  std::vector<PosedView> views;
+  std::vector<double> support = best.support;
+  AlignmentReport report = best.report;
+  if (visible.renderer) {
+    tell(3, "alignment with renders");
+    ORBITFUSE_ASSIGN(const RenderAlignment rendered,
+                     refined_by_renders(work, aligned, canonical_from_visible, visible.renderer, step, progress));
+    report.focal_px = rendered.focal_px;
+    for (std::size_t i = 0; i < rendered.views.size(); ++i) {
+      views.push_back(rendered.views[i].view);
+      support[i] = rendered.views[i].agreement;
+      report.residual_px[i] = rendered.views[i].median_px;
+    }
+    step.rung = "cross-modal, orbit prior and renders";
+  } else {
+    Reconstruction model;
+    for (const AlignmentView& v : best.views) model.views.push_back(v.view);
+    move_world(model, canonical_from_visible.inverse());
+    views = std::move(model.views);
+  }
 
   ThermalPoses result;
   result.shares_visible_frame = true;
@@ -333,32 +389,35 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (!(support[i] >= min_share_of_median * typical)) {
       result.dropped.push_back(
-          {views[i].view.name, fmt::format("its edges agree with the visible scene at {:.3f}, the "
+          {views[i].name, fmt::format("its edges agree with the visible scene at {:.3f}, the "
                                            "median view at {:.3f}", support[i], typical)});
       continue;
     }
-    const Rigid3d expected = cam_from_world_of(best.hypothesis.poses[i], work.lens.camera);
-    const Eigen::Vector3d place = camera_center(expected);
-    const double moved =
-        (camera_center(views[i].view.cam_from_world) - place).norm() / place.norm();
-    if (!(moved < max_move)) {
-      result.dropped.push_back(
-          {views[i].view.name, fmt::format("its edges pull it {:.0f} % of its distance away from "
-                                           "where its loop says it is", 100 * moved)});
-      continue;
+    // Lines alone can pull a view astray; against renders its agreement has been judged already.
+    if (!visible.renderer) {
+      const Rigid3d& lined_up = best.views[i].view.cam_from_world;
+      const Rigid3d expected = cam_from_world_of(best.hypothesis.poses[i], work.lens.camera);
+      const Eigen::Vector3d place = camera_center(expected);
+      const double moved =
+          (camera_center(lined_up) - place).norm() / place.norm();
+      if (!(moved < max_move)) {
+        result.dropped.push_back(
+            {views[i].name, fmt::format("its edges pull it {:.0f} % of its distance away from "
+                                             "where its loop says it is", 100 * moved)});
+        continue;
+      }
+      const OrbitPrior prior = loop_prior(work, best.hypothesis.poses, best.hypothesis, i);
+      const OrbitAngles angles = orbit_angles(camera_center(lined_up));
+      const double away = std::remainder(angles.azimuth_deg - prior.pose.azimuth_deg, 360);
+      if (!(std::abs(away) < max_station_deviation_deg)) {
+        result.dropped.push_back({views[i].name,
+                                  fmt::format("its edges fit best {:.0f} deg away from its station, "
+                                              "judged by its orbit", std::abs(away))});
+        continue;
+      }
     }
-    const OrbitPrior prior = loop_prior(work, best.hypothesis.poses, best.hypothesis, i);
-    const OrbitAngles angles = orbit_angles(camera_center(views[i].view.cam_from_world));
-    const double away = std::remainder(angles.azimuth_deg - prior.pose.azimuth_deg, 360);
-    if (!(std::abs(away) < max_station_deviation_deg)) {
-      result.dropped.push_back({views[i].view.name,
-                                fmt::format("its edges fit best {:.0f} deg away from its station, "
-                                            "judged by its orbit", std::abs(away))});
-      continue;
-    }
-    result.reconstruction.views.push_back(views[i].view);
+    result.reconstruction.views.push_back(views[i]);
   }
-  move_world(result.reconstruction, canonical_from_visible.inverse());
   result.gates["posed_ratio"] = result.posed_ratio();
   result.gates["edge_agreement"] = typical;
   result.gates["orbit_decisiveness"] = decisiveness;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -81,10 +82,18 @@ struct ThermalPoses : ModalityPoses {
   bool shares_visible_frame = false;
 };
 
+/// The visible scene as some camera sees it.
+struct SceneView {
+  cv::Mat brightness;  ///< CV_32FC1
+  cv::Mat depth;       ///< CV_32FC1, along the optical axis; NaN = nothing there
+};
+using SceneRenderer = std::function<Result<SceneView>(const Camera&, const Rigid3d& cam_from_world)>;
+
 /// The visible world that thermal views are localised in; images come from the session's paths.
 struct VisibleScene {
   Reconstruction reconstruction;
   std::vector<DepthMap> depth;  ///< dense geometry of its views; may be empty (less accurate)
+  SceneRenderer renderer;       ///< of its trained field; may be empty (less accurate)
 };
 
 /// Visible views: known poses, else COLMAP with orbit-limited pairs and ever more relaxed

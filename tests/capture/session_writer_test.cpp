@@ -7,6 +7,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "capture/raw_counts.hpp"
 #include "core/file_io.hpp"
 #include "core/image_codec.hpp"
 #include "core/image_io.hpp"
@@ -160,6 +161,29 @@ TEST(SessionWriter, FullDiskKeepsEveryAcknowledgedFrame) {
   ASSERT_TRUE(writer->append("thermal0", thermal_frame(2)));
   ASSERT_TRUE(writer->close());
   EXPECT_EQ(open_session(folder / "s")->frames.size(), 2u);
+}
+
+TEST(SessionWriter, CountsOfUnknownScaleAreNeverTemperatures) {
+  const TempFolder folder;
+  auto writer = SessionWriter::create(folder / "s");
+  ASSERT_TRUE((*writer)->add_device(thermal_device()));
+  RawCounts raw;
+  cv::Mat dark, bright;
+  thermal_pixels().convertTo(dark, CV_16U, 0.1, 4000);
+  dark.convertTo(bright, CV_16U, 1, 200);
+  std::vector<double> mean;
+  for (const cv::Mat& counts : {dark, bright}) {
+    Frame frame = test::frame_delivery(mean.size(), counts.clone()).frame;
+    EXPECT_EQ(raw.apply(frame).has_value(), mean.empty());  // the stretch is told once
+    mean.push_back(cv::mean(frame.pixels)[0]);
+    const auto record = (*writer)->append("thermal0", frame);
+    ASSERT_TRUE(record) << record.error().message();
+    EXPECT_TRUE(record->thermal_is_gray);
+    EXPECT_TRUE(record->has_flag("raw-counts"));
+    EXPECT_FALSE(std::filesystem::exists(folder / ("s/" + record->file + ".json")));
+  }
+  EXPECT_GT(mean[1], mean[0] + 20);  // one stretch: brighter counts are brighter
+  EXPECT_EQ(cv::norm(*read_image(folder / "s/thermal/originals/000001.tiff"), bright, cv::NORM_INF), 0);
 }
 
 }  // namespace

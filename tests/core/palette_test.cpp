@@ -26,6 +26,12 @@ TEST(Palette, AllHave256DistinctlyOrderedColours) {
   }
 }
 
+TEST(Palette, RainbowIsBlueWhereColdAndRedWhereHot) {
+  const cv::Mat c = *palette("rainbow");
+  EXPECT_GT(c.at<cv::Vec3b>(0, 0)[0], c.at<cv::Vec3b>(0, 0)[2]);
+  EXPECT_GT(c.at<cv::Vec3b>(0, 255)[2], c.at<cv::Vec3b>(0, 255)[0]);
+}
+
 TEST(Palette, UnknownNameListsTheKnownOnes) {
   const auto p = palette("purple");
   ASSERT_FALSE(p);

@@ -161,6 +161,20 @@ TEST_F(SessionTest, UnknownLinesAreSkippedAndNewerFormatsRefused) {
   EXPECT_NE(open(text).error().message().find("update"), std::string::npos);
 }
 
+TEST_F(SessionTest, LaterLineAboutAFileAmendsIt) {
+  FrameRecord chosen = full_frame();
+  chosen.tracking = false;
+  chosen.station = Station{2, 3, 90, 55, 1, 1};
+  std::string text = manifest();
+  text.insert(text.rfind('\n', text.size() - 2) + 1, manifest_line(chosen) + "\n");  // before the end line
+  const auto s = open(text);
+  ASSERT_TRUE(s) << s.error().message();
+  ASSERT_EQ(s->frames.size(), 1u);
+  EXPECT_FALSE(s->frames[0].tracking);
+  EXPECT_EQ(s->frames[0].station->loop, 2);
+  EXPECT_TRUE(s->complete);
+}
+
 TEST_F(SessionTest, NoSession) {
   EXPECT_FALSE(open_session(folder / "none"));
   EXPECT_FALSE(open_session(folder.path()));

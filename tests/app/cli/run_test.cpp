@@ -133,7 +133,7 @@ TEST_F(Run, JsonStreamIsOneObjectALineAndEndsWithTheResult) {
 
 TEST_F(Run, InterruptedTrainingResumesToTheSameField) {
   write_fixture_session(session);
-  const std::vector<std::string> longer = {"--set", "train.visible.iterations=2000", "--set",
+  const std::vector<std::string> longer = {"--set", "train.visible.iterations=400", "--set",
                                            "train.visible.eval_count=4"};
   const Outcome stopped = run(longer, {.interrupt_after = "\"stage\":\"train.visible\""}, "train");
   if (stopped.code == 0) GTEST_SKIP() << "the training was over before the signal arrived";

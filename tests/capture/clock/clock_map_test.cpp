@@ -44,6 +44,8 @@ TEST(ClockMap, OffsetAndDriftWithinFiveMilliseconds) {
   }
   EXPECT_NEAR(map.drift_ppm(), -50, 15);  // host gains what the device loses
   EXPECT_NEAR(map.offset_s(), -40, 0.1);
+  EXPECT_LE(map.residual_rms_s(), 0.005);
+  EXPECT_GT(map.residual_rms_s(), 0);
   EXPECT_EQ(map.jumps(), 0);
 }
 

@@ -101,7 +101,7 @@ TEST_F(AravisStream, WrongFramesMidStreamAreAllRejected) {
 TEST_F(AravisStream, KilledCameraIsToldAndComesBackWithItsSettings) {
   AravisSource source(options);
   ASSERT_TRUE(source.start());
-  drain(source, 10s, frames(20));
+  const Tally before = drain(source, 10s, frames(20));
   camera.kill();
   const auto killed = testing_clock::now();
   const Tally silent = drain(source, 5s, [](const Tally& t) { return t.has("silent") || t.has("disconnected"); });
@@ -112,6 +112,10 @@ TEST_F(AravisStream, KilledCameraIsToldAndComesBackWithItsSettings) {
   const Tally back = drain(source, 20s, frames(20));
   EXPECT_TRUE(back.has("reconnected"));
   EXPECT_EQ(back.frames, 20u);
+  // Two seconds and more at 60 Hz are a gap in the ids, and no more than the outage lasted.
+  const double outage_s = std::chrono::duration<double>(testing_clock::now() - killed).count();
+  EXPECT_GT(back.first_id, before.last_id + 60);
+  EXPECT_LT(static_cast<double>(back.first_id - before.last_id), 90 * outage_s);
   EXPECT_EQ(back.wrong_bits + back.not_rising, 0u);
   EXPECT_EQ(camera.register_value(registers::ir_format), 2u);
 }
@@ -139,7 +143,10 @@ TEST_F(AravisStream, MutedControlChannelIsToldAndRecovered) {
   GevFaults faults;
   faults.mute_control = true;  // the stream runs on until the camera's heartbeat times out
   camera.set_faults(faults);
-  EXPECT_TRUE(drain(source, 15s, [](const Tally& t) { return t.has("disconnected"); }).has("disconnected"));
+  const Tally mute = drain(source, 15s, [](const Tally& t) { return t.has("disconnected"); });
+  ASSERT_TRUE(mute.has("disconnected"));
+  EXPECT_EQ(mute.events.front(), "control-silent");  // long before the stream ends
+  EXPECT_GT(mute.frames, 20u);
   camera.set_faults({});
   const Tally back = drain(source, 20s, frames(20));
   EXPECT_TRUE(back.has("reconnected"));

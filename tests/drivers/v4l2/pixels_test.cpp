@@ -49,7 +49,7 @@ TEST(V4l2Pixels, Y16WithoutScaleIsMarked) {
   Frame frame;
   ASSERT_TRUE(unpack({reinterpret_cast<const std::uint8_t*>(&count), 2}, layout, frame));
   EXPECT_EQ(frame.pixels.at<std::uint16_t>(0, 0), 12345);
-  EXPECT_EQ(frame.flags, std::vector<std::string>{"not-radiometric"});
+  EXPECT_EQ(frame.flags, std::vector<std::string>{"raw-counts"});
 }
 
 TEST(V4l2Pixels, CutJpegIsDamage) {

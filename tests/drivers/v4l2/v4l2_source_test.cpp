@@ -91,7 +91,7 @@ TEST_F(V4l2SourceTest, UnpluggedAndBackUnderAnotherNode) {
   EXPECT_EQ(back.reason, "reconnected");
   EXPECT_NE(back.detail.find("/dev/video6"), std::string::npos);
   shoot(0);  // the driver counts from 0 again
-  EXPECT_EQ(deliver(source).frame.id, 1u);
+  EXPECT_EQ(deliver(source).frame.id, 2u);  // one frame's time at least was lost
 }
 
 TEST_F(V4l2SourceTest, StallIsToldAndReopened) {
@@ -102,6 +102,28 @@ TEST_F(V4l2SourceTest, StallIsToldAndReopened) {
   EXPECT_EQ(system->streams_started, 2);
   shoot(0);
   EXPECT_EQ(deliver(source).kind, Kind::frame);
+}
+
+TEST_F(V4l2SourceTest, HungCameraGetsItsPortReset) {
+  std::vector<std::string> resets;
+  options.reset_port = [&](const std::string& port) -> Status {
+    resets.push_back(port);
+    return {};
+  };
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  EXPECT_EQ(deliver(source).reason, "stalled");
+  EXPECT_EQ(deliver(source).reason, "reconnected");
+  EXPECT_TRUE(resets.empty());  // reopening alone comes first
+  const Delivery again = deliver(source);
+  EXPECT_EQ(again.reason, "stalled");
+  EXPECT_NE(again.detail.find("reset"), std::string::npos);
+  EXPECT_EQ(resets, std::vector<std::string>{"1-4"});
+  EXPECT_EQ(deliver(source).reason, "reconnected");
+  shoot(0);
+  EXPECT_EQ(deliver(source).kind, Kind::frame);
+  EXPECT_EQ(deliver(source).reason, "stalled");
+  EXPECT_EQ(resets.size(), 1u);
 }
 
 TEST_F(V4l2SourceTest, StartErrorsNameTheRemedyAndLeakNothing) {

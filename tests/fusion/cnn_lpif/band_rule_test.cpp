@@ -60,6 +60,8 @@ TEST(CnnLpif, OptionsOutOfRangeAreNamed) {
   };
   EXPECT_EQ(where([](auto& o) { o.vote_px = 4; }), "cnn_lpif.vote_px");
   EXPECT_EQ(where([](auto& o) { o.network_bands = -1; }), "cnn_lpif.network_bands");
+  EXPECT_EQ(where([](auto& o) { o.network_halvings = 9; }), "cnn_lpif.network_halvings");
+  EXPECT_EQ(where([](auto& o) { o.flat_within = 300; }), "cnn_lpif.flat_within");
   EXPECT_EQ(where([](auto& o) { o.match_threshold = std::numeric_limits<double>::quiet_NaN(); }),
             "cnn_lpif.match_threshold");
   EXPECT_EQ(where([](auto&) {}), "none");

@@ -106,6 +106,23 @@ TEST(Network, EqualPatchesAreNotAsked) {
   EXPECT_FLOAT_EQ(w(80, 80), 0.5F);
 }
 
+TEST(Network, HalvedImagesGiveACoarserWeightOfFullSize) {
+  const Plane a = dead_leaves({200, 120}, 5), b = dead_leaves({200, 120}, 6);
+  CnnLpifOptions options;
+  CnnLpifReport report;
+  const Plane full = thermal_weight(a, b, options, report);
+  for (const int halvings : {1, 2, 8}) {  // 8: stops at one patch
+    options.network_halvings = halvings;
+    const Plane w = thermal_weight(a, b, options, report);
+    ASSERT_EQ(w.size(), a.size());
+    EXPECT_GT(cv::norm(w, full, cv::NORM_INF), 0) << halvings;
+    double low = 0, high = 0;
+    cv::minMaxLoc(w, &low, &high);
+    EXPECT_GE(low, -1e-6) << "running sums round";
+    EXPECT_LE(high, 1 + 1e-6);
+  }
+}
+
 TEST(Network, DamagedBytesAreErrors) {
   EXPECT_FALSE(cnn::parameters_of_bytes("abc"));
   std::string bytes = cnn::bytes_of(cnn::shipped_network());

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "fusion/pyramid/bands.hpp"
 #include "fusion/pyramid/pyramid.hpp"
 #include "tests/fusion/fuse/images.hpp"
@@ -35,16 +37,18 @@ TEST(Pyramid, LevelsStopAtTheSmallestBase) {
   EXPECT_EQ(fusion::pyramid_levels({8, 8}, 4, 8), 0);
 }
 
-TEST(Bands, LargerMagnitudeIsTakenAndLoneSwitchesAreNot) {
+TEST(Bands, LargerMagnitudeIsTakenLoneSwitchesAreNotAndBordersAreRamps) {
   fusion::Plane v(20, 20, 1.0F), t(20, 20, 0.5F);
-  for (int x = 10; x < 20; ++x)
-    for (int y = 0; y < 20; ++y) t(y, x) = -3;
-  const cv::Mat1b take = fusion::choose_by_magnitude(v, t);
-  EXPECT_EQ(take(10, 3), 255);
-  EXPECT_EQ(take(10, 15), 0);
-  const fusion::Plane chosen = fusion::choose(v, t, take);
-  EXPECT_EQ(chosen(10, 3), 1.0F);
-  EXPECT_EQ(chosen(10, 15), -3.0F);
+  t.colRange(10, 20) = -3;
+  v(4, 2) = 0, t(4, 2) = 1.5F;  // a lone switch
+  const fusion::Plane share = fusion::share_by_magnitude(v, t);
+  EXPECT_EQ(share(4, 2), 1.0F);
+  EXPECT_EQ(share(10, 3), 1.0F);
+  EXPECT_EQ(share(10, 15), 0.0F);
+  for (int x = 1; x < 20; ++x) {
+    EXPECT_LE(share(10, x), share(10, x - 1));
+    EXPECT_GE(share(10, x), share(10, x - 1) - 0.34F);
+  }
 }
 
 TEST(FusionOptions, EveryMistakeNamesItsField) {
@@ -58,6 +62,9 @@ TEST(FusionOptions, EveryMistakeNamesItsField) {
   EXPECT_EQ(where([](auto& o) { o.pca_msif.smoother.time_step = 1.01; }), "pca_msif.smoother.time_step");
   EXPECT_EQ(where([](auto& o) { o.cnn_lpif.match_threshold = 2; }), "cnn_lpif.match_threshold");
   EXPECT_EQ(where([](auto& o) { o.best.sharpness = 0; }), "best.sharpness");
+  EXPECT_EQ(where([](auto& o) { o.best.contrast_kept = 1.5; }), "best.contrast_kept");
+  EXPECT_EQ(where([](auto& o) { o.best.visible_preference = -1; }), "best.visible_preference");
+  EXPECT_EQ(where([](auto& o) { o.best.brightness_weight = std::nan(""); }), "best.brightness_weight");
   EXPECT_EQ(where([](auto&) {}), "valid");
 }
 

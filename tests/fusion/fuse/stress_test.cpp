@@ -143,13 +143,5 @@ TEST(Planes, NotANumberIsAnError) {
   check(fusion::fuse_cnn_lpif(v, t, {}));
 }
 
-TEST(Planes, FourThousandPixelsWide) {
-  fusion::Plane v(3072, 4096, 10.0F), t(3072, 4096, 10.0F);
-  v(100, 100) = 200;
-  const auto result = fusion::fuse_best(v, t, {});
-  ASSERT_TRUE(result);
-  EXPECT_TRUE(cv::checkRange(*result));
-}
-
 }  // namespace
 }  // namespace orbitfuse

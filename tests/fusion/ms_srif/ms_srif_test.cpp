@@ -103,17 +103,45 @@ TEST(Ksvd, ErrorFallsAndSeedsRepeat) {
   EXPECT_FALSE(train_ksvd(patches.leftCols(10), options, [](int, double) {}));
 }
 
-TEST(MsSrif, SkippingFlatPatchesIsReported) {
+/// One quarter textured in the visible image, noise of 5 gray levels in the right half of both.
+std::pair<Plane, Plane> part_textured() {
   Plane v(64, 64, 50.0F), t(64, 64, 60.0F);
   for (int y = 0; y < 20; ++y)
-    for (int x = 0; x < 20; ++x) v(y, x) = (x + y) % 7 * 20.0F;
+    for (int x = 0; x < 20; ++x) v(y, x) = static_cast<float>((x + y) % 7) * 20;
+  cv::RNG random(3);
+  for (Plane* p : {&v, &t})
+    for (int y = 0; y < 64; ++y)
+      for (int x = 48; x < 64; ++x) (*p)(y, x) += static_cast<float>(random.gaussian(5));
+  return {v, t};
+}
+
+TEST(MsSrif, SkippedPatchesAreReported) {
+  const auto [v, t] = part_textured();
   MsSrifReport report;
-  const auto fused = fuse_ms_srif(v, t, {}, &report);
-  ASSERT_TRUE(fused);
-  EXPECT_GT(report.flat_patches, report.patches / 3);
+  MsSrifOptions options;
+  options.levels = 0;
+  ASSERT_TRUE(fuse_ms_srif(v, t, options, &report));
+  EXPECT_GT(report.flat_patches, report.patches / 4);
+  EXPECT_GT(report.certain_patches, report.patches / 20);
+  EXPECT_LT(report.flat_patches + report.certain_patches, report.patches);
   EXPECT_FALSE(report.skipped);
   ASSERT_TRUE(fuse_ms_srif(v, v, {}, &report));
   EXPECT_TRUE(report.skipped);
+}
+
+TEST(MsSrif, SkippingChangesNothingWherePatchesAreCertain) {
+  const auto [v, t] = part_textured();
+  MsSrifOptions options;
+  options.levels = 0;
+  options.relative_residual = 0.001;
+  MsSrifReport with, without;
+  const Plane skipping = fuse_ms_srif(v, t, options, &with).value();
+  options.certain_ratio = 0;
+  const Plane all = fuse_ms_srif(v, t, options, &without).value();
+  EXPECT_EQ(without.certain_patches, 0);
+  EXPECT_LT(with.atoms_per_patch, without.atoms_per_patch);
+  const cv::Rect textured(0, 0, 40, 64);
+  EXPECT_LT(cv::norm(skipping(textured), all(textured), cv::NORM_INF), 1);
 }
 
 }  // namespace

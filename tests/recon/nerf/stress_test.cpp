@@ -122,6 +122,7 @@ TEST(Stress, CameraInsideTheObjectAndEmptySpaceRender) {
   ASSERT_TRUE(view);
   EXPECT_TRUE(cv::checkRange(view->color));
   std::fill(field.state().occupancy.on.begin(), field.state().occupancy.on.end(), 0);
+  field.state().occupancy.refresh();
   view = render(field, data.views[0].camera, data.views[0].cam_from_world, {}, {});
   ASSERT_TRUE(view);
   EXPECT_TRUE(cv::checkRange(view->color));
@@ -150,6 +151,7 @@ TEST(Occupancy, RaysThatMissAndDegenerateRaysGetNoSamples) {
   float t[max_ray_samples], dt[max_ray_samples];
   EXPECT_EQ(march(grid, {{100, 100, 100}, {0, 0, 1}, 1}, {}, 0.5f, t, dt), 0);
   std::fill(grid.on.begin(), grid.on.end(), 0);
+  grid.refresh();
   EXPECT_EQ(march(grid, {{0, 0, 0}, {0, 0, 1}, 1}, {}, 0.5f, t, dt), 0);
 }
 
@@ -161,6 +163,7 @@ TEST(Occupancy, SamplesCoverTheOccupiedLengthInOrder) {
     const Ray ray{{std::cos(a), std::sin(a), 0.2f}, {std::cos(b), std::sin(b), 0}, 1};
     for (std::size_t c = 0; c < grid.density.size(); ++c)
       grid.density[c] = static_cast<float>((c * 2654435761u) >> 8 & 31);
+    grid.refresh();
     float t[max_ray_samples], dt[max_ray_samples];
     const int count = march(grid, ray, {}, 0.5f, t, dt);
     ASSERT_GT(count, 0);

@@ -43,6 +43,26 @@ Dataset toy_scene(Modality modality, int views, double scale, int pixels) {
   return data;
 }
 
+std::vector<DepthMap> toy_depth(const Dataset& data, double scale) {
+  std::vector<DepthMap> maps;
+  const double ball = 0.4 * scale;
+  for (std::size_t i = 0; i < data.views.size(); ++i) {
+    const TrainingView& view = data.views[i];
+    const Eigen::Vector3d eye = camera_center(view.cam_from_world);
+    DepthMap map{static_cast<int>(i), view.camera, {}, {}, {}};
+    map.depth.create(view.camera.height, view.camera.width, CV_32FC1);
+    for (int y = 0; y < map.depth.rows; ++y)
+      for (int x = 0; x < map.depth.cols; ++x) {
+        const Eigen::Vector3d ray = view.camera.ray_of({x + 0.5, y + 0.5});
+        const Eigen::Vector3d d = view.cam_from_world.rotation.conjugate() * ray;
+        const double a = d.squaredNorm(), b = eye.dot(d), gap = b * b - a * (eye.squaredNorm() - ball * ball);
+        map.depth.at<float>(y, x) = gap > 0 ? static_cast<float>((-b - std::sqrt(gap)) / a) : std::nanf("");
+      }
+    maps.push_back(std::move(map));
+  }
+  return maps;
+}
+
 TrainOptions toy_options(Modality modality, int iterations) {
   TrainOptions options = preset(default_preset(modality)).value();
   options.iterations = iterations;

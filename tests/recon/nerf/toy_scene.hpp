@@ -10,6 +10,9 @@ namespace orbitfuse::nerf::test {
 Dataset toy_scene(Modality modality, int views, double scale = 1, int pixels = 32);
 
 /// A run short enough for a test.
+/// Exact depth of the ball; the background has none.
+std::vector<DepthMap> toy_depth(const Dataset& data, double scale = 1.0);
+
 TrainOptions toy_options(Modality modality, int iterations);
 
 }  // namespace orbitfuse::nerf::test

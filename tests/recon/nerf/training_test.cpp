@@ -27,10 +27,11 @@ TEST(Training, LearnsTheToySceneInBothModalities) {
     options.holdout_every = 6;
     options.samples_per_step = 1 << 14;
     Field field;
-    const Dataset data = toy_scene(modality, 18);
+    Dataset data = toy_scene(modality, 18);
+    data.depth = test::toy_depth(data);
     const auto report = train(data, options, {}, field);
     ASSERT_TRUE(report) << report.error().message();
-    EXPECT_GT(report->best_psnr, 15) << name(modality);
+    EXPECT_GT(report->best_psnr, 18) << name(modality);
     EXPECT_EQ(report->heldout.size(), 3u);
     const auto view = render(field, data.views[0].camera, data.views[0].cam_from_world, {}, {});
     ASSERT_TRUE(view);

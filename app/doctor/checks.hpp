@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace orbitfuse::doctor {
+
+/// One thing looked at. Without remedy it is fine; a finding that is `needed` fails the doctor,
+/// any other is advice for cameras that this machine may never see.
+struct Finding {
+  std::string what, found, remedy;
+  bool needed = false;
+};
+
+/// Where the kernel's files are read; tests give a folder of their own.
+struct Machine {
+  std::filesystem::path root = "/";
+  /// Whether the kernel's clock is disciplined (adjtimex); absent: ask the kernel.
+  std::optional<bool> clock_synchronised;
+};
+
+/// Link state and speed, MTU, multicast, subnets of wired interfaces; reverse path filter; receive
+/// buffers. For GigE Vision cameras.
+std::vector<Finding> check_network(const Machine& machine);
+/// Memory for USB transfers, power saving, the UVC driver.
+std::vector<Finding> check_usb(const Machine& machine);
+/// The year, and whether a time service keeps the clock.
+std::vector<Finding> check_clocks(const Machine& machine);
+/// Free space and the rate of synced 1 MiB files in the folder. Writes and removes one file.
+Finding check_disk(const std::filesystem::path& folder);
+
+}  // namespace orbitfuse::doctor

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "capture/frame_source.hpp"
+
+namespace orbitfuse::recording {
+
+/// A source made fit for a session. It is started before the session's folder is made, so that a
+/// camera that is absent, taken or forbidden leaves nothing behind, and so that its model and
+/// serial are known when it is announced. Ids go on where the device's earlier recording ended.
+class PreparedSource final : public FrameSource {
+ public:
+  explicit PreparedSource(std::unique_ptr<FrameSource> source) : source_(std::move(source)) {}
+
+  DeviceInfo describe() const override;
+  Status start() override;
+  Result<Delivery> next(std::chrono::milliseconds timeout) override;
+  void stop() override;
+  bool can_wait() const override { return source_->can_wait(); }
+
+  /// The session's name for the device, its first id, and whether frames are tracking frames until
+  /// the guide chooses them. Before the first next().
+  void fit(std::string device_id, std::uint64_t first_id, bool tracking);
+
+ private:
+  std::unique_ptr<FrameSource> source_;
+  bool started_ = false, tracking_ = false;
+  std::optional<std::string> device_id_;
+  std::uint64_t first_id_ = 0;
+  std::optional<std::uint64_t> source_first_id_;
+};
+
+}  // namespace orbitfuse::recording

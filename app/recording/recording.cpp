@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/recording/recording.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+#include <thread>
+
+namespace orbitfuse::recording {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// First id after everything that an earlier recording of the device counted.
+std::uint64_t next_id(const Session& session, const std::string& device) {
+  std::uint64_t next = 0;
+  for (const FrameRecord& frame : session.frames) {
+    if (frame.device == device) next = std::max(next, frame.sequence + 1);
+  }
+  for (const GapRecord& gap : session.gaps) {
+    if (gap.device == device) next = std::max(next, gap.first_sequence + gap.count);
+  }
+  for (const StreamRecord& stream : session.streams) {
+    if (stream.device == device) next = std::max(next, stream.last_sequence + 1);
+  }
+  return next;
+}
+
+bool same_camera(const DeviceInfo& a, const DeviceInfo& b) {
+  return a.modality == b.modality && a.driver == b.driver && a.model == b.model &&
+         a.serial == b.serial;
+}
+
+}  // namespace
+
+Status RecordingOptions::validate() const {
+  if (session.empty())
+    return fail(ErrorKind::usage, "session", "empty", "name the session's folder");
+  if (!(seconds >= 0))
+    return fail(ErrorKind::usage, "seconds", fmt::format("{}", seconds), "must be >= 0");
+  return guide ? guide->validate() : Status{};
+}
+
+Recording::Recording(std::vector<std::unique_ptr<FrameSource>> sources, RecordingOptions options,
+                     PositionFinder finder)
+    : options_(std::move(options)), finder_(std::move(finder)) {
+  for (auto& source : sources)
+    sources_.push_back(std::make_unique<PreparedSource>(std::move(source)));
+}
+
+Recording::~Recording() {
+  for (const auto& source : sources_) source->stop();
+}
+
+/// Each camera under a name of its own; a camera that the session knows keeps its name.
+Status Recording::fit_into(const std::optional<Session>& earlier) {
+  std::set<std::string> used;
+  for (const auto& source : sources_) {
+    DeviceInfo device = source->describe();
+    std::uint64_t first_id = 0;
+    for (int number = 0;; ++number) {
+      // The source's own name first, then visible0, visible1, ...
+      if (number > 0) device.id = fmt::format("{}{}", name(device.modality), number - 1);
+      const DeviceInfo* known = earlier ? earlier->device(device.id) : nullptr;
+      if (used.count(device.id) || (known && !same_camera(*known, device))) continue;
+      if (known) first_id = next_id(*earlier, device.id);
+      break;
+    }
+    used.insert(device.id);
+    source->fit(device.id, first_id, options_.choose_stations && !source->can_wait());
+    devices_.push_back(device);
+  }
+  return {};
+}
+
+Status Recording::prepare() {
+  ORBITFUSE_TRY(options_.validate());
+  if (sources_.empty())
+    return fail(ErrorKind::usage, "cameras", "none given", "give --visible or --thermal");
+  std::optional<Session> earlier;
+  if (options_.resume) {
+    ORBITFUSE_ASSIGN(earlier, open_session(options_.session));
+  }
+  for (const auto& source : sources_) ORBITFUSE_TRY(source->start());
+  ORBITFUSE_TRY(fit_into(earlier));
+  if (options_.resume) {
+    ORBITFUSE_ASSIGN(writer_, SessionWriter::resume(options_.session));
+  } else {
+    ORBITFUSE_ASSIGN(writer_, SessionWriter::create(options_.session, options_.notes));
+  }
+  const std::lock_guard lock(mutex_);
+  if (options_.guide) {
+    guide_ = std::make_unique<LiveGuide>(*writer_, *options_.guide, finder_);
+    // Sectors that an earlier recording filled stay filled.
+    if (earlier) {
+      for (const FrameRecord& frame : earlier->frames) guide_->add(frame);
+    }
+  }
+  RecorderOptions recorder_options;
+  if (!options_.live) recorder_options.backpressure = Backpressure::wait;
+  recorder_ = std::make_unique<Recorder>(*writer_, recorder_options);
+  if (guide_) recorder_->on_frame = [this](const FrameRecord& frame) { guide_->add(frame); };
+  return {};
+}
+
+Result<Ending> Recording::run(const std::atomic<bool>* cancel, const std::function<void()>& tick) {
+  std::atomic<bool> over{false}, returned{false};
+  Ending ending = Ending::source_over;
+  const Clock::time_point started = Clock::now();
+  {
+    const std::lock_guard lock(mutex_);
+    started_ = started;
+    running_ = true;
+  }
+  std::jthread supervisor([&] {
+    while (!returned) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      const double seconds = std::chrono::duration<double>(Clock::now() - started).count();
+      std::optional<Ending> reason;
+      if (options_.seconds > 0 && seconds >= options_.seconds) reason = Ending::time_over;
+      if (options_.stop_when_complete && guide_ && guide_->complete()) reason = Ending::complete;
+      if (stop_ || (cancel && *cancel)) reason = Ending::stopped;
+      if (reason && !over) {
+        ending = *reason;
+        over = true;
+      }
+      measure_rates();
+      if (tick) tick();
+    }
+  });
+  std::vector<FrameSource*> sources;
+  for (const auto& source : sources_) sources.push_back(source.get());
+  Progress progress;
+  progress.cancel = &over;
+  const Status status = recorder_->run(sources, progress);
+  returned = true;
+  supervisor.join();
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = Clock::now();
+    running_ = false;
+  }
+  if (guide_) guide_->finish();
+  if (!status && status.error().kind != ErrorKind::cancelled) return tl::unexpected(status.error());
+  if (guide_ && guide_->error()) return tl::unexpected(*guide_->error());
+  // Ctrl-C is how a live recording ends, but it cuts a replay short.
+  if (cancel && *cancel && !options_.live)
+    return fail(ErrorKind::cancelled, "capture", "stopped by the user", "capture it again");
+  ORBITFUSE_TRY(writer_->close());
+  return ending;
+}
+
+void Recording::measure_rates() {
+  const std::lock_guard lock(mutex_);
+  const Clock::time_point now = Clock::now();
+  const double seconds = std::chrono::duration<double>(now - rates_measured_).count();
+  if (seconds < 1) return;
+  for (const StreamStatus& s : recorder_->status()) {
+    Rate& rate = rates_[s.device];
+    if (rates_measured_ != Clock::time_point{})
+      rate.hz = static_cast<double>(s.received - rate.received) / seconds;
+    rate.received = s.received;
+  }
+  rates_measured_ = now;
+}
+
+LiveState Recording::state() const {
+  const std::lock_guard lock(mutex_);
+  LiveState state;
+  state.session = options_.session.string();
+  state.running = running_;
+  if (started_ != Clock::time_point{}) {
+    state.elapsed_s =
+        std::chrono::duration<double>((running_ ? Clock::now() : ended_) - started_).count();
+  }
+  // The session's folder is made last: until then its parent's disk counts.
+  std::error_code error;
+  std::filesystem::path folder = std::filesystem::absolute(options_.session);
+  while (!std::filesystem::exists(folder, error) && folder.has_parent_path() &&
+         folder != folder.parent_path())
+    folder = folder.parent_path();
+  const auto space = std::filesystem::space(folder, error);
+  if (!error) state.free_bytes = space.available;
+  if (recorder_) state.streams = recorder_->status();
+  for (const StreamStatus& s : state.streams) {
+    const auto rate = rates_.find(s.device);
+    state.rates_hz.push_back(rate == rates_.end() ? 0 : rate->second.hz);
+  }
+  if (guide_) {
+    state.cameras = guide_->cameras();
+    state.sectors = guide_->sectors();
+    state.complete = guide_->complete();
+  }
+  state.warnings = warnings_of(state);
+  return state;
+}
+
+std::filesystem::path Recording::latest(Modality modality) const {
+  const FrameRecord* newest = nullptr;
+  const std::vector<StreamStatus> streams = status();
+  for (const StreamStatus& s : streams) {
+    if (s.latest && s.latest->modality == modality &&
+        (!newest || s.latest->host_time_ns >= newest->host_time_ns))
+      newest = &*s.latest;
+  }
+  return newest ? options_.session / newest->file : std::filesystem::path();
+}
+
+void Recording::operator_at_station() {
+  const std::lock_guard lock(mutex_);
+  if (guide_) guide_->operator_at_station();
+}
+
+std::vector<StreamStatus> Recording::status() const {
+  const std::lock_guard lock(mutex_);
+  return recorder_ ? recorder_->status() : std::vector<StreamStatus>{};
+}
+
+}  // namespace orbitfuse::recording

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/recording/prepared_source.hpp"
+#include "capture/live/live_guide.hpp"
+#include "capture/live/live_state.hpp"
+#include "capture/recorder.hpp"
+
+namespace orbitfuse::recording {
+
+struct RecordingOptions {
+  std::filesystem::path session;
+  bool resume = false;              ///< go on with a session instead of making one
+  bool live = false;                ///< drop frames rather than wait when the disk is slow
+  bool choose_stations = false;     ///< frames are tracking frames until the guide chooses them
+  double seconds = 0;               ///< stop by itself after this long; 0: never
+  bool stop_when_complete = false;  ///< stop by itself when every sector is done
+  std::optional<LiveGuideOptions> guide;
+  std::map<std::string, std::string> notes;
+
+  Status validate() const;
+};
+
+/// How a recording ended.
+enum class Ending { source_over, time_over, complete, stopped };
+
+/// One recording of some cameras into one session. prepare, run and finish are called in turn from
+/// one thread; the others from any.
+class Recording {
+ public:
+  Recording(std::vector<std::unique_ptr<FrameSource>> sources, RecordingOptions options,
+            PositionFinder finder = {});
+  ~Recording();
+
+  /// Starts the cameras, then makes or reopens the session. Nothing is left behind on failure.
+  Status prepare();
+  /// Records until the sources end, the time is over, the guide is complete, request_stop() or
+  /// `cancel`; then closes the session. On an error the accounting is in the manifest and the
+  /// session stays incomplete. `tick` is called a few times a second.
+  Result<Ending> run(const std::atomic<bool>* cancel, const std::function<void()>& tick = {});
+  void request_stop() { stop_ = true; }
+
+  std::vector<StreamStatus> status() const;
+  /// Everything the page and the terminal show; also before prepare() and after run().
+  LiveState state() const;
+  /// The newest recorded image of a modality; empty: none yet.
+  std::filesystem::path latest(Modality modality) const;
+  void operator_at_station();
+  LiveGuide* guide() { return guide_.get(); }
+  const std::vector<DeviceInfo>& devices() const { return devices_; }
+  const std::filesystem::path& folder() const { return options_.session; }
+
+ private:
+  struct Rate {
+    std::uint64_t received = 0;
+    double hz = 0;
+  };
+  Status fit_into(const std::optional<Session>& earlier);
+  void measure_rates();
+
+  RecordingOptions options_;
+  PositionFinder finder_;
+  std::vector<std::unique_ptr<PreparedSource>> sources_;
+  std::vector<DeviceInfo> devices_;
+  std::unique_ptr<SessionWriter> writer_;
+  std::unique_ptr<LiveGuide> guide_;
+  std::unique_ptr<Recorder> recorder_;
+  std::atomic<bool> stop_{false}, running_{false};
+  mutable std::mutex mutex_;  ///< guards what the page's threads see of a recording
+  std::chrono::steady_clock::time_point started_{}, ended_{}, rates_measured_{};
+  std::map<std::string, Rate> rates_;
+};
+
+}  // namespace orbitfuse::recording

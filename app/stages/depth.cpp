@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include "app/stages/artifacts.hpp"
+#include "app/stages/stage_list.hpp"
+#include "core/image_io.hpp"
+#include "core/parallel.hpp"
+#include "recon/depth/dense_depth.hpp"
+
+namespace orbitfuse::stages {
+namespace {
+using pipeline::StageContext;
+using pipeline::StageOutput;
+
+/// The views that train, and where they stand among all: held-out views are not matched, so that
+/// the geometry they measure comes from the others (their poses and points come from all).
+struct TrainingViews {
+  Reconstruction model;
+  std::vector<int> index;
+};
+
+TrainingViews training_views(const Reconstruction& all, int holdout_every) {
+  TrainingViews out;
+  std::vector<int> place(all.views.size(), -1);
+  for (std::size_t i = 0; i < all.views.size(); ++i) {
+    if (holdout_every > 0 && i % static_cast<std::size_t>(holdout_every) == 0) continue;
+    place[i] = static_cast<int>(out.index.size());
+    out.index.push_back(static_cast<int>(i));
+    out.model.views.push_back(all.views[i]);
+  }
+  for (const SparsePoint& point : all.points) {
+    SparsePoint kept = point;
+    kept.track.clear();
+    for (Observation seen : point.track) {
+      seen.view = place[static_cast<std::size_t>(seen.view)];
+      if (seen.view >= 0) kept.track.push_back(seen);
+    }
+    if (kept.track.size() > 1) out.model.points.push_back(std::move(kept));
+  }
+  return out;
+}
+
+Result<StageOutput> estimate(const StageContext& context, const SessionInput& input, const RunConfig& config) {
+  ORBITFUSE_ASSIGN(const Reconstruction all, load_poses(context.of("poses_visible"), Modality::visible));
+  const TrainingViews views = training_views(all, config.train_visible.options.holdout_every);
+  std::vector<cv::Mat> images(views.model.views.size());
+  std::vector<Status> problems(images.size());
+  parallel_for(static_cast<int>(images.size()), [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    auto image = read_visible(input.session.folder / views.model.views[k].name);
+    if (image)
+      images[k] = *std::move(image);
+    else
+      problems[k] = tl::unexpected(image.error());
+  });
+  for (const Status& problem : problems) ORBITFUSE_TRY(problem);
+
+  StageOutput output;
+  auto found = depth::dense_depth(views.model, images, config.depth, context.progress);
+  if (!found && found.error().kind == ErrorKind::quality) {
+    // A scene without parallax still has fields to train; they only know less.
+    output.skips.push_back({"dense depth", found.error().message(), "fields train from images and sparse points"});
+    output.metrics = {{"brief", "none: " + found.error().message()}, {"known", 0.0}};
+    ORBITFUSE_TRY(save_depth_maps(context.folder, {}));
+    return output;
+  }
+  if (!found) return tl::unexpected(found.error());
+  for (DepthMap& map : found->maps) map.view = views.index[static_cast<std::size_t>(map.view)];
+  ORBITFUSE_TRY(save_depth_maps(context.folder, found->maps));
+  output.skips = found->report.skips;
+  output.metrics = {{"brief", fmt::format("{:.0f} % of the pixels of {} views confirmed by other views",
+                                          100 * found->report.known, images.size())},
+                    {"known", found->report.known},
+                    {"matched", found->report.matched},
+                    {"views_without_neighbours", found->report.views_without}};
+  return output;
+}
+
+}  // namespace
+
+pipeline::Stage depth_stage(const StageInputs& in) {
+  pipeline::Stage stage;
+  stage.name = "depth";
+  stage.needs = {"poses_visible"};
+  stage.options = in.config->settings().to_json("depth");
+  stage.options["holdout_every"] = in.config->train_visible.options.holdout_every;
+  stage.options["seed"] = in.config->seed;
+  stage.inputs_hash = in.session->content.at(Modality::visible);
+  stage.run = [in](const StageContext& context) { return estimate(context, *in.session, *in.config); };
+  return stage;
+}
+
+}  // namespace orbitfuse::stages

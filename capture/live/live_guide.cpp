@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "capture/live/live_guide.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "core/exif.hpp"
+#include "core/file_io.hpp"
+#include "core/image_codec.hpp"
+
+namespace orbitfuse {
+namespace {
+
+std::size_t slot(Modality modality) { return modality == Modality::visible ? 0 : 1; }
+
+/// The image of a frame on disk, upright.
+std::optional<cv::Mat> read_back(const std::filesystem::path& file) {
+  const Result<std::string> bytes = read_file(file);
+  if (!bytes) return std::nullopt;
+  const Result<cv::Mat> image = decode_image(*bytes, file.string());
+  if (!image) return std::nullopt;
+  return apply_orientation(*image, read_exif(*bytes).orientation);
+}
+
+}  // namespace
+
+Status LiveGuideOptions::validate() const {
+  ORBITFUSE_TRY(plan.validate());
+  ORBITFUSE_TRY(coverage.validate());
+  if (!(looks_per_second > 0 && looks_per_second <= 100)) {
+    return fail(ErrorKind::usage, "guide.looks_per_second", fmt::format("{}", looks_per_second),
+                "must be > 0, at most 100");
+  }
+  if (!(unseen_after_s > 0)) {
+    return fail(ErrorKind::usage, "guide.unseen_after_s", fmt::format("{}", unseen_after_s),
+                "must be > 0");
+  }
+  return {};
+}
+
+LiveGuide::LiveGuide(SessionWriter& writer, LiveGuideOptions options, PositionFinder finder)
+    : writer_(writer),
+      options_(std::move(options)),
+      finder_(std::move(finder)),
+      coverage_(options_.plan, options_.coverage) {
+  for (const Modality modality : options_.plan.modalities) {
+    cameras_[modality].shown.modality = modality;
+    cameras_[modality].shown.instruction = coverage_.instruction(modality, std::nullopt);
+  }
+  if (finder_) looker_ = std::jthread([this] { look(); });
+}
+
+LiveGuide::~LiveGuide() { finish(); }
+
+void LiveGuide::finish() {
+  {
+    const std::lock_guard lock(mutex_);
+    over_ = true;
+    changed_.notify_all();
+  }
+  if (looker_.joinable()) looker_.join();
+}
+
+void LiveGuide::add(const FrameRecord& frame) {
+  const std::lock_guard lock(mutex_);
+  const auto known = cameras_.find(frame.modality);
+  if (known == cameras_.end()) return;  // this orbit is not asked for
+  Camera& camera = known->second;
+  camera.shown.latest_file = frame.file;
+  if (frame.station && !frame.tracking) {
+    // The source's or the operator's word: there, and at rest.
+    set_position(camera, {frame.station->azimuth_deg, frame.station->elevation_deg, 0, 0},
+                 frame.host_time_ns);
+    camera.position->speed_deg_s = 0;
+    judge(camera, frame, camera.position);
+  } else if (camera.key_pressed) {
+    const std::optional<OrbitPosition> there = next_station(frame.modality);
+    judge(camera, frame, there);
+    if (camera.shown.refusal == Refusal::none) {
+      camera.key_pressed = false;
+      camera.position = there;
+    }
+  } else if (finder_) {
+    camera.waiting = frame;
+    changed_.notify_all();
+  }
+}
+
+void LiveGuide::operator_at_station() {
+  const std::lock_guard lock(mutex_);
+  for (auto& [modality, camera] : cameras_) camera.key_pressed = next_station(modality).has_value();
+}
+
+std::optional<OrbitPosition> LiveGuide::next_station(Modality modality) const {
+  const std::vector<const Sector*> missing = coverage_.missing(modality);
+  if (missing.empty()) return std::nullopt;
+  return OrbitPosition{missing.front()->azimuth_deg, missing.front()->elevation_deg, 0, 0};
+}
+
+void LiveGuide::set_position(Camera& camera, OrbitPosition position, std::int64_t time_ns) {
+  const double seconds = 1e-9 * static_cast<double>(time_ns - camera.position_time_ns);
+  if (camera.position && seconds > 0 && seconds <= options_.unseen_after_s) {
+    const double across = angle_difference_deg(position.azimuth_deg, camera.position->azimuth_deg);
+    position.speed_deg_s =
+        std::hypot(across, position.elevation_deg - camera.position->elevation_deg) / seconds;
+  } else {
+    // Whether it moves is known only from the second look on.
+    position.speed_deg_s = std::numeric_limits<double>::infinity();
+  }
+  camera.position = position;
+  camera.position_time_ns = time_ns;
+}
+
+void LiveGuide::judge(Camera& camera, const FrameRecord& frame,
+                      const std::optional<OrbitPosition>& position) {
+  FrameAssessment assessment;
+  assessment.modality = frame.modality;
+  assessment.file = frame.file;
+  assessment.position = position;
+  assessment.rank = frame.quality ? frame.quality->sharpness : 0;
+  assessment.sharpness = camera.sharpness.relative(assessment.rank, position);
+  // Thermal frames clip where the scene leaves the sensor's range, which is no exposure fault.
+  if (frame.quality && frame.modality == Modality::visible)
+    assessment.overexposed = frame.quality->clipped_fraction;
+  assessment.nuc = frame.has_flag("nuc");
+  // A photo was taken on purpose; whether the hand was still shows in its sharpness.
+  if (assessment.position && frame.has_flag("still")) assessment.position->speed_deg_s = 0;
+  camera.shown.judged_file = frame.file;
+  camera.shown.refusal = coverage_.add(assessment);
+  if (camera.shown.refusal == Refusal::none) note_choice(camera, frame);
+  camera.shown.instruction = coverage_.instruction(frame.modality, position, camera.shown.refusal);
+}
+
+void LiveGuide::note_choice(Camera& camera, const FrameRecord& frame) {
+  const std::vector<Sector>& sectors = coverage_.sectors();
+  for (std::size_t i = 0; i < sectors.size(); ++i) {
+    if (sectors[i].file[slot(frame.modality)] != frame.file) continue;
+    const auto amend = [this](const FrameRecord& record) {
+      if (const Status status = writer_.amend(record); !status && !error_) error_ = status.error();
+    };
+    if (frame.station && !frame.tracking) return;  // written with its station
+    FrameRecord chosen = frame;
+    chosen.tracking = false;
+    chosen.station =
+        Station{sectors[i].loop,
+                sectors[i].index,
+                camera.position ? camera.position->azimuth_deg : sectors[i].azimuth_deg,
+                camera.position ? camera.position->elevation_deg : sectors[i].elevation_deg,
+                1,
+                1};
+    const auto before = camera.chosen.find(i);
+    if (before != camera.chosen.end()) {
+      FrameRecord replaced = before->second;
+      replaced.tracking = true;
+      amend(replaced);
+    }
+    amend(chosen);
+    camera.chosen[i] = chosen;
+    return;
+  }
+}
+
+/// The looking thread: the newest frame of each camera, no faster than asked.
+void LiveGuide::look() {
+  const auto pause = std::chrono::duration<double>(1 / options_.looks_per_second);
+  std::unique_lock lock(mutex_);
+  const auto has_work = [this] {
+    return over_ || std::any_of(cameras_.begin(), cameras_.end(),
+                                [](const auto& c) { return c.second.waiting.has_value(); });
+  };
+  while (true) {
+    changed_.wait(lock, has_work);
+    if (over_) return;
+    const auto started = std::chrono::steady_clock::now();
+    for (auto& [modality, camera] : cameras_) {
+      if (!camera.waiting) continue;
+      const FrameRecord frame = *camera.waiting;
+      camera.waiting.reset();
+      lock.unlock();
+      const std::optional<cv::Mat> image = read_back(writer_.folder() / frame.file);
+      std::optional<OrbitPosition> seen;
+      if (image) seen = finder_(*image, modality);
+      lock.lock();
+      if (seen) {
+        set_position(camera, *seen, frame.host_time_ns);
+      } else if (1e-9 * static_cast<double>(frame.host_time_ns - camera.position_time_ns) >
+                 options_.unseen_after_s) {
+        camera.position.reset();
+      }
+      judge(camera, frame, seen ? camera.position : std::nullopt);
+    }
+    changed_.wait_for(lock, pause - (std::chrono::steady_clock::now() - started),
+                      [this] { return over_; });
+  }
+}
+
+std::vector<LiveCamera> LiveGuide::cameras() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<LiveCamera> list;
+  for (const Modality modality : options_.plan.modalities) {
+    const Camera& camera = cameras_.at(modality);
+    list.push_back(camera.shown);
+    list.back().position = camera.position;
+  }
+  return list;
+}
+
+std::vector<Sector> LiveGuide::sectors() const {
+  const std::lock_guard lock(mutex_);
+  return coverage_.sectors();
+}
+
+int LiveGuide::done_count(Modality modality) const {
+  const std::lock_guard lock(mutex_);
+  return coverage_.done_count(modality);
+}
+
+bool LiveGuide::complete() const {
+  const std::lock_guard lock(mutex_);
+  return coverage_.complete();
+}
+
+std::optional<Error> LiveGuide::error() const {
+  const std::lock_guard lock(mutex_);
+  return error_;
+}
+
+}  // namespace orbitfuse

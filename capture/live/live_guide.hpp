@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "capture/guide/coverage.hpp"
+#include "capture/live/sharpness_reference.hpp"
+#include "capture/session_writer.hpp"
+
+namespace orbitfuse {
+
+/// Finds the camera in an upright image (CV_8UC3 BGR, CV_8UC1 or CV_16UC1 centikelvin).
+using PositionFinder = std::function<std::optional<OrbitPosition>(const cv::Mat&, Modality)>;
+
+struct LiveGuideOptions {
+  OrbitPlan plan;
+  CoverageOptions coverage;
+  double looks_per_second = 4;  ///< per camera; finding the mat costs 5-20 ms a look
+  double unseen_after_s = 1.0;  ///< a position older than this is no longer where the camera is
+
+  Status validate() const;
+};
+
+/// What one camera shows at the moment.
+struct LiveCamera {
+  Modality modality = Modality::visible;
+  std::optional<OrbitPosition> position;
+  Refusal refusal = Refusal::none;  ///< of the latest frame that was judged
+  std::string instruction;          ///< what to do next for this modality
+  std::string latest_file, judged_file;
+};
+
+/// Follows a recording and decides which stations are done. Every frame comes here after it is on
+/// disk. Its position is the station that it carries (replay, synthetic, turntable), or the
+/// operator's key, or what `finder` sees in the image, read back from disk a few times a second on
+/// a thread of its own so that recording never waits for it. The frame chosen for a sector is
+/// marked in the manifest (SessionWriter::amend); one that it replaces becomes a tracking frame.
+class LiveGuide {
+ public:
+  /// `writer` outlives the guide. Without `finder` only stations and keys give positions.
+  LiveGuide(SessionWriter& writer, LiveGuideOptions options, PositionFinder finder = {});
+  ~LiveGuide();
+
+  /// From any thread; fast unless the frame carries a station.
+  void add(const FrameRecord& frame);
+  /// The operator stands at the next station: for each modality the next good frame is it.
+  void operator_at_station();
+
+  /// Ends the looking; call it before the writer closes the session.
+  void finish();
+
+  /// In the order of the plan's modalities.
+  std::vector<LiveCamera> cameras() const;
+  std::vector<Sector> sectors() const;
+  const OrbitPlan& plan() const { return options_.plan; }
+  int done_count(Modality modality) const;
+  bool complete() const;
+  /// The first that failed when a chosen station was noted; recording goes on without.
+  std::optional<Error> error() const;
+
+ private:
+  struct Camera {
+    LiveCamera shown;
+    SharpnessReference sharpness;
+    std::optional<OrbitPosition> position;
+    std::int64_t position_time_ns = 0;
+    std::optional<FrameRecord> waiting;  ///< newest frame not looked at yet
+    bool key_pressed = false;
+    std::map<std::size_t, FrameRecord> chosen;  ///< by sector
+  };
+  void look();
+  void judge(Camera& camera, const FrameRecord& frame,
+             const std::optional<OrbitPosition>& position);
+  void note_choice(Camera& camera, const FrameRecord& frame);
+  std::optional<OrbitPosition> next_station(Modality modality) const;
+  void set_position(Camera& camera, OrbitPosition position, std::int64_t time_ns);
+
+  SessionWriter& writer_;
+  LiveGuideOptions options_;
+  PositionFinder finder_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  Coverage coverage_;
+  std::map<Modality, Camera> cameras_;
+  std::optional<Error> error_;
+  bool over_ = false;
+  std::jthread looker_;
+};
+
+}  // namespace orbitfuse

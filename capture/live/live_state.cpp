@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "capture/live/live_state.hpp"
+
+#include <fmt/format.h>
+
+#include <map>
+#include <nlohmann/json.hpp>
+
+namespace orbitfuse {
+namespace {
+
+using Json = nlohmann::json;
+constexpr std::uint64_t little_disk_bytes = 2ull << 30;
+
+Json json_of(const StreamStatus& s, double rate_hz) {
+  return {{"device", s.device},   {"received", s.received}, {"lost", s.lost},
+          {"missing", s.missing}, {"rejected", s.rejected}, {"dropped", s.dropped},
+          {"silent", s.silent},   {"ended", s.ended},       {"first_id", s.first_id},
+          {"last_id", s.last_id}, {"rate_hz", rate_hz}};
+}
+
+Json json_of(const LiveCamera& camera) {
+  Json json = {{"modality", name(camera.modality)},
+               {"instruction", camera.instruction},
+               {"refusal", text(camera.refusal)},
+               {"file", camera.latest_file}};
+  if (camera.position) {
+    json["position"] = {{"azimuth_deg", camera.position->azimuth_deg},
+                        {"elevation_deg", camera.position->elevation_deg},
+                        {"sigma_deg", camera.position->sigma_deg}};
+  }
+  return json;
+}
+
+}  // namespace
+
+std::vector<std::string> warnings_of(const LiveState& state) {
+  std::vector<std::string> list;
+  for (const StreamStatus& s : state.streams) {
+    if (s.ended && state.running)
+      list.push_back(s.device + ": the stream has ended");
+    else if (s.silent && state.running)
+      list.push_back(s.device + ": no frames");
+    if (s.dropped > 0)
+      list.push_back(
+          fmt::format("{}: the disk is too slow, {} frames dropped", s.device, s.dropped));
+    if (s.missing > 0)
+      list.push_back(fmt::format("{}: {} frames lost on the way", s.device, s.missing));
+    if (s.rejected > 0)
+      list.push_back(fmt::format("{}: {} frames arrived damaged", s.device, s.rejected));
+  }
+  if (state.free_bytes < little_disk_bytes) {
+    list.push_back(fmt::format("{:.1f} GiB left on the disk",
+                               static_cast<double>(state.free_bytes) / (1ull << 30)));
+  }
+  return list;
+}
+
+std::string json_of(const LiveState& state) {
+  Json json = {{"session", state.session},       {"running", state.running},
+               {"complete", state.complete},     {"elapsed_s", state.elapsed_s},
+               {"free_bytes", state.free_bytes}, {"warnings", state.warnings},
+               {"streams", Json::array()},       {"cameras", Json::array()},
+               {"loops", Json::array()}};
+  for (std::size_t i = 0; i < state.streams.size(); ++i) {
+    json["streams"].push_back(
+        json_of(state.streams[i], i < state.rates_hz.size() ? state.rates_hz[i] : 0));
+  }
+  for (const LiveCamera& camera : state.cameras) json["cameras"].push_back(json_of(camera));
+  for (const Sector& sector : state.sectors) {
+    const auto loop = static_cast<std::size_t>(sector.loop);
+    while (json["loops"].size() <= loop)
+      json["loops"].push_back(
+          {{"elevation_deg", sector.elevation_deg}, {"sectors", Json::array()}});
+    json["loops"][loop]["sectors"].push_back({{"azimuth_deg", sector.azimuth_deg},
+                                              {"visible", !sector.file[0].empty()},
+                                              {"thermal", !sector.file[1].empty()}});
+  }
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string terminal_view(const LiveState& state) {
+  const auto seconds = static_cast<long>(state.elapsed_s);
+  std::string out = fmt::format("{}  {}  {}:{:02}  {:.1f} GiB free\n", state.session,
+                                state.running ? "recording" : "stopped", seconds / 60, seconds % 60,
+                                static_cast<double>(state.free_bytes) / (1ull << 30));
+  for (std::size_t i = 0; i < state.streams.size(); ++i) {
+    const StreamStatus& s = state.streams[i];
+    out += fmt::format(
+        "{:<10} {:5.1f} Hz  {} received, {} lost ({} missing, {} rejected, {} dropped)\n", s.device,
+        i < state.rates_hz.size() ? state.rates_hz[i] : 0.0, s.received, s.lost, s.missing,
+        s.rejected, s.dropped);
+  }
+  std::map<int, std::pair<double, std::string>> loops;
+  for (const Sector& sector : state.sectors) {
+    auto& [elevation, marks] = loops[sector.loop];
+    elevation = sector.elevation_deg;
+    const bool visible = !sector.file[0].empty(), thermal = !sector.file[1].empty();
+    const bool wants_both = state.cameras.size() > 1;
+    marks += visible && thermal ? '#'
+             : visible          ? (wants_both ? 'v' : '#')
+             : thermal          ? (wants_both ? 't' : '#')
+                                : '.';
+  }
+  for (const auto& [loop, row] : loops)
+    out += fmt::format("loop {:3.0f} deg  {}\n", row.first, row.second);
+  for (const LiveCamera& camera : state.cameras) {
+    out += fmt::format("{:<10} {}", name(camera.modality), camera.instruction);
+    if (camera.position)
+      out += fmt::format("  (at {:.0f}, {:.0f} deg)", camera.position->azimuth_deg,
+                         camera.position->elevation_deg);
+    out += "\n";
+  }
+  for (const std::string& warning : state.warnings) out += "! " + warning + "\n";
+  return out;
+}
+
+}  // namespace orbitfuse

@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "capture/mat/mat_finder.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <cmath>
+#include <numbers>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "capture/mat/aruco_dictionary.hpp"
+
+namespace orbitfuse {
+namespace {
+
+/// Above what Coverage accepts: a followed position steers, it proves no station.
+constexpr double followed_sigma_deg = 3;
+
+constexpr double deg = 180 / std::numbers::pi;
+
+/// 8-bit grey; thermal samples stretched between percentiles, so that one hot spot hides nothing.
+cv::Mat gray_of(const cv::Mat& image) {
+  cv::Mat gray;
+  if (image.type() == CV_8UC3) {
+    cv::cvtColor(image, gray, cv::COLOR_BGR2GRAY);
+  } else if (image.type() == CV_8UC1) {
+    gray = image;
+  } else if (image.type() == CV_16UC1) {
+    std::vector<std::uint16_t> samples;
+    for (int y = 0; y < image.rows; y += 2) {
+      for (int x = 0; x < image.cols; x += 2) {
+        if (const std::uint16_t v = image.at<std::uint16_t>(y, x); v != 0) samples.push_back(v);
+      }
+    }
+    if (samples.empty()) return {};
+    const auto percentile = [&](double share) {
+      const auto at = samples.begin() +
+                      static_cast<std::ptrdiff_t>(share * static_cast<double>(samples.size() - 1));
+      std::nth_element(samples.begin(), at, samples.end());
+      return static_cast<double>(*at);
+    };
+    const double low = percentile(0.01), high = std::max(percentile(0.99), low + 1);
+    image.convertTo(gray, CV_8U, 255 / (high - low), -255 * low / (high - low));
+  }
+  return gray;
+}
+
+using Corners = MatCorners;
+
+/// Corners of all tags of the design, in the image's own pixels.
+Corners detect(const cv::Mat& gray, const MatDesign& design, int largest_side_px) {
+  const int side = std::max(gray.cols, gray.rows);
+  // Seen at 10 degrees a tag is a few pixels high: interpolation lets the detector read its cells.
+  const double scale = 2 * side <= largest_side_px
+                           ? 2.0
+                           : std::min(1.0, static_cast<double>(largest_side_px) / side);
+  cv::Mat search = gray;
+  if (scale != 1)
+    cv::resize(gray, search, {}, scale, scale, scale < 1 ? cv::INTER_AREA : cv::INTER_CUBIC);
+  const auto parameters = cv::aruco::DetectorParameters::create();
+  parameters->cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
+  parameters->cornerRefinementWinSize = 3;     // cells of distant tags have few pixels
+  parameters->minMarkerPerimeterRate = 0.015;  // many small tags
+  parameters->detectInvertedMarker = true;
+  std::vector<std::vector<cv::Point2f>> tags;
+  std::vector<int> ids;
+  cv::aruco::detectMarkers(search, dictionary_of(design), tags, ids, parameters);
+  Corners out;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    if (ids[i] >= design.tags()) continue;
+    const auto corners = design.corners_m(ids[i]);
+    for (std::size_t c = 0; c < 4; ++c) {
+      out.mat.emplace_back(corners[c].x(), corners[c].y(), corners[c].z());
+      // Pixel centres: at scale s, x' + 0.5 = s (x + 0.5).
+      out.image.emplace_back((tags[i][c].x + 0.5) / scale - 0.5,
+                             (tags[i][c].y + 0.5) / scale - 0.5);
+    }
+  }
+  return out;
+}
+
+/// Only tags that agree with one plane; false detections and bent paper go.
+std::optional<Eigen::Matrix3d> agree_on_plane(Corners& corners, double max_error_px,
+                                              std::size_t min_corners) {
+  if (corners.image.size() < min_corners) return std::nullopt;
+  std::vector<cv::Point2d> plane;
+  for (const cv::Point3d& p : corners.mat) plane.emplace_back(p.x, p.y);
+  std::vector<unsigned char> good;
+  const cv::Mat h =
+      cv::findHomography(plane, corners.image, cv::RANSAC, max_error_px, good, 2000, 0.999);
+  if (h.empty()) return std::nullopt;
+  Corners kept;
+  for (std::size_t i = 0; i < good.size(); i += 4) {
+    if (!good[i] || !good[i + 1] || !good[i + 2] || !good[i + 3]) continue;
+    for (std::size_t c = i; c < i + 4; ++c) {
+      kept.mat.push_back(corners.mat[c]);
+      kept.image.push_back(corners.image[c]);
+    }
+  }
+  corners = std::move(kept);
+  if (corners.image.size() < min_corners) return std::nullopt;
+  Eigen::Matrix3d out;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) out(r, c) = h.at<double>(r, c);
+  }
+  return out;
+}
+
+using Pose = Eigen::Matrix<double, 6, 1>;  // rotation vector, translation
+
+Pose pose_of(const cv::Mat& r, const cv::Mat& t) {
+  Pose pose;
+  for (int i = 0; i < 3; ++i) {
+    pose[i] = r.at<double>(i);
+    pose[3 + i] = t.at<double>(i);
+  }
+  return pose;
+}
+
+Rigid3d rigid_of(const Pose& pose) {
+  const Eigen::Vector3d r = pose.head<3>();
+  const double angle = r.norm();
+  const Eigen::AngleAxisd rotation(
+      angle, angle > 0 ? Eigen::Vector3d(r / angle) : Eigen::Vector3d::UnitX());
+  return {Eigen::Quaterniond(rotation), pose.tail<3>()};
+}
+
+/// Azimuth and elevation in degrees.
+Eigen::Vector2d angles_of(const Pose& pose) {
+  const Eigen::Vector3d eye = camera_center(rigid_of(pose));
+  return {std::atan2(eye.y(), eye.x()) * deg,
+          std::atan2(eye.z(), std::hypot(eye.x(), eye.y())) * deg};
+}
+
+double rms(const Corners& corners, const cv::Matx33d& k, const cv::Mat& r, const cv::Mat& t) {
+  std::vector<cv::Point2d> projected;
+  cv::projectPoints(corners.mat, r, t, k, cv::noArray(), projected);
+  double sum = 0;
+  for (std::size_t i = 0; i < projected.size(); ++i) {
+    const cv::Point2d d = projected[i] - corners.image[i];
+    sum += d.dot(d);
+  }
+  return std::sqrt(sum / static_cast<double>(projected.size()));
+}
+
+/// One standard deviation of the direction: corner noise through the fit's Jacobian.
+double sigma_deg(const Corners& corners, const cv::Matx33d& k, const cv::Mat& r, const cv::Mat& t,
+                 double error_px) {
+  std::vector<cv::Point2d> projected;
+  cv::Mat jacobian;
+  cv::projectPoints(corners.mat, r, t, k, cv::noArray(), projected, jacobian);
+  Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
+  for (int row = 0; row < jacobian.rows; ++row) {
+    Pose j;
+    for (int i = 0; i < 6; ++i) j[i] = jacobian.at<double>(row, i);
+    information += j * j.transpose();
+  }
+  const Eigen::Matrix<double, 6, 6> covariance =
+      information.ldlt().solve(Eigen::Matrix<double, 6, 6>::Identity()) *
+      std::pow(std::max(error_px, 0.1), 2);
+  const Pose pose = pose_of(r, t);
+  const Eigen::Vector2d here = angles_of(pose);
+  double worst = 0;
+  for (int angle = 0; angle < 2; ++angle) {
+    Pose gradient;
+    for (int i = 0; i < 6; ++i) {
+      const double step = 1e-6 * std::max(1.0, std::abs(pose[i]));
+      Pose moved = pose;
+      moved[i] += step;
+      gradient[i] = angle_difference_deg(angles_of(moved)[angle], here[angle]) / step;
+    }
+    worst = std::max(worst, gradient.dot(covariance * gradient));
+  }
+  return std::sqrt(worst);
+}
+
+}  // namespace
+
+Status MatFinderOptions::validate() const {
+  if (min_tags < 1)
+    return fail(ErrorKind::usage, "mat.min_tags", fmt::format("{}", min_tags), "must be >= 1");
+  if (!(max_error_px > 0))
+    return fail(ErrorKind::usage, "mat.max_error_px", fmt::format("{}", max_error_px),
+                "must be > 0");
+  if (largest_side_px < 320)
+    return fail(ErrorKind::usage, "mat.largest_side_px", fmt::format("{}", largest_side_px),
+                "must be >= 320");
+  return {};
+}
+
+MatFinder::MatFinder(const MatDesign& design, MatFinderOptions options)
+    : design_(design), options_(options) {}
+
+void MatFinder::set_focal_px(Modality modality, double focal_px) {
+  known_focal_px_[modality] = focal_px;
+}
+
+std::optional<double> MatFinder::focal_px(Modality modality) const {
+  if (const auto known = known_focal_px_.find(modality); known != known_focal_px_.end())
+    return known->second;
+  const auto estimate = estimates_.find(modality);
+  return estimate == estimates_.end() ? std::nullopt : estimate->second.focal_px();
+}
+
+std::optional<MatSighting> MatFinder::find(const cv::Mat& image, Modality modality) {
+  const cv::Mat gray = gray_of(image);
+  if (gray.empty() || std::min(gray.cols, gray.rows) < 32) return std::nullopt;
+  Corners corners = detect(gray, design_, options_.largest_side_px);
+  const double max_error_px = options_.max_error_px * std::max(1.0, static_cast<double>(gray.cols) /
+                                                                        options_.largest_side_px);
+  const auto min_corners = 4 * static_cast<std::size_t>(options_.min_tags);
+  auto h = agree_on_plane(corners, max_error_px, min_corners);
+  MatTracker& tracker = trackers_[modality];
+  const bool followed = !h;
+  if (h) {
+    tracker.remember(gray, corners);
+  } else if (std::optional<Corners> moved = tracker.follow(gray)) {
+    corners = *std::move(moved);
+    h = agree_on_plane(corners, max_error_px, min_corners);
+  }
+  if (!h) return std::nullopt;
+  const double cx = 0.5 * (gray.cols - 1),
+               cy = 0.5 * (gray.rows - 1);  // pixel centres are whole numbers here
+  Eigen::Matrix3d centred = Eigen::Matrix3d::Identity();
+  centred(0, 2) = -cx;
+  centred(1, 2) = -cy;
+  // The plane in units of its size, so that perspective terms compare between mats.
+  const Eigen::Matrix3d unit = Eigen::Vector3d(design_.size_m, design_.size_m, 1).asDiagonal();
+  if (!followed) estimates_[modality].add(centred * *h * unit, gray.cols);
+  const std::optional<double> focal = focal_px(modality);
+  if (!focal) return std::nullopt;
+
+  const cv::Matx33d k(*focal, 0, cx, 0, *focal, cy, 0, 0, 1);
+  std::vector<cv::Mat> rotations, translations;
+  cv::solvePnPGeneric(corners.mat, corners.image, k, cv::noArray(), rotations, translations, false,
+                      cv::SOLVEPNP_IPPE);
+  std::vector<std::pair<double, std::size_t>> ranked;
+  for (std::size_t i = 0; i < rotations.size(); ++i) {
+    cv::solvePnPRefineLM(corners.mat, corners.image, k, cv::noArray(), rotations[i],
+                         translations[i]);
+    // The mat is printed on one side: a camera below it is the mirrored solution.
+    if (angles_of(pose_of(rotations[i], translations[i]))[1] <= 0) continue;
+    ranked.emplace_back(rms(corners, k, rotations[i], translations[i]), i);
+  }
+  if (ranked.empty()) return std::nullopt;
+  std::sort(ranked.begin(), ranked.end());
+  const std::size_t best = ranked[0].second;
+  const Pose pose = pose_of(rotations[best], translations[best]);
+  if (!pose.allFinite()) return std::nullopt;
+  MatSighting sighting;
+  sighting.cam_from_mat = rigid_of(pose);
+  sighting.tags = static_cast<int>(corners.image.size() / 4);
+  sighting.error_px = ranked[0].first;
+  const Eigen::Vector2d angles = angles_of(pose);
+  sighting.position = {angles[0] < 0 ? angles[0] + 360 : angles[0], angles[1], 0, 0};
+  sighting.position.sigma_deg =
+      sigma_deg(corners, k, rotations[best], translations[best], sighting.error_px);
+  if (ranked.size() > 1 && ranked[1].first < 1.5 * ranked[0].first) {
+    const Eigen::Vector2d other =
+        angles_of(pose_of(rotations[ranked[1].second], translations[ranked[1].second]));
+    sighting.position.sigma_deg +=
+        std::hypot(angle_difference_deg(other[0], angles[0]), other[1] - angles[1]) / 2;
+  }
+  sighting.followed = followed;
+  if (followed) sighting.position.sigma_deg += followed_sigma_deg;
+  return sighting;
+}
+
+}  // namespace orbitfuse

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "capture/live/live_state.hpp"
+
+namespace orbitfuse {
+
+struct PageOptions {
+  std::string host =
+      "127.0.0.1";             ///< the address to listen on; anything but loopback needs a token
+  int port = 8470;             ///< 0: any free one
+  std::string token;           ///< empty off loopback: a random one is made
+  bool require_token = false;  ///< on loopback too
+
+  Status validate() const;
+};
+
+/// What the page shows and does. All are called from the server's threads.
+struct PageHooks {
+  std::function<LiveState()> state;
+  /// The newest recorded file of a modality; empty: none yet.
+  std::function<std::filesystem::path(Modality)> latest;
+  std::function<void()> start, stop, at_station;  ///< may be empty
+};
+
+/// The capture page. It answers with one page without any outside address, its state as JSON,
+/// previews as JPEG and temperatures; a content security policy keeps browsers from asking anybody
+/// else. Requests without the token (where one is needed) get 401; requests for another host name
+/// than an address or localhost get 403 (DNS rebinding); changes need a POST with the header
+/// X-OrbitFuse, which other sites' pages cannot send.
+class PageServer {
+ public:
+  PageServer(PageOptions options, PageHooks hooks);
+  ~PageServer();
+
+  /// Device error with the remedy when the port is taken or the address is not this machine's.
+  Status start();
+  void stop();
+  int port() const;
+  /// What to open, the token included where one is needed.
+  std::string url() const;
+  const std::string& token() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace orbitfuse

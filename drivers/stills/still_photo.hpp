@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "capture/frame_source.hpp"
+#include "drivers/stills/thermal_decoder.hpp"
+
+namespace orbitfuse {
+
+/// One file as a frame, and the camera that took it as far as the file says.
+struct StillPhoto {
+  Frame frame;  ///< host time from the file's own clock, 0 if it has none
+  DeviceInfo camera;
+  std::string key;  ///< same key: same camera, lens and image size
+};
+
+/// Size of the upright image at 35 mm equivalent focal length, in pixels.
+double focal_px_of_35mm(double focal_35mm, cv::Size size);
+
+/// A photo (JPEG, PNG, TIFF) kept byte for byte. Input error when it doesn't decode.
+Result<StillPhoto> read_visible_still(const std::filesystem::path& file);
+/// A thermal image turned into centikelvin, or kept as it is when it is 8-bit. `decoder` gets to
+/// see 16-bit samples of unknown scale first.
+Result<StillPhoto> read_thermal_still(const std::filesystem::path& file, ThermalDecoder& decoder);
+
+/// Whether the file is a radiometric JPEG; false also when it can't be read.
+bool is_radiometric(const std::filesystem::path& file);
+
+}  // namespace orbitfuse

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "drivers/stills/watch_source.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <ctime>
+
+#include "core/file_io.hpp"
+#include "drivers/stills/folder_watch.hpp"
+#include "drivers/stills/image_list.hpp"
+#include "drivers/stills/still_photo.hpp"
+
+namespace orbitfuse {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+constexpr std::chrono::milliseconds retry_every{250};
+
+bool has_image_name(const fs::path& file) {
+  std::string extension = file.extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  for (const char* known : {".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp"}) {
+    if (extension == known) return true;
+  }
+  return false;
+}
+
+std::int64_t written_ns(const fs::path& file) {
+  std::error_code error;
+  const auto written = fs::last_write_time(file, error);
+  if (error) return 0;
+  const auto utc = std::chrono::file_clock::to_sys(written);
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(utc.time_since_epoch()).count();
+}
+
+}  // namespace
+
+struct WatchSource::Reader {
+  explicit Reader(const WatchOptions& options)
+      : watch(options.folder, options.settle, options.rescan), decoder(import) {}
+  FolderWatch watch;
+  ImportOptions import;  ///< outlives the decoder, which refers to it
+  ThermalDecoder decoder;
+};
+
+Status WatchOptions::validate() const {
+  if (folder.empty())
+    return fail(ErrorKind::usage, "stills.folder", "empty", "name the folder where photos arrive");
+  if (settle.count() <= 0 || rescan.count() <= 0 || give_up < settle) {
+    return fail(ErrorKind::usage, "stills.settle", "not positive, or longer than give_up",
+                "must be > 0 and at most give_up");
+  }
+  return {};
+}
+
+WatchSource::WatchSource(WatchOptions options)
+    : options_(std::move(options)), reader_(std::make_unique<Reader>(options_)) {
+  info_.id = options_.device_id;
+  info_.modality = options_.modality;
+  info_.driver = "stills";
+}
+
+WatchSource::~WatchSource() = default;
+
+DeviceInfo WatchSource::describe() const {
+  const std::lock_guard lock(mutex_);
+  return info_;
+}
+
+Status WatchSource::start() {
+  ORBITFUSE_TRY(options_.validate());
+  return reader_->watch.open(options_.existing);
+}
+
+void WatchSource::stop() { reader_->watch.close(); }
+
+Delivery WatchSource::event(std::string kind, std::string detail) const {
+  Delivery delivery;
+  delivery.kind = Delivery::Kind::event;
+  delivery.reason = std::move(kind);
+  delivery.detail = std::move(detail);
+  return delivery;
+}
+
+Result<Delivery> WatchSource::next(std::chrono::milliseconds timeout) {
+  const auto deadline = Clock::now() + timeout;
+  while (true) {
+    const auto due = std::find_if(queue_.begin(), queue_.end(),
+                                  [](const Attempt& a) { return a.next_try <= Clock::now(); });
+    if (due != queue_.end()) {
+      Attempt attempt = std::move(*due);
+      queue_.erase(due);
+      if (std::optional<Delivery> delivery = take(std::move(attempt))) return std::move(*delivery);
+      continue;
+    }
+    const auto left =
+        std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
+    if (left.count() <= 0) return Delivery{};
+    const auto found = reader_->watch.wait(std::min(left, queue_.empty() ? left : retry_every));
+    if (reader_->watch.folder_gone() != gone_told_) {
+      gone_told_ = !gone_told_;
+      return event(gone_told_ ? "disconnected" : "reconnected", options_.folder.string());
+    }
+    for (const fs::path& file : found) {
+      // Written again while it waits for its rest: one attempt is enough.
+      std::erase_if(queue_, [&](const Attempt& a) { return a.file == file; });
+      queue_.push_back({file, Clock::now(), Clock::now()});
+    }
+  }
+}
+
+/// One look at a file; nothing when it has to be tried again.
+std::optional<Delivery> WatchSource::take(Attempt attempt) {
+  const std::string name = attempt.file.filename().string();
+  if (!has_image_name(attempt.file)) {
+    return event("ignored",
+                 name + ": not a JPEG, PNG, TIFF or BMP (set the camera to one of these)");
+  }
+  const bool thermal = options_.modality == Modality::thermal;
+  const bool radiometric = is_radiometric(attempt.file);
+  if (!thermal && radiometric) return event("ignored", name + ": a thermal image, not a photo");
+  Result<StillPhoto> still = thermal ? read_thermal_still(attempt.file, reader_->decoder)
+                                     : read_visible_still(attempt.file);
+  Delivery delivery;
+  if (!still) {
+    std::error_code error;
+    if (!fs::exists(attempt.file, error))
+      return event("ignored", name + ": vanished before it was read");
+    if (Clock::now() - attempt.first_try < options_.give_up) {
+      attempt.next_try = Clock::now() + retry_every;
+      queue_.push_back(std::move(attempt));
+      return std::nullopt;
+    }
+    delivery.kind = Delivery::Kind::rejected;
+    delivery.frame.id = next_id_++;
+    delivery.reason = name + ": " + still.error().found;
+    return delivery;
+  }
+  if (thermal && still->frame.thermal_is_gray && !options_.accept_gray) {
+    return event("ignored", name + ": no temperatures in it (gray=yes takes it all the same)");
+  }
+  const Result<std::string> bytes = read_file(attempt.file);
+  if (!bytes || !seen_hashes_.insert(content_hash(*bytes)).second) {
+    return event("duplicate", name + ": the same image came before");
+  }
+  delivery.frame = std::move(still->frame);
+  delivery.frame.id = next_id_++;
+  {
+    const std::lock_guard lock(mutex_);
+    if (camera_key_.empty()) {
+      camera_key_ = still->key;
+      info_.model = still->camera.model;
+      info_.serial = still->camera.serial;
+      info_.lens = still->camera.lens;
+    } else if (still->key != camera_key_) {
+      delivery.kind = Delivery::Kind::rejected;
+      delivery.reason =
+          name +
+          ": another camera, lens or image size than the first (give it a folder of its own)";
+      return delivery;
+    }
+  }
+  if (delivery.frame.host_time_ns == 0) delivery.frame.host_time_ns = written_ns(attempt.file);
+  delivery.kind = Delivery::Kind::frame;
+  delivery.frame.source =
+      (attempt.file.parent_path().filename() / attempt.file.filename()).string();
+  delivery.frame.flags.push_back("still");
+  return delivery;
+}
+
+}  // namespace orbitfuse

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "fusion/pyramid/image_pair.hpp"
+
+namespace orbitfuse {
+
+/// Holes filled from the valid pixels round them, coarse to fine, so that filters across the edge
+/// of a hole see a smooth continuation instead of its contents.
+fusion::Plane filled(const fusion::Plane& image, const cv::Mat1b& valid);
+
+/// The part of the image that has to be fused: the valid pixels with what filters reach from them,
+/// on a grid that all pyramids share. The whole image where that saves little.
+cv::Rect needed_part(const cv::Mat1b& valid);
+
+}  // namespace orbitfuse

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Recording from the command line, and what belongs to it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "core/session.hpp"
+#include "tests/app/cli/program.hpp"
+#include "tests/app/temp_folder.hpp"
+
+namespace orbitfuse {
+namespace {
+using testing::HasSubstr;
+
+const std::string tiny = "synthetic,size=64x48,spacing=60";
+
+Session opened(const std::filesystem::path& folder) {
+  const auto session = open_session(folder);
+  EXPECT_TRUE(session) << session.error().message();
+  return session ? *session : Session{};
+}
+
+TEST(Capture, TwoCameraSessionReplaysToTheSameFrames) {
+  const TempFolder temp;
+  const std::string first = temp.path / "first", second = temp.path / "second";
+  const Outcome captured = orbitfuse_program({"capture", first, "--driver", tiny, "--json"});
+  ASSERT_EQ(captured.code, 0) << captured.err;
+  const auto result = captured.result();
+  EXPECT_EQ(result.at("stations").at("visible").at("done"),
+            result.at("stations").at("visible").at("of"));
+  for (const auto& stream : result.at("streams")) {
+    EXPECT_EQ(stream.at("lost"), 0);
+    EXPECT_EQ(stream.at("received").get<int>(),
+              stream.at("last_id").get<int>() - stream.at("first_id").get<int>() + 1);
+  }
+  const Outcome replayed = orbitfuse_program({"capture", second, "--driver", "replay:" + first});
+  ASSERT_EQ(replayed.code, 0) << replayed.err;
+  EXPECT_THAT(replayed.out, HasSubstr("visible0: 12 received, 0 lost"));
+  const Session a = opened(first), b = opened(second);
+  EXPECT_TRUE(a.complete && b.complete);
+  ASSERT_EQ(a.frames.size(), b.frames.size());
+  for (const FrameRecord& frame : a.frames) {
+    const auto same = std::find_if(b.frames.begin(), b.frames.end(), [&](const FrameRecord& f) {
+      return f.device == frame.device && f.sequence == frame.sequence;
+    });
+    ASSERT_NE(same, b.frames.end());
+    EXPECT_EQ(same->content_hash, frame.content_hash);
+    EXPECT_EQ(same->host_time_ns, frame.host_time_ns);
+    EXPECT_EQ(same->station->azimuth_deg, frame.station->azimuth_deg);
+  }
+  const Outcome inspected = orbitfuse_program({"inspect", second, "--json"});
+  EXPECT_EQ(inspected.code, 0);
+  EXPECT_EQ(inspected.result().at("visible").at("frames"), 12);
+  EXPECT_EQ(inspected.result().at("thermal").at("has_temperatures"), true);
+  // The pipeline takes the copy as it takes the original.
+  for (const std::string& session : {first, second}) {
+    const Outcome planned =
+        orbitfuse_program({"run", session, "--out", temp.path / "out", "--dry-run"});
+    EXPECT_EQ(planned.code, 0) << planned.err;
+  }
+}
+
+TEST(Capture, DryRunWritesNothing) {
+  const TempFolder temp;
+  const Outcome outcome = orbitfuse_program(
+      {"capture", temp.path / "s", "--visible", tiny, "--dry-run", "--seconds", "0.5", "--json"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_GT(outcome.result().at("streams").at(0).at("frames"), 0);
+  EXPECT_FALSE(std::filesystem::exists(temp.path / "s"));
+}
+
+TEST(Capture, RefusesAForeignFolderAndResumesASession) {
+  const TempFolder temp;
+  std::ofstream(temp.path / "holiday.txt") << "x";
+  const Outcome foreign = orbitfuse_program({"capture", temp.path, "--visible", tiny});
+  EXPECT_EQ(foreign.code, 3);
+  EXPECT_THAT(foreign.err, HasSubstr("choose another folder"));
+  EXPECT_EQ(orbitfuse_program({"capture", temp.path, "--visible", tiny, "--resume"}).code, 3);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temp.path), {}), 1);
+
+  const std::string session = temp.path / "s";
+  ASSERT_EQ(orbitfuse_program({"capture", session, "--visible", tiny}).code, 0);
+  const Outcome again = orbitfuse_program({"capture", session, "--thermal", tiny});
+  EXPECT_EQ(again.code, 3);
+  EXPECT_THAT(again.err, HasSubstr("--resume"));
+  // The other camera hours later: one after the other into one session.
+  ASSERT_EQ(orbitfuse_program({"capture", session, "--thermal", tiny, "--resume"}).code, 0);
+  const Session both = opened(session);
+  EXPECT_TRUE(both.complete);
+  EXPECT_EQ(both.frames_of(Modality::visible).size(), 12u);
+  EXPECT_EQ(both.frames_of(Modality::thermal).size(), 12u);
+}
+
+TEST(Mat, IsWrittenWholeOrNotAtAll) {
+  const TempFolder temp;
+  const std::string file = temp.path / "mat.pdf";
+  const Outcome outcome =
+      orbitfuse_program({"mat", "--out", file, "--size-m", "0.5", "--thermal", "--json"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(outcome.result().at("tags_per_side"), 5);
+  EXPECT_GT(std::filesystem::file_size(file), 1000u);
+  EXPECT_EQ(orbitfuse_program({"mat", "--out", temp.path / "no.pdf", "--tags", "99"}).code, 2);
+  EXPECT_EQ(orbitfuse_program({"mat", "--out", temp.path / "no.pdf", "--paper", "letter"}).code, 2);
+  EXPECT_FALSE(std::filesystem::exists(temp.path / "no.pdf"));
+}
+
+TEST(Devices, AnswersWithAList) {
+  const Outcome outcome = orbitfuse_program({"devices", "--json"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_TRUE(outcome.result().at("devices").is_array());
+}
+
+TEST(Capture, MistakesHaveARemedyAndLeaveNothing) {
+  const TempFolder temp;
+  const std::string session = temp.path / "s";
+  struct Case {
+    std::vector<std::string> cameras;
+    int code;
+    std::string words;
+  };
+  const std::vector<Case> cases = {
+      {{}, 2, "--visible"},
+      {{"--visible", "webcam"}, 2, "use one of aravis"},
+      {{"--visible", "v4l2:/dev/video97"}, 4, "plug it in"},
+      {{"--thermal", "aravis:nobody-0815"}, 4, "subnet"},
+      {{"--thermal", "aravis,profile=nonsense"}, 2, "flir-ax5"},
+      {{"--driver", "replay:/nowhere"}, 3, "no such folder"},
+      {{"--driver", tiny, "--spacing-deg", "31"}, 2, "guide.spacing_deg"},
+  };
+  for (const Case& c : cases) {
+    std::vector<std::string> arguments = {"capture", session};
+    arguments.insert(arguments.end(), c.cameras.begin(), c.cameras.end());
+    const Outcome outcome = orbitfuse_program(arguments);
+    EXPECT_EQ(outcome.code, c.code) << c.words << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr(c.words));
+    EXPECT_FALSE(std::filesystem::exists(session)) << c.words;
+  }
+}
+
+}  // namespace
+}  // namespace orbitfuse

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/recording/recording.hpp"
+
+#include <gtest/gtest.h>
+
+#include "app/recording/rehearsal.hpp"
+#include "tests/capture/scripted_source.hpp"
+#include "tests/core/temp_folder.hpp"
+
+namespace orbitfuse::recording {
+namespace {
+
+using test::ScriptedSource;
+
+std::vector<std::unique_ptr<FrameSource>> one_camera(std::uint64_t first, std::uint64_t count,
+                                                     const char* id = "thermal0") {
+  std::deque<Delivery> script;
+  for (std::uint64_t i = 0; i < count; ++i)
+    script.push_back(test::frame_delivery(first + i, test::thermal_pixels()));
+  std::vector<std::unique_ptr<FrameSource>> sources;
+  sources.push_back(std::make_unique<ScriptedSource>(id, Modality::thermal, std::move(script)));
+  return sources;
+}
+
+Result<Ending> record(std::vector<std::unique_ptr<FrameSource>> sources,
+                      const RecordingOptions& options) {
+  Recording recording(std::move(sources), options);
+  ORBITFUSE_TRY(recording.prepare());
+  return recording.run(nullptr);
+}
+
+TEST(Recording, ResumeGoesOnWithTheIdsOfTheSameCamera) {
+  const test::TempFolder folder;
+  RecordingOptions options;
+  options.session = folder / "s";
+  ASSERT_TRUE(record(one_camera(7, 5), options));
+  options.resume = true;
+  ASSERT_TRUE(record(one_camera(0, 4), options));
+  const auto session = open_session(folder / "s");
+  ASSERT_TRUE(session) << session.error().message();
+  EXPECT_TRUE(session->complete);
+  ASSERT_EQ(session->frames.size(), 9u);
+  EXPECT_EQ(session->devices.size(), 1u);
+  ASSERT_EQ(session->streams.size(), 2u);
+  EXPECT_EQ(session->streams[0].last_sequence, 11u);
+  EXPECT_EQ(session->streams[1].first_sequence, 12u);
+  for (const StreamRecord& s : session->streams)
+    EXPECT_EQ(s.received + s.lost, s.last_sequence - s.first_sequence + 1);
+}
+
+TEST(Recording, AnotherCameraGetsItsOwnName) {
+  const test::TempFolder folder;
+  RecordingOptions options;
+  options.session = folder / "s";
+  ASSERT_TRUE(record(one_camera(0, 2), options));
+  options.resume = true;
+  auto other =
+      std::make_unique<ScriptedSource>("thermal0", Modality::visible, std::deque<Delivery>{});
+  std::vector<std::unique_ptr<FrameSource>> sources;
+  sources.push_back(std::move(other));
+  ASSERT_TRUE(record(std::move(sources), options));
+  const auto session = open_session(folder / "s");
+  ASSERT_TRUE(session);
+  ASSERT_EQ(session->devices.size(), 2u);
+  EXPECT_EQ(session->devices[1].id, "visible0");
+}
+
+TEST(Recording, CameraThatDoesNotStartLeavesNoFolder) {
+  const test::TempFolder folder;
+  RecordingOptions options;
+  options.session = folder / "s";
+  auto sources = one_camera(0, 2);
+  static_cast<ScriptedSource&>(*sources[0]).fail_start = true;
+  const auto ending = record(std::move(sources), options);
+  ASSERT_FALSE(ending);
+  EXPECT_EQ(ending.error().kind, ErrorKind::device);
+  EXPECT_FALSE(std::filesystem::exists(folder / "s"));
+}
+
+TEST(Recording, CameraThatFailsLaterLeavesAnIncompleteSessionWithItsAccount) {
+  const test::TempFolder folder;
+  RecordingOptions options;
+  options.session = folder / "s";
+  auto sources = one_camera(0, 3);
+  static_cast<ScriptedSource&>(*sources[0]).fail_at_end = true;
+  EXPECT_FALSE(record(std::move(sources), options));
+  const auto session = open_session(folder / "s");
+  ASSERT_TRUE(session);
+  EXPECT_FALSE(session->complete);
+  EXPECT_EQ(session->frames.size(), 3u);
+  EXPECT_EQ(session->streams.size(), 1u);
+}
+
+TEST(Recording, StopsByItself) {
+  const test::TempFolder folder;
+  RecordingOptions options;
+  options.session = folder / "s";
+  options.live = true;
+  options.seconds = 0.2;
+  auto sources = one_camera(0, 100000);
+  static_cast<ScriptedSource&>(*sources[0]).pause = std::chrono::milliseconds(5);
+  const auto ending = record(std::move(sources), options);
+  ASSERT_TRUE(ending) << ending.error().message();
+  EXPECT_EQ(*ending, Ending::time_over);
+  EXPECT_TRUE(open_session(folder / "s")->complete);
+}
+
+TEST(Recording, FramesForTheGuideToChooseAreTrackingFrames) {
+  const test::TempFolder folder;
+  RecordingOptions options;
+  options.session = folder / "s";
+  options.choose_stations = true;
+  options.guide = LiveGuideOptions{};
+  ASSERT_TRUE(record(one_camera(0, 2), options));
+  const Session session = *open_session(folder / "s");
+  for (const FrameRecord& frame : session.frames) EXPECT_TRUE(frame.tracking);
+}
+
+TEST(Rehearsal, CountsAndWritesNothing) {
+  auto sources = one_camera(0, 3);
+  std::deque<Delivery> script;
+  script.push_back(test::frame_delivery(10, test::thermal_pixels()));
+  script.push_back(test::rejected_delivery(14, "short"));
+  sources.push_back(
+      std::make_unique<ScriptedSource>("thermal1", Modality::thermal, std::move(script)));
+  const auto list = rehearse(sources, 5);
+  ASSERT_TRUE(list) << list.error().message();
+  EXPECT_EQ((*list)[0].frames, 3u);
+  EXPECT_EQ((*list)[0].width, 32);
+  EXPECT_EQ((*list)[1].missing, 3u);
+  EXPECT_EQ((*list)[1].rejected, 1u);
+  EXPECT_EQ((*list)[1].reasons.at("short"), 1);
+  EXPECT_EQ(static_cast<ScriptedSource&>(*sources[0]).stops, 1);
+}
+
+}  // namespace
+}  // namespace orbitfuse::recording

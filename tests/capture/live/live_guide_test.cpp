@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "capture/live/live_guide.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <thread>
+
+#include "tests/capture/scripted_source.hpp"
+#include "tests/core/temp_folder.hpp"
+
+namespace orbitfuse {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// A session with one visible camera whose frames carry their azimuth in their grey level.
+class LiveGuideTest : public ::testing::Test {
+ protected:
+  LiveGuideTest() {
+    writer = *SessionWriter::create(folder / "s");
+    DeviceInfo device;
+    device.id = "visible0";
+    EXPECT_TRUE(writer->add_device(device));
+    options.plan.loop_elevations_deg = {20};
+    options.plan.modalities = {Modality::visible};
+    options.looks_per_second = 100;
+  }
+
+  /// Grey level g stands for azimuth 2 g; noise keeps the image sharp.
+  FrameRecord record(int level, double time_s, bool blurred = false) {
+    Frame frame;
+    frame.id = next_id++;
+    frame.host_time_ns = static_cast<std::int64_t>(1e18 + time_s * 1e9);
+    frame.tracking = true;
+    frame.pixels = cv::Mat(32, 32, CV_8UC1, cv::Scalar(level));
+    for (int i = 0; i < 32; ++i)
+      frame.pixels.at<std::uint8_t>(i, i) = static_cast<std::uint8_t>(level + (blurred ? 0 : 60));
+    if (blurred) {
+      for (int y = 0; y < 32; ++y) {
+        for (int x = 0; x < 32; ++x)
+          frame.pixels.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(level + y);
+      }
+    }
+    return *writer->append("visible0", frame);
+  }
+
+  static std::optional<OrbitPosition> find(const cv::Mat& image, Modality) {
+    const int level = image.at<std::uint8_t>(0, 31) % 200;
+    if (level == 199) return std::nullopt;
+    return OrbitPosition{2.0 * level, 20, 0.1, 0};
+  }
+
+  /// Gives a frame to the guide and waits until it has been judged.
+  static void show(LiveGuide& guide, const FrameRecord& frame) {
+    guide.add(frame);
+    const auto deadline = std::chrono::steady_clock::now() + 10s;
+    while (guide.cameras()[0].judged_file != frame.file) {
+      ASSERT_LT(std::chrono::steady_clock::now(), deadline);
+      std::this_thread::sleep_for(1ms);
+    }
+  }
+
+  test::TempFolder folder;
+  std::unique_ptr<SessionWriter> writer;
+  LiveGuideOptions options;
+  std::uint64_t next_id = 0;
+};
+
+TEST_F(LiveGuideTest, RestingSharpFrameBecomesAStationInTheManifest) {
+  {
+    LiveGuide guide(*writer, options, find);
+    show(guide, record(15, 0.0));  // speed unknown: proves nothing
+    EXPECT_EQ(guide.done_count(Modality::visible), 0);
+    EXPECT_EQ(guide.cameras()[0].refusal, Refusal::moving);
+    show(guide, record(15, 0.25));
+    EXPECT_EQ(guide.done_count(Modality::visible), 1);
+    EXPECT_NEAR(guide.cameras()[0].position->azimuth_deg, 30, 1e-9);
+    show(guide, record(25, 0.5));  // 80 degrees a second
+    EXPECT_EQ(guide.cameras()[0].refusal, Refusal::moving);
+    EXPECT_EQ(guide.done_count(Modality::visible), 1);
+  }
+  ASSERT_TRUE(writer->close());
+  const auto session = open_session(folder / "s");
+  ASSERT_TRUE(session) << session.error().message();
+  ASSERT_EQ(session->frames.size(), 3u);
+  EXPECT_TRUE(session->frames[0].tracking);
+  EXPECT_FALSE(session->frames[1].tracking);
+  EXPECT_EQ(session->frames[1].station->index, 1);
+  EXPECT_TRUE(session->frames[2].tracking);
+}
+
+TEST_F(LiveGuideTest, BlurredFrameStaysATrackingFrame) {
+  LiveGuide guide(*writer, options, find);
+  show(guide, record(0, 0.0));
+  show(guide, record(0, 0.25, true));
+  EXPECT_EQ(guide.done_count(Modality::visible), 0);
+}
+
+TEST_F(LiveGuideTest, LosesThePositionWhenTheMatIsOutOfSight) {
+  LiveGuide guide(*writer, options, find);
+  show(guide, record(15, 0));
+  EXPECT_TRUE(guide.cameras()[0].position);
+  show(guide, record(199, 2));
+  EXPECT_FALSE(guide.cameras()[0].position);
+  EXPECT_EQ(guide.cameras()[0].instruction, "show the mat to the camera");
+}
+
+TEST_F(LiveGuideTest, OperatorsKeyFillsTheNextStation) {
+  LiveGuide guide(*writer, options);
+  guide.add(record(15, 0));
+  EXPECT_EQ(guide.done_count(Modality::visible), 0);
+  guide.operator_at_station();
+  guide.add(record(15, 1));
+  guide.add(record(15, 2));
+  EXPECT_EQ(guide.done_count(Modality::visible), 1);
+  for (int i = 0; i < 11; ++i) {
+    EXPECT_FALSE(guide.complete());
+    guide.operator_at_station();
+    guide.add(record(15, 3 + i));
+  }
+  EXPECT_TRUE(guide.complete());
+  EXPECT_FALSE(guide.error());
+}
+
+TEST_F(LiveGuideTest, StationsThatFramesCarryCountAtOnce) {
+  LiveGuide guide(*writer, options);
+  FrameRecord frame = record(15, 0);
+  frame.tracking = false;
+  frame.station = Station{0, 3, 90, 20, 5, 5};
+  guide.add(frame);
+  EXPECT_EQ(guide.done_count(Modality::visible), 1);
+  frame.flags = {"nuc"};
+  frame.station->azimuth_deg = 120;
+  guide.add(frame);
+  EXPECT_EQ(guide.done_count(Modality::visible), 1);
+}
+
+TEST_F(LiveGuideTest, OptionsAreChecked) {
+  options.looks_per_second = 0;
+  EXPECT_EQ(options.validate().error().where, "guide.looks_per_second");
+  options = {};
+  options.plan.spacing_deg = 7;
+  EXPECT_EQ(options.validate().error().where, "guide.spacing_deg");
+}
+
+}  // namespace
+}  // namespace orbitfuse

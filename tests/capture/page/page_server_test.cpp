@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "capture/page/page_server.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <thread>
+
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wold-style-cast"
+#pragma GCC diagnostic ignored "-Wshadow"
+#include <httplib.h>
+#pragma GCC diagnostic pop
+
+#include "core/image_codec.hpp"
+#include "core/image_io.hpp"
+#include "tests/core/temp_folder.hpp"
+
+namespace orbitfuse {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+LiveState some_state() {
+  LiveState state;
+  state.session = "car \"A\"";
+  state.running = true;
+  state.elapsed_s = 83;
+  state.free_bytes = 5ull << 30;
+  StreamStatus stream;
+  stream.device = "thermal0";
+  stream.received = 90;
+  stream.lost = 10;
+  stream.missing = 7;
+  stream.dropped = 3;
+  stream.first_id = 1;
+  stream.last_id = 100;
+  state.streams = {stream};
+  state.rates_hz = {29.9};
+  LiveCamera camera;
+  camera.instruction = "12° further left";
+  camera.position = OrbitPosition{350, 12, 0.1, 0};
+  state.cameras = {camera};
+  OrbitPlan plan;
+  state.sectors = Coverage(plan).sectors();
+  state.sectors[0].file[0] = "visible/000000.jpg";
+  state.warnings = warnings_of(state);
+  return state;
+}
+
+class PageTest : public ::testing::Test {
+ protected:
+  void serve(PageOptions options) {
+    options.port = 0;
+    PageHooks hooks;
+    hooks.state = some_state;
+    hooks.latest = [this](Modality modality) {
+      return modality == Modality::visible ? visible : thermal;
+    };
+    hooks.stop = [this] { ++stops; };
+    server = std::make_unique<PageServer>(options, hooks);
+    const Status status = server->start();
+    ASSERT_TRUE(status) << status.error().message();
+  }
+  httplib::Client client() const { return httplib::Client("127.0.0.1", server->port()); }
+
+  std::filesystem::path visible, thermal;
+  std::atomic<int> stops{0};
+  std::unique_ptr<PageServer> server;
+};
+
+TEST_F(PageTest, PageAsksNobodyElse) {
+  serve({});
+  const auto page = client().Get("/");
+  ASSERT_TRUE(page);
+  EXPECT_EQ(page->status, 200);
+  for (const char* outside :
+       {"http:", "https:", "//cdn", "src=\"//", "url(", "@import", "ws:", "<link"}) {
+    EXPECT_THAT(page->body, Not(HasSubstr(outside)));
+  }
+  EXPECT_THAT(page->get_header_value("Content-Security-Policy"), HasSubstr("default-src 'none'"));
+  EXPECT_THAT(page->get_header_value("Content-Security-Policy"), HasSubstr("connect-src 'self'"));
+  EXPECT_EQ(server->url().find("token"), std::string::npos);
+}
+
+TEST_F(PageTest, StateIsWhatTheRecorderSays) {
+  serve({});
+  const auto answer = client().Get("/state");
+  ASSERT_TRUE(answer);
+  const auto state = nlohmann::json::parse(answer->body);
+  EXPECT_EQ(state.at("session"), "car \"A\"");
+  EXPECT_EQ(state.at("running"), true);
+  const auto& stream = state.at("streams").at(0);
+  EXPECT_EQ(stream.at("received").get<int>() + stream.at("lost").get<int>(), 100);
+  EXPECT_EQ(stream.at("missing"), 7);
+  EXPECT_EQ(stream.at("dropped"), 3);
+  EXPECT_EQ(state.at("loops").size(), 3u);
+  EXPECT_EQ(state.at("loops").at(0).at("sectors").size(), 12u);
+  EXPECT_EQ(state.at("loops").at(0).at("sectors").at(0).at("visible"), true);
+  EXPECT_EQ(state.at("loops").at(0).at("sectors").at(0).at("thermal"), false);
+  EXPECT_EQ(state.at("cameras").at(0).at("instruction"), "12° further left");
+  EXPECT_THAT(state.at("warnings").dump(), HasSubstr("3 frames dropped"));
+}
+
+TEST_F(PageTest, TokenIsAskedForEverything) {
+  PageOptions options;
+  options.token = "right-token-1";
+  options.require_token = true;
+  serve(options);
+  const httplib::Headers wrong{{"X-Token", "wrong-token-1"}, {"X-OrbitFuse", "1"}},
+      right{{"X-Token", "right-token-1"}, {"X-OrbitFuse", "1"}};
+  for (const char* path :
+       {"/", "/state", "/preview/visible", "/temperature?u=0&v=0", "/nonsense"}) {
+    EXPECT_EQ(client().Get(path)->status, 401) << path;
+    EXPECT_EQ(client().Get(path, wrong)->status, 401) << path;
+    EXPECT_NE(client().Get(path, right)->status, 401) << path;
+  }
+  EXPECT_EQ(client().Post("/stop", wrong, "", "text/plain")->status, 401);
+  EXPECT_EQ(stops, 0);
+  EXPECT_EQ(client().Get("/?token=right-token-1")->status, 200);
+  EXPECT_EQ(client().Get("/?token=right-token-")->status, 401);
+  EXPECT_EQ(client().Get("/?token=")->status, 401);
+  EXPECT_THAT(server->url(), HasSubstr("?token=right-token-1"));
+  EXPECT_EQ(client().Post("/stop", right, "", "text/plain")->status, 204);
+  EXPECT_EQ(stops, 1);
+}
+
+TEST_F(PageTest, BeyondLoopbackATokenIsMade) {
+  PageOptions options;
+  options.host = "0.0.0.0";
+  serve(options);
+  EXPECT_EQ(server->token().size(), 32u);
+  EXPECT_EQ(client().Get("/state")->status, 401);
+  EXPECT_EQ(client().Get("/state", {{"X-Token", server->token()}})->status, 200);
+}
+
+TEST_F(PageTest, OtherSitesCannotPressItsButtons) {
+  serve({});
+  EXPECT_EQ(client().Post("/stop", httplib::Headers{}, "", "text/plain")->status, 403);
+  EXPECT_EQ(client().Get("/stop")->status, 404);
+  EXPECT_EQ(stops, 0);
+  // A name of another site that was pointed at this machine.
+  EXPECT_EQ(client().Get("/state", {{"Host", "evil.example:80"}})->status, 403);
+  EXPECT_EQ(client().Get("/state", {{"Host", "localhost:80"}})->status, 200);
+  EXPECT_EQ(client().Get("/state", {{"Host", "[::1]:80"}})->status, 200);
+  EXPECT_EQ(client().Post("/start", {{"X-OrbitFuse", "1"}}, "", "text/plain")->status,
+            404);  // no such hook
+}
+
+TEST_F(PageTest, PreviewsAndTemperatures) {
+  const test::TempFolder folder;
+  serve({});
+  EXPECT_EQ(client().Get("/preview/visible")->status, 404);
+  visible = folder / "a.jpg";
+  ASSERT_TRUE(write_jpeg(visible, cv::Mat(900, 1200, CV_8UC3, cv::Scalar(10, 200, 30))));
+  const auto picture = client().Get("/preview/visible");
+  ASSERT_EQ(picture->status, 200);
+  EXPECT_EQ(picture->get_header_value("Content-Type"), "image/jpeg");
+  const auto image = decode_image(picture->body, "preview");
+  ASSERT_TRUE(image);
+  EXPECT_EQ(image->cols, 640);
+  EXPECT_NEAR(image->at<cv::Vec3b>(5, 5)[1], 200, 6);
+
+  thermal = folder / "t.tiff";
+  cv::Mat kelvin(48, 64, CV_32FC1);
+  for (int x = 0; x < 64; ++x) kelvin.col(x) = 280.0 + x;
+  ASSERT_TRUE(write_thermal_tiff(thermal, kelvin));
+  const auto colours = client().Get("/preview/thermal?palette=white-hot&low=280&high=343");
+  ASSERT_EQ(colours->status, 200);
+  EXPECT_EQ(colours->get_header_value("X-Span-Low"), "280.00");
+  const cv::Mat ramp = *decode_image(colours->body, "preview");
+  EXPECT_LT(ramp.at<cv::Vec3b>(20, 1)[0], 30);
+  EXPECT_GT(ramp.at<cv::Vec3b>(20, 62)[0], 225);
+  const auto own_span = client().Get("/preview/thermal");
+  EXPECT_NEAR(std::stod(own_span->get_header_value("X-Span-High")), 343, 2);
+  EXPECT_NEAR(nlohmann::json::parse(client().Get("/temperature?u=0.5&v=0.5")->body)
+                  .at("kelvin")
+                  .get<double>(),
+              312, 0.02);
+  for (const char* bad : {"/temperature", "/temperature?u=2&v=0", "/temperature?u=nan&v=0",
+                          "/temperature?u=x&v=0", "/preview/thermal?palette=mud"}) {
+    EXPECT_EQ(client().Get(bad)->status, 400) << bad;
+  }
+  EXPECT_EQ(client().Get("/preview/../state")->status, 404);
+}
+
+TEST_F(PageTest, TenViewersAreServed) {
+  const test::TempFolder folder;
+  visible = folder / "a.jpg";
+  ASSERT_TRUE(write_jpeg(visible, cv::Mat(300, 400, CV_8UC3, cv::Scalar(10, 200, 30))));
+  serve({});
+  std::atomic<int> good{0};
+  std::vector<std::jthread> viewers;
+  for (int i = 0; i < 10; ++i) {
+    viewers.emplace_back([&] {
+      for (int n = 0; n < 5; ++n) {
+        const auto a = client().Get("/state"), b = client().Get("/preview/visible");
+        good += a && b && a->status == 200 && b->status == 200;
+      }
+    });
+  }
+  viewers.clear();
+  EXPECT_EQ(good, 50);
+}
+
+TEST_F(PageTest, PortInUseAndBadOptionsHaveARemedy) {
+  serve({});
+  PageOptions options;
+  options.port = server->port();
+  PageServer second(options, {});
+  const Status taken = second.start();
+  ASSERT_FALSE(taken);
+  EXPECT_EQ(taken.error().kind, ErrorKind::device);
+  EXPECT_THAT(taken.error().remedy, HasSubstr("--page"));
+  options.port = 70000;
+  EXPECT_EQ(options.validate().error().where, "page.port");
+  options.port = 1;
+  options.token = "short";
+  EXPECT_EQ(options.validate().error().where, "page.token");
+}
+
+TEST(LiveState, TerminalShowsTheSame) {
+  const std::string view = terminal_view(some_state());
+  EXPECT_THAT(view, HasSubstr("90 received, 10 lost (7 missing, 0 rejected, 3 dropped)"));
+  EXPECT_THAT(view, HasSubstr("loop  10 deg  #..........."));
+  EXPECT_THAT(view, HasSubstr("12° further left"));
+  EXPECT_THAT(view, HasSubstr("! thermal0: the disk is too slow"));
+}
+
+TEST(LiveState, WarningsFollowFromTheFigures) {
+  LiveState state;
+  state.running = true;
+  state.free_bytes = 100ull << 30;
+  EXPECT_TRUE(warnings_of(state).empty());
+  state.free_bytes = 1ull << 30;
+  StreamStatus stream;
+  stream.device = "v";
+  stream.silent = true;
+  stream.rejected = 2;
+  state.streams = {stream};
+  const auto list = warnings_of(state);
+  ASSERT_EQ(list.size(), 3u);
+  EXPECT_EQ(list[0], "v: no frames");
+  state.streams[0].ended = true;
+  EXPECT_EQ(warnings_of(state)[0], "v: the stream has ended");
+}
+
+}  // namespace
+}  // namespace orbitfuse

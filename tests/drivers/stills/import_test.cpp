@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "drivers/stills/import.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "core/colmap_model.hpp"
+#include "core/file_io.hpp"
+#include "core/image_codec.hpp"
+#include "core/image_io.hpp"
+#include "core/transforms_json.hpp"
+#include "tests/core/temp_folder.hpp"
+#include "tests/support/shared_data.hpp"
+
+namespace orbitfuse {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+class ImportTest : public ::testing::Test {
+ protected:
+  void put(const std::string& name, const std::string& bytes) const {
+    fs::create_directories((folder / name).parent_path());
+    std::ofstream(folder / name, std::ios::binary) << bytes;
+  }
+  void put_photo(const std::string& name) const {
+    cv::Mat image(30, 40, CV_8UC3);
+    cv::RNG random(7);
+    random.fill(image, cv::RNG::UNIFORM, 0, 255);
+    put(name, *encode_jpeg(image, 90));
+  }
+  Result<ImportReport> import() const { return import_session(options, folder / "session"); }
+
+  test::TempFolder folder;
+  ImportOptions options;
+};
+
+/// The table of a published calibration image: rows of degrees Celsius.
+std::vector<std::vector<double>> celsius_table(const fs::path& file) {
+  std::string text = *read_file(file);
+  if (text.starts_with("\xEF\xBB\xBF")) text.erase(0, 3);
+  std::vector<std::vector<double>> rows;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.find_first_of("0123456789") == std::string::npos) continue;
+    std::istringstream cells(line);
+    rows.emplace_back();
+    for (std::string cell; std::getline(cells, cell, ',');)
+      if (cell.find_first_of("0123456789") != std::string::npos) rows.back().push_back(std::stod(cell));
+  }
+  return rows;
+}
+
+TEST_F(ImportTest, RadiometricJpegMatchesThePublishedTemperatures) {
+  const fs::path sample = testing::shared_data() / "rjpeg/irimage_test";
+  if (!fs::exists(sample)) GTEST_SKIP() << "the shared radiometric JPEGs are not here";
+  options.thermal = {sample / "test_image.jpg"};
+  options.object = {0.95, 5.0, 280.15, 293.15, 0.5};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_TRUE(report->has_temperatures);
+  const auto kelvin = read_thermal_k(report->session.path_of(report->session.frames.at(0)));
+  ASSERT_TRUE(kelvin);
+  const auto expected = celsius_table(sample / "expected_celsius.csv");
+  ASSERT_EQ(static_cast<int>(expected.size()), kelvin->rows);
+  double worst = 0;
+  for (int y = 0; y < kelvin->rows; ++y) {
+    ASSERT_EQ(static_cast<int>(expected[static_cast<std::size_t>(y)].size()), kelvin->cols);
+    for (int x = 0; x < kelvin->cols; ++x)
+      worst = std::max(worst, std::abs(kelvin->at<float>(y, x) - 273.15 -
+                                       expected[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)]));
+  }
+  EXPECT_LT(worst, 0.02);  // degrees Celsius; the bar is 0.2
+}
+
+TEST_F(ImportTest, EveryCameraModelAtHandDecodesToPlausibleTemperatures) {
+  const fs::path samples = testing::shared_data() / "rjpeg";
+  if (!fs::exists(samples)) GTEST_SKIP() << "the shared radiometric JPEGs are not here";
+  options.thermal = {samples};
+  options.embedded_visible = true;
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->thermal, 11);
+  for (const FrameRecord* frame : report->session.frames_of(Modality::thermal)) {
+    const auto kelvin = read_thermal_k(report->session.path_of(*frame));
+    ASSERT_TRUE(kelvin);
+    double low = 0, high = 0;
+    cv::minMaxLoc(*kelvin, &low, &high);
+    EXPECT_GT(low, 200) << frame->source;
+    EXPECT_LT(high, 500) << frame->source;
+  }
+}
+
+TEST_F(ImportTest, RadiometricJpegCutAnywhereIsAnErrorOrAWholeImage) {
+  const fs::path sample = testing::shared_data() / "rjpeg/irimage_test/test_image.jpg";
+  if (!fs::exists(sample)) GTEST_SKIP() << "the shared radiometric JPEGs are not here";
+  const std::string whole = *read_file(sample);
+  for (int part = 0; part < 16; ++part) {
+    put("in/cut.jpg", whole.substr(0, whole.size() * static_cast<std::size_t>(part) / 16));
+    options.thermal = {folder / "in/cut.jpg"};
+    fs::remove_all(folder / "session");
+    const auto report = import();
+    if (!report) {
+      EXPECT_THAT(report.error().message(), HasSubstr("cut.jpg"));
+    } else {
+      EXPECT_EQ(report->thermal, 1);
+    }
+  }
+}
+
+TEST_F(ImportTest, ATextNamedJpgIsRefusedByName) {
+  put_photo("in/a.jpg");
+  put("in/b.jpg", "this is not a picture");
+  options.visible = {folder / "in"};
+  const auto report = import();
+  if (report) {
+    EXPECT_EQ(report->visible, 1);
+    EXPECT_THAT(report->warnings, ::testing::Contains(HasSubstr("b.jpg")));
+  } else {
+    EXPECT_THAT(report.error().message(), HasSubstr("b.jpg"));
+  }
+}
+
+TEST_F(ImportTest, SixteenBitIsCentikelvinAndEightBitHasNoTemperatures) {
+  const cv::Mat centikelvin(30, 40, CV_16UC1, cv::Scalar(30115));
+  put("in/t.tiff", *encode_thermal_tiff(centikelvin));
+  options.thermal = {folder / "in/t.tiff"};
+  auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  const auto kelvin = read_thermal_k(report->session.path_of(report->session.frames.at(0)));
+  ASSERT_TRUE(kelvin);
+  EXPECT_NEAR(kelvin->at<float>(5, 5), 301.15, 1e-3);
+
+  ASSERT_TRUE(write_png(folder / "in/g.png", cv::Mat(30, 40, CV_8UC1, cv::Scalar(77))));
+  options.thermal = {folder / "in/g.png"};
+  fs::remove_all(folder / "session");
+  report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_FALSE(report->has_temperatures);
+  EXPECT_TRUE(report->session.frames.at(0).thermal_is_gray);
+}
+
+TEST_F(ImportTest, PosesComeFromTransformsAndFromColmapModels) {
+  Reconstruction model;
+  Transforms transforms;
+  for (int i = 0; i < 3; ++i) {
+    const std::string name = "p" + std::to_string(i) + ".jpg";
+    put_photo("in/" + name);
+    Camera camera = Camera::from_fov(40, 30, 50);
+    Rigid3d pose;
+    pose.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(0.3 * i, Eigen::Vector3d::UnitY()));
+    pose.translation = {0.1 * i, 0, 2};
+    model.views.push_back({name, camera, pose});
+    TransformsFrame frame;
+    frame.file_path = "in/" + name;
+    frame.camera = camera;
+    frame.cam_from_world = pose;
+    transforms.frames.push_back(frame);
+  }
+  ASSERT_TRUE(write_transforms_json(folder / "transforms.json", transforms));
+  const auto check = [&] {
+    fs::remove_all(folder / "session");
+    const auto report = import();
+    ASSERT_TRUE(report) << report.error().message();
+    EXPECT_EQ(report->with_pose, 3);
+    for (int i = 0; i < 3; ++i) {
+      const FrameRecord& frame = report->session.frames.at(static_cast<std::size_t>(i));
+      ASSERT_TRUE(frame.cam_from_world.has_value());
+      const auto k = static_cast<std::size_t>(i);
+      EXPECT_LT((camera_center(*frame.cam_from_world) - camera_center(model.views[k].cam_from_world)).norm(), 1e-9);
+    }
+  };
+  options.transforms_json = folder / "transforms.json";
+  check();
+  options.transforms_json.reset();
+  options.visible = {folder / "in"};
+  options.visible_colmap = folder / "model";
+  for (const ColmapFormat format : {ColmapFormat::text, ColmapFormat::binary}) {
+    fs::remove_all(folder / "model");
+    ASSERT_TRUE(write_colmap_model(folder / "model", model, format));
+    check();
+  }
+}
+
+TEST_F(ImportTest, AFolderInUseAndNothingToImportAreErrors) {
+  EXPECT_FALSE(import());
+  put_photo("in/a.jpg");
+  options.visible = {folder / "in"};
+  put("session/other.txt", "somebody's");
+  const auto report = import();
+  ASSERT_FALSE(report);
+  EXPECT_THAT(report.error().message(), HasSubstr("session"));
+  EXPECT_TRUE(fs::exists(folder / "session/other.txt"));
+}
+
+}  // namespace
+}  // namespace orbitfuse

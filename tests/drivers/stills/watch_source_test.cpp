@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "drivers/stills/watch_source.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <thread>
+
+#include "capture/recorder.hpp"
+#include "core/file_io.hpp"
+#include "core/image_codec.hpp"
+#include "tests/core/temp_folder.hpp"
+#include "tests/support/shared_data.hpp"
+
+namespace orbitfuse {
+namespace {
+
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+std::string photo(int seed, int width = 40, int height = 30) {
+  cv::Mat image(height, width, CV_8UC3);
+  cv::RNG random(static_cast<std::uint64_t>(seed + 1));
+  random.fill(image, cv::RNG::UNIFORM, 0, 255);
+  return *encode_jpeg(image, 90);
+}
+
+class WatchTest : public ::testing::Test {
+ protected:
+  WatchTest() {
+    options.folder = folder.path();
+    options.settle = 60ms;
+    options.rescan = 20ms;
+    options.give_up = 300ms;
+  }
+
+  void put(const std::string& name, const std::string& bytes) const {
+    std::ofstream(folder / name, std::ios::binary) << bytes;
+  }
+
+  /// The next frame, rejection or event.
+  static Delivery soon(FrameSource& source) {
+    const auto deadline = std::chrono::steady_clock::now() + 10s;
+    while (std::chrono::steady_clock::now() < deadline) {
+      auto delivery = source.next(50ms);
+      EXPECT_TRUE(delivery);
+      if (delivery && delivery->kind != Delivery::Kind::timeout) return std::move(*delivery);
+    }
+    ADD_FAILURE() << "nothing came";
+    return {};
+  }
+  static bool quiet(FrameSource& source, std::chrono::milliseconds time = 250ms) {
+    return source.next(time)->kind == Delivery::Kind::timeout;
+  }
+
+  test::TempFolder folder;
+  WatchOptions options;
+};
+
+TEST_F(WatchTest, NewPhotosComeByteForByteAndOldOnesStay) {
+  put("old.jpg", photo(0));
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  EXPECT_TRUE(quiet(source));
+  put("IMG_1.jpg", photo(1));
+  const Delivery first = soon(source);
+  ASSERT_EQ(first.kind, Delivery::Kind::frame) << first.reason;
+  EXPECT_EQ(first.frame.encoded, photo(1));
+  EXPECT_EQ(first.frame.id, 0u);
+  EXPECT_GT(first.frame.host_time_ns, 0);
+  EXPECT_EQ(first.frame.flags, std::vector<std::string>{"still"});
+  EXPECT_THAT(first.frame.source, HasSubstr("IMG_1.jpg"));
+  put("IMG_2.jpg", photo(2));
+  EXPECT_EQ(soon(source).frame.id, 1u);
+}
+
+TEST_F(WatchTest, ExistingPhotosComeInNaturalOrder) {
+  for (int i : {10, 9, 1}) put("IMG_" + std::to_string(i) + ".jpg", photo(i));
+  options.existing = true;
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  for (int i : {1, 9, 10}) EXPECT_EQ(soon(source).frame.encoded, photo(i)) << i;
+}
+
+TEST_F(WatchTest, FileWrittenInPiecesIsReadOnceAndWhole) {
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  const std::string bytes = photo(3);
+  std::ofstream out(folder / "slow.jpg", std::ios::binary);
+  out << bytes.substr(0, bytes.size() / 2) << std::flush;
+  EXPECT_TRUE(quiet(source, 150ms));  // longer than the settling time: still not decodable
+  out << bytes.substr(bytes.size() / 2) << std::flush;
+  out.close();
+  EXPECT_EQ(soon(source).frame.encoded, bytes);
+  EXPECT_TRUE(quiet(source));
+}
+
+TEST_F(WatchTest, FileThatStaysCutIsRejectedAndCounted) {
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  put("cut.jpg", photo(4).substr(0, 400));
+  const Delivery cut = soon(source);
+  EXPECT_EQ(cut.kind, Delivery::Kind::rejected);
+  EXPECT_THAT(cut.reason, HasSubstr("cut.jpg"));
+  put("good.jpg", photo(5));
+  EXPECT_EQ(soon(source).frame.id, cut.frame.id + 1);
+}
+
+TEST_F(WatchTest, DuplicatesOtherFormatsAndTemporaryFilesAreNotFrames) {
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  put("a.jpg", photo(6));
+  EXPECT_EQ(soon(source).kind, Delivery::Kind::frame);
+  put("copy of a.jpg", photo(6));
+  EXPECT_EQ(soon(source).reason, "duplicate");
+  put("b.heic", "ftypheic");
+  EXPECT_EQ(soon(source).reason, "ignored");
+  put("c.jpg.part", photo(7).substr(0, 100));
+  put(".c.jpg.swp", "x");
+  EXPECT_TRUE(quiet(source));
+  put("c.jpg.part", photo(7));
+  fs::rename(folder / "c.jpg.part", folder / "c.jpg");
+  EXPECT_EQ(soon(source).frame.encoded, photo(7));
+}
+
+TEST_F(WatchTest, OverwrittenFileIsANewPhoto) {
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  put("latest.jpg", photo(8));
+  EXPECT_EQ(soon(source).frame.encoded, photo(8));
+  put("latest.jpg", photo(9, 40, 30));
+  EXPECT_EQ(soon(source).frame.encoded, photo(9));
+}
+
+TEST_F(WatchTest, AnotherCameraIsRejectedAndNamed) {
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  put("a.jpg", photo(10));
+  EXPECT_EQ(soon(source).kind, Delivery::Kind::frame);
+  put("b.jpg", photo(11, 60, 30));
+  const Delivery other = soon(source);
+  EXPECT_EQ(other.kind, Delivery::Kind::rejected);
+  EXPECT_THAT(other.reason, HasSubstr("another camera"));
+}
+
+TEST_F(WatchTest, FolderThatGoesAndComesBack) {
+  options.folder = folder / "card";
+  fs::create_directory(options.folder);
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  fs::remove_all(options.folder);
+  EXPECT_EQ(soon(source).reason, "disconnected");
+  fs::create_directory(options.folder);
+  EXPECT_EQ(soon(source).reason, "reconnected");
+  put("card/a.jpg", photo(12));
+  EXPECT_EQ(soon(source).kind, Delivery::Kind::frame);
+}
+
+TEST_F(WatchTest, ThermalTakesRadiometricFilesOnly) {
+  options.modality = Modality::thermal;
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  put("photo.jpg", photo(13));
+  EXPECT_EQ(soon(source).reason, "ignored");
+  const cv::Mat kelvin(30, 40, CV_16UC1, cv::Scalar(29815));
+  put("t.tiff", *encode_thermal_tiff(kelvin));
+  const Delivery thermal = soon(source);
+  ASSERT_EQ(thermal.kind, Delivery::Kind::frame) << thermal.reason;
+  EXPECT_EQ(thermal.frame.pixels.at<std::uint16_t>(3, 3), 29815);
+}
+
+TEST_F(WatchTest, RadiometricJpegFromACameraBringsItsModel) {
+  const fs::path files = testing::shared_data() / "rjpeg";
+  fs::path sample;
+  std::error_code none;
+  for (fs::recursive_directory_iterator entry(files, none), end; !none && entry != end;
+       entry.increment(none)) {
+    if (sample.empty() && entry->path().extension() == ".jpg") sample = entry->path();
+  }
+  if (sample.empty()) GTEST_SKIP() << "the shared radiometric JPEGs are not here";
+  options.modality = Modality::thermal;
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  fs::copy_file(sample, folder / "FLIR0001.jpg");
+  const Delivery delivery = soon(source);
+  ASSERT_EQ(delivery.kind, Delivery::Kind::frame) << delivery.reason << delivery.detail;
+  EXPECT_FALSE(delivery.frame.thermal_is_gray);
+  EXPECT_EQ(delivery.frame.pixels.type(), CV_16UC1);
+  EXPECT_NE(source.describe().model, "");
+  // The visible source passes it over.
+  WatchOptions visible = options;
+  visible.modality = Modality::visible;
+  visible.existing = true;
+  WatchSource photos(visible);
+  ASSERT_TRUE(photos.start());
+  EXPECT_EQ(soon(photos).reason, "ignored");
+}
+
+TEST_F(WatchTest, AllOfACardJoinsTheSession) {
+  for (int i = 0; i < 40; ++i) put("IMG_" + std::to_string(i) + ".jpg", photo(100 + i));
+  options.existing = true;
+  WatchSource source(options);
+  const test::TempFolder out;
+  const auto writer = SessionWriter::create(out / "s");
+  ASSERT_TRUE(writer);
+  RecorderOptions recorder_options;
+  recorder_options.queue_frames = 1;  // a card is faster than a disk: nothing may be dropped
+  Recorder recorder(**writer, recorder_options);
+  std::atomic<bool> stop{false};
+  std::atomic<int> stored{0};
+  recorder.on_frame = [&](const FrameRecord&) { stop = ++stored == 40; };
+  Progress progress;
+  progress.cancel = &stop;
+  (void)recorder.run({&source}, progress);
+  ASSERT_TRUE((*writer)->close());
+  const auto session = open_session(out / "s");
+  ASSERT_TRUE(session);
+  EXPECT_EQ(session->frames.size(), 40u);
+  EXPECT_EQ(session->streams.at(0).lost, 0u);
+}
+
+TEST_F(WatchTest, MissingFolderHasARemedy) {
+  options.folder = folder / "none";
+  WatchSource source(options);
+  EXPECT_EQ(source.start().error().kind, ErrorKind::input);
+  options.folder.clear();
+  EXPECT_EQ(WatchSource(options).start().error().kind, ErrorKind::usage);
+}
+
+}  // namespace
+}  // namespace orbitfuse
