@@ -41,7 +41,9 @@ void BlockGradients::reset(const FieldState& field) {
   mlp.assign(field.main.mlp.weights.size(), 0);
   color.assign(field.color.weights.size(), 0);
   offsets.assign(field.image_offsets.size(), 0);
-  squared_error = distortion = depth = 0;
+  for (std::size_t i = 0; i < field.proposals.size(); ++i)
+    proposals[i].assign(field.proposals[i].mlp.weights.size(), 0);
+  squared_error = distortion = depth = interlevel = 0;
   channels = 0;
   finite = true;
 }
@@ -53,9 +55,11 @@ void BlockGradients::add(const BlockGradients& other) {
   sum(mlp, other.mlp);
   sum(color, other.color);
   sum(offsets, other.offsets);
+  for (std::size_t i = 0; i < proposals.size(); ++i) sum(proposals[i], other.proposals[i]);
   squared_error += other.squared_error;
   distortion += other.distortion;
   depth += other.depth;
+  interlevel += other.interlevel;
   channels += other.channels;
   finite = finite && other.finite;
 }
@@ -155,16 +159,7 @@ void backward(const FieldState& field, const Kernels& kernels, const LossSetting
                           b.dfeatures.data(), b.scratch_a, b.scratch_b, gradients.mlp.data());
   gradients.finite = gradients.finite && all_finite(b.dfeatures.data(), count * width);
 
-  const auto features = static_cast<std::size_t>(field.main.grid.features);
-  const std::size_t levels = field.main.grid.levels.size();
-  ensure(grid, levels * count * features);
-  for (std::size_t l = 0; l < levels; ++l) {
-    const float scale = field.main.grid.level_weight[l];
-    float* out = &grid[l * count * features];
-    const float* in = &b.dfeatures[l * features];
-    for (std::size_t i = 0; i < count; ++i)
-      for (std::size_t f = 0; f < features; ++f) out[i * features + f] = scale * in[i * width + f];
-  }
+  by_level(field.main.grid, b.dfeatures, count, grid);
 }
 
 }  // namespace orbitfuse::nerf

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "recon/nerf/ray_block.hpp"
@@ -24,7 +25,8 @@ struct LossSettings {
 /// Sums over a block; gradients are added, losses are means once divided by the rays.
 struct BlockGradients {
   std::vector<float> mlp, color, offsets;
-  double squared_error = 0, distortion = 0, depth = 0;
+  std::array<std::vector<float>, 2> proposals;  ///< of their perceptrons
+  double squared_error = 0, distortion = 0, depth = 0, interlevel = 0;
   long channels = 0;
   bool finite = true;
   void reset(const FieldState& field);

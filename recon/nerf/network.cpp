@@ -84,6 +84,20 @@ void HashEncoding::encode(const Kernels& kernels, const float* position01, int c
   }
 }
 
+void by_level(const HashEncoding& grid, const std::vector<float>& rows, std::size_t count,
+              std::vector<float>& levels) {
+  const auto features = static_cast<std::size_t>(grid.features), width = static_cast<std::size_t>(grid.width);
+  const std::size_t need = grid.levels.size() * count * features;
+  if (levels.size() < need) levels.resize(need + need / 4);
+  for (std::size_t l = 0; l < grid.levels.size(); ++l) {
+    const float scale = grid.level_weight[l];
+    float* out = &levels[l * count * features];
+    const float* in = &rows[l * features];
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t f = 0; f < features; ++f) out[i * features + f] = scale * in[i * width + f];
+  }
+}
+
 void Mlp::create(const std::vector<int>& widths, std::uint64_t seed) {
   layers.clear();
   std::int64_t offset = 0;

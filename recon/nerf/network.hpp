@@ -30,6 +30,10 @@ struct HashEncoding {
   void encode(const Kernels& kernels, const float* position01, int count, float* out) const;
 };
 
+/// Gradients of encoded rows, [row][width], as scatter() reads them: [level][row][feature].
+void by_level(const HashEncoding& grid, const std::vector<float>& rows, std::size_t count,
+              std::vector<float>& levels);
+
 /// A perceptron without biases: ReLU between layers, linear output.
 struct Mlp {
   struct Layer {

@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/parallel.hpp"
+#include "recon/nerf/proposal.hpp"
 #include "recon/nerf/ray_block.hpp"
 
 namespace orbitfuse::nerf {
@@ -115,6 +116,7 @@ class ImageRenderer {
         else
           for (const int p : again) add(p, no_limit, block, pixels);
         if (pixels.empty()) continue;
+        propose(block);
         forward(field_, kernels_, limits_, block);
         int row = 0;
         for (std::size_t r = 0; r < pixels.size(); ++r) {
@@ -138,8 +140,21 @@ class ImageRenderer {
     if (!rays_.ray(std::min(camera.width - 1, x) + 0.5, std::min(camera.height - 1, y) + 0.5, ray)) return;
     MarchSettings settings = march_;
     settings.far = far;
-    block.add(field_, ray, settings, 0.5f);
+    if (proposing_) drawn().push_back(ray);
+    else block.add(field_, ray, settings, 0.5f);
     pixels.push_back(pixel);
+  }
+  /// Sampling::proposal: the samples of all rays that add() noted.
+  void propose(RayBlock& block) const {
+    if (!proposing_) return;
+    thread_local ProposalBlock proposals;
+    add_proposed(field_, kernels_, drawn(), std::vector<float>(drawn().size(), 0.5f),
+                 {.near = march_.near}, proposals, block);
+    drawn().clear();
+  }
+  static std::vector<Ray>& drawn() {
+    thread_local std::vector<Ray> rays;
+    return rays;
   }
   bool stopped(const RayBlock& block, int ray) const {
     const auto r = static_cast<std::size_t>(ray);
@@ -153,6 +168,7 @@ class ImageRenderer {
   const Kernels& kernels_;
   MarchSettings march_;
   ForwardSettings limits_;
+  bool proposing_ = field_.options.sampling == Sampling::proposal;
 };
 
 }  // namespace
@@ -161,7 +177,8 @@ RenderedView render_strided(const FieldState& field, const ViewRays& rays, int s
                             const RenderOptions& options) {
   ImageRenderer renderer(field, rays, stride, options);
   const int width = (rays.camera().width + stride - 1) / stride, height = (rays.camera().height + stride - 1) / stride;
-  if (std::min(width, height) < 8 * limit_stride)
+  // Proposal networks know where surfaces are.
+  if (field.options.sampling == Sampling::proposal || std::min(width, height) < 8 * limit_stride)
     return renderer.image(cv::Mat(height, width, CV_32FC1, cv::Scalar(no_limit)));
   // What lies behind opaque surfaces is half of most rays. Look where they are at a sixteenth of
   // the pixels; the farthest of the neighbours is the limit.

@@ -62,7 +62,7 @@ Status inherit_geometry(const FieldState& guide, FieldState& state) {
     return guide.options.get(key) != state.options.get(key);
   };
   for (const char* key : {"levels", "features_per_level", "log2_table", "base_resolution",
-                          "max_resolution", "hidden", "occupancy_resolution"})
+                          "max_resolution", "hidden", "occupancy_resolution", "sampling"})
     if (differs(key))
       return fail(ErrorKind::usage, fmt::format("nerf.{}", key),
                   fmt::format("{}, the guide field has {}", state.options.get(key),
@@ -71,6 +71,10 @@ Status inherit_geometry(const FieldState& guide, FieldState& state) {
   state.space = guide.space;
   state.main.grid.table.value = guide.main.grid.table.value;
   state.main.mlp.weights.value = guide.main.mlp.weights.value;
+  for (std::size_t k = 0; k < state.proposals.size(); ++k) {
+    state.proposals[k].grid.table.value = guide.proposals[k].grid.table.value;
+    state.proposals[k].mlp.weights.value = guide.proposals[k].mlp.weights.value;
+  }
   state.occupancy.on = guide.occupancy.on;
   state.occupancy.density = guide.occupancy.density;
   state.occupancy.refresh();
@@ -145,11 +149,8 @@ Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
     report.skips.push_back({"density from nothing", "the visible field's geometry is given",
                             "training starts from its density and empty space"});
   }
-  if (options.sampling == Sampling::proposal)
-    report.skips.push_back({"proposal networks", "not implemented",
-                            "rays are sampled by occupancy; widths and weights are as published"});
   const std::vector<SceneView> views = prepare_views(dataset, state->space, state->span);
-  if (!resumed && !options.shared_geometry) {
+  if (!resumed && !options.shared_geometry && options.sampling == Sampling::occupancy) {
     const double left = carve(dataset, state->space, views, options, state->occupancy);
     report.skips.push_back({"empty space", fmt::format("{:.1f} % of the cells seen by enough views and "
                                                        "not in front of known depth", 100 * left),

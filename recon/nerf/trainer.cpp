@@ -31,6 +31,18 @@ double depth_weight(const TrainOptions& o, double progress) {
   return o.depth_weight * (1 - part) + o.depth_final_weight * part;
 }
 
+/// Mip-NeRF 360's schedule: the exponent rises from 0 to 1 over the first thirtieth of the run.
+float proposal_anneal(double progress) {
+  const double part = std::min(1.0, 30 * progress);
+  return static_cast<float>(10 * part / (9 * part + 1));
+}
+
+/// Scatters one level's gradients of a block.
+struct LevelGradient {
+  int count;
+  const float *position01, *gradient;
+};
+
 }  // namespace
 
 Trainer::Trainer(FieldState& field, const std::vector<SceneView>& views,
@@ -46,7 +58,8 @@ Trainer::Trainer(FieldState& field, const std::vector<SceneView>& views,
     known_ends_.push_back(known);
   }
   shards_.resize(shard_count);
-  if (field_.rays_per_step == 0) field_.rays_per_step = 512;
+  if (field_.rays_per_step == 0)
+    field_.rays_per_step = proposing() ? std::max(1, field_.options.samples_per_step / field_.options.fine_samples) : 512;
 }
 
 void Trainer::draw(Block& block, int begin, int end, double progress) {
@@ -59,6 +72,8 @@ void Trainer::draw(Block& block, int begin, int end, double progress) {
   const bool sparse = known_ends_.back() > 0 && known_ends_.back() < pixel_ends_.back() / 10;
   block.rays.clear();
   block.targets.clear();
+  block.drawn.clear();
+  block.jitter.clear();
   MarchSettings settings = field_.march_settings();
   for (int i = begin; i < end; ++i) {
     for (int attempt = 0; attempt < 8; ++attempt) {
@@ -89,10 +104,25 @@ void Trainer::draw(Block& block, int begin, int end, double progress) {
         target.depth_weight = supervision;
       }
       block.targets.push_back(target);
-      block.rays.add(field_, ray, settings, random_uniform(o.seed, jitter_stream, draw_key));
+      const float jitter = random_uniform(o.seed, jitter_stream, draw_key);
+      if (proposing()) {
+        block.drawn.push_back(ray);
+        block.jitter.push_back(jitter);
+      } else {
+        block.rays.add(field_, ray, settings, jitter);
+      }
       break;
     }
   }
+  if (proposing())
+    add_proposed(field_, kernels_, block.drawn, block.jitter,
+                 {.near = settings.near, .anneal = proposal_anneal(progress)}, block.proposals, block.rays);
+}
+
+/// As nerfacto: every step at first, every fifth after a sixth of the run.
+bool Trainer::proposals_learn(double progress) const {
+  const int every = std::clamp(static_cast<int>(30 * progress), 1, 5);
+  return proposing() && field_.step % every == 0;
 }
 
 bool Trainer::step(double progress) {
@@ -112,6 +142,7 @@ bool Trainer::step(double progress) {
   loss.per_ray = 1.0f / static_cast<float>(rays);
   loss.distortion_weight = static_cast<float>(o.distortion_weight);
   loss.huber = field_.modality == Modality::thermal ? 0.02f : 0.0f;
+  const bool with_proposals = proposals_learn(progress);
   parallel_for(shard_count, [&](int shard) {
     BlockGradients& gradients = shards_[static_cast<std::size_t>(shard)];
     gradients.reset(field_);
@@ -120,6 +151,9 @@ bool Trainer::step(double progress) {
       draw(block, b * rays_per_block, std::min(rays, (b + 1) * rays_per_block), progress);
       forward(field_, kernels_, {}, block.rays);
       backward(field_, kernels_, loss, block.targets, block.rays, gradients, block.grid);
+      if (with_proposals)
+        gradients.interlevel += backward_proposals(field_, kernels_, block.rays, loss.per_ray,
+                                                   block.proposals, gradients.proposals);
     }
   });
   for (int shard = 1; shard < shard_count; ++shard)
@@ -135,13 +169,14 @@ bool Trainer::step(double progress) {
   rays_ += drawn;
   samples_ += samples;
   const bool finite = gradients.finite && std::isfinite(gradients.squared_error) &&
-                      std::isfinite(gradients.distortion) && std::isfinite(gradients.depth);
+                      std::isfinite(gradients.distortion) && std::isfinite(gradients.depth) &&
+                      std::isfinite(gradients.interlevel);
   if (finite && drawn > 0) {
     AdamStep adam;
     adam.learning_rate = learning_rate(o, field_.step, progress);
     adam.correction1 = static_cast<float>(1.0 / (1 - std::pow(adam.beta1, field_.step + 1)));
     adam.correction2 = static_cast<float>(1.0 / (1 - std::pow(adam.beta2, field_.step + 1)));
-    apply(adam, gradients);
+    apply(adam, gradients, with_proposals);
     const double mse = gradients.squared_error / static_cast<double>(std::max(1l, gradients.channels));
     const double psnr = -10 * std::log10(std::max(mse, 1e-12));
     field_.train_psnr = field_.step == 0 ? psnr : 0.98 * field_.train_psnr + 0.02 * psnr;
@@ -149,31 +184,37 @@ bool Trainer::step(double progress) {
   const double per_ray = static_cast<double>(samples) / static_cast<double>(std::max(1l, drawn));
   field_.samples_per_ray =
       field_.step == 0 ? per_ray : 0.9 * field_.samples_per_ray + 0.1 * per_ray;
-  field_.rays_per_step = std::clamp(
-      static_cast<int>(o.samples_per_step / std::max(1.0, field_.samples_per_ray)), 128, 16384);
-  if (finite) update_occupancy(progress);
+  if (!proposing()) {
+    field_.rays_per_step = std::clamp(
+        static_cast<int>(o.samples_per_step / std::max(1.0, field_.samples_per_ray)), 128, 16384);
+    if (finite) update_occupancy(progress);
+  }
   ++field_.step;
   return finite;
 }
 
-void Trainer::apply(const AdamStep& adam, const BlockGradients& gradients) {
-  HashEncoding& grid = field_.main.grid;
+void Trainer::apply(const AdamStep& adam, const BlockGradients& gradients, bool with_proposals) {
   // Whole levels per task: no two threads write to one table.
-  parallel_for(static_cast<int>(grid.levels.size()), [&](int l) {
-    const GridLevel& level = grid.levels[static_cast<std::size_t>(l)];
-    if (grid.level_weight[static_cast<std::size_t>(l)] <= 0) return;
-    const auto offset = static_cast<std::size_t>(level.offset);
-    float* grad = grid.table.grad.data() + offset;
-    for (const Block& block : blocks_) {
-      const int n = block.rays.samples();
-      if (n == 0) continue;
-      kernels_.scatter(level, grad, block.rays.position01.data(), n,
-                       block.grid.data() + static_cast<std::size_t>(l) * static_cast<std::size_t>(n) *
-                                               static_cast<std::size_t>(grid.features));
-    }
-    kernels_.adam(adam, static_cast<std::int64_t>(level.entries) * level.features,
-                  grid.table.value.data() + offset, grid.table.first.data() + offset,
-                  grid.table.second.data() + offset, grad, grid.half.data() + offset);
+  const auto update_grid = [&](HashEncoding& grid, const auto& gradient_of) {
+    parallel_for(static_cast<int>(grid.levels.size()), [&](int l) {
+      const auto index = static_cast<std::size_t>(l);
+      const GridLevel& level = grid.levels[index];
+      if (grid.level_weight[index] <= 0) return;
+      const auto offset = static_cast<std::size_t>(level.offset);
+      float* grad = grid.table.grad.data() + offset;
+      for (const Block& block : blocks_) {
+        if (block.rays.samples() == 0) continue;
+        const LevelGradient g = gradient_of(block);
+        kernels_.scatter(level, grad, g.position01, g.count,
+                         g.gradient + index * static_cast<std::size_t>(g.count) * static_cast<std::size_t>(grid.features));
+      }
+      kernels_.adam(adam, static_cast<std::int64_t>(level.entries) * level.features,
+                    grid.table.value.data() + offset, grid.table.first.data() + offset,
+                    grid.table.second.data() + offset, grad, grid.half.data() + offset);
+    });
+  };
+  update_grid(field_.main.grid, [](const Block& block) {
+    return LevelGradient{block.rays.samples(), block.rays.position01.data(), block.grid.data()};
   });
   const auto update = [&](Parameters& p, const std::vector<float>& grad, AdamStep step) {
     std::copy(grad.begin(), grad.end(), p.grad.begin());
@@ -186,6 +227,15 @@ void Trainer::apply(const AdamStep& adam, const BlockGradients& gradients) {
   update(field_.color.weights, gradients.color, mlp);
   field_.main.mlp.refresh();
   field_.color.refresh();
+  for (std::size_t k = 0; with_proposals && k < field_.proposals.size(); ++k) {
+    DensityNetwork& network = field_.proposals[k];
+    update_grid(network.grid, [k](const Block& block) {
+      const ProposalBlock::Level& level = block.proposals.levels[k];
+      return LevelGradient{block.proposals.samples(static_cast<int>(k)), level.position01.data(), level.grid.data()};
+    });
+    update(network.mlp.weights, gradients.proposals[k], mlp);
+    network.mlp.refresh();
+  }
   if (field_.options.per_image_offset) {
     AdamStep slow = adam;
     slow.learning_rate *= 0.1f;

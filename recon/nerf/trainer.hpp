@@ -6,6 +6,7 @@
 
 #include "recon/nerf/backward.hpp"
 #include "recon/nerf/field_state.hpp"
+#include "recon/nerf/proposal.hpp"
 #include "recon/nerf/scene.hpp"
 
 namespace orbitfuse::nerf {
@@ -29,10 +30,15 @@ class Trainer {
     RayBlock rays;
     std::vector<RayTarget> targets;
     std::vector<float> grid;  ///< [level][sample][feature]
+    ProposalBlock proposals;  ///< Sampling::proposal
+    std::vector<Ray> drawn;
+    std::vector<float> jitter;
   };
 
   void draw(Block& block, int begin, int end, double progress);
-  void apply(const AdamStep& adam, const BlockGradients& gradients);
+  bool proposing() const { return field_.options.sampling == Sampling::proposal; }
+  bool proposals_learn(double progress) const;
+  void apply(const AdamStep& adam, const BlockGradients& gradients, bool with_proposals);
   void update_occupancy(double progress);
   void probe_cells();
 

@@ -11,7 +11,6 @@
 #include <limits>
 #include <utility>
 
-#include "core/parallel.hpp"
 #include "recon/poses/projection.hpp"
 
 namespace orbitfuse {
@@ -179,7 +178,7 @@ class Problem {
     ceres::Solver::Options solver;
     solver.linear_solver_type =
         model_.views.size() > 200 ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;
-    solver.num_threads = options_.threads > 0 ? options_.threads : std::max(thread_count(), 1);
+    solver.num_threads = 1;  // more sum in any order; these problems are small
     solver.max_num_iterations = options_.max_iterations;
     solver.function_tolerance = 1e-8;
     solver.logging_type = ceres::SILENT;

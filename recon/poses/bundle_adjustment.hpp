@@ -30,7 +30,6 @@ struct BundleOptions {
   /// Prior of the principal point about the image centre, share of the width.
   double principal_point_sigma = 0.02;
   int max_iterations = 60;
-  int threads = 0;
 };
 
 struct BundleReport {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <fmt/format.h>
 #include <map>
-#include <sqlite3.h>
 #include <tuple>
 
 #include "core/colmap_model.hpp"
@@ -16,36 +15,6 @@ namespace orbitfuse {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// First column of the query's only row.
-Result<double> query(sqlite3* database, const fs::path& path, const char* sql) {
-  sqlite3_stmt* statement = nullptr;
-  const bool good = sqlite3_prepare_v2(database, sql, -1, &statement, nullptr) == SQLITE_OK &&
-                    sqlite3_step(statement) == SQLITE_ROW;
-  const double value = good ? sqlite3_column_double(statement, 0) : 0.0;
-  sqlite3_finalize(statement);
-  if (good) return value;
-  return fail(ErrorKind::input, path.string(),
-              fmt::format("not a COLMAP database ({})", sqlite3_errmsg(database)),
-              "delete it and run the pose stage again");
-}
-
-Result<DatabaseCounts> count_open(sqlite3* database, const fs::path& path) {
-  DatabaseCounts counts;
-  const auto number = [&](const char* sql) { return query(database, path, sql); };
-  ORBITFUSE_ASSIGN(const double images, number("SELECT COUNT(*) FROM images"));
-  ORBITFUSE_ASSIGN(const double featured, number("SELECT COUNT(*) FROM keypoints WHERE rows > 0"));
-  ORBITFUSE_ASSIGN(counts.mean_features, number("SELECT TOTAL(rows) FROM keypoints"));
-  ORBITFUSE_ASSIGN(const double tried, number("SELECT COUNT(*) FROM matches"));
-  ORBITFUSE_ASSIGN(const double verified,
-                   number("SELECT COUNT(*) FROM two_view_geometries WHERE rows > 0"));
-  counts.images = static_cast<int>(images);
-  counts.images_with_features = static_cast<int>(featured);
-  counts.mean_features /= std::max(counts.images, 1);
-  counts.matched_pairs = static_cast<int>(tried);
-  counts.verified_pairs = static_cast<int>(verified);
-  return counts;
-}
 
 /// Where extraction starts: the device's focal prior at the proxy's size, else COLMAP's own guess
 /// of 1.2 times the longer side.
@@ -104,19 +73,6 @@ std::vector<MapperSettings> mapper_ladder() {
   return {MapperSettings{}, relaxed, last};
 }
 
-Result<DatabaseCounts> count_database(const fs::path& database) {
-  sqlite3* handle = nullptr;
-  const int status =
-      sqlite3_open_v2(database.c_str(), &handle, SQLITE_OPEN_READONLY, nullptr);
-  auto counts = status == SQLITE_OK
-                    ? count_open(handle, database)
-                    : Result<DatabaseCounts>(fail(ErrorKind::input, database.string(),
-                                                  "no COLMAP database",
-                                                  "see colmap.log beside it"));
-  sqlite3_close(handle);
-  return counts;
-}
-
 Result<ColmapProject> ColmapProject::create(const fs::path& folder, const fs::path& image_folder,
                                             const ColmapOptions& options) {
   std::error_code error;
@@ -170,6 +126,7 @@ Result<DatabaseCounts> ColmapProject::extract(const Session& session,
          fmt::format("{}", options_.peak_threshold)});
     ORBITFUSE_TRY(run(std::move(arguments), progress));
   }
+  ORBITFUSE_TRY(number_images_by_name(database_));
   ORBITFUSE_ASSIGN(const DatabaseCounts counts, count_database(database_));
   if (counts.images_with_features == 0)
     return fail(ErrorKind::quality, (folder_ / "colmap.log").string(),
@@ -181,16 +138,30 @@ Result<DatabaseCounts> ColmapProject::extract(const Session& session,
 Result<DatabaseCounts> ColmapProject::match(const std::vector<ProxyImage>& images,
                                             const std::vector<ViewPair>& pairs,
                                             const Progress& progress) {
-  std::string list;
-  for (const auto& [i, j] : pairs)
-    list += images[static_cast<std::size_t>(i)].name + " " +
+  ORBITFUSE_ASSIGN(const auto descriptors, read_descriptors(database_));
+  const auto of = [&](int image) -> const Descriptors& {
+    static const Descriptors none(0, 128);
+    const auto found = descriptors.find(images[static_cast<std::size_t>(image)].name);
+    return found == descriptors.end() ? none : found->second;
+  };
+  std::vector<std::string> blocks(pairs.size());
+  parallel_for(static_cast<int>(pairs.size()), [&](int p) {
+    if (progress.cancelled()) return;
+    const auto [i, j] = pairs[static_cast<std::size_t>(p)];
+    std::string& block = blocks[static_cast<std::size_t>(p)];
+    block = images[static_cast<std::size_t>(i)].name + " " +
             images[static_cast<std::size_t>(j)].name + "\n";
-  const fs::path list_file = folder_ / "pairs.txt";
-  ORBITFUSE_TRY(write_file_atomic(list_file, list));
+    for (const auto& [a, b] : match_descriptors(of(i), of(j))) block += fmt::format("{} {}\n", a, b);
+    block += "\n";
+  });
+  ORBITFUSE_TRY(progress.check("poses.colmap"));
+  const fs::path list_file = folder_ / "matches.txt";
+  ORBITFUSE_TRY(write_file_atomic(list_file, fmt::format("{}", fmt::join(blocks, ""))));
   std::vector<std::string> arguments = seed_and("matches_importer");
-  arguments.insert(arguments.end(), {"--match_list_path", list_file.string(),
-                                     "--SiftMatching.use_gpu", "0", "--SiftMatching.num_threads",
-                                     fmt::format("{}", options_.threads)});
+  arguments.insert(arguments.end(), {"--match_list_path", list_file.string(), "--match_type", "raw",
+                                     "--SiftMatching.use_gpu", "0",
+                                     // One thread draws the samples of all pairs, in their order.
+                                     "--SiftMatching.num_threads", "1"});
   ORBITFUSE_TRY(run(std::move(arguments), progress));
   return count_database(database_);
 }
@@ -215,7 +186,7 @@ Result<Reconstruction> ColmapProject::map(const Session& session,
   };
   arguments.insert(arguments.end(), {"--image_path", image_folder_.string(), "--output_path",
                                      sparse.string()});
-  add("num_threads", fmt::format("{}", options_.threads));
+  add("num_threads", "1");  // sums in another order end in another model
   add("ba_refine_focal_length", flag(!calibrated));
   add("init_min_tri_angle", fmt::format("{}", settings.init_min_tri_angle_deg));
   add("init_min_num_inliers", fmt::format("{}", settings.init_min_num_inliers));

@@ -8,6 +8,7 @@
 #include "core/progress.hpp"
 #include "core/reconstruction.hpp"
 #include "core/result.hpp"
+#include "recon/poses/colmap_database.hpp"
 #include "recon/poses/pair_selection.hpp"
 #include "recon/poses/proxy_images.hpp"
 
@@ -38,16 +39,6 @@ struct ColmapOptions {
   double peak_threshold = 0.02 / 3;  ///< SIFT contrast; lower finds more on dim thermal images
 };
 
-struct DatabaseCounts {
-  int images = 0, images_with_features = 0;
-  double mean_features = 0;
-  int matched_pairs = 0;   ///< pairs that were tried
-  int verified_pairs = 0;  ///< with a two-view geometry
-};
-
-/// Input error when the file is not a COLMAP database.
-Result<DatabaseCounts> count_database(const std::filesystem::path& database);
-
 /// One folder of proxies and its database.
 class ColmapProject {
  public:
@@ -60,6 +51,8 @@ class ColmapProject {
   /// the device's prior. Quality error when no image has features.
   Result<DatabaseCounts> extract(const Session& session, const std::vector<ProxyImage>& images,
                                  const Progress& progress);
+  /// Exact matching of ours (COLMAP's random trees answer differently on each run), verified by
+  /// COLMAP.
   Result<DatabaseCounts> match(const std::vector<ProxyImage>& images,
                                const std::vector<ViewPair>& pairs, const Progress& progress);
   /// The largest model, in the frames' own pixels and names; no views when there is none.

@@ -204,7 +204,7 @@ struct Aligned {
 };
 
 Result<Aligned> align(const Work& work, const OrbitHypothesis& hypothesis,
-                      const PoseOptions& options, const Progress& progress) {
+                      const Progress& progress) {
   Aligned result{hypothesis, {}, {}, {}};
   std::vector<OrbitPose>& poses = result.hypothesis.poses;
   poses = refined_views(work, hypothesis, progress);
@@ -219,7 +219,6 @@ Result<Aligned> align(const Work& work, const OrbitHypothesis& hypothesis,
   alignment.focal_relative_sigma = work.lens.focal_relative_sigma;
   alignment.first_reach_px *= unit;
   alignment.last_reach_px *= unit;
-  alignment.threads = options.threads;
   ORBITFUSE_ASSIGN(result.report, align_edges(work.lines, result.views, alignment, progress));
   for (std::size_t i = 0; i < poses.size(); ++i)
     result.support.push_back(alignment_score(work.lines, result.views[i].view.camera,
@@ -334,7 +333,7 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
   std::vector<Aligned> aligned;
   for (const OrbitHypothesis& hypothesis : hypotheses) {
     tell(2, fmt::format("alignment from {:.0f} deg", hypothesis.offset_deg));
-    ORBITFUSE_ASSIGN(Aligned one, align(work, hypothesis, options, progress));
+    ORBITFUSE_ASSIGN(Aligned one, align(work, hypothesis, progress));
     aligned.push_back(std::move(one));
   }
   std::stable_sort(aligned.begin(), aligned.end(), [](const Aligned& x, const Aligned& y) {

@@ -221,7 +221,7 @@ Result<AlignmentReport> align_edges(const LineModel& lines, std::vector<Alignmen
     if (options.focal_relative_sigma == 0) problem.SetParameterBlockConstant(&focal);
     ceres::Solver::Options solver;
     solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-    solver.num_threads = options.threads > 0 ? options.threads : std::max(thread_count(), 1);
+    solver.num_threads = 1;  // more sum in any order
     solver.max_num_iterations = 12;
     solver.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;

@@ -49,7 +49,6 @@ struct AlignmentOptions {
   double min_agreement = 0.25;      ///< of an image edge that a line may be drawn to
   double focal_px = 0;              ///< prior; 0 = the views' own
   double focal_relative_sigma = 0.03;
-  int threads = 0;
 };
 
 struct AlignmentReport {

@@ -69,7 +69,7 @@ double solve(const std::vector<ViewMatches>& views, const Camera& camera, double
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::SPARSE_SCHUR;
     options.max_num_iterations = 25;
-    options.num_threads = thread_count();
+    options.num_threads = 1;  // more sum in any order
     options.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem, &summary);

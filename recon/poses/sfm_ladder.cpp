@@ -112,7 +112,6 @@ Result<ModalityPoses> adjusted(Reconstruction model, const Session& session,
                                                                  model.views[v].camera.height);
   }
   BundleOptions bundle;
-  bundle.threads = options.threads;
   // Errors scale with the pixels that features were found in, not with the recorded ones.
   const double proxy_scale =
       std::max(1.0, std::max(model.views[0].camera.width, model.views[0].camera.height) /
