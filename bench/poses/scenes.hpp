@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/reconstruction.hpp"
 #include "core/session.hpp"
@@ -40,8 +41,21 @@ Scene session_scene(const std::filesystem::path& folder);
 /// Folders visible/ and thermal/ of images without anything known; 8-bit or raw thermal.
 Scene folder_scene(const std::filesystem::path& folder);
 
+/// An imported or recorded session; truth by the name of each frame's source.
+Result<Scene> run_scene(const std::filesystem::path& session, const std::filesystem::path& truth);
+/// Thermal frames recorded between the stations, in their order, without stations of their own.
+void add_tracking(Scene& scene, const std::filesystem::path& tracking_json);
+
+struct ViewError {
+  std::string name;
+  double center_percent = 0, outward_percent = 0;  ///< of the extent; along the true optical axis
+  double rotation_deg = 0;
+};
+
 struct PoseError {
   int views = 0;
+  std::vector<ViewError> each;
+  double mean_rotation_deg = 0;
   double ate_percent = 0;       ///< RMS of centres, share of the truth's extent
   double median_percent = 0, worst_percent = 0;
   double rotation_deg = 0;      ///< median

@@ -244,6 +244,7 @@ Result<RenderAlignment> refined_by_renders(const Work& work, const std::vector<A
                                            const Similarity3d& canonical_from_visible,
                                            const SceneRenderer& renderer, LadderStep& step,
                                            const Progress& progress) {
+  progress.report({"poses.thermal", 3, 4, -1, "against renders"});
   OrbitViews orbit{work.images, {}, canonical_from_visible, false};
   for (const FrameRecord* frame : work.frames) orbit.stations.push_back(*frame->station);
   RenderAlignmentOptions options;
@@ -269,11 +270,8 @@ Result<RenderAlignment> refined_by_renders(const Work& work, const std::vector<A
     options.rounds = {coarse_rounds().back()};
     ORBITFUSE_ASSIGN(best, align_with_renders(renderer, work.images, views, options, progress));
   }
-  ORBITFUSE_TRY(rescue_views(renderer, orbit, best, progress));
-  options.rounds = fine_rounds();
-  std::vector<PosedView> views;
-  for (const RenderAlignedView& v : best.views) views.push_back(v.view);
-  return align_with_renders(renderer, work.images, views, options, progress);
+  ORBITFUSE_TRY(refine_orbit(renderer, orbit, best, options.focal_relative_sigma, progress));
+  return best;
 }
 
 }  // namespace
