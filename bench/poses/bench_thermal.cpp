@@ -13,6 +13,7 @@
 #include <opencv2/imgproc.hpp>
 #include <string_view>
 
+#include "bench/poses/misalignment.hpp"
 #include "bench/poses/scenes.hpp"
 #include "core/colmap_model.hpp"
 #include "core/cpu.hpp"
@@ -91,10 +92,10 @@ Status run(const Arguments& arguments) {
   const auto start = std::chrono::steady_clock::now();
   PoseOptions options;
   options.use_known_poses = false;
-  ORBITFUSE_ASSIGN(const ThermalPoses poses,
-                   estimate_thermal_poses(scene.session, &seen, options,
-                                          fs::temp_directory_path() / "orbitfuse_bench_thermal",
-                                          progress));
+  ORBITFUSE_ASSIGN(
+      const ThermalPoses poses,
+      estimate_thermal_poses(scene.session, &seen, options,
+                             fs::temp_directory_path() / "orbitfuse_bench_thermal", progress));
   const double wall =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   for (const LadderStep& step : poses.ladder)
@@ -104,14 +105,21 @@ Status run(const Arguments& arguments) {
   fmt::print("{}/{} posed, {:.1f} s, {:.1f} CPU s, {:.1f} of them in {} renders\n",
              poses.reconstruction.views.size(), poses.frame_count, wall, cpu_seconds() - before,
              rendering_s, renders);
-  const bench::PoseError error =
-      bench::pose_error(poses.reconstruction,
-                        poses.shares_visible_frame ? seen.reconstruction : poses.reconstruction,
-                        scene.truth);
-  fmt::print("centres ATE {:.3f} %, median {:.3f} %, worst {:.3f} % of the extent; rotation mean "
-             "{:.3f}, median {:.3f}, worst {:.3f} deg\n",
-             error.ate_percent, error.median_percent, error.worst_percent,
-             error.mean_rotation_deg, error.rotation_deg, error.worst_rotation_deg);
+  const bench::PoseError error = bench::pose_error(
+      poses.reconstruction, poses.shares_visible_frame ? seen.reconstruction : poses.reconstruction,
+      scene.truth);
+  fmt::print(
+      "centres ATE {:.3f} %, median {:.3f} %, worst {:.3f} % of the extent; rotation mean "
+      "{:.3f}, median {:.3f}, worst {:.3f} deg\n",
+      error.ate_percent, error.median_percent, error.worst_percent, error.mean_rotation_deg,
+      error.rotation_deg, error.worst_rotation_deg);
+  ORBITFUSE_ASSIGN(
+      const bench::Misalignment apart,
+      bench::misalignment(scene, seen.reconstruction, poses.reconstruction, seen.renderer));
+  fmt::print(
+      "rendered pairs of {} test views: median misalignment {:.2f} px at 640 wide, 90 % within "
+      "{:.2f} px\n",
+      scene.test.size(), apart.median(), apart.share(0.9));
   if (arguments.views)
     for (const bench::ViewError& view : error.each)
       fmt::print("{} centre {:.2f} %, outwards {:+.2f} %, rotation {:.2f} deg\n", view.name,

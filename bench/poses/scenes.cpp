@@ -151,6 +151,12 @@ Result<Scene> run_scene(const fs::path& session, const fs::path& truth_file) {
       if (found != by_name.end()) scene.truth.views[frame->file] = found->second;
     }
   }
+  if (truth.contains("test"))
+    for (const json& f : truth.at("test").at("frames")) {
+      json named = f;
+      if (!named.contains("file")) named["file"] = "";
+      scene.test.push_back(truth_view(named, truth.at("test").at("K")));
+    }
   return scene;
 }
 
@@ -191,25 +197,30 @@ Scene folder_scene(const fs::path& folder) {
   return scene;
 }
 
-PoseError pose_error(const Reconstruction& model, const Reconstruction& anchor,
-                     const Truth& truth) {
-  PoseError error;
+std::optional<Similarity3d> model_from_truth(const Reconstruction& model, const Truth& truth) {
   std::vector<const PosedView*> pairs;
-  for (const PosedView& view : anchor.views)
+  for (const PosedView& view : model.views)
     if (truth.views.contains(view.name)) pairs.push_back(&view);
-  if (pairs.size() < 3) return error;
+  if (pairs.size() < 3) return std::nullopt;
   Eigen::Matrix3Xd ours(3, static_cast<Eigen::Index>(pairs.size())), theirs = ours;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     ours.col(static_cast<Eigen::Index>(i)) = camera_center(pairs[i]->cam_from_world);
-    theirs.col(static_cast<Eigen::Index>(i)) =
-        camera_center(truth.views.at(pairs[i]->name).cam_from_world);
+    theirs.col(static_cast<Eigen::Index>(i)) = camera_center(truth.views.at(pairs[i]->name).cam_from_world);
   }
-  const Eigen::Matrix4d m = Eigen::umeyama(ours, theirs, true);
-  Similarity3d truth_from_model;
-  truth_from_model.scale = std::cbrt(m.topLeftCorner<3, 3>().determinant());
-  truth_from_model.rotation = Eigen::Quaterniond(
-      Eigen::Matrix3d(m.topLeftCorner<3, 3>() / truth_from_model.scale));
-  truth_from_model.translation = m.topRightCorner<3, 1>();
+  const Eigen::Matrix4d m = Eigen::umeyama(theirs, ours, true);
+  Similarity3d fit;
+  fit.scale = std::cbrt(m.topLeftCorner<3, 3>().determinant());
+  fit.rotation = Eigen::Quaterniond(Eigen::Matrix3d(m.topLeftCorner<3, 3>() / fit.scale));
+  fit.translation = m.topRightCorner<3, 1>();
+  return fit;
+}
+
+PoseError pose_error(const Reconstruction& model, const Reconstruction& anchor,
+                     const Truth& truth) {
+  PoseError error;
+  const std::optional<Similarity3d> fit = model_from_truth(anchor, truth);
+  if (!fit) return error;
+  const Similarity3d truth_from_model = fit->inverse();
 
   // Extent: the greatest distance between two true camera centres of the judged modality.
   std::vector<Eigen::Vector3d> centers;

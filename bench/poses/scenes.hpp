@@ -24,6 +24,7 @@ struct Truth {
 struct Scene {
   Session session;
   Truth truth;
+  std::vector<PosedView> test;  ///< new views that both modalities would share
 };
 
 struct ContainerOptions {
@@ -61,6 +62,9 @@ struct PoseError {
   double rotation_deg = 0;      ///< median
   double worst_rotation_deg = 0;
 };
+/// The similarity that brings true camera centres onto the model's.
+std::optional<Similarity3d> model_from_truth(const Reconstruction& model, const Truth& truth);
+
 /// After the similarity that fits `anchor`'s centres to the truth (the visible cameras, when
 /// thermal poses are judged in the visible frame).
 PoseError pose_error(const Reconstruction& model, const Reconstruction& anchor, const Truth& truth);

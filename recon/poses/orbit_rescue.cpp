@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/poses/orbit_rescue.hpp"
 
+#include <fmt/format.h>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <map>
 #include <numbers>
 #include <numeric>
@@ -16,18 +16,18 @@ namespace orbitfuse {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180;
-constexpr double supported_share = 0.72;
-constexpr int min_matches = 25;
 /// A restart that ends within this of the view's pose confirms it.
 constexpr double same_pose_deg = 1;
 /// How much better a restart must be: two places this close in score are one, seen twice.
 constexpr double clearly_better = 1.02;
 /// Views with less than this share of the median support are tried at other elevations.
 constexpr double doubtful_share = 0.85, nudge_deg = 2;
+/// Views with less than this share are searched as wholes.
+constexpr double lost_share = 0.6;
 
 /// Where the stations of the orbit lie, as the better half of its aligned views says.
 struct LoopModel {
-  double offset_deg = 0;                    ///< azimuth - nominal azimuth
+  double offset_deg = 0;                        ///< azimuth - nominal azimuth
   std::map<int, double> elevation_deg, radius;  ///< by loop
 };
 
@@ -48,7 +48,8 @@ OrbitAngles angles_of(const OrbitViews& orbit, const Rigid3d& cam_from_world) {
 
 LoopModel loop_model(const OrbitViews& orbit, const RenderAlignment& alignment) {
   std::map<int, std::vector<std::size_t>> loops;
-  for (std::size_t i = 0; i < orbit.stations.size(); ++i) loops[orbit.stations[i].loop].push_back(i);
+  for (std::size_t i = 0; i < orbit.stations.size(); ++i)
+    if (alignment.views[i].matches > 0) loops[orbit.stations[i].loop].push_back(i);
   LoopModel model;
   std::vector<double> sines, cosines;
   for (auto& [loop, members] : loops) {
@@ -68,7 +69,7 @@ LoopModel loop_model(const OrbitViews& orbit, const RenderAlignment& alignment) 
     model.elevation_deg[loop] = median_of(elevations);
     model.radius[loop] = median_of(radii);
   }
-  model.offset_deg = std::atan2(median_of(sines), median_of(cosines)) / degree;
+  if (!sines.empty()) model.offset_deg = std::atan2(median_of(sines), median_of(cosines)) / degree;
   return model;
 }
 
@@ -76,17 +77,23 @@ LoopModel loop_model(const OrbitViews& orbit, const RenderAlignment& alignment) 
 std::size_t lender(const OrbitViews& orbit, const RenderAlignment& alignment, std::size_t lost) {
   std::vector<std::size_t> near;
   for (std::size_t i = 0; i < orbit.stations.size(); ++i)
-    if (i != lost && orbit.stations[i].loop == orbit.stations[lost].loop) near.push_back(i);
+    if (i != lost && orbit.stations[i].loop == orbit.stations[lost].loop &&
+        alignment.views[i].matches > 0)
+      near.push_back(i);
   if (near.empty()) return lost;
   const auto away = [&](std::size_t i) {
     return std::abs(std::remainder(nominal_deg(orbit, i) - nominal_deg(orbit, lost), 360));
   };
-  std::sort(near.begin(), near.end(), [&](std::size_t a, std::size_t b) { return away(a) < away(b); });
+  std::sort(near.begin(), near.end(),
+            [&](std::size_t a, std::size_t b) { return away(a) < away(b); });
   near.resize(std::min<std::size_t>(near.size(), 4));
   return *std::max_element(near.begin(), near.end(), [&](std::size_t a, std::size_t b) {
     return alignment.views[a].support() < alignment.views[b].support();
   });
 }
+
+/// To a fraction of a degree, and where places are compared.
+std::vector<RenderRound> judging_rounds() { return {{256, 8, 8, 12}, {256, 5, 6, 10}}; }
 
 using Fit = RenderAlignment;
 
@@ -107,21 +114,32 @@ struct Refinery {
   }
 
   /// All views from where they are, with their common lens.
-  Status together(Fit& alignment, double focal_relative_sigma, std::vector<RenderRound> rounds) const {
+  Status together(Fit& alignment, double focal_relative_sigma,
+                  std::vector<RenderRound> rounds) const {
     std::vector<PosedView> views;
     for (const RenderAlignedView& v : alignment.views) views.push_back(v.view);
     RenderAlignmentOptions options;
     options.focal_relative_sigma = focal_relative_sigma;
     options.rounds = std::move(rounds);
-    ORBITFUSE_ASSIGN(alignment, align_with_renders(renderer, orbit.images, views, options, progress));
+    ORBITFUSE_ASSIGN(alignment,
+                     align_with_renders(renderer, orbit.images, views, options, progress));
     return {};
   }
 };
 
-/// The view's place as its loop predicts it.
-PosedView predicted(const OrbitViews& orbit, const Fit& alignment, const LoopModel& model, std::size_t i) {
+/// Of the first `count` views, at least one.
+double median_support(const Fit& alignment, std::size_t count) {
+  std::vector<double> supports;
+  for (std::size_t i = 0; i < count; ++i) supports.push_back(alignment.views[i].support());
+  return median_of(supports);
+}
+
+/// The view's place as its loop predicts it; where no view of the loop is posed, its own.
+PosedView predicted(const OrbitViews& orbit, const Fit& alignment, const LoopModel& model,
+                    std::size_t i) {
   const int loop = orbit.stations[i].loop;
   PosedView view = alignment.views[i].view;
+  if (!model.radius.contains(loop)) return view;
   const Rigid3d& like = alignment.views[lender(orbit, alignment, i)].view.cam_from_world;
   const OrbitAngles from = angles_of(orbit, like);
   view.cam_from_world = moved(like, orbit.canonical_from_world,
@@ -139,7 +157,8 @@ bool same_place(const OrbitViews& orbit, const Rigid3d& a, const Rigid3d& b) {
 }
 
 /// Takes what is supported better; returns those views.
-std::vector<std::size_t> keep_better(const std::vector<std::size_t>& owner, const Fit& tried, Fit& alignment) {
+std::vector<std::size_t> keep_better(const std::vector<std::size_t>& owner, const Fit& tried,
+                                     Fit& alignment) {
   std::vector<std::size_t> better;
   for (std::size_t c = 0; c < owner.size(); ++c) {
     RenderAlignedView& view = alignment.views[owner[c]];
@@ -150,56 +169,65 @@ std::vector<std::size_t> keep_better(const std::vector<std::size_t>& owner, cons
   return better;
 }
 
-/// Of `asked`, the views that don't come back to their place from where their loop predicts them.
-Result<std::vector<std::size_t>> unsettled(const Refinery& refinery, const std::vector<std::size_t>& asked,
-                                           Fit& alignment) {
+/// Views that don't come back to their place from where their loop predicts them, or have little
+/// support there, so that they may have come back to a wrong one.
+Result<std::vector<std::size_t>> unsettled(const Refinery& refinery, Fit& alignment) {
   const LoopModel model = loop_model(refinery.orbit, alignment);
-  std::vector<PosedView> starts;
-  for (const std::size_t i : asked) starts.push_back(predicted(refinery.orbit, alignment, model, i));
-  ORBITFUSE_ASSIGN(const Fit tried, refinery.restart(asked, starts, {{160, 12, 10, 16}, {256, 8, 8, 12}}));
-  std::vector<std::size_t> lost;
-  for (std::size_t c = 0; c < asked.size(); ++c)
-    if (!same_place(refinery.orbit, alignment.views[asked[c]].view.cam_from_world, tried.views[c].view.cam_from_world))
-      lost.push_back(asked[c]);
-  // A restart that differs gets the last round too, to be compared as equals.
-  std::vector<PosedView> places;
-  for (std::size_t c = 0; c < asked.size(); ++c)
-    if (std::find(lost.begin(), lost.end(), asked[c]) != lost.end()) places.push_back(tried.views[c].view);
-  ORBITFUSE_ASSIGN(const Fit judged, refinery.restart(lost, places, {{256, 5, 6, 10}}));
+  std::vector<std::size_t> all(alignment.views.size()), lost;
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  std::vector<PosedView> starts, places;
+  for (const std::size_t i : all) starts.push_back(predicted(refinery.orbit, alignment, model, i));
+  ORBITFUSE_ASSIGN(const Fit tried,
+                   refinery.restart(all, starts, {{160, 12, 10, 16}, {256, 8, 8, 12}}));
+  const double typical = median_support(alignment, all.size());
+  for (const std::size_t i : all) {
+    const RenderAlignedView& view = alignment.views[i];
+    if (same_place(refinery.orbit, view.view.cam_from_world, tried.views[i].view.cam_from_world) &&
+        view.support() > lost_share * typical)
+      continue;
+    lost.push_back(i);
+    places.push_back(tried.views[i].view);
+  }
+  // Compared after the same last round.
+  ORBITFUSE_ASSIGN(const Fit judged, refinery.restart(lost, places, {judging_rounds().back()}));
   keep_better(lost, judged, alignment);
+  // A restart that found good support is no longer lost.
+  std::erase_if(
+      lost, [&](std::size_t i) { return alignment.views[i].support() > doubtful_share * typical; });
   return lost;
 }
 
 /// Lost views searched as wholes from where their loop predicts them.
-Status search_whole(const Refinery& refinery, const std::vector<std::size_t>& lost, Fit& alignment) {
+Status search_whole(const Refinery& refinery, const std::vector<std::size_t>& lost,
+                    Fit& alignment) {
   const LoopModel model = loop_model(refinery.orbit, alignment);
   std::vector<PosedView> starts;
   for (const std::size_t i : lost) {
     PosedView view = predicted(refinery.orbit, alignment, model, i);
-    ORBITFUSE_TRY(climb(refinery.renderer, refinery.orbit.canonical_from_world, refinery.orbit.images[i], view, {},
-                        refinery.progress));
+    ORBITFUSE_TRY(climb(refinery.renderer, refinery.orbit.canonical_from_world,
+                        refinery.orbit.images[i], view, {}, refinery.progress));
     starts.push_back(view);
   }
-  ORBITFUSE_ASSIGN(const Fit tried, refinery.restart(lost, starts, {{256, 8, 8, 12}, {256, 5, 6, 10}}));
+  ORBITFUSE_ASSIGN(const Fit tried, refinery.restart(lost, starts, judging_rounds()));
   keep_better(lost, tried, alignment);
   return {};
 }
 
 /// Low views of a scene can settle a little too high or too low: the weaker ones are tried there,
 /// again as long as that helps.
-Status nudge(const Refinery& refinery, Fit& alignment) {
-  std::vector<double> supports;
-  for (const RenderAlignedView& v : alignment.views) supports.push_back(v.support());
-  const double typical = median_of(supports);
+Status nudge(const Refinery& refinery, std::size_t first, Fit& alignment) {
+  const double typical = median_support(alignment, alignment.views.size());
   for (const double elevation_deg : {nudge_deg, -nudge_deg}) {
     std::vector<std::size_t> weak;
-    for (std::size_t i = 0; i < supports.size(); ++i)
-      if (supports[i] < doubtful_share * typical) weak.push_back(i);
+    for (std::size_t i = first; i < alignment.views.size(); ++i)
+      if (alignment.views[i].support() < doubtful_share * typical) weak.push_back(i);
     for (int pass = 0; pass < 2 && !weak.empty(); ++pass) {
       std::vector<PosedView> starts;
       for (const std::size_t i : weak) {
         starts.push_back(alignment.views[i].view);
-        starts.back().cam_from_world = moved(starts.back().cam_from_world, refinery.orbit.canonical_from_world, {0, elevation_deg, 0});
+        starts.back().cam_from_world =
+            moved(starts.back().cam_from_world, refinery.orbit.canonical_from_world,
+                  {0, elevation_deg, 0});
       }
       ORBITFUSE_ASSIGN(const Fit tried, refinery.restart(weak, starts, fine_rounds()));
       weak = keep_better(weak, tried, alignment);
@@ -210,31 +238,55 @@ Status nudge(const Refinery& refinery, Fit& alignment) {
 
 }  // namespace
 
-std::vector<bool> supported_views(const RenderAlignment& alignment) {
-  std::vector<double> agreements;
-  for (const RenderAlignedView& v : alignment.views) agreements.push_back(v.agreement);
-  std::sort(agreements.begin(), agreements.end());
-  const double good = agreements.empty() ? 0 : agreements[agreements.size() * 3 / 4];
-  std::vector<bool> supported;
-  for (const RenderAlignedView& v : alignment.views)
-    supported.push_back(v.agreement >= supported_share * good && v.matches >= min_matches);
-  return supported;
-}
-
-Status refine_orbit(const SceneRenderer& renderer, const OrbitViews& orbit, RenderAlignment& alignment,
-                    double focal_relative_sigma, const Progress& progress) {
+Status refine_orbit(const SceneRenderer& renderer, const OrbitViews& orbit,
+                    RenderAlignment& alignment, double focal_relative_sigma,
+                    const Progress& progress) {
   const Refinery refinery{renderer, orbit, progress};
-  ORBITFUSE_TRY(refinery.together(alignment, focal_relative_sigma, {{256, 8, 8, 12}, {256, 5, 6, 10}}));
-  std::vector<std::size_t> lost(orbit.images.size());
-  std::iota(lost.begin(), lost.end(), std::size_t{0});
-  for (int pass = 0; pass < 2; ++pass) {
-    ORBITFUSE_ASSIGN(lost, unsettled(refinery, lost, alignment));
-    progress.report({"poses.thermal", 3, 4, -1, fmt::format("{} views don't come back to their place", lost.size())});
-  }
+  ORBITFUSE_TRY(refinery.together(alignment, focal_relative_sigma, judging_rounds()));
+  ORBITFUSE_ASSIGN(const std::vector<std::size_t> lost, unsettled(refinery, alignment));
+  progress.report({"poses.thermal", 3, 4, -1,
+                   fmt::format("{} views don't come back to their place", lost.size())});
   ORBITFUSE_TRY(search_whole(refinery, lost, alignment));
   ORBITFUSE_TRY(refinery.together(alignment, focal_relative_sigma, fine_rounds()));
-  ORBITFUSE_TRY(nudge(refinery, alignment));
+  ORBITFUSE_TRY(nudge(refinery, 0, alignment));
   return refinery.together(alignment, focal_relative_sigma, {fine_rounds().back()});
+}
+
+double station_offset_deg(const OrbitViews& orbit, const RenderAlignment& alignment) {
+  return loop_model(orbit, alignment).offset_deg;
+}
+
+Status add_views(const SceneRenderer& renderer, const OrbitViews& orbit, std::size_t first_new,
+                 RenderAlignment& alignment, const Progress& progress) {
+  const Refinery refinery{renderer, orbit, progress};
+  const LoopModel model = loop_model(orbit, alignment);
+  if (first_new == 0) return {};
+  const double typical = median_support(alignment, first_new);
+  std::vector<std::size_t> added, lost;
+  std::vector<PosedView> starts;
+  for (std::size_t i = first_new; i < orbit.images.size(); ++i) {
+    added.push_back(i);
+    starts.push_back(predicted(orbit, alignment, model, i));
+  }
+  std::vector<RenderRound> rounds = {{160, 16, 12, 18}, {160, 8, 8, 12}};
+  for (const RenderRound& round : fine_rounds()) rounds.push_back(round);
+  ORBITFUSE_ASSIGN(const Fit tried, refinery.restart(added, starts, rounds));
+  for (std::size_t c = 0; c < added.size(); ++c) {
+    alignment.views[added[c]] = tried.views[c];
+    if (tried.views[c].support() < lost_share * typical) lost.push_back(added[c]);
+  }
+  progress.report(
+      {"poses.thermal", 3, 4, -1,
+       fmt::format("{} of {} added views searched as a whole", lost.size(), added.size())});
+  starts.clear();
+  for (const std::size_t i : lost) {
+    PosedView view = predicted(orbit, alignment, model, i);
+    ORBITFUSE_TRY(climb(renderer, orbit.canonical_from_world, orbit.images[i], view, {}, progress));
+    starts.push_back(view);
+  }
+  ORBITFUSE_ASSIGN(const Fit searched, refinery.restart(lost, starts, fine_rounds()));
+  keep_better(lost, searched, alignment);
+  return nudge(refinery, first_new, alignment);
 }
 
 }  // namespace orbitfuse

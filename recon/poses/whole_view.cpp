@@ -21,7 +21,8 @@ Rigid3d turn(double degrees, const Eigen::Vector3d& axis) {
 /// The camera turned so that what it showed at the principal point moves by the shift.
 Rigid3d looking_aside(const Rigid3d& cam_from_world, const Camera& camera, const WholeMatch& by) {
   const Eigen::Vector3d to(by.shift_x_px / camera.fx, by.shift_y_px / camera.fy, 1);
-  return Rigid3d{Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), to), Eigen::Vector3d::Zero()} *
+  return Rigid3d{Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), to),
+                 Eigen::Vector3d::Zero()} *
          cam_from_world;
 }
 
@@ -40,7 +41,8 @@ Rigid3d moved(const Rigid3d& cam_from_world, const Similarity3d& canonical_from_
 
 WholeMatch match_whole(const cv::Mat& edges, const cv::Mat& field, int reach_px) {
   cv::Mat parts[2], padded, correlation;
-  cv::copyMakeBorder(field, padded, reach_px, reach_px, reach_px, reach_px, cv::BORDER_CONSTANT, cv::Scalar::all(0));
+  cv::copyMakeBorder(field, padded, reach_px, reach_px, reach_px, reach_px, cv::BORDER_CONSTANT,
+                     cv::Scalar::all(0));
   // Both fields as two planes: their correlation is the real part of the complex one.
   cv::matchTemplate(padded.reshape(1), edges.reshape(1), correlation, cv::TM_CCORR);
   const double energy = cv::norm(edges) * cv::norm(field);
@@ -60,7 +62,8 @@ Result<double> climb(const SceneRenderer& renderer, const Similarity3d& canonica
                      const Progress& progress) {
   const int width = std::min(options.width_px, view.camera.width);
   const Camera camera =
-      view.camera.scaled_to(width, std::max(1, view.camera.height * width / view.camera.width)).without_distortion();
+      view.camera.scaled_to(width, std::max(1, view.camera.height * width / view.camera.width))
+          .without_distortion();
   cv::Mat reduced;
   cv::resize(image, reduced, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
   const cv::Mat field = orientation_field(reduced, 1.0);
@@ -73,7 +76,8 @@ Result<double> climb(const SceneRenderer& renderer, const Similarity3d& canonica
   ORBITFUSE_ASSIGN(WholeMatch best, match(pose));
   for (double step = options.first_step_deg; step >= options.last_step_deg; step /= 2) {
     const double in_radius = step / 100;
-    const OrbitMove moves[] = {{step, 0, 0}, {-step, 0, 0}, {0, step, 0}, {0, -step, 0}, {0, 0, in_radius}, {0, 0, -in_radius}};
+    const OrbitMove moves[] = {{step, 0, 0},  {-step, 0, 0},     {0, step, 0},
+                               {0, -step, 0}, {0, 0, in_radius}, {0, 0, -in_radius}};
     for (int pass = 0; pass < 3; ++pass) {
       const double before = best.correlation;
       pose = looking_aside(pose, camera, best);

@@ -9,7 +9,7 @@
 namespace orbitfuse {
 
 struct WholeMatch {
-  double correlation = -1;     ///< normalised: edges that only one of the two shows count against it
+  double correlation = -1;  ///< normalised: edges that only one of the two shows count against it
   double shift_x_px = 0, shift_y_px = 0;  ///< of the render, to the best fit
 };
 
@@ -25,7 +25,7 @@ Rigid3d moved(const Rigid3d& cam_from_world, const Similarity3d& canonical_from_
 
 struct ClimbOptions {
   int width_px = 160;
-  int reach_px = 12;             ///< of the image shift
+  int reach_px = 12;  ///< of the image shift
   double first_step_deg = 4, last_step_deg = 1;
 };
 
