@@ -99,9 +99,17 @@ Json json_of(const Eigen::Matrix4d& m) {
 
 Result<Transforms> read_transforms_json(const std::filesystem::path& file) {
   ORBITFUSE_ASSIGN(const std::string text, read_file(file));
-  const Json root = Json::parse(text, nullptr, false);
+  Json root;
+  try {
+    root = Json::parse(text);
+  } catch (const Json::exception& error) {
+    // "[json.exception.parse_error.101] parse error at line 3, ...": the place, or the number.
+    const std::string what = error.what();
+    return fail(ErrorKind::input, file.string(), "not JSON, or cut off: " + what.substr(what.find("] ") + 2),
+                "write the file again");
+  }
   if (!root.is_object()) {
-    return fail(ErrorKind::input, file.string(), "not a JSON object (cut off?)", "write the file again");
+    return fail(ErrorKind::input, file.string(), "not a JSON object", "write the file again");
   }
   if (!root.contains("frames") || !root["frames"].is_array() || root["frames"].empty()) {
     return fail(ErrorKind::input, file.string() + ": frames", "no list of frames",

@@ -92,10 +92,11 @@ bool in_sector(const json& frame) {
 Result<nerf::Dataset> load_scene(const std::string& name, const std::filesystem::path& folder,
                                  const std::filesystem::path& model) {
   if (name == "fox") return load_fox(folder / "fox");
-  const bool thermal = name != "container";
-  if (thermal && name != "container-thermal" && name != "container-thermal-sector")
+  const bool thermal = name.starts_with("container-thermal");
+  const bool full = name == "container-full";
+  if (name != "container" && !full && name != "container-thermal" && name != "container-thermal-sector")
     return fail(ErrorKind::usage, "scene", "'" + name + "'",
-                "choose fox, container, container-thermal or container-thermal-sector");
+                "choose fox, container, container-full, container-thermal or container-thermal-sector");
   const bool sector = name == "container-thermal-sector";
   nerf::Dataset data;
   data.modality = thermal ? Modality::thermal : Modality::visible;
@@ -109,7 +110,7 @@ Result<nerf::Dataset> load_scene(const std::string& name, const std::filesystem:
       ORBITFUSE_ASSIGN(nerf::TrainingView view,
                        load_view(folder / "container" / file, camera_of(truth.at(group).at("K")),
                                  pose_of(frame), data.modality, test));
-      data.views.push_back(thermal ? std::move(view) : nerf::resized(view, 400, 300));
+      data.views.push_back(thermal || full ? std::move(view) : nerf::resized(view, 400, 300));
     }
   if (!model.empty()) ORBITFUSE_TRY(add_points(data, model));
   return data;

@@ -9,6 +9,7 @@
 #include <mutex>
 
 #include "core/parallel.hpp"
+#include "core/scene_ball.hpp"
 #include "recon/depth/consistency.hpp"
 #include "recon/depth/neighbours.hpp"
 #include "recon/depth/patch_match.hpp"
@@ -18,53 +19,15 @@ namespace {
 
 constexpr int min_side_px = 16;
 
-struct Scene {
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();
-  double radius = 1;  ///< mean distance of the cameras
-};
-
-/// The point nearest to all optical axes; median of the points if the axes are parallel.
-Scene scene_of(const Reconstruction& model) {
-  Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d b = Eigen::Vector3d::Zero();
-  const double n = static_cast<double>(model.views.size());
-  for (const PosedView& view : model.views) {
-    const Eigen::Vector3d d = view.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ();
-    const Eigen::Matrix3d off_axis = Eigen::Matrix3d::Identity() - d * d.transpose();
-    a += off_axis;
-    b += off_axis * camera_center(view.cam_from_world);
-  }
-  Scene scene;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(a);
-  if (eigen.eigenvalues()(0) > 1e-3 * n) {
-    scene.center = a.ldlt().solve(b);
-  } else if (model.points.empty()) {  // parallel axes: as far ahead as the cameras are apart
-    Eigen::Vector3d mean = Eigen::Vector3d::Zero(), forward = mean;
-    for (const PosedView& view : model.views) {
-      mean += camera_center(view.cam_from_world) / n;
-      forward += view.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ();
-    }
-    double spread = 0;
-    for (const PosedView& view : model.views)
-      spread = std::max(spread, (camera_center(view.cam_from_world) - mean).norm());
-    scene.center = mean + forward.normalized() * (spread > 0 ? 2 * spread : 1.0);
-  } else {
-    std::vector<double> values(model.points.size(), 0.0);
-    for (int i = 0; i < 3; ++i) {
-      for (std::size_t k = 0; k < model.points.size(); ++k) values[k] = model.points[k].position[i];
-      const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-      std::nth_element(values.begin(), middle, values.end());
-      scene.center[i] = *middle;
-    }
-  }
-  double distance = 0;
-  for (const PosedView& view : model.views)
-    distance += (camera_center(view.cam_from_world) - scene.center).norm() / n;
-  scene.radius = std::isfinite(distance) && distance > 0 ? distance : 1.0;
-  return scene;
+SceneBall scene_of(const Reconstruction& model) {
+  std::vector<Rigid3d> poses;
+  std::vector<Eigen::Vector3d> points;
+  for (const PosedView& view : model.views) poses.push_back(view.cam_from_world);
+  for (const SparsePoint& point : model.points) points.push_back(point.position);
+  return scene_ball(poses, std::move(points));
 }
 
-std::vector<Seed> seeds_of(const Reconstruction& model, int index, const DepthView& view, const Scene& scene) {
+std::vector<Seed> seeds_of(const Reconstruction& model, int index, const DepthView& view, const SceneBall& scene) {
   std::vector<Seed> seeds;
   for (const SparsePoint& point : model.points) {
     const bool seen = std::any_of(point.track.begin(), point.track.end(),
@@ -121,7 +84,7 @@ Result<DenseDepth> dense_depth(const Reconstruction& model, const std::vector<cv
   ORBITFUSE_TRY(options.validate());
   ORBITFUSE_TRY(check(model, images));
   const int count = static_cast<int>(images.size());
-  const Scene scene = scene_of(model);
+  const SceneBall scene = scene_of(model);
   std::vector<DepthView> fine(images.size()), coarse(images.size());
   parallel_for(count, [&](int i) {
     const auto k = static_cast<std::size_t>(i);

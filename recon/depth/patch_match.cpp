@@ -87,16 +87,21 @@ Match match_of(const DepthView& view, const std::vector<SourceView>& sources, in
           static_cast<float>(c.cx / c.fx), static_cast<float>(c.cy / c.fy)};
 }
 
-}  // namespace
-
-PlaneMap random_planes(const DepthView& view, DepthRange range, const std::vector<Seed>& seeds,
-                       std::uint64_t seed) {
+PlaneMap blank_map(const DepthView& view) {
   PlaneMap map;
   map.width = view.gray.cols;
   map.height = view.gray.rows;
   const auto pixels = static_cast<std::size_t>(map.width) * static_cast<std::size_t>(map.height);
   map.plane.resize(pixels);
   map.cost.assign(pixels, worst_cost);
+  return map;
+}
+
+}  // namespace
+
+PlaneMap random_planes(const DepthView& view, DepthRange range, const std::vector<Seed>& seeds,
+                       std::uint64_t seed) {
+  PlaneMap map = blank_map(view);
   for (int y = 0; y < map.height; ++y)
     for (int x = 0; x < map.width; ++x) {
       Random random(seed, map.at(x, y));
@@ -122,12 +127,7 @@ PlaneMap random_planes(const DepthView& view, DepthRange range, const std::vecto
 }
 
 PlaneMap doubled(const PlaneMap& coarse, const DepthView& fine, DepthRange range) {
-  PlaneMap map;
-  map.width = fine.gray.cols;
-  map.height = fine.gray.rows;
-  const auto pixels = static_cast<std::size_t>(map.width) * static_cast<std::size_t>(map.height);
-  map.plane.resize(pixels);
-  map.cost.assign(pixels, worst_cost);
+  PlaneMap map = blank_map(fine);
   for (int y = 0; y < map.height; ++y)
     for (int x = 0; x < map.width; ++x) {
       const int cx = std::min(coarse.width - 1, x * coarse.width / map.width);

@@ -60,8 +60,8 @@ void clear_segment(Occupancy& occupancy, const Ray& ray, float end, float tube) 
 
 }  // namespace
 
-double carve(const Dataset& dataset, const Space& space, const std::vector<SceneView>& views,
-             const TrainOptions& options, Occupancy& occupancy) {
+double carve(const Dataset& dataset, const std::vector<SceneView>& views, const TrainOptions& options,
+             Occupancy& occupancy) {
   const int n = occupancy.resolution;
   // Votes are cast for 2x2x2 cells at once; their half diagonal is part of the margin.
   const int half = n / 2;
@@ -98,7 +98,6 @@ double carve(const Dataset& dataset, const Space& space, const std::vector<Scene
       }
   occupancy.on = occupancy.allowed;
   occupancy.refresh();
-  static_cast<void>(space);
   return occupancy.fraction_on();
 }
 

@@ -178,7 +178,8 @@ RenderedView render_strided(const FieldState& field, const ViewRays& rays, int s
   ImageRenderer renderer(field, rays, stride, options);
   const int width = (rays.camera().width + stride - 1) / stride, height = (rays.camera().height + stride - 1) / stride;
   // Proposal networks know where surfaces are.
-  if (field.options.sampling == Sampling::proposal || std::min(width, height) < 8 * limit_stride)
+  if (!options.look_ahead || field.options.sampling == Sampling::proposal ||
+      std::min(width, height) < 8 * limit_stride)
     return renderer.image(cv::Mat(height, width, CV_32FC1, cv::Scalar(no_limit)));
   // What lies behind opaque surfaces is half of most rays. Look where they are at a sixteenth of
   // the pixels; the farthest of the neighbours is the limit.

@@ -7,17 +7,12 @@
 #include <limits>
 
 #include "core/parallel.hpp"
+#include "core/scene_ball.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
 
 constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Dense maps first, then sparse points where no map has a value.
 cv::Mat known_distance(const Dataset& dataset, const Space& space, int index,
@@ -57,42 +52,12 @@ cv::Mat known_distance(const Dataset& dataset, const Space& space, int index,
 }  // namespace
 
 Space estimate_space(const Dataset& dataset) {
-  Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d b = Eigen::Vector3d::Zero(), mean = Eigen::Vector3d::Zero();
-  Eigen::Vector3d forward = Eigen::Vector3d::Zero();
-  for (const TrainingView& view : dataset.views) {
-    const Eigen::Vector3d c = camera_center(view.cam_from_world);
-    const Eigen::Vector3d d = view.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ();
-    const Eigen::Matrix3d off_axis = Eigen::Matrix3d::Identity() - d * d.transpose();
-    a += off_axis;
-    b += off_axis * c;
-    mean += c;
-    forward += d;
-  }
-  const double n = static_cast<double>(dataset.views.size());
-  mean /= n;
-  Space space;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(a);
-  const bool axes_meet = eigen.eigenvalues()(0) > 1e-3 * n;
-  if (axes_meet) {
-    space.center = a.ldlt().solve(b);
-  } else if (!dataset.points.empty()) {
-    for (int i = 0; i < 3; ++i) {
-      std::vector<double> values;
-      for (const SparsePoint& p : dataset.points) values.push_back(p.position[i]);
-      space.center[i] = median(values);
-    }
-  } else {
-    double spread = 0;
-    for (const TrainingView& view : dataset.views)
-      spread = std::max(spread, (camera_center(view.cam_from_world) - mean).norm());
-    space.center = mean + forward.normalized() * (spread > 0 ? 2 * spread : 1.0);
-  }
-  double distance = 0;
-  for (const TrainingView& view : dataset.views)
-    distance += (camera_center(view.cam_from_world) - space.center).norm() / n;
-  space.radius = std::isfinite(distance) && distance > 0 ? distance : 1.0;
-  return space;
+  std::vector<Rigid3d> poses;
+  std::vector<Eigen::Vector3d> points;
+  for (const TrainingView& view : dataset.views) poses.push_back(view.cam_from_world);
+  for (const SparsePoint& point : dataset.points) points.push_back(point.position);
+  const SceneBall ball = scene_ball(poses, std::move(points));
+  return {ball.center, ball.radius};
 }
 
 ValueSpan estimate_span(const Dataset& dataset) {

@@ -27,9 +27,7 @@ struct SceneView {
   std::vector<std::int32_t> known;  ///< pixels (y * width + x) whose distance is known
 };
 
-/// Where the cameras look: the point nearest to all optical axes, and the cameras' mean distance
-/// from it. Points, when there are any, replace it if the axes do not meet (one view, a straight
-/// path).
+/// The scene's ball (core/scene_ball.hpp).
 Space estimate_space(const Dataset& dataset);
 
 /// Thermal: the 0.1 and 99.9 percentile over all views, at least 1 K wide. Visible: 0..1.
@@ -39,7 +37,7 @@ std::vector<SceneView> prepare_views(const Dataset& dataset, const Space& space,
 
 /// Switches off cells that too few views see and cells in front of known depth (SfM tracks, depth
 /// maps). Returns the fraction left on.
-double carve(const Dataset& dataset, const Space& space, const std::vector<SceneView>& views,
-             const TrainOptions& options, Occupancy& occupancy);
+double carve(const Dataset& dataset, const std::vector<SceneView>& views, const TrainOptions& options,
+             Occupancy& occupancy);
 
 }  // namespace orbitfuse::nerf

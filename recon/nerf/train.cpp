@@ -151,7 +151,7 @@ Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
   }
   const std::vector<SceneView> views = prepare_views(dataset, state->space, state->span);
   if (!resumed && !options.shared_geometry && options.sampling == Sampling::occupancy) {
-    const double left = carve(dataset, state->space, views, options, state->occupancy);
+    const double left = carve(dataset, views, options, state->occupancy);
     report.skips.push_back({"empty space", fmt::format("{:.1f} % of the cells seen by enough views and "
                                                        "not in front of known depth", 100 * left),
                             "rays skip the rest from the first step"});

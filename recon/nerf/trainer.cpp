@@ -46,8 +46,8 @@ struct LevelGradient {
 }  // namespace
 
 Trainer::Trainer(FieldState& field, const std::vector<SceneView>& views,
-                 const std::vector<bool>& heldout)
-    : field_(field), views_(views), kernels_(kernels_for(best_isa())) {
+                 const std::vector<bool>& heldout, const Kernels& kernels)
+    : field_(field), views_(views), kernels_(kernels) {
   std::int64_t pixels = 0, known = 0;
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (heldout[i]) continue;

@@ -15,8 +15,8 @@ namespace orbitfuse::nerf {
 class Trainer {
  public:
   /// `heldout[i]` views are never drawn from.
-  Trainer(FieldState& field, const std::vector<SceneView>& views,
-          const std::vector<bool>& heldout);
+  Trainer(FieldState& field, const std::vector<SceneView>& views, const std::vector<bool>& heldout,
+          const Kernels& kernels = kernels_for(best_isa()));
 
   /// One step; `progress` in [0, 1] is the place in the schedule. False: a gradient was not
   /// finite, nothing was changed.

@@ -59,6 +59,7 @@ TEST(TransformsJson, BadInputNamesFrameAndField) {
       {R"({"frames":[]})", "frames"},
       {R"({"frames":7})", "frames"},
       {R"({"frames":[{"file_p)", "cut off"},
+      {R"({"w":4,"h":4,"fl_x":1e999,"frames":[]})", "1e999"},
       {"[]", "object"}};
   for (const auto& [text, word] : cases) {
     put(folder / "t.json", text);
