@@ -62,6 +62,9 @@ class FrameSource {
   /// but a `rejected` delivery. Ids rise strictly.
   virtual Result<Delivery> next(std::chrono::milliseconds timeout) = 0;
   virtual void stop() = 0;
+  /// Goes on with a session: what an earlier recording knew of the device, and its frames. Called
+  /// before the first next(); a source of files leaves out those that it delivered then.
+  virtual void resume(const DeviceInfo& /*device*/, const std::vector<FrameRecord>& /*frames*/) {}
   /// Whether nothing is lost when the recorder takes its time (files): then it never drops.
   virtual bool can_wait() const { return false; }
 };

@@ -20,6 +20,9 @@ class PreparedSource final : public FrameSource {
   Result<Delivery> next(std::chrono::milliseconds timeout) override;
   void stop() override;
   bool can_wait() const override { return source_->can_wait(); }
+  void resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames) override {
+    source_->resume(device, frames);
+  }
 
   /// The session's name for the device, its first id, and whether frames are tracking frames until
   /// the guide chooses them. Before the first next().

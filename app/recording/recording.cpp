@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <set>
 #include <thread>
 
@@ -27,9 +28,18 @@ std::uint64_t next_id(const Session& session, const std::string& device) {
   return next;
 }
 
-bool same_camera(const DeviceInfo& a, const DeviceInfo& b) {
-  return a.modality == b.modality && a.driver == b.driver && a.model == b.model &&
-         a.serial == b.serial;
+bool same_camera(const DeviceInfo& known, const DeviceInfo& now) {
+  // Photos tell their camera when the first one comes; the source refuses those of another.
+  const bool not_known_yet = now.driver == "stills" && now.model.empty() && now.serial.empty();
+  return known.modality == now.modality && known.driver == now.driver &&
+         (not_known_yet || (known.model == now.model && known.serial == now.serial));
+}
+
+std::vector<FrameRecord> frames_of(const Session& session, const std::string& device) {
+  std::vector<FrameRecord> frames;
+  std::copy_if(session.frames.begin(), session.frames.end(), std::back_inserter(frames),
+               [&](const FrameRecord& frame) { return frame.device == device; });
+  return frames;
 }
 
 }  // namespace
@@ -64,7 +74,11 @@ Status Recording::fit_into(const std::optional<Session>& earlier) {
       if (number > 0) device.id = fmt::format("{}{}", name(device.modality), number - 1);
       const DeviceInfo* known = earlier ? earlier->device(device.id) : nullptr;
       if (used.count(device.id) || (known && !same_camera(*known, device))) continue;
-      if (known) first_id = next_id(*earlier, device.id);
+      if (known) {
+        first_id = next_id(*earlier, device.id);
+        source->resume(*known, frames_of(*earlier, device.id));
+        device = *known;
+      }
       break;
     }
     used.insert(device.id);

@@ -91,9 +91,6 @@ Result<StageOutput> pose_thermal(const StageContext& context, const SessionInput
   const bool visible = context.has("poses_visible");
   if (visible) {
     ORBITFUSE_ASSIGN(scene.reconstruction, load_poses(context.of("poses_visible"), Modality::visible));
-    if (context.has("depth")) {
-      ORBITFUSE_ASSIGN(scene.depth, load_depth_maps(context.of("depth")));
-    }
   }
   nerf::Field field;
   if (context.has("train_visible")) {
@@ -127,7 +124,7 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   pipeline::Stage stage;
   stage.name = "poses_" + std::string(name(modality));
   if (!visible) {
-    stage.uses = {"poses_visible", "depth"};
+    stage.uses = {"poses_visible"};
     // Thermal views are aligned with renders of the visible field; known poses need none.
     if (!in.config->poses.use_known_poses || !all_posed(in.session->session)) stage.uses.push_back("train_visible");
   }

@@ -22,7 +22,7 @@ using nlohmann::json;
 struct Options {
   std::string session, driver, visible, thermal, profiles, guide = "auto", mat = "paper";
   int mat_tags = 0;
-  double seconds = 0, spacing_deg = 0;
+  double seconds = 0, spacing_deg = 0, turntable_deg = 0;
   std::vector<double> elevations_deg;
   bool stop_when_complete = false, view = false, wait_for_start = false;
   std::string page, token;
@@ -51,6 +51,7 @@ Result<std::optional<LiveGuideOptions>> guide_of(const Options& o,
   LiveGuideOptions guide;
   if (cameras.plan) guide.plan = *cameras.plan;
   if (o.spacing_deg > 0) guide.plan.spacing_deg = o.spacing_deg;
+  guide.turntable_step_deg = o.turntable_deg;
   if (!o.elevations_deg.empty()) guide.plan.loop_elevations_deg = o.elevations_deg;
   std::set<Modality> modalities;
   for (const auto& source : cameras.sources) modalities.insert(source->describe().modality);
@@ -61,7 +62,8 @@ Result<std::optional<LiveGuideOptions>> guide_of(const Options& o,
 
 /// Finds the mat in what live cameras see; frames that carry their stations need none.
 Result<PositionFinder> finder_of(const Options& o, const recording::Cameras& cameras) {
-  if (o.guide == "off" || o.guide == "key" || cameras.stations) return PositionFinder{};
+  if (o.guide == "off" || o.guide == "key" || o.turntable_deg != 0 || cameras.stations)
+    return PositionFinder{};
   MatDesign design = o.mat == "foil" ? MatDesign::for_thermal(0.6) : MatDesign{};
   if (o.mat_tags > 0) design.tags_per_side = o.mat_tags;
   ORBITFUSE_TRY(design.validate());
@@ -218,7 +220,7 @@ Status open_page(Context& context, const Options& o, recording::Recording& recor
   hooks.at_station = [&recording] { recording.operator_at_station(); };
   page.server = std::make_unique<PageServer>(options, std::move(hooks));
   ORBITFUSE_TRY(page.server->start());
-  context.console.info("page: " + page.server->url());
+  for (const std::string& url : page.server->urls()) context.console.info("page: " + url);
   context.console.event({{"event", "page"}, {"url", page.server->url()}});
   while (o.wait_for_start && !page.started && !context.progress.cancelled())
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
@@ -308,6 +310,9 @@ Action add_capture(CLI::App& app) {
                  "Enter key says where; off: record without stations")
       ->check(CLI::IsMember({"auto", "key", "off"}))
       ->capture_default_str();
+  app.add_option("--turntable", options->turntable_deg,
+                 "The object stands on a turntable: each Enter key, and each photo of a stills "
+                 "camera, is this many degrees further; a full turn later it is the next loop");
   app.add_option("--mat", options->mat, "The mat that lies there (orbitfuse mat): paper or foil")
       ->check(CLI::IsMember({"paper", "foil"}))
       ->capture_default_str();

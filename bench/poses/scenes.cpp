@@ -135,6 +135,46 @@ Scene session_scene(const fs::path& folder) {
   return scene;
 }
 
+Result<Scene> run_scene(const fs::path& session, const fs::path& truth_file) {
+  Scene scene;
+  ORBITFUSE_ASSIGN(scene.session, open_session(session));
+  const json truth = load(truth_file);
+  for (const Modality modality : {Modality::visible, Modality::thermal}) {
+    const json& entry = truth.at(std::string(name(modality)));
+    std::map<std::string, PosedView> by_name;
+    for (const json& f : entry.at("frames")) {
+      const PosedView view = truth_view(f, entry.at("K"));
+      by_name[view.name] = view;
+    }
+    for (const FrameRecord* frame : scene.session.frames_of(modality)) {
+      const auto found = by_name.find(frame->source.empty() ? frame->file : frame->source);
+      if (found != by_name.end()) scene.truth.views[frame->file] = found->second;
+    }
+  }
+  if (truth.contains("test"))
+    for (const json& f : truth.at("test").at("frames")) {
+      json named = f;
+      if (!named.contains("file")) named["file"] = "";
+      scene.test.push_back(truth_view(named, truth.at("test").at("K")));
+    }
+  return scene;
+}
+
+void add_tracking(Scene& scene, const fs::path& tracking_json) {
+  const json tracking = load(tracking_json);
+  const FrameRecord like = *scene.session.frames_of(Modality::thermal).back();
+  std::uint64_t sequence = like.sequence + 1;
+  for (const json& entry : tracking.at("frames")) {
+    FrameRecord record = like;
+    record.file = (tracking_json.parent_path() / entry.at("file").get<std::string>()).string();
+    record.station.reset();
+    record.sequence = sequence++;
+    record.tracking = true;
+    scene.truth.views[record.file] = truth_view(entry, tracking.at("K"));
+    scene.session.frames.push_back(std::move(record));
+  }
+}
+
 Scene folder_scene(const fs::path& folder) {
   Scene scene;
   scene.session.folder = folder;
@@ -157,25 +197,30 @@ Scene folder_scene(const fs::path& folder) {
   return scene;
 }
 
-PoseError pose_error(const Reconstruction& model, const Reconstruction& anchor,
-                     const Truth& truth) {
-  PoseError error;
+std::optional<Similarity3d> model_from_truth(const Reconstruction& model, const Truth& truth) {
   std::vector<const PosedView*> pairs;
-  for (const PosedView& view : anchor.views)
+  for (const PosedView& view : model.views)
     if (truth.views.contains(view.name)) pairs.push_back(&view);
-  if (pairs.size() < 3) return error;
+  if (pairs.size() < 3) return std::nullopt;
   Eigen::Matrix3Xd ours(3, static_cast<Eigen::Index>(pairs.size())), theirs = ours;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     ours.col(static_cast<Eigen::Index>(i)) = camera_center(pairs[i]->cam_from_world);
-    theirs.col(static_cast<Eigen::Index>(i)) =
-        camera_center(truth.views.at(pairs[i]->name).cam_from_world);
+    theirs.col(static_cast<Eigen::Index>(i)) = camera_center(truth.views.at(pairs[i]->name).cam_from_world);
   }
-  const Eigen::Matrix4d m = Eigen::umeyama(ours, theirs, true);
-  Similarity3d truth_from_model;
-  truth_from_model.scale = std::cbrt(m.topLeftCorner<3, 3>().determinant());
-  truth_from_model.rotation = Eigen::Quaterniond(
-      Eigen::Matrix3d(m.topLeftCorner<3, 3>() / truth_from_model.scale));
-  truth_from_model.translation = m.topRightCorner<3, 1>();
+  const Eigen::Matrix4d m = Eigen::umeyama(theirs, ours, true);
+  Similarity3d fit;
+  fit.scale = std::cbrt(m.topLeftCorner<3, 3>().determinant());
+  fit.rotation = Eigen::Quaterniond(Eigen::Matrix3d(m.topLeftCorner<3, 3>() / fit.scale));
+  fit.translation = m.topRightCorner<3, 1>();
+  return fit;
+}
+
+PoseError pose_error(const Reconstruction& model, const Reconstruction& anchor,
+                     const Truth& truth) {
+  PoseError error;
+  const std::optional<Similarity3d> fit = model_from_truth(anchor, truth);
+  if (!fit) return error;
+  const Similarity3d truth_from_model = fit->inverse();
 
   // Extent: the greatest distance between two true camera centres of the judged modality.
   std::vector<Eigen::Vector3d> centers;
@@ -187,12 +232,20 @@ PoseError pose_error(const Reconstruction& model, const Reconstruction& anchor,
     const Rigid3d moved = rebase(view.cam_from_world, truth_from_model);
     offsets.push_back((camera_center(moved) - centers.back()).norm());
     angles.push_back(rotation_angle_deg(moved.rotation, found->second.cam_from_world.rotation));
+    const Eigen::Vector3d off = camera_center(moved) - centers.back();
+    const Eigen::Vector3d back =
+        -(found->second.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ());
+    error.each.push_back({view.name, off.norm(), off.dot(back), angles.back()});
+    error.mean_rotation_deg += angles.back();
   }
   if (offsets.empty()) return error;
   double extent = 0, sum = 0;
   for (const auto& a : centers)
     for (const auto& b : centers) extent = std::max(extent, (a - b).norm());
   for (const double d : offsets) sum += d * d;
+  for (ViewError& view : error.each)
+    view.center_percent *= 100 / extent, view.outward_percent *= 100 / extent;
+  error.mean_rotation_deg /= static_cast<double>(angles.size());
   std::sort(offsets.begin(), offsets.end());
   std::sort(angles.begin(), angles.end());
   error.views = static_cast<int>(offsets.size());

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/reconstruction.hpp"
 #include "core/session.hpp"
@@ -23,6 +24,7 @@ struct Truth {
 struct Scene {
   Session session;
   Truth truth;
+  std::vector<PosedView> test;  ///< new views that both modalities would share
 };
 
 struct ContainerOptions {
@@ -40,13 +42,29 @@ Scene session_scene(const std::filesystem::path& folder);
 /// Folders visible/ and thermal/ of images without anything known; 8-bit or raw thermal.
 Scene folder_scene(const std::filesystem::path& folder);
 
+/// An imported or recorded session; truth by the name of each frame's source.
+Result<Scene> run_scene(const std::filesystem::path& session, const std::filesystem::path& truth);
+/// Thermal frames recorded between the stations, in their order, without stations of their own.
+void add_tracking(Scene& scene, const std::filesystem::path& tracking_json);
+
+struct ViewError {
+  std::string name;
+  double center_percent = 0, outward_percent = 0;  ///< of the extent; along the true optical axis
+  double rotation_deg = 0;
+};
+
 struct PoseError {
   int views = 0;
+  std::vector<ViewError> each;
+  double mean_rotation_deg = 0;
   double ate_percent = 0;       ///< RMS of centres, share of the truth's extent
   double median_percent = 0, worst_percent = 0;
   double rotation_deg = 0;      ///< median
   double worst_rotation_deg = 0;
 };
+/// The similarity that brings true camera centres onto the model's.
+std::optional<Similarity3d> model_from_truth(const Reconstruction& model, const Truth& truth);
+
 /// After the similarity that fits `anchor`'s centres to the truth (the visible cameras, when
 /// thermal poses are judged in the visible frame).
 PoseError pose_error(const Reconstruction& model, const Reconstruction& anchor, const Truth& truth);

@@ -35,6 +35,10 @@ Status LiveGuideOptions::validate() const {
     return fail(ErrorKind::usage, "guide.looks_per_second", fmt::format("{}", looks_per_second),
                 "must be > 0, at most 100");
   }
+  if (!(std::abs(turntable_step_deg) <= 120)) {
+    return fail(ErrorKind::usage, "guide.turntable_step_deg", fmt::format("{}", turntable_step_deg),
+                "must be within 120 degrees, 0 for no turntable");
+  }
   if (!(unseen_after_s > 0)) {
     return fail(ErrorKind::usage, "guide.unseen_after_s", fmt::format("{}", unseen_after_s),
                 "must be > 0");
@@ -73,17 +77,17 @@ void LiveGuide::add(const FrameRecord& frame) {
   camera.shown.latest_file = frame.file;
   if (frame.station && !frame.tracking) {
     // The source's or the operator's word: there, and at rest.
+    if (frame.has_flag("still")) ++camera.table_steps;
     set_position(camera, {frame.station->azimuth_deg, frame.station->elevation_deg, 0, 0},
                  frame.host_time_ns);
     camera.position->speed_deg_s = 0;
     judge(camera, frame, camera.position);
-  } else if (camera.key_pressed) {
-    const std::optional<OrbitPosition> there = next_station(frame.modality);
-    judge(camera, frame, there);
-    if (camera.shown.refusal == Refusal::none) {
-      camera.key_pressed = false;
-      camera.position = there;
-    }
+  } else if (options_.turntable_step_deg != 0 && frame.has_flag("still")) {
+    camera.announced = next_table_position(camera);
+    judge_announced(camera, frame);
+    camera.announced.reset();  // the next photo is the next step, whatever this one was
+  } else if (camera.announced) {
+    judge_announced(camera, frame);
   } else if (finder_) {
     camera.waiting = frame;
     changed_.notify_all();
@@ -92,7 +96,29 @@ void LiveGuide::add(const FrameRecord& frame) {
 
 void LiveGuide::operator_at_station() {
   const std::lock_guard lock(mutex_);
-  for (auto& [modality, camera] : cameras_) camera.key_pressed = next_station(modality).has_value();
+  for (auto& [modality, camera] : cameras_) {
+    if (options_.turntable_step_deg != 0) camera.announced = next_table_position(camera);
+    else camera.announced = next_station(modality);
+  }
+}
+
+OrbitPosition LiveGuide::next_table_position(Camera& camera) const {
+  const double way_deg = camera.table_steps++ * options_.turntable_step_deg;
+  // Rounded: twelve thirds of 90 degrees are a turn.
+  const auto turn = static_cast<std::size_t>(std::floor(std::abs(way_deg) / 360 + 1e-9));
+  const std::vector<double>& loops = options_.plan.loop_elevations_deg;
+  const double azimuth = std::fmod(way_deg, 360);
+  return {azimuth < 0 ? azimuth + 360 : azimuth, loops[turn % loops.size()], 0, 0};
+}
+
+void LiveGuide::judge_announced(Camera& camera, const FrameRecord& frame) {
+  const std::optional<OrbitPosition> there = camera.announced;
+  camera.position = there;
+  judge(camera, frame, there);
+  const Refusal refusal = camera.shown.refusal;
+  // A blurred frame is followed by another from the same place; a place between stations stays one.
+  if (refusal == Refusal::none || refusal == Refusal::between_stations || refusal == Refusal::out_of_band)
+    camera.announced.reset();
 }
 
 std::optional<OrbitPosition> LiveGuide::next_station(Modality modality) const {

@@ -24,8 +24,11 @@ using PositionFinder = std::function<std::optional<OrbitPosition>(const cv::Mat&
 struct LiveGuideOptions {
   OrbitPlan plan;
   CoverageOptions coverage;
-  double looks_per_second = 4;  ///< per camera; finding the mat costs 5-20 ms a look
+  double looks_per_second = 4;  ///< per camera; finding the mat costs 5-30 ms a look
   double unseen_after_s = 1.0;  ///< a position older than this is no longer where the camera is
+  /// The object stands on a turntable: each key, and each photo, is this much further in azimuth,
+  /// negative for a table that turns the other way; a full turn later it is the next loop. 0: none.
+  double turntable_step_deg = 0;
 
   Status validate() const;
 };
@@ -40,8 +43,8 @@ struct LiveCamera {
 };
 
 /// Follows a recording and decides which stations are done. Every frame comes here after it is on
-/// disk. Its position is the station that it carries (replay, synthetic, turntable), or the
-/// operator's key, or what `finder` sees in the image, read back from disk a few times a second on
+/// disk. Its position is the station that it carries (replay, synthetic), or the turntable's step,
+/// or the operator's key, or what `finder` sees in the image, read back from disk a few times a second on
 /// a thread of its own so that recording never waits for it. The frame chosen for a sector is
 /// marked in the manifest (SessionWriter::amend); one that it replaces becomes a tracking frame.
 class LiveGuide {
@@ -52,7 +55,8 @@ class LiveGuide {
 
   /// From any thread; fast unless the frame carries a station.
   void add(const FrameRecord& frame);
-  /// The operator stands at the next station: for each modality the next good frame is it.
+  /// The operator stands at the next station, or has turned the table by a step: for each modality
+  /// the next good frame is it.
   void operator_at_station();
 
   /// Ends the looking; call it before the writer closes the session.
@@ -74,7 +78,8 @@ class LiveGuide {
     std::optional<OrbitPosition> position;
     std::int64_t position_time_ns = 0;
     std::optional<FrameRecord> waiting;  ///< newest frame not looked at yet
-    bool key_pressed = false;
+    std::optional<OrbitPosition> announced;  ///< by the key: where the next good frame is
+    int table_steps = 0;                     ///< that the turntable has made
     std::map<std::size_t, FrameRecord> chosen;  ///< by sector
   };
   void look();
@@ -82,6 +87,8 @@ class LiveGuide {
              const std::optional<OrbitPosition>& position);
   void note_choice(Camera& camera, const FrameRecord& frame);
   std::optional<OrbitPosition> next_station(Modality modality) const;
+  OrbitPosition next_table_position(Camera& camera) const;
+  void judge_announced(Camera& camera, const FrameRecord& frame);
   void set_position(Camera& camera, OrbitPosition position, std::int64_t time_ns);
 
   SessionWriter& writer_;

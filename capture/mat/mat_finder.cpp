@@ -3,22 +3,19 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
-#include <numbers>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "capture/mat/aruco_dictionary.hpp"
+#include "capture/mat/pose_sigma.hpp"
 
 namespace orbitfuse {
 namespace {
 
 /// Above what Coverage accepts: a followed position steers, it proves no station.
 constexpr double followed_sigma_deg = 3;
-
-constexpr double deg = 180 / std::numbers::pi;
 
 /// 8-bit grey; thermal samples stretched between percentiles, so that one hot spot hides nothing.
 cv::Mat gray_of(const cv::Mat& image) {
@@ -108,72 +105,8 @@ std::optional<Eigen::Matrix3d> agree_on_plane(Corners& corners, double max_error
   return out;
 }
 
-using Pose = Eigen::Matrix<double, 6, 1>;  // rotation vector, translation
-
-Pose pose_of(const cv::Mat& r, const cv::Mat& t) {
-  Pose pose;
-  for (int i = 0; i < 3; ++i) {
-    pose[i] = r.at<double>(i);
-    pose[3 + i] = t.at<double>(i);
-  }
-  return pose;
-}
-
-Rigid3d rigid_of(const Pose& pose) {
-  const Eigen::Vector3d r = pose.head<3>();
-  const double angle = r.norm();
-  const Eigen::AngleAxisd rotation(
-      angle, angle > 0 ? Eigen::Vector3d(r / angle) : Eigen::Vector3d::UnitX());
-  return {Eigen::Quaterniond(rotation), pose.tail<3>()};
-}
-
-/// Azimuth and elevation in degrees.
-Eigen::Vector2d angles_of(const Pose& pose) {
-  const Eigen::Vector3d eye = camera_center(rigid_of(pose));
-  return {std::atan2(eye.y(), eye.x()) * deg,
-          std::atan2(eye.z(), std::hypot(eye.x(), eye.y())) * deg};
-}
-
-double rms(const Corners& corners, const cv::Matx33d& k, const cv::Mat& r, const cv::Mat& t) {
-  std::vector<cv::Point2d> projected;
-  cv::projectPoints(corners.mat, r, t, k, cv::noArray(), projected);
-  double sum = 0;
-  for (std::size_t i = 0; i < projected.size(); ++i) {
-    const cv::Point2d d = projected[i] - corners.image[i];
-    sum += d.dot(d);
-  }
-  return std::sqrt(sum / static_cast<double>(projected.size()));
-}
-
-/// One standard deviation of the direction: corner noise through the fit's Jacobian.
-double sigma_deg(const Corners& corners, const cv::Matx33d& k, const cv::Mat& r, const cv::Mat& t,
-                 double error_px) {
-  std::vector<cv::Point2d> projected;
-  cv::Mat jacobian;
-  cv::projectPoints(corners.mat, r, t, k, cv::noArray(), projected, jacobian);
-  Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
-  for (int row = 0; row < jacobian.rows; ++row) {
-    Pose j;
-    for (int i = 0; i < 6; ++i) j[i] = jacobian.at<double>(row, i);
-    information += j * j.transpose();
-  }
-  const Eigen::Matrix<double, 6, 6> covariance =
-      information.ldlt().solve(Eigen::Matrix<double, 6, 6>::Identity()) *
-      std::pow(std::max(error_px, 0.1), 2);
-  const Pose pose = pose_of(r, t);
-  const Eigen::Vector2d here = angles_of(pose);
-  double worst = 0;
-  for (int angle = 0; angle < 2; ++angle) {
-    Pose gradient;
-    for (int i = 0; i < 6; ++i) {
-      const double step = 1e-6 * std::max(1.0, std::abs(pose[i]));
-      Pose moved = pose;
-      moved[i] += step;
-      gradient[i] = angle_difference_deg(angles_of(moved)[angle], here[angle]) / step;
-    }
-    worst = std::max(worst, gradient.dot(covariance * gradient));
-  }
-  return std::sqrt(worst);
+OrbitPosition position_of(const Eigen::Vector2d& angles) {
+  return {angles[0] < 0 ? angles[0] + 360 : angles[0], angles[1], 0, 0};
 }
 
 }  // namespace
@@ -191,7 +124,7 @@ Status MatFinderOptions::validate() const {
 }
 
 MatFinder::MatFinder(const MatDesign& design, MatFinderOptions options)
-    : design_(design), options_(options) {}
+    : design_(design), options_(options), scene_(design.size_m) {}
 
 void MatFinder::set_focal_px(Modality modality, double focal_px) {
   known_focal_px_[modality] = focal_px;
@@ -202,6 +135,20 @@ std::optional<double> MatFinder::focal_px(Modality modality) const {
     return known->second;
   const auto estimate = estimates_.find(modality);
   return estimate == estimates_.end() ? std::nullopt : estimate->second.focal_px();
+}
+
+std::optional<MatSighting> MatFinder::place_by_scene(const cv::Mat& gray, Modality modality) {
+  const std::optional<double> focal = focal_px(modality);
+  if (modality != Modality::visible || !focal) return std::nullopt;
+  const auto seen = scene_.follow(gray, *focal);
+  if (!seen) return std::nullopt;
+  MatSighting sighting;
+  sighting.cam_from_mat = seen->cam_from_mat;
+  sighting.position = position_of(angles_of(seen->cam_from_mat));
+  sighting.position.sigma_deg = seen->sigma_deg;
+  sighting.error_px = seen->error_px;
+  sighting.followed = true;
+  return sighting;
 }
 
 std::optional<MatSighting> MatFinder::find(const cv::Mat& image, Modality modality) {
@@ -216,6 +163,8 @@ std::optional<MatSighting> MatFinder::find(const cv::Mat& image, Modality modali
   const bool followed = !h;
   if (h) {
     tracker.remember(gray, corners);
+  } else if (std::optional<MatSighting> placed = place_by_scene(gray, modality)) {
+    return placed;
   } else if (std::optional<Corners> moved = tracker.follow(gray)) {
     corners = *std::move(moved);
     h = agree_on_plane(corners, max_error_px, min_corners);
@@ -242,21 +191,21 @@ std::optional<MatSighting> MatFinder::find(const cv::Mat& image, Modality modali
                          translations[i]);
     // The mat is printed on one side: a camera below it is the mirrored solution.
     if (angles_of(pose_of(rotations[i], translations[i]))[1] <= 0) continue;
-    ranked.emplace_back(rms(corners, k, rotations[i], translations[i]), i);
+    ranked.emplace_back(reprojection_rms_px(corners, k, rotations[i], translations[i]), i);
   }
   if (ranked.empty()) return std::nullopt;
   std::sort(ranked.begin(), ranked.end());
   const std::size_t best = ranked[0].second;
-  const Pose pose = pose_of(rotations[best], translations[best]);
+  const PoseVector pose = pose_of(rotations[best], translations[best]);
   if (!pose.allFinite()) return std::nullopt;
   MatSighting sighting;
   sighting.cam_from_mat = rigid_of(pose);
   sighting.tags = static_cast<int>(corners.image.size() / 4);
   sighting.error_px = ranked[0].first;
   const Eigen::Vector2d angles = angles_of(pose);
-  sighting.position = {angles[0] < 0 ? angles[0] + 360 : angles[0], angles[1], 0, 0};
+  sighting.position = position_of(angles);
   sighting.position.sigma_deg =
-      sigma_deg(corners, k, rotations[best], translations[best], sighting.error_px);
+      direction_sigma_deg(corners, k, rotations[best], translations[best], sighting.error_px);
   if (ranked.size() > 1 && ranked[1].first < 1.5 * ranked[0].first) {
     const Eigen::Vector2d other =
         angles_of(pose_of(rotations[ranked[1].second], translations[ranked[1].second]));
@@ -264,7 +213,11 @@ std::optional<MatSighting> MatFinder::find(const cv::Mat& image, Modality modali
         std::hypot(angle_difference_deg(other[0], angles[0]), other[1] - angles[1]) / 2;
   }
   sighting.followed = followed;
-  if (followed) sighting.position.sigma_deg += followed_sigma_deg;
+  if (followed) {
+    sighting.position.sigma_deg += followed_sigma_deg;
+  } else if (modality == Modality::visible) {
+    scene_.remember(gray, *focal, sighting.cam_from_mat, sighting.position.sigma_deg);
+  }
   return sighting;
 }
 

@@ -9,6 +9,7 @@
 #include "capture/mat/focal_estimate.hpp"
 #include "capture/mat/mat_design.hpp"
 #include "capture/mat/mat_tracker.hpp"
+#include "capture/mat/scene_odometry.hpp"
 #include "core/transform.hpp"
 
 namespace orbitfuse {
@@ -25,7 +26,7 @@ struct MatSighting {
   OrbitPosition position;  ///< sigma from the fit; the speed is the caller's
   Rigid3d cam_from_mat;
   int tags = 0;
-  bool followed = false;         ///< by optical flow, not read: sigma is beyond what counts
+  bool followed = false;  ///< not read: by optical flow of the mat, or by odometry on the scene
   double error_px = 0;  ///< root mean square, at the image's own size
 };
 
@@ -34,7 +35,8 @@ struct MatSighting {
 /// that of the plane with the least reprojection error (IPPE, Collins and Bartoli, IJCV 2014, then
 /// Levenberg-Marquardt); where the mirrored pose fits nearly as well the sigma says so. The camera
 /// is a pinhole with its principal point in the middle; its focal length is given or is learnt from
-/// the sightings.
+/// the sightings. Visible images without a readable mat are placed by SceneOdometry, with its growing
+/// sigma; else the mat's corners are followed (MatTracker), with one beyond what counts.
 class MatFinder {
  public:
   explicit MatFinder(const MatDesign& design, MatFinderOptions options = {});
@@ -48,11 +50,13 @@ class MatFinder {
   std::optional<MatSighting> find(const cv::Mat& image, Modality modality);
 
  private:
+  std::optional<MatSighting> place_by_scene(const cv::Mat& gray, Modality modality);
   MatDesign design_;
   MatFinderOptions options_;
   std::map<Modality, double> known_focal_px_;
   std::map<Modality, FocalEstimate> estimates_;
   std::map<Modality, MatTracker> trackers_;
+  SceneOdometry scene_;  ///< of visible images
 };
 
 }  // namespace orbitfuse

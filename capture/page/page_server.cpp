@@ -20,6 +20,7 @@
 #endif
 
 #include "capture/page/preview.hpp"
+#include "capture/page/reachable.hpp"
 
 namespace orbitfuse {
 namespace embedded {
@@ -239,11 +240,16 @@ void PageServer::stop() {
 int PageServer::port() const { return impl_->port; }
 const std::string& PageServer::token() const { return impl_->options.token; }
 
-std::string PageServer::url() const {
-  const std::string& host = impl_->options.host;
-  return fmt::format("http://{}:{}/{}",
-                     host.find(':') == std::string::npos ? host : "[" + host + "]", impl_->port,
-                     impl_->needs_token ? "?token=" + impl_->options.token : "");
+std::string PageServer::url() const { return urls().front(); }
+
+std::vector<std::string> PageServer::urls() const {
+  std::vector<std::string> list;
+  for (const std::string& host : reachable_hosts(impl_->options.host)) {
+    list.push_back(fmt::format("http://{}:{}/{}",
+                               host.find(':') == std::string::npos ? host : "[" + host + "]", impl_->port,
+                               impl_->needs_token ? "?token=" + impl_->options.token : ""));
+  }
+  return list;
 }
 
 }  // namespace orbitfuse

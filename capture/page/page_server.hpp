@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "capture/live/live_state.hpp"
 
@@ -42,8 +43,10 @@ class PageServer {
   Status start();
   void stop();
   int port() const;
-  /// What to open, the token included where one is needed.
+  /// What to open, the token included where one is needed: the first of urls().
   std::string url() const;
+  /// For a wildcard address one for each of the machine's own, the loopback's last.
+  std::vector<std::string> urls() const;
   const std::string& token() const;
 
  private:

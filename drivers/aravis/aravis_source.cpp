@@ -45,6 +45,13 @@ std::optional<Format> format_of(ArvPixelFormat format) {
   }
 }
 
+/// Packets and their resending don't wait for a busy machine, where the system allows that
+/// (RLIMIT_RTPRIO or RLIMIT_NICE); without the right it is as before.
+void prefer_receiving(void* /*data*/, ArvStreamCallbackType type, ArvBuffer* /*buffer*/) {
+  if (type != ARV_STREAM_CALLBACK_TYPE_INIT) return;
+  if (!arv_make_thread_realtime(10)) arv_make_thread_high_priority(-10);
+}
+
 }  // namespace
 
 /// The Aravis objects of one connection; destroying them may block for seconds.
@@ -132,7 +139,7 @@ Status AravisSource::open() {
     if (link->payload < static_cast<std::size_t>(link->width) * static_cast<std::size_t>(link->height) * static_cast<std::size_t>(format->bytes)) {
       return fail(ErrorKind::device, where, "its payload is smaller than its image", "power-cycle the camera");
     }
-    link->stream = arv_camera_create_stream(link->camera, nullptr, nullptr, &error);
+    link->stream = arv_camera_create_stream(link->camera, prefer_receiving, nullptr, &error);
     if (!link->stream) return fail(ErrorKind::device, where, take(error), "check the network (orbitfuse doctor)");
     // Aravis gives a frame 200 ms for its resent packets; a loaded host needs longer now and then.
     if (ARV_IS_GV_STREAM(link->stream)) g_object_set(link->stream, "frame-retention", 300'000u, nullptr);

@@ -73,6 +73,18 @@ Status WatchSource::start() {
   return reader_->watch.open(options_.existing);
 }
 
+void WatchSource::resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames) {
+  const std::lock_guard lock(mutex_);
+  const std::string id = info_.id;
+  info_ = device;
+  info_.id = id;
+  resumed_ = !device.model.empty() || !device.serial.empty();
+  for (const FrameRecord& frame : frames) {
+    seen_hashes_.insert(frame.content_hash);
+    seen_files_.insert({frame.source, frame.host_time_ns});  // thermal images are stored decoded
+  }
+}
+
 void WatchSource::stop() { reader_->watch.close(); }
 
 Delivery WatchSource::event(std::string kind, std::string detail) const {
@@ -145,9 +157,21 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
     return event("duplicate", name + ": the same image came before");
   }
   delivery.frame = std::move(still->frame);
+  if (delivery.frame.host_time_ns == 0) delivery.frame.host_time_ns = written_ns(attempt.file);
+  delivery.frame.source =
+      (attempt.file.parent_path().filename() / attempt.file.filename()).string();
+  if (seen_files_.contains({delivery.frame.source, delivery.frame.host_time_ns})) {
+    return event("duplicate", name + ": in the session already");
+  }
   delivery.frame.id = next_id_++;
   {
     const std::lock_guard lock(mutex_);
+    if (resumed_ && (still->camera.model != info_.model || still->camera.serial != info_.serial)) {
+      delivery.kind = Delivery::Kind::rejected;
+      delivery.reason = name + ": of " + still->camera.model + " " + still->camera.serial + ", the session's are of " +
+                        info_.model + " " + info_.serial;
+      return delivery;
+    }
     if (camera_key_.empty()) {
       camera_key_ = still->key;
       info_.model = still->camera.model;
@@ -161,10 +185,7 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
       return delivery;
     }
   }
-  if (delivery.frame.host_time_ns == 0) delivery.frame.host_time_ns = written_ns(attempt.file);
   delivery.kind = Delivery::Kind::frame;
-  delivery.frame.source =
-      (attempt.file.parent_path().filename() / attempt.file.filename()).string();
   delivery.frame.flags.push_back("still");
   return delivery;
 }

@@ -104,8 +104,10 @@ Status V4l2Source::open_and_stream() {
     if (ioctl(VIDIOC_STREAMON, &type) < 0) return device_error(node_.path, "streaming did not start", errno);
     return {};
   };
+  const std::size_t told = pending_.size();
   if (Status status = prepare(); !status) {
     close_device();
+    pending_.resize(told);  // what an attempt that failed had to tell comes again with the next
     return status;
   }
   last_frame_ = Clock::now();
@@ -194,9 +196,13 @@ Status V4l2Source::apply_controls() {
     v4l2_control value{lock.value_control, 0};
     if (lock.value) {
       value.value = *lock.value;
+    } else if (const auto kept = locked_.find(lock.value_control); kept != locked_.end()) {
+      value.value = kept->second;
     } else if (ioctl(VIDIOC_G_CTRL, &value) < 0) {
       continue;  // the camera has no such control: nothing can drift
     }
+    // A camera that was switched off comes back with other values: the first ones hold.
+    locked_[lock.value_control] = value.value;
     v4l2_control automatic{lock.automatic, lock.manual};
     ioctl(VIDIOC_S_CTRL, &automatic);  // some cameras have only the value; the check below decides
     v4l2_control check = value;
@@ -252,6 +258,7 @@ void V4l2Source::stop() {
 Delivery V4l2Source::lose(const std::string& event, const std::string& why) {
   close_device();
   away_ = true;
+  rhythm_.interrupt();
   lost_at_ = last_frame_;
   last_attempt_ = {};
   Delivery delivery;
@@ -277,7 +284,7 @@ std::optional<Delivery> V4l2Source::try_reopen() {
   away_ = false;
   const double outage_s = std::chrono::duration<double>(Clock::now() - lost_at_).count();
   // Ids leave room for what the outage cost, so that it counts as lost.
-  const auto cost = interval_s_ > 0 ? static_cast<std::uint64_t>(std::llround(outage_s / interval_s_)) : 1;
+  const std::uint64_t cost = rhythm_.frames_in(outage_s);
   base_id_ += cost;
   Delivery delivery;
   delivery.kind = Delivery::Kind::event;
@@ -317,8 +324,11 @@ Result<Delivery> V4l2Source::dequeue() {
     return lose("disconnected", std::strerror(errno));  // ENODEV: unplugged; EIO: the stream broke
   }
   if (buffer.index >= buffers_.size()) return lose("disconnected", "the driver answers nonsense");
-  const double interval_s = std::chrono::duration<double>(Clock::now() - last_frame_).count();
-  if (next_id_ > 0 && interval_s < 1) interval_s_ = interval_s_ > 0 ? 0.9 * interval_s_ + 0.1 * interval_s : interval_s;
+  // When a transfer fails uvcvideo hands every buffer back empty, with the number of an old frame.
+  const bool old = last_sequence_ && static_cast<std::int32_t>(buffer.sequence - *last_sequence_) <= 0;
+  if ((buffer.flags & V4L2_BUF_FLAG_ERROR) && buffer.bytesused == 0 && (old || !last_sequence_)) {
+    return lose("disconnected", "a transfer failed: the driver gave its buffers back empty");
+  }
   last_frame_ = Clock::now();
   stalls_in_a_row_ = 0;
   const std::uint64_t id = unwrap(buffer.sequence);
@@ -332,8 +342,24 @@ Result<Delivery> V4l2Source::dequeue() {
       (buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
   // The kernel's stamp leaves out our own scheduling delay.
   if (monotonic && stamp_ns > 0) delivery.frame.host_time_ns -= now_ns(CLOCK_MONOTONIC) - stamp_ns;
+  watch_rhythm(id, stamp_ns);
   if (ioctl(VIDIOC_QBUF, &buffer) < 0) pending_.push_back(lose("disconnected", std::strerror(errno)));
   return delivery;
+}
+
+void V4l2Source::watch_rhythm(std::uint64_t id, std::int64_t stamp_ns) {
+  const int missing = rhythm_.note(id, stamp_ns > 0 ? stamp_ns : now_ns(CLOCK_MONOTONIC));
+  if (missing == 0) return;
+  late_frames_ += missing;
+  // A camera of unsteady rate (phones) would fill the manifest.
+  if (Clock::now() - last_late_event_ < std::chrono::seconds(10)) return;
+  last_late_event_ = Clock::now();
+  Delivery event;
+  event.kind = Delivery::Kind::event;
+  event.reason = "late-frame";
+  event.detail = fmt::format("frame {} is late by {} though none is missing in the driver's count; {} so far: "
+                             "lost whole on USB, or the camera slowed down", id, missing, late_frames_);
+  pending_.push_back(std::move(event));
 }
 
 Delivery V4l2Source::delivery_of(std::uint32_t index, std::uint32_t bytes, std::uint32_t flags) {

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,6 +12,7 @@
 
 #include "capture/frame_source.hpp"
 #include "capture/raw_counts.hpp"
+#include "drivers/v4l2/frame_rhythm.hpp"
 #include "drivers/v4l2/identity.hpp"
 #include "drivers/v4l2/pixels.hpp"
 #include "drivers/v4l2/video_system.hpp"
@@ -43,6 +45,7 @@ struct V4l2Options {
 /// camera is unplugged or stalls, everything is closed, and it is looked for under its lasting
 /// name (serial, else USB port) until it is back: events "disconnected", "stalled",
 /// "reconnected" tell, settings are pushed again and verified ("setting-lost" when one is not).
+/// "late-frame" tells of a pause without a gap in the driver's count (FrameRhythm).
 class V4l2Source final : public FrameSource {
  public:
   V4l2Source(V4l2Options options, std::shared_ptr<VideoSystem> system = make_video_system());
@@ -71,6 +74,7 @@ class V4l2Source final : public FrameSource {
   std::optional<Delivery> try_reopen();
   Result<Delivery> dequeue();
   Delivery delivery_of(std::uint32_t index, std::uint32_t bytes, std::uint32_t flags);
+  void watch_rhythm(std::uint64_t id, std::int64_t stamp_ns);
   std::uint64_t unwrap(std::uint32_t sequence);
   int ioctl(unsigned long request, void* argument);
 
@@ -87,7 +91,10 @@ class V4l2Source final : public FrameSource {
   Clock::time_point last_frame_{}, last_attempt_{}, lost_at_{};
   std::uint64_t next_id_ = 0, base_id_ = 0;
   int stalls_in_a_row_ = 0;
-  double interval_s_ = 0;               ///< between frames, smoothed; tells how many an outage cost
+  std::map<std::uint32_t, int> locked_; ///< controls and the values they were locked at
+  FrameRhythm rhythm_;
+  int late_frames_ = 0;
+  Clock::time_point last_late_event_{};
   std::optional<std::uint32_t> last_sequence_;
 };
 

@@ -92,7 +92,6 @@ using SceneRenderer = std::function<Result<SceneView>(const Camera&, const Rigid
 /// The visible world that thermal views are localised in; images come from the session's paths.
 struct VisibleScene {
   Reconstruction reconstruction;
-  std::vector<DepthMap> depth;  ///< dense geometry of its views; may be empty (less accurate)
   SceneRenderer renderer;       ///< of its trained field; may be empty (less accurate)
 };
 

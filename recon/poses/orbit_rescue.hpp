@@ -17,15 +17,21 @@ struct OrbitViews {
   bool clockwise = false;
 };
 
-/// The camera turned about the orbit's axis, degrees counter-clockwise seen from above.
-Rigid3d turned(const Rigid3d& cam_from_world, const Similarity3d& canonical_from_world, double degrees);
-
-/// Views whose agreement reaches a share of what the better quarter reaches, with enough matches.
-std::vector<bool> supported_views(const RenderAlignment& alignment);
-
-/// Starts every unsupported view again from its neighbours' poses, turned to its station, and keeps
-/// what agrees better; repeated while that helps. Errors: the renderer's, cancelled.
-Status rescue_views(const SceneRenderer& renderer, const OrbitViews& orbit, RenderAlignment& alignment,
+/// From views aligned to a degree or so to the end. Every view must come back to its place from
+/// where its loop, judged by the better half of its views, predicts it; one that doesn't is
+/// searched as a whole (whole_view.hpp), and what is supported better is kept. Then all views
+/// together. The lens' focal length changes in every view of `alignment`. Errors: the renderer's,
+/// cancelled.
+Status refine_orbit(const SceneRenderer& renderer, const OrbitViews& orbit,
+                    RenderAlignment& alignment, double focal_relative_sigma,
                     const Progress& progress);
+
+/// Azimuth less nominal azimuth of the orbit's stations, by its better supported views.
+double station_offset_deg(const OrbitViews& orbit, const RenderAlignment& alignment);
+
+/// The views of `orbit` from index `first_new` on, which have a station but no pose yet, posed
+/// among the others, which stay as they are; the lens is theirs. Errors as above.
+Status add_views(const SceneRenderer& renderer, const OrbitViews& orbit, std::size_t first_new,
+                 RenderAlignment& alignment, const Progress& progress);
 
 }  // namespace orbitfuse

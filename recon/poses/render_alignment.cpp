@@ -52,20 +52,22 @@ struct ViewMatches {
 using Correction = std::array<double, 6>;
 
 /// All corrections and the common focal, the robust scale lowered step by step.
-double solve(const std::vector<ViewMatches>& views, const Camera& camera, double prior_offset, double sigma,
-             std::vector<Correction>& corrections) {
+double solve(const std::vector<ViewMatches>& views, const Camera& camera, double prior_offset,
+             double sigma, std::vector<Correction>& corrections) {
   double log_focal = 0;
   for (const double scale_px : {8.0, 4.0, 2.0, 1.0}) {
     ceres::Problem problem;
     for (std::size_t i = 0; i < views.size(); ++i)
       for (const PatchMatch& match : views[i].matches)
-        problem.AddResidualBlock(
-            new ceres::AutoDiffCostFunction<PatchResidual, 2, 6, 1>(new PatchResidual{match, camera}),
-            new ceres::ScaledLoss(new ceres::CauchyLoss(scale_px), match.score, ceres::TAKE_OWNERSHIP),
-            corrections[i].data(), &log_focal);
+        problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PatchResidual, 2, 6, 1>(
+                                     new PatchResidual{match, camera}),
+                                 new ceres::ScaledLoss(new ceres::CauchyLoss(scale_px), match.score,
+                                                       ceres::TAKE_OWNERSHIP),
+                                 corrections[i].data(), &log_focal);
     if (problem.NumResidualBlocks() == 0) return 0;
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<FocalPrior, 1, 1>(new FocalPrior{prior_offset, sigma}),
-                             nullptr, &log_focal);
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<FocalPrior, 1, 1>(new FocalPrior{prior_offset, sigma}),
+        nullptr, &log_focal);
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::SPARSE_SCHUR;
     options.max_num_iterations = 25;
@@ -80,8 +82,9 @@ double solve(const std::vector<ViewMatches>& views, const Camera& camera, double
 Rigid3d rigid_of(const Correction& c) {
   const Eigen::Vector3d axis(c[0], c[1], c[2]);
   const double angle = axis.norm();
-  const Eigen::Quaterniond q =
-      angle > 0 ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis / angle)) : Eigen::Quaterniond::Identity();
+  const Eigen::Quaterniond q = angle > 0
+                                   ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis / angle))
+                                   : Eigen::Quaterniond::Identity();
   return {q, {c[3], c[4], c[5]}};
 }
 
@@ -92,8 +95,8 @@ cv::Mat reduced(const cv::Mat& image, const Camera& camera) {
 }
 
 /// Residuals of the matches after the correction, and how many are small.
-void judge(const ViewMatches& matched, const Correction& correction, double log_focal, const Camera& camera,
-           RenderAlignedView& view) {
+void judge(const ViewMatches& matched, const Correction& correction, double log_focal,
+           const Camera& camera, RenderAlignedView& view) {
   std::vector<double> distances;
   for (const PatchMatch& match : matched.matches) {
     double r[2];
@@ -114,9 +117,11 @@ double RenderAlignment::mean_agreement() const {
   return views.empty() ? 0 : sum / static_cast<double>(views.size());
 }
 
-Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer, const std::vector<cv::Mat>& images,
+Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer,
+                                           const std::vector<cv::Mat>& images,
                                            const std::vector<PosedView>& views,
-                                           const RenderAlignmentOptions& options, const Progress& progress) {
+                                           const RenderAlignmentOptions& options,
+                                           const Progress& progress) {
   RenderAlignment result;
   for (const PosedView& view : views) result.views.push_back({view, 0, 0, 0});
   if (views.empty()) return result;
@@ -144,7 +149,8 @@ Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer, const 
       result.views[i].agreement = edge_agreement(edges, field);
     });
     std::vector<Correction> corrections(views.size(), Correction{});
-    const double log_focal = solve(matched, seen_by, std::log(prior_focal / focal), options.focal_relative_sigma, corrections);
+    const double log_focal = solve(matched, seen_by, std::log(prior_focal / focal),
+                                   options.focal_relative_sigma, corrections);
     focal *= std::exp(log_focal);
     for (std::size_t i = 0; i < views.size(); ++i) {
       RenderAlignedView& view = result.views[i];

@@ -26,7 +26,7 @@ struct RenderRound {
 inline std::vector<RenderRound> coarse_rounds() {
   return {{160, 30, 14, 22}, {160, 12, 10, 16}, {160, 6, 7, 10}};
 }
-inline std::vector<RenderRound> fine_rounds() { return {{160, 6, 7, 10}, {256, 5, 6, 10}, {320, 3, 4, 10}}; }
+inline std::vector<RenderRound> fine_rounds() { return {{320, 6, 7, 12}, {320, 4, 6, 10}}; }
 
 struct RenderAlignmentOptions {
   std::vector<RenderRound> rounds = coarse_rounds();
@@ -36,9 +36,13 @@ struct RenderAlignmentOptions {
 
 struct RenderAlignedView {
   PosedView view;
-  double agreement = 0;    ///< mean agreement of rendered edges with the image's, after the last round
-  int matches = 0;         ///< patches within 2 px of the bundle's answer
-  double median_px = 0;    ///< their residual, in pixels of the last round
+  double agreement =
+      0;            ///< mean agreement of rendered edges with the image's, after the last round
+  int matches = 0;  ///< patches within 2 px of the bundle's answer
+  double median_px = 0;  ///< their residual, in pixels of the last round
+  /// Compares places of one view. Agreement alone favours a place with few edges, the number of
+  /// patches alone one with many.
+  double support() const { return agreement * matches; }
 };
 
 struct RenderAlignment {
@@ -48,8 +52,10 @@ struct RenderAlignment {
 };
 
 /// Refines `views` (images: CV_32FC1 of the cameras' size). Errors: the renderer's, cancelled.
-Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer, const std::vector<cv::Mat>& images,
+Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer,
+                                           const std::vector<cv::Mat>& images,
                                            const std::vector<PosedView>& views,
-                                           const RenderAlignmentOptions& options, const Progress& progress);
+                                           const RenderAlignmentOptions& options,
+                                           const Progress& progress);
 
 }  // namespace orbitfuse

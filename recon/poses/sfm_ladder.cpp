@@ -177,6 +177,15 @@ bool passes_gates(ModalityPoses& poses, const Session& session, const PoseOption
                        fit.mirrored ? " (which run the other way round)" : "");
     good = good && residual <= options.max_station_residual && outliers <= 0.15;
   }
+  const CaptureOrder order = capture_order(poses.reconstruction.views, session);
+  if (order.steps >= 8) {
+    poses.gates["order_leaps"] = order.leaps;
+    poses.gates["order_reversals"] = order.reversals;
+    if (order.contradicted())
+      why += fmt::format(", and leaps {} times or turns back {} times in {} steps of the recording",
+                         order.leaps, order.reversals, order.steps);
+    good = good && !order.contradicted();
+  }
   return good;
 }
 

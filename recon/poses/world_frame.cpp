@@ -19,6 +19,9 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+/// Of a station's azimuth, where its origin alone is unknown.
+constexpr double nominal_sigma_deg = 8;
+
 double wrapped_deg(double angle) { return std::remainder(angle, 360.0); }
 
 Eigen::Vector3d axis_in_world(const PosedView& view, const Eigen::Vector3d& axis_in_cam) {
@@ -39,8 +42,7 @@ double robust_offset_deg(const std::vector<double>& differences) {
 }  // namespace
 
 Eigen::Vector3d look_at_point(const std::vector<PosedView>& views) {
-  Eigen::Vector3d point =
-      Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  Eigen::Vector3d point = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   std::vector<double> weight(views.size(), 1.0);
   for (int pass = 0; pass < 10; ++pass) {
     Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
@@ -121,7 +123,8 @@ Similarity3d canonical_from_world(const std::vector<PosedView>& views,
 }
 
 void move_world(Reconstruction& model, const Similarity3d& new_from_old) {
-  for (PosedView& view : model.views) view.cam_from_world = rebase(view.cam_from_world, new_from_old);
+  for (PosedView& view : model.views)
+    view.cam_from_world = rebase(view.cam_from_world, new_from_old);
   for (SparsePoint& point : model.points) point.position = new_from_old * point.position;
 }
 
@@ -135,7 +138,9 @@ StationFit fit_stations(const std::vector<PosedView>& views, const Session& sess
     if (found == by_name.end() || !found->second->station) continue;
     azimuth.push_back(orbit_angles(canonical * camera_center(view.cam_from_world)).azimuth_deg);
     station.push_back(found->second->station->azimuth_deg);
-    sigma.push_back(found->second->station->azimuth_sigma_deg);
+    // From 90 deg on only the origin is unknown (core/session.hpp); it is fitted here.
+    const double declared = found->second->station->azimuth_sigma_deg;
+    sigma.push_back(declared < 90 ? declared : nominal_sigma_deg);
   }
   StationFit best;
   if (azimuth.size() < 3) return best;
@@ -157,6 +162,48 @@ StationFit fit_stations(const std::vector<PosedView>& views, const Session& sess
     if (fit.median_residual_deg < best.median_residual_deg) best = fit;
   }
   return best;
+}
+
+CaptureOrder capture_order(const std::vector<PosedView>& views, const Session& session) {
+  std::map<std::string, OrbitAngles> posed;
+  const Similarity3d canonical = canonical_from_world(views, {});
+  for (const PosedView& view : views)
+    posed[view.name] = orbit_angles(canonical * camera_center(view.cam_from_world));
+  std::map<std::string, std::vector<const FrameRecord*>> streams;
+  for (const FrameRecord& frame : session.frames)
+    if ((frame.station || frame.tracking) && posed.contains(frame.file))
+      // Imported stations and tracking frames are streams of their own.
+      streams[frame.device + (frame.tracking ? " tracking" : "")].push_back(&frame);
+  struct Step {
+    double azimuth_deg, frames;
+    bool same_loop;
+  };
+  std::vector<Step> steps;
+  for (auto& [device, frames] : streams) {
+    std::stable_sort(frames.begin(), frames.end(), [](const FrameRecord* a, const FrameRecord* b) {
+      return a->sequence < b->sequence;
+    });
+    for (std::size_t i = 1; i < frames.size(); ++i) {
+      const OrbitAngles &from = posed[frames[i - 1]->file], &to = posed[frames[i]->file];
+      steps.push_back(
+          {wrapped_deg(to.azimuth_deg - from.azimuth_deg),
+           std::max(1.0, static_cast<double>(frames[i]->sequence - frames[i - 1]->sequence)),
+           std::abs(to.elevation_deg - from.elevation_deg) < 8});
+    }
+  }
+  CaptureOrder order;
+  order.steps = static_cast<int>(steps.size());
+  std::vector<double> rates;
+  for (const Step& s : steps) rates.push_back(s.azimuth_deg / s.frames);
+  if (rates.empty()) return order;
+  const double usual = median(rates);
+  for (const Step& s : steps) {
+    if (!s.same_loop) continue;
+    const double expected = usual * s.frames;  // beyond a sixth of the orbit a guess
+    order.leaps += std::abs(expected) < 60 && std::abs(wrapped_deg(s.azimuth_deg - expected)) > 60;
+    order.reversals += (usual >= 0 ? s.azimuth_deg : -s.azimuth_deg) < -5;
+  }
+  return order;
 }
 
 }  // namespace orbitfuse

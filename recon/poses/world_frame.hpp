@@ -36,14 +36,26 @@ OrbitAngles orbit_angles(const Eigen::Vector3d& center);
 /// How well posed views agree with their stations, after the best offset in azimuth.
 struct StationFit {
   int views = 0;
-  bool mirrored = false;          ///< the stations run clockwise against the poses
-  double offset_deg = 0;          ///< azimuth = +-station + offset
+  bool mirrored = false;  ///< the stations run clockwise against the poses
+  double offset_deg = 0;  ///< azimuth = +-station + offset
   double median_residual_deg = 0;
   double worst_residual_deg = 0;
-  int outliers = 0;               ///< residual above 20 deg + 3 sigma
+  int outliers = 0;  ///< residual above 20 deg + 3 sigma
 };
 /// nullopt-like: views = 0 when fewer than three views have stations. Azimuths are the views' in
 /// their own canonical frame, so nothing of the world has to be right.
 StationFit fit_stations(const std::vector<PosedView>& views, const Session& session);
+
+/// How the posed views follow each other in the order they were recorded in. A camera carried round
+/// neither leaps across its orbit between two frames nor turns back all the time; a model that
+/// merged front and back of a near-symmetric object has it do so.
+struct CaptureOrder {
+  int steps = 0;      ///< between successive posed frames of one stream
+  int leaps = 0;      ///< more than 60 deg off the usual step, without a change of loop
+  int reversals = 0;  ///< more than 5 deg against the usual direction
+  bool contradicted() const { return leaps > steps / 50 || 4 * reversals > steps; }
+};
+/// Only stations and tracking frames have an order that means something; steps = 0 for others.
+CaptureOrder capture_order(const std::vector<PosedView>& views, const Session& session);
 
 }  // namespace orbitfuse

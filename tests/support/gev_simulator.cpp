@@ -350,10 +350,12 @@ void GevSimulator::stream_loop() {
         std::swap(frame.packets[i], frame.packets[i + 1]);
       }
     }
+    const std::uint64_t dropped_before = packets_dropped_;
     for (std::size_t i = 0; i < frame.packets.size(); ++i) {
       std::lock_guard lock(mutex_);
       send_packet(frame.packets[i]);
     }
+    frames_damaged_ += packets_dropped_ != dropped_before;
     ++number_;
     ++frames_sent_;
     id = id == 65535 ? std::uint16_t{1} : static_cast<std::uint16_t>(id + 1);

@@ -55,6 +55,8 @@ class GevSimulator {
   void step_clock(double seconds);
 
   std::uint64_t frames_sent() const { return frames_sent_; }
+  /// Frames of which a packet was dropped when it was first sent.
+  std::uint64_t frames_damaged() const { return frames_damaged_; }
   std::uint64_t packets_dropped() const { return packets_dropped_; }
   std::uint64_t resends_answered() const { return resends_; }
   int nuc_count() const { return nuc_count_; }
@@ -91,7 +93,7 @@ class GevSimulator {
   std::map<std::uint16_t, SentFrame> history_;
   std::vector<std::uint16_t> history_order_;
   std::atomic<bool> running_{false}, acquiring_{false};
-  std::atomic<std::uint64_t> frames_sent_{0}, packets_dropped_{0}, resends_{0};
+  std::atomic<std::uint64_t> frames_sent_{0}, frames_damaged_{0}, packets_dropped_{0}, resends_{0};
   std::atomic<int> nuc_count_{0};
   std::uint64_t number_ = 0;
   std::uint32_t random_ = 12345;

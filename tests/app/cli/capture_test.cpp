@@ -127,6 +127,7 @@ TEST(Capture, MistakesHaveARemedyAndLeaveNothing) {
       {{"--thermal", "aravis,profile=nonsense"}, 2, "flir-ax5"},
       {{"--driver", "replay:/nowhere"}, 3, "no such folder"},
       {{"--driver", tiny, "--spacing-deg", "31"}, 2, "guide.spacing_deg"},
+      {{"--driver", tiny, "--turntable", "500"}, 2, "guide.turntable_step_deg"},
   };
   for (const Case& c : cases) {
     std::vector<std::string> arguments = {"capture", session};

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "app/recording/rehearsal.hpp"
+#include "core/image_codec.hpp"
+#include "drivers/stills/watch_source.hpp"
 #include "tests/capture/scripted_source.hpp"
 #include "tests/core/temp_folder.hpp"
 
@@ -46,6 +48,40 @@ TEST(Recording, ResumeGoesOnWithTheIdsOfTheSameCamera) {
   EXPECT_EQ(session->streams[1].first_sequence, 12u);
   for (const StreamRecord& s : session->streams)
     EXPECT_EQ(s.received + s.lost, s.last_sequence - s.first_sequence + 1);
+}
+
+TEST(Recording, ResumedPhotosAreOneDeviceAndComeOnce) {
+  const test::TempFolder folder;
+  const auto put_photo = [&](int number) {
+    cv::Mat image(30, 40, CV_8UC3);
+    cv::RNG random(static_cast<std::uint64_t>(number));
+    random.fill(image, cv::RNG::UNIFORM, 0, 255);
+    test::put(folder / ("photos/IMG_" + std::to_string(number) + ".jpg"), *encode_jpeg(image, 90));
+  };
+  RecordingOptions options;
+  options.session = folder / "s";
+  options.live = true;
+  options.seconds = 1.5;
+  const auto watch = [&] {
+    WatchOptions stills;
+    stills.folder = folder / "photos";
+    stills.existing = true;
+    stills.settle = std::chrono::milliseconds(50);
+    std::vector<std::unique_ptr<FrameSource>> sources;
+    sources.push_back(std::make_unique<WatchSource>(stills));
+    return record(std::move(sources), options);
+  };
+  put_photo(1);
+  put_photo(2);
+  ASSERT_TRUE(watch());
+  put_photo(3);
+  options.resume = true;
+  ASSERT_TRUE(watch());
+  const Session session = *open_session(folder / "s");
+  EXPECT_EQ(session.devices.size(), 1u);
+  ASSERT_EQ(session.frames.size(), 3u);
+  EXPECT_EQ(session.frames[2].sequence, 2u);
+  EXPECT_NE(session.frames[2].source.find("IMG_3"), std::string::npos);
 }
 
 TEST(Recording, AnotherCameraGetsItsOwnName) {

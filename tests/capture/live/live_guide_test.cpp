@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <limits>
 #include <thread>
 
 #include "tests/capture/scripted_source.hpp"
@@ -136,7 +137,79 @@ TEST_F(LiveGuideTest, StationsThatFramesCarryCountAtOnce) {
   EXPECT_EQ(guide.done_count(Modality::visible), 1);
 }
 
+TEST_F(LiveGuideTest, TurntableCountsKeysAndTurns) {
+  options.plan.loop_elevations_deg = {20, 50};
+  options.turntable_step_deg = -15;  // every other step is a station
+  LiveGuide guide(*writer, options);
+  const auto at = [&] { return *guide.cameras()[0].position; };
+  double time_s = 0;
+  guide.operator_at_station();
+  guide.add(record(15, ++time_s));
+  EXPECT_NEAR(at().azimuth_deg, 0, 1e-9);
+  EXPECT_EQ(guide.done_count(Modality::visible), 1);
+  guide.operator_at_station();
+  guide.add(record(15, ++time_s));
+  EXPECT_NEAR(at().azimuth_deg, 345, 1e-9);
+  EXPECT_EQ(guide.cameras()[0].refusal, Refusal::between_stations);
+  EXPECT_EQ(guide.done_count(Modality::visible), 1);
+  guide.add(record(15, ++time_s));  // the table hasn't been turned on: nothing new is known
+  EXPECT_EQ(guide.done_count(Modality::visible), 1);
+  for (int step = 2; step < 48; ++step) {
+    guide.operator_at_station();
+    guide.add(record(15, ++time_s));
+  }
+  EXPECT_NEAR(at().elevation_deg, 50, 1e-9);  // the second turn
+  EXPECT_TRUE(guide.complete());
+}
+
+TEST_F(LiveGuideTest, TurntableTriesAgainWhereAFrameWasBlurred) {
+  options.turntable_step_deg = 30;
+  LiveGuide guide(*writer, options);
+  guide.operator_at_station();
+  guide.add(record(15, 0));
+  guide.operator_at_station();
+  guide.add(record(15, 1, true));
+  EXPECT_EQ(guide.cameras()[0].refusal, Refusal::blurred);
+  EXPECT_EQ(guide.done_count(Modality::visible), 1);
+  guide.add(record(15, 2));
+  EXPECT_EQ(guide.done_count(Modality::visible), 2);
+  EXPECT_NEAR(guide.cameras()[0].position->azimuth_deg, 30, 1e-9);
+}
+
+TEST_F(LiveGuideTest, EachPhotoIsAStepOfTheTurntable) {
+  options.turntable_step_deg = 30;
+  {
+    LiveGuide guide(*writer, options);
+    for (int i = 0; i < 12; ++i) {
+      EXPECT_FALSE(guide.complete());
+      FrameRecord photo = record(15, i, i == 4);  // the fifth is blurred
+      photo.flags = {"still"};
+      guide.add(photo);
+    }
+    EXPECT_EQ(guide.done_count(Modality::visible), 11);
+    EXPECT_NEAR(guide.cameras()[0].position->azimuth_deg, 330, 1e-9);
+  }
+  // Another turn after a restart: the photos that were chosen come back with their stations.
+  LiveGuide guide(*writer, options);
+  for (int i = 0; i < 12; ++i) {
+    FrameRecord photo = record(15, 20 + i, i == 4);
+    photo.flags = {"still"};
+    if (i != 4) photo.tracking = false, photo.station = Station{0, i, 30.0 * i, 20, 1, 1};
+    guide.add(photo);
+  }
+  EXPECT_EQ(guide.done_count(Modality::visible), 11);
+  for (int i = 0; i < 5; ++i) {
+    FrameRecord photo = record(15, 40 + i);
+    photo.flags = {"still"};
+    guide.add(photo);
+  }
+  EXPECT_TRUE(guide.complete());
+}
+
 TEST_F(LiveGuideTest, OptionsAreChecked) {
+  options.turntable_step_deg = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(options.validate().error().where, "guide.turntable_step_deg");
+  options.turntable_step_deg = 0;
   options.looks_per_second = 0;
   EXPECT_EQ(options.validate().error().where, "guide.looks_per_second");
   options = {};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "capture/page/page_server.hpp"
+#include "capture/page/reachable.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -85,6 +86,33 @@ TEST_F(PageTest, PageAsksNobodyElse) {
   EXPECT_THAT(page->get_header_value("Content-Security-Policy"), HasSubstr("default-src 'none'"));
   EXPECT_THAT(page->get_header_value("Content-Security-Policy"), HasSubstr("connect-src 'self'"));
   EXPECT_EQ(server->url().find("token"), std::string::npos);
+}
+
+TEST(ReachableHosts, WildcardsBecomeAddressesToType) {
+  EXPECT_EQ(reachable_hosts("192.168.7.9"), std::vector<std::string>{"192.168.7.9"});
+  const std::vector<std::string> v4 = reachable_hosts("0.0.0.0"), v6 = reachable_hosts("::");
+  EXPECT_EQ(v4.back(), "127.0.0.1");
+  EXPECT_EQ(v6.back(), "::1");
+  for (const std::string& host : v4) {
+    EXPECT_NE(host, "0.0.0.0");
+    EXPECT_EQ(host.find(':'), std::string::npos);
+  }
+  for (const std::string& host : v6) EXPECT_FALSE(host.starts_with("fe80:")) << host;
+}
+
+TEST_F(PageTest, EveryAddressOfAWildcardAnswers) {
+  PageOptions options;
+  options.host = "0.0.0.0";
+  options.token = "right-token-1";
+  options.require_token = true;
+  serve(options);
+  for (const std::string& url : server->urls()) {
+    const std::size_t end = url.find('/', 7);
+    httplib::Client browser(url.substr(0, end));
+    const auto answer = browser.Get(url.substr(end));
+    ASSERT_TRUE(answer) << url;
+    EXPECT_EQ(answer->status, 200) << url;
+  }
 }
 
 TEST_F(PageTest, StateIsWhatTheRecorderSays) {

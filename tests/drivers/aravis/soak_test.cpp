@@ -39,5 +39,35 @@ void soak(double loss) {
 TEST(AravisSoak, CleanMinute) { soak(0); }
 TEST(AravisSoak, OnePercentLossWithResend) { soak(0.01); }
 
+/// Nine frames of ten are damaged: each is counted, and every other is stored.
+TEST(AravisSoak, HalfPercentLossWithoutResend) {
+  GevSimulator camera;
+  bool up = false;
+  for (int i = 0; i < 100 && !(up = camera.start()); ++i) usleep(100'000);
+  if (!up) GTEST_SKIP() << "the GVCP port 3956 on loopback is in use";
+  GevFaults faults;
+  faults.packet_loss = 0.005;
+  faults.answer_resend = false;
+  camera.set_faults(faults);
+  AravisOptions options;
+  options.camera = "127.0.0.1";
+  options.profiles = std::string(ORBITFUSE_SOURCE_DIR) + "/config/cameras";
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  const char* wanted = std::getenv("ORBITFUSE_SOAK_S");
+  const auto count = static_cast<std::uint64_t>(30 * (wanted ? std::atof(wanted) : 60.0));
+  const Tally tally = drain(source, std::chrono::seconds(count / 10), [&](const Tally& t) { return t.span() >= count; });
+  const std::uint64_t sent = camera.frames_sent(), whole = sent - camera.frames_damaged();
+  std::printf("span %llu of %llu sent: %llu frames stored of %llu whole ones, %llu rejected, %llu missing\n",
+              static_cast<unsigned long long>(tally.span()), static_cast<unsigned long long>(sent),
+              static_cast<unsigned long long>(tally.frames), static_cast<unsigned long long>(whole),
+              static_cast<unsigned long long>(tally.rejected),
+              static_cast<unsigned long long>(tally.span() - tally.frames - tally.rejected));
+  EXPECT_EQ(tally.wrong_bits + tally.not_rising, 0u);
+  // Frames under way at either end are the difference.
+  EXPECT_NEAR(static_cast<double>(tally.span()), static_cast<double>(sent), 20);
+  EXPECT_NEAR(static_cast<double>(tally.frames), static_cast<double>(whole), 5);
+}
+
 }  // namespace
 }  // namespace orbitfuse::aravis

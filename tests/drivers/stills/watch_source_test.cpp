@@ -76,6 +76,55 @@ TEST_F(WatchTest, NewPhotosComeByteForByteAndOldOnesStay) {
   EXPECT_EQ(soon(source).frame.id, 1u);
 }
 
+TEST_F(WatchTest, ResumedSessionGetsNoPhotoTwice) {
+  options.existing = true;
+  for (int i : {1, 2}) put("IMG_" + std::to_string(i) + ".jpg", photo(i));
+  std::vector<FrameRecord> recorded;
+  {
+    WatchSource source(options);
+    ASSERT_TRUE(source.start());
+    for (int i = 0; i < 2; ++i) {
+      const Delivery delivery = soon(source);
+      FrameRecord record;
+      // The first as it is stored, byte for byte; the second as a thermal one, stored decoded.
+      if (i == 0) record.content_hash = content_hash(delivery.frame.encoded);
+      record.source = delivery.frame.source;
+      record.host_time_ns = delivery.frame.host_time_ns;
+      recorded.push_back(record);
+    }
+  }
+  put("IMG_3.jpg", photo(3));
+  put("IMG_2.jpg.copy.jpg", photo(1));
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  DeviceInfo known;
+  known.id = "visible0";
+  source.resume(known, recorded);
+  int frames = 0, duplicates = 0;
+  for (int i = 0; i < 4; ++i) {
+    const Delivery delivery = soon(source);
+    frames += delivery.kind == Delivery::Kind::frame;
+    duplicates += delivery.reason == "duplicate";
+    if (delivery.kind == Delivery::Kind::frame) EXPECT_EQ(delivery.frame.encoded, photo(3));
+  }
+  EXPECT_EQ(frames, 1);
+  EXPECT_EQ(duplicates, 3);
+}
+
+TEST_F(WatchTest, ResumedSessionTakesNoOtherCamera) {
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  DeviceInfo known;
+  known.model = "Phone 9";
+  source.resume(known, {});
+  EXPECT_EQ(source.describe().model, "Phone 9");
+  EXPECT_EQ(source.describe().id, options.device_id);
+  put("IMG_1.jpg", photo(1));  // says of no camera at all
+  const Delivery delivery = soon(source);
+  EXPECT_EQ(delivery.kind, Delivery::Kind::rejected);
+  EXPECT_THAT(delivery.reason, HasSubstr("Phone 9"));
+}
+
 TEST_F(WatchTest, ExistingPhotosComeInNaturalOrder) {
   for (int i : {10, 9, 1}) put("IMG_" + std::to_string(i) + ".jpg", photo(i));
   options.existing = true;

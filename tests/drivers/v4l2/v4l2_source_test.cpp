@@ -75,6 +75,22 @@ TEST_F(V4l2SourceTest, DamagedFramesAreRejectedNeverStored) {
   EXPECT_EQ(deliver(source).kind, Kind::frame);
 }
 
+TEST_F(V4l2SourceTest, BuffersGivenBackEmptyAreNoFrames) {
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  for (std::uint32_t sequence : {0u, 1u, 2u}) shoot(sequence), deliver(source);
+  shoot(1, V4L2_BUF_FLAG_ERROR, 0);  // an old number: what the buffer held before
+  EXPECT_EQ(deliver(source).reason, "disconnected");
+  EXPECT_EQ(deliver(source).reason, "reconnected");
+  shoot(0, V4L2_BUF_FLAG_ERROR, 0);  // before any frame of the new stream
+  EXPECT_EQ(deliver(source).reason, "disconnected");
+  EXPECT_EQ(deliver(source).reason, "reconnected");
+  shoot(0);
+  shoot(1, V4L2_BUF_FLAG_ERROR, 0);  // a new number: a frame that came damaged
+  EXPECT_EQ(deliver(source).kind, Kind::frame);
+  EXPECT_EQ(deliver(source).kind, Kind::rejected);
+}
+
 TEST_F(V4l2SourceTest, UnpluggedAndBackUnderAnotherNode) {
   V4l2Source source(options, system);
   ASSERT_TRUE(source.start());
@@ -169,6 +185,21 @@ TEST_F(V4l2SourceTest, LocksExposureAndTellsWhenItDoesNotHold) {
   V4l2Source source(options, system);
   ASSERT_TRUE(source.start());
   EXPECT_EQ(deliver(source).reason, "setting-lost");
+}
+
+TEST_F(V4l2SourceTest, ValuesLockedFirstAreRestoredAfterReplug) {
+  system->controls = {{V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_APERTURE_PRIORITY},
+                      {V4L2_CID_EXPOSURE_ABSOLUTE, 312}};
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  system->plugged = false;
+  EXPECT_EQ(deliver(source).reason, "disconnected");
+  system->controls = {{V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_APERTURE_PRIORITY},
+                      {V4L2_CID_EXPOSURE_ABSOLUTE, 156}};  // switched on again
+  system->plugged = true;
+  EXPECT_EQ(deliver(source).reason, "reconnected");
+  EXPECT_EQ(system->controls[V4L2_CID_EXPOSURE_AUTO], V4L2_EXPOSURE_MANUAL);
+  EXPECT_EQ(system->controls[V4L2_CID_EXPOSURE_ABSOLUTE], 312);
 }
 
 TEST_F(V4l2SourceTest, OptionsAreValidatedByName) {

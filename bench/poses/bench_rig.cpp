@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// bench_rig SESSION RUN: where both cameras shared a rig, unknown to the pipeline, frames of the
+// same source name were taken from (almost) the same place. Prints how far the camera centres of
+// the two modalities lie apart after the run's similarity, and after the best one there is.
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "core/colmap_model.hpp"
+#include "core/session.hpp"
+
+namespace {
+
+using namespace orbitfuse;
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+/// Camera centres by the stem of the file that each frame was imported from.
+std::map<std::string, Eigen::Vector3d> centers(const Session& session,
+                                               const Reconstruction& model) {
+  std::map<std::string, std::string> source;
+  for (const FrameRecord& frame : session.frames)
+    source[frame.file] = fs::path(frame.source).stem().string();
+  std::map<std::string, Eigen::Vector3d> result;
+  for (const PosedView& view : model.views)
+    result[source[view.name]] = camera_center(view.cam_from_world);
+  return result;
+}
+
+void print(const char* what, const Eigen::Matrix4d& m, const Eigen::Matrix3Xd& from,
+           const Eigen::Matrix3Xd& to, double extent) {
+  std::vector<double> apart;
+  for (Eigen::Index i = 0; i < from.cols(); ++i)
+    apart.push_back(
+        (m.topLeftCorner<3, 3>() * from.col(i) + m.topRightCorner<3, 1>() - to.col(i)).norm() /
+        extent);
+  std::sort(apart.begin(), apart.end());
+  fmt::print(
+      "{}: centres of {} pairs apart by {:.2f} % of the extent in the median, {:.2f} % at worst\n",
+      what, apart.size(), 100 * apart[apart.size() / 2], 100 * apart.back());
+}
+
+Status run(const fs::path& folder, const fs::path& out) {
+  ORBITFUSE_ASSIGN(const Session session, open_session(folder));
+  ORBITFUSE_ASSIGN(const Reconstruction visible,
+                   read_colmap_model(out / "poses_visible/model", Modality::visible));
+  ORBITFUSE_ASSIGN(const Reconstruction thermal,
+                   read_colmap_model(out / "poses_thermal/model", Modality::thermal));
+  std::ifstream stream(out / "register/registration.json");
+  const json found = json::parse(stream, nullptr, false);
+  if (found.is_discarded())
+    return fail(ErrorKind::input, "registration.json", "absent or not JSON",
+                "run the register stage");
+  const json& s = found.at("visible_from_thermal");
+  const auto q = s.at("rotation_wxyz").get<std::vector<double>>(),
+             t = s.at("translation").get<std::vector<double>>();
+  const Similarity3d similarity{
+      s.at("scale").get<double>(), Eigen::Quaterniond(q[0], q[1], q[2], q[3]), {t[0], t[1], t[2]}};
+
+  const auto of_visible = centers(session, visible), of_thermal = centers(session, thermal);
+  std::vector<Eigen::Vector3d> from, to;
+  for (const auto& [name, center] : of_thermal)
+    if (of_visible.contains(name)) from.push_back(center), to.push_back(of_visible.at(name));
+  if (from.size() < 3)
+    return fail(ErrorKind::input, folder.string(), "fewer than 3 pairs", "give a session of a rig");
+  Eigen::Matrix3Xd a(3, static_cast<Eigen::Index>(from.size())), b = a;
+  double extent = 0;
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    a.col(static_cast<Eigen::Index>(i)) = from[i], b.col(static_cast<Eigen::Index>(i)) = to[i];
+    for (const Eigen::Vector3d& other : to) extent = std::max(extent, (other - to[i]).norm());
+  }
+  print("similarity of the run", similarity.matrix(), a, b, extent);
+  const Eigen::Matrix4d best = Eigen::umeyama(a, b, true);
+  print("best similarity of the centres", best, a, b, extent);
+  const double scale = std::cbrt(best.topLeftCorner<3, 3>().determinant());
+  const Eigen::Quaterniond rotation(Eigen::Matrix3d(best.topLeftCorner<3, 3>() / scale));
+  fmt::print("between the two: scale {:.2f} %, rotation {:.2f} deg\n",
+             100 * (similarity.scale / scale - 1),
+             rotation_angle_deg(rotation, similarity.rotation));
+  return {};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 3) {
+    std::fputs("bench_rig SESSION RUN\n", stderr);
+    return 2;
+  }
+  const Status done = run(argv[1], argv[2]);
+  if (!done) std::fprintf(stderr, "%s\n", done.error().message().c_str());
+  return done ? 0 : 1;
+}

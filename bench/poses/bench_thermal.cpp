@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// bench_thermal SESSION RUN GROUND_TRUTH [--tracking TRACKING_JSON] [--views]
+// The thermal pose stage alone, on what an earlier run left in its folder RUN (poses_visible,
+// train_visible), so that one stage can be judged without the others. GROUND_TRUTH serves the
+// comparison only. --tracking adds frames recorded between the stations, --views prints each view.
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string_view>
+
+#include "bench/poses/misalignment.hpp"
+#include "bench/poses/scenes.hpp"
+#include "core/colmap_model.hpp"
+#include "core/cpu.hpp"
+#include "core/parallel.hpp"
+#include "recon/nerf/nerf.hpp"
+#include "recon/poses/estimate_poses.hpp"
+
+namespace {
+
+using namespace orbitfuse;
+namespace fs = std::filesystem;
+
+double cpu_seconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+         1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+}
+
+struct Arguments {
+  fs::path session, run, truth, tracking;
+  bool views = false;
+};
+
+Arguments arguments_of(int argc, char** argv) {
+  Arguments arguments;
+  std::vector<std::string> places;
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    if (word == "--views") {
+      arguments.views = true;
+    } else if (word == "--tracking" && i + 1 < argc) {
+      arguments.tracking = argv[++i];
+    } else {
+      places.emplace_back(word);
+    }
+  }
+  if (places.size() == 3)
+    arguments.session = places[0], arguments.run = places[1], arguments.truth = places[2];
+  return arguments;
+}
+
+Result<SceneView> rendered(const nerf::Field& field, const Camera& camera,
+                           const Rigid3d& cam_from_world, const Progress& progress) {
+  nerf::RenderOptions coarse;
+  coarse.sample_factor = 0.5;  // as in the application's stage
+  ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
+                   nerf::render(field, camera, cam_from_world, coarse, progress));
+  SceneView view{{}, seen.depth};
+  cv::cvtColor(seen.color, view.brightness, cv::COLOR_RGB2GRAY);
+  return view;
+}
+
+Status run(const Arguments& arguments) {
+  ORBITFUSE_ASSIGN(bench::Scene scene, bench::run_scene(arguments.session, arguments.truth));
+  if (!arguments.tracking.empty()) bench::add_tracking(scene, arguments.tracking);
+  ORBITFUSE_ASSIGN(Reconstruction visible,
+                   read_colmap_model(arguments.run / "poses_visible/model", Modality::visible));
+  ORBITFUSE_ASSIGN(const nerf::Field field,
+                   nerf::Field::load(arguments.run / "train_visible/field.bin"));
+  Progress progress;
+  double rendering_s = 0;
+  int renders = 0;
+  VisibleScene seen{std::move(visible), [&](const Camera& camera, const Rigid3d& pose) {
+                      const double before = cpu_seconds();
+                      auto view = rendered(field, camera, pose, progress);
+                      rendering_s += cpu_seconds() - before, ++renders;
+                      return view;
+                    }};
+  fmt::print("{}; {} threads\n", cpu_description(), thread_count());
+  const double before = cpu_seconds();
+  if (arguments.views)
+    progress.report = [&](const ProgressEvent& e) {
+      fmt::print("after {:.1f} CPU s: {}\n", cpu_seconds() - before, e.detail);
+    };
+  const auto start = std::chrono::steady_clock::now();
+  PoseOptions options;
+  options.use_known_poses = false;
+  ORBITFUSE_ASSIGN(
+      const ThermalPoses poses,
+      estimate_thermal_poses(scene.session, &seen, options,
+                             fs::temp_directory_path() / "orbitfuse_bench_thermal", progress));
+  const double wall =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  for (const LadderStep& step : poses.ladder)
+    fmt::print("{} {}: {}\n", step.held ? "held" : "fell", step.rung, step.why);
+  for (const DroppedView& view : poses.dropped) fmt::print("dropped {}: {}\n", view.name, view.why);
+  for (const auto& [gate, value] : poses.gates) fmt::print("{} = {:.4g}\n", gate, value);
+  fmt::print("{}/{} posed, {:.1f} s, {:.1f} CPU s, {:.1f} of them in {} renders\n",
+             poses.reconstruction.views.size(), poses.frame_count, wall, cpu_seconds() - before,
+             rendering_s, renders);
+  const bench::PoseError error = bench::pose_error(
+      poses.reconstruction, poses.shares_visible_frame ? seen.reconstruction : poses.reconstruction,
+      scene.truth);
+  fmt::print(
+      "centres ATE {:.3f} %, median {:.3f} %, worst {:.3f} % of the extent; rotation mean "
+      "{:.3f}, median {:.3f}, worst {:.3f} deg\n",
+      error.ate_percent, error.median_percent, error.worst_percent, error.mean_rotation_deg,
+      error.rotation_deg, error.worst_rotation_deg);
+  ORBITFUSE_ASSIGN(
+      const bench::Misalignment apart,
+      bench::misalignment(scene, seen.reconstruction, poses.reconstruction, seen.renderer));
+  fmt::print(
+      "rendered pairs of {} test views: median misalignment {:.2f} px at 640 wide, 90 % within "
+      "{:.2f} px\n",
+      scene.test.size(), apart.median(), apart.share(0.9));
+  if (arguments.views)
+    for (const bench::ViewError& view : error.each)
+      fmt::print("{} centre {:.2f} %, outwards {:+.2f} %, rotation {:.2f} deg\n", view.name,
+                 view.center_percent, view.outward_percent, view.rotation_deg);
+  return {};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);
+  const Arguments arguments = arguments_of(argc, argv);
+  if (arguments.truth.empty()) {
+    std::fputs("bench_thermal SESSION RUN GROUND_TRUTH [--tracking TRACKING_JSON] [--views]\n",
+               stderr);
+    return 2;
+  }
+  const Status done = run(arguments);
+  if (!done) std::fprintf(stderr, "%s\n", done.error().message().c_str());
+  return done ? 0 : 1;
+}

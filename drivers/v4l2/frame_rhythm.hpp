@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+namespace orbitfuse::v4l2 {
+
+/// The time between a camera's frames. It tells how many an outage cost, and of frames that never
+/// came although the driver's count has no hole: a UVC frame that is lost whole turns no frame bit.
+class FrameRhythm {
+ public:
+  /// Every frame, good or damaged. Returns how many more should have come since the one before,
+  /// when ids follow each other but the time between them is 1.75 times the usual or longer.
+  int note(std::uint64_t id, std::int64_t stamp_ns);
+  /// The stream was broken: the time until the next frame says nothing.
+  void interrupt() { last_.reset(); }
+  /// How many frames fit into an outage; at least 1, because the frame that was under way is lost.
+  std::uint64_t frames_in(double seconds) const;
+
+ private:
+  struct Seen {
+    std::uint64_t id;
+    std::int64_t stamp_ns;
+  };
+  std::optional<Seen> last_;
+  double interval_s_ = 0;  ///< smoothed
+  int known_ = 0;          ///< intervals so far
+};
+
+}  // namespace orbitfuse::v4l2

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What `orbitfuse capture` says, and with which exit code, when a camera, a port or a folder is not
+// to be had; nothing is left behind.
+#include <arpa/inet.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "drivers/aravis/aravis_source.hpp"
+#include "tests/app/cli/program.hpp"
+#include "tests/app/temp_folder.hpp"
+#include "tests/support/gev_simulator.hpp"
+
+namespace orbitfuse {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+const std::string tiny = "synthetic,size=64x48,spacing=60";
+
+/// With a simulated GigE camera at the loopback address.
+class RefusedGigE : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    bool up = false;
+    for (int i = 0; i < 100 && !(up = camera.start()); ++i) usleep(100'000);
+    if (!up) GTEST_SKIP() << "the GVCP port 3956 on loopback is in use";
+  }
+  testing::GevSimulator camera;
+  const TempFolder temp;
+  const std::string session = temp.path / "s";
+};
+
+TEST_F(RefusedGigE, ProfileWithAFeatureThatTheCameraLacks) {
+  // TemperatureLinearMode is of another family than the simulated camera.
+  const Outcome outcome =
+      orbitfuse_program({"capture", session, "--thermal", "aravis:127.0.0.1,profile=flir-ax5", "--seconds", "1"});
+  EXPECT_EQ(outcome.code, 4) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("flir-ax5"));
+  EXPECT_FALSE(std::filesystem::exists(session));
+}
+
+TEST_F(RefusedGigE, CameraThatAnotherProgramControls) {
+  aravis::AravisOptions options;
+  options.camera = "127.0.0.1";
+  options.profiles = std::string(ORBITFUSE_SOURCE_DIR) + "/config/cameras";
+  aravis::AravisSource first(options);
+  ASSERT_TRUE(first.start());
+  const Outcome outcome = orbitfuse_program({"capture", session, "--thermal", "aravis:127.0.0.1", "--seconds", "1"});
+  EXPECT_EQ(outcome.code, 4) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("another program"));
+  EXPECT_FALSE(std::filesystem::exists(session));
+  // The one that has it goes on.
+  int frames = 0;
+  for (int i = 0; i < 100 && frames < 10; ++i) {
+    const auto delivery = first.next(std::chrono::milliseconds(200));
+    ASSERT_TRUE(delivery);
+    frames += delivery->kind == Delivery::Kind::frame;
+  }
+  EXPECT_EQ(frames, 10);
+}
+
+TEST(Refused, PageAtAPortInUse) {
+  const TempFolder temp;
+  const int holder = ::socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t length = sizeof address;
+  ASSERT_EQ(::bind(holder, reinterpret_cast<sockaddr*>(&address), length), 0);
+  ASSERT_EQ(::listen(holder, 1), 0);
+  ASSERT_EQ(::getsockname(holder, reinterpret_cast<sockaddr*>(&address), &length), 0);
+  const std::string port = std::to_string(ntohs(address.sin_port));
+  const Outcome outcome = orbitfuse_program({"capture", temp.path / "s", "--visible", tiny, "--page", port});
+  ::close(holder);
+  EXPECT_EQ(outcome.code, 4) << outcome.err;
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr(port), HasSubstr("choose another with --page")));
+  EXPECT_FALSE(std::filesystem::exists(temp.path / "s"));
+}
+
+/// Without root's rights, also when the tests have them.
+Outcome as_nobody(std::vector<std::string> arguments) {
+  std::vector<std::string> command{ORBITFUSE_BINARY_DIR "/app/orbitfuse"};
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  if (::geteuid() == 0) {
+    const std::vector<std::string> drop{"setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"};
+    command.insert(command.begin(), drop.begin(), drop.end());
+  }
+  return run_program(command);
+}
+
+TEST(Refused, DeviceAndFolderWithoutPermission) {
+  const TempFolder temp;
+  std::filesystem::permissions(temp.path, std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec |
+                                              std::filesystem::perms::others_read |
+                                              std::filesystem::perms::others_exec);
+  const std::string session = temp.path / "s";
+  if (as_nobody({"--version"}).code != 0) GTEST_SKIP() << "setpriv, or the program for other users, is missing";
+  const Outcome folder = as_nobody({"capture", session, "--visible", tiny});
+  EXPECT_EQ(folder.code, 4) << folder.err;
+  EXPECT_THAT(folder.err, HasSubstr(session));
+  // Any device that only root may open stands for a camera.
+  if (std::filesystem::exists("/dev/loop-control")) {
+    const Outcome device = as_nobody({"capture", "/tmp/never", "--visible", "v4l2:/dev/loop-control", "--seconds", "1"});
+    EXPECT_EQ(device.code, 4) << device.err;
+    EXPECT_THAT(device.err, HasSubstr("group video"));
+    EXPECT_FALSE(std::filesystem::exists("/tmp/never"));
+  }
+  EXPECT_FALSE(std::filesystem::exists(session));
+  std::filesystem::permissions(temp.path, std::filesystem::perms::owner_all);
+}
+
+}  // namespace
+}  // namespace orbitfuse

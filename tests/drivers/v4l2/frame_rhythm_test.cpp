@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "drivers/v4l2/frame_rhythm.hpp"
+
+#include <gtest/gtest.h>
+
+namespace orbitfuse::v4l2 {
+namespace {
+
+constexpr std::int64_t ms = 1'000'000;
+
+FrameRhythm settled_at_10_hz(std::uint64_t frames) {
+  FrameRhythm rhythm;
+  for (std::uint64_t id = 0; id < frames; ++id) {
+    EXPECT_EQ(rhythm.note(id, 1000 * ms + 100 * ms * static_cast<std::int64_t>(id)), 0);
+  }
+  return rhythm;
+}
+
+TEST(FrameRhythm, FramesMissingWithoutAHoleAreNoticed) {
+  FrameRhythm rhythm = settled_at_10_hz(20);
+  EXPECT_EQ(rhythm.note(20, 1000 * ms + 2300 * ms), 3);  // 2.0 s was due
+}
+
+TEST(FrameRhythm, AHoleInTheIdsExplainsTheTime) {
+  FrameRhythm rhythm = settled_at_10_hz(20);
+  EXPECT_EQ(rhythm.note(23, 1000 * ms + 2300 * ms), 0);
+}
+
+TEST(FrameRhythm, JitterAndTheStartOfAStreamAreNotLate) {
+  FrameRhythm rhythm;
+  std::int64_t stamp = 500 * ms;
+  EXPECT_EQ(rhythm.note(0, stamp), 0);
+  EXPECT_EQ(rhythm.note(1, stamp += 400 * ms), 0);  // nothing is known yet
+  for (std::uint64_t id = 2; id < 40; ++id) stamp += 100 * ms, rhythm.note(id, stamp);
+  for (std::uint64_t id = 40; id < 60; ++id) {
+    EXPECT_EQ(rhythm.note(id, stamp += (id % 2 == 0 ? 140 : 60) * ms), 0) << id;
+  }
+}
+
+TEST(FrameRhythm, ASlowerRateIsFollowed) {
+  FrameRhythm rhythm = settled_at_10_hz(20);
+  std::int64_t stamp = 1000 * ms + 1900 * ms;
+  int told = 0;
+  for (std::uint64_t id = 20; id < 60; ++id) told += rhythm.note(id, stamp += 200 * ms) > 0;
+  EXPECT_GT(told, 0);
+  EXPECT_LT(told, 5);
+}
+
+TEST(FrameRhythm, OutagesAreCountedInFramesAndNotAsLate) {
+  FrameRhythm rhythm = settled_at_10_hz(20);
+  EXPECT_EQ(rhythm.frames_in(3.0), 30u);
+  rhythm.interrupt();
+  EXPECT_EQ(rhythm.note(50, 1000 * ms + 60'000 * ms), 0);
+  EXPECT_EQ(FrameRhythm().frames_in(3.0), 1u);
+}
+
+TEST(FrameRhythm, StampsThatDoNotRiseSayNothing) {
+  FrameRhythm rhythm = settled_at_10_hz(20);
+  EXPECT_EQ(rhythm.note(20, 1), 0);
+  EXPECT_EQ(rhythm.note(21, 1), 0);
+  EXPECT_EQ(rhythm.note(22, 0), 0);
+  EXPECT_EQ(rhythm.frames_in(1.0), 10u);
+}
+
+}  // namespace
+}  // namespace orbitfuse::v4l2

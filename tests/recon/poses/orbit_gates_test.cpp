@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "recon/poses/sfm_ladder.hpp"
+#include "recon/poses/world_frame.hpp"
+#include "tests/recon/poses/orbit_fixture.hpp"
+
+// What COLMAP makes of thermal frames of the container: front and back of a near-symmetric object
+// merged, at 0.8 px. The gates must refuse it without knowing the truth.
+namespace orbitfuse {
+namespace {
+
+/// Frames every 10 deg in two loops, as a stream of tracking frames.
+Session tracking_session(int count) {
+  Session session;
+  for (int i = 0; i < count; ++i) {
+    FrameRecord frame;
+    frame.modality = Modality::thermal;
+    frame.device = "thermal0";
+    frame.file = "track" + std::to_string(i);
+    frame.sequence = static_cast<std::uint64_t>(i);
+    frame.tracking = true;
+    session.frames.push_back(frame);
+  }
+  return session;
+}
+
+template <class Fold>
+ModalityPoses poses_with(const Session& session, const Fold& fold) {
+  ModalityPoses poses;
+  poses.frame_count = static_cast<int>(session.frames.size());
+  for (std::size_t i = 0; i < session.frames.size(); ++i) {
+    OrbitPose pose;
+    pose.azimuth_deg = fold(10.0 * static_cast<double>(i % 36));
+    pose.elevation_deg = i < 36 ? 10 : 32;
+    pose.radius = 4;
+    const Camera camera = testing_orbit::camera(1400);
+    poses.reconstruction.views.push_back(
+        {session.frames[i].file, camera, cam_from_world_of(pose, camera)});
+  }
+  poses.gates["reprojection_rms_proxy_px"] = 0.79;
+  poses.gates["median_triangulation_deg"] = 10;
+  return poses;
+}
+
+bool believed(ModalityPoses poses, const Session& session, std::string* why = nullptr) {
+  std::string words;
+  const bool passes = passes_gates(poses, session, {}, words);
+  if (why != nullptr) *why = words;
+  return passes;
+}
+
+double as_taken(double azimuth) { return azimuth + 3 * std::sin(azimuth); }
+double front_on_back(double azimuth) { return std::fmod(as_taken(azimuth) + 360, 180); }
+double mirrored_back(double azimuth) { return azimuth < 180 ? azimuth : 360 - azimuth; }
+
+TEST(OrbitGates, AnOrbitInOrderIsBelieved) {
+  for (const int count : {36, 72}) {
+    const Session session = tracking_session(count);
+    std::string why;
+    EXPECT_TRUE(believed(poses_with(session, as_taken), session, &why)) << why;
+  }
+}
+
+TEST(OrbitGates, FrontMergedWithBackIsRefusedByTheOrderOfTrackingFramesAlone) {
+  for (const int count : {36, 72}) {
+    const Session session = tracking_session(count);
+    std::string why;
+    EXPECT_FALSE(believed(poses_with(session, front_on_back), session, &why));
+    EXPECT_NE(why.find("leaps"), std::string::npos) << why;
+    EXPECT_FALSE(believed(poses_with(session, mirrored_back), session, &why));
+    EXPECT_NE(why.find("turns back"), std::string::npos) << why;
+  }
+}
+
+TEST(OrbitGates, FrontMergedWithBackIsRefusedByStationsOfUnknownOrigin) {
+  Session session = tracking_session(36);
+  for (std::size_t i = 0; i < session.frames.size(); ++i) {
+    FrameRecord& frame = session.frames[i];
+    frame.tracking = false;
+    frame.sequence = 0;  // the stations alone must tell
+    Station station;
+    station.index = static_cast<int>(i);
+    station.azimuth_deg = 10.0 * static_cast<double>(i);
+    station.azimuth_sigma_deg = 180;
+    frame.station = station;
+  }
+  EXPECT_TRUE(believed(poses_with(session, as_taken), session));
+  const ModalityPoses merged = poses_with(session, front_on_back);
+  EXPECT_FALSE(believed(merged, session));
+  const StationFit fit = fit_stations(merged.reconstruction.views, session);
+  EXPECT_GE(fit.outliers, 15) << "an unknown origin says nothing against differences";
+}
+
+TEST(OrbitGates, APartOfTheFramesIsNotEnough) {
+  // 45 of 72, as measured: a right model of so few would be refused as well.
+  const Session session = tracking_session(72);
+  ModalityPoses poses = poses_with(session, as_taken);
+  poses.reconstruction.views.resize(45);
+  EXPECT_FALSE(believed(poses, session));
+}
+
+TEST(OrbitGates, PhotosWithoutStationsHaveNoOrderToContradict) {
+  Session session = tracking_session(36);
+  for (FrameRecord& frame : session.frames) frame.tracking = false;
+  const ModalityPoses poses =
+      poses_with(session, [](double a) { return std::fmod(a * 7.3, 360.0); });
+  EXPECT_EQ(capture_order(poses.reconstruction.views, session).steps, 0);
+  EXPECT_TRUE(believed(poses, session));
+}
+
+}  // namespace
+}  // namespace orbitfuse
