@@ -24,7 +24,7 @@ using PositionFinder = std::function<std::optional<OrbitPosition>(const cv::Mat&
 struct LiveGuideOptions {
   OrbitPlan plan;
   CoverageOptions coverage;
-  double looks_per_second = 4;  ///< per camera; finding the mat costs 5-20 ms a look
+  double looks_per_second = 4;  ///< per camera; finding the mat costs 5-30 ms a look
   double unseen_after_s = 1.0;  ///< a position older than this is no longer where the camera is
   /// The object stands on a turntable: each key, and each photo, is this much further in azimuth,
   /// negative for a table that turns the other way; a full turn later it is the next loop. 0: none.

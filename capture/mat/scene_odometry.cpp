@@ -14,7 +14,7 @@
 namespace orbitfuse {
 namespace {
 
-constexpr int largest_side_px = 800;  // of the images that are followed: 20 ms a look
+constexpr int largest_side_px = 800;  // of the images that are followed: four looks a second
 constexpr int most_tracks = 240;
 constexpr double track_distance_px = 10;
 constexpr float most_disagreement_px = 0.7f;
@@ -25,7 +25,7 @@ constexpr double landmark_error_px = 2;
 constexpr std::size_t fewest_landmarks = 15;
 constexpr std::size_t enough_read_landmarks = 40;
 constexpr int most_misses = 8;  // two seconds at the guide's four looks
-/// Drift is at most this share of the way (bench: docs/benchmarks/capture.md); the rest is margin.
+/// Beyond the drift that was measured (docs/benchmarks/capture.md).
 constexpr double drift_share = 0.03;
 constexpr double deg = 180 / std::numbers::pi;
 

@@ -4,8 +4,8 @@
 #include <linux/videodev2.h>
 #include <sys/mman.h>
 
+#include <algorithm>
 #include <cerrno>
-#include <cstring>
 
 namespace orbitfuse::v4l2 {
 namespace {
@@ -65,7 +65,7 @@ int FakeVideoSystem::dequeue(void* argument) {
   auto* buffer = static_cast<v4l2_buffer*>(argument);
   buffer->index = queued_.front();
   queued_.pop_front();
-  std::memcpy(memory_[buffer->index].data(), shot.bytes.data(), shot.bytes.size());
+  std::copy(shot.bytes.begin(), shot.bytes.end(), memory_[buffer->index].begin());
   buffer->bytesused = shot.claimed_bytes ? shot.claimed_bytes : static_cast<std::uint32_t>(shot.bytes.size());
   buffer->sequence = shot.sequence;
   buffer->flags = shot.flags;
