@@ -4,11 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <opencv2/imgproc.hpp>
 
 
 #include "app/stages/artifacts.hpp"
 #include "app/stages/stage_list.hpp"
+#include "app/stages/visible_renderer.hpp"
 #include "core/image_io.hpp"
 #include "core/palette.hpp"
 #include "recon/nerf/nerf.hpp"
@@ -95,15 +95,7 @@ Result<StageOutput> pose_thermal(const StageContext& context, const SessionInput
   nerf::Field field;
   if (context.has("train_visible")) {
     ORBITFUSE_ASSIGN(field, nerf::Field::load(context.of("train_visible") / field_file));
-    // Edges need fewer samples a ray than pictures.
-    nerf::RenderOptions coarse;
-    coarse.sample_factor = 0.5;
-    scene.renderer = [&, coarse](const Camera& camera, const Rigid3d& cam_from_world) -> Result<SceneView> {
-      ORBITFUSE_ASSIGN(const nerf::RenderedView seen, nerf::render(field, camera, cam_from_world, coarse, context.progress));
-      SceneView view{{}, seen.depth};
-      cv::cvtColor(seen.color, view.brightness, cv::COLOR_RGB2GRAY);
-      return view;
-    };
+    scene.renderer = edge_renderer(field, context.progress);
   }
   ORBITFUSE_ASSIGN(const ThermalPoses poses,
                    estimate_thermal_poses(input.session, visible ? &scene : nullptr, options,

@@ -5,7 +5,10 @@
 #include "app/stages/registration_json.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
+#include "app/stages/training_data.hpp"
+#include "app/stages/visible_renderer.hpp"
 #include "core/ply.hpp"
+#include "recon/poses/similarity_refinement.hpp"
 #include "recon/registration/register.hpp"
 
 namespace orbitfuse::stages {
@@ -26,39 +29,83 @@ Status save_registration(const StageContext& context, const Similarity3d& visibl
 Result<PointCloud> cloud_of(const StageContext& context, const char* stage) {
   const auto file = context.of(stage) / cloud_file;
   if (!std::filesystem::exists(file))
-    return fail(ErrorKind::quality, stage, "its field gave no point cloud", "train longer, or record more views");
+    return fail(ErrorKind::quality, stage, "its field gave no point cloud",
+                "train longer, or record more views");
   return read_ply(file);
 }
 
+/// The thermal images against renders of the visible field: closer than the clouds' blur allows.
+Result<SimilarityRefinement> refined_by_images(const StageContext& context,
+                                               const SessionInput& input,
+                                               const Similarity3d& visible_from_thermal) {
+  ORBITFUSE_ASSIGN(const Reconstruction thermal,
+                   load_poses(context.of("poses_thermal"), Modality::thermal));
+  ORBITFUSE_ASSIGN(const nerf::Field field,
+                   nerf::Field::load(context.of("train_visible") / field_file));
+  std::vector<cv::Mat> images;
+  for (const PosedView& view : thermal.views) {
+    ORBITFUSE_ASSIGN(cv::Mat image, field_image(input.session.folder / view.name, Modality::thermal,
+                                                !input.has_temperatures()));
+    images.push_back(std::move(image));
+  }
+  return refine_similarity(edge_renderer(field, context.progress), images, thermal.views,
+                           visible_from_thermal, similarity_rounds(), context.progress);
+}
+
 /// Two frames of their own: the clouds tell how they relate.
-Result<StageOutput> register_by_clouds(const StageContext& context, std::uint64_t seed) {
+Result<StageOutput> register_by_clouds(const StageContext& context, const SessionInput& input,
+                                       std::uint64_t seed) {
   ORBITFUSE_ASSIGN(const PointCloud thermal, cloud_of(context, "train_thermal"));
   ORBITFUSE_ASSIGN(const PointCloud visible, cloud_of(context, "train_visible"));
   RegistrationOptions options;
   options.seed = static_cast<std::uint32_t>(seed);
-  ORBITFUSE_ASSIGN(const RegistrationReport report, register_clouds(thermal, visible, options, context.progress));
-  ORBITFUSE_TRY(save_registration(context, report.target_from_source, "point clouds"));
+  ORBITFUSE_ASSIGN(const RegistrationReport report,
+                   register_clouds(thermal, visible, options, context.progress));
+  ORBITFUSE_ASSIGN(const SimilarityRefinement refined,
+                   refined_by_images(context, input, report.target_from_source));
+  ORBITFUSE_TRY(save_registration(
+      context, refined.visible_from_thermal,
+      refined.improved ? "point clouds, then edges of the thermal images" : "point clouds"));
   StageOutput output;
   output.skips = report.skips;
-  if (report.ambiguous) output.warnings.push_back("the registration is ambiguous: " + report.ambiguity);
+  if (report.ambiguous)
+    output.warnings.push_back("the registration is ambiguous: " + report.ambiguity);
   output.metrics = to_json(report);
-  output.metrics["brief"] = report.brief();
-  output.metrics["note"] = "The thermal cloud was brought onto the visible one (visible_from_thermal).";
-  output.metrics["facts"] = facts(report);
+  output.metrics["brief"] =
+      report.brief() + (refined.improved ? ", refined by the thermal images" : "");
+  output.metrics["image_refinement"] = {
+      {"kept", refined.improved},
+      {"agreement_before", refined.agreement_before},
+      {"agreement_after", refined.agreement_after},
+      {"patches_before", refined.matches_before},
+      {"patches_after", refined.matches_after},
+      {"visible_from_thermal", to_json(refined.visible_from_thermal)}};
+  output.metrics["note"] =
+      "The thermal cloud was brought onto the visible one (visible_from_thermal).";
+  RegistrationReport shown = report;
+  shown.target_from_source = refined.visible_from_thermal;
+  output.metrics["facts"] = facts(shown);
+  output.metrics["facts"].push_back(json::array(
+      {"refined by the thermal images",
+       fmt::format("{}: agreement of edges {:.3f} before, {:.3f} after",
+                   refined.improved ? "kept" : "refused, the clouds' answer stays",
+                   refined.agreement_before, refined.agreement_after)}));
   return output;
 }
 
-Result<StageOutput> register_fields(const StageContext& context, std::uint64_t seed) {
+Result<StageOutput> register_fields(const StageContext& context, const SessionInput& input,
+                                    std::uint64_t seed) {
   ORBITFUSE_ASSIGN(const json poses, read_json(context.of("poses_thermal") / "poses.json"));
-  if (!poses.value("shared_frame", false)) return register_by_clouds(context, seed);
+  if (!poses.value("shared_frame", false)) return register_by_clouds(context, input, seed);
   ORBITFUSE_TRY(save_registration(context, {}, "shared frame"));
   StageOutput output;
   output.skips.push_back({"registration of the two point clouds",
                           "the thermal views were posed in the visible frame",
                           "nothing left to find: the similarity is the identity"});
   output.metrics = {{"brief", "skipped: both modalities share the visible frame"},
-                    {"note", "Skipped: the thermal views were posed in the visible frame, so both "
-                             "fields already share it (s = 1, R = identity, t = 0)."}};
+                    {"note",
+                     "Skipped: the thermal views were posed in the visible frame, so both "
+                     "fields already share it (s = 1, R = identity, t = 0)."}};
   return output;
 }
 
@@ -69,7 +116,9 @@ pipeline::Stage register_stage(const StageInputs& in) {
   stage.name = "register";
   stage.needs = {"poses_visible", "poses_thermal", "train_visible", "train_thermal"};
   stage.options = {{"seed", in.config->seed}};
-  stage.run = [in](const StageContext& context) { return register_fields(context, in.config->seed); };
+  stage.run = [in](const StageContext& context) {
+    return register_fields(context, *in.session, in.config->seed);
+  };
   return stage;
 }
 

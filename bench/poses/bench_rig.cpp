@@ -10,9 +10,13 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "core/colmap_model.hpp"
 #include "core/session.hpp"
+#include "recon/nerf/nerf.hpp"
+#include "recon/poses/proxy_images.hpp"
+#include "recon/poses/similarity_refinement.hpp"
 
 namespace {
 
@@ -77,6 +81,29 @@ Status run(const fs::path& folder, const fs::path& out) {
   print("similarity of the run", similarity.matrix(), a, b, extent);
   const Eigen::Matrix4d best = Eigen::umeyama(a, b, true);
   print("best similarity of the centres", best, a, b, extent);
+  ORBITFUSE_ASSIGN(const nerf::Field field, nerf::Field::load(out / "train_visible/field.bin"));
+  const Progress progress;
+  const SceneRenderer renderer = [&](const Camera& camera, const Rigid3d& pose) -> Result<SceneView> {
+    nerf::RenderOptions coarse;
+    coarse.sample_factor = 0.5;
+    ORBITFUSE_ASSIGN(const nerf::RenderedView seen, nerf::render(field, camera, pose, coarse, progress));
+    SceneView view{{}, seen.depth};
+    cv::cvtColor(seen.color, view.brightness, cv::COLOR_RGB2GRAY);
+    return view;
+  };
+  std::vector<cv::Mat> images;
+  for (const PosedView& view : thermal.views)
+    for (const FrameRecord& frame : session.frames)
+      if (frame.file == view.name) {
+        ORBITFUSE_ASSIGN(cv::Mat image, read_luminance(session, frame));
+        images.push_back(std::move(image));
+      }
+  ORBITFUSE_ASSIGN(const SimilarityRefinement refined,
+                   refine_similarity(renderer, images, thermal.views, similarity, similarity_rounds(), progress));
+  fmt::print("refined by the thermal images' edges: agreement {:.4f} to {:.4f}, patches {} to {}: {}\n",
+             refined.agreement_before, refined.agreement_after, refined.matches_before, refined.matches_after,
+             refined.improved ? "kept" : "refused");
+  print("refined similarity", refined.visible_from_thermal.matrix(), a, b, extent);
   const double scale = std::cbrt(best.topLeftCorner<3, 3>().determinant());
   const Eigen::Quaterniond rotation(Eigen::Matrix3d(best.topLeftCorner<3, 3>() / scale));
   fmt::print("between the two: scale {:.2f} %, rotation {:.2f} deg\n",

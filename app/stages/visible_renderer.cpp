@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/stages/visible_renderer.hpp"
+
+#include <opencv2/imgproc.hpp>
+
+namespace orbitfuse::stages {
+
+SceneRenderer edge_renderer(const nerf::Field& field, const Progress& progress) {
+  nerf::RenderOptions coarse;
+  coarse.sample_factor = 0.5;
+  return [&, coarse](const Camera& camera, const Rigid3d& cam_from_world) -> Result<SceneView> {
+    ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
+                     nerf::render(field, camera, cam_from_world, coarse, progress));
+    SceneView view{{}, seen.depth};
+    cv::cvtColor(seen.color, view.brightness, cv::COLOR_RGB2GRAY);
+    return view;
+  };
+}
+
+}  // namespace orbitfuse::stages

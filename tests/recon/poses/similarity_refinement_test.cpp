@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/similarity_refinement.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/recon/poses/box_scene.hpp"
+#include "tests/recon/poses/orbit_fixture.hpp"
+
+namespace orbitfuse {
+namespace {
+
+/// Half an orbit of thermal views in a world of their own.
+struct ThermalOrbit {
+  Similarity3d visible_from_thermal{
+      0.4,
+      Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Eigen::Vector3d(1, -2, 0.5).normalized())),
+      {3, -1, 2}};
+  std::vector<PosedView> views;
+  std::vector<cv::Mat> images;
+
+  ThermalOrbit() {
+    const Camera camera = testing_orbit::camera(1000).scaled_to(320, 240);
+    for (int i = 0; i < 6; ++i) {
+      OrbitPose pose;
+      pose.azimuth_deg = 35.0 * i, pose.elevation_deg = i % 2 == 0 ? 12 : 25, pose.radius = 2.5;
+      const Rigid3d in_visible = cam_from_world_of(pose, camera);
+      images.push_back(testing_orbit::box_view(camera, in_visible, true).brightness);
+      views.push_back({"view", camera, rebase(in_visible, visible_from_thermal.inverse())});
+    }
+  }
+};
+
+TEST(SimilarityRefinement, FindsWhatTheCloudsMissed) {
+  const ThermalOrbit orbit;
+  const Similarity3d off{
+      1.02,
+      Eigen::Quaterniond(Eigen::AngleAxisd(0.04, Eigen::Vector3d(0, 1, 2).normalized())),
+      {0.02, -0.01, 0.015}};
+  const auto refined = refine_similarity(testing_orbit::box_renderer(), orbit.images, orbit.views,
+                                         off * orbit.visible_from_thermal, similarity_rounds(), {});
+  ASSERT_TRUE(refined) << refined.error().message();
+  EXPECT_TRUE(refined->improved);
+  EXPECT_GT(refined->matches_after, refined->matches_before);
+  const Similarity3d error = refined->visible_from_thermal * orbit.visible_from_thermal.inverse();
+  EXPECT_NEAR(error.scale, 1, 0.004);
+  EXPECT_LT(rotation_angle_deg(error.rotation, Eigen::Quaterniond::Identity()), 0.3);
+  EXPECT_LT(error.translation.norm(), 0.01);
+}
+
+TEST(SimilarityRefinement, WhatIsRightStaysAndNothingToSeeIsRefused) {
+  ThermalOrbit orbit;
+  for (cv::Mat& image : orbit.images) image = cv::Scalar(295.15);
+  const auto refined = refine_similarity(testing_orbit::box_renderer(), orbit.images, orbit.views,
+                                         orbit.visible_from_thermal, similarity_rounds(), {});
+  ASSERT_TRUE(refined) << refined.error().message();
+  EXPECT_FALSE(refined->improved);
+  EXPECT_EQ(refined->visible_from_thermal.matrix(), orbit.visible_from_thermal.matrix());
+}
+
+TEST(SimilarityRefinement, CountsThatDifferAreAnInputError) {
+  const ThermalOrbit orbit;
+  const auto refined = refine_similarity(testing_orbit::box_renderer(), {}, orbit.views, {},
+                                         similarity_rounds(), {});
+  ASSERT_FALSE(refined);
+  EXPECT_EQ(refined.error().kind, ErrorKind::input);
+}
+
+}  // namespace
+}  // namespace orbitfuse
