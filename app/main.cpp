@@ -7,6 +7,7 @@
 #include <exception>
 
 #include "app/cli/command_line.hpp"
+#include "app/cli/run_stages.hpp"
 #include "app/terminal/exit_code.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/cpu.hpp"
@@ -27,11 +28,17 @@ void set_up_logging(int verbosity) {
                                     : spdlog::level::warn);
 }
 
-Status resolve_config(const cli::CommonOptions& common, stages::RunConfig& config) {
+/// Defaults, then the options of the run whose folder is given, then the file, then --set.
+Status resolve_config(const cli::CommonOptions& common, const CLI::App& verb, stages::RunConfig& config) {
   config::Settings settings = config.settings();
+  const CLI::Option* session = verb.get_option_no_throw("session");
+  bool again = false;
+  if (session != nullptr && session->count() > 0) {
+    ORBITFUSE_ASSIGN(again, cli::read_earlier_options(session->as<std::string>(), settings));
+  }
   if (!common.config_file.empty()) ORBITFUSE_TRY(settings.read_toml(common.config_file));
   for (const std::string& assignment : common.overrides) ORBITFUSE_TRY(settings.apply(assignment));
-  config.set_seed(common.seed);
+  if (!again || verb.count("--seed") > 0) config.set_seed(common.seed);
   return config.validate();
 }
 
@@ -87,7 +94,7 @@ int run(int argc, char** argv) {
   context.progress.cancel = &interrupt_flag();
 
   Status status = check_machine(line.common);
-  if (status) status = resolve_config(line.common, config);
+  if (status) status = resolve_config(line.common, *line.app.get_subcommand(verb->name), config);
   if (status && line.common.print_config) {
     console.data(config.settings().to_toml());
     context.result = {{"config", config.settings().to_json()}};

@@ -59,18 +59,36 @@ void add_folders(CLI::App& app, StageFolders& folders) {
       ->capture_default_str();
 }
 
-Status resolve(StageFolders& folders) {
-  if (folders.session.empty())
-    return fail(ErrorKind::usage, "session", "none given",
-                "name a session folder, e.g. replay_data/container");
-  const fs::path record = fs::path(folders.session) / run_file;
-  if (!fs::exists(record)) return {};
+namespace {
+
+/// run.json of an earlier run's folder; null when there is none.
+Result<json> earlier_run(const std::string& folder) {
+  const fs::path record = fs::path(folder) / run_file;
+  if (folder.empty() || !fs::exists(record)) return json();
   ORBITFUSE_ASSIGN(const std::string text, read_file(record));
-  const json run = json::parse(text, nullptr, false);
+  json run = json::parse(text, nullptr, false);
   if (!run.is_object() || !run.contains("session") || !run["session"].is_string())
     return fail(ErrorKind::input, record.string(), "no session named in it",
                 "give the session folder and --out");
-  folders.out = folders.session;
+  return run;
+}
+
+}  // namespace
+
+Result<bool> read_earlier_options(const std::string& folder, config::Settings& settings) {
+  ORBITFUSE_ASSIGN(const json run, earlier_run(folder));
+  if (!run.contains("config") || !run["config"].is_object()) return false;
+  ORBITFUSE_TRY(settings.read_json(run["config"], (fs::path(folder) / run_file).string()));
+  return true;
+}
+
+Status resolve(StageFolders& folders) {
+  if (folders.session.empty())
+    return fail(ErrorKind::usage, "session", "none given",
+                "name a session folder, e.g. replay_data/car");
+  ORBITFUSE_ASSIGN(const json run, earlier_run(folders.session));
+  if (run.is_null()) return {};
+  if (folders.out == StageFolders{}.out) folders.out = folders.session;
   folders.session = run["session"];
   return {};
 }

@@ -19,6 +19,9 @@ void add_folders(CLI::App& app, StageFolders& folders);
 /// The session and the out folder meant; an out folder knows its session (run.json).
 Status resolve(StageFolders& folders);
 
+/// The --out folder of an earlier run brings that run's options; false: `folder` is none.
+Result<bool> read_earlier_options(const std::string& folder, config::Settings& settings);
+
 /// Runs the targets and all they read, says how each stage fared, and fills the --json result.
 /// Empty targets: every stage.
 Status run_stages(Context& context, const StageFolders& folders,

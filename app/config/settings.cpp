@@ -107,13 +107,25 @@ Status Settings::read_toml(const std::filesystem::path& file) {
     flatten(table, "", entries);
   } catch (const toml::parse_error& e) {
     return fail(ErrorKind::usage, fmt::format("{}:{}", file.string(), e.source().begin.line),
-                std::string(e.description()), "write it as TOML, e.g. budget_s = 60.0");
+                std::string(e.description()), "write it as TOML; config/orbitfuse.toml is an example");
   }
   // A preset sets many fields, which the other keys then change.
   std::stable_partition(entries.begin(), entries.end(),
                         [](const Entry& e) { return e.key.ends_with(".preset"); });
   for (const Entry& e : entries)
     ORBITFUSE_TRY(set(e.key, e.value, fmt::format("{}:{}", file.string(), e.line)));
+  return {};
+}
+
+Status Settings::read_json(const json& values, const std::string& where) {
+  for (const bool presets : {true, false})  // a preset sets many fields, which the other keys then change
+    for (const Setting& s : list_) {
+      if (s.key.ends_with(".preset") != presets) continue;
+      std::string path = "/" + s.key;
+      std::replace(path.begin(), path.end(), '.', '/');
+      const json::json_pointer pointer(path);
+      if (values.contains(pointer)) ORBITFUSE_TRY(set(s.key, values[pointer], where));
+    }
   return {};
 }
 

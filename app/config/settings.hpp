@@ -46,6 +46,8 @@ class Settings {
 
   /// Usage error naming file, line and key; an unknown key with the nearest known one.
   Status read_toml(const std::filesystem::path& file);
+  /// What to_json() wrote; keys of other versions are passed over.
+  Status read_json(const nlohmann::json& values, const std::string& where);
   /// "key=value" with the value as in TOML (quotes may be left out).
   Status apply(const std::string& assignment);
 

@@ -51,7 +51,7 @@ json views_json(const Model& model) {
 
 std::string figure(const json& view, const char* kind, const char* label, bool probe) {
   const bool fused = std::string(kind) == "fused";
-  const std::string uri = fused ? view["fused"].back()["uri"].get<std::string>()
+  const std::string uri = fused ? view["fused"].front()["uri"].get<std::string>()
                                 : view[kind].get<std::string>();
   return fmt::format(
       "<figure><div class=\"{}\"><img id=\"img-{}\" data-label=\"{}\" src=\"{}\" alt=\"{}, {}\">{}"
@@ -117,7 +117,7 @@ std::string viewer(const Model& model, const json& views) {
         "id=\"tag-right\"></span><output class=\"readout\"></output></div>\n"
         "<input class=\"swiper\" id=\"cut\" type=\"range\" min=\"0\" max=\"100\" value=\"50\" "
         "aria-labelledby=\"h-swipe\">\n",
-        fused ? first["fused"].back()["uri"].get<std::string>() : first["thermal"].get<std::string>(),
+        fused ? first["fused"].front()["uri"].get<std::string>() : first["thermal"].get<std::string>(),
         visible ? first["visible"].get<std::string>() : first["thermal"].get<std::string>());
   }
   return html + "</section>\n";

@@ -53,6 +53,13 @@ Result<NewViews> choose_views(const StageContext& context, const RenderConfig& c
   }
   ORBITFUSE_ASSIGN(const Transforms given, read_transforms_json(config.cameras));
   NewViews views;
+  constexpr double max_pixels = 64e6;  // a view is held whole, with depth and opacity
+  for (std::size_t i = 0; i < given.frames.size(); ++i) {
+    const Camera& camera = given.frames[i].camera;
+    if (static_cast<double>(camera.width) * camera.height > max_pixels)
+      return fail(ErrorKind::input, fmt::format("{}: frames[{}]", config.cameras, i),
+                  fmt::format("{}x{} pixels", camera.width, camera.height), "choose w and h for at most 64 megapixels");
+  }
   for (const TransformsFrame& f : given.frames)
     views.views.push_back({fmt::format("{:03}", views.views.size()), f.camera.without_distortion(),
                            f.cam_from_world});

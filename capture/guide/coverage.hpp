@@ -47,7 +47,7 @@ struct CoverageOptions {
   double min_sharpness = 0.25;                    ///< a blur of one pixel costs nine tenths
   double max_clipped = 0.25;                      ///< share of over- or underexposed pixels
   double rest_speed_deg_s = 2;                    ///< at 1/100 s this blurs 0.3 px at 640 px, 25 deg
-  double max_sigma_deg = 2;                       ///< a position less sure than this proves nothing
+  double max_sigma_deg = 1;                       ///< a position less sure than this proves nothing
 
   Status validate() const;
 };

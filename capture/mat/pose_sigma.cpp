@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "capture/mat/pose_sigma.hpp"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Dense>
+#include <Eigen/Dense>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <opencv2/calib3d.hpp>
 
@@ -59,6 +61,12 @@ double direction_sigma_deg(const MatCorners& corners, const cv::Matx33d& k, cons
     for (int i = 0; i < 6; ++i) j[i] = jacobian.at<double>(row, i);
     information += j * j.transpose();
   }
+  constexpr double unknown = std::numeric_limits<double>::infinity();
+  // Scaled to a unit diagonal, so that radians and metres weigh alike.
+  const PoseVector scale = information.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> shape(scale.asDiagonal() * information *
+                                                                         scale.asDiagonal());
+  if (!scale.allFinite() || !(shape.eigenvalues()[0] > 1e-10)) return unknown;
   const Eigen::Matrix<double, 6, 6> covariance =
       information.ldlt().solve(Eigen::Matrix<double, 6, 6>::Identity()) *
       std::pow(std::max(error_px, 0.1), 2);
@@ -73,7 +81,9 @@ double direction_sigma_deg(const MatCorners& corners, const cv::Matx33d& k, cons
       moved[i] += step;
       gradient[i] = angle_difference_deg(angles_of(moved)[angle], here[angle]) / step;
     }
-    worst = std::max(worst, gradient.dot(covariance * gradient));
+    const double variance = gradient.dot(covariance * gradient);
+    if (!std::isfinite(variance)) return unknown;
+    worst = std::max(worst, variance);
   }
   return std::sqrt(worst);
 }

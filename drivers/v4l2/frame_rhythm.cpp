@@ -22,7 +22,9 @@ int FrameRhythm::note(std::uint64_t id, std::int64_t stamp_ns) {
   if (steps == 1 && known_ >= settled && interval_s > late * interval_s_) {
     missing = static_cast<int>(std::clamp(std::round(interval_s / interval_s_) - 1, 1.0, 1e6));
   }
-  interval_s_ = known_ == 0 ? interval_s : (1 - weight) * interval_s_ + weight * interval_s;
+  // A pause says nothing about the rate before and after it.
+  const double told_s = missing > 0 ? std::min(interval_s, late * interval_s_) : interval_s;
+  interval_s_ = known_ == 0 ? interval_s : (1 - weight) * interval_s_ + weight * told_s;
   ++known_;
   return missing;
 }

@@ -259,7 +259,7 @@ Delivery V4l2Source::lose(const std::string& event, const std::string& why) {
   close_device();
   away_ = true;
   rhythm_.interrupt();
-  lost_at_ = last_frame_;
+  lost_at_ = last_frame_;  // set on reopening too: an earlier outage is counted already
   last_attempt_ = {};
   Delivery delivery;
   delivery.kind = Delivery::Kind::event;
@@ -285,7 +285,7 @@ std::optional<Delivery> V4l2Source::try_reopen() {
   const double outage_s = std::chrono::duration<double>(Clock::now() - lost_at_).count();
   // Ids leave room for what the outage cost, so that it counts as lost.
   const std::uint64_t cost = rhythm_.frames_in(outage_s);
-  base_id_ += cost;
+  next_id_ = base_id_ += cost;  // also if it is lost again before a frame
   Delivery delivery;
   delivery.kind = Delivery::Kind::event;
   delivery.reason = "reconnected";

@@ -29,12 +29,6 @@ double depth_loss(const RayTarget& target, int count, const float* t, const floa
   return -target.depth_weight * std::log(mass);
 }
 
-bool all_finite(const float* values, std::size_t count) {
-  float sum = 0;  // x * 0 is NaN exactly for the values that must not pass
-  for (std::size_t i = 0; i < count; ++i) sum += values[i] * 0.0f;
-  return sum == 0.0f;
-}
-
 }  // namespace
 
 void BlockGradients::reset(const FieldState& field) {

@@ -26,6 +26,11 @@ void resample(int bins, const T* edges, const T* weights, T padding, T jitter, i
   T total = 0;
   for (int i = 0; i < bins; ++i) total += weights[i] + padding;
   const int ends = count + 1;
+  if (!(total > 0)) {  // nothing is known, or not a number: look everywhere
+    for (int i = 0; i < ends; ++i)
+      out[i] = edges[0] + static_cast<T>(i) / static_cast<T>(count) * (edges[bins] - edges[0]);
+    return;
+  }
   T before = 0;
   int bin = 0;
   for (int i = 0; i < ends; ++i) {
@@ -34,8 +39,8 @@ void resample(int bins, const T* edges, const T* weights, T padding, T jitter, i
       before += weights[bin] + padding;
       ++bin;
     }
-    const T part = total > 0 ? std::clamp((wanted - before) / (weights[bin] + padding), T(0), T(1))
-                             : static_cast<T>(i) / static_cast<T>(count);
+    const T mass = weights[bin] + padding;
+    const T part = mass > 0 ? std::clamp((wanted - before) / mass, T(0), T(1)) : T(0);
     out[i] = edges[bin] + part * (edges[bin + 1] - edges[bin]);
   }
 }

@@ -54,9 +54,9 @@ Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
 
 struct RenderOptions {
   double stop_transmittance = 1e-3;  ///< a ray ends when less light than this is left
-  double sample_factor = 1;          ///< samples per ray, as a multiple of those in training
-  /// Rays stop sampling a little behind what their neighbours met: a third less time. A surface
-  /// that no ray of a 4x4 tile's neighbours shows can be missed; false looks along every ray.
+  double sample_factor = 1;          ///< samples per ray, as a multiple of those in training (Sampling::occupancy)
+  /// Rays spread their samples over the way to a little behind what their neighbours met, and go on
+  /// to the end only if nothing stopped them: finer samples, a third less time.
   bool look_ahead = true;
   Status validate() const;
 };

@@ -84,6 +84,12 @@ void HashEncoding::encode(const Kernels& kernels, const float* position01, int c
   }
 }
 
+bool all_finite(const float* values, std::size_t count) {
+  float sum = 0;  // x * 0 is NaN exactly for the values that must not pass
+  for (std::size_t i = 0; i < count; ++i) sum += values[i] * 0.0f;
+  return sum == 0.0f;
+}
+
 void by_level(const HashEncoding& grid, const std::vector<float>& rows, std::size_t count,
               std::vector<float>& levels) {
   const auto features = static_cast<std::size_t>(grid.features), width = static_cast<std::size_t>(grid.width);

@@ -34,6 +34,8 @@ struct HashEncoding {
 void by_level(const HashEncoding& grid, const std::vector<float>& rows, std::size_t count,
               std::vector<float>& levels);
 
+bool all_finite(const float* values, std::size_t count);
+
 /// A perceptron without biases: ReLU between layers, linear output.
 struct Mlp {
   struct Layer {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "recon/nerf/compositing.hpp"
 #include "recon/nerf/interlevel.hpp"
@@ -140,6 +141,7 @@ double backward_proposals(const FieldState& field, const Kernels& kernels, const
     network.mlp.backward(kernels, static_cast<int>(count), level.features.data(), level.density,
                          level.ddensity.data(), level.dfeatures.data(), p.scratch_a, p.scratch_b,
                          dweights[k].data());
+    if (!all_finite(level.dfeatures.data(), count * width)) loss = std::numeric_limits<double>::quiet_NaN();
     by_level(network.grid, level.dfeatures, count, level.grid);
   }
   return loss;

@@ -38,7 +38,8 @@ void add_proposed(const FieldState& field, const Kernels& kernels, const std::ve
                   ProposalBlock& proposals, RayBlock& block);
 
 /// Gradients of the interlevel loss for a block that add_proposed() and forward() have filled:
-/// added to dweights[level], the grids' into proposals. Returns the loss (times nothing).
+/// added to dweights[level], the grids' into proposals. Returns the loss, NaN if a gradient is not
+/// finite.
 /// The fine weights are constants here: the field doesn't learn from its proposals.
 double backward_proposals(const FieldState& field, const Kernels& kernels, const RayBlock& block,
                           float per_ray, ProposalBlock& proposals,

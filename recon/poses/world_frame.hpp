@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <Eigen/Core>
 #include <vector>
 
@@ -53,7 +54,8 @@ struct CaptureOrder {
   int steps = 0;      ///< between successive posed frames of one stream
   int leaps = 0;      ///< more than 60 deg off the usual step, without a change of loop
   int reversals = 0;  ///< more than 5 deg against the usual direction
-  bool contradicted() const { return leaps > steps / 50 || 4 * reversals > steps; }
+  /// A station made up for at the end is one leap, and one view astray is two.
+  bool contradicted() const { return leaps > std::max(2, steps / 16) || 4 * reversals > steps; }
 };
 /// Only stations and tracking frames have an order that means something; steps = 0 for others.
 CaptureOrder capture_order(const std::vector<PosedView>& views, const Session& session);

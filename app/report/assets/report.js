@@ -46,12 +46,12 @@
 
   if (method) {
     method.replaceChildren(...view.fused.map((f, i) => new Option(f.method, i)));
-    method.value = Math.max(0, view.fused.length - 1);
+    method.value = 0;  // the default method comes first
     method.addEventListener("change", show);
   }
   if (left) {
     fill(left, 0);
-    fill(right, 99);
+    fill(right, (view.visible ? 1 : 0) + (view.thermal ? 1 : 0));  // the first fused image
     for (const s of [left, right]) s.addEventListener("change", showSwipe);
     const swipe = byId("swipe");
     const move = (percent) => { cut.value = percent; swipe.style.setProperty("--cut", percent + "%"); };

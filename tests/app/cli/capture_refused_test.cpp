@@ -103,10 +103,11 @@ TEST(Refused, DeviceAndFolderWithoutPermission) {
   EXPECT_THAT(folder.err, HasSubstr(session));
   // Any device that only root may open stands for a camera.
   if (std::filesystem::exists("/dev/loop-control")) {
-    const Outcome device = as_nobody({"capture", "/tmp/never", "--visible", "v4l2:/dev/loop-control", "--seconds", "1"});
+    const std::string never = temp.path / "never";
+    const Outcome device = as_nobody({"capture", never, "--visible", "v4l2:/dev/loop-control", "--seconds", "1"});
     EXPECT_EQ(device.code, 4) << device.err;
     EXPECT_THAT(device.err, HasSubstr("group video"));
-    EXPECT_FALSE(std::filesystem::exists("/tmp/never"));
+    EXPECT_FALSE(std::filesystem::exists(never));
   }
   EXPECT_FALSE(std::filesystem::exists(session));
   std::filesystem::permissions(temp.path, std::filesystem::perms::owner_all);

@@ -75,6 +75,19 @@ TEST_F(Run, BothModalitiesThenNothingThenWhatChanged) {
   EXPECT_FALSE(fs::exists(out / "render/visible/001.png"));
 }
 
+TEST_F(Run, AFinishedRunKeepsItsOptions) {
+  write_fixture_session(session, {.thermal = 0});
+  ASSERT_EQ(run({"--seed", "5"}).code, 0);
+  const Outcome again = orbitfuse_program({"report", out.string(), "--json"});
+  ASSERT_EQ(again.code, 0) << again.err;
+  for (const auto& [stage, state] : states(again))
+    EXPECT_TRUE(stage == "report" || state != "ran") << stage;
+  const Outcome changed = orbitfuse_program({"render", out.string(), "--json", "--set", "render.views=1"});
+  ASSERT_EQ(changed.code, 0) << changed.err;
+  EXPECT_EQ(states(changed).at("train_visible"), "unchanged");
+  EXPECT_EQ(states(changed).at("render"), "ran");
+}
+
 TEST_F(Run, VisibleOnlySaysSoAndSucceeds) {
   write_fixture_session(session, {.thermal = 0});
   const Outcome outcome = run();
@@ -117,6 +130,11 @@ TEST_F(Run, GivenCamerasAreRenderedAsGiven) {
   EXPECT_EQ(image->cols, 40);
   EXPECT_FALSE(fs::exists(out / "render/visible/001.png"));
   EXPECT_EQ(run({"--cameras", "/none.json"}, {}, "render").code, 3);
+  cameras->frames[0].camera = cameras->frames[0].camera.scaled_to(1000000, 1000000);
+  ASSERT_TRUE(write_transforms_json(temp.path / "huge.json", *cameras));
+  const Outcome huge = run({"--cameras", (temp.path / "huge.json").string()}, {}, "render");
+  EXPECT_EQ(huge.code, 3);
+  EXPECT_THAT(huge.err, HasSubstr("huge.json: frames[0]"));
 }
 
 TEST_F(Run, JsonStreamIsOneObjectALineAndEndsWithTheResult) {

@@ -103,7 +103,8 @@ TEST(Agreement, LookingAheadChangesNoPicture) {
   EXPECT_LT(rms, 0.03);
 }
 
-// Kernels in double arithmetic, from their definitions.
+// The perceptrons' sums in double, from their definitions. The table is stored in half precision
+// and the rest of the step is float in all of them.
 
 void double_encode(const GridLevel& level, const std::uint16_t* table, const float* position, int count,
                    float* out, int stride) {
@@ -166,7 +167,7 @@ double psnr_with(const Dataset& data, const Kernels& kernels) {
   return psnr_of(state, views[0], 1);
 }
 
-TEST(Agreement, TrainingInFloatBfloatAndDoubleEndsWithinAFifthOfADecibel) {
+TEST(Agreement, PerceptronsInFloatBfloatAndDoubleTrainWithinAFifthOfADecibel) {
   Dataset data = toy_scene(Modality::visible, 10);
   data.depth = test::toy_depth(data);
   Kernels in_double = kernels_avx2();
