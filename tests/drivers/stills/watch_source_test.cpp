@@ -105,7 +105,9 @@ TEST_F(WatchTest, ResumedSessionGetsNoPhotoTwice) {
     const Delivery delivery = soon(source);
     frames += delivery.kind == Delivery::Kind::frame;
     duplicates += delivery.reason == "duplicate";
-    if (delivery.kind == Delivery::Kind::frame) EXPECT_EQ(delivery.frame.encoded, photo(3));
+    if (delivery.kind == Delivery::Kind::frame) {
+      EXPECT_EQ(delivery.frame.encoded, photo(3));
+    }
   }
   EXPECT_EQ(frames, 1);
   EXPECT_EQ(duplicates, 3);
