@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <optional>
 
 #include "app/cli/command_line.hpp"
 #include "app/cli/run_stages.hpp"
@@ -32,13 +33,13 @@ void set_up_logging(int verbosity) {
 Status resolve_config(const cli::CommonOptions& common, const CLI::App& verb, stages::RunConfig& config) {
   config::Settings settings = config.settings();
   const CLI::Option* session = verb.get_option_no_throw("session");
-  bool again = false;
+  std::optional<std::uint64_t> seed;
   if (session != nullptr && session->count() > 0) {
-    ORBITFUSE_ASSIGN(again, cli::read_earlier_options(session->as<std::string>(), settings));
+    ORBITFUSE_ASSIGN(seed, cli::read_earlier_options(session->as<std::string>(), settings));
   }
   if (!common.config_file.empty()) ORBITFUSE_TRY(settings.read_toml(common.config_file));
   for (const std::string& assignment : common.overrides) ORBITFUSE_TRY(settings.apply(assignment));
-  if (!again || verb.count("--seed") > 0) config.set_seed(common.seed);
+  config.set_seed(verb.count("--seed") > 0 ? common.seed : seed.value_or(common.seed));
   return config.validate();
 }
 

@@ -75,11 +75,13 @@ Result<json> earlier_run(const std::string& folder) {
 
 }  // namespace
 
-Result<bool> read_earlier_options(const std::string& folder, config::Settings& settings) {
+Result<std::optional<std::uint64_t>> read_earlier_options(const std::string& folder, config::Settings& settings) {
   ORBITFUSE_ASSIGN(const json run, earlier_run(folder));
-  if (!run.contains("config") || !run["config"].is_object()) return false;
+  if (!run.contains("config") || !run["config"].is_object()) return std::nullopt;
   ORBITFUSE_TRY(settings.read_json(run["config"], (fs::path(folder) / run_file).string()));
-  return true;
+  return run.contains("seed") && run["seed"].is_number_unsigned()
+             ? std::optional<std::uint64_t>(run["seed"].get<std::uint64_t>())
+             : std::nullopt;
 }
 
 Status resolve(StageFolders& folders) {
@@ -121,6 +123,7 @@ Status run_stages(Context& context, const StageFolders& given,
                       {"session", fs::absolute(folders.session).lexically_normal().string()},
                       {"orbitfuse", pipeline::software_version()},
                       {"config", context.config.settings().to_json()},
+                      {"seed", context.config.seed},
                       {"stages", list}};
     const Status written = write_file_atomic(fs::path(folders.out) / run_file, run.dump(2) + "\n");
     if (!written && !summary.error) return written;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,8 +20,9 @@ void add_folders(CLI::App& app, StageFolders& folders);
 /// The session and the out folder meant; an out folder knows its session (run.json).
 Status resolve(StageFolders& folders);
 
-/// The --out folder of an earlier run brings that run's options; false: `folder` is none.
-Result<bool> read_earlier_options(const std::string& folder, config::Settings& settings);
+/// The --out folder of an earlier run brings that run's options; returns its seed, or none when
+/// `folder` is no such folder.
+Result<std::optional<std::uint64_t>> read_earlier_options(const std::string& folder, config::Settings& settings);
 
 /// Runs the targets and all they read, says how each stage fared, and fills the --json result.
 /// Empty targets: every stage.

@@ -197,6 +197,7 @@ CaptureOrder capture_order(const std::vector<PosedView>& views, const Session& s
   for (const Step& s : steps) rates.push_back(s.azimuth_deg / s.frames);
   if (rates.empty()) return order;
   const double usual = median(rates);
+  order.dense = std::abs(usual) < 20;
   for (const Step& s : steps) {
     if (!s.same_loop) continue;
     const double expected = usual * s.frames;  // beyond a sixth of the orbit a guess

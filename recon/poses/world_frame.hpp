@@ -54,8 +54,11 @@ struct CaptureOrder {
   int steps = 0;      ///< between successive posed frames of one stream
   int leaps = 0;      ///< more than 60 deg off the usual step, without a change of loop
   int reversals = 0;  ///< more than 5 deg against the usual direction
-  /// A station made up for at the end is one leap, and one view astray is two.
-  bool contradicted() const { return leaps > std::max(2, steps / 16) || 4 * reversals > steps; }
+  bool dense = false; ///< frames between the stations too: steps under 20 deg
+  /// Among stations alone, one made up for at the end is a leap, and one view astray is two.
+  bool contradicted() const {
+    return leaps > (dense ? steps / 50 : std::max(2, steps / 16)) || 4 * reversals > steps;
+  }
 };
 /// Only stations and tracking frames have an order that means something; steps = 0 for others.
 CaptureOrder capture_order(const std::vector<PosedView>& views, const Session& session);
