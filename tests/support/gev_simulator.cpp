@@ -95,6 +95,14 @@ void GevSimulator::reset_memory() {
   real(gev_registers::reflected_k, 293.15f);
 }
 
+bool GevSimulator::start_when_free() {
+  for (int i = 0; i < 100; ++i) {
+    if (start()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+  return false;
+}
+
 bool GevSimulator::start() {
   if (running_) return true;
   reset_memory();

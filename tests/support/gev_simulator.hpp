@@ -48,6 +48,8 @@ class GevSimulator {
 
   /// False when the GVCP port is taken (another simulator runs).
   bool start();
+  /// Tries for ten seconds: another run's simulator may still hold the port.
+  bool start_when_free();
   /// As if the power were cut: sockets closed, registers back to their defaults.
   void kill();
   void set_faults(const GevFaults& faults);

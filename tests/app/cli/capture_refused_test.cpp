@@ -24,9 +24,7 @@ const std::string tiny = "synthetic,size=64x48,spacing=60";
 class RefusedGigE : public ::testing::Test {
  protected:
   void SetUp() override {
-    bool up = false;
-    for (int i = 0; i < 100 && !(up = camera.start()); ++i) usleep(100'000);
-    if (!up) GTEST_SKIP() << "the GVCP port 3956 on loopback is in use";
+    if (!camera.start_when_free()) GTEST_SKIP() << "the GVCP port 3956 on loopback is in use";
   }
   testing::GevSimulator camera;
   const TempFolder temp;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <unistd.h>
+#include <memory>
 
 #include "tests/drivers/aravis/stream_harness.hpp"
 
@@ -10,53 +10,53 @@ using namespace std::chrono_literals;
 using orbitfuse::testing::GevFaults;
 using orbitfuse::testing::GevSimulator;
 
-/// 640x480 Mono16 at 30 Hz for a minute (ORBITFUSE_SOAK_S: longer), clean and with 1 % loss.
-void soak(double loss) {
+/// 640x480 Mono16 at 30 Hz for a minute (ORBITFUSE_SOAK_S: longer).
+class AravisSoak : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!camera.start_when_free()) GTEST_SKIP() << "the GVCP port 3956 on loopback is in use";
+    const char* wanted = std::getenv("ORBITFUSE_SOAK_S");
+    count = static_cast<std::uint64_t>(30 * (wanted ? std::atof(wanted) : 60.0));
+  }
+  /// Null when it doesn't start.
+  std::unique_ptr<AravisSource> started(double packet_loss, bool answer_resend) {
+    GevFaults faults;
+    faults.packet_loss = packet_loss;
+    faults.answer_resend = answer_resend;
+    camera.set_faults(faults);
+    AravisOptions options;
+    options.camera = "127.0.0.1";
+    options.profiles = std::string(ORBITFUSE_SOURCE_DIR) + "/config/cameras";
+    auto source = std::make_unique<AravisSource>(options);
+    return source->start() ? std::move(source) : nullptr;
+  }
+  void expect_every_frame(double packet_loss);
+
   GevSimulator camera;
-  bool up = false;
-  for (int i = 0; i < 100 && !(up = camera.start()); ++i) usleep(100'000);
-  if (!up) GTEST_SKIP() << "the GVCP port 3956 on loopback is in use";
-  GevFaults faults;
-  faults.packet_loss = loss;
-  camera.set_faults(faults);
-  AravisOptions options;
-  options.camera = "127.0.0.1";
-  options.profiles = std::string(ORBITFUSE_SOURCE_DIR) + "/config/cameras";
-  AravisSource source(options);
-  ASSERT_TRUE(source.start());
-  const char* wanted = std::getenv("ORBITFUSE_SOAK_S");
-  const auto count = static_cast<std::uint64_t>(30 * (wanted ? std::atof(wanted) : 60.0));
-  const Tally tally = drain(source, std::chrono::seconds(count / 10), [&](const Tally& t) { return t.frames + t.rejected >= count; });
+  std::uint64_t count = 0;
+};
+
+void AravisSoak::expect_every_frame(double packet_loss) {
+  const auto source = started(packet_loss, true);
+  ASSERT_TRUE(source);
+  const Tally tally = drain(*source, std::chrono::seconds(count / 10), [&](const Tally& t) { return t.frames + t.rejected >= count; });
   EXPECT_EQ(tally.frames, count);
   EXPECT_EQ(tally.span(), count);
   EXPECT_EQ(tally.rejected + tally.wrong_bits + tally.not_rising, 0u);
   std::printf("frames %llu, dropped packets %llu, resent %llu, clock residual %.2f ms, drift %.1f ppm\n",
               static_cast<unsigned long long>(tally.frames), static_cast<unsigned long long>(camera.packets_dropped()),
-              static_cast<unsigned long long>(camera.resends_answered()), 1000 * source.clock().residual_rms_s(),
-              source.clock().drift_ppm());
+              static_cast<unsigned long long>(camera.resends_answered()), 1000 * source->clock().residual_rms_s(),
+              source->clock().drift_ppm());
 }
 
-TEST(AravisSoak, CleanMinute) { soak(0); }
-TEST(AravisSoak, OnePercentLossWithResend) { soak(0.01); }
+TEST_F(AravisSoak, CleanMinute) { expect_every_frame(0); }
+TEST_F(AravisSoak, OnePercentLossWithResend) { expect_every_frame(0.01); }
 
 /// Nine frames of ten are damaged: each is counted, and every other is stored.
-TEST(AravisSoak, HalfPercentLossWithoutResend) {
-  GevSimulator camera;
-  bool up = false;
-  for (int i = 0; i < 100 && !(up = camera.start()); ++i) usleep(100'000);
-  if (!up) GTEST_SKIP() << "the GVCP port 3956 on loopback is in use";
-  GevFaults faults;
-  faults.packet_loss = 0.005;
-  faults.answer_resend = false;
-  camera.set_faults(faults);
-  AravisOptions options;
-  options.camera = "127.0.0.1";
-  options.profiles = std::string(ORBITFUSE_SOURCE_DIR) + "/config/cameras";
-  AravisSource source(options);
-  ASSERT_TRUE(source.start());
-  const char* wanted = std::getenv("ORBITFUSE_SOAK_S");
-  const auto count = static_cast<std::uint64_t>(30 * (wanted ? std::atof(wanted) : 60.0));
-  const Tally tally = drain(source, std::chrono::seconds(count / 10), [&](const Tally& t) { return t.span() >= count; });
+TEST_F(AravisSoak, HalfPercentLossWithoutResend) {
+  const auto source = started(0.005, false);
+  ASSERT_TRUE(source);
+  const Tally tally = drain(*source, std::chrono::seconds(count / 10), [&](const Tally& t) { return t.span() >= count; });
   const std::uint64_t sent = camera.frames_sent(), whole = sent - camera.frames_damaged();
   std::printf("span %llu of %llu sent: %llu frames stored of %llu whole ones, %llu rejected, %llu missing\n",
               static_cast<unsigned long long>(tally.span()), static_cast<unsigned long long>(sent),

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <unistd.h>
-
 #include "tests/drivers/aravis/stream_harness.hpp"
 #include "tests/support/gev_genicam_xml.hpp"
 
@@ -16,10 +14,7 @@ namespace registers = orbitfuse::testing::gev_registers;
 class AravisStream : public ::testing::Test {
  protected:
   void SetUp() override {
-    // Another run's simulator may still hold the port.
-    bool up = false;
-    for (int i = 0; i < 100 && !(up = camera.start()); ++i) usleep(100'000);
-    if (!up) GTEST_SKIP() << "the GVCP port 3956 on loopback is in use";
+    if (!camera.start_when_free()) GTEST_SKIP() << "the GVCP port 3956 on loopback is in use";
     options.camera = "127.0.0.1";
     options.profiles = std::string(ORBITFUSE_SOURCE_DIR) + "/config/cameras";
   }

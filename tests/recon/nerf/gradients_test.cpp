@@ -7,6 +7,7 @@
 #include "recon/nerf/backward.hpp"
 #include "recon/nerf/compositing.hpp"
 #include "recon/nerf/random.hpp"
+#include "tests/recon/nerf/slope.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
@@ -130,25 +131,15 @@ class FieldGradient : public ::testing::TestWithParam<Modality> {
                                 settings_.distortion_weight * gradients.distortion + gradients.depth);
   }
 
-  /// Slope along the gradient itself, the best conditioned direction: must be its length.
-  void check(Parameters& parameters, const std::vector<float>& gradient) {
-    double length = 0;
-    for (const float g : gradient) length += double{g} * g;
-    length = std::sqrt(length);
-    ASSERT_GT(length, 1e-6);
-    const auto kept = parameters.value;
-    const double h = 3e-3;
-    double side[2];
-    for (int k = 0; k < 2; ++k) {
-      for (std::size_t i = 0; i < gradient.size(); ++i)
-        parameters.value[i] = kept[i] + static_cast<float>((k == 0 ? h : -h) * gradient[i] / length);
-      field_.refresh();
-      BlockGradients unused;
-      side[k] = loss(unused);
-    }
-    parameters.value = kept;
+  double moved_loss() {
     field_.refresh();
-    EXPECT_NEAR((side[0] - side[1]) / (2 * h), length, 0.01 * length);
+    BlockGradients unused;
+    return loss(unused);
+  }
+
+  void check(Parameters& parameters, const std::vector<float>& gradient) {
+    test::expect_slope(parameters.value, gradient, 3e-3, 0.01, [&] { return moved_loss(); });
+    field_.refresh();
   }
 
   const Kernels& kernels_ = kernels_for(Isa::avx2);
@@ -180,21 +171,7 @@ TEST_P(FieldGradient, OfTheHashTableMatchesDifferences) {
     kernels_.scatter(grid.levels[l], table.data() + grid.levels[l].offset, block_.position01.data(), n,
                      grid_.data() + l * static_cast<std::size_t>(n * grid.features));
   // The table is read in half precision, so the step must be large against 2^-11.
-  double length = 0;
-  for (const float g : table) length += double{g} * g;
-  length = std::sqrt(length);
-  ASSERT_GT(length, 1e-6);
-  const auto kept = grid.table.value;
-  const double h = 0.05;
-  double side[2];
-  for (int k = 0; k < 2; ++k) {
-    for (std::size_t i = 0; i < table.size(); ++i)
-      grid.table.value[i] = kept[i] + static_cast<float>((k == 0 ? h : -h) * table[i] / length);
-    field_.refresh();
-    BlockGradients unused;
-    side[k] = loss(unused);
-  }
-  EXPECT_NEAR((side[0] - side[1]) / (2 * h), length, 0.03 * length);
+  test::expect_slope(grid.table.value, table, 0.05, 0.03, [&] { return moved_loss(); });
 }
 
 INSTANTIATE_TEST_SUITE_P(EveryModality, FieldGradient,
