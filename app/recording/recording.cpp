@@ -106,10 +106,7 @@ Status Recording::prepare() {
   const std::lock_guard lock(mutex_);
   if (options_.guide) {
     guide_ = std::make_unique<LiveGuide>(*writer_, *options_.guide, finder_);
-    // Sectors that an earlier recording filled stay filled.
-    if (earlier) {
-      for (const FrameRecord& frame : earlier->frames) guide_->add(frame);
-    }
+    if (earlier) guide_->resume(earlier->frames);
   }
   RecorderOptions recorder_options;
   if (!options_.live) recorder_options.backpressure = Backpressure::wait;

@@ -311,8 +311,8 @@ Action add_capture(CLI::App& app) {
       ->check(CLI::IsMember({"auto", "key", "off"}))
       ->capture_default_str();
   app.add_option("--turntable", options->turntable_deg,
-                 "The object stands on a turntable: each Enter key, and each photo of a stills "
-                 "camera, is this many degrees further; a full turn later it is the next loop");
+                 "The object stands on a turntable: each Enter key (without keys: each photo of a "
+                 "stills camera) is this many degrees further; a full turn later it is the next loop");
   app.add_option("--mat", options->mat, "The mat that lies there (orbitfuse mat): paper or foil")
       ->check(CLI::IsMember({"paper", "foil"}))
       ->capture_default_str();

@@ -14,6 +14,7 @@
 
 #include "capture/guide/coverage.hpp"
 #include "capture/live/sharpness_reference.hpp"
+#include "capture/live/turntable.hpp"
 #include "capture/session_writer.hpp"
 
 namespace orbitfuse {
@@ -26,8 +27,9 @@ struct LiveGuideOptions {
   CoverageOptions coverage;
   double looks_per_second = 4;  ///< per camera; finding the mat costs 5-30 ms a look
   double unseen_after_s = 1.0;  ///< a position older than this is no longer where the camera is
-  /// The object stands on a turntable: each key, and each photo, is this much further in azimuth,
-  /// negative for a table that turns the other way; a full turn later it is the next loop. 0: none.
+  /// The object stands on a turntable: each key is this much further in azimuth, negative for a
+  /// table that turns the other way; a full turn later it is the next loop. A photo shows the table
+  /// where the last key put it; without keys each photo of a camera is a step. 0: none.
   double turntable_step_deg = 0;
 
   Status validate() const;
@@ -53,6 +55,9 @@ class LiveGuide {
   LiveGuide(SessionWriter& writer, LiveGuideOptions options, PositionFinder finder = {});
   ~LiveGuide();
 
+  /// What an earlier recording of the session stored, before the first add(): sectors that it
+  /// filled stay filled, and the turntable goes on one step after the last recorded station.
+  void resume(const std::vector<FrameRecord>& earlier);
   /// From any thread; fast unless the frame carries a station.
   void add(const FrameRecord& frame);
   /// The operator stands at the next station, or has turned the table by a step: for each modality
@@ -79,15 +84,16 @@ class LiveGuide {
     std::int64_t position_time_ns = 0;
     std::optional<FrameRecord> waiting;  ///< newest frame not looked at yet
     std::optional<OrbitPosition> announced;  ///< by the key: where the next good frame is
-    int table_steps = 0;                     ///< that the turntable has made
+    TableView table;
     std::map<std::size_t, FrameRecord> chosen;  ///< by sector
   };
+  void add_at_station(Camera& camera, const FrameRecord& frame);
   void look();
   void judge(Camera& camera, const FrameRecord& frame,
              const std::optional<OrbitPosition>& position);
   void note_choice(Camera& camera, const FrameRecord& frame);
   std::optional<OrbitPosition> next_station(Modality modality) const;
-  OrbitPosition next_table_position(Camera& camera) const;
+  OrbitPosition on_table(TableView& view, double azimuth_deg) const;
   void judge_announced(Camera& camera, const FrameRecord& frame);
   void set_position(Camera& camera, OrbitPosition position, std::int64_t time_ns);
 
@@ -98,6 +104,7 @@ class LiveGuide {
   std::condition_variable changed_;
   Coverage coverage_;
   std::map<Modality, Camera> cameras_;
+  Turntable table_;
   std::optional<Error> error_;
   bool over_ = false;
   std::jthread looker_;
