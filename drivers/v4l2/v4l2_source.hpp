@@ -17,6 +17,8 @@
 #include "drivers/v4l2/pixels.hpp"
 #include "drivers/v4l2/video_system.hpp"
 
+struct v4l2_buffer;
+
 namespace orbitfuse::v4l2 {
 
 struct V4l2Options {
@@ -70,9 +72,10 @@ class V4l2Source final : public FrameSource {
   Status map_buffers();
   void close_device();
   Delivery lose(const std::string& event, const std::string& why);
-  Delivery stall();
+  Delivery stall(const std::string& why);
   std::optional<Delivery> try_reopen();
   Result<Delivery> dequeue();
+  Result<Delivery> empty_at_start(v4l2_buffer& buffer);
   Delivery delivery_of(std::uint32_t index, std::uint32_t bytes, std::uint32_t flags);
   void watch_rhythm(std::uint64_t id, std::int64_t stamp_ns);
   std::uint64_t unwrap(std::uint32_t sequence);
@@ -90,7 +93,7 @@ class V4l2Source final : public FrameSource {
   std::vector<Delivery> pending_;       ///< events to tell before the next frame
   Clock::time_point last_frame_{}, last_attempt_{}, lost_at_{};
   std::uint64_t next_id_ = 0, base_id_ = 0;
-  int stalls_in_a_row_ = 0;
+  int stalls_in_a_row_ = 0, empty_at_start_ = 0;
   std::map<std::uint32_t, int> locked_; ///< controls and the values they were locked at
   FrameRhythm rhythm_;
   int late_frames_ = 0;

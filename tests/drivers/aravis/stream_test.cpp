@@ -131,6 +131,35 @@ TEST_F(AravisStream, LinkDownAndBack) {
   EXPECT_EQ(back.wrong_bits + back.not_rising, 0u);
 }
 
+TEST_F(AravisStream, TwoOutagesWithoutAFrameBetweenCostTheTimeOfBoth) {
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  const Tally before = drain(source, 10s, frames(60));
+  const auto lost = testing_clock::now();
+  const auto disconnected = [](const Tally& t) { return t.has("disconnected"); };
+  const auto reconnected = [](const Tally& t) { return t.has("reconnected"); };
+  GevFaults faults;
+  faults.link_down = true;
+  camera.set_faults(faults);
+  ASSERT_TRUE(disconnected(drain(source, 10s, disconnected)));
+  drain(source, 1s);
+  faults = {};
+  faults.packet_loss = 1;  // it answers, but sends nothing
+  faults.answer_resend = false;
+  camera.set_faults(faults);
+  const Tally between = drain(source, 20s, reconnected);
+  ASSERT_TRUE(reconnected(between));
+  EXPECT_EQ(between.frames + between.rejected, 0u);
+  ASSERT_TRUE(disconnected(drain(source, 10s, disconnected)));
+  camera.set_faults({});
+  const Tally back = drain(source, 20s, [](const Tally& t) { return t.frames > 0; });
+  ASSERT_TRUE(reconnected(back));
+  const double both_s = std::chrono::duration<double>(testing_clock::now() - lost).count();
+  const auto gap = static_cast<double>(back.first_id - before.last_id);
+  EXPECT_GT(gap, 0.75 * 60 * both_s);  // either alone is under two thirds
+  EXPECT_LT(gap, 1.5 * 60 * both_s);
+}
+
 TEST_F(AravisStream, MutedControlChannelIsToldAndRecovered) {
   AravisSource source(options);
   ASSERT_TRUE(source.start());
