@@ -293,10 +293,12 @@ Action add_capture(CLI::App& app) {
                  "Session folder: new, or with --resume one to go on with")
       ->required();
   app.add_option("--visible", options->visible,
-                 "Visible camera: DRIVER[:CAMERA][,KEY=VALUE]...; drivers are aravis, v4l2, "
-                 "replay and synthetic");
+                 "Visible camera: DRIVER[:CAMERA][,KEY=VALUE]...; drivers are aravis (GigE Vision), v4l2 "
+                 "(USB video), stills (stills:FOLDER takes photos that arrive there), replay and "
+                 "synthetic");
   app.add_option("--thermal", options->thermal,
-                 "Thermal camera, written alike, e.g. aravis:192.168.1.20");
+                 "Thermal camera, written alike, e.g. aravis:192.168.1.20 or stills:FOLDER for "
+                 "radiometric JPEGs");
   app.add_option("--driver", options->driver,
                  "For modalities without a camera of their own, e.g. replay:FOLDER");
   app.add_option("--profiles", options->profiles,
