@@ -120,6 +120,7 @@ struct Recorder::Channel {
       if (delivery->kind == Delivery::Kind::end) break;
       take(*std::move(delivery));
     }
+    if (const std::string counted = source.transport_report(); !counted.empty()) log_event("transport", counted);
     source.stop();
     if (!status) {
       keep_first(status.error());

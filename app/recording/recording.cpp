@@ -223,6 +223,10 @@ void Recording::operator_at_station() {
   if (guide_) guide_->operator_at_station();
 }
 
+void Recording::request_correction() {
+  for (const auto& source : sources_) source->request_correction();
+}
+
 std::vector<StreamStatus> Recording::status() const {
   const std::lock_guard lock(mutex_);
   return recorder_ ? recorder_->status() : std::vector<StreamStatus>{};

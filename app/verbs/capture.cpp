@@ -173,6 +173,8 @@ class Teller {
     const ssize_t count = ::read(STDIN_FILENO, keys, sizeof keys);
     if (count > 0 && keys[0] == 'q')
       recording_.request_stop();
+    else if (count > 0 && keys[0] == 'n')
+      recording_.request_correction();
     else if (count > 0 && recording_.guide())
       recording_.operator_at_station();
   }
@@ -218,6 +220,7 @@ Status open_page(Context& context, const Options& o, recording::Recording& recor
   hooks.start = [&page] { page.started = true; };
   hooks.stop = [&recording] { recording.request_stop(); };
   hooks.at_station = [&recording] { recording.operator_at_station(); };
+  hooks.correct = [&recording] { recording.request_correction(); };
   page.server = std::make_unique<PageServer>(options, std::move(hooks));
   ORBITFUSE_TRY(page.server->start());
   for (const std::string& url : page.server->urls()) context.console.info("page: " + url);
@@ -277,7 +280,7 @@ Status run(Context& context, const Options& o) {
         fmt::format("{}: {} {} {}", device.id, device.driver, device.model, device.serial));
   }
   if (options.live)
-    context.console.info("recording; Enter: at the next station, q or Ctrl-C: stop");
+    context.console.info("recording; Enter: at the next station, n: shutter correction (NUC) now, q or Ctrl-C: stop");
   Teller teller(context, recording, options.live, o.view);
   const auto ending = recording.run(context.progress.cancel, [&] { teller.tick(); });
   account(context, recording);

@@ -50,6 +50,7 @@ Status AravisSource::start() {
 void AravisSource::bury_link() {
   control_watch_ = {};
   if (!link_) return;
+  earlier_ += link_statistics();
   graves_.emplace_back([link = std::move(link_)]() mutable { link.reset(); });
   link_ = nullptr;
 }
@@ -102,6 +103,7 @@ Result<Delivery> AravisSource::next(std::chrono::milliseconds timeout) {
   }
   if (!link_) return fail(ErrorKind::device, "camera " + options_.camera, "not started", "call start() first");
   if (link_->control_lost) return lose("control lost");
+  if (correction_wanted_.exchange(false)) return correct_as_asked();
   if (control_mute_ != mute_told_) {
     mute_told_ = control_mute_;
     return event(mute_told_ ? "control-silent" : "control-back", address_);
@@ -211,7 +213,33 @@ Status AravisSource::correct_nonuniformity() {
   return {};
 }
 
+Delivery AravisSource::correct_as_asked() {
+  if (const Status status = correct_nonuniformity(); !status) return event("nuc-failed", status.error().message());
+  return event("nuc", "asked for by the operator");
+}
+
+StreamStatistics& StreamStatistics::operator+=(const StreamStatistics& other) {
+  completed += other.completed;
+  failures += other.failures;
+  underruns += other.underruns;
+  resent += other.resent;
+  missing_packets += other.missing_packets;
+  size_mismatches += other.size_mismatches;
+  return *this;
+}
+
 StreamStatistics AravisSource::statistics() const {
+  StreamStatistics all = earlier_;
+  return all += link_statistics();
+}
+
+std::string AravisSource::transport_report() const {
+  const StreamStatistics s = statistics();
+  return fmt::format("{} buffers completed, {} failed, {} underruns; {} packets resent, {} missing; {} of another size",
+                     s.completed, s.failures, s.underruns, s.resent, s.missing_packets, s.size_mismatches);
+}
+
+StreamStatistics AravisSource::link_statistics() const {
   StreamStatistics s;
   if (!link_ || !link_->stream) return s;
   const auto info = [&](const char* key) { return arv_stream_get_info_uint64_by_name(link_->stream, key); };

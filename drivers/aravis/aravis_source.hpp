@@ -32,6 +32,8 @@ struct AravisOptions {
 
 struct StreamStatistics {
   std::uint64_t completed = 0, failures = 0, underruns = 0, resent = 0, missing_packets = 0, size_mismatches = 0;
+
+  StreamStatistics& operator+=(const StreamStatistics& other);
 };
 
 /// A GigE Vision camera. Aravis calls some damaged frames good, so every frame is checked for its
@@ -51,8 +53,12 @@ class AravisSource final : public FrameSource {
   Result<Delivery> next(std::chrono::milliseconds timeout) override;
   void stop() override;
 
+  /// Done by the next next().
+  void request_correction() override { correction_wanted_ = true; }
+  std::string transport_report() const override;
   /// Asks the camera for a shutter correction now; frames until it settles are flagged.
   Status correct_nonuniformity();
+  /// Of all connections since the source was made.
   StreamStatistics statistics() const;
   const ClockMap& clock() const { return clock_; }
 
@@ -67,6 +73,8 @@ class AravisSource final : public FrameSource {
   void watch_control();
   Delivery lose(const std::string& why);
   Delivery event(std::string kind, std::string detail) const;
+  Delivery correct_as_asked();
+  StreamStatistics link_statistics() const;
   std::optional<Delivery> try_reopen();
   Delivery inspect(void* buffer);
   void mark_nuc(Frame& frame, const void* data, std::size_t size);
@@ -76,7 +84,8 @@ class AravisSource final : public FrameSource {
   std::shared_ptr<Link> link_;
   std::vector<std::thread> graves_;
   std::jthread control_watch_;
-  std::atomic<bool> control_mute_{false};
+  std::atomic<bool> control_mute_{false}, correction_wanted_{false};
+  StreamStatistics earlier_;           ///< of connections that are gone
   std::vector<std::uint16_t> table_;
   std::vector<Delivery> pending_;
   DeviceInfo info_;

@@ -1,4 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <thread>
+
+#include "drivers/aravis/gvcp_probe.hpp"
+#include "tests/core/temp_folder.hpp"
 #include "tests/drivers/aravis/stream_harness.hpp"
 #include "tests/support/gev_genicam_xml.hpp"
 
@@ -209,12 +215,40 @@ TEST_F(AravisStream, NucIsCommandedAndFramesAreFlagged) {
   EXPECT_EQ(delivery->frame.flags, std::vector<std::string>{"nuc"});
 }
 
+TEST_F(AravisStream, NucAskedForFromAnotherThreadIsToldAndCountersAreReported) {
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  drain(source, 10s, frames(5));
+  std::thread([&] { source.request_correction(); }).join();
+  const Tally tally = drain(source, 5s, [](const Tally& t) { return t.has("nuc"); });
+  EXPECT_TRUE(tally.has("nuc"));
+  EXPECT_EQ(camera.nuc_count(), 1);
+  drain(source, 10s, frames(10));
+  const auto completed = source.statistics().completed;
+  EXPECT_GE(completed, 15u);
+  EXPECT_NE(source.transport_report().find(fmt::format("{} buffers completed", completed)), std::string::npos);
+}
+
 TEST_F(AravisStream, UnknownFeatureInTheProfileIsNamed) {
-  options.profile = "flir-ax5";  // Mono14 and TemperatureLinearMode are not on this camera
+  const test::TempFolder folder;
+  test::put(folder / "mine.toml", "name = \"mine\"\nmodels = []\nsettings = [{PixelFormat = \"Mono16\"}, {NoSuchThing = 3}]\n");
+  options.profiles = folder.path();
+  options.profile = "mine";
   AravisSource source(options);
   const Status status = source.start();
   ASSERT_FALSE(status);
-  EXPECT_NE(status.error().where.find("flir-ax5"), std::string::npos) << status.error().message();
+  EXPECT_EQ(status.error().kind, ErrorKind::usage);
+  EXPECT_NE(status.error().where.find("NoSuchThing"), std::string::npos) << status.error().message();
+}
+
+TEST_F(AravisStream, RegistersAreReadWithoutControl) {
+  EXPECT_EQ(read_register("127.0.0.1", GvcpRegister::control_privilege, 500ms), 0u);
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  EXPECT_NE(read_register("127.0.0.1", GvcpRegister::control_privilege, 500ms).value_or(0), 0u);
+  EXPECT_GT(read_register("127.0.0.1", GvcpRegister::packet_size, 500ms).value_or(0) & 0xffff, 500u);
+  EXPECT_FALSE(read_register("127.0.0.99", GvcpRegister::packet_size, 50ms));
+  EXPECT_FALSE(read_register("no address", GvcpRegister::packet_size, 50ms));
 }
 
 TEST(AravisAbsent, NoCameraIsADeviceError) {
