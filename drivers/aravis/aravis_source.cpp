@@ -2,7 +2,6 @@
 #include "drivers/aravis/aravis_source.hpp"
 
 #include <fmt/format.h>
-#include <xxhash.h>
 
 #include <algorithm>
 #include <cmath>
@@ -31,7 +30,7 @@ Status AravisOptions::validate() const {
   return {};
 }
 
-AravisSource::AravisSource(AravisOptions options) : options_(std::move(options)) {
+AravisSource::AravisSource(AravisOptions options) : options_(std::move(options)), freeze_(options_.nuc_settle) {
   info_.id = options_.device_id;
   info_.modality = options_.modality;
   info_.driver = "aravis";
@@ -82,7 +81,12 @@ std::optional<Delivery> AravisSource::try_reopen() {
   using namespace std::chrono_literals;
   if (Clock::now() - last_attempt_ < 200ms) return std::nullopt;
   last_attempt_ = Clock::now();
-  if (!answers(address_, 100ms) || !open()) return std::nullopt;
+  if (!answers(address_, 100ms)) return std::nullopt;
+  if (const Status status = open(); !status) {
+    if (!failure_.note(status.error().message())) return std::nullopt;
+    return event("reopen-failed", status.error().message());
+  }
+  failure_.clear();
   away_ = false;
   const double outage_s = std::chrono::duration<double>(Clock::now() - lost_at_).count();
   const auto cost = interval_s_ > 0 ? static_cast<std::uint64_t>(std::llround(outage_s / interval_s_)) : 1;
@@ -179,7 +183,8 @@ Delivery AravisSource::inspect(void* handle) {
   frame.host_time_ns = stamp.host_time_ns;
   if (stamp.event) pending_.push_back(event("clock", *stamp.event));
   cv::Mat(height, width, format.cv_type, const_cast<void*>(data)).copyTo(frame.pixels);
-  mark_nuc(frame, data, needed);
+  if (options_.modality == Modality::thermal && freeze_.mark(frame, data, needed))
+    pending_.push_back(event("nuc", "the image is frozen"));
   if (format.bytes == 1) {
     frame.thermal_is_gray = options_.modality == Modality::thermal;
   } else if (table_.empty()) {
@@ -190,26 +195,13 @@ Delivery AravisSource::inspect(void* handle) {
   return delivery;
 }
 
-/// A thermal sensor never repeats its noise: equal frames mean that the shutter is closed.
-void AravisSource::mark_nuc(Frame& frame, const void* data, std::size_t size) {
-  const std::uint64_t hash = XXH3_64bits(data, size);
-  const bool frozen = hash == last_hash_;
-  last_hash_ = hash;
-  if (frozen) {
-    nuc_until_ = Clock::now() + options_.nuc_settle;
-    if (!frozen_) pending_.push_back(event("nuc", "the image is frozen"));
-  }
-  frozen_ = frozen;
-  if (Clock::now() < nuc_until_) frame.flags.push_back("nuc");
-}
-
 Status AravisSource::correct_nonuniformity() {
   if (!link_) return fail(ErrorKind::device, "NUC", "the camera is not connected", "wait until it is back");
   if (profile_.nuc_command.empty()) return fail(ErrorKind::unavailable, "NUC", "not known for " + profile_.name, "set nuc_command in its profile");
   GError* error = nullptr;
   arv_camera_execute_command(link_->camera, profile_.nuc_command.c_str(), &error);
   if (error) return fail(ErrorKind::device, "NUC", take(error), "try again");
-  nuc_until_ = Clock::now() + options_.nuc_settle;
+  freeze_.expect();
   return {};
 }
 

@@ -10,7 +10,9 @@
 #include <vector>
 
 #include "capture/clock/clock_map.hpp"
+#include "capture/freeze_watch.hpp"
 #include "capture/frame_source.hpp"
+#include "capture/lasting_failure.hpp"
 #include "capture/raw_counts.hpp"
 #include "drivers/aravis/profile.hpp"
 
@@ -77,7 +79,6 @@ class AravisSource final : public FrameSource {
   StreamStatistics link_statistics() const;
   std::optional<Delivery> try_reopen();
   Delivery inspect(void* buffer);
-  void mark_nuc(Frame& frame, const void* data, std::size_t size);
 
   AravisOptions options_;
   CameraProfile profile_;
@@ -93,10 +94,12 @@ class AravisSource final : public FrameSource {
   GvspFrameCounter counter_;
   ClockMap clock_;
   RawCounts raw_counts_;
-  std::uint64_t base_id_ = 0, next_id_ = 0, mismatches_ = 0, last_hash_ = 0;
+  FreezeWatch freeze_;
+  LastingFailure failure_;             ///< to reopen
+  std::uint64_t base_id_ = 0, next_id_ = 0, mismatches_ = 0;
   double interval_s_ = 0;              ///< between frames, smoothed; tells how many an outage cost
-  bool away_ = false, silent_told_ = false, mute_told_ = false, frozen_ = false;
-  Clock::time_point last_frame_{}, last_attempt_{}, lost_at_{}, nuc_until_{};
+  bool away_ = false, silent_told_ = false, mute_told_ = false;
+  Clock::time_point last_frame_{}, last_attempt_{}, lost_at_{};
 };
 
 struct FoundCamera {

@@ -49,6 +49,7 @@ Status V4l2Options::validate() const {
   if (buffers < 2) return bad("buffers", fmt::format("{}", buffers), "must be >= 2");
   if (!(kelvin_per_dn >= 0)) return bad("kelvin_per_dn", fmt::format("{}", kelvin_per_dn), "must be >= 0");
   if (stall.count() <= 0 || reopen_every.count() <= 0) return bad("stall", "not positive", "must be > 0");
+  if (nuc_settle.count() < 0) return bad("nuc_settle", "negative", "must be >= 0");
   return {};
 }
 

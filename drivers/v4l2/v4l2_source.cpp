@@ -20,7 +20,7 @@ std::int64_t now_ns(clockid_t clock) {
 }  // namespace
 
 V4l2Source::V4l2Source(V4l2Options options, std::shared_ptr<VideoSystem> system)
-    : options_(std::move(options)), system_(std::move(system)) {}
+    : options_(std::move(options)), system_(std::move(system)), freeze_(options_.nuc_settle) {}
 
 V4l2Source::~V4l2Source() { stop(); }
 
@@ -80,8 +80,17 @@ Delivery V4l2Source::stall(const std::string& why) {
 std::optional<Delivery> V4l2Source::try_reopen() {
   if (Clock::now() - last_attempt_ < options_.reopen_every) return std::nullopt;
   last_attempt_ = Clock::now();
-  const Status status = open_and_stream();
-  if (!status) return std::nullopt;  // still away: tried again, for as long as the user waits
+  // Away or refused: tried again, for as long as the user waits.
+  if (!find_camera(*system_, wanted_)) return std::nullopt;
+  if (const Status status = open_and_stream(); !status) {
+    if (!failure_.note(status.error().message())) return std::nullopt;
+    Delivery event;
+    event.kind = Delivery::Kind::event;
+    event.reason = "reopen-failed";
+    event.detail = status.error().message();
+    return event;
+  }
+  failure_.clear();
   away_ = false;
   const double outage_s = std::chrono::duration<double>(Clock::now() - lost_at_).count();
   // Ids leave room for what the outage cost, so that it counts as lost.
@@ -193,6 +202,13 @@ Delivery V4l2Source::delivery_of(std::uint32_t index, std::uint32_t bytes, std::
     return delivery;
   }
   delivery.kind = Delivery::Kind::frame;
+  if (options_.modality == Modality::thermal && freeze_.mark(delivery.frame, mapping.address, bytes)) {
+    Delivery event;
+    event.kind = Delivery::Kind::event;
+    event.reason = "nuc";
+    event.detail = "the image is frozen";
+    pending_.push_back(std::move(event));
+  }
   const bool counts = layout_.fourcc == V4L2_PIX_FMT_Y16;
   delivery.frame.thermal_is_gray = options_.modality == Modality::thermal && !counts;
   if (counts && layout_.kelvin_per_dn <= 0) {

@@ -7,7 +7,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <fstream>
+#include <thread>
 
 #include "drivers/aravis/aravis_source.hpp"
 #include "tests/app/cli/program.hpp"
@@ -55,6 +57,19 @@ TEST_F(RefusedGigE, UnknownFeatureInAProfileOfTheUser) {
 TEST_F(RefusedGigE, DoctorSaysThatTheCameraIsFree) {
   const Outcome outcome = orbitfuse_program({"doctor", "--folder", temp.path});
   EXPECT_THAT(outcome.out, HasSubstr("at 127.0.0.1, packets of 1400 bytes"));
+}
+
+TEST_F(RefusedGigE, WatchedDevicesAreToldWhenTheyArrive) {
+  camera.kill();
+  std::jthread plug([this] {
+    std::this_thread::sleep_for(std::chrono::seconds(3));
+    EXPECT_TRUE(camera.start());
+  });
+  RunOptions until;
+  until.interrupt_after = "+ aravis:";
+  const Outcome outcome = orbitfuse_program({"devices", "--watch"}, until);
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("SIM0001"));
 }
 
 TEST_F(RefusedGigE, CameraThatAnotherProgramControls) {

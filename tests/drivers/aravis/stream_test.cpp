@@ -251,6 +251,18 @@ TEST_F(AravisStream, RegistersAreReadWithoutControl) {
   EXPECT_FALSE(read_register("no address", GvcpRegister::packet_size, 50ms));
 }
 
+TEST_F(AravisStream, DiscoveryFindsItAndItsSerialOpensIt) {
+  const std::vector<FoundCamera> found = discover();
+  const auto ours = std::find_if(found.begin(), found.end(), [](const FoundCamera& c) { return c.serial == "SIM0001"; });
+  ASSERT_NE(ours, found.end()) << found.size() << " others";
+  EXPECT_EQ(ours->address, "127.0.0.1");
+  EXPECT_NE(ours->model.find("A70"), std::string::npos);
+  options.camera = ours->id;
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  EXPECT_EQ(drain(source, 10s, frames(10)).frames, 10u);
+}
+
 TEST(AravisAbsent, NoCameraIsADeviceError) {
   AravisOptions options;
   options.camera = "127.0.0.99";

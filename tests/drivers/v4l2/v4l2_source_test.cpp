@@ -170,6 +170,49 @@ TEST_F(V4l2SourceTest, EveryOutageCostsItsTimeInIds) {
   EXPECT_LE(third, frames_since(lost_again) + 2);
 }
 
+TEST_F(V4l2SourceTest, BackButRefusedIsToldOnceWithItsReason) {
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  system->plugged = false;
+  EXPECT_EQ(deliver(source).reason, "disconnected");
+  system->stream_on_error = ENOSPC;
+  system->plugged = true;
+  const Delivery refused = deliver(source);
+  EXPECT_EQ(refused.reason, "reopen-failed");
+  EXPECT_NE(refused.detail.find("bandwidth"), std::string::npos) << refused.detail;
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_EQ(source.next(1ms)->kind, Kind::timeout);
+    std::this_thread::sleep_for(1ms);
+  }
+  EXPECT_EQ(system->open_descriptors, 0);
+  EXPECT_EQ(system->mapped, 0);
+  system->stream_on_error = 0;
+  EXPECT_EQ(deliver(source).reason, "reconnected");
+}
+
+TEST_F(V4l2SourceTest, FrozenThermalFramesAreFlagged) {
+  options.modality = Modality::thermal;
+  options.stall = 10s;
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  for (std::uint32_t sequence : {0u, 1u}) shoot(sequence);
+  for (int i = 0; i < 2; ++i) EXPECT_TRUE(deliver(source).frame.flags.empty());
+  shoot(2);
+  system->shots.back().bytes.assign(32, 1);  // as the frame before: the shutter is closed
+  EXPECT_EQ(deliver(source).frame.flags, std::vector<std::string>{"nuc"});
+  EXPECT_EQ(deliver(source).reason, "nuc");
+  shoot(3);
+  EXPECT_EQ(deliver(source).frame.flags, std::vector<std::string>{"nuc"}) << "it still drifts";
+  options.modality = Modality::visible;  // a dark room is no shutter
+  V4l2Source photos(options, system);
+  ASSERT_TRUE(photos.start());
+  for (int i = 0; i < 3; ++i) {
+    shoot(static_cast<std::uint32_t>(i));
+    system->shots.back().bytes.assign(32, 1);
+    EXPECT_TRUE(deliver(photos).frame.flags.empty());
+  }
+}
+
 TEST_F(V4l2SourceTest, UnpluggedAndBackUnderAnotherNode) {
   V4l2Source source(options, system);
   ASSERT_TRUE(source.start());
