@@ -19,6 +19,14 @@ std::int64_t wall_ns() {
   return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
 }
 
+/// When its first packet came, as Aravis' thread saw it: nothing of waiting for resent packets, of
+/// the queue or of a busy host is in it.
+std::int64_t arrival_of(ArvBuffer* buffer) {
+  const std::int64_t now_ns = wall_ns();
+  const auto first_ns = static_cast<std::int64_t>(arv_buffer_get_system_timestamp(buffer));
+  return first_ns > 0 && first_ns <= now_ns && now_ns - first_ns < 5'000'000'000 ? first_ns : now_ns;
+}
+
 }  // namespace
 
 Status AravisOptions::validate() const {
@@ -133,7 +141,7 @@ Delivery AravisSource::inspect(void* handle) {
   auto* buffer = static_cast<ArvBuffer*>(handle);
   Delivery delivery;
   delivery.kind = Delivery::Kind::rejected;
-  const std::int64_t arrival_ns = wall_ns();
+  const std::int64_t arrival_ns = arrival_of(buffer);
   const auto frame_id = static_cast<std::uint16_t>(arv_buffer_get_frame_id(buffer));
   const std::optional<std::uint64_t> count = counter_.unwrap(frame_id);
   if (!count) {
