@@ -113,8 +113,10 @@ void LiveGuide::operator_at_station() {
   const std::lock_guard lock(mutex_);
   const bool turned = options_.turntable_step_deg != 0;
   const double table_deg = turned ? table_.key() : 0;
-  for (auto& [modality, camera] : cameras_)
+  for (auto& [modality, camera] : cameras_) {
+    if (turned && camera.table.counts_photos) continue;  // its photos tell, and may come late
     camera.announced = turned ? on_table(camera.table, table_deg) : next_station(modality);
+  }
 }
 
 OrbitPosition LiveGuide::on_table(TableView& view, double azimuth_deg) const {

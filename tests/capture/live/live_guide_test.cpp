@@ -282,6 +282,19 @@ TEST_F(MixedTableTest, PhotoBeforeTheKeyIsTheSameStep) {
   EXPECT_TRUE(guide.complete());
 }
 
+TEST_F(MixedTableTest, CountedPhotosMayComeLate) {
+  options.plan.loop_elevations_deg = {20, 50};
+  LiveGuide guide(*writer, options);
+  photo(guide);
+  for (int i = 0; i < 3; ++i) key(guide);
+  for (int i = 1; i < 3; ++i) {
+    photo(guide);
+    EXPECT_NEAR(azimuth(guide, Modality::thermal), 30 * i, 1e-9);
+    EXPECT_NEAR(guide.cameras()[1].position->elevation_deg, 20, 1e-9);
+  }
+  EXPECT_EQ(guide.done_count(Modality::thermal), 3);
+}
+
 TEST_F(MixedTableTest, AStationWithoutItsPhotoDoesNotShiftTheNext) {
   LiveGuide guide(*writer, options);
   for (int i = 0; i < 12; ++i) {
