@@ -34,8 +34,11 @@ std::map<std::string, Bus> camera_buses(const std::filesystem::path& devices) {
     if (!seen.insert(device).second) continue;
     const long long speed = number_of(devices / device / "speed").value_or(0);
     Bus& bus = buses[name.substr(0, dash)];
-    bus.cameras.push_back(fmt::format("{} ({} Mbit/s)", line_of(devices / device / "product").value_or(device), speed));
-    if (speed > 0) bus.slowest_megabit_s = bus.slowest_megabit_s > 0 ? std::min(bus.slowest_megabit_s, speed) : speed;
+    bus.cameras.push_back(fmt::format(
+        "{} ({} Mbit/s)", line_of(devices / device / "product").value_or(device), speed));
+    if (speed > 0)
+      bus.slowest_megabit_s =
+          bus.slowest_megabit_s > 0 ? std::min(bus.slowest_megabit_s, speed) : speed;
   }
   return buses;
 }
@@ -46,7 +49,8 @@ Finding check_bus(const std::string& number, const Bus& bus) {
     finding.remedy = "too slow for video: use another port or cable, and no hub of USB 1";
   } else if (bus.cameras.size() > 1 && bus.slowest_megabit_s == usb2_megabit_s) {
     finding.remedy =
-        "cameras on one USB 2 bus share some 300 Mbit/s; 640x480 YUYV at 30 Hz takes 147: plug one into a port of "
+        "cameras on one USB 2 bus share some 300 Mbit/s; 640x480 YUYV at 30 Hz takes 147: plug one "
+        "into a port of "
         "another bus (lsusb -t), or use format=MJPG or a lower rate";
   }
   return finding;

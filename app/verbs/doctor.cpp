@@ -43,7 +43,8 @@ Finding check_colmap() {
 
 doctor::CameraLink link_of(const aravis::FoundCamera& camera) {
   const auto ask = [&](aravis::GvcpRegister address) {
-    return aravis::read_register(camera.address, address, std::chrono::milliseconds(200)).value_or(0);
+    return aravis::read_register(camera.address, address, std::chrono::milliseconds(200))
+        .value_or(0);
   };
   return {camera.model + " " + camera.serial, camera.address,
           static_cast<int>(ask(aravis::GvcpRegister::packet_size) & 0xffff),

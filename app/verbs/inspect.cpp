@@ -19,7 +19,8 @@ using nlohmann::json;
 /// The frames of each camera, lens and image size: they may not be mixed up.
 json groups_of(const Session& session, Modality modality) {
   std::map<std::tuple<std::string, int, int>, int> frames;
-  for (const FrameRecord* frame : session.frames_of(modality)) ++frames[{frame->device, frame->width, frame->height}];
+  for (const FrameRecord* frame : session.frames_of(modality))
+    ++frames[{frame->device, frame->width, frame->height}];
   json groups = json::array();
   for (const auto& [key, count] : frames) {
     const auto& [id, width, height] = key;
@@ -38,9 +39,11 @@ std::string described(const json& group) {
   std::string text = fmt::format("  {}: {} frames of {}", group["device"].get<std::string>(),
                                  group["frames"].get<int>(), group["size"].get<std::string>());
   for (const char* known : {"model", "serial"}) {
-    if (const std::string value = group.value(known, std::string()); !value.empty()) text += ", " + value;
+    if (const std::string value = group.value(known, std::string()); !value.empty())
+      text += ", " + value;
   }
-  if (group.contains("focal_px")) text += fmt::format(", focal length about {:.0f} px", group["focal_px"].get<double>());
+  if (group.contains("focal_px"))
+    text += fmt::format(", focal length about {:.0f} px", group["focal_px"].get<double>());
   return text;
 }
 
@@ -66,9 +69,13 @@ json describe(const Session& session, Modality modality) {
     const auto size = group["size"].get<std::string>();
     if (std::find(sizes.begin(), sizes.end(), size) == sizes.end()) sizes.push_back(size);
   }
-  return {{"frames", stations}, {"tracking", tracking}, {"with_pose", posed},
-          {"with_station", with_station}, {"size", fmt::format("{}", fmt::join(sizes, ", "))},
-          {"lost", lost}, {"groups", groups},
+  return {{"frames", stations},
+          {"tracking", tracking},
+          {"with_pose", posed},
+          {"with_station", with_station},
+          {"size", fmt::format("{}", fmt::join(sizes, ", "))},
+          {"lost", lost},
+          {"groups", groups},
           {"has_temperatures", modality == Modality::thermal && gray < stations + tracking},
           {"devices", devices}};
 }
@@ -82,8 +89,8 @@ Status inspect_run(Context& context, const fs::path& folder) {
       context.console.warning(record.error().message());
       continue;
     }
-    context.console.data(fmt::format("{:<14} {}  {:>7.1f} s  {}", record->stage, record->finished_utc,
-                                     record->wall_s,
+    context.console.data(fmt::format("{:<14} {}  {:>7.1f} s  {}", record->stage,
+                                     record->finished_utc, record->wall_s,
                                      record->output.metrics.value("brief", std::string())));
     stages.push_back(to_json(*record));
   }
@@ -93,10 +100,14 @@ Status inspect_run(Context& context, const fs::path& folder) {
 
 Status inspect_session(Context& context, const fs::path& folder) {
   ORBITFUSE_ASSIGN(const Session session, open_session(folder));
-  context.console.data(fmt::format("session {} of {}{}", session.id, session.created,
-                                   session.complete ? "" : ", incomplete: the recorder was stopped"));
-  context.result = {{"session", folder.string()}, {"id", session.id}, {"created", session.created},
-                    {"complete", session.complete}, {"warnings", session.warnings}};
+  context.console.data(
+      fmt::format("session {} of {}{}", session.id, session.created,
+                  session.complete ? "" : ", incomplete: the recorder was stopped"));
+  context.result = {{"session", folder.string()},
+                    {"id", session.id},
+                    {"created", session.created},
+                    {"complete", session.complete},
+                    {"warnings", session.warnings}};
   for (const Modality modality : {Modality::visible, Modality::thermal}) {
     const json j = describe(session, modality);
     context.result[std::string(name(modality))] = j;
@@ -106,9 +117,10 @@ Status inspect_session(Context& context, const fs::path& folder) {
     }
     context.console.data(fmt::format(
         "{}: {} frames of {}, {} tracking, {} with a station, {} with a pose, {} lost{}",
-        name(modality), j["frames"].get<int>(), j["size"].get<std::string>(), j["tracking"].get<int>(),
-        j["with_station"].get<int>(), j["with_pose"].get<int>(), j["lost"].get<std::uint64_t>(),
-        modality == Modality::visible  ? ""
+        name(modality), j["frames"].get<int>(), j["size"].get<std::string>(),
+        j["tracking"].get<int>(), j["with_station"].get<int>(), j["with_pose"].get<int>(),
+        j["lost"].get<std::uint64_t>(),
+        modality == Modality::visible   ? ""
         : j["has_temperatures"] == true ? ", temperatures"
                                         : ", gray levels"));
     if (j["groups"].size() > 1)

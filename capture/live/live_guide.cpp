@@ -54,7 +54,8 @@ LiveGuide::LiveGuide(SessionWriter& writer, LiveGuideOptions options, PositionFi
       table_(options_.turntable_step_deg) {
   for (const Modality modality : options_.plan.modalities) {
     cameras_[modality].shown.modality = modality;
-    cameras_[modality].shown.instruction = coverage_.instruction(modality, std::nullopt);
+    Camera& camera = cameras_[modality];
+    camera.shown.instruction = instruction(modality, camera, std::nullopt, Refusal::none);
   }
   if (finder_) looker_ = std::jthread([this] { look(); });
 }
@@ -130,7 +131,8 @@ void LiveGuide::judge_announced(Camera& camera, const FrameRecord& frame) {
   judge(camera, frame, there);
   const Refusal refusal = camera.shown.refusal;
   // A blurred frame is followed by another from the same place; a place between stations stays one.
-  if (refusal == Refusal::none || refusal == Refusal::between_stations || refusal == Refusal::out_of_band)
+  if (refusal == Refusal::none || refusal == Refusal::between_stations ||
+      refusal == Refusal::out_of_band)
     camera.announced.reset();
 }
 
@@ -171,7 +173,36 @@ void LiveGuide::judge(Camera& camera, const FrameRecord& frame,
   camera.shown.judged_file = frame.file;
   camera.shown.refusal = coverage_.add(assessment);
   if (camera.shown.refusal == Refusal::none) note_choice(camera, frame);
-  camera.shown.instruction = coverage_.instruction(frame.modality, position, camera.shown.refusal);
+  camera.shown.instruction = instruction(frame.modality, camera, position, camera.shown.refusal);
+}
+
+/// What to do next, in the words of how positions are known here.
+std::string LiveGuide::instruction(Modality modality, const Camera& camera,
+                                   const std::optional<OrbitPosition>& position,
+                                   Refusal last) const {
+  const std::optional<OrbitPosition> next = next_station(modality);
+  if (next && options_.turntable_step_deg != 0) return table_instruction(camera, last);
+  if (next && !position && !finder_) {
+    return fmt::format("go to azimuth {:.0f}°, {:.0f}° high, then press Enter", next->azimuth_deg,
+                       next->elevation_deg);
+  }
+  return coverage_.instruction(modality, position, last);
+}
+
+std::string LiveGuide::table_instruction(const Camera& camera, Refusal last) const {
+  const TableView& view = camera.table;
+  const bool to_repeat = last == Refusal::nuc || last == Refusal::blurred ||
+                         last == Refusal::badly_exposed || last == Refusal::moving;
+  if (to_repeat && camera.announced && !view.counts_photos) return text(last);
+  const char* then = view.counts_photos ? "take the photo" : "press Enter";
+  if (!view.start_deg) return "put the table at its start, then press Enter or take the photo";
+  std::string words = to_repeat ? text(last) + "; " : "";
+  words += fmt::format("turn the table by {:g}°", std::abs(options_.turntable_step_deg));
+  const std::vector<double>& loops = options_.plan.loop_elevations_deg;
+  const double elevation_deg = loops[table_.turn_after_step(view) % loops.size()];
+  if (camera.position && elevation_deg != camera.position->elevation_deg)
+    words += fmt::format(", move the camera to {:g}° high", elevation_deg);
+  return words + ", then " + then;
 }
 
 void LiveGuide::note_choice(Camera& camera, const FrameRecord& frame) {

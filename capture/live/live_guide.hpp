@@ -46,9 +46,10 @@ struct LiveCamera {
 
 /// Follows a recording and decides which stations are done. Every frame comes here after it is on
 /// disk. Its position is the station that it carries (replay, synthetic), or the turntable's step,
-/// or the operator's key, or what `finder` sees in the image, read back from disk a few times a second on
-/// a thread of its own so that recording never waits for it. The frame chosen for a sector is
-/// marked in the manifest (SessionWriter::amend); one that it replaces becomes a tracking frame.
+/// or the operator's key, or what `finder` sees in the image, read back from disk a few times a
+/// second on a thread of its own so that recording never waits for it. The frame chosen for a
+/// sector is marked in the manifest (SessionWriter::amend); one that it replaces becomes a tracking
+/// frame.
 class LiveGuide {
  public:
   /// `writer` outlives the guide. Without `finder` only stations and keys give positions.
@@ -82,7 +83,7 @@ class LiveGuide {
     SharpnessReference sharpness;
     std::optional<OrbitPosition> position;
     std::int64_t position_time_ns = 0;
-    std::optional<FrameRecord> waiting;  ///< newest frame not looked at yet
+    std::optional<FrameRecord> waiting;      ///< newest frame not looked at yet
     std::optional<OrbitPosition> announced;  ///< by the key: where the next good frame is
     TableView table;
     std::map<std::size_t, FrameRecord> chosen;  ///< by sector
@@ -92,6 +93,9 @@ class LiveGuide {
   void judge(Camera& camera, const FrameRecord& frame,
              const std::optional<OrbitPosition>& position);
   void note_choice(Camera& camera, const FrameRecord& frame);
+  std::string instruction(Modality modality, const Camera& camera,
+                          const std::optional<OrbitPosition>& position, Refusal last) const;
+  std::string table_instruction(const Camera& camera, Refusal last) const;
   std::optional<OrbitPosition> next_station(Modality modality) const;
   OrbitPosition on_table(TableView& view, double azimuth_deg) const;
   void judge_announced(Camera& camera, const FrameRecord& frame);

@@ -15,6 +15,10 @@ double wrapped_deg(double degrees) {
   return within > 360 - same_place_deg ? 0 : within;
 }
 
+std::size_t whole_turns(double degrees) {
+  return static_cast<std::size_t>((degrees + same_place_deg) / 360);
+}
+
 }  // namespace
 
 double Turntable::azimuth_deg(int count) const {
@@ -40,9 +44,13 @@ void Turntable::resume_at(TableView& view, const Station& station) {
 
 std::size_t Turntable::turn(TableView& view, double azimuth_deg) const {
   if (!view.start_deg) view.start_deg = azimuth_deg;
-  view.turned_deg += way_deg(wrapped_deg(*view.start_deg + std::copysign(view.turned_deg, step_deg_)),
-                             azimuth_deg);
-  return static_cast<std::size_t>((view.turned_deg + same_place_deg) / 360);
+  view.turned_deg += way_deg(
+      wrapped_deg(*view.start_deg + std::copysign(view.turned_deg, step_deg_)), azimuth_deg);
+  return whole_turns(view.turned_deg);
+}
+
+std::size_t Turntable::turn_after_step(const TableView& view) const {
+  return whole_turns(view.turned_deg + std::abs(step_deg_));
 }
 
 }  // namespace orbitfuse

@@ -11,10 +11,10 @@ namespace orbitfuse {
 /// How one camera has seen a turntable. Cameras may see it one after the other, and each then makes
 /// its own turns.
 struct TableView {
-  int photos = 0;                      ///< counted by this camera
-  bool counts_photos = false;          ///< its photos began before the first key
-  std::optional<double> start_deg;     ///< azimuth at which its first turn began
-  double turned_deg = 0;               ///< since then, never negative
+  int photos = 0;                   ///< counted by this camera
+  bool counts_photos = false;       ///< its photos began before the first key
+  std::optional<double> start_deg;  ///< azimuth at which its first turn began
+  double turned_deg = 0;            ///< since then, never negative
 };
 
 /// The angle of a turntable from what its operator does: one count for all cameras. Azimuths are
@@ -34,6 +34,7 @@ class Turntable {
 
   /// Which full turn this is for `view`, now that it sees the table at `azimuth_deg`.
   std::size_t turn(TableView& view, double azimuth_deg) const;
+  std::size_t turn_after_step(const TableView& view) const;
 
  private:
   double azimuth_deg(int count) const;
@@ -41,7 +42,7 @@ class Turntable {
 
   double step_deg_;
   double base_deg_ = 0;
-  int steps_before_ = -1;              ///< of the first count: it is at the base, or a step after it
+  int steps_before_ = -1;  ///< of the first count: it is at the base, or a step after it
   int keys_ = 0;
 };
 

@@ -24,21 +24,26 @@ std::int64_t wall_ns() {
 std::int64_t arrival_of(ArvBuffer* buffer) {
   const std::int64_t now_ns = wall_ns();
   const auto first_ns = static_cast<std::int64_t>(arv_buffer_get_system_timestamp(buffer));
-  return first_ns > 0 && first_ns <= now_ns && now_ns - first_ns < 5'000'000'000 ? first_ns : now_ns;
+  return first_ns > 0 && first_ns <= now_ns && now_ns - first_ns < 5'000'000'000 ? first_ns
+                                                                                 : now_ns;
 }
 
 }  // namespace
 
 Status AravisOptions::validate() const {
-  if (buffers < 2) return fail(ErrorKind::usage, "aravis.buffers", fmt::format("{}", buffers), "must be >= 2");
+  if (buffers < 2)
+    return fail(ErrorKind::usage, "aravis.buffers", fmt::format("{}", buffers), "must be >= 2");
   if (silence.count() <= 0 || give_up < silence) {
-    return fail(ErrorKind::usage, "aravis.give_up", fmt::format("{} ms", give_up.count()), "must be > 0 and >= silence");
+    return fail(ErrorKind::usage, "aravis.give_up", fmt::format("{} ms", give_up.count()),
+                "must be > 0 and >= silence");
   }
-  if (nuc_settle.count() < 0) return fail(ErrorKind::usage, "aravis.nuc_settle", "negative", "must be >= 0");
+  if (nuc_settle.count() < 0)
+    return fail(ErrorKind::usage, "aravis.nuc_settle", "negative", "must be >= 0");
   return {};
 }
 
-AravisSource::AravisSource(AravisOptions options) : options_(std::move(options)), freeze_(options_.nuc_settle) {
+AravisSource::AravisSource(AravisOptions options)
+    : options_(std::move(options)), freeze_(options_.nuc_settle) {
   info_.id = options_.device_id;
   info_.modality = options_.modality;
   info_.driver = "aravis";
@@ -97,9 +102,12 @@ std::optional<Delivery> AravisSource::try_reopen() {
   failure_.clear();
   away_ = false;
   const double outage_s = std::chrono::duration<double>(Clock::now() - lost_at_).count();
-  const auto cost = interval_s_ > 0 ? static_cast<std::uint64_t>(std::llround(outage_s / interval_s_)) : 1;
+  const auto cost =
+      interval_s_ > 0 ? static_cast<std::uint64_t>(std::llround(outage_s / interval_s_)) : 1;
   next_id_ = base_id_ += cost;  // also if it is lost again before a frame
-  return event("reconnected", fmt::format("{} after {:.1f} s, about {} frames; settings pushed and verified", address_, outage_s, cost));
+  return event("reconnected",
+               fmt::format("{} after {:.1f} s, about {} frames; settings pushed and verified",
+                           address_, outage_s, cost));
 }
 
 Result<Delivery> AravisSource::next(std::chrono::milliseconds timeout) {
@@ -113,7 +121,9 @@ Result<Delivery> AravisSource::next(std::chrono::milliseconds timeout) {
     std::this_thread::sleep_for(std::min(timeout, std::chrono::milliseconds(100)));
     return Delivery{};
   }
-  if (!link_) return fail(ErrorKind::device, "camera " + options_.camera, "not started", "call start() first");
+  if (!link_)
+    return fail(ErrorKind::device, "camera " + options_.camera, "not started",
+                "call start() first");
   if (link_->control_lost) return lose("control lost");
   if (correction_wanted_.exchange(false)) return correct_as_asked();
   if (control_mute_ != mute_told_) {
@@ -122,7 +132,8 @@ Result<Delivery> AravisSource::next(std::chrono::milliseconds timeout) {
   }
   const auto wait = std::min(timeout, options_.silence / 2);
   ArvBuffer* buffer = arv_stream_timeout_pop_buffer(
-      link_->stream, static_cast<guint64>(std::chrono::duration_cast<std::chrono::microseconds>(wait).count()));
+      link_->stream,
+      static_cast<guint64>(std::chrono::duration_cast<std::chrono::microseconds>(wait).count()));
   if (!buffer) {
     const auto quiet = Clock::now() - last_frame_;
     if (quiet > options_.give_up) return lose("no frame for a second; reopening it");
@@ -156,29 +167,36 @@ Delivery AravisSource::inspect(void* handle) {
   const bool mismatch = mismatches != mismatches_;
   mismatches_ = mismatches;
   if (status != ARV_BUFFER_STATUS_SUCCESS) {
-    const bool packets = status == ARV_BUFFER_STATUS_MISSING_PACKETS || status == ARV_BUFFER_STATUS_TIMEOUT;
-    delivery.reason = packets ? "packets are missing" : fmt::format("Aravis status {}", static_cast<int>(status));
+    const bool packets =
+        status == ARV_BUFFER_STATUS_MISSING_PACKETS || status == ARV_BUFFER_STATUS_TIMEOUT;
+    delivery.reason =
+        packets ? "packets are missing" : fmt::format("Aravis status {}", static_cast<int>(status));
     if (mismatch) delivery.reason += ", larger than announced";
     return delivery;
   }
   const double interval_s = std::chrono::duration<double>(Clock::now() - last_frame_).count();
-  if (interval_s < 1) interval_s_ = interval_s_ > 0 ? 0.9 * interval_s_ + 0.1 * interval_s : interval_s;
+  if (interval_s < 1)
+    interval_s_ = interval_s_ > 0 ? 0.9 * interval_s_ + 0.1 * interval_s : interval_s;
   last_frame_ = Clock::now();
   silent_told_ = false;
-  const int width = arv_buffer_get_image_width(buffer), height = arv_buffer_get_image_height(buffer);
+  const int width = arv_buffer_get_image_width(buffer),
+            height = arv_buffer_get_image_height(buffer);
   const ArvPixelFormat pixel_format = arv_buffer_get_image_pixel_format(buffer);
   if (mismatch || width != link_->width || height != link_->height) {
-    delivery.reason = fmt::format("{}x{} where {}x{} is set", width, height, link_->width, link_->height);
+    delivery.reason =
+        fmt::format("{}x{} where {}x{} is set", width, height, link_->width, link_->height);
     return delivery;
   }
   if (pixel_format != link_->pixel_format) {
-    delivery.reason = fmt::format("pixel format {:#x} where {:#x} is set", pixel_format, link_->pixel_format);
+    delivery.reason =
+        fmt::format("pixel format {:#x} where {:#x} is set", pixel_format, link_->pixel_format);
     return delivery;
   }
   const Format format = *format_of(pixel_format);
   std::size_t size = 0;
   const void* data = arv_buffer_get_data(buffer, &size);
-  const std::size_t needed = static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * static_cast<std::size_t>(format.bytes);
+  const std::size_t needed = static_cast<std::size_t>(width) * static_cast<std::size_t>(height) *
+                             static_cast<std::size_t>(format.bytes);
   if (size < needed) {
     delivery.reason = fmt::format("{} bytes where {} are needed", size, needed);
     return delivery;
@@ -196,7 +214,8 @@ Delivery AravisSource::inspect(void* handle) {
   if (format.bytes == 1) {
     frame.thermal_is_gray = options_.modality == Modality::thermal;
   } else if (table_.empty()) {
-    if (const auto stretch = raw_counts_.apply(frame)) pending_.push_back(event("raw-counts", *stretch));
+    if (const auto stretch = raw_counts_.apply(frame))
+      pending_.push_back(event("raw-counts", *stretch));
   } else {
     frame.pixels.forEach<std::uint16_t>([this](std::uint16_t& dn, const int*) { dn = table_[dn]; });
   }
@@ -204,8 +223,11 @@ Delivery AravisSource::inspect(void* handle) {
 }
 
 Status AravisSource::correct_nonuniformity() {
-  if (!link_) return fail(ErrorKind::device, "NUC", "the camera is not connected", "wait until it is back");
-  if (profile_.nuc_command.empty()) return fail(ErrorKind::unavailable, "NUC", "not known for " + profile_.name, "set nuc_command in its profile");
+  if (!link_)
+    return fail(ErrorKind::device, "NUC", "the camera is not connected", "wait until it is back");
+  if (profile_.nuc_command.empty())
+    return fail(ErrorKind::unavailable, "NUC", "not known for " + profile_.name,
+                "set nuc_command in its profile");
   GError* error = nullptr;
   arv_camera_execute_command(link_->camera, profile_.nuc_command.c_str(), &error);
   if (error) return fail(ErrorKind::device, "NUC", take(error), "try again");
@@ -214,7 +236,8 @@ Status AravisSource::correct_nonuniformity() {
 }
 
 Delivery AravisSource::correct_as_asked() {
-  if (const Status status = correct_nonuniformity(); !status) return event("nuc-failed", status.error().message());
+  if (const Status status = correct_nonuniformity(); !status)
+    return event("nuc-failed", status.error().message());
   return event("nuc", "asked for by the operator");
 }
 
@@ -235,16 +258,20 @@ StreamStatistics AravisSource::statistics() const {
 
 std::string AravisSource::transport_report() const {
   const StreamStatistics s = statistics();
-  return fmt::format("{} buffers completed, {} failed, {} underruns; {} packets resent, {} missing; {} of another size",
-                     s.completed, s.failures, s.underruns, s.resent, s.missing_packets, s.size_mismatches);
+  return fmt::format(
+      "{} buffers completed, {} failed, {} underruns; {} packets resent, {} missing; {} of another "
+      "size",
+      s.completed, s.failures, s.underruns, s.resent, s.missing_packets, s.size_mismatches);
 }
 
 StreamStatistics AravisSource::link_statistics() const {
   StreamStatistics s;
   if (!link_ || !link_->stream) return s;
-  const auto info = [&](const char* key) { return arv_stream_get_info_uint64_by_name(link_->stream, key); };
-  return {info("n_completed_buffers"), info("n_failures"), info("n_underruns"), info("n_resent_packets"),
-          info("n_missing_packets"), info("n_size_mismatch_errors")};
+  const auto info = [&](const char* key) {
+    return arv_stream_get_info_uint64_by_name(link_->stream, key);
+  };
+  return {info("n_completed_buffers"), info("n_failures"),        info("n_underruns"),
+          info("n_resent_packets"),    info("n_missing_packets"), info("n_size_mismatch_errors")};
 }
 
 }  // namespace orbitfuse::aravis

@@ -46,7 +46,9 @@ struct AravisSource::Link {
     g_clear_object(&stream);
     g_clear_object(&camera);
   }
-  static void on_control_lost(ArvDevice*, void* self) { static_cast<Link*>(self)->control_lost = true; }
+  static void on_control_lost(ArvDevice*, void* self) {
+    static_cast<Link*>(self)->control_lost = true;
+  }
 };
 
 }  // namespace orbitfuse::aravis

@@ -18,8 +18,10 @@ namespace {
 tl::unexpected<Error> device_error(const std::string& where, const std::string& what, int error) {
   std::string remedy = "unplug it and plug it in again";
   if (error == EBUSY) remedy = "close the other program that uses it (fuser -v " + where + ")";
-  if (error == EACCES || error == EPERM) remedy = "add yourself to the group video and log in again";
-  if (error == ENOENT || error == ENODEV) remedy = "plug it in, or name another (orbitfuse devices)";
+  if (error == EACCES || error == EPERM)
+    remedy = "add yourself to the group video and log in again";
+  if (error == ENOENT || error == ENODEV)
+    remedy = "plug it in, or name another (orbitfuse devices)";
   if (error == ENOSPC) {
     remedy = "USB bandwidth is used up: lower the size or rate, use MJPG, or another USB port";
   }
@@ -47,8 +49,10 @@ Status V4l2Options::validate() const {
     return bad("format", format, "one of MJPG, YUYV, NV12, GREY, Y16");
   }
   if (buffers < 2) return bad("buffers", fmt::format("{}", buffers), "must be >= 2");
-  if (!(kelvin_per_dn >= 0)) return bad("kelvin_per_dn", fmt::format("{}", kelvin_per_dn), "must be >= 0");
-  if (stall.count() <= 0 || reopen_every.count() <= 0) return bad("stall", "not positive", "must be > 0");
+  if (!(kelvin_per_dn >= 0))
+    return bad("kelvin_per_dn", fmt::format("{}", kelvin_per_dn), "must be >= 0");
+  if (stall.count() <= 0 || reopen_every.count() <= 0)
+    return bad("stall", "not positive", "must be > 0");
   if (nuc_settle.count() < 0) return bad("nuc_settle", "negative", "must be >= 0");
   return {};
 }
@@ -64,7 +68,8 @@ Status V4l2Source::open_and_stream() {
     ORBITFUSE_TRY(apply_controls());
     ORBITFUSE_TRY(map_buffers());
     int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-    if (ioctl(VIDIOC_STREAMON, &type) < 0) return device_error(node_.path, "streaming did not start", errno);
+    if (ioctl(VIDIOC_STREAMON, &type) < 0)
+      return device_error(node_.path, "streaming did not start", errno);
     return {};
   };
   const std::size_t told = pending_.size();
@@ -88,8 +93,13 @@ Status V4l2Source::choose_format() {
   if (options_.modality == Modality::thermal) order = {"Y16 ", "GREY", "YUYV", "MJPG", "NV12"};
   if (!options_.format.empty()) order = {options_.format};
   std::vector<std::uint32_t> offered;
-  for (v4l2_fmtdesc entry{.index = 0, .type = V4L2_BUF_TYPE_VIDEO_CAPTURE, .flags = 0, .description = {},
-                          .pixelformat = 0, .mbus_code = 0, .reserved = {}};
+  for (v4l2_fmtdesc entry{.index = 0,
+                    .type = V4L2_BUF_TYPE_VIDEO_CAPTURE,
+                    .flags = 0,
+                    .description = {},
+                    .pixelformat = 0,
+                    .mbus_code = 0,
+                    .reserved = {}};
        ioctl(VIDIOC_ENUM_FMT, &entry) == 0; ++entry.index) {
     offered.push_back(entry.pixelformat);
   }
@@ -111,16 +121,18 @@ Status V4l2Source::choose_format() {
     format.fmt.pix.width = static_cast<std::uint32_t>(options_.width);
     format.fmt.pix.height = static_cast<std::uint32_t>(options_.height);
   }
-  if (ioctl(VIDIOC_S_FMT, &format) < 0) return device_error(node_.path, "refuses the format", errno);
+  if (ioctl(VIDIOC_S_FMT, &format) < 0)
+    return device_error(node_.path, "refuses the format", errno);
   const v4l2_pix_format& got = format.fmt.pix;
   // Drivers answer with the nearest size they have; a session must not change size silently.
   if (got.pixelformat != chosen ||
       (options_.width > 0 && (static_cast<int>(got.width) != options_.width ||
                               static_cast<int>(got.height) != options_.height))) {
-    return fail(ErrorKind::device, node_.path,
-                fmt::format("gives {} {}x{}, asked for {} {}x{}", fourcc_text(got.pixelformat), got.width,
-                            got.height, fourcc_text(chosen), options_.width, options_.height),
-                "choose a size that the camera has (v4l2-ctl --list-formats-ext)");
+    return fail(
+        ErrorKind::device, node_.path,
+        fmt::format("gives {} {}x{}, asked for {} {}x{}", fourcc_text(got.pixelformat), got.width,
+                    got.height, fourcc_text(chosen), options_.width, options_.height),
+        "choose a size that the camera has (v4l2-ctl --list-formats-ext)");
   }
   layout_ = Layout{got.pixelformat, static_cast<int>(got.width), static_cast<int>(got.height),
                    static_cast<int>(got.bytesperline), options_.kelvin_per_dn};
@@ -150,11 +162,12 @@ Status V4l2Source::apply_controls() {
     const char* name;
   };
   const std::array<Lock, 3> locks{
-      {{options_.lock_exposure, V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL, V4L2_CID_EXPOSURE_ABSOLUTE,
-        options_.exposure_100us, "exposure"},
-       {options_.lock_focus, V4L2_CID_FOCUS_AUTO, 0, V4L2_CID_FOCUS_ABSOLUTE, options_.focus, "focus"},
-       {options_.lock_white_balance, V4L2_CID_AUTO_WHITE_BALANCE, 0, V4L2_CID_WHITE_BALANCE_TEMPERATURE,
-        options_.white_balance_k, "white balance"}}};
+      {{options_.lock_exposure, V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL,
+        V4L2_CID_EXPOSURE_ABSOLUTE, options_.exposure_100us, "exposure"},
+       {options_.lock_focus, V4L2_CID_FOCUS_AUTO, 0, V4L2_CID_FOCUS_ABSOLUTE, options_.focus,
+        "focus"},
+       {options_.lock_white_balance, V4L2_CID_AUTO_WHITE_BALANCE, 0,
+        V4L2_CID_WHITE_BALANCE_TEMPERATURE, options_.white_balance_k, "white balance"}}};
   for (const Lock& lock : locks) {
     if (!lock.wanted && !lock.value) continue;
     v4l2_control value{lock.value_control, 0};
@@ -175,8 +188,8 @@ Status V4l2Source::apply_controls() {
     Delivery event;
     event.kind = Delivery::Kind::event;
     event.reason = "setting-lost";
-    event.detail = fmt::format("{} is not locked: wanted {}, the camera has {}", lock.name, value.value,
-                               check.value);
+    event.detail = fmt::format("{} is not locked: wanted {}, the camera has {}", lock.name,
+                               value.value, check.value);
     pending_.push_back(std::move(event));
   }
   return {};
@@ -195,11 +208,13 @@ Status V4l2Source::map_buffers() {
     buffer.index = i;
     buffer.type = request.type;
     buffer.memory = request.memory;
-    if (ioctl(VIDIOC_QUERYBUF, &buffer) < 0) return device_error(node_.path, "buffer query failed", errno);
+    if (ioctl(VIDIOC_QUERYBUF, &buffer) < 0)
+      return device_error(node_.path, "buffer query failed", errno);
     void* address = system_->mmap(buffer.length, fd_, buffer.m.offset);
     if (address == MAP_FAILED) return device_error(node_.path, "buffer mapping failed", errno);
     buffers_.push_back({address, buffer.length});
-    if (ioctl(VIDIOC_QBUF, &buffer) < 0) return device_error(node_.path, "buffer not accepted", errno);
+    if (ioctl(VIDIOC_QBUF, &buffer) < 0)
+      return device_error(node_.path, "buffer not accepted", errno);
   }
   return {};
 }

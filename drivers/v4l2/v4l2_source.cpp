@@ -137,9 +137,11 @@ Result<Delivery> V4l2Source::dequeue() {
   }
   if (buffer.index >= buffers_.size()) return lose("disconnected", "the driver answers nonsense");
   // When a transfer fails uvcvideo hands every buffer back empty, with the number of an old frame.
-  const bool old = last_sequence_ && static_cast<std::int32_t>(buffer.sequence - *last_sequence_) <= 0;
+  const bool old =
+      last_sequence_ && static_cast<std::int32_t>(buffer.sequence - *last_sequence_) <= 0;
   if ((buffer.flags & V4L2_BUF_FLAG_ERROR) && buffer.bytesused == 0) {
-    if (old) return lose("disconnected", "a transfer failed: the driver gave its buffers back empty");
+    if (old)
+      return lose("disconnected", "a transfer failed: the driver gave its buffers back empty");
     if (!last_sequence_) return empty_at_start(buffer);
   }
   last_frame_ = Clock::now();
@@ -156,7 +158,8 @@ Result<Delivery> V4l2Source::dequeue() {
   // The kernel's stamp leaves out our own scheduling delay.
   if (monotonic && stamp_ns > 0) delivery.frame.host_time_ns -= now_ns(CLOCK_MONOTONIC) - stamp_ns;
   watch_rhythm(id, stamp_ns);
-  if (ioctl(VIDIOC_QBUF, &buffer) < 0) pending_.push_back(lose("disconnected", std::strerror(errno)));
+  if (ioctl(VIDIOC_QBUF, &buffer) < 0)
+    pending_.push_back(lose("disconnected", std::strerror(errno)));
   return delivery;
 }
 
@@ -178,8 +181,10 @@ void V4l2Source::watch_rhythm(std::uint64_t id, std::int64_t stamp_ns) {
   Delivery event;
   event.kind = Delivery::Kind::event;
   event.reason = "late-frame";
-  event.detail = fmt::format("frame {} is late by {} though none is missing in the driver's count; {} so far: "
-                             "lost whole on USB, or the camera slowed down", id, missing, late_frames_);
+  event.detail = fmt::format(
+      "frame {} is late by {} though none is missing in the driver's count; {} so far: "
+      "lost whole on USB, or the camera slowed down",
+      id, missing, late_frames_);
   pending_.push_back(std::move(event));
 }
 
@@ -202,7 +207,8 @@ Delivery V4l2Source::delivery_of(std::uint32_t index, std::uint32_t bytes, std::
     return delivery;
   }
   delivery.kind = Delivery::Kind::frame;
-  if (options_.modality == Modality::thermal && freeze_.mark(delivery.frame, mapping.address, bytes)) {
+  if (options_.modality == Modality::thermal &&
+      freeze_.mark(delivery.frame, mapping.address, bytes)) {
     Delivery event;
     event.kind = Delivery::Kind::event;
     event.reason = "nuc";

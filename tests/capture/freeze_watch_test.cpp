@@ -14,7 +14,8 @@ using namespace std::chrono_literals;
 class FreezeWatchTest : public ::testing::Test {
  protected:
   bool send(int picture, double rate_hz) {
-    now += std::chrono::duration_cast<FreezeWatch::Clock::duration>(std::chrono::duration<double>(1 / rate_hz));
+    now += std::chrono::duration_cast<FreezeWatch::Clock::duration>(
+        std::chrono::duration<double>(1 / rate_hz));
     Frame frame;
     begins += watch.mark(frame, &picture, sizeof picture, now);
     return !frame.flags.empty();

@@ -162,6 +162,35 @@ TEST_F(LiveGuideTest, TurntableCountsKeysAndTurns) {
   EXPECT_TRUE(guide.complete());
 }
 
+TEST_F(LiveGuideTest, SaysWhatToDoWithTheTableAndTheKey) {
+  {
+    LiveGuide guide(*writer, options);
+    EXPECT_EQ(guide.cameras()[0].instruction, "go to azimuth 0°, 20° high, then press Enter");
+  }
+  options.plan.loop_elevations_deg = {20, 50};
+  options.turntable_step_deg = 30;
+  LiveGuide guide(*writer, options);
+  const auto words = [&] { return guide.cameras()[0].instruction; };
+  EXPECT_EQ(words(), "put the table at its start, then press Enter or take the photo");
+  guide.operator_at_station();
+  guide.add(record(15, 1));
+  EXPECT_EQ(words(), "turn the table by 30°, then press Enter");
+  for (int i = 1; i < 12; ++i) {
+    guide.operator_at_station();
+    if (i == 4) {
+      guide.add(record(15, 1 + i, true));
+      EXPECT_EQ(words(), text(Refusal::blurred));
+    }
+    guide.add(record(15, 1.5 + i));
+  }
+  EXPECT_EQ(words(), "turn the table by 30°, move the camera to 50° high, then press Enter");
+  for (int i = 12; i < 24; ++i) {
+    guide.operator_at_station();
+    guide.add(record(15, 1 + i));
+  }
+  EXPECT_EQ(words(), "visible: done");
+}
+
 TEST_F(LiveGuideTest, TurntableTriesAgainWhereAFrameWasBlurred) {
   options.turntable_step_deg = 30;
   LiveGuide guide(*writer, options);

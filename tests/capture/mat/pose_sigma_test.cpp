@@ -61,7 +61,8 @@ TEST_F(PoseSigma, AgreesWithTheSpreadOfNoisyFits) {
     cv::Mat r_fit = r.clone(), t_fit = t.clone();
     cv::solvePnP(noisy.mat, noisy.image, k, cv::noArray(), r_fit, t_fit, true);
     const Eigen::Vector2d angles = angles_of(pose_of(r_fit, t_fit));
-    for (int i = 0; i < 2; ++i) squares[i] += std::pow(angle_difference_deg(angles[i], truth[i]), 2);
+    for (int i = 0; i < 2; ++i)
+      squares[i] += std::pow(angle_difference_deg(angles[i], truth[i]), 2);
   }
   const double spread = std::sqrt(std::max(squares[0], squares[1]) / fits);
   EXPECT_NEAR(direction_sigma_deg(exact, k, r, t, 0.5) / spread, 1, 0.15);
