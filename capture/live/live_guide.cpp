@@ -80,6 +80,8 @@ void LiveGuide::resume(const std::vector<FrameRecord>& earlier) {
     add_at_station(known->second, frame);
     table_.resume_at(known->second.table, *frame.station);
   }
+  for (auto& [modality, camera] : cameras_)
+    camera.shown.instruction = instruction(modality, camera, camera.position, Refusal::none);
 }
 
 /// The source's or the operator's word: there, and at rest.
@@ -194,8 +196,10 @@ std::string LiveGuide::table_instruction(const Camera& camera, Refusal last) con
   const bool to_repeat = last == Refusal::nuc || last == Refusal::blurred ||
                          last == Refusal::badly_exposed || last == Refusal::moving;
   if (to_repeat && camera.announced && !view.counts_photos) return text(last);
-  const char* then = view.counts_photos ? "take the photo" : "press Enter";
-  if (!view.start_deg) return "put the table at its start, then press Enter or take the photo";
+  const std::string then = view.counts_photos ? "take the photo"
+                           : view.start_deg   ? "press Enter"
+                                              : "press Enter or take the photo";
+  if (!view.start_deg && !table_.begun()) return "put the table at its start, then " + then;
   std::string words = to_repeat ? text(last) + "; " : "";
   words += fmt::format("turn the table by {:g}°", std::abs(options_.turntable_step_deg));
   const std::vector<double>& loops = options_.plan.loop_elevations_deg;

@@ -32,6 +32,8 @@ class Turntable {
   /// `view` saw the table at `station`; the next key or photo is a step further.
   void resume_at(TableView& view, const Station& station);
 
+  /// False until the first key, or a station to go on from.
+  bool begun() const { return keys_ > 0 || steps_before_ == 0; }
   /// Which full turn this is for `view`, now that it sees the table at `azimuth_deg`.
   std::size_t turn(TableView& view, double azimuth_deg) const;
   std::size_t turn_after_step(const TableView& view) const;

@@ -253,6 +253,7 @@ TEST_F(LiveGuideTest, ResumedKeySessionGoesOnAfterItsLastStation) {
   LiveGuide guide(*writer, options);
   guide.resume(earlier);
   EXPECT_EQ(guide.done_count(Modality::visible), 13);
+  EXPECT_EQ(guide.cameras()[0].instruction, "turn the table by 30°, then press Enter");
   guide.operator_at_station();
   guide.add(record(15, 20));
   EXPECT_NEAR(guide.cameras()[0].position->azimuth_deg, 300, 1e-9);
@@ -344,6 +345,7 @@ TEST_F(MixedTableTest, SecondCameraAfterAResumeMakesItsOwnFirstTurn) {
   }
   LiveGuide guide(*writer, options);
   guide.resume(earlier);
+  EXPECT_EQ(guide.cameras()[1].instruction, "turn the table by 30°, then press Enter or take the photo");
   for (int i = 0; i < 12; ++i) photo(guide);
   EXPECT_EQ(guide.done_count(Modality::thermal), 12);
   EXPECT_NEAR(guide.cameras()[1].position->elevation_deg, 20, 1e-9);
