@@ -65,6 +65,12 @@ class FrameSource {
   /// Goes on with a session: what an earlier recording knew of the device, and its frames. Called
   /// before the first next(); a source of files leaves out those that it delivered then.
   virtual void resume(const DeviceInfo& /*device*/, const std::vector<FrameRecord>& /*frames*/) {}
+  /// Asks for a shutter correction (NUC) as soon as can be; from any thread. Events of the stream
+  /// tell what came of it ("nuc", "nuc-failed"). Nothing for cameras that have none.
+  virtual void request_correction() {}
+  /// What the transport counted, for people, e.g. "1800 completed, 12 resent"; empty: nothing is
+  /// counted. From the thread of next(), before stop().
+  virtual std::string transport_report() const { return {}; }
   /// Whether nothing is lost when the recorder takes its time (files): then it never drops.
   virtual bool can_wait() const { return false; }
 };

@@ -51,7 +51,7 @@ struct Recorder::Channel {
   std::deque<Frame> queue;
   bool capture_over = false;
   bool writer_failed = false;
-  bool silent = false;
+  bool silent = false, away = false;
   std::optional<Error> error;
   std::optional<FrameRecord> latest;
 
@@ -115,11 +115,15 @@ struct Recorder::Channel {
       }
       {
         const std::lock_guard lock(mutex);
-        silent = delivery->kind == Delivery::Kind::timeout;
+        if (delivery->kind == Delivery::Kind::event && delivery->reason == "disconnected") away = true;
+        if (delivery->kind == Delivery::Kind::event && delivery->reason == "reconnected") away = false;
+        // Files come when they come, unless their folder is gone.
+        silent = delivery->kind == Delivery::Kind::timeout && (!source.can_wait() || away);
       }
       if (delivery->kind == Delivery::Kind::end) break;
       take(*std::move(delivery));
     }
+    if (const std::string counted = source.transport_report(); !counted.empty()) log_event("transport", counted);
     source.stop();
     if (!status) {
       keep_first(status.error());

@@ -25,7 +25,16 @@ struct Machine {
 /// Link state and speed, MTU, multicast, subnets of wired interfaces; reverse path filter; receive
 /// buffers. For GigE Vision cameras.
 std::vector<Finding> check_network(const Machine& machine);
-/// Memory for USB transfers, power saving, the UVC driver.
+/// What a GigE Vision camera says of itself to anyone who asks.
+struct CameraLink {
+  std::string name, address;
+  int packet_bytes = 0;     ///< of its stream packets; 0: it didn't say
+  bool controlled = false;  ///< by some program
+};
+/// Its packets against the MTU of the interface in its subnet, and whether it is free.
+Finding check_camera(const Machine& machine, const CameraLink& camera);
+
+/// Memory for USB transfers, power saving, the UVC driver, cameras that share a bus.
 std::vector<Finding> check_usb(const Machine& machine);
 /// The year, and whether a time service keeps the clock.
 std::vector<Finding> check_clocks(const Machine& machine);

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <arpa/inet.h>
 #include <fmt/format.h>
 
 #include <cstdint>
@@ -86,6 +87,33 @@ Finding check_interface(const Machine& machine, const std::string& name,
 }
 
 }  // namespace
+
+Finding check_camera(const Machine& machine, const CameraLink& camera) {
+  Finding finding{"camera " + camera.name, "at " + camera.address, "", false};
+  std::uint32_t address = 0;
+  in_addr parsed{};
+  if (inet_pton(AF_INET, camera.address.c_str(), &parsed) == 1) address = parsed.s_addr;
+  long long mtu = 0;
+  for (const auto& [name, list] : subnets(machine)) {
+    for (const Subnet& net : list) {
+      if ((address & net.mask) == (net.address & net.mask))
+        mtu = number_of(machine.root / "sys/class/net" / name / "mtu").value_or(0);
+    }
+  }
+  if (camera.packet_bytes > 0)
+    finding.found += fmt::format(", packets of {} bytes", camera.packet_bytes);
+  if (mtu > 0) finding.found += fmt::format(" over an MTU of {}", mtu);
+  if (camera.controlled) {
+    finding.found += ", controlled by a program";
+    finding.remedy = "close the program that has it, or it can't be recorded";
+  } else if (mtu > 0 && camera.packet_bytes > mtu) {
+    finding.remedy = fmt::format(
+        "packets larger than the MTU don't arrive: raise the MTU to {}, or set GevSCPSPacketSize "
+        "to {} in its profile",
+        camera.packet_bytes, mtu);
+  }
+  return finding;
+}
 
 std::vector<Finding> check_network(const Machine& machine) {
   std::vector<Finding> list;

@@ -1,5 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
 
 #include "app/doctor/checks.hpp"
 #include "app/doctor/kernel_files.hpp"
@@ -7,8 +12,49 @@
 namespace orbitfuse::doctor {
 namespace {
 
+constexpr long long usb2_megabit_s = 480;
+
 constexpr long long wanted_usbfs_mb =
     256;  // the kernel's 16 MB hold less than one USB3 Vision burst
+
+/// Cameras by bus, from the kernel's list: a camera has a video interface (class 0e) in a folder
+/// such as "1-4.2:1.0".
+struct Bus {
+  std::vector<std::string> cameras;
+  long long slowest_megabit_s = 0;
+};
+std::map<std::string, Bus> camera_buses(const std::filesystem::path& devices) {
+  std::map<std::string, Bus> buses;
+  std::set<std::string> seen;
+  for (const std::string& name : names_in(devices)) {
+    const std::size_t colon = name.find(':'), dash = name.find('-');
+    if (colon == std::string::npos || dash == std::string::npos) continue;
+    if (line_of(devices / name / "bInterfaceClass") != "0e") continue;
+    const std::string device = name.substr(0, colon);
+    if (!seen.insert(device).second) continue;
+    const long long speed = number_of(devices / device / "speed").value_or(0);
+    Bus& bus = buses[name.substr(0, dash)];
+    bus.cameras.push_back(fmt::format(
+        "{} ({} Mbit/s)", line_of(devices / device / "product").value_or(device), speed));
+    if (speed > 0)
+      bus.slowest_megabit_s =
+          bus.slowest_megabit_s > 0 ? std::min(bus.slowest_megabit_s, speed) : speed;
+  }
+  return buses;
+}
+
+Finding check_bus(const std::string& number, const Bus& bus) {
+  Finding finding{"USB bus " + number, fmt::format("{}", fmt::join(bus.cameras, ", ")), "", false};
+  if (bus.slowest_megabit_s > 0 && bus.slowest_megabit_s < usb2_megabit_s) {
+    finding.remedy = "too slow for video: use another port or cable, and no hub of USB 1";
+  } else if (bus.cameras.size() > 1 && bus.slowest_megabit_s == usb2_megabit_s) {
+    finding.remedy =
+        "cameras on one USB 2 bus share some 300 Mbit/s; 640x480 YUYV at 30 Hz takes 147: plug one "
+        "into a port of "
+        "another bus (lsusb -t), or use format=MJPG or a lower rate";
+  }
+  return finding;
+}
 
 }  // namespace
 
@@ -39,6 +85,8 @@ std::vector<Finding> check_usb(const Machine& machine) {
          fmt::format("{} nodes, uvcvideo {}", nodes.size(), has_uvc ? "loaded" : "not loaded"),
          has_uvc || !nodes.empty() ? "" : "for USB cameras: modprobe uvcvideo", false});
   }
+  for (const auto& [number, bus] : camera_buses(machine.root / "sys/bus/usb/devices"))
+    list.push_back(check_bus(number, bus));
   return list;
 }
 

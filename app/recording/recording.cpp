@@ -106,10 +106,7 @@ Status Recording::prepare() {
   const std::lock_guard lock(mutex_);
   if (options_.guide) {
     guide_ = std::make_unique<LiveGuide>(*writer_, *options_.guide, finder_);
-    // Sectors that an earlier recording filled stay filled.
-    if (earlier) {
-      for (const FrameRecord& frame : earlier->frames) guide_->add(frame);
-    }
+    if (earlier) guide_->resume(earlier->frames);
   }
   RecorderOptions recorder_options;
   if (!options_.live) recorder_options.backpressure = Backpressure::wait;
@@ -224,6 +221,10 @@ std::filesystem::path Recording::latest(Modality modality) const {
 void Recording::operator_at_station() {
   const std::lock_guard lock(mutex_);
   if (guide_) guide_->operator_at_station();
+}
+
+void Recording::request_correction() {
+  for (const auto& source : sources_) source->request_correction();
 }
 
 std::vector<StreamStatus> Recording::status() const {

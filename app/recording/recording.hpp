@@ -55,6 +55,8 @@ class Recording {
   /// The newest recorded image of a modality; empty: none yet.
   std::filesystem::path latest(Modality modality) const;
   void operator_at_station();
+  /// A shutter correction (NUC) of every camera that has one, now rather than at a station.
+  void request_correction();
   LiveGuide* guide() { return guide_.get(); }
   const std::vector<DeviceInfo>& devices() const { return devices_; }
   const std::filesystem::path& folder() const { return options_.session; }

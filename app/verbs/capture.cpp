@@ -173,6 +173,8 @@ class Teller {
     const ssize_t count = ::read(STDIN_FILENO, keys, sizeof keys);
     if (count > 0 && keys[0] == 'q')
       recording_.request_stop();
+    else if (count > 0 && keys[0] == 'n')
+      recording_.request_correction();
     else if (count > 0 && recording_.guide())
       recording_.operator_at_station();
   }
@@ -218,6 +220,7 @@ Status open_page(Context& context, const Options& o, recording::Recording& recor
   hooks.start = [&page] { page.started = true; };
   hooks.stop = [&recording] { recording.request_stop(); };
   hooks.at_station = [&recording] { recording.operator_at_station(); };
+  hooks.correct = [&recording] { recording.request_correction(); };
   page.server = std::make_unique<PageServer>(options, std::move(hooks));
   ORBITFUSE_TRY(page.server->start());
   for (const std::string& url : page.server->urls()) context.console.info("page: " + url);
@@ -277,7 +280,7 @@ Status run(Context& context, const Options& o) {
         fmt::format("{}: {} {} {}", device.id, device.driver, device.model, device.serial));
   }
   if (options.live)
-    context.console.info("recording; Enter: at the next station, q or Ctrl-C: stop");
+    context.console.info("recording; Enter: at the next station, n: shutter correction (NUC) now, q or Ctrl-C: stop");
   Teller teller(context, recording, options.live, o.view);
   const auto ending = recording.run(context.progress.cancel, [&] { teller.tick(); });
   account(context, recording);
@@ -293,10 +296,12 @@ Action add_capture(CLI::App& app) {
                  "Session folder: new, or with --resume one to go on with")
       ->required();
   app.add_option("--visible", options->visible,
-                 "Visible camera: DRIVER[:CAMERA][,KEY=VALUE]...; drivers are aravis, v4l2, "
-                 "replay and synthetic");
+                 "Visible camera: DRIVER[:CAMERA][,KEY=VALUE]...; drivers are aravis (GigE Vision), v4l2 "
+                 "(USB video), stills (stills:FOLDER takes photos that arrive there), replay and "
+                 "synthetic");
   app.add_option("--thermal", options->thermal,
-                 "Thermal camera, written alike, e.g. aravis:192.168.1.20");
+                 "Thermal camera, written alike, e.g. aravis:192.168.1.20 or stills:FOLDER for "
+                 "radiometric JPEGs");
   app.add_option("--driver", options->driver,
                  "For modalities without a camera of their own, e.g. replay:FOLDER");
   app.add_option("--profiles", options->profiles,
@@ -311,8 +316,8 @@ Action add_capture(CLI::App& app) {
       ->check(CLI::IsMember({"auto", "key", "off"}))
       ->capture_default_str();
   app.add_option("--turntable", options->turntable_deg,
-                 "The object stands on a turntable: each Enter key, and each photo of a stills "
-                 "camera, is this many degrees further; a full turn later it is the next loop");
+                 "The object stands on a turntable: each Enter key (without keys: each photo of a "
+                 "stills camera) is this many degrees further; a full turn later it is the next loop");
   app.add_option("--mat", options->mat, "The mat that lies there (orbitfuse mat): paper or foil")
       ->check(CLI::IsMember({"paper", "foil"}))
       ->capture_default_str();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
@@ -9,6 +10,8 @@
 #include "app/doctor/checks.hpp"
 #include "core/cpu.hpp"
 #include "core/parallel.hpp"
+#include "drivers/aravis/aravis_source.hpp"
+#include "drivers/aravis/gvcp_probe.hpp"
 
 namespace orbitfuse::cli {
 namespace {
@@ -36,6 +39,16 @@ Finding check_colmap() {
     return {"COLMAP", "not on PATH", "apt install colmap, or import sessions with known poses",
             true};
   return {"COLMAP", colmap, "", true};
+}
+
+doctor::CameraLink link_of(const aravis::FoundCamera& camera) {
+  const auto ask = [&](aravis::GvcpRegister address) {
+    return aravis::read_register(camera.address, address, std::chrono::milliseconds(200))
+        .value_or(0);
+  };
+  return {camera.model + " " + camera.serial, camera.address,
+          static_cast<int>(ask(aravis::GvcpRegister::packet_size) & 0xffff),
+          ask(aravis::GvcpRegister::control_privilege) != 0};
 }
 
 Finding check_cpu() {
@@ -66,6 +79,8 @@ Action add_doctor(CLI::App& app) {
                              doctor::check_usb(machine)}) {
       findings.insert(findings.end(), more.begin(), more.end());
     }
+    for (const aravis::FoundCamera& camera : aravis::discover())
+      findings.push_back(doctor::check_camera(machine, link_of(camera)));
     auto list = nlohmann::json::array();
     int problems = 0;
     for (const Finding& f : findings) {

@@ -1,5 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <map>
+#include <tuple>
 
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
@@ -11,16 +16,45 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
+/// The frames of each camera, lens and image size: they may not be mixed up.
+json groups_of(const Session& session, Modality modality) {
+  std::map<std::tuple<std::string, int, int>, int> frames;
+  for (const FrameRecord* frame : session.frames_of(modality))
+    ++frames[{frame->device, frame->width, frame->height}];
+  json groups = json::array();
+  for (const auto& [key, count] : frames) {
+    const auto& [id, width, height] = key;
+    json group = {{"device", id}, {"size", fmt::format("{}x{}", width, height)}, {"frames", count}};
+    if (const DeviceInfo* device = session.device(id)) {
+      group["model"] = device->model;
+      group["serial"] = device->serial;
+      if (device->lens.focal_px) group["focal_px"] = *device->lens.focal_px;
+    }
+    groups.push_back(group);
+  }
+  return groups;
+}
+
+std::string described(const json& group) {
+  std::string text = fmt::format("  {}: {} frames of {}", group["device"].get<std::string>(),
+                                 group["frames"].get<int>(), group["size"].get<std::string>());
+  for (const char* known : {"model", "serial"}) {
+    if (const std::string value = group.value(known, std::string()); !value.empty())
+      text += ", " + value;
+  }
+  if (group.contains("focal_px"))
+    text += fmt::format(", focal length about {:.0f} px", group["focal_px"].get<double>());
+  return text;
+}
+
 json describe(const Session& session, Modality modality) {
   int stations = 0, tracking = 0, posed = 0, with_station = 0, gray = 0;
   std::uint64_t lost = 0;
-  std::string size;
   for (const FrameRecord* frame : session.frames_of(modality)) {
     ++(frame->tracking ? tracking : stations);
     posed += frame->cam_from_world.has_value();
     with_station += frame->station.has_value();
     gray += frame->thermal_is_gray;
-    if (size.empty()) size = fmt::format("{}x{}", frame->width, frame->height);
   }
   json devices = json::array();
   for (const DeviceInfo& device : session.devices) {
@@ -29,8 +63,19 @@ json describe(const Session& session, Modality modality) {
     for (const GapRecord& gap : session.gaps)
       if (gap.device == device.id) lost += gap.count;
   }
-  return {{"frames", stations}, {"tracking", tracking}, {"with_pose", posed},
-          {"with_station", with_station}, {"size", size}, {"lost", lost},
+  const json groups = groups_of(session, modality);
+  std::vector<std::string> sizes;
+  for (const json& group : groups) {
+    const auto size = group["size"].get<std::string>();
+    if (std::find(sizes.begin(), sizes.end(), size) == sizes.end()) sizes.push_back(size);
+  }
+  return {{"frames", stations},
+          {"tracking", tracking},
+          {"with_pose", posed},
+          {"with_station", with_station},
+          {"size", fmt::format("{}", fmt::join(sizes, ", "))},
+          {"lost", lost},
+          {"groups", groups},
           {"has_temperatures", modality == Modality::thermal && gray < stations + tracking},
           {"devices", devices}};
 }
@@ -44,8 +89,8 @@ Status inspect_run(Context& context, const fs::path& folder) {
       context.console.warning(record.error().message());
       continue;
     }
-    context.console.data(fmt::format("{:<14} {}  {:>7.1f} s  {}", record->stage, record->finished_utc,
-                                     record->wall_s,
+    context.console.data(fmt::format("{:<14} {}  {:>7.1f} s  {}", record->stage,
+                                     record->finished_utc, record->wall_s,
                                      record->output.metrics.value("brief", std::string())));
     stages.push_back(to_json(*record));
   }
@@ -55,10 +100,14 @@ Status inspect_run(Context& context, const fs::path& folder) {
 
 Status inspect_session(Context& context, const fs::path& folder) {
   ORBITFUSE_ASSIGN(const Session session, open_session(folder));
-  context.console.data(fmt::format("session {} of {}{}", session.id, session.created,
-                                   session.complete ? "" : ", incomplete: the recorder was stopped"));
-  context.result = {{"session", folder.string()}, {"id", session.id}, {"created", session.created},
-                    {"complete", session.complete}, {"warnings", session.warnings}};
+  context.console.data(
+      fmt::format("session {} of {}{}", session.id, session.created,
+                  session.complete ? "" : ", incomplete: the recorder was stopped"));
+  context.result = {{"session", folder.string()},
+                    {"id", session.id},
+                    {"created", session.created},
+                    {"complete", session.complete},
+                    {"warnings", session.warnings}};
   for (const Modality modality : {Modality::visible, Modality::thermal}) {
     const json j = describe(session, modality);
     context.result[std::string(name(modality))] = j;
@@ -68,11 +117,14 @@ Status inspect_session(Context& context, const fs::path& folder) {
     }
     context.console.data(fmt::format(
         "{}: {} frames of {}, {} tracking, {} with a station, {} with a pose, {} lost{}",
-        name(modality), j["frames"].get<int>(), j["size"].get<std::string>(), j["tracking"].get<int>(),
-        j["with_station"].get<int>(), j["with_pose"].get<int>(), j["lost"].get<std::uint64_t>(),
-        modality == Modality::visible  ? ""
+        name(modality), j["frames"].get<int>(), j["size"].get<std::string>(),
+        j["tracking"].get<int>(), j["with_station"].get<int>(), j["with_pose"].get<int>(),
+        j["lost"].get<std::uint64_t>(),
+        modality == Modality::visible   ? ""
         : j["has_temperatures"] == true ? ", temperatures"
                                         : ", gray levels"));
+    if (j["groups"].size() > 1)
+      for (const json& group : j["groups"]) context.console.data(described(group));
   }
   for (const std::string& warning : session.warnings) context.console.warning(warning);
   return {};

@@ -50,10 +50,12 @@ LiveGuide::LiveGuide(SessionWriter& writer, LiveGuideOptions options, PositionFi
     : writer_(writer),
       options_(std::move(options)),
       finder_(std::move(finder)),
-      coverage_(options_.plan, options_.coverage) {
+      coverage_(options_.plan, options_.coverage),
+      table_(options_.turntable_step_deg) {
   for (const Modality modality : options_.plan.modalities) {
     cameras_[modality].shown.modality = modality;
-    cameras_[modality].shown.instruction = coverage_.instruction(modality, std::nullopt);
+    Camera& camera = cameras_[modality];
+    camera.shown.instruction = instruction(modality, camera, std::nullopt, Refusal::none);
   }
   if (finder_) looker_ = std::jthread([this] { look(); });
 }
@@ -69,6 +71,27 @@ void LiveGuide::finish() {
   if (looker_.joinable()) looker_.join();
 }
 
+void LiveGuide::resume(const std::vector<FrameRecord>& earlier) {
+  const std::lock_guard lock(mutex_);
+  for (const FrameRecord& frame : earlier) {
+    const auto known = cameras_.find(frame.modality);
+    if (known == cameras_.end() || !frame.station || frame.tracking) continue;
+    known->second.shown.latest_file = frame.file;
+    add_at_station(known->second, frame);
+    table_.resume_at(known->second.table, *frame.station);
+  }
+  for (auto& [modality, camera] : cameras_)
+    camera.shown.instruction = instruction(modality, camera, camera.position, Refusal::none);
+}
+
+/// The source's or the operator's word: there, and at rest.
+void LiveGuide::add_at_station(Camera& camera, const FrameRecord& frame) {
+  set_position(camera, {frame.station->azimuth_deg, frame.station->elevation_deg, 0, 0},
+               frame.host_time_ns);
+  camera.position->speed_deg_s = 0;
+  judge(camera, frame, camera.position);
+}
+
 void LiveGuide::add(const FrameRecord& frame) {
   const std::lock_guard lock(mutex_);
   const auto known = cameras_.find(frame.modality);
@@ -76,16 +99,11 @@ void LiveGuide::add(const FrameRecord& frame) {
   Camera& camera = known->second;
   camera.shown.latest_file = frame.file;
   if (frame.station && !frame.tracking) {
-    // The source's or the operator's word: there, and at rest.
-    if (frame.has_flag("still")) ++camera.table_steps;
-    set_position(camera, {frame.station->azimuth_deg, frame.station->elevation_deg, 0, 0},
-                 frame.host_time_ns);
-    camera.position->speed_deg_s = 0;
-    judge(camera, frame, camera.position);
+    add_at_station(camera, frame);
   } else if (options_.turntable_step_deg != 0 && frame.has_flag("still")) {
-    camera.announced = next_table_position(camera);
+    camera.announced = on_table(camera.table, table_.photo(camera.table));
     judge_announced(camera, frame);
-    camera.announced.reset();  // the next photo is the next step, whatever this one was
+    camera.announced.reset();  // the next photo tells anew where the table is
   } else if (camera.announced) {
     judge_announced(camera, frame);
   } else if (finder_) {
@@ -96,19 +114,17 @@ void LiveGuide::add(const FrameRecord& frame) {
 
 void LiveGuide::operator_at_station() {
   const std::lock_guard lock(mutex_);
+  const bool turned = options_.turntable_step_deg != 0;
+  const double table_deg = turned ? table_.key() : 0;
   for (auto& [modality, camera] : cameras_) {
-    if (options_.turntable_step_deg != 0) camera.announced = next_table_position(camera);
-    else camera.announced = next_station(modality);
+    if (turned && camera.table.counts_photos) continue;  // its photos tell, and may come late
+    camera.announced = turned ? on_table(camera.table, table_deg) : next_station(modality);
   }
 }
 
-OrbitPosition LiveGuide::next_table_position(Camera& camera) const {
-  const double way_deg = camera.table_steps++ * options_.turntable_step_deg;
-  // Rounded: twelve thirds of 90 degrees are a turn.
-  const auto turn = static_cast<std::size_t>(std::floor(std::abs(way_deg) / 360 + 1e-9));
+OrbitPosition LiveGuide::on_table(TableView& view, double azimuth_deg) const {
   const std::vector<double>& loops = options_.plan.loop_elevations_deg;
-  const double azimuth = std::fmod(way_deg, 360);
-  return {azimuth < 0 ? azimuth + 360 : azimuth, loops[turn % loops.size()], 0, 0};
+  return {azimuth_deg, loops[table_.turn(view, azimuth_deg) % loops.size()], 0, 0};
 }
 
 void LiveGuide::judge_announced(Camera& camera, const FrameRecord& frame) {
@@ -117,7 +133,8 @@ void LiveGuide::judge_announced(Camera& camera, const FrameRecord& frame) {
   judge(camera, frame, there);
   const Refusal refusal = camera.shown.refusal;
   // A blurred frame is followed by another from the same place; a place between stations stays one.
-  if (refusal == Refusal::none || refusal == Refusal::between_stations || refusal == Refusal::out_of_band)
+  if (refusal == Refusal::none || refusal == Refusal::between_stations ||
+      refusal == Refusal::out_of_band)
     camera.announced.reset();
 }
 
@@ -158,7 +175,38 @@ void LiveGuide::judge(Camera& camera, const FrameRecord& frame,
   camera.shown.judged_file = frame.file;
   camera.shown.refusal = coverage_.add(assessment);
   if (camera.shown.refusal == Refusal::none) note_choice(camera, frame);
-  camera.shown.instruction = coverage_.instruction(frame.modality, position, camera.shown.refusal);
+  camera.shown.instruction = instruction(frame.modality, camera, position, camera.shown.refusal);
+}
+
+/// What to do next, in the words of how positions are known here.
+std::string LiveGuide::instruction(Modality modality, const Camera& camera,
+                                   const std::optional<OrbitPosition>& position,
+                                   Refusal last) const {
+  const std::optional<OrbitPosition> next = next_station(modality);
+  if (next && options_.turntable_step_deg != 0) return table_instruction(camera, last);
+  if (next && !position && !finder_) {
+    return fmt::format("go to azimuth {:.0f}°, {:.0f}° high, then press Enter", next->azimuth_deg,
+                       next->elevation_deg);
+  }
+  return coverage_.instruction(modality, position, last);
+}
+
+std::string LiveGuide::table_instruction(const Camera& camera, Refusal last) const {
+  const TableView& view = camera.table;
+  const bool to_repeat = last == Refusal::nuc || last == Refusal::blurred ||
+                         last == Refusal::badly_exposed || last == Refusal::moving;
+  if (to_repeat && camera.announced && !view.counts_photos) return text(last);
+  const std::string then = view.counts_photos ? "take the photo"
+                           : view.start_deg   ? "press Enter"
+                                              : "press Enter or take the photo";
+  if (!view.start_deg && !table_.begun()) return "put the table at its start, then " + then;
+  std::string words = to_repeat ? text(last) + "; " : "";
+  words += fmt::format("turn the table by {:g}°", std::abs(options_.turntable_step_deg));
+  const std::vector<double>& loops = options_.plan.loop_elevations_deg;
+  const double elevation_deg = loops[table_.turn_after_step(view) % loops.size()];
+  if (camera.position && elevation_deg != camera.position->elevation_deg)
+    words += fmt::format(", move the camera to {:g}° high", elevation_deg);
+  return words + ", then " + then;
 }
 
 void LiveGuide::note_choice(Camera& camera, const FrameRecord& frame) {

@@ -14,6 +14,7 @@
 
 #include "capture/guide/coverage.hpp"
 #include "capture/live/sharpness_reference.hpp"
+#include "capture/live/turntable.hpp"
 #include "capture/session_writer.hpp"
 
 namespace orbitfuse {
@@ -26,8 +27,9 @@ struct LiveGuideOptions {
   CoverageOptions coverage;
   double looks_per_second = 4;  ///< per camera; finding the mat costs 5-30 ms a look
   double unseen_after_s = 1.0;  ///< a position older than this is no longer where the camera is
-  /// The object stands on a turntable: each key, and each photo, is this much further in azimuth,
-  /// negative for a table that turns the other way; a full turn later it is the next loop. 0: none.
+  /// The object stands on a turntable: each key is this much further in azimuth, negative for a
+  /// table that turns the other way; a full turn later it is the next loop. A photo shows the table
+  /// where the last key put it; without keys each photo of a camera is a step. 0: none.
   double turntable_step_deg = 0;
 
   Status validate() const;
@@ -44,15 +46,19 @@ struct LiveCamera {
 
 /// Follows a recording and decides which stations are done. Every frame comes here after it is on
 /// disk. Its position is the station that it carries (replay, synthetic), or the turntable's step,
-/// or the operator's key, or what `finder` sees in the image, read back from disk a few times a second on
-/// a thread of its own so that recording never waits for it. The frame chosen for a sector is
-/// marked in the manifest (SessionWriter::amend); one that it replaces becomes a tracking frame.
+/// or the operator's key, or what `finder` sees in the image, read back from disk a few times a
+/// second on a thread of its own so that recording never waits for it. The frame chosen for a
+/// sector is marked in the manifest (SessionWriter::amend); one that it replaces becomes a tracking
+/// frame.
 class LiveGuide {
  public:
   /// `writer` outlives the guide. Without `finder` only stations and keys give positions.
   LiveGuide(SessionWriter& writer, LiveGuideOptions options, PositionFinder finder = {});
   ~LiveGuide();
 
+  /// What an earlier recording of the session stored, before the first add(): sectors that it
+  /// filled stay filled, and the turntable goes on one step after the last recorded station.
+  void resume(const std::vector<FrameRecord>& earlier);
   /// From any thread; fast unless the frame carries a station.
   void add(const FrameRecord& frame);
   /// The operator stands at the next station, or has turned the table by a step: for each modality
@@ -77,17 +83,21 @@ class LiveGuide {
     SharpnessReference sharpness;
     std::optional<OrbitPosition> position;
     std::int64_t position_time_ns = 0;
-    std::optional<FrameRecord> waiting;  ///< newest frame not looked at yet
+    std::optional<FrameRecord> waiting;      ///< newest frame not looked at yet
     std::optional<OrbitPosition> announced;  ///< by the key: where the next good frame is
-    int table_steps = 0;                     ///< that the turntable has made
+    TableView table;
     std::map<std::size_t, FrameRecord> chosen;  ///< by sector
   };
+  void add_at_station(Camera& camera, const FrameRecord& frame);
   void look();
   void judge(Camera& camera, const FrameRecord& frame,
              const std::optional<OrbitPosition>& position);
   void note_choice(Camera& camera, const FrameRecord& frame);
+  std::string instruction(Modality modality, const Camera& camera,
+                          const std::optional<OrbitPosition>& position, Refusal last) const;
+  std::string table_instruction(const Camera& camera, Refusal last) const;
   std::optional<OrbitPosition> next_station(Modality modality) const;
-  OrbitPosition next_table_position(Camera& camera) const;
+  OrbitPosition on_table(TableView& view, double azimuth_deg) const;
   void judge_announced(Camera& camera, const FrameRecord& frame);
   void set_position(Camera& camera, OrbitPosition position, std::int64_t time_ns);
 
@@ -98,6 +108,7 @@ class LiveGuide {
   std::condition_variable changed_;
   Coverage coverage_;
   std::map<Modality, Camera> cameras_;
+  Turntable table_;
   std::optional<Error> error_;
   bool over_ = false;
   std::jthread looker_;

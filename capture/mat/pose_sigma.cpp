@@ -2,7 +2,6 @@
 #include "capture/mat/pose_sigma.hpp"
 
 #include <Eigen/Dense>
-#include <Eigen/Dense>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -12,6 +11,7 @@
 
 namespace orbitfuse {
 
+static constexpr double unknown = std::numeric_limits<double>::infinity();
 static constexpr double deg = 180 / std::numbers::pi;
 
 PoseVector pose_of(const cv::Mat& r, const cv::Mat& t) {
@@ -40,6 +40,7 @@ Eigen::Vector2d angles_of(const Rigid3d& cam_from_mat) {
 }
 
 double reprojection_rms_px(const MatCorners& corners, const cv::Matx33d& k, const cv::Mat& r, const cv::Mat& t) {
+  if (corners.mat.empty()) return unknown;
   std::vector<cv::Point2d> projected;
   cv::projectPoints(corners.mat, r, t, k, cv::noArray(), projected);
   double sum = 0;
@@ -52,6 +53,7 @@ double reprojection_rms_px(const MatCorners& corners, const cv::Matx33d& k, cons
 
 double direction_sigma_deg(const MatCorners& corners, const cv::Matx33d& k, const cv::Mat& r, const cv::Mat& t,
                  double error_px) {
+  if (corners.mat.empty() || !std::isfinite(error_px)) return unknown;
   std::vector<cv::Point2d> projected;
   cv::Mat jacobian;
   cv::projectPoints(corners.mat, r, t, k, cv::noArray(), projected, jacobian);
@@ -61,12 +63,12 @@ double direction_sigma_deg(const MatCorners& corners, const cv::Matx33d& k, cons
     for (int i = 0; i < 6; ++i) j[i] = jacobian.at<double>(row, i);
     information += j * j.transpose();
   }
-  constexpr double unknown = std::numeric_limits<double>::infinity();
   // Scaled to a unit diagonal, so that radians and metres weigh alike.
   const PoseVector scale = information.diagonal().cwiseSqrt().cwiseInverse();
+  if (!scale.allFinite()) return unknown;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> shape(scale.asDiagonal() * information *
                                                                          scale.asDiagonal());
-  if (!scale.allFinite() || !(shape.eigenvalues()[0] > 1e-10)) return unknown;
+  if (!(shape.eigenvalues()[0] > 1e-10)) return unknown;
   const Eigen::Matrix<double, 6, 6> covariance =
       information.ldlt().solve(Eigen::Matrix<double, 6, 6>::Identity()) *
       std::pow(std::max(error_px, 0.1), 2);

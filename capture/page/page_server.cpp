@@ -181,6 +181,7 @@ struct PageServer::Impl {
     action("/start", hooks.start);
     action("/stop", hooks.stop);
     action("/station", hooks.at_station);
+    action("/nuc", hooks.correct);
   }
 };
 

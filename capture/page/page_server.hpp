@@ -26,7 +26,7 @@ struct PageHooks {
   std::function<LiveState()> state;
   /// The newest recorded file of a modality; empty: none yet.
   std::function<std::filesystem::path(Modality)> latest;
-  std::function<void()> start, stop, at_station;  ///< may be empty
+  std::function<void()> start, stop, at_station, correct;  ///< may be empty
 };
 
 /// The capture page. It answers with one page without any outside address, its state as JSON,

@@ -10,7 +10,9 @@
 #include <vector>
 
 #include "capture/clock/clock_map.hpp"
+#include "capture/freeze_watch.hpp"
 #include "capture/frame_source.hpp"
+#include "capture/lasting_failure.hpp"
 #include "capture/raw_counts.hpp"
 #include "drivers/aravis/profile.hpp"
 
@@ -32,6 +34,8 @@ struct AravisOptions {
 
 struct StreamStatistics {
   std::uint64_t completed = 0, failures = 0, underruns = 0, resent = 0, missing_packets = 0, size_mismatches = 0;
+
+  StreamStatistics& operator+=(const StreamStatistics& other);
 };
 
 /// A GigE Vision camera. Aravis calls some damaged frames good, so every frame is checked for its
@@ -51,8 +55,12 @@ class AravisSource final : public FrameSource {
   Result<Delivery> next(std::chrono::milliseconds timeout) override;
   void stop() override;
 
+  /// Done by the next next().
+  void request_correction() override { correction_wanted_ = true; }
+  std::string transport_report() const override;
   /// Asks the camera for a shutter correction now; frames until it settles are flagged.
   Status correct_nonuniformity();
+  /// Of all connections since the source was made.
   StreamStatistics statistics() const;
   const ClockMap& clock() const { return clock_; }
 
@@ -67,16 +75,18 @@ class AravisSource final : public FrameSource {
   void watch_control();
   Delivery lose(const std::string& why);
   Delivery event(std::string kind, std::string detail) const;
+  Delivery correct_as_asked();
+  StreamStatistics link_statistics() const;
   std::optional<Delivery> try_reopen();
   Delivery inspect(void* buffer);
-  void mark_nuc(Frame& frame, const void* data, std::size_t size);
 
   AravisOptions options_;
   CameraProfile profile_;
   std::shared_ptr<Link> link_;
   std::vector<std::thread> graves_;
   std::jthread control_watch_;
-  std::atomic<bool> control_mute_{false};
+  std::atomic<bool> control_mute_{false}, correction_wanted_{false};
+  StreamStatistics earlier_;           ///< of connections that are gone
   std::vector<std::uint16_t> table_;
   std::vector<Delivery> pending_;
   DeviceInfo info_;
@@ -84,10 +94,12 @@ class AravisSource final : public FrameSource {
   GvspFrameCounter counter_;
   ClockMap clock_;
   RawCounts raw_counts_;
-  std::uint64_t base_id_ = 0, next_id_ = 0, mismatches_ = 0, last_hash_ = 0;
+  FreezeWatch freeze_;
+  LastingFailure failure_;             ///< to reopen
+  std::uint64_t base_id_ = 0, next_id_ = 0, mismatches_ = 0;
   double interval_s_ = 0;              ///< between frames, smoothed; tells how many an outage cost
-  bool away_ = false, silent_told_ = false, mute_told_ = false, frozen_ = false;
-  Clock::time_point last_frame_{}, last_attempt_{}, lost_at_{}, nuc_until_{};
+  bool away_ = false, silent_told_ = false, mute_told_ = false;
+  Clock::time_point last_frame_{}, last_attempt_{}, lost_at_{};
 };
 
 struct FoundCamera {

@@ -11,24 +11,55 @@
 
 namespace orbitfuse::aravis {
 
-bool answers(const std::string& ip_address, std::chrono::milliseconds timeout) {
+namespace {
+
+using Reply = std::array<std::uint8_t, 512>;
+
+/// Sends one request of id 0x6f66 and returns the size of its acknowledgement; 0: none came.
+std::size_t ask(const std::string& ip_address, const void* request, std::size_t size,
+                std::chrono::milliseconds timeout, Reply& reply) {
   sockaddr_in to{};
   to.sin_family = AF_INET;
   to.sin_port = htons(3956);
-  if (inet_pton(AF_INET, ip_address.c_str(), &to.sin_addr) != 1) return false;
+  if (inet_pton(AF_INET, ip_address.c_str(), &to.sin_addr) != 1) return 0;
   const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (fd < 0) return false;
-  // Key 0x42, acknowledge wanted, DISCOVERY_CMD, no payload, request id 0x6f66.
-  const std::array<std::uint8_t, 8> request{0x42, 0x01, 0x00, 0x02, 0x00, 0x00, 0x6f, 0x66};
-  bool answered = false;
-  if (sendto(fd, request.data(), request.size(), 0, reinterpret_cast<sockaddr*>(&to), sizeof to) > 0) {
+  if (fd < 0) return 0;
+  ssize_t received = 0;
+  if (sendto(fd, request, size, 0, reinterpret_cast<sockaddr*>(&to), sizeof to) > 0) {
     pollfd waiter{fd, POLLIN, 0};
-    std::array<std::uint8_t, 512> reply{};
-    answered = poll(&waiter, 1, static_cast<int>(timeout.count())) > 0 &&
-               recv(fd, reply.data(), reply.size(), 0) >= 8 && reply[3] == 0x03 && reply[6] == 0x6f && reply[7] == 0x66;
+    if (poll(&waiter, 1, static_cast<int>(timeout.count())) > 0)
+      received = recv(fd, reply.data(), reply.size(), 0);
   }
   close(fd);
-  return answered;
+  const bool ours = received >= 8 && reply[6] == 0x6f && reply[7] == 0x66;
+  return ours ? static_cast<std::size_t>(received) : 0;
+}
+
+}  // namespace
+
+bool answers(const std::string& ip_address, std::chrono::milliseconds timeout) {
+  // Key 0x42, acknowledge wanted, DISCOVERY_CMD, no payload, request id 0x6f66.
+  const std::array<std::uint8_t, 8> request{0x42, 0x01, 0x00, 0x02, 0x00, 0x00, 0x6f, 0x66};
+  Reply reply{};
+  return ask(ip_address, request.data(), request.size(), timeout, reply) > 0 && reply[3] == 0x03;
+}
+
+std::optional<std::uint32_t> read_register(const std::string& ip_address, GvcpRegister address,
+                                           std::chrono::milliseconds timeout) {
+  const auto a = static_cast<std::uint32_t>(address);
+  const auto byte = [](std::uint32_t value, int shift) {
+    return static_cast<std::uint8_t>(value >> shift);
+  };
+  // READREG_CMD of one address.
+  const std::array<std::uint8_t, 12> request{0x42,        0x01,        0x00,       0x80,
+                                             0x00,        0x04,        0x6f,       0x66,
+                                             byte(a, 24), byte(a, 16), byte(a, 8), byte(a, 0)};
+  Reply reply{};
+  const std::size_t size = ask(ip_address, request.data(), request.size(), timeout, reply);
+  // READREG_ACK, status success.
+  if (size < 12 || reply[0] != 0 || reply[1] != 0 || reply[3] != 0x81) return std::nullopt;
+  return std::uint32_t{reply[8]} << 24 | std::uint32_t{reply[9]} << 16 |
+         std::uint32_t{reply[10]} << 8 | reply[11];
 }
 
 }  // namespace orbitfuse::aravis

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
+#include <optional>
 #include <string>
 
 namespace orbitfuse::aravis {
@@ -9,5 +11,14 @@ namespace orbitfuse::aravis {
 /// Whether a GigE Vision device answers a discovery request at this address in time. Opening a
 /// camera that is away blocks Aravis for seconds; this asks first.
 bool answers(const std::string& ip_address, std::chrono::milliseconds timeout);
+
+/// Registers that every GigE Vision device has.
+enum class GvcpRegister : std::uint32_t {
+  control_privilege = 0x0a00,  ///< 0: nobody controls the camera
+  packet_size = 0x0d04,        ///< bytes of a stream packet in the low half, headers included
+};
+/// A register, which may be read without controlling the camera; nothing when no answer comes.
+std::optional<std::uint32_t> read_register(const std::string& ip_address, GvcpRegister address,
+                                           std::chrono::milliseconds timeout);
 
 }  // namespace orbitfuse::aravis

@@ -2,10 +2,11 @@
 #include "drivers/stills/import.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <deque>
 
 #include "capture/session_writer.hpp"
 #include "core/exif.hpp"
@@ -115,7 +116,7 @@ class Importer {
       Source source{file, std::nullopt, 0};
       if (const Result<ThermalFile> thermal = read_thermal_file(file)) {
         decoder_.observe(*thermal);
-        source.taken_ns = thermal->flir ? thermal->flir->taken_ns : read_exif(thermal->bytes).taken_ns;
+        source.taken_ns = taken_ns(*thermal);
       }
       sources.push_back(source);
     }
@@ -141,96 +142,46 @@ class Importer {
         pass_over(bytes.error());
         continue;
       }
-      Frame frame;
-      frame.encoded = *bytes;
-      frame.tracking = tracking;
-      frame.source = short_name(source.file);
-      ORBITFUSE_TRY(add_visible_frame(std::move(frame), source, options_.visible_stations));
+      ORBITFUSE_TRY(add_visible_frame(*bytes, source, tracking, options_.visible_stations));
     }
     return {};
   }
 
-  Status add_visible_frame(Frame frame, const Source& source, const std::optional<DeclaredStations>& stations) {
-    const ExifInfo exif = read_exif(frame.encoded);
-    const Result<cv::Mat> decoded = decode_image(frame.encoded, source.file.string());
-    if (!decoded) {
-      pass_over(decoded.error());
+  Status add_visible_frame(std::string bytes, const Source& source, bool tracking,
+                           const std::optional<DeclaredStations>& stations) {
+    Result<StillPhoto> still = visible_still(std::move(bytes), source.file.string());
+    if (!still) {
+      pass_over(still.error());
       return {};
     }
-    const cv::Size size = apply_orientation(*decoded, exif.orientation).size();
-    frame.extension = extension_of(frame.encoded);
-    frame.host_time_ns = source.taken_ns.value_or(0);
-    DeviceInfo device;
-    device.modality = Modality::visible;
-    device.driver = "stills";
-    device.model = exif.make.empty() ? exif.model : exif.make + " " + exif.model;
-    device.serial = exif.serial;
-    if (exif.focal_35mm) {
-      device.lens.focal_px = focal_px_of_35mm(*exif.focal_35mm, size);
-    }
-    if (options_.visible_focal_px) device.lens.focal_px = options_.visible_focal_px;
-    const std::string key = fmt::format("{}|{}|{}x{}", device.model, exif.focal_mm.value_or(0), size.width, size.height);
-    return add_frame(std::move(frame), device, key, size, source, stations);
+    return add_frame(std::move(*still), source, tracking, stations);
   }
 
   Status add_thermal(const std::vector<Source>& sources, bool tracking) {
     for (const Source& source : sources) {
       ORBITFUSE_TRY(step());
-      Result<ThermalFile> file = read_thermal_file(source.file);
+      const Result<ThermalFile> file = read_thermal_file(source.file);
       if (!file) {
         pass_over(file.error());
         continue;
       }
-      Result<ThermalDecoder::Converted> converted = decoder_.convert(*file, source.file.string());
-      if (!converted) {
-        pass_over(converted.error());
+      Result<StillPhoto> still = thermal_still(*file, decoder_, source.file.string());
+      if (!still) {
+        pass_over(still.error());
         continue;
       }
-      ORBITFUSE_TRY(add_thermal_frame(*file, *converted, source, tracking));
+      report_.has_temperatures = report_.has_temperatures || !still->frame.thermal_is_gray;
+      if (!still->frame.original.empty()) {
+        still->frame.original.release();  // the file itself is kept, below
+        ORBITFUSE_TRY(keep_original(source.file, file->bytes));
+      }
+      ORBITFUSE_TRY(add_frame(std::move(*still), source, tracking, options_.thermal_stations));
       if (options_.embedded_visible && file->flir && !file->flir->embedded_visible.empty()) {
-        Frame photo;
-        photo.encoded = file->flir->embedded_visible;
-        photo.source = short_name(source.file);
-        photo.tracking = tracking;
-        ORBITFUSE_TRY(add_visible_frame(std::move(photo), source, options_.thermal_stations));
+        ORBITFUSE_TRY(add_visible_frame(file->flir->embedded_visible, source, tracking,
+                                        options_.thermal_stations));
       }
     }
     return {};
-  }
-
-  Status add_thermal_frame(const ThermalFile& file, const ThermalDecoder::Converted& converted, const Source& source,
-                           bool tracking) {
-    Frame frame;
-    frame.source = short_name(source.file);
-    frame.tracking = tracking;
-    frame.host_time_ns = source.taken_ns.value_or(0);
-    frame.thermal_is_gray = converted.centikelvin.empty();
-    cv::Size size = file.image.size();
-    if (converted.keep_bytes) {
-      frame.encoded = file.bytes;
-      frame.extension = extension_of(file.bytes);
-    } else {
-      frame.pixels = frame.thermal_is_gray ? converted.gray : converted.centikelvin;
-      size = frame.pixels.size();
-    }
-    if (!converted.gray.empty()) {
-      frame.flags.push_back("raw-counts");
-      ORBITFUSE_TRY(keep_original(source.file, file.bytes));
-    }
-    DeviceInfo device;
-    device.modality = Modality::thermal;
-    device.driver = "stills";
-    if (file.flir) {
-      device.model = file.flir->camera_model;
-      device.serial = file.flir->camera_serial;
-      if (const auto fov = file.flir->horizontal_fov_deg) {
-        device.lens.focal_px = 0.5 * size.width / std::tan(0.5 * *fov * std::numbers::pi / 180);
-      }
-    }
-    if (options_.thermal_focal_px) device.lens.focal_px = options_.thermal_focal_px;
-    report_.has_temperatures = report_.has_temperatures || !frame.thermal_is_gray;
-    const std::string key = fmt::format("{}|{}x{}", device.model, size.width, size.height);
-    return add_frame(std::move(frame), device, key, size, source, options_.thermal_stations);
   }
 
   /// The 8-bit proxy of raw counts is what later stages see; the counts themselves stay with it.
@@ -238,24 +189,33 @@ class Importer {
     return write_file_atomic(writer_.folder() / "thermal" / "originals" / file.filename(), bytes);
   }
 
-  Status add_frame(Frame frame, DeviceInfo device, const std::string& key, cv::Size size, const Source& source,
+  Status add_frame(StillPhoto still, const Source& source, bool tracking,
                    const std::optional<DeclaredStations>& stations) {
+    ORBITFUSE_ASSIGN(Group* group, group_of(still, source));
+    Frame& frame = still.frame;
+    DeviceInfo& device = still.camera;
+    frame.source = short_name(source.file);
+    frame.tracking = tracking;
+    frame.host_time_ns = source.taken_ns.value_or(0);
     const KnownViews& known = known_[device.modality];
     const KnownView* view = known.find(source.file);
-    if (view) apply_known(*view, size, frame, device);
+    if (view) apply_known(*view, still.size, frame, device);
     if (known.shared_camera() && !options_.ground_truth_priors_only) {
-      device.lens.calibrated = fitted(*known.shared_camera(), size);
+      device.lens.calibrated = fitted(*known.shared_camera(), still.size);
     }
     if (stations && !frame.tracking) frame.station = station_at(*stations, source.position, view);
-    ORBITFUSE_ASSIGN(const std::string id, device_id(std::move(device), key));
-    frame.id = next_id_[id];
-    const Result<FrameRecord> record = writer_.append(id, frame);
+    if (group->id.empty()) {
+      group->id = device.id = next_device_id(device.modality);
+      ORBITFUSE_TRY(writer_.add_device(device));
+    }
+    frame.id = group->frames;
+    const Result<FrameRecord> record = writer_.append(group->id, frame);
     if (!record) {
       if (record.error().kind != ErrorKind::input) return tl::unexpected(record.error());
       pass_over(record.error());
       return {};
     }
-    ++next_id_[id];
+    ++group->frames;
     count(*record);
     return {};
   }
@@ -295,16 +255,50 @@ class Importer {
   }
 
   /// Photos of one camera, lens and size share a device, so that they may share intrinsics.
-  Result<std::string> device_id(DeviceInfo device, const std::string& key) {
-    const std::string full_key = std::string(name(device.modality)) + "|" + key;
-    if (const auto known = device_ids_.find(full_key); known != device_ids_.end()) return known->second;
-    const auto of_modality = std::count_if(device_ids_.begin(), device_ids_.end(), [&](const auto& entry) {
-      return entry.first.rfind(std::string(name(device.modality)) + "|", 0) == 0;
+  struct Group {
+    Modality modality = Modality::visible;
+    std::string key, described, first_file, id;
+    std::uint64_t frames = 0;
+  };
+
+  Result<Group*> group_of(StillPhoto& still, const Source& source) {
+    const Modality modality = still.camera.modality;
+    const auto& focal = modality == Modality::visible ? options_.visible_focal_px : options_.thermal_focal_px;
+    if (focal) still.camera.lens.focal_px = focal;
+    const std::string key = still.key();
+    for (Group& group : groups_) {
+      if (group.modality != modality) continue;
+      if (group.key == key) return &group;
+      if (focal) {
+        return fail(ErrorKind::input, short_name(source.file),
+                    fmt::format("is of {}, but {} of {}", still.described(), group.first_file, group.described),
+                    fmt::format("one focal length of {:g} px is not true of both: import them one by one, "
+                                "or leave the option away",
+                                *focal));
+      }
+    }
+    groups_.push_back({modality, key, still.described(), short_name(source.file), {}, 0});
+    return &groups_.back();
+  }
+
+  std::string next_device_id(Modality modality) const {
+    const auto known = std::count_if(groups_.begin(), groups_.end(), [&](const Group& group) {
+      return group.modality == modality && !group.id.empty();
     });
-    device.id = fmt::format("{}{}", name(device.modality), of_modality);
-    ORBITFUSE_TRY(writer_.add_device(device));
-    device_ids_.emplace(full_key, device.id);
-    return device.id;
+    return fmt::format("{}{}", name(modality), known);
+  }
+
+  void tell_of_groups(Modality modality) {
+    std::vector<std::string> list;
+    for (const Group& group : groups_) {
+      if (group.modality == modality)
+        list.push_back(fmt::format("{} from {} ({})", group.id, group.first_file, group.described));
+    }
+    if (list.size() < 2) return;
+    report_.warnings.push_back(fmt::format(
+        "{}: {} cameras, lenses or image sizes, each calibrated on its own: {}; leave out what is not of this "
+        "orbit",
+        name(modality), list.size(), fmt::join(list, "; ")));
   }
 
   void count(const FrameRecord& record) {
@@ -317,9 +311,12 @@ class Importer {
   }
 
   Status finish() {
-    for (const auto& [id, count] : next_id_) {
-      if (count > 0) ORBITFUSE_TRY(writer_.append(StreamRecord{id, 0, count - 1, count, 0}));
+    for (const Group& group : groups_) {
+      if (group.frames > 0)
+        ORBITFUSE_TRY(writer_.append(StreamRecord{group.id, 0, group.frames - 1, group.frames, 0}));
     }
+    tell_of_groups(Modality::visible);
+    tell_of_groups(Modality::thermal);
     check_station_count(options_.visible_stations, report_.visible, "visible");
     check_station_count(options_.thermal_stations, report_.thermal, "thermal");
     if (decoder_.samples_are_raw_counts()) {
@@ -337,22 +334,12 @@ class Importer {
     }
   }
 
-  static std::string extension_of(const std::string& bytes) {
-    switch (image_format(bytes)) {
-      case ImageFormat::jpeg: return ".jpg";
-      case ImageFormat::png: return ".png";
-      case ImageFormat::tiff: return ".tiff";
-      default: return ".bmp";
-    }
-  }
-
   const ImportOptions& options_;
   SessionWriter& writer_;
   const Progress& progress_;
   ThermalDecoder decoder_;
   std::map<Modality, KnownViews> known_;
-  std::map<std::string, std::string> device_ids_;
-  std::map<std::string, std::uint64_t> next_id_;
+  std::deque<Group> groups_;  ///< a deque: groups are pointed to while others join
   std::size_t done_ = 0, total_ = 0;
   std::string first_failure_;
   ImportReport report_;

@@ -34,55 +34,82 @@ double focal_px_of_35mm(double focal_35mm, cv::Size size) {
   return focal_35mm * std::hypot(size.width, size.height) / full_frame_diagonal_mm;
 }
 
-Result<StillPhoto> read_visible_still(const std::filesystem::path& file) {
+Result<StillPhoto> visible_still(std::string bytes, const std::string& where) {
   StillPhoto still;
-  ORBITFUSE_ASSIGN(still.frame.encoded, read_file(file));
-  ORBITFUSE_ASSIGN(const cv::Mat image, decode_image(still.frame.encoded, file.string()));
-  const ExifInfo exif = read_exif(still.frame.encoded);
-  const cv::Size size = apply_orientation(image, exif.orientation).size();
-  still.frame.extension = extension_of(still.frame.encoded);
+  ORBITFUSE_ASSIGN(const cv::Mat image, decode_image(bytes, where));
+  const ExifInfo exif = read_exif(bytes);
+  still.size = apply_orientation(image, exif.orientation).size();
+  still.frame.extension = extension_of(bytes);
+  still.frame.encoded = std::move(bytes);
   still.frame.host_time_ns = exif.taken_ns.value_or(0);
   still.camera.modality = Modality::visible;
+  still.camera.driver = "stills";
   still.camera.model = exif.make.empty() ? exif.model : exif.make + " " + exif.model;
   still.camera.serial = exif.serial;
-  if (exif.focal_35mm) still.camera.lens.focal_px = focal_px_of_35mm(*exif.focal_35mm, size);
-  still.key = fmt::format("{}|{}|{}x{}", still.camera.model, exif.focal_mm.value_or(0), size.width,
-                          size.height);
+  if (exif.focal_35mm) still.camera.lens.focal_px = focal_px_of_35mm(*exif.focal_35mm, still.size);
+  still.lens = exif.focal_mm ? fmt::format("{:g} mm", *exif.focal_mm) : "";
+  // A digital zoom changes only the equivalent.
+  if (exif.focal_35mm) still.lens += fmt::format(" (35 mm: {:g} mm)", *exif.focal_35mm);
   return still;
 }
 
-Result<StillPhoto> read_thermal_still(const std::filesystem::path& path, ThermalDecoder& decoder) {
+Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& decoder,
+                                 const std::string& where) {
   StillPhoto still;
-  ORBITFUSE_ASSIGN(ThermalFile file, read_thermal_file(path));
-  decoder.observe(file);
-  ORBITFUSE_ASSIGN(ThermalDecoder::Converted converted, decoder.convert(file, path.string()));
+  ORBITFUSE_ASSIGN(const ThermalDecoder::Converted converted, decoder.convert(file, where));
   Frame& frame = still.frame;
   frame.thermal_is_gray = converted.centikelvin.empty();
-  cv::Size size = file.image.size();
+  still.size = file.image.size();
   if (converted.keep_bytes) {
     frame.encoded = file.bytes;
     frame.extension = extension_of(file.bytes);
   } else {
     frame.pixels = frame.thermal_is_gray ? converted.gray : converted.centikelvin;
-    size = frame.pixels.size();
+    still.size = frame.pixels.size();
   }
   if (!converted.gray.empty()) {
     frame.flags.push_back("raw-counts");
     frame.original = file.image;
   }
-  frame.host_time_ns =
-      (file.flir ? file.flir->taken_ns : read_exif(file.bytes).taken_ns).value_or(0);
+  frame.host_time_ns = taken_ns(file).value_or(0);
   still.camera.modality = Modality::thermal;
+  still.camera.driver = "stills";
   if (file.flir) {
     still.camera.model = file.flir->camera_model;
     still.camera.serial = file.flir->camera_serial;
     if (const auto fov = file.flir->horizontal_fov_deg) {
-      still.camera.lens.focal_px = 0.5 * size.width / std::tan(0.5 * *fov * std::numbers::pi / 180);
+      still.camera.lens.focal_px = 0.5 * still.size.width / std::tan(0.5 * *fov * std::numbers::pi / 180);
+      still.lens = fmt::format("{:.1f} degrees", *fov);
     }
   }
-  still.key = fmt::format("{}|{}x{}|{}", still.camera.model, size.width, size.height,
-                          frame.thermal_is_gray);
   return still;
+}
+
+Result<StillPhoto> read_visible_still(const std::filesystem::path& file) {
+  ORBITFUSE_ASSIGN(std::string bytes, read_file(file));
+  return visible_still(std::move(bytes), file.string());
+}
+
+Result<StillPhoto> read_thermal_still(const std::filesystem::path& path, ThermalDecoder& decoder) {
+  ORBITFUSE_ASSIGN(const ThermalFile file, read_thermal_file(path));
+  decoder.observe(file);
+  return thermal_still(file, decoder, path.string());
+}
+
+std::optional<std::int64_t> taken_ns(const ThermalFile& file) {
+  return file.flir ? file.flir->taken_ns : read_exif(file.bytes).taken_ns;
+}
+
+std::string StillPhoto::key() const {
+  return fmt::format("{}|{}|{}|{}x{}|{}", camera.model, camera.serial, lens, size.width, size.height,
+                     frame.thermal_is_gray);
+}
+
+std::string StillPhoto::described() const {
+  std::string text = camera.model.empty() ? "unknown camera" : camera.model;
+  if (!camera.serial.empty()) text += " " + camera.serial;
+  if (!lens.empty()) text += ", lens " + lens;
+  return text + fmt::format(", {}x{}{}", size.width, size.height, frame.thermal_is_gray ? ", grey" : "");
 }
 
 bool is_radiometric(const std::filesystem::path& file) {

@@ -13,16 +13,27 @@ namespace orbitfuse {
 struct StillPhoto {
   Frame frame;  ///< host time from the file's own clock, 0 if it has none
   DeviceInfo camera;
-  std::string key;  ///< same key: same camera, lens and image size
+  std::string lens;  ///< "4.2 mm (35 mm: 26 mm)", "25.0 degrees"; empty when unknown
+  cv::Size size;     ///< upright
+
+  std::string key() const;        ///< same key: same camera, lens, image size and kind of samples
+  std::string described() const;  ///< the same for people
 };
 
 /// Size of the upright image at 35 mm equivalent focal length, in pixels.
 double focal_px_of_35mm(double focal_35mm, cv::Size size);
 
+/// The bytes of a photo (JPEG, PNG, TIFF). Input error naming `where` when they don't decode.
+Result<StillPhoto> visible_still(std::string bytes, const std::string& where);
+/// A thermal image turned into centikelvin, or kept as it is when it is 8-bit; counts without a
+/// scale stay as the frame's original.
+Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& decoder,
+                                 const std::string& where);
+std::optional<std::int64_t> taken_ns(const ThermalFile& file);
+
 /// A photo (JPEG, PNG, TIFF) kept byte for byte. Input error when it doesn't decode.
 Result<StillPhoto> read_visible_still(const std::filesystem::path& file);
-/// A thermal image turned into centikelvin, or kept as it is when it is 8-bit. `decoder` gets to
-/// see 16-bit samples of unknown scale first.
+/// As above; `decoder` gets to see 16-bit samples of unknown scale first.
 Result<StillPhoto> read_thermal_still(const std::filesystem::path& file, ThermalDecoder& decoder);
 
 /// Whether the file is a radiometric JPEG; false also when it can't be read.

@@ -173,15 +173,15 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
       return delivery;
     }
     if (camera_key_.empty()) {
-      camera_key_ = still->key;
+      camera_key_ = still->key();
       info_.model = still->camera.model;
       info_.serial = still->camera.serial;
       info_.lens = still->camera.lens;
-    } else if (still->key != camera_key_) {
+    } else if (still->key() != camera_key_) {
       delivery.kind = Delivery::Kind::rejected;
       delivery.reason =
-          name +
-          ": another camera, lens or image size than the first (give it a folder of its own)";
+          name + ": another camera, lens or image size than the first (" + still->described() +
+          "; give it a folder of its own)";
       return delivery;
     }
   }

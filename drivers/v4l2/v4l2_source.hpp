@@ -10,12 +10,16 @@
 #include <string>
 #include <vector>
 
+#include "capture/freeze_watch.hpp"
 #include "capture/frame_source.hpp"
+#include "capture/lasting_failure.hpp"
 #include "capture/raw_counts.hpp"
 #include "drivers/v4l2/frame_rhythm.hpp"
 #include "drivers/v4l2/identity.hpp"
 #include "drivers/v4l2/pixels.hpp"
 #include "drivers/v4l2/video_system.hpp"
+
+struct v4l2_buffer;
 
 namespace orbitfuse::v4l2 {
 
@@ -34,6 +38,7 @@ struct V4l2Options {
   std::optional<int> exposure_100us, focus, white_balance_k;  ///< absent: the value it had
   std::chrono::milliseconds stall{2000};       ///< silence after which the stream is reopened
   std::chrono::milliseconds reopen_every{250}; ///< while the camera is away
+  std::chrono::milliseconds nuc_settle{500};   ///< thermal frames right after a freeze still drift
   /// Resets the camera's USB port ("1-4.2"); called when reopening alone did not end a stall.
   std::function<Status(const std::string& usb_path)> reset_port;
 
@@ -44,7 +49,8 @@ struct V4l2Options {
 /// shorter than their format, are rejected deliveries; sequence gaps show as id gaps. When the
 /// camera is unplugged or stalls, everything is closed, and it is looked for under its lasting
 /// name (serial, else USB port) until it is back: events "disconnected", "stalled",
-/// "reconnected" tell, settings are pushed again and verified ("setting-lost" when one is not).
+/// "reopen-failed" (back, but taken, forbidden or without bandwidth), "reconnected" tell, settings are pushed again and verified ("setting-lost" when one is not).
+/// Frozen thermal frames are flagged "nuc" (FreezeWatch).
 /// "late-frame" tells of a pause without a gap in the driver's count (FrameRhythm).
 class V4l2Source final : public FrameSource {
  public:
@@ -70,9 +76,10 @@ class V4l2Source final : public FrameSource {
   Status map_buffers();
   void close_device();
   Delivery lose(const std::string& event, const std::string& why);
-  Delivery stall();
+  Delivery stall(const std::string& why);
   std::optional<Delivery> try_reopen();
   Result<Delivery> dequeue();
+  Result<Delivery> empty_at_start(v4l2_buffer& buffer);
   Delivery delivery_of(std::uint32_t index, std::uint32_t bytes, std::uint32_t flags);
   void watch_rhythm(std::uint64_t id, std::int64_t stamp_ns);
   std::uint64_t unwrap(std::uint32_t sequence);
@@ -87,10 +94,12 @@ class V4l2Source final : public FrameSource {
   bool away_ = false;
   std::vector<Mapping> buffers_;
   RawCounts raw_counts_;
+  FreezeWatch freeze_;
   std::vector<Delivery> pending_;       ///< events to tell before the next frame
   Clock::time_point last_frame_{}, last_attempt_{}, lost_at_{};
   std::uint64_t next_id_ = 0, base_id_ = 0;
-  int stalls_in_a_row_ = 0;
+  int stalls_in_a_row_ = 0, empty_at_start_ = 0;
+  LastingFailure failure_;              ///< to reopen
   std::map<std::uint32_t, int> locked_; ///< controls and the values they were locked at
   FrameRhythm rhythm_;
   int late_frames_ = 0;

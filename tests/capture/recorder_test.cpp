@@ -145,6 +145,25 @@ TEST(Recorder, CameraThatDoesNotStart) {
   EXPECT_TRUE(r.open().streams.empty());
 }
 
+/// Photos come when they come; a camera that sends nothing is silent, and so is a folder that is gone.
+TEST(Recorder, SilenceIsAnAlarmForCamerasAndForFoldersThatAreGone) {
+  for (const bool waits : {false, true}) {
+    Recording r;
+    Delivery gone, back;
+    gone.kind = back.kind = Delivery::Kind::event;
+    gone.reason = "disconnected";
+    back.reason = "reconnected";
+    ScriptedSource source("thermal0", Modality::thermal,
+                          {Delivery{}, gone, Delivery{}, back, Delivery{}, frame_delivery(1, thermal_pixels())});
+    source.waits = waits;
+    Recorder recorder(*r.writer, {});
+    std::vector<bool> silent;
+    source.before_next = [&] { silent.push_back(recorder.status().at(0).silent); };
+    ASSERT_TRUE(recorder.run({&source}));
+    EXPECT_EQ(silent, (std::vector<bool>{false, !waits, false, true, false, !waits})) << waits;
+  }
+}
+
 TEST(Recorder, CancelKeepsWhatWasQueued) {
   Recording r;
   std::deque<Delivery> script;

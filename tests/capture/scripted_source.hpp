@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <deque>
+#include <functional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -57,14 +58,17 @@ class ScriptedSource : public FrameSource {
       end.kind = Delivery::Kind::end;
       return end;
     }
+    if (before_next) before_next();
     if (pause.count() > 0) std::this_thread::sleep_for(pause);
     Delivery d = std::move(script_.front());
     script_.pop_front();
     return d;
   }
   void stop() override { ++stops; }
+  bool can_wait() const override { return waits; }
 
-  bool fail_start = false, fail_at_end = false;
+  bool fail_start = false, fail_at_end = false, waits = false;
+  std::function<void()> before_next;
   std::chrono::milliseconds pause{0};
   int stops = 0;
 

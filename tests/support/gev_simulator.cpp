@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <chrono>
 #include <cstring>
@@ -119,6 +120,7 @@ bool GevSimulator::start() {
     close(stream_fd_);
     return false;
   }
+  open_discovery();
   running_ = true;
   acquiring_ = false;
   number_ = 0;
@@ -135,6 +137,20 @@ void GevSimulator::kill() {
   stream_thread_.join();
   close(control_fd_);
   close(stream_fd_);
+  if (discovery_fd_ >= 0) close(discovery_fd_);
+  discovery_fd_ = -1;
+}
+
+/// Who looks for cameras asks everybody: broadcasts come to a socket of their own.
+void GevSimulator::open_discovery() {
+  sockaddr_in everybody{};
+  everybody.sin_family = AF_INET;
+  everybody.sin_port = htons(gvcp_port);
+  everybody.sin_addr.s_addr = htonl(INADDR_BROADCAST);
+  discovery_fd_ = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (bind(discovery_fd_, reinterpret_cast<sockaddr*>(&everybody), sizeof everybody) == 0) return;
+  close(discovery_fd_);
+  discovery_fd_ = -1;
 }
 
 void GevSimulator::set_faults(const GevFaults& faults) {
@@ -154,20 +170,12 @@ std::uint64_t GevSimulator::device_clock_ns() {
 }
 
 void GevSimulator::control_loop() {
-  std::vector<std::uint8_t> buffer(2048);
   while (running_) {
-    pollfd waiter{control_fd_, POLLIN, 0};
-    if (poll(&waiter, 1, 50) > 0) {
-      sockaddr_in from{};
-      socklen_t length = sizeof from;
-      const ssize_t size = recvfrom(control_fd_, buffer.data(), buffer.size(), 0, reinterpret_cast<sockaddr*>(&from), &length);
-      if (size < 8 || buffer[0] != 0x42) continue;
-      std::lock_guard lock(mutex_);
-      if (faults_.mute_control || faults_.link_down) continue;
-      const auto packet = answer(buffer.data(), static_cast<std::size_t>(size), from);
-      if (!packet.empty()) {
-        sendto(control_fd_, packet.data(), packet.size(), 0, reinterpret_cast<sockaddr*>(&from), length);
-      }
+    // A negative descriptor is passed over.
+    std::array<pollfd, 2> waiters{{{control_fd_, POLLIN, 0}, {discovery_fd_, POLLIN, 0}}};
+    poll(waiters.data(), waiters.size(), 50);
+    for (const pollfd& waiter : waiters) {
+      if (waiter.revents & POLLIN) answer_datagram(waiter.fd);
     }
     std::lock_guard lock(mutex_);
     // A controller that falls silent loses control (heartbeat), and the stream stops.
@@ -177,6 +185,20 @@ void GevSimulator::control_loop() {
       acquiring_ = false;
     }
   }
+}
+
+void GevSimulator::answer_datagram(int fd) {
+  std::array<std::uint8_t, 2048> buffer{};
+  sockaddr_in from{};
+  socklen_t length = sizeof from;
+  const ssize_t size = recvfrom(fd, buffer.data(), buffer.size(), 0, reinterpret_cast<sockaddr*>(&from), &length);
+  if (size < 8 || buffer[0] != 0x42) return;
+  if ((ntohl(from.sin_addr.s_addr) >> 24) != 127) return;  // broadcasts of others: loopback only
+  std::lock_guard lock(mutex_);
+  if (faults_.mute_control || faults_.link_down) return;
+  const auto packet = answer(buffer.data(), static_cast<std::size_t>(size), from);
+  if (packet.empty()) return;
+  sendto(control_fd_, packet.data(), packet.size(), 0, reinterpret_cast<sockaddr*>(&from), length);
 }
 
 std::uint32_t GevSimulator::read_register(std::uint32_t address) {

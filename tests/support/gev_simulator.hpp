@@ -74,7 +74,9 @@ class GevSimulator {
   };
 
   void reset_memory();
+  void open_discovery();
   void control_loop();
+  void answer_datagram(int fd);
   void stream_loop();
   std::vector<std::uint8_t> answer(const std::uint8_t* request, std::size_t size, const sockaddr_in& from);
   void write_register(std::uint32_t address, std::uint32_t value);
@@ -88,7 +90,7 @@ class GevSimulator {
   std::vector<std::uint8_t> memory_;
   std::recursive_mutex mutex_;
   GevFaults faults_;
-  int control_fd_ = -1, stream_fd_ = -1;
+  int control_fd_ = -1, stream_fd_ = -1, discovery_fd_ = -1;
   sockaddr_in controller_{};
   std::int64_t last_control_ns_ = 0;
   double clock_step_s_ = 0;

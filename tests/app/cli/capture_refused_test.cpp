@@ -7,6 +7,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <chrono>
+#include <fstream>
+#include <thread>
+
 #include "drivers/aravis/aravis_source.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/app/temp_folder.hpp"
@@ -38,6 +42,34 @@ TEST_F(RefusedGigE, ProfileWithAFeatureThatTheCameraLacks) {
   EXPECT_EQ(outcome.code, 4) << outcome.err;
   EXPECT_THAT(outcome.err, HasSubstr("flir-ax5"));
   EXPECT_FALSE(std::filesystem::exists(session));
+}
+
+TEST_F(RefusedGigE, UnknownFeatureInAProfileOfTheUser) {
+  std::filesystem::create_directory(temp.path / "profiles");
+  std::ofstream(temp.path / "profiles/mine.toml") << "name = \"mine\"\nmodels = []\nsettings = [{NoSuchThing = 3}]\n";
+  const Outcome outcome = orbitfuse_program({"capture", session, "--thermal", "aravis:127.0.0.1,profile=mine",
+                                             "--profiles", temp.path / "profiles", "--seconds", "1"});
+  EXPECT_EQ(outcome.code, 2) << outcome.err;
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("NoSuchThing"), HasSubstr("correct the profile")));
+  EXPECT_FALSE(std::filesystem::exists(session));
+}
+
+TEST_F(RefusedGigE, DoctorSaysThatTheCameraIsFree) {
+  const Outcome outcome = orbitfuse_program({"doctor", "--folder", temp.path});
+  EXPECT_THAT(outcome.out, HasSubstr("at 127.0.0.1, packets of 1400 bytes"));
+}
+
+TEST_F(RefusedGigE, WatchedDevicesAreToldWhenTheyArrive) {
+  camera.kill();
+  std::jthread plug([this] {
+    std::this_thread::sleep_for(std::chrono::seconds(3));
+    EXPECT_TRUE(camera.start());
+  });
+  RunOptions until;
+  until.interrupt_after = "+ aravis:";
+  const Outcome outcome = orbitfuse_program({"devices", "--watch"}, until);
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("SIM0001"));
 }
 
 TEST_F(RefusedGigE, CameraThatAnotherProgramControls) {

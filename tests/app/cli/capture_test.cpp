@@ -5,6 +5,7 @@
 
 #include <fstream>
 
+#include "core/image_io.hpp"
 #include "core/session.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/app/temp_folder.hpp"
@@ -19,6 +20,32 @@ Session opened(const std::filesystem::path& folder) {
   const auto session = open_session(folder);
   EXPECT_TRUE(session) << session.error().message();
   return session ? *session : Session{};
+}
+
+TEST(Capture, HelpNamesEveryDriver) {
+  const Outcome help = orbitfuse_program({"capture", "--help"});
+  EXPECT_EQ(help.code, 0);
+  for (const char* driver : {"aravis", "v4l2", "stills", "replay", "synthetic"})
+    EXPECT_THAT(help.out, HasSubstr(driver));
+}
+
+TEST(Inspect, EachCameraAndSizeIsListed) {
+  const TempFolder temp;
+  std::filesystem::create_directories(temp.path / "in");
+  for (const auto& [file, width] : {std::pair{"a.png", 40}, {"b.png", 40}, {"c.png", 64}}) {
+    ASSERT_TRUE(write_png(temp.path / "in" / file, cv::Mat(30, width, CV_8UC3, cv::Scalar(9, 80, 7))));
+  }
+  const std::string session = temp.path / "s";
+  const Outcome imported = orbitfuse_program({"import", session, "--visible", temp.path / "in"});
+  ASSERT_EQ(imported.code, 0) << imported.err;
+  EXPECT_THAT(imported.err, testing::AllOf(HasSubstr("in/a.png"), HasSubstr("in/c.png"), HasSubstr("64x30")));
+  const Outcome words = orbitfuse_program({"inspect", session});
+  EXPECT_THAT(words.out, testing::AllOf(HasSubstr("visible0: 2 frames of 40x30"), HasSubstr("visible1: 1 frames of 64x30")));
+  const auto visible = orbitfuse_program({"inspect", session, "--json"}).result().at("visible");
+  EXPECT_EQ(visible.at("size"), "40x30, 64x30");
+  ASSERT_EQ(visible.at("groups").size(), 2u);
+  EXPECT_EQ(visible.at("groups")[1].at("size"), "64x30");
+  EXPECT_EQ(visible.at("groups")[1].at("frames"), 1);
 }
 
 TEST(Capture, TwoCameraSessionReplaysToTheSameFrames) {

@@ -103,6 +103,40 @@ TEST_F(DoctorTest, UsbMemoryAndDriver) {
   EXPECT_EQ(remedy(list, "video cameras"), "");
 }
 
+TEST_F(DoctorTest, CamerasThatShareASlowBus) {
+  const auto plug = [&](const std::string& port, const std::string& speed, const std::string& product) {
+    const std::string at = "sys/bus/usb/devices/" + port;
+    put(folder / (at + "/speed"), speed + "\n");
+    put(folder / (at + "/product"), product + "\n");
+    for (const char* interface : {":1.0", ":1.1"}) put(folder / (at + interface + "/bInterfaceClass"), "0e\n");
+  };
+  plug("1-4", "480", "Webcam");
+  plug("2-1", "5000", "Fast");
+  plug("2-2", "5000", "Faster");
+  EXPECT_EQ(remedy(check_usb(machine), "USB bus 1"), "");
+  EXPECT_EQ(remedy(check_usb(machine), "USB bus 2"), "");
+  plug("1-5.1", "480", "Boson");
+  EXPECT_THAT(remedy(check_usb(machine), "USB bus 1"), HasSubstr("another bus"));
+  plug("3-1", "12", "Old");
+  EXPECT_THAT(remedy(check_usb(machine), "USB bus 3"), HasSubstr("another port"));
+}
+
+TEST_F(DoctorTest, PacketsMustFitTheInterfaceAndTheCameraBeFree) {
+  interface("eth1", 1500, 1000);
+  routes(route("eth1", "0005A8C0", "00FFFFFF"));
+  CameraLink camera{"FLIR A70 1", "192.168.5.20", 1400, false};
+  EXPECT_EQ(check_camera(machine, camera).remedy, "");
+  EXPECT_THAT(check_camera(machine, camera).found, HasSubstr("MTU of 1500"));
+  camera.packet_bytes = 8164;
+  EXPECT_THAT(check_camera(machine, camera).remedy, HasSubstr("8164"));
+  camera.controlled = true;
+  EXPECT_THAT(check_camera(machine, camera).remedy, HasSubstr("close the program"));
+  camera = {"elsewhere", "10.0.0.1", 0, false};
+  EXPECT_EQ(check_camera(machine, camera).found, "at 10.0.0.1");
+  camera.address = "garbage";
+  EXPECT_EQ(check_camera(machine, camera).remedy, "");
+}
+
 TEST_F(DoctorTest, EmptyMachineGivesNoNonsense) {
   EXPECT_TRUE(check_network(machine).empty());
   EXPECT_TRUE(check_usb(machine).empty());

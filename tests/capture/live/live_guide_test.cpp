@@ -162,6 +162,35 @@ TEST_F(LiveGuideTest, TurntableCountsKeysAndTurns) {
   EXPECT_TRUE(guide.complete());
 }
 
+TEST_F(LiveGuideTest, SaysWhatToDoWithTheTableAndTheKey) {
+  {
+    LiveGuide guide(*writer, options);
+    EXPECT_EQ(guide.cameras()[0].instruction, "go to azimuth 0°, 20° high, then press Enter");
+  }
+  options.plan.loop_elevations_deg = {20, 50};
+  options.turntable_step_deg = 30;
+  LiveGuide guide(*writer, options);
+  const auto words = [&] { return guide.cameras()[0].instruction; };
+  EXPECT_EQ(words(), "put the table at its start, then press Enter or take the photo");
+  guide.operator_at_station();
+  guide.add(record(15, 1));
+  EXPECT_EQ(words(), "turn the table by 30°, then press Enter");
+  for (int i = 1; i < 12; ++i) {
+    guide.operator_at_station();
+    if (i == 4) {
+      guide.add(record(15, 1 + i, true));
+      EXPECT_EQ(words(), text(Refusal::blurred));
+    }
+    guide.add(record(15, 1.5 + i));
+  }
+  EXPECT_EQ(words(), "turn the table by 30°, move the camera to 50° high, then press Enter");
+  for (int i = 12; i < 24; ++i) {
+    guide.operator_at_station();
+    guide.add(record(15, 1 + i));
+  }
+  EXPECT_EQ(words(), "visible: done");
+}
+
 TEST_F(LiveGuideTest, TurntableTriesAgainWhereAFrameWasBlurred) {
   options.turntable_step_deg = 30;
   LiveGuide guide(*writer, options);
@@ -190,13 +219,15 @@ TEST_F(LiveGuideTest, EachPhotoIsAStepOfTheTurntable) {
     EXPECT_NEAR(guide.cameras()[0].position->azimuth_deg, 330, 1e-9);
   }
   // Another turn after a restart: the photos that were chosen come back with their stations.
-  LiveGuide guide(*writer, options);
+  std::vector<FrameRecord> earlier;
   for (int i = 0; i < 12; ++i) {
     FrameRecord photo = record(15, 20 + i, i == 4);
     photo.flags = {"still"};
     if (i != 4) photo.tracking = false, photo.station = Station{0, i, 30.0 * i, 20, 1, 1};
-    guide.add(photo);
+    earlier.push_back(photo);
   }
+  LiveGuide guide(*writer, options);
+  guide.resume(earlier);
   EXPECT_EQ(guide.done_count(Modality::visible), 11);
   for (int i = 0; i < 5; ++i) {
     FrameRecord photo = record(15, 40 + i);
@@ -204,6 +235,125 @@ TEST_F(LiveGuideTest, EachPhotoIsAStepOfTheTurntable) {
     guide.add(photo);
   }
   EXPECT_TRUE(guide.complete());
+}
+
+TEST_F(LiveGuideTest, ResumedKeySessionGoesOnAfterItsLastStation) {
+  options.plan.loop_elevations_deg = {20, 50};
+  options.turntable_step_deg = -30;
+  std::vector<FrameRecord> earlier;
+  for (int i = 0; i < 14; ++i) {  // a turn and two steps: at 330 degrees, in the second loop
+    FrameRecord frame = record(15, i);
+    const int index = (12 - i % 12) % 12;
+    if (i != 7) {  // the operator went on without a good frame
+      frame.tracking = false;
+      frame.station = Station{i / 12, index, 30.0 * index, i < 12 ? 20.0 : 50.0, 1, 1};
+    }
+    earlier.push_back(frame);
+  }
+  LiveGuide guide(*writer, options);
+  guide.resume(earlier);
+  EXPECT_EQ(guide.done_count(Modality::visible), 13);
+  EXPECT_EQ(guide.cameras()[0].instruction, "turn the table by 30°, then press Enter");
+  guide.operator_at_station();
+  guide.add(record(15, 20));
+  EXPECT_NEAR(guide.cameras()[0].position->azimuth_deg, 300, 1e-9);
+  EXPECT_NEAR(guide.cameras()[0].position->elevation_deg, 50, 1e-9);
+  EXPECT_EQ(guide.done_count(Modality::visible), 14);
+}
+
+/// A table with a video camera (visible, stations by the key) and a camera that takes photos.
+class MixedTableTest : public LiveGuideTest {
+ protected:
+  MixedTableTest() {
+    DeviceInfo device;
+    device.id = "thermal0";
+    device.modality = Modality::thermal;
+    EXPECT_TRUE(writer->add_device(device));
+    options.plan.modalities = {Modality::visible, Modality::thermal};
+    options.turntable_step_deg = 30;
+  }
+  void key(LiveGuide& guide) {
+    guide.operator_at_station();
+    guide.add(record(15, ++time_s));
+  }
+  void photo(LiveGuide& guide, bool blurred = false) {
+    FrameRecord frame = record(15, ++time_s, blurred);
+    frame.modality = Modality::thermal;
+    frame.device = "thermal0";
+    frame.flags = {"still"};
+    guide.add(frame);
+  }
+  static double azimuth(const LiveGuide& guide, Modality modality) {
+    return guide.cameras()[modality == Modality::visible ? 0 : 1].position->azimuth_deg;
+  }
+  double time_s = 0;
+};
+
+TEST_F(MixedTableTest, KeyAndPhotoAtOneStationAreOneStep) {
+  LiveGuide guide(*writer, options);
+  for (int i = 0; i < 12; ++i) {
+    key(guide);
+    if (i == 4) photo(guide, true);  // taken again below
+    photo(guide);
+    EXPECT_NEAR(azimuth(guide, Modality::visible), 30 * i, 1e-9);
+    EXPECT_NEAR(azimuth(guide, Modality::thermal), 30 * i, 1e-9);
+  }
+  EXPECT_TRUE(guide.complete());
+}
+
+TEST_F(MixedTableTest, PhotoBeforeTheKeyIsTheSameStep) {
+  LiveGuide guide(*writer, options);
+  for (int i = 0; i < 12; ++i) {
+    photo(guide);
+    key(guide);
+    EXPECT_NEAR(azimuth(guide, Modality::visible), 30 * i, 1e-9);
+    EXPECT_NEAR(azimuth(guide, Modality::thermal), 30 * i, 1e-9);
+  }
+  EXPECT_TRUE(guide.complete());
+}
+
+TEST_F(MixedTableTest, CountedPhotosMayComeLate) {
+  options.plan.loop_elevations_deg = {20, 50};
+  LiveGuide guide(*writer, options);
+  photo(guide);
+  for (int i = 0; i < 3; ++i) key(guide);
+  for (int i = 1; i < 3; ++i) {
+    photo(guide);
+    EXPECT_NEAR(azimuth(guide, Modality::thermal), 30 * i, 1e-9);
+    EXPECT_NEAR(guide.cameras()[1].position->elevation_deg, 20, 1e-9);
+  }
+  EXPECT_EQ(guide.done_count(Modality::thermal), 3);
+}
+
+TEST_F(MixedTableTest, AStationWithoutItsPhotoDoesNotShiftTheNext) {
+  LiveGuide guide(*writer, options);
+  for (int i = 0; i < 12; ++i) {
+    key(guide);
+    if (i != 3) photo(guide);
+  }
+  EXPECT_NEAR(azimuth(guide, Modality::thermal), 330, 1e-9);
+  EXPECT_EQ(guide.done_count(Modality::thermal), 11);
+}
+
+TEST_F(MixedTableTest, SecondCameraAfterAResumeMakesItsOwnFirstTurn) {
+  options.plan.loop_elevations_deg = {20, 50};
+  std::vector<FrameRecord> earlier;
+  for (int i = 0; i < 12; ++i) {
+    earlier.push_back(record(15, ++time_s));
+    earlier.back().tracking = false;
+    earlier.back().station = Station{0, i, 30.0 * i, 20, 1, 1};
+  }
+  LiveGuide guide(*writer, options);
+  guide.resume(earlier);
+  EXPECT_EQ(guide.cameras()[1].instruction, "turn the table by 30°, then press Enter or take the photo");
+  for (int i = 0; i < 12; ++i) photo(guide);
+  EXPECT_EQ(guide.done_count(Modality::thermal), 12);
+  EXPECT_NEAR(guide.cameras()[1].position->elevation_deg, 20, 1e-9);
+  photo(guide);
+  EXPECT_NEAR(guide.cameras()[1].position->elevation_deg, 50, 1e-9);
+  EXPECT_EQ(guide.done_count(Modality::thermal), 13);
+  key(guide);  // the visible camera's second turn
+  EXPECT_NEAR(guide.cameras()[0].position->elevation_deg, 50, 1e-9);
 }
 
 TEST_F(LiveGuideTest, OptionsAreChecked) {

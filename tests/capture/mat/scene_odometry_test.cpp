@@ -19,6 +19,10 @@ struct Walk {
   double elevation_deg, step_deg;  ///< between looks, four a second
 };
 
+double elevation_deg(const Eigen::Vector3d& eye) {
+  return std::atan2(eye.z(), std::hypot(eye.x(), eye.y())) * 180 / M_PI;
+}
+
 class OdometryWalk : public testing::TestWithParam<Walk> {};
 
 TEST_P(OdometryWalk, AzimuthIsKeptWhileTheMatIsHidden) {
@@ -35,7 +39,7 @@ TEST_P(OdometryWalk, AzimuthIsKeptWhileTheMatIsHidden) {
   Coverage coverage(plan);
   double worst_deg = 0, worst_in_sigmas = 0, last_sigma_deg = 0;
   double hidden_s = 0, seen_s = 0;
-  int seen_looks = 0, read = 0, looks = 0, followed = 0, green_when_unsure = 0;
+  int seen_looks = 0, read = 0, looks = 0, followed = 0, green = 0, false_green = 0;
   for (double azimuth = 0; azimuth < end_deg; azimuth += walk.step_deg) {
     const bool hidden = azimuth >= hidden_from_deg && azimuth < hidden_to_deg;
     // A hand is no rail: nearer and further, up and down, the aim wanders.
@@ -67,20 +71,23 @@ TEST_P(OdometryWalk, AzimuthIsKeptWhileTheMatIsHidden) {
     frame.sharpness = 1;
     frame.position = sighting->position;
     frame.position->speed_deg_s = 0;
-    if (coverage.add(frame) == Refusal::none && sighting->position.sigma_deg > CoverageOptions{}.max_sigma_deg) {
-      ++green_when_unsure;
-    }
+    if (coverage.add(frame) != Refusal::none) continue;
+    ++green;
+    // What counts is where the camera was, whatever sigma says.
+    const double seen_from_deg = elevation_deg(eye);
+    false_green += error > 1 || std::abs(sighting->position.elevation_deg - seen_from_deg) > 1;
   }
-  std::printf("%s: %d of %d looks followed over 90 deg (mat read %d times), worst azimuth error %.2f deg, %.2f sigma; sigma at the end %.2f deg; "
+  std::printf("%s: %d of %d looks followed over 90 deg (mat read %d times), worst azimuth error %.2f deg, %.2f sigma; sigma at the end %.2f deg; %d green, %d of them false; "
               "%.0f CPU ms a look with the mat, %.0f without\n",
-              walk.name, followed, looks, read, worst_deg, worst_in_sigmas, last_sigma_deg,
+              walk.name, followed, looks, read, worst_deg, worst_in_sigmas, last_sigma_deg, green, false_green,
               1e3 * seen_s / seen_looks, 1e3 * hidden_s / looks);
   EXPECT_GE(read, 10);
   EXPECT_GE(followed, looks * 9 / 10);
   EXPECT_LE(worst_deg, 2);
   EXPECT_LE(worst_in_sigmas, 2);
   EXPECT_GT(last_sigma_deg, CoverageOptions{}.max_sigma_deg) << "after so long it proves nothing";
-  EXPECT_EQ(green_when_unsure, 0);
+  EXPECT_EQ(false_green, 0);
+  EXPECT_GE(green, 1) << "none of them was judged";
 }
 
 INSTANTIATE_TEST_SUITE_P(All, OdometryWalk,

@@ -63,6 +63,7 @@ class PageTest : public ::testing::Test {
       return modality == Modality::visible ? visible : thermal;
     };
     hooks.stop = [this] { ++stops; };
+    hooks.correct = [this] { ++corrections; };
     server = std::make_unique<PageServer>(options, hooks);
     const Status status = server->start();
     ASSERT_TRUE(status) << status.error().message();
@@ -70,7 +71,7 @@ class PageTest : public ::testing::Test {
   httplib::Client client() const { return httplib::Client("127.0.0.1", server->port()); }
 
   std::filesystem::path visible, thermal;
-  std::atomic<int> stops{0};
+  std::atomic<int> stops{0}, corrections{0};
   std::unique_ptr<PageServer> server;
 };
 
@@ -155,6 +156,9 @@ TEST_F(PageTest, TokenIsAskedForEverything) {
   EXPECT_THAT(server->url(), HasSubstr("?token=right-token-1"));
   EXPECT_EQ(client().Post("/stop", right, "", "text/plain")->status, 204);
   EXPECT_EQ(stops, 1);
+  EXPECT_EQ(client().Post("/nuc", wrong, "", "text/plain")->status, 401);
+  EXPECT_EQ(client().Post("/nuc", right, "", "text/plain")->status, 204);
+  EXPECT_EQ(corrections, 1);
 }
 
 TEST_F(PageTest, BeyondLoopbackATokenIsMade) {

@@ -1,4 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <thread>
+
+#include "drivers/aravis/gvcp_probe.hpp"
+#include "tests/core/temp_folder.hpp"
 #include "tests/drivers/aravis/stream_harness.hpp"
 #include "tests/support/gev_genicam_xml.hpp"
 
@@ -131,6 +137,35 @@ TEST_F(AravisStream, LinkDownAndBack) {
   EXPECT_EQ(back.wrong_bits + back.not_rising, 0u);
 }
 
+TEST_F(AravisStream, TwoOutagesWithoutAFrameBetweenCostTheTimeOfBoth) {
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  const Tally before = drain(source, 10s, frames(60));
+  const auto lost = testing_clock::now();
+  const auto disconnected = [](const Tally& t) { return t.has("disconnected"); };
+  const auto reconnected = [](const Tally& t) { return t.has("reconnected"); };
+  GevFaults faults;
+  faults.link_down = true;
+  camera.set_faults(faults);
+  ASSERT_TRUE(disconnected(drain(source, 10s, disconnected)));
+  drain(source, 1s);
+  faults = {};
+  faults.packet_loss = 1;  // it answers, but sends nothing
+  faults.answer_resend = false;
+  camera.set_faults(faults);
+  const Tally between = drain(source, 20s, reconnected);
+  ASSERT_TRUE(reconnected(between));
+  EXPECT_EQ(between.frames + between.rejected, 0u);
+  ASSERT_TRUE(disconnected(drain(source, 10s, disconnected)));
+  camera.set_faults({});
+  const Tally back = drain(source, 20s, [](const Tally& t) { return t.frames > 0; });
+  ASSERT_TRUE(reconnected(back));
+  const double both_s = std::chrono::duration<double>(testing_clock::now() - lost).count();
+  const auto gap = static_cast<double>(back.first_id - before.last_id);
+  EXPECT_GT(gap, 0.75 * 60 * both_s);  // either alone is under two thirds
+  EXPECT_LT(gap, 1.5 * 60 * both_s);
+}
+
 TEST_F(AravisStream, MutedControlChannelIsToldAndRecovered) {
   AravisSource source(options);
   ASSERT_TRUE(source.start());
@@ -180,12 +215,52 @@ TEST_F(AravisStream, NucIsCommandedAndFramesAreFlagged) {
   EXPECT_EQ(delivery->frame.flags, std::vector<std::string>{"nuc"});
 }
 
+TEST_F(AravisStream, NucAskedForFromAnotherThreadIsToldAndCountersAreReported) {
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  drain(source, 10s, frames(5));
+  std::thread([&] { source.request_correction(); }).join();
+  const Tally tally = drain(source, 5s, [](const Tally& t) { return t.has("nuc"); });
+  EXPECT_TRUE(tally.has("nuc"));
+  EXPECT_EQ(camera.nuc_count(), 1);
+  drain(source, 10s, frames(10));
+  const auto completed = source.statistics().completed;
+  EXPECT_GE(completed, 15u);
+  EXPECT_NE(source.transport_report().find(fmt::format("{} buffers completed", completed)), std::string::npos);
+}
+
 TEST_F(AravisStream, UnknownFeatureInTheProfileIsNamed) {
-  options.profile = "flir-ax5";  // Mono14 and TemperatureLinearMode are not on this camera
+  const test::TempFolder folder;
+  test::put(folder / "mine.toml", "name = \"mine\"\nmodels = []\nsettings = [{PixelFormat = \"Mono16\"}, {NoSuchThing = 3}]\n");
+  options.profiles = folder.path();
+  options.profile = "mine";
   AravisSource source(options);
   const Status status = source.start();
   ASSERT_FALSE(status);
-  EXPECT_NE(status.error().where.find("flir-ax5"), std::string::npos) << status.error().message();
+  EXPECT_EQ(status.error().kind, ErrorKind::usage);
+  EXPECT_NE(status.error().where.find("NoSuchThing"), std::string::npos) << status.error().message();
+}
+
+TEST_F(AravisStream, RegistersAreReadWithoutControl) {
+  EXPECT_EQ(read_register("127.0.0.1", GvcpRegister::control_privilege, 500ms), 0u);
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  EXPECT_NE(read_register("127.0.0.1", GvcpRegister::control_privilege, 500ms).value_or(0), 0u);
+  EXPECT_GT(read_register("127.0.0.1", GvcpRegister::packet_size, 500ms).value_or(0) & 0xffff, 500u);
+  EXPECT_FALSE(read_register("127.0.0.99", GvcpRegister::packet_size, 50ms));
+  EXPECT_FALSE(read_register("no address", GvcpRegister::packet_size, 50ms));
+}
+
+TEST_F(AravisStream, DiscoveryFindsItAndItsSerialOpensIt) {
+  const std::vector<FoundCamera> found = discover();
+  const auto ours = std::find_if(found.begin(), found.end(), [](const FoundCamera& c) { return c.serial == "SIM0001"; });
+  ASSERT_NE(ours, found.end()) << found.size() << " others";
+  EXPECT_EQ(ours->address, "127.0.0.1");
+  EXPECT_NE(ours->model.find("A70"), std::string::npos);
+  options.camera = ours->id;
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  EXPECT_EQ(drain(source, 10s, frames(10)).frames, 10u);
 }
 
 TEST(AravisAbsent, NoCameraIsADeviceError) {

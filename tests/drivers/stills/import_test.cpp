@@ -6,6 +6,8 @@
 
 #include <cmath>
 #include <fstream>
+#include <map>
+#include <set>
 #include <sstream>
 
 #include "core/colmap_model.hpp"
@@ -40,6 +42,33 @@ class ImportTest : public ::testing::Test {
   ImportOptions options;
 };
 
+void append(std::string& to, std::uint32_t value, int bytes) {
+  for (int i = 0; i < bytes; ++i) to += static_cast<char>(value >> (8 * i));
+}
+
+/// A JPEG whose EXIF tells the 35 mm equivalent of its focal length.
+std::string jpeg_with_focal(int width, int height, int focal_35mm) {
+  cv::Mat image(height, width, CV_8UC3);
+  cv::RNG(static_cast<std::uint64_t>(width + focal_35mm)).fill(image, cv::RNG::UNIFORM, 0, 255);
+  std::string jpeg = *encode_jpeg(image, 90);
+  std::string exif("Exif\0\0II*\0", 10);
+  const auto directory = [&exif](int tag, int type, int value) {  // of one entry
+    append(exif, 1, 2);
+    append(exif, static_cast<std::uint32_t>(tag), 2);
+    append(exif, static_cast<std::uint32_t>(type), 2);
+    append(exif, 1, 4);
+    append(exif, static_cast<std::uint32_t>(value), 4);
+    append(exif, 0, 4);
+  };
+  append(exif, 8, 4);
+  directory(0x8769, 4, 26);           // the EXIF directory follows this one
+  directory(0xa405, 3, focal_35mm);
+  std::string segment("\xff\xe1", 2);
+  segment += static_cast<char>((exif.size() + 2) >> 8);
+  segment += static_cast<char>((exif.size() + 2) & 0xff);
+  return jpeg.insert(2, segment + exif);
+}
+
 /// The table of a published calibration image: rows of degrees Celsius.
 std::vector<std::vector<double>> celsius_table(const fs::path& file) {
   std::string text = *read_file(file);
@@ -54,6 +83,48 @@ std::vector<std::vector<double>> celsius_table(const fs::path& file) {
       if (cell.find_first_of("0123456789") != std::string::npos) rows.back().push_back(std::stod(cell));
   }
   return rows;
+}
+
+TEST_F(ImportTest, PhotosOfSeveralLensesAndSizesAreKeptApartAndNamed) {
+  put("in/a.jpg", jpeg_with_focal(40, 30, 24));
+  put("in/b.jpg", jpeg_with_focal(40, 30, 24));
+  put("in/c.jpg", jpeg_with_focal(40, 30, 70));
+  put("in/d.jpg", jpeg_with_focal(48, 32, 24));
+  options.visible = {folder / "in"};
+  auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  ASSERT_EQ(report->session.devices.size(), 3u);
+  std::map<std::string, int> frames;
+  for (const FrameRecord& frame : report->session.frames) ++frames[frame.device];
+  EXPECT_EQ(frames, (std::map<std::string, int>{{"visible0", 2}, {"visible1", 1}, {"visible2", 1}}));
+  EXPECT_NEAR(*report->session.device("visible1")->lens.focal_px / *report->session.device("visible0")->lens.focal_px,
+              70.0 / 24, 1e-9);
+  const auto tells = ::testing::AllOf(HasSubstr("in/a.jpg"), HasSubstr("in/c.jpg"), HasSubstr("70 mm"),
+                                      HasSubstr("in/d.jpg"), HasSubstr("48x32"), HasSubstr("leave out"));
+  EXPECT_THAT(report->warnings, ::testing::Contains(tells));
+  // One focal length in pixels can't be true of all of them.
+  options.visible_focal_px = 35;
+  fs::remove_all(folder / "session");
+  report = import();
+  ASSERT_FALSE(report);
+  EXPECT_THAT(report.error().message(), ::testing::AllOf(HasSubstr("in/a.jpg"), HasSubstr("in/c.jpg"), HasSubstr("one by one")));
+  EXPECT_FALSE(fs::exists(folder / "session"));
+}
+
+TEST_F(ImportTest, ThermalFilesOfSeveralCamerasAreKeptApartAndNamed) {
+  const fs::path samples = testing::shared_data() / "rjpeg";
+  if (!fs::exists(samples)) GTEST_SKIP() << "the shared radiometric JPEGs are not here";
+  options.thermal = {samples};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_GE(report->session.devices.size(), 4u);
+  EXPECT_THAT(report->warnings, ::testing::Contains(::testing::AllOf(HasSubstr("T640"), HasSubstr("b60"), HasSubstr("E40"))));
+  for (const DeviceInfo& device : report->session.devices) {
+    std::set<std::pair<int, int>> sizes;
+    for (const FrameRecord& frame : report->session.frames)
+      if (frame.device == device.id) sizes.insert({frame.width, frame.height});
+    EXPECT_EQ(sizes.size(), 1u) << device.id;
+  }
 }
 
 TEST_F(ImportTest, RadiometricJpegMatchesThePublishedTemperatures) {

@@ -59,6 +59,7 @@ int FakeVideoSystem::poll(pollfd* fds, nfds_t count, int) {
 }
 
 int FakeVideoSystem::dequeue(void* argument) {
+  if (dequeue_error) return failure(dequeue_error);
   if (shots.empty() || queued_.empty()) return failure(EAGAIN);
   const Shot shot = shots.front();
   shots.pop_front();
@@ -69,6 +70,8 @@ int FakeVideoSystem::dequeue(void* argument) {
   buffer->bytesused = shot.claimed_bytes ? shot.claimed_bytes : static_cast<std::uint32_t>(shot.bytes.size());
   buffer->sequence = shot.sequence;
   buffer->flags = shot.flags;
+  buffer->timestamp.tv_sec = shot.stamp_us / 1'000'000;
+  buffer->timestamp.tv_usec = shot.stamp_us % 1'000'000;
   return 0;
 }
 

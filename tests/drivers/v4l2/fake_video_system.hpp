@@ -19,13 +19,14 @@ class FakeVideoSystem final : public VideoSystem {
     std::uint32_t sequence = 0, flags = 0;
     std::vector<std::uint8_t> bytes;
     std::uint32_t claimed_bytes = 0;  ///< 0: bytes.size()
+    std::int64_t stamp_us = 0;        ///< of the driver; 0: none
   };
 
   Node camera{"/dev/video0", "SN42", "1-4", "046d:0825", "Fake Camera"};
   std::uint32_t fourcc = 0;
   int width = 8, height = 4;
   bool plugged = true;
-  int open_error = 0, stream_on_error = 0;
+  int open_error = 0, stream_on_error = 0, dequeue_error = 0;
   bool exposure_sticks = true;
   std::deque<Shot> shots;
   std::map<std::uint32_t, int> controls;

@@ -83,12 +83,134 @@ TEST_F(V4l2SourceTest, BuffersGivenBackEmptyAreNoFrames) {
   EXPECT_EQ(deliver(source).reason, "disconnected");
   EXPECT_EQ(deliver(source).reason, "reconnected");
   shoot(0, V4L2_BUF_FLAG_ERROR, 0);  // before any frame of the new stream
-  EXPECT_EQ(deliver(source).reason, "disconnected");
-  EXPECT_EQ(deliver(source).reason, "reconnected");
   shoot(0);
   shoot(1, V4L2_BUF_FLAG_ERROR, 0);  // a new number: a frame that came damaged
   EXPECT_EQ(deliver(source).kind, Kind::frame);
   EXPECT_EQ(deliver(source).kind, Kind::rejected);
+}
+
+TEST_F(V4l2SourceTest, StreamsOfEmptyBuffersAreAStallAndGetTheirPortReset) {
+  std::vector<std::string> resets;
+  options.stall = 10s;  // it is not silence that ends these streams
+  options.reset_port = [&](const std::string& port) -> Status {
+    resets.push_back(port);
+    return {};
+  };
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  const auto shoot_empty = [&] {
+    for (int i = 0; i <= options.buffers; ++i) shoot(0, V4L2_BUF_FLAG_ERROR, 0);
+  };
+  shoot_empty();
+  EXPECT_EQ(deliver(source).reason, "stalled");
+  EXPECT_EQ(deliver(source).reason, "reconnected");
+  EXPECT_TRUE(resets.empty());
+  shoot_empty();
+  const Delivery again = deliver(source);
+  EXPECT_EQ(again.reason, "stalled");
+  EXPECT_NE(again.detail.find("empty buffers"), std::string::npos);
+  EXPECT_EQ(resets, std::vector<std::string>{"1-4"});
+  EXPECT_EQ(deliver(source).reason, "reconnected");
+  shoot(0);
+  EXPECT_EQ(deliver(source).kind, Kind::frame);
+}
+
+TEST_F(V4l2SourceTest, AStreamThatBreaksBeforeItsFirstFrameEscalatesToo) {
+  int resets = 0;
+  options.stall = 10s;
+  options.reset_port = [&](const std::string&) -> Status {
+    ++resets;
+    return {};
+  };
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  for (int i = 0; i < 2; ++i) {
+    shoot(0);
+    system->dequeue_error = EIO;
+    EXPECT_EQ(deliver(source).reason, "stalled");
+    EXPECT_EQ(deliver(source).reason, "reconnected");
+    EXPECT_EQ(resets, i);
+  }
+  system->dequeue_error = 0;
+  EXPECT_EQ(deliver(source).kind, Kind::frame);
+}
+
+TEST_F(V4l2SourceTest, EveryOutageCostsItsTimeInIds) {
+  options.stall = 10s;
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  // 100 Hz by the driver's stamps.
+  for (std::uint32_t i = 0; i < 20; ++i) shoot(i), system->shots.back().stamp_us = 1'000'000 + 10'000 * i;
+  std::uint64_t last = 0;
+  for (int i = 0; i < 20; ++i) last = deliver(source).frame.id;
+  const auto outage = [&](std::chrono::milliseconds away) {
+    system->plugged = false;
+    EXPECT_EQ(deliver(source).reason, "disconnected");
+    std::this_thread::sleep_for(away);
+    system->plugged = true;
+    EXPECT_EQ(deliver(source).reason, "reconnected");
+  };
+  const auto lost_at = std::chrono::steady_clock::now();
+  const auto frames_since = [](auto start) {
+    return 100 * std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
+  outage(200ms);
+  outage(300ms);  // before a frame came: its time adds to the first's
+  shoot(0);
+  system->shots.back().stamp_us = 10'000'000;
+  const Delivery back = deliver(source);
+  const double first_two = static_cast<double>(back.frame.id - last - 1);
+  EXPECT_GE(first_two, 49);
+  EXPECT_LE(first_two, frames_since(lost_at) + 2);
+  const auto lost_again = std::chrono::steady_clock::now();
+  outage(200ms);
+  shoot(0);
+  const double third = static_cast<double>(deliver(source).frame.id - back.frame.id - 1);
+  EXPECT_GE(third, 19);
+  EXPECT_LE(third, frames_since(lost_again) + 2);
+}
+
+TEST_F(V4l2SourceTest, BackButRefusedIsToldOnceWithItsReason) {
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  system->plugged = false;
+  EXPECT_EQ(deliver(source).reason, "disconnected");
+  system->stream_on_error = ENOSPC;
+  system->plugged = true;
+  const Delivery refused = deliver(source);
+  EXPECT_EQ(refused.reason, "reopen-failed");
+  EXPECT_NE(refused.detail.find("bandwidth"), std::string::npos) << refused.detail;
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_EQ(source.next(1ms)->kind, Kind::timeout);
+    std::this_thread::sleep_for(1ms);
+  }
+  EXPECT_EQ(system->open_descriptors, 0);
+  EXPECT_EQ(system->mapped, 0);
+  system->stream_on_error = 0;
+  EXPECT_EQ(deliver(source).reason, "reconnected");
+}
+
+TEST_F(V4l2SourceTest, FrozenThermalFramesAreFlagged) {
+  options.modality = Modality::thermal;
+  options.stall = 10s;
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  for (std::uint32_t sequence : {0u, 1u}) shoot(sequence);
+  for (int i = 0; i < 2; ++i) EXPECT_TRUE(deliver(source).frame.flags.empty());
+  shoot(2);
+  system->shots.back().bytes.assign(32, 1);  // as the frame before: the shutter is closed
+  EXPECT_EQ(deliver(source).frame.flags, std::vector<std::string>{"nuc"});
+  EXPECT_EQ(deliver(source).reason, "nuc");
+  shoot(3);
+  EXPECT_EQ(deliver(source).frame.flags, std::vector<std::string>{"nuc"}) << "it still drifts";
+  options.modality = Modality::visible;  // a dark room is no shutter
+  V4l2Source photos(options, system);
+  ASSERT_TRUE(photos.start());
+  for (int i = 0; i < 3; ++i) {
+    shoot(static_cast<std::uint32_t>(i));
+    system->shots.back().bytes.assign(32, 1);
+    EXPECT_TRUE(deliver(photos).frame.flags.empty());
+  }
 }
 
 TEST_F(V4l2SourceTest, UnpluggedAndBackUnderAnotherNode) {

@@ -18,6 +18,6 @@ for word in $($busybox cat /proc/cmdline); do
   case $word in filter=*) filter=${word#filter=} ;; esac
 done
 echo "ORBITFUSE-GUEST-BEGIN"
-LD_LIBRARY_PATH=/lib/x86_64-linux-gnu:/usr/lib/x86_64-linux-gnu /test --gtest_filter="$filter"
+LD_LIBRARY_PATH=/lib/x86_64-linux-gnu:/usr/lib/x86_64-linux-gnu /test --gtest_color=no --gtest_filter="$filter"
 echo "ORBITFUSE-GUEST-RESULT $?"
 $busybox poweroff -f

@@ -60,6 +60,23 @@ V4l2Options options_for(const std::string& serial, const std::string& format = "
   return options;
 }
 
+std::unique_ptr<UvcCamera> plug_in(const std::string& serial, double rate_hz = 10) {
+  auto camera = std::make_unique<UvcCamera>(serial, rate_hz);
+  wait_for_node(serial);
+  return camera;
+}
+
+/// A camera that has been recorded for some frames.
+struct Recorded {
+  Recorded(const std::string& serial, std::uint64_t frames, const std::string& format = "YUYV",
+           double rate_hz = 10)
+      : camera(plug_in(serial, rate_hz)), recording(options_for(serial, format)) {
+    EXPECT_TRUE(recording.wait_for_frames(frames));
+  }
+  std::unique_ptr<UvcCamera> camera;
+  Recording recording;
+};
+
 /// The numbers that the stored pictures show, by frame id: each exactly a frame that was sent
 /// whole, in order.
 std::map<std::uint64_t, int> expect_true_frames(const Session& session, const UvcCamera& camera) {
@@ -93,12 +110,10 @@ void expect_ids_tell_the_truth(const std::map<std::uint64_t, int>& numbers) {
 class UvcFormats : public Uvc, public testing::WithParamInterface<const char*> {};
 
 TEST_P(UvcFormats, CleanStreamIsExact) {
-  UvcCamera camera("OF-CLEAN");
-  ASSERT_TRUE(wait_for_node("OF-CLEAN"));
-  Recording recording(options_for("OF-CLEAN", GetParam()));
-  EXPECT_TRUE(recording.wait_for_frames(15));
+  Recorded recorded("OF-CLEAN", 15, GetParam());
+  auto& [camera, recording] = recorded;
   const Session session = recording.finish();
-  expect_ids_tell_the_truth(expect_true_frames(session, camera));
+  expect_ids_tell_the_truth(expect_true_frames(session, *camera));
   EXPECT_EQ(session.devices.at(0).serial, "OF-CLEAN");
   EXPECT_EQ(count_events(session, "disconnected") + count_events(session, "stalled"), 0);
 }
@@ -107,10 +122,8 @@ INSTANTIATE_TEST_SUITE_P(All, UvcFormats, testing::Values("YUYV", "MJPG", "Y16")
                          [](const auto& test) { return std::string(test.param); });
 
 TEST_F(Uvc, MjpegIsStoredByteForByte) {
-  UvcCamera camera("OF-JPEG");
-  ASSERT_TRUE(wait_for_node("OF-JPEG"));
-  Recording recording(options_for("OF-JPEG", "MJPG"));
-  EXPECT_TRUE(recording.wait_for_frames(3));
+  Recorded recorded("OF-JPEG", 3, "MJPG");
+  auto& [camera, recording] = recorded;
   const Session session = recording.finish();
   for (const FrameRecord& frame : session.frames) {
     const std::string stored = test::get(session.path_of(frame));
@@ -133,18 +146,16 @@ class UvcDamage : public Uvc, public testing::WithParamInterface<Damage> {};
 TEST_P(UvcDamage, IsCountedAndNeverStored) {
   const Damage& damage = GetParam();
   set_nodrop(damage.nodrop);
-  UvcCamera camera("OF-DAMAGE");
-  ASSERT_TRUE(wait_for_node("OF-DAMAGE"));
-  Recording recording(options_for("OF-DAMAGE", damage.format));
-  EXPECT_TRUE(recording.wait_for_frames(3));
+  Recorded recorded("OF-DAMAGE", 3, damage.format);
+  auto& [camera, recording] = recorded;
   for (int i = 0; i < 3; ++i) {
-    camera.fail_next(damage.fault);
+    camera->fail_next(damage.fault);
     EXPECT_TRUE(recording.wait_for_frames(3));
   }
   const StreamStatus counts = recording.status();
   const Session session = recording.finish();
-  EXPECT_EQ(camera.faulty_frames().size(), 3u);
-  expect_ids_tell_the_truth(expect_true_frames(session, camera));
+  EXPECT_EQ(camera->faulty_frames().size(), 3u);
+  expect_ids_tell_the_truth(expect_true_frames(session, *camera));
   // Withheld by the driver they are holes in its sequence; handed out they are rejected.
   const bool seen = damage.nodrop || std::string(damage.format) == "MJPG";
   EXPECT_GE(seen ? counts.rejected : counts.missing, 3u);
@@ -163,8 +174,7 @@ INSTANTIATE_TEST_SUITE_P(All, UvcDamage,
                          [](const auto& test) { return std::string(test.param.name); });
 
 TEST_F(Uvc, SlowReaderSeesWhatTheDriverDropped) {
-  UvcCamera camera("OF-SLOW");
-  ASSERT_TRUE(wait_for_node("OF-SLOW"));
+  const auto camera = plug_in("OF-SLOW");
   V4l2Source source(options_for("OF-SLOW"));
   ASSERT_TRUE(source.start());
   std::map<std::uint64_t, int> numbers;
@@ -176,8 +186,8 @@ TEST_F(Uvc, SlowReaderSeesWhatTheDriverDropped) {
     ASSERT_TRUE(number);
     numbers[delivery->frame.id] = *number;
     if (numbers.size() == 4) {  // longer than the buffers last
-      const int begun = camera.frames_begun();
-      for (int wait = 0; wait < 600 && camera.frames_begun() < begun + 8; ++wait) std::this_thread::sleep_for(50ms);
+      const int begun = camera->frames_begun();
+      for (int wait = 0; wait < 600 && camera->frames_begun() < begun + 8; ++wait) std::this_thread::sleep_for(50ms);
     }
   }
   EXPECT_EQ(numbers.size(), 12u);
@@ -186,57 +196,47 @@ TEST_F(Uvc, SlowReaderSeesWhatTheDriverDropped) {
 }
 
 TEST_F(Uvc, SilentStreamIsFlaggedAndResumed) {
-  UvcCamera camera("OF-SILENT");
-  ASSERT_TRUE(wait_for_node("OF-SILENT"));
-  Recording recording(options_for("OF-SILENT"));
-  EXPECT_TRUE(recording.wait_for_frames(4));
-  camera.fall_silent();
+  Recorded recorded("OF-SILENT", 4);
+  auto& [camera, recording] = recorded;
+  camera->fall_silent();
   EXPECT_TRUE(recording.wait_until([](const StreamStatus& s) { return s.silent; }));
   EXPECT_TRUE(recording.wait_for_frames(4));
   const Session session = recording.finish();
-  expect_true_frames(session, camera);
+  expect_true_frames(session, *camera);
   EXPECT_EQ(count_events(session, "stalled"), 1);
   EXPECT_EQ(count_events(session, "reconnected"), 1);
   EXPECT_GE(session.gaps.size(), 1u);
 }
 
 TEST_F(Uvc, HaltedEndpointIsFlaggedAndResumed) {
-  UvcCamera camera("OF-HALT");
-  ASSERT_TRUE(wait_for_node("OF-HALT"));
-  Recording recording(options_for("OF-HALT"));
-  EXPECT_TRUE(recording.wait_for_frames(4));
-  camera.halt_endpoint();
+  Recorded recorded("OF-HALT", 4);
+  auto& [camera, recording] = recorded;
+  camera->halt_endpoint();
   EXPECT_TRUE(recording.wait_for_frames(6));
   const Session session = recording.finish();
-  expect_true_frames(session, camera);
+  expect_true_frames(session, *camera);
   EXPECT_GE(count_events(session, "disconnected") + count_events(session, "stalled"), 1);
   EXPECT_GE(count_events(session, "reconnected"), 1);
 }
 
 TEST_F(Uvc, ReplugUnderAnotherNodeGoesOnWithTheSameCamera) {
-  auto camera = std::make_unique<UvcCamera>("OF-0001");
-  ASSERT_TRUE(wait_for_node("OF-0001"));
+  Recorded recorded("OF-0001", 4);
+  auto& [camera, recording] = recorded;
   const auto system = make_video_system();
   const CameraName name{CameraName::By::serial, "OF-0001"};
   const std::string before = find_camera(*system, name)->path;
-
-  Recording recording(options_for("OF-0001"));
-  EXPECT_TRUE(recording.wait_for_frames(4));
-  const std::set<int> none = camera->faulty_frames();
   camera->unplug();
   EXPECT_TRUE(recording.wait_until([](const StreamStatus& s) { return s.silent; }));
   const StreamStatus away = recording.status();
   // Another camera takes the number that became free; it must not be taken for ours.
-  UvcCamera stranger("OF-9999");
-  ASSERT_TRUE(wait_for_node("OF-9999"));
-  camera = std::make_unique<UvcCamera>("OF-0001");
-  ASSERT_TRUE(wait_for_node("OF-0001"));
+  const auto stranger = plug_in("OF-9999");
+  camera = plug_in("OF-0001");
   const std::string after = find_camera(*system, name)->path;
   EXPECT_TRUE(recording.wait_for_frames(4));
   const Session session = recording.finish();
 
   EXPECT_NE(before, after);
-  EXPECT_EQ(stranger.frames_begun(), 0);
+  EXPECT_EQ(stranger->frames_begun(), 0);
   EXPECT_EQ(count_events(session, "disconnected"), 1);
   EXPECT_EQ(count_events(session, "reconnected"), 1);
   ASSERT_EQ(session.gaps.size(), 1u);  // the outage
@@ -270,30 +270,26 @@ TEST_F(Uvc, ReplugRestoresTheLockedSettings) {
 }
 
 TEST_F(Uvc, UnpluggedForGoodEndsInOrder) {
-  UvcCamera camera("OF-GONE");
-  ASSERT_TRUE(wait_for_node("OF-GONE"));
-  Recording recording(options_for("OF-GONE"));
-  EXPECT_TRUE(recording.wait_for_frames(4));
-  camera.unplug();
+  Recorded recorded("OF-GONE", 4);
+  auto& [camera, recording] = recorded;
+  camera->unplug();
   EXPECT_TRUE(recording.wait_until([](const StreamStatus& s) { return s.silent; }));
   const Session session = recording.finish();  // does not hang
-  expect_ids_tell_the_truth(expect_true_frames(session, camera));
+  expect_ids_tell_the_truth(expect_true_frames(session, *camera));
   EXPECT_EQ(count_events(session, "disconnected"), 1);
   EXPECT_EQ(count_events(session, "reconnected"), 0);
 }
 
 /// A frame of which nothing arrives leaves no hole in the driver's count: only time tells.
 TEST_F(Uvc, FrameLostWholeIsTold) {
-  UvcCamera camera("OF-LATE", 5);
-  ASSERT_TRUE(wait_for_node("OF-LATE"));
-  Recording recording(options_for("OF-LATE"));
-  EXPECT_TRUE(recording.wait_for_frames(10));
-  camera.fail_next(Fault::lost);
-  camera.fail_next(Fault::lost);
-  camera.fail_next(Fault::lost);
+  Recorded recorded("OF-LATE", 10, "YUYV", 5);
+  auto& [camera, recording] = recorded;
+  camera->fail_next(Fault::lost);
+  camera->fail_next(Fault::lost);
+  camera->fail_next(Fault::lost);
   EXPECT_TRUE(recording.wait_for_frames(4));
   const Session session = recording.finish();
-  expect_true_frames(session, camera);
+  expect_true_frames(session, *camera);
   EXPECT_GE(count_events(session, "late-frame"), 1);
 }
 

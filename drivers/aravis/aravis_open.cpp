@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// From a name to a running stream: control, profile, temperatures, buffers.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "drivers/aravis/gvcp_probe.hpp"
+#include "drivers/aravis/link.hpp"
+#include "drivers/aravis/thermal_table.hpp"
+
+namespace orbitfuse::aravis {
+namespace {
+
+/// Packets and their resending don't wait for a busy machine, where the system allows that
+/// (RLIMIT_RTPRIO or RLIMIT_NICE); without the right it is as before.
+void prefer_receiving(void* /*data*/, ArvStreamCallbackType type, ArvBuffer* /*buffer*/) {
+  if (type != ARV_STREAM_CALLBACK_TYPE_INIT) return;
+  if (!arv_make_thread_realtime(10)) arv_make_thread_high_priority(-10);
+}
+
+}  // namespace
+
+std::optional<Format> format_of(ArvPixelFormat format) {
+  switch (format) {
+    case ARV_PIXEL_FORMAT_MONO_8:
+      return Format{CV_8UC1, 1};
+    case ARV_PIXEL_FORMAT_MONO_10:
+    case ARV_PIXEL_FORMAT_MONO_12:
+    case ARV_PIXEL_FORMAT_MONO_14:
+    case ARV_PIXEL_FORMAT_MONO_16:
+      return Format{CV_16UC1, 2};
+    default:
+      return std::nullopt;
+  }
+}
+
+Status AravisSource::open() {
+  auto link = std::make_shared<Link>();
+  const std::string wanted = address_.empty() ? options_.camera : address_;
+  const std::string where = wanted.empty() ? "GigE Vision camera" : "camera " + wanted;
+  GError* error = nullptr;
+  link->camera = arv_camera_new(wanted.empty() ? nullptr : wanted.c_str(), &error);
+  if (!link->camera) {
+    return fail(ErrorKind::device, where, take(error),
+                "check power, cable and subnet (orbitfuse doctor)");
+  }
+  ArvDevice* device = arv_camera_get_device(link->camera);
+  info_.model = text(arv_camera_get_model_name(link->camera, nullptr));
+  info_.serial = text(arv_camera_get_device_id(link->camera, nullptr));
+  // Without control no "control-lost" is ever emitted and every write times out.
+  if (ARV_IS_GV_DEVICE(device) && !arv_gv_device_is_controller(ARV_GV_DEVICE(device))) {
+    return fail(ErrorKind::device, where, "controlled by another program or computer",
+                "close that program and try again");
+  }
+  g_signal_connect(device, "control-lost", G_CALLBACK(Link::on_control_lost), link.get());
+  if (ARV_IS_GV_DEVICE(device)) {
+    auto* socket_address =
+        G_INET_SOCKET_ADDRESS(arv_gv_device_get_device_address(ARV_GV_DEVICE(device)));
+    char* ip = g_inet_address_to_string(g_inet_socket_address_get_address(socket_address));
+    address_ = ip;
+    g_free(ip);
+    // The packet size found by Aravis' probing must not change between reconnections.
+    arv_gv_device_set_packet_size_adjustment(ARV_GV_DEVICE(device),
+                                             ARV_GV_PACKET_SIZE_ADJUSTMENT_ON_FAILURE_ONCE);
+  }
+  link_ = link;
+  const auto prepare = [&]() -> Status {
+    ORBITFUSE_TRY(push_settings());
+    ORBITFUSE_ASSIGN(table_, temperature_table());
+    gint x = 0, y = 0;
+    arv_camera_get_region(link->camera, &x, &y, &link->width, &link->height, nullptr);
+    link->pixel_format = arv_camera_get_pixel_format(link->camera, nullptr);
+    const std::optional<Format> format = format_of(link->pixel_format);
+    if (!format) {
+      return fail(ErrorKind::device, where, "sends a pixel format other than Mono8..Mono16",
+                  "set PixelFormat in its profile");
+    }
+    link->payload = arv_camera_get_payload(link->camera, &error);
+    if (error) return fail(ErrorKind::device, where, take(error), "power-cycle the camera");
+    if (link->payload < static_cast<std::size_t>(link->width) *
+                            static_cast<std::size_t>(link->height) *
+                            static_cast<std::size_t>(format->bytes)) {
+      return fail(ErrorKind::device, where, "its payload is smaller than its image",
+                  "power-cycle the camera");
+    }
+    link->stream = arv_camera_create_stream(link->camera, prefer_receiving, nullptr, &error);
+    if (!link->stream)
+      return fail(ErrorKind::device, where, take(error), "check the network (orbitfuse doctor)");
+    // Aravis gives a frame 200 ms for its resent packets; a loaded host needs longer now and then.
+    if (ARV_IS_GV_STREAM(link->stream))
+      g_object_set(link->stream, "frame-retention", 300'000u, nullptr);
+    for (int i = 0; i < options_.buffers; ++i)
+      arv_stream_push_buffer(link->stream, arv_buffer_new(link->payload, nullptr));
+    arv_camera_start_acquisition(link->camera, &error);
+    if (error) return fail(ErrorKind::device, where, take(error), "power-cycle the camera");
+    return {};
+  };
+  if (Status status = prepare(); !status) {
+    bury_link();
+    return status;
+  }
+  counter_ = {};
+  base_id_ = next_id_;
+  mismatches_ = 0;
+  silent_told_ = false;
+  last_frame_ = Clock::now();
+  watch_control();
+  return {};
+}
+
+/// Frames go on for seconds after the control channel has died, until the camera's heartbeat ends;
+/// Aravis tells only then. Two unanswered questions in a row are an early word, not a verdict.
+void AravisSource::watch_control() {
+  control_mute_ = mute_told_ = false;
+  if (address_.empty()) return;
+  control_watch_ = std::jthread([this, address = address_](const std::stop_token& over) {
+    for (int unanswered = 0; !over.stop_requested();) {
+      unanswered = answers(address, std::chrono::milliseconds(80)) ? 0 : unanswered + 1;
+      control_mute_ = unanswered >= 2;
+      for (int i = 0; i < 4 && !over.stop_requested(); ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(25));
+    }
+  });
+}
+
+Status AravisSource::push_settings() {
+  if (profile_.name.empty()) {
+    if (options_.profiles.empty()) {
+      profile_.name = "generic";
+    } else if (!options_.profile.empty()) {
+      ORBITFUSE_ASSIGN(profile_, named_profile(options_.profiles, options_.profile));
+    } else {
+      ORBITFUSE_ASSIGN(profile_, find_profile(options_.profiles, info_.model));
+    }
+  }
+  ArvCamera* camera = link_->camera;
+  for (const auto& [feature, value] : profile_.settings) {
+    const std::string where = "profile " + profile_.name + ": " + feature;
+    if (!arv_camera_is_feature_available(camera, feature.c_str(), nullptr)) {
+      return fail(ErrorKind::usage, where, "the camera " + info_.model + " has no such feature",
+                  "correct the profile in config/cameras or choose another");
+    }
+    GError* error = nullptr;
+    bool verified = false;
+    if (const auto* b = std::get_if<bool>(&value)) {
+      arv_camera_set_boolean(camera, feature.c_str(), *b, &error);
+      verified = !error &&
+                 static_cast<bool>(arv_camera_get_boolean(camera, feature.c_str(), &error)) == *b;
+    } else if (const auto* i = std::get_if<std::int64_t>(&value)) {
+      arv_camera_set_integer(camera, feature.c_str(), *i, &error);
+      verified = !error && arv_camera_get_integer(camera, feature.c_str(), &error) == *i;
+    } else if (const auto* d = std::get_if<double>(&value)) {
+      arv_camera_set_float(camera, feature.c_str(), *d, &error);
+      verified = !error && std::abs(arv_camera_get_float(camera, feature.c_str(), &error) - *d) <=
+                               1e-6 * std::abs(*d);
+    } else {
+      const std::string& s = std::get<std::string>(value);
+      arv_camera_set_string(camera, feature.c_str(), s.c_str(), &error);
+      verified = !error && text(arv_camera_get_string(camera, feature.c_str(), &error)) == s;
+    }
+    if (error || !verified) {
+      const std::string why = error ? take(error) : "reads back another value";
+      return fail(ErrorKind::device, where, why,
+                  "correct the profile, or close another program that controls the camera");
+    }
+  }
+  return {};
+}
+
+Result<std::vector<std::uint16_t>> AravisSource::temperature_table() {
+  if (profile_.scale == ThermalScale::none) return std::vector<std::uint16_t>{};
+  if (profile_.scale == ThermalScale::linear) return linear_table(profile_.kelvin_per_dn);
+  PlanckParameters parameters;
+  for (const auto& [node, field] : {std::pair<const char*, double*>{"R", &parameters.r},
+                                    {"B", &parameters.b},
+                                    {"F", &parameters.f},
+                                    {"J0", &parameters.j0},
+                                    {"J1", &parameters.j1},
+                                    {"ObjectEmissivity", &parameters.emissivity},
+                                    {"ReflectedTemperature", &parameters.reflected_k}}) {
+    GError* error = nullptr;
+    *field = arv_camera_get_float(link_->camera, node, &error);
+    if (error)
+      return fail(ErrorKind::device, std::string("node ") + node, take(error),
+                  "choose a profile with scale = \"linear\"");
+  }
+  return planck_table(parameters);
+}
+
+}  // namespace orbitfuse::aravis

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <arv.h>
+
+#include <atomic>
+#include <cstddef>
+#include <optional>
+#include <string>
+
+#include "drivers/aravis/aravis_source.hpp"
+
+// What the files of this driver share of Aravis' C interface; not for users of the driver.
+namespace orbitfuse::aravis {
+
+/// Takes the error's text and frees it.
+inline std::string take(GError*& error) {
+  std::string text = error ? error->message : "";
+  g_clear_error(&error);
+  return text;
+}
+
+inline std::string text(const char* value) { return value ? value : ""; }
+
+/// How a pixel format lies in memory.
+struct Format {
+  int cv_type, bytes;
+};
+/// Nothing for formats that are not supported.
+std::optional<Format> format_of(ArvPixelFormat format);
+
+/// The Aravis objects of one connection; destroying them may block for seconds.
+struct AravisSource::Link {
+  ArvCamera* camera = nullptr;
+  ArvStream* stream = nullptr;
+  std::atomic<bool> control_lost{false};
+  int width = 0, height = 0;
+  ArvPixelFormat pixel_format = 0;
+  std::size_t payload = 0;
+
+  ~Link() {
+    if (camera) {
+      arv_camera_stop_acquisition(camera, nullptr);
+      g_signal_handlers_disconnect_by_data(arv_camera_get_device(camera), this);
+    }
+    g_clear_object(&stream);
+    g_clear_object(&camera);
+  }
+  static void on_control_lost(ArvDevice*, void* self) {
+    static_cast<Link*>(self)->control_lost = true;
+  }
+};
+
+}  // namespace orbitfuse::aravis
