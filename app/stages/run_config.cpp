@@ -47,7 +47,7 @@ void add_train(Settings& settings, const std::string& table, TrainConfig& config
                 },
                 true});
   settings.add(table + ".max_width_px", config.max_width_px,
-               "Training images are reduced to this width; larger is slower");
+               "Training images are reduced to this width; larger takes more memory");
   settings.add(table + ".cloud_width_px", config.cloud.max_width,
                "Width of the depth maps the point cloud is made from");
   settings.add(table + ".cloud_tolerance", config.cloud.depth_tolerance,
