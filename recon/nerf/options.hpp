@@ -35,7 +35,7 @@ struct TrainOptions {
   // -- field ---------------------------------------------------------------------------------
   int levels = 8;              ///< hash-grid resolutions
   int features_per_level = 4;  ///< 2 or 4
-  int log2_table = 17;         ///< entries per level; 15 is 10 % faster and 0.4 dB worse
+  int log2_table = 17;         ///< entries per level; 16 takes a sixth less time and loses 0.3 dB
   int base_resolution = 16;
   int max_resolution = 1024;   ///< cells over the contracted scene, finest level
   int hidden = 64;             ///< width of the density network

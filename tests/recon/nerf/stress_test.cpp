@@ -184,5 +184,40 @@ TEST(Occupancy, SamplesCoverTheOccupiedLengthInOrder) {
   }
 }
 
+TEST(Occupancy, WholeBlocksAreCrossedAsTheirCellsWouldBe) {
+  Occupancy grid;
+  grid.create(16, 2);
+  cv::RNG random(5);
+  for (std::size_t block = 0; block < grid.on.size(); ++block) {
+    const int kind = random.uniform(0, 4);  // empty, plain, known densities throughout, holes
+    grid.on[block] = kind == 0 ? 0 : ~std::uint64_t{0};
+    for (std::size_t cell = 64 * block; cell < 64 * (block + 1); ++cell) {
+      if (kind >= 2) grid.density[cell] = random.uniform(0.0f, 3.0f);
+      if (kind == 3) Occupancy::put(grid.on, static_cast<std::int64_t>(cell), random.uniform(0, 2) == 1);
+    }
+  }
+  grid.refresh();
+  for (int k = 0; k < 50; ++k) {
+    Ray ray{{random.uniform(-0.9f, 0.9f), random.uniform(-0.9f, 0.9f), -1.5f},
+            {random.uniform(-0.4f, 0.4f), random.uniform(-0.4f, 0.4f), 1}, 1};
+    const float norm = std::sqrt(ray.direction[0] * ray.direction[0] + ray.direction[1] * ray.direction[1] + 1);
+    for (float& d : ray.direction) d /= norm;
+    constexpr double step = 1e-3;
+    double occupied = 0;
+    for (double at = 0.1 + step / 2; at < 8; at += step) {
+      float x[3];
+      for (int d = 0; d < 3; ++d) x[d] = ray.origin[d] + static_cast<float>(at) * ray.direction[d];
+      const int cascade = Occupancy::cascade_of(x);
+      if (cascade >= grid.cascades) break;
+      occupied += Occupancy::test(grid.on, grid.cell_of(cascade, x)) ? step : 0;
+    }
+    float t[max_ray_samples], dt[max_ray_samples];
+    const int count = march(grid, ray, {}, 0.5f, t, dt);
+    double covered = 0;
+    for (int i = 0; i < count; ++i) covered += dt[i];
+    EXPECT_NEAR(covered, occupied, 0.02 * occupied + 0.01) << k;
+  }
+}
+
 }  // namespace
 }  // namespace orbitfuse::nerf
