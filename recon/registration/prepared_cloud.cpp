@@ -43,13 +43,12 @@ Similarity3d unit_frame(const Points& points) {
   return unit;
 }
 
-/// Normal and planarity from the scatter of the nearest neighbours.
+/// Normals from the scatter of the nearest neighbours.
 void estimate_normals(PreparedCloud& cloud) {
   constexpr std::size_t k = PreparedCloud::kNeighbours + 1;  // and the point itself
   const KdTree tree(cloud.points);
   const std::size_t n = cloud.points.size();
   cloud.normals.resize(n);
-  cloud.planarity.resize(n);
   cloud.neighbours.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     std::size_t index[k];
@@ -69,9 +68,7 @@ void estimate_normals(PreparedCloud& cloud) {
     }
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
     solver.computeDirect(scatter);
-    const Eigen::Vector3d& e = solver.eigenvalues();
     cloud.normals[i] = solver.eigenvectors().col(0);
-    cloud.planarity[i] = e[1] > 0 ? std::clamp(1 - e[0] / e[1], 0.0, 1.0) : 0.0;
   }
 }
 

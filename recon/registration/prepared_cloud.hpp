@@ -19,7 +19,6 @@ struct PreparedCloud {
   Similarity3d unit_from_cloud;
   Points points;
   Points normals;                 ///< unit length, signs consistent along the surface
-  std::vector<double> planarity;  ///< 0..1: how far the normal can be trusted
   std::vector<std::array<std::int32_t, kNeighbours>> neighbours;  ///< -1 where there are fewer
   NearestGrid nearest_table;
   std::size_t dropped_not_finite = 0, dropped_outliers = 0;
