@@ -2,8 +2,8 @@
 // Success, error and CPU time of registration on synthetic pairs.
 //   bench_registration [--trials 20] [--first-seed 0] [--cloud car] [--level "gap, hard"]
 //     [--initialiser both|features|grid|none] [--oracle] [--out FILE.json] [--verbose]
-// "none" refines from near starts only; --oracle adds the errors of the best similarities that the
-// true correspondences allow.
+// "both" also refines from near starts, "none" does that only; --oracle adds the errors of the best
+// similarities that the true correspondences allow.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -66,8 +66,8 @@ struct Errors {
 struct Tally {
   int trials = 0, good = 0, flagged_wrong = 0, flagged_good = 0, errors = 0;
   std::vector<double> cpu_ms;
-  Errors right;                            ///< of the successes
-  Errors refined;                          ///< refinement alone
+  Errors right;    ///< of the successes
+  Errors refined;  ///< refinement alone
   std::map<bench::Oracle, Errors> oracles;
   std::map<std::string, int> good_of_cloud;
 };
@@ -137,7 +137,8 @@ void run_trial(const bench::CloudPair& pair, const Arguments& arguments, const s
 void run_oracles(const bench::CloudPair& pair, Tally& tally) {
   for (const auto kind :
        {bench::Oracle::all_points, bench::Oracle::common, bench::Oracle::robust_common}) {
-    if (const auto best = bench::oracle_similarity(pair, kind)) tally.oracles[kind].add(pair, *best);
+    if (const auto best = bench::oracle_similarity(pair, kind))
+      tally.oracles[kind].add(pair, *best);
   }
 }
 
@@ -148,10 +149,9 @@ void print_row(const bench::Level& level, const Tally& t) {
   fmt::print(
       "| {} | {}/{} = {:.0f} % ({:.0f}) | {} | {}/{} | {}/{} | {} | {:.0f} ({:.0f}) | {}, {:.0f} |",
       level.name, t.good, t.trials, 100.0 * t.good / std::max(1, t.trials), 100 * level.success_bar,
-      clouds, t.flagged_wrong + t.errors, t.trials - t.good, t.flagged_good, t.good,
-      t.right.text(), median(t.cpu_ms),
-      t.cpu_ms.empty() ? 0 : *std::max_element(t.cpu_ms.begin(), t.cpu_ms.end()), t.refined.text(),
-      median(t.refined.cpu_ms));
+      clouds, t.flagged_wrong + t.errors, t.trials - t.good, t.flagged_good, t.good, t.right.text(),
+      median(t.cpu_ms), t.cpu_ms.empty() ? 0 : *std::max_element(t.cpu_ms.begin(), t.cpu_ms.end()),
+      t.refined.text(), median(t.refined.cpu_ms));
   for (const auto& [kind, errors] : t.oracles) fmt::print(" {} |", errors.text());
   fmt::print("\n");
   std::fflush(stdout);
@@ -175,9 +175,10 @@ nlohmann::json json_row(const bench::Level& level, const Tally& t) {
 
 Arguments parse(int argc, char** argv) {
   Arguments a;
-  const std::map<std::string, std::string*> texts = {
-      {"--cloud", &a.cloud}, {"--level", &a.level}, {"--initialiser", &a.initialiser},
-      {"--out", &a.out}};
+  const std::map<std::string, std::string*> texts = {{"--cloud", &a.cloud},
+                                                     {"--level", &a.level},
+                                                     {"--initialiser", &a.initialiser},
+                                                     {"--out", &a.out}};
   const std::map<std::string, int*> numbers = {{"--trials", &a.trials},
                                                {"--first-seed", &a.first_seed}};
   const std::map<std::string, bool*> switches = {{"--verbose", &a.verbose},
@@ -232,7 +233,8 @@ int main(int argc, char** argv) {
         const bench::CloudPair pair = bench::make_pair(surface, level, seed);
         if (arguments.initialiser != "none")
           run_trial(pair, arguments, level.name, name, seed, total);
-        run_refinement(pair, seed, total);
+        if (arguments.initialiser == "both" || arguments.initialiser == "none")
+          run_refinement(pair, seed, total);
         if (arguments.oracle) run_oracles(pair, total);
       }
     }

@@ -40,8 +40,7 @@ std::optional<Similarity3d> oracle_similarity(const CloudPair& pair, Oracle kind
   for (std::size_t i = 0; i < pair.source_truth.size(); ++i) {
     const Eigen::Vector3d& truth = pair.source_truth[i];
     if (!truth.allFinite()) continue;
-    if (kind != Oracle::all_points &&
-        !has_near(pair.target.positions, truth, 0.03 * pair.diameter))
+    if (kind != Oracle::all_points && !has_near(pair.target.positions, truth, 0.03 * pair.diameter))
       continue;
     from.push_back(pair.source.positions[i]);
     to.push_back(truth);

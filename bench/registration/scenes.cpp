@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <numeric>
 #include <numbers>
+#include <numeric>
 
 namespace orbitfuse::bench {
 namespace {
@@ -254,7 +254,8 @@ double Surface::radius() const {
   Vector3d center = Vector3d::Zero();
   for (std::size_t i = 0; i < triangles_.size(); ++i) {
     const double area = area_until_[i] - (i > 0 ? area_until_[i - 1] : 0);
-    center += area / area_until_.back() * (triangles_[i][0] + triangles_[i][1] + triangles_[i][2]) / 3;
+    center +=
+        area / area_until_.back() * (triangles_[i][0] + triangles_[i][1] + triangles_[i][2]) / 3;
   }
   double radius = 0;
   for (const auto& t : triangles_) {

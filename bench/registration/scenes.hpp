@@ -57,7 +57,7 @@ struct CloudPair {
   /// Where each source point truly lies, damage undone, target frame; NaN for points off any
   /// surface (floaters, outliers).
   Positions source_truth;
-  Positions check;      ///< undamaged surface points in the source frame
+  Positions check;  ///< undamaged surface points in the source frame
 };
 CloudPair make_pair(const Surface& surface, const Level& level, std::uint32_t seed);
 

@@ -43,12 +43,13 @@ Similarity3d unit_frame(const Points& points) {
   return unit;
 }
 
-/// Normals from the scatter of the nearest neighbours.
+/// Normals and their trust from the scatter of the nearest neighbours.
 void estimate_normals(PreparedCloud& cloud) {
   constexpr std::size_t k = PreparedCloud::kNeighbours + 1;  // and the point itself
   const KdTree tree(cloud.points);
   const std::size_t n = cloud.points.size();
   cloud.normals.resize(n);
+  cloud.trust.resize(n);
   cloud.neighbours.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     std::size_t index[k];
@@ -68,7 +69,9 @@ void estimate_normals(PreparedCloud& cloud) {
     }
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
     solver.computeDirect(scatter);
+    const Eigen::Vector3d& e = solver.eigenvalues();
     cloud.normals[i] = solver.eigenvectors().col(0);
+    cloud.trust[i] = e[1] > 0 ? std::sqrt(std::clamp(1 - e[0] / e[1], 0.0, 1.0)) : 0.0;
   }
 }
 

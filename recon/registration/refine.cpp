@@ -50,7 +50,7 @@ class Pairs {
     if (d.squaredNorm() > bound2_) return false;
     pair.normal = target_.normals[j];
     pair.lever = y - center_;
-    return finish(pair, d, rotation_ * source_.normals[i]);
+    return finish(pair, d, rotation_ * source_.normals[i], target_.trust[j] * source_.trust[i]);
   }
 
   /// The target's point z against the source's plane. The scale's derivative is taken at z, as if
@@ -68,18 +68,19 @@ class Pairs {
     if (d.squaredNorm() > bound2_) return false;
     pair.normal = rotation_ * source_.normals[i];
     pair.lever = z - center_;
-    return finish(pair, d, target_.normals[j]);
+    return finish(pair, d, target_.normals[j], target_.trust[j] * source_.trust[i]);
   }
 
  private:
   int partner(const PreparedCloud& cloud, const Eigen::Vector3d& x) const {
     return exact_ ? cloud.nearest(x) : cloud.nearest_table.lookup(x);
   }
-  static bool finish(Pair& pair, const Eigen::Vector3d& d, const Eigen::Vector3d& other) {
+  static bool finish(Pair& pair, const Eigen::Vector3d& d, const Eigen::Vector3d& other,
+                     double trust) {
     const double cosine = pair.normal.dot(other);
     if (cosine * cosine < 0.25) return false;
     pair.residual = pair.normal.dot(d);
-    pair.trust = cosine * cosine;
+    pair.trust = cosine * cosine * trust;
     return true;
   }
   const bool exact_;
