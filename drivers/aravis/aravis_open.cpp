@@ -45,8 +45,13 @@ Status AravisSource::open() {
                 "check power, cable and subnet (orbitfuse doctor)");
   }
   ArvDevice* device = arv_camera_get_device(link->camera);
-  info_.model = text(arv_camera_get_model_name(link->camera, nullptr));
-  info_.serial = text(arv_camera_get_device_id(link->camera, nullptr));
+  const std::string model = text(arv_camera_get_model_name(link->camera, nullptr));
+  const std::string serial = text(arv_camera_get_device_id(link->camera, nullptr));
+  {
+    const std::lock_guard lock(info_mutex_);
+    info_.model = model;
+    info_.serial = serial;
+  }
   // Without control no "control-lost" is ever emitted and every write times out.
   if (ARV_IS_GV_DEVICE(device) && !arv_gv_device_is_controller(ARV_GV_DEVICE(device))) {
     return fail(ErrorKind::device, where, "controlled by another program or computer",

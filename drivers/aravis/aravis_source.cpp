@@ -51,7 +51,10 @@ AravisSource::AravisSource(AravisOptions options)
 
 AravisSource::~AravisSource() { stop(); }
 
-DeviceInfo AravisSource::describe() const { return info_; }
+DeviceInfo AravisSource::describe() const {
+  const std::lock_guard lock(info_mutex_);
+  return info_;
+}
 
 Status AravisSource::start() {
   ORBITFUSE_TRY(options_.validate());

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
@@ -89,6 +90,7 @@ class AravisSource final : public FrameSource {
   StreamStatistics earlier_;           ///< of connections that are gone
   std::vector<std::uint16_t> table_;
   std::vector<Delivery> pending_;
+  mutable std::mutex info_mutex_;      ///< describe() comes from other threads while a camera reopens
   DeviceInfo info_;
   std::string address_;
   GvspFrameCounter counter_;

@@ -58,7 +58,11 @@ Status V4l2Options::validate() const {
 }
 
 Status V4l2Source::open_and_stream() {
-  ORBITFUSE_ASSIGN(node_, find_camera(*system_, wanted_));
+  ORBITFUSE_ASSIGN(VideoSystem::Node node, find_camera(*system_, wanted_));
+  {
+    const std::lock_guard lock(node_mutex_);
+    node_ = std::move(node);
+  }
   // Non-blocking: a blocking DQBUF can hang for ever when the camera is unplugged.
   fd_ = system_->open(node_.path, O_RDWR | O_NONBLOCK | O_CLOEXEC);
   if (fd_ < 0) return device_error(node_.path, "cannot be opened", errno);

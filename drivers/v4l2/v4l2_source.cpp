@@ -29,6 +29,7 @@ DeviceInfo V4l2Source::describe() const {
   info.id = options_.device_id;
   info.modality = options_.modality;
   info.driver = "v4l2";
+  const std::lock_guard lock(node_mutex_);
   info.model = node_.product;
   info.serial = node_.serial;
   return info;

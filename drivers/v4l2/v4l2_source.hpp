@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -88,6 +89,7 @@ class V4l2Source final : public FrameSource {
   V4l2Options options_;
   std::shared_ptr<VideoSystem> system_;
   CameraName wanted_;
+  mutable std::mutex node_mutex_;  ///< describe() comes from other threads while a camera reopens
   VideoSystem::Node node_;
   Layout layout_;
   int fd_ = -1;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <linux/videodev2.h>
 
+#include <atomic>
 #include <cerrno>
 #include <thread>
 
@@ -230,6 +231,30 @@ TEST_F(V4l2SourceTest, UnpluggedAndBackUnderAnotherNode) {
   EXPECT_NE(back.detail.find("/dev/video6"), std::string::npos);
   shoot(0);  // the driver counts from 0 again
   EXPECT_EQ(deliver(source).frame.id, 2u);  // one frame's time at least was lost
+}
+
+/// For the thread sanitizer too: the recorder's writer asks while the capture thread reopens.
+TEST_F(V4l2SourceTest, DescribesItselfToOtherThreadsWhileItReopens) {
+  system->camera.product = std::string(200, 'p');
+  system->camera.serial = std::string(200, 's');
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  std::atomic<bool> over = false;
+  std::thread asking([&] {
+    while (!over) {
+      const DeviceInfo info = source.describe();
+      EXPECT_EQ(info.model, std::string(200, 'p'));
+      EXPECT_EQ(info.serial, std::string(200, 's'));
+    }
+  });
+  for (int i = 0; i < 50; ++i) {
+    system->plugged = false;
+    EXPECT_EQ(deliver(source).reason, "disconnected");
+    system->plugged = true;
+    EXPECT_EQ(deliver(source).reason, "reconnected");
+  }
+  over = true;
+  asking.join();
 }
 
 TEST_F(V4l2SourceTest, StallIsToldAndReopened) {
