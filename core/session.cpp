@@ -80,7 +80,8 @@ Result<Session> open_session(const std::filesystem::path& folder) {
   std::error_code ignored;
   const std::filesystem::path file = folder / "manifest.jsonl";
   if (!std::filesystem::is_directory(folder, ignored)) {
-    return fail(ErrorKind::input, folder.string(), "no such folder", "give a session folder");
+    const bool is_file = std::filesystem::exists(folder, ignored);
+    return fail(ErrorKind::input, folder.string(), is_file ? "is a file" : "no such folder", "give a session folder");
   }
   if (!std::filesystem::exists(file, ignored)) {
     return fail(ErrorKind::input, folder.string(), "no manifest.jsonl, so not a session",

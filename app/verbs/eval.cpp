@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
@@ -50,6 +51,11 @@ Status run(Context& context, Options& o) {
     return fail(ErrorKind::input, o.folders.out, "no such folder", "run the session first");
   ORBITFUSE_ASSIGN(const json result, eval::evaluate(o.folders.out, session, truth, o.evaluate,
                                                      context.progress));
+  if (!result.contains("poses_visible") && !result.contains("poses_thermal"))
+    return fail(ErrorKind::input, o.truth,
+                fmt::format("nothing could be compared: {}",
+                            fmt::join(result["notes"].get<std::vector<std::string>>(), "; ")),
+                "give the truth of this session, after its poses stage");
   print(context.console, result);
   context.result = result;
   return {};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
+#include "core/transforms_json.hpp"
 
 namespace orbitfuse::cli {
 
@@ -9,8 +10,12 @@ Action add_run(CLI::App& app) {
   const auto cameras = std::make_shared<std::string>();
   add_folders(app, *folders);
   app.add_option("--cameras", *cameras, "transforms.json with the new views, in the visible frame");
-  return [folders, cameras](Context& context) {
-    if (!cameras->empty()) context.config.render.cameras = *cameras;
+  return [folders, cameras](Context& context) -> Status {
+    if (!cameras->empty()) {
+      // Read here once, so that a wrong file doesn't cost the hours before it is needed.
+      ORBITFUSE_TRY(read_transforms_json(*cameras));
+      context.config.render.cameras = *cameras;
+    }
     return run_stages(context, *folders, {});
   };
 }

@@ -64,6 +64,8 @@ class Importer {
     ORBITFUSE_ASSIGN(const auto visible_tracking, listed(options_.visible_tracking));
     ORBITFUSE_ASSIGN(auto thermal, thermal_sources());
     ORBITFUSE_ASSIGN(auto thermal_tracking, listed(options_.thermal_tracking));
+    ORBITFUSE_TRY(check_known(Modality::visible, {&visible, &visible_tracking}));
+    ORBITFUSE_TRY(check_known(Modality::thermal, {&thermal, &thermal_tracking}));
     total_ = visible.size() + visible_tracking.size() + thermal.size() + thermal_tracking.size();
     ORBITFUSE_TRY(add_visible(with_exif_times(visible), false));
     ORBITFUSE_TRY(add_visible(with_exif_times(visible_tracking), true));
@@ -94,6 +96,26 @@ class Importer {
     if (!options_.thermal.empty()) return list_images(options_.thermal);
     return files_of_transforms(Modality::thermal);
   }
+  /// Poses that were given belong to the images that were given.
+  Status check_known(Modality modality, std::initializer_list<const std::vector<fs::path>*> lists) {
+    const auto known = known_.find(modality);
+    if (known == known_.end() || known->second.all().empty()) return {};
+    std::size_t images = 0, with_pose = 0;
+    for (const auto* files : lists) {
+      images += files->size();
+      for (const fs::path& file : *files) with_pose += known->second.find(file) != nullptr;
+    }
+    if (images == 0 || with_pose == images) return {};
+    const std::string found = fmt::format("{} of {} images have a pose among the {} given", with_pose, images,
+                                          known->second.all().size());
+    if (with_pose == 0)
+      return fail(ErrorKind::input, fmt::format("known poses, {}", name(modality)),
+                  fmt::format("{}; the first given is for {}", found, known->second.all().front().file.string()),
+                  "give the poses of these images, or none");
+    report_.warnings.push_back(fmt::format("{}: {}; the others are left to the pose stage", name(modality), found));
+    return {};
+  }
+
   std::vector<fs::path> files_of_transforms(Modality modality) const {
     std::vector<fs::path> files;
     if (!options_.transforms_json || !known_.count(modality)) return files;

@@ -153,7 +153,10 @@ int segments_of(const Occupancy& occupancy, const Ray& ray, float near, float fa
     const float size = occupancy.cell_size(cascade);
     const std::int64_t cell = occupancy.cell_of(cascade, x);
     const bool empty = !Occupancy::test(occupancy.any, cell >> 6);
-    const float step = empty ? 4 * size : size;  // an empty block in one step
+    const std::uint64_t* words = &occupancy.march_words[2 * static_cast<std::size_t>(cell >> 6)];
+    // A block that is empty, or of which nothing is known, in one step.
+    const bool plain = !empty && words[0] == ~std::uint64_t{0} && words[1] == 0;
+    const float step = empty || plain ? 4 * size : size;
     const float per_step = 1 / step;
     float exit = std::numeric_limits<float>::max();
     for (int d = 0; d < 3; ++d) {
@@ -161,7 +164,6 @@ int segments_of(const Occupancy& occupancy, const Ray& ray, float near, float fa
       exit = std::min(exit, (edge - x[d]) * inverse[d]);
     }
     exit = std::max(exit, 0.0f) + 1e-3f * size;  // across the border in spite of rounding
-    const std::uint64_t* words = &occupancy.march_words[2 * static_cast<std::size_t>(cell >> 6)];
     if (!empty && (words[0] >> (cell & 63) & 1u)) {
       const int code = words[1] >> (cell & 63) & 1u ? occupancy.code[static_cast<std::size_t>(cell)] : 0;
       Segment* last = count > 0 ? &out[count - 1] : nullptr;

@@ -60,6 +60,7 @@ const std::vector<Entry>& table() {
       FIELD(proposal_samples_2, 8, 1024),
       FIELD(fine_samples, 4, 1024),
       FIELD(learning_rate, 1e-6, 1),
+      FIELD(network_learning_rate, 1e-6, 1),
       FIELD(distortion_weight, 0, 100),
       FIELD(depth_weight, 0, 1000),
       FIELD(depth_end, 0, 1),
@@ -211,6 +212,8 @@ Result<TrainOptions> preset(const std::string& name) {
   o.color_layers = 2;
   o.sh_degree = 4;
   o.samples_per_step = 4096 * 48;
+  o.learning_rate = o.network_learning_rate = 1e-2;
+  o.distortion_weight = 0.002;
   o.depth_weight = 0;
   o.carve = false;
   o.min_views = 0;

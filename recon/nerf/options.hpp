@@ -18,7 +18,7 @@ struct TrainOptions {
   std::string preset = "fast-visible";
 
   // -- when to stop --------------------------------------------------------------------------
-  int iterations = 4000;     ///< hard end; the learning rate is annealed over these
+  int iterations = 4000;     ///< hard end; the learning rates are annealed over these
   double budget_s = 0;       ///< wall-clock limit, 0 = none; the schedule is fitted to it
   double target_psnr = 0;    ///< stop when the held-out PSNR reaches it, 0 = never
   int holdout_every = 0;     ///< every n-th view measures and does not train; 0 = none
@@ -45,7 +45,8 @@ struct TrainOptions {
 
   // -- sampling ------------------------------------------------------------------------------
   Sampling sampling = Sampling::occupancy;
-  int samples_per_step = 1 << 15;        ///< rays per step adapt to this
+  /// Rays per step adapt to this. Small: at equal time more steps gain more than steadier ones.
+  int samples_per_step = 1 << 12;
   int occupancy_resolution = 128;        ///< cells per axis of each cascade
   double occupancy_threshold = 0.02;     ///< visible opacity below which a cell is empty
   int surface_samples = 16;              ///< per ray, where surfaces are expected
@@ -56,8 +57,10 @@ struct TrainOptions {
   int fine_samples = 48;
 
   // -- losses --------------------------------------------------------------------------------
-  double learning_rate = 1e-2;
-  double distortion_weight = 0.002;  ///< Mip-NeRF 360, eq. 15
+  /// Adam's peak for the hash tables: few rays meet an entry, so it has to move far each time.
+  double learning_rate = 4e-2;
+  double network_learning_rate = 1.2e-2;  ///< Adam's peak for the perceptrons
+  double distortion_weight = 0.008;       ///< Mip-NeRF 360, eq. 15
   double depth_weight = 0.05;        ///< SfM and dense depth, annealed
   double depth_end = 0.5;            ///< fraction of the run at which depth_weight reaches its end
   double depth_final_weight = 0.0;   ///< what remains of depth_weight after depth_end

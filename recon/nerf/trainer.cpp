@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "core/parallel.hpp"
 #include "recon/nerf/random.hpp"
@@ -19,10 +20,10 @@ constexpr float known_depth_margin = 1.08f;  ///< a wrong depth must be able to 
 
 enum Stream : std::uint64_t { pixel_stream = 1, jitter_stream, known_stream, probe_stream };
 
-/// Warm-up, then exponential decay to 1/30.
-float learning_rate(const TrainOptions& options, int step, double progress) {
+/// What the learning rates are multiplied by: warm-up, then half a cosine down to 1/100.
+double schedule(int step, double progress) {
   const double warmup = std::min(1.0, (step + 1) / 30.0);
-  return static_cast<float>(options.learning_rate * warmup * std::pow(1.0 / 30, progress));
+  return warmup * (0.01 + 0.99 * 0.5 * (1 + std::cos(std::numbers::pi * progress)));
 }
 
 double depth_weight(const TrainOptions& o, double progress) {
@@ -173,10 +174,13 @@ bool Trainer::step(double progress) {
                       std::isfinite(gradients.interlevel);
   if (finite && drawn > 0) {
     AdamStep adam;
-    adam.learning_rate = learning_rate(o, field_.step, progress);
+    adam.learning_rate = static_cast<float>(o.learning_rate * schedule(field_.step, progress));
     adam.correction1 = static_cast<float>(1.0 / (1 - std::pow(adam.beta1, field_.step + 1)));
     adam.correction2 = static_cast<float>(1.0 / (1 - std::pow(adam.beta2, field_.step + 1)));
-    apply(adam, gradients, with_proposals);
+    AdamStep network = adam;
+    network.learning_rate *= static_cast<float>(o.network_learning_rate / o.learning_rate);
+    network.weight_decay = 1e-6f;
+    apply(adam, network, gradients, with_proposals);
     const double mse = gradients.squared_error / static_cast<double>(std::max(1l, gradients.channels));
     const double psnr = -10 * std::log10(std::max(mse, 1e-12));
     field_.train_psnr = field_.step == 0 ? psnr : 0.98 * field_.train_psnr + 0.02 * psnr;
@@ -193,7 +197,8 @@ bool Trainer::step(double progress) {
   return finite;
 }
 
-void Trainer::apply(const AdamStep& adam, const BlockGradients& gradients, bool with_proposals) {
+void Trainer::apply(const AdamStep& grid_step, const AdamStep& network_step,
+                    const BlockGradients& gradients, bool with_proposals) {
   // Whole levels per task: no two threads write to one table.
   const auto update_grid = [&](HashEncoding& grid, const auto& gradient_of) {
     parallel_for(static_cast<int>(grid.levels.size()), [&](int l) {
@@ -208,7 +213,7 @@ void Trainer::apply(const AdamStep& adam, const BlockGradients& gradients, bool 
         kernels_.scatter(level, grad, g.position01, g.count,
                          g.gradient + index * static_cast<std::size_t>(g.count) * static_cast<std::size_t>(grid.features));
       }
-      kernels_.adam(adam, static_cast<std::int64_t>(level.entries) * level.features,
+      kernels_.adam(grid_step, static_cast<std::int64_t>(level.entries) * level.features,
                     grid.table.value.data() + offset, grid.table.first.data() + offset,
                     grid.table.second.data() + offset, grad, grid.half.data() + offset);
     });
@@ -221,10 +226,8 @@ void Trainer::apply(const AdamStep& adam, const BlockGradients& gradients, bool 
     kernels_.adam(step, static_cast<std::int64_t>(p.size()), p.value.data(), p.first.data(),
                   p.second.data(), p.grad.data(), nullptr);
   };
-  AdamStep mlp = adam;
-  mlp.weight_decay = 1e-6f;
-  update(field_.main.mlp.weights, gradients.mlp, mlp);
-  update(field_.color.weights, gradients.color, mlp);
+  update(field_.main.mlp.weights, gradients.mlp, network_step);
+  update(field_.color.weights, gradients.color, network_step);
   field_.main.mlp.refresh();
   field_.color.refresh();
   for (std::size_t k = 0; with_proposals && k < field_.proposals.size(); ++k) {
@@ -233,12 +236,13 @@ void Trainer::apply(const AdamStep& adam, const BlockGradients& gradients, bool 
       const ProposalBlock::Level& level = block.proposals.levels[k];
       return LevelGradient{block.proposals.samples(static_cast<int>(k)), level.position01.data(), level.grid.data()};
     });
-    update(network.mlp.weights, gradients.proposals[k], mlp);
+    update(network.mlp.weights, gradients.proposals[k], network_step);
     network.mlp.refresh();
   }
   if (field_.options.per_image_offset) {
-    AdamStep slow = adam;
+    AdamStep slow = network_step;
     slow.learning_rate *= 0.1f;
+    slow.weight_decay = 0;
     update(field_.image_offsets, gradients.offsets, slow);
     // The mean offset is the scene's temperature, not drift.
     double mean = 0;

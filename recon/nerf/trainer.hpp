@@ -38,7 +38,8 @@ class Trainer {
   void draw(Block& block, int begin, int end, double progress);
   bool proposing() const { return field_.options.sampling == Sampling::proposal; }
   bool proposals_learn(double progress) const;
-  void apply(const AdamStep& adam, const BlockGradients& gradients, bool with_proposals);
+  void apply(const AdamStep& grid_step, const AdamStep& network_step, const BlockGradients& gradients,
+             bool with_proposals);
   void update_occupancy(double progress);
   void probe_cells();
 

@@ -75,6 +75,23 @@ TEST_F(Run, BothModalitiesThenNothingThenWhatChanged) {
   EXPECT_FALSE(fs::exists(out / "render/visible/001.png"));
 }
 
+TEST_F(Run, WhatNobodyCanMeasureIsAnErrorAndCamerasAreReadFirst) {
+  write_fixture_session(session, {.thermal = 0});
+  const Outcome no_cameras = run({"--cameras", (temp.path / "none.json").string()});
+  EXPECT_EQ(no_cameras.code, 3) << no_cameras.err;
+  EXPECT_FALSE(fs::exists(out / "train_visible"));
+
+  ASSERT_EQ(run({}, {}, "poses").code, 0);
+  const fs::path truth = temp.path / "truth.json";
+  ASSERT_TRUE(write_file_atomic(truth, R"({"visible": {"K": {"w": 64, "h": 48, "fx": 60, "fy": 60,
+      "cx": 32, "cy": 24}, "frames": [{"file": "of/another/scene.jpg",
+      "c2w": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]}})"));
+  const Outcome foreign = orbitfuse_program({"eval", session.string(), "--out", out.string(),
+                                             "--ground-truth", truth.string()});
+  EXPECT_EQ(foreign.code, 3) << foreign.err;
+  EXPECT_THAT(foreign.err, HasSubstr("truth.json"));
+}
+
 TEST_F(Run, AFinishedRunKeepsItsOptions) {
   write_fixture_session(session, {.thermal = 0});
   ASSERT_EQ(run({"--seed", "5"}).code, 0);

@@ -258,6 +258,32 @@ TEST_F(ImportTest, PosesComeFromTransformsAndFromColmapModels) {
   }
 }
 
+TEST_F(ImportTest, PosesOfOtherPhotosAreRefusedAndMissingOnesTold) {
+  for (const char* name : {"in/a.jpg", "in/b.jpg"}) put_photo(name);
+  options.visible = {folder / "in"};
+  options.transforms_json = folder / "transforms.json";
+  const auto poses_of = [&](const std::string& file) {
+    Transforms transforms;
+    transforms.frames.push_back({});
+    transforms.frames[0].file_path = file;
+    transforms.frames[0].camera = Camera::from_fov(40, 30, 50);
+    ASSERT_TRUE(write_transforms_json(folder / "transforms.json", transforms));
+  };
+  poses_of("elsewhere/c.jpg");
+  const auto none = import();
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().kind, ErrorKind::input);
+  EXPECT_THAT(none.error().message(), HasSubstr("0 of 2 images"));
+  EXPECT_THAT(none.error().message(), HasSubstr("c.jpg"));
+
+  fs::remove_all(folder / "session");
+  poses_of("in/b.jpg");
+  const auto one = import();
+  ASSERT_TRUE(one) << one.error().message();
+  EXPECT_EQ(one->with_pose, 1);
+  EXPECT_THAT(one->warnings, ::testing::Contains(HasSubstr("1 of 2 images")));
+}
+
 TEST_F(ImportTest, AFolderInUseAndNothingToImportAreErrors) {
   EXPECT_FALSE(import());
   put_photo("in/a.jpg");
