@@ -30,7 +30,7 @@ std::vector<Connected> usb_cameras(v4l2::VideoSystem& video,
     // Only nodes that capture; and a camera with several of them is listed once.
     if (!v4l2::find_camera(video, {v4l2::CameraName::By::node, node.path})) continue;
     if (!node.usb_path.empty() && !ports.insert(node.usb_path).second) continue;
-    Connected camera{"v4l2",       "v4l2:" + v4l2::text(v4l2::lasting_name(node)),
+    Connected camera{"v4l2",       "v4l2:" + v4l2::text(v4l2::lasting_name(video, node)),
                      node.product, node.serial,
                      node.path,    {}};
     for (const usb::UsbDevice& device : bus) {

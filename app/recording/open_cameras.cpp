@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "drivers/aravis/aravis_source.hpp"
 #include "drivers/replay/replay_source.hpp"
@@ -105,6 +106,28 @@ Status add_aravis(const CameraSpec& spec, Modality modality, const fs::path& pro
   return {};
 }
 
+/// What is not given the camera's automatic finds, and unless lock=no it is locked there.
+Status set_controls(const CameraSpec& spec, v4l2::V4l2Options& options) {
+  const auto set = [&](const char* key, double scale, std::optional<int>& value) -> Status {
+    if (spec.value(key).empty()) return {};
+    // Focus 0 is infinity.
+    const bool infinity = std::string(key) == "focus" && spec.value(key) == "0";
+    ORBITFUSE_ASSIGN(const double given, infinity ? Result<double>(0) : number(spec, key, 0));
+    if (given * scale > 1e9 || (given > 0 && given * scale < 0.5))
+      return fail(ErrorKind::usage, fmt::format("{} {}", spec.driver, key), spec.value(key),
+                  "give what the camera can have (v4l2-ctl --list-ctrls)");
+    value = static_cast<int>(std::lround(given * scale));
+    return {};
+  };
+  ORBITFUSE_TRY(set("exposure", 10, options.exposure_100us));  // given in ms
+  ORBITFUSE_TRY(set("focus", 1, options.focus));
+  ORBITFUSE_TRY(set("white-balance", 1, options.white_balance_k));
+  if (spec.value("lock").empty()) return {};
+  ORBITFUSE_ASSIGN(const bool lock, yes_or_no(spec, "lock"));
+  options.lock_exposure = options.lock_focus = options.lock_white_balance = lock;
+  return {};
+}
+
 Status add_v4l2(const CameraSpec& spec, Modality modality, Cameras& cameras) {
   v4l2::V4l2Options options;
   if (!spec.camera.empty()) options.camera = spec.camera;
@@ -116,6 +139,7 @@ Status add_v4l2(const CameraSpec& spec, Modality modality, Cameras& cameras) {
   ORBITFUSE_ASSIGN(options.rate_hz, number(spec, "rate", 0));
   ORBITFUSE_ASSIGN(options.kelvin_per_dn, number(spec, "kelvin-per-dn", 0));
   options.format = spec.value("format");
+  ORBITFUSE_TRY(set_controls(spec, options));
   options.reset_port = [](const std::string& port) -> Status {
     ORBITFUSE_ASSIGN(const auto bus, usb::make_usb_bus());
     return bus->reset(port);

@@ -101,30 +101,58 @@ void LiveGuide::add(const FrameRecord& frame) {
   if (frame.station && !frame.tracking) {
     add_at_station(camera, frame);
   } else if (options_.turntable_step_deg != 0 && frame.has_flag("still")) {
-    camera.announced = on_table(camera.table, table_.photo(camera.table));
-    judge_announced(camera, frame);
-    camera.announced.reset();  // the next photo tells anew where the table is
+    judge_table_photo(camera, frame);
   } else if (camera.announced) {
     judge_announced(camera, frame);
   } else if (finder_) {
-    camera.waiting = frame;
+    if (frame.has_flag("still")) {
+      camera.photos.push_back(frame);
+    } else {
+      camera.waiting = frame;
+    }
     changed_.notify_all();
   }
 }
 
-void LiveGuide::operator_at_station() {
+void LiveGuide::judge_table_photo(Camera& camera, const FrameRecord& frame) {
+  if (table_.keys() == 0) camera.table.counts_photos = true;
+  if (camera.table.counts_photos) {
+    camera.announced = at_photo(camera.table);
+  } else if (const auto key =
+                 table_.key_before(frame.has_flag("file-time") ? 0 : frame.host_time_ns)) {
+    camera.announced = at_key(camera.table, *key);
+  } else {
+    camera.announced = at_key(camera.table, table_.keys());
+    camera.announced->sigma_deg = 180;  // it may be from any station
+  }
+  judge_announced(camera, frame);
+  camera.announced.reset();  // the next photo tells anew where the table is
+}
+
+void LiveGuide::operator_at_station(std::int64_t time_ns) {
   const std::lock_guard lock(mutex_);
   const bool turned = options_.turntable_step_deg != 0;
-  const double table_deg = turned ? table_.key() : 0;
+  if (time_ns == 0) {
+    time_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
+                  std::chrono::system_clock::now().time_since_epoch())
+                  .count();
+  }
+  const int key = turned ? table_.key(time_ns) : 0;
   for (auto& [modality, camera] : cameras_) {
     if (turned && camera.table.counts_photos) continue;  // its photos tell, and may come late
-    camera.announced = turned ? on_table(camera.table, table_deg) : next_station(modality);
+    camera.announced = turned ? at_key(camera.table, key) : next_station(modality);
   }
 }
 
-OrbitPosition LiveGuide::on_table(TableView& view, double azimuth_deg) const {
+OrbitPosition LiveGuide::at_photo(TableView& view) const {
   const std::vector<double>& loops = options_.plan.loop_elevations_deg;
+  const double azimuth_deg = table_.photo(view);
   return {azimuth_deg, loops[table_.turn(view, azimuth_deg) % loops.size()], 0, 0};
+}
+
+OrbitPosition LiveGuide::at_key(TableView& view, int key) const {
+  const std::vector<double>& loops = options_.plan.loop_elevations_deg;
+  return {table_.azimuth_deg(key), loops[table_.turn_at_key(view, key) % loops.size()], 0, 0};
 }
 
 void LiveGuide::judge_announced(Camera& camera, const FrameRecord& frame) {
@@ -238,22 +266,37 @@ void LiveGuide::note_choice(Camera& camera, const FrameRecord& frame) {
   }
 }
 
-/// The looking thread: the newest frame of each camera, no faster than asked.
+std::optional<FrameRecord> LiveGuide::Camera::next_to_look() {
+  std::optional<FrameRecord> next;
+  if (!photos.empty()) {
+    next = std::move(photos.front());
+    photos.pop_front();
+  } else {
+    waiting.swap(next);
+  }
+  return next;
+}
+
+/// The looking thread: every photo, and of a video the newest frame, no faster than asked.
 void LiveGuide::look() {
   const auto pause = std::chrono::duration<double>(1 / options_.looks_per_second);
   std::unique_lock lock(mutex_);
-  const auto has_work = [this] {
-    return over_ || std::any_of(cameras_.begin(), cameras_.end(),
-                                [](const auto& c) { return c.second.waiting.has_value(); });
+  const auto has_photos = [this] {
+    return std::any_of(cameras_.begin(), cameras_.end(),
+                       [](const auto& c) { return !c.second.photos.empty(); });
+  };
+  const auto has_work = [this, has_photos] {
+    return has_photos() || std::any_of(cameras_.begin(), cameras_.end(),
+                                       [](const auto& c) { return c.second.waiting.has_value(); });
   };
   while (true) {
-    changed_.wait(lock, has_work);
-    if (over_) return;
+    changed_.wait(lock, [&] { return over_ || has_work(); });
+    if (!has_work()) return;  // over, and everything was judged
     const auto started = std::chrono::steady_clock::now();
     for (auto& [modality, camera] : cameras_) {
-      if (!camera.waiting) continue;
-      const FrameRecord frame = *camera.waiting;
-      camera.waiting.reset();
+      const std::optional<FrameRecord> next = camera.next_to_look();
+      if (!next) continue;
+      const FrameRecord& frame = *next;
       lock.unlock();
       const std::optional<cv::Mat> image = read_back(writer_.folder() / frame.file);
       std::optional<OrbitPosition> seen;
@@ -268,7 +311,7 @@ void LiveGuide::look() {
       judge(camera, frame, seen ? camera.position : std::nullopt);
     }
     changed_.wait_for(lock, pause - (std::chrono::steady_clock::now() - started),
-                      [this] { return over_; });
+                      [&] { return over_ || has_photos(); });
   }
 }
 

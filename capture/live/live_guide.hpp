@@ -3,6 +3,7 @@
 
 #include <condition_variable>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <mutex>
@@ -29,7 +30,8 @@ struct LiveGuideOptions {
   double unseen_after_s = 1.0;  ///< a position older than this is no longer where the camera is
   /// The object stands on a turntable: each key is this much further in azimuth, negative for a
   /// table that turns the other way; a full turn later it is the next loop. A photo shows the table
-  /// where the last key put it; without keys each photo of a camera is a step. 0: none.
+  /// where the last key before its time put it, however late it arrives; one whose time does not
+  /// tell is refused. Without keys each photo of a camera is a step. 0: none.
   double turntable_step_deg = 0;
 
   Status validate() const;
@@ -63,9 +65,10 @@ class LiveGuide {
   void add(const FrameRecord& frame);
   /// The operator stands at the next station, or has turned the table by a step: for each modality
   /// the next good frame is it.
-  void operator_at_station();
+  /// `time_ns`: when (UTC epoch); 0: now.
+  void operator_at_station(std::int64_t time_ns = 0);
 
-  /// Ends the looking; call it before the writer closes the session.
+  /// Judges what was stored and ends the looking; call it before the writer closes the session.
   void finish();
 
   /// In the order of the plan's modalities.
@@ -83,7 +86,9 @@ class LiveGuide {
     SharpnessReference sharpness;
     std::optional<OrbitPosition> position;
     std::int64_t position_time_ns = 0;
-    std::optional<FrameRecord> waiting;      ///< newest frame not looked at yet
+    std::optional<FrameRecord> waiting;      ///< newest frame of a video not looked at yet
+    std::deque<FrameRecord> photos;          ///< not looked at yet: each was taken on purpose
+    std::optional<FrameRecord> next_to_look();
     std::optional<OrbitPosition> announced;  ///< by the key: where the next good frame is
     TableView table;
     std::map<std::size_t, FrameRecord> chosen;  ///< by sector
@@ -97,7 +102,9 @@ class LiveGuide {
                           const std::optional<OrbitPosition>& position, Refusal last) const;
   std::string table_instruction(const Camera& camera, Refusal last) const;
   std::optional<OrbitPosition> next_station(Modality modality) const;
-  OrbitPosition on_table(TableView& view, double azimuth_deg) const;
+  OrbitPosition at_photo(TableView& view) const;
+  OrbitPosition at_key(TableView& view, int key) const;
+  void judge_table_photo(Camera& camera, const FrameRecord& frame);
   void judge_announced(Camera& camera, const FrameRecord& frame);
   void set_position(Camera& camera, OrbitPosition position, std::int64_t time_ns);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "capture/live/turntable.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace orbitfuse {
@@ -30,9 +31,24 @@ double Turntable::way_deg(double from_deg, double to_deg) const {
   return wrapped_deg(step_deg_ < 0 ? from_deg - to_deg : to_deg - from_deg);
 }
 
-double Turntable::photo(TableView& view) const {
-  if (keys_ == 0) view.counts_photos = true;
-  return azimuth_deg(view.counts_photos ? ++view.photos : keys_);
+int Turntable::key(std::int64_t time_ns) {
+  // A host clock that was set back must not put this key before the one it follows.
+  if (!key_times_ns_.empty()) time_ns = std::max(time_ns, key_times_ns_.back());
+  key_times_ns_.push_back(time_ns);
+  return keys();
+}
+
+std::optional<int> Turntable::key_before(std::int64_t photo_ns) const {
+  constexpr std::int64_t second_ns = 1'000'000'000;
+  const auto count_until = [this](std::int64_t time_ns) {
+    return static_cast<int>(
+        std::upper_bound(key_times_ns_.begin(), key_times_ns_.end(), time_ns) - key_times_ns_.begin());
+  };
+  if (photo_ns <= 0) return std::nullopt;
+  const int key = count_until(photo_ns);
+  const std::int64_t latest_ns = photo_ns % second_ns == 0 ? photo_ns + second_ns - 1 : photo_ns;
+  if (key == 0 || count_until(latest_ns) != key) return std::nullopt;
+  return key;
 }
 
 void Turntable::resume_at(TableView& view, const Station& station) {
@@ -46,6 +62,20 @@ std::size_t Turntable::turn(TableView& view, double azimuth_deg) const {
   if (!view.start_deg) view.start_deg = azimuth_deg;
   view.turned_deg += way_deg(
       wrapped_deg(*view.start_deg + std::copysign(view.turned_deg, step_deg_)), azimuth_deg);
+  return whole_turns(view.turned_deg);
+}
+
+std::size_t Turntable::turn_at_key(TableView& view, int key) const {
+  if (view.key == 0) {
+    view.key = key;
+    return turn(view, azimuth_deg(key));
+  }
+  view.turned_deg += (key - view.key) * std::abs(step_deg_);
+  view.key = key;
+  if (view.turned_deg < 0) {
+    view.turned_deg = 0;
+    view.start_deg = azimuth_deg(key);
+  }
   return whole_turns(view.turned_deg);
 }
 

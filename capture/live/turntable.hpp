@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "core/session.hpp"
 
@@ -15,6 +17,7 @@ struct TableView {
   bool counts_photos = false;       ///< its photos began before the first key
   std::optional<double> start_deg;  ///< azimuth at which its first turn began
   double turned_deg = 0;            ///< since then, never negative
+  int key = 0;                      ///< the key at which turned_deg held; 0: none
 };
 
 /// The angle of a turntable from what its operator does: one count for all cameras. Azimuths are
@@ -25,27 +28,33 @@ class Turntable {
   explicit Turntable(double step_deg) : step_deg_(step_deg) {}
 
   /// The operator's key: the table was turned by a step (the first key: it stands at its start).
-  double key() { return azimuth_deg(++keys_); }
-  /// A camera's photo: where the last key put the table, so that a photo can be taken again. A
-  /// camera whose photos began without keys: a step each, however late the photos arrive.
-  double photo(TableView& view) const;
+  /// Returns its number, from 1.
+  int key(std::int64_t time_ns);
+  /// A photo of a camera whose photos began without keys: a step each, however late they arrive.
+  double photo(TableView& view) const { return azimuth_deg(++view.photos); }
+  /// The key before a photo that was taken at `photo_ns`, however late it arrives; nullopt when its
+  /// time is unknown (0), before the first key, or too coarse to tell (whole seconds, as EXIF has).
+  std::optional<int> key_before(std::int64_t photo_ns) const;
+  double azimuth_deg(int count) const;
   /// `view` saw the table at `station`; the next key or photo is a step further.
   void resume_at(TableView& view, const Station& station);
 
   /// False until the first key, or a station to go on from.
-  bool begun() const { return keys_ > 0 || steps_before_ == 0; }
+  bool begun() const { return keys() > 0 || steps_before_ == 0; }
+  int keys() const { return static_cast<int>(key_times_ns_.size()); }
   /// Which full turn this is for `view`, now that it sees the table at `azimuth_deg`.
   std::size_t turn(TableView& view, double azimuth_deg) const;
+  /// The same at a key, also one before the latest that `view` knows.
+  std::size_t turn_at_key(TableView& view, int key) const;
   std::size_t turn_after_step(const TableView& view) const;
 
  private:
-  double azimuth_deg(int count) const;
   double way_deg(double from_deg, double to_deg) const;
 
   double step_deg_;
   double base_deg_ = 0;
   int steps_before_ = -1;  ///< of the first count: it is at the base, or a step after it
-  int keys_ = 0;
+  std::vector<std::int64_t> key_times_ns_;  ///< rising
 };
 
 }  // namespace orbitfuse

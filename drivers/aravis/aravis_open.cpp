@@ -45,8 +45,19 @@ Status AravisSource::open() {
                 "check power, cable and subnet (orbitfuse doctor)");
   }
   ArvDevice* device = arv_camera_get_device(link->camera);
-  info_.model = text(arv_camera_get_model_name(link->camera, nullptr));
-  info_.serial = text(arv_camera_get_device_id(link->camera, nullptr));
+  const std::string model = text(arv_camera_get_model_name(link->camera, nullptr));
+  const std::string serial = text(arv_camera_get_device_id(link->camera, nullptr));
+  if (first_image_ && serial != info_.serial) {
+    return fail(ErrorKind::device, where,
+                fmt::format("camera {} {} answers, the session's is {} {}", model, serial,
+                            info_.model, info_.serial),
+                "give each camera an address of its own");
+  }
+  {
+    const std::lock_guard lock(info_mutex_);
+    info_.model = model;
+    info_.serial = serial;
+  }
   // Without control no "control-lost" is ever emitted and every write times out.
   if (ARV_IS_GV_DEVICE(device) && !arv_gv_device_is_controller(ARV_GV_DEVICE(device))) {
     return fail(ErrorKind::device, where, "controlled by another program or computer",
@@ -67,9 +78,7 @@ Status AravisSource::open() {
   const auto prepare = [&]() -> Status {
     ORBITFUSE_TRY(push_settings());
     ORBITFUSE_ASSIGN(table_, temperature_table());
-    gint x = 0, y = 0;
-    arv_camera_get_region(link->camera, &x, &y, &link->width, &link->height, nullptr);
-    link->pixel_format = arv_camera_get_pixel_format(link->camera, nullptr);
+    ORBITFUSE_TRY(settle_image(*link, where));
     const std::optional<Format> format = format_of(link->pixel_format);
     if (!format) {
       return fail(ErrorKind::device, where, "sends a pixel format other than Mono8..Mono16",
@@ -99,13 +108,51 @@ Status AravisSource::open() {
     bury_link();
     return status;
   }
+  first_image_ = Image{link->width, link->height, link->pixel_format};
   counter_ = {};
+  duplicates_in_a_row_ = 0;
   base_id_ = next_id_;
   mismatches_ = 0;
   silent_told_ = false;
   last_frame_ = Clock::now();
   watch_control();
   return {};
+}
+
+/// Reads what the camera sends. A camera that was switched off may come back with another size; a
+/// session keeps its first.
+Status AravisSource::settle_image(Link& link, const std::string& where) {
+  GError* error = nullptr;
+  gint x = 0, y = 0;
+  const auto read = [&]() -> Status {
+    arv_camera_get_region(link.camera, &x, &y, &link.width, &link.height, &error);
+    if (!error) link.pixel_format = arv_camera_get_pixel_format(link.camera, &error);
+    if (error) return fail(ErrorKind::device, where, take(error), "power-cycle the camera");
+    return {};
+  };
+  ORBITFUSE_TRY(read());
+  if (link.width <= 0 || link.height <= 0) {
+    return fail(ErrorKind::device, where,
+                fmt::format("its image is {}x{}", link.width, link.height),
+                "set Width and Height in its profile");
+  }
+  const auto as_first = [&] {
+    return link.width == first_image_->width && link.height == first_image_->height &&
+           link.pixel_format == first_image_->pixel_format;
+  };
+  if (!first_image_ || as_first()) return {};
+  const Image found{link.width, link.height, link.pixel_format};
+  arv_camera_set_pixel_format(link.camera, first_image_->pixel_format, &error);
+  g_clear_error(&error);  // reading back decides
+  arv_camera_set_region(link.camera, x, y, first_image_->width, first_image_->height, &error);
+  g_clear_error(&error);
+  ORBITFUSE_TRY(read());
+  if (as_first()) return {};
+  return fail(ErrorKind::device, where,
+              fmt::format("came back with {}x{} (format {:#x}), the session's is {}x{} ({:#x})",
+                          found.width, found.height, found.pixel_format, first_image_->width,
+                          first_image_->height, first_image_->pixel_format),
+              "set it as before, or stop and record a session of its own");
 }
 
 /// Frames go on for seconds after the control channel has died, until the camera's heartbeat ends;

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <ctime>
 
 #include "drivers/aravis/gvcp_probe.hpp"
@@ -51,7 +50,10 @@ AravisSource::AravisSource(AravisOptions options)
 
 AravisSource::~AravisSource() { stop(); }
 
-DeviceInfo AravisSource::describe() const { return info_; }
+DeviceInfo AravisSource::describe() const {
+  const std::lock_guard lock(info_mutex_);
+  return info_;
+}
 
 Status AravisSource::start() {
   ORBITFUSE_TRY(options_.validate());
@@ -63,13 +65,22 @@ void AravisSource::bury_link() {
   control_watch_ = {};
   if (!link_) return;
   earlier_ += link_statistics();
-  graves_.emplace_back([link = std::move(link_)]() mutable { link.reset(); });
+  std::erase_if(graves_, [](Grave& grave) {
+    if (!*grave.done) return false;
+    grave.thread.join();
+    return true;
+  });
+  auto done = std::make_shared<std::atomic<bool>>(false);
+  graves_.push_back({done, std::thread([link = std::move(link_), done]() mutable {
+                       link.reset();
+                       *done = true;
+                     })});
   link_ = nullptr;
 }
 
 void AravisSource::stop() {
   bury_link();
-  for (std::thread& grave : graves_) grave.join();
+  for (Grave& grave : graves_) grave.thread.join();
   graves_.clear();
   away_ = false;
 }
@@ -85,6 +96,7 @@ Delivery AravisSource::event(std::string kind, std::string detail) const {
 Delivery AravisSource::lose(const std::string& why) {
   bury_link();
   away_ = true;
+  rhythm_.interrupt();
   lost_at_ = last_frame_;
   last_attempt_ = {};
   return event("disconnected", why);
@@ -102,8 +114,7 @@ std::optional<Delivery> AravisSource::try_reopen() {
   failure_.clear();
   away_ = false;
   const double outage_s = std::chrono::duration<double>(Clock::now() - lost_at_).count();
-  const auto cost =
-      interval_s_ > 0 ? static_cast<std::uint64_t>(std::llround(outage_s / interval_s_)) : 1;
+  const std::uint64_t cost = rhythm_.frames_in(outage_s);
   next_id_ = base_id_ += cost;  // also if it is lost again before a frame
   return event("reconnected",
                fmt::format("{} after {:.1f} s, about {} frames; settings pushed and verified",
@@ -143,8 +154,12 @@ Result<Delivery> AravisSource::next(std::chrono::milliseconds timeout) {
     }
     return Delivery{};
   }
+  last_frame_ = Clock::now();  // damaged or not: the stream lives
+  silent_told_ = false;
   Delivery delivery = inspect(buffer);
   arv_stream_push_buffer(link_->stream, buffer);
+  // Late packets make one such frame; a camera that counts from 1 again makes nothing else.
+  if (duplicates_in_a_row_ >= 3) return lose("the camera's frame numbers restarted; reopening it");
   return delivery;
 }
 
@@ -153,14 +168,19 @@ Delivery AravisSource::inspect(void* handle) {
   Delivery delivery;
   delivery.kind = Delivery::Kind::rejected;
   const std::int64_t arrival_ns = arrival_of(buffer);
+  const Clock::time_point came_at = Clock::now() - std::chrono::nanoseconds(wall_ns() - arrival_ns);
   const auto frame_id = static_cast<std::uint16_t>(arv_buffer_get_frame_id(buffer));
   const std::optional<std::uint64_t> count = counter_.unwrap(frame_id);
   if (!count) {
     // A frame number that was counted already: late packets of a frame that was given up.
+    ++duplicates_in_a_row_;
     return event("duplicate", fmt::format("frame id {} again", frame_id));
   }
+  duplicates_in_a_row_ = 0;
   delivery.frame.id = base_id_ + *count;
   next_id_ = delivery.frame.id + 1;
+  rhythm_.note(delivery.frame.id,
+               std::chrono::duration_cast<std::chrono::nanoseconds>(came_at.time_since_epoch()).count());
 
   const ArvBufferStatus status = arv_buffer_get_status(buffer);
   guint64 mismatches = arv_stream_get_info_uint64_by_name(link_->stream, "n_size_mismatch_errors");
@@ -174,11 +194,6 @@ Delivery AravisSource::inspect(void* handle) {
     if (mismatch) delivery.reason += ", larger than announced";
     return delivery;
   }
-  const double interval_s = std::chrono::duration<double>(Clock::now() - last_frame_).count();
-  if (interval_s < 1)
-    interval_s_ = interval_s_ > 0 ? 0.9 * interval_s_ + 0.1 * interval_s : interval_s;
-  last_frame_ = Clock::now();
-  silent_told_ = false;
   const int width = arv_buffer_get_image_width(buffer),
             height = arv_buffer_get_image_height(buffer);
   const ArvPixelFormat pixel_format = arv_buffer_get_image_pixel_format(buffer);
@@ -209,7 +224,7 @@ Delivery AravisSource::inspect(void* handle) {
   frame.host_time_ns = stamp.host_time_ns;
   if (stamp.event) pending_.push_back(event("clock", *stamp.event));
   cv::Mat(height, width, format.cv_type, const_cast<void*>(data)).copyTo(frame.pixels);
-  if (options_.modality == Modality::thermal && freeze_.mark(frame, data, needed))
+  if (options_.modality == Modality::thermal && freeze_.mark(frame, data, needed, came_at))
     pending_.push_back(event("nuc", "the image is frozen"));
   if (format.bytes == 1) {
     frame.thermal_is_gray = options_.modality == Modality::thermal;
@@ -236,6 +251,8 @@ Status AravisSource::correct_nonuniformity() {
 }
 
 Delivery AravisSource::correct_as_asked() {
+  // Asking would wait for the answer, seconds long, and the stream with it.
+  if (control_mute_) return event("nuc-failed", "the camera does not answer on its control channel");
   if (const Status status = correct_nonuniformity(); !status)
     return event("nuc-failed", status.error().message());
   return event("nuc", "asked for by the operator");

@@ -5,13 +5,16 @@
 #include <chrono>
 #include <filesystem>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "capture/clock/clock_map.hpp"
-#include "capture/freeze_watch.hpp"
+#include "capture/frame_rhythm.hpp"
 #include "capture/frame_source.hpp"
+#include "capture/freeze_watch.hpp"
 #include "capture/lasting_failure.hpp"
 #include "capture/raw_counts.hpp"
 #include "drivers/aravis/profile.hpp"
@@ -70,6 +73,7 @@ class AravisSource final : public FrameSource {
 
   Status open();
   Status push_settings();
+  Status settle_image(Link& link, const std::string& where);
   Result<std::vector<std::uint16_t>> temperature_table();
   void bury_link();
   void watch_control();
@@ -83,12 +87,22 @@ class AravisSource final : public FrameSource {
   AravisOptions options_;
   CameraProfile profile_;
   std::shared_ptr<Link> link_;
-  std::vector<std::thread> graves_;
+  struct Grave {
+    std::shared_ptr<std::atomic<bool>> done;
+    std::thread thread;
+  };
+  struct Image {
+    int width = 0, height = 0;
+    unsigned pixel_format = 0;
+  };
+  std::vector<Grave> graves_;          ///< connections that are being destroyed
+  std::optional<Image> first_image_;   ///< a session keeps its size
   std::jthread control_watch_;
   std::atomic<bool> control_mute_{false}, correction_wanted_{false};
   StreamStatistics earlier_;           ///< of connections that are gone
   std::vector<std::uint16_t> table_;
   std::vector<Delivery> pending_;
+  mutable std::mutex info_mutex_;      ///< describe() comes from other threads while a camera reopens
   DeviceInfo info_;
   std::string address_;
   GvspFrameCounter counter_;
@@ -97,7 +111,8 @@ class AravisSource final : public FrameSource {
   FreezeWatch freeze_;
   LastingFailure failure_;             ///< to reopen
   std::uint64_t base_id_ = 0, next_id_ = 0, mismatches_ = 0;
-  double interval_s_ = 0;              ///< between frames, smoothed; tells how many an outage cost
+  FrameRhythm rhythm_;                 ///< tells how many frames an outage cost
+  int duplicates_in_a_row_ = 0;
   bool away_ = false, silent_told_ = false, mute_told_ = false;
   Clock::time_point last_frame_{}, last_attempt_{}, lost_at_{};
 };

@@ -157,7 +157,10 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
     return event("duplicate", name + ": the same image came before");
   }
   delivery.frame = std::move(still->frame);
-  if (delivery.frame.host_time_ns == 0) delivery.frame.host_time_ns = written_ns(attempt.file);
+  if (delivery.frame.host_time_ns == 0) {
+    delivery.frame.host_time_ns = written_ns(attempt.file);
+    delivery.frame.flags.emplace_back("file-time");  // of copying, perhaps
+  }
   delivery.frame.source =
       (attempt.file.parent_path().filename() / attempt.file.filename()).string();
   if (seen_files_.contains({delivery.frame.source, delivery.frame.host_time_ns})) {

@@ -5,6 +5,7 @@
 #include <linux/videodev2.h>
 
 #include <array>
+#include <optional>
 #include <utility>
 
 namespace orbitfuse::v4l2 {
@@ -36,6 +37,10 @@ bool is_capture_node(VideoSystem& system, const std::string& path) {
   return answered && (caps & V4L2_CAP_VIDEO_CAPTURE) && (caps & V4L2_CAP_STREAMING);
 }
 
+bool like(const VideoSystem::Node& a, const VideoSystem::Node& b) {
+  return a.usb_id == b.usb_id && a.serial == b.serial && a.function == b.function;
+}
+
 }  // namespace
 
 Result<CameraName> parse_camera_name(const std::string& text) {
@@ -58,17 +63,40 @@ Result<VideoSystem::Node> find_camera(VideoSystem& system, const CameraName& nam
   }
   // A node without sysfs entry (a container, a test) may still open.
   if (name.by == CameraName::By::node && seen.empty()) {
-    return VideoSystem::Node{.path = name.value, .serial = {}, .usb_path = {}, .usb_id = {}, .product = {}};
+    return VideoSystem::Node{.path = name.value, .serial = {}, .usb_path = {}, .usb_id = {}, .product = {}, .function = {}};
   }
   return fail(ErrorKind::device, "camera " + text(name),
               seen.empty() ? "no video device is connected" : "not connected; there is " + seen,
               "plug it in, or name another (orbitfuse devices)");
 }
 
-CameraName lasting_name(const VideoSystem::Node& node) {
-  if (!node.serial.empty()) return {CameraName::By::serial, node.serial};
-  if (!node.usb_path.empty()) return {CameraName::By::usb_path, node.usb_path};
-  return {CameraName::By::node, node.path};
+CameraIdentity identity_of(VideoSystem& system, const VideoSystem::Node& node) {
+  CameraIdentity identity{node, node.serial.empty()};
+  for (const VideoSystem::Node& other : system.nodes())
+    identity.port_only |= other.usb_path != node.usb_path && like(other, node);
+  return identity;
+}
+
+CameraName lasting_name(VideoSystem& system, const VideoSystem::Node& node) {
+  if (node.usb_path.empty()) return {CameraName::By::node, node.path};
+  if (identity_of(system, node).port_only) return {CameraName::By::usb_path, node.usb_path};
+  return {CameraName::By::serial, node.serial};
+}
+
+Result<VideoSystem::Node> find_again(VideoSystem& system, const CameraIdentity& camera) {
+  const VideoSystem::Node& node = camera.node;
+  if (node.usb_path.empty()) return find_camera(system, {CameraName::By::node, node.path});
+  std::optional<VideoSystem::Node> found;
+  for (const VideoSystem::Node& candidate : system.nodes()) {
+    const bool same_port = candidate.usb_path == node.usb_path;
+    if (!like(candidate, node) || (camera.port_only && !same_port)) continue;
+    if ((found && !same_port) || !is_capture_node(system, candidate.path)) continue;
+    found = candidate;
+    if (same_port) break;
+  }
+  if (found) return *found;
+  return fail(ErrorKind::device, "camera " + node.product + " at usb:" + node.usb_path,
+              "not connected", "plug it in again, into the same port");
 }
 
 std::string text(const CameraName& name) {

@@ -22,8 +22,18 @@ Result<CameraName> parse_camera_name(const std::string& text);
 /// device error listing what is connected otherwise.
 Result<VideoSystem::Node> find_camera(VideoSystem& system, const CameraName& name);
 
-/// The steadiest name of a node: serial, else USB port, else the path.
-CameraName lasting_name(const VideoSystem::Node& node);
+/// A camera that was opened, to be found again wherever it is plugged in.
+struct CameraIdentity {
+  VideoSystem::Node node;
+  /// Others have its serial too, or it has none: only its port tells it from them.
+  bool port_only = false;
+};
+CameraIdentity identity_of(VideoSystem& system, const VideoSystem::Node& node);
+/// The steadiest name of a node: serial where no other has it, else USB port, else the path.
+CameraName lasting_name(VideoSystem& system, const VideoSystem::Node& node);
+/// The same camera: equal USB id, serial and function, at its own port where others are like it;
+/// what is no USB device is known by its path. Device error when it is not there.
+Result<VideoSystem::Node> find_again(VideoSystem& system, const CameraIdentity& camera);
 std::string text(const CameraName& name);
 
 }  // namespace orbitfuse::v4l2

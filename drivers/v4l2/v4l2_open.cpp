@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// From a camera's name to a running stream: format, rate, locked controls, buffers.
+// From a camera's name to a running stream: format, rate, buffers.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <linux/videodev2.h>
 #include <sys/mman.h>
 
-#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -57,8 +56,11 @@ Status V4l2Options::validate() const {
   return {};
 }
 
-Status V4l2Source::open_and_stream() {
-  ORBITFUSE_ASSIGN(node_, find_camera(*system_, wanted_));
+Status V4l2Source::open_and_stream(const VideoSystem::Node& node) {
+  {
+    const std::lock_guard lock(node_mutex_);
+    node_ = node;
+  }
   // Non-blocking: a blocking DQBUF can hang for ever when the camera is unplugged.
   fd_ = system_->open(node_.path, O_RDWR | O_NONBLOCK | O_CLOEXEC);
   if (fd_ < 0) return device_error(node_.path, "cannot be opened", errno);
@@ -92,6 +94,12 @@ Status V4l2Source::choose_format() {
   std::vector<std::string> order{"MJPG", "YUYV", "NV12", "GREY", "Y16 "};
   if (options_.modality == Modality::thermal) order = {"Y16 ", "GREY", "YUYV", "MJPG", "NV12"};
   if (!options_.format.empty()) order = {options_.format};
+  int width = options_.width, height = options_.height;
+  if (first_layout_) {
+    order = {fourcc_text(first_layout_->fourcc)};
+    width = first_layout_->width;
+    height = first_layout_->height;
+  }
   std::vector<std::uint32_t> offered;
   for (v4l2_fmtdesc entry{.index = 0,
                     .type = V4L2_BUF_TYPE_VIDEO_CAPTURE,
@@ -117,21 +125,24 @@ Status V4l2Source::choose_format() {
   }
   format.fmt.pix.pixelformat = chosen;
   format.fmt.pix.field = V4L2_FIELD_NONE;
-  if (options_.width > 0) {
-    format.fmt.pix.width = static_cast<std::uint32_t>(options_.width);
-    format.fmt.pix.height = static_cast<std::uint32_t>(options_.height);
+  if (width > 0) {
+    format.fmt.pix.width = static_cast<std::uint32_t>(width);
+    format.fmt.pix.height = static_cast<std::uint32_t>(height);
   }
   if (ioctl(VIDIOC_S_FMT, &format) < 0)
     return device_error(node_.path, "refuses the format", errno);
   const v4l2_pix_format& got = format.fmt.pix;
   // Drivers answer with the nearest size they have; a session must not change size silently.
+  if (got.width == 0 || got.height == 0)
+    return fail(ErrorKind::device, node_.path, "has images of 0 pixels",
+                "name a size (size=1280x720; v4l2-ctl --list-formats-ext)");
   if (got.pixelformat != chosen ||
-      (options_.width > 0 && (static_cast<int>(got.width) != options_.width ||
-                              static_cast<int>(got.height) != options_.height))) {
+      (width > 0 &&
+       (static_cast<int>(got.width) != width || static_cast<int>(got.height) != height))) {
     return fail(
         ErrorKind::device, node_.path,
         fmt::format("gives {} {}x{}, asked for {} {}x{}", fourcc_text(got.pixelformat), got.width,
-                    got.height, fourcc_text(chosen), options_.width, options_.height),
+                    got.height, fourcc_text(chosen), width, height),
         "choose a size that the camera has (v4l2-ctl --list-formats-ext)");
   }
   layout_ = Layout{got.pixelformat, static_cast<int>(got.width), static_cast<int>(got.height),
@@ -148,49 +159,6 @@ Status V4l2Source::set_rate() {
       static_cast<std::uint32_t>(std::lround(1000 * options_.rate_hz));
   if (ioctl(VIDIOC_S_PARM, &parameters) < 0 && errno != ENOTTY && errno != EINVAL) {
     return device_error(node_.path, "refuses the frame rate", errno);
-  }
-  return {};
-}
-
-Status V4l2Source::apply_controls() {
-  struct Lock {
-    bool wanted;
-    std::uint32_t automatic;
-    int manual;  ///< the value of `automatic` that means "off"
-    std::uint32_t value_control;
-    std::optional<int> value;
-    const char* name;
-  };
-  const std::array<Lock, 3> locks{
-      {{options_.lock_exposure, V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL,
-        V4L2_CID_EXPOSURE_ABSOLUTE, options_.exposure_100us, "exposure"},
-       {options_.lock_focus, V4L2_CID_FOCUS_AUTO, 0, V4L2_CID_FOCUS_ABSOLUTE, options_.focus,
-        "focus"},
-       {options_.lock_white_balance, V4L2_CID_AUTO_WHITE_BALANCE, 0,
-        V4L2_CID_WHITE_BALANCE_TEMPERATURE, options_.white_balance_k, "white balance"}}};
-  for (const Lock& lock : locks) {
-    if (!lock.wanted && !lock.value) continue;
-    v4l2_control value{lock.value_control, 0};
-    if (lock.value) {
-      value.value = *lock.value;
-    } else if (const auto kept = locked_.find(lock.value_control); kept != locked_.end()) {
-      value.value = kept->second;
-    } else if (ioctl(VIDIOC_G_CTRL, &value) < 0) {
-      continue;  // the camera has no such control: nothing can drift
-    }
-    // A camera that was switched off comes back with other values: the first ones hold.
-    locked_[lock.value_control] = value.value;
-    v4l2_control automatic{lock.automatic, lock.manual};
-    ioctl(VIDIOC_S_CTRL, &automatic);  // some cameras have only the value; the check below decides
-    v4l2_control check = value;
-    const bool set = ioctl(VIDIOC_S_CTRL, &value) == 0 && ioctl(VIDIOC_G_CTRL, &check) == 0;
-    if (set && check.value == value.value) continue;
-    Delivery event;
-    event.kind = Delivery::Kind::event;
-    event.reason = "setting-lost";
-    event.detail = fmt::format("{} is not locked: wanted {}, the camera has {}", lock.name,
-                               value.value, check.value);
-    pending_.push_back(std::move(event));
   }
   return {};
 }

@@ -9,15 +9,6 @@
 #include <ctime>
 
 namespace orbitfuse::v4l2 {
-namespace {
-
-std::int64_t now_ns(clockid_t clock) {
-  timespec t{};
-  clock_gettime(clock, &t);
-  return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
-}
-
-}  // namespace
 
 V4l2Source::V4l2Source(V4l2Options options, std::shared_ptr<VideoSystem> system)
     : options_(std::move(options)), system_(std::move(system)), freeze_(options_.nuc_settle) {}
@@ -29,6 +20,7 @@ DeviceInfo V4l2Source::describe() const {
   info.id = options_.device_id;
   info.modality = options_.modality;
   info.driver = "v4l2";
+  const std::lock_guard lock(node_mutex_);
   info.model = node_.product;
   info.serial = node_.serial;
   return info;
@@ -44,10 +36,12 @@ int V4l2Source::ioctl(unsigned long request, void* argument) {
 
 Status V4l2Source::start() {
   ORBITFUSE_TRY(options_.validate());
-  wanted_ = *parse_camera_name(options_.camera);
-  ORBITFUSE_TRY(open_and_stream());
-  // From here on the camera is followed wherever it is plugged in.
-  if (wanted_.by == CameraName::By::node) wanted_ = lasting_name(node_);
+  ORBITFUSE_ASSIGN(const VideoSystem::Node node,
+                   find_camera(*system_, *parse_camera_name(options_.camera)));
+  ORBITFUSE_TRY(open_and_stream(node));
+  // From here on it is this camera, wherever it is plugged in.
+  identity_ = identity_of(*system_, node);
+  first_layout_ = layout_;
   return {};
 }
 
@@ -81,8 +75,9 @@ std::optional<Delivery> V4l2Source::try_reopen() {
   if (Clock::now() - last_attempt_ < options_.reopen_every) return std::nullopt;
   last_attempt_ = Clock::now();
   // Away or refused: tried again, for as long as the user waits.
-  if (!find_camera(*system_, wanted_)) return std::nullopt;
-  if (const Status status = open_and_stream(); !status) {
+  const Result<VideoSystem::Node> node = find_again(*system_, *identity_);
+  if (!node) return std::nullopt;
+  if (const Status status = open_and_stream(*node); !status) {
     if (!failure_.note(status.error().message())) return std::nullopt;
     Delivery event;
     event.kind = Delivery::Kind::event;
@@ -147,17 +142,30 @@ Result<Delivery> V4l2Source::dequeue() {
   last_frame_ = Clock::now();
   stalls_in_a_row_ = 0;
   const std::uint64_t id = unwrap(buffer.sequence);
-  Delivery delivery = delivery_of(buffer.index, buffer.bytesused, buffer.flags);
-  delivery.frame.id = id;
   const std::int64_t stamp_ns = std::int64_t{buffer.timestamp.tv_sec} * 1'000'000'000 +
                                 std::int64_t{buffer.timestamp.tv_usec} * 1000;
+  // Frames that waited for us come in a burst: how long a picture stands is told by their stamps.
+  const FreezeWatch::Clock::time_point taken_at{
+      std::chrono::nanoseconds(stamp_ns > 0 ? stamp_ns : system_->now_ns(CLOCK_MONOTONIC))};
+  Delivery delivery = delivery_of(buffer.index, buffer.bytesused, buffer.flags, taken_at);
+  delivery.frame.id = id;
   delivery.frame.device_time_ns = stamp_ns;
-  delivery.frame.host_time_ns = now_ns(CLOCK_REALTIME);
+  const std::int64_t monotonic_ns = system_->now_ns(CLOCK_MONOTONIC);
+  std::int64_t arrival_ns = system_->now_ns(CLOCK_REALTIME);
   const bool monotonic =
       (buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
   // The kernel's stamp leaves out our own scheduling delay.
-  if (monotonic && stamp_ns > 0) delivery.frame.host_time_ns -= now_ns(CLOCK_MONOTONIC) - stamp_ns;
-  watch_rhythm(id, stamp_ns);
+  if (monotonic && stamp_ns > 0) arrival_ns -= monotonic_ns - stamp_ns;
+  // The wall clock may be set while recording; times in a session rise all the same.
+  const ClockMap::Stamp stamp = clock_.add(stamp_ns, arrival_ns);
+  delivery.frame.host_time_ns = stamp.host_time_ns;
+  if (stamp.event) tell("clock", *stamp.event);
+  watch_rhythm(id, stamp_ns > 0 ? stamp_ns : monotonic_ns);
+  if (adapting_ && delivery.kind == Delivery::Kind::frame) {
+    if (adapting_since_ns_ == 0) adapting_since_ns_ = monotonic_ns;
+    if (monotonic_ns - adapting_since_ns_ >= std::chrono::nanoseconds(options_.adapt).count())
+      lock_adapted();
+  }
   if (ioctl(VIDIOC_QBUF, &buffer) < 0)
     pending_.push_back(lose("disconnected", std::strerror(errno)));
   return delivery;
@@ -172,23 +180,28 @@ Result<Delivery> V4l2Source::empty_at_start(v4l2_buffer& buffer) {
 }
 
 void V4l2Source::watch_rhythm(std::uint64_t id, std::int64_t stamp_ns) {
-  const int missing = rhythm_.note(id, stamp_ns > 0 ? stamp_ns : now_ns(CLOCK_MONOTONIC));
+  const int missing = rhythm_.note(id, stamp_ns);
   if (missing == 0) return;
   late_frames_ += missing;
   // A camera of unsteady rate (phones) would fill the manifest.
   if (Clock::now() - last_late_event_ < std::chrono::seconds(10)) return;
   last_late_event_ = Clock::now();
+  tell("late-frame",
+       fmt::format("frame {} is late by {} though none is missing in the driver's count; {} so far: "
+                   "lost whole on USB, or the camera slowed down",
+                   id, missing, late_frames_));
+}
+
+void V4l2Source::tell(std::string kind, std::string detail) {
   Delivery event;
   event.kind = Delivery::Kind::event;
-  event.reason = "late-frame";
-  event.detail = fmt::format(
-      "frame {} is late by {} though none is missing in the driver's count; {} so far: "
-      "lost whole on USB, or the camera slowed down",
-      id, missing, late_frames_);
+  event.reason = std::move(kind);
+  event.detail = std::move(detail);
   pending_.push_back(std::move(event));
 }
 
-Delivery V4l2Source::delivery_of(std::uint32_t index, std::uint32_t bytes, std::uint32_t flags) {
+Delivery V4l2Source::delivery_of(std::uint32_t index, std::uint32_t bytes, std::uint32_t flags,
+                                 FreezeWatch::Clock::time_point taken_at) {
   Delivery delivery;
   delivery.kind = Delivery::Kind::rejected;
   if (flags & V4L2_BUF_FLAG_ERROR) {
@@ -208,23 +221,13 @@ Delivery V4l2Source::delivery_of(std::uint32_t index, std::uint32_t bytes, std::
   }
   delivery.kind = Delivery::Kind::frame;
   if (options_.modality == Modality::thermal &&
-      freeze_.mark(delivery.frame, mapping.address, bytes)) {
-    Delivery event;
-    event.kind = Delivery::Kind::event;
-    event.reason = "nuc";
-    event.detail = "the image is frozen";
-    pending_.push_back(std::move(event));
+      freeze_.mark(delivery.frame, mapping.address, bytes, taken_at)) {
+    tell("nuc", "the image is frozen");
   }
   const bool counts = layout_.fourcc == V4L2_PIX_FMT_Y16;
   delivery.frame.thermal_is_gray = options_.modality == Modality::thermal && !counts;
   if (counts && layout_.kelvin_per_dn <= 0) {
-    if (const auto stretch = raw_counts_.apply(delivery.frame)) {
-      Delivery event;
-      event.kind = Delivery::Kind::event;
-      event.reason = "raw-counts";
-      event.detail = *stretch;
-      pending_.push_back(std::move(event));
-    }
+    if (const auto stretch = raw_counts_.apply(delivery.frame)) tell("raw-counts", *stretch);
   }
   return delivery;
 }

@@ -6,15 +6,17 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "capture/freeze_watch.hpp"
+#include "capture/clock/clock_map.hpp"
+#include "capture/frame_rhythm.hpp"
 #include "capture/frame_source.hpp"
+#include "capture/freeze_watch.hpp"
 #include "capture/lasting_failure.hpp"
 #include "capture/raw_counts.hpp"
-#include "drivers/v4l2/frame_rhythm.hpp"
 #include "drivers/v4l2/identity.hpp"
 #include "drivers/v4l2/pixels.hpp"
 #include "drivers/v4l2/video_system.hpp"
@@ -35,7 +37,9 @@ struct V4l2Options {
   double kelvin_per_dn = 0;            ///< UVC thermal cameras with linear output, e.g. 0.01
   /// Locked by default: a camera that adapts between stations changes colours between views.
   bool lock_exposure = true, lock_focus = true, lock_white_balance = true;
-  std::optional<int> exposure_100us, focus, white_balance_k;  ///< absent: the value it had
+  /// Absent: the value that the camera's automatic had found after `adapt`.
+  std::optional<int> exposure_100us, focus, white_balance_k;
+  std::chrono::milliseconds adapt{1000};  ///< of streaming on automatic before locking
   std::chrono::milliseconds stall{2000};       ///< silence after which the stream is reopened
   std::chrono::milliseconds reopen_every{250}; ///< while the camera is away
   std::chrono::milliseconds nuc_settle{500};   ///< thermal frames right after a freeze still drift
@@ -47,8 +51,8 @@ struct V4l2Options {
 
 /// A UVC (or other V4L2 streaming) camera. Frames that the driver flags as damaged, or that are
 /// shorter than their format, are rejected deliveries; sequence gaps show as id gaps. When the
-/// camera is unplugged or stalls, everything is closed, and it is looked for under its lasting
-/// name (serial, else USB port) until it is back: events "disconnected", "stalled",
+/// camera is unplugged or stalls, everything is closed, and it is looked for (find_again) until it is
+/// back, with the size and format that it had: events "disconnected", "stalled",
 /// "reopen-failed" (back, but taken, forbidden or without bandwidth), "reconnected" tell, settings are pushed again and verified ("setting-lost" when one is not).
 /// Frozen thermal frames are flagged "nuc" (FreezeWatch).
 /// "late-frame" tells of a pause without a gap in the driver's count (FrameRhythm).
@@ -69,10 +73,15 @@ class V4l2Source final : public FrameSource {
   };
   using Clock = std::chrono::steady_clock;
 
-  Status open_and_stream();
+  Status open_and_stream(const VideoSystem::Node& node);
   Status choose_format();
   Status set_rate();
+  struct Lock;
+  std::vector<Lock> locks() const;
   Status apply_controls();
+  void set_automatic(const Lock& lock);
+  void lock(const Lock& lock, int value);
+  void lock_adapted();
   Status map_buffers();
   void close_device();
   Delivery lose(const std::string& event, const std::string& why);
@@ -80,16 +89,21 @@ class V4l2Source final : public FrameSource {
   std::optional<Delivery> try_reopen();
   Result<Delivery> dequeue();
   Result<Delivery> empty_at_start(v4l2_buffer& buffer);
-  Delivery delivery_of(std::uint32_t index, std::uint32_t bytes, std::uint32_t flags);
+  Delivery delivery_of(std::uint32_t index, std::uint32_t bytes, std::uint32_t flags,
+                       FreezeWatch::Clock::time_point taken_at);
   void watch_rhythm(std::uint64_t id, std::int64_t stamp_ns);
+  void tell(std::string kind, std::string detail);
   std::uint64_t unwrap(std::uint32_t sequence);
   int ioctl(unsigned long request, void* argument);
 
   V4l2Options options_;
   std::shared_ptr<VideoSystem> system_;
-  CameraName wanted_;
+  std::optional<CameraIdentity> identity_;  ///< of the camera that was opened first
+  mutable std::mutex node_mutex_;  ///< describe() comes from other threads while a camera reopens
   VideoSystem::Node node_;
   Layout layout_;
+  std::optional<Layout> first_layout_;      ///< a session keeps its size
+  ClockMap clock_;
   int fd_ = -1;
   bool away_ = false;
   std::vector<Mapping> buffers_;
@@ -101,6 +115,8 @@ class V4l2Source final : public FrameSource {
   int stalls_in_a_row_ = 0, empty_at_start_ = 0;
   LastingFailure failure_;              ///< to reopen
   std::map<std::uint32_t, int> locked_; ///< controls and the values they were locked at
+  bool adapting_ = false;               ///< some are automatic still
+  std::int64_t adapting_since_ns_ = 0;  ///< monotonic; 0: no frame yet
   FrameRhythm rhythm_;
   int late_frames_ = 0;
   Clock::time_point last_late_event_{};

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -41,6 +42,12 @@ std::string first_line(const fs::path& file) {
 
 }  // namespace
 
+std::int64_t VideoSystem::now_ns(clockid_t clock) {
+  timespec t{};
+  clock_gettime(clock, &t);
+  return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
+}
+
 std::shared_ptr<VideoSystem> make_video_system() { return std::make_shared<KernelVideoSystem>(); }
 
 std::vector<VideoSystem::Node> read_nodes(const std::string& sysfs_class_folder) {
@@ -57,6 +64,8 @@ std::vector<VideoSystem::Node> read_nodes(const std::string& sysfs_class_folder)
       const fs::path usb = usb_interface.parent_path();
       node.serial = first_line(usb / "serial");
       node.usb_path = usb.filename().string();
+      const std::string name = usb_interface.filename();  // "1-4:1.0"
+      node.function = name.substr(name.find(':') + 1) + "/" + first_line(entry.path() / "index");
       node.usb_id = first_line(usb / "idVendor") + ":" + first_line(usb / "idProduct");
     }
     nodes.push_back(std::move(node));

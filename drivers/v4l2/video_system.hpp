@@ -5,6 +5,7 @@
 #include <sys/types.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -30,8 +31,11 @@ class VideoSystem {
     std::string usb_path;    ///< the port, e.g. "1-4.2"; stays when the node changes
     std::string usb_id;      ///< "046d:0825"
     std::string product;
+    std::string function;    ///< which of the device's cameras: USB interface and index, "1.0/0"
   };
   virtual std::vector<Node> nodes() = 0;
+  /// Of CLOCK_REALTIME or CLOCK_MONOTONIC.
+  virtual std::int64_t now_ns(clockid_t clock);
 };
 
 /// The kernel's.

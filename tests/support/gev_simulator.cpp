@@ -362,6 +362,7 @@ void GevSimulator::stream_loop() {
       next = std::chrono::steady_clock::now();
       continue;
     }
+    if (restart_ids_.exchange(false)) id = 1;
     SentFrame frame;
     double reorder = 0;
     {

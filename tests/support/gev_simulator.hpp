@@ -53,6 +53,8 @@ class GevSimulator {
   /// As if the power were cut: sockets closed, registers back to their defaults.
   void kill();
   void set_faults(const GevFaults& faults);
+  /// The next frame has id 1, as after a camera's internal restart.
+  void restart_ids() { restart_ids_ = true; }
   /// Steps the device clock.
   void step_clock(double seconds);
 
@@ -96,7 +98,7 @@ class GevSimulator {
   double clock_step_s_ = 0;
   std::map<std::uint16_t, SentFrame> history_;
   std::vector<std::uint16_t> history_order_;
-  std::atomic<bool> running_{false}, acquiring_{false};
+  std::atomic<bool> running_{false}, acquiring_{false}, restart_ids_{false};
   std::atomic<std::uint64_t> frames_sent_{0}, frames_damaged_{0}, packets_dropped_{0}, resends_{0};
   std::atomic<int> nuc_count_{0};
   std::uint64_t number_ = 0;

@@ -49,6 +49,22 @@ TEST(OpenCameras, WhatCannotBeOpenedIsSaidBeforeAnythingRuns) {
   EXPECT_TRUE(cameras.sources.empty());
 }
 
+TEST(OpenCameras, ControlsOfAVideoCameraAreChecked) {
+  Cameras cameras;
+  const auto add = [&](const std::string& settings) {
+    return add_cameras(*parse_camera_spec("v4l2:/dev/video0," + settings), Modality::visible, {},
+                       cameras);
+  };
+  for (const char* bad : {"exposure=fast", "exposure=0", "exposure=0.01", "focus=-1",
+                          "white-balance=1e30", "lock=maybe"}) {
+    const Status status = add(bad);
+    ASSERT_FALSE(status) << bad;
+    EXPECT_EQ(status.error().kind, ErrorKind::usage) << bad;
+  }
+  EXPECT_TRUE(add("exposure=8.5,focus=0,white-balance=4500,lock=no"));
+  EXPECT_EQ(cameras.sources.size(), 1u);
+}
+
 TEST(OpenCameras, ReplayKnowsTheLoopsOfItsStations) {
   Cameras cameras;
   const auto spec =

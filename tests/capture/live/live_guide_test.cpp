@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cmath>
 #include <limits>
 #include <thread>
 
@@ -28,11 +29,15 @@ class LiveGuideTest : public ::testing::Test {
     options.looks_per_second = 100;
   }
 
+  static std::int64_t at_ns(double time_s) {
+    return std::int64_t{1'000'000'000'000'000'000} + std::llround(time_s * 1e9);
+  }
+
   /// Grey level g stands for azimuth 2 g; noise keeps the image sharp.
   FrameRecord record(int level, double time_s, bool blurred = false) {
     Frame frame;
     frame.id = next_id++;
-    frame.host_time_ns = static_cast<std::int64_t>(1e18 + time_s * 1e9);
+    frame.host_time_ns = at_ns(time_s);
     frame.tracking = true;
     frame.pixels = cv::Mat(32, 32, CV_8UC1, cv::Scalar(level));
     for (int i = 0; i < 32; ++i)
@@ -237,6 +242,53 @@ TEST_F(LiveGuideTest, EachPhotoIsAStepOfTheTurntable) {
   EXPECT_TRUE(guide.complete());
 }
 
+TEST_F(LiveGuideTest, PhotosSyncedAtTheEndBelongToTheKeyBeforeThem) {
+  options.plan.loop_elevations_deg = {20, 50};
+  options.turntable_step_deg = 30;
+  LiveGuide guide(*writer, options);
+  for (int i = 0; i < 24; ++i) guide.operator_at_station(at_ns(10 * i));
+  for (int i = 23; i >= 0; --i) {  // the newest first
+    FrameRecord photo = record(15, 10 * i + 3);
+    photo.flags = {"still"};
+    guide.add(photo);
+    EXPECT_NEAR(guide.cameras()[0].position->azimuth_deg, 30 * (i % 12), 1e-9) << i;
+    EXPECT_NEAR(guide.cameras()[0].position->elevation_deg, i < 12 ? 20 : 50, 1e-9) << i;
+  }
+  EXPECT_TRUE(guide.complete());
+}
+
+TEST_F(LiveGuideTest, PhotosWhoseTimeDoesNotTellTheirKeyAreRefused) {
+  options.turntable_step_deg = 30;
+  LiveGuide guide(*writer, options);
+  for (int i = 0; i < 3; ++i) guide.operator_at_station(at_ns(10 * i + 0.5));
+  const auto judged = [&](double time_s, const char* flag) {
+    FrameRecord photo = record(15, time_s);
+    if (time_s < -100) photo.host_time_ns = 0;
+    photo.flags = {"still", flag};
+    guide.add(photo);
+    return guide.cameras()[0].refusal;
+  };
+  EXPECT_EQ(judged(-1000, ""), Refusal::position_unsure);    // no time
+  EXPECT_EQ(judged(25, "file-time"), Refusal::position_unsure);  // when it was copied
+  EXPECT_EQ(judged(-5, ""), Refusal::position_unsure);       // before the first key
+  EXPECT_EQ(judged(10, ""), Refusal::position_unsure);       // some time in the second of a key
+  EXPECT_EQ(guide.done_count(Modality::visible), 0);
+  EXPECT_EQ(judged(10.7, ""), Refusal::none);
+  EXPECT_NEAR(guide.cameras()[0].position->azimuth_deg, 30, 1e-9);
+}
+
+TEST_F(LiveGuideTest, PhotosCopiedAllAtOnceAreAllJudged) {
+  LiveGuide guide(*writer, options, find);
+  for (int i = 1; i <= 12; ++i) {
+    FrameRecord photo = record(15 * i, i);
+    photo.flags = {"still"};
+    guide.add(photo);
+  }
+  guide.finish();
+  EXPECT_EQ(guide.done_count(Modality::visible), 12);
+  EXPECT_TRUE(guide.complete());
+}
+
 TEST_F(LiveGuideTest, ResumedKeySessionGoesOnAfterItsLastStation) {
   options.plan.loop_elevations_deg = {20, 50};
   options.turntable_step_deg = -30;
@@ -273,7 +325,7 @@ class MixedTableTest : public LiveGuideTest {
     options.turntable_step_deg = 30;
   }
   void key(LiveGuide& guide) {
-    guide.operator_at_station();
+    guide.operator_at_station(at_ns(time_s + 1));
     guide.add(record(15, ++time_s));
   }
   void photo(LiveGuide& guide, bool blurred = false) {

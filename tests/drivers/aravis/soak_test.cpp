@@ -43,6 +43,7 @@ void AravisSoak::expect_every_frame(double packet_loss) {
   EXPECT_EQ(tally.frames, count);
   EXPECT_EQ(tally.span(), count);
   EXPECT_EQ(tally.rejected + tally.wrong_bits + tally.not_rising, 0u);
+  EXPECT_NEAR(tally.rate_hz(), 30, 0.3);  // by the camera's stamps
   std::printf("frames %llu, dropped packets %llu, resent %llu, clock residual %.2f ms, drift %.1f ppm\n",
               static_cast<unsigned long long>(tally.frames), static_cast<unsigned long long>(camera.packets_dropped()),
               static_cast<unsigned long long>(camera.resends_answered()), 1000 * source->clock().residual_rms_s(),

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -21,26 +22,32 @@ using testing_clock = std::chrono::steady_clock;
 struct Tally {
   std::uint64_t frames = 0, rejected = 0, wrong_bits = 0, not_rising = 0, first_id = 0, last_id = 0;
   std::vector<std::string> events;
-  std::int64_t last_host_ns = 0;
+  std::int64_t last_host_ns = 0, first_device_ns = 0, last_device_ns = 0;
+  std::uint64_t first_frame_id = 0, last_frame_id = 0;
+  /// Frame numbers less ids, modulo 4001: the same for all frames of a connection.
+  std::optional<std::uint64_t> shift;
+  double rate_hz() const {
+    return 1e9 * static_cast<double>(last_frame_id - first_frame_id) /
+           static_cast<double>(last_device_ns - first_device_ns);
+  }
   bool has(const std::string& event) const {
     return std::find(events.begin(), events.end(), event) != events.end();
   }
   std::uint64_t span() const { return frames + rejected == 0 ? 0 : last_id - first_id + 1; }
 };
 
-/// Does the frame hold, bit by bit, what the simulator sends as some frame? With `exact` its number
-/// must be the id.
-inline bool bits_right(const Frame& frame) {
+/// The number of the simulator's frame that this one holds bit by bit, modulo 4001.
+inline std::optional<std::uint64_t> number_of(const Frame& frame) {
   const auto* p = frame.pixels.ptr<std::uint16_t>();
   // Content repeats with the number modulo 4001; the first pixel tells which it is.
   for (std::uint64_t number = 0; number < 4001; ++number) {
     if (orbitfuse::testing::GevSimulator::pixel(number, 0) != p[0]) continue;
     for (std::size_t i = 0; i < frame.pixels.total(); ++i) {
-      if (p[i] != orbitfuse::testing::GevSimulator::pixel(number, i)) return false;
+      if (p[i] != orbitfuse::testing::GevSimulator::pixel(number, i)) return std::nullopt;
     }
-    return true;
+    return number;
   }
-  return false;
+  return std::nullopt;
 }
 
 /// Delivers until `enough` says so or the time is up.
@@ -59,13 +66,24 @@ inline Tally drain(AravisSource& source, std::chrono::milliseconds limit, const 
     }
     if (delivery->kind == Delivery::Kind::frame) {
       ++tally.frames;
-      if (!bits_right(delivery->frame)) ++tally.wrong_bits;
+      const Frame& frame = delivery->frame;
+      const std::optional<std::uint64_t> number = number_of(frame);
+      const std::uint64_t shift = number ? (*number + 4001 - frame.id % 4001) % 4001 : 0;
+      if (!number || shift != tally.shift.value_or(shift)) ++tally.wrong_bits;
+      if (number) tally.shift = shift;
+      if (tally.first_device_ns == 0) {
+        tally.first_device_ns = frame.device_time_ns;
+        tally.first_frame_id = frame.id;
+      }
+      tally.last_device_ns = frame.device_time_ns;
+      tally.last_frame_id = frame.id;
       if (delivery->frame.host_time_ns <= tally.last_host_ns) ++tally.not_rising;
       tally.last_host_ns = delivery->frame.host_time_ns;
     } else if (delivery->kind == Delivery::Kind::rejected) {
       ++tally.rejected;
     } else if (delivery->kind == Delivery::Kind::event) {
       tally.events.push_back(delivery->reason);
+      if (delivery->reason == "reconnected") tally.shift.reset();
     }
   }
   return tally;

@@ -70,7 +70,7 @@ TEST_F(WatchTest, NewPhotosComeByteForByteAndOldOnesStay) {
   EXPECT_EQ(first.frame.encoded, photo(1));
   EXPECT_EQ(first.frame.id, 0u);
   EXPECT_GT(first.frame.host_time_ns, 0);
-  EXPECT_EQ(first.frame.flags, std::vector<std::string>{"still"});
+  EXPECT_EQ(first.frame.flags, (std::vector<std::string>{"file-time", "still"}));  // no EXIF
   EXPECT_THAT(first.frame.source, HasSubstr("IMG_1.jpg"));
   put("IMG_2.jpg", photo(2));
   EXPECT_EQ(soon(source).frame.id, 1u);

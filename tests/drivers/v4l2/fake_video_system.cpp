@@ -18,7 +18,8 @@ int failure(int error) {
 }  // namespace
 
 int FakeVideoSystem::open(const std::string& path, int) {
-  if (!plugged || path != camera.path) return failure(ENOENT);
+  const bool other = std::any_of(others.begin(), others.end(), [&](const Node& n) { return n.path == path; });
+  if (!other && (!plugged || path != camera.path)) return failure(ENOENT);
   if (open_error) return failure(open_error);
   ++open_descriptors;
   return 7;
@@ -30,7 +31,13 @@ int FakeVideoSystem::close(int) {
 }
 
 std::vector<VideoSystem::Node> FakeVideoSystem::nodes() {
-  return plugged ? std::vector<Node>{camera} : std::vector<Node>{};
+  std::vector<Node> list = others;
+  if (plugged) list.push_back(camera);
+  return list;
+}
+
+std::int64_t FakeVideoSystem::now_ns(clockid_t clock) {
+  return VideoSystem::now_ns(clock) + monotonic_step_ns + (clock == CLOCK_REALTIME ? wall_step_ns : 0);
 }
 
 void* FakeVideoSystem::mmap(std::size_t length, int, off_t offset) {
@@ -104,6 +111,8 @@ int FakeVideoSystem::ioctl(int, unsigned long request, void* argument) {
     case VIDIOC_G_FMT: return 0;
     case VIDIOC_S_FMT: {
       auto& pixels = static_cast<v4l2_format*>(argument)->fmt.pix;
+      asked_width = static_cast<int>(pixels.width);
+      asked_height = static_cast<int>(pixels.height);
       pixels.width = static_cast<std::uint32_t>(width);
       pixels.height = static_cast<std::uint32_t>(height);
       pixels.bytesperline = 0;

@@ -22,12 +22,15 @@ class FakeVideoSystem final : public VideoSystem {
     std::int64_t stamp_us = 0;        ///< of the driver; 0: none
   };
 
-  Node camera{"/dev/video0", "SN42", "1-4", "046d:0825", "Fake Camera"};
+  Node camera{"/dev/video0", "SN42", "1-4", "046d:0825", "Fake Camera", "1.0/0"};
+  std::vector<Node> others;  ///< plugged in all the time, listed before the camera
   std::uint32_t fourcc = 0;
   int width = 8, height = 4;
   bool plugged = true;
   int open_error = 0, stream_on_error = 0, dequeue_error = 0;
   bool exposure_sticks = true;
+  int asked_width = 0, asked_height = 0;
+  std::int64_t wall_step_ns = 0, monotonic_step_ns = 0;  ///< added to the clocks
   std::deque<Shot> shots;
   std::map<std::uint32_t, int> controls;
 
@@ -41,6 +44,7 @@ class FakeVideoSystem final : public VideoSystem {
   int munmap(void* address, std::size_t length) override;
   int poll(pollfd* fds, nfds_t count, int timeout_ms) override;
   std::vector<Node> nodes() override;
+  std::int64_t now_ns(clockid_t clock) override;
 
  private:
   int dequeue(void* argument);

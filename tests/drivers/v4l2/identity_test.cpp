@@ -31,6 +31,45 @@ TEST(V4l2Identity, UnknownCameraListsWhatIsThere) {
   EXPECT_EQ(find_camera(system, *parse_camera_name("serial:SN42"))->path, "/dev/video0");
 }
 
+TEST(V4l2Identity, ACameraIsFoundAgainAndNoOtherIsTakenForIt) {
+  using Node = VideoSystem::Node;
+  FakeVideoSystem system;
+  const auto at = [](Node node, const char* path, const char* port) {
+    node.path = path;
+    node.usb_path = port;
+    return node;
+  };
+  const Node first = system.camera;
+  const CameraIdentity unique = identity_of(system, first);
+  EXPECT_EQ(text(lasting_name(system, first)), "serial:SN42");
+  system.camera = at(first, "/dev/video5", "3-1");
+  EXPECT_EQ(find_again(system, unique)->path, "/dev/video5") << "another port: its serial tells";
+  system.camera.usb_id = "1d6b:0102";
+  EXPECT_FALSE(find_again(system, unique)) << "another model of the same serial";
+  system.camera = first;
+  system.camera.usb_id = "1d6b:0102";
+  EXPECT_FALSE(find_again(system, unique)) << "another camera in its port";
+  system.others = {at(first, "/dev/video0", "2-1")};
+  system.camera = at(first, "/dev/video2", "1-4");
+  EXPECT_EQ(find_again(system, unique)->path, "/dev/video2") << "of two, the one in its port";
+  EXPECT_EQ(text(lasting_name(system, system.camera)), "usb:1-4");
+  const CameraIdentity twin = identity_of(system, system.camera);
+  system.plugged = false;
+  EXPECT_FALSE(find_again(system, twin)) << "its twin is not it";
+  system.plugged = true;
+  EXPECT_EQ(find_again(system, twin)->path, "/dev/video2");
+  // Two cameras in one device.
+  system.camera.function = "1.2/0";
+  system.others = {at(first, "/dev/video0", "1-4")};
+  EXPECT_EQ(find_again(system, identity_of(system, system.camera))->path, "/dev/video2");
+  // No serial: the port alone.
+  system.others.clear();
+  system.camera.serial.clear();
+  const CameraIdentity nameless = identity_of(system, system.camera);
+  system.camera.usb_path = "2-2";
+  EXPECT_FALSE(find_again(system, nameless));
+}
+
 TEST(V4l2Identity, ReadsSysfs) {
   const fs::path root = fs::path(testing::TempDir()) / "orbitfuse_sysfs";
   fs::remove_all(root);
@@ -41,6 +80,7 @@ TEST(V4l2Identity, ReadsSysfs) {
   std::ofstream(usb / "idVendor") << "1d6b\n";
   std::ofstream(usb / "idProduct") << "0102\n";
   std::ofstream(root / "class/video10/name") << "Webcam\n";
+  std::ofstream(root / "class/video10/index") << "0\n";
   fs::create_directory_symlink(usb / "1-4:1.0", root / "class/video10/device");
   fs::create_directories(root / "class/video2");  // no device link: still listed
   const auto nodes = read_nodes(root / "class");
@@ -49,7 +89,7 @@ TEST(V4l2Identity, ReadsSysfs) {
   EXPECT_EQ(nodes[1].serial, "SN9");
   EXPECT_EQ(nodes[1].usb_path, "1-4");
   EXPECT_EQ(nodes[1].usb_id, "1d6b:0102");
-  EXPECT_EQ(text(lasting_name(nodes[1])), "serial:SN9");
+  EXPECT_EQ(nodes[1].function, "1.0/0");
   EXPECT_TRUE(read_nodes(root / "absent").empty());
   fs::remove_all(root);
 }

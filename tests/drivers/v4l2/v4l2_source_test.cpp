@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <linux/videodev2.h>
 
+#include <atomic>
 #include <cerrno>
 #include <thread>
 
@@ -232,6 +233,30 @@ TEST_F(V4l2SourceTest, UnpluggedAndBackUnderAnotherNode) {
   EXPECT_EQ(deliver(source).frame.id, 2u);  // one frame's time at least was lost
 }
 
+/// For the thread sanitizer too: the recorder's writer asks while the capture thread reopens.
+TEST_F(V4l2SourceTest, DescribesItselfToOtherThreadsWhileItReopens) {
+  system->camera.product = std::string(200, 'p');
+  system->camera.serial = std::string(200, 's');
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  std::atomic<bool> over = false;
+  std::thread asking([&] {
+    while (!over) {
+      const DeviceInfo info = source.describe();
+      EXPECT_EQ(info.model, std::string(200, 'p'));
+      EXPECT_EQ(info.serial, std::string(200, 's'));
+    }
+  });
+  for (int i = 0; i < 50; ++i) {
+    system->plugged = false;
+    EXPECT_EQ(deliver(source).reason, "disconnected");
+    system->plugged = true;
+    EXPECT_EQ(deliver(source).reason, "reconnected");
+  }
+  over = true;
+  asking.join();
+}
+
 TEST_F(V4l2SourceTest, StallIsToldAndReopened) {
   V4l2Source source(options, system);
   ASSERT_TRUE(source.start());
@@ -309,19 +334,112 @@ TEST_F(V4l2SourceTest, LocksExposureAndTellsWhenItDoesNotHold) {
   EXPECT_EQ(deliver(source).reason, "setting-lost");
 }
 
-TEST_F(V4l2SourceTest, ValuesLockedFirstAreRestoredAfterReplug) {
-  system->controls = {{V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_APERTURE_PRIORITY},
-                      {V4L2_CID_EXPOSURE_ABSOLUTE, 312}};
+TEST_F(V4l2SourceTest, ControlsAreLockedOnceTheCameraHasAdaptedAndHoldAfterReplug) {
+  const std::map<std::uint32_t, int> switched_on = {
+      {V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL}, {V4L2_CID_EXPOSURE_ABSOLUTE, 10}};
+  system->controls = switched_on;
   V4l2Source source(options, system);
   ASSERT_TRUE(source.start());
+  EXPECT_EQ(system->controls[V4L2_CID_EXPOSURE_AUTO], V4L2_EXPOSURE_APERTURE_PRIORITY);
+  shoot(0);
+  EXPECT_EQ(deliver(source).kind, Kind::frame);
+  system->controls[V4L2_CID_EXPOSURE_ABSOLUTE] = 312;  // its automatic found this
+  EXPECT_EQ(system->controls[V4L2_CID_EXPOSURE_AUTO], V4L2_EXPOSURE_APERTURE_PRIORITY);
+  system->monotonic_step_ns += 1'000'000'000;
+  shoot(1);
+  EXPECT_EQ(deliver(source).kind, Kind::frame);
+  EXPECT_EQ(system->controls[V4L2_CID_EXPOSURE_AUTO], V4L2_EXPOSURE_MANUAL);
+  EXPECT_EQ(system->controls[V4L2_CID_EXPOSURE_ABSOLUTE], 312);
   system->plugged = false;
   EXPECT_EQ(deliver(source).reason, "disconnected");
-  system->controls = {{V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_APERTURE_PRIORITY},
-                      {V4L2_CID_EXPOSURE_ABSOLUTE, 156}};  // switched on again
+  system->controls = switched_on;
   system->plugged = true;
   EXPECT_EQ(deliver(source).reason, "reconnected");
   EXPECT_EQ(system->controls[V4L2_CID_EXPOSURE_AUTO], V4L2_EXPOSURE_MANUAL);
   EXPECT_EQ(system->controls[V4L2_CID_EXPOSURE_ABSOLUTE], 312);
+}
+
+TEST_F(V4l2SourceTest, UnlockedControlsStayAutomatic) {
+  system->controls = {{V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL}, {V4L2_CID_FOCUS_AUTO, 0}};
+  options.lock_exposure = options.lock_focus = options.lock_white_balance = false;
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    shoot(i);
+    EXPECT_EQ(deliver(source).kind, Kind::frame);
+    system->monotonic_step_ns += 2'000'000'000;
+  }
+  EXPECT_EQ(system->controls[V4L2_CID_EXPOSURE_AUTO], V4L2_EXPOSURE_APERTURE_PRIORITY);
+  EXPECT_EQ(system->controls[V4L2_CID_FOCUS_AUTO], 1);
+}
+
+TEST_F(V4l2SourceTest, ComesBackWithItsSizeOrNotAtAll) {
+  options.stall = 10s;
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  shoot(0);
+  deliver(source);
+  system->plugged = false;
+  EXPECT_EQ(deliver(source).reason, "disconnected");
+  system->width = 4;
+  system->plugged = true;
+  const Delivery refused = deliver(source);
+  EXPECT_EQ(refused.reason, "reopen-failed");
+  EXPECT_NE(refused.detail.find("4x4"), std::string::npos) << refused.detail;
+  EXPECT_EQ(system->asked_width, 8);
+  EXPECT_EQ(system->asked_height, 4);
+  system->width = 8;
+  EXPECT_EQ(deliver(source).reason, "reconnected");
+  shoot(0);
+  EXPECT_EQ(deliver(source).frame.pixels.cols, 8);
+}
+
+TEST_F(V4l2SourceTest, ImagesOfNoPixelsAreRefused) {
+  system->width = 0;
+  EXPECT_NE(V4l2Source(options, system).start().error().message().find("0 pixels"), std::string::npos);
+}
+
+TEST_F(V4l2SourceTest, HostTimesRiseWhenTheClockIsSetBackAndTheStepIsTold) {
+  options.stall = 10s;
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  std::int64_t before = 0;
+  const std::int64_t start_us = system->now_ns(CLOCK_MONOTONIC) / 1000;
+  bool told = false;
+  for (std::uint32_t i = 0; i < 20; ++i) {
+    if (i == 10) system->wall_step_ns = -5'000'000'000;
+    system->monotonic_step_ns += 33'000'000;
+    shoot(i, V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC);
+    system->shots.back().stamp_us = start_us + 33'000 * i;
+    Delivery delivery = deliver(source);
+    while (delivery.kind == Kind::event) {
+      told |= delivery.reason == "clock";
+      delivery = deliver(source);
+    }
+    EXPECT_GT(delivery.frame.host_time_ns, before) << i;
+    before = delivery.frame.host_time_ns;
+  }
+  EXPECT_TRUE(told);
+}
+
+/// A 9 Hz sensor at 60 Hz, whose frames lie waiting while the host is busy.
+TEST_F(V4l2SourceTest, ABusyHostIsNoShutter) {
+  options.modality = Modality::thermal;
+  options.stall = 10s;
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  int flagged = 0;
+  for (std::uint32_t i = 0; i < 60; ++i) {
+    shoot(i, V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC);
+    system->shots.back().stamp_us = 1'000'000 + 16'667 * i;
+    system->shots.back().bytes.assign(32, static_cast<std::uint8_t>(i * 9 / 60));
+    if (i > 50) system->monotonic_step_ns += 300'000'000;
+    if (i == 55) std::this_thread::sleep_for(300ms);
+    Delivery delivery = deliver(source);
+    while (delivery.kind == Kind::event) delivery = deliver(source);
+    if (i > 50) flagged += !delivery.frame.flags.empty();
+  }
+  EXPECT_EQ(flagged, 0);
 }
 
 TEST_F(V4l2SourceTest, OptionsAreValidatedByName) {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-namespace orbitfuse::v4l2 {
+namespace orbitfuse {
 
 /// The time between a camera's frames. It tells how many an outage cost, and of frames that never
 /// came although the driver's count has no hole: a UVC frame that is lost whole turns no frame bit.
@@ -28,4 +28,4 @@ class FrameRhythm {
   int known_ = 0;          ///< intervals so far
 };
 
-}  // namespace orbitfuse::v4l2
+}  // namespace orbitfuse

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "drivers/v4l2/frame_rhythm.hpp"
+#include "capture/frame_rhythm.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-namespace orbitfuse::v4l2 {
+namespace orbitfuse {
 
 namespace {
 constexpr int settled = 8;       // the first intervals of a stream are irregular
@@ -34,4 +34,4 @@ std::uint64_t FrameRhythm::frames_in(double seconds) const {
   return static_cast<std::uint64_t>(std::llround(std::clamp(seconds / interval_s_, 1.0, 1e9)));
 }
 
-}  // namespace orbitfuse::v4l2
+}  // namespace orbitfuse

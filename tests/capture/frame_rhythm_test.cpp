@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "drivers/v4l2/frame_rhythm.hpp"
+#include "capture/frame_rhythm.hpp"
 
 #include <gtest/gtest.h>
 
-namespace orbitfuse::v4l2 {
+namespace orbitfuse {
 namespace {
 
 constexpr std::int64_t ms = 1'000'000;
@@ -77,4 +77,4 @@ TEST(FrameRhythm, StampsThatDoNotRiseSayNothing) {
 }
 
 }  // namespace
-}  // namespace orbitfuse::v4l2
+}  // namespace orbitfuse
