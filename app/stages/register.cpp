@@ -34,13 +34,18 @@ Result<PointCloud> cloud_of(const StageContext& context, const char* stage) {
   return read_ply(file);
 }
 
-/// The thermal images against renders of the visible field: closer than the clouds' blur allows.
-Result<SimilarityRefinement> refined_by_images(const StageContext& context,
-                                               const SessionInput& input,
-                                               const Similarity3d& visible_from_thermal) {
-  ORBITFUSE_ASSIGN(const Reconstruction thermal,
+/// The thermal images, posed in their own world, and the visible field whose renders must explain
+/// them.
+struct ImageEvidence {
+  Reconstruction thermal;
+  std::vector<cv::Mat> images;
+  nerf::Field field;
+};
+
+Result<ImageEvidence> load_evidence(const StageContext& context, const SessionInput& input) {
+  ORBITFUSE_ASSIGN(Reconstruction thermal,
                    load_poses(context.of("poses_thermal"), Modality::thermal));
-  ORBITFUSE_ASSIGN(const nerf::Field field,
+  ORBITFUSE_ASSIGN(nerf::Field field,
                    nerf::Field::load(context.of("train_visible") / field_file));
   std::vector<cv::Mat> images;
   for (const PosedView& view : thermal.views) {
@@ -48,8 +53,7 @@ Result<SimilarityRefinement> refined_by_images(const StageContext& context,
                                                 !input.has_temperatures()));
     images.push_back(std::move(image));
   }
-  return refine_similarity(edge_renderer(field, context.progress), images, thermal.views,
-                           visible_from_thermal, similarity_rounds(), context.progress);
+  return ImageEvidence{std::move(thermal), std::move(images), std::move(field)};
 }
 
 /// Two frames of their own: the clouds tell how they relate.
@@ -59,10 +63,22 @@ Result<StageOutput> register_by_clouds(const StageContext& context, const Sessio
   ORBITFUSE_ASSIGN(const PointCloud visible, cloud_of(context, "train_visible"));
   RegistrationOptions options;
   options.seed = static_cast<std::uint32_t>(seed);
+  ORBITFUSE_ASSIGN(const ImageEvidence seen, load_evidence(context, input));
+  const SceneRenderer renderer = edge_renderer(seen.field, context.progress);
+  Status views_failed;
+  const ViewScore explained = [&](const Similarity3d& visible_from_thermal) {
+    const auto support = similarity_support(renderer, seen.images, seen.thermal.views,
+                                            visible_from_thermal, context.progress);
+    if (!support) views_failed = tl::unexpected(support.error());
+    return support ? *support : 0.0;
+  };
   ORBITFUSE_ASSIGN(const RegistrationReport report,
-                   register_clouds(thermal, visible, options, context.progress));
+                   register_clouds(thermal, visible, options, context.progress, explained));
+  ORBITFUSE_TRY(views_failed);
   ORBITFUSE_ASSIGN(const SimilarityRefinement refined,
-                   refined_by_images(context, input, report.target_from_source));
+                   refine_similarity(renderer, seen.images, seen.thermal.views,
+                                     report.target_from_source, similarity_rounds(),
+                                     context.progress));
   ORBITFUSE_TRY(save_registration(
       context, refined.visible_from_thermal,
       refined.improved ? "point clouds, then edges of the thermal images" : "point clouds"));

@@ -24,6 +24,8 @@ json to_json(const RegistrationReport& r) {
           {"spread_rotation_deg", r.spread_rotation_deg},
           {"spread_scale_percent", r.spread_scale_percent},
           {"spread_translation_percent", r.spread_translation_percent},
+          {"decided_by_views", r.decided_by_views},
+          {"view_score", r.view_score},
           {"ambiguous", r.ambiguous},
           {"ambiguity", r.ambiguity},
           {"alternatives", alternatives},

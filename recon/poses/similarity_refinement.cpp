@@ -13,6 +13,7 @@
 #include "core/parallel.hpp"
 #include "recon/poses/edge_field.hpp"
 #include "recon/poses/patch_matching.hpp"
+#include "recon/poses/whole_view.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -148,6 +149,13 @@ Result<Round> look(const SceneRenderer& visible, const std::vector<cv::Mat>& ima
   return seen;
 }
 
+Status one_image_each(const std::vector<cv::Mat>& images, const std::vector<PosedView>& thermal) {
+  if (images.size() == thermal.size()) return {};
+  return fail(ErrorKind::input, "similarity refinement",
+              fmt::format("{} images for {} views", images.size(), thermal.size()),
+              "give one image a view");
+}
+
 }  // namespace
 
 Result<SimilarityRefinement> refine_similarity(const SceneRenderer& visible,
@@ -156,10 +164,7 @@ Result<SimilarityRefinement> refine_similarity(const SceneRenderer& visible,
                                                const Similarity3d& visible_from_thermal,
                                                const std::vector<RenderRound>& rounds,
                                                const Progress& progress) {
-  if (images.size() != thermal.size())
-    return fail(ErrorKind::input, "similarity refinement",
-                fmt::format("{} images for {} views", images.size(), thermal.size()),
-                "give one image a view");
+  ORBITFUSE_TRY(one_image_each(images, thermal));
   SimilarityRefinement result;
   result.visible_from_thermal = visible_from_thermal;
   if (thermal.empty()) return result;
@@ -183,6 +188,35 @@ Result<SimilarityRefinement> refine_similarity(const SceneRenderer& visible,
                     result.matches_after > result.matches_before;
   if (result.improved) result.visible_from_thermal = current;
   return result;
+}
+
+Result<double> similarity_support(const SceneRenderer& visible, const std::vector<cv::Mat>& images,
+                                  const std::vector<PosedView>& thermal,
+                                  const Similarity3d& visible_from_thermal,
+                                  const Progress& progress) {
+  constexpr int kWidth = 160, kReach = 16;
+  constexpr std::size_t kMostViews = 8;
+  ORBITFUSE_TRY(one_image_each(images, thermal));
+  if (thermal.empty()) return 0.0;
+  const std::size_t count = std::min(kMostViews, thermal.size());
+  double sum = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    ORBITFUSE_TRY(progress.check("register"));
+    const PosedView& view = thermal[k * thermal.size() / count];
+    const int width = std::min(kWidth, view.camera.width);
+    const Camera camera =
+        view.camera.scaled_to(width, std::max(1, view.camera.height * width / view.camera.width))
+            .without_distortion();
+    ORBITFUSE_ASSIGN(const SceneView seen,
+                     visible(camera, rebase(view.cam_from_world, visible_from_thermal)));
+    cv::Mat reduced;
+    cv::resize(images[k * thermal.size() / count], reduced, {camera.width, camera.height}, 0, 0,
+               cv::INTER_AREA);
+    const WholeMatch match =
+        match_whole(rendered_edges(seen), orientation_field(reduced, 1.0), kReach);
+    sum += std::max(0.0, match.correlation);
+  }
+  return sum / static_cast<double>(count);
 }
 
 }  // namespace orbitfuse

@@ -28,6 +28,15 @@ Result<SimilarityRefinement> refine_similarity(const SceneRenderer& visible,
                                                const std::vector<RenderRound>& rounds,
                                                const Progress& progress);
 
+/// How well the visible scene, seen from where the similarity puts the thermal cameras, explains
+/// their images: the mean, over at most eight views, of the normalised correlation of all edges at
+/// its best shift, 0..1. Tells placements apart that the clouds cannot (flips); their last degrees
+/// are refine_similarity's. Errors as there.
+Result<double> similarity_support(const SceneRenderer& visible, const std::vector<cv::Mat>& images,
+                                  const std::vector<PosedView>& thermal,
+                                  const Similarity3d& visible_from_thermal,
+                                  const Progress& progress);
+
 /// From several degrees and a tenth of the distance off.
 inline std::vector<RenderRound> similarity_rounds() {
   return {{160, 30, 14, 22}, {160, 20, 12, 18}, {160, 8, 8, 12}, {256, 8, 8, 12}, {320, 6, 7, 12}};

@@ -46,6 +46,16 @@ void measure_spread(const Search& search, const Refined& best, RegistrationRepor
   }
 }
 
+/// Whether views prefer the chosen of the first `rivals` by a tenth of its score or more.
+bool stands_out(const std::vector<RegistrationAlternative>& judged, std::size_t chosen,
+                std::size_t rivals) {
+  const double best = judged[chosen].view_score;
+  for (std::size_t i = 0; i < rivals; ++i) {
+    if (i != chosen && !(judged[i].view_score < best - 0.1 * std::abs(best))) return false;
+  }
+  return true;
+}
+
 void add_words(std::string& text, const std::string& words) {
   if (!text.empty()) text += "; ";
   text += words;
@@ -129,12 +139,15 @@ Result<RegistrationReport> register_clouds(const PointCloud& source_cloud,
   }
   RegistrationReport report = reported(search, found.ranked[chosen].target_from_source);
   report.initialiser = judged[chosen].origin;
+  report.view_score = judged[chosen].view_score;
+  report.decided_by_views = view_score && rivals > 1 && stands_out(judged, chosen, rivals);
   report.skips = std::move(found.skips);
-  if (rivals > 1 && !view_score) {
+  if (rivals > 1 && !report.decided_by_views) {
     report.ambiguous = true;
     add_words(report.ambiguity,
-              fmt::format("{} placements have {:.0f} % of the best one's evidence or more", rivals,
-                          100 * options.ambiguity_ratio));
+              fmt::format("{} placements have {:.0f} % of the best one's evidence or more{}", rivals,
+                          100 * options.ambiguity_ratio,
+                          view_score ? ", and views of both do not decide between them" : ""));
   }
   judged.erase(judged.begin() + static_cast<std::ptrdiff_t>(chosen));
   report.alternatives = std::move(judged);

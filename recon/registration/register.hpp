@@ -51,6 +51,8 @@ struct RegistrationReport {
   double rmse_percent_of_diameter = 0;
   double overlap_source = 0, overlap_target = 0;  ///< share of each cloud near the other
   double spread_rotation_deg = 0, spread_scale_percent = 0, spread_translation_percent = 0;
+  bool decided_by_views = false;  ///< between placements that geometry leaves open
+  double view_score = 0;          ///< of the result, where views were asked
   bool ambiguous = false;
   std::string ambiguity;                              ///< what geometry leaves open, in words
   std::vector<RegistrationAlternative> alternatives;  ///< best first, the result not included
@@ -61,7 +63,9 @@ struct RegistrationReport {
   std::string brief() const;
 };
 
-/// Judges a candidate by rendered views of both fields; higher is better. Decides flips.
+/// Judges a placement by how views of one field explain those of the other; higher is better, 0 is
+/// no agreement. Asked only where geometry leaves more than one placement; a best score that does
+/// not lead by a tenth decides nothing, and the result stays ambiguous.
 using ViewScore = std::function<double(const Similarity3d& target_from_source)>;
 
 /// Errors (input): fewer than 20 finite points, all points in one place, on one line or plane.

@@ -57,6 +57,38 @@ TEST(SimilarityRefinement, WhatIsRightStaysAndNothingToSeeIsRefused) {
   EXPECT_EQ(refined->visible_from_thermal.matrix(), orbit.visible_from_thermal.matrix());
 }
 
+TEST(SimilaritySupport, TellsHalfTurnsFromTheTruth) {
+  const ThermalOrbit orbit;
+  const auto support = [&](const Similarity3d& s) {
+    const auto value =
+        similarity_support(testing_orbit::box_renderer(), orbit.images, orbit.views, s, {});
+    EXPECT_TRUE(value);
+    return value.value_or(-1);
+  };
+  // As far off as clouds leave it, and the box stood on its other end.
+  const Similarity3d off{
+      1.01,
+      Eigen::Quaterniond(Eigen::AngleAxisd(0.03, Eigen::Vector3d(0, 1, 2).normalized())),
+      {0.01, -0.01, 0.01}};
+  const double right = support(off * orbit.visible_from_thermal);
+  for (const Eigen::Vector3d& axis :
+       {Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ()}) {
+    const Similarity3d half_turn{1, Eigen::Quaterniond(Eigen::AngleAxisd(EIGEN_PI, axis)), {0, 0, 0}};
+    EXPECT_LT(support(off * half_turn * orbit.visible_from_thermal), 0.9 * right)
+        << axis.transpose();
+  }
+}
+
+TEST(SimilaritySupport, NothingToSeeSupportsNothing) {
+  ThermalOrbit orbit;
+  for (cv::Mat& image : orbit.images) image = cv::Scalar(295.15);
+  const auto blank = similarity_support(testing_orbit::box_renderer(), orbit.images, orbit.views,
+                                        orbit.visible_from_thermal, {});
+  ASSERT_TRUE(blank);
+  EXPECT_EQ(*blank, 0);
+  EXPECT_FALSE(similarity_support(testing_orbit::box_renderer(), {}, orbit.views, {}, {}));
+}
+
 TEST(SimilarityRefinement, CountsThatDifferAreAnInputError) {
   const ThermalOrbit orbit;
   const auto refined = refine_similarity(testing_orbit::box_renderer(), {}, orbit.views, {},

@@ -105,6 +105,27 @@ TEST(Register, ViewsDecideBetweenPlacementsThatGeometryCannot) {
   const auto decided = register_clouds(source, target, {}, {}, views);
   ASSERT_TRUE(decided);
   EXPECT_LT(rotation_angle_deg(decided->target_from_source.rotation, wanted.rotation), 2);
+  EXPECT_TRUE(decided->decided_by_views);
+  EXPECT_FALSE(decided->ambiguous) << decided->ambiguity;
+  // Views that see no difference decide nothing.
+  const auto open =
+      register_clouds(source, target, {}, {}, [](const Similarity3d&) { return 0.5; });
+  ASSERT_TRUE(open);
+  EXPECT_FALSE(open->decided_by_views);
+  EXPECT_TRUE(open->ambiguous);
+}
+
+TEST(Register, ViewsAreNotAskedWhereGeometryDecides) {
+  const bench::CloudPair pair = indoor_pair(5);
+  int asked = 0;
+  const auto report = register_clouds(pair.source, pair.target, {}, {}, [&](const Similarity3d&) {
+    ++asked;
+    return 1.0;
+  });
+  ASSERT_TRUE(report);
+  EXPECT_TRUE(is_right(report->target_from_source, pair.target_from_source));
+  EXPECT_EQ(asked, 0);
+  EXPECT_FALSE(report->decided_by_views);
 }
 
 TEST(Register, RefinementAloneStaysAtTheTruth) {
