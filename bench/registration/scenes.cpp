@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <numbers>
+#include <numeric>
 
 namespace orbitfuse::bench {
 namespace {
@@ -151,7 +152,20 @@ void add_floaters(Positions& points, double share, double diameter, std::mt19937
   }
 }
 
-void add_outliers(Positions& points, double share, std::mt19937& random) {
+/// Both shuffled alike.
+void shuffle_together(Positions& points, Positions& companions, std::mt19937& random) {
+  std::vector<std::size_t> order(points.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::shuffle(order.begin(), order.end(), random);
+  const Positions old_points = points, old_companions = companions;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    points[i] = old_points[order[i]];
+    companions[i] = old_companions[order[i]];
+  }
+}
+
+/// `truth` holds where the points come from.
+void add_outliers(Positions& points, Positions& truth, double share, std::mt19937& random) {
   Vector3d low = points[0], high = points[0];
   for (const auto& p : points) {
     low = low.cwiseMin(p);
@@ -160,10 +174,10 @@ void add_outliers(Positions& points, double share, std::mt19937& random) {
   const Vector3d center = 0.5 * (low + high), half = 0.6 * (high - low);
   std::uniform_real_distribution<double> unit(-1, 1);
   const auto count = static_cast<int>(share * static_cast<double>(points.size()));
-  std::shuffle(points.begin(), points.end(), random);
-  for (int i = 0; i < count; ++i) {
-    points[static_cast<std::size_t>(i)] =
-        center + half.cwiseProduct(Vector3d(unit(random), unit(random), unit(random)));
+  shuffle_together(points, truth, random);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+    points[i] = center + half.cwiseProduct(Vector3d(unit(random), unit(random), unit(random)));
+    truth[i].setConstant(NAN);
   }
 }
 
@@ -236,6 +250,20 @@ double Surface::diameter() const {
   return (high - low).norm();
 }
 
+double Surface::radius() const {
+  Vector3d center = Vector3d::Zero();
+  for (std::size_t i = 0; i < triangles_.size(); ++i) {
+    const double area = area_until_[i] - (i > 0 ? area_until_[i - 1] : 0);
+    center +=
+        area / area_until_.back() * (triangles_[i][0] + triangles_[i][1] + triangles_[i][2]) / 3;
+  }
+  double radius = 0;
+  for (const auto& t : triangles_) {
+    for (const auto& p : t) radius = std::max(radius, (p - center).norm());
+  }
+  return radius;
+}
+
 std::optional<Surface> surface(const std::string& name) {
   if (name == "indoor") return indoor();
   if (name == "car") return car();
@@ -298,16 +326,19 @@ CloudPair make_pair(const Surface& surface, const Level& level, std::uint32_t se
     keep_lowest(target, -axis, kept);
   }
   if (level.holes > 0) punch_holes(source, level.holes, diameter, random);
+  Positions source_truth = source, target_truth = target;
   if (level.warp > 0) warp(source, level.warp, diameter, random);
   if (level.floaters > 0) add_floaters(source, level.floaters, diameter, random);
+  source_truth.resize(source.size(), Vector3d::Constant(NAN));
   std::normal_distribution<double> normal;
-  for (Positions* cloud : {&source, &target}) {
-    if (level.outliers > 0) add_outliers(*cloud, level.outliers, random);
+  for (const auto& [cloud, origin] :
+       {std::pair(&source, &source_truth), std::pair(&target, &target_truth)}) {
+    if (level.outliers > 0) add_outliers(*cloud, *origin, level.outliers, random);
     if (level.noise > 0) {
       for (auto& p : *cloud)
         p += level.noise * diameter * Vector3d(normal(random), normal(random), normal(random));
     }
-    std::shuffle(cloud->begin(), cloud->end(), random);
+    shuffle_together(*cloud, *origin, random);
   }
   std::uniform_real_distribution<double> unit(-1, 1);
   Similarity3d& truth = pair.target_from_source;
@@ -317,6 +348,8 @@ CloudPair make_pair(const Surface& surface, const Level& level, std::uint32_t se
           .normalized();
   truth.translation = 3 * diameter * Vector3d(unit(random), unit(random), unit(random));
   for (auto& p : target) p = truth * p;
+  for (auto& p : source_truth) p = truth * p;
+  pair.source_truth = std::move(source_truth);
   pair.diameter = truth.scale * diameter;
   pair.source.positions = std::move(source);
   pair.target.positions = std::move(target);

@@ -24,7 +24,8 @@ class Surface {
   void box(const Eigen::Vector3d& low, const Eigen::Vector3d& high);
   void cylinder(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double radius);
   Positions sample(int count, std::mt19937& random) const;
-  double diameter() const;
+  double diameter() const;  ///< of the bounding box
+  double radius() const;    ///< largest distance of a vertex from the centre of the area
   bool empty() const { return triangles_.empty(); }
 
  private:
@@ -53,7 +54,10 @@ struct CloudPair {
   PointCloud source, target;
   Similarity3d target_from_source;
   double diameter = 1;  ///< of the target's surface, target units
-  Positions check;      ///< undamaged surface points in the source frame
+  /// Where each source point truly lies, damage undone, target frame; NaN for points off any
+  /// surface (floaters, outliers).
+  Positions source_truth;
+  Positions check;  ///< undamaged surface points in the source frame
 };
 CloudPair make_pair(const Surface& surface, const Level& level, std::uint32_t seed);
 

@@ -221,6 +221,7 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
     step.why += ": doubtful, check the start angle in the rendered pairs";
   std::vector<PosedView> views;
   std::vector<double> support = best.support;
+  std::vector<std::string> doubts(support.size());
   AlignmentReport report = best.report;
   if (visible.renderer) {
     tell(3, "alignment with renders");
@@ -233,10 +234,12 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
                                   rendered, progress));
     report.focal_px = rendered.focal_px;
     support.resize(rendered.views.size());
+    doubts.resize(rendered.views.size());
     report.residual_px.resize(rendered.views.size());
     for (std::size_t i = 0; i < rendered.views.size(); ++i) {
       views.push_back(rendered.views[i].view);
       support[i] = rendered.views[i].agreement;
+      doubts[i] = rendered.views[i].doubt;
       report.residual_px[i] = rendered.views[i].median_px;
     }
     step.rung = "cross-modal, orbit prior and renders";
@@ -260,6 +263,10 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
           {views[i].name, fmt::format("its edges agree with the visible scene at {:.3f}, the "
                                       "median view at {:.3f}",
                                       support[i], typical)});
+      continue;
+    }
+    if (!doubts[i].empty()) {
+      result.dropped.push_back({views[i].name, doubts[i]});
       continue;
     }
     // Lines alone can pull a view astray; against renders its agreement has been judged already.

@@ -9,6 +9,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "recon/poses/painted_scene.hpp"
 #include "recon/poses/whole_view.hpp"
 #include "recon/poses/world_frame.hpp"
 
@@ -24,6 +25,9 @@ constexpr double clearly_better = 1.02;
 constexpr double doubtful_share = 0.85, nudge_deg = 2;
 /// Views with less than this share are searched as wholes.
 constexpr double lost_share = 0.6;
+/// Of their loop's usual support among temperatures. Right places on `container` had 0.7 or more,
+/// wrong ones 0.4 at most.
+constexpr double found_share = 0.5;
 
 /// Where the stations of the orbit lie, as the better half of its aligned views says.
 struct LoopModel {
@@ -149,11 +153,16 @@ PosedView predicted(const OrbitViews& orbit, const Fit& alignment, const LoopMod
   return view;
 }
 
-bool same_place(const OrbitViews& orbit, const Rigid3d& a, const Rigid3d& b) {
+/// The larger of how far two poses lie apart as seen from the orbit's centre, and their turn.
+double apart_deg(const OrbitViews& orbit, const Rigid3d& a, const Rigid3d& b) {
   const Eigen::Vector3d ca = camera_center(rebase(a, orbit.canonical_from_world));
   const Eigen::Vector3d cb = camera_center(rebase(b, orbit.canonical_from_world));
-  return (ca - cb).norm() < same_pose_deg * degree * ca.norm() &&
-         rotation_angle_deg(a.rotation, b.rotation) < same_pose_deg;
+  return std::max((ca - cb).norm() / ca.norm() / degree,
+                  rotation_angle_deg(a.rotation, b.rotation));
+}
+
+bool same_place(const OrbitViews& orbit, const Rigid3d& a, const Rigid3d& b) {
+  return apart_deg(orbit, a, b) < same_pose_deg;
 }
 
 /// Takes what is supported better; returns those views.
@@ -236,6 +245,94 @@ Status nudge(const Refinery& refinery, std::size_t first, Fit& alignment) {
   return {};
 }
 
+/// Why the place found among the temperatures of settled views doesn't confirm the view's; empty if
+/// it does.
+std::string doubt(const OrbitViews& orbit, const RenderAlignedView& view,
+                  const RenderAlignedView& second, double usual_support) {
+  if (!(second.support() > found_share * usual_support))
+    return "its edges are not found among the stations' temperatures";
+  const double apart = apart_deg(orbit, view.view.cam_from_world, second.view.cam_from_world);
+  if (apart < same_pose_deg) return {};
+  return fmt::format("the visible scene and the stations' temperatures place it {:.1f} deg apart",
+                     apart);
+}
+
+using Usual = std::map<int, double>;  // support by loop: one sees more of the scene than another
+
+Usual usual_support(const OrbitViews& orbit, const std::vector<std::size_t>& asked,
+                    const Fit& found) {
+  std::map<int, std::vector<double>> supports;
+  for (std::size_t c = 0; c < asked.size(); ++c)
+    supports[orbit.stations[asked[c]].loop].push_back(found.views[c].support());
+  Usual usual;
+  for (const auto& [loop, values] : supports) usual[loop] = median_of(values);
+  return usual;
+}
+
+/// Views whose place isn't confirmed by the temperatures of the settled ones. Each is given the
+/// place that both agree on from there, if there is one. `usual` is filled where empty.
+Result<std::vector<std::size_t>> unconfirmed(const Refinery& visible, const Refinery& painted,
+                                             const std::vector<std::size_t>& asked, Usual& usual,
+                                             Fit& alignment) {
+  const OrbitViews& orbit = visible.orbit;
+  std::vector<PosedView> starts, places;
+  for (const std::size_t i : asked) starts.push_back(alignment.views[i].view);
+  ORBITFUSE_ASSIGN(const Fit second, painted.restart(asked, starts, judging_rounds()));
+  if (usual.empty()) usual = usual_support(orbit, asked, second);
+  const auto doubt_of = [&](std::size_t view, const RenderAlignedView& by_form,
+                            const RenderAlignedView& by_heat) {
+    return doubt(orbit, by_form, by_heat, usual.at(orbit.stations[view].loop));
+  };
+  std::vector<std::size_t> doubtful, still;
+  std::vector<RenderAlignedView> seconds;
+  for (std::size_t c = 0; c < asked.size(); ++c) {
+    RenderAlignedView& view = alignment.views[asked[c]];
+    view.doubt = doubt_of(asked[c], view, second.views[c]);
+    if (view.doubt.empty()) continue;
+    doubtful.push_back(asked[c]);
+    seconds.push_back(second.views[c]);
+    places.push_back(second.views[c].view);
+  }
+  ORBITFUSE_ASSIGN(const Fit first, visible.restart(doubtful, places, fine_rounds()));
+  for (std::size_t c = 0; c < doubtful.size(); ++c) {
+    if (doubt_of(doubtful[c], first.views[c], seconds[c]).empty())
+      alignment.views[doubtful[c]] = first.views[c];
+    else
+      still.push_back(doubtful[c]);
+  }
+  return still;
+}
+
+/// Every added view confirmed by what the settled ones, before `first_new`, measured; those that
+/// are not are searched as wholes in it.
+Status confirm(const Refinery& refinery, std::size_t first_new, Fit& alignment) {
+  const OrbitViews& orbit = refinery.orbit;
+  std::vector<PosedView> settled;
+  std::vector<std::size_t> added;
+  for (std::size_t i = 0; i < first_new; ++i) settled.push_back(alignment.views[i].view);
+  for (std::size_t i = first_new; i < orbit.images.size(); ++i) added.push_back(i);
+  ORBITFUSE_ASSIGN(const SceneRenderer renderer,
+                   painted_scene(refinery.renderer, settled, orbit.images, {}, refinery.progress));
+  const Refinery painted{renderer, orbit, refinery.progress};
+  Usual usual;
+  ORBITFUSE_ASSIGN(std::vector<std::size_t> lost,
+                   unconfirmed(refinery, painted, added, usual, alignment));
+  const LoopModel model = loop_model(orbit, alignment);
+  std::vector<PosedView> starts;
+  for (const std::size_t i : lost) {
+    starts.push_back(predicted(orbit, alignment, model, i));
+    ORBITFUSE_TRY(climb(renderer, orbit.canonical_from_world, orbit.images[i], starts.back(), {},
+                        refinery.progress));
+  }
+  ORBITFUSE_ASSIGN(const Fit searched, refinery.restart(lost, starts, fine_rounds()));
+  for (std::size_t c = 0; c < lost.size(); ++c) alignment.views[lost[c]] = searched.views[c];
+  ORBITFUSE_ASSIGN(lost, unconfirmed(refinery, painted, lost, usual, alignment));
+  refinery.progress.report(
+      {"poses.thermal", 3, 4, -1,
+       fmt::format("{} of {} added views are not confirmed", lost.size(), added.size())});
+  return {};
+}
+
 }  // namespace
 
 Status refine_orbit(const SceneRenderer& renderer, const OrbitViews& orbit,
@@ -286,7 +383,8 @@ Status add_views(const SceneRenderer& renderer, const OrbitViews& orbit, std::si
   }
   ORBITFUSE_ASSIGN(const Fit searched, refinery.restart(lost, starts, fine_rounds()));
   keep_better(lost, searched, alignment);
-  return nudge(refinery, first_new, alignment);
+  ORBITFUSE_TRY(nudge(refinery, first_new, alignment));
+  return confirm(refinery, first_new, alignment);
 }
 
 }  // namespace orbitfuse

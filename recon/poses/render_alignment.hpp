@@ -2,6 +2,7 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <string>
 #include <vector>
 
 #include "core/progress.hpp"
@@ -40,6 +41,8 @@ struct RenderAlignedView {
       0;            ///< mean agreement of rendered edges with the image's, after the last round
   int matches = 0;  ///< patches within 2 px of the bundle's answer
   double median_px = 0;  ///< their residual, in pixels of the last round
+  std::string
+      doubt;  ///< why a second opinion doesn't confirm it; empty: it does, or none was sought
   /// Compares places of one view. Agreement alone favours a place with few edges, the number of
   /// patches alone one with many.
   double support() const { return agreement * matches; }

@@ -14,6 +14,8 @@ struct Candidate {
   double score = 0;      ///< what ranks it: coarse agreement in the search, evidence at the end
   double agreement = 0;  ///< at the end: Agreement::score with the report's bounds
   std::string origin;
+  double residual_sigma = 0;  ///< of its full refinement; 0: not had yet, or too few pairs
+  bool refined = false;       ///< fully: needs no other
 };
 using Candidates = std::vector<Candidate>;
 

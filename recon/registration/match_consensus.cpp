@@ -117,7 +117,7 @@ Candidates consensus_candidates(const FeaturePoints& source, const FeaturePoints
     if (p.size() < 4) continue;
     const Result<RobustSimilarity> fit = robust_umeyama(p, q, 0.12);
     if (!fit) continue;
-    candidates.push_back({fit->target_from_source, 0, 0, "features"});
+    candidates.push_back({fit->target_from_source, 0, 0, "features", 0, false});
   }
   return candidates;
 }

@@ -17,16 +17,17 @@ void NearestGrid::build(const std::vector<Eigen::Vector3d>& points, int cells_pe
   side_ = cells_per_side;
   inverse_cell_ = side_ / extent;
   const auto n = static_cast<std::size_t>(side_);
-  index_.assign(n * n * n, -1);
+  constexpr std::uint16_t kNone = 0xFFFF;
+  index_.assign(n * n * n, kNone);
   std::vector<float> best(index_.size(), std::numeric_limits<float>::infinity());
   std::vector<Eigen::Vector3f> cell_points;
   cell_points.reserve(points.size());
   for (const auto& p : points) cell_points.push_back(((p - origin_) * inverse_cell_).cast<float>());
 
-  const auto offer = [&](int x, int y, int z, std::int32_t candidate) {
-    if (candidate < 0) return;
+  const auto offer = [&](int x, int y, int z, std::uint16_t candidate) {
+    if (candidate == kNone) return;
     const auto at = static_cast<std::size_t>((z * side_ + y) * side_ + x);
-    const Eigen::Vector3f& p = cell_points[static_cast<std::size_t>(candidate)];
+    const Eigen::Vector3f& p = cell_points[candidate];
     const float dx = p.x() - (static_cast<float>(x) + 0.5f),
                 dy = p.y() - (static_cast<float>(y) + 0.5f),
                 dz = p.z() - (static_cast<float>(z) + 0.5f);
@@ -38,7 +39,7 @@ void NearestGrid::build(const std::vector<Eigen::Vector3d>& points, int cells_pe
   };
   for (std::size_t i = 0; i < cell_points.size(); ++i) {
     const Eigen::Vector3i c = cell_points[i].array().floor().cast<int>().min(side_ - 1).max(0);
-    offer(c.x(), c.y(), c.z(), static_cast<std::int32_t>(i));
+    offer(c.x(), c.y(), c.z(), static_cast<std::uint16_t>(i));
   }
   const auto owner = [&](int x, int y, int z) {
     return index_[static_cast<std::size_t>((z * side_ + y) * side_ + x)];

@@ -12,7 +12,7 @@ Status RegistrationOptions::validate() const {
     return fail(ErrorKind::usage, fmt::format("registration.{}", field), fmt::format("{}", value),
                 rule);
   };
-  if (points < 100 || points > 100000) return wrong("points", points, "must be 100 to 100000");
+  if (points < 100 || points > 65000) return wrong("points", points, "must be 100 to 65000");
   if (!(max_pair_distance > 0 && max_pair_distance <= 0.5)) {
     return wrong("max_pair_distance", max_pair_distance, "must be > 0 and <= 0.5 of the diameter");
   }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "recon/registration/kd_tree.hpp"
 
@@ -33,26 +34,35 @@ double thickness(const Points& points, const Neighbourhood& around, std::size_t 
 
 /// Most points near one plane through the first point, over planes through pairs of its neighbours.
 double best_plane_support(const Points& points, const Neighbourhood& around) {
+  // A column a point, the first the point itself at zero; padded to whole registers.
+  constexpr std::size_t kColumns = 32;
+  std::array<float, kColumns> x{}, y{}, z{};
   std::array<Eigen::Vector3f, kNeighbours> d;
   for (std::size_t j = 0; j < kNeighbours; ++j) {
     d[j] = ((points[around[j]] - points[around[0]]) / kSlab).cast<float>();
+    x[j] = d[j].x();
+    y[j] = d[j].y();
+    z[j] = d[j].z();
   }
-  float best = 0;
+  constexpr float kAlways = kColumns - kNeighbours + 1;  // zeros lie on every plane
+  float best = kAlways;
   for (std::size_t a = 1; a <= kSpanning; ++a) {
     for (std::size_t b = a + 1; b <= kSpanning; ++b) {
       const Eigen::Vector3f normal = d[a].cross(d[b]);
       const float length2 = normal.squaredNorm();
       if (length2 < 0.09f * d[a].squaredNorm() * d[b].squaredNorm()) continue;
       const float per_length2 = 1 / std::max(length2, 1e-12f);
-      float support = 0;
-      for (std::size_t j = 1; j < kNeighbours; ++j) {
-        const float h = normal.dot(d[j]);
-        support += std::max(0.0f, 1 - h * h * per_length2);
+      std::array<float, 8> support{};
+      for (std::size_t j = 0; j < kColumns; j += 8) {
+        for (std::size_t k = 0; k < 8; ++k) {
+          const float h = normal.x() * x[j + k] + normal.y() * y[j + k] + normal.z() * z[j + k];
+          support[k] += std::max(0.0f, 1 - h * h * per_length2);
+        }
       }
-      best = std::max(best, support);
+      best = std::max(best, std::accumulate(support.begin(), support.end(), 0.0f));
     }
   }
-  return best;
+  return best - kAlways;
 }
 
 /// Low for points on a surface: minus the log of the plane's support per area.

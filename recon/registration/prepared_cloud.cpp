@@ -43,13 +43,13 @@ Similarity3d unit_frame(const Points& points) {
   return unit;
 }
 
-/// Normal and planarity from the scatter of the nearest neighbours.
+/// Normals and their trust from the scatter of the nearest neighbours.
 void estimate_normals(PreparedCloud& cloud) {
   constexpr std::size_t k = PreparedCloud::kNeighbours + 1;  // and the point itself
   const KdTree tree(cloud.points);
   const std::size_t n = cloud.points.size();
   cloud.normals.resize(n);
-  cloud.planarity.resize(n);
+  cloud.trust.resize(n);
   cloud.neighbours.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     std::size_t index[k];
@@ -71,7 +71,7 @@ void estimate_normals(PreparedCloud& cloud) {
     solver.computeDirect(scatter);
     const Eigen::Vector3d& e = solver.eigenvalues();
     cloud.normals[i] = solver.eigenvectors().col(0);
-    cloud.planarity[i] = e[1] > 0 ? std::clamp(1 - e[0] / e[1], 0.0, 1.0) : 0.0;
+    cloud.trust[i] = e[1] > 0 ? std::sqrt(std::clamp(1 - e[0] / e[1], 0.0, 1.0)) : 0.0;
   }
 }
 

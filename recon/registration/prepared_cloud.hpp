@@ -18,8 +18,10 @@ struct PreparedCloud {
 
   Similarity3d unit_from_cloud;
   Points points;
-  Points normals;                 ///< unit length, signs consistent along the surface
-  std::vector<double> planarity;  ///< 0..1: how far the normal can be trusted
+  Points normals;  ///< unit length, signs consistent along the surface
+  /// 0..1, of the normal: the root of its neighbourhood's planarity. Planarity itself would leave
+  /// warped surfaces with too few points to average over, none would let outliers pull.
+  std::vector<double> trust;
   std::vector<std::array<std::int32_t, kNeighbours>> neighbours;  ///< -1 where there are fewer
   NearestGrid nearest_table;
   std::size_t dropped_not_finite = 0, dropped_outliers = 0;

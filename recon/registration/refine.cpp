@@ -9,8 +9,8 @@ namespace orbitfuse::registration {
 namespace {
 
 struct Equations {
-  Matrix7 hessian = Matrix7::Zero();
-  Vector7 gradient = Vector7::Zero();
+  // Rows and columns 0-6: the hessian; 7: the gradient. Eight by eight fills whole registers.
+  Eigen::Matrix<double, 8, 8> sums = Eigen::Matrix<double, 8, 8>::Zero();
   double weight = 0;
   std::vector<double> distances;  ///< |plane distance| of the pairs
 };
@@ -50,8 +50,7 @@ class Pairs {
     if (d.squaredNorm() > bound2_) return false;
     pair.normal = target_.normals[j];
     pair.lever = y - center_;
-    return finish(pair, d, rotation_ * source_.normals[i],
-                  target_.planarity[j] * source_.planarity[i]);
+    return finish(pair, d, rotation_ * source_.normals[i], target_.trust[j] * source_.trust[i]);
   }
 
   /// The target's point z against the source's plane. The scale's derivative is taken at z, as if
@@ -69,7 +68,7 @@ class Pairs {
     if (d.squaredNorm() > bound2_) return false;
     pair.normal = rotation_ * source_.normals[i];
     pair.lever = z - center_;
-    return finish(pair, d, target_.normals[j], target_.planarity[j] * source_.planarity[i]);
+    return finish(pair, d, target_.normals[j], target_.trust[j] * source_.trust[i]);
   }
 
  private:
@@ -77,11 +76,11 @@ class Pairs {
     return exact_ ? cloud.nearest(x) : cloud.nearest_table.lookup(x);
   }
   static bool finish(Pair& pair, const Eigen::Vector3d& d, const Eigen::Vector3d& other,
-                     double planarity) {
+                     double trust) {
     const double cosine = pair.normal.dot(other);
     if (cosine * cosine < 0.25) return false;
     pair.residual = pair.normal.dot(d);
-    pair.trust = cosine * cosine * planarity;
+    pair.trust = cosine * cosine * trust;
     return true;
   }
   const bool exact_;
@@ -104,9 +103,9 @@ void add(Equations& equations, const Pair& pair, double bound) {
   const double w = pair.trust * tukey(pair.residual, bound);
   equations.distances.push_back(std::abs(pair.residual));
   if (w <= 0) return;
-  const Vector7 j = plane_jacobian(pair.lever, pair.normal);
-  equations.hessian.selfadjointView<Eigen::Lower>().rankUpdate(j, w);
-  equations.gradient += w * pair.residual * j;
+  Eigen::Matrix<double, 8, 1> j;
+  j << plane_jacobian(pair.lever, pair.normal), pair.residual;
+  equations.sums.noalias() += (w * j).lazyProduct(j.transpose());
   equations.weight += w;
 }
 
@@ -124,7 +123,6 @@ Equations equations_at(const PreparedCloud& source, const PreparedCloud& target,
   for (const int j : target_subset) {
     if (pairs.backward(static_cast<std::size_t>(j), pair)) add(equations, pair, plane_bound);
   }
-  equations.hessian = equations.hessian.selfadjointView<Eigen::Lower>();
   return equations;
 }
 
@@ -174,13 +172,13 @@ Refined refine(const PreparedCloud& source, const PreparedCloud& target,
         equations_at(source, target, source_subset, target_subset, refined.target_from_source,
                      bound, plane_bound, options.exact_partners);
     if (equations.distances.size() < 10 || !(equations.weight > 0)) break;
-    sigma = robust_sigma(equations.distances);
-    refined.hessian = equations.hessian / equations.weight;
+    if (options.adapt_bound) sigma = robust_sigma(equations.distances);
+    refined.hessian = equations.sums.topLeftCorner<7, 7>() / equations.weight;
     refined.residual_sigma = sigma;
     refined.pairs = static_cast<int>(equations.distances.size());
-    Matrix7 damped = equations.hessian;
+    Matrix7 damped = equations.sums.topLeftCorner<7, 7>();
     damped.diagonal().array() += 1e-4 * equations.weight;  // open directions stay where they are
-    Vector7 update = -damped.ldlt().solve(equations.gradient);
+    Vector7 update = -damped.ldlt().solve(equations.sums.col(7).head<7>());
     if (!update.allFinite()) break;
     const double longest =
         std::max({update.head<3>().norm(), std::abs(update[3]), update.tail<3>().norm()});
@@ -188,7 +186,7 @@ Refined refine(const PreparedCloud& source, const PreparedCloud& target,
     refined.target_from_source =
         updated(refined.target_from_source, placed_center(refined.target_from_source), update);
     if (iteration < options.iterations) bound = std::max(options.end_bound, bound * shrink);
-    if (iteration >= options.iterations && longest < 1e-6) break;
+    if (iteration >= options.iterations && longest < options.settled) break;
   }
   return refined;
 }

@@ -27,12 +27,14 @@ struct RefineOptions {
   int polish = 8;             ///< at the last bound, until the update vanishes
   bool exact_partners = true;  ///< false: a table cell's error is far below the bounds
   bool adapt_bound = true;     ///< Tukey bound from the residuals' spread, where that is smaller
+  double settled = 1e-6;       ///< polishing ends at updates below this
 };
 
 struct Refined {
   Similarity3d target_from_source;
   Matrix7 hessian = Matrix7::Zero();  ///< per unit of weight, about the source's centre
-  double residual_sigma = 0;          ///< robust spread of the plane distances, target unit lengths
+  /// Robust spread of the plane distances, target unit lengths; the start bound unless adapt_bound.
+  double residual_sigma = 0;
   int pairs = 0;
 };
 

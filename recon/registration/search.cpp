@@ -61,27 +61,34 @@ constexpr int kAllPoints = 1 << 30;
 /// Coarse scores for all, a short refinement for the best, full refinement for the best of those.
 Candidates narrowed(const Search& search, Candidates candidates) {
   constexpr RefineOptions brief_refinement{0.25, 0.12, 6, 0, false, false};
-  constexpr RefineOptions full_refinement{0.15, 0.06, 8, 6, true, true};
+  constexpr RefineOptions full_refinement{0.15, 0.06, 8, 6, true, true, 2e-4};
   for (Candidate& c : candidates)
     c.score = search.agree(c.target_from_source, 200, {0.2, 0.2, 0}).score;
   candidates = best_distinct(std::move(candidates), 30);
   for (Candidate& c : candidates) {
-    c.target_from_source =
-        search.refine_with(c.target_from_source, 250, brief_refinement).target_from_source;
+    if (!c.refined) {
+      c.target_from_source =
+          search.refine_with(c.target_from_source, 250, brief_refinement).target_from_source;
+    }
     c.score = search.agree(c.target_from_source, 500, search.coarse).evidence;
   }
   candidates = best_distinct(std::move(candidates), 14);
   double sigma = INFINITY;
   for (Candidate& c : candidates) {
-    const Refined refined = search.refine_with(c.target_from_source, 800, full_refinement);
-    c.target_from_source = refined.target_from_source;
-    if (refined.pairs > 400) sigma = std::min(sigma, refined.residual_sigma);
+    if (!c.refined) {
+      const Refined refined = search.refine_with(c.target_from_source, 800, full_refinement);
+      c.target_from_source = refined.target_from_source;
+      if (refined.pairs > 400) c.residual_sigma = refined.residual_sigma;
+      c.refined = true;
+    }
+    if (c.residual_sigma > 0) sigma = std::min(sigma, c.residual_sigma);
   }
-  for (Candidate& c : candidates) {
+  for (Candidate& c : candidates)
     c.score = search.agree(c.target_from_source, kAllPoints, search.strict(sigma)).evidence;
+  candidates = best_distinct(std::move(candidates), 6);
+  for (Candidate& c : candidates)
     c.agreement = search.agree(c.target_from_source, kAllPoints, search.fine).score;
-  }
-  return best_distinct(std::move(candidates), 6);
+  return candidates;
 }
 
 /// The placements that a near-symmetric object could be mistaken for: quarter and half turns about
@@ -106,7 +113,7 @@ Candidates turned(const Search& search, const Candidate& best) {
         const Similarity3d start = best.target_from_source * turn;
         all.push_back(
             {search.refine_with(start, 150, {0.35, 0.2, 5, 0, false, false}).target_from_source, 0,
-             0, best.origin + ", turned"});
+             0, best.origin + ", turned", 0, false});
       }
     }
   }

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/painted_scene.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "recon/poses/orbit_rescue.hpp"
+#include "tests/recon/poses/box_scene.hpp"
+#include "tests/recon/poses/orbit_fixture.hpp"
+
+namespace orbitfuse {
+namespace {
+
+PosedView at(double azimuth, double elevation = 14) {
+  const Camera camera = testing_orbit::camera(1000).scaled_to(320, 240);
+  OrbitPose pose;
+  pose.azimuth_deg = azimuth, pose.elevation_deg = elevation, pose.radius = 2.5;
+  return {"view", camera, cam_from_world_of(pose, camera)};
+}
+
+cv::Mat thermal_of(const PosedView& view, float offset = 0) {
+  cv::Mat image = testing_orbit::box_view(view.camera, view.cam_from_world, true).brightness;
+  image += cv::Scalar(offset);
+  return image;
+}
+
+TEST(PaintedScene, ShowsTheTemperaturesSeenFromBesideIt) {
+  const std::vector<PosedView> views = {at(15), at(45), at(200)};
+  // The second camera drifted by half the scene's contrast.
+  const std::vector<cv::Mat> images = {thermal_of(views[0]), thermal_of(views[1], 0.4F),
+                                       thermal_of(views[2])};
+  const SceneRenderer form = testing_orbit::box_renderer();
+  const auto painted = painted_scene(form, views, images, {}, {});
+  ASSERT_TRUE(painted) << painted.error().message();
+  const PosedView between = at(27, 17);
+  const auto seen = (*painted)(between.camera, between.cam_from_world);
+  ASSERT_TRUE(seen);
+  const cv::Mat truth = thermal_of(between);
+  int on_box = 0, close = 0;
+  for (int y = 0; y < truth.rows; ++y)
+    for (int x = 0; x < truth.cols; ++x) {
+      const float value = seen->brightness.at<float>(y, x);
+      if (!std::isfinite(seen->depth.at<float>(y, x))) {
+        EXPECT_TRUE(std::isnan(value));
+        continue;
+      }
+      ++on_box;
+      close += std::abs(value - truth.at<float>(y, x)) < 0.1F ? 1 : 0;
+    }
+  EXPECT_GT(on_box, 1000);
+  EXPECT_GT(close, 9 * on_box / 10);
+}
+
+TEST(PaintedScene, WithoutPaintersNothingIsPainted) {
+  const SceneRenderer form = testing_orbit::box_renderer();
+  const auto painted = painted_scene(form, {}, {}, {}, {});
+  ASSERT_TRUE(painted);
+  const auto seen = (*painted)(at(0).camera, at(0).cam_from_world);
+  ASSERT_TRUE(seen);
+  for (const float value : cv::Mat1f(seen->brightness)) EXPECT_TRUE(std::isnan(value));
+}
+
+TEST(PaintedScene, ARendererThatFailsIsPassedOn) {
+  const SceneRenderer broken = [](const Camera&, const Rigid3d&) -> Result<SceneView> {
+    return fail(ErrorKind::input, "field", "cut", "train again");
+  };
+  const auto painted = painted_scene(broken, {at(0)}, {thermal_of(at(0))}, {}, {});
+  ASSERT_FALSE(painted);
+  EXPECT_EQ(painted.error().where, "field");
+}
+
+/// Stations every 30 deg, as posed.
+void add_stations(OrbitViews& orbit, RenderAlignment& alignment) {
+  for (int i = 0; i < 12; ++i) {
+    RenderAlignedView view;
+    view.view = at(30 * i), view.agreement = 0.5, view.matches = 200;
+    orbit.images.push_back(thermal_of(view.view));
+    Station station;
+    station.azimuth_deg = 30 * i;
+    orbit.stations.push_back(station);
+    alignment.views.push_back(view);
+  }
+}
+
+void add_tracking(OrbitViews& orbit, RenderAlignment& alignment, double nominal_deg,
+                  const cv::Mat& image) {
+  RenderAlignedView view;
+  view.view = at(0);
+  alignment.views.push_back(view);
+  orbit.images.push_back(image);
+  Station station;
+  station.azimuth_deg = nominal_deg;
+  orbit.stations.push_back(station);
+}
+
+TEST(AddViews, OnlyFramesThatBothScenesPlaceAlikeAreConfirmed) {
+  OrbitViews orbit;
+  RenderAlignment alignment;
+  add_stations(orbit, alignment);
+  add_tracking(orbit, alignment, 20, thermal_of(at(22, 13)));
+  add_tracking(orbit, alignment, 50, thermal_of(at(48, 16)));
+  // A frame of noise fits anywhere as badly as elsewhere.
+  cv::Mat noise(240, 320, CV_32F);
+  cv::theRNG().state = 7;
+  cv::randu(noise, 0, 1);
+  add_tracking(orbit, alignment, 80, noise);
+  // One taken far from where its order has it.
+  add_tracking(orbit, alignment, 110, thermal_of(at(60, 40)));
+  ASSERT_TRUE(add_views(testing_orbit::box_renderer(), orbit, 12, alignment, {}));
+  EXPECT_EQ(alignment.views[12].doubt, "");
+  EXPECT_EQ(alignment.views[13].doubt, "");
+  EXPECT_NE(alignment.views[14].doubt, "");
+  // Found or doubted, but not kept where it was not taken.
+  const double away = rotation_angle_deg(alignment.views[15].view.cam_from_world.rotation,
+                                         at(60, 40).cam_from_world.rotation);
+  EXPECT_TRUE(away < 1 || !alignment.views[15].doubt.empty()) << away;
+  EXPECT_LT(rotation_angle_deg(alignment.views[12].view.cam_from_world.rotation,
+                               at(22, 13).cam_from_world.rotation),
+            0.5);
+}
+
+}  // namespace
+}  // namespace orbitfuse
