@@ -6,6 +6,7 @@
 #include <condition_variable>
 #include <deque>
 #include <thread>
+#include <variant>
 
 #include "capture/stream_account.hpp"
 
@@ -48,7 +49,10 @@ struct Recorder::Channel {
 
   std::mutex mutex;
   std::condition_variable changed;
-  std::deque<Frame> queue;
+  /// What came, in its order; only frames count for the bound, because events are small.
+  using Item = std::variant<Frame, EventRecord>;
+  std::deque<Item> queue;
+  std::size_t frames_queued = 0;
   bool capture_over = false;
   bool writer_failed = false;
   bool silent = false, away = false;
@@ -65,14 +69,17 @@ struct Recorder::Channel {
     if (!error) error = e;
   }
 
+  /// Written by the writer thread: a slow disk must not hold up the capture thread.
   void log_event(const std::string& kind, const std::string& detail) {
-    if (const Status s = writer.append(EventRecord{device.id, now_ns(), kind, detail}); !s) keep_first(s.error());
+    const std::lock_guard lock(mutex);
+    queue.push_back(EventRecord{device.id, now_ns(), kind, detail});
+    changed.notify_all();
   }
 
   void push(Frame frame) {
     std::unique_lock lock(mutex);
     const auto has_room = [&] {
-      return queue.size() < static_cast<std::size_t>(options.queue_frames) || writer_failed;
+      return frames_queued < static_cast<std::size_t>(options.queue_frames) || writer_failed;
     };
     if (options.backpressure == Backpressure::wait || source.can_wait()) {
       while (!has_room() && !progress.cancelled()) changed.wait_for(lock, std::chrono::milliseconds(50));
@@ -82,6 +89,7 @@ struct Recorder::Channel {
       return;
     }
     queue.push_back(std::move(frame));
+    ++frames_queued;
     changed.notify_all();
   }
 
@@ -134,14 +142,15 @@ struct Recorder::Channel {
     changed.notify_all();
   }
 
-  std::optional<Frame> pop() {
+  std::optional<Item> pop() {
     std::unique_lock lock(mutex);
     changed.wait(lock, [&] { return !queue.empty() || capture_over; });
     if (queue.empty()) return std::nullopt;
-    Frame frame = std::move(queue.front());
+    Item item = std::move(queue.front());
     queue.pop_front();
+    frames_queued -= std::holds_alternative<Frame>(item);
     changed.notify_all();
-    return frame;
+    return item;
   }
 
   /// Some sources know their camera only from its first frame.
@@ -181,22 +190,25 @@ struct Recorder::Channel {
     changed.notify_all();
   }
 
-  void write_gaps(bool all) {
-    for (const GapRecord& gap : account.take_gaps(all)) {
+  void write_gaps(std::optional<std::uint64_t> stored_id) {
+    for (const GapRecord& gap : account.take_gaps(stored_id)) {
       if (const Status s = writer.append(gap); !s) keep_first(s.error());
     }
   }
 
   void write() {
-    while (std::optional<Frame> frame = pop()) {
-      if (writer_failed) {
+    while (std::optional<Item> item = pop()) {
+      const Frame* frame = std::get_if<Frame>(&*item);
+      if (!frame) {
+        if (const Status s = writer.append(std::get<EventRecord>(*item)); !s) keep_first(s.error());
+      } else if (writer_failed) {
         account.lose(frame->id, Loss::dropped, "not written");
       } else {
         store(*frame);
-        write_gaps(false);
+        write_gaps(frame->id);
       }
     }
-    write_gaps(true);
+    write_gaps(std::nullopt);
     if (!account.counts().any) return;
     if (const Status s = writer.append(account.record()); !s) keep_first(s.error());
   }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "capture/stream_account.hpp"
 
+#include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace orbitfuse {
@@ -46,14 +48,13 @@ StreamAccount::Counts StreamAccount::counts() const {
   return counts_;
 }
 
-std::vector<GapRecord> StreamAccount::take_gaps(bool all) {
+std::vector<GapRecord> StreamAccount::take_gaps(std::optional<std::uint64_t> stored_id) {
   const std::lock_guard lock(mutex_);
-  std::vector<GapRecord> out;
-  std::swap(out, gaps_);
-  if (!all && !out.empty()) {
-    gaps_.push_back(std::move(out.back()));
-    out.pop_back();
-  }
+  const auto over = std::stable_partition(gaps_.begin(), gaps_.end(), [&](const GapRecord& gap) {
+    return !stored_id || gap.first_sequence < *stored_id;
+  });
+  std::vector<GapRecord> out(std::make_move_iterator(gaps_.begin()), std::make_move_iterator(over));
+  gaps_.erase(gaps_.begin(), over);
   return out;
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,9 +30,9 @@ class StreamAccount {
     std::uint64_t lost() const { return missing + rejected + dropped; }
   };
   Counts counts() const;
-  /// Gaps not yet written; neighbours with one reason are one gap. While the stream runs the
-  /// newest gap stays, because it may still grow.
-  std::vector<GapRecord> take_gaps(bool all);
+  /// Gaps not yet written; neighbours with one reason are one gap. Those before the id that was
+  /// stored last cannot grow any more; nullopt: all.
+  std::vector<GapRecord> take_gaps(std::optional<std::uint64_t> stored_id);
   StreamRecord record() const;
 
  private:

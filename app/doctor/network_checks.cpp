@@ -94,16 +94,22 @@ Finding check_camera(const Machine& machine, const CameraLink& camera) {
   in_addr parsed{};
   if (inet_pton(AF_INET, camera.address.c_str(), &parsed) == 1) address = parsed.s_addr;
   long long mtu = 0;
+  bool in_subnet = address == 0 || (address & 0xff) == 127;  // loopback is not among the routes
   for (const auto& [name, list] : subnets(machine)) {
     for (const Subnet& net : list) {
-      if ((address & net.mask) == (net.address & net.mask))
-        mtu = number_of(machine.root / "sys/class/net" / name / "mtu").value_or(0);
+      if ((address & net.mask) != (net.address & net.mask)) continue;
+      in_subnet = true;
+      mtu = number_of(machine.root / "sys/class/net" / name / "mtu").value_or(0);
     }
   }
   if (camera.packet_bytes > 0)
     finding.found += fmt::format(", packets of {} bytes", camera.packet_bytes);
   if (mtu > 0) finding.found += fmt::format(" over an MTU of {}", mtu);
-  if (camera.controlled) {
+  if (!in_subnet) {
+    finding.found += ", no interface in its subnet";
+    finding.remedy = "it can't be reached: give an interface an address in the camera's subnet (ip addr add "
+                     "ADDRESS/MASK dev INTERFACE), or the camera one in yours";
+  } else if (camera.controlled) {
     finding.found += ", controlled by a program";
     finding.remedy = "close the program that has it, or it can't be recorded";
   } else if (mtu > 0 && camera.packet_bytes > mtu) {
@@ -111,6 +117,11 @@ Finding check_camera(const Machine& machine, const CameraLink& camera) {
         "packets larger than the MTU don't arrive: raise the MTU to {}, or set GevSCPSPacketSize "
         "to {} in its profile",
         camera.packet_bytes, mtu);
+  } else if (!camera.answers) {
+    finding.found += ", does not answer";
+    finding.remedy =
+        "it was seen, but questions to it (UDP port 3956) get no answer: check the firewall, that no "
+        "other device has its address, and power-cycle it";
   }
   return finding;
 }

@@ -128,6 +128,10 @@ class Teller {
       say_changed(
           s.device + " dropped",
           s.dropped > 0 ? s.device + ": the disk is too slow, frames are dropped and counted" : "");
+      say_changed(s.device + " missing",
+                  s.missing > 0 ? s.device + ": frames are lost on the way and counted" : "");
+      say_changed(s.device + " rejected",
+                  s.rejected > 0 ? s.device + ": frames arrive damaged and are counted" : "");
     }
     if (!recording_.guide()) return;
     const auto total = recording_.guide()->sectors().size();

@@ -43,12 +43,14 @@ Finding check_colmap() {
 
 doctor::CameraLink link_of(const aravis::FoundCamera& camera) {
   const auto ask = [&](aravis::GvcpRegister address) {
-    return aravis::read_register(camera.address, address, std::chrono::milliseconds(200))
-        .value_or(0);
+    return aravis::read_register(camera.address, address, std::chrono::milliseconds(200));
   };
+  const auto packet_size = ask(aravis::GvcpRegister::packet_size);
+  // Only GigE cameras have an address and that port.
   return {camera.model + " " + camera.serial, camera.address,
-          static_cast<int>(ask(aravis::GvcpRegister::packet_size) & 0xffff),
-          ask(aravis::GvcpRegister::control_privilege) != 0};
+          static_cast<int>(packet_size.value_or(0) & 0xffff),
+          ask(aravis::GvcpRegister::control_privilege).value_or(0) != 0,
+          packet_size.has_value() || camera.address.empty()};
 }
 
 Finding check_cpu() {

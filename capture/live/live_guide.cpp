@@ -15,6 +15,8 @@
 namespace orbitfuse {
 namespace {
 
+constexpr double darkest_mean_level = 8;  // of 255
+
 std::size_t slot(Modality modality) { return modality == Modality::visible ? 0 : 1; }
 
 /// The image of a frame on disk, upright.
@@ -79,6 +81,7 @@ void LiveGuide::resume(const std::vector<FrameRecord>& earlier) {
     known->second.shown.latest_file = frame.file;
     add_at_station(known->second, frame);
     table_.resume_at(known->second.table, *frame.station);
+    remember_choice(known->second, frame);
   }
   for (auto& [modality, camera] : cameras_)
     camera.shown.instruction = instruction(modality, camera, camera.position, Refusal::none);
@@ -195,8 +198,11 @@ void LiveGuide::judge(Camera& camera, const FrameRecord& frame,
   assessment.rank = frame.quality ? frame.quality->sharpness : 0;
   assessment.sharpness = camera.sharpness.relative(assessment.rank, position);
   // Thermal frames clip where the scene leaves the sensor's range, which is no exposure fault.
-  if (frame.quality && frame.modality == Modality::visible)
+  if (frame.quality && frame.modality == Modality::visible) {
     assessment.overexposed = frame.quality->clipped_fraction;
+    // What a picture this dark shows is noise, even where no pixel is 0.
+    assessment.underexposed = frame.quality->mean_level < darkest_mean_level ? 1 : 0;
+  }
   assessment.nuc = frame.has_flag("nuc");
   // A photo was taken on purpose; whether the hand was still shows in its sharpness.
   if (assessment.position && frame.has_flag("still")) assessment.position->speed_deg_s = 0;
@@ -237,6 +243,14 @@ std::string LiveGuide::table_instruction(const Camera& camera, Refusal last) con
   return words + ", then " + then;
 }
 
+/// Of an earlier recording: to be demoted when a better one comes.
+void LiveGuide::remember_choice(Camera& camera, const FrameRecord& frame) {
+  const std::vector<Sector>& sectors = coverage_.sectors();
+  for (std::size_t i = 0; i < sectors.size(); ++i) {
+    if (sectors[i].file[slot(frame.modality)] == frame.file) camera.chosen[i] = frame;
+  }
+}
+
 void LiveGuide::note_choice(Camera& camera, const FrameRecord& frame) {
   const std::vector<Sector>& sectors = coverage_.sectors();
   for (std::size_t i = 0; i < sectors.size(); ++i) {
@@ -254,13 +268,14 @@ void LiveGuide::note_choice(Camera& camera, const FrameRecord& frame) {
                 camera.position ? camera.position->elevation_deg : sectors[i].elevation_deg,
                 1,
                 1};
+    // The new one first: a crash between the two leaves two stations, never none.
+    amend(chosen);
     const auto before = camera.chosen.find(i);
     if (before != camera.chosen.end()) {
       FrameRecord replaced = before->second;
       replaced.tracking = true;
       amend(replaced);
     }
-    amend(chosen);
     camera.chosen[i] = chosen;
     return;
   }

@@ -97,6 +97,7 @@ class LiveGuide {
   void look();
   void judge(Camera& camera, const FrameRecord& frame,
              const std::optional<OrbitPosition>& position);
+  void remember_choice(Camera& camera, const FrameRecord& frame);
   void note_choice(Camera& camera, const FrameRecord& frame);
   std::string instruction(Modality modality, const Camera& camera,
                           const std::optional<OrbitPosition>& position, Refusal last) const;

@@ -193,10 +193,6 @@ class Importer {
         continue;
       }
       report_.has_temperatures = report_.has_temperatures || !still->frame.thermal_is_gray;
-      if (!still->frame.original.empty()) {
-        still->frame.original.release();  // the file itself is kept, below
-        ORBITFUSE_TRY(keep_original(source.file, file->bytes));
-      }
       ORBITFUSE_TRY(add_frame(std::move(*still), source, tracking, options_.thermal_stations));
       if (options_.embedded_visible && file->flir && !file->flir->embedded_visible.empty()) {
         ORBITFUSE_TRY(add_visible_frame(file->flir->embedded_visible, source, tracking,
@@ -204,11 +200,6 @@ class Importer {
       }
     }
     return {};
-  }
-
-  /// The 8-bit proxy of raw counts is what later stages see; the counts themselves stay with it.
-  Status keep_original(const fs::path& file, const std::string& bytes) {
-    return write_file_atomic(writer_.folder() / "thermal" / "originals" / file.filename(), bytes);
   }
 
   Status add_frame(StillPhoto still, const Source& source, bool tracking,

@@ -5,6 +5,7 @@
 
 #include <atomic>
 
+#include "core/file_io.hpp"
 #include "core/image_io.hpp"
 #include "tests/capture/scripted_source.hpp"
 #include "tests/core/temp_folder.hpp"
@@ -99,6 +100,47 @@ TEST(Recorder, SlowDiskDropsByPolicyAndCounts) {
   EXPECT_GT(s.dropped, 0u);
   EXPECT_EQ(s.received + s.dropped, 200u);
   EXPECT_FALSE(session.complete);  // the caller has not closed it
+}
+
+/// The writer stands still until the whole script was taken: neither frames nor events wait for it,
+/// and both are written in the order in which they came.
+TEST(Recorder, EventsDoNotWaitForTheWriterAndKeepTheirPlace) {
+  Recording r;
+  Delivery event;
+  event.kind = Delivery::Kind::event;
+  event.reason = "nuc";
+  ScriptedSource source("thermal0", Modality::thermal,
+                        {frame_delivery(1, thermal_pixels()), frame_delivery(2, thermal_pixels()), event,
+                         frame_delivery(3, thermal_pixels()), Delivery{}});
+  std::atomic<int> taken{0};
+  source.before_next = [&] { ++taken; };
+  Recorder recorder(*r.writer, {});
+  recorder.on_frame = [&](const FrameRecord&) {
+    while (taken < 5) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  };
+  ASSERT_TRUE(recorder.run({&source}));
+  const std::string manifest = *read_file(r.folder / "s" / "manifest.jsonl");
+  const auto place = [&](const char* text) { return manifest.find(text); };
+  const std::size_t nuc = place("\"nuc\"");
+  ASSERT_NE(nuc, std::string::npos);
+  EXPECT_LT(place("\"sequence\":2"), nuc);
+  EXPECT_GT(place("\"sequence\":3"), nuc);
+  EXPECT_NE(place("\"sequence\":3"), std::string::npos);
+}
+
+/// What a kill would leave: each gap is on disk with the frame after it.
+TEST(Recorder, AGapIsWrittenAsSoonAsALaterFrameIsStored) {
+  Recording r;
+  std::deque<Delivery> script;
+  for (std::uint64_t id : {1, 2, 5, 6}) script.push_back(frame_delivery(id, thermal_pixels()));
+  ScriptedSource source("thermal0", Modality::thermal, script);
+  Recorder recorder(*r.writer, {});
+  std::size_t gaps_at_6 = 0;
+  recorder.on_frame = [&](const FrameRecord& frame) {
+    if (frame.sequence == 6) gaps_at_6 = open_session(r.folder / "s")->gaps.size();
+  };
+  ASSERT_TRUE(recorder.run({&source}));
+  EXPECT_EQ(gaps_at_6, 1u);
 }
 
 TEST(Recorder, WaitingLosesNothing) {

@@ -132,7 +132,15 @@ TEST_F(DoctorTest, PacketsMustFitTheInterfaceAndTheCameraBeFree) {
   camera.controlled = true;
   EXPECT_THAT(check_camera(machine, camera).remedy, HasSubstr("close the program"));
   camera = {"elsewhere", "10.0.0.1", 0, false};
-  EXPECT_EQ(check_camera(machine, camera).found, "at 10.0.0.1");
+  EXPECT_THAT(check_camera(machine, camera).found, HasSubstr("no interface in its subnet"));
+  EXPECT_THAT(check_camera(machine, camera).remedy, HasSubstr("ip addr add"));
+  camera.address = "192.168.5.21";
+  EXPECT_EQ(check_camera(machine, camera).remedy, "");
+  camera.answers = false;
+  EXPECT_THAT(check_camera(machine, camera).found, HasSubstr("does not answer"));
+  EXPECT_THAT(check_camera(machine, camera).remedy, HasSubstr("firewall"));
+  camera = {"simulated", "127.0.0.1", 1400, false};
+  EXPECT_EQ(check_camera(machine, camera).remedy, "");
   camera.address = "garbage";
   EXPECT_EQ(check_camera(machine, camera).remedy, "");
 }

@@ -277,6 +277,46 @@ TEST_F(LiveGuideTest, PhotosWhoseTimeDoesNotTellTheirKeyAreRefused) {
   EXPECT_NEAR(guide.cameras()[0].position->azimuth_deg, 30, 1e-9);
 }
 
+TEST_F(LiveGuideTest, ABetterFrameAfterAResumeTakesTheStationOver) {
+  FrameRecord earlier = record(15, 0);
+  earlier.tracking = false;
+  earlier.station = Station{0, 1, 30, 20, 1, 1};
+  earlier.quality->sharpness /= 2;
+  ASSERT_TRUE(writer->amend(earlier));
+  {
+    LiveGuide guide(*writer, options, find);
+    guide.resume({earlier});
+    EXPECT_EQ(guide.done_count(Modality::visible), 1);
+    FrameRecord photo = record(15, 5);
+    photo.flags = {"still"};
+    guide.add(photo);
+    guide.finish();
+    EXPECT_EQ(guide.done_count(Modality::visible), 1);
+    EXPECT_FALSE(guide.error());
+  }
+  ASSERT_TRUE(writer->close());
+  const auto session = open_session(folder / "s");
+  ASSERT_TRUE(session) << session.error().message();
+  int stations = 0;
+  for (const FrameRecord& frame : session->frames) {
+    stations += !frame.tracking;
+    EXPECT_TRUE(frame.tracking || frame.file != earlier.file);
+  }
+  EXPECT_EQ(stations, 1);
+}
+
+TEST_F(LiveGuideTest, ANearlyBlackFrameIsRefused) {
+  LiveGuide guide(*writer, options);
+  const auto judged = [&](int level) {
+    guide.operator_at_station();
+    guide.add(record(level, level));
+    return guide.cameras()[0].refusal;
+  };
+  EXPECT_EQ(judged(2), Refusal::badly_exposed);  // no pixel of it is 0
+  EXPECT_EQ(guide.done_count(Modality::visible), 0);
+  EXPECT_EQ(judged(15), Refusal::none);
+}
+
 TEST_F(LiveGuideTest, PhotosCopiedAllAtOnceAreAllJudged) {
   LiveGuide guide(*writer, options, find);
   for (int i = 1; i <= 12; ++i) {

@@ -216,6 +216,29 @@ TEST_F(ImportTest, SixteenBitIsCentikelvinAndEightBitHasNoTemperatures) {
   EXPECT_TRUE(report->session.frames.at(0).thermal_is_gray);
 }
 
+TEST_F(ImportTest, CountsStayWithTheirFrameWhereFilesShareAName) {
+  cv::Mat station(30, 40, CV_16UC1), tracking;
+  for (int i = 0; i < 1200; ++i) station.at<std::uint16_t>(i / 40, i % 40) = static_cast<std::uint16_t>(5000 + i);
+  tracking = station + 2000;
+  put("in/stations/IR.tiff", *encode_tiff(station, "counts"));
+  put("in/tracking/IR.tiff", *encode_tiff(tracking, "counts"));
+  options.thermal = {folder / "in/stations/IR.tiff"};
+  options.thermal_tracking = {folder / "in/tracking/IR.tiff"};
+  options.thermal_scale = ThermalScale::raw_counts;
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  ASSERT_EQ(report->session.frames.size(), 2u);
+  for (const FrameRecord& frame : report->session.frames) {
+    const fs::path file(report->session.path_of(frame));
+    const fs::path counts = file.parent_path() / "originals" / (file.stem().string() + ".tiff");
+    const auto bytes = read_file(counts);
+    ASSERT_TRUE(bytes) << counts;
+    const auto image = decode_image(*bytes, "counts");
+    ASSERT_TRUE(image);
+    EXPECT_EQ(cv::norm(*image, frame.tracking ? tracking : station, cv::NORM_INF), 0);
+  }
+}
+
 TEST_F(ImportTest, PosesComeFromTransformsAndFromColmapModels) {
   Reconstruction model;
   Transforms transforms;

@@ -253,6 +253,10 @@ TEST_F(Uvc, ReplugRestoresTheLockedSettings) {
   Recording recording(options_for("OF-LOCK"));
   EXPECT_TRUE(recording.wait_for_frames(2));
   const auto expect_locked = [&] {
+    // The first time once it has adapted for a second.
+    EXPECT_TRUE(recording.wait_until([&](const StreamStatus&) {
+      return camera->exposure_mode() == 1u && camera->white_balance_auto() == 0u;
+    }));
     EXPECT_EQ(camera->exposure_mode(), 1u);
     EXPECT_EQ(camera->exposure_100us(), 312u);
     EXPECT_EQ(camera->white_balance_auto(), 0u);
@@ -264,8 +268,8 @@ TEST_F(Uvc, ReplugRestoresTheLockedSettings) {
   camera = std::make_unique<UvcCamera>("OF-LOCK");  // switched off and on: automatic again
   EXPECT_NE(camera->exposure_100us(), 312u);
   EXPECT_TRUE(recording.wait_for_frames(2));
-  const Session session = recording.finish();
   expect_locked();
+  const Session session = recording.finish();
   EXPECT_EQ(count_events(session, "setting-lost"), 0);
 }
 
