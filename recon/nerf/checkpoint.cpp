@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstring>
 
 #include "core/file_io.hpp"
@@ -13,12 +14,12 @@
 namespace orbitfuse::nerf {
 namespace {
 
-constexpr char magic[8] = {'O', 'F', 'N', 'E', 'R', 'F', '0', '2'};
+constexpr char magic[8] = {'O', 'F', 'N', 'E', 'R', 'F', '0', '3'};
 constexpr std::size_t hash_length = 32;
 
 class Writer {
  public:
-  static constexpr bool reading = false;
+  static constexpr bool reading = false, ok = true;
   std::string bytes{magic, sizeof magic};
   template <class T>
     requires std::is_trivially_copyable_v<T>
@@ -74,12 +75,20 @@ class Reader {
   std::string_view bytes_;
 };
 
+/// Keys with their values: a field outlives the options that its program knows.
 template <class Archive>
 void visit_options(Archive& io, TrainOptions& options) {
-  for (const std::string& key : TrainOptions::keys()) {
-    std::string value = options.get(key);
+  const std::vector<std::string> keys = TrainOptions::keys();
+  std::uint64_t count = keys.size();
+  io(count);
+  for (std::uint64_t i = 0; io.ok && i < count; ++i) {
+    std::string key = i < keys.size() ? keys[i] : std::string(), value = options.get(key);
+    io(key);
     io(value);
-    if constexpr (Archive::reading) io.ok = io.ok && options.set(key, value).has_value();
+    if constexpr (Archive::reading) {
+      const bool known = std::find(keys.begin(), keys.end(), key) != keys.end();
+      io.ok = io.ok && (!known || options.set(key, value).has_value());
+    }
   }
 }
 

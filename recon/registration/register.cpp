@@ -142,6 +142,10 @@ Result<RegistrationReport> register_clouds(const PointCloud& source_cloud,
   report.view_score = judged[chosen].view_score;
   report.decided_by_views = view_score && rivals > 1 && stands_out(judged, chosen, rivals);
   report.skips = std::move(found.skips);
+  if (view_score && rivals == 1) {
+    report.skips.push_back({"views of the candidates", "geometry leaves one placement",
+                            "no renders of the scene from rival placements"});
+  }
   if (rivals > 1 && !report.decided_by_views) {
     report.ambiguous = true;
     add_words(report.ambiguity,

@@ -177,7 +177,7 @@ TEST_F(SessionTest, LaterLineAboutAFileAmendsIt) {
 
 TEST_F(SessionTest, NoSession) {
   EXPECT_FALSE(open_session(folder / "none"));
-  ASSERT_TRUE(write_file_atomic(folder / "file", "no folder"));
+  put(folder / "file", "no folder");
   EXPECT_EQ(open_session(folder / "file").error().found, "is a file");
   EXPECT_FALSE(open_session(folder.path()));
   EXPECT_FALSE(open(""));

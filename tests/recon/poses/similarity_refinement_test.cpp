@@ -72,7 +72,7 @@ TEST(SimilaritySupport, TellsHalfTurnsFromTheTruth) {
       {0.01, -0.01, 0.01}};
   const double right = support(off * orbit.visible_from_thermal);
   for (const Eigen::Vector3d& axis :
-       {Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ()}) {
+       {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(0, 0, 1)}) {
     const Similarity3d half_turn{1, Eigen::Quaterniond(Eigen::AngleAxisd(EIGEN_PI, axis)), {0, 0, 0}};
     EXPECT_LT(support(off * half_turn * orbit.visible_from_thermal), 0.9 * right)
         << axis.transpose();
