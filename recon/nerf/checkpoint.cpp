@@ -152,6 +152,26 @@ void visit(Archive& io, Snapshot& best) {
     best.values.resize(count);
   }
   for (std::vector<float>& values : best.values) io(values);
+  io(best.codes);
+  std::uint64_t networks = best.level_weights.size();
+  io(networks);
+  if constexpr (Archive::reading) {
+    if (networks > 64) return void(io.ok = false);
+    best.level_weights.resize(networks);
+  }
+  for (std::vector<float>& weights : best.level_weights) io(weights);
+}
+
+bool fits(const Snapshot& best, FieldState& state) {
+  const auto parameters = state.parameters();
+  const auto networks = state.density_networks();
+  bool same = best.values.size() == parameters.size() && best.level_weights.size() == networks.size() &&
+              best.occupied.size() == state.occupancy.on.size() && best.codes.size() == state.occupancy.code.size();
+  for (std::size_t i = 0; same && i < parameters.size(); ++i)
+    same = best.values[i].size() == parameters[i]->value.size();
+  for (std::size_t i = 0; same && i < networks.size(); ++i)
+    same = best.level_weights[i].size() == networks[i]->grid.level_weight.size();
+  return same;
 }
 
 template <class Archive>
@@ -187,6 +207,7 @@ void visit(Archive& io, FieldState& state) {
   }
   visit(io, state.occupancy);
   visit(io, state.best);
+  if constexpr (Archive::reading) io.ok = io.ok && (state.best.empty() || fits(state.best, state));
 }
 
 }  // namespace

@@ -56,14 +56,17 @@ Snapshot FieldState::snapshot(double psnr) {
   out.psnr = psnr;
   for (const Parameters* p : parameters()) out.values.push_back(p->value);
   out.occupied = occupancy.on;
+  out.codes = occupancy.code;
+  for (const DensityNetwork* network : density_networks()) out.level_weights.push_back(network->grid.level_weight);
   return out;
 }
 
 void FieldState::restore(const Snapshot& from) {
   const auto sets = parameters();
   for (std::size_t i = 0; i < sets.size(); ++i) sets[i]->value = from.values[i];
-  occupancy.on = from.occupied;
-  occupancy.refresh();
+  const auto networks = density_networks();
+  for (std::size_t i = 0; i < networks.size(); ++i) networks[i]->grid.level_weight = from.level_weights[i];
+  occupancy.restore(from.occupied, from.codes);
   refresh();
 }
 

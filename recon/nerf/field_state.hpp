@@ -31,6 +31,8 @@ struct Snapshot {
   double psnr = 0;
   std::vector<std::vector<float>> values;
   std::vector<std::uint64_t> occupied;
+  std::vector<std::uint8_t> codes;                ///< the occupancy's: they place the samples
+  std::vector<std::vector<float>> level_weights;  ///< of each density network
   bool empty() const { return values.empty(); }
 };
 

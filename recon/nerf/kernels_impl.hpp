@@ -249,13 +249,16 @@ inline void scatter_grid(const GridLevel& level, float* grad, const float* posit
 inline void adam_update(const AdamStep& step, std::int64_t count, float* parameter, float* first,
                         float* second, float* grad, std::uint16_t* half) {
   const __m256 zero = _mm256_setzero_ps();
+  const __m256 largest = _mm256_set1_ps(1e15f), minus_largest = _mm256_set1_ps(-1e15f);
   const __m256 limit = _mm256_set1_ps(max_half), minus_limit = _mm256_set1_ps(-max_half);
   for (std::int64_t i = 0; i < count; i += 8) {
     const __m256 raw = _mm256_loadu_ps(grad + i);
     const __m256 used = _mm256_cmp_ps(raw, zero, _CMP_NEQ_UQ);
     if (_mm256_testz_ps(used, used)) continue;
     const __m256 p = _mm256_loadu_ps(parameter + i);
-    const __m256 g = _mm256_fmadd_ps(_mm256_set1_ps(step.weight_decay), p, raw);
+    // Its square must stay finite; the order of the operands turns NaN into the bound.
+    const __m256 bounded = _mm256_max_ps(_mm256_min_ps(raw, largest), minus_largest);
+    const __m256 g = _mm256_fmadd_ps(_mm256_set1_ps(step.weight_decay), p, bounded);
     const __m256 m0 = _mm256_loadu_ps(first + i), v0 = _mm256_loadu_ps(second + i);
     const __m256 m = _mm256_fmadd_ps(_mm256_set1_ps(1 - step.beta1), _mm256_sub_ps(g, m0), m0);
     const __m256 v = _mm256_fmadd_ps(_mm256_set1_ps(1 - step.beta2),

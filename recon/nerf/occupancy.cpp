@@ -59,6 +59,11 @@ struct Decoded {
   }
 };
 
+const Decoded& decoded() {
+  static const Decoded table;
+  return table;
+}
+
 }  // namespace
 
 void Occupancy::refresh() {
@@ -73,6 +78,12 @@ void Occupancy::refresh() {
     code[i] = density[i] > 0 ? code_of(density[i]) : std::uint8_t{0};
     if (code[i] > 0) march_words[2 * (i >> 6) + 1] |= std::uint64_t{1} << (i & 63);
   }
+}
+
+void Occupancy::restore(const std::vector<std::uint64_t>& cells_on, const std::vector<std::uint8_t>& codes) {
+  on = cells_on;
+  for (std::size_t i = 0; i < density.size(); ++i) density[i] = decoded().density[codes[i]];
+  refresh();
 }
 
 double Occupancy::fraction_on() const {
@@ -126,7 +137,7 @@ struct Segment {
   bool plain;     ///< nothing is known of it but that it may be occupied
 };
 
-constexpr int max_segments = 1024;
+constexpr int max_segments = 4096;  // a diagonal through all cascades of 256 cells needs 2300
 
 /// Occupied cells along the ray, nearest first.
 int segments_of(const Occupancy& occupancy, const Ray& ray, float near, float far, Segment* out) {
@@ -143,7 +154,7 @@ int segments_of(const Occupancy& occupancy, const Ray& ray, float near, float fa
     if (ray.origin[d] * ray.direction[d] >= 0) return 0;
     t = std::max(t, gap * std::abs(inverse[d]) * 1.0001f);
   }
-  static const Decoded decoded;
+  const Decoded& table = decoded();
   int count = 0;
   for (int guard = 0; t < far && guard < 8 * max_segments && count < max_segments; ++guard) {
     float x[3];
@@ -172,7 +183,7 @@ int segments_of(const Occupancy& occupancy, const Ray& ray, float near, float fa
         last->haze += exit / size;
       } else {
         // depth / (1 + depth) stands for 1 - exp(-depth): only relative sizes matter here.
-        const float depth = exit * decoded.density[code];
+        const float depth = exit * table.density[code];
         out[count++] = {t, exit, depth / (1 + depth), exit / size, code == 0};
       }
     }

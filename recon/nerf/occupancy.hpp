@@ -58,6 +58,8 @@ struct Occupancy {
     return block * 64 + ((i[2] & 3) << 4 | (i[1] & 3) << 2 | (i[0] & 3));
   }
   int coordinates_of(std::int64_t cell, int i[3]) const;  ///< returns the cascade
+  /// Cells and codes as they were; densities follow from the codes.
+  void restore(const std::vector<std::uint64_t>& cells_on, const std::vector<std::uint8_t>& codes);
   /// Derived arrays, after `on` or `density` were set from outside.
   void refresh();
 

@@ -237,6 +237,10 @@ Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
     }
   }
   watch.pause();
+  if (report.skipped_steps > 0 && trainer.rays() > 0 && report.skipped_steps == state->step)
+    return fail(ErrorKind::quality, stage,
+                fmt::format("none of the {} steps had a finite gradient", report.skipped_steps),
+                "look for NaN in the images or, with shared geometry, train the guide field again");
   ORBITFUSE_TRY(save());
   report.iterations = state->step;
   report.cpu_s = watch.cpu_s;

@@ -169,7 +169,12 @@ bool Trainer::step(double progress) {
   }
   rays_ += drawn;
   samples_ += samples;
-  const bool finite = gradients.finite && std::isfinite(gradients.squared_error) &&
+  bool finite = gradients.finite && all_finite(gradients.mlp.data(), gradients.mlp.size()) &&
+                all_finite(gradients.color.data(), gradients.color.size()) &&
+                all_finite(gradients.offsets.data(), gradients.offsets.size());
+  for (std::size_t k = 0; with_proposals && k < field_.proposals.size(); ++k)
+    finite = finite && all_finite(gradients.proposals[k].data(), gradients.proposals[k].size());
+  finite = finite && std::isfinite(gradients.squared_error) &&
                       std::isfinite(gradients.distortion) && std::isfinite(gradients.depth) &&
                       std::isfinite(gradients.interlevel);
   if (finite && drawn > 0) {

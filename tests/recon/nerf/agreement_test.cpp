@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "core/parallel.hpp"
 #include "recon/nerf/compositing.hpp"
@@ -228,9 +229,15 @@ TEST(Agreement, GridParametersStayWithinHalfPrecision) {
     const auto count = static_cast<std::int64_t>(grid.table.size());
     AdamStep step;
     step.learning_rate = 1e9f;
-    for (std::size_t i = 0; i < grid.table.size(); ++i) grid.table.grad[i] = i % 2 ? 1e30f : -1e-30f;
-    kernels_for(isa).adam(step, count, grid.table.value.data(), grid.table.first.data(),
-                          grid.table.second.data(), grid.table.grad.data(), grid.half.data());
+    // A step past the range of half precision, then gradients whose squares are infinite, and NaN.
+    for (const float gradient : {1.0f, 1e30f, std::numeric_limits<float>::infinity(), std::nanf("")}) {
+      for (std::size_t i = 0; i < grid.table.size(); ++i) grid.table.grad[i] = i % 2 ? gradient : -gradient;
+      kernels_for(isa).adam(step, count, grid.table.value.data(), grid.table.first.data(),
+                            grid.table.second.data(), grid.table.grad.data(), grid.half.data());
+      if (gradient == 1.0f) {
+        EXPECT_EQ(std::abs(grid.table.value[0]), max_half) << "the step was to pass it, " << name(isa);
+      }
+    }
     for (std::size_t i = 0; i < grid.table.size(); ++i) {
       EXPECT_LE(std::abs(grid.table.value[i]), max_half) << name(isa);
       EXPECT_LT(grid.half[i] & 0x7fff, 0x7c00) << "infinite half, " << name(isa);

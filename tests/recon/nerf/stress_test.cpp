@@ -132,7 +132,7 @@ TEST(Stress, CameraInsideTheObjectAndEmptySpaceRender) {
   EXPECT_FALSE(render(field, data.views[0].camera, inside, {}, {}));
 }
 
-TEST(Stress, AStepWithoutFiniteGradientIsSkippedAndCounted) {
+TEST(Stress, StepsWithoutFiniteGradientsAreSkippedAndARunOfThemIsAnError) {
   const Dataset data = toy_scene(Modality::visible, 6);
   Field guide;
   ASSERT_TRUE(train(data, toy_options(Modality::visible, 5), {}, guide));
@@ -141,8 +141,9 @@ TEST(Stress, AStepWithoutFiniteGradientIsSkippedAndCounted) {
   options.shared_geometry = true;
   Field field;
   const auto report = train(data, options, {}, field, &guide);
-  ASSERT_TRUE(report);
-  EXPECT_EQ(report->skipped_steps, 6);
+  ASSERT_FALSE(report);
+  EXPECT_EQ(report.error().kind, ErrorKind::quality);
+  EXPECT_NE(report.error().found.find("none of the 6 steps"), std::string::npos);
 }
 
 TEST(Occupancy, RaysThatMissAndDegenerateRaysGetNoSamples) {
