@@ -6,6 +6,6 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 cmake/install_packages.sh
-cmake/build.sh
+cmake/build.sh --target orbitfuse
 session=$(ls -d replay_data/*/ | head -n 1)
 build/release/app/orbitfuse run "${session%/}" --out out/ "$@"

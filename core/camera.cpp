@@ -5,6 +5,7 @@
 
 #include <Eigen/LU>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -45,6 +46,18 @@ Status Camera::validate(const std::string& where) const {
   if (fx <= 0 || fy <= 0) {
     return fail(ErrorKind::input, where, fmt::format("focal length {} x {} pixels", fx, fy),
                 "must be > 0");
+  }
+  // Fields of view from half a degree to 170; cropping moves the centre, but not out of sight.
+  const double side = std::max(width, height);
+  for (const double focal : {fx, fy}) {
+    if (focal < 0.04 * side || focal > 120 * side) {
+      return fail(ErrorKind::input, where, fmt::format("focal length {:g} pixels for an image of {}x{}", focal, width, height),
+                  "give it in pixels of this image size");
+    }
+  }
+  if (std::abs(cx - 0.5 * width) > side || std::abs(cy - 0.5 * height) > side) {
+    return fail(ErrorKind::input, where, fmt::format("principal point ({:g}, {:g}) far outside an image of {}x{}", cx, cy, width, height),
+                "give cx and cy in pixels of this image size");
   }
   return {};
 }

@@ -26,10 +26,7 @@ Result<std::string> fuse_one(const std::string& stem, const fs::path& visible_fi
   ORBITFUSE_ASSIGN(const cv::Mat visible, read_image(visible_file));
   ORBITFUSE_ASSIGN(cv::Mat thermal, read_thermal(thermal_file));
   ORBITFUSE_ASSIGN(const cv::Mat fused, fuse(visible, thermal, {}, options));
-  if (thermal.depth() == CV_32F) {
-    ORBITFUSE_ASSIGN(const ThermalGray gray, thermal_gray(thermal, options.span));
-    gray.gray.convertTo(thermal, CV_8U);
-  }
+  ORBITFUSE_ASSIGN(thermal, gray_of_thermal(thermal, options.span));
   ORBITFUSE_ASSIGN(const auto values, fusion_metrics(visible, thermal, fused));
   ORBITFUSE_TRY(write_png(out / "vi" / (stem + ".png"), visible));
   ORBITFUSE_TRY(write_png(out / "ir" / (stem + ".png"), thermal));
@@ -44,6 +41,14 @@ Result<std::string> fuse_one(const std::string& stem, const fs::path& visible_fi
 Result<cv::Mat> read_thermal(const fs::path& file) {
   ORBITFUSE_ASSIGN(const cv::Mat image, read_image(file));
   return image.type() == CV_16UC1 ? read_thermal_k(file) : Result<cv::Mat>(image);
+}
+
+Result<cv::Mat> gray_of_thermal(const cv::Mat& thermal, const std::optional<TemperatureSpan>& span) {
+  if (thermal.depth() != CV_32F) return thermal;
+  ORBITFUSE_ASSIGN(const ThermalGray gray, thermal_gray(thermal, span));
+  cv::Mat bytes;
+  gray.gray.convertTo(bytes, CV_8U);
+  return bytes;
 }
 
 Result<Summary> fuse_folder(const fs::path& visible, const fs::path& thermal, const fs::path& out,

@@ -21,10 +21,13 @@ struct Summary {
 /// anything else stays as stored.
 Result<cv::Mat> read_thermal(const std::filesystem::path& file);
 
+/// The 8-bit image in which it is fused and scored: kelvin over `span` (none: their own), anything
+/// else as it is.
+Result<cv::Mat> gray_of_thermal(const cv::Mat& thermal, const std::optional<TemperatureSpan>& span);
+
 /// Fuses the images of equal stem in two folders into out/vi, out/ir and out/fused (all PNG, equal
-/// names: the aligned-pairs layout that fusion networks train on) and writes out/metrics.csv.
-/// Thermal images in
-/// kelvin are written and scored as the gray images that were fused. A bad pair is told and left out. Input error when no pair could be fused.
+/// names: the aligned-pairs layout that fusion networks train on) and writes out/metrics.csv. A bad
+/// pair is told and left out. Input error when no pair could be fused.
 Result<Summary> fuse_folder(const std::filesystem::path& visible, const std::filesystem::path& thermal,
                             const std::filesystem::path& out, const FusionOptions& options,
                             const Progress& progress);

@@ -151,12 +151,7 @@ RunConfig::RunConfig() {
   train_thermal.options = nerf::preset(nerf::default_preset(Modality::thermal)).value();
   // A run shows held-out error, and fits into a few minutes on two cores; docs/benchmarks/run.md.
   for (TrainConfig* train : {&train_visible, &train_thermal}) train->options.holdout_every = 12;
-  // Thermal views are posed against renders of this field. Renders of the preset's many small steps
-  // led some views of a scene astray that these few large ones place (docs/benchmarks/run.md).
-  train_visible.options.iterations = 1200;
-  train_visible.options.samples_per_step = 1 << 15;
-  train_visible.options.learning_rate = train_visible.options.network_learning_rate = 1e-2;
-  train_visible.options.distortion_weight = 0.002;
+  train_visible.options.iterations = 4800;
   train_thermal.options.iterations = 2400;
   // Thermal views have little texture: on their own they become fog.
   train_thermal.options.shared_geometry = true;

@@ -18,7 +18,7 @@ namespace orbitfuse::stages {
 /// How one modality's field is trained; the fields of `options` come from its preset.
 struct TrainConfig {
   nerf::TrainOptions options;
-  int max_width_px = 400;  ///< training images; poses were measured with fields of this width
+  int max_width_px = 800;  ///< training images: memory, not time, grows with it
   nerf::ExportOptions cloud;
 };
 

@@ -3,6 +3,7 @@
 
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
+#include "app/fusion_batch/fusion_batch.hpp"
 #include "core/image_io.hpp"
 #include "fusion/metrics/metrics.hpp"
 
@@ -20,7 +21,9 @@ Status score_files(Context& context, const Options& o) {
        {std::pair{"--visible", &o.visible}, {"--thermal", &o.thermal}, {"--fused", &o.fused}})
     if (value->empty()) return fail(ErrorKind::usage, option, "not given", "name all three images");
   ORBITFUSE_ASSIGN(const cv::Mat visible, read_image(o.visible));
-  ORBITFUSE_ASSIGN(const cv::Mat thermal, read_image(o.thermal));
+  // Radiometric files are scored as the gray image that fusion makes of them.
+  ORBITFUSE_ASSIGN(const cv::Mat stored, batch::read_thermal(o.thermal));
+  ORBITFUSE_ASSIGN(const cv::Mat thermal, batch::gray_of_thermal(stored, {}));
   ORBITFUSE_ASSIGN(const cv::Mat fused, read_image(o.fused));
   ORBITFUSE_ASSIGN(const auto values, fusion_metrics(visible, thermal, fused));
   nlohmann::json metrics = nlohmann::json::object(), definitions = metrics;

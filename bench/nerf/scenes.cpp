@@ -23,6 +23,10 @@ Camera camera_of(const json& k) {
   c.fy = k.at("fy");
   c.cx = k.at("cx");
   c.cy = k.at("cy");
+  c.k1 = k.value("k1", 0.0);
+  c.k2 = k.value("k2", 0.0);
+  c.p1 = k.value("p1", 0.0);
+  c.p2 = k.value("p2", 0.0);
   return c;
 }
 
@@ -80,11 +84,38 @@ Status add_points(nerf::Dataset& data, const std::filesystem::path& model) {
   return {};
 }
 
-/// Stations at 15 to 131 degrees: five of each loop, 116 degrees wide.
+/// 125 degrees: of a 30 degree orbit four or five stations of each loop.
 bool in_sector(const json& frame) {
   const Eigen::Vector3d center = camera_center(pose_of(frame));
   const double azimuth = std::atan2(center.y(), center.x()) * 180 / 3.14159265358979;
   return azimuth >= 10 && azimuth <= 135;
+}
+
+/// Removes "-WORD" from the end of the name; whether it was there.
+bool take_word(std::string& name, const std::string& word) {
+  if (!name.ends_with("-" + word)) return false;
+  name.resize(name.size() - word.size() - 1);
+  return true;
+}
+
+Result<nerf::Dataset> load_orbit(const std::filesystem::path& folder, Modality modality, bool sector, bool full) {
+  const bool thermal = modality == Modality::thermal;
+  const std::string own(name(modality));
+  nerf::Dataset data;
+  data.modality = modality;
+  ORBITFUSE_ASSIGN(const std::string text, read_file(folder / "ground_truth.json"));
+  const json truth = json::parse(text);
+  for (const std::string& group : {own, std::string("test")})
+    for (const json& frame : truth.at(group).at("frames")) {
+      if (sector && !in_sector(frame)) continue;
+      const bool test = group == "test";
+      ORBITFUSE_ASSIGN(nerf::TrainingView view,
+                       load_view(folder / frame.at(test ? own : "file").get<std::string>(),
+                                 camera_of(truth.at(group).at("K")), pose_of(frame), modality, test));
+      const Camera& c = view.camera;
+      data.views.push_back(thermal || full ? std::move(view) : nerf::resized(view, 400, 400 * c.height / c.width));
+    }
+  return data;
 }
 
 }  // namespace
@@ -92,26 +123,11 @@ bool in_sector(const json& frame) {
 Result<nerf::Dataset> load_scene(const std::string& name, const std::filesystem::path& folder,
                                  const std::filesystem::path& model) {
   if (name == "fox") return load_fox(folder / "fox");
-  const bool thermal = name.starts_with("container-thermal");
-  const bool full = name == "container-full";
-  if (name != "container" && !full && name != "container-thermal" && name != "container-thermal-sector")
-    return fail(ErrorKind::usage, "scene", "'" + name + "'",
-                "choose fox, container, container-full, container-thermal or container-thermal-sector");
-  const bool sector = name == "container-thermal-sector";
-  nerf::Dataset data;
-  data.modality = thermal ? Modality::thermal : Modality::visible;
-  ORBITFUSE_ASSIGN(const std::string text, read_file(folder / "container/ground_truth.json"));
-  const json truth = json::parse(text);
-  for (const char* group : {thermal ? "thermal" : "visible", "test"})
-    for (const json& frame : truth.at(group).at("frames")) {
-      const bool test = std::string(group) == "test";
-      if (sector && !in_sector(frame)) continue;
-      const std::string file = frame.at(test ? (thermal ? "thermal" : "visible") : "file");
-      ORBITFUSE_ASSIGN(nerf::TrainingView view,
-                       load_view(folder / "container" / file, camera_of(truth.at(group).at("K")),
-                                 pose_of(frame), data.modality, test));
-      data.views.push_back(thermal || full ? std::move(view) : nerf::resized(view, 400, 300));
-    }
+  std::string base = name;
+  const bool full = take_word(base, "full"), sector = take_word(base, "sector");
+  const Modality modality = take_word(base, "thermal") ? Modality::thermal : Modality::visible;
+  ORBITFUSE_ASSIGN(nerf::Dataset data, load_orbit(base.find('/') == std::string::npos ? folder / base : std::filesystem::path(base),
+                                                  modality, sector, full));
   if (!model.empty()) ORBITFUSE_TRY(add_points(data, model));
   return data;
 }

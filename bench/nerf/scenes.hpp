@@ -9,10 +9,10 @@
 
 namespace orbitfuse::bench {
 
-/// Named cases on the shared data: "fox" (270x480, every 8th view measures), "container" (visible,
-/// exact poses, 24 train, the 8 test views measure, 400x300), "container-full" (the same at 800x600), "container-thermal" (exact poses, 24
-/// train at 640x480, the 8 noise-free test views measure), "container-thermal-sector" (120 degrees).
-/// `model` (may be empty) is a COLMAP model whose points are used (container).
+/// "fox" (270x480, every 8th view measures), or ORBIT[-thermal][-sector][-full]: an orbit with a
+/// ground_truth.json (a folder in `data`, or a path with a slash), exact poses, its test views
+/// measure. Visible images are 400 pixels wide unless "-full"; "-sector" keeps the views, of both
+/// kinds, in 125 degrees of azimuth. `model` (may be empty) is a COLMAP model whose points are used.
 Result<nerf::Dataset> load_scene(const std::string& name, const std::filesystem::path& data,
                                  const std::filesystem::path& model);
 

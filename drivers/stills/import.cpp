@@ -195,6 +195,7 @@ class Importer {
       report_.has_temperatures = report_.has_temperatures || !still->frame.thermal_is_gray;
       ORBITFUSE_TRY(add_frame(std::move(*still), source, tracking, options_.thermal_stations));
       if (options_.embedded_visible && file->flir && !file->flir->embedded_visible.empty()) {
+        ++embedded_;
         ORBITFUSE_TRY(add_visible_frame(file->flir->embedded_visible, source, tracking,
                                         options_.thermal_stations));
       }
@@ -332,6 +333,8 @@ class Importer {
     tell_of_groups(Modality::thermal);
     check_station_count(options_.visible_stations, report_.visible, "visible");
     check_station_count(options_.thermal_stations, report_.thermal, "thermal");
+    if (options_.embedded_visible && embedded_ == 0)
+      report_.warnings.push_back("no thermal image has a photo embedded: there are no visible frames from them");
     if (decoder_.samples_are_raw_counts()) {
       report_.warnings.push_back("thermal samples are raw counts without a known scale: kept as grey intensities, "
                                  "no temperatures (give their scale if you know it)");
@@ -356,6 +359,7 @@ class Importer {
   std::size_t done_ = 0, total_ = 0;
   std::string first_failure_;
   ImportReport report_;
+  int embedded_ = 0;  ///< photos found in radiometric JPEGs
 };
 
 }  // namespace

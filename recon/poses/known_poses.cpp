@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace orbitfuse {
 namespace {
 
@@ -13,6 +15,13 @@ std::optional<Camera> known_camera(const Session& session, const FrameRecord& fr
   const Camera& camera = *device->lens.calibrated;
   if (frame.width <= 0 || frame.height <= 0) return camera;
   return camera.scaled_to(frame.width, frame.height);
+}
+
+bool at_one_place(const Reconstruction& model) {
+  const Eigen::Vector3d first = camera_center(model.views.front().cam_from_world);
+  return std::all_of(model.views.begin(), model.views.end(), [&](const PosedView& view) {
+    return (camera_center(view.cam_from_world) - first).norm() <= 1e-9 * std::max(1e-9, first.norm());
+  });
 }
 
 }  // namespace
@@ -39,10 +48,14 @@ Result<ModalityPoses> known_poses(const Session& session, Modality modality) {
     ORBITFUSE_TRY(camera->validate(frame->file));
     if (!frame->cam_from_world->is_finite())
       return fail(ErrorKind::input, frame->file, "its known pose is not finite",
-                  "correct the imported poses, or run with --no-known-poses");
+                  "correct the imported poses, or set poses.use_known_poses = false (--set)");
     poses.reconstruction.views.push_back({frame->file, *camera, *frame->cam_from_world});
   }
   const int posed = static_cast<int>(poses.reconstruction.views.size());
+  if (posed >= 2 && at_one_place(poses.reconstruction))
+    return fail(ErrorKind::input, fmt::format("known {} poses", name(modality)),
+                fmt::format("all {} cameras stand at one place", posed),
+                "form needs views from several: correct the imported poses, or set poses.use_known_poses = false (--set)");
   poses.ladder.push_back({"known poses", true, "the session carries them", posed,
                           poses.frame_count, 0.0});
   poses.gates["posed_ratio"] = poses.posed_ratio();

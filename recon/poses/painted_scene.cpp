@@ -71,13 +71,14 @@ void paint(const cv::Mat& layer, cv::Mat& painting) {
 
 /// Painters by how little their direction of view differs, nearest first.
 std::vector<const Painter*> nearest(const Painters& painters, const Rigid3d& cam_from_world,
-                                    int count) {
-  std::vector<const Painter*> near;
-  for (const Painter& painter : painters) near.push_back(&painter);
-  const auto kept = std::min(near.size(), static_cast<std::size_t>(std::max(count, 0)));
+                                    const PaintedSceneOptions& options) {
   const auto turned = [&](const Painter* p) {
     return rotation_angle_deg(p->cam_from_world.rotation, cam_from_world.rotation);
   };
+  std::vector<const Painter*> near;
+  for (const Painter& painter : painters)
+    if (turned(&painter) >= options.min_turn_deg) near.push_back(&painter);
+  const auto kept = std::min(near.size(), static_cast<std::size_t>(std::max(options.painters, 0)));
   std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(kept), near.end(),
                     [&](const Painter* a, const Painter* b) { return turned(a) < turned(b); });
   near.resize(kept);
@@ -110,7 +111,7 @@ Result<SceneRenderer> painted_scene(const SceneRenderer& renderer,
     ORBITFUSE_ASSIGN(SceneView view, renderer(camera, cam_from_world));
     const auto points = world_points(view.depth, camera, cam_from_world);
     view.brightness = cv::Mat(view.depth.size(), CV_32F, cv::Scalar(unpainted));
-    for (const Painter* painter : nearest(*painters, cam_from_world, options.painters)) {
+    for (const Painter* painter : nearest(*painters, cam_from_world, options)) {
       cv::Mat layer(view.depth.size(), CV_32F);
       for (std::size_t p = 0; p < points.size(); ++p)
         layer.ptr<float>()[p] = seen_by(*painter, points[p], options.depth_tolerance);

@@ -15,6 +15,8 @@ struct PaintedSceneOptions {
   int width_px = 320;             ///< of the painting images and their depth
   int painters = 3;               ///< views that paint a render: those seen from nearest by
   double depth_tolerance = 0.03;  ///< relative; beyond it the painter sees something else there
+  /// Views turned by less don't paint: a view that is itself a painter must be judged by others.
+  double min_turn_deg = 0;
 };
 
 /// Renders with `renderer`'s depth and brightness from `images` (CV_32FC1) of `views`, NaN where no

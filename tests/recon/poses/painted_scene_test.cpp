@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "recon/poses/heat_check.hpp"
 #include "recon/poses/orbit_rescue.hpp"
 #include "tests/recon/poses/box_scene.hpp"
 #include "tests/recon/poses/orbit_fixture.hpp"
@@ -70,6 +71,17 @@ TEST(PaintedScene, ARendererThatFailsIsPassedOn) {
   EXPECT_EQ(painted.error().where, "field");
 }
 
+void add_tracking(OrbitViews& orbit, RenderAlignment& alignment, double nominal_deg,
+                  const cv::Mat& image) {
+  RenderAlignedView view;
+  view.view = at(0);
+  alignment.views.push_back(view);
+  orbit.images.push_back(image);
+  Station station;
+  station.azimuth_deg = nominal_deg;
+  orbit.stations.push_back(station);
+}
+
 /// Stations every 30 deg, as posed.
 void add_stations(OrbitViews& orbit, RenderAlignment& alignment) {
   for (int i = 0; i < 12; ++i) {
@@ -83,15 +95,53 @@ void add_stations(OrbitViews& orbit, RenderAlignment& alignment) {
   }
 }
 
-void add_tracking(OrbitViews& orbit, RenderAlignment& alignment, double nominal_deg,
-                  const cv::Mat& image) {
-  RenderAlignedView view;
-  view.view = at(0);
-  alignment.views.push_back(view);
-  orbit.images.push_back(image);
-  Station station;
-  station.azimuth_deg = nominal_deg;
-  orbit.stations.push_back(station);
+TEST(PaintedScene, APainterDoesNotJudgeItself) {
+  const SceneRenderer form = testing_orbit::box_renderer();
+  PaintedSceneOptions options;
+  options.min_turn_deg = 8;
+  const auto painted = painted_scene(form, {at(0)}, {thermal_of(at(0))}, options, {});
+  ASSERT_TRUE(painted);
+  const auto own = (*painted)(at(3).camera, at(3).cam_from_world);
+  ASSERT_TRUE(own);
+  for (const float value : cv::Mat1f(own->brightness)) EXPECT_TRUE(std::isnan(value));
+  const auto other = (*painted)(at(20).camera, at(20).cam_from_world);
+  ASSERT_TRUE(other);
+  EXPECT_GT(cv::countNonZero(other->brightness == other->brightness), 1000);
+}
+
+double off_deg(const RenderAlignedView& view, const PosedView& truth) {
+  return rotation_angle_deg(view.view.cam_from_world.rotation, truth.cam_from_world.rotation);
+}
+
+TEST(CorrectByHeat, AViewOnTheWrongRibGoesHomeAndTheOthersStay) {
+  OrbitViews orbit;
+  RenderAlignment alignment;
+  add_stations(orbit, alignment);
+  alignment.views[4].view = at(129);
+  alignment.views[9].view = at(270, 20);
+  const SceneRenderer form = testing_orbit::box_renderer();
+  const Progress progress;
+  const auto gone = correct_by_heat({form, orbit, progress}, alignment);
+  ASSERT_TRUE(gone) << gone.error().message();
+  EXPECT_GE(*gone, 2);
+  for (int i = 0; i < 12; ++i)
+    EXPECT_LT(off_deg(alignment.views[static_cast<std::size_t>(i)], at(30 * i)), 1.0) << i;
+}
+
+TEST(CorrectByHeat, WhereMostAreContradictedNoneGoes) {
+  OrbitViews orbit;
+  RenderAlignment alignment;
+  add_stations(orbit, alignment);
+  for (std::size_t i = 0; i < 12; ++i)
+    if (i % 4 != 0) alignment.views[i].view = at(30.0 * static_cast<double>(i) + 40, 35);
+  const RenderAlignment before = alignment;
+  const SceneRenderer form = testing_orbit::box_renderer();
+  const Progress progress;
+  const auto gone = correct_by_heat({form, orbit, progress}, alignment);
+  ASSERT_TRUE(gone) << gone.error().message();
+  EXPECT_EQ(*gone, 0);
+  for (std::size_t i = 0; i < 12; ++i)
+    EXPECT_EQ(off_deg(alignment.views[i], before.views[i].view), 0) << i;
 }
 
 TEST(AddViews, OnlyFramesThatBothScenesPlaceAlikeAreConfirmed) {

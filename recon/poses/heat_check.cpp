@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/heat_check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+
+#include "recon/poses/painted_scene.hpp"
+
+namespace orbitfuse {
+namespace {
+
+/// Of their loop's usual support among temperatures. Right places on `container` had 0.7 or more,
+/// wrong ones 0.4 at most.
+constexpr double found_share = 0.5;
+/// Among stations, which see less of each other's scene: below it a station is searched again.
+constexpr double settled_share = 0.6;
+/// Two views turned by less are one station's: its own temperatures confirm any place.
+constexpr double own_turn_deg = 8;
+
+/// Why the place found among the temperatures of settled views doesn't confirm the view's; empty if
+/// it does.
+std::string doubt(const OrbitViews& orbit, const RenderAlignedView& view,
+                  const RenderAlignedView& second, double usual_support) {
+  if (!(second.support() > found_share * usual_support))
+    return "its edges are not found among the stations' temperatures";
+  const Rigid3d &by_form = view.view.cam_from_world, &by_heat = second.view.cam_from_world;
+  if (same_place(orbit, by_form, by_heat)) return {};
+  return fmt::format("the visible scene and the stations' temperatures place it {:.1f} deg apart",
+                     apart_deg(orbit, by_form, by_heat));
+}
+
+using Usual = std::map<int, double>;  // support by loop: one sees more of the scene than another
+
+Usual usual_support(const OrbitViews& orbit, const std::vector<std::size_t>& asked,
+                    const Fit& found) {
+  std::map<int, std::vector<double>> supports;
+  for (std::size_t c = 0; c < asked.size(); ++c)
+    supports[orbit.stations[asked[c]].loop].push_back(found.views[c].support());
+  Usual usual;
+  for (const auto& [loop, values] : supports) usual[loop] = median_of(values);
+  return usual;
+}
+
+/// Views whose place isn't confirmed by the temperatures of the settled ones. Each is given the
+/// place that both agree on from there, if there is one. `usual` is filled where empty.
+Result<std::vector<std::size_t>> unconfirmed(const Refinery& visible, const Refinery& painted,
+                                             const std::vector<std::size_t>& asked, Usual& usual,
+                                             Fit& alignment) {
+  const OrbitViews& orbit = visible.orbit;
+  std::vector<PosedView> starts, places;
+  for (const std::size_t i : asked) starts.push_back(alignment.views[i].view);
+  ORBITFUSE_ASSIGN(const Fit second, painted.restart(asked, starts, judging_rounds()));
+  if (usual.empty()) usual = usual_support(orbit, asked, second);
+  const auto doubt_of = [&](std::size_t view, const RenderAlignedView& by_form,
+                            const RenderAlignedView& by_heat) {
+    return doubt(orbit, by_form, by_heat, usual.at(orbit.stations[view].loop));
+  };
+  std::vector<std::size_t> doubtful, still;
+  std::vector<RenderAlignedView> seconds;
+  for (std::size_t c = 0; c < asked.size(); ++c) {
+    RenderAlignedView& view = alignment.views[asked[c]];
+    view.doubt = doubt_of(asked[c], view, second.views[c]);
+    if (view.doubt.empty()) continue;
+    doubtful.push_back(asked[c]);
+    seconds.push_back(second.views[c]);
+    places.push_back(second.views[c].view);
+  }
+  ORBITFUSE_ASSIGN(const Fit first, visible.restart(doubtful, places, fine_rounds()));
+  for (std::size_t c = 0; c < doubtful.size(); ++c) {
+    if (doubt_of(doubtful[c], first.views[c], seconds[c]).empty())
+      alignment.views[doubtful[c]] = first.views[c];
+    else
+      still.push_back(doubtful[c]);
+  }
+  return still;
+}
+
+/// The scene that the chosen views paint, for judging them: none paints for itself.
+Result<SceneRenderer> painted_by(const Refinery& refinery, const Fit& alignment,
+                                 const std::vector<std::size_t>& chosen) {
+  PaintedSceneOptions painting;
+  painting.min_turn_deg = own_turn_deg;
+  std::vector<PosedView> painters;
+  std::vector<cv::Mat> images;
+  for (const std::size_t i : chosen) {
+    painters.push_back(alignment.views[i].view);
+    images.push_back(refinery.orbit.images[i]);
+  }
+  return painted_scene(refinery.renderer, painters, images, painting, refinery.progress);
+}
+
+/// Views whose place the temperatures of the others don't confirm.
+Result<std::vector<std::size_t>> contradicted(const Refinery& refinery, const Fit& alignment) {
+  const OrbitViews& orbit = refinery.orbit;
+  std::vector<std::size_t> all(alignment.views.size()), lost;
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  std::vector<PosedView> places;
+  for (const RenderAlignedView& v : alignment.views) places.push_back(v.view);
+  ORBITFUSE_ASSIGN(const SceneRenderer renderer, painted_by(refinery, alignment, all));
+  const Refinery painted{renderer, orbit, refinery.progress};
+  ORBITFUSE_ASSIGN(const Fit second, painted.restart(all, places, judging_rounds()));
+  const Usual usual = usual_support(orbit, all, second);
+  for (const std::size_t i : all)
+    if (second.views[i].support() < settled_share * usual.at(orbit.stations[i].loop) ||
+        !same_place(orbit, places[i].cam_from_world, second.views[i].view.cam_from_world))
+      lost.push_back(i);
+  return lost;
+}
+
+}  // namespace
+
+Result<int> correct_by_heat(const Refinery& refinery, Fit& alignment) {
+  const OrbitViews& orbit = refinery.orbit;
+  ORBITFUSE_ASSIGN(const std::vector<std::size_t> lost, contradicted(refinery, alignment));
+  refinery.progress.report(
+      {"poses.thermal", 3, 4, -1,
+       fmt::format("{} views contradicted by the others' temperatures", lost.size())});
+  if (lost.empty() || 2 * lost.size() > alignment.views.size()) return 0;
+  std::vector<std::size_t> rest;
+  for (std::size_t i = 0; i < alignment.views.size(); ++i)
+    if (std::count(lost.begin(), lost.end(), i) == 0) rest.push_back(i);
+  ORBITFUSE_ASSIGN(const SceneRenderer renderer, painted_by(refinery, alignment, rest));
+  const Refinery painted{renderer, orbit, refinery.progress};
+  ORBITFUSE_ASSIGN(const std::vector<PosedView> starts, painted.search(lost, alignment));
+  std::vector<PosedView> places, best;
+  for (const std::size_t i : lost) places.push_back(alignment.views[i].view);
+  ORBITFUSE_ASSIGN(const Fit stayed, painted.restart(lost, places, judging_rounds()));
+  ORBITFUSE_ASSIGN(const Fit searched, painted.restart(lost, starts, judging_rounds()));
+  for (std::size_t c = 0; c < lost.size(); ++c)
+    best.push_back(searched.views[c].support() > clearly_better * stayed.views[c].support()
+                       ? searched.views[c].view
+                       : stayed.views[c].view);
+  ORBITFUSE_ASSIGN(const Fit first, refinery.restart(lost, best, fine_rounds()));
+  int gone = 0;
+  for (std::size_t c = 0; c < lost.size(); ++c) {
+    if (!same_place(orbit, first.views[c].view.cam_from_world, best[c].cam_from_world)) continue;
+    alignment.views[lost[c]] = first.views[c];
+    ++gone;
+  }
+  return gone;
+}
+
+Status confirm_by_heat(const Refinery& refinery, std::size_t first_new, Fit& alignment) {
+  const OrbitViews& orbit = refinery.orbit;
+  std::vector<PosedView> settled;
+  std::vector<std::size_t> added;
+  for (std::size_t i = 0; i < first_new; ++i) settled.push_back(alignment.views[i].view);
+  for (std::size_t i = first_new; i < orbit.images.size(); ++i) added.push_back(i);
+  ORBITFUSE_ASSIGN(const SceneRenderer renderer,
+                   painted_scene(refinery.renderer, settled, orbit.images, {}, refinery.progress));
+  const Refinery painted{renderer, orbit, refinery.progress};
+  Usual usual;
+  ORBITFUSE_ASSIGN(std::vector<std::size_t> lost,
+                   unconfirmed(refinery, painted, added, usual, alignment));
+  ORBITFUSE_ASSIGN(const std::vector<PosedView> starts, painted.search(lost, alignment));
+  ORBITFUSE_ASSIGN(const Fit searched, refinery.restart(lost, starts, fine_rounds()));
+  for (std::size_t c = 0; c < lost.size(); ++c) alignment.views[lost[c]] = searched.views[c];
+  ORBITFUSE_ASSIGN(lost, unconfirmed(refinery, painted, lost, usual, alignment));
+  refinery.progress.report(
+      {"poses.thermal", 3, 4, -1,
+       fmt::format("{} of {} added views are not confirmed", lost.size(), added.size())});
+  return {};
+}
+
+}  // namespace orbitfuse

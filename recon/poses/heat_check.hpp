@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "recon/poses/orbit_refinery.hpp"
+
+// A second opinion on thermal poses: what other thermal views measured, painted on the visible
+// scene's form (painted_scene.hpp). It shows edges that the visible scene lacks, and finds a view
+// that settled on the wrong rib of a repeated form. Internal to recon/poses; errors: the
+// renderer's, cancelled.
+namespace orbitfuse {
+
+/// Each view judged by the temperatures of the others. Those that they contradict are searched as
+/// wholes in the scene that the rest paints, and go where both scenes then agree. Returns how many
+/// went. Where most are contradicted nobody is left to judge, and none goes.
+Result<int> correct_by_heat(const Refinery& refinery, Fit& alignment);
+
+/// Every added view, from `first_new` on, confirmed by what the settled ones before it measured;
+/// those that are not are searched as wholes in it, and keep a `doubt` if that fails.
+Status confirm_by_heat(const Refinery& refinery, std::size_t first_new, Fit& alignment);
+
+}  // namespace orbitfuse
