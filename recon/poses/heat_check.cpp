@@ -92,29 +92,48 @@ Result<SceneRenderer> painted_by(const Refinery& refinery, const Fit& alignment,
   return painted_scene(refinery.renderer, painters, images, painting, refinery.progress);
 }
 
-/// Views whose place the temperatures of the others don't confirm.
-Result<std::vector<std::size_t>> contradicted(const Refinery& refinery, const Fit& alignment) {
+struct Contradicted {
+  std::vector<std::size_t> views;  ///< whose place the temperatures of the others don't confirm
+  Usual usual;                     ///< support of a view in the scene that all others paint
+};
+
+Result<Contradicted> contradicted(const Refinery& refinery, const Fit& alignment) {
   const OrbitViews& orbit = refinery.orbit;
-  std::vector<std::size_t> all(alignment.views.size()), lost;
+  std::vector<std::size_t> all(alignment.views.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
   std::vector<PosedView> places;
   for (const RenderAlignedView& v : alignment.views) places.push_back(v.view);
   ORBITFUSE_ASSIGN(const SceneRenderer renderer, painted_by(refinery, alignment, all));
   const Refinery painted{renderer, orbit, refinery.progress};
   ORBITFUSE_ASSIGN(const Fit second, painted.restart(all, places, judging_rounds()));
-  const Usual usual = usual_support(orbit, all, second);
+  Contradicted lost{{}, usual_support(orbit, all, second)};
   for (const std::size_t i : all)
-    if (second.views[i].support() < settled_share * usual.at(orbit.stations[i].loop) ||
+    if (second.views[i].support() < settled_share * lost.usual.at(orbit.stations[i].loop) ||
         !same_place(orbit, places[i].cam_from_world, second.views[i].view.cam_from_world))
-      lost.push_back(i);
+      lost.views.push_back(i);
   return lost;
+}
+
+/// Where temperatures place each view best: from where it is, or searched as a whole.
+Result<Fit> best_by_heat(const Refinery& painted, const std::vector<std::size_t>& lost,
+                         const Fit& alignment) {
+  std::vector<PosedView> places;
+  for (const std::size_t i : lost) places.push_back(alignment.views[i].view);
+  ORBITFUSE_ASSIGN(const std::vector<PosedView> starts, painted.search(lost, alignment));
+  ORBITFUSE_ASSIGN(Fit best, painted.restart(lost, places, judging_rounds()));
+  ORBITFUSE_ASSIGN(const Fit searched, painted.restart(lost, starts, judging_rounds()));
+  for (std::size_t c = 0; c < lost.size(); ++c)
+    if (searched.views[c].support() > clearly_better * best.views[c].support())
+      best.views[c] = searched.views[c];
+  return best;
 }
 
 }  // namespace
 
 Result<int> correct_by_heat(const Refinery& refinery, Fit& alignment) {
   const OrbitViews& orbit = refinery.orbit;
-  ORBITFUSE_ASSIGN(const std::vector<std::size_t> lost, contradicted(refinery, alignment));
+  ORBITFUSE_ASSIGN(const Contradicted found, contradicted(refinery, alignment));
+  const std::vector<std::size_t>& lost = found.views;
   refinery.progress.report(
       {"poses.thermal", 3, 4, -1,
        fmt::format("{} views contradicted by the others' temperatures", lost.size())});
@@ -123,22 +142,23 @@ Result<int> correct_by_heat(const Refinery& refinery, Fit& alignment) {
   for (std::size_t i = 0; i < alignment.views.size(); ++i)
     if (std::count(lost.begin(), lost.end(), i) == 0) rest.push_back(i);
   ORBITFUSE_ASSIGN(const SceneRenderer renderer, painted_by(refinery, alignment, rest));
-  const Refinery painted{renderer, orbit, refinery.progress};
-  ORBITFUSE_ASSIGN(const std::vector<PosedView> starts, painted.search(lost, alignment));
-  std::vector<PosedView> places, best;
-  for (const std::size_t i : lost) places.push_back(alignment.views[i].view);
-  ORBITFUSE_ASSIGN(const Fit stayed, painted.restart(lost, places, judging_rounds()));
-  ORBITFUSE_ASSIGN(const Fit searched, painted.restart(lost, starts, judging_rounds()));
-  for (std::size_t c = 0; c < lost.size(); ++c)
-    best.push_back(searched.views[c].support() > clearly_better * stayed.views[c].support()
-                       ? searched.views[c].view
-                       : stayed.views[c].view);
-  ORBITFUSE_ASSIGN(const Fit first, refinery.restart(lost, best, fine_rounds()));
+  ORBITFUSE_ASSIGN(const Fit by_heat, best_by_heat({renderer, orbit, refinery.progress}, lost, alignment));
+  std::vector<PosedView> places;
+  for (const RenderAlignedView& v : by_heat.views) places.push_back(v.view);
+  ORBITFUSE_ASSIGN(const Fit by_form, refinery.restart(lost, places, fine_rounds()));
   int gone = 0;
   for (std::size_t c = 0; c < lost.size(); ++c) {
-    if (!same_place(orbit, first.views[c].view.cam_from_world, best[c].cam_from_world)) continue;
-    alignment.views[lost[c]] = first.views[c];
-    ++gone;
+    const RenderAlignedView &form = by_form.views[c], &heat = by_heat.views[c];
+    RenderAlignedView& view = alignment.views[lost[c]];
+    const bool agree = same_place(orbit, form.view.cam_from_world, heat.view.cam_from_world);
+    if (agree || heat.support() > settled_share * found.usual.at(orbit.stations[lost[c]].loop)) {
+      // Temperatures know more edges: where they are sure, form alone doesn't pull a view away.
+      view.view = agree ? form.view : heat.view;
+      ++gone;
+    } else {
+      view.doubt = fmt::format("the visible scene and the other views' temperatures place it {:.1f} deg apart",
+                               apart_deg(orbit, view.view.cam_from_world, heat.view.cam_from_world));
+    }
   }
   return gone;
 }

@@ -10,8 +10,9 @@
 namespace orbitfuse {
 
 /// Each view judged by the temperatures of the others. Those that they contradict are searched as
-/// wholes in the scene that the rest paints, and go where both scenes then agree. Returns how many
-/// went. Where most are contradicted nobody is left to judge, and none goes.
+/// wholes in the scene that the rest paints, and go where both scenes then agree or temperatures
+/// are sure; the others keep a `doubt`. Returns how many went. Where most are contradicted nobody
+/// is left to judge, and none goes.
 Result<int> correct_by_heat(const Refinery& refinery, Fit& alignment);
 
 /// Every added view, from `first_new` on, confirmed by what the settled ones before it measured;

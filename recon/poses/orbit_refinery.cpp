@@ -103,8 +103,9 @@ bool same_place(const OrbitViews& orbit, const Rigid3d& a, const Rigid3d& b) {
   return apart_deg(orbit, a, b) < same_pose_deg;
 }
 
-Result<Fit> Refinery::restart(const std::vector<std::size_t>& chosen, const std::vector<PosedView>& starts,
-                    std::vector<RenderRound> rounds) const {
+Result<Fit> Refinery::restart(const std::vector<std::size_t>& chosen,
+                              const std::vector<PosedView>& starts,
+                              std::vector<RenderRound> rounds) const {
   std::vector<cv::Mat> images;
   for (const std::size_t i : chosen) images.push_back(orbit.images[i]);
   RenderAlignmentOptions options;
@@ -114,14 +115,17 @@ Result<Fit> Refinery::restart(const std::vector<std::size_t>& chosen, const std:
 }
 
 Status Refinery::together(Fit& alignment, double focal_relative_sigma,
-                std::vector<RenderRound> rounds) const {
+                          std::vector<RenderRound> rounds) const {
   std::vector<PosedView> views;
   for (const RenderAlignedView& v : alignment.views) views.push_back(v.view);
   RenderAlignmentOptions options;
   options.focal_relative_sigma = focal_relative_sigma;
   options.rounds = std::move(rounds);
-  ORBITFUSE_ASSIGN(alignment,
+  ORBITFUSE_ASSIGN(Fit aligned,
                    align_with_renders(renderer, orbit.images, views, options, progress));
+  for (std::size_t i = 0; i < views.size(); ++i)
+    aligned.views[i].doubt = std::move(alignment.views[i].doubt);
+  alignment = std::move(aligned);
   return {};
 }
 
