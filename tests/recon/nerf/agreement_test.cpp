@@ -199,14 +199,18 @@ TEST(Agreement, ManyThreadsGiveWhatOneGives) {
 TEST(Agreement, WithoutHeldOutViewsTheLastStepIsKept) {
   const Dataset data = toy_scene(Modality::visible, 4);
   TrainOptions options = toy_options(Modality::visible, 20);
-  options.target_psnr = 1;  // nothing measures, so nothing can reach it
-  options.plateau_db = 0.1;
+  options.plateau_db = 0.1;  // nothing measures, so nothing falls
   Field field;
   const auto report = train(data, options, {}, field);
   ASSERT_TRUE(report);
   EXPECT_EQ(report->iterations, 20);
   EXPECT_EQ(report->best_step, 20);
   EXPECT_TRUE(std::isnan(report->best_psnr));
+  options.target_psnr = 20;
+  const auto unmeasured = train(data, options, {}, field);
+  ASSERT_FALSE(unmeasured);
+  EXPECT_EQ(unmeasured.error().kind, ErrorKind::usage);
+  EXPECT_NE(unmeasured.error().remedy.find("nerf.holdout_every"), std::string::npos);
 }
 
 TEST(Agreement, EightBitThermalKeepsItsGrayValues) {
