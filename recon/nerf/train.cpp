@@ -283,6 +283,9 @@ Result<TrainReport> train(const Dataset& given, const TrainOptions& options,
     return fail(ErrorKind::quality, stage,
                 fmt::format("none of the {} steps had a finite gradient", history.skipped_steps),
                 "look for NaN in the images or, with shared geometry, train the guide field again");
+  if (state->step == 0)
+    return fail(ErrorKind::usage, "nerf.budget_s", fmt::format("{} s were over before the first step", options.budget_s),
+                "allow more time");
   ORBITFUSE_TRY(save());
   static_cast<History&>(report) = history;
   report.iterations = report.best_step = state->step;
