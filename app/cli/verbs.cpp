@@ -14,7 +14,7 @@ const std::vector<Verb>& verbs() {
       {"poses", "Estimate the camera poses of both modalities",
        "orbitfuse poses replay_data/car --out out/", add_poses},
       {"train", "Train the visible and the thermal radiance field",
-       "orbitfuse train replay_data/car --out out/", add_train},
+       "orbitfuse train replay_data/car --out out/ --budget 60s", add_train},
       {"register", "Bring the thermal field, or a point cloud, into the visible frame",
        "orbitfuse register --source thermal.ply --target visible.ply --json", add_register},
       {"render", "Render both fields from the same new cameras",

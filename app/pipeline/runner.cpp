@@ -141,12 +141,23 @@ Runner::Key Runner::key_of(const Stage& stage) const {
   return key;
 }
 
+bool Runner::forced(const Stage& stage) const {
+  return options_.force && (options_.targets.empty() || std::count(options_.targets.begin(), options_.targets.end(),
+                                                                   stage.name) > 0);
+}
+
+std::optional<EarlierResult> Runner::earlier_result(const Stage& stage, const Key& key) const {
+  const fs::path folder = options_.out / stage.name;
+  const auto record = read_stage_record(folder);
+  if (forced(stage) || !record || record->version != stage.version || record->inputs != key.inputs ||
+      !damage(folder, *record).empty())
+    return std::nullopt;
+  return EarlierResult{folder, record->options, record->output.metrics};
+}
+
 std::string Runner::why_run(const Stage& stage, const Key& key,
                             const Result<StageRecord>& record) const {
-  const bool forced = options_.force && (options_.targets.empty() ||
-                                         std::count(options_.targets.begin(),
-                                                    options_.targets.end(), stage.name) > 0);
-  if (forced) return "--force";
+  if (forced(stage)) return "--force";
   if (!fs::exists(options_.out / stage.name / stage_record_file)) return "not done yet";
   if (!record) return "its done mark can't be read";
   if (stage.always) return "describes this run";
@@ -166,7 +177,7 @@ std::string Runner::why_run(const Stage& stage, const Key& key,
 
 StageContext Runner::context(fs::path folder, bool resume) const {
   StageContext context{.out = options_.out, .folder = std::move(folder), .resume = resume,
-                       .progress = progress_, .finished = {}, .earlier = &statuses_};
+                       .progress = progress_, .earlier_result = {}, .finished = {}, .earlier = &statuses_};
   for (const auto& [name, hash] : outputs_) context.finished.insert(name);
   return context;
 }
@@ -244,7 +255,9 @@ StageStatus Runner::execute(const Stage& stage, const Key& key, std::string why)
     if (!resume) ORBITFUSE_TRY(remove_tree(folder));
     ORBITFUSE_TRY(make_folder(folder));
     ORBITFUSE_TRY(write_attempt(attempt_path, attempt));
-    return stage.run(context(folder, resume));
+    StageContext given = context(folder, resume);
+    given.earlier_result = earlier_result(stage, key);
+    return stage.run(given);
   };
   auto result = work();
   attempt.cpu_s += clock.cpu_s();

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -46,7 +47,9 @@ class Runner {
 
   bool wanted(const std::string& stage) const;
   Key key_of(const Stage& stage) const;
+  bool forced(const Stage& stage) const;
   StageContext context(std::filesystem::path folder, bool resume) const;
+  std::optional<EarlierResult> earlier_result(const Stage& stage, const Key& key) const;
   StageStatus visit(const Stage& stage);
   StageStatus execute(const Stage& stage, const Key& key, std::string why);
   std::string why_run(const Stage& stage, const Key& key, const Result<StageRecord>& record) const;

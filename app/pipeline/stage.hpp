@@ -43,12 +43,20 @@ struct StageStatus {
   bool done() const { return state == StageState::ran || state == StageState::unchanged; }
 };
 
+/// A stage's last result that still stands, made from the same inputs by the same method.
+struct EarlierResult {
+  std::filesystem::path folder;
+  nlohmann::json options, metrics;
+};
+
 /// What a stage may read and where it writes while it runs.
 struct StageContext {
   std::filesystem::path out;     ///< folder of the whole run
   std::filesystem::path folder;  ///< the stage's own, private until it is done
   bool resume = false;           ///< `folder` holds an interrupted attempt with the same key
   Progress progress;
+  /// What other options made of the same inputs, for a stage that can go on from there. Not with --force.
+  std::optional<EarlierResult> earlier_result;
 
   std::set<std::string> finished;  ///< stages whose outputs belong to this run
   const std::vector<StageStatus>* earlier = nullptr;  ///< how the stages before fared

@@ -166,6 +166,10 @@ Status RunConfig::validate() const {
   ORBITFUSE_TRY(depth.validate());
   for (const TrainConfig* train : {&train_visible, &train_thermal}) {
     ORBITFUSE_TRY(train->options.validate());
+    const std::string table = train == &train_visible ? "train.visible" : "train.thermal";
+    if (train->options.target_psnr > 0 && train->options.holdout_every == 0)
+      return fail(ErrorKind::usage, table + ".target_psnr", "no view is held out to measure it",
+                  "hold some out, e.g. --set " + table + ".holdout_every=12");
     ORBITFUSE_TRY(train->cloud.validate());
     if (train->max_width_px < 16)
       return fail(ErrorKind::usage, "train.max_width_px", std::to_string(train->max_width_px),

@@ -3,6 +3,7 @@
 
 #include "app/stages/artifacts.hpp"
 #include "app/stages/stage_list.hpp"
+#include "app/stages/train_extension.hpp"
 #include "app/stages/training_data.hpp"
 #include "core/ply.hpp"
 #include "recon/nerf/nerf.hpp"
@@ -13,14 +14,6 @@ using nlohmann::json;
 using pipeline::StageContext;
 using pipeline::StageOutput;
 
-json curve_json(const nerf::TrainReport& report) {
-  json curve = json::array();
-  for (const nerf::CurvePoint& p : report.curve)
-    curve.push_back({{"cpu_s", p.cpu_s}, {"step", p.step}, {"heldout_psnr", p.heldout_psnr},
-                     {"train_psnr", p.train_psnr}, {"samples_per_ray", p.samples_per_ray}});
-  return curve;
-}
-
 /// The field that lends its geometry: the visible one, when thermal poses live in its frame.
 Result<nerf::Field> guide_field(const StageContext& context) {
   if (!context.has("train_visible")) return nerf::Field();
@@ -30,7 +23,7 @@ Result<nerf::Field> guide_field(const StageContext& context) {
 }
 
 Result<StageOutput> train(const StageContext& context, const SessionInput& input,
-                          const TrainConfig& config, Modality modality) {
+                          const TrainConfig& config, Modality modality, const json& resolved) {
   const std::string poses = "poses_" + std::string(name(modality));
   ORBITFUSE_ASSIGN(const Reconstruction model, load_poses(context.of(poses), modality));
   ORBITFUSE_ASSIGN(nerf::Dataset data,
@@ -50,7 +43,14 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
     }
   }
   options.checkpoint = context.folder / "checkpoint.bin";
-  options.resume = context.resume;
+  options.resume = true;  // where there is a checkpoint: of an interrupted attempt, or to extend
+  if (!context.resume) {
+    ORBITFUSE_ASSIGN(const int done, extend_training(context, resolved, options.checkpoint));
+    if (done > 0)
+      output.skips.push_back({fmt::format("the first {} steps", done),
+                              "the last result has them, and only the length of the run has changed",
+                              "training goes on from there; --force starts from nothing"});
+  }
 
   nerf::Field field;
   ORBITFUSE_ASSIGN(const nerf::TrainReport report,
@@ -69,19 +69,13 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
   std::filesystem::remove(options.checkpoint, ignored);
 
   output.skips.insert(output.skips.end(), report.skips.begin(), report.skips.end());
+  output.warnings.insert(output.warnings.end(), report.warnings.begin(), report.warnings.end());
   if (report.skipped_steps > 0)
     output.warnings.push_back(fmt::format("{} training steps dropped: a gradient was not finite",
                                           report.skipped_steps));
-  output.metrics = {{"brief", report.brief()},
-                    {"iterations", report.iterations},
-                    {"stop", nerf::name(report.stop)},
-                    {"best_step", report.best_step},
-                    {"heldout_psnr_db", report.best_psnr},
-                    {"heldout", report.heldout},
-                    {"cloud_points", cloud ? cloud->size() : 0},
-                    {"width_px", data.views.empty() ? 0 : data.views[0].camera.width},
-                    {"samples_per_ray",
-                     report.rays > 0 ? static_cast<double>(report.samples) / static_cast<double>(report.rays) : 0.0}};
+  output.metrics = metrics_json(report);
+  output.metrics["cloud_points"] = cloud ? cloud->size() : 0;
+  output.metrics["width_px"] = data.views.empty() ? 0 : data.views[0].camera.width;
   return output;
 }
 
@@ -97,8 +91,8 @@ pipeline::Stage train_stage(const StageInputs& in, Modality modality) {
   stage.options = in.config->settings().to_json("train." + modality_name);
   stage.options["seed"] = in.config->seed;
   stage.inputs_hash = in.session->content.at(modality);
-  stage.run = [in, modality](const StageContext& context) {
-    return train(context, *in.session, in.config->train(modality), modality);
+  stage.run = [in, modality, options = stage.options](const StageContext& context) {
+    return train(context, *in.session, in.config->train(modality), modality, options);
   };
   return stage;
 }

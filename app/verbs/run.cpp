@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "app/cli/run_stages.hpp"
+#include "app/cli/training_limits.hpp"
 #include "app/cli/verb.hpp"
 #include "core/transforms_json.hpp"
 
@@ -8,9 +9,12 @@ namespace orbitfuse::cli {
 Action add_run(CLI::App& app) {
   const auto folders = std::make_shared<StageFolders>();
   const auto cameras = std::make_shared<std::string>();
+  const auto limits = std::make_shared<TrainingLimits>();
   add_folders(app, *folders);
   app.add_option("--cameras", *cameras, "transforms.json with the new views, in the visible frame");
-  return [folders, cameras](Context& context) -> Status {
+  add_limits(app, *limits);
+  return [folders, cameras, limits](Context& context) -> Status {
+    ORBITFUSE_TRY(apply(*limits, {Modality::visible, Modality::thermal}, context.config));
     if (!cameras->empty()) {
       // Read here once, so that a wrong file doesn't cost the hours before it is needed.
       ORBITFUSE_TRY(read_transforms_json(*cameras));

@@ -4,17 +4,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "core/file_io.hpp"
-#include "recon/nerf/field.hpp"
+#include "core/parallel.hpp"
+#include "recon/nerf/nerf.hpp"
 
 // Layout: magic, version, then tagless values in the order of `visit`, then the hash of all bytes
 // before it. Little-endian, as every machine this project runs on.
 namespace orbitfuse::nerf {
 namespace {
 
-constexpr char magic[8] = {'O', 'F', 'N', 'E', 'R', 'F', '0', '3'};
+constexpr char magic[8] = {'O', 'F', 'N', 'E', 'R', 'F', '0', '4'};  // the last two: version
 constexpr std::size_t hash_length = 32;
 
 class Writer {
@@ -44,6 +46,11 @@ class Reader {
   static constexpr bool reading = true;
   explicit Reader(std::string_view bytes) : bytes_(bytes) {}
   bool ok = true;
+  std::string problem = "malformed content";  ///< what to say when not ok
+  void refuse(std::string why) {
+    if (ok) problem = std::move(why);
+    ok = false;
+  }
   template <class T>
     requires std::is_trivially_copyable_v<T>
   void operator()(T& value) {
@@ -75,7 +82,8 @@ class Reader {
   std::string_view bytes_;
 };
 
-/// Keys with their values: a field outlives the options that its program knows.
+/// Keys with their values. An option that the file lacks keeps its default: a field outlives the program
+/// that made it. An option that this program doesn't know might change what the parameters mean.
 template <class Archive>
 void visit_options(Archive& io, TrainOptions& options) {
   const std::vector<std::string> keys = TrainOptions::keys();
@@ -86,8 +94,10 @@ void visit_options(Archive& io, TrainOptions& options) {
     io(key);
     io(value);
     if constexpr (Archive::reading) {
-      const bool known = std::find(keys.begin(), keys.end(), key) != keys.end();
-      io.ok = io.ok && (!known || options.set(key, value).has_value());
+      if (io.ok && std::find(keys.begin(), keys.end(), key) == keys.end())
+        io.refuse(fmt::format("it has the option nerf.{}, unknown to this program", key));
+      if (const Status set = io.ok ? options.set(key, value) : Status(); !set)
+        io.refuse(fmt::format("its option nerf.{} is '{}'", key, value));
     }
   }
 }
@@ -152,6 +162,31 @@ void visit(Archive& io, std::vector<std::vector<float>>& lists) {
 }
 
 template <class Archive>
+void visit(Archive& io, History& history) {
+  io(history.curve);
+  io(history.skipped_steps);
+  io(history.rays);
+  io(history.samples);
+  io(history.cpu_s);
+  io(history.wall_s);
+}
+
+template <class Archive>
+void visit(Archive& io, std::vector<ViewRecord>& views) {
+  std::uint64_t count = views.size();
+  io(count);
+  if constexpr (Archive::reading) {
+    if (!io.ok || count > 1000000) return void(io.ok = false);
+    views.resize(count);
+  }
+  for (ViewRecord& view : views) {
+    io(view.name);
+    io(view.heldout);
+    io(view.hash);
+  }
+}
+
+template <class Archive>
 void visit(Archive& io, Snapshot& best) {
   io(best.step);
   io(best.psnr);
@@ -176,12 +211,12 @@ bool fits(const Snapshot& best, FieldState& state) {
 template <class Archive>
 void visit(Archive& io, FieldState& state) {
   visit_options(io, state.options);
-  std::uint64_t views = state.image_offsets.size();
   io(state.modality);
-  io(views);
+  visit(io, state.views);
   if constexpr (Archive::reading) {
-    if (!io.ok || views > 1000000 || !state.options.validate()) return void(io.ok = false);
-    state.create(state.options, state.modality, static_cast<int>(views));
+    if (!io.ok) return;
+    if (const Status valid = state.options.validate(); !valid) return io.refuse(valid.error().message());
+    state.create(state.options, state.modality, static_cast<int>(state.views.size()));
   }
   io(state.thermal_is_gray);
   double center[3] = {state.space.center.x(), state.space.center.y(), state.space.center.z()};
@@ -193,8 +228,7 @@ void visit(Archive& io, FieldState& state) {
   io(state.rays_per_step);
   io(state.train_psnr);
   io(state.samples_per_ray);
-  io(state.spent_cpu_s);
-  io(state.spent_wall_s);
+  visit(io, state.history);
   for (DensityNetwork* network : state.density_networks()) io(network->grid.level_weight);
   std::vector<std::size_t> sizes;
   for (const Parameters* p : state.parameters()) sizes.push_back(p->size());
@@ -225,35 +259,76 @@ Result<FieldState> load_state(const std::filesystem::path& path) {
     return fail(ErrorKind::input, path.string(), std::move(found),
                 "delete it and train again, or restore a copy");
   };
-  if (bytes.size() < sizeof magic + hash_length || std::memcmp(bytes.data(), magic, sizeof magic) != 0)
-    return bad("not a field of this version, or cut short");
+  if (bytes.size() < sizeof magic + hash_length) return bad(fmt::format("cut short: {} bytes", bytes.size()));
+  if (std::memcmp(bytes.data(), magic, sizeof magic - 2) != 0) return bad("not a field");
+  if (std::memcmp(bytes.data(), magic, sizeof magic) != 0) return bad("a field of another version of this program");
   const std::string_view body(bytes.data(), bytes.size() - hash_length);
   if (content_hash(body) != bytes.substr(body.size())) return bad("checksum differs: cut or altered");
   Reader reader(body.substr(sizeof magic));
   FieldState state;
   visit(reader, state);
-  if (!reader.at_end()) return bad("malformed content");
+  if (!reader.at_end()) return bad(reader.problem);
   state.refresh();
   return state;
 }
 
-Status check_resumable(const FieldState& state, const Dataset& dataset, const TrainOptions& options) {
-  const auto differs = [&](const std::string& what) {
-    return fail(ErrorKind::input, options.checkpoint.string(), "made with another " + what,
-                "resume with the same data and options, or delete it to start afresh");
+std::vector<ViewRecord> records_of(const Dataset& dataset, const std::vector<bool>& heldout) {
+  std::vector<ViewRecord> records(dataset.views.size());
+  parallel_for(static_cast<int>(records.size()), [&](int index) {
+    const auto i = static_cast<std::size_t>(index);
+    const TrainingView& view = dataset.views[i];
+    const cv::Mat image = view.image.isContinuous() ? view.image : view.image.clone();
+    const Camera& c = view.camera;
+    const Eigen::Quaterniond& q = view.cam_from_world.rotation;
+    const Eigen::Vector3d& t = view.cam_from_world.translation;
+    const double where[] = {double(c.width), double(c.height), c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2,
+                            q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()};
+    const std::string pixels =
+        content_hash({reinterpret_cast<const char*>(image.data), image.total() * image.elemSize()});
+    const std::string_view placed(reinterpret_cast<const char*>(where), sizeof where);
+    records[i] = {view.name, heldout[i], content_hash(std::string(placed) + pixels)};
+  });
+  return records;
+}
+
+Status check_resumable(const FieldState& state, const Dataset& dataset,
+                       const std::vector<ViewRecord>& views, const TrainOptions& options) {
+  const auto differs = [&](const std::string& found) {
+    return fail(ErrorKind::input, options.checkpoint.string(), found,
+                "go on with the same data and options, or delete it to start afresh");
   };
-  if (state.modality != dataset.modality) return differs("modality");
-  if (state.image_offsets.size() != (dataset.views.size() + 7) / 8 * 8) return differs("number of views");
-  for (const char* key : {"levels", "features_per_level", "log2_table", "base_resolution", "seed",
-                          "max_resolution", "hidden", "color_hidden", "color_layers", "sampling",
-                          "occupancy_resolution"})
-    if (state.options.get(key) != options.get(key)) return differs(std::string("nerf.") + key);
+  if (state.modality != dataset.modality) return differs("made with another modality");
+  if (state.thermal_is_gray != dataset.thermal_is_gray)
+    return differs("made with another unit of thermal samples");
+  for (const std::string& key : TrainOptions::keys())
+    if (!TrainOptions::free_to_change(key) && state.options.get(key) != options.get(key))
+      return differs(fmt::format("made with nerf.{} = {}, not {}", key, state.options.get(key), options.get(key)));
+  if (state.views.size() != views.size())
+    return differs(fmt::format("made with {} views, not {}", state.views.size(), views.size()));
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const ViewRecord &then = state.views[i], &now = views[i];
+    if (then.name != now.name) return differs(fmt::format("view {} was {}, not {}", i, then.name, now.name));
+    if (then.heldout != now.heldout)
+      return differs(fmt::format("made with {} {}", now.name, then.heldout ? "held out" : "training"));
+    if (then.hash != now.hash) return differs("made with another image, camera or pose of " + now.name);
+  }
   return {};
 }
 
 Result<Field> Field::load(const std::filesystem::path& path) {
   ORBITFUSE_ASSIGN(FieldState state, load_state(path));
   return Field(std::make_unique<FieldState>(std::move(state)));
+}
+
+Status save_checkpoint(Field finished, const TrainReport& report, const std::filesystem::path& checkpoint) {
+  if (finished.empty()) return fail(ErrorKind::input, "field", "it is empty", "train or load it first");
+  FieldState& state = finished.state();
+  state.history = report;
+  if (state.options.keep_best && std::isfinite(report.best_psnr)) {
+    state.best = state.snapshot(report.best_psnr);
+    state.best.step = report.best_step;
+  }
+  return save_state(state, checkpoint);
 }
 
 Status Field::save(const std::filesystem::path& path) const {

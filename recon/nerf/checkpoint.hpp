@@ -13,7 +13,11 @@ namespace orbitfuse::nerf {
 Status save_state(const FieldState& state, const std::filesystem::path& path);
 Result<FieldState> load_state(const std::filesystem::path& path);
 
-/// A checkpoint continues only the dataset and architecture it was made with; names what differs.
-Status check_resumable(const FieldState& state, const Dataset& dataset, const TrainOptions& options);
+std::vector<ViewRecord> records_of(const Dataset& dataset, const std::vector<bool>& heldout);
+
+/// A checkpoint goes on only with the data and the options that give its parameters their meaning; the
+/// error names the first that differs.
+Status check_resumable(const FieldState& state, const Dataset& dataset,
+                       const std::vector<ViewRecord>& views, const TrainOptions& options);
 
 }  // namespace orbitfuse::nerf

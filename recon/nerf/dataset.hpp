@@ -19,7 +19,8 @@ struct TrainingView {
   Camera camera;     ///< at the image's own size
   Rigid3d cam_from_world;
   /// Visible: CV_32FC3 in R, G, B order, 0..1 as stored (sRGB). Thermal: CV_32FC1 kelvin, NaN =
-  /// invalid pixel (never trained on). NaN in a visible image is an input error.
+  /// dead pixel, as cameras have some: it is left out, and a view of more than half NaN is dropped;
+  /// train() names both. NaN in a visible image, which no camera makes, is an input error.
   cv::Mat image;
   /// Held out: measures, never trains. The field is the same without it, bit for bit, except that
   /// TrainOptions::keep_best chooses among its steps by what held-out views say.

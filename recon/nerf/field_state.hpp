@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/modality.hpp"
+#include "recon/nerf/history.hpp"
 #include "recon/nerf/network.hpp"
 #include "recon/nerf/occupancy.hpp"
 #include "recon/nerf/options.hpp"
@@ -52,7 +53,8 @@ struct FieldState {
   int step = 0;
   int rays_per_step = 0;
   double train_psnr = 0, samples_per_ray = 0;
-  double spent_cpu_s = 0, spent_wall_s = 0;
+  std::vector<ViewRecord> views;  ///< of the dataset
+  History history;                ///< empty in a finished field: equal fields are equal files
   Snapshot best;
 
   int channels() const { return modality == Modality::visible ? 3 : 1; }

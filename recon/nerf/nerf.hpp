@@ -9,36 +9,25 @@
 #include "core/reconstruction.hpp"
 #include "recon/nerf/dataset.hpp"
 #include "recon/nerf/field.hpp"
+#include "recon/nerf/history.hpp"
 #include "recon/nerf/options.hpp"
 
 // Radiance fields on the CPU: a multiresolution hash grid (Müller et al. 2022, "Instant neural
 // graphics primitives") with small MLPs, in contracted space (Barron et al. 2022, "Mip-NeRF 360").
 namespace orbitfuse::nerf {
 
-/// One point of the error-against-time curve.
-struct CurvePoint {
-  double cpu_s = 0, wall_s = 0;  ///< spent training, evaluation excluded
-  int step = 0;
-  double heldout_psnr = 0;  ///< dB; NaN without held-out views
-  double train_psnr = 0;    ///< dB, running mean over recent steps
-  double samples_per_ray = 0;
-};
-
 enum class StopReason { iterations, budget, target_psnr, plateau, cancelled };
 const char* name(StopReason reason);
 
-struct TrainReport {
+struct TrainReport : History {
   int iterations = 0;
-  double cpu_s = 0, wall_s = 0;
   StopReason stop = StopReason::iterations;
-  std::vector<CurvePoint> curve;
   int best_step = 0;         ///< the step whose parameters the field holds
   double best_psnr = 0;      ///< held-out, dB; NaN without held-out views
-  long rays = 0, samples = 0;
-  int skipped_steps = 0;     ///< steps dropped because a gradient was not finite
   std::vector<std::string> heldout;  ///< names of the views that measured
-  std::vector<double> image_offsets_k;  ///< per training view (per_image_offset)
+  std::vector<double> image_offsets_k;  ///< per view that was not dropped (per_image_offset)
   std::vector<Skip> skips;
+  std::vector<std::string> warnings;  ///< views that were dropped, a target that was missed
 
   /// "4000 steps, 62.1 CPU s, held-out 26.9 dB (step 3600), 17 samples a ray".
   std::string brief() const;
@@ -47,10 +36,24 @@ struct TrainReport {
 /// Trains `field` from scratch, or on from its checkpoint (TrainOptions::resume), and leaves the
 /// best parameters in it. `guide` (same world frame) supplies geometry when
 /// options.shared_geometry is set. The same dataset, options and seed give the same field for any
-/// thread count on one instruction set, unless budget_s ends the run. Errors: usage (options),
-/// input (dataset, checkpoint), cancelled (a checkpoint is written first).
+/// thread count on one instruction set, unless budget_s ends the run.
+///
+/// The place in every schedule (learning rates, annealed losses) is step / iterations, or time spent
+/// / budget_s if that is further, of the options in force. A run that goes on with more of either
+/// therefore finds itself earlier in a longer schedule: its learning rates rise to where that has
+/// them, and fall to the end as if the run had been that long from its start.
+///
+/// A thermal view of which more than half the pixels are NaN is dropped with a warning that names
+/// it; fewer invalid pixels are left out one by one, as a skip that names the views.
+/// Errors: usage (options), input (dataset, checkpoint; each names what is wrong), quality (no step
+/// had a finite gradient), cancelled (a checkpoint is written first).
 Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
                           const Progress& progress, Field& field, const Field* guide = nullptr);
+
+/// Writes a finished run as a checkpoint, from which train() with `resume` and more iterations or
+/// budget extends it. It goes on from the field, i.e. the best step's parameters, with the optimiser's
+/// moments of the last step; a field no better on held-out views doesn't replace that one.
+Status save_checkpoint(Field finished, const TrainReport& report, const std::filesystem::path& checkpoint);
 
 struct RenderOptions {
   double stop_transmittance = 1e-3;  ///< a ray ends when less light than this is left

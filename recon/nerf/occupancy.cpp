@@ -231,10 +231,8 @@ int march(const Occupancy& occupancy, const Ray& ray, const MarchSettings& setti
   float edge = 0;
   const float shift = 0.5f * (jitter - 0.5f);  // samples keep to the middle half of their stratum
   for (int k = 0; k < count; ++k) {
-    const auto [l_mid, at] = advance((static_cast<float>(k) + 0.5f + shift) * per_sample);
-    static_cast<void>(l_mid);
+    t[k] = advance((static_cast<float>(k) + 0.5f + shift) * per_sample).second;
     const float next = advance(static_cast<float>(k + 1) * per_sample).first;
-    t[k] = at;
     dt[k] = std::max(0.0f, next - edge);
     edge = next;
   }

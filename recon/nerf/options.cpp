@@ -18,58 +18,62 @@ using Member = std::variant<int TrainOptions::*, double TrainOptions::*, bool Tr
                             std::uint64_t TrainOptions::*, std::string TrainOptions::*,
                             std::filesystem::path TrainOptions::*, Sampling TrainOptions::*>;
 
+/// May a run go on with another value?
+enum class Change { free, never };
+
 struct Entry {
   const char* key;
   Member member;
+  Change change;
   double low = 0, high = 1e30;
 };
 
-#define FIELD(member, ...) \
-  Entry { #member, &TrainOptions::member __VA_OPT__(, ) __VA_ARGS__ }
+#define FIELD(member, change, ...) \
+  Entry { #member, &TrainOptions::member, Change::change __VA_OPT__(, ) __VA_ARGS__ }
 
 const std::vector<Entry>& table() {
   static const std::vector<Entry> entries = {
-      FIELD(preset),
-      FIELD(iterations, 1, 1e7),
-      FIELD(budget_s, 0),
-      FIELD(target_psnr, 0, 100),
-      FIELD(holdout_every, 0, 1e6),
-      FIELD(plateau_db, 0, 100),
-      FIELD(keep_best),
-      FIELD(eval_count, 0, 10000),
-      FIELD(seed),
-      FIELD(checkpoint),
-      FIELD(checkpoint_every_s, 0),
-      FIELD(resume),
-      FIELD(levels, 1, 16),
-      FIELD(features_per_level, 2, 4),
-      FIELD(log2_table, 8, 22),
-      FIELD(base_resolution, 2, 1024),
-      FIELD(max_resolution, 4, 1 << 16),
-      FIELD(hidden, 16, 256),
-      FIELD(color_hidden, 16, 256),
-      FIELD(color_layers, 1, 2),
-      FIELD(sh_degree, 0, 4),
-      FIELD(sampling),
-      FIELD(samples_per_step, 256, 1 << 22),
-      FIELD(occupancy_resolution, 16, 256),
-      FIELD(occupancy_threshold, 0, 0.9),
-      FIELD(surface_samples, 1, 128),
-      FIELD(haze_samples, 0, 128),
-      FIELD(proposal_samples_1, 8, 1024),
-      FIELD(proposal_samples_2, 8, 1024),
-      FIELD(fine_samples, 4, 1024),
-      FIELD(learning_rate, 1e-6, 1),
-      FIELD(network_learning_rate, 1e-6, 1),
-      FIELD(distortion_weight, 0, 100),
-      FIELD(depth_weight, 0, 1000),
-      FIELD(depth_end, 0, 1),
-      FIELD(depth_final_weight, 0, 1000),
-      FIELD(min_views, 0, 1e6),
-      FIELD(carve),
-      FIELD(level_anneal_end, 0, 1),
-      FIELD(per_image_offset),
-      FIELD(shared_geometry),
+      FIELD(preset, free),
+      FIELD(iterations, free, 1, 1e7),
+      FIELD(budget_s, free, 0),
+      FIELD(target_psnr, free, 0, 100),
+      FIELD(holdout_every, never, 0, 1e6),
+      FIELD(plateau_db, free, 0, 100),
+      FIELD(keep_best, free),
+      FIELD(eval_count, free, 0, 10000),
+      FIELD(seed, never),
+      FIELD(checkpoint, free),
+      FIELD(checkpoint_every_s, free, 0),
+      FIELD(resume, free),
+      FIELD(levels, never, 1, 16),
+      FIELD(features_per_level, never, 2, 4),
+      FIELD(log2_table, never, 8, 22),
+      FIELD(base_resolution, never, 2, 1024),
+      FIELD(max_resolution, never, 4, 1 << 16),
+      FIELD(hidden, never, 16, 256),
+      FIELD(color_hidden, never, 16, 256),
+      FIELD(color_layers, never, 1, 2),
+      FIELD(sh_degree, never, 0, 4),
+      FIELD(sampling, never),
+      FIELD(samples_per_step, free, 256, 1 << 22),
+      FIELD(occupancy_resolution, never, 16, 256),
+      FIELD(occupancy_threshold, free, 0, 0.9),
+      FIELD(surface_samples, free, 1, 128),
+      FIELD(haze_samples, free, 0, 128),
+      FIELD(proposal_samples_1, free, 8, 1024),
+      FIELD(proposal_samples_2, free, 8, 1024),
+      FIELD(fine_samples, free, 4, 1024),
+      FIELD(learning_rate, free, 1e-6, 1),
+      FIELD(network_learning_rate, free, 1e-6, 1),
+      FIELD(distortion_weight, free, 0, 100),
+      FIELD(depth_weight, free, 0, 1000),
+      FIELD(depth_end, free, 0, 1),
+      FIELD(depth_final_weight, free, 0, 1000),
+      FIELD(min_views, never, 0, 1e6),
+      FIELD(carve, never),
+      FIELD(level_anneal_end, never, 0, 1),
+      FIELD(per_image_offset, never),
+      FIELD(shared_geometry, never),
   };
   return entries;
 }
@@ -180,6 +184,11 @@ std::vector<std::string> TrainOptions::keys() {
   std::vector<std::string> out;
   for (const Entry& entry : table()) out.emplace_back(entry.key);
   return out;
+}
+
+bool TrainOptions::free_to_change(const std::string& key) {
+  const Entry* entry = find(key);
+  return entry != nullptr && entry->change == Change::free;
 }
 
 std::string default_preset(Modality modality) {

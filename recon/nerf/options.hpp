@@ -20,8 +20,8 @@ struct TrainOptions {
   // -- when to stop --------------------------------------------------------------------------
   int iterations = 4000;     ///< hard end; the learning rates are annealed over these
   double budget_s = 0;       ///< wall-clock limit, 0 = none; the schedule is fitted to it
-  double target_psnr = 0;    ///< stop when the held-out PSNR reaches it, 0 = never
-  int holdout_every = 0;     ///< every n-th view measures and does not train; 0 = none
+  double target_psnr = 0;    ///< stop when the held-out PSNR reaches it, 0 = never; needs held-out views
+  int holdout_every = 0;     ///< every n-th view measures and doesn't train (besides measure_only); 0 = none
   double plateau_db = 0;     ///< stop when held-out PSNR is this far below its best; 0 = never
   bool keep_best = true;     ///< the field is that of the best held-out evaluation
   int eval_count = 8;        ///< held-out evaluations over the run (0 = only the last)
@@ -30,7 +30,9 @@ struct TrainOptions {
   std::uint64_t seed = 1;
   std::filesystem::path checkpoint;  ///< written atomically; empty = no checkpoints
   double checkpoint_every_s = 60;    ///< also written on cancel and at the end
-  bool resume = false;               ///< go on from `checkpoint` if it exists
+  /// Go on from `checkpoint` if it exists. Options that free_to_change() may differ from those it was
+  /// made with; more iterations or budget_s extend the run (nerf.hpp says how schedules go on).
+  bool resume = false;
 
   // -- field ---------------------------------------------------------------------------------
   int levels = 8;              ///< hash-grid resolutions
@@ -76,6 +78,9 @@ struct TrainOptions {
   Status set(const std::string& key, const std::string& value);
   std::string get(const std::string& key) const;
   static std::vector<std::string> keys();
+  /// True if a run may go on with another value; false if the option gives the parameters or the data
+  /// their meaning.
+  static bool free_to_change(const std::string& key);
 };
 
 /// "fast-visible", "fast-thermal", and as published: "nerfacto", "nerf-rgb", "nerf-ir".

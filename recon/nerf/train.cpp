@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "recon/nerf/checkpoint.hpp"
 #include "recon/nerf/nerf.hpp"
@@ -106,19 +107,68 @@ std::string TrainReport::brief() const {
   return text;
 }
 
-Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
+namespace {
+
+/// Thermal views of which more than half is no temperature: a broken transfer, a shutter in the way.
+std::vector<bool> broken_views(const Dataset& dataset, TrainReport& report) {
+  std::vector<bool> broken(dataset.views.size(), false);
+  std::string partly;
+  for (std::size_t i = 0; dataset.modality == Modality::thermal && i < broken.size(); ++i) {
+    const cv::Mat& image = dataset.views[i].image;
+    const double invalid = 1 - cv::countNonZero(image == image) / static_cast<double>(image.total());
+    broken[i] = invalid > 0.5;
+    if (broken[i])
+      report.warnings.push_back(fmt::format("{} dropped: {:.0f} % of its pixels hold no temperature",
+                                            dataset.views[i].name, 100 * invalid));
+    else if (invalid > 0)
+      partly += fmt::format("{}{} {:.2g} %", partly.empty() ? "" : ", ", dataset.views[i].name, 100 * invalid);
+  }
+  if (!partly.empty())
+    report.skips.push_back({"invalid pixels", partly, "they neither train nor measure"});
+  return broken;
+}
+
+/// How well the held-out views come out, against what the options ask for.
+std::optional<StopReason> good_enough(const TrainOptions& options, const Snapshot& best, double psnr) {
+  if (options.target_psnr > 0 && psnr >= options.target_psnr) return StopReason::target_psnr;
+  if (options.plateau_db > 0 && !best.empty() && psnr < best.psnr - options.plateau_db)
+    return StopReason::plateau;
+  return std::nullopt;
+}
+
+/// Progress in words: the last measured error, and the running one of the training views.
+std::string errors_of(const FieldState& state) {
+  const std::vector<CurvePoint>& curve = state.history.curve;
+  std::string text = fmt::format("training views {:.2f} dB", state.train_psnr);
+  if (!curve.empty() && std::isfinite(curve.back().heldout_psnr))
+    text = fmt::format("held-out {:.2f} dB, {}", curve.back().heldout_psnr, text);
+  return text;
+}
+
+}  // namespace
+
+Result<TrainReport> train(const Dataset& given, const TrainOptions& options,
                           const Progress& progress, Field& out, const Field* guide) {
   ORBITFUSE_TRY(options.validate());
-  ORBITFUSE_TRY(dataset.validate());
-  const std::string stage = fmt::format("train.{}", orbitfuse::name(dataset.modality));
+  ORBITFUSE_TRY(given.validate());
+  const std::string stage = fmt::format("train.{}", orbitfuse::name(given.modality));
   if (options.shared_geometry && (!guide || guide->empty()))
     return fail(ErrorKind::usage, "nerf.shared_geometry", "no guide field",
                 "train the visible field first");
 
   TrainReport report;
+  const std::vector<bool> broken = broken_views(given, report);
+  const Dataset dataset = training_part(given, broken);
+  if (dataset.views.empty())
+    return fail(ErrorKind::input, given.views[0].name, "no view has temperatures in half of its pixels",
+                "look at the frames and their radiometric scale");
   const std::vector<bool> heldout = heldout_views(dataset, options.holdout_every);
   for (std::size_t i = 0; i < heldout.size(); ++i)
     if (heldout[i]) report.heldout.push_back(dataset.views[i].name);
+  const bool measuring = !report.heldout.empty();
+  if (options.target_psnr > 0 && !measuring)
+    return fail(ErrorKind::usage, "nerf.target_psnr", "no view is held out to measure it",
+                "set nerf.holdout_every, e.g. to 8");
   if (report.heldout.size() == dataset.views.size())
     return fail(ErrorKind::usage, "nerf.holdout_every", "no view is left to train on",
                 "hold out fewer views");
@@ -130,12 +180,14 @@ Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
   if (options.resume && std::filesystem::exists(options.checkpoint)) {
     ORBITFUSE_ASSIGN(Field loaded, Field::load(options.checkpoint));
     *state = std::move(loaded.state());
-    ORBITFUSE_TRY(check_resumable(*state, dataset, options));
+    ORBITFUSE_TRY(check_resumable(*state, dataset, records_of(dataset, heldout), options));
     state->options = options;
+    if (!options.keep_best) state->best = {};
     resumed = true;
   } else {
     state->create(options, dataset.modality, static_cast<int>(dataset.views.size()));
     state->thermal_is_gray = dataset.thermal_is_gray;
+    state->views = records_of(dataset, heldout);
     state->space = estimate_space(training);
     state->span = estimate_span(training);
   }
@@ -154,108 +206,104 @@ Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
                             "rays skip the rest from the first step"});
   }
   Trainer trainer(*state, views, heldout);
-  watch.cpu_s += state->spent_cpu_s;
-  watch.wall_s += state->spent_wall_s;
+  History& history = state->history;
+  watch.cpu_s += history.cpu_s;
+  watch.wall_s += history.wall_s;
+  const long earlier_rays = history.rays, earlier_samples = history.samples;
 
+  const int evaluations = std::max(1, options.eval_count);
   const int eval_every =
       options.eval_count > 0 ? std::max(1, options.iterations / options.eval_count) : options.iterations;
+  const auto fraction_now = [&] {
+    const double by_time = options.budget_s > 0 ? watch.wall_now() / options.budget_s : 0;
+    return std::max(by_time, static_cast<double>(state->step) / options.iterations);
+  };
+  double next_eval_fraction = (std::floor(fraction_now() * evaluations) + 1) / evaluations;
   double last_saved = wall_seconds();
-  const bool measuring = !report.heldout.empty();
-  report.best_psnr = std::numeric_limits<double>::quiet_NaN();
-  double next_eval_fraction = 1.0 / std::max(1, options.eval_count);
-  const auto save = [&]() -> Status {
+  const auto pause = [&] {
+    watch.pause();
+    history.cpu_s = watch.cpu_s;
+    history.wall_s = watch.wall_s;
+    history.rays = earlier_rays + trainer.rays();
+    history.samples = earlier_samples + trainer.samples();
+  };
+  const auto save = [&]() -> Status {  // while paused
     if (options.checkpoint.empty()) return {};
-    state->spent_cpu_s = watch.cpu_s;
-    state->spent_wall_s = watch.wall_s;
     last_saved = wall_seconds();
     return save_state(*state, options.checkpoint);
   };
-
-  const auto report_progress = [&](std::string detail, double fraction, double wall_s) {
-    progress.report({stage, static_cast<double>(state->step),
-                     static_cast<double>(options.iterations),
-                     wall_s / std::max(1e-9, fraction) * (1 - fraction), std::move(detail)});
+  const auto report_progress = [&](double fraction, double wall_s) {
+    progress.report({stage, fraction * options.iterations, static_cast<double>(options.iterations),
+                     wall_s / std::max(1e-9, fraction) * (1 - fraction), errors_of(*state)});
   };
 
   report.stop = StopReason::iterations;
-  while (state->step < options.iterations) {
-    const double wall = watch.wall_now();
-    const double by_time = options.budget_s > 0 ? wall / options.budget_s : 0;
-    const double fraction = std::max(by_time, static_cast<double>(state->step) / options.iterations);
-    if (by_time >= 1) {
+  const bool reached = !state->best.empty() && good_enough(options, {}, state->best.psnr).has_value();
+  if (reached) report.stop = StopReason::target_psnr;
+  while (!reached && state->step < options.iterations) {
+    const double fraction = fraction_now();
+    if (options.budget_s > 0 && watch.wall_now() >= options.budget_s) {
       report.stop = StopReason::budget;
       break;
     }
     if (progress.cancelled()) {
-      watch.pause();
+      pause();
       ORBITFUSE_TRY(save());
       return fail(ErrorKind::cancelled, stage, fmt::format("stopped by the user at step {}", state->step),
                   options.checkpoint.empty() ? "run again" : "run again with --resume");
     }
-    if (!trainer.step(fraction)) ++report.skipped_steps;
+    if (!trainer.step(fraction)) ++history.skipped_steps;
 
-    const bool by_step = state->step % eval_every == 0;
     const bool by_budget = options.budget_s > 0 && fraction >= next_eval_fraction;
-    if (by_step || by_budget || state->step == options.iterations) {
-      watch.pause();
-      while (fraction >= next_eval_fraction) next_eval_fraction += 1.0 / std::max(1, options.eval_count);
-      CurvePoint point;
-      point.cpu_s = watch.cpu_s;
-      point.wall_s = watch.wall_s;
-      point.step = state->step;
-      point.train_psnr = state->train_psnr;
-      point.samples_per_ray = state->samples_per_ray;
-      point.heldout_psnr = heldout_psnr(*state, views, heldout, 4);
-      report.curve.push_back(point);
-      if (measuring && options.keep_best &&
-          (state->best.empty() || point.heldout_psnr > state->best.psnr))
-        state->best = state->snapshot(point.heldout_psnr);
-      report_progress(measuring ? fmt::format("held-out {:.2f} dB", point.heldout_psnr)
-                                : fmt::format("training views {:.2f} dB", point.train_psnr),
-                      fraction, watch.wall_s);
+    if (state->step % eval_every == 0 || by_budget || state->step == options.iterations) {
+      pause();
+      while (fraction >= next_eval_fraction) next_eval_fraction += 1.0 / evaluations;
+      const double psnr = heldout_psnr(*state, views, heldout, 4);
+      history.curve.push_back({watch.cpu_s, watch.wall_s, state->step, psnr, state->train_psnr,
+                               state->samples_per_ray});
+      if (measuring && options.keep_best && (state->best.empty() || psnr > state->best.psnr))
+        state->best = state->snapshot(psnr);
+      report_progress(fraction, watch.wall_s);
       watch.go_on();
-      if (measuring && options.target_psnr > 0 && point.heldout_psnr >= options.target_psnr) {
-        report.stop = StopReason::target_psnr;
-        break;
-      }
-      if (measuring && options.plateau_db > 0 && !state->best.empty() &&
-          point.heldout_psnr < state->best.psnr - options.plateau_db) {
-        report.stop = StopReason::plateau;
+      if (const auto stop = measuring ? good_enough(options, state->best, psnr) : std::nullopt) {
+        report.stop = *stop;
         break;
       }
     } else if (state->step % 50 == 0) {
-      report_progress(fmt::format("training views {:.2f} dB", state->train_psnr), fraction,
-                      watch.wall_now());
+      report_progress(fraction, watch.wall_now());
     }
     if (!options.checkpoint.empty() && wall_seconds() - last_saved > options.checkpoint_every_s) {
-      watch.pause();
+      pause();
       ORBITFUSE_TRY(save());
       watch.go_on();
     }
   }
-  watch.pause();
-  if (report.skipped_steps > 0 && trainer.rays() > 0 && report.skipped_steps == state->step)
+  pause();
+  if (history.skipped_steps > 0 && trainer.rays() > 0 && history.skipped_steps == state->step)
     return fail(ErrorKind::quality, stage,
-                fmt::format("none of the {} steps had a finite gradient", report.skipped_steps),
+                fmt::format("none of the {} steps had a finite gradient", history.skipped_steps),
                 "look for NaN in the images or, with shared geometry, train the guide field again");
+  if (state->step == 0)
+    return fail(ErrorKind::usage, "nerf.budget_s", fmt::format("{} s were over before the first step", options.budget_s),
+                "allow more time");
   ORBITFUSE_TRY(save());
-  report.iterations = state->step;
-  report.cpu_s = watch.cpu_s;
-  report.wall_s = watch.wall_s;
-  report.rays = trainer.rays();
-  report.samples = trainer.samples();
-  report.best_step = state->step;
-  if (measuring && !report.curve.empty()) report.best_psnr = report.curve.back().heldout_psnr;
+  static_cast<History&>(report) = history;
+  report.iterations = report.best_step = state->step;
+  report.best_psnr = measuring && !history.curve.empty() ? history.curve.back().heldout_psnr
+                                                          : std::numeric_limits<double>::quiet_NaN();
   if (!state->best.empty()) {
     report.best_step = state->best.step;
     report.best_psnr = state->best.psnr;
     state->restore(state->best);
     state->best = {};
   }
+  if (options.target_psnr > 0 && !(report.best_psnr >= options.target_psnr))
+    report.warnings.push_back(fmt::format("the target of {:.2f} dB was not reached: held-out {:.2f} dB",
+                                          options.target_psnr, report.best_psnr));
   for (std::size_t i = 0; options.per_image_offset && i < dataset.views.size(); ++i)
     report.image_offsets_k.push_back(state->image_offsets.value[i] * (state->span.high - state->span.low));
   // How a field came about is the report's; equal fields are equal files.
-  state->spent_cpu_s = state->spent_wall_s = 0;
+  state->history = {};
   state->options.resume = false;
   state->options.checkpoint.clear();
   out = Field(std::move(state));

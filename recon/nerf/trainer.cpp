@@ -18,7 +18,7 @@ constexpr int occupancy_every = 16;
 constexpr int occupancy_warmup = 64;
 constexpr float known_depth_margin = 1.08f;  ///< a wrong depth must be able to move
 
-enum Stream : std::uint64_t { pixel_stream = 1, jitter_stream, known_stream, probe_stream };
+enum Stream : std::uint64_t { pixel_stream = 1, jitter_stream = 2, probe_stream = 4 };
 
 /// What the learning rates are multiplied by: warm-up, then half a cosine down to 1/100.
 double schedule(int step, double progress) {

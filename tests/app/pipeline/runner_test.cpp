@@ -197,6 +197,41 @@ TEST(Runner, ResumesAnInterruptedStageWithTheSameKeyOnly) {
   EXPECT_FALSE(resumed) << "an attempt with other options must not be continued";
 }
 
+TEST(Runner, AStageSeesWhatOtherOptionsMadeOfTheSameInputs) {
+  const TempFolder temp;
+  int option = 1;
+  std::string session = "one";
+  std::optional<EarlierResult> seen;
+  const auto run = [&](bool force = false) {
+    Stage stage{.name = "long", .options = {{"x", option}}, .inputs_hash = session};
+    stage.run = [&](const StageContext& context) -> Result<StageOutput> {
+      seen = context.earlier_result;
+      ORBITFUSE_TRY(write_file_atomic(context.folder / "result", std::to_string(option)));
+      return StageOutput{.metrics = {{"made", option}}, .skips = {}, .warnings = {}};
+    };
+    Runner({stage}, {.out = temp.path, .force = force}, {}).run();
+  };
+  run();
+  EXPECT_FALSE(seen);
+  option = 2;
+  run();
+  ASSERT_TRUE(seen);
+  EXPECT_EQ(seen->folder, temp.path / "long");
+  EXPECT_EQ(seen->options.at("x"), 1);
+  EXPECT_EQ(seen->metrics.at("made"), 1);
+  option = 3;
+  run(true);
+  EXPECT_FALSE(seen) << "--force starts from nothing";
+  option = 4;
+  std::ofstream(temp.path / "long/result") << "tampered";
+  run();
+  EXPECT_FALSE(seen) << "a damaged result is none";
+  option = 5;
+  session = "another";
+  run();
+  EXPECT_FALSE(seen) << "made from other inputs";
+}
+
 TEST(Runner, AbsentIsNotAFailure) {
   const TempFolder temp;
   Stage absent{.name = "thermal"};

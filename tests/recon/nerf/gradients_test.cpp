@@ -97,10 +97,13 @@ class FieldGradient : public ::testing::TestWithParam<Modality> {
     options.log2_table = 10;
     options.max_resolution = 64;
     options.levels = 4;
+    options.color_layers = 2;
     options.occupancy_resolution = 16;
     field_.create(options, GetParam(), 3);
+    // In steps of 2^-8, so that these and what the tests add are exact in half precision.
     for (std::size_t i = 0; i < field_.main.grid.table.size(); ++i)
-      field_.main.grid.table.value[i] = random_uniform(8, 1, i) - 0.5f;
+      field_.main.grid.table.value[i] = std::round((random_uniform(8, 1, i) - 0.5f) * 256) / 256;
+    field_.main.grid.level_weight[2] = 0.5f;  // coming in, coarse to fine
     field_.refresh();
     for (int r = 0; r < 12; ++r) {
       const float a = 0.5f * static_cast<float>(r);
@@ -127,8 +130,34 @@ class FieldGradient : public ::testing::TestWithParam<Modality> {
     gradients.reset(field_);
     forward(field_, kernels_, {1e-9f, 0.0f}, block_);
     backward(field_, kernels_, settings_, targets_, block_, gradients, grid_);
-    return settings_.per_ray * (gradients.squared_error / field_.channels() +
+    return settings_.per_ray * (color_loss() / field_.channels() +
                                 settings_.distortion_weight * gradients.distortion + gradients.depth);
+  }
+
+  /// From the definition: squared error, beyond `huber` its tangent.
+  double color_loss() const {
+    double sum = 0;
+    int row = 0;
+    for (std::size_t r = 0; r < targets_.size(); ++r) {
+      float value[3];
+      ray_value(field_, block_, static_cast<int>(r), row, value);
+      for (int c = 0; c < field_.channels(); ++c) {
+        const double offset = field_.image_offsets.value[static_cast<std::size_t>(targets_[r].view)];
+        const double error = std::abs(double{value[c]} + offset - targets_[r].value[c]), h = settings_.huber;
+        sum += h > 0 && error > h ? 2 * h * error - h * h : error * error;
+      }
+    }
+    return sum;
+  }
+
+  std::vector<float> table_gradient() const {
+    const HashEncoding& grid = field_.main.grid;
+    const int n = block_.samples();
+    std::vector<float> table(grid.table.size());
+    for (std::size_t l = 0; l < grid.levels.size(); ++l)
+      kernels_.scatter(grid.levels[l], table.data() + grid.levels[l].offset, block_.position01.data(), n,
+                       grid_.data() + l * static_cast<std::size_t>(n * grid.features));
+    return table;
   }
 
   double moved_loss() {
@@ -164,14 +193,40 @@ TEST_P(FieldGradient, OfColourDistortionAndDepthLossMatchesDifferences) {
 TEST_P(FieldGradient, OfTheHashTableMatchesDifferences) {
   BlockGradients gradients;
   loss(gradients);
-  HashEncoding& grid = field_.main.grid;
-  const int n = block_.samples();
-  std::vector<float> table(grid.table.size());
-  for (std::size_t l = 0; l < grid.levels.size(); ++l)
-    kernels_.scatter(grid.levels[l], table.data() + grid.levels[l].offset, block_.position01.data(), n,
-                     grid_.data() + l * static_cast<std::size_t>(n * grid.features));
   // The table is read in half precision, so the step must be large against 2^-11.
-  test::expect_slope(grid.table.value, table, 0.05, 0.03, [&] { return moved_loss(); });
+  test::expect_slope(field_.main.grid.table.value, table_gradient(), 0.05, 0.03, [&] { return moved_loss(); });
+}
+
+TEST_P(FieldGradient, OfEachPartAloneMatchesDifferencesAlongAnyDirection) {
+  for (const float huber : {0.0f, 0.1f}) {
+    SCOPED_TRACE(huber);
+    settings_.huber = huber;
+    BlockGradients gradients;
+    loss(gradients);
+    const auto moved = [&] { return moved_loss(); };
+    const auto check_parts = [&](std::vector<float>& values, const std::vector<float>& gradient,
+                                 const std::vector<test::Part>& parts, float step) {
+      test::expect_random_slopes(values, gradient, parts, step, 0.06, moved);
+      field_.refresh();
+    };
+    {
+      SCOPED_TRACE("table");
+      HashEncoding& grid = field_.main.grid;
+      check_parts(grid.table.value, table_gradient(), test::levels_of(grid), 1.0f / 2048);
+    }
+    {
+      SCOPED_TRACE("density network");
+      check_parts(field_.main.mlp.weights.value, gradients.mlp, test::layers_of(field_.main.mlp), 1e-4f);
+    }
+    {
+      SCOPED_TRACE("colour network");
+      check_parts(field_.color.weights.value, gradients.color, test::layers_of(field_.color), 1e-4f);
+    }
+    {
+      SCOPED_TRACE("offsets");
+      check_parts(field_.image_offsets.value, gradients.offsets, {{"one", 1, 1}, {"another", 2, 1}}, 1e-3f);
+    }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(EveryModality, FieldGradient,

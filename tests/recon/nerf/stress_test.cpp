@@ -45,8 +45,8 @@ TEST(Stress, MalformedViewIsNamed) {
   data = toy_scene(Modality::thermal, 4);
   data.views[0].image.at<float>(0, 0) = std::numeric_limits<float>::infinity();
   EXPECT_EQ(error_of(data).where, "000.png");
-  data = toy_scene(Modality::thermal, 4);
-  data.views[0].image = nan_value;
+  data = toy_scene(Modality::thermal, 2);
+  for (TrainingView& view : data.views) view.image = nan_value;
   EXPECT_EQ(error_of(data).where, "000.png");
   data = toy_scene(Modality::thermal, 4);
   data.views[2].cam_from_world.translation.x() = nan_value;
@@ -62,6 +62,58 @@ TEST(Stress, InvalidThermalPixelsAreNotTrainedOn) {
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_EQ(report->skipped_steps, 0);
   expect_finite(field);
+}
+
+TEST(Stress, ABrokenThermalViewIsDroppedWithItsNameAndDeadPixelsAreTold) {
+  const Dataset good = toy_scene(Modality::thermal, 6);
+  Dataset data = toy_scene(Modality::thermal, 7);
+  for (std::size_t i = 0; i < 6; ++i) data.views[i == 0 ? 0 : i + 1] = good.views[i];
+  data.views[1].name = "broken.tiff";
+  data.views[1].image.rowRange(0, 17) = nan_value;  // of 32
+  TrainOptions options = toy_options(Modality::thermal, 20);
+  options.holdout_every = 3;
+  Field with, without;
+  const auto report = train(data, options, {}, with);
+  ASSERT_TRUE(report) << report.error().message();
+  ASSERT_EQ(report->warnings.size(), 1u);
+  EXPECT_NE(report->warnings[0].find("broken.tiff dropped: 53 %"), std::string::npos) << report->warnings[0];
+  EXPECT_EQ(report->image_offsets_k.size(), 6u);
+  ASSERT_TRUE(train(good, options, {}, without));
+  EXPECT_EQ(with.state().main.grid.table.value, without.state().main.grid.table.value);
+
+  data = good;
+  data.views[2].image.at<float>(5, 5) = nan_value;
+  const auto dead = train(data, options, {}, with);
+  ASSERT_TRUE(dead);
+  EXPECT_TRUE(dead->warnings.empty());
+  const auto told = std::find_if(dead->skips.begin(), dead->skips.end(),
+                                 [](const Skip& skip) { return skip.what == "invalid pixels"; });
+  ASSERT_TRUE(told != dead->skips.end());
+  EXPECT_NE(told->why.find("002.png"), std::string::npos);
+}
+
+TEST(Stress, ACameraInsideTheObjectTrains) {
+  for (const Modality modality : {Modality::visible, Modality::thermal}) {
+    Dataset data = toy_scene(modality, 8);
+    // Two stand in the ball and see its dark inside; depth, where known, is a hand's breadth.
+    for (const std::size_t i : {1u, 5u}) {
+      data.views[i].cam_from_world.translation *= 0.1;
+      data.views[i].image = modality == Modality::visible ? cv::Scalar(0.05, 0.05, 0.05) : cv::Scalar(300);
+      data.depth.push_back({static_cast<int>(i), data.views[i].camera,
+                            cv::Mat(32, 32, CV_32FC1, cv::Scalar(0.3)), {}, {}});
+    }
+    Field field;
+    const auto report = train(data, toy_options(modality, 80), {}, field);
+    ASSERT_TRUE(report) << report.error().message();
+    EXPECT_EQ(report->skipped_steps, 0);
+    expect_finite(field);
+    EXPECT_GT(report->curve.back().train_psnr, 10) << name(modality);
+    for (const std::size_t i : {0u, 1u}) {
+      const auto view = render(field, data.views[i].camera, data.views[i].cam_from_world, {}, {});
+      ASSERT_TRUE(view);
+      EXPECT_TRUE(cv::checkRange(view->color));
+    }
+  }
 }
 
 TEST(Stress, OneViewAndTwoEqualViewsTrain) {
