@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // bench_thermal SESSION RUN GROUND_TRUTH [--tracking TRACKING_JSON]
-// [--focal-error RELATIVE] [--views]
+// [--focal-error RELATIVE] [--views] [--rungs]
 // The thermal pose stage alone, on what an earlier run left in its folder RUN (poses_visible,
 // train_visible), so that one stage can be judged without the others. GROUND_TRUTH serves the
 // comparison only. --tracking adds frames recorded between the stations, --focal-error 0.03 makes
-// the thermal focal length known 3 % too long, --views prints each view.
+// the thermal focal length known 3 % too long, --views prints each view, --rungs sets what COLMAP,
+// the scene's lines and its renders give alone beside each other, with their time.
 #include <fmt/format.h>
 #include <sys/resource.h>
 
@@ -29,17 +30,22 @@ namespace {
 using namespace orbitfuse;
 namespace fs = std::filesystem;
 
+/// Of this program and of COLMAP, which it starts.
 double cpu_seconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
-         1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+  double sum = 0;
+  for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
+    rusage usage{};
+    getrusage(who, &usage);
+    sum += static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+           1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+  }
+  return sum;
 }
 
 struct Arguments {
   fs::path session, run, truth, tracking;
   double focal_error = 0;
-  bool views = false;
+  bool views = false, rungs = false;
 };
 
 Arguments arguments_of(int argc, char** argv) {
@@ -49,6 +55,8 @@ Arguments arguments_of(int argc, char** argv) {
     const std::string_view word = argv[i];
     if (word == "--views") {
       arguments.views = true;
+    } else if (word == "--rungs") {
+      arguments.rungs = true;
     } else if (word == "--tracking" && i + 1 < argc) {
       arguments.tracking = argv[++i];
     } else if (word == "--focal-error" && i + 1 < argc) {
@@ -71,6 +79,34 @@ Result<SceneView> rendered(const nerf::Field& field, const Camera& camera,
   SceneView view{{}, seen.depth};
   cv::cvtColor(seen.color, view.brightness, cv::COLOR_RGB2GRAY);
   return view;
+}
+
+/// One rung of the ladder alone: its success and error against its time.
+void print_rung(const char* name, const bench::Scene& scene, const VisibleScene* seen,
+                const PoseOptions& options) {
+  const double before = cpu_seconds();
+  const auto poses = estimate_thermal_poses(
+      scene.session, seen, options, fs::temp_directory_path() / "orbitfuse_bench_rung", {});
+  const double spent = cpu_seconds() - before;
+  if (!poses) {
+    fmt::print("| {} | none: {} | | | {:.0f} |\n", name, poses.error().found.substr(0, 120), spent);
+    return;
+  }
+  const bench::PoseError error = bench::pose_error(
+      poses->reconstruction, poses->shares_visible_frame ? seen->reconstruction : poses->reconstruction,
+      scene.truth);
+  fmt::print("| {} | {}/{} | {:.2f} / {:.2f} | {:.2f} / {:.2f} | {:.0f} |\n", name,
+             poses->reconstruction.views.size(), poses->frame_count, error.ate_percent,
+             error.worst_percent, error.mean_rotation_deg, error.worst_rotation_deg, spent);
+}
+
+void print_rungs(const bench::Scene& scene, const VisibleScene& seen, const PoseOptions& options) {
+  fmt::print("| rung alone | posed | centres RMS / worst, % | rotation mean / worst, deg | CPU s |\n"
+             "|---|---|---|---|---|\n");
+  print_rung("COLMAP on the thermal views", scene, nullptr, options);
+  const VisibleScene lines{seen.reconstruction, nullptr};
+  print_rung("lines of the visible scene, else COLMAP", scene, &lines, options);
+  print_rung("lines, then renders and temperatures", scene, &seen, options);
 }
 
 Status run(const Arguments& arguments) {
@@ -101,6 +137,10 @@ Status run(const Arguments& arguments) {
   const auto start = std::chrono::steady_clock::now();
   PoseOptions options;
   options.use_known_poses = false;
+  if (arguments.rungs) {
+    print_rungs(scene, seen, options);
+    return {};
+  }
   ORBITFUSE_ASSIGN(
       const ThermalPoses poses,
       estimate_thermal_poses(scene.session, &seen, options,
@@ -144,7 +184,7 @@ int main(int argc, char** argv) {
   if (arguments.truth.empty()) {
     std::fputs(
         "bench_thermal SESSION RUN GROUND_TRUTH [--tracking TRACKING_JSON] [--focal-error "
-        "RELATIVE] [--views]\n",
+        "RELATIVE] [--views] [--rungs]\n",
         stderr);
     return 2;
   }
