@@ -58,6 +58,13 @@ void BlockGradients::add(const BlockGradients& other) {
   finite = finite && other.finite;
 }
 
+bool BlockGradients::all_parts_finite() const {
+  const auto numbers = [](const std::vector<float>& part) { return all_finite(part.data(), part.size()); };
+  return finite && numbers(mlp) && numbers(color) && numbers(offsets) &&
+         std::all_of(std::begin(proposals), std::end(proposals), numbers) && std::isfinite(squared_error) &&
+         std::isfinite(distortion) && std::isfinite(depth) && std::isfinite(interlevel);
+}
+
 void backward(const FieldState& field, const Kernels& kernels, const LossSettings& settings,
               const std::vector<RayTarget>& targets, RayBlock& b, BlockGradients& gradients,
               std::vector<float>& grid) {

@@ -28,7 +28,8 @@ struct BlockGradients {
   std::array<std::vector<float>, 2> proposals;  ///< of their perceptrons
   double squared_error = 0, distortion = 0, depth = 0, interlevel = 0;
   long channels = 0;
-  bool finite = true;
+  bool finite = true;  ///< the encoded features' gradients
+  bool all_parts_finite() const;
   void reset(const FieldState& field);
   void add(const BlockGradients& other);
 };

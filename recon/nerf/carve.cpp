@@ -15,9 +15,10 @@ struct Votes {
   int solid = 0;  ///< ... at a known surface
 };
 
-Votes vote(const std::vector<SceneView>& views, const float x[3], float half_diagonal) {
+Votes vote(const std::vector<const SceneView*>& voters, const float x[3], float half_diagonal) {
   Votes votes;
-  for (const SceneView& view : views) {
+  for (const SceneView* voter : voters) {
+    const SceneView& view = *voter;
     double px, py, z;
     if (!view.rays.project(x, px, py, z)) continue;
     ++votes.seen;
@@ -60,12 +61,15 @@ void clear_segment(Occupancy& occupancy, const Ray& ray, float end, float tube) 
 
 }  // namespace
 
-double carve(const Dataset& dataset, const std::vector<SceneView>& views, const TrainOptions& options,
-             Occupancy& occupancy) {
+double carve(bool dense_depth, const std::vector<SceneView>& views, const std::vector<bool>& heldout,
+             const TrainOptions& options, Occupancy& occupancy) {
+  std::vector<const SceneView*> voters;
+  for (std::size_t i = 0; i < views.size(); ++i)
+    if (!heldout[i]) voters.push_back(&views[i]);
   const int n = occupancy.resolution;
   // Votes are cast for 2x2x2 cells at once; their half diagonal is part of the margin.
   const int half = n / 2;
-  const int min_views = std::min(static_cast<int>(options.min_views), static_cast<int>(views.size()));
+  const int min_views = std::min(static_cast<int>(options.min_views), static_cast<int>(voters.size()));
   std::vector<std::uint8_t> off(static_cast<std::size_t>(half) * half * half * occupancy.cascades);
   parallel_blocks(half * occupancy.cascades, 1, [&](int slab, int) {
     const int cascade = slab / half;
@@ -76,7 +80,7 @@ double carve(const Dataset& dataset, const std::vector<SceneView>& views, const 
         const float center[3] = {low + (static_cast<float>(x) + 0.5f) * size,
                                  low + (static_cast<float>(y) + 0.5f) * size,
                                  low + (static_cast<float>(slab % half) + 0.5f) * size};
-        const Votes votes = vote(views, center, 0.87f * size);
+        const Votes votes = vote(voters, center, 0.87f * size);
         const bool free = options.carve && votes.free >= 2 && votes.free > 2 * votes.solid;
         off[(static_cast<std::size_t>(slab) * half + y) * half + x] = votes.seen < min_views || free;
       }
@@ -87,13 +91,13 @@ double carve(const Dataset& dataset, const std::vector<SceneView>& views, const 
     if (off[static_cast<std::size_t>((slab * half + i[1] / 2) * half + i[0] / 2)])
       Occupancy::put(occupancy.allowed, cell, false);
   }
-  if (options.carve && !dataset.has_dense_depth())
-    for (const SceneView& view : views)
-      for (const std::int32_t pixel : view.known) {
-        const int width = view.rays.camera().width;
+  if (options.carve && !dense_depth)
+    for (const SceneView* view : voters)
+      for (const std::int32_t pixel : view->known) {
+        const int width = view->rays.camera().width;
         Ray ray;
-        if (!view.rays.ray(pixel % width + 0.5, pixel / width + 0.5, ray)) continue;
-        const float end = view.distance.at<float>(pixel / width, pixel % width);
+        if (!view->rays.ray(pixel % width + 0.5, pixel / width + 0.5, ray)) continue;
+        const float end = view->distance.at<float>(pixel / width, pixel % width);
         clear_segment(occupancy, ray, 0.96f * end - 0.02f, 0.03f);
       }
   occupancy.on = occupancy.allowed;

@@ -141,25 +141,24 @@ void visit(Archive& io, Occupancy& grid) {
 }
 
 template <class Archive>
+void visit(Archive& io, std::vector<std::vector<float>>& lists) {
+  std::uint64_t count = lists.size();
+  io(count);
+  if constexpr (Archive::reading) {
+    if (count > 64) return void(io.ok = false);
+    lists.resize(count);
+  }
+  for (std::vector<float>& list : lists) io(list);
+}
+
+template <class Archive>
 void visit(Archive& io, Snapshot& best) {
   io(best.step);
   io(best.psnr);
   io(best.occupied);
-  std::uint64_t count = best.values.size();
-  io(count);
-  if constexpr (Archive::reading) {
-    if (count > 64) return void(io.ok = false);
-    best.values.resize(count);
-  }
-  for (std::vector<float>& values : best.values) io(values);
+  visit(io, best.values);
   io(best.codes);
-  std::uint64_t networks = best.level_weights.size();
-  io(networks);
-  if constexpr (Archive::reading) {
-    if (networks > 64) return void(io.ok = false);
-    best.level_weights.resize(networks);
-  }
-  for (std::vector<float>& weights : best.level_weights) io(weights);
+  visit(io, best.level_weights);
 }
 
 bool fits(const Snapshot& best, FieldState& state) {

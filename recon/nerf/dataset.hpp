@@ -21,7 +21,9 @@ struct TrainingView {
   /// Visible: CV_32FC3 in R, G, B order, 0..1 as stored (sRGB). Thermal: CV_32FC1 kelvin, NaN =
   /// invalid pixel (never trained on). NaN in a visible image is an input error.
   cv::Mat image;
-  bool measure_only = false;  ///< held out: measures, never trains
+  /// Held out: measures, never trains. The field is the same without it, bit for bit, except that
+  /// TrainOptions::keep_best chooses among its steps by what held-out views say.
+  bool measure_only = false;
 };
 
 /// Everything known of one modality. All views, points and depth maps share one world frame; the

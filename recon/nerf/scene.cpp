@@ -51,19 +51,56 @@ cv::Mat known_distance(const Dataset& dataset, const Space& space, int index,
 
 }  // namespace
 
-Space estimate_space(const Dataset& dataset) {
+std::vector<bool> heldout_views(const Dataset& dataset, int holdout_every) {
+  std::vector<bool> heldout;
+  int turn = 0;  // only views that might train are counted: others change nothing
+  for (const TrainingView& view : dataset.views) {
+    const bool turned = !view.measure_only && holdout_every > 0 && dataset.views.size() > 1 &&
+                        turn++ % holdout_every == 0;
+    heldout.push_back(view.measure_only || turned);
+  }
+  return heldout;
+}
+
+Dataset training_part(const Dataset& dataset, const std::vector<bool>& heldout) {
+  Dataset part;
+  part.modality = dataset.modality;
+  part.thermal_is_gray = dataset.thermal_is_gray;
+  std::vector<int> place(dataset.views.size(), -1);
+  for (std::size_t i = 0; i < dataset.views.size(); ++i) {
+    if (heldout[i]) continue;
+    place[i] = static_cast<int>(part.views.size());
+    part.views.push_back(dataset.views[i]);
+  }
+  for (const SparsePoint& point : dataset.points) {
+    SparsePoint seen = point;
+    seen.track.clear();
+    for (Observation o : point.track) {
+      o.view = place[static_cast<std::size_t>(o.view)];
+      if (o.view >= 0) seen.track.push_back(o);
+    }
+    if (point.track.empty() || !seen.track.empty()) part.points.push_back(std::move(seen));
+  }
+  for (DepthMap map : dataset.depth) {
+    map.view = place[static_cast<std::size_t>(map.view)];
+    if (map.view >= 0) part.depth.push_back(std::move(map));
+  }
+  return part;
+}
+
+Space estimate_space(const Dataset& training) {
   std::vector<Rigid3d> poses;
   std::vector<Eigen::Vector3d> points;
-  for (const TrainingView& view : dataset.views) poses.push_back(view.cam_from_world);
-  for (const SparsePoint& point : dataset.points) points.push_back(point.position);
+  for (const TrainingView& view : training.views) poses.push_back(view.cam_from_world);
+  for (const SparsePoint& point : training.points) points.push_back(point.position);
   const SceneBall ball = scene_ball(poses, std::move(points));
   return {ball.center, ball.radius};
 }
 
-ValueSpan estimate_span(const Dataset& dataset) {
-  if (dataset.modality == Modality::visible) return {0, 1};
+ValueSpan estimate_span(const Dataset& training) {
+  if (training.modality == Modality::visible) return {0, 1};
   std::vector<float> samples;
-  for (const TrainingView& view : dataset.views)
+  for (const TrainingView& view : training.views)
     for (int y = 0; y < view.image.rows; y += 4)
       for (int x = 0; x < view.image.cols; x += 4)
         if (const float v = view.image.at<float>(y, x); std::isfinite(v)) samples.push_back(v);

@@ -27,17 +27,24 @@ struct SceneView {
   std::vector<std::int32_t> known;  ///< pixels (y * width + x) whose distance is known
 };
 
-/// The scene's ball (core/scene_ball.hpp).
-Space estimate_space(const Dataset& dataset);
+/// Views that don't train: those marked so, and every n-th of the others (0 = none).
+std::vector<bool> heldout_views(const Dataset& dataset, int holdout_every);
 
-/// Thermal: the 0.1 and 99.9 percentile over all views, at least 1 K wide. Visible: 0..1.
-ValueSpan estimate_span(const Dataset& dataset);
+/// What training may know: the dataset without held-out views, their depth maps and the points that
+/// only they saw. Images are shared, not copied.
+Dataset training_part(const Dataset& dataset, const std::vector<bool>& heldout);
+
+/// The ball of the scene that these views and points show (core/scene_ball.hpp).
+Space estimate_space(const Dataset& training);
+
+/// Thermal: the 0.1 and 99.9 percentile over these views, at least 1 K wide. Visible: 0..1.
+ValueSpan estimate_span(const Dataset& training);
 
 std::vector<SceneView> prepare_views(const Dataset& dataset, const Space& space, ValueSpan span);
 
-/// Switches off cells that too few views see and cells in front of known depth (SfM tracks, depth
-/// maps). Returns the fraction left on.
-double carve(const Dataset& dataset, const std::vector<SceneView>& views, const TrainOptions& options,
-             Occupancy& occupancy);
+/// Switches off cells that too few training views see and cells in front of depth that these know
+/// (SfM tracks, depth maps; `dense_depth` as Dataset::has_dense_depth). Returns the fraction left on.
+double carve(bool dense_depth, const std::vector<SceneView>& views, const std::vector<bool>& heldout,
+             const TrainOptions& options, Occupancy& occupancy);
 
 }  // namespace orbitfuse::nerf

@@ -116,16 +116,13 @@ Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
                 "train the visible field first");
 
   TrainReport report;
-  std::vector<bool> heldout(dataset.views.size(), false);
-  for (std::size_t i = 0; i < heldout.size(); ++i) {
-    heldout[i] = dataset.views[i].measure_only ||
-                 (options.holdout_every > 0 && dataset.views.size() > 1 &&
-                  i % static_cast<std::size_t>(options.holdout_every) == 0);
+  const std::vector<bool> heldout = heldout_views(dataset, options.holdout_every);
+  for (std::size_t i = 0; i < heldout.size(); ++i)
     if (heldout[i]) report.heldout.push_back(dataset.views[i].name);
-  }
   if (report.heldout.size() == dataset.views.size())
     return fail(ErrorKind::usage, "nerf.holdout_every", "no view is left to train on",
                 "hold out fewer views");
+  const Dataset training = training_part(dataset, heldout);
 
   Stopwatch watch;
   auto state = std::make_unique<FieldState>();
@@ -139,11 +136,11 @@ Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
   } else {
     state->create(options, dataset.modality, static_cast<int>(dataset.views.size()));
     state->thermal_is_gray = dataset.thermal_is_gray;
-    state->space = estimate_space(dataset);
-    state->span = estimate_span(dataset);
+    state->space = estimate_space(training);
+    state->span = estimate_span(training);
   }
   if (state->options.haze_samples == 0)
-    state->options.haze_samples = !dataset.has_dense_depth() && !options.shared_geometry ? 24 : 8;
+    state->options.haze_samples = !training.has_dense_depth() && !options.shared_geometry ? 24 : 8;
   if (options.shared_geometry && !resumed) {
     ORBITFUSE_TRY(inherit_geometry(guide->state(), *state));
     report.skips.push_back({"density from nothing", "the visible field's geometry is given",
@@ -151,7 +148,7 @@ Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
   }
   const std::vector<SceneView> views = prepare_views(dataset, state->space, state->span);
   if (!resumed && !options.shared_geometry && options.sampling == Sampling::occupancy) {
-    const double left = carve(dataset, views, options, state->occupancy);
+    const double left = carve(training.has_dense_depth(), views, heldout, options, state->occupancy);
     report.skips.push_back({"empty space", fmt::format("{:.1f} % of the cells seen by enough views and "
                                                        "not in front of known depth", 100 * left),
                             "rays skip the rest from the first step"});

@@ -169,21 +169,15 @@ bool Trainer::step(double progress) {
   }
   rays_ += drawn;
   samples_ += samples;
-  bool finite = gradients.finite && all_finite(gradients.mlp.data(), gradients.mlp.size()) &&
-                all_finite(gradients.color.data(), gradients.color.size()) &&
-                all_finite(gradients.offsets.data(), gradients.offsets.size());
-  for (std::size_t k = 0; with_proposals && k < field_.proposals.size(); ++k)
-    finite = finite && all_finite(gradients.proposals[k].data(), gradients.proposals[k].size());
-  finite = finite && std::isfinite(gradients.squared_error) &&
-                      std::isfinite(gradients.distortion) && std::isfinite(gradients.depth) &&
-                      std::isfinite(gradients.interlevel);
+  const bool finite = gradients.all_parts_finite();
   if (finite && drawn > 0) {
     AdamStep adam;
-    adam.learning_rate = static_cast<float>(o.learning_rate * schedule(field_.step, progress));
+    const double scheduled = schedule(field_.step, progress);
+    adam.learning_rate = static_cast<float>(o.learning_rate * scheduled);
     adam.correction1 = static_cast<float>(1.0 / (1 - std::pow(adam.beta1, field_.step + 1)));
     adam.correction2 = static_cast<float>(1.0 / (1 - std::pow(adam.beta2, field_.step + 1)));
     AdamStep network = adam;
-    network.learning_rate *= static_cast<float>(o.network_learning_rate / o.learning_rate);
+    network.learning_rate = static_cast<float>(o.network_learning_rate * scheduled);
     network.weight_decay = 1e-6f;
     apply(adam, network, gradients, with_proposals);
     const double mse = gradients.squared_error / static_cast<double>(std::max(1l, gradients.channels));

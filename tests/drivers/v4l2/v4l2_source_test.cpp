@@ -38,6 +38,24 @@ class V4l2SourceTest : public testing::Test {
     return {};
   }
 
+  void note_resets() {
+    options.reset_port = [this](const std::string& port) -> Status {
+      resets.push_back(port);
+      return {};
+    };
+  }
+  /// The second stall in a row: its port was reset, and frames come again.
+  void expect_reset_and_frames(V4l2Source& source, const std::string& detail) {
+    const Delivery again = deliver(source);
+    EXPECT_EQ(again.reason, "stalled");
+    EXPECT_NE(again.detail.find(detail), std::string::npos);
+    EXPECT_EQ(resets, std::vector<std::string>{"1-4"});
+    EXPECT_EQ(deliver(source).reason, "reconnected");
+    shoot(0);
+    EXPECT_EQ(deliver(source).kind, Kind::frame);
+  }
+
+  std::vector<std::string> resets;
   std::shared_ptr<FakeVideoSystem> system = std::make_shared<FakeVideoSystem>();
   V4l2Options options;
 };
@@ -91,12 +109,8 @@ TEST_F(V4l2SourceTest, BuffersGivenBackEmptyAreNoFrames) {
 }
 
 TEST_F(V4l2SourceTest, StreamsOfEmptyBuffersAreAStallAndGetTheirPortReset) {
-  std::vector<std::string> resets;
+  note_resets();
   options.stall = 10s;  // it is not silence that ends these streams
-  options.reset_port = [&](const std::string& port) -> Status {
-    resets.push_back(port);
-    return {};
-  };
   V4l2Source source(options, system);
   ASSERT_TRUE(source.start());
   const auto shoot_empty = [&] {
@@ -107,30 +121,20 @@ TEST_F(V4l2SourceTest, StreamsOfEmptyBuffersAreAStallAndGetTheirPortReset) {
   EXPECT_EQ(deliver(source).reason, "reconnected");
   EXPECT_TRUE(resets.empty());
   shoot_empty();
-  const Delivery again = deliver(source);
-  EXPECT_EQ(again.reason, "stalled");
-  EXPECT_NE(again.detail.find("empty buffers"), std::string::npos);
-  EXPECT_EQ(resets, std::vector<std::string>{"1-4"});
-  EXPECT_EQ(deliver(source).reason, "reconnected");
-  shoot(0);
-  EXPECT_EQ(deliver(source).kind, Kind::frame);
+  expect_reset_and_frames(source, "empty buffers");
 }
 
 TEST_F(V4l2SourceTest, AStreamThatBreaksBeforeItsFirstFrameEscalatesToo) {
-  int resets = 0;
+  note_resets();
   options.stall = 10s;
-  options.reset_port = [&](const std::string&) -> Status {
-    ++resets;
-    return {};
-  };
   V4l2Source source(options, system);
   ASSERT_TRUE(source.start());
-  for (int i = 0; i < 2; ++i) {
+  for (std::size_t i = 0; i < 2; ++i) {
     shoot(0);
     system->dequeue_error = EIO;
     EXPECT_EQ(deliver(source).reason, "stalled");
     EXPECT_EQ(deliver(source).reason, "reconnected");
-    EXPECT_EQ(resets, i);
+    EXPECT_EQ(resets.size(), i);
   }
   system->dequeue_error = 0;
   EXPECT_EQ(deliver(source).kind, Kind::frame);
@@ -350,23 +354,13 @@ TEST_F(V4l2SourceTest, StallIsToldAndReopened) {
 }
 
 TEST_F(V4l2SourceTest, HungCameraGetsItsPortReset) {
-  std::vector<std::string> resets;
-  options.reset_port = [&](const std::string& port) -> Status {
-    resets.push_back(port);
-    return {};
-  };
+  note_resets();
   V4l2Source source(options, system);
   ASSERT_TRUE(source.start());
   EXPECT_EQ(deliver(source).reason, "stalled");
   EXPECT_EQ(deliver(source).reason, "reconnected");
   EXPECT_TRUE(resets.empty());  // reopening alone comes first
-  const Delivery again = deliver(source);
-  EXPECT_EQ(again.reason, "stalled");
-  EXPECT_NE(again.detail.find("reset"), std::string::npos);
-  EXPECT_EQ(resets, std::vector<std::string>{"1-4"});
-  EXPECT_EQ(deliver(source).reason, "reconnected");
-  shoot(0);
-  EXPECT_EQ(deliver(source).kind, Kind::frame);
+  expect_reset_and_frames(source, "reset");
   EXPECT_EQ(deliver(source).reason, "stalled");
   EXPECT_EQ(resets.size(), 1u);
 }

@@ -150,19 +150,20 @@ void double_backward_weights(const LayerView& layer, int rows, const float* in, 
 }
 
 /// Error of a view that didn't train, after a short training with these kernels.
-double psnr_with(const Dataset& data, const Kernels& kernels) {
+double psnr_with(Dataset data, const Kernels& kernels) {
   TrainOptions options = toy_options(data.modality, 200);
   options.hidden = options.color_hidden = 16;
   options.samples_per_step = 8192;
   options.haze_samples = 8;
   FieldState state;
   state.create(options, data.modality, static_cast<int>(data.views.size()));
-  state.space = estimate_space(data);
-  state.span = estimate_span(data);
+  data.views[0].measure_only = true;
+  const std::vector<bool> heldout = heldout_views(data, 0);
+  const Dataset training = training_part(data, heldout);
+  state.space = estimate_space(training);
+  state.span = estimate_span(training);
   const auto views = prepare_views(data, state.space, state.span);
-  carve(data, views, options, state.occupancy);
-  std::vector<bool> heldout(views.size(), false);
-  heldout[0] = true;
+  carve(training.has_dense_depth(), views, heldout, options, state.occupancy);
   Trainer trainer(state, views, heldout, kernels);
   for (int i = 0; i < options.iterations; ++i) EXPECT_TRUE(trainer.step(i / double(options.iterations)));
   return psnr_of(state, views[0], 1);

@@ -59,6 +59,65 @@ TEST(Training, IsTheSameForOneAndTwoThreads) {
   EXPECT_NE(different.state().color.weights.value, fields[0].state().color.weights.value);
 }
 
+/// A view that would spoil a training: absurd values from inside the object, with depth and a point.
+void add_hostile_view(Dataset& data, bool first) {
+  TrainingView view = data.views[0];
+  view.name = "hostile.png";
+  view.measure_only = true;
+  view.cam_from_world.translation = {0.01, 0.02, 0.03};
+  const cv::Scalar value = data.modality == Modality::thermal ? cv::Scalar(5000) : cv::Scalar(1, 0, 1);
+  view.image = cv::Mat(view.image.size(), view.image.type(), value);
+  const int at = first ? 0 : static_cast<int>(data.views.size());
+  if (first) {
+    for (DepthMap& map : data.depth) ++map.view;
+    for (SparsePoint& point : data.points)
+      for (Observation& o : point.track) ++o.view;
+  }
+  data.views.insert(data.views.begin() + at, view);
+  for (const float depth : {100.0f, 0.05f})
+    data.depth.push_back({at, view.camera, cv::Mat(32, 32, CV_32FC1, cv::Scalar(depth)), {}, {}});
+  SparsePoint point;
+  point.position = {90, -70, 50};
+  point.track = {{at, {3.5, 4.5}}};
+  data.points.push_back(point);
+}
+
+TEST(Training, AViewThatOnlyMeasuresChangesNothing) {
+  for (const Modality modality : {Modality::visible, Modality::thermal})
+    for (const bool dense : {true, false}) {
+      Dataset data = toy_scene(modality, 6);
+      if (dense) data.depth = test::toy_depth(data);
+      SparsePoint point;
+      point.position = {0, 0, 0.4};
+      point.track = {{1, {16.5, 9.5}}, {2, {16.5, 10.5}}};
+      data.points.push_back(point);
+      TrainOptions options = toy_options(modality, 12);
+      options.keep_best = false;
+      options.holdout_every = 3;
+      Field without;
+      ASSERT_TRUE(train(data, options, {}, without));
+      for (const bool first : {false, true}) {
+        Dataset more = data;
+        add_hostile_view(more, first);
+        Field with;
+        const auto report = train(more, options, {}, with);
+        ASSERT_TRUE(report) << report.error().message();
+        EXPECT_EQ(report->heldout.size(), 3u);
+        const FieldState &a = without.state(), &b = with.state();
+        EXPECT_EQ(a.main.grid.table.value, b.main.grid.table.value) << name(modality) << first;
+        EXPECT_EQ(a.main.mlp.weights.value, b.main.mlp.weights.value);
+        EXPECT_EQ(a.color.weights.value, b.color.weights.value);
+        EXPECT_EQ(a.occupancy.on, b.occupancy.on);
+        EXPECT_EQ(a.occupancy.allowed, b.occupancy.allowed);
+        EXPECT_EQ(a.span.low, b.span.low);
+        EXPECT_EQ(a.span.high, b.span.high);
+        EXPECT_EQ(a.space.radius, b.space.radius);
+        for (std::size_t i = 0; i < data.views.size(); ++i)
+          EXPECT_EQ(a.image_offsets.value[i], b.image_offsets.value[i + (first ? 1 : 0)]);
+      }
+    }
+}
+
 TEST(Training, ResumedAfterACancelEndsAsAnUnbrokenRun) {
   const orbitfuse::test::TempFolder folder;
   const Dataset data = toy_scene(Modality::thermal, 9);
