@@ -9,6 +9,8 @@
 #include <tuple>
 #include <vector>
 
+#include "capture/image_noise.hpp"
+
 namespace orbitfuse {
 namespace {
 
@@ -27,22 +29,19 @@ double quantile(std::vector<float>& values, double share) {
 }
 
 struct Signal {
-  double noise;     ///< standard deviation, if it is white: from the finest diagonal differences
+  double noise;     ///< standard deviation, if it is white
   double range;     ///< between the levels that a fiftieth of the pixels is below and above
   double rounding;  ///< slopes that are arithmetic's alone
 };
 
 Signal signal_of(const cv::Mat& gray) {
-  std::vector<float> detail, level;
-  for (int y = 0; y + 1 < gray.rows; y += 3) {
-    const float *a = gray.ptr<float>(y), *b = gray.ptr<float>(y + 1);
-    for (int x = 0; x + 1 < gray.cols; x += 3) {
-      detail.push_back(std::abs(a[x] - a[x + 1] - b[x] + b[x + 1]) / 2);
-      level.push_back(a[x]);
-    }
+  constexpr int stride = 3;
+  std::vector<float> level;
+  for (int y = 0; y < gray.rows; y += stride) {
+    for (int x = 0; x < gray.cols; x += stride) level.push_back(gray.at<float>(y, x));
   }
   const double low = quantile(level, 0.02), high = quantile(level, 0.98);
-  return {quantile(detail, 0.5) / 0.6745, high - low,
+  return {white_noise_sigma(gray, stride), high - low,
           1e-6 * std::max(std::abs(low), std::abs(high))};
 }
 

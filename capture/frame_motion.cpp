@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-#include <vector>
+
+#include "capture/image_noise.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -16,7 +17,8 @@ cv::Mat small_gray(const cv::Mat& image) {
   cv::Mat gray = image, small;
   if (image.channels() == 3) cv::cvtColor(image, gray, cv::COLOR_BGR2GRAY);
   const double scale = std::min(1.0, static_cast<double>(width_px) / gray.cols);
-  cv::resize(gray, small, {}, scale, scale, cv::INTER_AREA);
+  const auto pixels = [&](int side) { return std::max(1, static_cast<int>(side * scale)); };
+  cv::resize(gray, small, {pixels(gray.cols), pixels(gray.rows)}, 0, 0, cv::INTER_AREA);
   small.convertTo(small, CV_32F);
   return small;
 }
@@ -29,20 +31,6 @@ cv::Mat smoothed(const cv::Mat& image) {
 
 double mean_square(const cv::Mat& image) {
   return image.dot(image) / static_cast<double>(image.total());
-}
-
-/// Variance of white noise, from the median of the finest diagonal differences (Donoho 1995).
-double noise_variance(const cv::Mat& image) {
-  std::vector<float> detail;
-  for (int y = 0; y + 1 < image.rows; ++y) {
-    const float *a = image.ptr<float>(y), *b = image.ptr<float>(y + 1);
-    for (int x = 0; x + 1 < image.cols; ++x)
-      detail.push_back(std::abs(a[x] - a[x + 1] - b[x] + b[x + 1]) / 2);
-  }
-  if (detail.empty()) return 0;
-  const auto middle = detail.begin() + static_cast<std::ptrdiff_t>(detail.size() / 2);
-  std::nth_element(detail.begin(), middle, detail.end());
-  return std::pow(*middle / 0.6745, 2);
 }
 
 double slopes_square(const cv::Mat& smooth) {
@@ -60,7 +48,7 @@ double apparent_motion(const cv::Mat& before, const cv::Mat& after) {
   cv::Mat difference = b - a;
   difference -= cv::mean(difference);
   // Of white noise smoothing leaves 1 / (4 pi s^2) of the variance, 1 / (4 pi s^4) in both slopes.
-  const double s2 = smooth_px * smooth_px, noise = noise_variance(difference);
+  const double s2 = smooth_px * smooth_px, noise = std::pow(white_noise_sigma(difference, 1), 2);
   const double changed = mean_square(smoothed(difference)) - noise / (4 * CV_PI * s2);
   const double slopes =
       (slopes_square(smoothed(a)) + slopes_square(smoothed(b)) - noise / (4 * CV_PI * s2 * s2)) / 2;

@@ -22,7 +22,9 @@ double variance(const cv::Mat& image) {
 cv::Mat at_most(int limit, int side, const cv::Mat& gray) {
   cv::Mat small = gray;
   const double scale = static_cast<double>(limit) / side;
-  if (scale < 1) cv::resize(gray, small, {}, scale, scale, cv::INTER_AREA);
+  const auto pixels = [&](int length) { return std::max(1, static_cast<int>(length * scale)); };
+  if (scale < 1)
+    cv::resize(gray, small, {pixels(gray.cols), pixels(gray.rows)}, 0, 0, cv::INTER_AREA);
   small.convertTo(small, CV_32F);
   return small;
 }

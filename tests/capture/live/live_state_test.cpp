@@ -101,6 +101,8 @@ TEST(LiveState, TroubleIsAWarning) {
   EXPECT_EQ(warnings[1], "thermal0: a camera like it is at usb:2-1");
   EXPECT_EQ(warnings[2], "thermal0: the disk is too slow, 2 frames dropped");
   LiveState state = some_state();
+  state.streams[1].ended = true;
+  EXPECT_EQ(warnings_of(state)[0], "thermal0: the stream has ended");
   state.streams.clear();
   EXPECT_TRUE(warnings_of(state).empty());
   state.free_bytes = 1 << 30;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
-#include <filesystem>
-#include <iterator>
 #include <thread>
 
 #include "drivers/aravis/gvcp_probe.hpp"
@@ -128,32 +126,6 @@ TEST_F(AravisStream, KilledCameraIsToldAndComesBackWithItsSettings) {
   EXPECT_LT(static_cast<double>(back.first_id - before.last_id), 90 * outage_s);
   EXPECT_EQ(back.wrong_bits + back.not_rising, 0u);
   EXPECT_EQ(camera.register_value(registers::ir_format), 2u);
-}
-
-int threads_of_this_process() {
-  return static_cast<int>(std::distance(std::filesystem::directory_iterator("/proc/self/task"),
-                                        std::filesystem::directory_iterator()));
-}
-
-/// Each lost connection is destroyed on a thread of its own.
-TEST_F(AravisStream, OutagesLeaveNoThreadsBehind) {
-  AravisSource source(options);
-  ASSERT_TRUE(source.start());
-  drain(source, 10s, frames(3));
-  const int streaming = threads_of_this_process();
-  for (int outage = 0; outage < 3; ++outage) {
-    camera.kill();
-    drain(source, 5s, [](const Tally& t) { return t.has("disconnected"); });
-    ASSERT_TRUE(camera.start());
-    EXPECT_TRUE(drain(source, 10s, frames(3)).has("reconnected"));
-  }
-  const auto limit = testing_clock::now() + 10s;
-  while (threads_of_this_process() > streaming && testing_clock::now() < limit) drain(source, 100ms);
-  EXPECT_LE(threads_of_this_process(), streaming);
-  camera.kill();
-  drain(source, 5s, [](const Tally& t) { return t.has("disconnected"); });
-  source.stop();  // waits for the one that is going down
-  EXPECT_LT(threads_of_this_process(), streaming);
 }
 
 TEST_F(AravisStream, LinkDownAndBack) {
