@@ -6,6 +6,7 @@
 #include <cstring>
 #include <exception>
 #include <optional>
+#include <vector>
 
 #include "app/cli/command_line.hpp"
 #include "app/cli/run_stages.hpp"
@@ -65,7 +66,18 @@ int finish(const std::string& verb, Console& console, const Status& status, nloh
   return code;
 }
 
-int run(int argc, char** argv) {
+/// "help [VERB]" means "[VERB] --help".
+std::vector<const char*> words_of(int argc, char** argv) {
+  std::vector<const char*> words(argv, argv + argc);
+  if (argc < 2 || std::strcmp(words[1], "help") != 0) return words;
+  words.erase(words.begin() + 1);
+  words.push_back("--help");
+  return words;
+}
+
+int run(const std::vector<const char*>& words) {
+  const auto argc = static_cast<int>(words.size());
+  const char* const* argv = words.data();
   cli::CommandLine line;
   try {
     line.app.parse(argc, argv);
@@ -110,7 +122,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   try {
-    return orbitfuse::run(argc, argv);
+    return orbitfuse::run(orbitfuse::words_of(argc, argv));
   } catch (const std::exception& bug) {
     std::fprintf(stderr, "internal error: %s; please report it with the command line\n", bug.what());
   } catch (...) {

@@ -10,6 +10,7 @@ namespace orbitfuse {
 /// Sharpness: variance of the 3x3 Laplacian over the variance of the image, at no more than 640
 /// pixels across, so that it does not depend on contrast or resolution (Pech-Pacheco et al.,
 /// ICPR 2000, normalised). A constant image has sharpness 0.
+/// edge_blur: see measure_edge_blur().
 /// `image`: CV_8UC3, CV_8UC1 or CV_16UC1 centikelvin; 0 is no sample in the last.
 FrameQuality measure_quality(const cv::Mat& image);
 

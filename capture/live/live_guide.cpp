@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "capture/frame_motion.hpp"
 #include "core/exif.hpp"
 #include "core/file_io.hpp"
 #include "core/image_codec.hpp"
@@ -40,6 +41,10 @@ Status LiveGuideOptions::validate() const {
   if (!(std::abs(turntable_step_deg) <= 120)) {
     return fail(ErrorKind::usage, "guide.turntable_step_deg", fmt::format("{}", turntable_step_deg),
                 "must be within 120 degrees, 0 for no turntable");
+  }
+  if (!(key_motion > 0 && key_motion < 1)) {
+    return fail(ErrorKind::usage, "guide.key_motion", fmt::format("{}", key_motion),
+                "must be > 0 and < 1");
   }
   if (!(unseen_after_s > 0)) {
     return fail(ErrorKind::usage, "guide.unseen_after_s", fmt::format("{}", unseen_after_s),
@@ -105,8 +110,10 @@ void LiveGuide::add(const FrameRecord& frame) {
     add_at_station(camera, frame);
   } else if (options_.turntable_step_deg != 0 && frame.has_flag("still")) {
     judge_table_photo(camera, frame);
-  } else if (camera.announced) {
+  } else if (camera.announced && frame.has_flag("still")) {
     judge_announced(camera, frame);
+  } else if (camera.announced) {
+    judge_between_neighbours(camera, frame);
   } else if (finder_) {
     if (frame.has_flag("still")) {
       camera.photos.push_back(frame);
@@ -132,6 +139,26 @@ void LiveGuide::judge_table_photo(Camera& camera, const FrameRecord& frame) {
   camera.announced.reset();  // the next photo tells anew where the table is
 }
 
+/// A frame that is shaken differs from its neighbours.
+void LiveGuide::judge_between_neighbours(Camera& camera, const FrameRecord& frame) {
+  std::deque<Look>& looks = camera.since_key;
+  const std::optional<cv::Mat> image = read_back(writer_.folder() / frame.file);
+  if (!image) return;
+  const auto agrees = [&](const cv::Mat& before) {
+    return before.size() == image->size() && before.type() == image->type() &&
+           apparent_motion(before, *image) <= options_.key_motion;
+  };
+  if (!looks.empty() && !agrees(looks.back().image)) {
+    looks.clear();
+    camera.shown.refusal = Refusal::moving;
+    camera.shown.instruction = text(Refusal::moving);
+  }
+  looks.push_back({frame, *image});
+  if (looks.size() < 3) return;
+  looks.pop_front();
+  judge_announced(camera, looks.front().frame);
+}
+
 void LiveGuide::operator_at_station(std::int64_t time_ns) {
   const std::lock_guard lock(mutex_);
   const bool turned = options_.turntable_step_deg != 0;
@@ -143,6 +170,7 @@ void LiveGuide::operator_at_station(std::int64_t time_ns) {
   const int key = turned ? table_.key(time_ns) : 0;
   for (auto& [modality, camera] : cameras_) {
     if (turned && camera.table.counts_photos) continue;  // its photos tell, and may come late
+    camera.since_key.clear();
     camera.announced = turned ? at_key(camera.table, key) : next_station(modality);
   }
 }
@@ -196,6 +224,7 @@ void LiveGuide::judge(Camera& camera, const FrameRecord& frame,
   assessment.file = frame.file;
   assessment.position = position;
   assessment.rank = frame.quality ? frame.quality->sharpness : 0;
+  if (frame.quality) assessment.edge_blur = frame.quality->edge_blur;
   assessment.sharpness = camera.sharpness.relative(assessment.rank, position);
   // Thermal frames clip where the scene leaves the sensor's range, which is no exposure fault.
   if (frame.quality && frame.modality == Modality::visible) {
@@ -227,7 +256,7 @@ std::string LiveGuide::instruction(Modality modality, const Camera& camera,
 
 std::string LiveGuide::table_instruction(const Camera& camera, Refusal last) const {
   const TableView& view = camera.table;
-  const bool to_repeat = last == Refusal::nuc || last == Refusal::blurred ||
+  const bool to_repeat = last == Refusal::nuc || last == Refusal::blurred || last == Refusal::featureless ||
                          last == Refusal::badly_exposed || last == Refusal::moving;
   if (to_repeat && camera.announced && !view.counts_photos) return text(last);
   const std::string then = view.counts_photos ? "take the photo"
