@@ -81,9 +81,11 @@ int run(const std::vector<const char*>& words) {
   cli::CommandLine line;
   try {
     line.app.parse(argc, argv);
-  } catch (const CLI::Success& success) {  // --help, --version
-    return line.app.exit(success) == 0 ? exit_ok : exit_internal;
   } catch (const CLI::ParseError& error) {
+    const bool unknown_verb = argc > 1 && argv[1][0] != '-' &&
+                              line.app.get_subcommand_no_throw(argv[1]) == nullptr;
+    if (dynamic_cast<const CLI::Success*>(&error) != nullptr && !unknown_verb)  // --help, --version
+      return line.app.exit(error) == 0 ? exit_ok : exit_internal;
     ConsoleOptions options = detect_terminal();
     for (int i = 1; i < argc; ++i) options.json = options.json || std::strcmp(argv[i], "--json") == 0;
     Console console(options);

@@ -19,7 +19,11 @@ constexpr int reach_px = 24, border_px = 3, directions = 4;
 constexpr double tail = 0.15;            // of the peak, where an edge is taken to end
 constexpr double within_tails = 0.9486;  // erf(sqrt(-ln tail)): of the contrast inside them
 constexpr std::ptrdiff_t most = 400;     // edges looked at in a direction
-constexpr std::size_t enough = 24;       // of a direction, to tell its width
+
+/// Edges of a direction, to tell its width; small images have few.
+std::size_t enough_in(const cv::Mat& image) {
+  return static_cast<std::size_t>(std::clamp((image.rows + image.cols) / 10, 8, 24));
+}
 
 double quantile(std::vector<float>& values, double share) {
   const auto place =
@@ -141,9 +145,9 @@ struct Width {
   double peak, sigma_px;
 };
 
-/// Of at least `enough` edges: the median over the strongest third, without those that are much
+/// The median over the strongest third, at least `enough`, without those that are much
 /// wider than its sharpest: these are shadows and shading, not edges.
-double typical(std::vector<Width>& widths) {
+double typical(std::vector<Width>& widths, std::size_t enough) {
   std::sort(widths.begin(), widths.end(),
             [](const Width& a, const Width& b) { return a.peak > b.peak; });
   widths.resize(std::max(enough, (widths.size() + 2) / 3));
@@ -165,12 +169,13 @@ EdgeBlur blur_of(const Fields& f) {
     }
     most_found = std::max(most_found, widths[d].size());
   }
+  const std::size_t enough = enough_in(f.slope);
   EdgeBlur blur;
   for (std::vector<Width>& list : widths) {
     // A direction in which little is seen tells little.
     if (list.size() < std::max(enough, most_found / 4)) continue;
     blur.edges += static_cast<int>(list.size());
-    blur.sigma_px = std::max(blur.sigma_px, typical(list));
+    blur.sigma_px = std::max(blur.sigma_px, typical(list, enough));
   }
   return blur;
 }

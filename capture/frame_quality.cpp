@@ -52,8 +52,15 @@ FrameQuality measure_quality(const cv::Mat& image) {
   cv::Laplacian(small, laplacian, CV_32F);
   const double spread = variance(small);
   quality.sharpness = spread > 1e-9 ? variance(laplacian) / spread : 0.0;
-  quality.edge_blur = measure_edge_blur(at_most(max_size_px, std::max(gray.cols, gray.rows), gray));
   return quality;
+}
+
+EdgeBlur measure_edges(const cv::Mat& image) {
+  CV_Assert(image.type() == CV_8UC3 || image.type() == CV_8UC1 || image.type() == CV_16UC1);
+  if (image.empty()) return {};
+  cv::Mat gray = image;
+  if (image.channels() == 3) cv::cvtColor(image, gray, cv::COLOR_BGR2GRAY);
+  return measure_edge_blur(at_most(max_size_px, std::max(gray.cols, gray.rows), gray));
 }
 
 }  // namespace orbitfuse

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "capture/frame_motion.hpp"
+#include "capture/frame_quality.hpp"
 #include "core/exif.hpp"
 #include "core/file_io.hpp"
 #include "core/image_codec.hpp"
@@ -27,6 +28,10 @@ std::optional<cv::Mat> read_back(const std::filesystem::path& file) {
   const Result<cv::Mat> image = decode_image(*bytes, file.string());
   if (!image) return std::nullopt;
   return apply_orientation(*image, read_exif(*bytes).orientation);
+}
+
+void note_edges(FrameRecord& frame, const cv::Mat& image) {
+  if (frame.quality && !frame.quality->edge_blur) frame.quality->edge_blur = measure_edges(image);
 }
 
 }  // namespace
@@ -100,13 +105,18 @@ void LiveGuide::add_at_station(Camera& camera, const FrameRecord& frame) {
   judge(camera, frame, camera.position);
 }
 
-void LiveGuide::add(const FrameRecord& frame) {
+void LiveGuide::add(const FrameRecord& stored) {
+  FrameRecord frame = stored;
+  const bool at_station = frame.station && !frame.tracking;
+  if (at_station || frame.has_flag("still")) {
+    if (const auto image = read_back(writer_.folder() / frame.file)) note_edges(frame, *image);
+  }
   const std::lock_guard lock(mutex_);
   const auto known = cameras_.find(frame.modality);
   if (known == cameras_.end()) return;  // this orbit is not asked for
   Camera& camera = known->second;
   camera.shown.latest_file = frame.file;
-  if (frame.station && !frame.tracking) {
+  if (at_station) {
     add_at_station(camera, frame);
   } else if (options_.turntable_step_deg != 0 && frame.has_flag("still")) {
     judge_table_photo(camera, frame);
@@ -156,6 +166,7 @@ void LiveGuide::judge_between_neighbours(Camera& camera, const FrameRecord& fram
   looks.push_back({frame, *image});
   if (looks.size() < 3) return;
   looks.pop_front();
+  note_edges(looks.front().frame, looks.front().image);
   judge_announced(camera, looks.front().frame);
 }
 
@@ -338,13 +349,14 @@ void LiveGuide::look() {
     if (!has_work()) return;  // over, and everything was judged
     const auto started = std::chrono::steady_clock::now();
     for (auto& [modality, camera] : cameras_) {
-      const std::optional<FrameRecord> next = camera.next_to_look();
+      std::optional<FrameRecord> next = camera.next_to_look();
       if (!next) continue;
-      const FrameRecord& frame = *next;
+      FrameRecord& frame = *next;
       lock.unlock();
       const std::optional<cv::Mat> image = read_back(writer_.folder() / frame.file);
       std::optional<OrbitPosition> seen;
       if (image) seen = finder_(*image, modality);
+      if (seen) note_edges(frame, *image);
       lock.lock();
       if (seen) {
         set_position(camera, *seen, frame.host_time_ns);

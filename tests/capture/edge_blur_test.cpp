@@ -61,6 +61,15 @@ TEST(EdgeBlur, TellsMotionThoughEdgesAlongItStaySharp) {
   }
 }
 
+TEST(EdgeBlur, SmallImagesHaveFewEdgesButEnough) {
+  cv::Mat small, blurred;
+  cv::resize(squares(50, 200)(cv::Rect(0, 0, 80, 80)), small, {}, 0.5, 0.5, cv::INTER_AREA);
+  EXPECT_GT(measure_edge_blur(small).edges, 0);
+  EXPECT_LT(measure_edge_blur(small).sigma_px, 1);
+  cv::GaussianBlur(small, blurred, {}, 2);
+  EXPECT_GT(measure_edge_blur(blurred).sigma_px, 1.75);
+}
+
 TEST(EdgeBlur, ScaleAndOffsetOfTheLevelsDoNotMatter) {
   const double usual = measure_edge_blur(squares(50, 200)).sigma_px;
   EXPECT_NEAR(measure_edge_blur(squares(0.001, 0.002)).sigma_px, usual, 0.05);

@@ -73,7 +73,7 @@ TEST(MatOrbit, EverySectorIsFoundAndNoneFalsely) {
     frame.file = std::to_string(i);
     const FrameQuality quality = measure_quality(image);
     frame.rank = quality.sharpness;
-    frame.edge_blur = quality.edge_blur;
+    frame.edge_blur = measure_edges(image);
     if (const auto sighting = finder.find(image, Modality::visible)) {
       ++found;
       worst_deg = std::max(worst_deg, std::abs(angle_difference_deg(sighting->position.azimuth_deg,
