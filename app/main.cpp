@@ -6,6 +6,7 @@
 #include <cstring>
 #include <exception>
 #include <optional>
+#include <vector>
 
 #include "app/cli/command_line.hpp"
 #include "app/cli/run_stages.hpp"
@@ -65,13 +66,26 @@ int finish(const std::string& verb, Console& console, const Status& status, nloh
   return code;
 }
 
-int run(int argc, char** argv) {
+/// "help [VERB]" means "[VERB] --help".
+std::vector<const char*> words_of(int argc, char** argv) {
+  std::vector<const char*> words(argv, argv + argc);
+  if (argc < 2 || std::strcmp(words[1], "help") != 0) return words;
+  words.erase(words.begin() + 1);
+  words.push_back("--help");
+  return words;
+}
+
+int run(const std::vector<const char*>& words) {
+  const auto argc = static_cast<int>(words.size());
+  const char* const* argv = words.data();
   cli::CommandLine line;
   try {
     line.app.parse(argc, argv);
-  } catch (const CLI::Success& success) {  // --help, --version
-    return line.app.exit(success) == 0 ? exit_ok : exit_internal;
   } catch (const CLI::ParseError& error) {
+    const bool unknown_verb = argc > 1 && argv[1][0] != '-' &&
+                              line.app.get_subcommand_no_throw(argv[1]) == nullptr;
+    if (dynamic_cast<const CLI::Success*>(&error) != nullptr && !unknown_verb)  // --help, --version
+      return line.app.exit(error) == 0 ? exit_ok : exit_internal;
     ConsoleOptions options = detect_terminal();
     for (int i = 1; i < argc; ++i) options.json = options.json || std::strcmp(argv[i], "--json") == 0;
     Console console(options);
@@ -110,7 +124,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   try {
-    return orbitfuse::run(argc, argv);
+    return orbitfuse::run(orbitfuse::words_of(argc, argv));
   } catch (const std::exception& bug) {
     std::fprintf(stderr, "internal error: %s; please report it with the command line\n", bug.what());
   } catch (...) {

@@ -58,6 +58,7 @@ struct Recorder::Channel {
   bool silent = false, away = false;
   std::optional<Error> error;
   std::optional<FrameRecord> latest;
+  std::string notice;
 
   bool stopping() {
     const std::lock_guard lock(mutex);
@@ -93,6 +94,15 @@ struct Recorder::Channel {
     changed.notify_all();
   }
 
+  /// Of an event that asks for the operator; with the mutex held.
+  void note(const Delivery& delivery) {
+    if (delivery.kind != Delivery::Kind::event) return;
+    for (const char* kind : {"moved", "twin", "look-alike", "reopen-failed", "setting-lost"}) {
+      if (delivery.reason == kind) notice = delivery.detail;
+    }
+    if (delivery.reason == "reconnected") notice.clear();
+  }
+
   void take(Delivery delivery) {
     switch (delivery.kind) {
       case Delivery::Kind::frame:
@@ -126,6 +136,7 @@ struct Recorder::Channel {
         if (delivery->kind == Delivery::Kind::event && delivery->reason == "disconnected") away = true;
         if (delivery->kind == Delivery::Kind::event && delivery->reason == "reconnected") away = false;
         // Files come when they come, unless their folder is gone.
+        note(*delivery);
         silent = delivery->kind == Delivery::Kind::timeout && (!source.can_wait() || away);
       }
       if (delivery->kind == Delivery::Kind::end) break;
@@ -217,7 +228,7 @@ struct Recorder::Channel {
     const StreamAccount::Counts c = account.counts();
     const std::lock_guard lock(mutex);
     return {device.id, c.received, c.lost(), c.first,  c.last,       c.missing,
-            c.rejected, c.dropped, silent,   capture_over && queue.empty(), latest};
+            c.rejected, c.dropped, silent,   capture_over && queue.empty(), notice, latest};
   }
 };
 

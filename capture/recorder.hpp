@@ -36,6 +36,7 @@ struct StreamStatus {
   std::uint64_t received = 0, lost = 0, first_id = 0, last_id = 0;
   std::uint64_t missing = 0, rejected = 0, dropped = 0;  ///< the parts of lost
   bool silent = false, ended = false;
+  std::string notice;  ///< what the operator should look into: "moved", "twin", "look-alike", ...
   std::optional<FrameRecord> latest;
 };
 

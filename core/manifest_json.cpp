@@ -156,6 +156,11 @@ Status read_optional_parts(const Reader& line, FrameRecord& frame) {
     ORBITFUSE_ASSIGN(quality.sharpness, child.number("sharpness"));
     ORBITFUSE_ASSIGN(quality.mean_level, child.number("mean_level"));
     ORBITFUSE_ASSIGN(quality.clipped_fraction, child.number("clipped_fraction"));
+    if (child.has("edges")) {
+      quality.edge_blur.emplace();
+      ORBITFUSE_ASSIGN(quality.edge_blur->sigma_px, child.number("edge_sigma_px"));
+      ORBITFUSE_ASSIGN(quality.edge_blur->edges, small_count(child, "edges"));
+    }
     frame.quality = quality;
   }
   if (line.has("flags")) {
@@ -304,6 +309,10 @@ std::string manifest_line(const FrameRecord& frame) {
     json["quality"] = {{"sharpness", frame.quality->sharpness},
                        {"mean_level", frame.quality->mean_level},
                        {"clipped_fraction", frame.quality->clipped_fraction}};
+    if (const auto& blur = frame.quality->edge_blur) {
+      json["quality"]["edge_sigma_px"] = blur->sigma_px;
+      json["quality"]["edges"] = blur->edges;
+    }
   }
   return manifest::line_of(json);
 }

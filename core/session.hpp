@@ -44,11 +44,21 @@ struct Station {
   double azimuth_sigma_deg = 5, elevation_sigma_deg = 5;
 };
 
+/// How wide the edges of one image are, without another image to compare with.
+struct EdgeBlur {
+  /// Standard deviation of the Gaussian that the edges are blurred with, in the direction in which
+  /// they are widest: motion leaves the edges along it sharp.
+  double sigma_px = 0;
+  int edges = 0;  ///< that it was taken from, clear of the noise; 0: the image has none
+};
+
 /// Measured when the frame was recorded; guides the operator and the choice of frames.
 struct FrameQuality {
   double sharpness = 0;            ///< variance of the Laplacian over the variance of the image
   double mean_level = 0;           ///< visible: 0..255; thermal: kelvin
   double clipped_fraction = 0;     ///< of samples at either end of the range
+  /// With at most 640 pixels along the longer side. Absent: not measured (older sessions).
+  std::optional<EdgeBlur> edge_blur = {};
 };
 
 struct FrameRecord {

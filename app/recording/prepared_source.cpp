@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "app/recording/prepared_source.hpp"
 
+#include <fmt/format.h>
+
 namespace orbitfuse::recording {
 
 DeviceInfo PreparedSource::describe() const {
@@ -11,13 +13,22 @@ DeviceInfo PreparedSource::describe() const {
 
 Status PreparedSource::start() {
   if (started_) return {};
+  started_ns_ = std::chrono::duration_cast<std::chrono::nanoseconds>(
+                    std::chrono::system_clock::now().time_since_epoch())
+                    .count();
   ORBITFUSE_TRY(source_->start());
   started_ = true;
   return {};
 }
 
 Result<Delivery> PreparedSource::next(std::chrono::milliseconds timeout) {
-  Result<Delivery> delivery = source_->next(timeout);
+  Result<Delivery> delivery = Delivery{};
+  if (waiting_.empty()) {
+    delivery = source_->next(timeout);
+  } else {
+    delivery = std::move(waiting_.front());
+    waiting_.pop_front();
+  }
   if (!delivery) return delivery;
   if (delivery->kind != Delivery::Kind::frame && delivery->kind != Delivery::Kind::rejected)
     return delivery;
@@ -29,6 +40,28 @@ Result<Delivery> PreparedSource::next(std::chrono::milliseconds timeout) {
   }
   if (tracking_) delivery->frame.tracking = true;
   return delivery;
+}
+
+void PreparedSource::drop_before(std::int64_t all_run_ns) {
+  std::uint64_t dropped = 0;
+  for (bool over = false; !over;) {
+    Result<Delivery> delivery = source_->next(std::chrono::milliseconds(0));
+    const bool stale = delivery && (delivery->kind == Delivery::Kind::rejected ||
+                                    (delivery->kind == Delivery::Kind::frame &&
+                                     delivery->frame.host_time_ns >= started_ns_ &&
+                                     delivery->frame.host_time_ns < all_run_ns));
+    dropped += stale;
+    if (delivery && delivery->kind == Delivery::Kind::timeout) break;
+    if (stale) continue;
+    over = !delivery || delivery->kind != Delivery::Kind::event;
+    waiting_.push_back(std::move(delivery));
+  }
+  if (dropped == 0) return;
+  Delivery event;
+  event.kind = Delivery::Kind::event;
+  event.reason = "stale";
+  event.detail = fmt::format("{} frames from before all cameras ran were left out", dropped);
+  waiting_.push_front(std::move(event));
 }
 
 void PreparedSource::stop() {

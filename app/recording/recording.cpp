@@ -28,6 +28,12 @@ std::uint64_t next_id(const Session& session, const std::string& device) {
   return next;
 }
 
+std::int64_t utc_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
 bool same_camera(const DeviceInfo& known, const DeviceInfo& now) {
   // Photos tell their camera when the first one comes; the source refuses those of another.
   const bool not_known_yet = now.driver == "stills" && now.model.empty() && now.serial.empty();
@@ -97,11 +103,15 @@ Status Recording::prepare() {
     ORBITFUSE_ASSIGN(earlier, open_session(options_.session));
   }
   for (const auto& source : sources_) ORBITFUSE_TRY(source->start());
+  const std::int64_t all_run_ns = utc_ns();
   ORBITFUSE_TRY(fit_into(earlier));
   if (options_.resume) {
     ORBITFUSE_ASSIGN(writer_, SessionWriter::resume(options_.session));
   } else {
     ORBITFUSE_ASSIGN(writer_, SessionWriter::create(options_.session, options_.notes));
+  }
+  for (const auto& source : sources_) {
+    if (sources_.size() > 1 && !source->can_wait()) source->drop_before(all_run_ns);
   }
   const std::lock_guard lock(mutex_);
   if (options_.guide) {

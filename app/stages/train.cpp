@@ -44,7 +44,7 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
   }
   options.checkpoint = context.folder / "checkpoint.bin";
   options.resume = true;  // where there is a checkpoint: of an interrupted attempt, or to extend
-  if (!context.resume) {
+  if (!std::filesystem::exists(options.checkpoint)) {
     ORBITFUSE_ASSIGN(const int done, extend_training(context, resolved, options.checkpoint));
     if (done > 0)
       output.skips.push_back({fmt::format("the first {} steps", done),

@@ -23,7 +23,7 @@ struct Options {
   std::string session, driver, visible, thermal, profiles, guide = "auto", mat = "paper";
   int mat_tags = 0;
   double seconds = 0, spacing_deg = 0, turntable_deg = 0;
-  std::vector<double> elevations_deg;
+  std::vector<double> elevations_deg, max_edge_px;
   bool stop_when_complete = false, view = false, wait_for_start = false;
   std::string page, token;
 };
@@ -52,6 +52,10 @@ Result<std::optional<LiveGuideOptions>> guide_of(const Options& o,
   if (cameras.plan) guide.plan = *cameras.plan;
   if (o.spacing_deg > 0) guide.plan.spacing_deg = o.spacing_deg;
   guide.turntable_step_deg = o.turntable_deg;
+  if (!o.max_edge_px.empty()) {
+    guide.coverage.max_visible_edge_px = o.max_edge_px[0];
+    guide.coverage.max_thermal_edge_px = o.max_edge_px[1];
+  }
   if (!o.elevations_deg.empty()) guide.plan.loop_elevations_deg = o.elevations_deg;
   std::set<Modality> modalities;
   for (const auto& source : cameras.sources) modalities.insert(source->describe().modality);
@@ -125,6 +129,7 @@ class Teller {
     if (view_) draw();
     for (const StreamStatus& s : recording_.status()) {
       say_changed(s.device + " silent", s.silent ? s.device + ": no frames" : "");
+      say_changed(s.device + " notice", s.notice.empty() ? "" : s.device + ": " + s.notice);
       say_changed(
           s.device + " dropped",
           s.dropped > 0 ? s.device + ": the disk is too slow, frames are dropped and counted" : "");
@@ -339,6 +344,11 @@ Action add_capture(CLI::App& app) {
                  "Azimuth between stations; 30 if nothing else is known");
   app.add_option("--elevations-deg", options->elevations_deg,
                  "Elevation of each loop; 10 30 55 if nothing else is known");
+  app.add_option("--max-edge-px", options->max_edge_px,
+                 "VISIBLE THERMAL: edges blurred wider than this (Gaussian sigma, with 640 pixels "
+                 "along the longer side) are no station; 1.75 3.2 if not given")
+      ->expected(2)
+      ->check(CLI::PositiveNumber);
   return [options](Context& context) { return run(context, *options); };
 }
 

@@ -63,6 +63,8 @@ Status CoverageOptions::validate() const {
     return fail(ErrorKind::usage, std::string("guide.") + field, fmt::format("{}", found), "must be > 0 (shares <= 1)");
   };
   if (!(min_sharpness > 0 && min_sharpness <= 1)) return bad("min_sharpness", min_sharpness);
+  if (!(max_visible_edge_px > 0)) return bad("max_visible_edge_px", max_visible_edge_px);
+  if (!(max_thermal_edge_px > 0)) return bad("max_thermal_edge_px", max_thermal_edge_px);
   if (!(max_clipped > 0 && max_clipped <= 1)) return bad("max_clipped", max_clipped);
   if (!(rest_speed_deg_s > 0)) return bad("rest_speed_deg_s", rest_speed_deg_s);
   if (!(max_sigma_deg > 0)) return bad("max_sigma_deg", max_sigma_deg);
@@ -77,6 +79,7 @@ std::string text(Refusal refusal) {
     case Refusal::nuc: return "the camera is correcting itself, wait";
     case Refusal::moving: return "too fast, hold still";
     case Refusal::blurred: return "blurred, hold still";
+    case Refusal::featureless: return "nothing to see, aim at the object and focus";
     case Refusal::badly_exposed: return "too dark or too bright";
     case Refusal::position_unsure: return "position unsure, look at the mat";
     case Refusal::between_stations: return "between stations";
@@ -103,8 +106,15 @@ Refusal Coverage::add(const FrameAssessment& frame) {
   // Negated comparisons, so that NaN refuses.
   if (!(p.sigma_deg <= options_.max_sigma_deg)) return Refusal::position_unsure;
   if (!(std::abs(p.speed_deg_s) <= options_.rest_speed_deg_s)) return Refusal::moving;
-  if (!(frame.sharpness >= options_.min_sharpness)) return Refusal::blurred;
+  // Exposure first: what is too dark has no edges either.
   if (!(std::max(frame.overexposed, frame.underexposed) <= options_.max_clipped)) return Refusal::badly_exposed;
+  if (!(frame.sharpness >= options_.min_sharpness)) return Refusal::blurred;
+  if (frame.edge_blur) {
+    const double widest =
+        frame.modality == Modality::visible ? options_.max_visible_edge_px : options_.max_thermal_edge_px;
+    if (frame.edge_blur->edges == 0) return Refusal::featureless;
+    if (!(frame.edge_blur->sigma_px <= widest)) return Refusal::blurred;
+  }
   bool in_band = false;
   for (Sector& sector : sectors_) {
     if (!(std::abs(p.elevation_deg - sector.elevation_deg) <= plan_.elevation_tolerance_deg)) continue;

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <limits>
 
+#include "capture/frame_motion.hpp"
+#include "capture/frame_quality.hpp"
 #include "core/exif.hpp"
 #include "core/file_io.hpp"
 #include "core/image_codec.hpp"
@@ -28,6 +30,10 @@ std::optional<cv::Mat> read_back(const std::filesystem::path& file) {
   return apply_orientation(*image, read_exif(*bytes).orientation);
 }
 
+void note_edges(FrameRecord& frame, const cv::Mat& image) {
+  if (frame.quality && !frame.quality->edge_blur) frame.quality->edge_blur = measure_edges(image);
+}
+
 }  // namespace
 
 Status LiveGuideOptions::validate() const {
@@ -40,6 +46,10 @@ Status LiveGuideOptions::validate() const {
   if (!(std::abs(turntable_step_deg) <= 120)) {
     return fail(ErrorKind::usage, "guide.turntable_step_deg", fmt::format("{}", turntable_step_deg),
                 "must be within 120 degrees, 0 for no turntable");
+  }
+  if (!(key_motion > 0 && key_motion < 1)) {
+    return fail(ErrorKind::usage, "guide.key_motion", fmt::format("{}", key_motion),
+                "must be > 0 and < 1");
   }
   if (!(unseen_after_s > 0)) {
     return fail(ErrorKind::usage, "guide.unseen_after_s", fmt::format("{}", unseen_after_s),
@@ -95,18 +105,25 @@ void LiveGuide::add_at_station(Camera& camera, const FrameRecord& frame) {
   judge(camera, frame, camera.position);
 }
 
-void LiveGuide::add(const FrameRecord& frame) {
+void LiveGuide::add(const FrameRecord& stored) {
+  FrameRecord frame = stored;
+  const bool at_station = frame.station && !frame.tracking;
+  if (at_station || frame.has_flag("still")) {
+    if (const auto image = read_back(writer_.folder() / frame.file)) note_edges(frame, *image);
+  }
   const std::lock_guard lock(mutex_);
   const auto known = cameras_.find(frame.modality);
   if (known == cameras_.end()) return;  // this orbit is not asked for
   Camera& camera = known->second;
   camera.shown.latest_file = frame.file;
-  if (frame.station && !frame.tracking) {
+  if (at_station) {
     add_at_station(camera, frame);
   } else if (options_.turntable_step_deg != 0 && frame.has_flag("still")) {
     judge_table_photo(camera, frame);
-  } else if (camera.announced) {
+  } else if (camera.announced && frame.has_flag("still")) {
     judge_announced(camera, frame);
+  } else if (camera.announced) {
+    judge_between_neighbours(camera, frame);
   } else if (finder_) {
     if (frame.has_flag("still")) {
       camera.photos.push_back(frame);
@@ -132,6 +149,27 @@ void LiveGuide::judge_table_photo(Camera& camera, const FrameRecord& frame) {
   camera.announced.reset();  // the next photo tells anew where the table is
 }
 
+/// A frame that is shaken differs from its neighbours.
+void LiveGuide::judge_between_neighbours(Camera& camera, const FrameRecord& frame) {
+  std::deque<Look>& looks = camera.since_key;
+  const std::optional<cv::Mat> image = read_back(writer_.folder() / frame.file);
+  if (!image) return;
+  const auto agrees = [&](const cv::Mat& before) {
+    return before.size() == image->size() && before.type() == image->type() &&
+           apparent_motion(before, *image) <= options_.key_motion;
+  };
+  if (!looks.empty() && !agrees(looks.back().image)) {
+    looks.clear();
+    camera.shown.refusal = Refusal::moving;
+    camera.shown.instruction = text(Refusal::moving);
+  }
+  looks.push_back({frame, *image});
+  if (looks.size() < 3) return;
+  looks.pop_front();
+  note_edges(looks.front().frame, looks.front().image);
+  judge_announced(camera, looks.front().frame);
+}
+
 void LiveGuide::operator_at_station(std::int64_t time_ns) {
   const std::lock_guard lock(mutex_);
   const bool turned = options_.turntable_step_deg != 0;
@@ -143,6 +181,7 @@ void LiveGuide::operator_at_station(std::int64_t time_ns) {
   const int key = turned ? table_.key(time_ns) : 0;
   for (auto& [modality, camera] : cameras_) {
     if (turned && camera.table.counts_photos) continue;  // its photos tell, and may come late
+    camera.since_key.clear();
     camera.announced = turned ? at_key(camera.table, key) : next_station(modality);
   }
 }
@@ -196,6 +235,7 @@ void LiveGuide::judge(Camera& camera, const FrameRecord& frame,
   assessment.file = frame.file;
   assessment.position = position;
   assessment.rank = frame.quality ? frame.quality->sharpness : 0;
+  if (frame.quality) assessment.edge_blur = frame.quality->edge_blur;
   assessment.sharpness = camera.sharpness.relative(assessment.rank, position);
   // Thermal frames clip where the scene leaves the sensor's range, which is no exposure fault.
   if (frame.quality && frame.modality == Modality::visible) {
@@ -227,7 +267,7 @@ std::string LiveGuide::instruction(Modality modality, const Camera& camera,
 
 std::string LiveGuide::table_instruction(const Camera& camera, Refusal last) const {
   const TableView& view = camera.table;
-  const bool to_repeat = last == Refusal::nuc || last == Refusal::blurred ||
+  const bool to_repeat = last == Refusal::nuc || last == Refusal::blurred || last == Refusal::featureless ||
                          last == Refusal::badly_exposed || last == Refusal::moving;
   if (to_repeat && camera.announced && !view.counts_photos) return text(last);
   const std::string then = view.counts_photos ? "take the photo"
@@ -309,13 +349,14 @@ void LiveGuide::look() {
     if (!has_work()) return;  // over, and everything was judged
     const auto started = std::chrono::steady_clock::now();
     for (auto& [modality, camera] : cameras_) {
-      const std::optional<FrameRecord> next = camera.next_to_look();
+      std::optional<FrameRecord> next = camera.next_to_look();
       if (!next) continue;
-      const FrameRecord& frame = *next;
+      FrameRecord& frame = *next;
       lock.unlock();
       const std::optional<cv::Mat> image = read_back(writer_.folder() / frame.file);
       std::optional<OrbitPosition> seen;
       if (image) seen = finder_(*image, modality);
+      if (seen) note_edges(frame, *image);
       lock.lock();
       if (seen) {
         set_position(camera, *seen, frame.host_time_ns);

@@ -28,6 +28,9 @@ struct LiveGuideOptions {
   CoverageOptions coverage;
   double looks_per_second = 4;  ///< per camera; finding the mat costs 5-30 ms a look
   double unseen_after_s = 1.0;  ///< a position older than this is no longer where the camera is
+  /// After the key a frame counts only when those before and after it show the same, up to this
+  /// share of the image's width: half a percent a frame at 30 Hz is 4 degrees a second at 25.
+  double key_motion = 0.005;
   /// The object stands on a turntable: each key is this much further in azimuth, negative for a
   /// table that turns the other way; a full turn later it is the next loop. A photo shows the table
   /// where the last key before its time put it, however late it arrives; one whose time does not
@@ -64,7 +67,7 @@ class LiveGuide {
   /// From any thread; fast unless the frame carries a station.
   void add(const FrameRecord& frame);
   /// The operator stands at the next station, or has turned the table by a step: for each modality
-  /// the next good frame is it.
+  /// the next good frame is it; of a video, the next between two that show the same.
   /// `time_ns`: when (UTC epoch); 0: now.
   void operator_at_station(std::int64_t time_ns = 0);
 
@@ -81,6 +84,10 @@ class LiveGuide {
   std::optional<Error> error() const;
 
  private:
+  struct Look {
+    FrameRecord frame;
+    cv::Mat image;
+  };
   struct Camera {
     LiveCamera shown;
     SharpnessReference sharpness;
@@ -90,6 +97,7 @@ class LiveGuide {
     std::deque<FrameRecord> photos;          ///< not looked at yet: each was taken on purpose
     std::optional<FrameRecord> next_to_look();
     std::optional<OrbitPosition> announced;  ///< by the key: where the next good frame is
+    std::deque<Look> since_key;              ///< video frames, the newest up to three
     TableView table;
     std::map<std::size_t, FrameRecord> chosen;  ///< by sector
   };
@@ -106,6 +114,7 @@ class LiveGuide {
   OrbitPosition at_photo(TableView& view) const;
   OrbitPosition at_key(TableView& view, int key) const;
   void judge_table_photo(Camera& camera, const FrameRecord& frame);
+  void judge_between_neighbours(Camera& camera, const FrameRecord& frame);
   void judge_announced(Camera& camera, const FrameRecord& frame);
   void set_position(Camera& camera, OrbitPosition position, std::int64_t time_ns);
 

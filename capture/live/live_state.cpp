@@ -41,6 +41,7 @@ std::vector<std::string> warnings_of(const LiveState& state) {
       list.push_back(s.device + ": the stream has ended");
     else if (s.silent && state.running)
       list.push_back(s.device + ": no frames");
+    if (!s.notice.empty()) list.push_back(s.device + ": " + s.notice);
     if (s.dropped > 0)
       list.push_back(
           fmt::format("{}: the disk is too slow, {} frames dropped", s.device, s.dropped));

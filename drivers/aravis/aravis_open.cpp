@@ -47,7 +47,7 @@ Status AravisSource::open() {
   ArvDevice* device = arv_camera_get_device(link->camera);
   const std::string model = text(arv_camera_get_model_name(link->camera, nullptr));
   const std::string serial = text(arv_camera_get_device_id(link->camera, nullptr));
-  if (first_image_ && serial != info_.serial) {
+  if (first_image_ && (serial != info_.serial || model != info_.model)) {
     return fail(ErrorKind::device, where,
                 fmt::format("camera {} {} answers, the session's is {} {}", model, serial,
                             info_.model, info_.serial),

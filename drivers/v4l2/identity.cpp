@@ -72,8 +72,7 @@ Result<VideoSystem::Node> find_camera(VideoSystem& system, const CameraName& nam
 
 CameraIdentity identity_of(VideoSystem& system, const VideoSystem::Node& node) {
   CameraIdentity identity{node, node.serial.empty()};
-  for (const VideoSystem::Node& other : system.nodes())
-    identity.port_only |= other.usb_path != node.usb_path && like(other, node);
+  identity.port_only |= look_alike(system, identity).has_value();
   return identity;
 }
 
@@ -97,6 +96,16 @@ Result<VideoSystem::Node> find_again(VideoSystem& system, const CameraIdentity& 
   if (found) return *found;
   return fail(ErrorKind::device, "camera " + node.product + " at usb:" + node.usb_path,
               "not connected", "plug it in again, into the same port");
+}
+
+std::optional<VideoSystem::Node> look_alike(VideoSystem& system, const CameraIdentity& camera,
+                                            const std::string& except_port) {
+  for (const VideoSystem::Node& node : system.nodes()) {
+    if (like(node, camera.node) && node.usb_path != camera.node.usb_path &&
+        node.usb_path != except_port)
+      return node;
+  }
+  return std::nullopt;
 }
 
 std::string text(const CameraName& name) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "core/result.hpp"
@@ -34,6 +35,10 @@ CameraName lasting_name(VideoSystem& system, const VideoSystem::Node& node);
 /// The same camera: equal USB id, serial and function, at its own port where others are like it;
 /// what is no USB device is known by its path. Device error when it is not there.
 Result<VideoSystem::Node> find_again(VideoSystem& system, const CameraIdentity& camera);
+/// Another camera that nothing but its port tells from it: equal USB id, serial and function,
+/// neither in its own port nor in `except_port`.
+std::optional<VideoSystem::Node> look_alike(VideoSystem& system, const CameraIdentity& camera,
+                                            const std::string& except_port = {});
 std::string text(const CameraName& name);
 
 }  // namespace orbitfuse::v4l2

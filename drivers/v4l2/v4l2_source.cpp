@@ -52,6 +52,12 @@ void V4l2Source::stop() {
 
 Delivery V4l2Source::lose(const std::string& event, const std::string& why) {
   close_device();
+  // Nobody plugs a camera in again within half a second: one like it elsewhere is its twin.
+  using namespace std::chrono_literals;
+  if (identity_ && Clock::now() - last_frame_ < 500ms &&
+      look_alike(*system_, *identity_, node_.usb_path))
+    identity_->port_only = true;
+  look_alike_told_ = false;
   away_ = true;
   rhythm_.interrupt();
   lost_at_ = last_frame_;  // set on reopening too: an earlier outage is counted already
@@ -76,7 +82,7 @@ std::optional<Delivery> V4l2Source::try_reopen() {
   last_attempt_ = Clock::now();
   // Away or refused: tried again, for as long as the user waits.
   const Result<VideoSystem::Node> node = find_again(*system_, *identity_);
-  if (!node) return std::nullopt;
+  if (!node) return tell_look_alike();
   if (const Status status = open_and_stream(*node); !status) {
     if (!failure_.note(status.error().message())) return std::nullopt;
     Delivery event;
@@ -95,7 +101,42 @@ std::optional<Delivery> V4l2Source::try_reopen() {
   delivery.kind = Delivery::Kind::event;
   delivery.reason = "reconnected";
   delivery.detail = fmt::format("{} after {:.1f} s, about {} frames", node_.path, outage_s, cost);
+  moved_ = node_.usb_path != identity_->node.usb_path;
+  ports_looked_at_ = Clock::now();
+  if (moved_) {
+    tell("moved",
+         fmt::format("the camera of serial {} is at usb:{} now, it was at usb:{}; if this is another "
+                     "camera of that serial, stop and put the first one back",
+                     node_.serial, node_.usb_path, identity_->node.usb_path));
+  } else if (identity_->port_only && !node_.usb_path.empty()) {
+    delivery.detail += fmt::format("; known by its port usb:{} alone", node_.usb_path);
+  }
   return delivery;
+}
+
+/// While the camera is away and one like it is elsewhere: once in an outage.
+std::optional<Delivery> V4l2Source::tell_look_alike() {
+  if (look_alike_told_ || !identity_->port_only) return std::nullopt;
+  const auto other = look_alike(*system_, *identity_);
+  if (!other) return std::nullopt;
+  look_alike_told_ = true;
+  Delivery event;
+  event.kind = Delivery::Kind::event;
+  event.reason = "look-alike";
+  event.detail = fmt::format("a camera like it is at usb:{} and is not taken for it; plug the "
+                             "session's into usb:{} again",
+                             other->usb_path, identity_->node.usb_path);
+  return event;
+}
+
+/// While a camera in another port is taken for it.
+bool V4l2Source::original_is_back() {
+  using namespace std::chrono_literals;
+  if (!moved_ || Clock::now() - ports_looked_at_ < std::min<Clock::duration>(options_.stall, 1s))
+    return false;
+  ports_looked_at_ = Clock::now();
+  const Result<VideoSystem::Node> found = find_again(*system_, *identity_);
+  return found && found->usb_path == identity_->node.usb_path;
 }
 
 Result<Delivery> V4l2Source::next(std::chrono::milliseconds timeout) {
@@ -111,6 +152,12 @@ Result<Delivery> V4l2Source::next(std::chrono::milliseconds timeout) {
     return Delivery{};
   }
   if (fd_ < 0) return fail(ErrorKind::device, options_.camera, "not started", "call start() first");
+  if (original_is_back()) {
+    identity_->port_only = true;
+    return lose("twin", fmt::format("there are two cameras of serial {}; going back to the one at "
+                                    "usb:{}; frames flagged other-port are the other's",
+                                    identity_->node.serial, identity_->node.usb_path));
+  }
   pollfd waiter{fd_, POLLIN, 0};
   const int ready = system_->poll(&waiter, 1, static_cast<int>(timeout.count()));
   if (ready < 0 && errno != EINTR) return lose("disconnected", std::strerror(errno));
@@ -220,6 +267,7 @@ Delivery V4l2Source::delivery_of(std::uint32_t index, std::uint32_t bytes, std::
     return delivery;
   }
   delivery.kind = Delivery::Kind::frame;
+  if (moved_) delivery.frame.flags.push_back("other-port");
   if (options_.modality == Modality::thermal &&
       freeze_.mark(delivery.frame, mapping.address, bytes, taken_at)) {
     tell("nuc", "the image is frozen");

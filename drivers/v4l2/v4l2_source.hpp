@@ -54,6 +54,11 @@ struct V4l2Options {
 /// camera is unplugged or stalls, everything is closed, and it is looked for (find_again) until it is
 /// back, with the size and format that it had: events "disconnected", "stalled",
 /// "reopen-failed" (back, but taken, forbidden or without bandwidth), "reconnected" tell, settings are pushed again and verified ("setting-lost" when one is not).
+/// Serials are not always unique, so the port counts too. A camera of the same serial in another
+/// port is taken ("moved", and its frames are flagged "other-port") unless one like it was plugged
+/// in at the same time; when another one turns up in the first port, that one is the session's
+/// ("twin"). Without a serial, and once there was a twin, only the port counts: a camera like it
+/// elsewhere is not taken ("look-alike").
 /// Frozen thermal frames are flagged "nuc" (FreezeWatch).
 /// "late-frame" tells of a pause without a gap in the driver's count (FrameRhythm).
 class V4l2Source final : public FrameSource {
@@ -87,6 +92,8 @@ class V4l2Source final : public FrameSource {
   Delivery lose(const std::string& event, const std::string& why);
   Delivery stall(const std::string& why);
   std::optional<Delivery> try_reopen();
+  std::optional<Delivery> tell_look_alike();
+  bool original_is_back();
   Result<Delivery> dequeue();
   Result<Delivery> empty_at_start(v4l2_buffer& buffer);
   Delivery delivery_of(std::uint32_t index, std::uint32_t bytes, std::uint32_t flags,
@@ -106,6 +113,9 @@ class V4l2Source final : public FrameSource {
   ClockMap clock_;
   int fd_ = -1;
   bool away_ = false;
+  bool moved_ = false;                  ///< found again in another port, by its serial
+  bool look_alike_told_ = false;        ///< in this outage
+  Clock::time_point ports_looked_at_{};
   std::vector<Mapping> buffers_;
   RawCounts raw_counts_;
   FreezeWatch freeze_;

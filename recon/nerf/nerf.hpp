@@ -44,7 +44,7 @@ struct TrainReport : History {
 /// them, and fall to the end as if the run had been that long from its start.
 ///
 /// A thermal view of which more than half the pixels are NaN is dropped with a warning that names
-/// it; fewer invalid pixels are left out one by one, as a skip that names the views.
+/// it; fewer dead pixels are left out one by one, and a skip names the view that has most.
 /// Errors: usage (options), input (dataset, checkpoint; each names what is wrong), quality (no step
 /// had a finite gradient), cancelled (a checkpoint is written first).
 Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,

@@ -19,7 +19,8 @@ struct TrainOptions {
 
   // -- when to stop --------------------------------------------------------------------------
   int iterations = 4000;     ///< hard end; the learning rates are annealed over these
-  double budget_s = 0;       ///< wall-clock limit, 0 = none; the schedule is fitted to it
+  /// Wall-clock limit, 0 = none, with preparation and without evaluation; the schedule is fitted to it.
+  double budget_s = 0;
   double target_psnr = 0;    ///< stop when the held-out PSNR reaches it, 0 = never; needs held-out views
   int holdout_every = 0;     ///< every n-th view measures and doesn't train (besides measure_only); 0 = none
   double plateau_db = 0;     ///< stop when held-out PSNR is this far below its best; 0 = never

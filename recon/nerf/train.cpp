@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -112,24 +113,30 @@ namespace {
 /// Thermal views of which more than half is no temperature: a broken transfer, a shutter in the way.
 std::vector<bool> broken_views(const Dataset& dataset, TrainReport& report) {
   std::vector<bool> broken(dataset.views.size(), false);
-  std::string partly;
+  int partly = 0;
+  std::size_t worst = 0;
+  double most = 0;
   for (std::size_t i = 0; dataset.modality == Modality::thermal && i < broken.size(); ++i) {
     const cv::Mat& image = dataset.views[i].image;
     const double invalid = 1 - cv::countNonZero(image == image) / static_cast<double>(image.total());
     broken[i] = invalid > 0.5;
-    if (broken[i])
+    if (broken[i]) {
       report.warnings.push_back(fmt::format("{} dropped: {:.0f} % of its pixels hold no temperature",
                                             dataset.views[i].name, 100 * invalid));
-    else if (invalid > 0)
-      partly += fmt::format("{}{} {:.2g} %", partly.empty() ? "" : ", ", dataset.views[i].name, 100 * invalid);
+    } else if (invalid > 0) {
+      ++partly;
+      if (invalid > most) worst = i;
+      most = std::max(most, invalid);
+    }
   }
-  if (!partly.empty())
-    report.skips.push_back({"invalid pixels", partly, "they neither train nor measure"});
+  if (partly > 0)
+    report.skips.push_back({"dead pixels", fmt::format("no temperature, in {} of {} views, most in {}: {:.2g} %", partly,
+                                                       broken.size(), dataset.views[worst].name, 100 * most),
+                            "they neither train nor measure"});
   return broken;
 }
-
-/// How well the held-out views come out, against what the options ask for.
-std::optional<StopReason> good_enough(const TrainOptions& options, const Snapshot& best, double psnr) {
+/// Whether held-out views at `psnr` end the run.
+std::optional<StopReason> reason_to_stop(const TrainOptions& options, const Snapshot& best, double psnr) {
   if (options.target_psnr > 0 && psnr >= options.target_psnr) return StopReason::target_psnr;
   if (options.plateau_db > 0 && !best.empty() && psnr < best.psnr - options.plateau_db)
     return StopReason::plateau;
@@ -238,7 +245,7 @@ Result<TrainReport> train(const Dataset& given, const TrainOptions& options,
   };
 
   report.stop = StopReason::iterations;
-  const bool reached = !state->best.empty() && good_enough(options, {}, state->best.psnr).has_value();
+  const bool reached = options.target_psnr > 0 && !state->best.empty() && state->best.psnr >= options.target_psnr;
   if (reached) report.stop = StopReason::target_psnr;
   while (!reached && state->step < options.iterations) {
     const double fraction = fraction_now();
@@ -265,7 +272,7 @@ Result<TrainReport> train(const Dataset& given, const TrainOptions& options,
         state->best = state->snapshot(psnr);
       report_progress(fraction, watch.wall_s);
       watch.go_on();
-      if (const auto stop = measuring ? good_enough(options, state->best, psnr) : std::nullopt) {
+      if (const auto stop = measuring ? reason_to_stop(options, state->best, psnr) : std::nullopt) {
         report.stop = *stop;
         break;
       }

@@ -28,6 +28,12 @@ TEST(FrameQuality, BlurLowersSharpnessAndContrastDoesNotChangeIt) {
   EXPECT_NEAR(measure_quality(checkers(CV_16UC1, 29000, 29400)).sharpness, a, 0.02 * a);
 }
 
+TEST(FrameQuality, LongThinImagesHaveADefinedAnswer) {
+  const cv::Mat image(8, 20000, CV_8UC1, cv::Scalar(90));
+  EXPECT_EQ(measure_quality(image).sharpness, 0);
+  EXPECT_EQ(measure_edges(image).edges, 0);
+}
+
 TEST(FrameQuality, LevelsAndClipping) {
   EXPECT_NEAR(measure_quality(cv::Mat(8, 8, CV_8UC1, cv::Scalar(255))).clipped_fraction, 1, 1e-12);
   EXPECT_EQ(measure_quality(cv::Mat(8, 8, CV_8UC1, cv::Scalar(255))).sharpness, 0);

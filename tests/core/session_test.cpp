@@ -29,7 +29,7 @@ FrameRecord full_frame() {
   f.cam_from_world = Rigid3d{Eigen::Quaterniond(0.3, -0.5, 0.2, 0.7).normalized(), {1.0 / 3, -2, 3}};
   f.camera = Camera::from_fov(640, 480, 25);
   f.source = "thermal/x \"quoted\".tiff";
-  f.quality = FrameQuality{0.25, 295.5, 0.001};
+  f.quality = FrameQuality{0.25, 295.5, 0.001, EdgeBlur{1.25, 70}};
   return f;
 }
 
@@ -78,6 +78,8 @@ TEST_F(SessionTest, EveryFieldComesBack) {
   EXPECT_EQ(f.camera, e.camera);
   EXPECT_EQ(f.cam_from_world->translation, e.cam_from_world->translation);
   EXPECT_EQ(f.quality->sharpness, 0.25);
+  EXPECT_EQ(f.quality->edge_blur->sigma_px, 1.25);
+  EXPECT_EQ(f.quality->edge_blur->edges, 70);
   EXPECT_EQ(s->gaps[0].count, 9u);
   EXPECT_EQ(s->streams[0].received + s->streams[0].lost, 20u);
   EXPECT_EQ(s->events[0].kind, "nuc");

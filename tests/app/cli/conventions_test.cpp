@@ -35,6 +35,10 @@ TEST(Cli, TopLevelHelpListsEveryVerb) {
   const Outcome help = orbitfuse_program({"--help"});
   EXPECT_EQ(help.code, 0);
   for (const std::string& verb : verbs) EXPECT_THAT(help.out, HasSubstr("\n  " + verb + " "));
+  EXPECT_EQ(orbitfuse_program({"help"}).out, help.out);
+  EXPECT_EQ(orbitfuse_program({"help", "capture"}).out,
+            orbitfuse_program({"capture", "--help"}).out);
+  EXPECT_EQ(orbitfuse_program({"help", "captrue"}).code, 2);
 }
 
 TEST(Cli, Version) {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <thread>
+
 #include "app/recording/rehearsal.hpp"
 #include "core/image_codec.hpp"
 #include "drivers/stills/watch_source.hpp"
@@ -48,6 +50,70 @@ TEST(Recording, ResumeGoesOnWithTheIdsOfTheSameCamera) {
   EXPECT_EQ(session->streams[1].first_sequence, 12u);
   for (const StreamRecord& s : session->streams)
     EXPECT_EQ(s.received + s.lost, s.last_sequence - s.first_sequence + 1);
+}
+
+/// Frames with ids below 110 are from right after its start, the others from much later.
+class QueueingSource final : public ScriptedSource {
+ public:
+  using ScriptedSource::ScriptedSource;
+  Status start() override {
+    started_ns_ = std::chrono::duration_cast<std::chrono::nanoseconds>(
+                      std::chrono::system_clock::now().time_since_epoch())
+                      .count();
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    return {};
+  }
+  Result<Delivery> next(std::chrono::milliseconds timeout) override {
+    Result<Delivery> delivery = ScriptedSource::next(timeout);
+    const std::int64_t after_ns = delivery->frame.id < 110 ? 1'000'000 : 3'600'000'000'000;
+    delivery->frame.host_time_ns = started_ns_ + after_ns;
+    return delivery;
+  }
+
+ private:
+  std::int64_t started_ns_ = 0;
+};
+
+/// The first camera fills its queue while the second one starts.
+TEST(Recording, FramesFromBeforeAllCamerasRanAreLeftOut) {
+  const test::TempFolder folder;
+  RecordingOptions options;
+  options.session = folder / "s";
+  options.live = true;
+  std::deque<Delivery> script;
+  const auto frame = [&](std::uint64_t id) {
+    script.push_back(test::frame_delivery(id, test::thermal_pixels()));
+  };
+  for (std::uint64_t id = 100; id < 105; ++id) frame(id);
+  script.push_back(test::rejected_delivery(105, "short"));
+  Delivery event;
+  event.kind = Delivery::Kind::event;
+  event.reason = "nuc";
+  script.push_back(event);
+  frame(107);
+  frame(110);  // from here on all run; 108 and 109 never came
+  script.push_back(test::rejected_delivery(111, "short"));
+  frame(114);
+  std::vector<std::unique_ptr<FrameSource>> sources;
+  sources.push_back(
+      std::make_unique<QueueingSource>("thermal0", Modality::thermal, std::move(script)));
+  sources.push_back(std::move(one_camera(0, 2, "thermal1")[0]));  // times from long ago: a replay
+  ASSERT_TRUE(record(std::move(sources), options));
+  const auto session = open_session(folder / "s");
+  ASSERT_TRUE(session) << session.error().message();
+  EXPECT_EQ(session->frames.size(), 2u + 2u);
+  ASSERT_EQ(session->streams.size(), 2u);
+  for (const StreamRecord& s : session->streams) {
+    EXPECT_EQ(s.received + s.lost, s.last_sequence - s.first_sequence + 1);
+    EXPECT_EQ(s.received, 2u);
+    if (s.device != "thermal0") continue;
+    EXPECT_EQ(s.first_sequence, 110u);
+    EXPECT_EQ(s.lost, 3u);
+  }
+  std::map<std::string, std::string> events;
+  for (const EventRecord& e : session->events) events[e.kind] = e.detail;
+  EXPECT_EQ(events["stale"], "7 frames from before all cameras ran were left out");
+  EXPECT_TRUE(events.count("nuc"));
 }
 
 TEST(Recording, ResumedPhotosAreOneDeviceAndComeOnce) {

@@ -49,6 +49,14 @@ TEST(Coverage, NoFalseGreen) {
       {Refusal::moving, [&](auto& f) { f.position->speed_deg_s = nan; }},
       {Refusal::blurred, [](auto& f) { f.sharpness = 0.2; }},
       {Refusal::blurred, [&](auto& f) { f.sharpness = nan; }},
+      {Refusal::blurred, [](auto& f) { f.edge_blur = EdgeBlur{1.8, 100}; }},
+      {Refusal::blurred, [&](auto& f) { f.edge_blur = EdgeBlur{nan, 100}; }},
+      {Refusal::blurred,
+       [](auto& f) {
+         f.edge_blur = EdgeBlur{3.3, 100};
+         f.modality = Modality::thermal;
+       }},
+      {Refusal::featureless, [](auto& f) { f.edge_blur = EdgeBlur{0, 0}; }},
       {Refusal::badly_exposed, [](auto& f) { f.underexposed = 0.6; }},
       {Refusal::between_stations, [](auto& f) { f.position->azimuth_deg = 15; }},
       {Refusal::between_stations, [&](auto& f) { f.position->azimuth_deg = nan; }},
@@ -59,8 +67,23 @@ TEST(Coverage, NoFalseGreen) {
     FrameAssessment frame = good_frame(0, 10);
     c.spoil(frame);
     EXPECT_EQ(coverage.add(frame), c.expected) << text(c.expected);
-    EXPECT_EQ(coverage.done_count(Modality::visible), 0) << text(c.expected);
+    EXPECT_EQ(coverage.done_count(Modality::visible) + coverage.done_count(Modality::thermal), 0)
+        << text(c.expected);
   }
+}
+
+TEST(Coverage, ThermalEdgesMayBeWider) {
+  Coverage coverage({});
+  FrameAssessment frame = good_frame(0, 10, Modality::thermal);
+  frame.edge_blur = EdgeBlur{2.5, 100};
+  EXPECT_EQ(coverage.add(frame), Refusal::none);
+  frame.modality = Modality::visible;
+  EXPECT_EQ(coverage.add(frame), Refusal::blurred);
+  CoverageOptions options;
+  options.max_visible_edge_px = 3;
+  EXPECT_EQ(Coverage({}, options).add(frame), Refusal::none);
+  options.max_visible_edge_px = 0;
+  EXPECT_EQ(options.validate().error().where, "guide.max_visible_edge_px");
 }
 
 TEST(Coverage, KeepsTheSharpest) {

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <opencv2/imgproc.hpp>
 #include <thread>
 
 #include "tests/capture/scripted_source.hpp"
@@ -51,10 +52,32 @@ class LiveGuideTest : public ::testing::Test {
     return *writer->append("visible0", frame);
   }
 
+  /// What a resting video camera delivers round a key.
+  void film(LiveGuide& guide, int level, double time_s, bool blurred = false) {
+    for (int i = 0; i < 3; ++i) guide.add(record(level, time_s + 0.03 * i, blurred));
+  }
+
   static std::optional<OrbitPosition> find(const cv::Mat& image, Modality) {
     const int level = image.at<std::uint8_t>(0, 31) % 200;
     if (level == 199) return std::nullopt;
     return OrbitPosition{2.0 * level, 20, 0.1, 0};
+  }
+
+  static cv::Mat boxes(int high, int low) {
+    cv::Mat image(240, 320, CV_8UC1, cv::Scalar(low));
+    for (int y = 0; y < 240; y += 80) {
+      for (int x = 0; x < 320; x += 80) image(cv::Rect(x + 20, y + 20, 40, 40)).setTo(high);
+    }
+    return image;
+  }
+
+  Result<FrameRecord> stored(const cv::Mat& image, double at_s) {
+    Frame frame;
+    frame.id = next_id++;
+    frame.host_time_ns = at_ns(at_s);
+    frame.tracking = true;
+    frame.pixels = image;
+    return writer->append("visible0", frame);
   }
 
   /// Gives a frame to the guide and waits until it has been judged.
@@ -71,6 +94,7 @@ class LiveGuideTest : public ::testing::Test {
   std::unique_ptr<SessionWriter> writer;
   LiveGuideOptions options;
   std::uint64_t next_id = 0;
+  double now_s = 0;
 };
 
 TEST_F(LiveGuideTest, RestingSharpFrameBecomesAStationInTheManifest) {
@@ -114,19 +138,61 @@ TEST_F(LiveGuideTest, LosesThePositionWhenTheMatIsOutOfSight) {
 
 TEST_F(LiveGuideTest, OperatorsKeyFillsTheNextStation) {
   LiveGuide guide(*writer, options);
-  guide.add(record(15, 0));
+  film(guide, 15, 0);
   EXPECT_EQ(guide.done_count(Modality::visible), 0);
   guide.operator_at_station();
-  guide.add(record(15, 1));
-  guide.add(record(15, 2));
+  film(guide, 15, 1);
+  film(guide, 15, 2);
   EXPECT_EQ(guide.done_count(Modality::visible), 1);
   for (int i = 0; i < 11; ++i) {
     EXPECT_FALSE(guide.complete());
     guide.operator_at_station();
-    guide.add(record(15, 3 + i));
+    film(guide, 15, 3 + i);
   }
   EXPECT_TRUE(guide.complete());
   EXPECT_FALSE(guide.error());
+}
+
+TEST_F(LiveGuideTest, ABlurredFirstFrameIsNoStation) {
+  LiveGuide guide(*writer, options);
+  guide.operator_at_station();
+  const auto stands = [&](const cv::Mat& image) {
+    for (int i = 0; i < 3; ++i) guide.add(*stored(image, ++now_s));
+    return guide.cameras()[0].refusal;
+  };
+  cv::Mat sharp = boxes(200, 60), blurred;
+  cv::GaussianBlur(sharp, blurred, {}, 3);
+  EXPECT_EQ(stands(blurred), Refusal::blurred);  // nothing sharper was ever seen
+  cv::blur(sharp, blurred, {11, 1});             // shaken sideways: the level edges stay sharp
+  EXPECT_EQ(stands(blurred), Refusal::blurred);
+  EXPECT_EQ(stands(cv::Mat(sharp.size(), CV_8UC1, cv::Scalar(90))), Refusal::blurred);  // constant
+  EXPECT_EQ(guide.done_count(Modality::visible), 0);
+  EXPECT_EQ(stands(sharp), Refusal::none);
+  EXPECT_EQ(guide.done_count(Modality::visible), 1);
+}
+
+TEST_F(LiveGuideTest, FramesThatDifferFromTheirNeighboursAreNoStation) {
+  LiveGuide guide(*writer, options);
+  const cv::Mat sharp = boxes(200, 60);
+  const auto moved = [&](double shift_px) {
+    cv::Mat image;
+    const cv::Mat way = (cv::Mat_<double>(2, 3) << 1, 0, shift_px, 0, 1, 0);
+    cv::warpAffine(sharp, image, way, sharp.size(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+    return image;
+  };
+  guide.operator_at_station();
+  for (int i = 0; i < 6; ++i) guide.add(*stored(moved(i % 2 ? 8 : 0), ++now_s));
+  EXPECT_EQ(guide.cameras()[0].refusal, Refusal::moving);
+  EXPECT_EQ(guide.cameras()[0].instruction, "too fast, hold still");
+  EXPECT_EQ(guide.done_count(Modality::visible), 0);
+  // Comes to rest: the second of three that agree is taken, not the first.
+  std::vector<FrameRecord> resting;
+  for (int i = 0; i < 3; ++i) {
+    resting.push_back(*stored(moved(4 + 0.2 * i), ++now_s));
+    EXPECT_EQ(guide.done_count(Modality::visible), 0);
+    guide.add(resting.back());
+  }
+  EXPECT_EQ(guide.sectors()[0].file[0], resting[1].file);
 }
 
 TEST_F(LiveGuideTest, StationsThatFramesCarryCountAtOnce) {
@@ -147,21 +213,20 @@ TEST_F(LiveGuideTest, TurntableCountsKeysAndTurns) {
   options.turntable_step_deg = -15;  // every other step is a station
   LiveGuide guide(*writer, options);
   const auto at = [&] { return *guide.cameras()[0].position; };
-  double time_s = 0;
   guide.operator_at_station();
-  guide.add(record(15, ++time_s));
+  film(guide, 15, ++now_s);
   EXPECT_NEAR(at().azimuth_deg, 0, 1e-9);
   EXPECT_EQ(guide.done_count(Modality::visible), 1);
   guide.operator_at_station();
-  guide.add(record(15, ++time_s));
+  film(guide, 15, ++now_s);
   EXPECT_NEAR(at().azimuth_deg, 345, 1e-9);
   EXPECT_EQ(guide.cameras()[0].refusal, Refusal::between_stations);
   EXPECT_EQ(guide.done_count(Modality::visible), 1);
-  guide.add(record(15, ++time_s));  // the table hasn't been turned on: nothing new is known
+  film(guide, 15, ++now_s);  // the table hasn't been turned on: nothing new is known
   EXPECT_EQ(guide.done_count(Modality::visible), 1);
   for (int step = 2; step < 48; ++step) {
     guide.operator_at_station();
-    guide.add(record(15, ++time_s));
+    film(guide, 15, ++now_s);
   }
   EXPECT_NEAR(at().elevation_deg, 50, 1e-9);  // the second turn
   EXPECT_TRUE(guide.complete());
@@ -178,20 +243,20 @@ TEST_F(LiveGuideTest, SaysWhatToDoWithTheTableAndTheKey) {
   const auto words = [&] { return guide.cameras()[0].instruction; };
   EXPECT_EQ(words(), "put the table at its start, then press Enter or take the photo");
   guide.operator_at_station();
-  guide.add(record(15, 1));
+  film(guide, 15, 1);
   EXPECT_EQ(words(), "turn the table by 30°, then press Enter");
   for (int i = 1; i < 12; ++i) {
     guide.operator_at_station();
     if (i == 4) {
-      guide.add(record(15, 1 + i, true));
+      film(guide, 15, 1 + i, true);
       EXPECT_EQ(words(), text(Refusal::blurred));
     }
-    guide.add(record(15, 1.5 + i));
+    film(guide, 15, 1.5 + i);
   }
   EXPECT_EQ(words(), "turn the table by 30°, move the camera to 50° high, then press Enter");
   for (int i = 12; i < 24; ++i) {
     guide.operator_at_station();
-    guide.add(record(15, 1 + i));
+    film(guide, 15, 1 + i);
   }
   EXPECT_EQ(words(), "visible: done");
 }
@@ -200,12 +265,12 @@ TEST_F(LiveGuideTest, TurntableTriesAgainWhereAFrameWasBlurred) {
   options.turntable_step_deg = 30;
   LiveGuide guide(*writer, options);
   guide.operator_at_station();
-  guide.add(record(15, 0));
+  film(guide, 15, 0);
   guide.operator_at_station();
-  guide.add(record(15, 1, true));
+  film(guide, 15, 1, true);
   EXPECT_EQ(guide.cameras()[0].refusal, Refusal::blurred);
   EXPECT_EQ(guide.done_count(Modality::visible), 1);
-  guide.add(record(15, 2));
+  film(guide, 15, 2);
   EXPECT_EQ(guide.done_count(Modality::visible), 2);
   EXPECT_NEAR(guide.cameras()[0].position->azimuth_deg, 30, 1e-9);
 }
@@ -309,7 +374,7 @@ TEST_F(LiveGuideTest, ANearlyBlackFrameIsRefused) {
   LiveGuide guide(*writer, options);
   const auto judged = [&](int level) {
     guide.operator_at_station();
-    guide.add(record(level, level));
+    film(guide, level, level);
     return guide.cameras()[0].refusal;
   };
   EXPECT_EQ(judged(2), Refusal::badly_exposed);  // no pixel of it is 0
@@ -347,7 +412,7 @@ TEST_F(LiveGuideTest, ResumedKeySessionGoesOnAfterItsLastStation) {
   EXPECT_EQ(guide.done_count(Modality::visible), 13);
   EXPECT_EQ(guide.cameras()[0].instruction, "turn the table by 30°, then press Enter");
   guide.operator_at_station();
-  guide.add(record(15, 20));
+  film(guide, 15, 20);
   EXPECT_NEAR(guide.cameras()[0].position->azimuth_deg, 300, 1e-9);
   EXPECT_NEAR(guide.cameras()[0].position->elevation_deg, 50, 1e-9);
   EXPECT_EQ(guide.done_count(Modality::visible), 14);
@@ -365,11 +430,11 @@ class MixedTableTest : public LiveGuideTest {
     options.turntable_step_deg = 30;
   }
   void key(LiveGuide& guide) {
-    guide.operator_at_station(at_ns(time_s + 1));
-    guide.add(record(15, ++time_s));
+    guide.operator_at_station(at_ns(now_s + 1));
+    film(guide, 15, ++now_s);
   }
   void photo(LiveGuide& guide, bool blurred = false) {
-    FrameRecord frame = record(15, ++time_s, blurred);
+    FrameRecord frame = record(15, ++now_s, blurred);
     frame.modality = Modality::thermal;
     frame.device = "thermal0";
     frame.flags = {"still"};
@@ -378,7 +443,6 @@ class MixedTableTest : public LiveGuideTest {
   static double azimuth(const LiveGuide& guide, Modality modality) {
     return guide.cameras()[modality == Modality::visible ? 0 : 1].position->azimuth_deg;
   }
-  double time_s = 0;
 };
 
 TEST_F(MixedTableTest, KeyAndPhotoAtOneStationAreOneStep) {
@@ -431,7 +495,7 @@ TEST_F(MixedTableTest, SecondCameraAfterAResumeMakesItsOwnFirstTurn) {
   options.plan.loop_elevations_deg = {20, 50};
   std::vector<FrameRecord> earlier;
   for (int i = 0; i < 12; ++i) {
-    earlier.push_back(record(15, ++time_s));
+    earlier.push_back(record(15, ++now_s));
     earlier.back().tracking = false;
     earlier.back().station = Station{0, i, 30.0 * i, 20, 1, 1};
   }

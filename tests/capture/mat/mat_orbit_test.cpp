@@ -71,8 +71,9 @@ TEST(MatOrbit, EverySectorIsFoundAndNoneFalsely) {
     if (blur_px > 1) cv::blur(image, image, {blur_px, 1});
     FrameAssessment frame;
     frame.file = std::to_string(i);
-    const double sharpness = measure_quality(image).sharpness;
-    frame.rank = sharpness;
+    const FrameQuality quality = measure_quality(image);
+    frame.rank = quality.sharpness;
+    frame.edge_blur = measure_edges(image);
     if (const auto sighting = finder.find(image, Modality::visible)) {
       ++found;
       worst_deg = std::max(worst_deg, std::abs(angle_difference_deg(sighting->position.azimuth_deg,
@@ -87,7 +88,7 @@ TEST(MatOrbit, EverySectorIsFoundAndNoneFalsely) {
       before = sighting->position;
       before_s = step.time_s;
     }
-    frame.sharpness = reference.relative(sharpness, frame.position);
+    frame.sharpness = reference.relative(quality.sharpness, frame.position);
     if (coverage.add(frame) == Refusal::none) {
       const double off =
           std::abs(angle_difference_deg(step.azimuth_deg, 30 * std::round(step.azimuth_deg / 30)));

@@ -255,31 +255,5 @@ TEST_F(PageTest, PortInUseAndBadOptionsHaveARemedy) {
   EXPECT_EQ(options.validate().error().where, "page.token");
 }
 
-TEST(LiveState, TerminalShowsTheSame) {
-  const std::string view = terminal_view(some_state());
-  EXPECT_THAT(view, HasSubstr("90 received, 10 lost (7 missing, 0 rejected, 3 dropped)"));
-  EXPECT_THAT(view, HasSubstr("loop  10 deg  #..........."));
-  EXPECT_THAT(view, HasSubstr("12° further left"));
-  EXPECT_THAT(view, HasSubstr("! thermal0: the disk is too slow"));
-}
-
-TEST(LiveState, WarningsFollowFromTheFigures) {
-  LiveState state;
-  state.running = true;
-  state.free_bytes = 100ull << 30;
-  EXPECT_TRUE(warnings_of(state).empty());
-  state.free_bytes = 1ull << 30;
-  StreamStatus stream;
-  stream.device = "v";
-  stream.silent = true;
-  stream.rejected = 2;
-  state.streams = {stream};
-  const auto list = warnings_of(state);
-  ASSERT_EQ(list.size(), 3u);
-  EXPECT_EQ(list[0], "v: no frames");
-  state.streams[0].ended = true;
-  EXPECT_EQ(warnings_of(state)[0], "v: the stream has ended");
-}
-
 }  // namespace
 }  // namespace orbitfuse

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <filesystem>
+#include <iterator>
 #include <memory>
 
 #include "tests/drivers/aravis/stream_harness.hpp"
@@ -68,6 +70,33 @@ TEST_F(AravisSoak, HalfPercentLossWithoutResend) {
   // Frames under way at either end are the difference.
   EXPECT_NEAR(static_cast<double>(tally.span()), static_cast<double>(sent), 20);
   EXPECT_NEAR(static_cast<double>(tally.frames), static_cast<double>(whole), 5);
+}
+
+int threads_of_this_process() {
+  return static_cast<int>(std::distance(std::filesystem::directory_iterator("/proc/self/task"),
+                                        std::filesystem::directory_iterator()));
+}
+
+/// Each lost connection is destroyed on a thread of its own.
+TEST_F(AravisSoak, OutagesLeaveNoThreadsBehind) {
+  const auto source = started(0, true);
+  ASSERT_TRUE(source);
+  const auto three = [](const Tally& t) { return t.frames >= 3; };
+  drain(*source, 10s, three);
+  const int streaming = threads_of_this_process();
+  for (int outage = 0; outage < 3; ++outage) {
+    camera.kill();
+    drain(*source, 5s, [](const Tally& t) { return t.has("disconnected"); });
+    ASSERT_TRUE(camera.start());
+    EXPECT_TRUE(drain(*source, 10s, three).has("reconnected"));
+  }
+  const auto limit = testing_clock::now() + 10s;
+  while (threads_of_this_process() > streaming && testing_clock::now() < limit) drain(*source, 100ms);
+  EXPECT_LE(threads_of_this_process(), streaming);
+  camera.kill();
+  drain(*source, 5s, [](const Tally& t) { return t.has("disconnected"); });
+  source->stop();  // waits for the one that is going down
+  EXPECT_LT(threads_of_this_process(), streaming);
 }
 
 }  // namespace

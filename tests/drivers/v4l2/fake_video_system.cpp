@@ -22,6 +22,7 @@ int FakeVideoSystem::open(const std::string& path, int) {
   if (!other && (!plugged || path != camera.path)) return failure(ENOENT);
   if (open_error) return failure(open_error);
   ++open_descriptors;
+  last_opened = path;
   return 7;
 }
 

@@ -34,6 +34,7 @@ class FakeVideoSystem final : public VideoSystem {
   std::deque<Shot> shots;
   std::map<std::uint32_t, int> controls;
 
+  std::string last_opened;
   int open_descriptors = 0, mapped = 0, streams_started = 0, polls = 0;
   static constexpr std::size_t buffer_length = 4096;
 

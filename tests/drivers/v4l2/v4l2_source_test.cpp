@@ -238,6 +238,88 @@ TEST_F(V4l2SourceTest, UnpluggedAndBackUnderAnotherNode) {
 }
 
 /// For the thread sanitizer too: the recorder's writer asks while the capture thread reopens.
+/// What a camera like the session's does in another port.
+class V4l2TwinTest : public V4l2SourceTest {
+ protected:
+  V4l2TwinTest() : first(system->camera), second(system->camera) {
+    second.path = "/dev/video3";
+    second.usb_path = "2-1";
+  }
+  void unplug(V4l2Source& source) {
+    shoot(0);
+    EXPECT_EQ(deliver(source).kind, Kind::frame);
+    system->plugged = false;
+    EXPECT_EQ(deliver(source).reason, "disconnected");
+  }
+  void plug(const VideoSystem::Node& node) {
+    system->camera = node;
+    system->plugged = true;
+  }
+  VideoSystem::Node first, second;
+};
+
+TEST_F(V4l2TwinTest, OneOfTheSameSerialElsewhereIsTakenButToldAndGivenUpForTheFirst) {
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  unplug(source);
+  plug(second);
+  EXPECT_EQ(deliver(source).reason, "reconnected");
+  const Delivery moved = deliver(source);
+  EXPECT_EQ(moved.reason, "moved");
+  EXPECT_NE(moved.detail.find("usb:2-1"), std::string::npos);
+  EXPECT_NE(moved.detail.find("usb:1-4"), std::string::npos);
+  shoot(0);
+  EXPECT_EQ(deliver(source).frame.flags, std::vector<std::string>{"other-port"});
+  // The first one is plugged in again: there are two.
+  system->others = {first};
+  EXPECT_EQ(deliver(source).reason, "twin");
+  EXPECT_EQ(deliver(source).reason, "reconnected");
+  EXPECT_EQ(system->last_opened, first.path);
+  shoot(0);
+  EXPECT_TRUE(deliver(source).frame.flags.empty());
+  // From now on its port alone counts.
+  system->others.clear();
+  plug(second);
+  system->dequeue_error = ENODEV;
+  shoot(1);
+  EXPECT_EQ(deliver(source).reason, "disconnected");
+  system->dequeue_error = 0;
+  EXPECT_EQ(deliver(source).reason, "look-alike");
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(source.next(1ms)->kind, Kind::timeout);
+  EXPECT_EQ(system->last_opened, first.path);
+}
+
+TEST_F(V4l2TwinTest, ATwinThatWasThereAllAlongIsNeverTaken) {
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  system->others = {second};  // while ours streams
+  unplug(source);
+  EXPECT_EQ(deliver(source).reason, "look-alike");
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(source.next(1ms)->kind, Kind::timeout);
+  EXPECT_EQ(system->last_opened, first.path);
+  plug(first);
+  const Delivery back = deliver(source);
+  EXPECT_EQ(back.reason, "reconnected");
+  EXPECT_NE(back.detail.find("by its port"), std::string::npos);
+}
+
+TEST_F(V4l2TwinTest, WithoutASerialOnlyThePortCounts) {
+  system->camera.serial.clear();
+  first.serial.clear();
+  second.serial.clear();
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  unplug(source);
+  plug(second);
+  const Delivery told = deliver(source);
+  EXPECT_EQ(told.reason, "look-alike");
+  EXPECT_NE(told.detail.find("usb:1-4"), std::string::npos);
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(source.next(1ms)->kind, Kind::timeout) << "told once";
+  EXPECT_EQ(system->open_descriptors, 0);
+  plug(first);
+  EXPECT_EQ(deliver(source).reason, "reconnected");
+}
+
 TEST_F(V4l2SourceTest, DescribesItselfToOtherThreadsWhileItReopens) {
   system->camera.product = std::string(200, 'p');
   system->camera.serial = std::string(200, 's');

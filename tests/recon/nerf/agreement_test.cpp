@@ -138,6 +138,37 @@ TEST(Agreement, LookingAheadIsAsNearToTheWholePictureAsNotLooking) {
   EXPECT_GT(deep_quick, 0.8 * solid);
 }
 
+TEST(Agreement, LookingAheadSeesThroughAHoleThatItsNeighboursMiss) {
+  Dataset data = toy_scene(Modality::visible, 8, 1.0, 96);
+  data.depth = test::toy_depth(data);
+  TrainOptions options = toy_options(data.modality, 150);
+  options.occupancy_resolution = 128;
+  Field field;
+  ASSERT_TRUE(train(data, options, {}, field));
+  FieldState& state = field.state();
+  const Mlp::Layer& last = state.main.mlp.layers.back();  // a wall, not mist: see above
+  for (int i = 0; i < last.in; ++i)
+    state.main.mlp.weights.value[static_cast<std::size_t>(last.offset + i * last.out)] *= 2;
+  state.refresh();
+  const auto shown = [&](bool look_ahead) {
+    return render(field, data.views[0].camera, data.views[0].cam_from_world, {.look_ahead = look_ahead}, {}).value();
+  };
+  const cv::Rect hole(47, 47, 2, 2);
+  const cv::Mat closed = shown(true).color(hole);
+  // A tunnel of 2 x 2 cells along the first camera's axis, narrower than the rays that look ahead are apart.
+  Occupancy& grid = state.occupancy;
+  for (float along = -1 + grid.cell_size(0) / 2; along < 1; along += grid.cell_size(0))
+    for (const float y : {-0.5f, 0.5f})
+      for (const float z : {-0.5f, 0.5f}) {
+        const float x[3] = {along, y * grid.cell_size(0), z * grid.cell_size(0)};
+        Occupancy::put(grid.on, grid.cell_of(0, x), false);
+      }
+  grid.refresh();
+  const cv::Mat quick = shown(true).color(hole), slow = shown(false).color(hole);
+  EXPECT_GT(rms_of(slow, closed), 0.1) << "there is a hole";
+  EXPECT_LT(rms_of(quick, slow), 0.02);
+}
+
 // Every kernel in double, from its definition. What lies between them is stored as in any training:
 // parameters and activations in float, the table in half precision. Compositing and its gradient in float
 // are held to double above.

@@ -87,7 +87,7 @@ TEST(Stress, ABrokenThermalViewIsDroppedWithItsNameAndDeadPixelsAreTold) {
   ASSERT_TRUE(dead);
   EXPECT_TRUE(dead->warnings.empty());
   const auto told = std::find_if(dead->skips.begin(), dead->skips.end(),
-                                 [](const Skip& skip) { return skip.what == "invalid pixels"; });
+                                 [](const Skip& skip) { return skip.what == "dead pixels"; });
   ASSERT_TRUE(told != dead->skips.end());
   EXPECT_NE(told->why.find("002.png"), std::string::npos);
 }
