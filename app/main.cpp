@@ -2,6 +2,7 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
 #include <exception>
@@ -82,8 +83,10 @@ int run(const std::vector<const char*>& words) {
   try {
     line.app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    const bool unknown_verb = argc > 1 && argv[1][0] != '-' &&
-                              line.app.get_subcommand_no_throw(argv[1]) == nullptr;
+    const bool unknown_verb =
+        argc > 1 && argv[1][0] != '-' &&
+        std::none_of(line.actions.begin(), line.actions.end(),
+                     [&](const auto& action) { return std::strcmp(action.first->name, argv[1]) == 0; });
     if (dynamic_cast<const CLI::Success*>(&error) != nullptr && !unknown_verb)  // --help, --version
       return line.app.exit(error) == 0 ? exit_ok : exit_internal;
     ConsoleOptions options = detect_terminal();
