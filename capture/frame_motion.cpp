@@ -14,7 +14,7 @@ constexpr int width_px = 160;      // half a percent of the width is most of a p
 constexpr double smooth_px = 1.5;  // so that a slope lasts as long as the shifts asked for
 
 cv::Mat small_gray(const cv::Mat& image) {
-  cv::Mat gray = image, small;
+  cv::Mat gray = without_dead_pixels(image), small;
   if (image.channels() == 3) cv::cvtColor(image, gray, cv::COLOR_BGR2GRAY);
   const double scale = std::min(1.0, static_cast<double>(width_px) / gray.cols);
   const auto pixels = [&](int side) { return std::max(1, static_cast<int>(side * scale)); };

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "capture/image_noise.hpp"
+
 #include "capture/edge_blur.hpp"
 #include "core/temperature.hpp"
 
@@ -60,6 +62,7 @@ EdgeBlur measure_edges(const cv::Mat& image) {
   if (image.empty()) return {};
   cv::Mat gray = image;
   if (image.channels() == 3) cv::cvtColor(image, gray, cv::COLOR_BGR2GRAY);
+  gray = without_dead_pixels(gray);
   return measure_edge_blur(at_most(max_size_px, std::max(gray.cols, gray.rows), gray));
 }
 

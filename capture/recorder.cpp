@@ -135,8 +135,8 @@ struct Recorder::Channel {
         const std::lock_guard lock(mutex);
         if (delivery->kind == Delivery::Kind::event && delivery->reason == "disconnected") away = true;
         if (delivery->kind == Delivery::Kind::event && delivery->reason == "reconnected") away = false;
-        // Files come when they come, unless their folder is gone.
         note(*delivery);
+        // Files come when they come, unless their folder is gone.
         silent = delivery->kind == Delivery::Kind::timeout && (!source.can_wait() || away);
       }
       if (delivery->kind == Delivery::Kind::end) break;

@@ -47,7 +47,7 @@ Status Camera::validate(const std::string& where) const {
     return fail(ErrorKind::input, where, fmt::format("focal length {} x {} pixels", fx, fy),
                 "must be > 0");
   }
-  // Fields of view from half a degree to 170; cropping moves the centre, but not out of sight.
+  // Fields of view from half a degree to 170.
   const double side = std::max(width, height);
   for (const double focal : {fx, fy}) {
     if (focal < 0.04 * side || focal > 120 * side) {
@@ -55,7 +55,8 @@ Status Camera::validate(const std::string& where) const {
                   "give it in pixels of this image size");
     }
   }
-  if (std::abs(cx - 0.5 * width) > side || std::abs(cy - 0.5 * height) > side) {
+  // A crop may lie beside the optical axis, not beyond what a lens shows.
+  if (std::abs(cx - 0.5 * width) > 3 * fx || std::abs(cy - 0.5 * height) > 3 * fy) {
     return fail(ErrorKind::input, where, fmt::format("principal point ({:g}, {:g}) far outside an image of {}x{}", cx, cy, width, height),
                 "give cx and cy in pixels of this image size");
   }

@@ -28,7 +28,8 @@ Result<double> parse_duration(const std::string& text) {
   while (valid && at != end) {
     double value = 0;
     const auto [next, error] = std::from_chars(at, end, value, std::chars_format::fixed);
-    const char letter = next != end ? *next : 's';
+    // A number alone is seconds; after another unit it could be anything.
+    const char letter = next != end ? *next : at == text.data() ? 's' : '?';
     const double unit = letter == 's' ? 1 : letter == 'm' ? 60 : letter == 'h' ? 3600 : 0;
     valid = error == std::errc() && value >= 0 && unit > 0 && unit < last_unit;
     seconds += value * unit;

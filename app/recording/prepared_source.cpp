@@ -43,19 +43,25 @@ Result<Delivery> PreparedSource::next(std::chrono::milliseconds timeout) {
 }
 
 void PreparedSource::drop_before(std::int64_t all_run_ns) {
+  constexpr std::size_t longest_queue = 4096;  // a source that never runs dry is not drained for ever
   std::uint64_t dropped = 0;
-  for (bool over = false; !over;) {
+  // A rejected frame may have no time: it is stale if a stale one follows, else it counts as rejected.
+  std::deque<Result<Delivery>> undecided;
+  for (bool over = false; !over && undecided.size() < longest_queue;) {
     Result<Delivery> delivery = source_->next(std::chrono::milliseconds(0));
-    const bool stale = delivery && (delivery->kind == Delivery::Kind::rejected ||
-                                    (delivery->kind == Delivery::Kind::frame &&
-                                     delivery->frame.host_time_ns >= started_ns_ &&
-                                     delivery->frame.host_time_ns < all_run_ns));
-    dropped += stale;
     if (delivery && delivery->kind == Delivery::Kind::timeout) break;
-    if (stale) continue;
-    over = !delivery || delivery->kind != Delivery::Kind::event;
-    waiting_.push_back(std::move(delivery));
+    const bool stale = delivery && delivery->kind == Delivery::Kind::frame &&
+                       delivery->frame.host_time_ns >= started_ns_ &&
+                       delivery->frame.host_time_ns < all_run_ns;
+    if (stale) {
+      const auto rejected = [](const auto& d) { return d && d->kind == Delivery::Kind::rejected; };
+      dropped += 1 + static_cast<std::uint64_t>(std::erase_if(undecided, rejected));
+      continue;
+    }
+    over = !delivery || delivery->kind == Delivery::Kind::frame;
+    undecided.push_back(std::move(delivery));
   }
+  for (Result<Delivery>& delivery : undecided) waiting_.push_back(std::move(delivery));
   if (dropped == 0) return;
   Delivery event;
   event.kind = Delivery::Kind::event;

@@ -18,7 +18,7 @@ namespace orbitfuse::stages {
 /// How one modality's field is trained; the fields of `options` come from its preset.
 struct TrainConfig {
   nerf::TrainOptions options;
-  int max_width_px = 800;  ///< training images: memory, not time, grows with it
+  int max_width_px = 400;  ///< training images; wider ones suit temperatures, these poses (run.md)
   nerf::ExportOptions cloud;
 };
 

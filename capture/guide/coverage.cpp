@@ -108,11 +108,11 @@ Refusal Coverage::add(const FrameAssessment& frame) {
   if (!(std::abs(p.speed_deg_s) <= options_.rest_speed_deg_s)) return Refusal::moving;
   // Exposure first: what is too dark has no edges either.
   if (!(std::max(frame.overexposed, frame.underexposed) <= options_.max_clipped)) return Refusal::badly_exposed;
+  if (frame.edge_blur && frame.edge_blur->edges == 0) return Refusal::featureless;
   if (!(frame.sharpness >= options_.min_sharpness)) return Refusal::blurred;
   if (frame.edge_blur) {
     const double widest =
         frame.modality == Modality::visible ? options_.max_visible_edge_px : options_.max_thermal_edge_px;
-    if (frame.edge_blur->edges == 0) return Refusal::featureless;
     if (!(frame.edge_blur->sigma_px <= widest)) return Refusal::blurred;
   }
   bool in_band = false;

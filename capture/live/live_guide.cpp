@@ -30,6 +30,12 @@ std::optional<cv::Mat> read_back(const std::filesystem::path& file) {
   return apply_orientation(*image, read_exif(*bytes).orientation);
 }
 
+/// Refused for what another frame from the same place may not have.
+bool to_repeat(Refusal last) {
+  return last == Refusal::nuc || last == Refusal::blurred || last == Refusal::featureless ||
+         last == Refusal::badly_exposed || last == Refusal::moving;
+}
+
 void note_edges(FrameRecord& frame, const cv::Mat& image) {
   if (frame.quality && !frame.quality->edge_blur) frame.quality->edge_blur = measure_edges(image);
 }
@@ -108,22 +114,25 @@ void LiveGuide::add_at_station(Camera& camera, const FrameRecord& frame) {
 void LiveGuide::add(const FrameRecord& stored) {
   FrameRecord frame = stored;
   const bool at_station = frame.station && !frame.tracking;
-  if (at_station || frame.has_flag("still")) {
-    if (const auto image = read_back(writer_.folder() / frame.file)) note_edges(frame, *image);
-  }
+  const bool judged_alone = at_station || frame.has_flag("still");
+  // Reading takes long: the other camera's frames and the page don't wait for it.
+  std::optional<cv::Mat> image;
+  if (judged_alone || is_announced(frame.modality)) image = read_back(writer_.folder() / frame.file);
+  if (judged_alone && image) note_edges(frame, *image);
   const std::lock_guard lock(mutex_);
   const auto known = cameras_.find(frame.modality);
   if (known == cameras_.end()) return;  // this orbit is not asked for
   Camera& camera = known->second;
   camera.shown.latest_file = frame.file;
   if (at_station) {
+    camera.told_by_source = true;
     add_at_station(camera, frame);
   } else if (options_.turntable_step_deg != 0 && frame.has_flag("still")) {
     judge_table_photo(camera, frame);
   } else if (camera.announced && frame.has_flag("still")) {
     judge_announced(camera, frame);
   } else if (camera.announced) {
-    judge_between_neighbours(camera, frame);
+    if (image) judge_between_neighbours(camera, frame, *image);
   } else if (finder_) {
     if (frame.has_flag("still")) {
       camera.photos.push_back(frame);
@@ -149,21 +158,25 @@ void LiveGuide::judge_table_photo(Camera& camera, const FrameRecord& frame) {
   camera.announced.reset();  // the next photo tells anew where the table is
 }
 
+bool LiveGuide::is_announced(Modality modality) {
+  const std::lock_guard lock(mutex_);
+  const auto known = cameras_.find(modality);
+  return known != cameras_.end() && known->second.announced.has_value();
+}
+
 /// A frame that is shaken differs from its neighbours.
-void LiveGuide::judge_between_neighbours(Camera& camera, const FrameRecord& frame) {
+void LiveGuide::judge_between_neighbours(Camera& camera, const FrameRecord& frame, const cv::Mat& image) {
   std::deque<Look>& looks = camera.since_key;
-  const std::optional<cv::Mat> image = read_back(writer_.folder() / frame.file);
-  if (!image) return;
   const auto agrees = [&](const cv::Mat& before) {
-    return before.size() == image->size() && before.type() == image->type() &&
-           apparent_motion(before, *image) <= options_.key_motion;
+    return before.size() == image.size() && before.type() == image.type() &&
+           apparent_motion(before, image) <= options_.key_motion;
   };
   if (!looks.empty() && !agrees(looks.back().image)) {
     looks.clear();
     camera.shown.refusal = Refusal::moving;
     camera.shown.instruction = text(Refusal::moving);
   }
-  looks.push_back({frame, *image});
+  looks.push_back({frame, image});
   if (looks.size() < 3) return;
   looks.pop_front();
   note_edges(looks.front().frame, looks.front().image);
@@ -258,7 +271,9 @@ std::string LiveGuide::instruction(Modality modality, const Camera& camera,
                                    Refusal last) const {
   const std::optional<OrbitPosition> next = next_station(modality);
   if (next && options_.turntable_step_deg != 0) return table_instruction(camera, last);
-  if (next && !position && !finder_) {
+  // The next key records the next missing station, wherever the camera stood before.
+  if (next && !finder_ && !camera.told_by_source) {
+    if (camera.announced && to_repeat(last)) return text(last);
     return fmt::format("go to azimuth {:.0f}°, {:.0f}° high, then press Enter", next->azimuth_deg,
                        next->elevation_deg);
   }
@@ -267,14 +282,12 @@ std::string LiveGuide::instruction(Modality modality, const Camera& camera,
 
 std::string LiveGuide::table_instruction(const Camera& camera, Refusal last) const {
   const TableView& view = camera.table;
-  const bool to_repeat = last == Refusal::nuc || last == Refusal::blurred || last == Refusal::featureless ||
-                         last == Refusal::badly_exposed || last == Refusal::moving;
-  if (to_repeat && camera.announced && !view.counts_photos) return text(last);
+  if (to_repeat(last) && camera.announced && !view.counts_photos) return text(last);
   const std::string then = view.counts_photos ? "take the photo"
                            : view.start_deg   ? "press Enter"
                                               : "press Enter or take the photo";
   if (!view.start_deg && !table_.begun()) return "put the table at its start, then " + then;
-  std::string words = to_repeat ? text(last) + "; " : "";
+  std::string words = to_repeat(last) ? text(last) + "; " : "";
   words += fmt::format("turn the table by {:g}°", std::abs(options_.turntable_step_deg));
   const std::vector<double>& loops = options_.plan.loop_elevations_deg;
   const double elevation_deg = loops[table_.turn_after_step(view) % loops.size()];

@@ -97,6 +97,7 @@ class LiveGuide {
     std::deque<FrameRecord> photos;          ///< not looked at yet: each was taken on purpose
     std::optional<FrameRecord> next_to_look();
     std::optional<OrbitPosition> announced;  ///< by the key: where the next good frame is
+    bool told_by_source = false;  ///< its frames come with their stations: no key is needed
     std::deque<Look> since_key;              ///< video frames, the newest up to three
     TableView table;
     std::map<std::size_t, FrameRecord> chosen;  ///< by sector
@@ -114,7 +115,8 @@ class LiveGuide {
   OrbitPosition at_photo(TableView& view) const;
   OrbitPosition at_key(TableView& view, int key) const;
   void judge_table_photo(Camera& camera, const FrameRecord& frame);
-  void judge_between_neighbours(Camera& camera, const FrameRecord& frame);
+  void judge_between_neighbours(Camera& camera, const FrameRecord& frame, const cv::Mat& image);
+  bool is_announced(Modality modality);
   void judge_announced(Camera& camera, const FrameRecord& frame);
   void set_position(Camera& camera, OrbitPosition position, std::int64_t time_ns);
 

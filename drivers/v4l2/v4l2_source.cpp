@@ -42,6 +42,7 @@ Status V4l2Source::start() {
   // From here on it is this camera, wherever it is plugged in.
   identity_ = identity_of(*system_, node);
   first_layout_ = layout_;
+  moved_ = look_alike_told_ = false;
   return {};
 }
 

@@ -53,9 +53,11 @@ cv::Mat known_distance(const Dataset& dataset, const Space& space, int index,
 
 std::vector<bool> heldout_views(const Dataset& dataset, int holdout_every) {
   std::vector<bool> heldout;
+  const auto trainable = std::count_if(dataset.views.begin(), dataset.views.end(),
+                                       [](const TrainingView& view) { return !view.measure_only; });
   int turn = 0;  // only views that might train are counted: others change nothing
   for (const TrainingView& view : dataset.views) {
-    const bool turned = !view.measure_only && holdout_every > 0 && dataset.views.size() > 1 &&
+    const bool turned = !view.measure_only && holdout_every > 0 && trainable > 1 &&
                         turn++ % holdout_every == 0;
     heldout.push_back(view.measure_only || turned);
   }

@@ -244,6 +244,19 @@ Result<TrainReport> train(const Dataset& given, const TrainOptions& options,
                      wall_s / std::max(1e-9, fraction) * (1 - fraction), errors_of(*state)});
   };
 
+  /// The curve's next point, and the best field so far. Returns the held-out PSNR.
+  const auto evaluate = [&](double fraction) {
+    pause();
+    const double psnr = heldout_psnr(*state, views, heldout, 4);
+    history.curve.push_back({watch.cpu_s, watch.wall_s, state->step, psnr, state->train_psnr,
+                             state->samples_per_ray});
+    if (measuring && options.keep_best && (state->best.empty() || psnr > state->best.psnr))
+      state->best = state->snapshot(psnr);
+    report_progress(fraction, watch.wall_s);
+    watch.go_on();
+    return psnr;
+  };
+
   report.stop = StopReason::iterations;
   const bool reached = options.target_psnr > 0 && !state->best.empty() && state->best.psnr >= options.target_psnr;
   if (reached) report.stop = StopReason::target_psnr;
@@ -251,6 +264,8 @@ Result<TrainReport> train(const Dataset& given, const TrainOptions& options,
     const double fraction = fraction_now();
     if (options.budget_s > 0 && watch.wall_now() >= options.budget_s) {
       report.stop = StopReason::budget;
+      // No step begins at the budget's very end, so that its last point is still to be measured.
+      if (state->step > 0 && (history.curve.empty() || history.curve.back().step != state->step)) evaluate(1);
       break;
     }
     if (progress.cancelled()) {
@@ -263,15 +278,8 @@ Result<TrainReport> train(const Dataset& given, const TrainOptions& options,
 
     const bool by_budget = options.budget_s > 0 && fraction >= next_eval_fraction;
     if (state->step % eval_every == 0 || by_budget || state->step == options.iterations) {
-      pause();
       while (fraction >= next_eval_fraction) next_eval_fraction += 1.0 / evaluations;
-      const double psnr = heldout_psnr(*state, views, heldout, 4);
-      history.curve.push_back({watch.cpu_s, watch.wall_s, state->step, psnr, state->train_psnr,
-                               state->samples_per_ray});
-      if (measuring && options.keep_best && (state->best.empty() || psnr > state->best.psnr))
-        state->best = state->snapshot(psnr);
-      report_progress(fraction, watch.wall_s);
-      watch.go_on();
+      const double psnr = evaluate(fraction);
       if (const auto stop = measuring ? reason_to_stop(options, state->best, psnr) : std::nullopt) {
         report.stop = *stop;
         break;

@@ -223,6 +223,7 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
   std::vector<double> support = best.support;
   std::vector<std::string> doubts(support.size());
   AlignmentReport report = best.report;
+  int undecided = 0;
   if (visible.renderer) {
     tell(3, "alignment with renders");
     OrbitViews views_of_orbit;
@@ -233,6 +234,9 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
       ORBITFUSE_TRY(pose_tracking(session, work, tracking, visible.renderer, views_of_orbit,
                                   rendered, progress));
     report.focal_px = rendered.focal_px;
+    undecided = rendered.undecided;
+    if (undecided > 0)
+      step.why += fmt::format("; {} views don't fit the others' temperatures: look at the rendered pairs", undecided);
     support.resize(rendered.views.size());
     doubts.resize(rendered.views.size());
     report.residual_px.resize(rendered.views.size());
@@ -297,6 +301,7 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
   }
   result.gates["posed_ratio"] = result.posed_ratio();
   result.gates["edge_agreement"] = typical;
+  result.gates["views_against_temperatures"] = undecided;
   result.gates["orbit_decisiveness"] = decisiveness;
   result.gates["focal_px"] = report.focal_px;
   result.gates["focal_sigma_percent"] = 100 * report.focal_relative_sigma;

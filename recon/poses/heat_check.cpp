@@ -130,14 +130,16 @@ Result<Fit> best_by_heat(const Refinery& painted, const std::vector<std::size_t>
 
 }  // namespace
 
-Result<int> correct_by_heat(const Refinery& refinery, Fit& alignment) {
+Result<HeatCheck> correct_by_heat(const Refinery& refinery, Fit& alignment) {
   const OrbitViews& orbit = refinery.orbit;
   ORBITFUSE_ASSIGN(const Contradicted found, contradicted(refinery, alignment));
   const std::vector<std::size_t>& lost = found.views;
   refinery.progress.report(
       {"poses.thermal", 3, 4, -1,
        fmt::format("{} views contradicted by the others' temperatures", lost.size())});
-  if (lost.empty() || 2 * lost.size() > alignment.views.size()) return 0;
+  HeatCheck check;
+  if (2 * lost.size() > alignment.views.size()) check.undecided = static_cast<int>(lost.size());
+  if (lost.empty() || check.undecided > 0) return check;
   std::vector<std::size_t> rest;
   for (std::size_t i = 0; i < alignment.views.size(); ++i)
     if (std::count(lost.begin(), lost.end(), i) == 0) rest.push_back(i);
@@ -146,31 +148,36 @@ Result<int> correct_by_heat(const Refinery& refinery, Fit& alignment) {
   std::vector<PosedView> places;
   for (const RenderAlignedView& v : by_heat.views) places.push_back(v.view);
   ORBITFUSE_ASSIGN(const Fit by_form, refinery.restart(lost, places, fine_rounds()));
-  int gone = 0;
   for (std::size_t c = 0; c < lost.size(); ++c) {
     const RenderAlignedView &form = by_form.views[c], &heat = by_heat.views[c];
     RenderAlignedView& view = alignment.views[lost[c]];
     const bool agree = same_place(orbit, form.view.cam_from_world, heat.view.cam_from_world);
     if (agree || heat.support() > settled_share * found.usual.at(orbit.stations[lost[c]].loop)) {
       // Temperatures know more edges: where they are sure, form alone doesn't pull a view away.
+      if (!agree) check.by_heat_alone.emplace_back(lost[c], heat.view.cam_from_world);
       view.view = agree ? form.view : heat.view;
-      ++gone;
+      ++check.moved;
     } else {
       view.doubt = fmt::format("the visible scene and the other views' temperatures place it {:.1f} deg apart",
                                apart_deg(orbit, view.view.cam_from_world, heat.view.cam_from_world));
     }
   }
-  return gone;
+  return check;
 }
 
 Status confirm_by_heat(const Refinery& refinery, std::size_t first_new, Fit& alignment) {
   const OrbitViews& orbit = refinery.orbit;
   std::vector<PosedView> settled;
+  std::vector<cv::Mat> images;
   std::vector<std::size_t> added;
-  for (std::size_t i = 0; i < first_new; ++i) settled.push_back(alignment.views[i].view);
+  for (std::size_t i = 0; i < first_new; ++i) {
+    if (!alignment.views[i].doubt.empty()) continue;
+    settled.push_back(alignment.views[i].view);
+    images.push_back(orbit.images[i]);
+  }
   for (std::size_t i = first_new; i < orbit.images.size(); ++i) added.push_back(i);
   ORBITFUSE_ASSIGN(const SceneRenderer renderer,
-                   painted_scene(refinery.renderer, settled, orbit.images, {}, refinery.progress));
+                   painted_scene(refinery.renderer, settled, images, {}, refinery.progress));
   const Refinery painted{renderer, orbit, refinery.progress};
   Usual usual;
   ORBITFUSE_ASSIGN(std::vector<std::size_t> lost,

@@ -18,9 +18,12 @@ std::optional<Camera> known_camera(const Session& session, const FrameRecord& fr
 }
 
 bool at_one_place(const Reconstruction& model) {
-  const Eigen::Vector3d first = camera_center(model.views.front().cam_from_world);
+  // Apart by no more than the rounding of what is stored, in a world however far from its origin.
+  const Rigid3d& first = model.views.front().cam_from_world;
   return std::all_of(model.views.begin(), model.views.end(), [&](const PosedView& view) {
-    return (camera_center(view.cam_from_world) - first).norm() <= 1e-9 * std::max(1e-9, first.norm());
+    const Rigid3d& cam = view.cam_from_world;
+    const double rounding = 1e-12 * std::max(cam.translation.norm(), first.translation.norm()) + 1e-12;
+    return (camera_center(cam) - camera_center(first)).norm() <= rounding;
   });
 }
 

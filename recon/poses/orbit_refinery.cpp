@@ -125,6 +125,7 @@ Status Refinery::together(Fit& alignment, double focal_relative_sigma,
                    align_with_renders(renderer, orbit.images, views, options, progress));
   for (std::size_t i = 0; i < views.size(); ++i)
     aligned.views[i].doubt = std::move(alignment.views[i].doubt);
+  aligned.undecided = alignment.undecided;
   alignment = std::move(aligned);
   return {};
 }

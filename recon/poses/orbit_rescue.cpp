@@ -110,9 +110,15 @@ Status refine_orbit(const SceneRenderer& renderer, const OrbitViews& orbit,
   ORBITFUSE_TRY(refinery.together(alignment, focal_relative_sigma, fine_rounds()));
   ORBITFUSE_TRY(nudge(refinery, 0, alignment));
   ORBITFUSE_TRY(refinery.together(alignment, focal_relative_sigma, {fine_rounds().back()}));
-  ORBITFUSE_ASSIGN(const int corrected, correct_by_heat(refinery, alignment));
-  if (corrected == 0) return {};
-  return refinery.together(alignment, focal_relative_sigma, {fine_rounds().back()});
+  ORBITFUSE_ASSIGN(const HeatCheck check, correct_by_heat(refinery, alignment));
+  alignment.undecided = check.undecided;
+  if (check.moved == 0) return {};
+  ORBITFUSE_TRY(refinery.together(alignment, focal_relative_sigma, {fine_rounds().back()}));
+  for (const auto& [i, cam_from_world] : check.by_heat_alone) {
+    Rigid3d& now = alignment.views[i].view.cam_from_world;
+    if (!same_place(orbit, now, cam_from_world)) now = cam_from_world;
+  }
+  return {};
 }
 
 double station_offset_deg(const OrbitViews& orbit, const RenderAlignment& alignment) {

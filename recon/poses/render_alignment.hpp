@@ -51,6 +51,8 @@ struct RenderAlignedView {
 struct RenderAlignment {
   std::vector<RenderAlignedView> views;
   double focal_px = 0, focal_relative_sigma = 0;
+  /// Views contradicted by the others' temperatures, where these are too many to tell who is right.
+  int undecided = 0;
   double mean_agreement() const;
 };
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "capture/frame_motion.hpp"
+#include "capture/frame_quality.hpp"
 #include "capture/guide/coverage.hpp"
 
 namespace orbitfuse {
@@ -103,6 +104,32 @@ TEST(EdgeBlur, NothingToSeeIsNoEdge) {
   EXPECT_EQ(measure_edge_blur(cv::Mat(0, 0, CV_32FC1)).edges, 0);
   for (std::uint64_t seed = 1; seed <= 5; ++seed)
     EXPECT_EQ(measure_edge_blur(noisy(constant, 10, seed)).edges, 0) << seed;
+}
+
+TEST(EdgeBlur, DeadPixelsOfAThermalImageAreNoEdges) {
+  cv::Mat blurred, image;
+  cv::GaussianBlur(noisy(squares(29500, 30100), 8), blurred, {}, 4.5);
+  blurred.convertTo(image, CV_16U);
+  const double before = measure_edges(image).sigma_px;
+  image(cv::Rect(60, 60, 10, 10)).setTo(0);
+  image(cv::Rect(200, 20, 1, 200)).setTo(0);
+  const EdgeBlur found = measure_edges(image);
+  EXPECT_GT(found.edges, 0);
+  EXPECT_NEAR(found.sigma_px, before, 0.1 * before);
+  EXPECT_GT(found.sigma_px, CoverageOptions{}.max_thermal_edge_px);
+  const cv::Mat none = cv::Mat::zeros(image.size(), CV_16U);
+  EXPECT_EQ(measure_edges(none).edges, 0);
+}
+
+TEST(FrameMotion, DeadPixelsDoNotHideTheMotion) {
+  cv::Mat a, b;
+  squares(29500, 30100).convertTo(a, CV_16U);
+  cv::Mat shifted(a.size(), CV_16U);
+  a(cv::Rect(0, 0, 312, 240)).copyTo(shifted(cv::Rect(8, 0, 312, 240)));
+  a(cv::Rect(0, 0, 8, 240)).copyTo(shifted(cv::Rect(0, 0, 8, 240)));
+  const double seen = apparent_motion(a, shifted);
+  for (cv::Mat* image : {&a, &shifted}) (*image)(cv::Rect(60, 60, 10, 10)).setTo(0);
+  EXPECT_NEAR(apparent_motion(a, shifted), seen, 0.2 * seen);
 }
 
 TEST(FrameMotion, TellsTheShift) {

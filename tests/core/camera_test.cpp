@@ -38,6 +38,25 @@ TEST(Camera, ValidateNamesTheField) {
   EXPECT_FALSE(c.validate("x"));
 }
 
+TEST(Camera, ImpossibleLensesAreRefusedAndCropsAreNot) {
+  Camera c = Camera::from_fov(640, 480, 60);
+  for (const double focal : {1e-3, 1.0, 1e6}) {
+    c.fx = focal;
+    const Status status = c.validate("x");
+    ASSERT_FALSE(status) << focal;
+    EXPECT_NE(status.error().message().find("640x480"), std::string::npos);
+  }
+  for (const double degrees : {1.0, 25.0, 150.0})
+    EXPECT_TRUE(Camera::from_fov(640, 480, degrees).validate("x")) << degrees;
+  c = Camera::from_fov(640, 480, 60);
+  c.cx = 1e5;
+  EXPECT_FALSE(c.validate("x"));
+  // A small window from the corner of a large sensor.
+  Camera corner = Camera::from_fov(4000, 3000, 60);
+  corner.width = 64, corner.height = 64;
+  EXPECT_TRUE(corner.validate("x"));
+}
+
 TEST(Camera, ScalingKeepsRays) {
   const Camera c = Camera::from_fov(800, 600, 58);
   const Camera half = c.scaled_to(400, 300);

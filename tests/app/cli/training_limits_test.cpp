@@ -14,7 +14,7 @@ TEST(Duration, IsReadInSeconds) {
     ASSERT_TRUE(read) << text;
     EXPECT_EQ(*read, seconds) << text;
   }
-  for (const char* text : {"", "0", "-3s", "2 m", "5x", "s", "1m1m", "1s1m", "nan", "inf", "1e400", "60 s"}) {
+  for (const char* text : {"", "0", "-3s", "2 m", "5x", "s", "1m1m", "1s1m", "nan", "inf", "1e400", "60 s", "1h30", "1m30"}) {
     const auto read = parse_duration(text);
     ASSERT_FALSE(read) << text;
     EXPECT_EQ(read.error().kind, ErrorKind::usage);

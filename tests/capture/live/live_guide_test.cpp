@@ -165,7 +165,7 @@ TEST_F(LiveGuideTest, ABlurredFirstFrameIsNoStation) {
   EXPECT_EQ(stands(blurred), Refusal::blurred);  // nothing sharper was ever seen
   cv::blur(sharp, blurred, {11, 1});             // shaken sideways: the level edges stay sharp
   EXPECT_EQ(stands(blurred), Refusal::blurred);
-  EXPECT_EQ(stands(cv::Mat(sharp.size(), CV_8UC1, cv::Scalar(90))), Refusal::blurred);  // constant
+  EXPECT_EQ(stands(cv::Mat(sharp.size(), CV_8UC1, cv::Scalar(90))), Refusal::featureless);
   EXPECT_EQ(guide.done_count(Modality::visible), 0);
   EXPECT_EQ(stands(sharp), Refusal::none);
   EXPECT_EQ(guide.done_count(Modality::visible), 1);
@@ -236,6 +236,16 @@ TEST_F(LiveGuideTest, SaysWhatToDoWithTheTableAndTheKey) {
   {
     LiveGuide guide(*writer, options);
     EXPECT_EQ(guide.cameras()[0].instruction, "go to azimuth 0°, 20° high, then press Enter");
+  }
+  {
+    // A loop above is nearer than the next station, but the next key records the next station.
+    LiveGuideOptions loops = options;
+    loops.plan.loop_elevations_deg = {20, 45};
+    LiveGuide guide(*writer, loops);
+    guide.operator_at_station();
+    film(guide, 15, 1);
+    EXPECT_EQ(guide.done_count(Modality::visible), 1);
+    EXPECT_EQ(guide.cameras()[0].instruction, "go to azimuth 30°, 20° high, then press Enter");
   }
   options.plan.loop_elevations_deg = {20, 50};
   options.turntable_step_deg = 30;

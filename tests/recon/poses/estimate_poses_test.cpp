@@ -101,5 +101,27 @@ TEST(EstimatePoses, KnownPosesReplaceTheStage) {
   EXPECT_EQ(poses->reconstruction.views[2].cam_from_world.translation.x(), 2.0);
 }
 
+TEST(EstimatePoses, KnownPosesAtOnePlaceAreRefusedHoweverTheyAreRounded) {
+  const test::TempFolder folder;
+  PoseOptions options;
+  options.colmap = "no-colmap-on-this-path";
+  for (const double offset : {0.0, 4e8}) {
+    for (const double apart : {0.0, 1e-16, 0.4}) {
+      Session session = session_of(folder.path(), 3);
+      for (std::size_t i = 0; i < 3; ++i) {
+        session.frames[i].camera = Camera::from_fov(160, 120, 60);
+        Rigid3d pose;
+        pose.translation.x() = offset + apart * static_cast<double>(i);
+        session.frames[i].cam_from_world = pose;
+      }
+      const auto poses = estimate_visible_poses(session, options, folder / "work", {});
+      EXPECT_EQ(poses.has_value(), apart > 0.1) << offset << " " << apart;
+      if (!poses) {
+        EXPECT_NE(poses.error().message().find("one place"), std::string::npos);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace orbitfuse
