@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
-#include "capture/image_noise.hpp"
-
 #include "capture/edge_blur.hpp"
+#include "capture/image_noise.hpp"
 #include "core/temperature.hpp"
 
 namespace orbitfuse {

@@ -9,18 +9,13 @@
 #include <variant>
 
 #include "capture/stream_account.hpp"
+#include "core/utc_now.hpp"
 
 namespace orbitfuse {
 namespace {
 
 namespace fs = std::filesystem;
 using Loss = StreamAccount::Loss;
-
-std::int64_t now_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 Status check_disk(const fs::path& folder, std::uint64_t min_free_bytes) {
   std::error_code error;
@@ -73,7 +68,7 @@ struct Recorder::Channel {
   /// Written by the writer thread: a slow disk must not hold up the capture thread.
   void log_event(const std::string& kind, const std::string& detail) {
     const std::lock_guard lock(mutex);
-    queue.push_back(EventRecord{device.id, now_ns(), kind, detail});
+    queue.push_back(EventRecord{device.id, utc_now_ns(), kind, detail});
     changed.notify_all();
   }
 

@@ -16,6 +16,7 @@
 #include "capture/frame_quality.hpp"
 #include "core/file_io.hpp"
 #include "core/image_codec.hpp"
+#include "core/utc_now.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -24,12 +25,6 @@ namespace fs = std::filesystem;
 
 std::string utc_now() {
   return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
-}
-
-std::int64_t now_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
 }
 
 std::string new_id() {
@@ -100,7 +95,7 @@ Result<std::unique_ptr<SessionWriter>> SessionWriter::resume(const fs::path& fol
   }
   session.frames.clear();
   writer->session_ = std::move(session);
-  ORBITFUSE_TRY(writer->append(EventRecord{"", now_ns(), "resumed", ""}));
+  ORBITFUSE_TRY(writer->append(EventRecord{"", utc_now_ns(), "resumed", ""}));
   return writer;
 }
 

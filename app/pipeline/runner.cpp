@@ -256,7 +256,7 @@ StageStatus Runner::execute(const Stage& stage, const Key& key, std::string why)
     ORBITFUSE_TRY(make_folder(folder));
     ORBITFUSE_TRY(write_attempt(attempt_path, attempt));
     StageContext given = context(folder, resume);
-    given.earlier_result = earlier_result(stage, key);
+    given.earlier_result = [&] { return earlier_result(stage, key); };
     return stage.run(given);
   };
   auto result = work();

@@ -55,8 +55,9 @@ struct StageContext {
   std::filesystem::path folder;  ///< the stage's own, private until it is done
   bool resume = false;           ///< `folder` holds an interrupted attempt with the same key
   Progress progress;
-  /// What other options made of the same inputs, for a stage that can go on from there. Not with --force.
-  std::optional<EarlierResult> earlier_result;
+  /// What other options made of the same inputs, for a stage that can go on from there. Not with
+  /// --force. Checked when it is asked for: reading all files of a result takes time.
+  std::function<std::optional<EarlierResult>()> earlier_result;
 
   std::set<std::string> finished;  ///< stages whose outputs belong to this run
   const std::vector<StageStatus>* earlier = nullptr;  ///< how the stages before fared

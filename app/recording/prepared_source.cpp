@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include "core/utc_now.hpp"
+
 namespace orbitfuse::recording {
 
 DeviceInfo PreparedSource::describe() const {
@@ -13,9 +15,7 @@ DeviceInfo PreparedSource::describe() const {
 
 Status PreparedSource::start() {
   if (started_) return {};
-  started_ns_ = std::chrono::duration_cast<std::chrono::nanoseconds>(
-                    std::chrono::system_clock::now().time_since_epoch())
-                    .count();
+  started_ns_ = utc_now_ns();
   ORBITFUSE_TRY(source_->start());
   started_ = true;
   return {};

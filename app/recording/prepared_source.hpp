@@ -29,8 +29,8 @@ class PreparedSource final : public FrameSource {
   }
 
   /// Cameras start one after the other, and the first one's queue fills meanwhile. Leaves out what
-  /// lies there from between its start and `all_run_ns` (UTC, by the frames' own times) and tells it by an event
-  /// "stale"; ids count from the first frame that is kept. Before the first next().
+  /// lies there from between its start and `all_run_ns` (UTC, by the frames' own times) and tells it
+  /// by an event "stale"; ids count from the first frame that is kept. Before the first next().
   void drop_before(std::int64_t all_run_ns);
   /// The session's name for the device, its first id, and whether frames are tracking frames until
   /// the guide chooses them. Before the first next().

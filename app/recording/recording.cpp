@@ -8,6 +8,8 @@
 #include <set>
 #include <thread>
 
+#include "core/utc_now.hpp"
+
 namespace orbitfuse::recording {
 namespace {
 
@@ -26,12 +28,6 @@ std::uint64_t next_id(const Session& session, const std::string& device) {
     if (stream.device == device) next = std::max(next, stream.last_sequence + 1);
   }
   return next;
-}
-
-std::int64_t utc_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
 }
 
 bool same_camera(const DeviceInfo& known, const DeviceInfo& now) {
@@ -103,7 +99,7 @@ Status Recording::prepare() {
     ORBITFUSE_ASSIGN(earlier, open_session(options_.session));
   }
   for (const auto& source : sources_) ORBITFUSE_TRY(source->start());
-  const std::int64_t all_run_ns = utc_ns();
+  const std::int64_t all_run_ns = utc_now_ns();
   ORBITFUSE_TRY(fit_into(earlier));
   if (options_.resume) {
     ORBITFUSE_ASSIGN(writer_, SessionWriter::resume(options_.session));

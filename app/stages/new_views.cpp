@@ -8,17 +8,14 @@
 
 #include <fmt/format.h>
 
+#include "core/median.hpp"
+
 namespace orbitfuse::stages {
 namespace {
 
 constexpr double deg = std::numbers::pi / 180;
 /// Below this share of the circle a full orbit would show sides that no camera saw.
 constexpr double orbit_span_deg = 270;
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<long>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
 
 Eigen::Vector3d axis(const PosedView& view, int row) {
   return view.cam_from_world.rotation.conjugate() * Eigen::Vector3d::Unit(row);

@@ -55,14 +55,14 @@ json metrics_json(const nerf::TrainReport& report) {
           {"skipped_steps", report.skipped_steps},
           {"rays", report.rays},
           {"samples", report.samples},
-          {"samples_per_ray",
-           report.rays > 0 ? static_cast<double>(report.samples) / static_cast<double>(report.rays) : 0.0}};
+          {"samples_per_ray", report.samples_per_ray()}};
 }
 
 Result<int> extend_training(const pipeline::StageContext& context, const json& options,
                             const std::filesystem::path& checkpoint) {
-  if (!context.earlier_result) return 0;
-  const auto& [folder, then, done] = *context.earlier_result;
+  const auto earlier = context.earlier_result();
+  if (!earlier) return 0;
+  const auto& [folder, then, done] = *earlier;
   if (!only_longer(then, options, done)) return 0;
   auto field = nerf::Field::load(folder / field_file);
   if (!field) return 0;  // of another version

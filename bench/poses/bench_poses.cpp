@@ -2,7 +2,6 @@
 // bench_poses SCENE [WORKDIR [--visible-truth]]: runs the pose ladder on a shared scene and prints success and
 // error against run time per rung. Scenes: container, tracking, fox, metu_cloudy_scene_7,
 // metu_sunny_scene_7, arco, car (the session recorded in replay_data).
-#include <sys/resource.h>
 
 #include <cstdio>
 #include <fmt/format.h>
@@ -15,17 +14,6 @@
 namespace {
 
 using namespace orbitfuse;
-
-double cpu_seconds() {
-  double total = 0;
-  for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
-    rusage usage{};
-    getrusage(who, &usage);
-    total += static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
-             1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
-  }
-  return total;
-}
 
 void print(const ModalityPoses& poses, const Reconstruction& anchor, const bench::Truth& truth,
            double cpu_s) {
@@ -75,7 +63,7 @@ int main(int argc, char** argv) {
 
   const PoseOptions options;
   Progress progress;
-  double start = cpu_seconds();
+  double start = bench::cpu_seconds();
   const bool from_truth = argc > 3 && std::string(argv[3]) == "--visible-truth";
   Result<ModalityPoses> visible = ModalityPoses{};
   if (from_truth) {
@@ -87,20 +75,20 @@ int main(int argc, char** argv) {
   fmt::print("visible\n");
   VisibleScene seen;
   if (visible) {
-    print(*visible, visible->reconstruction, scene.truth, cpu_seconds() - start);
+    print(*visible, visible->reconstruction, scene.truth, bench::cpu_seconds() - start);
     seen.reconstruction = visible->reconstruction;
   } else {
     fmt::print("  {}\n", visible.error().message());
   }
   if (scene.session.frames_of(Modality::thermal).empty()) return 0;
-  start = cpu_seconds();
+  start = bench::cpu_seconds();
   const auto thermal = estimate_thermal_poses(scene.session, visible ? &seen : nullptr, options,
                                               workdir, progress);
   fmt::print("thermal\n");
   if (thermal) {
     print(*thermal,
           thermal->shares_visible_frame ? seen.reconstruction : thermal->reconstruction,
-          scene.truth, cpu_seconds() - start);
+          scene.truth, bench::cpu_seconds() - start);
   } else {
     fmt::print("  {}\n", thermal.error().message());
   }

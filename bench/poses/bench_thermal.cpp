@@ -7,7 +7,6 @@
 // the thermal focal length known 3 % too long, --views prints each view, --rungs sets what COLMAP,
 // the scene's lines and its renders give alone beside each other, with their time.
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <chrono>
 #include <cstdio>
@@ -29,18 +28,6 @@ namespace {
 
 using namespace orbitfuse;
 namespace fs = std::filesystem;
-
-/// Of this program and of COLMAP, which it starts.
-double cpu_seconds() {
-  double sum = 0;
-  for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
-    rusage usage{};
-    getrusage(who, &usage);
-    sum += static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
-           1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
-  }
-  return sum;
-}
 
 struct Arguments {
   fs::path session, run, truth, tracking;
@@ -84,10 +71,10 @@ Result<SceneView> rendered(const nerf::Field& field, const Camera& camera,
 /// One rung of the ladder alone: its success and error against its time.
 void print_rung(const char* name, const bench::Scene& scene, const VisibleScene* seen,
                 const PoseOptions& options) {
-  const double before = cpu_seconds();
+  const double before = bench::cpu_seconds();
   const auto poses = estimate_thermal_poses(
       scene.session, seen, options, fs::temp_directory_path() / "orbitfuse_bench_rung", {});
-  const double spent = cpu_seconds() - before;
+  const double spent = bench::cpu_seconds() - before;
   if (!poses) {
     fmt::print("| {} | none: {} | | | {:.0f} |\n", name, poses.error().found.substr(0, 120), spent);
     return;
@@ -123,16 +110,16 @@ Status run(const Arguments& arguments) {
   double rendering_s = 0;
   int renders = 0;
   VisibleScene seen{std::move(visible), [&](const Camera& camera, const Rigid3d& pose) {
-                      const double before = cpu_seconds();
+                      const double before = bench::cpu_seconds();
                       auto view = rendered(field, camera, pose, progress);
-                      rendering_s += cpu_seconds() - before, ++renders;
+                      rendering_s += bench::cpu_seconds() - before, ++renders;
                       return view;
                     }};
   fmt::print("{}; {} threads\n", cpu_description(), thread_count());
-  const double before = cpu_seconds();
+  const double before = bench::cpu_seconds();
   if (arguments.views)
     progress.report = [&](const ProgressEvent& e) {
-      fmt::print("after {:.1f} CPU s: {}\n", cpu_seconds() - before, e.detail);
+      fmt::print("after {:.1f} CPU s: {}\n", bench::cpu_seconds() - before, e.detail);
     };
   const auto start = std::chrono::steady_clock::now();
   PoseOptions options;
@@ -152,7 +139,7 @@ Status run(const Arguments& arguments) {
   for (const DroppedView& view : poses.dropped) fmt::print("dropped {}: {}\n", view.name, view.why);
   for (const auto& [gate, value] : poses.gates) fmt::print("{} = {:.4g}\n", gate, value);
   fmt::print("{}/{} posed, {:.1f} s, {:.1f} CPU s, {:.1f} of them in {} renders\n",
-             poses.reconstruction.views.size(), poses.frame_count, wall, cpu_seconds() - before,
+             poses.reconstruction.views.size(), poses.frame_count, wall, bench::cpu_seconds() - before,
              rendering_s, renders);
   const bench::PoseError error = bench::pose_error(
       poses.reconstruction, poses.shares_visible_frame ? seen.reconstruction : poses.reconstruction,

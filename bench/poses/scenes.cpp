@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bench/poses/scenes.hpp"
 
+#include <sys/resource.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -56,6 +58,17 @@ json load(const fs::path& file) {
 }
 
 }  // namespace
+
+double cpu_seconds() {
+  double sum = 0;
+  for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
+    rusage usage{};
+    getrusage(who, &usage);
+    sum += static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+           1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+  }
+  return sum;
+}
 
 std::optional<fs::path> shared_data() {
   const char* named = std::getenv("ORBITFUSE_SHARED");

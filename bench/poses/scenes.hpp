@@ -42,6 +42,9 @@ Scene session_scene(const std::filesystem::path& folder);
 /// Folders visible/ and thermal/ of images without anything known; 8-bit or raw thermal.
 Scene folder_scene(const std::filesystem::path& folder);
 
+/// CPU seconds spent so far by this program and by COLMAP, which it starts.
+double cpu_seconds();
+
 /// An imported or recorded session; truth by the name of each frame's source.
 Result<Scene> run_scene(const std::filesystem::path& session, const std::filesystem::path& truth);
 /// Thermal frames recorded between the stations, in their order, without stations of their own.

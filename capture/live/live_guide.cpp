@@ -13,6 +13,7 @@
 #include "core/exif.hpp"
 #include "core/file_io.hpp"
 #include "core/image_codec.hpp"
+#include "core/utc_now.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -186,11 +187,7 @@ void LiveGuide::judge_between_neighbours(Camera& camera, const FrameRecord& fram
 void LiveGuide::operator_at_station(std::int64_t time_ns) {
   const std::lock_guard lock(mutex_);
   const bool turned = options_.turntable_step_deg != 0;
-  if (time_ns == 0) {
-    time_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
-                  std::chrono::system_clock::now().time_since_epoch())
-                  .count();
-  }
+  if (time_ns == 0) time_ns = utc_now_ns();
   const int key = turned ? table_.key(time_ns) : 0;
   for (auto& [modality, camera] : cameras_) {
     if (turned && camera.table.counts_photos) continue;  // its photos tell, and may come late

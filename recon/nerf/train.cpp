@@ -84,32 +84,6 @@ Status inherit_geometry(const FieldState& guide, FieldState& state) {
   return {};
 }
 
-}  // namespace
-
-const char* name(StopReason reason) {
-  switch (reason) {
-    case StopReason::iterations: return "iterations";
-    case StopReason::budget: return "budget";
-    case StopReason::target_psnr: return "target PSNR";
-    case StopReason::plateau: return "plateau";
-    case StopReason::cancelled: return "cancelled";
-  }
-  return "";
-}
-
-std::string TrainReport::brief() const {
-  std::string text = fmt::format("{} steps, {:.1f} CPU s", iterations, cpu_s);
-  if (std::isfinite(best_psnr))
-    text += fmt::format(", held-out {:.2f} dB (step {})", best_psnr, best_step);
-  text += fmt::format(", {:.1f} samples a ray, stopped by {}",
-                      rays > 0 ? static_cast<double>(samples) / static_cast<double>(rays) : 0.0,
-                      name(stop));
-  if (skipped_steps > 0) text += fmt::format(", {} steps skipped (not finite)", skipped_steps);
-  return text;
-}
-
-namespace {
-
 /// Thermal views of which more than half is no temperature: a broken transfer, a shutter in the way.
 std::vector<bool> broken_views(const Dataset& dataset, TrainReport& report) {
   std::vector<bool> broken(dataset.views.size(), false);
@@ -135,6 +109,7 @@ std::vector<bool> broken_views(const Dataset& dataset, TrainReport& report) {
                             "they neither train nor measure"});
   return broken;
 }
+
 /// Whether held-out views at `psnr` end the run.
 std::optional<StopReason> reason_to_stop(const TrainOptions& options, const Snapshot& best, double psnr) {
   if (options.target_psnr > 0 && psnr >= options.target_psnr) return StopReason::target_psnr;
@@ -153,6 +128,28 @@ std::string errors_of(const FieldState& state) {
 }
 
 }  // namespace
+
+const char* name(StopReason reason) {
+  switch (reason) {
+    case StopReason::iterations: return "iterations";
+    case StopReason::budget: return "budget";
+    case StopReason::target_psnr: return "target PSNR";
+    case StopReason::plateau: return "plateau";
+    case StopReason::cancelled: return "cancelled";
+  }
+  return "";
+}
+
+std::string TrainReport::brief() const {
+  std::string text = fmt::format("{} steps, {:.1f} CPU s", iterations, cpu_s);
+  if (std::isfinite(best_psnr))
+    text += fmt::format(", held-out {:.2f} dB (step {})", best_psnr, best_step);
+  text += fmt::format(", {:.1f} samples a ray, stopped by {}",
+                      samples_per_ray(),
+                      name(stop));
+  if (skipped_steps > 0) text += fmt::format(", {} steps skipped (not finite)", skipped_steps);
+  return text;
+}
 
 Result<TrainReport> train(const Dataset& given, const TrainOptions& options,
                           const Progress& progress, Field& out, const Field* guide) {

@@ -81,12 +81,8 @@ Result<RenderAlignment> refined_by_renders(const OrbitWork& work,
     best = std::move(one);
     orbit.clockwise = aligned[i].hypothesis.mirrored;
   }
-  {
-    std::vector<PosedView> views;
-    for (const RenderAlignedView& v : best.views) views.push_back(v.view);
-    options.rounds = {coarse_rounds().back()};
-    ORBITFUSE_ASSIGN(best, align_with_renders(renderer, work.images, views, options, progress));
-  }
+  options.rounds = {coarse_rounds().back()};
+  ORBITFUSE_ASSIGN(best, align_with_renders(renderer, work.images, best.poses(), options, progress));
   ORBITFUSE_TRY(refine_orbit(renderer, orbit, best, options.focal_relative_sigma, progress));
   return best;
 }

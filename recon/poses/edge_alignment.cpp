@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/median.hpp"
 #include "core/parallel.hpp"
 #include "recon/poses/projection.hpp"
 
@@ -94,13 +95,6 @@ std::vector<EdgeMatch> matches_of(const LineModel& lines, const AlignmentView& v
     matches.push_back(match);
   }
   return matches;
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <map>
 #include <numeric>
 
+#include "core/median.hpp"
 #include "recon/poses/painted_scene.hpp"
 
 namespace orbitfuse {
@@ -40,7 +41,7 @@ Usual usual_support(const OrbitViews& orbit, const std::vector<std::size_t>& ask
   for (std::size_t c = 0; c < asked.size(); ++c)
     supports[orbit.stations[asked[c]].loop].push_back(found.views[c].support());
   Usual usual;
-  for (const auto& [loop, values] : supports) usual[loop] = median_of(values);
+  for (const auto& [loop, values] : supports) usual[loop] = median(values);
   return usual;
 }
 
@@ -78,11 +79,11 @@ Result<std::vector<std::size_t>> unconfirmed(const Refinery& visible, const Refi
   return still;
 }
 
-/// The scene that the chosen views paint, for judging them: none paints for itself.
+/// The scene that the chosen views paint, for views that are turned by `min_turn_deg` or more.
 Result<SceneRenderer> painted_by(const Refinery& refinery, const Fit& alignment,
-                                 const std::vector<std::size_t>& chosen) {
+                                 const std::vector<std::size_t>& chosen, double min_turn_deg) {
   PaintedSceneOptions painting;
-  painting.min_turn_deg = own_turn_deg;
+  painting.min_turn_deg = min_turn_deg;
   std::vector<PosedView> painters;
   std::vector<cv::Mat> images;
   for (const std::size_t i : chosen) {
@@ -101,9 +102,8 @@ Result<Contradicted> contradicted(const Refinery& refinery, const Fit& alignment
   const OrbitViews& orbit = refinery.orbit;
   std::vector<std::size_t> all(alignment.views.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
-  std::vector<PosedView> places;
-  for (const RenderAlignedView& v : alignment.views) places.push_back(v.view);
-  ORBITFUSE_ASSIGN(const SceneRenderer renderer, painted_by(refinery, alignment, all));
+  const std::vector<PosedView> places = alignment.poses();
+  ORBITFUSE_ASSIGN(const SceneRenderer renderer, painted_by(refinery, alignment, all, own_turn_deg));
   const Refinery painted{renderer, orbit, refinery.progress};
   ORBITFUSE_ASSIGN(const Fit second, painted.restart(all, places, judging_rounds()));
   Contradicted lost{{}, usual_support(orbit, all, second)};
@@ -143,11 +143,9 @@ Result<HeatCheck> correct_by_heat(const Refinery& refinery, Fit& alignment) {
   std::vector<std::size_t> rest;
   for (std::size_t i = 0; i < alignment.views.size(); ++i)
     if (std::count(lost.begin(), lost.end(), i) == 0) rest.push_back(i);
-  ORBITFUSE_ASSIGN(const SceneRenderer renderer, painted_by(refinery, alignment, rest));
+  ORBITFUSE_ASSIGN(const SceneRenderer renderer, painted_by(refinery, alignment, rest, own_turn_deg));
   ORBITFUSE_ASSIGN(const Fit by_heat, best_by_heat({renderer, orbit, refinery.progress}, lost, alignment));
-  std::vector<PosedView> places;
-  for (const RenderAlignedView& v : by_heat.views) places.push_back(v.view);
-  ORBITFUSE_ASSIGN(const Fit by_form, refinery.restart(lost, places, fine_rounds()));
+  ORBITFUSE_ASSIGN(const Fit by_form, refinery.restart(lost, by_heat.poses(), fine_rounds()));
   for (std::size_t c = 0; c < lost.size(); ++c) {
     const RenderAlignedView &form = by_form.views[c], &heat = by_heat.views[c];
     RenderAlignedView& view = alignment.views[lost[c]];
@@ -167,17 +165,11 @@ Result<HeatCheck> correct_by_heat(const Refinery& refinery, Fit& alignment) {
 
 Status confirm_by_heat(const Refinery& refinery, std::size_t first_new, Fit& alignment) {
   const OrbitViews& orbit = refinery.orbit;
-  std::vector<PosedView> settled;
-  std::vector<cv::Mat> images;
-  std::vector<std::size_t> added;
-  for (std::size_t i = 0; i < first_new; ++i) {
-    if (!alignment.views[i].doubt.empty()) continue;
-    settled.push_back(alignment.views[i].view);
-    images.push_back(orbit.images[i]);
-  }
+  std::vector<std::size_t> settled, added;
+  for (std::size_t i = 0; i < first_new; ++i)
+    if (alignment.views[i].doubt.empty()) settled.push_back(i);
   for (std::size_t i = first_new; i < orbit.images.size(); ++i) added.push_back(i);
-  ORBITFUSE_ASSIGN(const SceneRenderer renderer,
-                   painted_scene(refinery.renderer, settled, images, {}, refinery.progress));
+  ORBITFUSE_ASSIGN(const SceneRenderer renderer, painted_by(refinery, alignment, settled, 0));
   const Refinery painted{renderer, orbit, refinery.progress};
   Usual usual;
   ORBITFUSE_ASSIGN(std::vector<std::size_t> lost,

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <utility>
+#include <vector>
+
 #include "recon/poses/orbit_refinery.hpp"
 
 // A second opinion on thermal poses: what other thermal views measured, painted on the visible
@@ -9,16 +12,17 @@
 // renderer's, cancelled.
 namespace orbitfuse {
 
-/// Each view judged by the temperatures of the others. Those that they contradict are searched as
-/// wholes in the scene that the rest paints, and go where both scenes then agree or temperatures
-/// are sure; the others keep a `doubt`. Where most are contradicted nobody is left to judge, and
-/// none goes.
 struct HeatCheck {
   int moved = 0;
   int undecided = 0;  ///< contradicted, where that were most of the views
   /// Views that form would pull away from where temperatures are sure they are.
   std::vector<std::pair<std::size_t, Rigid3d>> by_heat_alone;
 };
+
+/// Each view judged by the temperatures of the others. Those that they contradict are searched as
+/// wholes in the scene that the rest paints, and go where both scenes then agree or temperatures
+/// are sure; the others keep a `doubt`. Where most are contradicted nobody is left to judge, and
+/// none goes.
 Result<HeatCheck> correct_by_heat(const Refinery& refinery, Fit& alignment);
 
 /// Every added view, from `first_new` on, confirmed by what the settled ones before it measured;

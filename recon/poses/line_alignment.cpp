@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/median.hpp"
 #include "core/parallel.hpp"
 
 namespace orbitfuse {
@@ -53,12 +54,6 @@ Refined refined(const OrbitWork& work, const Scales& fields, const std::vector<O
     if (score > best.score) best = {pose, score};
   }
   return best;
-}
-
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 std::vector<OrbitPose> poses_of(const std::vector<Refined>& found) {
@@ -137,10 +132,10 @@ OrbitPrior loop_prior(const OrbitWork& work, const std::vector<OrbitPose>& poses
   }
   OrbitPrior prior;
   prior.weight = 0.005;
-  prior.pose.azimuth_deg = nominal(view) + median_of(turn);
-  prior.pose.elevation_deg = median_of(elevation);
-  prior.pose.radius = median_of(radius);
-  prior.pose.shift_y_px = median_of(shift);
+  prior.pose.azimuth_deg = nominal(view) + median(turn);
+  prior.pose.elevation_deg = median(elevation);
+  prior.pose.radius = median(radius);
+  prior.pose.shift_y_px = median(shift);
   return prior;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/median.hpp"
 #include "recon/poses/whole_view.hpp"
 #include "recon/poses/world_frame.hpp"
 
@@ -45,12 +46,6 @@ std::size_t lender(const OrbitViews& orbit, const RenderAlignment& alignment, st
 
 }  // namespace
 
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 LoopModel loop_model(const OrbitViews& orbit, const RenderAlignment& alignment) {
   std::map<int, std::vector<std::size_t>> loops;
   for (std::size_t i = 0; i < orbit.stations.size(); ++i)
@@ -71,10 +66,10 @@ LoopModel loop_model(const OrbitViews& orbit, const RenderAlignment& alignment) 
       sines.push_back(std::sin(turn));
       cosines.push_back(std::cos(turn));
     }
-    model.elevation_deg[loop] = median_of(elevations);
-    model.radius[loop] = median_of(radii);
+    model.elevation_deg[loop] = median(elevations);
+    model.radius[loop] = median(radii);
   }
-  if (!sines.empty()) model.offset_deg = std::atan2(median_of(sines), median_of(cosines)) / degree;
+  if (!sines.empty()) model.offset_deg = std::atan2(median(sines), median(cosines)) / degree;
   return model;
 }
 
@@ -116,14 +111,12 @@ Result<Fit> Refinery::restart(const std::vector<std::size_t>& chosen,
 
 Status Refinery::together(Fit& alignment, double focal_relative_sigma,
                           std::vector<RenderRound> rounds) const {
-  std::vector<PosedView> views;
-  for (const RenderAlignedView& v : alignment.views) views.push_back(v.view);
   RenderAlignmentOptions options;
   options.focal_relative_sigma = focal_relative_sigma;
   options.rounds = std::move(rounds);
   ORBITFUSE_ASSIGN(Fit aligned,
-                   align_with_renders(renderer, orbit.images, views, options, progress));
-  for (std::size_t i = 0; i < views.size(); ++i)
+                   align_with_renders(renderer, orbit.images, alignment.poses(), options, progress));
+  for (std::size_t i = 0; i < aligned.views.size(); ++i)
     aligned.views[i].doubt = std::move(alignment.views[i].doubt);
   aligned.undecided = alignment.undecided;
   alignment = std::move(aligned);

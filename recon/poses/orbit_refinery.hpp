@@ -35,9 +35,6 @@ double apart_deg(const OrbitViews& orbit, const Rigid3d& a, const Rigid3d& b);
 /// Within a degree: a restart that ends there confirms the view's pose.
 bool same_place(const OrbitViews& orbit, const Rigid3d& a, const Rigid3d& b);
 
-/// Not of an empty set.
-double median_of(std::vector<double> values);
-
 /// Restarts of views of one orbit in one scene. Errors: the renderer's, cancelled.
 struct Refinery {
   const SceneRenderer& renderer;

@@ -5,6 +5,7 @@
 
 #include <numeric>
 
+#include "core/median.hpp"
 #include "recon/poses/heat_check.hpp"
 #include "recon/poses/whole_view.hpp"
 
@@ -20,7 +21,7 @@ constexpr double lost_share = 0.6;
 double median_support(const Fit& alignment, std::size_t count) {
   std::vector<double> supports;
   for (std::size_t i = 0; i < count; ++i) supports.push_back(alignment.views[i].support());
-  return median_of(supports);
+  return median(supports);
 }
 
 /// Takes what is supported better; returns those views.

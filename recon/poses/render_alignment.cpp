@@ -117,6 +117,12 @@ double RenderAlignment::mean_agreement() const {
   return views.empty() ? 0 : sum / static_cast<double>(views.size());
 }
 
+std::vector<PosedView> RenderAlignment::poses() const {
+  std::vector<PosedView> poses;
+  for (const RenderAlignedView& v : views) poses.push_back(v.view);
+  return poses;
+}
+
 Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer,
                                            const std::vector<cv::Mat>& images,
                                            const std::vector<PosedView>& views,

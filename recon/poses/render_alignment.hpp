@@ -54,6 +54,7 @@ struct RenderAlignment {
   /// Views contradicted by the others' temperatures, where these are too many to tell who is right.
   int undecided = 0;
   double mean_agreement() const;
+  std::vector<PosedView> poses() const;
 };
 
 /// Refines `views` (images: CV_32FC1 of the cameras' size). Errors: the renderer's, cancelled.

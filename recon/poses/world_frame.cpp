@@ -7,17 +7,12 @@
 #include <limits>
 #include <map>
 
+#include "core/median.hpp"
+
 namespace orbitfuse {
 namespace {
 
 constexpr double degrees = 180.0 / 3.14159265358979323846;
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Of a station's azimuth, where its origin alone is unknown.
 constexpr double nominal_sigma_deg = 8;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/median.hpp"
 #include "recon/registration/kd_tree.hpp"
 
 namespace orbitfuse::registration {
@@ -120,12 +121,6 @@ Split otsu(std::vector<double> sorted) {
   split.step = far_mean - near_mean;
   split.separation = split.step / std::sqrt(near_variance + far_variance + 1e-6);
   return split;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace

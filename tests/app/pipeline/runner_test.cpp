@@ -205,7 +205,7 @@ TEST(Runner, AStageSeesWhatOtherOptionsMadeOfTheSameInputs) {
   const auto run = [&](bool force = false) {
     Stage stage{.name = "long", .options = {{"x", option}}, .inputs_hash = session};
     stage.run = [&](const StageContext& context) -> Result<StageOutput> {
-      seen = context.earlier_result;
+      seen = context.earlier_result();
       ORBITFUSE_TRY(write_file_atomic(context.folder / "result", std::to_string(option)));
       return StageOutput{.metrics = {{"made", option}}, .skips = {}, .warnings = {}};
     };

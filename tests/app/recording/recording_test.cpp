@@ -7,6 +7,7 @@
 
 #include "app/recording/rehearsal.hpp"
 #include "core/image_codec.hpp"
+#include "core/utc_now.hpp"
 #include "drivers/stills/watch_source.hpp"
 #include "tests/capture/scripted_source.hpp"
 #include "tests/core/temp_folder.hpp"
@@ -57,9 +58,7 @@ class QueueingSource final : public ScriptedSource {
  public:
   using ScriptedSource::ScriptedSource;
   Status start() override {
-    started_ns_ = std::chrono::duration_cast<std::chrono::nanoseconds>(
-                      std::chrono::system_clock::now().time_since_epoch())
-                      .count();
+    started_ns_ = utc_now_ns();
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
     return {};
   }
