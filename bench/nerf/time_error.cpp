@@ -6,7 +6,9 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <ctime>
+#include <opencv2/core.hpp>
 
 #include "bench/nerf/experiment.hpp"
 #include "bench/nerf/scenes.hpp"
@@ -21,6 +23,7 @@ struct Arguments {
   std::string scene = "fox", preset, data = "../shared/data/orbits", model, images, field, guide, out;
   std::vector<std::string> set;
   int threads = 0;
+  double exposure = 0;
   bool quick = false, depth = false, train = true;
   depth::DepthOptions depth_options;
 };
@@ -30,6 +33,7 @@ void print_curve(const nerf::TrainReport& report) {
     fmt::print("step {:5d}  cpu {:7.1f} s  wall {:7.1f} s  test {:6.2f} dB  train {:6.2f} dB  {:6.1f} samples/ray\n",
                p.step, p.cpu_s, p.wall_s, p.heldout_psnr, p.train_psnr, p.samples_per_ray);
   fmt::print("{}; {:.3f} us a sample\n", report.brief(), 1e6 * report.cpu_s / static_cast<double>(report.samples));
+  if (!report.image_gains.empty()) fmt::print("exposure of the views: {:.3f}\n", fmt::join(report.image_gains, " "));
   for (const auto& skip : report.skips) fmt::print("skip {}: {}\n", skip.what, skip.why);
 }
 
@@ -47,6 +51,20 @@ Status time_render(const nerf::Field& field, const nerf::Dataset& data) {
   return {};
 }
 
+/// Training views as a camera on automatic would have stored them: each channel of each view times a
+/// gain, clipped.
+void vary_exposure(nerf::Dataset& data, double log_sigma) {
+  cv::RNG random(7);
+  for (nerf::TrainingView& view : data.views) {
+    if (view.measure_only) continue;
+    const double common = random.gaussian(log_sigma);
+    cv::Scalar gain;
+    for (int c = 0; c < 3; ++c) gain[c] = std::exp(common + random.gaussian(log_sigma / 4));
+    cv::multiply(view.image, gain, view.image);
+    view.image = cv::min(view.image, 1.0);
+  }
+}
+
 Status run(const Arguments& a) {
   set_thread_count(a.threads);
   ORBITFUSE_ASSIGN(nerf::Dataset data, bench::load_scene(a.scene, a.data, a.model));
@@ -59,6 +77,7 @@ Status run(const Arguments& a) {
     ORBITFUSE_TRY(options.set(assignment.substr(0, at), assignment.substr(at + 1)));
   }
   fmt::print("{}, {} threads, {}, {}\n", cpu_description(), thread_count(), name(best_isa()), a.scene);
+  if (a.exposure > 0) vary_exposure(data, a.exposure);
   bench::Run result{options.preset, 0, {}};
   if (a.depth) {
     ORBITFUSE_ASSIGN(result.before_cpu_s, bench::add_depth(data, a.depth_options));
@@ -102,6 +121,7 @@ int main(int argc, char** argv) {
   app.add_option("--depth-neighbours", a.depth_options.neighbours);
   app.add_option("--depth-best", a.depth_options.best_neighbours);
   app.add_option("--guide", a.guide, "field whose geometry this one starts from");
+  app.add_option("--vary-exposure", a.exposure, "gains of the training views: sigma of their logarithm");
   app.add_flag("--quick", a.quick, "no full-resolution evaluation");
   app.add_option("--threads", a.threads);
   app.add_option("--set", a.set, "training option key=value");

@@ -26,6 +26,7 @@ struct TrainReport : History {
   double best_psnr = 0;      ///< held-out, dB; NaN without held-out views
   std::vector<std::string> heldout;  ///< names of the views that measured
   std::vector<double> image_offsets_k;  ///< per view that was not dropped (per_image_offset)
+  std::vector<double> image_gains;  ///< per view, mean of its channels' against the common exposure (even_exposure)
   std::vector<Skip> skips;
   std::vector<std::string> warnings;  ///< views that were dropped, a target that was missed
 

@@ -73,6 +73,7 @@ const std::vector<Entry>& table() {
       FIELD(carve, never),
       FIELD(level_anneal_end, never, 0, 1),
       FIELD(per_image_offset, never),
+      FIELD(even_exposure, never),
       FIELD(shared_geometry, never),
   };
   return entries;
@@ -224,6 +225,7 @@ Result<TrainOptions> preset(const std::string& name) {
   o.learning_rate = o.network_learning_rate = 1e-2;
   o.distortion_weight = 0.002;
   o.depth_weight = 0;
+  o.even_exposure = false;
   o.carve = false;
   o.min_views = 0;
   if (name == "nerfacto") return o;

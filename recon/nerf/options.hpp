@@ -71,6 +71,9 @@ struct TrainOptions {
   bool carve = true;                 ///< cells in front of known depth start empty
   double level_anneal_end = 0;       ///< fraction of the run by which the finest level is on; 0 = off
   bool per_image_offset = false;     ///< thermal drift: one offset per frame, mean zero
+  /// Visible views of a camera on automatic are brought to one exposure first, where points that several
+  /// see say that it varied (exposure.hpp).
+  bool even_exposure = true;
   bool shared_geometry = false;      ///< start from the guide field's density (train()'s argument)
 
   Status validate() const;

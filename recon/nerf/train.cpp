@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "recon/nerf/checkpoint.hpp"
+#include "recon/nerf/exposure.hpp"
 #include "recon/nerf/nerf.hpp"
 #include "recon/nerf/render.hpp"
 #include "recon/nerf/trainer.hpp"
@@ -110,6 +111,16 @@ std::vector<bool> broken_views(const Dataset& dataset, TrainReport& report) {
   return broken;
 }
 
+void report_exposure(const Exposure& exposure, TrainReport& report) {
+  if (exposure.points == 0)
+    report.skips.push_back({"even exposure", "no point is known to be seen by two views", "images are used as they are"});
+  else if (!exposure.varies())
+    report.skips.push_back({"even exposure", fmt::format("views agree within {:.1f} % on {} points", 100 * exposure.spread,
+                                                         exposure.points), "images are used as they are"});
+  else
+    for (const Eigen::Array3d& gain : exposure.log_gain) report.image_gains.push_back(std::exp(gain.mean()));
+}
+
 /// Whether held-out views at `psnr` end the run.
 std::optional<StopReason> reason_to_stop(const TrainOptions& options, const Snapshot& best, double psnr) {
   if (options.target_psnr > 0 && psnr >= options.target_psnr) return StopReason::target_psnr;
@@ -202,7 +213,12 @@ Result<TrainReport> train(const Dataset& given, const TrainOptions& options,
     report.skips.push_back({"density from nothing", "the visible field's geometry is given",
                             "training starts from its density and empty space"});
   }
-  const std::vector<SceneView> views = prepare_views(dataset, state->space, state->span);
+  std::vector<SceneView> views = prepare_views(dataset, state->space, state->span);
+  if (options.even_exposure && dataset.modality == Modality::visible) {
+    const Exposure exposure = estimate_exposure(dataset, heldout);
+    report_exposure(exposure, report);
+    if (exposure.varies()) even_out(exposure, views);
+  }
   if (!resumed && !options.shared_geometry && options.sampling == Sampling::occupancy) {
     const double left = carve(training.has_dense_depth(), views, heldout, options, state->occupancy);
     report.skips.push_back({"empty space", fmt::format("{:.1f} % of the cells seen by enough views and "
