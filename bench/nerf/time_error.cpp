@@ -23,7 +23,7 @@ struct Arguments {
   std::string scene = "fox", preset, data = "../shared/data/orbits", model, images, field, guide, out;
   std::vector<std::string> set;
   int threads = 0;
-  double exposure = 0;
+  double exposure = 0, pose_error_deg = 0;
   bool quick = false, depth = false, train = true;
   depth::DepthOptions depth_options;
 };
@@ -65,6 +65,38 @@ void vary_exposure(nerf::Dataset& data, double log_sigma) {
   }
 }
 
+/// Training views as poses of that error show them: turned, and moved as far as the turn moves the scene.
+void perturb_poses(nerf::Dataset& data, double sigma_deg) {
+  cv::RNG random(11);
+  const double sigma = sigma_deg * 3.14159265358979 / 180;
+  const auto draw = [&] { return Eigen::Vector3d(random.gaussian(sigma), random.gaussian(sigma), random.gaussian(sigma)); };
+  for (nerf::TrainingView& view : data.views) {
+    if (view.measure_only) continue;
+    const Eigen::Vector3d turn = draw(), shift = draw() * view.cam_from_world.translation.norm();
+    const Rigid3d moved_from_cam{Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized())), shift};
+    view.cam_from_world = moved_from_cam * view.cam_from_world;
+  }
+}
+
+/// RMS over training views of what a pose is off by: turn in degrees, centre in % of the distance to the
+/// world's origin; poses are compared as they are, without a similarity between them.
+void print_pose_errors(const std::vector<Rigid3d>& truth, const nerf::Dataset& given,
+                       const std::map<std::string, Rigid3d>& refined) {
+  const auto print = [&](const char* what, const auto& pose_of) {
+    double turn = 0, shift = 0, count = 0;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      if (given.views[i].measure_only) continue;
+      const Rigid3d pose = pose_of(i);
+      turn += std::pow(rotation_angle_deg(truth[i].rotation, pose.rotation), 2);
+      shift += (camera_center(truth[i]) - camera_center(pose)).squaredNorm() / camera_center(truth[i]).squaredNorm();
+      ++count;
+    }
+    fmt::print("poses {}: {:.3f} deg, {:.3f} %\n", what, std::sqrt(turn / count), 100 * std::sqrt(shift / count));
+  };
+  print("as given", [&](std::size_t i) { return given.views[i].cam_from_world; });
+  print("refined", [&](std::size_t i) { return refined.at(given.views[i].name); });
+}
+
 Status run(const Arguments& a) {
   set_thread_count(a.threads);
   ORBITFUSE_ASSIGN(nerf::Dataset data, bench::load_scene(a.scene, a.data, a.model));
@@ -77,6 +109,9 @@ Status run(const Arguments& a) {
     ORBITFUSE_TRY(options.set(assignment.substr(0, at), assignment.substr(at + 1)));
   }
   fmt::print("{}, {} threads, {}, {}\n", cpu_description(), thread_count(), name(best_isa()), a.scene);
+  std::vector<Rigid3d> true_poses;
+  for (const auto& view : data.views) true_poses.push_back(view.cam_from_world);
+  if (a.pose_error_deg > 0) perturb_poses(data, a.pose_error_deg);
   if (a.exposure > 0) vary_exposure(data, a.exposure);
   bench::Run result{options.preset, 0, {}};
   if (a.depth) {
@@ -90,6 +125,7 @@ Status run(const Arguments& a) {
   }
   ORBITFUSE_ASSIGN(result.report, nerf::train(data, options, {}, field, guide.empty() ? nullptr : &guide));
   print_curve(result.report);
+  if (!result.report.refined_poses.empty()) print_pose_errors(true_poses, data, result.report.refined_poses);
   if (!a.out.empty()) ORBITFUSE_TRY(bench::write_curves(a.out, a.scene, {result}));
   if (!a.field.empty()) ORBITFUSE_TRY(field.save(a.field));
   if (a.quick) return {};
@@ -122,6 +158,7 @@ int main(int argc, char** argv) {
   app.add_option("--depth-best", a.depth_options.best_neighbours);
   app.add_option("--guide", a.guide, "field whose geometry this one starts from");
   app.add_option("--vary-exposure", a.exposure, "gains of the training views: sigma of their logarithm");
+  app.add_option("--perturb-poses", a.pose_error_deg, "error of the training views' poses: sigma of turn and shift, degrees");
   app.add_flag("--quick", a.quick, "no full-resolution evaluation");
   app.add_option("--threads", a.threads);
   app.add_option("--set", a.set, "training option key=value");

@@ -11,7 +11,7 @@ namespace orbitfuse::nerf {
 /// What a ray should show.
 struct RayTarget {
   float value[3] = {0, 0, 0};
-  int view = 0;
+  int view = 0, x = 0, y = 0;  ///< where it comes from
   float distance = 0;      ///< known distance along the ray (normalised), 0 = unknown
   float depth_weight = 0;  ///< of the depth loss on this ray
 };

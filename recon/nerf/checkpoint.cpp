@@ -229,6 +229,7 @@ void visit(Archive& io, FieldState& state) {
   io(state.train_psnr);
   io(state.samples_per_ray);
   visit(io, state.history);
+  if (state.options.refine_poses) io(state.refined_poses);
   for (DensityNetwork* network : state.density_networks()) io(network->grid.level_weight);
   std::vector<std::size_t> sizes;
   for (const Parameters* p : state.parameters()) sizes.push_back(p->size());
@@ -240,7 +241,10 @@ void visit(Archive& io, FieldState& state) {
   }
   visit(io, state.occupancy);
   visit(io, state.best);
-  if constexpr (Archive::reading) io.ok = io.ok && (state.best.empty() || fits(state.best, state));
+  if constexpr (Archive::reading) {
+    io.ok = io.ok && (state.best.empty() || fits(state.best, state)) &&
+            (!state.options.refine_poses || state.refined_poses.size() == state.views.size());
+  }
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "recon/nerf/network.hpp"
 #include "recon/nerf/occupancy.hpp"
 #include "recon/nerf/options.hpp"
+#include "recon/nerf/pose_steps.hpp"
 #include "recon/nerf/scene.hpp"
 #include "recon/nerf/space.hpp"
 
@@ -48,6 +49,7 @@ struct FieldState {
   Mlp color;
   std::vector<DensityNetwork> proposals;  ///< Sampling::proposal
   Parameters image_offsets;               ///< per training view, in units of the span
+  std::vector<RefinedPose> refined_poses;  ///< per view of the dataset (refine_poses)
   Occupancy occupancy;
 
   int step = 0;

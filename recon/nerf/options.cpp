@@ -74,6 +74,7 @@ const std::vector<Entry>& table() {
       FIELD(level_anneal_end, never, 0, 1),
       FIELD(per_image_offset, never),
       FIELD(even_exposure, never),
+      FIELD(refine_poses, never),
       FIELD(shared_geometry, never),
   };
   return entries;
@@ -210,6 +211,7 @@ Result<TrainOptions> preset(const std::string& name) {
     o.color_hidden = 32;
     o.sh_degree = 0;  // emitted heat hardly depends on the direction
     o.per_image_offset = true;
+    o.refine_poses = true;  // thermal poses are a third of a degree off where visible ones are exact
     return o;
   }
   // The published trainers: proposal sampling, 16 levels, 2^19 entries, a deeper colour network.

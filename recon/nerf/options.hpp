@@ -74,6 +74,9 @@ struct TrainOptions {
   /// Visible views of a camera on automatic are brought to one exposure first, where points that several
   /// see say that it varied (exposure.hpp).
   bool even_exposure = true;
+  /// Training views move to where the field sees them (pose_steps.hpp). Views that measure follow: each
+  /// time after they have.
+  bool refine_poses = false;
   bool shared_geometry = false;      ///< start from the guide field's density (train()'s argument)
 
   Status validate() const;

@@ -11,7 +11,10 @@ namespace orbitfuse::nerf {
 RenderedView render_strided(const FieldState& field, const ViewRays& rays, int stride,
                             const RenderOptions& options);
 
-/// PSNR in dB over finite pixels of the target, values clamped to 0..1.
-double psnr_of(const FieldState& field, const SceneView& view, int stride);
+/// PSNR in dB of a strided picture over finite pixels of the target, values clamped to 0..1.
+double psnr_of(const RenderedView& picture, const cv::Mat& target, int stride);
+
+/// How a strided picture of the view's scene asks its camera to move.
+PoseSums sums_of(const RenderedView& picture, int stride, const Space& space, const SceneView& view);
 
 }  // namespace orbitfuse::nerf

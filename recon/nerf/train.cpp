@@ -46,14 +46,18 @@ struct Stopwatch {
   double wall_now() const { return wall_s + wall_seconds() - wall_mark; }
 };
 
-double heldout_psnr(const FieldState& field, const std::vector<SceneView>& views,
-                    const std::vector<bool>& heldout, int stride) {
+/// With refine_poses, views that measure follow the field, which moves with the views that train.
+double heldout_psnr(FieldState& field, std::vector<SceneView>& views, const std::vector<bool>& heldout) {
+  constexpr int stride = 4;
   double sum = 0;
   int count = 0;
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (!heldout[i]) continue;
-    sum += psnr_of(field, views[i], stride);
+    const RenderedView picture = render_strided(field, views[i].rays, stride, {});
+    sum += psnr_of(picture, views[i].target, stride);
     ++count;
+    if (field.options.refine_poses)
+      take_step(sums_of(picture, stride, field.space, views[i]), field.space, field.refined_poses[i], views[i]);
   }
   return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
 }
@@ -225,6 +229,10 @@ Result<TrainReport> train(const Dataset& given, const TrainOptions& options,
                                                        "not in front of known depth", 100 * left),
                             "rays skip the rest from the first step"});
   }
+  for (std::size_t i = 0; options.refine_poses && i < views.size(); ++i) {
+    if (!resumed) state->refined_poses.push_back(unmoved(dataset.views[i].cam_from_world));
+    else views[i].rays = ViewRays(dataset.views[i].camera, state->refined_poses[i].pose(), state->space);
+  }
   Trainer trainer(*state, views, heldout);
   History& history = state->history;
   watch.cpu_s += history.cpu_s;
@@ -260,7 +268,7 @@ Result<TrainReport> train(const Dataset& given, const TrainOptions& options,
   /// The curve's next point, and the best field so far. Returns the held-out PSNR.
   const auto evaluate = [&](double fraction) {
     pause();
-    const double psnr = heldout_psnr(*state, views, heldout, 4);
+    const double psnr = heldout_psnr(*state, views, heldout);
     history.curve.push_back({watch.cpu_s, watch.wall_s, state->step, psnr, state->train_psnr,
                              state->samples_per_ray});
     if (measuring && options.keep_best && (state->best.empty() || psnr > state->best.psnr))
@@ -330,6 +338,8 @@ Result<TrainReport> train(const Dataset& given, const TrainOptions& options,
                                           options.target_psnr, report.best_psnr));
   for (std::size_t i = 0; options.per_image_offset && i < dataset.views.size(); ++i)
     report.image_offsets_k.push_back(state->image_offsets.value[i] * (state->span.high - state->span.low));
+  for (std::size_t i = 0; i < state->refined_poses.size(); ++i)
+    report.refined_poses[dataset.views[i].name] = state->refined_poses[i].pose();
   // How a field came about is the report's; equal fields are equal files.
   state->history = {};
   state->options.resume = false;

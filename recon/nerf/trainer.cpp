@@ -16,6 +16,8 @@ constexpr int rays_per_block = 32;
 constexpr int shard_count = 16;  ///< of weight gradients; fixed, so sums do not depend on threads
 constexpr int occupancy_every = 16;
 constexpr int occupancy_warmup = 64;
+constexpr int pose_every = 25;  ///< steps; where views are many, the rays of several such turns make a step
+constexpr double poses_move_from = 0.1, poses_move_until = 0.9;  ///< of the run: after first form, before fine details
 constexpr float known_depth_margin = 1.08f;  ///< a wrong depth must be able to move
 
 enum Stream : std::uint64_t { pixel_stream = 1, jitter_stream = 2, probe_stream = 4 };
@@ -46,7 +48,7 @@ struct LevelGradient {
 
 }  // namespace
 
-Trainer::Trainer(FieldState& field, const std::vector<SceneView>& views,
+Trainer::Trainer(FieldState& field, std::vector<SceneView>& views,
                  const std::vector<bool>& heldout, const Kernels& kernels)
     : field_(field), views_(views), kernels_(kernels) {
   std::int64_t pixels = 0, known = 0;
@@ -59,6 +61,7 @@ Trainer::Trainer(FieldState& field, const std::vector<SceneView>& views,
     known_ends_.push_back(known);
   }
   shards_.resize(shard_count);
+  if (field.options.refine_poses) pose_shards_.assign(shard_count, std::vector<PoseSums>(views.size()));
   if (field_.rays_per_step == 0)
     field_.rays_per_step = proposing() ? std::max(1, field_.options.samples_per_step / field_.options.fine_samples) : 512;
 }
@@ -96,6 +99,8 @@ void Trainer::draw(Block& block, int begin, int end, double progress) {
       if (!std::isfinite(stored[0]) || !view.rays.ray(x + 0.5, y + 0.5, ray)) continue;
       std::copy_n(stored, field_.channels(), target.value);
       target.view = index;
+      target.x = x;
+      target.y = y;
       const float distance = view.distance.at<float>(y, x);
       settings.far = std::numeric_limits<float>::max();
       if (std::isfinite(distance)) {
@@ -152,6 +157,7 @@ bool Trainer::step(double progress) {
       draw(block, b * rays_per_block, std::min(rays, (b + 1) * rays_per_block), progress);
       forward(field_, kernels_, {}, block.rays);
       backward(field_, kernels_, loss, block.targets, block.rays, gradients, block.grid);
+      if (o.refine_poses) watch_poses(block, pose_shards_[static_cast<std::size_t>(shard)]);
       if (with_proposals)
         gradients.interlevel += backward_proposals(field_, kernels_, block.rays, loss.per_ray,
                                                    block.proposals, gradients.proposals);
@@ -193,7 +199,39 @@ bool Trainer::step(double progress) {
     if (finite) update_occupancy(progress);
   }
   ++field_.step;
+  if (o.refine_poses && field_.step % pose_every == 0 && progress > poses_move_from && progress < poses_move_until)
+    move_views();
   return finite;
+}
+
+/// By how much each ray's picture differs, and at what distance it saw what it shows.
+void Trainer::watch_poses(const Block& block, std::vector<PoseSums>& sums) const {
+  const RayBlock& b = block.rays;
+  int row = 0;
+  for (std::size_t r = 0; r < b.rays.size(); ++r) {
+    float value[3];
+    ray_value(field_, b, static_cast<int>(r), row, value);
+    float opacity = 0, distance = 0;
+    for (auto i = static_cast<std::size_t>(b.first[r]); i < static_cast<std::size_t>(b.first[r] + b.used[r]); ++i) {
+      opacity += b.weight[i];
+      distance += b.weight[i] * b.t[i];
+    }
+    if (opacity < 0.5f) continue;
+    const RayTarget& target = block.targets[r];
+    const auto view = static_cast<std::size_t>(target.view);
+    for (int c = 0; c < field_.channels(); ++c) value[c] += field_.image_offsets.value[view];
+    add_ray(views_[view], target.x, target.y, value, distance / opacity, sums[view]);
+  }
+}
+
+void Trainer::move_views() {
+  for (const int index : training_) {
+    const auto view = static_cast<std::size_t>(index);
+    PoseSums sums;
+    for (const std::vector<PoseSums>& shard : pose_shards_) sums.add(shard[view]);
+    if (!take_step(sums, field_.space, field_.refined_poses[view], views_[view])) continue;
+    for (std::vector<PoseSums>& shard : pose_shards_) shard[view] = {};
+  }
 }
 
 void Trainer::apply(const AdamStep& grid_step, const AdamStep& network_step,

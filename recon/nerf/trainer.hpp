@@ -6,6 +6,7 @@
 
 #include "recon/nerf/backward.hpp"
 #include "recon/nerf/field_state.hpp"
+#include "recon/nerf/pose_steps.hpp"
 #include "recon/nerf/proposal.hpp"
 #include "recon/nerf/scene.hpp"
 
@@ -15,7 +16,8 @@ namespace orbitfuse::nerf {
 class Trainer {
  public:
   /// `heldout[i]` views are never drawn from.
-  Trainer(FieldState& field, const std::vector<SceneView>& views, const std::vector<bool>& heldout,
+  /// Views that train move if TrainOptions::refine_poses says so.
+  Trainer(FieldState& field, std::vector<SceneView>& views, const std::vector<bool>& heldout,
           const Kernels& kernels = kernels_for(best_isa()));
 
   /// One step; `progress` in [0, 1] is the place in the schedule. False: a gradient was not
@@ -42,15 +44,18 @@ class Trainer {
              bool with_proposals);
   void update_occupancy(double progress);
   void probe_cells();
+  void watch_poses(const Block& block, std::vector<PoseSums>& sums) const;
+  void move_views();
 
   FieldState& field_;
-  const std::vector<SceneView>& views_;
+  std::vector<SceneView>& views_;
   const Kernels& kernels_;
   std::vector<int> training_;             ///< indices of the views that train
   std::vector<std::int64_t> pixel_ends_;  ///< running pixel count over them
   std::vector<std::int64_t> known_ends_;  ///< running count of pixels with known distance
   std::vector<Block> blocks_;
   std::vector<BlockGradients> shards_;
+  std::vector<std::vector<PoseSums>> pose_shards_;  ///< [shard][view], since the last step (refine_poses)
   long rays_ = 0, samples_ = 0;
 };
 

@@ -27,25 +27,25 @@ ViewRays::ViewRays(const Camera& camera, const Rigid3d& cam_from_world, const Sp
     }
 }
 
-bool ViewRays::ray(double px, double py, Ray& out) const {
-  Eigen::Vector3d d;
-  if (lattice_.empty()) {
-    d = {(px - camera_.cx) / camera_.fx, (py - camera_.cy) / camera_.fy, 1.0};
-  } else {
-    const int ix = std::clamp(static_cast<int>(px) / spacing_px, 0, lattice_width_ - 2);
-    const int rows = static_cast<int>(lattice_.size()) / lattice_width_;
-    const int iy = std::clamp(static_cast<int>(py) / spacing_px, 0, rows - 2);
-    const auto fraction = [](double p, int i, int limit) {
-      const double low = std::min(i * spacing_px, limit);
-      const double high = std::min((i + 1) * spacing_px, limit);
-      return high > low ? static_cast<float>((p - low) / (high - low)) : 0.0f;
-    };
-    const float fx = fraction(px, ix, camera_.width), fy = fraction(py, iy, camera_.height);
-    const Eigen::Vector2f* row = lattice_.data() + iy * lattice_width_ + ix;
-    const Eigen::Vector2f n = (1 - fy) * ((1 - fx) * row[0] + fx * row[1]) +
-                              fy * ((1 - fx) * row[lattice_width_] + fx * row[lattice_width_ + 1]);
-    d = {n.x(), n.y(), 1.0};
-  }
+Eigen::Vector3d ViewRays::through(double px, double py) const {
+  if (lattice_.empty()) return {(px - camera_.cx) / camera_.fx, (py - camera_.cy) / camera_.fy, 1.0};
+  const int ix = std::clamp(static_cast<int>(px) / spacing_px, 0, lattice_width_ - 2);
+  const int rows = static_cast<int>(lattice_.size()) / lattice_width_;
+  const int iy = std::clamp(static_cast<int>(py) / spacing_px, 0, rows - 2);
+  const auto fraction = [](double p, int i, int limit) {
+    const double low = std::min(i * spacing_px, limit);
+    const double high = std::min((i + 1) * spacing_px, limit);
+    return high > low ? static_cast<float>((p - low) / (high - low)) : 0.0f;
+  };
+  const float fx = fraction(px, ix, camera_.width), fy = fraction(py, iy, camera_.height);
+  const Eigen::Vector2f* row = lattice_.data() + iy * lattice_width_ + ix;
+  const Eigen::Vector2f n = (1 - fy) * ((1 - fx) * row[0] + fx * row[1]) +
+                            fy * ((1 - fx) * row[lattice_width_] + fx * row[lattice_width_ + 1]);
+  return {n.x(), n.y(), 1.0};
+}
+
+bool ViewRays::ray(double x, double y, Ray& out) const {
+  Eigen::Vector3d d = through(x, y);
   if (!d.allFinite()) return false;
   const double length = d.norm();
   out.forward = static_cast<float>(1.0 / length);
@@ -55,6 +55,23 @@ bool ViewRays::ray(double px, double py, Ray& out) const {
     out.direction[i] = static_cast<float>(d[i]);
   }
   return true;
+}
+
+Eigen::Vector3d ViewRays::in_camera(double x, double y, double distance) const {
+  return distance * through(x, y).normalized();
+}
+
+void ViewRays::move(const Eigen::Vector3d& shift, const Eigen::Vector3d& turn) {
+  const double angle = turn.norm();
+  const Eigen::Matrix3d rotation =
+      angle > 0 ? Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix() : Eigen::Matrix3d::Identity();
+  world_from_cam_ = world_from_cam_ * rotation.transpose();
+  origin_ -= world_from_cam_ * shift;
+}
+
+Rigid3d ViewRays::cam_from_world(const Space& space) const {
+  const Eigen::Quaterniond rotation(world_from_cam_.transpose());
+  return {rotation.normalized(), -(rotation.normalized() * (space.center + space.radius * origin_))};
 }
 
 bool ViewRays::project(const float point[3], double& x, double& y, double& depth) const {

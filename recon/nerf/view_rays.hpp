@@ -26,12 +26,19 @@ class ViewRays {
   bool ray(double x, double y, Ray& out) const;
   /// Pixel and z depth (normalised units) of a normalised point; false behind the camera.
   bool project(const float point[3], double& x, double& y, double& depth) const;
+  /// What lies at a distance (normalised units) on that ray, in camera axes from the camera.
+  Eigen::Vector3d in_camera(double x, double y, double distance) const;
+  /// The scene seen from here is turned by `turn` (axis times radians) and then shifted, both in camera axes.
+  void move(const Eigen::Vector3d& shift, const Eigen::Vector3d& turn);
+  Rigid3d cam_from_world(const Space& space) const;
   /// Angle of one pixel, radians.
   float pixel_angle() const { return pixel_angle_; }
   const Camera& camera() const { return camera_; }
   const Eigen::Vector3d& origin() const { return origin_; }
 
  private:
+  Eigen::Vector3d through(double x, double y) const;  ///< in camera axes, z = 1
+
   Camera camera_;
   Eigen::Matrix3d world_from_cam_ = Eigen::Matrix3d::Identity();
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
