@@ -18,7 +18,10 @@ class ExampleFirst : public CLI::Formatter {
     return (example.empty() ? "" : "Example:\n  " + example + "\n\n") +
            Formatter::make_description(app);
   }
-  std::string make_footer(const CLI::App*) const override { return {}; }
+  std::string make_footer(const CLI::App* app) const override {
+    if (app->get_parent() != nullptr) return {};
+    return "\norbitfuse help VERB tells a verb's options.\n";
+  }
 };
 
 void add_common(CLI::App& app, CommonOptions& common) {

@@ -64,7 +64,8 @@ namespace {
 /// run.json of an earlier run's folder; null when there is none.
 Result<json> earlier_run(const std::string& folder) {
   const fs::path record = fs::path(folder) / run_file;
-  if (folder.empty() || !fs::exists(record)) return json();
+  std::error_code unreadable;  // whoever opens the session says why
+  if (folder.empty() || !fs::exists(record, unreadable)) return json();
   ORBITFUSE_ASSIGN(const std::string text, read_file(record));
   json run = json::parse(text, nullptr, false);
   if (!run.is_object() || !run.contains("session") || !run["session"].is_string())

@@ -24,8 +24,8 @@ class PreparedSource final : public FrameSource {
   bool can_wait() const override { return source_->can_wait(); }
   void request_correction() override { source_->request_correction(); }
   std::string transport_report() const override { return source_->transport_report(); }
-  void resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames) override {
-    source_->resume(device, frames);
+  bool resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames) override {
+    return source_->resume(device, frames);
   }
 
   /// Cameras start one after the other, and the first one's queue fills meanwhile. Leaves out what

@@ -89,25 +89,40 @@ void resolve(Options& o) {
   }
 }
 
-Status run(Context& context, Options& o) {
-  resolve(o);
-  ORBITFUSE_TRY(o.import.validate());
-  if (context.common.dry_run) {
-    context.console.info("would import into " + o.session);
-    return {};
+/// Options of every verb that would mean something else here than the user hopes.
+Status check_common(const CommonOptions& common) {
+  if (common.resume) {
+    return fail(ErrorKind::usage, "--resume", "an import is made at one go",
+                "leave it out; photos are added to a session by "
+                "orbitfuse capture SESSION --resume --visible stills:FOLDER,existing=yes");
   }
-  ORBITFUSE_ASSIGN(const ImportReport report, import_session(o.import, o.session, context.progress));
+  if (common.force) {
+    return fail(ErrorKind::usage, "--force", "a session is never overwritten",
+                "leave it out, and import into another folder");
+  }
+  return {};
+}
+
+Status run(Context& context, Options& o) {
+  ORBITFUSE_TRY(check_common(context.common));
+  resolve(o);
+  const bool dry = context.common.dry_run;
+  ORBITFUSE_ASSIGN(const ImportReport report,
+                   dry ? rehearse_import(o.import, o.session, context.progress)
+                       : import_session(o.import, o.session, context.progress));
   for (const std::string& warning : report.warnings) context.console.warning(warning);
   context.console.data(fmt::format(
-      "{}: {} visible and {} thermal frames{}, {} tracking frames, {} with a pose, {} with a station",
-      o.session, report.visible, report.thermal,
+      "{}{}: {} visible and {} thermal frames{}, {} tracking frames, {} with a pose, {} with a station",
+      dry ? "would make " : "", o.session, report.visible, report.thermal,
       report.thermal == 0 ? "" : report.has_temperatures ? " with temperatures" : " without temperatures",
       report.tracking, report.with_pose, report.with_station));
+  if (dry) context.console.info("nothing was written");
   context.result = {{"session", o.session},         {"visible", report.visible},
                     {"thermal", report.thermal},    {"tracking", report.tracking},
                     {"with_pose", report.with_pose}, {"with_station", report.with_station},
                     {"has_temperatures", report.has_temperatures},
                     {"warnings", report.warnings}};
+  if (dry) context.result["dry_run"] = true;
   return {};
 }
 

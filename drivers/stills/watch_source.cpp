@@ -73,7 +73,7 @@ Status WatchSource::start() {
   return reader_->watch.open(options_.existing);
 }
 
-void WatchSource::resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames) {
+bool WatchSource::resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames) {
   const std::lock_guard lock(mutex_);
   const std::string id = info_.id;
   info_ = device;
@@ -83,6 +83,7 @@ void WatchSource::resume(const DeviceInfo& device, const std::vector<FrameRecord
     seen_hashes_.insert(frame.content_hash);
     seen_files_.insert({frame.source, frame.host_time_ns});  // thermal images are stored decoded
   }
+  return false;
 }
 
 void WatchSource::stop() { reader_->watch.close(); }

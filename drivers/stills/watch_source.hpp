@@ -48,7 +48,7 @@ class WatchSource final : public FrameSource {
   Result<Delivery> next(std::chrono::milliseconds timeout) override;
   void stop() override;
   bool can_wait() const override { return true; }
-  void resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames) override;
+  bool resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames) override;
 
  private:
   struct Reader;

@@ -5,6 +5,7 @@
 
 #include <fstream>
 
+#include "core/file_io.hpp"
 #include "core/image_io.hpp"
 #include "core/session.hpp"
 #include "tests/app/cli/program.hpp"
@@ -132,6 +133,75 @@ TEST(Mat, IsWrittenWholeOrNotAtAll) {
   EXPECT_FALSE(std::filesystem::exists(temp.path / "no.pdf"));
 }
 
+TEST(Mat, OverwritesAndMakesNothingUnasked) {
+  const TempFolder temp;
+  const std::string file = temp.path / "mat.pdf", note = temp.path / "notes.txt";
+  std::ofstream(file) << "the operator's";
+  std::ofstream(note) << "the operator's";
+  std::filesystem::create_directory(temp.path / "folder.pdf");
+  struct Case {
+    std::string out;
+    int code;
+    std::string words;
+  };
+  const std::vector<Case> cases = {
+      {file, 3, "exists already; choose another name, or overwrite it: --force"},
+      {note, 2, "end it in .pdf"},
+      {temp.path / "mat", 2, "end it in .pdf"},
+      {temp.path / ".pdf", 2, "end it in .pdf"},
+      {temp.path / "", 2, "end it in .pdf"},
+      {temp.path / "none" / "mat.pdf", 3, "no such folder"},
+      {temp.path / "folder.pdf", 3, "exists and is not a file"},
+      {temp.path / (std::string(300, 'x') + ".pdf"), 2, "choose another name"},
+      {"/proc/mat.pdf", 4, "/proc"},
+  };
+  for (const Case& c : cases) {
+    for (const bool dry : {false, true}) {
+      std::vector<std::string> words = {"mat", "--out", c.out};
+      if (dry) words.emplace_back("--dry-run");
+      if (dry && c.out.starts_with("/proc")) continue;  // only the writing tells
+      const Outcome outcome = orbitfuse_program(words);
+      EXPECT_EQ(outcome.code, c.code) << c.out << outcome.err;
+      EXPECT_THAT(outcome.err, HasSubstr(c.words));
+    }
+  }
+  EXPECT_EQ(*read_file(file), "the operator's");
+  EXPECT_EQ(*read_file(note), "the operator's");
+  EXPECT_FALSE(std::filesystem::exists(temp.path / "none"));
+  EXPECT_EQ(orbitfuse_program({"mat", "--out", file, "--force"}).code, 0);
+  EXPECT_THAT(*read_file(file), testing::StartsWith("%PDF"));
+  EXPECT_EQ(orbitfuse_program({"mat", "--out", "here.PDF", "--tags", "0"}, {.folder = temp.path}).code, 2);
+  EXPECT_EQ(orbitfuse_program({"mat", "--out", "here.PDF"}, {.folder = temp.path}).code, 0);
+}
+
+TEST(Capture, FilesPassedOverAreNamed) {
+  const TempFolder temp;
+  const auto card = temp.path / "card";
+  std::filesystem::create_directory(card);
+  cv::Mat image(30, 40, CV_8UC3);
+  cv::randu(image, 0, 255);
+  ASSERT_TRUE(write_png(card / "a.png", image));
+  std::filesystem::copy(card / "a.png", card / "b.png");
+  std::ofstream(card / "c.heic") << "x";
+  const std::vector<std::string> words = {"capture", temp.path / "s",  "--visible", "stills:" + card.string() + ",existing=yes",
+                                          "--seconds", "2.5", "--guide", "off"};
+  const Outcome outcome = orbitfuse_program(words);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  for (const std::string& text : {outcome.err, outcome.out})
+    EXPECT_THAT(text, testing::AllOf(HasSubstr("passed over"), HasSubstr("c.heic: not a JPEG")));
+  EXPECT_THAT(outcome.out, testing::AllOf(HasSubstr("visible0: 2 files passed over"), HasSubstr("b.png: the same image")));
+  EXPECT_THAT(outcome.err, HasSubstr("stills, camera known from its first photo"));
+}
+
+TEST(Capture, WithoutAFrameTheAccountHasNoIds) {
+  const TempFolder temp;
+  const std::vector<std::string> words = {"capture", temp.path / "s", "--visible", "stills:" + temp.path.string(),
+                                          "--seconds", "0.2", "--guide", "off"};
+  const Outcome outcome = orbitfuse_program(words);
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("visible0: no frame came"));
+}
+
 TEST(Devices, AnswersWithAList) {
   const Outcome outcome = orbitfuse_program({"devices", "--json"});
   EXPECT_EQ(outcome.code, 0) << outcome.err;
@@ -154,7 +224,20 @@ TEST(Capture, MistakesHaveARemedyAndLeaveNothing) {
       {{"--thermal", "aravis,profile=nonsense"}, 2, "flir-ax5"},
       {{"--driver", "replay:/nowhere"}, 3, "no such folder"},
       {{"--driver", tiny, "--spacing-deg", "31"}, 2, "guide.spacing_deg"},
-      {{"--driver", tiny, "--turntable", "500"}, 2, "guide.turntable_step_deg"},
+      {{"--driver", tiny, "--turntable", "500"}, 2, "--turntable: 500"},
+      {{"--driver", tiny, "--turntable", "0"}, 2, "--turntable: 0; give the table's step, -120 to 120 and not 0"},
+      {{"--driver", tiny, "--turntable", "15"}, 2, "don't wait for a key"},
+      {{"--driver", tiny, "--spacing-deg", "0"}, 2, "--spacing-deg: 0; give 1 to 120"},
+      {{"--driver", tiny, "--seconds", "-1"}, 2, "--seconds: -1; give 0 (until it is stopped) to 10000000"},
+      {{"--driver", tiny, "--seconds", "nan"}, 2, "--seconds: nan"},
+      {{"--driver", tiny, "--max-edge-px", "0", "3"}, 2, "--max-edge-px: 0; give more than 0"},
+      {{"--driver", tiny, "--elevations-deg", "100"}, 2, "--elevations-deg: 100"},
+      {{"--driver", tiny, "--mat-tags", "7"}, 2, "the frames carry their stations"},
+      {{"--driver", tiny, "--mat", "foil"}, 2, "--mat: no mat is looked for"},
+      {{"--visible", "stills:.", "--guide", "key", "--mat-tags", "7"}, 2, "use --guide auto without --turntable"},
+      {{"--visible", "stills:.", "--mat-tags", "0"}, 2, "mat.tags_per_side: 0; must be 2 to 15"},
+      {{"--driver", tiny, "--guide", "key"}, 2, "--guide key: replayed and synthetic frames don't wait for a key"},
+      {{"--driver", tiny, "--token", "12345678"}, 2, "--token: given without --page"},
   };
   for (const Case& c : cases) {
     std::vector<std::string> arguments = {"capture", session};
