@@ -52,10 +52,10 @@ std::optional<std::uint64_t> free_bytes_at(const fs::path& folder) {
 Status check_free_space(const fs::path& folder, std::uint64_t needed_bytes, const char* remedy) {
   const std::optional<std::uint64_t> available = free_bytes_at(folder);
   if (!available || *available >= needed_bytes) return {};
-  return fail(ErrorKind::device, folder.string(),
-              fmt::format("{} free on the disk, {} needed", mebibytes(*available),
-                          mebibytes(needed_bytes)),
-              remedy);
+  return fail(
+      ErrorKind::device, folder.string(),
+      fmt::format("{} free on the disk, {} needed", mebibytes(*available), mebibytes(needed_bytes)),
+      remedy);
 }
 
 bool holds_session(const fs::path& folder) {

@@ -39,11 +39,13 @@ Status CaptureOptions::validate() const {
   if (turntable_deg && guide == "off")
     return wrong("--turntable", "given with --guide off", "leave one of them out");
   for (const double px : max_edge_px) {
-    if (!(px > 0 && px <= 100)) return wrong("--max-edge-px", text(px), "give more than 0, at most 100");
+    if (!(px > 0 && px <= 100))
+      return wrong("--max-edge-px", text(px), "give more than 0, at most 100");
   }
   for (const double elevation : elevations_deg) {
     if (!(elevation > -90 && elevation < 90))
-      return wrong("--elevations-deg", text(elevation), "give -90 to 90, without the two themselves");
+      return wrong("--elevations-deg", text(elevation),
+                   "give -90 to 90, without the two themselves");
   }
   if (!token.empty() && page.empty())
     return wrong("--token", "given without --page", "name the page's port with --page");
@@ -72,9 +74,10 @@ Result<std::optional<LiveGuideOptions>> guide_of(const CaptureOptions& o,
                                                  const recording::Cameras& cameras) {
   if (o.guide == "off") return std::optional<LiveGuideOptions>{};
   if (!cameras.live && (o.guide == "key" || o.turntable_deg)) {
-    return wrong(o.guide == "key" ? "--guide key" : "--turntable",
-                 "replayed and synthetic frames don't wait for a key",
-                 "leave it out: their stations come with the frames, or from the mat that they show");
+    return wrong(
+        o.guide == "key" ? "--guide key" : "--turntable",
+        "replayed and synthetic frames don't wait for a key",
+        "leave it out: their stations come with the frames, or from the mat that they show");
   }
   LiveGuideOptions guide;
   if (cameras.plan) guide.plan = *cameras.plan;
@@ -143,10 +146,11 @@ void add_capture_options(CLI::App& app, CaptureOptions& options) {
   app.add_option("session", options.session,
                  "Session folder: new, or with --resume one to go on with")
       ->required();
-  app.add_option("--visible", options.visible,
-                 "Visible camera: DRIVER[:CAMERA][,KEY=VALUE]...; drivers are aravis (GigE Vision), v4l2 "
-                 "(USB video), stills (stills:FOLDER takes photos that arrive there), replay and "
-                 "synthetic");
+  app.add_option(
+      "--visible", options.visible,
+      "Visible camera: DRIVER[:CAMERA][,KEY=VALUE]...; drivers are aravis (GigE Vision), v4l2 "
+      "(USB video), stills (stills:FOLDER takes photos that arrive there), replay and "
+      "synthetic");
   app.add_option("--thermal", options.thermal,
                  "Thermal camera, written alike, e.g. aravis:192.168.1.20 or stills:FOLDER for "
                  "radiometric JPEGs");
@@ -162,9 +166,10 @@ void add_capture_options(CLI::App& app, CaptureOptions& options) {
                  "Enter key says where; off: record without stations")
       ->check(CLI::IsMember({"auto", "key", "off"}))
       ->capture_default_str();
-  app.add_option("--turntable", options.turntable_deg,
-                 "The object stands on a turntable: each Enter key (without keys: each photo of a "
-                 "stills camera) is this many degrees further; a full turn later it is the next loop");
+  app.add_option(
+      "--turntable", options.turntable_deg,
+      "The object stands on a turntable: each Enter key (without keys: each photo of a "
+      "stills camera) is this many degrees further; a full turn later it is the next loop");
   app.add_option("--mat", options.mat, "The mat that lies there (orbitfuse mat): paper or foil")
       ->check(CLI::IsMember({"paper", "foil"}))
       ->default_str("paper");

@@ -13,7 +13,8 @@ std::string described(const DeviceInfo& device) {
   for (const std::string& known : {device.model, device.serial})
     if (!known.empty()) words += " " + known;
   if (!device.model.empty() || !device.serial.empty()) return words;
-  return words + (device.driver == "stills" ? ", camera known from its first photo" : ", model unknown");
+  return words +
+         (device.driver == "stills" ? ", camera known from its first photo" : ", model unknown");
 }
 
 std::string passed_over(const StreamStatus& s) {

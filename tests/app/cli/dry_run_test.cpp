@@ -39,7 +39,8 @@ class DryRun : public ::testing::Test {
   void TearDown() override { EXPECT_EQ(tree(temp.path), before); }
 
   const TempFolder temp;
-  const std::string done = temp.path / "done", photos = temp.path / "photos", fresh = temp.path / "new";
+  const std::string done = temp.path / "done", photos = temp.path / "photos",
+                    fresh = temp.path / "new";
   std::set<std::string> before;
 };
 
@@ -55,7 +56,8 @@ TEST_F(DryRun, FoldersThatNoSessionCanBeMadeIn) {
       {temp.path / "file", 3, "is not a folder"},
       {temp.path / "file" / "under", 3, "a part of the path is a file"},
       {temp.path / std::string(300, 'x'), 2, "choose a shorter name"},
-      {temp.path / "made" / "on" / "the" / "way" / std::string(300, 'x'), 2, "choose a shorter name"},
+      {temp.path / "made" / "on" / "the" / "way" / std::string(300, 'x'), 2,
+       "choose a shorter name"},
       {"/proc/orbitfuse", 4, "/proc/orbitfuse"},
   };
   for (const Case& c : cases) {
@@ -71,7 +73,8 @@ TEST_F(DryRun, FoldersThatNoSessionCanBeMadeIn) {
 TEST_F(DryRun, CamerasAndGuides) {
   expect_refused({"capture", fresh, "--visible", "v4l2:/dev/video97"}, 4, "plug it in");
   expect_refused({"capture", fresh, "--visible", "stills:" + photos + "/none"}, 3, "none");
-  expect_refused({"capture", fresh, "--visible", tiny, "--spacing-deg", "31"}, 2, "guide.spacing_deg");
+  expect_refused({"capture", fresh, "--visible", tiny, "--spacing-deg", "31"}, 2,
+                 "guide.spacing_deg");
   expect_refused({"capture", fresh, "--visible", tiny, "--page", "somewhere"}, 2, "write PORT");
 }
 
@@ -79,19 +82,22 @@ TEST_F(DryRun, PhotosThatCannotBeImported) {
   expect_refused({"import", fresh, "--visible", temp.path / "none"}, 3, "No such file");
   expect_refused({"import", fresh, "--visible", temp.path / "empty"}, 3, "no images");
   expect_refused({"import", fresh, "--visible", temp.path / "file"}, 3, "file");
-  expect_refused({"import", fresh, "--visible", photos, "--transforms", temp.path / "file"}, 3, "file");
+  expect_refused({"import", fresh, "--visible", photos, "--transforms", temp.path / "file"}, 3,
+                 "file");
 }
 
 TEST_F(DryRun, SaysWhatImportWouldMake) {
-  const Outcome dry = orbitfuse_program({"import", fresh, "--visible", photos, "--dry-run", "--json"});
+  const Outcome dry =
+      orbitfuse_program({"import", fresh, "--visible", photos, "--dry-run", "--json"});
   EXPECT_EQ(dry.code, 0) << dry.err;
   EXPECT_EQ(dry.result().at("visible"), 2);
   EXPECT_EQ(dry.result().at("dry_run"), true);
 }
 
 TEST_F(DryRun, WatchedFolderMayStillBeEmpty) {
-  const Outcome dry = orbitfuse_program(
-      {"capture", fresh, "--visible", "stills:" + (temp.path / "empty").string(), "--dry-run", "--seconds", "0.3"});
+  const Outcome dry =
+      orbitfuse_program({"capture", fresh, "--visible", "stills:" + (temp.path / "empty").string(),
+                         "--dry-run", "--seconds", "0.3"});
   EXPECT_EQ(dry.code, 0) << dry.err;
   EXPECT_THAT(dry.err, HasSubstr("no new photo came meanwhile"));
 }
@@ -101,7 +107,8 @@ TEST_F(DryRun, ImportDoesNotSendToResume) {
   const Outcome again = orbitfuse_program({"import", done, "--visible", photos});
   EXPECT_EQ(again.code, 3);
   EXPECT_THAT(again.err, Not(HasSubstr("--resume")));
-  expect_refused({"import", done, "--visible", photos, "--resume"}, 2, "orbitfuse capture SESSION --resume");
+  expect_refused({"import", done, "--visible", photos, "--resume"}, 2,
+                 "orbitfuse capture SESSION --resume");
   expect_refused({"import", done, "--visible", photos, "--force"}, 2, "never overwritten");
 }
 

@@ -18,8 +18,9 @@ inline std::string error_line(const Outcome& outcome) {
 }
 
 /// Refused with this code and these words, and --dry-run says the same.
-inline void expect_refused(std::vector<std::string> arguments, int code, const std::string& words,
-                           const Runner& run = [](const auto& a) { return orbitfuse_program(a); }) {
+inline void expect_refused(
+    std::vector<std::string> arguments, int code, const std::string& words,
+    const Runner& run = [](const auto& a) { return orbitfuse_program(a); }) {
   const Outcome real = run(arguments);
   arguments.emplace_back("--dry-run");
   const Outcome dry = run(arguments);

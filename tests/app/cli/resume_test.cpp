@@ -16,13 +16,15 @@ namespace {
 using testing::HasSubstr;
 
 /// Ids and content of each device's frames, in order.
-std::map<std::string, std::vector<std::pair<std::uint64_t, std::string>>> frames_of(const std::string& folder) {
+std::map<std::string, std::vector<std::pair<std::uint64_t, std::string>>> frames_of(
+    const std::string& folder) {
   std::map<std::string, std::vector<std::pair<std::uint64_t, std::string>>> list;
   const auto session = open_session(folder);
   EXPECT_TRUE(session) << session.error().message();
   if (!session) return list;
   EXPECT_TRUE(session->complete);
-  for (const FrameRecord& frame : session->frames) list[frame.device].emplace_back(frame.sequence, frame.content_hash);
+  for (const FrameRecord& frame : session->frames)
+    list[frame.device].emplace_back(frame.sequence, frame.content_hash);
   for (auto& [device, frames] : list) std::sort(frames.begin(), frames.end());
   for (const StreamRecord& s : session->streams)
     EXPECT_EQ(s.received + s.lost, s.last_sequence - s.first_sequence + 1);
@@ -60,34 +62,43 @@ class Resumed : public ::testing::Test {
 TEST_F(Resumed, SyntheticWalkGoesOnAfterCtrlC) {
   const std::vector<std::string> camera = {"--visible", "synthetic,size=80x60,spacing=60"};
   ASSERT_EQ(orbitfuse_program({"capture", once, camera[0], camera[1]}).code, 0);
-  const Outcome cut =
-      orbitfuse_program({"capture", again, camera[0], camera[1], "-v"}, {.interrupt_after = "visible 2/"});
+  const Outcome cut = orbitfuse_program({"capture", again, camera[0], camera[1], "-v"},
+                                        {.interrupt_after = "visible 2/"});
   ASSERT_EQ(cut.code, 130) << cut.err << cut.out;
   EXPECT_THAT(cut.err, HasSubstr("with --resume goes on"));
   resume({"capture", again, camera[0], camera[1]});
 }
 
 TEST_F(Resumed, ReplayedSessionGoesOn) {
-  ASSERT_EQ(orbitfuse_program({"capture", once, "--driver", "synthetic,size=64x48,spacing=60"}).code, 0);
+  ASSERT_EQ(
+      orbitfuse_program({"capture", once, "--driver", "synthetic,size=64x48,spacing=60"}).code, 0);
   make_killed_recording(9);
   resume({"capture", again, "--driver", "replay:" + once});
 }
 
 TEST_F(Resumed, ReplayVerbToo) {
-  ASSERT_EQ(orbitfuse_program({"capture", once, "--driver", "synthetic,size=64x48,spacing=60"}).code, 0);
+  ASSERT_EQ(
+      orbitfuse_program({"capture", once, "--driver", "synthetic,size=64x48,spacing=60"}).code, 0);
   make_killed_recording(14);
   resume({"replay", once, "--to", again});
 }
 
 /// Another session of the same camera is no repetition: its frames come after the first one's.
 TEST_F(Resumed, AnotherSessionIsAppended) {
-  ASSERT_EQ(orbitfuse_program({"capture", once, "--visible", "synthetic,size=64x48,spacing=60"}).code, 0);
+  ASSERT_EQ(
+      orbitfuse_program({"capture", once, "--visible", "synthetic,size=64x48,spacing=60"}).code, 0);
   const std::string other = temp.path / "other";
-  ASSERT_EQ(orbitfuse_program({"capture", other, "--visible", "synthetic,size=80x60,spacing=60"}).code, 0);
-  ASSERT_EQ(orbitfuse_program({"capture", again, "--driver", "replay:" + once, "--visible", "replay:" + once}).code, 3)
+  ASSERT_EQ(
+      orbitfuse_program({"capture", other, "--visible", "synthetic,size=80x60,spacing=60"}).code,
+      0);
+  ASSERT_EQ(orbitfuse_program(
+                {"capture", again, "--driver", "replay:" + once, "--visible", "replay:" + once})
+                .code,
+            3)
       << "it has no thermal frames";
   ASSERT_EQ(orbitfuse_program({"capture", again, "--visible", "replay:" + once}).code, 0);
-  ASSERT_EQ(orbitfuse_program({"capture", again, "--visible", "replay:" + other, "--resume"}).code, 0);
+  ASSERT_EQ(orbitfuse_program({"capture", again, "--visible", "replay:" + other, "--resume"}).code,
+            0);
   const auto frames = frames_of(again).at("visible0");
   ASSERT_EQ(frames.size(), 24u);
   EXPECT_EQ(frames.back().first, 23u);
