@@ -74,6 +74,9 @@ class FrameSource {
   /// What the transport counted, for people, e.g. "1800 completed, 12 resent"; empty: nothing is
   /// counted. From the thread of next(), before stop().
   virtual std::string transport_report() const { return {}; }
+  /// What is to be told when the recording ends before the source does: files that were still
+  /// waited for. Events and rejections; from the thread of next(), before stop().
+  virtual std::vector<Delivery> unfinished() { return {}; }
   /// Whether nothing is lost when the recorder takes its time (files): then it never drops.
   virtual bool can_wait() const { return false; }
 };

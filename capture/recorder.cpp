@@ -138,6 +138,13 @@ struct Recorder::Channel {
       if (delivery->kind == Delivery::Kind::end) break;
       take(*std::move(delivery));
     }
+    for (Delivery& late : source.unfinished()) {
+      {
+        const std::lock_guard lock(mutex);
+        note(late);
+      }
+      take(std::move(late));
+    }
     if (const std::string counted = source.transport_report(); !counted.empty()) log_event("transport", counted);
     source.stop();
     if (!status) {

@@ -28,7 +28,7 @@ Finding check_disk(const std::filesystem::path& folder) {
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   fs::remove(probe, ec);
-  if (!status) return {"disk", status.error().message(), "choose a folder you can write to", true, ErrorKind::device};
+  if (!status) return {"disk", status.error().where + ": " + status.error().found, "choose a folder you can write to", true, ErrorKind::device};
   const double free_gib = static_cast<double>(space.available) / (1 << 30);
   const double mib_s = writes / seconds;
   std::string remedy;

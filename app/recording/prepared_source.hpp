@@ -24,6 +24,7 @@ class PreparedSource final : public FrameSource {
   bool can_wait() const override { return source_->can_wait(); }
   void request_correction() override { source_->request_correction(); }
   std::string transport_report() const override { return source_->transport_report(); }
+  std::vector<Delivery> unfinished() override;
   bool resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames) override {
     return source_->resume(device, frames);
   }
@@ -37,6 +38,8 @@ class PreparedSource final : public FrameSource {
   void fit(std::string device_id, std::uint64_t first_id, bool tracking);
 
  private:
+  void renumber(Delivery& delivery);
+
   std::unique_ptr<FrameSource> source_;
   std::deque<Result<Delivery>> waiting_;  ///< delivered before what the source has next
   bool started_ = false, tracking_ = false;

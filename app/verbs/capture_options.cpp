@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <set>
 
 #include "capture/mat/mat_finder.hpp"
@@ -54,13 +55,38 @@ Status CaptureOptions::validate() const {
   return {};
 }
 
+namespace {
+
+/// What is recorded there would come in again as a photo.
+Status check_watched(const recording::CameraSpec& spec, const std::string& session) {
+  std::error_code error;
+  const auto whole = [&](const std::string& name) {
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(name, error), error);
+  };
+  const auto watched = whole(spec.camera);
+  auto folder = whole(session);
+  if (!folder.has_filename()) folder = folder.parent_path();
+  const auto apart = std::mismatch(folder.begin(), folder.end(), watched.begin(), watched.end());
+  if (spec.driver != "stills" || spec.camera.empty() || apart.first != folder.end()) return {};
+  return fail(ErrorKind::usage, "stills:" + spec.camera,
+              "lies in the session that it is recorded into",
+              "name the folder where photos arrive");
+}
+
+}  // namespace
+
 Result<recording::Cameras> cameras_of(const CaptureOptions& o) {
+  std::error_code error;
+  if (!o.profiles.empty() && !std::filesystem::is_directory(o.profiles, error))
+    return fail(ErrorKind::input, "--profiles " + o.profiles, "no such folder",
+                "name a folder of camera profiles");
   recording::Cameras cameras;
   for (const Modality modality : {Modality::visible, Modality::thermal}) {
     const std::string& own = modality == Modality::visible ? o.visible : o.thermal;
     const std::string& text = own.empty() ? o.driver : own;
     if (text.empty()) continue;
     ORBITFUSE_ASSIGN(const recording::CameraSpec spec, recording::parse_camera_spec(text));
+    ORBITFUSE_TRY(check_watched(spec, o.session));
     ORBITFUSE_TRY(recording::add_cameras(spec, modality, o.profiles, cameras));
   }
   if (cameras.sources.empty()) {

@@ -15,7 +15,7 @@ struct Options {
   std::optional<double> kelvin_per_count, kelvin_offset;
   std::optional<double> reflected_c, air_c, humidity_percent;
   std::optional<double> spacing_deg;
-  int loops = 1;
+  std::optional<int> loops;
   std::vector<double> elevations_deg;
 };
 
@@ -83,7 +83,7 @@ void resolve(Options& o) {
   if (o.spacing_deg) {
     DeclaredStations stations;
     stations.spacing_deg = *o.spacing_deg;
-    stations.loops = o.loops;
+    stations.loops = o.loops.value_or(1);
     stations.elevations_deg = o.elevations_deg;
     o.import.visible_stations = o.import.thermal_stations = stations;
   }
@@ -103,8 +103,28 @@ Status check_common(const CommonOptions& common) {
   return {};
 }
 
+/// Options that only mean something with another one.
+Status check_alone(const Options& o) {
+  const auto needs = [](const char* option, const char* other) {
+    return fail(ErrorKind::usage, option, std::string("given without ") + other,
+                std::string("give ") + other + " too, or leave it out");
+  };
+  if (!o.spacing_deg && o.loops) return needs("--loops", "--station-spacing-deg");
+  if (!o.spacing_deg && !o.elevations_deg.empty())
+    return needs("--elevations-deg", "--station-spacing-deg");
+  if (o.scale != "linear" && o.kelvin_per_count)
+    return needs("--kelvin-per-count", "--thermal-scale linear");
+  if (o.scale != "linear" && o.kelvin_offset)
+    return needs("--kelvin-offset", "--thermal-scale linear");
+  const bool no_thermal = o.import.thermal.empty() && o.import.thermal_tracking.empty() &&
+                          !o.import.transforms_json;
+  if (no_thermal && o.scale != "auto") return needs("--thermal-scale", "--thermal");
+  return {};
+}
+
 Status run(Context& context, Options& o) {
   ORBITFUSE_TRY(check_common(context.common));
+  ORBITFUSE_TRY(check_alone(o));
   resolve(o);
   const bool dry = context.common.dry_run;
   ORBITFUSE_ASSIGN(const ImportReport report,

@@ -143,6 +143,17 @@ TEST(Refused, DeviceAndFolderWithoutPermission) {
   std::filesystem::permissions(temp.path, std::filesystem::perms::owner_all);
 }
 
+TEST(Refused, SessionThatMayNotBeRead) {
+  const TempFolder temp;
+  std::ofstream(temp.path / "manifest.jsonl") << "x";
+  std::filesystem::permissions(temp.path, std::filesystem::perms::none);
+  if (as_nobody({"--version"}).code != 0) GTEST_SKIP() << "setpriv, or the program for other users, is missing";
+  const Outcome outcome = as_nobody({"inspect", temp.path});
+  std::filesystem::permissions(temp.path, std::filesystem::perms::owner_all);
+  EXPECT_EQ(outcome.code, 3) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("Permission denied"));
+}
+
 /// On a disk of 16 MiB.
 TEST(Refused, DiskWithTooLittleSpace) {
   const TempFolder temp;

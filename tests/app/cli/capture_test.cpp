@@ -193,6 +193,40 @@ TEST(Capture, FilesPassedOverAreNamed) {
   EXPECT_THAT(outcome.err, HasSubstr("stills, camera known from its first photo"));
 }
 
+/// Whoever took it thinks that it is in the session.
+TEST(Capture, PhotoThatWasNotWholeAtTheEndIsAccountedFor) {
+  const TempFolder temp;
+  const auto card = temp.path / "card";
+  std::filesystem::create_directory(card);
+  ASSERT_TRUE(write_png(card / "a.png", cv::Mat(30, 40, CV_8UC3, cv::Scalar(9, 80, 7))));
+  std::ofstream(card / "cut.png", std::ios::binary) << read_file(card / "a.png")->substr(0, 60);
+  std::ofstream(card / "zero.png").flush();
+  const std::string camera = "stills:" + card.string() + ",existing=yes";
+  const Outcome short_one = orbitfuse_program({"capture", temp.path / "short", "--visible", camera, "--seconds", "0.5"});
+  EXPECT_THAT(short_one.out, testing::AllOf(HasSubstr("no frame came"), HasSubstr("3 files passed over"),
+                                            HasSubstr("a.png: not read before the recording ended"),
+                                            HasSubstr("zero.png: an empty file")));
+  const Outcome outcome = orbitfuse_program({"capture", temp.path / "s", "--visible", camera, "--seconds", "2.5"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("1 received, 1 lost (0 missing, 1 rejected, 0 dropped) of ids 0 to 1"));
+  EXPECT_THAT(outcome.out, HasSubstr("1 file passed over, last zero.png"));
+  const Session session = opened(temp.path / "s");
+  ASSERT_EQ(session.gaps.size(), 1u);
+  EXPECT_THAT(session.gaps[0].reason, HasSubstr("cut.png"));
+}
+
+TEST(Capture, NamesThatAreNotUtf8) {
+  const TempFolder temp;
+  const std::string session = temp.path / "gr\xf6\xdf" "e";
+  const Outcome captured = orbitfuse_program({"capture", session, "--visible", tiny, "--json"});
+  EXPECT_EQ(captured.code, 0) << captured.err;
+  EXPECT_EQ(captured.result().at("ok"), true);
+  EXPECT_EQ(orbitfuse_program({"inspect", session, "--json"}).result().at("ok"), true);
+  const Outcome unknown = orbitfuse_program({"inspect", "\xff", "--json"});
+  EXPECT_EQ(unknown.code, 3);
+  EXPECT_EQ(unknown.result().at("exit_code"), 3);
+}
+
 TEST(Capture, WithoutAFrameTheAccountHasNoIds) {
   const TempFolder temp;
   const std::vector<std::string> words = {"capture", temp.path / "s", "--visible", "stills:" + temp.path.string(),

@@ -75,6 +75,10 @@ TEST_F(DryRun, CamerasAndGuides) {
   expect_refused({"capture", fresh, "--visible", "stills:" + photos + "/none"}, 3, "none");
   expect_refused({"capture", fresh, "--visible", tiny, "--spacing-deg", "31"}, 2,
                  "guide.spacing_deg");
+  expect_refused({"capture", fresh, "--visible", "aravis", "--profiles", photos + "/none"}, 3, "no such folder");
+  expect_refused({"capture", done, "--resume", "--visible", "stills:" + done + "/visible"}, 2,
+                 "lies in the session that it is recorded into");
+  expect_refused({"capture", done, "--force", "--visible", tiny}, 2, "never overwritten");
   expect_refused({"capture", fresh, "--visible", tiny, "--page", "somewhere"}, 2, "write PORT");
 }
 
@@ -84,6 +88,19 @@ TEST_F(DryRun, PhotosThatCannotBeImported) {
   expect_refused({"import", fresh, "--visible", temp.path / "file"}, 3, "file");
   expect_refused({"import", fresh, "--visible", photos, "--transforms", temp.path / "file"}, 3,
                  "file");
+}
+
+TEST_F(DryRun, ImportOptionsWithoutEffect) {
+  const auto refused = [&](std::vector<std::string> options, const std::string& words) {
+    options.insert(options.begin(), {"import", fresh, "--visible", photos});
+    expect_refused(options, 2, words);
+  };
+  refused({"--loops", "2"}, "--loops: given without --station-spacing-deg");
+  refused({"--elevations-deg", "10"}, "--elevations-deg: given without --station-spacing-deg");
+  refused({"--kelvin-per-count", "5"}, "--kelvin-per-count: given without --thermal-scale linear");
+  refused({"--thermal-scale", "linear"}, "--thermal-scale: given without --thermal");
+  refused({photos + "/a.png"}, "given twice");
+  refused({""}, "an empty name");
 }
 
 TEST_F(DryRun, SaysWhatImportWouldMake) {
