@@ -121,6 +121,7 @@ struct Recorder::Channel {
 
   void capture() {
     Status status = source.start();
+    const bool started = status.has_value();
     while (status && !stopping()) {
       Result<Delivery> delivery = source.next(options.next_timeout);
       if (!delivery) {
@@ -138,7 +139,7 @@ struct Recorder::Channel {
       if (delivery->kind == Delivery::Kind::end) break;
       take(*std::move(delivery));
     }
-    for (Delivery& late : source.unfinished()) {
+    for (Delivery& late : started ? source.unfinished() : std::vector<Delivery>{}) {
       {
         const std::lock_guard lock(mutex);
         note(late);

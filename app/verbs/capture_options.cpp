@@ -25,38 +25,6 @@ bool looks_for_mat(const CaptureOptions& o, const recording::Cameras& cameras) {
   return o.guide == "auto" && !o.turntable_deg && !cameras.stations;
 }
 
-}  // namespace
-
-Status CaptureOptions::validate() const {
-  constexpr double longest_s = 1e7;  // four months
-  if (!(seconds >= 0 && seconds <= longest_s))
-    return wrong("--seconds", text(seconds), "give 0 (until it is stopped) to 10000000");
-  if (spacing_deg && !(*spacing_deg >= 1 && *spacing_deg <= 120))
-    return wrong("--spacing-deg", text(*spacing_deg), "give 1 to 120, a divisor of 360");
-  if (turntable_deg && !(*turntable_deg != 0 && std::abs(*turntable_deg) <= 120)) {
-    return wrong("--turntable", text(*turntable_deg),
-                 "give the table's step, -120 to 120 and not 0; leave it out without a turntable");
-  }
-  if (turntable_deg && guide == "off")
-    return wrong("--turntable", "given with --guide off", "leave one of them out");
-  for (const double px : max_edge_px) {
-    if (!(px > 0 && px <= 100))
-      return wrong("--max-edge-px", text(px), "give more than 0, at most 100");
-  }
-  for (const double elevation : elevations_deg) {
-    if (!(elevation > -90 && elevation < 90))
-      return wrong("--elevations-deg", text(elevation),
-                   "give -90 to 90, without the two themselves");
-  }
-  if (!token.empty() && page.empty())
-    return wrong("--token", "given without --page", "name the page's port with --page");
-  if (stop_when_complete && guide == "off")
-    return wrong("--stop-when-complete", "given with --guide off", "leave one of them out");
-  return {};
-}
-
-namespace {
-
 /// What is recorded there would come in again as a photo.
 Status check_watched(const recording::CameraSpec& spec, const std::string& session) {
   std::error_code error;
@@ -73,7 +41,45 @@ Status check_watched(const recording::CameraSpec& spec, const std::string& sessi
               "name the folder where photos arrive");
 }
 
+/// The first option that only a guide obeys; null: none.
+const char* option_for_guide(const CaptureOptions& o) {
+  if (o.turntable_deg) return "--turntable";
+  if (o.spacing_deg) return "--spacing-deg";
+  if (!o.elevations_deg.empty()) return "--elevations-deg";
+  if (!o.max_edge_px.empty()) return "--max-edge-px";
+  return o.stop_when_complete ? "--stop-when-complete" : nullptr;
+}
+
 }  // namespace
+
+Status CaptureOptions::validate() const {
+  if (session.empty()) return wrong("session", "empty", "name the session's folder");
+  constexpr double longest_s = 1e7;  // four months
+  if (!(seconds >= 0 && seconds <= longest_s))
+    return wrong("--seconds", text(seconds), "give 0 (until it is stopped) to 10000000");
+  if (spacing_deg && !(*spacing_deg >= 1 && *spacing_deg <= 120))
+    return wrong("--spacing-deg", text(*spacing_deg), "give 1 to 120, a divisor of 360");
+  if (turntable_deg && !(*turntable_deg != 0 && std::abs(*turntable_deg) <= 120)) {
+    return wrong("--turntable", text(*turntable_deg),
+                 "give the table's step, -120 to 120 and not 0; leave it out without a turntable");
+  }
+  for (const double px : max_edge_px) {
+    if (!(px > 0 && px <= 100))
+      return wrong("--max-edge-px", text(px), "give more than 0, at most 100");
+  }
+  for (const double elevation : elevations_deg) {
+    if (!(elevation > -90 && elevation < 90))
+      return wrong("--elevations-deg", text(elevation),
+                   "give -90 to 90, without the two themselves");
+  }
+  if (!token.empty() && page.empty())
+    return wrong("--token", "given without --page", "name the page's port with --page");
+  if (const char* option = option_for_guide(*this); option && guide == "off")
+    return wrong(option, "given with --guide off", "leave one of them out");
+  if (!driver.empty() && !visible.empty() && !thermal.empty())
+    return wrong("--driver", driver, "leave it out: --visible and --thermal name both cameras");
+  return {};
+}
 
 Result<recording::Cameras> cameras_of(const CaptureOptions& o) {
   std::error_code error;

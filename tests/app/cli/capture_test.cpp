@@ -271,6 +271,8 @@ TEST(Capture, MistakesHaveARemedyAndLeaveNothing) {
       {{"--visible", "stills:.", "--guide", "key", "--mat-tags", "7"}, 2, "use --guide auto without --turntable"},
       {{"--visible", "stills:.", "--mat-tags", "0"}, 2, "mat.tags_per_side: 0; must be 2 to 15"},
       {{"--driver", tiny, "--guide", "key"}, 2, "--guide key: replayed and synthetic frames don't wait for a key"},
+      {{"--driver", tiny, "--guide", "off", "--spacing-deg", "60"}, 2, "--spacing-deg: given with --guide off"},
+      {{"--driver", tiny, "--visible", tiny, "--thermal", tiny}, 2, "leave it out: --visible and --thermal"},
       {{"--driver", tiny, "--token", "12345678"}, 2, "--token: given without --page"},
   };
   for (const Case& c : cases) {
