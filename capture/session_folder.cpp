@@ -10,8 +10,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Names like "new/../s" stay as they are: the kernel goes through "new" too.
 fs::path without_trailing_slash(const fs::path& folder) {
-  const fs::path plain = fs::absolute(folder).lexically_normal();
+  const fs::path plain = fs::absolute(folder);
   return plain.has_filename() ? plain : plain.parent_path();
 }
 
@@ -21,7 +22,7 @@ tl::unexpected<Error> cannot_make(const fs::path& folder, const std::error_code&
       return fail(ErrorKind::usage, folder.string(), error.message(), "choose a shorter name");
     case ENOTDIR:
     case EEXIST:
-      return fail(ErrorKind::input, folder.string(), "a part of the path is a file, not a folder",
+      return fail(ErrorKind::input, folder.string(), "a part of the path is a file or a broken link",
                   "choose another folder");
     case ENOSPC:
     case EDQUOT:

@@ -37,7 +37,7 @@ void add_common(CLI::App& app, CommonOptions& common) {
   app.add_flag("-q,--quiet", common.quiet, "Errors only")->group(group);
   app.add_option("--threads", common.threads, "Worker threads; 0 = all cores")
       ->check(CLI::Range(0, 1024))->group(group);
-  app.add_option("--seed", common.seed, "Seed of everything random")->capture_default_str()->group(group);
+  app.add_option("--seed", common.seed, "Seed of everything random")->check(CLI::NonNegativeNumber)->capture_default_str()->group(group);
   app.add_option("--device", common.device, "Where to compute")
       ->check(CLI::IsMember({"cpu", "cuda"}))->capture_default_str()->group(group);
   app.add_flag("--force", common.force, "Run again although nothing changed")->group(group);

@@ -47,17 +47,22 @@ class ReplaySource : public FrameSource {
     std::map<std::pair<std::string, std::int64_t>, std::uint64_t> recorded;
     for (const FrameRecord& frame : frames)
       recorded[{frame.content_hash, frame.host_time_ns}] = frame.sequence;
-    for (std::size_t i = records_.size(); i > 0; --i) {
-      const FrameRecord& record = records_[i - 1];
+    const auto sequence_of = [&](const FrameRecord& record) -> const std::uint64_t* {
       const auto found = recorded.find({record.content_hash, record.host_time_ns});
-      if (found == recorded.end()) continue;
-      next_ = i;
-      first_ = std::min(i, records_.size() - 1);
-      id_offset_ = found->second - record.sequence;
-      resumed_ = resumed_event(i, records_.size());
-      return true;
+      return found == recorded.end() ? nullptr : &found->second;
+    };
+    std::size_t known = 0;
+    for (std::size_t i = 0; i < records_.size(); ++i) {
+      const std::uint64_t* sequence = sequence_of(records_[i]);
+      if (!sequence) continue;
+      ++known;
+      next_ = i + 1;
+      id_offset_ = *sequence - records_[i].sequence;
     }
-    return false;
+    if (known == 0) return false;
+    first_ = std::min(next_, records_.size() - 1);
+    resumed_ = resumed_event(known, records_.size(), next_ == records_.size());
+    return true;
   }
 
   Result<Delivery> next(std::chrono::milliseconds timeout) override {

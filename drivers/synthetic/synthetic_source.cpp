@@ -44,16 +44,18 @@ class SyntheticSource : public FrameSource {
 
   /// Goes on after the last frame of the same walk that the earlier recording has.
   bool resume(const DeviceInfo&, const std::vector<FrameRecord>& frames) override {
-    for (std::size_t i = walk_.size(); i > 0; --i) {
+    std::size_t known = 0;
+    for (std::size_t i = 0; i < walk_.size(); ++i) {
       const auto found = std::find_if(frames.begin(), frames.end(),
-                                      [&](const FrameRecord& f) { return is_of(f, walk_[i - 1]); });
+                                      [&](const FrameRecord& f) { return is_of(f, walk_[i]); });
       if (found == frames.end()) continue;
-      next_ = i;
-      id_offset_ = found->sequence - (i - 1);
-      resumed_ = resumed_event(i, walk_.size());
-      return true;
+      ++known;
+      next_ = i + 1;
+      id_offset_ = found->sequence - i;
     }
-    return false;
+    if (known == 0) return false;
+    resumed_ = resumed_event(known, walk_.size(), next_ == walk_.size());
+    return true;
   }
 
   Result<Delivery> next(std::chrono::milliseconds) override {

@@ -265,6 +265,7 @@ TEST(Capture, MistakesHaveARemedyAndLeaveNothing) {
       {{"--driver", tiny, "--seconds", "-1"}, 2, "--seconds: -1; give 0 (until it is stopped) to 10000000"},
       {{"--driver", tiny, "--seconds", "nan"}, 2, "--seconds: nan"},
       {{"--driver", tiny, "--max-edge-px", "0", "3"}, 2, "--max-edge-px: 0; give more than 0"},
+      {{"--driver", tiny, "--elevations-deg", "10", "12"}, 2, "degrees apart or more"},
       {{"--driver", tiny, "--elevations-deg", "100"}, 2, "--elevations-deg: 100"},
       {{"--driver", tiny, "--mat-tags", "7"}, 2, "the frames carry their stations"},
       {{"--driver", tiny, "--mat", "foil"}, 2, "--mat: no mat is looked for"},

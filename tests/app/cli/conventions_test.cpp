@@ -60,6 +60,7 @@ TEST(Cli, SlipsGetASuggestionAndExitCode2) {
   EXPECT_EQ(orbitfuse_program({"run"}).code, 2);
   EXPECT_EQ(orbitfuse_program({"run", "x", "--threads", "many"}).code, 2);
   EXPECT_EQ(orbitfuse_program({"run", "x", "--device", "tpu"}).code, 2);
+  EXPECT_EQ(orbitfuse_program({"run", "x", "--seed", "-1"}).code, 2);
 }
 
 TEST(Cli, UsageErrorsKeepTheJsonContract) {

@@ -33,6 +33,7 @@ class DryRun : public ::testing::Test {
     }
     fs::create_directory(temp.path / "empty");
     std::ofstream(temp.path / "file") << "x";
+    fs::create_symlink(temp.path / "nowhere", temp.path / "broken");
     ASSERT_EQ(orbitfuse_program({"import", done, "--visible", photos}).code, 0);
     before = tree(temp.path);
   }
@@ -58,6 +59,7 @@ TEST_F(DryRun, FoldersThatNoSessionCanBeMadeIn) {
       {temp.path / std::string(300, 'x'), 2, "choose a shorter name"},
       {temp.path / "made" / "on" / "the" / "way" / std::string(300, 'x'), 2,
        "choose a shorter name"},
+      {temp.path / "broken", 3, "a broken link"},
       {"/proc/orbitfuse", 4, "/proc/orbitfuse"},
   };
   for (const Case& c : cases) {
@@ -75,7 +77,8 @@ TEST_F(DryRun, CamerasAndGuides) {
   expect_refused({"capture", fresh, "--visible", "stills:" + photos + "/none"}, 3, "none");
   expect_refused({"capture", fresh, "--visible", tiny, "--spacing-deg", "31"}, 2,
                  "guide.spacing_deg");
-  expect_refused({"capture", fresh, "--visible", "aravis", "--profiles", photos + "/none"}, 3, "no such folder");
+  expect_refused({"capture", fresh, "--visible", "aravis", "--profiles", photos + "/none"}, 3,
+                 "no such folder");
   expect_refused({"capture", done, "--resume", "--visible", "stills:" + done + "/visible"}, 2,
                  "lies in the session that it is recorded into");
   expect_refused({"capture", done, "--force", "--visible", tiny}, 2, "never overwritten");
@@ -101,6 +104,18 @@ TEST_F(DryRun, ImportOptionsWithoutEffect) {
   refused({"--thermal-scale", "linear"}, "--thermal-scale: given without --thermal");
   refused({photos + "/a.png"}, "given twice");
   refused({""}, "an empty name");
+}
+
+TEST_F(DryRun, WayThroughAFolderThatIsMadeToo) {
+  const std::string roundabout = temp.path / "a" / ".." / "b" / "." / "c" / "";
+  const Outcome dry = orbitfuse_program({"capture", roundabout, "--visible", tiny, "--dry-run"});
+  EXPECT_EQ(dry.code, 0) << dry.err;
+  EXPECT_EQ(tree(temp.path), before);
+  const Outcome real = orbitfuse_program({"capture", roundabout, "--visible", tiny});
+  EXPECT_EQ(real.code, 0) << real.err;
+  EXPECT_TRUE(open_session(temp.path / "b" / "c"));
+  fs::remove_all(temp.path / "a");
+  fs::remove_all(temp.path / "b");
 }
 
 TEST_F(DryRun, SaysWhatImportWouldMake) {

@@ -83,6 +83,18 @@ TEST_F(Resumed, ReplayVerbToo) {
   resume({"replay", once, "--to", again});
 }
 
+TEST_F(Resumed, DamagedFramesAreNotSaidToBeThere) {
+  ASSERT_EQ(
+      orbitfuse_program({"capture", once, "--visible", "synthetic,size=64x48,spacing=60"}).code, 0);
+  std::ofstream(once + "/visible/000004.jpg", std::ios::app) << "damage";
+  const std::vector<std::string> command = {"capture", again, "--visible", "replay:" + once};
+  ASSERT_EQ(orbitfuse_program(command).code, 0);
+  const Outcome rest =
+      orbitfuse_program({command[0], command[1], command[2], command[3], "--resume"});
+  EXPECT_EQ(rest.code, 0);
+  EXPECT_THAT(rest.err, HasSubstr("11 of 12 frames are in the session already, the last one too"));
+}
+
 /// Another session of the same camera is no repetition: its frames come after the first one's.
 TEST_F(Resumed, AnotherSessionIsAppended) {
   ASSERT_EQ(
