@@ -36,10 +36,14 @@ Status rehearse(Context& context, const CaptureOptions& o, const recording::Came
     context.console.data(fmt::format(
         "{} ({}): {} frames{}{}, {} rejected, {} missing", r.device.id, described(r.device),
         r.frames, r.frames > 0 ? fmt::format(" of {}x{}", r.width, r.height) : "",
-        cameras.live && r.frames > 1 ? fmt::format(" at {:.1f} Hz", r.rate_hz) : "", r.rejected,
+        cameras.live && r.rate_hz > 0 ? fmt::format(" at {:.1f} Hz", r.rate_hz) : "", r.rejected,
         r.missing));
-    for (const auto& [reason, times] : r.reasons)
-      context.console.warning(fmt::format("{}: {} ({} times)", r.device.id, reason, times));
+    for (const auto& [reason, times] : r.reasons) {
+      const auto last = r.details.find(reason);
+      context.console.warning(
+          fmt::format("{}: {} ({} {}){}", r.device.id, reason, times, times == 1 ? "time" : "times",
+                      last == r.details.end() ? "" : ", last " + last->second));
+    }
     streams.push_back({{"device", r.device.id},
                        {"driver", r.device.driver},
                        {"model", known_or_null(r.device.model)},

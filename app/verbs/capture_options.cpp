@@ -223,6 +223,15 @@ void add_capture_options(CLI::App& app, CaptureOptions& options) {
                  "VISIBLE THERMAL: edges blurred wider than this (Gaussian sigma, with 640 pixels "
                  "along the longer side) are no station; 1.75 3.2 if not given")
       ->expected(2);
+  // A shell's unset variable must not silently leave a camera or the page out.
+  const CLI::Validator named(
+      [](const std::string& given) {
+        return std::string(given.empty() ? "given without a name" : "");
+      },
+      "", "");
+  for (const char* option :
+       {"--visible", "--thermal", "--driver", "--page", "--profiles", "--token"})
+    app.get_option(option)->check(named);
 }
 
 }  // namespace orbitfuse::cli

@@ -134,6 +134,15 @@ TEST_F(DryRun, WatchedFolderMayStillBeEmpty) {
   EXPECT_THAT(dry.err, HasSubstr("no new photo came meanwhile"));
 }
 
+TEST_F(DryRun, WatchedPhotosHaveNoRateAndThoseIgnoredAreNamed) {
+  const std::string camera = "stills:" + photos + ",existing=yes";
+  const Outcome dry =
+      orbitfuse_program({"capture", fresh, "--visible", camera, "--thermal", camera, "--dry-run"});
+  EXPECT_EQ(dry.code, 0) << dry.err;
+  EXPECT_THAT(dry.out, HasSubstr("2 frames of 40x30, 0 rejected"));
+  EXPECT_THAT(dry.err, HasSubstr("thermal0: ignored (2 times), last b.png: no temperatures in it"));
+}
+
 /// What an import refuses to do must not be its own remedy.
 TEST_F(DryRun, ImportDoesNotSendToResume) {
   const Outcome again = orbitfuse_program({"import", done, "--visible", photos});
