@@ -222,6 +222,9 @@ TEST(Capture, NamesThatAreNotUtf8) {
   EXPECT_EQ(captured.code, 0) << captured.err;
   EXPECT_EQ(captured.result().at("ok"), true);
   EXPECT_EQ(orbitfuse_program({"inspect", session, "--json"}).result().at("ok"), true);
+  const Outcome run = orbitfuse_program({"run", session, "--out", temp.path / "out"});
+  EXPECT_EQ(run.code, 2) << run.err;
+  EXPECT_THAT(run.err, HasSubstr("its name is not UTF-8; rename the folder"));
   const Outcome unknown = orbitfuse_program({"inspect", "\xff", "--json"});
   EXPECT_EQ(unknown.code, 3);
   EXPECT_EQ(unknown.result().at("exit_code"), 3);
