@@ -63,14 +63,20 @@ class FrameSource {
   virtual Result<Delivery> next(std::chrono::milliseconds timeout) = 0;
   virtual void stop() = 0;
   /// Goes on with a session: what an earlier recording knew of the device, and its frames. Called
-  /// before the first next(); a source of files leaves out those that it delivered then.
-  virtual void resume(const DeviceInfo& /*device*/, const std::vector<FrameRecord>& /*frames*/) {}
+  /// before the first next(); a source of files leaves out those that it delivered then. True when
+  /// its ids go on after the earlier ones by themselves; else the recording shifts them there.
+  virtual bool resume(const DeviceInfo& /*device*/, const std::vector<FrameRecord>& /*frames*/) {
+    return false;
+  }
   /// Asks for a shutter correction (NUC) as soon as can be; from any thread. Events of the stream
   /// tell what came of it ("nuc", "nuc-failed"). Nothing for cameras that have none.
   virtual void request_correction() {}
   /// What the transport counted, for people, e.g. "1800 completed, 12 resent"; empty: nothing is
   /// counted. From the thread of next(), before stop().
   virtual std::string transport_report() const { return {}; }
+  /// What is to be told when the recording ends before the source does: files that were still
+  /// waited for. Events and rejections; from the thread of next(), before stop().
+  virtual std::vector<Delivery> unfinished() { return {}; }
   /// Whether nothing is lost when the recorder takes its time (files): then it never drops.
   virtual bool can_wait() const { return false; }
 };

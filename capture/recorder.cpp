@@ -14,17 +14,10 @@
 namespace orbitfuse {
 namespace {
 
-namespace fs = std::filesystem;
 using Loss = StreamAccount::Loss;
 
-Status check_disk(const fs::path& folder, std::uint64_t min_free_bytes) {
-  std::error_code error;
-  const auto space = fs::space(folder, error);
-  if (error || space.available >= min_free_bytes) return {};
-  return fail(ErrorKind::device, folder.string(),
-              fmt::format("{:.0f} MiB free on the disk", static_cast<double>(space.available) / 1048576.0),
-              "free disk space and resume the session; every frame acknowledged is safe");
-}
+constexpr const char* when_full =
+    "free disk space and resume the session; every frame acknowledged is safe";
 
 }  // namespace
 
@@ -54,6 +47,8 @@ struct Recorder::Channel {
   std::optional<Error> error;
   std::optional<FrameRecord> latest;
   std::string notice;
+  std::uint64_t passed_over = 0;
+  std::vector<std::string> passed_over_last;
 
   bool stopping() {
     const std::lock_guard lock(mutex);
@@ -92,8 +87,14 @@ struct Recorder::Channel {
   /// Of an event that asks for the operator; with the mutex held.
   void note(const Delivery& delivery) {
     if (delivery.kind != Delivery::Kind::event) return;
-    for (const char* kind : {"moved", "twin", "look-alike", "reopen-failed", "setting-lost"}) {
+    for (const char* kind : {"moved", "twin", "look-alike", "reopen-failed", "setting-lost", "nothing-new"}) {
       if (delivery.reason == kind) notice = delivery.detail;
+    }
+    if (delivery.reason == "ignored" || delivery.reason == "duplicate") {
+      constexpr std::size_t shown = 3;
+      ++passed_over;
+      if (passed_over_last.size() == shown) passed_over_last.erase(passed_over_last.begin());
+      passed_over_last.push_back(delivery.detail);
     }
     if (delivery.reason == "reconnected") notice.clear();
   }
@@ -120,6 +121,7 @@ struct Recorder::Channel {
 
   void capture() {
     Status status = source.start();
+    const bool started = status.has_value();
     while (status && !stopping()) {
       Result<Delivery> delivery = source.next(options.next_timeout);
       if (!delivery) {
@@ -136,6 +138,13 @@ struct Recorder::Channel {
       }
       if (delivery->kind == Delivery::Kind::end) break;
       take(*std::move(delivery));
+    }
+    for (Delivery& late : started ? source.unfinished() : std::vector<Delivery>{}) {
+      {
+        const std::lock_guard lock(mutex);
+        note(late);
+      }
+      take(std::move(late));
     }
     if (const std::string counted = source.transport_report(); !counted.empty()) log_event("transport", counted);
     source.stop();
@@ -170,7 +179,7 @@ struct Recorder::Channel {
   }
 
   void store(const Frame& frame) {
-    if (const Status space = check_disk(writer.folder(), options.min_free_bytes); !space) {
+    if (const Status space = check_free_space(writer.folder(), options.min_free_bytes, when_full); !space) {
       return give_up(frame, space.error());
     }
     tell_what_is_known();
@@ -222,8 +231,8 @@ struct Recorder::Channel {
   StreamStatus status() {
     const StreamAccount::Counts c = account.counts();
     const std::lock_guard lock(mutex);
-    return {device.id, c.received, c.lost(), c.first,  c.last,       c.missing,
-            c.rejected, c.dropped, silent,   capture_over && queue.empty(), notice, latest};
+    return {device.id, c.received, c.lost(), c.first, c.last, c.missing, c.rejected, c.dropped,
+            silent, capture_over && queue.empty(), passed_over, passed_over_last, notice, latest};
   }
 };
 
@@ -241,7 +250,7 @@ Recorder::Recorder(SessionWriter& writer, RecorderOptions options) : writer_(wri
 
 Status Recorder::run(const std::vector<FrameSource*>& sources, const Progress& progress) {
   ORBITFUSE_TRY(options_.validate());
-  ORBITFUSE_TRY(check_disk(writer_.folder(), options_.min_free_bytes));
+  ORBITFUSE_TRY(check_free_space(writer_.folder(), options_.min_free_bytes, when_full));
   std::vector<std::shared_ptr<Channel>> channels;
   for (FrameSource* source : sources) {
     channels.push_back(std::make_shared<Channel>(*source, writer_, options_, progress, on_frame));

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "capture/frame_source.hpp"
+#include "capture/session_folder.hpp"
 #include "capture/session_writer.hpp"
 #include "core/progress.hpp"
 
@@ -25,7 +26,8 @@ struct RecorderOptions {
   int queue_frames = 16;                 ///< per camera; bounds memory when the disk is slow
   Backpressure backpressure = Backpressure::drop_newest;
   std::chrono::milliseconds next_timeout{200};  ///< the early alarm for a silent camera
-  std::uint64_t min_free_bytes = 64ull << 20;   ///< below this recording stops with an error
+  /// Below this recording stops with an error.
+  std::uint64_t min_free_bytes = min_free_session_bytes;
 
   Status validate() const;
 };
@@ -36,8 +38,13 @@ struct StreamStatus {
   std::uint64_t received = 0, lost = 0, first_id = 0, last_id = 0;
   std::uint64_t missing = 0, rejected = 0, dropped = 0;  ///< the parts of lost
   bool silent = false, ended = false;
+  std::uint64_t passed_over = 0;              ///< files that were no frames
+  std::vector<std::string> passed_over_last;  ///< up to three: name and why
   std::string notice;  ///< what the operator should look into: "moved", "twin", "look-alike", ...
   std::optional<FrameRecord> latest;
+
+  /// Whether a frame came at all; before, the ids say nothing.
+  bool any() const { return received + lost > 0; }
 };
 
 /// Records several cameras into one session: a capture thread per camera, a bounded queue each,

@@ -14,6 +14,7 @@
 
 #include "capture/frame_encoding.hpp"
 #include "capture/frame_quality.hpp"
+#include "capture/session_folder.hpp"
 #include "core/file_io.hpp"
 #include "core/image_codec.hpp"
 #include "core/utc_now.hpp"
@@ -53,6 +54,11 @@ Result<int> open_manifest(const fs::path& folder, int extra_flags) {
   return fd;
 }
 
+void remove_manifest(const fs::path& folder) {
+  std::error_code ignored;
+  fs::remove(folder / "manifest.jsonl", ignored);
+}
+
 }  // namespace
 
 SessionWriter::SessionWriter(fs::path folder, int manifest_fd)
@@ -64,23 +70,39 @@ SessionWriter::~SessionWriter() {
 
 Result<std::unique_ptr<SessionWriter>> SessionWriter::create(
     const fs::path& folder, const std::map<std::string, std::string>& notes) {
-  std::error_code error;
-  if (fs::exists(folder, error) && (!fs::is_directory(folder, error) || !fs::is_empty(folder, error))) {
-    const bool is_session = fs::exists(folder / "manifest.jsonl", error);
-    return fail(ErrorKind::input, folder.string(),
-                is_session ? "holds a session already" : "exists and is not an empty folder",
-                is_session ? "choose another folder, or go on with it: --resume" : "choose another folder");
-  }
-  fs::create_directories(folder, error);
-  if (error) return fail(ErrorKind::device, folder.string(), error.message(), "check the permissions");
+  ORBITFUSE_TRY(check_is_new(folder));
+  MadeFolders made;
+  ORBITFUSE_TRY(made.make(folder));
   ORBITFUSE_ASSIGN(const int fd, open_manifest(folder, O_CREAT | O_EXCL));
   std::unique_ptr<SessionWriter> writer(new SessionWriter(folder, fd));
   writer->session_.id = new_id();
   writer->session_.created = utc_now();
   writer->session_.notes = notes;
-  ORBITFUSE_TRY(writer->append_line(manifest_header_line(writer->session_)));
-  ORBITFUSE_TRY(sync_folder(folder));
+  Status begun = writer->append_line(manifest_header_line(writer->session_));
+  if (begun) begun = sync_folder(folder);
+  if (!begun) {
+    remove_manifest(folder);
+    return tl::unexpected(begun.error());
+  }
+  made.keep();
   return writer;
+}
+
+Status SessionWriter::try_create(const fs::path& folder) {
+  ORBITFUSE_TRY(check_is_new(folder));
+  MadeFolders made;
+  ORBITFUSE_TRY(made.make(folder));
+  ORBITFUSE_ASSIGN(const int fd, open_manifest(folder, O_CREAT | O_EXCL));
+  remove_manifest(folder);
+  ::close(fd);
+  return {};
+}
+
+Status SessionWriter::try_resume(const fs::path& folder) {
+  ORBITFUSE_TRY(open_session(folder));
+  ORBITFUSE_ASSIGN(const int fd, open_manifest(folder, 0));
+  ::close(fd);
+  return {};
 }
 
 Result<std::unique_ptr<SessionWriter>> SessionWriter::resume(const fs::path& folder) {

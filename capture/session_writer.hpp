@@ -17,11 +17,14 @@ namespace orbitfuse {
 /// files are never overwritten. All functions may be called from several threads.
 class SessionWriter {
  public:
-  /// A new session: the folder must not exist or be empty.
+  /// A new session: the folder must not exist or be empty. On an error nothing is left behind.
   static Result<std::unique_ptr<SessionWriter>> create(
       const std::filesystem::path& folder, const std::map<std::string, std::string>& notes = {});
   /// Goes on with a session that was recorded before, complete or not.
   static Result<std::unique_ptr<SessionWriter>> resume(const std::filesystem::path& folder);
+  /// Whether create() or resume() would be refused, and why. The folder is made and removed again.
+  static Status try_create(const std::filesystem::path& folder);
+  static Status try_resume(const std::filesystem::path& folder);
   ~SessionWriter();
   SessionWriter(const SessionWriter&) = delete;
   SessionWriter& operator=(const SessionWriter&) = delete;

@@ -83,7 +83,7 @@ Result<Session> open_session(const std::filesystem::path& folder) {
     const bool is_file = std::filesystem::exists(folder, ignored);
     return fail(ErrorKind::input, folder.string(), is_file ? "is a file" : "no such folder", "give a session folder");
   }
-  if (!std::filesystem::exists(file, ignored)) {
+  if (std::filesystem::status(file, ignored).type() == std::filesystem::file_type::not_found) {
     return fail(ErrorKind::input, folder.string(), "no manifest.jsonl, so not a session",
                 "make one with: orbitfuse import");
   }

@@ -18,7 +18,10 @@ class ExampleFirst : public CLI::Formatter {
     return (example.empty() ? "" : "Example:\n  " + example + "\n\n") +
            Formatter::make_description(app);
   }
-  std::string make_footer(const CLI::App*) const override { return {}; }
+  std::string make_footer(const CLI::App* app) const override {
+    if (app->get_parent() != nullptr) return {};
+    return "\norbitfuse help VERB tells a verb's options.\n";
+  }
 };
 
 void add_common(CLI::App& app, CommonOptions& common) {
@@ -34,7 +37,7 @@ void add_common(CLI::App& app, CommonOptions& common) {
   app.add_flag("-q,--quiet", common.quiet, "Errors only")->group(group);
   app.add_option("--threads", common.threads, "Worker threads; 0 = all cores")
       ->check(CLI::Range(0, 1024))->group(group);
-  app.add_option("--seed", common.seed, "Seed of everything random")->capture_default_str()->group(group);
+  app.add_option("--seed", common.seed, "Seed of everything random")->check(CLI::NonNegativeNumber)->capture_default_str()->group(group);
   app.add_option("--device", common.device, "Where to compute")
       ->check(CLI::IsMember({"cpu", "cuda"}))->capture_default_str()->group(group);
   app.add_flag("--force", common.force, "Run again although nothing changed")->group(group);

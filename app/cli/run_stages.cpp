@@ -61,10 +61,15 @@ void add_folders(CLI::App& app, StageFolders& folders) {
 
 namespace {
 
+bool is_utf8(const std::string& text) {
+  return json::parse(json(text).dump(-1, ' ', false, json::error_handler_t::replace)) == text;
+}
+
 /// run.json of an earlier run's folder; null when there is none.
 Result<json> earlier_run(const std::string& folder) {
   const fs::path record = fs::path(folder) / run_file;
-  if (folder.empty() || !fs::exists(record)) return json();
+  std::error_code unreadable;  // whoever opens the session says why
+  if (folder.empty() || !fs::exists(record, unreadable)) return json();
   ORBITFUSE_ASSIGN(const std::string text, read_file(record));
   json run = json::parse(text, nullptr, false);
   if (!run.is_object() || !run.contains("session") || !run["session"].is_string())
@@ -89,6 +94,11 @@ Status resolve(StageFolders& folders) {
     return fail(ErrorKind::usage, "session", "none given",
                 "name a session folder, e.g. replay_data/car");
   ORBITFUSE_ASSIGN(const json run, earlier_run(folders.session));
+  // run.json and the records of the stages are JSON and name both folders.
+  for (const std::string& folder : {folders.session, folders.out}) {
+    if (!is_utf8(folder))
+      return fail(ErrorKind::usage, folder, "its name is not UTF-8", "rename the folder");
+  }
   if (run.is_null()) return {};
   if (folders.out == StageFolders{}.out) folders.out = folders.session;
   folders.session = run["session"];

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "core/result.hpp"
+
 namespace orbitfuse::doctor {
 
 /// One thing looked at. Without remedy it is fine; a finding that is `needed` fails the doctor,
@@ -13,6 +15,7 @@ namespace orbitfuse::doctor {
 struct Finding {
   std::string what, found, remedy;
   bool needed = false;
+  ErrorKind kind = ErrorKind::unavailable;  ///< of the doctor's error, when it is needed
 };
 
 /// Where the kernel's files are read; tests give a folder of their own.

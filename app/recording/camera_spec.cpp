@@ -64,6 +64,7 @@ Result<CameraSpec> parse_camera_spec(const std::string& text) {
                                 : fmt::format("{} has {}, written key=value", spec.driver,
                                               fmt::join(keys, ", ")));
     }
+    if (spec.settings.contains(key)) return wrong(text, key + " is given twice", "give it once");
     spec.settings[key] = setting.substr(equals + 1);
     comma = next;
   }

@@ -29,17 +29,25 @@ Result<Delivery> PreparedSource::next(std::chrono::milliseconds timeout) {
     delivery = std::move(waiting_.front());
     waiting_.pop_front();
   }
-  if (!delivery) return delivery;
-  if (delivery->kind != Delivery::Kind::frame && delivery->kind != Delivery::Kind::rejected)
-    return delivery;
-  std::uint64_t& id = delivery->frame.id;
+  if (delivery) renumber(*delivery);
+  return delivery;
+}
+
+std::vector<Delivery> PreparedSource::unfinished() {
+  std::vector<Delivery> list = source_->unfinished();
+  for (Delivery& delivery : list) renumber(delivery);
+  return list;
+}
+
+void PreparedSource::renumber(Delivery& delivery) {
+  if (delivery.kind != Delivery::Kind::frame && delivery.kind != Delivery::Kind::rejected) return;
+  std::uint64_t& id = delivery.frame.id;
   // Without an earlier recording ids stay the device's own.
   if (first_id_ > 0) {
     if (!source_first_id_) source_first_id_ = id;
     id = first_id_ + (id - *source_first_id_);
   }
-  if (tracking_) delivery->frame.tracking = true;
-  return delivery;
+  if (tracking_) delivery.frame.tracking = true;
 }
 
 void PreparedSource::drop_before(std::int64_t all_run_ns) {

@@ -24,8 +24,9 @@ class PreparedSource final : public FrameSource {
   bool can_wait() const override { return source_->can_wait(); }
   void request_correction() override { source_->request_correction(); }
   std::string transport_report() const override { return source_->transport_report(); }
-  void resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames) override {
-    source_->resume(device, frames);
+  std::vector<Delivery> unfinished() override;
+  bool resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames) override {
+    return source_->resume(device, frames);
   }
 
   /// Cameras start one after the other, and the first one's queue fills meanwhile. Leaves out what
@@ -37,6 +38,8 @@ class PreparedSource final : public FrameSource {
   void fit(std::string device_id, std::uint64_t first_id, bool tracking);
 
  private:
+  void renumber(Delivery& delivery);
+
   std::unique_ptr<FrameSource> source_;
   std::deque<Result<Delivery>> waiting_;  ///< delivered before what the source has next
   bool started_ = false, tracking_ = false;

@@ -54,6 +54,17 @@ Status RecordingOptions::validate() const {
   return guide ? guide->validate() : Status{};
 }
 
+Status check_folder(const RecordingOptions& options) {
+  ORBITFUSE_TRY(options.validate());
+  Status status = options.resume ? SessionWriter::try_resume(options.session)
+                                 : SessionWriter::try_create(options.session);
+  if (!status && !options.resume && status.error().kind == ErrorKind::input &&
+      holds_session(options.session))
+    status.error().remedy += ", or go on with it: --resume";
+  ORBITFUSE_TRY(status);
+  return check_free_space(options.session, options.min_free_bytes);
+}
+
 Recording::Recording(std::vector<std::unique_ptr<FrameSource>> sources, RecordingOptions options,
                      PositionFinder finder)
     : options_(std::move(options)), finder_(std::move(finder)) {
@@ -77,8 +88,8 @@ Status Recording::fit_into(const std::optional<Session>& earlier) {
       const DeviceInfo* known = earlier ? earlier->device(device.id) : nullptr;
       if (used.count(device.id) || (known && !same_camera(*known, device))) continue;
       if (known) {
-        first_id = next_id(*earlier, device.id);
-        source->resume(*known, frames_of(*earlier, device.id));
+        const bool ids_go_on = source->resume(*known, frames_of(*earlier, device.id));
+        first_id = ids_go_on ? 0 : next_id(*earlier, device.id);
         device = *known;
       }
       break;
@@ -91,9 +102,9 @@ Status Recording::fit_into(const std::optional<Session>& earlier) {
 }
 
 Status Recording::prepare() {
-  ORBITFUSE_TRY(options_.validate());
   if (sources_.empty())
     return fail(ErrorKind::usage, "cameras", "none given", "give --visible or --thermal");
+  ORBITFUSE_TRY(check_folder(options_));
   std::optional<Session> earlier;
   if (options_.resume) {
     ORBITFUSE_ASSIGN(earlier, open_session(options_.session));
@@ -115,6 +126,7 @@ Status Recording::prepare() {
     if (earlier) guide_->resume(earlier->frames);
   }
   RecorderOptions recorder_options;
+  recorder_options.min_free_bytes = options_.min_free_bytes;
   if (!options_.live) recorder_options.backpressure = Backpressure::wait;
   recorder_ = std::make_unique<Recorder>(*writer_, recorder_options);
   if (guide_) recorder_->on_frame = [this](const FrameRecord& frame) { guide_->add(frame); };
@@ -163,7 +175,8 @@ Result<Ending> Recording::run(const std::atomic<bool>* cancel, const std::functi
   if (guide_ && guide_->error()) return tl::unexpected(*guide_->error());
   // Ctrl-C is how a live recording ends, but it cuts a replay short.
   if (cancel && *cancel && !options_.live)
-    return fail(ErrorKind::cancelled, "capture", "stopped by the user", "capture it again");
+    return fail(ErrorKind::cancelled, "capture", "stopped by the user",
+                "every frame up to here is safe; the same command with --resume goes on");
   ORBITFUSE_TRY(writer_->close());
   return ending;
 }
@@ -191,14 +204,7 @@ LiveState Recording::state() const {
     state.elapsed_s =
         std::chrono::duration<double>((running_ ? Clock::now() : ended_) - started_).count();
   }
-  // The session's folder is made last: until then its parent's disk counts.
-  std::error_code error;
-  std::filesystem::path folder = std::filesystem::absolute(options_.session);
-  while (!std::filesystem::exists(folder, error) && folder.has_parent_path() &&
-         folder != folder.parent_path())
-    folder = folder.parent_path();
-  const auto space = std::filesystem::space(folder, error);
-  if (!error) state.free_bytes = space.available;
+  state.free_bytes = free_bytes_at(options_.session).value_or(0);
   if (recorder_) state.streams = recorder_->status();
   for (const StreamStatus& s : state.streams) {
     const auto rate = rates_.find(s.device);

@@ -26,9 +26,13 @@ struct RecordingOptions {
   bool stop_when_complete = false;  ///< stop by itself when every sector is done
   std::optional<LiveGuideOptions> guide;
   std::map<std::string, std::string> notes;
+  std::uint64_t min_free_bytes = min_free_session_bytes;  ///< below this nothing is recorded
 
   Status validate() const;
 };
+
+/// Whether the folder and its disk would take the recording; nothing is left there.
+Status check_folder(const RecordingOptions& options);
 
 /// How a recording ended.
 enum class Ending { source_over, time_over, complete, stopped };

@@ -12,7 +12,10 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 Status count(const Delivery& delivery, std::optional<std::uint64_t>& last_id, Rehearsal& out) {
-  if (delivery.kind == Delivery::Kind::event) ++out.reasons[delivery.reason];
+  if (delivery.kind == Delivery::Kind::event) {
+    ++out.reasons[delivery.reason];
+    if (!delivery.detail.empty()) out.details[delivery.reason] = delivery.detail;
+  }
   if (delivery.kind != Delivery::Kind::frame && delivery.kind != Delivery::Kind::rejected)
     return {};
   if (last_id && delivery.frame.id > *last_id + 1) out.missing += delivery.frame.id - *last_id - 1;
@@ -48,8 +51,9 @@ Result<Rehearsal> rehearse_one(FrameSource& source, double seconds,
     last = Clock::now();
     if (out.frames == 1) first = last;
   }
+  for (const Delivery& late : source.unfinished()) ORBITFUSE_TRY(count(late, last_id, out));
   const double span_s = std::chrono::duration<double>(last - first).count();
-  if (out.frames > 1 && span_s > 0) out.rate_hz = static_cast<double>(out.frames - 1) / span_s;
+  if (out.frames > 1 && span_s > 0 && !source.can_wait()) out.rate_hz = static_cast<double>(out.frames - 1) / span_s;
   return out;
 }
 

@@ -26,6 +26,11 @@ std::string bar_line(const ProgressEvent& e) {
   return line.size() > 110 ? line.substr(0, 110) : line;
 }
 
+/// File names are bytes; what of them is not UTF-8 shows as U+FFFD.
+std::string line_of(const nlohmann::json& j) {
+  return j.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
 }  // namespace
 
 ConsoleOptions detect_terminal() {
@@ -93,7 +98,7 @@ void Console::progress(const ProgressEvent& e) {
                         {"total", e.total}};
     j["eta_s"] = e.eta_s >= 0 ? nlohmann::json(e.eta_s) : nlohmann::json(nullptr);
     if (!e.detail.empty()) j["detail"] = e.detail;
-    write_stdout(j.dump());
+    write_stdout(line_of(j));
   } else if (options_.terminal && options_.verbosity >= 0) {
     fmt::print(stderr, "\r\033[K{}", bar_line(e));
     std::fflush(stderr);
@@ -111,7 +116,7 @@ void Console::data(const std::string& line) {
 void Console::event(nlohmann::json event) {
   if (!options_.json) return;
   const std::lock_guard lock(mutex_);
-  write_stdout(event.dump());
+  write_stdout(line_of(event));
 }
 
 void Console::result(const std::string& verb, nlohmann::json body) {

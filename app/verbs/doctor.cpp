@@ -85,6 +85,8 @@ Action add_doctor(CLI::App& app) {
       findings.push_back(doctor::check_camera(machine, link_of(camera)));
     auto list = nlohmann::json::array();
     int problems = 0;
+    // What is missing on the machine weighs less than a disk that fails: that code says where to look.
+    ErrorKind kind = ErrorKind::unavailable;
     for (const Finding& f : findings) {
       const bool fine = f.remedy.empty();
       context.console.data(fmt::format("{:<5}{:<15} {}{}",
@@ -94,11 +96,13 @@ Action add_doctor(CLI::App& app) {
                                        f.what, f.found, fine ? "" : "; " + f.remedy));
       list.push_back(
           {{"what", f.what}, {"found", f.found}, {"remedy", f.remedy}, {"needed", f.needed}});
-      problems += !fine && f.needed;
+      if (fine || !f.needed) continue;
+      ++problems;
+      if (f.kind != ErrorKind::unavailable) kind = f.kind;
     }
     context.result = {{"findings", list}, {"threads", thread_count()}};
     if (problems > 0)
-      return fail(ErrorKind::unavailable, "doctor", fmt::format("{} findings to fix", problems),
+      return fail(kind, "doctor", fmt::format("{} to fix", problems == 1 ? "1 finding" : fmt::format("{} findings", problems)),
                   "see the lines marked FIX");
     return {};
   };

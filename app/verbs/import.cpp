@@ -15,7 +15,7 @@ struct Options {
   std::optional<double> kelvin_per_count, kelvin_offset;
   std::optional<double> reflected_c, air_c, humidity_percent;
   std::optional<double> spacing_deg;
-  int loops = 1;
+  std::optional<int> loops;
   std::vector<double> elevations_deg;
 };
 
@@ -83,31 +83,66 @@ void resolve(Options& o) {
   if (o.spacing_deg) {
     DeclaredStations stations;
     stations.spacing_deg = *o.spacing_deg;
-    stations.loops = o.loops;
+    stations.loops = o.loops.value_or(1);
     stations.elevations_deg = o.elevations_deg;
     o.import.visible_stations = o.import.thermal_stations = stations;
   }
 }
 
-Status run(Context& context, Options& o) {
-  resolve(o);
-  ORBITFUSE_TRY(o.import.validate());
-  if (context.common.dry_run) {
-    context.console.info("would import into " + o.session);
-    return {};
+/// Options of every verb that would mean something else here than the user hopes.
+Status check_common(const CommonOptions& common) {
+  if (common.resume) {
+    return fail(ErrorKind::usage, "--resume", "an import is made at one go",
+                "leave it out; photos are added to a session by "
+                "orbitfuse capture SESSION --resume --visible stills:FOLDER,existing=yes");
   }
-  ORBITFUSE_ASSIGN(const ImportReport report, import_session(o.import, o.session, context.progress));
+  if (common.force) {
+    return fail(ErrorKind::usage, "--force", "a session is never overwritten",
+                "leave it out, and import into another folder");
+  }
+  return {};
+}
+
+/// Options that only mean something with another one.
+Status check_alone(const Options& o) {
+  const auto needs = [](const char* option, const char* other) {
+    return fail(ErrorKind::usage, option, std::string("given without ") + other,
+                std::string("give ") + other + " too, or leave it out");
+  };
+  if (!o.spacing_deg && o.loops) return needs("--loops", "--station-spacing-deg");
+  if (!o.spacing_deg && !o.elevations_deg.empty())
+    return needs("--elevations-deg", "--station-spacing-deg");
+  if (o.scale != "linear" && o.kelvin_per_count)
+    return needs("--kelvin-per-count", "--thermal-scale linear");
+  if (o.scale != "linear" && o.kelvin_offset)
+    return needs("--kelvin-offset", "--thermal-scale linear");
+  const bool no_thermal = o.import.thermal.empty() && o.import.thermal_tracking.empty() &&
+                          !o.import.transforms_json;
+  if (no_thermal && o.scale != "auto") return needs("--thermal-scale", "--thermal");
+  return {};
+}
+
+Status run(Context& context, Options& o) {
+  ORBITFUSE_TRY(check_common(context.common));
+  ORBITFUSE_TRY(check_alone(o));
+  resolve(o);
+  const bool dry = context.common.dry_run;
+  ORBITFUSE_ASSIGN(const ImportReport report,
+                   dry ? rehearse_import(o.import, o.session, context.progress)
+                       : import_session(o.import, o.session, context.progress));
   for (const std::string& warning : report.warnings) context.console.warning(warning);
   context.console.data(fmt::format(
-      "{}: {} visible and {} thermal frames{}, {} tracking frames, {} with a pose, {} with a station",
-      o.session, report.visible, report.thermal,
+      "{}{}: {} visible and {} thermal frames{}, {} tracking frames, {} with a pose, {} with a station",
+      dry ? "would make " : "", o.session, report.visible, report.thermal,
       report.thermal == 0 ? "" : report.has_temperatures ? " with temperatures" : " without temperatures",
       report.tracking, report.with_pose, report.with_station));
+  if (dry) context.console.info("nothing was written");
   context.result = {{"session", o.session},         {"visible", report.visible},
                     {"thermal", report.thermal},    {"tracking", report.tracking},
                     {"with_pose", report.with_pose}, {"with_station", report.with_station},
                     {"has_temperatures", report.has_temperatures},
                     {"warnings", report.warnings}};
+  if (dry) context.result["dry_run"] = true;
   return {};
 }
 

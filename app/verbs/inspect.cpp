@@ -82,8 +82,12 @@ json describe(const Session& session, Modality modality) {
 
 Status inspect_run(Context& context, const fs::path& folder) {
   json stages = json::array();
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    if (!entry.is_directory() || !fs::exists(entry.path() / pipeline::stage_record_file)) continue;
+  std::error_code error;
+  const fs::directory_iterator entries(folder, error);
+  if (error)
+    return fail(ErrorKind::input, folder.string(), error.message(), "check the permissions");
+  for (const auto& entry : entries) {
+    if (!fs::exists(entry.path() / pipeline::stage_record_file, error)) continue;
     const auto record = pipeline::read_stage_record(entry.path());
     if (!record) {
       context.console.warning(record.error().message());
@@ -136,8 +140,9 @@ Action add_inspect(CLI::App& app) {
   const auto folder = std::make_shared<std::string>();
   app.add_option("folder", *folder, "Session folder, or the --out folder of a run")->required();
   return [folder](Context& context) {
-    return fs::exists(fs::path(*folder) / "run.json") ? inspect_run(context, *folder)
-                                                      : inspect_session(context, *folder);
+    std::error_code unreadable;  // inspect_session says why
+    return fs::exists(fs::path(*folder) / "run.json", unreadable) ? inspect_run(context, *folder)
+                                                                  : inspect_session(context, *folder);
   };
 }
 

@@ -3,9 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "app/cli/verb.hpp"
-#include "capture/recorder.hpp"
-#include "capture/session_writer.hpp"
+#include "app/recording/recording.hpp"
 
 namespace orbitfuse::cli {
 namespace {
@@ -14,35 +15,55 @@ struct Options {
   std::string session, to, speed = "full";
 };
 
+Result<std::vector<std::unique_ptr<FrameSource>>> sources_of(Context& context, const Session& session,
+                                                            ReplaySpeed speed) {
+  std::vector<std::unique_ptr<FrameSource>> sources;
+  for (const DeviceInfo& device : session.devices) {
+    const bool has_frames =
+        std::any_of(session.frames.begin(), session.frames.end(),
+                    [&](const FrameRecord& frame) { return frame.device == device.id; });
+    if (has_frames)
+      sources.push_back(make_replay_source(session, device.id, speed));
+    else
+      context.console.warning(device.id + ": no frames, left out");
+  }
+  if (sources.empty())
+    return fail(ErrorKind::input, session.folder.string(), "no frames", "replay another session");
+  return sources;
+}
+
 Status run(Context& context, const Options& o) {
   ORBITFUSE_ASSIGN(const Session session, open_session(o.session));
   for (const std::string& warning : session.warnings) context.console.warning(warning);
-  const auto sources = make_replay_sources(
-      session, o.speed == "full" ? ReplaySpeed::full : ReplaySpeed::recorded);
-  std::vector<FrameSource*> pointers;
-  for (const auto& source : sources) pointers.push_back(source.get());
+  ORBITFUSE_ASSIGN(auto sources, sources_of(context, session,
+                                            o.speed == "full" ? ReplaySpeed::full : ReplaySpeed::recorded));
+  recording::RecordingOptions options;
+  options.session = o.to;
+  options.resume = context.common.resume;
+  options.notes = session.notes;
+  ORBITFUSE_TRY(recording::check_folder(options));
   if (context.common.dry_run) {
     context.console.info(fmt::format("would replay {} frames of {} devices into {}",
                                      session.frames.size(), sources.size(), o.to));
     return {};
   }
-  ORBITFUSE_ASSIGN(const auto writer, SessionWriter::create(o.to, session.notes));
-  RecorderOptions options;
-  options.backpressure = Backpressure::wait;
-  Recorder recorder(*writer, options);
-  std::atomic<int> written{0};
-  recorder.on_frame = [&](const FrameRecord& frame) {
-    context.progress.report({"replay", static_cast<double>(++written),
-                             static_cast<double>(session.frames.size()), -1, frame.file});
-  };
-  ORBITFUSE_TRY(recorder.run(pointers, context.progress));
-  ORBITFUSE_TRY(writer->close());
+  recording::Recording recording(std::move(sources), options);
+  ORBITFUSE_TRY(recording.prepare());
+  const auto ending = recording.run(context.progress.cancel, [&] {
+    std::uint64_t written = 0;
+    for (const StreamStatus& s : recording.status()) written += s.received;
+    context.progress.report({"replay", static_cast<double>(written),
+                             static_cast<double>(session.frames.size()), -1, ""});
+  });
   auto streams = nlohmann::json::array();
-  for (const StreamStatus& s : recorder.status()) {
-    context.console.data(fmt::format("{}: {} received, {} lost", s.device, s.received, s.lost));
+  for (const StreamStatus& s : recording.status()) {
+    context.console.data(s.notice.empty()
+                             ? fmt::format("{}: {} received, {} lost", s.device, s.received, s.lost)
+                             : s.device + ": " + s.notice);
     streams.push_back({{"device", s.device}, {"received", s.received}, {"lost", s.lost}});
   }
   context.result = {{"session", o.to}, {"streams", streams}};
+  if (!ending) return tl::unexpected(ending.error());
   return {};
 }
 
@@ -51,7 +72,7 @@ Status run(Context& context, const Options& o) {
 Action add_replay(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   app.add_option("session", options->session, "Recorded session")->required();
-  app.add_option("--to", options->to, "New session folder")->required();
+  app.add_option("--to", options->to, "Session folder: new, or with --resume one to go on with")->required();
   app.add_option("--speed", options->speed, "full, or recorded: as long between frames as then")
       ->check(CLI::IsMember({"full", "recorded"}))->capture_default_str();
   return [options](Context& context) { return run(context, *options); };

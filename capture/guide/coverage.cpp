@@ -32,7 +32,7 @@ double angle_difference_deg(double a_deg, double b_deg) {
 int OrbitPlan::sectors_per_loop() const { return static_cast<int>(std::lround(360.0 / spacing_deg)); }
 
 Status OrbitPlan::validate() const {
-  const auto bad = [](const char* field, double found, const char* remedy) {
+  const auto bad = [](const char* field, double found, const std::string& remedy) {
     return fail(ErrorKind::usage, std::string("guide.") + field, fmt::format("{}", found), remedy);
   };
   const double count = 360.0 / spacing_deg;
@@ -51,7 +51,7 @@ Status OrbitPlan::validate() const {
   std::sort(sorted.begin(), sorted.end());
   for (std::size_t i = 1; i < sorted.size(); ++i) {
     if (sorted[i] - sorted[i - 1] < 2 * elevation_tolerance_deg) {
-      return bad("loop_elevations_deg", sorted[i], "loops must be two tolerances apart, or a frame fits both");
+      return bad("loop_elevations_deg", sorted[i], fmt::format("loops must be {:g} degrees apart or more, or a frame fits both", 2 * elevation_tolerance_deg));
     }
   }
   if (modalities.empty()) return bad("modalities", 0, "give at least one");

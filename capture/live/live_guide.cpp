@@ -74,6 +74,7 @@ LiveGuide::LiveGuide(SessionWriter& writer, LiveGuideOptions options, PositionFi
   for (const Modality modality : options_.plan.modalities) {
     cameras_[modality].shown.modality = modality;
     Camera& camera = cameras_[modality];
+    camera.told_by_source = options_.stations_come_with_frames;
     camera.shown.instruction = instruction(modality, camera, std::nullopt, Refusal::none);
   }
   if (finder_) looker_ = std::jthread([this] { look(); });
@@ -274,6 +275,7 @@ std::string LiveGuide::instruction(Modality modality, const Camera& camera,
     return fmt::format("go to azimuth {:.0f}°, {:.0f}° high, then press Enter", next->azimuth_deg,
                        next->elevation_deg);
   }
+  if (next && camera.told_by_source && camera.shown.latest_file.empty()) return "no frame yet";
   return coverage_.instruction(modality, position, last);
 }
 

@@ -36,6 +36,8 @@ struct LiveGuideOptions {
   /// where the last key before its time put it, however late it arrives; one whose time does not
   /// tell is refused. Without keys each photo of a camera is a step. 0: none.
   double turntable_step_deg = 0;
+  /// Every frame will carry its station (replay, synthetic): no key is asked for.
+  bool stations_come_with_frames = false;
 
   Status validate() const;
 };

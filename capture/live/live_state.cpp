@@ -2,6 +2,7 @@
 #include "capture/live/live_state.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <map>
 #include <nlohmann/json.hpp>
@@ -13,16 +14,30 @@ using Json = nlohmann::json;
 constexpr std::uint64_t little_disk_bytes = 2ull << 30;
 
 Json json_of(const StreamStatus& s, double rate_hz) {
-  return {{"device", s.device},   {"received", s.received}, {"lost", s.lost},
-          {"missing", s.missing}, {"rejected", s.rejected}, {"dropped", s.dropped},
-          {"silent", s.silent},   {"ended", s.ended},       {"first_id", s.first_id},
-          {"last_id", s.last_id}, {"rate_hz", rate_hz}};
+  return {{"device", s.device},
+          {"received", s.received},
+          {"lost", s.lost},
+          {"missing", s.missing},
+          {"rejected", s.rejected},
+          {"dropped", s.dropped},
+          {"passed_over", s.passed_over},
+          {"passed_over_last", s.passed_over_last},
+          {"silent", s.silent},
+          {"ended", s.ended},
+          {"first_id", s.any() ? Json(s.first_id) : Json()},
+          {"last_id", s.any() ? Json(s.last_id) : Json()},
+          {"rate_hz", rate_hz}};
+}
+
+std::string verdict(const LiveCamera& camera) {
+  if (!camera.judged_file.empty()) return text(camera.refusal);
+  return camera.latest_file.empty() ? "no frame yet" : "no frame judged yet";
 }
 
 Json json_of(const LiveCamera& camera) {
   Json json = {{"modality", name(camera.modality)},
                {"instruction", camera.instruction},
-               {"refusal", text(camera.refusal)},
+               {"refusal", verdict(camera)},
                {"file", camera.latest_file}};
   if (camera.position) {
     json["position"] = {{"azimuth_deg", camera.position->azimuth_deg},
@@ -87,10 +102,19 @@ std::string terminal_view(const LiveState& state) {
                                 static_cast<double>(state.free_bytes) / (1ull << 30));
   for (std::size_t i = 0; i < state.streams.size(); ++i) {
     const StreamStatus& s = state.streams[i];
+    if (!s.any()) {
+      out += fmt::format("{:<10} no frame yet\n", s.device);
+      continue;
+    }
     out += fmt::format(
         "{:<10} {:5.1f} Hz  {} received, {} lost ({} missing, {} rejected, {} dropped)\n", s.device,
         i < state.rates_hz.size() ? state.rates_hz[i] : 0.0, s.received, s.lost, s.missing,
         s.rejected, s.dropped);
+  }
+  for (const StreamStatus& s : state.streams) {
+    if (s.passed_over > 0)
+      out += fmt::format("{:<10} {} passed over, last {}\n", s.device, s.passed_over,
+                         fmt::join(s.passed_over_last, "; "));
   }
   std::map<int, std::pair<double, std::string>> loops;
   for (const Sector& sector : state.sectors) {

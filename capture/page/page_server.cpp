@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <map>
 #include <random>
 #include <thread>
 
@@ -111,9 +112,26 @@ struct PageServer::Impl {
             401,
             "the token is missing or wrong: open the address that orbitfuse capture printed\n");
     }
-    if (request.method == "POST" && !request.has_header("X-OrbitFuse"))
+    const bool reads = request.method == "GET" || request.method == "HEAD";
+    if (!reads && request.method != "POST") return refuse(405, "GET, HEAD or POST\n");
+    if (!reads && !request.has_header("X-OrbitFuse"))
       return refuse(403, "the header X-OrbitFuse is missing\n");
+    // Without a length it has no body (RFC 9110, 8.6); httplib would wait for one until the client
+    // gives up.
+    if (!reads && !request.has_header("Content-Length") && !request.has_header("Transfer-Encoding")) {
+      act(request.path, response);
+      return httplib::Server::HandlerResponse::Handled;
+    }
     return httplib::Server::HandlerResponse::Unhandled;
+  }
+
+  void act(const std::string& path, httplib::Response& response) const {
+    const std::map<std::string, const std::function<void()>*> actions = {
+        {"/start", &hooks.start}, {"/stop", &hooks.stop}, {"/station", &hooks.at_station}, {"/nuc", &hooks.correct}};
+    const auto action = actions.find(path);
+    const bool known = action != actions.end() && *action->second;
+    if (known) (*action->second)();
+    response.status = known ? 204 : 404;
   }
 
   void preview(const httplib::Request& request, httplib::Response& response) {
@@ -172,16 +190,7 @@ struct PageServer::Impl {
                [this](const auto& request, auto& response) { preview(request, response); });
     server.Get("/temperature",
                [this](const auto& request, auto& response) { temperature(request, response); });
-    const auto action = [this](const char* path, const std::function<void()>& hook) {
-      server.Post(path, [&hook](const auto&, auto& response) {
-        if (hook) hook();
-        response.status = hook ? 204 : 404;
-      });
-    };
-    action("/start", hooks.start);
-    action("/stop", hooks.stop);
-    action("/station", hooks.at_station);
-    action("/nuc", hooks.correct);
+    server.Post(".*", [this](const auto& request, auto& response) { act(request.path, response); });
   }
 };
 

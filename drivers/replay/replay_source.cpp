@@ -2,8 +2,12 @@
 #include "drivers/replay/replay_source.hpp"
 
 #include <algorithm>
+#include <map>
+#include <optional>
 #include <thread>
+#include <utility>
 
+#include "capture/resumed_event.hpp"
 #include "core/file_io.hpp"
 #include "core/image_codec.hpp"
 
@@ -38,7 +42,31 @@ class ReplaySource : public FrameSource {
     return {};
   }
 
+  /// Goes on after the last frame that the earlier recording has, in that recording's count.
+  bool resume(const DeviceInfo&, const std::vector<FrameRecord>& frames) override {
+    std::map<std::pair<std::string, std::int64_t>, std::uint64_t> recorded;
+    for (const FrameRecord& frame : frames)
+      recorded[{frame.content_hash, frame.host_time_ns}] = frame.sequence;
+    const auto sequence_of = [&](const FrameRecord& record) -> const std::uint64_t* {
+      const auto found = recorded.find({record.content_hash, record.host_time_ns});
+      return found == recorded.end() ? nullptr : &found->second;
+    };
+    std::size_t known = 0;
+    for (std::size_t i = 0; i < records_.size(); ++i) {
+      const std::uint64_t* sequence = sequence_of(records_[i]);
+      if (!sequence) continue;
+      ++known;
+      next_ = i + 1;
+      id_offset_ = *sequence - records_[i].sequence;
+    }
+    if (known == 0) return false;
+    first_ = std::min(next_, records_.size() - 1);
+    resumed_ = resumed_event(known, records_.size(), next_ == records_.size());
+    return true;
+  }
+
   Result<Delivery> next(std::chrono::milliseconds timeout) override {
+    if (resumed_) return *std::exchange(resumed_, std::nullopt);
     Delivery delivery;
     if (next_ >= records_.size()) {
       delivery.kind = Delivery::Kind::end;
@@ -59,7 +87,7 @@ class ReplaySource : public FrameSource {
   bool wait_for(const FrameRecord& record, std::chrono::milliseconds timeout) {
     if (speed_ == ReplaySpeed::full || record.host_time_ns == 0) return true;
     const auto due = started_ + std::chrono::nanoseconds(
-                                    std::max<std::int64_t>(0, record.host_time_ns - records_.front().host_time_ns));
+                                    std::max<std::int64_t>(0, record.host_time_ns - records_[first_].host_time_ns));
     const auto deadline = Clock::now() + timeout;
     std::this_thread::sleep_until(std::min(due, deadline));
     return due <= deadline;
@@ -67,7 +95,7 @@ class ReplaySource : public FrameSource {
 
   Status load(const FrameRecord& record, Delivery& delivery) const {
     Frame& frame = delivery.frame;
-    frame.id = record.sequence;
+    frame.id = record.sequence + id_offset_;
     delivery.kind = Delivery::Kind::rejected;
     Result<std::string> bytes = read_file(session_.path_of(record));
     if (!bytes) {
@@ -104,7 +132,9 @@ class ReplaySource : public FrameSource {
   DeviceInfo device_;
   ReplaySpeed speed_;
   std::vector<FrameRecord> records_;
-  std::size_t next_ = 0;
+  std::size_t next_ = 0, first_ = 0;  ///< first_: of this recording; waiting counts from it
+  std::uint64_t id_offset_ = 0;       ///< modulo 2^64
+  std::optional<Delivery> resumed_;   ///< to be told first
   Clock::time_point started_;
 };
 

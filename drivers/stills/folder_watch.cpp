@@ -127,6 +127,15 @@ std::vector<fs::path> FolderWatch::rescan() {
   return ready;
 }
 
+std::vector<fs::path> FolderWatch::untold() const {
+  std::vector<fs::path> files;
+  for (const auto& [name, state] : list()) {
+    const auto told = told_.find(name);
+    if (told == told_.end() || !(told->second == state)) files.push_back(folder_ / name);
+  }
+  return files;
+}
+
 std::vector<fs::path> FolderWatch::wait(std::chrono::milliseconds timeout) {
   const auto deadline = Clock::now() + timeout;
   while (true) {

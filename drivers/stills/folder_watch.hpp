@@ -32,6 +32,8 @@ class FolderWatch {
   /// Files that became ready, in natural name order; waits at most `timeout`. A file is told again
   /// when it is written again. While the folder is gone nothing is ready.
   std::vector<std::filesystem::path> wait(std::chrono::milliseconds timeout);
+  /// Files that are there and were never ready: still written, or empty.
+  std::vector<std::filesystem::path> untold() const;
   bool folder_gone() const { return gone_; }
 
  private:

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <set>
 
 namespace orbitfuse {
 namespace {
@@ -53,6 +54,8 @@ Result<std::vector<fs::path>> list_images(const std::vector<fs::path>& paths) {
   std::vector<fs::path> files;
   for (const fs::path& path : paths) {
     std::error_code error;
+    if (path.empty())
+      return fail(ErrorKind::usage, "images", "an empty name", "name a folder or a file");
     if (fs::is_regular_file(path, error)) {
       files.push_back(path);
       continue;
@@ -67,6 +70,13 @@ Result<std::vector<fs::path>> list_images(const std::vector<fs::path>& paths) {
       return fail(ErrorKind::input, path.string(), "no images (jpg, png, tif, bmp) in the folder",
                   "give the folder that holds the images themselves");
     }
+  }
+  std::set<fs::path> seen;
+  for (const fs::path& file : files) {
+    std::error_code error;
+    const fs::path one_name = fs::weakly_canonical(file, error);
+    if (!seen.insert(error ? file : one_name).second)
+      return fail(ErrorKind::usage, file.string(), "given twice", "name each folder and file once");
   }
   std::stable_sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
     return natural_less(a.filename().string(), b.filename().string());

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <deque>
 
+#include "capture/frame_encoding.hpp"
+#include "capture/session_folder.hpp"
 #include "capture/session_writer.hpp"
 #include "core/exif.hpp"
 #include "core/file_io.hpp"
@@ -55,8 +57,9 @@ std::string short_name(const fs::path& file) {
 
 class Importer {
  public:
-  Importer(const ImportOptions& options, SessionWriter& writer, const Progress& progress)
-      : options_(options), writer_(writer), progress_(progress), decoder_(options) {}
+  /// Without a writer everything is done but the writing.
+  Importer(const ImportOptions& options, const fs::path& folder, SessionWriter* writer, const Progress& progress)
+      : options_(options), folder_(folder), writer_(writer), progress_(progress), decoder_(options) {}
 
   Status run() {
     ORBITFUSE_ASSIGN(known_, read_known_poses(options_));
@@ -66,6 +69,7 @@ class Importer {
     ORBITFUSE_ASSIGN(auto thermal_tracking, listed(options_.thermal_tracking));
     ORBITFUSE_TRY(check_known(Modality::visible, {&visible, &visible_tracking}));
     ORBITFUSE_TRY(check_known(Modality::thermal, {&thermal, &thermal_tracking}));
+    ORBITFUSE_TRY(check_disk({&visible, &visible_tracking}));
     total_ = visible.size() + visible_tracking.size() + thermal.size() + thermal_tracking.size();
     ORBITFUSE_TRY(add_visible(with_exif_times(visible), false));
     ORBITFUSE_TRY(add_visible(with_exif_times(visible_tracking), true));
@@ -96,6 +100,19 @@ class Importer {
     if (!options_.thermal.empty()) return list_images(options_.thermal);
     return files_of_transforms(Modality::thermal);
   }
+  /// Photos are copied as they are.
+  Status check_disk(std::initializer_list<const std::vector<fs::path>*> photos) const {
+    std::uint64_t needed = min_free_session_bytes;
+    for (const auto* files : photos) {
+      for (const fs::path& file : *files) {
+        std::error_code unreadable;
+        const std::uintmax_t size = fs::file_size(file, unreadable);
+        if (!unreadable) needed += size;
+      }
+    }
+    return check_free_space(folder_, needed, "free disk space, or import to another disk");
+  }
+
   /// Poses that were given belong to the images that were given.
   Status check_known(Modality modality, std::initializer_list<const std::vector<fs::path>*> lists) {
     const auto known = known_.find(modality);
@@ -220,10 +237,11 @@ class Importer {
     if (stations && !frame.tracking) frame.station = station_at(*stations, source.position, view);
     if (group->id.empty()) {
       group->id = device.id = next_device_id(device.modality);
-      ORBITFUSE_TRY(writer_.add_device(device));
+      if (writer_) ORBITFUSE_TRY(writer_->add_device(device));
     }
     frame.id = group->frames;
-    const Result<FrameRecord> record = writer_.append(group->id, frame);
+    const Result<FrameRecord> record =
+        writer_ ? writer_->append(group->id, frame) : rehearsed(frame, device.modality);
     if (!record) {
       if (record.error().kind != ErrorKind::input) return tl::unexpected(record.error());
       pass_over(record.error());
@@ -232,6 +250,17 @@ class Importer {
     ++group->frames;
     count(*record);
     return {};
+  }
+
+  /// What can be said of a frame before it is stored.
+  static Result<FrameRecord> rehearsed(const Frame& frame, Modality modality) {
+    ORBITFUSE_TRY(encode_frame(frame, modality, frame.source));
+    FrameRecord record;
+    record.modality = modality;
+    record.tracking = frame.tracking;
+    record.station = frame.station;
+    record.cam_from_world = frame.cam_from_world;
+    return record;
   }
 
   void apply_known(const KnownView& view, cv::Size size, Frame& frame, DeviceInfo& device) {
@@ -326,8 +355,8 @@ class Importer {
 
   Status finish() {
     for (const Group& group : groups_) {
-      if (group.frames > 0)
-        ORBITFUSE_TRY(writer_.append(StreamRecord{group.id, 0, group.frames - 1, group.frames, 0}));
+      if (group.frames > 0 && writer_)
+        ORBITFUSE_TRY(writer_->append(StreamRecord{group.id, 0, group.frames - 1, group.frames, 0}));
     }
     tell_of_groups(Modality::visible);
     tell_of_groups(Modality::thermal);
@@ -339,7 +368,7 @@ class Importer {
       report_.warnings.push_back("thermal samples are raw counts without a known scale: kept as grey intensities, "
                                  "no temperatures (give their scale if you know it)");
     }
-    return writer_.close();
+    return writer_ ? writer_->close() : Status{};
   }
 
   void check_station_count(const std::optional<DeclaredStations>& stations, int frames, const char* what) {
@@ -351,7 +380,8 @@ class Importer {
   }
 
   const ImportOptions& options_;
-  SessionWriter& writer_;
+  const fs::path& folder_;
+  SessionWriter* writer_;
   const Progress& progress_;
   ThermalDecoder decoder_;
   std::map<Modality, KnownViews> known_;
@@ -362,23 +392,48 @@ class Importer {
   int embedded_ = 0;  ///< photos found in radiometric JPEGs
 };
 
+/// The sources are untouched; half a session would only be in the way of the next attempt.
+void empty(const fs::path& folder) {
+  std::error_code ignored;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored))
+    fs::remove_all(entry.path(), ignored);
+}
+
+Status run(Importer& importer) {
+  Status status = importer.run();
+  if (!status && status.error().kind == ErrorKind::cancelled)
+    status.error().remedy = "nothing was kept; import again";
+  return status;
+}
+
 }  // namespace
 
 Result<ImportReport> import_session(const ImportOptions& options, const fs::path& session_folder,
                                     const Progress& progress) {
   ORBITFUSE_TRY(options.validate());
+  ORBITFUSE_TRY(check_is_new(session_folder));
+  MadeFolders made;
+  ORBITFUSE_TRY(made.make(session_folder));
   ORBITFUSE_ASSIGN(auto writer, SessionWriter::create(session_folder, {{"recorded_by", "import"}}));
-  Importer importer(options, *writer, progress);
-  if (const Status status = importer.run(); !status) {
-    // The sources are untouched; half a session would only be in the way of the next attempt.
-    std::error_code ignored;
+  Importer importer(options, session_folder, writer.get(), progress);
+  if (const Status status = run(importer); !status) {
     writer.reset();
-    fs::remove_all(session_folder, ignored);
+    empty(session_folder);
     return tl::unexpected(status.error());
   }
+  made.keep();
   ImportReport report = importer.take_report();
   ORBITFUSE_ASSIGN(report.session, open_session(session_folder));
   return report;
+}
+
+Result<ImportReport> rehearse_import(const ImportOptions& options, const fs::path& session_folder,
+                                     const Progress& progress) {
+  ORBITFUSE_TRY(options.validate());
+  ORBITFUSE_TRY(SessionWriter::try_create(session_folder));
+  Importer importer(options, session_folder, nullptr, progress);
+  ORBITFUSE_TRY(run(importer));
+  return importer.take_report();
 }
 
 }  // namespace orbitfuse

@@ -82,9 +82,16 @@ struct ImportReport {
 
 /// Imports into a new session folder (which must not exist or be empty). Photos are copied byte
 /// for byte; thermal images become 16-bit centikelvin TIFF (or stay 8-bit grey). A file that can't
-/// be read is left out with a warning; the import fails only when nothing is left.
+/// be read is left out with a warning; the import fails only when nothing is left, and then, or when
+/// it is cancelled, leaves nothing behind.
 Result<ImportReport> import_session(const ImportOptions& options,
                                     const std::filesystem::path& session_folder,
                                     const Progress& progress = {});
+
+/// What import_session() would do and say, without leaving anything behind: every file is read and
+/// decoded, so that it takes about as long. The report's session is empty.
+Result<ImportReport> rehearse_import(const ImportOptions& options,
+                                     const std::filesystem::path& session_folder,
+                                     const Progress& progress = {});
 
 }  // namespace orbitfuse

@@ -73,7 +73,7 @@ Status WatchSource::start() {
   return reader_->watch.open(options_.existing);
 }
 
-void WatchSource::resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames) {
+bool WatchSource::resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames) {
   const std::lock_guard lock(mutex_);
   const std::string id = info_.id;
   info_ = device;
@@ -83,6 +83,41 @@ void WatchSource::resume(const DeviceInfo& device, const std::vector<FrameRecord
     seen_hashes_.insert(frame.content_hash);
     seen_files_.insert({frame.source, frame.host_time_ns});  // thermal images are stored decoded
   }
+  return false;
+}
+
+Delivery WatchSource::rejection(const std::string& name, const std::string& why) {
+  Delivery delivery;
+  delivery.kind = Delivery::Kind::rejected;
+  delivery.frame.id = next_id_++;
+  delivery.reason = name + ": " + why;
+  return delivery;
+}
+
+/// Whoever took these photos thinks that they are in the session.
+std::vector<Delivery> WatchSource::unfinished() {
+  std::vector<Delivery> list;
+  const auto unread = [&](const fs::path& file) {
+    std::error_code error;
+    const bool empty = fs::file_size(file, error) == 0 && !error;
+    list.push_back(event("ignored", file.filename().string() +
+                                        (empty ? ": an empty file"
+                                               : ": not read before the recording ended; go on with "
+                                                 "--resume and existing=yes")));
+  };
+  for (const Attempt& attempt : queue_) {
+    if (attempt.why.empty())
+      unread(attempt.file);
+    else
+      list.push_back(rejection(attempt.file.filename().string(), attempt.why));
+  }
+  for (const fs::path& file : reader_->watch.untold()) {
+    const bool waiting = std::any_of(queue_.begin(), queue_.end(),
+                                     [&](const Attempt& a) { return a.file == file; });
+    if (!waiting && has_image_name(file)) unread(file);
+  }
+  queue_.clear();
+  return list;
 }
 
 void WatchSource::stop() { reader_->watch.close(); }
@@ -117,7 +152,7 @@ Result<Delivery> WatchSource::next(std::chrono::milliseconds timeout) {
     for (const fs::path& file : found) {
       // Written again while it waits for its rest: one attempt is enough.
       std::erase_if(queue_, [&](const Attempt& a) { return a.file == file; });
-      queue_.push_back({file, Clock::now(), Clock::now()});
+      queue_.push_back({file, Clock::now(), Clock::now(), {}});
     }
   }
 }
@@ -141,13 +176,11 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
       return event("ignored", name + ": vanished before it was read");
     if (Clock::now() - attempt.first_try < options_.give_up) {
       attempt.next_try = Clock::now() + retry_every;
+      attempt.why = still.error().found;
       queue_.push_back(std::move(attempt));
       return std::nullopt;
     }
-    delivery.kind = Delivery::Kind::rejected;
-    delivery.frame.id = next_id_++;
-    delivery.reason = name + ": " + still.error().found;
-    return delivery;
+    return rejection(name, still.error().found);
   }
   if (thermal && still->frame.thermal_is_gray && !options_.accept_gray) {
     return event("ignored", name + ": no temperatures in it (gray=yes takes it all the same)");

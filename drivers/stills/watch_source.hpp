@@ -47,16 +47,19 @@ class WatchSource final : public FrameSource {
   Status start() override;
   Result<Delivery> next(std::chrono::milliseconds timeout) override;
   void stop() override;
+  std::vector<Delivery> unfinished() override;
   bool can_wait() const override { return true; }
-  void resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames) override;
+  bool resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames) override;
 
  private:
   struct Reader;
   struct Attempt {
     std::filesystem::path file;
     std::chrono::steady_clock::time_point first_try, next_try;
+    std::string why;  ///< it could not be read; empty: it was not looked at yet
   };
   Delivery event(std::string kind, std::string detail) const;
+  Delivery rejection(const std::string& name, const std::string& why);
   std::optional<Delivery> take(Attempt attempt);
 
   WatchOptions options_;

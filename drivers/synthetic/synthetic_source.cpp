@@ -1,4 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "capture/resumed_event.hpp"
 #include "core/image_codec.hpp"
 #include "drivers/synthetic/orbit.hpp"
 #include "drivers/synthetic/renderer.hpp"
@@ -37,7 +42,24 @@ class SyntheticSource : public FrameSource {
     return {};
   }
 
+  /// Goes on after the last frame of the same walk that the earlier recording has.
+  bool resume(const DeviceInfo&, const std::vector<FrameRecord>& frames) override {
+    std::size_t known = 0;
+    for (std::size_t i = 0; i < walk_.size(); ++i) {
+      const auto found = std::find_if(frames.begin(), frames.end(),
+                                      [&](const FrameRecord& f) { return is_of(f, walk_[i]); });
+      if (found == frames.end()) continue;
+      ++known;
+      next_ = i + 1;
+      id_offset_ = found->sequence - i;
+    }
+    if (known == 0) return false;
+    resumed_ = resumed_event(known, walk_.size(), next_ == walk_.size());
+    return true;
+  }
+
   Result<Delivery> next(std::chrono::milliseconds) override {
+    if (resumed_) return *std::exchange(resumed_, std::nullopt);
     Delivery delivery;
     if (next_ >= walk_.size()) {
       delivery.kind = Delivery::Kind::end;
@@ -46,12 +68,12 @@ class SyntheticSource : public FrameSource {
     const synthetic::Exposure& exposure = walk_[next_];
     delivery.kind = Delivery::Kind::frame;
     Frame& frame = delivery.frame;
-    frame.id = next_;
-    frame.device_time_ns = static_cast<std::int64_t>(exposure.time_s * 1e9);
+    frame.id = next_ + id_offset_;
+    frame.device_time_ns = device_time_ns(exposure);
     frame.host_time_ns = visible_start_ns + frame.device_time_ns + (modality_ == Modality::thermal ? thermal_delay_ns : 0);
     frame.tracking = exposure.tracking;
     if (!exposure.tracking) frame.station = exposure.nominal;
-    ORBITFUSE_TRY(render(exposure.cam_from_world, frame));
+    ORBITFUSE_TRY(render(exposure.cam_from_world, next_, frame));
     ++next_;
     return delivery;
   }
@@ -60,15 +82,26 @@ class SyntheticSource : public FrameSource {
   bool can_wait() const override { return true; }
 
  private:
-  Status render(const Rigid3d& cam_from_world, Frame& frame) const {
+  static std::int64_t device_time_ns(const synthetic::Exposure& exposure) {
+    return static_cast<std::int64_t>(exposure.time_s * 1e9);
+  }
+
+  bool is_of(const FrameRecord& f, const synthetic::Exposure& exposure) const {
+    if (f.device_time_ns != device_time_ns(exposure) || f.width != camera_.width || f.height != camera_.height)
+      return false;
+    return exposure.tracking || (f.station && f.station->azimuth_deg == exposure.nominal.azimuth_deg &&
+                                 f.station->elevation_deg == exposure.nominal.elevation_deg);
+  }
+
+  Status render(const Rigid3d& cam_from_world, std::uint64_t index, Frame& frame) const {
     const int samples = options_.samples_per_axis;
     if (modality_ == Modality::thermal) {
       frame.pixels = synthetic::spoil_thermal(synthetic::render_thermal(scene_, camera_, cam_from_world, samples),
-                                              options_.defects, options_.seed, frame.id);
+                                              options_.defects, options_.seed, index);
       return {};
     }
     cv::Mat image = synthetic::render_visible(scene_, camera_, cam_from_world, samples);
-    synthetic::spoil_visible(image, options_.visible_noise, options_.seed, frame.id);
+    synthetic::spoil_visible(image, options_.visible_noise, options_.seed, index);
     // A camera that compresses by itself: its JPEG is what goes to disk, byte for byte.
     ORBITFUSE_ASSIGN(frame.encoded, encode_jpeg(image, options_.jpeg_quality));
     frame.extension = ".jpg";
@@ -81,6 +114,8 @@ class SyntheticSource : public FrameSource {
   synthetic::Scene scene_;
   std::vector<synthetic::Exposure> walk_;
   std::size_t next_ = 0;
+  std::uint64_t id_offset_ = 0;      ///< modulo 2^64
+  std::optional<Delivery> resumed_;  ///< to be told first
 };
 
 }  // namespace

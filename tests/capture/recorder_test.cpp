@@ -243,5 +243,24 @@ TEST(Recorder, OptionsNameTheField) {
   EXPECT_NE(options.validate().error().where.find("queue_frames"), std::string::npos);
 }
 
+TEST(Recorder, FilesPassedOverAreCountedAndTheLastAreNamed) {
+  Recording r;
+  std::deque<Delivery> script;
+  for (const char* name : {"1", "2", "3", "4"}) {
+    Delivery event;
+    event.kind = Delivery::Kind::event;
+    event.reason = *name % 2 ? "ignored" : "duplicate";
+    event.detail = name;
+    script.push_back(event);
+  }
+  ScriptedSource photos("visible0", Modality::visible, script);
+  Recorder recorder(*r.writer, {});
+  ASSERT_TRUE(recorder.run({&photos}));
+  const StreamStatus status = recorder.status().at(0);
+  EXPECT_EQ(status.passed_over, 4u);
+  EXPECT_EQ(status.passed_over_last, (std::vector<std::string>{"2", "3", "4"}));
+  EXPECT_FALSE(status.any());
+}
+
 }  // namespace
 }  // namespace orbitfuse

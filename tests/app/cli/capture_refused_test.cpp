@@ -11,8 +11,9 @@
 #include <fstream>
 #include <thread>
 
+#include "core/image_io.hpp"
 #include "drivers/aravis/aravis_source.hpp"
-#include "tests/app/cli/program.hpp"
+#include "tests/app/cli/refusal.hpp"
 #include "tests/app/temp_folder.hpp"
 #include "tests/support/gev_simulator.hpp"
 
@@ -103,15 +104,14 @@ TEST(Refused, PageAtAPortInUse) {
   ASSERT_EQ(::listen(holder, 1), 0);
   ASSERT_EQ(::getsockname(holder, reinterpret_cast<sockaddr*>(&address), &length), 0);
   const std::string port = std::to_string(ntohs(address.sin_port));
-  const Outcome outcome = orbitfuse_program({"capture", temp.path / "s", "--visible", tiny, "--page", port});
+  expect_refused({"capture", temp.path / "s", "--visible", tiny, "--page", port}, 4, port);
+  expect_refused({"capture", temp.path / "s", "--visible", tiny, "--page", port}, 4, "choose another with --page");
   ::close(holder);
-  EXPECT_EQ(outcome.code, 4) << outcome.err;
-  EXPECT_THAT(outcome.err, AllOf(HasSubstr(port), HasSubstr("choose another with --page")));
   EXPECT_FALSE(std::filesystem::exists(temp.path / "s"));
 }
 
 /// Without root's rights, also when the tests have them.
-Outcome as_nobody(std::vector<std::string> arguments) {
+Outcome as_nobody(const std::vector<std::string>& arguments) {
   std::vector<std::string> command{ORBITFUSE_BINARY_DIR "/app/orbitfuse"};
   command.insert(command.end(), arguments.begin(), arguments.end());
   if (::geteuid() == 0) {
@@ -128,12 +128,12 @@ TEST(Refused, DeviceAndFolderWithoutPermission) {
                                               std::filesystem::perms::others_exec);
   const std::string session = temp.path / "s";
   if (as_nobody({"--version"}).code != 0) GTEST_SKIP() << "setpriv, or the program for other users, is missing";
-  const Outcome folder = as_nobody({"capture", session, "--visible", tiny});
-  EXPECT_EQ(folder.code, 4) << folder.err;
-  EXPECT_THAT(folder.err, HasSubstr(session));
+  expect_refused({"capture", session, "--visible", tiny}, 4, session + ": Permission denied", as_nobody);
   // Any device that only root may open stands for a camera.
   if (std::filesystem::exists("/dev/loop-control")) {
-    const std::string never = temp.path / "never";
+    const TempFolder open_to_all;
+    std::filesystem::permissions(open_to_all.path, std::filesystem::perms::all);
+    const std::string never = open_to_all.path / "never";
     const Outcome device = as_nobody({"capture", never, "--visible", "v4l2:/dev/loop-control", "--seconds", "1"});
     EXPECT_EQ(device.code, 4) << device.err;
     EXPECT_THAT(device.err, HasSubstr("group video"));
@@ -141,6 +141,36 @@ TEST(Refused, DeviceAndFolderWithoutPermission) {
   }
   EXPECT_FALSE(std::filesystem::exists(session));
   std::filesystem::permissions(temp.path, std::filesystem::perms::owner_all);
+}
+
+TEST(Refused, SessionThatMayNotBeRead) {
+  const TempFolder temp;
+  std::ofstream(temp.path / "manifest.jsonl") << "x";
+  std::filesystem::permissions(temp.path, std::filesystem::perms::none);
+  if (as_nobody({"--version"}).code != 0) GTEST_SKIP() << "setpriv, or the program for other users, is missing";
+  const Outcome outcome = as_nobody({"inspect", temp.path});
+  std::filesystem::permissions(temp.path, std::filesystem::perms::owner_all);
+  EXPECT_EQ(outcome.code, 3) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("Permission denied"));
+}
+
+/// On a disk of 16 MiB.
+TEST(Refused, DiskWithTooLittleSpace) {
+  const TempFolder temp;
+  const std::string disk = temp.path, session = temp.path / "a" / "s";
+  const std::string photo = temp.path.string() + "-photo.png";
+  ASSERT_TRUE(write_png(photo, cv::Mat(30, 40, CV_8UC3, cv::Scalar(9, 80, 7))));
+  const Runner run = [&](const std::vector<std::string>& arguments) {
+    std::string line = "mount -t tmpfs -o size=16m none '" + disk + "' && '" ORBITFUSE_BINARY_DIR "/app/orbitfuse'";
+    for (const std::string& word : arguments) line += " '" + word + "'";
+    line += "; code=$?; [ -z \"$(ls -A '" + disk + "')\" ] && exit $code || exit 99";
+    return run_program({"unshare", "--map-root-user", "--mount", "sh", "-c", line});
+  };
+  if (run({"--version"}).code != 0) GTEST_SKIP() << "no disk of its own can be mounted here (unshare)";
+  const std::string words = "16 MiB free on the disk, 64 MiB needed; free disk space, or ";
+  expect_refused({"capture", session, "--visible", tiny}, 4, words + "record to another disk", run);
+  expect_refused({"import", session, "--visible", photo}, 4, words + "import to another disk", run);
+  std::filesystem::remove(photo);
 }
 
 }  // namespace

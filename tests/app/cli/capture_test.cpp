@@ -5,6 +5,7 @@
 
 #include <fstream>
 
+#include "core/file_io.hpp"
 #include "core/image_io.hpp"
 #include "core/session.hpp"
 #include "tests/app/cli/program.hpp"
@@ -132,6 +133,112 @@ TEST(Mat, IsWrittenWholeOrNotAtAll) {
   EXPECT_FALSE(std::filesystem::exists(temp.path / "no.pdf"));
 }
 
+TEST(Mat, OverwritesAndMakesNothingUnasked) {
+  const TempFolder temp;
+  const std::string file = temp.path / "mat.pdf", note = temp.path / "notes.txt";
+  std::ofstream(file) << "the operator's";
+  std::ofstream(note) << "the operator's";
+  std::filesystem::create_directory(temp.path / "folder.pdf");
+  struct Case {
+    std::string out;
+    int code;
+    std::string words;
+  };
+  const std::vector<Case> cases = {
+      {file, 3, "exists already; choose another name, or overwrite it: --force"},
+      {note, 2, "end it in .pdf"},
+      {temp.path / "mat", 2, "end it in .pdf"},
+      {temp.path / ".pdf", 2, "end it in .pdf"},
+      {temp.path / "", 2, "end it in .pdf"},
+      {temp.path / "none" / "mat.pdf", 3, "no such folder"},
+      {temp.path / "folder.pdf", 3, "exists and is not a file"},
+      {temp.path / (std::string(300, 'x') + ".pdf"), 2, "choose another name"},
+      {"/proc/mat.pdf", 4, "/proc"},
+  };
+  for (const Case& c : cases) {
+    for (const bool dry : {false, true}) {
+      std::vector<std::string> words = {"mat", "--out", c.out};
+      if (dry) words.emplace_back("--dry-run");
+      if (dry && c.out.starts_with("/proc")) continue;  // only the writing tells
+      const Outcome outcome = orbitfuse_program(words);
+      EXPECT_EQ(outcome.code, c.code) << c.out << outcome.err;
+      EXPECT_THAT(outcome.err, HasSubstr(c.words));
+    }
+  }
+  EXPECT_EQ(*read_file(file), "the operator's");
+  EXPECT_EQ(*read_file(note), "the operator's");
+  EXPECT_FALSE(std::filesystem::exists(temp.path / "none"));
+  EXPECT_EQ(orbitfuse_program({"mat", "--out", file, "--force"}).code, 0);
+  EXPECT_THAT(*read_file(file), testing::StartsWith("%PDF"));
+  EXPECT_EQ(orbitfuse_program({"mat", "--out", "here.PDF", "--tags", "0"}, {.folder = temp.path}).code, 2);
+  EXPECT_EQ(orbitfuse_program({"mat", "--out", "here.PDF"}, {.folder = temp.path}).code, 0);
+}
+
+TEST(Capture, FilesPassedOverAreNamed) {
+  const TempFolder temp;
+  const auto card = temp.path / "card";
+  std::filesystem::create_directory(card);
+  cv::Mat image(30, 40, CV_8UC3);
+  cv::randu(image, 0, 255);
+  ASSERT_TRUE(write_png(card / "a.png", image));
+  std::filesystem::copy(card / "a.png", card / "b.png");
+  std::ofstream(card / "c.heic") << "x";
+  const std::vector<std::string> words = {"capture", temp.path / "s",  "--visible", "stills:" + card.string() + ",existing=yes",
+                                          "--seconds", "2.5", "--guide", "off"};
+  const Outcome outcome = orbitfuse_program(words);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  for (const std::string& text : {outcome.err, outcome.out})
+    EXPECT_THAT(text, testing::AllOf(HasSubstr("passed over"), HasSubstr("c.heic: not a JPEG")));
+  EXPECT_THAT(outcome.out, testing::AllOf(HasSubstr("visible0: 2 files passed over"), HasSubstr("b.png: the same image")));
+  EXPECT_THAT(outcome.err, HasSubstr("stills, camera known from its first photo"));
+}
+
+/// Whoever took it thinks that it is in the session.
+TEST(Capture, PhotoThatWasNotWholeAtTheEndIsAccountedFor) {
+  const TempFolder temp;
+  const auto card = temp.path / "card";
+  std::filesystem::create_directory(card);
+  ASSERT_TRUE(write_png(card / "a.png", cv::Mat(30, 40, CV_8UC3, cv::Scalar(9, 80, 7))));
+  std::ofstream(card / "cut.png", std::ios::binary) << read_file(card / "a.png")->substr(0, 60);
+  std::ofstream(card / "zero.png").flush();
+  const std::string camera = "stills:" + card.string() + ",existing=yes";
+  const Outcome short_one = orbitfuse_program({"capture", temp.path / "short", "--visible", camera, "--seconds", "0.5"});
+  EXPECT_THAT(short_one.out, testing::AllOf(HasSubstr("no frame came"), HasSubstr("3 files passed over"),
+                                            HasSubstr("a.png: not read before the recording ended"),
+                                            HasSubstr("zero.png: an empty file")));
+  const Outcome outcome = orbitfuse_program({"capture", temp.path / "s", "--visible", camera, "--seconds", "2.5"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("1 received, 1 lost (0 missing, 1 rejected, 0 dropped) of ids 0 to 1"));
+  EXPECT_THAT(outcome.out, HasSubstr("1 file passed over, last zero.png"));
+  const Session session = opened(temp.path / "s");
+  ASSERT_EQ(session.gaps.size(), 1u);
+  EXPECT_THAT(session.gaps[0].reason, HasSubstr("cut.png"));
+}
+
+TEST(Capture, NamesThatAreNotUtf8) {
+  const TempFolder temp;
+  const std::string session = temp.path / "gr\xf6\xdf" "e";
+  const Outcome captured = orbitfuse_program({"capture", session, "--visible", tiny, "--json"});
+  EXPECT_EQ(captured.code, 0) << captured.err;
+  EXPECT_EQ(captured.result().at("ok"), true);
+  EXPECT_EQ(orbitfuse_program({"inspect", session, "--json"}).result().at("ok"), true);
+  const Outcome run = orbitfuse_program({"run", session, "--out", temp.path / "out"});
+  EXPECT_EQ(run.code, 2) << run.err;
+  EXPECT_THAT(run.err, HasSubstr("its name is not UTF-8; rename the folder"));
+  const Outcome unknown = orbitfuse_program({"inspect", "\xff", "--json"});
+  EXPECT_EQ(unknown.code, 3);
+  EXPECT_EQ(unknown.result().at("exit_code"), 3);
+}
+
+TEST(Capture, WithoutAFrameTheAccountHasNoIds) {
+  const TempFolder temp;
+  const std::vector<std::string> words = {"capture", temp.path / "s", "--visible", "stills:" + temp.path.string(),
+                                          "--seconds", "0.2", "--guide", "off"};
+  const Outcome outcome = orbitfuse_program(words);
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("visible0: no frame came"));
+}
+
 TEST(Devices, AnswersWithAList) {
   const Outcome outcome = orbitfuse_program({"devices", "--json"});
   EXPECT_EQ(outcome.code, 0) << outcome.err;
@@ -154,7 +261,26 @@ TEST(Capture, MistakesHaveARemedyAndLeaveNothing) {
       {{"--thermal", "aravis,profile=nonsense"}, 2, "flir-ax5"},
       {{"--driver", "replay:/nowhere"}, 3, "no such folder"},
       {{"--driver", tiny, "--spacing-deg", "31"}, 2, "guide.spacing_deg"},
-      {{"--driver", tiny, "--turntable", "500"}, 2, "guide.turntable_step_deg"},
+      {{"--driver", tiny, "--turntable", "500"}, 2, "--turntable: 500"},
+      {{"--driver", tiny, "--turntable", "0"}, 2, "--turntable: 0; give the table's step, -120 to 120 and not 0"},
+      {{"--driver", tiny, "--turntable", "15"}, 2, "don't wait for a key"},
+      {{"--driver", tiny, "--spacing-deg", "0"}, 2, "--spacing-deg: 0; give 1 to 120"},
+      {{"--driver", tiny, "--seconds", "-1"}, 2, "--seconds: -1; give 0 (until it is stopped) to 10000000"},
+      {{"--driver", tiny, "--seconds", "nan"}, 2, "--seconds: nan"},
+      {{"--driver", tiny, "--max-edge-px", "0", "3"}, 2, "--max-edge-px: 0; give more than 0"},
+      {{"--driver", tiny, "--elevations-deg", "10", "12"}, 2, "degrees apart or more"},
+      {{"--driver", tiny, "--elevations-deg", "100"}, 2, "--elevations-deg: 100"},
+      {{"--driver", tiny, "--mat-tags", "7"}, 2, "the frames carry their stations"},
+      {{"--driver", tiny, "--mat", "foil"}, 2, "--mat: no mat is looked for"},
+      {{"--visible", "stills:.", "--guide", "key", "--mat-tags", "7"}, 2, "use --guide auto without --turntable"},
+      {{"--visible", "stills:.", "--mat-tags", "0"}, 2, "mat.tags_per_side: 0; must be 2 to 15"},
+      {{"--driver", tiny, "--guide", "key"}, 2, "--guide key: replayed and synthetic frames don't wait for a key"},
+      {{"--driver", tiny, "--guide", "off", "--spacing-deg", "60"}, 2, "--spacing-deg: given with --guide off"},
+      {{"--driver", tiny, "--visible", tiny, "--thermal", tiny}, 2, "leave it out: --visible and --thermal"},
+      {{"--visible", "", "--thermal", tiny}, 2, "--visible: given without a name"},
+      {{"--visible", tiny, "--page", ""}, 2, "--page: given without a name"},
+      {{"--visible", "stills:.,existing=yes,existing=no"}, 2, "existing is given twice"},
+      {{"--driver", tiny, "--token", "12345678"}, 2, "--token: given without --page"},
   };
   for (const Case& c : cases) {
     std::vector<std::string> arguments = {"capture", session};

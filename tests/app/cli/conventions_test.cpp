@@ -39,6 +39,7 @@ TEST(Cli, TopLevelHelpListsEveryVerb) {
   EXPECT_EQ(orbitfuse_program({"help", "capture"}).out,
             orbitfuse_program({"capture", "--help"}).out);
   EXPECT_EQ(orbitfuse_program({"help", "captrue"}).code, 2);
+  EXPECT_THAT(help.out, HasSubstr("orbitfuse help VERB"));
 }
 
 TEST(Cli, Version) {
@@ -59,6 +60,7 @@ TEST(Cli, SlipsGetASuggestionAndExitCode2) {
   EXPECT_EQ(orbitfuse_program({"run"}).code, 2);
   EXPECT_EQ(orbitfuse_program({"run", "x", "--threads", "many"}).code, 2);
   EXPECT_EQ(orbitfuse_program({"run", "x", "--device", "tpu"}).code, 2);
+  EXPECT_EQ(orbitfuse_program({"run", "x", "--seed", "-1"}).code, 2);
 }
 
 TEST(Cli, UsageErrorsKeepTheJsonContract) {
@@ -125,6 +127,17 @@ TEST(Cli, DoctorSaysWhatIsMissing) {
   for (const auto& finding : result.at("findings"))
     if (finding.at("what") == "COLMAP") colmap = finding.at("remedy") != "";
   EXPECT_TRUE(colmap);
+}
+
+TEST(Cli, DoctorTellsABadFolderFromAMissingProgram) {
+  const TempFolder temp;
+  std::ofstream(temp.path / "file") << "x";
+  for (const std::string folder : {temp.path / "none", temp.path / "file"}) {
+    const Outcome outcome = orbitfuse_program({"doctor", "--folder", folder});
+    EXPECT_EQ(outcome.code, 3) << outcome.out;
+    EXPECT_THAT(outcome.out, HasSubstr(folder));
+  }
+  EXPECT_EQ(orbitfuse_program({"doctor", "--folder", "/proc"}).code, 4);
 }
 
 TEST(Cli, NoColorAndNoBarWhenStderrIsAFile) {

@@ -116,5 +116,34 @@ TEST(LiveState, OneCameraAloneFillsItsSectors) {
   EXPECT_EQ(terminal_view(LiveState{}).find("loop"), std::string::npos);  // without a guide
 }
 
+TEST(LiveState, BeforeTheFirstFrameNothingIsGood) {
+  LiveState state = some_state();
+  StreamStatus fresh;
+  fresh.device = "visible0";
+  state.streams[0] = fresh;
+  state.cameras[0].latest_file.clear();
+  state.cameras[1].latest_file = "thermal/0.tiff";
+  Json page = Json::parse(json_of(state));
+  EXPECT_EQ(page["cameras"][0]["refusal"], "no frame yet");
+  EXPECT_EQ(page["cameras"][1]["refusal"], "no frame judged yet");
+  EXPECT_TRUE(page["streams"][0]["first_id"].is_null());
+  EXPECT_TRUE(page["streams"][0]["last_id"].is_null());
+  EXPECT_EQ(page["streams"][1]["last_id"], 99);
+  EXPECT_NE(terminal_view(state).find("visible0   no frame yet"), std::string::npos);
+  state.cameras[0].judged_file = "visible/0.jpg";
+  EXPECT_EQ(Json::parse(json_of(state))["cameras"][0]["refusal"], "good");
+}
+
+TEST(LiveState, FilesPassedOverAreShown) {
+  LiveState state = some_state();
+  state.streams[0].passed_over = 7;
+  state.streams[0].passed_over_last = {"a.heic: not a JPEG", "b.jpg: the same image came before"};
+  const Json page = Json::parse(json_of(state));
+  EXPECT_EQ(page["streams"][0]["passed_over"], 7);
+  EXPECT_EQ(page["streams"][0]["passed_over_last"].size(), 2u);
+  EXPECT_NE(terminal_view(state).find("7 passed over, last a.heic: not a JPEG; b.jpg: the same image came before"),
+            std::string::npos);
+}
+
 }  // namespace
 }  // namespace orbitfuse

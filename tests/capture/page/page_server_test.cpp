@@ -2,8 +2,12 @@
 #include "capture/page/page_server.hpp"
 #include "capture/page/reachable.hpp"
 
+#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <nlohmann/json.hpp>
@@ -181,6 +185,46 @@ TEST_F(PageTest, OtherSitesCannotPressItsButtons) {
   EXPECT_EQ(client().Get("/state", {{"Host", "[::1]:80"}})->status, 200);
   EXPECT_EQ(client().Post("/start", {{"X-OrbitFuse", "1"}}, "", "text/plain")->status,
             404);  // no such hook
+}
+
+/// The answer to a request that is sent as it stands here, without closing the connection.
+std::string answer_to(int port, const std::string& request) {
+  const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  std::string answer;
+  if (::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0 &&
+      ::send(fd, request.data(), request.size(), 0) == static_cast<ssize_t>(request.size())) {
+    char bytes[4096];
+    pollfd ready{fd, POLLIN, 0};
+    while (::poll(&ready, 1, 3000) > 0) {
+      const ssize_t count = ::recv(fd, bytes, sizeof bytes, 0);
+      if (count <= 0) break;
+      answer.append(bytes, static_cast<std::size_t>(count));
+    }
+  }
+  ::close(fd);
+  return answer;
+}
+
+/// RFC 9110: a request without a length has no body, so that nothing more is to be waited for.
+TEST_F(PageTest, PostWithoutALengthIsAnsweredAtOnce) {
+  serve({});
+  const auto post = [&](const char* method, const char* path, const char* header) {
+    return answer_to(server->port(),
+                     std::string(method) + " " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\n" + header + "\r\n");
+  };
+  EXPECT_THAT(post("POST", "/stop", "X-OrbitFuse: 1\r\n"), HasSubstr(" 204 "));
+  EXPECT_EQ(stops, 1);
+  EXPECT_THAT(post("POST", "/nuc", "X-OrbitFuse: 1\r\nContent-Length: 0\r\n"), HasSubstr(" 204 "));
+  EXPECT_EQ(corrections, 1);
+  EXPECT_THAT(post("POST", "/nowhere", "X-OrbitFuse: 1\r\n"), HasSubstr(" 404 "));
+  EXPECT_THAT(post("POST", "/stop", ""), HasSubstr(" 403 "));
+  for (const char* method : {"PUT", "PATCH", "DELETE"})
+    EXPECT_THAT(post(method, "/stop", "X-OrbitFuse: 1\r\n"), HasSubstr(" 405 "));
+  EXPECT_EQ(stops, 1);
 }
 
 TEST_F(PageTest, PreviewsAndTemperatures) {
