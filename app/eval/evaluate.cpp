@@ -85,7 +85,9 @@ Status add_poses(Run& run, const Session& session, const GroundTruth& truth, Mod
 }
 
 /// Thermal cameras in the visible frame: the error of the registration as a user meets it.
-Status add_registration(Run& run, const std::vector<PosePair>& thermal) {
+/// Also as training left them (rung (e): poses refined against the field).
+Status add_registration(Run& run, const Session& session, const GroundTruth& truth,
+                        const std::vector<PosePair>& thermal) {
   if (!run.done("register") || !run.truth_from_visible || !run.truth_from_thermal) {
     run.note("no registration to measure");
     return {};
@@ -101,6 +103,11 @@ Status add_registration(Run& run, const std::vector<PosePair>& thermal) {
       rotation_angle_deg(error.rotation, Eigen::Quaterniond::Identity());
   result["similarity_scale_percent"] = 100 * std::abs(error.scale - 1);
   run.result["registration"] = result;
+  const fs::path trained = run.out / "train_thermal";
+  if (!run.done("train_thermal") || !fs::exists(trained / "model")) return {};
+  ORBITFUSE_ASSIGN(const Reconstruction model, stages::load_poses(trained, Modality::thermal));
+  const std::vector<PosePair> refined = match(session, model, truth.views.at(Modality::thermal));
+  run.result["registration_refined"] = to_json(pose_error(refined, truth_from_thermal), thermal.size());
   return {};
 }
 
@@ -192,7 +199,7 @@ Result<json> evaluate(const fs::path& out, const Session& session, const GroundT
   std::vector<PosePair> visible, thermal;
   ORBITFUSE_TRY(add_poses(run, session, truth, Modality::visible, visible));
   ORBITFUSE_TRY(add_poses(run, session, truth, Modality::thermal, thermal));
-  ORBITFUSE_TRY(add_registration(run, thermal));
+  ORBITFUSE_TRY(add_registration(run, session, truth, thermal));
   ORBITFUSE_TRY(add_test_views(run, truth, options, progress));
   json seconds = json::object();
   for (const auto& entry : fs::directory_iterator(out)) {

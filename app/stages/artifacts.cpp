@@ -66,6 +66,13 @@ Result<Reconstruction> load_poses(const fs::path& folder, Modality modality) {
   return read_colmap_model(folder / "model", modality);
 }
 
+Result<Reconstruction> load_trained_poses(const pipeline::StageContext& context, Modality modality) {
+  const std::string of(name(modality));
+  if (context.has("train_" + of) && fs::exists(context.of("train_" + of) / "model"))
+    return load_poses(context.of("train_" + of), modality);
+  return load_poses(context.of("poses_" + of), modality);
+}
+
 Status save_depth_maps(const fs::path& folder, const std::vector<DepthMap>& maps) {
   json list = json::array();
   for (const DepthMap& map : maps) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "app/pipeline/stage.hpp"
 #include "core/reconstruction.hpp"
 #include "core/session.hpp"
 #include "core/transform.hpp"
@@ -16,6 +17,8 @@ namespace orbitfuse::stages {
 /// model/ (COLMAP, binary), transforms.json.
 Status save_poses(const std::filesystem::path& folder, const Reconstruction& model);
 Result<Reconstruction> load_poses(const std::filesystem::path& folder, Modality modality);
+/// Of the views as the field of this modality sees them: where training moved them, else as posed.
+Result<Reconstruction> load_trained_poses(const pipeline::StageContext& context, Modality modality);
 
 /// NNN_depth.tiff, NNN_confidence.tiff, NNN_normal_{x,y,z}.tiff and depth.json with the cameras.
 Status save_depth_maps(const std::filesystem::path& folder, const std::vector<DepthMap>& maps);

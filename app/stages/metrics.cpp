@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <opencv2/imgproc.hpp>
 
@@ -28,8 +29,8 @@ Status score_field(const StageContext& context, const SessionInput& input, const
   const json* trained = context.metrics_of(train);
   const auto heldout = trained ? trained->value("heldout", std::vector<std::string>()) : std::vector<std::string>();
   if (heldout.empty()) return {};
-  ORBITFUSE_ASSIGN(Reconstruction model,
-                   load_poses(context.of("poses_" + std::string(name(modality))), modality));
+  const json gains = trained->value("image_gains", json::object());
+  ORBITFUSE_ASSIGN(Reconstruction model, load_trained_poses(context, modality));
   model.points.clear();
   std::erase_if(model.views, [&](const PosedView& v) {
     return std::find(heldout.begin(), heldout.end(), v.name) == heldout.end();
@@ -42,6 +43,10 @@ Status score_field(const StageContext& context, const SessionInput& input, const
                      nerf::render(field, view.camera, view.cam_from_world, {}, context.progress));
     cv::Mat truth = view.image, rendered = seen.color;
     if (modality == Modality::visible) {
+      if (gains.contains(view.name)) {  // the field shows the common exposure, the frame its own
+        const std::array<double, 3> gain = gains.at(view.name);
+        cv::multiply(rendered, cv::Scalar(gain[0], gain[1], gain[2]), rendered);
+      }
       truth.convertTo(truth, CV_8U, 255);
       rendered.convertTo(rendered, CV_8U, 255);
     } else {

@@ -44,7 +44,7 @@ struct ImageEvidence {
 
 Result<ImageEvidence> load_evidence(const StageContext& context, const SessionInput& input) {
   ORBITFUSE_ASSIGN(Reconstruction thermal,
-                   load_poses(context.of("poses_thermal"), Modality::thermal));
+                   load_trained_poses(context, Modality::thermal));
   ORBITFUSE_ASSIGN(nerf::Field field,
                    nerf::Field::load(context.of("train_visible") / field_file));
   std::vector<cv::Mat> images;

@@ -22,10 +22,21 @@ Result<nerf::Field> guide_field(const StageContext& context) {
   return nerf::Field::load(context.of("train_visible") / field_file);
 }
 
+/// Keeps the poses that training ended with, if it moved them.
+Status take_refined_poses(const nerf::TrainReport& report, const std::filesystem::path& folder, Reconstruction& model) {
+  if (report.refined_poses.empty()) return {};
+  for (PosedView& view : model.views)
+    if (const auto refined = report.refined_poses.find(view.name); refined != report.refined_poses.end())
+      view.cam_from_world = refined->second;
+  Reconstruction moved = model;
+  moved.points.clear();  // they were where the views had been
+  return save_poses(folder, moved);
+}
+
 Result<StageOutput> train(const StageContext& context, const SessionInput& input,
                           const TrainConfig& config, Modality modality, const json& resolved) {
   const std::string poses = "poses_" + std::string(name(modality));
-  ORBITFUSE_ASSIGN(const Reconstruction model, load_poses(context.of(poses), modality));
+  ORBITFUSE_ASSIGN(Reconstruction model, load_poses(context.of(poses), modality));
   ORBITFUSE_ASSIGN(nerf::Dataset data,
                    training_data(input, model, config.max_width_px, context.progress));
   if (modality == Modality::visible && context.has("depth")) {
@@ -57,6 +68,7 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
                    nerf::train(data, options, context.progress, field, guide.empty() ? nullptr : &guide));
   ORBITFUSE_TRY(field.save(context.folder / field_file));
   ORBITFUSE_TRY(write_json(context.folder / "curve.json", curve_json(report)));
+  ORBITFUSE_TRY(take_refined_poses(report, context.folder, model));
   auto cloud = nerf::export_point_cloud(field, model.views, config.cloud, context.progress);
   if (cloud) {
     ORBITFUSE_TRY(write_ply(context.folder / cloud_file, *cloud));

@@ -55,7 +55,9 @@ json metrics_json(const nerf::TrainReport& report) {
           {"skipped_steps", report.skipped_steps},
           {"rays", report.rays},
           {"samples", report.samples},
-          {"samples_per_ray", report.samples_per_ray()}};
+          {"samples_per_ray", report.samples_per_ray()},
+          {"image_gains", report.image_gains},
+          {"image_offsets_k", report.image_offsets_k}};
 }
 
 Result<int> extend_training(const pipeline::StageContext& context, const json& options,

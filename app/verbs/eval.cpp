@@ -30,6 +30,7 @@ void print(terminal::Console& console, const json& result) {
   print_poses(console, result, "poses_visible", "visible poses");
   print_poses(console, result, "poses_thermal", "thermal poses");
   print_poses(console, result, "registration", "thermal, visible frame");
+  print_poses(console, result, "registration_refined", "the same, as trained");
   if (const auto it = result.find("test_views"); it != result.end()) {
     if (it->contains("visible_psnr_db"))
       console.data(fmt::format("{:<22} {:.2f} dB on {} test views", "visible field",

@@ -46,6 +46,7 @@ Result<Row> row_of(const std::string& name, const nerf::Dataset& data, nerf::Tra
                    double cpu_seconds, double before_cpu_s, nerf::Field& field,
                    const nerf::Field* guide = nullptr) {
   options.keep_best = false;  // nothing is chosen on the test views
+  options.refine_poses = false;  // these poses are exact
   // Proposal networks take a hundred times as long to render: their curves have fewer points.
   options.eval_count = options.sampling == nerf::Sampling::proposal ? 4 : 24;
   options.iterations = 1 << 20;

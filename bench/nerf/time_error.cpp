@@ -33,7 +33,7 @@ void print_curve(const nerf::TrainReport& report) {
     fmt::print("step {:5d}  cpu {:7.1f} s  wall {:7.1f} s  test {:6.2f} dB  train {:6.2f} dB  {:6.1f} samples/ray\n",
                p.step, p.cpu_s, p.wall_s, p.heldout_psnr, p.train_psnr, p.samples_per_ray);
   fmt::print("{}; {:.3f} us a sample\n", report.brief(), 1e6 * report.cpu_s / static_cast<double>(report.samples));
-  if (!report.image_gains.empty()) fmt::print("exposure of the views: {:.3f}\n", fmt::join(report.image_gains, " "));
+  for (const auto& [view, gain] : report.image_gains) fmt::print("exposure of {}: {:.3f}\n", view, fmt::join(gain, " "));
   for (const auto& skip : report.skips) fmt::print("skip {}: {}\n", skip.what, skip.why);
 }
 

@@ -16,7 +16,7 @@
 namespace orbitfuse::nerf {
 namespace {
 
-constexpr char magic[8] = {'O', 'F', 'N', 'E', 'R', 'F', '0', '4'};  // the last two: version
+constexpr char magic[8] = {'O', 'F', 'N', 'E', 'R', 'F', '0', '5'};  // the last two: version
 constexpr std::size_t hash_length = 32;
 
 class Writer {
@@ -194,12 +194,14 @@ void visit(Archive& io, Snapshot& best) {
   visit(io, best.values);
   io(best.codes);
   visit(io, best.level_weights);
+  io(best.poses);
 }
 
 bool fits(const Snapshot& best, FieldState& state) {
   const auto parameters = state.parameters();
   const auto networks = state.density_networks();
   bool same = best.values.size() == parameters.size() && best.level_weights.size() == networks.size() &&
+              best.poses.size() == state.refined_poses.size() &&
               best.occupied.size() == state.occupancy.on.size() && best.codes.size() == state.occupancy.code.size();
   for (std::size_t i = 0; same && i < parameters.size(); ++i)
     same = best.values[i].size() == parameters[i]->value.size();
@@ -229,7 +231,7 @@ void visit(Archive& io, FieldState& state) {
   io(state.train_psnr);
   io(state.samples_per_ray);
   visit(io, state.history);
-  if (state.options.refine_poses) io(state.refined_poses);
+  io(state.refined_poses);
   for (DensityNetwork* network : state.density_networks()) io(network->grid.level_weight);
   std::vector<std::size_t> sizes;
   for (const Parameters* p : state.parameters()) sizes.push_back(p->size());
@@ -243,7 +245,7 @@ void visit(Archive& io, FieldState& state) {
   visit(io, state.best);
   if constexpr (Archive::reading) {
     io.ok = io.ok && (state.best.empty() || fits(state.best, state)) &&
-            (!state.options.refine_poses || state.refined_poses.size() == state.views.size());
+            state.refined_poses.size() == (state.options.refine_poses ? state.views.size() : 0);
   }
 }
 

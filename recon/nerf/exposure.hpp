@@ -12,12 +12,13 @@ namespace orbitfuse::nerf {
 /// What a camera on automatic did from view to view: each channel of a view is that of the common
 /// exposure times a gain (stored sRGB samples; a factor of light is nearly a factor of these too).
 struct Exposure {
-  std::vector<Eigen::Array3d> log_gain;  ///< per view, R, G, B; zero where nothing is known
-  double spread = 0;  ///< RMS over views that train
+  std::vector<Eigen::Array3d> log_gain;  ///< per view, R, G, B; zero of views that share fewer than 50 samples
+  double spread = 0, largest = 0;  ///< RMS over views that train; the one farthest from zero
   int points = 0;     ///< seen by two views that train or more
 
   /// Shading that depends on the direction alone reaches 2 % (rendered container, one exposure).
-  bool varies() const { return spread > 0.04; }
+  /// One wild view among many is told by itself.
+  bool varies() const { return spread > 0.04 || largest > 0.15; }
 };
 
 /// From what the views that train see of the same points: SfM tracks, and dense depth where some view

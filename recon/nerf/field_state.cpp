@@ -58,6 +58,7 @@ Snapshot FieldState::snapshot(double psnr) {
   out.occupied = occupancy.on;
   out.codes = occupancy.code;
   for (const DensityNetwork* network : density_networks()) out.level_weights.push_back(network->grid.level_weight);
+  out.poses = refined_poses;
   return out;
 }
 
@@ -66,6 +67,7 @@ void FieldState::restore(const Snapshot& from) {
   for (std::size_t i = 0; i < sets.size(); ++i) sets[i]->value = from.values[i];
   const auto networks = density_networks();
   for (std::size_t i = 0; i < networks.size(); ++i) networks[i]->grid.level_weight = from.level_weights[i];
+  refined_poses = from.poses;
   occupancy.restore(from.occupied, from.codes);
   refresh();
 }

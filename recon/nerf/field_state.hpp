@@ -35,6 +35,7 @@ struct Snapshot {
   std::vector<std::uint64_t> occupied;
   std::vector<std::uint8_t> codes;                ///< the occupancy's: they place the samples
   std::vector<std::vector<float>> level_weights;  ///< of each density network
+  std::vector<RefinedPose> poses;                 ///< refine_poses
   bool empty() const { return values.empty(); }
 };
 

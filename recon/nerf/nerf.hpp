@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <map>
 #include <string>
 #include <vector>
@@ -27,7 +28,8 @@ struct TrainReport : History {
   double best_psnr = 0;      ///< held-out, dB; NaN without held-out views
   std::vector<std::string> heldout;  ///< names of the views that measured
   std::vector<double> image_offsets_k;  ///< per view that was not dropped (per_image_offset)
-  std::vector<double> image_gains;  ///< per view, mean of its channels' against the common exposure (even_exposure)
+  /// R, G, B of a view against the common exposure, which the field shows (even_exposure); empty: steady.
+  std::map<std::string, std::array<double, 3>> image_gains;
   std::map<std::string, Rigid3d> refined_poses;  ///< cam_from_world by view, as training left it (refine_poses)
   std::vector<Skip> skips;
   std::vector<std::string> warnings;  ///< views that were dropped, a target that was missed

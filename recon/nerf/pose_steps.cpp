@@ -12,7 +12,6 @@ namespace {
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-constexpr int fewest_rays = 200;
 constexpr int reach_px = 2;       ///< slopes are taken over twice this: errors of that size still pull home
 constexpr double huber = 0.05;    ///< of the span; what the scene hides or reflects doesn't count for more
 constexpr double rate = 0.7;      ///< of a step: its rays are few
@@ -46,6 +45,7 @@ void add_ray(const SceneView& view, int x, int y, const float* shown, float dist
   const auto at = [&](int dx, int dy, int c) -> double {
     return photo.ptr<float>(y + dy)[(x + dx) * channels + c];
   };
+  bool said = false;
   for (int c = 0; c < channels; ++c) {
     const Eigen::RowVector2d slope((at(reach_px, 0, c) - at(-reach_px, 0, c)) / (2 * reach_px),
                                    (at(0, reach_px, c) - at(0, -reach_px, c)) / (2 * reach_px));
@@ -53,10 +53,11 @@ void add_ray(const SceneView& view, int x, int y, const float* shown, float dist
     if (!slope.allFinite() || !std::isfinite(error)) continue;
     const double weight = std::min(1.0, huber / std::max(1e-12, std::abs(error)));
     const Vector6 row = (slope * motion).transpose();
+    said = true;
     normal += weight * row * row.transpose();
     right += weight * error * row;
   }
-  ++sums.rays;
+  sums.rays += said ? 1 : 0;
 }
 
 Rigid3d RefinedPose::pose() const {
@@ -67,18 +68,18 @@ Rigid3d RefinedPose::pose() const {
 RefinedPose unmoved(const Rigid3d& pose) {
   const Eigen::Quaterniond& q = pose.rotation;
   const Eigen::Vector3d& t = pose.translation;
-  return {{q.x(), q.y(), q.z(), q.w(), t.x(), t.y(), t.z()}, {}};
+  return {{q.x(), q.y(), q.z(), q.w(), t.x(), t.y(), t.z()}, {}, {}};
 }
 
 bool take_step(const PoseSums& sums, const Space& space, RefinedPose& refined, SceneView& view,
                const PosePrior& prior) {
-  if (sums.rays < fewest_rays) return false;
+  if (sums.rays < fewest_pose_rays) return false;
   const auto information = [&](double sigma) { return Eigen::Vector3d::Constant(prior.noise * prior.noise / (sigma * sigma)); };
   Vector6 given;
   given << information(prior.sigma_shift), information(prior.sigma_turn_rad);
   Eigen::Map<Vector6> moved(refined.moved.data());
   const Eigen::Map<const Vector6> right(sums.right.data());
-  const double share = static_cast<double>(fewest_rays) / sums.rays;  // more rays aren't more sure of what is alike in all
+  const double share = fewest_pose_rays / static_cast<double>(sums.rays);  // more rays aren't more sure of what is alike in all
   Matrix6 normal = share * Eigen::Map<const Matrix6>(sums.normal.data());
   normal.diagonal() += given;
   Vector6 step = rate * normal.ldlt().solve(share * right - given.cwiseProduct(moved));

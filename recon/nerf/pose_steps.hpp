@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "recon/nerf/scene.hpp"
@@ -12,12 +13,15 @@
 // camera's motion would change that, and each view takes the Gauss-Newton step of its rays.
 namespace orbitfuse::nerf {
 
+inline constexpr int fewest_pose_rays = 200;    ///< for a step
+inline constexpr double poses_move_from = 0.1;  ///< of a run: by then there is form to go by
+
 /// Normal equations of one view's motion x = (shift, turn) in camera axes, normalised units:
 /// sum w |slope * motion(x) - (shown - photo)|^2 over its rays.
 struct PoseSums {
   std::array<double, 36> normal{};
   std::array<double, 6> right{};
-  int rays = 0;
+  std::int64_t rays = 0;  ///< as wide as the others: stored as it lies, without padding
   void add(const PoseSums& other);
 };
 
@@ -29,6 +33,7 @@ void add_ray(const SceneView& view, int x, int y, const float* shown, float dist
 struct RefinedPose {
   std::array<double, 7> cam_from_world{};  ///< quaternion x y z w, translation
   std::array<double, 6> moved{};           ///< sum of its steps
+  PoseSums pending;                        ///< of rays since the last one
   Rigid3d pose() const;
 };
 

@@ -46,18 +46,25 @@ struct Stopwatch {
   double wall_now() const { return wall_s + wall_seconds() - wall_mark; }
 };
 
-/// With refine_poses, views that measure follow the field, which moves with the views that train.
-double heldout_psnr(FieldState& field, std::vector<SceneView>& views, const std::vector<bool>& heldout) {
-  constexpr int stride = 4;
+/// Every n-th pixel of a row and column measures: a thousand or more of an image.
+int measuring_stride(const cv::Mat& image) {
+  return std::clamp(static_cast<int>(std::sqrt(static_cast<double>(image.total()) / 1200)), 1, 4);
+}
+
+/// With `align`, views that measure first follow the field, which moves with the views that train.
+double heldout_psnr(FieldState& field, std::vector<SceneView>& views, const std::vector<bool>& heldout, bool align) {
   double sum = 0;
   int count = 0;
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (!heldout[i]) continue;
-    const RenderedView picture = render_strided(field, views[i].rays, stride, {});
+    const int stride = measuring_stride(views[i].target);
+    RenderedView picture = render_strided(field, views[i].rays, stride, {});
+    for (int turn = 0; align && turn < 3; ++turn) {
+      if (!take_step(sums_of(picture, stride, field.space, views[i]), field.space, field.refined_poses[i], views[i])) break;
+      picture = render_strided(field, views[i].rays, stride, {});
+    }
     sum += psnr_of(picture, views[i].target, stride);
     ++count;
-    if (field.options.refine_poses)
-      take_step(sums_of(picture, stride, field.space, views[i]), field.space, field.refined_poses[i], views[i]);
   }
   return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
 }
@@ -115,14 +122,15 @@ std::vector<bool> broken_views(const Dataset& dataset, TrainReport& report) {
   return broken;
 }
 
-void report_exposure(const Exposure& exposure, TrainReport& report) {
-  if (exposure.points == 0)
-    report.skips.push_back({"even exposure", "no point is known to be seen by two views", "images are used as they are"});
-  else if (!exposure.varies())
-    report.skips.push_back({"even exposure", fmt::format("views agree within {:.1f} % on {} points", 100 * exposure.spread,
-                                                         exposure.points), "images are used as they are"});
-  else
-    for (const Eigen::Array3d& gain : exposure.log_gain) report.image_gains.push_back(std::exp(gain.mean()));
+void report_exposure(const Exposure& exposure, const Dataset& dataset, TrainReport& report) {
+  const auto skip = [&](std::string why) { report.skips.push_back({"even exposure", std::move(why), "images are used as they are"}); };
+  if (exposure.points == 0) return skip("no point is known to be seen by two views");
+  if (!exposure.varies())
+    return skip(fmt::format("views agree within {:.1f} % on {} points", 100 * exposure.spread, exposure.points));
+  for (std::size_t i = 0; i < dataset.views.size(); ++i) {
+    const Eigen::Array3d gain = exposure.log_gain[i].exp();
+    report.image_gains[dataset.views[i].name] = {gain[0], gain[1], gain[2]};
+  }
 }
 
 /// Whether held-out views at `psnr` end the run.
@@ -220,7 +228,7 @@ Result<TrainReport> train(const Dataset& given, const TrainOptions& options,
   std::vector<SceneView> views = prepare_views(dataset, state->space, state->span);
   if (options.even_exposure && dataset.modality == Modality::visible) {
     const Exposure exposure = estimate_exposure(dataset, heldout);
-    report_exposure(exposure, report);
+    report_exposure(exposure, dataset, report);
     if (exposure.varies()) even_out(exposure, views);
   }
   if (!resumed && !options.shared_geometry && options.sampling == Sampling::occupancy) {
@@ -268,7 +276,7 @@ Result<TrainReport> train(const Dataset& given, const TrainOptions& options,
   /// The curve's next point, and the best field so far. Returns the held-out PSNR.
   const auto evaluate = [&](double fraction) {
     pause();
-    const double psnr = heldout_psnr(*state, views, heldout);
+    const double psnr = heldout_psnr(*state, views, heldout, options.refine_poses && fraction > poses_move_from);
     history.curve.push_back({watch.cpu_s, watch.wall_s, state->step, psnr, state->train_psnr,
                              state->samples_per_ray});
     if (measuring && options.keep_best && (state->best.empty() || psnr > state->best.psnr))

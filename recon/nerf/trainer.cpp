@@ -17,7 +17,7 @@ constexpr int shard_count = 16;  ///< of weight gradients; fixed, so sums do not
 constexpr int occupancy_every = 16;
 constexpr int occupancy_warmup = 64;
 constexpr int pose_every = 25;  ///< steps; where views are many, the rays of several such turns make a step
-constexpr double poses_move_from = 0.1, poses_move_until = 0.9;  ///< of the run: after first form, before fine details
+constexpr double poses_move_until = 0.9;  ///< of the run: the last details are of poses that stay
 constexpr float known_depth_margin = 1.08f;  ///< a wrong depth must be able to move
 
 enum Stream : std::uint64_t { pixel_stream = 1, jitter_stream = 2, probe_stream = 4 };
@@ -149,6 +149,7 @@ bool Trainer::step(double progress) {
   loss.distortion_weight = static_cast<float>(o.distortion_weight);
   loss.huber = field_.modality == Modality::thermal ? 0.02f : 0.0f;
   const bool with_proposals = proposals_learn(progress);
+  const bool posing = o.refine_poses && progress > poses_move_from && progress < poses_move_until;
   parallel_for(shard_count, [&](int shard) {
     BlockGradients& gradients = shards_[static_cast<std::size_t>(shard)];
     gradients.reset(field_);
@@ -157,7 +158,7 @@ bool Trainer::step(double progress) {
       draw(block, b * rays_per_block, std::min(rays, (b + 1) * rays_per_block), progress);
       forward(field_, kernels_, {}, block.rays);
       backward(field_, kernels_, loss, block.targets, block.rays, gradients, block.grid);
-      if (o.refine_poses) watch_poses(block, pose_shards_[static_cast<std::size_t>(shard)]);
+      if (posing) watch_poses(block, pose_shards_[static_cast<std::size_t>(shard)]);
       if (with_proposals)
         gradients.interlevel += backward_proposals(field_, kernels_, block.rays, loss.per_ray,
                                                    block.proposals, gradients.proposals);
@@ -199,8 +200,7 @@ bool Trainer::step(double progress) {
     if (finite) update_occupancy(progress);
   }
   ++field_.step;
-  if (o.refine_poses && field_.step % pose_every == 0 && progress > poses_move_from && progress < poses_move_until)
-    move_views();
+  if (posing) move_views();
   return finite;
 }
 
@@ -227,10 +227,15 @@ void Trainer::watch_poses(const Block& block, std::vector<PoseSums>& sums) const
 void Trainer::move_views() {
   for (const int index : training_) {
     const auto view = static_cast<std::size_t>(index);
-    PoseSums sums;
-    for (const std::vector<PoseSums>& shard : pose_shards_) sums.add(shard[view]);
-    if (!take_step(sums, field_.space, field_.refined_poses[view], views_[view])) continue;
-    for (std::vector<PoseSums>& shard : pose_shards_) shard[view] = {};
+    RefinedPose& refined = field_.refined_poses[view];
+    for (std::vector<PoseSums>& shard : pose_shards_) {
+      if (shard[view].rays > 0) refined.pending.add(shard[view]);
+      shard[view] = {};
+    }
+    if (field_.step % pose_every == 0 && refined.pending.rays >= fewest_pose_rays) {
+      take_step(refined.pending, field_.space, refined, views_[view]);
+      refined.pending = {};
+    }
   }
 }
 

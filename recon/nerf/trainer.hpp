@@ -55,7 +55,7 @@ class Trainer {
   std::vector<std::int64_t> known_ends_;  ///< running count of pixels with known distance
   std::vector<Block> blocks_;
   std::vector<BlockGradients> shards_;
-  std::vector<std::vector<PoseSums>> pose_shards_;  ///< [shard][view], since the last step (refine_poses)
+  std::vector<std::vector<PoseSums>> pose_shards_;  ///< [shard][view] of one step (refine_poses)
   long rays_ = 0, samples_ = 0;
 };
 

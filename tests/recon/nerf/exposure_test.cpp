@@ -100,6 +100,24 @@ TEST(Exposure, ThatIsSteadyIsLeftAlone) {
   EXPECT_LT(exposure.spread, 0.005);
 }
 
+TEST(Exposure, OfAViewWithAFewWrongMatchesIsOne) {
+  Dataset data = varied_scene();
+  data.depth.pop_back();
+  for (int p = 0; p < 3; ++p)  // all that ties the last view to another
+    data.points.push_back({{0, 0, 0.4}, {}, 0, {{view_count - 1, {20.0 + p, 30}}, {2, {40, 30.0 + p}}}});
+  const Exposure exposure = estimate_exposure(data, none_heldout());
+  EXPECT_TRUE((exposure.log_gain.back() == 0).all()) << exposure.log_gain.back().transpose();
+  EXPECT_TRUE(exposure.varies());
+}
+
+TEST(Exposure, OfOneWildViewAmongManyIsTold) {
+  Exposure exposure;
+  exposure.spread = 0.01;
+  EXPECT_FALSE(exposure.varies());
+  exposure.largest = 0.7;
+  EXPECT_TRUE(exposure.varies());
+}
+
 TEST(Exposure, OfViewsWithNothingInCommonIsOne) {
   const auto expect_none = [](const Dataset& data) {
     const Exposure exposure = estimate_exposure(data, std::vector<bool>(data.views.size(), false));
@@ -135,10 +153,11 @@ TEST(Exposure, EvenedOutIsThatOfEveryViewAndLeavesOutWhatWasClipped) {
         const auto& truth = plain.views[i].image.at<cv::Vec3f>(y, x);
         if (!std::isfinite(seen[0])) {
           ++unknown;
-          EXPECT_EQ(std::max({stored[0], stored[1], stored[2]}), 1.0f);
+          EXPECT_GE(std::max({stored[0], stored[1], stored[2]}), 0.96f);
           continue;
         }
-        for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen[c], truth[c], 1e-5) << i;
+        // A gain within 3 % keeps its highlights.
+        for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen[c], truth[c], stored[c] < 1 ? 1e-5 : 0.03) << i;
       }
   EXPECT_GT(unknown, 0);
 }

@@ -145,6 +145,7 @@ TEST(PoseSteps, ThatNothingSupportsAreNotTaken) {
   add_ray(view, 20, 20, &shown, nan, nothing);
   view.target.setTo(nan);
   add_ray(view, 20, 20, &shown, 1, nothing);
+  EXPECT_EQ(nothing.rays, 0);
   EXPECT_EQ(nothing.right, PoseSums().right);
   expect_none(nothing);
 }
@@ -159,7 +160,7 @@ TEST(PoseSteps, OfAConstantPhotoKeepThePose) {
 
 /// A ring of cameras, those that train turned and moved a little.
 Dataset shaken_scene(Modality modality, double turn_deg) {
-  Dataset data = test::toy_scene(modality, 24, 1, 48);
+  Dataset data = test::toy_scene(modality, 24, 1, 64);
   for (std::size_t i = 0; i < data.views.size(); ++i) {
     TrainingView& view = data.views[i];
     if (i % 4 == 0) {
@@ -186,8 +187,9 @@ TEST(PoseRefinement, WinsBackWhatWrongPosesCost) {
   };
   const double exact = psnr_with(0, false), given = psnr_with(2, false);
   EXPECT_GT(exact, given + 2);  // or there is nothing to win
-  EXPECT_GT(psnr_with(2, true), given + 0.1 * (exact - given));
-  EXPECT_GT(psnr_with(0, true), exact - 0.5);
+  const double refined = psnr_with(2, true);
+  EXPECT_GT(refined, given + 0.15 * (exact - given));
+  EXPECT_GT(psnr_with(0, true), exact - 1);  // smooth pictures hold a pose badly
 }
 
 TEST(PoseRefinement, GoesOnWhereACheckpointLeftIt) {
