@@ -62,10 +62,12 @@ class FrameSource {
   /// but a `rejected` delivery. Ids rise strictly.
   virtual Result<Delivery> next(std::chrono::milliseconds timeout) = 0;
   virtual void stop() = 0;
-  /// Goes on with a session: what an earlier recording knew of the device, and its frames. Called
-  /// before the first next(); a source of files leaves out those that it delivered then. True when
-  /// its ids go on after the earlier ones by themselves; else the recording shifts them there.
-  virtual bool resume(const DeviceInfo& /*device*/, const std::vector<FrameRecord>& /*frames*/) {
+  /// Goes on with a session: what earlier recordings knew of the device, its frames, and the id
+  /// after all that they account for, received or lost. Called before the first next(); a source of
+  /// files leaves out those that it delivered then. True when its ids go on from `next_id` by
+  /// themselves; else the recording shifts them there.
+  virtual bool resume(const DeviceInfo& /*device*/, const std::vector<FrameRecord>& /*frames*/,
+                      std::uint64_t /*next_id*/) {
     return false;
   }
   /// Asks for a shutter correction (NUC) as soon as can be; from any thread. Events of the stream

@@ -19,13 +19,19 @@ using Loss = StreamAccount::Loss;
 constexpr const char* when_full =
     "free disk space and resume the session; every frame acknowledged is safe";
 
+std::optional<std::uint64_t> next_id_in(const RecorderOptions& options, const std::string& device) {
+  const auto found = options.next_ids.find(device);
+  return found == options.next_ids.end() ? std::nullopt : std::optional(found->second);
+}
+
 }  // namespace
 
 /// One camera. The capture thread pushes, the writer thread pops; the queue bounds memory.
 struct Recorder::Channel {
   Channel(FrameSource& s, SessionWriter& w, const RecorderOptions& o, const Progress& p,
           const std::function<void(const FrameRecord&)>& f)
-      : source(s), writer(w), options(o), progress(p), on_frame(f), device(s.describe()), account(device.id) {}
+      : source(s), writer(w), options(o), progress(p), on_frame(f), device(s.describe()),
+        account(device.id, next_id_in(o, device.id)) {}
 
   FrameSource& source;
   SessionWriter& writer;
@@ -43,6 +49,7 @@ struct Recorder::Channel {
   std::size_t frames_queued = 0;
   bool capture_over = false;
   bool writer_failed = false;
+  std::optional<std::uint64_t> first_unwritten;  ///< the frame at which the writer failed
   bool silent = false, away = false;
   std::optional<Error> error;
   std::optional<FrameRecord> latest;
@@ -54,6 +61,9 @@ struct Recorder::Channel {
     const std::lock_guard lock(mutex);
     return writer_failed || progress.cancelled();
   }
+
+  /// Nothing of such a source is lost for being late, nor when the recording stops.
+  bool source_waits() const { return options.backpressure == Backpressure::wait || source.can_wait(); }
 
   void keep_first(const Error& e) {
     const std::lock_guard lock(mutex);
@@ -72,9 +82,8 @@ struct Recorder::Channel {
     const auto has_room = [&] {
       return frames_queued < static_cast<std::size_t>(options.queue_frames) || writer_failed;
     };
-    if (options.backpressure == Backpressure::wait || source.can_wait()) {
-      while (!has_room() && !progress.cancelled()) changed.wait_for(lock, std::chrono::milliseconds(50));
-    }
+    // Also when the recording is being stopped: the writer still writes what is queued.
+    if (source_waits()) changed.wait(lock, has_room);
     if (!has_room() || writer_failed) {
       account.lose(frame.id, Loss::dropped, writer_failed ? "not written" : "dropped: the disk is too slow");
       return;
@@ -199,16 +208,26 @@ struct Recorder::Channel {
 
   void give_up(const Frame& frame, const Error& cause) {
     account.lose(frame.id, Loss::dropped, "not written");
+    first_unwritten = frame.id;
     keep_first(cause);
     const std::lock_guard lock(mutex);
     writer_failed = true;
     changed.notify_all();
   }
 
-  void write_gaps(std::optional<std::uint64_t> stored_id) {
-    for (const GapRecord& gap : account.take_gaps(stored_id)) {
+  void write_gaps(std::optional<std::uint64_t> frame_id) {
+    for (const GapRecord& gap : account.take_gaps(frame_id)) {
       if (const Status s = writer.append(gap); !s) keep_first(s.error());
     }
+  }
+
+  /// A source that waits has the frames that were not written still, and delivers them again.
+  void leave_for_resuming() {
+    const std::uint64_t before = account.counts().lost();
+    account.forget_from(*first_unwritten);
+    const EventRecord event{device.id, utc_now_ns(), "unwritten",
+                            fmt::format("{} frames are left for --resume", before - account.counts().lost())};
+    if (const Status s = writer.append(event); !s) keep_first(s.error());
   }
 
   void write() {
@@ -219,10 +238,11 @@ struct Recorder::Channel {
       } else if (writer_failed) {
         account.lose(frame->id, Loss::dropped, "not written");
       } else {
+        write_gaps(frame->id);  // first: wherever the manifest ends, it accounts for every id up to there
         store(*frame);
-        write_gaps(frame->id);
       }
     }
+    if (first_unwritten && source_waits()) leave_for_resuming();
     write_gaps(std::nullopt);
     if (!account.counts().any) return;
     if (const Status s = writer.append(account.record()); !s) keep_first(s.error());

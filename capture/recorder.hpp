@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -19,13 +20,16 @@ namespace orbitfuse {
 /// What a full queue does to the frame that arrives.
 enum class Backpressure {
   drop_newest,  ///< live cameras: the frame is dropped and counted
-  wait,         ///< replay, synthetic, stills: the source waits
+  wait,         ///< replay, synthetic, stills: the source waits; what it cannot write comes again
 };
 
 struct RecorderOptions {
   int queue_frames = 16;                 ///< per camera; bounds memory when the disk is slow
   Backpressure backpressure = Backpressure::drop_newest;
   std::chrono::milliseconds next_timeout{200};  ///< the early alarm for a silent camera
+  /// Per device, the id after all that earlier recordings of the session account for: ids that its
+  /// stream skips from there on are missing.
+  std::map<std::string, std::uint64_t> next_ids;
   /// Below this recording stops with an error.
   std::uint64_t min_free_bytes = min_free_session_bytes;
 

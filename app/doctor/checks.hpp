@@ -42,7 +42,8 @@ Finding check_camera(const Machine& machine, const CameraLink& camera);
 std::vector<Finding> check_usb(const Machine& machine);
 /// The year, and whether a time service keeps the clock.
 std::vector<Finding> check_clocks(const Machine& machine);
-/// Free space and the rate of synced 1 MiB files in the folder. Writes and removes one file.
-Finding check_disk(const std::filesystem::path& folder);
+/// Free space and the rate of synced 1 MiB files in the folder. Writes and removes one file; in a
+/// dry run it writes nothing and leaves out the rate.
+Finding check_disk(const std::filesystem::path& folder, bool dry_run = false);
 
 }  // namespace orbitfuse::doctor

@@ -25,8 +25,9 @@ class PreparedSource final : public FrameSource {
   void request_correction() override { source_->request_correction(); }
   std::string transport_report() const override { return source_->transport_report(); }
   std::vector<Delivery> unfinished() override;
-  bool resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames) override {
-    return source_->resume(device, frames);
+  bool resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames,
+              std::uint64_t next_id) override {
+    return source_->resume(device, frames, next_id);
   }
 
   /// Cameras start one after the other, and the first one's queue fills meanwhile. Leaves out what

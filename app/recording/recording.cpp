@@ -88,8 +88,10 @@ Status Recording::fit_into(const std::optional<Session>& earlier) {
       const DeviceInfo* known = earlier ? earlier->device(device.id) : nullptr;
       if (used.count(device.id) || (known && !same_camera(*known, device))) continue;
       if (known) {
-        const bool ids_go_on = source->resume(*known, frames_of(*earlier, device.id));
-        first_id = ids_go_on ? 0 : next_id(*earlier, device.id);
+        const std::uint64_t next = next_id(*earlier, device.id);
+        const bool ids_go_on = source->resume(*known, frames_of(*earlier, device.id), next);
+        first_id = ids_go_on ? 0 : next;
+        if (next > 0) next_ids_[device.id] = next;
         device = *known;
       }
       break;
@@ -127,6 +129,7 @@ Status Recording::prepare() {
   }
   RecorderOptions recorder_options;
   recorder_options.min_free_bytes = options_.min_free_bytes;
+  recorder_options.next_ids = next_ids_;
   if (!options_.live) recorder_options.backpressure = Backpressure::wait;
   recorder_ = std::make_unique<Recorder>(*writer_, recorder_options);
   if (guide_) recorder_->on_frame = [this](const FrameRecord& frame) { guide_->add(frame); };

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -77,6 +78,7 @@ class Recording {
   PositionFinder finder_;
   std::vector<std::unique_ptr<PreparedSource>> sources_;
   std::vector<DeviceInfo> devices_;
+  std::map<std::string, std::uint64_t> next_ids_;  ///< RecorderOptions::next_ids
   std::unique_ptr<SessionWriter> writer_;
   std::unique_ptr<LiveGuide> guide_;
   std::unique_ptr<Recorder> recorder_;

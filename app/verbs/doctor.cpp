@@ -74,7 +74,7 @@ Action add_doctor(CLI::App& app) {
   const auto folder = std::make_shared<std::string>(".");
   app.add_option("--folder", *folder, "Where sessions and results will lie")->capture_default_str();
   return [folder](Context& context) -> Status {
-    std::vector<Finding> findings{check_cpu(), check_memory(), doctor::check_disk(*folder),
+    std::vector<Finding> findings{check_cpu(), check_memory(), doctor::check_disk(*folder, context.common.dry_run),
                                   check_colmap()};
     const doctor::Machine machine;
     for (const auto& more : {doctor::check_clocks(machine), doctor::check_network(machine),

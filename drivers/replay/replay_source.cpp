@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "capture/resumed_event.hpp"
+#include "capture/resumed_ids.hpp"
 #include "core/file_io.hpp"
 #include "core/image_codec.hpp"
 
@@ -43,7 +44,7 @@ class ReplaySource : public FrameSource {
   }
 
   /// Goes on after the last frame that the earlier recording has, in that recording's count.
-  bool resume(const DeviceInfo&, const std::vector<FrameRecord>& frames) override {
+  bool resume(const DeviceInfo&, const std::vector<FrameRecord>& frames, std::uint64_t next_id) override {
     std::map<std::pair<std::string, std::int64_t>, std::uint64_t> recorded;
     for (const FrameRecord& frame : frames)
       recorded[{frame.content_hash, frame.host_time_ns}] = frame.sequence;
@@ -57,7 +58,7 @@ class ReplaySource : public FrameSource {
       if (!sequence) continue;
       ++known;
       next_ = i + 1;
-      id_offset_ = *sequence - records_[i].sequence;
+      ids_.go_on(records_[i].sequence, *sequence, next_id);
     }
     if (known == 0) return false;
     first_ = std::min(next_, records_.size() - 1);
@@ -68,14 +69,16 @@ class ReplaySource : public FrameSource {
   Result<Delivery> next(std::chrono::milliseconds timeout) override {
     if (resumed_) return *std::exchange(resumed_, std::nullopt);
     Delivery delivery;
-    if (next_ >= records_.size()) {
-      delivery.kind = Delivery::Kind::end;
+    while (next_ < records_.size()) {
+      const FrameRecord& record = records_[next_];
+      if (!wait_for(record, timeout)) return delivery;  // kind timeout
+      ++next_;
+      load(record, delivery);
+      if (delivery.kind == Delivery::Kind::rejected && ids_.settled(record.sequence)) continue;  // lost then, too
+      delivery.frame.id = ids_.give(record.sequence);
       return delivery;
     }
-    const FrameRecord& record = records_[next_];
-    if (!wait_for(record, timeout)) return delivery;  // kind timeout
-    ++next_;
-    ORBITFUSE_TRY(load(record, delivery));
+    delivery.kind = Delivery::Kind::end;
     return delivery;
   }
 
@@ -93,20 +96,21 @@ class ReplaySource : public FrameSource {
     return due <= deadline;
   }
 
-  Status load(const FrameRecord& record, Delivery& delivery) const {
+  /// A good frame or a rejected one, without its id.
+  void load(const FrameRecord& record, Delivery& delivery) const {
     Frame& frame = delivery.frame;
-    frame.id = record.sequence + id_offset_;
     delivery.kind = Delivery::Kind::rejected;
     Result<std::string> bytes = read_file(session_.path_of(record));
     if (!bytes) {
       delivery.reason = bytes.error().found;
-      return {};
+      return;
     }
     if (!record.content_hash.empty() && content_hash(*bytes) != record.content_hash) {
       delivery.reason = "the file changed since it was recorded";
-      return {};
+      return;
     }
     delivery.kind = Delivery::Kind::frame;
+    delivery.reason.clear();
     frame.encoded = *std::move(bytes);
     const std::filesystem::path file(record.file);
     const auto counts = session_.folder / file.parent_path() / "originals" / (file.stem().string() + ".tiff");
@@ -125,7 +129,6 @@ class ReplaySource : public FrameSource {
     frame.cam_from_world = record.cam_from_world;
     frame.camera = record.camera;
     frame.source = record.source;
-    return {};
   }
 
   Session session_;
@@ -133,7 +136,7 @@ class ReplaySource : public FrameSource {
   ReplaySpeed speed_;
   std::vector<FrameRecord> records_;
   std::size_t next_ = 0, first_ = 0;  ///< first_: of this recording; waiting counts from it
-  std::uint64_t id_offset_ = 0;       ///< modulo 2^64
+  ResumedIds ids_;
   std::optional<Delivery> resumed_;   ///< to be told first
   Clock::time_point started_;
 };

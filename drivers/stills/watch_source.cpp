@@ -73,7 +73,7 @@ Status WatchSource::start() {
   return reader_->watch.open(options_.existing);
 }
 
-bool WatchSource::resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames) {
+bool WatchSource::resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames, std::uint64_t) {
   const std::lock_guard lock(mutex_);
   const std::string id = info_.id;
   info_ = device;

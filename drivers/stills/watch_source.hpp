@@ -49,7 +49,7 @@ class WatchSource final : public FrameSource {
   void stop() override;
   std::vector<Delivery> unfinished() override;
   bool can_wait() const override { return true; }
-  bool resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames) override;
+  bool resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames, std::uint64_t next_id) override;
 
  private:
   struct Reader;

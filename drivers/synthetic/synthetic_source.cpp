@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "capture/resumed_event.hpp"
+#include "capture/resumed_ids.hpp"
 #include "core/image_codec.hpp"
 #include "drivers/synthetic/orbit.hpp"
 #include "drivers/synthetic/renderer.hpp"
@@ -43,7 +44,7 @@ class SyntheticSource : public FrameSource {
   }
 
   /// Goes on after the last frame of the same walk that the earlier recording has.
-  bool resume(const DeviceInfo&, const std::vector<FrameRecord>& frames) override {
+  bool resume(const DeviceInfo&, const std::vector<FrameRecord>& frames, std::uint64_t next_id) override {
     std::size_t known = 0;
     for (std::size_t i = 0; i < walk_.size(); ++i) {
       const auto found = std::find_if(frames.begin(), frames.end(),
@@ -51,7 +52,7 @@ class SyntheticSource : public FrameSource {
       if (found == frames.end()) continue;
       ++known;
       next_ = i + 1;
-      id_offset_ = found->sequence - i;
+      ids_.go_on(i, found->sequence, next_id);
     }
     if (known == 0) return false;
     resumed_ = resumed_event(known, walk_.size(), next_ == walk_.size());
@@ -68,7 +69,7 @@ class SyntheticSource : public FrameSource {
     const synthetic::Exposure& exposure = walk_[next_];
     delivery.kind = Delivery::Kind::frame;
     Frame& frame = delivery.frame;
-    frame.id = next_ + id_offset_;
+    frame.id = ids_.give(next_);
     frame.device_time_ns = device_time_ns(exposure);
     frame.host_time_ns = visible_start_ns + frame.device_time_ns + (modality_ == Modality::thermal ? thermal_delay_ns : 0);
     frame.tracking = exposure.tracking;
@@ -114,7 +115,7 @@ class SyntheticSource : public FrameSource {
   synthetic::Scene scene_;
   std::vector<synthetic::Exposure> walk_;
   std::size_t next_ = 0;
-  std::uint64_t id_offset_ = 0;      ///< modulo 2^64
+  ResumedIds ids_;
   std::optional<Delivery> resumed_;  ///< to be told first
 };
 

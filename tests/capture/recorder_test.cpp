@@ -8,6 +8,7 @@
 #include "core/file_io.hpp"
 #include "core/image_io.hpp"
 #include "tests/capture/scripted_source.hpp"
+#include "tests/core/session_account.hpp"
 #include "tests/core/temp_folder.hpp"
 
 namespace orbitfuse {
@@ -20,6 +21,7 @@ using test::TempFolder;
 using test::thermal_pixels;
 
 void expect_exact_accounts(const Session& session) {
+  test::expect_each_id_once(session);
   for (const StreamRecord& s : session.streams) {
     EXPECT_EQ(s.received + s.lost, s.last_sequence - s.first_sequence + 1) << s.device;
     std::uint64_t gaps = 0, frames = 0;
@@ -128,19 +130,94 @@ TEST(Recorder, EventsDoNotWaitForTheWriterAndKeepTheirPlace) {
   EXPECT_NE(place("\"sequence\":3"), std::string::npos);
 }
 
-/// What a kill would leave: each gap is on disk with the frame after it.
-TEST(Recorder, AGapIsWrittenAsSoonAsALaterFrameIsStored) {
+/// What a kill would leave: each gap is on disk before the frame after it.
+TEST(Recorder, WhereverTheManifestEndsItAccountsForEveryIdUpToThere) {
   Recording r;
   std::deque<Delivery> script;
   for (std::uint64_t id : {1, 2, 5, 6}) script.push_back(frame_delivery(id, thermal_pixels()));
   ScriptedSource source("thermal0", Modality::thermal, script);
   Recorder recorder(*r.writer, {});
-  std::size_t gaps_at_6 = 0;
-  recorder.on_frame = [&](const FrameRecord& frame) {
-    if (frame.sequence == 6) gaps_at_6 = open_session(r.folder / "s")->gaps.size();
+  int looks = 0;
+  recorder.on_frame = [&](const FrameRecord&) {
+    ++looks;
+    test::expect_each_id_once(*open_session(r.folder / "s"));
   };
   ASSERT_TRUE(recorder.run({&source}));
-  EXPECT_EQ(gaps_at_6, 1u);
+  EXPECT_EQ(looks, 4);
+}
+
+/// Stopped while a frame waits for room: it is written, because the writer goes on to the last one.
+TEST(Recorder, StoppingLosesNoFrameOfASourceThatWaits) {
+  Recording r;
+  std::deque<Delivery> script;
+  for (std::uint64_t id = 1; id <= 9; ++id) script.push_back(frame_delivery(id, thermal_pixels()));
+  ScriptedSource source("thermal0", Modality::thermal, script);
+  source.waits = true;
+  std::atomic<int> taken{0};
+  source.before_next = [&] { ++taken; };
+  std::atomic<bool> cancel{false};
+  Progress progress;
+  progress.cancel = &cancel;
+  RecorderOptions options;
+  options.queue_frames = 1;
+  Recorder recorder(*r.writer, options);
+  recorder.on_frame = [&](const FrameRecord& f) {
+    if (f.sequence != 1) return;
+    while (taken < 3) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    cancel = true;  // 2 is queued, 3 in hand
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  };
+  EXPECT_FALSE(recorder.run({&source}, progress));
+  const Session session = r.open();
+  expect_exact_accounts(session);
+  EXPECT_EQ(session.frames.size(), 3u);
+  EXPECT_TRUE(session.gaps.empty());
+}
+
+/// The folder of the images is gone from frame 6 on: a camera's frames are lost then, and those of
+/// a source that waits are left for later.
+TEST(Recorder, FramesThatCannotBeWrittenAreLostOnlyToACamera) {
+  for (const bool waits : {false, true}) {
+    Recording r;
+    std::deque<Delivery> script;
+    for (std::uint64_t id : {1, 2, 5, 6, 7, 10}) script.push_back(frame_delivery(id, thermal_pixels()));
+    script.push_back(rejected_delivery(11, "short"));
+    ScriptedSource source("thermal0", Modality::thermal, script);
+    source.waits = waits;
+    Recorder recorder(*r.writer, {});
+    const auto images = r.folder / "s" / "thermal";
+    recorder.on_frame = [&](const FrameRecord& f) {
+      if (f.sequence != 5) return;
+      while (recorder.status()[0].last_id < 11) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      std::filesystem::rename(images, r.folder / "kept");
+      test::put(images, "no folder");
+    };
+    EXPECT_FALSE(recorder.run({&source}));
+    std::filesystem::remove(images);
+    std::filesystem::rename(r.folder / "kept", images);
+    const Session session = r.open();
+    expect_exact_accounts(session);
+    const StreamStatus s = recorder.status()[0];
+    EXPECT_EQ(s.received, 3u);
+    EXPECT_EQ(s.last_id, waits ? 5u : 11u);
+    EXPECT_EQ(s.missing, waits ? 2u : 4u);
+    EXPECT_EQ(s.rejected, waits ? 0u : 1u);
+    EXPECT_EQ(s.dropped, waits ? 0u : 3u);
+    EXPECT_EQ(session.events.size(), waits ? 1u : 0u);
+  }
+}
+
+TEST(Recorder, WhatAResumedStreamSkipsAtItsBeginningIsMissing) {
+  Recording r;
+  ScriptedSource source("thermal0", Modality::thermal, {frame_delivery(9, thermal_pixels())});
+  RecorderOptions options;
+  options.next_ids["thermal0"] = 7;
+  Recorder recorder(*r.writer, options);
+  ASSERT_TRUE(recorder.run({&source}));
+  const Session session = r.open();
+  expect_exact_accounts(session);
+  EXPECT_EQ(session.streams.at(0).first_sequence, 7u);
+  EXPECT_EQ(session.streams.at(0).lost, 2u);
 }
 
 TEST(Recorder, WaitingLosesNothing) {

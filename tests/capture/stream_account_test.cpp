@@ -50,6 +50,28 @@ TEST(StreamAccount, NeighboursWithOneReasonAreOneGap) {
   EXPECT_EQ(gaps[0].count, 5u);
 }
 
+TEST(StreamAccount, WhatIsForgottenComesAgain) {
+  for (const bool resumed : {false, true}) {
+    StreamAccount account("d", resumed ? std::optional<std::uint64_t>(3) : std::nullopt);
+    EXPECT_FALSE(resumed && account.see(2));
+    account.see(5);
+    account.lose(5, Loss::dropped, "not written");
+    account.see(7);
+    account.lose(7, Loss::rejected, "bad");
+    EXPECT_EQ(account.take_gaps(5).size(), resumed ? 1u : 0u);  // 3 and 4
+    account.forget_from(5);
+    EXPECT_EQ(account.counts().any, resumed);
+    EXPECT_EQ(account.counts().lost(), resumed ? 2u : 0u);
+    EXPECT_TRUE(account.take_gaps(std::nullopt).empty());
+    EXPECT_FALSE(account.see(4));
+    ASSERT_TRUE(account.see(5));
+    account.receive();
+    const StreamRecord r = account.record();
+    EXPECT_EQ(r.first_sequence, resumed ? 3u : 5u);
+    EXPECT_EQ(r.received + r.lost, r.last_sequence - r.first_sequence + 1);
+  }
+}
+
 TEST(StreamAccount, IdsThatDoNotRiseAreRefused) {
   StreamAccount account("d");
   EXPECT_TRUE(account.see(5));

@@ -9,6 +9,7 @@
 #include "core/session.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/app/temp_folder.hpp"
+#include "tests/core/session_account.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -23,6 +24,7 @@ std::map<std::string, std::vector<std::pair<std::uint64_t, std::string>>> frames
   EXPECT_TRUE(session) << session.error().message();
   if (!session) return list;
   EXPECT_TRUE(session->complete);
+  test::expect_each_id_once(*session);
   for (const FrameRecord& frame : session->frames)
     list[frame.device].emplace_back(frame.sequence, frame.content_hash);
   for (auto& [device, frames] : list) std::sort(frames.begin(), frames.end());

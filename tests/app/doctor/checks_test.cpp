@@ -169,5 +169,14 @@ TEST_F(DoctorTest, DiskIsMeasuredAndLeftClean) {
   EXPECT_THAT(check_disk(folder / "none").remedy, HasSubstr("--folder"));
 }
 
+TEST_F(DoctorTest, DryRunWritesNothingToTheDisk) {
+  const auto changed = std::filesystem::last_write_time(folder.path());
+  const Finding disk = check_disk(folder.path(), true);
+  EXPECT_EQ(std::filesystem::last_write_time(folder.path()), changed);
+  EXPECT_THAT(disk.found, HasSubstr("GiB free"));
+  EXPECT_THAT(disk.found, Not(HasSubstr("MiB/s")));
+  EXPECT_THAT(check_disk(folder / "none", true).remedy, HasSubstr("--folder"));
+}
+
 }  // namespace
 }  // namespace orbitfuse::doctor

@@ -99,7 +99,7 @@ TEST_F(WatchTest, ResumedSessionGetsNoPhotoTwice) {
   ASSERT_TRUE(source.start());
   DeviceInfo known;
   known.id = "visible0";
-  source.resume(known, recorded);
+  source.resume(known, recorded, 3);
   int frames = 0, duplicates = 0;
   for (int i = 0; i < 4; ++i) {
     const Delivery delivery = soon(source);
@@ -118,7 +118,7 @@ TEST_F(WatchTest, ResumedSessionTakesNoOtherCamera) {
   ASSERT_TRUE(source.start());
   DeviceInfo known;
   known.model = "Phone 9";
-  source.resume(known, {});
+  source.resume(known, {}, 0);
   EXPECT_EQ(source.describe().model, "Phone 9");
   EXPECT_EQ(source.describe().id, options.device_id);
   put("IMG_1.jpg", photo(1));  // says of no camera at all
