@@ -168,6 +168,7 @@ Result<Ending> Recording::run(const std::atomic<bool>* cancel, const std::functi
   const Status status = recorder_->run(sources, progress);
   returned = true;
   supervisor.join();
+  if (tick) tick();  // what came after the last one is told, too: a short replay is over between two
   {
     const std::lock_guard lock(mutex_);
     ended_ = Clock::now();
