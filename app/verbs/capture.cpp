@@ -6,6 +6,7 @@
 #include "app/recording/rehearsal.hpp"
 #include "app/verbs/capture_options.hpp"
 #include "app/verbs/capture_teller.hpp"
+#include "capture/live/live_state.hpp"
 
 namespace orbitfuse::cli {
 namespace {
@@ -108,15 +109,7 @@ void account(Context& context, recording::Recording& recording) {
                       s.last_id)
                 : s.device + ": no frame came");
     if (s.passed_over > 0) context.console.data(passed_over(s));
-    streams.push_back({{"device", s.device},
-                       {"received", s.received},
-                       {"lost", s.lost},
-                       {"missing", s.missing},
-                       {"rejected", s.rejected},
-                       {"dropped", s.dropped},
-                       {"passed_over", s.passed_over},
-                       {"first_id", s.any() ? json(s.first_id) : json()},
-                       {"last_id", s.any() ? json(s.last_id) : json()}});
+    streams.push_back(account_json(s));
   }
   context.result["session"] = recording.folder().string();
   context.result["streams"] = streams;

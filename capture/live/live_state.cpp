@@ -14,19 +14,12 @@ using Json = nlohmann::json;
 constexpr std::uint64_t little_disk_bytes = 2ull << 30;
 
 Json json_of(const StreamStatus& s, double rate_hz) {
-  return {{"device", s.device},
-          {"received", s.received},
-          {"lost", s.lost},
-          {"missing", s.missing},
-          {"rejected", s.rejected},
-          {"dropped", s.dropped},
-          {"passed_over", s.passed_over},
-          {"passed_over_last", s.passed_over_last},
-          {"silent", s.silent},
-          {"ended", s.ended},
-          {"first_id", s.any() ? Json(s.first_id) : Json()},
-          {"last_id", s.any() ? Json(s.last_id) : Json()},
-          {"rate_hz", rate_hz}};
+  Json json = account_json(s);
+  json["passed_over_last"] = s.passed_over_last;
+  json["silent"] = s.silent;
+  json["ended"] = s.ended;
+  json["rate_hz"] = rate_hz;
+  return json;
 }
 
 std::string verdict(const LiveCamera& camera) {
@@ -48,6 +41,18 @@ Json json_of(const LiveCamera& camera) {
 }
 
 }  // namespace
+
+Json account_json(const StreamStatus& s) {
+  return {{"device", s.device},
+          {"received", s.received},
+          {"lost", s.lost},
+          {"missing", s.missing},
+          {"rejected", s.rejected},
+          {"dropped", s.dropped},
+          {"passed_over", s.passed_over},
+          {"first_id", s.any() ? Json(s.first_id) : Json()},
+          {"last_id", s.any() ? Json(s.last_id) : Json()}};
+}
 
 std::vector<std::string> warnings_of(const LiveState& state) {
   std::vector<std::string> list;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,9 @@ struct LiveState {
 
 /// Warnings that follow from the figures: silence, drops, rejections, a nearly full disk.
 std::vector<std::string> warnings_of(const LiveState& state);
+
+/// What came of a stream and what was lost, and the span of its ids (null before its first frame).
+nlohmann::json account_json(const StreamStatus& stream);
 
 /// {"session","running","elapsed_s","free_bytes","streams":[...],"cameras":[...],"loops":[...],...};
 /// docs/capture.md describes the fields.
