@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/memory.hpp"
+
 namespace orbitfuse::nerf {
 
 void Occupancy::create(int cells_per_axis, int cascade_count) {
@@ -14,6 +16,7 @@ void Occupancy::create(int cells_per_axis, int cascade_count) {
   const auto cells = static_cast<std::size_t>(cell_count());
   on.assign((cells + 63) / 64, ~std::uint64_t{0});
   allowed = on;
+  reserve_huge(density, cells);
   density.assign(cells, 0);
   code.assign(cells, 0);
   window.assign(cells, -1);
@@ -68,6 +71,7 @@ const Decoded& decoded() {
 
 void Occupancy::refresh() {
   code.resize(density.size());
+  reserve_huge(march_words, 2 * on.size());
   march_words.assign(2 * on.size(), 0);
   any.assign((on.size() + 63) / 64, 0);
   for (std::size_t b = 0; b < on.size(); ++b) {
