@@ -198,14 +198,20 @@ TEST(Stress, StepsWithoutFiniteGradientsAreSkippedAndARunOfThemIsAnError) {
   EXPECT_NE(report.error().found.find("none of the 6 steps"), std::string::npos);
 }
 
+Marched march_one(const Occupancy& grid, const Ray& ray) {
+  Marched out;
+  const DrawnRay drawn{.ray = ray};
+  march(grid, {}, &drawn, 1, &out);
+  return out;
+}
+
 TEST(Occupancy, RaysThatMissAndDegenerateRaysGetNoSamples) {
   Occupancy grid;
   grid.create(16, 3);
-  float t[max_ray_samples], dt[max_ray_samples];
-  EXPECT_EQ(march(grid, {{100, 100, 100}, {0, 0, 1}, 1}, {}, 0.5f, t, dt), 0);
+  EXPECT_EQ(march_one(grid, {{100, 100, 100}, {0, 0, 1}, 1}).count, 0);
   std::fill(grid.on.begin(), grid.on.end(), 0);
   grid.refresh();
-  EXPECT_EQ(march(grid, {{0, 0, 0}, {0, 0, 1}, 1}, {}, 0.5f, t, dt), 0);
+  EXPECT_EQ(march_one(grid, {{0, 0, 0}, {0, 0, 1}, 1}).count, 0);
 }
 
 TEST(Occupancy, SamplesCoverTheOccupiedLengthInOrder) {
@@ -217,8 +223,7 @@ TEST(Occupancy, SamplesCoverTheOccupiedLengthInOrder) {
     for (std::size_t c = 0; c < grid.density.size(); ++c)
       grid.density[c] = static_cast<float>((c * 2654435761u) >> 8 & 31);
     grid.refresh();
-    float t[max_ray_samples], dt[max_ray_samples];
-    const int count = march(grid, ray, {}, 0.5f, t, dt);
+    const auto [count, t, dt] = march_one(grid, ray);
     ASSERT_GT(count, 0);
     double covered = 0;
     for (int i = 0; i < count; ++i) {
@@ -264,8 +269,7 @@ TEST(Occupancy, WholeBlocksAreCrossedAsTheirCellsWouldBe) {
       if (cascade >= grid.cascades) break;
       occupied += Occupancy::test(grid.on, grid.cell_of(cascade, x)) ? step : 0;
     }
-    float t[max_ray_samples], dt[max_ray_samples];
-    const int count = march(grid, ray, {}, 0.5f, t, dt);
+    const auto [count, t, dt] = march_one(grid, ray);
     double covered = 0;
     for (int i = 0; i < count; ++i) covered += dt[i];
     EXPECT_NEAR(covered, occupied, 0.02 * occupied + 0.01) << k;
