@@ -149,22 +149,14 @@ void walk_through(const Occupancy& grid, const Lanes& lanes, Walk& walk) {
 
 /// What the cells hold. No cell waits for another one's memory.
 void look_up_cells(const Occupancy& grid, Walk& walk) {
-  const __m256i none = _mm256_set1_epi32(-1);
   for (int k = 0; k < walk.count; ++k) {
     Walk::Turn& turn = walk.turns[static_cast<std::size_t>(k)];
     const __m256i cell = _mm256_load_si256(reinterpret_cast<const __m256i*>(turn.cell));
-    const __m256i there = _mm256_cmpgt_epi32(cell, none);
-    // A block's four words: 64 bits that say what is on, 64 what has a code.
-    const __m256i word = _mm256_or_si256(_mm256_slli_epi32(_mm256_srli_epi32(cell, 6), 2),
-                                         and1(_mm256_srli_epi32(cell, 5)));
-    const __m256i bit = _mm256_and_si256(cell, _mm256_set1_epi32(31));
-    const __m256i on = is_one(and1(_mm256_srlv_epi32(gather(grid.march_words, word, there), bit)));
-    const __m256i coded_word = gather(grid.march_words, _mm256_add_epi32(word, _mm256_set1_epi32(2)), on);
-    const __m256i coded = is_one(and1(_mm256_srlv_epi32(coded_word, bit)));
-    const __m256i four_codes = gather(grid.code, _mm256_srli_epi32(cell, 2), coded);
+    const __m256i there = _mm256_cmpgt_epi32(cell, _mm256_set1_epi32(-1));
+    const __m256i four = gather(grid.look, _mm256_srli_epi32(cell, 2), there);
     const __m256i shift = _mm256_slli_epi32(_mm256_and_si256(cell, _mm256_set1_epi32(3)), 3);
-    const __m256i code = _mm256_and_si256(_mm256_srlv_epi32(four_codes, shift), _mm256_set1_epi32(255));
-    store(turn.code, _mm256_blendv_epi8(none, code, on));
+    const __m256i look = _mm256_and_si256(_mm256_srlv_epi32(four, shift), _mm256_set1_epi32(255));
+    store(turn.code, _mm256_sub_epi32(look, _mm256_set1_epi32(1)));
   }
 }
 

@@ -71,22 +71,28 @@ const float* densities_of_codes() {
 
 void Occupancy::refresh() {
   code.resize(density.size());
-  reserve_huge(march_words, 2 * on.size());
-  march_words.assign(2 * on.size(), 0);
+  reserve_huge(look, density.size());
+  look.resize(density.size());
+  coded_.assign(on.size(), 0);
   any.assign((on.size() + 63) / 64, 0);
   plain = any;
   for (std::size_t i = 0; i < density.size(); ++i) {
     code[i] = density[i] > 0 ? code_of(density[i]) : std::uint8_t{0};
-    if (code[i] > 0) march_words[2 * (i >> 6) + 1] |= std::uint64_t{1} << (i & 63);
+    show(static_cast<std::int64_t>(i));
   }
   for (std::size_t b = 0; b < on.size(); ++b) sum_up(static_cast<std::int64_t>(b));
 }
 
+void Occupancy::show(std::int64_t cell) {
+  const auto i = static_cast<std::size_t>(cell);
+  put(coded_, cell, code[i] > 0);
+  look[i] = test(on, cell) ? static_cast<std::uint8_t>(1 + std::min<int>(code[i], 254)) : std::uint8_t{0};
+}
+
 void Occupancy::sum_up(std::int64_t block) {
   const auto b = static_cast<std::size_t>(block);
-  march_words[2 * b] = on[b];
   put(any, block, on[b] != 0);
-  put(plain, block, on[b] == ~std::uint64_t{0} && march_words[2 * b + 1] == 0);
+  put(plain, block, on[b] == ~std::uint64_t{0} && coded_[b] == 0);
 }
 
 void Occupancy::restore(const std::vector<std::uint64_t>& cells_on, const std::vector<std::uint8_t>& codes) {
@@ -128,7 +134,7 @@ void Occupancy::update(float decay, float threshold) {
     const auto i = static_cast<std::size_t>(c);
     put(on, c, test(allowed, c) && opacity(c, density[i]) >= limit);
     code[i] = code_of(density[i]);
-    put(march_words, (c >> 6) * 128 + 64 + (c & 63), code[i] > 0);
+    show(c);
     sum_up(c >> 6);
     window[i] = -1;
   }

@@ -61,8 +61,8 @@ struct Occupancy {
   /// Derived arrays, after `on` or `density` were set from outside.
   void refresh();
 
-  /// Two words a block: `on`, and which cells have a code; marching reads codes only of those.
-  std::vector<std::uint64_t> march_words;
+  /// What marching reads of a cell: 0 = off, else 1 + code. A block is one cache line.
+  std::vector<std::uint8_t> look;
   /// Bits per block, small enough for the L1 cache: a cell of it is on; all are, and nothing else is known.
   std::vector<std::uint64_t> any, plain;
   double fraction_on() const;
@@ -74,7 +74,9 @@ struct Occupancy {
   void update(float decay, float threshold);
 
  private:
-  void sum_up(std::int64_t block);  ///< what marching reads of a block
+  void sum_up(std::int64_t block);  ///< its bits in `any` and `plain`
+  void show(std::int64_t cell);     ///< sets its byte in `look`
+  std::vector<std::uint64_t> coded_;  ///< bit per cell: its code isn't 0
 };
 
 const float* densities_of_codes();  ///< [256]
