@@ -53,10 +53,10 @@ struct alignas(32) Lanes {
       origin[d][lane] = o;
       direction[d][lane] = along;
       inverse[d][lane] = 1.0f / (std::abs(along) > 1e-9f ? along : std::copysign(1e-9f, along));
-      // A camera outside all cascades first advances to the largest cube.
       const float gap = std::abs(o) - far_edge;
-      if (gap <= 0) continue;
-      if (o * along >= 0) far[lane] = 0;
+      if (gap <= 0 && std::isfinite(along)) continue;
+      // A camera outside all cascades first advances to the largest cube. (NaN gets here, and ends.)
+      if (!(o * along < 0)) far[lane] = 0;
       t[lane] = std::max(t[lane], gap * std::abs(inverse[d][lane]) * 1.0001f);
     }
   }
