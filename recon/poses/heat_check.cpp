@@ -179,6 +179,13 @@ Result<HeatCheck> correct_by_heat(const Refinery& refinery, Fit& alignment) {
     seen.form_before = view.support() * by_usual_form;
     seen.form_there = form.support() * by_usual_form;
     seen.heat_there = heat.support() / std::max(found.usual.at(loop), least_support);
+    refinery.progress.report(
+        {"poses.thermal", 3, 4, -1,
+         fmt::format("{}: usual support {:.2f} among temperatures, {:.2f} of form there, {:.2f} "
+                     "before, {:.1f} deg away; {}",
+                     view.view.name, seen.heat_there, seen.form_there, seen.form_before,
+                     apart_deg(orbit, view.view.cam_from_world, heat.view.cam_from_world),
+                     seen.agree ? "they agree" : "they differ")});
     switch (verdict(seen)) {
       case HeatVerdict::both:
         view.view = form.view;
