@@ -144,7 +144,7 @@ void register_all(Isa isa) {
 
 int main(int argc, char** argv) {
   fmt::print("{}\n", cpu_description());
-  for (const Isa isa : {Isa::avx2, Isa::avx512, Isa::avx512bf16})
+  for (const Isa isa : {Isa::avx2, Isa::avx512, Isa::avx512bf16, Isa::amx})
     if (isa <= best_isa()) register_all(isa);
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;

@@ -64,6 +64,7 @@ const Kernels& kernels_for(Isa isa);
 const Kernels& kernels_avx2();
 const Kernels& kernels_avx512();
 const Kernels& kernels_avx512bf16();
+const Kernels& kernels_amx();  ///< the layers; the rest is that of AVX-512
 
 inline constexpr float max_half = 60000.0f;  ///< grid parameters are kept within +-this
 

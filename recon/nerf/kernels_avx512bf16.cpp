@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #define ORBITFUSE_LANES 16
+#include "recon/nerf/bf16_rounding.hpp"
 #include "recon/nerf/kernels_impl.hpp"
 
 // Layers with bf16 operands and fp32 sums (VDPBF16PS: two multiply-adds per lane). Grid and
@@ -13,13 +14,6 @@ inline __m512bh pair_broadcast(const std::uint16_t* p) {
   std::int32_t bits;
   __builtin_memcpy(&bits, p, 4);
   return reinterpret_cast<__m512bh>(_mm512_set1_epi32(bits));
-}
-
-/// Rounds `count` floats (a multiple of 16) to bf16.
-inline void to_bf16(const float* in, int count, std::uint16_t* out) {
-  for (int i = 0; i < count; i += 16)
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(out + i),
-                        reinterpret_cast<__m256i>(_mm512_cvtneps_pbh(_mm512_loadu_ps(in + i))));
 }
 
 /// C[R][C*16] = sum over pairs of A (bf16 rows, `a_row` apart, pairs `a_pair` apart) and B
@@ -66,13 +60,13 @@ inline void rows_bf16(int rows, int depth, const float* in, const std::uint16_t*
   alignas(64) std::uint16_t a[R * max_width];
   int r = 0;
   for (; r + R <= rows; r += R) {
-    to_bf16(in + static_cast<long>(r) * depth, R * depth, a);
+    Avx512Rounding::in_order(in + static_cast<long>(r) * depth, R * depth, a);
     const long at = static_cast<long>(r) * columns;
     tile_bf16<R, C, E>(a, depth, 2, b, columns, out + at, columns, depth / 2,
                        mask ? mask + at : nullptr);
   }
   for (; r < rows; ++r) {
-    to_bf16(in + static_cast<long>(r) * depth, depth, a);
+    Avx512Rounding::in_order(in + static_cast<long>(r) * depth, depth, a);
     const long at = static_cast<long>(r) * columns;
     tile_bf16<1, C, E>(a, depth, 2, b, columns, out + at, columns, depth / 2,
                        mask ? mask + at : nullptr);
@@ -108,22 +102,6 @@ void backward_input_bf16(const LayerView& layer, int rows, const float* dout, fl
     multiply_bf16<Epilogue::store>(rows, layer.in, layer.out, dout, layer.paired_t, din, nullptr);
 }
 
-/// bf16 [rows/2][width][2]: neighbouring samples become the pairs that are summed over.
-inline void pair_rows(const float* in, int rows, int width, std::uint16_t* out) {
-  const __m512i low_high = _mm512_set_epi16(
-      31, 15, 30, 14, 29, 13, 28, 12, 27, 11, 26, 10, 25, 9, 24, 8, 23, 7, 22, 6, 21, 5, 20, 4, 19,
-      3, 18, 2, 17, 1, 16, 0);
-  for (int s = 0; s < rows; s += 2)
-    for (int i = 0; i < width; i += 16) {
-      const __m512 a = _mm512_loadu_ps(in + static_cast<long>(s) * width + i);
-      const __m512 b = s + 1 < rows ? _mm512_loadu_ps(in + static_cast<long>(s + 1) * width + i)
-                                    : _mm512_setzero_ps();
-      const __m512i both = reinterpret_cast<__m512i>(_mm512_cvtne2ps_pbh(b, a));
-      _mm512_storeu_si512(out + static_cast<long>(s) * width + 2 * i,
-                          _mm512_permutexvar_epi16(low_high, both));
-    }
-}
-
 void backward_weights_bf16(const LayerView& layer, int rows, const float* in, const float* dout,
                            float* dweights) {
   constexpr int chunk = 128;
@@ -131,8 +109,8 @@ void backward_weights_bf16(const LayerView& layer, int rows, const float* in, co
   const int width = layer.in, columns = layer.out;
   for (int begin = 0; begin < rows; begin += chunk) {
     const int n = rows - begin < chunk ? rows - begin : chunk;
-    pair_rows(in + static_cast<long>(begin) * width, n, width, a);
-    pair_rows(dout + static_cast<long>(begin) * columns, n, columns, b);
+    Avx512Rounding::pair_rows(in + static_cast<long>(begin) * width, n, width, a);
+    Avx512Rounding::pair_rows(dout + static_cast<long>(begin) * columns, n, columns, b);
     const int pairs = (n + 1) / 2;
     for (int j = 0; j < columns;) {
       const int left = columns - j;

@@ -189,6 +189,15 @@ bool passes_gates(ModalityPoses& poses, const Session& session, const PoseOption
   return good;
 }
 
+Result<JudgedModel> judge_model(Reconstruction model, const Session& session,
+                                const std::vector<const FrameRecord*>& frames,
+                                const PoseOptions& options) {
+  JudgedModel judged;
+  ORBITFUSE_ASSIGN(judged.poses, adjusted(std::move(model), session, frames, options));
+  judged.believed = passes_gates(judged.poses, session, options, judged.why);
+  return judged;
+}
+
 Result<ModalityPoses> structure_from_motion(const Session& session,
                                             const std::vector<const FrameRecord*>& frames,
                                             const PoseOptions& options, const fs::path& workdir,
@@ -235,26 +244,23 @@ Result<ModalityPoses> structure_from_motion(const Session& session,
       LadderStep step{attempt.name + ", " + settings.name, false, found, 0, total, 0};
       if (model.views.size() >= 2) {
         tell(3, "bundle adjustment");
-        Result<ModalityPoses> poses = adjusted(std::move(model), session, frames, options);
-        if (poses) {
-          std::string why;
-          step.held = passes_gates(*poses, session, options, why);
-          step.why += "; " + why;
-          step.posed = static_cast<int>(poses->reconstruction.views.size());
-        } else {
-          step.why += "; " + poses.error().found;
+        Result<JudgedModel> judged = judge_model(std::move(model), session, frames, options);
+        step.why += "; " + (judged ? judged->why : judged.error().found);
+        if (judged) {
+          step.held = judged->believed;
+          step.posed = static_cast<int>(judged->poses.reconstruction.views.size());
         }
         step.seconds = seconds_since(rung_start);
         steps.push_back(step);
         if (step.held) {
           if (!attempt.exhaustive && pairs.size() < exhaustive_pairs(total).size())
-            poses->skips.push_back(
+            judged->poses.skips.push_back(
                 {"exhaustive matching",
                  fmt::format("{} of {} pairs held", pairs.size(), exhaustive_pairs(total).size()),
                  fmt::format("{:.1f}x fewer pairs to match",
                              static_cast<double>(exhaustive_pairs(total).size()) /
                                  static_cast<double>(pairs.size()))});
-          return poses;
+          return std::move(judged->poses);
         }
       } else {
         step.why += "; no model";

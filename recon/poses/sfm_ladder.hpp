@@ -17,6 +17,20 @@ Result<ModalityPoses> structure_from_motion(const Session& session,
                                             const Progress& progress,
                                             std::vector<LadderStep>& steps);
 
+/// A model that structure from motion made, and whether the gates believe it.
+struct JudgedModel {
+  ModalityPoses poses;  ///< after bundle adjustment, in the canonical world
+  bool believed = false;
+  std::string why;  ///< the figures behind the verdict
+};
+
+/// How the ladder judges each model, which may come from elsewhere too: bundle adjustment with the
+/// session's lenses, then the gates. `frames` are all that could have been posed.
+/// Errors: those of adjust_bundle.
+Result<JudgedModel> judge_model(Reconstruction model, const Session& session,
+                                const std::vector<const FrameRecord*>& frames,
+                                const PoseOptions& options);
+
 /// The gates a model must pass without ground truth; `why` says the figures either way.
 /// Fills poses.gates.
 bool passes_gates(ModalityPoses& poses, const Session& session, const PoseOptions& options,

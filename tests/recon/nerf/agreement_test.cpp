@@ -15,6 +15,7 @@
 #include "recon/nerf/random.hpp"
 #include "recon/nerf/render.hpp"
 #include "recon/nerf/trainer.hpp"
+#include "tests/recon/nerf/emulated_amx.hpp"
 #include "tests/recon/nerf/toy_scene.hpp"
 
 namespace orbitfuse::nerf {
@@ -310,10 +311,13 @@ TEST(Agreement, KernelsInFloatBfloatAndDoubleTrainWithinAFifthOfADecibel) {
   in_double.backward_weights = double_backward_weights;
   const double reference = psnr_with(data, in_double);
   EXPECT_GT(reference, 14);  // the background alone gives 11
-  for (const Isa isa : {Isa::avx2, Isa::avx512, Isa::avx512bf16})
+  for (const Isa isa : {Isa::avx2, Isa::avx512, Isa::avx512bf16, Isa::amx})
     if (isa <= best_isa()) {
       EXPECT_NEAR(psnr_with(data, kernels_for(isa)), reference, 0.2) << name(isa);
     }
+  if (best_isa() < Isa::amx) {
+    EXPECT_NEAR(psnr_with(data, test::emulated_amx()), reference, 0.2) << "emulated AMX";
+  }
 }
 
 TEST(Agreement, ManyThreadsGiveWhatOneGives) {
@@ -358,7 +362,7 @@ TEST(Agreement, EightBitThermalKeepsItsGrayValues) {
 }
 
 TEST(Agreement, GridParametersStayWithinHalfPrecision) {
-  for (const Isa isa : {Isa::avx2, Isa::avx512, Isa::avx512bf16}) {
+  for (const Isa isa : {Isa::avx2, Isa::avx512, Isa::avx512bf16, Isa::amx}) {
     if (isa > best_isa()) continue;
     HashEncoding grid;
     grid.create(1, 4, 8, 4, 4, 1);

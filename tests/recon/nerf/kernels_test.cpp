@@ -163,7 +163,7 @@ TEST_P(KernelsTest, AdamFollowsThePaperAndLeavesUntouchedEntriesAlone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(EveryIsa, KernelsTest,
-                         ::testing::Values(Isa::avx2, Isa::avx512, Isa::avx512bf16),
+                         ::testing::Values(Isa::avx2, Isa::avx512, Isa::avx512bf16, Isa::amx),
                          [](const auto& instance) { return std::string(name(instance.param)); });
 
 // Orthonormal on the sphere: the quadrature of Y_i Y_j over many directions is the identity.
