@@ -61,10 +61,6 @@ void add_folders(CLI::App& app, StageFolders& folders) {
 
 namespace {
 
-bool is_utf8(const std::string& text) {
-  return json::parse(json(text).dump(-1, ' ', false, json::error_handler_t::replace)) == text;
-}
-
 /// run.json of an earlier run's folder; null when there is none.
 Result<json> earlier_run(const std::string& folder) {
   const fs::path record = fs::path(folder) / run_file;
@@ -72,6 +68,8 @@ Result<json> earlier_run(const std::string& folder) {
   if (folder.empty() || !fs::exists(record, unreadable)) return json();
   ORBITFUSE_ASSIGN(const std::string text, read_file(record));
   json run = json::parse(text, nullptr, false);
+  if (run.is_discarded())
+    return fail(ErrorKind::input, record.string(), "not JSON, or cut off", "give the session folder and --out");
   if (!run.is_object() || !run.contains("session") || !run["session"].is_string())
     return fail(ErrorKind::input, record.string(), "no session named in it",
                 "give the session folder and --out");
@@ -82,11 +80,22 @@ Result<json> earlier_run(const std::string& folder) {
 
 Result<std::optional<std::uint64_t>> read_earlier_options(const std::string& folder, config::Settings& settings) {
   ORBITFUSE_ASSIGN(const json run, earlier_run(folder));
-  if (!run.contains("config") || !run["config"].is_object()) return std::nullopt;
-  ORBITFUSE_TRY(settings.read_json(run["config"], (fs::path(folder) / run_file).string()));
-  return run.contains("seed") && run["seed"].is_number_unsigned()
-             ? std::optional<std::uint64_t>(run["seed"].get<std::uint64_t>())
-             : std::nullopt;
+  if (run.is_null()) return std::nullopt;
+  const std::string file = (fs::path(folder) / run_file).string();
+  const auto broken = [&](const char* key, const char* wanted) {
+    return fail(ErrorKind::input, file, fmt::format("{} = {}", key, run[key].dump()),
+                fmt::format("it must be {}; or give the session folder and --out", wanted));
+  };
+  if (run.contains("config")) {
+    if (!run["config"].is_object()) return broken("config", "a table of settings");
+    ORBITFUSE_TRY(settings.read_json(run["config"], file).map_error([](Error error) {
+      error.kind = ErrorKind::input;  // the user didn't write it
+      return error;
+    }));
+  }
+  if (!run.contains("seed")) return std::nullopt;
+  if (!run["seed"].is_number_unsigned()) return broken("seed", "an integer of at least 0");
+  return run["seed"].get<std::uint64_t>();
 }
 
 Status resolve(StageFolders& folders) {
@@ -96,7 +105,7 @@ Status resolve(StageFolders& folders) {
   ORBITFUSE_ASSIGN(const json run, earlier_run(folders.session));
   // run.json and the records of the stages are JSON and name both folders.
   for (const std::string& folder : {folders.session, folders.out}) {
-    if (!is_utf8(folder))
+    if (!config::is_utf8(folder))
       return fail(ErrorKind::usage, folder, "its name is not UTF-8", "rename the folder");
   }
   if (run.is_null()) return {};

@@ -65,7 +65,26 @@ std::size_t edits(const std::string& a, const std::string& b) {
   return row[b.size()];
 }
 
+/// The value of a dotted key, nullptr where there is none; an error where a table on the way is none.
+Result<const json*> value_at(const json& values, const std::string& key, const std::string& where) {
+  const json* node = &values;
+  for (std::size_t begin = 0, end = 0; end != std::string::npos; begin = end + 1) {
+    if (!node->is_object())
+      return fail(ErrorKind::usage, where, fmt::format("{} = {}", key.substr(0, begin - 1), node->dump()),
+                  "it must be a table of settings");
+    end = key.find('.', begin);
+    const auto next = node->find(key.substr(begin, end - begin));
+    if (next == node->end()) return nullptr;
+    node = &*next;
+  }
+  return node;
+}
+
 }  // namespace
+
+bool is_utf8(const std::string& text) {
+  return json::parse(json(text).dump(-1, ' ', false, json::error_handler_t::replace)) == text;
+}
 
 std::string nearest(const std::string& word, const std::vector<std::string>& known) {
   std::string best;
@@ -121,10 +140,8 @@ Status Settings::read_json(const json& values, const std::string& where) {
   for (const bool presets : {true, false})  // a preset sets many fields, which the other keys then change
     for (const Setting& s : list_) {
       if (s.key.ends_with(".preset") != presets) continue;
-      std::string path = "/" + s.key;
-      std::replace(path.begin(), path.end(), '.', '/');
-      const json::json_pointer pointer(path);
-      if (values.contains(pointer)) ORBITFUSE_TRY(set(s.key, values[pointer], where));
+      ORBITFUSE_ASSIGN(const json* value, value_at(values, s.key, where));
+      if (value) ORBITFUSE_TRY(set(s.key, *value, where));
     }
   return {};
 }
@@ -135,6 +152,7 @@ Status Settings::apply(const std::string& assignment) {
     return fail(ErrorKind::usage, "--set " + assignment, "no '='", "write --set key=value");
   const std::string key = assignment.substr(0, equals), text = assignment.substr(equals + 1);
   const std::string where = "--set " + assignment;
+  if (!is_utf8(assignment)) return fail(ErrorKind::usage, where, "it is not UTF-8", "write it as UTF-8");
   json value = json::parse(text, nullptr, false);
   if (value.is_discarded()) value = text;
   return set(key, value, where);

@@ -112,6 +112,9 @@ void Settings::add_choice(std::string key, E& field, std::vector<std::pair<E, st
                    }, true});
 }
 
+/// JSON, and so every record of a run, holds nothing else.
+bool is_utf8(const std::string& text);
+
 /// The known word that takes the fewest edits from `word`, when that is few enough to be a slip.
 std::string nearest(const std::string& word, const std::vector<std::string>& known);
 

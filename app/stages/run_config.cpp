@@ -14,13 +14,13 @@ using nlohmann::json;
 /// Set by the run, not by a preset's user.
 constexpr const char* run_owned[] = {"preset", "seed", "checkpoint", "resume"};
 
-/// Every field of the training recipe by its own name; listed in recon/nerf/options.hpp.
+/// Every field of the training recipe by its own name.
 void add_train_fields(Settings& settings, const std::string& table, nerf::TrainOptions& options) {
   for (const std::string& key : nerf::TrainOptions::keys()) {
     if (std::count(std::begin(run_owned), std::end(run_owned), key) > 0) continue;
     Setting setting;
     setting.key = table + "." + key;
-    setting.type = "as in recon/nerf/options.hpp";
+    setting.type = nerf::TrainOptions::allowed(key);
     setting.listed = false;
     setting.get = [&options, key] {
       const std::string text = options.get(key);
@@ -165,14 +165,18 @@ Status RunConfig::validate() const {
   ORBITFUSE_TRY(poses.validate());
   ORBITFUSE_TRY(depth.validate());
   for (const TrainConfig* train : {&train_visible, &train_thermal}) {
-    ORBITFUSE_TRY(train->options.validate());
     const std::string table = train == &train_visible ? "train.visible" : "train.thermal";
+    ORBITFUSE_TRY(train->options.validate().map_error([&](Error error) {
+      // Named as the user wrote it.
+      if (error.where.starts_with("nerf.")) error.where = table + error.where.substr(4);
+      return error;
+    }));
     if (train->options.target_psnr > 0 && train->options.holdout_every == 0)
       return fail(ErrorKind::usage, table + ".target_psnr", "no view is held out to measure it",
                   "hold some out, e.g. --set " + table + ".holdout_every=12");
     ORBITFUSE_TRY(train->cloud.validate());
     if (train->max_width_px < 16)
-      return fail(ErrorKind::usage, "train.max_width_px", std::to_string(train->max_width_px),
+      return fail(ErrorKind::usage, table + ".max_width_px", std::to_string(train->max_width_px),
                   "must be at least 16");
   }
   ORBITFUSE_TRY(render.path.validate());

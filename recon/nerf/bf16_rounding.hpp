@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// fp32 to bf16 with AVX-512 BF16, in the layouts that matrix kernels read. Only for sources compiled
-// for it; no standard-library templates in here (see kernels_impl.hpp).
+// fp32 to bf16 with AVX-512 BF16, in the layouts that matrix kernels read. Only for sources
+// compiled for it; no standard-library templates in here (see kernels_impl.hpp).
 #include <immintrin.h>
 
 #include <cstdint>
@@ -45,9 +45,9 @@ struct Avx512Rounding {
  private:
   /// 16 features of two samples; of the `left` samples from `in` on, those that are missing are 0.
   static inline __m512i pairs(const float* in, int left, int width) {
-    const __m512i low_high = _mm512_set_epi16(31, 15, 30, 14, 29, 13, 28, 12, 27, 11, 26, 10, 25, 9,
-                                              24, 8, 23, 7, 22, 6, 21, 5, 20, 4, 19, 3, 18, 2, 17,
-                                              1, 16, 0);
+    const __m512i low_high =
+        _mm512_set_epi16(31, 15, 30, 14, 29, 13, 28, 12, 27, 11, 26, 10, 25, 9, 24, 8, 23, 7, 22, 6,
+                         21, 5, 20, 4, 19, 3, 18, 2, 17, 1, 16, 0);
     const __m512 even = left > 0 ? _mm512_loadu_ps(in) : _mm512_setzero_ps();
     const __m512 odd = left > 1 ? _mm512_loadu_ps(in + width) : _mm512_setzero_ps();
     return _mm512_permutexvar_epi16(low_high,

@@ -61,15 +61,16 @@ void clear_segment(Occupancy& occupancy, const Ray& ray, float end, float tube) 
 
 }  // namespace
 
-double carve(bool dense_depth, const std::vector<SceneView>& views, const std::vector<bool>& heldout,
-             const TrainOptions& options, Occupancy& occupancy) {
+double carve(bool dense_depth, const std::vector<SceneView>& views,
+             const std::vector<bool>& heldout, const TrainOptions& options, Occupancy& occupancy) {
   std::vector<const SceneView*> voters;
   for (std::size_t i = 0; i < views.size(); ++i)
     if (!heldout[i]) voters.push_back(&views[i]);
   const int n = occupancy.resolution;
   // Votes are cast for 2x2x2 cells at once; their half diagonal is part of the margin.
   const int half = n / 2;
-  const int min_views = std::min(static_cast<int>(options.min_views), static_cast<int>(voters.size()));
+  const int min_views =
+      std::min(static_cast<int>(options.min_views), static_cast<int>(voters.size()));
   std::vector<std::uint8_t> off(static_cast<std::size_t>(half) * half * half * occupancy.cascades);
   parallel_blocks(half * occupancy.cascades, 1, [&](int slab, int) {
     const int cascade = slab / half;
@@ -82,7 +83,8 @@ double carve(bool dense_depth, const std::vector<SceneView>& views, const std::v
                                  low + (static_cast<float>(slab % half) + 0.5f) * size};
         const Votes votes = vote(voters, center, 0.87f * size);
         const bool free = options.carve && votes.free >= 2 && votes.free > 2 * votes.solid;
-        off[(static_cast<std::size_t>(slab) * half + y) * half + x] = votes.seen < min_views || free;
+        off[(static_cast<std::size_t>(slab) * half + y) * half + x] =
+            votes.seen < min_views || free;
       }
   });
   for (std::int64_t cell = 0; cell < occupancy.cell_count(); ++cell) {

@@ -24,10 +24,8 @@ class Writer {
   static constexpr bool reading = false, ok = true;
   std::string bytes{magic, sizeof magic};
   template <class T>
-    requires std::is_trivially_copyable_v<T>
-  void operator()(T& value) {
-    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
-  }
+  requires std::is_trivially_copyable_v<T>
+  void operator()(T& value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof value); }
   template <class T>
   void operator()(std::vector<T>& values) {
     std::uint64_t count = values.size();
@@ -52,10 +50,8 @@ class Reader {
     ok = false;
   }
   template <class T>
-    requires std::is_trivially_copyable_v<T>
-  void operator()(T& value) {
-    take(&value, sizeof value);
-  }
+  requires std::is_trivially_copyable_v<T>
+  void operator()(T& value) { take(&value, sizeof value); }
   template <class T>
   void operator()(std::vector<T>& values) {
     std::uint64_t count = 0;
@@ -82,8 +78,9 @@ class Reader {
   std::string_view bytes_;
 };
 
-/// Keys with their values. An option that the file lacks keeps its default: a field outlives the program
-/// that made it. An option that this program doesn't know might change what the parameters mean.
+/// Keys with their values. An option that the file lacks keeps its default: a field outlives the
+/// program that made it. An option that this program doesn't know might change what the parameters
+/// mean.
 template <class Archive>
 void visit_options(Archive& io, TrainOptions& options) {
   const std::vector<std::string> keys = TrainOptions::keys();
@@ -121,7 +118,8 @@ void visit(Archive& io, Occupancy& grid) {
   std::vector<float> dense;
   if constexpr (!Archive::reading) {
     for (std::int64_t c = 0; c < grid.cell_count(); ++c)
-      if (grid.density[static_cast<std::size_t>(c)] > 0) dense.push_back(grid.density[static_cast<std::size_t>(c)]);
+      if (grid.density[static_cast<std::size_t>(c)] > 0)
+        dense.push_back(grid.density[static_cast<std::size_t>(c)]);
   }
   std::vector<std::uint64_t> set((grid.density.size() + 63) / 64);
   if constexpr (!Archive::reading)
@@ -132,12 +130,13 @@ void visit(Archive& io, Occupancy& grid) {
   io(grid.visited);
   std::vector<float> window;
   if constexpr (!Archive::reading)
-    for (const std::int64_t c : grid.visited) window.push_back(grid.window[static_cast<std::size_t>(c)]);
+    for (const std::int64_t c : grid.visited)
+      window.push_back(grid.window[static_cast<std::size_t>(c)]);
   io(window);
   if constexpr (Archive::reading) {
     const std::size_t words = (grid.density.size() + 63) / 64;
-    io.ok = io.ok && set.size() == words && grid.on.size() == words && grid.allowed.size() == words &&
-            window.size() == grid.visited.size();
+    io.ok = io.ok && set.size() == words && grid.on.size() == words &&
+            grid.allowed.size() == words && window.size() == grid.visited.size();
     if (!io.ok) return;
     std::size_t next = 0;
     for (std::int64_t c = 0; c < grid.cell_count() && next < dense.size(); ++c)
@@ -200,9 +199,11 @@ void visit(Archive& io, Snapshot& best) {
 bool fits(const Snapshot& best, FieldState& state) {
   const auto parameters = state.parameters();
   const auto networks = state.density_networks();
-  bool same = best.values.size() == parameters.size() && best.level_weights.size() == networks.size() &&
+  bool same = best.values.size() == parameters.size() &&
+              best.level_weights.size() == networks.size() &&
               best.poses.size() == state.refined_poses.size() &&
-              best.occupied.size() == state.occupancy.on.size() && best.codes.size() == state.occupancy.code.size();
+              best.occupied.size() == state.occupancy.on.size() &&
+              best.codes.size() == state.occupancy.code.size();
   for (std::size_t i = 0; same && i < parameters.size(); ++i)
     same = best.values[i].size() == parameters[i]->value.size();
   for (std::size_t i = 0; same && i < networks.size(); ++i)
@@ -217,7 +218,8 @@ void visit(Archive& io, FieldState& state) {
   visit(io, state.views);
   if constexpr (Archive::reading) {
     if (!io.ok) return;
-    if (const Status valid = state.options.validate(); !valid) return io.refuse(valid.error().message());
+    if (const Status valid = state.options.validate(); !valid)
+      return io.refuse(valid.error().message());
     state.create(state.options, state.modality, static_cast<int>(state.views.size()));
   }
   io(state.thermal_is_gray);
@@ -265,11 +267,14 @@ Result<FieldState> load_state(const std::filesystem::path& path) {
     return fail(ErrorKind::input, path.string(), std::move(found),
                 "delete it and train again, or restore a copy");
   };
-  if (bytes.size() < sizeof magic + hash_length) return bad(fmt::format("cut short: {} bytes", bytes.size()));
+  if (bytes.size() < sizeof magic + hash_length)
+    return bad(fmt::format("cut short: {} bytes", bytes.size()));
   if (std::memcmp(bytes.data(), magic, sizeof magic - 2) != 0) return bad("not a field");
-  if (std::memcmp(bytes.data(), magic, sizeof magic) != 0) return bad("a field of another version of this program");
+  if (std::memcmp(bytes.data(), magic, sizeof magic) != 0)
+    return bad("a field of another version of this program");
   const std::string_view body(bytes.data(), bytes.size() - hash_length);
-  if (content_hash(body) != bytes.substr(body.size())) return bad("checksum differs: cut or altered");
+  if (content_hash(body) != bytes.substr(body.size()))
+    return bad("checksum differs: cut or altered");
   Reader reader(body.substr(sizeof magic));
   FieldState state;
   visit(reader, state);
@@ -287,8 +292,23 @@ std::vector<ViewRecord> records_of(const Dataset& dataset, const std::vector<boo
     const Camera& c = view.camera;
     const Eigen::Quaterniond& q = view.cam_from_world.rotation;
     const Eigen::Vector3d& t = view.cam_from_world.translation;
-    const double where[] = {double(c.width), double(c.height), c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2,
-                            q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()};
+    const double where[] = {double(c.width),
+                            double(c.height),
+                            c.fx,
+                            c.fy,
+                            c.cx,
+                            c.cy,
+                            c.k1,
+                            c.k2,
+                            c.p1,
+                            c.p2,
+                            q.w(),
+                            q.x(),
+                            q.y(),
+                            q.z(),
+                            t.x(),
+                            t.y(),
+                            t.z()};
     const std::string pixels =
         content_hash({reinterpret_cast<const char*>(image.data), image.total() * image.elemSize()});
     const std::string_view placed(reinterpret_cast<const char*>(where), sizeof where);
@@ -308,15 +328,19 @@ Status check_resumable(const FieldState& state, const Dataset& dataset,
     return differs("made with another unit of thermal samples");
   for (const std::string& key : TrainOptions::keys())
     if (!TrainOptions::free_to_change(key) && state.options.get(key) != options.get(key))
-      return differs(fmt::format("made with nerf.{} = {}, not {}", key, state.options.get(key), options.get(key)));
+      return differs(fmt::format("made with nerf.{} = {}, not {}", key, state.options.get(key),
+                                 options.get(key)));
   if (state.views.size() != views.size())
     return differs(fmt::format("made with {} views, not {}", state.views.size(), views.size()));
   for (std::size_t i = 0; i < views.size(); ++i) {
     const ViewRecord &then = state.views[i], &now = views[i];
-    if (then.name != now.name) return differs(fmt::format("view {} was {}, not {}", i, then.name, now.name));
+    if (then.name != now.name)
+      return differs(fmt::format("view {} was {}, not {}", i, then.name, now.name));
     if (then.heldout != now.heldout)
-      return differs(fmt::format("made with {} {}", now.name, then.heldout ? "held out" : "training"));
-    if (then.hash != now.hash) return differs("made with another image, camera or pose of " + now.name);
+      return differs(
+          fmt::format("made with {} {}", now.name, then.heldout ? "held out" : "training"));
+    if (then.hash != now.hash)
+      return differs("made with another image, camera or pose of " + now.name);
   }
   return {};
 }
@@ -326,8 +350,10 @@ Result<Field> Field::load(const std::filesystem::path& path) {
   return Field(std::make_unique<FieldState>(std::move(state)));
 }
 
-Status save_checkpoint(Field finished, const TrainReport& report, const std::filesystem::path& checkpoint) {
-  if (finished.empty()) return fail(ErrorKind::input, "field", "it is empty", "train or load it first");
+Status save_checkpoint(Field finished, const TrainReport& report,
+                       const std::filesystem::path& checkpoint) {
+  if (finished.empty())
+    return fail(ErrorKind::input, "field", "it is empty", "train or load it first");
   FieldState& state = finished.state();
   state.history = report;
   if (state.options.keep_best && std::isfinite(report.best_psnr)) {

@@ -17,7 +17,7 @@ Status check_view(const TrainingView& view, Modality modality) {
   if (view.image.empty()) return bad("no image", "remove the view or read its file");
   if (view.image.type() != type)
     return bad("wrong pixel type", modality == Modality::visible ? "pass CV_32FC3 R, G, B in 0..1"
-                                                                  : "pass CV_32FC1 kelvin");
+                                                                 : "pass CV_32FC1 kelvin");
   if (view.image.cols != view.camera.width || view.image.rows != view.camera.height)
     return bad(fmt::format("image {}x{}, camera {}x{}", view.image.cols, view.image.rows,
                            view.camera.width, view.camera.height),

@@ -20,7 +20,8 @@ struct DepthView {
 
 Eigen::Vector3d lift(const DepthView& from, int x, int y) {
   const float z = from.image.depth.at<float>(y, x);
-  const Eigen::Vector3d in_cam = from.view.camera.ray_of({x + 0.5, y + 0.5}) * static_cast<double>(z);
+  const Eigen::Vector3d in_cam =
+      from.view.camera.ray_of({x + 0.5, y + 0.5}) * static_cast<double>(z);
   return from.view.cam_from_world.inverse() * in_cam;
 }
 
@@ -30,7 +31,8 @@ Eigen::Vector3d normal_at(const DepthView& from, int x, int y) {
   if (x < 1 || y < 1 || x + 1 >= depth.cols || y + 1 >= depth.rows) return Eigen::Vector3d::Zero();
   const float z = depth.at<float>(y, x);
   for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}})
-    if (!(std::abs(depth.at<float>(y + dy, x + dx) - z) < 0.05f * z)) return Eigen::Vector3d::Zero();
+    if (!(std::abs(depth.at<float>(y + dy, x + dx) - z) < 0.05f * z))
+      return Eigen::Vector3d::Zero();
   const Eigen::Vector3d n = (lift(from, x + 1, y) - lift(from, x - 1, y))
                                 .cross(lift(from, x, y + 1) - lift(from, x, y - 1));
   const Eigen::Vector3d to_camera = camera_center(from.view.cam_from_world) - lift(from, x, y);
@@ -52,7 +54,8 @@ Agreement agreement(const std::vector<DepthView>& views, std::size_t self,
     const Eigen::Vector3d in_cam = views[i].view.cam_from_world * point;
     const Eigen::Vector2d pixel = views[i].view.camera.project(in_cam);
     const cv::Mat& depth = views[i].image.depth;
-    if (!(pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < depth.cols && pixel.y() < depth.rows)) continue;
+    if (!(pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < depth.cols && pixel.y() < depth.rows))
+      continue;
     const float z = depth.at<float>(static_cast<int>(pixel.y()), static_cast<int>(pixel.x()));
     if (!std::isfinite(z)) continue;
     if (std::abs(z - in_cam.z()) <= tolerance * in_cam.z()) ++result.agree;
@@ -64,7 +67,9 @@ Agreement agreement(const std::vector<DepthView>& views, std::size_t self,
 std::uint64_t voxel_key(const Eigen::Vector3d& p, double size) {
   std::uint64_t key = 0;
   for (int d = 0; d < 3; ++d)
-    key = (key << 21) | (static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(p[d] / size))) & 0x1FFFFF);
+    key =
+        (key << 21) |
+        (static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(p[d] / size))) & 0x1FFFFF);
   return key;
 }
 
@@ -77,7 +82,8 @@ void append(PointCloud& cloud, const DepthView& from, int x, int y, const Eigen:
     return;
   }
   const auto rgb = from.image.color.at<cv::Vec3f>(y, x);
-  cloud.colors.push_back({cv::saturate_cast<std::uint8_t>(255 * rgb[0]), cv::saturate_cast<std::uint8_t>(255 * rgb[1]),
+  cloud.colors.push_back({cv::saturate_cast<std::uint8_t>(255 * rgb[0]),
+                          cv::saturate_cast<std::uint8_t>(255 * rgb[1]),
                           cv::saturate_cast<std::uint8_t>(255 * rgb[2])});
 }
 
@@ -88,8 +94,10 @@ Status ExportOptions::validate() const {
     return fail(ErrorKind::usage, std::string("export.") + field, fmt::format("{}", value), remedy);
   };
   if (max_width < 8) return bad("max_width", max_width, "choose at least 8");
-  if (min_consistent_views < 0) return bad("min_consistent_views", min_consistent_views, "choose 0 or more");
-  if (!(depth_tolerance > 0 && depth_tolerance < 1)) return bad("depth_tolerance", depth_tolerance, "choose 0..1");
+  if (min_consistent_views < 0)
+    return bad("min_consistent_views", min_consistent_views, "choose 0 or more");
+  if (!(depth_tolerance > 0 && depth_tolerance < 1))
+    return bad("depth_tolerance", depth_tolerance, "choose 0..1");
   if (!(max_distance > 0)) return bad("max_distance", max_distance, "choose above 0");
   if (!(voxel >= 0)) return bad("voxel", voxel, "choose 0 or more");
   return {};
@@ -99,23 +107,28 @@ Result<PointCloud> export_point_cloud(const Field& field, const std::vector<Pose
                                       const ExportOptions& options, const Progress& progress) {
   ORBITFUSE_TRY(options.validate());
   if (views.empty())
-    return fail(ErrorKind::input, "export.views", "no camera to see the field from", "pass the training views");
+    return fail(ErrorKind::input, "export.views", "no camera to see the field from",
+                "pass the training views");
   std::vector<DepthView> rendered;
   for (const PosedView& view : views) {
     ORBITFUSE_TRY(progress.check("export"));
     const int width = std::min(view.camera.width, options.max_width);
-    const int height = std::max(1, static_cast<int>(std::lround(
-                                       static_cast<double>(view.camera.height) * width / view.camera.width)));
+    const int height =
+        std::max(1, static_cast<int>(std::lround(static_cast<double>(view.camera.height) * width /
+                                                 view.camera.width)));
     DepthView out;
     out.view = view;
     out.view.camera = view.camera.scaled_to(width, height).without_distortion();
     ORBITFUSE_ASSIGN(out.image, render(field, out.view.camera, view.cam_from_world, {}, progress));
     rendered.push_back(std::move(out));
-    progress.report({"export", static_cast<double>(rendered.size()), static_cast<double>(views.size()), -1, view.name});
+    progress.report({"export", static_cast<double>(rendered.size()),
+                     static_cast<double>(views.size()), -1, view.name});
   }
 
-  const int needed = std::min<int>(options.min_consistent_views, static_cast<int>(views.size()) - 1);
-  const double reach = options.max_distance * field.radius(), voxel = options.voxel * field.radius();
+  const int needed =
+      std::min<int>(options.min_consistent_views, static_cast<int>(views.size()) - 1);
+  const double reach = options.max_distance * field.radius(),
+               voxel = options.voxel * field.radius();
   PointCloud cloud;
   std::unordered_set<std::uint64_t> taken;
   for (std::size_t i = 0; i < rendered.size(); ++i) {

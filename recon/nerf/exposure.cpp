@@ -34,7 +34,9 @@ using Sights = std::vector<Sight>;
 
 /// Mean of 3x3 pixels round `pixel`; false outside the image.
 bool sample_at(const cv::Mat& image, const Eigen::Vector2d& pixel, Eigen::Array3f& log_value) {
-  if (!(pixel.x() >= 1 && pixel.y() >= 1 && pixel.x() < image.cols - 1 && pixel.y() < image.rows - 1)) return false;
+  if (!(pixel.x() >= 1 && pixel.y() >= 1 && pixel.x() < image.cols - 1 &&
+        pixel.y() < image.rows - 1))
+    return false;
   const int x = static_cast<int>(pixel.x()), y = static_cast<int>(pixel.y());
   cv::Vec3f sum(0, 0, 0);
   for (int dy = -1; dy <= 1; ++dy)
@@ -73,17 +75,24 @@ void add_sights_of_depth(const Dataset& data, const std::vector<bool>& heldout, 
     const Eigen::Vector3d p = data.views[static_cast<std::size_t>(map.view)].cam_from_world * world;
     if (!(p.z() > 0)) return false;
     const Eigen::Vector2d pixel = map.camera.project(p);
-    if (!(pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < map.depth.cols && pixel.y() < map.depth.rows)) return false;
+    if (!(pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < map.depth.cols &&
+          pixel.y() < map.depth.rows))
+      return false;
     const float z = map.depth.at<float>(static_cast<int>(pixel.y()), static_cast<int>(pixel.x()));
     return std::abs(z - p.z()) < 0.01 * p.z();
   };
-  const auto trains = [&](const DepthMap& map) { return !heldout[static_cast<std::size_t>(map.view)]; };
-  const auto maps = static_cast<double>(std::count_if(data.depth.begin(), data.depth.end(), trains));
+  const auto trains = [&](const DepthMap& map) {
+    return !heldout[static_cast<std::size_t>(map.view)];
+  };
+  const auto maps =
+      static_cast<double>(std::count_if(data.depth.begin(), data.depth.end(), trains));
   const double per_map = std::clamp(4e6 / (maps * maps), 50.0, 1000.0);
   for (const DepthMap& map : data.depth) {
     if (!trains(map)) continue;
-    const Rigid3d world_from_cam = data.views[static_cast<std::size_t>(map.view)].cam_from_world.inverse();
-    const int step = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(map.depth.total()) / per_map)));
+    const Rigid3d world_from_cam =
+        data.views[static_cast<std::size_t>(map.view)].cam_from_world.inverse();
+    const int step =
+        std::max(1, static_cast<int>(std::sqrt(static_cast<double>(map.depth.total()) / per_map)));
     for (int y = step / 2; y < map.depth.rows; y += step)
       for (int x = step / 2; x < map.depth.cols; x += step) {
         const float z = map.depth.at<float>(y, x);
@@ -94,7 +103,8 @@ void add_sights_of_depth(const Dataset& data, const std::vector<bool>& heldout, 
           Sample sample{other.view, {}};
           if (trains(other) && sight.samples.size() < most_per_sight &&
               (&other == &map || confirms(other, sight.position)) &&
-              seen_from(data.views[static_cast<std::size_t>(other.view)], sight.position, sample.log_value))
+              seen_from(data.views[static_cast<std::size_t>(other.view)], sight.position,
+                        sample.log_value))
             sight.samples.push_back(sample);
         }
         if (sight.samples.size() > 1) sights.push_back(std::move(sight));
@@ -108,7 +118,8 @@ std::vector<int> support_of(const Sights& sights, std::size_t views, int channel
   for (const Sight& sight : sights) {
     const auto finite = [&](const Sample& s) { return std::isfinite(s.log_value[channel]); };
     if (std::count_if(sight.samples.begin(), sight.samples.end(), finite) < 2) continue;
-    for (const Sample& s : sight.samples) counts[static_cast<std::size_t>(s.view)] += finite(s) ? 1 : 0;
+    for (const Sample& s : sight.samples)
+      counts[static_cast<std::size_t>(s.view)] += finite(s) ? 1 : 0;
   }
   return counts;
 }
@@ -121,7 +132,7 @@ bool too_few(const Sights& sights, const std::vector<bool>& heldout) {
 }
 
 struct ChannelFit {
-  std::vector<int> place;        ///< per view: its row in `gain`, -1 without enough support
+  std::vector<int> place;  ///< per view: its row in `gain`, -1 without enough support
   Eigen::VectorXd gain;
   std::vector<double> of_sight;  ///< NaN: fewer than two views show this channel
   double gain_of(std::size_t view) const { return gain[place[view]]; }
@@ -135,7 +146,8 @@ ChannelFit fit_channel(const Sights& sights, std::size_t views, int channel) {
   for (std::size_t i = 0; i < views; ++i)
     if (support[i] >= enough_per_view) fit.place[i] = size++;
   fit.gain = Eigen::VectorXd::Zero(size);
-  constexpr double prior = 1e-2;  // parts of the orbit that nothing ties together each have mean zero
+  constexpr double prior =
+      1e-2;  // parts of the orbit that nothing ties together each have mean zero
   struct Weighed {
     int place;
     double value, weight;
@@ -143,7 +155,8 @@ ChannelFit fit_channel(const Sights& sights, std::size_t views, int channel) {
   std::vector<std::vector<Weighed>> used(sights.size());
   for (std::size_t p = 0; p < sights.size(); ++p)
     for (const Sample& s : sights[p].samples)
-      if (const int place = fit.place[static_cast<std::size_t>(s.view)]; place >= 0 && std::isfinite(s.log_value[channel]))
+      if (const int place = fit.place[static_cast<std::size_t>(s.view)];
+          place >= 0 && std::isfinite(s.log_value[channel]))
         used[p].push_back({place, s.log_value[channel], 1});
   for (int turn = 0; turn < 12; ++turn) {
     Eigen::MatrixXd normal = prior * Eigen::MatrixXd::Identity(size, size);
@@ -170,7 +183,8 @@ ChannelFit fit_channel(const Sights& sights, std::size_t views, int channel) {
       fit.of_sight[p] = mean / total;
       for (Weighed& s : used[p]) {
         const double residual = s.value - fit.gain[s.place] - fit.of_sight[p];
-        s.weight = std::pow(usual / std::max(usual, std::abs(residual)), 2);  // wrong matches count for nothing
+        s.weight = std::pow(usual / std::max(usual, std::abs(residual)),
+                            2);  // wrong matches count for nothing
       }
     }
   }
@@ -178,7 +192,8 @@ ChannelFit fit_channel(const Sights& sights, std::size_t views, int channel) {
 }
 
 /// The two training views that look most alike.
-std::vector<int> nearest_views(const Dataset& data, const std::vector<bool>& heldout, std::size_t view) {
+std::vector<int> nearest_views(const Dataset& data, const std::vector<bool>& heldout,
+                               std::size_t view) {
   const auto axis = [&](std::size_t i) -> Eigen::Vector3d {
     return data.views[i].cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ();
   };
@@ -186,9 +201,11 @@ std::vector<int> nearest_views(const Dataset& data, const std::vector<bool>& hel
   for (std::size_t i = 0; i < heldout.size(); ++i)
     if (!heldout[i]) others.push_back(static_cast<int>(i));
   const auto count = std::min<std::size_t>(2, others.size());
-  std::partial_sort(others.begin(), others.begin() + static_cast<std::ptrdiff_t>(count), others.end(), [&](int a, int b) {
-    return axis(static_cast<std::size_t>(a)).dot(axis(view)) > axis(static_cast<std::size_t>(b)).dot(axis(view));
-  });
+  std::partial_sort(others.begin(), others.begin() + static_cast<std::ptrdiff_t>(count),
+                    others.end(), [&](int a, int b) {
+                      return axis(static_cast<std::size_t>(a)).dot(axis(view)) >
+                             axis(static_cast<std::size_t>(b)).dot(axis(view));
+                    });
   others.resize(count);
   return others;
 }
@@ -217,8 +234,8 @@ Exposure estimate_exposure(const Dataset& data, const std::vector<bool>& heldout
                              [view](const Sample& s) { return s.view == view; });
         });
         Eigen::Array3f value;
-        if (seen && std::isfinite(fit.of_sight[p]) && seen_from(data.views[i], sights[p].position, value) &&
-            std::isfinite(value[c]))
+        if (seen && std::isfinite(fit.of_sight[p]) &&
+            seen_from(data.views[i], sights[p].position, value) && std::isfinite(value[c]))
           differences.push_back(value[c] - fit.of_sight[p] - mean);
       }
       if (differences.size() >= enough_per_view) gain = median(differences);
@@ -229,7 +246,8 @@ Exposure estimate_exposure(const Dataset& data, const std::vector<bool>& heldout
     // A channel of which nothing is known goes with the others, so that no hue is made.
     Eigen::Array3d& gain = exposure.log_gain[i];
     const Eigen::Array3d known = gain.isFinite().cast<double>();
-    const double others = known.sum() > 0 ? (gain.isFinite().select(gain, 0)).sum() / known.sum() : 0;
+    const double others =
+        known.sum() > 0 ? (gain.isFinite().select(gain, 0)).sum() / known.sum() : 0;
     gain = gain.isFinite().select(gain, others);
     if (heldout[i]) continue;
     squares += gain.square().sum();

@@ -20,7 +20,8 @@ void FieldState::create(const TrainOptions& with, Modality what, int view_count)
     for (int i = 0; i < 2; ++i) {
       proposals[static_cast<std::size_t>(i)].grid.create(5, 2, 17, 16, 128 << i,
                                                          with.seed + 3 + static_cast<unsigned>(i));
-      proposals[static_cast<std::size_t>(i)].mlp.create({16, 16, 16}, with.seed + 5 + static_cast<unsigned>(i));
+      proposals[static_cast<std::size_t>(i)].mlp.create({16, 16, 16},
+                                                        with.seed + 5 + static_cast<unsigned>(i));
     }
   }
   image_offsets.resize(static_cast<std::size_t>((view_count + 7) / 8 * 8));
@@ -57,7 +58,8 @@ Snapshot FieldState::snapshot(double psnr) {
   for (const Parameters* p : parameters()) out.values.push_back(p->value);
   out.occupied = occupancy.on;
   out.codes = occupancy.code;
-  for (const DensityNetwork* network : density_networks()) out.level_weights.push_back(network->grid.level_weight);
+  for (const DensityNetwork* network : density_networks())
+    out.level_weights.push_back(network->grid.level_weight);
   out.poses = refined_poses;
   return out;
 }
@@ -66,7 +68,8 @@ void FieldState::restore(const Snapshot& from) {
   const auto sets = parameters();
   for (std::size_t i = 0; i < sets.size(); ++i) sets[i]->value = from.values[i];
   const auto networks = density_networks();
-  for (std::size_t i = 0; i < networks.size(); ++i) networks[i]->grid.level_weight = from.level_weights[i];
+  for (std::size_t i = 0; i < networks.size(); ++i)
+    networks[i]->grid.level_weight = from.level_weights[i];
   refined_poses = from.poses;
   occupancy.restore(from.occupied, from.codes);
   refresh();

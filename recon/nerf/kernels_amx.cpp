@@ -6,9 +6,9 @@
 namespace orbitfuse::nerf {
 namespace {
 
-/// The processor's tiles, for the time of one kernel call: outside it they are in their initial state,
-/// so no other code, thread switch or signal pays for saving them. GCC 12's own intrinsics want the
-/// tile's number as a literal and don't tell the compiler that a load reads memory.
+/// The processor's tiles, for the time of one kernel call: outside it they are in their initial
+/// state, so no other code, thread switch or signal pays for saving them. GCC 12's own intrinsics
+/// want the tile's number as a literal and don't tell the compiler that a load reads memory.
 class AmxTiles {
  public:
   explicit AmxTiles(const TileConfig& config) {
@@ -24,11 +24,17 @@ class AmxTiles {
   }
   template <int T>
   void load(const void* base, long row_bytes) {
-    __asm__ volatile("tileloadd (%0,%1,1), %%tmm%c2" : : "r"(base), "r"(row_bytes), "i"(T) : "memory");
+    __asm__ volatile("tileloadd (%0,%1,1), %%tmm%c2"
+                     :
+                     : "r"(base), "r"(row_bytes), "i"(T)
+                     : "memory");
   }
   template <int T>
   void store(void* base, long row_bytes) {
-    __asm__ volatile("tilestored %%tmm%c2, (%0,%1,1)" : : "r"(base), "r"(row_bytes), "i"(T) : "memory");
+    __asm__ volatile("tilestored %%tmm%c2, (%0,%1,1)"
+                     :
+                     : "r"(base), "r"(row_bytes), "i"(T)
+                     : "memory");
   }
   template <int Sum, int Left, int Right>
   void multiply_add() {

@@ -3,12 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <toml++/toml.h>
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <numeric>
 #include <sstream>
-#include <toml++/toml.h>
 #include <variant>
 
 namespace orbitfuse::nerf {
@@ -131,35 +131,58 @@ bool assign(const std::string& text, Sampling& out) {
 
 std::string text_of(bool value) { return value ? "true" : "false"; }
 std::string text_of(const std::filesystem::path& value) { return value.string(); }
-std::string text_of(Sampling value) { return value == Sampling::proposal ? "proposal" : "occupancy"; }
+std::string text_of(Sampling value) {
+  return value == Sampling::proposal ? "proposal" : "occupancy";
+}
 template <class T>
 std::string text_of(const T& value) {
   return fmt::format("{}", value);
 }
 
+std::string range_text(const Entry& entry) {
+  return entry.high < 1e30 ? fmt::format("in {:.15g}..{:.15g}", entry.low, entry.high)
+                           : fmt::format("of at least {:.15g}", entry.low);
+}
+
+/// What the range leaves out.
+std::string step_text(const std::string& key) {
+  if (key == "features_per_level") return ", 2 or 4";
+  const bool of_16 = key == "hidden" || key == "color_hidden" || key == "occupancy_resolution";
+  return of_16 ? ", a multiple of 16" : "";
+}
+
 }  // namespace
+
+std::string TrainOptions::allowed(const std::string& key) {
+  const Entry* entry = find(key);
+  if (!entry) return "one of TrainOptions";
+  return std::visit(
+      [&]<class T>(T TrainOptions::*) -> std::string {
+        if constexpr (std::is_same_v<T, bool>) return "true or false";
+        if constexpr (std::is_same_v<T, int>)
+          return "an integer " + range_text(*entry) + step_text(key);
+        if constexpr (std::is_same_v<T, double>) return "a number " + range_text(*entry);
+        if constexpr (std::is_same_v<T, std::uint64_t>) return "an integer of at least 0";
+        if constexpr (std::is_same_v<T, Sampling>) return "occupancy or proposal";
+        return "text";
+      },
+      entry->member);
+}
 
 Status TrainOptions::validate() const {
   for (const Entry& entry : table()) {
     double value = entry.low;
     if (const auto* i = std::get_if<int TrainOptions::*>(&entry.member)) value = this->*(*i);
     if (const auto* d = std::get_if<double TrainOptions::*>(&entry.member)) value = this->*(*d);
-    if (!(value >= entry.low && value <= entry.high))
-      return fail(ErrorKind::usage, fmt::format("nerf.{}", entry.key), fmt::format("{}", value),
-                  fmt::format("choose {}..{}", entry.low, entry.high));
+    const std::string key = entry.key;
+    const bool stepped = step_text(key).empty() ||
+                         (key == "features_per_level" ? value != 3 : std::fmod(value, 16) == 0);
+    if (!(value >= entry.low && value <= entry.high) || !stepped)
+      return fail(ErrorKind::usage, "nerf." + key, get(key), "choose " + allowed(key));
   }
-  if (features_per_level == 3)
-    return fail(ErrorKind::usage, "nerf.features_per_level", "3", "choose 2 or 4");
   if (max_resolution < base_resolution)
     return fail(ErrorKind::usage, "nerf.max_resolution", fmt::format("{}", max_resolution),
                 fmt::format("choose at least base_resolution ({})", base_resolution));
-  if (occupancy_resolution % 16 != 0)
-    return fail(ErrorKind::usage, "nerf.occupancy_resolution", fmt::format("{}", occupancy_resolution),
-                "choose a multiple of 16");
-  for (const int width : {hidden, color_hidden})
-    if (width % 16 != 0)
-      return fail(ErrorKind::usage, "nerf.hidden", fmt::format("{}", width),
-                  "choose a multiple of 16");
   if (resume && checkpoint.empty())
     return fail(ErrorKind::usage, "nerf.resume", "no checkpoint named", "set nerf.checkpoint");
   return {};
@@ -170,9 +193,10 @@ Status TrainOptions::set(const std::string& key, const std::string& value) {
   if (!entry)
     return fail(ErrorKind::usage, "nerf." + key, "unknown key",
                 "did you mean nerf." + nearest(key, keys()) + "?");
-  const bool ok = std::visit([&](auto member) { return assign(value, this->*member); },
-                             entry->member);
-  if (!ok) return fail(ErrorKind::usage, "nerf." + key, "'" + value + "'", "give a valid value");
+  const bool ok =
+      std::visit([&](auto member) { return assign(value, this->*member); }, entry->member);
+  if (!ok)
+    return fail(ErrorKind::usage, "nerf." + key, "'" + value + "'", "choose " + allowed(key));
   return {};
 }
 
@@ -211,7 +235,8 @@ Result<TrainOptions> preset(const std::string& name) {
     o.color_hidden = 32;
     o.sh_degree = 0;  // emitted heat hardly depends on the direction
     o.per_image_offset = true;
-    o.refine_poses = true;  // thermal poses are a third of a degree off where visible ones are exact
+    o.refine_poses =
+        true;  // thermal poses are a third of a degree off where visible ones are exact
     return o;
   }
   // The published trainers: proposal sampling, 16 levels, 2^19 entries, a deeper colour network.

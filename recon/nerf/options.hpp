@@ -84,6 +84,8 @@ struct TrainOptions {
   /// with the nearest known one.
   Status set(const std::string& key, const std::string& value);
   std::string get(const std::string& key) const;
+  /// What a field may hold, e.g. "an integer in 1..16"; for messages.
+  static std::string allowed(const std::string& key);
   static std::vector<std::string> keys();
   /// True if a run may go on with another value; false if the option gives the parameters or the data
   /// their meaning.

@@ -12,9 +12,11 @@ namespace {
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-constexpr int reach_px = 2;       ///< slopes are taken over twice this: errors of that size still pull home
-constexpr double huber = 0.05;    ///< of the span; what the scene hides or reflects doesn't count for more
-constexpr double rate = 0.7;      ///< of a step: its rays are few
+constexpr int reach_px =
+    2;  ///< slopes are taken over twice this: errors of that size still pull home
+constexpr double huber =
+    0.05;  ///< of the span; what the scene hides or reflects doesn't count for more
+constexpr double rate = 0.7;  ///< of a step: its rays are few
 constexpr double longest_turn = std::numbers::pi / 180, longest_shift = 0.02;
 
 }  // namespace
@@ -25,9 +27,11 @@ void PoseSums::add(const PoseSums& other) {
   rays += other.rays;
 }
 
-void add_ray(const SceneView& view, int x, int y, const float* shown, float distance, PoseSums& sums) {
+void add_ray(const SceneView& view, int x, int y, const float* shown, float distance,
+             PoseSums& sums) {
   const cv::Mat& photo = view.target;
-  if (x < reach_px || y < reach_px || x >= photo.cols - reach_px || y >= photo.rows - reach_px) return;
+  if (x < reach_px || y < reach_px || x >= photo.cols - reach_px || y >= photo.rows - reach_px)
+    return;
   const Camera& camera = view.rays.camera();
   const Eigen::Vector3d p = view.rays.in_camera(x + 0.5, y + 0.5, distance);
   if (!(p.z() > 1e-6)) return;
@@ -74,17 +78,22 @@ RefinedPose unmoved(const Rigid3d& pose) {
 bool take_step(const PoseSums& sums, const Space& space, RefinedPose& refined, SceneView& view,
                const PosePrior& prior) {
   if (sums.rays < fewest_pose_rays) return false;
-  const auto information = [&](double sigma) { return Eigen::Vector3d::Constant(prior.noise * prior.noise / (sigma * sigma)); };
+  const auto information = [&](double sigma) {
+    return Eigen::Vector3d::Constant(prior.noise * prior.noise / (sigma * sigma));
+  };
   Vector6 given;
   given << information(prior.sigma_shift), information(prior.sigma_turn_rad);
   Eigen::Map<Vector6> moved(refined.moved.data());
   const Eigen::Map<const Vector6> right(sums.right.data());
-  const double share = fewest_pose_rays / static_cast<double>(sums.rays);  // more rays aren't more sure of what is alike in all
+  const double share =
+      fewest_pose_rays /
+      static_cast<double>(sums.rays);  // more rays aren't more sure of what is alike in all
   Matrix6 normal = share * Eigen::Map<const Matrix6>(sums.normal.data());
   normal.diagonal() += given;
   Vector6 step = rate * normal.ldlt().solve(share * right - given.cwiseProduct(moved));
   if (!step.allFinite()) return false;
-  step /= std::max({1.0, step.head<3>().norm() / longest_shift, step.tail<3>().norm() / longest_turn});
+  step /=
+      std::max({1.0, step.head<3>().norm() / longest_shift, step.tail<3>().norm() / longest_turn});
   moved += step;
   view.rays.move(step.head<3>(), step.tail<3>());
   refined.cam_from_world = unmoved(view.rays.cam_from_world(space)).cam_from_world;

@@ -29,7 +29,8 @@ cv::Mat known_distance(const Dataset& dataset, const Space& space, int index,
         // The map's camera differs in size and has no distortion: follow the ray into it.
         const Eigen::Vector3d world(ray.direction[0], ray.direction[1], ray.direction[2]);
         const Eigen::Vector2d at = map.camera.project(pose.rotation * world);
-        const int mx = static_cast<int>(std::floor(at.x())), my = static_cast<int>(std::floor(at.y()));
+        const int mx = static_cast<int>(std::floor(at.x())),
+                  my = static_cast<int>(std::floor(at.y()));
         if (!(mx >= 0 && my >= 0 && mx < map.depth.cols && my < map.depth.rows)) continue;
         const float z = map.depth.at<float>(my, mx);
         const float trust = map.confidence.empty() ? 1.0f : map.confidence.at<float>(my, mx);
@@ -40,7 +41,8 @@ cv::Mat known_distance(const Dataset& dataset, const Space& space, int index,
   for (const SparsePoint& point : dataset.points)
     for (const Observation& o : point.track) {
       if (o.view != index) continue;
-      const int x = static_cast<int>(std::floor(o.pixel.x())), y = static_cast<int>(std::floor(o.pixel.y()));
+      const int x = static_cast<int>(std::floor(o.pixel.x())),
+                y = static_cast<int>(std::floor(o.pixel.y()));
       if (x < 0 || y < 0 || x >= camera.width || y >= camera.height) continue;
       float& d = out.at<float>(y, x);
       if (!std::isfinite(d))
@@ -57,8 +59,8 @@ std::vector<bool> heldout_views(const Dataset& dataset, int holdout_every) {
                                        [](const TrainingView& view) { return !view.measure_only; });
   int turn = 0;  // only views that might train are counted: others change nothing
   for (const TrainingView& view : dataset.views) {
-    const bool turned = !view.measure_only && holdout_every > 0 && trainable > 1 &&
-                        turn++ % holdout_every == 0;
+    const bool turned =
+        !view.measure_only && holdout_every > 0 && trainable > 1 && turn++ % holdout_every == 0;
     heldout.push_back(view.measure_only || turned);
   }
   return heldout;

@@ -5,9 +5,9 @@
 
 #include "recon/nerf/kernels.hpp"
 
-// Layers over matrix tiles (Intel SDM volume 1, "Programming with Intel AMX"), with bf16 operands and
-// fp32 sums. The tiles and the rounding are policies, so that what runs on a processor with AMX is
-// tested on any. No standard-library templates in here (see kernels_impl.hpp).
+// Layers over matrix tiles (Intel SDM volume 1, "Programming with Intel AMX"), with bf16 operands
+// and fp32 sums. The tiles and the rounding are policies, so that what runs on a processor with AMX
+// is tested on any. No standard-library templates in here (see kernels_impl.hpp).
 namespace orbitfuse::nerf {
 namespace {
 
@@ -47,8 +47,8 @@ class TileLayers {
       product<After::nothing>(layer.out, layer.in, rows, dout, layer.paired_t, din, nullptr);
   }
 
-  static void backward_weights(const LayerView& layer, int rows, const float* in,
-                               const float* dout, float* dweights) {
+  static void backward_weights(const LayerView& layer, int rows, const float* in, const float* dout,
+                               float* dweights) {
     constexpr int chunk = 128;
     alignas(64) std::uint16_t left[chunk * max_width], right[chunk * max_width];
     const int columns = layer.out;
@@ -135,8 +135,8 @@ class TileLayers {
     store<M, N>(t, c, 4 * columns);
   }
 
-  /// out[rows][columns] = in[rows][depth] * weights (bf16 [depth/2][columns][2]), 32 rows at a time,
-  /// so that each row is rounded once.
+  /// out[rows][columns] = in[rows][depth] * weights (bf16 [depth/2][columns][2]), 32 rows at a
+  /// time, so that each row is rounded once.
   template <After A>
   static void product(int depth, int columns, int rows, const float* in,
                       const std::uint16_t* weights, float* out, const float* mask) {

@@ -28,7 +28,8 @@ ViewRays::ViewRays(const Camera& camera, const Rigid3d& cam_from_world, const Sp
 }
 
 Eigen::Vector3d ViewRays::through(double px, double py) const {
-  if (lattice_.empty()) return {(px - camera_.cx) / camera_.fx, (py - camera_.cy) / camera_.fy, 1.0};
+  if (lattice_.empty())
+    return {(px - camera_.cx) / camera_.fx, (py - camera_.cy) / camera_.fy, 1.0};
   const int ix = std::clamp(static_cast<int>(px) / spacing_px, 0, lattice_width_ - 2);
   const int rows = static_cast<int>(lattice_.size()) / lattice_width_;
   const int iy = std::clamp(static_cast<int>(py) / spacing_px, 0, rows - 2);
@@ -63,15 +64,17 @@ Eigen::Vector3d ViewRays::in_camera(double x, double y, double distance) const {
 
 void ViewRays::move(const Eigen::Vector3d& shift, const Eigen::Vector3d& turn) {
   const double angle = turn.norm();
-  const Eigen::Matrix3d rotation =
-      angle > 0 ? Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix() : Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d rotation = angle > 0
+                                       ? Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix()
+                                       : Eigen::Matrix3d::Identity();
   world_from_cam_ = world_from_cam_ * rotation.transpose();
   origin_ -= world_from_cam_ * shift;
 }
 
 Rigid3d ViewRays::cam_from_world(const Space& space) const {
   const Eigen::Quaterniond rotation(world_from_cam_.transpose());
-  return {rotation.normalized(), -(rotation.normalized() * (space.center + space.radius * origin_))};
+  return {rotation.normalized(),
+          -(rotation.normalized() * (space.center + space.radius * origin_))};
 }
 
 bool ViewRays::project(const float point[3], double& x, double& y, double& depth) const {

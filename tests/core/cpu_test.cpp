@@ -10,11 +10,8 @@ int asked = 0;
 bool granted() { return ++asked > 0; }
 bool refused() { return ++asked < 0; }
 
-constexpr CpuFeatures everything{.avx512 = true,
-                                 .avx512_bf16 = true,
-                                 .amx_tile = true,
-                                 .amx_bf16 = true,
-                                 .tile_state = true};
+constexpr CpuFeatures everything{
+    .avx512 = true, .avx512_bf16 = true, .amx_tile = true, .amx_bf16 = true, .tile_state = true};
 
 CpuFeatures without(bool CpuFeatures::*feature) {
   CpuFeatures f = everything;
@@ -25,7 +22,8 @@ CpuFeatures without(bool CpuFeatures::*feature) {
 TEST(Cpu, TilesAreOfferedOnlyIfProcessorAndKernelAgree) {
   EXPECT_EQ(best_isa(everything, "", granted), Isa::amx);
   EXPECT_EQ(best_isa(everything, "", refused), Isa::avx512bf16);
-  for (const auto missing : {&CpuFeatures::amx_tile, &CpuFeatures::amx_bf16, &CpuFeatures::tile_state}) {
+  for (const auto missing :
+       {&CpuFeatures::amx_tile, &CpuFeatures::amx_bf16, &CpuFeatures::tile_state}) {
     asked = 0;
     EXPECT_EQ(best_isa(without(missing), "", granted), Isa::avx512bf16);
     EXPECT_EQ(asked, 0) << "nothing would use them";

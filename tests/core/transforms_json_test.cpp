@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/file_io.hpp"
 #include "tests/core/temp_folder.hpp"
 
 namespace orbitfuse {
@@ -47,6 +48,21 @@ TEST(TransformsJson, FieldOfViewAndPerFrameIntrinsics) {
   EXPECT_LT((t->frames[0].cam_from_world.inverse().rotation * Eigen::Vector3d::UnitZ() + Eigen::Vector3d::UnitZ()).norm(), 1e-12);
 }
 
+TEST(TransformsJson, WhereverItIsCutItIsRefused) {
+  const TempFolder folder;
+  TransformsFrame frame;
+  frame.file_path = "images/\u00e9.jpg";
+  frame.camera = Camera::from_fov(320, 240, 50);
+  ASSERT_TRUE(write_transforms_json(folder / "t.json", {{frame}}));
+  const std::string whole = read_file(folder / "t.json").value();
+  for (std::size_t length = 0; length + 2 < whole.size(); ++length) {  // it ends with "}\n"
+    put(folder / "t.json", whole.substr(0, length));
+    const auto t = read_transforms_json(folder / "t.json");
+    ASSERT_FALSE(t) << length;
+    EXPECT_NE(t.error().message().find("cut off"), std::string::npos) << t.error().message();
+  }
+}
+
 TEST(TransformsJson, BadInputNamesFrameAndField) {
   const TempFolder folder;
   const std::pair<std::string, std::string> cases[] = {
@@ -59,6 +75,9 @@ TEST(TransformsJson, BadInputNamesFrameAndField) {
       {R"({"frames":[]})", "frames"},
       {R"({"frames":7})", "frames"},
       {R"({"frames":[{"file_p)", "cut off"},
+      {"{\"frames\":[{\"file_path\":\"\xff\xfe\"}]}", "UTF-8"},
+      {"\xff\xfe{\"frames\":[]}", "not JSON"},  // UTF-16's mark
+      {"", "cut off"},
       {R"({"w":4,"h":4,"fl_x":1e999,"frames":[]})", "1e999"},
       {"[]", "object"}};
   for (const auto& [text, word] : cases) {

@@ -177,6 +177,57 @@ TEST_F(BadInput, OutFolderThatCannotBeWritten) {
   EXPECT_EQ(poses().code, 4);
 }
 
+// The folder of an earlier run brings its options: damage there must not silently give other ones.
+TEST_F(BadInput, RecordOfAnEarlierRunThatIsDamaged) {
+  make_session();
+  run_before_the_damage();
+  const fs::path record = out / "run.json";
+  const std::string good = *read_file(record);
+  const auto replaced = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return text.replace(at, from.size(), to);
+  };
+  const std::pair<std::string, std::string> cases[] = {
+      {good.substr(0, good.size() / 2), "cut off"},
+      {"", "cut off"},
+      {replaced("\"session\": \"", "\"session\": \"\xff"), "not JSON"},
+      {"[]", "no session"},
+      {replaced("\"seed\": 1", "\"seed\": -1"), "seed = -1"},
+      {replaced("\"seed\": 1", "\"seed\": \"1\""), "seed = \"1\""},
+      {replaced("\"config\": {", "\"config\": 7, \"old\": {"), "config = 7"},
+      {replaced("\"fuse\": {", "\"fuse\": [], \"old\": {"), "fuse = []"},
+      {replaced("\"max_features\": ", "\"max_features\": 0.5"), "poses.max_features = 0.5"}};
+  for (const auto& [text, mention] : cases) {
+    std::ofstream(record, std::ios::trunc) << text;
+    const Outcome failed = orbitfuse_program({"poses", out.string()});
+    EXPECT_EQ(failed.code, 3) << mention << ": " << failed.err;
+    EXPECT_THAT(failed.err, HasSubstr("run.json"));
+    EXPECT_THAT(failed.err, HasSubstr(mention));
+    EXPECT_EQ(contents(out), before);
+  }
+  std::ofstream(record, std::ios::trunc) << good;
+  EXPECT_EQ(orbitfuse_program({"poses", out.string()}).code, 0);
+}
+
+TEST_F(BadInput, TrainingOptionsAreNamedAsTheyAreWritten) {
+  make_session();
+  const std::pair<const char*, const char*> cases[] = {
+      {"train.visible.iterations=many", "must be an integer in 1..10000000"},
+      {"train.thermal.iterations=0", "train.thermal.iterations: 0; choose an integer in 1..10000000"},
+      {"train.visible.color_hidden=40", "train.visible.color_hidden: 40; choose an integer in 16..256, a multiple of 16"},
+      {"train.visible.sampling=all", "must be occupancy or proposal"},
+      {"train.visible.carve=2", "must be true or false"},
+      {"render.palette=\xff", "UTF-8"}};
+  for (const auto& [set, mention] : cases) {
+    const Outcome refused = orbitfuse_program({"poses", session.string(), "--out", out.string(), "--set", set});
+    EXPECT_EQ(refused.code, 2) << refused.err;
+    EXPECT_THAT(refused.err, HasSubstr(mention));
+    EXPECT_FALSE(fs::exists(out));
+  }
+}
+
 TEST_F(BadInput, ImportOfNothingReadable) {
   fs::create_directories(temp.path / "photos");
   std::ofstream(temp.path / "photos/a.jpg") << "text";

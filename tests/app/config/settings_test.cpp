@@ -86,6 +86,30 @@ TEST_F(SettingsTest, Overrides) {
   EXPECT_FALSE(settings.apply("render.views"));
 }
 
+TEST_F(SettingsTest, WhatARecordCannotHoldIsRefused) {
+  const Status status = settings.apply("render.palette=\xff");
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().kind, ErrorKind::usage);
+  EXPECT_THAT(status.error().message(), HasSubstr("UTF-8"));
+  EXPECT_EQ(options.palette, "inferno");
+  ASSERT_TRUE(settings.apply("render.palette=\u00e9"));
+}
+
+TEST_F(SettingsTest, RecordsOfWrongTypesNameTheKey) {
+  using nlohmann::json;
+  const std::pair<const char*, const char*> cases[] = {{R"({"train":7})", "train = 7"},
+                                                       {R"({"train":{"visible":[1]}})", "train.visible = [1]"},
+                                                       {R"({"render":{"views":"x"}})", "render.views = \"x\""},
+                                                       {R"({"render":{"views":null}})", "render.views = null"}};
+  for (const auto& [text, named] : cases) {
+    const Status status = settings.read_json(json::parse(text), "run.json");
+    ASSERT_FALSE(status) << text;
+    EXPECT_THAT(status.error().message(), HasSubstr("run.json: "));
+    EXPECT_THAT(status.error().message(), HasSubstr(named));
+  }
+  EXPECT_TRUE(settings.read_json(json::parse(R"({"of another version":{"x":1},"render":{}})"), "run.json"));
+}
+
 TEST_F(SettingsTest, TomlReferenceReadsBackToTheSameValues) {
   const auto before = settings.to_json();
   EXPECT_THAT(settings.to_toml(), HasSubstr("weight = 0.1\n"));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The layers on tiles, on processors that have none: the manual's semantics in plain C++, and the
-// compiled instructions executed one by one by the same. Processors that have them also run KernelsTest.
+// compiled instructions executed one by one by the same. Processors that have them also run
+// KernelsTest.
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -61,14 +62,14 @@ float dot(const std::vector<float>& left, const std::vector<float>& right, float
 
 TEST(TileMachine, SumsAsTheManualSays) {
   EXPECT_EQ(dot({2, 3}, {5, 7}, 100), 131);
-  // Even and odd halves are summed apart, then together, then to the sum: with 2^24 + 1 = 2^24 in fp32,
-  // the order decides. ((2^24 + 1) + (1 + 0)) ...
+  // Even and odd halves are summed apart, then together, then to the sum: with 2^24 + 1 = 2^24 in
+  // fp32, the order decides. ((2^24 + 1) + (1 + 0)) ...
   const float big = 16777216;
-  EXPECT_EQ(dot({big, 0, 1, 0}, {1, 0, 1, 0}, 0), big);            // even: 2^24 + 1, to even
-  EXPECT_EQ(dot({big, 1, 0, 1}, {1, 1, 0, 1}, 0), big + 2);        // odd: 1 + 1 first
-  EXPECT_EQ(dot({1, 0, 1, 0}, {1, 0, 1, 0}, big), big + 2);        // the sum comes last
-  EXPECT_EQ(dot({-big, 1, 0, 0}, {1, 1, 0, 0}, big), 1);           // exact: -2^24 + 1 fits
-  EXPECT_EQ(dot({3, 0}, {1, 0}, big), big + 4);                    // 2^24 + 3, to even
+  EXPECT_EQ(dot({big, 0, 1, 0}, {1, 0, 1, 0}, 0), big);      // even: 2^24 + 1, to even
+  EXPECT_EQ(dot({big, 1, 0, 1}, {1, 1, 0, 1}, 0), big + 2);  // odd: 1 + 1 first
+  EXPECT_EQ(dot({1, 0, 1, 0}, {1, 0, 1, 0}, big), big + 2);  // the sum comes last
+  EXPECT_EQ(dot({-big, 1, 0, 0}, {1, 1, 0, 0}, big), 1);     // exact: -2^24 + 1 fits
+  EXPECT_EQ(dot({3, 0}, {1, 0}, big), big + 4);              // 2^24 + 3, to even
 }
 
 TEST(TileMachine, DenormalsAreZeroAndNansAreNot) {
@@ -100,10 +101,13 @@ TEST(TileMachine, RefusesWhatAProcessorRefuses) {
     TileMachine().configure(&config);
   };
   EXPECT_NO_THROW(configure([](TileConfig&) {}));
-  EXPECT_THROW(configure([](TileConfig& c) { c.rows[3] = 17, c.row_bytes[3] = 4; }), std::logic_error);
-  EXPECT_THROW(configure([](TileConfig& c) { c.rows[3] = 1, c.row_bytes[3] = 65; }), std::logic_error);
+  EXPECT_THROW(configure([](TileConfig& c) { c.rows[3] = 17, c.row_bytes[3] = 4; }),
+               std::logic_error);
+  EXPECT_THROW(configure([](TileConfig& c) { c.rows[3] = 1, c.row_bytes[3] = 65; }),
+               std::logic_error);
   EXPECT_THROW(configure([](TileConfig& c) { c.rows[3] = 1; }), std::logic_error);
-  EXPECT_THROW(configure([](TileConfig& c) { c.rows[8] = 1, c.row_bytes[8] = 4; }), std::logic_error);
+  EXPECT_THROW(configure([](TileConfig& c) { c.rows[8] = 1, c.row_bytes[8] = 4; }),
+               std::logic_error);
   EXPECT_THROW(configure([](TileConfig& c) { c.palette = 2; }), std::logic_error);
   EXPECT_THROW(configure([](TileConfig& c) { c.reserved[3] = 1; }), std::logic_error);
   TileMachine machine;
@@ -131,7 +135,8 @@ struct Case {
   int rows, in_width, out_width;
   std::vector<float> in, dout;
 
-  Case(int width_in, int width_out, int row_count) : rows(row_count), in_width(width_in), out_width(width_out) {
+  Case(int width_in, int width_out, int row_count)
+      : rows(row_count), in_width(width_in), out_width(width_out) {
     mlp.create({width_in, width_out}, static_cast<std::uint64_t>(4 + width_in));
     in = noise(static_cast<std::size_t>(rows * width_in), 21);
     dout = noise(static_cast<std::size_t>(rows * width_out), 22);
@@ -144,7 +149,8 @@ struct Case {
     r.dweights.assign(mlp.weights.size() + 1, 0.25f);
     r.dweights.back() = Results::guard;
     kernels.forward(mlp.view(0), rows, in.data(), r.out.data(), relu);
-    kernels.backward_input(mlp.view(0), rows, dout.data(), r.din.data(), relu ? in.data() : nullptr);
+    kernels.backward_input(mlp.view(0), rows, dout.data(), r.din.data(),
+                           relu ? in.data() : nullptr);
     kernels.backward_weights(mlp.view(0), rows, in.data(), dout.data(), r.dweights.data());
     for (const auto* v : {&r.out, &r.din, &r.dweights}) EXPECT_EQ(v->back(), Results::guard);
     return r;
@@ -164,13 +170,16 @@ struct Sum {
 struct Reference {
   std::vector<Sum> out, din, dweights;
 
-  explicit Reference(const Case& c) : out(c.dout.size()), din(c.in.size()), dweights(c.mlp.weights.size()) {
+  explicit Reference(const Case& c)
+      : out(c.dout.size()), din(c.in.size()), dweights(c.mlp.weights.size()) {
     const std::vector<float>& w = c.mlp.weights.value;
-    const auto inputs = static_cast<std::size_t>(c.in_width), outputs = static_cast<std::size_t>(c.out_width);
+    const auto inputs = static_cast<std::size_t>(c.in_width),
+               outputs = static_cast<std::size_t>(c.out_width);
     for (std::size_t r = 0; r < static_cast<std::size_t>(c.rows); ++r)
       for (std::size_t i = 0; i < inputs; ++i)
         for (std::size_t o = 0; o < outputs; ++o) {
-          const double x = c.in[r * inputs + i], d = c.dout[r * outputs + o], weight = w[i * outputs + o];
+          const double x = c.in[r * inputs + i], d = c.dout[r * outputs + o],
+                       weight = w[i * outputs + o];
           out[r * outputs + o].add(x, weight);
           din[r * inputs + i].add(d, weight);
           dweights[i * outputs + o].add(x, d);
@@ -181,13 +190,16 @@ struct Reference {
 struct Widths {
   int in, out;
 };
-/// Every layer of the presets (ours 32-64-16, colour 32-64-16 and thermal 32-32-16; published 32-64-16,
-/// 64-128-16, 32-64-64-16, 32-128-128-16 and 32-32-32-16; proposals 16-16-16), the widest, and odd multiples of 16.
-constexpr Widths all_widths[] = {{32, 64}, {64, 16}, {64, 64},   {16, 32}, {32, 16},   {32, 32}, {64, 128}, {128, 16},
-                                 {32, 128}, {128, 128}, {16, 16}, {16, 64}, {256, 256}, {48, 80}, {80, 48}};
+/// Every layer of the presets (ours 32-64-16, colour 32-64-16 and thermal 32-32-16; published
+/// 32-64-16, 64-128-16, 32-64-64-16, 32-128-128-16 and 32-32-32-16; proposals 16-16-16), the
+/// widest, and odd multiples of 16.
+constexpr Widths all_widths[] = {{32, 64}, {64, 16},  {64, 64},   {16, 32},  {32, 16},
+                                 {32, 32}, {64, 128}, {128, 16},  {32, 128}, {128, 128},
+                                 {16, 16}, {16, 64},  {256, 256}, {48, 80},  {80, 48}};
 
 std::vector<int> row_counts(Widths w) {
-  return w.in * w.out > 128 * 128 ? std::vector<int>{33} : std::vector<int>{1, 15, 16, 17, 31, 32, 33, 127, 129, 300};
+  return w.in * w.out > 128 * 128 ? std::vector<int>{33}
+                                  : std::vector<int>{1, 15, 16, 17, 31, 32, 33, 127, 129, 300};
 }
 
 TEST(AmxLayers, FollowDoubleWithinTheRoundingOfTheirOperands) {
@@ -197,30 +209,36 @@ TEST(AmxLayers, FollowDoubleWithinTheRoundingOfTheirOperands) {
         const Case c(w.in, w.out, rows);
         const Results r = c.run(emulated_amx(), relu);
         const Reference exact(c);
-        // Both operands are rounded to 8 significant bits, by up to 2^-8 each; 1 % more for the sums.
+        // Both operands are rounded to 8 significant bits, by up to 2^-8 each; 1 % more for the
+        // sums.
         constexpr double tolerance = 1.01 / 128;
         for (std::size_t k = 0; k < exact.out.size(); ++k) {
           const double value = relu ? std::max(0.0, exact.out[k].value) : exact.out[k].value;
-          ASSERT_NEAR(r.out[k], value, tolerance * exact.out[k].magnitude) << w.in << "-" << w.out << " x " << rows;
+          ASSERT_NEAR(r.out[k], value, tolerance * exact.out[k].magnitude)
+              << w.in << "-" << w.out << " x " << rows;
         }
         for (std::size_t k = 0; k < exact.din.size(); ++k) {
           const double value = relu && c.in[k] <= 0 ? 0.0 : exact.din[k].value;
-          ASSERT_NEAR(r.din[k], value, tolerance * exact.din[k].magnitude) << w.in << "-" << w.out << " x " << rows;
+          ASSERT_NEAR(r.din[k], value, tolerance * exact.din[k].magnitude)
+              << w.in << "-" << w.out << " x " << rows;
         }
         for (std::size_t k = 0; k < exact.dweights.size(); ++k)
-          ASSERT_NEAR(r.dweights[k], 0.25 + exact.dweights[k].value, tolerance * exact.dweights[k].magnitude + 1e-6)
+          ASSERT_NEAR(r.dweights[k], 0.25 + exact.dweights[k].value,
+                      tolerance * exact.dweights[k].magnitude + 1e-6)
               << w.in << "-" << w.out << " x " << rows;
       }
 }
 
 TEST(AmxLayers, DifferFromAvx512OnlyInTheOrderOfTheirSums) {
-  if (best_isa() < Isa::avx512bf16) GTEST_SKIP() << "this processor has no AVX-512 with bf16 to compare with";
+  if (best_isa() < Isa::avx512bf16)
+    GTEST_SKIP() << "this processor has no AVX-512 with bf16 to compare with";
   for (const Widths w : all_widths)
     for (const int rows : row_counts(w)) {
       const Case c(w.in, w.out, rows);
       const Results amx = c.run(emulated_amx(), true), avx512 = c.run(kernels_avx512bf16(), true);
       const Reference exact(c);
-      const auto near = [](const std::vector<float>& a, const std::vector<float>& b, const std::vector<Sum>& sums, int terms) {
+      const auto near = [](const std::vector<float>& a, const std::vector<float>& b,
+                           const std::vector<Sum>& sums, int terms) {
         for (std::size_t k = 0; k < sums.size(); ++k)
           ASSERT_NEAR(a[k], b[k], terms * 0x1p-23 * (0.25 + sums[k].magnitude));
       };
@@ -252,8 +270,10 @@ TEST(AmxLayers, WhatIsNotFiniteStaysInItsRowAndColumn) {
       }
     }
     // A rectified NaN is 0 in every kernel.
-    const Results rectified = c.run(emulated_amx(), true), other_rectified = c.run(kernels_for(Isa::avx512bf16), true);
-    for (std::size_t k = hit * 64; k < (hit + 1) * 64; ++k) EXPECT_EQ(rectified.out[k], other_rectified.out[k]);
+    const Results rectified = c.run(emulated_amx(), true),
+                  other_rectified = c.run(kernels_for(Isa::avx512bf16), true);
+    for (std::size_t k = hit * 64; k < (hit + 1) * 64; ++k)
+      EXPECT_EQ(rectified.out[k], other_rectified.out[k]);
   }
 }
 
@@ -278,12 +298,14 @@ struct Pass {
   Pass(const Kernels& kernels, const std::vector<int>& widths, int rows) {
     Mlp mlp;
     mlp.create(widths, 3);
-    const auto in = noise(static_cast<std::size_t>(rows * mlp.in()), 31), dout = noise(static_cast<std::size_t>(rows * mlp.out()), 32);
+    const auto in = noise(static_cast<std::size_t>(rows * mlp.in()), 31),
+               dout = noise(static_cast<std::size_t>(rows * mlp.out()), 32);
     din.resize(in.size());
     dweights.resize(mlp.weights.size());
     std::vector<float> scratch_a, scratch_b;
     mlp.forward(kernels, rows, in.data(), a);
-    mlp.backward(kernels, rows, in.data(), a, dout.data(), din.data(), scratch_a, scratch_b, dweights.data());
+    mlp.backward(kernels, rows, in.data(), a, dout.data(), din.data(), scratch_a, scratch_b,
+                 dweights.data());
   }
 };
 
@@ -297,20 +319,26 @@ double relative_error(const std::vector<float>& a, const std::vector<float>& b, 
 }
 
 TEST(AmxLayers, OfWholePerceptronsAreThoseOfFloatWithinAPercent) {
-  for (const std::vector<int>& widths : {std::vector{32, 64, 16}, {32, 64, 64, 16}, {32, 32, 16}, {64, 128, 16}, {32, 128, 128, 16}}) {
+  for (const std::vector<int>& widths : {std::vector{32, 64, 16},
+                                         {32, 64, 64, 16},
+                                         {32, 32, 16},
+                                         {64, 128, 16},
+                                         {32, 128, 128, 16}}) {
     const int rows = 203;
     const Pass amx(emulated_amx(), widths, rows), exact(kernels_avx2(), widths, rows);
-    EXPECT_LT(relative_error(amx.a.back(), exact.a.back(), static_cast<std::size_t>(rows * 16)), 0.01);
+    EXPECT_LT(relative_error(amx.a.back(), exact.a.back(), static_cast<std::size_t>(rows * 16)),
+              0.01);
     // Units whose sign the rounding changes let through a gradient that the other has not.
     EXPECT_LT(relative_error(amx.din, exact.din, exact.din.size()), 0.08);
     EXPECT_LT(relative_error(amx.dweights, exact.dweights, exact.dweights.size()), 0.08);
   }
 }
 
-// The kernels as compiled. Where the processor has no tiles, each of their instructions is decoded and
-// done by the machine above; where it has, this compares the two.
+// The kernels as compiled. Where the processor has no tiles, each of their instructions is decoded
+// and done by the machine above; where it has, this compares the two.
 TEST(AmxLayers, AsCompiledGiveWhatTheEmulationGives) {
-  if (best_isa() < Isa::avx512bf16) GTEST_SKIP() << "this processor has no AVX-512 with bf16, as the kernels need around tiles";
+  if (best_isa() < Isa::avx512bf16)
+    GTEST_SKIP() << "this processor has no AVX-512 with bf16, as the kernels need around tiles";
   for (const Widths w : all_widths)
     for (const int rows : {1, 33, 130}) {
       if (w.in * w.out > 128 * 128 && rows > 33) continue;
@@ -323,7 +351,8 @@ TEST(AmxLayers, AsCompiledGiveWhatTheEmulationGives) {
         if (best_isa() == Isa::amx) {
           EXPECT_EQ(trap.executed(), 0);
         } else {
-          EXPECT_GT(trap.executed(), 3 * 5) << "at least configure, load, multiply, store and release, thrice";
+          EXPECT_GT(trap.executed(), 3 * 5)
+              << "at least configure, load, multiply, store and release, thrice";
         }
         EXPECT_EQ(compiled.out, expected.out) << w.in << "-" << w.out << " x " << rows;
         EXPECT_EQ(compiled.din, expected.din) << w.in << "-" << w.out << " x " << rows;

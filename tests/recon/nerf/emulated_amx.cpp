@@ -38,7 +38,8 @@ struct PlainRounding {
   static void pair_rows(const float* in, int rows, int width, std::uint16_t* out) {
     for (int s = 0; s < rows + rows % 2; ++s)
       for (int i = 0; i < width; ++i)
-        out[(s / 2 * width + i) * 2 + s % 2] = s < rows ? bf16_of(in[s * width + i]) : std::uint16_t{0};
+        out[(s / 2 * width + i) * 2 + s % 2] =
+            s < rows ? bf16_of(in[s * width + i]) : std::uint16_t{0};
   }
   static void transpose(const float* in, int rows, int width, long stride, std::uint16_t* out) {
     for (int s = 0; s < (rows + 31) / 32 * 32; ++s)

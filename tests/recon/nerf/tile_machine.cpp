@@ -68,14 +68,16 @@ void TileMachine::load(int index, const void* base, std::int64_t stride) {
   t.data = {};
   const auto* from = static_cast<const std::uint8_t*>(base);
   for (int r = 0; r < t.rows; ++r)
-    std::memcpy(t.data[static_cast<std::size_t>(r)].data(), from + r * stride, static_cast<std::size_t>(t.row_bytes));
+    std::memcpy(t.data[static_cast<std::size_t>(r)].data(), from + r * stride,
+                static_cast<std::size_t>(t.row_bytes));
 }
 
 void TileMachine::store(int index, void* base, std::int64_t stride) const {
   const Tile& t = tile(index);
   auto* to = static_cast<std::uint8_t*>(base);
   for (int r = 0; r < t.rows; ++r)
-    std::memcpy(to + r * stride, t.data[static_cast<std::size_t>(r)].data(), static_cast<std::size_t>(t.row_bytes));
+    std::memcpy(to + r * stride, t.data[static_cast<std::size_t>(r)].data(),
+                static_cast<std::size_t>(t.row_bytes));
 }
 
 void TileMachine::multiply_add(int sum, int left, int right) {
@@ -83,7 +85,8 @@ void TileMachine::multiply_add(int sum, int left, int right) {
   const Tile &a = tile(left), &b = tile(right);
   require(sum != left && sum != right && left != right, "one tile as two operands");
   require(c.row_bytes % 4 == 0 && a.row_bytes % 4 == 0 && b.row_bytes % 4 == 0, "bytes of a row");
-  require(c.rows == a.rows && a.row_bytes / 4 == b.rows && b.row_bytes == c.row_bytes, "shapes differ");
+  require(c.rows == a.rows && a.row_bytes / 4 == b.rows && b.row_bytes == c.row_bytes,
+          "shapes differ");
   float right_even[16][16], right_odd[16][16];
   for (std::size_t k = 0; k < 16; ++k) {
     std::uint16_t row[32];

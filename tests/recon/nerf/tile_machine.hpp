@@ -6,9 +6,9 @@
 
 namespace orbitfuse::nerf::test {
 
-/// The AMX tiles as the manual has them (Intel SDM volume 1, "Programming with Intel AMX"; volume 2,
-/// LDTILECFG to TILEZERO). What a processor would refuse throws std::logic_error: configurations out of
-/// range (#GP), shapes that don't fit each other and tiles that aren't configured (#UD).
+/// The AMX tiles as the manual has them (Intel SDM volume 1, "Programming with Intel AMX"; volume
+/// 2, LDTILECFG to TILEZERO). What a processor would refuse throws std::logic_error: configurations
+/// out of range (#GP), shapes that don't fit each other and tiles that aren't configured (#UD).
 class TileMachine {
  public:
   void configure(const void* bytes64);

@@ -3,8 +3,8 @@
 
 namespace orbitfuse::nerf::test {
 
-/// While it lives, AMX instructions that this processor doesn't know (SIGILL) are decoded and executed
-/// by a TileMachine: the compiled kernels run as they are. One thread at a time.
+/// While it lives, AMX instructions that this processor doesn't know (SIGILL) are decoded and
+/// executed by a TileMachine: the compiled kernels run as they are. One thread at a time.
 class TileTrap {
  public:
   TileTrap();

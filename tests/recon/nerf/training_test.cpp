@@ -257,7 +257,9 @@ TEST(Options, PresetsHoldThePublishedValues) {
   const auto unknown = o.set("iteration", "3");
   ASSERT_FALSE(unknown);
   EXPECT_NE(unknown.error().remedy.find("nerf.iterations"), std::string::npos);
-  EXPECT_FALSE(o.set("iterations", "many"));
+  const auto wrong = o.set("iterations", "many");
+  ASSERT_FALSE(wrong);
+  EXPECT_EQ(wrong.error().message(), "nerf.iterations: 'many'; choose an integer in 1..10000000");
   for (const std::string& key : TrainOptions::keys()) EXPECT_TRUE(o.set(key, o.get(key))) << key;
 }
 
