@@ -106,6 +106,15 @@ Status run(const fs::path& folder, const fs::path& out) {
   print("refined similarity", refined.visible_from_thermal.matrix(), a, b, extent);
   const double scale = std::cbrt(best.topLeftCorner<3, 3>().determinant());
   const Eigen::Quaterniond rotation(Eigen::Matrix3d(best.topLeftCorner<3, 3>() / scale));
+  // A higher agreement from there says that the search failed, a lower one that the score does.
+  ORBITFUSE_ASSIGN(const SimilarityRefinement from_best,
+                   refine_similarity(renderer, images, thermal.views,
+                                     {scale, rotation, best.topRightCorner<3, 1>()},
+                                     similarity_rounds(), progress));
+  fmt::print("refined from the best similarity of the centres: agreement {:.4f} to {:.4f}, patches {} to {}\n",
+             from_best.agreement_before, from_best.agreement_after, from_best.matches_before,
+             from_best.matches_after);
+  print("refined from there", from_best.visible_from_thermal.matrix(), a, b, extent);
   fmt::print("between the two: scale {:.2f} %, rotation {:.2f} deg\n",
              100 * (similarity.scale / scale - 1),
              rotation_angle_deg(rotation, similarity.rotation));

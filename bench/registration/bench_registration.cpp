@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Success, error and CPU time of registration on synthetic pairs.
 //   bench_registration [--trials 20] [--first-seed 0] [--cloud car] [--level "gap, hard"]
-//     [--initialiser both|features|grid|none] [--oracle] [--out FILE.json] [--verbose]
+//     [--initialiser both|features|grid|none] [--oracle] [--no-warp] [--out FILE.json]
+//     [--verbose]
 // "both" also refines from near starts, "none" does that only; --oracle adds the errors of the best
-// similarities that the true correspondences allow.
+// similarities that the true correspondences allow; --no-warp leaves the estimate of a smooth warp
+// out.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -26,7 +28,7 @@ namespace {
 struct Arguments {
   int trials = 20, first_seed = 0;
   std::string cloud, level, initialiser = "both", out;
-  bool verbose = false, oracle = false;
+  bool verbose = false, oracle = false, no_warp = false;
 };
 
 double median(std::vector<double> values) {
@@ -73,7 +75,8 @@ struct Tally {
 };
 
 /// From 3 degrees and 3 % off, turned about the object's middle.
-void run_refinement(const bench::CloudPair& pair, std::uint32_t seed, Tally& tally) {
+void run_refinement(const bench::CloudPair& pair, const Arguments& arguments, std::uint32_t seed,
+                    Tally& tally) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   const Similarity3d& truth = pair.target_from_source;
@@ -84,7 +87,9 @@ void run_refinement(const bench::CloudPair& pair, std::uint32_t seed, Tally& tal
       Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized()));
   const double grow = random() % 2 ? 1.03 : 1 / 1.03;
   Similarity3d kick{grow, turn, center - grow * (turn * center)};
-  const auto refined = refine_registration(pair.source, pair.target, kick * truth, {});
+  RegistrationOptions options;
+  options.estimate_warp = !arguments.no_warp;
+  const auto refined = refine_registration(pair.source, pair.target, kick * truth, options);
   if (refined) tally.refined.add(pair, refined->target_from_source, refined->cpu_s);
 }
 
@@ -112,6 +117,7 @@ void run_trial(const bench::CloudPair& pair, const Arguments& arguments, const s
   ++tally.trials;
   RegistrationOptions options;
   options.seed = seed + 1;
+  options.estimate_warp = !arguments.no_warp;
   options.use_features = arguments.initialiser != "grid";
   options.use_grid = arguments.initialiser != "features";
   const auto report = register_clouds(pair.source, pair.target, options, {});
@@ -181,8 +187,8 @@ Arguments parse(int argc, char** argv) {
                                                      {"--out", &a.out}};
   const std::map<std::string, int*> numbers = {{"--trials", &a.trials},
                                                {"--first-seed", &a.first_seed}};
-  const std::map<std::string, bool*> switches = {{"--verbose", &a.verbose},
-                                                 {"--oracle", &a.oracle}};
+  const std::map<std::string, bool*> switches = {
+      {"--verbose", &a.verbose}, {"--oracle", &a.oracle}, {"--no-warp", &a.no_warp}};
   for (int i = 1; i < argc; ++i) {
     const std::string name = argv[i];
     const bool has_value = i + 1 < argc;
@@ -234,7 +240,7 @@ int main(int argc, char** argv) {
         if (arguments.initialiser != "none")
           run_trial(pair, arguments, level.name, name, seed, total);
         if (arguments.initialiser == "both" || arguments.initialiser == "none")
-          run_refinement(pair, seed, total);
+          run_refinement(pair, arguments, seed, total);
         if (arguments.oracle) run_oracles(pair, total);
       }
     }
@@ -244,11 +250,10 @@ int main(int argc, char** argv) {
   }
   fmt::print("median over all pairs: {:.0f} CPU ms\n", median(all_ms));
   if (arguments.out.empty()) return 0;
-  const nlohmann::json report = {{"initialiser", arguments.initialiser},
-                                 {"first_seed", arguments.first_seed},
-                                 {"trials_per_cloud", arguments.trials},
-                                 {"cpu_ms_median", median(all_ms)},
-                                 {"levels", rows}};
+  const nlohmann::json report = {
+      {"initialiser", arguments.initialiser}, {"estimate_warp", !arguments.no_warp},
+      {"first_seed", arguments.first_seed},   {"trials_per_cloud", arguments.trials},
+      {"cpu_ms_median", median(all_ms)},      {"levels", rows}};
   if (const Status written = write_file_atomic(arguments.out, report.dump(1) + "\n"); !written) {
     fmt::print(stderr, "{}\n", written.error().message());
     return 1;

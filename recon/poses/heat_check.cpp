@@ -18,8 +18,12 @@ namespace {
 constexpr double found_share = 0.5;
 /// Among stations, which see less of each other's scene: below it a station is searched again.
 constexpr double settled_share = 0.6;
+/// Of their loop's usual support in the visible scene: views that form alone may vouch for.
+constexpr double vouched_share = 0.6;
 /// Two views turned by less are one station's: its own temperatures confirm any place.
 constexpr double own_turn_deg = 8;
+/// Shares of a support below it mean nothing.
+constexpr double least_support = 1e-9;
 
 /// Why the place found among the temperatures of settled views doesn't confirm the view's; empty if
 /// it does.
@@ -103,7 +107,8 @@ Result<Contradicted> contradicted(const Refinery& refinery, const Fit& alignment
   std::vector<std::size_t> all(alignment.views.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
   const std::vector<PosedView> places = alignment.poses();
-  ORBITFUSE_ASSIGN(const SceneRenderer renderer, painted_by(refinery, alignment, all, own_turn_deg));
+  ORBITFUSE_ASSIGN(const SceneRenderer renderer,
+                   painted_by(refinery, alignment, all, own_turn_deg));
   const Refinery painted{renderer, orbit, refinery.progress};
   ORBITFUSE_ASSIGN(const Fit second, painted.restart(all, places, judging_rounds()));
   Contradicted lost{{}, usual_support(orbit, all, second)};
@@ -130,6 +135,19 @@ Result<Fit> best_by_heat(const Refinery& painted, const std::vector<std::size_t>
 
 }  // namespace
 
+HeatVerdict verdict(const HeatOpinions& seen) {
+  const bool found = seen.heat_there > settled_share;
+  // Two scenes that show nothing of the view agree as easily as two that do.
+  if (seen.agree && (found || seen.form_there >= seen.form_before)) return HeatVerdict::both;
+  // Temperatures know more edges: where they are sure, form alone doesn't pull a view away.
+  if (!seen.agree && found) return HeatVerdict::heat_alone;
+  // Where they find it nowhere they don't speak against a place that form knows well.
+  if (seen.heat_there < found_share && seen.form_before > vouched_share &&
+      seen.form_before > seen.form_there)
+    return HeatVerdict::form_alone;
+  return HeatVerdict::doubt;
+}
+
 Result<HeatCheck> correct_by_heat(const Refinery& refinery, Fit& alignment) {
   const OrbitViews& orbit = refinery.orbit;
   ORBITFUSE_ASSIGN(const Contradicted found, contradicted(refinery, alignment));
@@ -143,21 +161,47 @@ Result<HeatCheck> correct_by_heat(const Refinery& refinery, Fit& alignment) {
   std::vector<std::size_t> rest;
   for (std::size_t i = 0; i < alignment.views.size(); ++i)
     if (std::count(lost.begin(), lost.end(), i) == 0) rest.push_back(i);
-  ORBITFUSE_ASSIGN(const SceneRenderer renderer, painted_by(refinery, alignment, rest, own_turn_deg));
-  ORBITFUSE_ASSIGN(const Fit by_heat, best_by_heat({renderer, orbit, refinery.progress}, lost, alignment));
+  ORBITFUSE_ASSIGN(const SceneRenderer renderer,
+                   painted_by(refinery, alignment, rest, own_turn_deg));
+  ORBITFUSE_ASSIGN(const Fit by_heat,
+                   best_by_heat({renderer, orbit, refinery.progress}, lost, alignment));
   ORBITFUSE_ASSIGN(const Fit by_form, refinery.restart(lost, by_heat.poses(), fine_rounds()));
+  std::vector<std::size_t> all(alignment.views.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  const Usual usual_form = usual_support(orbit, all, alignment);
   for (std::size_t c = 0; c < lost.size(); ++c) {
     const RenderAlignedView &form = by_form.views[c], &heat = by_heat.views[c];
     RenderAlignedView& view = alignment.views[lost[c]];
-    const bool agree = same_place(orbit, form.view.cam_from_world, heat.view.cam_from_world);
-    if (agree || heat.support() > settled_share * found.usual.at(orbit.stations[lost[c]].loop)) {
-      // Temperatures know more edges: where they are sure, form alone doesn't pull a view away.
-      if (!agree) check.by_heat_alone.emplace_back(lost[c], heat.view.cam_from_world);
-      view.view = agree ? form.view : heat.view;
-      ++check.moved;
-    } else {
-      view.doubt = fmt::format("the visible scene and the other views' temperatures place it {:.1f} deg apart",
-                               apart_deg(orbit, view.view.cam_from_world, heat.view.cam_from_world));
+    const int loop = orbit.stations[lost[c]].loop;
+    const double by_usual_form = 1 / std::max(usual_form.at(loop), least_support);
+    HeatOpinions seen;
+    seen.agree = same_place(orbit, form.view.cam_from_world, heat.view.cam_from_world);
+    seen.form_before = view.support() * by_usual_form;
+    seen.form_there = form.support() * by_usual_form;
+    seen.heat_there = heat.support() / std::max(found.usual.at(loop), least_support);
+    refinery.progress.report(
+        {"poses.thermal", 3, 4, -1,
+         fmt::format("{}: usual support {:.2f} among temperatures, {:.2f} of form there, {:.2f} "
+                     "before, {:.1f} deg away; {}",
+                     view.view.name, seen.heat_there, seen.form_there, seen.form_before,
+                     apart_deg(orbit, view.view.cam_from_world, heat.view.cam_from_world),
+                     seen.agree ? "they agree" : "they differ")});
+    switch (verdict(seen)) {
+      case HeatVerdict::both:
+        view.view = form.view;
+        ++check.moved;
+        break;
+      case HeatVerdict::heat_alone:
+        check.by_heat_alone.emplace_back(lost[c], heat.view.cam_from_world);
+        view.view = heat.view;
+        ++check.moved;
+        break;
+      case HeatVerdict::form_alone:
+        break;
+      case HeatVerdict::doubt:
+        view.doubt = fmt::format(
+            "the visible scene and the other views' temperatures place it {:.1f} deg apart",
+            apart_deg(orbit, view.view.cam_from_world, heat.view.cam_from_world));
     }
   }
   return check;

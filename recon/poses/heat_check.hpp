@@ -12,6 +12,19 @@
 // renderer's, cancelled.
 namespace orbitfuse {
 
+/// A view that the others' temperatures contradict, from where they place it best. Supports are
+/// shares of its loop's usual one in the same scene.
+struct HeatOpinions {
+  bool agree = false;      ///< form, started there, stays within a degree
+  double heat_there = 0;   ///< among temperatures
+  double form_there = 0;   ///< in the visible scene
+  double form_before = 0;  ///< in the visible scene, where it was
+};
+
+/// Whose word places the view; doubt: nobody's.
+enum class HeatVerdict { both, heat_alone, form_alone, doubt };
+HeatVerdict verdict(const HeatOpinions& seen);
+
 struct HeatCheck {
   int moved = 0;
   int undecided = 0;  ///< contradicted, where that were most of the views
@@ -21,7 +34,8 @@ struct HeatCheck {
 
 /// Each view judged by the temperatures of the others. Those that they contradict are searched as
 /// wholes in the scene that the rest paints, and go where both scenes then agree or temperatures
-/// are sure; the others keep a `doubt`. Where most are contradicted nobody is left to judge, and
+/// are sure. One that temperatures find nowhere stays where form knows it well; the others keep a
+/// `doubt`. Where most are contradicted nobody is left to judge, and
 /// none goes.
 Result<HeatCheck> correct_by_heat(const Refinery& refinery, Fit& alignment);
 

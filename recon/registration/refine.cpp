@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "recon/registration/pairs.hpp"
+
 namespace orbitfuse::registration {
 namespace {
 
@@ -15,88 +17,9 @@ struct Equations {
   std::vector<double> distances;  ///< |plane distance| of the pairs
 };
 
-struct Pair {
-  Eigen::Vector3d lever;   ///< the moved point, from the centre
-  Eigen::Vector3d normal;  ///< of the surface it is measured against
-  double residual;
-  double trust;
-};
-
 /// Where the source's centre, the origin of its unit frame, lies in the target.
 Eigen::Vector3d placed_center(const Similarity3d& target_from_source) {
   return target_from_source.translation;
-}
-
-class Pairs {
- public:
-  Pairs(const PreparedCloud& source, const PreparedCloud& target, const Similarity3d& placement,
-        double bound, bool exact)
-      : exact_(exact),
-        source_(source),
-        target_(target),
-        placement_(placement),
-        inverse_(placement.inverse()),
-        rotation_(placement.rotation.toRotationMatrix()),
-        bound2_(bound * bound),
-        center_(placed_center(placement)) {}
-
-  bool forward(std::size_t i, Pair& pair) const {
-    const Eigen::Vector3d y =
-        placement_.scale * (rotation_ * source_.points[i]) + placement_.translation;
-    const int found = partner(target_, y);
-    if (found < 0) return false;
-    const auto j = static_cast<std::size_t>(found);
-    const Eigen::Vector3d d = y - target_.points[j];
-    if (d.squaredNorm() > bound2_) return false;
-    pair.normal = target_.normals[j];
-    pair.lever = y - center_;
-    return finish(pair, d, rotation_ * source_.normals[i], target_.trust[j] * source_.trust[i]);
-  }
-
-  /// The target's point z against the source's plane. The scale's derivative is taken at z, as if
-  /// the target moved the other way, so that noise biases the two directions oppositely and
-  /// cancels.
-  bool backward(std::size_t j, Pair& pair) const {
-    const Eigen::Vector3d& z = target_.points[j];
-    const int found =
-        partner(source_, inverse_.scale * (rotation_.transpose() * z) + inverse_.translation);
-    if (found < 0) return false;
-    const auto i = static_cast<std::size_t>(found);
-    const Eigen::Vector3d y =
-        placement_.scale * (rotation_ * source_.points[i]) + placement_.translation;
-    const Eigen::Vector3d d = y - z;
-    if (d.squaredNorm() > bound2_) return false;
-    pair.normal = rotation_ * source_.normals[i];
-    pair.lever = z - center_;
-    return finish(pair, d, target_.normals[j], target_.trust[j] * source_.trust[i]);
-  }
-
- private:
-  int partner(const PreparedCloud& cloud, const Eigen::Vector3d& x) const {
-    return exact_ ? cloud.nearest(x) : cloud.nearest_table.lookup(x);
-  }
-  static bool finish(Pair& pair, const Eigen::Vector3d& d, const Eigen::Vector3d& other,
-                     double trust) {
-    const double cosine = pair.normal.dot(other);
-    if (cosine * cosine < 0.25) return false;
-    pair.residual = pair.normal.dot(d);
-    pair.trust = cosine * cosine * trust;
-    return true;
-  }
-  const bool exact_;
-  const PreparedCloud& source_;
-  const PreparedCloud& target_;
-  const Similarity3d& placement_;
-  const Similarity3d inverse_;
-  const Eigen::Matrix3d rotation_;
-  const double bound2_;
-  const Eigen::Vector3d center_;
-};
-
-/// Tukey's biweight: 0 beyond the bound.
-double tukey(double residual, double bound) {
-  const double u = residual / bound, v = 1 - u * u;
-  return v > 0 ? v * v : 0;
 }
 
 void add(Equations& equations, const Pair& pair, double bound) {
@@ -115,7 +38,7 @@ Equations equations_at(const PreparedCloud& source, const PreparedCloud& target,
                        bool exact) {
   Equations equations;
   equations.distances.reserve(source_subset.size() + target_subset.size());
-  const Pairs pairs(source, target, placement, pair_bound, exact);
+  const Pairs pairs(source, target, placement, pair_bound, exact, kNoDisplacement);
   Pair pair;
   for (const int i : source_subset) {
     if (pairs.forward(static_cast<std::size_t>(i), pair)) add(equations, pair, plane_bound);
@@ -126,13 +49,13 @@ Equations equations_at(const PreparedCloud& source, const PreparedCloud& target,
   return equations;
 }
 
-double robust_sigma(std::vector<double>& distances) {
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
+}  // namespace
+
+double robust_sigma(std::vector<double>& sizes) {
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
   return 1.4826 * *middle;
 }
-
-}  // namespace
 
 Vector7 plane_jacobian(const Eigen::Vector3d& lever, const Eigen::Vector3d& normal) {
   Vector7 j;

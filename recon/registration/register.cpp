@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <iterator>
 #include <random>
 
 #include "recon/registration/ambiguity.hpp"
 #include "recon/registration/search.hpp"
+#include "recon/registration/warp.hpp"
 
 namespace orbitfuse {
 namespace registration {
@@ -64,8 +66,19 @@ void add_words(std::string& text, const std::string& words) {
 /// Last refinement on all points and everything the report says about the result.
 RegistrationReport reported(const Search& search, const Similarity3d& start) {
   constexpr RefineOptions last{0.10, 0.06, 5, 20, true, true};
-  const Refined best = search.refine_with(start, 1 << 30, last);
+  const Refined plain = search.refine_with(start, 1 << 30, last);
+  Refined best = plain;
   RegistrationReport report;
+  if (search.options.estimate_warp) {
+    const Unwarped unwarped = refine_beside_warp(search.source, search.target, plain, {});
+    best.target_from_source = unwarped.target_from_source;
+    // Three coordinates; the diameter is 2.
+    report.warp_percent_of_diameter = 100 * std::sqrt(3.0) * unwarped.amplitude / 2;
+    if (!(unwarped.amplitude > 0)) {
+      report.skips.push_back(
+          {"smooth warp beside the similarity", "the residuals show none", "saved its refinement"});
+    }
+  }
   const Similarity3d target_from_unit = search.target.unit_from_cloud.inverse();
   report.target_from_source =
       target_from_unit * best.target_from_source * search.source.unit_from_cloud;
@@ -81,7 +94,7 @@ RegistrationReport reported(const Search& search, const Similarity3d& start) {
   report.rmse_percent_of_diameter = 100 * matched.rmse / 2;
   report.overlap_source = near.source_share;
   report.overlap_target = near.target_share;
-  measure_spread(search, best, report);
+  measure_spread(search, plain, report);
   if (const std::string open = open_directions(best.hessian); !open.empty()) {
     report.ambiguous = true;
     add_words(report.ambiguity, "the shape leaves open: " + open);
@@ -141,7 +154,8 @@ Result<RegistrationReport> register_clouds(const PointCloud& source_cloud,
   report.initialiser = judged[chosen].origin;
   report.view_score = judged[chosen].view_score;
   report.decided_by_views = view_score && rivals > 1 && stands_out(judged, chosen, rivals);
-  report.skips = std::move(found.skips);
+  report.skips.insert(report.skips.begin(), std::make_move_iterator(found.skips.begin()),
+                      std::make_move_iterator(found.skips.end()));
   if (view_score && rivals == 1) {
     report.skips.push_back({"views of the candidates", "geometry leaves one placement",
                             "no renders of the scene from rival placements"});
@@ -149,8 +163,8 @@ Result<RegistrationReport> register_clouds(const PointCloud& source_cloud,
   if (rivals > 1 && !report.decided_by_views) {
     report.ambiguous = true;
     add_words(report.ambiguity,
-              fmt::format("{} placements have {:.0f} % of the best one's evidence or more{}", rivals,
-                          100 * options.ambiguity_ratio,
+              fmt::format("{} placements have {:.0f} % of the best one's evidence or more{}",
+                          rivals, 100 * options.ambiguity_ratio,
                           view_score ? ", and views of both do not decide between them" : ""));
   }
   judged.erase(judged.begin() + static_cast<std::ptrdiff_t>(chosen));

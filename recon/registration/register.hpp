@@ -23,9 +23,11 @@ struct RegistrationOptions {
                                   ///< if hardly anything contradicts it and no rival comes near
   double ambiguity_ratio = 0.85;  ///< a distinct runner-up with this share of the evidence makes
                                   ///< the result ambiguous, and views decide, if there are any
-  bool use_features = true;     ///< the first initialiser: fast, and enough for most pairs
+  bool use_features = true;       ///< the first initialiser: fast, and enough for most pairs
   bool use_grid = true;         ///< the second: rotations x scales, where the first is not decisive
   bool filter_outliers = true;  ///< by neighbour distance, only where two populations are seen
+  bool estimate_warp = true;    ///< beside the similarity, where the residuals show one: fields of
+                                ///< two modalities are bent, and the largest bent patch would pull
   int restarts = 3;             ///< refinements from disturbed starts, for the spread
   std::uint32_t seed = 1;
 
@@ -51,8 +53,10 @@ struct RegistrationReport {
   double rmse_percent_of_diameter = 0;
   double overlap_source = 0, overlap_target = 0;  ///< share of each cloud near the other
   double spread_rotation_deg = 0, spread_scale_percent = 0, spread_translation_percent = 0;
-  bool decided_by_views = false;  ///< between placements that geometry leaves open
-  double view_score = 0;          ///< of the result, where views were asked
+  double warp_percent_of_diameter = 0;  ///< root mean square of the smooth warp found beside the
+                                        ///< similarity and left out of it; 0: none shows
+  bool decided_by_views = false;        ///< between placements that geometry leaves open
+  double view_score = 0;                ///< of the result, where views were asked
   bool ambiguous = false;
   std::string ambiguity;                              ///< what geometry leaves open, in words
   std::vector<RegistrationAlternative> alternatives;  ///< best first, the result not included

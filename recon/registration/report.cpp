@@ -13,6 +13,8 @@ std::string RegistrationReport::brief() const {
       score, evidence, initialiser, 100 * overlap_source, 100 * overlap_target,
       rmse_percent_of_diameter, target_from_source.scale, spread_rotation_deg,
       spread_scale_percent);
+  if (warp_percent_of_diameter > 0)
+    text += fmt::format("; smooth warp of {:.2f} % left out", warp_percent_of_diameter);
   if (ambiguous) text += "; AMBIGUOUS: " + ambiguity;
   return text;
 }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "recon/poses/heat_check.hpp"
 #include "recon/poses/orbit_rescue.hpp"
@@ -127,6 +128,23 @@ TEST(CorrectByHeat, AViewOnTheWrongRibGoesHomeAndTheOthersStay) {
   EXPECT_EQ(check->undecided, 0);
   for (int i = 0; i < 12; ++i)
     EXPECT_LT(off_deg(alignment.views[static_cast<std::size_t>(i)], at(30 * i)), 1.0) << i;
+}
+
+TEST(CorrectByHeat, OnlyTemperaturesThatFindAViewMoveIt) {
+  // Found there: it goes, with form or without.
+  EXPECT_EQ(verdict({true, 0.8, 0.9, 1.0}), HeatVerdict::both);
+  EXPECT_EQ(verdict({false, 0.8, 0.3, 1.0}), HeatVerdict::heat_alone);
+  // Weakly, but form likes it better there too.
+  EXPECT_EQ(verdict({true, 0.3, 0.9, 0.5}), HeatVerdict::both);
+  // Found nowhere; that both scenes agree on a place where neither knows it says nothing.
+  EXPECT_EQ(verdict({true, 0.03, 0.2, 0.7}), HeatVerdict::form_alone);
+  EXPECT_EQ(verdict({false, 0.03, 0.2, 0.7}), HeatVerdict::form_alone);
+  // Half found elsewhere, or known to neither: nobody's word.
+  EXPECT_EQ(verdict({false, 0.55, 0.2, 0.7}), HeatVerdict::doubt);
+  EXPECT_EQ(verdict({false, 0.1, 0.2, 0.4}), HeatVerdict::doubt);
+  EXPECT_EQ(verdict({}), HeatVerdict::doubt);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(verdict({false, nan, nan, nan}), HeatVerdict::doubt);
 }
 
 TEST(CorrectByHeat, WhereMostAreContradictedNoneGoes) {

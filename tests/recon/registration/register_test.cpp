@@ -56,6 +56,7 @@ TEST(Register, SameSeedSameAnswerForAnyThreadCount) {
 TEST(Register, SecondInitialiserIsSkippedWhenTheFirstIsDecisive) {
   const bench::CloudPair pair = indoor_pair(6);
   RegistrationOptions options;
+  options.estimate_warp = false;  // has a skip of its own
   const auto quick = register_clouds(pair.source, pair.target, options, {});
   ASSERT_TRUE(quick);
   ASSERT_EQ(quick->skips.size(), 1u);

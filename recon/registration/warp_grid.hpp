@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "recon/registration/similarity.hpp"
+
+namespace orbitfuse::registration {
+
+/// A displacement field on the corners of a cubic grid, trilinear between them. Only cells with
+/// enough points have corners: elsewhere there is no displacement, and nothing to solve for.
+class WarpGrid {
+ public:
+  static constexpr int kCorners = 8;
+  struct Place {
+    int cell = -1;  ///< -1: outside
+    std::array<double, kCorners> weights;
+  };
+
+  /// The spacing grows until there are no more than `most_nodes` corners.
+  WarpGrid(const Points& points, double spacing, int fewest_points, std::size_t most_nodes);
+
+  Place place(const Eigen::Vector3d& x) const;
+  /// Corners of a cell, in the order of Place::weights: indices of nodes.
+  const std::array<int, kCorners>& corners(int cell) const {
+    return cells_[static_cast<std::size_t>(cell)];
+  }
+  std::size_t cell_count() const { return cells_.size(); }
+  const Points& nodes() const { return nodes_; }
+  double spacing() const { return spacing_; }
+
+  Eigen::Vector3d displacement(const Place& place) const;
+  Eigen::Vector3d operator()(const Eigen::Vector3d& x) const { return displacement(place(x)); }
+  void displace(const Eigen::VectorXd& by_node);  ///< x, y, z of each node in turn
+
+ private:
+  void build(const Points& points, int fewest_points);
+
+  double spacing_;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+  Eigen::Array3i count_ = Eigen::Array3i::Zero();  ///< cells a side
+  std::vector<int> cell_at_;                       ///< -1 where there are too few points
+  std::vector<std::array<int, kCorners>> cells_;
+  Points nodes_, displacements_;
+};
+
+}  // namespace orbitfuse::registration
