@@ -133,6 +133,8 @@ Status run(const Arguments& a) {
   ORBITFUSE_ASSIGN(const bench::TestError error, bench::test_error(field, data));
   fmt::print("full resolution: {:.2f} dB", error.psnr_db);
   if (data.modality == Modality::thermal) fmt::print(", MAE {:.3f} K", error.mae_k);
+  ORBITFUSE_ASSIGN(const auto metrics, bench::table_metrics(field, data));
+  for (const auto& [metric, value] : metrics) fmt::print(", {} {:.4g}", metric, value);
   fmt::print("\n");
   return a.images.empty() ? Status{} : bench::write_pictures(field, data, a.images);
 }
