@@ -116,6 +116,7 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   pipeline::Stage stage;
   stage.name = "poses_" + std::string(name(modality));
   if (!visible) {
+    stage.version = 2;
     stage.uses = {"poses_visible"};
     // Thermal views are aligned with renders of the visible field; known poses need none.
     if (!in.config->poses.use_known_poses || !all_posed(in.session->session)) stage.uses.push_back("train_visible");

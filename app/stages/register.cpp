@@ -130,6 +130,7 @@ Result<StageOutput> register_fields(const StageContext& context, const SessionIn
 pipeline::Stage register_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "register";
+  stage.version = 2;
   stage.needs = {"poses_visible", "poses_thermal", "train_visible", "train_thermal"};
   stage.options = {{"seed", in.config->seed}};
   stage.run = [in](const StageContext& context) {

@@ -6,16 +6,16 @@
 
 namespace orbitfuse::stages {
 
-Result<double> add_thermal_depth(nerf::Dataset& data, int width_px, int holdout_every, std::uint64_t seed,
-                                 const Progress& progress) {
-  const std::vector<bool> heldout = nerf::heldout_views(data, holdout_every);
-  const nerf::ValueSpan span = nerf::estimate_span(data);
+Result<ThermalDepth> add_thermal_depth(nerf::Dataset& data, int width_px, int holdout_every,
+                                       std::uint64_t seed, const Progress& progress) {
+  const std::vector<bool> left_out = nerf::left_out_views(data, holdout_every);
+  const nerf::ValueSpan span = nerf::estimate_span(nerf::training_part(data, left_out));
   const double per_level = (span.high - span.low) / 255;
   Reconstruction model;
   std::vector<cv::Mat> images;
   std::vector<int> index;
   for (std::size_t i = 0; i < data.views.size(); ++i) {
-    if (heldout[i]) continue;
+    if (left_out[i]) continue;
     const nerf::TrainingView& view = data.views[i];
     cv::Mat levels;
     view.image.convertTo(levels, CV_8U, 1 / per_level, -span.low / per_level);
@@ -27,13 +27,14 @@ Result<double> add_thermal_depth(nerf::Dataset& data, int width_px, int holdout_
   options.width_px = width_px;
   options.seed = seed;
   auto found = depth::dense_depth(model, images, options, progress);
-  if (!found && found.error().kind == ErrorKind::quality) return 0.0;
+  if (!found && found.error().kind != ErrorKind::cancelled)
+    return ThermalDepth{0, found.error().message()};
   if (!found) return tl::unexpected(found.error());
   for (DepthMap& map : found->maps) {
     map.view = index[static_cast<std::size_t>(map.view)];
     data.depth.push_back(std::move(map));
   }
-  return found->report.known;
+  return ThermalDepth{found->report.known, {}};
 }
 
 }  // namespace orbitfuse::stages

@@ -1,15 +1,23 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <string>
+
 #include "core/progress.hpp"
 #include "recon/nerf/dataset.hpp"
 
 namespace orbitfuse::stages {
 
-/// Adds depth of thermal views that lend each other none through a visible field: matched at a small width,
-/// where neither noise nor the blur of heat is left (docs/benchmarks/nerf.md). Every `holdout_every`-th view
-/// (0: none) takes no part. Returns the share of pixels whose depth another view confirms; 0 without parallax.
-Result<double> add_thermal_depth(nerf::Dataset& data, int width_px, int holdout_every, std::uint64_t seed,
-                                 const Progress& progress);
+struct ThermalDepth {
+  double known = 0;     ///< share of the pixels whose depth another view confirms
+  std::string problem;  ///< why there is none; empty otherwise
+};
+
+/// Adds depth to a thermal dataset that no visible field lends its geometry: matched between its
+/// own training views at a small width, where noise is averaged out (docs/benchmarks/nerf.md).
+/// Views that train() drops or measures (`holdout_every`) take no part. Depth is a help that
+/// training can do without: what prevents it is told in ThermalDepth::problem. Errors: cancelled.
+Result<ThermalDepth> add_thermal_depth(nerf::Dataset& data, int width_px, int holdout_every,
+                                       std::uint64_t seed, const Progress& progress);
 
 }  // namespace orbitfuse::stages

@@ -54,10 +54,12 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
                               "the thermal field learns its own density"});
     }
   }
-  double own_depth = 0;
+  ThermalDepth own_depth;
   if (modality == Modality::thermal && guide.empty() && config.depth_width_px > 0 && options.depth_weight > 0) {
     ORBITFUSE_ASSIGN(own_depth, add_thermal_depth(data, config.depth_width_px, options.holdout_every, options.seed,
                                                   context.progress));
+    if (!own_depth.problem.empty())
+      output.skips.push_back({"depth of the thermal views", own_depth.problem, "the field learns from images alone"});
   }
   options.checkpoint = context.folder / "checkpoint.bin";
   options.resume = true;  // where there is a checkpoint: of an interrupted attempt, or to extend
@@ -92,7 +94,7 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
     output.warnings.push_back(fmt::format("{} training steps dropped: a gradient was not finite",
                                           report.skipped_steps));
   output.metrics = metrics_json(report);
-  if (own_depth > 0) output.metrics["own_depth_known"] = own_depth;
+  if (own_depth.known > 0) output.metrics["own_depth_known"] = own_depth.known;
   output.metrics["cloud_points"] = cloud ? cloud->size() : 0;
   output.metrics["width_px"] = data.views.empty() ? 0 : data.views[0].camera.width;
   return output;
@@ -105,6 +107,7 @@ pipeline::Stage train_stage(const StageInputs& in, Modality modality) {
   const bool visible = modality == Modality::visible;
   pipeline::Stage stage;
   stage.name = "train_" + modality_name;
+  stage.version = 2;
   stage.needs = {"poses_" + modality_name};
   stage.uses = {visible ? "depth" : "train_visible"};
   stage.options = in.config->settings().to_json("train." + modality_name);

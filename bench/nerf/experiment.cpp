@@ -108,7 +108,7 @@ Result<double> add_depth(nerf::Dataset& data, const depth::DepthOptions& options
   Reconstruction model;
   std::vector<cv::Mat> images;
   std::vector<int> index;
-  const nerf::ValueSpan span = nerf::estimate_span(data);
+  const nerf::ValueSpan span = nerf::estimate_span(nerf::training_part(data, nerf::left_out_views(data, 0)));
   for (std::size_t i = 0; i < data.views.size(); ++i) {
     const nerf::TrainingView& view = data.views[i];
     if (view.measure_only) continue;

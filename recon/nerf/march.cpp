@@ -4,6 +4,7 @@
 #include <immintrin.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -55,7 +56,8 @@ struct alignas(32) Lanes {
       inverse[d][lane] = 1.0f / (std::abs(along) > 1e-9f ? along : std::copysign(1e-9f, along));
       const float gap = std::abs(o) - far_edge;
       if (gap <= 0 && std::isfinite(along)) continue;
-      // A camera outside all cascades first advances to the largest cube. (NaN gets here, and ends.)
+      // A camera outside all cascades first advances to the largest cube. (NaN gets here, and
+      // ends.)
       if (!(o * along < 0)) far[lane] = 0;
       t[lane] = std::max(t[lane], gap * std::abs(inverse[d][lane]) * 1.0001f);
     }
@@ -68,7 +70,8 @@ void store(std::int32_t* out, __m256i v) { _mm256_store_si256(reinterpret_cast<_
 /// 32-bit words of a little-endian array, zero in the other lanes.
 template <typename T>
 __m256i gather(const std::vector<T>& words, __m256i index, __m256i lanes) {
-  return _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), reinterpret_cast<const int*>(words.data()), index, lanes, 4);
+  return _mm256_mask_i32gather_epi32(_mm256_setzero_si256(),
+                                     reinterpret_cast<const int*>(words.data()), index, lanes, 4);
 }
 __m256i bit_of(const std::vector<std::uint64_t>& words, __m256i index) {
   const __m256i word = gather(words, _mm256_srli_epi32(index, 5), _mm256_set1_epi32(-1));
@@ -83,32 +86,38 @@ struct Walk {
     std::int32_t code[march_lanes];  ///< of what is on; -1: off
   };
   int count = 0;
-  std::vector<Turn> turns = std::vector<Turn>(8 * max_segments);
+  std::vector<Turn> turns = std::vector<Turn>(512);  ///< grows to what rays need
 };
 
-/// Crosses blocks cell by cell, empty and plain ones in one step. Reads only what lies in the L1 cache: the next
-/// step waits for it.
+/// Crosses blocks cell by cell, empty and plain ones in one step. Reads only what lies in the L1
+/// cache: the next step waits for it.
 void walk_through(const Occupancy& grid, const Lanes& lanes, Walk& walk) {
   const __m256 half_resolution = _mm256_set1_ps(0.5f * static_cast<float>(grid.resolution));
   const __m256 cell_per_cube = _mm256_set1_ps(grid.cell_size(0));
-  const __m256i top = _mm256_set1_epi32(grid.resolution - 1), blocks = _mm256_set1_epi32(grid.resolution / 4);
+  const __m256i top = _mm256_set1_epi32(grid.resolution - 1),
+                blocks = _mm256_set1_epi32(grid.resolution / 4);
   const __m256i three = _mm256_set1_epi32(3), bias = _mm256_set1_epi32(127);
   const __m256 far = _mm256_load_ps(lanes.far), sign = _mm256_set1_ps(-0.0f);
   __m256 t = _mm256_load_ps(lanes.t);
   walk.count = 0;
-  for (std::size_t steps = 0; steps < walk.turns.size(); ++steps) {
+  for (int step_count = 0; step_count < 8 * max_segments; ++step_count) {
     __m256 x[3];
     for (int d = 0; d < 3; ++d)
-      x[d] = _mm256_add_ps(_mm256_load_ps(lanes.origin[d]), _mm256_mul_ps(t, _mm256_load_ps(lanes.direction[d])));
+      x[d] = _mm256_add_ps(_mm256_load_ps(lanes.origin[d]),
+                           _mm256_mul_ps(t, _mm256_load_ps(lanes.direction[d])));
     // The smallest cube that holds the point, as Occupancy::cascade_of.
-    const __m256 outwards = _mm256_max_ps(_mm256_max_ps(_mm256_andnot_ps(sign, x[0]), _mm256_andnot_ps(sign, x[1])),
-                                          _mm256_andnot_ps(sign, x[2]));
+    const __m256 outwards =
+        _mm256_max_ps(_mm256_max_ps(_mm256_andnot_ps(sign, x[0]), _mm256_andnot_ps(sign, x[1])),
+                      _mm256_andnot_ps(sign, x[2]));
     const __m256i exponent = _mm256_srli_epi32(_mm256_castps_si256(outwards), 23);
-    const __m256i cascade = _mm256_max_epi32(_mm256_sub_epi32(exponent, _mm256_set1_epi32(126)), _mm256_setzero_si256());
-    const __m256 inside = _mm256_castsi256_ps(_mm256_cmpgt_epi32(_mm256_set1_epi32(grid.cascades), cascade));
+    const __m256i cascade = _mm256_max_epi32(_mm256_sub_epi32(exponent, _mm256_set1_epi32(126)),
+                                             _mm256_setzero_si256());
+    const __m256 inside =
+        _mm256_castsi256_ps(_mm256_cmpgt_epi32(_mm256_set1_epi32(grid.cascades), cascade));
     const __m256 live = _mm256_and_ps(_mm256_cmp_ps(t, far, _CMP_LT_OQ), inside);
     if (_mm256_testz_ps(live, live)) return;
-    const __m256i level = _mm256_and_si256(cascade, _mm256_castps_si256(live));  // others must read something, too
+    const __m256i level =
+        _mm256_and_si256(cascade, _mm256_castps_si256(live));  // others must read something, too
     const __m256 size = _mm256_mul_ps(
         cell_per_cube, _mm256_castsi256_ps(_mm256_slli_epi32(_mm256_add_epi32(level, bias), 23)));
     const __m256 scale = _mm256_mul_ps(
@@ -116,8 +125,10 @@ void walk_through(const Occupancy& grid, const Lanes& lanes, Walk& walk) {
     __m256i block = level, cell = _mm256_setzero_si256();
     for (int d = 2; d >= 0; --d) {
       const __m256i i = _mm256_min_epi32(
-          _mm256_max_epi32(_mm256_cvttps_epi32(_mm256_add_ps(_mm256_mul_ps(x[d], scale), half_resolution)),
-                           _mm256_setzero_si256()), top);
+          _mm256_max_epi32(
+              _mm256_cvttps_epi32(_mm256_add_ps(_mm256_mul_ps(x[d], scale), half_resolution)),
+              _mm256_setzero_si256()),
+          top);
       block = _mm256_add_epi32(_mm256_mullo_epi32(block, blocks), _mm256_srli_epi32(i, 2));
       cell = _mm256_or_si256(_mm256_slli_epi32(cell, 2), _mm256_and_si256(i, three));
     }
@@ -128,14 +139,19 @@ void walk_through(const Occupancy& grid, const Lanes& lanes, Walk& walk) {
     __m256 exit = _mm256_set1_ps(std::numeric_limits<float>::max());
     for (int d = 0; d < 3; ++d) {
       const __m256 inverse = _mm256_load_ps(lanes.inverse[d]);
-      const __m256 forward = _mm256_and_ps(_mm256_cmp_ps(inverse, _mm256_setzero_ps(), _CMP_GT_OQ), _mm256_set1_ps(1));
-      const __m256 edge = _mm256_mul_ps(_mm256_add_ps(_mm256_floor_ps(_mm256_mul_ps(x[d], per_step)), forward), step);
+      const __m256 forward =
+          _mm256_and_ps(_mm256_cmp_ps(inverse, _mm256_setzero_ps(), _CMP_GT_OQ), _mm256_set1_ps(1));
+      const __m256 edge = _mm256_mul_ps(
+          _mm256_add_ps(_mm256_floor_ps(_mm256_mul_ps(x[d], per_step)), forward), step);
       exit = _mm256_min_ps(exit, _mm256_mul_ps(_mm256_sub_ps(edge, x[d]), inverse));
     }
     // Across the border in spite of rounding.
-    exit = _mm256_add_ps(_mm256_max_ps(exit, _mm256_setzero_ps()), _mm256_mul_ps(size, _mm256_set1_ps(1e-3f)));
+    exit = _mm256_add_ps(_mm256_max_ps(exit, _mm256_setzero_ps()),
+                         _mm256_mul_ps(size, _mm256_set1_ps(1e-3f)));
     const __m256i matter = _mm256_and_si256(any, _mm256_castps_si256(live));
     if (!_mm256_testz_si256(matter, matter)) {
+      if (walk.count == static_cast<int>(walk.turns.size()))
+        walk.turns.resize(2 * walk.turns.size());
       Walk::Turn& turn = walk.turns[static_cast<std::size_t>(walk.count++)];
       _mm256_store_ps(turn.begin, t);
       _mm256_store_ps(turn.length, exit);
@@ -166,11 +182,13 @@ void collect(const Walk& walk, int lane, Segments& out) {
   for (int k = 0; k < walk.count && out.count < max_segments; ++k) {
     const Walk::Turn& turn = walk.turns[static_cast<std::size_t>(k)];
     if (turn.code[lane] >= 0)
-      out.add(turn.begin[lane], turn.length[lane], turn.length[lane] / turn.size[lane], turn.code[lane]);
+      out.add(turn.begin[lane], turn.length[lane], turn.length[lane] / turn.size[lane],
+              turn.code[lane]);
   }
 }
 
-void place_samples(const Segments& found, const MarchSettings& settings, float jitter, Marched& out) {
+void place_samples(const Segments& found, const MarchSettings& settings, float jitter,
+                   Marched& out) {
   const Segment* segments = found.list;
   const int cells = found.count;
   out.count = 0;
@@ -183,7 +201,8 @@ void place_samples(const Segments& found, const MarchSettings& settings, float j
   const float for_surface = static_cast<float>(settings.surface) * std::min(1.0f, surface);
   const float for_haze = std::clamp(haze, 2.0f, std::max(2.0f, static_cast<float>(settings.haze)));
   const int count = std::min(max_ray_samples, static_cast<int>(std::ceil(for_surface + for_haze)));
-  const float surface_share = surface > 0 ? for_surface / surface : 0.0f, haze_share = for_haze / haze;
+  const float surface_share = surface > 0 ? for_surface / surface : 0.0f,
+              haze_share = for_haze / haze;
 
   // Inverse transform sampling: `mass` runs to for_surface + for_haze in steps of one sample.
   const float per_sample = (for_surface + for_haze) / static_cast<float>(count);
@@ -216,8 +235,9 @@ void place_samples(const Segments& found, const MarchSettings& settings, float j
 
 }  // namespace
 
-void march(const Occupancy& occupancy, const MarchSettings& settings, const DrawnRay* rays, int count,
-           Marched* out) {
+void march(const Occupancy& occupancy, const MarchSettings& settings, const DrawnRay* rays,
+           int count, Marched* out) {
+  assert(count >= 0 && count <= march_lanes);
   thread_local Walk walk;
   thread_local Segments segments;
   Lanes lanes;

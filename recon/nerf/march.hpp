@@ -11,7 +11,7 @@ namespace orbitfuse::nerf {
 /// How many samples a ray gets: `surface` of them where surfaces are expected, and one per
 /// occupied cell, up to `haze`, over everything that is not known to be empty.
 struct MarchSettings {
-  float near = 0.1f;   ///< normalised units
+  float near = 0.1f;  ///< normalised units
   int surface = 16;
   int haze = 24;
 };
@@ -31,10 +31,10 @@ struct Marched {
   float t[max_ray_samples], dt[max_ray_samples];
 };
 
-/// Samples of up to march_lanes rays, which cross the cells side by side: one ray's next cell depends on its
-/// last, so that a single one mostly waits. The cells' densities are the proposal distribution; no network is
-/// asked where to look. Rays don't influence each other.
-void march(const Occupancy& occupancy, const MarchSettings& settings, const DrawnRay* rays, int count,
-           Marched* out);
+/// Samples of up to march_lanes rays, which cross the cells side by side: one ray's next cell
+/// depends on its last, so that a single one mostly waits. The cells' densities are the proposal
+/// distribution; no network is asked where to look. Rays don't influence each other.
+void march(const Occupancy& occupancy, const MarchSettings& settings, const DrawnRay* rays,
+           int count, Marched* out);
 
 }  // namespace orbitfuse::nerf

@@ -66,6 +66,26 @@ std::vector<bool> heldout_views(const Dataset& dataset, int holdout_every) {
   return heldout;
 }
 
+double invalid_share(const cv::Mat& image) {
+  return 1 - cv::countNonZero(image == image) / static_cast<double>(image.total());
+}
+
+std::vector<bool> broken_views(const Dataset& dataset) {
+  std::vector<bool> broken;
+  for (const TrainingView& view : dataset.views)
+    broken.push_back(dataset.modality == Modality::thermal && invalid_share(view.image) > 0.5);
+  return broken;
+}
+
+std::vector<bool> left_out_views(const Dataset& given, int holdout_every) {
+  std::vector<bool> out = broken_views(given);
+  const std::vector<bool> heldout = heldout_views(training_part(given, out), holdout_every);
+  auto next = heldout.begin();
+  for (std::size_t i = 0; i < out.size(); ++i)
+    if (!out[i]) out[i] = *next++;
+  return out;
+}
+
 Dataset training_part(const Dataset& dataset, const std::vector<bool>& heldout) {
   Dataset part;
   part.modality = dataset.modality;

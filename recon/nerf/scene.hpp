@@ -30,6 +30,14 @@ struct SceneView {
 /// Views that don't train: those marked so, and every n-th of the others (0 = none).
 std::vector<bool> heldout_views(const Dataset& dataset, int holdout_every);
 
+/// Thermal views of which more than half is no temperature: a broken transfer, a shutter in the way.
+std::vector<bool> broken_views(const Dataset& dataset);
+/// Share of an image's pixels that hold no value.
+double invalid_share(const cv::Mat& image);
+
+/// Of the views given to train(): the broken ones, and of the others those that don't train.
+std::vector<bool> left_out_views(const Dataset& given, int holdout_every);
+
 /// What training may know: the dataset without held-out views, their depth maps and the points that
 /// only they saw. Images are shared, not copied.
 Dataset training_part(const Dataset& dataset, const std::vector<bool>& heldout);

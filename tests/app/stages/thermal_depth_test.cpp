@@ -31,9 +31,10 @@ nerf::Dataset warm_floor(const depth::test::World& world) {
 TEST(ThermalDepth, IsFoundInNoisyTemperaturesOfTheViewsThatTrain) {
   const depth::test::World world = depth::test::arc(5, 15);
   nerf::Dataset data = warm_floor(world);
-  const auto known = add_thermal_depth(data, 120, 4, 1, {});  // views 0 and 4 measure
-  ASSERT_TRUE(known) << known.error().message();
-  EXPECT_GT(*known, 0.4);
+  const auto found = add_thermal_depth(data, 120, 4, 1, {});  // views 0 and 4 measure
+  ASSERT_TRUE(found) << found.error().message();
+  EXPECT_GT(found->known, 0.4);
+  EXPECT_EQ(found->problem, "");
   ASSERT_EQ(data.depth.size(), 3u);
   EXPECT_TRUE(data.validate());
   double good = 0, all = 0;
@@ -45,7 +46,9 @@ TEST(ThermalDepth, IsFoundInNoisyTemperaturesOfTheViewsThatTrain) {
         const float z = map.depth.at<float>(y, x);
         if (!std::isfinite(z)) continue;
         ++all;
-        good += std::abs(z / truth.at<float>(y * truth.rows / map.depth.rows, x * truth.cols / map.depth.cols) - 1) < 0.03;
+        good += std::abs(z / truth.at<float>(y * truth.rows / map.depth.rows,
+                                             x * truth.cols / map.depth.cols) -
+                         1) < 0.03;
       }
   }
   EXPECT_GT(good / all, 0.9);
@@ -55,10 +58,31 @@ TEST(ThermalDepth, WithoutParallaxThereIsNoneAndTrainingGoesOn) {
   depth::test::World world = depth::test::arc(3, 15);
   nerf::Dataset data = warm_floor(world);
   for (nerf::TrainingView& view : data.views) view.cam_from_world = data.views[0].cam_from_world;
-  const auto known = add_thermal_depth(data, 120, 0, 1, {});
-  ASSERT_TRUE(known) << known.error().message();
-  EXPECT_EQ(*known, 0);
+  const auto found = add_thermal_depth(data, 120, 0, 1, {});
+  ASSERT_TRUE(found) << found.error().message();
+  EXPECT_EQ(found->known, 0);
+  EXPECT_NE(found->problem, "");
   EXPECT_FALSE(data.has_dense_depth());
+}
+
+TEST(ThermalDepth, IsNotMatchedInViewsThatTrainingDropsOrMeasures) {
+  const depth::test::World world = depth::test::arc(9, 8);
+  nerf::Dataset data = warm_floor(world);
+  data.views[1].image.setTo(std::numeric_limits<float>::quiet_NaN());
+  const auto found = add_thermal_depth(data, 64, 4, 1,
+                                       {});  // of the eight others, the first and the fifth measure
+  ASSERT_TRUE(found) << found.error().message();
+  std::vector<int> views;
+  for (const DepthMap& map : data.depth) views.push_back(map.view);
+  EXPECT_EQ(views, (std::vector<int>{2, 3, 4, 6, 7, 8}));
+}
+
+TEST(ThermalDepth, ImagesTooSmallToMatchAreNoError) {
+  nerf::Dataset data = warm_floor(depth::test::arc(3, 15));
+  for (nerf::TrainingView& view : data.views) view = nerf::resized(view, 16, 12);
+  const auto found = add_thermal_depth(data, 260, 0, 1, {});
+  ASSERT_TRUE(found) << found.error().message();
+  EXPECT_NE(found->problem, "");
 }
 
 }  // namespace

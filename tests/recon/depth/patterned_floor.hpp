@@ -20,7 +20,8 @@ struct World {
 inline double pattern(const Eigen::Vector3d& p) {
   double v = 0;
   for (int i = 1; i <= 4; ++i)
-    v += std::sin((7 + 5 * i) * p.x() + 3 * i) * std::cos((6 + 4 * i) * p.y() + 2 * i + (9 + i) * p.z());
+    v += std::sin((7 + 5 * i) * p.x() + 3 * i) *
+         std::cos((6 + 4 * i) * p.y() + 2 * i + (9 + i) * p.z());
   return 128 + 28 * v;
 }
 
@@ -44,7 +45,8 @@ inline World arc(int views, double step_deg, double scale = 1, int width = 160, 
       for (int x = 0; x < width; ++x) {
         const Eigen::Vector3d d = axes * view.camera.ray_of({x + 0.5, y + 0.5});
         const double t = -eye.z() / d.z();
-        image.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(pattern((eye + t * d) / scale));
+        image.at<std::uint8_t>(y, x) =
+            cv::saturate_cast<std::uint8_t>(pattern((eye + t * d) / scale));
         depth.at<float>(y, x) = static_cast<float>(t);  // the ray's z is 1
       }
     world.images.push_back(image);
