@@ -43,7 +43,7 @@ std::string svg_of(const std::vector<Run>& runs) {
   std::string text = fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" font-family=\"sans-serif\" font-size=\"12\">\n"
       "<rect width=\"{0}\" height=\"{1}\" fill=\"white\"/>\n"
-      "<text x=\"{2}\" y=\"20\">test views, dB, against CPU seconds (depth and guide included); {3}</text>\n",
+      "<text x=\"{2}\" y=\"20\">test views, dB, against CPU seconds (what comes before included); {3}</text>\n",
       width, height, left, cpu_description());
   for (double db = low; db <= high; db += std::max(1.0, std::ceil((high - low) / 10)))
     text += fmt::format("<text x=\"10\" y=\"{0:.0f}\">{1:.0f}</text><line x1=\"{2}\" x2=\"{3}\" y1=\"{0:.0f}\" y2=\"{0:.0f}\" stroke=\"#ddd\"/>\n",

@@ -113,7 +113,7 @@ Status run(const Arguments& a) {
   for (const auto& view : data.views) true_poses.push_back(view.cam_from_world);
   if (a.pose_error_deg > 0) perturb_poses(data, a.pose_error_deg);
   if (a.exposure > 0) vary_exposure(data, a.exposure);
-  bench::Run result{options.preset, 0, {}};
+  bench::Run result{options.preset + (a.guide.empty() ? "" : ", without its guide's time"), 0, {}};
   if (a.depth) {
     ORBITFUSE_ASSIGN(result.before_cpu_s, bench::add_depth(data, a.depth_options));
   }
