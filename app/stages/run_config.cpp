@@ -179,6 +179,8 @@ Status RunConfig::validate() const {
       return fail(ErrorKind::usage, table + ".max_width_px", std::to_string(train->max_width_px),
                   "must be at least 16");
   }
+  if (const int width = train_thermal.depth_width_px; width != 0 && (width < 32 || width > 8192))
+    return fail(ErrorKind::usage, "train.thermal.depth_width_px", std::to_string(width), "choose 0 (none) or 32..8192");
   ORBITFUSE_TRY(render.path.validate());
   ORBITFUSE_TRY(render.quality.validate());
   ORBITFUSE_TRY(palette(render.palette));
@@ -196,6 +198,8 @@ Settings RunConfig::settings() {
   add_depth(settings, depth);
   add_train(settings, "train.visible", train_visible);
   add_train(settings, "train.thermal", train_thermal);
+  settings.add("train.thermal.depth_width_px", train_thermal.depth_width_px,
+               "Depth maps matched in thermal views where no visible field gives the geometry; 0: none");
   add_render(settings, render);
   add_fuse(settings, fuse);
   return settings;

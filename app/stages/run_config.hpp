@@ -20,6 +20,9 @@ struct TrainConfig {
   nerf::TrainOptions options;
   int max_width_px = 400;  ///< training images; wider ones suit temperatures, these poses (run.md)
   nerf::ExportOptions cloud;
+  /// Depth maps of the thermal views themselves, where no visible field gives the geometry; 0 = none.
+  /// Wider ones match noise (nerf.md).
+  int depth_width_px = 260;
 };
 
 struct RenderConfig {

@@ -3,6 +3,7 @@
 
 #include "app/stages/artifacts.hpp"
 #include "app/stages/stage_list.hpp"
+#include "app/stages/thermal_depth.hpp"
 #include "app/stages/train_extension.hpp"
 #include "app/stages/training_data.hpp"
 #include "core/ply.hpp"
@@ -53,6 +54,11 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
                               "the thermal field learns its own density"});
     }
   }
+  double own_depth = 0;
+  if (modality == Modality::thermal && guide.empty() && config.depth_width_px > 0 && options.depth_weight > 0) {
+    ORBITFUSE_ASSIGN(own_depth, add_thermal_depth(data, config.depth_width_px, options.holdout_every, options.seed,
+                                                  context.progress));
+  }
   options.checkpoint = context.folder / "checkpoint.bin";
   options.resume = true;  // where there is a checkpoint: of an interrupted attempt, or to extend
   if (!std::filesystem::exists(options.checkpoint)) {
@@ -86,6 +92,7 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
     output.warnings.push_back(fmt::format("{} training steps dropped: a gradient was not finite",
                                           report.skipped_steps));
   output.metrics = metrics_json(report);
+  if (own_depth > 0) output.metrics["own_depth_known"] = own_depth;
   output.metrics["cloud_points"] = cloud ? cloud->size() : 0;
   output.metrics["width_px"] = data.views.empty() ? 0 : data.views[0].camera.width;
   return output;

@@ -9,6 +9,7 @@
 
 #include "core/image_io.hpp"
 #include "fusion/metrics/metrics.hpp"
+#include "recon/nerf/scene.hpp"
 
 namespace orbitfuse::bench {
 namespace {
@@ -107,10 +108,11 @@ Result<double> add_depth(nerf::Dataset& data, const depth::DepthOptions& options
   Reconstruction model;
   std::vector<cv::Mat> images;
   std::vector<int> index;
+  const nerf::ValueSpan span = nerf::estimate_span(data);
   for (std::size_t i = 0; i < data.views.size(); ++i) {
     const nerf::TrainingView& view = data.views[i];
     if (view.measure_only) continue;
-    images.push_back(bytes_of(view.image, {}));  // R, G, B order: only its gray matters
+    images.push_back(bytes_of(view.image, {span.low, span.high}));  // R, G, B order: only its gray matters
     model.views.push_back({view.name, view.camera, view.cam_from_world});
     index.push_back(static_cast<int>(i));
   }

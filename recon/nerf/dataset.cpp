@@ -58,14 +58,13 @@ Status Dataset::validate() const {
   return {};
 }
 
-bool Dataset::has_dense_depth() const {
-  constexpr double least = 0.1;  // share of the pixels; below it maps are like sparse points
+double Dataset::known_depth() const {
   std::int64_t known = 0, all = 0;
   for (const DepthMap& map : depth) {
     known += cv::countNonZero(map.depth == map.depth);
     all += static_cast<std::int64_t>(map.depth.total());
   }
-  return all > 0 && static_cast<double>(known) > least * static_cast<double>(all);
+  return all > 0 ? static_cast<double>(known) / static_cast<double>(all) : 0;
 }
 
 cv::Mat rgb_of_bgr8(const cv::Mat& bgr8, cv::Size size) {

@@ -37,8 +37,9 @@ struct Dataset {
   std::vector<SparsePoint> points;  ///< optional; Observation::view indexes `views`
   std::vector<DepthMap> depth;      ///< optional; DepthMap::view indexes `views`
 
-  /// Depth maps know enough of the scene to say where it is empty.
-  bool has_dense_depth() const;
+  double known_depth() const;  ///< share of the depth maps' pixels
+  /// Depth maps know enough of the scene to say where it is empty; below this they are like sparse points.
+  bool has_dense_depth() const { return known_depth() > 0.1; }
   /// Names the view and the field that is malformed: sizes, types, cameras, poses, values.
   Status validate() const;
 };

@@ -7,7 +7,7 @@
 #include "core/modality.hpp"
 #include "recon/nerf/history.hpp"
 #include "recon/nerf/network.hpp"
-#include "recon/nerf/occupancy.hpp"
+#include "recon/nerf/march.hpp"
 #include "recon/nerf/options.hpp"
 #include "recon/nerf/pose_steps.hpp"
 #include "recon/nerf/scene.hpp"

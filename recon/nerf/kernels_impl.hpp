@@ -197,51 +197,87 @@ inline void encode_point2(const Corners& corners, int i, const std::uint16_t* ta
                 _mm_fmadd_ps(_mm_sub_ps(x1, sum), _mm_broadcast_ss(&corners.x[i]), sum));
 }
 
+/// Points are looked up in groups of 8: while one group's corners are read, the next one's are on their way
+/// from memory. A table that fits into the L2 cache with the others' gains nothing.
+constexpr unsigned long prefetched_from = 1ul << 19;  ///< bytes
+
+template <typename T>
+inline void prefetch(const Corners& corners, const T* table, int features) {
+  for (int c = 0; c < 8; ++c)
+    for (int i = 0; i < 8; ++i)
+      _mm_prefetch(reinterpret_cast<const char*>(table + static_cast<unsigned long>(features) * corners.entry[c][i]),
+                   _MM_HINT_T0);
+}
+
+/// visit(corners, begin, n) for each group in turn.
+template <typename T, typename Visit>
+inline void visit_groups(const GridLevel& level, const T* table, const float* position, int count,
+                         const Visit& visit) {
+  const bool ahead = level.entries * static_cast<unsigned long>(level.features) * sizeof(T) >= prefetched_from;
+  Corners corners[2];
+  const auto look_up = [&](int begin, Corners& group) {
+    const int n = count - begin < 8 ? count - begin : 8;
+    corners_of(level, position + 3l * begin, n, group);
+  };
+  if (ahead && count > 0) look_up(0, corners[0]);
+  int turn = 0;
+  for (int begin = 0; begin < count; begin += 8) {
+    if (!ahead) {
+      look_up(begin, corners[0]);
+    } else if (begin + 8 < count) {
+      look_up(begin + 8, corners[turn ^ 1]);
+      prefetch(corners[turn ^ 1], table, level.features);
+    }
+    visit(corners[turn], begin, count - begin < 8 ? count - begin : 8);
+    if (ahead) turn ^= 1;
+  }
+}
+
 inline void encode_grid(const GridLevel& level, const std::uint16_t* table, const float* position,
                         int count, float* out, int stride) {
-  Corners corners;
-  for (int begin = 0; begin < count; begin += 8) {
-    const int n = count - begin < 8 ? count - begin : 8;
-    corners_of(level, position + 3l * begin, n, corners);
+  visit_groups(level, table, position, count, [&](const Corners& corners, int begin, int n) {
     float* row = out + static_cast<long>(begin) * stride;
     if (level.features == 4)
       for (int i = 0; i < n; ++i) encode_point4(corners, i, table, row + static_cast<long>(i) * stride);
     else
       for (int i = 0; i < n; ++i) encode_point2(corners, i, table, row + static_cast<long>(i) * stride);
+  });
+}
+
+inline void scatter_point4(const Corners& corners, int i, __m128 d, float* grad) {
+  const __m128 d1 = _mm_mul_ps(d, _mm_broadcast_ss(&corners.x[i]));
+  const __m128 d0 = _mm_sub_ps(d, d1);
+  for (int c = 0; c < 4; ++c) {
+    const __m128 w = _mm_broadcast_ss(&corners.yz[c][i]);
+    float* g0 = grad + 4ul * corners.entry[2 * c][i];
+    _mm_storeu_ps(g0, _mm_fmadd_ps(d0, w, _mm_loadu_ps(g0)));
+    float* g1 = grad + 4ul * corners.entry[2 * c + 1][i];
+    _mm_storeu_ps(g1, _mm_fmadd_ps(d1, w, _mm_loadu_ps(g1)));
+  }
+}
+
+inline void scatter_point2(const Corners& corners, int i, __m128 d, float* grad) {
+  const __m128 d1 = _mm_mul_ps(d, _mm_broadcast_ss(&corners.x[i]));
+  const __m128 d0 = _mm_sub_ps(d, d1);
+  for (int c = 0; c < 8; ++c) {
+    float* g = grad + 2ul * corners.entry[c][i];
+    const __m128 old = _mm_castsi128_ps(_mm_loadl_epi64(reinterpret_cast<__m128i*>(g)));
+    _mm_storel_pi(reinterpret_cast<__m64*>(g),
+                  _mm_fmadd_ps(c & 1 ? d1 : d0, _mm_broadcast_ss(&corners.yz[c >> 1][i]), old));
   }
 }
 
 inline void scatter_grid(const GridLevel& level, float* grad, const float* position, int count,
                          const float* dfeatures) {
-  Corners corners;
-  for (int begin = 0; begin < count; begin += 8) {
-    const int n = count - begin < 8 ? count - begin : 8;
-    corners_of(level, position + 3l * begin, n, corners);
-    for (int i = 0; i < n; ++i) {
-      __m128 d;
-      if (level.features == 4)
-        d = _mm_loadu_ps(dfeatures + 4l * (begin + i));
-      else
-        d = _mm_castsi128_ps(
-            _mm_loadl_epi64(reinterpret_cast<const __m128i*>(dfeatures + 2l * (begin + i))));
-      const __m128 d1 = _mm_mul_ps(d, _mm_broadcast_ss(&corners.x[i]));
-      const __m128 d0 = _mm_sub_ps(d, d1);
-      for (int c = 0; c < 4; ++c) {
-        const __m128 w = _mm_broadcast_ss(&corners.yz[c][i]);
-        for (int x = 0; x < 2; ++x) {
-          const __m128 v = x ? d1 : d0;
-          if (level.features == 4) {
-            float* g = grad + 4ul * corners.entry[2 * c + x][i];
-            _mm_storeu_ps(g, _mm_fmadd_ps(v, w, _mm_loadu_ps(g)));
-          } else {
-            float* g = grad + 2ul * corners.entry[2 * c + x][i];
-            const __m128 old = _mm_castsi128_ps(_mm_loadl_epi64(reinterpret_cast<__m128i*>(g)));
-            _mm_storel_pi(reinterpret_cast<__m64*>(g), _mm_fmadd_ps(v, w, old));
-          }
-        }
-      }
-    }
-  }
+  visit_groups(level, grad, position, count, [&](const Corners& corners, int begin, int n) {
+    if (level.features == 4)
+      for (int i = 0; i < n; ++i) scatter_point4(corners, i, _mm_loadu_ps(dfeatures + 4l * (begin + i)), grad);
+    else
+      for (int i = 0; i < n; ++i)
+        scatter_point2(corners, i,
+                       _mm_castsi128_ps(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(dfeatures + 2l * (begin + i)))),
+                       grad);
+  });
 }
 
 // ---- optimiser -----------------------------------------------------------------------------

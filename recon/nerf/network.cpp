@@ -6,6 +6,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "core/memory.hpp"
 #include "recon/nerf/random.hpp"
 
 namespace orbitfuse::nerf {
@@ -23,10 +24,10 @@ std::uint16_t half_of(float value) {
 }  // namespace
 
 void Parameters::resize(std::size_t count) {
-  value.assign(count, 0);
-  first.assign(count, 0);
-  second.assign(count, 0);
-  grad.assign(count, 0);
+  for (std::vector<float>* values : {&value, &first, &second, &grad}) {
+    reserve_huge(*values, count);
+    values->assign(count, 0);
+  }
 }
 
 void HashEncoding::create(int level_count, int features_per_level, int log2_table,
@@ -61,6 +62,7 @@ void HashEncoding::create(int level_count, int features_per_level, int log2_tabl
 }
 
 void HashEncoding::refresh_half() {
+  reserve_huge(half, table.size());
   half.resize(table.size());
   for (std::size_t i = 0; i < half.size(); ++i) half[i] = half_of(table.value[i]);
 }

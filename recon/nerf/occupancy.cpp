@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/memory.hpp"
+
 namespace orbitfuse::nerf {
 
 void Occupancy::create(int cells_per_axis, int cascade_count) {
@@ -14,6 +16,7 @@ void Occupancy::create(int cells_per_axis, int cascade_count) {
   const auto cells = static_cast<std::size_t>(cell_count());
   on.assign((cells + 63) / 64, ~std::uint64_t{0});
   allowed = on;
+  reserve_huge(density, cells);
   density.assign(cells, 0);
   code.assign(cells, 0);
   window.assign(cells, -1);
@@ -59,30 +62,42 @@ struct Decoded {
   }
 };
 
-const Decoded& decoded() {
-  static const Decoded table;
-  return table;
-}
-
 }  // namespace
+
+const float* densities_of_codes() {
+  static const Decoded table;
+  return table.density;
+}
 
 void Occupancy::refresh() {
   code.resize(density.size());
-  march_words.assign(2 * on.size(), 0);
+  reserve_huge(look, density.size());
+  look.resize(density.size());
+  coded_.assign(on.size(), 0);
   any.assign((on.size() + 63) / 64, 0);
-  for (std::size_t b = 0; b < on.size(); ++b) {
-    march_words[2 * b] = on[b];
-    put(any, static_cast<std::int64_t>(b), on[b] != 0);
-  }
+  plain = any;
   for (std::size_t i = 0; i < density.size(); ++i) {
     code[i] = density[i] > 0 ? code_of(density[i]) : std::uint8_t{0};
-    if (code[i] > 0) march_words[2 * (i >> 6) + 1] |= std::uint64_t{1} << (i & 63);
+    show(static_cast<std::int64_t>(i));
   }
+  for (std::size_t b = 0; b < on.size(); ++b) sum_up(static_cast<std::int64_t>(b));
+}
+
+void Occupancy::show(std::int64_t cell) {
+  const auto i = static_cast<std::size_t>(cell);
+  put(coded_, cell, code[i] > 0);
+  look[i] = test(on, cell) ? static_cast<std::uint8_t>(1 + std::min<int>(code[i], 254)) : std::uint8_t{0};
+}
+
+void Occupancy::sum_up(std::int64_t block) {
+  const auto b = static_cast<std::size_t>(block);
+  put(any, block, on[b] != 0);
+  put(plain, block, on[b] == ~std::uint64_t{0} && coded_[b] == 0);
 }
 
 void Occupancy::restore(const std::vector<std::uint64_t>& cells_on, const std::vector<std::uint8_t>& codes) {
   on = cells_on;
-  for (std::size_t i = 0; i < density.size(); ++i) density[i] = decoded().density[codes[i]];
+  for (std::size_t i = 0; i < density.size(); ++i) density[i] = densities_of_codes()[codes[i]];
   refresh();
 }
 
@@ -119,124 +134,11 @@ void Occupancy::update(float decay, float threshold) {
     const auto i = static_cast<std::size_t>(c);
     put(on, c, test(allowed, c) && opacity(c, density[i]) >= limit);
     code[i] = code_of(density[i]);
-    march_words[2 * (i >> 6)] = on[i >> 6];
-    put(any, c >> 6, on[i >> 6] != 0);
-    put(march_words, (c >> 6) * 128 + 64 + (c & 63), code[i] > 0);
+    show(c);
+    sum_up(c >> 6);
     window[i] = -1;
   }
   visited.clear();
-}
-
-namespace {
-
-/// The stretch of a ray inside one occupied cell.
-struct Segment {
-  float begin, length;
-  float surface;  ///< opacity expected there
-  float haze;     ///< share of the samples that look everywhere
-  bool plain;     ///< nothing is known of it but that it may be occupied
-};
-
-constexpr int max_segments = 4096;  // a diagonal through all cascades of 256 cells needs 2300
-
-/// Occupied cells along the ray, nearest first.
-int segments_of(const Occupancy& occupancy, const Ray& ray, float near, float far, Segment* out) {
-  float inverse[3];
-  for (int d = 0; d < 3; ++d)
-    inverse[d] = 1.0f / (std::abs(ray.direction[d]) > 1e-9f ? ray.direction[d]
-                                                            : std::copysign(1e-9f, ray.direction[d]));
-  const float far_edge = static_cast<float>(1 << (occupancy.cascades - 1));
-  float t = near;
-  // A camera outside all cascades first advances to the largest cube.
-  for (int d = 0; d < 3; ++d) {
-    const float gap = std::abs(ray.origin[d]) - far_edge;
-    if (gap <= 0) continue;
-    if (ray.origin[d] * ray.direction[d] >= 0) return 0;
-    t = std::max(t, gap * std::abs(inverse[d]) * 1.0001f);
-  }
-  const Decoded& table = decoded();
-  int count = 0;
-  for (int guard = 0; t < far && guard < 8 * max_segments && count < max_segments; ++guard) {
-    float x[3];
-    for (int d = 0; d < 3; ++d) x[d] = ray.origin[d] + t * ray.direction[d];
-    const int cascade = Occupancy::cascade_of(x);
-    if (cascade >= occupancy.cascades) break;
-    const float size = occupancy.cell_size(cascade);
-    const std::int64_t cell = occupancy.cell_of(cascade, x);
-    const bool empty = !Occupancy::test(occupancy.any, cell >> 6);
-    const std::uint64_t* words = &occupancy.march_words[2 * static_cast<std::size_t>(cell >> 6)];
-    // A block that is empty, or of which nothing is known, in one step.
-    const bool plain = !empty && words[0] == ~std::uint64_t{0} && words[1] == 0;
-    const float step = empty || plain ? 4 * size : size;
-    const float per_step = 1 / step;
-    float exit = std::numeric_limits<float>::max();
-    for (int d = 0; d < 3; ++d) {
-      const float edge = (std::floor(x[d] * per_step) + (inverse[d] > 0 ? 1.0f : 0.0f)) * step;
-      exit = std::min(exit, (edge - x[d]) * inverse[d]);
-    }
-    exit = std::max(exit, 0.0f) + 1e-3f * size;  // across the border in spite of rounding
-    if (!empty && (words[0] >> (cell & 63) & 1u)) {
-      const int code = words[1] >> (cell & 63) & 1u ? occupancy.code[static_cast<std::size_t>(cell)] : 0;
-      Segment* last = count > 0 ? &out[count - 1] : nullptr;
-      if (code == 0 && last && last->plain && t <= last->begin + last->length + 1e-5f) {
-        last->length += exit;
-        last->haze += exit / size;
-      } else {
-        // depth / (1 + depth) stands for 1 - exp(-depth): only relative sizes matter here.
-        const float depth = exit * table.density[code];
-        out[count++] = {t, exit, depth / (1 + depth), exit / size, code == 0};
-      }
-    }
-    t += exit;
-  }
-  return count;
-}
-
-}  // namespace
-
-int march(const Occupancy& occupancy, const Ray& ray, const MarchSettings& settings, float jitter,
-          float* t, float* dt) {
-  thread_local std::vector<Segment> segments(max_segments);
-  const int cells = segments_of(occupancy, ray, settings.near, settings.far, segments.data());
-  if (cells == 0) return 0;
-  float surface = 0, haze = 0;
-  for (int i = 0; i < cells; ++i) {
-    surface += segments[static_cast<std::size_t>(i)].surface;
-    haze += segments[static_cast<std::size_t>(i)].haze;
-  }
-  const float for_surface = static_cast<float>(settings.surface) * std::min(1.0f, surface);
-  const float for_haze = std::clamp(haze, 2.0f, std::max(2.0f, static_cast<float>(settings.haze)));
-  const int count = std::min(max_ray_samples, static_cast<int>(std::ceil(for_surface + for_haze)));
-  const float surface_share = surface > 0 ? for_surface / surface : 0.0f, haze_share = for_haze / haze;
-
-  // Inverse transform sampling: `mass` runs to for_surface + for_haze in steps of one sample.
-  const float per_sample = (for_surface + for_haze) / static_cast<float>(count);
-  int cell = 0;
-  float mass_before = 0, length_before = 0;
-  const auto density_of_cell = [&](int i) {
-    const Segment& s = segments[static_cast<std::size_t>(i)];
-    return s.surface * surface_share + s.haze * haze_share;
-  };
-  const auto advance = [&](float mass) {  // occupied length and distance at this mass
-    float own = density_of_cell(cell);
-    while (cell + 1 < cells && mass_before + own < mass) {
-      mass_before += own;
-      length_before += segments[static_cast<std::size_t>(cell)].length;
-      own = density_of_cell(++cell);
-    }
-    const Segment& s = segments[static_cast<std::size_t>(cell)];
-    const float part = std::clamp((mass - mass_before) / std::max(own, 1e-12f), 0.0f, 1.0f);
-    return std::pair{length_before + part * s.length, s.begin + part * s.length};
-  };
-  float edge = 0;
-  const float shift = 0.5f * (jitter - 0.5f);  // samples keep to the middle half of their stratum
-  for (int k = 0; k < count; ++k) {
-    t[k] = advance((static_cast<float>(k) + 0.5f + shift) * per_sample).second;
-    const float next = advance(static_cast<float>(k + 1) * per_sample).first;
-    dt[k] = std::max(0.0f, next - edge);
-    edge = next;
-  }
-  return count;
 }
 
 }  // namespace orbitfuse::nerf

@@ -3,10 +3,8 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <limits>
 #include <vector>
 
-#include "recon/nerf/view_rays.hpp"
 
 namespace orbitfuse::nerf {
 
@@ -63,9 +61,10 @@ struct Occupancy {
   /// Derived arrays, after `on` or `density` were set from outside.
   void refresh();
 
-  /// Two words a block: `on`, and which cells have a code; marching reads codes only of those.
-  std::vector<std::uint64_t> march_words;
-  std::vector<std::uint64_t> any;  ///< bit per block: a cell of it is on; small enough for the L1 cache
+  /// What marching reads of a cell: 0 = off, else 1 + code. A block is one cache line.
+  std::vector<std::uint8_t> look;
+  /// Bits per block, small enough for the L1 cache: a cell of it is on; all are, and nothing else is known.
+  std::vector<std::uint64_t> any, plain;
   double fraction_on() const;
 
   /// Notes a visible density found at a point.
@@ -73,23 +72,13 @@ struct Occupancy {
   /// Applies the window: visited cells take max(old * decay, window) and stay on while
   /// their opacity, density * cell size, is at least min(threshold, half the mean).
   void update(float decay, float threshold);
+
+ private:
+  void sum_up(std::int64_t block);  ///< its bits in `any` and `plain`
+  void show(std::int64_t cell);     ///< sets its byte in `look`
+  std::vector<std::uint64_t> coded_;  ///< bit per cell: its code isn't 0
 };
 
-/// How many samples a ray gets: `surface` of them where surfaces are expected, and one per
-/// occupied cell, up to `haze`, over everything that is not known to be empty.
-struct MarchSettings {
-  float near = 0.1f;   ///< normalised units
-  float far = std::numeric_limits<float>::max();  ///< nothing beyond it is seen
-  int surface = 16;
-  int haze = 24;
-};
-
-inline constexpr int max_ray_samples = 256;
-
-/// Samples along a ray: t (midpoints) and dt (the occupied length each stands for). The cells'
-/// densities are the proposal distribution, so no network is asked where to look. Returns the
-/// number of samples, at most max_ray_samples.
-int march(const Occupancy& occupancy, const Ray& ray, const MarchSettings& settings, float jitter,
-          float* t, float* dt);
+const float* densities_of_codes();  ///< [256]
 
 }  // namespace orbitfuse::nerf

@@ -53,8 +53,8 @@ struct TrainOptions {
   int occupancy_resolution = 128;        ///< cells per axis of each cascade
   double occupancy_threshold = 0.02;     ///< visible opacity below which a cell is empty
   int surface_samples = 16;              ///< per ray, where surfaces are expected
-  /// Per ray at most, over all that may not be empty; 0 = 8 where dense depth or a guide field tell
-  /// empty space from matter, else 24.
+  /// Per ray at most, over all that may not be empty; 0 = 8 where depth of most pixels or a guide field
+  /// tell empty space from matter, else 24.
   int haze_samples = 0;
   int proposal_samples_1 = 256, proposal_samples_2 = 96;  ///< per ray (Sampling::proposal)
   int fine_samples = 48;

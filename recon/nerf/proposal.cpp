@@ -23,7 +23,7 @@ void even_edges(int bins, float jitter, float* out) {
 }
 
 /// Densities and weights of a level whose edges are set.
-void evaluate(const DensityNetwork& network, const Kernels& kernels, const std::vector<Ray>& rays,
+void evaluate(const DensityNetwork& network, const Kernels& kernels, const std::vector<DrawnRay>& rays,
               ProposalBlock::Level& level) {
   const auto bins = static_cast<std::size_t>(level.bins);
   const std::size_t count = rays.size() * bins;
@@ -34,7 +34,7 @@ void evaluate(const DensityNetwork& network, const Kernels& kernels, const std::
       const float* edge = &level.edge[r * (bins + 1) + i];
       const float t = 0.5f * (edge[0] + edge[1]);
       float x[3];
-      for (int d = 0; d < 3; ++d) x[d] = rays[r].origin[d] + t * rays[r].direction[d];
+      for (int d = 0; d < 3; ++d) x[d] = rays[r].ray.origin[d] + t * rays[r].ray.direction[d];
       contract01(x, &level.position01[3 * (r * bins + i)]);
       level.dt[r * bins + i] = edge[1] - edge[0];
     }
@@ -59,41 +59,40 @@ void distances_of(const std::vector<float>& spaced, const ProposalSettings& sett
 }
 
 /// Edges of the next finer sampling.
-void resample_rays(const ProposalBlock::Level& from, const std::vector<float>& jitter, float anneal,
+void resample_rays(const ProposalBlock::Level& from, const std::vector<DrawnRay>& rays, float anneal,
                    int count, std::vector<float>& out) {
   const auto bins = static_cast<std::size_t>(from.bins);
   std::vector<float> flattened(bins);
-  out.resize(jitter.size() * static_cast<std::size_t>(count + 1));
-  for (std::size_t r = 0; r < jitter.size(); ++r) {
+  out.resize(rays.size() * static_cast<std::size_t>(count + 1));
+  for (std::size_t r = 0; r < rays.size(); ++r) {
     for (std::size_t i = 0; i < bins; ++i) {
       const float w = from.weight[r * bins + i];
       flattened[i] = anneal == 1 ? w : std::pow(w, anneal);
     }
-    resample(from.bins, &from.spaced[r * (bins + 1)], flattened.data(), histogram_padding, jitter[r],
+    resample(from.bins, &from.spaced[r * (bins + 1)], flattened.data(), histogram_padding, rays[r].jitter,
              count, &out[r * static_cast<std::size_t>(count + 1)]);
   }
 }
 
 }  // namespace
 
-void add_proposed(const FieldState& field, const Kernels& kernels, const std::vector<Ray>& rays,
-                  const std::vector<float>& jitter, const ProposalSettings& settings,
+void add_proposed(const FieldState& field, const Kernels& kernels, const std::vector<DrawnRay>& rays, const ProposalSettings& settings,
                   ProposalBlock& proposals, RayBlock& block) {
   auto& [first, second] = proposals.levels;
   first.bins = field.options.proposal_samples_1;
   second.bins = field.options.proposal_samples_2;
   first.spaced.resize(rays.size() * static_cast<std::size_t>(first.bins + 1));
   for (std::size_t r = 0; r < rays.size(); ++r)
-    even_edges(first.bins, jitter[r], &first.spaced[r * static_cast<std::size_t>(first.bins + 1)]);
+    even_edges(first.bins, rays[r].jitter, &first.spaced[r * static_cast<std::size_t>(first.bins + 1)]);
   distances_of(first.spaced, settings, first.edge);
   evaluate(field.proposals[0], kernels, rays, first);
-  resample_rays(first, jitter, settings.anneal, second.bins, second.spaced);
+  resample_rays(first, rays, settings.anneal, second.bins, second.spaced);
   distances_of(second.spaced, settings, second.edge);
   evaluate(field.proposals[1], kernels, rays, second);
 
   const int fine = field.options.fine_samples;
   std::vector<float> spaced;
-  resample_rays(second, jitter, settings.anneal, fine, spaced);
+  resample_rays(second, rays, settings.anneal, fine, spaced);
   distances_of(spaced, settings, proposals.fine_edge);
   std::vector<float> t(static_cast<std::size_t>(fine)), dt(static_cast<std::size_t>(fine));
   for (std::size_t r = 0; r < rays.size(); ++r) {
@@ -102,7 +101,7 @@ void add_proposed(const FieldState& field, const Kernels& kernels, const std::ve
       t[static_cast<std::size_t>(i)] = 0.5f * (edge[i] + edge[i + 1]);
       dt[static_cast<std::size_t>(i)] = edge[i + 1] - edge[i];
     }
-    block.add(rays[r], t.data(), dt.data(), fine);
+    block.add(rays[r].ray, t.data(), dt.data(), fine);
   }
 }
 

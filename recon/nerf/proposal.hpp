@@ -32,10 +32,9 @@ struct ProposalSettings {
   float anneal = 1;
 };
 
-/// Adds `rays` with field.options.fine_samples samples each to `block`. `jitter`: one a ray.
-void add_proposed(const FieldState& field, const Kernels& kernels, const std::vector<Ray>& rays,
-                  const std::vector<float>& jitter, const ProposalSettings& settings,
-                  ProposalBlock& proposals, RayBlock& block);
+/// Adds `rays` with field.options.fine_samples samples each to `block`.
+void add_proposed(const FieldState& field, const Kernels& kernels, const std::vector<DrawnRay>& rays,
+                  const ProposalSettings& settings, ProposalBlock& proposals, RayBlock& block);
 
 /// Gradients of the interlevel loss for a block that add_proposed() and forward() have filled:
 /// added to dweights[level], the grids' into proposals. Returns the loss, NaN if a gradient is not

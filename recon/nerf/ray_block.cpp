@@ -51,13 +51,17 @@ void RayBlock::add(const Ray& ray, const float* t_mid, const float* dt_in, int c
   first.push_back(static_cast<int>(t.size()));
 }
 
-void RayBlock::add(const FieldState& field, const Ray& ray, const MarchSettings& settings,
-                   float jitter) {
-  thread_local std::vector<float> t_mid, length;
-  t_mid.resize(max_ray_samples);
-  length.resize(max_ray_samples);
-  const int count = march(field.occupancy, ray, settings, jitter, t_mid.data(), length.data());
-  add(ray, t_mid.data(), length.data(), count);
+void RayBlock::add(const Occupancy& occupancy, const MarchSettings& settings, const std::vector<DrawnRay>& marched) {
+  thread_local std::vector<Marched> samples(march_lanes);
+  const int count = static_cast<int>(marched.size());
+  for (int begin = 0; begin < count; begin += march_lanes) {
+    const int n = std::min(march_lanes, count - begin);
+    march(occupancy, settings, &marched[static_cast<std::size_t>(begin)], n, samples.data());
+    for (int i = 0; i < n; ++i) {
+      const Marched& m = samples[static_cast<std::size_t>(i)];
+      add(marched[static_cast<std::size_t>(begin + i)].ray, m.t, m.dt, m.count);
+    }
+  }
 }
 
 namespace {

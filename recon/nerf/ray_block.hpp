@@ -34,8 +34,8 @@ struct RayBlock {
 
   int samples() const { return first.empty() ? 0 : first.back(); }
   void clear();
-  /// Adds a ray and its samples (occupancy marching).
-  void add(const FieldState& field, const Ray& ray, const MarchSettings& settings, float jitter);
+  /// Adds rays and their samples (occupancy marching).
+  void add(const Occupancy& occupancy, const MarchSettings& settings, const std::vector<DrawnRay>& marched);
   /// Adds a ray with given samples.
   void add(const Ray& ray, const float* t_mid, const float* dt_in, int count);
 };

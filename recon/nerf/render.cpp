@@ -84,7 +84,8 @@ class ImageRenderer {
       thread_local std::vector<int> pixels;
       block.clear();
       pixels.clear();
-      for (int p = begin; p < end; ++p) add(p, no_limit, block, pixels);
+      for (int p = begin; p < end; ++p) add(p, no_limit, pixels);
+      place(block);
       forward(field_, kernels_, limits_, block);
       for (std::size_t r = 0; r < pixels.size(); ++r)
         if (stopped(block, static_cast<int>(r))) {
@@ -112,11 +113,11 @@ class ImageRenderer {
         block.clear();
         pixels.clear();
         if (limited)
-          for (int p = begin; p < end; ++p) add(p, far.at<float>(p / width_, p % width_), block, pixels);
+          for (int p = begin; p < end; ++p) add(p, far.at<float>(p / width_, p % width_), pixels);
         else
-          for (const int p : again) add(p, no_limit, block, pixels);
+          for (const int p : again) add(p, no_limit, pixels);
         if (pixels.empty()) continue;
-        propose(block);
+        place(block);
         forward(field_, kernels_, limits_, block);
         int row = 0;
         for (std::size_t r = 0; r < pixels.size(); ++r) {
@@ -133,27 +134,23 @@ class ImageRenderer {
   }
 
  private:
-  void add(int pixel, float far, RayBlock& block, std::vector<int>& pixels) const {
+  void add(int pixel, float far, std::vector<int>& pixels) const {
     const Camera& camera = rays_.camera();
     const int x = pixel % width_ * stride_ + stride_ / 2, y = pixel / width_ * stride_ + stride_ / 2;
     Ray ray;
     if (!rays_.ray(std::min(camera.width - 1, x) + 0.5, std::min(camera.height - 1, y) + 0.5, ray)) return;
-    MarchSettings settings = march_;
-    settings.far = far;
-    if (proposing_) drawn().push_back(ray);
-    else block.add(field_, ray, settings, 0.5f);
+    drawn().push_back({ray, far, 0.5f});
     pixels.push_back(pixel);
   }
-  /// Sampling::proposal: the samples of all rays that add() noted.
-  void propose(RayBlock& block) const {
-    if (!proposing_) return;
+  /// The samples of all rays that add() noted.
+  void place(RayBlock& block) const {
     thread_local ProposalBlock proposals;
-    add_proposed(field_, kernels_, drawn(), std::vector<float>(drawn().size(), 0.5f),
-                 {.near = march_.near}, proposals, block);
+    if (proposing_) add_proposed(field_, kernels_, drawn(), {.near = march_.near}, proposals, block);
+    else block.add(field_.occupancy, march_, drawn());
     drawn().clear();
   }
-  static std::vector<Ray>& drawn() {
-    thread_local std::vector<Ray> rays;
+  static std::vector<DrawnRay>& drawn() {
+    thread_local std::vector<DrawnRay> rays;
     return rays;
   }
   bool stopped(const RayBlock& block, int ray) const {

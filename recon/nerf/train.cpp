@@ -219,7 +219,7 @@ Result<TrainReport> train(const Dataset& given, const TrainOptions& options,
     state->span = estimate_span(training);
   }
   if (state->options.haze_samples == 0)
-    state->options.haze_samples = !training.has_dense_depth() && !options.shared_geometry ? 24 : 8;
+    state->options.haze_samples = training.known_depth() >= 0.5 || options.shared_geometry ? 8 : 24;
   if (options.shared_geometry && !resumed) {
     ORBITFUSE_TRY(inherit_geometry(guide->state(), *state));
     report.skips.push_back({"density from nothing", "the visible field's geometry is given",

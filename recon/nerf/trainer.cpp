@@ -77,8 +77,7 @@ void Trainer::draw(Block& block, int begin, int end, double progress) {
   block.rays.clear();
   block.targets.clear();
   block.drawn.clear();
-  block.jitter.clear();
-  MarchSettings settings = field_.march_settings();
+  const MarchSettings settings = field_.march_settings();
   for (int i = begin; i < end; ++i) {
     for (int attempt = 0; attempt < 8; ++attempt) {
       const std::uint64_t draw_key = key(i) * 8 + static_cast<unsigned>(attempt);
@@ -95,34 +94,30 @@ void Trainer::draw(Block& block, int begin, int end, double progress) {
       const int x = static_cast<int>(pixel % view.target.cols), y = static_cast<int>(pixel / view.target.cols);
       RayTarget target;
       const float* stored = view.target.ptr<float>(y) + x * field_.channels();
-      Ray ray;
-      if (!std::isfinite(stored[0]) || !view.rays.ray(x + 0.5, y + 0.5, ray)) continue;
+      DrawnRay drawn;
+      if (!std::isfinite(stored[0]) || !view.rays.ray(x + 0.5, y + 0.5, drawn.ray)) continue;
       std::copy_n(stored, field_.channels(), target.value);
       target.view = index;
       target.x = x;
       target.y = y;
       const float distance = view.distance.at<float>(y, x);
-      settings.far = std::numeric_limits<float>::max();
       if (std::isfinite(distance)) {
         // What lies behind a known surface isn't seen. Sparse points are too few to gain from it.
-        if (!sparse) settings.far = distance * known_depth_margin;
+        if (!sparse) drawn.far = distance * known_depth_margin;
         target.distance = distance;
         target.depth_weight = supervision;
       }
       block.targets.push_back(target);
-      const float jitter = random_uniform(o.seed, jitter_stream, draw_key);
-      if (proposing()) {
-        block.drawn.push_back(ray);
-        block.jitter.push_back(jitter);
-      } else {
-        block.rays.add(field_, ray, settings, jitter);
-      }
+      drawn.jitter = random_uniform(o.seed, jitter_stream, draw_key);
+      block.drawn.push_back(drawn);
       break;
     }
   }
   if (proposing())
-    add_proposed(field_, kernels_, block.drawn, block.jitter,
-                 {.near = settings.near, .anneal = proposal_anneal(progress)}, block.proposals, block.rays);
+    add_proposed(field_, kernels_, block.drawn, {.near = settings.near, .anneal = proposal_anneal(progress)},
+                 block.proposals, block.rays);
+  else
+    block.rays.add(field_.occupancy, settings, block.drawn);
 }
 
 /// As nerfacto: every step at first, every fifth after a sixth of the run.

@@ -33,8 +33,7 @@ class Trainer {
     std::vector<RayTarget> targets;
     std::vector<float> grid;  ///< [level][sample][feature]
     ProposalBlock proposals;  ///< Sampling::proposal
-    std::vector<Ray> drawn;
-    std::vector<float> jitter;
+    std::vector<DrawnRay> drawn;
   };
 
   void draw(Block& block, int begin, int end, double progress);

@@ -71,21 +71,20 @@ TEST(Agreement, FrontToBackWithStopsIsTheWholeRay) {
   RayBlock shortened, whole;
   shortened.clear();
   whole.clear();
-  int count = 0;
+  std::vector<DrawnRay> drawn;
   for (int y = 0; y < data.views[1].camera.height; y += 2)
     for (int x = 0; x < data.views[1].camera.width; x += 2) {
-      Ray ray;
-      if (!rays.ray(x + 0.5, y + 0.5, ray)) continue;
-      shortened.add(state, ray, state.march_settings(), 0.5f);
-      whole.add(state, ray, state.march_settings(), 0.5f);
-      ++count;
+      DrawnRay ray;
+      if (rays.ray(x + 0.5, y + 0.5, ray.ray)) drawn.push_back(ray);
     }
+  shortened.add(state.occupancy, state.march_settings(), drawn);
+  whole.add(state.occupancy, state.march_settings(), drawn);
   forward(state, kernels, {1e-4f, 1e-4f, false}, shortened);
   forward(state, kernels, {0.0f, 0.0f, false}, whole);
   EXPECT_LT(shortened.samples(), whole.samples()) << "nothing was skipped";
   int row_a = 0, row_b = 0;
   double worst = 0;
-  for (int r = 0; r < count; ++r) {
+  for (int r = 0; r < static_cast<int>(drawn.size()); ++r) {
     float a[3], b[3];
     ray_value(state, shortened, r, row_a, a);
     ray_value(state, whole, r, row_b, b);

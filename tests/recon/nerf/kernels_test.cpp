@@ -63,9 +63,9 @@ class KernelsTest : public ::testing::TestWithParam<Isa> {
 };
 
 TEST_P(KernelsTest, EncodingIsTrilinearAndHashedAsPublished) {
-  for (const int features : {2, 4}) {
+  for (const auto& [features, log2_table] : {std::pair{2, 10}, {4, 10}, {2, 18}, {4, 17}}) {  // in and beyond the caches
     HashEncoding grid;
-    grid.create(6, features, 10, 4, 64, 3);
+    grid.create(6, features, log2_table, 4, 128, 3);
     grid.table.value = noise(grid.table.size(), 5);
     grid.refresh_half();
     const int count = 67;
@@ -85,9 +85,9 @@ TEST_P(KernelsTest, EncodingIsTrilinearAndHashedAsPublished) {
 
 // The encoding is linear in the table, so its gradient is its adjoint: <E t, d> = <t, E^T d>.
 TEST_P(KernelsTest, ScatterIsTheAdjointOfTheEncoding) {
-  for (const int features : {2, 4}) {
+  for (const auto& [features, log2_table] : {std::pair{2, 9}, {4, 9}, {2, 18}, {4, 15}}) {
     HashEncoding grid;
-    grid.create(5, features, 9, 4, 64, 3);
+    grid.create(5, features, log2_table, 4, 128, 3);
     grid.table.value = noise(grid.table.size(), 15);
     grid.refresh_half();
     const int count = 133;

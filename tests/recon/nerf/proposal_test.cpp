@@ -147,17 +147,16 @@ TEST(Proposals, GradientOfEachNetworkMatchesDifferencesAlongAnyDirection) {
       network->grid.table.value[i] = std::round((random_uniform(8, 1, i) - 0.5f) * 256) / 256;
   field.refresh();
   const Kernels& kernels = kernels_for(Isa::avx2);
-  std::vector<Ray> rays;
-  std::vector<float> jitter;
+  std::vector<DrawnRay> rays;
   for (int r = 0; r < 8; ++r) {
     const float a = 0.7f * static_cast<float>(r);
-    rays.push_back({{std::cos(a), std::sin(a), 0.1f}, {-std::cos(a + 0.1f), -std::sin(a + 0.1f), 0}, 1});
-    jitter.push_back(0.1f * static_cast<float>(r));
+    const Ray ray{{std::cos(a), std::sin(a), 0.1f}, {-std::cos(a + 0.1f), -std::sin(a + 0.1f), 0}, 1};
+    rays.push_back({.ray = ray, .jitter = 0.1f * static_cast<float>(r)});
   }
   RayBlock fine;
   fine.clear();
   ProposalBlock asked;
-  add_proposed(field, kernels, rays, jitter, {}, asked, fine);
+  add_proposed(field, kernels, rays, {}, asked, fine);
   EXPECT_EQ(fine.samples(), 8 * 17);
   forward(field, kernels, {1e-9f, 0.0f}, fine);
 

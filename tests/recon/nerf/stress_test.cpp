@@ -198,14 +198,20 @@ TEST(Stress, StepsWithoutFiniteGradientsAreSkippedAndARunOfThemIsAnError) {
   EXPECT_NE(report.error().found.find("none of the 6 steps"), std::string::npos);
 }
 
+Marched march_one(const Occupancy& grid, const Ray& ray) {
+  Marched out;
+  const DrawnRay drawn{.ray = ray};
+  march(grid, {}, &drawn, 1, &out);
+  return out;
+}
+
 TEST(Occupancy, RaysThatMissAndDegenerateRaysGetNoSamples) {
   Occupancy grid;
   grid.create(16, 3);
-  float t[max_ray_samples], dt[max_ray_samples];
-  EXPECT_EQ(march(grid, {{100, 100, 100}, {0, 0, 1}, 1}, {}, 0.5f, t, dt), 0);
+  EXPECT_EQ(march_one(grid, {{100, 100, 100}, {0, 0, 1}, 1}).count, 0);
   std::fill(grid.on.begin(), grid.on.end(), 0);
   grid.refresh();
-  EXPECT_EQ(march(grid, {{0, 0, 0}, {0, 0, 1}, 1}, {}, 0.5f, t, dt), 0);
+  EXPECT_EQ(march_one(grid, {{0, 0, 0}, {0, 0, 1}, 1}).count, 0);
 }
 
 TEST(Occupancy, SamplesCoverTheOccupiedLengthInOrder) {
@@ -217,8 +223,7 @@ TEST(Occupancy, SamplesCoverTheOccupiedLengthInOrder) {
     for (std::size_t c = 0; c < grid.density.size(); ++c)
       grid.density[c] = static_cast<float>((c * 2654435761u) >> 8 & 31);
     grid.refresh();
-    float t[max_ray_samples], dt[max_ray_samples];
-    const int count = march(grid, ray, {}, 0.5f, t, dt);
+    const auto [count, t, dt] = march_one(grid, ray);
     ASSERT_GT(count, 0);
     double covered = 0;
     for (int i = 0; i < count; ++i) {
@@ -264,12 +269,53 @@ TEST(Occupancy, WholeBlocksAreCrossedAsTheirCellsWouldBe) {
       if (cascade >= grid.cascades) break;
       occupied += Occupancy::test(grid.on, grid.cell_of(cascade, x)) ? step : 0;
     }
-    float t[max_ray_samples], dt[max_ray_samples];
-    const int count = march(grid, ray, {}, 0.5f, t, dt);
+    const auto [count, t, dt] = march_one(grid, ray);
     double covered = 0;
     for (int i = 0; i < count; ++i) covered += dt[i];
     EXPECT_NEAR(covered, occupied, 0.02 * occupied + 0.01) << k;
   }
+}
+
+TEST(Occupancy, ARayDoesNotDependOnThoseBesideIt) {
+  Occupancy grid;
+  grid.create(32, 3);
+  cv::RNG random(9);
+  for (std::size_t c = 0; c < grid.density.size(); ++c) {
+    Occupancy::put(grid.on, static_cast<std::int64_t>(c), random.uniform(0, 3) == 0);
+    if (random.uniform(0, 2) == 0) grid.density[c] = random.uniform(0.0f, 5.0f);
+  }
+  grid.refresh();
+  std::vector<DrawnRay> rays(march_lanes);
+  for (DrawnRay& drawn : rays) {
+    Eigen::Vector3f direction;
+    for (int d = 0; d < 3; ++d) direction[d] = static_cast<float>(random.gaussian(1));
+    direction.normalize();
+    for (int d = 0; d < 3; ++d) {
+      drawn.ray.origin[d] = random.uniform(-1.0f, 1.0f);
+      drawn.ray.direction[d] = direction[d];
+    }
+    drawn.far = random.uniform(0.5f, 9.0f);
+    drawn.jitter = random.uniform(0.0f, 1.0f);
+  }
+  rays[2].ray.origin[1] = 50;           // outside, away from the scene or towards it
+  rays[5].ray.direction[0] = std::nanf("");  // a camera model's failure must stay its own
+  rays[6].far = 0;
+  std::vector<Marched> together(march_lanes);
+  march(grid, {}, rays.data(), march_lanes, together.data());
+  int samples = 0;
+  for (std::size_t r = 0; r < rays.size(); ++r) {
+    Marched alone;
+    march(grid, {}, &rays[r], 1, &alone);
+    ASSERT_EQ(alone.count, together[r].count) << r;
+    samples += alone.count;
+    for (int i = 0; i < alone.count; ++i) {
+      EXPECT_EQ(alone.t[i], together[r].t[i]);
+      EXPECT_EQ(alone.dt[i], together[r].dt[i]);
+    }
+  }
+  EXPECT_GT(samples, 50);
+  EXPECT_EQ(together[5].count, 0);
+  EXPECT_EQ(together[6].count, 0);
 }
 
 }  // namespace
