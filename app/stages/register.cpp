@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "app/stages/artifacts.hpp"
 #include "app/stages/registration_json.hpp"
 #include "app/stages/rendered_views.hpp"
@@ -8,7 +10,7 @@
 #include "app/stages/training_data.hpp"
 #include "app/stages/visible_renderer.hpp"
 #include "core/ply.hpp"
-#include "recon/poses/similarity_refinement.hpp"
+#include "recon/poses/similarity_search.hpp"
 #include "recon/registration/register.hpp"
 
 namespace orbitfuse::stages {
@@ -56,6 +58,15 @@ Result<ImageEvidence> load_evidence(const StageContext& context, const SessionIn
   return ImageEvidence{std::move(thermal), std::move(images), std::move(field)};
 }
 
+/// What the clouds leave open, to be searched by the images.
+SimilaritySearchOptions left_open(const RegistrationReport& clouds) {
+  SimilaritySearchOptions options;
+  options.turn_deg = std::clamp(2 * clouds.spread_rotation_deg, options.turn_deg, 15.0);
+  options.growth = std::clamp(2 * clouds.spread_scale_percent / 100, options.growth, 0.15);
+  options.clouds_decide = !clouds.ambiguous;
+  return options;
+}
+
 /// Two frames of their own: the clouds tell how they relate.
 Result<StageOutput> register_by_clouds(const StageContext& context, const SessionInput& input,
                                        std::uint64_t seed) {
@@ -76,14 +87,15 @@ Result<StageOutput> register_by_clouds(const StageContext& context, const Sessio
                    register_clouds(thermal, visible, options, context.progress, explained));
   ORBITFUSE_TRY(views_failed);
   ORBITFUSE_ASSIGN(const SimilarityRefinement refined,
-                   refine_similarity(renderer, seen.images, seen.thermal.views,
-                                     report.target_from_source, similarity_rounds(),
+                   search_similarity(renderer, seen.images, seen.thermal.views,
+                                     report.target_from_source, left_open(report),
                                      context.progress));
   ORBITFUSE_TRY(save_registration(
       context, refined.visible_from_thermal,
       refined.improved ? "point clouds, then edges of the thermal images" : "point clouds"));
   StageOutput output;
   output.skips = report.skips;
+  output.skips.insert(output.skips.end(), refined.skips.begin(), refined.skips.end());
   if (report.ambiguous)
     output.warnings.push_back("the registration is ambiguous: " + report.ambiguity);
   output.metrics = to_json(report);
@@ -91,6 +103,7 @@ Result<StageOutput> register_by_clouds(const StageContext& context, const Sessio
       report.brief() + (refined.improved ? ", refined by the thermal images" : "");
   output.metrics["image_refinement"] = {
       {"kept", refined.improved},
+      {"starts", refined.starts},
       {"agreement_before", refined.agreement_before},
       {"agreement_after", refined.agreement_after},
       {"patches_before", refined.matches_before},
@@ -103,9 +116,9 @@ Result<StageOutput> register_by_clouds(const StageContext& context, const Sessio
   output.metrics["facts"] = facts(shown);
   output.metrics["facts"].push_back(json::array(
       {"refined by the thermal images",
-       fmt::format("{}: agreement of edges {:.3f} before, {:.3f} after",
+       fmt::format("{}: agreement of edges {:.3f} before, {:.3f} after, the best of {} starts",
                    refined.improved ? "kept" : "refused, the clouds' answer stays",
-                   refined.agreement_before, refined.agreement_after)}));
+                   refined.agreement_before, refined.agreement_after, refined.starts)}));
   return output;
 }
 

@@ -17,6 +17,8 @@ struct SimilarityRefinement {
   int matches_before = 0, matches_after = 0;         ///< patches within 2 px
   /// The images are explained better than before; if not, the similarity is the one given.
   bool improved = false;
+  int starts = 1;           ///< tried from
+  std::vector<Skip> skips;  ///< starts not tried, and why
 };
 
 /// `images`: CV_32FC1 of `thermal` views, in their own world. Errors: input (counts differ), the
@@ -25,6 +27,16 @@ Result<SimilarityRefinement> refine_similarity(const SceneRenderer& visible,
                                                const std::vector<cv::Mat>& images,
                                                const std::vector<PosedView>& thermal,
                                                const Similarity3d& visible_from_thermal,
+                                               const std::vector<RenderRound>& rounds,
+                                               const Progress& progress);
+
+/// The same from a `start` found elsewhere, judged against `visible_from_thermal`, which stays if
+/// that explains the images better.
+Result<SimilarityRefinement> refine_similarity(const SceneRenderer& visible,
+                                               const std::vector<cv::Mat>& images,
+                                               const std::vector<PosedView>& thermal,
+                                               const Similarity3d& visible_from_thermal,
+                                               const Similarity3d& start,
                                                const std::vector<RenderRound>& rounds,
                                                const Progress& progress);
 
