@@ -40,6 +40,11 @@ StageOutput describe(const ModalityPoses& poses, bool shared_frame) {
     dropped.push_back({{"view", view.name}, {"why", view.why}});
     output.warnings.push_back(view.name + " has no pose: " + view.why);
   }
+  json contested = json::array();
+  for (const ContestedView& view : poses.contested) {
+    contested.push_back({{"view", view.name}, {"why", view.why}});
+    output.warnings.push_back(view.name + " may be misplaced: " + view.why);
+  }
   const std::size_t posed = poses.reconstruction.views.size();
   output.skips = poses.skips;
   output.metrics = {{"brief", fmt::format("{} of {} views posed by {}", posed, poses.frame_count,
@@ -49,6 +54,7 @@ StageOutput describe(const ModalityPoses& poses, bool shared_frame) {
                     {"rung", held_rung(poses)},
                     {"ladder", ladder_json(poses.ladder)},
                     {"dropped", dropped},
+                    {"contested", contested},
                     {"reprojection_rms_px", poses.reprojection_rms_px},
                     {"points", poses.reconstruction.points.size()},
                     {"shared_frame", shared_frame},

@@ -24,6 +24,8 @@ json to_json(const RegistrationReport& r) {
           {"spread_rotation_deg", r.spread_rotation_deg},
           {"spread_scale_percent", r.spread_scale_percent},
           {"spread_translation_percent", r.spread_translation_percent},
+          {"warp", name_of(r.warp)},
+          {"warp_percent_of_diameter", r.warp_percent_of_diameter},
           {"decided_by_views", r.decided_by_views},
           {"view_score", r.view_score},
           {"ambiguous", r.ambiguous},
@@ -32,6 +34,25 @@ json to_json(const RegistrationReport& r) {
           {"initialiser", r.initialiser},
           {"cpu_s", r.cpu_s}};
 }
+
+namespace {
+
+std::string warp_text(const RegistrationReport& r) {
+  switch (r.warp) {
+    case WarpOutcome::not_asked: return "not asked for";
+    case WarpOutcome::too_little: return "too few points beside each other to tell";
+    case WarpOutcome::none: return "none shows";
+    case WarpOutcome::found:
+      return fmt::format("{:.2f} % of the diameter, left out of the similarity", r.warp_percent_of_diameter);
+    case WarpOutcome::at_limit:
+      return fmt::format("{:.2f} % of the diameter or more (the limit), left out of the similarity",
+                         r.warp_percent_of_diameter);
+    case WarpOutcome::diverged: return "one shows but could not be estimated; the similarity follows it";
+  }
+  return "";
+}
+
+}  // namespace
 
 json facts(const RegistrationReport& r) {
   const Similarity3d& s = r.target_from_source;
@@ -45,8 +66,9 @@ json facts(const RegistrationReport& r) {
   add("matching ratio", fmt::format("{:.1f} % of the source", 100 * r.matching_ratio));
   add("RMSE", fmt::format("{:.5f}, {:.3f} % of the diameter", r.rmse, r.rmse_percent_of_diameter));
   add("overlap", fmt::format("{:.1f} % of the source, {:.1f} % of the target", 100 * r.overlap_source, 100 * r.overlap_target));
-  add("spread over restarts", fmt::format("{:.3f}°, {:.3f} % in scale, {:.3f} % in position", r.spread_rotation_deg,
+  add("spread of other answers", fmt::format("{:.3f}°, {:.3f} % in scale, {:.3f} % in position", r.spread_rotation_deg,
                                           r.spread_scale_percent, r.spread_translation_percent));
+  add("smooth warp", warp_text(r));
   add("ambiguity", r.ambiguous ? r.ambiguity : "none found");
   add("found by", r.initialiser);
   return list;

@@ -130,6 +130,20 @@ std::vector<const FrameRecord*> tracking_of(const std::vector<const FrameRecord*
 
 }  // namespace
 
+void tell_contradicted(int undecided, ModalityPoses& poses, std::string& why) {
+  poses.gates["views_against_temperatures"] =
+      undecided + static_cast<double>(poses.contested.size());
+  if (undecided > 0)
+    why += fmt::format("; {} views don't fit the others' temperatures: look at the rendered pairs",
+                       undecided);
+  if (poses.contested.empty()) return;
+  std::string names;
+  for (const ContestedView& view : poses.contested)
+    names += (names.empty() ? "" : ", ") + view.name;
+  why += fmt::format("; kept by the visible scene alone, against the others' temperatures: {}",
+                     names);
+}
+
 Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleScene& visible,
                                          const std::vector<const FrameRecord*>& frames,
                                          const PoseOptions& options, const Progress& progress,
@@ -217,7 +231,7 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
     step.why += ": doubtful, check the start angle in the rendered pairs";
   std::vector<PosedView> views;
   std::vector<double> support = best.support;
-  std::vector<std::string> doubts(support.size());
+  std::vector<std::string> doubts(support.size()), objections(support.size());
   AlignmentReport report = best.report;
   int undecided = 0;
   if (visible.renderer) {
@@ -231,15 +245,15 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
                                   rendered, progress));
     report.focal_px = rendered.focal_px;
     undecided = rendered.undecided;
-    if (undecided > 0)
-      step.why += fmt::format("; {} views don't fit the others' temperatures: look at the rendered pairs", undecided);
     support.resize(rendered.views.size());
     doubts.resize(rendered.views.size());
+    objections.resize(rendered.views.size());
     report.residual_px.resize(rendered.views.size());
     for (std::size_t i = 0; i < rendered.views.size(); ++i) {
       views.push_back(rendered.views[i].view);
       support[i] = rendered.views[i].agreement;
       doubts[i] = rendered.views[i].doubt;
+      objections[i] = rendered.views[i].objection;
       report.residual_px[i] = rendered.views[i].median_px;
     }
     step.rung = "cross-modal, orbit prior and renders";
@@ -293,11 +307,12 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
         continue;
       }
     }
+    if (!objections[i].empty()) result.contested.push_back({views[i].name, objections[i]});
     result.reconstruction.views.push_back(views[i]);
   }
   result.gates["posed_ratio"] = result.posed_ratio();
   result.gates["edge_agreement"] = typical;
-  result.gates["views_against_temperatures"] = undecided;
+  tell_contradicted(undecided, result, step.why);
   result.gates["orbit_decisiveness"] = decisiveness;
   result.gates["focal_px"] = report.focal_px;
   result.gates["focal_sigma_percent"] = 100 * report.focal_relative_sigma;

@@ -16,4 +16,8 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
                                          const PoseOptions& options, const Progress& progress,
                                          std::vector<LadderStep>& steps);
 
+/// Says in `why` and in the gate "views_against_temperatures" which views are kept against the
+/// other views' temperatures: the contested ones, and `undecided` that nobody was left to judge.
+void tell_contradicted(int undecided, ModalityPoses& poses, std::string& why);
+
 }  // namespace orbitfuse

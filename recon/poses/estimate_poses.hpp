@@ -59,10 +59,16 @@ struct DroppedView {
   std::string name, why;
 };
 
+/// A view that is kept although a second opinion contradicts it: to be looked at.
+struct ContestedView {
+  std::string name, why;
+};
+
 struct ModalityPoses {
   Reconstruction reconstruction;
   int frame_count = 0;  ///< views that could have been posed
   std::vector<DroppedView> dropped;
+  std::vector<ContestedView> contested;  ///< among the posed ones
   std::vector<LadderStep> ladder;
   /// Root mean square over all observations; 0 where the rung has none.
   double reprojection_rms_px = 0;

@@ -22,14 +22,14 @@ constexpr double settled_share = 0.6;
 constexpr double vouched_share = 0.6;
 /// Two views turned by less are one station's: its own temperatures confirm any place.
 constexpr double own_turn_deg = 8;
-/// Shares of a support below it mean nothing.
+/// Rounding of no support at all.
 constexpr double least_support = 1e-9;
 
 /// Why the place found among the temperatures of settled views doesn't confirm the view's; empty if
 /// it does.
 std::string doubt(const OrbitViews& orbit, const RenderAlignedView& view,
                   const RenderAlignedView& second, double usual_support) {
-  if (!(second.support() > found_share * usual_support))
+  if (!(share_of_usual(second.support(), usual_support) > found_share))
     return "its edges are not found among the stations' temperatures";
   const Rigid3d &by_form = view.view.cam_from_world, &by_heat = second.view.cam_from_world;
   if (same_place(orbit, by_form, by_heat)) return {};
@@ -137,8 +137,10 @@ Result<Fit> best_by_heat(const Refinery& painted, const std::vector<std::size_t>
 
 HeatVerdict verdict(const HeatOpinions& seen) {
   const bool found = seen.heat_there > settled_share;
-  // Two scenes that show nothing of the view agree as easily as two that do.
-  if (seen.agree && (found || seen.form_there >= seen.form_before)) return HeatVerdict::both;
+  // Two scenes that show nothing of the view agree as easily as two that do: one must know it there.
+  const bool better_by_form =
+      seen.form_there > vouched_share && seen.form_there >= seen.form_before;
+  if (seen.agree && (found || better_by_form)) return HeatVerdict::both;
   // Temperatures know more edges: where they are sure, form alone doesn't pull a view away.
   if (!seen.agree && found) return HeatVerdict::heat_alone;
   // Where they find it nowhere they don't speak against a place that form knows well.
@@ -146,6 +148,10 @@ HeatVerdict verdict(const HeatOpinions& seen) {
       seen.form_before > seen.form_there)
     return HeatVerdict::form_alone;
   return HeatVerdict::doubt;
+}
+
+double share_of_usual(double support, double usual) {
+  return usual > least_support ? support / usual : 0;
 }
 
 Result<HeatCheck> correct_by_heat(const Refinery& refinery, Fit& alignment) {
@@ -173,12 +179,11 @@ Result<HeatCheck> correct_by_heat(const Refinery& refinery, Fit& alignment) {
     const RenderAlignedView &form = by_form.views[c], &heat = by_heat.views[c];
     RenderAlignedView& view = alignment.views[lost[c]];
     const int loop = orbit.stations[lost[c]].loop;
-    const double by_usual_form = 1 / std::max(usual_form.at(loop), least_support);
     HeatOpinions seen;
     seen.agree = same_place(orbit, form.view.cam_from_world, heat.view.cam_from_world);
-    seen.form_before = view.support() * by_usual_form;
-    seen.form_there = form.support() * by_usual_form;
-    seen.heat_there = heat.support() / std::max(found.usual.at(loop), least_support);
+    seen.form_before = share_of_usual(view.support(), usual_form.at(loop));
+    seen.form_there = share_of_usual(form.support(), usual_form.at(loop));
+    seen.heat_there = share_of_usual(heat.support(), found.usual.at(loop));
     refinery.progress.report(
         {"poses.thermal", 3, 4, -1,
          fmt::format("{}: usual support {:.2f} among temperatures, {:.2f} of form there, {:.2f} "
@@ -197,6 +202,10 @@ Result<HeatCheck> correct_by_heat(const Refinery& refinery, Fit& alignment) {
         ++check.moved;
         break;
       case HeatVerdict::form_alone:
+        view.objection = fmt::format(
+            "the other views' temperatures contradict its place and find it nowhere (at best {:.2f} "
+            "of the usual support); the visible scene alone keeps it, at {:.2f} of its usual support",
+            seen.heat_there, seen.form_before);
         break;
       case HeatVerdict::doubt:
         view.doubt = fmt::format(

@@ -21,9 +21,13 @@ struct HeatOpinions {
   double form_before = 0;  ///< in the visible scene, where it was
 };
 
-/// Whose word places the view; doubt: nobody's.
+/// Whose word places the view; doubt: nobody's. It only moves to a place that temperatures find or
+/// that form knows well enough to vouch for.
 enum class HeatVerdict { both, heat_alone, form_alone, doubt };
 HeatVerdict verdict(const HeatOpinions& seen);
+
+/// Of its loop's usual support; 0 where the loop usually has none: shares of nothing say nothing.
+double share_of_usual(double support, double usual);
 
 struct HeatCheck {
   int moved = 0;
@@ -34,8 +38,8 @@ struct HeatCheck {
 
 /// Each view judged by the temperatures of the others. Those that they contradict are searched as
 /// wholes in the scene that the rest paints, and go where both scenes then agree or temperatures
-/// are sure. One that temperatures find nowhere stays where form knows it well; the others keep a
-/// `doubt`. Where most are contradicted nobody is left to judge, and
+/// are sure. One that temperatures find nowhere stays where form knows it well, and keeps an
+/// `objection`; the others keep a `doubt`. Where most are contradicted nobody is left to judge, and
 /// none goes.
 Result<HeatCheck> correct_by_heat(const Refinery& refinery, Fit& alignment);
 

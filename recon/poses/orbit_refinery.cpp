@@ -116,8 +116,10 @@ Status Refinery::together(Fit& alignment, double focal_relative_sigma,
   options.rounds = std::move(rounds);
   ORBITFUSE_ASSIGN(Fit aligned,
                    align_with_renders(renderer, orbit.images, alignment.poses(), options, progress));
-  for (std::size_t i = 0; i < aligned.views.size(); ++i)
+  for (std::size_t i = 0; i < aligned.views.size(); ++i) {
     aligned.views[i].doubt = std::move(alignment.views[i].doubt);
+    aligned.views[i].objection = std::move(alignment.views[i].objection);
+  }
   aligned.undecided = alignment.undecided;
   alignment = std::move(aligned);
   return {};

@@ -129,7 +129,7 @@ Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer,
                                            const RenderAlignmentOptions& options,
                                            const Progress& progress) {
   RenderAlignment result;
-  for (const PosedView& view : views) result.views.push_back({view, 0, 0, 0, {}});
+  for (const PosedView& view : views) result.views.push_back({view, 0, 0, 0, {}, {}});
   if (views.empty()) return result;
   const double prior_focal = views.front().camera.fx;
   double focal = prior_focal;

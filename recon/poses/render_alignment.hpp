@@ -43,6 +43,8 @@ struct RenderAlignedView {
   double median_px = 0;  ///< their residual, in pixels of the last round
   std::string
       doubt;  ///< why a second opinion doesn't confirm it; empty: it does, or none was sought
+  /// What the other views' temperatures say against a view that form alone keeps; else empty.
+  std::string objection;
   /// Compares places of one view. Agreement alone favours a place with few edges, the number of
   /// patches alone one with many.
   double support() const { return agreement * matches; }

@@ -49,6 +49,15 @@ Equations equations_at(const PreparedCloud& source, const PreparedCloud& target,
   return equations;
 }
 
+/// 4.685 sigma: Tukey's 95 % efficiency; a floor, or exact data would leave no pair.
+double adapted_bound(double sigma, double pair_bound) {
+  return std::clamp(4.685 * sigma, 0.004, pair_bound);
+}
+
+bool enough(const Equations& equations) {
+  return equations.distances.size() >= 10 && equations.weight > 0;
+}
+
 }  // namespace
 
 double robust_sigma(std::vector<double>& sizes) {
@@ -88,13 +97,11 @@ Refined refine(const PreparedCloud& source, const PreparedCloud& target,
                                                : 1.0;
   double bound = options.start_bound, sigma = bound;
   for (int iteration = 0; iteration < options.iterations + options.polish; ++iteration) {
-    // 4.685 sigma: Tukey's 95 % efficiency; a floor, or exact data would leave no pair.
-    const double plane_bound =
-        options.adapt_bound ? std::clamp(4.685 * sigma, 0.004, bound) : bound;
+    const double plane_bound = options.adapt_bound ? adapted_bound(sigma, bound) : bound;
     Equations equations =
         equations_at(source, target, source_subset, target_subset, refined.target_from_source,
                      bound, plane_bound, options.exact_partners);
-    if (equations.distances.size() < 10 || !(equations.weight > 0)) break;
+    if (!enough(equations)) break;
     if (options.adapt_bound) sigma = robust_sigma(equations.distances);
     refined.hessian = equations.sums.topLeftCorner<7, 7>() / equations.weight;
     refined.residual_sigma = sigma;
@@ -112,6 +119,24 @@ Refined refine(const PreparedCloud& source, const PreparedCloud& target,
     if (iteration >= options.iterations && longest < options.settled) break;
   }
   return refined;
+}
+
+Refined measured_at(const PreparedCloud& source, const PreparedCloud& target,
+                    const std::vector<int>& source_subset, const std::vector<int>& target_subset,
+                    const Similarity3d& placement, const RefineOptions& options) {
+  const double bound = options.end_bound;
+  Refined measured{placement, Matrix7::Zero(), bound, 0};
+  for (const bool sigma_known : {false, true}) {
+    const double plane_bound =
+        sigma_known && options.adapt_bound ? adapted_bound(measured.residual_sigma, bound) : bound;
+    Equations equations = equations_at(source, target, source_subset, target_subset, placement,
+                                       bound, plane_bound, options.exact_partners);
+    if (!enough(equations)) break;
+    if (options.adapt_bound) measured.residual_sigma = robust_sigma(equations.distances);
+    measured.hessian = equations.sums.topLeftCorner<7, 7>() / equations.weight;
+    measured.pairs = static_cast<int>(equations.distances.size());
+  }
+  return measured;
 }
 
 }  // namespace orbitfuse::registration

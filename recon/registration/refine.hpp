@@ -44,4 +44,9 @@ Refined refine(const PreparedCloud& source, const PreparedCloud& target,
                const std::vector<int>& source_subset, const std::vector<int>& target_subset,
                const Similarity3d& start, const RefineOptions& options);
 
+/// What refine() says of its result (hessian, residual_sigma, pairs), for any other placement.
+Refined measured_at(const PreparedCloud& source, const PreparedCloud& target,
+                    const std::vector<int>& source_subset, const std::vector<int>& target_subset,
+                    const Similarity3d& placement, const RefineOptions& options);
+
 }  // namespace orbitfuse::registration

@@ -26,25 +26,27 @@ double cpu_seconds() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-void measure_spread(const Search& search, const Refined& best, RegistrationReport& report) {
+void widen_spread(const Similarity3d& answer, const Similarity3d& other,
+                  RegistrationReport& report) {
+  const auto widen = [](double& spread, double by) { spread = std::max(spread, by); };
+  widen(report.spread_rotation_deg, rotation_angle_deg(other.rotation, answer.rotation));
+  widen(report.spread_scale_percent, 100 * std::abs(std::log(other.scale / answer.scale)));
+  widen(report.spread_translation_percent, 50 * (other.translation - answer.translation).norm());
+}
+
+/// Restarts estimate no warp, so that where one was left out the spread says what that changed.
+void measure_spread(const Search& search, const Similarity3d& answer,
+                    const Similarity3d& without_warp, RegistrationReport& report) {
+  widen_spread(answer, without_warp, report);
   std::mt19937 random(search.options.seed);
   std::uniform_real_distribution<double> unit(-1, 1);
   for (int i = 0; i < search.options.restarts; ++i) {
     Vector7 kick;
     for (int k = 0; k < 7; ++k) kick[k] = 0.035 * unit(random);
-    const Similarity3d start =
-        updated(best.target_from_source, best.target_from_source.translation, kick);
-    const Similarity3d end =
-        search.refine_with(start, 600, {0.12, 0.06, 6, 4, true, true}).target_from_source;
-    report.spread_rotation_deg =
-        std::max(report.spread_rotation_deg,
-                 rotation_angle_deg(end.rotation, best.target_from_source.rotation));
-    report.spread_scale_percent =
-        std::max(report.spread_scale_percent,
-                 100 * std::abs(std::log(end.scale / best.target_from_source.scale)));
-    report.spread_translation_percent =
-        std::max(report.spread_translation_percent,
-                 50 * (end.translation - best.target_from_source.translation).norm());
+    const Similarity3d start = updated(without_warp, without_warp.translation, kick);
+    widen_spread(answer,
+                 search.refine_with(start, 600, {0.12, 0.06, 6, 4, true, true}).target_from_source,
+                 report);
   }
 }
 
@@ -58,33 +60,65 @@ bool stands_out(const std::vector<RegistrationAlternative>& judged, std::size_t 
   return true;
 }
 
-void add_words(std::string& text, const std::string& words) {
-  if (!text.empty()) text += "; ";
-  text += words;
+void doubt(RegistrationReport& report, const std::string& why) {
+  report.ambiguous = true;
+  if (!report.ambiguity.empty()) report.ambiguity += "; ";
+  report.ambiguity += why;
+}
+
+/// The placement beside a smooth warp, and what the report says about that.
+Similarity3d beside_warp(const Search& search, const Refined& plain, RegistrationReport& report) {
+  const char* const what = "smooth warp beside the similarity";
+  const Unwarped unwarped = refine_beside_warp(search.source, search.target, plain, {});
+  report.warp = unwarped.outcome;
+  // Three coordinates; the diameter is 2.
+  report.warp_percent_of_diameter = 100 * std::sqrt(3.0) * unwarped.amplitude / 2;
+  switch (unwarped.outcome) {
+    case WarpOutcome::not_asked:
+    case WarpOutcome::found:
+      break;
+    case WarpOutcome::too_little:
+      report.skips.push_back(
+          {what, "too few points of the clouds lie beside each other", "a warp would not be seen"});
+      break;
+    case WarpOutcome::none:
+      report.skips.push_back({what, "the residuals show none", "saved its refinement"});
+      break;
+    case WarpOutcome::at_limit:
+      doubt(report, fmt::format("the clouds are bent against each other by {:.1f} % of the "
+                                "diameter or more, so they may not show the same shape",
+                                report.warp_percent_of_diameter));
+      break;
+    case WarpOutcome::diverged:
+      report.skips.push_back({what,
+                              "one shows, but estimating it led away from where the clouds fit",
+                              "saved nothing; the answer is the one without it"});
+      doubt(report,
+            "the clouds are bent against each other, and where they belong without the bend could "
+            "not be found");
+      break;
+  }
+  return unwarped.target_from_source;
 }
 
 /// Last refinement on all points and everything the report says about the result.
 RegistrationReport reported(const Search& search, const Similarity3d& start) {
   constexpr RefineOptions last{0.10, 0.06, 5, 20, true, true};
-  const Refined plain = search.refine_with(start, 1 << 30, last);
+  constexpr int kAllPoints = 1 << 30;
+  const Refined plain = search.refine_with(start, kAllPoints, last);
   Refined best = plain;
   RegistrationReport report;
   if (search.options.estimate_warp) {
-    const Unwarped unwarped = refine_beside_warp(search.source, search.target, plain, {});
-    best.target_from_source = unwarped.target_from_source;
-    // Three coordinates; the diameter is 2.
-    report.warp_percent_of_diameter = 100 * std::sqrt(3.0) * unwarped.amplitude / 2;
-    if (!(unwarped.amplitude > 0)) {
-      report.skips.push_back(
-          {"smooth warp beside the similarity", "the residuals show none", "saved its refinement"});
-    }
+    const Similarity3d beside = beside_warp(search, plain, report);
+    if (report.warp_percent_of_diameter > 0) best = search.measured_at(beside, kAllPoints, last);
   }
   const Similarity3d target_from_unit = search.target.unit_from_cloud.inverse();
   report.target_from_source =
       target_from_unit * best.target_from_source * search.source.unit_from_cloud;
-  report.score = search.agree(best.target_from_source, 1 << 30, search.fine).score;
+  report.score = search.agree(best.target_from_source, kAllPoints, search.fine).score;
   report.evidence =
-      search.agree(best.target_from_source, 1 << 30, search.strict(best.residual_sigma)).evidence;
+      search.agree(best.target_from_source, kAllPoints, search.strict(best.residual_sigma))
+          .evidence;
   const MatchFigures matched = match_figures(search.source, search.target, best.target_from_source,
                                              2 * search.options.inlier_distance);
   const MatchFigures near = match_figures(search.source, search.target, best.target_from_source,
@@ -94,16 +128,12 @@ RegistrationReport reported(const Search& search, const Similarity3d& start) {
   report.rmse_percent_of_diameter = 100 * matched.rmse / 2;
   report.overlap_source = near.source_share;
   report.overlap_target = near.target_share;
-  measure_spread(search, plain, report);
-  if (const std::string open = open_directions(best.hessian); !open.empty()) {
-    report.ambiguous = true;
-    add_words(report.ambiguity, "the shape leaves open: " + open);
-  }
+  measure_spread(search, best.target_from_source, plain.target_from_source, report);
+  if (const std::string open = open_directions(best.hessian); !open.empty())
+    doubt(report, "the shape leaves open: " + open);
   if (report.score < kWeakScore || report.evidence < kWeakEvidence) {
-    report.ambiguous = true;
-    add_words(report.ambiguity,
-              fmt::format("the clouds support it weakly (score {:.2f}, evidence {:.2f})",
-                          report.score, report.evidence));
+    doubt(report, fmt::format("the clouds support it weakly (score {:.2f}, evidence {:.2f})",
+                              report.score, report.evidence));
   }
   return report;
 }
@@ -161,11 +191,9 @@ Result<RegistrationReport> register_clouds(const PointCloud& source_cloud,
                             "no renders of the scene from rival placements"});
   }
   if (rivals > 1 && !report.decided_by_views) {
-    report.ambiguous = true;
-    add_words(report.ambiguity,
-              fmt::format("{} placements have {:.0f} % of the best one's evidence or more{}",
-                          rivals, 100 * options.ambiguity_ratio,
-                          view_score ? ", and views of both do not decide between them" : ""));
+    doubt(report, fmt::format("{} placements have {:.0f} % of the best one's evidence or more{}",
+                              rivals, 100 * options.ambiguity_ratio,
+                              view_score ? ", and views of both do not decide between them" : ""));
   }
   judged.erase(judged.begin() + static_cast<std::ptrdiff_t>(chosen));
   report.alternatives = std::move(judged);

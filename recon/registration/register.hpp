@@ -34,6 +34,18 @@ struct RegistrationOptions {
   Status validate() const;
 };
 
+/// What became of the smooth warp beside the similarity.
+enum class WarpOutcome {
+  not_asked,   ///< RegistrationOptions::estimate_warp is off
+  too_little,  ///< too few points beside each other to tell
+  none,        ///< the residuals show none
+  found,       ///< and left out of the answer
+  at_limit,    ///< left out, but as large as a warp may be: perhaps two shapes; ambiguous
+  diverged,  ///< one shows, but estimating it led away from the clouds' fit: the answer is the one
+             ///< without it; ambiguous
+};
+const char* name_of(WarpOutcome outcome);
+
 struct RegistrationAlternative {
   Similarity3d target_from_source;
   double score = 0;       ///< two-sided, as RegistrationReport::score
@@ -52,9 +64,12 @@ struct RegistrationReport {
   double rmse = 0;            ///< of matched pairs, target units
   double rmse_percent_of_diameter = 0;
   double overlap_source = 0, overlap_target = 0;  ///< share of each cloud near the other
+  /// How far from the answer others end at most: refinements from disturbed starts, none of which
+  /// estimates a warp, and the answer without it.
   double spread_rotation_deg = 0, spread_scale_percent = 0, spread_translation_percent = 0;
+  WarpOutcome warp = WarpOutcome::not_asked;
   double warp_percent_of_diameter = 0;  ///< root mean square of the smooth warp found beside the
-                                        ///< similarity and left out of it; 0: none shows
+                                        ///< similarity and left out of it; 0: none was left out
   bool decided_by_views = false;        ///< between placements that geometry leaves open
   double view_score = 0;                ///< of the result, where views were asked
   bool ambiguous = false;

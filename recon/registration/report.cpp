@@ -5,6 +5,24 @@
 
 namespace orbitfuse {
 
+const char* name_of(WarpOutcome outcome) {
+  switch (outcome) {
+    case WarpOutcome::not_asked:
+      return "not_asked";
+    case WarpOutcome::too_little:
+      return "too_little";
+    case WarpOutcome::none:
+      return "none";
+    case WarpOutcome::found:
+      return "found";
+    case WarpOutcome::at_limit:
+      return "at_limit";
+    case WarpOutcome::diverged:
+      return "diverged";
+  }
+  return "";
+}
+
 std::string RegistrationReport::brief() const {
   std::string text = fmt::format(
       "score {:.2f} (evidence {:.2f}) by {}; overlap {:.0f} % of the source, {:.0f} % of the "

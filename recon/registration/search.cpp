@@ -46,6 +46,12 @@ Refined Search::refine_with(const Similarity3d& start, int points, const RefineO
                 strided_subset(target.points.size(), points), start, how);
 }
 
+Refined Search::measured_at(const Similarity3d& placement, int points,
+                            const RefineOptions& how) const {
+  return registration::measured_at(source, target, strided_subset(source.points.size(), points),
+                                   strided_subset(target.points.size(), points), placement, how);
+}
+
 Agreement Search::agree(const Similarity3d& placement, int points,
                         const ScoreBounds& bounds) const {
   const double s = placement.scale;

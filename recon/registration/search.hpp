@@ -22,6 +22,7 @@ struct Search {
   /// As strict as the clouds are clean: the best placement's residuals are noise.
   ScoreBounds strict(double sigma) const;
   Refined refine_with(const Similarity3d& start, int points, const RefineOptions& how) const;
+  Refined measured_at(const Similarity3d& placement, int points, const RefineOptions& how) const;
   /// Zero for placements outside the options' scales.
   Agreement agree(const Similarity3d& placement, int points, const ScoreBounds& bounds) const;
 };

@@ -207,11 +207,16 @@ Unwarped refine_beside_warp(const PreparedCloud& source, const PreparedCloud& ta
   constexpr int kFewestPoints = 8;
   constexpr std::size_t kMostNodes = 120;  // objects have about 60; bounds the time for others
   constexpr int kAmplitudeRounds = 3;      // then it stays, or the updates would not settle
-  const Unwarped none{start.target_from_source, 0, 0};
-  Unwarped result = none;
+  Unwarped result;
+  result.target_from_source = start.target_from_source;
+  const auto without = [&result](WarpOutcome outcome) {
+    result.outcome = outcome;
+    result.amplitude = 0;
+    return result;
+  };
   WarpGrid grid(paired_points(source, target, start.target_from_source, options.pair_bound),
                 kSpacing * options.length, kFewestPoints, kMostNodes);
-  if (grid.nodes().empty()) return none;
+  if (grid.nodes().empty()) return without(WarpOutcome::too_little);
   const Prior prior(grid.nodes(), grid.spacing() / kSpacing);
   Similarity3d placement = start.target_from_source;
   double sigma = start.residual_sigma;
@@ -219,25 +224,30 @@ Unwarped refine_beside_warp(const PreparedCloud& source, const PreparedCloud& ta
     sigma = std::max(sigma, options.min_sigma);
     Equations equations = equations_at(source, target, placement, grid, options.pair_bound,
                                        std::min(4.685 * sigma, options.pair_bound));
-    if (equations.distances.size() < 10 || !(equations.weight > 0)) return none;
+    if (equations.distances.size() < 10 || !(equations.weight > 0))
+      return without(round == 0 ? WarpOutcome::too_little : WarpOutcome::diverged);
     const Displacements displacements(equations, sigma, prior);
-    if (round == 0 && !displacements.any()) return none;
+    if (round == 0 && !displacements.any()) return without(WarpOutcome::none);
     if (round < kAmplitudeRounds) {
       std::tie(result.amplitude, result.gain) =
           likeliest_amplitude(displacements, options.max_amplitude);
-      if (result.gain < options.min_gain) return {start.target_from_source, 0, result.gain};
+      if (result.gain < options.min_gain) return without(WarpOutcome::none);
     }
     Vector by_node;
-    displacements.gain(result.amplitude, &by_node);
+    const double gain = displacements.gain(result.amplitude, &by_node);
+    if (!std::isfinite(gain)) return without(WarpOutcome::diverged);
     const Vector7 update = displacements.update(by_node);
-    if (!update.allFinite()) return none;
+    if (!update.allFinite()) return without(WarpOutcome::diverged);
     grid.displace(by_node);
     placement = updated(placement, placement.translation, update);
-    if (distinct(placement, start.target_from_source)) return none;  // no refinement any more
+    if (distinct(placement, start.target_from_source)) return without(WarpOutcome::diverged);
     sigma = robust_sigma(equations.distances);
     if (update.norm() < 1e-4) break;
   }
   result.target_from_source = placement;
+  // The amplitudes tried are a fifth apart.
+  result.outcome =
+      result.amplitude < 0.99 * options.max_amplitude ? WarpOutcome::found : WarpOutcome::at_limit;
   return result;
 }
 

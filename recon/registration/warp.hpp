@@ -2,6 +2,7 @@
 #pragma once
 
 #include "recon/registration/refine.hpp"
+#include "recon/registration/register.hpp"
 
 namespace orbitfuse::registration {
 
@@ -12,17 +13,18 @@ struct WarpOptions {
   double pair_bound = 0.06;    ///< wider lets floaters near the surface bend the field to them
   double min_gain = 3;         ///< log evidence for a warp over none: 20 to 1, "strong" in Kass and
                                ///< Raftery (1995)
-  double max_amplitude = 0.1;  ///< more is another shape, not a warp
+  double max_amplitude = 0.1;  ///< more is another shape, not a warp: WarpOutcome::at_limit
   double min_sigma = 0.002;    ///< data of less noise than that have sampling errors instead, which
                                ///< are no warp
   int rounds = 8;              ///< of pairing and solving, at most; the updates settle in 4 to 8
 };
 
 struct Unwarped {
-  Similarity3d target_from_source;  ///< the start, where no warp was found
-  double amplitude =
-      0;            ///< of the displacements' prior, a coordinate's standard deviation; 0: none
-  double gain = 0;  ///< log evidence for that amplitude over 0
+  Similarity3d target_from_source;  ///< the start, unless `found` or `at_limit`
+  WarpOutcome outcome = WarpOutcome::none;
+  double amplitude = 0;  ///< of the displacements' prior, a coordinate's standard deviation; 0
+                         ///< unless `found` or `at_limit`
+  double gain = 0;  ///< log evidence for the likeliest amplitude over 0, also if below min_gain
 };
 
 /// A similarity beside a smooth warp of the source. Where one cloud is bent, the residuals of

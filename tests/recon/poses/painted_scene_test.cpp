@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "recon/poses/cross_modal.hpp"
 #include "recon/poses/heat_check.hpp"
 #include "recon/poses/orbit_rescue.hpp"
 #include "tests/recon/poses/box_scene.hpp"
@@ -136,6 +137,11 @@ TEST(CorrectByHeat, OnlyTemperaturesThatFindAViewMoveIt) {
   EXPECT_EQ(verdict({false, 0.8, 0.3, 1.0}), HeatVerdict::heat_alone);
   // Weakly, but form likes it better there too.
   EXPECT_EQ(verdict({true, 0.3, 0.9, 0.5}), HeatVerdict::both);
+  // Neither scene knows it there: agreeing on nothing moves nobody.
+  EXPECT_EQ(verdict({true, 0, 0, 0}), HeatVerdict::doubt);
+  EXPECT_EQ(verdict({true, 0.03, 0.05, 0.04}), HeatVerdict::doubt);
+  EXPECT_EQ(verdict({true, 0.3, 0.59, 0.5}), HeatVerdict::doubt);
+  EXPECT_EQ(verdict({true, 0.3, 0.61, 0.5}), HeatVerdict::both);
   // Found nowhere; that both scenes agree on a place where neither knows it says nothing.
   EXPECT_EQ(verdict({true, 0.03, 0.2, 0.7}), HeatVerdict::form_alone);
   EXPECT_EQ(verdict({false, 0.03, 0.2, 0.7}), HeatVerdict::form_alone);
@@ -145,6 +151,57 @@ TEST(CorrectByHeat, OnlyTemperaturesThatFindAViewMoveIt) {
   EXPECT_EQ(verdict({}), HeatVerdict::doubt);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(verdict({false, nan, nan, nan}), HeatVerdict::doubt);
+}
+
+TEST(CorrectByHeat, SharesOfNothingSayNothing) {
+  EXPECT_DOUBLE_EQ(share_of_usual(30, 40), 0.75);
+  EXPECT_EQ(share_of_usual(0, 0), 0);
+  EXPECT_EQ(share_of_usual(5, 0), 0);
+}
+
+TEST(CorrectByHeat, AViewKeptByFormAloneCarriesTheObjection) {
+  // Temperatures find it nowhere; what form said of it before decides.
+  for (const bool known_to_form : {true, false}) {
+    OrbitViews orbit;
+    RenderAlignment alignment;
+    add_stations(orbit, alignment);
+    orbit.images[4] = cv::Scalar(0.5);
+    if (!known_to_form) alignment.views[4].agreement = 0;
+    const SceneRenderer form = testing_orbit::box_renderer();
+    const Progress progress;
+    const Refinery refinery{form, orbit, progress};
+    const auto check = correct_by_heat(refinery, alignment);
+    ASSERT_TRUE(check) << check.error().message();
+    EXPECT_EQ(check->undecided, 0);
+    EXPECT_EQ(off_deg(alignment.views[4], at(120)), 0);
+    ASSERT_TRUE(refinery.together(alignment, 1e-4, {judging_rounds().front()}));
+    for (std::size_t i = 0; i < 12; ++i)
+      EXPECT_EQ(!alignment.views[i].objection.empty(), i == 4 && known_to_form) << i;
+    EXPECT_EQ(alignment.views[4].doubt.empty(), known_to_form);
+    const std::string& told = alignment.views[4].objection;
+    EXPECT_EQ(told.find("1.00 of its usual") != std::string::npos, known_to_form) << told;
+  }
+}
+
+TEST(CorrectByHeat, ViewsKeptAgainstTemperaturesAreNamedAndCounted) {
+  ModalityPoses poses;
+  poses.contested = {{"t004.tiff", "found nowhere"}, {"t009.tiff", "found nowhere"}};
+  std::string why = "12 lines";
+  tell_contradicted(0, poses, why);
+  EXPECT_EQ(poses.gates.at("views_against_temperatures"), 2);
+  EXPECT_NE(why.find("t004.tiff, t009.tiff"), std::string::npos) << why;
+
+  ModalityPoses most;
+  why = "12 lines";
+  tell_contradicted(7, most, why);
+  EXPECT_EQ(most.gates.at("views_against_temperatures"), 7);
+  EXPECT_NE(why.find("7 views"), std::string::npos) << why;
+
+  ModalityPoses none;
+  why = "12 lines";
+  tell_contradicted(0, none, why);
+  EXPECT_EQ(none.gates.at("views_against_temperatures"), 0);
+  EXPECT_EQ(why, "12 lines");
 }
 
 TEST(CorrectByHeat, WhereMostAreContradictedNoneGoes) {
