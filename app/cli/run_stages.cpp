@@ -26,11 +26,12 @@ json status_json(const StageStatus& status) {
   return j;
 }
 
-void announce(terminal::Console& console, const StageStatus& s) {
+void announce(terminal::Console& console, const StageStatus& s, bool dry_run) {
   const std::string brief = s.output.metrics.value("brief", std::string());
   switch (s.state) {
     case StageState::planned:
-      console.detail(fmt::format("{:<14} starts: {}", s.stage, s.why));
+      if (dry_run) console.info(fmt::format("{:<14} would run: {}", s.stage, s.why));
+      else console.detail(fmt::format("{:<14} starts: {}", s.stage, s.why));
       break;
     case StageState::ran:
       console.info(fmt::format("{:<14} {:>6.1f} s  {}", s.stage, s.wall_s, brief));
@@ -121,13 +122,18 @@ Status run_stages(Context& context, const StageFolders& given,
   ORBITFUSE_ASSIGN(stages::SessionInput input,
                    stages::open_session_input(folders.session, context.progress));
   for (const std::string& warning : input.session.warnings) context.console.warning(warning);
+  const std::string session = fs::absolute(folders.session).lexically_normal().string();
+  if (const auto earlier = earlier_run(folders.out); earlier && !earlier->is_null() && (*earlier)["session"] != session)
+    context.console.warning(fmt::format("{} holds results of {}: what this run doesn't reach stays that session's; "
+                                        "give each session an --out of its own",
+                                        folders.out, (*earlier)["session"].get<std::string>()));
   const pipeline::RunOptions options{.out = folders.out, .targets = targets,
                                      .force = context.common.force,
                                      .resume = context.common.resume,
                                      .dry_run = context.common.dry_run};
   pipeline::Runner runner(stages::build_stages(input, context.config), options, context.progress);
   runner.on_status = [&](const StageStatus& status) {
-    announce(context.console, status);
+    announce(context.console, status, options.dry_run);
     json event = status_json(status);
     event["event"] = "stage";
     context.console.event(std::move(event));
@@ -139,7 +145,7 @@ Status run_stages(Context& context, const StageFolders& given,
   context.result = {{"session", folders.session}, {"out", folders.out}, {"stages", list}};
   if (!context.common.dry_run && !summary.stages.empty()) {
     const json run = {{"schema", 1},
-                      {"session", fs::absolute(folders.session).lexically_normal().string()},
+                      {"session", session},
                       {"orbitfuse", pipeline::software_version()},
                       {"config", context.config.settings().to_json()},
                       {"seed", context.config.seed},

@@ -159,7 +159,7 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
     return fail(ErrorKind::quality, "poses.thermal",
                 fmt::format("{} thermal frames carry stations, 4 are needed to place an orbit",
                             stations.size()),
-                "declare the stations on import (spacing and number of loops)");
+                "import again and say how the views were taken, e.g. --station-spacing-deg 30 --loops 2");
 
   const std::vector<const FrameRecord*> tracking =
       visible.renderer ? tracking_of(frames, *stations.front()) : std::vector<const FrameRecord*>{};

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <map>
 
 #include "core/file_io.hpp"
@@ -130,6 +131,17 @@ TEST_F(Run, DryRunWritesNothing) {
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_FALSE(fs::exists(out));
   EXPECT_EQ(states(outcome).at("poses_visible"), "planned");
+  const Outcome told = orbitfuse_program({"run", session, "--out", out, "--dry-run"});
+  EXPECT_THAT(told.out + told.err, HasSubstr("would run"));
+}
+
+TEST_F(Run, FolderOfAnotherSessionsResultsIsWarnedOf) {
+  write_fixture_session(session);
+  fs::create_directories(out);
+  std::ofstream(out / "run.json") << R"({"schema": 1, "session": "/elsewhere/car", "stages": []})";
+  const Outcome outcome = run({"--dry-run"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out + outcome.err, HasSubstr("/elsewhere/car"));
 }
 
 TEST_F(Run, GivenCamerasAreRenderedAsGiven) {
