@@ -13,9 +13,9 @@
 #include "app/cli/run_stages.hpp"
 #include "app/terminal/exit_code.hpp"
 #include "app/terminal/interrupt.hpp"
-#include "core/cpu.hpp"
-#include "core/memory.hpp"
-#include "core/parallel.hpp"
+#include "core/system/cpu.hpp"
+#include "core/system/memory.hpp"
+#include "core/system/parallel.hpp"
 
 // The only place that turns errors into exit codes (docs/cli.md).
 namespace orbitfuse {

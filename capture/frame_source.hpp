@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "core/camera.hpp"
+#include "core/geometry/camera.hpp"
 #include "core/result.hpp"
-#include "core/session.hpp"
+#include "core/session/session.hpp"
 
 // The seam to hardware. A driver implements four functions: describe, start, next, stop.
 namespace orbitfuse {

@@ -5,7 +5,7 @@
 
 #include "app/pipeline/runner.hpp"
 #include "app/stages/build_stages.hpp"
-#include "core/file_io.hpp"
+#include "core/system/file_io.hpp"
 
 namespace orbitfuse::cli {
 namespace {

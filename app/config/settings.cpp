@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "core/file_io.hpp"
+#include "core/system/file_io.hpp"
 
 namespace orbitfuse::config {
 namespace {

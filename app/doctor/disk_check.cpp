@@ -7,7 +7,7 @@
 #include <cstring>
 
 #include "app/doctor/checks.hpp"
-#include "core/file_io.hpp"
+#include "core/system/file_io.hpp"
 
 namespace orbitfuse::doctor {
 

@@ -6,7 +6,7 @@
 
 #include "app/eval/ground_truth.hpp"
 #include "core/progress.hpp"
-#include "core/session.hpp"
+#include "core/session/session.hpp"
 
 namespace orbitfuse::eval {
 

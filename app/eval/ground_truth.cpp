@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/file_io.hpp"
+#include "core/system/file_io.hpp"
 
 namespace orbitfuse::eval {
 namespace {

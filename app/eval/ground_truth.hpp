@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/modality.hpp"
-#include "core/reconstruction.hpp"
+#include "core/geometry/reconstruction.hpp"
 
 namespace orbitfuse::eval {
 

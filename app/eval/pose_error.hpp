@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/reconstruction.hpp"
+#include "core/geometry/reconstruction.hpp"
 #include "core/result.hpp"
 
 namespace orbitfuse::eval {

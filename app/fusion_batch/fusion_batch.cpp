@@ -5,8 +5,8 @@
 
 #include <map>
 
-#include "core/file_io.hpp"
-#include "core/image_io.hpp"
+#include "core/system/file_io.hpp"
+#include "core/image/image_io.hpp"
 #include "fusion/metrics/metrics.hpp"
 
 namespace orbitfuse::batch {

@@ -10,7 +10,7 @@
 
 #include "app/pipeline/folder_lock.hpp"
 #include "app/pipeline/usage_clock.hpp"
-#include "core/file_io.hpp"
+#include "core/system/file_io.hpp"
 
 namespace orbitfuse::pipeline {
 namespace fs = std::filesystem;

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "core/file_io.hpp"
+#include "core/system/file_io.hpp"
 
 namespace orbitfuse::pipeline {
 namespace fs = std::filesystem;

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "core/utc_now.hpp"
+#include "core/system/utc_now.hpp"
 
 namespace orbitfuse::recording {
 

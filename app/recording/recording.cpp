@@ -8,7 +8,7 @@
 #include <set>
 #include <thread>
 
-#include "core/utc_now.hpp"
+#include "core/system/utc_now.hpp"
 
 namespace orbitfuse::recording {
 namespace {

@@ -14,7 +14,7 @@
 #include "app/recording/prepared_source.hpp"
 #include "capture/live/live_guide.hpp"
 #include "capture/live/live_state.hpp"
-#include "capture/recorder.hpp"
+#include "capture/recording/recorder.hpp"
 
 namespace orbitfuse::recording {
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <thread>
 
-#include "capture/frame_encoding.hpp"
+#include "capture/recording/frame_encoding.hpp"
 
 namespace orbitfuse::recording {
 namespace {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "app/pipeline/stage.hpp"
-#include "core/palette.hpp"
+#include "core/image/palette.hpp"
 
 namespace orbitfuse::report {
 

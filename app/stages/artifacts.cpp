@@ -3,11 +3,11 @@
 
 #include <fmt/format.h>
 
-#include "core/colmap_model.hpp"
-#include "core/file_io.hpp"
-#include "core/image_io.hpp"
+#include "core/formats/colmap_model.hpp"
+#include "core/system/file_io.hpp"
+#include "core/image/image_io.hpp"
 #include "core/temperature.hpp"
-#include "core/transforms_json.hpp"
+#include "core/formats/transforms_json.hpp"
 
 namespace orbitfuse::stages {
 namespace fs = std::filesystem;

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "app/pipeline/stage.hpp"
-#include "core/reconstruction.hpp"
-#include "core/session.hpp"
-#include "core/transform.hpp"
+#include "core/geometry/reconstruction.hpp"
+#include "core/session/session.hpp"
+#include "core/geometry/transform.hpp"
 
 // What stages leave for each other, in formats that other tools read (docs/formats.md).
 namespace orbitfuse::stages {

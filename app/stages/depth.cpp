@@ -3,8 +3,8 @@
 
 #include "app/stages/artifacts.hpp"
 #include "app/stages/stage_list.hpp"
-#include "core/image_io.hpp"
-#include "core/parallel.hpp"
+#include "core/image/image_io.hpp"
+#include "core/system/parallel.hpp"
 #include "recon/depth/dense_depth.hpp"
 
 namespace orbitfuse::stages {

@@ -8,7 +8,7 @@
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
 #include "app/stages/training_data.hpp"
-#include "core/image_io.hpp"
+#include "core/image/image_io.hpp"
 
 namespace orbitfuse::stages {
 namespace {

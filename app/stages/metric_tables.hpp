@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/palette.hpp"
+#include "core/image/palette.hpp"
 #include "fusion/metrics/metrics.hpp"
 
 namespace orbitfuse::stages {

@@ -11,8 +11,8 @@
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
 #include "app/stages/training_data.hpp"
-#include "core/file_io.hpp"
-#include "core/image_io.hpp"
+#include "core/system/file_io.hpp"
+#include "core/image/image_io.hpp"
 #include "recon/nerf/nerf.hpp"
 
 namespace orbitfuse::stages {

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "core/median.hpp"
+#include "core/numeric/median.hpp"
 
 namespace orbitfuse::stages {
 namespace {

@@ -9,8 +9,8 @@
 #include "app/stages/artifacts.hpp"
 #include "app/stages/stage_list.hpp"
 #include "app/stages/visible_renderer.hpp"
-#include "core/image_io.hpp"
-#include "core/palette.hpp"
+#include "core/image/image_io.hpp"
+#include "core/image/palette.hpp"
 #include "recon/nerf/nerf.hpp"
 
 namespace orbitfuse::stages {

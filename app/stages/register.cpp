@@ -9,8 +9,8 @@
 #include "app/stages/stage_list.hpp"
 #include "app/stages/training_data.hpp"
 #include "app/stages/visible_renderer.hpp"
-#include "core/ply.hpp"
-#include "recon/poses/similarity_search.hpp"
+#include "core/formats/ply.hpp"
+#include "recon/registration/images/similarity_search.hpp"
 #include "recon/registration/register.hpp"
 
 namespace orbitfuse::stages {

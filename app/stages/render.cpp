@@ -9,10 +9,10 @@
 #include "app/stages/artifacts.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
-#include "core/file_io.hpp"
-#include "core/image_io.hpp"
-#include "core/palette.hpp"
-#include "core/transforms_json.hpp"
+#include "core/system/file_io.hpp"
+#include "core/image/image_io.hpp"
+#include "core/image/palette.hpp"
+#include "core/formats/transforms_json.hpp"
 #include "recon/nerf/nerf.hpp"
 
 namespace orbitfuse::stages {

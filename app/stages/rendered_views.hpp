@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/palette.hpp"
+#include "core/image/palette.hpp"
 #include "core/result.hpp"
 
 namespace orbitfuse::stages {

@@ -3,8 +3,8 @@
 
 #include "app/stages/report_content.hpp"
 #include "app/stages/stage_list.hpp"
-#include "core/file_io.hpp"
-#include "core/image_io.hpp"
+#include "core/system/file_io.hpp"
+#include "core/image/image_io.hpp"
 
 namespace orbitfuse::stages {
 namespace {

@@ -7,9 +7,9 @@
 #include "app/stages/artifacts.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/training_data.hpp"
-#include "core/cpu.hpp"
-#include "core/image_io.hpp"
-#include "core/parallel.hpp"
+#include "core/system/cpu.hpp"
+#include "core/image/image_io.hpp"
+#include "core/system/parallel.hpp"
 #include "core/temperature.hpp"
 
 namespace orbitfuse::stages {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "core/palette.hpp"
+#include "core/image/palette.hpp"
 
 namespace orbitfuse::stages {
 namespace {

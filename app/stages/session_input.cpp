@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <mutex>
 
-#include "core/file_io.hpp"
-#include "core/image_io.hpp"
-#include "core/parallel.hpp"
+#include "core/system/file_io.hpp"
+#include "core/image/image_io.hpp"
+#include "core/system/parallel.hpp"
 
 namespace orbitfuse::stages {
 namespace {

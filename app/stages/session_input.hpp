@@ -5,7 +5,7 @@
 #include <string>
 
 #include "core/progress.hpp"
-#include "core/session.hpp"
+#include "core/session/session.hpp"
 
 namespace orbitfuse::stages {
 

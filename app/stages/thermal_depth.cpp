@@ -2,7 +2,7 @@
 #include "app/stages/thermal_depth.hpp"
 
 #include "recon/depth/dense_depth.hpp"
-#include "recon/nerf/scene.hpp"
+#include "recon/nerf/training/scene.hpp"
 
 namespace orbitfuse::stages {
 

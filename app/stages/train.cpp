@@ -6,7 +6,7 @@
 #include "app/stages/thermal_depth.hpp"
 #include "app/stages/train_extension.hpp"
 #include "app/stages/training_data.hpp"
-#include "core/ply.hpp"
+#include "core/formats/ply.hpp"
 #include "recon/nerf/nerf.hpp"
 
 namespace orbitfuse::stages {

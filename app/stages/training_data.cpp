@@ -7,8 +7,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "core/image_io.hpp"
-#include "core/parallel.hpp"
+#include "core/image/image_io.hpp"
+#include "core/system/parallel.hpp"
 
 namespace orbitfuse::stages {
 

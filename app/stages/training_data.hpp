@@ -2,7 +2,7 @@
 #pragma once
 
 #include "app/stages/session_input.hpp"
-#include "core/reconstruction.hpp"
+#include "core/geometry/reconstruction.hpp"
 #include "recon/nerf/dataset.hpp"
 
 namespace orbitfuse::stages {

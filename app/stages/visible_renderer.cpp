@@ -8,10 +8,10 @@ namespace orbitfuse::stages {
 SceneRenderer edge_renderer(const nerf::Field& field, const Progress& progress) {
   nerf::RenderOptions coarse;
   coarse.sample_factor = 0.5;
-  return [&, coarse](const Camera& camera, const Rigid3d& cam_from_world) -> Result<SceneView> {
+  return [&, coarse](const Camera& camera, const Rigid3d& cam_from_world) -> Result<SceneRender> {
     ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
                      nerf::render(field, camera, cam_from_world, coarse, progress));
-    SceneView view{{}, seen.depth};
+    SceneRender view{{}, seen.depth};
     cv::cvtColor(seen.color, view.brightness, cv::COLOR_RGB2GRAY);
     return view;
   };

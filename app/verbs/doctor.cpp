@@ -8,8 +8,8 @@
 
 #include "app/cli/verb.hpp"
 #include "app/doctor/checks.hpp"
-#include "core/cpu.hpp"
-#include "core/parallel.hpp"
+#include "core/system/cpu.hpp"
+#include "core/system/parallel.hpp"
 #include "drivers/aravis/aravis_source.hpp"
 #include "drivers/aravis/gvcp_probe.hpp"
 

@@ -6,7 +6,7 @@
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
 #include "app/fusion_batch/fusion_batch.hpp"
-#include "core/image_io.hpp"
+#include "core/image/image_io.hpp"
 
 namespace orbitfuse::cli {
 namespace {

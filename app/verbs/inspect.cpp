@@ -9,7 +9,7 @@
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
 #include "app/pipeline/stage_record.hpp"
-#include "core/session.hpp"
+#include "core/session/session.hpp"
 
 namespace orbitfuse::cli {
 namespace {

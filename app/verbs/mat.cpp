@@ -12,7 +12,7 @@
 #include <optional>
 
 #include "app/cli/verb.hpp"
-#include "core/file_io.hpp"
+#include "core/system/file_io.hpp"
 
 namespace orbitfuse::cli {
 namespace {

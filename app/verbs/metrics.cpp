@@ -4,7 +4,7 @@
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
 #include "app/fusion_batch/fusion_batch.hpp"
-#include "core/image_io.hpp"
+#include "core/image/image_io.hpp"
 #include "fusion/metrics/metrics.hpp"
 
 namespace orbitfuse::cli {

@@ -6,7 +6,7 @@
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
 #include "app/stages/registration_json.hpp"
-#include "core/ply.hpp"
+#include "core/formats/ply.hpp"
 
 namespace orbitfuse::cli {
 namespace {

@@ -2,7 +2,7 @@
 #include "app/cli/run_stages.hpp"
 #include "app/cli/training_limits.hpp"
 #include "app/cli/verb.hpp"
-#include "core/transforms_json.hpp"
+#include "core/formats/transforms_json.hpp"
 
 namespace orbitfuse::cli {
 

@@ -11,8 +11,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "core/cpu.hpp"
-#include "core/parallel.hpp"
+#include "core/system/cpu.hpp"
+#include "core/system/parallel.hpp"
 #include "fusion/cnn_lpif/cnn_lpif.hpp"
 #include "fusion/metrics/metrics.hpp"
 

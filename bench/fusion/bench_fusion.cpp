@@ -12,9 +12,9 @@
 #include <string>
 
 #include "bench/fusion/modes.hpp"
-#include "core/cpu.hpp"
-#include "core/memory.hpp"
-#include "core/parallel.hpp"
+#include "core/system/cpu.hpp"
+#include "core/system/memory.hpp"
+#include "core/system/parallel.hpp"
 
 int main(int argc, char** argv) {
   using namespace orbitfuse;

@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <string_view>
 
-#include "core/file_io.hpp"
+#include "core/system/file_io.hpp"
 
 namespace orbitfuse::bench {
 namespace {

@@ -9,8 +9,8 @@
 #include <string>
 
 #include "bench/fusion/modes.hpp"
-#include "core/cpu.hpp"
-#include "core/parallel.hpp"
+#include "core/system/cpu.hpp"
+#include "core/system/parallel.hpp"
 #include "fusion/metrics/metrics.hpp"
 
 namespace orbitfuse::bench {

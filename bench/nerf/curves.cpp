@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/nerf/experiment.hpp"
-#include "core/cpu.hpp"
-#include "core/file_io.hpp"
-#include "core/parallel.hpp"
+#include "core/system/cpu.hpp"
+#include "core/system/file_io.hpp"
+#include "core/system/parallel.hpp"
 
 namespace orbitfuse::bench {
 namespace {

@@ -7,9 +7,9 @@
 #include <ctime>
 #include <opencv2/imgproc.hpp>
 
-#include "core/image_io.hpp"
+#include "core/image/image_io.hpp"
 #include "fusion/metrics/metrics.hpp"
-#include "recon/nerf/scene.hpp"
+#include "recon/nerf/training/scene.hpp"
 
 namespace orbitfuse::bench {
 namespace {

@@ -7,9 +7,9 @@
 
 #include <cmath>
 
-#include "core/cpu.hpp"
-#include "recon/nerf/network.hpp"
-#include "recon/nerf/random.hpp"
+#include "core/system/cpu.hpp"
+#include "recon/nerf/field/network.hpp"
+#include "core/numeric/random.hpp"
 
 namespace {
 

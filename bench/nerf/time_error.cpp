@@ -12,8 +12,8 @@
 
 #include "bench/nerf/experiment.hpp"
 #include "bench/nerf/scenes.hpp"
-#include "core/cpu.hpp"
-#include "core/parallel.hpp"
+#include "core/system/cpu.hpp"
+#include "core/system/parallel.hpp"
 
 namespace {
 

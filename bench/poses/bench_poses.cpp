@@ -6,16 +6,16 @@
 #include <cstdio>
 #include <fmt/format.h>
 
-#include "bench/poses/scenes.hpp"
-#include "core/cpu.hpp"
-#include "core/parallel.hpp"
+#include "tests/support/orbit_scenes.hpp"
+#include "core/system/cpu.hpp"
+#include "core/system/parallel.hpp"
 #include "recon/poses/estimate_poses.hpp"
 
 namespace {
 
 using namespace orbitfuse;
 
-void print(const ModalityPoses& poses, const Reconstruction& anchor, const bench::Truth& truth,
+void print(const ModalityPoses& poses, const Reconstruction& anchor, const scenes::Truth& truth,
            double cpu_s) {
   for (const LadderStep& step : poses.ladder)
     fmt::print("  {} {}: {}/{} in {:.1f} s: {}\n", step.held ? "held " : "fell ", step.rung,
@@ -25,7 +25,7 @@ void print(const ModalityPoses& poses, const Reconstruction& anchor, const bench
   for (const auto& [gate, value] : poses.gates) fmt::print("  {} = {:.4g}\n", gate, value);
   fmt::print("  posed {}/{}, {:.1f} CPU s, {:.2f} px\n", poses.reconstruction.views.size(),
              poses.frame_count, cpu_s, poses.reprojection_rms_px);
-  const bench::PoseError error = bench::pose_error(poses.reconstruction, anchor, truth);
+  const scenes::PoseError error = scenes::pose_error(poses.reconstruction, anchor, truth);
   if (error.views > 0)
     fmt::print("  against the truth: ATE {:.3f} %, median {:.3f} %, worst {:.3f} % of the extent; "
                "rotation median {:.3f}, worst {:.3f} deg\n",
@@ -37,7 +37,7 @@ void print(const ModalityPoses& poses, const Reconstruction& anchor, const bench
 
 int main(int argc, char** argv) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);  // a run that is cut short keeps its first rungs
-  const auto data = bench::shared_data();
+  const auto data = scenes::shared_data();
   if (argc < 2 || !data) {
     std::fputs("bench_poses SCENE [WORKDIR [--visible-truth]]; needs the shared data (ORBITFUSE_SHARED)\n", stderr);
     return 2;
@@ -45,25 +45,25 @@ int main(int argc, char** argv) {
   const std::string which = argv[1];
   const std::filesystem::path workdir =
       argc > 2 ? argv[2] : std::filesystem::temp_directory_path() / "orbitfuse_bench_poses";
-  bench::Scene scene;
+  scenes::Scene scene;
   if (which == "container" || which == "tracking") {
-    bench::ContainerOptions options;
+    scenes::ContainerOptions options;
     options.tracking = which == "tracking";
     options.thermal_focal_error = 0.03;
     options.visible_focal_error = 0.03;
-    scene = bench::container_scene(*data, options);
+    scene = scenes::container_scene(*data, options);
   } else if (which == "car") {
-    scene = bench::session_scene(std::filesystem::path(ORBITFUSE_SOURCE_DIR) / "replay_data/car");
+    scene = scenes::session_scene(std::filesystem::path(ORBITFUSE_SOURCE_DIR) / "replay_data/car");
   } else if (which == "fox") {
-    scene = bench::fox_scene(*data);
+    scene = scenes::fox_scene(*data);
   } else {
-    scene = bench::folder_scene(*data / (which == "arco" ? "orbits" : "pairs") / which);
+    scene = scenes::folder_scene(*data / (which == "arco" ? "orbits" : "pairs") / which);
   }
   fmt::print("{}; {} threads\n", cpu_description(), thread_count());
 
   const PoseOptions options;
   Progress progress;
-  double start = bench::cpu_seconds();
+  double start = scenes::cpu_seconds();
   const bool from_truth = argc > 3 && std::string(argv[3]) == "--visible-truth";
   Result<ModalityPoses> visible = ModalityPoses{};
   if (from_truth) {
@@ -75,20 +75,20 @@ int main(int argc, char** argv) {
   fmt::print("visible\n");
   VisibleScene seen;
   if (visible) {
-    print(*visible, visible->reconstruction, scene.truth, bench::cpu_seconds() - start);
+    print(*visible, visible->reconstruction, scene.truth, scenes::cpu_seconds() - start);
     seen.reconstruction = visible->reconstruction;
   } else {
     fmt::print("  {}\n", visible.error().message());
   }
   if (scene.session.frames_of(Modality::thermal).empty()) return 0;
-  start = bench::cpu_seconds();
+  start = scenes::cpu_seconds();
   const auto thermal = estimate_thermal_poses(scene.session, visible ? &seen : nullptr, options,
                                               workdir, progress);
   fmt::print("thermal\n");
   if (thermal) {
     print(*thermal,
           thermal->shares_visible_frame ? seen.reconstruction : thermal->reconstruction,
-          scene.truth, bench::cpu_seconds() - start);
+          scene.truth, scenes::cpu_seconds() - start);
   } else {
     fmt::print("  {}\n", thermal.error().message());
   }

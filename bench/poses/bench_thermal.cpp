@@ -17,10 +17,10 @@
 #include <string_view>
 
 #include "bench/poses/misalignment.hpp"
-#include "bench/poses/scenes.hpp"
-#include "core/colmap_model.hpp"
-#include "core/cpu.hpp"
-#include "core/parallel.hpp"
+#include "tests/support/orbit_scenes.hpp"
+#include "core/formats/colmap_model.hpp"
+#include "core/system/cpu.hpp"
+#include "core/system/parallel.hpp"
 #include "recon/nerf/nerf.hpp"
 #include "recon/poses/estimate_poses.hpp"
 
@@ -57,29 +57,29 @@ Arguments arguments_of(int argc, char** argv) {
   return arguments;
 }
 
-Result<SceneView> rendered(const nerf::Field& field, const Camera& camera,
+Result<SceneRender> rendered(const nerf::Field& field, const Camera& camera,
                            const Rigid3d& cam_from_world, const Progress& progress) {
   nerf::RenderOptions coarse;
   coarse.sample_factor = 0.5;  // as in the application's stage
   ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
                    nerf::render(field, camera, cam_from_world, coarse, progress));
-  SceneView view{{}, seen.depth};
+  SceneRender view{{}, seen.depth};
   cv::cvtColor(seen.color, view.brightness, cv::COLOR_RGB2GRAY);
   return view;
 }
 
 /// One rung of the ladder alone: its success and error against its time.
-void print_rung(const char* name, const bench::Scene& scene, const VisibleScene* seen,
+void print_rung(const char* name, const scenes::Scene& scene, const VisibleScene* seen,
                 const PoseOptions& options) {
-  const double before = bench::cpu_seconds();
+  const double before = scenes::cpu_seconds();
   const auto poses = estimate_thermal_poses(
       scene.session, seen, options, fs::temp_directory_path() / "orbitfuse_bench_rung", {});
-  const double spent = bench::cpu_seconds() - before;
+  const double spent = scenes::cpu_seconds() - before;
   if (!poses) {
     fmt::print("| {} | none: {} | | | {:.0f} |\n", name, poses.error().found.substr(0, 120), spent);
     return;
   }
-  const bench::PoseError error = bench::pose_error(
+  const scenes::PoseError error = scenes::pose_error(
       poses->reconstruction, poses->shares_visible_frame ? seen->reconstruction : poses->reconstruction,
       scene.truth);
   fmt::print("| {} | {}/{} | {:.2f} / {:.2f} | {:.2f} / {:.2f} | {:.0f} |\n", name,
@@ -87,7 +87,7 @@ void print_rung(const char* name, const bench::Scene& scene, const VisibleScene*
              error.worst_percent, error.mean_rotation_deg, error.worst_rotation_deg, spent);
 }
 
-void print_rungs(const bench::Scene& scene, const VisibleScene& seen, const PoseOptions& options) {
+void print_rungs(const scenes::Scene& scene, const VisibleScene& seen, const PoseOptions& options) {
   fmt::print("| rung alone | posed | centres RMS / worst, % | rotation mean / worst, deg | CPU s |\n"
              "|---|---|---|---|---|\n");
   print_rung("COLMAP on the thermal views", scene, nullptr, options);
@@ -97,8 +97,8 @@ void print_rungs(const bench::Scene& scene, const VisibleScene& seen, const Pose
 }
 
 Status run(const Arguments& arguments) {
-  ORBITFUSE_ASSIGN(bench::Scene scene, bench::run_scene(arguments.session, arguments.truth));
-  if (!arguments.tracking.empty()) bench::add_tracking(scene, arguments.tracking);
+  ORBITFUSE_ASSIGN(scenes::Scene scene, scenes::run_scene(arguments.session, arguments.truth));
+  if (!arguments.tracking.empty()) scenes::add_tracking(scene, arguments.tracking);
   for (DeviceInfo& device : scene.session.devices)
     if (device.modality == Modality::thermal && device.lens.focal_px)
       *device.lens.focal_px *= 1 + arguments.focal_error;
@@ -110,16 +110,16 @@ Status run(const Arguments& arguments) {
   double rendering_s = 0;
   int renders = 0;
   VisibleScene seen{std::move(visible), [&](const Camera& camera, const Rigid3d& pose) {
-                      const double before = bench::cpu_seconds();
+                      const double before = scenes::cpu_seconds();
                       auto view = rendered(field, camera, pose, progress);
-                      rendering_s += bench::cpu_seconds() - before, ++renders;
+                      rendering_s += scenes::cpu_seconds() - before, ++renders;
                       return view;
                     }};
   fmt::print("{}; {} threads\n", cpu_description(), thread_count());
-  const double before = bench::cpu_seconds();
+  const double before = scenes::cpu_seconds();
   if (arguments.views)
     progress.report = [&](const ProgressEvent& e) {
-      fmt::print("after {:.1f} CPU s: {}\n", bench::cpu_seconds() - before, e.detail);
+      fmt::print("after {:.1f} CPU s: {}\n", scenes::cpu_seconds() - before, e.detail);
     };
   const auto start = std::chrono::steady_clock::now();
   PoseOptions options;
@@ -141,9 +141,9 @@ Status run(const Arguments& arguments) {
     fmt::print("contested {}: {}\n", view.name, view.why);
   for (const auto& [gate, value] : poses.gates) fmt::print("{} = {:.4g}\n", gate, value);
   fmt::print("{}/{} posed, {:.1f} s, {:.1f} CPU s, {:.1f} of them in {} renders\n",
-             poses.reconstruction.views.size(), poses.frame_count, wall, bench::cpu_seconds() - before,
+             poses.reconstruction.views.size(), poses.frame_count, wall, scenes::cpu_seconds() - before,
              rendering_s, renders);
-  const bench::PoseError error = bench::pose_error(
+  const scenes::PoseError error = scenes::pose_error(
       poses.reconstruction, poses.shares_visible_frame ? seen.reconstruction : poses.reconstruction,
       scene.truth);
   fmt::print(
@@ -152,14 +152,14 @@ Status run(const Arguments& arguments) {
       error.ate_percent, error.median_percent, error.worst_percent, error.mean_rotation_deg,
       error.rotation_deg, error.worst_rotation_deg);
   ORBITFUSE_ASSIGN(
-      const bench::Misalignment apart,
-      bench::misalignment(scene, seen.reconstruction, poses.reconstruction, seen.renderer));
+      const scenes::Misalignment apart,
+      scenes::misalignment(scene, seen.reconstruction, poses.reconstruction, seen.renderer));
   fmt::print(
       "rendered pairs of {} test views: median misalignment {:.2f} px at 640 wide, 90 % within "
       "{:.2f} px\n",
       scene.test.size(), apart.median(), apart.share(0.9));
   if (arguments.views)
-    for (const bench::ViewError& view : error.each)
+    for (const scenes::ViewError& view : error.each)
       fmt::print("{} centre {:.2f} %, outwards {:+.2f} %, rotation {:.2f} deg\n", view.name,
                  view.center_percent, view.outward_percent, view.rotation_deg);
   return {};

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace orbitfuse::bench {
+namespace orbitfuse::scenes {
 namespace {
 
 /// Views by how near their direction to the scene's point is to the new camera's.
@@ -61,7 +61,7 @@ Result<Misalignment> misalignment(const Scene& scene, const Reconstruction& visi
         test.camera.scaled_to(80, std::max(1, 80 * test.camera.height / test.camera.width))
             .without_distortion();
     small.cam_from_world = rebase(test.cam_from_world, *fit);
-    ORBITFUSE_ASSIGN(const SceneView seen, renderer(small.camera, small.cam_from_world));
+    ORBITFUSE_ASSIGN(const SceneRender seen, renderer(small.camera, small.cam_from_world));
     const Eigen::Vector3d center = camera_center(small.cam_from_world);
     const Rigid3d world_from_cam = small.cam_from_world.inverse();
     const auto at = [&](int x, int y) {
@@ -86,4 +86,4 @@ Result<Misalignment> misalignment(const Scene& scene, const Reconstruction& visi
   return result;
 }
 
-}  // namespace orbitfuse::bench
+}  // namespace orbitfuse::scenes

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "bench/poses/scenes.hpp"
+#include "tests/support/orbit_scenes.hpp"
 #include "recon/poses/estimate_poses.hpp"
 
-namespace orbitfuse::bench {
+namespace orbitfuse::scenes {
 
 /// How far apart the two modalities of a rendered pair lie, against the truth. A field shows what
 /// its views near the new camera saw: a scene point's pixel in a true view is put back into the
@@ -22,4 +22,4 @@ struct Misalignment {
 Result<Misalignment> misalignment(const Scene& scene, const Reconstruction& visible,
                                   const Reconstruction& thermal, const SceneRenderer& renderer);
 
-}  // namespace orbitfuse::bench
+}  // namespace orbitfuse::scenes

@@ -16,9 +16,9 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/registration/oracle.hpp"
-#include "bench/registration/scenes.hpp"
-#include "core/file_io.hpp"
-#include "core/parallel.hpp"
+#include "tests/support/cloud_scenes.hpp"
+#include "core/system/file_io.hpp"
+#include "core/system/parallel.hpp"
 #include "recon/registration/register.hpp"
 
 using namespace orbitfuse;
@@ -46,10 +46,10 @@ double scale_error_percent(const Similarity3d& a, const Similarity3d& b) {
 struct Errors {
   std::vector<double> rotation_deg, scale_percent, rmse_percent, cpu_ms;
 
-  void add(const bench::CloudPair& pair, const Similarity3d& estimate, double cpu_s = 0) {
+  void add(const scenes::CloudPair& pair, const Similarity3d& estimate, double cpu_s = 0) {
     rotation_deg.push_back(rotation_angle_deg(estimate.rotation, pair.target_from_source.rotation));
     scale_percent.push_back(scale_error_percent(estimate, pair.target_from_source));
-    rmse_percent.push_back(bench::surface_rmse_percent(pair, estimate));
+    rmse_percent.push_back(scenes::surface_rmse_percent(pair, estimate));
     cpu_ms.push_back(1000 * cpu_s);
   }
   std::string text() const {
@@ -70,12 +70,12 @@ struct Tally {
   std::vector<double> cpu_ms;
   Errors right;    ///< of the successes
   Errors refined;  ///< refinement alone
-  std::map<bench::Oracle, Errors> oracles;
+  std::map<scenes::Oracle, Errors> oracles;
   std::map<std::string, int> good_of_cloud;
 };
 
 /// From 3 degrees and 3 % off, turned about the object's middle.
-void run_refinement(const bench::CloudPair& pair, const Arguments& arguments, std::uint32_t seed,
+void run_refinement(const scenes::CloudPair& pair, const Arguments& arguments, std::uint32_t seed,
                     Tally& tally) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
@@ -93,7 +93,7 @@ void run_refinement(const bench::CloudPair& pair, const Arguments& arguments, st
   if (refined) tally.refined.add(pair, refined->target_from_source, refined->cpu_s);
 }
 
-void explain(const bench::CloudPair& pair, const RegistrationOptions& options,
+void explain(const scenes::CloudPair& pair, const RegistrationOptions& options,
              const RegistrationReport& report, const std::string& label, std::uint32_t seed) {
   const Similarity3d& truth = pair.target_from_source;
   bool among = false;
@@ -112,7 +112,7 @@ void explain(const bench::CloudPair& pair, const RegistrationOptions& options,
   std::fflush(stdout);
 }
 
-void run_trial(const bench::CloudPair& pair, const Arguments& arguments, const std::string& level,
+void run_trial(const scenes::CloudPair& pair, const Arguments& arguments, const std::string& level,
                const std::string& cloud, std::uint32_t seed, Tally& tally) {
   ++tally.trials;
   RegistrationOptions options;
@@ -140,15 +140,15 @@ void run_trial(const bench::CloudPair& pair, const Arguments& arguments, const s
     explain(pair, options, *report, level + " " + cloud, seed);
 }
 
-void run_oracles(const bench::CloudPair& pair, Tally& tally) {
+void run_oracles(const scenes::CloudPair& pair, Tally& tally) {
   for (const auto kind :
-       {bench::Oracle::all_points, bench::Oracle::common, bench::Oracle::robust_common}) {
-    if (const auto best = bench::oracle_similarity(pair, kind))
+       {scenes::Oracle::all_points, scenes::Oracle::common, scenes::Oracle::robust_common}) {
+    if (const auto best = scenes::oracle_similarity(pair, kind))
       tally.oracles[kind].add(pair, *best);
   }
 }
 
-void print_row(const bench::Level& level, const Tally& t) {
+void print_row(const scenes::Level& level, const Tally& t) {
   std::string clouds;
   for (const auto& [name, good] : t.good_of_cloud)
     clouds += fmt::format("{}{} {}", clouds.empty() ? "" : ", ", name, good);
@@ -163,7 +163,7 @@ void print_row(const bench::Level& level, const Tally& t) {
   std::fflush(stdout);
 }
 
-nlohmann::json json_row(const bench::Level& level, const Tally& t) {
+nlohmann::json json_row(const scenes::Level& level, const Tally& t) {
   nlohmann::json row = {{"level", level.name},
                         {"trials", t.trials},
                         {"right", t.good},
@@ -211,10 +211,10 @@ Arguments parse(int argc, char** argv) {
 int main(int argc, char** argv) {
   const Arguments arguments = parse(argc, argv);
   set_thread_count(1);
-  std::vector<std::pair<std::string, bench::Surface>> surfaces;
+  std::vector<std::pair<std::string, scenes::Surface>> surfaces;
   for (const char* name : {"bunny", "indoor", "car"}) {
     if (!arguments.cloud.empty() && arguments.cloud != name) continue;
-    auto s = bench::surface(name);
+    auto s = scenes::surface(name);
     fmt::print("{}: {}\n", name,
                s ? fmt::format("largest radius {:.3f} of the diameter", s->radius() / s->diameter())
                  : "skipped, not in the shared data");
@@ -228,15 +228,15 @@ int main(int argc, char** argv) {
       arguments.oracle ? "---|---|---|" : "");
   std::vector<double> all_ms;
   nlohmann::json rows = nlohmann::json::array();
-  for (std::size_t l = 0; l < bench::levels().size(); ++l) {
-    const bench::Level& level = bench::levels()[l];
+  for (std::size_t l = 0; l < scenes::levels().size(); ++l) {
+    const scenes::Level& level = scenes::levels()[l];
     if (!arguments.level.empty() && arguments.level != level.name) continue;
     Tally total;
     for (const auto& [name, surface] : surfaces) {
       for (int trial = 0; trial < arguments.trials; ++trial) {
         const auto seed = static_cast<std::uint32_t>(arguments.first_seed + trial) * 1000u +
                           static_cast<std::uint32_t>(l);
-        const bench::CloudPair pair = bench::make_pair(surface, level, seed);
+        const scenes::CloudPair pair = scenes::make_pair(surface, level, seed);
         if (arguments.initialiser != "none")
           run_trial(pair, arguments, level.name, name, seed, total);
         if (arguments.initialiser == "both" || arguments.initialiser == "none")

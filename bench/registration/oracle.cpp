@@ -6,7 +6,7 @@
 
 #include "recon/registration/similarity.hpp"
 
-namespace orbitfuse::bench {
+namespace orbitfuse::scenes {
 namespace {
 
 /// Whether some point lies within `distance` of x.
@@ -54,4 +54,4 @@ std::optional<Similarity3d> oracle_similarity(const CloudPair& pair, Oracle kind
   return *fit;
 }
 
-}  // namespace orbitfuse::bench
+}  // namespace orbitfuse::scenes

@@ -9,7 +9,7 @@
 
 #include "core/modality.hpp"
 #include "core/result.hpp"
-#include "core/session.hpp"
+#include "core/session/session.hpp"
 
 namespace orbitfuse {
 

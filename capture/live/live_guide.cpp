@@ -8,12 +8,12 @@
 #include <cmath>
 #include <limits>
 
-#include "capture/frame_motion.hpp"
-#include "capture/frame_quality.hpp"
-#include "core/exif.hpp"
-#include "core/file_io.hpp"
-#include "core/image_codec.hpp"
-#include "core/utc_now.hpp"
+#include "capture/image_quality/frame_motion.hpp"
+#include "capture/image_quality/frame_quality.hpp"
+#include "core/image/exif.hpp"
+#include "core/system/file_io.hpp"
+#include "core/image/image_codec.hpp"
+#include "core/system/utc_now.hpp"
 
 namespace orbitfuse {
 namespace {

@@ -16,7 +16,7 @@
 #include "capture/guide/coverage.hpp"
 #include "capture/live/sharpness_reference.hpp"
 #include "capture/live/turntable.hpp"
-#include "capture/session_writer.hpp"
+#include "capture/recording/session_writer.hpp"
 
 namespace orbitfuse {
 

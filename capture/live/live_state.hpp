@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "capture/live/live_guide.hpp"
-#include "capture/recorder.hpp"
+#include "capture/recording/recorder.hpp"
 
 namespace orbitfuse {
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/session.hpp"
+#include "core/session/session.hpp"
 
 namespace orbitfuse {
 

@@ -10,7 +10,7 @@
 #include "capture/mat/mat_design.hpp"
 #include "capture/mat/mat_tracker.hpp"
 #include "capture/mat/scene_odometry.hpp"
-#include "core/transform.hpp"
+#include "core/geometry/transform.hpp"
 
 namespace orbitfuse {
 

@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 
 #include "capture/mat/mat_tracker.hpp"
-#include "core/transform.hpp"
+#include "core/geometry/transform.hpp"
 
 namespace orbitfuse {
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/transform.hpp"
+#include "core/geometry/transform.hpp"
 
 namespace orbitfuse {
 

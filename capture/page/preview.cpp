@@ -6,8 +6,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "core/image_codec.hpp"
-#include "core/image_io.hpp"
+#include "core/image/image_codec.hpp"
+#include "core/image/image_io.hpp"
 
 namespace orbitfuse {
 namespace {

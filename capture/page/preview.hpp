@@ -9,7 +9,7 @@
 #include <string>
 
 #include "core/modality.hpp"
-#include "core/palette.hpp"
+#include "core/image/palette.hpp"
 #include "core/result.hpp"
 
 namespace orbitfuse {

@@ -7,10 +7,10 @@
 #include <thread>
 #include <utility>
 
-#include "capture/resumed_event.hpp"
-#include "capture/resumed_ids.hpp"
-#include "core/file_io.hpp"
-#include "core/image_codec.hpp"
+#include "capture/recording/resumed_event.hpp"
+#include "capture/recording/resumed_ids.hpp"
+#include "core/system/file_io.hpp"
+#include "core/image/image_codec.hpp"
 
 namespace orbitfuse {
 namespace {

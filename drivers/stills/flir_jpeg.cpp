@@ -10,7 +10,7 @@
 #include <map>
 #include <vector>
 
-#include "core/image_codec.hpp"
+#include "core/image/image_codec.hpp"
 #include "core/temperature.hpp"
 
 namespace orbitfuse {

@@ -8,12 +8,12 @@
 #include <cmath>
 #include <deque>
 
-#include "capture/frame_encoding.hpp"
-#include "capture/session_folder.hpp"
-#include "capture/session_writer.hpp"
-#include "core/exif.hpp"
-#include "core/file_io.hpp"
-#include "core/image_codec.hpp"
+#include "capture/recording/frame_encoding.hpp"
+#include "capture/recording/session_folder.hpp"
+#include "capture/recording/session_writer.hpp"
+#include "core/image/exif.hpp"
+#include "core/system/file_io.hpp"
+#include "core/image/image_codec.hpp"
 #include "drivers/stills/image_list.hpp"
 #include "drivers/stills/known_poses.hpp"
 #include "drivers/stills/still_photo.hpp"

@@ -8,7 +8,7 @@
 
 #include "core/progress.hpp"
 #include "core/result.hpp"
-#include "core/session.hpp"
+#include "core/session/session.hpp"
 
 // Makes a session from files that other cameras and tools left. docs/formats.md lists the sources.
 namespace orbitfuse {

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "core/colmap_model.hpp"
-#include "core/file_io.hpp"
-#include "core/transforms_json.hpp"
+#include "core/formats/colmap_model.hpp"
+#include "core/system/file_io.hpp"
+#include "core/formats/transforms_json.hpp"
 
 namespace orbitfuse {
 namespace {

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "core/camera.hpp"
+#include "core/geometry/camera.hpp"
 #include "core/modality.hpp"
 #include "core/result.hpp"
-#include "core/transform.hpp"
+#include "core/geometry/transform.hpp"
 #include "drivers/stills/import.hpp"
 
 namespace orbitfuse {

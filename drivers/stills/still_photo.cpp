@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/exif.hpp"
-#include "core/file_io.hpp"
+#include "core/image/exif.hpp"
+#include "core/system/file_io.hpp"
 
 namespace orbitfuse {
 namespace {

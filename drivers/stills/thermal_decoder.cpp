@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/file_io.hpp"
+#include "core/system/file_io.hpp"
 #include "core/temperature.hpp"
 
 namespace orbitfuse {

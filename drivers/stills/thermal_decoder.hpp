@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "core/image_codec.hpp"
+#include "core/image/image_codec.hpp"
 #include "core/result.hpp"
 #include "drivers/stills/flir_jpeg.hpp"
 #include "drivers/stills/import.hpp"

@@ -5,7 +5,7 @@
 #include <cctype>
 #include <ctime>
 
-#include "core/file_io.hpp"
+#include "core/system/file_io.hpp"
 #include "drivers/stills/folder_watch.hpp"
 #include "drivers/stills/image_list.hpp"
 #include "drivers/stills/still_photo.hpp"

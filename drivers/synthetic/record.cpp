@@ -5,10 +5,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "capture/recorder.hpp"
-#include "core/file_io.hpp"
-#include "core/image_codec.hpp"
-#include "core/image_io.hpp"
+#include "capture/recording/recorder.hpp"
+#include "core/system/file_io.hpp"
+#include "core/image/image_codec.hpp"
+#include "core/image/image_io.hpp"
 #include "drivers/synthetic/orbit.hpp"
 #include "drivers/synthetic/renderer.hpp"
 #include "drivers/synthetic/sensor.hpp"

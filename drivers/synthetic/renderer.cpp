@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/parallel.hpp"
+#include "core/system/parallel.hpp"
 #include "drivers/synthetic/shading.hpp"
 
 namespace orbitfuse::synthetic {

@@ -3,8 +3,8 @@
 
 #include <opencv2/core.hpp>
 
-#include "core/camera.hpp"
-#include "core/transform.hpp"
+#include "core/geometry/camera.hpp"
+#include "core/geometry/transform.hpp"
 #include "drivers/synthetic/scene.hpp"
 
 namespace orbitfuse::synthetic {

@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/camera.hpp"
+#include "core/geometry/camera.hpp"
 #include "core/modality.hpp"
-#include "core/session.hpp"
-#include "core/transform.hpp"
+#include "core/session/session.hpp"
+#include "core/geometry/transform.hpp"
 #include "drivers/synthetic/orbit.hpp"
 
 namespace orbitfuse::synthetic {

@@ -3,9 +3,9 @@
 #include <optional>
 #include <utility>
 
-#include "capture/resumed_event.hpp"
-#include "capture/resumed_ids.hpp"
-#include "core/image_codec.hpp"
+#include "capture/recording/resumed_event.hpp"
+#include "capture/recording/resumed_ids.hpp"
+#include "core/image/image_codec.hpp"
 #include "drivers/synthetic/orbit.hpp"
 #include "drivers/synthetic/renderer.hpp"
 #include "drivers/synthetic/sensor.hpp"

@@ -12,11 +12,11 @@
 #include <vector>
 
 #include "capture/clock/clock_map.hpp"
-#include "capture/frame_rhythm.hpp"
+#include "capture/recording/frame_rhythm.hpp"
 #include "capture/frame_source.hpp"
-#include "capture/freeze_watch.hpp"
-#include "capture/lasting_failure.hpp"
-#include "capture/raw_counts.hpp"
+#include "capture/recording/freeze_watch.hpp"
+#include "capture/recording/lasting_failure.hpp"
+#include "capture/recording/raw_counts.hpp"
 #include "drivers/v4l2/identity.hpp"
 #include "drivers/v4l2/pixels.hpp"
 #include "drivers/v4l2/video_system.hpp"

@@ -5,7 +5,7 @@
 #include <opencv2/core/hal/hal.hpp>
 #include <vector>
 
-#include "core/parallel.hpp"
+#include "core/system/parallel.hpp"
 
 namespace orbitfuse::fusion {
 namespace {

@@ -6,7 +6,7 @@
 #include <array>
 #include <opencv2/imgproc.hpp>
 
-#include "core/parallel.hpp"
+#include "core/system/parallel.hpp"
 #include "fusion/best/band_mix.hpp"
 #include "fusion/best/base_rule.hpp"
 #include "fusion/pyramid/bands.hpp"

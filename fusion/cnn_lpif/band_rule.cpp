@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
-#include "core/parallel.hpp"
+#include "core/system/parallel.hpp"
 
 namespace orbitfuse::fusion {
 namespace {

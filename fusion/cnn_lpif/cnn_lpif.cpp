@@ -6,7 +6,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "core/parallel.hpp"
+#include "core/system/parallel.hpp"
 #include "fusion/cnn_lpif/band_rule.hpp"
 #include "fusion/cnn_lpif/score_map.hpp"
 #include "fusion/pyramid/bands.hpp"

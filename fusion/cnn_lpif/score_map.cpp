@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "core/parallel.hpp"
+#include "core/system/parallel.hpp"
 #include "fusion/cnn_lpif/conv_row.hpp"
 
 namespace orbitfuse::fusion::cnn {

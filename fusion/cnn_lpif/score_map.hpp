@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "core/cpu.hpp"
+#include "core/system/cpu.hpp"
 #include "fusion/cnn_lpif/network.hpp"
 #include "fusion/pyramid/image_pair.hpp"
 

@@ -8,8 +8,8 @@
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 
-#include "core/file_io.hpp"
-#include "core/parallel.hpp"
+#include "core/system/file_io.hpp"
+#include "core/system/parallel.hpp"
 #include "fusion/cnn_lpif/network.hpp"
 #include "fusion/training/dead_leaves.hpp"
 

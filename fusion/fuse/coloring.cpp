@@ -5,7 +5,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "core/palette.hpp"
+#include "core/image/palette.hpp"
 
 namespace orbitfuse {
 namespace {

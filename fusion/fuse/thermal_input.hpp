@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "core/palette.hpp"
+#include "core/image/palette.hpp"
 #include "fusion/pyramid/image_pair.hpp"
 
 namespace orbitfuse {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/parallel.hpp"
+#include "core/system/parallel.hpp"
 
 namespace orbitfuse::metrics {
 namespace {

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <functional>
 
-#include "core/parallel.hpp"
+#include "core/system/parallel.hpp"
 #include "fusion/metrics/measures.hpp"
 #include "fusion/metrics/metrics.hpp"
 

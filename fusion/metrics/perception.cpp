@@ -3,7 +3,7 @@
 #include <complex>
 #include <opencv2/imgproc.hpp>
 
-#include "core/parallel.hpp"
+#include "core/system/parallel.hpp"
 #include "fusion/metrics/blur.hpp"
 #include "fusion/metrics/measures.hpp"
 

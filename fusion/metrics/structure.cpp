@@ -4,7 +4,7 @@
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 
-#include "core/parallel.hpp"
+#include "core/system/parallel.hpp"
 #include "fusion/metrics/blur.hpp"
 #include "fusion/metrics/measures.hpp"
 

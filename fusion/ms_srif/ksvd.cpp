@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "core/parallel.hpp"
+#include "core/system/parallel.hpp"
 
 namespace orbitfuse::fusion {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "core/parallel.hpp"
+#include "core/system/parallel.hpp"
 #include "fusion/pyramid/bands.hpp"
 #include "fusion/pyramid/patch_dct.hpp"
 #include "fusion/pyramid/pyramid.hpp"

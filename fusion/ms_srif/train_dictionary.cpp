@@ -5,7 +5,7 @@
 
 #include <cstdlib>
 
-#include "core/file_io.hpp"
+#include "core/system/file_io.hpp"
 #include "fusion/ms_srif/ksvd.hpp"
 #include "fusion/pyramid/pyramid.hpp"
 #include "fusion/training/dead_leaves.hpp"

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/progress.hpp"
-#include "core/reconstruction.hpp"
+#include "core/geometry/reconstruction.hpp"
 #include "core/result.hpp"
 #include "recon/depth/options.hpp"
 

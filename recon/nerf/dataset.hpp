@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "core/camera.hpp"
+#include "core/geometry/camera.hpp"
 #include "core/modality.hpp"
-#include "core/reconstruction.hpp"
+#include "core/geometry/reconstruction.hpp"
 #include "core/result.hpp"
-#include "core/transform.hpp"
+#include "core/geometry/transform.hpp"
 
 namespace orbitfuse::nerf {
 

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "core/point_cloud.hpp"
+#include "core/geometry/point_cloud.hpp"
 #include "core/progress.hpp"
-#include "core/reconstruction.hpp"
+#include "core/geometry/reconstruction.hpp"
 #include "recon/nerf/dataset.hpp"
 #include "recon/nerf/field.hpp"
 #include "recon/nerf/history.hpp"

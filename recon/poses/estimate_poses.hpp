@@ -9,9 +9,10 @@
 #include <vector>
 
 #include "core/progress.hpp"
-#include "core/reconstruction.hpp"
+#include "core/geometry/reconstruction.hpp"
 #include "core/result.hpp"
-#include "core/session.hpp"
+#include "core/session/session.hpp"
+#include "recon/alignment/scene_renderer.hpp"
 
 // Camera poses of each modality by a ladder of methods; the first rung whose result passes the
 // gates holds, and the result says which and why.
@@ -87,13 +88,6 @@ struct ThermalPoses : ModalityPoses {
   /// False: a frame of its own, related to the visible one by an unknown similarity.
   bool shares_visible_frame = false;
 };
-
-/// The visible scene as some camera sees it.
-struct SceneView {
-  cv::Mat brightness;  ///< CV_32FC1
-  cv::Mat depth;       ///< CV_32FC1, along the optical axis; NaN = nothing there
-};
-using SceneRenderer = std::function<Result<SceneView>(const Camera&, const Rigid3d& cam_from_world)>;
 
 /// The visible world that thermal views are localised in; images come from the session's paths.
 struct VisibleScene {

@@ -7,7 +7,7 @@
 #include <limits>
 #include <map>
 
-#include "core/median.hpp"
+#include "core/numeric/median.hpp"
 
 namespace orbitfuse {
 namespace {

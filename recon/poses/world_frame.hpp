@@ -5,10 +5,10 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "core/reconstruction.hpp"
+#include "core/geometry/reconstruction.hpp"
 #include "core/result.hpp"
-#include "core/session.hpp"
-#include "core/transform.hpp"
+#include "core/session/session.hpp"
+#include "core/geometry/transform.hpp"
 
 // The world of a reconstruction is free up to a similarity. Ours is chosen so that orbits, crops
 // and cameras mean something in it: z up, the origin where the cameras look, median distance 1.

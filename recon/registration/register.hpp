@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "core/point_cloud.hpp"
+#include "core/geometry/point_cloud.hpp"
 #include "core/progress.hpp"
 #include "core/result.hpp"
-#include "core/transform.hpp"
+#include "core/geometry/transform.hpp"
 
 // Registration of two clouds of one object by a similarity (scale, R, t). Every length in the
 // options is relative to the target's robust diameter, so that units do not matter.

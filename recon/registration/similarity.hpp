@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/result.hpp"
-#include "core/transform.hpp"
+#include "core/geometry/transform.hpp"
 
 namespace orbitfuse::registration {
 

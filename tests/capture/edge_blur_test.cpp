@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "capture/edge_blur.hpp"
+#include "capture/image_quality/edge_blur.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "capture/frame_motion.hpp"
-#include "capture/frame_quality.hpp"
+#include "capture/image_quality/frame_motion.hpp"
+#include "capture/image_quality/frame_quality.hpp"
 #include "capture/guide/coverage.hpp"
 
 namespace orbitfuse {

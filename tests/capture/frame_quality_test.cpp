@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "capture/frame_quality.hpp"
+#include "capture/image_quality/frame_quality.hpp"
 
 #include <gtest/gtest.h>
 

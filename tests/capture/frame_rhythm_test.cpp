@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "capture/frame_rhythm.hpp"
+#include "capture/recording/frame_rhythm.hpp"
 
 #include <gtest/gtest.h>
 

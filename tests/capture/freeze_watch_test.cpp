@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "capture/freeze_watch.hpp"
+#include "capture/recording/freeze_watch.hpp"
 
 #include <gtest/gtest.h>
 

@@ -4,8 +4,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "capture/session_writer.hpp"
-#include "core/image_io.hpp"
+#include "capture/recording/session_writer.hpp"
+#include "core/image/image_io.hpp"
 #include "tests/capture/scripted_source.hpp"
 #include "tests/core/temp_folder.hpp"
 

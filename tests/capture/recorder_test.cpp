@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "capture/recorder.hpp"
+#include "capture/recording/recorder.hpp"
 
 #include <gtest/gtest.h>
 
 #include <atomic>
 
-#include "core/file_io.hpp"
-#include "core/image_io.hpp"
+#include "core/system/file_io.hpp"
+#include "core/image/image_io.hpp"
 #include "tests/capture/scripted_source.hpp"
 #include "tests/core/session_account.hpp"
 #include "tests/core/temp_folder.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "capture/session_writer.hpp"
+#include "capture/recording/session_writer.hpp"
 
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -7,10 +7,10 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "capture/raw_counts.hpp"
-#include "core/file_io.hpp"
-#include "core/image_codec.hpp"
-#include "core/image_io.hpp"
+#include "capture/recording/raw_counts.hpp"
+#include "core/system/file_io.hpp"
+#include "core/image/image_codec.hpp"
+#include "core/image/image_io.hpp"
 #include "tests/capture/scripted_source.hpp"
 #include "tests/core/temp_folder.hpp"
 

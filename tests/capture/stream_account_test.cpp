@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "capture/stream_account.hpp"
+#include "capture/recording/stream_account.hpp"
 
 #include <gtest/gtest.h>
 

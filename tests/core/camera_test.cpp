@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/camera.hpp"
+#include "core/geometry/camera.hpp"
 
 #include <gtest/gtest.h>
 

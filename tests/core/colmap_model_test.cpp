@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/colmap_model.hpp"
+#include "core/formats/colmap_model.hpp"
 
 #include <gtest/gtest.h>
 

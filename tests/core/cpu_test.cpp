@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/cpu.hpp"
+#include "core/system/cpu.hpp"
 
 #include <gtest/gtest.h>
 

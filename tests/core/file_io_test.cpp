@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/file_io.hpp"
+#include "core/system/file_io.hpp"
 
 #include <gtest/gtest.h>
 #include <signal.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/image_io.hpp"
+#include "core/image/image_io.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "core/file_io.hpp"
-#include "core/image_codec.hpp"
+#include "core/system/file_io.hpp"
+#include "core/image/image_codec.hpp"
 #include "core/temperature.hpp"
 #include "tests/core/temp_folder.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/palette.hpp"
+#include "core/image/palette.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/ply.hpp"
+#include "core/formats/ply.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/scene_ball.hpp"
+#include "core/geometry/scene_ball.hpp"
 
 #include <gtest/gtest.h>
 

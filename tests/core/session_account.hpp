@@ -6,7 +6,7 @@
 #include <map>
 #include <string>
 
-#include "core/session.hpp"
+#include "core/session/session.hpp"
 
 namespace orbitfuse::test {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/session.hpp"
+#include "core/session/session.hpp"
 
 #include <gtest/gtest.h>
 

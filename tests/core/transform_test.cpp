@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/transform.hpp"
+#include "core/geometry/transform.hpp"
 
 #include <gtest/gtest.h>
 

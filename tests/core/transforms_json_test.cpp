@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/transforms_json.hpp"
+#include "core/formats/transforms_json.hpp"
 
 #include <gtest/gtest.h>
 
-#include "core/file_io.hpp"
+#include "core/system/file_io.hpp"
 #include "tests/core/temp_folder.hpp"
 
 namespace orbitfuse {

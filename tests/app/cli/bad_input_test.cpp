@@ -8,8 +8,8 @@
 #include <fstream>
 #include <map>
 
-#include "core/file_io.hpp"
-#include "core/image_io.hpp"
+#include "core/system/file_io.hpp"
+#include "core/image/image_io.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/app/cli/session_fixture.hpp"
 #include "tests/app/temp_folder.hpp"

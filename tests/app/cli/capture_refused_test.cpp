@@ -11,7 +11,7 @@
 #include <fstream>
 #include <thread>
 
-#include "core/image_io.hpp"
+#include "core/image/image_io.hpp"
 #include "drivers/aravis/aravis_source.hpp"
 #include "tests/app/cli/refusal.hpp"
 #include "tests/app/temp_folder.hpp"

@@ -5,9 +5,9 @@
 
 #include <fstream>
 
-#include "core/file_io.hpp"
-#include "core/image_io.hpp"
-#include "core/session.hpp"
+#include "core/system/file_io.hpp"
+#include "core/image/image_io.hpp"
+#include "core/session/session.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/app/temp_folder.hpp"
 

@@ -2,8 +2,8 @@
 // --dry-run of what makes sessions says what the real command would say, and leaves nothing.
 #include <fstream>
 
-#include "core/image_io.hpp"
-#include "core/session.hpp"
+#include "core/image/image_io.hpp"
+#include "core/session/session.hpp"
 #include "tests/app/cli/refusal.hpp"
 #include "tests/app/temp_folder.hpp"
 

@@ -6,7 +6,7 @@
 #include <map>
 #include <set>
 
-#include "core/file_io.hpp"
+#include "core/system/file_io.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/app/temp_folder.hpp"
 

@@ -11,7 +11,7 @@
 #include <sstream>
 #include <thread>
 
-#include "core/file_io.hpp"
+#include "core/system/file_io.hpp"
 #include "tests/app/temp_folder.hpp"
 
 namespace orbitfuse {

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <map>
 
-#include "core/session.hpp"
+#include "core/session/session.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/app/temp_folder.hpp"
 #include "tests/core/session_account.hpp"

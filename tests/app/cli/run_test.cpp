@@ -6,10 +6,10 @@
 #include <fstream>
 #include <map>
 
-#include "core/file_io.hpp"
-#include "core/image_io.hpp"
-#include "core/ply.hpp"
-#include "core/transforms_json.hpp"
+#include "core/system/file_io.hpp"
+#include "core/image/image_io.hpp"
+#include "core/formats/ply.hpp"
+#include "core/formats/transforms_json.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/app/cli/session_fixture.hpp"
 #include "tests/app/temp_folder.hpp"

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <optional>
 
-#include "capture/session_writer.hpp"
+#include "capture/recording/session_writer.hpp"
 
 namespace orbitfuse {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "core/session.hpp"
+#include "core/session/session.hpp"
 
 namespace orbitfuse {
 

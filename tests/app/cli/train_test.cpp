@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/file_io.hpp"
+#include "core/system/file_io.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/app/cli/session_fixture.hpp"
 #include "tests/app/temp_folder.hpp"

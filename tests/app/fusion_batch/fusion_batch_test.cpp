@@ -9,7 +9,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "core/image_io.hpp"
+#include "core/image/image_io.hpp"
 #include "fusion/metrics/metrics.hpp"
 #include "tests/app/temp_folder.hpp"
 

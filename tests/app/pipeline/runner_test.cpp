@@ -7,7 +7,7 @@
 #include <atomic>
 #include <fstream>
 
-#include "core/file_io.hpp"
+#include "core/system/file_io.hpp"
 #include "tests/app/temp_folder.hpp"
 
 namespace orbitfuse::pipeline {

@@ -6,8 +6,8 @@
 #include <thread>
 
 #include "app/recording/rehearsal.hpp"
-#include "core/image_codec.hpp"
-#include "core/utc_now.hpp"
+#include "core/image/image_codec.hpp"
+#include "core/system/utc_now.hpp"
 #include "drivers/stills/watch_source.hpp"
 #include "tests/capture/scripted_source.hpp"
 #include "tests/core/temp_folder.hpp"

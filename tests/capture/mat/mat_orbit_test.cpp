@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <set>
 
-#include "capture/frame_quality.hpp"
+#include "capture/image_quality/frame_quality.hpp"
 #include "capture/live/sharpness_reference.hpp"
 #include "capture/mat/mat_finder.hpp"
 #include "tests/capture/mat/rendered_mat.hpp"

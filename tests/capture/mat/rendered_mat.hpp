@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "capture/mat/mat_design.hpp"
-#include "core/camera.hpp"
-#include "core/transform.hpp"
+#include "core/geometry/camera.hpp"
+#include "core/geometry/transform.hpp"
 
 namespace orbitfuse::test {
 

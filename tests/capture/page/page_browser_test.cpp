@@ -7,7 +7,7 @@
 #include <opencv2/core.hpp>
 
 #include "capture/page/page_server.hpp"
-#include "core/image_io.hpp"
+#include "core/image/image_io.hpp"
 #include "tests/core/temp_folder.hpp"
 
 namespace orbitfuse {

@@ -20,8 +20,8 @@
 #include <httplib.h>
 #pragma GCC diagnostic pop
 
-#include "core/image_codec.hpp"
-#include "core/image_io.hpp"
+#include "core/image/image_codec.hpp"
+#include "core/image/image_io.hpp"
 #include "tests/core/temp_folder.hpp"
 
 namespace orbitfuse {

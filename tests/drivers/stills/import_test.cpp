@@ -10,11 +10,11 @@
 #include <set>
 #include <sstream>
 
-#include "core/colmap_model.hpp"
-#include "core/file_io.hpp"
-#include "core/image_codec.hpp"
-#include "core/image_io.hpp"
-#include "core/transforms_json.hpp"
+#include "core/formats/colmap_model.hpp"
+#include "core/system/file_io.hpp"
+#include "core/image/image_codec.hpp"
+#include "core/image/image_io.hpp"
+#include "core/formats/transforms_json.hpp"
 #include "tests/core/temp_folder.hpp"
 #include "tests/support/shared_data.hpp"
 

@@ -7,9 +7,9 @@
 #include <fstream>
 #include <thread>
 
-#include "capture/recorder.hpp"
-#include "core/file_io.hpp"
-#include "core/image_codec.hpp"
+#include "capture/recording/recorder.hpp"
+#include "core/system/file_io.hpp"
+#include "core/image/image_codec.hpp"
 #include "tests/core/temp_folder.hpp"
 #include "tests/support/shared_data.hpp"
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "core/parallel.hpp"
+#include "core/system/parallel.hpp"
 #include "fusion/fuse/fuse.hpp"
 #include "tests/fusion/fuse/images.hpp"
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <opencv2/core.hpp>
 
-#include "core/parallel.hpp"
+#include "core/system/parallel.hpp"
 #include "fusion/metrics/metrics.hpp"
 
 namespace orbitfuse {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "core/parallel.hpp"
+#include "core/system/parallel.hpp"
 #include "tests/recon/depth/patterned_floor.hpp"
 
 namespace orbitfuse::depth {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/reconstruction.hpp"
+#include "core/geometry/reconstruction.hpp"
 
 namespace orbitfuse::depth::test {
 

@@ -9,12 +9,12 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
-#include "core/parallel.hpp"
-#include "recon/nerf/compositing.hpp"
-#include "recon/nerf/ray_block.hpp"
-#include "recon/nerf/random.hpp"
-#include "recon/nerf/render.hpp"
-#include "recon/nerf/trainer.hpp"
+#include "core/system/parallel.hpp"
+#include "recon/nerf/kernels/compositing.hpp"
+#include "recon/nerf/rendering/ray_block.hpp"
+#include "core/numeric/random.hpp"
+#include "recon/nerf/rendering/render.hpp"
+#include "recon/nerf/training/trainer.hpp"
 #include "tests/recon/nerf/emulated_amx.hpp"
 #include "tests/recon/nerf/toy_scene.hpp"
 

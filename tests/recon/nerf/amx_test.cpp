@@ -10,9 +10,9 @@
 #include <limits>
 #include <stdexcept>
 
-#include "recon/nerf/network.hpp"
-#include "recon/nerf/random.hpp"
-#include "recon/nerf/tile_layers.hpp"
+#include "recon/nerf/field/network.hpp"
+#include "core/numeric/random.hpp"
+#include "recon/nerf/kernels/tile_layers.hpp"
 #include "tests/recon/nerf/emulated_amx.hpp"
 #include "tests/recon/nerf/tile_machine.hpp"
 #include "tests/recon/nerf/tile_trap.hpp"

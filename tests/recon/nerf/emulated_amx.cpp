@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tests/recon/nerf/emulated_amx.hpp"
 
-#include "recon/nerf/tile_layers.hpp"
+#include "recon/nerf/kernels/tile_layers.hpp"
 #include "tests/recon/nerf/tile_machine.hpp"
 
 namespace orbitfuse::nerf::test {

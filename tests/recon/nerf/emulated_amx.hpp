@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "recon/nerf/kernels.hpp"
+#include "recon/nerf/kernels/kernels.hpp"
 
 namespace orbitfuse::nerf::test {
 

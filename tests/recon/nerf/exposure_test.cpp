@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/nerf/exposure.hpp"
+#include "recon/nerf/training/exposure.hpp"
 
 #include <gtest/gtest.h>
 
@@ -140,7 +140,7 @@ TEST(Exposure, OfViewsWithNothingInCommonIsOne) {
 
 TEST(Exposure, EvenedOutIsThatOfEveryViewAndLeavesOutWhatWasClipped) {
   const Dataset plain = test::toy_scene(Modality::visible, view_count, 1, 64), varied = varied_scene();
-  std::vector<SceneView> views = prepare_views(varied, {}, {});
+  std::vector<NormalisedView> views = prepare_views(varied, {}, {});
   Exposure exposure;
   for (std::size_t i = 0; i < view_count; ++i) exposure.log_gain.push_back(log_gain_of(i));
   even_out(exposure, views);

@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "recon/nerf/backward.hpp"
-#include "recon/nerf/compositing.hpp"
-#include "recon/nerf/random.hpp"
+#include "recon/nerf/training/backward.hpp"
+#include "recon/nerf/kernels/compositing.hpp"
+#include "core/numeric/random.hpp"
 #include "tests/recon/nerf/slope.hpp"
 
 namespace orbitfuse::nerf {

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "recon/nerf/network.hpp"
-#include "recon/nerf/random.hpp"
-#include "recon/nerf/spherical_harmonics.hpp"
+#include "recon/nerf/field/network.hpp"
+#include "core/numeric/random.hpp"
+#include "recon/nerf/kernels/spherical_harmonics.hpp"
 
 namespace orbitfuse::nerf {
 namespace {

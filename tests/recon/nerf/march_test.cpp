@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/nerf/march.hpp"
+#include "recon/nerf/rendering/march.hpp"
 
 #include <gtest/gtest.h>
 

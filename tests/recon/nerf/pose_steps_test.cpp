@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/nerf/pose_steps.hpp"
+#include "recon/nerf/training/pose_steps.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "recon/nerf/random.hpp"
+#include "core/numeric/random.hpp"
 #include "tests/recon/nerf/toy_scene.hpp"
 
 namespace orbitfuse::nerf {
@@ -36,10 +36,10 @@ Eigen::Vector3d point_at(const Ray& ray, double t) {
   return {ray.origin[0] + t * ray.direction[0], ray.origin[1] + t * ray.direction[1], ray.origin[2] + t * ray.direction[2]};
 }
 
-SceneView photo_from(const Rigid3d& cam_from_world, double k1) {
+NormalisedView photo_from(const Rigid3d& cam_from_world, double k1) {
   Camera camera = Camera::from_fov(80, 60, 50);
   camera.k1 = k1;
-  SceneView view{"photo", ViewRays(camera, cam_from_world, {}), cv::Mat(60, 80, CV_32FC1), {}, {}};
+  NormalisedView view{"photo", ViewRays(camera, cam_from_world, {}), cv::Mat(60, 80, CV_32FC1), {}, {}};
   Ray ray;
   for (int y = 0; y < 60; ++y)
     for (int x = 0; x < 80; ++x)
@@ -49,7 +49,7 @@ SceneView photo_from(const Rigid3d& cam_from_world, double k1) {
 }
 
 /// What a perfect field shows from where the view is taken to be.
-PoseSums sums_of_truth(const SceneView& view) {
+PoseSums sums_of_truth(const NormalisedView& view) {
   PoseSums sums;
   Ray ray;
   for (int y = 0; y < view.target.rows; ++y)
@@ -63,7 +63,7 @@ PoseSums sums_of_truth(const SceneView& view) {
 }
 
 /// RMS of what a perfect field shows from there less the photo.
-double picture_error(const SceneView& view) {
+double picture_error(const NormalisedView& view) {
   double sum = 0;
   Ray ray;
   for (int y = 0; y < view.target.rows; ++y)
@@ -81,7 +81,7 @@ Rigid3d pose(double turn_deg, double shift) {
 
 TEST(PoseSteps, FindTheWayHome) {
   for (const double k1 : {0.0, -0.2}) {
-    SceneView view = photo_from(pose(0, 0), k1);
+    NormalisedView view = photo_from(pose(0, 0), k1);
     view.rays = ViewRays(view.rays.camera(), pose(0.8, 0.012), {});
     RefinedPose refined = unmoved(pose(0.8, 0.012));
     for (int i = 0; i < 40; ++i) ASSERT_TRUE(take_step(sums_of_truth(view), {}, refined, view, {.noise = 1e-3}));
@@ -91,7 +91,7 @@ TEST(PoseSteps, FindTheWayHome) {
 }
 
 TEST(PoseSteps, KeepToTheGivenPoseWhereAPictureSaysLittle) {
-  SceneView view = photo_from(pose(0, 0), 0);
+  NormalisedView view = photo_from(pose(0, 0), 0);
   view.rays = ViewRays(view.rays.camera(), pose(0.8, 0.012), {});
   const double before = picture_error(view);
   RefinedPose refined = unmoved(pose(0.8, 0.012));
@@ -102,7 +102,7 @@ TEST(PoseSteps, KeepToTheGivenPoseWhereAPictureSaysLittle) {
 }
 
 TEST(PoseSteps, StayAtHome) {
-  SceneView view = photo_from(pose(0, 0), -0.2);
+  NormalisedView view = photo_from(pose(0, 0), -0.2);
   RefinedPose refined = unmoved(pose(0, 0));
   for (int i = 0; i < 10; ++i) ASSERT_TRUE(take_step(sums_of_truth(view), {}, refined, view));
   EXPECT_LT(rotation_angle_deg(refined.pose().rotation, Eigen::Quaterniond::Identity()), 1e-4);
@@ -110,7 +110,7 @@ TEST(PoseSteps, StayAtHome) {
 }
 
 TEST(PoseSteps, AreShortHoweverMuchIsAsked) {
-  SceneView view = photo_from(pose(0, 0), 0);
+  NormalisedView view = photo_from(pose(0, 0), 0);
   PoseSums sums = sums_of_truth(view);
   for (double& v : sums.right) v = 1e9;
   RefinedPose refined = unmoved(pose(0, 0));
@@ -121,14 +121,14 @@ TEST(PoseSteps, AreShortHoweverMuchIsAsked) {
 
 TEST(PoseSteps, ThatNothingSupportsAreNotTaken) {
   const auto expect_none = [](const PoseSums& sums) {
-    SceneView view = photo_from(pose(0, 0), 0);
+    NormalisedView view = photo_from(pose(0, 0), 0);
     RefinedPose refined = unmoved(pose(0, 0));
     EXPECT_FALSE(take_step(sums, {}, refined, view));
     EXPECT_EQ(refined.pose().translation.norm(), 0);
     EXPECT_EQ(camera_center(view.rays.cam_from_world({})).norm(), 0);
   };
   expect_none({});
-  SceneView view = photo_from(pose(0, 0), 0);
+  NormalisedView view = photo_from(pose(0, 0), 0);
   PoseSums few;
   const float shown = 0.5f;
   for (int i = 0; i < 10; ++i) add_ray(view, 20 + i, 20, &shown, 1, few);
@@ -151,7 +151,7 @@ TEST(PoseSteps, ThatNothingSupportsAreNotTaken) {
 }
 
 TEST(PoseSteps, OfAConstantPhotoKeepThePose) {
-  SceneView view = photo_from(pose(0, 0), 0);
+  NormalisedView view = photo_from(pose(0, 0), 0);
   view.target.setTo(0.5);
   RefinedPose refined = unmoved(pose(0, 0));
   take_step(sums_of_truth(view), {}, refined, view);

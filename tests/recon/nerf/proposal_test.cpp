@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/nerf/proposal.hpp"
+#include "recon/nerf/rendering/proposal.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numeric>
 
-#include "core/parallel.hpp"
-#include "recon/nerf/compositing.hpp"
-#include "recon/nerf/interlevel.hpp"
-#include "recon/nerf/random.hpp"
+#include "core/system/parallel.hpp"
+#include "recon/nerf/kernels/compositing.hpp"
+#include "recon/nerf/kernels/interlevel.hpp"
+#include "core/numeric/random.hpp"
 #include "tests/recon/nerf/slope.hpp"
 #include "tests/recon/nerf/toy_scene.hpp"
 

@@ -4,9 +4,9 @@
 
 #include <atomic>
 
-#include "core/file_io.hpp"
-#include "recon/nerf/checkpoint.hpp"
-#include "recon/nerf/field_state.hpp"
+#include "core/system/file_io.hpp"
+#include "recon/nerf/field/checkpoint.hpp"
+#include "recon/nerf/field/field_state.hpp"
 #include "tests/core/temp_folder.hpp"
 #include "tests/recon/nerf/toy_scene.hpp"
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "recon/nerf/network.hpp"
-#include "recon/nerf/random.hpp"
+#include "recon/nerf/field/network.hpp"
+#include "core/numeric/random.hpp"
 
 namespace orbitfuse::nerf::test {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "recon/nerf/field_state.hpp"
+#include "recon/nerf/field/field_state.hpp"
 #include "tests/recon/nerf/toy_scene.hpp"
 
 namespace orbitfuse::nerf {

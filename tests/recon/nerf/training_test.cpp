@@ -3,8 +3,8 @@
 
 #include <atomic>
 
-#include "core/parallel.hpp"
-#include "recon/nerf/field_state.hpp"
+#include "core/system/parallel.hpp"
+#include "recon/nerf/field/field_state.hpp"
 #include "tests/core/temp_folder.hpp"
 #include "tests/recon/nerf/toy_scene.hpp"
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/bundle_adjustment.hpp"
+#include "recon/poses/sfm/bundle_adjustment.hpp"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "tests/recon/poses/orbit_fixture.hpp"
+#include "tests/support/orbit_fixture.hpp"
 
 namespace orbitfuse {
 namespace {

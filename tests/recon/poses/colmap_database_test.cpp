@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/colmap_database.hpp"
+#include "recon/poses/sfm/colmap_database.hpp"
 
 #include <gtest/gtest.h>
 #include <sqlite3.h>

@@ -2,34 +2,34 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "bench/poses/scenes.hpp"
-#include "recon/poses/colmap.hpp"
+#include "tests/support/orbit_scenes.hpp"
+#include "recon/poses/sfm/colmap.hpp"
 #include "recon/poses/estimate_poses.hpp"
-#include "recon/poses/sfm_ladder.hpp"
+#include "recon/poses/sfm/sfm_ladder.hpp"
 #include "tests/core/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {
 
 TEST(ContainerSlow, VisibleOrbitToATenthOfAPercent) {
-  const auto data = bench::shared_data();
+  const auto data = scenes::shared_data();
   if (!data) GTEST_SKIP() << "shared data absent: set ORBITFUSE_SHARED";
   const test::TempFolder folder;
-  const auto scene = bench::container_scene(*data, {});
+  const auto scene = scenes::container_scene(*data, {});
   const auto poses = estimate_visible_poses(scene.session, {}, folder.path(), {});
   if (!poses && poses.error().kind == ErrorKind::unavailable) GTEST_SKIP() << "no COLMAP on PATH";
   ASSERT_TRUE(poses) << poses.error().message();
   EXPECT_EQ(poses->reconstruction.views.size(), 24u);
-  const auto error = bench::pose_error(poses->reconstruction, poses->reconstruction, scene.truth);
+  const auto error = scenes::pose_error(poses->reconstruction, poses->reconstruction, scene.truth);
   EXPECT_LE(error.ate_percent, 0.1);
 }
 
 /// The tracking frames alone, with the focal length known: what the measured wrong model was made
 /// from.
-bench::Scene tracking_scene(const std::filesystem::path& data) {
-  bench::ContainerOptions container;
+scenes::Scene tracking_scene(const std::filesystem::path& data) {
+  scenes::ContainerOptions container;
   container.tracking = true;
-  bench::Scene scene = bench::container_scene(data, container);
+  scenes::Scene scene = scenes::container_scene(data, container);
   std::erase_if(scene.session.frames, [](const FrameRecord& frame) { return !frame.tracking; });
   for (DeviceInfo& device : scene.session.devices) device.lens.focal_relative_sigma = 0;
   return scene;
@@ -56,10 +56,10 @@ Result<Reconstruction> colmap_model(const Session& session,
 }
 
 TEST(ContainerSlow, MergedThermalTrackingModelIsNotBelieved) {
-  const auto data = bench::shared_data();
+  const auto data = scenes::shared_data();
   if (!data) GTEST_SKIP() << "shared data absent: set ORBITFUSE_SHARED";
   const test::TempFolder folder;
-  const bench::Scene scene = tracking_scene(*data);
+  const scenes::Scene scene = tracking_scene(*data);
   const auto frames = scene.session.frames_of(Modality::thermal, true);
   const auto model = colmap_model(scene.session, frames, folder.path());
   if (!model && model.error().kind == ErrorKind::unavailable) GTEST_SKIP() << "no COLMAP on PATH";
@@ -75,7 +75,7 @@ TEST(ContainerSlow, MergedThermalTrackingModelIsNotBelieved) {
     const auto judged = judge_model(*model, scene.session, frames, options);
     ASSERT_TRUE(judged) << judged.error().message();
     const Reconstruction& adjusted = judged->poses.reconstruction;
-    const bench::PoseError error = bench::pose_error(adjusted, adjusted, scene.truth);
+    const scenes::PoseError error = scenes::pose_error(adjusted, adjusted, scene.truth);
     fmt::print("{:.2f} px; centres {:.0f} % of the extent and {:.0f} deg off; gates: {}\n",
                judged->poses.gates.at("reprojection_rms_proxy_px"), error.ate_percent,
                error.mean_rotation_deg, judged->why);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/descriptor_matching.hpp"
+#include "recon/poses/sfm/descriptor_matching.hpp"
 
 #include <gtest/gtest.h>
 

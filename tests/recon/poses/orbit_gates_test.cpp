@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "recon/poses/sfm_ladder.hpp"
+#include "recon/poses/sfm/sfm_ladder.hpp"
 #include "recon/poses/world_frame.hpp"
-#include "tests/recon/poses/orbit_fixture.hpp"
+#include "tests/support/orbit_fixture.hpp"
 
 // What COLMAP makes of thermal frames of the container: front and back of a near-symmetric object
 // merged, at 0.8 px. The gates must refuse it without knowing the truth.

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/orbit_search.hpp"
+#include "recon/poses/cross_modal/orbit_search.hpp"
 
 #include <gtest/gtest.h>
 
 #include <opencv2/imgproc.hpp>
 
-#include "recon/poses/edge_alignment.hpp"
+#include "recon/poses/cross_modal/edge_alignment.hpp"
 
 namespace orbitfuse {
 namespace {

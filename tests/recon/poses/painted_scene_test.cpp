@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/painted_scene.hpp"
+#include "recon/poses/cross_modal/painted_scene.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "recon/poses/cross_modal.hpp"
-#include "recon/poses/heat_check.hpp"
-#include "recon/poses/orbit_rescue.hpp"
-#include "tests/recon/poses/box_scene.hpp"
-#include "tests/recon/poses/orbit_fixture.hpp"
+#include "recon/poses/cross_modal/cross_modal.hpp"
+#include "recon/poses/cross_modal/heat_check.hpp"
+#include "recon/poses/cross_modal/orbit_rescue.hpp"
+#include "tests/support/box_scene.hpp"
+#include "tests/support/orbit_fixture.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -65,7 +65,7 @@ TEST(PaintedScene, WithoutPaintersNothingIsPainted) {
 }
 
 TEST(PaintedScene, ARendererThatFailsIsPassedOn) {
-  const SceneRenderer broken = [](const Camera&, const Rigid3d&) -> Result<SceneView> {
+  const SceneRenderer broken = [](const Camera&, const Rigid3d&) -> Result<SceneRender> {
     return fail(ErrorKind::input, "field", "cut", "train again");
   };
   const auto painted = painted_scene(broken, {at(0)}, {thermal_of(at(0))}, {}, {});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/pair_selection.hpp"
+#include "recon/poses/sfm/pair_selection.hpp"
 
 #include <gtest/gtest.h>
 

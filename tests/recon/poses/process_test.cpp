@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/process.hpp"
+#include "recon/poses/sfm/process.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/projection.hpp"
+#include "recon/alignment/projection.hpp"
 
 #include <ceres/jet.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/tracking_views.hpp"
+#include "recon/poses/cross_modal/tracking_views.hpp"
 
 #include <gtest/gtest.h>
 

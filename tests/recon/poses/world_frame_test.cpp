@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/recon/poses/orbit_fixture.hpp"
+#include "tests/support/orbit_fixture.hpp"
 
 namespace orbitfuse {
 namespace {

@@ -3,12 +3,12 @@
 
 #include <algorithm>
 
-#include "recon/registration/features.hpp"
-#include "recon/registration/match_consensus.hpp"
-#include "recon/registration/outlier_filter.hpp"
-#include "recon/registration/prepared_cloud.hpp"
-#include "recon/registration/rotation_grid.hpp"
-#include "recon/registration/thinning.hpp"
+#include "recon/registration/clouds/features.hpp"
+#include "recon/registration/clouds/match_consensus.hpp"
+#include "recon/registration/clouds/outlier_filter.hpp"
+#include "recon/registration/clouds/prepared_cloud.hpp"
+#include "recon/registration/clouds/rotation_grid.hpp"
+#include "recon/registration/clouds/thinning.hpp"
 #include "tests/recon/registration/shapes.hpp"
 
 namespace orbitfuse::registration {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/registration/refine.hpp"
+#include "recon/registration/clouds/refine.hpp"
 
 #include <gtest/gtest.h>
 
-#include "recon/registration/score.hpp"
-#include "recon/registration/thinning.hpp"
+#include "recon/registration/clouds/score.hpp"
+#include "recon/registration/clouds/thinning.hpp"
 #include "tests/recon/registration/shapes.hpp"
 
 namespace orbitfuse::registration {

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "bench/registration/scenes.hpp"
-#include "core/parallel.hpp"
+#include "tests/support/cloud_scenes.hpp"
+#include "core/system/parallel.hpp"
 #include "tests/recon/registration/shapes.hpp"
 
 namespace orbitfuse {
@@ -21,12 +21,12 @@ bool is_right(const Similarity3d& found, const Similarity3d& truth) {
 class Suite : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(Suite, FindsTheTruth) {
-  const auto surface = bench::surface(GetParam());
+  const auto surface = scenes::surface(GetParam());
   if (!surface) GTEST_SKIP() << GetParam() << " is not in the shared data";
   std::uint32_t seed = 900001;
-  for (const bench::Level& level : bench::levels()) {
+  for (const scenes::Level& level : scenes::levels()) {
     if (level.success_bar < 1) continue;
-    const bench::CloudPair pair = bench::make_pair(*surface, level, ++seed);
+    const scenes::CloudPair pair = scenes::make_pair(*surface, level, ++seed);
     const auto report = register_clouds(pair.source, pair.target, {}, {});
     ASSERT_TRUE(report) << report.error().message();
     EXPECT_TRUE(is_right(report->target_from_source, pair.target_from_source))
@@ -36,12 +36,12 @@ TEST_P(Suite, FindsTheTruth) {
 }
 INSTANTIATE_TEST_SUITE_P(Clouds, Suite, ::testing::Values("bunny", "indoor", "car"));
 
-bench::CloudPair indoor_pair(std::uint32_t seed) {
-  return bench::make_pair(*bench::surface("indoor"), bench::levels()[1], seed);
+scenes::CloudPair indoor_pair(std::uint32_t seed) {
+  return scenes::make_pair(*scenes::surface("indoor"), scenes::levels()[1], seed);
 }
 
 TEST(Register, SameSeedSameAnswerForAnyThreadCount) {
-  const bench::CloudPair pair = indoor_pair(5);
+  const scenes::CloudPair pair = indoor_pair(5);
   set_thread_count(1);
   const auto a = register_clouds(pair.source, pair.target, {}, {});
   set_thread_count(2);
@@ -54,7 +54,7 @@ TEST(Register, SameSeedSameAnswerForAnyThreadCount) {
 }
 
 TEST(Register, SecondInitialiserIsSkippedWhenTheFirstIsDecisive) {
-  const bench::CloudPair pair = indoor_pair(6);
+  const scenes::CloudPair pair = indoor_pair(6);
   RegistrationOptions options;
   options.estimate_warp = false;  // has a skip of its own
   const auto quick = register_clouds(pair.source, pair.target, options, {});
@@ -68,7 +68,7 @@ TEST(Register, SecondInitialiserIsSkippedWhenTheFirstIsDecisive) {
 }
 
 TEST(Register, EachInitialiserAloneFindsTheTruth) {
-  const bench::CloudPair pair = indoor_pair(11);
+  const scenes::CloudPair pair = indoor_pair(11);
   for (const bool features : {true, false}) {
     RegistrationOptions options;
     options.use_features = features;
@@ -81,7 +81,7 @@ TEST(Register, EachInitialiserAloneFindsTheTruth) {
 }
 
 TEST(Register, TheReverseIsTheInverse) {
-  const bench::CloudPair pair = indoor_pair(7);
+  const scenes::CloudPair pair = indoor_pair(7);
   const auto back = register_clouds(pair.target, pair.source, {}, {});
   ASSERT_TRUE(back);
   EXPECT_TRUE(is_right(back->target_from_source.inverse(), pair.target_from_source));
@@ -117,7 +117,7 @@ TEST(Register, ViewsDecideBetweenPlacementsThatGeometryCannot) {
 }
 
 TEST(Register, ViewsAreNotAskedWhereGeometryDecides) {
-  const bench::CloudPair pair = indoor_pair(5);
+  const scenes::CloudPair pair = indoor_pair(5);
   int asked = 0;
   const auto report = register_clouds(pair.source, pair.target, {}, {}, [&](const Similarity3d&) {
     ++asked;
@@ -130,10 +130,10 @@ TEST(Register, ViewsAreNotAskedWhereGeometryDecides) {
 }
 
 TEST(Register, RefinementAloneStaysAtTheTruth) {
-  const bench::CloudPair pair = indoor_pair(8);
+  const scenes::CloudPair pair = indoor_pair(8);
   const auto report = refine_registration(pair.source, pair.target, pair.target_from_source, {});
   ASSERT_TRUE(report);
-  EXPECT_LT(bench::surface_rmse_percent(pair, report->target_from_source), 0.3);
+  EXPECT_LT(scenes::surface_rmse_percent(pair, report->target_from_source), 0.3);
   EXPECT_GT(report->overlap_source, 0.95);
   EXPECT_GT(report->overlap_target, 0.95);
   EXPECT_LT(report->rmse_percent_of_diameter, 2);
@@ -141,7 +141,7 @@ TEST(Register, RefinementAloneStaysAtTheTruth) {
 }
 
 TEST(Register, RefinementRefusesAStartThatIsNone) {
-  const bench::CloudPair pair = indoor_pair(9);
+  const scenes::CloudPair pair = indoor_pair(9);
   Similarity3d start;
   start.scale = 0;
   EXPECT_FALSE(refine_registration(pair.source, pair.target, start, {}));
@@ -150,7 +150,7 @@ TEST(Register, RefinementRefusesAStartThatIsNone) {
 }
 
 TEST(Register, StopsWhenAsked) {
-  const bench::CloudPair pair = indoor_pair(10);
+  const scenes::CloudPair pair = indoor_pair(10);
   std::atomic<bool> cancel{true};
   Progress progress;
   progress.cancel = &cancel;

@@ -5,8 +5,8 @@
 #include <numbers>
 #include <random>
 
-#include "core/point_cloud.hpp"
-#include "core/transform.hpp"
+#include "core/geometry/point_cloud.hpp"
+#include "core/geometry/transform.hpp"
 
 namespace orbitfuse::testing {
 

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <limits>
 
-#include "core/ply.hpp"
+#include "core/formats/ply.hpp"
 #include "tests/recon/registration/shapes.hpp"
 #include "tests/support/shared_data.hpp"
 

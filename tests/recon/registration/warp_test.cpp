@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/registration/warp.hpp"
+#include "recon/registration/clouds/warp.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "recon/registration/register.hpp"
-#include "recon/registration/thinning.hpp"
-#include "recon/registration/warp_grid.hpp"
+#include "recon/registration/clouds/thinning.hpp"
+#include "recon/registration/clouds/warp_grid.hpp"
 #include "tests/recon/registration/shapes.hpp"
 
 namespace orbitfuse::registration {

@@ -6,7 +6,7 @@
 #include <functional>
 #include <thread>
 
-#include "capture/recorder.hpp"
+#include "capture/recording/recorder.hpp"
 #include "drivers/v4l2/v4l2_source.hpp"
 #include "tests/core/temp_folder.hpp"
 

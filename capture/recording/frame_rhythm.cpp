@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "capture/recording/frame_rhythm.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace orbitfuse {
+
+namespace {
+constexpr int settled = 8;       // the first intervals of a stream are irregular
+constexpr double late = 1.75;    // of the usual interval
+constexpr double weight = 0.1;   // a rate that changes with the light is followed in some frames
+}  // namespace
+
+int FrameRhythm::note(std::uint64_t id, std::int64_t stamp_ns) {
+  const std::optional<Seen> before = last_;
+  last_ = Seen{id, stamp_ns};
+  if (!before || id <= before->id || stamp_ns <= before->stamp_ns) return 0;
+  const std::uint64_t steps = id - before->id;
+  const double interval_s = 1e-9 * static_cast<double>(stamp_ns - before->stamp_ns) / static_cast<double>(steps);
+  int missing = 0;
+  if (steps == 1 && known_ >= settled && interval_s > late * interval_s_) {
+    missing = static_cast<int>(std::clamp(std::round(interval_s / interval_s_) - 1, 1.0, 1e6));
+  }
+  // A pause says nothing about the rate before and after it.
+  const double told_s = missing > 0 ? std::min(interval_s, late * interval_s_) : interval_s;
+  interval_s_ = known_ == 0 ? interval_s : (1 - weight) * interval_s_ + weight * told_s;
+  ++known_;
+  return missing;
+}
+
+std::uint64_t FrameRhythm::frames_in(double seconds) const {
+  if (known_ == 0 || !(seconds > 0)) return 1;
+  return static_cast<std::uint64_t>(std::llround(std::clamp(seconds / interval_s_, 1.0, 1e9)));
+}
+
+}  // namespace orbitfuse

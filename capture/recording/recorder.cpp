@@ -1,0 +1,303 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "capture/recording/recorder.hpp"
+
+#include <fmt/format.h>
+
+#include <condition_variable>
+#include <deque>
+#include <thread>
+#include <variant>
+
+#include "capture/recording/stream_account.hpp"
+#include "core/system/utc_now.hpp"
+
+namespace orbitfuse {
+namespace {
+
+using Loss = StreamAccount::Loss;
+
+constexpr const char* when_full =
+    "free disk space and resume the session; every frame acknowledged is safe";
+
+std::optional<std::uint64_t> next_id_in(const RecorderOptions& options, const std::string& device) {
+  const auto found = options.next_ids.find(device);
+  return found == options.next_ids.end() ? std::nullopt : std::optional(found->second);
+}
+
+}  // namespace
+
+/// One camera. The capture thread pushes, the writer thread pops; the queue bounds memory.
+struct Recorder::Channel {
+  Channel(FrameSource& s, SessionWriter& w, const RecorderOptions& o, const Progress& p,
+          const std::function<void(const FrameRecord&)>& f)
+      : source(s), writer(w), options(o), progress(p), on_frame(f), device(s.describe()),
+        account(device.id, next_id_in(o, device.id)) {}
+
+  FrameSource& source;
+  SessionWriter& writer;
+  const RecorderOptions& options;
+  const Progress& progress;
+  const std::function<void(const FrameRecord&)>& on_frame;
+  DeviceInfo device;  ///< changed by the writer thread only
+  StreamAccount account;
+
+  std::mutex mutex;
+  std::condition_variable changed;
+  /// What came, in its order; only frames count for the bound, because events are small.
+  using Item = std::variant<Frame, EventRecord>;
+  std::deque<Item> queue;
+  std::size_t frames_queued = 0;
+  bool capture_over = false;
+  bool writer_failed = false;
+  std::optional<std::uint64_t> first_unwritten;  ///< the frame at which the writer failed
+  bool silent = false, away = false;
+  std::optional<Error> error;
+  std::optional<FrameRecord> latest;
+  std::string notice;
+  std::uint64_t passed_over = 0;
+  std::vector<std::string> passed_over_last;
+
+  bool stopping() {
+    const std::lock_guard lock(mutex);
+    return writer_failed || progress.cancelled();
+  }
+
+  /// Nothing of such a source is lost for being late, nor when the recording stops.
+  bool source_waits() const { return options.backpressure == Backpressure::wait || source.can_wait(); }
+
+  void keep_first(const Error& e) {
+    const std::lock_guard lock(mutex);
+    if (!error) error = e;
+  }
+
+  /// Written by the writer thread: a slow disk must not hold up the capture thread.
+  void log_event(const std::string& kind, const std::string& detail) {
+    const std::lock_guard lock(mutex);
+    queue.push_back(EventRecord{device.id, utc_now_ns(), kind, detail});
+    changed.notify_all();
+  }
+
+  void push(Frame frame) {
+    std::unique_lock lock(mutex);
+    const auto has_room = [&] {
+      return frames_queued < static_cast<std::size_t>(options.queue_frames) || writer_failed;
+    };
+    // Also when the recording is being stopped: the writer still writes what is queued.
+    if (source_waits()) changed.wait(lock, has_room);
+    if (!has_room() || writer_failed) {
+      account.lose(frame.id, Loss::dropped, writer_failed ? "not written" : "dropped: the disk is too slow");
+      return;
+    }
+    queue.push_back(std::move(frame));
+    ++frames_queued;
+    changed.notify_all();
+  }
+
+  /// Of an event that asks for the operator; with the mutex held.
+  void note(const Delivery& delivery) {
+    if (delivery.kind != Delivery::Kind::event) return;
+    for (const char* kind : {"moved", "twin", "look-alike", "reopen-failed", "setting-lost", "nothing-new"}) {
+      if (delivery.reason == kind) notice = delivery.detail;
+    }
+    if (delivery.reason == "ignored" || delivery.reason == "duplicate") {
+      constexpr std::size_t shown = 3;
+      ++passed_over;
+      if (passed_over_last.size() == shown) passed_over_last.erase(passed_over_last.begin());
+      passed_over_last.push_back(delivery.detail);
+    }
+    if (delivery.reason == "reconnected") notice.clear();
+  }
+
+  void take(Delivery delivery) {
+    switch (delivery.kind) {
+      case Delivery::Kind::frame:
+      case Delivery::Kind::rejected: {
+        const std::uint64_t id = delivery.frame.id;
+        if (!account.see(id)) {
+          log_event("out-of-order", fmt::format("frame {} after a later one", id));
+        } else if (delivery.kind == Delivery::Kind::frame) {
+          push(std::move(delivery.frame));
+        } else {
+          account.lose(id, Loss::rejected, "rejected: " + delivery.reason);
+        }
+        break;
+      }
+      case Delivery::Kind::event: log_event(delivery.reason, delivery.detail); break;
+      case Delivery::Kind::timeout:
+      case Delivery::Kind::end: break;
+    }
+  }
+
+  void capture() {
+    Status status = source.start();
+    const bool started = status.has_value();
+    while (status && !stopping()) {
+      Result<Delivery> delivery = source.next(options.next_timeout);
+      if (!delivery) {
+        status = tl::unexpected(delivery.error());
+        break;
+      }
+      {
+        const std::lock_guard lock(mutex);
+        if (delivery->kind == Delivery::Kind::event && delivery->reason == "disconnected") away = true;
+        if (delivery->kind == Delivery::Kind::event && delivery->reason == "reconnected") away = false;
+        note(*delivery);
+        // Files come when they come, unless their folder is gone.
+        silent = delivery->kind == Delivery::Kind::timeout && (!source.can_wait() || away);
+      }
+      if (delivery->kind == Delivery::Kind::end) break;
+      take(*std::move(delivery));
+    }
+    for (Delivery& late : started ? source.unfinished() : std::vector<Delivery>{}) {
+      {
+        const std::lock_guard lock(mutex);
+        note(late);
+      }
+      take(std::move(late));
+    }
+    if (const std::string counted = source.transport_report(); !counted.empty()) log_event("transport", counted);
+    source.stop();
+    if (!status) {
+      keep_first(status.error());
+      log_event("stream-error", status.error().message());
+    }
+    const std::lock_guard lock(mutex);
+    capture_over = true;
+    changed.notify_all();
+  }
+
+  std::optional<Item> pop() {
+    std::unique_lock lock(mutex);
+    changed.wait(lock, [&] { return !queue.empty() || capture_over; });
+    if (queue.empty()) return std::nullopt;
+    Item item = std::move(queue.front());
+    queue.pop_front();
+    frames_queued -= std::holds_alternative<Frame>(item);
+    changed.notify_all();
+    return item;
+  }
+
+  /// Some sources know their camera only from its first frame.
+  void tell_what_is_known() {
+    DeviceInfo now = source.describe();
+    if (now.model == device.model && now.serial == device.serial && now.lens.focal_px == device.lens.focal_px) return;
+    device.model = std::move(now.model);
+    device.serial = std::move(now.serial);
+    device.lens = now.lens;
+    if (const Status s = writer.update_device(device); !s) keep_first(s.error());
+  }
+
+  void store(const Frame& frame) {
+    if (const Status space = check_free_space(writer.folder(), options.min_free_bytes, when_full); !space) {
+      return give_up(frame, space.error());
+    }
+    tell_what_is_known();
+    const Result<FrameRecord> record = writer.append(device.id, frame);
+    if (!record && record.error().kind == ErrorKind::input) {
+      account.lose(frame.id, Loss::rejected, "rejected: " + record.error().found);
+      return;
+    }
+    if (!record) return give_up(frame, record.error());
+    account.receive();
+    {
+      const std::lock_guard lock(mutex);
+      latest = *record;
+    }
+    if (on_frame) on_frame(*record);
+  }
+
+  void give_up(const Frame& frame, const Error& cause) {
+    account.lose(frame.id, Loss::dropped, "not written");
+    first_unwritten = frame.id;
+    keep_first(cause);
+    const std::lock_guard lock(mutex);
+    writer_failed = true;
+    changed.notify_all();
+  }
+
+  void write_gaps(std::optional<std::uint64_t> frame_id) {
+    for (const GapRecord& gap : account.take_gaps(frame_id)) {
+      if (const Status s = writer.append(gap); !s) keep_first(s.error());
+    }
+  }
+
+  /// A source that waits has the frames that were not written still, and delivers them again.
+  void leave_for_resuming() {
+    const std::uint64_t before = account.counts().lost();
+    account.forget_from(*first_unwritten);
+    const EventRecord event{device.id, utc_now_ns(), "unwritten",
+                            fmt::format("{} frames are left for --resume", before - account.counts().lost())};
+    if (const Status s = writer.append(event); !s) keep_first(s.error());
+  }
+
+  void write() {
+    while (std::optional<Item> item = pop()) {
+      const Frame* frame = std::get_if<Frame>(&*item);
+      if (!frame) {
+        if (const Status s = writer.append(std::get<EventRecord>(*item)); !s) keep_first(s.error());
+      } else if (writer_failed) {
+        account.lose(frame->id, Loss::dropped, "not written");
+      } else {
+        write_gaps(frame->id);  // first: wherever the manifest ends, it accounts for every id up to there
+        store(*frame);
+      }
+    }
+    if (first_unwritten && source_waits()) leave_for_resuming();
+    write_gaps(std::nullopt);
+    if (!account.counts().any) return;
+    if (const Status s = writer.append(account.record()); !s) keep_first(s.error());
+  }
+
+  StreamStatus status() {
+    const StreamAccount::Counts c = account.counts();
+    const std::lock_guard lock(mutex);
+    return {device.id, c.received, c.lost(), c.first, c.last, c.missing, c.rejected, c.dropped,
+            silent, capture_over && queue.empty(), passed_over, passed_over_last, notice, latest};
+  }
+};
+
+Status RecorderOptions::validate() const {
+  if (queue_frames < 1 || queue_frames > 100000) {
+    return fail(ErrorKind::usage, "recorder.queue_frames", fmt::format("{}", queue_frames), "must be 1 to 100000");
+  }
+  if (next_timeout.count() < 1) {
+    return fail(ErrorKind::usage, "recorder.next_timeout", fmt::format("{} ms", next_timeout.count()), "must be > 0");
+  }
+  return {};
+}
+
+Recorder::Recorder(SessionWriter& writer, RecorderOptions options) : writer_(writer), options_(options) {}
+
+Status Recorder::run(const std::vector<FrameSource*>& sources, const Progress& progress) {
+  ORBITFUSE_TRY(options_.validate());
+  ORBITFUSE_TRY(check_free_space(writer_.folder(), options_.min_free_bytes, when_full));
+  std::vector<std::shared_ptr<Channel>> channels;
+  for (FrameSource* source : sources) {
+    channels.push_back(std::make_shared<Channel>(*source, writer_, options_, progress, on_frame));
+    ORBITFUSE_TRY(writer_.add_device(channels.back()->device));
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    channels_ = channels;
+  }
+  {
+    std::vector<std::jthread> threads;
+    for (const auto& channel : channels) {
+      threads.emplace_back([channel] { channel->capture(); });
+      threads.emplace_back([channel] { channel->write(); });
+    }
+  }
+  for (const auto& channel : channels) {
+    if (channel->error) return tl::unexpected(*channel->error);
+  }
+  return progress.check("record");
+}
+
+std::vector<StreamStatus> Recorder::status() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<StreamStatus> out;
+  for (const auto& channel : channels_) out.push_back(channel->status());
+  return out;
+}
+
+}  // namespace orbitfuse

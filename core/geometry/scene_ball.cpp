@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/geometry/scene_ball.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+namespace orbitfuse {
+
+SceneBall scene_ball(const std::vector<Rigid3d>& cam_from_world, std::vector<Eigen::Vector3d> points) {
+  const double n = static_cast<double>(cam_from_world.size());
+  Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero(), mean = b, forward = b;
+  for (const Rigid3d& pose : cam_from_world) {
+    const Eigen::Vector3d c = camera_center(pose), axis = pose.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+    const Eigen::Matrix3d off_axis = Eigen::Matrix3d::Identity() - axis * axis.transpose();
+    a += off_axis;
+    b += off_axis * c;
+    mean += c / n;
+    forward += axis;
+  }
+  SceneBall ball;
+  if (Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(a).eigenvalues()(0) > 1e-3 * n) {
+    ball.center = a.ldlt().solve(b);
+  } else if (!points.empty()) {
+    const auto middle = points.begin() + static_cast<std::ptrdiff_t>(points.size() / 2);
+    for (int i = 0; i < 3; ++i) {
+      std::nth_element(points.begin(), middle, points.end(), [i](const auto& p, const auto& q) { return p[i] < q[i]; });
+      ball.center[i] = (*middle)[i];
+    }
+  } else {
+    double spread = 0;
+    for (const Rigid3d& pose : cam_from_world) spread = std::max(spread, (camera_center(pose) - mean).norm());
+    ball.center = mean + forward.normalized() * (spread > 0 ? 2 * spread : 1.0);
+  }
+  double distance = 0;
+  for (const Rigid3d& pose : cam_from_world) distance += (camera_center(pose) - ball.center).norm() / n;
+  ball.radius = std::isfinite(distance) && distance > 0 ? distance : 1.0;
+  return ball;
+}
+
+}  // namespace orbitfuse

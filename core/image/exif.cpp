@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/image/exif.hpp"
+
+#include <cctype>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <exiv2/exiv2.hpp>
+#include <mutex>
+
+namespace orbitfuse {
+namespace {
+
+std::string text_of(const Exiv2::ExifData& data, const char* key) {
+  const auto it = data.findKey(Exiv2::ExifKey(key));
+  if (it == data.end()) return {};
+  std::string text = it->toString();
+  while (!text.empty() && (text.back() == '\0' || std::isspace(static_cast<unsigned char>(text.back())))) {
+    text.pop_back();
+  }
+  return text;
+}
+
+std::optional<double> number_of(const Exiv2::ExifData& data, const char* key) {
+  const auto it = data.findKey(Exiv2::ExifKey(key));
+  if (it == data.end() || it->count() < 1) return std::nullopt;
+  const double value = static_cast<double>(it->toFloat());
+  return std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
+/// "2021:06:30 10:20:30", ".123" digits and "+02:00" to UTC nanoseconds.
+std::optional<std::int64_t> epoch_ns(const std::string& date, const std::string& subsec,
+                                     const std::string& offset) {
+  int y, mo, d, h, mi, s;
+  if (std::sscanf(date.c_str(), "%d:%d:%d %d:%d:%d", &y, &mo, &d, &h, &mi, &s) != 6) return std::nullopt;
+  const std::chrono::year_month_day day{std::chrono::year(y), std::chrono::month(static_cast<unsigned>(mo)),
+                                        std::chrono::day(static_cast<unsigned>(d))};
+  if (!day.ok() || y < 1970 || y > 2200 || h > 23 || mi > 59 || s > 60) return std::nullopt;
+  std::int64_t seconds = std::chrono::sys_days(day).time_since_epoch().count() * 86400LL +
+                         h * 3600LL + mi * 60LL + s;
+  char sign = 0;
+  int oh = 0, om = 0;
+  if (std::sscanf(offset.c_str(), "%c%d:%d", &sign, &oh, &om) == 3 && (sign == '+' || sign == '-')) {
+    seconds -= (sign == '+' ? 1 : -1) * (oh * 3600LL + om * 60LL);
+  }
+  std::int64_t fraction_ns = 0, unit = 100'000'000;
+  for (char c : subsec) {
+    if (!std::isdigit(static_cast<unsigned char>(c)) || unit == 0) break;
+    fraction_ns += (c - '0') * unit;
+    unit /= 10;
+  }
+  return seconds * 1'000'000'000LL + fraction_ns;
+}
+
+}  // namespace
+
+ExifInfo read_exif(std::string_view bytes) {
+  ExifInfo info;
+  // Exiv2's XMP parser keeps global state.
+  static std::mutex mutex;
+  const std::lock_guard lock(mutex);
+  try {
+    Exiv2::LogMsg::setLevel(Exiv2::LogMsg::mute);
+    const auto image = Exiv2::ImageFactory::open(reinterpret_cast<const Exiv2::byte*>(bytes.data()),
+                                                 static_cast<long>(bytes.size()));
+    image->readMetadata();
+    const Exiv2::ExifData& data = image->exifData();
+    const double orientation = number_of(data, "Exif.Image.Orientation").value_or(1);
+    if (orientation >= 1 && orientation <= 8) info.orientation = static_cast<int>(orientation);
+    info.focal_mm = number_of(data, "Exif.Photo.FocalLength");
+    info.focal_35mm = number_of(data, "Exif.Photo.FocalLengthIn35mmFilm");
+    if (info.focal_mm && *info.focal_mm <= 0) info.focal_mm.reset();
+    if (info.focal_35mm && *info.focal_35mm <= 0) info.focal_35mm.reset();
+    info.make = text_of(data, "Exif.Image.Make");
+    info.model = text_of(data, "Exif.Image.Model");
+    info.serial = text_of(data, "Exif.Photo.BodySerialNumber");
+    const std::string offset = text_of(data, "Exif.Photo.OffsetTimeOriginal");
+    info.taken_ns = epoch_ns(text_of(data, "Exif.Photo.DateTimeOriginal"),
+                             text_of(data, "Exif.Photo.SubSecTimeOriginal"), offset);
+    info.taken_has_offset = !offset.empty();
+  } catch (const std::exception&) {
+    // No or broken metadata: what was read so far stands.
+  }
+  return info;
+}
+
+}  // namespace orbitfuse

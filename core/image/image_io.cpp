@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/image/image_io.hpp"
+
+#include <fmt/format.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "core/image/exif.hpp"
+#include "core/system/file_io.hpp"
+#include "core/image/image_codec.hpp"
+#include "core/temperature.hpp"
+
+namespace orbitfuse {
+namespace {
+
+namespace fs = std::filesystem;
+
+
+fs::path sidecar_of(const fs::path& path) { return path.string() + ".json"; }
+
+Status write_encoded(const fs::path& path, const Result<std::string>& bytes) {
+  if (!bytes) return tl::unexpected(bytes.error());
+  return write_file_atomic(path, *bytes);
+}
+
+}  // namespace
+
+Result<cv::Mat> read_visible(const fs::path& path) {
+  ORBITFUSE_ASSIGN(const std::string bytes, read_file(path));
+  ORBITFUSE_ASSIGN(cv::Mat image, decode_image(bytes, path.string()));
+  if (image.depth() != CV_8U) {
+    return fail(ErrorKind::input, path.string(), "16-bit samples, 8-bit expected",
+                "a thermal image? Give it as thermal, or convert it to 8-bit");
+  }
+  if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
+  return apply_orientation(image, read_exif(bytes).orientation);
+}
+
+Result<cv::Mat> read_thermal_k(const fs::path& path) {
+  ORBITFUSE_ASSIGN(const std::string bytes, read_file(path));
+  std::string description;
+  cv::Mat image;
+  if (image_format(bytes) == ImageFormat::tiff) {
+    ORBITFUSE_ASSIGN(image, decode_tiff(bytes, path.string(), &description));
+  } else {
+    ORBITFUSE_ASSIGN(image, decode_image(bytes, path.string()));
+  }
+  if (image.type() != CV_16UC1) {
+    return fail(ErrorKind::input, path.string(),
+                fmt::format("{}-bit samples in {} channels, 16-bit grey expected",
+                            8 * image.elemSize1(), image.channels()),
+                "this is not a radiometric image; import it as 8-bit thermal");
+  }
+  std::optional<ThermalScaleTag> tag = thermal_scale_of_json(description);
+  std::error_code ignored;
+  if (!tag && fs::exists(sidecar_of(path), ignored)) {
+    ORBITFUSE_ASSIGN(const std::string sidecar, read_file(sidecar_of(path)));
+    tag = thermal_scale_of_json(sidecar);
+    if (!tag) {
+      return fail(ErrorKind::input, sidecar_of(path).string(), "no usable \"scale\" (kelvin per count)",
+                  "correct or remove the sidecar");
+    }
+  }
+  const ThermalScaleTag scale = tag.value_or(ThermalScaleTag{});
+  cv::Mat kelvin(image.size(), CV_32FC1);
+  for (int y = 0; y < image.rows; ++y) {
+    const auto* from = image.ptr<std::uint16_t>(y);
+    auto* to = kelvin.ptr<float>(y);
+    for (int x = 0; x < image.cols; ++x) {
+      to[x] = from[x] == 0 ? invalid_k : static_cast<float>(from[x] * scale.scale + scale.offset);
+    }
+  }
+  return kelvin;
+}
+
+Result<cv::Mat> read_image(const fs::path& path) {
+  ORBITFUSE_ASSIGN(const std::string bytes, read_file(path));
+  return decode_image(bytes, path.string());
+}
+
+Status write_png(const fs::path& path, const cv::Mat& image) {
+  return write_encoded(path, encode_png(image));
+}
+
+Status write_jpeg(const fs::path& path, const cv::Mat& image, int quality) {
+  return write_encoded(path, encode_jpeg(image, quality));
+}
+
+Status write_thermal_tiff(const fs::path& path, const cv::Mat& kelvin) {
+  CV_Assert(kelvin.type() == CV_32FC1);
+  cv::Mat centikelvin(kelvin.size(), CV_16UC1);
+  for (int y = 0; y < kelvin.rows; ++y) {
+    for (int x = 0; x < kelvin.cols; ++x) {
+      centikelvin.at<std::uint16_t>(y, x) = centikelvin_from_kelvin(kelvin.at<float>(y, x));
+    }
+  }
+  ORBITFUSE_TRY(write_encoded(path, encode_thermal_tiff(centikelvin)));
+  return write_file_atomic(sidecar_of(path), thermal_sidecar_json() + "\n");
+}
+
+Status write_float_tiff(const fs::path& path, const cv::Mat& values) {
+  CV_Assert(values.type() == CV_32FC1);
+  return write_encoded(path, encode_tiff(values, ""));
+}
+
+Result<cv::Mat> read_float_tiff(const fs::path& path) {
+  ORBITFUSE_ASSIGN(const std::string bytes, read_file(path));
+  ORBITFUSE_ASSIGN(cv::Mat image, decode_tiff(bytes, path.string()));
+  if (image.type() != CV_32FC1) {
+    return fail(ErrorKind::input, path.string(), "not a 32-bit float TIFF", "write the depth map again");
+  }
+  return image;
+}
+
+}  // namespace orbitfuse

@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+#include <tiffio.h>
+
+#include <algorithm>
+#include <cstdarg>
+#include <cstring>
+#include <memory>
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+#include "core/image/image_codec.hpp"
+
+namespace orbitfuse {
+namespace {
+
+/// A TIFF in memory; libtiff reads and writes it through the callbacks below.
+struct MemoryFile {
+  std::string_view input;
+  std::string output;
+  bool writing = false;
+  bool tag_is_cut = false;  ///< a tag's value lies beyond the end of the file
+  toff_t position = 0;
+
+  toff_t size() const { return writing ? output.size() : input.size(); }
+};
+
+tmsize_t read_bytes(thandle_t handle, void* to, tmsize_t count) {
+  auto& file = *static_cast<MemoryFile*>(handle);
+  const char* from = file.writing ? file.output.data() : file.input.data();
+  if (count <= 0 || file.position >= file.size()) return 0;
+  const auto n = std::min<toff_t>(static_cast<toff_t>(count), file.size() - file.position);
+  std::memcpy(to, from + file.position, n);
+  file.position += n;
+  return static_cast<tmsize_t>(n);
+}
+
+tmsize_t write_bytes(thandle_t handle, void* from, tmsize_t count) {
+  auto& file = *static_cast<MemoryFile*>(handle);
+  const auto n = static_cast<toff_t>(count);
+  if (file.position + n > file.output.size()) file.output.resize(file.position + n);
+  std::memcpy(file.output.data() + file.position, from, n);
+  file.position += n;
+  return count;
+}
+
+toff_t seek(thandle_t handle, toff_t offset, int whence) {
+  auto& file = *static_cast<MemoryFile*>(handle);
+  const toff_t base = whence == SEEK_SET ? 0 : whence == SEEK_CUR ? file.position : file.size();
+  return file.position = base + offset;
+}
+
+int close_nothing(thandle_t) { return 0; }
+toff_t size_of(thandle_t handle) { return static_cast<MemoryFile*>(handle)->size(); }
+int map_nothing(thandle_t, void**, toff_t*) { return 0; }
+void unmap_nothing(thandle_t, void*, toff_t) {}
+
+/// libtiff leaves out tags that it can't read and goes on; only its warning tells.
+void on_warning(thandle_t handle, const char*, const char* format, va_list) {
+  if (handle && std::strstr(format, "IO error")) static_cast<MemoryFile*>(handle)->tag_is_cut = true;
+}
+
+using TiffHandle = std::unique_ptr<TIFF, decltype(&TIFFClose)>;
+
+TiffHandle open(MemoryFile& file, const char* mode) {
+  // libtiff prints to stderr by default; failures are reported by return values here.
+  static const bool quiet = [] {
+    TIFFSetErrorHandler(nullptr);
+    TIFFSetWarningHandler(nullptr);
+    TIFFSetWarningHandlerExt(on_warning);
+    return true;
+  }();
+  (void)quiet;
+  return {TIFFClientOpen("memory", mode, &file, read_bytes, write_bytes, seek, close_nothing,
+                         size_of, map_nothing, unmap_nothing),
+          &TIFFClose};
+}
+
+struct Layout {
+  std::uint32_t width = 0, height = 0;
+  std::uint16_t bits = 1, channels = 1, format = SAMPLEFORMAT_UINT, planar = PLANARCONFIG_CONTIG;
+  std::uint16_t photometric = PHOTOMETRIC_MINISBLACK;
+};
+
+Layout layout_of(TIFF* tiff) {
+  Layout l;
+  TIFFGetField(tiff, TIFFTAG_IMAGEWIDTH, &l.width);
+  TIFFGetField(tiff, TIFFTAG_IMAGELENGTH, &l.height);
+  TIFFGetFieldDefaulted(tiff, TIFFTAG_BITSPERSAMPLE, &l.bits);
+  TIFFGetFieldDefaulted(tiff, TIFFTAG_SAMPLESPERPIXEL, &l.channels);
+  TIFFGetFieldDefaulted(tiff, TIFFTAG_SAMPLEFORMAT, &l.format);
+  TIFFGetFieldDefaulted(tiff, TIFFTAG_PLANARCONFIG, &l.planar);
+  TIFFGetField(tiff, TIFFTAG_PHOTOMETRIC, &l.photometric);
+  return l;
+}
+
+int depth_of(const Layout& l) {
+  if (l.format == SAMPLEFORMAT_IEEEFP && l.bits == 32) return CV_32F;
+  if (l.format == SAMPLEFORMAT_UINT && l.bits == 16) return CV_16U;
+  if (l.format == SAMPLEFORMAT_UINT && l.bits == 8) return CV_8U;
+  return -1;
+}
+
+bool read_strips(TIFF* tiff, const Layout& l, cv::Mat& image) {
+  const auto row_bytes = static_cast<std::size_t>(l.width) * image.elemSize();
+  if (static_cast<std::size_t>(TIFFScanlineSize(tiff)) != row_bytes) return false;
+  for (std::uint32_t y = 0; y < l.height; ++y) {
+    if (TIFFReadScanline(tiff, image.ptr(static_cast<int>(y)), y, 0) < 0) return false;
+  }
+  return true;
+}
+
+bool read_tiles(TIFF* tiff, const Layout& l, cv::Mat& image) {
+  std::uint32_t tile_w = 0, tile_h = 0;
+  TIFFGetField(tiff, TIFFTAG_TILEWIDTH, &tile_w);
+  TIFFGetField(tiff, TIFFTAG_TILELENGTH, &tile_h);
+  const std::size_t row_bytes = static_cast<std::size_t>(tile_w) * image.elemSize();
+  if (tile_w == 0 || tile_h == 0 || tile_w > 65536 || tile_h > 65536 ||
+      static_cast<std::size_t>(TIFFTileSize(tiff)) != row_bytes * tile_h) {
+    return false;
+  }
+  std::vector<unsigned char> tile(row_bytes * tile_h);
+  for (std::uint32_t y = 0; y < l.height; y += tile_h) {
+    for (std::uint32_t x = 0; x < l.width; x += tile_w) {
+      if (TIFFReadTile(tiff, tile.data(), x, y, 0, 0) < 0) return false;
+      const std::size_t n = std::min(tile_w, l.width - x) * image.elemSize();
+      for (std::uint32_t r = 0; r < std::min(tile_h, l.height - y); ++r) {
+        std::memcpy(image.ptr(static_cast<int>(y + r)) + x * image.elemSize(),
+                    tile.data() + r * row_bytes, n);
+      }
+    }
+  }
+  return true;
+}
+
+cv::Mat to_bgr(const cv::Mat& image) {
+  cv::Mat out = image;
+  if (image.channels() == 3) cv::cvtColor(image, out, cv::COLOR_RGB2BGR);
+  if (image.channels() == 4) cv::cvtColor(image, out, cv::COLOR_RGBA2BGR);
+  if (image.channels() == 2) cv::extractChannel(image, out, 0);
+  return out;
+}
+
+}  // namespace
+
+Result<cv::Mat> decode_tiff(std::string_view bytes, const std::string& where,
+                            std::string* image_description) {
+  MemoryFile file;
+  file.input = bytes;
+  const TiffHandle tiff = open(file, "rm");
+  if (!tiff) return fail(ErrorKind::input, where, "not a readable TIFF", "copy the file again");
+  const Layout l = layout_of(tiff.get());
+  const int depth = depth_of(l);
+  if (depth < 0 || l.channels < 1 || l.channels > 4 || l.planar != PLANARCONFIG_CONTIG ||
+      l.photometric == PHOTOMETRIC_PALETTE) {
+    return fail(ErrorKind::input, where,
+                fmt::format("TIFF with {}-bit samples (format {}), {} channels", l.bits, l.format, l.channels),
+                "convert it to 8 or 16-bit unsigned grey or RGB");
+  }
+  const long long samples = 1LL * l.width * l.height * l.channels;
+  if (l.width == 0 || l.height == 0 || l.width > 65536 || l.height > 65536 || samples > max_image_samples) {
+    return fail(ErrorKind::input, where, fmt::format("TIFF of {}x{}", l.width, l.height),
+                "the header is damaged; copy the file again");
+  }
+  if (image_description) {
+    const char* text = nullptr;
+    if (TIFFGetField(tiff.get(), TIFFTAG_IMAGEDESCRIPTION, &text) && text) *image_description = text;
+  }
+  cv::Mat image(static_cast<int>(l.height), static_cast<int>(l.width), CV_MAKETYPE(depth, l.channels));
+  const bool whole = TIFFIsTiled(tiff.get()) ? read_tiles(tiff.get(), l, image)
+                                             : read_strips(tiff.get(), l, image);
+  if (!whole || file.tag_is_cut) {
+    return fail(ErrorKind::input, where, "truncated or damaged TIFF", "copy the file again");
+  }
+  return to_bgr(image);
+}
+
+Result<std::string> encode_tiff(const cv::Mat& image, const std::string& image_description) {
+  CV_Assert(image.type() == CV_16UC1 || image.type() == CV_32FC1);
+  const bool is_float = image.type() == CV_32FC1;
+  MemoryFile file;
+  file.writing = true;
+  {
+    const TiffHandle tiff = open(file, "wm");
+    if (!tiff) return fail(ErrorKind::device, "TIFF", "encoder failed", "report this");
+    TIFFSetField(tiff.get(), TIFFTAG_IMAGEWIDTH, static_cast<std::uint32_t>(image.cols));
+    TIFFSetField(tiff.get(), TIFFTAG_IMAGELENGTH, static_cast<std::uint32_t>(image.rows));
+    TIFFSetField(tiff.get(), TIFFTAG_BITSPERSAMPLE, is_float ? 32 : 16);
+    TIFFSetField(tiff.get(), TIFFTAG_SAMPLESPERPIXEL, 1);
+    TIFFSetField(tiff.get(), TIFFTAG_SAMPLEFORMAT, is_float ? SAMPLEFORMAT_IEEEFP : SAMPLEFORMAT_UINT);
+    TIFFSetField(tiff.get(), TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+    TIFFSetField(tiff.get(), TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
+    TIFFSetField(tiff.get(), TIFFTAG_ORIENTATION, ORIENTATION_TOPLEFT);
+    TIFFSetField(tiff.get(), TIFFTAG_COMPRESSION, COMPRESSION_ADOBE_DEFLATE);
+    TIFFSetField(tiff.get(), TIFFTAG_PREDICTOR, is_float ? PREDICTOR_FLOATINGPOINT : PREDICTOR_HORIZONTAL);
+    TIFFSetField(tiff.get(), TIFFTAG_ROWSPERSTRIP, static_cast<std::uint32_t>(image.rows));
+    TIFFSetField(tiff.get(), TIFFTAG_SOFTWARE, "OrbitFuse");
+    if (!image_description.empty()) {
+      TIFFSetField(tiff.get(), TIFFTAG_IMAGEDESCRIPTION, image_description.c_str());
+    }
+    cv::Mat row;
+    for (int y = 0; y < image.rows; ++y) {
+      image.row(y).copyTo(row);  // the predictor works in place on the row it is given
+      if (TIFFWriteScanline(tiff.get(), row.data, static_cast<std::uint32_t>(y), 0) < 0) {
+        return fail(ErrorKind::device, "TIFF", "encoder failed", "report this");
+      }
+    }
+  }
+  return std::move(file.output);
+}
+
+}  // namespace orbitfuse

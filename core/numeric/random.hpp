@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+
+namespace orbitfuse {
+
+/// Counter-based random numbers (SplitMix64 finaliser): the value depends on the key alone, so
+/// draws are the same for any thread count and after a resume.
+inline std::uint64_t random_bits(std::uint64_t seed, std::uint64_t stream, std::uint64_t counter) {
+  std::uint64_t x = seed * 0x9E3779B97F4A7C15ull ^ stream * 0xD1B54A32D192ED03ull;
+  x += counter * 0xBF58476D1CE4E5B9ull + 0x9E3779B97F4A7C15ull;
+  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9ull;
+  x = (x ^ (x >> 27)) * 0x94D049BB133111EBull;
+  x ^= x >> 31;
+  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9ull;
+  return x ^ (x >> 27);
+}
+
+/// Uniform in [0, 1).
+inline float uniform01(std::uint64_t bits) { return static_cast<float>(bits >> 40) * 0x1p-24f; }
+inline float random_uniform(std::uint64_t seed, std::uint64_t stream, std::uint64_t counter) {
+  return uniform01(random_bits(seed, stream, counter));
+}
+
+}  // namespace orbitfuse

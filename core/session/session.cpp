@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/session/session.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <unordered_map>
+
+#include "core/system/file_io.hpp"
+#include "core/session/manifest_json.hpp"
+
+namespace orbitfuse {
+namespace {
+
+using manifest::Json;
+
+using FrameIndex = std::unordered_map<std::string, std::size_t>;  ///< by file
+
+/// One parsed line applied to the session. Unknown types are skipped: newer writers may add some.
+/// A later frame line about the same file amends the earlier one: the guide chooses stations after
+/// the frames are on disk.
+Status apply(const Json& line, const std::string& where, Session& session, FrameIndex& index) {
+  const manifest::Reader reader(line, where);
+  ORBITFUSE_ASSIGN(const std::string type, reader.text("type"));
+  session.complete = type == "end";
+  if (type == "session") return manifest::read_header(reader, session);
+  if (type == "device") {
+    ORBITFUSE_ASSIGN(DeviceInfo device, manifest::read_device(reader));
+    std::erase_if(session.devices, [&](const DeviceInfo& d) { return d.id == device.id; });
+    session.devices.push_back(std::move(device));
+  } else if (type == "frame") {
+    ORBITFUSE_ASSIGN(FrameRecord frame, manifest::read_frame(reader));
+    const auto [known, is_new] = index.emplace(frame.file, session.frames.size());
+    if (is_new) session.frames.push_back(std::move(frame));
+    else session.frames[known->second] = std::move(frame);
+  } else if (type == "gap") {
+    ORBITFUSE_ASSIGN(GapRecord gap, manifest::read_gap(reader));
+    session.gaps.push_back(std::move(gap));
+  } else if (type == "stream") {
+    ORBITFUSE_ASSIGN(StreamRecord stream, manifest::read_stream(reader));
+    session.streams.push_back(std::move(stream));
+  } else if (type == "event") {
+    ORBITFUSE_ASSIGN(EventRecord event, manifest::read_event(reader));
+    session.events.push_back(std::move(event));
+  }
+  return {};
+}
+
+void drop_missing_files(Session& session) {
+  std::erase_if(session.frames, [&](const FrameRecord& frame) {
+    std::error_code ignored;
+    if (std::filesystem::is_regular_file(session.path_of(frame), ignored)) return false;
+    session.warnings.push_back(frame.file + ": listed in the manifest, but the file is missing");
+    return true;
+  });
+}
+
+}  // namespace
+
+bool FrameRecord::has_flag(const std::string& flag) const {
+  return std::find(flags.begin(), flags.end(), flag) != flags.end();
+}
+
+const DeviceInfo* Session::device(const std::string& id_wanted) const {
+  for (const DeviceInfo& d : devices) {
+    if (d.id == id_wanted) return &d;
+  }
+  return nullptr;
+}
+
+std::vector<const FrameRecord*> Session::frames_of(Modality modality, bool with_tracking) const {
+  std::vector<const FrameRecord*> out;
+  for (const FrameRecord& frame : frames) {
+    if (frame.modality == modality && (with_tracking || !frame.tracking)) out.push_back(&frame);
+  }
+  return out;
+}
+
+Result<Session> open_session(const std::filesystem::path& folder) {
+  std::error_code ignored;
+  const std::filesystem::path file = folder / "manifest.jsonl";
+  if (!std::filesystem::is_directory(folder, ignored)) {
+    const bool is_file = std::filesystem::exists(folder, ignored);
+    return fail(ErrorKind::input, folder.string(), is_file ? "is a file" : "no such folder", "give a session folder");
+  }
+  if (std::filesystem::status(file, ignored).type() == std::filesystem::file_type::not_found) {
+    return fail(ErrorKind::input, folder.string(), "no manifest.jsonl, so not a session",
+                "make one with: orbitfuse import");
+  }
+  ORBITFUSE_ASSIGN(const std::string text, read_file(file));
+  Session session;
+  session.folder = folder;
+  FrameIndex index;
+  std::size_t at = 0;
+  for (int number = 1; at < text.size(); ++number) {
+    const std::size_t end = text.find('\n', at);
+    const bool is_last = end == std::string::npos;
+    const std::string_view line(text.data() + at, (is_last ? text.size() : end) - at);
+    const std::string where = fmt::format("{}:{}", file.string(), number);
+    const Json json = Json::parse(line, nullptr, false);
+    if (json.is_discarded() && is_last && number > 1) {
+      session.complete = false;
+      session.warnings.push_back(where + ": cut in the middle of the line (a crash while recording?)");
+      break;
+    }
+    if (!json.is_object()) {
+      return fail(ErrorKind::input, where, "not a JSON object", "restore the manifest from a backup");
+    }
+    if (number == 1 && json.value("type", "") != std::string("session")) {
+      return fail(ErrorKind::input, where, "the first line is not a session header",
+                  "restore the manifest from a backup");
+    }
+    ORBITFUSE_TRY(apply(json, where, session, index));
+    if (is_last) break;
+    at = end + 1;
+  }
+  if (session.id.empty()) {
+    return fail(ErrorKind::input, file.string(), "empty manifest", "record or import the session again");
+  }
+  for (const FrameRecord& frame : session.frames) {
+    if (!session.device(frame.device)) {
+      return fail(ErrorKind::input, file.string(), frame.file + " is of unknown device \"" + frame.device + "\"",
+                  "restore the manifest from a backup");
+    }
+  }
+  drop_missing_files(session);
+  if (!session.complete) session.warnings.push_back("the session was not closed: it may be incomplete");
+  return session;
+}
+
+}  // namespace orbitfuse

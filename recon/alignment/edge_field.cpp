@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/alignment/edge_field.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace orbitfuse {
+namespace {
+
+float percentile(cv::Mat values, double share) {
+  std::vector<float> v(values.begin<float>(), values.end<float>());
+  const auto place = v.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(v.size() - 1));
+  std::nth_element(v.begin(), place, v.end());
+  return *place;
+}
+
+/// Invalid samples take the image's median: no gradient of their own where they are few.
+cv::Mat filled(const cv::Mat& values) {
+  cv::Mat copy = values.clone();
+  std::vector<float> good;
+  for (const float v : cv::Mat_<float>(copy))
+    if (std::isfinite(v)) good.push_back(v);
+  float middle = 0;
+  if (!good.empty()) {
+    const auto place = good.begin() + static_cast<std::ptrdiff_t>(good.size() / 2);
+    std::nth_element(good.begin(), place, good.end());
+    middle = *place;
+  }
+  for (float& v : cv::Mat_<float>(copy))
+    if (!std::isfinite(v)) v = middle;
+  return copy;
+}
+
+}  // namespace
+
+cv::Mat orientation_field(const cv::Mat& values, double sigma_px) {
+  cv::Mat image = filled(values), dx, dy;
+  // A saturated or empty region (sky) far below the scene would set the scale of everything.
+  const float low = percentile(image, 0.02), high = percentile(image, 0.98);
+  cv::max(image, low, image);
+  cv::min(image, high, image);
+  cv::GaussianBlur(image, image, {}, sigma_px);
+  cv::Sobel(image, dx, CV_32F, 1, 0, 1, 0.5);
+  cv::Sobel(image, dy, CV_32F, 0, 1, 1, 0.5);
+  cv::Mat magnitude;
+  cv::magnitude(dx, dy, magnitude);
+  cv::Mat field(image.size(), CV_32FC2, cv::Scalar::all(0));
+  const float noise = percentile(magnitude, 0.5);
+  const float strong = percentile(magnitude, 0.99);
+  const float unit = std::max(3.0f * noise, 0.02f * strong);
+  if (!(strong > 0) || !(unit > 0)) return field;
+  const float full = std::log1p(strong / unit);
+  for (int y = 0; y < field.rows; ++y)
+    for (int x = 0; x < field.cols; ++x) {
+      const float gx = dx.at<float>(y, x), gy = dy.at<float>(y, x), m = magnitude.at<float>(y, x);
+      if (!(m > 0)) continue;
+      const float strength = std::min(1.0f, std::log1p(m / unit) / full) / (m * m);
+      field.at<cv::Vec2f>(y, x) = {strength * (gx * gx - gy * gy), strength * 2 * gx * gy};
+    }
+  return field;
+}
+
+cv::Mat cell_field(const cv::Mat& field, int columns, int rows) {
+  cv::Mat cells;
+  cv::resize(field, cells, {columns, rows}, 0, 0, cv::INTER_AREA);
+  cv::GaussianBlur(cells, cells, {}, 0.8);
+  return cells;
+}
+
+}  // namespace orbitfuse

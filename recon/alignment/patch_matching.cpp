@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/alignment/patch_matching.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+
+#include "recon/alignment/edge_field.hpp"
+
+namespace orbitfuse {
+namespace {
+
+struct EdgePixel {
+  int x = 0, y = 0;
+  float re = 0, im = 0;  ///< of the field
+  float strength = 0;
+};
+
+/// Pixels that carry the edges; the rest of a patch says nothing.
+std::vector<EdgePixel> edge_pixels(const cv::Mat& edges, float threshold) {
+  std::vector<EdgePixel> list;
+  for (int y = 0; y < edges.rows; ++y)
+    for (int x = 0; x < edges.cols; ++x) {
+      const auto& v = edges.at<cv::Vec2f>(y, x);
+      const float s = std::hypot(v[0], v[1]);
+      if (s > threshold) list.push_back({x, y, v[0], v[1], s});
+    }
+  return list;
+}
+
+/// Correlation of edge pixels with the image over a square of shifts.
+cv::Mat1f correlation(const std::vector<EdgePixel>& pixels, const cv::Mat& field, int cx, int cy, int reach) {
+  cv::Mat1f score = cv::Mat1f::zeros(2 * reach + 1, 2 * reach + 1);
+  for (const EdgePixel& p : pixels)
+    for (int dy = -reach; dy <= reach; ++dy) {
+      const int y = p.y + cy + dy;
+      if (y < 0 || y >= field.rows) continue;
+      const int first = std::max(-reach, -(p.x + cx)), last = std::min(reach, field.cols - 1 - (p.x + cx));
+      const auto* row = field.ptr<cv::Vec2f>(y) + p.x + cx;
+      float* out = score[dy + reach] + reach;
+      for (int dx = first; dx <= last; ++dx) out[dx] += p.re * row[dx][0] + p.im * row[dx][1];
+    }
+  return score;
+}
+
+double strength_squared(const std::vector<EdgePixel>& pixels) {
+  double sum = 0;
+  for (const EdgePixel& p : pixels) sum += static_cast<double>(p.strength) * static_cast<double>(p.strength);
+  return sum;
+}
+
+/// Peak to a fraction of a pixel, and the curvature of the score there.
+struct Peak {
+  Eigen::Vector2d shift;
+  Eigen::Matrix2d curvature;  ///< minus the Hessian, positive definite at a true peak
+  double value = 0;
+  bool inside = false;        ///< not on the border of the search
+};
+
+Peak peak_of(const cv::Mat1f& score, int reach) {
+  cv::Point at;
+  double value = 0;
+  cv::minMaxLoc(score, nullptr, &value, nullptr, &at);
+  Peak peak;
+  peak.value = value;
+  peak.shift = Eigen::Vector2d(at.x - reach, at.y - reach);
+  peak.curvature.setZero();
+  peak.inside = at.x > 0 && at.y > 0 && at.x < 2 * reach && at.y < 2 * reach;
+  if (!peak.inside) return peak;
+  const auto s = [&](int dx, int dy) { return static_cast<double>(score(at.y + dy, at.x + dx)); };
+  const double xx = s(1, 0) - 2 * s(0, 0) + s(-1, 0), yy = s(0, 1) - 2 * s(0, 0) + s(0, -1);
+  const double xy = (s(1, 1) - s(1, -1) - s(-1, 1) + s(-1, -1)) / 4;
+  peak.curvature << -xx, -xy, -xy, -yy;
+  const Eigen::Vector2d gradient((s(1, 0) - s(-1, 0)) / 2, (s(0, 1) - s(0, -1)) / 2);
+  if (peak.curvature.determinant() > 1e-6 * peak.curvature.squaredNorm() && peak.curvature.trace() > 0) {
+    const Eigen::Vector2d step = peak.curvature.inverse() * gradient;
+    if (step.cwiseAbs().maxCoeff() <= 1) peak.shift += step;
+  }
+  return peak;
+}
+
+/// Depth of what an edge belongs to: the nearest surface beside it.
+double near_depth(const cv::Mat& depth, int x, int y) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (int dy = -1; dy <= 1; ++dy)
+    for (int dx = -1; dx <= 1; ++dx) {
+      const int u = x + dx, v = y + dy;
+      if (u < 0 || v < 0 || u >= depth.cols || v >= depth.rows) continue;
+      const auto z = static_cast<double>(depth.at<float>(v, u));
+      if (z > 0 && z < nearest) nearest = z;
+    }
+  return nearest;
+}
+
+}  // namespace
+
+cv::Mat rendered_edges(const SceneRender& render) {
+  // Inverse depth: equal steps look alike near and far, and what has no depth is infinitely far.
+  cv::Mat inverse(render.depth.size(), CV_32F);
+  for (int y = 0; y < inverse.rows; ++y)
+    for (int x = 0; x < inverse.cols; ++x) {
+      const float z = render.depth.at<float>(y, x);
+      inverse.at<float>(y, x) = z > 0 ? 1 / z : 0;
+    }
+  const cv::Mat form = orientation_field(inverse, 1.0), shade = orientation_field(render.brightness, 1.0);
+  // An edge of form shows in both modalities, one of paint perhaps: form counts more.
+  constexpr float paint = 0.6F;
+  cv::Mat edges = form.clone();
+  for (int y = 0; y < edges.rows; ++y)
+    for (int x = 0; x < edges.cols; ++x) {
+      auto& f = edges.at<cv::Vec2f>(y, x);
+      const auto s = paint * shade.at<cv::Vec2f>(y, x);
+      if (s.dot(s) > f.dot(f)) f = s;
+    }
+  return edges;
+}
+
+std::vector<PatchMatch> match_patches(const SceneRender& render, const cv::Mat& edges, const Camera& camera,
+                                      const cv::Mat& field, const PatchMatchOptions& options) {
+  const std::vector<EdgePixel> all = edge_pixels(edges, 0.25F);
+  std::vector<PatchMatch> matches;
+  if (all.size() < 20) return matches;
+  const Peak whole = peak_of(correlation(all, field, 0, 0, options.search_px), options.search_px);
+  const int sx = static_cast<int>(std::lround(whole.shift.x())), sy = static_cast<int>(std::lround(whole.shift.y()));
+  cv::Mat energy;
+  {
+    cv::Mat parts[2];
+    cv::split(field, parts);
+    energy = parts[0].mul(parts[0]) + parts[1].mul(parts[1]);
+  }
+  const int r = options.radius_px;
+  for (int cy = options.spacing_px / 2; cy < edges.rows; cy += options.spacing_px)
+    for (int cx = options.spacing_px / 2; cx < edges.cols; cx += options.spacing_px) {
+      std::vector<EdgePixel> patch;
+      for (const EdgePixel& p : all)
+        if (std::abs(p.x - cx) <= r && std::abs(p.y - cy) <= r) patch.push_back(p);
+      if (patch.size() < 12) continue;
+      const Peak peak = peak_of(correlation(patch, field, sx, sy, options.patch_search_px), options.patch_search_px);
+      if (!peak.inside || !(peak.value > 0)) continue;
+      // Normalised by the image's own strength under the patch's edge pixels.
+      double there = 0;
+      const Eigen::Vector2d shift = peak.shift + Eigen::Vector2d(sx, sy);
+      for (const EdgePixel& p : patch) {
+        const int x = p.x + static_cast<int>(std::lround(shift.x())), y = p.y + static_cast<int>(std::lround(shift.y()));
+        if (x >= 0 && y >= 0 && x < field.cols && y < field.rows) there += static_cast<double>(energy.at<float>(y, x));
+      }
+      const double score = peak.value / std::sqrt(std::max(1e-9, there * strength_squared(patch)));
+      // Edges that the image shows only faintly must not count as a perfect match.
+      const double coverage = std::sqrt(there / strength_squared(patch));
+      if (score < options.min_score || coverage < 0.2) continue;
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(peak.curvature);
+      const Eigen::Vector2d values = eigen.eigenvalues().cwiseMax(0);
+      if (!(values.maxCoeff() > 0)) continue;
+      const Eigen::Matrix2d root = eigen.eigenvectors() * (values / values.maxCoeff()).cwiseSqrt().asDiagonal() *
+                                   eigen.eigenvectors().transpose();
+      // The strongest edge pixel nearest to the patch's centre stands for it.
+      const EdgePixel* anchor = nullptr;
+      double best = -1;
+      for (const EdgePixel& p : patch) {
+        const double distance = std::hypot(p.x - cx, p.y - cy);
+        const double value = static_cast<double>(p.strength) / (1 + distance / r);
+        if (value > best && std::isfinite(near_depth(render.depth, p.x, p.y))) best = value, anchor = &p;
+      }
+      if (!anchor) continue;
+      const Eigen::Vector2d pixel(anchor->x + 0.5, anchor->y + 0.5);
+      matches.push_back({camera.ray_of(pixel) * near_depth(render.depth, anchor->x, anchor->y), pixel + shift, root,
+                         score * std::min(1.0, coverage)});
+    }
+  return matches;
+}
+
+double edge_agreement(const cv::Mat& edges, const cv::Mat& field) {
+  double sum = 0, total = 0;
+  for (const EdgePixel& p : edge_pixels(edges, 0.25F)) {
+    const auto& v = field.at<cv::Vec2f>(p.y, p.x);
+    sum += static_cast<double>(p.re * v[0] + p.im * v[1]) / static_cast<double>(p.strength);
+    total += 1;
+  }
+  return total > 0 ? sum / total : 0;
+}
+
+}  // namespace orbitfuse

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/alignment/render_alignment.hpp"
+
+#include <ceres/ceres.h>
+#include <ceres/rotation.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "core/system/parallel.hpp"
+#include "recon/alignment/edge_field.hpp"
+#include "recon/alignment/patch_matching.hpp"
+
+namespace orbitfuse {
+namespace {
+
+/// A correction of the rendering camera's pose (angle-axis, translation) and the lens' scale.
+struct PatchResidual {
+  PatchMatch match;
+  Camera camera;
+
+  template <class T>
+  bool operator()(const T* correction, const T* log_focal, T* residual) const {
+    const T point[3] = {T(match.point.x()), T(match.point.y()), T(match.point.z())};
+    T moved[3];
+    ceres::AngleAxisRotatePoint(correction, point, moved);
+    for (int i = 0; i < 3; ++i) moved[i] += correction[3 + i];
+    if (!(moved[2] > T(1e-6))) return false;
+    const T scale = exp(log_focal[0]);
+    const T dx = scale * T(camera.fx) * moved[0] / moved[2] + T(camera.cx) - T(match.seen.x());
+    const T dy = scale * T(camera.fy) * moved[1] / moved[2] + T(camera.cy) - T(match.seen.y());
+    residual[0] = T(match.sqrt_weight(0, 0)) * dx + T(match.sqrt_weight(0, 1)) * dy;
+    residual[1] = T(match.sqrt_weight(1, 0)) * dx + T(match.sqrt_weight(1, 1)) * dy;
+    return true;
+  }
+};
+
+struct FocalPrior {
+  double offset, sigma;
+  template <class T>
+  bool operator()(const T* log_focal, T* residual) const {
+    residual[0] = (log_focal[0] - T(offset)) / T(sigma);
+    return true;
+  }
+};
+
+struct ViewMatches {
+  std::vector<PatchMatch> matches;
+};
+
+using Correction = std::array<double, 6>;
+
+/// All corrections and the common focal, the robust scale lowered step by step.
+double solve(const std::vector<ViewMatches>& views, const Camera& camera, double prior_offset,
+             double sigma, std::vector<Correction>& corrections) {
+  double log_focal = 0;
+  for (const double scale_px : {8.0, 4.0, 2.0, 1.0}) {
+    ceres::Problem problem;
+    for (std::size_t i = 0; i < views.size(); ++i)
+      for (const PatchMatch& match : views[i].matches)
+        problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PatchResidual, 2, 6, 1>(
+                                     new PatchResidual{match, camera}),
+                                 new ceres::ScaledLoss(new ceres::CauchyLoss(scale_px), match.score,
+                                                       ceres::TAKE_OWNERSHIP),
+                                 corrections[i].data(), &log_focal);
+    if (problem.NumResidualBlocks() == 0) return 0;
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<FocalPrior, 1, 1>(new FocalPrior{prior_offset, sigma}),
+        nullptr, &log_focal);
+    ceres::Solver::Options options;
+    options.linear_solver_type = ceres::SPARSE_SCHUR;
+    options.max_num_iterations = 25;
+    options.num_threads = 1;  // more sum in any order
+    options.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, &problem, &summary);
+  }
+  return log_focal;
+}
+
+Rigid3d rigid_of(const Correction& c) {
+  const Eigen::Vector3d axis(c[0], c[1], c[2]);
+  const double angle = axis.norm();
+  const Eigen::Quaterniond q = angle > 0
+                                   ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis / angle))
+                                   : Eigen::Quaterniond::Identity();
+  return {q, {c[3], c[4], c[5]}};
+}
+
+cv::Mat reduced(const cv::Mat& image, const Camera& camera) {
+  cv::Mat small;
+  cv::resize(image, small, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
+  return small;
+}
+
+/// Residuals of the matches after the correction, and how many are small.
+void judge(const ViewMatches& matched, const Correction& correction, double log_focal,
+           const Camera& camera, RenderAlignedView& view) {
+  std::vector<double> distances;
+  for (const PatchMatch& match : matched.matches) {
+    double r[2];
+    if (!PatchResidual{match, camera}(correction.data(), &log_focal, r)) continue;
+    const double d = std::hypot(r[0], r[1]);
+    if (d < 2) distances.push_back(d);
+  }
+  view.matches = static_cast<int>(distances.size());
+  std::sort(distances.begin(), distances.end());
+  view.median_px = distances.empty() ? 0 : distances[distances.size() / 2];
+}
+
+}  // namespace
+
+double RenderAlignment::mean_agreement() const {
+  double sum = 0;
+  for (const RenderAlignedView& v : views) sum += v.agreement;
+  return views.empty() ? 0 : sum / static_cast<double>(views.size());
+}
+
+std::vector<PosedView> RenderAlignment::poses() const {
+  std::vector<PosedView> poses;
+  for (const RenderAlignedView& v : views) poses.push_back(v.view);
+  return poses;
+}
+
+Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer,
+                                           const std::vector<cv::Mat>& images,
+                                           const std::vector<PosedView>& views,
+                                           const RenderAlignmentOptions& options,
+                                           const Progress& progress) {
+  RenderAlignment result;
+  for (const PosedView& view : views) result.views.push_back({view, 0, 0, 0, {}, {}});
+  if (views.empty()) return result;
+  const double prior_focal = views.front().camera.fx;
+  double focal = prior_focal;
+  for (const RenderRound& round : options.rounds) {
+    std::vector<ViewMatches> matched(views.size());
+    const Camera full = result.views.front().view.camera;
+    const int width = std::min(round.width_px, full.width);
+    Camera camera = full.scaled_to(width, std::max(1, full.height * width / full.width));
+    const Camera seen_by = camera.without_distortion();
+    std::vector<SceneRender> renders;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      ORBITFUSE_TRY(progress.check("poses.thermal"));
+      ORBITFUSE_ASSIGN(SceneRender render, renderer(seen_by, result.views[i].view.cam_from_world));
+      renders.push_back(std::move(render));
+    }
+    const PatchMatchOptions matching{round.search_px, round.patch_search_px, round.patch_radius_px,
+                                     options.patch_spacing_px};
+    parallel_for(static_cast<int>(views.size()), [&](int index) {
+      const auto i = static_cast<std::size_t>(index);
+      const cv::Mat edges = rendered_edges(renders[i]);
+      const cv::Mat field = orientation_field(reduced(images[i], camera), 1.0);
+      matched[i].matches = match_patches(renders[i], edges, seen_by, field, matching);
+      result.views[i].agreement = edge_agreement(edges, field);
+    });
+    std::vector<Correction> corrections(views.size(), Correction{});
+    const double log_focal = solve(matched, seen_by, std::log(prior_focal / focal),
+                                   options.focal_relative_sigma, corrections);
+    focal *= std::exp(log_focal);
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      RenderAlignedView& view = result.views[i];
+      judge(matched[i], corrections[i], log_focal, seen_by, view);
+      // Too few patches would turn the camera anywhere; it stays where it is for this round.
+      if (matched[i].matches.size() < 12) continue;
+      view.view.cam_from_world = rigid_of(corrections[i]) * view.view.cam_from_world;
+    }
+    for (RenderAlignedView& view : result.views) view.view.camera.fx = view.view.camera.fy = focal;
+  }
+  result.focal_px = focal;
+  return result;
+}
+
+}  // namespace orbitfuse

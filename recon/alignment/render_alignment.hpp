@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "core/progress.hpp"
+#include "core/geometry/reconstruction.hpp"
+#include "recon/alignment/scene_renderer.hpp"
+
+// Thermal views aligned with renders of the visible scene from where they are believed to be: small
+// patches round rendered edges (of brightness and of depth) are found again in the thermal image by
+// sign-free gradient orientation, and all poses and the shared lens follow in one robust bundle.
+// What the renderer shows is what is visible from there: no line behind a wall takes part.
+namespace orbitfuse {
+
+/// One round: render, match, solve.
+struct RenderRound {
+  int width_px = 160;        ///< of the render; the thermal image is reduced alike
+  int search_px = 20;        ///< reach of the whole view's first shift
+  int patch_search_px = 8;   ///< reach of each patch beyond it
+  int patch_radius_px = 10;  ///< large patches are rarely mistaken, small ones are exact
+};
+
+/// From several degrees off to about one, and from there to the end.
+inline std::vector<RenderRound> coarse_rounds() {
+  return {{160, 30, 14, 22}, {160, 12, 10, 16}, {160, 6, 7, 10}};
+}
+inline std::vector<RenderRound> fine_rounds() { return {{320, 6, 7, 12}, {320, 4, 6, 10}}; }
+
+struct RenderAlignmentOptions {
+  std::vector<RenderRound> rounds = coarse_rounds();
+  int patch_spacing_px = 8;
+  double focal_relative_sigma = 0.03;
+};
+
+struct RenderAlignedView {
+  PosedView view;
+  double agreement =
+      0;            ///< mean agreement of rendered edges with the image's, after the last round
+  int matches = 0;  ///< patches within 2 px of the bundle's answer
+  double median_px = 0;  ///< their residual, in pixels of the last round
+  std::string
+      doubt;  ///< why a second opinion doesn't confirm it; empty: it does, or none was sought
+  /// What the other views' temperatures say against a view that form alone keeps; else empty.
+  std::string objection;
+  /// Compares places of one view. Agreement alone favours a place with few edges, the number of
+  /// patches alone one with many.
+  double support() const { return agreement * matches; }
+};
+
+struct RenderAlignment {
+  std::vector<RenderAlignedView> views;
+  double focal_px = 0, focal_relative_sigma = 0;
+  /// Views contradicted by the others' temperatures, where these are too many to tell who is right.
+  int undecided = 0;
+  double mean_agreement() const;
+  std::vector<PosedView> poses() const;
+};
+
+/// Refines `views` (images: CV_32FC1 of the cameras' size). Errors: the renderer's, cancelled.
+Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer,
+                                           const std::vector<cv::Mat>& images,
+                                           const std::vector<PosedView>& views,
+                                           const RenderAlignmentOptions& options,
+                                           const Progress& progress);
+
+}  // namespace orbitfuse

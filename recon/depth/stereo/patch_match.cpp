@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/depth/stereo/patch_match.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace orbitfuse::depth {
+namespace {
+
+/// Splitmix64: a small stream per pixel.
+class Random {
+ public:
+  Random(std::uint64_t seed, std::uint64_t key) : state_(seed * 0x9E3779B97F4A7C15ull ^ key) {}
+  float uniform() {  // [0, 1)
+    state_ += 0x9E3779B97F4A7C15ull;
+    std::uint64_t z = state_;
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EBull;
+    return static_cast<float>((z ^ (z >> 31)) >> 40) * 0x1p-24f;
+  }
+  float spread(float width) { return width * (2 * uniform() - 1); }
+
+ private:
+  std::uint64_t state_;
+};
+
+Eigen::Vector3f ray_of(const DepthView& view, int x, int y) {
+  return view.camera.ray_of({x + 0.5, y + 0.5}).cast<float>();
+}
+
+constexpr float least_slant = 0.12f;  // cosine between normal and ray: about 83 degrees
+
+/// The normal made to face the camera at no more than a grazing angle.
+Eigen::Vector3f facing(Eigen::Vector3f normal, const Eigen::Vector3f& ray) {
+  const Eigen::Vector3f toward = -ray.normalized();
+  float cosine = normal.normalized().dot(toward);
+  normal.normalize();
+  if (cosine < 0) {
+    normal = -normal;
+    cosine = -cosine;
+  }
+  if (cosine < least_slant) normal = (normal + (2 * least_slant) * toward).normalized();
+  return normal;
+}
+
+/// Where the plane seen at one ray meets another, z along the axis; NaN if behind.
+float depth_on(const Plane& plane, const Eigen::Vector3f& own_ray, const Eigen::Vector3f& ray) {
+  const float bottom = plane.normal.dot(ray);
+  const float depth = plane.depth * plane.normal.dot(own_ray) / bottom;
+  return bottom < 0 && depth > 0 ? depth : std::numeric_limits<float>::quiet_NaN();
+}
+
+struct Match {
+  const DepthView& view;
+  const std::vector<SourceView>& sources;
+  int best;  ///< sources that count
+  float ifx, ify, icx, icy;
+
+  /// Mean of the best sources' costs: a surface is not seen by all.
+  float cost(const ReferencePatch& patch, const Plane& plane, const Eigen::Vector3f& ray) const {
+    // n . X over the plane is constant: depth * n . ray. In pixels: K^-T n / that.
+    const float scale = 1.0f / (plane.depth * plane.normal.dot(ray));
+    const Eigen::Vector3f n = plane.normal * scale;
+    const Eigen::Vector3f pixels(n.x() * ifx, n.y() * ify,
+                                 n.z() - n.x() * icx - n.y() * icy);
+    std::array<float, 16> costs;
+    const int count = static_cast<int>(sources.size());
+    for (int i = 0; i < count; ++i) {
+      float c = patch_cost(patch, sources[static_cast<std::size_t>(i)], pixels);
+      int at = i;  // insertion sort
+      for (; at > 0 && costs[static_cast<std::size_t>(at - 1)] > c; --at)
+        costs[static_cast<std::size_t>(at)] = costs[static_cast<std::size_t>(at - 1)];
+      costs[static_cast<std::size_t>(at)] = c;
+    }
+    const int used = std::min(best, count);
+    float sum = 0;
+    for (int i = 0; i < used; ++i) sum += costs[static_cast<std::size_t>(i)];
+    return sum / static_cast<float>(used);
+  }
+};
+
+Match match_of(const DepthView& view, const std::vector<SourceView>& sources, int best) {
+  const Camera& c = view.camera;
+  return {view, sources, best, static_cast<float>(1 / c.fx), static_cast<float>(1 / c.fy),
+          static_cast<float>(c.cx / c.fx), static_cast<float>(c.cy / c.fy)};
+}
+
+PlaneMap blank_map(const DepthView& view) {
+  PlaneMap map;
+  map.width = view.gray.cols;
+  map.height = view.gray.rows;
+  const auto pixels = static_cast<std::size_t>(map.width) * static_cast<std::size_t>(map.height);
+  map.plane.resize(pixels);
+  map.cost.assign(pixels, worst_cost);
+  return map;
+}
+
+}  // namespace
+
+PlaneMap random_planes(const DepthView& view, DepthRange range, const std::vector<Seed>& seeds,
+                       std::uint64_t seed) {
+  PlaneMap map = blank_map(view);
+  for (int y = 0; y < map.height; ++y)
+    for (int x = 0; x < map.width; ++x) {
+      Random random(seed, map.at(x, y));
+      Plane& plane = map.plane[map.at(x, y)];
+      const float u = random.uniform();
+      plane.depth = 1 / ((1 - u) / range.near + u / range.far);
+      const Eigen::Vector3f ray = ray_of(view, x, y);
+      plane.normal = facing(Eigen::Vector3f(random.spread(1), random.spread(1), random.spread(1)) -
+                                ray.normalized(),
+                            ray);
+    }
+  // A seed speaks for its surroundings: half of the pixels there start at its depth.
+  constexpr int reach = 8;
+  for (const Seed& s : seeds) {
+    if (!(s.depth >= range.near && s.depth <= range.far)) continue;
+    const int sx = static_cast<int>(s.x), sy = static_cast<int>(s.y);
+    for (int y = std::max(0, sy - reach); y <= std::min(map.height - 1, sy + reach); ++y)
+      for (int x = std::max(0, sx - reach); x <= std::min(map.width - 1, sx + reach); ++x)
+        if ((x == sx && y == sy) || Random(seed + 1, map.at(x, y)).uniform() < 0.5f)
+          map.plane[map.at(x, y)].depth = s.depth;
+  }
+  return map;
+}
+
+PlaneMap doubled(const PlaneMap& coarse, const DepthView& fine, DepthRange range) {
+  PlaneMap map = blank_map(fine);
+  for (int y = 0; y < map.height; ++y)
+    for (int x = 0; x < map.width; ++x) {
+      const int cx = std::min(coarse.width - 1, x * coarse.width / map.width);
+      const int cy = std::min(coarse.height - 1, y * coarse.height / map.height);
+      const Plane& from = coarse.plane[coarse.at(cx, cy)];
+      Plane& to = map.plane[map.at(x, y)];
+      to = from;
+      // The coarse pixel's ray in the fine camera.
+      const Eigen::Vector3f own =
+          fine.camera
+              .ray_of({(cx + 0.5) * map.width / coarse.width, (cy + 0.5) * map.height / coarse.height})
+              .cast<float>();
+      const float depth = depth_on(from, own, ray_of(fine, x, y));
+      if (std::isfinite(depth)) to.depth = std::clamp(depth, range.near, range.far);
+    }
+  return map;
+}
+
+void improve(PlaneMap& map, const DepthView& view, const std::vector<SourceView>& sources,
+             DepthRange range, int iterations, const DepthOptions& options, std::uint64_t seed) {
+  if (sources.empty()) return;
+  const Match match = match_of(view, sources, options.best_neighbours);
+  std::vector<Eigen::Vector3f> rays(map.plane.size());
+  for (int y = 0; y < map.height; ++y)
+    for (int x = 0; x < map.width; ++x) rays[map.at(x, y)] = ray_of(view, x, y);
+  static constexpr int offers[8][2] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-5, 0}, {5, 0}, {0, -5}, {0, 5}};
+  for (int iteration = 0; iteration <= iterations; ++iteration) {
+    // Round 0 only prices what is there; changes shrink by half each round.
+    const float width = std::ldexp(0.5f, -iteration);
+    for (int color = 0; color < (iteration == 0 ? 1 : 2); ++color)
+      for (int y = 0; y < map.height; ++y)
+        for (int x = 0; x < map.width; ++x) {
+          if (iteration > 0 && (x + y) % 2 != color) continue;
+          const std::size_t here = map.at(x, y);
+          const Eigen::Vector3f& ray = rays[here];
+          const ReferencePatch patch = reference_patch(view, x, y);
+          Plane best = map.plane[here];
+          if (iteration == 0) {
+            map.cost[here] = match.cost(patch, best, ray);
+            continue;
+          }
+          float best_cost = map.cost[here];
+          const auto offer = [&](const Plane& plane) {
+            if (!(plane.depth >= range.near && plane.depth <= range.far)) return;
+            const float cost = match.cost(patch, plane, ray);
+            if (cost < best_cost) {
+              best_cost = cost;
+              best = plane;
+            }
+          };
+          for (const auto& o : offers) {
+            const int nx = x + o[0], ny = y + o[1];
+            if (nx < 0 || ny < 0 || nx >= map.width || ny >= map.height) continue;
+            const std::size_t there = map.at(nx, ny);
+            Plane plane = map.plane[there];
+            plane.depth = depth_on(plane, rays[there], ray);
+            plane.normal = facing(plane.normal, ray);
+            offer(plane);
+          }
+          Random random(seed + static_cast<std::uint64_t>(iteration) * 1000003u, here);
+          Plane change = best;
+          change.depth = 1 / std::clamp(1 / best.depth * (1 + random.spread(width)), 1 / range.far,
+                                        1 / range.near);
+          offer(change);
+          change = best;
+          change.normal = facing(best.normal + Eigen::Vector3f(random.spread(width), random.spread(width),
+                                                               random.spread(width)),
+                                 ray);
+          offer(change);
+          change = best;
+          change.depth = best.depth * (1 + random.spread(0.1f * width));
+          change.normal = facing(best.normal + Eigen::Vector3f(random.spread(width), random.spread(width),
+                                                               random.spread(width)),
+                                 ray);
+          offer(change);
+          map.plane[here] = best;
+          map.cost[here] = best_cost;
+        }
+  }
+}
+
+}  // namespace orbitfuse::depth

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/nerf/field/field_state.hpp"
+
+namespace orbitfuse::nerf {
+
+void FieldState::create(const TrainOptions& with, Modality what, int view_count) {
+  options = with;
+  modality = what;
+  main.grid.create(with.levels, with.features_per_level, with.log2_table, with.base_resolution,
+                   with.max_resolution, with.seed);
+  main.mlp.create({main.grid.width, with.hidden, density_outputs}, with.seed + 1);
+  std::vector<int> widths{color_inputs};
+  for (int i = 0; i < with.color_layers; ++i) widths.push_back(with.color_hidden);
+  widths.push_back(color_outputs);
+  color.create(widths, with.seed + 2);
+  proposals.clear();
+  if (with.sampling == Sampling::proposal) {
+    // As in nerfacto: 5 levels of 2 features, 2^17 entries, finest 128 and 256 cells, 16 hidden.
+    proposals.resize(2);
+    for (int i = 0; i < 2; ++i) {
+      proposals[static_cast<std::size_t>(i)].grid.create(5, 2, 17, 16, 128 << i,
+                                                         with.seed + 3 + static_cast<unsigned>(i));
+      proposals[static_cast<std::size_t>(i)].mlp.create({16, 16, 16},
+                                                        with.seed + 5 + static_cast<unsigned>(i));
+    }
+  }
+  image_offsets.resize(static_cast<std::size_t>((view_count + 7) / 8 * 8));
+  occupancy.create(with.occupancy_resolution, 5);
+}
+
+std::vector<Parameters*> FieldState::parameters() {
+  std::vector<Parameters*> all{&main.grid.table, &main.mlp.weights, &color.weights, &image_offsets};
+  for (DensityNetwork& p : proposals) {
+    all.push_back(&p.grid.table);
+    all.push_back(&p.mlp.weights);
+  }
+  return all;
+}
+
+std::vector<DensityNetwork*> FieldState::density_networks() {
+  std::vector<DensityNetwork*> all{&main};
+  for (DensityNetwork& p : proposals) all.push_back(&p);
+  return all;
+}
+
+void FieldState::refresh() {
+  for (DensityNetwork* network : density_networks()) {
+    network->grid.refresh_half();
+    network->mlp.refresh();
+  }
+  color.refresh();
+}
+
+Snapshot FieldState::snapshot(double psnr) {
+  Snapshot out;
+  out.step = step;
+  out.psnr = psnr;
+  for (const Parameters* p : parameters()) out.values.push_back(p->value);
+  out.occupied = occupancy.on;
+  out.codes = occupancy.code;
+  for (const DensityNetwork* network : density_networks())
+    out.level_weights.push_back(network->grid.level_weight);
+  out.poses = refined_poses;
+  return out;
+}
+
+void FieldState::restore(const Snapshot& from) {
+  const auto sets = parameters();
+  for (std::size_t i = 0; i < sets.size(); ++i) sets[i]->value = from.values[i];
+  const auto networks = density_networks();
+  for (std::size_t i = 0; i < networks.size(); ++i)
+    networks[i]->grid.level_weight = from.level_weights[i];
+  refined_poses = from.poses;
+  occupancy.restore(from.occupied, from.codes);
+  refresh();
+}
+
+MarchSettings FieldState::march_settings() const {
+  MarchSettings settings;
+  settings.surface = options.surface_samples;
+  settings.haze = options.haze_samples;
+  return settings;
+}
+
+}  // namespace orbitfuse::nerf

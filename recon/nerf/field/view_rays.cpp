@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/nerf/field/view_rays.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace orbitfuse::nerf {
+namespace {
+constexpr int spacing_px = 8;
+}
+
+ViewRays::ViewRays(const Camera& camera, const Rigid3d& cam_from_world, const Space& space)
+    : camera_(camera),
+      world_from_cam_(cam_from_world.rotation.conjugate().toRotationMatrix()),
+      origin_(space.normalized(camera_center(cam_from_world))),
+      pixel_angle_(static_cast<float>(2.0 / (camera.fx + camera.fy))) {
+  if (!camera.has_distortion()) return;
+  lattice_width_ = camera.width / spacing_px + 2;
+  const int height = camera.height / spacing_px + 2;
+  lattice_.reserve(static_cast<std::size_t>(lattice_width_ * height));
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < lattice_width_; ++x) {
+      // Lattice nodes beyond the image border are clamped: outside it the model may not invert.
+      const Eigen::Vector2d pixel(std::min(x * spacing_px, camera.width),
+                                  std::min(y * spacing_px, camera.height));
+      lattice_.push_back(camera.normalized_of(pixel).cast<float>());
+    }
+}
+
+Eigen::Vector3d ViewRays::through(double px, double py) const {
+  if (lattice_.empty())
+    return {(px - camera_.cx) / camera_.fx, (py - camera_.cy) / camera_.fy, 1.0};
+  const int ix = std::clamp(static_cast<int>(px) / spacing_px, 0, lattice_width_ - 2);
+  const int rows = static_cast<int>(lattice_.size()) / lattice_width_;
+  const int iy = std::clamp(static_cast<int>(py) / spacing_px, 0, rows - 2);
+  const auto fraction = [](double p, int i, int limit) {
+    const double low = std::min(i * spacing_px, limit);
+    const double high = std::min((i + 1) * spacing_px, limit);
+    return high > low ? static_cast<float>((p - low) / (high - low)) : 0.0f;
+  };
+  const float fx = fraction(px, ix, camera_.width), fy = fraction(py, iy, camera_.height);
+  const Eigen::Vector2f* row = lattice_.data() + iy * lattice_width_ + ix;
+  const Eigen::Vector2f n = (1 - fy) * ((1 - fx) * row[0] + fx * row[1]) +
+                            fy * ((1 - fx) * row[lattice_width_] + fx * row[lattice_width_ + 1]);
+  return {n.x(), n.y(), 1.0};
+}
+
+bool ViewRays::ray(double x, double y, Ray& out) const {
+  Eigen::Vector3d d = through(x, y);
+  if (!d.allFinite()) return false;
+  const double length = d.norm();
+  out.forward = static_cast<float>(1.0 / length);
+  d = world_from_cam_ * (d / length);
+  for (int i = 0; i < 3; ++i) {
+    out.origin[i] = static_cast<float>(origin_[i]);
+    out.direction[i] = static_cast<float>(d[i]);
+  }
+  return true;
+}
+
+Eigen::Vector3d ViewRays::in_camera(double x, double y, double distance) const {
+  return distance * through(x, y).normalized();
+}
+
+void ViewRays::move(const Eigen::Vector3d& shift, const Eigen::Vector3d& turn) {
+  const double angle = turn.norm();
+  const Eigen::Matrix3d rotation = angle > 0
+                                       ? Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix()
+                                       : Eigen::Matrix3d::Identity();
+  world_from_cam_ = world_from_cam_ * rotation.transpose();
+  origin_ -= world_from_cam_ * shift;
+}
+
+Rigid3d ViewRays::cam_from_world(const Space& space) const {
+  const Eigen::Quaterniond rotation(world_from_cam_.transpose());
+  return {rotation.normalized(),
+          -(rotation.normalized() * (space.center + space.radius * origin_))};
+}
+
+bool ViewRays::project(const float point[3], double& x, double& y, double& depth) const {
+  const Eigen::Vector3d p =
+      world_from_cam_.transpose() * (Eigen::Vector3d(point[0], point[1], point[2]) - origin_);
+  depth = p.z();
+  if (depth <= 1e-6) return false;
+  const Eigen::Vector2d pixel = camera_.project(p);
+  x = pixel.x();
+  y = pixel.y();
+  return x >= 0 && y >= 0 && x < camera_.width && y < camera_.height;
+}
+
+}  // namespace orbitfuse::nerf

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#define ORBITFUSE_LANES 8
+#include "recon/nerf/kernels/kernels_impl.hpp"
+
+namespace orbitfuse::nerf {
+
+const Kernels& kernels_avx2() {
+  static constexpr Kernels table{Isa::avx2,       encode_grid,        scatter_grid,
+                                 forward_f32,     backward_input_f32, backward_weights_f32,
+                                 adam_update};
+  return table;
+}
+
+}  // namespace orbitfuse::nerf

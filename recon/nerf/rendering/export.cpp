@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+#include <unordered_set>
+
+#include "recon/nerf/nerf.hpp"
+#include "recon/nerf/rendering/render.hpp"
+
+namespace orbitfuse::nerf {
+namespace {
+
+struct DepthView {
+  PosedView view;  ///< at the rendered size, without distortion
+  RenderedView image;
+};
+
+Eigen::Vector3d lift(const DepthView& from, int x, int y) {
+  const float z = from.image.depth.at<float>(y, x);
+  const Eigen::Vector3d in_cam =
+      from.view.camera.ray_of({x + 0.5, y + 0.5}) * static_cast<double>(z);
+  return from.view.cam_from_world.inverse() * in_cam;
+}
+
+/// Normal by the cross product of central differences; zero beside a depth step or a border.
+Eigen::Vector3d normal_at(const DepthView& from, int x, int y) {
+  const cv::Mat& depth = from.image.depth;
+  if (x < 1 || y < 1 || x + 1 >= depth.cols || y + 1 >= depth.rows) return Eigen::Vector3d::Zero();
+  const float z = depth.at<float>(y, x);
+  for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}})
+    if (!(std::abs(depth.at<float>(y + dy, x + dx) - z) < 0.05f * z))
+      return Eigen::Vector3d::Zero();
+  const Eigen::Vector3d n = (lift(from, x + 1, y) - lift(from, x - 1, y))
+                                .cross(lift(from, x, y + 1) - lift(from, x, y - 1));
+  const Eigen::Vector3d to_camera = camera_center(from.view.cam_from_world) - lift(from, x, y);
+  const double length = n.norm();
+  if (!(length > 0)) return Eigen::Vector3d::Zero();
+  return n / length * (n.dot(to_camera) < 0 ? -1.0 : 1.0);
+}
+
+/// Other views whose own depth agrees with this point, and views that see through it (a floater).
+struct Agreement {
+  int agree = 0, see_through = 0;
+};
+
+Agreement agreement(const std::vector<DepthView>& views, std::size_t self,
+                    const Eigen::Vector3d& point, double tolerance) {
+  Agreement result;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (i == self) continue;
+    const Eigen::Vector3d in_cam = views[i].view.cam_from_world * point;
+    const Eigen::Vector2d pixel = views[i].view.camera.project(in_cam);
+    const cv::Mat& depth = views[i].image.depth;
+    if (!(pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < depth.cols && pixel.y() < depth.rows))
+      continue;
+    const float z = depth.at<float>(static_cast<int>(pixel.y()), static_cast<int>(pixel.x()));
+    if (!std::isfinite(z)) continue;
+    if (std::abs(z - in_cam.z()) <= tolerance * in_cam.z()) ++result.agree;
+    if (z > in_cam.z() * (1 + 5 * tolerance)) ++result.see_through;
+  }
+  return result;
+}
+
+std::uint64_t voxel_key(const Eigen::Vector3d& p, double size) {
+  std::uint64_t key = 0;
+  for (int d = 0; d < 3; ++d)
+    key =
+        (key << 21) |
+        (static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(p[d] / size))) & 0x1FFFFF);
+  return key;
+}
+
+void append(PointCloud& cloud, const DepthView& from, int x, int y, const Eigen::Vector3d& point,
+            const Eigen::Vector3d& normal, Modality modality) {
+  cloud.positions.push_back(point);
+  cloud.normals.push_back(normal.cast<float>());
+  if (modality == Modality::thermal) {
+    cloud.temperatures_k.push_back(from.image.color.at<float>(y, x));
+    return;
+  }
+  const auto rgb = from.image.color.at<cv::Vec3f>(y, x);
+  cloud.colors.push_back({cv::saturate_cast<std::uint8_t>(255 * rgb[0]),
+                          cv::saturate_cast<std::uint8_t>(255 * rgb[1]),
+                          cv::saturate_cast<std::uint8_t>(255 * rgb[2])});
+}
+
+}  // namespace
+
+Status ExportOptions::validate() const {
+  const auto bad = [](const char* field, double value, const char* remedy) {
+    return fail(ErrorKind::usage, std::string("export.") + field, fmt::format("{}", value), remedy);
+  };
+  if (max_width < 8) return bad("max_width", max_width, "choose at least 8");
+  if (min_consistent_views < 0)
+    return bad("min_consistent_views", min_consistent_views, "choose 0 or more");
+  if (!(depth_tolerance > 0 && depth_tolerance < 1))
+    return bad("depth_tolerance", depth_tolerance, "choose 0..1");
+  if (!(max_distance > 0)) return bad("max_distance", max_distance, "choose above 0");
+  if (!(voxel >= 0)) return bad("voxel", voxel, "choose 0 or more");
+  return {};
+}
+
+Result<PointCloud> export_point_cloud(const Field& field, const std::vector<PosedView>& views,
+                                      const ExportOptions& options, const Progress& progress) {
+  ORBITFUSE_TRY(options.validate());
+  if (views.empty())
+    return fail(ErrorKind::input, "export.views", "no camera to see the field from",
+                "pass the training views");
+  std::vector<DepthView> rendered;
+  for (const PosedView& view : views) {
+    ORBITFUSE_TRY(progress.check("export"));
+    const int width = std::min(view.camera.width, options.max_width);
+    const int height =
+        std::max(1, static_cast<int>(std::lround(static_cast<double>(view.camera.height) * width /
+                                                 view.camera.width)));
+    DepthView out;
+    out.view = view;
+    out.view.camera = view.camera.scaled_to(width, height).without_distortion();
+    ORBITFUSE_ASSIGN(out.image, render(field, out.view.camera, view.cam_from_world, {}, progress));
+    rendered.push_back(std::move(out));
+    progress.report({"export", static_cast<double>(rendered.size()),
+                     static_cast<double>(views.size()), -1, view.name});
+  }
+
+  const int needed =
+      std::min<int>(options.min_consistent_views, static_cast<int>(views.size()) - 1);
+  const double reach = options.max_distance * field.radius(),
+               voxel = options.voxel * field.radius();
+  PointCloud cloud;
+  std::unordered_set<std::uint64_t> taken;
+  for (std::size_t i = 0; i < rendered.size(); ++i) {
+    const cv::Mat& depth = rendered[i].image.depth;
+    for (int y = 0; y < depth.rows; ++y)
+      for (int x = 0; x < depth.cols; ++x) {
+        if (!std::isfinite(depth.at<float>(y, x))) continue;
+        const Eigen::Vector3d point = lift(rendered[i], x, y);
+        if ((point - field.center()).norm() > reach) continue;
+        const Agreement votes = agreement(rendered, i, point, options.depth_tolerance);
+        if (votes.agree < needed || votes.see_through > votes.agree) continue;
+        const Eigen::Vector3d normal = normal_at(rendered[i], x, y);
+        if (normal.isZero()) continue;
+        if (voxel > 0 && !taken.insert(voxel_key(point, voxel)).second) continue;
+        append(cloud, rendered[i], x, y, point, normal, field.modality());
+      }
+  }
+  if (cloud.empty())
+    return fail(ErrorKind::quality, "export", "no point is consistent over the views",
+                "train longer, or lower export.min_consistent_views");
+  return cloud;
+}
+
+}  // namespace orbitfuse::nerf

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "recon/nerf/training/backward.hpp"
+#include "recon/nerf/field/field_state.hpp"
+#include "recon/nerf/training/pose_steps.hpp"
+#include "recon/nerf/rendering/proposal.hpp"
+#include "recon/nerf/training/scene.hpp"
+
+namespace orbitfuse::nerf {
+
+/// The optimisation loop's one turn: draw rays, march, forward, backward, scatter, Adam.
+class Trainer {
+ public:
+  /// `heldout[i]` views are never drawn from.
+  /// Views that train move if TrainOptions::refine_poses says so.
+  Trainer(FieldState& field, std::vector<NormalisedView>& views, const std::vector<bool>& heldout,
+          const Kernels& kernels = kernels_for(best_isa()));
+
+  /// One step; `progress` in [0, 1] is the place in the schedule. False: a gradient was not
+  /// finite, nothing was changed.
+  bool step(double progress);
+
+  long rays() const { return rays_; }
+  long samples() const { return samples_; }
+
+ private:
+  struct Block {
+    RayBlock rays;
+    std::vector<RayTarget> targets;
+    std::vector<float> grid;  ///< [level][sample][feature]
+    ProposalBlock proposals;  ///< Sampling::proposal
+    std::vector<DrawnRay> drawn;
+  };
+
+  void draw(Block& block, int begin, int end, double progress);
+  bool proposing() const { return field_.options.sampling == Sampling::proposal; }
+  bool proposals_learn(double progress) const;
+  void apply(const AdamStep& grid_step, const AdamStep& network_step, const BlockGradients& gradients,
+             bool with_proposals);
+  void update_occupancy(double progress);
+  void probe_cells();
+  void watch_poses(const Block& block, std::vector<PoseSums>& sums) const;
+  void move_views();
+
+  FieldState& field_;
+  std::vector<NormalisedView>& views_;
+  const Kernels& kernels_;
+  std::vector<int> training_;             ///< indices of the views that train
+  std::vector<std::int64_t> pixel_ends_;  ///< running pixel count over them
+  std::vector<std::int64_t> known_ends_;  ///< running count of pixels with known distance
+  std::vector<Block> blocks_;
+  std::vector<BlockGradients> shards_;
+  std::vector<std::vector<PoseSums>> pose_shards_;  ///< [shard][view] of one step (refine_poses)
+  long rays_ = 0, samples_ = 0;
+};
+
+}  // namespace orbitfuse::nerf

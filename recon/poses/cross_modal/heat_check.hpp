@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "recon/poses/cross_modal/orbit_refinery.hpp"
+
+// A second opinion on thermal poses: what other thermal views measured, painted on the visible
+// scene's form (painted_scene.hpp). It shows edges that the visible scene lacks, and finds a view
+// that settled on the wrong rib of a repeated form. Internal to recon/poses; errors: the
+// renderer's, cancelled.
+namespace orbitfuse {
+
+/// A view that the others' temperatures contradict, from where they place it best. Supports are
+/// shares of its loop's usual one in the same scene.
+struct HeatOpinions {
+  bool agree = false;      ///< form, started there, stays within a degree
+  double heat_there = 0;   ///< among temperatures
+  double form_there = 0;   ///< in the visible scene
+  double form_before = 0;  ///< in the visible scene, where it was
+};
+
+/// Whose word places the view; doubt: nobody's. It only moves to a place that temperatures find or
+/// that form knows well enough to vouch for.
+enum class HeatVerdict { both, heat_alone, form_alone, doubt };
+HeatVerdict verdict(const HeatOpinions& seen);
+
+/// Of its loop's usual support; 0 where the loop usually has none: shares of nothing say nothing.
+double share_of_usual(double support, double usual);
+
+struct HeatCheck {
+  int moved = 0;
+  int undecided = 0;  ///< contradicted, where that were most of the views
+  /// Views that form would pull away from where temperatures are sure they are.
+  std::vector<std::pair<std::size_t, Rigid3d>> by_heat_alone;
+};
+
+/// Each view judged by the temperatures of the others. Those that they contradict are searched as
+/// wholes in the scene that the rest paints, and go where both scenes then agree or temperatures
+/// are sure. One that temperatures find nowhere stays where form knows it well, and keeps an
+/// `objection`; the others keep a `doubt`. Where most are contradicted nobody is left to judge, and
+/// none goes.
+Result<HeatCheck> correct_by_heat(const Refinery& refinery, Fit& alignment);
+
+/// Every added view, from `first_new` on, confirmed by what the settled ones before it measured;
+/// those that are not are searched as wholes in it, and keep a `doubt` if that fails.
+Status confirm_by_heat(const Refinery& refinery, std::size_t first_new, Fit& alignment);
+
+}  // namespace orbitfuse

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "recon/poses/cross_modal/orbit_views.hpp"
+#include "recon/alignment/render_alignment.hpp"
+
+// What refining an orbit against renders works with; internal to recon/poses.
+namespace orbitfuse {
+
+using Fit = RenderAlignment;
+
+/// How much better a restart must be: two places this close in score are one, seen twice.
+constexpr double clearly_better = 1.02;
+
+/// To a fraction of a degree, and where places are compared.
+inline std::vector<RenderRound> judging_rounds() { return {{256, 8, 8, 12}, {256, 5, 6, 10}}; }
+
+/// Where the stations of the orbit lie, as the better half of its aligned views says.
+struct LoopModel {
+  double offset_deg = 0;                        ///< azimuth - nominal azimuth
+  std::map<int, double> elevation_deg, radius;  ///< by loop
+};
+
+LoopModel loop_model(const OrbitViews& orbit, const Fit& alignment);
+
+/// The view's place as its loop predicts it; where no view of the loop is posed, its own.
+PosedView predicted(const OrbitViews& orbit, const Fit& alignment, const LoopModel& model,
+                    std::size_t view);
+
+/// The larger of how far two poses lie apart as seen from the orbit's centre, and their turn.
+double apart_deg(const OrbitViews& orbit, const Rigid3d& a, const Rigid3d& b);
+/// Within a degree: a restart that ends there confirms the view's pose.
+bool same_place(const OrbitViews& orbit, const Rigid3d& a, const Rigid3d& b);
+
+/// Restarts of views of one orbit in one scene. Errors: the renderer's, cancelled.
+struct Refinery {
+  const SceneRenderer& renderer;
+  const OrbitViews& orbit;
+  const Progress& progress;
+
+  /// The chosen views from given places, one at a time: the lens is settled.
+  Result<Fit> restart(const std::vector<std::size_t>& chosen, const std::vector<PosedView>& starts,
+                      std::vector<RenderRound> rounds) const;
+  /// All views from where they are, with their common lens.
+  Status together(Fit& alignment, double focal_relative_sigma,
+                  std::vector<RenderRound> rounds) const;
+  /// The chosen views searched as wholes from where their loop predicts them; not aligned yet.
+  Result<std::vector<PosedView>> search(const std::vector<std::size_t>& chosen,
+                                        const Fit& alignment) const;
+};
+
+}  // namespace orbitfuse

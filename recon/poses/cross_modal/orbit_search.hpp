@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
+
+#include "core/progress.hpp"
+#include "core/session/session.hpp"
+#include "core/geometry/transform.hpp"
+#include "recon/poses/cross_modal/line_model.hpp"
+
+// Where on its orbit was a loop of views taken? Rendered lines are correlated with the views over
+// azimuth, elevation, distance and image shift; the views of the stations vote together for the one
+// start angle, which a single view of a near-symmetric object can't decide.
+namespace orbitfuse {
+
+/// A camera on a sphere about the world's origin (z up), turned by a small amount off the centre.
+struct OrbitPose {
+  double azimuth_deg = 0, elevation_deg = 0, radius = 1;
+  double roll_deg = 0;
+  double shift_x_px = 0, shift_y_px = 0;  ///< where the origin is seen, from the principal point
+};
+Rigid3d cam_from_world_of(const OrbitPose& pose, const Camera& camera);
+
+/// One view to place: its field, camera and (if declared) station.
+struct SearchView {
+  cv::Mat field;
+  Camera camera;
+  std::optional<Station> station;
+};
+
+struct OrbitSearchOptions {
+  double azimuth_step_deg = 7.5;
+  std::vector<double> elevations_deg = {4, 12, 20, 28, 37, 48, 62};
+  double nearest = 0.5, farthest = 3, radius_ratio = 1.12;  ///< world units
+  int columns = 80;              ///< cells of the correlated fields
+  double max_shift = 0.25;       ///< of the image's width
+  double max_station_error_deg = 16;
+  int hypotheses = 2;            ///< returned at most
+  int starts = 5;                ///< of a view, at most
+};
+
+/// One start angle and direction that the views may have been taken with.
+struct OrbitHypothesis {
+  std::vector<OrbitPose> poses;  ///< one a view
+  /// Places of each view worth refining, best first: one peak of a coarse table is often wrong.
+  std::vector<std::vector<OrbitPose>> starts;
+  double offset_deg = 0;         ///< world azimuth of station azimuth 0
+  bool mirrored = false;         ///< stations run clockwise
+  double score = 0;              ///< mean correlation, [-1, 1]
+};
+
+/// The best hypotheses, best first, whose starts differ by 40 deg or in direction. A near-symmetric
+/// object gives two of nearly equal score: which is right shows only after refinement.
+Result<std::vector<OrbitHypothesis>> search_orbit(const LineModel& lines,
+                                                  const std::vector<SearchView>& views,
+                                                  const OrbitSearchOptions& options,
+                                                  const Progress& progress);
+
+}  // namespace orbitfuse

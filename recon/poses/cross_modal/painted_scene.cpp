@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/cross_modal/painted_scene.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <opencv2/imgproc.hpp>
+
+namespace orbitfuse {
+namespace {
+
+struct Painter {
+  Camera camera;
+  Rigid3d cam_from_world;
+  cv::Mat image, depth;
+};
+
+using Painters = std::vector<Painter>;
+
+constexpr float unpainted = std::numeric_limits<float>::quiet_NaN();
+
+/// What the painter saw at a point of the world; NaN where it saw something else or nothing.
+float seen_by(const Painter& painter, const Eigen::Vector3d& point, double depth_tolerance) {
+  const Eigen::Vector3d in_cam = painter.cam_from_world * point;
+  const Eigen::Vector2d pixel = painter.camera.project(in_cam);
+  const double x = pixel.x() - 0.5, y = pixel.y() - 0.5;
+  if (!(x >= 0 && y >= 0 && x < painter.image.cols - 1 && y < painter.image.rows - 1))
+    return unpainted;
+  const auto depth = static_cast<double>(
+      painter.depth.at<float>(static_cast<int>(std::lround(y)), static_cast<int>(std::lround(x))));
+  if (!(std::abs(depth - in_cam.z()) < depth_tolerance * in_cam.z())) return unpainted;
+  const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
+  const auto ax = static_cast<float>(x - x0), ay = static_cast<float>(y - y0);
+  const float *upper = painter.image.ptr<float>(y0) + x0,
+              *lower = painter.image.ptr<float>(y0 + 1) + x0;
+  return (upper[0] * (1 - ax) + upper[1] * ax) * (1 - ay) +
+         (lower[0] * (1 - ax) + lower[1] * ax) * ay;
+}
+
+/// The render's depth as points of the world, empty depth as NaN.
+std::vector<Eigen::Vector3d> world_points(const cv::Mat& depth, const Camera& camera,
+                                          const Rigid3d& cam_from_world) {
+  const Rigid3d world_from_cam = cam_from_world.inverse();
+  std::vector<Eigen::Vector3d> points;
+  points.reserve(depth.total());
+  for (int y = 0; y < depth.rows; ++y)
+    for (int x = 0; x < depth.cols; ++x)
+      points.push_back(world_from_cam *
+                       Eigen::Vector3d(camera.ray_of({x + 0.5, y + 0.5}) *
+                                       static_cast<double>(depth.at<float>(y, x))));
+  return points;
+}
+
+/// Fills what is not painted yet, brought to the level of what is.
+void paint(const cv::Mat& layer, cv::Mat& painting) {
+  double difference = 0;
+  int both = 0;
+  for (int y = 0; y < layer.rows; ++y)
+    for (int x = 0; x < layer.cols; ++x) {
+      const float d = painting.at<float>(y, x) - layer.at<float>(y, x);
+      if (std::isfinite(d)) difference += static_cast<double>(d), ++both;
+    }
+  const auto level = static_cast<float>(both > 0 ? difference / both : 0);
+  for (int y = 0; y < layer.rows; ++y)
+    for (int x = 0; x < layer.cols; ++x) {
+      float& value = painting.at<float>(y, x);
+      if (!std::isfinite(value)) value = layer.at<float>(y, x) + level;
+    }
+}
+
+/// Painters by how little their direction of view differs, nearest first.
+std::vector<const Painter*> nearest(const Painters& painters, const Rigid3d& cam_from_world,
+                                    const PaintedSceneOptions& options) {
+  const auto turned = [&](const Painter* p) {
+    return rotation_angle_deg(p->cam_from_world.rotation, cam_from_world.rotation);
+  };
+  std::vector<const Painter*> near;
+  for (const Painter& painter : painters)
+    if (turned(&painter) >= options.min_turn_deg) near.push_back(&painter);
+  const auto kept = std::min(near.size(), static_cast<std::size_t>(std::max(options.painters, 0)));
+  std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(kept), near.end(),
+                    [&](const Painter* a, const Painter* b) { return turned(a) < turned(b); });
+  near.resize(kept);
+  return near;
+}
+
+}  // namespace
+
+Result<SceneRenderer> painted_scene(const SceneRenderer& renderer,
+                                    const std::vector<PosedView>& views,
+                                    const std::vector<cv::Mat>& images,
+                                    const PaintedSceneOptions& options, const Progress& progress) {
+  const auto painters = std::make_shared<Painters>();
+  for (std::size_t i = 0; i < std::min(views.size(), images.size()); ++i) {
+    ORBITFUSE_TRY(progress.check("poses.thermal"));
+    const Camera& full = views[i].camera;
+    const int width = std::min(options.width_px, full.width);
+    Painter painter;
+    painter.camera =
+        full.scaled_to(width, std::max(1, full.height * width / full.width)).without_distortion();
+    painter.cam_from_world = views[i].cam_from_world;
+    cv::resize(images[i], painter.image, {painter.camera.width, painter.camera.height}, 0, 0,
+               cv::INTER_AREA);
+    ORBITFUSE_ASSIGN(const SceneRender seen, renderer(painter.camera, painter.cam_from_world));
+    painter.depth = seen.depth;
+    painters->push_back(std::move(painter));
+  }
+  return [&renderer, painters, options](const Camera& camera,
+                                        const Rigid3d& cam_from_world) -> Result<SceneRender> {
+    ORBITFUSE_ASSIGN(SceneRender view, renderer(camera, cam_from_world));
+    const auto points = world_points(view.depth, camera, cam_from_world);
+    view.brightness = cv::Mat(view.depth.size(), CV_32F, cv::Scalar(unpainted));
+    for (const Painter* painter : nearest(*painters, cam_from_world, options)) {
+      cv::Mat layer(view.depth.size(), CV_32F);
+      for (std::size_t p = 0; p < points.size(); ++p)
+        layer.ptr<float>()[p] = seen_by(*painter, points[p], options.depth_tolerance);
+      paint(layer, view.brightness);
+    }
+    return view;
+  };
+}
+
+}  // namespace orbitfuse

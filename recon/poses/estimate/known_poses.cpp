@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/estimate/known_poses.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace orbitfuse {
+namespace {
+
+std::optional<Camera> known_camera(const Session& session, const FrameRecord& frame) {
+  if (frame.camera) return frame.camera;
+  const DeviceInfo* device = session.device(frame.device);
+  if (device == nullptr || !device->lens.calibrated) return std::nullopt;
+  const Camera& camera = *device->lens.calibrated;
+  if (frame.width <= 0 || frame.height <= 0) return camera;
+  return camera.scaled_to(frame.width, frame.height);
+}
+
+bool at_one_place(const Reconstruction& model) {
+  // Apart by no more than the rounding of what is stored, in a world however far from its origin.
+  const Rigid3d& first = model.views.front().cam_from_world;
+  return std::all_of(model.views.begin(), model.views.end(), [&](const PosedView& view) {
+    const Rigid3d& cam = view.cam_from_world;
+    const double rounding = 1e-12 * std::max(cam.translation.norm(), first.translation.norm()) + 1e-12;
+    return (camera_center(cam) - camera_center(first)).norm() <= rounding;
+  });
+}
+
+}  // namespace
+
+bool has_known_poses(const Session& session, Modality modality) {
+  int known = 0;
+  for (const FrameRecord* frame : session.frames_of(modality))
+    known += frame->cam_from_world && known_camera(session, *frame) ? 1 : 0;
+  return known >= 2;
+}
+
+Result<ModalityPoses> known_poses(const Session& session, Modality modality) {
+  ModalityPoses poses;
+  poses.reconstruction.modality = modality;
+  for (const FrameRecord* frame : session.frames_of(modality)) {
+    const std::optional<Camera> camera = known_camera(session, *frame);
+    // Tracking frames only ever served to pose the stations.
+    if (frame->tracking && !frame->cam_from_world) continue;
+    ++poses.frame_count;
+    if (!frame->cam_from_world || !camera) {
+      poses.dropped.push_back({frame->file, "the session knows the others' poses, not this one's"});
+      continue;
+    }
+    ORBITFUSE_TRY(camera->validate(frame->file));
+    if (!frame->cam_from_world->is_finite())
+      return fail(ErrorKind::input, frame->file, "its known pose is not finite",
+                  "correct the imported poses, or set poses.use_known_poses = false (--set)");
+    poses.reconstruction.views.push_back({frame->file, *camera, *frame->cam_from_world});
+  }
+  const int posed = static_cast<int>(poses.reconstruction.views.size());
+  if (posed >= 2 && at_one_place(poses.reconstruction))
+    return fail(ErrorKind::input, fmt::format("known {} poses", name(modality)),
+                fmt::format("all {} cameras stand at one place", posed),
+                "form needs views from several: correct the imported poses, or set poses.use_known_poses = false (--set)");
+  poses.ladder.push_back({"known poses", true, "the session carries them", posed,
+                          poses.frame_count, 0.0});
+  poses.gates["posed_ratio"] = poses.posed_ratio();
+  poses.skips.push_back({fmt::format("{} pose estimation", name(modality)),
+                         fmt::format("the session carries {} poses", posed),
+                         "no structure from motion; poses are as trusted as their source"});
+  return poses;
+}
+
+}  // namespace orbitfuse

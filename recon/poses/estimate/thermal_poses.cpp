@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/estimate_poses.hpp"
+
+#include <fmt/format.h>
+
+#include "recon/poses/cross_modal/cross_modal.hpp"
+#include "recon/poses/estimate/known_poses.hpp"
+#include "recon/poses/sfm/sfm_ladder.hpp"
+
+namespace orbitfuse {
+
+Result<ThermalPoses> estimate_thermal_poses(const Session& session, const VisibleScene* visible,
+                                            const PoseOptions& options,
+                                            const std::filesystem::path& workdir,
+                                            const Progress& progress) {
+  ORBITFUSE_TRY(options.validate());
+  ORBITFUSE_TRY(progress.check("poses.thermal"));
+  if (options.use_known_poses && has_known_poses(session, Modality::thermal)) {
+    ORBITFUSE_ASSIGN(ModalityPoses poses, known_poses(session, Modality::thermal));
+    // Known poses of a session share one world; estimated visible ones do not live in it.
+    const bool shares =
+        visible != nullptr && has_known_poses(session, Modality::visible);
+    return ThermalPoses{std::move(poses), shares};
+  }
+  const auto frames = session.frames_of(Modality::thermal, options.use_tracking_frames);
+  if (frames.size() < 2)
+    return fail(ErrorKind::input, session.folder.string(),
+                fmt::format("{} thermal frames, at least 2 are needed", frames.size()),
+                "record or import more views");
+  std::vector<LadderStep> steps;
+  if (visible != nullptr) {
+    auto localised = localise_in_visible(session, *visible, frames, options, progress, steps);
+    if (localised) {
+      localised->ladder = std::move(steps);
+      return localised;
+    }
+    if (localised.error().kind != ErrorKind::quality) return tl::unexpected(localised.error());
+    if (steps.empty())
+      steps.push_back({"cross-modal, orbit prior", false, localised.error().found, 0,
+                       static_cast<int>(frames.size()), 0});
+  }
+  auto alone = structure_from_motion(session, frames, options, workdir / "thermal", progress, steps);
+  if (!alone && visible != nullptr && alone.error().kind == ErrorKind::unavailable)
+    alone.error().found = steps.front().rung + ": " + steps.front().why + "; " + alone.error().found;
+  if (!alone) return tl::unexpected(std::move(alone.error()));
+  ModalityPoses poses = *std::move(alone);
+  poses.ladder = std::move(steps);
+  return ThermalPoses{std::move(poses), false};
+}
+
+}  // namespace orbitfuse

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/estimate_poses.hpp"
+
+#include <fmt/format.h>
+
+#include "recon/poses/estimate/known_poses.hpp"
+#include "recon/poses/sfm/sfm_ladder.hpp"
+
+namespace orbitfuse {
+
+Result<ModalityPoses> estimate_visible_poses(const Session& session, const PoseOptions& options,
+                                             const std::filesystem::path& workdir,
+                                             const Progress& progress) {
+  ORBITFUSE_TRY(options.validate());
+  ORBITFUSE_TRY(progress.check("poses.visible"));
+  if (options.use_known_poses && has_known_poses(session, Modality::visible))
+    return known_poses(session, Modality::visible);
+  const auto frames = session.frames_of(Modality::visible, options.use_tracking_frames);
+  if (frames.size() < 2)
+    return fail(ErrorKind::input, session.folder.string(),
+                fmt::format("{} visible frames, at least 2 are needed", frames.size()),
+                "record or import more views");
+  std::vector<LadderStep> steps;
+  ORBITFUSE_ASSIGN(ModalityPoses poses, structure_from_motion(session, frames, options,
+                                                              workdir / "visible", progress,
+                                                              steps));
+  poses.ladder = std::move(steps);
+  return poses;
+}
+
+}  // namespace orbitfuse

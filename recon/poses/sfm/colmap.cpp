@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/sfm/colmap.hpp"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <map>
+#include <tuple>
+
+#include "core/formats/colmap_model.hpp"
+#include "core/system/file_io.hpp"
+#include "core/system/parallel.hpp"
+#include "recon/poses/sfm/process.hpp"
+
+namespace orbitfuse {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Where extraction starts: the device's focal prior at the proxy's size, else COLMAP's own guess
+/// of 1.2 times the longer side.
+std::string camera_parameters(const Session& session, const ProxyImage& image) {
+  const DeviceInfo* device = session.device(image.frame->device);
+  double focal = 1.2 * std::max(image.width, image.height);
+  if (device != nullptr && image.frame->width > 0) {
+    const double scale = static_cast<double>(image.width) / image.frame->width;
+    if (device->lens.calibrated) focal = device->lens.calibrated->fx * scale;
+    else if (device->lens.focal_px) focal = *device->lens.focal_px * scale;
+  }
+  return fmt::format("{},{},{},0", focal, image.width / 2.0, image.height / 2.0);
+}
+
+/// A model of proxies renamed and scaled to the recorded frames.
+void restore_frames(Reconstruction& model, const std::vector<ProxyImage>& images) {
+  std::map<std::string, const ProxyImage*> by_name;
+  for (const ProxyImage& image : images) by_name[image.name] = &image;
+  std::vector<Eigen::Vector2d> scale(model.views.size(), Eigen::Vector2d::Ones());
+  for (std::size_t v = 0; v < model.views.size(); ++v) {
+    PosedView& view = model.views[v];
+    const auto found = by_name.find(view.name);
+    if (found == by_name.end()) continue;
+    const FrameRecord& frame = *found->second->frame;
+    view.name = frame.file;
+    if (frame.width <= 0) continue;
+    scale[v] = {static_cast<double>(frame.width) / view.camera.width,
+                static_cast<double>(frame.height) / view.camera.height};
+    view.camera = view.camera.scaled_to(frame.width, frame.height);
+  }
+  for (SparsePoint& point : model.points)
+    for (Observation& observation : point.track)
+      observation.pixel =
+          observation.pixel.cwiseProduct(scale[static_cast<std::size_t>(observation.view)]);
+}
+
+std::string flag(bool on) { return on ? "1" : "0"; }
+
+}  // namespace
+
+std::vector<MapperSettings> mapper_ladder() {
+  MapperSettings relaxed;
+  relaxed.name = "relaxed settings";
+  relaxed.init_min_tri_angle_deg = 6;
+  relaxed.init_min_num_inliers = 50;
+  relaxed.abs_pose_min_num_inliers = 18;
+  relaxed.abs_pose_min_inlier_ratio = 0.15;
+  MapperSettings last = relaxed;
+  last.name = "most relaxed settings";
+  last.init_min_tri_angle_deg = 2;
+  last.init_min_num_inliers = 25;
+  last.init_max_forward_motion = 1;
+  last.abs_pose_min_num_inliers = 12;
+  last.abs_pose_min_inlier_ratio = 0.1;
+  last.min_num_matches = 10;
+  return {MapperSettings{}, relaxed, last};
+}
+
+Result<ColmapProject> ColmapProject::create(const fs::path& folder, const fs::path& image_folder,
+                                            const ColmapOptions& options) {
+  std::error_code error;
+  fs::remove_all(folder, error);
+  fs::create_directories(folder, error);
+  if (error)
+    return fail(ErrorKind::device, folder.string(), error.message(), "check the disk and rights");
+  ColmapProject project;
+  project.options_ = options;
+  if (project.options_.threads == 0) project.options_.threads = thread_count();
+  project.folder_ = folder;
+  project.image_folder_ = image_folder;
+  project.database_ = folder / "database.db";
+  return project;
+}
+
+Status ColmapProject::run(std::vector<std::string> arguments, const Progress& progress) const {
+  arguments.insert(arguments.begin(), options_.command);
+  ORBITFUSE_ASSIGN(const int status,
+                   run_process(arguments, folder_ / "colmap.log", "poses.colmap", progress));
+  static_cast<void>(status);  // never believed: callers count what was written
+  return {};
+}
+
+std::vector<std::string> ColmapProject::seed_and(const std::string& verb) const {
+  return {verb, "--random_seed", fmt::format("{}", options_.seed % 2147483647u),
+          "--database_path", database_.string()};
+}
+
+Result<DatabaseCounts> ColmapProject::extract(const Session& session,
+                                              const std::vector<ProxyImage>& images,
+                                              const Progress& progress) {
+  std::map<std::tuple<std::string, int, int>, std::vector<const ProxyImage*>> groups;
+  for (const ProxyImage& image : images)
+    groups[{image.frame->device, image.width, image.height}].push_back(&image);
+  int group_number = 0;
+  for (const auto& [key, members] : groups) {
+    std::string list;
+    for (const ProxyImage* image : members) list += image->name + "\n";
+    const fs::path list_file = folder_ / fmt::format("images_{}.txt", group_number++);
+    ORBITFUSE_TRY(write_file_atomic(list_file, list));
+    std::vector<std::string> arguments = seed_and("feature_extractor");
+    arguments.insert(
+        arguments.end(),
+        {"--image_path", image_folder_.string(), "--image_list_path", list_file.string(),
+         "--ImageReader.camera_model", "SIMPLE_RADIAL", "--ImageReader.single_camera", "1",
+         "--ImageReader.camera_params", camera_parameters(session, *members.front()),
+         "--SiftExtraction.use_gpu", "0", "--SiftExtraction.num_threads",
+         fmt::format("{}", options_.threads), "--SiftExtraction.max_num_features",
+         fmt::format("{}", options_.max_features), "--SiftExtraction.peak_threshold",
+         fmt::format("{}", options_.peak_threshold)});
+    ORBITFUSE_TRY(run(std::move(arguments), progress));
+  }
+  ORBITFUSE_TRY(number_images_by_name(database_));
+  ORBITFUSE_ASSIGN(const DatabaseCounts counts, count_database(database_));
+  if (counts.images_with_features == 0)
+    return fail(ErrorKind::quality, (folder_ / "colmap.log").string(),
+                fmt::format("COLMAP found no features in {} images", images.size()),
+                "check that the images are sharp and show more than one flat surface");
+  return counts;
+}
+
+Result<DatabaseCounts> ColmapProject::match(const std::vector<ProxyImage>& images,
+                                            const std::vector<ViewPair>& pairs,
+                                            const Progress& progress) {
+  ORBITFUSE_ASSIGN(const auto descriptors, read_descriptors(database_));
+  const auto of = [&](int image) -> const Descriptors& {
+    static const Descriptors none(0, 128);
+    const auto found = descriptors.find(images[static_cast<std::size_t>(image)].name);
+    return found == descriptors.end() ? none : found->second;
+  };
+  std::vector<std::string> blocks(pairs.size());
+  parallel_for(static_cast<int>(pairs.size()), [&](int p) {
+    if (progress.cancelled()) return;
+    const auto [i, j] = pairs[static_cast<std::size_t>(p)];
+    std::string& block = blocks[static_cast<std::size_t>(p)];
+    block = images[static_cast<std::size_t>(i)].name + " " +
+            images[static_cast<std::size_t>(j)].name + "\n";
+    for (const auto& [a, b] : match_descriptors(of(i), of(j))) block += fmt::format("{} {}\n", a, b);
+    block += "\n";
+  });
+  ORBITFUSE_TRY(progress.check("poses.colmap"));
+  const fs::path list_file = folder_ / "matches.txt";
+  ORBITFUSE_TRY(write_file_atomic(list_file, fmt::format("{}", fmt::join(blocks, ""))));
+  std::vector<std::string> arguments = seed_and("matches_importer");
+  arguments.insert(arguments.end(), {"--match_list_path", list_file.string(), "--match_type", "raw",
+                                     "--SiftMatching.use_gpu", "0",
+                                     // One thread draws the samples of all pairs, in their order.
+                                     "--SiftMatching.num_threads", "1"});
+  ORBITFUSE_TRY(run(std::move(arguments), progress));
+  return count_database(database_);
+}
+
+Result<Reconstruction> ColmapProject::map(const Session& session,
+                                          const std::vector<ProxyImage>& images,
+                                          const MapperSettings& settings,
+                                          const Progress& progress) {
+  const fs::path sparse = folder_ / "sparse";
+  std::error_code error;
+  fs::remove_all(sparse, error);
+  fs::create_directories(sparse, error);
+  // A lens that was calibrated needs no self-calibration, which few views support badly.
+  const bool calibrated = std::all_of(images.begin(), images.end(), [&](const ProxyImage& image) {
+    const DeviceInfo* device = session.device(image.frame->device);
+    return device != nullptr && (device->lens.calibrated || device->lens.focal_relative_sigma == 0);
+  });
+  std::vector<std::string> arguments = seed_and("mapper");
+  const auto add = [&](const char* name, const std::string& value) {
+    arguments.push_back(std::string("--Mapper.") + name);
+    arguments.push_back(value);
+  };
+  arguments.insert(arguments.end(), {"--image_path", image_folder_.string(), "--output_path",
+                                     sparse.string()});
+  add("num_threads", "1");  // sums in another order end in another model
+  add("ba_refine_focal_length", flag(!calibrated));
+  add("init_min_tri_angle", fmt::format("{}", settings.init_min_tri_angle_deg));
+  add("init_min_num_inliers", fmt::format("{}", settings.init_min_num_inliers));
+  add("init_max_forward_motion", fmt::format("{}", settings.init_max_forward_motion));
+  add("abs_pose_min_num_inliers", fmt::format("{}", settings.abs_pose_min_num_inliers));
+  add("abs_pose_min_inlier_ratio", fmt::format("{}", settings.abs_pose_min_inlier_ratio));
+  add("min_num_matches", fmt::format("{}", settings.min_num_matches));
+  ORBITFUSE_TRY(run(std::move(arguments), progress));
+
+  Reconstruction best;
+  best.modality = images.front().frame->modality;
+  for (const auto& entry : fs::directory_iterator(sparse, error)) {
+    if (!entry.is_directory()) continue;
+    ORBITFUSE_ASSIGN(Reconstruction model, read_colmap_model(entry.path(), best.modality));
+    const auto size = std::tuple(model.views.size(), model.points.size());
+    if (size > std::tuple(best.views.size(), best.points.size())) best = std::move(model);
+  }
+  restore_frames(best, images);
+  return best;
+}
+
+}  // namespace orbitfuse

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/sfm/colmap_database.hpp"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <functional>
+#include <memory>
+#include <sqlite3.h>
+#include <vector>
+
+namespace orbitfuse {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int sift_bytes = 128;
+
+class Database {
+ public:
+  static Result<Database> open(const fs::path& path, int flags) {
+    sqlite3* handle = nullptr;
+    const int status = sqlite3_open_v2(path.c_str(), &handle, flags, nullptr);
+    Database database(handle, path);
+    if (status == SQLITE_OK) return database;
+    return fail(ErrorKind::input, path.string(), "no COLMAP database", "see colmap.log beside it");
+  }
+
+  /// Calls `row` for each row of the answer.
+  Status query(const char* sql, const std::function<void(sqlite3_stmt*)>& row) const {
+    sqlite3_stmt* statement = nullptr;
+    int status = sqlite3_prepare_v2(handle_.get(), sql, -1, &statement, nullptr);
+    if (status == SQLITE_OK)
+      while ((status = sqlite3_step(statement)) == SQLITE_ROW) row(statement);
+    sqlite3_finalize(statement);
+    if (status == SQLITE_DONE) return {};
+    return fail(ErrorKind::input, path_.string(),
+                fmt::format("not a COLMAP database ({})", sqlite3_errmsg(handle_.get())),
+                "delete it and run the pose stage again");
+  }
+
+  Result<double> number(const char* sql) const {
+    double value = 0;
+    ORBITFUSE_TRY(query(sql, [&](sqlite3_stmt* row) { value = sqlite3_column_double(row, 0); }));
+    return value;
+  }
+
+ private:
+  Database(sqlite3* handle, fs::path path) : handle_(handle, sqlite3_close), path_(std::move(path)) {}
+
+  std::unique_ptr<sqlite3, int (*)(sqlite3*)> handle_;
+  fs::path path_;
+};
+
+}  // namespace
+
+Result<DatabaseCounts> count_database(const fs::path& path) {
+  ORBITFUSE_ASSIGN(const Database database, Database::open(path, SQLITE_OPEN_READONLY));
+  const auto number = [&](const char* sql) { return database.number(sql); };
+  DatabaseCounts counts;
+  ORBITFUSE_ASSIGN(const double images, number("SELECT COUNT(*) FROM images"));
+  ORBITFUSE_ASSIGN(const double featured, number("SELECT COUNT(*) FROM keypoints WHERE rows > 0"));
+  ORBITFUSE_ASSIGN(const double features, number("SELECT TOTAL(rows) FROM keypoints"));
+  ORBITFUSE_ASSIGN(const double tried, number("SELECT COUNT(*) FROM matches"));
+  ORBITFUSE_ASSIGN(const double verified,
+                   number("SELECT COUNT(*) FROM two_view_geometries WHERE rows > 0"));
+  counts.images = static_cast<int>(images);
+  counts.images_with_features = static_cast<int>(featured);
+  counts.mean_features = features / std::max(counts.images, 1);
+  counts.matched_pairs = static_cast<int>(tried);
+  counts.verified_pairs = static_cast<int>(verified);
+  return counts;
+}
+
+Status number_images_by_name(const fs::path& path) {
+  ORBITFUSE_ASSIGN(const Database database, Database::open(path, SQLITE_OPEN_READWRITE));
+  // By way of numbers that no image has, because the tables allow none twice.
+  const std::string ranks =
+      "CREATE TEMP TABLE ranks AS SELECT image_id AS old, "
+      "ROW_NUMBER() OVER (ORDER BY name) AS new FROM images";
+  const auto execute = [&](const std::string& sql) {
+    return database.query(sql.c_str(), [](sqlite3_stmt*) {});
+  };
+  ORBITFUSE_TRY(execute("BEGIN"));
+  ORBITFUSE_TRY(execute(ranks));
+  for (const char* table : {"images", "keypoints", "descriptors"}) {
+    ORBITFUSE_TRY(execute(fmt::format(
+        "UPDATE {} SET image_id = 1000000000 + (SELECT new FROM ranks WHERE old = image_id)", table)));
+    ORBITFUSE_TRY(execute(fmt::format("UPDATE {} SET image_id = image_id - 1000000000", table)));
+  }
+  return execute("COMMIT");
+}
+
+Result<std::map<std::string, Descriptors>> read_descriptors(const fs::path& path) {
+  ORBITFUSE_ASSIGN(const Database database, Database::open(path, SQLITE_OPEN_READONLY));
+  std::map<std::string, Descriptors> found;
+  bool whole = true;
+  ORBITFUSE_TRY(database.query(
+      "SELECT images.name, descriptors.rows, descriptors.cols, descriptors.data FROM images "
+      "LEFT JOIN descriptors ON descriptors.image_id = images.image_id",
+      [&](sqlite3_stmt* row) {
+        const auto* name = reinterpret_cast<const char*>(sqlite3_column_text(row, 0));
+        const Eigen::Index rows = sqlite3_column_int(row, 1);
+        Descriptors& descriptors = found[name != nullptr ? name : ""];
+        if (rows <= 0) return;
+        whole = whole && sqlite3_column_int(row, 2) == sift_bytes &&
+                sqlite3_column_bytes(row, 3) == rows * sift_bytes;
+        if (!whole) return;
+        using Bytes = Eigen::Matrix<std::uint8_t, Eigen::Dynamic, sift_bytes, Eigen::RowMajor>;
+        const auto* bytes = static_cast<const std::uint8_t*>(sqlite3_column_blob(row, 3));
+        descriptors = Eigen::Map<const Bytes>(bytes, rows, sift_bytes).cast<float>();
+      }));
+  if (whole) return found;
+  return fail(ErrorKind::input, path.string(), "descriptors of another size than SIFT's 128 bytes",
+              "delete it and run the pose stage again");
+}
+
+}  // namespace orbitfuse

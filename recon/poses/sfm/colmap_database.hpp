@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+
+#include "core/result.hpp"
+#include "recon/poses/sfm/descriptor_matching.hpp"
+
+namespace orbitfuse {
+
+struct DatabaseCounts {
+  int images = 0, images_with_features = 0;
+  double mean_features = 0;
+  int matched_pairs = 0;   ///< pairs that were tried
+  int verified_pairs = 0;  ///< with a two-view geometry
+};
+
+/// Input error when the file is not a COLMAP database.
+Result<DatabaseCounts> count_database(const std::filesystem::path& database);
+
+/// Numbers the images in the order of their names. COLMAP numbers them as its threads finish, and
+/// the mapper's choices depend on the numbers. Only before matching: pairs carry numbers too.
+Status number_images_by_name(const std::filesystem::path& database);
+
+/// By image name; images without features have no rows.
+Result<std::map<std::string, Descriptors>> read_descriptors(const std::filesystem::path& database);
+
+}  // namespace orbitfuse

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/sfm/descriptor_matching.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace orbitfuse {
+namespace {
+
+/// The nearest and the runner-up of one feature, by inner product.
+struct Nearest {
+  float best = -1, second = -1;
+  int index = -1;
+
+  void offer(float product, int candidate) {
+    if (product > best) {
+      second = best;
+      best = product, index = candidate;
+    } else if (product > second) {
+      second = product;
+    }
+  }
+};
+
+double angle_rad(float product) { return std::acos(std::clamp(product / (512.0 * 512.0), 0.0, 1.0)); }
+
+bool passes(const Nearest& nearest, const DescriptorMatchOptions& options) {
+  if (nearest.index < 0) return false;
+  const double best = angle_rad(nearest.best);
+  return best <= options.max_distance_rad &&
+         (nearest.second < 0 || best < options.max_ratio * angle_rad(nearest.second));
+}
+
+}  // namespace
+
+std::vector<FeatureMatch> match_descriptors(const Descriptors& first, const Descriptors& second,
+                                            const DescriptorMatchOptions& options) {
+  std::vector<Nearest> of_first(static_cast<std::size_t>(first.rows())),
+      of_second(static_cast<std::size_t>(second.rows()));
+  constexpr Eigen::Index block = 64;  // products of a block stay in the cache while they are read
+  Descriptors products;
+  for (Eigen::Index begin = 0; begin < first.rows(); begin += block) {
+    const Eigen::Index rows = std::min(block, first.rows() - begin);
+    products.noalias() = first.middleRows(begin, rows) * second.transpose();
+    for (Eigen::Index r = 0; r < rows; ++r) {
+      Nearest& row = of_first[static_cast<std::size_t>(begin + r)];
+      for (Eigen::Index c = 0; c < second.rows(); ++c) {
+        const float product = products(r, c);
+        row.offer(product, static_cast<int>(c));
+        of_second[static_cast<std::size_t>(c)].offer(product, static_cast<int>(begin + r));
+      }
+    }
+  }
+  std::vector<FeatureMatch> matches;
+  for (std::size_t i = 0; i < of_first.size(); ++i) {
+    if (!passes(of_first[i], options)) continue;
+    const Nearest& back = of_second[static_cast<std::size_t>(of_first[i].index)];
+    if (back.index == static_cast<int>(i) && passes(back, options))
+      matches.emplace_back(static_cast<int>(i), of_first[i].index);
+  }
+  return matches;
+}
+
+}  // namespace orbitfuse

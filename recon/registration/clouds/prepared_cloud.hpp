@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "core/geometry/point_cloud.hpp"
+#include "recon/registration/clouds/nearest_grid.hpp"
+#include "recon/registration/register.hpp"
+#include "recon/registration/similarity.hpp"
+
+namespace orbitfuse::registration {
+
+/// A cloud as the search uses it: finite points only, outliers dropped, centred and scaled to a
+/// robust radius of 1 (unit_from_cloud), evenly thinned, with normals.
+struct PreparedCloud {
+  static constexpr std::size_t kNeighbours = 12;
+
+  Similarity3d unit_from_cloud;
+  Points points;
+  Points normals;  ///< unit length, signs consistent along the surface
+  /// 0..1, of the normal: the root of its neighbourhood's planarity. Planarity itself would leave
+  /// warped surfaces with too few points to average over, none would let outliers pull.
+  std::vector<double> trust;
+  std::vector<std::array<std::int32_t, kNeighbours>> neighbours;  ///< -1 where there are fewer
+  NearestGrid nearest_table;
+  std::size_t dropped_not_finite = 0, dropped_outliers = 0;
+
+  /// Index of the (all but always) nearest point; -1 far outside the cloud's box.
+  int nearest(const Eigen::Vector3d& x) const {
+    int best = nearest_table.lookup(x);
+    if (best < 0) return best;
+    double best_d2 = (points[static_cast<std::size_t>(best)] - x).squaredNorm();
+    // The table is exact to a cell; one greedy step to a neighbour makes up for it.
+    for (const std::int32_t j : neighbours[static_cast<std::size_t>(best)]) {
+      if (j < 0) break;
+      const double d2 = (points[static_cast<std::size_t>(j)] - x).squaredNorm();
+      if (d2 < best_d2) {
+        best_d2 = d2;
+        best = j;
+      }
+    }
+    return best;
+  }
+};
+
+/// Input errors: fewer than 20 finite or distinct points; all in one place, on one line or plane.
+Result<PreparedCloud> prepare(const PointCloud& cloud, const RegistrationOptions& options,
+                              const std::string& name);
+
+}  // namespace orbitfuse::registration

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/registration/clouds/rotation_grid.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "recon/registration/clouds/refine.hpp"
+#include "recon/registration/clouds/score.hpp"
+#include "recon/registration/clouds/thinning.hpp"
+
+namespace orbitfuse::registration {
+namespace {
+
+struct Round {
+  int points, iterations;
+  double start_bound, end_bound;
+  std::size_t keep;
+};
+
+}  // namespace
+
+std::vector<Eigen::Quaterniond> rotation_spiral(int count) {
+  const double phi = std::numbers::sqrt2, psi = 1.533751168755204288118041;
+  std::vector<Eigen::Quaterniond> rotations;
+  for (int i = 0; i < count; ++i) {
+    const double s = i + 0.5, r = std::sqrt(s / count), big_r = std::sqrt(1 - s / count);
+    const double alpha = 2 * std::numbers::pi * s / phi, beta = 2 * std::numbers::pi * s / psi;
+    rotations.emplace_back(big_r * std::cos(beta), r * std::sin(alpha), r * std::cos(alpha),
+                           big_r * std::sin(beta));
+  }
+  return rotations;
+}
+
+Candidates grid_candidates(const PreparedCloud& source, const PreparedCloud& target,
+                           const RegistrationOptions& options, int most) {
+  Candidates candidates;
+  for (const double scale : {1.0, 0.8, 1.25}) {
+    if (scale < options.min_scale || scale > options.max_scale) continue;
+    for (const auto& rotation : rotation_spiral(scale == 1.0 ? 600 : 300)) {
+      candidates.push_back({{scale, rotation, Eigen::Vector3d::Zero()}, 0, 0, "rotation grid", 0, false});
+    }
+  }
+  constexpr Round rounds[] = {
+      {60, 3, 0.6, 0.4, 240}, {120, 4, 0.4, 0.25, 60}, {250, 5, 0.25, 0.15, 0}};
+  for (const Round& round : rounds) {
+    const auto source_subset = strided_subset(source.points.size(), round.points);
+    const auto target_subset = strided_subset(target.points.size(), round.points);
+    const RefineOptions coarse{
+        round.start_bound, round.end_bound, round.iterations, 0, false, false};
+    const ScoreBounds bounds{round.end_bound, round.end_bound};
+    for (Candidate& candidate : candidates) {
+      candidate.target_from_source =
+          refine(source, target, source_subset, target_subset, candidate.target_from_source, coarse)
+              .target_from_source;
+      const double s = candidate.target_from_source.scale;
+      candidate.score = s < options.min_scale || s > options.max_scale
+                            ? 0
+                            : agreement(source, target, source_subset, target_subset,
+                                        candidate.target_from_source, bounds)
+                                  .score;
+    }
+    candidates = best_distinct(std::move(candidates),
+                               round.keep ? round.keep : static_cast<std::size_t>(most));
+  }
+  return candidates;
+}
+
+}  // namespace orbitfuse::registration

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/registration/images/similarity_refinement.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+#include "recon/alignment/edge_field.hpp"
+#include "recon/registration/images/similarity_round.hpp"
+#include "recon/alignment/whole_view.hpp"
+
+namespace orbitfuse {
+namespace {
+
+Status one_image_each(const std::vector<cv::Mat>& images, const std::vector<PosedView>& thermal) {
+  if (images.size() == thermal.size()) return {};
+  return fail(ErrorKind::input, "similarity refinement",
+              fmt::format("{} images for {} views", images.size(), thermal.size()),
+              "give one image a view");
+}
+
+}  // namespace
+
+Result<SimilarityRefinement> refine_similarity(const SceneRenderer& visible,
+                                               const std::vector<cv::Mat>& images,
+                                               const std::vector<PosedView>& thermal,
+                                               const Similarity3d& visible_from_thermal,
+                                               const std::vector<RenderRound>& rounds,
+                                               const Progress& progress) {
+  return refine_similarity(visible, images, thermal, visible_from_thermal, visible_from_thermal,
+                           rounds, progress);
+}
+
+Result<SimilarityRefinement> refine_similarity(const SceneRenderer& visible,
+                                               const std::vector<cv::Mat>& images,
+                                               const std::vector<PosedView>& thermal,
+                                               const Similarity3d& visible_from_thermal,
+                                               const Similarity3d& start,
+                                               const std::vector<RenderRound>& rounds,
+                                               const Progress& progress) {
+  ORBITFUSE_TRY(one_image_each(images, thermal));
+  SimilarityRefinement result;
+  result.visible_from_thermal = visible_from_thermal;
+  if (thermal.empty()) return result;
+  Similarity3d current = start;
+  for (const RenderRound& round : rounds) {
+    ORBITFUSE_ASSIGN(const SimilarityRound seen,
+                     look(visible, images, thermal, current, round, progress));
+    if (seen.patches.size() < fewest_patches) break;
+    current = agreed_similarity(seen.patches, current.inverse()).inverse();
+  }
+  // Both judged alike: the same last round, without a search of its own.
+  const RenderRound judge{256, 3, 4, 10};
+  ORBITFUSE_ASSIGN(const SimilarityRound before,
+                   look(visible, images, thermal, visible_from_thermal, judge, progress));
+  ORBITFUSE_ASSIGN(const SimilarityRound after,
+                   look(visible, images, thermal, current, judge, progress));
+  result.agreement_before = before.agreement;
+  result.agreement_after = after.agreement;
+  result.matches_before = before.matches(visible_from_thermal.inverse());
+  result.matches_after = after.matches(current.inverse());
+  result.improved = current.is_finite() && current.scale > 0 &&
+                    result.agreement_after > result.agreement_before &&
+                    result.matches_after > result.matches_before;
+  if (result.improved) result.visible_from_thermal = current;
+  return result;
+}
+
+Result<double> similarity_support(const SceneRenderer& visible, const std::vector<cv::Mat>& images,
+                                  const std::vector<PosedView>& thermal,
+                                  const Similarity3d& visible_from_thermal,
+                                  const Progress& progress) {
+  constexpr int kWidth = 160, kReach = 16;
+  constexpr std::size_t kMostViews = 8;
+  ORBITFUSE_TRY(one_image_each(images, thermal));
+  if (thermal.empty()) return 0.0;
+  const std::size_t count = std::min(kMostViews, thermal.size());
+  double sum = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    ORBITFUSE_TRY(progress.check("register"));
+    const PosedView& view = thermal[k * thermal.size() / count];
+    const int width = std::min(kWidth, view.camera.width);
+    const Camera camera =
+        view.camera.scaled_to(width, std::max(1, view.camera.height * width / view.camera.width))
+            .without_distortion();
+    ORBITFUSE_ASSIGN(const SceneRender seen,
+                     visible(camera, rebase(view.cam_from_world, visible_from_thermal)));
+    cv::Mat reduced;
+    cv::resize(images[k * thermal.size() / count], reduced, {camera.width, camera.height}, 0, 0,
+               cv::INTER_AREA);
+    const WholeMatch match =
+        match_whole(rendered_edges(seen), orientation_field(reduced, 1.0), kReach);
+    sum += std::max(0.0, match.correlation);
+  }
+  return sum / static_cast<double>(count);
+}
+
+}  // namespace orbitfuse

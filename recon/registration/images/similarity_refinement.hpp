@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "recon/alignment/render_alignment.hpp"
+
+// Two reconstructions that point clouds have brought together are off by what the clouds' edges are
+// blurred by. The thermal images themselves say more: seen from where the similarity puts their
+// cameras, the visible scene's rendered edges must fall on theirs, in all views with one
+// similarity.
+namespace orbitfuse {
+
+struct SimilarityRefinement {
+  Similarity3d visible_from_thermal;
+  double agreement_before = 0, agreement_after = 0;  ///< of rendered edges with the images', -1..1
+  int matches_before = 0, matches_after = 0;         ///< patches within 2 px
+  /// The images are explained better than before; if not, the similarity is the one given.
+  bool improved = false;
+  int starts = 1;           ///< tried from
+  std::vector<Skip> skips;  ///< starts not tried, and why
+};
+
+/// `images`: CV_32FC1 of `thermal` views, in their own world. Errors: input (counts differ), the
+/// renderer's, cancelled.
+Result<SimilarityRefinement> refine_similarity(const SceneRenderer& visible,
+                                               const std::vector<cv::Mat>& images,
+                                               const std::vector<PosedView>& thermal,
+                                               const Similarity3d& visible_from_thermal,
+                                               const std::vector<RenderRound>& rounds,
+                                               const Progress& progress);
+
+/// The same from a `start` found elsewhere, judged against `visible_from_thermal`, which stays if
+/// that explains the images better.
+Result<SimilarityRefinement> refine_similarity(const SceneRenderer& visible,
+                                               const std::vector<cv::Mat>& images,
+                                               const std::vector<PosedView>& thermal,
+                                               const Similarity3d& visible_from_thermal,
+                                               const Similarity3d& start,
+                                               const std::vector<RenderRound>& rounds,
+                                               const Progress& progress);
+
+/// How well the visible scene, seen from where the similarity puts the thermal cameras, explains
+/// their images: the mean, over at most eight views, of the normalised correlation of all edges at
+/// its best shift, 0..1. Tells placements apart that the clouds cannot (flips); their last degrees
+/// are refine_similarity's. Errors as there.
+Result<double> similarity_support(const SceneRenderer& visible, const std::vector<cv::Mat>& images,
+                                  const std::vector<PosedView>& thermal,
+                                  const Similarity3d& visible_from_thermal,
+                                  const Progress& progress);
+
+/// From several degrees and a tenth of the distance off.
+inline std::vector<RenderRound> similarity_rounds() {
+  return {{160, 30, 14, 22}, {160, 20, 12, 18}, {160, 8, 8, 12}, {256, 8, 8, 12}, {320, 6, 7, 12}};
+}
+
+}  // namespace orbitfuse

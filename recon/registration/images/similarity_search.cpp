@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/registration/images/similarity_search.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "recon/registration/images/similarity_round.hpp"
+
+namespace orbitfuse {
+namespace {
+
+constexpr int search_width_px = 128;
+/// Of a start's step from the clouds' answer: beyond that they would not have met.
+constexpr double farthest = 3;
+
+/// From a start to where its basin is known, and on to the basin's floor.
+std::vector<RenderRound> opening_rounds() {
+  return {{search_width_px, 24, 11, 18}, {search_width_px, 16, 10, 15}};
+}
+constexpr RenderRound closing_round{search_width_px, 7, 7, 10};
+constexpr RenderRound judging_round{search_width_px, 3, 4, 8};
+
+/// A place on its way, and how well the images support it.
+struct Climber {
+  Similarity3d visible_from_thermal;
+  double support = 0;  ///< agreement of edges times patches in place
+  double share = 0;    ///< of the patches, in place
+  std::vector<ScenePatch> patches = {};  ///< of its last round
+};
+
+struct Evidence {
+  const SceneRenderer& visible;
+  std::vector<cv::Mat> images;
+  std::vector<PosedView> thermal;
+  const Progress& progress;
+};
+
+/// Moves by one round; false where the images show too little.
+Result<bool> step(const Evidence& seen, const RenderRound& round, Climber& climber) {
+  ORBITFUSE_ASSIGN(SimilarityRound found, look(seen.visible, seen.images, seen.thermal,
+                                               climber.visible_from_thermal, round, seen.progress));
+  if (found.patches.size() < fewest_patches) {
+    climber.support = 0;
+    return false;
+  }
+  const Similarity3d moved =
+      agreed_similarity(found.patches, climber.visible_from_thermal.inverse());
+  const int matches = found.matches(moved);
+  climber.visible_from_thermal = moved.inverse();
+  climber.share = matches / static_cast<double>(found.patches.size());
+  climber.support = std::max(0.0, found.agreement) * matches;
+  climber.patches = std::move(found.patches);
+  return moved.is_finite() && moved.scale > 0;
+}
+
+Status open(const Evidence& seen, Climber& climber) {
+  for (const RenderRound& round : opening_rounds()) {
+    ORBITFUSE_ASSIGN(const bool moves, step(seen, round, climber));
+    if (!moves) break;
+  }
+  return {};
+}
+
+Status close(const Evidence& seen, Climber& climber) {
+  if (!(climber.support > 0)) return {};
+  for (const RenderRound& round : {closing_round, judging_round})
+    ORBITFUSE_TRY(step(seen, round, climber));
+  return {};
+}
+
+/// The middle of what the views see, in the visible world.
+Eigen::Vector3d middle(const std::vector<ScenePatch>& patches) {
+  Eigen::Vector3d result;
+  std::vector<double> values(patches.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < patches.size(); ++i) values[i] = patches[i].point[axis];
+    const auto half = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), half, values.end());
+    result[axis] = *half;
+  }
+  return result;
+}
+
+/// The visible world turned and grown about a point.
+Similarity3d about(const Eigen::Vector3d& center, double turn_deg, const Eigen::Vector3d& axis,
+                   double growth) {
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(turn_deg * std::numbers::pi / 180, axis));
+  return {growth, turn, center - growth * (turn * center)};
+}
+
+std::vector<Climber> starts_round(const Similarity3d& visible_from_thermal,
+                                  const Eigen::Vector3d& center,
+                                  const SimilaritySearchOptions& options) {
+  std::vector<Climber> starts;
+  for (const double sign : {-1.0, 1.0}) {
+    for (int axis = 0; axis < 3; ++axis)
+      starts.push_back({about(center, sign * options.turn_deg, Eigen::Vector3d::Unit(axis), 1) *
+                        visible_from_thermal});
+    starts.push_back({about(center, 0, Eigen::Vector3d::UnitX(),
+                            std::pow(1 + options.growth, sign)) *
+                      visible_from_thermal});
+  }
+  return starts;
+}
+
+/// How far the images moved the clouds' answer, in steps of the search.
+double steps_between(const Similarity3d& a, const Similarity3d& b,
+                     const SimilaritySearchOptions& options) {
+  return std::max(rotation_angle_deg(a.rotation, b.rotation) / options.turn_deg,
+                  std::abs(std::log(a.scale / b.scale)) / std::log1p(options.growth));
+}
+
+}  // namespace
+
+Status SimilaritySearchOptions::validate() const {
+  const auto bad = [](const char* field, double value, const char* want) {
+    return fail(ErrorKind::usage, field, fmt::format("{}", value), want);
+  };
+  if (!(turn_deg > 0 && turn_deg <= 45)) return bad("turn_deg", turn_deg, "0 to 45 degrees");
+  if (!(growth > 0 && growth <= 1)) return bad("growth", growth, "above 0, at most 1");
+  if (!(decisive_share >= 0 && decisive_share <= 1))
+    return bad("decisive_share", decisive_share, "0 to 1");
+  if (most_views < 1) return bad("most_views", most_views, "at least 1");
+  if (finalists < 1) return bad("finalists", finalists, "at least 1");
+  return {};
+}
+
+Result<SimilarityRefinement> search_similarity(const SceneRenderer& visible,
+                                               const std::vector<cv::Mat>& images,
+                                               const std::vector<PosedView>& thermal,
+                                               const Similarity3d& visible_from_thermal,
+                                               const SimilaritySearchOptions& options,
+                                               const Progress& progress) {
+  ORBITFUSE_TRY(options.validate());
+  const auto finish = [&](const Similarity3d& start, const std::vector<RenderRound>& rounds) {
+    return refine_similarity(visible, images, thermal, visible_from_thermal, start, rounds,
+                             progress);
+  };
+  if (images.size() != thermal.size() || thermal.empty())
+    return finish(visible_from_thermal, similarity_rounds());
+
+  Evidence seen{visible, {}, {}, progress};
+  const std::size_t count =
+      std::min(static_cast<std::size_t>(options.most_views), thermal.size());
+  for (std::size_t k = 0; k < count; ++k) {
+    seen.images.push_back(images[k * thermal.size() / count]);
+    seen.thermal.push_back(thermal[k * thermal.size() / count]);
+  }
+  Climber first{visible_from_thermal};
+  ORBITFUSE_TRY(open(seen, first));
+  if (!(first.support > 0)) return finish(visible_from_thermal, similarity_rounds());
+  std::vector<Climber> climbers =
+      starts_round(visible_from_thermal, middle(first.patches), options);
+  ORBITFUSE_TRY(close(seen, first));
+  const double moved = steps_between(first.visible_from_thermal, visible_from_thermal, options);
+  progress.report({"register", 0, 0, -1,
+                   fmt::format("from the clouds' answer: support {:.0f}, {:.2f} of the patches in "
+                               "place, moved by {:.2f} steps",
+                               first.support, first.share, moved)});
+  const std::vector<RenderRound> last_rounds{{160, 8, 8, 12}, {256, 8, 8, 12}, {320, 6, 7, 12}};
+  if (options.clouds_decide && first.share >= options.decisive_share && moved < 0.5) {
+    ORBITFUSE_ASSIGN(SimilarityRefinement result, finish(first.visible_from_thermal, last_rounds));
+    result.skips.push_back(
+        {"further starts of the refinement by the thermal images",
+         fmt::format("images and clouds agree: {:.0f} % of the patches in place, {:.1f} of a "
+                     "start's step from the clouds' answer",
+                     100 * first.share, moved),
+         fmt::format("{} starts not tried", climbers.size())});
+    return result;
+  }
+  for (Climber& climber : climbers) {
+    ORBITFUSE_TRY(open(seen, climber));
+    progress.report({"register", 0, 0, -1, fmt::format("start: support {:.0f}", climber.support)});
+  }
+  const int starts = 1 + static_cast<int>(climbers.size());
+  // Clutter can draw a start to where the clouds don't meet at all.
+  const auto lost = [&](const Climber& climber) {
+    return steps_between(climber.visible_from_thermal, visible_from_thermal, options) > farthest;
+  };
+  const auto better = [](const Climber& a, const Climber& b) { return a.support > b.support; };
+  std::erase_if(climbers, lost);
+  std::stable_sort(climbers.begin(), climbers.end(), better);
+  climbers.resize(std::min(climbers.size(), static_cast<std::size_t>(options.finalists)));
+  for (Climber& climber : climbers) {
+    ORBITFUSE_TRY(close(seen, climber));
+    progress.report({"register", 0, 0, -1,
+                     fmt::format("finalist: support {:.0f}, {:.2f} in place", climber.support,
+                                 climber.share)});
+  }
+  climbers.push_back(std::move(first));
+  std::erase_if(climbers, lost);
+  if (climbers.empty()) climbers.push_back({visible_from_thermal});
+  const Climber& best = *std::min_element(climbers.begin(), climbers.end(), better);
+  ORBITFUSE_ASSIGN(SimilarityRefinement result, finish(best.visible_from_thermal, last_rounds));
+  result.starts = starts;
+  return result;
+}
+
+}  // namespace orbitfuse

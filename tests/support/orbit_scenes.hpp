@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/geometry/reconstruction.hpp"
+#include "core/session/session.hpp"
+
+// The shared scenes as sessions in memory, for benchmarks and slow tests: only what a user would
+// know (images, capture order, nominal stations, a rough focal), the truth kept apart.
+namespace orbitfuse::scenes {
+
+/// ORBITFUSE_SHARED, else <source>/../shared; nullopt when absent.
+std::optional<std::filesystem::path> shared_data();
+
+struct Truth {
+  std::map<std::string, PosedView> views;  ///< by file
+};
+
+struct Scene {
+  Session session;
+  Truth truth;
+  std::vector<PosedView> test;  ///< new views that both modalities would share
+};
+
+struct ContainerOptions {
+  bool tracking = false;
+  double visible_focal_error = 0, thermal_focal_error = 0;  ///< of the prior, relative
+  bool mirrored_stations = false;                           ///< the operator walked the other way
+  double station_error_deg = 0;                             ///< alternating, on top of nature's
+};
+/// Nominal 30 deg stations in two loops of twelve, azimuth from 0 in each modality.
+Scene container_scene(const std::filesystem::path& data, const ContainerOptions& options);
+/// A folder of visible images, transforms.json as truth; no stations.
+Scene fox_scene(const std::filesystem::path& data);
+/// A recorded session with its ground_truth.json beside the manifest.
+Scene session_scene(const std::filesystem::path& folder);
+/// Folders visible/ and thermal/ of images without anything known; 8-bit or raw thermal.
+Scene folder_scene(const std::filesystem::path& folder);
+
+/// CPU seconds spent so far by this program and by COLMAP, which it starts.
+double cpu_seconds();
+
+/// An imported or recorded session; truth by the name of each frame's source.
+Result<Scene> run_scene(const std::filesystem::path& session, const std::filesystem::path& truth);
+/// Thermal frames recorded between the stations, in their order, without stations of their own.
+void add_tracking(Scene& scene, const std::filesystem::path& tracking_json);
+
+struct ViewError {
+  std::string name;
+  double center_percent = 0, outward_percent = 0;  ///< of the extent; along the true optical axis
+  double rotation_deg = 0;
+};
+
+struct PoseError {
+  int views = 0;
+  std::vector<ViewError> each;
+  double mean_rotation_deg = 0;
+  double ate_percent = 0;       ///< RMS of centres, share of the truth's extent
+  double median_percent = 0, worst_percent = 0;
+  double rotation_deg = 0;      ///< median
+  double worst_rotation_deg = 0;
+};
+/// The similarity that brings true camera centres onto the model's.
+std::optional<Similarity3d> model_from_truth(const Reconstruction& model, const Truth& truth);
+
+/// After the similarity that fits `anchor`'s centres to the truth (the visible cameras, when
+/// thermal poses are judged in the visible frame).
+PoseError pose_error(const Reconstruction& model, const Reconstruction& anchor, const Truth& truth);
+
+}  // namespace orbitfuse::scenes
