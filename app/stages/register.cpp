@@ -10,7 +10,7 @@
 #include "app/stages/training_data.hpp"
 #include "app/stages/visible_renderer.hpp"
 #include "core/formats/ply.hpp"
-#include "recon/registration/images/similarity_search.hpp"
+#include "recon/registration/similarity_search.hpp"
 #include "recon/registration/register.hpp"
 
 namespace orbitfuse::stages {

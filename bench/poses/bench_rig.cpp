@@ -23,7 +23,7 @@
 #include "core/session/session.hpp"
 #include "recon/nerf/nerf.hpp"
 #include "recon/poses/sfm/proxy_images.hpp"
-#include "recon/registration/images/similarity_search.hpp"
+#include "recon/registration/similarity_search.hpp"
 
 namespace {
 
