@@ -2,9 +2,6 @@
 #include "capture/mat/pdf_writer.hpp"
 
 #include <fmt/format.h>
-#include <hpdf.h>
-
-#include <array>
 
 namespace orbitfuse {
 namespace {
@@ -48,12 +45,8 @@ void PdfPage::clip(double x, double y, double width, double height) {
 
 void PdfPage::end_clip() { HPDF_Page_GRestore(page_); }
 
-PdfWriter::PdfWriter(const std::string& title) {
-  // Without a handler libHaru remembers its first error and does nothing from there on.
-  document_ = std::shared_ptr<void>(HPDF_New(nullptr, nullptr), [](void* document) {
-    if (document) HPDF_Free(document);
-  });
-  if (!document_) return;
+// Without a handler libHaru remembers its first error and does nothing from there on.
+PdfWriter::PdfWriter(const std::string& title) : document_(HPDF_New(nullptr, nullptr)) {
   HPDF_SetInfoAttr(document_.get(), HPDF_INFO_TITLE, ascii(title).c_str());
   HPDF_SetInfoAttr(document_.get(), HPDF_INFO_CREATOR, "OrbitFuse");
   // Readers that scale pages to the paper would make every distance on the mat wrong.

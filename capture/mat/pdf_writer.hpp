@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <hpdf.h>
+
 #include <memory>
 #include <string>
+#include <type_traits>
 
 #include "core/result.hpp"
 
@@ -25,8 +28,8 @@ class PdfPage {
 
  private:
   friend class PdfWriter;
-  void* page_ = nullptr;  ///< HPDF_Page and HPDF_Font, which belong to the writer
-  void* font_ = nullptr;
+  HPDF_Page page_ = nullptr;  ///< both belong to the writer
+  HPDF_Font font_ = nullptr;
   double width_mm_ = 0, height_mm_ = 0;
 };
 
@@ -42,7 +45,10 @@ class PdfWriter {
   static constexpr double largest_page_mm = 14400 * 25.4 / 72;  ///< PDF 1.4, Annex C: 200 inches
 
  private:
-  std::shared_ptr<void> document_;  ///< HPDF_Doc
+  struct Free {
+    void operator()(HPDF_Doc document) const { HPDF_Free(document); }
+  };
+  std::unique_ptr<std::remove_pointer_t<HPDF_Doc>, Free> document_;
 };
 
 }  // namespace orbitfuse
