@@ -121,17 +121,17 @@ TEST(Examples, TrainAndRender) {
   for (const KnownView& view : truth->at(Modality::visible).all()) {
     const cv::Mat photo = *read_visible(replay / "visible" / view.file.filename());
     cv::Mat small;
-    cv::resize(photo, small, {96, 72}, 0, 0, cv::INTER_AREA);
+    cv::resize(photo, small, {48, 36}, 0, 0, cv::INTER_AREA);
     const std::string name = view.file.stem().string() + ".png";
     ASSERT_TRUE(write_png(folder / name, small));
-    transforms.frames.push_back({name, {}, view.camera.scaled_to(96, 72), *view.cam_from_world});
+    transforms.frames.push_back({name, {}, view.camera.scaled_to(48, 36), *view.cam_from_world});
   }
   ASSERT_GE(transforms.frames.size(), 10u);
   ASSERT_TRUE(write_transforms_json(folder / "transforms.json", transforms));
   const Outcome outcome =
-      run("examples/03_train_and_render", {folder / "transforms.json", "200", folder / "view.png"});
+      run("examples/03_train_and_render", {folder / "transforms.json", "300", folder / "view.png"});
   ASSERT_EQ(outcome.status, 0) << outcome.output;
-  // 200 steps tell the object's place and colours, which a wrong axis, order or scale would not.
+  // 300 steps tell the object's place and colours, which a wrong axis, order or scale would not.
   const auto photo = read_visible(folder / transforms.frames[0].file_path), view = read_visible(folder / "view.png");
   ASSERT_TRUE(photo && view);
   const cv::Mat plain(photo->size(), photo->type(), cv::mean(*photo));

@@ -22,7 +22,7 @@ struct NormalisedView {
   std::vector<std::int32_t> known;  ///< pixels (y * width + x) whose distance is known
 };
 
-/// The ball of the scene that these views and points show (core/scene_ball.hpp).
+/// The ball of the scene that these views and points show (core/geometry/scene_ball.hpp).
 Space estimate_space(const Dataset& training);
 
 std::vector<NormalisedView> prepare_views(const Dataset& dataset, const Space& space, ValueSpan span);
