@@ -16,5 +16,5 @@ extern const std::string_view ${symbol};
 const std::string_view ${symbol}(reinterpret_cast<const char*>(bytes), sizeof bytes);
 }
 " @ONLY)
-  target_sources(${target} PRIVATE ${source})
+  target_sources(orbitfuse_${target} PRIVATE ${source})
 endfunction()

@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # One folder, one target, links stated. Headers are included from the repository root
-# (#include "core/result.hpp").
-include(GoogleTest)
+# (#include "core/result.hpp"); users of the libraries write <orbitfuse/core/result.hpp>.
+if(with_tests)
+  include(GoogleTest)
+endif()
+include(GNUInstallDirs)
 
-add_library(orbitfuse_flags INTERFACE)
-target_compile_options(orbitfuse_flags INTERFACE
+# How this project compiles its own sources. These hold for this folder and those below, and reach
+# nobody who links the libraries.
+add_compile_options(
   -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wold-style-cast
   $<$<BOOL:${ORBITFUSE_WERROR}>:-Werror>
   # g++ 12 reports these in inlined <string>, fmt and Eigen code that is correct (GCC bug 105329).
@@ -13,31 +17,96 @@ target_compile_options(orbitfuse_flags INTERFACE
   -march=x86-64-v3
   # a*b+c must round alike in every translation unit, or results depend on inlining.
   -ffp-contract=off)
-# Debian's Ceres is built for SSE2; without this Eigen would align to 32 bytes here and 16 there.
-target_compile_definitions(orbitfuse_flags INTERFACE EIGEN_MAX_ALIGN_BYTES=16)
-target_include_directories(orbitfuse_flags INTERFACE ${CMAKE_SOURCE_DIR})
-target_include_directories(orbitfuse_flags SYSTEM INTERFACE ${OpenCV_INCLUDE_DIRS})
+
+# What everyone who includes a header needs, users of the installed libraries too.
+add_library(orbitfuse_headers INTERFACE)
+add_library(OrbitFuse::headers ALIAS orbitfuse_headers)
+set_target_properties(orbitfuse_headers PROPERTIES EXPORT_NAME headers)
+target_compile_features(orbitfuse_headers INTERFACE cxx_std_20)
+# Public headers hold Eigen types by value. Debian's Ceres is built for SSE2; without this Eigen would
+# align to 32 bytes here and to 16 there, or in the code of a user with other -march flags.
+target_compile_definitions(orbitfuse_headers INTERFACE EIGEN_MAX_ALIGN_BYTES=16)
+# Both spellings resolve, installed or not; links to the rooms, so that no folder holds itself.
+foreach(folder core capture drivers recon fusion)
+  file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/include/orbitfuse)
+  file(CREATE_LINK ${PROJECT_SOURCE_DIR}/${folder} ${PROJECT_BINARY_DIR}/include/orbitfuse/${folder}
+       SYMBOLIC)
+endforeach()
+target_include_directories(orbitfuse_headers INTERFACE
+  $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include>
+  $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include/orbitfuse>
+  $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
+  $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/orbitfuse>)
+include_directories(${PROJECT_SOURCE_DIR})
+if(ORBITFUSE_INSTALL)
+  install(TARGETS orbitfuse_headers EXPORT OrbitFuse COMPONENT library)
+endif()
 
 set_property(GLOBAL PROPERTY ORBITFUSE_LINK_GRAPH "")
 
-# orbitfuse_module(recon_poses SRCS a.cpp b.cpp LINK core PRIVATE_LINK Ceres::ceres)
-# Project modules in LINK/PRIVATE_LINK are named by their folder (core, recon_poses, ...).
+# Modules are named by their folder (core, recon_poses, ...); the target of one is orbitfuse_<name>,
+# so that a project which includes this one may have a target "core" of its own.
+function(orbitfuse_targets_of variable)
+  set(targets "")
+  foreach(dep ${ARGN})
+    if(TARGET orbitfuse_${dep})
+      list(APPEND targets orbitfuse_${dep})
+    else()
+      list(APPEND targets ${dep})
+    endif()
+  endforeach()
+  set(${variable} ${targets} PARENT_SCOPE)
+endfunction()
+
+# orbitfuse_module(recon_poses SRCS a.cpp b.cpp LINK core PRIVATE_LINK Ceres::ceres
+#                  EXPORT poses HEADERS *.hpp)
+# EXPORT: the module is part of the installed package, as OrbitFuse::poses. HEADERS: patterns of its
+# public headers, from the module's folder; all that they include must be public too.
 function(orbitfuse_module name)
-  cmake_parse_arguments(ARG "" "" "SRCS;LINK;PRIVATE_LINK" ${ARGN})
-  add_library(${name} STATIC ${ARG_SRCS})
-  target_link_libraries(${name} PUBLIC orbitfuse_flags ${ARG_LINK} PRIVATE ${ARG_PRIVATE_LINK})
+  cmake_parse_arguments(ARG "" "EXPORT" "SRCS;LINK;PRIVATE_LINK;HEADERS" ${ARGN})
   foreach(dep ${ARG_LINK} ${ARG_PRIVATE_LINK})
     set_property(GLOBAL APPEND PROPERTY ORBITFUSE_LINK_GRAPH "${name} ${dep}")
+  endforeach()
+  orbitfuse_targets_of(public_links ${ARG_LINK})
+  orbitfuse_targets_of(private_links ${ARG_PRIVATE_LINK})
+  set(target orbitfuse_${name})
+  add_library(${target} STATIC ${ARG_SRCS})
+  target_link_libraries(${target} PUBLIC orbitfuse_headers ${public_links} PRIVATE ${private_links})
+  if(PROJECT_IS_TOP_LEVEL)
+    add_library(${name} ALIAS ${target})
+  endif()
+  if(ARG_EXPORT)
+    add_library(OrbitFuse::${ARG_EXPORT} ALIAS ${target})
+    set_target_properties(${target} PROPERTIES EXPORT_NAME ${ARG_EXPORT})
+  endif()
+  if(ARG_EXPORT AND ORBITFUSE_INSTALL)
+    install(TARGETS ${target} EXPORT OrbitFuse ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library)
+    orbitfuse_install_headers(${ARG_HEADERS})
+  endif()
+endfunction()
+
+function(orbitfuse_install_headers)
+  foreach(pattern ${ARGN})
+    file(GLOB headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}
+         ${CMAKE_CURRENT_SOURCE_DIR}/${pattern})
+    if(NOT headers)
+      message(FATAL_ERROR "${CMAKE_CURRENT_SOURCE_DIR} has no header ${pattern}")
+    endif()
+    foreach(header ${headers})
+      cmake_path(GET header PARENT_PATH folder)
+      install(FILES ${PROJECT_SOURCE_DIR}/${header} COMPONENT library
+              DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/orbitfuse/${folder})
+    endforeach()
   endforeach()
 endfunction()
 
 # Sources compiled for one instruction set beyond the baseline, e.g.
 # orbitfuse_isa_sources(recon_nerf avx512 mlp_avx512.cpp)
-function(orbitfuse_isa_sources target isa)
+function(orbitfuse_isa_sources name isa)
   set(flags_avx512 -mavx512f -mavx512bw -mavx512vl -mavx512dq -mprefer-vector-width=512)
   set(flags_avx512bf16 ${flags_avx512} -mavx512bf16)
   set(flags_amx ${flags_avx512bf16} -mamx-tile -mamx-bf16 -mamx-int8)
-  target_sources(${target} PRIVATE ${ARGN})
+  target_sources(orbitfuse_${name} PRIVATE ${ARGN})
   set_property(SOURCE ${ARGN} APPEND PROPERTY COMPILE_OPTIONS ${flags_${isa}})
 endfunction()
 
@@ -48,10 +117,11 @@ function(orbitfuse_test name)
   if(NOT ARG_LABEL)
     set(ARG_LABEL fast)
   endif()
+  orbitfuse_targets_of(links ${ARG_LINK})
   add_executable(${name} ${ARG_SRCS})
-  target_link_libraries(${name} PRIVATE ${ARG_LINK} GTest::gtest GTest::gmock GTest::gtest_main)
+  target_link_libraries(${name} PRIVATE ${links} GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE
-    ORBITFUSE_SOURCE_DIR="${CMAKE_SOURCE_DIR}" ORBITFUSE_BINARY_DIR="${CMAKE_BINARY_DIR}")
+    ORBITFUSE_SOURCE_DIR="${PROJECT_SOURCE_DIR}" ORBITFUSE_BINARY_DIR="${PROJECT_BINARY_DIR}")
   gtest_discover_tests(${name} PROPERTIES LABELS ${ARG_LABEL} RESOURCE_LOCK "${ARG_LOCK}" DISCOVERY_TIMEOUT 60)
 endfunction()
 

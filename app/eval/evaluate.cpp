@@ -142,7 +142,7 @@ Status compare_thermal(const nerf::Field& field, const TestView& view, const Cam
   ORBITFUSE_ASSIGN(nerf::RenderedView seen, nerf::render(field, camera, cam_from_thermal, {}, progress));
   ORBITFUSE_ASSIGN(const cv::Mat truth, field_image(view.thermal, Samples::kelvin));
   seen.color.setTo(std::nanf(""), seen.opacity < options.min_opacity);
-  const TemperatureError error = temperature_error(seen.color, resized(truth, camera),
+  const ThermalViewError error = thermal_view_error(seen.color, resized(truth, camera),
                                                    kelvin_from_celsius(options.scene_above_c));
   if (!std::isfinite(error.mae_k)) return {};
   sums.mae_k += error.mae_k;

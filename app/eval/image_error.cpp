@@ -13,7 +13,7 @@ double psnr_db(const cv::Mat& a, const cv::Mat& b, double peak) {
   return mse > 0 ? 10 * std::log10(peak * peak / mse) : std::numeric_limits<double>::infinity();
 }
 
-TemperatureError temperature_error(const cv::Mat& rendered_k, const cv::Mat& truth_k,
+ThermalViewError thermal_view_error(const cv::Mat& rendered_k, const cv::Mat& truth_k,
                                    double scene_above_k) {
   CV_Assert(rendered_k.size() == truth_k.size());
   double absolute = 0, squared = 0, low = 1e9, high = -1e9;
@@ -30,7 +30,7 @@ TemperatureError temperature_error(const cv::Mat& rendered_k, const cv::Mat& tru
       absolute += std::abs(r - t);
       squared += (r - t) * (r - t);
     }
-  TemperatureError error;
+  ThermalViewError error;
   if (covered == 0) return {std::nan(""), 0, std::nan("")};
   const auto n = static_cast<double>(covered);
   error.mae_k = absolute / n;

@@ -126,7 +126,7 @@ std::string viewer(const Model& model, const json& views) {
 std::string poses_section(const Model& model) {
   if (model.poses.empty()) return {};
   std::string html = "<section aria-labelledby=\"h-poses\"><h2 id=\"h-poses\">Posed views</h2>\n";
-  for (const ModalityPoses& p : model.poses) {
+  for (const PosesSummary& p : model.poses) {
     const double percent = p.total > 0 ? 100.0 * p.posed / p.total : 0;
     html += fmt::format("<h3>{}: {} of {} views ({:.0f} %)</h3><div class=\"meter{}\"><i style=\"width:"
                         "{:.1f}%\"></i></div>\n",

@@ -31,7 +31,7 @@ struct Rung {
   std::string name, outcome, detail;
 };
 
-struct ModalityPoses {
+struct PosesSummary {
   std::string modality;
   int posed = 0, total = 0;
   std::vector<Rung> ladder;
@@ -59,7 +59,7 @@ struct Model {
   TemperatureSpan span;
   bool has_temperature = false;      ///< the span is in kelvin (else gray levels)
   cv::Mat palette_bgr;               ///< 1x256
-  std::vector<ModalityPoses> poses;
+  std::vector<PosesSummary> poses;
   std::string registration_note;
   Facts registration;
   std::vector<Table> tables;

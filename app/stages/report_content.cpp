@@ -72,7 +72,7 @@ Status add_views(const StageContext& context, const RenderConfig& config, report
   return {};
 }
 
-std::string advice(const report::ModalityPoses& poses) {
+std::string advice(const report::PosesSummary& poses) {
   if (poses.posed == poses.total) return {};
   return poses.modality == "Visible"
              ? "Views without a pose are left out. Record them again with more overlap, sharp and "
@@ -84,7 +84,7 @@ std::string advice(const report::ModalityPoses& poses) {
 void add_poses(const StageContext& context, const SessionInput& input, report::Model& model) {
   for (const Modality modality : {Modality::visible, Modality::thermal}) {
     const bool visible = modality == Modality::visible;
-    report::ModalityPoses poses;
+    report::PosesSummary poses;
     poses.modality = visible ? "Visible" : "Thermal";
     poses.total = input.count(modality);
     if (poses.total == 0) continue;

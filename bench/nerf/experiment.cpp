@@ -9,7 +9,7 @@
 
 #include "core/image/image_io.hpp"
 #include "fusion/metrics/metrics.hpp"
-#include "recon/nerf/training/scene.hpp"
+#include "recon/nerf/training_views.hpp"
 
 namespace orbitfuse::bench {
 namespace {

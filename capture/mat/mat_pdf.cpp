@@ -40,6 +40,43 @@ void ruler(PdfPage& page, double left, double y) {
   page.text(left + 102, y - 1, 3, "100 mm: print at 100 %, not fitted to the page");
 }
 
+/// What of the mat is where on which page: tile (row, column) shows as much as fits between margins.
+struct Tiling {
+  Paper sheet;
+  double side_mm = 0, tile_w_mm = 0, tile_h_mm = 0;
+  int columns = 0, rows = 0;
+};
+
+Tiling tiling_of(const MatDesign& design, const std::string& paper) {
+  Tiling t;
+  t.side_mm = design.size_m * mm;
+  t.sheet = papers.at(paper);
+  if (t.sheet.width_mm <= 0) {
+    const double whole = std::min(t.side_mm + 2 * margin_mm, PdfWriter::largest_page_mm);
+    t.sheet = {whole, whole};
+  }
+  t.tile_w_mm = std::min(t.side_mm, t.sheet.width_mm - 2 * margin_mm);
+  t.tile_h_mm = std::min(t.side_mm, t.sheet.height_mm - 2 * margin_mm);
+  t.columns = static_cast<int>(std::ceil(t.side_mm / t.tile_w_mm - 1e-9));
+  t.rows = static_cast<int>(std::ceil(t.side_mm / t.tile_h_mm - 1e-9));
+  return t;
+}
+
+/// The part of the mat that lies on a tile; rows from the top.
+void paint(PdfPage& page, const Tiling& t, int row, int column, const std::vector<MatRectangle>& black) {
+  // Lower left corner of the tile in the mat's frame.
+  const double left = column * t.tile_w_mm - t.side_mm / 2,
+               bottom = t.side_mm / 2 - (row + 1) * t.tile_h_mm;
+  page.clip(margin_mm, margin_mm, t.tile_w_mm, t.tile_h_mm);
+  for (const MatRectangle& r : black) {
+    const double x = r.left * mm - left, y = r.bottom * mm - bottom;
+    if (x >= t.tile_w_mm || y >= t.tile_h_mm || x + r.width * mm <= 0 || y + r.height * mm <= 0)
+      continue;
+    page.rectangle(margin_mm + x, margin_mm + y, r.width * mm, r.height * mm);
+  }
+  page.end_clip();
+}
+
 }  // namespace
 
 Status check_paper(const std::string& paper) {
@@ -50,45 +87,30 @@ Status check_paper(const std::string& paper) {
 Result<std::string> mat_pdf(const MatDesign& design, const std::string& paper) {
   ORBITFUSE_TRY(design.validate());
   ORBITFUSE_TRY(check_paper(paper));
-  const double side = design.size_m * mm;
-  Paper sheet = papers.at(paper);
-  if (paper == "one") sheet = {side + 2 * margin_mm, side + 2 * margin_mm};
-  // Each tile shows as much of the mat as fits between its margins.
-  const double tile_w = std::min(side, sheet.width_mm - 2 * margin_mm),
-               tile_h = std::min(side, sheet.height_mm - 2 * margin_mm);
-  const int columns = static_cast<int>(std::ceil(side / tile_w - 1e-9)),
-            rows = static_cast<int>(std::ceil(side / tile_h - 1e-9));
-  if (columns * rows > most_tiles) {
-    return fail(ErrorKind::usage, "mat.paper", fmt::format("{} pages of {}", columns * rows, paper),
+  const Tiling tiling = tiling_of(design, paper);
+  if (tiling.columns * tiling.rows > most_tiles) {
+    return fail(ErrorKind::usage, "mat.paper",
+                fmt::format("{} pages of {}", tiling.columns * tiling.rows, paper),
                 "use larger paper or \"one\" for a plotter");
   }
   const std::vector<MatRectangle> black = black_rectangles(design);
-  std::vector<PdfPage> pages;
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
-      // Lower left corner of the tile in the mat's frame; rows from the top.
-      const double left = column * tile_w - side / 2, bottom = side / 2 - (row + 1) * tile_h;
-      PdfPage page(sheet.width_mm, sheet.height_mm);
-      page.clip(margin_mm, margin_mm, tile_w, tile_h);
-      for (const MatRectangle& r : black) {
-        const double x = r.left * mm - left, y = r.bottom * mm - bottom;
-        if (x >= tile_w || y >= tile_h || x + r.width * mm <= 0 || y + r.height * mm <= 0) continue;
-        page.rectangle(margin_mm + x, margin_mm + y, r.width * mm, r.height * mm);
-      }
-      page.end_clip();
-      marks(page, tile_w, tile_h);
-      if (sheet.width_mm > 150) ruler(page, margin_mm + 8, margin_mm - 8);
-      const double top = sheet.height_mm - margin_mm + 6;
+  PdfWriter writer(fmt::format("OrbitFuse mat, {:g} m", design.size_m));
+  for (int row = 0; row < tiling.rows; ++row) {
+    for (int column = 0; column < tiling.columns; ++column) {
+      PdfPage page = writer.add_page(tiling.sheet.width_mm, tiling.sheet.height_mm);
+      paint(page, tiling, row, column, black);
+      marks(page, tiling.tile_w_mm, tiling.tile_h_mm);
+      if (tiling.sheet.width_mm > 150) ruler(page, margin_mm + 8, margin_mm - 8);
+      const double top = tiling.sheet.height_mm - margin_mm + 6;
       page.text(margin_mm + 8, top, 3,
                 fmt::format("OrbitFuse mat {:g} m, {} x {} tags{}; row {} of {}, column {} of {}; "
                             "azimuth 0 is to the right",
                             design.size_m, design.tags_per_side, design.tags_per_side,
-                            design.thermal ? ", black = matt paint on foil" : "", row + 1, rows,
-                            column + 1, columns));
-      pages.push_back(std::move(page));
+                            design.thermal ? ", black = matt paint on foil" : "", row + 1,
+                            tiling.rows, column + 1, tiling.columns));
     }
   }
-  return pdf_file(pages, fmt::format("OrbitFuse mat, {:g} m", design.size_m));
+  return writer.bytes();
 }
 
 }  // namespace orbitfuse

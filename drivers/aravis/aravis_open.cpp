@@ -215,8 +215,8 @@ Status AravisSource::push_settings() {
 }
 
 Result<std::vector<std::uint16_t>> AravisSource::temperature_table() {
-  if (profile_.scale == ThermalScale::none) return std::vector<std::uint16_t>{};
-  if (profile_.scale == ThermalScale::linear) return linear_table(profile_.kelvin_per_dn);
+  if (profile_.scale == SampleScale::none) return std::vector<std::uint16_t>{};
+  if (profile_.scale == SampleScale::linear) return linear_table(profile_.kelvin_per_dn);
   PlanckParameters parameters;
   for (const auto& [node, field] : {std::pair<const char*, double*>{"R", &parameters.r},
                                     {"B", &parameters.b},

@@ -31,10 +31,10 @@ Result<CameraProfile> profile_of(const toml::table& table, const fs::path& file)
     for (const auto& model : *models) profile.models.push_back(model.value_or(std::string()));
   }
   const std::string scale = table["scale"].value_or(std::string("none"));
-  if (scale == "linear") profile.scale = ThermalScale::linear;
-  else if (scale == "radiometric") profile.scale = ThermalScale::radiometric;
+  if (scale == "linear") profile.scale = SampleScale::linear;
+  else if (scale == "radiometric") profile.scale = SampleScale::radiometric;
   else if (scale != "none") return bad(file, "scale", scale, "one of none, linear, radiometric");
-  if (profile.scale == ThermalScale::linear && !(profile.kelvin_per_dn > 0)) {
+  if (profile.scale == SampleScale::linear && !(profile.kelvin_per_dn > 0)) {
     return bad(file, "kelvin_per_dn", "missing", "scale = \"linear\" needs it, e.g. 0.01");
   }
   // An array of one-entry tables, because the order matters and TOML tables have none.

@@ -12,7 +12,7 @@
 namespace orbitfuse::aravis {
 
 /// How samples become kelvin.
-enum class ThermalScale {
+enum class SampleScale {
   none,         ///< counts or gray levels; no temperatures (RawCounts)
   linear,       ///< T[K] = kelvin_per_dn * DN
   radiometric,  ///< FLIR: nodes R, B, F, J0, J1 read from the camera
@@ -26,7 +26,7 @@ struct CameraProfile {
   std::string name;
   std::vector<std::string> models;   ///< substrings of the model name that it is for
   std::vector<std::pair<std::string, FeatureValue>> settings;
-  ThermalScale scale = ThermalScale::none;
+  SampleScale scale = SampleScale::none;
   double kelvin_per_dn = 0;
   std::string nuc_command;           ///< empty: the camera has none
 };

@@ -2,7 +2,7 @@
 #include "recon/assembly/thermal_depth.hpp"
 
 #include "recon/depth/dense_depth.hpp"
-#include "recon/nerf/training/scene.hpp"
+#include "recon/nerf/training_views.hpp"
 
 namespace orbitfuse {
 

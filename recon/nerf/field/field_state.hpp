@@ -11,7 +11,7 @@
 #include "recon/nerf/field/march_settings.hpp"
 #include "recon/nerf/options.hpp"
 #include "recon/nerf/field/refined_pose.hpp"
-#include "recon/nerf/field/value_span.hpp"
+#include "recon/nerf/value_span.hpp"
 #include "recon/nerf/field/space.hpp"
 
 namespace orbitfuse::nerf {

@@ -5,12 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "recon/nerf/dataset.hpp"
 #include "recon/nerf/field/occupancy.hpp"
 #include "recon/nerf/options.hpp"
 #include "recon/nerf/field/space.hpp"
-#include "recon/nerf/field/value_span.hpp"
 #include "recon/nerf/field/view_rays.hpp"
+#include "recon/nerf/training_views.hpp"
 
 namespace orbitfuse::nerf {
 
@@ -23,26 +22,8 @@ struct NormalisedView {
   std::vector<std::int32_t> known;  ///< pixels (y * width + x) whose distance is known
 };
 
-/// Views that don't train: those marked so, and every n-th of the others (0 = none).
-std::vector<bool> heldout_views(const Dataset& dataset, int holdout_every);
-
-/// Thermal views of which more than half is no temperature: a broken transfer, a shutter in the way.
-std::vector<bool> broken_views(const Dataset& dataset);
-/// Share of an image's pixels that hold no value.
-double invalid_share(const cv::Mat& image);
-
-/// Of the views given to train(): the broken ones, and of the others those that don't train.
-std::vector<bool> left_out_views(const Dataset& given, int holdout_every);
-
-/// What training may know: the dataset without held-out views, their depth maps and the points that
-/// only they saw. Images are shared, not copied.
-Dataset training_part(const Dataset& dataset, const std::vector<bool>& heldout);
-
 /// The ball of the scene that these views and points show (core/geometry/scene_ball.hpp).
 Space estimate_space(const Dataset& training);
-
-/// Thermal: the 0.1 and 99.9 percentile over these views, at least 1 K wide. Visible: 0..1.
-ValueSpan estimate_span(const Dataset& training);
 
 std::vector<NormalisedView> prepare_views(const Dataset& dataset, const Space& space, ValueSpan span);
 

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "recon/poses/cross_modal/cross_modal.hpp"
-#include "recon/poses/estimate/known_poses.hpp"
+#include "recon/poses/estimate/session_poses.hpp"
 #include "recon/poses/sfm/sfm_ladder.hpp"
 
 namespace orbitfuse {

@@ -19,16 +19,16 @@ struct Page {
   std::vector<MatRectangle> black;  // metres from the page's lower left corner
 };
 
-/// A reader of the subset that the writer uses, strict about the cross-reference table.
-std::vector<Page> read_pdf(const std::string& file) {
-  std::vector<Page> pages;
-  EXPECT_EQ(file.rfind("%PDF-1.4", 0), 0u);
+/// Every entry of the cross-reference table leads to its object.
+void check_table(const std::string& file) {
+  EXPECT_EQ(file.rfind("%PDF-1.", 0), 0u);
   const std::size_t start = std::stoul(file.substr(file.rfind("startxref") + 10));
   std::istringstream table(file.substr(start));
   std::string word;
   std::size_t zero = 0, count = 0;
   table >> word >> zero >> count;
   EXPECT_EQ(word, "xref");
+  EXPECT_GT(count, 4u);
   for (std::size_t i = 0; i < count; ++i) {
     std::string offset, generation, kind;
     table >> offset >> generation >> kind;
@@ -36,26 +36,39 @@ std::vector<Page> read_pdf(const std::string& file) {
     const std::string head = std::to_string(i) + " 0 obj";
     EXPECT_EQ(file.compare(std::stoul(offset), head.size(), head), 0) << i;
   }
-  const std::regex box(R"(MediaBox \[0 0 ([\d.]+) ([\d.]+)\])"),
-      stream(R"(Length (\d+) >>\nstream\n)");
+}
+
+/// Filled rectangles of an uncompressed content stream: "x y width height re", then "f".
+std::vector<MatRectangle> filled_rectangles(const std::string& content) {
+  std::vector<MatRectangle> black;
+  MatRectangle last;
+  std::istringstream lines(content);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.ends_with(" re")) {
+      std::istringstream numbers(line);
+      numbers >> last.left >> last.bottom >> last.width >> last.height;
+      for (double* v : {&last.left, &last.bottom, &last.width, &last.height}) *v /= pt_per_m;
+    } else if (line == "f") {
+      black.push_back(last);
+    }
+  }
+  return black;
+}
+
+/// A reader of the subset that the writer uses.
+std::vector<Page> read_pdf(const std::string& file) {
+  check_table(file);
+  std::vector<Page> pages;
+  const std::regex box(R"(MediaBox \[ 0 0 ([\d.]+) ([\d.]+) \])"), stream(R"(>>\r?\nstream\r?\n)");
   for (std::sregex_iterator it(file.begin(), file.end(), box), end; it != end; ++it) {
     pages.push_back({std::stod((*it)[1]), std::stod((*it)[2]), {}});
   }
   std::size_t page = 0;
   for (std::sregex_iterator it(file.begin(), file.end(), stream), end; it != end; ++it, ++page) {
-    const auto at = static_cast<std::size_t>(it->position() + it->length()),
-               length = std::stoul((*it)[1]);
-    EXPECT_EQ(file.compare(at + length, 9, "endstream"), 0);
-    std::istringstream lines(file.substr(at, length));
-    for (std::string line; std::getline(lines, line);) {
-      if (!line.ends_with(" re f")) continue;
-      std::istringstream numbers(line);
-      MatRectangle r;
-      numbers >> r.left >> r.bottom >> r.width >> r.height;
-      for (double* v : {&r.left, &r.bottom, &r.width, &r.height}) *v /= pt_per_m;
-      pages.at(page).black.push_back(r);
-    }
+    const auto at = static_cast<std::size_t>(it->position() + it->length());
+    pages.at(page).black = filled_rectangles(file.substr(at, file.find("endstream", at) - at));
   }
+  EXPECT_EQ(page, pages.size());
   return pages;
 }
 
@@ -99,6 +112,14 @@ TEST(MatPdf, TilesCoverTheMatOnce) {
     }
   }
   EXPECT_NEAR(tiled / whole, 1, 1e-4);
+}
+
+TEST(MatPdf, MatBeyondTheLargestPageComesOnSeveral) {
+  MatDesign design{};
+  design.size_m = 8;
+  const auto pages = read_pdf(*mat_pdf(design, "one"));
+  EXPECT_EQ(pages.size(), 4u);
+  for (const Page& page : pages) EXPECT_LE(page.width_pt, 14400);
 }
 
 TEST(MatPdf, FoilVersionIsInvertedWithAPaintedBorder) {

@@ -16,7 +16,7 @@ TEST(CameraProfile, ShippedProfilesMatchTheirModels) {
   EXPECT_EQ(find_profile(shipped, "FLIR A70 (simulated)")->name, "flir-axx");
   EXPECT_EQ(find_profile(shipped, "FLIR A65")->name, "flir-ax5");
   EXPECT_EQ(find_profile(shipped, "Blackfly")->name, "generic");
-  EXPECT_EQ(read_profile(shipped / "flir-radiometric.toml")->scale, ThermalScale::radiometric);
+  EXPECT_EQ(read_profile(shipped / "flir-radiometric.toml")->scale, SampleScale::radiometric);
 }
 
 TEST(CameraProfile, SettingsKeepTheirOrder) {

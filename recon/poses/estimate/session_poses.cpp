@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/estimate/known_poses.hpp"
+#include "recon/poses/estimate/session_poses.hpp"
 
 #include <fmt/format.h>
 
