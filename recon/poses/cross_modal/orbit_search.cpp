@@ -7,6 +7,7 @@
 #include <map>
 
 #include "core/system/parallel.hpp"
+#include "recon/alignment/edge_field.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -96,36 +97,81 @@ struct Candidate {
   double score = -2;
   double offset_deg = 0;
   bool mirrored = false;
+  int radius = 0;                                 ///< index of the distance common to the loops
   std::map<int, std::pair<int, int>> loop_place;  ///< loop -> elevation, radius index
 };
 
-Candidate evaluate(const Table& table, const std::vector<SearchView>& views,
-                    const OrbitSearchOptions& options, double offset_deg, bool mirrored) {
-  Candidate h;
-  h.offset_deg = offset_deg;
-  h.mirrored = mirrored;
-  h.score = 0;
+/// A loop's summed score and the elevation it is reached at, by radius.
+struct LoopScores {
+  std::size_t members = 0;
+  std::vector<double> sum;
+  std::vector<int> elevation;
+};
+
+std::map<int, LoopScores> loop_scores(const Table& table, const std::vector<SearchView>& views,
+                                      const OrbitSearchOptions& options, double offset_deg,
+                                      bool mirrored) {
   std::map<int, std::vector<std::size_t>> loops;
   for (std::size_t i = 0; i < views.size(); ++i) loops[views[i].station->loop].push_back(i);
+  std::map<int, LoopScores> scores;
   for (const auto& [loop, members] : loops) {
-    double best_sum = -1e9;
-    for (int e = 0; e < table.elevations; ++e)
-      for (int r = 0; r < table.radii; ++r) {
+    LoopScores& of_loop = scores[loop];
+    of_loop.members = members.size();
+    of_loop.sum.assign(static_cast<std::size_t>(table.radii), -1e9);
+    of_loop.elevation.assign(static_cast<std::size_t>(table.radii), 0);
+    for (int r = 0; r < table.radii; ++r)
+      for (int e = 0; e < table.elevations; ++e) {
         double sum = 0;
         for (const std::size_t i : members) {
-          const double nominal =
-              offset_deg + (mirrored ? -1 : 1) * views[i].station->azimuth_deg;
+          const double nominal = offset_deg + (mirrored ? -1 : 1) * views[i].station->azimuth_deg;
           sum += best_near(table, i, nominal, options.max_station_error_deg, e, r,
                            options.azimuth_step_deg);
         }
-        if (sum > best_sum) {
-          best_sum = sum;
-          h.loop_place[loop] = {e, r};
-        }
+        const auto place = static_cast<std::size_t>(r);
+        if (sum > of_loop.sum[place]) of_loop.sum[place] = sum, of_loop.elevation[place] = e;
       }
-    h.score += best_sum / static_cast<double>(views.size());
   }
-  return h;
+  return scores;
+}
+
+/// One candidate for each distance that the loops may have in common.
+void evaluate(const Table& table, const std::vector<SearchView>& views,
+              const OrbitSearchOptions& options, double offset_deg, bool mirrored,
+              std::vector<Candidate>& candidates) {
+  const auto scores = loop_scores(table, views, options, offset_deg, mirrored);
+  for (int common = 0; common < table.radii; ++common) {
+    Candidate candidate{0, offset_deg, mirrored, common, {}};
+    for (const auto& [loop, of_loop] : scores) {
+      double best = -1e9;
+      for (int r = 0; r < table.radii; ++r) {
+        const double sigmas =
+            (r - common) * std::log(options.radius_ratio) / options.distance_log_sigma;
+        const double value = of_loop.sum[static_cast<std::size_t>(r)] -
+                             static_cast<double>(of_loop.members) * options.distance_cost *
+                                 sigmas * sigmas;
+        if (value <= best) continue;
+        best = value;
+        candidate.loop_place[loop] = {of_loop.elevation[static_cast<std::size_t>(r)], r};
+      }
+      candidate.score += best / static_cast<double>(views.size());
+    }
+    candidates.push_back(std::move(candidate));
+  }
+}
+
+/// Whether a candidate says something that none of the better ones does.
+bool distinct(const Candidate& candidate, const std::vector<Candidate>& better,
+              const OrbitSearchOptions& options) {
+  constexpr double other_start_deg = 40, other_distance = 0.2;
+  int of_same_start = 0;
+  for (const Candidate& b : better) {
+    if (b.mirrored != candidate.mirrored ||
+        std::abs(std::remainder(b.offset_deg - candidate.offset_deg, 360)) >= other_start_deg)
+      continue;
+    const double apart = (b.radius - candidate.radius) * std::log(options.radius_ratio);
+    if (std::abs(apart) < other_distance || ++of_same_start == 2) return false;
+  }
+  return true;
 }
 
 /// A view's best places near its loop's, which may be a step nearer or higher; neighbours of a
@@ -249,27 +295,36 @@ Result<std::vector<OrbitHypothesis>> search_orbit(const LineModel& lines,
   std::vector<Candidate> candidates;
   for (int a = 0; a < table.azimuths; ++a)
     for (const bool mirrored : {false, true})
-      candidates.push_back(
-          evaluate(table, views, options, a * options.azimuth_step_deg, mirrored));
+      evaluate(table, views, options, a * options.azimuth_step_deg, mirrored, candidates);
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Candidate& x, const Candidate& y) { return x.score > y.score; });
+  std::vector<Candidate> kept;
+  for (const Candidate& candidate : candidates) {
+    if (static_cast<int>(kept.size()) >= options.hypotheses) break;
+    if (distinct(candidate, kept, options)) kept.push_back(candidate);
+  }
 
   std::vector<OrbitHypothesis> result;
-  for (const Candidate& candidate : candidates) {
-    const bool distinct =
-        std::all_of(result.begin(), result.end(), [&](const OrbitHypothesis& h) {
-          return h.mirrored != candidate.mirrored ||
-                 std::abs(std::remainder(h.offset_deg - candidate.offset_deg, 360)) >= 40;
-        });
-    if (!distinct) continue;
-    OrbitHypothesis hypothesis{{}, {}, candidate.offset_deg, candidate.mirrored, candidate.score};
+  for (const Candidate& candidate : kept) {
+    OrbitHypothesis hypothesis;
+    hypothesis.offset_deg = candidate.offset_deg;
+    hypothesis.mirrored = candidate.mirrored;
+    hypothesis.score = candidate.score;
+    hypothesis.radius = radii[static_cast<std::size_t>(candidate.radius)];
     for (std::size_t i = 0; i < views.size(); ++i) {
+      const Station& station = *views[i].station;
       hypothesis.starts.push_back(
-          start_poses(table, i, *views[i].station, options, radii, cell, candidate));
+          start_poses(table, i, station, options, radii, cell, candidate));
       hypothesis.poses.push_back(hypothesis.starts.back().front());
+      const auto [e, r] = candidate.loop_place.at(station.loop);
+      OrbitPose nominal;
+      nominal.azimuth_deg =
+          candidate.offset_deg + (candidate.mirrored ? -1 : 1) * station.azimuth_deg;
+      nominal.elevation_deg = options.elevations_deg[static_cast<std::size_t>(e)];
+      nominal.radius = radii[static_cast<std::size_t>(r)];
+      hypothesis.nominal.push_back(nominal);
     }
     result.push_back(std::move(hypothesis));
-    if (static_cast<int>(result.size()) >= options.hypotheses) break;
   }
   return result;
 }

@@ -39,6 +39,10 @@ struct OrbitSearchOptions {
   double max_station_error_deg = 16;
   int hypotheses = 2;            ///< returned at most
   int starts = 5;                ///< of a view, at most
+  /// Loops of one operator are walked at one distance, give or take: mean correlation that a view
+  /// costs whose loop leaves the common distance by `distance_log_sigma`. Alone, a low loop whose
+  /// strongest edge (the horizon) has no line in the visible scene settled at half its distance.
+  double distance_cost = 0.005, distance_log_sigma = 0.15;
 };
 
 /// One start angle and direction that the views may have been taken with.
@@ -46,13 +50,18 @@ struct OrbitHypothesis {
   std::vector<OrbitPose> poses;  ///< one a view
   /// Places of each view worth refining, best first: one peak of a coarse table is often wrong.
   std::vector<std::vector<OrbitPose>> starts;
+  /// Where each view's loop has it, at its nominal azimuth.
+  std::vector<OrbitPose> nominal;
   double offset_deg = 0;         ///< world azimuth of station azimuth 0
+  double radius = 0;             ///< common to the loops
   bool mirrored = false;         ///< stations run clockwise
-  double score = 0;              ///< mean correlation, [-1, 1]
+  double score = 0;              ///< mean correlation less what the distances cost, [-1, 1]
 };
 
-/// The best hypotheses, best first, whose starts differ by 40 deg or in direction. A near-symmetric
-/// object gives two of nearly equal score: which is right shows only after refinement.
+/// The best hypotheses, best first, whose starts differ by 40 deg, in direction or by a fifth in
+/// distance; at most two of one start and direction. A near-symmetric object gives two of nearly
+/// equal score, and so does a near orbit that lays another edge on the horizon: which is right shows
+/// only against renders.
 Result<std::vector<OrbitHypothesis>> search_orbit(const LineModel& lines,
                                                   const std::vector<SearchView>& views,
                                                   const OrbitSearchOptions& options,
