@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "app/stages/new_views.hpp"
+#include "recon/assembly/new_views.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -10,7 +10,7 @@
 
 #include "core/numeric/median.hpp"
 
-namespace orbitfuse::stages {
+namespace orbitfuse {
 namespace {
 
 constexpr double deg = std::numbers::pi / 180;
@@ -151,4 +151,4 @@ Result<NewViews> new_views(const std::vector<PosedView>& posed, const NewViewOpt
   return result;
 }
 
-}  // namespace orbitfuse::stages
+}  // namespace orbitfuse
