@@ -106,29 +106,30 @@ Canvas drawn(const Keyframe& key, const Camera& camera, const Rigid3d& cam_from_
   return canvas;
 }
 
-/// What no keyframe saw lies behind the nearer of its neighbours: it takes the farther one's depth.
+/// What no keyframe saw lies behind what hides it: a hole takes the farthest of the four surfaces
+/// that it meets along its row and its column.
 void fill_holes(Canvas& canvas) {
-  for (int y = 0; y < canvas.depth.rows; ++y) {
-    float* depth = canvas.depth[y];
-    float* value = canvas.brightness[y];
-    for (int x = 0; x < canvas.depth.cols;) {
-      if (std::isfinite(depth[x])) {
-        ++x;
-        continue;
+  const cv::Mat1f seen = canvas.depth.clone(), shade = canvas.brightness.clone();
+  // Runs over the canvas in one direction, carrying the last surface met.
+  const auto sweep = [&](int lines, int length, const auto& at) {
+    for (int line = 0; line < lines; ++line) {
+      float depth = 0, value = 0;
+      for (int i = 0; i < length; ++i) {
+        const cv::Point p = at(line, i);
+        float& filled = canvas.depth(p);
+        if (std::isfinite(seen(p))) {
+          depth = seen(p), value = shade(p);
+        } else if (depth > 0 && (!std::isfinite(filled) || depth > filled)) {
+          filled = depth, canvas.brightness(p) = value;
+        }
       }
-      int end = x;
-      while (end < canvas.depth.cols && !std::isfinite(depth[end])) ++end;
-      const bool left = x > 0, right = end < canvas.depth.cols;
-      int from = -1;
-      if (left && right)
-        from = depth[x - 1] > depth[end] ? x - 1 : end;
-      else if (left || right)
-        from = left ? x - 1 : end;
-      for (int i = x; i < end; ++i)
-        if (from >= 0) depth[i] = depth[from], value[i] = value[from];
-      x = end;
     }
-  }
+  };
+  const int w = seen.cols, h = seen.rows;
+  sweep(h, w, [](int y, int x) { return cv::Point(x, y); });
+  sweep(h, w, [w](int y, int x) { return cv::Point(w - 1 - x, y); });
+  sweep(w, h, [](int x, int y) { return cv::Point(x, y); });
+  sweep(w, h, [h](int x, int y) { return cv::Point(x, h - 1 - y); });
 }
 
 class KeyframeScene {

@@ -211,7 +211,7 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
         break;
       case MoveDecision::temperatures_alone:
         check.by_temperatures_alone.emplace_back(lost[c], warm.view.cam_from_world);
-        view.view = heat.view;
+        view.view = warm.view;
         ++check.moved;
         break;
       case MoveDecision::form_alone:

@@ -176,32 +176,36 @@ TEST(CorrectByTemperatures, AViewKeptByFormAloneCarriesTheObjection) {
     EXPECT_EQ(off_deg(alignment.views[4], at(120)), 0);
     ASSERT_TRUE(refinement.together(alignment, 1e-4, {judging_rounds().front()}));
     for (std::size_t i = 0; i < 12; ++i)
-      EXPECT_EQ(!alignment.views[i].objection.empty(), i == 4 && known_to_form) << i;
-    EXPECT_EQ(alignment.views[4].doubt.empty(), known_to_form);
-    const std::string& told = alignment.views[4].objection;
+      EXPECT_EQ(alignment.views[i].verdict.reason == DoubtReason::temperatures_contradict,
+                i == 4 && known_to_form)
+          << i;
+    EXPECT_EQ(alignment.views[4].verdict.confidence,
+              known_to_form ? Confidence::doubtful : Confidence::dropped);
+    const std::string& told = alignment.views[4].verdict.detail;
     EXPECT_EQ(told.find("1.00 of its usual") != std::string::npos, known_to_form) << told;
   }
 }
 
-TEST(CorrectByTemperatures, ViewsKeptAgainstTemperaturesAreNamedAndCounted) {
+TEST(TakeVerdicts, DoubtfulViewsAreKeptNamedAndCountedAndDroppedOnesAreNot) {
+  PlacedViews placed;
+  for (const Confidence confidence : {Confidence::sure, Confidence::doubtful, Confidence::dropped})
+    placed.views.push_back(
+        {at(0), {confidence, DoubtReason::temperatures_unlike, "at 0.42 only"}, 0.2, 0.5});
+  placed.views[1].view.name = "t004.tiff";
+  placed.views[2].view.name = "t009.tiff";
+  placed.warnings = {"loop 0 as a whole is in doubt"};
   ModalityPoses poses;
-  poses.contested = {{"t004.tiff", "found nowhere"}, {"t009.tiff", "found nowhere"}};
-  std::string why = "12 lines";
-  tell_contradicted(0, poses, why);
-  EXPECT_EQ(poses.gates.at("views_against_temperatures"), 2);
-  EXPECT_NE(why.find("t004.tiff, t009.tiff"), std::string::npos) << why;
-
-  ModalityPoses most;
-  why = "12 lines";
-  tell_contradicted(7, most, why);
-  EXPECT_EQ(most.gates.at("views_against_temperatures"), 7);
-  EXPECT_NE(why.find("7 views"), std::string::npos) << why;
-
-  ModalityPoses none;
-  why = "12 lines";
-  tell_contradicted(0, none, why);
-  EXPECT_EQ(none.gates.at("views_against_temperatures"), 0);
-  EXPECT_EQ(why, "12 lines");
+  poses.frame_count = 3;
+  take_verdicts(placed, poses);
+  EXPECT_EQ(poses.reconstruction.views.size(), 2u);
+  ASSERT_EQ(poses.doubtful.size(), 1u);
+  EXPECT_EQ(poses.doubtful[0].name, "t004.tiff");
+  EXPECT_EQ(poses.doubtful[0].reason, DoubtReason::temperatures_unlike);
+  ASSERT_EQ(poses.dropped.size(), 1u);
+  EXPECT_EQ(poses.dropped[0].name, "t009.tiff");
+  EXPECT_EQ(poses.gates.at("views_sure"), 1);
+  EXPECT_EQ(poses.gates.at("views_doubtful"), 1);
+  EXPECT_EQ(poses.warnings, placed.warnings);
 }
 
 TEST(CorrectByTemperatures, WhereMostAreContradictedNoneGoes) {
@@ -217,6 +221,10 @@ TEST(CorrectByTemperatures, WhereMostAreContradictedNoneGoes) {
   ASSERT_TRUE(check) << check.error().message();
   EXPECT_EQ(check->moved, 0);
   EXPECT_GT(check->undecided, 6);
+  int doubted = 0;
+  for (const RenderAlignedView& view : alignment.views)
+    doubted += view.verdict.reason == DoubtReason::undecided ? 1 : 0;
+  EXPECT_EQ(doubted, check->undecided) << "kept, but not in silence";
   for (std::size_t i = 0; i < 12; ++i)
     EXPECT_EQ(off_deg(alignment.views[i], before.views[i].view), 0) << i;
 }
@@ -235,13 +243,13 @@ TEST(AddViews, OnlyFramesThatBothScenesPlaceAlikeAreConfirmed) {
   // One taken far from where its order has it.
   add_tracking(orbit, alignment, 110, thermal_of(at(60, 40)));
   ASSERT_TRUE(add_views(testing_orbit::box_renderer(), orbit, 12, alignment, {}));
-  EXPECT_EQ(alignment.views[12].doubt, "");
-  EXPECT_EQ(alignment.views[13].doubt, "");
-  EXPECT_NE(alignment.views[14].doubt, "");
+  EXPECT_TRUE(alignment.views[12].verdict.sure());
+  EXPECT_TRUE(alignment.views[13].verdict.sure());
+  EXPECT_EQ(alignment.views[14].verdict.confidence, Confidence::dropped);
   // Found or doubted, but not kept where it was not taken.
   const double away = rotation_angle_deg(alignment.views[15].view.cam_from_world.rotation,
                                          at(60, 40).cam_from_world.rotation);
-  EXPECT_TRUE(away < 1 || !alignment.views[15].doubt.empty()) << away;
+  EXPECT_TRUE(away < 1 || !alignment.views[15].verdict.sure()) << away;
   EXPECT_LT(rotation_angle_deg(alignment.views[12].view.cam_from_world.rotation,
                                at(22, 13).cam_from_world.rotation),
             0.5);
