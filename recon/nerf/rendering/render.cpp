@@ -8,6 +8,7 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
+#include "core/option_range.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/nerf/rendering/proposal.hpp"
 #include "recon/nerf/rendering/ray_block.hpp"
@@ -47,13 +48,9 @@ void write_ray(const FieldState& field, const RayBlock& block, int r, int& row, 
 }  // namespace
 
 Status RenderOptions::validate() const {
-  if (!(stop_transmittance > 0 && stop_transmittance < 0.5))
-    return fail(ErrorKind::usage, "render.stop_transmittance", fmt::format("{}", stop_transmittance),
-                "choose above 0 and below 0.5");
-  if (!(sample_factor >= 0.1 && sample_factor <= 16))
-    return fail(ErrorKind::usage, "render.sample_factor", fmt::format("{}", sample_factor),
-                "choose 0.1..16");
-  return {};
+  const OptionCheck check("render");
+  ORBITFUSE_TRY(check("stop_transmittance", stop_transmittance, between(0, 0.5)));
+  return check("sample_factor", sample_factor, from_to(0.1, 16));
 }
 
 namespace {
