@@ -109,6 +109,7 @@ struct Row {
   int posed = 0, total = 0, sure = 0, wrong_but_sure = 0, needlessly_doubted = 0, dropped = 0;
   scenes::PoseError error;
   double cpu_s = 0, focal_percent = 0;
+  double rendering_s = 0, rays = 0;  ///< CPU, millions
 };
 
 void judge(const ThermalPoses& poses, const Reconstruction& visible, const scenes::Scene& scene,
@@ -136,7 +137,8 @@ void judge(const ThermalPoses& poses, const Reconstruction& visible, const scene
 
 Row measured(const SceneFolders& folders, const scenes::Perturbation& by, const Arguments& arguments,
              const nerf::Field& field, const Reconstruction& visible) {
-  Row row{folders.name, by.name, {}, 0, 0, 0, 0, 0, 0, {}, 0, 0};
+  Row row;
+  row.scene = folders.name, row.perturbation = by.name;
   auto scene = scenes::run_scene(folders.session, folders.truth);
   const fs::path images =
       fs::temp_directory_path() / fmt::format("orbitfuse_suite_{}_{}", folders.name, by.name);
@@ -150,7 +152,14 @@ Row measured(const SceneFolders& folders, const scenes::Perturbation& by, const 
   Progress progress;
   if (arguments.views)
     progress.report = [](const ProgressEvent& e) { fmt::print("  {}\n", e.detail); };
-  const VisibleScene seen{visible, edge_renderer(field, progress)};
+  const SceneRenderer renderer = edge_renderer(field, progress);
+  const VisibleScene seen{visible, [&](const Camera& camera, const Rigid3d& pose) {
+                            const double start = cpu_seconds();
+                            auto render = renderer(camera, pose);
+                            row.rendering_s += cpu_seconds() - start;
+                            row.rays += 1e-6 * camera.width * camera.height;
+                            return render;
+                          }};
   PoseOptions options;
   options.use_known_poses = false;
   const double before = cpu_seconds();
@@ -181,11 +190,11 @@ void print(const Row& row) {
   }
   fmt::print(
       "| {} | {} | {}/{} | {:.2f} / {:.2f} / {:.2f} | {:.2f} / {:.2f} | {:+.2f} | {} | {} | {:.0f} "
-      "|\n",
+      "({:.0f}, {:.1f} M) |\n",
       row.scene, row.perturbation, row.posed, row.total, row.error.ate_percent,
       row.error.median_percent, row.error.worst_percent, row.error.mean_rotation_deg,
       row.error.worst_rotation_deg, row.focal_percent, row.wrong_but_sure,
-      row.needlessly_doubted + row.dropped, row.cpu_s);
+      row.needlessly_doubted + row.dropped, row.cpu_s, row.rendering_s, row.rays);
 }
 
 json json_of(const Row& row) {
@@ -204,7 +213,9 @@ json json_of(const Row& row) {
           {"rotation_mean_deg", row.error.mean_rotation_deg},
           {"rotation_worst_deg", row.error.worst_rotation_deg},
           {"focal_percent", row.focal_percent},
-          {"cpu_s", row.cpu_s}};
+          {"cpu_s", row.cpu_s},
+          {"rendering_cpu_s", row.rendering_s},
+          {"rays_millions", row.rays}};
 }
 
 Status run_scene(const SceneFolders& folders, const Arguments& arguments, json& rows) {
@@ -234,7 +245,7 @@ int main(int argc, char** argv) {
   fmt::print("{}; {} threads\n\n", cpu_description(), thread_count());
   fmt::print(
       "| scene | perturbation | posed | centres RMS / median / worst, % | rotation mean / worst, deg "
-      "| focal, % | sure but wrong | right, yet doubted, or dropped | CPU s |\n"
+      "| focal, % | sure but wrong | right, yet doubted, or dropped | CPU s (renders, rays) |\n"
       "|---|---|---|---|---|---|---|---|---|\n");
   json rows = json::array();
   bool all_measured = true;

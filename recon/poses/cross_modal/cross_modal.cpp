@@ -26,6 +26,8 @@ namespace {
 constexpr int max_tracking_frames = 96;
 /// Below this share of sure views the answer as a whole is not one.
 constexpr double min_sure_ratio = 0.5;
+/// Views of a walk that place each other; more where nothing but their order is known.
+constexpr std::size_t min_stations = 4, min_unknown_stations = 8;
 /// Visible views that the scene is first rendered at: more would show the same from nearer by.
 constexpr int max_keyframes = 36;
 
@@ -81,17 +83,38 @@ std::vector<const FrameRecord*> tracking_of(const std::vector<const FrameRecord*
   return thinned(tracking, max_tracking_frames);
 }
 
-/// Frames with a station, in which the orbit is searched.
+/// Frames in which the orbit is searched: those with a station, else all of one camera, in the
+/// order of capture.
 Result<std::vector<const FrameRecord*>> stations_of(const std::vector<const FrameRecord*>& frames) {
-  std::vector<const FrameRecord*> stations;
-  for (const FrameRecord* frame : frames)
-    if (frame->station && !frame->tracking) stations.push_back(frame);
-  if (stations.size() < 4)
-    return fail(ErrorKind::quality, "poses.thermal",
-                fmt::format("{} thermal frames carry stations, 4 are needed to place an orbit",
-                            stations.size()),
-                "import again and say how the views were taken, e.g. --station-spacing-deg 30 --loops 2");
-  return stations;
+  std::vector<const FrameRecord*> stations, ordered;
+  for (const FrameRecord* frame : frames) {
+    if (frame->tracking) continue;
+    if (frame->station) stations.push_back(frame);
+    if (ordered.empty() || (frame->device == ordered.front()->device &&
+                            frame->width == ordered.front()->width &&
+                            frame->height == ordered.front()->height))
+      ordered.push_back(frame);
+  }
+  if (stations.size() >= min_stations) return stations;
+  std::stable_sort(
+      ordered.begin(), ordered.end(),
+      [](const FrameRecord* a, const FrameRecord* b) { return a->sequence < b->sequence; });
+  if (ordered.size() >= min_unknown_stations) return ordered;
+  return fail(ErrorKind::quality, "poses.thermal",
+              fmt::format("{} thermal frames carry stations, {} are needed to place an orbit ({} "
+                          "where only their order is known)",
+                          stations.size(), min_stations, min_unknown_stations),
+              "import again and say how the views were taken, e.g. --station-spacing-deg 30 --loops 2");
+}
+
+/// The ways the views may have been taken: as declared, or any even walk in their order.
+std::vector<std::vector<Station>> layouts_of(const std::vector<const FrameRecord*>& stations) {
+  const bool declared = std::all_of(stations.begin(), stations.end(),
+                                    [](const FrameRecord* f) { return f->station.has_value(); });
+  if (!declared) return station_layouts(stations.size());
+  std::vector<Station> layout;
+  for (const FrameRecord* frame : stations) layout.push_back(*frame->station);
+  return {layout};
 }
 
 /// All that placing the stations needs, read once.
@@ -125,8 +148,7 @@ Result<Evidence> gather(const Session& session, const Reconstruction& visible,
   const Camera& lens = evidence.work.lens.camera;
   for (const FrameRecord* frame : stations) {
     ORBITFUSE_ASSIGN(cv::Mat values, read_luminance(session, *frame));
-    evidence.search.push_back(
-        {orientation_field(values, 2.0 * frame->width / 640.0), lens, frame->station});
+    evidence.search.push_back({orientation_field(values, 2.0 * frame->width / 640.0), lens});
     evidence.work.images.push_back(std::move(values));
   }
   const Camera& seen = canonical.views.front().camera;
@@ -140,7 +162,18 @@ Result<std::vector<OrbitHypothesis>> search(const Evidence& evidence, bool rende
   options.nearest = 0.4 * evidence.similar_distance;
   options.farthest = 1.8 * evidence.similar_distance;
   options.hypotheses = renders_decide ? 4 : 2;
-  return search_orbit(evidence.work.lines, evidence.search, options, progress);
+  ORBITFUSE_ASSIGN(const OrbitTable table,
+                   tabulate_orbit(evidence.work.lines, evidence.search, options, progress));
+  std::vector<OrbitHypothesis> found;
+  for (const std::vector<Station>& layout : layouts_of(evidence.work.frames))
+    for (OrbitHypothesis& hypothesis : search_orbit(table, layout, options))
+      found.push_back(std::move(hypothesis));
+  std::stable_sort(found.begin(), found.end(), [](const auto& x, const auto& y) {
+    return x.score > y.score;
+  });
+  constexpr std::size_t most = 6;
+  if (found.size() > most) found.resize(most);
+  return found;
 }
 
 std::string words(const SelectedOrbit& selected) {
@@ -183,10 +216,8 @@ Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene&
                    scene_of(visible, evidence.canonical_from_visible, progress));
   OrbitViews orbit{evidence.work.images, {}, evidence.canonical_from_visible, false};
   std::vector<PosedView> blank;
-  for (const FrameRecord* frame : evidence.work.frames) {
-    orbit.stations.push_back(*frame->station);
+  for (const FrameRecord* frame : evidence.work.frames)
     blank.push_back({frame->file, evidence.work.lens.camera, {}});
-  }
   ORBITFUSE_ASSIGN(SelectedOrbit selected,
                    select_by_renders(renderer, orbit, blank, hypotheses, progress));
   PlacedViews placed;

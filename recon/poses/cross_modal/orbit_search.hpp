@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <opencv2/core.hpp>
-#include <optional>
 #include <vector>
 
 #include "core/progress.hpp"
@@ -23,11 +23,10 @@ struct OrbitPose {
 };
 Rigid3d cam_from_world_of(const OrbitPose& pose, const Camera& camera);
 
-/// One view to place: its field, camera and (if declared) station.
+/// One view to place.
 struct SearchView {
   cv::Mat field;
   Camera camera;
-  std::optional<Station> station;
 };
 
 struct OrbitSearchOptions {
@@ -47,7 +46,8 @@ struct OrbitSearchOptions {
 
 /// One start angle and direction that the views may have been taken with.
 struct OrbitHypothesis {
-  std::vector<OrbitPose> poses;  ///< one a view
+  std::vector<Station> stations;  ///< that were taken for declared, one a view
+  std::vector<OrbitPose> poses;   ///< one a view
   /// Places of each view worth refining, best first: one peak of a coarse table is often wrong.
   std::vector<std::vector<OrbitPose>> starts;
   /// Where each view's loop has it, at its nominal azimuth.
@@ -58,13 +58,36 @@ struct OrbitHypothesis {
   double score = 0;              ///< mean correlation less what the distances cost, [-1, 1]
 };
 
+/// Peak correlation of a view and a candidate, and the image shift it is reached at.
+struct OrbitPeak {
+  float score = -1;
+  std::int16_t dx = 0, dy = 0;  ///< cells
+};
+
+/// Every view's correlation with the lines as seen from every place. It doesn't depend on stations:
+/// made once, it answers for every way the views may have been taken.
+struct OrbitTable {
+  int azimuths = 0, elevations = 0;
+  std::vector<double> radii;
+  double cell_px = 1;
+  std::vector<std::vector<OrbitPeak>> of_view;
+
+  const OrbitPeak& at(std::size_t view, int azimuth, int elevation, int radius) const;
+};
+/// Errors: cancelled.
+Result<OrbitTable> tabulate_orbit(const LineModel& lines, const std::vector<SearchView>& views,
+                                  const OrbitSearchOptions& options, const Progress& progress);
+
 /// The best hypotheses, best first, whose starts differ by 40 deg, in direction or by a fifth in
 /// distance; at most two of one start and direction. A near-symmetric object gives two of nearly
 /// equal score, and so does a near orbit that lays another edge on the horizon: which is right shows
 /// only against renders.
-Result<std::vector<OrbitHypothesis>> search_orbit(const LineModel& lines,
-                                                  const std::vector<SearchView>& views,
-                                                  const OrbitSearchOptions& options,
-                                                  const Progress& progress);
+std::vector<OrbitHypothesis> search_orbit(const OrbitTable& table,
+                                          const std::vector<Station>& stations,
+                                          const OrbitSearchOptions& options);
+
+/// How views of which only the order is known may have been taken: in one, two or three loops of
+/// even steps.
+std::vector<std::vector<Station>> station_layouts(std::size_t views);
 
 }  // namespace orbitfuse

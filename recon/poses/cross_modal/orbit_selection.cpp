@@ -19,6 +19,9 @@ constexpr RenderRound comparing_round{160, 6, 7, 10, 8};
 /// Hypotheses with less of the best one's support are not looked at again.
 constexpr double rival_share = 0.8;
 
+/// Views that tell hypotheses apart; with twice as many every second one is asked.
+constexpr std::size_t least_opened = 8;
+
 /// A start of one view.
 struct Start {
   std::size_t view = 0;
@@ -59,9 +62,9 @@ double mean_support(const RenderAlignment& alignment) {
   return sum / static_cast<double>(std::max<std::size_t>(alignment.views.size(), 1));
 }
 
-std::vector<Start> best_of_search(const OrbitHypothesis& hypothesis) {
+std::vector<Start> best_of_search(const OrbitHypothesis& hypothesis, std::size_t every) {
   std::vector<Start> starts;
-  for (std::size_t i = 0; i < hypothesis.poses.size(); ++i)
+  for (std::size_t i = 0; i < hypothesis.poses.size(); i += every)
     starts.push_back({i, hypothesis.poses[i]});
   return starts;
 }
@@ -81,7 +84,7 @@ std::vector<Start> further_starts(const OrbitHypothesis& hypothesis) {
 
 /// Every view at the best supported of all starts tried.
 Result<RenderAlignment> best_starts(const Selection& selection, const OrbitHypothesis& hypothesis) {
-  std::vector<Start> starts = best_of_search(hypothesis);
+  std::vector<Start> starts = best_of_search(hypothesis, 1);
   for (const Start& start : further_starts(hypothesis)) starts.push_back(start);
   std::vector<RenderRound> rounds = opening_rounds();
   rounds.push_back(comparing_round);
@@ -109,9 +112,10 @@ Result<SelectedOrbit> select_by_renders(const SceneRenderer& renderer, OrbitView
   const Selection selection(refinement, blank);
   SelectedOrbit selected;
   double best_opening = 0;
+  const std::size_t every = blank.size() >= 2 * least_opened ? 2 : 1;
   for (const OrbitHypothesis& hypothesis : hypotheses) {
     ORBITFUSE_ASSIGN(const RenderAlignment opened,
-                     selection.aligned(best_of_search(hypothesis), opening_rounds()));
+                     selection.aligned(best_of_search(hypothesis, every), opening_rounds()));
     const double support = mean_support(opened);
     selected.supports.push_back(
         {hypothesis.offset_deg, hypothesis.radius, hypothesis.mirrored, support});
@@ -131,7 +135,9 @@ Result<SelectedOrbit> select_by_renders(const SceneRenderer& renderer, OrbitView
     selected.hypothesis = h;
     selected.alignment = std::move(one);
   }
-  if (!hypotheses.empty()) orbit.clockwise = hypotheses[selected.hypothesis].mirrored;
+  if (hypotheses.empty()) return selected;
+  orbit.clockwise = hypotheses[selected.hypothesis].mirrored;
+  orbit.stations = hypotheses[selected.hypothesis].stations;
   return selected;
 }
 

@@ -26,7 +26,8 @@ struct SelectedOrbit {
 
 /// The best supported hypothesis, with the best supported of several starts of each view: its own
 /// best places in the search's table, and its loop's nominal place a little before, at and after
-/// its station. `blank` names the views and carries their camera. Sets orbit.clockwise.
+/// its station. `blank` names the views and carries their camera. Sets orbit.clockwise and
+/// orbit.stations.
 /// Errors: the renderer's, cancelled.
 Result<SelectedOrbit> select_by_renders(const SceneRenderer& renderer, OrbitViews& orbit,
                                         const std::vector<PosedView>& blank,

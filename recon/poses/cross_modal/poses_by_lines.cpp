@@ -56,7 +56,7 @@ ViewVerdict verdict_of(const OrbitWork& work, const AlignedOrbit& best, std::siz
                    fmt::format("its edges pull it {:.0f} % of its distance away from where its "
                                "loop says it is",
                                100 * moved));
-  const OrbitPrior prior = loop_prior(work, best.hypothesis.poses, best.hypothesis, i);
+  const OrbitPrior prior = loop_prior(best.hypothesis.poses, best.hypothesis, i);
   const OrbitAngles angles = orbit_angles(camera_center(lined_up));
   const double away = std::remainder(angles.azimuth_deg - prior.pose.azimuth_deg, 360);
   if (!(std::abs(away) < max_station_deviation_deg))

@@ -17,6 +17,9 @@ constexpr double doubtful_share = 0.85, nudge_deg = 2;
 /// Views with less than this share are searched as wholes.
 constexpr double lost_share = 0.6;
 
+/// From a degree or two off, the first without new renders of the field.
+std::vector<RenderRound> approach_rounds() { return {{200, 10, 8, 12}, {256, 6, 7, 10}}; }
+
 /// Of the first `count` views, at least one.
 double median_support(const Fit& alignment, std::size_t count) {
   std::vector<double> supports;
@@ -103,7 +106,7 @@ Status refine_orbit(const SceneRenderer& renderer, const OrbitViews& orbit,
                     RenderAlignment& alignment, double focal_relative_sigma,
                     const Progress& progress) {
   const OrbitRefinement refinement{renderer, orbit, progress};
-  ORBITFUSE_TRY(refinement.together(alignment, focal_relative_sigma, judging_rounds()));
+  ORBITFUSE_TRY(refinement.together(alignment, focal_relative_sigma, approach_rounds()));
   ORBITFUSE_ASSIGN(const std::vector<std::size_t> lost, unsettled(refinement, alignment));
   progress.report({"poses.thermal", 3, 4, -1,
                    fmt::format("{} views don't come back to their place", lost.size())});

@@ -71,6 +71,9 @@ OrbitHypothesis hypothesis(double lower_radius, double lower_elevation) {
     pose.azimuth_deg = 60.0 * (i % 6) + 2;
     pose.elevation_deg = i < 6 ? lower_elevation : 32;
     pose.radius = i < 6 ? lower_radius : 2.5;
+    Station station;
+    station.loop = i / 6, station.azimuth_deg = 60.0 * (i % 6);
+    h.stations.push_back(station);
     h.poses.push_back(pose);
     h.nominal.push_back(pose);
     h.starts.push_back({pose});
@@ -85,9 +88,6 @@ TEST(SelectByRenders, ANearImpostorThatLinesPreferIsNotTaken) {
     truth.push_back(at(60.0 * (i % 6) + (i % 2 == 0 ? 3 : -3), i < 6 ? 10 : 32, 2.5));
     orbit.images.push_back(
         testing_orbit::box_view(truth.back().camera, truth.back().cam_from_world, true).brightness);
-    Station station;
-    station.loop = i / 6, station.azimuth_deg = 60.0 * (i % 6);
-    orbit.stations.push_back(station);
     blank.push_back({"view" + std::to_string(i), truth.back().camera, {}});
   }
   // The search's order: the impostor first, its lower loop at 0.6 of the distance.
