@@ -40,21 +40,25 @@ StageOutput describe(const ModalityPoses& poses, PoseFrame frame) {
     dropped.push_back({{"view", view.name}, {"why", view.why}});
     output.warnings.push_back(view.name + " has no pose: " + view.why);
   }
-  json contested = json::array();
-  for (const ContestedView& view : poses.contested) {
-    contested.push_back({{"view", view.name}, {"why", view.why}});
+  json doubtful = json::array();
+  for (const DoubtfulView& view : poses.doubtful) {
+    doubtful.push_back({{"view", view.name}, {"reason", name(view.reason)}, {"why", view.why}});
     output.warnings.push_back(view.name + " may be misplaced: " + view.why);
   }
+  output.warnings.insert(output.warnings.end(), poses.warnings.begin(), poses.warnings.end());
   const std::size_t posed = poses.reconstruction.views.size();
   output.skips = poses.skips;
-  output.metrics = {{"brief", fmt::format("{} of {} views posed by {}", posed, poses.frame_count,
-                                          held_rung(poses))},
+  const std::string doubts =
+      poses.doubtful.empty() ? "" : fmt::format(", {} of them doubtful", poses.doubtful.size());
+  output.metrics = {{"brief", fmt::format("{} of {} views posed by {}{}", posed, poses.frame_count,
+                                          held_rung(poses), doubts)},
                     {"posed", posed},
                     {"total", poses.frame_count},
                     {"rung", held_rung(poses)},
                     {"ladder", ladder_json(poses.ladder)},
                     {"dropped", dropped},
-                    {"contested", contested},
+                    {"doubtful", doubtful},
+                    {"sure", posed - poses.doubtful.size()},
                     {"reprojection_rms_px", poses.reprojection_rms_px},
                     {"points", poses.reconstruction.points.size()},
                     {"shared_frame", frame == PoseFrame::visible},
@@ -124,7 +128,7 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   pipeline::Stage stage;
   stage.name = "poses_" + std::string(name(modality));
   if (!visible) {
-    stage.version = 2;
+    stage.version = 3;
     stage.uses = {"poses_visible"};
     // Thermal views are aligned with renders of the visible field; known poses need none.
     if (!in.config->poses.use_known_poses || !all_posed(in.session->session)) stage.uses.push_back("train_visible");

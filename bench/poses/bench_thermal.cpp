@@ -129,8 +129,8 @@ Status run(const Arguments& arguments) {
   for (const LadderStep& step : poses.ladder)
     fmt::print("{} {}: {}\n", step.held ? "held" : "fell", step.rung, step.why);
   for (const DroppedView& view : poses.dropped) fmt::print("dropped {}: {}\n", view.name, view.why);
-  for (const ContestedView& view : poses.contested)
-    fmt::print("contested {}: {}\n", view.name, view.why);
+  for (const DoubtfulView& view : poses.doubtful)
+    fmt::print("doubtful {}: {}\n", view.name, view.why);
   for (const auto& [gate, value] : poses.gates) fmt::print("{} = {:.4g}\n", gate, value);
   fmt::print("{}/{} posed, {:.1f} s, {:.1f} CPU s, {:.1f} of them in {} renders\n",
              poses.reconstruction.views.size(), poses.frame_count, wall, cpu_seconds() - before,

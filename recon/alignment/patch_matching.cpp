@@ -30,17 +30,29 @@ std::vector<EdgePixel> edge_pixels(const cv::Mat& edges, float threshold) {
   return list;
 }
 
+/// The image's field as two planes: rows of each are summed eight at a time.
+struct FieldPlanes {
+  cv::Mat1f re, im;
+  explicit FieldPlanes(const cv::Mat& field) {
+    cv::Mat parts[2];
+    cv::split(field, parts);
+    re = parts[0], im = parts[1];
+  }
+};
+
 /// Correlation of edge pixels with the image over a square of shifts.
-cv::Mat1f correlation(const std::vector<EdgePixel>& pixels, const cv::Mat& field, int cx, int cy, int reach) {
+cv::Mat1f correlation(const std::vector<EdgePixel>& pixels, const FieldPlanes& field, int cx, int cy,
+                      int reach) {
   cv::Mat1f score = cv::Mat1f::zeros(2 * reach + 1, 2 * reach + 1);
   for (const EdgePixel& p : pixels)
     for (int dy = -reach; dy <= reach; ++dy) {
       const int y = p.y + cy + dy;
-      if (y < 0 || y >= field.rows) continue;
-      const int first = std::max(-reach, -(p.x + cx)), last = std::min(reach, field.cols - 1 - (p.x + cx));
-      const auto* row = field.ptr<cv::Vec2f>(y) + p.x + cx;
+      if (y < 0 || y >= field.re.rows) continue;
+      const int first = std::max(-reach, -(p.x + cx));
+      const int last = std::min(reach, field.re.cols - 1 - (p.x + cx));
+      const float *re = field.re[y] + p.x + cx, *im = field.im[y] + p.x + cx;
       float* out = score[dy + reach] + reach;
-      for (int dx = first; dx <= last; ++dx) out[dx] += p.re * row[dx][0] + p.im * row[dx][1];
+      for (int dx = first; dx <= last; ++dx) out[dx] += p.re * re[dx] + p.im * im[dx];
     }
   return score;
 }
@@ -122,14 +134,10 @@ std::vector<PatchMatch> match_patches(const SceneRender& render, const cv::Mat& 
   const std::vector<EdgePixel> all = edge_pixels(edges, 0.25F);
   std::vector<PatchMatch> matches;
   if (all.size() < 20) return matches;
-  const Peak whole = peak_of(correlation(all, field, 0, 0, options.search_px), options.search_px);
+  const FieldPlanes planes(field);
+  const Peak whole = peak_of(correlation(all, planes, 0, 0, options.search_px), options.search_px);
   const int sx = static_cast<int>(std::lround(whole.shift.x())), sy = static_cast<int>(std::lround(whole.shift.y()));
-  cv::Mat energy;
-  {
-    cv::Mat parts[2];
-    cv::split(field, parts);
-    energy = parts[0].mul(parts[0]) + parts[1].mul(parts[1]);
-  }
+  const cv::Mat energy = planes.re.mul(planes.re) + planes.im.mul(planes.im);
   const int r = options.radius_px;
   for (int cy = options.spacing_px / 2; cy < edges.rows; cy += options.spacing_px)
     for (int cx = options.spacing_px / 2; cx < edges.cols; cx += options.spacing_px) {
@@ -137,7 +145,7 @@ std::vector<PatchMatch> match_patches(const SceneRender& render, const cv::Mat& 
       for (const EdgePixel& p : all)
         if (std::abs(p.x - cx) <= r && std::abs(p.y - cy) <= r) patch.push_back(p);
       if (patch.size() < 12) continue;
-      const Peak peak = peak_of(correlation(patch, field, sx, sy, options.patch_search_px), options.patch_search_px);
+      const Peak peak = peak_of(correlation(patch, planes, sx, sy, options.patch_search_px), options.patch_search_px);
       if (!peak.inside || !(peak.value > 0)) continue;
       // Normalised by the image's own strength under the patch's edge pixels.
       double there = 0;

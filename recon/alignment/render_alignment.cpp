@@ -129,7 +129,7 @@ Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer,
                                            const RenderAlignmentOptions& options,
                                            const Progress& progress) {
   RenderAlignment result;
-  for (const PosedView& view : views) result.views.push_back({view, 0, 0, 0, {}, {}});
+  for (const PosedView& view : views) result.views.push_back({view, 0, 0, 0, {}});
   if (views.empty()) return result;
   const double prior_focal = views.front().camera.fx;
   double focal = prior_focal;
@@ -146,7 +146,7 @@ Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer,
       renders.push_back(std::move(render));
     }
     const PatchMatchOptions matching{round.search_px, round.patch_search_px, round.patch_radius_px,
-                                     options.patch_spacing_px};
+                                     round.patch_spacing_px};
     parallel_for(static_cast<int>(views.size()), [&](int index) {
       const auto i = static_cast<std::size_t>(index);
       const cv::Mat edges = rendered_edges(renders[i]);

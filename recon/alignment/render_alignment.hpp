@@ -2,12 +2,12 @@
 #pragma once
 
 #include <opencv2/core.hpp>
-#include <string>
 #include <vector>
 
 #include "core/progress.hpp"
 #include "core/geometry/reconstruction.hpp"
 #include "recon/alignment/scene_renderer.hpp"
+#include "recon/alignment/view_verdict.hpp"
 
 // Thermal views aligned with renders of the visible scene from where they are believed to be: small
 // patches round rendered edges (of brightness and of depth) are found again in the thermal image by
@@ -21,6 +21,7 @@ struct RenderRound {
   int search_px = 20;        ///< reach of the whole view's first shift
   int patch_search_px = 8;   ///< reach of each patch beyond it
   int patch_radius_px = 10;  ///< large patches are rarely mistaken, small ones are exact
+  int patch_spacing_px = 8;
 };
 
 /// From several degrees off to about one, and from there to the end.
@@ -31,7 +32,6 @@ inline std::vector<RenderRound> fine_rounds() { return {{320, 6, 7, 12}, {320, 4
 
 struct RenderAlignmentOptions {
   std::vector<RenderRound> rounds = coarse_rounds();
-  int patch_spacing_px = 8;
   double focal_relative_sigma = 0.03;
 };
 
@@ -41,10 +41,7 @@ struct RenderAlignedView {
       0;            ///< mean agreement of rendered edges with the image's, after the last round
   int matches = 0;  ///< patches within 2 px of the bundle's answer
   double median_px = 0;  ///< their residual, in pixels of the last round
-  std::string
-      doubt;  ///< why a second opinion doesn't confirm it; empty: it does, or none was sought
-  /// What the other views' temperatures say against a view that form alone keeps; else empty.
-  std::string objection;
+  ViewVerdict verdict;
   /// Compares places of one view. Agreement alone favours a place with few edges, the number of
   /// patches alone one with many.
   double support() const { return agreement * matches; }
@@ -53,8 +50,6 @@ struct RenderAlignedView {
 struct RenderAlignment {
   std::vector<RenderAlignedView> views;
   double focal_px = 0, focal_relative_sigma = 0;
-  /// Views contradicted by the others' temperatures, where these are too many to tell who is right.
-  int undecided = 0;
   double mean_agreement() const;
   std::vector<PosedView> poses() const;
 };

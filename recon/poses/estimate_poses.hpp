@@ -13,6 +13,7 @@
 #include "core/result.hpp"
 #include "core/session/session.hpp"
 #include "recon/alignment/scene_renderer.hpp"
+#include "recon/alignment/view_verdict.hpp"
 
 // Camera poses of each modality by a ladder of methods; the first rung whose result passes the
 // gates holds, and the result says which and why.
@@ -60,16 +61,19 @@ struct DroppedView {
   std::string name, why;
 };
 
-/// A view that is kept although a second opinion contradicts it: to be looked at.
-struct ContestedView {
-  std::string name, why;
+/// A view that is kept although something speaks against its pose: to be looked at.
+struct DoubtfulView {
+  std::string name;
+  DoubtReason reason = DoubtReason::none;
+  std::string why;
 };
 
 struct ModalityPoses {
   Reconstruction reconstruction;
   int frame_count = 0;  ///< views that could have been posed
   std::vector<DroppedView> dropped;
-  std::vector<ContestedView> contested;  ///< among the posed ones
+  std::vector<DoubtfulView> doubtful;  ///< among the posed ones
+  std::vector<std::string> warnings;   ///< about more than one view
   std::vector<LadderStep> ladder;
   /// Root mean square over all observations; 0 where the rung has none.
   double reprojection_rms_px = 0;

@@ -6,31 +6,30 @@
 #include <chrono>
 #include <cmath>
 
+#include "core/numeric/median.hpp"
 #include "recon/alignment/edge_field.hpp"
+#include "recon/alignment/keyframe_scene.hpp"
 #include "recon/alignment/luminance.hpp"
 #include "recon/poses/cross_modal/edge_lines.hpp"
 #include "recon/poses/cross_modal/line_alignment.hpp"
-#include "recon/poses/cross_modal/orbit_rescue.hpp"
+#include "recon/poses/cross_modal/orbit_selection.hpp"
+#include "recon/poses/cross_modal/poses_by_lines.hpp"
 #include "recon/poses/cross_modal/tracking_views.hpp"
+#include "recon/poses/cross_modal/view_recovery.hpp"
+#include "recon/poses/cross_modal/view_verdicts.hpp"
 #include "recon/poses/world_frame.hpp"
 
 namespace orbitfuse {
 namespace {
 
-/// Below this the best start angle is not told from the next one (standard errors): refused.
-constexpr double min_decisiveness = 1.0;
-/// Below this the answer is given, with the rival named.
-constexpr double clear_decisiveness = 2.5;
-/// Stations are nominal to several degrees; beyond this a pose contradicts its station.
-constexpr double max_station_deviation_deg = 12;
-/// A view whose edges meet the lines worse than this share of the median view is not supported.
-constexpr double min_share_of_median = 0.55;
-
 /// Frames recorded at video rate say no more than one every few degrees.
 constexpr int max_tracking_frames = 96;
-
-/// Share of its distance that a view may leave the orbit's search by before it contradicts it.
-constexpr double max_move = 0.15;
+/// Below this share of sure views the answer as a whole is not one.
+constexpr double min_sure_ratio = 0.5;
+/// Views of a walk that place each other; more where nothing but their order is known.
+constexpr std::size_t min_stations = 4, min_unknown_stations = 8;
+/// Visible views that the scene is first rendered at: more would show the same from nearer by.
+constexpr int max_keyframes = 36;
 
 /// Lines that enough views confirm: as many witnesses as still leave a few hundred lines.
 std::vector<EdgeLine> confirmed(const std::vector<EdgeLine>& lines) {
@@ -41,51 +40,6 @@ std::vector<EdgeLine> confirmed(const std::vector<EdgeLine>& lines) {
     if (kept.size() >= 250 || views == 3) return kept;
   }
   return lines;
-}
-
-/// Mean of the paired differences in their own standard error.
-double standard_errors_apart(const std::vector<double>& better, const std::vector<double>& worse) {
-  double sum = 0, squares = 0;
-  for (std::size_t i = 0; i < better.size(); ++i) {
-    const double d = better[i] - worse[i];
-    sum += d, squares += d * d;
-  }
-  const auto n = static_cast<double>(better.size());
-  const double variance = std::max(squares / n - (sum / n) * (sum / n), 1e-12);
-  return (sum / n) / std::sqrt(variance / n);
-}
-
-/// The likelier hypotheses refined against renders; the best one's views in the visible frame.
-Result<RenderAlignment> refined_by_renders(const OrbitWork& work,
-                                           const std::vector<AlignedOrbit>& aligned,
-                                           const Similarity3d& canonical_from_visible,
-                                           const SceneRenderer& renderer, OrbitViews& orbit,
-                                           LadderStep& step, const Progress& progress) {
-  progress.report({"poses.thermal", 3, 4, -1, "against renders"});
-  orbit = {work.images, {}, canonical_from_visible, false};
-  for (const FrameRecord* frame : work.frames) orbit.stations.push_back(*frame->station);
-  RenderAlignmentOptions options;
-  options.focal_relative_sigma = std::max(1e-4, work.lens.focal_relative_sigma);
-  RenderAlignment best;
-  for (std::size_t i = 0; i < std::min<std::size_t>(2, aligned.size()); ++i) {
-    Reconstruction model;
-    for (const AlignmentView& v : aligned[i].views) model.views.push_back(v.view);
-    move_world(model, canonical_from_visible.inverse());
-    // The first round and a look at its result tell a wrong start; the right one gets the rest.
-    options.rounds = coarse_rounds();
-    options.rounds.resize(2);
-    ORBITFUSE_ASSIGN(RenderAlignment one,
-                     align_with_renders(renderer, work.images, model.views, options, progress));
-    step.why += fmt::format("; against renders from {:.0f} deg: {:.3f}",
-                            aligned[i].hypothesis.offset_deg, one.mean_agreement());
-    if (!best.views.empty() && one.mean_agreement() <= best.mean_agreement()) continue;
-    best = std::move(one);
-    orbit.clockwise = aligned[i].hypothesis.mirrored;
-  }
-  options.rounds = {coarse_rounds().back()};
-  ORBITFUSE_ASSIGN(best, align_with_renders(renderer, work.images, best.poses(), options, progress));
-  ORBITFUSE_TRY(refine_orbit(renderer, orbit, best, options.focal_relative_sigma, progress));
-  return best;
 }
 
 /// Frames recorded between the stations, posed among them; appended to `rendered`.
@@ -129,47 +83,52 @@ std::vector<const FrameRecord*> tracking_of(const std::vector<const FrameRecord*
   return thinned(tracking, max_tracking_frames);
 }
 
-}  // namespace
-
-void tell_contradicted(int undecided, ModalityPoses& poses, std::string& why) {
-  poses.gates["views_against_temperatures"] =
-      undecided + static_cast<double>(poses.contested.size());
-  if (undecided > 0)
-    why += fmt::format("; {} views don't fit the others' temperatures: look at the rendered pairs",
-                       undecided);
-  if (poses.contested.empty()) return;
-  std::string names;
-  for (const ContestedView& view : poses.contested)
-    names += (names.empty() ? "" : ", ") + view.name;
-  why += fmt::format("; kept by the visible scene alone, against the others' temperatures: {}",
-                     names);
+/// Frames in which the orbit is searched: those with a station, else all of one camera, in the
+/// order of capture.
+Result<std::vector<const FrameRecord*>> stations_of(const std::vector<const FrameRecord*>& frames) {
+  std::vector<const FrameRecord*> stations, ordered;
+  for (const FrameRecord* frame : frames) {
+    if (frame->tracking) continue;
+    if (frame->station) stations.push_back(frame);
+    if (ordered.empty() || (frame->device == ordered.front()->device &&
+                            frame->width == ordered.front()->width &&
+                            frame->height == ordered.front()->height))
+      ordered.push_back(frame);
+  }
+  if (stations.size() >= min_stations) return stations;
+  std::stable_sort(
+      ordered.begin(), ordered.end(),
+      [](const FrameRecord* a, const FrameRecord* b) { return a->sequence < b->sequence; });
+  if (ordered.size() >= min_unknown_stations) return ordered;
+  return fail(ErrorKind::quality, "poses.thermal",
+              fmt::format("{} thermal frames carry stations, {} are needed to place an orbit ({} "
+                          "where only their order is known)",
+                          stations.size(), min_stations, min_unknown_stations),
+              "import again and say how the views were taken, e.g. --station-spacing-deg 30 --loops 2");
 }
 
-Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleScene& visible,
-                                         const std::vector<const FrameRecord*>& frames,
-                                         const PoseOptions& options, const Progress& progress,
-                                         std::vector<LadderStep>& steps) {
-  const auto start = std::chrono::steady_clock::now();
-  const auto tell = [&](double done, const std::string& what) {
-    progress.report({"poses.thermal", done, 4, -1, what});
-  };
-  std::vector<const FrameRecord*> stations;
-  for (const FrameRecord* frame : frames)
-    if (frame->station && !frame->tracking) stations.push_back(frame);
-  if (stations.size() < 4)
-    return fail(ErrorKind::quality, "poses.thermal",
-                fmt::format("{} thermal frames carry stations, 4 are needed to place an orbit",
-                            stations.size()),
-                "import again and say how the views were taken, e.g. --station-spacing-deg 30 --loops 2");
+/// The ways the views may have been taken: as declared, or any even walk in their order.
+std::vector<std::vector<Station>> layouts_of(const std::vector<const FrameRecord*>& stations) {
+  const bool declared = std::all_of(stations.begin(), stations.end(),
+                                    [](const FrameRecord* f) { return f->station.has_value(); });
+  if (!declared) return station_layouts(stations.size());
+  std::vector<Station> layout;
+  for (const FrameRecord* frame : stations) layout.push_back(*frame->station);
+  return {layout};
+}
 
-  const std::vector<const FrameRecord*> tracking =
-      visible.renderer ? tracking_of(frames, *stations.front()) : std::vector<const FrameRecord*>{};
-  const std::size_t wanted = stations.size() + tracking.size();
+/// All that placing the stations needs, read once.
+struct Evidence {
+  OrbitWork work;
+  std::vector<SearchView> search;
+  Similarity3d canonical_from_visible;
+  double similar_distance = 1;  ///< from where the thermal image shows as much as the visible one
+};
 
-  tell(0, "lines of the visible scene");
-  const Similarity3d canonical_from_visible =
-      canonical_from_world(visible.reconstruction.views, {});
-  Reconstruction canonical = visible.reconstruction;
+Result<Evidence> gather(const Session& session, const Reconstruction& visible,
+                        const std::vector<const FrameRecord*>& stations, const Progress& progress) {
+  const Similarity3d canonical_from_visible = canonical_from_world(visible.views, {});
+  Reconstruction canonical = visible;
   move_world(canonical, canonical_from_visible);
   ORBITFUSE_ASSIGN(const std::vector<EdgeLine> all_lines,
                    visible_edge_lines(session, canonical, {}, progress));
@@ -182,152 +141,194 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
   std::vector<Eigen::Vector3d> centers;
   for (const PosedView& view : canonical.views)
     centers.push_back(camera_center(view.cam_from_world));
-
-  OrbitWork work{lens_of(session, *stations.front()), LineModel(lines, centers), stations, {}};
-  std::vector<SearchView> search;
+  Evidence evidence{{lens_of(session, *stations.front()), LineModel(lines, centers), stations, {}},
+                    {},
+                    canonical_from_visible,
+                    1};
+  const Camera& lens = evidence.work.lens.camera;
   for (const FrameRecord* frame : stations) {
     ORBITFUSE_ASSIGN(cv::Mat values, read_luminance(session, *frame));
-    search.push_back(
-        {orientation_field(values, 2.0 * frame->width / 640.0), work.lens.camera, frame->station});
-    work.images.push_back(std::move(values));
+    evidence.search.push_back({orientation_field(values, 2.0 * frame->width / 640.0), lens});
+    evidence.work.images.push_back(std::move(values));
   }
-
-  tell(1, "search of the orbit");
-  OrbitSearchOptions orbit;
-  // At this distance the thermal image shows as much of the scene as the visible one did.
   const Camera& seen = canonical.views.front().camera;
-  const double similar = work.lens.camera.fx / work.lens.camera.width * seen.width / seen.fx;
-  orbit.nearest = 0.4 * similar;
-  orbit.farthest = 1.8 * similar;
-  ORBITFUSE_ASSIGN(const std::vector<OrbitHypothesis> hypotheses,
-                   search_orbit(work.lines, search, orbit, progress));
+  evidence.similar_distance = lens.fx / lens.width * seen.width / seen.fx;
+  return evidence;
+}
 
-  std::vector<AlignedOrbit> aligned;
-  for (const OrbitHypothesis& hypothesis : hypotheses) {
-    tell(2, fmt::format("alignment from {:.0f} deg", hypothesis.offset_deg));
-    ORBITFUSE_ASSIGN(AlignedOrbit one, align_orbit(work, hypothesis, progress));
-    aligned.push_back(std::move(one));
+Result<std::vector<OrbitHypothesis>> search(const Evidence& evidence, bool renders_decide,
+                                            const Progress& progress) {
+  OrbitSearchOptions options;
+  options.nearest = 0.4 * evidence.similar_distance;
+  options.farthest = 1.8 * evidence.similar_distance;
+  options.hypotheses = renders_decide ? 4 : 2;
+  ORBITFUSE_ASSIGN(const OrbitTable table,
+                   tabulate_orbit(evidence.work.lines, evidence.search, options, progress));
+  std::vector<OrbitHypothesis> found;
+  for (const std::vector<Station>& layout : layouts_of(evidence.work.frames))
+    for (OrbitHypothesis& hypothesis : search_orbit(table, layout, options))
+      found.push_back(std::move(hypothesis));
+  std::stable_sort(found.begin(), found.end(), [](const auto& x, const auto& y) {
+    return x.score > y.score;
+  });
+  constexpr std::size_t most = 6;
+  if (found.size() > most) found.resize(most);
+  return found;
+}
+
+std::string words(const SelectedOrbit& selected) {
+  std::string text;
+  for (const HypothesisSupport& one : selected.supports)
+    text += fmt::format("; start at {:.0f} deg{}, distance {:.2f}: support {:.1f}", one.offset_deg,
+                        one.mirrored ? " clockwise" : "", one.radius, one.support);
+  return text;
+}
+
+/// The scene for alignment: most of its views are made of a few renders.
+Result<SceneRenderer> scene_of(const VisibleScene& visible, const Similarity3d& canonical_from_visible,
+                               const Progress& progress) {
+  std::vector<PosedView> views;
+  const auto count = static_cast<int>(visible.reconstruction.views.size());
+  const int kept = std::min(count, max_keyframes);
+  for (int i = 0; i < kept; ++i)
+    views.push_back(visible.reconstruction.views[static_cast<std::size_t>(i * count / kept)]);
+  const Eigen::Vector3d center = canonical_from_visible.inverse() * Eigen::Vector3d::Zero();
+  return keyframe_scene(visible.renderer, views, center, {}, progress);
+}
+
+std::string loops_in_doubt(const std::vector<int>& loops) {
+  std::string text;
+  for (const int loop : loops)
+    text += fmt::format("{}loop {} as a whole is in doubt: look at its rendered pairs",
+                        text.empty() ? "" : "; ", loop);
+  return text;
+}
+
+/// Places the views against renders: the hypothesis and the starts, then each view to the end, then
+/// the frames recorded between the stations, then the verdicts.
+Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene& visible,
+                                     const Evidence& evidence,
+                                     const std::vector<OrbitHypothesis>& hypotheses,
+                                     const std::vector<const FrameRecord*>& tracking,
+                                     const Progress& progress) {
+  progress.report({"poses.thermal", 2, 4, -1, "views of the scene"});
+  ORBITFUSE_ASSIGN(const SceneRenderer renderer,
+                   scene_of(visible, evidence.canonical_from_visible, progress));
+  OrbitViews orbit{evidence.work.images, {}, evidence.canonical_from_visible, false};
+  std::vector<PosedView> blank;
+  for (const FrameRecord* frame : evidence.work.frames)
+    blank.push_back({frame->file, evidence.work.lens.camera, {}});
+  ORBITFUSE_ASSIGN(SelectedOrbit selected,
+                   select_by_renders(renderer, orbit, blank, hypotheses, progress));
+  PlacedViews placed;
+  placed.method = "cross-modal, orbit prior and renders";
+  placed.why = words(selected);
+  RenderAlignment& rendered = selected.alignment;
+  const double focal_sigma = std::max(1e-4, evidence.work.lens.focal_relative_sigma);
+  progress.report({"poses.thermal", 3, 4, -1, "alignment with renders"});
+  ORBITFUSE_TRY(refine_orbit(renderer, orbit, rendered, focal_sigma, progress));
+  if (!tracking.empty())
+    ORBITFUSE_TRY(pose_tracking(session, evidence.work, tracking, renderer, orbit, rendered, progress));
+  ORBITFUSE_ASSIGN(const std::vector<int> doubted,
+                   judge_views({renderer, orbit, progress}, rendered));
+  if (!doubted.empty()) placed.warnings.push_back(loops_in_doubt(doubted));
+  for (const RenderAlignedView& view : rendered.views)
+    placed.views.push_back({view.view, view.verdict, view.agreement, view.median_px});
+  placed.gates["focal_px"] = rendered.focal_px;
+  placed.gates["loops_in_doubt"] = static_cast<double>(doubted.size());
+  return placed;
+}
+
+/// The answer as a whole: enough views, and most of them sure.
+Status believed(const PlacedViews& placed, const ThermalPoses& result, const LadderStep& step,
+                const PoseOptions& options) {
+  const double sure = result.gates.at("views_sure");
+  if (result.posed_ratio() >= options.min_posed_ratio && sure >= min_sure_ratio * step.total)
+    return {};
+  std::string found = fmt::format("{} of {} thermal views are placed, {:.0f} of them for sure",
+                                  step.posed, step.total, sure);
+  for (const std::string& warning : placed.warnings) found += "; " + warning;
+  std::map<std::string, int> reasons;
+  for (const PlacedView& view : placed.views)
+    if (!view.verdict.sure()) ++reasons[std::string(name(view.verdict.reason))];
+  for (const auto& [reason, count] : reasons) found += fmt::format("; {} {}", count, reason);
+  return fail(ErrorKind::quality, "poses.thermal", found,
+              "say how the views were taken (import --station-spacing-deg, --loops, "
+              "--thermal-focal-px), record more stations, or give known poses");
+}
+
+}  // namespace
+
+void take_verdicts(const PlacedViews& placed, ModalityPoses& poses) {
+  std::vector<double> agreements, residuals;
+  for (const PlacedView& one : placed.views) {
+    agreements.push_back(one.agreement);
+    residuals.push_back(one.residual_px);
+    if (one.verdict.confidence == Confidence::dropped) {
+      poses.dropped.push_back({one.view.name, one.verdict.detail});
+      continue;
+    }
+    if (!one.verdict.sure())
+      poses.doubtful.push_back({one.view.name, one.verdict.reason, one.verdict.detail});
+    poses.reconstruction.views.push_back(one.view);
   }
-  std::stable_sort(aligned.begin(), aligned.end(),
-                   [](const AlignedOrbit& x, const AlignedOrbit& y) {
-                     return x.mean_support() > y.mean_support();
-                   });
-  const AlignedOrbit& best = aligned.front();
-  const double decisiveness =
-      aligned.size() > 1 ? standard_errors_apart(best.support, aligned[1].support) : 1e3;
+  poses.warnings.insert(poses.warnings.end(), placed.warnings.begin(), placed.warnings.end());
+  for (const auto& [gate, value] : placed.gates) poses.gates[gate] = value;
+  poses.gates["posed_ratio"] = poses.posed_ratio();
+  poses.gates["edge_agreement"] = agreements.empty() ? 0 : median(agreements);
+  poses.gates["edge_residual_px"] = residuals.empty() ? 0 : median(residuals);
+  poses.gates["views_doubtful"] = static_cast<double>(poses.doubtful.size());
+  poses.gates["views_sure"] =
+      static_cast<double>(poses.reconstruction.views.size() - poses.doubtful.size());
+}
+
+Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleScene& visible,
+                                         const std::vector<const FrameRecord*>& frames,
+                                         const PoseOptions& options, const Progress& progress,
+                                         std::vector<LadderStep>& steps) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto tell = [&](double done, const std::string& what) {
+    progress.report({"poses.thermal", done, 4, -1, what});
+  };
+  ORBITFUSE_ASSIGN(const std::vector<const FrameRecord*> stations, stations_of(frames));
+  const std::vector<const FrameRecord*> tracking =
+      visible.renderer ? tracking_of(frames, *stations.front()) : std::vector<const FrameRecord*>{};
+  const std::size_t wanted = stations.size() + tracking.size();
+  tell(0, "lines of the visible scene");
+  ORBITFUSE_ASSIGN(const Evidence evidence,
+                   gather(session, visible.reconstruction, stations, progress));
+  tell(1, "search of the orbit");
+  const bool renders = static_cast<bool>(visible.renderer);
+  ORBITFUSE_ASSIGN(const std::vector<OrbitHypothesis> hypotheses,
+                   search(evidence, renders, progress));
+  const Result<PlacedViews> placed =
+      renders ? place_by_renders(session, visible, evidence, hypotheses, tracking, progress)
+              : place_by_lines(evidence.work, hypotheses, evidence.canonical_from_visible, progress);
   LadderStep step{"cross-modal, orbit prior", false, "", 0, static_cast<int>(wanted), 0};
-  step.why = fmt::format("{} lines", lines.size());
-  for (const AlignedOrbit& one : aligned)
-    step.why += fmt::format("; start at {:.0f} deg{}: agreement {:.3f}", one.hypothesis.offset_deg,
-                            one.hypothesis.mirrored ? " clockwise" : "", one.mean_support());
-  step.why += fmt::format("; {:.1f} standard errors apart", decisiveness);
-  // Renders of the scene tell the starts apart where its lines cannot.
-  if (!visible.renderer && decisiveness < min_decisiveness) {
+  step.why = fmt::format("{} lines", evidence.work.lines.size());
+  const auto finish = [&] {
     step.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     steps.push_back(step);
-    return fail(ErrorKind::quality, "poses.thermal", step.why + ": undecided",
-                "record more thermal stations, or thermal views whose edges show form");
+  };
+  if (!placed) {
+    step.why += "; " + placed.error().found;
+    finish();
+    return tl::unexpected(placed.error());
   }
-  if (decisiveness < clear_decisiveness)
-    step.why += ": doubtful, check the start angle in the rendered pairs";
-  std::vector<PosedView> views;
-  std::vector<double> support = best.support;
-  std::vector<std::string> doubts(support.size()), objections(support.size());
-  AlignmentReport report = best.report;
-  int undecided = 0;
-  if (visible.renderer) {
-    tell(3, "alignment with renders");
-    OrbitViews views_of_orbit;
-    ORBITFUSE_ASSIGN(RenderAlignment rendered,
-                     refined_by_renders(work, aligned, canonical_from_visible, visible.renderer,
-                                        views_of_orbit, step, progress));
-    if (!tracking.empty())
-      ORBITFUSE_TRY(pose_tracking(session, work, tracking, visible.renderer, views_of_orbit,
-                                  rendered, progress));
-    report.focal_px = rendered.focal_px;
-    undecided = rendered.undecided;
-    support.resize(rendered.views.size());
-    doubts.resize(rendered.views.size());
-    objections.resize(rendered.views.size());
-    report.residual_px.resize(rendered.views.size());
-    for (std::size_t i = 0; i < rendered.views.size(); ++i) {
-      views.push_back(rendered.views[i].view);
-      support[i] = rendered.views[i].agreement;
-      doubts[i] = rendered.views[i].doubt;
-      objections[i] = rendered.views[i].objection;
-      report.residual_px[i] = rendered.views[i].median_px;
-    }
-    step.rung = "cross-modal, orbit prior and renders";
-  } else {
-    Reconstruction model;
-    for (const AlignmentView& v : best.views) model.views.push_back(v.view);
-    move_world(model, canonical_from_visible.inverse());
-    views = std::move(model.views);
-  }
+  step.rung = placed->method;
+  step.why += placed->why;
 
   ThermalPoses result;
   result.shares_visible_frame = true;
   result.frame_count = static_cast<int>(wanted);
   result.reconstruction.modality = Modality::thermal;
-  std::vector<double> sorted = support;
-  std::sort(sorted.begin(), sorted.end());
-  const double typical = sorted[sorted.size() / 2];
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    if (!(support[i] >= min_share_of_median * typical)) {
-      result.dropped.push_back(
-          {views[i].name, fmt::format("its edges agree with the visible scene at {:.3f}, the "
-                                      "median view at {:.3f}",
-                                      support[i], typical)});
-      continue;
-    }
-    if (!doubts[i].empty()) {
-      result.dropped.push_back({views[i].name, doubts[i]});
-      continue;
-    }
-    // Lines alone can pull a view astray; against renders its agreement has been judged already.
-    if (!visible.renderer) {
-      const Rigid3d& lined_up = best.views[i].view.cam_from_world;
-      const Rigid3d expected = cam_from_world_of(best.hypothesis.poses[i], work.lens.camera);
-      const Eigen::Vector3d place = camera_center(expected);
-      const double moved = (camera_center(lined_up) - place).norm() / place.norm();
-      if (!(moved < max_move)) {
-        result.dropped.push_back(
-            {views[i].name, fmt::format("its edges pull it {:.0f} % of its distance away from "
-                                        "where its loop says it is",
-                                        100 * moved)});
-        continue;
-      }
-      const OrbitPrior prior = loop_prior(work, best.hypothesis.poses, best.hypothesis, i);
-      const OrbitAngles angles = orbit_angles(camera_center(lined_up));
-      const double away = std::remainder(angles.azimuth_deg - prior.pose.azimuth_deg, 360);
-      if (!(std::abs(away) < max_station_deviation_deg)) {
-        result.dropped.push_back(
-            {views[i].name, fmt::format("its edges fit best {:.0f} deg away from its station, "
-                                        "judged by its orbit",
-                                        std::abs(away))});
-        continue;
-      }
-    }
-    if (!objections[i].empty()) result.contested.push_back({views[i].name, objections[i]});
-    result.reconstruction.views.push_back(views[i]);
-  }
-  result.gates["posed_ratio"] = result.posed_ratio();
-  result.gates["edge_agreement"] = typical;
-  tell_contradicted(undecided, result, step.why);
-  result.gates["orbit_decisiveness"] = decisiveness;
-  result.gates["focal_px"] = report.focal_px;
-  result.gates["focal_sigma_percent"] = 100 * report.focal_relative_sigma;
-  sorted = report.residual_px;
-  std::sort(sorted.begin(), sorted.end());
-  result.gates["edge_residual_px"] = sorted[sorted.size() / 2];
+  take_verdicts(*placed, result);
   step.posed = static_cast<int>(result.reconstruction.views.size());
-  step.held = result.posed_ratio() >= options.min_posed_ratio;
-  step.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  steps.push_back(step);
-  if (!step.held)
-    return fail(ErrorKind::quality, "poses.thermal",
-                fmt::format("{} of {} thermal views aligned", step.posed, step.total),
-                "see the dropped views");
+  const Status good = believed(*placed, result, step, options);
+  step.held = good.has_value();
+  if (!good) step.why += "; " + good.error().found;
+  finish();
+  if (!good) return tl::unexpected(good.error());
   if (frames.size() > wanted)
     result.skips.push_back(
         {"poses of further tracking frames",

@@ -81,7 +81,7 @@ std::vector<OrbitPose> refined_views(const OrbitWork& work, const OrbitHypothesi
   for (int round = 0; round < 2; ++round) {
     const std::vector<OrbitPose> before = poses_of(found);
     each([&](std::size_t i) {
-      const OrbitPrior prior = loop_prior(work, before, hypothesis, i);
+      const OrbitPrior prior = loop_prior(before, hypothesis, i);
       std::vector<OrbitPose> starts = {before[i]};
       for (const double azimuth : {-5.0, 0.0, 5.0}) {
         starts.push_back(prior.pose);
@@ -118,16 +118,16 @@ LensGuess lens_of(const Session& session, const FrameRecord& frame) {
   return guess;
 }
 
-OrbitPrior loop_prior(const OrbitWork& work, const std::vector<OrbitPose>& poses,
-                      const OrbitHypothesis& hypothesis, std::size_t view) {
+OrbitPrior loop_prior(const std::vector<OrbitPose>& poses, const OrbitHypothesis& hypothesis,
+                      std::size_t view) {
   const double sign = hypothesis.mirrored ? -1 : 1;
   const auto nominal = [&](std::size_t i) {
-    return hypothesis.offset_deg + sign * work.frames[i]->station->azimuth_deg;
+    return hypothesis.offset_deg + sign * hypothesis.stations[i].azimuth_deg;
   };
   std::vector<double> turn, elevation, radius, shift;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     turn.push_back(std::remainder(poses[i].azimuth_deg - nominal(i), 360));
-    if (work.frames[i]->station->loop != work.frames[view]->station->loop) continue;
+    if (hypothesis.stations[i].loop != hypothesis.stations[view].loop) continue;
     elevation.push_back(poses[i].elevation_deg);
     radius.push_back(poses[i].radius);
     shift.push_back(poses[i].shift_y_px);

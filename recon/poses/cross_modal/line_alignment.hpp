@@ -47,7 +47,7 @@ Result<AlignedOrbit> align_orbit(const OrbitWork& work, const OrbitHypothesis& h
 
 /// Where a view should be if it kept to its loop: the operator's height and distance change little
 /// within one, and the azimuths follow the stations up to one offset.
-OrbitPrior loop_prior(const OrbitWork& work, const std::vector<OrbitPose>& poses,
-                      const OrbitHypothesis& hypothesis, std::size_t view);
+OrbitPrior loop_prior(const std::vector<OrbitPose>& poses, const OrbitHypothesis& hypothesis,
+                      std::size_t view);
 
 }  // namespace orbitfuse

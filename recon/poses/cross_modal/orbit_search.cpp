@@ -14,26 +14,6 @@ namespace {
 
 constexpr double radians = 3.14159265358979323846 / 180.0;
 
-/// Peak correlation and its shift for one view and one candidate.
-struct Peak {
-  float score = -1;
-  std::int16_t dx = 0, dy = 0;  ///< cells
-};
-
-/// Scores over (azimuth, elevation, radius) for every view.
-struct Table {
-  int azimuths = 0, elevations = 0, radii = 0;
-  std::vector<std::vector<Peak>> of_view;
-
-  std::size_t index(int a, int e, int r) const {
-    a = (a % azimuths + azimuths) % azimuths;
-    return (static_cast<std::size_t>(a) * static_cast<std::size_t>(elevations) +
-            static_cast<std::size_t>(e)) *
-               static_cast<std::size_t>(radii) +
-           static_cast<std::size_t>(r);
-  }
-};
-
 cv::Mat rendered_cells(const LineModel& lines, const Camera& camera, const Rigid3d& cam_from_world,
                        int columns, int rows) {
   const double cell = static_cast<double>(camera.width) / columns;
@@ -60,12 +40,12 @@ cv::Mat spectrum(const cv::Mat& cells, cv::Size size) {
   return padded;
 }
 
-Peak peak_of(const cv::Mat& view_spectrum, const cv::Mat& model_spectrum, float norms, int max_dx,
+OrbitPeak peak_of(const cv::Mat& view_spectrum, const cv::Mat& model_spectrum, float norms, int max_dx,
              int max_dy) {
   cv::Mat product, correlation;
   cv::mulSpectrums(view_spectrum, model_spectrum, product, 0, true);
   cv::dft(product, correlation, cv::DFT_INVERSE | cv::DFT_SCALE);
-  Peak best;
+  OrbitPeak best;
   for (int dy = -max_dy; dy <= max_dy; ++dy) {
     const auto* row = correlation.ptr<cv::Vec2f>((dy + correlation.rows) % correlation.rows);
     for (int dx = -max_dx; dx <= max_dx; ++dx) {
@@ -79,7 +59,7 @@ Peak peak_of(const cv::Mat& view_spectrum, const cv::Mat& model_spectrum, float 
 
 /// Best score of a view near a nominal azimuth, at one elevation and radius. Leaving the nominal
 /// place costs a little: without it all starts within the tolerance would score alike.
-double best_near(const Table& table, std::size_t view, double azimuth_deg, double tolerance_deg,
+double best_near(const OrbitTable& table, std::size_t view, double azimuth_deg, double tolerance_deg,
                  int e, int r, double step_deg) {
   constexpr double cost_at_tolerance = 0.04;
   const int center = static_cast<int>(std::lround(azimuth_deg / step_deg));
@@ -87,7 +67,7 @@ double best_near(const Table& table, std::size_t view, double azimuth_deg, doubl
   double best = -1;
   for (int a = center - reach; a <= center + reach; ++a) {
     const double away = (a * step_deg - azimuth_deg) / tolerance_deg;
-    best = std::max(best, static_cast<double>(table.of_view[view][table.index(a, e, r)].score) -
+    best = std::max(best, static_cast<double>(table.at(view, a, e, r).score) -
                               cost_at_tolerance * away * away);
   }
   return best;
@@ -97,47 +77,92 @@ struct Candidate {
   double score = -2;
   double offset_deg = 0;
   bool mirrored = false;
+  int radius = 0;                                 ///< index of the distance common to the loops
   std::map<int, std::pair<int, int>> loop_place;  ///< loop -> elevation, radius index
 };
 
-Candidate evaluate(const Table& table, const std::vector<SearchView>& views,
-                    const OrbitSearchOptions& options, double offset_deg, bool mirrored) {
-  Candidate h;
-  h.offset_deg = offset_deg;
-  h.mirrored = mirrored;
-  h.score = 0;
+/// A loop's summed score and the elevation it is reached at, by radius.
+struct LoopScores {
+  std::size_t members = 0;
+  std::vector<double> sum;
+  std::vector<int> elevation;
+};
+
+std::map<int, LoopScores> loop_scores(const OrbitTable& table, const std::vector<Station>& stations,
+                                      const OrbitSearchOptions& options, double offset_deg,
+                                      bool mirrored) {
   std::map<int, std::vector<std::size_t>> loops;
-  for (std::size_t i = 0; i < views.size(); ++i) loops[views[i].station->loop].push_back(i);
+  for (std::size_t i = 0; i < stations.size(); ++i) loops[stations[i].loop].push_back(i);
+  std::map<int, LoopScores> scores;
   for (const auto& [loop, members] : loops) {
-    double best_sum = -1e9;
-    for (int e = 0; e < table.elevations; ++e)
-      for (int r = 0; r < table.radii; ++r) {
+    LoopScores& of_loop = scores[loop];
+    of_loop.members = members.size();
+    of_loop.sum.assign(table.radii.size(), -1e9);
+    of_loop.elevation.assign(table.radii.size(), 0);
+    for (int r = 0; r < static_cast<int>(table.radii.size()); ++r)
+      for (int e = 0; e < table.elevations; ++e) {
         double sum = 0;
         for (const std::size_t i : members) {
-          const double nominal =
-              offset_deg + (mirrored ? -1 : 1) * views[i].station->azimuth_deg;
+          const double nominal = offset_deg + (mirrored ? -1 : 1) * stations[i].azimuth_deg;
           sum += best_near(table, i, nominal, options.max_station_error_deg, e, r,
                            options.azimuth_step_deg);
         }
-        if (sum > best_sum) {
-          best_sum = sum;
-          h.loop_place[loop] = {e, r};
-        }
+        const auto place = static_cast<std::size_t>(r);
+        if (sum > of_loop.sum[place]) of_loop.sum[place] = sum, of_loop.elevation[place] = e;
       }
-    h.score += best_sum / static_cast<double>(views.size());
   }
-  return h;
+  return scores;
+}
+
+/// One candidate for each distance that the loops may have in common.
+void evaluate(const OrbitTable& table, const std::vector<Station>& stations,
+              const OrbitSearchOptions& options, double offset_deg, bool mirrored,
+              std::vector<Candidate>& candidates) {
+  const auto scores = loop_scores(table, stations, options, offset_deg, mirrored);
+  const auto radii = static_cast<int>(table.radii.size());
+  for (int common = 0; common < radii; ++common) {
+    Candidate candidate{0, offset_deg, mirrored, common, {}};
+    for (const auto& [loop, of_loop] : scores) {
+      double best = -1e9;
+      for (int r = 0; r < radii; ++r) {
+        const double sigmas =
+            (r - common) * std::log(options.radius_ratio) / options.distance_log_sigma;
+        const double value = of_loop.sum[static_cast<std::size_t>(r)] -
+                             static_cast<double>(of_loop.members) * options.distance_cost *
+                                 sigmas * sigmas;
+        if (value <= best) continue;
+        best = value;
+        candidate.loop_place[loop] = {of_loop.elevation[static_cast<std::size_t>(r)], r};
+      }
+      candidate.score += best / static_cast<double>(stations.size());
+    }
+    candidates.push_back(std::move(candidate));
+  }
+}
+
+/// Whether a candidate says something that none of the better ones does.
+bool distinct(const Candidate& candidate, const std::vector<Candidate>& better,
+              const OrbitSearchOptions& options) {
+  constexpr double other_start_deg = 40, other_distance = 0.2;
+  int of_same_start = 0;
+  for (const Candidate& b : better) {
+    if (b.mirrored != candidate.mirrored ||
+        std::abs(std::remainder(b.offset_deg - candidate.offset_deg, 360)) >= other_start_deg)
+      continue;
+    const double apart = (b.radius - candidate.radius) * std::log(options.radius_ratio);
+    if (std::abs(apart) < other_distance || ++of_same_start == 2) return false;
+  }
+  return true;
 }
 
 /// A view's best places near its loop's, which may be a step nearer or higher; neighbours of a
 /// better place are left out.
-std::vector<OrbitPose> start_poses(const Table& table, std::size_t view, const Station& station,
-                                   const OrbitSearchOptions& options,
-                                   const std::vector<double>& radii, double cell_px,
+std::vector<OrbitPose> start_poses(const OrbitTable& table, std::size_t view,
+                                   const Station& station, const OrbitSearchOptions& options,
                                    const Candidate& candidate) {
   struct Place {
     int a, e, r;
-    Peak peak;
+    OrbitPeak peak;
   };
   const auto [le, lr] = candidate.loop_place.at(station.loop);
   const double nominal =
@@ -148,8 +173,9 @@ std::vector<OrbitPose> start_poses(const Table& table, std::size_t view, const S
   std::vector<Place> places;
   for (int a = center - reach; a <= center + reach; ++a)
     for (int e = std::max(0, le - 1); e <= std::min(table.elevations - 1, le + 1); ++e)
-      for (int r = std::max(0, lr - 1); r <= std::min(table.radii - 1, lr + 1); ++r)
-        places.push_back({a, e, r, table.of_view[view][table.index(a, e, r)]});
+      for (int r = std::max(0, lr - 1); r <= std::min(static_cast<int>(table.radii.size()) - 1, lr + 1);
+           ++r)
+        places.push_back({a, e, r, table.at(view, a, e, r)});
   const auto value = [&](const Place& p) {
     return p.peak.score - 0.01F * static_cast<float>((p.a - center) * (p.a - center));
   };
@@ -168,9 +194,9 @@ std::vector<OrbitPose> start_poses(const Table& table, std::size_t view, const S
     OrbitPose pose;
     pose.azimuth_deg = place.a * options.azimuth_step_deg;
     pose.elevation_deg = options.elevations_deg[static_cast<std::size_t>(place.e)];
-    pose.radius = radii[static_cast<std::size_t>(place.r)];
-    pose.shift_x_px = place.peak.dx * cell_px;
-    pose.shift_y_px = place.peak.dy * cell_px;
+    pose.radius = table.radii[static_cast<std::size_t>(place.r)];
+    pose.shift_x_px = place.peak.dx * table.cell_px;
+    pose.shift_y_px = place.peak.dy * table.cell_px;
     poses.push_back(pose);
   }
   return poses;
@@ -195,25 +221,29 @@ Rigid3d cam_from_world_of(const OrbitPose& pose, const Camera& camera) {
   return {q.normalized(), -(q.normalized() * (pose.radius * out))};
 }
 
-Result<std::vector<OrbitHypothesis>> search_orbit(const LineModel& lines,
-                                                  const std::vector<SearchView>& views,
-                                                  const OrbitSearchOptions& options,
-                                                  const Progress& progress) {
-  Table table;
+const OrbitPeak& OrbitTable::at(std::size_t view, int azimuth, int elevation, int radius) const {
+  const auto a = static_cast<std::size_t>((azimuth % azimuths + azimuths) % azimuths);
+  return of_view[view][(a * static_cast<std::size_t>(elevations) +
+                        static_cast<std::size_t>(elevation)) *
+                           radii.size() +
+                       static_cast<std::size_t>(radius)];
+}
+
+Result<OrbitTable> tabulate_orbit(const LineModel& lines, const std::vector<SearchView>& views,
+                                  const OrbitSearchOptions& options, const Progress& progress) {
+  OrbitTable table;
   table.azimuths = static_cast<int>(std::lround(360 / options.azimuth_step_deg));
   table.elevations = static_cast<int>(options.elevations_deg.size());
-  std::vector<double> radii;
   for (double r = options.nearest; r <= options.farthest; r *= options.radius_ratio)
-    radii.push_back(r);
-  table.radii = static_cast<int>(radii.size());
-  const std::size_t places = static_cast<std::size_t>(table.azimuths * table.elevations) *
-                             static_cast<std::size_t>(table.radii);
-  table.of_view.assign(views.size(), std::vector<Peak>(places));
+    table.radii.push_back(r);
+  const std::size_t places =
+      static_cast<std::size_t>(table.azimuths * table.elevations) * table.radii.size();
+  table.of_view.assign(views.size(), std::vector<OrbitPeak>(places));
 
   const Camera& camera = views.front().camera;
   const int columns = options.columns;
   const int rows = std::max(1, columns * camera.height / camera.width);
-  const double cell = static_cast<double>(camera.width) / columns;
+  table.cell_px = static_cast<double>(camera.width) / columns;
   const auto max_dx = static_cast<int>(options.max_shift * columns);
   const auto max_dy = static_cast<int>(options.max_shift * columns);
   const cv::Size padded(cv::getOptimalDFTSize(columns + max_dx),
@@ -229,11 +259,13 @@ Result<std::vector<OrbitHypothesis>> search_orbit(const LineModel& lines,
   parallel_for(table.azimuths, [&](int a) {
     if (progress.cancelled()) return;
     for (int e = 0; e < table.elevations; ++e)
-      for (int r = 0; r < table.radii; ++r) {
+      for (std::size_t r = 0; r < table.radii.size(); ++r) {
         OrbitPose pose;
         pose.azimuth_deg = a * options.azimuth_step_deg;
         pose.elevation_deg = options.elevations_deg[static_cast<std::size_t>(e)];
-        pose.radius = radii[static_cast<std::size_t>(r)];
+        pose.radius = table.radii[r];
+        const std::size_t place =
+            static_cast<std::size_t>(a * table.elevations + e) * table.radii.size() + r;
         const cv::Mat cells =
             rendered_cells(lines, camera, cam_from_world_of(pose, camera), columns, rows);
         const double norm = cv::norm(cells);
@@ -241,38 +273,72 @@ Result<std::vector<OrbitHypothesis>> search_orbit(const LineModel& lines,
         const cv::Mat model = spectrum(cells, padded);
         for (std::size_t i = 0; i < views.size(); ++i)
           if (norms[i] > 0)
-            table.of_view[i][table.index(a, e, r)] = peak_of(
-                spectra[i], model, static_cast<float>(norm * norms[i]), max_dx, max_dy);
+            table.of_view[i][place] = peak_of(spectra[i], model,
+                                              static_cast<float>(norm * norms[i]), max_dx, max_dy);
       }
   });
   ORBITFUSE_TRY(progress.check("poses.thermal"));
+  return table;
+}
 
+std::vector<OrbitHypothesis> search_orbit(const OrbitTable& table,
+                                          const std::vector<Station>& stations,
+                                          const OrbitSearchOptions& options) {
   std::vector<Candidate> candidates;
   for (int a = 0; a < table.azimuths; ++a)
     for (const bool mirrored : {false, true})
-      candidates.push_back(
-          evaluate(table, views, options, a * options.azimuth_step_deg, mirrored));
+      evaluate(table, stations, options, a * options.azimuth_step_deg, mirrored, candidates);
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Candidate& x, const Candidate& y) { return x.score > y.score; });
+  std::vector<Candidate> kept;
+  for (const Candidate& candidate : candidates) {
+    if (static_cast<int>(kept.size()) >= options.hypotheses) break;
+    if (distinct(candidate, kept, options)) kept.push_back(candidate);
+  }
 
   std::vector<OrbitHypothesis> result;
-  for (const Candidate& candidate : candidates) {
-    const bool distinct =
-        std::all_of(result.begin(), result.end(), [&](const OrbitHypothesis& h) {
-          return h.mirrored != candidate.mirrored ||
-                 std::abs(std::remainder(h.offset_deg - candidate.offset_deg, 360)) >= 40;
-        });
-    if (!distinct) continue;
-    OrbitHypothesis hypothesis{{}, {}, candidate.offset_deg, candidate.mirrored, candidate.score};
-    for (std::size_t i = 0; i < views.size(); ++i) {
-      hypothesis.starts.push_back(
-          start_poses(table, i, *views[i].station, options, radii, cell, candidate));
+  for (const Candidate& candidate : kept) {
+    OrbitHypothesis hypothesis;
+    hypothesis.offset_deg = candidate.offset_deg;
+    hypothesis.mirrored = candidate.mirrored;
+    hypothesis.score = candidate.score;
+    hypothesis.stations = stations;
+    hypothesis.radius = table.radii[static_cast<std::size_t>(candidate.radius)];
+    for (std::size_t i = 0; i < stations.size(); ++i) {
+      const Station& station = stations[i];
+      hypothesis.starts.push_back(start_poses(table, i, station, options, candidate));
       hypothesis.poses.push_back(hypothesis.starts.back().front());
+      const auto [e, r] = candidate.loop_place.at(station.loop);
+      OrbitPose nominal;
+      nominal.azimuth_deg =
+          candidate.offset_deg + (candidate.mirrored ? -1 : 1) * station.azimuth_deg;
+      nominal.elevation_deg = options.elevations_deg[static_cast<std::size_t>(e)];
+      nominal.radius = table.radii[static_cast<std::size_t>(r)];
+      hypothesis.nominal.push_back(nominal);
     }
     result.push_back(std::move(hypothesis));
-    if (static_cast<int>(result.size()) >= options.hypotheses) break;
   }
   return result;
+}
+
+std::vector<std::vector<Station>> station_layouts(std::size_t views) {
+  // Fewer than six a loop leave steps of more than 60 deg: no order to hold a view to.
+  constexpr std::size_t least_a_loop = 6;
+  std::vector<std::vector<Station>> layouts;
+  for (std::size_t loops = 1; loops <= 3 && (loops == 1 || views >= least_a_loop * loops); ++loops) {
+    std::vector<Station> stations(views);
+    for (std::size_t i = 0; i < views; ++i) {
+      const std::size_t loop = i * loops / views;
+      const std::size_t first = (loop * views + loops - 1) / loops;
+      const std::size_t next = ((loop + 1) * views + loops - 1) / loops;
+      stations[i].loop = static_cast<int>(loop), stations[i].index = static_cast<int>(i - first);
+      stations[i].azimuth_deg =
+          360.0 * static_cast<double>(i - first) / static_cast<double>(next - first);
+      stations[i].azimuth_sigma_deg = stations[i].elevation_sigma_deg = 180;
+    }
+    layouts.push_back(std::move(stations));
+  }
+  return layouts;
 }
 
 }  // namespace orbitfuse

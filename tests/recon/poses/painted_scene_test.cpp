@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "recon/poses/cross_modal/cross_modal.hpp"
-#include "recon/poses/cross_modal/heat_check.hpp"
-#include "recon/poses/cross_modal/orbit_rescue.hpp"
+#include "recon/poses/cross_modal/temperature_consistency.hpp"
+#include "recon/poses/cross_modal/view_recovery.hpp"
 #include "tests/support/box_scene.hpp"
 #include "tests/support/orbit_fixture.hpp"
 
@@ -115,7 +115,7 @@ double off_deg(const RenderAlignedView& view, const PosedView& truth) {
   return rotation_angle_deg(view.view.cam_from_world.rotation, truth.cam_from_world.rotation);
 }
 
-TEST(CorrectByHeat, AViewOnTheWrongRibGoesHomeAndTheOthersStay) {
+TEST(CorrectByTemperatures, AViewOnTheWrongRibGoesHomeAndTheOthersStay) {
   OrbitViews orbit;
   RenderAlignment alignment;
   add_stations(orbit, alignment);
@@ -123,7 +123,7 @@ TEST(CorrectByHeat, AViewOnTheWrongRibGoesHomeAndTheOthersStay) {
   alignment.views[9].view = at(270, 20);
   const SceneRenderer form = testing_orbit::box_renderer();
   const Progress progress;
-  const auto check = correct_by_heat({form, orbit, progress}, alignment);
+  const auto check = correct_by_temperatures({form, orbit, progress}, alignment);
   ASSERT_TRUE(check) << check.error().message();
   EXPECT_GE(check->moved, 2);
   EXPECT_EQ(check->undecided, 0);
@@ -131,35 +131,35 @@ TEST(CorrectByHeat, AViewOnTheWrongRibGoesHomeAndTheOthersStay) {
     EXPECT_LT(off_deg(alignment.views[static_cast<std::size_t>(i)], at(30 * i)), 1.0) << i;
 }
 
-TEST(CorrectByHeat, OnlyTemperaturesThatFindAViewMoveIt) {
+TEST(CorrectByTemperatures, OnlyTemperaturesThatFindAViewMoveIt) {
   // Found there: it goes, with form or without.
-  EXPECT_EQ(verdict({true, 0.8, 0.9, 1.0}), HeatVerdict::both);
-  EXPECT_EQ(verdict({false, 0.8, 0.3, 1.0}), HeatVerdict::heat_alone);
+  EXPECT_EQ(verdict({true, 0.8, 0.9, 1.0}), MoveDecision::both);
+  EXPECT_EQ(verdict({false, 0.8, 0.3, 1.0}), MoveDecision::temperatures_alone);
   // Weakly, but form likes it better there too.
-  EXPECT_EQ(verdict({true, 0.3, 0.9, 0.5}), HeatVerdict::both);
+  EXPECT_EQ(verdict({true, 0.3, 0.9, 0.5}), MoveDecision::both);
   // Neither scene knows it there: agreeing on nothing moves nobody.
-  EXPECT_EQ(verdict({true, 0, 0, 0}), HeatVerdict::doubt);
-  EXPECT_EQ(verdict({true, 0.03, 0.05, 0.04}), HeatVerdict::doubt);
-  EXPECT_EQ(verdict({true, 0.3, 0.59, 0.5}), HeatVerdict::doubt);
-  EXPECT_EQ(verdict({true, 0.3, 0.61, 0.5}), HeatVerdict::both);
+  EXPECT_EQ(verdict({true, 0, 0, 0}), MoveDecision::nobody);
+  EXPECT_EQ(verdict({true, 0.03, 0.05, 0.04}), MoveDecision::nobody);
+  EXPECT_EQ(verdict({true, 0.3, 0.59, 0.5}), MoveDecision::nobody);
+  EXPECT_EQ(verdict({true, 0.3, 0.61, 0.5}), MoveDecision::both);
   // Found nowhere; that both scenes agree on a place where neither knows it says nothing.
-  EXPECT_EQ(verdict({true, 0.03, 0.2, 0.7}), HeatVerdict::form_alone);
-  EXPECT_EQ(verdict({false, 0.03, 0.2, 0.7}), HeatVerdict::form_alone);
+  EXPECT_EQ(verdict({true, 0.03, 0.2, 0.7}), MoveDecision::form_alone);
+  EXPECT_EQ(verdict({false, 0.03, 0.2, 0.7}), MoveDecision::form_alone);
   // Half found elsewhere, or known to neither: nobody's word.
-  EXPECT_EQ(verdict({false, 0.55, 0.2, 0.7}), HeatVerdict::doubt);
-  EXPECT_EQ(verdict({false, 0.1, 0.2, 0.4}), HeatVerdict::doubt);
-  EXPECT_EQ(verdict({}), HeatVerdict::doubt);
+  EXPECT_EQ(verdict({false, 0.55, 0.2, 0.7}), MoveDecision::nobody);
+  EXPECT_EQ(verdict({false, 0.1, 0.2, 0.4}), MoveDecision::nobody);
+  EXPECT_EQ(verdict({}), MoveDecision::nobody);
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(verdict({false, nan, nan, nan}), HeatVerdict::doubt);
+  EXPECT_EQ(verdict({false, nan, nan, nan}), MoveDecision::nobody);
 }
 
-TEST(CorrectByHeat, SharesOfNothingSayNothing) {
+TEST(CorrectByTemperatures, SharesOfNothingSayNothing) {
   EXPECT_DOUBLE_EQ(share_of_usual(30, 40), 0.75);
   EXPECT_EQ(share_of_usual(0, 0), 0);
   EXPECT_EQ(share_of_usual(5, 0), 0);
 }
 
-TEST(CorrectByHeat, AViewKeptByFormAloneCarriesTheObjection) {
+TEST(CorrectByTemperatures, AViewKeptByFormAloneCarriesTheObjection) {
   // Temperatures find it nowhere; what form said of it before decides.
   for (const bool known_to_form : {true, false}) {
     OrbitViews orbit;
@@ -169,42 +169,46 @@ TEST(CorrectByHeat, AViewKeptByFormAloneCarriesTheObjection) {
     if (!known_to_form) alignment.views[4].agreement = 0;
     const SceneRenderer form = testing_orbit::box_renderer();
     const Progress progress;
-    const Refinery refinery{form, orbit, progress};
-    const auto check = correct_by_heat(refinery, alignment);
+    const OrbitRefinement refinement{form, orbit, progress};
+    const auto check = correct_by_temperatures(refinement, alignment);
     ASSERT_TRUE(check) << check.error().message();
     EXPECT_EQ(check->undecided, 0);
     EXPECT_EQ(off_deg(alignment.views[4], at(120)), 0);
-    ASSERT_TRUE(refinery.together(alignment, 1e-4, {judging_rounds().front()}));
+    ASSERT_TRUE(refinement.together(alignment, 1e-4, {judging_rounds().front()}));
     for (std::size_t i = 0; i < 12; ++i)
-      EXPECT_EQ(!alignment.views[i].objection.empty(), i == 4 && known_to_form) << i;
-    EXPECT_EQ(alignment.views[4].doubt.empty(), known_to_form);
-    const std::string& told = alignment.views[4].objection;
+      EXPECT_EQ(alignment.views[i].verdict.reason == DoubtReason::temperatures_contradict,
+                i == 4 && known_to_form)
+          << i;
+    EXPECT_EQ(alignment.views[4].verdict.confidence,
+              known_to_form ? Confidence::doubtful : Confidence::dropped);
+    const std::string& told = alignment.views[4].verdict.detail;
     EXPECT_EQ(told.find("1.00 of its usual") != std::string::npos, known_to_form) << told;
   }
 }
 
-TEST(CorrectByHeat, ViewsKeptAgainstTemperaturesAreNamedAndCounted) {
+TEST(TakeVerdicts, DoubtfulViewsAreKeptNamedAndCountedAndDroppedOnesAreNot) {
+  PlacedViews placed;
+  for (const Confidence confidence : {Confidence::sure, Confidence::doubtful, Confidence::dropped})
+    placed.views.push_back(
+        {at(0), {confidence, DoubtReason::temperatures_unlike, "at 0.42 only"}, 0.2, 0.5});
+  placed.views[1].view.name = "t004.tiff";
+  placed.views[2].view.name = "t009.tiff";
+  placed.warnings = {"loop 0 as a whole is in doubt"};
   ModalityPoses poses;
-  poses.contested = {{"t004.tiff", "found nowhere"}, {"t009.tiff", "found nowhere"}};
-  std::string why = "12 lines";
-  tell_contradicted(0, poses, why);
-  EXPECT_EQ(poses.gates.at("views_against_temperatures"), 2);
-  EXPECT_NE(why.find("t004.tiff, t009.tiff"), std::string::npos) << why;
-
-  ModalityPoses most;
-  why = "12 lines";
-  tell_contradicted(7, most, why);
-  EXPECT_EQ(most.gates.at("views_against_temperatures"), 7);
-  EXPECT_NE(why.find("7 views"), std::string::npos) << why;
-
-  ModalityPoses none;
-  why = "12 lines";
-  tell_contradicted(0, none, why);
-  EXPECT_EQ(none.gates.at("views_against_temperatures"), 0);
-  EXPECT_EQ(why, "12 lines");
+  poses.frame_count = 3;
+  take_verdicts(placed, poses);
+  EXPECT_EQ(poses.reconstruction.views.size(), 2u);
+  ASSERT_EQ(poses.doubtful.size(), 1u);
+  EXPECT_EQ(poses.doubtful[0].name, "t004.tiff");
+  EXPECT_EQ(poses.doubtful[0].reason, DoubtReason::temperatures_unlike);
+  ASSERT_EQ(poses.dropped.size(), 1u);
+  EXPECT_EQ(poses.dropped[0].name, "t009.tiff");
+  EXPECT_EQ(poses.gates.at("views_sure"), 1);
+  EXPECT_EQ(poses.gates.at("views_doubtful"), 1);
+  EXPECT_EQ(poses.warnings, placed.warnings);
 }
 
-TEST(CorrectByHeat, WhereMostAreContradictedNoneGoes) {
+TEST(CorrectByTemperatures, WhereMostAreContradictedNoneGoes) {
   OrbitViews orbit;
   RenderAlignment alignment;
   add_stations(orbit, alignment);
@@ -213,10 +217,14 @@ TEST(CorrectByHeat, WhereMostAreContradictedNoneGoes) {
   const RenderAlignment before = alignment;
   const SceneRenderer form = testing_orbit::box_renderer();
   const Progress progress;
-  const auto check = correct_by_heat({form, orbit, progress}, alignment);
+  const auto check = correct_by_temperatures({form, orbit, progress}, alignment);
   ASSERT_TRUE(check) << check.error().message();
   EXPECT_EQ(check->moved, 0);
   EXPECT_GT(check->undecided, 6);
+  int doubted = 0;
+  for (const RenderAlignedView& view : alignment.views)
+    doubted += view.verdict.reason == DoubtReason::undecided ? 1 : 0;
+  EXPECT_EQ(doubted, check->undecided) << "kept, but not in silence";
   for (std::size_t i = 0; i < 12; ++i)
     EXPECT_EQ(off_deg(alignment.views[i], before.views[i].view), 0) << i;
 }
@@ -235,13 +243,13 @@ TEST(AddViews, OnlyFramesThatBothScenesPlaceAlikeAreConfirmed) {
   // One taken far from where its order has it.
   add_tracking(orbit, alignment, 110, thermal_of(at(60, 40)));
   ASSERT_TRUE(add_views(testing_orbit::box_renderer(), orbit, 12, alignment, {}));
-  EXPECT_EQ(alignment.views[12].doubt, "");
-  EXPECT_EQ(alignment.views[13].doubt, "");
-  EXPECT_NE(alignment.views[14].doubt, "");
+  EXPECT_TRUE(alignment.views[12].verdict.sure());
+  EXPECT_TRUE(alignment.views[13].verdict.sure());
+  EXPECT_EQ(alignment.views[14].verdict.confidence, Confidence::dropped);
   // Found or doubted, but not kept where it was not taken.
   const double away = rotation_angle_deg(alignment.views[15].view.cam_from_world.rotation,
                                          at(60, 40).cam_from_world.rotation);
-  EXPECT_TRUE(away < 1 || !alignment.views[15].doubt.empty()) << away;
+  EXPECT_TRUE(away < 1 || !alignment.views[15].verdict.sure()) << away;
   EXPECT_LT(rotation_angle_deg(alignment.views[12].view.cam_from_world.rotation,
                                at(22, 13).cam_from_world.rotation),
             0.5);

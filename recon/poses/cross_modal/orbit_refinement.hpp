@@ -21,7 +21,10 @@ inline std::vector<RenderRound> judging_rounds() { return {{256, 8, 8, 12}, {256
 /// Where the stations of the orbit lie, as the better half of its aligned views says.
 struct LoopModel {
   double offset_deg = 0;                        ///< azimuth - nominal azimuth
+  std::map<int, double> loop_offset_deg;        ///< of its own: each walk starts a little elsewhere
   std::map<int, double> elevation_deg, radius;  ///< by loop
+
+  double azimuth_deg(const OrbitViews& orbit, std::size_t view) const;
 };
 
 LoopModel loop_model(const OrbitViews& orbit, const Fit& alignment);
@@ -36,7 +39,7 @@ double apart_deg(const OrbitViews& orbit, const Rigid3d& a, const Rigid3d& b);
 bool same_place(const OrbitViews& orbit, const Rigid3d& a, const Rigid3d& b);
 
 /// Restarts of views of one orbit in one scene. Errors: the renderer's, cancelled.
-struct Refinery {
+struct OrbitRefinement {
   const SceneRenderer& renderer;
   const OrbitViews& orbit;
   const Progress& progress;

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "recon/poses/cross_modal/orbit_refinery.hpp"
+#include "recon/poses/cross_modal/orbit_refinement.hpp"
 
 // A second opinion on thermal poses: what other thermal views measured, painted on the visible
 // scene's form (painted_scene.hpp). It shows edges that the visible scene lacks, and finds a view
@@ -14,26 +14,31 @@ namespace orbitfuse {
 
 /// A view that the others' temperatures contradict, from where they place it best. Supports are
 /// shares of its loop's usual one in the same scene.
-struct HeatOpinions {
+struct PlaceEvidence {
   bool agree = false;      ///< form, started there, stays within a degree
-  double heat_there = 0;   ///< among temperatures
+  double temperatures_there = 0;   ///< among temperatures
   double form_there = 0;   ///< in the visible scene
   double form_before = 0;  ///< in the visible scene, where it was
 };
 
-/// Whose word places the view; doubt: nobody's. It only moves to a place that temperatures find or
+/// Whose word places the view. It only moves to a place that temperatures find or
 /// that form knows well enough to vouch for.
-enum class HeatVerdict { both, heat_alone, form_alone, doubt };
-HeatVerdict verdict(const HeatOpinions& seen);
+enum class MoveDecision { both, temperatures_alone, form_alone, nobody };
+MoveDecision verdict(const PlaceEvidence& seen);
 
 /// Of its loop's usual support; 0 where the loop usually has none: shares of nothing say nothing.
 double share_of_usual(double support, double usual);
 
-struct HeatCheck {
+/// The scene that the chosen views paint, for views that are turned far enough not to be one of
+/// them.
+Result<SceneRenderer> painted_by_others(const OrbitRefinement& refinement, const Fit& alignment,
+                                        const std::vector<std::size_t>& chosen);
+
+struct TemperatureCheck {
   int moved = 0;
   int undecided = 0;  ///< contradicted, where that were most of the views
   /// Views that form would pull away from where temperatures are sure they are.
-  std::vector<std::pair<std::size_t, Rigid3d>> by_heat_alone;
+  std::vector<std::pair<std::size_t, Rigid3d>> by_temperatures_alone;
 };
 
 /// Each view judged by the temperatures of the others. Those that they contradict are searched as
@@ -41,10 +46,10 @@ struct HeatCheck {
 /// are sure. One that temperatures find nowhere stays where form knows it well, and keeps an
 /// `objection`; the others keep a `doubt`. Where most are contradicted nobody is left to judge, and
 /// none goes.
-Result<HeatCheck> correct_by_heat(const Refinery& refinery, Fit& alignment);
+Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refinement, Fit& alignment);
 
 /// Every added view, from `first_new` on, confirmed by what the settled ones before it measured;
-/// those that are not are searched as wholes in it, and keep a `doubt` if that fails.
-Status confirm_by_heat(const Refinery& refinery, std::size_t first_new, Fit& alignment);
+/// those that are not are searched as wholes in it, and dropped if that fails.
+Status confirm_by_temperatures(const OrbitRefinement& refinement, std::size_t first_new, Fit& alignment);
 
 }  // namespace orbitfuse

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/cross_modal/orbit_refinery.hpp"
+#include "recon/poses/cross_modal/orbit_refinement.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -15,6 +15,8 @@ namespace {
 
 constexpr double degree = std::numbers::pi / 180;
 constexpr double same_pose_deg = 1;
+/// Views of a loop that say where it starts.
+constexpr std::size_t min_own_offset = 3;
 
 double nominal_deg(const OrbitViews& orbit, std::size_t view) {
   const double azimuth = orbit.stations[view].azimuth_deg;
@@ -52,12 +54,16 @@ LoopModel loop_model(const OrbitViews& orbit, const RenderAlignment& alignment) 
     if (alignment.views[i].matches > 0) loops[orbit.stations[i].loop].push_back(i);
   LoopModel model;
   std::vector<double> sines, cosines;
+  const auto direction_deg = [](const std::vector<double>& s, const std::vector<double>& c) {
+    return std::atan2(median(s), median(c)) / degree;
+  };
   for (auto& [loop, members] : loops) {
     std::sort(members.begin(), members.end(), [&](std::size_t a, std::size_t b) {
       return alignment.views[a].support() > alignment.views[b].support();
     });
     members.resize((members.size() + 1) / 2);
     std::vector<double> elevations, radii;
+    const std::size_t before = sines.size();
     for (const std::size_t i : members) {
       const OrbitAngles at = angles_of(orbit, alignment.views[i].view.cam_from_world);
       elevations.push_back(at.elevation_deg);
@@ -68,9 +74,18 @@ LoopModel loop_model(const OrbitViews& orbit, const RenderAlignment& alignment) 
     }
     model.elevation_deg[loop] = median(elevations);
     model.radius[loop] = median(radii);
+    const auto own = static_cast<std::ptrdiff_t>(before);
+    if (members.size() >= min_own_offset)
+      model.loop_offset_deg[loop] =
+          direction_deg({sines.begin() + own, sines.end()}, {cosines.begin() + own, cosines.end()});
   }
-  if (!sines.empty()) model.offset_deg = std::atan2(median(sines), median(cosines)) / degree;
+  if (!sines.empty()) model.offset_deg = direction_deg(sines, cosines);
   return model;
+}
+
+double LoopModel::azimuth_deg(const OrbitViews& orbit, std::size_t view) const {
+  const auto own = loop_offset_deg.find(orbit.stations[view].loop);
+  return (own == loop_offset_deg.end() ? offset_deg : own->second) + nominal_deg(orbit, view);
 }
 
 PosedView predicted(const OrbitViews& orbit, const Fit& alignment, const LoopModel& model,
@@ -81,7 +96,7 @@ PosedView predicted(const OrbitViews& orbit, const Fit& alignment, const LoopMod
   const Rigid3d& like = alignment.views[lender(orbit, alignment, i)].view.cam_from_world;
   const OrbitAngles from = angles_of(orbit, like);
   view.cam_from_world = moved(like, orbit.canonical_from_world,
-                              {model.offset_deg + nominal_deg(orbit, i) - from.azimuth_deg,
+                              {model.azimuth_deg(orbit, i) - from.azimuth_deg,
                                model.elevation_deg.at(loop) - from.elevation_deg,
                                std::log(model.radius.at(loop) / from.radius)});
   return view;
@@ -98,7 +113,7 @@ bool same_place(const OrbitViews& orbit, const Rigid3d& a, const Rigid3d& b) {
   return apart_deg(orbit, a, b) < same_pose_deg;
 }
 
-Result<Fit> Refinery::restart(const std::vector<std::size_t>& chosen,
+Result<Fit> OrbitRefinement::restart(const std::vector<std::size_t>& chosen,
                               const std::vector<PosedView>& starts,
                               std::vector<RenderRound> rounds) const {
   std::vector<cv::Mat> images;
@@ -109,23 +124,20 @@ Result<Fit> Refinery::restart(const std::vector<std::size_t>& chosen,
   return align_with_renders(renderer, images, starts, options, progress);
 }
 
-Status Refinery::together(Fit& alignment, double focal_relative_sigma,
+Status OrbitRefinement::together(Fit& alignment, double focal_relative_sigma,
                           std::vector<RenderRound> rounds) const {
   RenderAlignmentOptions options;
   options.focal_relative_sigma = focal_relative_sigma;
   options.rounds = std::move(rounds);
   ORBITFUSE_ASSIGN(Fit aligned,
                    align_with_renders(renderer, orbit.images, alignment.poses(), options, progress));
-  for (std::size_t i = 0; i < aligned.views.size(); ++i) {
-    aligned.views[i].doubt = std::move(alignment.views[i].doubt);
-    aligned.views[i].objection = std::move(alignment.views[i].objection);
-  }
-  aligned.undecided = alignment.undecided;
+  for (std::size_t i = 0; i < aligned.views.size(); ++i)
+    aligned.views[i].verdict = std::move(alignment.views[i].verdict);
   alignment = std::move(aligned);
   return {};
 }
 
-Result<std::vector<PosedView>> Refinery::search(const std::vector<std::size_t>& chosen,
+Result<std::vector<PosedView>> OrbitRefinement::search(const std::vector<std::size_t>& chosen,
                                                 const Fit& alignment) const {
   const LoopModel model = loop_model(orbit, alignment);
   std::vector<PosedView> found;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/cross_modal/orbit_rescue.hpp"
+#include "recon/poses/cross_modal/view_recovery.hpp"
 
 #include <fmt/format.h>
 
 #include <numeric>
 
 #include "core/numeric/median.hpp"
-#include "recon/poses/cross_modal/heat_check.hpp"
+#include "recon/poses/cross_modal/temperature_consistency.hpp"
 #include "recon/alignment/whole_view.hpp"
 
 namespace orbitfuse {
@@ -16,6 +16,9 @@ namespace {
 constexpr double doubtful_share = 0.85, nudge_deg = 2;
 /// Views with less than this share are searched as wholes.
 constexpr double lost_share = 0.6;
+
+/// From a degree or two off, the first without new renders of the field.
+std::vector<RenderRound> approach_rounds() { return {{200, 10, 8, 12}, {256, 6, 7, 10}}; }
 
 /// Of the first `count` views, at least one.
 double median_support(const Fit& alignment, std::size_t count) {
@@ -39,25 +42,25 @@ std::vector<std::size_t> keep_better(const std::vector<std::size_t>& owner, cons
 
 /// Views that don't come back to their place from where their loop predicts them, or have little
 /// support there, so that they may have come back to a wrong one.
-Result<std::vector<std::size_t>> unsettled(const Refinery& refinery, Fit& alignment) {
-  const LoopModel model = loop_model(refinery.orbit, alignment);
+Result<std::vector<std::size_t>> unsettled(const OrbitRefinement& refinement, Fit& alignment) {
+  const LoopModel model = loop_model(refinement.orbit, alignment);
   std::vector<std::size_t> all(alignment.views.size()), lost;
   std::iota(all.begin(), all.end(), std::size_t{0});
   std::vector<PosedView> starts, places;
-  for (const std::size_t i : all) starts.push_back(predicted(refinery.orbit, alignment, model, i));
+  for (const std::size_t i : all) starts.push_back(predicted(refinement.orbit, alignment, model, i));
   ORBITFUSE_ASSIGN(const Fit tried,
-                   refinery.restart(all, starts, {{160, 12, 10, 16}, {256, 8, 8, 12}}));
+                   refinement.restart(all, starts, {{160, 12, 10, 16}, {256, 8, 8, 12}}));
   const double typical = median_support(alignment, all.size());
   for (const std::size_t i : all) {
     const RenderAlignedView& view = alignment.views[i];
-    if (same_place(refinery.orbit, view.view.cam_from_world, tried.views[i].view.cam_from_world) &&
+    if (same_place(refinement.orbit, view.view.cam_from_world, tried.views[i].view.cam_from_world) &&
         view.support() > lost_share * typical)
       continue;
     lost.push_back(i);
     places.push_back(tried.views[i].view);
   }
   // Compared after the same last round.
-  ORBITFUSE_ASSIGN(const Fit judged, refinery.restart(lost, places, {judging_rounds().back()}));
+  ORBITFUSE_ASSIGN(const Fit judged, refinement.restart(lost, places, {judging_rounds().back()}));
   keep_better(lost, judged, alignment);
   // A restart that found good support is no longer lost.
   std::erase_if(
@@ -66,17 +69,17 @@ Result<std::vector<std::size_t>> unsettled(const Refinery& refinery, Fit& alignm
 }
 
 /// Lost views searched as wholes from where their loop predicts them; what is better is kept.
-Status search_whole(const Refinery& refinery, const std::vector<std::size_t>& lost,
+Status search_whole(const OrbitRefinement& refinement, const std::vector<std::size_t>& lost,
                     std::vector<RenderRound> rounds, Fit& alignment) {
-  ORBITFUSE_ASSIGN(const std::vector<PosedView> starts, refinery.search(lost, alignment));
-  ORBITFUSE_ASSIGN(const Fit tried, refinery.restart(lost, starts, std::move(rounds)));
+  ORBITFUSE_ASSIGN(const std::vector<PosedView> starts, refinement.search(lost, alignment));
+  ORBITFUSE_ASSIGN(const Fit tried, refinement.restart(lost, starts, std::move(rounds)));
   keep_better(lost, tried, alignment);
   return {};
 }
 
 /// Low views of a scene can settle a little too high or too low: the weaker ones are tried there,
 /// again as long as that helps.
-Status nudge(const Refinery& refinery, std::size_t first, Fit& alignment) {
+Status nudge(const OrbitRefinement& refinement, std::size_t first, Fit& alignment) {
   const double typical = median_support(alignment, alignment.views.size());
   for (const double elevation_deg : {nudge_deg, -nudge_deg}) {
     std::vector<std::size_t> weak;
@@ -87,10 +90,10 @@ Status nudge(const Refinery& refinery, std::size_t first, Fit& alignment) {
       for (const std::size_t i : weak) {
         starts.push_back(alignment.views[i].view);
         starts.back().cam_from_world =
-            moved(starts.back().cam_from_world, refinery.orbit.canonical_from_world,
+            moved(starts.back().cam_from_world, refinement.orbit.canonical_from_world,
                   {0, elevation_deg, 0});
       }
-      ORBITFUSE_ASSIGN(const Fit tried, refinery.restart(weak, starts, fine_rounds()));
+      ORBITFUSE_ASSIGN(const Fit tried, refinement.restart(weak, starts, fine_rounds()));
       weak = keep_better(weak, tried, alignment);
     }
   }
@@ -102,20 +105,19 @@ Status nudge(const Refinery& refinery, std::size_t first, Fit& alignment) {
 Status refine_orbit(const SceneRenderer& renderer, const OrbitViews& orbit,
                     RenderAlignment& alignment, double focal_relative_sigma,
                     const Progress& progress) {
-  const Refinery refinery{renderer, orbit, progress};
-  ORBITFUSE_TRY(refinery.together(alignment, focal_relative_sigma, judging_rounds()));
-  ORBITFUSE_ASSIGN(const std::vector<std::size_t> lost, unsettled(refinery, alignment));
+  const OrbitRefinement refinement{renderer, orbit, progress};
+  ORBITFUSE_TRY(refinement.together(alignment, focal_relative_sigma, approach_rounds()));
+  ORBITFUSE_ASSIGN(const std::vector<std::size_t> lost, unsettled(refinement, alignment));
   progress.report({"poses.thermal", 3, 4, -1,
                    fmt::format("{} views don't come back to their place", lost.size())});
-  ORBITFUSE_TRY(search_whole(refinery, lost, judging_rounds(), alignment));
-  ORBITFUSE_TRY(refinery.together(alignment, focal_relative_sigma, fine_rounds()));
-  ORBITFUSE_TRY(nudge(refinery, 0, alignment));
-  ORBITFUSE_TRY(refinery.together(alignment, focal_relative_sigma, {fine_rounds().back()}));
-  ORBITFUSE_ASSIGN(const HeatCheck check, correct_by_heat(refinery, alignment));
-  alignment.undecided = check.undecided;
+  ORBITFUSE_TRY(search_whole(refinement, lost, judging_rounds(), alignment));
+  ORBITFUSE_TRY(refinement.together(alignment, focal_relative_sigma, fine_rounds()));
+  ORBITFUSE_TRY(nudge(refinement, 0, alignment));
+  ORBITFUSE_TRY(refinement.together(alignment, focal_relative_sigma, {fine_rounds().back()}));
+  ORBITFUSE_ASSIGN(const TemperatureCheck check, correct_by_temperatures(refinement, alignment));
   if (check.moved == 0) return {};
-  ORBITFUSE_TRY(refinery.together(alignment, focal_relative_sigma, {fine_rounds().back()}));
-  for (const auto& [i, cam_from_world] : check.by_heat_alone) {
+  ORBITFUSE_TRY(refinement.together(alignment, focal_relative_sigma, {fine_rounds().back()}));
+  for (const auto& [i, cam_from_world] : check.by_temperatures_alone) {
     Rigid3d& now = alignment.views[i].view.cam_from_world;
     if (!same_place(orbit, now, cam_from_world)) now = cam_from_world;
   }
@@ -128,7 +130,7 @@ double station_offset_deg(const OrbitViews& orbit, const RenderAlignment& alignm
 
 Status add_views(const SceneRenderer& renderer, const OrbitViews& orbit, std::size_t first_new,
                  RenderAlignment& alignment, const Progress& progress) {
-  const Refinery refinery{renderer, orbit, progress};
+  const OrbitRefinement refinement{renderer, orbit, progress};
   const LoopModel model = loop_model(orbit, alignment);
   if (first_new == 0) return {};
   const double typical = median_support(alignment, first_new);
@@ -140,7 +142,7 @@ Status add_views(const SceneRenderer& renderer, const OrbitViews& orbit, std::si
   }
   std::vector<RenderRound> rounds = {{160, 16, 12, 18}, {160, 8, 8, 12}};
   for (const RenderRound& round : fine_rounds()) rounds.push_back(round);
-  ORBITFUSE_ASSIGN(const Fit tried, refinery.restart(added, starts, rounds));
+  ORBITFUSE_ASSIGN(const Fit tried, refinement.restart(added, starts, rounds));
   for (std::size_t c = 0; c < added.size(); ++c) {
     alignment.views[added[c]] = tried.views[c];
     if (tried.views[c].support() < lost_share * typical) lost.push_back(added[c]);
@@ -148,9 +150,9 @@ Status add_views(const SceneRenderer& renderer, const OrbitViews& orbit, std::si
   progress.report(
       {"poses.thermal", 3, 4, -1,
        fmt::format("{} of {} added views searched as a whole", lost.size(), added.size())});
-  ORBITFUSE_TRY(search_whole(refinery, lost, fine_rounds(), alignment));
-  ORBITFUSE_TRY(nudge(refinery, first_new, alignment));
-  return confirm_by_heat(refinery, first_new, alignment);
+  ORBITFUSE_TRY(search_whole(refinement, lost, fine_rounds(), alignment));
+  ORBITFUSE_TRY(nudge(refinement, first_new, alignment));
+  return confirm_by_temperatures(refinement, first_new, alignment);
 }
 
 }  // namespace orbitfuse

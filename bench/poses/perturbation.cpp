@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "bench/poses/perturbation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+#include "core/image/image_io.hpp"
+
+namespace orbitfuse::scenes {
+namespace {
+
+bool changes_images(const Perturbation& by) {
+  return by.noise_k > 0 || by.blur_px > 0 || by.width_px > 0 || by.gray_gain;
+}
+
+/// Each image stretched between its own 1 and 99 per cent, as a camera without radiometry does.
+cv::Mat gray_of(const cv::Mat& kelvin) {
+  std::vector<float> values(kelvin.begin<float>(), kelvin.end<float>());
+  std::sort(values.begin(), values.end());
+  const auto low = static_cast<double>(values[values.size() / 100]);
+  const auto high = static_cast<double>(values[values.size() - 1 - values.size() / 100]);
+  cv::Mat gray;
+  kelvin.convertTo(gray, CV_8U, 255 / std::max(high - low, 1e-3),
+                   -255 * low / std::max(high - low, 1e-3));
+  return gray;
+}
+
+Status rewrite(Scene& scene, FrameRecord& frame, const Perturbation& by, cv::RNG& random,
+               const std::filesystem::path& folder) {
+  ORBITFUSE_ASSIGN(cv::Mat kelvin, read_thermal_k(scene.session.path_of(frame)));
+  if (by.blur_px > 0) cv::GaussianBlur(kelvin, kelvin, {}, by.blur_px);
+  PosedView& truth = scene.truth.views.at(frame.file);
+  if (by.width_px > 0 && by.width_px < frame.width) {
+    truth.camera =
+        truth.camera.scaled_to(by.width_px, frame.height * by.width_px / frame.width);
+    cv::resize(kelvin, kelvin, {truth.camera.width, truth.camera.height}, 0, 0, cv::INTER_AREA);
+  }
+  if (by.noise_k > 0) {
+    cv::Mat noise(kelvin.size(), CV_32F);
+    random.fill(noise, cv::RNG::NORMAL, 0, by.noise_k);
+    kelvin += noise;
+  }
+  const PosedView moved = truth;
+  scene.truth.views.erase(frame.file);
+  frame.file = (folder / fmt::format("{}_{:03}.{}", by.name, frame.sequence,
+                                     by.gray_gain ? "png" : "tiff"))
+                   .string();
+  frame.width = kelvin.cols, frame.height = kelvin.rows;
+  frame.thermal_is_gray = by.gray_gain;
+  scene.truth.views[frame.file] = moved;
+  return by.gray_gain ? write_png(frame.file, gray_of(kelvin))
+                      : write_float_tiff(frame.file, kelvin);
+}
+
+}  // namespace
+
+const std::vector<Perturbation>& perturbations() {
+  static const std::vector<Perturbation> all = [] {
+    std::vector<Perturbation> list(11);
+    list[1].name = "focal+3", list[1].focal_error = 0.03;
+    list[2].name = "focal-3", list[2].focal_error = -0.03;
+    list[3].name = "stations5", list[3].station_error_deg = 5;
+    list[4].name = "missing2", list[4].missing_stations = 2;
+    list[5].name = "start77", list[5].start_deg = 77;
+    list[6].name = "backwards", list[6].backwards = true;
+    list[7].name = "noise100mK", list[7].noise_k = 0.1;
+    list[8].name = "320px", list[8].width_px = 320;
+    list[9].name = "blur2", list[9].blur_px = 2;
+    list[10].name = "gray8", list[10].gray_gain = true;
+    return list;
+  }();
+  return all;
+}
+
+Status perturb(Scene& scene, const Perturbation& by, const std::filesystem::path& folder) {
+  for (DeviceInfo& device : scene.session.devices) {
+    if (device.modality != Modality::thermal || !device.lens.focal_px) continue;
+    *device.lens.focal_px *= 1 + by.focal_error;
+    const FrameRecord* frame = scene.session.frames_of(Modality::thermal).front();
+    if (by.width_px > 0 && by.width_px < frame->width)
+      *device.lens.focal_px *= static_cast<double>(by.width_px) / frame->width;
+  }
+  cv::RNG random(11);
+  int station = 0;
+  for (FrameRecord& frame : scene.session.frames) {
+    if (frame.modality != Modality::thermal) continue;
+    if (frame.station) {
+      double& azimuth = frame.station->azimuth_deg;
+      azimuth += by.start_deg + (++station % 2 == 0 ? 1 : -1) * by.station_error_deg;
+      if (by.backwards) azimuth = -azimuth;
+    }
+    if (changes_images(by)) ORBITFUSE_TRY(rewrite(scene, frame, by, random, folder));
+  }
+  int seen = 0, left_out = 0;
+  std::erase_if(scene.session.frames, [&](const FrameRecord& frame) {
+    if (frame.modality != Modality::thermal || !frame.station) return false;
+    const bool chosen = ++seen % 7 == 5 && left_out < by.missing_stations;
+    left_out += chosen ? 1 : 0;
+    return chosen;
+  });
+  return {};
+}
+
+}  // namespace orbitfuse::scenes

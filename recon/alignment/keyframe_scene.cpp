@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/alignment/keyframe_scene.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numbers>
+
+#include "core/system/parallel.hpp"
+
+namespace orbitfuse {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180;
+constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
+/// Where a keyframe shows nothing it is drawn this many orbit radii away, so that what lies before
+/// it keeps its outline.
+constexpr double sky_radii = 30;
+
+struct Keyframe {
+  Camera camera;
+  Rigid3d cam_from_world;
+  cv::Mat brightness, depth;  ///< depth: everywhere finite
+};
+
+/// A vertex of a keyframe's surface in the camera that it is drawn for.
+struct Vertex {
+  float x = 0, y = 0, z = -1, value = 0;
+};
+
+struct Canvas {
+  cv::Mat1f depth, brightness;
+  explicit Canvas(const Camera& camera)
+      : depth(camera.height, camera.width, std::numeric_limits<float>::infinity()),
+        brightness(camera.height, camera.width, nothing) {}
+};
+
+float cross(const Vertex& a, const Vertex& b, float x, float y) {
+  return (b.x - a.x) * (y - a.y) - (b.y - a.y) * (x - a.x);
+}
+
+/// Front faces only: a surface says nothing about what it looks like from behind.
+void draw_triangle(const Vertex& a, const Vertex& b, const Vertex& c, Canvas& canvas) {
+  const float area = cross(a, b, c.x, c.y);
+  if (!(area > 1e-9F)) return;
+  const int x0 = std::max(0, static_cast<int>(std::ceil(std::min({a.x, b.x, c.x}) - 0.5F)));
+  const int x1 = std::min(canvas.depth.cols - 1,
+                          static_cast<int>(std::floor(std::max({a.x, b.x, c.x}) - 0.5F)));
+  const int y0 = std::max(0, static_cast<int>(std::ceil(std::min({a.y, b.y, c.y}) - 0.5F)));
+  const int y1 = std::min(canvas.depth.rows - 1,
+                          static_cast<int>(std::floor(std::max({a.y, b.y, c.y}) - 0.5F)));
+  for (int y = y0; y <= y1; ++y)
+    for (int x = x0; x <= x1; ++x) {
+      const float px = static_cast<float>(x) + 0.5F, py = static_cast<float>(y) + 0.5F;
+      const float wa = cross(b, c, px, py), wb = cross(c, a, px, py), wc = cross(a, b, px, py);
+      if (wa < 0 || wb < 0 || wc < 0) continue;
+      const float z = (wa * a.z + wb * b.z + wc * c.z) / area;
+      float& nearest = canvas.depth(y, x);
+      if (!(z < nearest)) continue;
+      nearest = z;
+      canvas.brightness(y, x) = (wa * a.value + wb * b.value + wc * c.value) / area;
+    }
+}
+
+std::vector<Vertex> vertices_of(const Keyframe& key, const Camera& camera,
+                                const Rigid3d& cam_from_world) {
+  const Rigid3d cam_from_key = cam_from_world * key.cam_from_world.inverse();
+  const Eigen::Matrix3f rotation = cam_from_key.rotation.toRotationMatrix().cast<float>();
+  const Eigen::Vector3f translation = cam_from_key.translation.cast<float>();
+  const auto fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
+  const auto cx = static_cast<float>(camera.cx), cy = static_cast<float>(camera.cy);
+  std::vector<Vertex> vertices(key.depth.total());
+  std::size_t i = 0;
+  for (int y = 0; y < key.depth.rows; ++y)
+    for (int x = 0; x < key.depth.cols; ++x, ++i) {
+      const Eigen::Vector3f ray = key.camera.ray_of({x + 0.5, y + 0.5}).cast<float>();
+      const Eigen::Vector3f p = rotation * (ray * key.depth.at<float>(y, x)) + translation;
+      if (!(p.z() > 1e-6F)) continue;
+      vertices[i] = {fx * p.x() / p.z() + cx, fy * p.y() / p.z() + cy, p.z(),
+                     key.brightness.at<float>(y, x)};
+    }
+  return vertices;
+}
+
+Canvas drawn(const Keyframe& key, const Camera& camera, const Rigid3d& cam_from_world,
+             double max_depth_step) {
+  Canvas canvas(camera);
+  const std::vector<Vertex> vertices = vertices_of(key, camera, cam_from_world);
+  const int columns = key.depth.cols;
+  const auto step = static_cast<float>(1 + max_depth_step);
+  for (int y = 0; y + 1 < key.depth.rows; ++y)
+    for (int x = 0; x + 1 < columns; ++x) {
+      const float* upper = key.depth.ptr<float>(y) + x;
+      const float* lower = key.depth.ptr<float>(y + 1) + x;
+      const auto [near, far] = std::minmax({upper[0], upper[1], lower[0], lower[1]});
+      if (far > near * step) continue;
+      const Vertex* v = &vertices[static_cast<std::size_t>(y * columns + x)];
+      const Vertex &a = v[0], &b = v[1], &c = v[columns], &d = v[columns + 1];
+      if (a.z <= 0 || b.z <= 0 || c.z <= 0 || d.z <= 0) continue;
+      draw_triangle(a, b, d, canvas);
+      draw_triangle(a, d, c, canvas);
+    }
+  return canvas;
+}
+
+/// What no keyframe saw lies behind what hides it: a hole takes the farthest of the four surfaces
+/// that it meets along its row and its column.
+void fill_holes(Canvas& canvas) {
+  const cv::Mat1f seen = canvas.depth.clone(), shade = canvas.brightness.clone();
+  // Runs over the canvas in one direction, carrying the last surface met.
+  const auto sweep = [&](int lines, int length, const auto& at) {
+    for (int line = 0; line < lines; ++line) {
+      float depth = 0, value = 0;
+      for (int i = 0; i < length; ++i) {
+        const cv::Point p = at(line, i);
+        float& filled = canvas.depth(p);
+        if (std::isfinite(seen(p))) {
+          depth = seen(p), value = shade(p);
+        } else if (depth > 0 && (!std::isfinite(filled) || depth > filled)) {
+          filled = depth, canvas.brightness(p) = value;
+        }
+      }
+    }
+  };
+  const int w = seen.cols, h = seen.rows;
+  sweep(h, w, [](int y, int x) { return cv::Point(x, y); });
+  sweep(h, w, [w](int y, int x) { return cv::Point(w - 1 - x, y); });
+  sweep(w, h, [](int x, int y) { return cv::Point(x, y); });
+  sweep(w, h, [h](int x, int y) { return cv::Point(x, h - 1 - y); });
+}
+
+class KeyframeScene {
+ public:
+  KeyframeScene(const SceneRenderer& renderer, Eigen::Vector3d center, KeyframeOptions options)
+      : renderer_(renderer), center_(std::move(center)), options_(options) {}
+
+  /// Renders the scene for a keyframe; `width` is that of the view without its margin.
+  Status add(const Camera& camera, const Rigid3d& cam_from_world, int width, double margin_deg) {
+    Camera wide = camera.scaled_to(width, std::max(1, camera.height * width / camera.width))
+                      .without_distortion();
+    const int margin = static_cast<int>(std::ceil(margin_deg * degree * wide.fx));
+    wide.width += 2 * margin, wide.height += 2 * margin;
+    wide.cx += margin, wide.cy += margin;
+    ORBITFUSE_ASSIGN(SceneRender seen, renderer_(wide, cam_from_world));
+    const auto sky = static_cast<float>(sky_radii * distance(cam_from_world));
+    for (float& z : cv::Mat1f(seen.depth))
+      if (!(z > 0 && z < sky)) z = sky;
+    keyframes_.push_back({wide, cam_from_world, seen.brightness, seen.depth});
+    return {};
+  }
+
+  Result<SceneRender> view(const Camera& camera, const Rigid3d& cam_from_world) {
+    if (camera.width > options_.fine_width_px || camera.has_distortion())
+      return renderer_(camera, cam_from_world);
+    std::vector<const Keyframe*> used;
+    if (camera.width <= options_.coarse_width_px && !keyframes_.empty()) {
+      used = nearest(cam_from_world);
+    } else {
+      if (settled(camera, cam_from_world) == nullptr)
+        ORBITFUSE_TRY(add(camera, cam_from_world, options_.fine_width_px, options_.max_turn_deg));
+      used = {settled(camera, cam_from_world)};
+    }
+    return composed(used, camera, cam_from_world);
+  }
+
+ private:
+  double distance(const Rigid3d& cam) const { return (camera_center(cam) - center_).norm(); }
+
+  double apart_deg(const Rigid3d& a, const Rigid3d& b) const {
+    const Eigen::Vector3d to_a = camera_center(a) - center_, to_b = camera_center(b) - center_;
+    return std::atan2(to_a.cross(to_b).norm(), to_a.dot(to_b)) / degree;
+  }
+
+  std::vector<const Keyframe*> nearest(const Rigid3d& cam_from_world) const {
+    std::vector<const Keyframe*> all;
+    for (const Keyframe& key : keyframes_) all.push_back(&key);
+    const auto away = [&](const Keyframe* key) {
+      return apart_deg(key->cam_from_world, cam_from_world);
+    };
+    const auto count =
+        std::min<std::size_t>(all.size(), static_cast<std::size_t>(options_.coarse_keyframes));
+    std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count), all.end(),
+                      [&](const Keyframe* a, const Keyframe* b) { return away(a) < away(b); });
+    all.resize(count);
+    return all;
+  }
+
+  /// The nearest keyframe that shows all that the camera sees, from where it stands but for little.
+  const Keyframe* settled(const Camera& camera, const Rigid3d& cam) const {
+    const Keyframe* best = nullptr;
+    double least = options_.max_turn_deg * (1 + 1e-9);
+    for (const Keyframe& key : keyframes_) {
+      const double finer = key.camera.fx / camera.fx;
+      const double wide = (key.camera.width / key.camera.fx) / (camera.width / camera.fx);
+      if (finer < 0.97 || wide < 1) continue;
+      const double turned = std::max(
+          apart_deg(key.cam_from_world, cam),
+          rotation_angle_deg(key.cam_from_world.rotation, cam.rotation));
+      const double nearer = std::abs(std::log(distance(cam) / distance(key.cam_from_world)));
+      if (turned > least || nearer > options_.max_distance_change) continue;
+      best = &key, least = turned;
+    }
+    return best;
+  }
+
+  Result<SceneRender> composed(const std::vector<const Keyframe*>& used, const Camera& camera,
+                               const Rigid3d& cam_from_world) const {
+    std::vector<Canvas> layers(used.size(), Canvas(Camera{}));
+    parallel_for(static_cast<int>(used.size()), [&](int i) {
+      const auto k = static_cast<std::size_t>(i);
+      layers[k] = drawn(*used[k], camera, cam_from_world, options_.max_depth_step);
+    });
+    Canvas& all = layers.front();
+    // The nearest keyframe has the word; another one only where it sees something clearly before.
+    const auto before = static_cast<float>(1 - options_.max_depth_step);
+    for (std::size_t k = 1; k < layers.size(); ++k)
+      for (std::size_t p = 0; p < all.depth.total(); ++p) {
+        float& z = all.depth.ptr<float>()[p];
+        const float other = layers[k].depth.ptr<float>()[p];
+        if (!(other < before * z)) continue;
+        z = other;
+        all.brightness.ptr<float>()[p] = layers[k].brightness.ptr<float>()[p];
+      }
+    fill_holes(all);
+    const auto sky = static_cast<float>(0.3 * sky_radii * distance(cam_from_world));
+    for (float& z : all.depth)
+      if (!(z < sky)) z = nothing;
+    return SceneRender{all.brightness, all.depth};
+  }
+
+  const SceneRenderer& renderer_;
+  Eigen::Vector3d center_;
+  KeyframeOptions options_;
+  std::vector<Keyframe> keyframes_;
+};
+
+}  // namespace
+
+Result<SceneRenderer> keyframe_scene(const SceneRenderer& renderer,
+                                     const std::vector<PosedView>& views,
+                                     const Eigen::Vector3d& center, const KeyframeOptions& options,
+                                     const Progress& progress) {
+  const auto scene = std::make_shared<KeyframeScene>(renderer, center, options);
+  for (const PosedView& view : views) {
+    ORBITFUSE_TRY(progress.check("poses.thermal"));
+    ORBITFUSE_TRY(scene->add(view.camera, view.cam_from_world, options.first_width_px, 0));
+  }
+  return [scene](const Camera& camera, const Rigid3d& cam_from_world) {
+    return scene->view(camera, cam_from_world);
+  };
+}
+
+}  // namespace orbitfuse

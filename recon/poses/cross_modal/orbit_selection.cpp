@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/cross_modal/orbit_selection.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+
+namespace orbitfuse {
+namespace {
+
+/// A start and its first correction; what is in place after it is the support.
+std::vector<RenderRound> opening_rounds() {
+  return {{160, 30, 14, 22, 12}, {160, 12, 10, 16, 12}};
+}
+/// Places of one view are compared after one more.
+constexpr RenderRound comparing_round{160, 6, 7, 10, 8};
+
+/// Hypotheses with less of the best one's support are not looked at again.
+constexpr double rival_share = 0.8;
+
+/// Views that tell hypotheses apart; with twice as many every second one is asked.
+constexpr std::size_t least_opened = 8;
+
+/// A start of one view.
+struct Start {
+  std::size_t view = 0;
+  OrbitPose pose;
+};
+
+class Selection {
+ public:
+  Selection(const OrbitRefinement& refinement, const std::vector<PosedView>& blank)
+      : refinement_(refinement), blank_(blank) {}
+
+  /// Each of the starts taken through the rounds.
+  Result<RenderAlignment> aligned(const std::vector<Start>& starts,
+                                  std::vector<RenderRound> rounds) const {
+    std::vector<std::size_t> chosen;
+    std::vector<PosedView> views;
+    const Similarity3d world_from_canonical =
+        refinement_.orbit.canonical_from_world.inverse();
+    for (const Start& start : starts) {
+      chosen.push_back(start.view);
+      views.push_back(blank_[start.view]);
+      views.back().cam_from_world =
+          rebase(cam_from_world_of(start.pose, views.back().camera), world_from_canonical);
+    }
+    return refinement_.restart(chosen, views, std::move(rounds));
+  }
+
+  std::size_t views() const { return blank_.size(); }
+
+ private:
+  const OrbitRefinement& refinement_;
+  const std::vector<PosedView>& blank_;
+};
+
+double mean_support(const RenderAlignment& alignment) {
+  double sum = 0;
+  for (const RenderAlignedView& view : alignment.views) sum += view.support();
+  return sum / static_cast<double>(std::max<std::size_t>(alignment.views.size(), 1));
+}
+
+std::vector<Start> best_of_search(const OrbitHypothesis& hypothesis, std::size_t every) {
+  std::vector<Start> starts;
+  for (std::size_t i = 0; i < hypothesis.poses.size(); i += every)
+    starts.push_back({i, hypothesis.poses[i]});
+  return starts;
+}
+
+/// Beyond the search's best place: its second, and where the loop has the view.
+std::vector<Start> further_starts(const OrbitHypothesis& hypothesis) {
+  std::vector<Start> starts;
+  for (std::size_t i = 0; i < hypothesis.poses.size(); ++i) {
+    if (hypothesis.starts[i].size() > 1) starts.push_back({i, hypothesis.starts[i][1]});
+    for (const double azimuth_deg : {-7.0, 0.0, 7.0}) {
+      starts.push_back({i, hypothesis.nominal[i]});
+      starts.back().pose.azimuth_deg += azimuth_deg;
+    }
+  }
+  return starts;
+}
+
+/// Every view at the best supported of all starts tried.
+Result<RenderAlignment> best_starts(const Selection& selection, const OrbitHypothesis& hypothesis) {
+  std::vector<Start> starts = best_of_search(hypothesis, 1);
+  for (const Start& start : further_starts(hypothesis)) starts.push_back(start);
+  std::vector<RenderRound> rounds = opening_rounds();
+  rounds.push_back(comparing_round);
+  ORBITFUSE_ASSIGN(RenderAlignment tried, selection.aligned(starts, rounds));
+  RenderAlignment best;
+  best.views.resize(selection.views());
+  std::vector<bool> seen(selection.views(), false);
+  for (std::size_t s = 0; s < starts.size(); ++s) {
+    RenderAlignedView& view = best.views[starts[s].view];
+    if (seen[starts[s].view] && tried.views[s].support() <= view.support()) continue;
+    view = tried.views[s];
+    seen[starts[s].view] = true;
+  }
+  best.focal_px = tried.focal_px;
+  return best;
+}
+
+}  // namespace
+
+Result<SelectedOrbit> select_by_renders(const SceneRenderer& renderer, OrbitViews& orbit,
+                                        const std::vector<PosedView>& blank,
+                                        const std::vector<OrbitHypothesis>& hypotheses,
+                                        const Progress& progress) {
+  const OrbitRefinement refinement{renderer, orbit, progress};
+  const Selection selection(refinement, blank);
+  SelectedOrbit selected;
+  double best_opening = 0;
+  const std::size_t every = blank.size() >= 2 * least_opened ? 2 : 1;
+  for (const OrbitHypothesis& hypothesis : hypotheses) {
+    ORBITFUSE_ASSIGN(const RenderAlignment opened,
+                     selection.aligned(best_of_search(hypothesis, every), opening_rounds()));
+    const double support = mean_support(opened);
+    selected.supports.push_back(
+        {hypothesis.offset_deg, hypothesis.radius, hypothesis.mirrored, support});
+    best_opening = std::max(best_opening, support);
+    progress.report({"poses.thermal", 2, 4, -1,
+                     fmt::format("start at {:.0f} deg{}, distance {:.2f}: support {:.1f}",
+                                 hypothesis.offset_deg, hypothesis.mirrored ? " clockwise" : "",
+                                 hypothesis.radius, support)});
+  }
+  double best = -1;
+  for (std::size_t h = 0; h < hypotheses.size(); ++h) {
+    if (selected.supports[h].support < rival_share * best_opening) continue;
+    ORBITFUSE_ASSIGN(RenderAlignment one, best_starts(selection, hypotheses[h]));
+    selected.supports[h].support = mean_support(one);
+    if (selected.supports[h].support <= best) continue;
+    best = selected.supports[h].support;
+    selected.hypothesis = h;
+    selected.alignment = std::move(one);
+  }
+  if (hypotheses.empty()) return selected;
+  orbit.clockwise = hypotheses[selected.hypothesis].mirrored;
+  orbit.stations = hypotheses[selected.hypothesis].stations;
+  return selected;
+}
+
+}  // namespace orbitfuse

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "recon/poses/cross_modal/orbit_refinement.hpp"
+#include "recon/poses/cross_modal/orbit_search.hpp"
+
+// The lines of the visible scene propose; renders of it decide. Lines score a near camera that lays
+// a roof's edge on the horizon as well as the right one, and pull a right start away; what a render
+// shows in place (support) is four times less there.
+namespace orbitfuse {
+
+/// One hypothesis as renders see it.
+struct HypothesisSupport {
+  double offset_deg = 0, radius = 0;
+  bool mirrored = false;
+  double support = 0;  ///< mean over the views
+};
+
+struct SelectedOrbit {
+  RenderAlignment alignment;                ///< to about a degree
+  std::size_t hypothesis = 0;               ///< index of the chosen one
+  std::vector<HypothesisSupport> supports;  ///< of each, in the search's order
+};
+
+/// The best supported hypothesis, with the best supported of several starts of each view: its own
+/// best places in the search's table, and its loop's nominal place a little before, at and after
+/// its station. `blank` names the views and carries their camera. Sets orbit.clockwise and
+/// orbit.stations.
+/// Errors: the renderer's, cancelled.
+Result<SelectedOrbit> select_by_renders(const SceneRenderer& renderer, OrbitViews& orbit,
+                                        const std::vector<PosedView>& blank,
+                                        const std::vector<OrbitHypothesis>& hypotheses,
+                                        const Progress& progress);
+
+}  // namespace orbitfuse

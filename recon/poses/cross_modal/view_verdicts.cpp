@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/cross_modal/view_verdicts.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <numeric>
+#include <opencv2/imgproc.hpp>
+
+#include "core/numeric/median.hpp"
+#include "recon/poses/cross_modal/temperature_consistency.hpp"
+#include "recon/poses/world_frame.hpp"
+
+namespace orbitfuse {
+namespace {
+
+/// Wrong views had up to 0.25 of the median support of all loops, right ones 0.4 or more.
+constexpr double min_support_share = 0.3;
+/// Wrong views of `sedan` correlated with the others' temperatures at .42, right ones at .94.
+constexpr double min_correlation = 0.65;
+/// Stations are good to several degrees (sigma 2 to 3), loops to two in elevation.
+constexpr double max_azimuth_off_deg = 12, max_elevation_off_deg = 8;
+/// A loop keeps its distance to 3 %, loops of one operator to 5 %.
+constexpr double max_log_distance_off = 0.22;
+/// The operator looks at the object: 10 px of 640 in the median where right, 133 where wrong.
+constexpr double max_aim_off = 0.16;
+/// Compared at this width.
+constexpr int judged_width_px = 160;
+/// Fewer painted pixels say nothing.
+constexpr double min_painted_share = 0.08;
+
+/// Normalised correlation over the pixels that are painted; -1 where they are too few.
+double painted_correlation(const cv::Mat& painting, const cv::Mat& image) {
+  double n = 0, sx = 0, sy = 0, sxx = 0, syy = 0, sxy = 0;
+  for (int y = 0; y < painting.rows; ++y)
+    for (int x = 0; x < painting.cols; ++x) {
+      const auto a = static_cast<double>(painting.at<float>(y, x));
+      const auto b = static_cast<double>(image.at<float>(y, x));
+      if (!std::isfinite(a) || !std::isfinite(b)) continue;
+      n += 1, sx += a, sy += b;
+    }
+  if (n < min_painted_share * static_cast<double>(painting.total())) return -1;
+  const double mx = sx / n, my = sy / n;
+  for (int y = 0; y < painting.rows; ++y)
+    for (int x = 0; x < painting.cols; ++x) {
+      const double a = static_cast<double>(painting.at<float>(y, x)) - mx;
+      const double b = static_cast<double>(image.at<float>(y, x)) - my;
+      if (!std::isfinite(a) || !std::isfinite(b)) continue;
+      sxx += a * a, syy += b * b, sxy += a * b;
+    }
+  return sxx > 0 && syy > 0 ? sxy / std::sqrt(sxx * syy) : -1;
+}
+
+/// Pixels from which the orbit's centre is seen to the principal point, by the image's width.
+double aim_off(const OrbitViews& orbit, const PosedView& view) {
+  const Eigen::Vector3d center = rebase(view.cam_from_world, orbit.canonical_from_world).translation;
+  if (!(center.z() > 0)) return 1;
+  return view.camera.fx * center.head<2>().norm() / center.z() / view.camera.width;
+}
+
+double median_support(const Fit& alignment) {
+  std::vector<double> supports;
+  for (const RenderAlignedView& view : alignment.views) supports.push_back(view.support());
+  return median(supports);
+}
+
+}  // namespace
+
+Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
+                                              const Fit& alignment) {
+  const OrbitViews& orbit = refinement.orbit;
+  std::vector<std::size_t> all(alignment.views.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  ORBITFUSE_ASSIGN(const SceneRenderer painted, painted_by_others(refinement, alignment, all));
+  const LoopModel model = loop_model(orbit, alignment);
+  std::vector<double> radii;
+  for (const auto& [loop, radius] : model.radius) radii.push_back(radius);
+  const double common = radii.empty() ? 1 : median(radii);
+  const double usual = median_support(alignment);
+  std::vector<ViewEvidence> evidence;
+  for (const std::size_t i : all) {
+    const PosedView& view = alignment.views[i].view;
+    ViewEvidence seen;
+    seen.support_share = share_of_usual(alignment.views[i].support(), usual);
+    const int width = std::min(judged_width_px, view.camera.width);
+    const Camera camera =
+        view.camera.scaled_to(width, std::max(1, view.camera.height * width / view.camera.width))
+            .without_distortion();
+    ORBITFUSE_ASSIGN(const SceneRender painting, painted(camera, view.cam_from_world));
+    cv::Mat image;
+    cv::resize(orbit.images[i], image, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
+    seen.correlation = painted_correlation(painting.brightness, image);
+    const OrbitAngles at =
+        orbit_angles(camera_center(rebase(view.cam_from_world, orbit.canonical_from_world)));
+    const int loop = orbit.stations[i].loop;
+    seen.azimuth_off_deg =
+        std::abs(std::remainder(at.azimuth_deg - model.azimuth_deg(orbit, i), 360));
+    if (model.elevation_deg.contains(loop))
+      seen.elevation_off_deg = std::abs(at.elevation_deg - model.elevation_deg.at(loop));
+    seen.log_distance_off = std::abs(std::log(at.radius / common));
+    seen.aim_off = aim_off(orbit, view);
+    evidence.push_back(seen);
+  }
+  return evidence;
+}
+
+ViewVerdict judged(const ViewEvidence& seen, const ViewVerdict& before) {
+  if (before.confidence == Confidence::dropped) return before;
+  const auto doubtful = [](DoubtReason reason, std::string detail) {
+    return ViewVerdict{Confidence::doubtful, reason, std::move(detail)};
+  };
+  if (!(seen.support_share >= min_support_share))
+    return doubtful(DoubtReason::weak_support,
+                    fmt::format("its edges have {:.2f} of the usual support of all loops",
+                                seen.support_share));
+  if (!(seen.aim_off <= max_aim_off))
+    return doubtful(DoubtReason::off_its_loop,
+                    fmt::format("it looks {:.0f} % of its width past the orbit's centre",
+                                100 * seen.aim_off));
+  if (!(seen.azimuth_off_deg <= max_azimuth_off_deg &&
+        seen.elevation_off_deg <= max_elevation_off_deg))
+    return doubtful(DoubtReason::off_its_loop,
+                    fmt::format("it lies {:.1f} deg of azimuth and {:.1f} deg of elevation off its "
+                                "station's place on its loop",
+                                seen.azimuth_off_deg, seen.elevation_off_deg));
+  if (!(seen.log_distance_off <= max_log_distance_off))
+    return doubtful(DoubtReason::off_its_loop,
+                    fmt::format("its distance is {:.0f} % off that of the loops in common",
+                                100 * seen.log_distance_off));
+  if (seen.correlation >= -0.99 && !(seen.correlation >= min_correlation))
+    return doubtful(DoubtReason::temperatures_unlike,
+                    fmt::format("its image correlates with what the other views measured there at "
+                                "{:.2f} only",
+                                seen.correlation));
+  return before;
+}
+
+std::vector<int> doubt_whole_loops(const OrbitViews& orbit, Fit& alignment) {
+  std::map<int, std::pair<int, int>> loops;  // loop -> views not sure, views
+  for (std::size_t i = 0; i < alignment.views.size(); ++i) {
+    auto& [doubted, count] = loops[orbit.stations[i].loop];
+    doubted += alignment.views[i].verdict.sure() ? 0 : 1;
+    ++count;
+  }
+  std::vector<int> in_doubt;
+  for (const auto& [loop, counts] : loops)
+    if (2 * counts.first > counts.second) in_doubt.push_back(loop);
+  for (std::size_t i = 0; i < alignment.views.size(); ++i) {
+    ViewVerdict& verdict = alignment.views[i].verdict;
+    const int loop = orbit.stations[i].loop;
+    if (!verdict.sure() || std::count(in_doubt.begin(), in_doubt.end(), loop) == 0) continue;
+    const auto& [doubted, count] = loops.at(loop);
+    verdict = {Confidence::doubtful, DoubtReason::loop_in_doubt,
+               fmt::format("{} of the {} views of its loop are in doubt", doubted, count)};
+  }
+  return in_doubt;
+}
+
+Result<std::vector<int>> judge_views(const OrbitRefinement& refinement, Fit& alignment) {
+  ORBITFUSE_ASSIGN(const std::vector<ViewEvidence> evidence, evidence_of(refinement, alignment));
+  for (std::size_t i = 0; i < evidence.size(); ++i) {
+    const ViewEvidence& seen = evidence[i];
+    RenderAlignedView& view = alignment.views[i];
+    view.verdict = judged(seen, view.verdict);
+    refinement.progress.report(
+        {"poses.thermal", 3, 4, -1,
+         fmt::format("evidence {}: support {:.2f}, temperatures {:.2f}, azimuth {:.1f}, elevation "
+                     "{:.1f} deg, distance {:.3f}, aim {:.3f}",
+                     view.view.name, seen.support_share, seen.correlation, seen.azimuth_off_deg,
+                     seen.elevation_off_deg, seen.log_distance_off, seen.aim_off)});
+  }
+  return doubt_whole_loops(refinement.orbit, alignment);
+}
+
+}  // namespace orbitfuse

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "recon/poses/cross_modal/orbit_refinement.hpp"
+
+// What the poses of an orbit are worth, judged across loops: a loop that is wrong as a whole agrees
+// with itself. None of this needs the truth.
+namespace orbitfuse {
+
+/// What is known of one view's pose.
+struct ViewEvidence {
+  /// Support against renders, as a share of the median of all loops: a low loop sees less form (0.7
+  /// where it is right), a wrong one has next to none (0.16).
+  double support_share = 0;
+  /// Of its image with what the other views' temperatures show from there; -1 where too little is
+  /// painted to say.
+  double correlation = -1;
+  double azimuth_off_deg = 0, elevation_off_deg = 0;  ///< from where its loop has it
+  double log_distance_off = 0;                        ///< from the common distance of all loops
+  double aim_off = 0;  ///< orbit's centre from the principal point, share of the image's width
+};
+
+/// One entry a view. Errors: the renderer's, cancelled.
+Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement, const Fit& alignment);
+
+/// `before` is what restarts and temperatures said. A view that passed there may still fail here.
+ViewVerdict judged(const ViewEvidence& evidence, const ViewVerdict& before);
+
+/// Where most of a loop's stations are not sure, none of its views is. Returns those loops.
+std::vector<int> doubt_whole_loops(const OrbitViews& orbit, Fit& alignment);
+
+/// Evidence gathered and verdicts given, in alignment.views. Returns the loops in doubt.
+Result<std::vector<int>> judge_views(const OrbitRefinement& refinement, Fit& alignment);
+
+}  // namespace orbitfuse

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/cross_modal/view_verdicts.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "recon/poses/cross_modal/orbit_selection.hpp"
+#include "tests/support/box_scene.hpp"
+#include "tests/support/orbit_fixture.hpp"
+
+namespace orbitfuse {
+namespace {
+
+const ViewEvidence good{0.9, 0.94, 2, 1, 0.03, 0.02};
+
+TEST(ViewVerdicts, WhatSpeaksAgainstAViewIsNamed) {
+  EXPECT_TRUE(judged(good, {}).sure());
+  const auto reason = [](auto member, double value) {
+    ViewEvidence seen = good;
+    seen.*member = value;
+    const ViewVerdict verdict = judged(seen, {});
+    EXPECT_EQ(verdict.confidence == Confidence::sure, verdict.reason == DoubtReason::none);
+    return verdict.reason;
+  };
+  // As measured on a loop at half its distance: support 7 of 43, correlation .42, aim 133 of 640 px.
+  EXPECT_EQ(reason(&ViewEvidence::support_share, 7.0 / 43), DoubtReason::weak_support);
+  EXPECT_EQ(reason(&ViewEvidence::correlation, 0.42), DoubtReason::temperatures_unlike);
+  EXPECT_EQ(reason(&ViewEvidence::aim_off, 133.0 / 640), DoubtReason::off_its_loop);
+  EXPECT_EQ(reason(&ViewEvidence::log_distance_off, std::log(2.22 / 1.34)),
+            DoubtReason::off_its_loop);
+  EXPECT_EQ(reason(&ViewEvidence::azimuth_off_deg, 15), DoubtReason::off_its_loop);
+  EXPECT_EQ(reason(&ViewEvidence::elevation_off_deg, 12), DoubtReason::off_its_loop);
+  EXPECT_EQ(reason(&ViewEvidence::correlation, -1), DoubtReason::none) << "nothing was painted";
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NE(reason(&ViewEvidence::support_share, nan), DoubtReason::none);
+  EXPECT_NE(reason(&ViewEvidence::aim_off, nan), DoubtReason::none);
+  EXPECT_NE(reason(&ViewEvidence::log_distance_off, nan), DoubtReason::none);
+  const ViewVerdict dropped{Confidence::dropped, DoubtReason::not_found, "nowhere"};
+  EXPECT_EQ(judged(good, dropped).confidence, Confidence::dropped);
+}
+
+TEST(ViewVerdicts, ALoopThatIsMostlyInDoubtIsSoAsAWhole) {
+  OrbitViews orbit;
+  Fit alignment;
+  for (int i = 0; i < 12; ++i) {
+    Station station;
+    station.loop = i / 6;
+    orbit.stations.push_back(station);
+    RenderAlignedView view;
+    if (i < 4) view.verdict = {Confidence::doubtful, DoubtReason::weak_support, ""};
+    alignment.views.push_back(view);
+  }
+  EXPECT_EQ(doubt_whole_loops(orbit, alignment), std::vector<int>{0});
+  for (std::size_t i = 0; i < 12; ++i) EXPECT_EQ(alignment.views[i].verdict.sure(), i >= 6) << i;
+  EXPECT_EQ(alignment.views[5].verdict.reason, DoubtReason::loop_in_doubt);
+}
+
+PosedView at(double azimuth, double elevation, double radius) {
+  const Camera camera = testing_orbit::camera(1000).scaled_to(320, 240);
+  OrbitPose pose;
+  pose.azimuth_deg = azimuth, pose.elevation_deg = elevation, pose.radius = radius;
+  return {"view", camera, cam_from_world_of(pose, camera)};
+}
+
+/// A hypothesis that has the lower loop at the given distance.
+OrbitHypothesis hypothesis(double lower_radius, double lower_elevation) {
+  OrbitHypothesis h;
+  for (int i = 0; i < 12; ++i) {
+    OrbitPose pose;
+    pose.azimuth_deg = 60.0 * (i % 6) + 2;
+    pose.elevation_deg = i < 6 ? lower_elevation : 32;
+    pose.radius = i < 6 ? lower_radius : 2.5;
+    Station station;
+    station.loop = i / 6, station.azimuth_deg = 60.0 * (i % 6);
+    h.stations.push_back(station);
+    h.poses.push_back(pose);
+    h.nominal.push_back(pose);
+    h.starts.push_back({pose});
+  }
+  return h;
+}
+
+TEST(SelectByRenders, ANearImpostorThatLinesPreferIsNotTaken) {
+  OrbitViews orbit;
+  std::vector<PosedView> blank, truth;
+  for (int i = 0; i < 12; ++i) {
+    truth.push_back(at(60.0 * (i % 6) + (i % 2 == 0 ? 3 : -3), i < 6 ? 10 : 32, 2.5));
+    orbit.images.push_back(
+        testing_orbit::box_view(truth.back().camera, truth.back().cam_from_world, true).brightness);
+    blank.push_back({"view" + std::to_string(i), truth.back().camera, {}});
+  }
+  // The search's order: the impostor first, its lower loop at 0.6 of the distance.
+  const auto selected = select_by_renders(testing_orbit::box_renderer(), orbit, blank,
+                                          {hypothesis(1.5, 4), hypothesis(2.4, 12)}, {});
+  ASSERT_TRUE(selected) << selected.error().message();
+  EXPECT_EQ(selected->hypothesis, 1u);
+  ASSERT_EQ(selected->alignment.views.size(), 12u);
+  for (std::size_t i = 0; i < 12; ++i) {
+    const Rigid3d& found = selected->alignment.views[i].view.cam_from_world;
+    EXPECT_LT((camera_center(found) - camera_center(truth[i].cam_from_world)).norm(), 0.15) << i;
+    EXPECT_EQ(selected->alignment.views[i].view.name, blank[i].name);
+  }
+}
+
+}  // namespace
+}  // namespace orbitfuse
