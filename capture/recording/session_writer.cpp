@@ -15,6 +15,7 @@
 #include "capture/recording/frame_encoding.hpp"
 #include "capture/image_quality/frame_quality.hpp"
 #include "capture/recording/session_folder.hpp"
+#include "core/session/manifest_json.hpp"
 #include "core/system/file_io.hpp"
 #include "core/image/image_codec.hpp"
 #include "core/system/utc_now.hpp"

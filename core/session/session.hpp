@@ -126,11 +126,6 @@ struct Session {
 /// with a warning; damage elsewhere is an input error that names the line.
 Result<Session> open_session(const std::filesystem::path& folder);
 
-/// Whether open_session() would take the record's line: a NaN that slipped into a pose would make the
-/// whole session unreadable. To be asked before anything is written.
-Status check_readable(const FrameRecord& frame);
-Status check_readable(const DeviceInfo& device);
-
 /// One manifest line, without the newline (the writer in capture/ appends these).
 std::string manifest_header_line(const Session& session);
 std::string manifest_line(const DeviceInfo& device);
