@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <iostream>
 #include <optional>
 #include <vector>
 
@@ -64,7 +65,28 @@ int finish(const std::string& verb, Console& console, const Status& status, nloh
                                 {"remedy", status.error().remedy},
                                 {"message", status.error().message()}};
   console.result(verb, std::move(body));
-  return code;
+  const Status output = console.output_status();
+  if (!status || output) return code;
+  console.error(output.error());
+  return exit_code(output.error().kind);
+}
+
+/// --help and --version, which CLI11 prints.
+int finish_printing() {
+  std::cout.flush();
+  if (std::cout.good()) return exit_ok;
+  std::fputs("error: standard output: cannot be written\n", stderr);
+  return exit_device;
+}
+
+/// An empty value is a variable of a script that was not set: never the same as no option at all.
+Status check_no_empty_values(const CLI::App& verb) {
+  for (const CLI::Option* option : verb.get_options()) {
+    const auto& values = option->results();
+    if (option->get_expected_max() == 0 || std::find(values.begin(), values.end(), "") == values.end()) continue;
+    return fail(ErrorKind::usage, option->get_name(), "empty", "give a value, or leave it out");
+  }
+  return {};
 }
 
 /// "help [VERB]" means "[VERB] --help".
@@ -88,7 +110,7 @@ int run(const std::vector<const char*>& words) {
         std::none_of(line.actions.begin(), line.actions.end(),
                      [&](const auto& action) { return std::strcmp(action.first->name, argv[1]) == 0; });
     if (dynamic_cast<const CLI::Success*>(&error) != nullptr && !unknown_verb)  // --help, --version
-      return line.app.exit(error) == 0 ? exit_ok : exit_internal;
+      return line.app.exit(error) == 0 ? finish_printing() : exit_internal;
     ConsoleOptions options = detect_terminal();
     for (int i = 1; i < argc; ++i) options.json = options.json || std::strcmp(argv[i], "--json") == 0;
     Console console(options);
@@ -111,8 +133,10 @@ int run(const std::vector<const char*>& words) {
   context.progress.report = [&console](const ProgressEvent& event) { console.progress(event); };
   context.progress.cancel = &interrupt_flag();
 
-  Status status = check_machine(line.common);
-  if (status) status = resolve_config(line.common, *line.app.get_subcommand(verb->name), config);
+  const CLI::App& given = *line.app.get_subcommand(verb->name);
+  Status status = check_no_empty_values(given);
+  if (status) status = check_machine(line.common);
+  if (status) status = resolve_config(line.common, given, config);
   if (status && line.common.print_config) {
     console.data(config.settings().to_toml());
     context.result = {{"config", config.settings().to_json()}};

@@ -17,13 +17,16 @@ namespace orbitfuse {
 
 /// One frame as a driver delivers it. Either `encoded` holds a whole file (JPEG, PNG, TIFF),
 /// which is stored byte for byte, or `pixels` holds samples, which are stored without loss:
-/// CV_8UC3 BGR or CV_8UC1 for visible, CV_16UC1 centikelvin (0 = invalid) or CV_8UC1 for thermal.
+/// CV_8UC3 BGR or CV_8UC1 for visible, CV_16UC1 counts of temperature (0 = invalid) or CV_8UC1 for
+/// thermal.
 struct Frame {
   std::uint64_t id = 0;             ///< the device's own count, unwrapped; a gap = lost frames
   std::int64_t host_time_ns = 0;    ///< UTC epoch at arrival; 0 = unknown
   std::int64_t device_time_ns = 0;  ///< device clock; 0 = unknown
   std::string encoded, extension;   ///< extension with its dot, e.g. ".jpg"
   cv::Mat pixels;
+  double kelvin_per_count = 0.01;   ///< of 16-bit thermal pixels; coarser where the scene is hotter
+                                    ///< than 382 C (core/temperature.hpp)
   cv::Mat original;                 ///< 16-bit counts behind an 8-bit thermal picture (RawCounts)
   std::optional<Station> station;
   bool tracking = false;

@@ -115,8 +115,19 @@ Status resolve(StageFolders& folders) {
   return {};
 }
 
-Status run_stages(Context& context, const StageFolders& given,
-                  const std::vector<std::string>& targets) {
+namespace {
+
+bool any_stage_finished(const fs::path& out) {
+  std::error_code unreadable;
+  for (const auto& entry : fs::directory_iterator(out, unreadable))
+    if (fs::exists(entry.path() / pipeline::stage_record_file, unreadable)) return true;
+  return false;
+}
+
+}  // namespace
+
+Status run_stages(Context& context, const StageFolders& given, const std::vector<std::string>& targets,
+                  Missing missing) {
   StageFolders folders = given;
   ORBITFUSE_TRY(resolve(folders));
   ORBITFUSE_ASSIGN(stages::SessionInput input,
@@ -127,10 +138,14 @@ Status run_stages(Context& context, const StageFolders& given,
     context.console.warning(fmt::format("{} holds results of {}: what this run doesn't reach stays that session's; "
                                         "give each session an --out of its own",
                                         folders.out, (*earlier)["session"].get<std::string>()));
+  if (missing == Missing::leave_out && !any_stage_finished(folders.out))
+    return fail(ErrorKind::input, folders.out, "no finished stage in it",
+                "run the session first: orbitfuse run " + folders.session + " --out " + folders.out);
   const pipeline::RunOptions options{.out = folders.out, .targets = targets,
                                      .force = context.common.force,
                                      .resume = context.common.resume,
-                                     .dry_run = context.common.dry_run};
+                                     .dry_run = context.common.dry_run,
+                                     .targets_only = missing == Missing::leave_out};
   pipeline::Runner runner(stages::build_stages(input, context.config), options, context.progress);
   runner.on_status = [&](const StageStatus& status) {
     announce(context.console, status, options.dry_run);

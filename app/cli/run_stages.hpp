@@ -24,9 +24,15 @@ Status resolve(StageFolders& folders);
 /// `folder` is no such folder.
 Result<std::optional<std::uint64_t>> read_earlier_options(const std::string& folder, config::Settings& settings);
 
+/// What the targets read that is missing or out of date.
+enum class Missing {
+  run,       ///< is made
+  leave_out  ///< stays away: the targets work with what is there
+};
+
 /// Runs the targets and all they read, says how each stage fared, and fills the --json result.
 /// Empty targets: every stage.
-Status run_stages(Context& context, const StageFolders& folders,
-                  const std::vector<std::string>& targets);
+Status run_stages(Context& context, const StageFolders& folders, const std::vector<std::string>& targets,
+                  Missing missing = Missing::run);
 
 }  // namespace orbitfuse::cli

@@ -43,8 +43,8 @@ Result<double> parse_duration(const std::string& text) {
 
 Status apply(const TrainingLimits& limits, const std::vector<Modality>& fields, stages::RunConfig& config) {
   double budget_s = 0;
-  if (!limits.budget.empty()) {
-    ORBITFUSE_ASSIGN(budget_s, parse_duration(limits.budget));
+  if (limits.budget) {
+    ORBITFUSE_ASSIGN(budget_s, parse_duration(*limits.budget));
   }
   for (const Modality field : fields) {
     nerf::TrainOptions& options =

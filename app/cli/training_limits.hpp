@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,7 +11,7 @@ namespace orbitfuse::cli {
 
 /// How long fields are trained, as options of a verb.
 struct TrainingLimits {
-  std::string budget;      ///< a duration
+  std::optional<std::string> budget;  ///< a duration
   double target_psnr = 0;  ///< dB; 0 = none
 };
 

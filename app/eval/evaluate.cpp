@@ -30,12 +30,12 @@ std::string base_name(const FrameRecord& frame) {
 
 /// Pairs of estimated and true poses of one modality's station frames.
 std::vector<PosePair> match(const Session& session, const Reconstruction& model,
-                            const std::vector<PosedView>& truth) {
+                            const std::vector<TrueView>& truth) {
   std::vector<PosePair> pairs;
   for (const FrameRecord* frame : session.frames_of(model.modality, false)) {
     const auto posed = std::find_if(model.views.begin(), model.views.end(),
                                     [&](const PosedView& v) { return v.name == frame->file; });
-    const auto known = std::find_if(truth.begin(), truth.end(), [&](const PosedView& v) {
+    const auto known = std::find_if(truth.begin(), truth.end(), [&](const TrueView& v) {
       return fs::path(v.name).filename() == base_name(*frame);
     });
     if (posed != model.views.end() && known != truth.end())
@@ -123,7 +123,7 @@ cv::Mat resized(const cv::Mat& image, const Camera& camera) {
   return result;
 }
 
-Status compare_visible(const nerf::Field& field, const TestView& view, const Camera& camera,
+Status compare_visible(const nerf::Field& field, const TrueTestView& view, const Camera& camera,
                        const Rigid3d& cam_from_visible, const Progress& progress, Sums& sums) {
   ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
                    nerf::render(field, camera, cam_from_visible, {}, progress));
@@ -136,7 +136,7 @@ Status compare_visible(const nerf::Field& field, const TestView& view, const Cam
   return {};
 }
 
-Status compare_thermal(const nerf::Field& field, const TestView& view, const Camera& camera,
+Status compare_thermal(const nerf::Field& field, const TrueTestView& view, const Camera& camera,
                        const Rigid3d& cam_from_thermal, const EvaluateOptions& options,
                        const Progress& progress, Sums& sums) {
   ORBITFUSE_ASSIGN(nerf::RenderedView seen, nerf::render(field, camera, cam_from_thermal, {}, progress));
@@ -164,7 +164,7 @@ Status add_test_views(Run& run, const GroundTruth& truth, const EvaluateOptions&
   }
   Sums sums;
   for (std::size_t i = 0; i < truth.test.size(); ++i) {
-    const TestView& view = truth.test[i];
+    const TrueTestView& view = truth.test[i];
     progress.report({"eval", static_cast<double>(i), static_cast<double>(truth.test.size()), -1, ""});
     const int width = std::min(options.max_width_px, view.camera.width);
     const Camera camera = view.camera.scaled_to(width, view.camera.height * width / view.camera.width);

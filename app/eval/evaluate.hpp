@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "app/eval/ground_truth.hpp"
+#include "core/formats/ground_truth.hpp"
 #include "core/progress.hpp"
 #include "core/session/session.hpp"
 

@@ -112,13 +112,16 @@ const StageStatus* RunSummary::find(const std::string& stage) const {
 Runner::Runner(std::vector<Stage> stages, RunOptions options, Progress progress)
     : stages_(std::move(stages)), options_(std::move(options)), progress_(std::move(progress)) {
   for (auto it = stages_.rbegin(); it != stages_.rend(); ++it) {
-    const bool target = options_.targets.empty() ||
-                        std::count(options_.targets.begin(), options_.targets.end(), it->name) > 0;
-    if (!target && !wanted(it->name)) continue;
+    if (!is_target(it->name) && !wanted(it->name)) continue;
     closure_.push_back(it->name);
     closure_.insert(closure_.end(), it->needs.begin(), it->needs.end());
     closure_.insert(closure_.end(), it->uses.begin(), it->uses.end());
   }
+}
+
+bool Runner::is_target(const std::string& stage) const {
+  return options_.targets.empty() ||
+         std::find(options_.targets.begin(), options_.targets.end(), stage) != options_.targets.end();
 }
 
 bool Runner::wanted(const std::string& stage) const {
@@ -217,7 +220,16 @@ StageStatus Runner::visit(const Stage& stage) {
 
   const Key key = key_of(stage);
   const auto record = read_stage_record(options_.out / stage.name);
-  const std::string why = unknown ? "a stage it reads will run" : why_run(stage, key, record);
+  if (options_.targets_only && !is_target(stage.name)) {
+    const std::string wrong = record ? damage(options_.out / stage.name, *record) : "it has not run yet";
+    if (!wrong.empty()) {
+      status.state = StageState::absent;
+      status.why = wrong;
+      return status;
+    }
+  }
+  const bool as_it_lies = options_.targets_only && !is_target(stage.name);
+  const std::string why = as_it_lies ? "" : unknown ? "a stage it reads will run" : why_run(stage, key, record);
   if (why.empty()) {
     status.state = StageState::unchanged;
     status.output = record->output;

@@ -18,6 +18,7 @@ struct RunOptions {
   bool force = false;                ///< run the targets although they are unchanged
   bool resume = false;               ///< go on from an interrupted attempt where its key matches
   bool dry_run = false;              ///< say what would run, write nothing
+  bool targets_only = false;         ///< what the targets read is taken as it lies there, never run
 };
 
 struct RunSummary {
@@ -45,6 +46,7 @@ class Runner {
     std::map<std::string, std::string> inputs;
   };
 
+  bool is_target(const std::string& stage) const;
   bool wanted(const std::string& stage) const;
   Key key_of(const Stage& stage) const;
   bool forced(const Stage& stage) const;

@@ -9,6 +9,7 @@
 #include "app/report/assets.hpp"
 #include "app/report/html.hpp"
 #include "app/report/report_model.hpp"
+#include "core/image/image_io.hpp"
 #include "core/temperature.hpp"
 
 namespace orbitfuse::report {
@@ -18,8 +19,9 @@ using pipeline::StageState;
 
 constexpr int image_width_px = 800, thumbnail_width_px = 112, readout_width = 160;
 
-/// Centikelvin grid for the readout under the pointer.
+/// Grid of 16-bit temperatures for the readout under the pointer.
 json readout_grid(const cv::Mat& kelvin) {
+  const double scale = kelvin_per_count_for(std::vector<cv::Mat>{kelvin});
   const int width = std::min(readout_width, kelvin.cols);
   const int height = std::max(1, kelvin.rows * width / kelvin.cols);
   std::string bytes;
@@ -27,11 +29,11 @@ json readout_grid(const cv::Mat& kelvin) {
     for (int x = 0; x < width; ++x) {
       const float t = kelvin.at<float>((2 * y + 1) * kelvin.rows / (2 * height),
                                        (2 * x + 1) * kelvin.cols / (2 * width));
-      const std::uint16_t ck = std::isfinite(t) ? centikelvin_from_kelvin(t) : std::uint16_t{0};
-      bytes += static_cast<char>(ck & 0xff);
-      bytes += static_cast<char>(ck >> 8);
+      const std::uint16_t count = count_from_kelvin(static_cast<double>(t), scale);
+      bytes += static_cast<char>(count & 0xff);
+      bytes += static_cast<char>(count >> 8);
     }
-  return {{"width", width}, {"height", height}, {"centikelvin", base64(bytes)}};
+  return {{"width", width}, {"height", height}, {"kelvin_per_count", scale}, {"counts", base64(bytes)}};
 }
 
 json views_json(const Model& model) {

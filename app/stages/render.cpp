@@ -126,9 +126,7 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
         cv::Mat levels;
         seen.color.convertTo(levels, CV_8U);
         ORBITFUSE_TRY(write_png(context.folder / f.thermal, levels));
-      } else {
-        ORBITFUSE_TRY(write_thermal_tiff(context.folder / f.thermal, temperatures.back()));
-      }
+      }  // temperatures are written below, when the hottest of all views says in which scale
       ORBITFUSE_TRY(write_float_tiff(context.folder / f.thermal_opacity, seen.opacity));
       if (f.depth.empty()) {
         f.depth = "depth/" + view.name + ".tiff";
@@ -152,7 +150,9 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
   if (!temperatures.empty()) {
     rendered.span = gray ? TemperatureSpan{0, 255} : common_span(temperatures);
     ORBITFUSE_ASSIGN(const cv::Mat colors, palette(config.palette));
+    const double kelvin_per_count = kelvin_per_count_for(temperatures);
     for (std::size_t i = 0; i < files.size(); ++i) {
+      if (!gray) ORBITFUSE_TRY(write_thermal_tiff(context.folder / files[i].thermal, temperatures[i], kelvin_per_count));
       files[i].palette = "palette/" + files[i].name + ".png";
       ORBITFUSE_TRY(write_png(context.folder / files[i].palette,
                               colorize(temperatures[i], rendered.span, colors)));
@@ -171,6 +171,7 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
 pipeline::Stage render_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "render";
+  stage.version = 2;  // hot scenes: a scale that holds their temperatures
   stage.uses = {"poses_visible", "poses_thermal", "train_visible", "train_thermal", "register"};
   stage.options = in.config->settings().to_json("render");
   stage.options["cameras"] = in.config->render.cameras;

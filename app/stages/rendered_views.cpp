@@ -35,7 +35,7 @@ Status save_rendered_views(const std::filesystem::path& folder, const RenderedVi
   }
   return write_json(folder / views_file,
                     {{"schema", 1},
-                     {"conventions", "thermal: 16-bit centikelvin; depth: along the optical axis, "
+                     {"conventions", "thermal: 16-bit, kelvin = scale * count as the tag says (0.01 below 382 C); depth: along the optical axis, "
                                      "units of the visible reconstruction; poses in transforms.json"},
                      {"thermal_is_gray", rendered.thermal_is_gray},
                      {"span_low", rendered.span.low_k},

@@ -56,6 +56,20 @@ bool SessionInput::has_temperatures() const {
   });
 }
 
+Result<std::vector<Error>> damaged_frames(const Session& session, const Progress& progress) {
+  std::vector<Status> problems(session.frames.size());
+  parallel_for(static_cast<int>(problems.size()), [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    std::string hash;
+    if (!progress.cancelled()) problems[k] = check_frame(session, session.frames[k], hash);
+  });
+  ORBITFUSE_TRY(progress.check("session"));
+  std::vector<Error> found;
+  for (const Status& problem : problems)
+    if (!problem) found.push_back(problem.error());
+  return found;
+}
+
 Result<SessionInput> open_session_input(const fs::path& folder, const Progress& progress) {
   SessionInput input;
   ORBITFUSE_ASSIGN(input.session, open_session(folder));

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "core/progress.hpp"
 #include "core/session/session.hpp"
@@ -22,6 +23,10 @@ struct SessionInput {
   /// What the images of a modality hold.
   Samples samples(Modality modality) const;
 };
+
+/// What is wrong with each frame whose file is cut, changed beyond use or of another kind; every frame
+/// is looked at.
+Result<std::vector<Error>> damaged_frames(const Session& session, const Progress& progress);
 
 /// Input error that names the first frame whose file is missing, cut, or no image of the kind its
 /// modality needs, and what to do.

@@ -5,10 +5,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-
+#include <cstring>
 
 namespace orbitfuse::terminal {
 namespace {
@@ -54,18 +55,41 @@ void Console::clear_bar() {
 }
 
 void Console::write_stdout(const std::string& line) {
-  std::fwrite(line.data(), 1, line.size(), stdout);
-  std::fputc('\n', stdout);
-  std::fflush(stdout);
+  const std::string text = line + '\n';
+  const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
+  if (!written && output_error_ == 0) output_error_ = errno;
+}
+
+Status Console::output_status() const {
+  if (output_error_ == 0 || output_error_ == EPIPE) return {};
+  return fail(ErrorKind::device, "standard output", std::strerror(output_error_),
+              "send it where there is room; what was made is on disk");
+}
+
+std::string printable(const std::string& text) {
+  std::string out;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto c = static_cast<unsigned char>(text[i]);
+    const auto next = i + 1 < text.size() ? static_cast<unsigned char>(text[i + 1]) : 0u;
+    if ((c < 0x20 && c != '\n' && c != '\t') || c == 0x7f) {
+      out += fmt::format("\\x{:02x}", c);
+    } else if (c == 0xc2 && next >= 0x80 && next < 0xa0) {  // the same controls as two bytes of UTF-8
+      out += fmt::format("\\x{:02x}", next);
+      ++i;
+    } else {
+      out += text[i];
+    }
+  }
+  return out;
 }
 
 void Console::message(const char* label, const char* color, const std::string& text) {
   const std::lock_guard lock(mutex_);
   clear_bar();
   if (options_.color && *color)
-    fmt::print(stderr, "{}{}\033[0m{}\n", color, label, text);
+    fmt::print(stderr, "{}{}\033[0m{}\n", color, label, printable(text));
   else
-    fmt::print(stderr, "{}{}\n", label, text);
+    fmt::print(stderr, "{}{}\n", label, printable(text));
 }
 
 void Console::info(const std::string& text) {
@@ -100,7 +124,7 @@ void Console::progress(const ProgressEvent& e) {
     if (!e.detail.empty()) j["detail"] = e.detail;
     write_stdout(line_of(j));
   } else if (options_.terminal && options_.verbosity >= 0) {
-    fmt::print(stderr, "\r\033[K{}", bar_line(e));
+    fmt::print(stderr, "\r\033[K{}", printable(bar_line(e)));
     std::fflush(stderr);
     bar_drawn_ = true;
   }
@@ -110,7 +134,7 @@ void Console::data(const std::string& line) {
   if (options_.json) return;
   const std::lock_guard lock(mutex_);
   clear_bar();
-  write_stdout(line);
+  write_stdout(printable(line));
 }
 
 void Console::event(nlohmann::json event) {

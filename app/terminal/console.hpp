@@ -28,6 +28,9 @@ class Console {
   ~Console() { clear_bar(); }
 
   bool json() const { return options_.json; }
+  /// What stopped the output: data that never arrived must not look like success. A reader that
+  /// went away (head) has what it wanted.
+  Status output_status() const;
   bool verbose() const { return options_.verbosity > 0; }
   void info(const std::string& message);
   void detail(const std::string& message);  ///< with -v only
@@ -50,9 +53,14 @@ class Console {
   ConsoleOptions options_;
   std::mutex mutex_;
   bool bar_drawn_ = false;
+  int output_error_ = 0;  ///< errno of the first write to stdout that failed
   std::string last_stage_;
   std::chrono::steady_clock::time_point last_progress_{};
 };
+
+/// Names come from cards and archives: their control bytes must not reach the terminal, where they
+/// move the cursor and repaint lines. "\x1b[2J" is shown as written here; line breaks and tabs stay.
+std::string printable(const std::string& text);
 
 /// Reads NO_COLOR, TERM and isatty.
 ConsoleOptions detect_terminal();

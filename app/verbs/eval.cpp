@@ -47,7 +47,7 @@ void print(terminal::Console& console, const json& result) {
 Status run(Context& context, Options& o) {
   ORBITFUSE_TRY(resolve(o.folders));
   ORBITFUSE_ASSIGN(const Session session, open_session(o.folders.session));
-  ORBITFUSE_ASSIGN(const eval::GroundTruth truth, eval::read_ground_truth(o.truth));
+  ORBITFUSE_ASSIGN(const GroundTruth truth, read_ground_truth(o.truth));
   if (!std::filesystem::is_directory(o.folders.out))
     return fail(ErrorKind::input, o.folders.out, "no such folder", "run the session first");
   ORBITFUSE_ASSIGN(const json result, eval::evaluate(o.folders.out, session, truth, o.evaluate,

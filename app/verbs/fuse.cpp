@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <cctype>
+
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
 #include "app/fusion_batch/fusion_batch.hpp"
@@ -15,20 +17,64 @@ namespace fs = std::filesystem;
 struct Options {
   StageFolders folders;
   std::string visible, thermal, mask, method = "best";
-  bool gray = false;
+  bool gray = false, out_given = false;
 };
+
+using ImageWriter = Status (*)(const fs::path&, const cv::Mat&);
+
+/// By the extension; null for one that is not written.
+ImageWriter image_writer(const fs::path& file) {
+  std::string extension = file.extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (extension == ".png") return [](const fs::path& to, const cv::Mat& image) { return write_png(to, image); };
+  if (extension == ".jpg" || extension == ".jpeg")
+    return [](const fs::path& to, const cv::Mat& image) { return write_jpeg(to, image); };
+  return nullptr;
+}
 
 Result<cv::Mat> read_optional(const std::string& file) {
   return file.empty() ? Result<cv::Mat>(cv::Mat()) : read_image(file);
 }
 
+bool same_file(const fs::path& a, const fs::path& b) {
+  std::error_code missing;
+  return !a.empty() && !b.empty() && fs::equivalent(a, b, missing);
+}
+
+/// What to write, told by the name; the user says where, and never onto an input.
+Status check_image_out(const Options& o) {
+  if (!o.out_given)
+    return fail(ErrorKind::usage, "--out", "not given", "name the image to write, e.g. --out fused.png");
+  if (!image_writer(o.folders.out))
+    return fail(ErrorKind::usage, "--out " + o.folders.out, "no name of a PNG or JPEG", "end it in .png or .jpg");
+  for (const std::string& input : {o.visible, o.thermal, o.mask})
+    if (same_file(o.folders.out, input))
+      return fail(ErrorKind::usage, "--out " + o.folders.out, "is an input too", "give another name");
+  return {};
+}
+
+/// Pairs go to vi/, ir/ and fused/ below --out.
+Status check_folder_out(const Options& o) {
+  if (!o.out_given) return fail(ErrorKind::usage, "--out", "not given", "name the folder for the fused pairs");
+  for (const std::string& input : {o.visible, o.thermal})
+    for (const char* part : {"", "vi", "ir", "fused"})
+      if (same_file(fs::path(o.folders.out) / part, input))
+        return fail(ErrorKind::usage, "--out " + o.folders.out, "would write into the input " + input, "give another folder");
+  return {};
+}
+
 Status fuse_pair(Context& context, const Options& o, const FusionOptions& options) {
+  ORBITFUSE_TRY(check_image_out(o));
   ORBITFUSE_ASSIGN(const cv::Mat visible, read_image(o.visible));
   ORBITFUSE_ASSIGN(const cv::Mat thermal, batch::read_thermal(o.thermal));
   ORBITFUSE_ASSIGN(const cv::Mat mask, read_optional(o.mask));
   FusionReport said;
   ORBITFUSE_ASSIGN(const cv::Mat fused, fuse(visible, thermal, mask, options, &said));
-  ORBITFUSE_TRY(write_png(o.folders.out, fused));
+  if (context.common.dry_run) {
+    context.console.info("would write " + o.folders.out);
+    return {};
+  }
+  ORBITFUSE_TRY(image_writer(o.folders.out)(o.folders.out, fused));
   context.console.data(o.folders.out);
   context.result = {{"out", o.folders.out}, {"method", name(options.method)}, {"ms", 1000 * said.wall_s}};
   context.result["skips"] = nlohmann::json::array();
@@ -40,6 +86,11 @@ Status fuse_pair(Context& context, const Options& o, const FusionOptions& option
 }
 
 Status fuse_folder(Context& context, const Options& o, const FusionOptions& options) {
+  ORBITFUSE_TRY(check_folder_out(o));
+  if (context.common.dry_run) {
+    context.console.info("would write fused pairs below " + o.folders.out);
+    return {};
+  }
   ORBITFUSE_ASSIGN(const batch::Summary summary,
                    batch::fuse_folder(o.visible, o.thermal, o.folders.out, options, context.progress));
   for (const std::string& problem : summary.problems) context.console.warning(problem);
@@ -71,7 +122,10 @@ Action add_fuse(CLI::App& app) {
   app.add_option("--method", options->method, "For files; a session fuses by fuse.methods")
       ->check(CLI::IsMember(fusion_method_names()))->capture_default_str();
   app.add_flag("--gray", options->gray, "Fuse to gray instead of keeping the visible colours");
-  return [options](Context& context) { return run(context, *options); };
+  return [options, &app](Context& context) {
+    options->out_given = app.count("--out") > 0;
+    return run(context, *options);
+  };
 }
 
 }  // namespace orbitfuse::cli

@@ -71,6 +71,28 @@ void add_radiometry(CLI::App& app, Options& o) {
   app.add_option("--humidity", o.humidity_percent, "Relative humidity in percent")->group(group);
 }
 
+/// Checked here in the units of the command line: a message that says 9 where 900 was typed helps nobody.
+Status check_ranges(const Options& o) {
+  struct Range {
+    const char* option;
+    std::optional<double> value;
+    double low, high;
+  };
+  const Range ranges[] = {{"--humidity", o.humidity_percent, 0, 100},
+                          {"--reflected-c", o.reflected_c, -272, 4700},
+                          {"--air-c", o.air_c, -120, 120},
+                          {"--emissivity", o.import.object.emissivity, 0.01, 1},
+                          {"--distance-m", o.import.object.distance_m, 0, 1e5},
+                          {"--kelvin-offset", o.kelvin_offset, -10000, 10000},
+                          {"--visible-focal-px", o.import.visible_focal_px, 1, 1e6},
+                          {"--thermal-focal-px", o.import.thermal_focal_px, 1, 1e6}};
+  for (const Range& r : ranges) {
+    if (!r.value || (*r.value >= r.low && *r.value <= r.high)) continue;
+    return fail(ErrorKind::usage, r.option, fmt::format("{}", *r.value), fmt::format("must be {} to {}", r.low, r.high));
+  }
+  return {};
+}
+
 /// Temperatures and percentages of the command line in the units of the library.
 void resolve(Options& o) {
   for (const auto& [word, scale] : scales)
@@ -119,12 +141,14 @@ Status check_alone(const Options& o) {
   const bool no_thermal = o.import.thermal.empty() && o.import.thermal_tracking.empty() &&
                           !o.import.transforms_json;
   if (no_thermal && o.scale != "auto") return needs("--thermal-scale", "--thermal");
+  if (o.scale == "linear" && !o.kelvin_per_count) return needs("--thermal-scale linear", "--kelvin-per-count");
   return {};
 }
 
 Status run(Context& context, Options& o) {
   ORBITFUSE_TRY(check_common(context.common));
   ORBITFUSE_TRY(check_alone(o));
+  ORBITFUSE_TRY(check_ranges(o));
   resolve(o);
   const bool dry = context.common.dry_run;
   ORBITFUSE_ASSIGN(const ImportReport report,
@@ -141,6 +165,7 @@ Status run(Context& context, Options& o) {
                     {"thermal", report.thermal},    {"tracking", report.tracking},
                     {"with_pose", report.with_pose}, {"with_station", report.with_station},
                     {"has_temperatures", report.has_temperatures},
+                    {"kelvin_per_count", report.kelvin_per_count},
                     {"warnings", report.warnings}};
   if (dry) context.result["dry_run"] = true;
   return {};

@@ -9,6 +9,7 @@
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
 #include "app/pipeline/stage_record.hpp"
+#include "app/stages/session_input.hpp"
 #include "core/session/session.hpp"
 
 namespace orbitfuse::cli {
@@ -82,6 +83,7 @@ json describe(const Session& session, Modality modality) {
 
 Status inspect_run(Context& context, const fs::path& folder) {
   json stages = json::array();
+  std::vector<std::string> damaged;
   std::error_code error;
   const fs::directory_iterator entries(folder, error);
   if (error)
@@ -93,13 +95,18 @@ Status inspect_run(Context& context, const fs::path& folder) {
       context.console.warning(record.error().message());
       continue;
     }
+    if (const std::string wrong = pipeline::damage(entry.path(), *record); !wrong.empty()) {
+      context.console.warning(record->stage + ": " + wrong + "; the next run makes it again");
+      damaged.push_back(record->stage + ": " + wrong);
+    }
     context.console.data(fmt::format("{:<14} {}  {:>7.1f} s  {}", record->stage,
                                      record->finished_utc, record->wall_s,
                                      record->output.metrics.value("brief", std::string())));
     stages.push_back(to_json(*record));
   }
-  context.result = {{"out", folder.string()}, {"stages", stages}};
-  return {};
+  context.result = {{"out", folder.string()}, {"stages", stages}, {"damaged", damaged}};
+  if (damaged.empty()) return {};
+  return fail(ErrorKind::input, folder.string(), damaged.front(), "run again: what is damaged is made anew");
 }
 
 Status inspect_session(Context& context, const fs::path& folder) {
@@ -131,7 +138,17 @@ Status inspect_session(Context& context, const fs::path& folder) {
       for (const json& group : j["groups"]) context.console.data(described(group));
   }
   for (const std::string& warning : session.warnings) context.console.warning(warning);
-  return {};
+  ORBITFUSE_ASSIGN(const std::vector<Error> damaged, stages::damaged_frames(session, context.progress));
+  context.result["damaged"] = json::array();
+  for (const Error& error : damaged) {
+    context.result["damaged"].push_back(error.message());
+    context.console.warning("damaged: " + error.message());
+  }
+  if (damaged.empty()) return {};
+  return fail(ErrorKind::input, folder.string(),
+              fmt::format("{} of {} frames are damaged, first {}", damaged.size(), session.frames.size(),
+                          damaged.front().where),
+              "copy them from the original, or import the session again");
 }
 
 }  // namespace

@@ -3,40 +3,14 @@
 
 #include <cmath>
 #include <map>
-#include <nlohmann/json.hpp>
 
 #include "core/formats/colmap_model.hpp"
-#include "core/system/file_io.hpp"
+#include "core/formats/ground_truth.hpp"
 #include "core/image/image_io.hpp"
 #include "core/formats/transforms_json.hpp"
 
 namespace orbitfuse::bench {
 namespace {
-
-using nlohmann::json;
-
-Camera camera_of(const json& k) {
-  Camera c;
-  c.width = k.at("w");
-  c.height = k.at("h");
-  c.fx = k.at("fx");
-  c.fy = k.at("fy");
-  c.cx = k.at("cx");
-  c.cy = k.at("cy");
-  c.k1 = k.value("k1", 0.0);
-  c.k2 = k.value("k2", 0.0);
-  c.p1 = k.value("p1", 0.0);
-  c.p2 = k.value("p2", 0.0);
-  return c;
-}
-
-Rigid3d pose_of(const json& frame) {
-  Eigen::Matrix4d c2w;
-  for (int r = 0; r < 4; ++r)
-    for (int c = 0; c < 4; ++c)
-      c2w(r, c) = frame.at("c2w").at(static_cast<std::size_t>(r)).at(static_cast<std::size_t>(c));
-  return cam_from_world_of_opengl(c2w);
-}
 
 Result<nerf::TrainingView> load_view(const std::filesystem::path& file, const Camera& camera,
                                      const Rigid3d& pose, Modality modality, bool measure_only) {
@@ -85,8 +59,8 @@ Status add_points(nerf::Dataset& data, const std::filesystem::path& model) {
 }
 
 /// 125 degrees: of a 30 degree orbit four or five stations of each loop.
-bool in_sector(const json& frame) {
-  const Eigen::Vector3d center = camera_center(pose_of(frame));
+bool in_sector(const Rigid3d& cam_from_world) {
+  const Eigen::Vector3d center = camera_center(cam_from_world);
   const double azimuth = std::atan2(center.y(), center.x()) * 180 / 3.14159265358979;
   return azimuth >= 10 && azimuth <= 135;
 }
@@ -100,21 +74,22 @@ bool take_word(std::string& name, const std::string& word) {
 
 Result<nerf::Dataset> load_orbit(const std::filesystem::path& folder, Modality modality, bool sector, bool full) {
   const bool thermal = modality == Modality::thermal;
-  const std::string own(name(modality));
   nerf::Dataset data;
   data.modality = modality;
-  ORBITFUSE_ASSIGN(const std::string text, read_file(folder / "ground_truth.json"));
-  const json truth = json::parse(text);
-  for (const std::string& group : {own, std::string("test")})
-    for (const json& frame : truth.at(group).at("frames")) {
-      if (sector && !in_sector(frame)) continue;
-      const bool test = group == "test";
-      ORBITFUSE_ASSIGN(nerf::TrainingView view,
-                       load_view(folder / frame.at(test ? own : "file").get<std::string>(),
-                                 camera_of(truth.at(group).at("K")), pose_of(frame), modality, test));
-      const Camera& c = view.camera;
-      data.views.push_back(thermal || full ? std::move(view) : nerf::resized(view, 400, 400 * c.height / c.width));
-    }
+  ORBITFUSE_ASSIGN(const GroundTruth truth, read_ground_truth(folder / "ground_truth.json"));
+  const auto add = [&](const std::filesystem::path& file, const Camera& camera, const Rigid3d& pose,
+                       bool measure_only) -> Status {
+    if (sector && !in_sector(pose)) return {};
+    ORBITFUSE_ASSIGN(nerf::TrainingView view, load_view(file, camera, pose, modality, measure_only));
+    const Camera& c = view.camera;
+    data.views.push_back(thermal || full ? std::move(view) : nerf::resized(view, 400, 400 * c.height / c.width));
+    return {};
+  };
+  if (truth.views.count(modality) > 0)
+    for (const TrueView& view : truth.views.at(modality))
+      ORBITFUSE_TRY(add(folder / view.name, view.camera, view.cam_from_world, false));
+  for (const TrueTestView& view : truth.test)
+    ORBITFUSE_TRY(add(thermal ? view.thermal : view.visible, view.camera, view.cam_from_world, true));
   return data;
 }
 

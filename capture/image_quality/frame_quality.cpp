@@ -6,7 +6,6 @@
 
 #include "capture/image_quality/edge_blur.hpp"
 #include "capture/image_quality/image_noise.hpp"
-#include "core/temperature.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -32,7 +31,7 @@ cv::Mat at_most(int limit, int side, const cv::Mat& gray) {
 
 }  // namespace
 
-FrameQuality measure_quality(const cv::Mat& image) {
+FrameQuality measure_quality(const cv::Mat& image, double kelvin_per_count) {
   CV_Assert(image.type() == CV_8UC3 || image.type() == CV_8UC1 || image.type() == CV_16UC1);
   FrameQuality quality;
   if (image.empty()) return quality;
@@ -46,7 +45,7 @@ FrameQuality measure_quality(const cv::Mat& image) {
 
   const cv::Mat valid = is_thermal ? cv::Mat(gray != 0) : cv::Mat();
   const double mean = cv::mean(gray, valid.empty() ? cv::noArray() : cv::InputArray(valid))[0];
-  quality.mean_level = is_thermal ? mean * kelvin_per_dn : mean;
+  quality.mean_level = is_thermal ? mean * kelvin_per_count : mean;
 
   const cv::Mat small = at_most(max_size_px, gray.cols, gray);
   cv::Mat laplacian;

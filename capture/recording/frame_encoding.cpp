@@ -13,7 +13,7 @@ tl::unexpected<Error> unfit(const std::string& where, const cv::Mat& image, Moda
   return fail(ErrorKind::input, where,
               fmt::format("{}-bit samples in {} channels", 8 * image.elemSize1(), image.channels()),
               modality == Modality::visible ? "visible frames are 8-bit grey or colour"
-                                            : "thermal frames are 16-bit centikelvin or 8-bit grey");
+                                            : "thermal frames are 16-bit counts of temperature or 8-bit grey");
 }
 
 Status check_type(const cv::Mat& image, const Frame& frame, Modality modality, const std::string& where) {
@@ -33,9 +33,19 @@ Result<EncodedFrame> encode_frame(const Frame& frame, Modality modality, const s
   EncodedFrame out;
   out.has_temperature = modality == Modality::thermal && !frame.thermal_is_gray;
   if (!frame.encoded.empty()) {
-    ORBITFUSE_ASSIGN(const cv::Mat image, decode_image(frame.encoded, where));
+    std::string description;
+    cv::Mat image;
+    if (image_format(frame.encoded) == ImageFormat::tiff) {
+      ORBITFUSE_ASSIGN(image, decode_tiff(frame.encoded, where, &description));
+    } else {
+      ORBITFUSE_ASSIGN(image, decode_image(frame.encoded, where));
+    }
     ORBITFUSE_TRY(check_type(image, frame, modality, where));
     out.pixels = apply_orientation(image, modality == Modality::visible ? read_exif(frame.encoded).orientation : 1);
+    if (out.has_temperature) {
+      ORBITFUSE_ASSIGN(const auto tag, thermal_scale_of_description(description, where));
+      out.scale = tag.value_or(ThermalScaleTag{frame.kelvin_per_count, 0});
+    }
     out.bytes = frame.encoded;
     out.extension = frame.extension;
     return out;
@@ -43,8 +53,9 @@ Result<EncodedFrame> encode_frame(const Frame& frame, Modality modality, const s
   if (frame.pixels.empty()) return fail(ErrorKind::input, where, "an empty frame", "check the driver");
   ORBITFUSE_TRY(check_type(frame.pixels, frame, modality, where));
   out.pixels = frame.pixels;
+  out.scale = {frame.kelvin_per_count, 0};
   out.extension = out.has_temperature ? ".tiff" : ".png";
-  ORBITFUSE_ASSIGN(out.bytes, out.has_temperature ? encode_thermal_tiff(frame.pixels) : encode_png(frame.pixels));
+  ORBITFUSE_ASSIGN(out.bytes, out.has_temperature ? encode_thermal_tiff(frame.pixels, out.scale) : encode_png(frame.pixels));
   return out;
 }
 

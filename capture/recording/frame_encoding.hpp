@@ -5,6 +5,7 @@
 #include <string>
 
 #include "capture/frame_source.hpp"
+#include "core/image/image_codec.hpp"
 #include "core/modality.hpp"
 #include "core/result.hpp"
 
@@ -15,6 +16,7 @@ struct EncodedFrame {
   std::string bytes, extension;
   cv::Mat pixels;           ///< upright, for measurements
   bool has_temperature = false;
+  ThermalScaleTag scale;    ///< of the pixels, when they are temperatures
 };
 
 /// Encodes `pixels` without loss, or checks that `encoded` decodes as the modality demands.

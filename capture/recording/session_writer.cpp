@@ -15,6 +15,7 @@
 #include "capture/recording/frame_encoding.hpp"
 #include "capture/image_quality/frame_quality.hpp"
 #include "capture/recording/session_folder.hpp"
+#include "core/session/manifest_json.hpp"
 #include "core/system/file_io.hpp"
 #include "core/image/image_codec.hpp"
 #include "core/system/utc_now.hpp"
@@ -142,6 +143,7 @@ Status SessionWriter::append_line(const std::string& line) {
 }
 
 Status SessionWriter::add_device(const DeviceInfo& device) {
+  ORBITFUSE_TRY(check_readable(device));
   {
     const std::lock_guard lock(mutex_);
     if (const DeviceInfo* known = session_.device(device.id)) {
@@ -155,6 +157,7 @@ Status SessionWriter::add_device(const DeviceInfo& device) {
 }
 
 Status SessionWriter::update_device(const DeviceInfo& device) {
+  ORBITFUSE_TRY(check_readable(device));
   {
     const std::lock_guard lock(mutex_);
     std::erase_if(session_.devices, [&](const DeviceInfo& d) { return d.id == device.id; });
@@ -203,9 +206,10 @@ Result<FrameRecord> SessionWriter::append(const std::string& device_id, const Fr
   record.cam_from_world = frame.cam_from_world;
   record.camera = frame.camera;
   record.source = frame.source;
-  record.quality = measure_quality(encoded.pixels);
+  record.quality = measure_quality(encoded.pixels, encoded.scale.scale);
+  ORBITFUSE_TRY(check_readable(record));
   if (encoded.has_temperature) {
-    ORBITFUSE_TRY(write_file_atomic(folder_ / (record.file + ".json"), thermal_sidecar_json() + "\n"));
+    ORBITFUSE_TRY(write_file_atomic(folder_ / (record.file + ".json"), thermal_sidecar_json(encoded.scale) + "\n"));
   }
   if (!frame.original.empty()) {
     const fs::path file(record.file);
@@ -217,7 +221,10 @@ Result<FrameRecord> SessionWriter::append(const std::string& device_id, const Fr
   return record;
 }
 
-Status SessionWriter::amend(const FrameRecord& record) { return append_line(manifest_line(record)); }
+Status SessionWriter::amend(const FrameRecord& record) {
+  ORBITFUSE_TRY(check_readable(record));
+  return append_line(manifest_line(record));
+}
 Status SessionWriter::append(const GapRecord& gap) { return append_line(manifest_line(gap)); }
 Status SessionWriter::append(const StreamRecord& stream) { return append_line(manifest_line(stream)); }
 Status SessionWriter::append(const EventRecord& event) { return append_line(manifest_line(event)); }

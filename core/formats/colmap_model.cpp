@@ -10,6 +10,7 @@
 #include <unordered_map>
 
 #include "core/formats/colmap_records.hpp"
+#include "core/formats/rigid_matrix.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse {
@@ -70,8 +71,18 @@ Result<Reconstruction> join(const Records& records, const std::filesystem::path&
       return fail(ErrorKind::input, where, fmt::format("refers to camera {}, which is not there", image->camera),
                   "export the model again");
     }
-    if (!image->cam_from_world.is_finite() || !(image->cam_from_world.rotation.norm() > 1e-6)) {
-      return fail(ErrorKind::input, where, "pose is not finite", "export the model again");
+    // Far from 1 it is no quaternion that lost digits but damage, and its square would overflow.
+    const auto& q = image->cam_from_world.rotation.coeffs();
+    if (!image->cam_from_world.is_finite() || !(q.cwiseAbs().maxCoeff() > 1e-3) || q.cwiseAbs().maxCoeff() > 1e3) {
+      return fail(ErrorKind::input, where,
+                  fmt::format("a quaternion of {:g} {:g} {:g} {:g}, or a position that is not finite", q[3], q[0],
+                              q[1], q[2]),
+                  "export the model again");
+    }
+    if (image->cam_from_world.translation.cwiseAbs().maxCoeff() > max_coordinate) {
+      return fail(ErrorKind::input, where,
+                  fmt::format("a translation of {:g}", image->cam_from_world.translation.cwiseAbs().maxCoeff()),
+                  "export the model again");
     }
     Rigid3d pose = image->cam_from_world;
     pose.rotation.normalize();

@@ -3,12 +3,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
-
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "core/formats/rigid_matrix.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse {
@@ -66,29 +65,6 @@ Result<Camera> read_camera(const Json& frame, const Json& shared, const std::str
   return camera;
 }
 
-Result<Eigen::Matrix4d> read_matrix(const Json& frame, const std::string& where) {
-  const auto broken = [&] {
-    return fail(ErrorKind::input, where + ".transform_matrix", "not a finite 4x4 (or 3x4) rigid matrix",
-                "give the camera-to-world matrix with OpenGL axes");
-  };
-  if (!frame.contains("transform_matrix")) return broken();
-  const Json& rows = frame["transform_matrix"];
-  if (!rows.is_array() || rows.size() < 3 || rows.size() > 4) return broken();
-  Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
-  for (std::size_t r = 0; r < 3; ++r) {
-    if (!rows[r].is_array() || rows[r].size() != 4) return broken();
-    for (std::size_t c = 0; c < 4; ++c) {
-      if (!rows[r][c].is_number()) return broken();
-      m(static_cast<int>(r), static_cast<int>(c)) = rows[r][c].get<double>();
-    }
-  }
-  const Eigen::Matrix3d rotation = m.topLeftCorner<3, 3>();
-  const bool rigid = m.allFinite() && rotation.determinant() > 0 &&
-                     (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-2;
-  if (!rigid) return broken();
-  return m;
-}
-
 Json json_of(const Eigen::Matrix4d& m) {
   Json rows = Json::array();
   for (int r = 0; r < 4; ++r) rows.push_back({m(r, 0), m(r, 1), m(r, 2), m(r, 3)});
@@ -98,7 +74,7 @@ Json json_of(const Eigen::Matrix4d& m) {
 }  // namespace
 
 Result<Transforms> read_transforms_json(const std::filesystem::path& file) {
-  ORBITFUSE_ASSIGN(const std::string text, read_file(file));
+  ORBITFUSE_ASSIGN(const std::string text, read_file(file, max_text_bytes));
   Json root;
   try {
     root = Json::parse(text);
@@ -128,8 +104,8 @@ Result<Transforms> read_transforms_json(const std::filesystem::path& file) {
       out.thermal_file_path = frame["thermal_file_path"].get<std::string>();
     }
     ORBITFUSE_ASSIGN(out.camera, read_camera(frame, root, where));
-    ORBITFUSE_ASSIGN(const Eigen::Matrix4d world_from_cam, read_matrix(frame, where));
-    out.cam_from_world = cam_from_world_of_opengl(world_from_cam);
+    ORBITFUSE_ASSIGN(out.cam_from_world,
+                     rigid_of_opengl_json(frame.value("transform_matrix", Json()), where + ".transform_matrix"));
     transforms.frames.push_back(std::move(out));
   }
   return transforms;

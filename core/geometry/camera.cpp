@@ -43,6 +43,12 @@ Status Camera::validate(const std::string& where) const {
       return fail(ErrorKind::input, where + "." + field, "not a finite number", "correct the camera");
     }
   }
+  for (const double distortion : {k1, k2, p1, p2}) {
+    // No lens bends like that; a row of such numbers overflows.
+    if (std::abs(distortion) > 1e3) {
+      return fail(ErrorKind::input, where, fmt::format("a distortion coefficient of {:g}", distortion), "correct the camera");
+    }
+  }
   if (fx <= 0 || fy <= 0) {
     return fail(ErrorKind::input, where, fmt::format("focal length {} x {} pixels", fx, fy),
                 "must be > 0");

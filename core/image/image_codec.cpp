@@ -11,6 +11,8 @@
 namespace orbitfuse {
 namespace {
 
+constexpr double max_scale_number = 1e4;  // kelvin per count, kelvin
+
 bool starts_with(std::string_view bytes, std::string_view magic) {
   return bytes.substr(0, magic.size()) == magic;
 }
@@ -112,8 +114,24 @@ Result<cv::Mat> decode_image(std::string_view bytes, const std::string& where) {
     case ImageFormat::bmp: return decode_with_opencv(bytes, where);
     case ImageFormat::unknown: break;
   }
-  return fail(ErrorKind::input, where, "not an image (JPEG, PNG, TIFF or BMP)",
-              "remove the file or convert it");
+  const char* known = name_of_other_format(bytes);
+  return fail(ErrorKind::input, where,
+              known ? fmt::format("{}, which is not read", known) : "not an image (JPEG, PNG, TIFF or BMP)",
+              known ? "convert it to JPEG, PNG or TIFF" : "remove the file or convert it");
+}
+
+const char* name_of_other_format(std::string_view bytes) {
+  using namespace std::string_view_literals;
+  if (bytes.size() < 12) return nullptr;
+  if (bytes.substr(0, 4) == "RIFF"sv && bytes.substr(8, 4) == "WEBP"sv) return "a WebP image";
+  if (bytes.substr(0, 3) == "GIF"sv) return "a GIF image";
+  if (bytes.substr(0, 4) == "FFF\0"sv || bytes.substr(0, 4) == "AFF\0"sv) return "a FLIR recording";
+  if (bytes.substr(4, 4) != "ftyp"sv) return nullptr;
+  const std::string_view brand = bytes.substr(8, 4);
+  for (const std::string_view heif : {"heic"sv, "heix"sv, "hevc"sv, "mif1"sv, "msf1"sv, "heim"sv, "heis"sv}) {
+    if (brand == heif) return "a HEIC image";
+  }
+  return brand == "avif"sv ? "an AVIF image" : "a video";
 }
 
 cv::Mat apply_orientation(const cv::Mat& image, int orientation) {
@@ -133,14 +151,30 @@ cv::Mat apply_orientation(const cv::Mat& image, int orientation) {
   }
 }
 
-std::optional<ThermalScaleTag> thermal_scale_of_json(std::string_view json) {
-  const auto value = nlohmann::json::parse(json, nullptr, false);
-  if (!value.is_object() || !value.contains("scale") || !value["scale"].is_number()) return std::nullopt;
+Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_view text, const std::string& where) {
+  const auto value = nlohmann::json::parse(text, nullptr, false);
+  if (!value.is_object() || !value.contains("scale")) return std::nullopt;
   ThermalScaleTag tag;
-  tag.scale = value["scale"].get<double>();
-  if (value.contains("offset") && value["offset"].is_number()) tag.offset = value["offset"].get<double>();
-  if (!(tag.scale > 0) || !std::isfinite(tag.scale) || !std::isfinite(tag.offset)) return std::nullopt;
+  const auto read = [&](const char* key, double& number) -> Status {
+    if (!value.contains(key)) return {};
+    if (value[key].is_number()) number = value[key].get<double>();
+    // Beyond these nothing is a temperature, and arithmetic in float would overflow.
+    if (value[key].is_number() && std::isfinite(number) && std::abs(number) <= max_scale_number) return {};
+    return fail(ErrorKind::input, where, fmt::format("\"{}\": {}", key, value[key].dump().substr(0, 40)),
+                "kelvin = scale * count + offset; correct the two numbers");
+  };
+  ORBITFUSE_TRY(read("scale", tag.scale));
+  ORBITFUSE_TRY(read("offset", tag.offset));
+  if (!(tag.scale > 0)) {
+    return fail(ErrorKind::input, where, fmt::format("\"scale\": {}", tag.scale), "kelvin per count must be > 0");
+  }
   return tag;
+}
+
+Result<ThermalScaleTag> thermal_scale_of_sidecar(std::string_view text, const std::string& where) {
+  ORBITFUSE_ASSIGN(const auto tag, thermal_scale_of_description(text, where));
+  if (tag) return *tag;
+  return fail(ErrorKind::input, where, "no usable \"scale\" (kelvin per count)", "correct or remove the sidecar");
 }
 
 Result<std::string> encode_png(const cv::Mat& image) {
@@ -155,12 +189,13 @@ Result<std::string> encode_jpeg(const cv::Mat& image, int quality) {
       "JPEG");
 }
 
-std::string thermal_sidecar_json() {
-  return R"({"quantity":"temperature","unit":"kelvin","scale":0.01,"offset":0,"invalid":0})";
+std::string thermal_sidecar_json(ThermalScaleTag scale) {
+  return fmt::format(R"({{"quantity":"temperature","unit":"kelvin","scale":{:g},"offset":{:g},"invalid":0}})",
+                     scale.scale, scale.offset);
 }
 
-Result<std::string> encode_thermal_tiff(const cv::Mat& centikelvin) {
-  return encode_tiff(centikelvin, thermal_sidecar_json());
+Result<std::string> encode_thermal_tiff(const cv::Mat& counts, ThermalScaleTag scale) {
+  return encode_tiff(counts, thermal_sidecar_json(scale));
 }
 
 }  // namespace orbitfuse

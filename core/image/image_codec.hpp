@@ -14,6 +14,8 @@ namespace orbitfuse {
 enum class ImageFormat { jpeg, png, tiff, bmp, unknown };
 ImageFormat image_format(std::string_view bytes);
 const char* name(ImageFormat format);
+/// "a HEIC image" and the like for content that is known but not read; null otherwise.
+const char* name_of_other_format(std::string_view bytes);
 
 /// As stored, without EXIF orientation: CV_8U/CV_16U, 1 or 3 channels (BGR; alpha is dropped).
 /// A truncated or damaged file is an input error, even where a decoder would fill in grey.
@@ -26,20 +28,27 @@ cv::Mat apply_orientation(const cv::Mat& image, int orientation);
 struct ThermalScaleTag {
   double scale = 0.01, offset = 0;
 };
-std::optional<ThermalScaleTag> thermal_scale_of_json(std::string_view json);
+/// Nothing where the text names no scale (many programs write something into ImageDescription); an
+/// input error where it names one that can't be used.
+Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_view text, const std::string& where);
+/// A sidecar is there for its scale: without one it is an input error.
+Result<ThermalScaleTag> thermal_scale_of_sidecar(std::string_view text, const std::string& where);
 
-/// First page: 8/16-bit unsigned or 32-bit float samples, one channel or RGB (returned as BGR).
+/// Images of the first one's size in a TIFF; masks and reduced copies don't count. 0: unreadable.
+int tiff_page_count(std::string_view bytes);
+/// 8/16-bit unsigned or 32-bit float samples, one channel or RGB (returned as BGR). Without a page
+/// the file must hold a single one: nobody asked for the first of several.
 Result<cv::Mat> decode_tiff(std::string_view bytes, const std::string& where,
-                            std::string* image_description = nullptr);
+                            std::string* image_description = nullptr, std::optional<int> page = {});
 /// CV_16UC1 or CV_32FC1, deflate with the fitting predictor (lossless).
 Result<std::string> encode_tiff(const cv::Mat& image, const std::string& image_description);
 Result<cv::Mat> decode_jpeg(std::string_view bytes, const std::string& where);
 Result<std::string> encode_png(const cv::Mat& image);
 Result<std::string> encode_jpeg(const cv::Mat& image, int quality);
 
-/// The thermal TIFF of a session from CV_16UC1 centikelvin, and its sidecar's text.
-Result<std::string> encode_thermal_tiff(const cv::Mat& centikelvin);
-std::string thermal_sidecar_json();
+/// The thermal TIFF of a session from CV_16UC1 counts, 0 = invalid, and its sidecar's text.
+Result<std::string> encode_thermal_tiff(const cv::Mat& counts, ThermalScaleTag scale = {});
+std::string thermal_sidecar_json(ThermalScaleTag scale = {});
 
 /// A bigger image is refused before memory is taken for it.
 inline constexpr long long max_image_samples = 400'000'000;

@@ -26,7 +26,7 @@ Status write_encoded(const fs::path& path, const Result<std::string>& bytes) {
 }  // namespace
 
 Result<cv::Mat> read_visible(const fs::path& path) {
-  ORBITFUSE_ASSIGN(const std::string bytes, read_file(path));
+  ORBITFUSE_ASSIGN(const std::string bytes, read_file(path, max_image_bytes));
   ORBITFUSE_ASSIGN(cv::Mat image, decode_image(bytes, path.string()));
   if (image.depth() != CV_8U) {
     return fail(ErrorKind::input, path.string(), "16-bit samples, 8-bit expected",
@@ -37,7 +37,7 @@ Result<cv::Mat> read_visible(const fs::path& path) {
 }
 
 Result<cv::Mat> read_thermal_k(const fs::path& path) {
-  ORBITFUSE_ASSIGN(const std::string bytes, read_file(path));
+  ORBITFUSE_ASSIGN(const std::string bytes, read_file(path, max_image_bytes));
   std::string description;
   cv::Mat image;
   if (image_format(bytes) == ImageFormat::tiff) {
@@ -49,17 +49,13 @@ Result<cv::Mat> read_thermal_k(const fs::path& path) {
     return fail(ErrorKind::input, path.string(),
                 fmt::format("{}-bit samples in {} channels, 16-bit grey expected",
                             8 * image.elemSize1(), image.channels()),
-                "this is not a radiometric image; import it as 8-bit thermal");
+                "this is no radiometric image: give a 16-bit TIFF or PNG");
   }
-  std::optional<ThermalScaleTag> tag = thermal_scale_of_json(description);
+  ORBITFUSE_ASSIGN(std::optional<ThermalScaleTag> tag, thermal_scale_of_description(description, path.string()));
   std::error_code ignored;
   if (!tag && fs::exists(sidecar_of(path), ignored)) {
-    ORBITFUSE_ASSIGN(const std::string sidecar, read_file(sidecar_of(path)));
-    tag = thermal_scale_of_json(sidecar);
-    if (!tag) {
-      return fail(ErrorKind::input, sidecar_of(path).string(), "no usable \"scale\" (kelvin per count)",
-                  "correct or remove the sidecar");
-    }
+    ORBITFUSE_ASSIGN(const std::string sidecar, read_file(sidecar_of(path), max_settings_bytes));
+    ORBITFUSE_ASSIGN(tag, thermal_scale_of_sidecar(sidecar, sidecar_of(path).string()));
   }
   const ThermalScaleTag scale = tag.value_or(ThermalScaleTag{});
   cv::Mat kelvin(image.size(), CV_32FC1);
@@ -67,14 +63,15 @@ Result<cv::Mat> read_thermal_k(const fs::path& path) {
     const auto* from = image.ptr<std::uint16_t>(y);
     auto* to = kelvin.ptr<float>(y);
     for (int x = 0; x < image.cols; ++x) {
-      to[x] = from[x] == 0 ? invalid_k : static_cast<float>(from[x] * scale.scale + scale.offset);
+      const double t = from[x] * scale.scale + scale.offset;
+      to[x] = from[x] == 0 || !(t > 0) ? invalid_k : static_cast<float>(t);  // nothing is below 0 K
     }
   }
   return kelvin;
 }
 
 Result<cv::Mat> read_image(const fs::path& path) {
-  ORBITFUSE_ASSIGN(const std::string bytes, read_file(path));
+  ORBITFUSE_ASSIGN(const std::string bytes, read_file(path, max_image_bytes));
   return decode_image(bytes, path.string());
 }
 
@@ -86,16 +83,31 @@ Status write_jpeg(const fs::path& path, const cv::Mat& image, int quality) {
   return write_encoded(path, encode_jpeg(image, quality));
 }
 
-Status write_thermal_tiff(const fs::path& path, const cv::Mat& kelvin) {
-  CV_Assert(kelvin.type() == CV_32FC1);
-  cv::Mat centikelvin(kelvin.size(), CV_16UC1);
-  for (int y = 0; y < kelvin.rows; ++y) {
-    for (int x = 0; x < kelvin.cols; ++x) {
-      centikelvin.at<std::uint16_t>(y, x) = centikelvin_from_kelvin(kelvin.at<float>(y, x));
+double kelvin_per_count_for(const std::vector<cv::Mat>& kelvin_images) {
+  double hottest_k = 0;
+  for (const cv::Mat& image : kelvin_images) {
+    for (int y = 0; y < image.rows; ++y) {
+      for (int x = 0; x < image.cols; ++x) {
+        const double t = image.at<float>(y, x);
+        // What no scale holds decides nothing: it is not stored in any case.
+        if (t > hottest_k && t <= 65535 * stored_kelvin_per_count.back()) hottest_k = t;
+      }
     }
   }
-  ORBITFUSE_TRY(write_encoded(path, encode_thermal_tiff(centikelvin)));
-  return write_file_atomic(sidecar_of(path), thermal_sidecar_json() + "\n");
+  return kelvin_per_count_for(hottest_k);
+}
+
+Status write_thermal_tiff(const fs::path& path, const cv::Mat& kelvin, std::optional<double> kelvin_per_count) {
+  CV_Assert(kelvin.type() == CV_32FC1);
+  const double scale = kelvin_per_count ? *kelvin_per_count : kelvin_per_count_for(std::vector<cv::Mat>{kelvin});
+  cv::Mat counts(kelvin.size(), CV_16UC1);
+  for (int y = 0; y < kelvin.rows; ++y) {
+    for (int x = 0; x < kelvin.cols; ++x) {
+      counts.at<std::uint16_t>(y, x) = count_from_kelvin(static_cast<double>(kelvin.at<float>(y, x)), scale);
+    }
+  }
+  ORBITFUSE_TRY(write_encoded(path, encode_thermal_tiff(counts, {scale, 0})));
+  return write_file_atomic(sidecar_of(path), thermal_sidecar_json({scale, 0}) + "\n");
 }
 
 Status write_float_tiff(const fs::path& path, const cv::Mat& values) {
@@ -104,7 +116,7 @@ Status write_float_tiff(const fs::path& path, const cv::Mat& values) {
 }
 
 Result<cv::Mat> read_float_tiff(const fs::path& path) {
-  ORBITFUSE_ASSIGN(const std::string bytes, read_file(path));
+  ORBITFUSE_ASSIGN(const std::string bytes, read_file(path, max_image_bytes));
   ORBITFUSE_ASSIGN(cv::Mat image, decode_tiff(bytes, path.string()));
   if (image.type() != CV_32FC1) {
     return fail(ErrorKind::input, path.string(), "not a 32-bit float TIFF", "write the depth map again");

@@ -3,6 +3,8 @@
 
 #include <filesystem>
 #include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
 
 #include "core/result.hpp"
 
@@ -22,8 +24,12 @@ Result<cv::Mat> read_image(const std::filesystem::path& path);
 /// Encoders; all writes are atomic.
 Status write_png(const std::filesystem::path& path, const cv::Mat& image);
 Status write_jpeg(const std::filesystem::path& path, const cv::Mat& image, int quality = 95);
-/// 16-bit centikelvin TIFF with the scale in ImageDescription, and its sidecar.
-Status write_thermal_tiff(const std::filesystem::path& path, const cv::Mat& kelvin);
+/// The finest stored scale (core/temperature.hpp) that holds every temperature of the images.
+double kelvin_per_count_for(const std::vector<cv::Mat>& kelvin_images);
+/// 16-bit TIFF with the scale in ImageDescription, and its sidecar. Without a scale the finest that
+/// holds the image: 0.01 K a count (centikelvin) up to 382 C.
+Status write_thermal_tiff(const std::filesystem::path& path, const cv::Mat& kelvin,
+                          std::optional<double> kelvin_per_count = {});
 /// 32-bit float TIFF (depth, opacity).
 Status write_float_tiff(const std::filesystem::path& path, const cv::Mat& values);
 Result<cv::Mat> read_float_tiff(const std::filesystem::path& path);

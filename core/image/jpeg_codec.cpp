@@ -19,6 +19,8 @@ struct JpegErrors {
   std::jmp_buf jump;
   char text[JMSG_LENGTH_MAX];
   bool truncated;
+  bool damaged;  ///< in the compressed data
+  bool in_scan;  ///< past the headers
 };
 
 // libjpeg hands base back to the callbacks; it is the first member, so the cast is defined.
@@ -30,9 +32,20 @@ void on_fatal(j_common_ptr info) {
 }
 
 void on_message(j_common_ptr info, int level) {
+  if (level >= 0) return;
   // Where a decoder would fill the rest with grey: the data ended early.
   const int code = info->err->msg_code;
-  if (level < 0 && (code == JWRN_JPEG_EOF || code == JWRN_HIT_MARKER)) errors_of(info).truncated = true;
+  if (code == JWRN_JPEG_EOF || code == JWRN_HIT_MARKER) errors_of(info).truncated = true;
+  // Where it would go on with wrong colours: codes that no encoder writes.
+  if (code == JWRN_HUFF_BAD_CODE || code == JWRN_ARITH_BAD_CODE || code == JWRN_MUST_RESYNC ||
+      code == JWRN_BOGUS_PROGRESSION) {
+    errors_of(info).damaged = true;
+  }
+  // A shifted code often ends its scan early. Cameras pad a few bytes; half a block is damage.
+  constexpr int padding = 32;
+  if (code == JWRN_EXTRANEOUS_DATA && errors_of(info).in_scan && info->err->msg_parm.i[0] > padding) {
+    errors_of(info).damaged = true;
+  }
 }
 
 /// Plain C style: longjmp may not pass over C++ objects, so everything lives in the caller.
@@ -49,6 +62,7 @@ bool decode(std::string_view bytes, jpeg_decompress_struct& info, JpegErrors& er
   info.out_color_space = info.jpeg_color_space == JCS_GRAYSCALE ? JCS_GRAYSCALE
                          : cmyk                                 ? JCS_CMYK
                                                                 : JCS_EXT_BGR;
+  errors.in_scan = true;
   jpeg_start_decompress(&info);
   image.create(static_cast<int>(info.output_height), static_cast<int>(info.output_width),
                CV_8UC(info.output_components));
@@ -87,6 +101,9 @@ Result<cv::Mat> decode_jpeg(std::string_view bytes, const std::string& where) {
   jpeg_destroy_decompress(&info);
   if (!decoded) {
     return fail(ErrorKind::input, where, fmt::format("damaged JPEG ({})", errors.text), "copy the file again");
+  }
+  if (errors.damaged) {
+    return fail(ErrorKind::input, where, "damaged JPEG (wrong codes in its image data)", "copy the file again");
   }
   if (errors.truncated) return fail(ErrorKind::input, where, "truncated JPEG", "copy the file again");
   return image.channels() == 4 ? bgr_of_inverted_cmyk(image) : image;

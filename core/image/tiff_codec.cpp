@@ -60,6 +60,8 @@ void on_warning(thandle_t handle, const char*, const char* format, va_list) {
   if (handle && std::strstr(format, "IO error")) static_cast<MemoryFile*>(handle)->tag_is_cut = true;
 }
 
+constexpr int max_pages = 10000;  // a recording; a damaged chain of directories ends here
+
 using TiffHandle = std::unique_ptr<TIFF, decltype(&TIFFClose)>;
 
 TiffHandle open(MemoryFile& file, const char* mode) {
@@ -133,6 +135,19 @@ bool read_tiles(TIFF* tiff, const Layout& l, cv::Mat& image) {
   return true;
 }
 
+/// Advances to the next image of the first one's layout that is no mask or reduced copy of another.
+bool next_page(TIFF* tiff, const Layout& first) {
+  while (TIFFReadDirectory(tiff) == 1) {
+    std::uint32_t kind = 0;
+    TIFFGetFieldDefaulted(tiff, TIFFTAG_SUBFILETYPE, &kind);
+    const Layout l = layout_of(tiff);
+    const bool alike = l.width == first.width && l.height == first.height && l.bits == first.bits &&
+                       l.channels == first.channels && l.format == first.format;
+    if (alike && (kind & (FILETYPE_REDUCEDIMAGE | FILETYPE_MASK)) == 0) return true;
+  }
+  return false;
+}
+
 cv::Mat to_bgr(const cv::Mat& image) {
   cv::Mat out = image;
   if (image.channels() == 3) cv::cvtColor(image, out, cv::COLOR_RGB2BGR);
@@ -143,13 +158,33 @@ cv::Mat to_bgr(const cv::Mat& image) {
 
 }  // namespace
 
+int tiff_page_count(std::string_view bytes) {
+  MemoryFile file;
+  file.input = bytes;
+  const TiffHandle tiff = open(file, "rm");
+  if (!tiff) return 0;
+  const Layout first = layout_of(tiff.get());
+  int pages = 1;
+  while (pages < max_pages && next_page(tiff.get(), first)) ++pages;
+  return pages;
+}
+
 Result<cv::Mat> decode_tiff(std::string_view bytes, const std::string& where,
-                            std::string* image_description) {
+                            std::string* image_description, std::optional<int> page) {
+  if (!page) {
+    if (const int pages = tiff_page_count(bytes); pages > 1) {
+      return fail(ErrorKind::input, where, fmt::format("TIFF of {} pages, one expected", pages),
+                  "split it (tiffsplit), or import its pages as thermal frames");
+    }
+  }
   MemoryFile file;
   file.input = bytes;
   const TiffHandle tiff = open(file, "rm");
   if (!tiff) return fail(ErrorKind::input, where, "not a readable TIFF", "copy the file again");
   const Layout l = layout_of(tiff.get());
+  for (int at = 0; at < page.value_or(0); ++at) {
+    if (!next_page(tiff.get(), l)) return fail(ErrorKind::input, where, fmt::format("no page {}", *page + 1), "copy the file again");
+  }
   const int depth = depth_of(l);
   if (depth < 0 || l.channels < 1 || l.channels > 4 || l.planar != PLANARCONFIG_CONTIG ||
       l.photometric == PHOTOMETRIC_PALETTE) {

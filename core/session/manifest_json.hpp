@@ -8,6 +8,15 @@
 #include "core/session/session.hpp"
 
 // The manifest's lines as JSON; used by session.cpp and the writer functions of session.hpp.
+namespace orbitfuse {
+
+/// Whether open_session() would take the record's line: a NaN that slipped into a pose would make the
+/// whole session unreadable. To be asked before anything is written.
+Status check_readable(const FrameRecord& frame);
+Status check_readable(const DeviceInfo& device);
+
+}  // namespace orbitfuse
+
 namespace orbitfuse::manifest {
 
 using Json = nlohmann::json;

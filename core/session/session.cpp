@@ -76,6 +76,20 @@ std::vector<const FrameRecord*> Session::frames_of(Modality modality, bool with_
   return out;
 }
 
+Status check_readable(const FrameRecord& frame) {
+  const Json line = Json::parse(manifest_line(frame));
+  const auto read = manifest::read_frame(manifest::Reader(line, frame.source.empty() ? frame.file : frame.source));
+  if (read) return {};
+  return fail(ErrorKind::input, read.error().where, read.error().found, "correct what is known of this frame");
+}
+
+Status check_readable(const DeviceInfo& device) {
+  const Json line = Json::parse(manifest_line(device));
+  const auto read = manifest::read_device(manifest::Reader(line, "device " + device.id));
+  if (read) return {};
+  return fail(ErrorKind::input, read.error().where, read.error().found, "correct what is known of this camera");
+}
+
 Result<Session> open_session(const std::filesystem::path& folder) {
   std::error_code ignored;
   const std::filesystem::path file = folder / "manifest.jsonl";

@@ -7,9 +7,12 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <memory>
+#include <utility>
 
 namespace orbitfuse {
 namespace {
@@ -22,6 +25,7 @@ class Descriptor {
   ~Descriptor() {
     if (fd_ >= 0) ::close(fd_);
   }
+  Descriptor(Descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
   Descriptor(const Descriptor&) = delete;
   Descriptor& operator=(const Descriptor&) = delete;
   int get() const { return fd_; }
@@ -57,27 +61,60 @@ bool write_all(int fd, std::string_view bytes) {
   return true;
 }
 
-}  // namespace
+const char* kind_of(mode_t mode) {
+  if (S_ISDIR(mode)) return "a folder, not a file";
+  if (S_ISCHR(mode) || S_ISBLK(mode)) return "a device, not a file";
+  if (S_ISFIFO(mode)) return "a pipe, not a file";
+  return "not a file";
+}
 
-Result<std::string> read_file(const fs::path& path) {
-  Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+/// Opened for reading, and what the system says of it. Without O_NONBLOCK a pipe would be waited for.
+Result<Descriptor> open_regular(const fs::path& path, struct stat& info) {
+  Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (file.get() < 0) {
     return fail(ErrorKind::input, path.string(), std::strerror(errno), "check the path");
   }
-  struct stat info {};
-  if (::fstat(file.get(), &info) != 0 || S_ISDIR(info.st_mode)) {
-    return fail(ErrorKind::input, path.string(), "not a file", "check the path");
+  if (::fstat(file.get(), &info) != 0 || !S_ISREG(info.st_mode)) {
+    return fail(ErrorKind::input, path.string(), kind_of(info.st_mode), "check the path");
   }
-  std::string bytes(static_cast<std::size_t>(std::max<off_t>(0, info.st_size)), '\0');
+  return file;
+}
+
+tl::unexpected<Error> too_large(const fs::path& path, std::uint64_t size, std::uint64_t at_most) {
+  constexpr double mebibyte = 1 << 20;
+  return fail(ErrorKind::input, path.string(),
+              fmt::format("{:.0f} MiB, at most {:.0f} MiB are read", static_cast<double>(size) / mebibyte,
+                          static_cast<double>(at_most) / mebibyte),
+              "is it the file you mean?");
+}
+
+std::string hex(XXH128_hash_t hash) { return fmt::format("{:016x}{:016x}", hash.high64, hash.low64); }
+
+/// Bytes read, 0 at the end, -1 on an error.
+ssize_t read_some(int fd, char* to, std::size_t count) {
+  for (;;) {
+    const ssize_t n = ::read(fd, to, count);
+    if (n >= 0 || errno != EINTR) return n;
+  }
+}
+
+}  // namespace
+
+Result<std::string> read_file(const fs::path& path, std::uint64_t at_most) {
+  struct stat info {};
+  ORBITFUSE_ASSIGN(const Descriptor file, open_regular(path, info));
+  const auto size = static_cast<std::uint64_t>(std::max<off_t>(0, info.st_size));
+  if (size > at_most) return too_large(path, size, at_most);
+  std::string bytes(size + 1, '\0');  // one more: the end is seen without growing
   std::size_t have = 0;
-  // The size is a hint: pipes and /proc report 0, and a file may grow while it is read.
+  // The size is a hint: files of /proc report 0, and a file may grow while it is read.
   for (;;) {
     if (have == bytes.size()) bytes.resize(bytes.size() + 65536);
-    const ssize_t n = ::read(file.get(), bytes.data() + have, bytes.size() - have);
-    if (n < 0 && errno == EINTR) continue;
+    const ssize_t n = read_some(file.get(), bytes.data() + have, bytes.size() - have);
     if (n < 0) return fail(ErrorKind::input, path.string(), std::strerror(errno), "check the disk");
     if (n == 0) break;
     have += static_cast<std::size_t>(n);
+    if (have > at_most) return too_large(path, have, at_most);
   }
   bytes.resize(have);
   return bytes;
@@ -112,14 +149,21 @@ Status write_file_atomic(const fs::path& path, std::string_view bytes) {
   return sync_folder(folder);
 }
 
-std::string content_hash(std::string_view bytes) {
-  const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
-  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
-}
+std::string content_hash(std::string_view bytes) { return hex(XXH3_128bits(bytes.data(), bytes.size())); }
 
 Result<std::string> file_hash(const fs::path& path) {
-  ORBITFUSE_ASSIGN(const std::string bytes, read_file(path));
-  return content_hash(bytes);
+  struct stat info {};
+  ORBITFUSE_ASSIGN(const Descriptor file, open_regular(path, info));
+  const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(), &XXH3_freeState);
+  XXH3_128bits_reset(state.get());
+  std::string piece(1 << 20, '\0');
+  for (;;) {
+    const ssize_t n = read_some(file.get(), piece.data(), piece.size());
+    if (n < 0) return fail(ErrorKind::input, path.string(), std::strerror(errno), "check the disk");
+    if (n == 0) break;
+    XXH3_128bits_update(state.get(), piece.data(), static_cast<std::size_t>(n));
+  }
+  return hex(XXH3_128bits_digest(state.get()));
 }
 
 }  // namespace orbitfuse

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "core/image/image_codec.hpp"
-#include "core/temperature.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -236,19 +235,6 @@ Result<FlirImage> read_flir_jpeg(std::string_view bytes, const std::string& wher
     image.embedded_visible = e->second.substr(0x20);
   }
   return image;
-}
-
-cv::Mat centikelvin_of(const FlirImage& image) {
-  const FlirThermometer thermometer(image.calibration);
-  // 65536 possible signals: a table costs less than a logarithm per pixel.
-  std::vector<std::uint16_t> table(65536);
-  for (std::size_t s = 0; s < table.size(); ++s) {
-    table[s] = centikelvin_from_kelvin(static_cast<float>(thermometer.kelvin(static_cast<std::uint16_t>(s))));
-  }
-  cv::Mat out(image.signal.size(), CV_16UC1);
-  std::transform(image.signal.begin<std::uint16_t>(), image.signal.end<std::uint16_t>(),
-                 out.begin<std::uint16_t>(), [&](std::uint16_t s) { return table[s]; });
-  return out;
 }
 
 }  // namespace orbitfuse

@@ -29,7 +29,4 @@ bool is_flir_jpeg(std::string_view bytes);
 /// project). Any damage is an input error: every offset and length is checked.
 Result<FlirImage> read_flir_jpeg(std::string_view bytes, const std::string& where);
 
-/// CV_16UC1 centikelvin, 0 = no temperature.
-cv::Mat centikelvin_of(const FlirImage& image);
-
 }  // namespace orbitfuse

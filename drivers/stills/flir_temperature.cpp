@@ -75,6 +75,13 @@ double FlirThermometer::signal_of(double kelvin) const {
   return planck_.r1 / (planck_.r2 * (std::exp(planck_.b / kelvin) - planck_.f)) - planck_.o;
 }
 
+std::vector<double> kelvin_table(const FlirCalibration& calibration) {
+  const FlirThermometer thermometer(calibration);
+  std::vector<double> table(65536);
+  for (std::size_t s = 0; s < table.size(); ++s) table[s] = thermometer.kelvin(static_cast<std::uint16_t>(s));
+  return table;
+}
+
 double FlirThermometer::kelvin(std::uint16_t signal) const {
   const double s = gain_ * signal + offset_ + planck_.o;
   const double argument = planck_.r1 / (planck_.r2 * s) + planck_.f;

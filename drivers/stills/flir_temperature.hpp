@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "core/result.hpp"
 
@@ -53,5 +54,8 @@ class FlirThermometer {
   PlanckConstants planck_;
   double tau_ = 1, gain_ = 1, offset_ = 0;  ///< S_obj = gain S + offset
 };
+
+/// Of each of the 65536 signals: a table costs less than a logarithm per pixel.
+std::vector<double> kelvin_table(const FlirCalibration& calibration);
 
 }  // namespace orbitfuse

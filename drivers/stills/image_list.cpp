@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "drivers/stills/image_list.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cctype>
 #include <set>
+#include <string_view>
 
 namespace orbitfuse {
 namespace {
@@ -13,12 +16,29 @@ namespace fs = std::filesystem;
 
 bool is_digit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; }
 
-bool has_image_extension(const fs::path& path) {
+std::string extension_of(const fs::path& path) {
   std::string extension = path.extension().string();
   for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  constexpr std::array known{".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp"};
-  return std::find(known.begin(), known.end(), extension) != known.end();
+  return extension;
 }
+
+bool has_image_extension(const fs::path& path) {
+  constexpr std::array<std::string_view, 6> known{".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp"};
+  return std::find(known.begin(), known.end(), extension_of(path)) != known.end();
+}
+
+struct UnreadFormat {
+  const char* kind;
+  std::string_view extensions;  ///< each between dots
+};
+/// What phones, cameras and their software leave beside JPEGs.
+constexpr std::array<UnreadFormat, 6> unread_formats{
+    {{"HEIC", ".heic.heif.hif."},
+     {"raw photo", ".dng.cr2.cr3.nef.nrw.arw.orf.rw2.raf.pef.srw."},
+     {"video", ".mp4.mov.avi.mkv.m4v.mpg.mpeg.wmv.webm.mts.3gp."},
+     {"FLIR recording", ".seq.csq.fff.ats.sfmov.ptw.ravi."},
+     {"web image", ".webp.avif.gif.jxl."},
+     {"image", ".jp2.j2k.exr.hdr.psd.tga.pgm.ppm.pnm.is2.irg.bmt."}}};
 
 /// End of the digit run at `at` and its start without leading zeros.
 std::pair<std::size_t, std::size_t> digit_run(const std::string& s, std::size_t at) {
@@ -50,8 +70,17 @@ bool natural_less(const std::string& a, const std::string& b) {
   return a < b;  // "1" and "01": any fixed order
 }
 
-Result<std::vector<fs::path>> list_images(const std::vector<fs::path>& paths) {
-  std::vector<fs::path> files;
+std::string unread_kind(const fs::path& file) {
+  const std::string extension = extension_of(file) + ".";
+  for (const UnreadFormat& format : unread_formats) {
+    if (extension.size() > 2 && format.extensions.find(extension) != std::string_view::npos) return format.kind;
+  }
+  return {};
+}
+
+Result<ImageList> list_images(const std::vector<fs::path>& paths) {
+  ImageList list;
+  std::vector<fs::path>& files = list.images;
   for (const fs::path& path : paths) {
     std::error_code error;
     if (path.empty())
@@ -62,13 +91,19 @@ Result<std::vector<fs::path>> list_images(const std::vector<fs::path>& paths) {
     }
     fs::directory_iterator folder(path, error);
     if (error) return fail(ErrorKind::input, path.string(), error.message(), "check the path");
-    const std::size_t before = files.size();
+    const std::size_t before = files.size(), unread_before = list.unread.size();
     for (const fs::directory_entry& entry : folder) {
-      if (entry.is_regular_file(error) && has_image_extension(entry.path())) files.push_back(entry.path());
+      if (!entry.is_regular_file(error)) continue;
+      if (has_image_extension(entry.path())) files.push_back(entry.path());
+      else if (!unread_kind(entry.path()).empty()) list.unread.push_back(entry.path());
     }
     if (files.size() == before) {
-      return fail(ErrorKind::input, path.string(), "no images (jpg, png, tif, bmp) in the folder",
-                  "give the folder that holds the images themselves");
+      const bool other = list.unread.size() > unread_before;
+      return fail(ErrorKind::input, path.string(),
+                  other ? fmt::format("no JPEG, PNG, TIFF or BMP in the folder, but {} of another format ({})",
+                                      list.unread.size() - unread_before, list.unread.back().filename().string())
+                        : "no images (jpg, png, tif, bmp) in the folder",
+                  other ? "convert them to JPEG" : "give the folder that holds the images themselves");
     }
   }
   std::set<fs::path> seen;
@@ -81,7 +116,8 @@ Result<std::vector<fs::path>> list_images(const std::vector<fs::path>& paths) {
   std::stable_sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
     return natural_less(a.filename().string(), b.filename().string());
   });
-  return files;
+  std::sort(list.unread.begin(), list.unread.end());
+  return list;
 }
 
 }  // namespace orbitfuse

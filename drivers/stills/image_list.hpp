@@ -9,9 +9,18 @@
 
 namespace orbitfuse {
 
+struct ImageList {
+  std::vector<std::filesystem::path> images;
+  /// Pictures and videos in formats that are not read: who put them there expects them.
+  std::vector<std::filesystem::path> unread;
+};
+
 /// Image files named by the paths: files as given, folders without their sub-folders. In natural
 /// name order ("9.jpg" before "10.jpg"). Input error when a path is missing or has no images.
-Result<std::vector<std::filesystem::path>> list_images(const std::vector<std::filesystem::path>& paths);
+Result<ImageList> list_images(const std::vector<std::filesystem::path>& paths);
+
+/// "HEIC", "video" and the like for the name of a picture or video that is not read; else empty.
+std::string unread_kind(const std::filesystem::path& file);
 
 /// Natural order: digit runs compare as numbers.
 bool natural_less(const std::string& a, const std::string& b);

@@ -2,11 +2,9 @@
 #include "drivers/stills/import.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 
 #include "capture/recording/frame_encoding.hpp"
 #include "capture/recording/session_folder.hpp"
@@ -14,8 +12,12 @@
 #include "core/image/exif.hpp"
 #include "core/system/file_io.hpp"
 #include "core/image/image_codec.hpp"
+#include "core/temperature.hpp"
+#include "drivers/stills/camera_groups.hpp"
 #include "drivers/stills/image_list.hpp"
+#include "drivers/stills/import_leftover.hpp"
 #include "drivers/stills/known_poses.hpp"
+#include "drivers/stills/sources.hpp"
 #include "drivers/stills/still_photo.hpp"
 #include "drivers/stills/thermal_decoder.hpp"
 
@@ -23,24 +25,6 @@ namespace orbitfuse {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct Source {
-  fs::path file;
-  std::optional<std::int64_t> taken_ns;
-  int position = 0;  ///< in capture order, counting files that turn out unreadable
-};
-
-/// Capture order: by time where every file has one (file name breaks ties of one-second clocks),
-/// else by name.
-std::vector<Source> in_capture_order(std::vector<Source> sources) {
-  const bool all_timed = std::all_of(sources.begin(), sources.end(), [](const Source& s) { return s.taken_ns.has_value(); });
-  if (all_timed) {
-    std::stable_sort(sources.begin(), sources.end(),
-                     [](const Source& a, const Source& b) { return *a.taken_ns < *b.taken_ns; });
-  }
-  for (std::size_t i = 0; i < sources.size(); ++i) sources[i].position = static_cast<int>(i);
-  return sources;
-}
 
 /// The camera of a source at the image's own size; nothing when the shapes differ.
 std::optional<Camera> fitted(const Camera& camera, cv::Size size) {
@@ -50,33 +34,33 @@ std::optional<Camera> fitted(const Camera& camera, cv::Size size) {
   return camera.scaled_to(size.width, size.height);
 }
 
-/// Folder and file: enough to tell "visible/000.jpg" from "thermal/000.jpg" on any machine.
-std::string short_name(const fs::path& file) {
-  return (file.parent_path().filename() / file.filename()).string();
-}
-
 class Importer {
  public:
   /// Without a writer everything is done but the writing.
   Importer(const ImportOptions& options, const fs::path& folder, SessionWriter* writer, const Progress& progress)
-      : options_(options), folder_(folder), writer_(writer), progress_(progress), decoder_(options) {}
+      : options_(options), folder_(folder), writer_(writer), progress_(progress), decoder_(options), groups_(options) {}
 
   Status run() {
     ORBITFUSE_ASSIGN(known_, read_known_poses(options_));
-    ORBITFUSE_ASSIGN(const auto visible, visible_sources());
-    ORBITFUSE_ASSIGN(const auto visible_tracking, listed(options_.visible_tracking));
-    ORBITFUSE_ASSIGN(auto thermal, thermal_sources());
-    ORBITFUSE_ASSIGN(auto thermal_tracking, listed(options_.thermal_tracking));
-    ORBITFUSE_TRY(check_known(Modality::visible, {&visible, &visible_tracking}));
-    ORBITFUSE_TRY(check_known(Modality::thermal, {&thermal, &thermal_tracking}));
-    ORBITFUSE_TRY(check_disk({&visible, &visible_tracking}));
+    ORBITFUSE_ASSIGN(const auto visible_files, visible_sources());
+    ORBITFUSE_ASSIGN(const auto visible_tracking_files, listed(options_.visible_tracking));
+    ORBITFUSE_ASSIGN(const auto thermal_files, thermal_sources());
+    ORBITFUSE_ASSIGN(const auto thermal_tracking_files, listed(options_.thermal_tracking));
+    ORBITFUSE_TRY(check_known(Modality::visible, {&visible_files, &visible_tracking_files}));
+    ORBITFUSE_TRY(check_known(Modality::thermal, {&thermal_files, &thermal_tracking_files}));
+    ORBITFUSE_TRY(check_disk({&visible_files, &visible_tracking_files}));
+    // First every thermal file is looked at: what its samples mean is decided for all of them.
+    std::vector<Source> thermal = observed(thermal_files), thermal_tracking = observed(thermal_tracking_files);
+    ORBITFUSE_TRY(check_object_parameters());
+    std::vector<Source> visible = with_exif_times(visible_files);
+    std::vector<Source> visible_tracking = with_exif_times(visible_tracking_files);
+    take_out_copies(Modality::visible, {&visible, &visible_tracking});
+    take_out_copies(Modality::thermal, {&thermal, &thermal_tracking});
     total_ = visible.size() + visible_tracking.size() + thermal.size() + thermal_tracking.size();
-    ORBITFUSE_TRY(add_visible(with_exif_times(visible), false));
-    ORBITFUSE_TRY(add_visible(with_exif_times(visible_tracking), true));
-    // First every thermal file is looked at: what 16-bit samples mean is decided for all of them.
-    std::vector<Source> stations = observed(thermal), tracking = observed(thermal_tracking);
-    ORBITFUSE_TRY(add_thermal(in_capture_order(std::move(stations)), false));
-    ORBITFUSE_TRY(add_thermal(in_capture_order(std::move(tracking)), true));
+    ORBITFUSE_TRY(add_visible(in_capture_order(std::move(visible)), false));
+    ORBITFUSE_TRY(add_visible(in_capture_order(std::move(visible_tracking)), true));
+    ORBITFUSE_TRY(add_thermal(in_capture_order(std::move(thermal)), false));
+    ORBITFUSE_TRY(add_thermal(in_capture_order(std::move(thermal_tracking)), true));
     if (report_.visible + report_.thermal + report_.tracking == 0) {
       return fail(ErrorKind::input, "import", first_failure_.empty() ? "no readable image" : first_failure_,
                   "give folders with JPEG, PNG or TIFF images");
@@ -87,19 +71,25 @@ class Importer {
   ImportReport take_report() { return std::move(report_); }
 
  private:
-  Result<std::vector<fs::path>> listed(const std::vector<fs::path>& paths) const {
+  Result<std::vector<fs::path>> listed(const std::vector<fs::path>& paths) {
     if (paths.empty()) return std::vector<fs::path>{};
-    return list_images(paths);
+    ORBITFUSE_ASSIGN(ImageList list, list_images(paths));
+    for (const fs::path& file : list.unread) {
+      report_.warnings.push_back(fmt::format("left out: {}: {} files are not read; convert it to JPEG, PNG or TIFF",
+                                             file.string(), unread_kind(file)));
+    }
+    return std::move(list.images);
   }
 
-  Result<std::vector<fs::path>> visible_sources() const {
-    if (!options_.visible.empty()) return list_images(options_.visible);
+  Result<std::vector<fs::path>> visible_sources() {
+    if (!options_.visible.empty()) return listed(options_.visible);
     return files_of_transforms(Modality::visible);
   }
-  Result<std::vector<fs::path>> thermal_sources() const {
-    if (!options_.thermal.empty()) return list_images(options_.thermal);
+  Result<std::vector<fs::path>> thermal_sources() {
+    if (!options_.thermal.empty()) return listed(options_.thermal);
     return files_of_transforms(Modality::thermal);
   }
+
   /// Photos are copied as they are.
   Status check_disk(std::initializer_list<const std::vector<fs::path>*> photos) const {
     std::uint64_t needed = min_free_session_bytes;
@@ -140,26 +130,64 @@ class Importer {
     return files;
   }
 
-  std::vector<Source> with_exif_times(const std::vector<fs::path>& files) const {
+  static std::vector<Source> with_exif_times(const std::vector<fs::path>& files) {
     std::vector<Source> sources;
     for (const fs::path& file : files) {
-      const Result<std::string> bytes = read_file(file);
-      sources.push_back({file, bytes ? read_exif(*bytes).taken_ns : std::nullopt, 0});
+      const Result<std::string> bytes = read_file(file, max_image_bytes);
+      Source source;
+      source.file = file;
+      if (bytes) {
+        source.hash = content_hash(*bytes);
+        source.taken_ns = read_exif(*bytes).taken_ns;
+      }
+      sources.push_back(std::move(source));
     }
-    return in_capture_order(std::move(sources));
+    return sources;
   }
 
   std::vector<Source> observed(const std::vector<fs::path>& files) {
     std::vector<Source> sources;
     for (const fs::path& file : files) {
-      Source source{file, std::nullopt, 0};
-      if (const Result<ThermalFile> thermal = read_thermal_file(file)) {
-        decoder_.observe(*thermal);
-        source.taken_ns = taken_ns(*thermal);
+      Source source;
+      source.file = file;
+      Result<std::string> bytes = read_file(file, max_image_bytes);
+      if (!bytes) {
+        sources.push_back(source);
+        continue;
       }
-      sources.push_back(source);
+      source.hash = content_hash(*bytes);
+      if (image_format(*bytes) == ImageFormat::tiff) source.pages = std::max(1, tiff_page_count(*bytes));
+      for (source.page = 0; source.page < source.pages; ++source.page) {
+        source.taken_ns.reset();
+        if (const Result<ThermalFile> thermal = thermal_file(*bytes, file, source.page)) {
+          decoder_.observe(*thermal, source.short_name());
+          source.taken_ns = taken_ns(*thermal);
+        }
+        sources.push_back(source);
+      }
     }
     return sources;
+  }
+
+  void take_out_copies(Modality modality, std::initializer_list<std::vector<Source>*> lists) {
+    CopyFilter filter(known_[modality]);
+    for (std::vector<Source>* sources : lists) {
+      for (std::string& told : filter.take_out(*sources)) report_.warnings.push_back(std::move(told));
+    }
+  }
+
+  /// Only radiometric JPEGs say what was assumed of the object; temperatures of others are as they are.
+  Status check_object_parameters() {
+    if (!options_.object.any() || decoder_.radiometric_jpegs() == decoder_.files()) return {};
+    const int others = decoder_.files() - decoder_.radiometric_jpegs();
+    const std::string found = fmt::format("emissivity, distance, reflected or air temperature or humidity is given, but "
+                                          "{} of {} thermal files are no radiometric JPEGs",
+                                          others, decoder_.files());
+    if (decoder_.radiometric_jpegs() == 0) {
+      return fail(ErrorKind::usage, "import.object", found, "their temperatures can't be corrected: leave it out");
+    }
+    report_.warnings.push_back(found + ": their temperatures stay as they are");
+    return {};
   }
 
   void pass_over(const Error& error) {
@@ -176,7 +204,7 @@ class Importer {
   Status add_visible(const std::vector<Source>& sources, bool tracking) {
     for (const Source& source : sources) {
       ORBITFUSE_TRY(step());
-      const Result<std::string> bytes = read_file(source.file);
+      const Result<std::string> bytes = read_file(source.file, max_image_bytes);
       if (!bytes) {
         pass_over(bytes.error());
         continue;
@@ -188,7 +216,7 @@ class Importer {
 
   Status add_visible_frame(std::string bytes, const Source& source, bool tracking,
                            const std::optional<DeclaredStations>& stations) {
-    Result<StillPhoto> still = visible_still(std::move(bytes), source.file.string());
+    Result<StillPhoto> still = visible_still(std::move(bytes), source.where());
     if (!still) {
       pass_over(still.error());
       return {};
@@ -199,16 +227,17 @@ class Importer {
   Status add_thermal(const std::vector<Source>& sources, bool tracking) {
     for (const Source& source : sources) {
       ORBITFUSE_TRY(step());
-      const Result<ThermalFile> file = read_thermal_file(source.file);
+      const Result<ThermalFile> file = read_thermal_file(source.file, source.page);
       if (!file) {
         pass_over(file.error());
         continue;
       }
-      Result<StillPhoto> still = thermal_still(*file, decoder_, source.file.string());
+      Result<StillPhoto> still = thermal_still(*file, decoder_, source.where());
       if (!still) {
         pass_over(still.error());
         continue;
       }
+      tell_lost_samples(*still, source);
       report_.has_temperatures = report_.has_temperatures || !still->frame.thermal_is_gray;
       ORBITFUSE_TRY(add_frame(std::move(*still), source, tracking, options_.thermal_stations));
       if (options_.embedded_visible && file->flir && !file->flir->embedded_visible.empty()) {
@@ -220,12 +249,21 @@ class Importer {
     return {};
   }
 
+  void tell_lost_samples(const StillPhoto& still, const Source& source) {
+    if (still.without_temperature == 0) return;
+    report_.warnings.push_back(fmt::format("{}: {} of {} samples have no temperature that can be stored (above 0 K, at "
+                                           "most {:.0f} C): dead pixels",
+                                           source.short_name(), still.without_temperature,
+                                           still.size.width * still.size.height,
+                                           celsius_from_kelvin(65535 * still.frame.kelvin_per_count)));
+  }
+
   Status add_frame(StillPhoto still, const Source& source, bool tracking,
                    const std::optional<DeclaredStations>& stations) {
-    ORBITFUSE_ASSIGN(Group* group, group_of(still, source));
+    ORBITFUSE_ASSIGN(CameraGroup* group, groups_.of(still, source));
     Frame& frame = still.frame;
     DeviceInfo& device = still.camera;
-    frame.source = short_name(source.file);
+    frame.source = source.short_name();
     frame.tracking = tracking;
     frame.host_time_ns = source.taken_ns.value_or(0);
     const KnownViews& known = known_[device.modality];
@@ -236,7 +274,7 @@ class Importer {
     }
     if (stations && !frame.tracking) frame.station = station_at(*stations, source.position, view);
     if (group->id.empty()) {
-      group->id = device.id = next_device_id(device.modality);
+      group->id = device.id = groups_.next_device_id(device.modality);
       if (writer_) ORBITFUSE_TRY(writer_->add_device(device));
     }
     frame.id = group->frames;
@@ -297,53 +335,6 @@ class Importer {
     return station;
   }
 
-  /// Photos of one camera, lens and size share a device, so that they may share intrinsics.
-  struct Group {
-    Modality modality = Modality::visible;
-    std::string key, described, first_file, id;
-    std::uint64_t frames = 0;
-  };
-
-  Result<Group*> group_of(StillPhoto& still, const Source& source) {
-    const Modality modality = still.camera.modality;
-    const auto& focal = modality == Modality::visible ? options_.visible_focal_px : options_.thermal_focal_px;
-    if (focal) still.camera.lens.focal_px = focal;
-    const std::string key = still.key();
-    for (Group& group : groups_) {
-      if (group.modality != modality) continue;
-      if (group.key == key) return &group;
-      if (focal) {
-        return fail(ErrorKind::input, short_name(source.file),
-                    fmt::format("is of {}, but {} of {}", still.described(), group.first_file, group.described),
-                    fmt::format("one focal length of {:g} px is not true of both: import them one by one, "
-                                "or leave the option away",
-                                *focal));
-      }
-    }
-    groups_.push_back({modality, key, still.described(), short_name(source.file), {}, 0});
-    return &groups_.back();
-  }
-
-  std::string next_device_id(Modality modality) const {
-    const auto known = std::count_if(groups_.begin(), groups_.end(), [&](const Group& group) {
-      return group.modality == modality && !group.id.empty();
-    });
-    return fmt::format("{}{}", name(modality), known);
-  }
-
-  void tell_of_groups(Modality modality) {
-    std::vector<std::string> list;
-    for (const Group& group : groups_) {
-      if (group.modality == modality)
-        list.push_back(fmt::format("{} from {} ({})", group.id, group.first_file, group.described));
-    }
-    if (list.size() < 2) return;
-    report_.warnings.push_back(fmt::format(
-        "{}: {} cameras, lenses or image sizes, each calibrated on its own: {}; leave out what is not of this "
-        "orbit",
-        name(modality), list.size(), fmt::join(list, "; ")));
-  }
-
   void count(const FrameRecord& record) {
     int& counter = record.tracking ? report_.tracking
                    : record.modality == Modality::visible ? report_.visible
@@ -354,21 +345,40 @@ class Importer {
   }
 
   Status finish() {
-    for (const Group& group : groups_) {
+    for (const CameraGroup& group : groups_.all()) {
       if (group.frames > 0 && writer_)
         ORBITFUSE_TRY(writer_->append(StreamRecord{group.id, 0, group.frames - 1, group.frames, 0}));
     }
-    tell_of_groups(Modality::visible);
-    tell_of_groups(Modality::thermal);
+    for (const Modality modality : {Modality::visible, Modality::thermal}) {
+      if (auto several = groups_.described(modality)) report_.warnings.push_back(*std::move(several));
+    }
     check_station_count(options_.visible_stations, report_.visible, "visible");
     check_station_count(options_.thermal_stations, report_.thermal, "thermal");
     if (options_.embedded_visible && embedded_ == 0)
       report_.warnings.push_back("no thermal image has a photo embedded: there are no visible frames from them");
-    if (decoder_.samples_are_raw_counts()) {
+    tell_of_temperatures();
+    if (decoder_.samples_are_raw_counts() && !decoder_.has_temperatures()) {
       report_.warnings.push_back("thermal samples are raw counts without a known scale: kept as grey intensities, "
                                  "no temperatures (give their scale if you know it)");
     }
     return writer_ ? writer_->close() : Status{};
+  }
+
+  void tell_of_temperatures() {
+    if (!report_.has_temperatures) return;
+    report_.kelvin_per_count = decoder_.kelvin_per_count();
+    if (report_.kelvin_per_count > kelvin_per_dn) {
+      report_.warnings.push_back(fmt::format("the hottest sample is {:.0f} C, so thermal files hold {:g} K a count, not "
+                                             "{:g}; their tag says so",
+                                             celsius_from_kelvin(decoder_.hottest_k()), report_.kelvin_per_count,
+                                             kelvin_per_dn));
+    }
+    if (!decoder_.glowing().empty()) {
+      report_.warnings.push_back(fmt::format("half of {} ({} such files) is hotter than 500 C: if it is no furnace, its "
+                                             "scale is wrong (--thermal-scale centikelvin, or linear with "
+                                             "--kelvin-per-count)",
+                                             decoder_.glowing().front(), decoder_.glowing().size()));
+    }
   }
 
   void check_station_count(const std::optional<DeclaredStations>& stations, int frames, const char* what) {
@@ -385,19 +395,12 @@ class Importer {
   const Progress& progress_;
   ThermalDecoder decoder_;
   std::map<Modality, KnownViews> known_;
-  std::deque<Group> groups_;  ///< a deque: groups are pointed to while others join
+  CameraGroups groups_;
   std::size_t done_ = 0, total_ = 0;
   std::string first_failure_;
   ImportReport report_;
   int embedded_ = 0;  ///< photos found in radiometric JPEGs
 };
-
-/// The sources are untouched; half a session would only be in the way of the next attempt.
-void empty(const fs::path& folder) {
-  std::error_code ignored;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored))
-    fs::remove_all(entry.path(), ignored);
-}
 
 Status run(Importer& importer) {
   Status status = importer.run();
@@ -411,26 +414,25 @@ Status run(Importer& importer) {
 Result<ImportReport> import_session(const ImportOptions& options, const fs::path& session_folder,
                                     const Progress& progress) {
   ORBITFUSE_TRY(options.validate());
+  remove_cut_import(session_folder);
   ORBITFUSE_TRY(check_is_new(session_folder));
   MadeFolders made;
   ORBITFUSE_TRY(made.make(session_folder));
+  ImportLeftover leftover(session_folder);
   ORBITFUSE_ASSIGN(auto writer, SessionWriter::create(session_folder, {{"recorded_by", "import"}}));
   Importer importer(options, session_folder, writer.get(), progress);
-  if (const Status status = run(importer); !status) {
-    writer.reset();
-    empty(session_folder);
-    return tl::unexpected(status.error());
-  }
-  made.keep();
+  ORBITFUSE_TRY(run(importer));
   ImportReport report = importer.take_report();
   ORBITFUSE_ASSIGN(report.session, open_session(session_folder));
+  leftover.keep();
+  made.keep();
   return report;
 }
 
 Result<ImportReport> rehearse_import(const ImportOptions& options, const fs::path& session_folder,
                                      const Progress& progress) {
   ORBITFUSE_TRY(options.validate());
-  ORBITFUSE_TRY(SessionWriter::try_create(session_folder));
+  if (!is_cut_import(session_folder)) ORBITFUSE_TRY(SessionWriter::try_create(session_folder));
   Importer importer(options, session_folder, nullptr, progress);
   ORBITFUSE_TRY(run(importer));
   return importer.take_report();

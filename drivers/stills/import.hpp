@@ -29,6 +29,10 @@ struct ObjectParameterOverrides {
   std::optional<double> reflected_temperature_k;
   std::optional<double> atmospheric_temperature_k;
   std::optional<double> relative_humidity;       ///< 0..1
+
+  bool any() const {
+    return emissivity || distance_m || reflected_temperature_k || atmospheric_temperature_k || relative_humidity;
+  }
 };
 
 /// The user's word that the frames, in capture order, were taken at nominal stations.
@@ -62,7 +66,7 @@ struct ImportOptions {
   std::optional<DeclaredStations> visible_stations, thermal_stations;
 
   ThermalScale thermal_scale = ThermalScale::automatic;
-  double kelvin_per_count = 0.01;  ///< for ThermalScale::linear
+  double kelvin_per_count = 0;     ///< for ThermalScale::linear, which needs it
   double kelvin_offset = 0;
   ObjectParameterOverrides object;
 
@@ -77,13 +81,16 @@ struct ImportReport {
   int visible = 0, thermal = 0, tracking = 0;
   int with_pose = 0, with_station = 0;
   bool has_temperatures = false;
+  double kelvin_per_count = 0.01;     ///< in which temperatures are stored
   std::vector<std::string> warnings;  ///< files passed over and why, priors missing, ...
 };
 
 /// Imports into a new session folder (which must not exist or be empty). Photos are copied byte
-/// for byte; thermal images become 16-bit centikelvin TIFF (or stay 8-bit grey). A file that can't
-/// be read is left out with a warning; the import fails only when nothing is left, and then, or when
-/// it is cancelled, leaves nothing behind.
+/// for byte; thermal images become 16-bit TIFF of one scale for the session, centikelvin unless the
+/// scene is too hot for it (or stay 8-bit grey). A file that can't be read, a copy of another and a
+/// thermal file without temperatures among files that have them is left out with a warning; the import
+/// fails only when nothing is left, and then, or when it is cancelled, leaves nothing behind. What an
+/// import that was killed left in the folder is replaced.
 Result<ImportReport> import_session(const ImportOptions& options,
                                     const std::filesystem::path& session_folder,
                                     const Progress& progress = {});

@@ -55,10 +55,13 @@ Status ImportOptions::validate() const {
   ORBITFUSE_TRY(check_stations(thermal_stations, "thermal_stations"));
   if (thermal_scale == ThermalScale::linear) {
     ORBITFUSE_TRY(check(kelvin_per_count > 0 && kelvin_per_count <= 10, "kelvin_per_count",
-                        fmt::format("{}", kelvin_per_count), "must be > 0 and at most 10"));
+                        kelvin_per_count == 0 ? "not given" : fmt::format("{}", kelvin_per_count),
+                        "say how many kelvin a count is, more than 0 and at most 10 (--kelvin-per-count)"));
     ORBITFUSE_TRY(check(std::isfinite(kelvin_offset) && std::abs(kelvin_offset) <= 10000, "kelvin_offset",
                         fmt::format("{}", kelvin_offset), "must be within 10000 K of zero"));
   }
+  ORBITFUSE_TRY(check(!object.any() || !thermal.empty() || !thermal_tracking.empty() || transforms_json, "object",
+                      "object parameters, but no thermal files", "give the radiometric JPEGs as thermal, or leave it out"));
   ORBITFUSE_TRY(check_range(object.emissivity, 0.01, 1, "object.emissivity"));
   ORBITFUSE_TRY(check_range(object.distance_m, 0, 1e5, "object.distance_m"));
   ORBITFUSE_TRY(check_range(object.reflected_temperature_k, 1, 5000, "object.reflected_temperature_k"));

@@ -1,20 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "drivers/stills/known_poses.hpp"
 
-#include <fmt/format.h>
-
-#include <cmath>
-#include <nlohmann/json.hpp>
-
 #include "core/formats/colmap_model.hpp"
-#include "core/system/file_io.hpp"
+#include "core/formats/ground_truth.hpp"
 #include "core/formats/transforms_json.hpp"
 
 namespace orbitfuse {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
 
 /// A missing file may be named without its extension (NeRF's synthetic scenes).
 fs::path resolve(const fs::path& base, const std::string& name) {
@@ -46,74 +40,34 @@ Status add_colmap(const fs::path& folder, Modality modality, std::map<Modality, 
   return {};
 }
 
-tl::unexpected<Error> bad_truth(const std::string& where, const std::string& found) {
-  return fail(ErrorKind::input, where, found, "see docs/formats.md, ground truth");
-}
+}  // namespace
 
-Result<double> number(const Json& object, const char* key, const std::string& where) {
-  if (!object.is_object() || !object.contains(key) || !object[key].is_number()) {
-    return bad_truth(where + "." + key, "no number");
-  }
-  return object[key].get<double>();
-}
+namespace {
 
-Result<Camera> camera_of(const Json& k, const std::string& where) {
-  Camera c;
-  ORBITFUSE_ASSIGN(const double w, number(k, "w", where));
-  ORBITFUSE_ASSIGN(const double h, number(k, "h", where));
-  if (!(w >= 1 && w < 1e6 && h >= 1 && h < 1e6)) return bad_truth(where, "no usable image size");
-  c.width = static_cast<int>(w);
-  c.height = static_cast<int>(h);
-  ORBITFUSE_ASSIGN(c.fx, number(k, "fx", where));
-  ORBITFUSE_ASSIGN(c.fy, number(k, "fy", where));
-  ORBITFUSE_ASSIGN(c.cx, number(k, "cx", where));
-  ORBITFUSE_ASSIGN(c.cy, number(k, "cy", where));
-  for (const auto& [key, value] : {std::pair{"k1", &c.k1}, {"k2", &c.k2}, {"p1", &c.p1}, {"p2", &c.p2}}) {
-    if (k.contains(key)) {
-      ORBITFUSE_ASSIGN(*value, number(k, key, where));
-    }
-  }
-  ORBITFUSE_TRY(c.validate(where));
-  return c;
-}
-
-Result<Rigid3d> pose_of(const Json& frame, const std::string& where) {
-  Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
-  const auto broken = [&] { return bad_truth(where + ".c2w", "not a finite 4x4 matrix"); };
-  if (!frame.contains("c2w") || !frame["c2w"].is_array() || frame["c2w"].size() < 3) return broken();
-  for (std::size_t r = 0; r < 3; ++r) {
-    const Json& row = frame["c2w"][r];
-    if (!row.is_array() || row.size() != 4) return broken();
-    for (std::size_t c = 0; c < 4; ++c) {
-      if (!row[c].is_number()) return broken();
-      m(static_cast<int>(r), static_cast<int>(c)) = row[c].get<double>();
-    }
-  }
-  if (!m.allFinite() || m.topLeftCorner<3, 3>().determinant() < 0.5) return broken();
-  return cam_from_world_of_opengl(m);
+/// One name for a file however it is written, links followed.
+std::string canonical_name(const fs::path& file) {
+  std::error_code unresolved;
+  const fs::path canonical = fs::weakly_canonical(file, unresolved);
+  return (unresolved ? fs::absolute(file, unresolved).lexically_normal() : canonical).string();
 }
 
 }  // namespace
 
-void KnownViews::add(KnownView view) { views_.push_back(std::move(view)); }
+void KnownViews::add(KnownView view) {
+  const std::size_t index = views_.size();
+  by_file_.emplace(canonical_name(view.file), index);
+  ++by_name_.try_emplace(view.file.filename().string(), Named{index, 0}).first->second.views;
+  ++by_stem_.try_emplace(view.file.stem().string(), Named{index, 0}).first->second.views;
+  views_.push_back(std::move(view));
+}
 
 const KnownView* KnownViews::find(const fs::path& file) const {
-  std::error_code ignored;
-  for (const KnownView& view : views_) {
-    if (fs::equivalent(view.file, file, ignored)) return &view;
-  }
-  for (const bool by_stem : {false, true}) {
-    const KnownView* found = nullptr;
-    int matches = 0;
-    for (const KnownView& view : views_) {
-      const bool same = by_stem ? view.file.stem() == file.stem() : view.file.filename() == file.filename();
-      if (same) {
-        found = &view;
-        ++matches;
-      }
-    }
-    if (matches == 1) return found;
-    if (matches > 1) return nullptr;  // ambiguous: no pose is better than a wrong one
+  if (const auto same = by_file_.find(canonical_name(file)); same != by_file_.end()) return &views_[same->second];
+  for (const auto& [names, name] : {std::pair{&by_name_, file.filename().string()}, {&by_stem_, file.stem().string()}}) {
+    const auto found = names->find(name);
+    if (found == names->end()) continue;
+    // Ambiguous: no pose is better than a wrong one.
+    return found->second.views == 1 ? &views_[found->second.index] : nullptr;
   }
   return nullptr;
 }
@@ -127,32 +81,14 @@ std::optional<Camera> KnownViews::shared_camera() const {
 }
 
 Result<std::map<Modality, KnownViews>> read_ground_truth_views(const fs::path& file) {
-  ORBITFUSE_ASSIGN(const std::string text, read_file(file));
-  const Json root = Json::parse(text, nullptr, false);
-  if (!root.is_object()) return bad_truth(file.string(), "not a JSON object (cut off?)");
+  ORBITFUSE_ASSIGN(const GroundTruth truth, read_ground_truth(file));
   std::map<Modality, KnownViews> known;
-  for (const Modality modality : {Modality::visible, Modality::thermal}) {
-    const std::string key(name(modality));
-    if (!root.contains(key)) continue;
-    const Json& part = root[key];
-    const std::string where = file.string() + ": " + key;
-    if (!part.is_object() || !part.contains("K") || !part.contains("frames") || !part["frames"].is_array()) {
-      return bad_truth(where, "no K and frames");
-    }
-    ORBITFUSE_ASSIGN(const Camera camera, camera_of(part["K"], where + ".K"));
-    for (std::size_t i = 0; i < part["frames"].size(); ++i) {
-      const Json& frame = part["frames"][i];
-      const std::string at = fmt::format("{}.frames[{}]", where, i);
-      if (!frame.is_object() || !frame.contains("file") || !frame["file"].is_string()) return bad_truth(at, "no file");
-      KnownView view;
-      view.file = (file.parent_path() / frame["file"].get<std::string>()).lexically_normal();
-      view.camera = camera;
-      ORBITFUSE_ASSIGN(view.cam_from_world, pose_of(frame, at));
-      if (frame.contains("el") && frame["el"].is_number()) view.elevation_deg = frame["el"].get<double>();
-      known[modality].add(std::move(view));
+  for (const auto& [modality, views] : truth.views) {
+    for (const TrueView& view : views) {
+      known[modality].add({(file.parent_path() / view.name).lexically_normal(), view.camera, view.cam_from_world,
+                           view.elevation_deg});
     }
   }
-  if (known.empty()) return bad_truth(file.string(), "neither \"visible\" nor \"thermal\"");
   return known;
 }
 

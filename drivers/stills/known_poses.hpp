@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "core/geometry/camera.hpp"
@@ -34,7 +35,13 @@ class KnownViews {
   std::optional<Camera> shared_camera() const;
 
  private:
+  struct Named {
+    std::size_t index = 0;  ///< of the first
+    int views = 0;          ///< of that name
+  };
   std::vector<KnownView> views_;
+  std::unordered_map<std::string, std::size_t> by_file_;
+  std::unordered_map<std::string, Named> by_name_, by_stem_;
 };
 
 /// Reads the sources that `options` name, visible and thermal.

@@ -58,13 +58,15 @@ Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& 
   StillPhoto still;
   ORBITFUSE_ASSIGN(const ThermalDecoder::Converted converted, decoder.convert(file, where));
   Frame& frame = still.frame;
-  frame.thermal_is_gray = converted.centikelvin.empty();
+  frame.thermal_is_gray = converted.counts.empty();
+  frame.kelvin_per_count = converted.kelvin_per_count;
+  still.without_temperature = converted.without_temperature;
   still.size = file.image.size();
   if (converted.keep_bytes) {
     frame.encoded = file.bytes;
     frame.extension = extension_of(file.bytes);
   } else {
-    frame.pixels = frame.thermal_is_gray ? converted.gray : converted.centikelvin;
+    frame.pixels = frame.thermal_is_gray ? converted.gray : converted.counts;
     still.size = frame.pixels.size();
   }
   if (!converted.gray.empty()) {
@@ -86,13 +88,13 @@ Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& 
 }
 
 Result<StillPhoto> read_visible_still(const std::filesystem::path& file) {
-  ORBITFUSE_ASSIGN(std::string bytes, read_file(file));
+  ORBITFUSE_ASSIGN(std::string bytes, read_file(file, max_image_bytes));
   return visible_still(std::move(bytes), file.string());
 }
 
 Result<StillPhoto> read_thermal_still(const std::filesystem::path& path, ThermalDecoder& decoder) {
   ORBITFUSE_ASSIGN(const ThermalFile file, read_thermal_file(path));
-  decoder.observe(file);
+  decoder.observe(file, path.filename().string());
   return thermal_still(file, decoder, path.string());
 }
 
@@ -113,7 +115,7 @@ std::string StillPhoto::described() const {
 }
 
 bool is_radiometric(const std::filesystem::path& file) {
-  const Result<std::string> bytes = read_file(file);
+  const Result<std::string> bytes = read_file(file, max_image_bytes);
   return bytes && is_flir_jpeg(*bytes);
 }
 

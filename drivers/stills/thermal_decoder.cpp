@@ -13,16 +13,9 @@ namespace orbitfuse {
 namespace {
 
 /// -100 C: nothing on a field session is colder but a clear sky, and that has few pixels.
-constexpr double coldest_plausible_dn = 17315;
-
-cv::Mat centikelvin_of_linear(const cv::Mat& samples, double scale, double offset) {
-  cv::Mat out(samples.size(), CV_16UC1);
-  std::transform(samples.begin<std::uint16_t>(), samples.end<std::uint16_t>(), out.begin<std::uint16_t>(),
-                 [&](std::uint16_t dn) {
-                   return dn == 0 ? std::uint16_t{0} : centikelvin_from_kelvin(static_cast<float>(dn * scale + offset));
-                 });
-  return out;
-}
+constexpr double coldest_plausible_k = 173.15;
+/// 500 C: half an image that glows is a wrong scale, or a furnace.
+constexpr double glowing_k = 773.15;
 
 ObjectParameters with_overrides(ObjectParameters o, const ObjectParameterOverrides& over) {
   o.emissivity = over.emissivity.value_or(o.emissivity);
@@ -33,11 +26,62 @@ ObjectParameters with_overrides(ObjectParameters o, const ObjectParameterOverrid
   return o;
 }
 
+CountHistogram histogram_of(const cv::Mat& counts) {
+  CountHistogram histogram(65536);
+  for (int y = 0; y < counts.rows; ++y) {
+    const auto* row = counts.ptr<std::uint16_t>(y);
+    for (int x = 0; x < counts.cols; ++x) ++histogram[row[x]];
+  }
+  return histogram;
+}
+
+void add(const CountHistogram& from, CountHistogram& to) {
+  for (std::size_t i = 0; i < to.size(); ++i) to[i] += from[i];
+}
+
+/// Among the samples that are not 0; 65535 without any.
+double percentile(const CountHistogram& histogram, double percent) {
+  std::uint64_t total = 0;
+  for (std::size_t dn = 1; dn < histogram.size(); ++dn) total += histogram[dn];
+  if (total == 0) return 65535;
+  const auto rank = static_cast<std::uint64_t>(percent / 100.0 * static_cast<double>(total - 1));
+  std::uint64_t seen = 0;
+  for (std::size_t dn = 1; dn < histogram.size(); ++dn) {
+    seen += histogram[dn];
+    if (seen > rank) return static_cast<double>(dn);
+  }
+  return 65535;
+}
+
+double kelvin_of(double count, ThermalScaleTag scale) { return count * scale.scale + scale.offset; }
+
+bool is_plausible(const CountHistogram& histogram, ThermalScaleTag scale) {
+  return kelvin_of(percentile(histogram, 5), scale) >= coldest_plausible_k;
+}
+
+tl::unexpected<Error> too_cold(const std::string& where, const CountHistogram& histogram, ThermalScaleTag scale) {
+  const double coldest_k = kelvin_of(percentile(histogram, 5), scale);
+  return fail(ErrorKind::input, where,
+              fmt::format("{:g} K per count and an offset of {:g} K make {:.0f} C of its cold part ({:g} K)",
+                          scale.scale, scale.offset, celsius_from_kelvin(coldest_k), coldest_k),
+              "kelvin = scale * count + offset (an offset of -273.15 makes Celsius): correct its tag or sidecar, or "
+              "give --thermal-scale linear with --kelvin-per-count and --kelvin-offset");
+}
+
+constexpr const char* by_themselves =
+    "import files without temperatures by themselves, or give their scale: --thermal-scale linear "
+    "--kelvin-per-count K --kelvin-offset K";
+
 }  // namespace
 
-Result<ThermalFile> read_thermal_file(const std::filesystem::path& path) {
+Result<ThermalFile> read_thermal_file(const std::filesystem::path& path, std::optional<int> page) {
+  ORBITFUSE_ASSIGN(std::string bytes, read_file(path, max_image_bytes));
+  return thermal_file(std::move(bytes), path, page);
+}
+
+Result<ThermalFile> thermal_file(std::string bytes, const std::filesystem::path& path, std::optional<int> page) {
   ThermalFile file;
-  ORBITFUSE_ASSIGN(file.bytes, read_file(path));
+  file.bytes = std::move(bytes);
   const std::string where = path.string();
   if (is_flir_jpeg(file.bytes)) {
     file.kind = ThermalFile::Kind::radiometric_jpeg;
@@ -46,7 +90,7 @@ Result<ThermalFile> read_thermal_file(const std::filesystem::path& path) {
   }
   std::string description;
   if (image_format(file.bytes) == ImageFormat::tiff) {
-    ORBITFUSE_ASSIGN(file.image, decode_tiff(file.bytes, where, &description));
+    ORBITFUSE_ASSIGN(file.image, decode_tiff(file.bytes, where, &description, page));
   } else {
     ORBITFUSE_ASSIGN(file.image, decode_image(file.bytes, where));
   }
@@ -57,65 +101,128 @@ Result<ThermalFile> read_thermal_file(const std::filesystem::path& path) {
                 "thermal images are 16-bit grey, 8-bit or FLIR radiometric JPEGs");
   }
   file.kind = ThermalFile::Kind::samples16;
-  file.tag = thermal_scale_of_json(description);
+  ORBITFUSE_ASSIGN(file.tag, thermal_scale_of_description(description, where));
   const std::filesystem::path sidecar = where + ".json";
   std::error_code ignored;
   if (!file.tag && std::filesystem::exists(sidecar, ignored)) {
-    ORBITFUSE_ASSIGN(const std::string text, read_file(sidecar));
-    file.tag = thermal_scale_of_json(text);
+    ORBITFUSE_ASSIGN(const std::string text, read_file(sidecar, max_settings_bytes));
+    ORBITFUSE_ASSIGN(file.tag, thermal_scale_of_sidecar(text, sidecar.string()));
   }
   return file;
 }
 
-void ThermalDecoder::observe(const ThermalFile& file) {
-  const bool tag_counts = file.tag && options_.thermal_scale != ThermalScale::raw_counts;
-  if (file.kind != ThermalFile::Kind::samples16 || tag_counts) return;
-  ++untagged_;
-  for (int y = 0; y < file.image.rows; ++y) {
-    const auto* row = file.image.ptr<std::uint16_t>(y);
-    for (int x = 0; x < file.image.cols; ++x) ++histogram_[row[x]];
+std::optional<ThermalScaleTag> ThermalDecoder::scale_of(const ThermalFile& file) const {
+  switch (options_.thermal_scale) {
+    case ThermalScale::linear: return ThermalScaleTag{options_.kelvin_per_count, options_.kelvin_offset};
+    case ThermalScale::centikelvin: return ThermalScaleTag{};
+    case ThermalScale::raw_counts: return std::nullopt;
+    case ThermalScale::automatic: break;
+  }
+  return file.tag;
+}
+
+void ThermalDecoder::observe(const ThermalFile& file, const std::string& where) {
+  ++files_;
+  if (file.kind == ThermalFile::Kind::radiometric_jpeg) observe_jpeg(*file.flir);
+  if (file.kind == ThermalFile::Kind::samples16) observe_samples(file, where);
+}
+
+void ThermalDecoder::observe_jpeg(const FlirImage& image) {
+  ++radiometric_jpegs_;
+  FlirCalibration calibration = image.calibration;
+  calibration.object = with_overrides(calibration.object, options_.object);
+  if (!calibration.validate("")) return;  // convert() says so
+  const FlirThermometer thermometer(calibration);
+  double low = 0, high = 0;
+  cv::minMaxLoc(image.signal, &low, &high);
+  // The hottest signals may be ones that no temperature gives.
+  for (int signal = static_cast<int>(high); signal >= static_cast<int>(low); --signal) {
+    const double kelvin = thermometer.kelvin(static_cast<std::uint16_t>(signal));
+    if (!std::isfinite(kelvin)) continue;
+    hottest_k_ = std::max(hottest_k_, kelvin);
+    break;
   }
 }
 
-double ThermalDecoder::percentile(double percent) const {
-  std::uint64_t total = 0;
-  for (std::size_t dn = 1; dn < histogram_.size(); ++dn) total += histogram_[dn];
-  const auto rank = static_cast<std::uint64_t>(percent / 100.0 * static_cast<double>(total));
-  std::uint64_t seen = 0;
-  for (std::size_t dn = 1; dn < histogram_.size(); ++dn) {
-    seen += histogram_[dn];
-    if (seen > rank) return static_cast<double>(dn);
+void ThermalDecoder::observe_samples(const ThermalFile& file, const std::string& where) {
+  const CountHistogram histogram = histogram_of(file.image);
+  const auto scale = scale_of(file);
+  if (scale) {
+    if (!is_plausible(histogram, *scale)) return;  // convert() says so
+    ++with_scale_;
+    hottest_k_ = std::max(hottest_k_, kelvin_of(percentile(histogram, 100), *scale));
+    if (kelvin_of(percentile(histogram, 50), *scale) > glowing_k) glowing_.push_back(where);
+  } else if (is_plausible(histogram, {}) && options_.thermal_scale == ThermalScale::automatic) {
+    ++like_centikelvin_;
+    add(histogram, centikelvin_);
+  } else {
+    ++like_counts_;
+    add(histogram, counts_);
   }
-  return 65535;
 }
 
-bool ThermalDecoder::samples_are_raw_counts() const {
-  if (options_.thermal_scale == ThermalScale::raw_counts) return true;
-  return options_.thermal_scale == ThermalScale::automatic && untagged_ > 0 && percentile(5) < coldest_plausible_dn;
+bool ThermalDecoder::samples_are_raw_counts() const { return like_counts_ > like_centikelvin_; }
+
+bool ThermalDecoder::has_temperatures() const {
+  return radiometric_jpegs_ + with_scale_ > 0 || (like_centikelvin_ > 0 && !samples_are_raw_counts());
 }
+
+double ThermalDecoder::kelvin_per_count() const { return kelvin_per_count_for(hottest_k_); }
 
 Result<ThermalDecoder::Converted> ThermalDecoder::convert(const ThermalFile& file, const std::string& where) const {
-  Converted out;
   if (file.kind == ThermalFile::Kind::gray8) {
+    if (has_temperatures()) {
+      return fail(ErrorKind::input, where, "8-bit without temperatures, among thermal files that have them",
+                  "import it by itself, or with --visible if it is a photo");
+    }
+    Converted out;
     out.keep_bytes = true;
     return out;
   }
-  if (file.kind == ThermalFile::Kind::radiometric_jpeg) {
-    FlirImage flir = *file.flir;
-    flir.calibration.object = with_overrides(flir.calibration.object, options_.object);
-    ORBITFUSE_TRY(flir.calibration.validate(where));
-    out.centikelvin = centikelvin_of(flir);
-    return out;
+  if (file.kind == ThermalFile::Kind::samples16) return convert_samples(file, where);
+  FlirCalibration calibration = file.flir->calibration;
+  calibration.object = with_overrides(calibration.object, options_.object);
+  ORBITFUSE_TRY(calibration.validate(where));
+  return stored(file.flir->signal, kelvin_table(calibration));
+}
+
+Result<ThermalDecoder::Converted> ThermalDecoder::convert_samples(const ThermalFile& file,
+                                                                  const std::string& where) const {
+  std::optional<ThermalScaleTag> scale = scale_of(file);
+  const CountHistogram histogram = histogram_of(file.image);
+  if (scale && !is_plausible(histogram, *scale)) return too_cold(where, histogram, *scale);
+  if (!scale && !has_temperatures()) return stretched(file.image);
+  if (!scale && (samples_are_raw_counts() || !is_plausible(histogram, {}))) {
+    return fail(ErrorKind::input, where, "16-bit counts without a known scale, among thermal files with temperatures",
+                by_themselves);
   }
-  if (options_.thermal_scale == ThermalScale::raw_counts || (!file.tag && samples_are_raw_counts())) {
-    const double low = percentile(0.1), high = std::max(percentile(99.9), low + 1);
-    file.image.convertTo(out.gray, CV_8U, 255.0 / (high - low), -255.0 * low / (high - low));
-    return out;
-  }
-  ThermalScaleTag tag = file.tag.value_or(ThermalScaleTag{});
-  if (options_.thermal_scale == ThermalScale::linear) tag = {options_.kelvin_per_count, options_.kelvin_offset};
-  if (options_.thermal_scale == ThermalScale::centikelvin) tag = {};
-  out.centikelvin = centikelvin_of_linear(file.image, tag.scale, tag.offset);
+  const ThermalScaleTag tag = scale.value_or(ThermalScaleTag{});
+  std::vector<double> kelvin(65536, std::nan(""));
+  for (std::size_t dn = 1; dn < kelvin.size(); ++dn) kelvin[dn] = kelvin_of(static_cast<double>(dn), tag);
+  return stored(file.image, kelvin);
+}
+
+ThermalDecoder::Converted ThermalDecoder::stretched(const cv::Mat& counts) const {
+  CountHistogram all = counts_;
+  add(centikelvin_, all);
+  const double low = percentile(all, 0.1), high = std::max(percentile(all, 99.9), low + 1);
+  Converted out;
+  counts.convertTo(out.gray, CV_8U, 255.0 / (high - low), -255.0 * low / (high - low));
+  return out;
+}
+
+ThermalDecoder::Converted ThermalDecoder::stored(const cv::Mat& counts, const std::vector<double>& kelvin) const {
+  Converted out;
+  out.kelvin_per_count = kelvin_per_count();
+  std::vector<std::uint16_t> table(kelvin.size());
+  std::transform(kelvin.begin(), kelvin.end(), table.begin(),
+                 [&](double t) { return count_from_kelvin(t, out.kelvin_per_count); });
+  out.counts.create(counts.size(), CV_16UC1);
+  std::transform(counts.begin<std::uint16_t>(), counts.end<std::uint16_t>(), out.counts.begin<std::uint16_t>(),
+                 [&](std::uint16_t dn) { return table[dn]; });
+  // 0 was no sample before either.
+  cv::Mat lost = (out.counts == 0) & (counts != 0);
+  out.without_temperature = cv::countNonZero(lost);
   return out;
 }
 

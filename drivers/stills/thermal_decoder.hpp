@@ -26,29 +26,57 @@ struct ThermalFile {
   std::optional<ThermalScaleTag> tag; ///< from the file or its sidecar
 };
 
-Result<ThermalFile> read_thermal_file(const std::filesystem::path& file);
+/// Without a page the file must hold a single image.
+Result<ThermalFile> read_thermal_file(const std::filesystem::path& file, std::optional<int> page = {});
+/// The same of bytes that were read from `file`.
+Result<ThermalFile> thermal_file(std::string bytes, const std::filesystem::path& file, std::optional<int> page = {});
 
-/// What 16-bit samples without a tag mean, decided once for all files, so that a session never
-/// mixes meanings: first every file is observed, then each is converted.
+/// How often each count occurs.
+using CountHistogram = std::vector<std::uint64_t>;
+
+/// What thermal samples mean, decided once for all files, so that a session never mixes meanings:
+/// first every file is observed, then each is converted. Temperatures are what a session is for, so
+/// files that have none (8-bit, raw counts) are refused beside files that have them, each by name;
+/// among 16-bit files without a scale the larger part says whether they are centikelvin or counts.
 class ThermalDecoder {
  public:
   explicit ThermalDecoder(const ImportOptions& options) : options_(options) {}
-  void observe(const ThermalFile& file);
-  /// After all observations.
-  bool samples_are_raw_counts() const;
+  void observe(const ThermalFile& file, const std::string& where);
+
+  // After all observations:
+  bool samples_are_raw_counts() const;  ///< 16-bit samples without a scale
+  bool has_temperatures() const;        ///< so will the session
+  double kelvin_per_count() const;      ///< in which the session stores them: one for all files
+  double hottest_k() const { return hottest_k_; }
+  int files() const { return files_; }
+  int radiometric_jpegs() const { return radiometric_jpegs_; }
+  /// Files of which one half is hotter than anything but a furnace: is their scale right?
+  const std::vector<std::string>& glowing() const { return glowing_; }
 
   struct Converted {
-    cv::Mat centikelvin;   ///< empty for grey
+    cv::Mat counts;        ///< of temperature, 0 = invalid; empty for grey
+    double kelvin_per_count = 0.01;
+    int without_temperature = 0;  ///< samples that no temperature or stored count stands for
     cv::Mat gray;          ///< raw counts under one stretch for the session
     bool keep_bytes = false;  ///< 8-bit file: copy it
   };
+  /// Input error when the file's samples can't be temperatures, or are of another kind than the rest.
   Result<Converted> convert(const ThermalFile& file, const std::string& where) const;
 
  private:
-  double percentile(double percent) const;
+  std::optional<ThermalScaleTag> scale_of(const ThermalFile& file) const;
+  void observe_jpeg(const FlirImage& image);
+  void observe_samples(const ThermalFile& file, const std::string& where);
+  Result<Converted> convert_samples(const ThermalFile& file, const std::string& where) const;
+  Converted stretched(const cv::Mat& counts) const;
+  Converted stored(const cv::Mat& counts, const std::vector<double>& kelvin) const;
+
   const ImportOptions& options_;
-  std::vector<std::uint64_t> histogram_ = std::vector<std::uint64_t>(65536);
-  std::uint64_t untagged_ = 0;
+  int files_ = 0, radiometric_jpegs_ = 0, with_scale_ = 0;
+  int like_centikelvin_ = 0, like_counts_ = 0;  ///< 16-bit files without a scale
+  CountHistogram counts_ = CountHistogram(65536), centikelvin_ = CountHistogram(65536);  ///< of these
+  double hottest_k_ = 0;
+  std::vector<std::string> glowing_;
 };
 
 }  // namespace orbitfuse

@@ -185,7 +185,7 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
   if (thermal && still->frame.thermal_is_gray && !options_.accept_gray) {
     return event("ignored", name + ": no temperatures in it (gray=yes takes it all the same)");
   }
-  const Result<std::string> bytes = read_file(attempt.file);
+  const Result<std::string> bytes = read_file(attempt.file, max_image_bytes);
   if (!bytes || !seen_hashes_.insert(content_hash(*bytes)).second) {
     return event("duplicate", name + ": the same image came before");
   }

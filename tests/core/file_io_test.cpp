@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include "tests/support/temp_folder.hpp"
 
@@ -44,6 +45,27 @@ TEST(FileIo, MissingFileAndFolderAreNamed) {
   EXPECT_EQ(missing.error().kind, ErrorKind::input);
   EXPECT_NE(missing.error().message().find("none.txt"), std::string::npos);
   EXPECT_FALSE(read_file(folder.path()));
+}
+
+TEST(FileIo, OnlyRegularFilesOfABoundedSizeAreRead) {
+  const TempFolder folder;
+  const auto found = [](const std::filesystem::path& file, std::uint64_t at_most = max_file_bytes) {
+    const auto bytes = read_file(file, at_most);
+    return bytes ? "read" : bytes.error().found;
+  };
+  EXPECT_EQ(found("/dev/zero"), "a device, not a file");
+  ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
+  EXPECT_EQ(found(folder / "pipe"), "a pipe, not a file");  // and not waited for
+  EXPECT_EQ(found(folder.path()), "a folder, not a file");
+  test::put(folder / "sparse", "");
+  std::filesystem::resize_file(folder / "sparse", 8ull << 30);
+  EXPECT_EQ(found(folder / "sparse"), "8192 MiB, at most 2048 MiB are read");
+  test::put(folder / "text", std::string(2000, 'x'));
+  EXPECT_EQ(found(folder / "text", 2000), "read");
+  EXPECT_NE(found(folder / "text", 1999), "read");
+  EXPECT_FALSE(file_hash("/dev/zero"));
+  EXPECT_FALSE(file_hash(folder / "pipe"));
+  EXPECT_EQ(found("/proc/self/status"), "read");  // reports a size of 0
 }
 
 TEST(FileIo, FullDiskKeepsTheOldFile) {

@@ -174,6 +174,48 @@ TEST(ImageIo, ThermalScaleComesFromTagThenSidecarThenCentikelvin) {
   EXPECT_FALSE(read_thermal_k(folder / "plain.tiff"));
 }
 
+TEST(ImageIo, HotThermalTiffsTakeACoarserScale) {
+  const TempFolder folder;
+  cv::Mat kelvin(4, 4, CV_32FC1, cv::Scalar(295.5));
+  kelvin.at<float>(1, 2) = 1173.15F;
+  ASSERT_TRUE(write_thermal_tiff(folder / "t.tiff", kelvin));
+  const auto back = read_thermal_k(folder / "t.tiff");
+  ASSERT_TRUE(back);
+  EXPECT_NEAR(back->at<float>(1, 2), 1173.15, 0.0101);
+  EXPECT_NEAR(back->at<float>(0, 0), 295.5, 0.0101);
+  EXPECT_EQ(kelvin_per_count_for(std::vector<cv::Mat>{kelvin}), 0.02);
+  kelvin.at<float>(1, 2) = 655.3F;
+  EXPECT_EQ(kelvin_per_count_for(std::vector<cv::Mat>{kelvin}), 0.01);
+}
+
+TEST(ImageIo, ATemperatureBelowZeroKelvinIsNone) {
+  const TempFolder folder;
+  put(folder / "t.tiff", *encode_tiff(cv::Mat(4, 4, CV_16UC1, cv::Scalar(20000)), R"({"scale":0.01,"offset":-273.15})"));
+  EXPECT_TRUE(std::isnan(read_thermal_k(folder / "t.tiff")->at<float>(0, 0)));
+  put(folder / "t.tiff", *encode_tiff(cv::Mat(4, 4, CV_16UC1, cv::Scalar(20000)), R"({"scale":1e300})"));
+  EXPECT_FALSE(read_thermal_k(folder / "t.tiff"));
+  // What other programs write into the description is none of our business.
+  put(folder / "t.tiff", *encode_tiff(cv::Mat(4, 4, CV_16UC1, cv::Scalar(20000)), "taken in the cold"));
+  EXPECT_TRUE(read_thermal_k(folder / "t.tiff"));
+}
+
+TEST(ImageIo, AJpegWithAShiftedScanIsDamaged) {
+  const TempFolder folder;
+  cv::Mat image(240, 320, CV_8UC3);
+  cv::RNG(3).fill(image, cv::RNG::UNIFORM, 0, 255);
+  const std::string whole = *encode_jpeg(image, 90);
+  EXPECT_TRUE(decode_jpeg(whole, "whole"));
+  int told = 0;
+  for (std::size_t at = whole.size() / 4; at < whole.size() - 2000; at += whole.size() / 16) {
+    std::string bytes = whole;
+    for (std::size_t i = at; i < at + 64; ++i) bytes[i] = static_cast<char>(bytes[i] ^ 0x55);
+    told += !decode_jpeg(bytes, "damaged");
+  }
+  EXPECT_GE(told, 10);  // of 11: a scan may fall into step again
+  // A few bytes of padding before the end are what some cameras write.
+  EXPECT_TRUE(decode_jpeg(whole.substr(0, whole.size() - 2) + std::string(8, '\0') + whole.substr(whole.size() - 2), "padded"));
+}
+
 TEST(ImageIo, FloatTiffKeepsNanAndExtremes) {
   const TempFolder folder;
   cv::Mat values(5, 7, CV_32FC1, cv::Scalar(1.5));

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/session/session.hpp"
 
+#include "core/session/manifest_json.hpp"
+
 #include <gtest/gtest.h>
 
 #include "tests/support/temp_folder.hpp"
@@ -184,6 +186,22 @@ TEST_F(SessionTest, NoSession) {
   EXPECT_FALSE(open_session(folder.path()));
   EXPECT_FALSE(open(""));
   EXPECT_FALSE(open("\n"));
+}
+
+TEST(Session, ARecordThatWouldNotBeReadIsRefusedBeforeItIsWritten) {
+  FrameRecord frame;
+  frame.file = "visible/0.jpg";
+  frame.device = "visible0";
+  EXPECT_TRUE(check_readable(frame));
+  frame.cam_from_world = Rigid3d{Eigen::Quaterniond(0, 0, 0, 0), {0, 0, 0}};
+  EXPECT_FALSE(check_readable(frame));
+  frame.cam_from_world = Rigid3d{Eigen::Quaterniond::Identity(), {std::nan(""), 0, 0}};
+  EXPECT_FALSE(check_readable(frame));
+  DeviceInfo device;
+  device.id = "visible0";
+  EXPECT_TRUE(check_readable(device));
+  device.lens.focal_px = -4;
+  EXPECT_FALSE(check_readable(device));
 }
 
 }  // namespace

@@ -7,17 +7,16 @@
 #include <cmath>
 #include <cstdlib>
 #include <fmt/format.h>
-#include <fstream>
-#include <nlohmann/json.hpp>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 
+#include "core/formats/ground_truth.hpp"
 #include "core/formats/transforms_json.hpp"
 
 namespace orbitfuse::scenes {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
 
 DeviceInfo device(Modality modality, std::optional<double> focal_px) {
   DeviceInfo info;
@@ -38,39 +37,22 @@ FrameRecord frame(Modality modality, const std::string& file, int width, int hei
   return record;
 }
 
-PosedView truth_view(const json& entry, const json& k) {
-  PosedView view;
-  view.name = entry.at("file");
-  view.camera.width = k.at("w"), view.camera.height = k.at("h");
-  view.camera.fx = k.at("fx"), view.camera.fy = k.at("fy");
-  view.camera.cx = k.at("cx"), view.camera.cy = k.at("cy");
-  Eigen::Matrix4d c2w;
-  for (int r = 0; r < 4; ++r)
-    for (int c = 0; c < 4; ++c) c2w(r, c) = entry.at("c2w")[static_cast<std::size_t>(r)][static_cast<std::size_t>(c)];
-  view.cam_from_world = cam_from_world_of_opengl(c2w);
-  return view;
-}
-
-json load(const fs::path& file) {
-  std::ifstream stream(file);
-  return json::parse(stream);
-}
+/// Data that tests and benchmarks come with: a fault in it is theirs.
+GroundTruth truth_of(const fs::path& file) { return read_ground_truth(file).value(); }
 
 }  // namespace
 
 Scene container_scene(const fs::path& data, const ContainerOptions& options) {
   Scene scene;
   scene.session.folder = data / "orbits" / "container";
-  const json truth = load(scene.session.folder / "ground_truth.json");
-  for (const Modality modality : {Modality::visible, Modality::thermal}) {
-    const json& k = truth.at(std::string(name(modality))).at("K");
+  const GroundTruth truth = truth_of(scene.session.folder / "ground_truth.json");
+  for (const auto& [modality, views] : truth.views) {
     const double error = modality == Modality::visible ? options.visible_focal_error
                                                        : options.thermal_focal_error;
-    scene.session.devices.push_back(
-        device(modality, k.at("fx").get<double>() * (1.0 + error)));
+    scene.session.devices.push_back(device(modality, views.at(0).camera.fx * (1.0 + error)));
     int index = 0;
-    for (const json& entry : truth.at(std::string(name(modality))).at("frames")) {
-      FrameRecord record = frame(modality, entry.at("file"), k.at("w"), k.at("h"),
+    for (const TrueView& view : views) {
+      FrameRecord record = frame(modality, view.name, view.camera.width, view.camera.height,
                                  static_cast<std::uint64_t>(index));
       Station station;
       station.loop = index / 12, station.index = index % 12;
@@ -80,19 +62,18 @@ Scene container_scene(const fs::path& data, const ContainerOptions& options) {
       station.elevation_sigma_deg = 90;  // unknown
       record.station = station;
       scene.session.frames.push_back(record);
-      scene.truth.views[record.file] = truth_view(entry, k);
+      scene.truth.views[record.file] = view;
       ++index;
     }
   }
   if (!options.tracking) return scene;
-  const json tracking = load(scene.session.folder / "tracking.json");
+  const auto tracking = read_true_views(scene.session.folder / "tracking.json").value();
   std::uint64_t index = 24;
-  for (const json& entry : tracking.at("frames")) {
-    FrameRecord record = frame(Modality::thermal, entry.at("file"), tracking.at("K").at("w"),
-                               tracking.at("K").at("h"), index++);
+  for (const TrueView& view : tracking) {
+    FrameRecord record = frame(Modality::thermal, view.name, view.camera.width, view.camera.height, index++);
     record.tracking = true;
     scene.session.frames.push_back(record);
-    scene.truth.views[record.file] = truth_view(entry, tracking.at("K"));
+    scene.truth.views[record.file] = view;
   }
   return scene;
 }
@@ -119,51 +100,39 @@ Scene session_scene(const fs::path& folder) {
   auto session = open_session(folder);
   if (!session) return scene;
   scene.session = *std::move(session);
-  const json truth = load(folder / "ground_truth.json");
-  for (const Modality modality : {Modality::visible, Modality::thermal}) {
-    const json& entry = truth.at(std::string(name(modality)));
-    for (const json& f : entry.at("frames"))
-      scene.truth.views[f.at("file")] = truth_view(f, entry.at("K"));
-  }
+  const GroundTruth truth = truth_of(folder / "ground_truth.json");
+  for (const auto& [modality, views] : truth.views)
+    for (const TrueView& view : views) scene.truth.views[view.name] = view;
   return scene;
 }
 
 Result<Scene> run_scene(const fs::path& session, const fs::path& truth_file) {
   Scene scene;
   ORBITFUSE_ASSIGN(scene.session, open_session(session));
-  const json truth = load(truth_file);
-  for (const Modality modality : {Modality::visible, Modality::thermal}) {
-    const json& entry = truth.at(std::string(name(modality)));
+  ORBITFUSE_ASSIGN(const GroundTruth truth, read_ground_truth(truth_file));
+  for (const auto& [modality, views] : truth.views) {
     std::map<std::string, PosedView> by_name;
-    for (const json& f : entry.at("frames")) {
-      const PosedView view = truth_view(f, entry.at("K"));
-      by_name[view.name] = view;
-    }
+    for (const TrueView& view : views) by_name[view.name] = view;
     for (const FrameRecord* frame : scene.session.frames_of(modality)) {
       const auto found = by_name.find(frame->source.empty() ? frame->file : frame->source);
       if (found != by_name.end()) scene.truth.views[frame->file] = found->second;
     }
   }
-  if (truth.contains("test"))
-    for (const json& f : truth.at("test").at("frames")) {
-      json named = f;
-      if (!named.contains("file")) named["file"] = "";
-      scene.test.push_back(truth_view(named, truth.at("test").at("K")));
-    }
+  for (const TrueTestView& view : truth.test) scene.test.push_back({"", view.camera, view.cam_from_world});
   return scene;
 }
 
 void add_tracking(Scene& scene, const fs::path& tracking_json) {
-  const json tracking = load(tracking_json);
+  const auto tracking = read_true_views(tracking_json).value();
   const FrameRecord like = *scene.session.frames_of(Modality::thermal).back();
   std::uint64_t sequence = like.sequence + 1;
-  for (const json& entry : tracking.at("frames")) {
+  for (const TrueView& view : tracking) {
     FrameRecord record = like;
-    record.file = (tracking_json.parent_path() / entry.at("file").get<std::string>()).string();
+    record.file = (tracking_json.parent_path() / view.name).string();
     record.station.reset();
     record.sequence = sequence++;
     record.tracking = true;
-    scene.truth.views[record.file] = truth_view(entry, tracking.at("K"));
+    scene.truth.views[record.file] = view;
     scene.session.frames.push_back(std::move(record));
   }
 }

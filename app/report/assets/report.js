@@ -64,10 +64,10 @@
     swipe.addEventListener("pointermove", (e) => { if (e.buttons) drag(e); });
   }
 
-  // Temperatures ride along as a small grid of centikelvin.
+  // Temperatures ride along as a small grid of 16-bit counts.
   const decode = () => {
     if (!view.temperature) return null;
-    const raw = Uint8Array.from(atob(view.temperature.centikelvin), (c) => c.charCodeAt(0));
+    const raw = Uint8Array.from(atob(view.temperature.counts), (c) => c.charCodeAt(0));
     return new DataView(raw.buffer);
   };
   let grid = decode();
@@ -79,8 +79,8 @@
       const x = Math.floor((e.clientX - r.left) / r.width * t.width);
       const y = Math.floor((e.clientY - r.top) / r.height * t.height);
       if (x < 0 || y < 0 || x >= t.width || y >= t.height) { out.textContent = ""; return; }
-      const ck = grid.getUint16(2 * (y * t.width + x), true);
-      out.textContent = ck ? (ck / 100 - 273.15).toFixed(1) + " °C" : "no value";
+      const count = grid.getUint16(2 * (y * t.width + x), true);
+      out.textContent = count ? (count * t.kelvin_per_count - 273.15).toFixed(1) + " °C" : "no value";
     });
     box.addEventListener("pointerleave", () => { out.textContent = ""; });
   });

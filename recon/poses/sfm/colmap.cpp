@@ -73,6 +73,22 @@ std::vector<MapperSettings> mapper_ladder() {
   return {MapperSettings{}, relaxed, last};
 }
 
+namespace {
+
+/// The end of COLMAP's log for a message: the log itself goes with the stage's folder.
+std::string last_words(const fs::path& log) {
+  constexpr std::size_t enough = 300;
+  const auto text = read_file(log);
+  if (!text) return "";
+  const std::size_t end = text->find_last_not_of(" \r\n");
+  if (end == std::string::npos) return "";
+  const std::size_t line = text->find_last_of('\n', end) + 1;
+  const std::size_t begin = std::max(line, end + 1 > enough ? end + 1 - enough : 0);
+  return "; COLMAP's last words: " + text->substr(begin, end + 1 - begin);
+}
+
+}  // namespace
+
 Result<ColmapProject> ColmapProject::create(const fs::path& folder, const fs::path& image_folder,
                                             const ColmapOptions& options) {
   std::error_code error;
@@ -126,11 +142,15 @@ Result<DatabaseCounts> ColmapProject::extract(const Session& session,
          fmt::format("{}", options_.peak_threshold)});
     ORBITFUSE_TRY(run(std::move(arguments), progress));
   }
-  ORBITFUSE_TRY(number_images_by_name(database_));
-  ORBITFUSE_ASSIGN(const DatabaseCounts counts, count_database(database_));
+  const auto with_last_words = [this](Error error) {
+    error.found += last_words(folder_ / "colmap.log");
+    return error;
+  };
+  ORBITFUSE_TRY(number_images_by_name(database_).map_error(with_last_words));
+  ORBITFUSE_ASSIGN(const DatabaseCounts counts, count_database(database_).map_error(with_last_words));
   if (counts.images_with_features == 0)
-    return fail(ErrorKind::quality, (folder_ / "colmap.log").string(),
-                fmt::format("COLMAP found no features in {} images", images.size()),
+    return fail(ErrorKind::quality, "COLMAP",
+                fmt::format("no features in {} images{}", images.size(), last_words(folder_ / "colmap.log")),
                 "check that the images are sharp and show more than one flat surface");
   return counts;
 }

@@ -22,7 +22,7 @@ class Database {
     const int status = sqlite3_open_v2(path.c_str(), &handle, flags, nullptr);
     Database database(handle, path);
     if (status == SQLITE_OK) return database;
-    return fail(ErrorKind::input, path.string(), "no COLMAP database", "see colmap.log beside it");
+    return fail(ErrorKind::input, path.string(), "no COLMAP database", "COLMAP wrote none: see whether it runs by hand (colmap feature_extractor -h)");
   }
 
   /// Calls `row` for each row of the answer.

@@ -41,7 +41,7 @@ Result<pid_t> start(const std::vector<std::string>& command, const std::filesyst
     return fail(ErrorKind::unavailable, command.front(),
                 fmt::format("cannot be started: {}", std::strerror(error)),
                 "install it (Debian: apt-get install colmap), put it on PATH or name it with "
-                "--colmap");
+                "--set poses.colmap=FILE");
   return pid;
 }
 

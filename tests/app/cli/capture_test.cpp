@@ -277,8 +277,8 @@ TEST(Capture, MistakesHaveARemedyAndLeaveNothing) {
       {{"--driver", tiny, "--guide", "key"}, 2, "--guide key: replayed and synthetic frames don't wait for a key"},
       {{"--driver", tiny, "--guide", "off", "--spacing-deg", "60"}, 2, "--spacing-deg: given with --guide off"},
       {{"--driver", tiny, "--visible", tiny, "--thermal", tiny}, 2, "leave it out: --visible and --thermal"},
-      {{"--visible", "", "--thermal", tiny}, 2, "--visible: given without a name"},
-      {{"--visible", tiny, "--page", ""}, 2, "--page: given without a name"},
+      {{"--visible", "", "--thermal", tiny}, 2, "--visible: empty"},
+      {{"--visible", tiny, "--page", ""}, 2, "--page: empty"},
       {{"--visible", "stills:.,existing=yes,existing=no"}, 2, "existing is given twice"},
       {{"--driver", tiny, "--token", "12345678"}, 2, "--token: given without --page"},
   };

@@ -103,7 +103,7 @@ TEST_F(DryRun, ImportOptionsWithoutEffect) {
   refused({"--kelvin-per-count", "5"}, "--kelvin-per-count: given without --thermal-scale linear");
   refused({"--thermal-scale", "linear"}, "--thermal-scale: given without --thermal");
   refused({photos + "/a.png"}, "given twice");
-  refused({""}, "an empty name");
+  refused({""}, "--visible: empty");
 }
 
 TEST_F(DryRun, WayThroughAFolderThatIsMadeToo) {

@@ -61,7 +61,7 @@ TEST(Report, ShowsEverythingItIsGiven) {
   for (const char* text : {"container &lt;1&gt;", "24 of 24", "0.0 °C", "50.0 °C", "20 of 24 views",
                            "no initial pair", "record more", "Xydeas &amp; Petrovic", "0.65", "12.5 s",
                            "saved 200 s", "12 of 24 posed", "one &lt;warning&gt;", "id=\"swipe\"",
-                           "centikelvin"})
+                           "kelvin_per_count"})
     EXPECT_THAT(html, HasSubstr(text));
 }
 

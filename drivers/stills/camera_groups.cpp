@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "drivers/stills/camera_groups.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+namespace orbitfuse {
+
+Result<CameraGroup*> CameraGroups::of(StillPhoto& still, const Source& source) {
+  const Modality modality = still.camera.modality;
+  const auto& focal = modality == Modality::visible ? options_.visible_focal_px : options_.thermal_focal_px;
+  if (focal) still.camera.lens.focal_px = focal;
+  const std::string key = still.key();
+  for (CameraGroup& group : groups_) {
+    if (group.modality != modality) continue;
+    if (group.key == key) return &group;
+    if (focal) {
+      return fail(ErrorKind::input, source.short_name(),
+                  fmt::format("is of {}, but {} of {}", still.described(), group.first_file, group.described),
+                  fmt::format("one focal length of {:g} px is not true of both: import them one by one, "
+                              "or leave the option away",
+                              *focal));
+    }
+  }
+  groups_.push_back({modality, key, still.described(), source.short_name(), {}, 0});
+  return &groups_.back();
+}
+
+std::string CameraGroups::next_device_id(Modality modality) const {
+  const auto known = std::count_if(groups_.begin(), groups_.end(), [&](const CameraGroup& group) {
+    return group.modality == modality && !group.id.empty();
+  });
+  return fmt::format("{}{}", name(modality), known);
+}
+
+std::optional<std::string> CameraGroups::described(Modality modality) const {
+  std::vector<std::string> list;
+  for (const CameraGroup& group : groups_) {
+    if (group.modality == modality)
+      list.push_back(fmt::format("{} from {} ({})", group.id, group.first_file, group.described));
+  }
+  if (list.size() < 2) return std::nullopt;
+  return fmt::format(
+      "{}: {} cameras, lenses or image sizes, each calibrated on its own: {}; leave out what is not of this orbit",
+      name(modality), list.size(), fmt::join(list, "; "));
+}
+
+}  // namespace orbitfuse

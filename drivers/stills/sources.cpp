@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "drivers/stills/sources.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace orbitfuse {
+
+std::string Source::short_name() const {
+  const std::string name = (file.parent_path().filename() / file.filename()).string();
+  return pages > 1 ? fmt::format("{}#{}", name, page + 1) : name;
+}
+
+std::string Source::where() const {
+  return pages > 1 ? fmt::format("{} (page {})", file.string(), page + 1) : file.string();
+}
+
+std::vector<Source> in_capture_order(std::vector<Source> sources) {
+  const bool all_timed =
+      std::all_of(sources.begin(), sources.end(), [](const Source& s) { return s.taken_ns.has_value(); });
+  if (all_timed) {
+    std::stable_sort(sources.begin(), sources.end(),
+                     [](const Source& a, const Source& b) { return *a.taken_ns < *b.taken_ns; });
+  }
+  for (std::size_t i = 0; i < sources.size(); ++i) sources[i].position = static_cast<int>(i);
+  return sources;
+}
+
+std::vector<std::string> CopyFilter::take_out(std::vector<Source>& sources) {
+  std::vector<std::string> told;
+  std::erase_if(sources, [&](const Source& source) {
+    if (source.hash.empty()) return false;
+    const auto [first, is_new] = first_.emplace(fmt::format("{}#{}", source.hash, source.page), source);
+    if (is_new) return false;
+    const KnownView* own = known_.find(source.file);
+    if (own && own->cam_from_world && own != known_.find(first->second.file)) return false;
+    told.push_back(fmt::format("left out: {}: the same image as {}", source.short_name(), first->second.short_name()));
+    return true;
+  });
+  return told;
+}
+
+}  // namespace orbitfuse

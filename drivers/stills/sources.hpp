@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/stills/known_poses.hpp"
+
+namespace orbitfuse {
+
+/// One image to import: a file, or a page of one.
+struct Source {
+  std::filesystem::path file;
+  int page = 0, pages = 1;
+  std::string hash;  ///< of the file's bytes; empty: it can't be read
+  std::optional<std::int64_t> taken_ns;
+  int position = 0;  ///< in capture order, counting files that turn out unreadable
+
+  /// Folder and file: enough to tell "visible/000.jpg" from "thermal/000.jpg" on any machine.
+  std::string short_name() const;
+  /// The whole path; of one page among several also its number.
+  std::string where() const;
+};
+
+/// Capture order: by time where every file has one (file name breaks ties of one-second clocks),
+/// else by name. Sets the positions.
+std::vector<Source> in_capture_order(std::vector<Source> sources);
+
+/// Tells copies: the same bytes under another name say nothing new, and a view twice in the same
+/// place spoils what is estimated from pairs. Two views whose poses are both known are two views.
+class CopyFilter {
+ public:
+  explicit CopyFilter(const KnownViews& known) : known_(known) {}
+  /// Takes copies out of `sources`; returns a sentence for each.
+  std::vector<std::string> take_out(std::vector<Source>& sources);
+
+ private:
+  const KnownViews& known_;
+  std::map<std::string, Source> first_;  ///< by content
+};
+
+}  // namespace orbitfuse

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Odd words and files on the command line: the program says what it makes of them, and never writes
+// over what it was given.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <regex>
+
+#include "core/image/image_codec.hpp"
+#include "core/image/image_io.hpp"
+#include "core/system/file_io.hpp"
+#include "tests/app/cli/program.hpp"
+#include "tests/app/cli/session_fixture.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace orbitfuse {
+namespace {
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+class Hostile : public testing::Test {
+ protected:
+  std::string path(const std::string& name) const { return temp.path() / name; }
+  void put_pair() const {
+    cv::Mat visible(48, 64, CV_8UC3), thermal(48, 64, CV_8UC1);
+    cv::randu(visible, 0, 255);
+    cv::randu(thermal, 0, 255);
+    ASSERT_TRUE(write_png(path("v.png"), visible));
+    ASSERT_TRUE(write_png(path("t.png"), thermal));
+  }
+  Outcome fuse(std::vector<std::string> more) const {
+    more.insert(more.begin(), {"fuse", "--visible", path("v.png"), "--thermal", path("t.png")});
+    return orbitfuse_program(more, {.folder = temp.path()});
+  }
+  void refused(const Outcome& outcome, int code, const std::string& words) const {
+    EXPECT_EQ(outcome.code, code) << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr(words));
+  }
+  const test::TempFolder temp;
+};
+
+TEST_F(Hostile, FuseWritesWhereItIsToldAndNowhereElse) {
+  put_pair();
+  const std::string visible = *read_file(path("v.png"));
+  refused(fuse({}), 2, "--out: not given");
+  EXPECT_FALSE(fs::exists(path("out")));
+  refused(fuse({"--out", path("v.png")}), 2, "is an input too");
+  refused(fuse({"--out", path("./") + "v.png"}), 2, "is an input too");
+  EXPECT_EQ(*read_file(path("v.png")), visible);
+  refused(fuse({"--out", path("f.gif")}), 2, "end it in .png or .jpg");
+  EXPECT_EQ(fuse({"--out", path("f.png"), "--dry-run"}).code, 0);
+  EXPECT_FALSE(fs::exists(path("f.png")));
+  for (const auto& [name, format] : {std::pair{"f.png", ImageFormat::png}, {"f.jpg", ImageFormat::jpeg}, {"f.JPEG", ImageFormat::jpeg}}) {
+    const Outcome done = fuse({"--out", path(name)});
+    EXPECT_EQ(done.code, 0) << done.err;
+    EXPECT_EQ(image_format(*read_file(path(name))), format) << name;
+  }
+}
+
+TEST_F(Hostile, FoldersOfPairsAreNotWrittenOver) {
+  put_pair();
+  for (const char* part : {"vi", "ir"}) fs::create_directories(path("pairs") + "/" + part);
+  fs::copy_file(path("v.png"), path("pairs/vi/a.png"));
+  fs::copy_file(path("t.png"), path("pairs/ir/a.png"));
+  const auto run = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"fuse", "--visible", path("pairs/vi"), "--thermal", path("pairs/ir")});
+    return orbitfuse_program(more, {.folder = temp.path()});
+  };
+  refused(run({}), 2, "--out: not given");
+  refused(run({"--out", path("pairs")}), 2, "would write into the input");
+  EXPECT_FALSE(fs::exists(path("out")));
+}
+
+TEST_F(Hostile, EmptyValuesAreNoValues) {
+  write_fixture_session(path("s"));
+  for (const char* option : {"--budget", "--config", "--out", "--cameras"})
+    refused(orbitfuse_program({"run", path("s"), "--out", path("o"), option, ""}), 2, std::string(option) + ": empty");
+  refused(orbitfuse_program({"inspect", ""}), 2, "empty");
+}
+
+TEST_F(Hostile, NumbersAreNamedAsTheyWereTyped) {
+  put_pair();
+  const std::pair<std::vector<std::string>, std::string> cases[] = {
+      {{"--humidity", "900"}, "--humidity: 900; must be 0 to 100"},
+      {{"--reflected-c", "-300"}, "--reflected-c: -300"},
+      {{"--emissivity", "1.5"}, "--emissivity: 1.5"},
+      {{"--thermal-scale", "linear"}, "--kelvin-per-count"},
+      {{"--emissivity", "0.9"}, "no radiometric JPEGs"}};
+  for (const auto& [options, words] : cases) {
+    std::vector<std::string> line{"import", path("s"), "--thermal", path("t.png")};
+    line.insert(line.end(), options.begin(), options.end());
+    refused(orbitfuse_program(line), 2, words);
+    EXPECT_FALSE(fs::exists(path("s")));
+  }
+}
+
+TEST_F(Hostile, OutputThatNobodyGetsIsNoSuccess) {
+  write_fixture_session(path("s"));
+  const std::string program = ORBITFUSE_BINARY_DIR "/app/orbitfuse";
+  const auto shell = [&](const std::string& line) { return run_program({"sh", "-c", line}); };
+  refused(shell(program + " inspect " + path("s") + " > /dev/full"), 4, "standard output");
+  refused(shell(program + " inspect " + path("s") + " --json > /dev/full"), 4, "standard output");
+  EXPECT_EQ(shell(program + " --help > /dev/full").code, 4);
+  // Who stops reading has what he wanted.
+  EXPECT_EQ(shell("{ " + program + " inspect " + path("s") + "; echo $? >&2; } | true").err, "0\n");
+}
+
+TEST_F(Hostile, NamesDoNotReachTheTerminalAsCommands) {
+  const std::string name = path("a\x1b[2J\x07.jpg");
+  std::ofstream(name) << "no image";
+  const Outcome outcome = orbitfuse_program({"import", path("s"), "--visible", name});
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.err, AllOf(Not(HasSubstr("\x1b")), Not(HasSubstr("\x07")), HasSubstr("a\\x1b[2J\\x07.jpg")));
+  const Outcome word = orbitfuse_program({"insp\x1b[31mect"});
+  EXPECT_THAT(word.err, Not(HasSubstr("\x1b")));
+}
+
+TEST_F(Hostile, InspectLooksAtTheFrames) {
+  write_fixture_session(path("s"));
+  EXPECT_EQ(orbitfuse_program({"inspect", path("s")}).code, 0);
+  fs::resize_file(path("s/visible/000003.png"), 100);
+  fs::resize_file(path("s/thermal/000001.tiff"), 90);
+  const Outcome outcome = orbitfuse_program({"inspect", path("s"), "--json"});
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_EQ(outcome.result().at("damaged").size(), 2u);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("visible/000003.png"), HasSubstr("thermal/000001.tiff"), HasSubstr("2 of 24")));
+}
+
+TEST_F(Hostile, ReportTellsWhatIsThereAndMakesNothing) {
+  write_fixture_session(path("s"));
+  const auto report = [&] { return orbitfuse_program({"report", path("s"), "--out", path("o")}); };
+  refused(report(), 3, "no finished stage");
+  EXPECT_FALSE(fs::exists(path("o/run.json")));
+  ASSERT_EQ(orbitfuse_program({"poses", path("s"), "--out", path("o")}).code, 0);
+  const Outcome outcome = report();
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_TRUE(fs::exists(path("o/report/report.html")));
+  EXPECT_FALSE(fs::exists(path("o/train_visible")));
+  EXPECT_FALSE(fs::exists(path("o/depth")));
+  EXPECT_THAT(outcome.err, HasSubstr("it has not run yet"));
+}
+
+TEST_F(Hostile, WhyColmapFailedIsInTheMessage) {
+  write_fixture_session(path("s"), {.known_poses = false});
+  std::ofstream(path("boom.sh")) << "#!/bin/sh\necho 'boom: no GPU' >&2\nexit 3\n";
+  fs::permissions(path("boom.sh"), fs::perms::owner_all);
+  const Outcome outcome = orbitfuse_program({"poses", path("s"), "--out", path("o"), "--set", "poses.colmap=" + path("boom.sh")});
+  EXPECT_NE(outcome.code, 0);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("boom: no GPU"), Not(HasSubstr("colmap.log"))));
+}
+
+TEST_F(Hostile, ConfigurationsThatNeverEndAreRefused) {
+  write_fixture_session(path("s"));
+  refused(orbitfuse_program({"run", path("s"), "--out", path("o"), "--config", "/dev/zero"}), 3, "a device, not a file");
+  refused(orbitfuse_program({"register", "--source", "/dev/zero", "--target", "/dev/zero"}), 3, "a device, not a file");
+  std::ofstream(path("huge.toml")).close();
+  fs::resize_file(path("huge.toml"), 8ull << 30);
+  refused(orbitfuse_program({"run", path("s"), "--out", path("o"), "--config", path("huge.toml")}), 3, "8192 MiB");
+}
+
+/// Options named in messages are options of the program.
+TEST(Messages, NameOptionsThatExist) {
+  const std::string reference = *read_file(fs::path(ORBITFUSE_SOURCE_DIR) / "docs/cli.md");
+  // Of other programs that are told to run: v4l2-ctl, COLMAP, apt-get, and our recorder of scenes.
+  const std::regex literal(R"lit("((?:[^"\\]|\\.)*)")lit"), option(R"((^|[^\w-])(--[a-z][a-z0-9-]*[a-z0-9]))");
+  for (const char* folder : {"app", "core", "capture", "drivers", "fusion", "recon"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(fs::path(ORBITFUSE_SOURCE_DIR) / folder)) {
+      if (entry.path().extension() != ".cpp" || entry.path().filename() == "record_main.cpp" ||
+          entry.path().filename() == "colmap.cpp")
+        continue;
+      std::istringstream lines(*read_file(entry.path()));
+      for (std::string line; std::getline(lines, line);) {
+        if (line.find("v4l2-ctl") != std::string::npos) continue;
+        for (std::sregex_iterator text(line.begin(), line.end(), literal), end; text != end; ++text) {
+          const std::string words = (*text)[1];
+          for (std::sregex_iterator o(words.begin(), words.end(), option); o != end; ++o)
+            EXPECT_THAT(reference, HasSubstr((*o)[2].str())) << entry.path() << ": " << line;
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace orbitfuse

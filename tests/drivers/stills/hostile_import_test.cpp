@@ -1,0 +1,309 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Odd, damaged and mixed files: what is good is kept, what is not is named, and nothing is wrong
+// without a word.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "capture/recording/session_writer.hpp"
+#include "core/formats/colmap_model.hpp"
+#include "core/formats/transforms_json.hpp"
+#include "core/image/image_codec.hpp"
+#include "core/image/image_io.hpp"
+#include "drivers/stills/import.hpp"
+#include "tests/support/made_files.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace orbitfuse {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class HostileImport : public ::testing::Test {
+ protected:
+  void put(const std::string& name, const std::string& bytes) const {
+    fs::create_directories((folder / name).parent_path());
+    std::ofstream(folder / name, std::ios::binary) << bytes;
+  }
+  void put_photo(const std::string& name, std::uint64_t seed) const {
+    cv::Mat image(30, 40, CV_8UC3);
+    cv::RNG(seed + 1).fill(image, cv::RNG::UNIFORM, 0, 255);
+    put(name, *encode_jpeg(image, 90));
+  }
+  /// Samples around `middle`, different for each seed.
+  static cv::Mat counts(double middle, std::uint64_t seed) {
+    cv::Mat image(30, 40, CV_16UC1);
+    cv::RNG(seed + 1).fill(image, cv::RNG::UNIFORM, middle - 200, middle + 200);
+    return image;
+  }
+  void put_centikelvin(const std::string& name, std::uint64_t seed) const {
+    put(name, *encode_tiff(counts(29500, seed), ""));
+  }
+  Result<ImportReport> import() const { return import_session(options, folder / "session"); }
+  cv::Mat kelvin_of(const ImportReport& report, std::size_t frame) const {
+    return *read_thermal_k(report.session.path_of(report.session.frames.at(frame)));
+  }
+
+  test::TempFolder folder;
+  ImportOptions options;
+};
+
+TEST_F(HostileImport, GlowingSpotsKeepTheirTemperature) {
+  cv::Mat hot = counts(29300 / 4, 1);             // 293 K at 0.04 K a count
+  hot.at<std::uint16_t>(3, 7) = 1173 * 25;        // 900 C
+  put("in/0.tiff", *encode_tiff(hot, R"({"scale":0.04,"offset":0})"));
+  put_centikelvin("in/1.tiff", 2);
+  const FlirCalibration camera = made::flir_calibration();
+  cv::Mat signal(30, 40, CV_16UC1, cv::Scalar(made::flir_signal(300, camera)));
+  signal.at<std::uint16_t>(5, 6) = made::flir_signal(1173.15, camera);
+  put("in/2.jpg", made::flir_jpeg(signal, camera));
+  options.thermal = {folder / "in"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  ASSERT_EQ(report->thermal, 3);
+  EXPECT_NEAR(kelvin_of(*report, 0).at<float>(3, 7), 1173, 0.02);
+  EXPECT_NEAR(kelvin_of(*report, 0).at<float>(0, 0), hot.at<std::uint16_t>(0, 0) * 0.04, 0.02);
+  EXPECT_NEAR(kelvin_of(*report, 1).at<float>(0, 0), counts(29500, 2).at<std::uint16_t>(0, 0) * 0.01, 0.0101);
+  EXPECT_NEAR(kelvin_of(*report, 2).at<float>(5, 6), 1173.15, 0.5);  // one signal is 0.1 K there
+  EXPECT_NEAR(kelvin_of(*report, 2).at<float>(0, 0), 300, 0.1);
+  for (const FrameRecord& frame : report->session.frames) {
+    const std::string sidecar = test::get(report->session.path_of(frame).string() + ".json");
+    EXPECT_THAT(sidecar, HasSubstr("\"scale\":0.02")) << "one scale for the session";
+    EXPECT_NEAR(frame.quality->mean_level, 294, 5);
+  }
+  EXPECT_THAT(report->warnings, Contains(HasSubstr("0.02 K a count")));
+}
+
+TEST_F(HostileImport, OrdinarySessionsStayCentikelvin) {
+  put_centikelvin("in/0.tiff", 1);
+  options.thermal = {folder / "in"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->kelvin_per_count, 0.01);
+  EXPECT_EQ(kelvin_of(*report, 0).at<float>(1, 1), static_cast<float>(counts(29500, 1).at<std::uint16_t>(1, 1) * 0.01));
+}
+
+TEST_F(HostileImport, WhatNoScaleHoldsIsTold) {
+  cv::Mat hot = counts(3000, 1);
+  hot.at<std::uint16_t>(3, 7) = 65535;
+  put("in/0.tiff", *encode_tiff(hot, R"({"scale":0.2,"offset":0})"));  // 600 K, and 13,107 K
+  options.thermal = {folder / "in"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_TRUE(std::isnan(kelvin_of(*report, 0).at<float>(3, 7)));
+  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("in/0.tiff"), HasSubstr("1 of 1200 samples"))));
+}
+
+TEST_F(HostileImport, CountsAmongTemperaturesAreLeftOutByName) {
+  for (int i = 0; i < 4; ++i) put_centikelvin("in/" + std::to_string(i) + ".tiff", static_cast<std::uint64_t>(i));
+  put("in/raw.tiff", *encode_tiff(counts(8000, 9), ""));
+  options.thermal = {folder / "in"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_TRUE(report->has_temperatures);
+  EXPECT_EQ(report->thermal, 4);
+  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("left out"), HasSubstr("raw.tiff"), HasSubstr("--kelvin-per-count"))));
+  EXPECT_NEAR(kelvin_of(*report, 0).at<float>(0, 0), 295, 2.1);
+}
+
+TEST_F(HostileImport, EightBitAmongTemperaturesIsLeftOutByName) {
+  put_centikelvin("in/0.tiff", 1);
+  put_photo("in/DC_1.jpg", 2);
+  options.thermal = {folder / "in"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_TRUE(report->has_temperatures);
+  EXPECT_EQ(report->thermal, 1);
+  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("left out"), HasSubstr("DC_1.jpg"), HasSubstr("--visible"))));
+}
+
+TEST_F(HostileImport, AWholeFolderOfCountsStaysGrey) {
+  for (int i = 0; i < 3; ++i) put("in/" + std::to_string(i) + ".tiff", *encode_tiff(counts(9000, static_cast<std::uint64_t>(i)), ""));
+  put("in/warm.tiff", *encode_tiff(counts(18000, 9), ""));  // counts of the same camera, by the others' word
+  options.thermal = {folder / "in"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_FALSE(report->has_temperatures);
+  EXPECT_EQ(report->thermal, 4);
+}
+
+TEST_F(HostileImport, TagsThatMakeImpossibleTemperaturesAreRefused) {
+  put("in/0.tiff", *encode_tiff(counts(30000, 1), R"({"scale":0.01,"offset":-273.15})"));
+  put_centikelvin("in/1.tiff", 2);
+  options.thermal = {folder / "in"};
+  auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->thermal, 1);
+  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("0.tiff"), HasSubstr("-273.15"))));
+
+  options.thermal_scale = ThermalScale::linear;
+  options.kelvin_per_count = 0.01;
+  options.kelvin_offset = -300;
+  fs::remove_all(folder / "session");
+  report = import();
+  ASSERT_FALSE(report);
+  EXPECT_THAT(report.error().message(), HasSubstr("--kelvin-offset"));
+
+  options.kelvin_per_count = 0;  // never said
+  report = import();
+  ASSERT_FALSE(report);
+  EXPECT_EQ(report.error().kind, ErrorKind::usage);
+}
+
+TEST_F(HostileImport, ABrokenSidecarIsNoSidecarToPassOver) {
+  put_centikelvin("in/0.tiff", 1);
+  put_centikelvin("in/1.tiff", 2);
+  put("in/0.tiff.json", R"({"scale":)");
+  options.thermal = {folder / "in"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->thermal, 1);
+  EXPECT_THAT(report->warnings, Contains(HasSubstr("0.tiff.json")));
+}
+
+TEST_F(HostileImport, EveryPageOfATiffIsAFrame) {
+  put("in/0.tiff", made::tiff_of_pages({counts(29500, 1), counts(29600, 2), counts(29700, 3)}));
+  put("in/1.tiff", made::tiff_of_pages({counts(29800, 4)}, R"({"scale":0.01})"));
+  options.thermal = {folder / "in"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  ASSERT_EQ(report->thermal, 4);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(cv::mean(kelvin_of(*report, i))[0], 295 + static_cast<double>(i), 0.2);
+  EXPECT_EQ(report->session.frames[1].source, "in/0.tiff#2");
+  // Elsewhere one image is expected, and the first of several would be a guess.
+  const auto image = read_image(folder / "in/0.tiff");
+  ASSERT_FALSE(image);
+  EXPECT_THAT(image.error().message(), HasSubstr("3 pages"));
+}
+
+TEST_F(HostileImport, CopiesAreImportedOnce) {
+  put_photo("in/a.jpg", 1);
+  put_photo("in/a copy.jpg", 1);
+  put_photo("in/b.jpg", 2);
+  put_centikelvin("t/0.tiff", 1);
+  put_centikelvin("t/1.tiff", 1);
+  options.visible = {folder / "in"};
+  options.thermal = {folder / "t"};
+  DeclaredStations stations;
+  options.visible_stations = stations;
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->visible, 2);
+  EXPECT_EQ(report->thermal, 1);
+  EXPECT_EQ(report->session.frames_of(Modality::visible)[1]->station->index, 1) << "a copy is no station";
+  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("a copy.jpg"), HasSubstr("same image as"))));
+  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("t/1.tiff"), HasSubstr("t/0.tiff"))));
+}
+
+TEST_F(HostileImport, UnreadFormatsAreNamed) {
+  put_photo("in/a.jpg", 1);
+  put("in/IMG_3.HEIC", std::string("\0\0\0\x18" "ftypheic", 12));
+  for (const char* name : {"in/b.dng", "in/c.webp", "in/d.mp4", "in/notes.txt"}) put(name, "x");
+  options.visible = {folder / "in"};
+  auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  for (const char* name : {"IMG_3.HEIC", "b.dng", "c.webp", "d.mp4"})
+    EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("left out"), HasSubstr(name))));
+  EXPECT_THAT(report->warnings, Not(Contains(HasSubstr("notes.txt"))));
+
+  fs::remove(folder / "in/a.jpg");
+  fs::remove_all(folder / "session");
+  report = import();
+  ASSERT_FALSE(report);
+  EXPECT_THAT(report.error().message(), HasSubstr("convert them"));
+}
+
+TEST_F(HostileImport, ObjectParametersNeedRadiometricJpegs) {
+  put_centikelvin("in/0.tiff", 1);
+  options.thermal = {folder / "in"};
+  options.object.emissivity = 0.8;
+  auto report = import();
+  ASSERT_FALSE(report);
+  EXPECT_EQ(report.error().kind, ErrorKind::usage);
+  EXPECT_FALSE(fs::exists(folder / "session"));
+  const FlirCalibration camera = made::flir_calibration();
+  put("in/1.jpg", made::flir_jpeg(counts(made::flir_signal(300, camera), 3), camera));
+  report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_THAT(report->warnings, Contains(HasSubstr("1 of 2 thermal files are no radiometric JPEGs")));
+}
+
+TEST_F(HostileImport, APhotoWithADamagedScanIsLeftOut) {
+  put_photo("in/a.jpg", 1);
+  cv::Mat image(240, 320, CV_8UC3);
+  cv::RNG(5).fill(image, cv::RNG::UNIFORM, 0, 255);
+  std::string bytes = *encode_jpeg(image, 90);
+  for (std::size_t i = bytes.size() / 2; i < bytes.size() / 2 + 64; ++i) bytes[i] = static_cast<char>(bytes[i] ^ 0x55);
+  put("in/b.jpg", bytes);
+  options.visible = {folder / "in"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->visible, 1);
+  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("b.jpg"), HasSubstr("JPEG"))));
+}
+
+TEST_F(HostileImport, EndlessFilesAreRefusedAndLeaveTheWayFree) {
+  Transforms transforms;
+  for (const char* file : {"/dev/zero", "pipe", "huge.jpg", "in/a.jpg"}) {
+    transforms.frames.push_back({file, {}, Camera::from_fov(40, 30, 50), {}});
+  }
+  ASSERT_TRUE(write_transforms_json(folder / "transforms.json", transforms));
+  ASSERT_EQ(::system(("mkfifo " + (folder / "pipe").string()).c_str()), 0);
+  std::ofstream(folder / "huge.jpg").close();
+  fs::resize_file(folder / "huge.jpg", 8ull << 30);
+  options.transforms_json = folder / "transforms.json";
+  auto report = import();
+  ASSERT_FALSE(report);
+  EXPECT_FALSE(fs::exists(folder / "session"));
+  put_photo("in/a.jpg", 1);
+  report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->visible, 1);
+  for (const char* name : {"/dev/zero", "pipe", "huge.jpg"}) EXPECT_THAT(report->warnings, Contains(HasSubstr(name)));
+}
+
+TEST_F(HostileImport, WhatAKilledImportLeftIsReplaced) {
+  put_photo("in/a.jpg", 1);
+  options.visible = {folder / "in"};
+  ASSERT_TRUE(SessionWriter::create(folder / "session", {{"recorded_by", "import"}}));  // and not closed
+  put("session/visible/000000.jpg", "half");
+  EXPECT_TRUE(import());
+  EXPECT_FALSE(import()) << "a finished session stays";
+  ASSERT_TRUE(SessionWriter::create(folder / "recorded", {{"recorded_by", "capture"}}));
+  EXPECT_FALSE(import_session(options, folder / "recorded"));
+}
+
+TEST_F(HostileImport, ThousandsOfMissingFramesAreLookedUpByName) {
+  Transforms transforms;
+  for (int i = 0; i < 4000; ++i)
+    transforms.frames.push_back({"images/" + std::to_string(i) + ".jpg", {}, Camera::from_fov(40, 30, 50), {}});
+  ASSERT_TRUE(write_transforms_json(folder / "transforms.json", transforms));
+  put_photo("images/17.jpg", 1);
+  options.transforms_json = folder / "transforms.json";
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->with_pose, 1);
+  EXPECT_EQ(std::count_if(report->warnings.begin(), report->warnings.end(),
+                          [](const std::string& w) { return w.starts_with("left out"); }), 3999);
+}
+
+TEST_F(HostileImport, ASessionThatWouldNotOpenIsNotWritten) {
+  for (int i = 1; i <= 2; ++i) put_photo("in/" + std::to_string(i) + ".jpg", static_cast<std::uint64_t>(i));
+  put("model/cameras.txt", "1 PINHOLE 40 30 40 40 20 15\n");
+  put("model/images.txt", "1 1e200 0 0 0 1 2 3 1 1.jpg\n\n2 1 0 0 0 0 0 1 1 2.jpg\n\n");
+  options.visible = {folder / "in"};
+  options.visible_colmap = folder / "model";
+  const auto report = import();
+  ASSERT_FALSE(report);
+  EXPECT_THAT(report.error().message(), AllOf(HasSubstr("1.jpg"), HasSubstr("quaternion")));
+  EXPECT_FALSE(fs::exists(folder / "session"));
+}
+
+}  // namespace
+}  // namespace orbitfuse

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tests/support/made_files.hpp"
+
+#include <cmath>
+#include <cstring>
+
+#include "core/image/image_codec.hpp"
+
+namespace orbitfuse::made {
+namespace {
+
+void put_number(std::string& to, std::size_t at, std::uint64_t value, int bytes) {
+  if (to.size() < at + static_cast<std::size_t>(bytes)) to.resize(at + static_cast<std::size_t>(bytes));
+  for (int i = 0; i < bytes; ++i) to[at + static_cast<std::size_t>(i)] = static_cast<char>(value >> (8 * i));
+}
+
+void put_float(std::string& to, std::size_t at, double value) {
+  const auto narrow = static_cast<float>(value);
+  std::uint32_t bits;
+  std::memcpy(&bits, &narrow, sizeof bits);
+  put_number(to, at, bits, 4);
+}
+
+/// The directory is big-endian, records little-endian, as cameras write them.
+void put_big(std::string& to, std::size_t at, std::uint64_t value, int bytes) {
+  for (int i = 0; i < bytes; ++i)
+    to[at + static_cast<std::size_t>(i)] = static_cast<char>(value >> (8 * (bytes - 1 - i)));
+}
+
+std::string samples_of(const cv::Mat& image) {
+  std::string bytes;
+  for (int y = 0; y < image.rows; ++y)
+    bytes.append(reinterpret_cast<const char*>(image.ptr(y)), static_cast<std::size_t>(image.cols) * image.elemSize());
+  return bytes;
+}
+
+std::string raw_record(const cv::Mat& signal, FlirPixels pixels) {
+  std::string record(0x20, '\0');
+  put_number(record, 0, 2, 2);
+  put_number(record, 2, static_cast<std::uint64_t>(signal.cols), 2);
+  put_number(record, 4, static_cast<std::uint64_t>(signal.rows), 2);
+  if (pixels == FlirPixels::raw) return record + samples_of(signal);
+  cv::Mat swapped = signal.clone();
+  for (auto it = swapped.begin<std::uint16_t>(); it != swapped.end<std::uint16_t>(); ++it)
+    *it = static_cast<std::uint16_t>(*it << 8 | *it >> 8);
+  return record + *encode_png(swapped);
+}
+
+std::string camera_record(const cv::Mat& signal, const FlirCalibration& c) {
+  std::string record(0x400, '\0');
+  put_number(record, 0, 2, 2);
+  const std::pair<std::size_t, double> numbers[] = {
+      {0x20, c.object.emissivity},    {0x24, c.object.distance_m},          {0x28, c.object.reflected_k},
+      {0x2c, c.object.atmospheric_k}, {0x30, c.object.window_k},            {0x34, c.object.window_transmission},
+      {0x3c, c.object.relative_humidity}, {0x58, c.planck.r1},              {0x5c, c.planck.b},
+      {0x60, c.planck.f},             {0x70, c.atmosphere.alpha1},          {0x74, c.atmosphere.alpha2},
+      {0x78, c.atmosphere.beta1},     {0x7c, c.atmosphere.beta2},           {0x80, c.atmosphere.x},
+      {0x30c, c.planck.r2},           {0x1b4, 25.0}};
+  for (const auto& [at, value] : numbers) put_float(record, at, value);
+  put_number(record, 0x308, static_cast<std::uint32_t>(static_cast<std::int32_t>(c.planck.o)), 4);
+  record.replace(0xd4, 12, "Made T640 IR");
+  record.replace(0x104, 6, "000042");
+  double low = 0, high = 0;
+  cv::minMaxLoc(signal, &low, &high);
+  put_number(record, 0x310, static_cast<std::uint64_t>(low), 2);
+  put_number(record, 0x312, static_cast<std::uint64_t>(high), 2);
+  put_number(record, 0x338, signal.at<std::uint16_t>(signal.rows / 2, signal.cols / 2), 2);
+  put_number(record, 0x384, 1'700'000'000, 4);
+  return record;
+}
+
+void put_segment(std::string& to, unsigned char marker, const std::string& payload) {
+  to += '\xff';
+  to += static_cast<char>(marker);
+  to += static_cast<char>((payload.size() + 2) >> 8);
+  to += static_cast<char>((payload.size() + 2) & 0xff);
+  to += payload;
+}
+
+}  // namespace
+
+FlirCalibration flir_calibration() {
+  FlirCalibration c;
+  c.planck = {16556.0, 0.046952, 1428.0, 1.0, -207.0};
+  c.object = {1.0, 1.0, 293.15, 293.15, 293.15, 1.0, 0.5};
+  return c;
+}
+
+std::uint16_t flir_signal(double kelvin, const FlirCalibration& c) {
+  const FlirThermometer thermometer(c);
+  std::uint16_t best = 0;
+  double error = 1e9;
+  for (int s = 0; s < 65536; ++s) {
+    const double t = thermometer.kelvin(static_cast<std::uint16_t>(s));
+    if (std::isfinite(t) && std::abs(t - kelvin) < error) {
+      error = std::abs(t - kelvin);
+      best = static_cast<std::uint16_t>(s);
+    }
+  }
+  return best;
+}
+
+std::string flir_file(const cv::Mat& signal, const FlirCalibration& calibration, FlirPixels pixels,
+                      const std::string& embedded_photo) {
+  std::vector<std::pair<int, std::string>> records{{0x01, raw_record(signal, pixels)},
+                                                   {0x20, camera_record(signal, calibration)}};
+  if (!embedded_photo.empty()) records.emplace_back(0x0e, std::string(0x20, '\0') + embedded_photo);
+  std::string file(64 + 32 * records.size(), '\0');
+  file.replace(0, 4, "FFF\0", 4);
+  put_big(file, 0x14, 101, 4);
+  put_big(file, 0x18, 64, 4);
+  put_big(file, 0x1c, records.size(), 4);
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    put_big(file, 64 + 32 * i, static_cast<std::uint64_t>(records[i].first), 2);
+    put_big(file, 64 + 32 * i + 0x0c, file.size(), 4);
+    put_big(file, 64 + 32 * i + 0x10, records[i].second.size(), 4);
+    file += records[i].second;
+  }
+  return file;
+}
+
+std::string flir_jpeg(const cv::Mat& signal, const FlirCalibration& calibration, FlirPixels pixels,
+                      const std::string& embedded_photo, std::size_t segment_bytes) {
+  const std::string file = flir_file(signal, calibration, pixels, embedded_photo);
+  cv::Mat picture;
+  signal.convertTo(picture, CV_8U, 1.0 / 256);
+  const std::string jpeg = *encode_jpeg(picture, 80);
+  std::string out = jpeg.substr(0, 2);
+  const std::size_t parts = (file.size() + segment_bytes - 1) / segment_bytes;
+  for (std::size_t i = 0; i < parts; ++i) {
+    std::string payload("FLIR\0\1", 6);
+    payload += static_cast<char>(i);
+    payload += static_cast<char>(parts - 1);
+    put_segment(out, 0xe1, payload + file.substr(i * segment_bytes, segment_bytes));
+  }
+  return out + jpeg.substr(2);
+}
+
+std::string tiff_of_pages(const std::vector<cv::Mat>& pages, const std::string& description) {
+  std::string out("II*\0\0\0\0\0", 8);
+  std::size_t link = 4;  // where the offset of the next directory goes
+  for (const cv::Mat& page : pages) {
+    const std::size_t pixels_at = out.size();
+    out += samples_of(page);
+    const std::size_t text_at = out.size();
+    out += description + '\0';
+    if (out.size() % 2 == 1) out += '\0';
+    const std::size_t directory = out.size();
+    put_number(out, link, directory, 4);
+    const auto bits = static_cast<std::uint64_t>(8 * page.elemSize1());
+    struct Entry {
+      std::uint64_t tag, type, count, value;
+    };
+    std::vector<Entry> entries{{256, 4, 1, static_cast<std::uint64_t>(page.cols)},
+                               {257, 4, 1, static_cast<std::uint64_t>(page.rows)},
+                               {258, 3, 1, bits},
+                               {259, 3, 1, 1},
+                               {262, 3, 1, 1}};
+    if (description.size() > 3) entries.push_back({270, 2, description.size() + 1, text_at});
+    entries.push_back({273, 4, 1, pixels_at});
+    entries.push_back({277, 3, 1, 1});
+    entries.push_back({278, 4, 1, static_cast<std::uint64_t>(page.rows)});
+    entries.push_back({279, 4, 1, page.total() * page.elemSize()});
+    put_number(out, directory, entries.size(), 2);
+    for (std::size_t i = 0; i < entries.size(); ++i) {
+      const std::size_t at = directory + 2 + 12 * i;
+      put_number(out, at, entries[i].tag, 2);
+      put_number(out, at + 2, entries[i].type, 2);
+      put_number(out, at + 4, entries[i].count, 4);
+      put_number(out, at + 8, entries[i].value, 4);
+    }
+    link = directory + 2 + 12 * entries.size();
+    put_number(out, link, 0, 4);
+  }
+  return out;
+}
+
+}  // namespace orbitfuse::made

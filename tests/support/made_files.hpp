@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "drivers/stills/flir_temperature.hpp"
+
+// Files of cameras and programs that are not at hand, written as their formats are documented: for
+// tests and as seeds of the fuzzers.
+namespace orbitfuse::made {
+
+/// Calibration of a common uncooled camera: 295 K at about 14,000 counts.
+FlirCalibration flir_calibration();
+/// The signal at which that camera shows the temperature.
+std::uint16_t flir_signal(double kelvin, const FlirCalibration& calibration);
+
+enum class FlirPixels { raw, png };
+/// A FLIR radiometric JPEG: raw thermal record (CV_16UC1), camera record, and an embedded photo unless
+/// empty, in APP1 segments of at most `segment_bytes`.
+std::string flir_jpeg(const cv::Mat& signal, const FlirCalibration& calibration, FlirPixels pixels = FlirPixels::raw,
+                      const std::string& embedded_photo = {}, std::size_t segment_bytes = 60000);
+
+/// The FFF file inside it.
+std::string flir_file(const cv::Mat& signal, const FlirCalibration& calibration, FlirPixels pixels,
+                      const std::string& embedded_photo);
+
+/// An uncompressed little-endian TIFF of several CV_16UC1 or CV_8UC1 pages, with descriptions.
+std::string tiff_of_pages(const std::vector<cv::Mat>& pages, const std::string& description = {});
+
+}  // namespace orbitfuse::made
