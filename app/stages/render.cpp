@@ -13,6 +13,7 @@
 #include "core/image/palette.hpp"
 #include "core/formats/transforms_json.hpp"
 #include "core/system/clock.hpp"
+#include "recon/assembly/looked_at.hpp"
 #include "recon/nerf/nerf.hpp"
 
 namespace orbitfuse::stages {
@@ -82,6 +83,19 @@ cv::Mat masked(const cv::Mat& kelvin, const cv::Mat& opacity, double min_opacity
   return result;
 }
 
+/// What colours stand for in all pictures of the run: the span of the object that was gone round, and
+/// what is warm against its surroundings.
+Status choose_scales(const StageContext& context, Modality frame, const std::vector<ThermalView>& seen,
+                     RenderedViews& rendered) {
+  ORBITFUSE_ASSIGN(const Reconstruction posed, load_poses(context.of("poses_" + std::string(name(frame))), frame));
+  const TemperatureSpan object = object_span(seen, posed.views);
+  const HeatScaleOptions how = heat_scale_options(rendered.samples());
+  rendered.heat = heat_scale(within_orbit(seen, posed.views, surroundings_reach), how);
+  rendered.heat.hot = std::max(object.high_k, rendered.heat.usual + how.min_width);
+  rendered.span = rendered.thermal_is_gray ? TemperatureSpan{0, 255} : object;
+  return {};
+}
+
 Result<StageOutput> render(const StageContext& context, const SessionInput& input,
                            const RenderConfig& config) {
   ORBITFUSE_ASSIGN(const Fields fields, load_fields(context));
@@ -92,7 +106,7 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
 
   const UsageClock clock;
   std::vector<ViewFiles> files;
-  std::vector<cv::Mat> temperatures;
+  std::vector<ThermalView> temperatures;
   Transforms transforms;
   for (const PosedView& view : chosen.views) {
     ORBITFUSE_TRY(context.progress.check("render"));
@@ -101,6 +115,7 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
                              done > 0 ? clock.wall_s() / done * (total - done) : -1, view.name});
     ViewFiles f;
     f.name = view.name;
+    cv::Mat depth;
     if (!fields.visible.empty()) {
       ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
                        nerf::render(fields.visible, view.camera, view.cam_from_world,
@@ -109,7 +124,8 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
       f.depth = "depth/" + view.name + ".tiff";
       f.visible_opacity = "opacity/" + view.name + "_visible.tiff";
       ORBITFUSE_TRY(write_png(context.folder / f.visible, bgr8_of_rgb(seen.color)));
-      ORBITFUSE_TRY(write_float_tiff(context.folder / f.depth, seen.depth));
+      depth = seen.depth;
+      ORBITFUSE_TRY(write_float_tiff(context.folder / f.depth, depth));
       ORBITFUSE_TRY(write_float_tiff(context.folder / f.visible_opacity, seen.opacity));
     }
     if (!fields.thermal.empty()) {
@@ -121,13 +137,14 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
                                     context.progress));
       f.thermal = "thermal/" + view.name + (gray ? ".png" : ".tiff");
       f.thermal_opacity = "opacity/" + view.name + "_thermal.tiff";
-      temperatures.push_back(masked(seen.color, seen.opacity, config.min_opacity));
+      temperatures.push_back({view, masked(seen.color, seen.opacity, config.min_opacity),
+                              depth.empty() ? seen.depth : depth});
       if (gray) {
         cv::Mat levels;
         seen.color.convertTo(levels, CV_8U);
         ORBITFUSE_TRY(write_png(context.folder / f.thermal, levels));
       } else {
-        ORBITFUSE_TRY(write_thermal_tiff(context.folder / f.thermal, temperatures.back()));
+        ORBITFUSE_TRY(write_thermal_tiff(context.folder / f.thermal, temperatures.back().thermal));
       }
       ORBITFUSE_TRY(write_float_tiff(context.folder / f.thermal_opacity, seen.opacity));
       if (f.depth.empty()) {
@@ -150,12 +167,12 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
   RenderedViews rendered;
   rendered.thermal_is_gray = gray;
   if (!temperatures.empty()) {
-    rendered.span = gray ? TemperatureSpan{0, 255} : common_span(temperatures);
+    ORBITFUSE_TRY(choose_scales(context, frame, temperatures, rendered));
     ORBITFUSE_ASSIGN(const cv::Mat colors, palette(config.palette));
     for (std::size_t i = 0; i < files.size(); ++i) {
       files[i].palette = "palette/" + files[i].name + ".png";
       ORBITFUSE_TRY(write_png(context.folder / files[i].palette,
-                              colorize(temperatures[i], rendered.span, colors)));
+                              colorize(temperatures[i].thermal, rendered.span, colors)));
     }
     if (!gray)
       ORBITFUSE_TRY(save_temperature_bounds(context.folder, rendered.span.low_k, rendered.span.high_k));
@@ -171,6 +188,7 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
 pipeline::Stage render_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "render";
+  stage.version = 2;
   stage.uses = {"poses_visible", "poses_thermal", "train_visible", "train_thermal", "register"};
   stage.options = in.config->settings().to_json("render");
   stage.options["cameras"] = in.config->render.cameras;

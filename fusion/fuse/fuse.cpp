@@ -16,9 +16,6 @@ namespace {
 
 using fusion::Plane;
 
-/// Least range of gray levels that heat spreads its colours over; less is noise of an 8-bit image.
-constexpr double min_heat_gray_levels = 16;
-
 constexpr std::pair<FusionMethod, const char*> methods[] = {{FusionMethod::heat, "heat"},
                                                             {FusionMethod::best, "best"},
                                                             {FusionMethod::ms_srif, "ms-srif"},
@@ -116,7 +113,7 @@ Status check_sizes(const cv::Mat& visible, const cv::Mat& thermal) {
 }
 
 Result<cv::Mat> by_heat(const cv::Mat& visible, const Plane& levels, const cv::Mat1b& valid, const Plane& measured,
-                        const FusionOptions& options, bool gray_levels) {
+                        const FusionOptions& options, bool gray_levels, FusionReport& said) {
   fusion::HeatOptions chosen = options.heat;
   if (!chosen.scale) {
     Plane seen = levels.clone();
@@ -125,6 +122,7 @@ Result<cv::Mat> by_heat(const cv::Mat& visible, const Plane& levels, const cv::M
     if (gray_levels) how.min_width = min_heat_gray_levels;
     chosen.scale = heat_scale({seen}, how);
   }
+  said.heat = chosen.scale;
   cv::Mat bgr = options.color ? visible : cv::Mat(luma(visible));
   if (bgr.channels() == 1) cv::cvtColor(bgr, bgr, cv::COLOR_GRAY2BGR);
   return fusion::colored_by_heat(bgr, levels, measured, chosen);
@@ -195,7 +193,7 @@ Result<cv::Mat> fuse(const cv::Mat& visible, const cv::Mat& thermal, const cv::M
   cv::Mat result;
   if (options.method == FusionMethod::heat) {
     const bool gray_levels = thermal.depth() != CV_32F;
-    ORBITFUSE_ASSIGN(result, by_heat(v, gray_levels ? t.gray : Plane(thermal), mask, measured, options, gray_levels));
+    ORBITFUSE_ASSIGN(result, by_heat(v, gray_levels ? t.gray : Plane(thermal), mask, measured, options, gray_levels, said));
   } else {
     ORBITFUSE_ASSIGN(result, fuse_valid(v_luma, t.gray, mask, measured, options, said));
     if (!options.overlay.palette.empty() || (options.color && v.channels() == 3)) {

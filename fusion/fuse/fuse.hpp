@@ -50,6 +50,7 @@ struct SkippedShares {
 struct FusionReport {
   SkippedShares skipped;
   double unmeasured = 0;  ///< share of the image where the thermal one holds nothing
+  std::optional<HeatScale> heat;  ///< by which heat coloured the image
   std::vector<Skip> skips;
   double wall_s = 0;
 };

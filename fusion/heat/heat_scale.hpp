@@ -26,6 +26,9 @@ struct HeatScaleOptions {
   double min_width = 2;
 };
 
+/// `min_width` for 8-bit images, whose noise is some gray levels.
+inline constexpr double min_heat_gray_levels = 16;
+
 /// One scale for all images of a scene (CV_32FC1, NaN and infinite = nothing measured): `usual` is
 /// their median, `spread` the smaller distance to a quartile (the larger one reaches into the sky or
 /// the hot object). Without a finite sample: 0, 0, min_width.

@@ -12,6 +12,7 @@ namespace orbitfuse::fusion {
 namespace {
 
 constexpr int font = cv::FONT_HERSHEY_SIMPLEX;
+const cv::Scalar mid_gray = cv::Scalar::all(150);
 
 /// Sizes that follow the strip's width, so that it reads the same under any picture.
 struct Layout {
@@ -42,19 +43,29 @@ std::string label(double level, HeatUnit unit, bool last) {
 
 }  // namespace
 
+Result<cv::Mat> heat_ramp(const HeatLegend& legend, int width) {
+  HeatOptions how = legend.how;
+  how.scale = legend.scale;
+  Plane level(1, std::max(1, width));
+  for (int x = 0; x < level.cols; ++x)
+    level(0, x) = static_cast<float>(legend.scale.usual + (legend.scale.hot - legend.scale.usual) * x / std::max(1, level.cols - 1));
+  ORBITFUSE_ASSIGN(cv::Mat colors, colored_by_heat(cv::Mat(level.size(), CV_32FC3, mid_gray), level, {}, how));
+  colors.convertTo(colors, CV_8U);
+  return colors;
+}
+
 Result<cv::Mat> heat_legend(const HeatLegend& legend, int width) {
   HeatOptions how = legend.how;
   how.scale = legend.scale;
   const Layout layout(std::max(width, 1));
   const int bar = layout.bar_width();
-  // The same way as pictures are coloured, over mid gray; to its right the hatching.
+  // To the right of the bar the hatching.
   const cv::Size swatches(bar + layout.margin + layout.swatch, layout.bar_height);
-  Plane level(swatches, static_cast<float>(legend.scale.usual)), measured(swatches, 0.0F);
-  for (int x = 0; x < bar; ++x)
-    level.col(x).setTo(legend.scale.usual + (legend.scale.hot - legend.scale.usual) * x / std::max(1, bar - 1));
-  measured.colRange(0, bar).setTo(1);
-  ORBITFUSE_ASSIGN(cv::Mat colors, colored_by_heat(cv::Mat(swatches, CV_32FC3, cv::Scalar::all(150)), level, measured, how));
+  const Plane usual(swatches, static_cast<float>(legend.scale.usual));
+  ORBITFUSE_ASSIGN(cv::Mat colors, colored_by_heat(cv::Mat(swatches, CV_32FC3, mid_gray), usual, Plane::zeros(swatches), how));
   colors.convertTo(colors, CV_8U);
+  ORBITFUSE_ASSIGN(const cv::Mat ramp, heat_ramp(legend, bar));
+  cv::repeat(ramp, layout.bar_height, 1, colors.colRange(0, bar));
   colors.colRange(bar, bar + layout.margin).setTo(cv::Scalar::all(255));
   cv::Mat strip(layout.height, layout.width, CV_8UC3, cv::Scalar::all(255));
   const cv::Rect place(layout.margin, layout.margin, swatches.width, swatches.height);
