@@ -90,6 +90,32 @@ std::string temperature_bar(const Model& model) {
           : "The thermal frames hold gray levels, not temperatures: import radiometric files for °C.");
 }
 
+/// The colours of the heat pictures over mid gray, as they strengthen.
+std::string heat_bar(const Model& model) {
+  if (!model.heat) return {};
+  constexpr int width = 16, tick_count = 5;
+  const auto ramp = fusion::heat_ramp(*model.heat, width);
+  if (!ramp) return {};
+  std::string stops, ticks;
+  for (int i = 0; i < width; ++i) {
+    const cv::Vec3b c = ramp->at<cv::Vec3b>(0, i);
+    stops += fmt::format(",rgb({} {} {})", c[2], c[1], c[0]);
+  }
+  const HeatScale& scale = model.heat->scale;
+  for (int i = 0; i < tick_count; ++i) {
+    const double t = scale.usual + (scale.hot - scale.usual) * i / (tick_count - 1);
+    ticks += model.heat->unit == fusion::HeatUnit::kelvin ? fmt::format("<span>{:.1f} °C</span>", celsius_from_kelvin(t))
+                                                          : fmt::format("<span>{:.0f}</span>", t);
+  }
+  return fmt::format(
+      "<div class=\"bar\" role=\"img\" aria-label=\"Scale of the heat picture\"><div class=\"ramp\" "
+      "style=\"background:linear-gradient(90deg{})\"></div><div class=\"ticks\">{}</div></div>\n<p class=\"note\">"
+      "Heat picture: the visible one, with what is warmer than its surroundings in colour; the stronger, the more "
+      "unusual. The bar begins at what is usual here. <span class=\"hatch\"></span> Hatched: nothing was measured."
+      "</p>\n",
+      stops, ticks);
+}
+
 std::string viewer(const Model& model, const json& views) {
   if (views.empty()) return {};
   const json& first = views.front();
@@ -109,6 +135,7 @@ std::string viewer(const Model& model, const json& views) {
   if (fused) html += figure(first, "fused", "Fused", true);
   html += "</div>\n";
   if (thermal) html += temperature_bar(model);
+  if (fused) html += heat_bar(model);
   if (visible + thermal + fused > 1) {
     html += fmt::format(
         "<h3 id=\"h-swipe\">Swipe</h3>\n<div class=\"controls\"><label>Left <select id=\"left\">"

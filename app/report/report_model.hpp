@@ -3,12 +3,14 @@
 
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "app/pipeline/stage.hpp"
 #include "core/image/palette.hpp"
+#include "fusion/heat/legend.hpp"
 
 namespace orbitfuse::report {
 
@@ -59,6 +61,7 @@ struct Model {
   TemperatureSpan span;
   bool has_temperature = false;      ///< the span is in kelvin (else gray levels)
   cv::Mat palette_bgr;               ///< 1x256
+  std::optional<fusion::HeatLegend> heat;  ///< what the colours of the heat pictures stand for
   std::vector<PosesSummary> poses;
   std::string registration_note;
   Facts registration;

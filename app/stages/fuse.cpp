@@ -3,12 +3,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "app/stages/artifacts.hpp"
 #include "app/stages/metric_tables.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
 #include "recon/assembly/training_data.hpp"
 #include "core/image/image_io.hpp"
+#include "fusion/heat/legend.hpp"
 
 namespace orbitfuse::stages {
 namespace {
@@ -25,6 +28,25 @@ Result<cv::Mat> valid_pixels(const std::filesystem::path& folder, const ViewFile
   return valid;
 }
 
+/// One view by one method. Gray fusion takes the thermal image over the run's span; heat the levels
+/// themselves, which a span would cut.
+Result<cv::Mat> fuse_view(const cv::Mat& visible, const cv::Mat& thermal, const cv::Mat& valid,
+                          const RenderedViews& rendered, FusionOptions options, FusionReport& said) {
+  if (cv::countNonZero(valid) == 0) return visible;
+  if (options.method != FusionMethod::heat)
+    return fuse(visible, gray_of_kelvin(thermal, rendered.span), valid, options, &said);
+  options.heat.scale = rendered.heat;
+  options.span = rendered.span;
+  return fuse(visible, thermal, valid, options, &said);
+}
+
+/// The bar that says what heat's colours stand for, beside its pictures.
+Status write_legend(const StageContext& context, const RenderedViews& rendered, const FusionOptions& options) {
+  constexpr int width_px = 640;
+  ORBITFUSE_ASSIGN(const cv::Mat legend, fusion::heat_legend({rendered.heat, rendered.heat_unit(), options.heat}, width_px));
+  return write_png(context.folder / "heat_legend.png", legend);
+}
+
 Result<StageOutput> fuse_views(const StageContext& context, const RunConfig& config) {
   const auto folder = context.of("render");
   ORBITFUSE_ASSIGN(const RenderedViews rendered, load_rendered_views(folder));
@@ -32,6 +54,8 @@ Result<StageOutput> fuse_views(const StageContext& context, const RunConfig& con
   StageOutput output;
   std::map<std::string, double> wall_s;
   int fused_images = 0;
+  json measured = json::object();
+  double measured_sum = 0;
   for (const ViewFiles& files : rendered.views) {
     ORBITFUSE_TRY(context.progress.check("fuse"));
     context.progress.report({"fuse", static_cast<double>(fused_images),
@@ -40,14 +64,16 @@ Result<StageOutput> fuse_views(const StageContext& context, const RunConfig& con
     ORBITFUSE_ASSIGN(const cv::Mat thermal,
                      field_image(folder / files.thermal, rendered.samples()));
     ORBITFUSE_ASSIGN(const cv::Mat valid, valid_pixels(folder, files, thermal, config.render.min_opacity));
-    const cv::Mat gray = gray_of_kelvin(thermal, rendered.span);
-    ORBITFUSE_TRY(write_png(context.folder / "thermal" / (files.name + ".png"), gray));
+    ORBITFUSE_TRY(write_png(context.folder / "thermal" / (files.name + ".png"), gray_of_kelvin(thermal, rendered.span)));
+    ORBITFUSE_TRY(write_png(context.folder / "measured" / (files.name + ".png"), valid));
+    const double share = static_cast<double>(cv::countNonZero(valid)) / static_cast<double>(valid.total());
+    measured[files.name] = share;
+    measured_sum += share;
     for (const FusionMethod method : methods) {
       FusionOptions options = config.fuse.options;
       options.method = method;
       FusionReport said;
-      const auto image = cv::countNonZero(valid) > 0 ? fuse(visible, gray, valid, options, &said)
-                                                     : Result<cv::Mat>(visible);
+      const auto image = fuse_view(visible, thermal, valid, rendered, options, said);
       if (!image) return tl::unexpected(image.error());
       ORBITFUSE_TRY(write_png(context.folder / name(method) / (files.name + ".png"), *image));
       wall_s[name(method)] += said.wall_s;
@@ -66,8 +92,13 @@ Result<StageOutput> fuse_views(const StageContext& context, const RunConfig& con
     list.push_back(name(method));
     times[name(method)] = 1000 * wall_s[name(method)] / static_cast<double>(rendered.views.size());
   }
-  output.metrics = {{"brief", fmt::format("{} images by {} methods", fused_images, methods.size())},
-                    {"methods", list}, {"milliseconds_a_view", times}};
+  if (std::count(methods.begin(), methods.end(), FusionMethod::heat) > 0)
+    ORBITFUSE_TRY(write_legend(context, rendered, config.fuse.options));
+  const double measured_share = measured_sum / static_cast<double>(rendered.views.size());
+  output.metrics = {{"brief", fmt::format("{} images by {} methods, {:.0f} % of them with a temperature", fused_images,
+                                          methods.size(), 100 * measured_share)},
+                    {"methods", list}, {"milliseconds_a_view", times}, {"measured_share", measured_share},
+                    {"measured_share_by_view", measured}};
   return output;
 }
 
@@ -76,6 +107,7 @@ Result<StageOutput> fuse_views(const StageContext& context, const RunConfig& con
 pipeline::Stage fuse_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "fuse";
+  stage.version = 2;
   stage.needs = {"render"};
   stage.options = in.config->settings().to_json("fuse");
   stage.options["min_opacity"] = in.config->render.min_opacity;

@@ -83,6 +83,12 @@ Status score_fused(const StageContext& context, MetricMeans& means) {
   return {};
 }
 
+/// Share of the fused views that has a temperature; null where nothing was fused.
+json measured_share(const StageContext& context) {
+  const json* fused = context.metrics_of("fuse");
+  return fused ? fused->value("measured_share", json()) : json();
+}
+
 Result<StageOutput> score(const StageContext& context, const SessionInput& input, const RunConfig& config) {
   MetricMeans fields, fused;
   for (const Modality modality : {Modality::visible, Modality::thermal})
@@ -95,7 +101,8 @@ Result<StageOutput> score(const StageContext& context, const SessionInput& input
   ORBITFUSE_TRY(write_file_atomic(context.folder / "metrics.csv",
                                   MetricMeans::csv_header() + fields.csv() + fused.csv()));
   ORBITFUSE_TRY(write_json(context.folder / "metrics.json",
-                           {{"schema", 1}, {"fields", fields.to_json()}, {"fused", fused.to_json()}}));
+                           {{"schema", 1}, {"fields", fields.to_json()}, {"fused", fused.to_json()},
+                            {"measured_share", measured_share(context)}}));
   output.metrics = {{"brief", fmt::format("{} fused images, {} held-out views", fused.count(), fields.count())},
                     {"tables", tables}, {"fields", fields.to_json()}, {"fused", fused.to_json()}};
   return output;
@@ -106,6 +113,7 @@ Result<StageOutput> score(const StageContext& context, const SessionInput& input
 pipeline::Stage metrics_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "metrics";
+  stage.version = 2;
   stage.uses = {"poses_visible", "poses_thermal", "train_visible", "train_thermal", "render", "fuse"};
   stage.absent = [](const StageContext& context) -> std::optional<std::string> {
     if (context.has("train_visible") || context.has("train_thermal")) return std::nullopt;

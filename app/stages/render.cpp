@@ -13,6 +13,7 @@
 #include "core/image/palette.hpp"
 #include "core/formats/transforms_json.hpp"
 #include "core/system/clock.hpp"
+#include "recon/assembly/looked_at.hpp"
 #include "recon/nerf/nerf.hpp"
 
 namespace orbitfuse::stages {
@@ -82,6 +83,39 @@ cv::Mat masked(const cv::Mat& kelvin, const cv::Mat& opacity, double min_opacity
   return result;
 }
 
+/// What colours stand for in all pictures of the run: the span of the object that was gone round, and
+/// what is warm against its surroundings.
+Status choose_scales(const StageContext& context, Modality frame, const std::vector<ThermalView>& seen,
+                     RenderedViews& rendered) {
+  ORBITFUSE_ASSIGN(const Reconstruction posed, load_poses(context.of("poses_" + std::string(name(frame))), frame));
+  const TemperatureSpan object = object_span(seen, posed.views);
+  const HeatScaleOptions how = heat_scale_options(rendered.samples());
+  rendered.heat = heat_scale(within_orbit(seen, posed.views, surroundings_reach), how);
+  rendered.heat.hot = std::max(object.high_k, rendered.heat.usual + how.min_width);
+  rendered.span = rendered.thermal_is_gray ? TemperatureSpan{0, 255} : object;
+  return {};
+}
+
+/// All views in one scale of counts, which the hottest of them decides, and in one palette.
+Status write_temperatures(const StageContext& context, const std::vector<ThermalView>& temperatures,
+                          const RenderedViews& rendered, const std::string& palette_name,
+                          std::vector<ViewFiles>& files) {
+  ORBITFUSE_ASSIGN(const cv::Mat colors, palette(palette_name));
+  std::vector<cv::Mat> kelvin;
+  for (const ThermalView& view : temperatures) kelvin.push_back(view.thermal);
+  const double kelvin_per_count = kelvin_per_count_for(kelvin);
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (!rendered.thermal_is_gray)
+      ORBITFUSE_TRY(
+          write_thermal_tiff(context.folder / files[i].thermal, kelvin[i], kelvin_per_count));
+    files[i].palette = "palette/" + files[i].name + ".png";
+    ORBITFUSE_TRY(write_png(context.folder / files[i].palette,
+                            colorize(kelvin[i], rendered.span, colors)));
+  }
+  if (rendered.thermal_is_gray) return {};
+  return save_temperature_bounds(context.folder, rendered.span.low_k, rendered.span.high_k);
+}
+
 Result<StageOutput> render(const StageContext& context, const SessionInput& input,
                            const RenderConfig& config) {
   ORBITFUSE_ASSIGN(const Fields fields, load_fields(context));
@@ -92,7 +126,7 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
 
   const UsageClock clock;
   std::vector<ViewFiles> files;
-  std::vector<cv::Mat> temperatures;
+  std::vector<ThermalView> temperatures;
   Transforms transforms;
   for (const PosedView& view : chosen.views) {
     ORBITFUSE_TRY(context.progress.check("render"));
@@ -101,6 +135,7 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
                              done > 0 ? clock.wall_s() / done * (total - done) : -1, view.name});
     ViewFiles f;
     f.name = view.name;
+    cv::Mat depth;
     if (!fields.visible.empty()) {
       ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
                        nerf::render(fields.visible, view.camera, view.cam_from_world,
@@ -109,7 +144,8 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
       f.depth = "depth/" + view.name + ".tiff";
       f.visible_opacity = "opacity/" + view.name + "_visible.tiff";
       ORBITFUSE_TRY(write_png(context.folder / f.visible, bgr8_of_rgb(seen.color)));
-      ORBITFUSE_TRY(write_float_tiff(context.folder / f.depth, seen.depth));
+      depth = seen.depth;
+      ORBITFUSE_TRY(write_float_tiff(context.folder / f.depth, depth));
       ORBITFUSE_TRY(write_float_tiff(context.folder / f.visible_opacity, seen.opacity));
     }
     if (!fields.thermal.empty()) {
@@ -121,7 +157,8 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
                                     context.progress));
       f.thermal = "thermal/" + view.name + (gray ? ".png" : ".tiff");
       f.thermal_opacity = "opacity/" + view.name + "_thermal.tiff";
-      temperatures.push_back(masked(seen.color, seen.opacity, config.min_opacity));
+      temperatures.push_back({view, masked(seen.color, seen.opacity, config.min_opacity),
+                              depth.empty() ? seen.depth : depth});
       if (gray) {
         cv::Mat levels;
         seen.color.convertTo(levels, CV_8U);
@@ -148,17 +185,8 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
   RenderedViews rendered;
   rendered.thermal_is_gray = gray;
   if (!temperatures.empty()) {
-    rendered.span = gray ? TemperatureSpan{0, 255} : common_span(temperatures);
-    ORBITFUSE_ASSIGN(const cv::Mat colors, palette(config.palette));
-    const double kelvin_per_count = kelvin_per_count_for(temperatures);
-    for (std::size_t i = 0; i < files.size(); ++i) {
-      if (!gray) ORBITFUSE_TRY(write_thermal_tiff(context.folder / files[i].thermal, temperatures[i], kelvin_per_count));
-      files[i].palette = "palette/" + files[i].name + ".png";
-      ORBITFUSE_TRY(write_png(context.folder / files[i].palette,
-                              colorize(temperatures[i], rendered.span, colors)));
-    }
-    if (!gray)
-      ORBITFUSE_TRY(save_temperature_bounds(context.folder, rendered.span.low_k, rendered.span.high_k));
+    ORBITFUSE_TRY(choose_scales(context, frame, temperatures, rendered));
+    ORBITFUSE_TRY(write_temperatures(context, temperatures, rendered, config.palette, files));
   }
   rendered.views = std::move(files);
   ORBITFUSE_TRY(write_transforms_json(context.folder / "transforms.json", transforms));
@@ -171,7 +199,7 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
 pipeline::Stage render_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "render";
-  stage.version = 2;  // hot scenes: a scale that holds their temperatures
+  stage.version = 2;  // hot scenes: a scale that holds them; a span that serves the object
   stage.uses = {"poses_visible", "poses_thermal", "train_visible", "train_thermal", "register"};
   stage.options = in.config->settings().to_json("render");
   stage.options["cameras"] = in.config->render.cameras;

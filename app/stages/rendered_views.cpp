@@ -24,6 +24,12 @@ void visit_files(View& view, Visit visit) {
 
 }  // namespace
 
+HeatScaleOptions heat_scale_options(Samples samples) {
+  HeatScaleOptions options;
+  if (samples == Samples::gray) options.min_width = min_heat_gray_levels;
+  return options;
+}
+
 Status save_rendered_views(const std::filesystem::path& folder, const RenderedViews& rendered) {
   json views = json::array();
   for (const ViewFiles& view : rendered.views) {
@@ -40,6 +46,8 @@ Status save_rendered_views(const std::filesystem::path& folder, const RenderedVi
                      {"thermal_is_gray", rendered.thermal_is_gray},
                      {"span_low", rendered.span.low_k},
                      {"span_high", rendered.span.high_k},
+                     {"heat", {{"usual", rendered.heat.usual}, {"spread", rendered.heat.spread},
+                               {"hot", rendered.heat.hot}}},
                      {"views", views}});
 }
 
@@ -50,6 +58,10 @@ Result<RenderedViews> load_rendered_views(const std::filesystem::path& folder) {
     j.at("thermal_is_gray").get_to(rendered.thermal_is_gray);
     j.at("span_low").get_to(rendered.span.low_k);
     j.at("span_high").get_to(rendered.span.high_k);
+    const json& heat = j.at("heat");
+    heat.at("usual").get_to(rendered.heat.usual);
+    heat.at("spread").get_to(rendered.heat.spread);
+    heat.at("hot").get_to(rendered.heat.hot);
     for (const json& v : j.at("views")) {
       ViewFiles view;
       visit_files(view, [&](const char* key, std::string& value) { value = v.value(key, std::string()); });

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int picture_height_px = 300;
 
-/// The first view's visible, infrared and fused image side by side, to pass on.
+/// The first view's visible, infrared and fused image side by side, to pass on; heat with its bar.
 Status write_picture(const std::filesystem::path& folder, const report::Model& model) {
   if (model.views.empty()) return {};
   const report::View& view = model.views.front();
@@ -28,7 +28,11 @@ Status write_picture(const std::filesystem::path& folder, const report::Model& m
     else
       cv::hconcat(row, sized, row);
   }
-  return row.empty() ? Status{} : write_jpeg(folder / "picture.jpg", row, 88);
+  if (row.empty()) return {};
+  if (model.heat && !view.fused.empty() && view.fused.front().method == "heat") {
+    ORBITFUSE_ASSIGN(row, fusion::with_heat_legend(row, *model.heat));
+  }
+  return write_jpeg(folder / "picture.jpg", row, 88);
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "app/pipeline/runner.hpp"
 #include "app/stages/artifacts.hpp"
 #include "app/stages/rendered_views.hpp"
@@ -47,7 +49,7 @@ Status add_fused(const StageContext& context, const std::vector<std::string>& me
   return {};
 }
 
-Status add_views(const StageContext& context, const RenderConfig& config, report::Model& model) {
+Status add_views(const StageContext& context, const RunConfig& config, report::Model& model) {
   if (!context.has("render")) return {};
   ORBITFUSE_ASSIGN(const RenderedViews rendered, load_rendered_views(context.of("render")));
   std::vector<std::string> methods;
@@ -64,10 +66,12 @@ Status add_views(const StageContext& context, const RenderConfig& config, report
     model.views.push_back(std::move(view));
   }
   model.span = rendered.span;
+  if (std::count(methods.begin(), methods.end(), "heat") > 0)
+    model.heat = fusion::HeatLegend{rendered.heat, rendered.heat_unit(), config.fuse.options.heat};
   model.has_temperature = !rendered.thermal_is_gray && !model.views.empty() &&
                           !model.views[0].thermal.empty();
   if (!model.views.empty() && !model.views[0].thermal.empty()) {
-    ORBITFUSE_ASSIGN(model.palette_bgr, palette(config.palette));
+    ORBITFUSE_ASSIGN(model.palette_bgr, palette(config.render.palette));
   }
   return {};
 }
@@ -168,7 +172,7 @@ Result<report::Model> report_content(const StageContext& context, const StageInp
   model.title = folder.empty() ? input.session.id : folder;
   model.subtitle = fmt::format("Session {}, recorded {}. Computed on {}, {} threads.", input.session.id,
                                input.session.created, cpu_description(), thread_count());
-  ORBITFUSE_TRY(add_views(context, in.config->render, model));
+  ORBITFUSE_TRY(add_views(context, *in.config, model));
   add_poses(context, input, model);
   add_registration(context, model);
   add_fields(context, model);
@@ -182,6 +186,9 @@ Result<report::Model> report_content(const StageContext& context, const StageInp
     model.headline.emplace_back("temperatures shown",
                                 fmt::format("{:.0f} to {:.0f} °C", celsius_from_kelvin(model.span.low_k),
                                             celsius_from_kelvin(model.span.high_k)));
+  if (const json* fused = context.metrics_of("fuse"); fused && fused->contains("measured_share"))
+    model.headline.emplace_back("of the new views has a temperature",
+                                fmt::format("{:.0f} %", 100 * fused->at("measured_share").get<double>()));
   model.headline.emplace_back("run time", fmt::format("{:.0f} s", wall_s));
   model.warnings.insert(model.warnings.end(), input.session.warnings.begin(), input.session.warnings.end());
   for (const StageStatus& s : model.stages)

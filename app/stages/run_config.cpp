@@ -99,8 +99,14 @@ void add_render(Settings& settings, RenderConfig& render) {
 }
 
 void add_fuse(Settings& settings, FuseConfig& fuse) {
-  settings.add("fuse.methods", fuse.methods, "Any of best, ms-srif, pca-msif, cnn-lpif");
+  settings.add("fuse.methods", fuse.methods, "Any of heat, best, ms-srif, pca-msif, cnn-lpif; the first is shown first");
   settings.add("fuse.color", fuse.options.color, "Keep the visible colours; false: gray");
+  settings.add("fuse.heat_palette", fuse.options.heat.palette, "Colours of what is warmer than its surroundings");
+  settings.add("fuse.heat_opacity", fuse.options.heat.opacity, "0..1: of the colour where it is hottest");
+  settings.add("fuse.heat_shading", fuse.options.heat.shading,
+               "0..1: share of the colour's brightness that follows the visible picture");
+  settings.add("fuse.heat_hatching", fuse.options.heat.hatching,
+               "0..1: contrast of the hatching where nothing was measured");
   settings.add("fuse.overlay_palette", fuse.options.overlay.palette,
                "Palette whose hue tells the temperature in the fused image; empty: none");
   settings.add("fuse.overlay_strength", fuse.options.overlay.strength, "0..1: its colour against the visible one");

@@ -9,6 +9,7 @@
 #include "app/cli/verb.hpp"
 #include "app/fusion_batch/fusion_batch.hpp"
 #include "core/image/image_io.hpp"
+#include "fusion/heat/legend.hpp"
 
 namespace orbitfuse::cli {
 namespace {
@@ -16,7 +17,7 @@ namespace fs = std::filesystem;
 
 struct Options {
   StageFolders folders;
-  std::string visible, thermal, mask, method = "best";
+  std::string visible, thermal, mask, method = "heat";
   bool gray = false, out_given = false;
 };
 
@@ -63,6 +64,17 @@ Status check_folder_out(const Options& o) {
   return {};
 }
 
+/// The bar of what heat's colours stand for, beside the picture: OUT_legend.png.
+Status write_legend(Context& context, const fs::path& out, const cv::Mat& thermal, const FusionOptions& options,
+                    const FusionReport& said, int width) {
+  const auto unit = thermal.depth() == CV_32F ? fusion::HeatUnit::kelvin : fusion::HeatUnit::gray;
+  ORBITFUSE_ASSIGN(const cv::Mat legend, fusion::heat_legend({*said.heat, unit, options.heat}, width));
+  const fs::path file = out.parent_path() / (out.stem().string() + "_legend.png");
+  context.console.detail("what the colours stand for: " + file.string());
+  context.result["legend"] = file.string();
+  return write_png(file, legend);
+}
+
 Status fuse_pair(Context& context, const Options& o, const FusionOptions& options) {
   ORBITFUSE_TRY(check_image_out(o));
   ORBITFUSE_ASSIGN(const cv::Mat visible, read_image(o.visible));
@@ -77,6 +89,8 @@ Status fuse_pair(Context& context, const Options& o, const FusionOptions& option
   ORBITFUSE_TRY(image_writer(o.folders.out)(o.folders.out, fused));
   context.console.data(o.folders.out);
   context.result = {{"out", o.folders.out}, {"method", name(options.method)}, {"ms", 1000 * said.wall_s}};
+  if (said.heat) ORBITFUSE_TRY(write_legend(context, o.folders.out, thermal, options, said, fused.cols));
+  context.result["measured_share"] = 1 - said.unmeasured;
   context.result["skips"] = nlohmann::json::array();
   for (const Skip& skip : said.skips) {
     context.result["skips"].push_back({{"what", skip.what}, {"why", skip.why}, {"effect", skip.effect}});

@@ -46,6 +46,12 @@ Pair timed_pair(const std::vector<Pair>& pairs) {
   return pair;
 }
 
+std::vector<std::string> scored_methods() {
+  std::vector<std::string> names = fusion_method_names();
+  std::erase(names, "heat");
+  return names;
+}
+
 std::map<std::string, std::vector<Scores>> reference_scores(const fs::path& folder, const std::vector<Pair>& pairs) {
   std::ifstream file(folder / "reference" / "metrics.csv");
   std::map<std::string, std::vector<Scores>> result;

@@ -26,6 +26,9 @@ Pair timed_pair(const std::vector<Pair>& pairs);
 using Scores = std::map<std::string, double>;
 inline constexpr const char* shown[] = {"Qabf", "Qcb", "Qcv", "SSIM"};
 
+/// Methods that fuse gray planes and are scored; not heat, which colours one source by the other.
+std::vector<std::string> scored_methods();
+
 /// Of <folder>/reference/metrics.csv: method -> scores of each pair, in the order of `pairs`.
 std::map<std::string, std::vector<Scores>> reference_scores(const std::filesystem::path& folder,
                                                             const std::vector<Pair>& pairs);

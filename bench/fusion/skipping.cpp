@@ -67,7 +67,7 @@ void compare_all(const std::vector<Pair>& pairs, const FusionOptions& options, b
 int skipping(const std::filesystem::path& folder) {
   const auto pairs = load_pairs(folder);
   const Pair timed = timed_pair(pairs);
-  for (const std::string& method : fusion_method_names()) {
+  for (const std::string& method : scored_methods()) {
     FusionOptions options;
     options.method = fusion_method(method).value();
     const auto cpu_ms = [&](bool skip, const cv::Mat& mask) {

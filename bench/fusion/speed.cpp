@@ -47,7 +47,7 @@ int speed(const std::filesystem::path& folder, const char* program) {
     fmt::print("{}, {} threads used, one 640x480 gray pair, least of 60 runs\n\n"
                "| what | instructions | wall ms | CPU ms |\n|---|---|---|---|\n",
                cpu_description(), thread_count());
-  for (const std::string& method : fusion_method_names()) {
+  for (const std::string& method : scored_methods()) {
     FusionOptions options;
     options.method = fusion_method(method).value();
     print_row(method, times_of(60, [&] { fuse(pair.visible, pair.thermal, {}, options).value(); }));

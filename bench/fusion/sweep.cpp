@@ -59,7 +59,7 @@ int sweep(const std::filesystem::path& folder, bool knobs, const std::filesystem
   };
   print_header();
   for (const auto& [method, of_pairs] : reference_scores(folder, pairs)) add({"reference " + method, mean(of_pairs), {}});
-  for (const std::string& method : fusion_method_names()) {
+  for (const std::string& method : scored_methods()) {
     FusionOptions options;
     options.method = fusion_method(method).value();
     show(method, options);

@@ -37,16 +37,16 @@ Status TemperatureOverlay::validate() const {
 }
 
 Result<cv::Mat> colored(const fusion::Plane& fused, const cv::Mat& visible, const fusion::Plane& thermal,
-                        const cv::Mat1b& valid, const TemperatureOverlay& overlay) {
+                        const fusion::Plane& measured, const TemperatureOverlay& overlay) {
   cv::Mat bgr = visible;
   if (visible.channels() == 1) cv::cvtColor(visible, bgr, cv::COLOR_GRAY2BGR);
   cv::Mat result = ycrcb_of(bgr);
   if (!overlay.palette.empty()) {
     ORBITFUSE_ASSIGN(const cv::Mat colors, palette_colors(thermal, overlay.palette));
-    cv::Mat mixed;
-    cv::addWeighted(ycrcb_of(colors), overlay.strength, result, 1 - overlay.strength, 0, mixed);
-    if (valid.empty()) result = mixed;
-    else mixed.copyTo(result, valid);
+    cv::Mat strength(result.size(), CV_32FC1, overlay.strength), change = ycrcb_of(colors) - result;
+    if (!measured.empty()) strength = strength.mul(measured);
+    cv::merge(std::vector<cv::Mat>(3, strength), strength);
+    result += change.mul(strength);
   }
   cv::insertChannel(fused, result, 0);
   cv::cvtColor(result, result, cv::COLOR_YCrCb2BGR);

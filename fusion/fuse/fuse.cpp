@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <limits>
+#include <opencv2/imgproc.hpp>
 
 #include "fusion/fuse/holes.hpp"
 
@@ -14,7 +16,8 @@ namespace {
 
 using fusion::Plane;
 
-constexpr std::pair<FusionMethod, const char*> methods[] = {{FusionMethod::best, "best"},
+constexpr std::pair<FusionMethod, const char*> methods[] = {{FusionMethod::heat, "heat"},
+                                                            {FusionMethod::best, "best"},
                                                             {FusionMethod::ms_srif, "ms-srif"},
                                                             {FusionMethod::pca_msif, "pca-msif"},
                                                             {FusionMethod::cnn_lpif, "cnn-lpif"}};
@@ -75,6 +78,7 @@ Result<Plane> fuse_planes(const Plane& visible, const Plane& thermal, const Fusi
   }
   const FusionOptions chosen = options.skip_unneeded ? options : without_skipping(options);
   switch (chosen.method) {
+    case FusionMethod::heat: break;  // no fusion of planes: see by_heat
     case FusionMethod::best: return by_best(visible, thermal, chosen, said);
     case FusionMethod::ms_srif: return by_ms_srif(visible, thermal, chosen, said);
     case FusionMethod::pca_msif: return fusion::fuse_pca_msif(visible, thermal, chosen.pca_msif);
@@ -85,7 +89,7 @@ Result<Plane> fuse_planes(const Plane& visible, const Plane& thermal, const Fusi
 
 /// Fuses what holes leave of the pair; elsewhere the visible image.
 Result<Plane> fuse_valid(const Plane& visible, const Plane& thermal, const cv::Mat1b& valid,
-                         const FusionOptions& options, FusionReport& said) {
+                         const Plane& measured, const FusionOptions& options, FusionReport& said) {
   if (valid.empty()) return fuse_planes(visible, thermal, options, said);
   const cv::Rect part = options.skip_unneeded ? needed_part(valid) : cv::Rect({}, valid.size());
   const double outside = 1 - static_cast<double>(part.area()) / static_cast<double>(valid.total());
@@ -96,8 +100,32 @@ Result<Plane> fuse_valid(const Plane& visible, const Plane& thermal, const cv::M
   ORBITFUSE_ASSIGN(const Plane fused, fuse_planes(visible(part).clone(), filled_part, options, said));
   said.skipped.pixels = std::max(said.skipped.pixels, outside);
   Plane result = visible.clone();
-  fused.copyTo(result(part), valid(part));
+  result(part) += measured(part).mul(fused - visible(part));
   return result;
+}
+
+Status check_sizes(const cv::Mat& visible, const cv::Mat& thermal) {
+  if (visible.empty()) return fail(ErrorKind::input, "visible", "no pixels", "give an image");
+  if (visible.size() == thermal.size()) return {};
+  return fail(ErrorKind::input, "thermal",
+              fmt::format("{}x{} pixels, the visible image has {}x{}", thermal.cols, thermal.rows, visible.cols, visible.rows),
+              "register or resize the pair first: pixels must correspond");
+}
+
+Result<cv::Mat> by_heat(const cv::Mat& visible, const Plane& levels, const cv::Mat1b& valid, const Plane& measured,
+                        const FusionOptions& options, bool gray_levels, FusionReport& said) {
+  fusion::HeatOptions chosen = options.heat;
+  if (!chosen.scale) {
+    Plane seen = levels.clone();
+    if (!valid.empty()) seen.setTo(std::numeric_limits<float>::quiet_NaN(), ~valid);
+    HeatScaleOptions how;
+    if (gray_levels) how.min_width = min_heat_gray_levels;
+    chosen.scale = heat_scale({seen}, how);
+  }
+  said.heat = chosen.scale;
+  cv::Mat bgr = options.color ? visible : cv::Mat(luma(visible));
+  if (bgr.channels() == 1) cv::cvtColor(bgr, bgr, cv::COLOR_GRAY2BGR);
+  return fusion::colored_by_heat(bgr, levels, measured, chosen);
 }
 
 /// Both sources of validity in one mask, empty where everything is valid.
@@ -139,6 +167,7 @@ Result<FusionMethod> fusion_method(const std::string& wanted) {
 }
 
 Status FusionOptions::validate() const {
+  ORBITFUSE_TRY(heat.validate());
   ORBITFUSE_TRY(best.validate());
   ORBITFUSE_TRY(ms_srif.validate());
   ORBITFUSE_TRY(pca_msif.validate());
@@ -155,12 +184,21 @@ Result<cv::Mat> fuse(const cv::Mat& visible, const cv::Mat& thermal, const cv::M
   ORBITFUSE_TRY(options.validate());
   ORBITFUSE_ASSIGN(const cv::Mat v, floats_of(visible, "visible"));
   ORBITFUSE_ASSIGN(const ThermalGray t, thermal_gray(thermal, options.span));
+  ORBITFUSE_TRY(check_sizes(v, t.gray));
   const Plane v_luma = luma(v);
-  ORBITFUSE_TRY(fusion::check_pair(v_luma, t.gray));
+  if (options.method != FusionMethod::heat) ORBITFUSE_TRY(fusion::check_pair(v_luma, t.gray));
   ORBITFUSE_ASSIGN(const cv::Mat1b mask, joint_mask(valid, t.valid, visible.size()));
-  ORBITFUSE_ASSIGN(cv::Mat result, fuse_valid(v_luma, t.gray, mask, options, said));
-  if (!options.overlay.palette.empty() || (options.color && v.channels() == 3)) {
-    ORBITFUSE_ASSIGN(result, colored(result, options.color ? v : cv::Mat(v_luma), t.gray, mask, options.overlay));
+  const Plane measured = mask.empty() ? Plane() : feathered(mask);
+  if (!mask.empty()) said.unmeasured = 1 - static_cast<double>(cv::countNonZero(mask)) / static_cast<double>(mask.total());
+  cv::Mat result;
+  if (options.method == FusionMethod::heat) {
+    const bool gray_levels = thermal.depth() != CV_32F;
+    ORBITFUSE_ASSIGN(result, by_heat(v, gray_levels ? t.gray : Plane(thermal), mask, measured, options, gray_levels, said));
+  } else {
+    ORBITFUSE_ASSIGN(result, fuse_valid(v_luma, t.gray, mask, measured, options, said));
+    if (!options.overlay.palette.empty() || (options.color && v.channels() == 3)) {
+      ORBITFUSE_ASSIGN(result, colored(result, options.color ? v : cv::Mat(v_luma), t.gray, measured, options.overlay));
+    }
   }
   cv::Mat bytes;
   result.convertTo(bytes, CV_8U);

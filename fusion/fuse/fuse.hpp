@@ -10,14 +10,15 @@
 #include "fusion/cnn_lpif/cnn_lpif.hpp"
 #include "fusion/fuse/coloring.hpp"
 #include "fusion/fuse/thermal_input.hpp"
+#include "fusion/heat/heat.hpp"
 #include "fusion/ms_srif/ms_srif.hpp"
 #include "fusion/pca_msif/pca_msif.hpp"
 
 // One aligned pair to one fused image, by any of the methods.
 namespace orbitfuse {
 
-enum class FusionMethod { best, ms_srif, pca_msif, cnn_lpif };
-const char* name(FusionMethod method);              ///< "best", "ms-srif", "pca-msif", "cnn-lpif"
+enum class FusionMethod { heat, best, ms_srif, pca_msif, cnn_lpif };
+const char* name(FusionMethod method);  ///< "heat", "best", "ms-srif", "pca-msif", "cnn-lpif"
 std::vector<std::string> fusion_method_names();
 Result<FusionMethod> fusion_method(const std::string& name);  ///< usage error with the known names
 
@@ -30,6 +31,7 @@ struct FusionOptions {
   std::optional<TemperatureSpan> span;
   /// Off: nothing is skipped but identical pairs; for measuring what skipping saves and loses.
   bool skip_unneeded = true;
+  fusion::HeatOptions heat;
   fusion::BestOptions best;
   fusion::MsSrifOptions ms_srif;
   fusion::PcaMsifOptions pca_msif;
@@ -47,6 +49,8 @@ struct SkippedShares {
 
 struct FusionReport {
   SkippedShares skipped;
+  double unmeasured = 0;  ///< share of the image where the thermal one holds nothing
+  std::optional<HeatScale> heat;  ///< by which heat coloured the image
   std::vector<Skip> skips;
   double wall_s = 0;
 };
@@ -54,9 +58,11 @@ struct FusionReport {
 /// visible: CV_8U or CV_16U, 1 or 3 channels (BGR). thermal: gray, three channels, or floats such as
 /// kelvin with NaN where there is nothing (see thermal_gray); of one size with visible, pixels
 /// corresponding. valid: CV_8UC1, 0 where the thermal image holds nothing (a rendered hole); empty =
-/// wherever it is finite. There the result is the visible image, and the hole's values never reach
-/// its surroundings. Returns CV_8UC1, or CV_8UC3 with color or an overlay.
-/// Errors (input): types, sizes that differ, below 16 x 16, no valid pixel; (usage): options.
+/// wherever it is finite. There the result is the visible image, into which the fused one fades (see
+/// feathered), and the hole's values never reach its surroundings. Returns CV_8UC1, or CV_8UC3 with
+/// color, an overlay or by heat.
+/// Errors (input): types, sizes that differ, below 16 x 16 (heat: any size), no valid pixel; (usage):
+/// options.
 Result<cv::Mat> fuse(const cv::Mat& visible, const cv::Mat& thermal, const cv::Mat& valid,
                      const FusionOptions& options, FusionReport* report = nullptr);
 

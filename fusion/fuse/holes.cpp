@@ -34,6 +34,17 @@ Plane filled(const Plane& image, const cv::Mat1b& valid) {
   return result;
 }
 
+Plane feathered(const cv::Mat1b& valid) {
+  constexpr double reach = 1.0 / 80;  // of the width: the ramp is seen as soft, and no wider than that
+  Plane share, weight;
+  valid.convertTo(share, CV_32F, 1.0 / 255);
+  cv::GaussianBlur(share, weight, {}, std::max(1.0, reach * valid.cols), 0, cv::BORDER_REPLICATE);
+  // At a straight edge half of the window is valid.
+  weight = cv::min(cv::max(2 * weight - 1, 0), 1);
+  weight.setTo(0, valid == 0);
+  return weight;
+}
+
 cv::Rect needed_part(const cv::Mat1b& valid) {
   constexpr int reach = 64, grid = 64;  // px; four levels of pyramid, and half a patch of its base
   constexpr double worth = 0.8;

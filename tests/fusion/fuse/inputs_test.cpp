@@ -115,6 +115,7 @@ TEST(FusionSkips, PixelsFarFromThermalOnes) {
   const cv::Rect seen(200, 150, 60, 50);
   mask(seen) = 255;
   for (const std::string& method : fusion_method_names()) {
+    if (method == "heat") continue;  // has no work to spare
     FusionOptions options;
     options.method = fusion_method(method).value();
     FusionReport report;

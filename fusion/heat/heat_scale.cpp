@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "fusion/heat/heat_scale.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace orbitfuse {
+namespace {
+
+/// Of how unusual a level is; below 1 what is moderately warm shows too.
+constexpr double exponent = 0.7;
+
+}  // namespace
+
+double HeatScale::strength(double level) const {
+  const double above = level - usual;
+  if (!(above > 0)) return 0;
+  const double height = std::pow(std::min(1.0, above / (hot - usual)), exponent);
+  return spread > 0 ? height * -std::expm1(-above / spread) : height;
+}
+
+bool HeatScale::is_valid() const {
+  return std::isfinite(usual) && std::isfinite(hot) && std::isfinite(hot - usual) && hot > usual && spread >= 0 &&
+         std::isfinite(spread);
+}
+
+HeatScale heat_scale(const std::vector<cv::Mat>& images, const HeatScaleOptions& options) {
+  std::vector<float> samples;
+  for (const cv::Mat& image : images) {
+    CV_Assert(image.empty() || image.type() == CV_32FC1);
+    for (int y = 0; y < image.rows; ++y) {
+      const float* row = image.ptr<float>(y);
+      std::copy_if(row, row + image.cols, std::back_inserter(samples), [](float v) { return std::isfinite(v); });
+    }
+  }
+  if (samples.empty()) return {0, 0, options.min_width};
+  const auto at = [&](double share) {
+    const auto nth = samples.begin() +
+                     static_cast<std::ptrdiff_t>(std::floor(share * static_cast<double>(samples.size() - 1)));
+    std::nth_element(samples.begin(), nth, samples.end());
+    return static_cast<double>(*nth);
+  };
+  HeatScale scale;
+  scale.usual = at(0.5);
+  scale.spread = std::min(scale.usual - at(0.25), at(0.75) - scale.usual);
+  scale.hot = std::max(at(1 - options.hotter_share), scale.usual + options.min_width);
+  // Levels so large that a double can't tell them from their neighbour `min_width` away.
+  if (!(scale.hot > scale.usual)) scale.hot = std::nextafter(scale.usual, 1e300);
+  return scale;
+}
+
+}  // namespace orbitfuse
