@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <iterator>
 #include <random>
 
+#include "core/system/clock.hpp"
 #include "recon/registration/clouds/ambiguity.hpp"
 #include "recon/registration/clouds/search.hpp"
 #include "recon/registration/clouds/warp.hpp"
@@ -19,12 +19,6 @@ namespace {
 
 // Right placements stay above these but for clouds that are mostly outliers.
 constexpr double kWeakScore = 0.25, kWeakEvidence = 0.04;
-
-double cpu_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 
 void widen_spread(const Similarity3d& answer, const Similarity3d& other,
                   RegistrationReport& report) {

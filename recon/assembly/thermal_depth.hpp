@@ -6,7 +6,7 @@
 #include "core/progress.hpp"
 #include "recon/nerf/dataset.hpp"
 
-namespace orbitfuse::stages {
+namespace orbitfuse {
 
 struct ThermalDepth {
   double known = 0;     ///< share of the pixels whose depth another view confirms
@@ -20,4 +20,4 @@ struct ThermalDepth {
 Result<ThermalDepth> add_thermal_depth(nerf::Dataset& data, int width_px, int holdout_every,
                                        std::uint64_t seed, const Progress& progress);
 
-}  // namespace orbitfuse::stages
+}  // namespace orbitfuse
