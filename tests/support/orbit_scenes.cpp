@@ -60,7 +60,7 @@ json load(const fs::path& file) {
 
 Scene container_scene(const fs::path& data, const ContainerOptions& options) {
   Scene scene;
-  scene.session.folder = data / "orbits" / "container";
+  scene.session.folder = data / "orbits" / options.scene;
   const json truth = load(scene.session.folder / "ground_truth.json");
   for (const Modality modality : {Modality::visible, Modality::thermal}) {
     const json& k = truth.at(std::string(name(modality))).at("K");
