@@ -202,19 +202,25 @@ PosedFrames posed_frames(const FeatureGraph& graph, const Reconstruction& model)
   return posed;
 }
 
-std::vector<FeatureMatch> guided_matches(const FeatureGraph& graph, const ViewPair& pair,
-                                         const PosedFrames& posed, double band_px) {
+EpipolarBand epipolar_band(const FeatureGraph& graph, const ViewPair& pair,
+                           const PosedFrames& posed, double half_width_px) {
   const auto [a, b] = pair;
   const Rigid3d b_from_a = *posed.poses[at(b)] * posed.poses[at(a)]->inverse();
-  EpipolarBand band;
   const Eigen::Vector3d t = b_from_a.translation.normalized();
   Eigen::Matrix3d cross;
   cross << 0, -t.z(), t.y(), t.z(), 0, -t.x(), -t.y(), t.x(), 0;
+  EpipolarBand band;
   band.essential = cross * b_from_a.rotation.toRotationMatrix();
   band.first_rays = graph.rays(a, posed.cameras[at(a)]);
   band.second_rays = graph.rays(b, posed.cameras[at(b)]);
-  band.half_width = band_px / posed.cameras[at(b)].fx;
-  return match_in_band(graph.descriptors[at(a)], graph.descriptors[at(b)], band);
+  band.half_width = half_width_px / posed.cameras[at(b)].fx;
+  return band;
+}
+
+std::vector<FeatureMatch> guided_matches(const FeatureGraph& graph, const ViewPair& pair,
+                                         const PosedFrames& posed, double band_px) {
+  return match_in_band(graph.descriptors[at(pair.first)], graph.descriptors[at(pair.second)],
+                       epipolar_band(graph, pair, posed, band_px));
 }
 
 }  // namespace orbitfuse

@@ -44,6 +44,10 @@ Reconstruction reconstruction_of(const FeatureGraph& graph, const PosedFrames& p
 /// that of a posed view of the same device and size.
 PosedFrames posed_frames(const FeatureGraph& graph, const Reconstruction& model);
 
+/// The band of `half_width_px` (recorded) about the epipolar lines of a pair's poses.
+EpipolarBand epipolar_band(const FeatureGraph& graph, const ViewPair& pair,
+                           const PosedFrames& posed, double half_width_px);
+
 /// Matches of a pair that lie within `band_px` (recorded) of their epipolar lines, once both poses
 /// are known.
 std::vector<FeatureMatch> guided_matches(const FeatureGraph& graph, const ViewPair& pair,

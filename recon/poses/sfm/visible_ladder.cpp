@@ -7,6 +7,7 @@
 #include <chrono>
 #include <set>
 
+#include "recon/poses/global_sfm/global_mapper.hpp"
 #include "recon/poses/sfm/colmap.hpp"
 #include "recon/poses/sfm/resection.hpp"
 #include "recon/poses/sfm/sfm_ladder.hpp"
@@ -22,6 +23,9 @@ constexpr int full_image_side_px = 3200;
 constexpr int full_features = 8192;
 /// Without any model all pairs at full settings take a CPU second each: up to this many views.
 constexpr int max_exhaustive_views = 60;
+
+constexpr const char* featureless_why =
+    "shows nothing to match (blank, out of focus or overexposed?)";
 
 /// Features of some frames at one size, and the pairs matched so far.
 class FeatureLevel {
@@ -99,14 +103,14 @@ class VisibleLadder {
         FeatureLevel::extract(session_, frames_, options_, workdir_ / "quick", progress_);
     if (!quick && quick.error().kind != ErrorKind::quality) return tl::unexpected(quick.error());
     if (!quick) return without_features(quick.error());
-    ORBITFUSE_TRY(find_featureless(*quick));
+    ORBITFUSE_TRY(look_at_features(*quick));
     tell(1, "matches of the orbit's pairs");
     ORBITFUSE_TRY(quick->match(orbit, progress_));
     ORBITFUSE_TRY(try_mapper(*quick, "COLMAP, orbit pairs"));
     if (complete()) return answer(quick->pairs());
     if (best_) ORBITFUSE_TRY(try_resection(*quick, "resection on the quick model"));
     if (!complete() && !all_are_few) ORBITFUSE_TRY(try_more_pairs(*quick));
-    if (!complete()) ORBITFUSE_TRY(try_full_settings());
+    if (!complete() && limited_) ORBITFUSE_TRY(try_full_settings());
     return answer(quick->pairs());
   }
 
@@ -120,12 +124,17 @@ class VisibleLadder {
     return none_held(steps_, Modality::visible);
   }
 
-  /// Frames in which nothing can be matched can't be posed: no step is taken for them.
-  Status find_featureless(const FeatureLevel& level) {
+  /// Frames in which nothing can be matched can't be posed: no step is taken for them. Where neither
+  /// size nor number of features was limited, full settings would find the same ones again.
+  Status look_at_features(const FeatureLevel& level) {
     ORBITFUSE_ASSIGN(const FeatureGraph graph, level.graph());
-    for (int f = 0; f < graph.count(); ++f)
-      if (graph.pixels[static_cast<std::size_t>(f)].cols() < ResectionOptions{}.min_inliers)
+    limited_ = graph.pixel_scale > 1;
+    for (int f = 0; f < graph.count(); ++f) {
+      const Eigen::Index features = graph.pixels[static_cast<std::size_t>(f)].cols();
+      limited_ = limited_ || features >= options_.max_features;
+      if (features < ResectionOptions{}.min_inliers)
         featureless_.insert(graph.frames[static_cast<std::size_t>(f)]->file);
+    }
     return {};
   }
 
@@ -187,6 +196,20 @@ class VisibleLadder {
       ORBITFUSE_TRY(progress_.check("poses.visible"));
       if (best_) return {};
     }
+    return try_global(level, name);
+  }
+
+  Status try_global(const FeatureLevel& level, const std::string& name) {
+    const std::string rung = "global mapper, " + name.substr(name.find(", ") + 2);
+    tell(2, rung);
+    ORBITFUSE_ASSIGN(FeatureGraph graph, level.graph());
+    const Adjuster adjust = [&](Reconstruction model) -> Result<Reconstruction> {
+      ORBITFUSE_ASSIGN(JudgedModel judged,
+                       judge_model(std::move(model), session_, frames_, level.options()));
+      return std::move(judged.poses.reconstruction);
+    };
+    ORBITFUSE_ASSIGN(GlobalModel global, map_globally(graph, adjust, {}, progress_));
+    consider(rung, global.found, std::move(global.model), level.options());
     return {};
   }
 
@@ -256,12 +279,17 @@ class VisibleLadder {
   }
 
   Result<ModalityPoses> answer(int pairs) {
-    if (!best_) return none_held(steps_, Modality::visible);
+    if (!best_) {
+      auto error = none_held(steps_, Modality::visible);
+      for (const std::string& file : featureless_)
+        error.value().found += fmt::format("; {} {}", file, featureless_why);
+      return error;
+    }
     steps_[best_step_].held = true;
     ModalityPoses& poses = best_->poses;
     for (DroppedView& view : poses.dropped)
       if (featureless_.contains(view.name))
-        view.why = "it shows nothing to match (blank, out of focus or overexposed?)";
+        view.why = fmt::format("it {}", featureless_why);
     const auto all = static_cast<int>(exhaustive_pairs(total_).size());
     if (pairs < all)
       poses.skips.push_back({"exhaustive matching", fmt::format("{} of {} pairs held", pairs, all),
@@ -278,6 +306,7 @@ class VisibleLadder {
   std::vector<LadderStep>& steps_;
   const int total_;
   std::set<std::string> featureless_;
+  bool limited_ = false;
   std::optional<JudgedModel> best_;
   std::size_t best_step_ = 0;
   Clock::time_point since_ = Clock::now();
