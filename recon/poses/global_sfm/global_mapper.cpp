@@ -163,8 +163,14 @@ Result<GlobalModel> map_globally(FeatureGraph& graph, const Adjuster& adjust,
     std::vector<FeatureTrack> tracks = triangulate_tracks(graph, matches, result.posed, track);
     keep_connected(tracks, options.min_shared_points, result.posed.poses);
     tracks = triangulate_tracks(graph, matches, result.posed, track);
-    Result<Reconstruction> adjusted = adjust(
-        reconstruction_of(graph, result.posed, tracks, graph.frames.front()->modality));
+    Reconstruction model =
+        reconstruction_of(graph, result.posed, tracks, graph.frames.front()->modality);
+    if (model.views.size() < 2) {
+      result.found += "; no two views hold each other";
+      result.model = {};
+      return result;
+    }
+    Result<Reconstruction> adjusted = adjust(std::move(model));
     if (!adjusted) {
       result.found += "; " + adjusted.error().found;
       result.model = {};

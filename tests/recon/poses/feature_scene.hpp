@@ -20,8 +20,8 @@ struct FeatureScene {
 };
 
 struct FeatureSceneOptions {
-  int machine_points = 400;
-  int pillar_points = 10;    ///< of each of the seven pillars of each wall
+  int machine_points = 240;
+  int pillar_points = 18;    ///< of each of the seven pillars of each wall
   double wrong_pillar = 0.6; ///< share of pairs in which each pillar is taken for its neighbour
   double false_matches = 0.1;
   unsigned seed = 1;

@@ -5,6 +5,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "recon/alignment/edge_field.hpp"
 #include "recon/poses/cross_modal/edge_alignment.hpp"
 
 namespace orbitfuse {
