@@ -116,17 +116,24 @@ void keep_connected(const std::vector<FeatureTrack>& tracks, int min_shared, Fra
     if (!inside[f]) poses[f].reset();
 }
 
-/// Proposed matches that lie on the epipolar lines of the poses.
-PairMatches confirmed(const FeatureGraph& graph, const PosedFrames& posed, double max_error_px) {
-  PairMatches result;
-  for (const auto& [pair, matches] : graph.proposed) {
-    const auto [a, b] = pair;
-    if (!posed.poses[at(a)] || !posed.poses[at(b)]) continue;
-    const EpipolarBand band = epipolar_band(graph, pair, posed, max_error_px);
-    for (const auto& [i, j] : matches)
-      if (band.distance(i, j) <= band.half_width) result[pair].emplace_back(i, j);
+/// Matches along the epipolar lines of posed views that look in nearly the same direction.
+void guide(const FeatureGraph& graph, const PosedFrames& posed, double band_px,
+           PairMatches& matches) {
+  constexpr double max_angle_deg = 50;  // beyond, descriptors of one point have little in common
+  std::vector<ViewPair> pairs;
+  for (const ViewPair& pair : exhaustive_pairs(graph.count())) {
+    const auto &a = posed.poses[at(pair.first)], &b = posed.poses[at(pair.second)];
+    if (!a || !b) continue;
+    const double cosine = (a->rotation.conjugate() * Eigen::Vector3d::UnitZ())
+                              .dot(b->rotation.conjugate() * Eigen::Vector3d::UnitZ());
+    if (cosine > std::cos(max_angle_deg * EIGEN_PI / 180)) pairs.push_back(pair);
   }
-  return result;
+  std::vector<std::vector<FeatureMatch>> found(pairs.size());
+  parallel_for(static_cast<int>(pairs.size()), [&](int p) {
+    found[at(p)] = guided_matches(graph, pairs[at(p)], posed, band_px);
+  });
+  for (std::size_t p = 0; p < pairs.size(); ++p)
+    if (found[p].size() > matches[pairs[p]].size()) matches[pairs[p]] = std::move(found[p]);
 }
 
 }  // namespace
@@ -155,9 +162,14 @@ Result<GlobalModel> map_globally(FeatureGraph& graph, const Adjuster& adjust,
     const Eigen::Quaterniond& q = rotations.cam_from_world[at(f)];
     result.posed.poses.back() = Rigid3d{q, -(q * centers[at(f)])};
   }
+  // Repeated structure fails Lowe's test against the whole image, not against one line of it: once
+  // poses are near, matches of near views are looked for along the lines.
+  constexpr double guided_at_px = 4;
   // From where averaged pairs leave the rays to where features lie, in pixels of the proxies.
-  for (const double max_error_px : {40.0, 12.0, 4.0}) {
+  for (const double max_error_px : {40.0, 12.0, guided_at_px}) {
     ORBITFUSE_TRY(progress.check("poses.global"));
+    if (max_error_px <= guided_at_px)
+      guide(graph, result.posed, 3 * graph.pixel_scale, matches);
     TrackOptions track;
     track.max_error_px = max_error_px * graph.pixel_scale;
     std::vector<FeatureTrack> tracks = triangulate_tracks(graph, matches, result.posed, track);
@@ -178,7 +190,8 @@ Result<GlobalModel> map_globally(FeatureGraph& graph, const Adjuster& adjust,
     }
     result.model = *std::move(adjusted);
     result.posed = posed_frames(graph, result.model);
-    matches = confirmed(graph, result.posed, std::min(8.0, max_error_px) * graph.pixel_scale);
+    if (max_error_px > guided_at_px)
+      matches = confirmed_matches(graph, result.posed, std::min(8.0, max_error_px) * graph.pixel_scale);
   }
   graph.verified = std::move(matches);
   return result;

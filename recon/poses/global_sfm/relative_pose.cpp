@@ -52,7 +52,7 @@ std::optional<RelativePose> strongest(const NormalisedMatches& given, const View
   if (static_cast<int>(given.first.size()) < options.min_inliers) return std::nullopt;
   cv::Mat mask;
   const cv::Mat essential = cv::findEssentialMat(given.first, given.second, 1.0, {0, 0}, cv::RANSAC,
-                                                 0.9999, threshold, 2000, mask);
+                                                 0.999, threshold, 1000, mask);
   if (essential.rows != 3 || essential.cols != 3) return std::nullopt;
   cv::Mat r, t;
   cv::recoverPose(essential, given.first, given.second, r, t, 1.0, {0, 0}, mask);

@@ -217,6 +217,18 @@ EpipolarBand epipolar_band(const FeatureGraph& graph, const ViewPair& pair,
   return band;
 }
 
+PairMatches confirmed_matches(const FeatureGraph& graph, const PosedFrames& posed,
+                              double max_error_px) {
+  PairMatches result;
+  for (const auto& [pair, matches] : graph.proposed) {
+    if (!posed.poses[at(pair.first)] || !posed.poses[at(pair.second)]) continue;
+    const EpipolarBand band = epipolar_band(graph, pair, posed, max_error_px);
+    for (const auto& [i, j] : matches)
+      if (band.distance(i, j) <= band.half_width) result[pair].emplace_back(i, j);
+  }
+  return result;
+}
+
 std::vector<FeatureMatch> guided_matches(const FeatureGraph& graph, const ViewPair& pair,
                                          const PosedFrames& posed, double band_px) {
   return match_in_band(graph.descriptors[at(pair.first)], graph.descriptors[at(pair.second)],

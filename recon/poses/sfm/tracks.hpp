@@ -48,6 +48,10 @@ PosedFrames posed_frames(const FeatureGraph& graph, const Reconstruction& model)
 EpipolarBand epipolar_band(const FeatureGraph& graph, const ViewPair& pair,
                            const PosedFrames& posed, double half_width_px);
 
+/// Proposed matches of posed frames that lie on the epipolar lines of their poses.
+PairMatches confirmed_matches(const FeatureGraph& graph, const PosedFrames& posed,
+                              double max_error_px);
+
 /// Matches of a pair that lie within `band_px` (recorded) of their epipolar lines, once both poses
 /// are known.
 std::vector<FeatureMatch> guided_matches(const FeatureGraph& graph, const ViewPair& pair,

@@ -218,6 +218,9 @@ class VisibleLadder {
     tell(3, rung);
     ORBITFUSE_ASSIGN(FeatureGraph graph, level.graph());
     PosedFrames posed = posed_frames(graph, best_->poses.reconstruction);
+    // The model knows better than two-view geometry which matches hold.
+    for (auto& [pair, matches] : confirmed_matches(graph, posed, 3 * graph.pixel_scale))
+      if (matches.size() > graph.verified[pair].size()) graph.verified[pair] = matches;
     ORBITFUSE_ASSIGN(const std::vector<int> added, resect(graph, posed, {}, progress_));
     const std::string found = fmt::format("{} of {} views found a place", added.size(),
                                           missing().size());
