@@ -44,7 +44,7 @@ GroundTruth truth_of(const fs::path& file) { return read_ground_truth(file).valu
 
 Scene container_scene(const fs::path& data, const ContainerOptions& options) {
   Scene scene;
-  scene.session.folder = data / "orbits" / "container";
+  scene.session.folder = data / "orbits" / options.scene;
   const GroundTruth truth = truth_of(scene.session.folder / "ground_truth.json");
   for (const auto& [modality, views] : truth.views) {
     const double error = modality == Modality::visible ? options.visible_focal_error

@@ -25,6 +25,7 @@ struct Scene {
 };
 
 struct ContainerOptions {
+  std::string scene = "container";  ///< under orbits/, or the absolute path of such a folder
   bool tracking = false;
   double visible_focal_error = 0, thermal_focal_error = 0;  ///< of the prior, relative
   bool mirrored_stations = false;                           ///< the operator walked the other way

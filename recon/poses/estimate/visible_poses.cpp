@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "recon/poses/estimate/session_poses.hpp"
-#include "recon/poses/sfm/sfm_ladder.hpp"
+#include "recon/poses/sfm/visible_ladder.hpp"
 
 namespace orbitfuse {
 
@@ -21,9 +21,8 @@ Result<ModalityPoses> estimate_visible_poses(const Session& session, const PoseO
                 fmt::format("{} visible frames, at least 2 are needed", frames.size()),
                 "record or import more views");
   std::vector<LadderStep> steps;
-  ORBITFUSE_ASSIGN(ModalityPoses poses, structure_from_motion(session, frames, options,
-                                                              workdir / "visible", progress,
-                                                              steps));
+  ORBITFUSE_ASSIGN(ModalityPoses poses, pose_visible_views(session, frames, options,
+                                                           workdir / "visible", progress, steps));
   poses.ladder = std::move(steps);
   return poses;
 }

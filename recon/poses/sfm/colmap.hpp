@@ -52,12 +52,14 @@ class ColmapProject {
   Result<DatabaseCounts> extract(const Session& session, const std::vector<ProxyImage>& images,
                                  const Progress& progress);
   /// Exact matching of ours (COLMAP's random trees answer differently on each run), verified by
-  /// COLMAP.
+  /// COLMAP. Adds to the pairs matched before; a pair that was is left as it is.
   Result<DatabaseCounts> match(const std::vector<ProxyImage>& images,
                                const std::vector<ViewPair>& pairs, const Progress& progress);
   /// The largest model, in the frames' own pixels and names; no views when there is none.
   Result<Reconstruction> map(const Session& session, const std::vector<ProxyImage>& images,
                              const MapperSettings& settings, const Progress& progress);
+
+  const std::filesystem::path& database() const { return database_; }
 
  private:
   Status run(std::vector<std::string> arguments, const Progress& progress) const;

@@ -2,6 +2,7 @@
 #include "recon/poses/sfm/colmap_database.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <fmt/format.h>
 #include <functional>
 #include <memory>
@@ -101,6 +102,8 @@ Result<std::map<std::string, Descriptors>> read_descriptors(const fs::path& path
         const auto* name = reinterpret_cast<const char*>(sqlite3_column_text(row, 0));
         const Eigen::Index rows = sqlite3_column_int(row, 1);
         Descriptors& descriptors = found[name != nullptr ? name : ""];
+        // A product with a matrix of no columns would not be defined.
+        descriptors.resize(0, sift_bytes);
         if (rows <= 0) return;
         whole = whole && sqlite3_column_int(row, 2) == sift_bytes &&
                 sqlite3_column_bytes(row, 3) == rows * sift_bytes;
@@ -111,6 +114,60 @@ Result<std::map<std::string, Descriptors>> read_descriptors(const fs::path& path
       }));
   if (whole) return found;
   return fail(ErrorKind::input, path.string(), "descriptors of another size than SIFT's 128 bytes",
+              "delete it and run the pose stage again");
+}
+
+Result<std::map<std::string, Eigen::Matrix2Xd>> read_keypoints(const fs::path& path) {
+  ORBITFUSE_ASSIGN(const Database database, Database::open(path, SQLITE_OPEN_READONLY));
+  std::map<std::string, Eigen::Matrix2Xd> found;
+  bool whole = true;
+  ORBITFUSE_TRY(database.query(
+      "SELECT images.name, keypoints.rows, keypoints.cols, keypoints.data FROM images "
+      "LEFT JOIN keypoints ON keypoints.image_id = images.image_id",
+      [&](sqlite3_stmt* row) {
+        const auto* name = reinterpret_cast<const char*>(sqlite3_column_text(row, 0));
+        const Eigen::Index rows = sqlite3_column_int(row, 1), cols = sqlite3_column_int(row, 2);
+        Eigen::Matrix2Xd& pixels = found[name != nullptr ? name : ""];
+        if (rows <= 0) return;
+        whole = whole && cols >= 2 &&
+                sqlite3_column_bytes(row, 3) == rows * cols * static_cast<int>(sizeof(float));
+        if (!whole) return;
+        using Table = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+        const auto* values = static_cast<const float*>(sqlite3_column_blob(row, 3));
+        pixels = Eigen::Map<const Table>(values, rows, cols).leftCols(2).transpose().cast<double>();
+      }));
+  if (whole) return found;
+  return fail(ErrorKind::input, path.string(), "keypoints of another size than it states",
+              "delete it and run the pose stage again");
+}
+
+Result<NamedMatches> read_matches(const fs::path& path, MatchKind kind) {
+  ORBITFUSE_ASSIGN(const Database database, Database::open(path, SQLITE_OPEN_READONLY));
+  NamedMatches found;
+  bool whole = true;
+  // COLMAP's number of a pair: the lower image's times 2^31 - 1, plus the other's.
+  const std::string sql = fmt::format(
+      "SELECT a.name, b.name, m.rows, m.data FROM {} m "
+      "JOIN images a ON a.image_id = m.pair_id / 2147483647 "
+      "JOIN images b ON b.image_id = m.pair_id % 2147483647 WHERE m.rows > 0",
+      kind == MatchKind::proposed ? "matches" : "two_view_geometries");
+  ORBITFUSE_TRY(database.query(sql.c_str(), [&](sqlite3_stmt* row) {
+    std::string first = reinterpret_cast<const char*>(sqlite3_column_text(row, 0)),
+                second = reinterpret_cast<const char*>(sqlite3_column_text(row, 1));
+    const int rows = sqlite3_column_int(row, 2);
+    whole = whole && sqlite3_column_bytes(row, 3) == rows * 2 * static_cast<int>(sizeof(std::uint32_t));
+    if (!whole) return;
+    const auto* data = static_cast<const std::uint32_t*>(sqlite3_column_blob(row, 3));
+    const bool in_order = first < second;
+    if (!in_order) std::swap(first, second);
+    std::vector<FeatureMatch>& matches = found[{first, second}];
+    for (int i = 0; i < rows; ++i) {
+      const auto a = static_cast<int>(data[2 * i]), b = static_cast<int>(data[2 * i + 1]);
+      matches.emplace_back(in_order ? a : b, in_order ? b : a);
+    }
+  }));
+  if (whole) return found;
+  return fail(ErrorKind::input, path.string(), "matches of another size than it states",
               "delete it and run the pose stage again");
 }
 

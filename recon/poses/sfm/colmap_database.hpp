@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "core/result.hpp"
 #include "recon/poses/sfm/descriptor_matching.hpp"
@@ -26,5 +28,17 @@ Status number_images_by_name(const std::filesystem::path& database);
 
 /// By image name; images without features have no rows.
 Result<std::map<std::string, Descriptors>> read_descriptors(const std::filesystem::path& database);
+
+/// Positions of features by image name, a column each, in the proxies' pixels.
+Result<std::map<std::string, Eigen::Matrix2Xd>> read_keypoints(
+    const std::filesystem::path& database);
+
+enum class MatchKind {
+  proposed,  ///< by descriptors alone
+  verified,  ///< held by one two-view geometry
+};
+/// By the names of both images, the lower one first; empty pairs are left out.
+using NamedMatches = std::map<std::pair<std::string, std::string>, std::vector<FeatureMatch>>;
+Result<NamedMatches> read_matches(const std::filesystem::path& database, MatchKind kind);
 
 }  // namespace orbitfuse

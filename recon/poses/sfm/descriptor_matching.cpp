@@ -31,10 +31,11 @@ bool passes(const Nearest& nearest, const DescriptorMatchOptions& options) {
          (nearest.second < 0 || best < options.max_ratio * angle_rad(nearest.second));
 }
 
-}  // namespace
-
-std::vector<FeatureMatch> match_descriptors(const Descriptors& first, const Descriptors& second,
-                                            const DescriptorMatchOptions& options) {
+template <class Admits>
+std::vector<FeatureMatch> match_where(const Descriptors& first, const Descriptors& second,
+                                      const DescriptorMatchOptions& options,
+                                      const Admits& admits) {
+  if (first.rows() == 0 || second.rows() == 0) return {};  // a blank view has none
   std::vector<Nearest> of_first(static_cast<std::size_t>(first.rows())),
       of_second(static_cast<std::size_t>(second.rows()));
   constexpr Eigen::Index block = 64;  // products of a block stay in the cache while they are read
@@ -45,6 +46,7 @@ std::vector<FeatureMatch> match_descriptors(const Descriptors& first, const Desc
     for (Eigen::Index r = 0; r < rows; ++r) {
       Nearest& row = of_first[static_cast<std::size_t>(begin + r)];
       for (Eigen::Index c = 0; c < second.rows(); ++c) {
+        if (!admits(begin + r, c)) continue;
         const float product = products(r, c);
         row.offer(product, static_cast<int>(c));
         of_second[static_cast<std::size_t>(c)].offer(product, static_cast<int>(begin + r));
@@ -59,6 +61,29 @@ std::vector<FeatureMatch> match_descriptors(const Descriptors& first, const Desc
       matches.emplace_back(static_cast<int>(i), of_first[i].index);
   }
   return matches;
+}
+
+}  // namespace
+
+double EpipolarBand::distance(Eigen::Index first, Eigen::Index second) const {
+  const Eigen::Vector3d line = essential * first_rays.col(first);
+  return std::abs(line.dot(second_rays.col(second))) / std::max(line.head<2>().norm(), 1e-12);
+}
+
+std::vector<FeatureMatch> match_descriptors(const Descriptors& first, const Descriptors& second,
+                                            const DescriptorMatchOptions& options) {
+  return match_where(first, second, options, [](Eigen::Index, Eigen::Index) { return true; });
+}
+
+std::vector<FeatureMatch> match_in_band(const Descriptors& first, const Descriptors& second,
+                                        const EpipolarBand& band,
+                                        const DescriptorMatchOptions& options) {
+  Eigen::Matrix3Xd lines = band.essential * band.first_rays;
+  for (Eigen::Index i = 0; i < lines.cols(); ++i)
+    lines.col(i) /= std::max(lines.col(i).head<2>().norm(), 1e-12);
+  return match_where(first, second, options, [&](Eigen::Index a, Eigen::Index b) {
+    return std::abs(lines.col(a).dot(band.second_rays.col(b))) <= band.half_width;
+  });
 }
 
 }  // namespace orbitfuse

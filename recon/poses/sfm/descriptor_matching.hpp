@@ -18,10 +18,27 @@ struct DescriptorMatchOptions {
   double max_distance_rad = 0.7;
 };
 
+/// Which feature of the second image may match one of the first: those within a band about its
+/// epipolar line. Rays are undistorted, z = 1.
+struct EpipolarBand {
+  Eigen::Matrix3d essential;  ///< second^T E first = 0
+  Eigen::Matrix3Xd first_rays, second_rays;
+  double half_width = 0;  ///< in the second image's normalised plane
+
+  /// Distance of a feature of the second image from the line of one of the first.
+  double distance(Eigen::Index first, Eigen::Index second) const;
+};
+
 /// Mutual nearest neighbours that pass both tests, ordered by the first image's row; a tie goes to
 /// the lower row. Exact, unlike COLMAP's forest of random trees: whole numbers below 2^24 add up in
 /// float without rounding, so the answer depends on neither order, instruction set nor threads.
 std::vector<FeatureMatch> match_descriptors(const Descriptors& first, const Descriptors& second,
                                             const DescriptorMatchOptions& options = {});
+
+/// The same among the pairs of features that the band admits, where the poses are known: the
+/// runner-up of Lowe's test too must lie on the line, so that repeated structure matches as well.
+std::vector<FeatureMatch> match_in_band(const Descriptors& first, const Descriptors& second,
+                                        const EpipolarBand& band,
+                                        const DescriptorMatchOptions& options = {});
 
 }  // namespace orbitfuse

@@ -31,18 +31,12 @@ struct Attempt {
   bool exhaustive;
 };
 
-std::vector<Attempt> attempts(Modality modality, const PoseOptions& options, bool few_frames) {
+std::vector<Attempt> attempts(const PoseOptions& options, bool few_frames) {
   const double usual = 0.02 / 3;
-  ProxyOptions plain;
-  plain.max_side_px = options.max_image_side_px;
-  std::vector<Attempt> list;
-  if (modality == Modality::visible) {
-    list.push_back({"COLMAP, orbit pairs", plain, usual, false});
-    if (!few_frames) list.push_back({"COLMAP, all pairs", plain, usual, true});
-    return list;
-  }
-  ProxyOptions local = plain;
+  ProxyOptions local;
+  local.max_side_px = options.max_image_side_px;
   local.clahe = local.destripe = true;
+  std::vector<Attempt> list;
   list.push_back({"COLMAP, orbit pairs, local contrast", local, usual / 3, false});
   // Dim thermal pairs cost little to match (few features), so all pairs are affordable.
   if (!few_frames) list.push_back({"COLMAP, all pairs, local contrast", local, usual / 3, true});
@@ -139,6 +133,8 @@ Result<ModalityPoses> adjusted(Reconstruction model, const Session& session,
   return poses;
 }
 
+}  // namespace
+
 tl::unexpected<Error> none_held(const std::vector<LadderStep>& steps, Modality modality) {
   std::string found;
   for (const LadderStep& step : steps)
@@ -149,8 +145,6 @@ tl::unexpected<Error> none_held(const std::vector<LadderStep>& steps, Modality m
                     "import known poses"
                   : "record visible views of the same object too, or import known poses");
 }
-
-}  // namespace
 
 bool passes_gates(ModalityPoses& poses, const Session& session, const PoseOptions& options,
                   std::string& why) {
@@ -207,7 +201,7 @@ Result<ModalityPoses> structure_from_motion(const Session& session,
   const std::string stage = fmt::format("poses.{}", name(modality));
   const int total = static_cast<int>(frames.size());
   for (const Attempt& attempt :
-       attempts(modality, options, orbit_pairs(frames).size() ==
+       attempts(options, orbit_pairs(frames).size() ==
                                        exhaustive_pairs(static_cast<int>(frames.size())).size())) {
     const auto start = Clock::now();
     const fs::path folder = workdir / (attempt.exhaustive ? "all_pairs" : "orbit_pairs");

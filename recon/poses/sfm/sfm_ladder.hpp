@@ -5,9 +5,9 @@
 
 namespace orbitfuse {
 
-/// Structure from motion of one modality, step by step: orbit-limited pairs with the mapper's
-/// default, then relaxed settings; for thermal also stronger proxies; exhaustive pairs last. Each
-/// model goes through bundle adjustment and the gates; the first that passes holds.
+/// Structure from motion of thermal views, step by step: orbit-limited pairs with the mapper's
+/// default, then relaxed settings, exhaustive pairs last. Each model goes through bundle adjustment
+/// and the gates; the first that passes holds. (Visible views: visible_ladder.hpp.)
 /// The ladder of a failure is in `steps` as well as in the error's message.
 /// Errors: input, unavailable (no COLMAP), quality (no rung held), cancelled.
 Result<ModalityPoses> structure_from_motion(const Session& session,
@@ -30,6 +30,9 @@ struct JudgedModel {
 Result<JudgedModel> judge_model(Reconstruction model, const Session& session,
                                 const std::vector<const FrameRecord*>& frames,
                                 const PoseOptions& options);
+
+/// The error of a ladder of which no rung held.
+tl::unexpected<Error> none_held(const std::vector<LadderStep>& steps, Modality modality);
 
 /// The gates a model must pass without ground truth; `why` says the figures either way.
 /// Fills poses.gates.

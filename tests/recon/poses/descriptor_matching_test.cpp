@@ -89,5 +89,12 @@ TEST(DescriptorMatching, EmptyAndBlankSetsMatchNothing) {
   EXPECT_TRUE(match_descriptors(some, blank).empty());
 }
 
+TEST(DescriptorMatching, AViewWithoutFeaturesMatchesNothing) {
+  const Descriptors none, some = Descriptors::Constant(5, 128, 45);
+  EXPECT_TRUE(match_descriptors(none, some).empty());
+  EXPECT_TRUE(match_descriptors(some, none).empty());
+  EXPECT_TRUE(match_descriptors(none, none).empty());
+}
+
 }  // namespace
 }  // namespace orbitfuse

@@ -75,6 +75,18 @@ TEST(EstimatePoses, CancelledStops) {
   EXPECT_EQ(poses.error().kind, ErrorKind::cancelled);
 }
 
+TEST(EstimatePoses, AViewWithoutFeaturesIsNamedAndNeverMatched) {
+  const test::TempFolder folder;
+  const Session session = session_of(folder.path(), 4);
+  cv::imwrite((folder / "visible/2.png").string(), cv::Mat(120, 160, CV_8UC3, cv::Scalar(9, 9, 9)));
+  const auto poses = estimate_visible_poses(session, {}, folder / "work", {});
+  ASSERT_FALSE(poses) << "noise has no pose";
+  if (poses.error().kind == ErrorKind::unavailable) GTEST_SKIP() << "no COLMAP on PATH";
+  EXPECT_EQ(poses.error().kind, ErrorKind::quality) << poses.error().message();
+  EXPECT_NE(poses.error().found.find("visible/2.png shows nothing to match"), std::string::npos)
+      << poses.error().message();
+}
+
 TEST(EstimatePoses, OptionsOutOfRangeAreNamed) {
   PoseOptions options;
   options.min_posed_ratio = std::nan("");

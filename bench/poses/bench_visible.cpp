@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// bench_visible SCENE... [--focal-error R] [--no-stations] [--colmap]: poses of the visible views alone, and
+// their error where the truth is known. A scene is one of shared data's orbits (container, sedan,
+// van, fox, flowerpot, ...), one of its pairs (metu_sunny_scene_7, ...), or the path of a folder
+// rendered like them. --colmap poses with COLMAP's mapper on all pairs at full settings instead.
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fmt/format.h>
+#include <opencv2/imgcodecs.hpp>
+#include <string_view>
+#include <unistd.h>
+#include <vector>
+
+#include "core/system/clock.hpp"
+#include "core/system/cpu.hpp"
+#include "core/system/parallel.hpp"
+#include "recon/poses/estimate_poses.hpp"
+#include "recon/poses/sfm/colmap.hpp"
+#include "recon/poses/sfm/sfm_ladder.hpp"
+#include "tests/support/orbit_scenes.hpp"
+#include "tests/support/shared_data.hpp"
+
+namespace {
+
+using namespace orbitfuse;
+namespace fs = std::filesystem;
+
+struct Request {
+  std::vector<std::string> scenes;
+  double focal_error = 0.03;
+  bool stations = true, colmap = false;
+};
+
+/// Visible images of a folder, or of its folder visible/, in the order of their names.
+scenes::Scene photos(const fs::path& folder) {
+  scenes::Scene scene;
+  scene.session.folder = folder;
+  DeviceInfo device;
+  device.id = "visible0";
+  scene.session.devices.push_back(device);
+  std::vector<fs::path> files;
+  const fs::path inside = fs::exists(folder / "visible") ? folder / "visible" : folder;
+  for (const auto& entry : fs::directory_iterator(inside))
+    if (entry.path().extension() == ".jpg" || entry.path().extension() == ".png")
+      files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  for (const fs::path& file : files) {
+    const cv::Mat image = cv::imread(file.string());
+    FrameRecord frame;
+    frame.device = device.id;
+    frame.file = fs::relative(file, folder).string();
+    frame.width = image.cols, frame.height = image.rows;
+    frame.sequence = scene.session.frames.size();
+    scene.session.frames.push_back(frame);
+  }
+  return scene;
+}
+
+scenes::Scene load(const fs::path& data, const std::string& which, const Request& request) {
+  const fs::path folder = data / "orbits" / which;
+  scenes::Scene scene;
+  if (which == "fox") {
+    scene = scenes::fox_scene(data);
+  } else if (fs::exists(folder / "ground_truth.json") && which != "lego") {
+    scenes::ContainerOptions options;
+    options.scene = which;
+    options.visible_focal_error = request.focal_error;
+    scene = scenes::container_scene(data, options);
+  } else {
+    scene = photos(fs::exists(folder) ? folder : data / "pairs" / which);
+  }
+  std::erase_if(scene.session.frames,
+                [](const FrameRecord& frame) { return frame.modality != Modality::visible; });
+  if (!request.stations)
+    for (FrameRecord& frame : scene.session.frames) frame.station.reset();
+  return scene;
+}
+
+/// What the ladder must not fall behind.
+Result<ModalityPoses> colmap_poses(const Session& session, const fs::path& workdir) {
+  const auto frames = session.frames_of(Modality::visible);
+  PoseOptions options;
+  options.max_image_side_px = 3200;
+  options.max_features = 8192;
+  options.min_posed_ratio = 0;
+  ProxyOptions proxies;
+  proxies.max_side_px = options.max_image_side_px;
+  ColmapOptions engine;
+  engine.max_features = options.max_features;
+  ORBITFUSE_ASSIGN(const auto images,
+                   write_proxies(session, frames, proxies, workdir / "images", {}));
+  ORBITFUSE_ASSIGN(ColmapProject project,
+                   ColmapProject::create(workdir / "colmap", workdir / "images", engine));
+  ORBITFUSE_TRY(project.extract(session, images, {}));
+  ORBITFUSE_TRY(project.match(images, exhaustive_pairs(static_cast<int>(frames.size())), {}));
+  ORBITFUSE_ASSIGN(Reconstruction model, project.map(session, images, {}, {}));
+  if (model.views.size() < 2)
+    return fail(ErrorKind::quality, "colmap", "no model", "see its log");
+  ORBITFUSE_ASSIGN(JudgedModel judged, judge_model(std::move(model), session, frames, options));
+  judged.poses.ladder.push_back({"COLMAP, all pairs, full settings", judged.believed, judged.why,
+                                 static_cast<int>(judged.poses.reconstruction.views.size()),
+                                 static_cast<int>(frames.size()), 0});
+  return std::move(judged.poses);
+}
+
+void print(const scenes::Scene& scene, const Result<ModalityPoses>& poses, double cpu_s) {
+  if (!poses) {
+    fmt::print("  {}; {:.1f} CPU s\n", poses.error().message(), cpu_s);
+    return;
+  }
+  for (const LadderStep& step : poses->ladder)
+    fmt::print("  {} {}: {}/{} in {:.1f} s: {}\n", step.held ? "held" : "fell", step.rung,
+               step.posed, step.total, step.seconds, step.why);
+  for (const DroppedView& view : poses->dropped) fmt::print("  dropped {}: {}\n", view.name, view.why);
+  fmt::print("  posed {}/{}, {:.1f} CPU s", poses->reconstruction.views.size(), poses->frame_count,
+             cpu_s);
+  const scenes::PoseError error =
+      scenes::pose_error(poses->reconstruction, poses->reconstruction, scene.truth);
+  if (error.views > 0)
+    fmt::print("; centres RMS {:.3f} %, worst {:.3f} % of the extent; rotation mean {:.3f}, worst "
+               "{:.3f} deg",
+               error.ate_percent, error.worst_percent, error.mean_rotation_deg,
+               error.worst_rotation_deg);
+  fmt::print("\n");
+}
+
+Request parsed(int argc, char** argv) {
+  Request request;
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    if (word == "--focal-error" && i + 1 < argc) request.focal_error = std::strtod(argv[++i], nullptr);
+    else if (word == "--no-stations") request.stations = false;
+    else if (word == "--colmap") request.colmap = true;
+    else request.scenes.emplace_back(word);
+  }
+  return request;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);
+  const fs::path data = testing::shared_data();
+  const Request request = parsed(argc, argv);
+  if (request.scenes.empty() || !fs::exists(data)) {
+    std::fputs("bench_visible SCENE... [--focal-error R] [--no-stations] [--colmap]; needs the "
+               "shared data (ORBITFUSE_SHARED)\n",
+               stderr);
+    return 2;
+  }
+  fmt::print("{}; {} threads\n", cpu_description(), thread_count());
+  for (const std::string& which : request.scenes) {
+    fmt::print("{}\n", which);
+    const scenes::Scene scene = load(data, which, request);
+    const fs::path workdir =
+        fs::temp_directory_path() / fmt::format("orbitfuse_bench_visible_{}", ::getpid());
+    const double before = cpu_seconds();
+    const auto poses = request.colmap
+                           ? colmap_poses(scene.session, workdir)
+                           : estimate_visible_poses(scene.session, PoseOptions{}, workdir, {});
+    print(scene, poses, cpu_seconds() - before);
+    std::error_code ignored;
+    if (std::getenv("ORBITFUSE_KEEP") == nullptr) fs::remove_all(workdir, ignored);
+  }
+  return 0;
+}

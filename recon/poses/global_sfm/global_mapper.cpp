@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/global_sfm/global_mapper.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "core/system/parallel.hpp"
+#include "recon/poses/global_sfm/center_estimation.hpp"
+
+namespace orbitfuse {
+namespace {
+
+std::size_t at(int index) { return static_cast<std::size_t>(index); }
+
+PairCandidates candidates_of(const FeatureGraph& graph, const RelativePoseOptions& options) {
+  std::vector<ViewPair> pairs;
+  for (const auto& [pair, matches] : graph.proposed) pairs.push_back(pair);
+  PairCandidates candidates(pairs.size());
+  parallel_for(static_cast<int>(pairs.size()), [&](int p) {
+    candidates[at(p)] = relative_poses(graph, pairs[at(p)], options);
+  });
+  std::erase_if(candidates, [](const auto& of_pair) { return of_pair.empty(); });
+  return candidates;
+}
+
+bool all_have_stations(const FeatureGraph& graph) {
+  return std::all_of(graph.frames.begin(), graph.frames.end(),
+                     [](const FrameRecord* f) { return f->station.has_value(); });
+}
+
+/// Both ways round the object where there are stations: the loop says which.
+AveragedRotations averaged(const FeatureGraph& graph, const PairCandidates& candidates,
+                           const RotationOptions& options) {
+  const std::vector<double> elevations = loop_elevations_deg(graph.frames, candidates);
+  AveragedRotations best =
+      average_rotations(candidates, nominal_rotations(graph.frames, elevations, false), options);
+  if (!all_have_stations(graph)) return best;
+  AveragedRotations other =
+      average_rotations(candidates, nominal_rotations(graph.frames, elevations, true), options);
+  return other.cost < best.cost ? other : best;
+}
+
+/// Of each pair the candidate whose direction is nearest to the centres', within `max_deg`.
+std::vector<RelativePose> by_direction(const PairCandidates& kept,
+                                       const std::vector<Eigen::Quaterniond>& rotation,
+                                       const std::vector<Eigen::Vector3d>& center, double max_deg) {
+  std::vector<RelativePose> chosen;
+  for (const auto& of_pair : kept) {
+    const RelativePose* best = nullptr;
+    double least = max_deg;
+    for (const RelativePose& pose : of_pair) {
+      const Eigen::Vector3d seen =
+          rotation[at(pose.second)].conjugate() * pose.second_from_first.translation;
+      const Eigen::Vector3d expected = center[at(pose.first)] - center[at(pose.second)];
+      const double off =
+          std::atan2(seen.cross(expected).norm(), seen.dot(expected)) * 180 / EIGEN_PI;
+      if (off < least) least = off, best = &pose;
+    }
+    if (best != nullptr) chosen.push_back(*best);
+  }
+  return chosen;
+}
+
+/// The pairs to build on, and the centres that they give.
+std::vector<RelativePose> chosen_pairs(const FeatureGraph& graph,
+                                       const AveragedRotations& rotations,
+                                       const GlobalMapperOptions& options,
+                                       std::vector<Eigen::Vector3d>& centers) {
+  std::vector<RelativePose> pairs;
+  if (all_have_stations(graph)) {
+    centers = estimate_centers(rotations.cam_from_world, {}, {});
+    pairs = by_direction(rotations.kept, rotations.cam_from_world, centers,
+                         options.max_direction_deg);
+  } else {
+    for (const auto& of_pair : rotations.kept) pairs.push_back(of_pair.front());
+  }
+  centers = estimate_centers(rotations.cam_from_world, pairs, {});
+  return pairs;
+}
+
+/// The largest set of frames that `edges` connect.
+std::vector<bool> largest_part(int count, const std::vector<ViewPair>& edges) {
+  std::vector<int> part(at(count));
+  std::iota(part.begin(), part.end(), 0);
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (const auto& [a, b] : edges) {
+      const int low = std::min(part[at(a)], part[at(b)]);
+      changed = changed || part[at(a)] != low || part[at(b)] != low;
+      part[at(a)] = part[at(b)] = low;
+    }
+  }
+  std::vector<int> size(at(count), 0);
+  for (const int p : part) ++size[at(p)];
+  const int largest =
+      static_cast<int>(std::max_element(size.begin(), size.end()) - size.begin());
+  std::vector<bool> inside;
+  for (const int p : part) inside.push_back(p == largest);
+  return inside;
+}
+
+/// Frames that hold each other through points: two parts without would have no common scale.
+void keep_connected(const std::vector<FeatureTrack>& tracks, int min_shared, FramePoses& poses) {
+  std::map<ViewPair, int> shared;
+  for (const FeatureTrack& track : tracks)
+    for (std::size_t a = 0; a < track.features.size(); ++a)
+      for (std::size_t b = a + 1; b < track.features.size(); ++b)
+        ++shared[std::minmax(track.features[a].first, track.features[b].first)];
+  std::vector<ViewPair> edges;
+  for (const auto& [pair, count] : shared)
+    if (count >= min_shared) edges.push_back(pair);
+  const std::vector<bool> inside = largest_part(static_cast<int>(poses.size()), edges);
+  for (std::size_t f = 0; f < poses.size(); ++f)
+    if (!inside[f]) poses[f].reset();
+}
+
+/// Matches along the epipolar lines of posed views that look in nearly the same direction.
+void guide(const FeatureGraph& graph, const PosedFrames& posed, double band_px,
+           PairMatches& matches) {
+  constexpr double max_angle_deg = 50;  // beyond, descriptors of one point have little in common
+  std::vector<ViewPair> pairs;
+  for (const ViewPair& pair : exhaustive_pairs(graph.count())) {
+    const auto &a = posed.poses[at(pair.first)], &b = posed.poses[at(pair.second)];
+    if (!a || !b) continue;
+    const double cosine = (a->rotation.conjugate() * Eigen::Vector3d::UnitZ())
+                              .dot(b->rotation.conjugate() * Eigen::Vector3d::UnitZ());
+    if (cosine > std::cos(max_angle_deg * EIGEN_PI / 180)) pairs.push_back(pair);
+  }
+  std::vector<std::vector<FeatureMatch>> found(pairs.size());
+  parallel_for(static_cast<int>(pairs.size()), [&](int p) {
+    found[at(p)] = guided_matches(graph, pairs[at(p)], posed, band_px);
+  });
+  for (std::size_t p = 0; p < pairs.size(); ++p)
+    if (found[p].size() > matches[pairs[p]].size()) matches[pairs[p]] = std::move(found[p]);
+}
+
+}  // namespace
+
+Result<GlobalModel> map_globally(FeatureGraph& graph, const Adjuster& adjust,
+                                 const GlobalMapperOptions& options, const Progress& progress) {
+  GlobalModel result;
+  const PairCandidates candidates = candidates_of(graph, options.pairs);
+  ORBITFUSE_TRY(progress.check("poses.global"));
+  const AveragedRotations rotations = averaged(graph, candidates, options.rotations);
+  std::vector<Eigen::Vector3d> centers;
+  const std::vector<RelativePose> kept = chosen_pairs(graph, rotations, options, centers);
+  result.found = fmt::format("{} of {} pairs have a geometry, the loop confirms {}",
+                             candidates.size(), graph.proposed.size(), kept.size());
+  result.posed.cameras = graph.cameras;
+  PairMatches matches;
+  std::vector<ViewPair> edges;
+  for (const RelativePose& pair : kept) {
+    matches[{pair.first, pair.second}] = pair.matches;
+    edges.emplace_back(pair.first, pair.second);
+  }
+  const std::vector<bool> inside = largest_part(graph.count(), edges);
+  for (int f = 0; f < graph.count(); ++f) {
+    result.posed.poses.emplace_back();
+    if (!inside[at(f)] || !rotations.placed[at(f)]) continue;
+    const Eigen::Quaterniond& q = rotations.cam_from_world[at(f)];
+    result.posed.poses.back() = Rigid3d{q, -(q * centers[at(f)])};
+  }
+  // Repeated structure fails Lowe's test against the whole image, not against one line of it: once
+  // poses are near, matches of near views are looked for along the lines.
+  constexpr double guided_at_px = 4;
+  // From where averaged pairs leave the rays to where features lie, in pixels of the proxies.
+  for (const double max_error_px : {40.0, 12.0, guided_at_px}) {
+    ORBITFUSE_TRY(progress.check("poses.global"));
+    if (max_error_px <= guided_at_px)
+      guide(graph, result.posed, 3 * graph.pixel_scale, matches);
+    TrackOptions track;
+    track.max_error_px = max_error_px * graph.pixel_scale;
+    std::vector<FeatureTrack> tracks = triangulate_tracks(graph, matches, result.posed, track);
+    keep_connected(tracks, options.min_shared_points, result.posed.poses);
+    tracks = triangulate_tracks(graph, matches, result.posed, track);
+    Reconstruction model =
+        reconstruction_of(graph, result.posed, tracks, graph.frames.front()->modality);
+    if (model.views.size() < 2) {
+      result.found += "; no two views hold each other";
+      result.model = {};
+      return result;
+    }
+    Result<Reconstruction> adjusted = adjust(std::move(model));
+    if (!adjusted) {
+      result.found += "; " + adjusted.error().found;
+      result.model = {};
+      return result;
+    }
+    result.model = *std::move(adjusted);
+    result.posed = posed_frames(graph, result.model);
+    if (max_error_px > guided_at_px)
+      matches = confirmed_matches(graph, result.posed, std::min(8.0, max_error_px) * graph.pixel_scale);
+  }
+  graph.verified = std::move(matches);
+  return result;
+}
+
+}  // namespace orbitfuse

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/progress.hpp"
+#include "recon/poses/sfm/tracks.hpp"
+
+namespace orbitfuse {
+
+struct ResectionOptions {
+  /// Correspondences of the found pose; random ones agree with one by half a dozen at most.
+  int min_inliers = 20;
+  /// Share of them among the correspondences, above what a view of something else reaches.
+  double min_inlier_ratio = 0.1;
+  /// In pixels of the proxies.
+  double max_error_px = 4;
+};
+
+/// Poses the frames that have none on the points of those that do: by matches with every posed frame
+/// (exact, also those that no two-view geometry held), robustly; the frame with most correspondences
+/// first, whose points then help the next. Their guided matches join `graph.verified`.
+/// Returns the frames that it posed.
+Result<std::vector<int>> resect(FeatureGraph& graph, PosedFrames& posed,
+                                const ResectionOptions& options, const Progress& progress);
+
+}  // namespace orbitfuse

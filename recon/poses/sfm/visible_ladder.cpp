@@ -1,0 +1,328 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/sfm/visible_ladder.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <set>
+
+#include "recon/poses/global_sfm/global_mapper.hpp"
+#include "recon/poses/sfm/colmap.hpp"
+#include "recon/poses/sfm/resection.hpp"
+#include "recon/poses/sfm/sfm_ladder.hpp"
+
+namespace orbitfuse {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+/// COLMAP's own limits, for what the quick way left out.
+constexpr int full_image_side_px = 3200;
+constexpr int full_features = 8192;
+/// Without any model all pairs at full settings take a CPU second each: up to this many views.
+constexpr int max_exhaustive_views = 60;
+
+constexpr const char* featureless_why =
+    "shows nothing to match (blank, out of focus or overexposed?)";
+
+/// Features of some frames at one size, and the pairs matched so far.
+class FeatureLevel {
+ public:
+  static Result<FeatureLevel> extract(const Session& session,
+                                      const std::vector<const FrameRecord*>& frames,
+                                      const PoseOptions& options, const fs::path& folder,
+                                      const Progress& progress) {
+    ProxyOptions proxies;
+    proxies.max_side_px = options.max_image_side_px;
+    ColmapOptions engine{options.colmap, options.threads, options.seed, options.max_features,
+                         ColmapOptions{}.peak_threshold};
+    FeatureLevel level(session, options);
+    ORBITFUSE_ASSIGN(level.images_,
+                     write_proxies(session, frames, proxies, folder / "images", progress));
+    ORBITFUSE_ASSIGN(level.project_,
+                     ColmapProject::create(folder / "colmap", folder / "images", engine));
+    ORBITFUSE_ASSIGN(level.counts_, level.project_.extract(session, level.images_, progress));
+    return level;
+  }
+
+  Status match(const std::vector<ViewPair>& pairs, const Progress& progress) {
+    std::vector<ViewPair> fresh;
+    for (const ViewPair& pair : pairs)
+      if (matched_.insert(pair).second) fresh.push_back(pair);
+    if (fresh.empty()) return {};
+    ORBITFUSE_ASSIGN(counts_, project_.match(images_, fresh, progress));
+    return {};
+  }
+  Result<Reconstruction> map(const MapperSettings& settings, const Progress& progress) {
+    return project_.map(*session_, images_, settings, progress);
+  }
+  Result<FeatureGraph> graph() const {
+    return read_feature_graph(project_.database(), *session_, images_);
+  }
+
+  const PoseOptions& options() const { return options_; }
+  std::string found() const {
+    return fmt::format("{:.0f} features a view, {} of {} pairs verified", counts_.mean_features,
+                       counts_.verified_pairs, counts_.matched_pairs);
+  }
+  int pairs() const { return static_cast<int>(matched_.size()); }
+
+ private:
+  FeatureLevel(const Session& session, const PoseOptions& options)
+      : session_(&session), options_(options) {}
+
+  const Session* session_;
+  PoseOptions options_;
+  std::vector<ProxyImage> images_;
+  ColmapProject project_;
+  DatabaseCounts counts_;
+  std::set<ViewPair> matched_;
+};
+
+PoseOptions at_full_settings(PoseOptions options) {
+  options.max_image_side_px = std::max(options.max_image_side_px, full_image_side_px);
+  options.max_features = std::max(options.max_features, full_features);
+  return options;
+}
+
+class VisibleLadder {
+ public:
+  VisibleLadder(const Session& session, const std::vector<const FrameRecord*>& frames,
+                const PoseOptions& options, const fs::path& workdir, const Progress& progress,
+                std::vector<LadderStep>& steps)
+      : session_(session), frames_(frames), options_(options), workdir_(workdir),
+        progress_(progress), steps_(steps), total_(static_cast<int>(frames.size())) {}
+
+  Result<ModalityPoses> climb() {
+    const std::vector<ViewPair> orbit = orbit_pairs(frames_);
+    const bool all_are_few = orbit.size() == exhaustive_pairs(total_).size();
+    tell(0, "features");
+    Result<FeatureLevel> quick =
+        FeatureLevel::extract(session_, frames_, options_, workdir_ / "quick", progress_);
+    if (!quick && quick.error().kind != ErrorKind::quality) return tl::unexpected(quick.error());
+    if (!quick) return without_features(quick.error());
+    ORBITFUSE_TRY(look_at_features(*quick));
+    tell(1, "matches of the orbit's pairs");
+    ORBITFUSE_TRY(quick->match(orbit, progress_));
+    ORBITFUSE_TRY(try_mapper(*quick, "COLMAP, orbit pairs"));
+    if (complete()) return answer(quick->pairs());
+    if (best_) ORBITFUSE_TRY(try_resection(*quick, "resection on the quick model"));
+    if (!complete() && !all_are_few) ORBITFUSE_TRY(try_more_pairs(*quick));
+    if (!complete() && limited_) ORBITFUSE_TRY(try_full_settings());
+    return answer(quick->pairs());
+  }
+
+ private:
+  void tell(double done, const std::string& what) const {
+    progress_.report({"poses.visible", done, 4, -1, what});
+  }
+
+  Result<ModalityPoses> without_features(const Error& error) {
+    steps_.push_back({"COLMAP, orbit pairs", false, error.found, 0, total_, 0});
+    return none_held(steps_, Modality::visible);
+  }
+
+  /// Frames in which nothing can be matched can't be posed: no step is taken for them. Where neither
+  /// size nor number of features was limited, full settings would find the same ones again.
+  Status look_at_features(const FeatureLevel& level) {
+    ORBITFUSE_ASSIGN(const FeatureGraph graph, level.graph());
+    limited_ = graph.pixel_scale > 1;
+    for (int f = 0; f < graph.count(); ++f) {
+      const Eigen::Index features = graph.pixels[static_cast<std::size_t>(f)].cols();
+      limited_ = limited_ || features >= options_.max_features;
+      if (features < ResectionOptions{}.min_inliers)
+        featureless_.insert(graph.frames[static_cast<std::size_t>(f)]->file);
+    }
+    return {};
+  }
+
+  bool complete() const {
+    return best_ && best_->poses.reconstruction.views.size() + featureless_.size() >= frames_.size();
+  }
+  std::set<std::string> posed() const {
+    std::set<std::string> names;
+    if (best_)
+      for (const PosedView& view : best_->poses.reconstruction.views) names.insert(view.name);
+    return names;
+  }
+  std::vector<int> missing() const {
+    const std::set<std::string> names = posed();
+    std::vector<int> result;
+    for (int f = 0; f < total_; ++f) {
+      const std::string& file = frames_[static_cast<std::size_t>(f)]->file;
+      if (!names.contains(file) && !featureless_.contains(file)) result.push_back(f);
+    }
+    return result;
+  }
+
+  /// Judges a model and keeps it where it is believed and poses more views (or as many, at a lower
+  /// error) than the best one.
+  void consider(const std::string& rung, const std::string& found, Reconstruction model,
+                const PoseOptions& options) {
+    LadderStep step{rung, false, found, 0, total_, 0};
+    if (model.views.size() < 2) {
+      step.why += "; no model";
+    } else {
+      Result<JudgedModel> judged = judge_model(std::move(model), session_, frames_, options);
+      step.why += "; " + (judged ? judged->why : judged.error().found);
+      if (judged) step.posed = static_cast<int>(judged->poses.reconstruction.views.size());
+      if (judged && judged->believed && better(*judged)) {
+        best_ = std::move(*judged);
+        best_step_ = steps_.size();
+      } else if (judged && judged->believed) {
+        step.why += "; no more views than before";
+      }
+    }
+    step.seconds = std::chrono::duration<double>(Clock::now() - since_).count();
+    since_ = Clock::now();
+    steps_.push_back(std::move(step));
+  }
+
+  bool better(const JudgedModel& judged) const {
+    if (!best_) return true;
+    const std::size_t views = judged.poses.reconstruction.views.size(),
+                      best = best_->poses.reconstruction.views.size();
+    return views > best;
+  }
+
+  /// The mapper's default settings, then ever more relaxed ones until a model is believed.
+  Status try_mapper(FeatureLevel& level, const std::string& name) {
+    for (const MapperSettings& settings : mapper_ladder()) {
+      tell(2, name + ", " + settings.name);
+      ORBITFUSE_ASSIGN(Reconstruction model, level.map(settings, progress_));
+      consider(name + ", " + settings.name, level.found(), std::move(model), level.options());
+      ORBITFUSE_TRY(progress_.check("poses.visible"));
+      if (best_) return {};
+    }
+    return try_global(level, name);
+  }
+
+  Status try_global(const FeatureLevel& level, const std::string& name) {
+    const std::string rung = "global mapper, " + name.substr(name.find(", ") + 2);
+    tell(2, rung);
+    ORBITFUSE_ASSIGN(FeatureGraph graph, level.graph());
+    const Adjuster adjust = [&](Reconstruction model) -> Result<Reconstruction> {
+      ORBITFUSE_ASSIGN(JudgedModel judged,
+                       judge_model(std::move(model), session_, frames_, level.options()));
+      return std::move(judged.poses.reconstruction);
+    };
+    ORBITFUSE_ASSIGN(GlobalModel global, map_globally(graph, adjust, {}, progress_));
+    consider(rung, global.found, std::move(global.model), level.options());
+    return {};
+  }
+
+  /// The views left out, on the points of the best model.
+  Status try_resection(const FeatureLevel& level, const std::string& rung) {
+    tell(3, rung);
+    ORBITFUSE_ASSIGN(FeatureGraph graph, level.graph());
+    PosedFrames posed = posed_frames(graph, best_->poses.reconstruction);
+    // The model knows better than two-view geometry which matches hold.
+    for (auto& [pair, matches] : confirmed_matches(graph, posed, 3 * graph.pixel_scale))
+      if (matches.size() > graph.verified[pair].size()) graph.verified[pair] = matches;
+    ORBITFUSE_ASSIGN(const std::vector<int> added, resect(graph, posed, {}, progress_));
+    const std::string found = fmt::format("{} of {} views found a place", added.size(),
+                                          missing().size());
+    Reconstruction model;
+    if (!added.empty()) {
+      TrackOptions track;
+      track.max_error_px *= graph.pixel_scale;
+      model = reconstruction_of(graph, posed, triangulate_tracks(graph, graph.verified, posed, track),
+                                Modality::visible);
+    }
+    consider(rung, found, std::move(model), level.options());
+    return {};
+  }
+
+  /// Pairs of the views left out, and of those next to them in the recording; all of them while there
+  /// is no model.
+  std::vector<ViewPair> remaining_pairs() const {
+    if (!best_) return exhaustive_pairs(total_);
+    std::set<int> wanted;
+    for (const int f : missing())
+      for (const int near : {f - 1, f, f + 1}) wanted.insert((near + total_) % total_);
+    std::vector<ViewPair> pairs;
+    for (const ViewPair& pair : exhaustive_pairs(total_))
+      if (wanted.contains(pair.first) || wanted.contains(pair.second)) pairs.push_back(pair);
+    return pairs;
+  }
+
+  Status try_more_pairs(FeatureLevel& level) {
+    tell(1, "matches of the remaining pairs");
+    ORBITFUSE_TRY(level.match(remaining_pairs(), progress_));
+    return map_and_resect(level, "COLMAP, remaining pairs");
+  }
+
+  Status map_and_resect(FeatureLevel& level, const std::string& name) {
+    if (!best_) {
+      ORBITFUSE_TRY(try_mapper(level, name));
+    } else {
+      tell(2, name);
+      ORBITFUSE_ASSIGN(Reconstruction model, level.map({}, progress_));
+      consider(name, level.found(), std::move(model), level.options());
+    }
+    if (best_ && !complete()) ORBITFUSE_TRY(try_resection(level, "resection, " + name));
+    return {};
+  }
+
+  /// As COLMAP would do by default, but for pairs of views that are posed already.
+  Status try_full_settings() {
+    if (!best_ && total_ > max_exhaustive_views) return {};
+    tell(0, "features at full settings");
+    ORBITFUSE_ASSIGN(FeatureLevel full,
+                     FeatureLevel::extract(session_, frames_, at_full_settings(options_),
+                                           workdir_ / "full", progress_));
+    std::vector<ViewPair> pairs = remaining_pairs();
+    const std::vector<ViewPair> orbit = orbit_pairs(frames_);
+    pairs.insert(pairs.end(), orbit.begin(), orbit.end());
+    tell(1, "matches at full settings");
+    ORBITFUSE_TRY(full.match(pairs, progress_));
+    return map_and_resect(full, "COLMAP, full settings");
+  }
+
+  Result<ModalityPoses> answer(int pairs) {
+    if (!best_) {
+      auto error = none_held(steps_, Modality::visible);
+      for (const std::string& file : featureless_)
+        error.value().found += fmt::format("; {} {}", file, featureless_why);
+      return error;
+    }
+    steps_[best_step_].held = true;
+    ModalityPoses& poses = best_->poses;
+    for (DroppedView& view : poses.dropped)
+      if (featureless_.contains(view.name))
+        view.why = fmt::format("it {}", featureless_why);
+    const auto all = static_cast<int>(exhaustive_pairs(total_).size());
+    if (pairs < all)
+      poses.skips.push_back({"exhaustive matching", fmt::format("{} of {} pairs held", pairs, all),
+                             fmt::format("{:.1f}x fewer pairs to match",
+                                         static_cast<double>(all) / std::max(pairs, 1))});
+    return std::move(poses);
+  }
+
+  const Session& session_;
+  const std::vector<const FrameRecord*>& frames_;
+  const PoseOptions& options_;
+  const fs::path workdir_;
+  const Progress& progress_;
+  std::vector<LadderStep>& steps_;
+  const int total_;
+  std::set<std::string> featureless_;
+  bool limited_ = false;
+  std::optional<JudgedModel> best_;
+  std::size_t best_step_ = 0;
+  Clock::time_point since_ = Clock::now();
+};
+
+}  // namespace
+
+Result<ModalityPoses> pose_visible_views(const Session& session,
+                                         const std::vector<const FrameRecord*>& frames,
+                                         const PoseOptions& options, const fs::path& workdir,
+                                         const Progress& progress,
+                                         std::vector<LadderStep>& steps) {
+  return VisibleLadder(session, frames, options, workdir, progress, steps).climb();
+}
+
+}  // namespace orbitfuse

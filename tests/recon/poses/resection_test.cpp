@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/sfm/resection.hpp"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+
+#include "tests/recon/poses/feature_scene.hpp"
+
+namespace orbitfuse {
+namespace {
+
+using testing_orbit::FeatureScene;
+using testing_orbit::FeatureSceneMaker;
+
+/// Descriptors of the points (pillars alike), noise added; all matches between neighbours right.
+FeatureScene described_scene() {
+  testing_orbit::FeatureSceneOptions options;
+  options.wrong_pillar = options.false_matches = 0;
+  FeatureScene scene = FeatureSceneMaker(options).make();
+  std::mt19937 rng(3);
+  std::normal_distribution<float> normal(0, 1);
+  const auto random_row = [&] {
+    Eigen::RowVectorXf row(128);
+    for (Eigen::Index c = 0; c < 128; ++c) row(c) = std::abs(normal(rng));
+    return Eigen::RowVectorXf(row.normalized());
+  };
+  std::map<int, Eigen::RowVectorXf> of_point;
+  for (std::size_t v = 0; v < scene.point_of.size(); ++v) {
+    Descriptors& rows = scene.graph.descriptors[v];
+    rows.resize(static_cast<Eigen::Index>(scene.point_of[v].size()), 128);
+    for (std::size_t i = 0; i < scene.point_of[v].size(); ++i) {
+      const int point = scene.point_of[v][i];
+      const int look = point < options.machine_points
+                           ? point
+                           : options.machine_points + (point - options.machine_points) % options.pillar_points;
+      if (!of_point.contains(look)) of_point[look] = random_row();
+      const Eigen::RowVectorXf noisy = of_point[look] + 0.2f * random_row();
+      rows.row(static_cast<Eigen::Index>(i)) = (512 * noisy.normalized()).array().round();
+    }
+  }
+  scene.graph.verified = scene.graph.proposed;
+  return scene;
+}
+
+PosedFrames posed_but(const FeatureScene& scene, const std::vector<int>& left_out) {
+  PosedFrames posed{FramePoses(scene.truth.size()), scene.graph.cameras};
+  for (std::size_t v = 0; v < scene.truth.size(); ++v) posed.poses[v] = scene.truth[v].cam_from_world;
+  for (const int v : left_out) posed.poses[static_cast<std::size_t>(v)].reset();
+  return posed;
+}
+
+TEST(Resection, ViewsLeftOutFindTheirPlace) {
+  FeatureScene scene = described_scene();
+  PosedFrames posed = posed_but(scene, {3, 4, 17});
+  const auto added = resect(scene.graph, posed, {}, {});
+  ASSERT_TRUE(added) << added.error().message();
+  EXPECT_EQ(added->size(), 3u);
+  for (const std::size_t v : {3u, 4u, 17u}) {
+    ASSERT_TRUE(posed.poses[v]) << v;
+    EXPECT_LT((camera_center(*posed.poses[v]) - camera_center(scene.truth[v].cam_from_world)).norm(),
+              0.04)
+        << v;
+    EXPECT_LT(posed.poses[v]->rotation.angularDistance(scene.truth[v].cam_from_world.rotation), 0.01)
+        << v;
+  }
+  EXPECT_TRUE(scene.graph.verified.contains({3, 4})) << "its guided matches hold it in the adjustment";
+}
+
+TEST(Resection, AViewOfSomethingElseOrOfNothingGetsNoPose) {
+  FeatureScene scene = described_scene();
+  std::mt19937 rng(5);
+  std::uniform_real_distribution<double> pixel(0, 480);
+  for (Eigen::Index i = 0; i < scene.graph.pixels[7].cols(); ++i)
+    scene.graph.pixels[7].col(i) = Eigen::Vector2d(pixel(rng), pixel(rng));
+  scene.graph.pixels[9].resize(2, 0);
+  scene.graph.descriptors[9].resize(0, 128);
+  for (auto* list : {&scene.graph.proposed, &scene.graph.verified})
+    std::erase_if(*list, [](const auto& entry) {
+      return entry.first.first == 9 || entry.first.second == 9;
+    });
+  PosedFrames posed = posed_but(scene, {7, 9});
+  const auto added = resect(scene.graph, posed, {}, {});
+  ASSERT_TRUE(added) << added.error().message();
+  EXPECT_TRUE(added->empty());
+}
+
+TEST(Tracks, AreTriangulatedWhereTheTruthIs) {
+  const FeatureScene scene = described_scene();
+  const auto tracks =
+      triangulate_tracks(scene.graph, scene.graph.verified, posed_but(scene, {}), {});
+  ASSERT_GT(tracks.size(), 200u);
+  int longer = 0;
+  for (const FeatureTrack& track : tracks) {
+    longer += track.features.size() >= 3 ? 1 : 0;
+    std::set<int> points;
+    for (const auto& [f, i] : track.features)
+      points.insert(scene.point_of[static_cast<std::size_t>(f)][static_cast<std::size_t>(i)]);
+    EXPECT_EQ(points.size(), 1u);
+  }
+  EXPECT_GT(longer, 100);
+}
+
+}  // namespace
+}  // namespace orbitfuse
