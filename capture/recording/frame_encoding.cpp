@@ -29,22 +29,31 @@ Status check_type(const cv::Mat& image, const Frame& frame, Modality modality, c
 
 }  // namespace
 
+Result<cv::Mat> upright_pixels(const Frame& frame, Modality modality, const std::string& where) {
+  if (frame.encoded.empty()) {
+    if (frame.pixels.empty())
+      return fail(ErrorKind::input, where, "an empty frame", "check the driver");
+    ORBITFUSE_TRY(check_type(frame.pixels, frame, modality, where));
+    return frame.pixels;
+  }
+  ORBITFUSE_ASSIGN(const cv::Mat image, decode_image(frame.encoded, where));
+  ORBITFUSE_TRY(check_type(image, frame, modality, where));
+  return apply_orientation(
+      image, modality == Modality::visible ? read_exif(frame.encoded).orientation : 1);
+}
+
 Result<EncodedFrame> encode_frame(const Frame& frame, Modality modality, const std::string& where) {
   EncodedFrame out;
   out.has_temperature = modality == Modality::thermal && !frame.thermal_is_gray;
+  ORBITFUSE_ASSIGN(out.pixels, upright_pixels(frame, modality, where));
   if (!frame.encoded.empty()) {
-    ORBITFUSE_ASSIGN(const cv::Mat image, decode_image(frame.encoded, where));
-    ORBITFUSE_TRY(check_type(image, frame, modality, where));
-    out.pixels = apply_orientation(image, modality == Modality::visible ? read_exif(frame.encoded).orientation : 1);
     out.bytes = frame.encoded;
     out.extension = frame.extension;
     return out;
   }
-  if (frame.pixels.empty()) return fail(ErrorKind::input, where, "an empty frame", "check the driver");
-  ORBITFUSE_TRY(check_type(frame.pixels, frame, modality, where));
-  out.pixels = frame.pixels;
   out.extension = out.has_temperature ? ".tiff" : ".png";
-  ORBITFUSE_ASSIGN(out.bytes, out.has_temperature ? encode_thermal_tiff(frame.pixels) : encode_png(frame.pixels));
+  ORBITFUSE_ASSIGN(out.bytes, out.has_temperature ? encode_thermal_tiff(frame.pixels)
+                                                  : encode_png(frame.pixels));
   return out;
 }
 
