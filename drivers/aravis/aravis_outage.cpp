@@ -129,10 +129,12 @@ void AravisSource::drain(std::vector<Delivery>& list) {
 
 std::vector<Delivery> AravisSource::unfinished() {
   std::vector<Delivery> list = std::exchange(pending_, {});
-  const bool silent = state_ != State::streaming || Clock::now() - last_frame_ > options_.silence;
+  const Clock::time_point end = Clock::now(), last_before = last_frame_;
   if (link_) drain(list);
+  const bool came = last_frame_ != last_before;  // what was under way says that the stream lived
+  const bool silent = state_ != State::streaming || (!came && end - last_frame_ > options_.silence);
   if (!silent || !rhythm_.known() || last_came_ == Clock::time_point{}) return list;
-  const double outage_s = seconds(Clock::now() - last_came_);
+  const double outage_s = seconds(end - last_came_);
   Delivery lost;
   lost.kind = Delivery::Kind::lost;
   lost.frame.id = next_id_ + rhythm_.frames_in(outage_s) - 1;
