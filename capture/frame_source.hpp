@@ -35,6 +35,8 @@ struct Frame {
   std::optional<Rigid3d> cam_from_world;
   std::optional<Camera> camera;
   std::string source;               ///< original file name, if there was one
+
+  void flag(FrameFlag with) { flags.emplace_back(name(with)); }
 };
 
 /// What next() brought.
@@ -42,15 +44,26 @@ struct Delivery {
   enum class Kind {
     frame,     ///< a good frame
     rejected,  ///< the frame with this id arrived damaged; `reason` says how
-    event,     ///< `reason` is the event's kind ("nuc", "reconnected"), `detail` its text
+    lost,      ///< no frame came up to the one with this id, itself included; `reason` says why
+    event,     ///< `event` is its kind, `detail` its text
     timeout,   ///< nothing within the time given; the stream goes on
     end,       ///< the stream is over (replay, synthetic)
   };
   Kind kind = Kind::timeout;
-  Frame frame;          ///< kind frame; of a rejected one only the id
-  std::string reason;
+  Frame frame;          ///< kind frame; of rejected and lost ones only the id
+  EventKind event{};    ///< kind event
+  std::string reason;   ///< of an event its name
   std::string detail;
 };
+
+inline Delivery event_delivery(EventKind kind, std::string detail) {
+  Delivery delivery;
+  delivery.kind = Delivery::Kind::event;
+  delivery.event = kind;
+  delivery.reason = name(kind);
+  delivery.detail = std::move(detail);
+  return delivery;
+}
 
 /// One camera. start, next and stop are called from one thread, describe from any thread after
 /// the constructor; stop is idempotent and is called even when start failed.
@@ -73,14 +86,18 @@ class FrameSource {
                       std::uint64_t /*next_id*/) {
     return false;
   }
-  /// Asks for a shutter correction (NUC) as soon as can be; from any thread. Events of the stream
-  /// tell what came of it ("nuc", "nuc-failed"). Nothing for cameras that have none.
-  virtual void request_correction() {}
+  /// Asks for a shutter correction (NUC) as soon as can be; from any thread, after start(). Events
+  /// of the stream (nuc, nuc_failed) tell what came of it. Unavailable error where none is known.
+  virtual Status request_correction() {
+    return fail(ErrorKind::unavailable, describe().id, "has no shutter correction (NUC)",
+                "only GigE Vision cameras whose profile has a nuc_command have one");
+  }
   /// What the transport counted, for people, e.g. "1800 completed, 12 resent"; empty: nothing is
   /// counted. From the thread of next(), before stop().
   virtual std::string transport_report() const { return {}; }
   /// What is to be told when the recording ends before the source does: files that were still
-  /// waited for. Events and rejections; from the thread of next(), before stop().
+  /// waited for, frames under way, and what an outage that lasts to the end cost. From the thread
+  /// of next(), before stop().
   virtual std::vector<Delivery> unfinished() { return {}; }
   /// Whether nothing is lost when the recorder takes its time (files): then it never drops.
   virtual bool can_wait() const { return false; }

@@ -79,6 +79,16 @@ Result<json> earlier_run(const std::string& folder) {
 
 }  // namespace
 
+namespace {
+
+/// Whether a call that ended like this is gone on with. What made one fail must not make the next
+/// one fail too, which doesn't name it.
+bool keeps_options(ErrorKind kind) {
+  return kind == ErrorKind::cancelled || kind == ErrorKind::quality;
+}
+
+}  // namespace
+
 Result<std::optional<std::uint64_t>> read_earlier_options(const std::string& folder, config::Settings& settings) {
   ORBITFUSE_ASSIGN(const json run, earlier_run(folder));
   if (run.is_null()) return std::nullopt;
@@ -159,12 +169,22 @@ Status run_stages(Context& context, const StageFolders& given, const std::vector
   for (const StageStatus& status : summary.stages) list.push_back(status_json(status));
   context.result = {{"session", folders.session}, {"out", folders.out}, {"stages", list}};
   if (!context.common.dry_run && !summary.stages.empty()) {
-    const json run = {{"schema", 1},
-                      {"session", session},
-                      {"orbitfuse", pipeline::software_version()},
-                      {"config", context.config.settings().to_json()},
-                      {"seed", context.config.seed},
-                      {"stages", list}};
+    json run = {{"schema", 1},
+                {"session", session},
+                {"orbitfuse", pipeline::software_version()},
+                {"config", context.config.settings().to_json()},
+                {"seed", context.config.seed},
+                {"stages", list}};
+    if (summary.error && !keeps_options(summary.error->kind)) {
+      const json before = earlier_run(folders.out).value_or(json());
+      const bool known = before.is_object() && before.value("session", "") == session;
+      for (const char* key : {"config", "seed"}) {
+        if (known && before.contains(key))
+          run[key] = before[key];
+        else
+          run.erase(key);
+      }
+    }
     const Status written = write_file_atomic(fs::path(folders.out) / run_file, run.dump(2) + "\n");
     if (!written && !summary.error) return written;
   }

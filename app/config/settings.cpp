@@ -156,7 +156,7 @@ json Settings::to_json(const std::string& prefix) const {
 std::string Settings::to_toml() const {
   std::vector<std::pair<std::string, std::string>> tables;  // TOML wants each table once
   for (const Setting& s : list_) {
-    if (!s.listed) continue;
+    if (s.listed && !s.listed()) continue;
     const std::size_t dot = s.key.rfind('.');
     const std::string table = dot == std::string::npos ? "" : s.key.substr(0, dot);
     auto it = std::find_if(tables.begin(), tables.end(),

@@ -22,7 +22,8 @@ struct Setting {
   std::string type; ///< "integer", "number", "true or false", "text", or the allowed words
   std::function<nlohmann::json()> get;
   std::function<bool(const nlohmann::json&)> set;  ///< false: not of the type
-  bool listed = true;  ///< in the TOML reference; a preset's fields are not
+  /// Whether to_toml() has it; absent: always. A preset's fields are there where they differ from it.
+  std::function<bool()> listed = {};
 };
 
 /// The configuration as a list of keys: read from TOML, overridden by --set, written into every
@@ -33,7 +34,7 @@ class Settings {
   void add(std::string key, T& field, std::string doc) {
     list_.push_back({std::move(key), std::move(doc), type_name<T>(),
                      [&field] { return value_of(field); },
-                     [&field](const nlohmann::json& j) { return assign(field, j); }, true});
+                     [&field](const nlohmann::json& j) { return assign(field, j); }});
   }
   /// An enum, written as one of `words` (value, word).
   template <class E>
@@ -109,7 +110,7 @@ void Settings::add_choice(std::string key, E& field, std::vector<std::pair<E, st
                          return true;
                        }
                      return false;
-                   }, true});
+                   }});
 }
 
 /// JSON, and so every record of a run, holds nothing else.

@@ -40,7 +40,9 @@ std::vector<Delivery> PreparedSource::unfinished() {
 }
 
 void PreparedSource::renumber(Delivery& delivery) {
-  if (delivery.kind != Delivery::Kind::frame && delivery.kind != Delivery::Kind::rejected) return;
+  if (delivery.kind != Delivery::Kind::frame && delivery.kind != Delivery::Kind::rejected &&
+      delivery.kind != Delivery::Kind::lost)
+    return;
   std::uint64_t& id = delivery.frame.id;
   // Without an earlier recording ids stay the device's own.
   if (first_id_ > 0) {
@@ -71,11 +73,9 @@ void PreparedSource::drop_before(std::int64_t all_run_ns) {
   }
   for (Result<Delivery>& delivery : undecided) waiting_.push_back(std::move(delivery));
   if (dropped == 0) return;
-  Delivery event;
-  event.kind = Delivery::Kind::event;
-  event.reason = "stale";
-  event.detail = fmt::format("{} frames from before all cameras ran were left out", dropped);
-  waiting_.push_front(std::move(event));
+  waiting_.push_front(event_delivery(
+      EventKind::stale,
+      fmt::format("{} frames from before all cameras ran were left out", dropped)));
 }
 
 void PreparedSource::stop() {

@@ -22,7 +22,7 @@ class PreparedSource final : public FrameSource {
   Result<Delivery> next(std::chrono::milliseconds timeout) override;
   void stop() override;
   bool can_wait() const override { return source_->can_wait(); }
-  void request_correction() override { source_->request_correction(); }
+  Status request_correction() override { return source_->request_correction(); }
   std::string transport_report() const override { return source_->transport_report(); }
   std::vector<Delivery> unfinished() override;
   bool resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames,

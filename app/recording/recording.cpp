@@ -8,6 +8,7 @@
 #include <set>
 #include <thread>
 
+#include "capture/recording/frame_encoding.hpp"
 #include "core/system/utc_now.hpp"
 
 namespace orbitfuse::recording {
@@ -120,7 +121,7 @@ Status Recording::prepare() {
     ORBITFUSE_ASSIGN(writer_, SessionWriter::create(options_.session, options_.notes));
   }
   for (const auto& source : sources_) {
-    if (sources_.size() > 1 && !source->can_wait()) source->drop_before(all_run_ns);
+    if ((sources_.size() > 1 || shown_) && !source->can_wait()) source->drop_before(all_run_ns);
   }
   const std::lock_guard lock(mutex_);
   if (options_.guide) {
@@ -132,7 +133,43 @@ Status Recording::prepare() {
   recorder_options.next_ids = next_ids_;
   if (!options_.live) recorder_options.backpressure = Backpressure::wait;
   recorder_ = std::make_unique<Recorder>(*writer_, recorder_options);
-  if (guide_) recorder_->on_frame = [this](const FrameRecord& frame) { guide_->add(frame); };
+  recorder_->on_frame = [this](const FrameRecord& frame, const cv::Mat& pixels) {
+    keep_latest({frame.modality, pixels, frame.file});
+    if (guide_) guide_->add(frame, pixels);
+  };
+  return {};
+}
+
+void Recording::keep_latest(LatestFrame frame) {
+  const std::lock_guard lock(latest_mutex_);
+  latest_[frame.modality] = std::move(frame);
+}
+
+/// Pictures of one camera until it is over; a failure shows when the recording begins.
+void Recording::show(FrameSource& source, const std::atomic<bool>& over) {
+  const Modality modality = source.describe().modality;
+  while (!over) {
+    const Result<Delivery> delivery = source.next(std::chrono::milliseconds(100));
+    if (!delivery || delivery->kind == Delivery::Kind::end) return;
+    if (delivery->kind != Delivery::Kind::frame) continue;
+    const auto pixels = upright_pixels(delivery->frame, modality, "preview");
+    if (pixels) keep_latest({modality, *pixels, fmt::format("before recording {}", delivery->frame.id)});
+  }
+}
+
+Status Recording::show_until(const std::function<bool()>& over) {
+  for (const auto& source : sources_) ORBITFUSE_TRY(source->start());
+  shown_ = showing_ = true;
+  std::atomic<bool> stop{false};
+  {
+    std::vector<std::jthread> threads;
+    for (const auto& source : sources_) {
+      if (!source->can_wait()) threads.emplace_back([&, s = source.get()] { show(*s, stop); });
+    }
+    while (!over()) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    stop = true;
+  }
+  showing_ = false;
   return {};
 }
 
@@ -204,6 +241,7 @@ LiveState Recording::state() const {
   LiveState state;
   state.session = options_.session.string();
   state.running = running_;
+  state.waits_for_start = showing_;
   if (started_ != Clock::time_point{}) {
     state.elapsed_s =
         std::chrono::duration<double>((running_ ? Clock::now() : ended_) - started_).count();
@@ -223,24 +261,47 @@ LiveState Recording::state() const {
   return state;
 }
 
-std::filesystem::path Recording::latest(Modality modality) const {
-  const FrameRecord* newest = nullptr;
-  const std::vector<StreamStatus> streams = status();
-  for (const StreamStatus& s : streams) {
-    if (s.latest && s.latest->modality == modality &&
-        (!newest || s.latest->host_time_ns >= newest->host_time_ns))
-      newest = &*s.latest;
-  }
-  return newest ? options_.session / newest->file : std::filesystem::path();
+std::optional<LatestFrame> Recording::latest(Modality modality) const {
+  const std::lock_guard lock(latest_mutex_);
+  const auto found = latest_.find(modality);
+  return found == latest_.end() ? std::nullopt : std::optional(found->second);
 }
 
-void Recording::operator_at_station() {
+namespace {
+
+tl::unexpected<Error> not_recording(const char* asked) {
+  return fail(ErrorKind::usage, asked, "nothing is being recorded", "press Start first");
+}
+
+}  // namespace
+
+Result<std::string> Recording::request_stop() {
+  const bool again = stop_.exchange(true);
+  return again ? "stopping already" : running_ ? "stopping; what is recorded is safe" : "stopping";
+}
+
+Result<std::string> Recording::operator_at_station() {
   const std::lock_guard lock(mutex_);
-  if (guide_) guide_->operator_at_station();
+  if (!running_) return not_recording("at the station");
+  if (!guide_)
+    return fail(ErrorKind::usage, "at the station", "this recording has no guide",
+                "record without --guide off");
+  return guide_->operator_at_station();
 }
 
-void Recording::request_correction() {
-  for (const auto& source : sources_) source->request_correction();
+Result<std::string> Recording::request_correction() {
+  if (!running_) return not_recording("shutter correction (NUC)");
+  std::string asked;
+  std::optional<Error> refused;
+  for (const auto& source : sources_) {
+    const Status status = source->request_correction();
+    // A thermal camera's reason says more than that a visible one has none.
+    const bool thermal = source->describe().modality == Modality::thermal;
+    if (!status && (!refused || thermal)) refused = status.error();
+    if (status) asked += (asked.empty() ? "" : ", ") + source->describe().id;
+  }
+  if (asked.empty() && refused) return tl::unexpected(*refused);
+  return "shutter correction (NUC) asked of " + asked;
 }
 
 std::vector<StreamStatus> Recording::status() const {

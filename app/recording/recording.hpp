@@ -14,6 +14,7 @@
 #include "app/recording/prepared_source.hpp"
 #include "capture/live/live_guide.hpp"
 #include "capture/live/live_state.hpp"
+#include "capture/recording/latest_frame.hpp"
 #include "capture/recording/recorder.hpp"
 
 namespace orbitfuse::recording {
@@ -46,22 +47,27 @@ class Recording {
             PositionFinder finder = {});
   ~Recording();
 
+  /// Starts the cameras and shows what those that don't wait see (latest()) until `over` says so.
+  /// Nothing is recorded; for an operator who aims first. May be left out.
+  Status show_until(const std::function<bool()>& over);
   /// Starts the cameras, then makes or reopens the session. Nothing is left behind on failure.
   Status prepare();
   /// Records until the sources end, the time is over, the guide is complete, request_stop() or
   /// `cancel`; then closes the session. On an error the accounting is in the manifest and the
   /// session stays incomplete. `tick` is called a few times a second.
   Result<Ending> run(const std::atomic<bool>* cancel, const std::function<void()>& tick = {});
-  void request_stop() { stop_ = true; }
+  Result<std::string> request_stop();
+  bool stop_requested() const { return stop_; }
 
   std::vector<StreamStatus> status() const;
   /// Everything the page and the terminal show; also before prepare() and after run().
   LiveState state() const;
-  /// The newest recorded image of a modality; empty: none yet.
-  std::filesystem::path latest(Modality modality) const;
-  void operator_at_station();
+  /// The newest image of a modality; nothing: none yet.
+  std::optional<LatestFrame> latest(Modality modality) const;
+  /// What the operator asks for; in words what comes of it, or an error that says why nothing does.
+  Result<std::string> operator_at_station();
   /// A shutter correction (NUC) of every camera that has one, now rather than at a station.
-  void request_correction();
+  Result<std::string> request_correction();
   LiveGuide* guide() { return guide_.get(); }
   const std::vector<DeviceInfo>& devices() const { return devices_; }
   const std::filesystem::path& folder() const { return options_.session; }
@@ -72,6 +78,8 @@ class Recording {
     double hz = 0;
   };
   Status fit_into(const std::optional<Session>& earlier);
+  void show(FrameSource& source, const std::atomic<bool>& over);
+  void keep_latest(LatestFrame frame);
   void measure_rates();
 
   RecordingOptions options_;
@@ -82,7 +90,10 @@ class Recording {
   std::unique_ptr<SessionWriter> writer_;
   std::unique_ptr<LiveGuide> guide_;
   std::unique_ptr<Recorder> recorder_;
-  std::atomic<bool> stop_{false}, running_{false};
+  std::atomic<bool> stop_{false}, running_{false}, showing_{false};
+  bool shown_ = false;
+  mutable std::mutex latest_mutex_;
+  std::map<Modality, LatestFrame> latest_;
   mutable std::mutex mutex_;  ///< guards what the page's threads see of a recording
   std::chrono::steady_clock::time_point started_{}, ended_{}, rates_measured_{};
   std::map<std::string, Rate> rates_;

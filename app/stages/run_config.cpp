@@ -21,7 +21,11 @@ void add_train_fields(Settings& settings, const std::string& table, nerf::TrainO
     Setting setting;
     setting.key = table + "." + key;
     setting.type = nerf::TrainOptions::allowed(key);
-    setting.listed = false;
+    setting.doc = "Of the recipe, which has another value";
+    setting.listed = [&options, key] {
+      const auto recipe = nerf::preset(options.preset);
+      return !recipe || recipe->get(key) != options.get(key);
+    };
     setting.get = [&options, key] {
       const std::string text = options.get(key);
       const json value = json::parse(text, nullptr, false);
@@ -44,8 +48,7 @@ void add_train(Settings& settings, const std::string& table, TrainConfig& config
                   auto options = nerf::preset(value.get<std::string>());
                   if (options) config.options = *std::move(options);
                   return options.has_value();
-                },
-                true});
+                }});
   settings.add(table + ".max_width_px", config.max_width_px,
                "Training images are reduced to this width");
   settings.add(table + ".cloud_width_px", config.cloud.max_width,

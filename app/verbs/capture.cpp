@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
-#include <thread>
-
 #include "app/recording/rehearsal.hpp"
 #include "app/verbs/capture_options.hpp"
 #include "app/verbs/capture_teller.hpp"
@@ -75,17 +73,30 @@ Status open_page(Context& context, const CaptureOptions& o, recording::Recording
   PageHooks hooks;
   hooks.state = [&recording] { return recording.state(); };
   hooks.latest = [&recording](Modality modality) { return recording.latest(modality); };
-  hooks.start = [&page] { page.started = true; };
-  hooks.stop = [&recording] { recording.request_stop(); };
-  hooks.at_station = [&recording] { recording.operator_at_station(); };
-  hooks.correct = [&recording] { recording.request_correction(); };
+  const auto button = [&context](auto action) {
+    return [&context, action]() -> Result<std::string> {
+      return tell_outcome(context.console, action());
+    };
+  };
+  hooks.start = button([&page, waits = o.wait_for_start]() -> Result<std::string> {
+    if (!waits || page.started.exchange(true))
+      return fail(ErrorKind::usage, "Start", "the recording has begun already", "go on with it");
+    return "recording begins";
+  });
+  hooks.stop = button([&recording] { return recording.request_stop(); });
+  hooks.at_station = button([&recording] { return recording.operator_at_station(); });
+  hooks.correct = button([&recording] { return recording.request_correction(); });
   page.server = std::make_unique<PageServer>(options, std::move(hooks));
   ORBITFUSE_TRY(page.server->start());
   for (const std::string& url : page.server->urls()) context.console.info("page: " + url);
   context.console.event({{"event", "page"}, {"url", page.server->url()}});
-  while (o.wait_for_start && !page.started && !context.progress.cancelled())
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  if (!context.progress.cancelled()) return {};
+  if (o.wait_for_start) {
+    context.console.info("waiting for Start on the page");
+    ORBITFUSE_TRY(recording.show_until([&] {
+      return page.started || recording.stop_requested() || context.progress.cancelled();
+    }));
+  }
+  if (!context.progress.cancelled() && !recording.stop_requested()) return {};
   return fail(ErrorKind::cancelled, "capture", "stopped before it began",
               "nothing was recorded; start it again");
 }
@@ -99,15 +110,16 @@ Status try_page(const CaptureOptions& o) {
   return PageServer(options, std::move(hooks)).start();
 }
 
+std::string absence(const StreamStatus& s) {
+  return s.away ? fmt::format("; away for the last {:.1f} s", s.away->seconds) : "";
+}
+
 void account(Context& context, recording::Recording& recording) {
   auto streams = json::array();
   for (const StreamStatus& s : recording.status()) {
-    context.console.data(
-        s.any() ? fmt::format(
-                      "{}: {} received, {} lost ({} missing, {} rejected, {} dropped) of ids {} to {}",
-                      s.device, s.received, s.lost, s.missing, s.rejected, s.dropped, s.first_id,
-                      s.last_id)
-                : s.device + ": no frame came");
+    context.console.data(s.any() ? fmt::format("{}: {} of ids {} to {}{}", s.device,
+                                               account_words(s), s.first_id, s.last_id, absence(s))
+                                 : s.device + ": no frame came" + absence(s));
     if (s.passed_over > 0) context.console.data(passed_over(s));
     streams.push_back(account_json(s));
   }
@@ -154,7 +166,8 @@ Status run(Context& context, const CaptureOptions& o) {
   for (const DeviceInfo& device : recording.devices())
     context.console.info(device.id + ": " + described(device));
   if (options.live)
-    context.console.info("recording; Enter: at the next station, n: shutter correction (NUC) now, q or Ctrl-C: stop");
+    context.console.info(fmt::format("recording; {}n: shutter correction (NUC) now, q or Ctrl-C: stop",
+                                     options.guide ? "Enter: at the next station, " : ""));
   Teller teller(context, recording, options.live, o.view);
   const auto ending = recording.run(context.progress.cancel, [&] { teller.tick(); });
   account(context, recording);

@@ -28,6 +28,7 @@ void Teller::tick() {
   if (view_) draw();
   for (const StreamStatus& s : recording_.status()) {
     tell_alarms(s);
+    tell_correction(s);
     tell_passed_over(s);
   }
   if (recording_.guide()) tell_guide();
@@ -37,11 +38,21 @@ void Teller::tell_alarms(const StreamStatus& s) {
   const auto say = [&](const char* what, bool now, const std::string& words) {
     say_changed(s.device + what, now ? s.device + ": " + words : "");
   };
-  say(" silent", s.silent, "no frames");
+  say(" silent", s.silent && !s.away, "no frames");
+  say(" away", s.away.has_value(), "disconnected" + (s.away ? " (" + s.away->why + ")" : "") + ", reopening");
   say(" notice", !s.notice.empty(), s.notice);
   say(" dropped", s.dropped > 0, "the disk is too slow, frames are dropped and counted");
+  say(" unwritten", s.unwritten > 0, "frames could not be written; is the disk full?");
   say(" missing", s.missing > 0, "frames are lost on the way and counted");
   say(" rejected", s.rejected > 0, "frames arrive damaged and are counted");
+}
+
+/// Also one that a camera makes by itself: frames are useless meanwhile.
+void Teller::tell_correction(const StreamStatus& s) {
+  std::uint64_t& told = corrections_told_[s.device];
+  if (s.corrections == told) return;
+  told = s.corrections;
+  context_.console.info(s.device + ": " + s.correction);
 }
 
 /// A card full of other files is told every few seconds, not file by file.
@@ -60,7 +71,8 @@ void Teller::tell_guide() {
   for (const LiveCamera& camera : recording_.guide()->cameras()) {
     const int done = recording_.guide()->done_count(camera.modality);
     const std::string words =
-        fmt::format("{} {}/{}: {}", name(camera.modality), done, total, camera.instruction);
+        fmt::format("{} {}/{}: {}", name(camera.modality), done, total,
+                    instruction_for(camera, Operator::at_terminal));
     std::string& last = said_[std::string(name(camera.modality))];
     if (words == last) continue;
     last = words;
@@ -72,7 +84,7 @@ void Teller::tell_guide() {
                             {"modality", name(camera.modality)},
                             {"done", done},
                             {"of", total},
-                            {"instruction", camera.instruction}});
+                            {"instruction", instruction_for(camera, Operator::at_terminal)}});
   }
 }
 
@@ -96,12 +108,18 @@ void Teller::listen() {
   if (!isatty(STDIN_FILENO) || poll(&input, 1, 0) <= 0) return;
   char keys[64];
   const ssize_t count = ::read(STDIN_FILENO, keys, sizeof keys);
-  if (count > 0 && keys[0] == 'q')
-    recording_.request_stop();
-  else if (count > 0 && keys[0] == 'n')
-    recording_.request_correction();
-  else if (count > 0 && recording_.guide())
-    recording_.operator_at_station();
+  if (count <= 0) return;
+  tell_outcome(context_.console, keys[0] == 'q'   ? recording_.request_stop()
+                                 : keys[0] == 'n' ? recording_.request_correction()
+                                                  : recording_.operator_at_station());
+}
+
+Result<std::string> tell_outcome(terminal::Console& console, Result<std::string> outcome) {
+  if (outcome)
+    console.info(*outcome);
+  else
+    console.warning(outcome.error().message());
+  return outcome;
 }
 
 }  // namespace orbitfuse::cli

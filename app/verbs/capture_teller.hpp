@@ -15,6 +15,9 @@ std::string described(const DeviceInfo& device);
 /// How many files of a camera were no frames, and the last of them; empty: none.
 std::string passed_over(const StreamStatus& stream);
 
+/// Says what came of a key or of a button on the page, and hands it on.
+Result<std::string> tell_outcome(terminal::Console& console, Result<std::string> outcome);
+
 /// Says each instruction and each alarm once, and listens to the operator's keys.
 class Teller {
  public:
@@ -27,6 +30,7 @@ class Teller {
  private:
   void draw();
   void tell_alarms(const StreamStatus& stream);
+  void tell_correction(const StreamStatus& stream);
   void tell_passed_over(const StreamStatus& stream);
   void tell_guide();
   void say_changed(const std::string& key, const std::string& words);
@@ -37,6 +41,7 @@ class Teller {
   bool live_, view_;
   std::chrono::steady_clock::time_point drawn_{};
   std::map<std::string, std::string> said_;
+  std::map<std::string, std::uint64_t> corrections_told_;
   std::map<std::string, std::chrono::steady_clock::time_point> said_at_;
 };
 

@@ -125,7 +125,7 @@ std::optional<std::uint64_t> GvspFrameCounter::unwrap(std::uint16_t frame_id) {
     return next_++;
   }
   // Distance on the circle 1..65535; the far half is the past.
-  const int step = (static_cast<int>(frame_id) - static_cast<int>(*last_) + 65535) % 65535;
+  const int step = steps(*last_, frame_id);
   if (step == 0 || step > 32767) return std::nullopt;
   last_ = frame_id;
   next_ += static_cast<std::uint64_t>(step);

@@ -60,6 +60,10 @@ class GvspFrameCounter {
  public:
   std::optional<std::uint64_t> unwrap(std::uint16_t frame_id);
   void restart() { last_.reset(); }  ///< after the stream was opened again
+  /// From one number forward to the other on the circle 1..65535; 0: the same.
+  static int steps(std::uint16_t from, std::uint16_t to) {
+    return (static_cast<int>(to) - static_cast<int>(from) + 65535) % 65535;
+  }
 
  private:
   std::optional<std::uint16_t> last_;

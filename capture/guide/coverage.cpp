@@ -18,8 +18,7 @@ std::string sideways(double degrees) {
 }
 
 std::string upwards(double degrees) {
-  const char* amount = std::abs(degrees) < 12 ? "a little " : "";
-  return fmt::format("{}{}", amount, degrees > 0 ? "higher" : "lower");
+  return fmt::format("{:.0f}° {}", std::abs(degrees), degrees > 0 ? "higher" : "lower");
 }
 
 }  // namespace
@@ -167,6 +166,12 @@ const Sector* Coverage::nearest_missing(Modality modality, const OrbitPosition& 
     }
   }
   return best;
+}
+
+const Sector* Coverage::target(Modality modality, const std::optional<OrbitPosition>& now) const {
+  if (now) return nearest_missing(modality, *now);
+  const std::vector<const Sector*> list = missing(modality);
+  return list.empty() ? nullptr : list.front();
 }
 
 std::string Coverage::instruction(Modality modality, const std::optional<OrbitPosition>& now,

@@ -88,6 +88,8 @@ class Coverage {
   int done_count(Modality modality) const;
   bool complete() const;
   std::vector<const Sector*> missing(Modality modality) const;
+  /// The missing sector that is nearest on foot; without a position the first; nullptr: all done.
+  const Sector* target(Modality modality, const std::optional<OrbitPosition>& now) const;
 
   /// What to do next, in words: "12° further left, a little higher", "hold still", "done".
   std::string instruction(Modality modality, const std::optional<OrbitPosition>& now,

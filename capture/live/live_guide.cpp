@@ -19,6 +19,7 @@ namespace orbitfuse {
 namespace {
 
 constexpr double darkest_mean_level = 8;  // of 255
+constexpr std::size_t photos_in_memory = 4;  // of 36 MB each; those behind them are read back
 
 std::size_t slot(Modality modality) { return modality == Modality::visible ? 0 : 1; }
 
@@ -29,12 +30,6 @@ std::optional<cv::Mat> read_back(const std::filesystem::path& file) {
   const Result<cv::Mat> image = decode_image(*bytes, file.string());
   if (!image) return std::nullopt;
   return apply_orientation(*image, read_exif(*bytes).orientation);
-}
-
-/// Refused for what another frame from the same place may not have.
-bool to_repeat(Refusal last) {
-  return last == Refusal::nuc || last == Refusal::blurred || last == Refusal::featureless ||
-         last == Refusal::badly_exposed || last == Refusal::moving;
 }
 
 void note_edges(FrameRecord& frame, const cv::Mat& image) {
@@ -72,12 +67,19 @@ LiveGuide::LiveGuide(SessionWriter& writer, LiveGuideOptions options, PositionFi
       coverage_(options_.plan, options_.coverage),
       table_(options_.turntable_step_deg) {
   for (const Modality modality : options_.plan.modalities) {
-    cameras_[modality].shown.modality = modality;
     Camera& camera = cameras_[modality];
-    camera.told_by_source = options_.stations_come_with_frames;
-    camera.shown.instruction = instruction(modality, camera, std::nullopt, Refusal::none);
+    camera.shown.modality = modality;
+    camera.policy = policy_for(modality);
+    say_next(camera, std::nullopt, Refusal::none);
   }
   if (finder_) looker_ = std::jthread([this] { look(); });
+}
+
+std::unique_ptr<PositionPolicy> LiveGuide::policy_for(Modality modality) {
+  if (options_.stations_come_with_frames) return carried_stations(coverage_, modality);
+  if (options_.turntable_step_deg != 0)
+    return turntable_steps(coverage_, table_, options_.turntable_step_deg);
+  return finder_ ? mat_in_view(coverage_, modality, finder_) : operator_key(coverage_, modality);
 }
 
 LiveGuide::~LiveGuide() { finish(); }
@@ -98,11 +100,10 @@ void LiveGuide::resume(const std::vector<FrameRecord>& earlier) {
     if (known == cameras_.end() || !frame.station || frame.tracking) continue;
     known->second.shown.latest_file = frame.file;
     add_at_station(known->second, frame);
-    table_.resume_at(known->second.table, *frame.station);
+    known->second.policy->resume_at(*frame.station);
     remember_choice(known->second, frame);
   }
-  for (auto& [modality, camera] : cameras_)
-    camera.shown.instruction = instruction(modality, camera, camera.position, Refusal::none);
+  for (auto& [modality, camera] : cameras_) say_next(camera, camera.position, Refusal::none);
 }
 
 /// The source's or the operator's word: there, and at rest.
@@ -113,56 +114,54 @@ void LiveGuide::add_at_station(Camera& camera, const FrameRecord& frame) {
   judge(camera, frame, camera.position);
 }
 
-void LiveGuide::add(const FrameRecord& stored) {
+void LiveGuide::add(const FrameRecord& stored, const cv::Mat& pixels) {
   FrameRecord frame = stored;
   const bool at_station = frame.station && !frame.tracking;
-  const bool judged_alone = at_station || frame.has_flag("still");
-  // Reading takes long: the other camera's frames and the page don't wait for it.
-  std::optional<cv::Mat> image;
-  if (judged_alone || is_announced(frame.modality)) image = read_back(writer_.folder() / frame.file);
-  if (judged_alone && image) note_edges(frame, *image);
+  // Measuring takes long: the other camera's frames and the page don't wait for it.
+  cv::Mat image = pixels;
+  if (image.empty() && needs_image(frame)) {
+    if (const auto read = read_back(writer_.folder() / frame.file)) image = *read;
+  }
+  if ((at_station || frame.has_flag(FrameFlag::still)) && !image.empty()) note_edges(frame, image);
   const std::lock_guard lock(mutex_);
   const auto known = cameras_.find(frame.modality);
   if (known == cameras_.end()) return;  // this orbit is not asked for
   Camera& camera = known->second;
+  const bool first = camera.shown.latest_file.empty();
   camera.shown.latest_file = frame.file;
   if (at_station) {
-    camera.told_by_source = true;
+    if (first) camera.policy = carried_stations(coverage_, frame.modality);
     add_at_station(camera, frame);
-  } else if (options_.turntable_step_deg != 0 && frame.has_flag("still")) {
-    judge_table_photo(camera, frame);
-  } else if (camera.announced && frame.has_flag("still")) {
+  } else {
+    place(camera, frame, image);
+  }
+}
+
+/// A frame that doesn't carry its station.
+void LiveGuide::place(Camera& camera, const FrameRecord& frame, const cv::Mat& image) {
+  const bool photo = frame.has_flag(FrameFlag::still);
+  const std::optional<OrbitPosition> told = photo ? camera.policy->of_photo(frame) : std::nullopt;
+  if (told) {
+    camera.announced = told;
+    judge_announced(camera, frame);
+    camera.announced.reset();  // the next photo tells anew
+  } else if (camera.announced && photo) {
     judge_announced(camera, frame);
   } else if (camera.announced) {
-    if (image) judge_between_neighbours(camera, frame, *image);
-  } else if (finder_) {
-    if (frame.has_flag("still")) {
-      camera.photos.push_back(frame);
-    } else {
-      camera.waiting = frame;
-    }
+    if (!image.empty()) judge_between_neighbours(camera, frame, image);
+  } else if (camera.policy->finder()) {
+    if (photo)
+      camera.photos.push_back({frame, camera.photos.size() < photos_in_memory ? image : cv::Mat()});
+    else
+      camera.waiting = Look{frame, image};
     changed_.notify_all();
   }
 }
 
-void LiveGuide::judge_table_photo(Camera& camera, const FrameRecord& frame) {
-  if (table_.keys() == 0) camera.table.counts_photos = true;
-  if (camera.table.counts_photos) {
-    camera.announced = at_photo(camera.table);
-  } else if (const auto key =
-                 table_.key_before(frame.has_flag("file-time") ? 0 : frame.host_time_ns)) {
-    camera.announced = at_key(camera.table, *key);
-  } else {
-    camera.announced = at_key(camera.table, table_.keys());
-    camera.announced->sigma_deg = 180;  // it may be from any station
-  }
-  judge_announced(camera, frame);
-  camera.announced.reset();  // the next photo tells anew where the table is
-}
-
-bool LiveGuide::is_announced(Modality modality) {
+bool LiveGuide::needs_image(const FrameRecord& frame) {
+  if ((frame.station && !frame.tracking) || frame.has_flag(FrameFlag::still)) return true;
   const std::lock_guard lock(mutex_);
-  const auto known = cameras_.find(modality);
+  const auto known = cameras_.find(frame.modality);
   return known != cameras_.end() && known->second.announced.has_value();
 }
 
@@ -177,6 +176,7 @@ void LiveGuide::judge_between_neighbours(Camera& camera, const FrameRecord& fram
     looks.clear();
     camera.shown.refusal = Refusal::moving;
     camera.shown.instruction = text(Refusal::moving);
+    camera.shown.awaits = Awaited::nothing;
   }
   looks.push_back({frame, image});
   if (looks.size() < 3) return;
@@ -185,27 +185,24 @@ void LiveGuide::judge_between_neighbours(Camera& camera, const FrameRecord& fram
   judge_announced(camera, looks.front().frame);
 }
 
-void LiveGuide::operator_at_station(std::int64_t time_ns) {
+Result<std::string> LiveGuide::operator_at_station(std::int64_t time_ns) {
   const std::lock_guard lock(mutex_);
-  const bool turned = options_.turntable_step_deg != 0;
-  if (time_ns == 0) time_ns = utc_now_ns();
-  const int key = turned ? table_.key(time_ns) : 0;
+  KeyPress key{time_ns == 0 ? utc_now_ns() : time_ns, 0};
+  if (options_.turntable_step_deg != 0) key.number = table_.key(key.time_ns);
+  std::string words;
   for (auto& [modality, camera] : cameras_) {
-    if (turned && camera.table.counts_photos) continue;  // its photos tell, and may come late
+    const std::optional<OrbitPosition> there = camera.policy->at_key(key);
+    if (!there) continue;
     camera.since_key.clear();
-    camera.announced = turned ? at_key(camera.table, key) : next_station(modality);
+    camera.announced = there;
+    words += fmt::format("{}{}: the next good frame is azimuth {:.0f}°, {:.0f}° high",
+                         words.empty() ? "" : "; ", name(modality), there->azimuth_deg,
+                         there->elevation_deg);
   }
-}
-
-OrbitPosition LiveGuide::at_photo(TableView& view) const {
-  const std::vector<double>& loops = options_.plan.loop_elevations_deg;
-  const double azimuth_deg = table_.photo(view);
-  return {azimuth_deg, loops[table_.turn(view, azimuth_deg) % loops.size()], 0, 0};
-}
-
-OrbitPosition LiveGuide::at_key(TableView& view, int key) const {
-  const std::vector<double>& loops = options_.plan.loop_elevations_deg;
-  return {table_.azimuth_deg(key), loops[table_.turn_at_key(view, key) % loops.size()], 0, 0};
+  if (!words.empty()) return words;
+  return fail(ErrorKind::usage, "at the station", "nothing is waiting for it",
+              coverage_.complete() ? "all stations are done"
+                                   : "the frames tell their stations by themselves");
 }
 
 void LiveGuide::judge_announced(Camera& camera, const FrameRecord& frame) {
@@ -217,12 +214,6 @@ void LiveGuide::judge_announced(Camera& camera, const FrameRecord& frame) {
   if (refusal == Refusal::none || refusal == Refusal::between_stations ||
       refusal == Refusal::out_of_band)
     camera.announced.reset();
-}
-
-std::optional<OrbitPosition> LiveGuide::next_station(Modality modality) const {
-  const std::vector<const Sector*> missing = coverage_.missing(modality);
-  if (missing.empty()) return std::nullopt;
-  return OrbitPosition{missing.front()->azimuth_deg, missing.front()->elevation_deg, 0, 0};
 }
 
 void LiveGuide::set_position(Camera& camera, OrbitPosition position, std::int64_t time_ns) {
@@ -254,45 +245,24 @@ void LiveGuide::judge(Camera& camera, const FrameRecord& frame,
     // What a picture this dark shows is noise, even where no pixel is 0.
     assessment.underexposed = frame.quality->mean_level < darkest_mean_level ? 1 : 0;
   }
-  assessment.nuc = frame.has_flag("nuc");
+  assessment.nuc = frame.has_flag(FrameFlag::nuc);
   // A photo was taken on purpose; whether the hand was still shows in its sharpness.
-  if (assessment.position && frame.has_flag("still")) assessment.position->speed_deg_s = 0;
+  if (assessment.position && frame.has_flag(FrameFlag::still)) assessment.position->speed_deg_s = 0;
   camera.shown.judged_file = frame.file;
   camera.shown.refusal = coverage_.add(assessment);
   if (camera.shown.refusal == Refusal::none) note_choice(camera, frame);
-  camera.shown.instruction = instruction(frame.modality, camera, position, camera.shown.refusal);
+  say_next(camera, position, camera.shown.refusal);
 }
 
-/// What to do next, in the words of how positions are known here.
-std::string LiveGuide::instruction(Modality modality, const Camera& camera,
-                                   const std::optional<OrbitPosition>& position,
-                                   Refusal last) const {
-  const std::optional<OrbitPosition> next = next_station(modality);
-  if (next && options_.turntable_step_deg != 0) return table_instruction(camera, last);
-  // The next key records the next missing station, wherever the camera stood before.
-  if (next && !finder_ && !camera.told_by_source) {
-    if (camera.announced && to_repeat(last)) return text(last);
-    return fmt::format("go to azimuth {:.0f}°, {:.0f}° high, then press Enter", next->azimuth_deg,
-                       next->elevation_deg);
-  }
-  if (next && camera.told_by_source && camera.shown.latest_file.empty()) return "no frame yet";
-  return coverage_.instruction(modality, position, last);
-}
-
-std::string LiveGuide::table_instruction(const Camera& camera, Refusal last) const {
-  const TableView& view = camera.table;
-  if (to_repeat(last) && camera.announced && !view.counts_photos) return text(last);
-  const std::string then = view.counts_photos ? "take the photo"
-                           : view.start_deg   ? "press Enter"
-                                              : "press Enter or take the photo";
-  if (!view.start_deg && !table_.begun()) return "put the table at its start, then " + then;
-  std::string words = to_repeat(last) ? text(last) + "; " : "";
-  words += fmt::format("turn the table by {:g}°", std::abs(options_.turntable_step_deg));
-  const std::vector<double>& loops = options_.plan.loop_elevations_deg;
-  const double elevation_deg = loops[table_.turn_after_step(view) % loops.size()];
-  if (camera.position && elevation_deg != camera.position->elevation_deg)
-    words += fmt::format(", move the camera to {:g}° high", elevation_deg);
-  return words + ", then " + then;
+void LiveGuide::say_next(Camera& camera, const std::optional<OrbitPosition>& position,
+                         Refusal last) const {
+  const Modality modality = camera.shown.modality;
+  GuideStep step{coverage_.instruction(modality, position, last)};
+  if (!coverage_.missing(modality).empty())
+    step = camera.policy->next_step(
+        {position, last, camera.announced.has_value(), !camera.shown.latest_file.empty()});
+  camera.shown.instruction = step.words;
+  camera.shown.awaits = step.awaits;
 }
 
 /// Of an earlier recording: to be demoted when a better one comes.
@@ -333,8 +303,8 @@ void LiveGuide::note_choice(Camera& camera, const FrameRecord& frame) {
   }
 }
 
-std::optional<FrameRecord> LiveGuide::Camera::next_to_look() {
-  std::optional<FrameRecord> next;
+std::optional<LiveGuide::Look> LiveGuide::Camera::next_to_look() {
+  std::optional<Look> next;
   if (!photos.empty()) {
     next = std::move(photos.front());
     photos.pop_front();
@@ -361,14 +331,16 @@ void LiveGuide::look() {
     if (!has_work()) return;  // over, and everything was judged
     const auto started = std::chrono::steady_clock::now();
     for (auto& [modality, camera] : cameras_) {
-      std::optional<FrameRecord> next = camera.next_to_look();
+      std::optional<Look> next = camera.next_to_look();
       if (!next) continue;
-      FrameRecord& frame = *next;
+      FrameRecord& frame = next->frame;
       lock.unlock();
-      const std::optional<cv::Mat> image = read_back(writer_.folder() / frame.file);
+      if (next->image.empty()) {
+        if (const auto read = read_back(writer_.folder() / frame.file)) next->image = *read;
+      }
       std::optional<OrbitPosition> seen;
-      if (image) seen = finder_(*image, modality);
-      if (seen) note_edges(frame, *image);
+      if (!next->image.empty()) seen = finder_(next->image, modality);
+      if (seen) note_edges(frame, next->image);
       lock.lock();
       if (seen) {
         set_position(camera, *seen, frame.host_time_ns);
@@ -388,10 +360,26 @@ std::vector<LiveCamera> LiveGuide::cameras() const {
   std::vector<LiveCamera> list;
   for (const Modality modality : options_.plan.modalities) {
     const Camera& camera = cameras_.at(modality);
-    list.push_back(camera.shown);
-    list.back().position = camera.position;
+    LiveCamera& shown = list.emplace_back(camera.shown);
+    shown.position = camera.position;
+    shown.done = coverage_.done_count(modality);
+    shown.of = static_cast<int>(coverage_.sectors().size());
+    const bool by_place = camera.policy->finder() || options_.turntable_step_deg != 0;
+    if (const Sector* next = coverage_.target(modality, by_place ? camera.position : std::nullopt))
+      shown.target = OrbitPosition{next->azimuth_deg, next->elevation_deg, 0, 0};
   }
   return list;
+}
+
+std::string instruction_for(const LiveCamera& camera, Operator where) {
+  const std::string key = where == Operator::at_terminal ? "press Enter" : "tap At the station";
+  switch (camera.awaits) {
+    case Awaited::nothing: break;
+    case Awaited::key: return camera.instruction + ", then " + key;
+    case Awaited::photo: return camera.instruction + ", then take the photo";
+    case Awaited::key_or_photo: return camera.instruction + ", then " + key + " or take the photo";
+  }
+  return camera.instruction;
 }
 
 std::vector<Sector> LiveGuide::sectors() const {

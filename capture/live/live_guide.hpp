@@ -6,6 +6,7 @@
 #include <deque>
 #include <functional>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -14,14 +15,12 @@
 #include <vector>
 
 #include "capture/guide/coverage.hpp"
+#include "capture/live/position_policy.hpp"
 #include "capture/live/sharpness_reference.hpp"
 #include "capture/live/turntable.hpp"
 #include "capture/recording/session_writer.hpp"
 
 namespace orbitfuse {
-
-/// Finds the camera in an upright image (CV_8UC3 BGR, CV_8UC1 or CV_16UC1 centikelvin).
-using PositionFinder = std::function<std::optional<OrbitPosition>(const cv::Mat&, Modality)>;
 
 struct LiveGuideOptions {
   OrbitPlan plan;
@@ -47,16 +46,23 @@ struct LiveCamera {
   Modality modality = Modality::visible;
   std::optional<OrbitPosition> position;
   Refusal refusal = Refusal::none;  ///< of the latest frame that was judged
-  std::string instruction;          ///< what to do next for this modality
+  std::string instruction;          ///< what to do next for this modality, less what is awaited
+  Awaited awaits = Awaited::nothing;
+  std::optional<OrbitPosition> target;  ///< the station to go to; nothing: all are done
+  int done = 0, of = 0;                 ///< stations
   std::string latest_file, judged_file;
 };
 
+/// The instruction in the words of a terminal, where the key is Enter, or of the page, where it is
+/// a button.
+enum class Operator { at_terminal, at_page };
+std::string instruction_for(const LiveCamera& camera, Operator where);
+
 /// Follows a recording and decides which stations are done. Every frame comes here after it is on
-/// disk. Its position is the station that it carries (replay, synthetic), or the turntable's step,
-/// or the operator's key, or what `finder` sees in the image, read back from disk a few times a
-/// second on a thread of its own so that recording never waits for it. The frame chosen for a
-/// sector is marked in the manifest (SessionWriter::amend); one that it replaces becomes a tracking
-/// frame.
+/// disk. Where it was taken is known by its camera's PositionPolicy; what has to be looked for in
+/// images is looked for a few times a second on a thread of its own, so that recording never waits
+/// for it. The frame chosen for a sector is marked in the manifest (SessionWriter::amend); one that
+/// it replaces becomes a tracking frame.
 class LiveGuide {
  public:
   /// `writer` outlives the guide. Without `finder` only stations and keys give positions.
@@ -66,12 +72,14 @@ class LiveGuide {
   /// What an earlier recording of the session stored, before the first add(): sectors that it
   /// filled stay filled, and the turntable goes on one step after the last recorded station.
   void resume(const std::vector<FrameRecord>& earlier);
-  /// From any thread; fast unless the frame carries a station.
-  void add(const FrameRecord& frame);
+  /// From any thread; fast unless the frame carries a station. `pixels`: its image as it was decoded
+  /// for the disk, upright; empty: it is read back when it is needed.
+  void add(const FrameRecord& frame, const cv::Mat& pixels = {});
   /// The operator stands at the next station, or has turned the table by a step: for each modality
   /// the next good frame is it; of a video, the next between two that show the same.
-  /// `time_ns`: when (UTC epoch); 0: now.
-  void operator_at_station(std::int64_t time_ns = 0);
+  /// `time_ns`: when (UTC epoch); 0: now. In words what is taken next; usage error where the frames
+  /// or photos tell by themselves.
+  Result<std::string> operator_at_station(std::int64_t time_ns = 0);
 
   /// Judges what was stored and ends the looking; call it before the writer closes the session.
   void finish();
@@ -88,20 +96,19 @@ class LiveGuide {
  private:
   struct Look {
     FrameRecord frame;
-    cv::Mat image;
+    cv::Mat image;  ///< empty: to be read back
   };
   struct Camera {
     LiveCamera shown;
     SharpnessReference sharpness;
     std::optional<OrbitPosition> position;
     std::int64_t position_time_ns = 0;
-    std::optional<FrameRecord> waiting;      ///< newest frame of a video not looked at yet
-    std::deque<FrameRecord> photos;          ///< not looked at yet: each was taken on purpose
-    std::optional<FrameRecord> next_to_look();
-    std::optional<OrbitPosition> announced;  ///< by the key: where the next good frame is
-    bool told_by_source = false;  ///< its frames come with their stations: no key is needed
+    std::unique_ptr<PositionPolicy> policy;
+    std::optional<Look> waiting;             ///< newest frame of a video not looked at yet
+    std::deque<Look> photos;                 ///< not looked at yet: each was taken on purpose
+    std::optional<Look> next_to_look();
+    std::optional<OrbitPosition> announced;  ///< where the next good frame is
     std::deque<Look> since_key;              ///< video frames, the newest up to three
-    TableView table;
     std::map<std::size_t, FrameRecord> chosen;  ///< by sector
   };
   void add_at_station(Camera& camera, const FrameRecord& frame);
@@ -110,15 +117,11 @@ class LiveGuide {
              const std::optional<OrbitPosition>& position);
   void remember_choice(Camera& camera, const FrameRecord& frame);
   void note_choice(Camera& camera, const FrameRecord& frame);
-  std::string instruction(Modality modality, const Camera& camera,
-                          const std::optional<OrbitPosition>& position, Refusal last) const;
-  std::string table_instruction(const Camera& camera, Refusal last) const;
-  std::optional<OrbitPosition> next_station(Modality modality) const;
-  OrbitPosition at_photo(TableView& view) const;
-  OrbitPosition at_key(TableView& view, int key) const;
-  void judge_table_photo(Camera& camera, const FrameRecord& frame);
+  std::unique_ptr<PositionPolicy> policy_for(Modality modality);
+  void say_next(Camera& camera, const std::optional<OrbitPosition>& position, Refusal last) const;
+  void place(Camera& camera, const FrameRecord& frame, const cv::Mat& image);
   void judge_between_neighbours(Camera& camera, const FrameRecord& frame, const cv::Mat& image);
-  bool is_announced(Modality modality);
+  bool needs_image(const FrameRecord& frame);
   void judge_announced(Camera& camera, const FrameRecord& frame);
   void set_position(Camera& camera, OrbitPosition position, std::int64_t time_ns);
 

@@ -15,6 +15,10 @@ constexpr std::uint64_t little_disk_bytes = 2ull << 30;
 
 Json json_of(const StreamStatus& s, double rate_hz) {
   Json json = account_json(s);
+  json["modality"] = name(s.modality);
+  json["away_s"] = s.away ? Json(s.away->seconds) : Json();
+  json["correction"] = s.correction;
+  json["corrections"] = s.corrections;
   json["passed_over_last"] = s.passed_over_last;
   json["silent"] = s.silent;
   json["ended"] = s.ended;
@@ -29,9 +33,15 @@ std::string verdict(const LiveCamera& camera) {
 
 Json json_of(const LiveCamera& camera) {
   Json json = {{"modality", name(camera.modality)},
-               {"instruction", camera.instruction},
+               {"instruction", instruction_for(camera, Operator::at_page)},
                {"refusal", verdict(camera)},
+               {"refused", !camera.judged_file.empty() && camera.refusal != Refusal::none},
+               {"done", camera.done},
+               {"of", camera.of},
                {"file", camera.latest_file}};
+  if (camera.target)
+    json["target"] = {{"azimuth_deg", camera.target->azimuth_deg},
+                      {"elevation_deg", camera.target->elevation_deg}};
   if (camera.position) {
     json["position"] = {{"azimuth_deg", camera.position->azimuth_deg},
                         {"elevation_deg", camera.position->elevation_deg},
@@ -42,6 +52,15 @@ Json json_of(const LiveCamera& camera) {
 
 }  // namespace
 
+std::string account_words(const StreamStatus& s) {
+  std::string words = fmt::format("{} received, {} lost ({} missing, {} rejected, {} dropped",
+                                  s.received, s.lost, s.missing, s.rejected, s.dropped);
+  if (s.unwritten > 0) words += fmt::format(", {} not written", s.unwritten);
+  words += ")";
+  if (s.repeated > 0) words += fmt::format(", {} came again under a settled number", s.repeated);
+  return words;
+}
+
 Json account_json(const StreamStatus& s) {
   return {{"device", s.device},
           {"received", s.received},
@@ -49,22 +68,38 @@ Json account_json(const StreamStatus& s) {
           {"missing", s.missing},
           {"rejected", s.rejected},
           {"dropped", s.dropped},
+          {"unwritten", s.unwritten},
+          {"repeated", s.repeated},
           {"passed_over", s.passed_over},
           {"first_id", s.any() ? Json(s.first_id) : Json()},
           {"last_id", s.any() ? Json(s.last_id) : Json()}};
 }
 
-std::vector<std::string> warnings_of(const LiveState& state) {
+std::vector<std::string> alarms_of(const LiveState& state) {
   std::vector<std::string> list;
   for (const StreamStatus& s : state.streams) {
-    if (s.ended && state.running)
+    if (!state.running) continue;
+    if (s.ended)
       list.push_back(s.device + ": the stream has ended");
-    else if (s.silent && state.running)
+    else if (s.away)
+      list.push_back(
+          fmt::format("{}: disconnected {:.0f} s, reopening", s.device, s.away->seconds));
+    else if (s.silent)
       list.push_back(s.device + ": no frames");
+  }
+  return list;
+}
+
+std::vector<std::string> warnings_of(const LiveState& state) {
+  std::vector<std::string> list = alarms_of(state);
+  for (const StreamStatus& s : state.streams) {
     if (!s.notice.empty()) list.push_back(s.device + ": " + s.notice);
     if (s.dropped > 0)
       list.push_back(
           fmt::format("{}: the disk is too slow, {} frames dropped", s.device, s.dropped));
+    if (s.unwritten > 0)
+      list.push_back(
+          fmt::format("{}: {} frames could not be written; is the disk full?", s.device, s.unwritten));
     if (s.missing > 0)
       list.push_back(fmt::format("{}: {} frames lost on the way", s.device, s.missing));
     if (s.rejected > 0)
@@ -81,6 +116,7 @@ std::string json_of(const LiveState& state) {
   Json json = {{"session", state.session},       {"running", state.running},
                {"complete", state.complete},     {"elapsed_s", state.elapsed_s},
                {"free_bytes", state.free_bytes}, {"warnings", state.warnings},
+               {"alarms", alarms_of(state)},     {"waits_for_start", state.waits_for_start},
                {"streams", Json::array()},       {"cameras", Json::array()},
                {"loops", Json::array()}};
   for (std::size_t i = 0; i < state.streams.size(); ++i) {
@@ -103,7 +139,10 @@ std::string json_of(const LiveState& state) {
 std::string terminal_view(const LiveState& state) {
   const auto seconds = static_cast<long>(state.elapsed_s);
   std::string out = fmt::format("{}  {}  {}:{:02}  {:.1f} GiB free\n", state.session,
-                                state.running ? "recording" : "stopped", seconds / 60, seconds % 60,
+                                state.running           ? "recording"
+                                : state.waits_for_start ? "waiting for Start on the page"
+                                                        : "stopped",
+                                seconds / 60, seconds % 60,
                                 static_cast<double>(state.free_bytes) / (1ull << 30));
   for (std::size_t i = 0; i < state.streams.size(); ++i) {
     const StreamStatus& s = state.streams[i];
@@ -112,9 +151,8 @@ std::string terminal_view(const LiveState& state) {
       continue;
     }
     out += fmt::format(
-        "{:<10} {:5.1f} Hz  {} received, {} lost ({} missing, {} rejected, {} dropped)\n", s.device,
-        i < state.rates_hz.size() ? state.rates_hz[i] : 0.0, s.received, s.lost, s.missing,
-        s.rejected, s.dropped);
+        "{:<10} {:5.1f} Hz  {}\n", s.device,
+        i < state.rates_hz.size() ? state.rates_hz[i] : 0.0, account_words(s));
   }
   for (const StreamStatus& s : state.streams) {
     if (s.passed_over > 0)
@@ -135,7 +173,8 @@ std::string terminal_view(const LiveState& state) {
   for (const auto& [loop, row] : loops)
     out += fmt::format("loop {:3.0f} deg  {}\n", row.first, row.second);
   for (const LiveCamera& camera : state.cameras) {
-    out += fmt::format("{:<10} {}", name(camera.modality), camera.instruction);
+    out += fmt::format("{:<10} {}", name(camera.modality),
+                       instruction_for(camera, Operator::at_terminal));
     if (camera.position)
       out += fmt::format("  (at {:.0f}, {:.0f} deg)", camera.position->azimuth_deg,
                          camera.position->elevation_deg);

@@ -15,6 +15,7 @@ namespace orbitfuse {
 struct LiveState {
   std::string session;
   bool running = false, complete = false;
+  bool waits_for_start = false;  ///< the cameras are shown, but nothing is recorded yet
   double elapsed_s = 0;
   std::uint64_t free_bytes = 0;  ///< on the session's disk
   std::vector<StreamStatus> streams;
@@ -24,8 +25,15 @@ struct LiveState {
   std::vector<std::string> warnings;  ///< what the operator should act on now
 };
 
-/// Warnings that follow from the figures: silence, drops, rejections, a nearly full disk.
+/// What keeps the operator from going on: cameras that are away or silent while it runs. In words
+/// that change with the seconds.
+std::vector<std::string> alarms_of(const LiveState& state);
+
+/// Warnings that follow from the figures: drops, rejections, a nearly full disk, alarms.
 std::vector<std::string> warnings_of(const LiveState& state);
+
+/// The same in words: "90 received, 10 lost (5 missing, 3 rejected, 2 dropped)".
+std::string account_words(const StreamStatus& stream);
 
 /// What came of a stream and what was lost, and the span of its ids (null before its first frame).
 nlohmann::json account_json(const StreamStatus& stream);

@@ -4,11 +4,12 @@
 #include <arpa/inet.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <random>
-#include <thread>
 
 #if defined(__GNUC__)
 #pragma GCC diagnostic push
@@ -20,6 +21,7 @@
 #pragma GCC diagnostic pop
 #endif
 
+#include "capture/page/connection_gate.hpp"
 #include "capture/page/preview.hpp"
 #include "capture/page/reachable.hpp"
 
@@ -29,8 +31,6 @@ extern const std::string_view capture_page_html;
 }
 
 namespace {
-
-constexpr int workers = 4;
 
 bool is_loopback(const std::string& host) {
   return host == "localhost" || host == "::1" || host.starts_with("127.");
@@ -66,6 +66,47 @@ std::optional<double> number(const httplib::Request& request, const char* key) {
   return value;
 }
 
+/// One request that lies there whole, and the answer to it.
+class WholeRequest final : public httplib::Stream {
+ public:
+  explicit WholeRequest(const std::string& request) : request_(request) {}
+
+  bool is_readable() const override { return true; }
+  bool is_writable() const override { return true; }
+  ssize_t read(char* bytes, size_t size) override {
+    const size_t count = std::min(size, request_.size() - read_);
+    std::copy_n(request_.data() + read_, count, bytes);
+    read_ += count;
+    return static_cast<ssize_t>(count);
+  }
+  ssize_t write(const char* bytes, size_t size) override {
+    answer.append(bytes, size);
+    return static_cast<ssize_t>(size);
+  }
+  void get_remote_ip_and_port(std::string&, int&) const override {}
+  void get_local_ip_and_port(std::string&, int&) const override {}
+  socket_t socket() const override { return INVALID_SOCKET; }
+
+  std::string answer;
+
+ private:
+  const std::string& request_;
+  size_t read_ = 0;
+};
+
+/// httplib's reading of requests and routing, without its way with connections: there one peer that
+/// sends a byte a second holds a thread.
+class RequestRouter final : public httplib::Server {
+ public:
+  int take_listener() { return svr_sock_.exchange(INVALID_SOCKET); }
+  std::string answer(const std::string& request) {
+    WholeRequest stream(request);
+    bool closed = false;
+    process_request(stream, true, closed, nullptr);
+    return std::move(stream.answer);
+  }
+};
+
 }  // namespace
 
 Status PageOptions::validate() const {
@@ -80,9 +121,9 @@ Status PageOptions::validate() const {
 struct PageServer::Impl {
   PageOptions options;
   PageHooks hooks;
-  httplib::Server server;
+  RequestRouter server;
   PreviewCache previews;
-  std::thread thread;
+  std::unique_ptr<ConnectionGate> gate;
   int port = 0;
   bool needs_token = false;
 
@@ -126,19 +167,28 @@ struct PageServer::Impl {
   }
 
   void act(const std::string& path, httplib::Response& response) const {
-    const std::map<std::string, const std::function<void()>*> actions = {
-        {"/start", &hooks.start}, {"/stop", &hooks.stop}, {"/station", &hooks.at_station}, {"/nuc", &hooks.correct}};
+    const std::map<std::string, const PageAction*> actions = {{"/start", &hooks.start},
+                                                              {"/stop", &hooks.stop},
+                                                              {"/station", &hooks.at_station},
+                                                              {"/nuc", &hooks.correct}};
     const auto action = actions.find(path);
-    const bool known = action != actions.end() && *action->second;
-    if (known) (*action->second)();
-    response.status = known ? 204 : 404;
+    if (action == actions.end() || !*action->second) {
+      response.status = 404;
+      return;
+    }
+    const Result<std::string> outcome = (*action->second)();
+    response.status = outcome ? 200 : 409;
+    const nlohmann::json body = {{"done", outcome.has_value()},
+                                 {"message", outcome ? *outcome : outcome.error().message()}};
+    response.set_content(body.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace),
+                         "application/json");
   }
 
   void preview(const httplib::Request& request, httplib::Response& response) {
     const auto modality = modality_from_name(request.matches[1].str());
-    const std::filesystem::path file =
-        modality && hooks.latest ? hooks.latest(*modality) : std::filesystem::path();
-    if (file.empty()) {
+    const std::optional<LatestFrame> frame =
+        modality && hooks.latest ? hooks.latest(*modality) : std::nullopt;
+    if (!frame) {
       response.status = 404;
       return;
     }
@@ -147,7 +197,7 @@ struct PageServer::Impl {
     if (low && high && *low < *high) span = TemperatureSpan{*low, *high};
     const std::string palette_name =
         request.has_param("palette") ? request.get_param_value("palette") : "inferno";
-    const Result<Preview> picture = previews.get(file, *modality, palette_name, span);
+    const Result<Preview> picture = previews.get(*frame, palette_name, span);
     if (!picture) {
       response.status = picture.error().kind == ErrorKind::usage ? 400 : 404;
       response.set_content(picture.error().message() + "\n", "text/plain");
@@ -167,10 +217,9 @@ struct PageServer::Impl {
       response.set_content("u and v are shares of width and height, 0 to 1\n", "text/plain");
       return;
     }
-    const std::filesystem::path file =
-        hooks.latest ? hooks.latest(Modality::thermal) : std::filesystem::path();
-    const std::optional<double> kelvin =
-        file.empty() ? std::nullopt : previews.kelvin_at(file, *u, *v);
+    const std::optional<LatestFrame> frame =
+        hooks.latest ? hooks.latest(Modality::thermal) : std::nullopt;
+    const std::optional<double> kelvin = frame ? kelvin_at(*frame, *u, *v) : std::nullopt;
     response.set_content(
         kelvin ? fmt::format("{{\"kelvin\":{:.2f}}}", *kelvin) : "{\"kelvin\":null}",
         "application/json");
@@ -210,12 +259,7 @@ Status PageServer::start() {
     self.options.token =
         fmt::format("{:08x}{:08x}{:08x}{:08x}", random(), random(), random(), random());
   }
-  // One request a connection: idle viewers must not hold the few workers.
-  self.server.set_keep_alive_max_count(1);
-  self.server.new_task_queue = [] { return new httplib::ThreadPool(workers); };
   self.server.set_payload_max_length(1024);
-  self.server.set_read_timeout(5, 0);
-  self.server.set_write_timeout(5, 0);
   self.server.set_socket_options([](int socket) {
     // Not SO_REUSEPORT, httplib's default: a second recorder would share the port unnoticed.
     const int yes = 1;
@@ -235,17 +279,13 @@ Status PageServer::start() {
                 "the port is in use, or the address is not this machine's",
                 "choose another with --page HOST:PORT, or port 0 for any free one");
   }
-  self.thread = std::thread([&self] { self.server.listen_after_bind(); });
-  // stop() before the loop runs would be lost.
-  while (!self.server.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  self.gate = std::make_unique<ConnectionGate>(
+      self.server.take_listener(), GateLimits{},
+      [&self](const std::string& request) { return self.server.answer(request); });
   return {};
 }
 
-void PageServer::stop() {
-  if (!impl_->thread.joinable()) return;
-  impl_->server.stop();
-  impl_->thread.join();
-}
+void PageServer::stop() { impl_->gate.reset(); }
 
 int PageServer::port() const { return impl_->port; }
 const std::string& PageServer::token() const { return impl_->options.token; }

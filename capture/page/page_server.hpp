@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "capture/live/live_state.hpp"
+#include "capture/recording/latest_frame.hpp"
 
 namespace orbitfuse {
 
@@ -21,19 +22,23 @@ struct PageOptions {
   Status validate() const;
 };
 
+/// What a button does: in words for whoever pressed it what came of it, or why nothing did.
+using PageAction = std::function<Result<std::string>()>;
+
 /// What the page shows and does. All are called from the server's threads.
 struct PageHooks {
   std::function<LiveState()> state;
-  /// The newest recorded file of a modality; empty: none yet.
-  std::function<std::filesystem::path(Modality)> latest;
-  std::function<void()> start, stop, at_station, correct;  ///< may be empty
+  /// The newest frame of a modality; nothing: none yet.
+  std::function<std::optional<LatestFrame>(Modality)> latest;
+  PageAction start, stop, at_station, correct;  ///< may be empty
 };
 
 /// The capture page. It answers with one page without any outside address, its state as JSON,
 /// previews as JPEG and temperatures; a content security policy keeps browsers from asking anybody
 /// else. Requests without the token (where one is needed) get 401; requests for another host name
 /// than an address or localhost get 403 (DNS rebinding); changes need a POST with the header
-/// X-OrbitFuse, which other sites' pages cannot send.
+/// X-OrbitFuse, which other sites' pages cannot send. Peers that are slow or silent hold up neither
+/// other viewers nor the end of the program (ConnectionGate).
 class PageServer {
  public:
   PageServer(PageOptions options, PageHooks hooks);

@@ -3,11 +3,11 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
+#include <cstdint>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 
 #include "core/image/image_codec.hpp"
-#include "core/image/image_io.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -24,48 +24,44 @@ cv::Mat reduced(const cv::Mat& image) {
   return small;
 }
 
+/// Centikelvin to kelvin; invalid samples become NaN.
+cv::Mat kelvin_of(const cv::Mat& centikelvin) {
+  cv::Mat kelvin;
+  centikelvin.convertTo(kelvin, CV_32FC1, 0.01);
+  kelvin.setTo(std::numeric_limits<float>::quiet_NaN(), centikelvin == 0);
+  return kelvin;
+}
+
 }  // namespace
 
-Result<Preview> PreviewCache::get(const std::filesystem::path& file, Modality modality,
-                                  const std::string& palette_name,
+Result<Preview> PreviewCache::get(const LatestFrame& frame, const std::string& palette_name,
                                   std::optional<TemperatureSpan> span) {
   const std::lock_guard lock(mutex_);
-  const std::string key = fmt::format("{} {} {:.2f} {:.2f}", name(modality), palette_name,
+  const std::string key = fmt::format("{} {} {:.2f} {:.2f}", name(frame.modality), palette_name,
                                       span ? span->low_k : 0.0, span ? span->high_k : 0.0);
   if (const auto known = entries_.find(key);
       known != entries_.end() && Clock::now() - known->second.made < shortest_life) {
     return known->second.preview;
   }
   Preview preview;
-  cv::Mat picture;
-  const bool grey = modality == Modality::thermal && file.extension() != ".tiff";
-  if (modality == Modality::visible || grey) {
-    ORBITFUSE_ASSIGN(picture, grey ? read_image(file) : read_visible(file));
-  } else {
+  cv::Mat picture = reduced(frame.pixels);
+  if (picture.depth() == CV_16U) {
     ORBITFUSE_ASSIGN(const cv::Mat colours, palette(palette_name));
-    ORBITFUSE_ASSIGN(const cv::Mat kelvin, read_thermal_k(file));
-    preview.span = span ? *span : common_span({kelvin});
-    picture = colorize(kelvin, *preview.span, colours);
+    preview.span = span ? *span : common_span({kelvin_of(frame.pixels)});
+    picture = colorize(kelvin_of(picture), *preview.span, colours);
   }
-  ORBITFUSE_ASSIGN(preview.jpeg, encode_jpeg(reduced(picture), 80));
+  ORBITFUSE_ASSIGN(preview.jpeg, encode_jpeg(picture, 80));
   if (entries_.size() >= most_entries) entries_.clear();
   entries_[key] = {preview, Clock::now()};
   return preview;
 }
 
-std::optional<double> PreviewCache::kelvin_at(const std::filesystem::path& file, double u,
-                                              double v) {
-  if (!(u >= 0 && u < 1 && v >= 0 && v < 1) || file.extension() != ".tiff") return std::nullopt;
-  const std::lock_guard lock(mutex_);
-  if (kelvin_.image.empty() ||
-      (kelvin_.file != file && Clock::now() - kelvin_.made >= shortest_life)) {
-    Result<cv::Mat> image = read_thermal_k(file);
-    if (!image) return std::nullopt;
-    kelvin_ = {file, *std::move(image), Clock::now()};
-  }
-  const float value = kelvin_.image.at<float>(static_cast<int>(v * kelvin_.image.rows),
-                                              static_cast<int>(u * kelvin_.image.cols));
-  return std::isfinite(value) ? std::optional<double>(value) : std::nullopt;
+std::optional<double> kelvin_at(const LatestFrame& frame, double u, double v) {
+  const cv::Mat& image = frame.pixels;
+  if (!(u >= 0 && u < 1 && v >= 0 && v < 1) || image.depth() != CV_16U) return std::nullopt;
+  const int centikelvin = image.at<std::uint16_t>(static_cast<int>(v * image.rows),
+                                                  static_cast<int>(u * image.cols));
+  return centikelvin > 0 ? std::optional<double>(0.01 * centikelvin) : std::nullopt;
 }
 
 }  // namespace orbitfuse

@@ -2,13 +2,12 @@
 #pragma once
 
 #include <chrono>
-#include <filesystem>
 #include <map>
 #include <mutex>
 #include <optional>
 #include <string>
 
-#include "core/modality.hpp"
+#include "capture/recording/latest_frame.hpp"
 #include "core/image/palette.hpp"
 #include "core/result.hpp"
 
@@ -19,15 +18,13 @@ struct Preview {
   std::optional<TemperatureSpan> span;  ///< thermal with temperatures only
 };
 
-/// Small pictures of the newest frames, read back from disk. One camera's frame is read and encoded
+/// Small pictures of the newest frames, which were decoded already. One camera's frame is encoded
 /// at most five times a second whatever the number of viewers, so that they cost no frame.
 class PreviewCache {
  public:
-  /// `file`: a recorded frame. `span`: locked by the viewer; else this frame's own.
-  Result<Preview> get(const std::filesystem::path& file, Modality modality,
-                      const std::string& palette_name, std::optional<TemperatureSpan> span);
-  /// At a place given as shares of width and height; nothing without a temperature there.
-  std::optional<double> kelvin_at(const std::filesystem::path& file, double u, double v);
+  /// `span`: locked by the viewer; else this frame's own.
+  Result<Preview> get(const LatestFrame& frame, const std::string& palette_name,
+                      std::optional<TemperatureSpan> span);
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -35,14 +32,11 @@ class PreviewCache {
     Preview preview;
     Clock::time_point made;
   };
-  struct Kelvin {
-    std::filesystem::path file;
-    cv::Mat image;
-    Clock::time_point made;
-  };
   std::mutex mutex_;
   std::map<std::string, Entry> entries_;
-  Kelvin kelvin_;
 };
+
+/// At a place given as shares of width and height; nothing without a temperature there.
+std::optional<double> kelvin_at(const LatestFrame& frame, double u, double v);
 
 }  // namespace orbitfuse

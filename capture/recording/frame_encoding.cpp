@@ -27,35 +27,58 @@ Status check_type(const cv::Mat& image, const Frame& frame, Modality modality, c
   return {};
 }
 
+/// A frame's image, upright, with what its file says of itself.
+struct DecodedFrame {
+  cv::Mat pixels;
+  std::string description;  ///< of a TIFF
+};
+
+Result<DecodedFrame> decode_frame(const Frame& frame, Modality modality, const std::string& where) {
+  DecodedFrame decoded;
+  if (frame.encoded.empty()) {
+    if (frame.pixels.empty())
+      return fail(ErrorKind::input, where, "an empty frame", "check the driver");
+    ORBITFUSE_TRY(check_type(frame.pixels, frame, modality, where));
+    decoded.pixels = frame.pixels;
+    return decoded;
+  }
+  cv::Mat image;
+  if (image_format(frame.encoded) == ImageFormat::tiff) {
+    ORBITFUSE_ASSIGN(image, decode_tiff(frame.encoded, where, &decoded.description));
+  } else {
+    ORBITFUSE_ASSIGN(image, decode_image(frame.encoded, where));
+  }
+  ORBITFUSE_TRY(check_type(image, frame, modality, where));
+  decoded.pixels = apply_orientation(
+      image, modality == Modality::visible ? read_exif(frame.encoded).orientation : 1);
+  return decoded;
+}
+
 }  // namespace
 
+Result<cv::Mat> upright_pixels(const Frame& frame, Modality modality, const std::string& where) {
+  ORBITFUSE_ASSIGN(DecodedFrame decoded, decode_frame(frame, modality, where));
+  return std::move(decoded.pixels);
+}
+
 Result<EncodedFrame> encode_frame(const Frame& frame, Modality modality, const std::string& where) {
+  ORBITFUSE_ASSIGN(DecodedFrame decoded, decode_frame(frame, modality, where));
   EncodedFrame out;
   out.has_temperature = modality == Modality::thermal && !frame.thermal_is_gray;
+  out.pixels = std::move(decoded.pixels);
+  out.scale = {frame.kelvin_per_count, 0};
   if (!frame.encoded.empty()) {
-    std::string description;
-    cv::Mat image;
-    if (image_format(frame.encoded) == ImageFormat::tiff) {
-      ORBITFUSE_ASSIGN(image, decode_tiff(frame.encoded, where, &description));
-    } else {
-      ORBITFUSE_ASSIGN(image, decode_image(frame.encoded, where));
-    }
-    ORBITFUSE_TRY(check_type(image, frame, modality, where));
-    out.pixels = apply_orientation(image, modality == Modality::visible ? read_exif(frame.encoded).orientation : 1);
     if (out.has_temperature) {
-      ORBITFUSE_ASSIGN(const auto tag, thermal_scale_of_description(description, where));
-      out.scale = tag.value_or(ThermalScaleTag{frame.kelvin_per_count, 0});
+      ORBITFUSE_ASSIGN(const auto tag, thermal_scale_of_description(decoded.description, where));
+      if (tag) out.scale = *tag;
     }
     out.bytes = frame.encoded;
     out.extension = frame.extension;
     return out;
   }
-  if (frame.pixels.empty()) return fail(ErrorKind::input, where, "an empty frame", "check the driver");
-  ORBITFUSE_TRY(check_type(frame.pixels, frame, modality, where));
-  out.pixels = frame.pixels;
-  out.scale = {frame.kelvin_per_count, 0};
   out.extension = out.has_temperature ? ".tiff" : ".png";
-  ORBITFUSE_ASSIGN(out.bytes, out.has_temperature ? encode_thermal_tiff(frame.pixels, out.scale) : encode_png(frame.pixels));
+  ORBITFUSE_ASSIGN(out.bytes, out.has_temperature ? encode_thermal_tiff(out.pixels, out.scale)
+                                                  : encode_png(out.pixels));
   return out;
 }
 

@@ -19,6 +19,9 @@ struct EncodedFrame {
   ThermalScaleTag scale;    ///< of the pixels, when they are temperatures
 };
 
+/// The frame's image, upright; input error when it isn't one of its modality.
+Result<cv::Mat> upright_pixels(const Frame& frame, Modality modality, const std::string& where);
+
 /// Encodes `pixels` without loss, or checks that `encoded` decodes as the modality demands.
 /// Input error (the frame is bad) otherwise.
 Result<EncodedFrame> encode_frame(const Frame& frame, Modality modality, const std::string& where);

@@ -15,6 +15,8 @@ class FrameRhythm {
   int note(std::uint64_t id, std::int64_t stamp_ns);
   /// The stream was broken: the time until the next frame says nothing.
   void interrupt() { last_.reset(); }
+  /// False before two frames came: then nothing can be said of an outage.
+  bool known() const { return known_ > 0; }
   /// How many frames fit into an outage; at least 1, because the frame that was under way is lost.
   std::uint64_t frames_in(double seconds) const;
 

@@ -24,7 +24,7 @@ bool FreezeWatch::mark(Frame& frame, const void* samples, std::size_t size, Cloc
   }
   hash_ = hash;
   last_ = now;
-  if (now < until_) frame.flags.push_back("nuc");
+  if (now < until_) frame.flag(FrameFlag::nuc);
   return begins;
 }
 

@@ -40,7 +40,7 @@ std::optional<std::string> RawCounts::apply(Frame& frame) {
   frame.pixels = gray;
   frame.thermal_is_gray = true;
   if (std::find(frame.flags.begin(), frame.flags.end(), "raw-counts") == frame.flags.end())
-    frame.flags.push_back("raw-counts");
+    frame.flag(FrameFlag::raw_counts);
   return words;
 }
 

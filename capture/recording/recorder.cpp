@@ -16,8 +16,27 @@ namespace {
 
 using Loss = StreamAccount::Loss;
 
+using Clock = std::chrono::steady_clock;
+
 constexpr const char* when_full =
     "free disk space and resume the session; every frame acknowledged is safe";
+
+/// What the operator should look into until the camera is back.
+bool asks_for_operator(EventKind kind) {
+  switch (kind) {
+    case EventKind::moved:
+    case EventKind::twin:
+    case EventKind::look_alike:
+    case EventKind::reopen_failed:
+    case EventKind::setting_lost:
+    case EventKind::nothing_new: return true;
+    default: return false;
+  }
+}
+
+bool loses_stream(EventKind kind) {
+  return kind == EventKind::disconnected || kind == EventKind::stalled || kind == EventKind::twin;
+}
 
 std::optional<std::uint64_t> next_id_in(const RecorderOptions& options, const std::string& device) {
   const auto found = options.next_ids.find(device);
@@ -29,7 +48,7 @@ std::optional<std::uint64_t> next_id_in(const RecorderOptions& options, const st
 /// One camera. The capture thread pushes, the writer thread pops; the queue bounds memory.
 struct Recorder::Channel {
   Channel(FrameSource& s, SessionWriter& w, const RecorderOptions& o, const Progress& p,
-          const std::function<void(const FrameRecord&)>& f)
+          const OnFrame& f)
       : source(s), writer(w), options(o), progress(p), on_frame(f), device(s.describe()),
         account(device.id, next_id_in(o, device.id)) {}
 
@@ -37,7 +56,7 @@ struct Recorder::Channel {
   SessionWriter& writer;
   const RecorderOptions& options;
   const Progress& progress;
-  const std::function<void(const FrameRecord&)>& on_frame;
+  const OnFrame& on_frame;
   DeviceInfo device;  ///< changed by the writer thread only
   StreamAccount account;
 
@@ -50,11 +69,18 @@ struct Recorder::Channel {
   bool capture_over = false;
   bool writer_failed = false;
   std::optional<std::uint64_t> first_unwritten;  ///< the frame at which the writer failed
-  bool silent = false, away = false;
+  bool silent = false;
+  struct Away {
+    Clock::time_point since;
+    std::string why;
+  };
+  std::optional<Away> away;
+  std::optional<Clock::time_point> over_at;  ///< when the capture thread stopped listening
+  Clock::time_point last_frame = Clock::now();
   std::optional<Error> error;
   std::optional<FrameRecord> latest;
-  std::string notice;
-  std::uint64_t passed_over = 0;
+  std::string notice, correction;
+  std::uint64_t passed_over = 0, repeated = 0, corrections = 0;
   std::vector<std::string> passed_over_last;
 
   bool stopping() {
@@ -71,9 +97,9 @@ struct Recorder::Channel {
   }
 
   /// Written by the writer thread: a slow disk must not hold up the capture thread.
-  void log_event(const std::string& kind, const std::string& detail) {
+  void log_event(EventKind kind, const std::string& detail) {
     const std::lock_guard lock(mutex);
-    queue.push_back(EventRecord{device.id, utc_now_ns(), kind, detail});
+    queue.push_back(EventRecord{device.id, utc_now_ns(), std::string(name(kind)), detail});
     changed.notify_all();
   }
 
@@ -85,7 +111,10 @@ struct Recorder::Channel {
     // Also when the recording is being stopped: the writer still writes what is queued.
     if (source_waits()) changed.wait(lock, has_room);
     if (!has_room() || writer_failed) {
-      account.lose(frame.id, Loss::dropped, writer_failed ? "not written" : "dropped: the disk is too slow");
+      if (writer_failed)
+        account.lose(frame.id, Loss::unwritten, "not written");
+      else
+        account.lose(frame.id, Loss::dropped, "dropped: the disk is too slow");
       return;
     }
     queue.push_back(std::move(frame));
@@ -93,19 +122,43 @@ struct Recorder::Channel {
     changed.notify_all();
   }
 
-  /// Of an event that asks for the operator; with the mutex held.
+  /// What the operator sees of an event; with the mutex held.
   void note(const Delivery& delivery) {
     if (delivery.kind != Delivery::Kind::event) return;
-    for (const char* kind : {"moved", "twin", "look-alike", "reopen-failed", "setting-lost", "nothing-new"}) {
-      if (delivery.reason == kind) notice = delivery.detail;
+    if (asks_for_operator(delivery.event)) notice = delivery.detail;
+    if (loses_stream(delivery.event)) away = Away{last_frame, delivery.detail};
+    switch (delivery.event) {
+      case EventKind::ignored:
+      case EventKind::duplicate: {
+        constexpr std::size_t shown = 3;
+        ++passed_over;
+        if (passed_over_last.size() == shown) passed_over_last.erase(passed_over_last.begin());
+        passed_over_last.push_back(delivery.detail);
+        break;
+      }
+      case EventKind::repeated_id: ++repeated; break;
+      case EventKind::reconnected:
+        notice.clear();
+        away.reset();
+        break;
+      case EventKind::nuc:
+      case EventKind::nuc_failed:
+        correction = (delivery.event == EventKind::nuc ? "shutter correction (NUC): "
+                                                       : "no shutter correction (NUC): ") +
+                     delivery.detail;
+        ++corrections;
+        break;
+      default: break;
     }
-    if (delivery.reason == "ignored" || delivery.reason == "duplicate") {
-      constexpr std::size_t shown = 3;
-      ++passed_over;
-      if (passed_over_last.size() == shown) passed_over_last.erase(passed_over_last.begin());
-      passed_over_last.push_back(delivery.detail);
-    }
-    if (delivery.reason == "reconnected") notice.clear();
+  }
+
+  /// A timeout alone is no silence: one damaged frame holds up those behind it.
+  void watch_silence(Delivery::Kind kind) {
+    if (kind == Delivery::Kind::frame || kind == Delivery::Kind::rejected)
+      last_frame = Clock::now();
+    // Files come when they come, unless their folder is gone.
+    silent = kind == Delivery::Kind::timeout && Clock::now() - last_frame > options.silence &&
+             (!source.can_wait() || away);
   }
 
   void take(Delivery delivery) {
@@ -114,7 +167,7 @@ struct Recorder::Channel {
       case Delivery::Kind::rejected: {
         const std::uint64_t id = delivery.frame.id;
         if (!account.see(id)) {
-          log_event("out-of-order", fmt::format("frame {} after a later one", id));
+          log_event(EventKind::out_of_order, fmt::format("frame {} after a later one", id));
         } else if (delivery.kind == Delivery::Kind::frame) {
           push(std::move(delivery.frame));
         } else {
@@ -122,7 +175,8 @@ struct Recorder::Channel {
         }
         break;
       }
-      case Delivery::Kind::event: log_event(delivery.reason, delivery.detail); break;
+      case Delivery::Kind::lost: account.miss_until(delivery.frame.id, delivery.reason); break;
+      case Delivery::Kind::event: log_event(delivery.event, delivery.detail); break;
       case Delivery::Kind::timeout:
       case Delivery::Kind::end: break;
     }
@@ -131,6 +185,7 @@ struct Recorder::Channel {
   void capture() {
     Status status = source.start();
     const bool started = status.has_value();
+    bool ended_by_itself = false;
     while (status && !stopping()) {
       Result<Delivery> delivery = source.next(options.next_timeout);
       if (!delivery) {
@@ -139,13 +194,13 @@ struct Recorder::Channel {
       }
       {
         const std::lock_guard lock(mutex);
-        if (delivery->kind == Delivery::Kind::event && delivery->reason == "disconnected") away = true;
-        if (delivery->kind == Delivery::Kind::event && delivery->reason == "reconnected") away = false;
         note(*delivery);
-        // Files come when they come, unless their folder is gone.
-        silent = delivery->kind == Delivery::Kind::timeout && (!source.can_wait() || away);
+        watch_silence(delivery->kind);
       }
-      if (delivery->kind == Delivery::Kind::end) break;
+      if (delivery->kind == Delivery::Kind::end) {
+        ended_by_itself = true;
+        break;
+      }
       take(*std::move(delivery));
     }
     for (Delivery& late : started ? source.unfinished() : std::vector<Delivery>{}) {
@@ -155,15 +210,38 @@ struct Recorder::Channel {
       }
       take(std::move(late));
     }
-    if (const std::string counted = source.transport_report(); !counted.empty()) log_event("transport", counted);
+    if (const std::string counted = source.transport_report(); !counted.empty())
+      log_event(EventKind::transport, counted);
+    {
+      const std::lock_guard lock(mutex);
+      over_at = Clock::now();
+    }
     source.stop();
+    if (status && !ended_by_itself) status = expect_stream();
     if (!status) {
       keep_first(status.error());
-      log_event("stream-error", status.error().message());
+      log_event(EventKind::stream_error, status.error().message());
     }
     const std::lock_guard lock(mutex);
     capture_over = true;
     changed.notify_all();
+  }
+
+  double away_s(const Away& outage) const {
+    return std::chrono::duration<double>(over_at.value_or(Clock::now()) - outage.since).count();
+  }
+
+  /// When a recording is stopped: whether the camera still is there.
+  Status expect_stream() {
+    const std::lock_guard lock(mutex);
+    if (away) {
+      return fail(ErrorKind::device, device.id,
+                  fmt::format("away for the last {:.1f} s ({})", away_s(*away), away->why),
+                  "what is recorded is safe; check its power and cable, then go on with --resume");
+    }
+    if (source_waits() || account.counts().any || writer_failed) return {};
+    return fail(ErrorKind::device, device.id, "not one frame came",
+                "check the camera (orbitfuse doctor), then go on with --resume");
   }
 
   std::optional<Item> pop() {
@@ -192,22 +270,22 @@ struct Recorder::Channel {
       return give_up(frame, space.error());
     }
     tell_what_is_known();
-    const Result<FrameRecord> record = writer.append(device.id, frame);
-    if (!record && record.error().kind == ErrorKind::input) {
-      account.lose(frame.id, Loss::rejected, "rejected: " + record.error().found);
+    const Result<StoredFrame> stored = writer.store(device.id, frame);
+    if (!stored && stored.error().kind == ErrorKind::input) {
+      account.lose(frame.id, Loss::rejected, "rejected: " + stored.error().found);
       return;
     }
-    if (!record) return give_up(frame, record.error());
+    if (!stored) return give_up(frame, stored.error());
     account.receive();
     {
       const std::lock_guard lock(mutex);
-      latest = *record;
+      latest = stored->record;
     }
-    if (on_frame) on_frame(*record);
+    if (on_frame) on_frame(stored->record, stored->pixels);
   }
 
   void give_up(const Frame& frame, const Error& cause) {
-    account.lose(frame.id, Loss::dropped, "not written");
+    account.lose(frame.id, Loss::unwritten, "not written");
     first_unwritten = frame.id;
     keep_first(cause);
     const std::lock_guard lock(mutex);
@@ -225,7 +303,7 @@ struct Recorder::Channel {
   void leave_for_resuming() {
     const std::uint64_t before = account.counts().lost();
     account.forget_from(*first_unwritten);
-    const EventRecord event{device.id, utc_now_ns(), "unwritten",
+    const EventRecord event{device.id, utc_now_ns(), std::string(name(EventKind::unwritten)),
                             fmt::format("{} frames are left for --resume", before - account.counts().lost())};
     if (const Status s = writer.append(event); !s) keep_first(s.error());
   }
@@ -236,7 +314,7 @@ struct Recorder::Channel {
       if (!frame) {
         if (const Status s = writer.append(std::get<EventRecord>(*item)); !s) keep_first(s.error());
       } else if (writer_failed) {
-        account.lose(frame->id, Loss::dropped, "not written");
+        account.lose(frame->id, Loss::unwritten, "not written");
       } else {
         write_gaps(frame->id);  // first: wherever the manifest ends, it accounts for every id up to there
         store(*frame);
@@ -251,8 +329,28 @@ struct Recorder::Channel {
   StreamStatus status() {
     const StreamAccount::Counts c = account.counts();
     const std::lock_guard lock(mutex);
-    return {device.id, c.received, c.lost(), c.first, c.last, c.missing, c.rejected, c.dropped,
-            silent, capture_over && queue.empty(), passed_over, passed_over_last, notice, latest};
+    StreamStatus s;
+    s.device = device.id;
+    s.modality = device.modality;
+    s.received = c.received;
+    s.lost = c.lost();
+    s.first_id = c.first;
+    s.last_id = c.last;
+    s.missing = c.missing;
+    s.rejected = c.rejected;
+    s.dropped = c.dropped;
+    s.unwritten = c.unwritten;
+    s.silent = silent;
+    s.ended = capture_over && queue.empty();
+    if (away) s.away = Absence{away_s(*away), away->why};
+    s.passed_over = passed_over;
+    s.passed_over_last = passed_over_last;
+    s.repeated = repeated;
+    s.notice = notice;
+    s.correction = correction;
+    s.corrections = corrections;
+    s.latest = latest;
+    return s;
   }
 };
 
@@ -262,6 +360,9 @@ Status RecorderOptions::validate() const {
   }
   if (next_timeout.count() < 1) {
     return fail(ErrorKind::usage, "recorder.next_timeout", fmt::format("{} ms", next_timeout.count()), "must be > 0");
+  }
+  if (silence.count() < 0) {
+    return fail(ErrorKind::usage, "recorder.silence", fmt::format("{} ms", silence.count()), "must be >= 0");
   }
   return {};
 }

@@ -118,7 +118,7 @@ Result<std::unique_ptr<SessionWriter>> SessionWriter::resume(const fs::path& fol
   }
   session.frames.clear();
   writer->session_ = std::move(session);
-  ORBITFUSE_TRY(writer->append(EventRecord{"", utc_now_ns(), "resumed", ""}));
+  ORBITFUSE_TRY(writer->append(EventRecord{"", utc_now_ns(), std::string(name(EventKind::resumed)), ""}));
   return writer;
 }
 
@@ -181,6 +181,11 @@ std::string SessionWriter::next_file_name(Modality modality, bool tracking, cons
 }
 
 Result<FrameRecord> SessionWriter::append(const std::string& device_id, const Frame& frame) {
+  ORBITFUSE_ASSIGN(StoredFrame stored, store(device_id, frame));
+  return std::move(stored.record);
+}
+
+Result<StoredFrame> SessionWriter::store(const std::string& device_id, const Frame& frame) {
   FrameRecord record;
   {
     const std::lock_guard lock(mutex_);
@@ -218,7 +223,7 @@ Result<FrameRecord> SessionWriter::append(const std::string& device_id, const Fr
   }
   ORBITFUSE_TRY(write_file_atomic(folder_ / record.file, encoded.bytes));
   ORBITFUSE_TRY(append_line(manifest_line(record)));
-  return record;
+  return StoredFrame{std::move(record), encoded.pixels};
 }
 
 Status SessionWriter::amend(const FrameRecord& record) {

@@ -12,6 +12,12 @@
 
 namespace orbitfuse {
 
+/// A frame that is on disk, and its image as it was decoded on the way there, upright.
+struct StoredFrame {
+  FrameRecord record;
+  cv::Mat pixels;
+};
+
 /// Appends to a session folder. When append() returns, the frame's file and its manifest line are
 /// on disk (fsynced): a kill at any moment leaves every acknowledged frame readable. Existing
 /// files are never overwritten. All functions may be called from several threads.
@@ -36,6 +42,7 @@ class SessionWriter {
   /// More is known of an announced device: model, serial, lens.
   Status update_device(const DeviceInfo& device);
   /// Stores the frame's image and its record; returns the record as written.
+  Result<StoredFrame> store(const std::string& device, const Frame& frame);
   Result<FrameRecord> append(const std::string& device, const Frame& frame);
   /// Writes a stored frame's record again, e.g. with the station that it was found to show; the
   /// last word about a file counts. Its image stays as it is.

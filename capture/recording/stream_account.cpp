@@ -29,8 +29,22 @@ void StreamAccount::lose(std::uint64_t id, Loss loss, const std::string& reason)
   add_gap(id, 1, loss, reason);
 }
 
+void StreamAccount::miss_until(std::uint64_t last_id, const std::string& reason) {
+  const std::lock_guard lock(mutex_);
+  if (!counts_.any || !next_id_ || last_id < *next_id_) return;
+  add_gap(*next_id_, last_id - *next_id_ + 1, Loss::missing, "missing: " + reason);
+  counts_.last = last_id;
+  next_id_ = last_id + 1;
+}
+
 std::uint64_t& StreamAccount::count_of(Loss loss) {
-  return loss == Loss::missing ? counts_.missing : loss == Loss::rejected ? counts_.rejected : counts_.dropped;
+  switch (loss) {
+    case Loss::missing: return counts_.missing;
+    case Loss::rejected: return counts_.rejected;
+    case Loss::dropped: return counts_.dropped;
+    case Loss::unwritten: break;
+  }
+  return counts_.unwritten;
 }
 
 void StreamAccount::add_gap(std::uint64_t first, std::uint64_t count, Loss loss, const std::string& reason) {

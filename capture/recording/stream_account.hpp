@@ -23,13 +23,17 @@ class StreamAccount {
   /// False when the id does not rise: such a delivery has no place in the stream.
   bool see(std::uint64_t id);
   void receive();
-  enum class Loss { missing, rejected, dropped };
+  enum class Loss { missing, rejected, dropped, unwritten };
   void lose(std::uint64_t id, Loss loss, const std::string& reason);
+  /// Nothing came up to this id, itself included. Without any id before it the stream has no span
+  /// that this could be the end of.
+  void miss_until(std::uint64_t last_id, const std::string& reason);
 
   struct Counts {
-    std::uint64_t received = 0, missing = 0, rejected = 0, dropped = 0, first = 0, last = 0;
+    std::uint64_t received = 0, missing = 0, rejected = 0, dropped = 0, unwritten = 0;
+    std::uint64_t first = 0, last = 0;
     bool any = false;
-    std::uint64_t lost() const { return missing + rejected + dropped; }
+    std::uint64_t lost() const { return missing + rejected + dropped + unwritten; }
   };
   Counts counts() const;
   /// Takes back what was said of the ids from `first` on, none of them received and no gap among

@@ -57,8 +57,8 @@ void drop_missing_files(Session& session) {
 
 }  // namespace
 
-bool FrameRecord::has_flag(const std::string& flag) const {
-  return std::find(flags.begin(), flags.end(), flag) != flags.end();
+bool FrameRecord::has_flag(FrameFlag flag) const {
+  return std::find(flags.begin(), flags.end(), name(flag)) != flags.end();
 }
 
 const DeviceInfo* Session::device(const std::string& id_wanted) const {

@@ -10,6 +10,7 @@
 
 #include "core/geometry/camera.hpp"
 #include "core/modality.hpp"
+#include "core/session/manifest_terms.hpp"
 #include "core/result.hpp"
 #include "core/geometry/transform.hpp"
 
@@ -72,14 +73,14 @@ struct FrameRecord {
   std::optional<Station> station;       ///< absent on tracking frames without guidance
   bool tracking = false;                ///< recorded between stations
   bool thermal_is_gray = false;         ///< 8-bit thermal: intensities, no temperatures
-  std::vector<std::string> flags;       ///< "nuc", "blurred", "overexposed", ...
+  std::vector<std::string> flags;       ///< name(FrameFlag); later versions may know more
   std::string content_hash;             ///< of the file's bytes
   std::optional<Rigid3d> cam_from_world;  ///< known pose; all of a session share one world
   std::optional<Camera> camera;           ///< known intrinsics of this frame
   std::string source;                     ///< imported frames: "folder/name" of the original file
   std::optional<FrameQuality> quality;
 
-  bool has_flag(const std::string& flag) const;
+  bool has_flag(FrameFlag flag) const;
 };
 
 /// A stretch of a device's stream that was lost, and why.
@@ -98,7 +99,7 @@ struct StreamRecord {
   std::uint64_t lost = 0;      ///< in the network, rejected as damaged, or dropped by policy
 };
 
-/// Something worth knowing later: "nuc", "reconnected", "clock", "resumed".
+/// Something worth knowing later; `kind`: name(EventKind), or what a later version writes.
 struct EventRecord {
   std::string device;  ///< empty: the whole session
   std::int64_t host_time_ns = 0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/system/cpu.hpp"
+#include "core/system/isa_wish.hpp"
 
 #include <cpuid.h>
 #include <sys/syscall.h>
@@ -50,6 +51,15 @@ Isa best_isa() {
     return best_isa(features_here(), wanted ? wanted : "", request_tiles);
   }();
   return isa;
+}
+
+Status check_isa_wish() {
+  const char* wanted = std::getenv("ORBITFUSE_ISA");
+  if (!wanted || !*wanted) return {};
+  for (Isa known : {Isa::avx2, Isa::avx512, Isa::avx512bf16, Isa::amx})
+    if (std::string_view(wanted) == name(known)) return {};
+  return fail(ErrorKind::usage, "ORBITFUSE_ISA", wanted,
+              "write avx2, avx512, avx512bf16 or amx, or unset it");
 }
 
 Isa best_isa(const CpuFeatures& features, std::string_view wanted, bool (*permit_tiles)()) {

@@ -6,6 +6,7 @@
 
 #include "drivers/aravis/gvcp_probe.hpp"
 #include "drivers/aravis/link.hpp"
+#include "drivers/aravis/teardown.hpp"
 #include "drivers/aravis/thermal_table.hpp"
 
 namespace orbitfuse::aravis {
@@ -35,13 +36,17 @@ std::optional<Format> format_of(ArvPixelFormat format) {
 }
 
 Status AravisSource::open() {
+  // An earlier source of this program may have had the same camera, under any of its names.
+  if (!Teardowns::all().wait(address_, std::chrono::seconds(5)))
+    return fail(ErrorKind::device, "camera " + options_.camera,
+                "an earlier connection to it is still being closed", "try again in a few seconds");
   auto link = std::make_shared<Link>();
   const std::string wanted = address_.empty() ? options_.camera : address_;
   const std::string where = wanted.empty() ? "GigE Vision camera" : "camera " + wanted;
   GError* error = nullptr;
   link->camera = arv_camera_new(wanted.empty() ? nullptr : wanted.c_str(), &error);
   if (!link->camera) {
-    return fail(ErrorKind::device, where, take(error),
+    return fail(ErrorKind::device, where, take_text(error),
                 "check power, cable and subnet (orbitfuse doctor)");
   }
   ArvDevice* device = arv_camera_get_device(link->camera);
@@ -75,6 +80,8 @@ Status AravisSource::open() {
                                              ARV_GV_PACKET_SIZE_ADJUSTMENT_ON_FAILURE_ONCE);
   }
   link_ = link;
+  // Whoever had it before may have left it streaming, and then it refuses settings.
+  arv_camera_stop_acquisition(link->camera, nullptr);
   const auto prepare = [&]() -> Status {
     ORBITFUSE_TRY(push_settings());
     ORBITFUSE_ASSIGN(table_, temperature_table());
@@ -85,7 +92,7 @@ Status AravisSource::open() {
                   "set PixelFormat in its profile");
     }
     link->payload = arv_camera_get_payload(link->camera, &error);
-    if (error) return fail(ErrorKind::device, where, take(error), "power-cycle the camera");
+    if (error) return fail(ErrorKind::device, where, take_text(error), "power-cycle the camera");
     if (link->payload < static_cast<std::size_t>(link->width) *
                             static_cast<std::size_t>(link->height) *
                             static_cast<std::size_t>(format->bytes)) {
@@ -94,14 +101,14 @@ Status AravisSource::open() {
     }
     link->stream = arv_camera_create_stream(link->camera, prefer_receiving, nullptr, &error);
     if (!link->stream)
-      return fail(ErrorKind::device, where, take(error), "check the network (orbitfuse doctor)");
+      return fail(ErrorKind::device, where, take_text(error), "check the network (orbitfuse doctor)");
     // Aravis gives a frame 200 ms for its resent packets; a loaded host needs longer now and then.
     if (ARV_IS_GV_STREAM(link->stream))
       g_object_set(link->stream, "frame-retention", 300'000u, nullptr);
     for (int i = 0; i < options_.buffers; ++i)
       arv_stream_push_buffer(link->stream, arv_buffer_new(link->payload, nullptr));
     arv_camera_start_acquisition(link->camera, &error);
-    if (error) return fail(ErrorKind::device, where, take(error), "power-cycle the camera");
+    if (error) return fail(ErrorKind::device, where, take_text(error), "power-cycle the camera");
     return {};
   };
   if (Status status = prepare(); !status) {
@@ -127,7 +134,7 @@ Status AravisSource::settle_image(Link& link, const std::string& where) {
   const auto read = [&]() -> Status {
     arv_camera_get_region(link.camera, &x, &y, &link.width, &link.height, &error);
     if (!error) link.pixel_format = arv_camera_get_pixel_format(link.camera, &error);
-    if (error) return fail(ErrorKind::device, where, take(error), "power-cycle the camera");
+    if (error) return fail(ErrorKind::device, where, take_text(error), "power-cycle the camera");
     return {};
   };
   ORBITFUSE_TRY(read());
@@ -180,37 +187,16 @@ Status AravisSource::push_settings() {
       ORBITFUSE_ASSIGN(profile_, find_profile(options_.profiles, info_.model));
     }
   }
-  ArvCamera* camera = link_->camera;
-  for (const auto& [feature, value] : profile_.settings) {
-    const std::string where = "profile " + profile_.name + ": " + feature;
-    if (!arv_camera_is_feature_available(camera, feature.c_str(), nullptr)) {
-      return fail(ErrorKind::usage, where, "the camera " + info_.model + " has no such feature",
-                  "correct the profile in config/cameras or choose another");
-    }
-    GError* error = nullptr;
-    bool verified = false;
-    if (const auto* b = std::get_if<bool>(&value)) {
-      arv_camera_set_boolean(camera, feature.c_str(), *b, &error);
-      verified = !error &&
-                 static_cast<bool>(arv_camera_get_boolean(camera, feature.c_str(), &error)) == *b;
-    } else if (const auto* i = std::get_if<std::int64_t>(&value)) {
-      arv_camera_set_integer(camera, feature.c_str(), *i, &error);
-      verified = !error && arv_camera_get_integer(camera, feature.c_str(), &error) == *i;
-    } else if (const auto* d = std::get_if<double>(&value)) {
-      arv_camera_set_float(camera, feature.c_str(), *d, &error);
-      verified = !error && std::abs(arv_camera_get_float(camera, feature.c_str(), &error) - *d) <=
-                               1e-6 * std::abs(*d);
-    } else {
-      const std::string& s = std::get<std::string>(value);
-      arv_camera_set_string(camera, feature.c_str(), s.c_str(), &error);
-      verified = !error && text(arv_camera_get_string(camera, feature.c_str(), &error)) == s;
-    }
-    if (error || !verified) {
-      const std::string why = error ? take(error) : "reads back another value";
-      return fail(ErrorKind::device, where, why,
-                  "correct the profile, or close another program that controls the camera");
-    }
+  {
+    const std::lock_guard lock(info_mutex_);
+    correctable_ = {};
+    if (profile_.nuc_command.empty())
+      correctable_ = fail(ErrorKind::unavailable, info_.id + ": shutter correction (NUC)",
+                          "the profile " + profile_.name + " names no command for it",
+                          "set nuc_command in it (config/cameras)");
   }
+  for (const auto& [feature, value] : profile_.settings)
+    ORBITFUSE_TRY(push_setting(link_->camera, "profile " + profile_.name, feature, value));
   return {};
 }
 
@@ -228,7 +214,7 @@ Result<std::vector<std::uint16_t>> AravisSource::temperature_table() {
     GError* error = nullptr;
     *field = arv_camera_get_float(link_->camera, node, &error);
     if (error)
-      return fail(ErrorKind::device, std::string("node ") + node, take(error),
+      return fail(ErrorKind::device, std::string("node ") + node, take_text(error),
                   "choose a profile with scale = \"linear\"");
   }
   return planck_table(parameters);

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <ctime>
 
-#include "drivers/aravis/gvcp_probe.hpp"
 #include "drivers/aravis/link.hpp"
+#include "drivers/aravis/teardown.hpp"
 
 namespace orbitfuse::aravis {
 namespace {
@@ -60,65 +60,11 @@ Status AravisSource::start() {
   return open();
 }
 
-/// Destroying a connection can block for seconds while the camera does not answer.
-void AravisSource::bury_link() {
-  control_watch_ = {};
-  if (!link_) return;
-  earlier_ += link_statistics();
-  std::erase_if(graves_, [](Grave& grave) {
-    if (!*grave.done) return false;
-    grave.thread.join();
-    return true;
-  });
-  auto done = std::make_shared<std::atomic<bool>>(false);
-  graves_.push_back({done, std::thread([link = std::move(link_), done]() mutable {
-                       link.reset();
-                       *done = true;
-                     })});
-  link_ = nullptr;
-}
-
 void AravisSource::stop() {
   bury_link();
-  for (Grave& grave : graves_) grave.thread.join();
-  graves_.clear();
-  away_ = false;
-}
-
-Delivery AravisSource::event(std::string kind, std::string detail) const {
-  Delivery delivery;
-  delivery.kind = Delivery::Kind::event;
-  delivery.reason = std::move(kind);
-  delivery.detail = std::move(detail);
-  return delivery;
-}
-
-Delivery AravisSource::lose(const std::string& why) {
-  bury_link();
-  away_ = true;
-  rhythm_.interrupt();
-  lost_at_ = last_frame_;
-  last_attempt_ = {};
-  return event("disconnected", why);
-}
-
-std::optional<Delivery> AravisSource::try_reopen() {
-  using namespace std::chrono_literals;
-  if (Clock::now() - last_attempt_ < 200ms) return std::nullopt;
-  last_attempt_ = Clock::now();
-  if (!answers(address_, 100ms)) return std::nullopt;
-  if (const Status status = open(); !status) {
-    if (!failure_.note(status.error().message())) return std::nullopt;
-    return event("reopen-failed", status.error().message());
-  }
-  failure_.clear();
-  away_ = false;
-  const double outage_s = std::chrono::duration<double>(Clock::now() - lost_at_).count();
-  const std::uint64_t cost = rhythm_.frames_in(outage_s);
-  next_id_ = base_id_ += cost;  // also if it is lost again before a frame
-  return event("reconnected",
-               fmt::format("{} after {:.1f} s, about {} frames; settings pushed and verified",
-                           address_, outage_s, cost));
+  // A camera that answers takes milliseconds; nobody waits for one that is gone.
+  Teardowns::all().wait(address_, std::chrono::seconds(1));
+  state_ = State::streaming;
 }
 
 Result<Delivery> AravisSource::next(std::chrono::milliseconds timeout) {
@@ -127,9 +73,10 @@ Result<Delivery> AravisSource::next(std::chrono::milliseconds timeout) {
     pending_.erase(pending_.begin());
     return delivery;
   }
-  if (away_) {
-    if (std::optional<Delivery> back = try_reopen()) return std::move(*back);
-    std::this_thread::sleep_for(std::min(timeout, std::chrono::milliseconds(100)));
+  if (state_ == State::away) {
+    if (std::optional<Delivery> failed = try_reopen()) return std::move(*failed);
+    if (state_ == State::away)
+      std::this_thread::sleep_for(std::min(timeout, std::chrono::milliseconds(100)));
     return Delivery{};
   }
   if (!link_)
@@ -139,123 +86,140 @@ Result<Delivery> AravisSource::next(std::chrono::milliseconds timeout) {
   if (correction_wanted_.exchange(false)) return correct_as_asked();
   if (control_mute_ != mute_told_) {
     mute_told_ = control_mute_;
-    return event(mute_told_ ? "control-silent" : "control-back", address_);
+    return event_delivery(mute_told_ ? EventKind::control_silent : EventKind::control_back,
+                          address_);
   }
   const auto wait = std::min(timeout, options_.silence / 2);
   ArvBuffer* buffer = arv_stream_timeout_pop_buffer(
       link_->stream,
       static_cast<guint64>(std::chrono::duration_cast<std::chrono::microseconds>(wait).count()));
-  if (!buffer) {
-    const auto quiet = Clock::now() - last_frame_;
-    if (quiet > options_.give_up) return lose("no frame for a second; reopening it");
-    if (quiet > options_.silence && !silent_told_) {
-      silent_told_ = true;
-      return event("silent", fmt::format("no frame for {} ms", options_.silence.count()));
-    }
-    return Delivery{};
-  }
+  return buffer ? take(buffer) : on_silence();
+}
+
+Delivery AravisSource::on_silence() {
+  const auto quiet = Clock::now() - last_frame_;
+  if (quiet > options_.give_up) return lose("no frame for a second; reopening it");
+  if (quiet <= options_.silence || silent_told_ || state_ == State::proving) return {};
+  silent_told_ = true;
+  return event_delivery(EventKind::silent,
+                        fmt::format("no frame for {} ms", options_.silence.count()));
+}
+
+Delivery AravisSource::take(void* handle) {
+  auto* buffer = static_cast<ArvBuffer*>(handle);
   last_frame_ = Clock::now();  // damaged or not: the stream lives
   silent_told_ = false;
-  Delivery delivery = inspect(buffer);
+  const std::int64_t utc_ns = arrival_of(buffer);
+  const Arrival arrival{utc_ns, Clock::now() - std::chrono::nanoseconds(wall_ns() - utc_ns)};
+  Delivery delivery = state_ == State::proving ? come_back(buffer, arrival) : inspect(buffer, arrival);
   arv_stream_push_buffer(link_->stream, buffer);
   // Late packets make one such frame; a camera that counts from 1 again makes nothing else.
   if (duplicates_in_a_row_ >= 3) return lose("the camera's frame numbers restarted; reopening it");
   return delivery;
 }
 
-Delivery AravisSource::inspect(void* handle) {
+/// Why Aravis' buffer is no frame of this stream; empty: it is one.
+std::string AravisSource::damage(void* handle) {
   auto* buffer = static_cast<ArvBuffer*>(handle);
-  Delivery delivery;
-  delivery.kind = Delivery::Kind::rejected;
-  const std::int64_t arrival_ns = arrival_of(buffer);
-  const Clock::time_point came_at = Clock::now() - std::chrono::nanoseconds(wall_ns() - arrival_ns);
-  const auto frame_id = static_cast<std::uint16_t>(arv_buffer_get_frame_id(buffer));
-  const std::optional<std::uint64_t> count = counter_.unwrap(frame_id);
-  if (!count) {
-    // A frame number that was counted already: late packets of a frame that was given up.
-    ++duplicates_in_a_row_;
-    return event("duplicate", fmt::format("frame id {} again", frame_id));
-  }
-  duplicates_in_a_row_ = 0;
-  delivery.frame.id = base_id_ + *count;
-  next_id_ = delivery.frame.id + 1;
-  rhythm_.note(delivery.frame.id,
-               std::chrono::duration_cast<std::chrono::nanoseconds>(came_at.time_since_epoch()).count());
-
   const ArvBufferStatus status = arv_buffer_get_status(buffer);
-  guint64 mismatches = arv_stream_get_info_uint64_by_name(link_->stream, "n_size_mismatch_errors");
+  const guint64 mismatches =
+      arv_stream_get_info_uint64_by_name(link_->stream, "n_size_mismatch_errors");
   const bool mismatch = mismatches != mismatches_;
   mismatches_ = mismatches;
   if (status != ARV_BUFFER_STATUS_SUCCESS) {
     const bool packets =
         status == ARV_BUFFER_STATUS_MISSING_PACKETS || status == ARV_BUFFER_STATUS_TIMEOUT;
-    delivery.reason =
-        packets ? "packets are missing" : fmt::format("Aravis status {}", static_cast<int>(status));
-    if (mismatch) delivery.reason += ", larger than announced";
-    return delivery;
+    return (packets ? "packets are missing"
+                    : fmt::format("Aravis status {}", static_cast<int>(status))) +
+           (mismatch ? ", larger than announced" : "");
   }
   const int width = arv_buffer_get_image_width(buffer),
             height = arv_buffer_get_image_height(buffer);
+  if (mismatch || width != link_->width || height != link_->height)
+    return fmt::format("{}x{} where {}x{} is set", width, height, link_->width, link_->height);
   const ArvPixelFormat pixel_format = arv_buffer_get_image_pixel_format(buffer);
-  if (mismatch || width != link_->width || height != link_->height) {
-    delivery.reason =
-        fmt::format("{}x{} where {}x{} is set", width, height, link_->width, link_->height);
-    return delivery;
-  }
-  if (pixel_format != link_->pixel_format) {
-    delivery.reason =
-        fmt::format("pixel format {:#x} where {:#x} is set", pixel_format, link_->pixel_format);
-    return delivery;
-  }
-  const Format format = *format_of(pixel_format);
+  if (pixel_format != link_->pixel_format)
+    return fmt::format("pixel format {:#x} where {:#x} is set", pixel_format, link_->pixel_format);
   std::size_t size = 0;
-  const void* data = arv_buffer_get_data(buffer, &size);
-  const std::size_t needed = static_cast<std::size_t>(width) * static_cast<std::size_t>(height) *
-                             static_cast<std::size_t>(format.bytes);
-  if (size < needed) {
-    delivery.reason = fmt::format("{} bytes where {} are needed", size, needed);
-    return delivery;
+  arv_buffer_get_data(buffer, &size);
+  const std::size_t needed = link_->image_bytes();
+  return size < needed ? fmt::format("{} bytes where {} are needed", size, needed) : "";
+}
+
+Delivery AravisSource::inspect(void* handle, const Arrival& arrival) {
+  auto* buffer = static_cast<ArvBuffer*>(handle);
+  const auto number = static_cast<std::uint16_t>(arv_buffer_get_frame_id(buffer));
+  const std::optional<std::uint64_t> count = counter_.unwrap(number);
+  if (!count) {
+    // A frame number that was counted already: late packets of a frame that was given up.
+    ++duplicates_in_a_row_;
+    return event_delivery(EventKind::repeated_id, fmt::format("frame id {} again", number));
   }
+  duplicates_in_a_row_ = 0;
+  Delivery delivery;
+  delivery.frame.id = base_id_ + *count;
+  next_id_ = delivery.frame.id + 1;
+  last_number_ = number;
+  last_came_ = arrival.at;
+  rhythm_.note(delivery.frame.id,
+               std::chrono::duration_cast<std::chrono::nanoseconds>(arrival.at.time_since_epoch()).count());
+  delivery.kind = Delivery::Kind::rejected;
+  delivery.reason = damage(buffer);
+  if (!delivery.reason.empty()) return delivery;
+
+  const Format format = *format_of(link_->pixel_format);
+  const std::size_t needed = link_->image_bytes();
+  const void* data = arv_buffer_get_data(buffer, nullptr);
 
   delivery.kind = Delivery::Kind::frame;
   Frame& frame = delivery.frame;
   frame.device_time_ns = static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer));
-  const ClockMap::Stamp stamp = clock_.add(frame.device_time_ns, arrival_ns);
+  const ClockMap::Stamp stamp = clock_.add(frame.device_time_ns, arrival.utc_ns);
   frame.host_time_ns = stamp.host_time_ns;
-  if (stamp.event) pending_.push_back(event("clock", *stamp.event));
-  cv::Mat(height, width, format.cv_type, const_cast<void*>(data)).copyTo(frame.pixels);
-  if (options_.modality == Modality::thermal && freeze_.mark(frame, data, needed, came_at))
-    pending_.push_back(event("nuc", "the image is frozen"));
+  if (stamp.event) pending_.push_back(event_delivery(EventKind::clock, *stamp.event));
+  cv::Mat(link_->height, link_->width, format.cv_type, const_cast<void*>(data)).copyTo(frame.pixels);
+  if (options_.modality == Modality::thermal && freeze_.mark(frame, data, needed, arrival.at))
+    pending_.push_back(event_delivery(EventKind::nuc, "the image is frozen"));
   if (format.bytes == 1) {
     frame.thermal_is_gray = options_.modality == Modality::thermal;
   } else if (table_.empty()) {
     if (const auto stretch = raw_counts_.apply(frame))
-      pending_.push_back(event("raw-counts", *stretch));
+      pending_.push_back(event_delivery(EventKind::raw_counts, *stretch));
   } else {
     frame.pixels.forEach<std::uint16_t>([this](std::uint16_t& dn, const int*) { dn = table_[dn]; });
   }
   return delivery;
 }
 
+Status AravisSource::request_correction() {
+  const std::lock_guard lock(info_mutex_);
+  ORBITFUSE_TRY(correctable_);
+  correction_wanted_ = true;
+  return {};
+}
+
 Status AravisSource::correct_nonuniformity() {
   if (!link_)
     return fail(ErrorKind::device, "NUC", "the camera is not connected", "wait until it is back");
-  if (profile_.nuc_command.empty())
-    return fail(ErrorKind::unavailable, "NUC", "not known for " + profile_.name,
-                "set nuc_command in its profile");
+  {
+    const std::lock_guard lock(info_mutex_);
+    ORBITFUSE_TRY(correctable_);
+  }
   GError* error = nullptr;
   arv_camera_execute_command(link_->camera, profile_.nuc_command.c_str(), &error);
-  if (error) return fail(ErrorKind::device, "NUC", take(error), "try again");
+  if (error) return fail(ErrorKind::device, "NUC", take_text(error), "try again");
   freeze_.expect();
   return {};
 }
 
 Delivery AravisSource::correct_as_asked() {
   // Asking would wait for the answer, seconds long, and the stream with it.
-  if (control_mute_) return event("nuc-failed", "the camera does not answer on its control channel");
+  if (control_mute_)
+    return event_delivery(EventKind::nuc_failed,
+                          "the camera does not answer on its control channel");
   if (const Status status = correct_nonuniformity(); !status)
-    return event("nuc-failed", status.error().message());
-  return event("nuc", "asked for by the operator");
+    return event_delivery(EventKind::nuc_failed, status.error().message());
+  return event_delivery(EventKind::nuc, "asked for by the operator");
 }
 
 StreamStatistics& StreamStatistics::operator+=(const StreamStatistics& other) {
@@ -263,7 +227,6 @@ StreamStatistics& StreamStatistics::operator+=(const StreamStatistics& other) {
   failures += other.failures;
   underruns += other.underruns;
   resent += other.resent;
-  missing_packets += other.missing_packets;
   size_mismatches += other.size_mismatches;
   return *this;
 }
@@ -275,10 +238,10 @@ StreamStatistics AravisSource::statistics() const {
 
 std::string AravisSource::transport_report() const {
   const StreamStatistics s = statistics();
+  // Not Aravis' count of missing packets: of a damaged frame it counts all after the first hole.
   return fmt::format(
-      "{} buffers completed, {} failed, {} underruns; {} packets resent, {} missing; {} of another "
-      "size",
-      s.completed, s.failures, s.underruns, s.resent, s.missing_packets, s.size_mismatches);
+      "{} buffers completed, {} failed, {} underruns; {} packets resent; {} of another size",
+      s.completed, s.failures, s.underruns, s.resent, s.size_mismatches);
 }
 
 StreamStatistics AravisSource::link_statistics() const {
@@ -288,7 +251,7 @@ StreamStatistics AravisSource::link_statistics() const {
     return arv_stream_get_info_uint64_by_name(link_->stream, key);
   };
   return {info("n_completed_buffers"), info("n_failures"),        info("n_underruns"),
-          info("n_resent_packets"),    info("n_missing_packets"), info("n_size_mismatch_errors")};
+          info("n_resent_packets"),    info("n_size_mismatch_errors")};
 }
 
 }  // namespace orbitfuse::aravis

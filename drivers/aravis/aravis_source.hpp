@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "capture/clock/clock_map.hpp"
@@ -31,23 +32,26 @@ struct AravisOptions {
   std::chrono::milliseconds silence{400};  ///< told as "silent" after this long without a frame
   std::chrono::milliseconds give_up{1000}; ///< and reopened after this long
   std::chrono::milliseconds nuc_settle{500};  ///< frames right after a shutter freeze still drift
+  /// After two reopenings without a frame the next one waits this long, then twice as long each
+  /// time up to the most: a camera that is opened again and again may never come up.
+  std::chrono::milliseconds patience{2000}, most_patience{10000};
 
   Status validate() const;
 };
 
 struct StreamStatistics {
-  std::uint64_t completed = 0, failures = 0, underruns = 0, resent = 0, missing_packets = 0, size_mismatches = 0;
+  std::uint64_t completed = 0, failures = 0, underruns = 0, resent = 0, size_mismatches = 0;
 
   StreamStatistics& operator+=(const StreamStatistics& other);
 };
 
 /// A GigE Vision camera. Aravis calls some damaged frames good, so every frame is checked for its
 /// data size, width, height, pixel format and Aravis' own mismatch counter; ids are counted here
-/// (16 bits, never 0); silence of the stream
-/// or of the control channel is told within half a second; a lost camera is torn down on another
-/// thread, probed for, reopened, and its settings pushed and verified again. Frozen (bit-equal)
-/// frames are flagged "nuc". The ids leave room for the frames that an outage cost, as far as its
-/// length tells, so that they count as lost.
+/// (16 bits, never 0); silence of the stream or of the control channel is told within half a second.
+/// A lost camera is torn down on another thread; when that is over it is probed for, reopened, and
+/// its settings pushed and verified again. It is back with its first frame. Frozen (bit-equal)
+/// frames are flagged nuc. Ids leave room for the frames that an outage cost, so that they count as
+/// lost: by the camera's own numbers where these went on, else by the outage's length.
 class AravisSource final : public FrameSource {
  public:
   explicit AravisSource(AravisOptions options);
@@ -59,7 +63,8 @@ class AravisSource final : public FrameSource {
   void stop() override;
 
   /// Done by the next next().
-  void request_correction() override { correction_wanted_ = true; }
+  Status request_correction() override;
+  std::vector<Delivery> unfinished() override;
   std::string transport_report() const override;
   /// Asks the camera for a shutter correction now; frames until it settles are flagged.
   Status correct_nonuniformity();
@@ -71,6 +76,12 @@ class AravisSource final : public FrameSource {
   struct Link;
   using Clock = std::chrono::steady_clock;
 
+  enum class State {
+    streaming,  ///< the stream runs, or it is not started
+    away,       ///< lost; there is no connection
+    proving,    ///< opened again, but no frame has come yet
+  };
+
   Status open();
   Status push_settings();
   Status settle_image(Link& link, const std::string& where);
@@ -78,43 +89,51 @@ class AravisSource final : public FrameSource {
   void bury_link();
   void watch_control();
   Delivery lose(const std::string& why);
-  Delivery event(std::string kind, std::string detail) const;
   Delivery correct_as_asked();
   StreamStatistics link_statistics() const;
   std::optional<Delivery> try_reopen();
-  Delivery inspect(void* buffer);
+  Delivery on_silence();
+  Delivery take(void* buffer);
+  struct Arrival {
+    std::int64_t utc_ns;
+    Clock::time_point at;
+  };
+  Delivery come_back(void* buffer, const Arrival& arrival);
+  Delivery inspect(void* buffer, const Arrival& arrival);
+  std::string damage(void* buffer);
+  void drain(std::vector<Delivery>& list);
 
   AravisOptions options_;
   CameraProfile profile_;
   std::shared_ptr<Link> link_;
-  struct Grave {
-    std::shared_ptr<std::atomic<bool>> done;
-    std::thread thread;
-  };
   struct Image {
     int width = 0, height = 0;
     unsigned pixel_format = 0;
   };
-  std::vector<Grave> graves_;          ///< connections that are being destroyed
   std::optional<Image> first_image_;   ///< a session keeps its size
   std::jthread control_watch_;
   std::atomic<bool> control_mute_{false}, correction_wanted_{false};
   StreamStatistics earlier_;           ///< of connections that are gone
   std::vector<std::uint16_t> table_;
   std::vector<Delivery> pending_;
-  mutable std::mutex info_mutex_;      ///< describe() comes from other threads while a camera reopens
+  mutable std::mutex info_mutex_;      ///< others ask while a camera reopens
   DeviceInfo info_;
+  Status correctable_;                 ///< why not, where it isn't
   std::string address_;
   GvspFrameCounter counter_;
   ClockMap clock_;
   RawCounts raw_counts_;
   FreezeWatch freeze_;
+  std::uint16_t last_number_ = 0;      ///< the camera's, of the last frame
   LastingFailure failure_;             ///< to reopen
   std::uint64_t base_id_ = 0, next_id_ = 0, mismatches_ = 0;
   FrameRhythm rhythm_;                 ///< tells how many frames an outage cost
   int duplicates_in_a_row_ = 0;
-  bool away_ = false, silent_told_ = false, mute_told_ = false;
-  Clock::time_point last_frame_{}, last_attempt_{}, lost_at_{};
+  State state_ = State::streaming;
+  bool silent_told_ = false, mute_told_ = false;
+  int fruitless_ = 0;                  ///< reopenings of this outage without a frame
+  Clock::time_point last_frame_{};     ///< or the opening of its connection
+  Clock::time_point last_came_{}, next_attempt_{};  ///< last_came_: of a frame, by its first packet
 };
 
 struct FoundCamera {

@@ -114,7 +114,7 @@ class ReplaySource : public FrameSource {
     frame.encoded = *std::move(bytes);
     const std::filesystem::path file(record.file);
     const auto counts = session_.folder / file.parent_path() / "originals" / (file.stem().string() + ".tiff");
-    if (record.has_flag("raw-counts")) {
+    if (record.has_flag(FrameFlag::raw_counts)) {
       if (const Result<std::string> tiff = read_file(counts)) {
         if (const Result<cv::Mat> original = decode_tiff(*tiff, counts.string())) frame.original = *original;
       }

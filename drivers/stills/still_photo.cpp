@@ -70,7 +70,7 @@ Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& 
     still.size = frame.pixels.size();
   }
   if (!converted.gray.empty()) {
-    frame.flags.push_back("raw-counts");
+    frame.flag(FrameFlag::raw_counts);
     frame.original = file.image;
   }
   frame.host_time_ns = taken_ns(file).value_or(0);

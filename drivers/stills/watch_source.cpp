@@ -100,7 +100,7 @@ std::vector<Delivery> WatchSource::unfinished() {
   const auto unread = [&](const fs::path& file) {
     std::error_code error;
     const bool empty = fs::file_size(file, error) == 0 && !error;
-    list.push_back(event("ignored", file.filename().string() +
+    list.push_back(event_delivery(EventKind::ignored, file.filename().string() +
                                         (empty ? ": an empty file"
                                                : ": not read before the recording ended; go on with "
                                                  "--resume and existing=yes")));
@@ -122,14 +122,6 @@ std::vector<Delivery> WatchSource::unfinished() {
 
 void WatchSource::stop() { reader_->watch.close(); }
 
-Delivery WatchSource::event(std::string kind, std::string detail) const {
-  Delivery delivery;
-  delivery.kind = Delivery::Kind::event;
-  delivery.reason = std::move(kind);
-  delivery.detail = std::move(detail);
-  return delivery;
-}
-
 Result<Delivery> WatchSource::next(std::chrono::milliseconds timeout) {
   const auto deadline = Clock::now() + timeout;
   while (true) {
@@ -147,7 +139,8 @@ Result<Delivery> WatchSource::next(std::chrono::milliseconds timeout) {
     const auto found = reader_->watch.wait(std::min(left, queue_.empty() ? left : retry_every));
     if (reader_->watch.folder_gone() != gone_told_) {
       gone_told_ = !gone_told_;
-      return event(gone_told_ ? "disconnected" : "reconnected", options_.folder.string());
+      return event_delivery(gone_told_ ? EventKind::disconnected : EventKind::reconnected,
+                            options_.folder.string());
     }
     for (const fs::path& file : found) {
       // Written again while it waits for its rest: one attempt is enough.
@@ -161,19 +154,19 @@ Result<Delivery> WatchSource::next(std::chrono::milliseconds timeout) {
 std::optional<Delivery> WatchSource::take(Attempt attempt) {
   const std::string name = attempt.file.filename().string();
   if (!has_image_name(attempt.file)) {
-    return event("ignored",
+    return event_delivery(EventKind::ignored,
                  name + ": not a JPEG, PNG, TIFF or BMP (set the camera to one of these)");
   }
   const bool thermal = options_.modality == Modality::thermal;
   const bool radiometric = is_radiometric(attempt.file);
-  if (!thermal && radiometric) return event("ignored", name + ": a thermal image, not a photo");
+  if (!thermal && radiometric) return event_delivery(EventKind::ignored, name + ": a thermal image, not a photo");
   Result<StillPhoto> still = thermal ? read_thermal_still(attempt.file, reader_->decoder)
                                      : read_visible_still(attempt.file);
   Delivery delivery;
   if (!still) {
     std::error_code error;
     if (!fs::exists(attempt.file, error))
-      return event("ignored", name + ": vanished before it was read");
+      return event_delivery(EventKind::ignored, name + ": vanished before it was read");
     if (Clock::now() - attempt.first_try < options_.give_up) {
       attempt.next_try = Clock::now() + retry_every;
       attempt.why = still.error().found;
@@ -183,21 +176,21 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
     return rejection(name, still.error().found);
   }
   if (thermal && still->frame.thermal_is_gray && !options_.accept_gray) {
-    return event("ignored", name + ": no temperatures in it (gray=yes takes it all the same)");
+    return event_delivery(EventKind::ignored, name + ": no temperatures in it (gray=yes takes it all the same)");
   }
   const Result<std::string> bytes = read_file(attempt.file, max_image_bytes);
   if (!bytes || !seen_hashes_.insert(content_hash(*bytes)).second) {
-    return event("duplicate", name + ": the same image came before");
+    return event_delivery(EventKind::duplicate, name + ": the same image came before");
   }
   delivery.frame = std::move(still->frame);
   if (delivery.frame.host_time_ns == 0) {
     delivery.frame.host_time_ns = written_ns(attempt.file);
-    delivery.frame.flags.emplace_back("file-time");  // of copying, perhaps
+    delivery.frame.flag(FrameFlag::file_time);  // of copying, perhaps
   }
   delivery.frame.source =
       (attempt.file.parent_path().filename() / attempt.file.filename()).string();
   if (seen_files_.contains({delivery.frame.source, delivery.frame.host_time_ns})) {
-    return event("duplicate", name + ": in the session already");
+    return event_delivery(EventKind::duplicate, name + ": in the session already");
   }
   delivery.frame.id = next_id_++;
   {
@@ -222,7 +215,7 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
     }
   }
   delivery.kind = Delivery::Kind::frame;
-  delivery.frame.flags.push_back("still");
+  delivery.frame.flag(FrameFlag::still);
   return delivery;
 }
 

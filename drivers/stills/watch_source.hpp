@@ -58,7 +58,6 @@ class WatchSource final : public FrameSource {
     std::chrono::steady_clock::time_point first_try, next_try;
     std::string why;  ///< it could not be read; empty: it was not looked at yet
   };
-  Delivery event(std::string kind, std::string detail) const;
   Delivery rejection(const std::string& name, const std::string& why);
   std::optional<Delivery> take(Attempt attempt);
 

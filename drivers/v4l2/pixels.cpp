@@ -85,7 +85,7 @@ Status unpack(std::span<const std::uint8_t> bytes, const Layout& layout, Frame& 
     case V4L2_PIX_FMT_GREY: frame.pixels = view(CV_8UC1).clone(); break;
     default:
       frame.pixels = y16_pixels(view(CV_16UC1), layout.kelvin_per_dn);
-      if (layout.kelvin_per_dn <= 0) frame.flags.push_back("raw-counts");
+      if (layout.kelvin_per_dn <= 0) frame.flag(FrameFlag::raw_counts);
   }
   return {};
 }

@@ -74,7 +74,7 @@ void V4l2Source::lock(const Lock& control, int wanted) {
   v4l2_control value{control.value_control, wanted}, check = value;
   const bool set = ioctl(VIDIOC_S_CTRL, &value) == 0 && ioctl(VIDIOC_G_CTRL, &check) == 0;
   if (set && check.value == wanted) return;
-  tell("setting-lost",
+  tell(EventKind::setting_lost,
        set ? fmt::format("{} is not locked: wanted {}, the camera has {}", control.name, wanted,
                          check.value)
            : fmt::format("{} is not locked: the camera refuses {}", control.name, wanted));

@@ -51,7 +51,7 @@ void V4l2Source::stop() {
   away_ = false;
 }
 
-Delivery V4l2Source::lose(const std::string& event, const std::string& why) {
+Delivery V4l2Source::lose(EventKind kind, const std::string& why) {
   close_device();
   // Nobody plugs a camera in again within half a second: one like it elsewhere is its twin.
   using namespace std::chrono_literals;
@@ -63,15 +63,11 @@ Delivery V4l2Source::lose(const std::string& event, const std::string& why) {
   rhythm_.interrupt();
   lost_at_ = last_frame_;  // set on reopening too: an earlier outage is counted already
   last_attempt_ = {};
-  Delivery delivery;
-  delivery.kind = Delivery::Kind::event;
-  delivery.reason = event;
-  delivery.detail = why;
-  return delivery;
+  return event_delivery(kind, why);
 }
 
 Delivery V4l2Source::stall(const std::string& why) {
-  Delivery event = lose("stalled", why + "; reopening it");
+  Delivery event = lose(EventKind::stalled, why + "; reopening it");
   if (++stalls_in_a_row_ < 2 || !options_.reset_port || node_.usb_path.empty()) return event;
   const Status reset = options_.reset_port(node_.usb_path);
   event.detail = why + " again; " + (reset ? "its USB port was reset" : reset.error().message());
@@ -86,11 +82,7 @@ std::optional<Delivery> V4l2Source::try_reopen() {
   if (!node) return tell_look_alike();
   if (const Status status = open_and_stream(*node); !status) {
     if (!failure_.note(status.error().message())) return std::nullopt;
-    Delivery event;
-    event.kind = Delivery::Kind::event;
-    event.reason = "reopen-failed";
-    event.detail = status.error().message();
-    return event;
+    return event_delivery(EventKind::reopen_failed, status.error().message());
   }
   failure_.clear();
   away_ = false;
@@ -98,14 +90,13 @@ std::optional<Delivery> V4l2Source::try_reopen() {
   // Ids leave room for what the outage cost, so that it counts as lost.
   const std::uint64_t cost = rhythm_.frames_in(outage_s);
   next_id_ = base_id_ += cost;  // also if it is lost again before a frame
-  Delivery delivery;
-  delivery.kind = Delivery::Kind::event;
-  delivery.reason = "reconnected";
-  delivery.detail = fmt::format("{} after {:.1f} s, about {} frames", node_.path, outage_s, cost);
+  Delivery delivery = event_delivery(
+      EventKind::reconnected,
+      fmt::format("{} after {:.1f} s, about {} frames", node_.path, outage_s, cost));
   moved_ = node_.usb_path != identity_->node.usb_path;
   ports_looked_at_ = Clock::now();
   if (moved_) {
-    tell("moved",
+    tell(EventKind::moved,
          fmt::format("the camera of serial {} is at usb:{} now, it was at usb:{}; if this is another "
                      "camera of that serial, stop and put the first one back",
                      node_.serial, node_.usb_path, identity_->node.usb_path));
@@ -121,13 +112,10 @@ std::optional<Delivery> V4l2Source::tell_look_alike() {
   const auto other = look_alike(*system_, *identity_);
   if (!other) return std::nullopt;
   look_alike_told_ = true;
-  Delivery event;
-  event.kind = Delivery::Kind::event;
-  event.reason = "look-alike";
-  event.detail = fmt::format("a camera like it is at usb:{} and is not taken for it; plug the "
-                             "session's into usb:{} again",
-                             other->usb_path, identity_->node.usb_path);
-  return event;
+  return event_delivery(EventKind::look_alike,
+                        fmt::format("a camera like it is at usb:{} and is not taken for it; plug "
+                                    "the session's into usb:{} again",
+                                    other->usb_path, identity_->node.usb_path));
 }
 
 /// While a camera in another port is taken for it.
@@ -155,15 +143,15 @@ Result<Delivery> V4l2Source::next(std::chrono::milliseconds timeout) {
   if (fd_ < 0) return fail(ErrorKind::device, options_.camera, "not started", "call start() first");
   if (original_is_back()) {
     identity_->port_only = true;
-    return lose("twin", fmt::format("there are two cameras of serial {}; going back to the one at "
+    return lose(EventKind::twin, fmt::format("there are two cameras of serial {}; going back to the one at "
                                     "usb:{}; frames flagged other-port are the other's",
                                     identity_->node.serial, identity_->node.usb_path));
   }
   pollfd waiter{fd_, POLLIN, 0};
   const int ready = system_->poll(&waiter, 1, static_cast<int>(timeout.count()));
-  if (ready < 0 && errno != EINTR) return lose("disconnected", std::strerror(errno));
+  if (ready < 0 && errno != EINTR) return lose(EventKind::disconnected, std::strerror(errno));
   if (ready > 0 && (waiter.revents & POLLIN)) return dequeue();
-  if (ready > 0) return lose("disconnected", "the device reports an error");
+  if (ready > 0) return lose(EventKind::disconnected, "the device reports an error");
   if (Clock::now() - last_frame_ > options_.stall) return stall("no frame");
   return Delivery{};
 }
@@ -176,15 +164,15 @@ Result<Delivery> V4l2Source::dequeue() {
     if (errno == EAGAIN) return Delivery{};
     // A stream that breaks before its first frame would break again after mere reopening.
     if (errno == EIO && !last_sequence_) return stall("the stream broke before its first frame");
-    return lose("disconnected", std::strerror(errno));  // ENODEV: unplugged; EIO: the stream broke
+    return lose(EventKind::disconnected, std::strerror(errno));  // ENODEV: unplugged; EIO: the stream broke
   }
-  if (buffer.index >= buffers_.size()) return lose("disconnected", "the driver answers nonsense");
+  if (buffer.index >= buffers_.size()) return lose(EventKind::disconnected, "the driver answers nonsense");
   // When a transfer fails uvcvideo hands every buffer back empty, with the number of an old frame.
   const bool old =
       last_sequence_ && static_cast<std::int32_t>(buffer.sequence - *last_sequence_) <= 0;
   if ((buffer.flags & V4L2_BUF_FLAG_ERROR) && buffer.bytesused == 0) {
     if (old)
-      return lose("disconnected", "a transfer failed: the driver gave its buffers back empty");
+      return lose(EventKind::disconnected, "a transfer failed: the driver gave its buffers back empty");
     if (!last_sequence_) return empty_at_start(buffer);
   }
   last_frame_ = Clock::now();
@@ -207,7 +195,7 @@ Result<Delivery> V4l2Source::dequeue() {
   // The wall clock may be set while recording; times in a session rise all the same.
   const ClockMap::Stamp stamp = clock_.add(stamp_ns, arrival_ns);
   delivery.frame.host_time_ns = stamp.host_time_ns;
-  if (stamp.event) tell("clock", *stamp.event);
+  if (stamp.event) tell(EventKind::clock, *stamp.event);
   watch_rhythm(id, stamp_ns > 0 ? stamp_ns : monotonic_ns);
   if (adapting_ && delivery.kind == Delivery::Kind::frame) {
     if (adapting_since_ns_ == 0) adapting_since_ns_ = monotonic_ns;
@@ -215,7 +203,7 @@ Result<Delivery> V4l2Source::dequeue() {
       lock_adapted();
   }
   if (ioctl(VIDIOC_QBUF, &buffer) < 0)
-    pending_.push_back(lose("disconnected", std::strerror(errno)));
+    pending_.push_back(lose(EventKind::disconnected, std::strerror(errno)));
   return delivery;
 }
 
@@ -223,7 +211,7 @@ Result<Delivery> V4l2Source::dequeue() {
 /// hangs.
 Result<Delivery> V4l2Source::empty_at_start(v4l2_buffer& buffer) {
   if (++empty_at_start_ > options_.buffers) return stall("only empty buffers");
-  if (ioctl(VIDIOC_QBUF, &buffer) < 0) return lose("disconnected", std::strerror(errno));
+  if (ioctl(VIDIOC_QBUF, &buffer) < 0) return lose(EventKind::disconnected, std::strerror(errno));
   return Delivery{};
 }
 
@@ -234,18 +222,28 @@ void V4l2Source::watch_rhythm(std::uint64_t id, std::int64_t stamp_ns) {
   // A camera of unsteady rate (phones) would fill the manifest.
   if (Clock::now() - last_late_event_ < std::chrono::seconds(10)) return;
   last_late_event_ = Clock::now();
-  tell("late-frame",
+  tell(EventKind::late_frame,
        fmt::format("frame {} is late by {} though none is missing in the driver's count; {} so far: "
                    "lost whole on USB, or the camera slowed down",
                    id, missing, late_frames_));
 }
 
-void V4l2Source::tell(std::string kind, std::string detail) {
-  Delivery event;
-  event.kind = Delivery::Kind::event;
-  event.reason = std::move(kind);
-  event.detail = std::move(detail);
-  pending_.push_back(std::move(event));
+void V4l2Source::tell(EventKind kind, std::string detail) {
+  pending_.push_back(event_delivery(kind, std::move(detail)));
+}
+
+/// A camera that died and stayed away: what fits into the time since its last frame is lost.
+std::vector<Delivery> V4l2Source::unfinished() {
+  const double quiet_s = std::chrono::duration<double>(Clock::now() - last_frame_).count();
+  const bool gone = away_ || (fd_ >= 0 && Clock::now() - last_frame_ > options_.stall / 2);
+  const double since_s =
+      away_ ? std::chrono::duration<double>(Clock::now() - lost_at_).count() : quiet_s;
+  if (!gone || !rhythm_.known()) return {};
+  Delivery lost;
+  lost.kind = Delivery::Kind::lost;
+  lost.frame.id = next_id_ + rhythm_.frames_in(since_s) - 1;
+  lost.reason = fmt::format("no frame for the last {:.1f} s, counted by time", since_s);
+  return {lost};
 }
 
 Delivery V4l2Source::delivery_of(std::uint32_t index, std::uint32_t bytes, std::uint32_t flags,
@@ -268,15 +266,15 @@ Delivery V4l2Source::delivery_of(std::uint32_t index, std::uint32_t bytes, std::
     return delivery;
   }
   delivery.kind = Delivery::Kind::frame;
-  if (moved_) delivery.frame.flags.push_back("other-port");
+  if (moved_) delivery.frame.flag(FrameFlag::other_port);
   if (options_.modality == Modality::thermal &&
       freeze_.mark(delivery.frame, mapping.address, bytes, taken_at)) {
-    tell("nuc", "the image is frozen");
+    tell(EventKind::nuc, "the image is frozen");
   }
   const bool counts = layout_.fourcc == V4L2_PIX_FMT_Y16;
   delivery.frame.thermal_is_gray = options_.modality == Modality::thermal && !counts;
   if (counts && layout_.kelvin_per_dn <= 0) {
-    if (const auto stretch = raw_counts_.apply(delivery.frame)) tell("raw-counts", *stretch);
+    if (const auto stretch = raw_counts_.apply(delivery.frame)) tell(EventKind::raw_counts, *stretch);
   }
   return delivery;
 }

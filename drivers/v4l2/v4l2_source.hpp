@@ -70,6 +70,7 @@ class V4l2Source final : public FrameSource {
   Status start() override;
   Result<Delivery> next(std::chrono::milliseconds timeout) override;
   void stop() override;
+  std::vector<Delivery> unfinished() override;
 
  private:
   struct Mapping {
@@ -89,7 +90,7 @@ class V4l2Source final : public FrameSource {
   void lock_adapted();
   Status map_buffers();
   void close_device();
-  Delivery lose(const std::string& event, const std::string& why);
+  Delivery lose(EventKind kind, const std::string& why);
   Delivery stall(const std::string& why);
   std::optional<Delivery> try_reopen();
   std::optional<Delivery> tell_look_alike();
@@ -99,7 +100,7 @@ class V4l2Source final : public FrameSource {
   Delivery delivery_of(std::uint32_t index, std::uint32_t bytes, std::uint32_t flags,
                        FreezeWatch::Clock::time_point taken_at);
   void watch_rhythm(std::uint64_t id, std::int64_t stamp_ns);
-  void tell(std::string kind, std::string detail);
+  void tell(EventKind kind, std::string detail);
   std::uint64_t unwrap(std::uint32_t sequence);
   int ioctl(unsigned long request, void* argument);
 

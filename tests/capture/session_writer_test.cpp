@@ -179,7 +179,7 @@ TEST(SessionWriter, CountsOfUnknownScaleAreNeverTemperatures) {
     const auto record = (*writer)->append("thermal0", frame);
     ASSERT_TRUE(record) << record.error().message();
     EXPECT_TRUE(record->thermal_is_gray);
-    EXPECT_TRUE(record->has_flag("raw-counts"));
+    EXPECT_TRUE(record->has_flag(FrameFlag::raw_counts));
     EXPECT_FALSE(std::filesystem::exists(folder / ("s/" + record->file + ".json")));
   }
   EXPECT_GT(mean[1], mean[0] + 20);  // one stretch: brighter counts are brighter

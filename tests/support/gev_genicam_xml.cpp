@@ -61,7 +61,7 @@ std::string gev_genicam_xml() {
       "<Category Name=\"Root\" NameSpace=\"Standard\">";
   for (const char* feature :
        {"DeviceVendorName", "DeviceModelName", "DeviceID", "Width", "Height", "PixelFormat", "PayloadSize",
-        "AcquisitionMode", "AcquisitionStart", "AcquisitionStop", "IRFormat", "IRFrameRate", "NUCAction", "NUCMode",
+        "AcquisitionMode", "AcquisitionStart", "AcquisitionStop", "IRFormat", "IRFrameRate", "AcquisitionFrameRate", "NUCAction", "NUCMode",
         "R", "B", "F", "J0", "J1", "ObjectEmissivity", "ReflectedTemperature", "GevSCPSPacketSize",
         "GevTimestampTickFrequency"}) {
     xml += fmt::format("<pFeature>{}</pFeature>", feature);
@@ -82,7 +82,8 @@ std::string gev_genicam_xml() {
   xml += float_node("R", gev_registers::planck_r) + float_node("B", gev_registers::planck_b) +
          float_node("F", gev_registers::planck_f) + float_node("J0", gev_registers::j0) +
          float_node("J1", gev_registers::j1) + float_node("ObjectEmissivity", gev_registers::emissivity) +
-         float_node("ReflectedTemperature", gev_registers::reflected_k);
+         float_node("ReflectedTemperature", gev_registers::reflected_k) +
+         float_node("AcquisitionFrameRate", gev_registers::frame_rate);
   xml += integer("GevSCPSPacketSize", 0x0d04) + integer("GevTimestampTickFrequency", 0x0940, "RO");
   xml += "<Port Name=\"Device\"/>\n</RegisterDescription>\n";
   return xml;

@@ -39,6 +39,10 @@ void put32(std::uint8_t* p, std::uint32_t v) {
 std::uint32_t get16(const std::uint8_t* p) { return static_cast<std::uint32_t>(p[0] << 8 | p[1]); }
 std::uint32_t get32(const std::uint8_t* p) { return get16(p) << 16 | get16(p + 2); }
 
+std::uint16_t following(std::uint16_t id) {
+  return id == 65535 ? std::uint16_t{1} : static_cast<std::uint16_t>(id + 1);
+}
+
 std::vector<std::uint8_t> reply(std::uint32_t status, std::uint32_t command, std::uint32_t id, std::size_t payload) {
   std::vector<std::uint8_t> packet(8 + payload);
   put16(&packet[0], status);
@@ -170,7 +174,15 @@ std::uint64_t GevSimulator::device_clock_ns() {
 }
 
 void GevSimulator::control_loop() {
+  const auto frozen = [this] {
+    const std::lock_guard lock(mutex_);
+    return faults_.freeze;
+  };
   while (running_) {
+    if (frozen()) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      continue;
+    }
     // A negative descriptor is passed over.
     std::array<pollfd, 2> waiters{{{control_fd_, POLLIN, 0}, {discovery_fd_, POLLIN, 0}}};
     poll(waiters.data(), waiters.size(), 50);
@@ -211,12 +223,24 @@ std::uint32_t GevSimulator::register_value(std::uint32_t address) {
   return read_register(address);
 }
 
+void GevSimulator::set_register_mask(std::uint32_t address, std::uint32_t mask) {
+  std::lock_guard lock(mutex_);
+  masks_[address] = mask;
+}
+
 void GevSimulator::write_register(std::uint32_t address, std::uint32_t value) {
   if (address + 4 > memory_.size()) return;
+  if (const auto mask = masks_.find(address); mask != masks_.end()) value &= mask->second;
   put32(&memory_[address], value);
   if (address == gev_registers::start) acquiring_ = true;
   if (address == gev_registers::stop) acquiring_ = false;
   if (address == gev_registers::nuc_action) ++nuc_count_;
+  // Who lets go of the camera leaves it idle.
+  if (address == ccp && value == 0) acquiring_ = false;
+  if (address == gev_registers::frame_rate) {
+    // As a clock divider makes it: 30 becomes 30.0003.
+    put32(&memory_[address], std::bit_cast<std::uint32_t>(std::bit_cast<float>(value) * 1.00001f));
+  }
   if (address == gev_registers::width || address == gev_registers::height) {
     put32(&memory_[gev_registers::payload_size],
           2 * get32(&memory_[gev_registers::width]) * get32(&memory_[gev_registers::height]));
@@ -243,7 +267,8 @@ std::vector<std::uint8_t> GevSimulator::answer(const std::uint8_t* request, std:
       return packet;
     }
     case 0x0082: {  // write registers
-      if (controlled && !same) return reply(0x8006, 0x0083, id, 4);  // access denied
+      if (controlled && !same && options_.enforce_control)
+        return reply(0x8006, 0x0083, id, 4);  // access denied
       for (std::size_t at = 8; at + 8 <= size; at += 8) {
         const std::uint32_t address = get32(request + at);
         write_register(address, get32(request + at + 4));
@@ -265,7 +290,7 @@ std::vector<std::uint8_t> GevSimulator::answer(const std::uint8_t* request, std:
       return packet;
     }
     case 0x0086: {  // write memory
-      if (controlled && !same) return reply(0x8006, 0x0087, id, 4);
+      if (controlled && !same && options_.enforce_control) return reply(0x8006, 0x0087, id, 4);
       const std::uint32_t address = get32(request + 8);
       for (std::size_t i = 12; i + 4 <= size; i += 4) write_register(address + static_cast<std::uint32_t>(i) - 12, get32(request + i));
       return reply(0, 0x0087, id, 4);
@@ -365,6 +390,23 @@ void GevSimulator::stream_loop() {
     if (restart_ids_.exchange(false)) id = 1;
     SentFrame frame;
     double reorder = 0;
+    bool silent = false;
+    {
+      std::lock_guard lock(mutex_);
+      if (faults_.freeze || faults_.pause) {
+        next = std::chrono::steady_clock::now() + period;
+        silent = true;
+      } else if (faults_.stall) {
+        ++number_;
+        id = following(id);
+        next += period;
+        silent = true;
+      }
+    }
+    if (silent) {
+      std::this_thread::sleep_until(next);
+      continue;
+    }
     {
       std::lock_guard lock(mutex_);
       frame = make_frame(number_, id);
@@ -389,7 +431,7 @@ void GevSimulator::stream_loop() {
     frames_damaged_ += packets_dropped_ != dropped_before;
     ++number_;
     ++frames_sent_;
-    id = id == 65535 ? std::uint16_t{1} : static_cast<std::uint16_t>(id + 1);
+    id = following(id);
     next += period;
     std::this_thread::sleep_until(next);
   }

@@ -21,6 +21,9 @@ struct GevFaults {
   double reorder = 0, duplicate = 0;  ///< probability per stream packet
   bool mute_control = false;       ///< GVCP requests get no answer
   bool link_down = false;          ///< neither control nor stream
+  bool freeze = false;             ///< it does nothing; requests lie there and are answered after it
+  bool stall = false;              ///< it sends no frames, but counts them
+  bool pause = false;              ///< it takes no frames: its numbers go on afterwards
   int short_frame_every = 0;       ///< every n-th frame lacks its second half (trailer included)
   int wrong_size_every = 0;        ///< every n-th frame is 8 rows lower than announced
   int too_large_every = 0;         ///< every n-th frame is 8 rows taller
@@ -34,6 +37,7 @@ struct GevOptions {
   double rate_hz = 30;
   std::uint16_t first_frame_id = 65400;  ///< wraps early, as GVSP ids do
   double clock_offset_s = 40, clock_drift_ppm = 50;
+  bool enforce_control = true;  ///< false: whoever writes a register is obeyed
 };
 
 /// A GigE Vision camera in software (GVCP control, GVSP stream, GenICam description of our own):
@@ -65,6 +69,8 @@ class GevSimulator {
   std::uint64_t resends_answered() const { return resends_; }
   int nuc_count() const { return nuc_count_; }
   std::uint32_t register_value(std::uint32_t address);
+  /// The camera keeps only these bits of what is written there.
+  void set_register_mask(std::uint32_t address, std::uint32_t mask);
 
   /// Pixel of frame `number` (0 = the first sent since start()).
   static std::uint16_t pixel(std::uint64_t number, std::size_t index);
@@ -96,6 +102,7 @@ class GevSimulator {
   sockaddr_in controller_{};
   std::int64_t last_control_ns_ = 0;
   double clock_step_s_ = 0;
+  std::map<std::uint32_t, std::uint32_t> masks_;
   std::map<std::uint16_t, SentFrame> history_;
   std::vector<std::uint16_t> history_order_;
   std::atomic<bool> running_{false}, acquiring_{false}, restart_ids_{false};

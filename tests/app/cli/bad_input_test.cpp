@@ -158,6 +158,28 @@ TEST_F(BadInput, NoColmapOnPath) {
   EXPECT_THAT(outcome.err, HasSubstr("colmap"));
 }
 
+/// What made one call fail must not make the next one fail, which doesn't name it.
+TEST_F(BadInput, OptionsOfAFailedCallAreForgotten) {
+  make_session({.known_poses = false});
+  const auto options_of = [&] {
+    return nlohmann::json::parse(*read_file(out / "run.json")).value("config", nlohmann::json());
+  };
+  const Outcome outcome = orbitfuse_program({"poses", session.string(), "--out", out.string(), "--set",
+                                             "poses.colmap=/no/such/colmap"});
+  EXPECT_EQ(outcome.code, 6) << outcome.err;
+  EXPECT_TRUE(options_of().is_null()) << options_of();
+  fs::remove_all(session);
+  fs::remove_all(out);
+  make_session();
+  ASSERT_EQ(poses().code, 0);
+  const auto good = options_of();
+  ASSERT_TRUE(good.is_object());
+  for (const auto& entry : fs::directory_iterator(session / "visible")) fs::resize_file(entry.path(), 20);
+  EXPECT_NE(orbitfuse_program({"poses", session.string(), "--out", out.string(), "--set",
+                               "poses.max_features=17"}).code, 0);
+  EXPECT_EQ(options_of(), good);
+}
+
 TEST_F(BadInput, FullDisk) {
   make_session();
   fs::create_directories(out);

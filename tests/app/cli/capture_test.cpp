@@ -239,6 +239,16 @@ TEST(Capture, WithoutAFrameTheAccountHasNoIds) {
   EXPECT_THAT(outcome.out, HasSubstr("visible0: no frame came"));
 }
 
+TEST(Capture, WithoutAGuideThereIsNoEnterKey) {
+  const TempFolder temp;
+  const auto words = [&](const char* guide) {
+    return orbitfuse_program({"capture", temp.path / guide, "--visible", "stills:" + temp.path.string(),
+                              "--seconds", "0.2", "--guide", guide}).err;
+  };
+  EXPECT_THAT(words("off"), testing::Not(HasSubstr("Enter")));
+  EXPECT_THAT(words("key"), HasSubstr("Enter: at the next station"));
+}
+
 TEST(Devices, AnswersWithAList) {
   const Outcome outcome = orbitfuse_program({"devices", "--json"});
   EXPECT_EQ(outcome.code, 0) << outcome.err;

@@ -105,6 +105,27 @@ TEST(Cli, ShippedConfigHoldsTheBuiltInDefaults) {
   EXPECT_EQ(again.out, printed.out);
 }
 
+/// A recipe's field that was changed is part of what is run.
+TEST(Cli, PrintedConfigHoldsTheRecipesChangedFields) {
+  const Outcome printed = orbitfuse_program(
+      {"run", "--print-config", "--set", "train.visible.iterations=123"});
+  ASSERT_EQ(printed.code, 0) << printed.err;
+  const std::size_t visible = printed.out.find("[train.visible]");
+  ASSERT_NE(visible, std::string::npos);
+  EXPECT_LT(printed.out.find("\niterations = 123\n", visible), printed.out.find("\n[", visible + 1));
+  EXPECT_EQ(printed.out.find("iterations = 123"), printed.out.rfind("iterations = 123"));
+  const TempFolder temp;
+  std::ofstream(temp.path / "mine.toml") << printed.out;
+  const Outcome again = orbitfuse_program({"run", "--print-config", "--config", temp.path / "mine.toml"});
+  EXPECT_EQ(again.out, printed.out);
+}
+
+TEST(Cli, AMisspeltInstructionSetIsAnError) {
+  const Outcome outcome = orbitfuse_program({"devices"}, {.environment = {"ORBITFUSE_ISA=avx-2"}});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("ORBITFUSE_ISA: avx-2; write avx2, avx512"));
+}
+
 TEST(Cli, ReferenceMatchesHelp) {
   const auto reference = read_file(ORBITFUSE_SOURCE_DIR "/docs/cli.md");
   ASSERT_TRUE(reference);

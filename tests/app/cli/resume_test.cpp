@@ -62,10 +62,12 @@ class Resumed : public ::testing::Test {
 
 /// Frames large enough to be interrupted among them.
 TEST_F(Resumed, SyntheticWalkGoesOnAfterCtrlC) {
-  const std::vector<std::string> camera = {"--visible", "synthetic,size=80x60,spacing=60"};
+  // Long enough that the word is seen and the signal comes while it walks, on a busy machine too:
+  // with 12 small frames it was over between two looks.
+  const std::vector<std::string> camera = {"--visible", "synthetic,size=240x180,spacing=10"};
   ASSERT_EQ(orbitfuse_program({"capture", once, camera[0], camera[1]}).code, 0);
   const Outcome cut = orbitfuse_program({"capture", again, camera[0], camera[1], "-v"},
-                                        {.interrupt_after = "visible 2/"});
+                                        {.interrupt_after = "visible 1"});
   ASSERT_EQ(cut.code, 130) << cut.err << cut.out;
   EXPECT_THAT(cut.err, HasSubstr("with --resume goes on"));
   resume({"capture", again, camera[0], camera[1]});

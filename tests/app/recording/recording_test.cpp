@@ -85,10 +85,7 @@ TEST(Recording, FramesFromBeforeAllCamerasRanAreLeftOut) {
   };
   for (std::uint64_t id = 100; id < 105; ++id) frame(id);
   script.push_back(test::rejected_delivery(105, "short"));
-  Delivery event;
-  event.kind = Delivery::Kind::event;
-  event.reason = "nuc";
-  script.push_back(event);
+  script.push_back(event_delivery(EventKind::nuc, ""));
   frame(107);
   frame(110);  // from here on all run; 108 and 109 never came
   script.push_back(test::rejected_delivery(111, "short"));
@@ -215,6 +212,64 @@ TEST(Recording, FramesForTheGuideToChooseAreTrackingFrames) {
   ASSERT_TRUE(record(one_camera(0, 2), options));
   const Session session = *open_session(folder / "s");
   for (const FrameRecord& frame : session.frames) EXPECT_TRUE(frame.tracking);
+}
+
+/// Shows pictures while nothing is recorded; then records from the moment of the start on.
+class LiveCameraSource final : public ScriptedSource {
+ public:
+  LiveCameraSource() : ScriptedSource("thermal0", Modality::thermal, {}) {}
+  Result<Delivery> next(std::chrono::milliseconds timeout) override {
+    std::this_thread::sleep_for(std::chrono::milliseconds(timeout.count() > 0 ? 5 : 0));
+    if (timeout.count() == 0) return Delivery{};
+    Delivery delivery = test::frame_delivery(next_id_++, test::thermal_pixels());
+    delivery.frame.host_time_ns = utc_now_ns();
+    return delivery;
+  }
+
+ private:
+  std::uint64_t next_id_ = 0;
+};
+
+TEST(Recording, PicturesAreShownBeforeTheStartAndNothingIsRecorded) {
+  const test::TempFolder folder;
+  RecordingOptions options;
+  options.session = folder / "s";
+  options.live = true;
+  options.seconds = 0.2;
+  std::vector<std::unique_ptr<FrameSource>> sources;
+  sources.push_back(std::make_unique<LiveCameraSource>());
+  Recording recording(std::move(sources), options);
+  ASSERT_TRUE(recording.show_until([&] { return recording.latest(Modality::thermal).has_value(); }));
+  EXPECT_FALSE(recording.latest(Modality::thermal)->pixels.empty());
+  EXPECT_FALSE(recording.latest(Modality::visible));
+  EXPECT_FALSE(recording.operator_at_station());  // nothing is being recorded
+  EXPECT_FALSE(std::filesystem::exists(folder / "s"));
+  ASSERT_TRUE(recording.prepare());
+  const auto ending = recording.run(nullptr);
+  ASSERT_TRUE(ending) << ending.error().message();
+  const Session session = *open_session(folder / "s");
+  EXPECT_TRUE(session.complete);
+  ASSERT_EQ(session.streams.size(), 1u);
+  EXPECT_EQ(session.streams[0].lost, 0u);
+  EXPECT_GT(session.streams[0].first_sequence, 0u);
+}
+
+TEST(Recording, ACorrectionThatNoCameraHasIsRefusedWithTheReason) {
+  const test::TempFolder folder;
+  RecordingOptions options;
+  options.session = folder / "s";
+  options.live = true;
+  options.seconds = 0.3;
+  std::vector<std::unique_ptr<FrameSource>> sources;
+  sources.push_back(std::make_unique<LiveCameraSource>());
+  Recording recording(std::move(sources), options);
+  ASSERT_TRUE(recording.prepare());
+  std::string told;
+  ASSERT_TRUE(recording.run(nullptr, [&] {
+    if (const auto asked = recording.request_correction(); !asked && told.empty())
+      told = asked.error().message();
+  }));
+  EXPECT_NE(told.find("has no shutter correction"), std::string::npos) << told;
 }
 
 TEST(Rehearsal, CountsAndWritesNothing) {

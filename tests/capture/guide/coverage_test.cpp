@@ -116,11 +116,11 @@ TEST(Coverage, SaysWhereToGo) {
   plan.loop_elevations_deg = {10, 40};
   Coverage coverage(plan);
   EXPECT_EQ(coverage.instruction(Modality::visible, std::nullopt), "show the mat to the camera");
-  EXPECT_EQ(coverage.instruction(Modality::visible, OrbitPosition{12, 1, 0, 0}), "12° further left, a little higher");
+  EXPECT_EQ(coverage.instruction(Modality::visible, OrbitPosition{12, 1, 0, 0}), "12° further left, 9° higher");
   EXPECT_EQ(coverage.instruction(Modality::visible, OrbitPosition{348, 10, 0, 0}), "12° further right");
   EXPECT_EQ(coverage.instruction(Modality::visible, OrbitPosition{1, 10, 0, 0}, Refusal::blurred), "blurred, hold still");
   for (int i = 0; i < 12; ++i) coverage.add(good_frame(30 * i, 10));
-  EXPECT_EQ(coverage.instruction(Modality::visible, OrbitPosition{0, 10, 0, 0}), "higher");
+  EXPECT_EQ(coverage.instruction(Modality::visible, OrbitPosition{0, 10, 0, 0}), "30° higher");
 }
 
 TEST(Coverage, PlansAreValidatedByField) {

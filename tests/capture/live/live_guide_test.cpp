@@ -63,6 +63,10 @@ class LiveGuideTest : public ::testing::Test {
     return OrbitPosition{2.0 * level, 20, 0.1, 0};
   }
 
+  static std::string words_of(const LiveGuide& guide, std::size_t camera) {
+    return instruction_for(guide.cameras()[camera], Operator::at_terminal);
+  }
+
   static cv::Mat boxes(int high, int low) {
     cv::Mat image(240, 320, CV_8UC1, cv::Scalar(low));
     for (int y = 0; y < 240; y += 80) {
@@ -235,7 +239,7 @@ TEST_F(LiveGuideTest, TurntableCountsKeysAndTurns) {
 TEST_F(LiveGuideTest, SaysWhatToDoWithTheTableAndTheKey) {
   {
     LiveGuide guide(*writer, options);
-    EXPECT_EQ(guide.cameras()[0].instruction, "go to azimuth 0°, 20° high, then press Enter");
+    EXPECT_EQ(words_of(guide, 0), "go to azimuth 0°, 20° high, then press Enter");
   }
   {
     // A loop above is nearer than the next station, but the next key records the next station.
@@ -245,12 +249,12 @@ TEST_F(LiveGuideTest, SaysWhatToDoWithTheTableAndTheKey) {
     guide.operator_at_station();
     film(guide, 15, 1);
     EXPECT_EQ(guide.done_count(Modality::visible), 1);
-    EXPECT_EQ(guide.cameras()[0].instruction, "go to azimuth 30°, 20° high, then press Enter");
+    EXPECT_EQ(words_of(guide, 0), "go to azimuth 30°, 20° high, then press Enter");
   }
   options.plan.loop_elevations_deg = {20, 50};
   options.turntable_step_deg = 30;
   LiveGuide guide(*writer, options);
-  const auto words = [&] { return guide.cameras()[0].instruction; };
+  const auto words = [&] { return words_of(guide, 0); };
   EXPECT_EQ(words(), "put the table at its start, then press Enter or take the photo");
   guide.operator_at_station();
   film(guide, 15, 1);
@@ -420,7 +424,7 @@ TEST_F(LiveGuideTest, ResumedKeySessionGoesOnAfterItsLastStation) {
   LiveGuide guide(*writer, options);
   guide.resume(earlier);
   EXPECT_EQ(guide.done_count(Modality::visible), 13);
-  EXPECT_EQ(guide.cameras()[0].instruction, "turn the table by 30°, then press Enter");
+  EXPECT_EQ(words_of(guide, 0), "turn the table by 30°, then press Enter");
   guide.operator_at_station();
   film(guide, 15, 20);
   EXPECT_NEAR(guide.cameras()[0].position->azimuth_deg, 300, 1e-9);
@@ -511,7 +515,7 @@ TEST_F(MixedTableTest, SecondCameraAfterAResumeMakesItsOwnFirstTurn) {
   }
   LiveGuide guide(*writer, options);
   guide.resume(earlier);
-  EXPECT_EQ(guide.cameras()[1].instruction, "turn the table by 30°, then press Enter or take the photo");
+  EXPECT_EQ(words_of(guide, 1), "turn the table by 30°, then press Enter or take the photo");
   for (int i = 0; i < 12; ++i) photo(guide);
   EXPECT_EQ(guide.done_count(Modality::thermal), 12);
   EXPECT_NEAR(guide.cameras()[1].position->elevation_deg, 20, 1e-9);
@@ -520,6 +524,39 @@ TEST_F(MixedTableTest, SecondCameraAfterAResumeMakesItsOwnFirstTurn) {
   EXPECT_EQ(guide.done_count(Modality::thermal), 13);
   key(guide);  // the visible camera's second turn
   EXPECT_NEAR(guide.cameras()[0].position->elevation_deg, 50, 1e-9);
+}
+
+/// What the key is differs: there is no Enter on a phone.
+TEST_F(LiveGuideTest, ThePageSaysButtonWhereTheTerminalSaysEnter) {
+  LiveGuide guide(*writer, options);
+  const LiveCamera camera = guide.cameras()[0];
+  EXPECT_EQ(instruction_for(camera, Operator::at_page),
+            "go to azimuth 0°, 20° high, then tap At the station");
+  EXPECT_EQ(camera.target->azimuth_deg, 0);
+  EXPECT_EQ(camera.of, 12);
+  const auto taken = guide.operator_at_station();
+  ASSERT_TRUE(taken);
+  EXPECT_EQ(*taken, "visible: the next good frame is azimuth 0°, 20° high");
+}
+
+TEST_F(LiveGuideTest, AKeyThatNobodyWaitsForIsRefused) {
+  options.stations_come_with_frames = true;
+  LiveGuide guide(*writer, options);
+  const auto taken = guide.operator_at_station();
+  ASSERT_FALSE(taken);
+  EXPECT_NE(taken.error().message().find("by themselves"), std::string::npos);
+}
+
+/// The image comes with the frame: nothing is read back, not even when the file is gone.
+TEST_F(LiveGuideTest, FramesAreNotDecodedAgain) {
+  LiveGuide guide(*writer, options);
+  guide.operator_at_station();
+  for (int i = 0; i < 3; ++i) {
+    const FrameRecord frame = *stored(boxes(200, 60), ++now_s);
+    std::filesystem::remove(folder / "s" / frame.file);
+    guide.add(frame, boxes(200, 60));
+  }
+  EXPECT_EQ(guide.done_count(Modality::visible), 1);
 }
 
 TEST_F(LiveGuideTest, OptionsAreChecked) {

@@ -109,6 +109,46 @@ TEST(LiveState, TroubleIsAWarning) {
   EXPECT_EQ(warnings_of(state).size(), 1u);
 }
 
+TEST(LiveState, ACameraThatIsAwayIsAnAlarmWithItsSeconds) {
+  LiveState state = some_state();
+  state.streams[1].away = Absence{8.2, "no frame for a second"};
+  const std::vector<std::string> alarms = alarms_of(state);
+  ASSERT_EQ(alarms.size(), 1u);
+  EXPECT_EQ(alarms[0], "thermal0: disconnected 8 s, reopening");
+  const Json page = Json::parse(json_of(state));
+  EXPECT_EQ(page["alarms"][0], alarms[0]);
+  EXPECT_EQ(page["streams"][1]["away_s"], 8.2);
+  EXPECT_TRUE(page["streams"][0]["away_s"].is_null());
+  state.running = false;
+  EXPECT_TRUE(alarms_of(state).empty());
+}
+
+TEST(LiveState, AFullDiskIsNotCalledSlow) {
+  LiveState state = some_state();
+  state.streams[1].dropped = 0;
+  state.streams[1].unwritten = 2;
+  const std::string all = Json(warnings_of(state)).dump();
+  EXPECT_EQ(all.find("slow"), std::string::npos) << all;
+  EXPECT_NE(all.find("2 frames could not be written"), std::string::npos) << all;
+  EXPECT_NE(account_words(state.streams[1]).find("2 not written"), std::string::npos);
+}
+
+TEST(LiveState, ThePageKnowsTargetsCountsAndRefusals) {
+  LiveState state = some_state();
+  state.cameras[0].target = OrbitPosition{30, 10, 0, 0};
+  state.cameras[0].done = 6;
+  state.cameras[0].of = 24;
+  state.cameras[0].judged_file = "visible/0.jpg";
+  state.cameras[0].refusal = Refusal::blurred;
+  const Json camera = Json::parse(json_of(state))["cameras"][0];
+  EXPECT_EQ(camera["target"]["azimuth_deg"], 30);
+  EXPECT_EQ(camera["done"], 6);
+  EXPECT_EQ(camera["of"], 24);
+  EXPECT_EQ(camera["refused"], true);
+  EXPECT_EQ(camera["refusal"], "blurred, hold still");
+  EXPECT_EQ(Json::parse(json_of(state))["streams"][1]["modality"], "visible");
+}
+
 TEST(LiveState, OneCameraAloneFillsItsSectors) {
   LiveState state = some_state();
   state.cameras.resize(1);

@@ -52,8 +52,6 @@ class BrowserTest : public ::testing::Test {
  protected:
   void SetUp() override {
     if (!has_chromium()) GTEST_SKIP() << "chromium is not installed";
-    picture = folder / "a.png";
-    ASSERT_TRUE(write_png(picture, cv::Mat(300, 400, CV_8UC3, cv::Scalar(255, 0, 255))));
     PageOptions options;
     options.port = 0;
     options.token = "browser-token";
@@ -65,18 +63,21 @@ class BrowserTest : public ::testing::Test {
       state.running = true;
       state.sectors = Coverage(OrbitPlan{}).sectors();
       state.cameras.resize(2);
+      state.cameras[1].modality = Modality::thermal;
       for (int i = 0; i < done; ++i) state.sectors[static_cast<std::size_t>(i)].file = {"v", "t"};
       return state;
     };
     hooks.latest = [this](Modality modality) {
-      return modality == Modality::visible ? picture : std::filesystem::path();
+      const cv::Mat magenta(300, 400, CV_8UC3, cv::Scalar(255, 0, 255));
+      return modality == Modality::visible
+                 ? std::optional(LatestFrame{Modality::visible, magenta, "a"})
+                 : std::nullopt;
     };
     server = std::make_unique<PageServer>(options, hooks);
     ASSERT_TRUE(server->start());
   }
 
   test::TempFolder folder;
-  std::filesystem::path picture;
   std::atomic<int> done{0};
   std::unique_ptr<PageServer> server;
 };

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "capture/page/connection_gate.hpp"
 #include "capture/page/page_server.hpp"
 #include "capture/page/reachable.hpp"
 
@@ -22,7 +23,6 @@
 
 #include "core/image/image_codec.hpp"
 #include "core/image/image_io.hpp"
-#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -66,15 +66,21 @@ class PageTest : public ::testing::Test {
     hooks.latest = [this](Modality modality) {
       return modality == Modality::visible ? visible : thermal;
     };
-    hooks.stop = [this] { ++stops; };
-    hooks.correct = [this] { ++corrections; };
+    hooks.stop = [this]() -> Result<std::string> {
+      ++stops;
+      return "stopping";
+    };
+    hooks.correct = [this]() -> Result<std::string> {
+      ++corrections;
+      return fail(ErrorKind::unavailable, "thermal0", "the profile names no command", "set it");
+    };
     server = std::make_unique<PageServer>(options, hooks);
     const Status status = server->start();
     ASSERT_TRUE(status) << status.error().message();
   }
   httplib::Client client() const { return httplib::Client("127.0.0.1", server->port()); }
 
-  std::filesystem::path visible, thermal;
+  std::optional<LatestFrame> visible, thermal;
   std::atomic<int> stops{0}, corrections{0};
   std::unique_ptr<PageServer> server;
 };
@@ -158,10 +164,10 @@ TEST_F(PageTest, TokenIsAskedForEverything) {
   EXPECT_EQ(client().Get("/?token=right-token-")->status, 401);
   EXPECT_EQ(client().Get("/?token=")->status, 401);
   EXPECT_THAT(server->url(), HasSubstr("?token=right-token-1"));
-  EXPECT_EQ(client().Post("/stop", right, "", "text/plain")->status, 204);
+  EXPECT_EQ(client().Post("/stop", right, "", "text/plain")->status, 200);
   EXPECT_EQ(stops, 1);
   EXPECT_EQ(client().Post("/nuc", wrong, "", "text/plain")->status, 401);
-  EXPECT_EQ(client().Post("/nuc", right, "", "text/plain")->status, 204);
+  EXPECT_EQ(client().Post("/nuc", right, "", "text/plain")->status, 409);
   EXPECT_EQ(corrections, 1);
 }
 
@@ -188,7 +194,7 @@ TEST_F(PageTest, OtherSitesCannotPressItsButtons) {
 }
 
 /// The answer to a request that is sent as it stands here, without closing the connection.
-std::string answer_to(int port, const std::string& request) {
+std::string answer_to(int port, const std::string& request, int patience_ms = 3000) {
   const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
@@ -199,7 +205,7 @@ std::string answer_to(int port, const std::string& request) {
       ::send(fd, request.data(), request.size(), 0) == static_cast<ssize_t>(request.size())) {
     char bytes[4096];
     pollfd ready{fd, POLLIN, 0};
-    while (::poll(&ready, 1, 3000) > 0) {
+    while (::poll(&ready, 1, patience_ms) > 0) {
       const ssize_t count = ::recv(fd, bytes, sizeof bytes, 0);
       if (count <= 0) break;
       answer.append(bytes, static_cast<std::size_t>(count));
@@ -216,9 +222,9 @@ TEST_F(PageTest, PostWithoutALengthIsAnsweredAtOnce) {
     return answer_to(server->port(),
                      std::string(method) + " " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\n" + header + "\r\n");
   };
-  EXPECT_THAT(post("POST", "/stop", "X-OrbitFuse: 1\r\n"), HasSubstr(" 204 "));
+  EXPECT_THAT(post("POST", "/stop", "X-OrbitFuse: 1\r\n"), HasSubstr(" 200 "));
   EXPECT_EQ(stops, 1);
-  EXPECT_THAT(post("POST", "/nuc", "X-OrbitFuse: 1\r\nContent-Length: 0\r\n"), HasSubstr(" 204 "));
+  EXPECT_THAT(post("POST", "/nuc", "X-OrbitFuse: 1\r\nContent-Length: 0\r\n"), HasSubstr(" 409 "));
   EXPECT_EQ(corrections, 1);
   EXPECT_THAT(post("POST", "/nowhere", "X-OrbitFuse: 1\r\n"), HasSubstr(" 404 "));
   EXPECT_THAT(post("POST", "/stop", ""), HasSubstr(" 403 "));
@@ -227,12 +233,95 @@ TEST_F(PageTest, PostWithoutALengthIsAnsweredAtOnce) {
   EXPECT_EQ(stops, 1);
 }
 
+/// A button that does nothing says why.
+TEST_F(PageTest, EveryButtonSaysWhatCameOfIt) {
+  serve({});
+  const httplib::Headers ours{{"X-OrbitFuse", "1"}};
+  const auto stopped = client().Post("/stop", ours, "", "text/plain");
+  EXPECT_EQ(nlohmann::json::parse(stopped->body), (nlohmann::json{{"done", true}, {"message", "stopping"}}));
+  const auto refused = client().Post("/nuc", ours, "", "text/plain");
+  const auto said = nlohmann::json::parse(refused->body);
+  EXPECT_EQ(said.at("done"), false);
+  EXPECT_THAT(said.at("message").get<std::string>(), HasSubstr("the profile names no command"));
+}
+
+/// Peers that send a byte now and then, or nothing, or never read.
+class SlowPeers {
+ public:
+  SlowPeers(int port, int count) {
+    for (int i = 0; i < count; ++i) {
+      const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
+      sockaddr_in address{};
+      address.sin_family = AF_INET;
+      address.sin_port = htons(static_cast<std::uint16_t>(port));
+      address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+      if (::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0) fds_.push_back(fd);
+    }
+    drip_ = std::jthread([this](const std::stop_token& over) {
+      const std::string request = "GET /state HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: " + std::string(4000, 'x');
+      for (std::size_t at = 0; !over.stop_requested() && at < request.size(); ++at) {
+        for (const int fd : fds_) (void)!::send(fd, &request[at], 1, MSG_NOSIGNAL);
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      }
+    });
+  }
+  ~SlowPeers() {
+    drip_ = {};
+    for (const int fd : fds_) ::close(fd);
+  }
+  std::size_t count() const { return fds_.size(); }
+
+ private:
+  std::vector<int> fds_;
+  std::jthread drip_;
+};
+
+TEST_F(PageTest, SlowPeersHoldUpNeitherViewersNorTheEnd) {
+  using Clock = std::chrono::steady_clock;
+  serve({});
+  const SlowPeers peers(server->port(), 20);
+  EXPECT_EQ(peers.count(), 20u);
+  const auto asked = Clock::now();
+  for (int i = 0; i < 10; ++i) {
+    const auto answer = client().Get("/state");
+    ASSERT_TRUE(answer);
+    EXPECT_EQ(answer->status, 200);
+  }
+  EXPECT_LT(Clock::now() - asked, std::chrono::seconds(2));
+  const auto ending = Clock::now();
+  server->stop();
+  EXPECT_LT(Clock::now() - ending, std::chrono::seconds(2));  // the bar; it took 38 s
+}
+
+TEST_F(PageTest, MorePeersThanThereIsRoomForDoNotShutAViewerOut) {
+  serve({});
+  const SlowPeers peers(server->port(), 200);
+  for (int i = 0; i < 10; ++i) {
+    const auto answer = client().Get("/state");
+    ASSERT_TRUE(answer);
+    EXPECT_EQ(answer->status, 200);
+  }
+}
+
+TEST_F(PageTest, ARequestThatIsNotDoneInTimeIsCutOff) {
+  serve({});
+  const std::string begun = "GET /state HTTP/1.1\r\nHost: 127.0.0.1\r\n";
+  EXPECT_EQ(answer_to(server->port(), begun, 20000), "");  // closed, not waited for
+  EXPECT_THAT(answer_to(server->port(), begun + "X: " + std::string(20000, 'x')), HasSubstr(" 413 "));
+  EXPECT_THAT(answer_to(server->port(), "nonsense\r\n\r\n"), HasSubstr(" 400 "));
+}
+
+TEST(RequestSize, IsHeadAndBody) {
+  EXPECT_EQ(request_size("GET / HTTP/1.1\r\nHost: x\r\n"), 0u);
+  EXPECT_EQ(request_size("GET / HTTP/1.1\r\n\r\n"), 18u);
+  EXPECT_EQ(request_size("POST / HTTP/1.1\r\ncontent-LENGTH: 7\r\n\r\nabc"), 38u + 7u);
+  EXPECT_GT(request_size("POST / HTTP/1.1\r\nContent-Length: 99999999999999999999\r\n\r\n"), 1u << 29);
+}
+
 TEST_F(PageTest, PreviewsAndTemperatures) {
-  const test::TempFolder folder;
   serve({});
   EXPECT_EQ(client().Get("/preview/visible")->status, 404);
-  visible = folder / "a.jpg";
-  ASSERT_TRUE(write_jpeg(visible, cv::Mat(900, 1200, CV_8UC3, cv::Scalar(10, 200, 30))));
+  visible = LatestFrame{Modality::visible, cv::Mat(900, 1200, CV_8UC3, cv::Scalar(10, 200, 30)), "a"};
   const auto picture = client().Get("/preview/visible");
   ASSERT_EQ(picture->status, 200);
   EXPECT_EQ(picture->get_header_value("Content-Type"), "image/jpeg");
@@ -241,10 +330,9 @@ TEST_F(PageTest, PreviewsAndTemperatures) {
   EXPECT_EQ(image->cols, 640);
   EXPECT_NEAR(image->at<cv::Vec3b>(5, 5)[1], 200, 6);
 
-  thermal = folder / "t.tiff";
-  cv::Mat kelvin(48, 64, CV_32FC1);
-  for (int x = 0; x < 64; ++x) kelvin.col(x) = 280.0 + x;
-  ASSERT_TRUE(write_thermal_tiff(thermal, kelvin));
+  cv::Mat centikelvin(48, 64, CV_16UC1);
+  for (int x = 0; x < 64; ++x) centikelvin.col(x) = 28000 + 100 * x;
+  thermal = LatestFrame{Modality::thermal, centikelvin, "t"};
   const auto colours = client().Get("/preview/thermal?palette=white-hot&low=280&high=343");
   ASSERT_EQ(colours->status, 200);
   EXPECT_EQ(colours->get_header_value("X-Span-Low"), "280.00");
@@ -265,9 +353,7 @@ TEST_F(PageTest, PreviewsAndTemperatures) {
 }
 
 TEST_F(PageTest, TenViewersAreServed) {
-  const test::TempFolder folder;
-  visible = folder / "a.jpg";
-  ASSERT_TRUE(write_jpeg(visible, cv::Mat(300, 400, CV_8UC3, cv::Scalar(10, 200, 30))));
+  visible = LatestFrame{Modality::visible, cv::Mat(300, 400, CV_8UC3, cv::Scalar(10, 200, 30)), "a"};
   serve({});
   std::atomic<int> good{0};
   std::vector<std::jthread> viewers;

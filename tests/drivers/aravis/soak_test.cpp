@@ -95,7 +95,10 @@ TEST_F(AravisSoak, OutagesLeaveNoThreadsBehind) {
   EXPECT_LE(threads_of_this_process(), streaming);
   camera.kill();
   drain(*source, 5s, [](const Tally& t) { return t.has("disconnected"); });
-  source->stop();  // waits for the one that is going down
+  source->stop();
+  const auto end = testing_clock::now() + 20s;  // what is going down needs its time-outs
+  while (threads_of_this_process() >= streaming && testing_clock::now() < end)
+    std::this_thread::sleep_for(100ms);
   EXPECT_LT(threads_of_this_process(), streaming);
 }
 

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <functional>
@@ -21,7 +22,10 @@ using testing_clock = std::chrono::steady_clock;
 /// Runs a source against the simulator and counts what it says.
 struct Tally {
   std::uint64_t frames = 0, rejected = 0, wrong_bits = 0, not_rising = 0, first_id = 0, last_id = 0;
-  std::vector<std::string> events;
+  std::vector<std::string> events, details;  ///< details: of reconnections
+  std::ptrdiff_t times(const char* event) const {
+    return std::count(events.begin(), events.end(), event);
+  }
   std::int64_t last_host_ns = 0, first_device_ns = 0, last_device_ns = 0;
   std::uint64_t first_frame_id = 0, last_frame_id = 0;
   /// Frame numbers less ids, modulo 4001: the same for all frames of a connection.
@@ -83,7 +87,8 @@ inline Tally drain(AravisSource& source, std::chrono::milliseconds limit, const 
       ++tally.rejected;
     } else if (delivery->kind == Delivery::Kind::event) {
       tally.events.push_back(delivery->reason);
-      if (delivery->reason == "reconnected") tally.shift.reset();
+      if (delivery->event == EventKind::reconnected) tally.details.push_back(delivery->detail);
+      if (delivery->event == EventKind::reconnected) tally.shift.reset();
     }
   }
   return tally;

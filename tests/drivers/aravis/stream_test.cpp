@@ -160,10 +160,9 @@ TEST_F(AravisStream, TwoOutagesWithoutAFrameBetweenCostTheTimeOfBoth) {
   faults.packet_loss = 1;  // it answers, but sends nothing
   faults.answer_resend = false;
   camera.set_faults(faults);
-  const Tally between = drain(source, 20s, reconnected);
-  ASSERT_TRUE(reconnected(between));
+  const Tally between = drain(source, 2500ms);
+  EXPECT_FALSE(reconnected(between));
   EXPECT_EQ(between.frames + between.rejected, 0u);
-  ASSERT_TRUE(disconnected(drain(source, 10s, disconnected)));
   camera.set_faults({});
   const Tally back = drain(source, 20s, [](const Tally& t) { return t.frames > 0; });
   ASSERT_TRUE(reconnected(back));
@@ -238,7 +237,7 @@ TEST_F(AravisStream, FrameNumbersThatStartAgainAreALostStreamNotAFloodOfDuplicat
   camera.restart_ids();
   const Tally tally = drain(source, 20s, [](const Tally& t) { return t.has("reconnected") && t.frames > 20; });
   EXPECT_TRUE(tally.has("disconnected"));
-  EXPECT_LE(std::count(tally.events.begin(), tally.events.end(), "duplicate"), 3);
+  EXPECT_LE(tally.times("repeated-id"), 3);
   EXPECT_TRUE(tally.has("reconnected"));
   EXPECT_EQ(tally.not_rising, 0u);
 }
@@ -354,6 +353,172 @@ TEST_F(AravisStream, DiscoveryFindsItAndItsSerialOpensIt) {
   AravisSource source(options);
   ASSERT_TRUE(source.start());
   EXPECT_EQ(drain(source, 10s, frames(10)).frames, 10u);
+}
+
+/// Obeys whoever writes, also the connection that was given up.
+class AravisUnguarded : public AravisStream {
+ protected:
+  static GevOptions unguarded() {
+    GevOptions o = small();
+    o.enforce_control = false;
+    return o;
+  }
+  void SetUp() override {
+    if (!camera_of_all.start_when_free()) GTEST_SKIP() << "the GVCP port 3956 is in use";
+    options.camera = "127.0.0.1";
+    options.profiles = std::string(ORBITFUSE_SOURCE_DIR) + "/config/cameras";
+  }
+  /// Streams, lets the camera be away with `fault`, and sees it come back.
+  void expect_one_reconnection(const GevFaults& fault, std::chrono::milliseconds away) {
+    AravisSource source(options);
+    ASSERT_TRUE(source.start());
+    const Tally before = drain(source, 10s, frames(60));
+    ASSERT_TRUE(before.shift);
+    camera_of_all.set_faults(fault);
+    const Tally during = drain(source, away);
+    camera_of_all.set_faults({});
+    // Long enough for a second reconnection, had the first one been killed.
+    const Tally after = drain(source, 6s);
+    EXPECT_EQ(during.times("reconnected") + after.times("reconnected"), 1);
+    EXPECT_GT(after.frames, 120u);
+    EXPECT_EQ(after.wrong_bits + after.not_rising, 0u);
+    // Each id is the camera's own count still: what was skipped was lost, and nothing else.
+    EXPECT_EQ(after.shift, before.shift) << (after.details.empty() ? "" : after.details.front());
+  }
+
+  GevSimulator camera_of_all{unguarded()};
+};
+
+TEST_F(AravisUnguarded, FrozenForThreeSecondsItComesBackOnce) {
+  GevFaults fault;
+  fault.freeze = true;
+  expect_one_reconnection(fault, 3s);
+}
+
+TEST_F(AravisUnguarded, AStallOfItsStreamIsOneReconnection) {
+  GevFaults fault;
+  fault.stall = true;
+  expect_one_reconnection(fault, 1500ms);
+}
+
+/// Its numbers go on: nothing was lost, and nothing is counted.
+TEST_F(AravisUnguarded, APauseWithoutASkippedNumberIsNoLoss) {
+  GevFaults fault;
+  fault.pause = true;
+  expect_one_reconnection(fault, 2s);
+}
+
+TEST_F(AravisUnguarded, MuteForEightSecondsItComesBackOnce) {
+  GevFaults fault;
+  fault.mute_control = true;
+  expect_one_reconnection(fault, 8s);
+}
+
+TEST_F(AravisUnguarded, RestartedItComesBackOnceAndTheOutageIsCountedByTime) {
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  const Tally before = drain(source, 10s, frames(60));
+  const auto gone = testing_clock::now();
+  camera_of_all.kill();
+  const Tally during = drain(source, 3s);
+  ASSERT_TRUE(camera_of_all.start_when_free());
+  const Tally first = drain(source, 10s, frames(1));
+  const double outage_s = std::chrono::duration<double>(testing_clock::now() - gone).count();
+  const Tally after = drain(source, 4s);
+  EXPECT_EQ(during.times("reconnected") + first.times("reconnected"), 1);
+  EXPECT_EQ(after.times("reconnected") + after.times("disconnected"), 0);
+  const std::uint64_t last = std::max(before.last_id, during.last_id);
+  EXPECT_NEAR(static_cast<double>(first.first_id - last), 60 * outage_s, 12);
+}
+
+/// It answers and can be opened, but no frame ever comes: said so, and tried less often.
+TEST_F(AravisStream, ACameraThatNeverSendsIsToldAndLeftInPeace) {
+  options.patience = 30s;
+  options.most_patience = 30s;
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  drain(source, 10s, frames(30));
+  GevFaults fault;
+  fault.packet_loss = 1;
+  fault.answer_resend = false;
+  camera.set_faults(fault);
+  const Tally told = drain(source, 20s, [](const Tally& t) { return t.has("reopen-failed"); });
+  EXPECT_TRUE(told.has("reopen-failed"));
+  EXPECT_FALSE(told.has("reconnected"));
+  EXPECT_EQ(told.times("disconnected"), 1);
+  camera.set_faults({});
+  EXPECT_EQ(drain(source, 2s).frames, 0u);  // its patience is not over
+}
+
+TEST_F(AravisStream, AnOutageAtTheEndIsCountedByTimeAndStoppingDoesNotWait) {
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  const Tally before = drain(source, 10s, frames(60));
+  camera.kill();
+  const auto gone = testing_clock::now();
+  const Tally during = drain(source, 3s);
+  EXPECT_TRUE(during.has("disconnected"));
+  const std::uint64_t last = std::max(before.last_id, during.last_id);
+  const std::vector<Delivery> end = source.unfinished();
+  const double outage_s = std::chrono::duration<double>(testing_clock::now() - gone).count();
+  ASSERT_FALSE(end.empty());
+  EXPECT_EQ(end.back().kind, Delivery::Kind::lost);
+  EXPECT_NEAR(static_cast<double>(end.back().frame.id - last), 60 * outage_s, 8);
+  const auto stopping = testing_clock::now();
+  source.stop();
+  EXPECT_LT(testing_clock::now() - stopping, 2s);  // the bar; Aravis alone needs 5 s
+}
+
+/// Damaged frames that are still waited for when the recording ends are counted, too.
+TEST_F(AravisStream, FramesUnderWayAtTheEndAreInTheCount) {
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  Tally all = drain(source, 10s, frames(60));
+  ASSERT_TRUE(all.shift);
+  GevFaults lossy;
+  lossy.packet_loss = 0.2;
+  lossy.answer_resend = false;
+  camera.set_faults(lossy);
+  const Tally damaged = drain(source, 1s);
+  std::uint64_t last = std::max(all.last_id, damaged.last_id);
+  for (const Delivery& delivery : source.unfinished()) {
+    if (delivery.kind != Delivery::Kind::event) last = std::max(last, delivery.frame.id);
+  }
+  // The camera was told to stop: all that it sent is known by now.
+  const std::uint64_t sent_last = camera.frames_sent() - 1;
+  EXPECT_EQ((last + *all.shift) % 4001, sent_last % 4001);
+}
+
+TEST_F(AravisStream, ACorrectionThatTheProfileDoesNotKnowIsRefused) {
+  options.profile = "generic";
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  const Status status = source.request_correction();
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().kind, ErrorKind::unavailable);
+  EXPECT_NE(status.error().message().find("generic"), std::string::npos);
+}
+
+TEST_F(AravisStream, NumbersThatTheCameraRoundsAreTakenAndOthersAreNamed) {
+  const test::TempFolder folder;
+  const auto settings = [&](const std::string& setting) {
+    test::put(folder / "mine.toml", "name = \"mine\"\nmodels = []\nsettings = [{" + setting + "}]\n");
+  };
+  options.profiles = folder.path();
+  options.profile = "mine";
+  settings("AcquisitionFrameRate = 30.0");  // it makes 30.0003 of it
+  {
+    AravisSource source(options);
+    const Status status = source.start();
+    EXPECT_TRUE(status) << status.error().message();
+  }
+  settings("Width = 161");
+  AravisSource source(options);
+  camera.set_register_mask(registers::width, ~1u);
+  const Status status = source.start();
+  ASSERT_FALSE(status);
+  EXPECT_NE(status.error().found.find("161"), std::string::npos) << status.error().message();
+  EXPECT_NE(status.error().found.find("160"), std::string::npos);
 }
 
 TEST(AravisAbsent, NoCameraIsADeviceError) {

@@ -261,7 +261,7 @@ TEST_F(WatchTest, AllOfACardJoinsTheSession) {
   Recorder recorder(**writer, recorder_options);
   std::atomic<bool> stop{false};
   std::atomic<int> stored{0};
-  recorder.on_frame = [&](const FrameRecord&) { stop = ++stored == 40; };
+  recorder.on_frame = [&](const FrameRecord&, const cv::Mat&) { stop = ++stored == 40; };
   Progress progress;
   progress.cancel = &stop;
   (void)recorder.run({&source}, progress);

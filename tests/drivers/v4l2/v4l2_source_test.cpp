@@ -539,5 +539,23 @@ TEST_F(V4l2SourceTest, NextBeforeStartIsAnError) {
   source.stop();
 }
 
+TEST_F(V4l2SourceTest, AnOutageAtTheEndIsCountedByTime) {
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  for (std::uint32_t i = 0; i < 20; ++i) {
+    shoot(i);
+    system->shots.back().stamp_us = 1'000'000 + 10'000 * i;  // 100 Hz
+  }
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(deliver(source).kind, Kind::frame);
+  system->plugged = false;
+  EXPECT_EQ(deliver(source).reason, "disconnected");
+  const auto gone = std::chrono::steady_clock::now();
+  while (std::chrono::steady_clock::now() - gone < 200ms) source.next(1ms);
+  const std::vector<Delivery> end = source.unfinished();
+  ASSERT_EQ(end.size(), 1u);
+  EXPECT_EQ(end[0].kind, Kind::lost);
+  EXPECT_GE(end[0].frame.id, 19u + 20u);  // a fifth of a second of 100 Hz
+}
+
 }  // namespace
 }  // namespace orbitfuse::v4l2

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <string>
+
+namespace orbitfuse {
+
+struct GateLimits {
+  std::size_t connections = 64;       ///< the one that has been at its request longest makes room
+  std::size_t request_bytes = 16384;  ///< head and body
+  std::chrono::milliseconds request{3000};  ///< from the connection to the request's last byte
+  std::chrono::milliseconds answer{5000};   ///< from the answer's first byte to its last
+  int workers = 4;
+};
+
+/// Stands between the network and whoever answers requests. One thread reads all connections and
+/// hands on whole requests only, so that slow or silent peers hold up nobody; each connection
+/// carries one request, has a deadline, and their number is bounded. Stopping waits for no peer.
+class ConnectionGate {
+ public:
+  /// The answer, head and body, to a request; called from the workers' threads.
+  using Answer = std::function<std::string(const std::string& request)>;
+
+  /// Takes the listening socket.
+  ConnectionGate(int listening_socket, GateLimits limits, Answer answer);
+  ~ConnectionGate();
+  ConnectionGate(const ConnectionGate&) = delete;
+  ConnectionGate& operator=(const ConnectionGate&) = delete;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// How many bytes the request that begins like this has; 0: its head is not complete yet.
+std::size_t request_size(const std::string& begun);
+
+}  // namespace orbitfuse
