@@ -76,6 +76,8 @@ struct RenderedView {
   cv::Mat opacity;  ///< CV_32FC1, 0..1
 };
 
+/// The field as the camera sees it, at the camera's size; pose in the world frame of the training views.
+/// Errors: usage (options), input (camera, pose, a field that is empty), cancelled.
 Result<RenderedView> render(const Field& field, const Camera& camera,
                             const Rigid3d& cam_from_world, const RenderOptions& options,
                             const Progress& progress);
@@ -90,7 +92,8 @@ struct ExportOptions {
 };
 
 /// Points with normals from rendered depth, kept where other views agree; colours (visible) or
-/// temperatures (thermal).
+/// temperatures (thermal). In the world frame of the views. Errors: usage (options), input (no view),
+/// cancelled.
 Result<PointCloud> export_point_cloud(const Field& field, const std::vector<PosedView>& views,
                                       const ExportOptions& options, const Progress& progress);
 

@@ -94,7 +94,8 @@ Result<RegistrationReport> register_clouds(const PointCloud& source, const Point
                                            const Progress& progress,
                                            const ViewScore& view_score = {});
 
-/// Refinement alone, from a start within a few degrees and percent.
+/// Refinement alone, from a start within a few degrees and percent (of the target's diameter). Errors:
+/// register_clouds', and usage for a start that is not finite.
 Result<RegistrationReport> refine_registration(const PointCloud& source, const PointCloud& target,
                                                const Similarity3d& start,
                                                const RegistrationOptions& options);
