@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/image/image_codec.hpp"
+#include "drivers/stills/jpeg_ls.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -86,11 +87,13 @@ struct Records {
   std::map<int, std::string_view> by_type;
 };
 
+constexpr std::string_view fff_magic("FFF\0", 4), aff_magic("AFF\0", 4);
+constexpr std::size_t max_recording_frames = 100'000;
+
 enum RecordType { raw_data = 0x01, camera_info = 0x20, embedded_image = 0x0e };
 
 Result<Records> read_directory(std::string_view file, const std::string& where) {
-  if (file.size() < 64 || (file.substr(0, 4) != std::string_view("FFF\0", 4) &&
-                           file.substr(0, 4) != std::string_view("AFF\0", 4))) {
+  if (!is_flir_recording(file)) {
     return broken(where, "the FLIR data has no FFF header");
   }
   // The version, 100 to 199, tells the byte order.
@@ -197,6 +200,7 @@ Result<cv::Mat> read_raw_data(std::string_view record, std::string_view camera_r
   const int width = raw.u16(0x02), height = raw.u16(0x04);
   if (width == 0 || height == 0 || record.size() < 0x20) return broken(where, "no size in the raw thermal record");
   const std::string_view pixels = record.substr(0x20);
+  if (is_jpeg_ls(pixels)) return decode_jpeg_ls(pixels, where + " (raw thermal JPEG-LS)");
   if (image_format(pixels) == ImageFormat::png) {
     ORBITFUSE_ASSIGN(const cv::Mat image, decode_image(pixels, where + " (raw thermal PNG)"));
     if (image.type() != CV_16UC1) return broken(where, "the raw thermal PNG is not 16-bit grey");
@@ -221,6 +225,32 @@ Result<FlirImage> read_flir_jpeg(std::string_view bytes, const std::string& wher
   if (image_format(bytes) != ImageFormat::jpeg) return broken(where, "not a JPEG");
   const std::string file = join_segments(bytes);
   if (file.empty()) return broken(where, "no FLIR data in the JPEG");
+  return read_flir_file(file, where);
+}
+
+bool is_flir_recording(std::string_view bytes) {
+  return bytes.size() >= 64 && (bytes.substr(0, 4) == fff_magic || bytes.substr(0, 4) == aff_magic);
+}
+
+std::vector<std::string_view> flir_recording_frames(std::string_view bytes) {
+  std::vector<std::string_view> frames;
+  std::size_t at = is_flir_recording(bytes) ? 0 : std::string_view::npos;
+  while (at != std::string_view::npos && frames.size() < max_recording_frames) {
+    const std::string_view rest = bytes.substr(at);
+    const auto records = read_directory(rest, "");
+    if (!records) break;
+    // The magic may also occur among samples: look for the next frame behind all records of this one.
+    std::size_t end = 64;
+    for (const auto& [type, record] : records->by_type)
+      end = std::max(end, static_cast<std::size_t>(record.data() + record.size() - rest.data()));
+    const std::size_t next = std::min(rest.find(fff_magic, end), rest.find(aff_magic, end));
+    frames.push_back(rest.substr(0, next));
+    at = next == std::string_view::npos ? next : at + next;
+  }
+  return frames;
+}
+
+Result<FlirImage> read_flir_file(std::string_view file, const std::string& where) {
   ORBITFUSE_ASSIGN(const Records records, read_directory(file, where));
   const auto raw = records.by_type.find(raw_data);
   const auto info = records.by_type.find(camera_info);

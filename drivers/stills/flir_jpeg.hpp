@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/result.hpp"
 #include "drivers/stills/flir_temperature.hpp"
@@ -28,5 +29,13 @@ bool is_flir_jpeg(std::string_view bytes);
 /// Reads the FLIR file inside the JPEG's APP1 segments (layout as published by the ExifTool
 /// project). Any damage is an input error: every offset and length is checked.
 Result<FlirImage> read_flir_jpeg(std::string_view bytes, const std::string& where);
+
+/// A file that begins with a FLIR header: one image (FFF) or a recording (SEQ, and CSQ, which keeps
+/// its samples as JPEG-LS): such files one behind the other.
+bool is_flir_recording(std::string_view bytes);
+/// Its images, in order; what follows a damaged one is not found.
+std::vector<std::string_view> flir_recording_frames(std::string_view bytes);
+/// One of them.
+Result<FlirImage> read_flir_file(std::string_view file, const std::string& where);
 
 }  // namespace orbitfuse

@@ -22,9 +22,11 @@ std::string extension_of(const fs::path& path) {
   return extension;
 }
 
-bool has_image_extension(const fs::path& path) {
-  constexpr std::array<std::string_view, 6> known{".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp"};
-  return std::find(known.begin(), known.end(), extension_of(path)) != known.end();
+bool has_image_extension(Modality modality, const fs::path& path) {
+  constexpr std::array<std::string_view, 9> known{".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp",
+                                                  ".seq", ".csq",  ".fff"};  // the last three: thermal
+  const auto end = modality == Modality::thermal ? known.end() : known.end() - 3;
+  return std::find(known.begin(), end, extension_of(path)) != end;
 }
 
 struct UnreadFormat {
@@ -78,7 +80,7 @@ std::string unread_kind(const fs::path& file) {
   return {};
 }
 
-Result<ImageList> list_images(const std::vector<fs::path>& paths) {
+Result<ImageList> list_images(Modality modality, const std::vector<fs::path>& paths) {
   ImageList list;
   std::vector<fs::path>& files = list.images;
   for (const fs::path& path : paths) {
@@ -94,7 +96,7 @@ Result<ImageList> list_images(const std::vector<fs::path>& paths) {
     const std::size_t before = files.size(), unread_before = list.unread.size();
     for (const fs::directory_entry& entry : folder) {
       if (!entry.is_regular_file(error)) continue;
-      if (has_image_extension(entry.path())) files.push_back(entry.path());
+      if (has_image_extension(modality, entry.path())) files.push_back(entry.path());
       else if (!unread_kind(entry.path()).empty()) list.unread.push_back(entry.path());
     }
     if (files.size() == before) {

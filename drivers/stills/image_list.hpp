@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/modality.hpp"
 #include "core/result.hpp"
 
 namespace orbitfuse {
@@ -16,8 +17,9 @@ struct ImageList {
 };
 
 /// Image files named by the paths: files as given, folders without their sub-folders. In natural
-/// name order ("9.jpg" before "10.jpg"). Input error when a path is missing or has no images.
-Result<ImageList> list_images(const std::vector<std::filesystem::path>& paths);
+/// name order ("9.jpg" before "10.jpg"). FLIR recordings are thermal images. Input error when a path
+/// is missing or has no images.
+Result<ImageList> list_images(Modality modality, const std::vector<std::filesystem::path>& paths);
 
 /// "HEIC", "video" and the like for the name of a picture or video that is not read; else empty.
 std::string unread_kind(const std::filesystem::path& file);

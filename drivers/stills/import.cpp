@@ -5,15 +5,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "capture/recording/frame_encoding.hpp"
 #include "capture/recording/session_folder.hpp"
 #include "capture/recording/session_writer.hpp"
-#include "core/image/exif.hpp"
 #include "core/system/file_io.hpp"
 #include "core/image/image_codec.hpp"
 #include "core/temperature.hpp"
 #include "drivers/stills/camera_groups.hpp"
+#include "drivers/stills/declared_stations.hpp"
 #include "drivers/stills/image_list.hpp"
 #include "drivers/stills/import_leftover.hpp"
 #include "drivers/stills/known_poses.hpp"
@@ -43,17 +44,17 @@ class Importer {
   Status run() {
     ORBITFUSE_ASSIGN(known_, read_known_poses(options_));
     ORBITFUSE_ASSIGN(const auto visible_files, visible_sources());
-    ORBITFUSE_ASSIGN(const auto visible_tracking_files, listed(options_.visible_tracking));
+    ORBITFUSE_ASSIGN(const auto visible_tracking_files, listed(Modality::visible, options_.visible_tracking));
     ORBITFUSE_ASSIGN(const auto thermal_files, thermal_sources());
-    ORBITFUSE_ASSIGN(const auto thermal_tracking_files, listed(options_.thermal_tracking));
+    ORBITFUSE_ASSIGN(const auto thermal_tracking_files, listed(Modality::thermal, options_.thermal_tracking));
     ORBITFUSE_TRY(check_known(Modality::visible, {&visible_files, &visible_tracking_files}));
     ORBITFUSE_TRY(check_known(Modality::thermal, {&thermal_files, &thermal_tracking_files}));
     ORBITFUSE_TRY(check_disk({&visible_files, &visible_tracking_files}));
     // First every thermal file is looked at: what its samples mean is decided for all of them.
     std::vector<Source> thermal = observed(thermal_files), thermal_tracking = observed(thermal_tracking_files);
     ORBITFUSE_TRY(check_object_parameters());
-    std::vector<Source> visible = with_exif_times(visible_files);
-    std::vector<Source> visible_tracking = with_exif_times(visible_tracking_files);
+    std::vector<Source> visible = photo_sources(visible_files);
+    std::vector<Source> visible_tracking = photo_sources(visible_tracking_files);
     take_out_copies(Modality::visible, {&visible, &visible_tracking});
     take_out_copies(Modality::thermal, {&thermal, &thermal_tracking});
     total_ = visible.size() + visible_tracking.size() + thermal.size() + thermal_tracking.size();
@@ -71,9 +72,9 @@ class Importer {
   ImportReport take_report() { return std::move(report_); }
 
  private:
-  Result<std::vector<fs::path>> listed(const std::vector<fs::path>& paths) {
+  Result<std::vector<fs::path>> listed(Modality modality, const std::vector<fs::path>& paths) {
     if (paths.empty()) return std::vector<fs::path>{};
-    ORBITFUSE_ASSIGN(ImageList list, list_images(paths));
+    ORBITFUSE_ASSIGN(ImageList list, list_images(modality, paths));
     for (const fs::path& file : list.unread) {
       report_.warnings.push_back(fmt::format("left out: {}: {} files are not read; convert it to JPEG, PNG or TIFF",
                                              file.string(), unread_kind(file)));
@@ -82,11 +83,11 @@ class Importer {
   }
 
   Result<std::vector<fs::path>> visible_sources() {
-    if (!options_.visible.empty()) return listed(options_.visible);
+    if (!options_.visible.empty()) return listed(Modality::visible, options_.visible);
     return files_of_transforms(Modality::visible);
   }
   Result<std::vector<fs::path>> thermal_sources() {
-    if (!options_.thermal.empty()) return listed(options_.thermal);
+    if (!options_.thermal.empty()) return listed(Modality::thermal, options_.thermal);
     return files_of_transforms(Modality::thermal);
   }
 
@@ -130,21 +131,6 @@ class Importer {
     return files;
   }
 
-  static std::vector<Source> with_exif_times(const std::vector<fs::path>& files) {
-    std::vector<Source> sources;
-    for (const fs::path& file : files) {
-      const Result<std::string> bytes = read_file(file, max_image_bytes);
-      Source source;
-      source.file = file;
-      if (bytes) {
-        source.hash = content_hash(*bytes);
-        source.taken_ns = read_exif(*bytes).taken_ns;
-      }
-      sources.push_back(std::move(source));
-    }
-    return sources;
-  }
-
   std::vector<Source> observed(const std::vector<fs::path>& files) {
     std::vector<Source> sources;
     for (const fs::path& file : files) {
@@ -156,12 +142,12 @@ class Importer {
         continue;
       }
       source.hash = content_hash(*bytes);
-      if (image_format(*bytes) == ImageFormat::tiff) source.pages = std::max(1, tiff_page_count(*bytes));
+      source.pages = thermal_page_count(*bytes);
       for (source.page = 0; source.page < source.pages; ++source.page) {
         source.taken_ns.reset();
         if (const Result<ThermalFile> thermal = thermal_file(*bytes, file, source.page)) {
           decoder_.observe(*thermal, source.short_name());
-          source.taken_ns = taken_ns(*thermal);
+          source.taken_ns = thermal->taken_ns;
         }
         sources.push_back(source);
       }
@@ -227,7 +213,7 @@ class Importer {
   Status add_thermal(const std::vector<Source>& sources, bool tracking) {
     for (const Source& source : sources) {
       ORBITFUSE_TRY(step());
-      const Result<ThermalFile> file = read_thermal_file(source.file, source.page);
+      const Result<ThermalFile> file = read_page(source);
       if (!file) {
         pass_over(file.error());
         continue;
@@ -247,6 +233,16 @@ class Importer {
       }
     }
     return {};
+  }
+
+  /// Pages come one after the other: their file is read once.
+  Result<ThermalFile> read_page(const Source& source) {
+    if (source.pages == 1) return read_thermal_file(source.file);
+    if (paged_file_ != source.file) {
+      ORBITFUSE_ASSIGN(paged_bytes_, read_file(source.file, max_image_bytes));
+      paged_file_ = source.file;
+    }
+    return thermal_file(paged_bytes_, source.file, source.page);
   }
 
   void tell_lost_samples(const StillPhoto& still, const Source& source) {
@@ -272,7 +268,10 @@ class Importer {
     if (known.shared_camera() && !options_.ground_truth_priors_only) {
       device.lens.calibrated = fitted(*known.shared_camera(), still.size);
     }
-    if (stations && !frame.tracking) frame.station = station_at(*stations, source.position, view);
+    if (stations && !frame.tracking) {
+      const bool priors = options_.ground_truth_priors_only && view;
+      frame.station = station_at(*stations, source.position, priors ? view->elevation_deg : std::nullopt);
+    }
     if (group->id.empty()) {
       group->id = device.id = groups_.next_device_id(device.modality);
       if (writer_) ORBITFUSE_TRY(writer_->add_device(device));
@@ -317,24 +316,6 @@ class Importer {
     frame.cam_from_world = view.cam_from_world;
   }
 
-  Station station_at(const DeclaredStations& declared, int position, const KnownView* view) const {
-    const int per_loop = std::max(1, static_cast<int>(std::lround(360 / declared.spacing_deg)));
-    Station station;
-    station.loop = position / per_loop;
-    station.index = position % per_loop;
-    station.azimuth_deg = station.index * declared.spacing_deg;
-    station.azimuth_sigma_deg = 180;  // where the orbit began is unknown
-    station.elevation_sigma_deg = 90;
-    if (station.loop < static_cast<int>(declared.elevations_deg.size())) {
-      station.elevation_deg = declared.elevations_deg[static_cast<std::size_t>(station.loop)];
-      station.elevation_sigma_deg = declared.elevation_sigma_deg;
-    } else if (options_.ground_truth_priors_only && view && view->elevation_deg) {
-      station.elevation_deg = *view->elevation_deg;
-      station.elevation_sigma_deg = declared.elevation_sigma_deg;
-    }
-    return station;
-  }
-
   void count(const FrameRecord& record) {
     int& counter = record.tracking ? report_.tracking
                    : record.modality == Modality::visible ? report_.visible
@@ -352,41 +333,24 @@ class Importer {
     for (const Modality modality : {Modality::visible, Modality::thermal}) {
       if (auto several = groups_.described(modality)) report_.warnings.push_back(*std::move(several));
     }
-    check_station_count(options_.visible_stations, report_.visible, "visible");
-    check_station_count(options_.thermal_stations, report_.thermal, "thermal");
+    for (const auto& [modality, stations, frames] :
+         {std::tuple(Modality::visible, &options_.visible_stations, report_.visible),
+          std::tuple(Modality::thermal, &options_.thermal_stations, report_.thermal)}) {
+      if (!*stations || frames == station_count(**stations)) continue;
+      report_.warnings.push_back(
+          fmt::format("{}: {} frames, but {} stations declared", name(modality), frames, station_count(**stations)));
+    }
     if (options_.embedded_visible && embedded_ == 0)
       report_.warnings.push_back("no thermal image has a photo embedded: there are no visible frames from them");
-    tell_of_temperatures();
+    if (report_.has_temperatures) {
+      report_.kelvin_per_count = decoder_.kelvin_per_count();
+      for (std::string& remark : decoder_.remarks()) report_.warnings.push_back(std::move(remark));
+    }
     if (decoder_.samples_are_raw_counts() && !decoder_.has_temperatures()) {
       report_.warnings.push_back("thermal samples are raw counts without a known scale: kept as grey intensities, "
                                  "no temperatures (give their scale if you know it)");
     }
     return writer_ ? writer_->close() : Status{};
-  }
-
-  void tell_of_temperatures() {
-    if (!report_.has_temperatures) return;
-    report_.kelvin_per_count = decoder_.kelvin_per_count();
-    if (report_.kelvin_per_count > kelvin_per_dn) {
-      report_.warnings.push_back(fmt::format("the hottest sample is {:.0f} C, so thermal files hold {:g} K a count, not "
-                                             "{:g}; their tag says so",
-                                             celsius_from_kelvin(decoder_.hottest_k()), report_.kelvin_per_count,
-                                             kelvin_per_dn));
-    }
-    if (!decoder_.glowing().empty()) {
-      report_.warnings.push_back(fmt::format("half of {} ({} such files) is hotter than 500 C: if it is no furnace, its "
-                                             "scale is wrong (--thermal-scale centikelvin, or linear with "
-                                             "--kelvin-per-count)",
-                                             decoder_.glowing().front(), decoder_.glowing().size()));
-    }
-  }
-
-  void check_station_count(const std::optional<DeclaredStations>& stations, int frames, const char* what) {
-    if (!stations) return;
-    const int expected = stations->loops * static_cast<int>(std::lround(360 / stations->spacing_deg));
-    if (frames != expected) {
-      report_.warnings.push_back(fmt::format("{}: {} frames, but {} stations declared", what, frames, expected));
-    }
   }
 
   const ImportOptions& options_;
@@ -396,6 +360,8 @@ class Importer {
   ThermalDecoder decoder_;
   std::map<Modality, KnownViews> known_;
   CameraGroups groups_;
+  fs::path paged_file_;  ///< whose pages are being added
+  std::string paged_bytes_;
   std::size_t done_ = 0, total_ = 0;
   std::string first_failure_;
   ImportReport report_;

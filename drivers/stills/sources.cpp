@@ -5,6 +5,9 @@
 
 #include <algorithm>
 
+#include "core/image/exif.hpp"
+#include "core/system/file_io.hpp"
+
 namespace orbitfuse {
 
 std::string Source::short_name() const {
@@ -14,6 +17,21 @@ std::string Source::short_name() const {
 
 std::string Source::where() const {
   return pages > 1 ? fmt::format("{} (page {})", file.string(), page + 1) : file.string();
+}
+
+std::vector<Source> photo_sources(const std::vector<std::filesystem::path>& files) {
+  std::vector<Source> sources;
+  for (const std::filesystem::path& file : files) {
+    const Result<std::string> bytes = read_file(file, max_image_bytes);
+    Source source;
+    source.file = file;
+    if (bytes) {
+      source.hash = content_hash(*bytes);
+      source.taken_ns = read_exif(*bytes).taken_ns;
+    }
+    sources.push_back(std::move(source));
+  }
+  return sources;
 }
 
 std::vector<Source> in_capture_order(std::vector<Source> sources) {

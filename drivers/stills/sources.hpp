@@ -26,6 +26,9 @@ struct Source {
   std::string where() const;
 };
 
+/// Photos with the times that they name themselves.
+std::vector<Source> photo_sources(const std::vector<std::filesystem::path>& files);
+
 /// Capture order: by time where every file has one (file name breaks ties of one-second clocks),
 /// else by name. Sets the positions.
 std::vector<Source> in_capture_order(std::vector<Source> sources);

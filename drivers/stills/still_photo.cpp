@@ -73,7 +73,7 @@ Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& 
     frame.flag(FrameFlag::raw_counts);
     frame.original = file.image;
   }
-  frame.host_time_ns = taken_ns(file).value_or(0);
+  frame.host_time_ns = file.taken_ns.value_or(0);
   still.camera.modality = Modality::thermal;
   still.camera.driver = "stills";
   if (file.flir) {
@@ -96,10 +96,6 @@ Result<StillPhoto> read_thermal_still(const std::filesystem::path& path, Thermal
   ORBITFUSE_ASSIGN(const ThermalFile file, read_thermal_file(path));
   decoder.observe(file, path.filename().string());
   return thermal_still(file, decoder, path.string());
-}
-
-std::optional<std::int64_t> taken_ns(const ThermalFile& file) {
-  return file.flir ? file.flir->taken_ns : read_exif(file.bytes).taken_ns;
 }
 
 std::string StillPhoto::key() const {

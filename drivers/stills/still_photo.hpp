@@ -30,7 +30,6 @@ Result<StillPhoto> visible_still(std::string bytes, const std::string& where);
 /// scale stay as the frame's original.
 Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& decoder,
                                  const std::string& where);
-std::optional<std::int64_t> taken_ns(const ThermalFile& file);
 
 /// A photo (JPEG, PNG, TIFF) kept byte for byte. Input error when it doesn't decode.
 Result<StillPhoto> read_visible_still(const std::filesystem::path& file);

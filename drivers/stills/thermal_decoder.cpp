@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/image/exif.hpp"
 #include "core/system/file_io.hpp"
 #include "core/temperature.hpp"
 
@@ -75,26 +76,50 @@ constexpr const char* by_themselves =
 }  // namespace
 
 Result<ThermalFile> read_thermal_file(const std::filesystem::path& path, std::optional<int> page) {
-  ORBITFUSE_ASSIGN(std::string bytes, read_file(path, max_image_bytes));
-  return thermal_file(std::move(bytes), path, page);
+  ORBITFUSE_ASSIGN(const std::string bytes, read_file(path, max_image_bytes));
+  return thermal_file(bytes, path, page);
 }
 
-Result<ThermalFile> thermal_file(std::string bytes, const std::filesystem::path& path, std::optional<int> page) {
+int thermal_page_count(std::string_view bytes) {
+  if (is_flir_recording(bytes)) return std::max(1, static_cast<int>(flir_recording_frames(bytes).size()));
+  return image_format(bytes) == ImageFormat::tiff ? std::max(1, tiff_page_count(bytes)) : 1;
+}
+
+namespace {
+
+Result<FlirImage> recorded_image(std::string_view bytes, const std::string& where, std::optional<int> page) {
+  const auto frames = flir_recording_frames(bytes);
+  if (!page && frames.size() > 1) {
+    return fail(ErrorKind::input, where, fmt::format("a recording of {} images, one expected", frames.size()),
+                "import it: every image becomes a frame");
+  }
+  const auto index = static_cast<std::size_t>(page.value_or(0));
+  return read_flir_file(index < frames.size() ? frames[index] : bytes, where);
+}
+
+}  // namespace
+
+Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::path& path, std::optional<int> page) {
   ThermalFile file;
-  file.bytes = std::move(bytes);
   const std::string where = path.string();
-  if (is_flir_jpeg(file.bytes)) {
+  const bool recording = is_flir_recording(bytes);
+  if (recording || is_flir_jpeg(bytes)) {
     file.kind = ThermalFile::Kind::radiometric_jpeg;
-    ORBITFUSE_ASSIGN(file.flir, read_flir_jpeg(file.bytes, where));
+    ORBITFUSE_ASSIGN(file.flir, recording ? recorded_image(bytes, where, page) : read_flir_jpeg(bytes, where));
+    file.taken_ns = file.flir->taken_ns;
     return file;
   }
   std::string description;
-  if (image_format(file.bytes) == ImageFormat::tiff) {
-    ORBITFUSE_ASSIGN(file.image, decode_tiff(file.bytes, where, &description, page));
+  if (image_format(bytes) == ImageFormat::tiff) {
+    ORBITFUSE_ASSIGN(file.image, decode_tiff(bytes, where, &description, page));
   } else {
-    ORBITFUSE_ASSIGN(file.image, decode_image(file.bytes, where));
+    ORBITFUSE_ASSIGN(file.image, decode_image(bytes, where));
   }
-  if (file.image.depth() == CV_8U) return file;
+  file.taken_ns = read_exif(bytes).taken_ns;
+  if (file.image.depth() == CV_8U) {
+    file.bytes = bytes;
+    return file;
+  }
   if (file.image.type() != CV_16UC1) {
     return fail(ErrorKind::input, where,
                 fmt::format("{} channels of {} bits", file.image.channels(), 8 * file.image.elemSize1()),
@@ -168,6 +193,21 @@ bool ThermalDecoder::has_temperatures() const {
 }
 
 double ThermalDecoder::kelvin_per_count() const { return kelvin_per_count_for(hottest_k_); }
+
+std::vector<std::string> ThermalDecoder::remarks() const {
+  std::vector<std::string> list;
+  if (kelvin_per_count() > kelvin_per_dn) {
+    list.push_back(fmt::format("the hottest sample is {:.0f} C, so thermal files hold {:g} K a count, not {:g}; their "
+                               "tag says so",
+                               celsius_from_kelvin(hottest_k_), kelvin_per_count(), kelvin_per_dn));
+  }
+  if (!glowing_.empty()) {
+    list.push_back(fmt::format("half of {} ({} such files) is hotter than 500 C: if it is no furnace, its scale is wrong "
+                               "(--thermal-scale centikelvin, or linear with --kelvin-per-count)",
+                               glowing_.front(), glowing_.size()));
+  }
+  return list;
+}
 
 Result<ThermalDecoder::Converted> ThermalDecoder::convert(const ThermalFile& file, const std::string& where) const {
   if (file.kind == ThermalFile::Kind::gray8) {

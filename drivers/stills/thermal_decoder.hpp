@@ -18,9 +18,10 @@ namespace orbitfuse {
 
 /// One thermal file, before the session-wide decision what its samples mean.
 struct ThermalFile {
-  enum class Kind { radiometric_jpeg, samples16, gray8 };
+  enum class Kind { radiometric_jpeg, samples16, gray8 };  ///< the first: any image of a FLIR camera
   Kind kind = Kind::gray8;
-  std::string bytes;
+  std::string bytes;                  ///< gray8: the file
+  std::optional<std::int64_t> taken_ns;
   cv::Mat image;                      ///< samples16: CV_16UC1; gray8: CV_8U
   std::optional<FlirImage> flir;
   std::optional<ThermalScaleTag> tag; ///< from the file or its sidecar
@@ -29,7 +30,10 @@ struct ThermalFile {
 /// Without a page the file must hold a single image.
 Result<ThermalFile> read_thermal_file(const std::filesystem::path& file, std::optional<int> page = {});
 /// The same of bytes that were read from `file`.
-Result<ThermalFile> thermal_file(std::string bytes, const std::filesystem::path& file, std::optional<int> page = {});
+Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::path& file,
+                                 std::optional<int> page = {});
+/// Images in the bytes: pages of a TIFF, frames of a FLIR recording; at least 1.
+int thermal_page_count(std::string_view bytes);
 
 /// How often each count occurs.
 using CountHistogram = std::vector<std::uint64_t>;
@@ -47,11 +51,10 @@ class ThermalDecoder {
   bool samples_are_raw_counts() const;  ///< 16-bit samples without a scale
   bool has_temperatures() const;        ///< so will the session
   double kelvin_per_count() const;      ///< in which the session stores them: one for all files
-  double hottest_k() const { return hottest_k_; }
   int files() const { return files_; }
   int radiometric_jpegs() const { return radiometric_jpegs_; }
-  /// Files of which one half is hotter than anything but a furnace: is their scale right?
-  const std::vector<std::string>& glowing() const { return glowing_; }
+  /// What is worth telling of the temperatures: a coarser scale, and a doubtful one.
+  std::vector<std::string> remarks() const;
 
   struct Converted {
     cv::Mat counts;        ///< of temperature, 0 = invalid; empty for grey
@@ -76,7 +79,7 @@ class ThermalDecoder {
   int like_centikelvin_ = 0, like_counts_ = 0;  ///< 16-bit files without a scale
   CountHistogram counts_ = CountHistogram(65536), centikelvin_ = CountHistogram(65536);  ///< of these
   double hottest_k_ = 0;
-  std::vector<std::string> glowing_;
+  std::vector<std::string> glowing_;  ///< files of which one half is hotter than anything but a furnace
 };
 
 }  // namespace orbitfuse

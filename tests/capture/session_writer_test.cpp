@@ -186,5 +186,45 @@ TEST(SessionWriter, CountsOfUnknownScaleAreNeverTemperatures) {
   EXPECT_EQ(cv::norm(*read_image(folder / "s/thermal/originals/000001.tiff"), bright, cv::NORM_INF), 0);
 }
 
+TEST(SessionWriter, ScaleOfHotScenesIsInTagSidecarAndQuality) {
+  const TempFolder folder;
+  auto writer = SessionWriter::create(folder / "s");
+  ASSERT_TRUE(writer);
+  DeviceInfo device;
+  device.id = "thermal0";
+  device.modality = Modality::thermal;
+  ASSERT_TRUE((*writer)->add_device(device));
+  Frame counted, encoded;
+  counted.pixels = cv::Mat(8, 8, CV_16UC1, cv::Scalar(58657));  // 1173.14 K
+  counted.kelvin_per_count = 0.02;
+  encoded.encoded = *encode_thermal_tiff(counted.pixels, {0.02, 0});  // as a replay delivers it
+  encoded.extension = ".tiff";
+  for (const Frame& frame : {counted, encoded}) {
+    const auto record = (*writer)->append("thermal0", frame);
+    ASSERT_TRUE(record) << record.error().message();
+    EXPECT_NEAR(record->quality->mean_level, 1173.14, 1e-6);
+    EXPECT_NEAR(read_thermal_k(folder / "s" / record->file)->at<float>(0, 0), 1173.14, 1e-3);
+    EXPECT_NE(test::get(folder / "s" / (record->file + ".json")).find("\"scale\":0.02"), std::string::npos);
+  }
+}
+
+TEST(SessionWriter, ARecordThatWouldNotOpenLeavesNoFile) {
+  const TempFolder folder;
+  auto writer = SessionWriter::create(folder / "s");
+  ASSERT_TRUE(writer);
+  DeviceInfo device;
+  device.id = "visible0";
+  ASSERT_TRUE((*writer)->add_device(device));
+  Frame frame;
+  frame.pixels = cv::Mat(8, 8, CV_8UC3, cv::Scalar(1, 2, 3));
+  frame.cam_from_world = Rigid3d{Eigen::Quaterniond(0, 0, 0, 0), {0, 0, 0}};
+  EXPECT_FALSE((*writer)->append("visible0", frame));
+  EXPECT_FALSE(std::filesystem::exists(folder / "s/visible"));
+  frame.cam_from_world.reset();
+  ASSERT_TRUE((*writer)->append("visible0", frame));
+  ASSERT_TRUE((*writer)->close());
+  EXPECT_TRUE(open_session(folder / "s"));
+}
+
 }  // namespace
 }  // namespace orbitfuse

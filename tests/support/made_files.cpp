@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tests/support/made_files.hpp"
 
+#include <charls/charls.h>
+
 #include <cmath>
 #include <cstring>
 
@@ -34,12 +36,23 @@ std::string samples_of(const cv::Mat& image) {
   return bytes;
 }
 
+std::string jpeg_ls(const cv::Mat& signal) {
+  charls::jpegls_encoder encoder;
+  encoder.frame_info({static_cast<std::uint32_t>(signal.cols), static_cast<std::uint32_t>(signal.rows), 16, 1});
+  std::string bytes(encoder.estimated_destination_size(), '\0');
+  encoder.destination(bytes.data(), bytes.size());
+  const cv::Mat whole = signal.clone();
+  bytes.resize(encoder.encode(whole.data, whole.total() * whole.elemSize()));
+  return bytes;
+}
+
 std::string raw_record(const cv::Mat& signal, FlirPixels pixels) {
   std::string record(0x20, '\0');
   put_number(record, 0, 2, 2);
   put_number(record, 2, static_cast<std::uint64_t>(signal.cols), 2);
   put_number(record, 4, static_cast<std::uint64_t>(signal.rows), 2);
   if (pixels == FlirPixels::raw) return record + samples_of(signal);
+  if (pixels == FlirPixels::jpeg_ls) return record + jpeg_ls(signal);
   cv::Mat swapped = signal.clone();
   for (auto it = swapped.begin<std::uint16_t>(); it != swapped.end<std::uint16_t>(); ++it)
     *it = static_cast<std::uint16_t>(*it << 8 | *it >> 8);

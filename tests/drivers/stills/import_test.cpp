@@ -47,9 +47,9 @@ void append(std::string& to, std::uint32_t value, int bytes) {
 }
 
 /// A JPEG whose EXIF tells the 35 mm equivalent of its focal length.
-std::string jpeg_with_focal(int width, int height, int focal_35mm) {
+std::string jpeg_with_focal(int width, int height, int focal_35mm, int scene = 0) {
   cv::Mat image(height, width, CV_8UC3);
-  cv::RNG(static_cast<std::uint64_t>(width + focal_35mm)).fill(image, cv::RNG::UNIFORM, 0, 255);
+  cv::RNG(static_cast<std::uint64_t>(width + focal_35mm + scene)).fill(image, cv::RNG::UNIFORM, 0, 255);
   std::string jpeg = *encode_jpeg(image, 90);
   std::string exif("Exif\0\0II*\0", 10);
   const auto directory = [&exif](int tag, int type, int value) {  // of one entry
@@ -87,7 +87,7 @@ std::vector<std::vector<double>> celsius_table(const fs::path& file) {
 
 TEST_F(ImportTest, PhotosOfSeveralLensesAndSizesAreKeptApartAndNamed) {
   put("in/a.jpg", jpeg_with_focal(40, 30, 24));
-  put("in/b.jpg", jpeg_with_focal(40, 30, 24));
+  put("in/b.jpg", jpeg_with_focal(40, 30, 24, 1));
   put("in/c.jpg", jpeg_with_focal(40, 30, 70));
   put("in/d.jpg", jpeg_with_focal(48, 32, 24));
   options.visible = {folder / "in"};
