@@ -2,6 +2,7 @@
 #include "drivers/stills/import.hpp"
 
 #include <fmt/format.h>
+#include <map>
 #include <fmt/ranges.h>
 
 #include <algorithm>
@@ -414,7 +415,9 @@ Result<ImportReport> import_session(const ImportOptions& options, const fs::path
   ORBITFUSE_TRY(check_is_new(session_folder));
   MadeFolders made;
   ORBITFUSE_TRY(made.make(session_folder));
-  ORBITFUSE_ASSIGN(auto writer, SessionWriter::create(session_folder, {{"recorded_by", "import"}}));
+  std::map<std::string, std::string> notes = {{"recorded_by", "import"}};
+  if (options.rig) notes["rig"] = "yes";  // recon/poses/rig/rig_pairs.hpp reads it
+  ORBITFUSE_ASSIGN(auto writer, SessionWriter::create(session_folder, notes));
   Importer importer(options, session_folder, writer.get(), progress);
   if (const Status status = run(importer); !status) {
     writer.reset();
