@@ -127,6 +127,7 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   const bool visible = modality == Modality::visible;
   pipeline::Stage stage;
   stage.name = "poses_" + std::string(name(modality));
+  stage.version = 2;
   if (!visible) {
     stage.version = 3;
     stage.uses = {"poses_visible"};

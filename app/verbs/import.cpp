@@ -37,6 +37,8 @@ void add_sources(CLI::App& app, Options& o) {
       ->group(group);
   app.add_flag("--embedded-visible", o.import.embedded_visible,
                "Also take the photos embedded in radiometric JPEGs")->group(group);
+  app.add_flag("--rig", o.import.rig, "Images of equal name or time were shot at once by one device")
+      ->group(group);
 }
 
 void add_poses_known(CLI::App& app, Options& o) {

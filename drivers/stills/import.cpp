@@ -2,9 +2,11 @@
 #include "drivers/stills/import.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <tuple>
 
 #include "capture/recording/frame_encoding.hpp"
@@ -385,7 +387,9 @@ Result<ImportReport> import_session(const ImportOptions& options, const fs::path
   MadeFolders made;
   ORBITFUSE_TRY(made.make(session_folder));
   ImportLeftover leftover(session_folder);
-  ORBITFUSE_ASSIGN(auto writer, SessionWriter::create(session_folder, {{"recorded_by", "import"}}));
+  std::map<std::string, std::string> notes = {{"recorded_by", "import"}};
+  if (options.rig) notes["rig"] = "yes";  // recon/poses/rig/rig_pairs.hpp reads it
+  ORBITFUSE_ASSIGN(auto writer, SessionWriter::create(session_folder, notes));
   Importer importer(options, session_folder, writer.get(), progress);
   ORBITFUSE_TRY(run(importer));
   ImportReport report = importer.take_report();

@@ -52,6 +52,9 @@ struct ImportOptions {
 
   /// Radiometric JPEGs given as `thermal` also bring their embedded photo as a visible frame.
   bool embedded_visible = false;
+  /// The user's word that images of equal name or time were shot at once by cameras fixed to each
+  /// other, also where stations are declared; noted in the session for the pose stage.
+  bool rig = false;
 
   /// Known poses and intrinsics; at most one per modality. The images named there are matched
   /// with the frames by file name; with no `visible` given, transforms.json lists the images too.

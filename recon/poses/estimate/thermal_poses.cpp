@@ -5,6 +5,7 @@
 
 #include "recon/poses/cross_modal/cross_modal.hpp"
 #include "recon/poses/estimate/session_poses.hpp"
+#include "recon/poses/rig/rig_poses.hpp"
 #include "recon/poses/sfm/sfm_ladder.hpp"
 
 namespace orbitfuse {
@@ -29,13 +30,19 @@ Result<ThermalPoses> estimate_thermal_poses(const Session& session, const Visibl
                 "record or import more views");
   std::vector<LadderStep> steps;
   if (visible != nullptr) {
+    if (const RigPairs rig = find_rig_pairs(session); !rig.pairs.empty()) {
+      auto by_rig = pose_by_rig(session, visible->reconstruction, rig, progress, steps);
+      if (by_rig) by_rig->ladder = std::move(steps);
+      if (by_rig || by_rig.error().kind != ErrorKind::quality) return by_rig;
+    }
+    const std::size_t tried = steps.size();
     auto localised = localise_in_visible(session, *visible, frames, options, progress, steps);
     if (localised) {
       localised->ladder = std::move(steps);
       return localised;
     }
     if (localised.error().kind != ErrorKind::quality) return tl::unexpected(localised.error());
-    if (steps.empty())
+    if (steps.size() == tried)
       steps.push_back({"cross-modal, orbit prior", false, localised.error().found, 0,
                        static_cast<int>(frames.size()), 0});
   }

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// bench_rig_pairs SCENE...: the test pairs of the rendered scenes, where both modalities share one
+// camera, as a rig whose transform nobody knows: error of the transform and the lens, and by how much
+// corners and centre of the thermal image are misplaced. With the pairs shuffled it must refuse.
+
+#include <cstdio>
+#include <filesystem>
+#include <fmt/format.h>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "core/image/image_io.hpp"
+#include "core/system/clock.hpp"
+#include "core/system/cpu.hpp"
+#include "recon/alignment/luminance.hpp"
+#include "recon/poses/rig/rig_estimate.hpp"
+#include "tests/support/shared_data.hpp"
+
+namespace {
+
+using namespace orbitfuse;
+namespace fs = std::filesystem;
+
+struct TestPairs {
+  std::vector<RigView> views;
+  Camera camera;
+};
+
+Result<TestPairs> read(const fs::path& folder) {
+  std::ifstream stream(folder / "ground_truth.json");
+  const nlohmann::json test = nlohmann::json::parse(stream).at("test");
+  TestPairs pairs;
+  const auto& k = test.at("K");
+  pairs.camera.width = k.at("w"), pairs.camera.height = k.at("h");
+  pairs.camera.fx = k.at("fx"), pairs.camera.fy = k.at("fy");
+  pairs.camera.cx = k.at("cx"), pairs.camera.cy = k.at("cy");
+  Session session;
+  session.folder = folder;
+  for (const auto& entry : test.at("frames")) {
+    RigView view;
+    FrameRecord frame;
+    frame.width = pairs.camera.width, frame.height = pairs.camera.height;
+    frame.file = view.name = entry.at("visible");
+    ORBITFUSE_ASSIGN(view.visible, read_luminance(session, frame));
+    frame.file = entry.at("thermal");
+    frame.modality = Modality::thermal;
+    ORBITFUSE_ASSIGN(view.thermal, read_luminance(session, frame));
+    view.visible_camera = pairs.camera;
+    pairs.views.push_back(std::move(view));
+  }
+  return pairs;
+}
+
+/// Pixels by which the rig misplaces far points, over a grid of the image.
+double mean_misplacement_px(const RigEstimate& rig, const Camera& camera) {
+  double sum = 0;
+  int count = 0;
+  for (int y = 0; y <= 4; ++y)
+    for (int x = 0; x <= 4; ++x) {
+      const Eigen::Vector2d pixel(x * camera.width / 4.0, y * camera.height / 4.0);
+      sum += (rig.thermal.project(rig.thermal_from_visible * camera.ray_of(pixel)) - pixel).norm();
+      ++count;
+    }
+  return sum / count;
+}
+
+void print(const char* what, const TestPairs& pairs, double focal_error, double sigma) {
+  RigOptions options;
+  options.thermal_lens = pairs.camera;
+  options.thermal_lens.fx = options.thermal_lens.fy = pairs.camera.fx * (1 + focal_error);
+  options.focal_relative_sigma = sigma;
+  const double before = cpu_seconds();
+  const auto rig = estimate_rig(pairs.views, options, {});
+  const double spent = cpu_seconds() - before;
+  if (!rig) {
+    fmt::print("  {}: refused: {}; {:.1f} CPU s\n", what, rig.error().found, spent);
+    return;
+  }
+  fmt::print("  {}: off by {:.2f} deg, focal length by {:.2f} %, {:.2f} px in the mean; {}; {:.1f} CPU s\n",
+             what, Eigen::AngleAxisd(rig->thermal_from_visible.rotation).angle() * 180 / EIGEN_PI,
+             100 * (rig->thermal.fx / pairs.camera.fx - 1),
+             mean_misplacement_px(*rig, pairs.camera), rig->words(), spent);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);
+  const fs::path data = testing::shared_data();
+  if (argc < 2 || !fs::exists(data)) {
+    std::fputs("bench_rig_pairs SCENE...; needs the shared data (ORBITFUSE_SHARED)\n", stderr);
+    return 2;
+  }
+  fmt::print("{}\n", cpu_description());
+  for (int i = 1; i < argc; ++i) {
+    fmt::print("{}\n", argv[i]);
+    auto pairs = read(data / "orbits" / argv[i]);
+    if (!pairs) {
+      fmt::print("  {}\n", pairs.error().message());
+      continue;
+    }
+    print("focal length 5 % too long", *pairs, 0.05, 0.05);
+    print("focal length unknown", *pairs, 0.3, 0.3);
+    const cv::Mat first = pairs->views.front().thermal;
+    for (std::size_t v = 0; v + 1 < pairs->views.size(); ++v)
+      pairs->views[v].thermal = pairs->views[v + 1].thermal;
+    pairs->views.back().thermal = first;
+    print("shuffled", *pairs, 0.05, 0.05);
+  }
+  return 0;
+}

@@ -1,0 +1,347 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/rig/rig_estimate.hpp"
+
+#include <ceres/ceres.h>
+#include <ceres/rotation.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "core/numeric/median.hpp"
+#include "core/system/parallel.hpp"
+#include "recon/alignment/edge_field.hpp"
+#include "recon/alignment/patch_matching.hpp"
+#include "recon/poses/rig/rig_image.hpp"
+
+namespace orbitfuse {
+namespace {
+
+std::size_t at(int index) { return static_cast<std::size_t>(index); }
+
+Camera thermal_camera(const Camera& lens, double focal_px, int width) {
+  Camera camera = lens;
+  camera.fx = camera.fy = focal_px;
+  return camera.scaled_to(width, std::max(1, lens.height * width / lens.width));
+}
+
+/// Edges of an image whose NaN pixels show nothing.
+cv::Mat edges_of(const cv::Mat& image) {
+  cv::Mat field = orientation_field(image, 1.0);
+  cv::Mat blind = image != image;
+  cv::dilate(blind, blind, {}, {-1, -1}, 4);  // the border of what is shown is no edge
+  field.setTo(cv::Scalar::all(0), blind);
+  return field;
+}
+
+cv::Mat thermal_edges(const cv::Mat& image, const Camera& camera) {
+  cv::Mat small;
+  cv::resize(image, small, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
+  return orientation_field(small, 1.0);
+}
+
+cv::Mat energy_of(const cv::Mat& field) {
+  cv::Mat parts[2];
+  cv::split(field, parts);
+  return parts[0].mul(parts[0]) + parts[1].mul(parts[1]);
+}
+
+/// Where the thermal image lies in the photo, by the correlation of all edges at all shifts, summed
+/// over all pairs: the same shift in each.
+struct Place {
+  double focal_px = 0;  ///< at the recorded width
+  Eigen::Quaterniond thermal_from_visible = Eigen::Quaterniond::Identity();
+  double score = -1;
+};
+
+class ShiftSearch {
+ public:
+  ShiftSearch(const std::vector<RigView>& views, const RigOptions& options)
+      : views_(views), options_(options) {
+    const Camera camera = thermal_camera(options.thermal_lens, 1, width);
+    for (const RigView& view : views) {
+      thermal_.push_back(thermal_edges(view.thermal, camera));
+      energy_.push_back(cv::sum(energy_of(thermal_.back()))[0]);
+    }
+  }
+
+  /// The best place at one focal length, for right pairs and (into `wrong`) for shuffled ones.
+  Place best_at(double focal_px, double& wrong) const {
+    Camera wide = thermal_camera(options_.thermal_lens, focal_px, width);
+    wide.width += 2 * margin, wide.height += 2 * margin;
+    wide.cx += margin, wide.cy += margin;
+    const int controls = std::min<int>(3, static_cast<int>(views_.size()) - 1);
+    std::vector<std::vector<cv::Mat>> scores(views_.size());
+    parallel_for(static_cast<int>(views_.size()), [&](int i) {
+      const RigView& view = views_[at(i)];
+      const cv::Mat field = edges_of(
+          seen_from(view.visible, view.visible_camera, Eigen::Quaterniond::Identity(), wide));
+      for (int k = 0; k <= controls; ++k) {
+        const std::size_t j = (at(i) + at(k)) % views_.size();
+        scores[at(i)].push_back(correlation(field, j));
+      }
+    });
+    Place best;
+    for (int k = 0; k <= controls; ++k) {
+      cv::Mat sum = scores[0][at(k)].clone();
+      for (std::size_t i = 1; i < scores.size(); ++i) sum += scores[i][at(k)];
+      cv::GaussianBlur(sum, sum, {}, 1.0);
+      double value = 0;
+      cv::Point peak;
+      cv::minMaxLoc(sum, nullptr, &value, nullptr, &peak);
+      value /= static_cast<double>(views_.size());
+      if (k > 0) {
+        wrong = std::max(wrong, value);
+        continue;
+      }
+      const Camera camera = thermal_camera(options_.thermal_lens, focal_px, width);
+      const Eigen::Vector3d axis((peak.x - margin) / camera.fx, (peak.y - margin) / camera.fy, 1);
+      best = {focal_px, Eigen::Quaterniond::FromTwoVectors(axis, Eigen::Vector3d::UnitZ()), value};
+    }
+    return best;
+  }
+
+ private:
+  static constexpr int width = 160, margin = 56;
+
+  cv::Mat correlation(const cv::Mat& field, std::size_t j) const {
+    cv::Mat product, energy, ones = cv::Mat::ones(thermal_[j].size(), CV_32F);
+    cv::matchTemplate(field, thermal_[j], product, cv::TM_CCORR);
+    cv::matchTemplate(energy_of(field), ones, energy, cv::TM_CCORR);
+    // A corner of the photo with hardly an edge must not win by its small norm.
+    cv::max(energy, 0.25 * energy_[j], energy);
+    cv::Mat norm;
+    cv::sqrt(energy * energy_[j], norm);
+    cv::max(norm, 1e-6, norm);
+    return product / norm;
+  }
+
+  const std::vector<RigView>& views_;
+  const RigOptions& options_;
+  std::vector<cv::Mat> thermal_;
+  std::vector<double> energy_;
+};
+
+std::vector<double> focal_lengths(const RigOptions& options) {
+  const double width = options.thermal_lens.width;
+  std::vector<double> list;
+  constexpr double step = 1.04;
+  if (options.focal_relative_sigma > options.search_from) {
+    for (double f = width / 2 / std::tan(EIGEN_PI / 4); f < width / 2 / std::tan(EIGEN_PI / 30);
+         f *= step)
+      list.push_back(f);
+    return list;
+  }
+  const int reach =
+      static_cast<int>(std::ceil(2 * options.focal_relative_sigma / std::log(step)));
+  for (int i = -reach; i <= reach; ++i)
+    list.push_back(options.thermal_lens.fx * std::pow(step, i));
+  return list;
+}
+
+/// A point in the photo's axes, turned; the rig's remaining turn and shift, and the lens.
+struct RigResidual {
+  PatchMatch match;
+  Camera camera;
+
+  template <class T>
+  bool operator()(const T* rig, const T* log_focal, T* residual) const {
+    const T point[3] = {T(match.point.x()), T(match.point.y()), T(match.point.z())};
+    T moved[3];
+    ceres::AngleAxisRotatePoint(rig, point, moved);
+    for (int i = 0; i < 3; ++i) moved[i] += rig[3 + i];
+    if (!(moved[2] > T(1e-6))) return false;
+    const T scale = exp(log_focal[0]);
+    const T dx = scale * T(camera.fx) * moved[0] / moved[2] + T(camera.cx) - T(match.seen.x());
+    const T dy = scale * T(camera.fy) * moved[1] / moved[2] + T(camera.cy) - T(match.seen.y());
+    residual[0] = T(match.sqrt_weight(0, 0)) * dx + T(match.sqrt_weight(0, 1)) * dy;
+    residual[1] = T(match.sqrt_weight(1, 0)) * dx + T(match.sqrt_weight(1, 1)) * dy;
+    return true;
+  }
+};
+
+struct RigPrior {
+  double shift_sigma, log_focal_mean, log_focal_sigma;
+
+  template <class T>
+  bool operator()(const T* rig, const T* log_focal, T* residual) const {
+    for (int i = 0; i < 3; ++i) residual[i] = rig[3 + i] / T(shift_sigma);
+    residual[3] = (log_focal[0] - T(log_focal_mean)) / T(log_focal_sigma);
+    return true;
+  }
+};
+
+struct Round {
+  int width_px, search_px, patch_search_px, patch_radius_px;
+};
+
+struct RoundResult {
+  std::vector<std::vector<PatchMatch>> matches;
+  std::vector<cv::Mat> edges, fields;
+  Camera camera;
+};
+
+RoundResult match_round(const std::vector<RigView>& views, const RigEstimate& rig,
+                        const Round& round) {
+  RoundResult result;
+  const int width = std::min(round.width_px, rig.thermal.width);
+  result.camera = thermal_camera(rig.thermal, rig.thermal.fx, width).without_distortion();
+  result.matches.resize(views.size());
+  result.edges.resize(views.size());
+  result.fields.resize(views.size());
+  parallel_for(static_cast<int>(views.size()), [&](int i) {
+    const RigView& view = views[at(i)];
+    const Eigen::Quaterniond& turn = rig.thermal_from_visible.rotation;
+    SceneRender seen;
+    seen.brightness = seen_from(view.visible, view.visible_camera, turn, result.camera);
+    std::vector<Eigen::Vector3d> turned;
+    for (const Eigen::Vector3d& point : view.points) turned.push_back(turn * point);
+    seen.depth = sparse_depth(turned, result.camera);
+    result.edges[at(i)] = edges_of(seen.brightness);
+    result.fields[at(i)] = thermal_edges(view.thermal, result.camera);
+    result.matches[at(i)] =
+        match_patches(seen, result.edges[at(i)], result.camera, result.fields[at(i)],
+                      {round.search_px, round.patch_search_px, round.patch_radius_px, 8});
+  });
+  return result;
+}
+
+/// The rig and the lens from all pairs' patches, the robust scale lowered step by step.
+void solve(const RoundResult& round, const RigOptions& options, double depth, RigEstimate& rig,
+           std::array<double, 6>& correction, double& log_focal) {
+  correction = {0, 0, 0, rig.thermal_from_visible.translation.x(),
+                rig.thermal_from_visible.translation.y(), rig.thermal_from_visible.translation.z()};
+  log_focal = 0;
+  const bool searched = options.focal_relative_sigma > options.search_from;
+  for (const double scale_px : {8.0, 4.0, 2.0, 1.0}) {
+    ceres::Problem problem;
+    for (const auto& matches : round.matches)
+      for (const PatchMatch& match : matches)
+        problem.AddResidualBlock(
+            new ceres::AutoDiffCostFunction<RigResidual, 2, 6, 1>(
+                new RigResidual{match, round.camera}),
+            new ceres::ScaledLoss(new ceres::CauchyLoss(scale_px), match.score,
+                                  ceres::TAKE_OWNERSHIP),
+            correction.data(), &log_focal);
+    const double mean = searched ? 0 : std::log(options.thermal_lens.fx / rig.thermal.fx);
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<RigPrior, 4, 6, 1>(new RigPrior{
+            options.baseline_sigma * depth, mean,
+            std::max(1e-4, searched ? 0.1 : options.focal_relative_sigma)}),
+        nullptr, correction.data(), &log_focal);
+    ceres::Solver::Options solver;
+    solver.linear_solver_type = ceres::DENSE_QR;
+    solver.num_threads = 1;  // more sum in any order
+    solver.max_num_iterations = 30;
+    solver.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(solver, &problem, &summary);
+  }
+}
+
+void judge(const RoundResult& round, const std::array<double, 6>& correction, double log_focal,
+           RigEstimate& rig) {
+  const int count = static_cast<int>(round.edges.size());
+  rig.pairs.assign(at(count), {});
+  for (int i = 0; i < count; ++i) {
+    RigPairFit& fit = rig.pairs[at(i)];
+    std::vector<double> distances;
+    for (const PatchMatch& match : round.matches[at(i)]) {
+      double r[2];
+      if (!RigResidual{match, round.camera}(correction.data(), &log_focal, r)) continue;
+      if (const double d = std::hypot(r[0], r[1]); d < 2) distances.push_back(d);
+    }
+    fit.matches = static_cast<int>(distances.size());
+    fit.median_px = median(distances);
+    fit.agreement = edge_agreement(round.edges[at(i)], round.fields[at(i)]);
+    for (int j = 0; j < count; ++j)
+      if (j != i)
+        fit.control += edge_agreement(round.edges[at(i)], round.fields[at(j)]) / (count - 1);
+  }
+  double sum = 0, squares = 0;
+  for (const RigPairFit& fit : rig.pairs) {
+    const double d = fit.agreement - fit.control;
+    sum += d, squares += d * d;
+  }
+  const double mean = sum / count, variance = std::max(squares / count - mean * mean, 1e-9);
+  rig.decisiveness = mean / std::sqrt(variance / count);
+}
+
+double median_depth(const std::vector<RigView>& views) {
+  std::vector<double> depths;
+  for (const RigView& view : views)
+    for (const Eigen::Vector3d& point : view.points) depths.push_back(point.z());
+  return depths.empty() ? 1.0 : median(depths);
+}
+
+}  // namespace
+
+std::string RigEstimate::words() const {
+  double agreement = 0, control = 0;
+  std::vector<double> residuals;
+  int matches = 0;
+  for (const RigPairFit& fit : pairs) {
+    agreement += fit.agreement / static_cast<double>(pairs.size());
+    control += fit.control / static_cast<double>(pairs.size());
+    residuals.push_back(fit.median_px);
+    matches += fit.matches;
+  }
+  return fmt::format(
+      "{} pairs, turned by {:.1f} deg, focal length {:.0f} px; edges agree {:.3f}, in shuffled pairs "
+      "{:.3f} ({:.1f} standard errors apart), {} patches at {:.2f} px of {}",
+      pairs.size(),
+      Eigen::AngleAxisd(thermal_from_visible.rotation).angle() * 180 / EIGEN_PI, thermal.fx,
+      agreement, control, decisiveness, matches, median(residuals), judged_width_px);
+}
+
+Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOptions& options,
+                                 const Progress& progress) {
+  const auto refused = [](const std::string& found) {
+    return fail(ErrorKind::quality, "poses.rig", found,
+                "pair only images that were shot at once by cameras fixed to each other");
+  };
+  if (views.size() < 4) return refused(fmt::format("{} pairs, at least 4 are needed", views.size()));
+  const ShiftSearch search(views, options);
+  Place best;
+  double wrong = -1;
+  for (const double focal_px : focal_lengths(options)) {
+    ORBITFUSE_TRY(progress.check("poses.rig"));
+    const Place place = search.best_at(focal_px, wrong);
+    if (place.score > best.score) best = place;
+  }
+  RigEstimate rig;
+  rig.thermal = options.thermal_lens;
+  rig.thermal.fx = rig.thermal.fy = best.focal_px;
+  rig.thermal_from_visible.rotation = best.thermal_from_visible;
+  const double depth = median_depth(views);
+  RoundResult matched;
+  for (const Round& round : {Round{160, 8, 8, 18}, Round{160, 5, 7, 14}, Round{320, 6, 8, 16},
+                             Round{320, 4, 6, 12}, Round{320, 3, 5, 10}}) {
+    ORBITFUSE_TRY(progress.check("poses.rig"));
+    matched = match_round(views, rig, round);
+    std::size_t patches = 0;
+    for (const auto& matches : matched.matches) patches += matches.size();
+    if (patches < 12 * views.size() / 2)
+      return refused(fmt::format("{} patches of {} photos are found in the thermal images", patches,
+                                 views.size()));
+    std::array<double, 6> correction{};
+    double log_focal = 0;
+    solve(matched, options, depth, rig, correction, log_focal);
+    judge(matched, correction, log_focal, rig);
+    const Eigen::Vector3d turn(correction[0], correction[1], correction[2]);
+    const Eigen::Quaterniond more(
+        turn.norm() > 1e-12 ? Eigen::AngleAxisd(turn.norm(), turn.normalized())
+                            : Eigen::AngleAxisd::Identity());
+    rig.thermal_from_visible.rotation = (more * rig.thermal_from_visible.rotation).normalized();
+    rig.thermal_from_visible.translation = {correction[3], correction[4], correction[5]};
+    rig.thermal.fx = rig.thermal.fy = rig.thermal.fx * std::exp(log_focal);
+  }
+  if (rig.decisiveness < options.min_decisiveness || best.score <= wrong)
+    return refused(fmt::format("{}; correlation of all edges {:.3f}, of shuffled pairs {:.3f} at best",
+                               rig.words(), best.score, wrong));
+  return rig;
+}
+
+}  // namespace orbitfuse

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "core/geometry/reconstruction.hpp"
+#include "core/progress.hpp"
+#include "core/result.hpp"
+
+// Two cameras on one body: the transform between them and the thermal lens are the same in every pair,
+// so all pairs are aligned as one. No field is needed: what the thermal camera sees is what the
+// visible photo of the same moment shows, turned by the rig, with depths from the sparse points.
+namespace orbitfuse {
+
+struct RigView {
+  std::string name;               ///< of the thermal frame
+  cv::Mat visible, thermal;       ///< CV_32FC1
+  Camera visible_camera;
+  std::vector<Eigen::Vector3d> points;  ///< scene points that the visible view shows, in its axes
+};
+
+struct RigOptions {
+  Camera thermal_lens;            ///< as known before; its size is the frames'
+  /// Of the focal length; above `search_from` fields of view from 12 to 90 degrees are searched.
+  double focal_relative_sigma = 0.03;
+  double search_from = 0.1;
+  /// The cameras' distance as a share of the scene's, one standard deviation: they share a housing.
+  double baseline_sigma = 0.03;
+  /// Pairs in the right order must agree this much better, in standard errors, than wrong ones.
+  double min_decisiveness = 3;
+};
+
+struct RigPairFit {
+  double agreement = 0;  ///< of the photo's edges with the thermal image's
+  double control = 0;    ///< of the same photo with the thermal images of the other pairs, mean
+  int matches = 0;       ///< patches within 2 px of the rig's answer, at `judged_width_px`
+  double median_px = 0;  ///< their residual
+};
+
+struct RigEstimate {
+  Rigid3d thermal_from_visible;
+  Camera thermal;
+  std::vector<RigPairFit> pairs;
+  double decisiveness = 0;  ///< standard errors between right and wrong pairs
+  static constexpr int judged_width_px = 320;
+  std::string words() const;
+};
+
+/// Errors: quality (the pairs agree no better than shuffled ones; too few patches), cancelled.
+Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOptions& options,
+                                 const Progress& progress);
+
+}  // namespace orbitfuse

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/rig/rig_poses.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <map>
+
+#include "recon/alignment/luminance.hpp"
+#include "recon/poses/cross_modal/line_alignment.hpp"
+
+namespace orbitfuse {
+namespace {
+
+struct Gathered {
+  std::vector<RigView> views;
+  std::vector<const PosedView*> posed;  ///< the photo of each
+};
+
+Result<Gathered> gather(const Session& session, const Reconstruction& visible, const RigPairs& rig,
+                        const Camera& thermal_lens, ModalityPoses& poses) {
+  std::map<std::string, int> view_of;
+  for (std::size_t v = 0; v < visible.views.size(); ++v)
+    view_of[visible.views[v].name] = static_cast<int>(v);
+  std::vector<std::vector<Eigen::Vector3d>> seen(visible.views.size());
+  for (const SparsePoint& point : visible.points)
+    for (const Observation& o : point.track) {
+      const auto v = static_cast<std::size_t>(o.view);
+      seen[v].push_back(visible.views[v].cam_from_world * point.position);
+    }
+  Gathered result;
+  for (const auto& [photo, thermal] : rig.pairs) {
+    const auto found = view_of.find(photo->file);
+    if (found == view_of.end()) {
+      poses.dropped.push_back({thermal->file, "its photo has no pose"});
+      continue;
+    }
+    if (thermal->width != thermal_lens.width || thermal->height != thermal_lens.height) {
+      poses.dropped.push_back({thermal->file, "it is of another size than the rig's other images"});
+      continue;
+    }
+    const auto v = static_cast<std::size_t>(found->second);
+    RigView view;
+    view.name = thermal->file;
+    ORBITFUSE_ASSIGN(view.visible, read_luminance(session, *photo));
+    ORBITFUSE_ASSIGN(view.thermal, read_luminance(session, *thermal));
+    view.visible_camera = visible.views[v].camera;
+    view.points = std::move(seen[v]);
+    result.views.push_back(std::move(view));
+    result.posed.push_back(&visible.views[v]);
+  }
+  return result;
+}
+
+}  // namespace
+
+Result<ThermalPoses> pose_by_rig(const Session& session, const Reconstruction& visible,
+                                 const RigPairs& rig, const Progress& progress,
+                                 std::vector<LadderStep>& steps) {
+  const auto start = std::chrono::steady_clock::now();
+  progress.report({"poses.thermal", 0, 2, -1, "rig of " + rig.found_by});
+  LadderStep step{"rig, " + rig.found_by, false, "", 0, 0, 0};
+  ThermalPoses result;
+  result.shares_visible_frame = true;
+  result.reconstruction.modality = Modality::thermal;
+  const auto frames = session.frames_of(Modality::thermal, false);
+  result.frame_count = step.total = static_cast<int>(frames.size());
+  const LensGuess lens = lens_of(session, *rig.pairs.front().second);
+  ORBITFUSE_ASSIGN(const Gathered gathered,
+                   gather(session, visible, rig, lens.camera, result));
+  RigOptions options;
+  options.thermal_lens = lens.camera;
+  options.focal_relative_sigma = lens.focal_relative_sigma;
+  const Result<RigEstimate> found = estimate_rig(gathered.views, options, progress);
+  step.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (!found) {
+    step.why = found.error().found;
+    if (found.error().kind == ErrorKind::quality) steps.push_back(step);
+    return tl::unexpected(found.error());
+  }
+  for (std::size_t i = 0; i < gathered.views.size(); ++i) {
+    const RigPairFit& fit = found->pairs[i];
+    result.reconstruction.views.push_back(
+        {gathered.views[i].name, found->thermal,
+         found->thermal_from_visible * gathered.posed[i]->cam_from_world});
+    if (fit.agreement <= fit.control)
+      result.contested.push_back(
+          {gathered.views[i].name,
+           fmt::format("its edges agree with its photo's by {:.3f}, other pairs' by {:.3f}",
+                       fit.agreement, fit.control)});
+  }
+  for (const FrameRecord* frame : frames)
+    if (std::none_of(rig.pairs.begin(), rig.pairs.end(),
+                     [&](const auto& pair) { return pair.second == frame; }))
+      result.dropped.push_back({frame->file, "no photo was shot with it"});
+  result.gates["posed_ratio"] = result.posed_ratio();
+  result.gates["rig_decisiveness"] = found->decisiveness;
+  step.why = found->words();
+  step.held = true;
+  step.posed = static_cast<int>(result.reconstruction.views.size());
+  steps.push_back(step);
+  return result;
+}
+
+}  // namespace orbitfuse

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+#include <random>
+
+#include "recon/poses/rig/rig_estimate.hpp"
+#include "recon/poses/rig/rig_image.hpp"
+#include "recon/poses/rig/rig_pairs.hpp"
+
+namespace orbitfuse {
+namespace {
+
+/// A photo of overlapping shapes.
+cv::Mat shapes(unsigned seed) {
+  std::mt19937 rng(seed);
+  const auto draw = [&](int high) { return static_cast<int>(rng() % static_cast<unsigned>(high)); };
+  cv::Mat image(480, 640, CV_32F, cv::Scalar(90));
+  for (int i = 0; i < 60; ++i) {
+    const cv::Scalar shade(20 + draw(200));
+    const cv::Point at(draw(640), draw(480));
+    if (i % 2 == 0) cv::circle(image, at, 8 + draw(40), shade, cv::FILLED);
+    else cv::rectangle(image, {at.x, at.y, 10 + draw(90), 10 + draw(90)}, shade, cv::FILLED);
+  }
+  cv::GaussianBlur(image, image, {}, 1.0);
+  return image;
+}
+
+struct RigScene {
+  std::vector<RigView> views;
+  RigOptions options;
+  Eigen::Quaterniond thermal_from_visible;
+  Camera thermal = Camera::from_fov(320, 240, 38);
+
+  explicit RigScene(int count) {
+    thermal_from_visible = Eigen::AngleAxisd(0.05, Eigen::Vector3d(0.3, 1, 0.4).normalized());
+    const Camera visible = Camera::from_fov(640, 480, 60);
+    std::mt19937 rng(9);
+    std::normal_distribution<float> noise(0, 4);
+    for (int i = 0; i < count; ++i) {
+      RigView view;
+      view.name = std::to_string(i);
+      view.visible = shapes(static_cast<unsigned>(i + 1));
+      view.visible_camera = visible;
+      cv::Mat seen = seen_from(view.visible, visible, thermal_from_visible, thermal);
+      view.thermal = 300 - 0.4 * seen;  // bright is cold here
+      for (float& v : cv::Mat_<float>(view.thermal)) v += noise(rng);
+      for (int x = -4; x <= 4; ++x)
+        for (int y = -3; y <= 3; ++y) view.points.emplace_back(x, y, 10.0);
+      views.push_back(std::move(view));
+    }
+    options.thermal_lens = thermal;
+    options.thermal_lens.fx = options.thermal_lens.fy = 1.04 * thermal.fx;
+  }
+};
+
+TEST(Rig, OneTransformAndLensAreFoundFromAllPairs) {
+  for (const double sigma : {0.05, 0.3}) {  // a rough focal length, and none
+    RigScene scene(6);
+    scene.options.focal_relative_sigma = sigma;
+    const auto rig = estimate_rig(scene.views, scene.options, {});
+    ASSERT_TRUE(rig) << rig.error().message();
+    EXPECT_LT(rig->thermal_from_visible.rotation.angularDistance(scene.thermal_from_visible),
+              0.004)
+        << rig->words();
+    EXPECT_NEAR(rig->thermal.fx / scene.thermal.fx, 1, 0.006) << rig->words();
+    EXPECT_LT(rig->thermal_from_visible.translation.norm(), 0.05) << "0.5 % of the scene's distance";
+  }
+}
+
+TEST(Rig, ShuffledPairsAreRefused) {
+  RigScene scene(6);
+  const cv::Mat first = scene.views.front().thermal;
+  for (std::size_t i = 0; i + 1 < scene.views.size(); ++i)
+    scene.views[i].thermal = scene.views[i + 1].thermal;
+  scene.views.back().thermal = first;
+  const auto rig = estimate_rig(scene.views, scene.options, {});
+  ASSERT_FALSE(rig) << rig->words();
+  EXPECT_EQ(rig.error().kind, ErrorKind::quality);
+  EXPECT_EQ(rig.error().where, "poses.rig");
+}
+
+TEST(Rig, ThreePairsAreTooFew) {
+  const RigScene scene(3);
+  const auto rig = estimate_rig(scene.views, scene.options, {});
+  ASSERT_FALSE(rig);
+  EXPECT_NE(rig.error().found.find("3 pairs"), std::string::npos);
+}
+
+Session paired_session(int count) {
+  Session session;
+  for (const Modality modality : {Modality::visible, Modality::thermal})
+    for (int i = 0; i < count; ++i) {
+      FrameRecord frame;
+      frame.modality = modality;
+      frame.file = std::string(name(modality)) + "/" + std::to_string(i);
+      frame.source = modality == Modality::visible ? "photos/IM_" + std::to_string(7 * i) + ".jpg"
+                                                   : "flir/IM_" + std::to_string(7 * i) + ".tiff";
+      session.frames.push_back(frame);
+    }
+  return session;
+}
+
+TEST(RigPairs, EqualNamesArePairs) {
+  const Session session = paired_session(5);
+  const RigPairs rig = find_rig_pairs(session);
+  ASSERT_EQ(rig.pairs.size(), 5u);
+  for (const auto& [photo, thermal] : rig.pairs) {
+    EXPECT_EQ(photo->modality, Modality::visible);
+    EXPECT_EQ(photo->file.substr(8), thermal->file.substr(8));
+  }
+}
+
+TEST(RigPairs, EqualTimesArePairs) {
+  Session session = paired_session(5);
+  for (std::size_t i = 0; i < session.frames.size(); ++i) {
+    FrameRecord& frame = session.frames[i];
+    frame.source = frame.file;
+    const auto shot = static_cast<std::int64_t>(i % 5);
+    frame.source += frame.modality == Modality::visible ? "v" : "t";
+    frame.host_time_ns = 1'000'000'000 * (100 + 20 * shot) + (i < 5 ? 0 : 300'000'000);
+  }
+  const RigPairs rig = find_rig_pairs(session);
+  EXPECT_EQ(rig.pairs.size(), 5u);
+  EXPECT_EQ(rig.found_by, "times within a second");
+  for (FrameRecord& frame : session.frames)
+    if (frame.modality == Modality::thermal) frame.host_time_ns += 5'000'000'000;
+  EXPECT_TRUE(find_rig_pairs(session).pairs.empty());
+}
+
+TEST(RigPairs, StationsOfTheirOwnSayThatTheyWereShotApartUnlessDeclaredARig) {
+  Session session = paired_session(5);
+  for (FrameRecord& frame : session.frames) frame.station = Station{};
+  EXPECT_TRUE(find_rig_pairs(session).pairs.empty());
+  session.notes[rig_note] = "yes";
+  EXPECT_EQ(find_rig_pairs(session).pairs.size(), 5u);
+}
+
+}  // namespace
+}  // namespace orbitfuse
