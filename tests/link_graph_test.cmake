@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# The link rule: core <- capture <- drivers; core <- recon <- fusion; only app sees all.
+# The link rule: core <- capture <- drivers; core <- recon; core <- fusion; only app sees all.
 # Siblings inside drivers/ or recon/ stay independent, so that each can be read alone; what poses
-# and registration share is recon/alignment.
+# and registration share is recon/alignment, and recon/assembly joins them all.
 file(STRINGS ${GRAPH} edges)
 if(NOT edges)
   message(FATAL_ERROR "no link graph in ${GRAPH}")
@@ -24,9 +24,11 @@ foreach(edge ${edges})
     set(ok TRUE)
   elseif(from MATCHES "^recon_" AND to STREQUAL "core")
     set(ok TRUE)
+  elseif(from STREQUAL "recon_assembly" AND to MATCHES "^(core|recon_.*)$")
+    set(ok TRUE)
   elseif(from MATCHES "^recon_(poses|registration)$" AND to STREQUAL "recon_alignment")
     set(ok TRUE)
-  elseif(from MATCHES "^fusion" AND to MATCHES "^(core|recon_.*|fusion.*)$")
+  elseif(from MATCHES "^fusion" AND to MATCHES "^(core|fusion.*)$")
     set(ok TRUE)
   endif()
   if(NOT ok)

@@ -6,8 +6,8 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
-#include <numeric>
 
+#include "core/near_word.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse::config {
@@ -49,22 +49,6 @@ std::string toml_text(const json& value) {
   return whole ? text + ".0" : text;
 }
 
-/// Levenshtein distance.
-std::size_t edits(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t substituted = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, substituted});
-    }
-  }
-  return row[b.size()];
-}
-
 /// The value of a dotted key, nullptr where there is none; an error where a table on the way is none.
 Result<const json*> value_at(const json& values, const std::string& key, const std::string& where) {
   const json* node = &values;
@@ -92,7 +76,7 @@ std::string nearest(const std::string& word, const std::vector<std::string>& kno
   for (const std::string& candidate : known) {
     // A key given without its table is a slip too: "budget_s" for "train.visible.budget_s".
     const bool tail = candidate.size() > word.size() && candidate.ends_with("." + word);
-    const std::size_t distance = tail ? 1 : edits(word, candidate);
+    const std::size_t distance = tail ? 1 : edit_distance(word, candidate);
     if (distance < best_edits) {
       best_edits = distance;
       best = candidate;

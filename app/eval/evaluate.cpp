@@ -14,7 +14,7 @@
 #include "app/stages/artifacts.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
-#include "app/stages/training_data.hpp"
+#include "recon/assembly/training_data.hpp"
 #include "core/temperature.hpp"
 #include "recon/nerf/nerf.hpp"
 
@@ -92,9 +92,9 @@ Status add_registration(Run& run, const Session& session, const GroundTruth& tru
     run.note("no registration to measure");
     return {};
   }
-  ORBITFUSE_ASSIGN(const json j, stages::read_json(run.out / "register" / stages::registration_file));
-  ORBITFUSE_ASSIGN(run.visible_from_thermal,
-                   stages::similarity_of_json(j.value("visible_from_thermal", json()), "register"));
+  ORBITFUSE_ASSIGN(const stages::RegistrationRecord record,
+                   stages::load_registration(run.out / "register"));
+  run.visible_from_thermal = record.visible_from_thermal;
   run.registered = true;
   const Similarity3d truth_from_thermal = *run.truth_from_visible * run.visible_from_thermal;
   const Similarity3d error = run.truth_from_thermal->inverse() * truth_from_thermal;
@@ -127,7 +127,7 @@ Status compare_visible(const nerf::Field& field, const TestView& view, const Cam
                        const Rigid3d& cam_from_visible, const Progress& progress, Sums& sums) {
   ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
                    nerf::render(field, camera, cam_from_visible, {}, progress));
-  ORBITFUSE_ASSIGN(const cv::Mat truth, stages::field_image(view.visible, Modality::visible, false));
+  ORBITFUSE_ASSIGN(const cv::Mat truth, field_image(view.visible, Samples::color));
   cv::Mat truth8, seen8;
   resized(truth, camera).convertTo(truth8, CV_8U, 255);
   seen.color.convertTo(seen8, CV_8U, 255);
@@ -140,7 +140,7 @@ Status compare_thermal(const nerf::Field& field, const TestView& view, const Cam
                        const Rigid3d& cam_from_thermal, const EvaluateOptions& options,
                        const Progress& progress, Sums& sums) {
   ORBITFUSE_ASSIGN(nerf::RenderedView seen, nerf::render(field, camera, cam_from_thermal, {}, progress));
-  ORBITFUSE_ASSIGN(const cv::Mat truth, stages::field_image(view.thermal, Modality::thermal, false));
+  ORBITFUSE_ASSIGN(const cv::Mat truth, field_image(view.thermal, Samples::kelvin));
   seen.color.setTo(std::nanf(""), seen.opacity < options.min_opacity);
   const TemperatureError error = temperature_error(seen.color, resized(truth, camera),
                                                    kelvin_from_celsius(options.scene_above_c));

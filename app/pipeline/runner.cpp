@@ -9,8 +9,8 @@
 #include <ctime>
 
 #include "app/pipeline/folder_lock.hpp"
-#include "app/pipeline/usage_clock.hpp"
 #include "core/system/file_io.hpp"
+#include "core/system/clock.hpp"
 
 namespace orbitfuse::pipeline {
 namespace fs = std::filesystem;

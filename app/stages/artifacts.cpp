@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <array>
+
 #include "core/formats/colmap_model.hpp"
 #include "core/system/file_io.hpp"
 #include "core/image/image_io.hpp"
@@ -127,18 +129,52 @@ json to_json(const Similarity3d& s) {
           {"translation", {s.translation.x(), s.translation.y(), s.translation.z()}}};
 }
 
-Result<Similarity3d> similarity_of_json(const json& j, const std::string& where) {
+namespace {
+
+constexpr const char* pose_frame_file = "poses.json";
+constexpr const char* registration_file = "registration.json";
+constexpr const char* run_again = "run the stage that writes it again (--force)";
+
+}  // namespace
+
+Status save_pose_frame(const fs::path& folder, PoseFrame frame) {
+  return write_json(folder / pose_frame_file, {{"shared_frame", frame == PoseFrame::visible}});
+}
+
+Result<PoseFrame> load_pose_frame(const fs::path& folder) {
+  ORBITFUSE_ASSIGN(const json j, read_json(folder / pose_frame_file));
+  const auto shared = j.find("shared_frame");
+  if (shared == j.end() || !shared->is_boolean())
+    return fail(ErrorKind::input, (folder / pose_frame_file).string(),
+                "no shared_frame (true or false) in it", run_again);
+  return shared->get<bool>() ? PoseFrame::visible : PoseFrame::own;
+}
+
+Status save_registration(const fs::path& folder, const RegistrationRecord& record) {
+  return write_json(folder / registration_file,
+                    {{"schema", 1},
+                     {"conventions", "x_visible = scale * R * x_thermal + t"},
+                     {"how", record.how},
+                     {"visible_from_thermal", to_json(record.visible_from_thermal)}});
+}
+
+Result<RegistrationRecord> load_registration(const fs::path& folder) {
+  ORBITFUSE_ASSIGN(const json j, read_json(folder / registration_file));
   try {
-    const auto q = j.at("rotation_wxyz").get<std::vector<double>>();
-    const auto t = j.at("translation").get<std::vector<double>>();
-    Similarity3d s;
-    j.at("scale").get_to(s.scale);
-    s.rotation = Eigen::Quaterniond(q.at(0), q.at(1), q.at(2), q.at(3)).normalized();
-    s.translation = {t.at(0), t.at(1), t.at(2)};
-    if (s.is_finite() && s.scale > 0) return s;
-  } catch (const std::exception&) {  // json's and std::out_of_range: reported below
+    RegistrationRecord record;
+    j.at("how").get_to(record.how);
+    const json& s = j.at("visible_from_thermal");
+    const auto q = s.at("rotation_wxyz").get<std::array<double, 4>>();
+    const auto t = s.at("translation").get<std::array<double, 3>>();
+    Similarity3d& similarity = record.visible_from_thermal;
+    s.at("scale").get_to(similarity.scale);
+    similarity.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
+    similarity.translation = {t[0], t[1], t[2]};
+    if (similarity.is_finite() && similarity.scale > 0) return record;
+  } catch (const json::exception&) {  // reported below
   }
-  return fail(ErrorKind::input, where, "no similarity in it", "run the register stage again");
+  return fail(ErrorKind::input, (folder / registration_file).string(), "no similarity in it",
+              run_again);
 }
 
 }  // namespace orbitfuse::stages

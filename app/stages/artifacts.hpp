@@ -20,6 +20,20 @@ Result<Reconstruction> load_poses(const std::filesystem::path& folder, Modality 
 /// Of the views as the field of this modality sees them: where training moved them, else as posed.
 Result<Reconstruction> load_trained_poses(const pipeline::StageContext& context, Modality modality);
 
+/// Which world the poses of a stage live in (poses.json).
+enum class PoseFrame { own, visible };
+Status save_pose_frame(const std::filesystem::path& folder, PoseFrame frame);
+/// Errors: input (not there, cut, or without the field: the stage has to run again).
+Result<PoseFrame> load_pose_frame(const std::filesystem::path& folder);
+
+/// How the two fields relate, and what found it (registration.json).
+struct RegistrationRecord {
+  Similarity3d visible_from_thermal;
+  std::string how;
+};
+Status save_registration(const std::filesystem::path& folder, const RegistrationRecord& record);
+Result<RegistrationRecord> load_registration(const std::filesystem::path& folder);
+
 /// NNN_depth.tiff, NNN_confidence.tiff, NNN_normal_{x,y,z}.tiff and depth.json with the cameras.
 Status save_depth_maps(const std::filesystem::path& folder, const std::vector<DepthMap>& maps);
 Result<std::vector<DepthMap>> load_depth_maps(const std::filesystem::path& folder);
@@ -28,7 +42,6 @@ Result<std::vector<DepthMap>> load_depth_maps(const std::filesystem::path& folde
 Status save_temperature_bounds(const std::filesystem::path& folder, double low_k, double high_k);
 
 nlohmann::json to_json(const Similarity3d& a_from_b);
-Result<Similarity3d> similarity_of_json(const nlohmann::json& j, const std::string& where);
 
 Status write_json(const std::filesystem::path& file, const nlohmann::json& j);
 Result<nlohmann::json> read_json(const std::filesystem::path& file);

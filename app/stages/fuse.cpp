@@ -7,7 +7,7 @@
 #include "app/stages/metric_tables.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
-#include "app/stages/training_data.hpp"
+#include "recon/assembly/training_data.hpp"
 #include "core/image/image_io.hpp"
 
 namespace orbitfuse::stages {
@@ -38,7 +38,7 @@ Result<StageOutput> fuse_views(const StageContext& context, const RunConfig& con
                              static_cast<double>(rendered.views.size() * methods.size()), -1, files.name});
     ORBITFUSE_ASSIGN(const cv::Mat visible, read_visible(folder / files.visible));
     ORBITFUSE_ASSIGN(const cv::Mat thermal,
-                     field_image(folder / files.thermal, Modality::thermal, rendered.thermal_is_gray));
+                     field_image(folder / files.thermal, rendered.samples()));
     ORBITFUSE_ASSIGN(const cv::Mat valid, valid_pixels(folder, files, thermal, config.render.min_opacity));
     const cv::Mat gray = gray_of_kelvin(thermal, rendered.span);
     ORBITFUSE_TRY(write_png(context.folder / "thermal" / (files.name + ".png"), gray));

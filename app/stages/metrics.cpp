@@ -10,7 +10,7 @@
 #include "app/stages/metric_tables.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
-#include "app/stages/training_data.hpp"
+#include "recon/assembly/training_data.hpp"
 #include "core/system/file_io.hpp"
 #include "core/image/image_io.hpp"
 #include "recon/nerf/nerf.hpp"
@@ -36,7 +36,8 @@ Status score_field(const StageContext& context, const SessionInput& input, const
     return std::find(heldout.begin(), heldout.end(), v.name) == heldout.end();
   });
   ORBITFUSE_ASSIGN(const nerf::Dataset data,
-                   training_data(input, model, config.max_width_px, context.progress));
+                   training_data(input.session.folder, model, input.samples(model.modality),
+                                 config.max_width_px, context.progress));
   ORBITFUSE_ASSIGN(const nerf::Field field, nerf::Field::load(context.of(train) / field_file));
   for (const nerf::TrainingView& view : data.views) {
     ORBITFUSE_ASSIGN(const nerf::RenderedView seen,

@@ -8,7 +8,7 @@
 
 #include "app/stages/artifacts.hpp"
 #include "app/stages/stage_list.hpp"
-#include "app/stages/visible_renderer.hpp"
+#include "recon/assembly/field_renderer.hpp"
 #include "core/image/image_io.hpp"
 #include "core/image/palette.hpp"
 #include "recon/nerf/nerf.hpp"
@@ -33,7 +33,7 @@ std::string held_rung(const ModalityPoses& poses) {
   return "no rung";
 }
 
-StageOutput describe(const ModalityPoses& poses, bool shared_frame) {
+StageOutput describe(const ModalityPoses& poses, PoseFrame frame) {
   StageOutput output;
   json dropped = json::array();
   for (const DroppedView& view : poses.dropped) {
@@ -57,7 +57,7 @@ StageOutput describe(const ModalityPoses& poses, bool shared_frame) {
                     {"contested", contested},
                     {"reprojection_rms_px", poses.reprojection_rms_px},
                     {"points", poses.reconstruction.points.size()},
-                    {"shared_frame", shared_frame},
+                    {"shared_frame", frame == PoseFrame::visible},
                     {"gates", poses.gates}};
   return output;
 }
@@ -75,12 +75,13 @@ Status save_session_bounds(const StageContext& context, const SessionInput& inpu
   return save_temperature_bounds(context.folder, span.low_k, span.high_k);
 }
 
-Result<StageOutput> finish(const StageContext& context, const ModalityPoses& poses, bool shared_frame) {
+Result<StageOutput> finish(const StageContext& context, const ModalityPoses& poses,
+                           PoseFrame frame) {
   ORBITFUSE_TRY(save_poses(context.folder, poses.reconstruction));
-  ORBITFUSE_TRY(write_json(context.folder / "poses.json", {{"shared_frame", shared_frame}}));
+  ORBITFUSE_TRY(save_pose_frame(context.folder, frame));
   std::error_code ignored;
   std::filesystem::remove_all(context.folder / "work", ignored);
-  return describe(poses, shared_frame);
+  return describe(poses, frame);
 }
 
 Result<StageOutput> pose_visible(const StageContext& context, const SessionInput& input,
@@ -88,7 +89,7 @@ Result<StageOutput> pose_visible(const StageContext& context, const SessionInput
   ORBITFUSE_ASSIGN(const ModalityPoses poses,
                    estimate_visible_poses(input.session, options, context.folder / "work",
                                           context.progress));
-  return finish(context, poses, true);
+  return finish(context, poses, PoseFrame::visible);
 }
 
 Result<StageOutput> pose_thermal(const StageContext& context, const SessionInput& input,
@@ -107,7 +108,8 @@ Result<StageOutput> pose_thermal(const StageContext& context, const SessionInput
                    estimate_thermal_poses(input.session, visible ? &scene : nullptr, options,
                                           context.folder / "work", context.progress));
   ORBITFUSE_TRY(save_session_bounds(context, input, poses.reconstruction));
-  return finish(context, poses, poses.shares_visible_frame);
+  return finish(context, poses,
+                poses.shares_visible_frame ? PoseFrame::visible : PoseFrame::own);
 }
 
 bool all_posed(const Session& session) {

@@ -5,7 +5,6 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
-#include "app/pipeline/usage_clock.hpp"
 #include "app/stages/artifacts.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
@@ -13,6 +12,7 @@
 #include "core/image/image_io.hpp"
 #include "core/image/palette.hpp"
 #include "core/formats/transforms_json.hpp"
+#include "core/system/clock.hpp"
 #include "recon/nerf/nerf.hpp"
 
 namespace orbitfuse::stages {
@@ -35,9 +35,8 @@ Result<Fields> load_fields(const StageContext& context) {
     ORBITFUSE_ASSIGN(fields.thermal, nerf::Field::load(context.of("train_thermal") / field_file));
   }
   if (!fields.visible.empty() && !fields.thermal.empty() && context.has("register")) {
-    ORBITFUSE_ASSIGN(const json j, read_json(context.of("register") / registration_file));
-    ORBITFUSE_ASSIGN(fields.visible_from_thermal,
-                     similarity_of_json(j.value("visible_from_thermal", json()), "register"));
+    ORBITFUSE_ASSIGN(const RegistrationRecord record, load_registration(context.of("register")));
+    fields.visible_from_thermal = record.visible_from_thermal;
   }
   // Two fields whose frames nobody could relate can't be shown by one camera.
   if (!fields.visible.empty() && !context.has("register")) fields.thermal = nerf::Field();
@@ -91,7 +90,7 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
   const bool gray = !input.has_temperatures();
   const Similarity3d thermal_from_visible = fields.visible_from_thermal.inverse();
 
-  const pipeline::UsageClock clock;
+  const UsageClock clock;
   std::vector<ViewFiles> files;
   std::vector<cv::Mat> temperatures;
   Transforms transforms;

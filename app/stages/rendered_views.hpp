@@ -7,10 +7,9 @@
 
 #include "core/image/palette.hpp"
 #include "core/result.hpp"
+#include "recon/assembly/training_data.hpp"
 
 namespace orbitfuse::stages {
-
-inline constexpr const char* registration_file = "registration.json";
 
 /// Files of one new view, relative to the render stage's folder; empty = not rendered.
 struct ViewFiles {
@@ -23,6 +22,8 @@ struct RenderedViews {
   TemperatureSpan span;          ///< one for all views; gray levels when thermal_is_gray
   bool thermal_is_gray = false;
 
+  /// What the thermal files hold.
+  Samples samples() const { return thermal_is_gray ? Samples::gray : Samples::kelvin; }
   bool has_both() const {
     return !views.empty() && !views[0].visible.empty() && !views[0].thermal.empty();
   }

@@ -6,7 +6,7 @@
 #include "app/pipeline/runner.hpp"
 #include "app/stages/artifacts.hpp"
 #include "app/stages/rendered_views.hpp"
-#include "app/stages/training_data.hpp"
+#include "recon/assembly/training_data.hpp"
 #include "core/system/cpu.hpp"
 #include "core/image/image_io.hpp"
 #include "core/system/parallel.hpp"
@@ -23,7 +23,8 @@ using pipeline::StageStatus;
 /// More views would make the page too heavy to mail; the folders hold them all.
 constexpr std::size_t max_report_views = 16;
 
-Result<report::View> load_view(const StageContext& context, const ViewFiles& files, bool gray) {
+Result<report::View> load_view(const StageContext& context, const ViewFiles& files,
+                               Samples samples) {
   const fs::path folder = context.of("render");
   report::View view;
   view.name = files.name;
@@ -32,7 +33,7 @@ Result<report::View> load_view(const StageContext& context, const ViewFiles& fil
   }
   if (!files.palette.empty()) {
     ORBITFUSE_ASSIGN(view.thermal, read_visible(folder / files.palette));
-    ORBITFUSE_ASSIGN(view.temperature_k, field_image(folder / files.thermal, Modality::thermal, gray));
+    ORBITFUSE_ASSIGN(view.temperature_k, field_image(folder / files.thermal, samples));
   }
   return view;
 }
@@ -58,7 +59,7 @@ Status add_views(const StageContext& context, const RenderConfig& config, report
                                            max_report_views, rendered.views.size()));
       break;
     }
-    ORBITFUSE_ASSIGN(report::View view, load_view(context, files, rendered.thermal_is_gray));
+    ORBITFUSE_ASSIGN(report::View view, load_view(context, files, rendered.samples()));
     ORBITFUSE_TRY(add_fused(context, methods, view));
     model.views.push_back(std::move(view));
   }

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "app/config/settings.hpp"
-#include "app/stages/new_views.hpp"
+#include "recon/assembly/new_views.hpp"
 #include "core/modality.hpp"
 #include "fusion/fuse/fuse.hpp"
 #include "recon/depth/options.hpp"

@@ -45,6 +45,11 @@ int SessionInput::count(Modality modality) const {
   return static_cast<int>(session.frames_of(modality, false).size());
 }
 
+Samples SessionInput::samples(Modality modality) const {
+  if (modality == Modality::visible) return Samples::color;
+  return has_temperatures() ? Samples::kelvin : Samples::gray;
+}
+
 bool SessionInput::has_temperatures() const {
   return std::any_of(session.frames.begin(), session.frames.end(), [](const FrameRecord& f) {
     return f.modality == Modality::thermal && !f.thermal_is_gray;

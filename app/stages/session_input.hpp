@@ -6,6 +6,7 @@
 
 #include "core/progress.hpp"
 #include "core/session/session.hpp"
+#include "recon/assembly/training_data.hpp"
 
 namespace orbitfuse::stages {
 
@@ -18,6 +19,8 @@ struct SessionInput {
   bool has(Modality modality) const { return count(modality) > 0; }
   /// The thermal frames hold temperatures.
   bool has_temperatures() const;
+  /// What the images of a modality hold.
+  Samples samples(Modality modality) const;
 };
 
 /// Input error that names the first frame whose file is missing, cut, or no image of the kind its

@@ -3,9 +3,9 @@
 
 #include "app/stages/artifacts.hpp"
 #include "app/stages/stage_list.hpp"
-#include "app/stages/thermal_depth.hpp"
+#include "recon/assembly/thermal_depth.hpp"
 #include "app/stages/train_extension.hpp"
-#include "app/stages/training_data.hpp"
+#include "recon/assembly/training_data.hpp"
 #include "core/formats/ply.hpp"
 #include "recon/nerf/nerf.hpp"
 
@@ -18,8 +18,8 @@ using pipeline::StageOutput;
 /// The field that lends its geometry: the visible one, when thermal poses live in its frame.
 Result<nerf::Field> guide_field(const StageContext& context) {
   if (!context.has("train_visible")) return nerf::Field();
-  ORBITFUSE_ASSIGN(const json poses, read_json(context.of("poses_thermal") / "poses.json"));
-  if (!poses.value("shared_frame", false)) return nerf::Field();
+  ORBITFUSE_ASSIGN(const PoseFrame frame, load_pose_frame(context.of("poses_thermal")));
+  if (frame == PoseFrame::own) return nerf::Field();
   return nerf::Field::load(context.of("train_visible") / field_file);
 }
 
@@ -39,7 +39,8 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
   const std::string poses = "poses_" + std::string(name(modality));
   ORBITFUSE_ASSIGN(Reconstruction model, load_poses(context.of(poses), modality));
   ORBITFUSE_ASSIGN(nerf::Dataset data,
-                   training_data(input, model, config.max_width_px, context.progress));
+                   training_data(input.session.folder, model, input.samples(model.modality),
+                                 config.max_width_px, context.progress));
   if (modality == Modality::visible && context.has("depth")) {
     ORBITFUSE_ASSIGN(data.depth, load_depth_maps(context.of("depth")));
   }

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bench/fusion/pairs.hpp"
 
+#include "core/system/clock.hpp"
+
 #include <fmt/format.h>
 
-#include <ctime>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -91,10 +92,6 @@ Scores mean(const std::vector<Scores>& scores) {
   return result;
 }
 
-double process_cpu_ms() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
+double process_cpu_ms() { return 1e3 * cpu_seconds(); }
 
 }  // namespace orbitfuse::bench

@@ -6,7 +6,9 @@
 #include <cstdio>
 #include <fmt/format.h>
 
+#include "core/system/clock.hpp"
 #include "tests/support/orbit_scenes.hpp"
+#include "tests/support/shared_data.hpp"
 #include "core/system/cpu.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/poses/estimate_poses.hpp"
@@ -37,8 +39,8 @@ void print(const ModalityPoses& poses, const Reconstruction& anchor, const scene
 
 int main(int argc, char** argv) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);  // a run that is cut short keeps its first rungs
-  const auto data = scenes::shared_data();
-  if (argc < 2 || !data) {
+  const std::filesystem::path data = testing::shared_data();
+  if (argc < 2 || !std::filesystem::exists(data)) {
     std::fputs("bench_poses SCENE [WORKDIR [--visible-truth]]; needs the shared data (ORBITFUSE_SHARED)\n", stderr);
     return 2;
   }
@@ -51,19 +53,19 @@ int main(int argc, char** argv) {
     options.tracking = which == "tracking";
     options.thermal_focal_error = 0.03;
     options.visible_focal_error = 0.03;
-    scene = scenes::container_scene(*data, options);
+    scene = scenes::container_scene(data, options);
   } else if (which == "car") {
     scene = scenes::session_scene(std::filesystem::path(ORBITFUSE_SOURCE_DIR) / "replay_data/car");
   } else if (which == "fox") {
-    scene = scenes::fox_scene(*data);
+    scene = scenes::fox_scene(data);
   } else {
-    scene = scenes::folder_scene(*data / (which == "arco" ? "orbits" : "pairs") / which);
+    scene = scenes::folder_scene(data / (which == "arco" ? "orbits" : "pairs") / which);
   }
   fmt::print("{}; {} threads\n", cpu_description(), thread_count());
 
   const PoseOptions options;
   Progress progress;
-  double start = scenes::cpu_seconds();
+  double start = cpu_seconds();
   const bool from_truth = argc > 3 && std::string(argv[3]) == "--visible-truth";
   Result<ModalityPoses> visible = ModalityPoses{};
   if (from_truth) {
@@ -75,20 +77,20 @@ int main(int argc, char** argv) {
   fmt::print("visible\n");
   VisibleScene seen;
   if (visible) {
-    print(*visible, visible->reconstruction, scene.truth, scenes::cpu_seconds() - start);
+    print(*visible, visible->reconstruction, scene.truth, cpu_seconds() - start);
     seen.reconstruction = visible->reconstruction;
   } else {
     fmt::print("  {}\n", visible.error().message());
   }
   if (scene.session.frames_of(Modality::thermal).empty()) return 0;
-  start = scenes::cpu_seconds();
+  start = cpu_seconds();
   const auto thermal = estimate_thermal_poses(scene.session, visible ? &seen : nullptr, options,
                                               workdir, progress);
   fmt::print("thermal\n");
   if (thermal) {
     print(*thermal,
           thermal->shares_visible_frame ? seen.reconstruction : thermal->reconstruction,
-          scene.truth, scenes::cpu_seconds() - start);
+          scene.truth, cpu_seconds() - start);
   } else {
     fmt::print("  {}\n", thermal.error().message());
   }

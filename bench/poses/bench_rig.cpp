@@ -18,12 +18,14 @@
 #include <opencv2/imgproc.hpp>
 #include <string_view>
 
+#include "core/system/clock.hpp"
 #include "tests/support/orbit_scenes.hpp"
 #include "core/formats/colmap_model.hpp"
 #include "core/session/session.hpp"
+#include "recon/assembly/field_renderer.hpp"
 #include "recon/nerf/nerf.hpp"
 #include "recon/poses/sfm/proxy_images.hpp"
-#include "recon/registration/images/similarity_search.hpp"
+#include "recon/registration/similarity_search.hpp"
 
 namespace {
 
@@ -99,12 +101,12 @@ struct Refinery {
 
   Status compare(const Similarity3d& start, bool clouds_decide) const {
     pairs.print("start", start);
-    double before = scenes::cpu_seconds();
+    double before = cpu_seconds();
     ORBITFUSE_ASSIGN(
         const SimilarityRefinement single,
         refine_similarity(renderer, images, views, start, similarity_rounds(), progress));
     report("one start", single, before);
-    before = scenes::cpu_seconds();
+    before = cpu_seconds();
     SimilaritySearchOptions options;
     options.clouds_decide = clouds_decide;
     ORBITFUSE_ASSIGN(const SimilarityRefinement searched,
@@ -118,7 +120,7 @@ struct Refinery {
     pairs.print(what, r.visible_from_thermal);
     fmt::print("  agreement {:.4f} to {:.4f}, patches {} to {}: {}; {:.1f} CPU s\n",
                r.agreement_before, r.agreement_after, r.matches_before, r.matches_after,
-               r.improved ? "kept" : "refused", scenes::cpu_seconds() - before);
+               r.improved ? "kept" : "refused", cpu_seconds() - before);
   }
 };
 
@@ -180,14 +182,7 @@ Status run(const fs::path& folder, const fs::path& out, double degrees, bool vie
                    read_colmap_model(out / "poses_thermal/model", Modality::thermal));
   ORBITFUSE_ASSIGN(const nerf::Field field, nerf::Field::load(out / "train_visible/field.bin"));
   Progress progress;
-  const SceneRenderer renderer = [&](const Camera& camera, const Rigid3d& pose) -> Result<SceneRender> {
-    nerf::RenderOptions coarse;
-    coarse.sample_factor = 0.5;
-    ORBITFUSE_ASSIGN(const nerf::RenderedView seen, nerf::render(field, camera, pose, coarse, {}));
-    SceneRender view{{}, seen.depth};
-    cv::cvtColor(seen.color, view.brightness, cv::COLOR_RGB2GRAY);
-    return view;
-  };
+  const SceneRenderer renderer = edge_renderer(field, progress);
   std::vector<cv::Mat> images;
   for (const PosedView& view : thermal.views)
     for (const FrameRecord& frame : session.frames)

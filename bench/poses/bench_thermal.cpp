@@ -17,10 +17,12 @@
 #include <string_view>
 
 #include "bench/poses/misalignment.hpp"
+#include "core/system/clock.hpp"
 #include "tests/support/orbit_scenes.hpp"
 #include "core/formats/colmap_model.hpp"
 #include "core/system/cpu.hpp"
 #include "core/system/parallel.hpp"
+#include "recon/assembly/field_renderer.hpp"
 #include "recon/nerf/nerf.hpp"
 #include "recon/poses/estimate_poses.hpp"
 
@@ -57,24 +59,13 @@ Arguments arguments_of(int argc, char** argv) {
   return arguments;
 }
 
-Result<SceneRender> rendered(const nerf::Field& field, const Camera& camera,
-                           const Rigid3d& cam_from_world, const Progress& progress) {
-  nerf::RenderOptions coarse;
-  coarse.sample_factor = 0.5;  // as in the application's stage
-  ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
-                   nerf::render(field, camera, cam_from_world, coarse, progress));
-  SceneRender view{{}, seen.depth};
-  cv::cvtColor(seen.color, view.brightness, cv::COLOR_RGB2GRAY);
-  return view;
-}
-
 /// One rung of the ladder alone: its success and error against its time.
 void print_rung(const char* name, const scenes::Scene& scene, const VisibleScene* seen,
                 const PoseOptions& options) {
-  const double before = scenes::cpu_seconds();
+  const double before = cpu_seconds();
   const auto poses = estimate_thermal_poses(
       scene.session, seen, options, fs::temp_directory_path() / "orbitfuse_bench_rung", {});
-  const double spent = scenes::cpu_seconds() - before;
+  const double spent = cpu_seconds() - before;
   if (!poses) {
     fmt::print("| {} | none: {} | | | {:.0f} |\n", name, poses.error().found.substr(0, 120), spent);
     return;
@@ -109,17 +100,18 @@ Status run(const Arguments& arguments) {
   Progress progress;
   double rendering_s = 0;
   int renders = 0;
+  const SceneRenderer rendered = edge_renderer(field, progress);
   VisibleScene seen{std::move(visible), [&](const Camera& camera, const Rigid3d& pose) {
-                      const double before = scenes::cpu_seconds();
-                      auto view = rendered(field, camera, pose, progress);
-                      rendering_s += scenes::cpu_seconds() - before, ++renders;
+                      const double before = cpu_seconds();
+                      auto view = rendered(camera, pose);
+                      rendering_s += cpu_seconds() - before, ++renders;
                       return view;
                     }};
   fmt::print("{}; {} threads\n", cpu_description(), thread_count());
-  const double before = scenes::cpu_seconds();
+  const double before = cpu_seconds();
   if (arguments.views)
     progress.report = [&](const ProgressEvent& e) {
-      fmt::print("after {:.1f} CPU s: {}\n", scenes::cpu_seconds() - before, e.detail);
+      fmt::print("after {:.1f} CPU s: {}\n", cpu_seconds() - before, e.detail);
     };
   const auto start = std::chrono::steady_clock::now();
   PoseOptions options;
@@ -141,7 +133,7 @@ Status run(const Arguments& arguments) {
     fmt::print("contested {}: {}\n", view.name, view.why);
   for (const auto& [gate, value] : poses.gates) fmt::print("{} = {:.4g}\n", gate, value);
   fmt::print("{}/{} posed, {:.1f} s, {:.1f} CPU s, {:.1f} of them in {} renders\n",
-             poses.reconstruction.views.size(), poses.frame_count, wall, scenes::cpu_seconds() - before,
+             poses.reconstruction.views.size(), poses.frame_count, wall, cpu_seconds() - before,
              rendering_s, renders);
   const scenes::PoseError error = scenes::pose_error(
       poses.reconstruction, poses.shares_visible_frame ? seen.reconstruction : poses.reconstruction,

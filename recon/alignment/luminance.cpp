@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/alignment/luminance.hpp"
 
+#include <fmt/format.h>
+
 #include <opencv2/imgproc.hpp>
 
 #include "core/image/image_io.hpp"

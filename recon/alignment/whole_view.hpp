@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "core/geometry/reconstruction.hpp"
+#include "core/progress.hpp"
 #include "recon/alignment/scene_renderer.hpp"
 
 // A whole image against whole renders. Patches are exact but follow a repeated form (the ribs of a

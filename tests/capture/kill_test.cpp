@@ -7,7 +7,7 @@
 #include "capture/recording/session_writer.hpp"
 #include "core/image/image_io.hpp"
 #include "tests/capture/scripted_source.hpp"
-#include "tests/core/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {

@@ -9,7 +9,7 @@
 #include "core/image/image_io.hpp"
 #include "tests/capture/scripted_source.hpp"
 #include "tests/core/session_account.hpp"
-#include "tests/core/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {

@@ -10,7 +10,7 @@
 #include "core/system/file_io.hpp"
 #include "core/image/image_codec.hpp"
 #include "core/temperature.hpp"
-#include "tests/core/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "tests/core/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {

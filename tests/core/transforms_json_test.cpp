@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/system/file_io.hpp"
-#include "tests/core/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tests/support/cloud_scenes.hpp"
+#include "tests/support/shared_data.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -13,12 +14,6 @@ namespace orbitfuse::scenes {
 namespace {
 
 using Eigen::Vector3d;
-
-std::filesystem::path shared_data() {
-  if (const char* folder = std::getenv("ORBITFUSE_SHARED"))
-    return std::filesystem::path(folder) / "data";
-  return std::filesystem::path(ORBITFUSE_SOURCE_DIR).parent_path() / "shared" / "data";
-}
 
 /// The Stanford bunny's ASCII PLY, faces included (core/ply reads vertices only).
 std::optional<Surface> read_bunny(const std::filesystem::path& path) {
@@ -267,7 +262,7 @@ double Surface::radius() const {
 std::optional<Surface> surface(const std::string& name) {
   if (name == "indoor") return indoor();
   if (name == "car") return car();
-  if (name == "bunny") return read_bunny(shared_data() / "clouds" / "bun_zipper_res3.ply");
+  if (name == "bunny") return read_bunny(testing::shared_data() / "clouds" / "bun_zipper_res3.ply");
   return std::nullopt;
 }
 

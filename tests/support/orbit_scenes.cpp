@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tests/support/orbit_scenes.hpp"
 
-#include <sys/resource.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -58,25 +57,6 @@ json load(const fs::path& file) {
 }
 
 }  // namespace
-
-double cpu_seconds() {
-  double sum = 0;
-  for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
-    rusage usage{};
-    getrusage(who, &usage);
-    sum += static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
-           1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
-  }
-  return sum;
-}
-
-std::optional<fs::path> shared_data() {
-  const char* named = std::getenv("ORBITFUSE_SHARED");
-  const fs::path root = named != nullptr ? fs::path(named)
-                                         : fs::path(ORBITFUSE_SOURCE_DIR) / ".." / "shared";
-  if (!fs::exists(root / "data" / "orbits" / "container")) return std::nullopt;
-  return fs::canonical(root / "data");
-}
 
 Scene container_scene(const fs::path& data, const ContainerOptions& options) {
   Scene scene;

@@ -14,9 +14,6 @@
 // know (images, capture order, nominal stations, a rough focal), the truth kept apart.
 namespace orbitfuse::scenes {
 
-/// ORBITFUSE_SHARED, else <source>/../shared; nullopt when absent.
-std::optional<std::filesystem::path> shared_data();
-
 struct Truth {
   std::map<std::string, PosedView> views;  ///< by file
 };
@@ -41,9 +38,6 @@ Scene fox_scene(const std::filesystem::path& data);
 Scene session_scene(const std::filesystem::path& folder);
 /// Folders visible/ and thermal/ of images without anything known; 8-bit or raw thermal.
 Scene folder_scene(const std::filesystem::path& folder);
-
-/// CPU seconds spent so far by this program and by COLMAP, which it starts.
-double cpu_seconds();
 
 /// An imported or recorded session; truth by the name of each frame's source.
 Result<Scene> run_scene(const std::filesystem::path& session, const std::filesystem::path& truth);

@@ -8,6 +8,7 @@
 #include <unordered_set>
 
 #include "recon/nerf/nerf.hpp"
+#include "core/option_range.hpp"
 #include "recon/nerf/rendering/render.hpp"
 
 namespace orbitfuse::nerf {
@@ -90,17 +91,12 @@ void append(PointCloud& cloud, const DepthView& from, int x, int y, const Eigen:
 }  // namespace
 
 Status ExportOptions::validate() const {
-  const auto bad = [](const char* field, double value, const char* remedy) {
-    return fail(ErrorKind::usage, std::string("export.") + field, fmt::format("{}", value), remedy);
-  };
-  if (max_width < 8) return bad("max_width", max_width, "choose at least 8");
-  if (min_consistent_views < 0)
-    return bad("min_consistent_views", min_consistent_views, "choose 0 or more");
-  if (!(depth_tolerance > 0 && depth_tolerance < 1))
-    return bad("depth_tolerance", depth_tolerance, "choose 0..1");
-  if (!(max_distance > 0)) return bad("max_distance", max_distance, "choose above 0");
-  if (!(voxel >= 0)) return bad("voxel", voxel, "choose 0 or more");
-  return {};
+  const OptionCheck check("export");
+  ORBITFUSE_TRY(check("max_width", max_width, at_least(8)));
+  ORBITFUSE_TRY(check("min_consistent_views", min_consistent_views, at_least(0)));
+  ORBITFUSE_TRY(check("depth_tolerance", depth_tolerance, between(0, 1)));
+  ORBITFUSE_TRY(check("max_distance", max_distance, above(0)));
+  return check("voxel", voxel, at_least(0));
 }
 
 Result<PointCloud> export_point_cloud(const Field& field, const std::vector<PosedView>& views,

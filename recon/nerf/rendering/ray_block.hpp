@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "recon/nerf/field/field_state.hpp"
+#include "recon/nerf/rendering/march.hpp"
 
 namespace orbitfuse::nerf {
 

@@ -8,6 +8,7 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
+#include "core/option_range.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/nerf/rendering/proposal.hpp"
 #include "recon/nerf/rendering/ray_block.hpp"
@@ -47,13 +48,9 @@ void write_ray(const FieldState& field, const RayBlock& block, int r, int& row, 
 }  // namespace
 
 Status RenderOptions::validate() const {
-  if (!(stop_transmittance > 0 && stop_transmittance < 0.5))
-    return fail(ErrorKind::usage, "render.stop_transmittance", fmt::format("{}", stop_transmittance),
-                "choose above 0 and below 0.5");
-  if (!(sample_factor >= 0.1 && sample_factor <= 16))
-    return fail(ErrorKind::usage, "render.sample_factor", fmt::format("{}", sample_factor),
-                "choose 0.1..16");
-  return {};
+  const OptionCheck check("render");
+  ORBITFUSE_TRY(check("stop_transmittance", stop_transmittance, between(0, 0.5)));
+  return check("sample_factor", sample_factor, from_to(0.1, 16));
 }
 
 namespace {
@@ -188,42 +185,6 @@ RenderedView render_strided(const FieldState& field, const ViewRays& rays, int s
     for (float *f = far.ptr<float>(y), *e = f + width; f != e; ++f)
       if (*f < no_limit) *f *= limit_margin;
   return renderer.image(far);
-}
-
-double psnr_of(const RenderedView& picture, const cv::Mat& target, int stride) {
-  const int channels = target.channels();
-  double sum = 0;
-  long count = 0;
-  for (int y = 0; y < picture.color.rows; ++y)
-    for (int x = 0; x < picture.color.cols; ++x) {
-      const int px = std::min(target.cols - 1, x * stride + stride / 2);
-      const int py = std::min(target.rows - 1, y * stride + stride / 2);
-      for (int c = 0; c < channels; ++c) {
-        const float truth = target.ptr<float>(py)[px * channels + c];
-        const float value = picture.color.ptr<float>(y)[x * channels + c];
-        if (!std::isfinite(truth) || !std::isfinite(value)) continue;
-        const double error = std::clamp(value, 0.0f, 1.0f) - std::clamp(truth, 0.0f, 1.0f);
-        sum += error * error;
-        ++count;
-      }
-    }
-  return count > 0 ? -10 * std::log10(std::max(1e-12, sum / static_cast<double>(count)))
-                   : std::numeric_limits<double>::quiet_NaN();
-}
-
-PoseSums sums_of(const RenderedView& picture, int stride, const Space& space, const NormalisedView& view) {
-  PoseSums sums;
-  const int channels = picture.color.channels();
-  for (int y = 0; y < picture.depth.rows; ++y)
-    for (int x = 0; x < picture.depth.cols; ++x) {
-      const int px = std::min(view.target.cols - 1, x * stride + stride / 2);
-      const int py = std::min(view.target.rows - 1, y * stride + stride / 2);
-      Ray ray;
-      const float z = picture.depth.at<float>(y, x);
-      if (!std::isfinite(z) || !view.rays.ray(px + 0.5, py + 0.5, ray)) continue;
-      add_ray(view, px, py, picture.color.ptr<float>(y) + x * channels, z / ray.forward / static_cast<float>(space.radius), sums);
-    }
-  return sums;
 }
 
 Result<RenderedView> render(const Field& field, const Camera& camera,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "recon/nerf/field/field_state.hpp"
+#include "recon/nerf/field/view_rays.hpp"
 #include "recon/nerf/nerf.hpp"
 
 namespace orbitfuse::nerf {
@@ -10,11 +11,5 @@ namespace orbitfuse::nerf {
 /// are in units of the span (kelvin = low + value * (high - low)).
 RenderedView render_strided(const FieldState& field, const ViewRays& rays, int stride,
                             const RenderOptions& options);
-
-/// PSNR in dB of a strided picture over finite pixels of the target, values clamped to 0..1.
-double psnr_of(const RenderedView& picture, const cv::Mat& target, int stride);
-
-/// How a strided picture of the view's scene asks its camera to move.
-PoseSums sums_of(const RenderedView& picture, int stride, const Space& space, const NormalisedView& view);
 
 }  // namespace orbitfuse::nerf

@@ -6,10 +6,11 @@
 #include <chrono>
 #include <cmath>
 
+#include "recon/alignment/edge_field.hpp"
+#include "recon/alignment/luminance.hpp"
 #include "recon/poses/cross_modal/edge_lines.hpp"
 #include "recon/poses/cross_modal/line_alignment.hpp"
 #include "recon/poses/cross_modal/orbit_rescue.hpp"
-#include "recon/poses/sfm/proxy_images.hpp"
 #include "recon/poses/cross_modal/tracking_views.hpp"
 #include "recon/poses/world_frame.hpp"
 

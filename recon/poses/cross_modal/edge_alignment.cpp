@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/poses/cross_modal/edge_alignment.hpp"
 
+#include "recon/alignment/edge_field.hpp"
+
 #include <ceres/ceres.h>
 
 #include <Eigen/Geometry>

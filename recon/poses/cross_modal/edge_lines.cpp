@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "core/system/parallel.hpp"
-#include "recon/poses/sfm/proxy_images.hpp"
+#include "recon/alignment/luminance.hpp"
 
 namespace orbitfuse {
 namespace {

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "core/system/parallel.hpp"
+#include "recon/alignment/edge_field.hpp"
 
 namespace orbitfuse {
 namespace {

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "core/geometry/reconstruction.hpp"
 #include "core/progress.hpp"
 #include "recon/alignment/scene_renderer.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/registration/images/similarity_search.hpp"
+#include "recon/registration/similarity_search.hpp"
 
 #include <fmt/format.h>
 
@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/option_range.hpp"
 #include "recon/registration/images/similarity_round.hpp"
 
 namespace orbitfuse {
@@ -40,7 +41,7 @@ struct Evidence {
 
 /// Moves by one round; false where the images show too little.
 Result<bool> step(const Evidence& seen, const RenderRound& round, Climber& climber) {
-  ORBITFUSE_ASSIGN(SimilarityRound found, look(seen.visible, seen.images, seen.thermal,
+  ORBITFUSE_ASSIGN(SimilarityRound found, match_scene(seen.visible, seen.images, seen.thermal,
                                                climber.visible_from_thermal, round, seen.progress));
   if (found.patches.size() < fewest_patches) {
     climber.support = 0;
@@ -116,16 +117,12 @@ double steps_between(const Similarity3d& a, const Similarity3d& b,
 }  // namespace
 
 Status SimilaritySearchOptions::validate() const {
-  const auto bad = [](const char* field, double value, const char* want) {
-    return fail(ErrorKind::usage, field, fmt::format("{}", value), want);
-  };
-  if (!(turn_deg > 0 && turn_deg <= 45)) return bad("turn_deg", turn_deg, "0 to 45 degrees");
-  if (!(growth > 0 && growth <= 1)) return bad("growth", growth, "above 0, at most 1");
-  if (!(decisive_share >= 0 && decisive_share <= 1))
-    return bad("decisive_share", decisive_share, "0 to 1");
-  if (most_views < 1) return bad("most_views", most_views, "at least 1");
-  if (finalists < 1) return bad("finalists", finalists, "at least 1");
-  return {};
+  const OptionCheck check("similarity_search");
+  ORBITFUSE_TRY(check("turn_deg", turn_deg, above_up_to(0, 45)));
+  ORBITFUSE_TRY(check("growth", growth, above_up_to(0, 1)));
+  ORBITFUSE_TRY(check("decisive_share", decisive_share, from_to(0, 1)));
+  ORBITFUSE_TRY(check("most_views", most_views, at_least(1)));
+  return check("finalists", finalists, at_least(1));
 }
 
 Result<SimilarityRefinement> search_similarity(const SceneRenderer& visible,

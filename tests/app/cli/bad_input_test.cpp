@@ -12,7 +12,7 @@
 #include "core/image/image_io.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/app/cli/session_fixture.hpp"
-#include "tests/app/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -55,8 +55,8 @@ class BadInput : public testing::Test {
     ASSERT_FALSE(before.empty());
   }
 
-  TempFolder temp;
-  fs::path session = temp.path / "session", out = temp.path / "out";
+  test::TempFolder temp;
+  fs::path session = temp.path() / "session", out = temp.path() / "out";
   std::map<std::string, std::string> before;
 };
 
@@ -251,10 +251,10 @@ TEST_F(BadInput, TrainingOptionsAreNamedAsTheyAreWritten) {
 }
 
 TEST_F(BadInput, ImportOfNothingReadable) {
-  fs::create_directories(temp.path / "photos");
-  std::ofstream(temp.path / "photos/a.jpg") << "text";
+  fs::create_directories(temp.path() / "photos");
+  std::ofstream(temp.path() / "photos/a.jpg") << "text";
   const Outcome outcome =
-      orbitfuse_program({"import", session.string(), "--visible", (temp.path / "photos").string()});
+      orbitfuse_program({"import", session.string(), "--visible", (temp.path() / "photos").string()});
   EXPECT_EQ(outcome.code, 3) << outcome.err;
   EXPECT_THAT(outcome.err, HasSubstr("a.jpg"));
 }

@@ -14,7 +14,7 @@
 #include "core/image/image_io.hpp"
 #include "drivers/aravis/aravis_source.hpp"
 #include "tests/app/cli/refusal.hpp"
-#include "tests/app/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 #include "tests/support/gev_simulator.hpp"
 
 namespace orbitfuse {
@@ -32,8 +32,8 @@ class RefusedGigE : public ::testing::Test {
     if (!camera.start_when_free()) GTEST_SKIP() << "the GVCP port 3956 on loopback is in use";
   }
   testing::GevSimulator camera;
-  const TempFolder temp;
-  const std::string session = temp.path / "s";
+  const test::TempFolder temp;
+  const std::string session = temp.path() / "s";
 };
 
 TEST_F(RefusedGigE, ProfileWithAFeatureThatTheCameraLacks) {
@@ -46,17 +46,17 @@ TEST_F(RefusedGigE, ProfileWithAFeatureThatTheCameraLacks) {
 }
 
 TEST_F(RefusedGigE, UnknownFeatureInAProfileOfTheUser) {
-  std::filesystem::create_directory(temp.path / "profiles");
-  std::ofstream(temp.path / "profiles/mine.toml") << "name = \"mine\"\nmodels = []\nsettings = [{NoSuchThing = 3}]\n";
+  std::filesystem::create_directory(temp.path() / "profiles");
+  std::ofstream(temp.path() / "profiles/mine.toml") << "name = \"mine\"\nmodels = []\nsettings = [{NoSuchThing = 3}]\n";
   const Outcome outcome = orbitfuse_program({"capture", session, "--thermal", "aravis:127.0.0.1,profile=mine",
-                                             "--profiles", temp.path / "profiles", "--seconds", "1"});
+                                             "--profiles", temp.path() / "profiles", "--seconds", "1"});
   EXPECT_EQ(outcome.code, 2) << outcome.err;
   EXPECT_THAT(outcome.err, AllOf(HasSubstr("NoSuchThing"), HasSubstr("correct the profile")));
   EXPECT_FALSE(std::filesystem::exists(session));
 }
 
 TEST_F(RefusedGigE, DoctorSaysThatTheCameraIsFree) {
-  const Outcome outcome = orbitfuse_program({"doctor", "--folder", temp.path});
+  const Outcome outcome = orbitfuse_program({"doctor", "--folder", temp.path()});
   EXPECT_THAT(outcome.out, HasSubstr("at 127.0.0.1, packets of 1400 bytes"));
 }
 
@@ -94,7 +94,7 @@ TEST_F(RefusedGigE, CameraThatAnotherProgramControls) {
 }
 
 TEST(Refused, PageAtAPortInUse) {
-  const TempFolder temp;
+  const test::TempFolder temp;
   const int holder = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
@@ -104,10 +104,10 @@ TEST(Refused, PageAtAPortInUse) {
   ASSERT_EQ(::listen(holder, 1), 0);
   ASSERT_EQ(::getsockname(holder, reinterpret_cast<sockaddr*>(&address), &length), 0);
   const std::string port = std::to_string(ntohs(address.sin_port));
-  expect_refused({"capture", temp.path / "s", "--visible", tiny, "--page", port}, 4, port);
-  expect_refused({"capture", temp.path / "s", "--visible", tiny, "--page", port}, 4, "choose another with --page");
+  expect_refused({"capture", temp.path() / "s", "--visible", tiny, "--page", port}, 4, port);
+  expect_refused({"capture", temp.path() / "s", "--visible", tiny, "--page", port}, 4, "choose another with --page");
   ::close(holder);
-  EXPECT_FALSE(std::filesystem::exists(temp.path / "s"));
+  EXPECT_FALSE(std::filesystem::exists(temp.path() / "s"));
 }
 
 /// Without root's rights, also when the tests have them.
@@ -122,43 +122,43 @@ Outcome as_nobody(const std::vector<std::string>& arguments) {
 }
 
 TEST(Refused, DeviceAndFolderWithoutPermission) {
-  const TempFolder temp;
-  std::filesystem::permissions(temp.path, std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec |
+  const test::TempFolder temp;
+  std::filesystem::permissions(temp.path(), std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec |
                                               std::filesystem::perms::others_read |
                                               std::filesystem::perms::others_exec);
-  const std::string session = temp.path / "s";
+  const std::string session = temp.path() / "s";
   if (as_nobody({"--version"}).code != 0) GTEST_SKIP() << "setpriv, or the program for other users, is missing";
   expect_refused({"capture", session, "--visible", tiny}, 4, session + ": Permission denied", as_nobody);
   // Any device that only root may open stands for a camera.
   if (std::filesystem::exists("/dev/loop-control")) {
-    const TempFolder open_to_all;
-    std::filesystem::permissions(open_to_all.path, std::filesystem::perms::all);
-    const std::string never = open_to_all.path / "never";
+    const test::TempFolder open_to_all;
+    std::filesystem::permissions(open_to_all.path(), std::filesystem::perms::all);
+    const std::string never = open_to_all.path() / "never";
     const Outcome device = as_nobody({"capture", never, "--visible", "v4l2:/dev/loop-control", "--seconds", "1"});
     EXPECT_EQ(device.code, 4) << device.err;
     EXPECT_THAT(device.err, HasSubstr("group video"));
     EXPECT_FALSE(std::filesystem::exists(never));
   }
   EXPECT_FALSE(std::filesystem::exists(session));
-  std::filesystem::permissions(temp.path, std::filesystem::perms::owner_all);
+  std::filesystem::permissions(temp.path(), std::filesystem::perms::owner_all);
 }
 
 TEST(Refused, SessionThatMayNotBeRead) {
-  const TempFolder temp;
-  std::ofstream(temp.path / "manifest.jsonl") << "x";
-  std::filesystem::permissions(temp.path, std::filesystem::perms::none);
+  const test::TempFolder temp;
+  std::ofstream(temp.path() / "manifest.jsonl") << "x";
+  std::filesystem::permissions(temp.path(), std::filesystem::perms::none);
   if (as_nobody({"--version"}).code != 0) GTEST_SKIP() << "setpriv, or the program for other users, is missing";
-  const Outcome outcome = as_nobody({"inspect", temp.path});
-  std::filesystem::permissions(temp.path, std::filesystem::perms::owner_all);
+  const Outcome outcome = as_nobody({"inspect", temp.path()});
+  std::filesystem::permissions(temp.path(), std::filesystem::perms::owner_all);
   EXPECT_EQ(outcome.code, 3) << outcome.err;
   EXPECT_THAT(outcome.err, HasSubstr("Permission denied"));
 }
 
 /// On a disk of 16 MiB.
 TEST(Refused, DiskWithTooLittleSpace) {
-  const TempFolder temp;
-  const std::string disk = temp.path, session = temp.path / "a" / "s";
-  const std::string photo = temp.path.string() + "-photo.png";
+  const test::TempFolder temp;
+  const std::string disk = temp.path(), session = temp.path() / "a" / "s";
+  const std::string photo = temp.path().string() + "-photo.png";
   ASSERT_TRUE(write_png(photo, cv::Mat(30, 40, CV_8UC3, cv::Scalar(9, 80, 7))));
   const Runner run = [&](const std::vector<std::string>& arguments) {
     std::string line = "mount -t tmpfs -o size=16m none '" + disk + "' && '" ORBITFUSE_BINARY_DIR "/app/orbitfuse'";

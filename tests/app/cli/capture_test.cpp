@@ -9,7 +9,7 @@
 #include "core/image/image_io.hpp"
 #include "core/session/session.hpp"
 #include "tests/app/cli/program.hpp"
-#include "tests/app/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -31,13 +31,13 @@ TEST(Capture, HelpNamesEveryDriver) {
 }
 
 TEST(Inspect, EachCameraAndSizeIsListed) {
-  const TempFolder temp;
-  std::filesystem::create_directories(temp.path / "in");
+  const test::TempFolder temp;
+  std::filesystem::create_directories(temp.path() / "in");
   for (const auto& [file, width] : {std::pair{"a.png", 40}, {"b.png", 40}, {"c.png", 64}}) {
-    ASSERT_TRUE(write_png(temp.path / "in" / file, cv::Mat(30, width, CV_8UC3, cv::Scalar(9, 80, 7))));
+    ASSERT_TRUE(write_png(temp.path() / "in" / file, cv::Mat(30, width, CV_8UC3, cv::Scalar(9, 80, 7))));
   }
-  const std::string session = temp.path / "s";
-  const Outcome imported = orbitfuse_program({"import", session, "--visible", temp.path / "in"});
+  const std::string session = temp.path() / "s";
+  const Outcome imported = orbitfuse_program({"import", session, "--visible", temp.path() / "in"});
   ASSERT_EQ(imported.code, 0) << imported.err;
   EXPECT_THAT(imported.err, testing::AllOf(HasSubstr("in/a.png"), HasSubstr("in/c.png"), HasSubstr("64x30")));
   const Outcome words = orbitfuse_program({"inspect", session});
@@ -50,8 +50,8 @@ TEST(Inspect, EachCameraAndSizeIsListed) {
 }
 
 TEST(Capture, TwoCameraSessionReplaysToTheSameFrames) {
-  const TempFolder temp;
-  const std::string first = temp.path / "first", second = temp.path / "second";
+  const test::TempFolder temp;
+  const std::string first = temp.path() / "first", second = temp.path() / "second";
   const Outcome captured = orbitfuse_program({"capture", first, "--driver", tiny, "--json"});
   ASSERT_EQ(captured.code, 0) << captured.err;
   const auto result = captured.result();
@@ -84,30 +84,30 @@ TEST(Capture, TwoCameraSessionReplaysToTheSameFrames) {
   // The pipeline takes the copy as it takes the original.
   for (const std::string& session : {first, second}) {
     const Outcome planned =
-        orbitfuse_program({"run", session, "--out", temp.path / "out", "--dry-run"});
+        orbitfuse_program({"run", session, "--out", temp.path() / "out", "--dry-run"});
     EXPECT_EQ(planned.code, 0) << planned.err;
   }
 }
 
 TEST(Capture, DryRunWritesNothing) {
-  const TempFolder temp;
+  const test::TempFolder temp;
   const Outcome outcome = orbitfuse_program(
-      {"capture", temp.path / "s", "--visible", tiny, "--dry-run", "--seconds", "0.5", "--json"});
+      {"capture", temp.path() / "s", "--visible", tiny, "--dry-run", "--seconds", "0.5", "--json"});
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_GT(outcome.result().at("streams").at(0).at("frames"), 0);
-  EXPECT_FALSE(std::filesystem::exists(temp.path / "s"));
+  EXPECT_FALSE(std::filesystem::exists(temp.path() / "s"));
 }
 
 TEST(Capture, RefusesAForeignFolderAndResumesASession) {
-  const TempFolder temp;
-  std::ofstream(temp.path / "holiday.txt") << "x";
-  const Outcome foreign = orbitfuse_program({"capture", temp.path, "--visible", tiny});
+  const test::TempFolder temp;
+  std::ofstream(temp.path() / "holiday.txt") << "x";
+  const Outcome foreign = orbitfuse_program({"capture", temp.path(), "--visible", tiny});
   EXPECT_EQ(foreign.code, 3);
   EXPECT_THAT(foreign.err, HasSubstr("choose another folder"));
-  EXPECT_EQ(orbitfuse_program({"capture", temp.path, "--visible", tiny, "--resume"}).code, 3);
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temp.path), {}), 1);
+  EXPECT_EQ(orbitfuse_program({"capture", temp.path(), "--visible", tiny, "--resume"}).code, 3);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temp.path()), {}), 1);
 
-  const std::string session = temp.path / "s";
+  const std::string session = temp.path() / "s";
   ASSERT_EQ(orbitfuse_program({"capture", session, "--visible", tiny}).code, 0);
   const Outcome again = orbitfuse_program({"capture", session, "--thermal", tiny});
   EXPECT_EQ(again.code, 3);
@@ -121,24 +121,24 @@ TEST(Capture, RefusesAForeignFolderAndResumesASession) {
 }
 
 TEST(Mat, IsWrittenWholeOrNotAtAll) {
-  const TempFolder temp;
-  const std::string file = temp.path / "mat.pdf";
+  const test::TempFolder temp;
+  const std::string file = temp.path() / "mat.pdf";
   const Outcome outcome =
       orbitfuse_program({"mat", "--out", file, "--size-m", "0.5", "--thermal", "--json"});
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ(outcome.result().at("tags_per_side"), 5);
   EXPECT_GT(std::filesystem::file_size(file), 1000u);
-  EXPECT_EQ(orbitfuse_program({"mat", "--out", temp.path / "no.pdf", "--tags", "99"}).code, 2);
-  EXPECT_EQ(orbitfuse_program({"mat", "--out", temp.path / "no.pdf", "--paper", "letter"}).code, 2);
-  EXPECT_FALSE(std::filesystem::exists(temp.path / "no.pdf"));
+  EXPECT_EQ(orbitfuse_program({"mat", "--out", temp.path() / "no.pdf", "--tags", "99"}).code, 2);
+  EXPECT_EQ(orbitfuse_program({"mat", "--out", temp.path() / "no.pdf", "--paper", "letter"}).code, 2);
+  EXPECT_FALSE(std::filesystem::exists(temp.path() / "no.pdf"));
 }
 
 TEST(Mat, OverwritesAndMakesNothingUnasked) {
-  const TempFolder temp;
-  const std::string file = temp.path / "mat.pdf", note = temp.path / "notes.txt";
+  const test::TempFolder temp;
+  const std::string file = temp.path() / "mat.pdf", note = temp.path() / "notes.txt";
   std::ofstream(file) << "the operator's";
   std::ofstream(note) << "the operator's";
-  std::filesystem::create_directory(temp.path / "folder.pdf");
+  std::filesystem::create_directory(temp.path() / "folder.pdf");
   struct Case {
     std::string out;
     int code;
@@ -147,12 +147,12 @@ TEST(Mat, OverwritesAndMakesNothingUnasked) {
   const std::vector<Case> cases = {
       {file, 3, "exists already; choose another name, or overwrite it: --force"},
       {note, 2, "end it in .pdf"},
-      {temp.path / "mat", 2, "end it in .pdf"},
-      {temp.path / ".pdf", 2, "end it in .pdf"},
-      {temp.path / "", 2, "end it in .pdf"},
-      {temp.path / "none" / "mat.pdf", 3, "no such folder"},
-      {temp.path / "folder.pdf", 3, "exists and is not a file"},
-      {temp.path / (std::string(300, 'x') + ".pdf"), 2, "choose another name"},
+      {temp.path() / "mat", 2, "end it in .pdf"},
+      {temp.path() / ".pdf", 2, "end it in .pdf"},
+      {temp.path() / "", 2, "end it in .pdf"},
+      {temp.path() / "none" / "mat.pdf", 3, "no such folder"},
+      {temp.path() / "folder.pdf", 3, "exists and is not a file"},
+      {temp.path() / (std::string(300, 'x') + ".pdf"), 2, "choose another name"},
       {"/proc/mat.pdf", 4, "/proc"},
   };
   for (const Case& c : cases) {
@@ -167,23 +167,23 @@ TEST(Mat, OverwritesAndMakesNothingUnasked) {
   }
   EXPECT_EQ(*read_file(file), "the operator's");
   EXPECT_EQ(*read_file(note), "the operator's");
-  EXPECT_FALSE(std::filesystem::exists(temp.path / "none"));
+  EXPECT_FALSE(std::filesystem::exists(temp.path() / "none"));
   EXPECT_EQ(orbitfuse_program({"mat", "--out", file, "--force"}).code, 0);
   EXPECT_THAT(*read_file(file), testing::StartsWith("%PDF"));
-  EXPECT_EQ(orbitfuse_program({"mat", "--out", "here.PDF", "--tags", "0"}, {.folder = temp.path}).code, 2);
-  EXPECT_EQ(orbitfuse_program({"mat", "--out", "here.PDF"}, {.folder = temp.path}).code, 0);
+  EXPECT_EQ(orbitfuse_program({"mat", "--out", "here.PDF", "--tags", "0"}, {.folder = temp.path()}).code, 2);
+  EXPECT_EQ(orbitfuse_program({"mat", "--out", "here.PDF"}, {.folder = temp.path()}).code, 0);
 }
 
 TEST(Capture, FilesPassedOverAreNamed) {
-  const TempFolder temp;
-  const auto card = temp.path / "card";
+  const test::TempFolder temp;
+  const auto card = temp.path() / "card";
   std::filesystem::create_directory(card);
   cv::Mat image(30, 40, CV_8UC3);
   cv::randu(image, 0, 255);
   ASSERT_TRUE(write_png(card / "a.png", image));
   std::filesystem::copy(card / "a.png", card / "b.png");
   std::ofstream(card / "c.heic") << "x";
-  const std::vector<std::string> words = {"capture", temp.path / "s",  "--visible", "stills:" + card.string() + ",existing=yes",
+  const std::vector<std::string> words = {"capture", temp.path() / "s",  "--visible", "stills:" + card.string() + ",existing=yes",
                                           "--seconds", "2.5", "--guide", "off"};
   const Outcome outcome = orbitfuse_program(words);
   ASSERT_EQ(outcome.code, 0) << outcome.err;
@@ -195,34 +195,34 @@ TEST(Capture, FilesPassedOverAreNamed) {
 
 /// Whoever took it thinks that it is in the session.
 TEST(Capture, PhotoThatWasNotWholeAtTheEndIsAccountedFor) {
-  const TempFolder temp;
-  const auto card = temp.path / "card";
+  const test::TempFolder temp;
+  const auto card = temp.path() / "card";
   std::filesystem::create_directory(card);
   ASSERT_TRUE(write_png(card / "a.png", cv::Mat(30, 40, CV_8UC3, cv::Scalar(9, 80, 7))));
   std::ofstream(card / "cut.png", std::ios::binary) << read_file(card / "a.png")->substr(0, 60);
   std::ofstream(card / "zero.png").flush();
   const std::string camera = "stills:" + card.string() + ",existing=yes";
-  const Outcome short_one = orbitfuse_program({"capture", temp.path / "short", "--visible", camera, "--seconds", "0.5"});
+  const Outcome short_one = orbitfuse_program({"capture", temp.path() / "short", "--visible", camera, "--seconds", "0.5"});
   EXPECT_THAT(short_one.out, testing::AllOf(HasSubstr("no frame came"), HasSubstr("3 files passed over"),
                                             HasSubstr("a.png: not read before the recording ended"),
                                             HasSubstr("zero.png: an empty file")));
-  const Outcome outcome = orbitfuse_program({"capture", temp.path / "s", "--visible", camera, "--seconds", "2.5"});
+  const Outcome outcome = orbitfuse_program({"capture", temp.path() / "s", "--visible", camera, "--seconds", "2.5"});
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("1 received, 1 lost (0 missing, 1 rejected, 0 dropped) of ids 0 to 1"));
   EXPECT_THAT(outcome.out, HasSubstr("1 file passed over, last zero.png"));
-  const Session session = opened(temp.path / "s");
+  const Session session = opened(temp.path() / "s");
   ASSERT_EQ(session.gaps.size(), 1u);
   EXPECT_THAT(session.gaps[0].reason, HasSubstr("cut.png"));
 }
 
 TEST(Capture, NamesThatAreNotUtf8) {
-  const TempFolder temp;
-  const std::string session = temp.path / "gr\xf6\xdf" "e";
+  const test::TempFolder temp;
+  const std::string session = temp.path() / "gr\xf6\xdf" "e";
   const Outcome captured = orbitfuse_program({"capture", session, "--visible", tiny, "--json"});
   EXPECT_EQ(captured.code, 0) << captured.err;
   EXPECT_EQ(captured.result().at("ok"), true);
   EXPECT_EQ(orbitfuse_program({"inspect", session, "--json"}).result().at("ok"), true);
-  const Outcome run = orbitfuse_program({"run", session, "--out", temp.path / "out"});
+  const Outcome run = orbitfuse_program({"run", session, "--out", temp.path() / "out"});
   EXPECT_EQ(run.code, 2) << run.err;
   EXPECT_THAT(run.err, HasSubstr("its name is not UTF-8; rename the folder"));
   const Outcome unknown = orbitfuse_program({"inspect", "\xff", "--json"});
@@ -231,8 +231,8 @@ TEST(Capture, NamesThatAreNotUtf8) {
 }
 
 TEST(Capture, WithoutAFrameTheAccountHasNoIds) {
-  const TempFolder temp;
-  const std::vector<std::string> words = {"capture", temp.path / "s", "--visible", "stills:" + temp.path.string(),
+  const test::TempFolder temp;
+  const std::vector<std::string> words = {"capture", temp.path() / "s", "--visible", "stills:" + temp.path().string(),
                                           "--seconds", "0.2", "--guide", "off"};
   const Outcome outcome = orbitfuse_program(words);
   EXPECT_EQ(outcome.code, 0) << outcome.err;
@@ -256,8 +256,8 @@ TEST(Devices, AnswersWithAList) {
 }
 
 TEST(Capture, MistakesHaveARemedyAndLeaveNothing) {
-  const TempFolder temp;
-  const std::string session = temp.path / "s";
+  const test::TempFolder temp;
+  const std::string session = temp.path() / "s";
   struct Case {
     std::vector<std::string> cameras;
     int code;

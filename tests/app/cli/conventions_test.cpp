@@ -8,7 +8,7 @@
 
 #include "core/system/file_io.hpp"
 #include "tests/app/cli/program.hpp"
-#include "tests/app/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -80,8 +80,8 @@ TEST(Cli, CudaIsUnavailable) {
 }
 
 TEST(Cli, ConfigMistakesNameFileLineAndKey) {
-  const TempFolder temp;
-  const auto file = temp.path / "c.toml";
+  const test::TempFolder temp;
+  const auto file = temp.path() / "c.toml";
   std::ofstream(file) << "[render]\nviewz = 3\n";
   const Outcome outcome = orbitfuse_program({"run", "x", "--config", file.string()});
   EXPECT_EQ(outcome.code, 2);
@@ -151,9 +151,9 @@ TEST(Cli, DoctorSaysWhatIsMissing) {
 }
 
 TEST(Cli, DoctorTellsABadFolderFromAMissingProgram) {
-  const TempFolder temp;
-  std::ofstream(temp.path / "file") << "x";
-  for (const std::string folder : {temp.path / "none", temp.path / "file"}) {
+  const test::TempFolder temp;
+  std::ofstream(temp.path() / "file") << "x";
+  for (const std::string folder : {temp.path() / "none", temp.path() / "file"}) {
     const Outcome outcome = orbitfuse_program({"doctor", "--folder", folder});
     EXPECT_EQ(outcome.code, 3) << outcome.out;
     EXPECT_THAT(outcome.out, HasSubstr(folder));

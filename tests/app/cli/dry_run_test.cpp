@@ -5,7 +5,7 @@
 #include "core/image/image_io.hpp"
 #include "core/session/session.hpp"
 #include "tests/app/cli/refusal.hpp"
-#include "tests/app/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -25,23 +25,23 @@ std::set<std::string> tree(const fs::path& folder) {
 class DryRun : public ::testing::Test {
  protected:
   void SetUp() override {
-    fs::create_directory(temp.path / "photos");
+    fs::create_directory(temp.path() / "photos");
     for (const char* file : {"a.png", "b.png"}) {
       cv::Mat image(30, 40, CV_8UC3);
       cv::randu(image, 0, 255);
-      ASSERT_TRUE(write_png(temp.path / "photos" / file, image));
+      ASSERT_TRUE(write_png(temp.path() / "photos" / file, image));
     }
-    fs::create_directory(temp.path / "empty");
-    std::ofstream(temp.path / "file") << "x";
-    fs::create_symlink(temp.path / "nowhere", temp.path / "broken");
+    fs::create_directory(temp.path() / "empty");
+    std::ofstream(temp.path() / "file") << "x";
+    fs::create_symlink(temp.path() / "nowhere", temp.path() / "broken");
     ASSERT_EQ(orbitfuse_program({"import", done, "--visible", photos}).code, 0);
-    before = tree(temp.path);
+    before = tree(temp.path());
   }
-  void TearDown() override { EXPECT_EQ(tree(temp.path), before); }
+  void TearDown() override { EXPECT_EQ(tree(temp.path()), before); }
 
-  const TempFolder temp;
-  const std::string done = temp.path / "done", photos = temp.path / "photos",
-                    fresh = temp.path / "new";
+  const test::TempFolder temp;
+  const std::string done = temp.path() / "done", photos = temp.path() / "photos",
+                    fresh = temp.path() / "new";
   std::set<std::string> before;
 };
 
@@ -54,12 +54,12 @@ TEST_F(DryRun, FoldersThatNoSessionCanBeMadeIn) {
   const std::vector<Case> cases = {
       {done, 3, "holds a session already; choose another folder"},
       {photos, 3, "is not an empty folder"},
-      {temp.path / "file", 3, "is not a folder"},
-      {temp.path / "file" / "under", 3, "a part of the path is a file"},
-      {temp.path / std::string(300, 'x'), 2, "choose a shorter name"},
-      {temp.path / "made" / "on" / "the" / "way" / std::string(300, 'x'), 2,
+      {temp.path() / "file", 3, "is not a folder"},
+      {temp.path() / "file" / "under", 3, "a part of the path is a file"},
+      {temp.path() / std::string(300, 'x'), 2, "choose a shorter name"},
+      {temp.path() / "made" / "on" / "the" / "way" / std::string(300, 'x'), 2,
        "choose a shorter name"},
-      {temp.path / "broken", 3, "a broken link"},
+      {temp.path() / "broken", 3, "a broken link"},
       {"/proc/orbitfuse", 4, "/proc/orbitfuse"},
   };
   for (const Case& c : cases) {
@@ -86,10 +86,10 @@ TEST_F(DryRun, CamerasAndGuides) {
 }
 
 TEST_F(DryRun, PhotosThatCannotBeImported) {
-  expect_refused({"import", fresh, "--visible", temp.path / "none"}, 3, "No such file");
-  expect_refused({"import", fresh, "--visible", temp.path / "empty"}, 3, "no images");
-  expect_refused({"import", fresh, "--visible", temp.path / "file"}, 3, "file");
-  expect_refused({"import", fresh, "--visible", photos, "--transforms", temp.path / "file"}, 3,
+  expect_refused({"import", fresh, "--visible", temp.path() / "none"}, 3, "No such file");
+  expect_refused({"import", fresh, "--visible", temp.path() / "empty"}, 3, "no images");
+  expect_refused({"import", fresh, "--visible", temp.path() / "file"}, 3, "file");
+  expect_refused({"import", fresh, "--visible", photos, "--transforms", temp.path() / "file"}, 3,
                  "file");
 }
 
@@ -107,15 +107,15 @@ TEST_F(DryRun, ImportOptionsWithoutEffect) {
 }
 
 TEST_F(DryRun, WayThroughAFolderThatIsMadeToo) {
-  const std::string roundabout = temp.path / "a" / ".." / "b" / "." / "c" / "";
+  const std::string roundabout = temp.path() / "a" / ".." / "b" / "." / "c" / "";
   const Outcome dry = orbitfuse_program({"capture", roundabout, "--visible", tiny, "--dry-run"});
   EXPECT_EQ(dry.code, 0) << dry.err;
-  EXPECT_EQ(tree(temp.path), before);
+  EXPECT_EQ(tree(temp.path()), before);
   const Outcome real = orbitfuse_program({"capture", roundabout, "--visible", tiny});
   EXPECT_EQ(real.code, 0) << real.err;
-  EXPECT_TRUE(open_session(temp.path / "b" / "c"));
-  fs::remove_all(temp.path / "a");
-  fs::remove_all(temp.path / "b");
+  EXPECT_TRUE(open_session(temp.path() / "b" / "c"));
+  fs::remove_all(temp.path() / "a");
+  fs::remove_all(temp.path() / "b");
 }
 
 TEST_F(DryRun, SaysWhatImportWouldMake) {
@@ -128,7 +128,7 @@ TEST_F(DryRun, SaysWhatImportWouldMake) {
 
 TEST_F(DryRun, WatchedFolderMayStillBeEmpty) {
   const Outcome dry =
-      orbitfuse_program({"capture", fresh, "--visible", "stills:" + (temp.path / "empty").string(),
+      orbitfuse_program({"capture", fresh, "--visible", "stills:" + (temp.path() / "empty").string(),
                          "--dry-run", "--seconds", "0.3"});
   EXPECT_EQ(dry.code, 0) << dry.err;
   EXPECT_THAT(dry.err, HasSubstr("no new photo came meanwhile"));

@@ -8,7 +8,7 @@
 
 #include "core/system/file_io.hpp"
 #include "tests/app/cli/program.hpp"
-#include "tests/app/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -38,22 +38,22 @@ std::map<std::string, std::string> results(const fs::path& out) {
 }
 
 TEST(Interrupt, InEveryStageThenResumedEqualsUnbroken) {
-  const TempFolder temp;
+  const test::TempFolder temp;
   int interruptions = 0;
   // What each stage prints on its way, in the order of the stages.
   for (const char* sign : {"orbit pairs: features", "orbit pairs: mapping", "\"stage\":\"depth\",\"total\"",
                            "training views", "\"stage\":\"export\"", "alignment with renders",
                            "\"stage\":\"train.thermal\"", "\"stage\":\"register\"",
                            "\"stage\":\"render\",\"total\"", "\"stage\":\"metrics\",\"total\""}) {
-    const Outcome stopped = run_car(temp.path / "broken", sign);
+    const Outcome stopped = run_car(temp.path() / "broken", sign);
     if (stopped.code == 0) break;  // the last stages may end before the signal reaches them
     ASSERT_EQ(stopped.code, 130) << sign << '\n' << stopped.err;
     ++interruptions;
   }
   EXPECT_GE(interruptions, 7) << "the stages up to the thermal field take long enough";
-  ASSERT_EQ(run_car(temp.path / "broken").code, 0);
-  ASSERT_EQ(run_car(temp.path / "unbroken").code, 0);
-  const auto broken = results(temp.path / "broken"), unbroken = results(temp.path / "unbroken");
+  ASSERT_EQ(run_car(temp.path() / "broken").code, 0);
+  ASSERT_EQ(run_car(temp.path() / "unbroken").code, 0);
+  const auto broken = results(temp.path() / "broken"), unbroken = results(temp.path() / "unbroken");
   EXPECT_GT(unbroken.size(), 50u);
   for (const auto& [file, hash] : unbroken) {
     const auto found = broken.find(file);

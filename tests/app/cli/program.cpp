@@ -12,7 +12,7 @@
 #include <thread>
 
 #include "core/system/file_io.hpp"
-#include "tests/app/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 using nlohmann::json;
@@ -30,8 +30,8 @@ json Outcome::result() const {
 }
 
 Outcome run_program(const std::vector<std::string>& command, const RunOptions& options) {
-  const TempFolder temp;
-  const auto out = temp.path / "out", err = temp.path / "err";
+  const test::TempFolder temp;
+  const auto out = temp.path() / "out", err = temp.path() / "err";
   const pid_t child = fork();
   if (child == 0) {
     const int out_fd = open(out.c_str(), O_WRONLY | O_CREAT, 0600);

@@ -8,7 +8,7 @@
 
 #include "core/session/session.hpp"
 #include "tests/app/cli/program.hpp"
-#include "tests/app/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 #include "tests/core/session_account.hpp"
 
 namespace orbitfuse {
@@ -56,8 +56,8 @@ class Resumed : public ::testing::Test {
     EXPECT_EQ(frames_of(again), frames_of(once));
   }
 
-  const TempFolder temp;
-  const std::string once = temp.path / "once", again = temp.path / "again";
+  const test::TempFolder temp;
+  const std::string once = temp.path() / "once", again = temp.path() / "again";
 };
 
 /// Frames large enough to be interrupted among them.
@@ -103,7 +103,7 @@ TEST_F(Resumed, DamagedFramesAreNotSaidToBeThere) {
 TEST_F(Resumed, AnotherSessionIsAppended) {
   ASSERT_EQ(
       orbitfuse_program({"capture", once, "--visible", "synthetic,size=64x48,spacing=60"}).code, 0);
-  const std::string other = temp.path / "other";
+  const std::string other = temp.path() / "other";
   ASSERT_EQ(
       orbitfuse_program({"capture", other, "--visible", "synthetic,size=80x60,spacing=60"}).code,
       0);

@@ -12,7 +12,7 @@
 #include "core/formats/transforms_json.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/app/cli/session_fixture.hpp"
-#include "tests/app/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -42,8 +42,8 @@ class Run : public testing::Test {
     return result;
   }
 
-  TempFolder temp;
-  fs::path session = temp.path / "session", out = temp.path / "out";
+  test::TempFolder temp;
+  fs::path session = temp.path() / "session", out = temp.path() / "out";
 };
 
 TEST_F(Run, BothModalitiesThenNothingThenWhatChanged) {
@@ -78,12 +78,12 @@ TEST_F(Run, BothModalitiesThenNothingThenWhatChanged) {
 
 TEST_F(Run, WhatNobodyCanMeasureIsAnErrorAndCamerasAreReadFirst) {
   write_fixture_session(session, {.thermal = 0});
-  const Outcome no_cameras = run({"--cameras", (temp.path / "none.json").string()});
+  const Outcome no_cameras = run({"--cameras", (temp.path() / "none.json").string()});
   EXPECT_EQ(no_cameras.code, 3) << no_cameras.err;
   EXPECT_FALSE(fs::exists(out / "train_visible"));
 
   ASSERT_EQ(run({}, {}, "poses").code, 0);
-  const fs::path truth = temp.path / "truth.json";
+  const fs::path truth = temp.path() / "truth.json";
   ASSERT_TRUE(write_file_atomic(truth, R"({"visible": {"K": {"w": 64, "h": 48, "fx": 60, "fy": 60,
       "cx": 32, "cy": 24}, "frames": [{"file": "of/another/scene.jpg",
       "c2w": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]}})"));
@@ -151,8 +151,8 @@ TEST_F(Run, GivenCamerasAreRenderedAsGiven) {
   ASSERT_TRUE(cameras);
   cameras->frames.resize(1);
   cameras->frames[0].camera = cameras->frames[0].camera.scaled_to(40, 30);
-  ASSERT_TRUE(write_transforms_json(temp.path / "cameras.json", *cameras));
-  const Outcome outcome = run({"--cameras", (temp.path / "cameras.json").string()}, {}, "render");
+  ASSERT_TRUE(write_transforms_json(temp.path() / "cameras.json", *cameras));
+  const Outcome outcome = run({"--cameras", (temp.path() / "cameras.json").string()}, {}, "render");
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const auto image = read_visible(out / "render/visible/000.png");
   ASSERT_TRUE(image);
@@ -160,8 +160,8 @@ TEST_F(Run, GivenCamerasAreRenderedAsGiven) {
   EXPECT_FALSE(fs::exists(out / "render/visible/001.png"));
   EXPECT_EQ(run({"--cameras", "/none.json"}, {}, "render").code, 3);
   cameras->frames[0].camera = cameras->frames[0].camera.scaled_to(1000000, 1000000);
-  ASSERT_TRUE(write_transforms_json(temp.path / "huge.json", *cameras));
-  const Outcome huge = run({"--cameras", (temp.path / "huge.json").string()}, {}, "render");
+  ASSERT_TRUE(write_transforms_json(temp.path() / "huge.json", *cameras));
+  const Outcome huge = run({"--cameras", (temp.path() / "huge.json").string()}, {}, "render");
   EXPECT_EQ(huge.code, 3);
   EXPECT_THAT(huge.err, HasSubstr("huge.json: frames[0]"));
 }

@@ -6,7 +6,7 @@
 #include "core/system/file_io.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/app/cli/session_fixture.hpp"
-#include "tests/app/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -33,8 +33,8 @@ class Train : public testing::Test {
   std::string field() const { return *file_hash(out / "train_visible/field.bin"); }
   bool extended() const { return stage().at("skips").dump().find("training goes on from there") != std::string::npos; }
 
-  TempFolder temp;
-  fs::path session = temp.path / "session", out = temp.path / "out";
+  test::TempFolder temp;
+  fs::path session = temp.path() / "session", out = temp.path() / "out";
 };
 
 TEST_F(Train, MoreStepsGoOnFromTheResultAndForceDoesNot) {

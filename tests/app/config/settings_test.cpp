@@ -6,7 +6,7 @@
 
 #include <fstream>
 
-#include "tests/app/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse::config {
 namespace {
@@ -36,11 +36,11 @@ struct SettingsTest : testing::Test {
                         {{Kind::fast, "fast"}, {Kind::faithful, "faithful"}}, "recipe");
   }
   Status read(const std::string& text) {
-    const auto file = temp.path / "config.toml";
+    const auto file = temp.path() / "config.toml";
     std::ofstream(file) << text;
     return settings.read_toml(file);
   }
-  TempFolder temp;
+  test::TempFolder temp;
   Options options;
   Settings settings;
 };

@@ -11,7 +11,7 @@
 
 #include "core/image/image_io.hpp"
 #include "fusion/metrics/metrics.hpp"
-#include "tests/app/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse::batch {
 namespace {
@@ -40,16 +40,16 @@ std::string text_of(const fs::path& file) {
 class FusionBatch : public ::testing::Test {
  protected:
   void SetUp() override {
-    for (const char* folder : {"v", "t"}) fs::create_directories(temp.path / folder);
-    ASSERT_TRUE(write_png(temp.path / "v/a.png", noise({40, 32}, CV_8UC3, 1)));
-    ASSERT_TRUE(write_png(temp.path / "t/a.png", noise({40, 32}, CV_8UC1, 2)));
-    ASSERT_TRUE(write_png(temp.path / "v/b.png", noise({40, 32}, CV_8UC3, 3)));
-    ASSERT_TRUE(write_thermal_tiff(temp.path / "t/b.tiff", warm_scene({40, 32})));
+    for (const char* folder : {"v", "t"}) fs::create_directories(temp.path() / folder);
+    ASSERT_TRUE(write_png(temp.path() / "v/a.png", noise({40, 32}, CV_8UC3, 1)));
+    ASSERT_TRUE(write_png(temp.path() / "t/a.png", noise({40, 32}, CV_8UC1, 2)));
+    ASSERT_TRUE(write_png(temp.path() / "v/b.png", noise({40, 32}, CV_8UC3, 3)));
+    ASSERT_TRUE(write_thermal_tiff(temp.path() / "t/b.tiff", warm_scene({40, 32})));
   }
   Result<Summary> run(const Progress& progress = {}) {
-    return fuse_folder(temp.path / "v", temp.path / "t", temp.path / "out", {}, progress);
+    return fuse_folder(temp.path() / "v", temp.path() / "t", temp.path() / "out", {}, progress);
   }
-  TempFolder temp;
+  test::TempFolder temp;
 };
 
 TEST_F(FusionBatch, WritesTheLayoutAndTheScores) {
@@ -66,32 +66,32 @@ TEST_F(FusionBatch, WritesTheLayoutAndTheScores) {
   EXPECT_EQ(reports, 2);
   for (const char* stem : {"a.png", "b.png"})
     for (const char* folder : {"vi", "ir", "fused"})
-      EXPECT_EQ(read_image(temp.path / "out" / folder / stem).value().size(), cv::Size(40, 32)) << folder << stem;
-  const std::string csv = text_of(temp.path / "out" / metrics_file);
+      EXPECT_EQ(read_image(temp.path() / "out" / folder / stem).value().size(), cv::Size(40, 32)) << folder << stem;
+  const std::string csv = text_of(temp.path() / "out" / metrics_file);
   EXPECT_EQ(csv.find("pair,method,metric,value\na,best,MV,"), 0U);
-  const auto values = fusion_metrics(read_image(temp.path / "out/vi/a.png").value(), read_image(temp.path / "out/ir/a.png").value(),
-                                     read_image(temp.path / "out/fused/a.png").value()).value();
+  const auto values = fusion_metrics(read_image(temp.path() / "out/vi/a.png").value(), read_image(temp.path() / "out/ir/a.png").value(),
+                                     read_image(temp.path() / "out/fused/a.png").value()).value();
   EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), 1 + 2 * values.size());
 }
 
 TEST_F(FusionBatch, RadiometricImagesAreSpreadOverTheirTemperatures) {
   ASSERT_TRUE(run());
-  const cv::Mat gray = read_image(temp.path / "out/ir/b.png").value();
+  const cv::Mat gray = read_image(temp.path() / "out/ir/b.png").value();
   ASSERT_EQ(gray.type(), CV_8UC1);
   double low = 0, high = 0;
   cv::minMaxLoc(gray, &low, &high);
   EXPECT_LT(low, 5);
   EXPECT_GT(high, 250);
-  EXPECT_EQ(read_thermal(temp.path / "t/b.tiff").value().type(), CV_32FC1);
-  EXPECT_EQ(read_thermal(temp.path / "t/a.png").value().type(), CV_8UC1);
+  EXPECT_EQ(read_thermal(temp.path() / "t/b.tiff").value().type(), CV_32FC1);
+  EXPECT_EQ(read_thermal(temp.path() / "t/a.png").value().type(), CV_8UC1);
 }
 
 TEST_F(FusionBatch, BadPairsAreToldAndLeftOut) {
-  ASSERT_TRUE(write_png(temp.path / "v/alone.png", noise({40, 32}, CV_8UC1, 5)));
-  ASSERT_TRUE(write_png(temp.path / "v/odd.png", noise({40, 32}, CV_8UC1, 6)));
-  ASSERT_TRUE(write_png(temp.path / "t/odd.png", noise({41, 32}, CV_8UC1, 7)));
-  std::ofstream(temp.path / "v/torn.png") << "no image";
-  std::ofstream(temp.path / "t/torn.png") << "no image";
+  ASSERT_TRUE(write_png(temp.path() / "v/alone.png", noise({40, 32}, CV_8UC1, 5)));
+  ASSERT_TRUE(write_png(temp.path() / "v/odd.png", noise({40, 32}, CV_8UC1, 6)));
+  ASSERT_TRUE(write_png(temp.path() / "t/odd.png", noise({41, 32}, CV_8UC1, 7)));
+  std::ofstream(temp.path() / "v/torn.png") << "no image";
+  std::ofstream(temp.path() / "t/torn.png") << "no image";
   const auto summary = run();
   ASSERT_TRUE(summary);
   EXPECT_EQ(summary->fused, 2);
@@ -99,15 +99,15 @@ TEST_F(FusionBatch, BadPairsAreToldAndLeftOut) {
   EXPECT_NE(summary->problems[0].find("alone.png"), std::string::npos);
   EXPECT_NE(summary->problems[1].find("41x32"), std::string::npos);
   EXPECT_NE(summary->problems[2].find("torn"), std::string::npos);
-  EXPECT_FALSE(fs::exists(temp.path / "out/fused/odd.png"));
+  EXPECT_FALSE(fs::exists(temp.path() / "out/fused/odd.png"));
 }
 
 TEST_F(FusionBatch, NothingToFuseAndCancellingAreErrors) {
-  const auto missing = fuse_folder(temp.path / "v", temp.path / "nowhere", temp.path / "out", {}, {});
+  const auto missing = fuse_folder(temp.path() / "v", temp.path() / "nowhere", temp.path() / "out", {}, {});
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().kind, ErrorKind::input);
-  fs::create_directories(temp.path / "empty");
-  EXPECT_FALSE(fuse_folder(temp.path / "empty", temp.path / "t", temp.path / "out", {}, {}));
+  fs::create_directories(temp.path() / "empty");
+  EXPECT_FALSE(fuse_folder(temp.path() / "empty", temp.path() / "t", temp.path() / "out", {}, {}));
   std::atomic<bool> stop = true;
   Progress progress;
   progress.cancel = &stop;

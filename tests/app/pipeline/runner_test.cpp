@@ -8,7 +8,7 @@
 #include <fstream>
 
 #include "core/system/file_io.hpp"
-#include "tests/app/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse::pipeline {
 namespace {
@@ -36,7 +36,7 @@ class RunnerTest : public testing::Test {
   }
 
   RunSummary run(RunOptions options = {}) {
-    options.out = temp.path / "out";
+    options.out = temp.path() / "out";
     runs.clear();
     Progress progress;
     progress.cancel = &cancel;
@@ -51,9 +51,9 @@ class RunnerTest : public testing::Test {
     for (const auto& [name, count] : runs) names.push_back(name);
     return names;
   }
-  std::string text(const std::string& stage) { return *read_file(temp.path / "out" / stage / "text"); }
+  std::string text(const std::string& stage) { return *read_file(temp.path() / "out" / stage / "text"); }
 
-  TempFolder temp;
+  test::TempFolder temp;
   std::string session = "session";
   int a_option = 1, b_option = 1;
   std::map<std::string, int> runs;
@@ -100,16 +100,16 @@ TEST_F(RunnerTest, SameOutputsCutTheChainShort) {
 
 TEST_F(RunnerTest, DamagedOutputRunsAgain) {
   run();
-  std::ofstream(temp.path / "out/b/text") << "tampered";
+  std::ofstream(temp.path() / "out/b/text") << "tampered";
   EXPECT_EQ(run().find("b")->why, "text was changed");
   EXPECT_THAT(ran(), ElementsAre("b"));
-  fs::remove(temp.path / "out/c/text");
+  fs::remove(temp.path() / "out/c/text");
   EXPECT_EQ(run().find("c")->why, "text is missing");
 }
 
 TEST_F(RunnerTest, CutDoneMarkRunsAgain) {
   run();
-  const fs::path mark = temp.path / "out/d/stage.json";
+  const fs::path mark = temp.path() / "out/d/stage.json";
   fs::resize_file(mark, fs::file_size(mark) / 2);
   run();
   EXPECT_THAT(ran(), ElementsAre("d"));
@@ -133,10 +133,10 @@ TEST_F(RunnerTest, FailedGateKeepsTheEarlierResultAndTheOtherBranch) {
   EXPECT_EQ(summary.find("c")->state, StageState::blocked);
   EXPECT_THAT(summary.find("c")->why, HasSubstr("b"));
   EXPECT_EQ(summary.find("d")->state, StageState::ran);
-  EXPECT_TRUE(fs::exists(temp.path / "out/b.failed"));
+  EXPECT_TRUE(fs::exists(temp.path() / "out/b.failed"));
   fail_in.clear();
   EXPECT_FALSE(run().error);
-  EXPECT_FALSE(fs::exists(temp.path / "out/b.failed"));
+  EXPECT_FALSE(fs::exists(temp.path() / "out/b.failed"));
 }
 
 TEST_F(RunnerTest, DeviceErrorStopsAtOnce) {
@@ -151,7 +151,7 @@ TEST_F(RunnerTest, DryRunWritesNothing) {
   options.dry_run = true;
   const RunSummary summary = run(options);
   EXPECT_TRUE(runs.empty());
-  EXPECT_FALSE(fs::exists(temp.path / "out"));
+  EXPECT_FALSE(fs::exists(temp.path() / "out"));
   for (const StageStatus& s : summary.stages) EXPECT_EQ(s.state, StageState::planned);
 }
 
@@ -163,7 +163,7 @@ TEST_F(RunnerTest, CancelledBeforeAStageKeepsTheRest) {
 }
 
 TEST(Runner, ResumesAnInterruptedStageWithTheSameKeyOnly) {
-  const TempFolder temp;
+  const test::TempFolder temp;
   int option = 1;
   bool resumed = false;
   const auto run = [&](bool interrupt, bool resume) {
@@ -181,11 +181,11 @@ TEST(Runner, ResumesAnInterruptedStageWithTheSameKeyOnly) {
       ORBITFUSE_TRY(write_file_atomic(context.folder / "whole", "2"));
       return StageOutput{};
     };
-    Runner runner({stage}, {.out = temp.path, .resume = resume}, {});
+    Runner runner({stage}, {.out = temp.path(), .resume = resume}, {});
     return runner.run();
   };
   EXPECT_EQ(run(true, false).error->kind, ErrorKind::cancelled);
-  EXPECT_FALSE(fs::exists(temp.path / "long"));
+  EXPECT_FALSE(fs::exists(temp.path() / "long"));
   EXPECT_FALSE(run(false, true).error);
   EXPECT_TRUE(resumed);
   EXPECT_EQ(run(false, true).stages.at(0).state, StageState::unchanged);
@@ -198,7 +198,7 @@ TEST(Runner, ResumesAnInterruptedStageWithTheSameKeyOnly) {
 }
 
 TEST(Runner, AStageSeesWhatOtherOptionsMadeOfTheSameInputs) {
-  const TempFolder temp;
+  const test::TempFolder temp;
   int option = 1;
   std::string session = "one";
   std::optional<EarlierResult> seen;
@@ -209,21 +209,21 @@ TEST(Runner, AStageSeesWhatOtherOptionsMadeOfTheSameInputs) {
       ORBITFUSE_TRY(write_file_atomic(context.folder / "result", std::to_string(option)));
       return StageOutput{.metrics = {{"made", option}}, .skips = {}, .warnings = {}};
     };
-    Runner({stage}, {.out = temp.path, .force = force}, {}).run();
+    Runner({stage}, {.out = temp.path(), .force = force}, {}).run();
   };
   run();
   EXPECT_FALSE(seen);
   option = 2;
   run();
   ASSERT_TRUE(seen);
-  EXPECT_EQ(seen->folder, temp.path / "long");
+  EXPECT_EQ(seen->folder, temp.path() / "long");
   EXPECT_EQ(seen->options.at("x"), 1);
   EXPECT_EQ(seen->metrics.at("made"), 1);
   option = 3;
   run(true);
   EXPECT_FALSE(seen) << "--force starts from nothing";
   option = 4;
-  std::ofstream(temp.path / "long/result") << "tampered";
+  std::ofstream(temp.path() / "long/result") << "tampered";
   run();
   EXPECT_FALSE(seen) << "a damaged result is none";
   option = 5;
@@ -233,7 +233,7 @@ TEST(Runner, AStageSeesWhatOtherOptionsMadeOfTheSameInputs) {
 }
 
 TEST(Runner, AbsentIsNotAFailure) {
-  const TempFolder temp;
+  const test::TempFolder temp;
   Stage absent{.name = "thermal"};
   absent.absent = [](const StageContext&) { return std::optional<std::string>("no thermal frames"); };
   absent.run = [](const StageContext&) -> Result<StageOutput> {
@@ -247,7 +247,7 @@ TEST(Runner, AbsentIsNotAFailure) {
     EXPECT_FALSE(c.has("thermal"));
     return StageOutput{};
   };
-  Runner runner({absent, behind, beside}, {.out = temp.path}, {});
+  Runner runner({absent, behind, beside}, {.out = temp.path()}, {});
   const RunSummary summary = runner.run();
   EXPECT_FALSE(summary.error);
   EXPECT_EQ(summary.find("behind")->state, StageState::absent);
@@ -256,15 +256,15 @@ TEST(Runner, AbsentIsNotAFailure) {
 }
 
 TEST(Runner, TwoRunsInOneFolderAreRefused) {
-  const TempFolder temp;
+  const test::TempFolder temp;
   Stage outer{.name = "outer"};
   outer.run = [&](const StageContext&) -> Result<StageOutput> {
-    Runner inner({}, {.out = temp.path}, {});
+    Runner inner({}, {.out = temp.path()}, {});
     const RunSummary summary = inner.run();
     EXPECT_TRUE(summary.error && summary.error->kind == ErrorKind::usage);
     return StageOutput{};
   };
-  Runner runner({outer}, {.out = temp.path}, {});
+  Runner runner({outer}, {.out = temp.path()}, {});
   EXPECT_FALSE(runner.run().error);
 }
 

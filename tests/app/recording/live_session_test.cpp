@@ -12,7 +12,7 @@
 #include "capture/mat/mat_finder.hpp"
 #include "capture/page/page_server.hpp"
 #include "tests/capture/mat/rendered_mat.hpp"
-#include "tests/core/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 #include "tests/support/gev_simulator.hpp"
 
 // Last: its <resolv.h> defines a macro _res that Eigen trips over.

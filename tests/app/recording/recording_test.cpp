@@ -10,7 +10,7 @@
 #include "core/system/utc_now.hpp"
 #include "drivers/stills/watch_source.hpp"
 #include "tests/capture/scripted_source.hpp"
-#include "tests/core/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse::recording {
 namespace {

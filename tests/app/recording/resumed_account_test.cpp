@@ -9,7 +9,7 @@
 #include "drivers/replay/replay_source.hpp"
 #include "tests/capture/scripted_source.hpp"
 #include "tests/core/session_account.hpp"
-#include "tests/core/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse::recording {
 namespace {

@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "tests/capture/scripted_source.hpp"
-#include "tests/core/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {

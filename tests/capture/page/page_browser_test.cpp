@@ -8,7 +8,7 @@
 
 #include "capture/page/page_server.hpp"
 #include "core/image/image_io.hpp"
-#include "tests/core/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {

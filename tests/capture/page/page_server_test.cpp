@@ -22,6 +22,7 @@
 #pragma GCC diagnostic pop
 
 #include "core/image/image_codec.hpp"
+#include "core/image/image_io.hpp"
 
 namespace orbitfuse {
 namespace {

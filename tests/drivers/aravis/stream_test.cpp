@@ -4,7 +4,7 @@
 #include <thread>
 
 #include "drivers/aravis/gvcp_probe.hpp"
-#include "tests/core/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 #include "tests/drivers/aravis/stream_harness.hpp"
 #include "tests/support/gev_genicam_xml.hpp"
 

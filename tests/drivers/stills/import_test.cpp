@@ -15,7 +15,7 @@
 #include "core/image/image_codec.hpp"
 #include "core/image/image_io.hpp"
 #include "core/formats/transforms_json.hpp"
-#include "tests/core/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 #include "tests/support/shared_data.hpp"
 
 namespace orbitfuse {

@@ -10,7 +10,7 @@
 #include "capture/recording/recorder.hpp"
 #include "core/system/file_io.hpp"
 #include "core/image/image_codec.hpp"
-#include "tests/core/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 #include "tests/support/shared_data.hpp"
 
 namespace orbitfuse {

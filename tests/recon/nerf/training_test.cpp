@@ -5,7 +5,7 @@
 
 #include "core/system/parallel.hpp"
 #include "recon/nerf/field/field_state.hpp"
-#include "tests/core/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 #include "tests/recon/nerf/toy_scene.hpp"
 
 namespace orbitfuse::nerf {

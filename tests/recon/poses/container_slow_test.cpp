@@ -3,19 +3,20 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/orbit_scenes.hpp"
+#include "tests/support/shared_data.hpp"
 #include "recon/poses/sfm/colmap.hpp"
 #include "recon/poses/estimate_poses.hpp"
 #include "recon/poses/sfm/sfm_ladder.hpp"
-#include "tests/core/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {
 
 TEST(ContainerSlow, VisibleOrbitToATenthOfAPercent) {
-  const auto data = scenes::shared_data();
-  if (!data) GTEST_SKIP() << "shared data absent: set ORBITFUSE_SHARED";
+  const std::filesystem::path data = testing::shared_data();
+  if (!std::filesystem::exists(data)) GTEST_SKIP() << data << " is not here: set ORBITFUSE_SHARED";
   const test::TempFolder folder;
-  const auto scene = scenes::container_scene(*data, {});
+  const auto scene = scenes::container_scene(data, {});
   const auto poses = estimate_visible_poses(scene.session, {}, folder.path(), {});
   if (!poses && poses.error().kind == ErrorKind::unavailable) GTEST_SKIP() << "no COLMAP on PATH";
   ASSERT_TRUE(poses) << poses.error().message();
@@ -56,10 +57,10 @@ Result<Reconstruction> colmap_model(const Session& session,
 }
 
 TEST(ContainerSlow, MergedThermalTrackingModelIsNotBelieved) {
-  const auto data = scenes::shared_data();
-  if (!data) GTEST_SKIP() << "shared data absent: set ORBITFUSE_SHARED";
+  const std::filesystem::path data = testing::shared_data();
+  if (!std::filesystem::exists(data)) GTEST_SKIP() << data << " is not here: set ORBITFUSE_SHARED";
   const test::TempFolder folder;
-  const scenes::Scene scene = tracking_scene(*data);
+  const scenes::Scene scene = tracking_scene(data);
   const auto frames = scene.session.frames_of(Modality::thermal, true);
   const auto model = colmap_model(scene.session, frames, folder.path());
   if (!model && model.error().kind == ErrorKind::unavailable) GTEST_SKIP() << "no COLMAP on PATH";

@@ -6,7 +6,7 @@
 #include <atomic>
 #include <opencv2/imgcodecs.hpp>
 
-#include "tests/core/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {

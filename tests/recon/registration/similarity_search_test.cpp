@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/registration/images/similarity_search.hpp"
+#include "recon/registration/similarity_search.hpp"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 
 #include "capture/recording/recorder.hpp"
 #include "drivers/v4l2/v4l2_source.hpp"
-#include "tests/core/temp_folder.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse::v4l2::guest {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "app/stages/new_views.hpp"
+#include "recon/assembly/new_views.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace orbitfuse::stages {
+namespace orbitfuse {
 namespace {
 
 constexpr double deg = std::numbers::pi / 180;
@@ -94,4 +94,4 @@ TEST(NewViews, OptionsNameTheirField) {
 }
 
 }  // namespace
-}  // namespace orbitfuse::stages
+}  // namespace orbitfuse

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "app/stages/training_data.hpp"
+#include "recon/assembly/training_data.hpp"
 
 #include <fmt/format.h>
 
@@ -10,25 +10,26 @@
 #include "core/image/image_io.hpp"
 #include "core/system/parallel.hpp"
 
-namespace orbitfuse::stages {
+namespace orbitfuse {
 
-Result<cv::Mat> field_image(const std::filesystem::path& file, Modality modality, bool gray) {
-  if (modality == Modality::visible) {
+Result<cv::Mat> field_image(const std::filesystem::path& file, Samples samples) {
+  if (samples == Samples::color) {
     ORBITFUSE_ASSIGN(const cv::Mat bgr, read_visible(file));
     return nerf::rgb_of_bgr8(bgr);
   }
-  if (!gray) return read_thermal_k(file);
+  if (samples == Samples::kelvin) return read_thermal_k(file);
   ORBITFUSE_ASSIGN(cv::Mat levels, read_image(file));
   if (levels.channels() == 3) cv::cvtColor(levels, levels, cv::COLOR_BGR2GRAY);
   levels.convertTo(levels, CV_32F);
   return levels;
 }
 
-Result<nerf::Dataset> training_data(const SessionInput& input, const Reconstruction& model,
-                                    int max_width_px, const Progress& progress) {
+Result<nerf::Dataset> training_data(const std::filesystem::path& folder,
+                                    const Reconstruction& model, Samples samples, int max_width_px,
+                                    const Progress& progress) {
   nerf::Dataset data;
   data.modality = model.modality;
-  data.thermal_is_gray = model.modality == Modality::thermal && !input.has_temperatures();
+  data.thermal_is_gray = samples == Samples::gray;
   data.points = model.points;
   data.views.resize(model.views.size());
   std::vector<Status> problems(model.views.size());
@@ -36,8 +37,8 @@ Result<nerf::Dataset> training_data(const SessionInput& input, const Reconstruct
     const auto k = static_cast<std::size_t>(i);
     const PosedView& view = model.views[k];
     if (progress.cancelled()) return;
-    const auto path = input.session.folder / view.name;
-    auto image = field_image(path, model.modality, data.thermal_is_gray);
+    const auto path = folder / view.name;
+    auto image = field_image(path, samples);
     if (!image) {
       problems[k] = tl::unexpected(image.error());
       return;
@@ -70,4 +71,4 @@ Result<nerf::Dataset> training_data(const SessionInput& input, const Reconstruct
   return data;
 }
 
-}  // namespace orbitfuse::stages
+}  // namespace orbitfuse

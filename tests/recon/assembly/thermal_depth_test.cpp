@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "app/stages/thermal_depth.hpp"
+#include "recon/assembly/thermal_depth.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 
 #include "tests/recon/depth/patterned_floor.hpp"
 
-namespace orbitfuse::stages {
+namespace orbitfuse {
 namespace {
 
 /// The floor in kelvin with a camera's noise, a row of dead pixels and a flame.
@@ -86,4 +86,4 @@ TEST(ThermalDepth, ImagesTooSmallToMatchAreNoError) {
 }
 
 }  // namespace
-}  // namespace orbitfuse::stages
+}  // namespace orbitfuse

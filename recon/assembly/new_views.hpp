@@ -7,7 +7,7 @@
 #include "core/geometry/reconstruction.hpp"
 #include "core/result.hpp"
 
-namespace orbitfuse::stages {
+namespace orbitfuse {
 
 enum class PathKind {
   automatic,  ///< an orbit when the cameras surround the scene, else their path
@@ -46,4 +46,4 @@ struct NewViews {
 /// Cameras for rendering, in the frame of `posed`, without distortion.
 Result<NewViews> new_views(const std::vector<PosedView>& posed, const NewViewOptions& options);
 
-}  // namespace orbitfuse::stages
+}  // namespace orbitfuse

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "app/stages/visible_renderer.hpp"
+#include "recon/assembly/field_renderer.hpp"
 
 #include <opencv2/imgproc.hpp>
 
-namespace orbitfuse::stages {
+namespace orbitfuse {
 
 SceneRenderer edge_renderer(const nerf::Field& field, const Progress& progress) {
   nerf::RenderOptions coarse;
@@ -17,4 +17,4 @@ SceneRenderer edge_renderer(const nerf::Field& field, const Progress& progress) 
   };
 }
 
-}  // namespace orbitfuse::stages
+}  // namespace orbitfuse

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "app/pipeline/usage_clock.hpp"
+#include "core/system/clock.hpp"
 
 #include <sys/resource.h>
 
-namespace orbitfuse::pipeline {
+#include <chrono>
 
-double UsageClock::total_cpu_s() {
+namespace orbitfuse {
+
+double cpu_seconds() {
   double total = 0;
   for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
     rusage usage{};
@@ -16,4 +18,9 @@ double UsageClock::total_cpu_s() {
   return total;
 }
 
-}  // namespace orbitfuse::pipeline
+double wall_seconds() {
+  const auto now = std::chrono::steady_clock::now().time_since_epoch();
+  return std::chrono::duration<double>(now).count();
+}
+
+}  // namespace orbitfuse

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "app/stages/thermal_depth.hpp"
+#include "recon/assembly/thermal_depth.hpp"
 
 #include "recon/depth/dense_depth.hpp"
 #include "recon/nerf/training/scene.hpp"
 
-namespace orbitfuse::stages {
+namespace orbitfuse {
 
 Result<ThermalDepth> add_thermal_depth(nerf::Dataset& data, int width_px, int holdout_every,
                                        std::uint64_t seed, const Progress& progress) {
@@ -37,4 +37,4 @@ Result<ThermalDepth> add_thermal_depth(nerf::Dataset& data, int width_px, int ho
   return ThermalDepth{found->report.known, {}};
 }
 
-}  // namespace orbitfuse::stages
+}  // namespace orbitfuse

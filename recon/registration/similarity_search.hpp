@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "recon/registration/images/similarity_refinement.hpp"
+#include "recon/registration/similarity_refinement.hpp"
 
 // Patches bring a similarity home from a few degrees off; from farther they settle on the next
 // place that looks alike, with fewer of them in place. Where clouds overlap little they leave more

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "app/stages/new_views.hpp"
+#include "recon/assembly/new_views.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -8,9 +8,10 @@
 
 #include <fmt/format.h>
 
+#include "core/option_range.hpp"
 #include "core/numeric/median.hpp"
 
-namespace orbitfuse::stages {
+namespace orbitfuse {
 namespace {
 
 constexpr double deg = std::numbers::pi / 180;
@@ -77,17 +78,12 @@ NewViews along_path(const std::vector<PosedView>& posed, const NewViewOptions& o
 }  // namespace
 
 Status NewViewOptions::validate() const {
-  const auto bad = [](const char* field, double value, const char* rule) {
-    return fail(ErrorKind::usage, std::string("render.") + field, fmt::format("{}", value), rule);
-  };
-  if (views < 1 || views > 10000) return bad("views", views, "must be in 1..10000");
-  if (width_px < 16 || width_px > 8192) return bad("width_px", width_px, "must be in 16..8192");
-  if (!(std::abs(elevation_deg) <= 90))
-    return bad("elevation_deg", elevation_deg, "must be in -90..90");
-  if (!(radius_scale > 0.01 && radius_scale < 100))
-    return bad("radius_scale", radius_scale, "must be in 0.01..100");
-  if (!std::isfinite(azimuth_deg)) return bad("azimuth_deg", azimuth_deg, "must be finite");
-  return {};
+  const OptionCheck check("render");
+  ORBITFUSE_TRY(check("views", views, from_to(1, 10000)));
+  ORBITFUSE_TRY(check("width_px", width_px, from_to(16, 8192)));
+  ORBITFUSE_TRY(check("elevation_deg", elevation_deg, from_to(-90, 90)));
+  ORBITFUSE_TRY(check("radius_scale", radius_scale, between(0.01, 100)));
+  return check("azimuth_deg", azimuth_deg, from_to(-1e6, 1e6));
 }
 
 Result<OrbitGeometry> orbit_geometry(const std::vector<PosedView>& views) {
@@ -151,4 +147,4 @@ Result<NewViews> new_views(const std::vector<PosedView>& posed, const NewViewOpt
   return result;
 }
 
-}  // namespace orbitfuse::stages
+}  // namespace orbitfuse
