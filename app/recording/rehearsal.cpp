@@ -51,9 +51,11 @@ Result<Rehearsal> rehearse_one(FrameSource& source, double seconds,
     last = Clock::now();
     if (out.frames == 1) first = last;
   }
+  const std::uint64_t timed = out.frames;  // those under way come when they are asked for
   for (const Delivery& late : source.unfinished()) ORBITFUSE_TRY(count(late, last_id, out));
   const double span_s = std::chrono::duration<double>(last - first).count();
-  if (out.frames > 1 && span_s > 0 && !source.can_wait()) out.rate_hz = static_cast<double>(out.frames - 1) / span_s;
+  if (timed > 1 && span_s > 0 && !source.can_wait())
+    out.rate_hz = static_cast<double>(timed - 1) / span_s;
   return out;
 }
 

@@ -127,10 +127,10 @@ void LiveGuide::add(const FrameRecord& stored, const cv::Mat& pixels) {
   const auto known = cameras_.find(frame.modality);
   if (known == cameras_.end()) return;  // this orbit is not asked for
   Camera& camera = known->second;
-  const bool first = camera.shown.latest_file.empty();
   camera.shown.latest_file = frame.file;
   if (at_station) {
-    if (first) camera.policy = carried_stations(coverage_, frame.modality);
+    if (!camera.stations_come) camera.policy = carried_stations(coverage_, frame.modality);
+    camera.stations_come = true;
     add_at_station(camera, frame);
   } else {
     place(camera, frame, image);

@@ -104,6 +104,7 @@ class LiveGuide {
     std::optional<OrbitPosition> position;
     std::int64_t position_time_ns = 0;
     std::unique_ptr<PositionPolicy> policy;
+    bool stations_come = false;              ///< with its frames, whatever was expected
     std::optional<Look> waiting;             ///< newest frame of a video not looked at yet
     std::deque<Look> photos;                 ///< not looked at yet: each was taken on purpose
     std::optional<Look> next_to_look();

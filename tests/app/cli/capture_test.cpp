@@ -240,9 +240,9 @@ TEST(Capture, WithoutAFrameTheAccountHasNoIds) {
 }
 
 TEST(Capture, WithoutAGuideThereIsNoEnterKey) {
-  const TempFolder temp;
+  const test::TempFolder temp;
   const auto words = [&](const char* guide) {
-    return orbitfuse_program({"capture", temp.path / guide, "--visible", "stills:" + temp.path.string(),
+    return orbitfuse_program({"capture", temp / guide, "--visible", "stills:" + temp.path().string(),
                               "--seconds", "0.2", "--guide", guide}).err;
   };
   EXPECT_THAT(words("off"), testing::Not(HasSubstr("Enter")));

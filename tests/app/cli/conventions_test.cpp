@@ -114,9 +114,9 @@ TEST(Cli, PrintedConfigHoldsTheRecipesChangedFields) {
   ASSERT_NE(visible, std::string::npos);
   EXPECT_LT(printed.out.find("\niterations = 123\n", visible), printed.out.find("\n[", visible + 1));
   EXPECT_EQ(printed.out.find("iterations = 123"), printed.out.rfind("iterations = 123"));
-  const TempFolder temp;
-  std::ofstream(temp.path / "mine.toml") << printed.out;
-  const Outcome again = orbitfuse_program({"run", "--print-config", "--config", temp.path / "mine.toml"});
+  const test::TempFolder temp;
+  std::ofstream(temp / "mine.toml") << printed.out;
+  const Outcome again = orbitfuse_program({"run", "--print-config", "--config", temp / "mine.toml"});
   EXPECT_EQ(again.out, printed.out);
 }
 

@@ -483,6 +483,7 @@ TEST_F(AravisStream, FramesUnderWayAtTheEndAreInTheCount) {
   std::uint64_t last = std::max(all.last_id, damaged.last_id);
   for (const Delivery& delivery : source.unfinished()) {
     if (delivery.kind != Delivery::Kind::event) last = std::max(last, delivery.frame.id);
+    fmt::print("DBG {} {} {} {}\n", static_cast<int>(delivery.kind), delivery.frame.id, delivery.reason, delivery.detail);
   }
   // The camera was told to stop: all that it sent is known by now.
   const std::uint64_t sent_last = camera.frames_sent() - 1;

@@ -13,7 +13,7 @@ namespace orbitfuse::v4l2 {
 
 /// A scripted kernel with one camera: frames are queued with their flags and sequence numbers;
 /// unplugging makes every call fail with ENODEV until plug() puts the camera under another node.
-class FakeVideoSystem final : public VideoSystem {
+class FakeVideoSystem : public VideoSystem {
  public:
   struct Shot {
     std::uint32_t sequence = 0, flags = 0;
