@@ -149,6 +149,7 @@ Row measured(const SceneFolders& folders, const scenes::Perturbation& by, const 
     row.failure = perturbed.error().message();
     return row;
   }
+  if (by.tracking) scenes::add_tracking(*scene, folders.truth.parent_path() / "tracking.json");
   Progress progress;
   if (arguments.views)
     progress.report = [](const ProgressEvent& e) { fmt::print("  {}\n", e.detail); };
@@ -229,6 +230,7 @@ Status run_scene(const SceneFolders& folders, const Arguments& arguments, json& 
                             : arguments.perturbations.contains(by.name) ||
                                   arguments.perturbations.contains("all");
     if (!wanted) continue;
+    if (by.tracking && !fs::exists(folders.truth.parent_path() / "tracking.json")) continue;
     const Row row = measured(folders, by, arguments, field, visible);
     print(row);
     rows.push_back(json_of(row));

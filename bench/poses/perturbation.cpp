@@ -58,7 +58,7 @@ Status rewrite(Scene& scene, FrameRecord& frame, const Perturbation& by, cv::RNG
 
 const std::vector<Perturbation>& perturbations() {
   static const std::vector<Perturbation> all = [] {
-    std::vector<Perturbation> list(11);
+    std::vector<Perturbation> list(13);
     list[1].name = "focal+3", list[1].focal_error = 0.03;
     list[2].name = "focal-3", list[2].focal_error = -0.03;
     list[3].name = "stations5", list[3].station_error_deg = 5;
@@ -69,6 +69,8 @@ const std::vector<Perturbation>& perturbations() {
     list[8].name = "320px", list[8].width_px = 320;
     list[9].name = "blur2", list[9].blur_px = 2;
     list[10].name = "gray8", list[10].gray_gain = true;
+    list[11].name = "order", list[11].order_alone = true;
+    list[12].name = "tracking", list[12].tracking = true;
     return list;
   }();
   return all;
@@ -91,6 +93,7 @@ Status perturb(Scene& scene, const Perturbation& by, const std::filesystem::path
       azimuth += by.start_deg + (++station % 2 == 0 ? 1 : -1) * by.station_error_deg;
       if (by.backwards) azimuth = -azimuth;
     }
+    if (by.order_alone) frame.station.reset();
     if (changes_images(by)) ORBITFUSE_TRY(rewrite(scene, frame, by, random, folder));
   }
   int seen = 0, left_out = 0;

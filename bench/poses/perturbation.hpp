@@ -21,6 +21,8 @@ struct Perturbation {
   double noise_k = 0;               ///< standard deviation added
   double blur_px = 0;               ///< at full width
   int width_px = 0;                 ///< reduced to; 0: as it is
+  bool tracking = false;            ///< with the frames recorded between the stations
+  bool order_alone = false;         ///< nothing declared of the thermal orbit
   bool gray_gain = false;           ///< 8-bit with a gain of its own each image, no temperatures
 };
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <numbers>
@@ -23,7 +24,9 @@ constexpr double sky_radii = 30;
 struct Keyframe {
   Camera camera;
   Rigid3d cam_from_world;
-  cv::Mat brightness, depth;  ///< depth: everywhere finite
+  cv::Mat1f brightness, depth;          ///< depth: everywhere finite
+  std::vector<Eigen::Vector3f> points;  ///< of each pixel, in the camera
+  cv::Mat1b whole;                      ///< pixels that begin a square of one surface
 };
 
 /// A vertex of a keyframe's surface in the camera that it is drawn for.
@@ -72,31 +75,42 @@ std::vector<Vertex> vertices_of(const Keyframe& key, const Camera& camera,
   const Eigen::Vector3f translation = cam_from_key.translation.cast<float>();
   const auto fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
   const auto cx = static_cast<float>(camera.cx), cy = static_cast<float>(camera.cy);
-  std::vector<Vertex> vertices(key.depth.total());
-  std::size_t i = 0;
-  for (int y = 0; y < key.depth.rows; ++y)
-    for (int x = 0; x < key.depth.cols; ++x, ++i) {
-      const Eigen::Vector3f ray = key.camera.ray_of({x + 0.5, y + 0.5}).cast<float>();
-      const Eigen::Vector3f p = rotation * (ray * key.depth.at<float>(y, x)) + translation;
-      if (!(p.z() > 1e-6F)) continue;
-      vertices[i] = {fx * p.x() / p.z() + cx, fy * p.y() / p.z() + cy, p.z(),
-                     key.brightness.at<float>(y, x)};
-    }
+  std::vector<Vertex> vertices(key.points.size());
+  const float* values = key.brightness.ptr<float>();
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const Eigen::Vector3f p = rotation * key.points[i] + translation;
+    if (!(p.z() > 1e-6F)) continue;
+    vertices[i] = {fx * p.x() / p.z() + cx, fy * p.y() / p.z() + cy, p.z(), values[i]};
+  }
   return vertices;
 }
 
-Canvas drawn(const Keyframe& key, const Camera& camera, const Rigid3d& cam_from_world,
-             double max_depth_step) {
+/// The render as a surface.
+Keyframe keyframe_of(const Camera& camera, const Rigid3d& cam_from_world, const SceneRender& seen,
+                     double max_depth_step) {
+  Keyframe key{camera, cam_from_world, seen.brightness, seen.depth, {}, {}};
+  key.points.reserve(key.depth.total());
+  for (int y = 0; y < key.depth.rows; ++y)
+    for (int x = 0; x < key.depth.cols; ++x)
+      key.points.push_back(camera.ray_of({x + 0.5, y + 0.5}).cast<float>() * key.depth(y, x));
+  key.whole = cv::Mat1b(key.depth.size(), std::uint8_t{0});
+  const auto step = static_cast<float>(1 + max_depth_step);
+  for (int y = 0; y + 1 < key.depth.rows; ++y)
+    for (int x = 0; x + 1 < key.depth.cols; ++x) {
+      const float *upper = key.depth[y] + x, *lower = key.depth[y + 1] + x;
+      const auto [near, far] = std::minmax({upper[0], upper[1], lower[0], lower[1]});
+      key.whole(y, x) = far > near * step ? 0 : 1;
+    }
+  return key;
+}
+
+Canvas drawn(const Keyframe& key, const Camera& camera, const Rigid3d& cam_from_world) {
   Canvas canvas(camera);
   const std::vector<Vertex> vertices = vertices_of(key, camera, cam_from_world);
   const int columns = key.depth.cols;
-  const auto step = static_cast<float>(1 + max_depth_step);
   for (int y = 0; y + 1 < key.depth.rows; ++y)
     for (int x = 0; x + 1 < columns; ++x) {
-      const float* upper = key.depth.ptr<float>(y) + x;
-      const float* lower = key.depth.ptr<float>(y + 1) + x;
-      const auto [near, far] = std::minmax({upper[0], upper[1], lower[0], lower[1]});
-      if (far > near * step) continue;
+      if (key.whole(y, x) == 0) continue;
       const Vertex* v = &vertices[static_cast<std::size_t>(y * columns + x)];
       const Vertex &a = v[0], &b = v[1], &c = v[columns], &d = v[columns + 1];
       if (a.z <= 0 || b.z <= 0 || c.z <= 0 || d.z <= 0) continue;
@@ -148,7 +162,7 @@ class KeyframeScene {
     const auto sky = static_cast<float>(sky_radii * distance(cam_from_world));
     for (float& z : cv::Mat1f(seen.depth))
       if (!(z > 0 && z < sky)) z = sky;
-    keyframes_.push_back({wide, cam_from_world, seen.brightness, seen.depth});
+    keyframes_.push_back(keyframe_of(wide, cam_from_world, seen, options_.max_depth_step));
     return {};
   }
 
@@ -211,7 +225,7 @@ class KeyframeScene {
     std::vector<Canvas> layers(used.size(), Canvas(Camera{}));
     parallel_for(static_cast<int>(used.size()), [&](int i) {
       const auto k = static_cast<std::size_t>(i);
-      layers[k] = drawn(*used[k], camera, cam_from_world, options_.max_depth_step);
+      layers[k] = drawn(*used[k], camera, cam_from_world);
     });
     Canvas& all = layers.front();
     // The nearest keyframe has the word; another one only where it sees something clearly before.

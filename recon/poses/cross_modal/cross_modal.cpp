@@ -179,8 +179,9 @@ Result<std::vector<OrbitHypothesis>> search(const Evidence& evidence, bool rende
 std::string words(const SelectedOrbit& selected) {
   std::string text;
   for (const HypothesisSupport& one : selected.supports)
-    text += fmt::format("; start at {:.0f} deg{}, distance {:.2f}: support {:.1f}", one.offset_deg,
-                        one.mirrored ? " clockwise" : "", one.radius, one.support);
+    if (!one.repeats)
+      text += fmt::format("; start at {:.0f} deg{}, distance {:.2f}: support {:.1f}", one.offset_deg,
+                          one.mirrored ? " clockwise" : "", one.radius, one.support);
   return text;
 }
 

@@ -143,7 +143,7 @@ void evaluate(const OrbitTable& table, const std::vector<Station>& stations,
 /// Whether a candidate says something that none of the better ones does.
 bool distinct(const Candidate& candidate, const std::vector<Candidate>& better,
               const OrbitSearchOptions& options) {
-  constexpr double other_start_deg = 40, other_distance = 0.2;
+  constexpr double other_start_deg = 40, other_distance = 0.3;
   int of_same_start = 0;
   for (const Candidate& b : better) {
     if (b.mirrored != candidate.mirrored ||

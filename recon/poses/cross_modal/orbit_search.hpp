@@ -78,7 +78,7 @@ struct OrbitTable {
 Result<OrbitTable> tabulate_orbit(const LineModel& lines, const std::vector<SearchView>& views,
                                   const OrbitSearchOptions& options, const Progress& progress);
 
-/// The best hypotheses, best first, whose starts differ by 40 deg, in direction or by a fifth in
+/// The best hypotheses, best first, whose starts differ by 40 deg, in direction or by a third in
 /// distance; at most two of one start and direction. A near-symmetric object gives two of nearly
 /// equal score, and so does a near orbit that lays another edge on the horizon: which is right shows
 /// only against renders.

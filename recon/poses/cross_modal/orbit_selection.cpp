@@ -4,7 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numeric>
+
+#include "core/numeric/median.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -15,6 +16,9 @@ std::vector<RenderRound> opening_rounds() {
 }
 /// Places of one view are compared after one more.
 constexpr RenderRound comparing_round{160, 6, 7, 10, 8};
+
+/// Of a view; the others have been seen to be worse.
+constexpr std::size_t compared_starts = 2;
 
 /// Hypotheses with less of the best one's support are not looked at again.
 constexpr double rival_share = 0.8;
@@ -47,6 +51,12 @@ class Selection {
           rebase(cam_from_world_of(start.pose, views.back().camera), world_from_canonical);
     }
     return refinement_.restart(chosen, views, std::move(rounds));
+  }
+
+  /// Once more from where they are.
+  Result<RenderAlignment> compared(const std::vector<std::size_t>& views,
+                                   const std::vector<PosedView>& places) const {
+    return refinement_.restart(views, places, {comparing_round});
   }
 
   std::size_t views() const { return blank_.size(); }
@@ -82,24 +92,51 @@ std::vector<Start> further_starts(const OrbitHypothesis& hypothesis) {
   return starts;
 }
 
-/// Every view at the best supported of all starts tried.
+/// Indices of a view's best supported starts, best first.
+std::vector<std::vector<std::size_t>> ranked(const std::vector<Start>& starts,
+                                             const RenderAlignment& tried, std::size_t views) {
+  std::vector<std::vector<std::size_t>> of_view(views);
+  for (std::size_t s = 0; s < starts.size(); ++s) of_view[starts[s].view].push_back(s);
+  for (std::vector<std::size_t>& list : of_view)
+    std::stable_sort(list.begin(), list.end(), [&](std::size_t a, std::size_t b) {
+      return tried.views[a].support() > tried.views[b].support();
+    });
+  return of_view;
+}
+
+/// Every view at the best supported of all starts tried; the best few of each are compared.
 Result<RenderAlignment> best_starts(const Selection& selection, const OrbitHypothesis& hypothesis) {
   std::vector<Start> starts = best_of_search(hypothesis, 1);
   for (const Start& start : further_starts(hypothesis)) starts.push_back(start);
-  std::vector<RenderRound> rounds = opening_rounds();
-  rounds.push_back(comparing_round);
-  ORBITFUSE_ASSIGN(RenderAlignment tried, selection.aligned(starts, rounds));
+  ORBITFUSE_ASSIGN(const RenderAlignment tried, selection.aligned(starts, opening_rounds()));
+  std::vector<std::size_t> owner;
+  std::vector<PosedView> places;
+  for (const std::vector<std::size_t>& list : ranked(starts, tried, selection.views()))
+    for (std::size_t k = 0; k < std::min(list.size(), compared_starts); ++k) {
+      owner.push_back(starts[list[k]].view);
+      places.push_back(tried.views[list[k]].view);
+    }
+  ORBITFUSE_ASSIGN(const RenderAlignment compared, selection.compared(owner, places));
   RenderAlignment best;
   best.views.resize(selection.views());
+  best.focal_px = compared.focal_px;
   std::vector<bool> seen(selection.views(), false);
-  for (std::size_t s = 0; s < starts.size(); ++s) {
-    RenderAlignedView& view = best.views[starts[s].view];
-    if (seen[starts[s].view] && tried.views[s].support() <= view.support()) continue;
-    view = tried.views[s];
-    seen[starts[s].view] = true;
+  for (std::size_t c = 0; c < owner.size(); ++c) {
+    RenderAlignedView& view = best.views[owner[c]];
+    if (seen[owner[c]] && compared.views[c].support() <= view.support()) continue;
+    view = compared.views[c];
+    seen[owner[c]] = true;
   }
-  best.focal_px = tried.focal_px;
   return best;
+}
+
+/// Whether two hypotheses' views ended at the same places, mostly.
+bool same_orbit(const OrbitViews& orbit, const RenderAlignment& a, const RenderAlignment& b) {
+  constexpr double same_deg = 2;
+  std::vector<double> apart;
+  for (std::size_t i = 0; i < a.views.size(); ++i)
+    apart.push_back(apart_deg(orbit, a.views[i].view.cam_from_world, b.views[i].view.cam_from_world));
+  return median(apart) < same_deg;
 }
 
 }  // namespace
@@ -112,13 +149,18 @@ Result<SelectedOrbit> select_by_renders(const SceneRenderer& renderer, OrbitView
   const Selection selection(refinement, blank);
   SelectedOrbit selected;
   double best_opening = 0;
+  std::vector<RenderAlignment> openings;
   const std::size_t every = blank.size() >= 2 * least_opened ? 2 : 1;
   for (const OrbitHypothesis& hypothesis : hypotheses) {
-    ORBITFUSE_ASSIGN(const RenderAlignment opened,
+    ORBITFUSE_ASSIGN(RenderAlignment opened,
                      selection.aligned(best_of_search(hypothesis, every), opening_rounds()));
     const double support = mean_support(opened);
+    const bool repeats =
+        std::any_of(openings.begin(), openings.end(),
+                    [&](const RenderAlignment& before) { return same_orbit(orbit, before, opened); });
+    openings.push_back(std::move(opened));
     selected.supports.push_back(
-        {hypothesis.offset_deg, hypothesis.radius, hypothesis.mirrored, support});
+        {hypothesis.offset_deg, hypothesis.radius, hypothesis.mirrored, support, repeats});
     best_opening = std::max(best_opening, support);
     progress.report({"poses.thermal", 2, 4, -1,
                      fmt::format("start at {:.0f} deg{}, distance {:.2f}: support {:.1f}",
@@ -127,7 +169,9 @@ Result<SelectedOrbit> select_by_renders(const SceneRenderer& renderer, OrbitView
   }
   double best = -1;
   for (std::size_t h = 0; h < hypotheses.size(); ++h) {
-    if (selected.supports[h].support < rival_share * best_opening) continue;
+    if (selected.supports[h].repeats ||
+        selected.supports[h].support < rival_share * best_opening)
+      continue;
     ORBITFUSE_ASSIGN(RenderAlignment one, best_starts(selection, hypotheses[h]));
     selected.supports[h].support = mean_support(one);
     if (selected.supports[h].support <= best) continue;

@@ -15,7 +15,8 @@ namespace orbitfuse {
 struct HypothesisSupport {
   double offset_deg = 0, radius = 0;
   bool mirrored = false;
-  double support = 0;  ///< mean over the views
+  double support = 0;    ///< mean over the views
+  bool repeats = false;  ///< ends where one before it does
 };
 
 struct SelectedOrbit {

@@ -20,6 +20,8 @@ constexpr double found_share = 0.5;
 constexpr double settled_share = 0.6;
 /// Of their loop's usual support in the visible scene: views that form alone may vouch for.
 constexpr double vouched_share = 0.6;
+/// The same, of views that both scenes leave where they are.
+constexpr double confirmed_share = 0.4;
 /// Two views turned by less are one station's: its own temperatures confirm any place.
 constexpr double own_turn_deg = 8;
 /// Rounding of no support at all.
@@ -147,6 +149,10 @@ MoveDecision verdict(const PlaceEvidence& seen) {
   const bool better_by_form =
       seen.form_there > vouched_share && seen.form_there >= seen.form_before;
   if (seen.agree && (found || better_by_form)) return MoveDecision::both;
+  // Searched as a whole and found where it was: a weak view, but not a wrong one.
+  if (seen.agree && seen.stays && seen.temperatures_there > confirmed_share &&
+      seen.form_before > confirmed_share)
+    return MoveDecision::both;
   // Temperatures know more edges: where they are sure, form alone doesn't pull a view away.
   if (!seen.agree && found) return MoveDecision::temperatures_alone;
   // Where they find it nowhere they don't speak against a place that form knows well.
@@ -197,6 +203,7 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
     seen.form_before = share_of_usual(view.support(), usual_form.at(loop));
     seen.form_there = share_of_usual(form.support(), usual_form.at(loop));
     seen.temperatures_there = share_of_usual(warm.support(), found.usual.at(loop));
+    seen.stays = same_place(orbit, view.view.cam_from_world, warm.view.cam_from_world);
     refinement.progress.report(
         {"poses.thermal", 3, 4, -1,
          fmt::format("{}: usual support {:.2f} among temperatures, {:.2f} of form there, {:.2f} "

@@ -19,6 +19,7 @@ struct PlaceEvidence {
   double temperatures_there = 0;   ///< among temperatures
   double form_there = 0;   ///< in the visible scene
   double form_before = 0;  ///< in the visible scene, where it was
+  bool stays = false;      ///< temperatures place it within a degree of where it was
 };
 
 /// Whose word places the view. It only moves to a place that temperatures find or

@@ -19,8 +19,9 @@ namespace {
 
 /// Wrong views had up to 0.25 of the median support of all loops, right ones 0.4 or more.
 constexpr double min_support_share = 0.3;
-/// Wrong views of `sedan` correlated with the others' temperatures at .42, right ones at .94.
-constexpr double min_correlation = 0.65;
+/// Wrong views of `sedan` correlated with the others' temperatures at .42, right ones at .94 in the
+/// median, the least at .64.
+constexpr double min_correlation = 0.5;
 /// Stations are good to several degrees (sigma 2 to 3), loops to two in elevation.
 constexpr double max_azimuth_off_deg = 12, max_elevation_off_deg = 8;
 /// A loop keeps its distance to 3 %, loops of one operator to 5 %.

@@ -142,6 +142,10 @@ TEST(CorrectByTemperatures, OnlyTemperaturesThatFindAViewMoveIt) {
   EXPECT_EQ(verdict({true, 0.03, 0.05, 0.04}), MoveDecision::nobody);
   EXPECT_EQ(verdict({true, 0.3, 0.59, 0.5}), MoveDecision::nobody);
   EXPECT_EQ(verdict({true, 0.3, 0.61, 0.5}), MoveDecision::both);
+  // Searched as a whole and found where it was: weak, but nothing speaks against it.
+  EXPECT_EQ(verdict({true, 0.51, 0.50, 0.47, true}), MoveDecision::both);
+  EXPECT_EQ(verdict({true, 0.51, 0.50, 0.47, false}), MoveDecision::nobody);
+  EXPECT_EQ(verdict({true, 0.2, 0.50, 0.47, true}), MoveDecision::nobody);
   // Found nowhere; that both scenes agree on a place where neither knows it says nothing.
   EXPECT_EQ(verdict({true, 0.03, 0.2, 0.7}), MoveDecision::form_alone);
   EXPECT_EQ(verdict({false, 0.03, 0.2, 0.7}), MoveDecision::form_alone);
