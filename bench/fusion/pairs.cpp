@@ -72,6 +72,13 @@ std::map<std::string, std::vector<Scores>> reference_scores(const fs::path& fold
     of_method.resize(pairs.size());
     of_method[static_cast<std::size_t>(found - pairs.begin())][metric] = std::stod(value);
   }
+  for (auto& [method, of_method] : result)
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const cv::Mat fused = cv::imread((folder / "reference" / method / (pairs[i].name + ".png")).string(), cv::IMREAD_GRAYSCALE);
+      if (fused.empty()) continue;  // of the trivial methods there are no images
+      const auto values = fusion_metrics(pairs[i].visible, pairs[i].thermal, fused).value();
+      of_method[i]["halo"] = values.back().value;
+    }
   return result;
 }
 

@@ -24,7 +24,7 @@ std::vector<Pair> load_pairs(const std::filesystem::path& folder);
 Pair timed_pair(const std::vector<Pair>& pairs);
 
 using Scores = std::map<std::string, double>;
-inline constexpr const char* shown[] = {"Qabf", "Qcb", "Qcv", "SSIM"};
+inline constexpr const char* shown[] = {"Qabf", "Qcb", "Qcv", "SSIM", "halo"};
 
 /// Methods that fuse gray planes and are scored; not heat, which colours one source by the other.
 std::vector<std::string> scored_methods();

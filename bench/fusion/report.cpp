@@ -16,7 +16,8 @@ std::string json(const std::vector<Row>& rows) {
   std::string text = "[\n";
   for (std::size_t i = 0; i < rows.size(); ++i) {
     text += fmt::format("  {{\"method\": \"{}\"", rows[i].what);
-    for (const char* metric : shown) text += fmt::format(", \"{}\": {:.17g}", metric, rows[i].means.at(metric));
+    for (const char* metric : shown)
+      if (rows[i].means.contains(metric)) text += fmt::format(", \"{}\": {:.17g}", metric, rows[i].means.at(metric));
     if (rows[i].timed)
       text += fmt::format(", \"wall_ms\": {:.3f}, \"cpu_ms\": {:.3f}", rows[i].times.wall_ms, rows[i].times.cpu_ms);
     text += i + 1 < rows.size() ? "},\n" : "}\n";
@@ -53,12 +54,14 @@ std::string svg(const std::vector<Row>& rows) {
 }  // namespace
 
 void print_header() {
-  fmt::print("| method | Qabf | Qcb | Qcv | SSIM | wall ms | CPU ms |\n|---|---|---|---|---|---|---|\n");
+  fmt::print("| method | Qabf | Qcb | Qcv | SSIM | halo | wall ms | CPU ms |\n|---|---|---|---|---|---|---|---|\n");
 }
 
 void print(const Row& row) {
   fmt::print("| {} |", row.what);
-  for (const char* metric : shown) fmt::print(" {:.{}f} |", row.means.at(metric), std::string_view(metric) == "Qcv" ? 1 : 4);
+  for (const char* metric : shown)
+    if (row.means.contains(metric)) fmt::print(" {:.{}f} |", row.means.at(metric), std::string_view(metric) == "Qcv" ? 1 : 4);
+    else fmt::print(" - |");
   if (row.timed) fmt::print(" {:.1f} | {:.1f} |\n", row.times.wall_ms, row.times.cpu_ms);
   else fmt::print(" - | - |\n");
   std::fflush(stdout);

@@ -7,7 +7,7 @@ namespace orbitfuse::fusion {
 
 /// The default method. Details: per band the source with the larger local energy, chosen softly
 /// so that the choice never flickers, at a strength that keeps part of its contrast to the level it
-/// moves to. Base: by votes of patches on which source holds more. See docs/benchmarks/fusion.md
+/// moves to. Base: by votes of patches on which source holds more. See docs/notes/fusion.md
 /// for what each constant does to the scores.
 struct BestOptions {
   int levels = 4;            ///< of the pyramid; fewer where the base would be below 8 px

@@ -36,6 +36,7 @@ constexpr Definition definitions[] = {
     {"PSNR_vifb", "as VIFB prints it (scaled by the image size)"},
     {"RMSE_vifb", "as VIFB prints it (scaled by the image size)"},
     {"SSIM_sum", "sum over both sources, as VIFB prints it"},
+    {"halo", "level near edges far from both sources', 15x15 medians, gray levels; lower is better"},
 };
 constexpr std::size_t count = std::size(definitions);
 
@@ -43,9 +44,10 @@ std::array<double, count> of_planes(const Plane& v, const Plane& i, const Plane&
   std::array<Plane, 3> wide;  // stretched to 0..255, as some measures are defined
   parallel_for(3, [&](int k) { wide[static_cast<std::size_t>(k)] = stretched(k == 0 ? v : k == 1 ? i : f); });
   Perception eye;
-  double ssim_v = 0, ssim_i = 0, qabf = 0, en = 0, mi = 0, ce = 0, sf = 0, ag = 0, ei = 0, scd = 0, cc = 0, mse_v = 0, mse_i = 0;
+  double ssim_v = 0, ssim_i = 0, qabf = 0, en = 0, mi = 0, ce = 0, sf = 0, ag = 0, ei = 0, scd = 0, cc = 0, mse_v = 0, mse_i = 0, glow = 0;
   const std::vector<std::function<void()>> tasks{
       [&] { eye = perception(wide[0], wide[1], wide[2]); },
+      [&] { glow = halo(v, i, f); },
       [&] { ssim_v = structural_similarity(v, f); },
       [&] { ssim_i = structural_similarity(i, f); },
       [&] { qabf = edge_transfer(v, i, f); },
@@ -71,7 +73,7 @@ std::array<double, count> of_planes(const Plane& v, const Plane& i, const Plane&
   const double rmse = (std::sqrt(mse_v) + std::sqrt(mse_i)) / 2;
   const double rmse_vifb = rmse / std::sqrt(static_cast<double>(f.total()));
   return {mean(f), standard_deviation(f), en, sf, ag, ei, qabf, mi, psnr_db((mse_v + mse_i) / 2), rmse,
-          (ssim_v + ssim_i) / 2, ce, eye.qcb, eye.qcv, scd, cc, psnr_db(rmse_vifb), rmse_vifb, ssim_v + ssim_i};
+          (ssim_v + ssim_i) / 2, ce, eye.qcb, eye.qcv, scd, cc, psnr_db(rmse_vifb), rmse_vifb, ssim_v + ssim_i, glow};
 }
 
 }  // namespace

@@ -36,4 +36,10 @@ struct Perception {
 /// Of planes that went through `stretched`.
 Perception perception(const Plane& visible, const Plane& thermal, const Plane& fused);
 
+// halo.cpp
+/// How far the fused level lies from both sources' within a patch's reach of an edge, gray levels beyond
+/// 8; levels are medians of 15x15 patches. 0: every level beside an edge is one of the sources'. A glow
+/// round a hot part, or a sky half taken from each source, is far from both. 0 without edges.
+double halo(const Plane& visible, const Plane& thermal, const Plane& fused);
+
 }  // namespace orbitfuse::metrics

@@ -14,7 +14,7 @@ struct MsSrifOptions {
   int max_atoms = 63;
   double residual = 0.1;  ///< gray levels RMS at which a patch counts as coded; flat patches end here
   /// A patch is coded when this share of its norm is left: textured patches need no finer code to
-  /// be compared. 0 = the reference's stop. See docs/benchmarks/fusion.md.
+  /// be compared. 0 = the reference's stop. See docs/notes/fusion.md.
   double relative_residual = 0.01;
   /// No code is sought where the structure of one patch (L1 norm of its DCT) is this many times the
   /// other's: the codes would agree, and the winner itself is what its code comes close to. 0 = off.

@@ -52,6 +52,7 @@ TEST(MetricsReference, EveryValueOfVifb) {
     const auto values = fusion_metrics(v, i, fused);
     ASSERT_TRUE(values) << values.error().message();
     for (const MetricValue& m : *values) {
+      if (m.name == "halo") continue;  // our own
       const auto alias = name_in_csv.find(m.name);
       const double truth = expected.at(alias == name_in_csv.end() ? m.name : alias->second);
       EXPECT_NEAR(m.value, truth, (other_image ? 1e-4 : 1e-9) * std::abs(truth)) << pair << " " << method << " " << m.name;
