@@ -84,8 +84,8 @@ Result<ThermalPoses> pose_by_rig(const Session& session, const Reconstruction& v
         {gathered.views[i].name, found->thermal,
          found->thermal_from_visible * gathered.posed[i]->cam_from_world});
     if (fit.agreement <= fit.control)
-      result.contested.push_back(
-          {gathered.views[i].name,
+      result.doubtful.push_back(
+          {gathered.views[i].name, DoubtReason::weak_support,
            fmt::format("its edges agree with its photo's by {:.3f}, other pairs' by {:.3f}",
                        fit.agreement, fit.control)});
   }
