@@ -15,6 +15,7 @@
 #include "core/numeric/random.hpp"
 #include "recon/nerf/rendering/render.hpp"
 #include "recon/nerf/training/trainer.hpp"
+#include "recon/nerf/training/measure.hpp"
 #include "tests/recon/nerf/emulated_amx.hpp"
 #include "tests/recon/nerf/toy_scene.hpp"
 

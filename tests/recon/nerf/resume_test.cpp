@@ -7,6 +7,7 @@
 #include "core/system/file_io.hpp"
 #include "recon/nerf/field/checkpoint.hpp"
 #include "recon/nerf/field/field_state.hpp"
+#include "recon/nerf/training/measure.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/recon/nerf/toy_scene.hpp"
 

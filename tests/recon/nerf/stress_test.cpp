@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "recon/nerf/field/field_state.hpp"
+#include "recon/nerf/rendering/march.hpp"
 #include "tests/recon/nerf/toy_scene.hpp"
 
 namespace orbitfuse::nerf {
