@@ -103,7 +103,7 @@ Status Settings::set(const std::string& key, const json& value, const std::strin
 }
 
 Status Settings::read_toml(const std::filesystem::path& file) {
-  ORBITFUSE_ASSIGN(const std::string text, read_file(file));
+  ORBITFUSE_ASSIGN(const std::string text, read_file(file, max_settings_bytes));
   std::vector<Entry> entries;
   try {
     const toml::table table = toml::parse(text, file.string());

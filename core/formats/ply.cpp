@@ -13,6 +13,7 @@
 #include <sstream>
 #include <string_view>
 
+#include "core/formats/rigid_matrix.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse {
@@ -257,6 +258,12 @@ std::uint8_t color_level(double value, bool is_float) {
   return level >= 0 && level <= 255 ? static_cast<std::uint8_t>(std::lround(level)) : std::uint8_t(level > 255 ? 255 : 0);
 }
 
+/// What can't be computed with is no position, as NaN is none.
+Eigen::Vector3d usable(const Eigen::Vector3d& position) {
+  if (!(position.array().abs() > max_coordinate).any()) return position;
+  return Eigen::Vector3d::Constant(std::nan(""));
+}
+
 Result<PointCloud> read_vertices(const std::filesystem::path& path, Reader& reader,
                                  const Element& element, PlyFormat format) {
   const VertexLayout layout(element);
@@ -270,7 +277,7 @@ Result<PointCloud> read_vertices(const std::filesystem::path& path, Reader& read
       return bad(path, fmt::format("vertex {} of {} is cut off or unreadable", i, element.count));
     }
     const auto& v = vertex.values;
-    cloud.positions.emplace_back(v[0], v[1], v[2]);
+    cloud.positions.push_back(usable(Eigen::Vector3d(v[0], v[1], v[2])));
     if (normals) {
       cloud.normals.emplace_back(static_cast<float>(v[3]), static_cast<float>(v[4]), static_cast<float>(v[5]));
     }

@@ -9,7 +9,8 @@
 namespace orbitfuse {
 
 /// ASCII or binary PLY vertices: x y z, nx ny nz, red green blue, temperature (kelvin). Other
-/// properties and elements are skipped. Non-finite positions are kept (callers decide).
+/// properties and elements are skipped. Positions that are not finite, or
+/// beyond 1e9, are kept as NaN (callers decide).
 Result<PointCloud> read_ply(const std::filesystem::path& path);
 
 /// Binary little-endian.

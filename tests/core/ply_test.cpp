@@ -103,5 +103,16 @@ TEST(Ply, WrongTypesAreNamed) {
   EXPECT_FALSE(read_ply(folder / "x.ply"));
 }
 
+TEST(Ply, PositionsThatCannotBeComputedWithAreNone) {
+  const TempFolder folder;
+  put(folder / "c.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\n"
+                        "end_header\n1 2 3\n1e300 0 0\nnan 1 1\n");
+  const auto cloud = read_ply(folder / "c.ply");
+  ASSERT_TRUE(cloud) << cloud.error().message();
+  EXPECT_EQ(cloud->positions.at(0), Eigen::Vector3d(1, 2, 3));
+  EXPECT_TRUE(cloud->positions.at(1).array().isNaN().all());
+  EXPECT_TRUE(std::isnan(cloud->positions.at(2).x()));
+}
+
 }  // namespace
 }  // namespace orbitfuse

@@ -77,7 +77,7 @@ TEST_F(Hostile, FoldersOfPairsAreNotWrittenOver) {
 TEST_F(Hostile, EmptyValuesAreNoValues) {
   write_fixture_session(path("s"));
   for (const char* option : {"--budget", "--config", "--out", "--cameras"})
-    refused(orbitfuse_program({"run", path("s"), "--out", path("o"), option, ""}), 2, std::string(option) + ": empty");
+    refused(orbitfuse_program({"run", path("s"), option, ""}, {.folder = temp.path()}), 2, std::string(option) + ": empty");
   refused(orbitfuse_program({"inspect", ""}), 2, "empty");
 }
 
