@@ -2,12 +2,12 @@
 #include "drivers/stills/import.hpp"
 
 #include <fmt/format.h>
-#include <map>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <map>
 
 #include "capture/recording/frame_encoding.hpp"
 #include "capture/recording/session_folder.hpp"
