@@ -54,17 +54,32 @@ struct RigScene {
   }
 };
 
+/// Of the scene's points in the thermal image. At one depth a turn and a shift, and a step back and a
+/// shorter lens, look alike: only what they do together can be known.
+double misplacement_px(const RigEstimate& rig, const RigScene& scene) {
+  double sum = 0;
+  int count = 0;
+  for (int x = -3; x <= 3; ++x)
+    for (int y = -2; y <= 2; ++y) {
+      const Eigen::Vector3d point(x, y, 10);
+      sum += (rig.thermal.project(rig.thermal_from_visible * point) -
+              scene.thermal.project(scene.thermal_from_visible * point))
+                 .norm();
+      ++count;
+    }
+  return sum / count;
+}
+
 TEST(Rig, OneTransformAndLensAreFoundFromAllPairs) {
   for (const double sigma : {0.05, 0.3}) {  // a rough focal length, and none
     RigScene scene(6);
     scene.options.focal_relative_sigma = sigma;
     const auto rig = estimate_rig(scene.views, scene.options, {});
     ASSERT_TRUE(rig) << rig.error().message();
-    EXPECT_LT(rig->thermal_from_visible.rotation.angularDistance(scene.thermal_from_visible),
-              0.004)
+    EXPECT_LT(misplacement_px(*rig, scene), 0.5) << rig->words();
+    EXPECT_NEAR(rig->thermal.fx / scene.thermal.fx, 1, 0.015) << rig->words();
+    EXPECT_LT(rig->thermal_from_visible.rotation.angularDistance(scene.thermal_from_visible), 0.01)
         << rig->words();
-    EXPECT_NEAR(rig->thermal.fx / scene.thermal.fx, 1, 0.006) << rig->words();
-    EXPECT_LT(rig->thermal_from_visible.translation.norm(), 0.05) << "0.5 % of the scene's distance";
   }
 }
 
