@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# The link rule: core <- capture <- drivers; core <- recon <- fusion; only app sees all.
+# The link rule: core <- capture <- drivers; core <- recon; core <- fusion; only app sees all.
 # Siblings inside drivers/ or recon/ stay independent, so that each can be read alone; what poses
 # and registration share is recon/alignment, and recon/assembly joins them all.
 file(STRINGS ${GRAPH} edges)
@@ -28,7 +28,7 @@ foreach(edge ${edges})
     set(ok TRUE)
   elseif(from MATCHES "^recon_(poses|registration)$" AND to STREQUAL "recon_alignment")
     set(ok TRUE)
-  elseif(from MATCHES "^fusion" AND to MATCHES "^(core|recon_.*|fusion.*)$")
+  elseif(from MATCHES "^fusion" AND to MATCHES "^(core|fusion.*)$")
     set(ok TRUE)
   endif()
   if(NOT ok)

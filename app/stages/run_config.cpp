@@ -149,7 +149,7 @@ Result<std::vector<FusionMethod>> FuseConfig::chosen() const {
 RunConfig::RunConfig() {
   train_visible.options = nerf::preset(nerf::default_preset(Modality::visible)).value();
   train_thermal.options = nerf::preset(nerf::default_preset(Modality::thermal)).value();
-  // A run shows held-out error, and fits into a few minutes on two cores; docs/benchmarks/run.md.
+  // A run shows held-out error, and fits into a few minutes on two cores; docs/notes/run.md.
   for (TrainConfig* train : {&train_visible, &train_thermal}) train->options.holdout_every = 12;
   train_visible.options.iterations = 4800;
   train_thermal.options.iterations = 2400;

@@ -9,7 +9,7 @@ namespace orbitfuse {
 
 /// Hue tells the temperature, brightness stays the fused image's.
 struct TemperatureOverlay {
-  std::string palette;  ///< one of palette_names() (core/palette.hpp); empty = no overlay
+  std::string palette;  ///< one of palette_names() (core/image/palette.hpp); empty = no overlay
   double strength = 1;  ///< 0..1: the palette's colour against the visible one
 
   Status validate() const;  ///< usage error naming the field

@@ -14,7 +14,7 @@ struct ThermalDepth {
 };
 
 /// Adds depth to a thermal dataset that no visible field lends its geometry: matched between its
-/// own training views at a small width, where noise is averaged out (docs/benchmarks/nerf.md).
+/// own training views at a small width, where noise is averaged out (docs/notes/nerf.md).
 /// Views that train() drops or measures (`holdout_every`) take no part. Depth is a help that
 /// training can do without: what prevents it is told in ThermalDepth::problem. Errors: cancelled.
 Result<ThermalDepth> add_thermal_depth(nerf::Dataset& data, int width_px, int holdout_every,

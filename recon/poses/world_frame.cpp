@@ -133,7 +133,7 @@ StationFit fit_stations(const std::vector<PosedView>& views, const Session& sess
     if (found == by_name.end() || !found->second->station) continue;
     azimuth.push_back(orbit_angles(canonical * camera_center(view.cam_from_world)).azimuth_deg);
     station.push_back(found->second->station->azimuth_deg);
-    // From 90 deg on only the origin is unknown (core/session.hpp); it is fitted here.
+    // From 90 deg on only the origin is unknown (core/session/session.hpp); it is fitted here.
     const double declared = found->second->station->azimuth_sigma_deg;
     sigma.push_back(declared < 90 ? declared : nominal_sigma_deg);
   }

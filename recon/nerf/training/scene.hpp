@@ -38,7 +38,7 @@ std::vector<bool> left_out_views(const Dataset& given, int holdout_every);
 /// only they saw. Images are shared, not copied.
 Dataset training_part(const Dataset& dataset, const std::vector<bool>& heldout);
 
-/// The ball of the scene that these views and points show (core/scene_ball.hpp).
+/// The ball of the scene that these views and points show (core/geometry/scene_ball.hpp).
 Space estimate_space(const Dataset& training);
 
 /// Thermal: the 0.1 and 99.9 percentile over these views, at least 1 K wide. Visible: 0..1.

@@ -9,7 +9,7 @@
 namespace orbitfuse::registration {
 namespace {
 
-constexpr int kBins = 11;
+constexpr int histogram_bins = 11;
 
 /// atan2 / pi, to 0.002: far below a bin's width.
 float angle_over_pi(float y, float x) {
@@ -24,11 +24,11 @@ float angle_over_pi(float y, float x) {
 
 /// A vote at `value` in -1..1, shared between the two nearest bins.
 void vote(float* bins, float value, bool wraps, float weight) {
-  const float at = (value + 1) * (0.5f * kBins) - 0.5f;
+  const float at = (value + 1) * (0.5f * histogram_bins) - 0.5f;
   const int low = static_cast<int>(std::floor(at));
   const float share = at - static_cast<float>(low);
   const auto slot = [&](int bin) {
-    return wraps ? (bin + kBins) % kBins : std::clamp(bin, 0, kBins - 1);
+    return wraps ? (bin + histogram_bins) % histogram_bins : std::clamp(bin, 0, histogram_bins - 1);
   };
   bins[slot(low)] += weight * (1 - share);
   bins[slot(low + 1)] += weight * share;
@@ -68,13 +68,13 @@ void vote_pair(float* bins, const Eigen::Vector3f& between, float distance,
   const Eigen::Vector3f v_unit = v / length;
   const Eigen::Vector3f w = normal.cross(v_unit);
   vote(bins, v_unit.dot(other_normal), false, 1);
-  vote(bins + kBins, normal.dot(direction), false, 1);
-  vote(bins + 2 * kBins, angle_over_pi(w.dot(other_normal), normal.dot(other_normal)), true, 1);
+  vote(bins + histogram_bins, normal.dot(direction), false, 1);
+  vote(bins + 2 * histogram_bins, angle_over_pi(w.dot(other_normal), normal.dot(other_normal)), true, 1);
 }
 
 void normalise_parts(float* bins) {
   for (int part = 0; part < 3; ++part) {
-    Eigen::Map<Eigen::Array<float, kBins, 1>> h(bins + part * kBins);
+    Eigen::Map<Eigen::Array<float, histogram_bins, 1>> h(bins + part * histogram_bins);
     const float sum = h.sum();
     if (sum > 0) h /= sum;
   }

@@ -10,10 +10,10 @@
 namespace orbitfuse::registration {
 namespace {
 
-constexpr double kScaleSlack = 1.22;   // either way: the descriptor radii stand 1.25 apart
-constexpr double kNormalSlack = 0.30;  // of cosines
-constexpr double kShortest = 0.25;     // segments below say little about scale or direction
-constexpr double kCliqueScaleSlack = 1.10;
+constexpr double scale_slack = 1.22;   // either way: the descriptor radii stand 1.25 apart
+constexpr double normal_slack = 0.30;  // of cosines
+constexpr double shortest = 0.25;     // segments below say little about scale or direction
+constexpr double clique_scale_slack = 1.10;
 
 /// A square table of bits.
 class BitRows {
@@ -52,10 +52,10 @@ struct Ends {
 double agreed_scale(const Ends& a, const Ends& b, double scale) {
   const Eigen::Vector3d u = b.source - a.source, v = b.target - a.target;
   const double lu = u.norm(), lv = v.norm();
-  if (lu < kShortest || lv < kShortest) return 0;
+  if (lu < shortest || lv < shortest) return 0;
   const double ratio = lv / lu;
-  if (ratio > scale * kScaleSlack || ratio * kScaleSlack < scale) return 0;
-  const auto differ = [](double x, double y) { return std::abs(x - y) > kNormalSlack; };
+  if (ratio > scale * scale_slack || ratio * scale_slack < scale) return 0;
+  const auto differ = [](double x, double y) { return std::abs(x - y) > normal_slack; };
   if (differ(a.source_normal.dot(u) / lu, a.target_normal.dot(v) / lv)) return 0;
   if (differ(b.source_normal.dot(u) / lu, b.target_normal.dot(v) / lv)) return 0;
   if (differ(a.source_normal.dot(b.source_normal), a.target_normal.dot(b.target_normal))) return 0;
@@ -110,7 +110,7 @@ Candidates consensus_candidates(const FeaturePoints& source, const FeaturePoints
     for (const int i : friends.common_list(edge.a, edge.b)) {
       const double ra = agreed_scale(at(edge.a), at(i), scale) / edge_scale;
       const double rb = agreed_scale(at(edge.b), at(i), scale) / edge_scale;
-      if (std::max({ra, rb, 1 / ra, 1 / rb}) > kCliqueScaleSlack * kCliqueScaleSlack) continue;
+      if (std::max({ra, rb, 1 / ra, 1 / rb}) > clique_scale_slack * clique_scale_slack) continue;
       p.push_back(at(i).source);
       q.push_back(at(i).target);
     }

@@ -17,15 +17,15 @@ void NearestGrid::build(const std::vector<Eigen::Vector3d>& points, int cells_pe
   side_ = cells_per_side;
   inverse_cell_ = side_ / extent;
   const auto n = static_cast<std::size_t>(side_);
-  constexpr std::uint16_t kNone = 0xFFFF;
-  index_.assign(n * n * n, kNone);
+  constexpr std::uint16_t no_point = 0xFFFF;
+  index_.assign(n * n * n, no_point);
   std::vector<float> best(index_.size(), std::numeric_limits<float>::infinity());
   std::vector<Eigen::Vector3f> cell_points;
   cell_points.reserve(points.size());
   for (const auto& p : points) cell_points.push_back(((p - origin_) * inverse_cell_).cast<float>());
 
   const auto offer = [&](int x, int y, int z, std::uint16_t candidate) {
-    if (candidate == kNone) return;
+    if (candidate == no_point) return;
     const auto at = static_cast<std::size_t>((z * side_ + y) * side_ + x);
     const Eigen::Vector3f& p = cell_points[candidate];
     const float dx = p.x() - (static_cast<float>(x) + 0.5f),

@@ -13,11 +13,11 @@
 namespace orbitfuse::registration {
 namespace {
 
-constexpr std::size_t kNeighbours = 31;  // the point itself and thirty
-constexpr std::size_t kSpanning = 13;    // planes go through two of the nearest of these
-constexpr double kSlab = 0.03;           // half thickness in which points support a plane
+constexpr std::size_t neighbour_count = 31;  // the point itself and thirty
+constexpr std::size_t spanning = 13;    // planes go through two of the nearest of these
+constexpr double slab_share = 0.03;           // half thickness in which points support a plane
 
-using Neighbourhood = std::array<std::size_t, kNeighbours>;
+using Neighbourhood = std::array<std::size_t, neighbour_count>;
 
 /// 0 flat .. 1 round: root of smallest over largest variance.
 double thickness(const Points& points, const Neighbourhood& around, std::size_t count) {
@@ -36,25 +36,25 @@ double thickness(const Points& points, const Neighbourhood& around, std::size_t 
 /// Most points near one plane through the first point, over planes through pairs of its neighbours.
 double best_plane_support(const Points& points, const Neighbourhood& around) {
   // A column a point, the first the point itself at zero; padded to whole registers.
-  constexpr std::size_t kColumns = 32;
-  std::array<float, kColumns> x{}, y{}, z{};
-  std::array<Eigen::Vector3f, kNeighbours> d;
-  for (std::size_t j = 0; j < kNeighbours; ++j) {
-    d[j] = ((points[around[j]] - points[around[0]]) / kSlab).cast<float>();
+  constexpr std::size_t histogram_columns = 32;
+  std::array<float, histogram_columns> x{}, y{}, z{};
+  std::array<Eigen::Vector3f, neighbour_count> d;
+  for (std::size_t j = 0; j < neighbour_count; ++j) {
+    d[j] = ((points[around[j]] - points[around[0]]) / slab_share).cast<float>();
     x[j] = d[j].x();
     y[j] = d[j].y();
     z[j] = d[j].z();
   }
-  constexpr float kAlways = kColumns - kNeighbours + 1;  // zeros lie on every plane
-  float best = kAlways;
-  for (std::size_t a = 1; a <= kSpanning; ++a) {
-    for (std::size_t b = a + 1; b <= kSpanning; ++b) {
+  constexpr float always = histogram_columns - neighbour_count + 1;  // zeros lie on every plane
+  float best = always;
+  for (std::size_t a = 1; a <= spanning; ++a) {
+    for (std::size_t b = a + 1; b <= spanning; ++b) {
       const Eigen::Vector3f normal = d[a].cross(d[b]);
       const float length2 = normal.squaredNorm();
       if (length2 < 0.09f * d[a].squaredNorm() * d[b].squaredNorm()) continue;
       const float per_length2 = 1 / std::max(length2, 1e-12f);
       std::array<float, 8> support{};
-      for (std::size_t j = 0; j < kColumns; j += 8) {
+      for (std::size_t j = 0; j < histogram_columns; j += 8) {
         for (std::size_t k = 0; k < 8; ++k) {
           const float h = normal.x() * x[j + k] + normal.y() * y[j + k] + normal.z() * z[j + k];
           support[k] += std::max(0.0f, 1 - h * h * per_length2);
@@ -63,7 +63,7 @@ double best_plane_support(const Points& points, const Neighbourhood& around) {
       best = std::max(best, std::accumulate(support.begin(), support.end(), 0.0f));
     }
   }
-  return best - kAlways;
+  return best - always;
 }
 
 /// Low for points on a surface: minus the log of the plane's support per area.
@@ -76,8 +76,8 @@ Scatter scatter_of(const Points& points) {
   Scatter scatter;
   for (const auto& p : points) {
     Neighbourhood around;
-    std::array<double, kNeighbours> d2;
-    tree.nearest(p, kNeighbours, around.data(), d2.data());
+    std::array<double, neighbour_count> d2;
+    tree.nearest(p, neighbour_count, around.data(), d2.data());
     const double area = std::max(d2.back(), 1e-12);
     scatter.strangeness.push_back(-std::log((best_plane_support(points, around) + 0.1) / area));
     scatter.thickness.push_back(thickness(points, around, 16));
@@ -127,7 +127,7 @@ Split otsu(std::vector<double> sorted) {
 
 Points without_outliers(const Points& points) {
   // A sparse part of a surface is flat and 1 % noise 0.4 thick; points that fill space are 0.55.
-  constexpr double kThick = 0.42, kVolume = 0.46;
+  constexpr double thick_share = 0.42, volume_share = 0.46;
   Points kept = points;
   for (int pass = 0; pass < 4 && kept.size() >= 200; ++pass) {
     const Scatter scatter = scatter_of(kept);
@@ -142,9 +142,9 @@ Points without_outliers(const Points& points) {
       }
     }
     const double thick = median(far_thickness);
-    const bool two_populations = split.separation > 2.0 && split.step > 0.7 && thick > kThick;
+    const bool two_populations = split.separation > 2.0 && split.step > 0.7 && thick > thick_share;
     const bool drowned =
-        split.separation > 1.5 && split.step > (pass == 0 ? 0.5 : 0.65) && thick > kVolume;
+        split.separation > 1.5 && split.step > (pass == 0 ? 0.5 : 0.65) && thick > volume_share;
     if (!(two_populations || drowned) ||
         near.size() < std::max<std::size_t>(20, points.size() / 12))
       break;

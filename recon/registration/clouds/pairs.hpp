@@ -17,7 +17,7 @@ struct Pair {
 struct NoDisplacement {
   Eigen::Vector3d operator()(const Eigen::Vector3d&) const { return Eigen::Vector3d::Zero(); }
 };
-inline constexpr NoDisplacement kNoDisplacement;
+inline constexpr NoDisplacement no_displacement;
 
 /// Partners in both directions at one placement. A displacement bends the moved source: a smooth
 /// field over the target's frame, target unit lengths.

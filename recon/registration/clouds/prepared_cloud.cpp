@@ -15,7 +15,7 @@
 namespace orbitfuse::registration {
 namespace {
 
-constexpr std::size_t kFewest = 20;
+constexpr std::size_t fewest_points_of_cloud = 20;
 
 double percentile(std::vector<double> values, double share) {
   const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
@@ -45,7 +45,7 @@ Similarity3d unit_frame(const Points& points) {
 
 /// Normals and their trust from the scatter of the nearest neighbours.
 void estimate_normals(PreparedCloud& cloud) {
-  constexpr std::size_t k = PreparedCloud::kNeighbours + 1;  // and the point itself
+  constexpr std::size_t k = PreparedCloud::neighbour_count + 1;  // and the point itself
   const KdTree tree(cloud.points);
   const std::size_t n = cloud.points.size();
   cloud.normals.resize(n);
@@ -63,7 +63,7 @@ void estimate_normals(PreparedCloud& cloud) {
     for (std::size_t j = 0, slot = 0; j < found; ++j) {
       const Eigen::Vector3d d = cloud.points[index[j]] - mean;
       scatter += d * d.transpose();
-      if (index[j] != i && slot < PreparedCloud::kNeighbours) {
+      if (index[j] != i && slot < PreparedCloud::neighbour_count) {
         cloud.neighbours[i][slot++] = static_cast<std::int32_t>(index[j]);
       }
     }
@@ -146,7 +146,7 @@ Result<PreparedCloud> prepare(const PointCloud& cloud, const RegistrationOptions
                 "registration needs a cloud that fills space: use views from more sides");
   };
   const auto too_few = [&](std::size_t count, const char* kind) {
-    return unusable(fmt::format("{} {} points, at least {} are needed", count, kind, kFewest));
+    return unusable(fmt::format("{} {} points, at least {} are needed", count, kind, fewest_points_of_cloud));
   };
   PreparedCloud prepared;
   Points points;
@@ -154,7 +154,7 @@ Result<PreparedCloud> prepare(const PointCloud& cloud, const RegistrationOptions
     if (p.allFinite()) points.push_back(p);
   }
   prepared.dropped_not_finite = cloud.size() - points.size();
-  if (points.size() < kFewest) return too_few(points.size(), "finite");
+  if (points.size() < fewest_points_of_cloud) return too_few(points.size(), "finite");
 
   // Coordinates near the origin first; a large offset would eat their digits.
   Similarity3d from_origin;
@@ -163,11 +163,11 @@ Result<PreparedCloud> prepare(const PointCloud& cloud, const RegistrationOptions
   const Similarity3d rough = unit_frame(points);
   for (auto& p : points) p = rough * p;
   // Nine points of ten lie within 1.
-  constexpr double kFar = 8;
+  constexpr double far_bound = 8;
   prepared.dropped_outliers =
-      std::erase_if(points, [](const Eigen::Vector3d& p) { return p.norm() > kFar; });
+      std::erase_if(points, [](const Eigen::Vector3d& p) { return p.norm() > far_bound; });
   points = thinned_to(points, 4 * options.points);
-  if (points.size() < kFewest) return too_few(points.size(), "distinct");
+  if (points.size() < fewest_points_of_cloud) return too_few(points.size(), "distinct");
   const std::size_t before = points.size();
   if (options.filter_outliers) points = without_outliers(points);
   prepared.dropped_outliers += before - points.size();
@@ -175,7 +175,7 @@ Result<PreparedCloud> prepare(const PointCloud& cloud, const RegistrationOptions
   const Similarity3d fine = unit_frame(points);
   for (auto& p : points) p = fine * p;
   prepared.points = thinned_to(points, options.points);
-  if (prepared.points.size() < kFewest) return too_few(prepared.points.size(), "distinct");
+  if (prepared.points.size() < fewest_points_of_cloud) return too_few(prepared.points.size(), "distinct");
   if (const std::string flat = flatness(prepared.points); !flat.empty()) return unusable(flat);
   prepared.unit_from_cloud = fine * rough * from_origin;
   estimate_normals(prepared);

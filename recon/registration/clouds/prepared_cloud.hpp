@@ -14,7 +14,7 @@ namespace orbitfuse::registration {
 /// A cloud as the search uses it: finite points only, outliers dropped, centred and scaled to a
 /// robust radius of 1 (unit_from_cloud), evenly thinned, with normals.
 struct PreparedCloud {
-  static constexpr std::size_t kNeighbours = 12;
+  static constexpr std::size_t neighbour_count = 12;
 
   Similarity3d unit_from_cloud;
   Points points;
@@ -22,7 +22,7 @@ struct PreparedCloud {
   /// 0..1, of the normal: the root of its neighbourhood's planarity. Planarity itself would leave
   /// warped surfaces with too few points to average over, none would let outliers pull.
   std::vector<double> trust;
-  std::vector<std::array<std::int32_t, kNeighbours>> neighbours;  ///< -1 where there are fewer
+  std::vector<std::array<std::int32_t, neighbour_count>> neighbours;  ///< -1 where there are fewer
   NearestGrid nearest_table;
   std::size_t dropped_not_finite = 0, dropped_outliers = 0;
 

@@ -38,7 +38,7 @@ Equations equations_at(const PreparedCloud& source, const PreparedCloud& target,
                        bool exact) {
   Equations equations;
   equations.distances.reserve(source_subset.size() + target_subset.size());
-  const Pairs pairs(source, target, placement, pair_bound, exact, kNoDisplacement);
+  const Pairs pairs(source, target, placement, pair_bound, exact, no_displacement);
   Pair pair;
   for (const int i : source_subset) {
     if (pairs.forward(static_cast<std::size_t>(i), pair)) add(equations, pair, plane_bound);

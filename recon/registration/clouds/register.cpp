@@ -17,8 +17,20 @@ namespace orbitfuse {
 namespace registration {
 namespace {
 
+constexpr int all_points = 1 << 30;
+
+/// A disturbed start lies within 2 degrees and percent: bounds begin not much wider than they end.
+constexpr RefineOptions restart_refinement{
+    .start_bound = 0.12, .end_bound = 0.06, .iterations = 6, .polish = 4};
+/// A given start lies within several degrees and percent.
+constexpr RefineOptions given_start_refinement{
+    .start_bound = 0.2, .end_bound = 0.06, .iterations = 10, .polish = 4};
+/// The answer's, from a start that is already refined.
+constexpr RefineOptions last_refinement{
+    .start_bound = 0.10, .end_bound = 0.06, .iterations = 5, .polish = 20};
+
 // Right placements stay above these but for clouds that are mostly outliers.
-constexpr double kWeakScore = 0.25, kWeakEvidence = 0.04;
+constexpr double weak_score = 0.25, weak_evidence = 0.04;
 
 void widen_spread(const Similarity3d& answer, const Similarity3d& other,
                   RegistrationReport& report) {
@@ -39,7 +51,7 @@ void measure_spread(const Search& search, const Similarity3d& answer,
     for (int k = 0; k < 7; ++k) kick[k] = 0.035 * unit(random);
     const Similarity3d start = updated(without_warp, without_warp.translation, kick);
     widen_spread(answer,
-                 search.refine_with(start, 600, {0.12, 0.06, 6, 4, true, true}).target_from_source,
+                 search.refine_with(start, 600, restart_refinement).target_from_source,
                  report);
   }
 }
@@ -97,21 +109,19 @@ Similarity3d beside_warp(const Search& search, const Refined& plain, Registratio
 
 /// Last refinement on all points and everything the report says about the result.
 RegistrationReport reported(const Search& search, const Similarity3d& start) {
-  constexpr RefineOptions last{0.10, 0.06, 5, 20, true, true};
-  constexpr int kAllPoints = 1 << 30;
-  const Refined plain = search.refine_with(start, kAllPoints, last);
+  const Refined plain = search.refine_with(start, all_points, last_refinement);
   Refined best = plain;
   RegistrationReport report;
   if (search.options.estimate_warp) {
     const Similarity3d beside = beside_warp(search, plain, report);
-    if (report.warp_percent_of_diameter > 0) best = search.measured_at(beside, kAllPoints, last);
+    if (report.warp_percent_of_diameter > 0) best = search.measured_at(beside, all_points, last_refinement);
   }
   const Similarity3d target_from_unit = search.target.unit_from_cloud.inverse();
   report.target_from_source =
       target_from_unit * best.target_from_source * search.source.unit_from_cloud;
-  report.score = search.agree(best.target_from_source, kAllPoints, search.fine).score;
+  report.score = search.agree(best.target_from_source, all_points, search.fine).score;
   report.evidence =
-      search.agree(best.target_from_source, kAllPoints, search.strict(best.residual_sigma))
+      search.agree(best.target_from_source, all_points, search.strict(best.residual_sigma))
           .evidence;
   const MatchFigures matched = match_figures(search.source, search.target, best.target_from_source,
                                              2 * search.options.inlier_distance);
@@ -125,7 +135,7 @@ RegistrationReport reported(const Search& search, const Similarity3d& start) {
   measure_spread(search, best.target_from_source, plain.target_from_source, report);
   if (const std::string open = open_directions(best.hessian); !open.empty())
     doubt(report, "the shape leaves open: " + open);
-  if (report.score < kWeakScore || report.evidence < kWeakEvidence) {
+  if (report.score < weak_score || report.evidence < weak_evidence) {
     doubt(report, fmt::format("the clouds support it weakly (score {:.2f}, evidence {:.2f})",
                               report.score, report.evidence));
   }
@@ -210,7 +220,7 @@ Result<RegistrationReport> refine_registration(const PointCloud& source_cloud,
   const Search search(source, target, options);
   const Similarity3d unit_start = target.unit_from_cloud * start * source.unit_from_cloud.inverse();
   const Similarity3d closer =
-      search.refine_with(unit_start, 800, {0.2, 0.06, 10, 4, true, true}).target_from_source;
+      search.refine_with(unit_start, 800, given_start_refinement).target_from_source;
   RegistrationReport report = reported(search, closer);
   report.initialiser = "given start";
   report.cpu_s = cpu_seconds() - started;

@@ -42,12 +42,18 @@ Candidates grid_candidates(const PreparedCloud& source, const PreparedCloud& tar
     }
   }
   constexpr Round rounds[] = {
-      {60, 3, 0.6, 0.4, 240}, {120, 4, 0.4, 0.25, 60}, {250, 5, 0.25, 0.15, 0}};
+      {.points = 60, .iterations = 3, .start_bound = 0.6, .end_bound = 0.4, .keep = 240},
+      {.points = 120, .iterations = 4, .start_bound = 0.4, .end_bound = 0.25, .keep = 60},
+      {.points = 250, .iterations = 5, .start_bound = 0.25, .end_bound = 0.15, .keep = 0}};
   for (const Round& round : rounds) {
     const auto source_subset = strided_subset(source.points.size(), round.points);
     const auto target_subset = strided_subset(target.points.size(), round.points);
-    const RefineOptions coarse{
-        round.start_bound, round.end_bound, round.iterations, 0, false, false};
+    const RefineOptions coarse{.start_bound = round.start_bound,
+                               .end_bound = round.end_bound,
+                               .iterations = round.iterations,
+                               .polish = 0,
+                               .exact_partners = false,
+                               .adapt_bound = false};
     const ScoreBounds bounds{round.end_bound, round.end_bound};
     for (Candidate& candidate : candidates) {
       candidate.target_from_source =

@@ -15,7 +15,7 @@ struct Side {
 /// `from` moved into the frame of `to`; lengths in the units of `to`.
 Side one_side(const PreparedCloud& from, const PreparedCloud& to, const std::vector<int>& subset,
               const Similarity3d& to_from, const ScoreBounds& bounds, double unit) {
-  constexpr double kAbove = 0.7;  // height over distance: beside an edge or a cut says nothing
+  constexpr double steep_share = 0.7;  // height over distance: beside an edge or a cut says nothing
   const double pair2 = unit * unit * bounds.pair * bounds.pair, plane = unit * bounds.plane;
   const double reach2 = bounds.reach * bounds.reach * unit * unit;
   const Eigen::Matrix3d rotation = to_from.rotation.toRotationMatrix();
@@ -30,7 +30,7 @@ Side one_side(const PreparedCloud& from, const PreparedCloud& to, const std::vec
     const Eigen::Vector3d d = y - to.points[partner];
     const double d2 = d.squaredNorm(), height = std::abs(to.normals[partner].dot(d)),
                  off = height / plane;
-    if (d2 < reach2 && off > 1 && height * height > kAbove * kAbove * d2) {
+    if (d2 < reach2 && off > 1 && height * height > steep_share * steep_share * d2) {
       side.against += std::min(off - 1, 1.0) * (1 - d2 / reach2);
     }
     if (d2 >= pair2) continue;
@@ -54,7 +54,7 @@ Agreement agreement(const PreparedCloud& source, const PreparedCloud& target,
                     const std::vector<int>& source_subset, const std::vector<int>& target_subset,
                     const Similarity3d& target_from_source, const ScoreBounds& bounds) {
   // A contradicted point weighs ten agreeing ones: overlap alone must not outvote it.
-  constexpr double kAgainst = 10;
+  constexpr double against_weight = 10;
   const Side forward = one_side(source, target, source_subset, target_from_source, bounds, 1);
   const Side backward = one_side(target, source, target_subset, target_from_source.inverse(),
                                  bounds, 1 / target_from_source.scale);
@@ -62,7 +62,7 @@ Agreement agreement(const PreparedCloud& source, const PreparedCloud& target,
   result.score = std::sqrt(forward.agree * backward.agree);
   if (!(result.score > 0)) return {};
   const auto borne_out = [&](const Side& side) {
-    return side.agree / (side.agree + kAgainst * side.against);
+    return side.agree / (side.agree + against_weight * side.against);
   };
   result.evidence = result.score * std::sqrt(borne_out(forward) * borne_out(backward));
   return result;

@@ -62,12 +62,23 @@ Agreement Search::agree(const Similarity3d& placement, int points,
 
 namespace {
 
-constexpr int kAllPoints = 1 << 30;
+constexpr int all_points = 1 << 30;
+
+/// Candidates begin far off, and only need to be told apart: a table cell's error and a steady
+/// bound do.
+constexpr RefineOptions brief_refinement{.start_bound = 0.25, .end_bound = 0.12, .iterations = 6,
+                                         .polish = 0, .exact_partners = false,
+                                         .adapt_bound = false};
+/// Of the few that are left, ranked by what they end at.
+constexpr RefineOptions full_refinement{
+    .start_bound = 0.15, .end_bound = 0.06, .iterations = 8, .polish = 6, .settled = 2e-4};
+/// From a quarter turn away: wider than brief, since the turned cloud overlaps only in part.
+constexpr RefineOptions turned_refinement{.start_bound = 0.35, .end_bound = 0.2, .iterations = 5,
+                                          .polish = 0, .exact_partners = false,
+                                          .adapt_bound = false};
 
 /// Coarse scores for all, a short refinement for the best, full refinement for the best of those.
 Candidates narrowed(const Search& search, Candidates candidates) {
-  constexpr RefineOptions brief_refinement{0.25, 0.12, 6, 0, false, false};
-  constexpr RefineOptions full_refinement{0.15, 0.06, 8, 6, true, true, 2e-4};
   for (Candidate& c : candidates)
     c.score = search.agree(c.target_from_source, 200, {0.2, 0.2, 0}).score;
   candidates = best_distinct(std::move(candidates), 30);
@@ -90,10 +101,10 @@ Candidates narrowed(const Search& search, Candidates candidates) {
     if (c.residual_sigma > 0) sigma = std::min(sigma, c.residual_sigma);
   }
   for (Candidate& c : candidates)
-    c.score = search.agree(c.target_from_source, kAllPoints, search.strict(sigma)).evidence;
+    c.score = search.agree(c.target_from_source, all_points, search.strict(sigma)).evidence;
   candidates = best_distinct(std::move(candidates), 6);
   for (Candidate& c : candidates)
-    c.agreement = search.agree(c.target_from_source, kAllPoints, search.fine).score;
+    c.agreement = search.agree(c.target_from_source, all_points, search.fine).score;
   return candidates;
 }
 
@@ -118,7 +129,7 @@ Candidates turned(const Search& search, const Candidate& best) {
         turn.translation = mean - turn.rotation * mean + shift * axes.col(2);
         const Similarity3d start = best.target_from_source * turn;
         all.push_back(
-            {search.refine_with(start, 150, {0.35, 0.2, 5, 0, false, false}).target_from_source, 0,
+            {search.refine_with(start, 150, turned_refinement).target_from_source, 0,
              0, best.origin + ", turned", 0, false});
       }
     }
@@ -134,21 +145,21 @@ Candidates with_turns(const Search& search, Candidates ranked) {
 }
 
 bool decisive(const Candidates& ranked, const RegistrationOptions& options) {
-  constexpr double kBorneOut = 0.45, kRival = 0.7;
+  constexpr double borne_out = 0.45, rival_share = 0.7;
   if (ranked.empty() || ranked[0].agreement < options.decisive_score) return false;
-  if (ranked[0].score < kBorneOut * ranked[0].agreement) return false;
-  return ranked.size() < 2 || ranked[1].score < kRival * ranked[0].score;
+  if (ranked[0].score < borne_out * ranked[0].agreement) return false;
+  return ranked.size() < 2 || ranked[1].score < rival_share * ranked[0].score;
 }
 
 /// Candidates from descriptors, the likeliest ratio of sizes first: most pairs need no other.
 Candidates feature_candidates(const Search& search) {
-  constexpr double kRadius = 0.35;
+  constexpr double neighbourhood_radius = 0.35;
   const FeaturePoints source = feature_points(search.source, 1000);
   const FeaturePoints target = feature_points(search.target, 1000);
-  const Descriptors target_descriptors = describe(target, kRadius);
+  const Descriptors target_descriptors = describe(target, neighbourhood_radius);
   const auto at_scale = [&](double scale) -> Candidates {
     if (scale < search.options.min_scale || scale > search.options.max_scale) return {};
-    const auto matches = mutual_matches(describe(source, kRadius / scale), target_descriptors, 500);
+    const auto matches = mutual_matches(describe(source, neighbourhood_radius / scale), target_descriptors, 500);
     return consensus_candidates(source, target, matches, scale, 40);
   };
   Candidates all = narrowed(search, at_scale(1));

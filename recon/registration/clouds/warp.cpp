@@ -52,12 +52,12 @@ struct Equations {
 /// One cell's share: rows 0-23 its corners' displacements, 24-31 (u, y).
 using Block = Eigen::Matrix<double, 32, 32>;
 
-void scatter(const Block& block, const std::array<int, WarpGrid::kCorners>& corners,
+void scatter(const Block& block, const std::array<int, WarpGrid::cell_corners>& corners,
              Equations& equations) {
-  for (Index a = 0; a < WarpGrid::kCorners; ++a) {
+  for (Index a = 0; a < WarpGrid::cell_corners; ++a) {
     const Index to = 3 * corners[static_cast<std::size_t>(a)];
     equations.mixed.middleRows<3>(to) += block.block<3, 8>(3 * a, 24);
-    for (Index b = 0; b < WarpGrid::kCorners; ++b) {
+    for (Index b = 0; b < WarpGrid::cell_corners; ++b) {
       equations.nodes.block<3, 3>(to, 3 * corners[static_cast<std::size_t>(b)]) +=
           block.block<3, 3>(3 * a, 3 * b);
     }
@@ -80,7 +80,7 @@ Equations equations_at(const PreparedCloud& source, const PreparedCloud& target,
     const double w = pair.trust * tukey(pair.residual, plane_bound);
     if (w <= 0) return;
     Eigen::Matrix<double, 32, 1> row;
-    for (Index k = 0; k < WarpGrid::kCorners; ++k)
+    for (Index k = 0; k < WarpGrid::cell_corners; ++k)
       row.segment<3>(3 * k) = place.weights[static_cast<std::size_t>(k)] * pair.normal;
     row.segment<7>(24) = plane_jacobian(pair.lever, pair.normal);
     row[31] = pair.residual - pair.normal.dot(grid.displacement(place));
@@ -190,7 +190,7 @@ std::pair<double, double> likeliest_amplitude(const Displacements& displacements
 
 Points paired_points(const PreparedCloud& source, const PreparedCloud& target,
                      const Similarity3d& placement, double bound) {
-  const Pairs pairs(source, target, placement, bound, true, kNoDisplacement);
+  const Pairs pairs(source, target, placement, bound, true, no_displacement);
   Points points;
   Pair pair;
   for (std::size_t i = 0; i < source.points.size(); ++i) {
@@ -203,10 +203,10 @@ Points paired_points(const PreparedCloud& source, const PreparedCloud& target,
 
 Unwarped refine_beside_warp(const PreparedCloud& source, const PreparedCloud& target,
                             const Refined& start, const WarpOptions& options) {
-  constexpr double kSpacing = 1.2;  // of the length: finer gains nothing and costs its sixth power
-  constexpr int kFewestPoints = 8;
-  constexpr std::size_t kMostNodes = 120;  // objects have about 60; bounds the time for others
-  constexpr int kAmplitudeRounds = 3;      // then it stays, or the updates would not settle
+  constexpr double node_spacing = 1.2;  // of the length: finer gains nothing and costs its sixth power
+  constexpr int fewest_points = 8;
+  constexpr std::size_t most_nodes = 120;  // objects have about 60; bounds the time for others
+  constexpr int amplitude_rounds = 3;      // then it stays, or the updates would not settle
   Unwarped result;
   result.target_from_source = start.target_from_source;
   const auto without = [&result](WarpOutcome outcome) {
@@ -215,9 +215,9 @@ Unwarped refine_beside_warp(const PreparedCloud& source, const PreparedCloud& ta
     return result;
   };
   WarpGrid grid(paired_points(source, target, start.target_from_source, options.pair_bound),
-                kSpacing * options.length, kFewestPoints, kMostNodes);
+                node_spacing * options.length, fewest_points, most_nodes);
   if (grid.nodes().empty()) return without(WarpOutcome::too_little);
-  const Prior prior(grid.nodes(), grid.spacing() / kSpacing);
+  const Prior prior(grid.nodes(), grid.spacing() / node_spacing);
   Similarity3d placement = start.target_from_source;
   double sigma = start.residual_sigma;
   for (int round = 0; round < options.rounds; ++round) {
@@ -228,7 +228,7 @@ Unwarped refine_beside_warp(const PreparedCloud& source, const PreparedCloud& ta
       return without(round == 0 ? WarpOutcome::too_little : WarpOutcome::diverged);
     const Displacements displacements(equations, sigma, prior);
     if (round == 0 && !displacements.any()) return without(WarpOutcome::none);
-    if (round < kAmplitudeRounds) {
+    if (round < amplitude_rounds) {
       std::tie(result.amplitude, result.gain) =
           likeliest_amplitude(displacements, options.max_amplitude);
       if (result.gain < options.min_gain) return without(WarpOutcome::none);

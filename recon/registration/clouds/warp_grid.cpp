@@ -50,8 +50,8 @@ void WarpGrid::build(const Points& points, int fewest_points) {
         const bool enough = cell >= fewest_points;
         cell = enough ? static_cast<int>(cells_.size()) : -1;
         if (!enough) continue;
-        std::array<int, kCorners>& corners = cells_.emplace_back();
-        for (int k = 0; k < kCorners; ++k) {
+        std::array<int, cell_corners>& corners = cells_.emplace_back();
+        for (int k = 0; k < cell_corners; ++k) {
           const Eigen::Array3i at = c + corner_offset(k);
           int& node = node_at[static_cast<std::size_t>(flat(at, corner_count))];
           if (node < 0) {
@@ -72,7 +72,7 @@ WarpGrid::Place WarpGrid::place(const Eigen::Vector3d& x) const {
   const Eigen::Array3i c = u.cast<int>().min(count_ - 1);
   place.cell = cell_at_[static_cast<std::size_t>(flat(c, count_))];
   const Eigen::Array3d f = u - c.cast<double>();
-  for (int k = 0; k < kCorners; ++k) {
+  for (int k = 0; k < cell_corners; ++k) {
     const Eigen::Array3i o = corner_offset(k);
     place.weights[static_cast<std::size_t>(k)] =
         (o[0] ? f[0] : 1 - f[0]) * (o[1] ? f[1] : 1 - f[1]) * (o[2] ? f[2] : 1 - f[2]);
@@ -84,7 +84,7 @@ Eigen::Vector3d WarpGrid::displacement(const Place& place) const {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   if (place.cell < 0) return sum;
   const auto& nodes = corners(place.cell);
-  for (std::size_t k = 0; k < kCorners; ++k)
+  for (std::size_t k = 0; k < cell_corners; ++k)
     sum += place.weights[k] * displacements_[static_cast<std::size_t>(nodes[k])];
   return sum;
 }

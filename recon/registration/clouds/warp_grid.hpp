@@ -13,10 +13,10 @@ namespace orbitfuse::registration {
 /// enough points have corners: elsewhere there is no displacement, and nothing to solve for.
 class WarpGrid {
  public:
-  static constexpr int kCorners = 8;
+  static constexpr int cell_corners = 8;
   struct Place {
     int cell = -1;  ///< -1: outside
-    std::array<double, kCorners> weights;
+    std::array<double, cell_corners> weights;
   };
 
   /// The spacing grows until there are no more than `most_nodes` corners.
@@ -24,7 +24,7 @@ class WarpGrid {
 
   Place place(const Eigen::Vector3d& x) const;
   /// Corners of a cell, in the order of Place::weights: indices of nodes.
-  const std::array<int, kCorners>& corners(int cell) const {
+  const std::array<int, cell_corners>& corners(int cell) const {
     return cells_[static_cast<std::size_t>(cell)];
   }
   std::size_t cell_count() const { return cells_.size(); }
@@ -42,7 +42,7 @@ class WarpGrid {
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   Eigen::Array3i count_ = Eigen::Array3i::Zero();  ///< cells a side
   std::vector<int> cell_at_;                       ///< -1 where there are too few points
-  std::vector<std::array<int, kCorners>> cells_;
+  std::vector<std::array<int, cell_corners>> cells_;
   Points nodes_, displacements_;
 };
 

@@ -46,16 +46,16 @@ Result<SimilarityRefinement> refine_similarity(const SceneRenderer& visible,
   Similarity3d current = start;
   for (const RenderRound& round : rounds) {
     ORBITFUSE_ASSIGN(const SimilarityRound seen,
-                     look(visible, images, thermal, current, round, progress));
+                     match_scene(visible, images, thermal, current, round, progress));
     if (seen.patches.size() < fewest_patches) break;
     current = agreed_similarity(seen.patches, current.inverse()).inverse();
   }
   // Both judged alike: the same last round, without a search of its own.
   const RenderRound judge{256, 3, 4, 10};
   ORBITFUSE_ASSIGN(const SimilarityRound before,
-                   look(visible, images, thermal, visible_from_thermal, judge, progress));
+                   match_scene(visible, images, thermal, visible_from_thermal, judge, progress));
   ORBITFUSE_ASSIGN(const SimilarityRound after,
-                   look(visible, images, thermal, current, judge, progress));
+                   match_scene(visible, images, thermal, current, judge, progress));
   result.agreement_before = before.agreement;
   result.agreement_after = after.agreement;
   result.matches_before = before.matches(visible_from_thermal.inverse());
@@ -71,16 +71,16 @@ Result<double> similarity_support(const SceneRenderer& visible, const std::vecto
                                   const std::vector<PosedView>& thermal,
                                   const Similarity3d& visible_from_thermal,
                                   const Progress& progress) {
-  constexpr int kWidth = 160, kReach = 16;
-  constexpr std::size_t kMostViews = 8;
+  constexpr int render_width_px = 160, reach_px = 16;
+  constexpr std::size_t most_views = 8;
   ORBITFUSE_TRY(one_image_each(images, thermal));
   if (thermal.empty()) return 0.0;
-  const std::size_t count = std::min(kMostViews, thermal.size());
+  const std::size_t count = std::min(most_views, thermal.size());
   double sum = 0;
   for (std::size_t k = 0; k < count; ++k) {
     ORBITFUSE_TRY(progress.check("register"));
     const PosedView& view = thermal[k * thermal.size() / count];
-    const int width = std::min(kWidth, view.camera.width);
+    const int width = std::min(render_width_px, view.camera.width);
     const Camera camera =
         view.camera.scaled_to(width, std::max(1, view.camera.height * width / view.camera.width))
             .without_distortion();
@@ -90,7 +90,7 @@ Result<double> similarity_support(const SceneRenderer& visible, const std::vecto
     cv::resize(images[k * thermal.size() / count], reduced, {camera.width, camera.height}, 0, 0,
                cv::INTER_AREA);
     const WholeMatch match =
-        match_whole(rendered_edges(seen), orientation_field(reduced, 1.0), kReach);
+        match_whole(rendered_edges(seen), orientation_field(reduced, 1.0), reach_px);
     sum += std::max(0.0, match.correlation);
   }
   return sum / static_cast<double>(count);

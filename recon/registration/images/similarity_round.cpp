@@ -95,7 +95,7 @@ int SimilarityRound::matches(const Similarity3d& thermal_from_visible) const {
   return near;
 }
 
-Result<SimilarityRound> look(const SceneRenderer& visible, const std::vector<cv::Mat>& images,
+Result<SimilarityRound> match_scene(const SceneRenderer& visible, const std::vector<cv::Mat>& images,
                              const std::vector<PosedView>& thermal,
                              const Similarity3d& visible_from_thermal,
                              const RenderRound& round, const Progress& progress) {

@@ -30,7 +30,7 @@ struct SimilarityRound {
 inline constexpr std::size_t fewest_patches = 30;
 
 /// Errors: the renderer's, cancelled.
-Result<SimilarityRound> look(const SceneRenderer& visible, const std::vector<cv::Mat>& images,
+Result<SimilarityRound> match_scene(const SceneRenderer& visible, const std::vector<cv::Mat>& images,
                              const std::vector<PosedView>& thermal,
                              const Similarity3d& visible_from_thermal, const RenderRound& round,
                              const Progress& progress);

@@ -41,7 +41,7 @@ struct Evidence {
 
 /// Moves by one round; false where the images show too little.
 Result<bool> step(const Evidence& seen, const RenderRound& round, Climber& climber) {
-  ORBITFUSE_ASSIGN(SimilarityRound found, look(seen.visible, seen.images, seen.thermal,
+  ORBITFUSE_ASSIGN(SimilarityRound found, match_scene(seen.visible, seen.images, seen.thermal,
                                                climber.visible_from_thermal, round, seen.progress));
   if (found.patches.size() < fewest_patches) {
     climber.support = 0;
