@@ -22,6 +22,7 @@
 #include <thread>
 #include <vector>
 
+#include "app/recording/open_cameras.hpp"
 #include "app/recording/recording.hpp"
 #include "bench/capture/manifest_check.hpp"
 #include "bench/capture/paced_video.hpp"
@@ -50,6 +51,7 @@ int record(const fs::path& folder, bool resume, std::uint32_t seed) {
   std::signal(SIGINT, [](int) { interrupted = true; });
   aravis::AravisOptions thermal;
   thermal.camera = "127.0.0.1";
+  thermal.profiles = recording::shipped_profiles();
   v4l2::V4l2Options visible;
   std::vector<std::unique_ptr<FrameSource>> sources;
   sources.push_back(std::make_unique<aravis::AravisSource>(thermal));
