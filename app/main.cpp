@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <iostream>
@@ -152,12 +153,17 @@ int run(const std::vector<const char*>& words) {
 }  // namespace orbitfuse
 
 int main(int argc, char** argv) {
+  int code = orbitfuse::terminal::exit_internal;
   try {
-    return orbitfuse::run(orbitfuse::words_of(argc, argv));
+    code = orbitfuse::run(orbitfuse::words_of(argc, argv));
   } catch (const std::exception& bug) {
     std::fprintf(stderr, "internal error: %s; please report it with the command line\n", bug.what());
   } catch (...) {
     std::fputs("internal error; please report it with the command line\n", stderr);
   }
-  return orbitfuse::terminal::exit_internal;
+  // Everything is on disk by now. Exit handlers of camera libraries would wait for a camera that is
+  // gone, and race with the thread that still closes its connection.
+  std::cout.flush();
+  std::fflush(nullptr);
+  std::_Exit(code);
 }
