@@ -59,7 +59,7 @@ std::vector<fs::path> files_of(const fs::path& folder) {
   return files;
 }
 
-/// As the recorder would store it: BGR, counts, or centikelvin of a radiometric JPEG.
+/// As the recorder would store it: BGR, counts, or counts of temperature of a radiometric JPEG.
 cv::Mat frame_of(const fs::path& file, Modality modality) {
   if (modality == Modality::visible) {
     const Result<cv::Mat> image = read_visible(file);
@@ -70,7 +70,7 @@ cv::Mat frame_of(const fs::path& file, Modality modality) {
   if (thermal->kind != ThermalFile::Kind::radiometric_jpeg) return thermal->image;
   const ImportOptions options;
   const auto converted = ThermalDecoder(options).convert(*thermal, file.string());
-  return converted ? converted->centikelvin : cv::Mat();
+  return converted ? converted->counts : cv::Mat();
 }
 
 /// Blurred at the size at which it is measured, and rounded as a camera would.

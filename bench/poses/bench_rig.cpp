@@ -22,9 +22,9 @@
 #include "tests/support/orbit_scenes.hpp"
 #include "core/formats/colmap_model.hpp"
 #include "core/session/session.hpp"
+#include "recon/alignment/luminance.hpp"
 #include "recon/assembly/field_renderer.hpp"
 #include "recon/nerf/nerf.hpp"
-#include "recon/poses/sfm/proxy_images.hpp"
 #include "recon/registration/similarity_search.hpp"
 
 namespace {

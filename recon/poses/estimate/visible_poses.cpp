@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "recon/poses/estimate/session_poses.hpp"
-#include "recon/poses/sfm/visible_ladder.hpp"
+#include "recon/poses/estimate/visible_ladder.hpp"
 
 namespace orbitfuse {
 

@@ -7,7 +7,7 @@ namespace orbitfuse {
 
 /// Structure from motion of thermal views, step by step: orbit-limited pairs with the mapper's
 /// default, then relaxed settings, exhaustive pairs last. Each model goes through bundle adjustment
-/// and the gates; the first that passes holds. (Visible views: visible_ladder.hpp.)
+/// and the gates; the first that passes holds. (Visible views: estimate/visible_ladder.hpp.)
 /// The ladder of a failure is in `steps` as well as in the error's message.
 /// Errors: input, unavailable (no COLMAP), quality (no rung held), cancelled.
 Result<ModalityPoses> structure_from_motion(const Session& session,

@@ -33,9 +33,11 @@ TEST(Capture, HelpNamesEveryDriver) {
 TEST(Inspect, EachCameraAndSizeIsListed) {
   const test::TempFolder temp;
   std::filesystem::create_directories(temp.path() / "in");
-  for (const auto& [file, width] : {std::pair{"a.png", 40}, {"b.png", 40}, {"c.png", 64}}) {
-    ASSERT_TRUE(write_png(temp.path() / "in" / file, cv::Mat(30, width, CV_8UC3, cv::Scalar(9, 80, 7))));
-  }
+  // Of other contents each: a copy is imported once.
+  int green = 80;
+  for (const auto& [file, width] : {std::pair{"a.png", 40}, {"b.png", 40}, {"c.png", 64}})
+    ASSERT_TRUE(write_png(temp.path() / "in" / file,
+                          cv::Mat(30, width, CV_8UC3, cv::Scalar(9, green++, 7))));
   const std::string session = temp.path() / "s";
   const Outcome imported = orbitfuse_program({"import", session, "--visible", temp.path() / "in"});
   ASSERT_EQ(imported.code, 0) << imported.err;
@@ -287,8 +289,8 @@ TEST(Capture, MistakesHaveARemedyAndLeaveNothing) {
       {{"--driver", tiny, "--guide", "key"}, 2, "--guide key: replayed and synthetic frames don't wait for a key"},
       {{"--driver", tiny, "--guide", "off", "--spacing-deg", "60"}, 2, "--spacing-deg: given with --guide off"},
       {{"--driver", tiny, "--visible", tiny, "--thermal", tiny}, 2, "leave it out: --visible and --thermal"},
-      {{"--visible", "", "--thermal", tiny}, 2, "--visible: empty"},
-      {{"--visible", tiny, "--page", ""}, 2, "--page: empty"},
+      {{"--visible", "", "--thermal", tiny}, 2, "--visible: given without a name"},
+      {{"--visible", tiny, "--page", ""}, 2, "--page: given without a name"},
       {{"--visible", "stills:.,existing=yes,existing=no"}, 2, "existing is given twice"},
       {{"--driver", tiny, "--token", "12345678"}, 2, "--token: given without --page"},
   };

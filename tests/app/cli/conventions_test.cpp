@@ -90,7 +90,7 @@ TEST(Cli, ConfigMistakesNameFileLineAndKey) {
   EXPECT_EQ(orbitfuse_program({"run", "x", "--config", "/none.toml"}).code, 3);
   const Outcome range = orbitfuse_program({"run", "x", "--set", "render.views=-3"});
   EXPECT_EQ(range.code, 2);
-  EXPECT_THAT(range.err, HasSubstr("render.views: -3; must be"));
+  EXPECT_THAT(range.err, HasSubstr("render.views: -3; choose 1 to 10000"));
 }
 
 TEST(Cli, ShippedConfigHoldsTheBuiltInDefaults) {

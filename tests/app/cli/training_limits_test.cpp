@@ -36,7 +36,7 @@ TEST(TrainingLimits, GoToTheFieldsNamedOnly) {
   EXPECT_EQ(config.train_visible.options.target_psnr, 0);
 
   config.train_visible.options.holdout_every = 0;
-  const Status unmeasured = apply({"", 27}, {Modality::visible}, config);
+  const Status unmeasured = apply({std::nullopt, 27}, {Modality::visible}, config);
   ASSERT_FALSE(unmeasured);
   EXPECT_EQ(unmeasured.error().where, "train.visible.target_psnr");
   EXPECT_NE(unmeasured.error().remedy.find("train.visible.holdout_every"), std::string::npos);

@@ -109,7 +109,7 @@ TEST(SimilaritySearch, BadInputIsNamed) {
                                       options, {});
   ASSERT_FALSE(turn);
   EXPECT_EQ(turn.error().kind, ErrorKind::usage);
-  EXPECT_EQ(turn.error().where, "turn_deg");
+  EXPECT_EQ(turn.error().where, "similarity_search.turn_deg");
   const SceneRenderer fails = [](const Camera&, const Rigid3d&) -> Result<SceneRender> {
     return fail(ErrorKind::input, "field", "broken", "train again");
   };

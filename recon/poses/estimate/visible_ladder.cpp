@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/sfm/visible_ladder.hpp"
+#include "recon/poses/estimate/visible_ladder.hpp"
 
 #include <fmt/format.h>
 
