@@ -213,6 +213,16 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
                      seen.agree ? "they agree" : "they differ")});
     switch (verdict(seen)) {
       case MoveDecision::both:
+        // Temperatures moved it to where form settles too, but form knew it better before: two
+        // opinions that agree on the place and not on which is the better one.
+        if (seen.form_there < seen.form_before &&
+            !same_place(orbit, view.view.cam_from_world, form.view.cam_from_world))
+          view.verdict = {
+              Confidence::doubtful, DoubtReason::temperatures_elsewhere,
+              fmt::format("the other views' temperatures place it {:.1f} deg away, where the visible "
+                          "scene supports it less: {:.2f} of the usual support, {:.2f} before",
+                          apart_deg(orbit, view.view.cam_from_world, form.view.cam_from_world),
+                          seen.form_there, seen.form_before)};
         view.view = form.view;
         ++check.moved;
         break;
