@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "core/formats/colmap_records.hpp"
+#include "core/formats/append_bytes.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse::colmap {
@@ -133,13 +134,6 @@ Result<std::vector<PointRecord>> read_points(const std::filesystem::path& file) 
   return points;
 }
 
-template <class T>
-void put(std::string& out, T value) {
-  std::array<char, sizeof(T)> raw;
-  std::memcpy(raw.data(), &value, sizeof value);
-  out.append(raw.data(), raw.size());
-}
-
 }  // namespace
 
 Result<Records> read_binary(const std::filesystem::path& folder) {
@@ -152,39 +146,39 @@ Result<Records> read_binary(const std::filesystem::path& folder) {
 
 Status write_binary(const std::filesystem::path& folder, const Records& records) {
   std::string cameras, images, points;
-  put<std::uint64_t>(cameras, records.cameras.size());
+  append_bytes<std::uint64_t>(cameras, records.cameras.size());
   for (const CameraRecord& c : records.cameras) {
-    put(cameras, c.id);
-    put<std::int32_t>(cameras, c.model);
-    put(cameras, c.width);
-    put(cameras, c.height);
-    for (double p : c.parameters) put(cameras, p);
+    append_bytes(cameras, c.id);
+    append_bytes<std::int32_t>(cameras, c.model);
+    append_bytes(cameras, c.width);
+    append_bytes(cameras, c.height);
+    for (double p : c.parameters) append_bytes(cameras, p);
   }
-  put<std::uint64_t>(images, records.images.size());
+  append_bytes<std::uint64_t>(images, records.images.size());
   for (const ImageRecord& image : records.images) {
-    put(images, image.id);
+    append_bytes(images, image.id);
     const auto& q = image.cam_from_world.rotation;
-    for (double v : {q.w(), q.x(), q.y(), q.z()}) put(images, v);
-    for (int k = 0; k < 3; ++k) put(images, image.cam_from_world.translation[k]);
-    put(images, image.camera);
+    for (double v : {q.w(), q.x(), q.y(), q.z()}) append_bytes(images, v);
+    for (int k = 0; k < 3; ++k) append_bytes(images, image.cam_from_world.translation[k]);
+    append_bytes(images, image.camera);
     images.append(image.name.c_str(), image.name.size() + 1);
-    put<std::uint64_t>(images, image.pixels.size());
+    append_bytes<std::uint64_t>(images, image.pixels.size());
     for (std::size_t k = 0; k < image.pixels.size(); ++k) {
-      put(images, image.pixels[k].x());
-      put(images, image.pixels[k].y());
-      put(images, image.points[k]);
+      append_bytes(images, image.pixels[k].x());
+      append_bytes(images, image.pixels[k].y());
+      append_bytes(images, image.points[k]);
     }
   }
-  put<std::uint64_t>(points, records.points.size());
+  append_bytes<std::uint64_t>(points, records.points.size());
   for (const PointRecord& point : records.points) {
-    put(points, point.id);
-    for (int k = 0; k < 3; ++k) put(points, point.position[k]);
-    for (std::uint8_t c : point.rgb) put(points, c);
-    put(points, point.error);
-    put<std::uint64_t>(points, point.track.size());
+    append_bytes(points, point.id);
+    for (int k = 0; k < 3; ++k) append_bytes(points, point.position[k]);
+    for (std::uint8_t c : point.rgb) append_bytes(points, c);
+    append_bytes(points, point.error);
+    append_bytes<std::uint64_t>(points, point.track.size());
     for (const auto& [image, index] : point.track) {
-      put(points, image);
-      put(points, index);
+      append_bytes(points, image);
+      append_bytes(points, index);
     }
   }
   ORBITFUSE_TRY(write_file_atomic(folder / "cameras.bin", cameras));

@@ -13,6 +13,7 @@
 #include <sstream>
 #include <string_view>
 
+#include "core/formats/append_bytes.hpp"
 #include "core/formats/rigid_matrix.hpp"
 #include "core/system/file_io.hpp"
 
@@ -290,13 +291,6 @@ Result<PointCloud> read_vertices(const std::filesystem::path& path, Reader& read
   return cloud;
 }
 
-template <class T>
-void put(std::string& out, T value) {
-  std::array<char, sizeof(T)> raw;
-  std::memcpy(raw.data(), &value, sizeof value);
-  out.append(raw.data(), raw.size());
-}
-
 }  // namespace
 
 Result<PointCloud> read_ply(const std::filesystem::path& path) {
@@ -329,14 +323,14 @@ Status write_ply(const std::filesystem::path& path, const PointCloud& cloud) {
   if (temperature) out += "property float temperature\n";
   out += "end_header\n";
   for (std::size_t i = 0; i < cloud.size(); ++i) {
-    for (int k = 0; k < 3; ++k) put(out, cloud.positions[i][k]);
+    for (int k = 0; k < 3; ++k) append_bytes(out, cloud.positions[i][k]);
     if (normals) {
-      for (int k = 0; k < 3; ++k) put(out, cloud.normals[i][k]);
+      for (int k = 0; k < 3; ++k) append_bytes(out, cloud.normals[i][k]);
     }
     if (colors) {
-      for (std::uint8_t c : cloud.colors[i]) put(out, c);
+      for (std::uint8_t c : cloud.colors[i]) append_bytes(out, c);
     }
-    if (temperature) put(out, cloud.temperatures_k[i]);
+    if (temperature) append_bytes(out, cloud.temperatures_k[i]);
   }
   return write_file_atomic(path, out);
 }

@@ -14,6 +14,7 @@
 #include "core/system/parallel.hpp"
 #include "recon/alignment/edge_field.hpp"
 #include "recon/alignment/patch_matching.hpp"
+#include "recon/alignment/patch_residual.hpp"
 #include "recon/poses/rig/rig_image.hpp"
 
 namespace orbitfuse {
@@ -141,27 +142,6 @@ std::vector<double> focal_lengths(const RigOptions& options) {
   return list;
 }
 
-/// A point in the photo's axes, turned; the rig's remaining turn and shift, and the lens.
-struct RigResidual {
-  PatchMatch match;
-  Camera camera;
-
-  template <class T>
-  bool operator()(const T* rig, const T* log_focal, T* residual) const {
-    const T point[3] = {T(match.point.x()), T(match.point.y()), T(match.point.z())};
-    T moved[3];
-    ceres::AngleAxisRotatePoint(rig, point, moved);
-    for (int i = 0; i < 3; ++i) moved[i] += rig[3 + i];
-    if (!(moved[2] > T(1e-6))) return false;
-    const T scale = exp(log_focal[0]);
-    const T dx = scale * T(camera.fx) * moved[0] / moved[2] + T(camera.cx) - T(match.seen.x());
-    const T dy = scale * T(camera.fy) * moved[1] / moved[2] + T(camera.cy) - T(match.seen.y());
-    residual[0] = T(match.sqrt_weight(0, 0)) * dx + T(match.sqrt_weight(0, 1)) * dy;
-    residual[1] = T(match.sqrt_weight(1, 0)) * dx + T(match.sqrt_weight(1, 1)) * dy;
-    return true;
-  }
-};
-
 struct RigPrior {
   double shift_sigma, log_focal_mean, log_focal_sigma;
 
@@ -220,8 +200,8 @@ void solve(const RoundResult& round, const RigOptions& options, double depth, Ri
     for (const auto& matches : round.matches)
       for (const PatchMatch& match : matches)
         problem.AddResidualBlock(
-            new ceres::AutoDiffCostFunction<RigResidual, 2, 6, 1>(
-                new RigResidual{match, round.camera}),
+            new ceres::AutoDiffCostFunction<PatchResidual, 2, 6, 1>(
+                new PatchResidual{match, round.camera}),
             new ceres::ScaledLoss(new ceres::CauchyLoss(scale_px), match.score,
                                   ceres::TAKE_OWNERSHIP),
             correction.data(), &log_focal);
@@ -250,7 +230,7 @@ void judge(const RoundResult& round, const std::array<double, 6>& correction, do
     std::vector<double> distances;
     for (const PatchMatch& match : round.matches[at(i)]) {
       double r[2];
-      if (!RigResidual{match, round.camera}(correction.data(), &log_focal, r)) continue;
+      if (!PatchResidual{match, round.camera}(correction.data(), &log_focal, r)) continue;
       if (const double d = std::hypot(r[0], r[1]); d < 2) distances.push_back(d);
     }
     fit.matches = static_cast<int>(distances.size());
