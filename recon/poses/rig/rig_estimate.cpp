@@ -15,6 +15,7 @@
 #include "recon/alignment/edge_field.hpp"
 #include "recon/alignment/patch_matching.hpp"
 #include "recon/alignment/patch_residual.hpp"
+#include "recon/alignment/render_alignment.hpp"
 #include "recon/poses/rig/rig_image.hpp"
 
 namespace orbitfuse {
@@ -135,10 +136,8 @@ std::vector<double> focal_lengths(const RigOptions& options) {
       list.push_back(f);
     return list;
   }
-  const int reach =
-      static_cast<int>(std::ceil(2 * options.focal_relative_sigma / std::log(step)));
-  for (int i = -reach; i <= reach; ++i)
-    list.push_back(options.thermal_lens.fx * std::pow(step, i));
+  const int reach = static_cast<int>(std::ceil(2 * options.focal_relative_sigma / std::log(step)));
+  for (int i = -reach; i <= reach; ++i) list.push_back(options.thermal_lens.fx * std::pow(step, i));
   return list;
 }
 
@@ -153,10 +152,6 @@ struct RigPrior {
   }
 };
 
-struct Round {
-  int width_px, search_px, patch_search_px, patch_radius_px;
-};
-
 struct RoundResult {
   std::vector<std::vector<PatchMatch>> matches;
   std::vector<cv::Mat> edges, fields;
@@ -164,7 +159,7 @@ struct RoundResult {
 };
 
 RoundResult match_round(const std::vector<RigView>& views, const RigEstimate& rig,
-                        const Round& round) {
+                        const RenderRound& round) {
   RoundResult result;
   const int width = std::min(round.width_px, rig.thermal.width);
   result.camera = thermal_camera(rig.thermal, rig.thermal.fx, width).without_distortion();
@@ -191,26 +186,28 @@ RoundResult match_round(const std::vector<RigView>& views, const RigEstimate& ri
 /// The rig and the lens from all pairs' patches, the robust scale lowered step by step.
 void solve(const RoundResult& round, const RigOptions& options, double depth, RigEstimate& rig,
            std::array<double, 6>& correction, double& log_focal) {
-  correction = {0, 0, 0, rig.thermal_from_visible.translation.x(),
-                rig.thermal_from_visible.translation.y(), rig.thermal_from_visible.translation.z()};
+  correction = {0,
+                0,
+                0,
+                rig.thermal_from_visible.translation.x(),
+                rig.thermal_from_visible.translation.y(),
+                rig.thermal_from_visible.translation.z()};
   log_focal = 0;
   const bool searched = options.focal_relative_sigma > options.search_from;
   for (const double scale_px : {8.0, 4.0, 2.0, 1.0}) {
     ceres::Problem problem;
     for (const auto& matches : round.matches)
       for (const PatchMatch& match : matches)
-        problem.AddResidualBlock(
-            new ceres::AutoDiffCostFunction<PatchResidual, 2, 6, 1>(
-                new PatchResidual{match, round.camera}),
-            new ceres::ScaledLoss(new ceres::CauchyLoss(scale_px), match.score,
-                                  ceres::TAKE_OWNERSHIP),
-            correction.data(), &log_focal);
+        problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PatchResidual, 2, 6, 1>(
+                                     new PatchResidual{match, round.camera}),
+                                 new ceres::ScaledLoss(new ceres::CauchyLoss(scale_px), match.score,
+                                                       ceres::TAKE_OWNERSHIP),
+                                 correction.data(), &log_focal);
     const double mean = searched ? 0 : std::log(options.thermal_lens.fx / rig.thermal.fx);
-    problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<RigPrior, 4, 6, 1>(new RigPrior{
-            options.baseline_sigma * depth, mean,
-            std::max(1e-4, searched ? 0.1 : options.focal_relative_sigma)}),
-        nullptr, correction.data(), &log_focal);
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<RigPrior, 4, 6, 1>(new RigPrior{
+                                 options.baseline_sigma * depth, mean,
+                                 std::max(1e-4, searched ? 0.1 : options.focal_relative_sigma)}),
+                             nullptr, correction.data(), &log_focal);
     ceres::Solver::Options solver;
     solver.linear_solver_type = ceres::DENSE_QR;
     solver.num_threads = 1;  // more sum in any order
@@ -269,11 +266,11 @@ std::string RigEstimate::words() const {
     matches += fit.matches;
   }
   return fmt::format(
-      "{} pairs, turned by {:.1f} deg, focal length {:.0f} px; edges agree {:.3f}, in shuffled pairs "
+      "{} pairs, turned by {:.1f} deg, focal length {:.0f} px; edges agree {:.3f}, in shuffled "
+      "pairs "
       "{:.3f} ({:.1f} standard errors apart), {} patches at {:.2f} px of {}",
-      pairs.size(),
-      Eigen::AngleAxisd(thermal_from_visible.rotation).angle() * 180 / EIGEN_PI, thermal.fx,
-      agreement, control, decisiveness, matches, median(residuals), judged_width_px);
+      pairs.size(), Eigen::AngleAxisd(thermal_from_visible.rotation).angle() * 180 / EIGEN_PI,
+      thermal.fx, agreement, control, decisiveness, matches, median(residuals), judged_width_px);
 }
 
 Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOptions& options,
@@ -282,7 +279,8 @@ Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOpt
     return fail(ErrorKind::quality, "poses.rig", found,
                 "pair only images that were shot at once by cameras fixed to each other");
   };
-  if (views.size() < 4) return refused(fmt::format("{} pairs, at least 4 are needed", views.size()));
+  if (views.size() < 4)
+    return refused(fmt::format("{} pairs, at least 4 are needed", views.size()));
   const ShiftSearch search(views, options);
   Place best;
   double wrong = -1;
@@ -297,8 +295,9 @@ Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOpt
   rig.thermal_from_visible.rotation = best.thermal_from_visible;
   const double depth = median_depth(views);
   RoundResult matched;
-  for (const Round& round : {Round{160, 8, 8, 18}, Round{160, 5, 7, 14}, Round{320, 6, 8, 16},
-                             Round{320, 4, 6, 12}, Round{320, 3, 5, 10}}) {
+  constexpr RenderRound rounds[] = {
+      {160, 8, 8, 18}, {160, 5, 7, 14}, {320, 6, 8, 16}, {320, 4, 6, 12}, {320, 3, 5, 10}};
+  for (const RenderRound& round : rounds) {
     ORBITFUSE_TRY(progress.check("poses.rig"));
     matched = match_round(views, rig, round);
     std::size_t patches = 0;
@@ -311,16 +310,17 @@ Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOpt
     solve(matched, options, depth, rig, correction, log_focal);
     judge(matched, correction, log_focal, rig);
     const Eigen::Vector3d turn(correction[0], correction[1], correction[2]);
-    const Eigen::Quaterniond more(
-        turn.norm() > 1e-12 ? Eigen::AngleAxisd(turn.norm(), turn.normalized())
-                            : Eigen::AngleAxisd::Identity());
+    const Eigen::Quaterniond more(turn.norm() > 1e-12
+                                      ? Eigen::AngleAxisd(turn.norm(), turn.normalized())
+                                      : Eigen::AngleAxisd::Identity());
     rig.thermal_from_visible.rotation = (more * rig.thermal_from_visible.rotation).normalized();
     rig.thermal_from_visible.translation = {correction[3], correction[4], correction[5]};
     rig.thermal.fx = rig.thermal.fy = rig.thermal.fx * std::exp(log_focal);
   }
   if (rig.decisiveness < options.min_decisiveness || best.score <= wrong)
-    return refused(fmt::format("{}; correlation of all edges {:.3f}, of shuffled pairs {:.3f} at best",
-                               rig.words(), best.score, wrong));
+    return refused(
+        fmt::format("{}; correlation of all edges {:.3f}, of shuffled pairs {:.3f} at best",
+                    rig.words(), best.score, wrong));
   return rig;
 }
 
