@@ -35,7 +35,8 @@ void set_up_logging(int verbosity) {
 }
 
 /// Defaults, then the options of the run whose folder is given, then the file, then --set.
-Status resolve_config(const cli::CommonOptions& common, const CLI::App& verb, stages::RunConfig& config) {
+Status resolve_config(const cli::CommonOptions& common, const CLI::App& verb,
+                      stages::RunConfig& config) {
   config::Settings settings = config.settings();
   const CLI::Option* session = verb.get_option_no_throw("session");
   std::optional<std::uint64_t> seed;
@@ -63,10 +64,11 @@ int finish(const std::string& verb, Console& console, const Status& status, nloh
   if (!status) console.error(status.error());
   body["ok"] = status.has_value();
   body["exit_code"] = code;
-  if (!status) body["error"] = {{"where", status.error().where},
-                                {"found", status.error().found},
-                                {"remedy", status.error().remedy},
-                                {"message", status.error().message()}};
+  if (!status)
+    body["error"] = {{"where", status.error().where},
+                     {"found", status.error().found},
+                     {"remedy", status.error().remedy},
+                     {"message", status.error().message()}};
   console.result(verb, std::move(body));
   const Status output = console.output_status();
   if (!status || output) return code;
@@ -86,7 +88,9 @@ int finish_printing() {
 Status check_no_empty_values(const CLI::App& verb) {
   for (const CLI::Option* option : verb.get_options()) {
     const auto& values = option->results();
-    if (option->get_expected_max() == 0 || std::find(values.begin(), values.end(), "") == values.end()) continue;
+    if (option->get_expected_max() == 0 ||
+        std::find(values.begin(), values.end(), "") == values.end())
+      continue;
     return fail(ErrorKind::usage, option->get_name(), "empty", "give a value, or leave it out");
   }
   return {};
@@ -110,12 +114,14 @@ int run(const std::vector<const char*>& words) {
   } catch (const CLI::ParseError& error) {
     const bool unknown_verb =
         argc > 1 && argv[1][0] != '-' &&
-        std::none_of(line.actions.begin(), line.actions.end(),
-                     [&](const auto& action) { return std::strcmp(action.first->name, argv[1]) == 0; });
+        std::none_of(line.actions.begin(), line.actions.end(), [&](const auto& action) {
+          return std::strcmp(action.first->name, argv[1]) == 0;
+        });
     if (dynamic_cast<const CLI::Success*>(&error) != nullptr && !unknown_verb)  // --help, --version
       return line.app.exit(error) == 0 ? finish_printing() : exit_internal;
     ConsoleOptions options = detect_terminal();
-    for (int i = 1; i < argc; ++i) options.json = options.json || std::strcmp(argv[i], "--json") == 0;
+    for (int i = 1; i < argc; ++i)
+      options.json = options.json || std::strcmp(argv[i], "--json") == 0;
     Console console(options);
     return finish(argc > 1 ? argv[1] : "", console,
                   tl::unexpected(cli::usage_error(line, error, argc, argv)), {});
@@ -157,7 +163,8 @@ int main(int argc, char** argv) {
   try {
     code = orbitfuse::run(orbitfuse::words_of(argc, argv));
   } catch (const std::exception& bug) {
-    std::fprintf(stderr, "internal error: %s; please report it with the command line\n", bug.what());
+    std::fprintf(stderr, "internal error: %s; please report it with the command line\n",
+                 bug.what());
   } catch (...) {
     std::fputs("internal error; please report it with the command line\n", stderr);
   }

@@ -25,16 +25,16 @@ struct Frame {
   std::int64_t device_time_ns = 0;  ///< device clock; 0 = unknown
   std::string encoded, extension;   ///< extension with its dot, e.g. ".jpg"
   cv::Mat pixels;
-  double kelvin_per_count = 0.01;   ///< of 16-bit thermal pixels; coarser where the scene is hotter
-                                    ///< than 382 C (core/temperature.hpp)
-  cv::Mat original;                 ///< 16-bit counts behind an 8-bit thermal picture (RawCounts)
+  double kelvin_per_count = 0.01;  ///< of 16-bit thermal pixels; coarser where the scene is hotter
+                                   ///< than 382 C (core/temperature.hpp)
+  cv::Mat original;                ///< 16-bit counts behind an 8-bit thermal picture (RawCounts)
   std::optional<Station> station;
   bool tracking = false;
-  bool thermal_is_gray = false;     ///< 8-bit thermal: no temperatures
+  bool thermal_is_gray = false;  ///< 8-bit thermal: no temperatures
   std::vector<std::string> flags;
   std::optional<Rigid3d> cam_from_world;
   std::optional<Camera> camera;
-  std::string source;               ///< original file name, if there was one
+  std::string source;  ///< original file name, if there was one
 
   void flag(FrameFlag with) { flags.emplace_back(name(with)); }
 };
@@ -50,9 +50,9 @@ struct Delivery {
     end,       ///< the stream is over (replay, synthetic)
   };
   Kind kind = Kind::timeout;
-  Frame frame;          ///< kind frame; of rejected and lost ones only the id
-  EventKind event{};    ///< kind event
-  std::string reason;   ///< of an event its name
+  Frame frame;         ///< kind frame; of rejected and lost ones only the id
+  EventKind event{};   ///< kind event
+  std::string reason;  ///< of an event its name
   std::string detail;
 };
 

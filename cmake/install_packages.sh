@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Installs what OrbitFuse builds and runs with, from Debian 12 packages; does nothing when all are here.
+# Installs what OrbitFuse builds and runs with, and the packages named as arguments, from Debian 12;
+# does nothing when all are here.
 set -euo pipefail
 
 packages=(
@@ -11,6 +12,7 @@ packages=(
   libaravis-dev libusb-1.0-0-dev libopencv-contrib-dev libcpp-httplib-dev libhpdf-dev
   libgtest-dev libgmock-dev libbenchmark-dev
   colmap
+  "$@"
 )
 
 missing=()

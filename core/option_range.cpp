@@ -15,8 +15,10 @@ bool OptionRange::contains(double value) const {
 
 std::string OptionRange::words() const {
   if (std::isinf(high) && std::isinf(low)) return "any number";
-  if (std::isinf(high)) return low_included ? fmt::format("{} or more", low) : fmt::format("a number above {}", low);
-  if (std::isinf(low)) return high_included ? fmt::format("{} or less", high) : fmt::format("a number below {}", high);
+  if (std::isinf(high))
+    return low_included ? fmt::format("{} or more", low) : fmt::format("a number above {}", low);
+  if (std::isinf(low))
+    return high_included ? fmt::format("{} or less", high) : fmt::format("a number below {}", high);
   if (low_included && high_included) return fmt::format("{} to {}", low, high);
   return fmt::format("{} {}, {} {}", low_included ? "from" : "above", low,
                      high_included ? "up to" : "below", high);

@@ -34,8 +34,7 @@ using Status = Result<void>;
 
 inline tl::unexpected<Error> fail(ErrorKind kind, std::string where, std::string found,
                                   std::string remedy) {
-  return tl::unexpected<Error>(
-      Error{kind, std::move(where), std::move(found), std::move(remedy)});
+  return tl::unexpected<Error>(Error{kind, std::move(where), std::move(found), std::move(remedy)});
 }
 
 }  // namespace orbitfuse
@@ -44,15 +43,15 @@ inline tl::unexpected<Error> fail(ErrorKind kind, std::string where, std::string
 #define ORBITFUSE_CONCAT(a, b) ORBITFUSE_CONCAT_(a, b)
 
 /// Returns the error of a Status or Result from the enclosing function.
-#define ORBITFUSE_TRY(expression)                                              \
-  do {                                                                         \
-    auto&& status_ = (expression);                                             \
+#define ORBITFUSE_TRY(expression)                                                          \
+  do {                                                                                     \
+    auto&& status_ = (expression);                                                         \
     if (!status_) return tl::unexpected(std::forward<decltype(status_)>(status_).error()); \
   } while (false)
 
 /// ORBITFUSE_ASSIGN(auto x, make_x()): x on success, else returns the error.
-#define ORBITFUSE_ASSIGN(declaration, expression)                              \
-  auto ORBITFUSE_CONCAT(result_, __LINE__) = (expression);                     \
-  if (!ORBITFUSE_CONCAT(result_, __LINE__))                                    \
+#define ORBITFUSE_ASSIGN(declaration, expression)                                  \
+  auto ORBITFUSE_CONCAT(result_, __LINE__) = (expression);                         \
+  if (!ORBITFUSE_CONCAT(result_, __LINE__))                                        \
     return tl::unexpected(std::move(ORBITFUSE_CONCAT(result_, __LINE__)).error()); \
   declaration = *std::move(ORBITFUSE_CONCAT(result_, __LINE__))

@@ -15,11 +15,12 @@ of::Status train_and_render(const std::filesystem::path& file, int steps, const 
   of::nerf::Dataset dataset;
   for (const of::TransformsFrame& photo : photos.frames) {
     ORBITFUSE_ASSIGN(const cv::Mat bgr, of::read_visible(file.parent_path() / photo.file_path));
-    dataset.views.push_back({photo.file_path, photo.camera, photo.cam_from_world, of::nerf::rgb_of_bgr8(bgr)});
+    dataset.views.push_back(
+        {photo.file_path, photo.camera, photo.cam_from_world, of::nerf::rgb_of_bgr8(bgr)});
   }
   ORBITFUSE_ASSIGN(of::nerf::TrainOptions options, of::nerf::preset("fast-visible"));
   options.iterations = steps;  // a full run has 4000
-  options.holdout_every = 8;  // every 8th photo measures and never trains
+  options.holdout_every = 8;   // every 8th photo measures and never trains
   of::nerf::Field field;
   ORBITFUSE_ASSIGN(const auto report, of::nerf::train(dataset, options, {}, field));
   std::cout << report.brief() << "\n";

@@ -29,17 +29,26 @@ void add_common(CLI::App& app, CommonOptions& common) {
   app.add_option("--config", common.config_file, "TOML file; config/orbitfuse.toml lists all keys")
       ->group(group);
   app.add_option("--set", common.overrides, "Override one key, e.g. render.views=12; repeatable")
-      ->type_name("KEY=VALUE")->allow_extra_args(false)->group(group);
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false)
+      ->group(group);
   app.add_flag("--print-config", common.print_config, "Print the resolved configuration and stop")
       ->group(group);
-  app.add_flag("--json", common.json, "NDJSON events on stdout, the last line a result")->group(group);
+  app.add_flag("--json", common.json, "NDJSON events on stdout, the last line a result")
+      ->group(group);
   app.add_flag("-v,--verbose", common.verbosity, "More messages")->group(group);
   app.add_flag("-q,--quiet", common.quiet, "Errors only")->group(group);
   app.add_option("--threads", common.threads, "Worker threads; 0 = all cores")
-      ->check(CLI::Range(0, 1024))->group(group);
-  app.add_option("--seed", common.seed, "Seed of everything random")->check(CLI::NonNegativeNumber)->capture_default_str()->group(group);
+      ->check(CLI::Range(0, 1024))
+      ->group(group);
+  app.add_option("--seed", common.seed, "Seed of everything random")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->group(group);
   app.add_option("--device", common.device, "Where to compute")
-      ->check(CLI::IsMember({"cpu", "cuda"}))->capture_default_str()->group(group);
+      ->check(CLI::IsMember({"cpu", "cuda"}))
+      ->capture_default_str()
+      ->group(group);
   app.add_flag("--force", common.force, "Run again although nothing changed")->group(group);
   app.add_flag("--resume", common.resume, "Go on where an interrupted run stopped")->group(group);
   app.add_flag("--dry-run", common.dry_run, "Say what would be done, write nothing")->group(group);
@@ -78,7 +87,9 @@ Error usage_error(const CommandLine& line, const CLI::ParseError& error, int arg
     if (!words.empty() && words.front() == verb->name) app = line.app.get_subcommand(verb->name);
     known.emplace_back(verb->name);
   }
-  Error result{ErrorKind::usage, {}, error.what(),
+  Error result{ErrorKind::usage,
+               {},
+               error.what(),
                app == &line.app ? "orbitfuse --help lists the verbs"
                                 : "orbitfuse " + app->get_name() + " --help lists the options"};
   std::replace(result.found.begin(), result.found.end(), '\n', ' ');

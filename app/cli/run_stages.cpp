@@ -17,8 +17,9 @@ using pipeline::StageStatus;
 constexpr const char* run_file = "run.json";
 
 json status_json(const StageStatus& status) {
-  json j = {{"stage", status.stage}, {"state", name(status.state)}, {"why", status.why},
-            {"wall_s", status.wall_s}, {"cpu_s", status.cpu_s}, {"metrics", status.output.metrics}};
+  json j = {{"stage", status.stage}, {"state", name(status.state)},
+            {"why", status.why},     {"wall_s", status.wall_s},
+            {"cpu_s", status.cpu_s}, {"metrics", status.output.metrics}};
   j["skips"] = json::array();
   for (const Skip& skip : status.output.skips) j["skips"].push_back(pipeline::to_json(skip));
   j["warnings"] = status.output.warnings;
@@ -30,14 +31,18 @@ void announce(terminal::Console& console, const StageStatus& s, bool dry_run) {
   const std::string brief = s.output.metrics.value("brief", std::string());
   switch (s.state) {
     case StageState::planned:
-      if (dry_run) console.info(fmt::format("{:<14} would run: {}", s.stage, s.why));
-      else console.detail(fmt::format("{:<14} starts: {}", s.stage, s.why));
+      if (dry_run)
+        console.info(fmt::format("{:<14} would run: {}", s.stage, s.why));
+      else
+        console.detail(fmt::format("{:<14} starts: {}", s.stage, s.why));
       break;
     case StageState::ran:
       console.info(fmt::format("{:<14} {:>6.1f} s  {}", s.stage, s.wall_s, brief));
       for (const Skip& skip : s.output.skips)
-        console.detail(fmt::format("{:<14}   skipped {}: {}; {}", "", skip.what, skip.why, skip.effect));
-      for (const std::string& warning : s.output.warnings) console.warning(s.stage + ": " + warning);
+        console.detail(
+            fmt::format("{:<14}   skipped {}: {}; {}", "", skip.what, skip.why, skip.effect));
+      for (const std::string& warning : s.output.warnings)
+        console.warning(s.stage + ": " + warning);
       break;
     case StageState::unchanged:
       console.info(fmt::format("{:<14} unchanged  {}", s.stage, brief));
@@ -55,7 +60,8 @@ void announce(terminal::Console& console, const StageStatus& s, bool dry_run) {
 }  // namespace
 
 void add_folders(CLI::App& app, StageFolders& folders) {
-  app.add_option("session", folders.session, "Session folder, or the --out folder of an earlier run");
+  app.add_option("session", folders.session,
+                 "Session folder, or the --out folder of an earlier run");
   app.add_option("--out", folders.out, "Folder of the results, one folder a stage")
       ->capture_default_str();
 }
@@ -70,7 +76,8 @@ Result<json> earlier_run(const std::string& folder) {
   ORBITFUSE_ASSIGN(const std::string text, read_file(record));
   json run = json::parse(text, nullptr, false);
   if (run.is_discarded())
-    return fail(ErrorKind::input, record.string(), "not JSON, or cut off", "give the session folder and --out");
+    return fail(ErrorKind::input, record.string(), "not JSON, or cut off",
+                "give the session folder and --out");
   if (!run.is_object() || !run.contains("session") || !run["session"].is_string())
     return fail(ErrorKind::input, record.string(), "no session named in it",
                 "give the session folder and --out");
@@ -89,7 +96,8 @@ bool keeps_options(ErrorKind kind) {
 
 }  // namespace
 
-Result<std::optional<std::uint64_t>> read_earlier_options(const std::string& folder, config::Settings& settings) {
+Result<std::optional<std::uint64_t>> read_earlier_options(const std::string& folder,
+                                                          config::Settings& settings) {
   ORBITFUSE_ASSIGN(const json run, earlier_run(folder));
   if (run.is_null()) return std::nullopt;
   const std::string file = (fs::path(folder) / run_file).string();
@@ -136,22 +144,26 @@ bool any_stage_finished(const fs::path& out) {
 
 }  // namespace
 
-Status run_stages(Context& context, const StageFolders& given, const std::vector<std::string>& targets,
-                  Missing missing) {
+Status run_stages(Context& context, const StageFolders& given,
+                  const std::vector<std::string>& targets, Missing missing) {
   StageFolders folders = given;
   ORBITFUSE_TRY(resolve(folders));
   ORBITFUSE_ASSIGN(stages::SessionInput input,
                    stages::open_session_input(folders.session, context.progress));
   for (const std::string& warning : input.session.warnings) context.console.warning(warning);
   const std::string session = fs::absolute(folders.session).lexically_normal().string();
-  if (const auto earlier = earlier_run(folders.out); earlier && !earlier->is_null() && (*earlier)["session"] != session)
-    context.console.warning(fmt::format("{} holds results of {}: what this run doesn't reach stays that session's; "
-                                        "give each session an --out of its own",
-                                        folders.out, (*earlier)["session"].get<std::string>()));
+  if (const auto earlier = earlier_run(folders.out);
+      earlier && !earlier->is_null() && (*earlier)["session"] != session)
+    context.console.warning(
+        fmt::format("{} holds results of {}: what this run doesn't reach stays that session's; "
+                    "give each session an --out of its own",
+                    folders.out, (*earlier)["session"].get<std::string>()));
   if (missing == Missing::leave_out && !any_stage_finished(folders.out))
-    return fail(ErrorKind::input, folders.out, "no finished stage in it",
-                "run the session first: orbitfuse run " + folders.session + " --out " + folders.out);
-  const pipeline::RunOptions options{.out = folders.out, .targets = targets,
+    return fail(
+        ErrorKind::input, folders.out, "no finished stage in it",
+        "run the session first: orbitfuse run " + folders.session + " --out " + folders.out);
+  const pipeline::RunOptions options{.out = folders.out,
+                                     .targets = targets,
                                      .force = context.common.force,
                                      .resume = context.common.resume,
                                      .dry_run = context.common.dry_run,

@@ -11,7 +11,7 @@ namespace orbitfuse::cli {
 
 /// Positional and option of every verb that runs stages.
 struct StageFolders {
-  std::string session;       ///< a session, or the --out folder of an earlier run
+  std::string session;  ///< a session, or the --out folder of an earlier run
   std::string out = "out";
 };
 
@@ -22,7 +22,8 @@ Status resolve(StageFolders& folders);
 
 /// The --out folder of an earlier run brings that run's options; returns its seed, or none when
 /// `folder` is no such folder.
-Result<std::optional<std::uint64_t>> read_earlier_options(const std::string& folder, config::Settings& settings);
+Result<std::optional<std::uint64_t>> read_earlier_options(const std::string& folder,
+                                                          config::Settings& settings);
 
 /// What the targets read that is missing or out of date.
 enum class Missing {
@@ -32,7 +33,7 @@ enum class Missing {
 
 /// Runs the targets and all they read, says how each stage fared, and fills the --json result.
 /// Empty targets: every stage.
-Status run_stages(Context& context, const StageFolders& folders, const std::vector<std::string>& targets,
-                  Missing missing = Missing::run);
+Status run_stages(Context& context, const StageFolders& folders,
+                  const std::vector<std::string>& targets, Missing missing = Missing::run);
 
 }  // namespace orbitfuse::cli

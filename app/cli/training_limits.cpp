@@ -14,11 +14,14 @@ constexpr int target_evaluations = 24;       // a target is seen within a 24th o
 }  // namespace
 
 void add_limits(CLI::App& app, TrainingLimits& limits) {
-  app.add_option("--budget", limits.budget,
-                 "Time to train each field, e.g. 60s, 2m, 1m30s; replaces the recipe's number of steps")
+  app.add_option(
+         "--budget", limits.budget,
+         "Time to train each field, e.g. 60s, 2m, 1m30s; replaces the recipe's number of steps")
       ->type_name("DURATION");
-  app.add_option("--target-psnr", limits.target_psnr, "Stop training when the held-out views reach it, in dB")
-      ->check(CLI::Range(1.0, 100.0))->type_name("DB");
+  app.add_option("--target-psnr", limits.target_psnr,
+                 "Stop training when the held-out views reach it, in dB")
+      ->check(CLI::Range(1.0, 100.0))
+      ->type_name("DB");
 }
 
 Result<double> parse_duration(const std::string& text) {
@@ -37,11 +40,13 @@ Result<double> parse_duration(const std::string& text) {
     at = next == end ? end : next + 1;
   }
   if (!valid || !(seconds > 0) || !std::isfinite(seconds))
-    return fail(ErrorKind::usage, "--budget", "'" + text + "'", "write a duration such as 60s, 2m or 1m30s");
+    return fail(ErrorKind::usage, "--budget", "'" + text + "'",
+                "write a duration such as 60s, 2m or 1m30s");
   return seconds;
 }
 
-Status apply(const TrainingLimits& limits, const std::vector<Modality>& fields, stages::RunConfig& config) {
+Status apply(const TrainingLimits& limits, const std::vector<Modality>& fields,
+             stages::RunConfig& config) {
   double budget_s = 0;
   if (limits.budget) {
     ORBITFUSE_ASSIGN(budget_s, parse_duration(*limits.budget));

@@ -12,15 +12,17 @@ namespace orbitfuse::cli {
 /// How long fields are trained, as options of a verb.
 struct TrainingLimits {
   std::optional<std::string> budget;  ///< a duration
-  double target_psnr = 0;  ///< dB; 0 = none
+  double target_psnr = 0;             ///< dB; 0 = none
 };
 
 void add_limits(CLI::App& app, TrainingLimits& limits);
 
 /// Puts the limits into the recipes of the fields named ("visible", "thermal").
-Status apply(const TrainingLimits& limits, const std::vector<Modality>& fields, stages::RunConfig& config);
+Status apply(const TrainingLimits& limits, const std::vector<Modality>& fields,
+             stages::RunConfig& config);
 
-/// Seconds of "90", "60s", "2m", "1.5h", "1m30s"; a usage error for anything else, or nothing at all.
+/// Seconds of "90", "60s", "2m", "1.5h", "1m30s"; a usage error for anything else, or nothing at
+/// all.
 Result<double> parse_duration(const std::string& text);
 
 }  // namespace orbitfuse::cli

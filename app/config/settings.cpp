@@ -49,12 +49,14 @@ std::string toml_text(const json& value) {
   return whole ? text + ".0" : text;
 }
 
-/// The value of a dotted key, nullptr where there is none; an error where a table on the way is none.
+/// The value of a dotted key, nullptr where there is none; an error where a table on the way is
+/// none.
 Result<const json*> value_at(const json& values, const std::string& key, const std::string& where) {
   const json* node = &values;
   for (std::size_t begin = 0, end = 0; end != std::string::npos; begin = end + 1) {
     if (!node->is_object())
-      return fail(ErrorKind::usage, where, fmt::format("{} = {}", key.substr(0, begin - 1), node->dump()),
+      return fail(ErrorKind::usage, where,
+                  fmt::format("{} = {}", key.substr(0, begin - 1), node->dump()),
                   "it must be a table of settings");
     end = key.find('.', begin);
     const auto next = node->find(key.substr(begin, end - begin));
@@ -86,15 +88,15 @@ std::string nearest(const std::string& word, const std::vector<std::string>& kno
 }
 
 Status Settings::set(const std::string& key, const json& value, const std::string& where) {
-  const auto it = std::find_if(list_.begin(), list_.end(),
-                               [&](const Setting& s) { return s.key == key; });
+  const auto it =
+      std::find_if(list_.begin(), list_.end(), [&](const Setting& s) { return s.key == key; });
   if (it == list_.end()) {
     std::vector<std::string> known;
     for (const Setting& s : list_) known.push_back(s.key);
     const std::string guess = nearest(key, known);
-    return fail(ErrorKind::usage, where, "unknown key '" + key + "'",
-                guess.empty() ? "config/orbitfuse.toml lists every key"
-                              : "did you mean '" + guess + "'?");
+    return fail(
+        ErrorKind::usage, where, "unknown key '" + key + "'",
+        guess.empty() ? "config/orbitfuse.toml lists every key" : "did you mean '" + guess + "'?");
   }
   if (!it->set(value))
     return fail(ErrorKind::usage, where, fmt::format("{} = {}", key, value.dump()),
@@ -110,7 +112,8 @@ Status Settings::read_toml(const std::filesystem::path& file) {
     flatten(table, "", entries);
   } catch (const toml::parse_error& e) {
     return fail(ErrorKind::usage, fmt::format("{}:{}", file.string(), e.source().begin.line),
-                std::string(e.description()), "write it as TOML; config/orbitfuse.toml is an example");
+                std::string(e.description()),
+                "write it as TOML; config/orbitfuse.toml is an example");
   }
   // A preset sets many fields, which the other keys then change.
   std::stable_partition(entries.begin(), entries.end(),
@@ -121,7 +124,8 @@ Status Settings::read_toml(const std::filesystem::path& file) {
 }
 
 Status Settings::read_json(const json& values, const std::string& where) {
-  for (const bool presets : {true, false})  // a preset sets many fields, which the other keys then change
+  for (const bool presets :
+       {true, false})  // a preset sets many fields, which the other keys then change
     for (const Setting& s : list_) {
       if (s.key.ends_with(".preset") != presets) continue;
       ORBITFUSE_ASSIGN(const json* value, value_at(values, s.key, where));
@@ -136,7 +140,8 @@ Status Settings::apply(const std::string& assignment) {
     return fail(ErrorKind::usage, "--set " + assignment, "no '='", "write --set key=value");
   const std::string key = assignment.substr(0, equals), text = assignment.substr(equals + 1);
   const std::string where = "--set " + assignment;
-  if (!is_utf8(assignment)) return fail(ErrorKind::usage, where, "it is not UTF-8", "write it as UTF-8");
+  if (!is_utf8(assignment))
+    return fail(ErrorKind::usage, where, "it is not UTF-8", "write it as UTF-8");
   json value = json::parse(text, nullptr, false);
   if (value.is_discarded()) value = text;
   return set(key, value, where);

@@ -17,12 +17,13 @@ namespace orbitfuse::config {
 
 /// One key of the configuration, bound to a field of an options struct.
 struct Setting {
-  std::string key;  ///< e.g. "train.visible.budget_s"
-  std::string doc;  ///< one line; becomes the comment in the TOML reference
-  std::string type; ///< "integer", "number", "true or false", "text", or the allowed words
+  std::string key;   ///< e.g. "train.visible.budget_s"
+  std::string doc;   ///< one line; becomes the comment in the TOML reference
+  std::string type;  ///< "integer", "number", "true or false", "text", or the allowed words
   std::function<nlohmann::json()> get;
   std::function<bool(const nlohmann::json&)> set;  ///< false: not of the type
-  /// Whether to_toml() has it; absent: always. A preset's fields are there where they differ from it.
+  /// Whether to_toml() has it; absent: always. A preset's fields are there where they differ from
+  /// it.
   std::function<bool()> listed = {};
 };
 
@@ -62,25 +63,37 @@ class Settings {
 
   template <class T>
   static std::string type_name() {
-    if constexpr (std::is_same_v<T, bool>) return "true or false";
-    else if constexpr (std::is_integral_v<T>) return "integer";
-    else if constexpr (std::is_floating_point_v<T>) return "number";
-    else if constexpr (std::is_same_v<T, std::string>) return "text";
-    else return "list";
+    if constexpr (std::is_same_v<T, bool>)
+      return "true or false";
+    else if constexpr (std::is_integral_v<T>)
+      return "integer";
+    else if constexpr (std::is_floating_point_v<T>)
+      return "number";
+    else if constexpr (std::is_same_v<T, std::string>)
+      return "text";
+    else
+      return "list";
   }
   template <class T>
   static nlohmann::json value_of(const T& field) {
     // 0.1f must read 0.1, not 0.10000000149.
-    if constexpr (std::is_same_v<T, float>) return std::stod(fmt::format("{}", field));
-    else return field;
+    if constexpr (std::is_same_v<T, float>)
+      return std::stod(fmt::format("{}", field));
+    else
+      return field;
   }
   template <class T>
   static bool assign(T& field, const nlohmann::json& j) {
-    if constexpr (std::is_same_v<T, bool>) { if (!j.is_boolean()) return false; }
-    else if constexpr (std::is_integral_v<T>) { if (!j.is_number_integer()) return false; }
-    else if constexpr (std::is_floating_point_v<T>) { if (!j.is_number()) return false; }
-    else if constexpr (std::is_same_v<T, std::string>) { if (!j.is_string()) return false; }
-    else if (!j.is_array()) return false;
+    if constexpr (std::is_same_v<T, bool>) {
+      if (!j.is_boolean()) return false;
+    } else if constexpr (std::is_integral_v<T>) {
+      if (!j.is_number_integer()) return false;
+    } else if constexpr (std::is_floating_point_v<T>) {
+      if (!j.is_number()) return false;
+    } else if constexpr (std::is_same_v<T, std::string>) {
+      if (!j.is_string()) return false;
+    } else if (!j.is_array())
+      return false;
     try {
       field = j.get<T>();
     } catch (const nlohmann::json::exception&) {

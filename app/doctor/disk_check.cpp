@@ -17,8 +17,8 @@ Finding check_disk(const std::filesystem::path& folder, bool dry_run) {
   std::error_code ec;
   const auto space = fs::space(folder, ec);
   if (ec)
-    return {"disk", folder.string() + ": " + ec.message(), "choose a folder that exists with --folder", true,
-            ErrorKind::input};
+    return {"disk", folder.string() + ": " + ec.message(),
+            "choose a folder that exists with --folder", true, ErrorKind::input};
   if (!fs::is_directory(folder, ec))
     return {"disk", folder.string() + ": is not a folder", "choose a folder with --folder", true,
             ErrorKind::input};
@@ -27,9 +27,12 @@ Finding check_disk(const std::filesystem::path& folder, bool dry_run) {
   const char* other_folder = "choose a folder you can write to";
   if (dry_run) {
     if (::access(folder.c_str(), W_OK) != 0)
-      return {"disk", folder.string() + ": " + std::strerror(errno), other_folder, true, ErrorKind::device};
-    return {"disk", fmt::format("{:.1f} GiB free, its speed not measured: --dry-run writes nothing", free_gib),
-            more_space, true, ErrorKind::device};
+      return {"disk", folder.string() + ": " + std::strerror(errno), other_folder, true,
+              ErrorKind::device};
+    return {
+        "disk",
+        fmt::format("{:.1f} GiB free, its speed not measured: --dry-run writes nothing", free_gib),
+        more_space, true, ErrorKind::device};
   }
   constexpr int writes = 20;
   const std::string block(1 << 20, 'x');
@@ -41,7 +44,8 @@ Finding check_disk(const std::filesystem::path& folder, bool dry_run) {
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   fs::remove(probe, ec);
   if (!status)
-    return {"disk", status.error().where + ": " + status.error().found, other_folder, true, ErrorKind::device};
+    return {"disk", status.error().where + ": " + status.error().found, other_folder, true,
+            ErrorKind::device};
   const double mib_s = writes / seconds;
   std::string remedy = more_space;
   if (remedy.empty() && mib_s < 10) remedy = "record to a faster disk: cameras bring 20 MiB/s";

@@ -107,8 +107,9 @@ Finding check_camera(const Machine& machine, const CameraLink& camera) {
   if (mtu > 0) finding.found += fmt::format(" over an MTU of {}", mtu);
   if (!in_subnet) {
     finding.found += ", no interface in its subnet";
-    finding.remedy = "it can't be reached: give an interface an address in the camera's subnet (ip addr add "
-                     "ADDRESS/MASK dev INTERFACE), or the camera one in yours";
+    finding.remedy =
+        "it can't be reached: give an interface an address in the camera's subnet (ip addr add "
+        "ADDRESS/MASK dev INTERFACE), or the camera one in yours";
   } else if (camera.controlled) {
     finding.found += ", controlled by a program";
     finding.remedy = "close the program that has it, or it can't be recorded";
@@ -120,7 +121,8 @@ Finding check_camera(const Machine& machine, const CameraLink& camera) {
   } else if (!camera.answers) {
     finding.found += ", does not answer";
     finding.remedy =
-        "it was seen, but questions to it (UDP port 3956) get no answer: check the firewall, that no "
+        "it was seen, but questions to it (UDP port 3956) get no answer: check the firewall, that "
+        "no "
         "other device has its address, and power-cycle it";
   }
   return finding;

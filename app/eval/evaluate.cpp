@@ -14,8 +14,8 @@
 #include "app/stages/artifacts.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
-#include "recon/assembly/training_data.hpp"
 #include "core/temperature.hpp"
+#include "recon/assembly/training_data.hpp"
 #include "recon/nerf/nerf.hpp"
 
 namespace orbitfuse::eval {
@@ -45,9 +45,13 @@ std::vector<PosePair> match(const Session& session, const Reconstruction& model,
 }
 
 json to_json(const PoseError& e, std::size_t total) {
-  return {{"posed", e.views}, {"total", total}, {"ate_percent", e.ate_percent},
-          {"ate_max_percent", e.ate_max_percent}, {"rotation_mean_deg", e.rotation_mean_deg},
-          {"rotation_median_deg", e.rotation_median_deg}, {"rotation_max_deg", e.rotation_max_deg}};
+  return {{"posed", e.views},
+          {"total", total},
+          {"ate_percent", e.ate_percent},
+          {"ate_max_percent", e.ate_max_percent},
+          {"rotation_mean_deg", e.rotation_mean_deg},
+          {"rotation_median_deg", e.rotation_median_deg},
+          {"rotation_max_deg", e.rotation_max_deg}};
 }
 
 /// What a finished run left, loaded as far as it is there.
@@ -107,7 +111,8 @@ Status add_registration(Run& run, const Session& session, const GroundTruth& tru
   if (!run.done("train_thermal") || !fs::exists(trained / "model")) return {};
   ORBITFUSE_ASSIGN(const Reconstruction model, stages::load_poses(trained, Modality::thermal));
   const std::vector<PosePair> refined = match(session, model, truth.views.at(Modality::thermal));
-  run.result["registration_refined"] = to_json(pose_error(refined, truth_from_thermal), thermal.size());
+  run.result["registration_refined"] =
+      to_json(pose_error(refined, truth_from_thermal), thermal.size());
   return {};
 }
 
@@ -139,11 +144,12 @@ Status compare_visible(const nerf::Field& field, const TrueTestView& view, const
 Status compare_thermal(const nerf::Field& field, const TrueTestView& view, const Camera& camera,
                        const Rigid3d& cam_from_thermal, const EvaluateOptions& options,
                        const Progress& progress, Sums& sums) {
-  ORBITFUSE_ASSIGN(nerf::RenderedView seen, nerf::render(field, camera, cam_from_thermal, {}, progress));
+  ORBITFUSE_ASSIGN(nerf::RenderedView seen,
+                   nerf::render(field, camera, cam_from_thermal, {}, progress));
   ORBITFUSE_ASSIGN(const cv::Mat truth, field_image(view.thermal, Samples::kelvin));
   seen.color.setTo(std::nanf(""), seen.opacity < options.min_opacity);
   const ThermalViewError error = thermal_view_error(seen.color, resized(truth, camera),
-                                                   kelvin_from_celsius(options.scene_above_c));
+                                                    kelvin_from_celsius(options.scene_above_c));
   if (!std::isfinite(error.mae_k)) return {};
   sums.mae_k += error.mae_k;
   sums.covered += error.covered;
@@ -165,9 +171,11 @@ Status add_test_views(Run& run, const GroundTruth& truth, const EvaluateOptions&
   Sums sums;
   for (std::size_t i = 0; i < truth.test.size(); ++i) {
     const TrueTestView& view = truth.test[i];
-    progress.report({"eval", static_cast<double>(i), static_cast<double>(truth.test.size()), -1, ""});
+    progress.report(
+        {"eval", static_cast<double>(i), static_cast<double>(truth.test.size()), -1, ""});
     const int width = std::min(options.max_width_px, view.camera.width);
-    const Camera camera = view.camera.scaled_to(width, view.camera.height * width / view.camera.width);
+    const Camera camera =
+        view.camera.scaled_to(width, view.camera.height * width / view.camera.width);
     const Rigid3d cam_from_visible = rebase(view.cam_from_world, run.truth_from_visible->inverse());
     if (!visible.empty() && !view.visible.empty())
       ORBITFUSE_TRY(compare_visible(visible, view, camera, cam_from_visible, progress, sums));

@@ -11,9 +11,9 @@
 namespace orbitfuse::eval {
 
 struct EvaluateOptions {
-  int max_width_px = 640;         ///< test views are compared at most at this width
-  double scene_above_c = 0;       ///< temperatures below are sky, not scene
-  double min_opacity = 0.5;       ///< of the thermal field, for the share of the scene it covers
+  int max_width_px = 640;    ///< test views are compared at most at this width
+  double scene_above_c = 0;  ///< temperatures below are sky, not scene
+  double min_opacity = 0.5;  ///< of the thermal field, for the share of the scene it covers
 };
 
 /// Errors of a finished run against the truth. Poses: after a similarity fit of the camera centres

@@ -9,12 +9,13 @@ namespace orbitfuse::eval {
 double psnr_db(const cv::Mat& a, const cv::Mat& b, double peak) {
   CV_Assert(a.size() == b.size() && a.type() == b.type());
   const double squared = std::pow(cv::norm(a, b, cv::NORM_L2), 2);
-  const double mse = squared / static_cast<double>(a.total() * static_cast<std::size_t>(a.channels()));
+  const double mse =
+      squared / static_cast<double>(a.total() * static_cast<std::size_t>(a.channels()));
   return mse > 0 ? 10 * std::log10(peak * peak / mse) : std::numeric_limits<double>::infinity();
 }
 
 ThermalViewError thermal_view_error(const cv::Mat& rendered_k, const cv::Mat& truth_k,
-                                   double scene_above_k) {
+                                    double scene_above_k) {
   CV_Assert(rendered_k.size() == truth_k.size());
   double absolute = 0, squared = 0, low = 1e9, high = -1e9;
   long scene = 0, covered = 0;

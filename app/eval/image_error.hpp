@@ -9,13 +9,13 @@ namespace orbitfuse::eval {
 double psnr_db(const cv::Mat& a, const cv::Mat& b, double peak);
 
 struct ThermalViewError {
-  double mae_k = 0;          ///< over pixels where both are finite and the truth is scene
-  double covered = 0;        ///< share of the scene's pixels that have a rendered temperature
-  double psnr_db = 0;        ///< over the truth's own span
+  double mae_k = 0;    ///< over pixels where both are finite and the truth is scene
+  double covered = 0;  ///< share of the scene's pixels that have a rendered temperature
+  double psnr_db = 0;  ///< over the truth's own span
 };
 
 /// Pixels of `truth_k` at or below `scene_above_k` are not scene.
 ThermalViewError thermal_view_error(const cv::Mat& rendered_k, const cv::Mat& truth_k,
-                                   double scene_above_k);
+                                    double scene_above_k);
 
 }  // namespace orbitfuse::eval

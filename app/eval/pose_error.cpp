@@ -29,17 +29,18 @@ Result<Similarity3d> truth_from_estimate(const std::vector<PosePair>& pairs) {
   }
   const Eigen::Matrix4d m = Eigen::umeyama(estimate, truth, true);
   const double scale = std::cbrt(m.topLeftCorner<3, 3>().determinant());
-  return Similarity3d{scale,
-                      Eigen::Quaterniond(Eigen::Matrix3d(m.topLeftCorner<3, 3>() / scale)).normalized(),
-                      m.topRightCorner<3, 1>()};
+  return Similarity3d{
+      scale, Eigen::Quaterniond(Eigen::Matrix3d(m.topLeftCorner<3, 3>() / scale)).normalized(),
+      m.topRightCorner<3, 1>()};
 }
 
 double extent(const std::vector<PosePair>& pairs) {
   double largest = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i)
     for (std::size_t j = 0; j < i; ++j)
-      largest = std::max(largest, (camera_center(pairs[i].cam_from_truth) -
-                                   camera_center(pairs[j].cam_from_truth)).norm());
+      largest = std::max(
+          largest,
+          (camera_center(pairs[i].cam_from_truth) - camera_center(pairs[j].cam_from_truth)).norm());
   return largest;
 }
 

@@ -17,7 +17,7 @@ struct PosePair {
 /// Errors of camera poses after a similarity has brought them into the frame of the truth.
 struct PoseError {
   int views = 0;
-  double ate_percent = 0;         ///< RMS distance of the centres, % of the extent
+  double ate_percent = 0;  ///< RMS distance of the centres, % of the extent
   double ate_max_percent = 0;
   double rotation_mean_deg = 0, rotation_median_deg = 0, rotation_max_deg = 0;
 };

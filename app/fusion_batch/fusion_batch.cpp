@@ -5,8 +5,8 @@
 
 #include <map>
 
-#include "core/system/file_io.hpp"
 #include "core/image/image_io.hpp"
+#include "core/system/file_io.hpp"
 #include "fusion/metrics/metrics.hpp"
 
 namespace orbitfuse::batch {
@@ -21,8 +21,9 @@ std::map<std::string, fs::path> files_by_stem(const fs::path& folder) {
 }
 
 /// One pair into the layout; its lines of the CSV.
-Result<std::string> fuse_one(const std::string& stem, const fs::path& visible_file, const fs::path& thermal_file,
-                             const fs::path& out, const FusionOptions& options) {
+Result<std::string> fuse_one(const std::string& stem, const fs::path& visible_file,
+                             const fs::path& thermal_file, const fs::path& out,
+                             const FusionOptions& options) {
   ORBITFUSE_ASSIGN(const cv::Mat visible, read_image(visible_file));
   ORBITFUSE_ASSIGN(cv::Mat thermal, read_thermal(thermal_file));
   ORBITFUSE_ASSIGN(const cv::Mat fused, fuse(visible, thermal, {}, options));
@@ -32,7 +33,8 @@ Result<std::string> fuse_one(const std::string& stem, const fs::path& visible_fi
   ORBITFUSE_TRY(write_png(out / "ir" / (stem + ".png"), thermal));
   ORBITFUSE_TRY(write_png(out / "fused" / (stem + ".png"), fused));
   std::string lines;
-  for (const MetricValue& v : values) lines += fmt::format("{},{},{},{}\n", stem, name(options.method), v.name, v.value);
+  for (const MetricValue& v : values)
+    lines += fmt::format("{},{},{},{}\n", stem, name(options.method), v.name, v.value);
   return lines;
 }
 
@@ -43,7 +45,8 @@ Result<cv::Mat> read_thermal(const fs::path& file) {
   return image.type() == CV_16UC1 ? read_thermal_k(file) : Result<cv::Mat>(image);
 }
 
-Result<cv::Mat> gray_of_thermal(const cv::Mat& thermal, const std::optional<TemperatureSpan>& span) {
+Result<cv::Mat> gray_of_thermal(const cv::Mat& thermal,
+                                const std::optional<TemperatureSpan>& span) {
   if (thermal.depth() != CV_32F) return thermal;
   ORBITFUSE_ASSIGN(const ThermalGray gray, thermal_gray(thermal, span));
   cv::Mat bytes;
@@ -55,7 +58,8 @@ Result<Summary> fuse_folder(const fs::path& visible, const fs::path& thermal, co
                             const FusionOptions& options, const Progress& progress) {
   for (const fs::path& folder : {visible, thermal})
     if (!fs::is_directory(folder))
-      return fail(ErrorKind::input, folder.string(), "not a folder", "give two folders, or two images");
+      return fail(ErrorKind::input, folder.string(), "not a folder",
+                  "give two folders, or two images");
   const auto thermal_files = files_by_stem(thermal);
   const auto visible_files = files_by_stem(visible);
   Summary summary;
@@ -63,7 +67,8 @@ Result<Summary> fuse_folder(const fs::path& visible, const fs::path& thermal, co
   int done = 0;
   for (const auto& [stem, file] : visible_files) {
     ORBITFUSE_TRY(progress.check("fuse"));
-    progress.report({"fuse", static_cast<double>(done++), static_cast<double>(visible_files.size()), -1, stem});
+    progress.report(
+        {"fuse", static_cast<double>(done++), static_cast<double>(visible_files.size()), -1, stem});
     const auto partner = thermal_files.find(stem);
     if (partner == thermal_files.end()) {
       summary.problems.push_back(file.string() + ": no thermal image of that name");
@@ -79,7 +84,8 @@ Result<Summary> fuse_folder(const fs::path& visible, const fs::path& thermal, co
   }
   if (summary.fused == 0)
     return fail(ErrorKind::input, visible.string(),
-                summary.problems.empty() ? "no images" : "no pair could be fused; " + summary.problems.front(),
+                summary.problems.empty() ? "no images"
+                                         : "no pair could be fused; " + summary.problems.front(),
                 "pairs need equal file names and sizes");
   ORBITFUSE_TRY(write_file_atomic(out / metrics_file, csv));
   return summary;

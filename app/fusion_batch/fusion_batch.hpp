@@ -17,8 +17,8 @@ struct Summary {
   std::vector<std::string> problems;  ///< pairs that could not be fused, and why
 };
 
-/// Thermal image of a file: one channel of 16 bits is radiometric and becomes kelvin (NaN = invalid),
-/// anything else stays as stored.
+/// Thermal image of a file: one channel of 16 bits is radiometric and becomes kelvin (NaN =
+/// invalid), anything else stays as stored.
 Result<cv::Mat> read_thermal(const std::filesystem::path& file);
 
 /// The 8-bit image in which it is fused and scored: kelvin over `span` (none: their own), anything
@@ -28,8 +28,8 @@ Result<cv::Mat> gray_of_thermal(const cv::Mat& thermal, const std::optional<Temp
 /// Fuses the images of equal stem in two folders into out/vi, out/ir and out/fused (all PNG, equal
 /// names: the aligned-pairs layout that fusion networks train on) and writes out/metrics.csv. A bad
 /// pair is told and left out. Input error when no pair could be fused.
-Result<Summary> fuse_folder(const std::filesystem::path& visible, const std::filesystem::path& thermal,
-                            const std::filesystem::path& out, const FusionOptions& options,
-                            const Progress& progress);
+Result<Summary> fuse_folder(const std::filesystem::path& visible,
+                            const std::filesystem::path& thermal, const std::filesystem::path& out,
+                            const FusionOptions& options, const Progress& progress);
 
 }  // namespace orbitfuse::batch

@@ -9,8 +9,8 @@
 #include <ctime>
 
 #include "app/pipeline/folder_lock.hpp"
-#include "core/system/file_io.hpp"
 #include "core/system/clock.hpp"
+#include "core/system/file_io.hpp"
 
 namespace orbitfuse::pipeline {
 namespace fs = std::filesystem;
@@ -40,7 +40,8 @@ Attempt read_attempt(const fs::path& file) {
 
 Status write_attempt(const fs::path& file, const Attempt& attempt) {
   return write_file_atomic(
-      file, json{{"key", attempt.key}, {"cpu_s", attempt.cpu_s}, {"wall_s", attempt.wall_s}}.dump());
+      file,
+      json{{"key", attempt.key}, {"cpu_s", attempt.cpu_s}, {"wall_s", attempt.wall_s}}.dump());
 }
 
 Status device_error(const fs::path& path, const std::error_code& ec) {
@@ -120,8 +121,8 @@ Runner::Runner(std::vector<Stage> stages, RunOptions options, Progress progress)
 }
 
 bool Runner::is_target(const std::string& stage) const {
-  return options_.targets.empty() ||
-         std::find(options_.targets.begin(), options_.targets.end(), stage) != options_.targets.end();
+  return options_.targets.empty() || std::find(options_.targets.begin(), options_.targets.end(),
+                                               stage) != options_.targets.end();
 }
 
 bool Runner::wanted(const std::string& stage) const {
@@ -136,24 +137,25 @@ Runner::Key Runner::key_of(const Stage& stage) const {
       const auto it = outputs_.find(name);
       key.inputs[name] = it == outputs_.end() ? "none" : it->second;
     }
-  key.hash = content_hash(json{{"stage", stage.name},
-                               {"version", stage.version},
-                               {"options", stage.options},
-                               {"inputs", key.inputs}}
-                              .dump());
+  key.hash = content_hash(json{
+      {"stage", stage.name},
+      {"version", stage.version},
+      {"options", stage.options},
+      {"inputs", key.inputs}}.dump());
   return key;
 }
 
 bool Runner::forced(const Stage& stage) const {
-  return options_.force && (options_.targets.empty() || std::count(options_.targets.begin(), options_.targets.end(),
-                                                                   stage.name) > 0);
+  return options_.force &&
+         (options_.targets.empty() ||
+          std::count(options_.targets.begin(), options_.targets.end(), stage.name) > 0);
 }
 
 std::optional<EarlierResult> Runner::earlier_result(const Stage& stage, const Key& key) const {
   const fs::path folder = options_.out / stage.name;
   const auto record = read_stage_record(folder);
-  if (forced(stage) || !record || record->version != stage.version || record->inputs != key.inputs ||
-      !damage(folder, *record).empty())
+  if (forced(stage) || !record || record->version != stage.version ||
+      record->inputs != key.inputs || !damage(folder, *record).empty())
     return std::nullopt;
   return EarlierResult{folder, record->options, record->output.metrics};
 }
@@ -179,8 +181,13 @@ std::string Runner::why_run(const Stage& stage, const Key& key,
 }
 
 StageContext Runner::context(fs::path folder, bool resume) const {
-  StageContext context{.out = options_.out, .folder = std::move(folder), .resume = resume,
-                       .progress = progress_, .earlier_result = {}, .finished = {}, .earlier = &statuses_};
+  StageContext context{.out = options_.out,
+                       .folder = std::move(folder),
+                       .resume = resume,
+                       .progress = progress_,
+                       .earlier_result = {},
+                       .finished = {},
+                       .earlier = &statuses_};
   for (const auto& [name, hash] : outputs_) context.finished.insert(name);
   return context;
 }
@@ -213,15 +220,17 @@ StageStatus Runner::visit(const Stage& stage) {
       const bool chained = it != statuses_.end() && it->state == StageState::blocked;
       status.state = it != statuses_.end() && it->state == StageState::absent ? StageState::absent
                                                                               : StageState::blocked;
-      status.why = chained || status.state == StageState::absent ? it->why
-                                                                 : "needs " + name + ", which failed";
+      status.why = chained || status.state == StageState::absent
+                       ? it->why
+                       : "needs " + name + ", which failed";
       return status;
     }
 
   const Key key = key_of(stage);
   const auto record = read_stage_record(options_.out / stage.name);
   if (options_.targets_only && !is_target(stage.name)) {
-    const std::string wrong = record ? damage(options_.out / stage.name, *record) : "it has not run yet";
+    const std::string wrong =
+        record ? damage(options_.out / stage.name, *record) : "it has not run yet";
     if (!wrong.empty()) {
       status.state = StageState::absent;
       status.why = wrong;
@@ -229,7 +238,9 @@ StageStatus Runner::visit(const Stage& stage) {
     }
   }
   const bool as_it_lies = options_.targets_only && !is_target(stage.name);
-  const std::string why = as_it_lies ? "" : unknown ? "a stage it reads will run" : why_run(stage, key, record);
+  const std::string why = as_it_lies ? ""
+                          : unknown  ? "a stage it reads will run"
+                                     : why_run(stage, key, record);
   if (why.empty()) {
     status.state = StageState::unchanged;
     status.output = record->output;
@@ -278,10 +289,16 @@ StageStatus Runner::execute(const Stage& stage, const Key& key, std::string why)
   status.wall_s = attempt.wall_s;
 
   const auto finish = [&]() -> Status {
-    StageRecord record{.stage = stage.name, .key = key.hash,
-                       .software_version = software_version(), .finished_utc = utc_now(),
-                       .version = stage.version, .options = stage.options, .inputs = key.inputs,
-                       .outputs = {}, .output = *result, .cpu_s = attempt.cpu_s,
+    StageRecord record{.stage = stage.name,
+                       .key = key.hash,
+                       .software_version = software_version(),
+                       .finished_utc = utc_now(),
+                       .version = stage.version,
+                       .options = stage.options,
+                       .inputs = key.inputs,
+                       .outputs = {},
+                       .output = *result,
+                       .cpu_s = attempt.cpu_s,
                        .wall_s = attempt.wall_s};
     ORBITFUSE_ASSIGN(record.outputs, list_outputs(folder));
     ORBITFUSE_TRY(write_stage_record(folder, record));

@@ -13,12 +13,12 @@
 namespace orbitfuse::pipeline {
 
 struct RunOptions {
-  std::filesystem::path out;         ///< holds one folder a stage
-  std::vector<std::string> targets = {}; ///< stages wanted, with all they read; empty = all
-  bool force = false;                ///< run the targets although they are unchanged
-  bool resume = false;               ///< go on from an interrupted attempt where its key matches
-  bool dry_run = false;              ///< say what would run, write nothing
-  bool targets_only = false;         ///< what the targets read is taken as it lies there, never run
+  std::filesystem::path out;              ///< holds one folder a stage
+  std::vector<std::string> targets = {};  ///< stages wanted, with all they read; empty = all
+  bool force = false;                     ///< run the targets although they are unchanged
+  bool resume = false;        ///< go on from an interrupted attempt where its key matches
+  bool dry_run = false;       ///< say what would run, write nothing
+  bool targets_only = false;  ///< what the targets read is taken as it lies there, never run
 };
 
 struct RunSummary {

@@ -35,11 +35,11 @@ std::string_view name(StageState state);
 struct StageStatus {
   std::string stage;
   StageState state = StageState::absent;
-  std::string why;                        ///< reason of absent, blocked and of a new run
-  std::optional<Error> error;             ///< of failed
-  StageOutput output;                     ///< of ran and unchanged
+  std::string why;             ///< reason of absent, blocked and of a new run
+  std::optional<Error> error;  ///< of failed
+  StageOutput output;          ///< of ran and unchanged
   nlohmann::json options;
-  double cpu_s = 0, wall_s = 0;           ///< of the run that made the outputs
+  double cpu_s = 0, wall_s = 0;  ///< of the run that made the outputs
   bool done() const { return state == StageState::ran || state == StageState::unchanged; }
 };
 
@@ -59,7 +59,7 @@ struct StageContext {
   /// --force. Checked when it is asked for: reading all files of a result takes time.
   std::function<std::optional<EarlierResult>()> earlier_result;
 
-  std::set<std::string> finished;  ///< stages whose outputs belong to this run
+  std::set<std::string> finished;                     ///< stages whose outputs belong to this run
   const std::vector<StageStatus>* earlier = nullptr;  ///< how the stages before fared
 
   bool has(const std::string& stage) const { return finished.count(stage) > 0; }
@@ -75,12 +75,12 @@ struct StageContext {
 
 /// One box of the data flow: reads finished stages, writes its own folder.
 struct Stage {
-  std::string name;                ///< folder under out/
-  int version = 1;                 ///< raised when the same inputs give another result
+  std::string name;                     ///< folder under out/
+  int version = 1;                      ///< raised when the same inputs give another result
   std::vector<std::string> needs = {};  ///< can't run without these
   std::vector<std::string> uses = {};   ///< read when there; their absence changes the result
-  nlohmann::json options = {};         ///< every resolved option that the result depends on
-  std::string inputs_hash = {};        ///< of what it reads from outside out/ (session frames, files)
+  nlohmann::json options = {};          ///< every resolved option that the result depends on
+  std::string inputs_hash = {};  ///< of what it reads from outside out/ (session frames, files)
   /// Runs again although nothing changed (the report describes this very run).
   bool always = false;
   /// A reason why the data give this stage nothing to do ("the session has no thermal frames").

@@ -11,12 +11,18 @@ using nlohmann::json;
 
 std::string_view name(StageState state) {
   switch (state) {
-    case StageState::ran: return "ran";
-    case StageState::unchanged: return "unchanged";
-    case StageState::absent: return "absent";
-    case StageState::blocked: return "blocked";
-    case StageState::failed: return "failed";
-    case StageState::planned: return "planned";
+    case StageState::ran:
+      return "ran";
+    case StageState::unchanged:
+      return "unchanged";
+    case StageState::absent:
+      return "absent";
+    case StageState::blocked:
+      return "blocked";
+    case StageState::failed:
+      return "failed";
+    case StageState::planned:
+      return "planned";
   }
   return "unknown";
 }
@@ -47,9 +53,7 @@ json to_json(const Error& error) {
           {"message", error.message()}};
 }
 
-std::string StageRecord::outputs_hash() const {
-  return content_hash(outputs_json(outputs).dump());
-}
+std::string StageRecord::outputs_hash() const { return content_hash(outputs_json(outputs).dump()); }
 
 json to_json(const StageRecord& r) {
   json skips = json::array();

@@ -13,7 +13,8 @@ namespace {
 
 const std::map<std::string, std::vector<std::string>> drivers{
     {"aravis", {"profile"}},
-    {"v4l2", {"exposure", "focus", "format", "kelvin-per-dn", "lock", "rate", "size", "white-balance"}},
+    {"v4l2",
+     {"exposure", "focus", "format", "kelvin-per-dn", "lock", "rate", "size", "white-balance"}},
     {"stills", {"existing", "gray"}},
     {"replay", {"speed"}},
     {"synthetic", {"size", "spacing"}}};

@@ -53,9 +53,11 @@ void PreparedSource::renumber(Delivery& delivery) {
 }
 
 void PreparedSource::drop_before(std::int64_t all_run_ns) {
-  constexpr std::size_t longest_queue = 4096;  // a source that never runs dry is not drained for ever
+  constexpr std::size_t longest_queue =
+      4096;  // a source that never runs dry is not drained for ever
   std::uint64_t dropped = 0;
-  // A rejected frame may have no time: it is stale if a stale one follows, else it counts as rejected.
+  // A rejected frame may have no time: it is stale if a stale one follows, else it counts as
+  // rejected.
   std::deque<Result<Delivery>> undecided;
   for (bool over = false; !over && undecided.size() < longest_queue;) {
     Result<Delivery> delivery = source_->next(std::chrono::milliseconds(0));
@@ -73,9 +75,9 @@ void PreparedSource::drop_before(std::int64_t all_run_ns) {
   }
   for (Result<Delivery>& delivery : undecided) waiting_.push_back(std::move(delivery));
   if (dropped == 0) return;
-  waiting_.push_front(event_delivery(
-      EventKind::stale,
-      fmt::format("{} frames from before all cameras ran were left out", dropped)));
+  waiting_.push_front(
+      event_delivery(EventKind::stale,
+                     fmt::format("{} frames from before all cameras ran were left out", dropped)));
 }
 
 void PreparedSource::stop() {

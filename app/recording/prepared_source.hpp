@@ -31,8 +31,8 @@ class PreparedSource final : public FrameSource {
   }
 
   /// Cameras start one after the other, and the first one's queue fills meanwhile. Leaves out what
-  /// lies there from between its start and `all_run_ns` (UTC, by the frames' own times) and tells it
-  /// by an event "stale"; ids count from the first frame that is kept. Before the first next().
+  /// lies there from between its start and `all_run_ns` (UTC, by the frames' own times) and tells
+  /// it by an event "stale"; ids count from the first frame that is kept. Before the first next().
   void drop_before(std::int64_t all_run_ns);
   /// The session's name for the device, its first id, and whether frames are tracking frames until
   /// the guide chooses them. Before the first next().
@@ -45,7 +45,7 @@ class PreparedSource final : public FrameSource {
   std::deque<Result<Delivery>> waiting_;  ///< delivered before what the source has next
   bool started_ = false, tracking_ = false;
   std::optional<std::string> device_id_;
-  std::int64_t started_ns_ = 0;           ///< UTC
+  std::int64_t started_ns_ = 0;  ///< UTC
   std::uint64_t first_id_ = 0;
   std::optional<std::uint64_t> source_first_id_;
 };

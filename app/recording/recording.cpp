@@ -153,7 +153,8 @@ void Recording::show(FrameSource& source, const std::atomic<bool>& over) {
     if (!delivery || delivery->kind == Delivery::Kind::end) return;
     if (delivery->kind != Delivery::Kind::frame) continue;
     const auto pixels = upright_pixels(delivery->frame, modality, "preview");
-    if (pixels) keep_latest({modality, *pixels, fmt::format("before recording {}", delivery->frame.id)});
+    if (pixels)
+      keep_latest({modality, *pixels, fmt::format("before recording {}", delivery->frame.id)});
   }
 }
 
@@ -205,7 +206,8 @@ Result<Ending> Recording::run(const std::atomic<bool>* cancel, const std::functi
   const Status status = recorder_->run(sources, progress);
   returned = true;
   supervisor.join();
-  if (tick) tick();  // what came after the last one is told, too: a short replay is over between two
+  if (tick)
+    tick();  // what came after the last one is told, too: a short replay is over between two
   {
     const std::lock_guard lock(mutex_);
     ended_ = Clock::now();

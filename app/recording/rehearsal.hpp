@@ -18,8 +18,9 @@ struct Rehearsal {
   std::uint64_t frames = 0, rejected = 0, missing = 0;
   double rate_hz = 0;  ///< by arrival; 0 of files, which wait
   int width = 0, height = 0;
-  std::map<std::string, int> reasons;          ///< of rejections, and events
-  std::map<std::string, std::string> details;  ///< the last event's of each reason, where it has one
+  std::map<std::string, int> reasons;  ///< of rejections, and events
+  std::map<std::string, std::string>
+      details;  ///< the last event's of each reason, where it has one
 };
 
 /// Opens every camera and lets it deliver for some seconds (a finite source: at most to its end),

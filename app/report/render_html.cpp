@@ -33,7 +33,8 @@ json readout_grid(const cv::Mat& kelvin) {
       bytes += static_cast<char>(count & 0xff);
       bytes += static_cast<char>(count >> 8);
     }
-  return {{"width", width}, {"height", height}, {"kelvin_per_count", scale}, {"counts", base64(bytes)}};
+  return {
+      {"width", width}, {"height", height}, {"kelvin_per_count", scale}, {"counts", base64(bytes)}};
 }
 
 json views_json(const Model& model) {
@@ -53,8 +54,8 @@ json views_json(const Model& model) {
 
 std::string figure(const json& view, const char* kind, const char* label, bool probe) {
   const bool fused = std::string(kind) == "fused";
-  const std::string uri = fused ? view["fused"].front()["uri"].get<std::string>()
-                                : view[kind].get<std::string>();
+  const std::string uri =
+      fused ? view["fused"].front()["uri"].get<std::string>() : view[kind].get<std::string>();
   return fmt::format(
       "<figure><div class=\"{}\"><img id=\"img-{}\" data-label=\"{}\" src=\"{}\" alt=\"{}, {}\">{}"
       "</div><figcaption>{}</figcaption></figure>\n",
@@ -72,7 +73,8 @@ std::string temperature_bar(const Model& model) {
     stops += fmt::format(",rgb({} {} {})", c[2], c[1], c[0]);
   }
   for (int i = 0; i < tick_count; ++i) {
-    const double t = model.span.low_k + (model.span.high_k - model.span.low_k) * i / (tick_count - 1);
+    const double t =
+        model.span.low_k + (model.span.high_k - model.span.low_k) * i / (tick_count - 1);
     ticks += model.has_temperature ? fmt::format("<span>{:.1f} °C</span>", celsius_from_kelvin(t))
                                    : fmt::format("<span>{:.0f}</span>", t);
   }
@@ -80,14 +82,15 @@ std::string temperature_bar(const Model& model) {
       "<div class=\"bar\" role=\"img\" aria-label=\"{}\"><div class=\"ramp\" "
       "style=\"background:linear-gradient(90deg{})\"></div><div class=\"ticks\">{}</div></div>\n"
       "<p class=\"note\">{}</p>\n",
-      model.has_temperature
-          ? fmt::format("Temperature scale from {:.1f} to {:.1f} °C",
-                        celsius_from_kelvin(model.span.low_k), celsius_from_kelvin(model.span.high_k))
-          : std::string("Scale of gray levels"),
+      model.has_temperature ? fmt::format("Temperature scale from {:.1f} to {:.1f} °C",
+                                          celsius_from_kelvin(model.span.low_k),
+                                          celsius_from_kelvin(model.span.high_k))
+                            : std::string("Scale of gray levels"),
       stops, ticks,
       model.has_temperature
           ? "One span for all views. Point at an infrared or fused image to read its temperature."
-          : "The thermal frames hold gray levels, not temperatures: import radiometric files for °C.");
+          : "The thermal frames hold gray levels, not temperatures: import radiometric files for "
+            "°C.");
 }
 
 /// The colours of the heat pictures over mid gray, as they strengthen.
@@ -104,14 +107,19 @@ std::string heat_bar(const Model& model) {
   const HeatScale& scale = model.heat->scale;
   for (int i = 0; i < tick_count; ++i) {
     const double t = scale.usual + (scale.hot - scale.usual) * i / (tick_count - 1);
-    ticks += model.heat->unit == fusion::HeatUnit::kelvin ? fmt::format("<span>{:.1f} °C</span>", celsius_from_kelvin(t))
-                                                          : fmt::format("<span>{:.0f}</span>", t);
+    ticks += model.heat->unit == fusion::HeatUnit::kelvin
+                 ? fmt::format("<span>{:.1f} °C</span>", celsius_from_kelvin(t))
+                 : fmt::format("<span>{:.0f}</span>", t);
   }
   return fmt::format(
-      "<div class=\"bar\" role=\"img\" aria-label=\"Scale of the heat picture\"><div class=\"ramp\" "
-      "style=\"background:linear-gradient(90deg{})\"></div><div class=\"ticks\">{}</div></div>\n<p class=\"note\">"
-      "Heat picture: the visible one, with what is warmer than its surroundings in colour; the stronger, the more "
-      "unusual. The bar begins at what is usual here. <span class=\"hatch\"></span> Hatched: nothing was measured."
+      "<div class=\"bar\" role=\"img\" aria-label=\"Scale of the heat picture\"><div "
+      "class=\"ramp\" "
+      "style=\"background:linear-gradient(90deg{})\"></div><div class=\"ticks\">{}</div></div>\n<p "
+      "class=\"note\">"
+      "Heat picture: the visible one, with what is warmer than its surroundings in colour; the "
+      "stronger, the more "
+      "unusual. The bar begins at what is usual here. <span class=\"hatch\"></span> Hatched: "
+      "nothing was measured."
       "</p>\n",
       stops, ticks);
 }
@@ -121,13 +129,15 @@ std::string viewer(const Model& model, const json& views) {
   const json& first = views.front();
   const bool visible = first.contains("visible"), thermal = first.contains("thermal");
   const bool fused = !first["fused"].empty();
-  std::string html = "<section id=\"viewer\" aria-labelledby=\"h-views\"><h2 id=\"h-views\">"
-                     "New views</h2>\n<div class=\"strip\" role=\"group\" aria-label=\"Choose a view\">";
+  std::string html =
+      "<section id=\"viewer\" aria-labelledby=\"h-views\"><h2 id=\"h-views\">"
+      "New views</h2>\n<div class=\"strip\" role=\"group\" aria-label=\"Choose a view\">";
   for (std::size_t i = 0; i < model.views.size(); ++i) {
     const View& v = model.views[i];
-    html += fmt::format("<button type=\"button\" aria-pressed=\"{}\"><img src=\"{}\" alt=\"\">{}</button>",
-                        i == 0, data_uri(v.visible.empty() ? v.thermal : v.visible,
-                                         thumbnail_width_px, 75), escape(v.name));
+    html += fmt::format(
+        "<button type=\"button\" aria-pressed=\"{}\"><img src=\"{}\" alt=\"\">{}</button>", i == 0,
+        data_uri(v.visible.empty() ? v.thermal : v.visible, thumbnail_width_px, 75),
+        escape(v.name));
   }
   html += "</div>\n<div class=\"three\">\n";
   if (visible) html += figure(first, "visible", "Visible", false);
@@ -146,7 +156,8 @@ std::string viewer(const Model& model, const json& views) {
         "id=\"tag-right\"></span><output class=\"readout\"></output></div>\n"
         "<input class=\"swiper\" id=\"cut\" type=\"range\" min=\"0\" max=\"100\" value=\"50\" "
         "aria-labelledby=\"h-swipe\">\n",
-        fused ? first["fused"].front()["uri"].get<std::string>() : first["thermal"].get<std::string>(),
+        fused ? first["fused"].front()["uri"].get<std::string>()
+              : first["thermal"].get<std::string>(),
         visible ? first["visible"].get<std::string>() : first["thermal"].get<std::string>());
   }
   return html + "</section>\n";
@@ -157,18 +168,21 @@ std::string poses_section(const Model& model) {
   std::string html = "<section aria-labelledby=\"h-poses\"><h2 id=\"h-poses\">Posed views</h2>\n";
   for (const PosesSummary& p : model.poses) {
     const double percent = p.total > 0 ? 100.0 * p.posed / p.total : 0;
-    html += fmt::format("<h3>{}: {} of {} views ({:.0f} %)</h3><div class=\"meter{}\"><i style=\"width:"
-                        "{:.1f}%\"></i></div>\n",
-                        escape(p.modality), p.posed, p.total, percent,
-                        p.posed < p.total ? " part" : "", percent);
+    html += fmt::format(
+        "<h3>{}: {} of {} views ({:.0f} %)</h3><div class=\"meter{}\"><i style=\"width:"
+        "{:.1f}%\"></i></div>\n",
+        escape(p.modality), p.posed, p.total, percent, p.posed < p.total ? " part" : "", percent);
     if (!p.advice.empty()) html += fmt::format("<p class=\"notice\">{}</p>\n", escape(p.advice));
     if (p.ladder.empty()) continue;
-    html += "<div class=\"scroll\"><table><caption>What was tried, in order</caption><thead><tr>"
-            "<th scope=\"col\">Rung</th><th scope=\"col\" class=\"text\">Outcome</th>"
-            "<th scope=\"col\" class=\"text\">Why</th></tr></thead><tbody>\n";
+    html +=
+        "<div class=\"scroll\"><table><caption>What was tried, in order</caption><thead><tr>"
+        "<th scope=\"col\">Rung</th><th scope=\"col\" class=\"text\">Outcome</th>"
+        "<th scope=\"col\" class=\"text\">Why</th></tr></thead><tbody>\n";
     for (const Rung& r : p.ladder)
-      html += fmt::format("<tr><th scope=\"row\">{}</th><td class=\"text\">{}</td><td class=\"text\">{}</td></tr>\n",
-                          escape(r.name), escape(r.outcome), escape(r.detail));
+      html += fmt::format(
+          "<tr><th scope=\"row\">{}</th><td class=\"text\">{}</td><td "
+          "class=\"text\">{}</td></tr>\n",
+          escape(r.name), escape(r.outcome), escape(r.detail));
     html += "</tbody></table></div>\n";
   }
   return html + "</section>\n";
@@ -190,9 +204,11 @@ std::string registration_section(const Model& model) {
 }
 
 std::string table(const Table& t) {
-  std::string html = fmt::format("<h3>{}</h3><div class=\"scroll\"><table><thead><tr>", escape(t.title));
+  std::string html =
+      fmt::format("<h3>{}</h3><div class=\"scroll\"><table><thead><tr>", escape(t.title));
   for (const Column& c : t.columns)
-    html += fmt::format("<th scope=\"col\" title=\"{}\">{}</th>", escape(c.definition), escape(c.name));
+    html +=
+        fmt::format("<th scope=\"col\" title=\"{}\">{}</th>", escape(c.definition), escape(c.name));
   html += "</tr></thead><tbody>\n";
   for (const auto& row : t.rows) {
     html += "<tr>";
@@ -210,9 +226,11 @@ std::string table(const Table& t) {
 
 std::string stages_section(const Model& model) {
   std::string html =
-      "<section aria-labelledby=\"h-stages\"><h2 id=\"h-stages\">Run time, and what was skipped</h2>\n"
+      "<section aria-labelledby=\"h-stages\"><h2 id=\"h-stages\">Run time, and what was "
+      "skipped</h2>\n"
       "<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Stage</th><th scope=\"col\" "
-      "class=\"text\">State</th><th scope=\"col\">Wall</th><th scope=\"col\">CPU</th><th scope=\"col\" "
+      "class=\"text\">State</th><th scope=\"col\">Wall</th><th scope=\"col\">CPU</th><th "
+      "scope=\"col\" "
       "class=\"text\">Notes</th></tr></thead><tbody>\n";
   double wall_s = 0, cpu_s = 0;
   for (const auto& s : model.stages) {
@@ -232,8 +250,10 @@ std::string stages_section(const Model& model) {
     wall_s += s.wall_s;
     cpu_s += s.cpu_s;
   }
-  html += fmt::format("</tbody><tfoot><tr><th scope=\"row\">Total</th><td></td><td>{:.1f} s</td><td>{:.1f} s"
-                      "</td><td></td></tr></tfoot></table></div>\n</section>\n", wall_s, cpu_s);
+  html += fmt::format(
+      "</tbody><tfoot><tr><th scope=\"row\">Total</th><td></td><td>{:.1f} s</td><td>{:.1f} s"
+      "</td><td></td></tr></tfoot></table></div>\n</section>\n",
+      wall_s, cpu_s);
   return html;
 }
 
@@ -245,7 +265,8 @@ std::string to_html(const Model& model) {
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
       "content=\"width=device-width,initial-scale=1\"><meta http-equiv=\"Content-Security-Policy\" "
       "content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src "
-      "'unsafe-inline'\"><title>{0}</title>\n<style>\n{1}</style></head>\n<body>\n<header><h1>{0}</h1>"
+      "'unsafe-inline'\"><title>{0}</title>\n<style>\n{1}</style></head>\n<body>\n<header><h1>{0}</"
+      "h1>"
       "<p class=\"sub\">{2}</p></header>\n<main>\n",
       escape(model.title), report_css, escape(model.subtitle));
   for (const std::string& notice : model.notices)
@@ -270,11 +291,14 @@ std::string to_html(const Model& model) {
     html += "</ul></section>\n";
   }
   if (!model.configuration.empty())
-    html += fmt::format("<section><h2>Configuration</h2><details><summary>Every resolved option"
-                        "</summary><pre>{}</pre></details></section>\n", escape(model.configuration));
-  html += fmt::format("</main>\n<footer>OrbitFuse {} · {}</footer>\n<script type=\"application/json\" "
-                      "id=\"views\">{}</script>\n<script>\n{}</script>\n</body></html>\n",
-                      escape(model.software), escape(model.created), escape_json(views.dump()), report_js);
+    html += fmt::format(
+        "<section><h2>Configuration</h2><details><summary>Every resolved option"
+        "</summary><pre>{}</pre></details></section>\n",
+        escape(model.configuration));
+  html += fmt::format(
+      "</main>\n<footer>OrbitFuse {} · {}</footer>\n<script type=\"application/json\" "
+      "id=\"views\">{}</script>\n<script>\n{}</script>\n</body></html>\n",
+      escape(model.software), escape(model.created), escape_json(views.dump()), report_js);
   return html;
 }
 

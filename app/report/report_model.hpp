@@ -22,9 +22,9 @@ struct FusedImage {
 /// One camera seen by every field; an empty image was not rendered.
 struct View {
   std::string name;
-  cv::Mat visible;         ///< CV_8UC3
-  cv::Mat thermal;         ///< CV_8UC3, in the palette
-  cv::Mat temperature_k;   ///< CV_32FC1, NaN = none; for the readout
+  cv::Mat visible;        ///< CV_8UC3
+  cv::Mat thermal;        ///< CV_8UC3, in the palette
+  cv::Mat temperature_k;  ///< CV_32FC1, NaN = none; for the readout
   std::vector<FusedImage> fused;
 };
 
@@ -59,8 +59,8 @@ struct Model {
   std::vector<std::string> notices;  ///< what these data did not allow, in words
   std::vector<View> views;
   TemperatureSpan span;
-  bool has_temperature = false;      ///< the span is in kelvin (else gray levels)
-  cv::Mat palette_bgr;               ///< 1x256
+  bool has_temperature = false;            ///< the span is in kelvin (else gray levels)
+  cv::Mat palette_bgr;                     ///< 1x256
   std::optional<fusion::HeatLegend> heat;  ///< what the colours of the heat pictures stand for
   std::vector<PosesSummary> poses;
   std::string registration_note;

@@ -6,10 +6,10 @@
 #include <array>
 
 #include "core/formats/colmap_model.hpp"
-#include "core/system/file_io.hpp"
-#include "core/image/image_io.hpp"
-#include "core/temperature.hpp"
 #include "core/formats/transforms_json.hpp"
+#include "core/image/image_io.hpp"
+#include "core/system/file_io.hpp"
+#include "core/temperature.hpp"
 
 namespace orbitfuse::stages {
 namespace fs = std::filesystem;
@@ -18,8 +18,8 @@ using nlohmann::json;
 namespace {
 
 json camera_json(const Camera& c) {
-  return {{"width", c.width}, {"height", c.height}, {"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx},
-          {"cy", c.cy}};
+  return {{"width", c.width}, {"height", c.height}, {"fx", c.fx},
+          {"fy", c.fy},       {"cx", c.cx},         {"cy", c.cy}};
 }
 
 Camera camera_of_json(const json& j) {
@@ -68,7 +68,8 @@ Result<Reconstruction> load_poses(const fs::path& folder, Modality modality) {
   return read_colmap_model(folder / "model", modality);
 }
 
-Result<Reconstruction> load_trained_poses(const pipeline::StageContext& context, Modality modality) {
+Result<Reconstruction> load_trained_poses(const pipeline::StageContext& context,
+                                          Modality modality) {
   const std::string of(name(modality));
   if (context.has("train_" + of) && fs::exists(context.of("train_" + of) / "model"))
     return load_poses(context.of("train_" + of), modality);
@@ -84,8 +85,8 @@ Status save_depth_maps(const fs::path& folder, const std::vector<DepthMap>& maps
     if (!map.normal.empty()) cv::split(map.normal, axes);
     for (std::size_t i = 0; i < axes.size(); ++i)
       ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, normal_kinds[i]), axes[i]));
-    list.push_back({{"view", map.view}, {"camera", camera_json(map.camera)},
-                    {"normal", !map.normal.empty()}});
+    list.push_back(
+        {{"view", map.view}, {"camera", camera_json(map.camera)}, {"normal", !map.normal.empty()}});
   }
   return write_json(folder / "depth.json", list);
 }

@@ -8,8 +8,8 @@
 
 #include "app/pipeline/stage.hpp"
 #include "core/geometry/reconstruction.hpp"
-#include "core/session/session.hpp"
 #include "core/geometry/transform.hpp"
+#include "core/session/session.hpp"
 
 // What stages leave for each other, in formats that other tools read (docs/formats.md).
 namespace orbitfuse::stages {

@@ -40,8 +40,10 @@ TrainingViews training_views(const Reconstruction& all, int holdout_every) {
   return out;
 }
 
-Result<StageOutput> estimate(const StageContext& context, const SessionInput& input, const RunConfig& config) {
-  ORBITFUSE_ASSIGN(const Reconstruction all, load_poses(context.of("poses_visible"), Modality::visible));
+Result<StageOutput> estimate(const StageContext& context, const SessionInput& input,
+                             const RunConfig& config) {
+  ORBITFUSE_ASSIGN(const Reconstruction all,
+                   load_poses(context.of("poses_visible"), Modality::visible));
   const TrainingViews views = training_views(all, config.train_visible.options.holdout_every);
   std::vector<cv::Mat> images(views.model.views.size());
   std::vector<Status> problems(images.size());
@@ -59,7 +61,8 @@ Result<StageOutput> estimate(const StageContext& context, const SessionInput& in
   auto found = depth::dense_depth(views.model, images, config.depth, context.progress);
   if (!found && found.error().kind == ErrorKind::quality) {
     // A scene without parallax still has fields to train; they only know less.
-    output.skips.push_back({"dense depth", found.error().message(), "fields train from images and sparse points"});
+    output.skips.push_back(
+        {"dense depth", found.error().message(), "fields train from images and sparse points"});
     output.metrics = {{"brief", "none: " + found.error().message()}, {"known", 0.0}};
     ORBITFUSE_TRY(save_depth_maps(context.folder, {}));
     return output;
@@ -68,11 +71,12 @@ Result<StageOutput> estimate(const StageContext& context, const SessionInput& in
   for (DepthMap& map : found->maps) map.view = views.index[static_cast<std::size_t>(map.view)];
   ORBITFUSE_TRY(save_depth_maps(context.folder, found->maps));
   output.skips = found->report.skips;
-  output.metrics = {{"brief", fmt::format("{:.0f} % of the pixels of {} views confirmed by other views",
-                                          100 * found->report.known, images.size())},
-                    {"known", found->report.known},
-                    {"matched", found->report.matched},
-                    {"views_without_neighbours", found->report.views_without}};
+  output.metrics = {
+      {"brief", fmt::format("{:.0f} % of the pixels of {} views confirmed by other views",
+                            100 * found->report.known, images.size())},
+      {"known", found->report.known},
+      {"matched", found->report.matched},
+      {"views_without_neighbours", found->report.views_without}};
   return output;
 }
 
@@ -86,7 +90,9 @@ pipeline::Stage depth_stage(const StageInputs& in) {
   stage.options["holdout_every"] = in.config->train_visible.options.holdout_every;
   stage.options["seed"] = in.config->seed;
   stage.inputs_hash = in.session->content.at(Modality::visible);
-  stage.run = [in](const StageContext& context) { return estimate(context, *in.session, *in.config); };
+  stage.run = [in](const StageContext& context) {
+    return estimate(context, *in.session, *in.config);
+  };
   return stage;
 }
 

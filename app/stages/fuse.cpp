@@ -9,9 +9,9 @@
 #include "app/stages/metric_tables.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
-#include "recon/assembly/training_data.hpp"
 #include "core/image/image_io.hpp"
 #include "fusion/heat/legend.hpp"
+#include "recon/assembly/training_data.hpp"
 
 namespace orbitfuse::stages {
 namespace {
@@ -24,14 +24,16 @@ Result<cv::Mat> valid_pixels(const std::filesystem::path& folder, const ViewFile
                              const cv::Mat& thermal, double min_opacity) {
   ORBITFUSE_ASSIGN(const cv::Mat visible_opacity, read_float_tiff(folder / files.visible_opacity));
   ORBITFUSE_ASSIGN(const cv::Mat thermal_opacity, read_float_tiff(folder / files.thermal_opacity));
-  cv::Mat valid = (thermal == thermal) & (visible_opacity >= min_opacity) & (thermal_opacity >= min_opacity);
+  cv::Mat valid =
+      (thermal == thermal) & (visible_opacity >= min_opacity) & (thermal_opacity >= min_opacity);
   return valid;
 }
 
 /// One view by one method. Gray fusion takes the thermal image over the run's span; heat the levels
 /// themselves, which a span would cut.
 Result<cv::Mat> fuse_view(const cv::Mat& visible, const cv::Mat& thermal, const cv::Mat& valid,
-                          const RenderedViews& rendered, FusionOptions options, FusionReport& said) {
+                          const RenderedViews& rendered, FusionOptions options,
+                          FusionReport& said) {
   if (cv::countNonZero(valid) == 0) return visible;
   if (options.method != FusionMethod::heat)
     return fuse(visible, gray_of_kelvin(thermal, rendered.span), valid, options, &said);
@@ -41,9 +43,12 @@ Result<cv::Mat> fuse_view(const cv::Mat& visible, const cv::Mat& thermal, const 
 }
 
 /// The bar that says what heat's colours stand for, beside its pictures.
-Status write_legend(const StageContext& context, const RenderedViews& rendered, const FusionOptions& options) {
+Status write_legend(const StageContext& context, const RenderedViews& rendered,
+                    const FusionOptions& options) {
   constexpr int width_px = 640;
-  ORBITFUSE_ASSIGN(const cv::Mat legend, fusion::heat_legend({rendered.heat, rendered.heat_unit(), options.heat}, width_px));
+  ORBITFUSE_ASSIGN(
+      const cv::Mat legend,
+      fusion::heat_legend({rendered.heat, rendered.heat_unit(), options.heat}, width_px));
   return write_png(context.folder / "heat_legend.png", legend);
 }
 
@@ -59,14 +64,18 @@ Result<StageOutput> fuse_views(const StageContext& context, const RunConfig& con
   for (const ViewFiles& files : rendered.views) {
     ORBITFUSE_TRY(context.progress.check("fuse"));
     context.progress.report({"fuse", static_cast<double>(fused_images),
-                             static_cast<double>(rendered.views.size() * methods.size()), -1, files.name});
+                             static_cast<double>(rendered.views.size() * methods.size()), -1,
+                             files.name});
     ORBITFUSE_ASSIGN(const cv::Mat visible, read_visible(folder / files.visible));
     ORBITFUSE_ASSIGN(const cv::Mat thermal,
                      field_image(folder / files.thermal, rendered.samples()));
-    ORBITFUSE_ASSIGN(const cv::Mat valid, valid_pixels(folder, files, thermal, config.render.min_opacity));
-    ORBITFUSE_TRY(write_png(context.folder / "thermal" / (files.name + ".png"), gray_of_kelvin(thermal, rendered.span)));
+    ORBITFUSE_ASSIGN(const cv::Mat valid,
+                     valid_pixels(folder, files, thermal, config.render.min_opacity));
+    ORBITFUSE_TRY(write_png(context.folder / "thermal" / (files.name + ".png"),
+                            gray_of_kelvin(thermal, rendered.span)));
     ORBITFUSE_TRY(write_png(context.folder / "measured" / (files.name + ".png"), valid));
-    const double share = static_cast<double>(cv::countNonZero(valid)) / static_cast<double>(valid.total());
+    const double share =
+        static_cast<double>(cv::countNonZero(valid)) / static_cast<double>(valid.total());
     measured[files.name] = share;
     measured_sum += share;
     for (const FusionMethod method : methods) {
@@ -85,7 +94,8 @@ Result<StageOutput> fuse_views(const StageContext& context, const RunConfig& con
         }
     }
     if (cv::countNonZero(valid) == 0)
-      output.warnings.push_back(files.name + ": the thermal field does not cover this view; the visible one is shown");
+      output.warnings.push_back(
+          files.name + ": the thermal field does not cover this view; the visible one is shown");
   }
   json list = json::array(), times = json::object();
   for (const FusionMethod method : methods) {
@@ -95,10 +105,13 @@ Result<StageOutput> fuse_views(const StageContext& context, const RunConfig& con
   if (std::count(methods.begin(), methods.end(), FusionMethod::heat) > 0)
     ORBITFUSE_TRY(write_legend(context, rendered, config.fuse.options));
   const double measured_share = measured_sum / static_cast<double>(rendered.views.size());
-  output.metrics = {{"brief", fmt::format("{} images by {} methods, {:.0f} % of them with a temperature", fused_images,
-                                          methods.size(), 100 * measured_share)},
-                    {"methods", list}, {"milliseconds_a_view", times}, {"measured_share", measured_share},
-                    {"measured_share_by_view", measured}};
+  output.metrics = {
+      {"brief", fmt::format("{} images by {} methods, {:.0f} % of them with a temperature",
+                            fused_images, methods.size(), 100 * measured_share)},
+      {"methods", list},
+      {"milliseconds_a_view", times},
+      {"measured_share", measured_share},
+      {"measured_share_by_view", measured}};
   return output;
 }
 

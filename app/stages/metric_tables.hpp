@@ -15,7 +15,8 @@ namespace orbitfuse::stages {
 /// Metric values of several images, by group (a fusion method, a field), with their means.
 class MetricMeans {
  public:
-  void add(const std::string& group, const std::string& image, const std::vector<MetricValue>& values);
+  void add(const std::string& group, const std::string& image,
+           const std::vector<MetricValue>& values);
 
   bool empty() const { return rows_.empty(); }
   std::size_t count() const { return rows_.size(); }

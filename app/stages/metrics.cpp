@@ -10,9 +10,9 @@
 #include "app/stages/metric_tables.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
-#include "recon/assembly/training_data.hpp"
-#include "core/system/file_io.hpp"
 #include "core/image/image_io.hpp"
+#include "core/system/file_io.hpp"
+#include "recon/assembly/training_data.hpp"
 #include "recon/nerf/nerf.hpp"
 
 namespace orbitfuse::stages {
@@ -22,12 +22,13 @@ using pipeline::StageContext;
 using pipeline::StageOutput;
 
 /// Rendered against recorded, on views that did not train (seed paper, Table 4).
-Status score_field(const StageContext& context, const SessionInput& input, const TrainConfig& config,
-                   Modality modality, MetricMeans& means) {
+Status score_field(const StageContext& context, const SessionInput& input,
+                   const TrainConfig& config, Modality modality, MetricMeans& means) {
   const std::string train = "train_" + std::string(name(modality));
   if (!context.has(train)) return {};
   const json* trained = context.metrics_of(train);
-  const auto heldout = trained ? trained->value("heldout", std::vector<std::string>()) : std::vector<std::string>();
+  const auto heldout =
+      trained ? trained->value("heldout", std::vector<std::string>()) : std::vector<std::string>();
   if (heldout.empty()) return {};
   const json gains = trained->value("image_gains", json::object());
   ORBITFUSE_ASSIGN(Reconstruction model, load_trained_poses(context, modality));
@@ -70,12 +71,14 @@ Status score_fused(const StageContext& context, MetricMeans& means) {
   for (std::size_t i = 0; i < rendered.views.size(); ++i) {
     const ViewFiles& files = rendered.views[i];
     ORBITFUSE_TRY(context.progress.check("metrics"));
-    context.progress.report({"metrics", static_cast<double>(i), static_cast<double>(rendered.views.size()),
-                             -1, files.name});
+    context.progress.report({"metrics", static_cast<double>(i),
+                             static_cast<double>(rendered.views.size()), -1, files.name});
     ORBITFUSE_ASSIGN(const cv::Mat visible, read_image(context.of("render") / files.visible));
-    ORBITFUSE_ASSIGN(const cv::Mat thermal, read_image(context.of("fuse") / "thermal" / (files.name + ".png")));
+    ORBITFUSE_ASSIGN(const cv::Mat thermal,
+                     read_image(context.of("fuse") / "thermal" / (files.name + ".png")));
     for (const std::string& method : methods) {
-      ORBITFUSE_ASSIGN(const cv::Mat image, read_image(context.of("fuse") / method / (files.name + ".png")));
+      ORBITFUSE_ASSIGN(const cv::Mat image,
+                       read_image(context.of("fuse") / method / (files.name + ".png")));
       ORBITFUSE_ASSIGN(const auto values, fusion_metrics(visible, thermal, image));
       means.add(method, files.name, values);
     }
@@ -89,22 +92,30 @@ json measured_share(const StageContext& context) {
   return fused ? fused->value("measured_share", json()) : json();
 }
 
-Result<StageOutput> score(const StageContext& context, const SessionInput& input, const RunConfig& config) {
+Result<StageOutput> score(const StageContext& context, const SessionInput& input,
+                          const RunConfig& config) {
   MetricMeans fields, fused;
   for (const Modality modality : {Modality::visible, Modality::thermal})
     ORBITFUSE_TRY(score_field(context, input, config.train(modality), modality, fields));
   ORBITFUSE_TRY(score_fused(context, fused));
   StageOutput output;
   auto tables = json::array();
-  if (!fields.empty()) tables.push_back(fields.table("Rendered views against held-out frames", "field"));
-  if (!fused.empty()) tables.push_back(fused.table("Fused views, mean over the new cameras", "method"));
+  if (!fields.empty())
+    tables.push_back(fields.table("Rendered views against held-out frames", "field"));
+  if (!fused.empty())
+    tables.push_back(fused.table("Fused views, mean over the new cameras", "method"));
   ORBITFUSE_TRY(write_file_atomic(context.folder / "metrics.csv",
                                   MetricMeans::csv_header() + fields.csv() + fused.csv()));
-  ORBITFUSE_TRY(write_json(context.folder / "metrics.json",
-                           {{"schema", 1}, {"fields", fields.to_json()}, {"fused", fused.to_json()},
-                            {"measured_share", measured_share(context)}}));
-  output.metrics = {{"brief", fmt::format("{} fused images, {} held-out views", fused.count(), fields.count())},
-                    {"tables", tables}, {"fields", fields.to_json()}, {"fused", fused.to_json()}};
+  ORBITFUSE_TRY(
+      write_json(context.folder / "metrics.json", {{"schema", 1},
+                                                   {"fields", fields.to_json()},
+                                                   {"fused", fused.to_json()},
+                                                   {"measured_share", measured_share(context)}}));
+  output.metrics = {
+      {"brief", fmt::format("{} fused images, {} held-out views", fused.count(), fields.count())},
+      {"tables", tables},
+      {"fields", fields.to_json()},
+      {"fused", fused.to_json()}};
   return output;
 }
 
@@ -114,7 +125,8 @@ pipeline::Stage metrics_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "metrics";
   stage.version = 2;
-  stage.uses = {"poses_visible", "poses_thermal", "train_visible", "train_thermal", "render", "fuse"};
+  stage.uses = {"poses_visible", "poses_thermal", "train_visible",
+                "train_thermal", "render",        "fuse"};
   stage.absent = [](const StageContext& context) -> std::optional<std::string> {
     if (context.has("train_visible") || context.has("train_thermal")) return std::nullopt;
     return "no field was trained";

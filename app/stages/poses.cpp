@@ -5,12 +5,11 @@
 
 #include <algorithm>
 
-
 #include "app/stages/artifacts.hpp"
 #include "app/stages/stage_list.hpp"
-#include "recon/assembly/field_renderer.hpp"
 #include "core/image/image_io.hpp"
 #include "core/image/palette.hpp"
+#include "recon/assembly/field_renderer.hpp"
 #include "recon/nerf/nerf.hpp"
 
 namespace orbitfuse::stages {
@@ -22,8 +21,12 @@ using pipeline::StageOutput;
 json ladder_json(const std::vector<LadderStep>& ladder) {
   json list = json::array();
   for (const LadderStep& step : ladder)
-    list.push_back({{"rung", step.rung}, {"held", step.held}, {"why", step.why},
-                    {"posed", step.posed}, {"total", step.total}, {"seconds", step.seconds}});
+    list.push_back({{"rung", step.rung},
+                    {"held", step.held},
+                    {"why", step.why},
+                    {"posed", step.posed},
+                    {"total", step.total},
+                    {"seconds", step.seconds}});
   return list;
 }
 
@@ -90,9 +93,9 @@ Result<StageOutput> finish(const StageContext& context, const ModalityPoses& pos
 
 Result<StageOutput> pose_visible(const StageContext& context, const SessionInput& input,
                                  const PoseOptions& options) {
-  ORBITFUSE_ASSIGN(const ModalityPoses poses,
-                   estimate_visible_poses(input.session, options, context.folder / "work",
-                                          context.progress));
+  ORBITFUSE_ASSIGN(
+      const ModalityPoses poses,
+      estimate_visible_poses(input.session, options, context.folder / "work", context.progress));
   return finish(context, poses, PoseFrame::visible);
 }
 
@@ -101,7 +104,8 @@ Result<StageOutput> pose_thermal(const StageContext& context, const SessionInput
   VisibleScene scene;
   const bool visible = context.has("poses_visible");
   if (visible) {
-    ORBITFUSE_ASSIGN(scene.reconstruction, load_poses(context.of("poses_visible"), Modality::visible));
+    ORBITFUSE_ASSIGN(scene.reconstruction,
+                     load_poses(context.of("poses_visible"), Modality::visible));
   }
   nerf::Field field;
   if (context.has("train_visible")) {
@@ -112,13 +116,13 @@ Result<StageOutput> pose_thermal(const StageContext& context, const SessionInput
                    estimate_thermal_poses(input.session, visible ? &scene : nullptr, options,
                                           context.folder / "work", context.progress));
   ORBITFUSE_TRY(save_session_bounds(context, input, poses.reconstruction));
-  return finish(context, poses,
-                poses.shares_visible_frame ? PoseFrame::visible : PoseFrame::own);
+  return finish(context, poses, poses.shares_visible_frame ? PoseFrame::visible : PoseFrame::own);
 }
 
 bool all_posed(const Session& session) {
   const auto frames = session.frames_of(Modality::thermal, false);
-  return std::all_of(frames.begin(), frames.end(), [](const FrameRecord* f) { return f->cam_from_world.has_value(); });
+  return std::all_of(frames.begin(), frames.end(),
+                     [](const FrameRecord* f) { return f->cam_from_world.has_value(); });
 }
 
 }  // namespace
@@ -132,7 +136,8 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
     stage.version = 3;
     stage.uses = {"poses_visible"};
     // Thermal views are aligned with renders of the visible field; known poses need none.
-    if (!in.config->poses.use_known_poses || !all_posed(in.session->session)) stage.uses.push_back("train_visible");
+    if (!in.config->poses.use_known_poses || !all_posed(in.session->session))
+      stage.uses.push_back("train_visible");
   }
   stage.options = in.config->settings().to_json("poses");
   stage.options["seed"] = in.config->seed;

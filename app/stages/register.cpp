@@ -4,10 +4,10 @@
 #include "app/stages/artifacts.hpp"
 #include "app/stages/registration_json.hpp"
 #include "app/stages/stage_list.hpp"
-#include "recon/assembly/training_data.hpp"
-#include "recon/assembly/field_renderer.hpp"
 #include "core/formats/ply.hpp"
+#include "recon/assembly/field_renderer.hpp"
 #include "recon/assembly/register_fields.hpp"
+#include "recon/assembly/training_data.hpp"
 
 namespace orbitfuse::stages {
 namespace {

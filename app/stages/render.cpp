@@ -8,11 +8,11 @@
 #include "app/stages/artifacts.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
-#include "core/system/file_io.hpp"
+#include "core/formats/transforms_json.hpp"
 #include "core/image/image_io.hpp"
 #include "core/image/palette.hpp"
-#include "core/formats/transforms_json.hpp"
 #include "core/system/clock.hpp"
+#include "core/system/file_io.hpp"
 #include "recon/assembly/looked_at.hpp"
 #include "recon/nerf/nerf.hpp"
 
@@ -58,7 +58,8 @@ Result<NewViews> choose_views(const StageContext& context, const RenderConfig& c
     const Camera& camera = given.frames[i].camera;
     if (static_cast<double>(camera.width) * camera.height > max_pixels)
       return fail(ErrorKind::input, fmt::format("{}: frames[{}]", config.cameras, i),
-                  fmt::format("{}x{} pixels", camera.width, camera.height), "choose w and h for at most 64 megapixels");
+                  fmt::format("{}x{} pixels", camera.width, camera.height),
+                  "choose w and h for at most 64 megapixels");
   }
   for (const TransformsFrame& f : given.frames)
     views.views.push_back({fmt::format("{:03}", views.views.size()), f.camera.without_distortion(),
@@ -83,11 +84,12 @@ cv::Mat masked(const cv::Mat& kelvin, const cv::Mat& opacity, double min_opacity
   return result;
 }
 
-/// What colours stand for in all pictures of the run: the span of the object that was gone round, and
-/// what is warm against its surroundings.
-Status choose_scales(const StageContext& context, Modality frame, const std::vector<ThermalView>& seen,
-                     RenderedViews& rendered) {
-  ORBITFUSE_ASSIGN(const Reconstruction posed, load_poses(context.of("poses_" + std::string(name(frame))), frame));
+/// What colours stand for in all pictures of the run: the span of the object that was gone round,
+/// and what is warm against its surroundings.
+Status choose_scales(const StageContext& context, Modality frame,
+                     const std::vector<ThermalView>& seen, RenderedViews& rendered) {
+  ORBITFUSE_ASSIGN(const Reconstruction posed,
+                   load_poses(context.of("poses_" + std::string(name(frame))), frame));
   const TemperatureSpan object = object_span(seen, posed.views);
   const HeatScaleOptions how = heat_scale_options(rendered.samples());
   rendered.heat = heat_scale(within_orbit(seen, posed.views, surroundings_reach), how);
@@ -109,8 +111,8 @@ Status write_temperatures(const StageContext& context, const std::vector<Thermal
       ORBITFUSE_TRY(
           write_thermal_tiff(context.folder / files[i].thermal, kelvin[i], kelvin_per_count));
     files[i].palette = "palette/" + files[i].name + ".png";
-    ORBITFUSE_TRY(write_png(context.folder / files[i].palette,
-                            colorize(kelvin[i], rendered.span, colors)));
+    ORBITFUSE_TRY(
+        write_png(context.folder / files[i].palette, colorize(kelvin[i], rendered.span, colors)));
   }
   if (rendered.thermal_is_gray) return {};
   return save_temperature_bounds(context.folder, rendered.span.low_k, rendered.span.high_k);
@@ -130,9 +132,10 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
   Transforms transforms;
   for (const PosedView& view : chosen.views) {
     ORBITFUSE_TRY(context.progress.check("render"));
-    const double done = static_cast<double>(files.size()), total = static_cast<double>(chosen.views.size());
-    context.progress.report({"render", done, total,
-                             done > 0 ? clock.wall_s() / done * (total - done) : -1, view.name});
+    const double done = static_cast<double>(files.size()),
+                 total = static_cast<double>(chosen.views.size());
+    context.progress.report(
+        {"render", done, total, done > 0 ? clock.wall_s() / done * (total - done) : -1, view.name});
     ViewFiles f;
     f.name = view.name;
     cv::Mat depth;
@@ -170,17 +173,19 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
         ORBITFUSE_TRY(write_float_tiff(context.folder / f.depth, seen.depth));
       }
     }
-    TransformsFrame entry{f.visible.empty() ? f.thermal : f.visible, {}, view.camera, view.cam_from_world};
+    TransformsFrame entry{
+        f.visible.empty() ? f.thermal : f.visible, {}, view.camera, view.cam_from_world};
     if (!f.thermal.empty()) entry.thermal_file_path = f.thermal;
     transforms.frames.push_back(std::move(entry));
     files.push_back(std::move(f));
   }
 
   StageOutput output;
-  output.metrics["brief"] = fmt::format(
-      "{}, {}, {:.2f} s a view", chosen.described,
-      fields.thermal.empty() ? "visible" : fields.visible.empty() ? "thermal" : "both modalities",
-      clock.wall_s() / static_cast<double>(files.size()));
+  output.metrics["brief"] = fmt::format("{}, {}, {:.2f} s a view", chosen.described,
+                                        fields.thermal.empty()   ? "visible"
+                                        : fields.visible.empty() ? "thermal"
+                                                                 : "both modalities",
+                                        clock.wall_s() / static_cast<double>(files.size()));
   output.metrics["views"] = files.size();
   RenderedViews rendered;
   rendered.thermal_is_gray = gray;

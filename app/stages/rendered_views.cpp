@@ -41,13 +41,17 @@ Status save_rendered_views(const std::filesystem::path& folder, const RenderedVi
   }
   return write_json(folder / views_file,
                     {{"schema", 1},
-                     {"conventions", "thermal: 16-bit, kelvin = scale * count as the tag says (0.01 below 382 C); depth: along the optical axis, "
-                                     "units of the visible reconstruction; poses in transforms.json"},
+                     {"conventions",
+                      "thermal: 16-bit, kelvin = scale * count as the tag says (0.01 below 382 C); "
+                      "depth: along the optical axis, "
+                      "units of the visible reconstruction; poses in transforms.json"},
                      {"thermal_is_gray", rendered.thermal_is_gray},
                      {"span_low", rendered.span.low_k},
                      {"span_high", rendered.span.high_k},
-                     {"heat", {{"usual", rendered.heat.usual}, {"spread", rendered.heat.spread},
-                               {"hot", rendered.heat.hot}}},
+                     {"heat",
+                      {{"usual", rendered.heat.usual},
+                       {"spread", rendered.heat.spread},
+                       {"hot", rendered.heat.hot}}},
                      {"views", views}});
 }
 
@@ -64,11 +68,13 @@ Result<RenderedViews> load_rendered_views(const std::filesystem::path& folder) {
     heat.at("hot").get_to(rendered.heat.hot);
     for (const json& v : j.at("views")) {
       ViewFiles view;
-      visit_files(view, [&](const char* key, std::string& value) { value = v.value(key, std::string()); });
+      visit_files(
+          view, [&](const char* key, std::string& value) { value = v.value(key, std::string()); });
       rendered.views.push_back(std::move(view));
     }
   } catch (const json::exception& e) {
-    return fail(ErrorKind::input, (folder / views_file).string(), e.what(), "run the render stage again");
+    return fail(ErrorKind::input, (folder / views_file).string(), e.what(),
+                "run the render stage again");
   }
   return rendered;
 }

@@ -20,13 +20,15 @@ struct ViewFiles {
 
 struct RenderedViews {
   std::vector<ViewFiles> views;
-  TemperatureSpan span;          ///< one for all views; gray levels when thermal_is_gray
-  HeatScale heat;                ///< likewise
+  TemperatureSpan span;  ///< one for all views; gray levels when thermal_is_gray
+  HeatScale heat;        ///< likewise
   bool thermal_is_gray = false;
 
   /// What the thermal files hold.
   Samples samples() const { return thermal_is_gray ? Samples::gray : Samples::kelvin; }
-  fusion::HeatUnit heat_unit() const { return thermal_is_gray ? fusion::HeatUnit::gray : fusion::HeatUnit::kelvin; }
+  fusion::HeatUnit heat_unit() const {
+    return thermal_is_gray ? fusion::HeatUnit::gray : fusion::HeatUnit::kelvin;
+  }
   bool has_both() const {
     return !views.empty() && !views[0].visible.empty() && !views[0].thermal.empty();
   }

@@ -3,8 +3,8 @@
 
 #include "app/stages/report_content.hpp"
 #include "app/stages/stage_list.hpp"
-#include "core/system/file_io.hpp"
 #include "core/image/image_io.hpp"
+#include "core/system/file_io.hpp"
 
 namespace orbitfuse::stages {
 namespace {
@@ -22,7 +22,8 @@ Status write_picture(const std::filesystem::path& folder, const report::Model& m
     if (part.empty()) continue;
     cv::Mat color = part, sized;
     if (part.channels() == 1) cv::cvtColor(part, color, cv::COLOR_GRAY2BGR);
-    cv::resize(color, sized, {color.cols * picture_height_px / color.rows, picture_height_px}, 0, 0, cv::INTER_AREA);
+    cv::resize(color, sized, {color.cols * picture_height_px / color.rows, picture_height_px}, 0, 0,
+               cv::INTER_AREA);
     if (row.empty())
       row = sized;
     else
@@ -40,8 +41,8 @@ Status write_picture(const std::filesystem::path& folder, const report::Model& m
 pipeline::Stage report_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "report";
-  stage.uses = {"poses_visible", "poses_thermal", "depth",   "train_visible", "train_thermal",
-                "register",      "render",        "fuse",    "metrics"};
+  stage.uses = {"poses_visible", "poses_thermal", "depth", "train_visible", "train_thermal",
+                "register",      "render",        "fuse",  "metrics"};
   stage.always = true;
   stage.run = [in](const pipeline::StageContext& context) -> Result<pipeline::StageOutput> {
     ORBITFUSE_ASSIGN(const report::Model model, report_content(context, in));

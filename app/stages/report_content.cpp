@@ -8,11 +8,11 @@
 #include "app/pipeline/runner.hpp"
 #include "app/stages/artifacts.hpp"
 #include "app/stages/rendered_views.hpp"
-#include "recon/assembly/training_data.hpp"
-#include "core/system/cpu.hpp"
 #include "core/image/image_io.hpp"
+#include "core/system/cpu.hpp"
 #include "core/system/parallel.hpp"
 #include "core/temperature.hpp"
+#include "recon/assembly/training_data.hpp"
 
 namespace orbitfuse::stages {
 namespace {
@@ -53,8 +53,7 @@ Status add_views(const StageContext& context, const RunConfig& config, report::M
   if (!context.has("render")) return {};
   ORBITFUSE_ASSIGN(const RenderedViews rendered, load_rendered_views(context.of("render")));
   std::vector<std::string> methods;
-  if (const json* fused = context.metrics_of("fuse"))
-    methods = fused->value("methods", methods);
+  if (const json* fused = context.metrics_of("fuse")) methods = fused->value("methods", methods);
   for (const ViewFiles& files : rendered.views) {
     if (model.views.size() == max_report_views) {
       model.warnings.push_back(fmt::format("The report shows {} of {} views; render/ holds all.",
@@ -68,8 +67,8 @@ Status add_views(const StageContext& context, const RunConfig& config, report::M
   model.span = rendered.span;
   if (std::count(methods.begin(), methods.end(), "heat") > 0)
     model.heat = fusion::HeatLegend{rendered.heat, rendered.heat_unit(), config.fuse.options.heat};
-  model.has_temperature = !rendered.thermal_is_gray && !model.views.empty() &&
-                          !model.views[0].thermal.empty();
+  model.has_temperature =
+      !rendered.thermal_is_gray && !model.views.empty() && !model.views[0].thermal.empty();
   if (!model.views.empty() && !model.views[0].thermal.empty()) {
     ORBITFUSE_ASSIGN(model.palette_bgr, palette(config.render.palette));
   }
@@ -96,7 +95,8 @@ void add_poses(const StageContext& context, const SessionInput& input, report::M
       poses.posed = m->value("posed", 0);
       poses.total = m->value("total", poses.total);
       for (const json& rung : m->value("ladder", json::array()))
-        poses.ladder.push_back({rung.value("rung", ""), rung.value("held", false) ? "held" : "did not hold",
+        poses.ladder.push_back({rung.value("rung", ""),
+                                rung.value("held", false) ? "held" : "did not hold",
                                 rung.value("why", "")});
     }
     poses.advice = advice(poses);
@@ -117,8 +117,9 @@ void add_registration(const StageContext& context, report::Model& model) {
 void add_fields(const StageContext& context, report::Model& model) {
   report::Table table{"Radiance fields",
                       {{"Field", ""},
-                       {"Held-out PSNR (dB)", "10 log10(peak² / MSE) on views that did not train; "
-                                              "thermal over the session's span"},
+                       {"Held-out PSNR (dB)",
+                        "10 log10(peak² / MSE) on views that did not train; "
+                        "thermal over the session's span"},
                        {"Steps", "Of the parameters kept"},
                        {"Samples a ray", "Mean over training"},
                        {"Cloud points", "Exported to cloud.ply"}},
@@ -127,12 +128,12 @@ void add_fields(const StageContext& context, report::Model& model) {
     const json* m = context.metrics_of(stage);
     if (!m) continue;
     const json psnr = m->value("heldout_psnr_db", json());
-    table.rows.push_back({std::string(stage).substr(6),
-                          psnr.is_number() ? fmt::format("{:.2f}", psnr.get<double>())
-                                           : "all views trained",
-                          fmt::format("{}", m->value("best_step", 0)),
-                          fmt::format("{:.1f}", m->value("samples_per_ray", 0.0)),
-                          fmt::format("{}", m->value("cloud_points", 0))});
+    table.rows.push_back(
+        {std::string(stage).substr(6),
+         psnr.is_number() ? fmt::format("{:.2f}", psnr.get<double>()) : "all views trained",
+         fmt::format("{}", m->value("best_step", 0)),
+         fmt::format("{:.1f}", m->value("samples_per_ray", 0.0)),
+         fmt::format("{}", m->value("cloud_points", 0))});
   }
   if (!table.rows.empty()) model.tables.push_back(std::move(table));
 }
@@ -153,9 +154,10 @@ void add_metric_tables(const StageContext& context, report::Model& model) {
 void add_notices(const StageContext& context, const SessionInput& input, report::Model& model) {
   for (const Modality modality : {Modality::visible, Modality::thermal})
     if (!input.has(modality))
-      model.notices.push_back(fmt::format(
-          "This session has no {} frames: everything below is of the {} ones alone.", name(modality),
-          name(modality == Modality::visible ? Modality::thermal : Modality::visible)));
+      model.notices.push_back(
+          fmt::format("This session has no {} frames: everything below is of the {} ones alone.",
+                      name(modality),
+                      name(modality == Modality::visible ? Modality::thermal : Modality::visible)));
   if (input.has(Modality::thermal) && !input.has_temperatures())
     model.notices.push_back("The thermal frames hold gray levels, not temperatures.");
   for (const StageStatus& s : *context.earlier)
@@ -170,8 +172,9 @@ Result<report::Model> report_content(const StageContext& context, const StageInp
   report::Model model;
   const std::string folder = input.session.folder.lexically_normal().filename().string();
   model.title = folder.empty() ? input.session.id : folder;
-  model.subtitle = fmt::format("Session {}, recorded {}. Computed on {}, {} threads.", input.session.id,
-                               input.session.created, cpu_description(), thread_count());
+  model.subtitle =
+      fmt::format("Session {}, recorded {}. Computed on {}, {} threads.", input.session.id,
+                  input.session.created, cpu_description(), thread_count());
   ORBITFUSE_TRY(add_views(context, *in.config, model));
   add_poses(context, input, model);
   add_registration(context, model);
@@ -183,16 +186,20 @@ Result<report::Model> report_content(const StageContext& context, const StageInp
   for (const StageStatus& s : model.stages) wall_s += s.wall_s;
   model.headline.emplace_back("new views", fmt::format("{}", model.views.size()));
   if (model.has_temperature)
-    model.headline.emplace_back("temperatures shown",
-                                fmt::format("{:.0f} to {:.0f} °C", celsius_from_kelvin(model.span.low_k),
-                                            celsius_from_kelvin(model.span.high_k)));
+    model.headline.emplace_back(
+        "temperatures shown",
+        fmt::format("{:.0f} to {:.0f} °C", celsius_from_kelvin(model.span.low_k),
+                    celsius_from_kelvin(model.span.high_k)));
   if (const json* fused = context.metrics_of("fuse"); fused && fused->contains("measured_share"))
-    model.headline.emplace_back("of the new views has a temperature",
-                                fmt::format("{:.0f} %", 100 * fused->at("measured_share").get<double>()));
+    model.headline.emplace_back(
+        "of the new views has a temperature",
+        fmt::format("{:.0f} %", 100 * fused->at("measured_share").get<double>()));
   model.headline.emplace_back("run time", fmt::format("{:.0f} s", wall_s));
-  model.warnings.insert(model.warnings.end(), input.session.warnings.begin(), input.session.warnings.end());
+  model.warnings.insert(model.warnings.end(), input.session.warnings.begin(),
+                        input.session.warnings.end());
   for (const StageStatus& s : model.stages)
-    for (const std::string& warning : s.output.warnings) model.warnings.push_back(s.stage + ": " + warning);
+    for (const std::string& warning : s.output.warnings)
+      model.warnings.push_back(s.stage + ": " + warning);
   model.software = pipeline::software_version();
   model.created = input.session.created;
   model.configuration = in.config->settings().to_toml();

@@ -32,7 +32,8 @@ void add_train_fields(Settings& settings, const std::string& table, nerf::TrainO
       return value.is_discarded() ? json(text) : value;
     };
     setting.set = [&options, key](const json& value) {
-      return options.set(key, value.is_string() ? value.get<std::string>() : value.dump()).has_value();
+      return options.set(key, value.is_string() ? value.get<std::string>() : value.dump())
+          .has_value();
     };
     settings.add(std::move(setting));
   }
@@ -64,34 +65,40 @@ void add_poses(Settings& settings, PoseOptions& poses) {
                "Poses that the session carries replace the estimate");
   settings.add("poses.use_tracking_frames", poses.use_tracking_frames,
                "Thermal frames recorded between stations tie neighbours together");
-  settings.add("poses.max_image_side_px", poses.max_image_side_px, "Longest image side given to COLMAP");
+  settings.add("poses.max_image_side_px", poses.max_image_side_px,
+               "Longest image side given to COLMAP");
   settings.add("poses.max_features", poses.max_features, "SIFT features a view");
   settings.add("poses.min_posed_ratio", poses.min_posed_ratio,
                "Below this share of posed views the next method is tried");
   settings.add("poses.max_reprojection_rms_px", poses.max_reprojection_rms_px,
                "Above this error a model is not believed");
-  settings.add("poses.max_station_residual", poses.max_station_residual,
-               "A model that leaves the stations' orbit by more (share of the radius) is not believed");
+  settings.add(
+      "poses.max_station_residual", poses.max_station_residual,
+      "A model that leaves the stations' orbit by more (share of the radius) is not believed");
 }
 
 void add_depth(Settings& settings, depth::DepthOptions& depth) {
   settings.add("depth.width_px", depth.width_px, "Width of the visible views' depth maps");
   settings.add("depth.neighbours", depth.neighbours, "Views each view is matched with");
   settings.add("depth.best_neighbours", depth.best_neighbours, "Of these, the best so many count");
-  settings.add("depth.coarse_iterations", depth.coarse_iterations, "At half width, from random planes");
+  settings.add("depth.coarse_iterations", depth.coarse_iterations,
+               "At half width, from random planes");
   settings.add("depth.fine_iterations", depth.fine_iterations, "At full width");
   settings.add("depth.max_cost", depth.max_cost, "1 - NCC above which a match is none");
-  settings.add("depth.agreement", depth.agreement, "Relative difference below which two views agree");
+  settings.add("depth.agreement", depth.agreement,
+               "Relative difference below which two views agree");
   settings.add("depth.min_agreeing", depth.min_agreeing, "Views that must agree with a depth");
 }
 
 void add_render(Settings& settings, RenderConfig& render) {
-  settings.add_choice("render.path", render.path.path,
-                      {{PathKind::automatic, "auto"}, {PathKind::orbit, "orbit"}, {PathKind::path, "path"}},
-                      "New cameras on an orbit, between the recorded ones, or whichever suits the scene");
+  settings.add_choice(
+      "render.path", render.path.path,
+      {{PathKind::automatic, "auto"}, {PathKind::orbit, "orbit"}, {PathKind::path, "path"}},
+      "New cameras on an orbit, between the recorded ones, or whichever suits the scene");
   settings.add("render.views", render.path.views, "New cameras along the path");
   settings.add("render.width_px", render.path.width_px, "Width of a rendered image");
-  settings.add("render.azimuth_deg", render.path.azimuth_deg, "First new camera, from the first recorded one");
+  settings.add("render.azimuth_deg", render.path.azimuth_deg,
+               "First new camera, from the first recorded one");
   settings.add("render.elevation_deg", render.path.elevation_deg,
                "Of an orbit; below -89: the median of the recorded cameras");
   settings.add("render.radius_scale", render.path.radius_scale,
@@ -102,31 +109,39 @@ void add_render(Settings& settings, RenderConfig& render) {
 }
 
 void add_fuse(Settings& settings, FuseConfig& fuse) {
-  settings.add("fuse.methods", fuse.methods, "Any of heat, best, ms-srif, pca-msif, cnn-lpif; the first is shown first");
+  settings.add("fuse.methods", fuse.methods,
+               "Any of heat, best, ms-srif, pca-msif, cnn-lpif; the first is shown first");
   settings.add("fuse.color", fuse.options.color, "Keep the visible colours; false: gray");
-  settings.add("fuse.heat_palette", fuse.options.heat.palette, "Colours of what is warmer than its surroundings");
-  settings.add("fuse.heat_opacity", fuse.options.heat.opacity, "0..1: of the colour where it is hottest");
+  settings.add("fuse.heat_palette", fuse.options.heat.palette,
+               "Colours of what is warmer than its surroundings");
+  settings.add("fuse.heat_opacity", fuse.options.heat.opacity,
+               "0..1: of the colour where it is hottest");
   settings.add("fuse.heat_shading", fuse.options.heat.shading,
                "0..1: share of the colour's brightness that follows the visible picture");
   settings.add("fuse.heat_hatching", fuse.options.heat.hatching,
                "0..1: contrast of the hatching where nothing was measured");
   settings.add("fuse.overlay_palette", fuse.options.overlay.palette,
                "Palette whose hue tells the temperature in the fused image; empty: none");
-  settings.add("fuse.overlay_strength", fuse.options.overlay.strength, "0..1: its colour against the visible one");
+  settings.add("fuse.overlay_strength", fuse.options.overlay.strength,
+               "0..1: its colour against the visible one");
   settings.add("fuse.best_levels", fuse.options.best.levels, "Pyramid levels of best");
-  settings.add("fuse.best_sharpness", fuse.options.best.sharpness, "How hard best chooses between details");
+  settings.add("fuse.best_sharpness", fuse.options.best.sharpness,
+               "How hard best chooses between details");
   settings.add("fuse.best_contrast_kept", fuse.options.best.contrast_kept,
                "0..1: how far a detail's strength follows the level it moves to");
   settings.add("fuse.best_visible_preference", fuse.options.best.visible_preference,
                "Gray levels of structure the visible image has for free where neither has any");
   settings.add("fuse.best_brightness_weight", fuse.options.best.brightness_weight,
                "Share of brightness that counts as structure; 0 for black-hot thermal images");
-  settings.add("fuse.ms_srif_stride_px", fuse.options.ms_srif.stride_px, "Between patches of MS-SRIF's base");
+  settings.add("fuse.ms_srif_stride_px", fuse.options.ms_srif.stride_px,
+               "Between patches of MS-SRIF's base");
   settings.add("fuse.ms_srif_relative_residual", fuse.options.ms_srif.relative_residual,
                "Share of a patch's norm at which its code ends; 0 = the reference's stop");
   settings.add("fuse.ms_srif_certain_ratio", fuse.options.ms_srif.certain_ratio,
-               "Where one patch has so many times the other's structure no code is sought; 0: always sought");
-  settings.add("fuse.pca_msif_iterations", fuse.options.pca_msif.smoother.iterations, "Diffusion time of PCA-MSIF, in time steps");
+               "Where one patch has so many times the other's structure no code is sought; 0: "
+               "always sought");
+  settings.add("fuse.pca_msif_iterations", fuse.options.pca_msif.smoother.iterations,
+               "Diffusion time of PCA-MSIF, in time steps");
   settings.add("fuse.pca_msif_time_step", fuse.options.pca_msif.smoother.time_step,
                "At most 1: beyond it the diffusion diverges");
   settings.add("fuse.pca_msif_cycles", fuse.options.pca_msif.smoother.cycles,
@@ -139,8 +154,9 @@ void add_fuse(Settings& settings, FuseConfig& fuse) {
                "Side of the square over which those decisions are averaged; odd");
   settings.add("fuse.cnn_lpif_same_within", fuse.options.cnn_lpif.same_within,
                "Gray levels up to which the sources count as equal and the network is not asked");
-  settings.add("fuse.cnn_lpif_flat_within", fuse.options.cnn_lpif.flat_within,
-               "Gray levels within which a patch is flat and the network is not asked; -1: always asked");
+  settings.add(
+      "fuse.cnn_lpif_flat_within", fuse.options.cnn_lpif.flat_within,
+      "Gray levels within which a patch is flat and the network is not asked; -1: always asked");
 }
 
 }  // namespace
@@ -151,7 +167,8 @@ Result<std::vector<FusionMethod>> FuseConfig::chosen() const {
     ORBITFUSE_ASSIGN(const FusionMethod method, fusion_method(name));
     result.push_back(method);
   }
-  if (result.empty()) return fail(ErrorKind::usage, "fuse.methods", "empty", "name at least one method");
+  if (result.empty())
+    return fail(ErrorKind::usage, "fuse.methods", "empty", "name at least one method");
   return result;
 }
 
@@ -189,7 +206,8 @@ Status RunConfig::validate() const {
                   "must be at least 16");
   }
   if (const int width = train_thermal.depth_width_px; width != 0 && (width < 32 || width > 8192))
-    return fail(ErrorKind::usage, "train.thermal.depth_width_px", std::to_string(width), "choose 0 (none) or 32..8192");
+    return fail(ErrorKind::usage, "train.thermal.depth_width_px", std::to_string(width),
+                "choose 0 (none) or 32..8192");
   ORBITFUSE_TRY(render.path.validate());
   ORBITFUSE_TRY(render.quality.validate());
   ORBITFUSE_TRY(palette(render.palette));
@@ -207,8 +225,9 @@ Settings RunConfig::settings() {
   add_depth(settings, depth);
   add_train(settings, "train.visible", train_visible);
   add_train(settings, "train.thermal", train_thermal);
-  settings.add("train.thermal.depth_width_px", train_thermal.depth_width_px,
-               "Depth maps matched in thermal views where no visible field gives the geometry; 0: none");
+  settings.add(
+      "train.thermal.depth_width_px", train_thermal.depth_width_px,
+      "Depth maps matched in thermal views where no visible field gives the geometry; 0: none");
   add_render(settings, render);
   add_fuse(settings, fuse);
   return settings;

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "app/config/settings.hpp"
-#include "recon/assembly/new_views.hpp"
 #include "core/modality.hpp"
 #include "fusion/fuse/fuse.hpp"
+#include "recon/assembly/new_views.hpp"
 #include "recon/depth/options.hpp"
 #include "recon/nerf/nerf.hpp"
 #include "recon/poses/estimate_poses.hpp"
@@ -20,16 +20,16 @@ struct TrainConfig {
   nerf::TrainOptions options;
   int max_width_px = 400;  ///< training images; wider ones suit temperatures, these poses (run.md)
   nerf::ExportOptions cloud;
-  /// Depth maps of the thermal views themselves, where no visible field gives the geometry; 0 = none.
-  /// Wider ones match noise (nerf.md).
+  /// Depth maps of the thermal views themselves, where no visible field gives the geometry; 0 =
+  /// none. Wider ones match noise (nerf.md).
   int depth_width_px = 260;
 };
 
 struct RenderConfig {
   NewViewOptions path;
-  std::string cameras;             ///< transforms.json of given cameras; empty = `path`
+  std::string cameras;  ///< transforms.json of given cameras; empty = `path`
   std::string palette = "inferno";
-  double min_opacity = 0.5;        ///< below it a pixel has no temperature and isn't fused
+  double min_opacity = 0.5;  ///< below it a pixel has no temperature and isn't fused
   nerf::RenderOptions quality;
 };
 

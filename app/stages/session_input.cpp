@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <mutex>
 
-#include "core/system/file_io.hpp"
 #include "core/image/image_io.hpp"
+#include "core/system/file_io.hpp"
 #include "core/system/parallel.hpp"
 
 namespace orbitfuse::stages {

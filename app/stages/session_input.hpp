@@ -24,8 +24,8 @@ struct SessionInput {
   Samples samples(Modality modality) const;
 };
 
-/// What is wrong with each frame whose file is cut, changed beyond use or of another kind; every frame
-/// is looked at.
+/// What is wrong with each frame whose file is cut, changed beyond use or of another kind; every
+/// frame is looked at.
 Result<std::vector<Error>> damaged_frames(const Session& session, const Progress& progress);
 
 /// Input error that names the first frame whose file is missing, cut, or no image of the kind its

@@ -3,10 +3,10 @@
 
 #include "app/stages/artifacts.hpp"
 #include "app/stages/stage_list.hpp"
-#include "recon/assembly/thermal_depth.hpp"
 #include "app/stages/train_extension.hpp"
-#include "recon/assembly/training_data.hpp"
 #include "core/formats/ply.hpp"
+#include "recon/assembly/thermal_depth.hpp"
+#include "recon/assembly/training_data.hpp"
 #include "recon/nerf/nerf.hpp"
 
 namespace orbitfuse::stages {
@@ -24,10 +24,12 @@ Result<nerf::Field> guide_field(const StageContext& context) {
 }
 
 /// Keeps the poses that training ended with, if it moved them.
-Status take_refined_poses(const nerf::TrainReport& report, const std::filesystem::path& folder, Reconstruction& model) {
+Status take_refined_poses(const nerf::TrainReport& report, const std::filesystem::path& folder,
+                          Reconstruction& model) {
   if (report.refined_poses.empty()) return {};
   for (PosedView& view : model.views)
-    if (const auto refined = report.refined_poses.find(view.name); refined != report.refined_poses.end())
+    if (const auto refined = report.refined_poses.find(view.name);
+        refined != report.refined_poses.end())
       view.cam_from_world = refined->second;
   Reconstruction moved = model;
   moved.points.clear();  // they were where the views had been
@@ -56,25 +58,30 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
     }
   }
   ThermalDepth own_depth;
-  if (modality == Modality::thermal && guide.empty() && config.depth_width_px > 0 && options.depth_weight > 0) {
-    ORBITFUSE_ASSIGN(own_depth, add_thermal_depth(data, config.depth_width_px, options.holdout_every, options.seed,
-                                                  context.progress));
+  if (modality == Modality::thermal && guide.empty() && config.depth_width_px > 0 &&
+      options.depth_weight > 0) {
+    ORBITFUSE_ASSIGN(own_depth,
+                     add_thermal_depth(data, config.depth_width_px, options.holdout_every,
+                                       options.seed, context.progress));
     if (!own_depth.problem.empty())
-      output.skips.push_back({"depth of the thermal views", own_depth.problem, "the field learns from images alone"});
+      output.skips.push_back(
+          {"depth of the thermal views", own_depth.problem, "the field learns from images alone"});
   }
   options.checkpoint = context.folder / "checkpoint.bin";
   options.resume = true;  // where there is a checkpoint: of an interrupted attempt, or to extend
   if (!std::filesystem::exists(options.checkpoint)) {
     ORBITFUSE_ASSIGN(const int done, extend_training(context, resolved, options.checkpoint));
     if (done > 0)
-      output.skips.push_back({fmt::format("the first {} steps", done),
-                              "the last result has them, and only the length of the run has changed",
-                              "training goes on from there; --force starts from nothing"});
+      output.skips.push_back(
+          {fmt::format("the first {} steps", done),
+           "the last result has them, and only the length of the run has changed",
+           "training goes on from there; --force starts from nothing"});
   }
 
   nerf::Field field;
-  ORBITFUSE_ASSIGN(const nerf::TrainReport report,
-                   nerf::train(data, options, context.progress, field, guide.empty() ? nullptr : &guide));
+  ORBITFUSE_ASSIGN(
+      const nerf::TrainReport report,
+      nerf::train(data, options, context.progress, field, guide.empty() ? nullptr : &guide));
   ORBITFUSE_TRY(field.save(context.folder / field_file));
   ORBITFUSE_TRY(write_json(context.folder / "curve.json", curve_json(report)));
   ORBITFUSE_TRY(take_refined_poses(report, context.folder, model));
@@ -92,8 +99,8 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
   output.skips.insert(output.skips.end(), report.skips.begin(), report.skips.end());
   output.warnings.insert(output.warnings.end(), report.warnings.begin(), report.warnings.end());
   if (report.skipped_steps > 0)
-    output.warnings.push_back(fmt::format("{} training steps dropped: a gradient was not finite",
-                                          report.skipped_steps));
+    output.warnings.push_back(
+        fmt::format("{} training steps dropped: a gradient was not finite", report.skipped_steps));
   output.metrics = metrics_json(report);
   if (own_depth.known > 0) output.metrics["own_depth_known"] = own_depth.known;
   output.metrics["cloud_points"] = cloud ? cloud->size() : 0;

@@ -13,11 +13,13 @@ namespace {
 using nlohmann::json;
 
 /// How long a run goes on, and what is made of its field: not what it learns, nor how.
-constexpr const char* of_length[] = {"iterations", "budget_s", "target_psnr", "plateau_db", "eval_count",
-                                     "checkpoint_every_s", "cloud_width_px", "cloud_tolerance"};
+constexpr const char* of_length[] = {"iterations",     "budget_s",       "target_psnr",
+                                     "plateau_db",     "eval_count",     "checkpoint_every_s",
+                                     "cloud_width_px", "cloud_tolerance"};
 
 bool only_longer(const json& then, const json& now, const json& done) {
-  if (!then.is_object() || then.size() != now.size() || !done.contains("train_wall_s")) return false;
+  if (!then.is_object() || then.size() != now.size() || !done.contains("train_wall_s"))
+    return false;
   for (const auto& [key, value] : now.items()) {
     const bool length = std::count(std::begin(of_length), std::end(of_length), key) > 0;
     if (!then.contains(key) || (!length && then[key] != value)) return false;
@@ -37,8 +39,11 @@ double number(const json& j, const char* key) {
 json curve_json(const nerf::TrainReport& report) {
   json curve = json::array();
   for (const nerf::CurvePoint& p : report.curve)
-    curve.push_back({{"cpu_s", p.cpu_s}, {"wall_s", p.wall_s}, {"step", p.step},
-                     {"heldout_psnr", p.heldout_psnr}, {"train_psnr", p.train_psnr},
+    curve.push_back({{"cpu_s", p.cpu_s},
+                     {"wall_s", p.wall_s},
+                     {"step", p.step},
+                     {"heldout_psnr", p.heldout_psnr},
+                     {"train_psnr", p.train_psnr},
                      {"samples_per_ray", p.samples_per_ray}});
   return curve;
 }
@@ -72,8 +77,9 @@ Result<int> extend_training(const pipeline::StageContext& context, const json& o
   nerf::TrainReport report;
   try {
     for (const json& p : curve)
-      report.curve.push_back({p.at("cpu_s"), p.at("wall_s"), p.at("step"), number(p, "heldout_psnr"),
-                              number(p, "train_psnr"), p.at("samples_per_ray")});
+      report.curve.push_back({p.at("cpu_s"), p.at("wall_s"), p.at("step"),
+                              number(p, "heldout_psnr"), number(p, "train_psnr"),
+                              p.at("samples_per_ray")});
     report.best_psnr = number(done, "heldout_psnr_db");
     done.at("best_step").get_to(report.best_step);
     done.at("train_cpu_s").get_to(report.cpu_s);

@@ -56,7 +56,8 @@ void Console::clear_bar() {
 
 void Console::write_stdout(const std::string& line) {
   const std::string text = line + '\n';
-  const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
+  const bool written =
+      std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
   if (!written && output_error_ == 0) output_error_ = errno;
 }
 
@@ -73,7 +74,8 @@ std::string printable(const std::string& text) {
     const auto next = i + 1 < text.size() ? static_cast<unsigned char>(text[i + 1]) : 0u;
     if ((c < 0x20 && c != '\n' && c != '\t') || c == 0x7f) {
       out += fmt::format("\\x{:02x}", c);
-    } else if (c == 0xc2 && next >= 0x80 && next < 0xa0) {  // the same controls as two bytes of UTF-8
+    } else if (c == 0xc2 && next >= 0x80 &&
+               next < 0xa0) {  // the same controls as two bytes of UTF-8
       out += fmt::format("\\x{:02x}", next);
       ++i;
     } else {
@@ -105,21 +107,19 @@ void Console::warning(const std::string& text) {
   event({{"event", "warning"}, {"message", text}});
 }
 
-void Console::error(const Error& error) {
-  message("error: ", "\033[31m", error.message());
-}
+void Console::error(const Error& error) { message("error: ", "\033[31m", error.message()); }
 
 void Console::progress(const ProgressEvent& e) {
   const std::lock_guard lock(mutex_);
   const auto now = std::chrono::steady_clock::now();
-  const bool due = now - last_progress_ >= redraw_interval || e.stage != last_stage_ ||
-                   e.done >= e.total;
+  const bool due =
+      now - last_progress_ >= redraw_interval || e.stage != last_stage_ || e.done >= e.total;
   if (!due) return;
   last_progress_ = now;
   last_stage_ = e.stage;
   if (options_.json) {
-    nlohmann::json j = {{"event", "progress"}, {"stage", e.stage}, {"done", e.done},
-                        {"total", e.total}};
+    nlohmann::json j = {
+        {"event", "progress"}, {"stage", e.stage}, {"done", e.done}, {"total", e.total}};
     j["eta_s"] = e.eta_s >= 0 ? nlohmann::json(e.eta_s) : nlohmann::json(nullptr);
     if (!e.detail.empty()) j["detail"] = e.detail;
     write_stdout(line_of(j));

@@ -15,9 +15,9 @@ namespace orbitfuse::terminal {
 inline constexpr int json_schema = 1;
 
 struct ConsoleOptions {
-  bool json = false;     ///< NDJSON events on stdout instead of text
-  int verbosity = 0;     ///< < 0: errors only; > 0: details
-  bool terminal = false; ///< stderr is one: draw bars
+  bool json = false;      ///< NDJSON events on stdout instead of text
+  int verbosity = 0;      ///< < 0: errors only; > 0: details
+  bool terminal = false;  ///< stderr is one: draw bars
   bool color = false;
 };
 
@@ -59,7 +59,8 @@ class Console {
 };
 
 /// Names come from cards and archives: their control bytes must not reach the terminal, where they
-/// move the cursor and repaint lines. "\x1b[2J" is shown as written here; line breaks and tabs stay.
+/// move the cursor and repaint lines. "\x1b[2J" is shown as written here; line breaks and tabs
+/// stay.
 std::string printable(const std::string& text);
 
 /// Reads NO_COLOR, TERM and isatty.

@@ -19,12 +19,18 @@ enum ExitCode {
 
 constexpr ExitCode exit_code(ErrorKind kind) {
   switch (kind) {
-    case ErrorKind::usage: return exit_usage;
-    case ErrorKind::input: return exit_input;
-    case ErrorKind::device: return exit_device;
-    case ErrorKind::quality: return exit_quality;
-    case ErrorKind::unavailable: return exit_unavailable;
-    case ErrorKind::cancelled: return exit_interrupted;
+    case ErrorKind::usage:
+      return exit_usage;
+    case ErrorKind::input:
+      return exit_input;
+    case ErrorKind::device:
+      return exit_device;
+    case ErrorKind::quality:
+      return exit_quality;
+    case ErrorKind::unavailable:
+      return exit_unavailable;
+    case ErrorKind::cancelled:
+      return exit_interrupted;
   }
   return exit_internal;
 }

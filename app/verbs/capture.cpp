@@ -17,7 +17,8 @@ json known_or_null(const std::string& text) { return text.empty() ? json() : jso
 Status expect_frames(Context& context, const recording::Rehearsal& r) {
   if (r.frames > 0) return {};
   if (r.device.driver == "stills") {
-    context.console.info(r.device.id + ": no new photo came meanwhile; those that come to the folder will be taken");
+    context.console.info(
+        r.device.id + ": no new photo came meanwhile; those that come to the folder will be taken");
     return {};
   }
   return fail(ErrorKind::device, r.device.id, "opened, but delivered no frame",
@@ -29,7 +30,8 @@ Status rehearse(Context& context, const CaptureOptions& o, const recording::Came
       const auto list,
       recording::rehearse(cameras.sources, o.seconds > 0 ? o.seconds : 2, context.progress.cancel));
   if (context.progress.cancelled())
-    return fail(ErrorKind::cancelled, "capture", "dry run stopped by the user", "nothing was written");
+    return fail(ErrorKind::cancelled, "capture", "dry run stopped by the user",
+                "nothing was written");
   auto streams = json::array();
   for (const recording::Rehearsal& r : list) {
     context.console.data(fmt::format(
@@ -39,9 +41,9 @@ Status rehearse(Context& context, const CaptureOptions& o, const recording::Came
         r.missing));
     for (const auto& [reason, times] : r.reasons) {
       const auto last = r.details.find(reason);
-      context.console.warning(
-          fmt::format("{}: {} ({} {}){}", r.device.id, reason, times, times == 1 ? "time" : "times",
-                      last == r.details.end() ? "" : ", last " + last->second));
+      context.console.warning(fmt::format("{}: {} ({} {}){}", r.device.id, reason, times,
+                                          times == 1 ? "time" : "times",
+                                          last == r.details.end() ? "" : ", last " + last->second));
     }
     streams.push_back({{"device", r.device.id},
                        {"driver", r.device.driver},
@@ -67,7 +69,8 @@ struct Page {
   std::atomic<bool> started{false};
 };
 
-Status open_page(Context& context, const CaptureOptions& o, recording::Recording& recording, Page& page) {
+Status open_page(Context& context, const CaptureOptions& o, recording::Recording& recording,
+                 Page& page) {
   if (o.page.empty()) return {};
   ORBITFUSE_ASSIGN(const PageOptions options, page_of(o));
   PageHooks hooks;
@@ -166,8 +169,9 @@ Status run(Context& context, const CaptureOptions& o) {
   for (const DeviceInfo& device : recording.devices())
     context.console.info(device.id + ": " + described(device));
   if (options.live)
-    context.console.info(fmt::format("recording; {}n: shutter correction (NUC) now, q or Ctrl-C: stop",
-                                     options.guide ? "Enter: at the next station, " : ""));
+    context.console.info(
+        fmt::format("recording; {}n: shutter correction (NUC) now, q or Ctrl-C: stop",
+                    options.guide ? "Enter: at the next station, " : ""));
   Teller teller(context, recording, options.live, o.view);
   const auto ending = recording.run(context.progress.cancel, [&] { teller.tick(); });
   account(context, recording);

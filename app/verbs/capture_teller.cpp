@@ -39,7 +39,8 @@ void Teller::tell_alarms(const StreamStatus& s) {
     say_changed(s.device + what, now ? s.device + ": " + words : "");
   };
   say(" silent", s.silent && !s.away, "no frames");
-  say(" away", s.away.has_value(), "disconnected" + (s.away ? " (" + s.away->why + ")" : "") + ", reopening");
+  say(" away", s.away.has_value(),
+      "disconnected" + (s.away ? " (" + s.away->why + ")" : "") + ", reopening");
   say(" notice", !s.notice.empty(), s.notice);
   say(" dropped", s.dropped > 0, "the disk is too slow, frames are dropped and counted");
   say(" unwritten", s.unwritten > 0, "frames could not be written; is the disk full?");
@@ -70,9 +71,8 @@ void Teller::tell_guide() {
   const auto total = recording_.guide()->sectors().size();
   for (const LiveCamera& camera : recording_.guide()->cameras()) {
     const int done = recording_.guide()->done_count(camera.modality);
-    const std::string words =
-        fmt::format("{} {}/{}: {}", name(camera.modality), done, total,
-                    instruction_for(camera, Operator::at_terminal));
+    const std::string words = fmt::format("{} {}/{}: {}", name(camera.modality), done, total,
+                                          instruction_for(camera, Operator::at_terminal));
     std::string& last = said_[std::string(name(camera.modality))];
     if (words == last) continue;
     last = words;

@@ -74,7 +74,8 @@ Action add_doctor(CLI::App& app) {
   const auto folder = std::make_shared<std::string>(".");
   app.add_option("--folder", *folder, "Where sessions and results will lie")->capture_default_str();
   return [folder](Context& context) -> Status {
-    std::vector<Finding> findings{check_cpu(), check_memory(), doctor::check_disk(*folder, context.common.dry_run),
+    std::vector<Finding> findings{check_cpu(), check_memory(),
+                                  doctor::check_disk(*folder, context.common.dry_run),
                                   check_colmap()};
     const doctor::Machine machine;
     for (const auto& more : {doctor::check_clocks(machine), doctor::check_network(machine),
@@ -85,7 +86,8 @@ Action add_doctor(CLI::App& app) {
       findings.push_back(doctor::check_camera(machine, link_of(camera)));
     auto list = nlohmann::json::array();
     int problems = 0;
-    // What is missing on the machine weighs less than a disk that fails: that code says where to look.
+    // What is missing on the machine weighs less than a disk that fails: that code says where to
+    // look.
     ErrorKind kind = ErrorKind::unavailable;
     for (const Finding& f : findings) {
       const bool fine = f.remedy.empty();
@@ -102,7 +104,9 @@ Action add_doctor(CLI::App& app) {
     }
     context.result = {{"findings", list}, {"threads", thread_count()}};
     if (problems > 0)
-      return fail(kind, "doctor", fmt::format("{} to fix", problems == 1 ? "1 finding" : fmt::format("{} findings", problems)),
+      return fail(kind, "doctor",
+                  fmt::format("{} to fix",
+                              problems == 1 ? "1 finding" : fmt::format("{} findings", problems)),
                   "see the lines marked FIX");
     return {};
   };

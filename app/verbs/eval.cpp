@@ -16,14 +16,16 @@ struct Options {
   eval::EvaluateOptions evaluate;
 };
 
-void print_poses(terminal::Console& console, const json& result, const char* key, const char* label) {
+void print_poses(terminal::Console& console, const json& result, const char* key,
+                 const char* label) {
   if (!result.contains(key)) return;
   const json& j = result[key];
-  console.data(fmt::format("{:<22} {}/{} views, ATE {:.3f} % of the extent (max {:.3f}), rotation "
-                           "{:.3f} deg mean, {:.3f} max",
-                           label, j["posed"].get<int>(), j["total"].get<int>(),
-                           j["ate_percent"].get<double>(), j["ate_max_percent"].get<double>(),
-                           j["rotation_mean_deg"].get<double>(), j["rotation_max_deg"].get<double>()));
+  console.data(
+      fmt::format("{:<22} {}/{} views, ATE {:.3f} % of the extent (max {:.3f}), rotation "
+                  "{:.3f} deg mean, {:.3f} max",
+                  label, j["posed"].get<int>(), j["total"].get<int>(),
+                  j["ate_percent"].get<double>(), j["ate_max_percent"].get<double>(),
+                  j["rotation_mean_deg"].get<double>(), j["rotation_max_deg"].get<double>()));
 }
 
 void print(terminal::Console& console, const json& result) {
@@ -34,7 +36,8 @@ void print(terminal::Console& console, const json& result) {
   if (const auto it = result.find("test_views"); it != result.end()) {
     if (it->contains("visible_psnr_db"))
       console.data(fmt::format("{:<22} {:.2f} dB on {} test views", "visible field",
-                               it->at("visible_psnr_db").get<double>(), it->at("views").get<int>()));
+                               it->at("visible_psnr_db").get<double>(),
+                               it->at("views").get<int>()));
     if (it->contains("temperature_mae_c"))
       console.data(fmt::format("{:<22} MAE {:.3f} degC, {:.2f} dB, {:.0f} % of the scene covered",
                                "thermal field", it->at("temperature_mae_c").get<double>(),
@@ -50,8 +53,8 @@ Status run(Context& context, Options& o) {
   ORBITFUSE_ASSIGN(const GroundTruth truth, read_ground_truth(o.truth));
   if (!std::filesystem::is_directory(o.folders.out))
     return fail(ErrorKind::input, o.folders.out, "no such folder", "run the session first");
-  ORBITFUSE_ASSIGN(const json result, eval::evaluate(o.folders.out, session, truth, o.evaluate,
-                                                     context.progress));
+  ORBITFUSE_ASSIGN(const json result,
+                   eval::evaluate(o.folders.out, session, truth, o.evaluate, context.progress));
   if (!result.contains("poses_visible") && !result.contains("poses_thermal"))
     return fail(ErrorKind::input, o.truth,
                 fmt::format("nothing could be compared: {}",
@@ -69,8 +72,10 @@ Action add_eval(CLI::App& app) {
   add_folders(app, options->folders);
   app.add_option("--ground-truth", options->truth, "Exact poses and test views (docs/formats.md)")
       ->required();
-  app.add_option("--max-width", options->evaluate.max_width_px, "Test views are compared at this width")
-      ->check(CLI::Range(16, 8192))->capture_default_str();
+  app.add_option("--max-width", options->evaluate.max_width_px,
+                 "Test views are compared at this width")
+      ->check(CLI::Range(16, 8192))
+      ->capture_default_str();
   return [options](Context& context) { return run(context, *options); };
 }
 

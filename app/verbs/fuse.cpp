@@ -27,7 +27,8 @@ using ImageWriter = Status (*)(const fs::path&, const cv::Mat&);
 ImageWriter image_writer(const fs::path& file) {
   std::string extension = file.extension().string();
   for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  if (extension == ".png") return [](const fs::path& to, const cv::Mat& image) { return write_png(to, image); };
+  if (extension == ".png")
+    return [](const fs::path& to, const cv::Mat& image) { return write_png(to, image); };
   if (extension == ".jpg" || extension == ".jpeg")
     return [](const fs::path& to, const cv::Mat& image) { return write_jpeg(to, image); };
   return nullptr;
@@ -45,30 +46,36 @@ bool same_file(const fs::path& a, const fs::path& b) {
 /// What to write, told by the name; the user says where, and never onto an input.
 Status check_image_out(const Options& o) {
   if (!o.out_given)
-    return fail(ErrorKind::usage, "--out", "not given", "name the image to write, e.g. --out fused.png");
+    return fail(ErrorKind::usage, "--out", "not given",
+                "name the image to write, e.g. --out fused.png");
   if (!image_writer(o.folders.out))
-    return fail(ErrorKind::usage, "--out " + o.folders.out, "no name of a PNG or JPEG", "end it in .png or .jpg");
+    return fail(ErrorKind::usage, "--out " + o.folders.out, "no name of a PNG or JPEG",
+                "end it in .png or .jpg");
   for (const std::string& input : {o.visible, o.thermal, o.mask})
     if (same_file(o.folders.out, input))
-      return fail(ErrorKind::usage, "--out " + o.folders.out, "is an input too", "give another name");
+      return fail(ErrorKind::usage, "--out " + o.folders.out, "is an input too",
+                  "give another name");
   return {};
 }
 
 /// Pairs go to vi/, ir/ and fused/ below --out.
 Status check_folder_out(const Options& o) {
-  if (!o.out_given) return fail(ErrorKind::usage, "--out", "not given", "name the folder for the fused pairs");
+  if (!o.out_given)
+    return fail(ErrorKind::usage, "--out", "not given", "name the folder for the fused pairs");
   for (const std::string& input : {o.visible, o.thermal})
     for (const char* part : {"", "vi", "ir", "fused"})
       if (same_file(fs::path(o.folders.out) / part, input))
-        return fail(ErrorKind::usage, "--out " + o.folders.out, "would write into the input " + input, "give another folder");
+        return fail(ErrorKind::usage, "--out " + o.folders.out,
+                    "would write into the input " + input, "give another folder");
   return {};
 }
 
 /// The bar of what heat's colours stand for, beside the picture: OUT_legend.png.
-Status write_legend(Context& context, const fs::path& out, const cv::Mat& thermal, const FusionOptions& options,
-                    const FusionReport& said, int width) {
+Status write_legend(Context& context, const fs::path& out, const cv::Mat& thermal,
+                    const FusionOptions& options, const FusionReport& said, int width) {
   const auto unit = thermal.depth() == CV_32F ? fusion::HeatUnit::kelvin : fusion::HeatUnit::gray;
-  ORBITFUSE_ASSIGN(const cv::Mat legend, fusion::heat_legend({*said.heat, unit, options.heat}, width));
+  ORBITFUSE_ASSIGN(const cv::Mat legend,
+                   fusion::heat_legend({*said.heat, unit, options.heat}, width));
   const fs::path file = out.parent_path() / (out.stem().string() + "_legend.png");
   context.console.detail("what the colours stand for: " + file.string());
   context.result["legend"] = file.string();
@@ -88,12 +95,15 @@ Status fuse_pair(Context& context, const Options& o, const FusionOptions& option
   }
   ORBITFUSE_TRY(image_writer(o.folders.out)(o.folders.out, fused));
   context.console.data(o.folders.out);
-  context.result = {{"out", o.folders.out}, {"method", name(options.method)}, {"ms", 1000 * said.wall_s}};
-  if (said.heat) ORBITFUSE_TRY(write_legend(context, o.folders.out, thermal, options, said, fused.cols));
+  context.result = {
+      {"out", o.folders.out}, {"method", name(options.method)}, {"ms", 1000 * said.wall_s}};
+  if (said.heat)
+    ORBITFUSE_TRY(write_legend(context, o.folders.out, thermal, options, said, fused.cols));
   context.result["measured_share"] = 1 - said.unmeasured;
   context.result["skips"] = nlohmann::json::array();
   for (const Skip& skip : said.skips) {
-    context.result["skips"].push_back({{"what", skip.what}, {"why", skip.why}, {"effect", skip.effect}});
+    context.result["skips"].push_back(
+        {{"what", skip.what}, {"why", skip.why}, {"effect", skip.effect}});
     context.console.detail(fmt::format("skipped {}: {}; {}", skip.what, skip.why, skip.effect));
   }
   return {};
@@ -105,19 +115,24 @@ Status fuse_folder(Context& context, const Options& o, const FusionOptions& opti
     context.console.info("would write fused pairs below " + o.folders.out);
     return {};
   }
-  ORBITFUSE_ASSIGN(const batch::Summary summary,
-                   batch::fuse_folder(o.visible, o.thermal, o.folders.out, options, context.progress));
+  ORBITFUSE_ASSIGN(
+      const batch::Summary summary,
+      batch::fuse_folder(o.visible, o.thermal, o.folders.out, options, context.progress));
   for (const std::string& problem : summary.problems) context.console.warning(problem);
-  context.console.data(fmt::format("{} pairs fused, {} problems; {}", summary.fused, summary.problems.size(),
+  context.console.data(fmt::format("{} pairs fused, {} problems; {}", summary.fused,
+                                   summary.problems.size(),
                                    (fs::path(o.folders.out) / batch::metrics_file).string()));
-  context.result = {{"out", o.folders.out}, {"fused", summary.fused}, {"problems", summary.problems}};
+  context.result = {
+      {"out", o.folders.out}, {"fused", summary.fused}, {"problems", summary.problems}};
   return {};
 }
 
 Status run(Context& context, const Options& o) {
   if (o.visible.empty() && o.thermal.empty()) return run_stages(context, o.folders, {"fuse"});
-  for (const auto& [option, value] : {std::pair{"--visible", &o.visible}, {"--thermal", &o.thermal}})
-    if (value->empty()) return fail(ErrorKind::usage, option, "not given", "name both images, or both folders");
+  for (const auto& [option, value] :
+       {std::pair{"--visible", &o.visible}, {"--thermal", &o.thermal}})
+    if (value->empty())
+      return fail(ErrorKind::usage, option, "not given", "name both images, or both folders");
   FusionOptions options = context.config.fuse.options;
   ORBITFUSE_ASSIGN(options.method, fusion_method(o.method));
   options.color = !o.gray;
@@ -131,10 +146,12 @@ Action add_fuse(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   add_folders(app, options->folders);
   app.add_option("--visible", options->visible, "Visible image, or a folder of them");
-  app.add_option("--thermal", options->thermal, "Thermal image of the same size, or a folder with the same names");
+  app.add_option("--thermal", options->thermal,
+                 "Thermal image of the same size, or a folder with the same names");
   app.add_option("--mask", options->mask, "Gray image, 0 where the thermal image holds nothing");
   app.add_option("--method", options->method, "For files; a session fuses by fuse.methods")
-      ->check(CLI::IsMember(fusion_method_names()))->capture_default_str();
+      ->check(CLI::IsMember(fusion_method_names()))
+      ->capture_default_str();
   app.add_flag("--gray", options->gray, "Fuse to gray instead of keeping the visible colours");
   return [options, &app](Context& context) {
     options->out_given = app.count("--out") > 0;

@@ -30,32 +30,43 @@ void add_sources(CLI::App& app, Options& o) {
   constexpr const char* group = "Sources";
   app.add_option("--visible", o.import.visible, "Photos: folders or files")->group(group);
   app.add_option("--thermal", o.import.thermal,
-                 "Radiometric JPEG, 16-bit TIFF or PNG, 8-bit images: folders or files")->group(group);
+                 "Radiometric JPEG, 16-bit TIFF or PNG, 8-bit images: folders or files")
+      ->group(group);
   app.add_option("--visible-tracking", o.import.visible_tracking, "Photos taken between stations")
       ->group(group);
   app.add_option("--thermal-tracking", o.import.thermal_tracking, "Thermal frames between stations")
       ->group(group);
   app.add_flag("--embedded-visible", o.import.embedded_visible,
-               "Also take the photos embedded in radiometric JPEGs")->group(group);
-  app.add_flag("--rig", o.import.rig, "Images of equal name or time were shot at once by one device")
+               "Also take the photos embedded in radiometric JPEGs")
+      ->group(group);
+  app.add_flag("--rig", o.import.rig,
+               "Images of equal name or time were shot at once by one device")
       ->group(group);
 }
 
 void add_poses_known(CLI::App& app, Options& o) {
   constexpr const char* group = "Known poses and stations";
-  app.add_option("--transforms", o.import.transforms_json, "nerfstudio transforms.json")->group(group);
-  app.add_option("--visible-colmap", o.import.visible_colmap, "COLMAP model of the photos")->group(group);
+  app.add_option("--transforms", o.import.transforms_json, "nerfstudio transforms.json")
+      ->group(group);
+  app.add_option("--visible-colmap", o.import.visible_colmap, "COLMAP model of the photos")
+      ->group(group);
   app.add_option("--thermal-colmap", o.import.thermal_colmap, "COLMAP model of the thermal frames")
       ->group(group);
-  app.add_option("--ground-truth", o.import.ground_truth, "Exact poses (docs/formats.md)")->group(group);
+  app.add_option("--ground-truth", o.import.ground_truth, "Exact poses (docs/formats.md)")
+      ->group(group);
   app.add_flag("--priors-only", o.import.ground_truth_priors_only,
-               "Of --ground-truth take focal lengths and elevations, not the poses")->group(group);
+               "Of --ground-truth take focal lengths and elevations, not the poses")
+      ->group(group);
   app.add_option("--station-spacing-deg", o.spacing_deg,
-                 "The frames were taken in order at stations this far apart")->group(group);
+                 "The frames were taken in order at stations this far apart")
+      ->group(group);
   app.add_option("--loops", o.loops, "Loops of stations in each modality")->group(group);
-  app.add_option("--elevations-deg", o.elevations_deg, "Elevation of each loop, if known")->group(group);
-  app.add_option("--visible-focal-px", o.import.visible_focal_px, "Where the files name none")->group(group);
-  app.add_option("--thermal-focal-px", o.import.thermal_focal_px, "Where the files name none")->group(group);
+  app.add_option("--elevations-deg", o.elevations_deg, "Elevation of each loop, if known")
+      ->group(group);
+  app.add_option("--visible-focal-px", o.import.visible_focal_px, "Where the files name none")
+      ->group(group);
+  app.add_option("--thermal-focal-px", o.import.thermal_focal_px, "Where the files name none")
+      ->group(group);
 }
 
 void add_radiometry(CLI::App& app, Options& o) {
@@ -63,17 +74,23 @@ void add_radiometry(CLI::App& app, Options& o) {
   std::vector<std::string> words;
   for (const auto& [word, scale] : scales) words.push_back(word);
   app.add_option("--thermal-scale", o.scale, "How samples become temperatures")
-      ->check(CLI::IsMember(words))->capture_default_str()->group(group);
-  app.add_option("--kelvin-per-count", o.kelvin_per_count, "For --thermal-scale linear")->group(group);
+      ->check(CLI::IsMember(words))
+      ->capture_default_str()
+      ->group(group);
+  app.add_option("--kelvin-per-count", o.kelvin_per_count, "For --thermal-scale linear")
+      ->group(group);
   app.add_option("--kelvin-offset", o.kelvin_offset, "For --thermal-scale linear")->group(group);
-  app.add_option("--emissivity", o.import.object.emissivity, "Instead of the files' own")->group(group);
-  app.add_option("--distance-m", o.import.object.distance_m, "Instead of the files' own")->group(group);
+  app.add_option("--emissivity", o.import.object.emissivity, "Instead of the files' own")
+      ->group(group);
+  app.add_option("--distance-m", o.import.object.distance_m, "Instead of the files' own")
+      ->group(group);
   app.add_option("--reflected-c", o.reflected_c, "Reflected temperature")->group(group);
   app.add_option("--air-c", o.air_c, "Air temperature")->group(group);
   app.add_option("--humidity", o.humidity_percent, "Relative humidity in percent")->group(group);
 }
 
-/// Checked here in the units of the command line: a message that says 9 where 900 was typed helps nobody.
+/// Checked here in the units of the command line: a message that says 9 where 900 was typed helps
+/// nobody.
 Status check_ranges(const Options& o) {
   struct Range {
     const char* option;
@@ -90,7 +107,8 @@ Status check_ranges(const Options& o) {
                           {"--thermal-focal-px", o.import.thermal_focal_px, 1, 1e6}};
   for (const Range& r : ranges) {
     if (!r.value || (*r.value >= r.low && *r.value <= r.high)) continue;
-    return fail(ErrorKind::usage, r.option, fmt::format("{}", *r.value), fmt::format("must be {} to {}", r.low, r.high));
+    return fail(ErrorKind::usage, r.option, fmt::format("{}", *r.value),
+                fmt::format("must be {} to {}", r.low, r.high));
   }
   return {};
 }
@@ -140,10 +158,11 @@ Status check_alone(const Options& o) {
     return needs("--kelvin-per-count", "--thermal-scale linear");
   if (o.scale != "linear" && o.kelvin_offset)
     return needs("--kelvin-offset", "--thermal-scale linear");
-  const bool no_thermal = o.import.thermal.empty() && o.import.thermal_tracking.empty() &&
-                          !o.import.transforms_json;
+  const bool no_thermal =
+      o.import.thermal.empty() && o.import.thermal_tracking.empty() && !o.import.transforms_json;
   if (no_thermal && o.scale != "auto") return needs("--thermal-scale", "--thermal");
-  if (o.scale == "linear" && !o.kelvin_per_count) return needs("--thermal-scale linear", "--kelvin-per-count");
+  if (o.scale == "linear" && !o.kelvin_per_count)
+    return needs("--thermal-scale linear", "--kelvin-per-count");
   return {};
 }
 
@@ -157,15 +176,21 @@ Status run(Context& context, Options& o) {
                    dry ? rehearse_import(o.import, o.session, context.progress)
                        : import_session(o.import, o.session, context.progress));
   for (const std::string& warning : report.warnings) context.console.warning(warning);
-  context.console.data(fmt::format(
-      "{}{}: {} visible and {} thermal frames{}, {} tracking frames, {} with a pose, {} with a station",
-      dry ? "would make " : "", o.session, report.visible, report.thermal,
-      report.thermal == 0 ? "" : report.has_temperatures ? " with temperatures" : " without temperatures",
-      report.tracking, report.with_pose, report.with_station));
+  context.console.data(
+      fmt::format("{}{}: {} visible and {} thermal frames{}, {} tracking frames, {} with a pose, "
+                  "{} with a station",
+                  dry ? "would make " : "", o.session, report.visible, report.thermal,
+                  report.thermal == 0       ? ""
+                  : report.has_temperatures ? " with temperatures"
+                                            : " without temperatures",
+                  report.tracking, report.with_pose, report.with_station));
   if (dry) context.console.info("nothing was written");
-  context.result = {{"session", o.session},         {"visible", report.visible},
-                    {"thermal", report.thermal},    {"tracking", report.tracking},
-                    {"with_pose", report.with_pose}, {"with_station", report.with_station},
+  context.result = {{"session", o.session},
+                    {"visible", report.visible},
+                    {"thermal", report.thermal},
+                    {"tracking", report.tracking},
+                    {"with_pose", report.with_pose},
+                    {"with_station", report.with_station},
                     {"has_temperatures", report.has_temperatures},
                     {"kelvin_per_count", report.kelvin_per_count},
                     {"warnings", report.warnings}};

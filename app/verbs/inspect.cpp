@@ -106,7 +106,8 @@ Status inspect_run(Context& context, const fs::path& folder) {
   }
   context.result = {{"out", folder.string()}, {"stages", stages}, {"damaged", damaged}};
   if (damaged.empty()) return {};
-  return fail(ErrorKind::input, folder.string(), damaged.front(), "run again: what is damaged is made anew");
+  return fail(ErrorKind::input, folder.string(), damaged.front(),
+              "run again: what is damaged is made anew");
 }
 
 Status inspect_session(Context& context, const fs::path& folder) {
@@ -138,7 +139,8 @@ Status inspect_session(Context& context, const fs::path& folder) {
       for (const json& group : j["groups"]) context.console.data(described(group));
   }
   for (const std::string& warning : session.warnings) context.console.warning(warning);
-  ORBITFUSE_ASSIGN(const std::vector<Error> damaged, stages::damaged_frames(session, context.progress));
+  ORBITFUSE_ASSIGN(const std::vector<Error> damaged,
+                   stages::damaged_frames(session, context.progress));
   context.result["damaged"] = json::array();
   for (const Error& error : damaged) {
     context.result["damaged"].push_back(error.message());
@@ -146,8 +148,8 @@ Status inspect_session(Context& context, const fs::path& folder) {
   }
   if (damaged.empty()) return {};
   return fail(ErrorKind::input, folder.string(),
-              fmt::format("{} of {} frames are damaged, first {}", damaged.size(), session.frames.size(),
-                          damaged.front().where),
+              fmt::format("{} of {} frames are damaged, first {}", damaged.size(),
+                          session.frames.size(), damaged.front().where),
               "copy them from the original, or import the session again");
 }
 
@@ -158,8 +160,9 @@ Action add_inspect(CLI::App& app) {
   app.add_option("folder", *folder, "Session folder, or the --out folder of a run")->required();
   return [folder](Context& context) {
     std::error_code unreadable;  // inspect_session says why
-    return fs::exists(fs::path(*folder) / "run.json", unreadable) ? inspect_run(context, *folder)
-                                                                  : inspect_session(context, *folder);
+    return fs::exists(fs::path(*folder) / "run.json", unreadable)
+               ? inspect_run(context, *folder)
+               : inspect_session(context, *folder);
   };
 }
 

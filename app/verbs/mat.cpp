@@ -34,7 +34,8 @@ Status check_out(const std::string& out, bool force) {
   std::error_code error;
   const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
   if (!std::filesystem::is_directory(folder, error))
-    return fail(ErrorKind::input, folder.string(), "no such folder", "make it first, or choose another");
+    return fail(ErrorKind::input, folder.string(), "no such folder",
+                "make it first, or choose another");
   const auto status = std::filesystem::status(file, error);
   if (status.type() == std::filesystem::file_type::not_found) {
     if (::faccessat(AT_FDCWD, folder.c_str(), W_OK | X_OK, AT_EACCESS) == 0) return {};
@@ -45,7 +46,9 @@ Status check_out(const std::string& out, bool force) {
     return fail(ErrorKind::usage, "--out " + out, error.message(), "choose another name");
   if (!std::filesystem::is_regular_file(status))
     return fail(ErrorKind::input, out, "exists and is not a file", "choose another name");
-  if (!force) return fail(ErrorKind::input, out, "exists already", "choose another name, or overwrite it: --force");
+  if (!force)
+    return fail(ErrorKind::input, out, "exists already",
+                "choose another name, or overwrite it: --force");
   return {};
 }
 
@@ -78,7 +81,9 @@ Status run(Context& context, const Options& o) {
 
 Action add_mat(CLI::App& app) {
   const auto options = std::make_shared<Options>();
-  app.add_option("--out", options->out, "PDF to write; one that exists is overwritten only with --force")->required();
+  app.add_option("--out", options->out,
+                 "PDF to write; one that exists is overwritten only with --force")
+      ->required();
   app.add_option("--size-m", options->size_m, "Side of the whole mat")->capture_default_str();
   app.add_option("--paper", options->paper,
                  "A4, A3, A1: tiles to glue together; one: a single page for a plotter")

@@ -23,9 +23,11 @@ Status register_files(Context& context, const Options& o) {
   ORBITFUSE_ASSIGN(const PointCloud target, read_ply(o.target));
   RegistrationOptions options;
   options.seed = static_cast<std::uint32_t>(context.common.seed);
-  ORBITFUSE_ASSIGN(const RegistrationReport report, register_clouds(source, target, options, context.progress));
+  ORBITFUSE_ASSIGN(const RegistrationReport report,
+                   register_clouds(source, target, options, context.progress));
   for (const auto& fact : stages::facts(report))
-    context.console.data(fmt::format("{:<22} {}", fact[0].get<std::string>(), fact[1].get<std::string>()));
+    context.console.data(
+        fmt::format("{:<22} {}", fact[0].get<std::string>(), fact[1].get<std::string>()));
   if (report.ambiguous) context.console.warning("ambiguous: " + report.ambiguity);
   context.result = stages::to_json(report);
   return {};

@@ -16,7 +16,8 @@ struct Options {
 Action add_render(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   add_folders(app, options->folders);
-  app.add_option("--cameras", options->cameras, "transforms.json with the views, in the visible frame");
+  app.add_option("--cameras", options->cameras,
+                 "transforms.json with the views, in the visible frame");
   app.add_option("--path", options->path, "Where new cameras stand (render.path)")
       ->check(CLI::IsMember({"auto", "orbit", "path"}));
   app.add_option("--views", options->views, "New cameras (render.views)");

@@ -15,8 +15,9 @@ struct Options {
   std::string session, to, speed = "full";
 };
 
-Result<std::vector<std::unique_ptr<FrameSource>>> sources_of(Context& context, const Session& session,
-                                                            ReplaySpeed speed) {
+Result<std::vector<std::unique_ptr<FrameSource>>> sources_of(Context& context,
+                                                             const Session& session,
+                                                             ReplaySpeed speed) {
   std::vector<std::unique_ptr<FrameSource>> sources;
   for (const DeviceInfo& device : session.devices) {
     const bool has_frames =
@@ -35,8 +36,9 @@ Result<std::vector<std::unique_ptr<FrameSource>>> sources_of(Context& context, c
 Status run(Context& context, const Options& o) {
   ORBITFUSE_ASSIGN(const Session session, open_session(o.session));
   for (const std::string& warning : session.warnings) context.console.warning(warning);
-  ORBITFUSE_ASSIGN(auto sources, sources_of(context, session,
-                                            o.speed == "full" ? ReplaySpeed::full : ReplaySpeed::recorded));
+  ORBITFUSE_ASSIGN(
+      auto sources,
+      sources_of(context, session, o.speed == "full" ? ReplaySpeed::full : ReplaySpeed::recorded));
   recording::RecordingOptions options;
   options.session = o.to;
   options.resume = context.common.resume;
@@ -72,9 +74,11 @@ Status run(Context& context, const Options& o) {
 Action add_replay(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   app.add_option("session", options->session, "Recorded session")->required();
-  app.add_option("--to", options->to, "Session folder: new, or with --resume one to go on with")->required();
+  app.add_option("--to", options->to, "Session folder: new, or with --resume one to go on with")
+      ->required();
   app.add_option("--speed", options->speed, "full, or recorded: as long between frames as then")
-      ->check(CLI::IsMember({"full", "recorded"}))->capture_default_str();
+      ->check(CLI::IsMember({"full", "recorded"}))
+      ->capture_default_str();
   return [options](Context& context) { return run(context, *options); };
 }
 

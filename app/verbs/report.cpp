@@ -7,7 +7,9 @@ namespace orbitfuse::cli {
 Action add_report(CLI::App& app) {
   const auto folders = std::make_shared<StageFolders>();
   add_folders(app, *folders);
-  return [folders](Context& context) { return run_stages(context, *folders, {"report"}, Missing::leave_out); };
+  return [folders](Context& context) {
+    return run_stages(context, *folders, {"report"}, Missing::leave_out);
+  };
 }
 
 }  // namespace orbitfuse::cli

@@ -11,7 +11,8 @@ Action add_train(CLI::App& app) {
   const auto limits = std::make_shared<TrainingLimits>();
   add_folders(app, *folders);
   app.add_option("--modality", *modality, "Which field to train")
-      ->check(CLI::IsMember({"both", "visible", "thermal"}))->capture_default_str();
+      ->check(CLI::IsMember({"both", "visible", "thermal"}))
+      ->capture_default_str();
   add_limits(app, *limits);
   return [folders, modality, limits](Context& context) -> Status {
     std::vector<Modality> fields;

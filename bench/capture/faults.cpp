@@ -71,7 +71,9 @@ int record(const fs::path& folder, bool resume, std::uint32_t seed) {
   hooks.latest = [&](Modality modality) { return recording.latest(modality); };
   hooks.correct = [&] { return recording.request_correction(); };
   PageServer server(page, hooks);
-  const auto tell = [](const Error& error) { std::fprintf(stderr, "%s\n", error.message().c_str()); };
+  const auto tell = [](const Error& error) {
+    std::fprintf(stderr, "%s\n", error.message().c_str());
+  };
   if (const Status status = server.start(); !status) {
     tell(status.error());
     return refused;
@@ -138,7 +140,8 @@ class Campaign {
   }
   pid_t start(const fs::path& session, bool resume);
   void spoil(GevSimulator& camera);
-  void camera_fault(GevSimulator& camera, const char* name, GevFaults fault, std::chrono::milliseconds for_ms);
+  void camera_fault(GevSimulator& camera, const char* name, GevFaults fault,
+                    std::chrono::milliseconds for_ms);
   void spoil_disk(const fs::path& session);
   int end(pid_t child, bool kill, bool over_already);
   void violation(const std::string& what);
@@ -159,14 +162,15 @@ void Campaign::violation(const std::string& what) {
 }
 
 pid_t Campaign::start(const fs::path& session, bool resume) {
-  const std::string log = (folder_ / "log").string(), seed = std::to_string(random_()), where = session.string();
+  const std::string log = (folder_ / "log").string(), seed = std::to_string(random_()),
+                    where = session.string();
   const pid_t child = fork();
   if (child != 0) return child;
   const int fd = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);
   dup2(fd, 1);
   dup2(fd, 2);
-  execl("/proc/self/exe", "bench_capture_faults", "--record", where.c_str(), resume ? "resume" : "new",
-        seed.c_str(), static_cast<char*>(nullptr));
+  execl("/proc/self/exe", "bench_capture_faults", "--record", where.c_str(),
+        resume ? "resume" : "new", seed.c_str(), static_cast<char*>(nullptr));
   _exit(127);
 }
 
@@ -181,12 +185,24 @@ void Campaign::camera_fault(GevSimulator& camera, const char* name, GevFaults fa
 void Campaign::spoil(GevSimulator& camera) {
   GevFaults fault;
   switch (std::uniform_int_distribution<int>(0, 13)(random_)) {
-    case 0: fault.freeze = true; return camera_fault(camera, "freeze", fault, some_ms(500, 4000));
-    case 1: fault.stall = true; return camera_fault(camera, "stall", fault, some_ms(300, 2500));
-    case 2: fault.pause = true; return camera_fault(camera, "pause", fault, some_ms(300, 2500));
-    case 3: fault.mute_control = true; return camera_fault(camera, "mute", fault, some_ms(500, 8000));
-    case 4: fault.link_down = true; return camera_fault(camera, "link down", fault, some_ms(300, 5000));
-    case 5: fault.packet_loss = 0.01; return camera_fault(camera, "loss", fault, some_ms(500, 3000));
+    case 0:
+      fault.freeze = true;
+      return camera_fault(camera, "freeze", fault, some_ms(500, 4000));
+    case 1:
+      fault.stall = true;
+      return camera_fault(camera, "stall", fault, some_ms(300, 2500));
+    case 2:
+      fault.pause = true;
+      return camera_fault(camera, "pause", fault, some_ms(300, 2500));
+    case 3:
+      fault.mute_control = true;
+      return camera_fault(camera, "mute", fault, some_ms(500, 8000));
+    case 4:
+      fault.link_down = true;
+      return camera_fault(camera, "link down", fault, some_ms(300, 5000));
+    case 5:
+      fault.packet_loss = 0.01;
+      return camera_fault(camera, "loss", fault, some_ms(500, 3000));
     case 6:
       fault.packet_loss = 0.005;
       fault.answer_resend = false;
@@ -194,9 +210,15 @@ void Campaign::spoil(GevSimulator& camera) {
     case 7:
       fault.reorder = fault.duplicate = 0.02;
       return camera_fault(camera, "reorder, duplicate", fault, some_ms(500, 3000));
-    case 8: fault.short_frame_every = 5; return camera_fault(camera, "short", fault, some_ms(500, 3000));
-    case 9: fault.wrong_size_every = 5; return camera_fault(camera, "lower", fault, some_ms(500, 3000));
-    case 10: fault.wrong_format_every = 5; return camera_fault(camera, "format", fault, some_ms(500, 3000));
+    case 8:
+      fault.short_frame_every = 5;
+      return camera_fault(camera, "short", fault, some_ms(500, 3000));
+    case 9:
+      fault.wrong_size_every = 5;
+      return camera_fault(camera, "lower", fault, some_ms(500, 3000));
+    case 10:
+      fault.wrong_format_every = 5;
+      return camera_fault(camera, "format", fault, some_ms(500, 3000));
     case 11:
       ++faults_["clock step"];
       camera.step_clock(chance() < 0.5 ? -3.2 : 5);
@@ -259,7 +281,8 @@ bool Campaign::round() {
   fs::remove(session / "page.port", ignored);
   const pid_t child = start(session, resume);
   const auto limit = Clock::now() + 20s;
-  while (!fs::exists(session / "page.port") && Clock::now() < limit) std::this_thread::sleep_for(20ms);
+  while (!fs::exists(session / "page.port") && Clock::now() < limit)
+    std::this_thread::sleep_for(20ms);
   const int port = std::atoi(read_file(session / "page.port").value_or("0").c_str());
   std::unique_ptr<SlowPeers> peers;
   if (chance() < 0.5) {
@@ -288,9 +311,11 @@ bool Campaign::round() {
   const bench::Checked checked = bench::check_session(session, kill_it);
   for (const std::string& what : checked.violations) violation(what);
   if (!kill_it && checked.complete != (code == 0))
-    violation(fmt::format("exit code {} and {} session", code, checked.complete ? "a complete" : "an incomplete"));
+    violation(fmt::format("exit code {} and {} session", code,
+                          checked.complete ? "a complete" : "an incomplete"));
   if (!checked.violations.empty())
-    fs::copy(session, folder_ / fmt::format("violation{}", rounds_), fs::copy_options::recursive, ignored);
+    fs::copy(session, folder_ / fmt::format("violation{}", rounds_), fs::copy_options::recursive,
+             ignored);
   frames_ += checked.frames;
   lost_ += checked.lost;
   may_resume_ = checked.violations.empty() && checked.frames < 3000;
@@ -298,8 +323,10 @@ bool Campaign::round() {
 }
 
 void Campaign::report() const {
-  fmt::print("{} recordings, {} of them killed; {} frames checked, {} lost and accounted for; slowest end {:.2f} s\n",
-             rounds_, killed_, frames_, lost_, slowest_exit_s_);
+  fmt::print(
+      "{} recordings, {} of them killed; {} frames checked, {} lost and accounted for; slowest end "
+      "{:.2f} s\n",
+      rounds_, killed_, frames_, lost_, slowest_exit_s_);
   for (const auto& [name, times] : faults_) fmt::print("  {:<22} {}\n", name, times);
   fmt::print("{} violations\n", violations_);
 }
@@ -309,7 +336,9 @@ void Campaign::report() const {
 int main(int argc, char** argv) {
   const std::vector<std::string> words(argv + 1, argv + argc);
   if (words.size() == 4 && words[0] == "--record")
-    std::_Exit(record(words[1], words[2] == "resume", static_cast<std::uint32_t>(std::stoul(words[3]))));  // as the program ends: its exit handlers wait for nobody
+    std::_Exit(record(words[1], words[2] == "resume",
+                      static_cast<std::uint32_t>(std::stoul(
+                          words[3]))));  // as the program ends: its exit handlers wait for nobody
   double minutes = 1;
   unsigned long seed = 1;
   fs::path folder = fs::temp_directory_path() / fmt::format("capture_faults.{}", getpid());

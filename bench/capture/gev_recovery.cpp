@@ -134,8 +134,9 @@ std::optional<Outage> run(const Case& c) {
   outage.back_s = seconds(*watcher.back_at - returned);
   outage.ids_missing = watcher.first_id - last_id - 1;
   const double by_time = seconds(*watcher.back_at - last_at) * camera_options.rate_hz - 1;
-  outage.account_right = watcher.shift == shift_before ||
-                         (c.kill && std::abs(static_cast<double>(outage.ids_missing) - by_time) < 4);
+  outage.account_right =
+      watcher.shift == shift_before ||
+      (c.kill && std::abs(static_cast<double>(outage.ids_missing) - by_time) < 4);
   return outage;
 }
 
@@ -153,8 +154,8 @@ int main(int argc, char** argv) {
       {"unowned: mute 8 s", 8, false, false, fault(&GevFaults::mute_control)},
       {"unowned: restarted after 3 s", 3, false, true, {}}};
   std::printf("%d times each; unowned: a camera that obeys whoever writes\n", times);
-  std::printf("%-30s %10s %10s %14s %12s %14s\n", "case", "told s", "back s", "reconnections", "ids missing",
-              "account right");
+  std::printf("%-30s %10s %10s %14s %12s %14s\n", "case", "told s", "back s", "reconnections",
+              "ids missing", "account right");
   bool good = true;
   for (const Case& c : cases) {
     double told = 0, back = 0;
@@ -175,9 +176,10 @@ int main(int argc, char** argv) {
       fewest_ids = std::min(fewest_ids, outage->ids_missing);
       most_ids = std::max(most_ids, outage->ids_missing);
     }
-    std::printf("%-30s %10.2f %10.2f %8d of %2d %6llu-%llu %8d of %2d%s\n", c.name, told, back, once, times,
-                static_cast<unsigned long long>(fewest_ids), static_cast<unsigned long long>(most_ids), right,
-                times, came == times ? "" : "  NOT BACK");
+    std::printf("%-30s %10.2f %10.2f %8d of %2d %6llu-%llu %8d of %2d%s\n", c.name, told, back,
+                once, times, static_cast<unsigned long long>(fewest_ids),
+                static_cast<unsigned long long>(most_ids), right, times,
+                came == times ? "" : "  NOT BACK");
     std::fflush(stdout);
     good = good && came == times && once == times && right == times && back < 3;
   }

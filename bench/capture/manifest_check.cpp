@@ -35,14 +35,16 @@ bool is_simulated(const cv::Mat& image) {
   return false;
 }
 
-void check_image(const std::filesystem::path& folder, const json& line, std::vector<std::string>& bad) {
+void check_image(const std::filesystem::path& folder, const json& line,
+                 std::vector<std::string>& bad) {
   const std::string name = line.at("file");
   const cv::Mat image = cv::imread((folder / name).string(), cv::IMREAD_UNCHANGED);
   if (image.empty()) {
     bad.push_back(name + " cannot be read");
   } else if (image.cols != line.at("width") || image.rows != line.at("height")) {
     bad.push_back(name + " has another size than its line");
-  } else if (line.at("modality") == "thermal" && (image.type() != CV_16UC1 || !is_simulated(image))) {
+  } else if (line.at("modality") == "thermal" &&
+             (image.type() != CV_16UC1 || !is_simulated(image))) {
     bad.push_back(name + " is not what the camera sent");
   }
 }
@@ -63,8 +65,8 @@ void check_stream(const json& line, Stream& stream, std::vector<std::string>& ba
   const std::uint64_t first = line.at("first_sequence"), last = line.at("last_sequence"),
                       received = line.at("received"), lost = line.at("lost");
   if (received + lost != last - first + 1)
-    bad.push_back(fmt::format("{}: {} received and {} lost are not {} to {}", device, received, lost,
-                              first, last));
+    bad.push_back(fmt::format("{}: {} received and {} lost are not {} to {}", device, received,
+                              lost, first, last));
   if (received != stream.frames || lost != stream.lost)
     bad.push_back(fmt::format("{}: its stream line says {} and {}, its lines {} and {}", device,
                               received, lost, stream.frames, stream.lost));
@@ -84,7 +86,8 @@ Checked check_session(const std::filesystem::path& folder, bool killed) {
     at_end = manifest.eof();
     const json line = json::parse(text, nullptr, false);
     if (line.is_discarded()) {
-      if (!(killed && at_end)) result.violations.push_back("a line is no JSON: " + text.substr(0, 60));
+      if (!(killed && at_end))
+        result.violations.push_back("a line is no JSON: " + text.substr(0, 60));
       continue;
     }
     const std::string type = line.value("type", "");

@@ -10,8 +10,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "capture/image_quality/frame_quality.hpp"
 #include "capture/guide/coverage.hpp"
+#include "capture/image_quality/frame_quality.hpp"
 #include "core/image/image_io.hpp"
 #include "drivers/stills/thermal_decoder.hpp"
 #include "tests/support/shared_data.hpp"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// bench_cnn_lpif [FOLDER] : CNN-LPIF's knobs on the reference pairs (default ../shared/data/fusion):
-// mean Qabf, Qcb, Qcv, SSIM, share of patches skipped, and wall and CPU ms of a 640x480 pair (best of 7).
+// bench_cnn_lpif [FOLDER] : CNN-LPIF's knobs on the reference pairs (default
+// ../shared/data/fusion): mean Qabf, Qcb, Qcv, SSIM, share of patches skipped, and wall and CPU ms
+// of a 640x480 pair (best of 7).
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -42,7 +43,8 @@ std::vector<Pair> load_pairs(const fs::path& folder) {
     const std::string name = file.string();
     if (!name.ends_with("_ir.png")) continue;
     const std::string visible = name.substr(0, name.size() - 6) + "vis.png";
-    pairs.push_back({cv::imread(visible, cv::IMREAD_GRAYSCALE), cv::imread(name, cv::IMREAD_GRAYSCALE)});
+    pairs.push_back(
+        {cv::imread(visible, cv::IMREAD_GRAYSCALE), cv::imread(name, cv::IMREAD_GRAYSCALE)});
   }
   return pairs;
 }
@@ -54,7 +56,9 @@ void show(const std::string& what, const std::vector<Pair>& pairs, const CnnLpif
   for (const Pair& pair : pairs) {
     fusion::CnnLpifReport report;
     cv::Mat fused;
-    fusion::fuse_cnn_lpif(floats(pair.visible), floats(pair.thermal), options, &report).value().convertTo(fused, CV_8U);
+    fusion::fuse_cnn_lpif(floats(pair.visible), floats(pair.thermal), options, &report)
+        .value()
+        .convertTo(fused, CV_8U);
     skipped += report.patches_skipped / count;
     const auto values = fusion_metrics(pair.visible, pair.thermal, fused).value();
     for (const MetricValue& m : values) mean[m.name] += m.value / count;
@@ -68,10 +72,12 @@ void show(const std::string& what, const std::vector<Pair>& pairs, const CnnLpif
     const std::clock_t cpu = std::clock();
     if (!fusion::fuse_cnn_lpif(v, t, options)) std::exit(3);
     cpu_ms = std::min(cpu_ms, 1e3 * static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC);
-    wall_ms = std::min(wall_ms, std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+    wall_ms = std::min(
+        wall_ms, std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+                     .count());
   }
-  fmt::print("| {} | {:.4f} | {:.4f} | {:.1f} | {:.4f} | {:.1f} % | {:.1f} | {:.1f} |\n", what, mean["Qabf"], mean["Qcb"],
-             mean["Qcv"], mean["SSIM"], 100 * skipped, wall_ms, cpu_ms);
+  fmt::print("| {} | {:.4f} | {:.4f} | {:.1f} | {:.4f} | {:.1f} % | {:.1f} | {:.1f} |\n", what,
+             mean["Qabf"], mean["Qcb"], mean["Qcv"], mean["SSIM"], 100 * skipped, wall_ms, cpu_ms);
   std::fflush(stdout);
 }
 
@@ -84,8 +90,11 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "{}: no pairs; give the folder of the reference pairs\n", folder.string());
     return 3;
   }
-  fmt::print("{}, {} threads, {} pairs\n\n| knob | Qabf | Qcb | Qcv | SSIM | skipped | wall ms | CPU ms |\n"
-             "|---|---|---|---|---|---|---|---|\n", cpu_description(), thread_count(), pairs.size());
+  fmt::print(
+      "{}, {} threads, {} pairs\n\n| knob | Qabf | Qcb | Qcv | SSIM | skipped | wall ms | CPU ms "
+      "|\n"
+      "|---|---|---|---|---|---|---|---|\n",
+      cpu_description(), thread_count(), pairs.size());
   show("defaults", pairs, {});
   const auto vary = [&](const char* name, auto CnnLpifOptions::*field, auto values) {
     for (const auto value : values) {
@@ -96,7 +105,9 @@ int main(int argc, char** argv) {
   };
   vary("network_bands", &CnnLpifOptions::network_bands, std::initializer_list<int>{0, 1, 2, 3, 5});
   vary("vote_px", &CnnLpifOptions::vote_px, std::initializer_list<int>{1, 3, 5, 9});
-  vary("match_threshold", &CnnLpifOptions::match_threshold, std::initializer_list<double>{0.4, 0.6, 1.0});
-  vary("same_within", &CnnLpifOptions::same_within, std::initializer_list<double>{0.0, 4.0, 8.0, 16.0});
+  vary("match_threshold", &CnnLpifOptions::match_threshold,
+       std::initializer_list<double>{0.4, 0.6, 1.0});
+  vary("same_within", &CnnLpifOptions::same_within,
+       std::initializer_list<double>{0.0, 4.0, 8.0, 16.0});
   return 0;
 }

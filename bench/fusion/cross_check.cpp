@@ -30,13 +30,15 @@ Scores bar_of(const std::map<std::string, std::vector<Scores>>& references, cons
 
 /// How far beyond the bar the worst score is, as a share of the bar.
 double margin(const Scores& s, const Scores& bar) {
-  return std::min({s.at("Qabf") / bar.at("Qabf") - 1, s.at("Qcb") / bar.at("Qcb") - 1, 1 - s.at("Qcv") / bar.at("Qcv")});
+  return std::min({s.at("Qabf") / bar.at("Qabf") - 1, s.at("Qcb") / bar.at("Qcb") - 1,
+                   1 - s.at("Qcv") / bar.at("Qcv")});
 }
 
-void print_row(const char* what, const char* on, const fusion::BestOptions& o, const Scores& s, const Scores& bar) {
-  fmt::print("| {} | {} | {}, {}, {} | {:.4f} ({:.4f}) | {:.4f} ({:.4f}) | {:.1f} ({:.1f}) |\n", what, on, o.contrast_kept,
-             o.visible_preference, o.brightness_weight, s.at("Qabf"), bar.at("Qabf"), s.at("Qcb"), bar.at("Qcb"),
-             s.at("Qcv"), bar.at("Qcv"));
+void print_row(const char* what, const char* on, const fusion::BestOptions& o, const Scores& s,
+               const Scores& bar) {
+  fmt::print("| {} | {} | {}, {}, {} | {:.4f} ({:.4f}) | {:.4f} ({:.4f}) | {:.1f} ({:.1f}) |\n",
+             what, on, o.contrast_kept, o.visible_preference, o.brightness_weight, s.at("Qabf"),
+             bar.at("Qabf"), s.at("Qcb"), bar.at("Qcb"), s.at("Qcv"), bar.at("Qcv"));
 }
 
 }  // namespace
@@ -60,17 +62,23 @@ int cross_check(const std::filesystem::path& folder) {
       }
   Half even, odd;
   for (std::size_t i = 0; i < pairs.size(); ++i) (i % 2 == 0 ? even : odd).push_back(i);
-  fmt::print("| chosen on | scored on | contrast kept, visible preference, brightness weight | Qabf (bar) | Qcb (bar) | Qcv (bar) |\n"
-             "|---|---|---|---|---|---|\n");
+  fmt::print(
+      "| chosen on | scored on | contrast kept, visible preference, brightness weight | Qabf (bar) "
+      "| Qcb (bar) | Qcv (bar) |\n"
+      "|---|---|---|---|---|---|\n");
   const FusionOptions defaults;
   for (const auto& [here, there, here_name, there_name] :
-       {std::tuple{&even, &odd, "even pairs", "odd pairs"}, {&odd, &even, "odd pairs", "even pairs"}}) {
+       {std::tuple{&even, &odd, "even pairs", "odd pairs"},
+        {&odd, &even, "odd pairs", "even pairs"}}) {
     const Scores bar_here = bar_of(references, *here), bar_there = bar_of(references, *there);
-    const auto chosen = std::max_element(candidates.begin(), candidates.end(), [&](const Candidate& a, const Candidate& b) {
-      return margin(mean_of(a.scores, *here), bar_here) < margin(mean_of(b.scores, *here), bar_here);
-    });
+    const auto chosen = std::max_element(candidates.begin(), candidates.end(),
+                                         [&](const Candidate& a, const Candidate& b) {
+                                           return margin(mean_of(a.scores, *here), bar_here) <
+                                                  margin(mean_of(b.scores, *here), bar_here);
+                                         });
     print_row(here_name, there_name, chosen->options, mean_of(chosen->scores, *there), bar_there);
-    print_row("defaults", there_name, defaults.best, mean_of(scores(pairs, defaults), *there), bar_there);
+    print_row("defaults", there_name, defaults.best, mean_of(scores(pairs, defaults), *there),
+              bar_there);
   }
   return 0;
 }

@@ -25,17 +25,20 @@ namespace fs = std::filesystem;
 }  // namespace
 
 std::vector<Pair> load_pairs(const fs::path& folder) {
-  if (!fs::exists(folder / "pairs")) give_up(folder.string() + ": no pairs; give the folder of the reference pairs");
+  if (!fs::exists(folder / "pairs"))
+    give_up(folder.string() + ": no pairs; give the folder of the reference pairs");
   std::vector<Pair> pairs;
   for (const auto& entry : fs::directory_iterator(folder / "pairs")) {
     const std::string file = entry.path().filename().string();
     if (!file.ends_with("_ir.png")) continue;
     const std::string name = file.substr(0, file.size() - 7);
-    pairs.push_back({name, cv::imread((folder / "pairs" / (name + "_vis.png")).string(), cv::IMREAD_GRAYSCALE),
-                     cv::imread(entry.path().string(), cv::IMREAD_GRAYSCALE)});
+    pairs.push_back(
+        {name, cv::imread((folder / "pairs" / (name + "_vis.png")).string(), cv::IMREAD_GRAYSCALE),
+         cv::imread(entry.path().string(), cv::IMREAD_GRAYSCALE)});
   }
   if (pairs.empty()) give_up(folder.string() + "/pairs: no NAME_ir.png");
-  std::sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.name < b.name; });
+  std::sort(pairs.begin(), pairs.end(),
+            [](const Pair& a, const Pair& b) { return a.name < b.name; });
   return pairs;
 }
 
@@ -52,7 +55,8 @@ std::vector<std::string> scored_methods() {
   return names;
 }
 
-std::map<std::string, std::vector<Scores>> reference_scores(const fs::path& folder, const std::vector<Pair>& pairs) {
+std::map<std::string, std::vector<Scores>> reference_scores(const fs::path& folder,
+                                                            const std::vector<Pair>& pairs) {
   std::ifstream file(folder / "reference" / "metrics.csv");
   std::map<std::string, std::vector<Scores>> result;
   std::string line;
@@ -66,7 +70,8 @@ std::map<std::string, std::vector<Scores>> reference_scores(const fs::path& fold
     std::getline(fields, value, ',');
     if (metric == "SSIM") continue;  // VIFB's sum over the sources; ours is the mean
     if (metric == "SSIM_mean") metric = "SSIM";
-    const auto found = std::find_if(pairs.begin(), pairs.end(), [&](const Pair& p) { return p.name == pair; });
+    const auto found =
+        std::find_if(pairs.begin(), pairs.end(), [&](const Pair& p) { return p.name == pair; });
     if (found == pairs.end()) continue;
     auto& of_method = result[method];
     of_method.resize(pairs.size());
@@ -74,7 +79,9 @@ std::map<std::string, std::vector<Scores>> reference_scores(const fs::path& fold
   }
   for (auto& [method, of_method] : result)
     for (std::size_t i = 0; i < pairs.size(); ++i) {
-      const cv::Mat fused = cv::imread((folder / "reference" / method / (pairs[i].name + ".png")).string(), cv::IMREAD_GRAYSCALE);
+      const cv::Mat fused =
+          cv::imread((folder / "reference" / method / (pairs[i].name + ".png")).string(),
+                     cv::IMREAD_GRAYSCALE);
       if (fused.empty()) continue;  // of the trivial methods there are no images
       const auto values = fusion_metrics(pairs[i].visible, pairs[i].thermal, fused).value();
       of_method[i]["halo"] = values.back().value;

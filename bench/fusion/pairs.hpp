@@ -18,7 +18,8 @@ struct Pair {
   cv::Mat visible, thermal;
 };
 
-/// <folder>/pairs/NAME_vis.png and NAME_ir.png as gray, by name. Ends the program when there is none.
+/// <folder>/pairs/NAME_vis.png and NAME_ir.png as gray, by name. Ends the program when there is
+/// none.
 std::vector<Pair> load_pairs(const std::filesystem::path& folder);
 /// The first pair at 640x480, for times.
 Pair timed_pair(const std::vector<Pair>& pairs);
@@ -40,7 +41,8 @@ Scores mean(const std::vector<Scores>& scores);
 /// CPU time of all threads.
 double process_cpu_ms();
 
-/// Least of several runs. CPU time holds on a machine with other work, wall time only on an idle one.
+/// Least of several runs. CPU time holds on a machine with other work, wall time only on an idle
+/// one.
 struct Times {
   double wall_ms = 1e9, cpu_ms = 1e9;
 };
@@ -53,7 +55,8 @@ Times times_of(int runs, const Work& work) {
     const double cpu = process_cpu_ms();
     work();
     best.cpu_ms = std::min(best.cpu_ms, process_cpu_ms() - cpu);
-    best.wall_ms = std::min(best.wall_ms, std::chrono::duration<double, std::milli>(Clock::now() - start).count());
+    best.wall_ms = std::min(
+        best.wall_ms, std::chrono::duration<double, std::milli>(Clock::now() - start).count());
   }
   return best;
 }

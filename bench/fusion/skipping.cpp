@@ -18,11 +18,13 @@ struct Comparison {
 /// 255 in an ellipse of a third of the image's width and height: a thermal field that covers part.
 cv::Mat1b partial_mask(cv::Size size) {
   cv::Mat1b mask = cv::Mat1b::zeros(size);
-  cv::ellipse(mask, {size.width / 2, size.height / 2}, {size.width / 6, size.height / 6}, 0, 0, 360, 255, cv::FILLED);
+  cv::ellipse(mask, {size.width / 2, size.height / 2}, {size.width / 6, size.height / 6}, 0, 0, 360,
+              255, cv::FILLED);
   return mask;
 }
 
-double qabf(const Pair& pair, const cv::Mat& mask, const FusionOptions& options, FusionReport& report) {
+double qabf(const Pair& pair, const cv::Mat& mask, const FusionOptions& options,
+            FusionReport& report) {
   const cv::Mat fused = fuse(pair.visible, pair.thermal, mask, options, &report).value();
   const auto values = fusion_metrics(pair.visible, pair.thermal, fused).value();
   for (const MetricValue& v : values)
@@ -42,8 +44,9 @@ Comparison compare(const Pair& pair, const cv::Mat& mask, FusionOptions options)
 }
 
 void print(const std::string& what, const Comparison& c) {
-  fmt::print("| {} | {:.1f} % | {:.1f} % | {:.1f} % | {:.4f} | {:.4f} |\n", what, 100 * c.skipped.patches,
-             100 * c.skipped.pixels, 100 * c.skipped.levels, c.before, c.before - c.after);
+  fmt::print("| {} | {:.1f} % | {:.1f} % | {:.1f} % | {:.4f} | {:.4f} |\n", what,
+             100 * c.skipped.patches, 100 * c.skipped.pixels, 100 * c.skipped.levels, c.before,
+             c.before - c.after);
 }
 
 /// A line for each pair on which anything was skipped, and the mean over all.
@@ -51,8 +54,10 @@ void compare_all(const std::vector<Pair>& pairs, const FusionOptions& options, b
   Comparison mean;
   const auto n = static_cast<double>(pairs.size());
   for (const Pair& pair : pairs) {
-    const Comparison c = compare(pair, partial ? cv::Mat(partial_mask(pair.visible.size())) : cv::Mat(), options);
-    if (!partial && c.skipped.patches + c.skipped.pixels + c.skipped.levels > 0) print(pair.name, c);
+    const Comparison c =
+        compare(pair, partial ? cv::Mat(partial_mask(pair.visible.size())) : cv::Mat(), options);
+    if (!partial && c.skipped.patches + c.skipped.pixels + c.skipped.levels > 0)
+      print(pair.name, c);
     mean.before += c.before / n;
     mean.after += c.after / n;
     mean.skipped.patches += c.skipped.patches / n;
@@ -72,12 +77,16 @@ int skipping(const std::filesystem::path& folder) {
     options.method = fusion_method(method).value();
     const auto cpu_ms = [&](bool skip, const cv::Mat& mask) {
       options.skip_unneeded = skip;
-      return times_of(15, [&] { fuse(timed.visible, timed.thermal, mask, options).value(); }).cpu_ms;
+      return times_of(15, [&] { fuse(timed.visible, timed.thermal, mask, options).value(); })
+          .cpu_ms;
     };
     const cv::Mat part = partial_mask(timed.visible.size());
-    fmt::print("\n`{}`: {:.1f} CPU ms without skipping, {:.1f} with; {:.1f} and {:.1f} where the thermal image covers a "
-               "third of width and height.\n\n| pair | patches | pixels | levels | Qabf | lost |\n|---|---|---|---|---|---|\n",
-               method, cpu_ms(false, {}), cpu_ms(true, {}), cpu_ms(false, part), cpu_ms(true, part));
+    fmt::print(
+        "\n`{}`: {:.1f} CPU ms without skipping, {:.1f} with; {:.1f} and {:.1f} where the thermal "
+        "image covers a "
+        "third of width and height.\n\n| pair | patches | pixels | levels | Qabf | lost "
+        "|\n|---|---|---|---|---|---|\n",
+        method, cpu_ms(false, {}), cpu_ms(true, {}), cpu_ms(false, part), cpu_ms(true, part));
     compare_all(pairs, options, false);
     compare_all(pairs, options, true);
   }

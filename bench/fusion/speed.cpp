@@ -19,7 +19,8 @@ namespace {
 constexpr const char* in_child = "ORBITFUSE_BENCH_FUSION_CHILD";
 
 void print_row(const std::string& what, const Times& times) {
-  fmt::print("| {} | {} | {:.1f} | {:.1f} |\n", what, name(best_isa()), times.wall_ms, times.cpu_ms);
+  fmt::print("| {} | {} | {:.1f} | {:.1f} |\n", what, name(best_isa()), times.wall_ms,
+             times.cpu_ms);
   std::fflush(stdout);
 }
 
@@ -31,7 +32,8 @@ int repeat_for_avx2(const std::filesystem::path& folder, const char* program) {
   char* arguments[] = {self.data(), mode.data(), data.data(), nullptr};
   pid_t child = 0;
   int status = 0;
-  if (posix_spawn(&child, program, nullptr, nullptr, arguments, environ) != 0 || waitpid(child, &status, 0) != child) {
+  if (posix_spawn(&child, program, nullptr, nullptr, arguments, environ) != 0 ||
+      waitpid(child, &status, 0) != child) {
     fmt::print(stderr, "{}: cannot be started again\n", program);
     return 4;
   }
@@ -44,16 +46,18 @@ int speed(const std::filesystem::path& folder, const char* program) {
   const bool child = std::getenv(in_child) != nullptr;
   const Pair pair = timed_pair(load_pairs(folder));
   if (!child)
-    fmt::print("{}, {} threads used, one 640x480 gray pair, least of 60 runs\n\n"
-               "| what | instructions | wall ms | CPU ms |\n|---|---|---|---|\n",
-               cpu_description(), thread_count());
+    fmt::print(
+        "{}, {} threads used, one 640x480 gray pair, least of 60 runs\n\n"
+        "| what | instructions | wall ms | CPU ms |\n|---|---|---|---|\n",
+        cpu_description(), thread_count());
   for (const std::string& method : scored_methods()) {
     FusionOptions options;
     options.method = fusion_method(method).value();
     print_row(method, times_of(60, [&] { fuse(pair.visible, pair.thermal, {}, options).value(); }));
   }
   const cv::Mat fused = fuse(pair.visible, pair.thermal, {}, {}).value();
-  print_row("metrics, all", times_of(20, [&] { fusion_metrics(pair.visible, pair.thermal, fused).value(); }));
+  print_row("metrics, all",
+            times_of(20, [&] { fusion_metrics(pair.visible, pair.thermal, fused).value(); }));
   return child ? 0 : repeat_for_avx2(folder, program);
 }
 

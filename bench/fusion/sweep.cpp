@@ -24,21 +24,51 @@ std::vector<Knob> all_knobs() {
   return {
       {best, "levels", {3, 5, 6}, [=](O& o, double v) { o.best.levels = whole(v); }},
       {best, "sharpness", {2, 6, 24}, [](O& o, double v) { o.best.sharpness = v; }},
-      {best, "energy radius", {1, 3, 8}, [=](O& o, double v) { o.best.energy_radius_px = whole(v); }},
+      {best,
+       "energy radius",
+       {1, 3, 8},
+       [=](O& o, double v) { o.best.energy_radius_px = whole(v); }},
       {best, "contrast kept", {0, 0.2, 0.35, 1}, [](O& o, double v) { o.best.contrast_kept = v; }},
-      {best, "visible preference", {0, 1, 4}, [](O& o, double v) { o.best.visible_preference = v; }},
-      {best, "brightness weight", {0, 0.01, 0.04}, [](O& o, double v) { o.best.brightness_weight = v; }},
+      {best,
+       "visible preference",
+       {0, 1, 4},
+       [](O& o, double v) { o.best.visible_preference = v; }},
+      {best,
+       "brightness weight",
+       {0, 0.01, 0.04},
+       [](O& o, double v) { o.best.brightness_weight = v; }},
       {ms_srif, "levels", {3, 5}, [=](O& o, double v) { o.ms_srif.levels = whole(v); }},
       {ms_srif, "stride", {1, 4, 8}, [=](O& o, double v) { o.ms_srif.stride_px = whole(v); }},
       {ms_srif, "most atoms", {8, 16, 32}, [=](O& o, double v) { o.ms_srif.max_atoms = whole(v); }},
-      {ms_srif, "patch left", {0, 0.03, 0.1, 0.3}, [](O& o, double v) { o.ms_srif.relative_residual = v; }},
-      {ms_srif, "certain ratio", {0, 3, 2, 1.2, 1}, [](O& o, double v) { o.ms_srif.certain_ratio = v; }},
-      {pca_msif, "iterations", {5, 15, 30, 60}, [=](O& o, double v) { o.pca_msif.smoother.iterations = whole(v); }},
-      {pca_msif, "cycles", {0, 1, 4, 8}, [=](O& o, double v) { o.pca_msif.smoother.cycles = whole(v); }},
-      {cnn_lpif, "network bands", {0, 2, 5}, [=](O& o, double v) { o.cnn_lpif.network_bands = whole(v); }},
-      {cnn_lpif, "network halvings", {1, 2}, [=](O& o, double v) { o.cnn_lpif.network_halvings = whole(v); }},
+      {ms_srif,
+       "patch left",
+       {0, 0.03, 0.1, 0.3},
+       [](O& o, double v) { o.ms_srif.relative_residual = v; }},
+      {ms_srif,
+       "certain ratio",
+       {0, 3, 2, 1.2, 1},
+       [](O& o, double v) { o.ms_srif.certain_ratio = v; }},
+      {pca_msif,
+       "iterations",
+       {5, 15, 30, 60},
+       [=](O& o, double v) { o.pca_msif.smoother.iterations = whole(v); }},
+      {pca_msif,
+       "cycles",
+       {0, 1, 4, 8},
+       [=](O& o, double v) { o.pca_msif.smoother.cycles = whole(v); }},
+      {cnn_lpif,
+       "network bands",
+       {0, 2, 5},
+       [=](O& o, double v) { o.cnn_lpif.network_bands = whole(v); }},
+      {cnn_lpif,
+       "network halvings",
+       {1, 2},
+       [=](O& o, double v) { o.cnn_lpif.network_halvings = whole(v); }},
       {cnn_lpif, "vote px", {1, 3, 11}, [=](O& o, double v) { o.cnn_lpif.vote_px = whole(v); }},
-      {cnn_lpif, "match threshold", {0.6, 1}, [](O& o, double v) { o.cnn_lpif.match_threshold = v; }},
+      {cnn_lpif,
+       "match threshold",
+       {0.6, 1},
+       [](O& o, double v) { o.cnn_lpif.match_threshold = v; }},
       {cnn_lpif, "flat within", {-1, 2, 8, 16}, [](O& o, double v) { o.cnn_lpif.flat_within = v; }},
   };
 }
@@ -58,7 +88,8 @@ int sweep(const std::filesystem::path& folder, bool knobs, const std::filesystem
          times_of(9, [&] { fuse(timed.visible, timed.thermal, {}, options).value(); }), true});
   };
   print_header();
-  for (const auto& [method, of_pairs] : reference_scores(folder, pairs)) add({"reference " + method, mean(of_pairs), {}});
+  for (const auto& [method, of_pairs] : reference_scores(folder, pairs))
+    add({"reference " + method, mean(of_pairs), {}});
   for (const std::string& method : scored_methods()) {
     FusionOptions options;
     options.method = fusion_method(method).value();

@@ -43,7 +43,8 @@ template <class Body>
 Status each_test_view(const nerf::Field& field, const nerf::Dataset& data, const Body& body) {
   for (const auto& view : data.views) {
     if (!view.measure_only) continue;
-    ORBITFUSE_ASSIGN(const nerf::RenderedView out, nerf::render(field, view.camera, view.cam_from_world, {}, {}));
+    ORBITFUSE_ASSIGN(const nerf::RenderedView out,
+                     nerf::render(field, view.camera, view.cam_from_world, {}, {}));
     ORBITFUSE_TRY(body(view, out));
   }
   return {};
@@ -79,12 +80,14 @@ Result<TestError> test_error(const nerf::Field& field, const nerf::Dataset& data
   return sum;
 }
 
-Result<std::map<std::string, double>> table_metrics(const nerf::Field& field, const nerf::Dataset& data) {
+Result<std::map<std::string, double>> table_metrics(const nerf::Field& field,
+                                                    const nerf::Dataset& data) {
   const Span span = span_of(data);
   std::map<std::string, double> mean;
   int views = 0;
   ORBITFUSE_TRY(each_test_view(field, data, [&](const auto& view, const auto& out) -> Status {
-    ORBITFUSE_ASSIGN(const auto values, render_metrics(bytes_of(view.image, span), bytes_of(out.color, span)));
+    ORBITFUSE_ASSIGN(const auto values,
+                     render_metrics(bytes_of(view.image, span), bytes_of(out.color, span)));
     for (const MetricValue& value : values) mean[value.name] += value.value;
     ++views;
     return {};
@@ -93,7 +96,8 @@ Result<std::map<std::string, double>> table_metrics(const nerf::Field& field, co
   return mean;
 }
 
-Status write_pictures(const nerf::Field& field, const nerf::Dataset& data, const std::string& folder) {
+Status write_pictures(const nerf::Field& field, const nerf::Dataset& data,
+                      const std::string& folder) {
   const Span span = span_of(data);
   return each_test_view(field, data, [&](const auto& view, const auto& out) -> Status {
     cv::Mat picture = bytes_of(out.color, span), depth;
@@ -108,11 +112,13 @@ Result<double> add_depth(nerf::Dataset& data, const depth::DepthOptions& options
   Reconstruction model;
   std::vector<cv::Mat> images;
   std::vector<int> index;
-  const nerf::ValueSpan span = nerf::estimate_span(nerf::training_part(data, nerf::left_out_views(data, 0)));
+  const nerf::ValueSpan span =
+      nerf::estimate_span(nerf::training_part(data, nerf::left_out_views(data, 0)));
   for (std::size_t i = 0; i < data.views.size(); ++i) {
     const nerf::TrainingView& view = data.views[i];
     if (view.measure_only) continue;
-    images.push_back(bytes_of(view.image, {span.low, span.high}));  // R, G, B order: only its gray matters
+    images.push_back(
+        bytes_of(view.image, {span.low, span.high}));  // R, G, B order: only its gray matters
     model.views.push_back({view.name, view.camera, view.cam_from_world});
     index.push_back(static_cast<int>(i));
   }

@@ -21,10 +21,12 @@ Result<TestError> test_error(const nerf::Field& field, const nerf::Dataset& data
 
 /// SSIM, cosine similarity, mutual information, PSNR and histogram similarity as the seed paper's
 /// tables give them, on 8-bit images (thermal: over the session's span), mean over the views.
-Result<std::map<std::string, double>> table_metrics(const nerf::Field& field, const nerf::Dataset& data);
+Result<std::map<std::string, double>> table_metrics(const nerf::Field& field,
+                                                    const nerf::Dataset& data);
 
 /// Test views, temperatures as gray, and inverse depth as PNG files.
-Status write_pictures(const nerf::Field& field, const nerf::Dataset& data, const std::string& folder);
+Status write_pictures(const nerf::Field& field, const nerf::Dataset& data,
+                      const std::string& folder);
 
 /// Dense depth of the views that train, added to the data. Returns CPU seconds.
 Result<double> add_depth(nerf::Dataset& data, const depth::DepthOptions& options);
@@ -37,6 +39,7 @@ struct Run {
 };
 
 /// FOLDER/STEM.json and FOLDER/STEM.svg: error of the views that measure against CPU seconds.
-Status write_curves(const std::string& folder, const std::string& stem, const std::vector<Run>& runs);
+Status write_curves(const std::string& folder, const std::string& stem,
+                    const std::vector<Run>& runs);
 
 }  // namespace orbitfuse::bench

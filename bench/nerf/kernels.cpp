@@ -7,9 +7,9 @@
 
 #include <cmath>
 
+#include "core/numeric/random.hpp"
 #include "core/system/cpu.hpp"
 #include "recon/nerf/field/network.hpp"
-#include "core/numeric/random.hpp"
 
 namespace {
 
@@ -44,9 +44,11 @@ HashEncoding grid_of(int log2_table) {
 
 void per_sample(benchmark::State& state, double flop_per_sample = 0) {
   const auto done = static_cast<double>(state.iterations()) * samples;
-  state.counters["ns/sample"] = benchmark::Counter(done * 1e-9, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  state.counters["ns/sample"] =
+      benchmark::Counter(done * 1e-9, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
   if (flop_per_sample > 0)
-    state.counters["GFLOP/s"] = benchmark::Counter(done * flop_per_sample * 1e-9, benchmark::Counter::kIsRate);
+    state.counters["GFLOP/s"] =
+        benchmark::Counter(done * flop_per_sample * 1e-9, benchmark::Counter::kIsRate);
 }
 
 void encode(benchmark::State& state, const Kernels& kernels, int log2_table, bool along_rays) {
@@ -63,7 +65,8 @@ void scatter(benchmark::State& state, const Kernels& kernels, int log2_table, bo
   const std::vector<float> gradient(static_cast<std::size_t>(samples) * 4, 1e-3F);
   for (auto _ : state)
     for (const GridLevel& level : grid.levels)
-      kernels.scatter(level, grid.table.grad.data() + level.offset, at.data(), samples, gradient.data());
+      kernels.scatter(level, grid.table.grad.data() + level.offset, at.data(), samples,
+                      gradient.data());
   per_sample(state);
 }
 
@@ -90,7 +93,8 @@ void forward(benchmark::State& state, const Kernels& kernels, const std::vector<
   per_sample(state, p.flop);
 }
 
-void forward_and_backward(benchmark::State& state, const Kernels& kernels, const std::vector<int>& widths) {
+void forward_and_backward(benchmark::State& state, const Kernels& kernels,
+                          const std::vector<int>& widths) {
   Perceptron p(widths);
   // In blocks as in training, so that activations stay in the cache.
   constexpr int block = 512;
@@ -113,18 +117,19 @@ void adam(benchmark::State& state, const Kernels& kernels, int log2_table) {
     state.PauseTiming();
     std::fill(grid.table.grad.begin(), grid.table.grad.end(), 1e-3F);
     state.ResumeTiming();
-    kernels.adam(step, count, grid.table.value.data(), grid.table.first.data(), grid.table.second.data(),
-                 grid.table.grad.data(), grid.half.data());
+    kernels.adam(step, count, grid.table.value.data(), grid.table.first.data(),
+                 grid.table.second.data(), grid.table.grad.data(), grid.half.data());
   }
-  state.counters["ns/parameter"] =
-      benchmark::Counter(static_cast<double>(state.iterations()) * static_cast<double>(count) * 1e-9,
-                         benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  state.counters["ns/parameter"] = benchmark::Counter(
+      static_cast<double>(state.iterations()) * static_cast<double>(count) * 1e-9,
+      benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
 void register_all(Isa isa) {
   const Kernels& kernels = kernels_for(isa);
   const auto add = [&](const std::string& what, auto function, auto... arguments) {
-    benchmark::RegisterBenchmark(fmt::format("{}/{}", what, name(isa)).c_str(), function, kernels, arguments...);
+    benchmark::RegisterBenchmark(fmt::format("{}/{}", what, name(isa)).c_str(), function, kernels,
+                                 arguments...);
   };
   for (const int table : {15, 17, 19})
     for (const bool rays : {true, false}) {

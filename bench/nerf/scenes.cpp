@@ -6,8 +6,8 @@
 
 #include "core/formats/colmap_model.hpp"
 #include "core/formats/ground_truth.hpp"
-#include "core/image/image_io.hpp"
 #include "core/formats/transforms_json.hpp"
+#include "core/image/image_io.hpp"
 
 namespace orbitfuse::bench {
 namespace {
@@ -72,7 +72,8 @@ bool take_word(std::string& name, const std::string& word) {
   return true;
 }
 
-Result<nerf::Dataset> load_orbit(const std::filesystem::path& folder, Modality modality, bool sector, bool full) {
+Result<nerf::Dataset> load_orbit(const std::filesystem::path& folder, Modality modality,
+                                 bool sector, bool full) {
   const bool thermal = modality == Modality::thermal;
   nerf::Dataset data;
   data.modality = modality;
@@ -80,16 +81,19 @@ Result<nerf::Dataset> load_orbit(const std::filesystem::path& folder, Modality m
   const auto add = [&](const std::filesystem::path& file, const Camera& camera, const Rigid3d& pose,
                        bool measure_only) -> Status {
     if (sector && !in_sector(pose)) return {};
-    ORBITFUSE_ASSIGN(nerf::TrainingView view, load_view(file, camera, pose, modality, measure_only));
+    ORBITFUSE_ASSIGN(nerf::TrainingView view,
+                     load_view(file, camera, pose, modality, measure_only));
     const Camera& c = view.camera;
-    data.views.push_back(thermal || full ? std::move(view) : nerf::resized(view, 400, 400 * c.height / c.width));
+    data.views.push_back(thermal || full ? std::move(view)
+                                         : nerf::resized(view, 400, 400 * c.height / c.width));
     return {};
   };
   if (truth.views.count(modality) > 0)
     for (const TrueView& view : truth.views.at(modality))
       ORBITFUSE_TRY(add(folder / view.name, view.camera, view.cam_from_world, false));
   for (const TrueTestView& view : truth.test)
-    ORBITFUSE_TRY(add(thermal ? view.thermal : view.visible, view.camera, view.cam_from_world, true));
+    ORBITFUSE_TRY(
+        add(thermal ? view.thermal : view.visible, view.camera, view.cam_from_world, true));
   return data;
 }
 
@@ -101,8 +105,10 @@ Result<nerf::Dataset> load_scene(const std::string& name, const std::filesystem:
   std::string base = name;
   const bool full = take_word(base, "full"), sector = take_word(base, "sector");
   const Modality modality = take_word(base, "thermal") ? Modality::thermal : Modality::visible;
-  ORBITFUSE_ASSIGN(nerf::Dataset data, load_orbit(base.find('/') == std::string::npos ? folder / base : std::filesystem::path(base),
-                                                  modality, sector, full));
+  ORBITFUSE_ASSIGN(
+      nerf::Dataset data,
+      load_orbit(base.find('/') == std::string::npos ? folder / base : std::filesystem::path(base),
+                 modality, sector, full));
   if (!model.empty()) ORBITFUSE_TRY(add_points(data, model));
   return data;
 }

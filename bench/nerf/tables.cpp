@@ -41,7 +41,8 @@ depth::DepthOptions depth_options(const nerf::Dataset& data) {
   return options;
 }
 
-/// Test views at half the size where they are large: a published recipe takes 50 CPU s to render 640x480.
+/// Test views at half the size where they are large: a published recipe takes 50 CPU s to render
+/// 640x480.
 Result<nerf::Dataset> load(const Arguments& a, const std::string& scene) {
   ORBITFUSE_ASSIGN(nerf::Dataset data, bench::load_scene(scene, a.data, {}));
   for (nerf::TrainingView& view : data.views)
@@ -54,14 +55,15 @@ Result<nerf::Dataset> load(const Arguments& a, const std::string& scene) {
 Result<Row> row_of(const std::string& name, const nerf::Dataset& data, nerf::TrainOptions options,
                    double cpu_seconds, double before_cpu_s, nerf::Field& field,
                    const nerf::Field* guide = nullptr) {
-  options.keep_best = false;  // nothing is chosen on the test views
+  options.keep_best = false;     // nothing is chosen on the test views
   options.refine_poses = false;  // these poses are exact
   // Proposal networks take a hundred times as long to render: their curves have fewer points.
   options.eval_count = options.sampling == nerf::Sampling::proposal ? 4 : 24;
   options.iterations = 1 << 20;
   options.budget_s = (cpu_seconds - before_cpu_s) / thread_count();
   if (!(options.budget_s > 0))
-    return fail(ErrorKind::usage, "--cpu-seconds", fmt::format("{:.0f} s are spent before training {}", before_cpu_s, name),
+    return fail(ErrorKind::usage, "--cpu-seconds",
+                fmt::format("{:.0f} s are spent before training {}", before_cpu_s, name),
                 "allow more");
   ORBITFUSE_ASSIGN(nerf::TrainReport report, nerf::train(data, options, {}, field, guide));
   Row row{{name, before_cpu_s, std::move(report)}, {}, {}};
@@ -72,7 +74,8 @@ Result<Row> row_of(const std::string& name, const nerf::Dataset& data, nerf::Tra
   return row;
 }
 
-/// CPU seconds until the views that measure were seen this well, what came before training included.
+/// CPU seconds until the views that measure were seen this well, what came before training
+/// included.
 std::optional<double> seconds_to(const Row& row, double psnr) {
   for (const nerf::CurvePoint& p : row.run.report.curve)
     if (p.heldout_psnr >= psnr) return row.run.before_cpu_s + p.cpu_s;
@@ -83,22 +86,25 @@ std::optional<double> seconds_to(const Row& row, double psnr) {
 std::string sooner(const Row& published, const Row& ours) {
   const nerf::CurvePoint& end = published.run.report.curve.back();  // a budget's end is measured
   const auto reached = seconds_to(ours, end.heldout_psnr);
-  return reached ? fmt::format("{:.1f} x", (published.run.before_cpu_s + end.cpu_s) / *reached) : "not reached";
+  return reached ? fmt::format("{:.1f} x", (published.run.before_cpu_s + end.cpu_s) / *reached)
+                 : "not reached";
 }
 
 void print_table(const std::string& title, const std::vector<Row>& rows) {
   fmt::print("\n## {}\n\n| field | steps | CPU s before + training |", title);
   for (const char* column : columns) fmt::print(" {} |", column);
-  fmt::print(" MAE K | as good this much later than {} |\n|---|---|---|---|---|---|---|---|---|---|\n",
-             rows.back().run.name);
+  fmt::print(
+      " MAE K | as good this much later than {} |\n|---|---|---|---|---|---|---|---|---|---|\n",
+      rows.back().run.name);
   for (const Row& row : rows) {
-    fmt::print("| {} | {} | {:.0f} + {:.0f} |", row.run.name, row.run.report.iterations, row.run.before_cpu_s,
-               row.run.report.cpu_s);
+    fmt::print("| {} | {} | {:.0f} + {:.0f} |", row.run.name, row.run.report.iterations,
+               row.run.before_cpu_s, row.run.report.cpu_s);
     for (const char* column : columns) {
       const double value = row.metrics.at(column), baseline = rows.front().metrics.at(column);
       fmt::print(" {:.4g} ({:+.1f} %) |", value, 100 * (value / baseline - 1));
     }
-    fmt::print(" {:.2f} | {} |\n", row.error.mae_k, &row == &rows.back() ? "" : sooner(row, rows.back()));
+    fmt::print(" {:.2f} | {} |\n", row.error.mae_k,
+               &row == &rows.back() ? "" : sooner(row, rows.back()));
   }
   std::fflush(stdout);
 }
@@ -111,10 +117,12 @@ struct Guide {
 /// NeRFacto and the paper's variant for one modality.
 Result<std::vector<Row>> published_rows(const Arguments& a, const nerf::Dataset& data) {
   std::vector<Row> rows;
-  for (const char* name : {"nerfacto", data.modality == Modality::visible ? "nerf-rgb" : "nerf-ir"}) {
+  for (const char* name :
+       {"nerfacto", data.modality == Modality::visible ? "nerf-rgb" : "nerf-ir"}) {
     ORBITFUSE_ASSIGN(const nerf::TrainOptions options, nerf::preset(name));
     nerf::Field field;
-    ORBITFUSE_ASSIGN(Row row, row_of(name, data, options, a.cpu_seconds * a.published_factor, 0, field));
+    ORBITFUSE_ASSIGN(Row row,
+                     row_of(name, data, options, a.cpu_seconds * a.published_factor, 0, field));
     rows.push_back(std::move(row));
   }
   return rows;
@@ -133,7 +141,8 @@ Status finish(const Arguments& a, const std::string& scene, const std::vector<Ro
 Status visible_table(const Arguments& a, const std::string& scene) {
   ORBITFUSE_ASSIGN(nerf::Dataset data, load(a, scene));
   ORBITFUSE_ASSIGN(std::vector<Row> rows, published_rows(a, data));
-  ORBITFUSE_ASSIGN(const nerf::TrainOptions options, nerf::preset(nerf::default_preset(data.modality)));
+  ORBITFUSE_ASSIGN(const nerf::TrainOptions options,
+                   nerf::preset(nerf::default_preset(data.modality)));
   double before = 0;
   if (scene != "fox") {
     ORBITFUSE_ASSIGN(before, bench::add_depth(data, depth_options(data)));
@@ -147,33 +156,40 @@ Status visible_table(const Arguments& a, const std::string& scene) {
 /// A visible field of the same views' sector that takes half the time.
 Result<Guide> guide_of(const Arguments& a, const std::string& visible_scene) {
   ORBITFUSE_ASSIGN(nerf::Dataset data, load(a, visible_scene));
-  ORBITFUSE_ASSIGN(const nerf::TrainOptions options, nerf::preset(nerf::default_preset(data.modality)));
+  ORBITFUSE_ASSIGN(const nerf::TrainOptions options,
+                   nerf::preset(nerf::default_preset(data.modality)));
   ORBITFUSE_ASSIGN(const double before, bench::add_depth(data, depth_options(data)));
   Guide guide;
-  ORBITFUSE_ASSIGN(const Row row, row_of("guide", data, options, a.cpu_seconds / 2, before, guide.field));
+  ORBITFUSE_ASSIGN(const Row row,
+                   row_of("guide", data, options, a.cpu_seconds / 2, before, guide.field));
   guide.cpu_s = row.cpu_s();
   return guide;
 }
 
-Status thermal_table(const Arguments& a, const std::string& scene, const std::string& visible_scene) {
+Status thermal_table(const Arguments& a, const std::string& scene,
+                     const std::string& visible_scene) {
   ORBITFUSE_ASSIGN(const nerf::Dataset data, load(a, scene));
   ORBITFUSE_ASSIGN(std::vector<Row> rows, published_rows(a, data));
   ORBITFUSE_ASSIGN(nerf::TrainOptions options, nerf::preset(nerf::default_preset(data.modality)));
   nerf::Field alone, shared;
   nerf::Dataset with_depth = data;
-  ORBITFUSE_ASSIGN(const double before, bench::add_depth(with_depth, {.width_px = 260}));  // the program's default
-  ORBITFUSE_ASSIGN(Row own, row_of(options.preset + " alone", with_depth, options, a.cpu_seconds, before, alone));
+  ORBITFUSE_ASSIGN(const double before,
+                   bench::add_depth(with_depth, {.width_px = 260}));  // the program's default
+  ORBITFUSE_ASSIGN(Row own, row_of(options.preset + " alone", with_depth, options, a.cpu_seconds,
+                                   before, alone));
   rows.push_back(std::move(own));
   ORBITFUSE_ASSIGN(const Guide guide, guide_of(a, visible_scene));
   options.shared_geometry = true;
-  ORBITFUSE_ASSIGN(Row guided, row_of(options.preset, data, options, a.cpu_seconds, guide.cpu_s, shared, &guide.field));
+  ORBITFUSE_ASSIGN(Row guided, row_of(options.preset, data, options, a.cpu_seconds, guide.cpu_s,
+                                      shared, &guide.field));
   rows.push_back(std::move(guided));
   return finish(a, scene, rows);
 }
 
 Status run(const Arguments& a) {
-  fmt::print("{}, {} threads, {}; {:.0f} CPU s a field, {:g} times that for the published ones\n", cpu_description(),
-             thread_count(), name(best_isa()), a.cpu_seconds, a.published_factor);
+  fmt::print("{}, {} threads, {}; {:.0f} CPU s a field, {:g} times that for the published ones\n",
+             cpu_description(), thread_count(), name(best_isa()), a.cpu_seconds,
+             a.published_factor);
   for (const std::string& scene : a.scenes) {
     if (a.modality != "thermal") ORBITFUSE_TRY(visible_table(a, scene));
     if (scene == "fox" || a.modality == "visible") continue;
@@ -191,10 +207,13 @@ int main(int argc, char** argv) {
   CLI::App app("The published recipes and ours at equal CPU time");
   app.add_option("--data", a.data);
   app.add_option("--scenes", a.scenes, "fox, an orbit in --data or a path to one, ORBIT-sector");
-  app.add_option("--cpu-seconds", a.cpu_seconds, "per field, depth and guide included")->check(CLI::PositiveNumber);
-  app.add_option("--published-factor", a.published_factor, "so many times that for the published recipes")
+  app.add_option("--cpu-seconds", a.cpu_seconds, "per field, depth and guide included")
       ->check(CLI::PositiveNumber);
-  app.add_option("--modality", a.modality, "only this one's tables")->check(CLI::IsMember({"visible", "thermal"}));
+  app.add_option("--published-factor", a.published_factor,
+                 "so many times that for the published recipes")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--modality", a.modality, "only this one's tables")
+      ->check(CLI::IsMember({"visible", "thermal"}));
   app.add_option("--out", a.out, "folder for the curves");
   CLI11_PARSE(app, argc, argv);
   if (const auto status = run(a); !status) {

@@ -20,7 +20,8 @@ namespace {
 using namespace orbitfuse;
 
 struct Arguments {
-  std::string scene = "fox", preset, data = "../shared/data/orbits", model, images, field, guide, out;
+  std::string scene = "fox", preset, data = "../shared/data/orbits", model, images, field, guide,
+              out;
   std::vector<std::string> set;
   int threads = 0;
   double exposure = 0, pose_error_deg = 0;
@@ -30,29 +31,36 @@ struct Arguments {
 
 void print_curve(const nerf::TrainReport& report) {
   for (const auto& p : report.curve)
-    fmt::print("step {:5d}  cpu {:7.1f} s  wall {:7.1f} s  test {:6.2f} dB  train {:6.2f} dB  {:6.1f} samples/ray\n",
-               p.step, p.cpu_s, p.wall_s, p.heldout_psnr, p.train_psnr, p.samples_per_ray);
-  fmt::print("{}; {:.3f} us a sample\n", report.brief(), 1e6 * report.cpu_s / static_cast<double>(report.samples));
-  for (const auto& [view, gain] : report.image_gains) fmt::print("exposure of {}: {:.3f}\n", view, fmt::join(gain, " "));
+    fmt::print(
+        "step {:5d}  cpu {:7.1f} s  wall {:7.1f} s  test {:6.2f} dB  train {:6.2f} dB  {:6.1f} "
+        "samples/ray\n",
+        p.step, p.cpu_s, p.wall_s, p.heldout_psnr, p.train_psnr, p.samples_per_ray);
+  fmt::print("{}; {:.3f} us a sample\n", report.brief(),
+             1e6 * report.cpu_s / static_cast<double>(report.samples));
+  for (const auto& [view, gain] : report.image_gains)
+    fmt::print("exposure of {}: {:.3f}\n", view, fmt::join(gain, " "));
   for (const auto& skip : report.skips) fmt::print("skip {}: {}\n", skip.what, skip.why);
 }
 
 Status time_render(const nerf::Field& field, const nerf::Dataset& data) {
-  const auto view = std::find_if(data.views.begin(), data.views.end(), [](const auto& v) { return v.measure_only; });
+  const auto view = std::find_if(data.views.begin(), data.views.end(),
+                                 [](const auto& v) { return v.measure_only; });
   if (view == data.views.end()) return {};
   const auto start = std::chrono::steady_clock::now();
   const std::clock_t cpu = std::clock();
-  ORBITFUSE_ASSIGN(const nerf::RenderedView out,
-                   nerf::render(field, view->camera.scaled_to(640, 640 * view->camera.height / view->camera.width),
-                                view->cam_from_world, {}, {}));
+  ORBITFUSE_ASSIGN(
+      const nerf::RenderedView out,
+      nerf::render(field,
+                   view->camera.scaled_to(640, 640 * view->camera.height / view->camera.width),
+                   view->cam_from_world, {}, {}));
   fmt::print("render {}x{}: {:.2f} s wall, {:.2f} CPU s\n", out.color.cols, out.color.rows,
              std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(),
              static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC);
   return {};
 }
 
-/// Training views as a camera on automatic would have stored them: each channel of each view times a
-/// gain, clipped.
+/// Training views as a camera on automatic would have stored them: each channel of each view times
+/// a gain, clipped.
 void vary_exposure(nerf::Dataset& data, double log_sigma) {
   cv::RNG random(7);
   for (nerf::TrainingView& view : data.views) {
@@ -65,21 +73,25 @@ void vary_exposure(nerf::Dataset& data, double log_sigma) {
   }
 }
 
-/// Training views as poses of that error show them: turned, and moved as far as the turn moves the scene.
+/// Training views as poses of that error show them: turned, and moved as far as the turn moves the
+/// scene.
 void perturb_poses(nerf::Dataset& data, double sigma_deg) {
   cv::RNG random(11);
   const double sigma = sigma_deg * 3.14159265358979 / 180;
-  const auto draw = [&] { return Eigen::Vector3d(random.gaussian(sigma), random.gaussian(sigma), random.gaussian(sigma)); };
+  const auto draw = [&] {
+    return Eigen::Vector3d(random.gaussian(sigma), random.gaussian(sigma), random.gaussian(sigma));
+  };
   for (nerf::TrainingView& view : data.views) {
     if (view.measure_only) continue;
     const Eigen::Vector3d turn = draw(), shift = draw() * view.cam_from_world.translation.norm();
-    const Rigid3d moved_from_cam{Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized())), shift};
+    const Rigid3d moved_from_cam{
+        Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized())), shift};
     view.cam_from_world = moved_from_cam * view.cam_from_world;
   }
 }
 
-/// RMS over training views of what a pose is off by: turn in degrees, centre in % of the distance to the
-/// world's origin; poses are compared as they are, without a similarity between them.
+/// RMS over training views of what a pose is off by: turn in degrees, centre in % of the distance
+/// to the world's origin; poses are compared as they are, without a similarity between them.
 void print_pose_errors(const std::vector<Rigid3d>& truth, const nerf::Dataset& given,
                        const std::map<std::string, Rigid3d>& refined) {
   const auto print = [&](const char* what, const auto& pose_of) {
@@ -88,10 +100,12 @@ void print_pose_errors(const std::vector<Rigid3d>& truth, const nerf::Dataset& g
       if (given.views[i].measure_only) continue;
       const Rigid3d pose = pose_of(i);
       turn += std::pow(rotation_angle_deg(truth[i].rotation, pose.rotation), 2);
-      shift += (camera_center(truth[i]) - camera_center(pose)).squaredNorm() / camera_center(truth[i]).squaredNorm();
+      shift += (camera_center(truth[i]) - camera_center(pose)).squaredNorm() /
+               camera_center(truth[i]).squaredNorm();
       ++count;
     }
-    fmt::print("poses {}: {:.3f} deg, {:.3f} %\n", what, std::sqrt(turn / count), 100 * std::sqrt(shift / count));
+    fmt::print("poses {}: {:.3f} deg, {:.3f} %\n", what, std::sqrt(turn / count),
+               100 * std::sqrt(shift / count));
   };
   print("as given", [&](std::size_t i) { return given.views[i].cam_from_world; });
   print("refined", [&](std::size_t i) { return refined.at(given.views[i].name); });
@@ -105,10 +119,12 @@ Status run(const Arguments& a) {
   options.keep_best = false;  // the measured views are the test split: nothing is chosen on them
   for (const std::string& assignment : a.set) {
     const auto at = assignment.find('=');
-    if (at == std::string::npos) return fail(ErrorKind::usage, "--set", assignment, "give key=value");
+    if (at == std::string::npos)
+      return fail(ErrorKind::usage, "--set", assignment, "give key=value");
     ORBITFUSE_TRY(options.set(assignment.substr(0, at), assignment.substr(at + 1)));
   }
-  fmt::print("{}, {} threads, {}, {}\n", cpu_description(), thread_count(), name(best_isa()), a.scene);
+  fmt::print("{}, {} threads, {}, {}\n", cpu_description(), thread_count(), name(best_isa()),
+             a.scene);
   std::vector<Rigid3d> true_poses;
   for (const auto& view : data.views) true_poses.push_back(view.cam_from_world);
   if (a.pose_error_deg > 0) perturb_poses(data, a.pose_error_deg);
@@ -123,9 +139,11 @@ Status run(const Arguments& a) {
     ORBITFUSE_ASSIGN(guide, nerf::Field::load(a.guide));
     options.shared_geometry = true;
   }
-  ORBITFUSE_ASSIGN(result.report, nerf::train(data, options, {}, field, guide.empty() ? nullptr : &guide));
+  ORBITFUSE_ASSIGN(result.report,
+                   nerf::train(data, options, {}, field, guide.empty() ? nullptr : &guide));
   print_curve(result.report);
-  if (!result.report.refined_poses.empty()) print_pose_errors(true_poses, data, result.report.refined_poses);
+  if (!result.report.refined_poses.empty())
+    print_pose_errors(true_poses, data, result.report.refined_poses);
   if (!a.out.empty()) ORBITFUSE_TRY(bench::write_curves(a.out, a.scene, {result}));
   if (!a.field.empty()) ORBITFUSE_TRY(field.save(a.field));
   if (a.quick) return {};
@@ -159,8 +177,10 @@ int main(int argc, char** argv) {
   app.add_option("--depth-neighbours", a.depth_options.neighbours);
   app.add_option("--depth-best", a.depth_options.best_neighbours);
   app.add_option("--guide", a.guide, "field whose geometry this one starts from");
-  app.add_option("--vary-exposure", a.exposure, "gains of the training views: sigma of their logarithm");
-  app.add_option("--perturb-poses", a.pose_error_deg, "error of the training views' poses: sigma of turn and shift, degrees");
+  app.add_option("--vary-exposure", a.exposure,
+                 "gains of the training views: sigma of their logarithm");
+  app.add_option("--perturb-poses", a.pose_error_deg,
+                 "error of the training views' poses: sigma of turn and shift, degrees");
   app.add_flag("--quick", a.quick, "no full-resolution evaluation");
   app.add_option("--threads", a.threads);
   app.add_option("--set", a.set, "training option key=value");

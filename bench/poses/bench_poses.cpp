@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// bench_poses SCENE [WORKDIR [--visible-truth]]: runs the pose ladder on a shared scene and prints success and
-// error against run time per rung. Scenes: container, tracking, fox, metu_cloudy_scene_7,
-// metu_sunny_scene_7, arco, car (the session recorded in replay_data).
+// bench_poses SCENE [WORKDIR [--visible-truth]]: runs the pose ladder on a shared scene and prints
+// success and error against run time per rung. Scenes: container, tracking, fox,
+// metu_cloudy_scene_7, metu_sunny_scene_7, arco, car (the session recorded in replay_data).
 
-#include <cstdio>
 #include <fmt/format.h>
+#include <cstdio>
 
 #include "core/system/clock.hpp"
-#include "tests/support/orbit_scenes.hpp"
-#include "tests/support/shared_data.hpp"
 #include "core/system/cpu.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/poses/estimate_poses.hpp"
+#include "tests/support/orbit_scenes.hpp"
+#include "tests/support/shared_data.hpp"
 
 namespace {
 
@@ -29,10 +29,11 @@ void print(const ModalityPoses& poses, const Reconstruction& anchor, const scene
              poses.frame_count, cpu_s, poses.reprojection_rms_px);
   const scenes::PoseError error = scenes::pose_error(poses.reconstruction, anchor, truth);
   if (error.views > 0)
-    fmt::print("  against the truth: ATE {:.3f} %, median {:.3f} %, worst {:.3f} % of the extent; "
-               "rotation median {:.3f}, worst {:.3f} deg\n",
-               error.ate_percent, error.median_percent, error.worst_percent, error.rotation_deg,
-               error.worst_rotation_deg);
+    fmt::print(
+        "  against the truth: ATE {:.3f} %, median {:.3f} %, worst {:.3f} % of the extent; "
+        "rotation median {:.3f}, worst {:.3f} deg\n",
+        error.ate_percent, error.median_percent, error.worst_percent, error.rotation_deg,
+        error.worst_rotation_deg);
 }
 
 }  // namespace
@@ -41,7 +42,9 @@ int main(int argc, char** argv) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);  // a run that is cut short keeps its first rungs
   const std::filesystem::path data = testing::shared_data();
   if (argc < 2 || !std::filesystem::exists(data)) {
-    std::fputs("bench_poses SCENE [WORKDIR [--visible-truth]]; needs the shared data (ORBITFUSE_SHARED)\n", stderr);
+    std::fputs(
+        "bench_poses SCENE [WORKDIR [--visible-truth]]; needs the shared data (ORBITFUSE_SHARED)\n",
+        stderr);
     return 2;
   }
   const std::string which = argv[1];
@@ -84,12 +87,11 @@ int main(int argc, char** argv) {
   }
   if (scene.session.frames_of(Modality::thermal).empty()) return 0;
   start = cpu_seconds();
-  const auto thermal = estimate_thermal_poses(scene.session, visible ? &seen : nullptr, options,
-                                              workdir, progress);
+  const auto thermal =
+      estimate_thermal_poses(scene.session, visible ? &seen : nullptr, options, workdir, progress);
   fmt::print("thermal\n");
   if (thermal) {
-    print(*thermal,
-          thermal->shares_visible_frame ? seen.reconstruction : thermal->reconstruction,
+    print(*thermal, thermal->shares_visible_frame ? seen.reconstruction : thermal->reconstruction,
           scene.truth, cpu_seconds() - start);
   } else {
     fmt::print("  {}\n", thermal.error().message());

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // bench_poses_suite [RUNS] [--scenes A,B] [--perturbations A,B] [--json FILE] [--views] [--list]
 // Thermal poses of every scene under everything that recordings suffer from, against the truth:
-// posed, errors in the visible frame, views that are sure and wrong, right views doubted or dropped,
-// CPU seconds. RUNS (default ../runs) holds a session and a run folder for each scene; those that
-// are missing are made with the program beside this one (import, train --modality visible).
+// posed, errors in the visible frame, views that are sure and wrong, right views doubted or
+// dropped, CPU seconds. RUNS (default ../runs) holds a session and a run folder for each scene;
+// those that are missing are made with the program beside this one (import, train --modality
+// visible).
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -51,11 +52,16 @@ Arguments arguments_of(int argc, char** argv) {
   arguments.program = fs::path(argv[0]).parent_path() / "../../app/orbitfuse";
   for (int i = 1; i < argc; ++i) {
     const std::string_view word = argv[i];
-    if (word == "--views") arguments.views = true;
-    else if (word == "--scenes" && i + 1 < argc) arguments.scenes = words(argv[++i]);
-    else if (word == "--perturbations" && i + 1 < argc) arguments.perturbations = words(argv[++i]);
-    else if (word == "--json" && i + 1 < argc) arguments.json_file = argv[++i];
-    else arguments.runs = word;
+    if (word == "--views")
+      arguments.views = true;
+    else if (word == "--scenes" && i + 1 < argc)
+      arguments.scenes = words(argv[++i]);
+    else if (word == "--perturbations" && i + 1 < argc)
+      arguments.perturbations = words(argv[++i]);
+    else if (word == "--json" && i + 1 < argc)
+      arguments.json_file = argv[++i];
+    else
+      arguments.runs = word;
   }
   return arguments;
 }
@@ -85,21 +91,21 @@ Status prepare(const Arguments& arguments, const SceneFolders& scene) {
   const auto call = [&](std::vector<std::string> command) -> Status {
     command.insert(command.begin(), arguments.program.string());
     fs::create_directories(arguments.runs / scene.name);
-    ORBITFUSE_ASSIGN(const int status, run_process(command, arguments.runs / scene.name / "log.txt",
-                                                   "bench", {}));
+    ORBITFUSE_ASSIGN(const int status,
+                     run_process(command, arguments.runs / scene.name / "log.txt", "bench", {}));
     if (status == 0) return {};
     return fail(ErrorKind::quality, scene.name, fmt::format("{} ends with {}", command[1], status),
                 "see log.txt in its folder");
   };
   const fs::path data = scene.truth.parent_path();
   if (!fs::exists(scene.session / "manifest.jsonl"))
-    ORBITFUSE_TRY(call({"import", scene.session.string(), "--visible", (data / "visible").string(),
-                        "--thermal", (data / "thermal").string(), "--ground-truth",
-                        scene.truth.string(), "--priors-only", "--station-spacing-deg", "30",
-                        "--loops", "2"}));
+    ORBITFUSE_TRY(
+        call({"import", scene.session.string(), "--visible", (data / "visible").string(),
+              "--thermal", (data / "thermal").string(), "--ground-truth", scene.truth.string(),
+              "--priors-only", "--station-spacing-deg", "30", "--loops", "2"}));
   if (!fs::exists(scene.run / "train_visible/field.bin"))
-    ORBITFUSE_TRY(call({"train", scene.session.string(), "--out", scene.run.string(), "--modality",
-                        "visible"}));
+    ORBITFUSE_TRY(call(
+        {"train", scene.session.string(), "--out", scene.run.string(), "--modality", "visible"}));
   return {};
 }
 
@@ -117,9 +123,9 @@ void judge(const ThermalPoses& poses, const Reconstruction& visible, const scene
   row.posed = static_cast<int>(poses.reconstruction.views.size());
   row.total = poses.frame_count;
   row.dropped = static_cast<int>(poses.dropped.size());
-  row.error = scenes::pose_error(
-      poses.reconstruction, poses.shares_visible_frame ? visible : poses.reconstruction,
-      scene.truth);
+  row.error =
+      scenes::pose_error(poses.reconstruction,
+                         poses.shares_visible_frame ? visible : poses.reconstruction, scene.truth);
   std::set<std::string> doubtful;
   for (const DoubtfulView& view : poses.doubtful) doubtful.insert(view.name);
   for (const scenes::ViewError& view : row.error.each) {
@@ -131,12 +137,11 @@ void judge(const ThermalPoses& poses, const Reconstruction& visible, const scene
   }
   if (poses.reconstruction.views.empty()) return;
   const PosedView& first = poses.reconstruction.views.front();
-  row.focal_percent =
-      100 * (first.camera.fx / scene.truth.views.at(first.name).camera.fx - 1);
+  row.focal_percent = 100 * (first.camera.fx / scene.truth.views.at(first.name).camera.fx - 1);
 }
 
-Row measured(const SceneFolders& folders, const scenes::Perturbation& by, const Arguments& arguments,
-             const nerf::Field& field, const Reconstruction& visible) {
+Row measured(const SceneFolders& folders, const scenes::Perturbation& by,
+             const Arguments& arguments, const nerf::Field& field, const Reconstruction& visible) {
   Row row;
   row.scene = folders.name, row.perturbation = by.name;
   auto scene = scenes::run_scene(folders.session, folders.truth);
@@ -164,10 +169,13 @@ Row measured(const SceneFolders& folders, const scenes::Perturbation& by, const 
   PoseOptions options;
   options.use_known_poses = false;
   const double before = cpu_seconds();
-  const auto poses = estimate_thermal_poses(scene->session, &seen, options, images / "work", progress);
+  const auto poses =
+      estimate_thermal_poses(scene->session, &seen, options, images / "work", progress);
   row.cpu_s = cpu_seconds() - before;
-  if (poses) judge(*poses, visible, *scene, row);
-  else row.failure = poses.error().found;
+  if (poses)
+    judge(*poses, visible, *scene, row);
+  else
+    row.failure = poses.error().found;
   if (arguments.views && poses) {
     for (const LadderStep& step : poses->ladder) fmt::print("  {}: {}\n", step.rung, step.why);
     for (const DroppedView& view : poses->dropped)
@@ -223,12 +231,13 @@ Status run_scene(const SceneFolders& folders, const Arguments& arguments, json& 
   ORBITFUSE_TRY(prepare(arguments, folders));
   ORBITFUSE_ASSIGN(const Reconstruction visible,
                    read_colmap_model(folders.run / "poses_visible/model", Modality::visible));
-  ORBITFUSE_ASSIGN(const nerf::Field field, nerf::Field::load(folders.run / "train_visible/field.bin"));
+  ORBITFUSE_ASSIGN(const nerf::Field field,
+                   nerf::Field::load(folders.run / "train_visible/field.bin"));
   for (const scenes::Perturbation& by : scenes::perturbations()) {
-    const bool wanted = arguments.perturbations.empty()
-                            ? by.name == "default"
-                            : arguments.perturbations.contains(by.name) ||
-                                  arguments.perturbations.contains("all");
+    const bool wanted =
+        arguments.perturbations.empty()
+            ? by.name == "default"
+            : arguments.perturbations.contains(by.name) || arguments.perturbations.contains("all");
     if (!wanted) continue;
     if (by.tracking && !fs::exists(folders.truth.parent_path() / "tracking.json")) continue;
     const Row row = measured(folders, by, arguments, field, visible);
@@ -246,7 +255,8 @@ int main(int argc, char** argv) {
   const Arguments arguments = arguments_of(argc, argv);
   fmt::print("{}; {} threads\n\n", cpu_description(), thread_count());
   fmt::print(
-      "| scene | perturbation | posed | centres RMS / median / worst, % | rotation mean / worst, deg "
+      "| scene | perturbation | posed | centres RMS / median / worst, % | rotation mean / worst, "
+      "deg "
       "| focal, % | sure but wrong | right, yet doubted, or dropped | CPU s (renders, rays) |\n"
       "|---|---|---|---|---|---|---|---|---|\n");
   json rows = json::array();

@@ -18,14 +18,14 @@
 #include <opencv2/imgproc.hpp>
 #include <string_view>
 
-#include "core/system/clock.hpp"
-#include "tests/support/orbit_scenes.hpp"
 #include "core/formats/colmap_model.hpp"
 #include "core/session/session.hpp"
+#include "core/system/clock.hpp"
 #include "recon/alignment/luminance.hpp"
 #include "recon/assembly/field_renderer.hpp"
 #include "recon/nerf/nerf.hpp"
 #include "recon/registration/similarity_search.hpp"
+#include "tests/support/orbit_scenes.hpp"
 
 namespace {
 
@@ -69,8 +69,8 @@ Result<json> read(const fs::path& file) {
 Similarity3d similarity_of(const json& s) {
   const auto q = s.at("rotation_wxyz").get<std::vector<double>>(),
              t = s.at("translation").get<std::vector<double>>();
-  return {s.at("scale").get<double>(), Eigen::Quaterniond(q[0], q[1], q[2], q[3]),
-          {t[0], t[1], t[2]}};
+  return {
+      s.at("scale").get<double>(), Eigen::Quaterniond(q[0], q[1], q[2], q[3]), {t[0], t[1], t[2]}};
 }
 
 /// Camera centres that should coincide, in each world.
@@ -141,7 +141,8 @@ Status compare_with_rig(const Session& session, const fs::path& out, const Recon
   pairs.print("similarity of the run", similarity_of(found.at("visible_from_thermal")));
   const Eigen::Matrix4d m = Eigen::umeyama(pairs.thermal, pairs.visible, true);
   const double scale = std::cbrt(m.topLeftCorner<3, 3>().determinant());
-  const Similarity3d best{scale, Eigen::Quaterniond(Eigen::Matrix3d(m.topLeftCorner<3, 3>() / scale)),
+  const Similarity3d best{scale,
+                          Eigen::Quaterniond(Eigen::Matrix3d(m.topLeftCorner<3, 3>() / scale)),
                           m.topRightCorner<3, 1>()};
   pairs.print("best similarity of the centres", best);
   const Refinery refinery{renderer, images, thermal.views, pairs, progress};
@@ -167,7 +168,8 @@ Status compare_disturbed(const Reconstruction& thermal, const SceneRenderer& ren
     const double sign = i % 2 ? -1 : 1;
     const Eigen::Vector3d axis = axes[i].normalized();
     const Similarity3d off{
-        1 + sign * degrees / 200, Eigen::Quaterniond(Eigen::AngleAxisd(degrees * EIGEN_PI / 180, axis)),
+        1 + sign * degrees / 200,
+        Eigen::Quaterniond(Eigen::AngleAxisd(degrees * EIGEN_PI / 180, axis)),
         degrees / 300 * pairs.extent * axis.cross(Eigen::Vector3d(1, 1, 0).normalized())};
     ORBITFUSE_TRY(refinery.compare(off, true));
   }
@@ -190,8 +192,7 @@ Status run(const fs::path& folder, const fs::path& out, double degrees, bool vie
         ORBITFUSE_ASSIGN(cv::Mat image, read_luminance(session, frame));
         images.push_back(std::move(image));
       }
-  if (views)
-    progress.report = [](const ProgressEvent& e) { fmt::print("  {}\n", e.detail); };
+  if (views) progress.report = [](const ProgressEvent& e) { fmt::print("  {}\n", e.detail); };
   if (degrees > 0) return compare_disturbed(thermal, renderer, images, degrees, progress);
   return compare_with_rig(session, out, visible, thermal, renderer, images, progress);
 }

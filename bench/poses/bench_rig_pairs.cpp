@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // bench_rig_pairs SCENE...: the test pairs of the rendered scenes, where both modalities share one
-// camera, as a rig whose transform nobody knows: error of the transform and the lens, and by how much
-// corners and centre of the thermal image are misplaced. With the pairs shuffled it must refuse.
+// camera, as a rig whose transform nobody knows: error of the transform and the lens, and by how
+// much corners and centre of the thermal image are misplaced. With the pairs shuffled it must
+// refuse.
 
+#include <fmt/format.h>
 #include <cstdio>
 #include <filesystem>
-#include <fmt/format.h>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -76,10 +77,12 @@ void print(const char* what, const TestPairs& pairs, double focal_error, double 
     fmt::print("  {}: refused: {}; {:.1f} CPU s\n", what, rig.error().found, spent);
     return;
   }
-  fmt::print("  {}: off by {:.2f} deg, focal length by {:.2f} %, {:.2f} px in the mean; {}; {:.1f} CPU s\n",
-             what, Eigen::AngleAxisd(rig->thermal_from_visible.rotation).angle() * 180 / EIGEN_PI,
-             100 * (rig->thermal.fx / pairs.camera.fx - 1),
-             mean_misplacement_px(*rig, pairs.camera), rig->words(), spent);
+  fmt::print(
+      "  {}: off by {:.2f} deg, focal length by {:.2f} %, {:.2f} px in the mean; {}; {:.1f} CPU "
+      "s\n",
+      what, Eigen::AngleAxisd(rig->thermal_from_visible.rotation).angle() * 180 / EIGEN_PI,
+      100 * (rig->thermal.fx / pairs.camera.fx - 1), mean_misplacement_px(*rig, pairs.camera),
+      rig->words(), spent);
 }
 
 }  // namespace

@@ -17,14 +17,14 @@
 #include <string_view>
 
 #include "bench/poses/misalignment.hpp"
-#include "core/system/clock.hpp"
-#include "tests/support/orbit_scenes.hpp"
 #include "core/formats/colmap_model.hpp"
+#include "core/system/clock.hpp"
 #include "core/system/cpu.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/assembly/field_renderer.hpp"
 #include "recon/nerf/nerf.hpp"
 #include "recon/poses/estimate_poses.hpp"
+#include "tests/support/orbit_scenes.hpp"
 
 namespace {
 
@@ -63,24 +63,25 @@ Arguments arguments_of(int argc, char** argv) {
 void print_rung(const char* name, const scenes::Scene& scene, const VisibleScene* seen,
                 const PoseOptions& options) {
   const double before = cpu_seconds();
-  const auto poses = estimate_thermal_poses(
-      scene.session, seen, options, fs::temp_directory_path() / "orbitfuse_bench_rung", {});
+  const auto poses = estimate_thermal_poses(scene.session, seen, options,
+                                            fs::temp_directory_path() / "orbitfuse_bench_rung", {});
   const double spent = cpu_seconds() - before;
   if (!poses) {
     fmt::print("| {} | none: {} | | | {:.0f} |\n", name, poses.error().found.substr(0, 120), spent);
     return;
   }
   const scenes::PoseError error = scenes::pose_error(
-      poses->reconstruction, poses->shares_visible_frame ? seen->reconstruction : poses->reconstruction,
-      scene.truth);
+      poses->reconstruction,
+      poses->shares_visible_frame ? seen->reconstruction : poses->reconstruction, scene.truth);
   fmt::print("| {} | {}/{} | {:.2f} / {:.2f} | {:.2f} / {:.2f} | {:.0f} |\n", name,
              poses->reconstruction.views.size(), poses->frame_count, error.ate_percent,
              error.worst_percent, error.mean_rotation_deg, error.worst_rotation_deg, spent);
 }
 
 void print_rungs(const scenes::Scene& scene, const VisibleScene& seen, const PoseOptions& options) {
-  fmt::print("| rung alone | posed | centres RMS / worst, % | rotation mean / worst, deg | CPU s |\n"
-             "|---|---|---|---|---|\n");
+  fmt::print(
+      "| rung alone | posed | centres RMS / worst, % | rotation mean / worst, deg | CPU s |\n"
+      "|---|---|---|---|---|\n");
   print_rung("COLMAP on the thermal views", scene, nullptr, options);
   const VisibleScene lines{seen.reconstruction, nullptr};
   print_rung("lines of the visible scene, else COLMAP", scene, &lines, options);

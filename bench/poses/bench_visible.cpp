@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// bench_visible SCENE... [--focal-error R] [--no-stations] [--colmap]: poses of the visible views alone, and
-// their error where the truth is known. A scene is one of shared data's orbits (container, sedan,
-// van, fox, flowerpot, ...), one of its pairs (metu_sunny_scene_7, ...), or the path of a folder
-// rendered like them. --colmap poses with COLMAP's mapper on all pairs at full settings instead.
+// bench_visible SCENE... [--focal-error R] [--no-stations] [--colmap]: poses of the visible views
+// alone, and their error where the truth is known. A scene is one of shared data's orbits
+// (container, sedan, van, fox, flowerpot, ...), one of its pairs (metu_sunny_scene_7, ...), or the
+// path of a folder rendered like them. --colmap poses with COLMAP's mapper on all pairs at full
+// settings instead.
 
+#include <fmt/format.h>
+#include <unistd.h>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
 #include <string_view>
-#include <unistd.h>
 #include <vector>
 
 #include "core/system/clock.hpp"
@@ -96,8 +97,7 @@ Result<ModalityPoses> colmap_poses(const Session& session, const fs::path& workd
   ORBITFUSE_TRY(project.extract(session, images, {}));
   ORBITFUSE_TRY(project.match(images, exhaustive_pairs(static_cast<int>(frames.size())), {}));
   ORBITFUSE_ASSIGN(Reconstruction model, project.map(session, images, {}, {}));
-  if (model.views.size() < 2)
-    return fail(ErrorKind::quality, "colmap", "no model", "see its log");
+  if (model.views.size() < 2) return fail(ErrorKind::quality, "colmap", "no model", "see its log");
   ORBITFUSE_ASSIGN(JudgedModel judged, judge_model(std::move(model), session, frames, options));
   judged.poses.ladder.push_back({"COLMAP, all pairs, full settings", judged.believed, judged.why,
                                  static_cast<int>(judged.poses.reconstruction.views.size()),
@@ -113,16 +113,17 @@ void print(const scenes::Scene& scene, const Result<ModalityPoses>& poses, doubl
   for (const LadderStep& step : poses->ladder)
     fmt::print("  {} {}: {}/{} in {:.1f} s: {}\n", step.held ? "held" : "fell", step.rung,
                step.posed, step.total, step.seconds, step.why);
-  for (const DroppedView& view : poses->dropped) fmt::print("  dropped {}: {}\n", view.name, view.why);
+  for (const DroppedView& view : poses->dropped)
+    fmt::print("  dropped {}: {}\n", view.name, view.why);
   fmt::print("  posed {}/{}, {:.1f} CPU s", poses->reconstruction.views.size(), poses->frame_count,
              cpu_s);
   const scenes::PoseError error =
       scenes::pose_error(poses->reconstruction, poses->reconstruction, scene.truth);
   if (error.views > 0)
-    fmt::print("; centres RMS {:.3f} %, worst {:.3f} % of the extent; rotation mean {:.3f}, worst "
-               "{:.3f} deg",
-               error.ate_percent, error.worst_percent, error.mean_rotation_deg,
-               error.worst_rotation_deg);
+    fmt::print(
+        "; centres RMS {:.3f} %, worst {:.3f} % of the extent; rotation mean {:.3f}, worst "
+        "{:.3f} deg",
+        error.ate_percent, error.worst_percent, error.mean_rotation_deg, error.worst_rotation_deg);
   fmt::print("\n");
 }
 
@@ -130,10 +131,14 @@ Request parsed(int argc, char** argv) {
   Request request;
   for (int i = 1; i < argc; ++i) {
     const std::string_view word = argv[i];
-    if (word == "--focal-error" && i + 1 < argc) request.focal_error = std::strtod(argv[++i], nullptr);
-    else if (word == "--no-stations") request.stations = false;
-    else if (word == "--colmap") request.colmap = true;
-    else request.scenes.emplace_back(word);
+    if (word == "--focal-error" && i + 1 < argc)
+      request.focal_error = std::strtod(argv[++i], nullptr);
+    else if (word == "--no-stations")
+      request.stations = false;
+    else if (word == "--colmap")
+      request.colmap = true;
+    else
+      request.scenes.emplace_back(word);
   }
   return request;
 }
@@ -145,9 +150,10 @@ int main(int argc, char** argv) {
   const fs::path data = testing::shared_data();
   const Request request = parsed(argc, argv);
   if (request.scenes.empty() || !fs::exists(data)) {
-    std::fputs("bench_visible SCENE... [--focal-error R] [--no-stations] [--colmap]; needs the "
-               "shared data (ORBITFUSE_SHARED)\n",
-               stderr);
+    std::fputs(
+        "bench_visible SCENE... [--focal-error R] [--no-stations] [--colmap]; needs the "
+        "shared data (ORBITFUSE_SHARED)\n",
+        stderr);
     return 2;
   }
   fmt::print("{}; {} threads\n", cpu_description(), thread_count());

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "tests/support/orbit_scenes.hpp"
 #include "recon/poses/estimate_poses.hpp"
+#include "tests/support/orbit_scenes.hpp"
 
 namespace orbitfuse::scenes {
 

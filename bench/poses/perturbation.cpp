@@ -33,8 +33,7 @@ Status rewrite(Scene& scene, FrameRecord& frame, const Perturbation& by, cv::RNG
   if (by.blur_px > 0) cv::GaussianBlur(kelvin, kelvin, {}, by.blur_px);
   PosedView& truth = scene.truth.views.at(frame.file);
   if (by.width_px > 0 && by.width_px < frame.width) {
-    truth.camera =
-        truth.camera.scaled_to(by.width_px, frame.height * by.width_px / frame.width);
+    truth.camera = truth.camera.scaled_to(by.width_px, frame.height * by.width_px / frame.width);
     cv::resize(kelvin, kelvin, {truth.camera.width, truth.camera.height}, 0, 0, cv::INTER_AREA);
   }
   if (by.noise_k > 0) {
@@ -44,9 +43,9 @@ Status rewrite(Scene& scene, FrameRecord& frame, const Perturbation& by, cv::RNG
   }
   const PosedView moved = truth;
   scene.truth.views.erase(frame.file);
-  frame.file = (folder / fmt::format("{}_{:03}.{}", by.name, frame.sequence,
-                                     by.gray_gain ? "png" : "tiff"))
-                   .string();
+  frame.file =
+      (folder / fmt::format("{}_{:03}.{}", by.name, frame.sequence, by.gray_gain ? "png" : "tiff"))
+          .string();
   frame.width = kelvin.cols, frame.height = kelvin.rows;
   frame.thermal_is_gray = by.gray_gain;
   scene.truth.views[frame.file] = moved;

@@ -13,17 +13,17 @@ namespace orbitfuse::scenes {
 /// What users' recordings are like, done to a session in memory; changed images go to a folder.
 struct Perturbation {
   std::string name = "default";
-  double focal_error = 0;           ///< of the thermal prior, relative
-  double station_error_deg = 0;     ///< added to azimuths with alternating sign
-  double start_deg = 0;             ///< added to every azimuth
-  bool backwards = false;           ///< the thermal orbit walked and declared the other way
-  int missing_stations = 0;         ///< recorded frames that are not there
-  double noise_k = 0;               ///< standard deviation added
-  double blur_px = 0;               ///< at full width
-  int width_px = 0;                 ///< reduced to; 0: as it is
-  bool tracking = false;            ///< with the frames recorded between the stations
-  bool order_alone = false;         ///< nothing declared of the thermal orbit
-  bool gray_gain = false;           ///< 8-bit with a gain of its own each image, no temperatures
+  double focal_error = 0;        ///< of the thermal prior, relative
+  double station_error_deg = 0;  ///< added to azimuths with alternating sign
+  double start_deg = 0;          ///< added to every azimuth
+  bool backwards = false;        ///< the thermal orbit walked and declared the other way
+  int missing_stations = 0;      ///< recorded frames that are not there
+  double noise_k = 0;            ///< standard deviation added
+  double blur_px = 0;            ///< at full width
+  int width_px = 0;              ///< reduced to; 0: as it is
+  bool tracking = false;         ///< with the frames recorded between the stations
+  bool order_alone = false;      ///< nothing declared of the thermal orbit
+  bool gray_gain = false;        ///< 8-bit with a gain of its own each image, no temperatures
 };
 
 const std::vector<Perturbation>& perturbations();

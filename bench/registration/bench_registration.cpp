@@ -16,10 +16,10 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/registration/oracle.hpp"
-#include "tests/support/cloud_scenes.hpp"
 #include "core/system/file_io.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/registration/register.hpp"
+#include "tests/support/cloud_scenes.hpp"
 
 using namespace orbitfuse;
 

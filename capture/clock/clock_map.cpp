@@ -63,12 +63,14 @@ ClockMap::Stamp ClockMap::add(std::int64_t device_ns, std::int64_t arrival_ns) {
     samples_.push_back({device_s, arrival_s});
   }
   last_device_ns_ = device_ns;
-  while (samples_.size() > 2 && samples_.back().device_s - samples_.front().device_s > options_.window_s) {
+  while (samples_.size() > 2 &&
+         samples_.back().device_s - samples_.front().device_s > options_.window_s) {
     samples_.pop_front();
   }
   fit();
   // No frame is taken after it arrived.
-  return finish(std::min(arrival_ns, host_of(static_cast<double>(device_ns - device_origin_ns_) * ns)));
+  return finish(
+      std::min(arrival_ns, host_of(static_cast<double>(device_ns - device_origin_ns_) * ns)));
 }
 
 std::int64_t ClockMap::host_of(double device_s) const {
@@ -82,8 +84,10 @@ void ClockMap::fit() {
   constexpr int slices = 16;
   std::optional<Sample> best[slices];
   for (const Sample& s : samples_) {
-    const int slice = span > 0 ? std::min(slices - 1, static_cast<int>(slices * (s.device_s - first) / span)) : 0;
-    if (!best[slice] || s.arrival_s - s.device_s < best[slice]->arrival_s - best[slice]->device_s) best[slice] = s;
+    const int slice =
+        span > 0 ? std::min(slices - 1, static_cast<int>(slices * (s.device_s - first) / span)) : 0;
+    if (!best[slice] || s.arrival_s - s.device_s < best[slice]->arrival_s - best[slice]->device_s)
+      best[slice] = s;
   }
   double n = 0, mean_x = 0, mean_y = 0, sxx = 0, sxy = 0;
   for (const auto& s : best) {
@@ -99,7 +103,8 @@ void ClockMap::fit() {
     sxx += (s->device_s - mean_x) * (s->device_s - mean_x);
     sxy += (s->device_s - mean_x) * (s->arrival_s - s->device_s - mean_y);
   }
-  rate_ = span < min_span_s ? 1.0 : 1.0 + std::clamp(sxx > 0 ? sxy / sxx : 0.0, -max_drift, max_drift);
+  rate_ =
+      span < min_span_s ? 1.0 : 1.0 + std::clamp(sxx > 0 ? sxy / sxx : 0.0, -max_drift, max_drift);
   double earliest = INFINITY, squares = 0;
   for (const Sample& s : samples_) earliest = std::min(earliest, s.arrival_s - rate_ * s.device_s);
   intercept_s_ = earliest;
@@ -115,7 +120,8 @@ void ClockMap::fit() {
 double ClockMap::offset_s() const {
   if (samples_.empty()) return 0;
   const double device_s = samples_.back().device_s;
-  return static_cast<double>(host_origin_ns_ - device_origin_ns_) * ns + predicted_s(device_s) - device_s;
+  return static_cast<double>(host_origin_ns_ - device_origin_ns_) * ns + predicted_s(device_s) -
+         device_s;
 }
 
 std::optional<std::uint64_t> GvspFrameCounter::unwrap(std::uint16_t frame_id) {

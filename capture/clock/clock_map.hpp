@@ -10,9 +10,9 @@
 namespace orbitfuse {
 
 struct ClockMapOptions {
-  double window_s = 60;          ///< short enough to follow a drift that changes with warmth
-  double jump_s = 0.1;           ///< more than any queueing delay of a working link
-  int jump_frames = 3;           ///< a single late frame is no jump
+  double window_s = 60;  ///< short enough to follow a drift that changes with warmth
+  double jump_s = 0.1;   ///< more than any queueing delay of a working link
+  int jump_frames = 3;   ///< a single late frame is no jump
 };
 
 /// Device clock to host clock. Arrival stamps are late by a varying, never negative delay, so the

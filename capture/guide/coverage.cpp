@@ -28,7 +28,9 @@ double angle_difference_deg(double a_deg, double b_deg) {
   return (wrapped < 0 ? wrapped + 360.0 : wrapped) - 180.0;
 }
 
-int OrbitPlan::sectors_per_loop() const { return static_cast<int>(std::lround(360.0 / spacing_deg)); }
+int OrbitPlan::sectors_per_loop() const {
+  return static_cast<int>(std::lround(360.0 / spacing_deg));
+}
 
 Status OrbitPlan::validate() const {
   const auto bad = [](const char* field, double found, const std::string& remedy) {
@@ -39,18 +41,23 @@ Status OrbitPlan::validate() const {
     return bad("spacing_deg", spacing_deg, "must divide 360 and lie in 1..120");
   }
   if (!(azimuth_tolerance_deg > 0 && azimuth_tolerance_deg <= spacing_deg / 2)) {
-    return bad("azimuth_tolerance_deg", azimuth_tolerance_deg, "must be > 0 and at most half the spacing");
+    return bad("azimuth_tolerance_deg", azimuth_tolerance_deg,
+               "must be > 0 and at most half the spacing");
   }
-  if (!(elevation_tolerance_deg > 0)) return bad("elevation_tolerance_deg", elevation_tolerance_deg, "must be > 0");
+  if (!(elevation_tolerance_deg > 0))
+    return bad("elevation_tolerance_deg", elevation_tolerance_deg, "must be > 0");
   if (loop_elevations_deg.empty()) return bad("loop_elevations_deg", 0, "give at least one loop");
   for (double elevation : loop_elevations_deg) {
-    if (!(elevation > -90 && elevation < 90)) return bad("loop_elevations_deg", elevation, "must lie in -90..90");
+    if (!(elevation > -90 && elevation < 90))
+      return bad("loop_elevations_deg", elevation, "must lie in -90..90");
   }
   std::vector<double> sorted = loop_elevations_deg;
   std::sort(sorted.begin(), sorted.end());
   for (std::size_t i = 1; i < sorted.size(); ++i) {
     if (sorted[i] - sorted[i - 1] < 2 * elevation_tolerance_deg) {
-      return bad("loop_elevations_deg", sorted[i], fmt::format("loops must be {:g} degrees apart or more, or a frame fits both", 2 * elevation_tolerance_deg));
+      return bad("loop_elevations_deg", sorted[i],
+                 fmt::format("loops must be {:g} degrees apart or more, or a frame fits both",
+                             2 * elevation_tolerance_deg));
     }
   }
   if (modalities.empty()) return bad("modalities", 0, "give at least one");
@@ -59,7 +66,8 @@ Status OrbitPlan::validate() const {
 
 Status CoverageOptions::validate() const {
   const auto bad = [](const char* field, double found) {
-    return fail(ErrorKind::usage, std::string("guide.") + field, fmt::format("{}", found), "must be > 0 (shares <= 1)");
+    return fail(ErrorKind::usage, std::string("guide.") + field, fmt::format("{}", found),
+                "must be > 0 (shares <= 1)");
   };
   if (!(min_sharpness > 0 && min_sharpness <= 1)) return bad("min_sharpness", min_sharpness);
   if (!(max_visible_edge_px > 0)) return bad("max_visible_edge_px", max_visible_edge_px);
@@ -72,17 +80,28 @@ Status CoverageOptions::validate() const {
 
 std::string text(Refusal refusal) {
   switch (refusal) {
-    case Refusal::none: return "good";
-    case Refusal::not_on_disk: return "not saved";
-    case Refusal::lost: return "the mat is out of sight";
-    case Refusal::nuc: return "the camera is correcting itself, wait";
-    case Refusal::moving: return "too fast, hold still";
-    case Refusal::blurred: return "blurred, hold still";
-    case Refusal::featureless: return "nothing to see, aim at the object and focus";
-    case Refusal::badly_exposed: return "too dark or too bright";
-    case Refusal::position_unsure: return "position unsure, look at the mat";
-    case Refusal::between_stations: return "between stations";
-    case Refusal::out_of_band: return "too high or too low";
+    case Refusal::none:
+      return "good";
+    case Refusal::not_on_disk:
+      return "not saved";
+    case Refusal::lost:
+      return "the mat is out of sight";
+    case Refusal::nuc:
+      return "the camera is correcting itself, wait";
+    case Refusal::moving:
+      return "too fast, hold still";
+    case Refusal::blurred:
+      return "blurred, hold still";
+    case Refusal::featureless:
+      return "nothing to see, aim at the object and focus";
+    case Refusal::badly_exposed:
+      return "too dark or too bright";
+    case Refusal::position_unsure:
+      return "position unsure, look at the mat";
+    case Refusal::between_stations:
+      return "between stations";
+    case Refusal::out_of_band:
+      return "too high or too low";
   }
   return "";
 }
@@ -92,7 +111,12 @@ Coverage::Coverage(OrbitPlan plan, CoverageOptions options)
   assert(plan_.validate() && options_.validate());
   for (std::size_t loop = 0; loop < plan_.loop_elevations_deg.size(); ++loop) {
     for (int i = 0; i < plan_.sectors_per_loop(); ++i) {
-      sectors_.push_back({static_cast<int>(loop), i, i * plan_.spacing_deg, plan_.loop_elevations_deg[loop], {}, {}});
+      sectors_.push_back({static_cast<int>(loop),
+                          i,
+                          i * plan_.spacing_deg,
+                          plan_.loop_elevations_deg[loop],
+                          {},
+                          {}});
     }
   }
 }
@@ -106,19 +130,23 @@ Refusal Coverage::add(const FrameAssessment& frame) {
   if (!(p.sigma_deg <= options_.max_sigma_deg)) return Refusal::position_unsure;
   if (!(std::abs(p.speed_deg_s) <= options_.rest_speed_deg_s)) return Refusal::moving;
   // Exposure first: what is too dark has no edges either.
-  if (!(std::max(frame.overexposed, frame.underexposed) <= options_.max_clipped)) return Refusal::badly_exposed;
+  if (!(std::max(frame.overexposed, frame.underexposed) <= options_.max_clipped))
+    return Refusal::badly_exposed;
   if (frame.edge_blur && frame.edge_blur->edges == 0) return Refusal::featureless;
   if (!(frame.sharpness >= options_.min_sharpness)) return Refusal::blurred;
   if (frame.edge_blur) {
-    const double widest =
-        frame.modality == Modality::visible ? options_.max_visible_edge_px : options_.max_thermal_edge_px;
+    const double widest = frame.modality == Modality::visible ? options_.max_visible_edge_px
+                                                              : options_.max_thermal_edge_px;
     if (!(frame.edge_blur->sigma_px <= widest)) return Refusal::blurred;
   }
   bool in_band = false;
   for (Sector& sector : sectors_) {
-    if (!(std::abs(p.elevation_deg - sector.elevation_deg) <= plan_.elevation_tolerance_deg)) continue;
+    if (!(std::abs(p.elevation_deg - sector.elevation_deg) <= plan_.elevation_tolerance_deg))
+      continue;
     in_band = true;
-    if (!(std::abs(angle_difference_deg(p.azimuth_deg, sector.azimuth_deg)) <= plan_.azimuth_tolerance_deg)) continue;
+    if (!(std::abs(angle_difference_deg(p.azimuth_deg, sector.azimuth_deg)) <=
+          plan_.azimuth_tolerance_deg))
+      continue;
     const std::size_t s = slot(frame.modality);
     const double rank = frame.rank > 0 ? frame.rank : frame.sharpness;
     if (sector.file[s].empty() || rank > sector.rank[s]) {
@@ -185,7 +213,8 @@ std::string Coverage::instruction(Modality modality, const std::optional<OrbitPo
   const bool there = std::abs(turn) <= plan_.azimuth_tolerance_deg;
   const bool in_band = std::abs(climb) <= plan_.elevation_tolerance_deg;
   if (there && in_band) {
-    const bool fixable = last != Refusal::none && last != Refusal::between_stations && last != Refusal::out_of_band;
+    const bool fixable =
+        last != Refusal::none && last != Refusal::between_stations && last != Refusal::out_of_band;
     return fixable ? text(last) : "hold still";
   }
   std::string words;

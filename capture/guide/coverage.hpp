@@ -15,10 +15,10 @@ namespace orbitfuse {
 
 /// The orbits to be walked: one station every spacing_deg on every loop.
 struct OrbitPlan {
-  double spacing_deg = 30;                        ///< what the reconstruction is built for
+  double spacing_deg = 30;  ///< what the reconstruction is built for
   std::vector<double> loop_elevations_deg{10, 30, 55};
   double azimuth_tolerance_deg = 5;
-  double elevation_tolerance_deg = 7;             ///< half of the band round a loop's elevation
+  double elevation_tolerance_deg = 7;  ///< half of the band round a loop's elevation
   std::vector<Modality> modalities{Modality::visible, Modality::thermal};
 
   int sectors_per_loop() const;
@@ -28,38 +28,47 @@ struct OrbitPlan {
 /// Where the camera stands, as the mat, the turntable, the operator or odometry says.
 struct OrbitPosition {
   double azimuth_deg = 0, elevation_deg = 0;
-  double sigma_deg = 0;                           ///< one standard deviation
+  double sigma_deg = 0;  ///< one standard deviation
   double speed_deg_s = 0;
 };
 
 /// What is known of one frame when it is judged.
 struct FrameAssessment {
   Modality modality = Modality::visible;
-  std::string file;                               ///< empty: not on disk
-  std::optional<OrbitPosition> position;          ///< absent: the camera is lost
-  std::optional<EdgeBlur> edge_blur;              ///< absent: not measured
-  double sharpness = 0;                           ///< relative to what this view can have, 0..1
-  double rank = 0;                                ///< of two good frames the higher stays; 0: sharpness
-  double overexposed = 0, underexposed = 0;       ///< shares of pixels
-  bool nuc = false;                               ///< during or right after a shutter correction
+  std::string file;                          ///< empty: not on disk
+  std::optional<OrbitPosition> position;     ///< absent: the camera is lost
+  std::optional<EdgeBlur> edge_blur;         ///< absent: not measured
+  double sharpness = 0;                      ///< relative to what this view can have, 0..1
+  double rank = 0;                           ///< of two good frames the higher stays; 0: sharpness
+  double overexposed = 0, underexposed = 0;  ///< shares of pixels
+  bool nuc = false;                          ///< during or right after a shutter correction
 };
 
 struct CoverageOptions {
-  double min_sharpness = 0.25;                    ///< a blur of one pixel costs nine tenths
+  double min_sharpness = 0.25;  ///< a blur of one pixel costs nine tenths
   /// Wider edges are blurred, whatever there is to compare with. Measured (bench_sharpness): sharp
   /// visible images have up to 1.4 px, and 1.8 px or more once blurred by 2 px; thermal images have
   /// up to 3.1 px where there is little but noise, and 2.8 px or more once blurred by 3 px.
   double max_visible_edge_px = 1.75, max_thermal_edge_px = 3.2;
-  double max_clipped = 0.25;                      ///< share of over- or underexposed pixels
-  double rest_speed_deg_s = 2;                    ///< at 1/100 s this blurs 0.3 px at 640 px, 25 deg
-  double max_sigma_deg = 1;                       ///< a position less sure than this proves nothing
+  double max_clipped = 0.25;    ///< share of over- or underexposed pixels
+  double rest_speed_deg_s = 2;  ///< at 1/100 s this blurs 0.3 px at 640 px, 25 deg
+  double max_sigma_deg = 1;     ///< a position less sure than this proves nothing
 
   Status validate() const;
 };
 
 enum class Refusal {
-  none, not_on_disk, lost, nuc, moving, blurred, featureless, badly_exposed, position_unsure,
-  between_stations, out_of_band
+  none,
+  not_on_disk,
+  lost,
+  nuc,
+  moving,
+  blurred,
+  featureless,
+  badly_exposed,
+  position_unsure,
+  between_stations,
+  out_of_band
 };
 /// A short text for the operator: "too fast", "blurred", ...
 std::string text(Refusal refusal);

@@ -31,7 +31,8 @@ cv::Mat without_dead_pixels(const cv::Mat& image) {
   image.convertTo(values, CV_32F);
   known.convertTo(known, CV_32F, 1.0 / 255);
   // Means of what is known around, ever wider: smooth, and close to the border's values.
-  for (int side = 3; cv::countNonZero(known) < static_cast<int>(known.total()); side = 2 * side + 1) {
+  for (int side = 3; cv::countNonZero(known) < static_cast<int>(known.total());
+       side = 2 * side + 1) {
     cv::Mat sum, weight;
     cv::boxFilter(values, sum, CV_32F, {side, side}, {-1, -1}, false, cv::BORDER_CONSTANT);
     cv::boxFilter(known, weight, CV_32F, {side, side}, {-1, -1}, false, cv::BORDER_CONSTANT);

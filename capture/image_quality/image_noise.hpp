@@ -11,8 +11,8 @@ namespace orbitfuse {
 /// under 2x2.
 double white_noise_sigma(const cv::Mat& gray, int stride);
 
-/// A thermal image (CV_16UC1) with its dead pixels, 0, filled from around them, so that they make no
-/// edges; any other image, and one without a live pixel, as it is.
+/// A thermal image (CV_16UC1) with its dead pixels, 0, filled from around them, so that they make
+/// no edges; any other image, and one without a live pixel, as it is.
 cv::Mat without_dead_pixels(const cv::Mat& image);
 
 }  // namespace orbitfuse

@@ -11,14 +11,14 @@
 #include "capture/image_quality/frame_motion.hpp"
 #include "capture/image_quality/frame_quality.hpp"
 #include "core/image/exif.hpp"
-#include "core/system/file_io.hpp"
 #include "core/image/image_codec.hpp"
+#include "core/system/file_io.hpp"
 #include "core/system/utc_now.hpp"
 
 namespace orbitfuse {
 namespace {
 
-constexpr double darkest_mean_level = 8;  // of 255
+constexpr double darkest_mean_level = 8;     // of 255
 constexpr std::size_t photos_in_memory = 4;  // of 36 MB each; those behind them are read back
 
 std::size_t slot(Modality modality) { return modality == Modality::visible ? 0 : 1; }
@@ -166,7 +166,8 @@ bool LiveGuide::needs_image(const FrameRecord& frame) {
 }
 
 /// A frame that is shaken differs from its neighbours.
-void LiveGuide::judge_between_neighbours(Camera& camera, const FrameRecord& frame, const cv::Mat& image) {
+void LiveGuide::judge_between_neighbours(Camera& camera, const FrameRecord& frame,
+                                         const cv::Mat& image) {
   std::deque<Look>& looks = camera.since_key;
   const auto agrees = [&](const cv::Mat& before) {
     return before.size() == image.size() && before.type() == image.type() &&
@@ -374,10 +375,14 @@ std::vector<LiveCamera> LiveGuide::cameras() const {
 std::string instruction_for(const LiveCamera& camera, Operator where) {
   const std::string key = where == Operator::at_terminal ? "press Enter" : "tap At the station";
   switch (camera.awaits) {
-    case Awaited::nothing: break;
-    case Awaited::key: return camera.instruction + ", then " + key;
-    case Awaited::photo: return camera.instruction + ", then take the photo";
-    case Awaited::key_or_photo: return camera.instruction + ", then " + key + " or take the photo";
+    case Awaited::nothing:
+      break;
+    case Awaited::key:
+      return camera.instruction + ", then " + key;
+    case Awaited::photo:
+      return camera.instruction + ", then take the photo";
+    case Awaited::key_or_photo:
+      return camera.instruction + ", then " + key + " or take the photo";
   }
   return camera.instruction;
 }

@@ -72,8 +72,8 @@ class LiveGuide {
   /// What an earlier recording of the session stored, before the first add(): sectors that it
   /// filled stay filled, and the turntable goes on one step after the last recorded station.
   void resume(const std::vector<FrameRecord>& earlier);
-  /// From any thread; fast unless the frame carries a station. `pixels`: its image as it was decoded
-  /// for the disk, upright; empty: it is read back when it is needed.
+  /// From any thread; fast unless the frame carries a station. `pixels`: its image as it was
+  /// decoded for the disk, upright; empty: it is read back when it is needed.
   void add(const FrameRecord& frame, const cv::Mat& pixels = {});
   /// The operator stands at the next station, or has turned the table by a step: for each modality
   /// the next good frame is it; of a video, the next between two that show the same.
@@ -104,12 +104,12 @@ class LiveGuide {
     std::optional<OrbitPosition> position;
     std::int64_t position_time_ns = 0;
     std::unique_ptr<PositionPolicy> policy;
-    bool stations_come = false;              ///< with its frames, whatever was expected
-    std::optional<Look> waiting;             ///< newest frame of a video not looked at yet
-    std::deque<Look> photos;                 ///< not looked at yet: each was taken on purpose
+    bool stations_come = false;   ///< with its frames, whatever was expected
+    std::optional<Look> waiting;  ///< newest frame of a video not looked at yet
+    std::deque<Look> photos;      ///< not looked at yet: each was taken on purpose
     std::optional<Look> next_to_look();
-    std::optional<OrbitPosition> announced;  ///< where the next good frame is
-    std::deque<Look> since_key;              ///< video frames, the newest up to three
+    std::optional<OrbitPosition> announced;     ///< where the next good frame is
+    std::deque<Look> since_key;                 ///< video frames, the newest up to three
     std::map<std::size_t, FrameRecord> chosen;  ///< by sector
   };
   void add_at_station(Camera& camera, const FrameRecord& frame);

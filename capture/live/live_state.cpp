@@ -98,8 +98,8 @@ std::vector<std::string> warnings_of(const LiveState& state) {
       list.push_back(
           fmt::format("{}: the disk is too slow, {} frames dropped", s.device, s.dropped));
     if (s.unwritten > 0)
-      list.push_back(
-          fmt::format("{}: {} frames could not be written; is the disk full?", s.device, s.unwritten));
+      list.push_back(fmt::format("{}: {} frames could not be written; is the disk full?", s.device,
+                                 s.unwritten));
     if (s.missing > 0)
       list.push_back(fmt::format("{}: {} frames lost on the way", s.device, s.missing));
     if (s.rejected > 0)
@@ -138,21 +138,20 @@ std::string json_of(const LiveState& state) {
 
 std::string terminal_view(const LiveState& state) {
   const auto seconds = static_cast<long>(state.elapsed_s);
-  std::string out = fmt::format("{}  {}  {}:{:02}  {:.1f} GiB free\n", state.session,
-                                state.running           ? "recording"
-                                : state.waits_for_start ? "waiting for Start on the page"
-                                                        : "stopped",
-                                seconds / 60, seconds % 60,
-                                static_cast<double>(state.free_bytes) / (1ull << 30));
+  std::string out =
+      fmt::format("{}  {}  {}:{:02}  {:.1f} GiB free\n", state.session,
+                  state.running           ? "recording"
+                  : state.waits_for_start ? "waiting for Start on the page"
+                                          : "stopped",
+                  seconds / 60, seconds % 60, static_cast<double>(state.free_bytes) / (1ull << 30));
   for (std::size_t i = 0; i < state.streams.size(); ++i) {
     const StreamStatus& s = state.streams[i];
     if (!s.any()) {
       out += fmt::format("{:<10} no frame yet\n", s.device);
       continue;
     }
-    out += fmt::format(
-        "{:<10} {:5.1f} Hz  {}\n", s.device,
-        i < state.rates_hz.size() ? state.rates_hz[i] : 0.0, account_words(s));
+    out += fmt::format("{:<10} {:5.1f} Hz  {}\n", s.device,
+                       i < state.rates_hz.size() ? state.rates_hz[i] : 0.0, account_words(s));
   }
   for (const StreamStatus& s : state.streams) {
     if (s.passed_over > 0)

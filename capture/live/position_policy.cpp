@@ -41,9 +41,9 @@ class OperatorKey : public PositionPolicy {
     if (sight.announced && to_repeat(sight.last)) return {text(sight.last)};
     const std::optional<OrbitPosition> next = next_station();
     if (!next) return {coverage_.instruction(modality_, sight.position, sight.last)};
-    return {fmt::format("go to azimuth {:.0f}°, {:.0f}° high", next->azimuth_deg,
-                        next->elevation_deg),
-            Awaited::key};
+    return {
+        fmt::format("go to azimuth {:.0f}°, {:.0f}° high", next->azimuth_deg, next->elevation_deg),
+        Awaited::key};
   }
 
  protected:

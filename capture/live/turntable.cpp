@@ -41,8 +41,8 @@ int Turntable::key(std::int64_t time_ns) {
 std::optional<int> Turntable::key_before(std::int64_t photo_ns) const {
   constexpr std::int64_t second_ns = 1'000'000'000;
   const auto count_until = [this](std::int64_t time_ns) {
-    return static_cast<int>(
-        std::upper_bound(key_times_ns_.begin(), key_times_ns_.end(), time_ns) - key_times_ns_.begin());
+    return static_cast<int>(std::upper_bound(key_times_ns_.begin(), key_times_ns_.end(), time_ns) -
+                            key_times_ns_.begin());
   };
   if (photo_ns <= 0) return std::nullopt;
   const int key = count_until(photo_ns);

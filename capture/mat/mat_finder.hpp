@@ -27,16 +27,17 @@ struct MatSighting {
   Rigid3d cam_from_mat;
   int tags = 0;
   bool followed = false;  ///< not read: by optical flow of the mat, or by odometry on the scene
-  double error_px = 0;  ///< root mean square, at the image's own size
+  double error_px = 0;    ///< root mean square, at the image's own size
 };
 
-/// Finds the mat in images, given in their order, and says where the camera stands in the mat's frame. Tags may
-/// appear dark on bright or bright on dark (foil can be warmer or colder than paint). The pose is
-/// that of the plane with the least reprojection error (IPPE, Collins and Bartoli, IJCV 2014, then
-/// Levenberg-Marquardt); where the mirrored pose fits nearly as well the sigma says so. The camera
-/// is a pinhole with its principal point in the middle; its focal length is given or is learnt from
-/// the sightings. Visible images without a readable mat are placed by SceneOdometry, with its growing
-/// sigma; else the mat's corners are followed (MatTracker), with one beyond what counts.
+/// Finds the mat in images, given in their order, and says where the camera stands in the mat's
+/// frame. Tags may appear dark on bright or bright on dark (foil can be warmer or colder than
+/// paint). The pose is that of the plane with the least reprojection error (IPPE, Collins and
+/// Bartoli, IJCV 2014, then Levenberg-Marquardt); where the mirrored pose fits nearly as well the
+/// sigma says so. The camera is a pinhole with its principal point in the middle; its focal length
+/// is given or is learnt from the sightings. Visible images without a readable mat are placed by
+/// SceneOdometry, with its growing sigma; else the mat's corners are followed (MatTracker), with
+/// one beyond what counts.
 class MatFinder {
  public:
   explicit MatFinder(const MatDesign& design, MatFinderOptions options = {});

@@ -40,7 +40,8 @@ void ruler(PdfPage& page, double left, double y) {
   page.text(left + 102, y - 1, 3, "100 mm: print at 100 %, not fitted to the page");
 }
 
-/// What of the mat is where on which page: tile (row, column) shows as much as fits between margins.
+/// What of the mat is where on which page: tile (row, column) shows as much as fits between
+/// margins.
 struct Tiling {
   Paper sheet;
   double side_mm = 0, tile_w_mm = 0, tile_h_mm = 0;
@@ -63,7 +64,8 @@ Tiling tiling_of(const MatDesign& design, const std::string& paper) {
 }
 
 /// The part of the mat that lies on a tile; rows from the top.
-void paint(PdfPage& page, const Tiling& t, int row, int column, const std::vector<MatRectangle>& black) {
+void paint(PdfPage& page, const Tiling& t, int row, int column,
+           const std::vector<MatRectangle>& black) {
   // Lower left corner of the tile in the mat's frame.
   const double left = column * t.tile_w_mm - t.side_mm / 2,
                bottom = t.side_mm / 2 - (row + 1) * t.tile_h_mm;

@@ -7,8 +7,8 @@
 
 namespace orbitfuse {
 
-/// "A4", "A3", "A1": tiles of that paper to glue together; "one": a single page for a plotter, or as
-/// few as hold the mat where it is larger than the 5 m that a PDF page may have.
+/// "A4", "A3", "A1": tiles of that paper to glue together; "one": a single page for a plotter, or
+/// as few as hold the mat where it is larger than the 5 m that a PDF page may have.
 Status check_paper(const std::string& paper);
 
 /// The mat at its true size, with cutting marks, tile numbers, a 100 mm ruler that shows whether

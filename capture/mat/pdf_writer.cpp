@@ -67,7 +67,8 @@ PdfPage PdfWriter::add_page(double width_mm, double height_mm) {
 Result<std::string> PdfWriter::bytes() {
   const auto failed = [this] {
     return fail(ErrorKind::device, "mat PDF",
-                fmt::format("libHaru error {:#x}", document_ ? HPDF_GetError(document_.get()) : HPDF_FAILD_TO_ALLOC_MEM),
+                fmt::format("libHaru error {:#x}",
+                            document_ ? HPDF_GetError(document_.get()) : HPDF_FAILD_TO_ALLOC_MEM),
                 "try a smaller mat, and report the number");
   };
   if (!document_ || HPDF_SaveToStream(document_.get()) != HPDF_OK) return failed();

@@ -39,7 +39,8 @@ Eigen::Vector2d angles_of(const Rigid3d& cam_from_mat) {
           std::atan2(eye.z(), std::hypot(eye.x(), eye.y())) * deg};
 }
 
-double reprojection_rms_px(const MatCorners& corners, const cv::Matx33d& k, const cv::Mat& r, const cv::Mat& t) {
+double reprojection_rms_px(const MatCorners& corners, const cv::Matx33d& k, const cv::Mat& r,
+                           const cv::Mat& t) {
   if (corners.mat.empty()) return unknown;
   std::vector<cv::Point2d> projected;
   cv::projectPoints(corners.mat, r, t, k, cv::noArray(), projected);
@@ -51,8 +52,8 @@ double reprojection_rms_px(const MatCorners& corners, const cv::Matx33d& k, cons
   return std::sqrt(sum / static_cast<double>(projected.size()));
 }
 
-double direction_sigma_deg(const MatCorners& corners, const cv::Matx33d& k, const cv::Mat& r, const cv::Mat& t,
-                 double error_px) {
+double direction_sigma_deg(const MatCorners& corners, const cv::Matx33d& k, const cv::Mat& r,
+                           const cv::Mat& t, double error_px) {
   if (corners.mat.empty() || !std::isfinite(error_px)) return unknown;
   std::vector<cv::Point2d> projected;
   cv::Mat jacobian;
@@ -66,8 +67,8 @@ double direction_sigma_deg(const MatCorners& corners, const cv::Matx33d& k, cons
   // Scaled to a unit diagonal, so that radians and metres weigh alike.
   const PoseVector scale = information.diagonal().cwiseSqrt().cwiseInverse();
   if (!scale.allFinite()) return unknown;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> shape(scale.asDiagonal() * information *
-                                                                         scale.asDiagonal());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> shape(
+      scale.asDiagonal() * information * scale.asDiagonal());
   if (!(shape.eigenvalues()[0] > 1e-10)) return unknown;
   const Eigen::Matrix<double, 6, 6> covariance =
       information.ldlt().solve(Eigen::Matrix<double, 6, 6>::Identity()) *

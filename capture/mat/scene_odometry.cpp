@@ -18,8 +18,8 @@ constexpr int largest_side_px = 800;  // of the images that are followed: four l
 constexpr int most_tracks = 240;
 constexpr double track_distance_px = 10;
 constexpr float most_disagreement_px = 0.7f;
-/// Depth from a narrower angle is mostly noise; odometry's own poses need more, for their error goes
-/// into every later one.
+/// Depth from a narrower angle is mostly noise; odometry's own poses need more, for their error
+/// goes into every later one.
 constexpr double first_parallax_deg = 1.5, first_unsure_parallax_deg = 5, enough_parallax_deg = 15;
 constexpr double landmark_error_px = 2;
 constexpr std::size_t fewest_landmarks = 15;
@@ -30,18 +30,21 @@ constexpr double drift_share = 0.03;
 constexpr double deg = 180 / std::numbers::pi;
 
 Eigen::Vector3d ray_of(cv::Point2f px, double focal_px, cv::Point2d centre) {
-  return Eigen::Vector3d((px.x - centre.x) / focal_px, (px.y - centre.y) / focal_px, 1).normalized();
+  return Eigen::Vector3d((px.x - centre.x) / focal_px, (px.y - centre.y) / focal_px, 1)
+      .normalized();
 }
 
 /// The middle of the shortest line between two rays; nothing behind either camera.
 std::optional<Eigen::Vector3d> between_rays(const Rigid3d& a_from_mat, const Eigen::Vector3d& ray_a,
-                                            const Rigid3d& b_from_mat, const Eigen::Vector3d& ray_b) {
+                                            const Rigid3d& b_from_mat,
+                                            const Eigen::Vector3d& ray_b) {
   const Eigen::Vector3d eye_a = camera_center(a_from_mat), eye_b = camera_center(b_from_mat);
   const Eigen::Vector3d u = a_from_mat.rotation.conjugate() * ray_a,
                         v = b_from_mat.rotation.conjugate() * ray_b, w = eye_a - eye_b;
   const double uv = u.dot(v), denominator = 1 - uv * uv;
   if (denominator < 1e-6) return std::nullopt;
-  const double s = (uv * v.dot(w) - u.dot(w)) / denominator, t = (v.dot(w) - uv * u.dot(w)) / denominator;
+  const double s = (uv * v.dot(w) - u.dot(w)) / denominator,
+               t = (v.dot(w) - uv * u.dot(w)) / denominator;
   if (s <= 0 || t <= 0) return std::nullopt;
   return 0.5 * (eye_a + s * u + eye_b + t * v);
 }
@@ -72,25 +75,32 @@ std::vector<SceneOdometry::Track> SceneOdometry::followed(const View& view) cons
   std::vector<cv::Point2f> start, end, back;
   for (const Track& track : tracks_) start.push_back(track.px);
   std::vector<unsigned char> forth_good, back_good;
-  cv::calcOpticalFlowPyrLK(before_.gray, view.gray, start, end, forth_good, cv::noArray(), {21, 21}, 4);
-  cv::calcOpticalFlowPyrLK(view.gray, before_.gray, end, back, back_good, cv::noArray(), {21, 21}, 4);
+  cv::calcOpticalFlowPyrLK(before_.gray, view.gray, start, end, forth_good, cv::noArray(), {21, 21},
+                           4);
+  cv::calcOpticalFlowPyrLK(view.gray, before_.gray, end, back, back_good, cv::noArray(), {21, 21},
+                           4);
   for (std::size_t i = 0; i < start.size(); ++i) {
     const cv::Point2f off = back[i] - start[i];
-    if (!forth_good[i] || !back_good[i] || off.dot(off) > most_disagreement_px * most_disagreement_px) continue;
+    if (!forth_good[i] || !back_good[i] ||
+        off.dot(off) > most_disagreement_px * most_disagreement_px)
+      continue;
     kept.push_back(tracks_[i]);
     kept.back().px = end[i];
   }
   return kept;
 }
 
-void SceneOdometry::settle(const View& view, std::vector<Track> tracks, const Rigid3d& cam_from_mat, bool read) {
+void SceneOdometry::settle(const View& view, std::vector<Track> tracks, const Rigid3d& cam_from_mat,
+                           bool read) {
   std::vector<Track> kept;
   for (Track& track : tracks) {
     const bool sure = track.read && read;
     const Eigen::Vector3d ray = ray_of(track.px, view.focal_px, view.centre);
     const Eigen::Vector3d first = ray_of(track.first_px, view.focal_px, view.centre);
-    const double parallax = deg * std::acos(std::clamp((track.first_cam_from_mat.rotation.conjugate() * first)
-                                                           .dot(cam_from_mat.rotation.conjugate() * ray), -1.0, 1.0));
+    const double parallax =
+        deg * std::acos(std::clamp((track.first_cam_from_mat.rotation.conjugate() * first)
+                                       .dot(cam_from_mat.rotation.conjugate() * ray),
+                                   -1.0, 1.0));
     // A landmark from poses that the mat gave is not spoilt by later, less sure ones.
     const bool better = !track.point_m || (sure == track.read && parallax > track.parallax_deg);
     const double fewest_deg = sure ? first_parallax_deg : first_unsure_parallax_deg;
@@ -122,30 +132,36 @@ void SceneOdometry::settle(const View& view, std::vector<Track> tracks, const Ri
 void SceneOdometry::add_tracks(const View& view, const Rigid3d& cam_from_mat, bool read) {
   const int wanted = most_tracks - static_cast<int>(tracks_.size());
   if (wanted < most_tracks / 4) return;
-  cv::Mat outside(view.gray.size(), CV_8UC1, cv::Scalar(255)), inside(view.gray.size(), CV_8UC1, cv::Scalar(0));
+  cv::Mat outside(view.gray.size(), CV_8UC1, cv::Scalar(255)),
+      inside(view.gray.size(), CV_8UC1, cv::Scalar(0));
   std::vector<cv::Point> outline;
   const double half = 0.5 * mat_size_m_;
   for (const auto& [x, y] : {std::pair(-half, -half), {half, -half}, {half, half}, {-half, half}}) {
     const Eigen::Vector3d seen = cam_from_mat * Eigen::Vector3d(x, y, 0);
     if (seen.z() <= 1e-3) continue;
-    outline.emplace_back(static_cast<int>(std::clamp(view.focal_px * seen.x() / seen.z() + view.centre.x, -1e4, 1e4)),
-                         static_cast<int>(std::clamp(view.focal_px * seen.y() / seen.z() + view.centre.y, -1e4, 1e4)));
+    outline.emplace_back(static_cast<int>(std::clamp(
+                             view.focal_px * seen.x() / seen.z() + view.centre.x, -1e4, 1e4)),
+                         static_cast<int>(std::clamp(
+                             view.focal_px * seen.y() / seen.z() + view.centre.y, -1e4, 1e4)));
   }
   if (outline.size() == 4) {
     cv::fillConvexPoly(outside, outline, 0);
     cv::fillConvexPoly(inside, outline, 255);
   }
   for (const Track& track : tracks_) {
-    for (cv::Mat* mask : {&outside, &inside}) cv::circle(*mask, track.px, static_cast<int>(track_distance_px), 0, -1);
+    for (cv::Mat* mask : {&outside, &inside})
+      cv::circle(*mask, track.px, static_cast<int>(track_distance_px), 0, -1);
   }
   for (const cv::Mat* mask : {&outside, &inside}) {
     std::vector<cv::Point2f> corners;
     cv::goodFeaturesToTrack(view.gray, corners, wanted / 2, 0.01, track_distance_px, *mask);
-    for (const cv::Point2f& corner : corners) tracks_.push_back({corner, corner, cam_from_mat, {}, 0, read});
+    for (const cv::Point2f& corner : corners)
+      tracks_.push_back({corner, corner, cam_from_mat, {}, 0, read});
   }
 }
 
-void SceneOdometry::remember(const cv::Mat& gray, double focal_px, const Rigid3d& cam_from_mat, double sigma_deg) {
+void SceneOdometry::remember(const cv::Mat& gray, double focal_px, const Rigid3d& cam_from_mat,
+                             double sigma_deg) {
   const View view = view_of(gray, focal_px);
   std::vector<Track> tracks = followed(view);
   // What odometry found carries its drift; the mat knows better.
@@ -167,8 +183,8 @@ std::optional<SceneOdometry::Sighting> SceneOdometry::follow(const cv::Mat& gray
   const View view = view_of(gray, focal_px);
   std::vector<Track> tracks = followed(view);
   MatCorners landmarks;
-  const auto read_ones = std::count_if(tracks.begin(), tracks.end(),
-                                       [](const Track& track) { return track.point_m && track.read; });
+  const auto read_ones = std::count_if(
+      tracks.begin(), tracks.end(), [](const Track& track) { return track.point_m && track.read; });
   // While enough are left that the mat placed, there is no drift.
   const bool only_read = read_ones >= static_cast<std::ptrdiff_t>(enough_read_landmarks);
   for (const Track& track : tracks) {
@@ -180,8 +196,9 @@ std::optional<SceneOdometry::Sighting> SceneOdometry::follow(const cv::Mat& gray
   const cv::Matx33d k(view.focal_px, 0, view.centre.x, 0, view.focal_px, view.centre.y, 0, 0, 1);
   cv::Mat rotation, translation;
   std::vector<int> inliers;
-  if (!cv::solvePnPRansac(landmarks.mat, landmarks.image, k, cv::noArray(), rotation, translation, false, 300,
-                          static_cast<float>(landmark_error_px), 0.999, inliers, cv::SOLVEPNP_AP3P) ||
+  if (!cv::solvePnPRansac(landmarks.mat, landmarks.image, k, cv::noArray(), rotation, translation,
+                          false, 300, static_cast<float>(landmark_error_px), 0.999, inliers,
+                          cv::SOLVEPNP_AP3P) ||
       inliers.size() < std::max(fewest_landmarks, landmarks.image.size() / 2)) {
     return lost();
   }
@@ -195,7 +212,8 @@ std::optional<SceneOdometry::Sighting> SceneOdometry::follow(const cv::Mat& gray
   if (!pose.allFinite()) return lost();
   const Rigid3d cam_from_mat = rigid_of(pose);
   const Eigen::Vector3d from = camera_center(*pose_), to = camera_center(cam_from_mat);
-  const double step_deg = deg * std::acos(std::clamp(from.normalized().dot(to.normalized()), -1.0, 1.0));
+  const double step_deg =
+      deg * std::acos(std::clamp(from.normalized().dot(to.normalized()), -1.0, 1.0));
   Sighting sighting;
   sighting.cam_from_mat = cam_from_mat;
   sighting.landmarks = static_cast<int>(agreed.image.size());
@@ -204,7 +222,8 @@ std::optional<SceneOdometry::Sighting> SceneOdometry::follow(const cv::Mat& gray
   // The same error on the sphere is more of azimuth the higher the camera is.
   way_deg_ += step_deg;
   const double high = std::max(0.2, std::cos(angles_of(cam_from_mat)[1] / deg));
-  sighting.sigma_deg = read_sigma_deg_ + direction_sigma_deg(agreed, k, rotation, translation, error_px) +
+  sighting.sigma_deg = read_sigma_deg_ +
+                       direction_sigma_deg(agreed, k, rotation, translation, error_px) +
                        drift_share * way_deg_ / high;
   settle(view, std::move(tracks), cam_from_mat, false);
   return sighting;

@@ -22,7 +22,8 @@ class SceneOdometry {
   explicit SceneOdometry(double mat_size_m) : mat_size_m_(mat_size_m) {}
 
   /// The mat was read in this image (CV_8UC1; principal point in the middle).
-  void remember(const cv::Mat& gray, double focal_px, const Rigid3d& cam_from_mat, double sigma_deg);
+  void remember(const cv::Mat& gray, double focal_px, const Rigid3d& cam_from_mat,
+                double sigma_deg);
 
   struct Sighting {
     Rigid3d cam_from_mat;
@@ -55,7 +56,7 @@ class SceneOdometry {
   double mat_size_m_;
   View before_;
   std::vector<Track> tracks_;
-  std::optional<Rigid3d> pose_;   ///< at before_
+  std::optional<Rigid3d> pose_;              ///< at before_
   double read_sigma_deg_ = 0, way_deg_ = 0;  ///< way since the last reading
   int misses_ = 0;
 };

@@ -104,8 +104,8 @@ struct ConnectionGate::Impl {
   /// Who has been at its request longest goes; a whole request is answered first.
   bool make_room() {
     if (connections.size() < limits.connections) return true;
-    for (const auto state : {Connection::State::leaving, Connection::State::reading,
-                             Connection::State::writing}) {
+    for (const auto state :
+         {Connection::State::leaving, Connection::State::reading, Connection::State::writing}) {
       const auto oldest = std::find_if(connections.begin(), connections.end(),
                                        [&](const auto& c) { return c.second.state == state; });
       if (oldest == connections.end()) continue;
@@ -203,7 +203,8 @@ struct ConnectionGate::Impl {
       for (const auto& [key, c] : connections) {
         const bool writing = c.state == Connection::State::writing;
         const bool answering = c.state == Connection::State::answering;
-        waiters.push_back({answering ? -1 : c.fd, static_cast<short>(writing ? POLLOUT : POLLIN), 0});
+        waiters.push_back(
+            {answering ? -1 : c.fd, static_cast<short>(writing ? POLLOUT : POLLIN), 0});
         keys.push_back(key);
       }
       ::poll(waiters.data(), waiters.size(), 100);

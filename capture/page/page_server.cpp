@@ -159,7 +159,8 @@ struct PageServer::Impl {
       return refuse(403, "the header X-OrbitFuse is missing\n");
     // Without a length it has no body (RFC 9110, 8.6); httplib would wait for one until the client
     // gives up.
-    if (!reads && !request.has_header("Content-Length") && !request.has_header("Transfer-Encoding")) {
+    if (!reads && !request.has_header("Content-Length") &&
+        !request.has_header("Transfer-Encoding")) {
       act(request.path, response);
       return httplib::Server::HandlerResponse::Handled;
     }
@@ -295,9 +296,9 @@ std::string PageServer::url() const { return urls().front(); }
 std::vector<std::string> PageServer::urls() const {
   std::vector<std::string> list;
   for (const std::string& host : reachable_hosts(impl_->options.host)) {
-    list.push_back(fmt::format("http://{}:{}/{}",
-                               host.find(':') == std::string::npos ? host : "[" + host + "]", impl_->port,
-                               impl_->needs_token ? "?token=" + impl_->options.token : ""));
+    list.push_back(fmt::format(
+        "http://{}:{}/{}", host.find(':') == std::string::npos ? host : "[" + host + "]",
+        impl_->port, impl_->needs_token ? "?token=" + impl_->options.token : ""));
   }
   return list;
 }

@@ -59,8 +59,8 @@ Result<Preview> PreviewCache::get(const LatestFrame& frame, const std::string& p
 std::optional<double> kelvin_at(const LatestFrame& frame, double u, double v) {
   const cv::Mat& image = frame.pixels;
   if (!(u >= 0 && u < 1 && v >= 0 && v < 1) || image.depth() != CV_16U) return std::nullopt;
-  const int centikelvin = image.at<std::uint16_t>(static_cast<int>(v * image.rows),
-                                                  static_cast<int>(u * image.cols));
+  const int centikelvin =
+      image.at<std::uint16_t>(static_cast<int>(v * image.rows), static_cast<int>(u * image.cols));
   return centikelvin > 0 ? std::optional<double>(0.01 * centikelvin) : std::nullopt;
 }
 

@@ -16,7 +16,8 @@ std::vector<std::string> reachable_hosts(const std::string& host) {
   ifaddrs* all = nullptr;
   if (getifaddrs(&all) == 0) {
     for (const ifaddrs* entry = all; entry; entry = entry->ifa_next) {
-      if (!entry->ifa_addr || !(entry->ifa_flags & IFF_UP) || (entry->ifa_flags & IFF_LOOPBACK)) continue;
+      if (!entry->ifa_addr || !(entry->ifa_flags & IFF_UP) || (entry->ifa_flags & IFF_LOOPBACK))
+        continue;
       char text[INET6_ADDRSTRLEN] = "";
       const int family = entry->ifa_addr->sa_family;
       if (family == AF_INET) {
@@ -27,7 +28,8 @@ std::vector<std::string> reachable_hosts(const std::string& host) {
         sockaddr_in6 address{};
         std::memcpy(&address, entry->ifa_addr, sizeof address);
         // Link-local addresses need an interface's name, which browsers don't take.
-        if (!IN6_IS_ADDR_LINKLOCAL(&address.sin6_addr)) inet_ntop(AF_INET6, &address.sin6_addr, text, sizeof text);
+        if (!IN6_IS_ADDR_LINKLOCAL(&address.sin6_addr))
+          inet_ntop(AF_INET6, &address.sin6_addr, text, sizeof text);
       }
       if (*text) hosts.emplace_back(text);
     }

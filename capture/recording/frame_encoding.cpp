@@ -12,11 +12,13 @@ namespace {
 tl::unexpected<Error> unfit(const std::string& where, const cv::Mat& image, Modality modality) {
   return fail(ErrorKind::input, where,
               fmt::format("{}-bit samples in {} channels", 8 * image.elemSize1(), image.channels()),
-              modality == Modality::visible ? "visible frames are 8-bit grey or colour"
-                                            : "thermal frames are 16-bit counts of temperature or 8-bit grey");
+              modality == Modality::visible
+                  ? "visible frames are 8-bit grey or colour"
+                  : "thermal frames are 16-bit counts of temperature or 8-bit grey");
 }
 
-Status check_type(const cv::Mat& image, const Frame& frame, Modality modality, const std::string& where) {
+Status check_type(const cv::Mat& image, const Frame& frame, Modality modality,
+                  const std::string& where) {
   if (modality == Modality::visible) {
     if (image.depth() != CV_8U) return unfit(where, image, modality);
   } else if (frame.thermal_is_gray) {

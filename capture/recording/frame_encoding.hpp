@@ -14,9 +14,9 @@ namespace orbitfuse {
 /// A frame as it goes to disk.
 struct EncodedFrame {
   std::string bytes, extension;
-  cv::Mat pixels;           ///< upright, for measurements
+  cv::Mat pixels;  ///< upright, for measurements
   bool has_temperature = false;
-  ThermalScaleTag scale;    ///< of the pixels, when they are temperatures
+  ThermalScaleTag scale;  ///< of the pixels, when they are temperatures
 };
 
 /// The frame's image, upright; input error when it isn't one of its modality.

@@ -7,9 +7,9 @@
 namespace orbitfuse {
 
 namespace {
-constexpr int settled = 8;       // the first intervals of a stream are irregular
-constexpr double late = 1.75;    // of the usual interval
-constexpr double weight = 0.1;   // a rate that changes with the light is followed in some frames
+constexpr int settled = 8;      // the first intervals of a stream are irregular
+constexpr double late = 1.75;   // of the usual interval
+constexpr double weight = 0.1;  // a rate that changes with the light is followed in some frames
 }  // namespace
 
 int FrameRhythm::note(std::uint64_t id, std::int64_t stamp_ns) {
@@ -17,7 +17,8 @@ int FrameRhythm::note(std::uint64_t id, std::int64_t stamp_ns) {
   last_ = Seen{id, stamp_ns};
   if (!before || id <= before->id || stamp_ns <= before->stamp_ns) return 0;
   const std::uint64_t steps = id - before->id;
-  const double interval_s = 1e-9 * static_cast<double>(stamp_ns - before->stamp_ns) / static_cast<double>(steps);
+  const double interval_s =
+      1e-9 * static_cast<double>(stamp_ns - before->stamp_ns) / static_cast<double>(steps);
   int missing = 0;
   if (steps == 1 && known_ >= settled && interval_s > late * interval_s_) {
     missing = static_cast<int>(std::clamp(std::round(interval_s / interval_s_) - 1, 1.0, 1e6));

@@ -29,8 +29,10 @@ bool asks_for_operator(EventKind kind) {
     case EventKind::look_alike:
     case EventKind::reopen_failed:
     case EventKind::setting_lost:
-    case EventKind::nothing_new: return true;
-    default: return false;
+    case EventKind::nothing_new:
+      return true;
+    default:
+      return false;
   }
 }
 
@@ -49,7 +51,12 @@ std::optional<std::uint64_t> next_id_in(const RecorderOptions& options, const st
 struct Recorder::Channel {
   Channel(FrameSource& s, SessionWriter& w, const RecorderOptions& o, const Progress& p,
           const OnFrame& f)
-      : source(s), writer(w), options(o), progress(p), on_frame(f), device(s.describe()),
+      : source(s),
+        writer(w),
+        options(o),
+        progress(p),
+        on_frame(f),
+        device(s.describe()),
         account(device.id, next_id_in(o, device.id)) {}
 
   FrameSource& source;
@@ -89,7 +96,9 @@ struct Recorder::Channel {
   }
 
   /// Nothing of such a source is lost for being late, nor when the recording stops.
-  bool source_waits() const { return options.backpressure == Backpressure::wait || source.can_wait(); }
+  bool source_waits() const {
+    return options.backpressure == Backpressure::wait || source.can_wait();
+  }
 
   void keep_first(const Error& e) {
     const std::lock_guard lock(mutex);
@@ -136,7 +145,9 @@ struct Recorder::Channel {
         passed_over_last.push_back(delivery.detail);
         break;
       }
-      case EventKind::repeated_id: ++repeated; break;
+      case EventKind::repeated_id:
+        ++repeated;
+        break;
       case EventKind::reconnected:
         notice.clear();
         away.reset();
@@ -148,7 +159,8 @@ struct Recorder::Channel {
                      delivery.detail;
         ++corrections;
         break;
-      default: break;
+      default:
+        break;
     }
   }
 
@@ -175,10 +187,15 @@ struct Recorder::Channel {
         }
         break;
       }
-      case Delivery::Kind::lost: account.miss_until(delivery.frame.id, delivery.reason); break;
-      case Delivery::Kind::event: log_event(delivery.event, delivery.detail); break;
+      case Delivery::Kind::lost:
+        account.miss_until(delivery.frame.id, delivery.reason);
+        break;
+      case Delivery::Kind::event:
+        log_event(delivery.event, delivery.detail);
+        break;
       case Delivery::Kind::timeout:
-      case Delivery::Kind::end: break;
+      case Delivery::Kind::end:
+        break;
     }
   }
 
@@ -258,7 +275,9 @@ struct Recorder::Channel {
   /// Some sources know their camera only from its first frame.
   void tell_what_is_known() {
     DeviceInfo now = source.describe();
-    if (now.model == device.model && now.serial == device.serial && now.lens.focal_px == device.lens.focal_px) return;
+    if (now.model == device.model && now.serial == device.serial &&
+        now.lens.focal_px == device.lens.focal_px)
+      return;
     device.model = std::move(now.model);
     device.serial = std::move(now.serial);
     device.lens = now.lens;
@@ -266,7 +285,8 @@ struct Recorder::Channel {
   }
 
   void store(const Frame& frame) {
-    if (const Status space = check_free_space(writer.folder(), options.min_free_bytes, when_full); !space) {
+    if (const Status space = check_free_space(writer.folder(), options.min_free_bytes, when_full);
+        !space) {
       return give_up(frame, space.error());
     }
     tell_what_is_known();
@@ -303,8 +323,9 @@ struct Recorder::Channel {
   void leave_for_resuming() {
     const std::uint64_t before = account.counts().lost();
     account.forget_from(*first_unwritten);
-    const EventRecord event{device.id, utc_now_ns(), std::string(name(EventKind::unwritten)),
-                            fmt::format("{} frames are left for --resume", before - account.counts().lost())};
+    const EventRecord event{
+        device.id, utc_now_ns(), std::string(name(EventKind::unwritten)),
+        fmt::format("{} frames are left for --resume", before - account.counts().lost())};
     if (const Status s = writer.append(event); !s) keep_first(s.error());
   }
 
@@ -316,7 +337,8 @@ struct Recorder::Channel {
       } else if (writer_failed) {
         account.lose(frame->id, Loss::unwritten, "not written");
       } else {
-        write_gaps(frame->id);  // first: wherever the manifest ends, it accounts for every id up to there
+        write_gaps(
+            frame->id);  // first: wherever the manifest ends, it accounts for every id up to there
         store(*frame);
       }
     }
@@ -356,18 +378,22 @@ struct Recorder::Channel {
 
 Status RecorderOptions::validate() const {
   if (queue_frames < 1 || queue_frames > 100000) {
-    return fail(ErrorKind::usage, "recorder.queue_frames", fmt::format("{}", queue_frames), "must be 1 to 100000");
+    return fail(ErrorKind::usage, "recorder.queue_frames", fmt::format("{}", queue_frames),
+                "must be 1 to 100000");
   }
   if (next_timeout.count() < 1) {
-    return fail(ErrorKind::usage, "recorder.next_timeout", fmt::format("{} ms", next_timeout.count()), "must be > 0");
+    return fail(ErrorKind::usage, "recorder.next_timeout",
+                fmt::format("{} ms", next_timeout.count()), "must be > 0");
   }
   if (silence.count() < 0) {
-    return fail(ErrorKind::usage, "recorder.silence", fmt::format("{} ms", silence.count()), "must be >= 0");
+    return fail(ErrorKind::usage, "recorder.silence", fmt::format("{} ms", silence.count()),
+                "must be >= 0");
   }
   return {};
 }
 
-Recorder::Recorder(SessionWriter& writer, RecorderOptions options) : writer_(writer), options_(options) {}
+Recorder::Recorder(SessionWriter& writer, RecorderOptions options)
+    : writer_(writer), options_(options) {}
 
 Status Recorder::run(const std::vector<FrameSource*>& sources, const Progress& progress) {
   ORBITFUSE_TRY(options_.validate());

@@ -24,9 +24,10 @@ enum class Backpressure {
 };
 
 struct RecorderOptions {
-  int queue_frames = 16;                 ///< per camera; bounds memory when the disk is slow
+  int queue_frames = 16;  ///< per camera; bounds memory when the disk is slow
   Backpressure backpressure = Backpressure::drop_newest;
-  std::chrono::milliseconds next_timeout{200};  ///< how often a stream that delivers nothing is left
+  std::chrono::milliseconds next_timeout{
+      200};  ///< how often a stream that delivers nothing is left
   /// Without a frame for longer than this a camera is silent. Longer than one damaged frame may
   /// take: a driver waits 0.3 s for its missing packets, and those behind it wait with it.
   std::chrono::milliseconds silence{500};
@@ -77,8 +78,9 @@ class Recorder {
   OnFrame on_frame;
 
   /// Runs until every source ended, `progress` is cancelled or an error occurs. All accounting is
-  /// written to the manifest in each of these cases; close() of the writer is the caller's. A camera
-  /// that is away at the end, or never delivered, is a device error: its stream is not complete.
+  /// written to the manifest in each of these cases; close() of the writer is the caller's. A
+  /// camera that is away at the end, or never delivered, is a device error: its stream is not
+  /// complete.
   Status run(const std::vector<FrameSource*>& sources, const Progress& progress = {});
   std::vector<StreamStatus> status() const;
 

@@ -22,8 +22,8 @@ tl::unexpected<Error> cannot_make(const fs::path& folder, const std::error_code&
       return fail(ErrorKind::usage, folder.string(), error.message(), "choose a shorter name");
     case ENOTDIR:
     case EEXIST:
-      return fail(ErrorKind::input, folder.string(), "a part of the path is a file or a broken link",
-                  "choose another folder");
+      return fail(ErrorKind::input, folder.string(),
+                  "a part of the path is a file or a broken link", "choose another folder");
     case ENOSPC:
     case EDQUOT:
       return fail(ErrorKind::device, folder.string(), error.message(),

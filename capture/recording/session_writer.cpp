@@ -12,12 +12,12 @@
 #include <cstring>
 #include <random>
 
-#include "capture/recording/frame_encoding.hpp"
 #include "capture/image_quality/frame_quality.hpp"
+#include "capture/recording/frame_encoding.hpp"
 #include "capture/recording/session_folder.hpp"
+#include "core/image/image_codec.hpp"
 #include "core/session/manifest_json.hpp"
 #include "core/system/file_io.hpp"
-#include "core/image/image_codec.hpp"
 #include "core/system/utc_now.hpp"
 
 namespace orbitfuse {
@@ -118,7 +118,8 @@ Result<std::unique_ptr<SessionWriter>> SessionWriter::resume(const fs::path& fol
   }
   session.frames.clear();
   writer->session_ = std::move(session);
-  ORBITFUSE_TRY(writer->append(EventRecord{"", utc_now_ns(), std::string(name(EventKind::resumed)), ""}));
+  ORBITFUSE_TRY(
+      writer->append(EventRecord{"", utc_now_ns(), std::string(name(EventKind::resumed)), ""}));
   return writer;
 }
 
@@ -133,7 +134,8 @@ Status SessionWriter::append_line(const std::string& line) {
     if (n <= 0) {
       const int cause = errno;
       // Half a line would join the next one; the rest of the manifest must stay readable.
-      if (before >= 0 && ::ftruncate(manifest_fd_, before) != 0) return manifest_failure(folder_, errno);
+      if (before >= 0 && ::ftruncate(manifest_fd_, before) != 0)
+        return manifest_failure(folder_, errno);
       return manifest_failure(folder_, cause);
     }
     done += static_cast<std::size_t>(n);
@@ -166,7 +168,8 @@ Status SessionWriter::update_device(const DeviceInfo& device) {
   return append_line(manifest_line(device));
 }
 
-std::string SessionWriter::next_file_name(Modality modality, bool tracking, const std::string& extension) {
+std::string SessionWriter::next_file_name(Modality modality, bool tracking,
+                                          const std::string& extension) {
   const std::string stem = std::string(name(modality)) + (tracking ? "/track_" : "/");
   const std::lock_guard lock(mutex_);
   for (int& index = next_index_[stem];; ++index) {
@@ -190,7 +193,8 @@ Result<StoredFrame> SessionWriter::store(const std::string& device_id, const Fra
   {
     const std::lock_guard lock(mutex_);
     const DeviceInfo* device = session_.device(device_id);
-    if (!device) return fail(ErrorKind::input, "device " + device_id, "was not announced", "add it first");
+    if (!device)
+      return fail(ErrorKind::input, "device " + device_id, "was not announced", "add it first");
     record.modality = device->modality;
   }
   const std::string where =
@@ -214,12 +218,14 @@ Result<StoredFrame> SessionWriter::store(const std::string& device_id, const Fra
   record.quality = measure_quality(encoded.pixels, encoded.scale.scale);
   ORBITFUSE_TRY(check_readable(record));
   if (encoded.has_temperature) {
-    ORBITFUSE_TRY(write_file_atomic(folder_ / (record.file + ".json"), thermal_sidecar_json(encoded.scale) + "\n"));
+    ORBITFUSE_TRY(write_file_atomic(folder_ / (record.file + ".json"),
+                                    thermal_sidecar_json(encoded.scale) + "\n"));
   }
   if (!frame.original.empty()) {
     const fs::path file(record.file);
     ORBITFUSE_ASSIGN(const std::string counts, encode_tiff(frame.original, "raw counts"));
-    ORBITFUSE_TRY(write_file_atomic(folder_ / file.parent_path() / "originals" / (file.stem().string() + ".tiff"), counts));
+    ORBITFUSE_TRY(write_file_atomic(
+        folder_ / file.parent_path() / "originals" / (file.stem().string() + ".tiff"), counts));
   }
   ORBITFUSE_TRY(write_file_atomic(folder_ / record.file, encoded.bytes));
   ORBITFUSE_TRY(append_line(manifest_line(record)));
@@ -231,7 +237,9 @@ Status SessionWriter::amend(const FrameRecord& record) {
   return append_line(manifest_line(record));
 }
 Status SessionWriter::append(const GapRecord& gap) { return append_line(manifest_line(gap)); }
-Status SessionWriter::append(const StreamRecord& stream) { return append_line(manifest_line(stream)); }
+Status SessionWriter::append(const StreamRecord& stream) {
+  return append_line(manifest_line(stream));
+}
 Status SessionWriter::append(const EventRecord& event) { return append_line(manifest_line(event)); }
 Status SessionWriter::close() { return append_line(manifest_end_line(session_)); }
 

@@ -61,7 +61,7 @@ class SessionWriter {
   std::filesystem::path folder_;
   int manifest_fd_ = -1;
   std::mutex mutex_;
-  Session session_;                     ///< devices and identity; frames are not kept
+  Session session_;  ///< devices and identity; frames are not kept
   std::map<std::string, int> next_index_;
 };
 

@@ -39,15 +39,20 @@ void StreamAccount::miss_until(std::uint64_t last_id, const std::string& reason)
 
 std::uint64_t& StreamAccount::count_of(Loss loss) {
   switch (loss) {
-    case Loss::missing: return counts_.missing;
-    case Loss::rejected: return counts_.rejected;
-    case Loss::dropped: return counts_.dropped;
-    case Loss::unwritten: break;
+    case Loss::missing:
+      return counts_.missing;
+    case Loss::rejected:
+      return counts_.rejected;
+    case Loss::dropped:
+      return counts_.dropped;
+    case Loss::unwritten:
+      break;
   }
   return counts_.unwritten;
 }
 
-void StreamAccount::add_gap(std::uint64_t first, std::uint64_t count, Loss loss, const std::string& reason) {
+void StreamAccount::add_gap(std::uint64_t first, std::uint64_t count, Loss loss,
+                            const std::string& reason) {
   count_of(loss) += count;
   if (!gaps_.empty()) {
     GapRecord& latest = gaps_.back().record;
@@ -82,7 +87,8 @@ std::vector<GapRecord> StreamAccount::take_gaps(std::optional<std::uint64_t> fra
     return !frame_id || gap.record.first_sequence < *frame_id;
   });
   std::vector<GapRecord> out;
-  std::transform(gaps_.begin(), over, std::back_inserter(out), [](Gap& gap) { return std::move(gap.record); });
+  std::transform(gaps_.begin(), over, std::back_inserter(out),
+                 [](Gap& gap) { return std::move(gap.record); });
   gaps_.erase(gaps_.begin(), over);
   return out;
 }

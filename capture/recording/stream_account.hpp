@@ -13,8 +13,8 @@ namespace orbitfuse {
 
 /// Where every id of one stream went. Ids rise strictly; each seen id is settled exactly once, as
 /// received or lost, and each skipped id is missing. Then received + lost == last - first + 1.
-/// `next_id`: where the stream goes on after an earlier recording; ids skipped from there are missing.
-/// Thread-safe: ids are seen on the capture thread and settled on the writer thread.
+/// `next_id`: where the stream goes on after an earlier recording; ids skipped from there are
+/// missing. Thread-safe: ids are seen on the capture thread and settled on the writer thread.
 class StreamAccount {
  public:
   explicit StreamAccount(std::string device, std::optional<std::uint64_t> next_id = std::nullopt)

@@ -4,8 +4,8 @@
 #include <cstring>
 #include <string_view>
 
-#include "core/formats/colmap_records.hpp"
 #include "core/formats/append_bytes.hpp"
+#include "core/formats/colmap_records.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse::colmap {
@@ -53,9 +53,10 @@ class ByteReader {
   bool ok_ = true;
 };
 
-tl::unexpected<Error> cut(const std::filesystem::path& file, const char* what, std::uint64_t index) {
-  return fail(ErrorKind::input, file.string(), fmt::format("truncated or damaged at {} {}", what, index),
-              "export the model again");
+tl::unexpected<Error> cut(const std::filesystem::path& file, const char* what,
+                          std::uint64_t index) {
+  return fail(ErrorKind::input, file.string(),
+              fmt::format("truncated or damaged at {} {}", what, index), "export the model again");
 }
 
 Result<std::vector<CameraRecord>> read_cameras(const std::filesystem::path& file) {

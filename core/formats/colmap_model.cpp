@@ -24,8 +24,11 @@ struct ModelInfo {
   const char* name;
   std::size_t parameters;
 };
-constexpr std::array<ModelInfo, 5> known_models{
-    {{0, "SIMPLE_PINHOLE", 3}, {1, "PINHOLE", 4}, {2, "SIMPLE_RADIAL", 4}, {3, "RADIAL", 5}, {4, "OPENCV", 8}}};
+constexpr std::array<ModelInfo, 5> known_models{{{0, "SIMPLE_PINHOLE", 3},
+                                                 {1, "PINHOLE", 4},
+                                                 {2, "SIMPLE_RADIAL", 4},
+                                                 {3, "RADIAL", 5},
+                                                 {4, "OPENCV", 8}}};
 
 Result<Camera> camera_of(const CameraRecord& record, const std::string& where) {
   const auto& p = record.parameters;
@@ -50,7 +53,8 @@ Result<Camera> camera_of(const CameraRecord& record, const std::string& where) {
 }
 
 /// The raw records joined by their ids into a Reconstruction.
-Result<Reconstruction> join(const Records& records, const std::filesystem::path& folder, Modality modality) {
+Result<Reconstruction> join(const Records& records, const std::filesystem::path& folder,
+                            Modality modality) {
   Reconstruction model;
   model.modality = modality;
   std::unordered_map<std::uint32_t, Camera> cameras;
@@ -62,26 +66,31 @@ Result<Reconstruction> join(const Records& records, const std::filesystem::path&
   // COLMAP writes images in hash order; names make the order reproducible.
   std::vector<const ImageRecord*> images;
   for (const ImageRecord& image : records.images) images.push_back(&image);
-  std::sort(images.begin(), images.end(), [](const auto* a, const auto* b) { return a->name < b->name; });
+  std::sort(images.begin(), images.end(),
+            [](const auto* a, const auto* b) { return a->name < b->name; });
   std::unordered_map<std::uint32_t, std::size_t> view_of_image;
   for (const ImageRecord* image : images) {
     const auto camera = cameras.find(image->camera);
     const std::string where = fmt::format("{}: image \"{}\"", folder.string(), image->name);
     if (camera == cameras.end()) {
-      return fail(ErrorKind::input, where, fmt::format("refers to camera {}, which is not there", image->camera),
+      return fail(ErrorKind::input, where,
+                  fmt::format("refers to camera {}, which is not there", image->camera),
                   "export the model again");
     }
     // Far from 1 it is no quaternion that lost digits but damage, and its square would overflow.
     const auto& q = image->cam_from_world.rotation.coeffs();
-    if (!image->cam_from_world.is_finite() || !(q.cwiseAbs().maxCoeff() > 1e-3) || q.cwiseAbs().maxCoeff() > 1e3) {
-      return fail(ErrorKind::input, where,
-                  fmt::format("a quaternion of {:g} {:g} {:g} {:g}, or a position that is not finite", q[3], q[0],
-                              q[1], q[2]),
-                  "export the model again");
+    if (!image->cam_from_world.is_finite() || !(q.cwiseAbs().maxCoeff() > 1e-3) ||
+        q.cwiseAbs().maxCoeff() > 1e3) {
+      return fail(
+          ErrorKind::input, where,
+          fmt::format("a quaternion of {:g} {:g} {:g} {:g}, or a position that is not finite", q[3],
+                      q[0], q[1], q[2]),
+          "export the model again");
     }
     if (image->cam_from_world.translation.cwiseAbs().maxCoeff() > max_coordinate) {
       return fail(ErrorKind::input, where,
-                  fmt::format("a translation of {:g}", image->cam_from_world.translation.cwiseAbs().maxCoeff()),
+                  fmt::format("a translation of {:g}",
+                              image->cam_from_world.translation.cwiseAbs().maxCoeff()),
                   "export the model again");
     }
     Rigid3d pose = image->cam_from_world;
@@ -98,8 +107,8 @@ Result<Reconstruction> join(const Records& records, const std::filesystem::path&
       const ImageRecord& seen = *images[view->second];
       if (index >= seen.pixels.size()) {
         return fail(ErrorKind::input, fmt::format("{}: point {}", folder.string(), record.id),
-                    fmt::format("refers to observation {} of image \"{}\", which has {}", index, seen.name,
-                                seen.pixels.size()),
+                    fmt::format("refers to observation {} of image \"{}\", which has {}", index,
+                                seen.name, seen.pixels.size()),
                     "export the model again");
       }
       point.track.push_back({static_cast<int>(view->second), seen.pixels[index]});
@@ -118,11 +127,14 @@ Records records_of(const Reconstruction& model) {
     const auto known = std::find(cameras.begin(), cameras.end(), view.camera);
     const auto camera = static_cast<std::uint32_t>(known - cameras.begin()) + 1;
     if (known == cameras.end()) cameras.push_back(view.camera);
-    records.images.push_back({static_cast<std::uint32_t>(i) + 1, view.cam_from_world, camera, view.name, {}, {}});
+    records.images.push_back(
+        {static_cast<std::uint32_t>(i) + 1, view.cam_from_world, camera, view.name, {}, {}});
   }
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const Camera& c = cameras[i];
-    records.cameras.push_back({static_cast<std::uint32_t>(i) + 1, 4, static_cast<std::uint64_t>(c.width),
+    records.cameras.push_back({static_cast<std::uint32_t>(i) + 1,
+                               4,
+                               static_cast<std::uint64_t>(c.width),
                                static_cast<std::uint64_t>(c.height),
                                {c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2}});
   }
@@ -156,7 +168,9 @@ std::optional<int> colmap::model_id(const std::string& model_name) {
   return std::nullopt;
 }
 
-const char* colmap::model_name(int model) { return known_models[static_cast<std::size_t>(model)].name; }
+const char* colmap::model_name(int model) {
+  return known_models[static_cast<std::size_t>(model)].name;
+}
 
 tl::unexpected<Error> colmap::unknown_model(const std::string& where, const std::string& model) {
   return fail(ErrorKind::input, where, "camera model " + model + " is not supported",
@@ -177,7 +191,8 @@ Result<Reconstruction> read_colmap_model(const std::filesystem::path& folder, Mo
 Status write_colmap_model(const std::filesystem::path& folder, const Reconstruction& model,
                           ColmapFormat format) {
   const Records records = records_of(model);
-  return format == ColmapFormat::binary ? write_binary(folder, records) : write_text(folder, records);
+  return format == ColmapFormat::binary ? write_binary(folder, records)
+                                        : write_text(folder, records);
 }
 
 }  // namespace orbitfuse

@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/result.hpp"
 #include "core/geometry/transform.hpp"
+#include "core/result.hpp"
 
 // COLMAP's files record by record (https://colmap.github.io/format.html); colmap_model.cpp joins
 // them. Two encodings, one set of records.

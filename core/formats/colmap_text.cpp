@@ -45,7 +45,8 @@ Result<std::vector<CameraRecord>> read_cameras(const std::filesystem::path& file
     std::istringstream words(line);
     CameraRecord camera;
     std::string model;
-    if (!(words >> camera.id >> model >> camera.width >> camera.height)) return unreadable(file, lines.number());
+    if (!(words >> camera.id >> model >> camera.width >> camera.height))
+      return unreadable(file, lines.number());
     const auto id = model_id(model);
     if (!id) return unknown_model(fmt::format("{}:{}", file.string(), lines.number()), model);
     camera.model = *id;
@@ -68,7 +69,8 @@ Result<std::vector<ImageRecord>> read_images(const std::filesystem::path& file) 
     ImageRecord image;
     auto& q = image.cam_from_world.rotation;
     auto& t = image.cam_from_world.translation;
-    if (!(words >> image.id >> q.w() >> q.x() >> q.y() >> q.z() >> t.x() >> t.y() >> t.z() >> image.camera)) {
+    if (!(words >> image.id >> q.w() >> q.x() >> q.y() >> q.z() >> t.x() >> t.y() >> t.z() >>
+          image.camera)) {
       return unreadable(file, lines.number());
     }
     words >> std::ws;
@@ -102,7 +104,8 @@ Result<std::vector<PointRecord>> read_points(const std::filesystem::path& file) 
     if (!(words >> point.id >> p.x() >> p.y() >> p.z() >> r >> g >> b >> point.error)) {
       return unreadable(file, lines.number());
     }
-    point.rgb = {static_cast<std::uint8_t>(r), static_cast<std::uint8_t>(g), static_cast<std::uint8_t>(b)};
+    point.rgb = {static_cast<std::uint8_t>(r), static_cast<std::uint8_t>(g),
+                 static_cast<std::uint8_t>(b)};
     std::uint32_t image, index;
     while (words >> image) {
       if (!(words >> index)) return unreadable(file, lines.number());
@@ -133,8 +136,8 @@ Status write_text(const std::filesystem::path& folder, const Records& records) {
   for (const ImageRecord& image : records.images) {
     const auto& q = image.cam_from_world.rotation;
     const auto& t = image.cam_from_world.translation;
-    images += fmt::format("{} {} {} {} {} {} {} {} {} {}\n", image.id, q.w(), q.x(), q.y(), q.z(), t.x(),
-                          t.y(), t.z(), image.camera, image.name);
+    images += fmt::format("{} {} {} {} {} {} {} {} {} {}\n", image.id, q.w(), q.x(), q.y(), q.z(),
+                          t.x(), t.y(), t.z(), image.camera, image.name);
     for (std::size_t k = 0; k < image.pixels.size(); ++k) {
       if (k > 0) images += ' ';
       images += fmt::format("{} {} {}", image.pixels[k].x(), image.pixels[k].y(), image.points[k]);
@@ -143,8 +146,8 @@ Status write_text(const std::filesystem::path& folder, const Records& records) {
   }
   std::string points = "# POINT3D_ID X Y Z R G B ERROR TRACK[] as IMAGE_ID POINT2D_IDX\n";
   for (const PointRecord& p : records.points) {
-    points += fmt::format("{} {} {} {} {} {} {} {}", p.id, p.position.x(), p.position.y(), p.position.z(),
-                          int{p.rgb[0]}, int{p.rgb[1]}, int{p.rgb[2]}, p.error);
+    points += fmt::format("{} {} {} {} {} {} {} {}", p.id, p.position.x(), p.position.y(),
+                          p.position.z(), int{p.rgb[0]}, int{p.rgb[1]}, int{p.rgb[2]}, p.error);
     for (const auto& [image, index] : p.track) points += fmt::format(" {} {}", image, index);
     points += '\n';
   }

@@ -31,13 +31,16 @@ Result<Camera> camera_of(const Json& object, const std::string& where) {
   Camera c;
   for (const auto& [key, side] : {std::pair{"w", &c.width}, {"h", &c.height}}) {
     ORBITFUSE_ASSIGN(const double pixels, number(k, key, at));
-    if (!(pixels >= 1 && pixels <= 1e6)) return bad(at + "." + key, fmt::format("{:g} pixels", pixels));
+    if (!(pixels >= 1 && pixels <= 1e6))
+      return bad(at + "." + key, fmt::format("{:g} pixels", pixels));
     *side = static_cast<int>(pixels);
   }
-  for (const auto& [key, value] : {std::pair{"fx", &c.fx}, {"fy", &c.fy}, {"cx", &c.cx}, {"cy", &c.cy}}) {
+  for (const auto& [key, value] :
+       {std::pair{"fx", &c.fx}, {"fy", &c.fy}, {"cx", &c.cx}, {"cy", &c.cy}}) {
     ORBITFUSE_ASSIGN(*value, number(k, key, at));
   }
-  for (const auto& [key, value] : {std::pair{"k1", &c.k1}, {"k2", &c.k2}, {"p1", &c.p1}, {"p2", &c.p2}}) {
+  for (const auto& [key, value] :
+       {std::pair{"k1", &c.k1}, {"k2", &c.k2}, {"p1", &c.p1}, {"p2", &c.p2}}) {
     if (!k.contains(key)) continue;
     ORBITFUSE_ASSIGN(*value, number(k, key, at));
   }
@@ -46,7 +49,8 @@ Result<Camera> camera_of(const Json& object, const std::string& where) {
 }
 
 Result<Rigid3d> pose_of(const Json& frame, const std::string& where) {
-  return rigid_of_opengl_json(frame.is_object() ? frame.value("c2w", Json()) : Json(), where + ".c2w");
+  return rigid_of_opengl_json(frame.is_object() ? frame.value("c2w", Json()) : Json(),
+                              where + ".c2w");
 }
 
 std::optional<double> optional_degrees(const Json& frame, const char* key) {
@@ -69,7 +73,8 @@ Result<std::vector<TrueView>> views_of(const Json& object, const std::string& wh
   for (std::size_t i = 0; i < frames->size(); ++i) {
     const Json& frame = (*frames)[i];
     const std::string at = fmt::format("{}.frames[{}]", where, i);
-    if (!frame.is_object() || !frame.contains("file") || !frame["file"].is_string()) return bad(at, "no file");
+    if (!frame.is_object() || !frame.contains("file") || !frame["file"].is_string())
+      return bad(at, "no file");
     TrueView view;
     view.name = frame["file"].get<std::string>();
     view.camera = camera;
@@ -81,7 +86,8 @@ Result<std::vector<TrueView>> views_of(const Json& object, const std::string& wh
   return views;
 }
 
-Result<std::vector<TrueTestView>> test_views_of(const Json& object, const std::filesystem::path& folder,
+Result<std::vector<TrueTestView>> test_views_of(const Json& object,
+                                                const std::filesystem::path& folder,
                                                 const std::string& where) {
   ORBITFUSE_ASSIGN(const Json* frames, frames_of(object, where));
   ORBITFUSE_ASSIGN(const Camera camera, camera_of(object, where));
@@ -90,8 +96,10 @@ Result<std::vector<TrueTestView>> test_views_of(const Json& object, const std::f
     const Json& frame = (*frames)[i];
     TrueTestView view{{}, {}, camera, {}};
     ORBITFUSE_ASSIGN(view.cam_from_world, pose_of(frame, fmt::format("{}.frames[{}]", where, i)));
-    for (const auto& [key, file] : {std::pair{"visible", &view.visible}, {"thermal", &view.thermal}}) {
-      if (frame.contains(key) && frame[key].is_string()) *file = folder / frame[key].get<std::string>();
+    for (const auto& [key, file] :
+         {std::pair{"visible", &view.visible}, {"thermal", &view.thermal}}) {
+      if (frame.contains(key) && frame[key].is_string())
+        *file = folder / frame[key].get<std::string>();
     }
     views.push_back(std::move(view));
   }
@@ -117,7 +125,8 @@ Result<GroundTruth> read_ground_truth(const std::filesystem::path& file) {
   }
   if (truth.views.empty()) return bad(file.string(), "neither \"visible\" nor \"thermal\"");
   if (root.contains("test")) {
-    ORBITFUSE_ASSIGN(truth.test, test_views_of(root["test"], file.parent_path(), file.string() + ": test"));
+    ORBITFUSE_ASSIGN(truth.test,
+                     test_views_of(root["test"], file.parent_path(), file.string() + ": test"));
   }
   return truth;
 }

@@ -52,11 +52,22 @@ tl::unexpected<Error> bad(const std::filesystem::path& path, const std::string& 
 }
 
 std::optional<PlyType> type_of(const std::string& name) {
-  static const std::array<std::pair<const char*, PlyType>, 16> types{{
-      {"char", {1, 'i'}}, {"int8", {1, 'i'}}, {"uchar", {1, 'u'}}, {"uint8", {1, 'u'}},
-      {"short", {2, 'i'}}, {"int16", {2, 'i'}}, {"ushort", {2, 'u'}}, {"uint16", {2, 'u'}},
-      {"int", {4, 'i'}}, {"int32", {4, 'i'}}, {"uint", {4, 'u'}}, {"uint32", {4, 'u'}},
-      {"float", {4, 'f'}}, {"float32", {4, 'f'}}, {"double", {8, 'f'}}, {"float64", {8, 'f'}}}};
+  static const std::array<std::pair<const char*, PlyType>, 16> types{{{"char", {1, 'i'}},
+                                                                      {"int8", {1, 'i'}},
+                                                                      {"uchar", {1, 'u'}},
+                                                                      {"uint8", {1, 'u'}},
+                                                                      {"short", {2, 'i'}},
+                                                                      {"int16", {2, 'i'}},
+                                                                      {"ushort", {2, 'u'}},
+                                                                      {"uint16", {2, 'u'}},
+                                                                      {"int", {4, 'i'}},
+                                                                      {"int32", {4, 'i'}},
+                                                                      {"uint", {4, 'u'}},
+                                                                      {"uint32", {4, 'u'}},
+                                                                      {"float", {4, 'f'}},
+                                                                      {"float32", {4, 'f'}},
+                                                                      {"double", {8, 'f'}},
+                                                                      {"float64", {8, 'f'}}}};
   for (const auto& [text, type] : types) {
     if (name == text) return type;
   }
@@ -84,13 +95,18 @@ Result<Header> parse_header(const std::filesystem::path& path, std::string_view 
     if (word == "format") {
       words >> word;
       has_format = true;
-      if (word == "ascii") header.format = PlyFormat::ascii;
-      else if (word == "binary_little_endian") header.format = PlyFormat::little_endian;
-      else if (word == "binary_big_endian") header.format = PlyFormat::big_endian;
-      else return bad(path, "unknown PLY format \"" + word + "\"");
+      if (word == "ascii")
+        header.format = PlyFormat::ascii;
+      else if (word == "binary_little_endian")
+        header.format = PlyFormat::little_endian;
+      else if (word == "binary_big_endian")
+        header.format = PlyFormat::big_endian;
+      else
+        return bad(path, "unknown PLY format \"" + word + "\"");
     } else if (word == "element") {
       Element element;
-      if (!(words >> element.name >> element.count)) return bad(path, "unreadable line \"" + line + "\"");
+      if (!(words >> element.name >> element.count))
+        return bad(path, "unreadable line \"" + line + "\"");
       header.elements.push_back(element);
     } else if (word == "property") {
       if (header.elements.empty()) return bad(path, "a property before any element");
@@ -118,7 +134,8 @@ Result<Header> parse_header(const std::filesystem::path& path, std::string_view 
 /// Reads numbers one after the other in either encoding; false when the file ends.
 class Reader {
  public:
-  Reader(std::string_view bytes, std::size_t at, PlyFormat format) : bytes_(bytes), at_(at), format_(format) {}
+  Reader(std::string_view bytes, std::size_t at, PlyFormat format)
+      : bytes_(bytes), at_(at), format_(format) {}
 
   bool next(PlyType type, double& value) {
     return format_ == PlyFormat::ascii ? next_ascii(value) : next_binary(type, value);
@@ -137,8 +154,10 @@ class Reader {
     const char* end = bytes_.data() + bytes_.size();
     if (begin < end && *begin == '+') ++begin;
     const auto [stop, error] = std::from_chars(begin, end, value);
-    if (error == std::errc::result_out_of_range) value = 0;  // denormals
-    else if (error != std::errc()) return false;
+    if (error == std::errc::result_out_of_range)
+      value = 0;  // denormals
+    else if (error != std::errc())
+      return false;
     at_ = static_cast<std::size_t>(stop - bytes_.data());
     return at_ == bytes_.size() || std::isspace(static_cast<unsigned char>(bytes_[at_]));
   }
@@ -154,9 +173,13 @@ class Reader {
     if (type.kind == 'f') {
       value = type.size == 4 ? static_cast<double>(read<float>(raw)) : read<double>(raw);
     } else if (type.kind == 'u') {
-      value = type.size == 1 ? read<std::uint8_t>(raw) : type.size == 2 ? read<std::uint16_t>(raw) : read<std::uint32_t>(raw);
+      value = type.size == 1   ? read<std::uint8_t>(raw)
+              : type.size == 2 ? read<std::uint16_t>(raw)
+                               : read<std::uint32_t>(raw);
     } else {
-      value = type.size == 1 ? read<std::int8_t>(raw) : type.size == 2 ? read<std::int16_t>(raw) : read<std::int32_t>(raw);
+      value = type.size == 1   ? read<std::int8_t>(raw)
+              : type.size == 2 ? read<std::int16_t>(raw)
+                               : read<std::int32_t>(raw);
     }
     return true;
   }
@@ -239,8 +262,8 @@ class VertexLayout {
   bool float_colors_;
 };
 
-bool read_vertex(Reader& reader, const Element& element, const VertexLayout& layout, PlyFormat format,
-                 Vertex& vertex) {
+bool read_vertex(Reader& reader, const Element& element, const VertexLayout& layout,
+                 PlyFormat format, Vertex& vertex) {
   for (std::size_t i = 0; i < element.properties.size(); ++i) {
     const Property& p = element.properties[i];
     double value = 0;
@@ -256,7 +279,8 @@ bool read_vertex(Reader& reader, const Element& element, const VertexLayout& lay
 
 std::uint8_t color_level(double value, bool is_float) {
   const double level = is_float ? 255.0 * value : value;
-  return level >= 0 && level <= 255 ? static_cast<std::uint8_t>(std::lround(level)) : std::uint8_t(level > 255 ? 255 : 0);
+  return level >= 0 && level <= 255 ? static_cast<std::uint8_t>(std::lround(level))
+                                    : std::uint8_t(level > 255 ? 255 : 0);
 }
 
 /// What can't be computed with is no position, as NaN is none.
@@ -280,7 +304,8 @@ Result<PointCloud> read_vertices(const std::filesystem::path& path, Reader& read
     const auto& v = vertex.values;
     cloud.positions.push_back(usable(Eigen::Vector3d(v[0], v[1], v[2])));
     if (normals) {
-      cloud.normals.emplace_back(static_cast<float>(v[3]), static_cast<float>(v[4]), static_cast<float>(v[5]));
+      cloud.normals.emplace_back(static_cast<float>(v[3]), static_cast<float>(v[4]),
+                                 static_cast<float>(v[5]));
     }
     if (colors) {
       const bool f = layout.float_colors();
@@ -300,12 +325,13 @@ Result<PointCloud> read_ply(const std::filesystem::path& path) {
   for (const Element& element : header.elements) {
     const std::uint64_t least = std::max<std::uint64_t>(1, least_bytes(element, header.format));
     if (element.count > reader.left() / least + 1) {
-      return bad(path, fmt::format("{} {} entries declared, {} bytes left", element.count, element.name,
-                                   reader.left()));
+      return bad(path, fmt::format("{} {} entries declared, {} bytes left", element.count,
+                                   element.name, reader.left()));
     }
     if (element.name == "vertex") return read_vertices(path, reader, element, header.format);
     for (std::uint64_t i = 0; i < element.count; ++i) {
-      if (!skip_entry(reader, element, header.format)) return bad(path, "cut off before the vertices");
+      if (!skip_entry(reader, element, header.format))
+        return bad(path, "cut off before the vertices");
     }
   }
   return bad(path, "no vertex element");

@@ -25,12 +25,14 @@ Result<Rigid3d> rigid_of_opengl_json(const nlohmann::json& rows, const std::stri
   }
   if (!m.allFinite()) return broken(expected);
   if (m.topRightCorner<3, 1>().cwiseAbs().maxCoeff() > max_coordinate) {
-    return broken(fmt::format("a position of {:g}", m.topRightCorner<3, 1>().cwiseAbs().maxCoeff()));
+    return broken(
+        fmt::format("a position of {:g}", m.topRightCorner<3, 1>().cwiseAbs().maxCoeff()));
   }
   const Eigen::Matrix3d rotation = m.topLeftCorner<3, 3>();
   const double skew = (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm();
   const double bottom = (m.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm();
-  if (!(skew < 1e-2)) return broken(fmt::format("its 3x3 part is no rotation (off by {:.2g})", skew));
+  if (!(skew < 1e-2))
+    return broken(fmt::format("its 3x3 part is no rotation (off by {:.2g})", skew));
   if (!(rotation.determinant() > 0)) return broken("its 3x3 part mirrors");
   if (!(bottom < 1e-6)) return broken("its last row is not 0 0 0 1");
   return cam_from_world_of_opengl(m);

@@ -40,7 +40,8 @@ Result<Camera> read_camera(const Json& frame, const Json& shared, const std::str
     fy = 0.5 * camera.height / std::tan(0.5 * *angle);
   }
   if (!fx) fx = fy;
-  if (!fx) return fail(ErrorKind::input, where, "no focal length", "add \"fl_x\" or \"camera_angle_x\"");
+  if (!fx)
+    return fail(ErrorKind::input, where, "no focal length", "add \"fl_x\" or \"camera_angle_x\"");
   camera.fx = *fx;
   camera.fy = fy.value_or(*fx);
   camera.cx = number(frame, shared, "cx").value_or(0.5 * camera.width);
@@ -55,7 +56,7 @@ Result<Camera> read_camera(const Json& frame, const Json& shared, const std::str
                   "undistort the images or fit k1, k2, p1, p2");
     }
   }
-  const Json& model = frame.contains("camera_model") ? frame["camera_model"]
+  const Json& model = frame.contains("camera_model")    ? frame["camera_model"]
                       : shared.contains("camera_model") ? shared["camera_model"]
                                                         : Json();
   if (model.is_string() && model.get<std::string>().find("FISHEYE") != std::string::npos) {
@@ -81,7 +82,8 @@ Result<Transforms> read_transforms_json(const std::filesystem::path& file) {
   } catch (const Json::exception& error) {
     // "[json.exception.parse_error.101] parse error at line 3, ...": the place, or the number.
     const std::string what = error.what();
-    return fail(ErrorKind::input, file.string(), "not JSON, or cut off: " + what.substr(what.find("] ") + 2),
+    return fail(ErrorKind::input, file.string(),
+                "not JSON, or cut off: " + what.substr(what.find("] ") + 2),
                 "write the file again");
   }
   if (!root.is_object()) {
@@ -104,8 +106,9 @@ Result<Transforms> read_transforms_json(const std::filesystem::path& file) {
       out.thermal_file_path = frame["thermal_file_path"].get<std::string>();
     }
     ORBITFUSE_ASSIGN(out.camera, read_camera(frame, root, where));
-    ORBITFUSE_ASSIGN(out.cam_from_world,
-                     rigid_of_opengl_json(frame.value("transform_matrix", Json()), where + ".transform_matrix"));
+    ORBITFUSE_ASSIGN(
+        out.cam_from_world,
+        rigid_of_opengl_json(frame.value("transform_matrix", Json()), where + ".transform_matrix"));
     transforms.frames.push_back(std::move(out));
   }
   return transforms;
@@ -120,10 +123,17 @@ Status write_transforms_json(const std::filesystem::path& file, const Transforms
   Json frames = Json::array();
   for (const TransformsFrame& frame : transforms.frames) {
     const Camera& c = frame.camera;
-    Json out = {{"file_path", frame.file_path}, {"w", c.width}, {"h", c.height},
-                {"fl_x", c.fx},                 {"fl_y", c.fy}, {"cx", c.cx},
-                {"cy", c.cy},                   {"k1", c.k1},   {"k2", c.k2},
-                {"p1", c.p1},                   {"p2", c.p2}};
+    Json out = {{"file_path", frame.file_path},
+                {"w", c.width},
+                {"h", c.height},
+                {"fl_x", c.fx},
+                {"fl_y", c.fy},
+                {"cx", c.cx},
+                {"cy", c.cy},
+                {"k1", c.k1},
+                {"k2", c.k2},
+                {"p1", c.p1},
+                {"p2", c.p2}};
     if (frame.thermal_file_path) out["thermal_file_path"] = *frame.thermal_file_path;
     out["transform_matrix"] = json_of(opengl_of_cam_from_world(frame.cam_from_world));
     frames.push_back(std::move(out));

@@ -12,8 +12,8 @@
 namespace orbitfuse {
 
 struct TransformsFrame {
-  std::string file_path;                          ///< as written, relative to the JSON
-  std::optional<std::string> thermal_file_path;   ///< ThermoNeRF's aligned pairs
+  std::string file_path;                         ///< as written, relative to the JSON
+  std::optional<std::string> thermal_file_path;  ///< ThermoNeRF's aligned pairs
   Camera camera;
   Rigid3d cam_from_world;
 };

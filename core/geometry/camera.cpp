@@ -36,17 +36,26 @@ Status Camera::validate(const std::string& where) const {
     return fail(ErrorKind::input, where, fmt::format("image size {}x{}", width, height),
                 "give a positive width and height");
   }
-  const std::array<std::pair<const char*, double>, 8> fields{
-      {{"fx", fx}, {"fy", fy}, {"cx", cx}, {"cy", cy}, {"k1", k1}, {"k2", k2}, {"p1", p1}, {"p2", p2}}};
+  const std::array<std::pair<const char*, double>, 8> fields{{{"fx", fx},
+                                                              {"fy", fy},
+                                                              {"cx", cx},
+                                                              {"cy", cy},
+                                                              {"k1", k1},
+                                                              {"k2", k2},
+                                                              {"p1", p1},
+                                                              {"p2", p2}}};
   for (const auto& [field, value] : fields) {
     if (!std::isfinite(value)) {
-      return fail(ErrorKind::input, where + "." + field, "not a finite number", "correct the camera");
+      return fail(ErrorKind::input, where + "." + field, "not a finite number",
+                  "correct the camera");
     }
   }
   for (const double distortion : {k1, k2, p1, p2}) {
     // No lens bends like that; a row of such numbers overflows.
     if (std::abs(distortion) > 1e3) {
-      return fail(ErrorKind::input, where, fmt::format("a distortion coefficient of {:g}", distortion), "correct the camera");
+      return fail(ErrorKind::input, where,
+                  fmt::format("a distortion coefficient of {:g}", distortion),
+                  "correct the camera");
     }
   }
   if (fx <= 0 || fy <= 0) {
@@ -57,13 +66,17 @@ Status Camera::validate(const std::string& where) const {
   const double side = std::max(width, height);
   for (const double focal : {fx, fy}) {
     if (focal < 0.04 * side || focal > 120 * side) {
-      return fail(ErrorKind::input, where, fmt::format("focal length {:g} pixels for an image of {}x{}", focal, width, height),
-                  "give it in pixels of this image size");
+      return fail(
+          ErrorKind::input, where,
+          fmt::format("focal length {:g} pixels for an image of {}x{}", focal, width, height),
+          "give it in pixels of this image size");
     }
   }
   // A crop may lie beside the optical axis, not beyond what a lens shows.
   if (std::abs(cx - 0.5 * width) > 3 * fx || std::abs(cy - 0.5 * height) > 3 * fy) {
-    return fail(ErrorKind::input, where, fmt::format("principal point ({:g}, {:g}) far outside an image of {}x{}", cx, cy, width, height),
+    return fail(ErrorKind::input, where,
+                fmt::format("principal point ({:g}, {:g}) far outside an image of {}x{}", cx, cy,
+                            width, height),
                 "give cx and cy in pixels of this image size");
   }
   return {};

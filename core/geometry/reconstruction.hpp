@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "core/geometry/camera.hpp"
-#include "core/modality.hpp"
 #include "core/geometry/transform.hpp"
+#include "core/modality.hpp"
 
 namespace orbitfuse {
 

@@ -7,12 +7,14 @@
 
 namespace orbitfuse {
 
-SceneBall scene_ball(const std::vector<Rigid3d>& cam_from_world, std::vector<Eigen::Vector3d> points) {
+SceneBall scene_ball(const std::vector<Rigid3d>& cam_from_world,
+                     std::vector<Eigen::Vector3d> points) {
   const double n = static_cast<double>(cam_from_world.size());
   Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero(), mean = b, forward = b;
   for (const Rigid3d& pose : cam_from_world) {
-    const Eigen::Vector3d c = camera_center(pose), axis = pose.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+    const Eigen::Vector3d c = camera_center(pose),
+                          axis = pose.rotation.conjugate() * Eigen::Vector3d::UnitZ();
     const Eigen::Matrix3d off_axis = Eigen::Matrix3d::Identity() - axis * axis.transpose();
     a += off_axis;
     b += off_axis * c;
@@ -25,16 +27,19 @@ SceneBall scene_ball(const std::vector<Rigid3d>& cam_from_world, std::vector<Eig
   } else if (!points.empty()) {
     const auto middle = points.begin() + static_cast<std::ptrdiff_t>(points.size() / 2);
     for (int i = 0; i < 3; ++i) {
-      std::nth_element(points.begin(), middle, points.end(), [i](const auto& p, const auto& q) { return p[i] < q[i]; });
+      std::nth_element(points.begin(), middle, points.end(),
+                       [i](const auto& p, const auto& q) { return p[i] < q[i]; });
       ball.center[i] = (*middle)[i];
     }
   } else {
     double spread = 0;
-    for (const Rigid3d& pose : cam_from_world) spread = std::max(spread, (camera_center(pose) - mean).norm());
+    for (const Rigid3d& pose : cam_from_world)
+      spread = std::max(spread, (camera_center(pose) - mean).norm());
     ball.center = mean + forward.normalized() * (spread > 0 ? 2 * spread : 1.0);
   }
   double distance = 0;
-  for (const Rigid3d& pose : cam_from_world) distance += (camera_center(pose) - ball.center).norm() / n;
+  for (const Rigid3d& pose : cam_from_world)
+    distance += (camera_center(pose) - ball.center).norm() / n;
   ball.radius = std::isfinite(distance) && distance > 0 ? distance : 1.0;
   return ball;
 }

@@ -15,6 +15,7 @@ struct SceneBall {
 
 /// Centre: the point nearest to all optical axes; where they don't meet (one view, a straight path)
 /// the median of the points, and without points as far ahead as twice the cameras' spread.
-SceneBall scene_ball(const std::vector<Rigid3d>& cam_from_world, std::vector<Eigen::Vector3d> points);
+SceneBall scene_ball(const std::vector<Rigid3d>& cam_from_world,
+                     std::vector<Eigen::Vector3d> points);
 
 }  // namespace orbitfuse

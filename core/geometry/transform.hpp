@@ -58,8 +58,7 @@ inline Eigen::Vector3d operator*(const Similarity3d& a_from_b, const Eigen::Vect
   return a_from_b.scale * (a_from_b.rotation * x_in_b) + a_from_b.translation;
 }
 inline Similarity3d operator*(const Similarity3d& a_from_b, const Similarity3d& b_from_c) {
-  return {a_from_b.scale * b_from_c.scale,
-          (a_from_b.rotation * b_from_c.rotation).normalized(),
+  return {a_from_b.scale * b_from_c.scale, (a_from_b.rotation * b_from_c.rotation).normalized(),
           a_from_b.scale * (a_from_b.rotation * b_from_c.translation) + a_from_b.translation};
 }
 

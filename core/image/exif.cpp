@@ -15,7 +15,8 @@ std::string text_of(const Exiv2::ExifData& data, const char* key) {
   const auto it = data.findKey(Exiv2::ExifKey(key));
   if (it == data.end()) return {};
   std::string text = it->toString();
-  while (!text.empty() && (text.back() == '\0' || std::isspace(static_cast<unsigned char>(text.back())))) {
+  while (!text.empty() &&
+         (text.back() == '\0' || std::isspace(static_cast<unsigned char>(text.back())))) {
     text.pop_back();
   }
   return text;
@@ -32,15 +33,18 @@ std::optional<double> number_of(const Exiv2::ExifData& data, const char* key) {
 std::optional<std::int64_t> epoch_ns(const std::string& date, const std::string& subsec,
                                      const std::string& offset) {
   int y, mo, d, h, mi, s;
-  if (std::sscanf(date.c_str(), "%d:%d:%d %d:%d:%d", &y, &mo, &d, &h, &mi, &s) != 6) return std::nullopt;
-  const std::chrono::year_month_day day{std::chrono::year(y), std::chrono::month(static_cast<unsigned>(mo)),
+  if (std::sscanf(date.c_str(), "%d:%d:%d %d:%d:%d", &y, &mo, &d, &h, &mi, &s) != 6)
+    return std::nullopt;
+  const std::chrono::year_month_day day{std::chrono::year(y),
+                                        std::chrono::month(static_cast<unsigned>(mo)),
                                         std::chrono::day(static_cast<unsigned>(d))};
   if (!day.ok() || y < 1970 || y > 2200 || h > 23 || mi > 59 || s > 60) return std::nullopt;
-  std::int64_t seconds = std::chrono::sys_days(day).time_since_epoch().count() * 86400LL +
-                         h * 3600LL + mi * 60LL + s;
+  std::int64_t seconds =
+      std::chrono::sys_days(day).time_since_epoch().count() * 86400LL + h * 3600LL + mi * 60LL + s;
   char sign = 0;
   int oh = 0, om = 0;
-  if (std::sscanf(offset.c_str(), "%c%d:%d", &sign, &oh, &om) == 3 && (sign == '+' || sign == '-')) {
+  if (std::sscanf(offset.c_str(), "%c%d:%d", &sign, &oh, &om) == 3 &&
+      (sign == '+' || sign == '-')) {
     seconds -= (sign == '+' ? 1 : -1) * (oh * 3600LL + om * 60LL);
   }
   std::int64_t fraction_ns = 0, unit = 100'000'000;

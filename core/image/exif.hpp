@@ -10,11 +10,11 @@ namespace orbitfuse {
 
 /// What a photo says of itself; absent or malformed fields stay empty.
 struct ExifInfo {
-  int orientation = 1;                        ///< 1..8, TIFF 6.0; 1 = as stored
+  int orientation = 1;  ///< 1..8, TIFF 6.0; 1 = as stored
   std::optional<double> focal_mm;
-  std::optional<double> focal_35mm;           ///< equivalent for a 36 x 24 mm frame, by diagonal
-  std::optional<std::int64_t> taken_ns;       ///< DateTimeOriginal with SubSec; UTC if an offset is
-                                              ///< given, else the camera's clock read as UTC
+  std::optional<double> focal_35mm;      ///< equivalent for a 36 x 24 mm frame, by diagonal
+  std::optional<std::int64_t> taken_ns;  ///< DateTimeOriginal with SubSec; UTC if an offset is
+                                         ///< given, else the camera's clock read as UTC
   bool taken_has_offset = false;
   std::string make, model, serial;
 };

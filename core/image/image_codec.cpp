@@ -19,7 +19,8 @@ bool starts_with(std::string_view bytes, std::string_view magic) {
 
 std::uint32_t big_endian_u32(std::string_view bytes, std::size_t at) {
   std::uint32_t value = 0;
-  for (std::size_t i = 0; i < 4; ++i) value = value << 8 | static_cast<unsigned char>(bytes[at + i]);
+  for (std::size_t i = 0; i < 4; ++i)
+    value = value << 8 | static_cast<unsigned char>(bytes[at + i]);
   return value;
 }
 
@@ -79,11 +80,16 @@ ImageFormat image_format(std::string_view bytes) {
 
 const char* name(ImageFormat format) {
   switch (format) {
-    case ImageFormat::jpeg: return "JPEG";
-    case ImageFormat::png: return "PNG";
-    case ImageFormat::tiff: return "TIFF";
-    case ImageFormat::bmp: return "BMP";
-    case ImageFormat::unknown: break;
+    case ImageFormat::jpeg:
+      return "JPEG";
+    case ImageFormat::png:
+      return "PNG";
+    case ImageFormat::tiff:
+      return "TIFF";
+    case ImageFormat::bmp:
+      return "BMP";
+    case ImageFormat::unknown:
+      break;
   }
   return "unknown content";
 }
@@ -92,7 +98,8 @@ Result<cv::Mat> decode_image(std::string_view bytes, const std::string& where) {
   const ImageFormat format = image_format(bytes);
   if (bytes.empty()) return fail(ErrorKind::input, where, "empty file", "copy the file again");
   switch (format) {
-    case ImageFormat::jpeg: return decode_jpeg(bytes, where);
+    case ImageFormat::jpeg:
+      return decode_jpeg(bytes, where);
     case ImageFormat::tiff: {
       ORBITFUSE_ASSIGN(cv::Mat image, decode_tiff(bytes, where));
       if (image.depth() == CV_32F) {
@@ -111,13 +118,16 @@ Result<cv::Mat> decode_image(std::string_view bytes, const std::string& where) {
       }
       return decode_with_opencv(bytes, where);
     }
-    case ImageFormat::bmp: return decode_with_opencv(bytes, where);
-    case ImageFormat::unknown: break;
+    case ImageFormat::bmp:
+      return decode_with_opencv(bytes, where);
+    case ImageFormat::unknown:
+      break;
   }
   const char* known = name_of_other_format(bytes);
-  return fail(ErrorKind::input, where,
-              known ? fmt::format("{}, which is not read", known) : "not an image (JPEG, PNG, TIFF or BMP)",
-              known ? "convert it to JPEG, PNG or TIFF" : "remove the file or convert it");
+  return fail(
+      ErrorKind::input, where,
+      known ? fmt::format("{}, which is not read", known) : "not an image (JPEG, PNG, TIFF or BMP)",
+      known ? "convert it to JPEG, PNG or TIFF" : "remove the file or convert it");
 }
 
 const char* name_of_other_format(std::string_view bytes) {
@@ -128,7 +138,8 @@ const char* name_of_other_format(std::string_view bytes) {
   if (bytes.substr(0, 4) == "FFF\0"sv || bytes.substr(0, 4) == "AFF\0"sv) return "a FLIR recording";
   if (bytes.substr(4, 4) != "ftyp"sv) return nullptr;
   const std::string_view brand = bytes.substr(8, 4);
-  for (const std::string_view heif : {"heic"sv, "heix"sv, "hevc"sv, "mif1"sv, "msf1"sv, "heim"sv, "heis"sv}) {
+  for (const std::string_view heif :
+       {"heic"sv, "heix"sv, "hevc"sv, "mif1"sv, "msf1"sv, "heim"sv, "heis"sv}) {
     if (brand == heif) return "a HEIC image";
   }
   return brand == "avif"sv ? "an AVIF image" : "a video";
@@ -137,21 +148,35 @@ const char* name_of_other_format(std::string_view bytes) {
 cv::Mat apply_orientation(const cv::Mat& image, int orientation) {
   cv::Mat out;
   switch (orientation) {
-    case 2: cv::flip(image, out, 1); return out;
-    case 3: cv::rotate(image, out, cv::ROTATE_180); return out;
-    case 4: cv::flip(image, out, 0); return out;
-    case 5: cv::transpose(image, out); return out;
-    case 6: cv::rotate(image, out, cv::ROTATE_90_CLOCKWISE); return out;
+    case 2:
+      cv::flip(image, out, 1);
+      return out;
+    case 3:
+      cv::rotate(image, out, cv::ROTATE_180);
+      return out;
+    case 4:
+      cv::flip(image, out, 0);
+      return out;
+    case 5:
+      cv::transpose(image, out);
+      return out;
+    case 6:
+      cv::rotate(image, out, cv::ROTATE_90_CLOCKWISE);
+      return out;
     case 7:
       cv::transpose(image, out);
       cv::rotate(out, out, cv::ROTATE_180);
       return out;
-    case 8: cv::rotate(image, out, cv::ROTATE_90_COUNTERCLOCKWISE); return out;
-    default: return image;
+    case 8:
+      cv::rotate(image, out, cv::ROTATE_90_COUNTERCLOCKWISE);
+      return out;
+    default:
+      return image;
   }
 }
 
-Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_view text, const std::string& where) {
+Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_view text,
+                                                                    const std::string& where) {
   const auto value = nlohmann::json::parse(text, nullptr, false);
   if (!value.is_object() || !value.contains("scale")) return std::nullopt;
   ThermalScaleTag tag;
@@ -159,14 +184,17 @@ Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_
     if (!value.contains(key)) return {};
     if (value[key].is_number()) number = value[key].get<double>();
     // Beyond these nothing is a temperature, and arithmetic in float would overflow.
-    if (value[key].is_number() && std::isfinite(number) && std::abs(number) <= max_scale_number) return {};
-    return fail(ErrorKind::input, where, fmt::format("\"{}\": {}", key, value[key].dump().substr(0, 40)),
+    if (value[key].is_number() && std::isfinite(number) && std::abs(number) <= max_scale_number)
+      return {};
+    return fail(ErrorKind::input, where,
+                fmt::format("\"{}\": {}", key, value[key].dump().substr(0, 40)),
                 "kelvin = scale * count + offset; correct the two numbers");
   };
   ORBITFUSE_TRY(read("scale", tag.scale));
   ORBITFUSE_TRY(read("offset", tag.offset));
   if (!(tag.scale > 0)) {
-    return fail(ErrorKind::input, where, fmt::format("\"scale\": {}", tag.scale), "kelvin per count must be > 0");
+    return fail(ErrorKind::input, where, fmt::format("\"scale\": {}", tag.scale),
+                "kelvin per count must be > 0");
   }
   return tag;
 }
@@ -174,7 +202,8 @@ Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_
 Result<ThermalScaleTag> thermal_scale_of_sidecar(std::string_view text, const std::string& where) {
   ORBITFUSE_ASSIGN(const auto tag, thermal_scale_of_description(text, where));
   if (tag) return *tag;
-  return fail(ErrorKind::input, where, "no usable \"scale\" (kelvin per count)", "correct or remove the sidecar");
+  return fail(ErrorKind::input, where, "no usable \"scale\" (kelvin per count)",
+              "correct or remove the sidecar");
 }
 
 Result<std::string> encode_png(const cv::Mat& image) {
@@ -190,8 +219,9 @@ Result<std::string> encode_jpeg(const cv::Mat& image, int quality) {
 }
 
 std::string thermal_sidecar_json(ThermalScaleTag scale) {
-  return fmt::format(R"({{"quantity":"temperature","unit":"kelvin","scale":{:g},"offset":{:g},"invalid":0}})",
-                     scale.scale, scale.offset);
+  return fmt::format(
+      R"({{"quantity":"temperature","unit":"kelvin","scale":{:g},"offset":{:g},"invalid":0}})",
+      scale.scale, scale.offset);
 }
 
 Result<std::string> encode_thermal_tiff(const cv::Mat& counts, ThermalScaleTag scale) {

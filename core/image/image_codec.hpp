@@ -30,7 +30,8 @@ struct ThermalScaleTag {
 };
 /// Nothing where the text names no scale (many programs write something into ImageDescription); an
 /// input error where it names one that can't be used.
-Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_view text, const std::string& where);
+Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_view text,
+                                                                    const std::string& where);
 /// A sidecar is there for its scale: without one it is an input error.
 Result<ThermalScaleTag> thermal_scale_of_sidecar(std::string_view text, const std::string& where);
 

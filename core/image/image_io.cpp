@@ -6,15 +6,14 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/image/exif.hpp"
-#include "core/system/file_io.hpp"
 #include "core/image/image_codec.hpp"
+#include "core/system/file_io.hpp"
 #include "core/temperature.hpp"
 
 namespace orbitfuse {
 namespace {
 
 namespace fs = std::filesystem;
-
 
 fs::path sidecar_of(const fs::path& path) { return path.string() + ".json"; }
 
@@ -51,7 +50,8 @@ Result<cv::Mat> read_thermal_k(const fs::path& path) {
                             8 * image.elemSize1(), image.channels()),
                 "this is no radiometric image: give a 16-bit TIFF or PNG");
   }
-  ORBITFUSE_ASSIGN(std::optional<ThermalScaleTag> tag, thermal_scale_of_description(description, path.string()));
+  ORBITFUSE_ASSIGN(std::optional<ThermalScaleTag> tag,
+                   thermal_scale_of_description(description, path.string()));
   std::error_code ignored;
   if (!tag && fs::exists(sidecar_of(path), ignored)) {
     ORBITFUSE_ASSIGN(const std::string sidecar, read_file(sidecar_of(path), max_settings_bytes));
@@ -97,13 +97,16 @@ double kelvin_per_count_for(const std::vector<cv::Mat>& kelvin_images) {
   return kelvin_per_count_for(hottest_k);
 }
 
-Status write_thermal_tiff(const fs::path& path, const cv::Mat& kelvin, std::optional<double> kelvin_per_count) {
+Status write_thermal_tiff(const fs::path& path, const cv::Mat& kelvin,
+                          std::optional<double> kelvin_per_count) {
   CV_Assert(kelvin.type() == CV_32FC1);
-  const double scale = kelvin_per_count ? *kelvin_per_count : kelvin_per_count_for(std::vector<cv::Mat>{kelvin});
+  const double scale =
+      kelvin_per_count ? *kelvin_per_count : kelvin_per_count_for(std::vector<cv::Mat>{kelvin});
   cv::Mat counts(kelvin.size(), CV_16UC1);
   for (int y = 0; y < kelvin.rows; ++y) {
     for (int x = 0; x < kelvin.cols; ++x) {
-      counts.at<std::uint16_t>(y, x) = count_from_kelvin(static_cast<double>(kelvin.at<float>(y, x)), scale);
+      counts.at<std::uint16_t>(y, x) =
+          count_from_kelvin(static_cast<double>(kelvin.at<float>(y, x)), scale);
     }
   }
   ORBITFUSE_TRY(write_encoded(path, encode_thermal_tiff(counts, {scale, 0})));
@@ -119,7 +122,8 @@ Result<cv::Mat> read_float_tiff(const fs::path& path) {
   ORBITFUSE_ASSIGN(const std::string bytes, read_file(path, max_image_bytes));
   ORBITFUSE_ASSIGN(cv::Mat image, decode_tiff(bytes, path.string()));
   if (image.type() != CV_32FC1) {
-    return fail(ErrorKind::input, path.string(), "not a 32-bit float TIFF", "write the depth map again");
+    return fail(ErrorKind::input, path.string(), "not a 32-bit float TIFF",
+                "write the depth map again");
   }
   return image;
 }

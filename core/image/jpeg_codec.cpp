@@ -2,8 +2,8 @@
 #include <csetjmp>
 #include <cstdio>
 
-#include <jpeglib.h>
 #include <jerror.h>
+#include <jpeglib.h>
 
 #include <fmt/format.h>
 
@@ -43,19 +43,22 @@ void on_message(j_common_ptr info, int level) {
   }
   // A shifted code often ends its scan early. Cameras pad a few bytes; half a block is damage.
   constexpr int padding = 32;
-  if (code == JWRN_EXTRANEOUS_DATA && errors_of(info).in_scan && info->err->msg_parm.i[0] > padding) {
+  if (code == JWRN_EXTRANEOUS_DATA && errors_of(info).in_scan &&
+      info->err->msg_parm.i[0] > padding) {
     errors_of(info).damaged = true;
   }
 }
 
 /// Plain C style: longjmp may not pass over C++ objects, so everything lives in the caller.
-bool decode(std::string_view bytes, jpeg_decompress_struct& info, JpegErrors& errors, cv::Mat& image) {
+bool decode(std::string_view bytes, jpeg_decompress_struct& info, JpegErrors& errors,
+            cv::Mat& image) {
   if (setjmp(errors.jump)) return false;
   jpeg_create_decompress(&info);
   jpeg_mem_src(&info, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
   jpeg_read_header(&info, TRUE);
   if (1LL * info.image_width * info.image_height * 3 > max_image_samples) {
-    std::snprintf(errors.text, sizeof errors.text, "JPEG of %ux%u", info.image_width, info.image_height);
+    std::snprintf(errors.text, sizeof errors.text, "JPEG of %ux%u", info.image_width,
+                  info.image_height);
     return false;
   }
   const bool cmyk = info.jpeg_color_space == JCS_CMYK || info.jpeg_color_space == JCS_YCCK;
@@ -100,12 +103,15 @@ Result<cv::Mat> decode_jpeg(std::string_view bytes, const std::string& where) {
   const bool decoded = decode(bytes, info, errors, image);
   jpeg_destroy_decompress(&info);
   if (!decoded) {
-    return fail(ErrorKind::input, where, fmt::format("damaged JPEG ({})", errors.text), "copy the file again");
+    return fail(ErrorKind::input, where, fmt::format("damaged JPEG ({})", errors.text),
+                "copy the file again");
   }
   if (errors.damaged) {
-    return fail(ErrorKind::input, where, "damaged JPEG (wrong codes in its image data)", "copy the file again");
+    return fail(ErrorKind::input, where, "damaged JPEG (wrong codes in its image data)",
+                "copy the file again");
   }
-  if (errors.truncated) return fail(ErrorKind::input, where, "truncated JPEG", "copy the file again");
+  if (errors.truncated)
+    return fail(ErrorKind::input, where, "truncated JPEG", "copy the file again");
   return image.channels() == 4 ? bgr_of_inverted_cmyk(image) : image;
 }
 

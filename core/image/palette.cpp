@@ -70,7 +70,8 @@ Result<cv::Mat> palette(const std::string& name) {
 }
 
 cv::Mat colorize(const cv::Mat& kelvin, TemperatureSpan span, const cv::Mat& palette_bgr) {
-  CV_Assert(kelvin.type() == CV_32FC1 && palette_bgr.type() == CV_8UC3 && palette_bgr.total() == 256);
+  CV_Assert(kelvin.type() == CV_32FC1 && palette_bgr.type() == CV_8UC3 &&
+            palette_bgr.total() == 256);
   const double width = span.high_k - span.low_k;
   const double scale = width > 0 && std::isfinite(width) ? 255.0 / width : 0.0;
   cv::Mat out(kelvin.size(), CV_8UC3, cv::Scalar::all(0));
@@ -99,7 +100,8 @@ TemperatureSpan common_span(const std::vector<cv::Mat>& kelvin_images, double lo
   TemperatureSpan span{celsius_zero_k, celsius_zero_k};  // without a sample: any defined span
   if (!samples.empty()) {
     const auto at = [&](double percentile) {
-      const double rank = std::clamp(percentile, 0.0, 100.0) / 100.0 * static_cast<double>(samples.size() - 1);
+      const double rank =
+          std::clamp(percentile, 0.0, 100.0) / 100.0 * static_cast<double>(samples.size() - 1);
       const auto nth = samples.begin() + static_cast<std::ptrdiff_t>(std::lround(rank));
       std::nth_element(samples.begin(), nth, samples.end());
       return static_cast<double>(*nth);

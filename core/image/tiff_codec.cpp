@@ -57,7 +57,8 @@ void unmap_nothing(thandle_t, void*, toff_t) {}
 
 /// libtiff leaves out tags that it can't read and goes on; only its warning tells.
 void on_warning(thandle_t handle, const char*, const char* format, va_list) {
-  if (handle && std::strstr(format, "IO error")) static_cast<MemoryFile*>(handle)->tag_is_cut = true;
+  if (handle && std::strstr(format, "IO error"))
+    static_cast<MemoryFile*>(handle)->tag_is_cut = true;
 }
 
 constexpr int max_pages = 10000;  // a recording; a damaged chain of directories ends here
@@ -183,25 +184,31 @@ Result<cv::Mat> decode_tiff(std::string_view bytes, const std::string& where,
   if (!tiff) return fail(ErrorKind::input, where, "not a readable TIFF", "copy the file again");
   const Layout l = layout_of(tiff.get());
   for (int at = 0; at < page.value_or(0); ++at) {
-    if (!next_page(tiff.get(), l)) return fail(ErrorKind::input, where, fmt::format("no page {}", *page + 1), "copy the file again");
+    if (!next_page(tiff.get(), l))
+      return fail(ErrorKind::input, where, fmt::format("no page {}", *page + 1),
+                  "copy the file again");
   }
   const int depth = depth_of(l);
   if (depth < 0 || l.channels < 1 || l.channels > 4 || l.planar != PLANARCONFIG_CONTIG ||
       l.photometric == PHOTOMETRIC_PALETTE) {
     return fail(ErrorKind::input, where,
-                fmt::format("TIFF with {}-bit samples (format {}), {} channels", l.bits, l.format, l.channels),
+                fmt::format("TIFF with {}-bit samples (format {}), {} channels", l.bits, l.format,
+                            l.channels),
                 "convert it to 8 or 16-bit unsigned grey or RGB");
   }
   const long long samples = 1LL * l.width * l.height * l.channels;
-  if (l.width == 0 || l.height == 0 || l.width > 65536 || l.height > 65536 || samples > max_image_samples) {
+  if (l.width == 0 || l.height == 0 || l.width > 65536 || l.height > 65536 ||
+      samples > max_image_samples) {
     return fail(ErrorKind::input, where, fmt::format("TIFF of {}x{}", l.width, l.height),
                 "the header is damaged; copy the file again");
   }
   if (image_description) {
     const char* text = nullptr;
-    if (TIFFGetField(tiff.get(), TIFFTAG_IMAGEDESCRIPTION, &text) && text) *image_description = text;
+    if (TIFFGetField(tiff.get(), TIFFTAG_IMAGEDESCRIPTION, &text) && text)
+      *image_description = text;
   }
-  cv::Mat image(static_cast<int>(l.height), static_cast<int>(l.width), CV_MAKETYPE(depth, l.channels));
+  cv::Mat image(static_cast<int>(l.height), static_cast<int>(l.width),
+                CV_MAKETYPE(depth, l.channels));
   const bool whole = TIFFIsTiled(tiff.get()) ? read_tiles(tiff.get(), l, image)
                                              : read_strips(tiff.get(), l, image);
   if (!whole || file.tag_is_cut) {
@@ -222,12 +229,14 @@ Result<std::string> encode_tiff(const cv::Mat& image, const std::string& image_d
     TIFFSetField(tiff.get(), TIFFTAG_IMAGELENGTH, static_cast<std::uint32_t>(image.rows));
     TIFFSetField(tiff.get(), TIFFTAG_BITSPERSAMPLE, is_float ? 32 : 16);
     TIFFSetField(tiff.get(), TIFFTAG_SAMPLESPERPIXEL, 1);
-    TIFFSetField(tiff.get(), TIFFTAG_SAMPLEFORMAT, is_float ? SAMPLEFORMAT_IEEEFP : SAMPLEFORMAT_UINT);
+    TIFFSetField(tiff.get(), TIFFTAG_SAMPLEFORMAT,
+                 is_float ? SAMPLEFORMAT_IEEEFP : SAMPLEFORMAT_UINT);
     TIFFSetField(tiff.get(), TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
     TIFFSetField(tiff.get(), TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
     TIFFSetField(tiff.get(), TIFFTAG_ORIENTATION, ORIENTATION_TOPLEFT);
     TIFFSetField(tiff.get(), TIFFTAG_COMPRESSION, COMPRESSION_ADOBE_DEFLATE);
-    TIFFSetField(tiff.get(), TIFFTAG_PREDICTOR, is_float ? PREDICTOR_FLOATINGPOINT : PREDICTOR_HORIZONTAL);
+    TIFFSetField(tiff.get(), TIFFTAG_PREDICTOR,
+                 is_float ? PREDICTOR_FLOATINGPOINT : PREDICTOR_HORIZONTAL);
     TIFFSetField(tiff.get(), TIFFTAG_ROWSPERSTRIP, static_cast<std::uint32_t>(image.rows));
     TIFFSetField(tiff.get(), TIFFTAG_SOFTWARE, "OrbitFuse");
     if (!image_description.empty()) {

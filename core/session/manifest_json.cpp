@@ -95,7 +95,8 @@ Result<Rigid3d> read_pose(const Reader& line) {
     }
     std::vector<double> out;
     for (const Json& value : line.json()[key]) {
-      if (!value.is_number() || !std::isfinite(value.get<double>())) return line.wrong(key, "finite numbers");
+      if (!value.is_number() || !std::isfinite(value.get<double>()))
+        return line.wrong(key, "finite numbers");
       out.push_back(value.get<double>());
     }
     return out;
@@ -103,7 +104,8 @@ Result<Rigid3d> read_pose(const Reader& line) {
   ORBITFUSE_ASSIGN(const auto q, numbers("rotation_wxyz", 4));
   ORBITFUSE_ASSIGN(const auto t, numbers("translation", 3));
   Rigid3d pose{Eigen::Quaterniond(q[0], q[1], q[2], q[3]), {t[0], t[1], t[2]}};
-  if (std::abs(pose.rotation.norm() - 1.0) > 1e-3) return line.wrong("rotation_wxyz", "a unit quaternion");
+  if (std::abs(pose.rotation.norm() - 1.0) > 1e-3)
+    return line.wrong("rotation_wxyz", "a unit quaternion");
   pose.rotation.normalize();
   return pose;
 }
@@ -173,7 +175,9 @@ Status read_optional_parts(const Reader& line, FrameRecord& frame) {
   return {};
 }
 
-std::string line_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+std::string line_of(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
 
 }  // namespace
 

@@ -10,8 +10,8 @@
 // The manifest's lines as JSON; used by session.cpp and the writer functions of session.hpp.
 namespace orbitfuse {
 
-/// Whether open_session() would take the record's line: a NaN that slipped into a pose would make the
-/// whole session unreadable. To be asked before anything is written.
+/// Whether open_session() would take the record's line: a NaN that slipped into a pose would make
+/// the whole session unreadable. To be asked before anything is written.
 Status check_readable(const FrameRecord& frame);
 Status check_readable(const DeviceInfo& device);
 
@@ -29,9 +29,9 @@ class Reader {
   bool has(const char* key) const { return object_.contains(key) && !object_[key].is_null(); }
   Result<std::string> text(const char* key) const;
   std::string text_or(const char* key, const std::string& fallback) const;
-  Result<double> number(const char* key) const;            ///< finite
+  Result<double> number(const char* key) const;  ///< finite
   Result<std::int64_t> integer(const char* key) const;
-  Result<std::uint64_t> count(const char* key) const;      ///< integer >= 0
+  Result<std::uint64_t> count(const char* key) const;  ///< integer >= 0
   bool flag(const char* key) const { return has(key) && object_[key] == true; }
   Result<Reader> child(const char* key) const;
   const Json& json() const { return object_; }

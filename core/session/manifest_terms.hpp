@@ -11,13 +11,13 @@ namespace orbitfuse {
 
 /// What an event line tells.
 enum class EventKind {
-  resumed,        // of the session
-  ignored,        // of files
+  resumed,  // of the session
+  ignored,  // of files
   duplicate,
   skipped,
   nothing_new,
   unwritten,
-  disconnected,   // of cameras, and of folders that photos come to
+  disconnected,  // of cameras, and of folders that photos come to
   reconnected,
   stalled,
   silent,

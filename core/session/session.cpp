@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <unordered_map>
 
-#include "core/system/file_io.hpp"
 #include "core/session/manifest_json.hpp"
+#include "core/system/file_io.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -31,8 +31,10 @@ Status apply(const Json& line, const std::string& where, Session& session, Frame
   } else if (type == "frame") {
     ORBITFUSE_ASSIGN(FrameRecord frame, manifest::read_frame(reader));
     const auto [known, is_new] = index.emplace(frame.file, session.frames.size());
-    if (is_new) session.frames.push_back(std::move(frame));
-    else session.frames[known->second] = std::move(frame);
+    if (is_new)
+      session.frames.push_back(std::move(frame));
+    else
+      session.frames[known->second] = std::move(frame);
   } else if (type == "gap") {
     ORBITFUSE_ASSIGN(GapRecord gap, manifest::read_gap(reader));
     session.gaps.push_back(std::move(gap));
@@ -78,16 +80,19 @@ std::vector<const FrameRecord*> Session::frames_of(Modality modality, bool with_
 
 Status check_readable(const FrameRecord& frame) {
   const Json line = Json::parse(manifest_line(frame));
-  const auto read = manifest::read_frame(manifest::Reader(line, frame.source.empty() ? frame.file : frame.source));
+  const auto read = manifest::read_frame(
+      manifest::Reader(line, frame.source.empty() ? frame.file : frame.source));
   if (read) return {};
-  return fail(ErrorKind::input, read.error().where, read.error().found, "correct what is known of this frame");
+  return fail(ErrorKind::input, read.error().where, read.error().found,
+              "correct what is known of this frame");
 }
 
 Status check_readable(const DeviceInfo& device) {
   const Json line = Json::parse(manifest_line(device));
   const auto read = manifest::read_device(manifest::Reader(line, "device " + device.id));
   if (read) return {};
-  return fail(ErrorKind::input, read.error().where, read.error().found, "correct what is known of this camera");
+  return fail(ErrorKind::input, read.error().where, read.error().found,
+              "correct what is known of this camera");
 }
 
 Result<Session> open_session(const std::filesystem::path& folder) {
@@ -95,7 +100,8 @@ Result<Session> open_session(const std::filesystem::path& folder) {
   const std::filesystem::path file = folder / "manifest.jsonl";
   if (!std::filesystem::is_directory(folder, ignored)) {
     const bool is_file = std::filesystem::exists(folder, ignored);
-    return fail(ErrorKind::input, folder.string(), is_file ? "is a file" : "no such folder", "give a session folder");
+    return fail(ErrorKind::input, folder.string(), is_file ? "is a file" : "no such folder",
+                "give a session folder");
   }
   if (std::filesystem::status(file, ignored).type() == std::filesystem::file_type::not_found) {
     return fail(ErrorKind::input, folder.string(), "no manifest.jsonl, so not a session",
@@ -114,11 +120,13 @@ Result<Session> open_session(const std::filesystem::path& folder) {
     const Json json = Json::parse(line, nullptr, false);
     if (json.is_discarded() && is_last && number > 1) {
       session.complete = false;
-      session.warnings.push_back(where + ": cut in the middle of the line (a crash while recording?)");
+      session.warnings.push_back(where +
+                                 ": cut in the middle of the line (a crash while recording?)");
       break;
     }
     if (!json.is_object()) {
-      return fail(ErrorKind::input, where, "not a JSON object", "restore the manifest from a backup");
+      return fail(ErrorKind::input, where, "not a JSON object",
+                  "restore the manifest from a backup");
     }
     if (number == 1 && json.value("type", "") != std::string("session")) {
       return fail(ErrorKind::input, where, "the first line is not a session header",
@@ -129,16 +137,19 @@ Result<Session> open_session(const std::filesystem::path& folder) {
     at = end + 1;
   }
   if (session.id.empty()) {
-    return fail(ErrorKind::input, file.string(), "empty manifest", "record or import the session again");
+    return fail(ErrorKind::input, file.string(), "empty manifest",
+                "record or import the session again");
   }
   for (const FrameRecord& frame : session.frames) {
     if (!session.device(frame.device)) {
-      return fail(ErrorKind::input, file.string(), frame.file + " is of unknown device \"" + frame.device + "\"",
+      return fail(ErrorKind::input, file.string(),
+                  frame.file + " is of unknown device \"" + frame.device + "\"",
                   "restore the manifest from a backup");
     }
   }
   drop_missing_files(session);
-  if (!session.complete) session.warnings.push_back("the session was not closed: it may be incomplete");
+  if (!session.complete)
+    session.warnings.push_back("the session was not closed: it may be incomplete");
   return session;
 }
 

@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "core/geometry/camera.hpp"
-#include "core/modality.hpp"
-#include "core/session/manifest_terms.hpp"
-#include "core/result.hpp"
 #include "core/geometry/transform.hpp"
+#include "core/modality.hpp"
+#include "core/result.hpp"
+#include "core/session/manifest_terms.hpp"
 
 // A session is a folder: manifest.jsonl (one JSON object a line, appended and fsynced per frame),
 // visible/ and thermal/. docs/formats.md has the format. Reading is here; writing is in capture/.
@@ -22,9 +22,9 @@ inline constexpr int session_format_version = 1;
 
 /// What is known of a lens before calibration. Absent fields are unknown, never guessed.
 struct LensPrior {
-  std::optional<double> focal_px;        ///< at the frame's own resolution
-  double focal_relative_sigma = 0.03;    ///< 0 = exact
-  std::optional<Camera> calibrated;      ///< complete, trusted intrinsics (transforms.json, truth)
+  std::optional<double> focal_px;      ///< at the frame's own resolution
+  double focal_relative_sigma = 0.03;  ///< 0 = exact
+  std::optional<Camera> calibrated;    ///< complete, trusted intrinsics (transforms.json, truth)
 };
 
 struct DeviceInfo {
@@ -55,9 +55,9 @@ struct EdgeBlur {
 
 /// Measured when the frame was recorded; guides the operator and the choice of frames.
 struct FrameQuality {
-  double sharpness = 0;            ///< variance of the Laplacian over the variance of the image
-  double mean_level = 0;           ///< visible: 0..255; thermal: kelvin
-  double clipped_fraction = 0;     ///< of samples at either end of the range
+  double sharpness = 0;         ///< variance of the Laplacian over the variance of the image
+  double mean_level = 0;        ///< visible: 0..255; thermal: kelvin
+  double clipped_fraction = 0;  ///< of samples at either end of the range
   /// With at most 640 pixels along the longer side. Absent: not measured (older sessions).
   std::optional<EdgeBlur> edge_blur = {};
 };
@@ -65,16 +65,16 @@ struct FrameQuality {
 struct FrameRecord {
   Modality modality = Modality::visible;
   std::string device;
-  std::string file;                     ///< relative to the session folder
+  std::string file;  ///< relative to the session folder
   int width = 0, height = 0;
-  std::uint64_t sequence = 0;           ///< position in its device's stream, gaps = lost frames
-  std::int64_t host_time_ns = 0;        ///< UTC epoch; 0 = unknown
-  std::int64_t device_time_ns = 0;      ///< device clock; 0 = unknown
-  std::optional<Station> station;       ///< absent on tracking frames without guidance
-  bool tracking = false;                ///< recorded between stations
-  bool thermal_is_gray = false;         ///< 8-bit thermal: intensities, no temperatures
-  std::vector<std::string> flags;       ///< name(FrameFlag); later versions may know more
-  std::string content_hash;             ///< of the file's bytes
+  std::uint64_t sequence = 0;             ///< position in its device's stream, gaps = lost frames
+  std::int64_t host_time_ns = 0;          ///< UTC epoch; 0 = unknown
+  std::int64_t device_time_ns = 0;        ///< device clock; 0 = unknown
+  std::optional<Station> station;         ///< absent on tracking frames without guidance
+  bool tracking = false;                  ///< recorded between stations
+  bool thermal_is_gray = false;           ///< 8-bit thermal: intensities, no temperatures
+  std::vector<std::string> flags;         ///< name(FrameFlag); later versions may know more
+  std::string content_hash;               ///< of the file's bytes
   std::optional<Rigid3d> cam_from_world;  ///< known pose; all of a session share one world
   std::optional<Camera> camera;           ///< known intrinsics of this frame
   std::string source;                     ///< imported frames: "folder/name" of the original file
@@ -108,15 +108,15 @@ struct EventRecord {
 
 struct Session {
   std::filesystem::path folder;
-  std::string id, created;              ///< created: ISO 8601 UTC
+  std::string id, created;  ///< created: ISO 8601 UTC
   std::map<std::string, std::string> notes;
   std::vector<DeviceInfo> devices;
-  std::vector<FrameRecord> frames;      ///< in recording order
+  std::vector<FrameRecord> frames;  ///< in recording order
   std::vector<GapRecord> gaps;
   std::vector<StreamRecord> streams;
   std::vector<EventRecord> events;
-  bool complete = false;                ///< the recorder closed it properly
-  std::vector<std::string> warnings;    ///< e.g. a cut last manifest line, a missing file
+  bool complete = false;              ///< the recorder closed it properly
+  std::vector<std::string> warnings;  ///< e.g. a cut last manifest line, a missing file
 
   std::filesystem::path path_of(const FrameRecord& frame) const { return folder / frame.file; }
   const DeviceInfo* device(const std::string& id) const;

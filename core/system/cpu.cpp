@@ -15,8 +15,8 @@
 namespace orbitfuse {
 namespace {
 
-/// arch_prctl(ARCH_REQ_XCOMP_PERM, XFEATURE_XTILEDATA), for all threads of the process; see the Linux
-/// documentation's arch/x86/xstate.
+/// arch_prctl(ARCH_REQ_XCOMP_PERM, XFEATURE_XTILEDATA), for all threads of the process; see the
+/// Linux documentation's arch/x86/xstate.
 bool request_tiles() {
   constexpr int arch_req_xcomp_perm = 0x1023;
   constexpr int xfeature_xtiledata = 18;
@@ -65,7 +65,8 @@ Status check_isa_wish() {
 Isa best_isa(const CpuFeatures& features, std::string_view wanted, bool (*permit_tiles)()) {
   Isa isa = Isa::avx2;
   if (features.avx512) isa = features.avx512_bf16 ? Isa::avx512bf16 : Isa::avx512;
-  if (isa == Isa::avx512bf16 && features.amx_tile && features.amx_bf16 && features.tile_state) isa = Isa::amx;
+  if (isa == Isa::avx512bf16 && features.amx_tile && features.amx_bf16 && features.tile_state)
+    isa = Isa::amx;
   for (Isa candidate : {Isa::avx2, Isa::avx512, Isa::avx512bf16, Isa::amx})
     if (wanted == name(candidate)) isa = std::min(isa, candidate);
   return isa == Isa::amx && !permit_tiles() ? Isa::avx512bf16 : isa;

@@ -20,8 +20,9 @@ struct CpuFeatures {
   bool amx_tile = false, amx_bf16 = false;  ///< CPUID leaf 7
   bool tile_state = false;                  ///< the kernel saves tiles (XCR0 bits 17 and 18)
 };
-/// best_isa() of such a machine; `wanted` as ORBITFUSE_ISA, `permit_tiles` asks the kernel for the tile
-/// registers (Linux hands them out on request only) and is called only where they would be used.
+/// best_isa() of such a machine; `wanted` as ORBITFUSE_ISA, `permit_tiles` asks the kernel for the
+/// tile registers (Linux hands them out on request only) and is called only where they would be
+/// used.
 Isa best_isa(const CpuFeatures& features, std::string_view wanted, bool (*permit_tiles)());
 const char* name(Isa isa);
 /// False on a processor below the AVX2 baseline; main() then refuses to start.

@@ -44,11 +44,12 @@ tl::unexpected<Error> write_failure(const fs::path& path, int error) {
   std::error_code ignored;
   const auto space = fs::space(path.parent_path(), ignored);
   const std::string free =
-      ignored ? "" : fmt::format(" ({:.1f} MiB free)", static_cast<double>(space.available) / 1048576.0);
+      ignored ? ""
+              : fmt::format(" ({:.1f} MiB free)", static_cast<double>(space.available) / 1048576.0);
   const bool full = error == ENOSPC || error == EDQUOT || error == EFBIG;
-  return fail(ErrorKind::device, path.string(),
-              std::string("cannot write: ") + std::strerror(error) + free,
-              full ? "free disk space or choose another folder" : "check the folder and its permissions");
+  return fail(
+      ErrorKind::device, path.string(), std::string("cannot write: ") + std::strerror(error) + free,
+      full ? "free disk space or choose another folder" : "check the folder and its permissions");
 }
 
 bool write_all(int fd, std::string_view bytes) {
@@ -68,7 +69,8 @@ const char* kind_of(mode_t mode) {
   return "not a file";
 }
 
-/// Opened for reading, and what the system says of it. Without O_NONBLOCK a pipe would be waited for.
+/// Opened for reading, and what the system says of it. Without O_NONBLOCK a pipe would be waited
+/// for.
 Result<Descriptor> open_regular(const fs::path& path, struct stat& info) {
   Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (file.get() < 0) {
@@ -82,13 +84,16 @@ Result<Descriptor> open_regular(const fs::path& path, struct stat& info) {
 
 tl::unexpected<Error> too_large(const fs::path& path, std::uint64_t size, std::uint64_t at_most) {
   constexpr double mebibyte = 1 << 20;
-  return fail(ErrorKind::input, path.string(),
-              fmt::format("{:.0f} MiB, at most {:.0f} MiB are read", static_cast<double>(size) / mebibyte,
-                          static_cast<double>(at_most) / mebibyte),
-              "is it the file you mean?");
+  return fail(
+      ErrorKind::input, path.string(),
+      fmt::format("{:.0f} MiB, at most {:.0f} MiB are read", static_cast<double>(size) / mebibyte,
+                  static_cast<double>(at_most) / mebibyte),
+      "is it the file you mean?");
 }
 
-std::string hex(XXH128_hash_t hash) { return fmt::format("{:016x}{:016x}", hash.high64, hash.low64); }
+std::string hex(XXH128_hash_t hash) {
+  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+}
 
 /// Bytes read, 0 at the end, -1 on an error.
 ssize_t read_some(int fd, char* to, std::size_t count) {
@@ -149,12 +154,15 @@ Status write_file_atomic(const fs::path& path, std::string_view bytes) {
   return sync_folder(folder);
 }
 
-std::string content_hash(std::string_view bytes) { return hex(XXH3_128bits(bytes.data(), bytes.size())); }
+std::string content_hash(std::string_view bytes) {
+  return hex(XXH3_128bits(bytes.data(), bytes.size()));
+}
 
 Result<std::string> file_hash(const fs::path& path) {
   struct stat info {};
   ORBITFUSE_ASSIGN(const Descriptor file, open_regular(path, info));
-  const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(), &XXH3_freeState);
+  const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(),
+                                                                       &XXH3_freeState);
   XXH3_128bits_reset(state.get());
   std::string piece(1 << 20, '\0');
   for (;;) {

@@ -13,14 +13,15 @@ namespace orbitfuse {
 
 /// A file is read whole, so its size is bounded by what it may sensibly hold: a name that leads to
 /// something endless (a device, a sparse file) must cost neither the memory nor the time.
-inline constexpr std::uint64_t max_file_bytes = 2ull << 30;     ///< anything: a cloud, a field
+inline constexpr std::uint64_t max_file_bytes = 2ull << 30;  ///< anything: a cloud, a field
 inline constexpr std::uint64_t max_image_bytes = 1ull << 30;
-inline constexpr std::uint64_t max_text_bytes = 256ull << 20;   ///< poses of many frames
-inline constexpr std::uint64_t max_settings_bytes = 4ull << 20; ///< configurations, sidecars
+inline constexpr std::uint64_t max_text_bytes = 256ull << 20;    ///< poses of many frames
+inline constexpr std::uint64_t max_settings_bytes = 4ull << 20;  ///< configurations, sidecars
 
 /// Whole file as bytes. Input error naming the file when it is missing or unreadable, when it is no
 /// regular file (a folder, a device, a pipe) and when it is larger than `at_most`: before reading.
-Result<std::string> read_file(const std::filesystem::path& path, std::uint64_t at_most = max_file_bytes);
+Result<std::string> read_file(const std::filesystem::path& path,
+                              std::uint64_t at_most = max_file_bytes);
 
 /// Writes to a temporary beside the target, fsyncs, renames, fsyncs the folder: readers see the
 /// old content or the new, never a part. Creates missing parent folders. Device error (with the

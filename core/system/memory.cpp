@@ -16,7 +16,8 @@ void keep_freed_memory() {
 void advise_huge_pages(void* begin, std::size_t bytes) {
   constexpr std::uintptr_t page = std::uintptr_t{2} << 20;
   const auto address = reinterpret_cast<std::uintptr_t>(begin);
-  const std::uintptr_t first = (address + page - 1) / page * page, end = (address + bytes) / page * page;
+  const std::uintptr_t first = (address + page - 1) / page * page,
+                       end = (address + bytes) / page * page;
   if (first < end) madvise(reinterpret_cast<void*>(first), end - first, MADV_HUGEPAGE);
 }
 

@@ -11,8 +11,8 @@ namespace orbitfuse {
 /// of a fusion. Once, from main().
 void keep_freed_memory();
 
-/// Asks the kernel for pages of 2 MB where it has them: tables that are read in random order miss the
-/// TLB otherwise. For memory not written to yet; only advice, errors don't matter.
+/// Asks the kernel for pages of 2 MB where it has them: tables that are read in random order miss
+/// the TLB otherwise. For memory not written to yet; only advice, errors don't matter.
 void advise_huge_pages(void* begin, std::size_t bytes);
 
 /// Room for `count` values on huge pages; before the vector is filled.

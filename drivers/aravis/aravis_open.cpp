@@ -101,7 +101,8 @@ Status AravisSource::open() {
     }
     link->stream = arv_camera_create_stream(link->camera, prefer_receiving, nullptr, &error);
     if (!link->stream)
-      return fail(ErrorKind::device, where, take_text(error), "check the network (orbitfuse doctor)");
+      return fail(ErrorKind::device, where, take_text(error),
+                  "check the network (orbitfuse doctor)");
     // Aravis gives a frame 200 ms for its resent packets; a loaded host needs longer now and then.
     if (ARV_IS_GV_STREAM(link->stream))
       g_object_set(link->stream, "frame-retention", 300'000u, nullptr);

@@ -111,7 +111,8 @@ Delivery AravisSource::take(void* handle) {
   silent_told_ = false;
   const std::int64_t utc_ns = arrival_of(buffer);
   const Arrival arrival{utc_ns, Clock::now() - std::chrono::nanoseconds(wall_ns() - utc_ns)};
-  Delivery delivery = state_ == State::proving ? come_back(buffer, arrival) : inspect(buffer, arrival);
+  Delivery delivery =
+      state_ == State::proving ? come_back(buffer, arrival) : inspect(buffer, arrival);
   arv_stream_push_buffer(link_->stream, buffer);
   // Late packets make one such frame; a camera that counts from 1 again makes nothing else.
   if (duplicates_in_a_row_ >= 3) return lose("the camera's frame numbers restarted; reopening it");
@@ -161,8 +162,9 @@ Delivery AravisSource::inspect(void* handle, const Arrival& arrival) {
   next_id_ = delivery.frame.id + 1;
   last_number_ = number;
   last_came_ = arrival.at;
-  rhythm_.note(delivery.frame.id,
-               std::chrono::duration_cast<std::chrono::nanoseconds>(arrival.at.time_since_epoch()).count());
+  rhythm_.note(
+      delivery.frame.id,
+      std::chrono::duration_cast<std::chrono::nanoseconds>(arrival.at.time_since_epoch()).count());
   delivery.kind = Delivery::Kind::rejected;
   delivery.reason = damage(buffer);
   if (!delivery.reason.empty()) return delivery;
@@ -177,7 +179,8 @@ Delivery AravisSource::inspect(void* handle, const Arrival& arrival) {
   const ClockMap::Stamp stamp = clock_.add(frame.device_time_ns, arrival.utc_ns);
   frame.host_time_ns = stamp.host_time_ns;
   if (stamp.event) pending_.push_back(event_delivery(EventKind::clock, *stamp.event));
-  cv::Mat(link_->height, link_->width, format.cv_type, const_cast<void*>(data)).copyTo(frame.pixels);
+  cv::Mat(link_->height, link_->width, format.cv_type, const_cast<void*>(data))
+      .copyTo(frame.pixels);
   if (options_.modality == Modality::thermal && freeze_.mark(frame, data, needed, arrival.at))
     pending_.push_back(event_delivery(EventKind::nuc, "the image is frozen"));
   if (format.bytes == 1) {
@@ -250,8 +253,8 @@ StreamStatistics AravisSource::link_statistics() const {
   const auto info = [&](const char* key) {
     return arv_stream_get_info_uint64_by_name(link_->stream, key);
   };
-  return {info("n_completed_buffers"), info("n_failures"),        info("n_underruns"),
-          info("n_resent_packets"),    info("n_size_mismatch_errors")};
+  return {info("n_completed_buffers"), info("n_failures"), info("n_underruns"),
+          info("n_resent_packets"), info("n_size_mismatch_errors")};
 }
 
 }  // namespace orbitfuse::aravis

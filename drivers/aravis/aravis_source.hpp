@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "capture/clock/clock_map.hpp"
-#include "capture/recording/frame_rhythm.hpp"
 #include "capture/frame_source.hpp"
+#include "capture/recording/frame_rhythm.hpp"
 #include "capture/recording/freeze_watch.hpp"
 #include "capture/recording/lasting_failure.hpp"
 #include "capture/recording/raw_counts.hpp"
@@ -26,11 +26,11 @@ struct AravisOptions {
   std::string camera;                  ///< IP address, serial or Aravis id; empty: the first found
   std::string device_id = "thermal0";  ///< key in the session
   Modality modality = Modality::thermal;
-  std::filesystem::path profiles;      ///< folder of camera profiles (config/cameras)
-  std::string profile;                 ///< a profile by name; empty: by model
-  int buffers = 24;                    ///< 0.8 s at 30 Hz: rides over a slow moment of the host
+  std::filesystem::path profiles;          ///< folder of camera profiles (config/cameras)
+  std::string profile;                     ///< a profile by name; empty: by model
+  int buffers = 24;                        ///< 0.8 s at 30 Hz: rides over a slow moment of the host
   std::chrono::milliseconds silence{400};  ///< told as "silent" after this long without a frame
-  std::chrono::milliseconds give_up{1000}; ///< and reopened after this long
+  std::chrono::milliseconds give_up{1000};    ///< and reopened after this long
   std::chrono::milliseconds nuc_settle{500};  ///< frames right after a shutter freeze still drift
   /// After two reopenings without a frame the next one waits this long, then twice as long each
   /// time up to the most: a camera that is opened again and again may never come up.
@@ -47,11 +47,12 @@ struct StreamStatistics {
 
 /// A GigE Vision camera. Aravis calls some damaged frames good, so every frame is checked for its
 /// data size, width, height, pixel format and Aravis' own mismatch counter; ids are counted here
-/// (16 bits, never 0); silence of the stream or of the control channel is told within half a second.
-/// A lost camera is torn down on another thread; when that is over it is probed for, reopened, and
-/// its settings pushed and verified again. It is back with its first frame. Frozen (bit-equal)
-/// frames are flagged nuc. Ids leave room for the frames that an outage cost, so that they count as
-/// lost: by the camera's own numbers where these went on, else by the outage's length.
+/// (16 bits, never 0); silence of the stream or of the control channel is told within half a
+/// second. A lost camera is torn down on another thread; when that is over it is probed for,
+/// reopened, and its settings pushed and verified again. It is back with its first frame. Frozen
+/// (bit-equal) frames are flagged nuc. Ids leave room for the frames that an outage cost, so that
+/// they count as lost: by the camera's own numbers where these went on, else by the outage's
+/// length.
 class AravisSource final : public FrameSource {
  public:
   explicit AravisSource(AravisOptions options);
@@ -110,29 +111,29 @@ class AravisSource final : public FrameSource {
     int width = 0, height = 0;
     unsigned pixel_format = 0;
   };
-  std::optional<Image> first_image_;   ///< a session keeps its size
+  std::optional<Image> first_image_;  ///< a session keeps its size
   std::jthread control_watch_;
   std::atomic<bool> control_mute_{false}, correction_wanted_{false};
-  StreamStatistics earlier_;           ///< of connections that are gone
+  StreamStatistics earlier_;  ///< of connections that are gone
   std::vector<std::uint16_t> table_;
   std::vector<Delivery> pending_;
-  mutable std::mutex info_mutex_;      ///< others ask while a camera reopens
+  mutable std::mutex info_mutex_;  ///< others ask while a camera reopens
   DeviceInfo info_;
-  Status correctable_;                 ///< why not, where it isn't
+  Status correctable_;  ///< why not, where it isn't
   std::string address_;
   GvspFrameCounter counter_;
   ClockMap clock_;
   RawCounts raw_counts_;
   FreezeWatch freeze_;
-  std::uint16_t last_number_ = 0;      ///< the camera's, of the last frame
-  LastingFailure failure_;             ///< to reopen
+  std::uint16_t last_number_ = 0;  ///< the camera's, of the last frame
+  LastingFailure failure_;         ///< to reopen
   std::uint64_t base_id_ = 0, next_id_ = 0, mismatches_ = 0;
-  FrameRhythm rhythm_;                 ///< tells how many frames an outage cost
+  FrameRhythm rhythm_;  ///< tells how many frames an outage cost
   int duplicates_in_a_row_ = 0;
   State state_ = State::streaming;
   bool silent_told_ = false, mute_told_ = false;
-  int fruitless_ = 0;                  ///< reopenings of this outage without a frame
-  Clock::time_point last_frame_{};     ///< or the opening of its connection
+  int fruitless_ = 0;                               ///< reopenings of this outage without a frame
+  Clock::time_point last_frame_{};                  ///< or the opening of its connection
   Clock::time_point last_came_{}, next_attempt_{};  ///< last_came_: of a frame, by its first packet
 };
 

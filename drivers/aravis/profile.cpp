@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "drivers/aravis/profile.hpp"
 
+#include <toml++/toml.h>
 #include <algorithm>
 #include <array>
-#include <toml++/toml.h>
 
 namespace orbitfuse::aravis {
 namespace {
@@ -16,7 +16,8 @@ tl::unexpected<Error> bad(const fs::path& file, const std::string& key, const st
 }
 
 Result<CameraProfile> profile_of(const toml::table& table, const fs::path& file) {
-  constexpr std::array<std::string_view, 6> known{"name", "models", "settings", "scale", "kelvin_per_dn", "nuc_command"};
+  constexpr std::array<std::string_view, 6> known{"name",  "models",        "settings",
+                                                  "scale", "kelvin_per_dn", "nuc_command"};
   for (const auto& [key, value] : table) {
     if (std::find(known.begin(), known.end(), key.str()) == known.end()) {
       return bad(file, std::string(key.str()), "unknown key",
@@ -31,9 +32,12 @@ Result<CameraProfile> profile_of(const toml::table& table, const fs::path& file)
     for (const auto& model : *models) profile.models.push_back(model.value_or(std::string()));
   }
   const std::string scale = table["scale"].value_or(std::string("none"));
-  if (scale == "linear") profile.scale = SampleScale::linear;
-  else if (scale == "radiometric") profile.scale = SampleScale::radiometric;
-  else if (scale != "none") return bad(file, "scale", scale, "one of none, linear, radiometric");
+  if (scale == "linear")
+    profile.scale = SampleScale::linear;
+  else if (scale == "radiometric")
+    profile.scale = SampleScale::radiometric;
+  else if (scale != "none")
+    return bad(file, "scale", scale, "one of none, linear, radiometric");
   if (profile.scale == SampleScale::linear && !(profile.kelvin_per_dn > 0)) {
     return bad(file, "kelvin_per_dn", "missing", "scale = \"linear\" needs it, e.g. 0.01");
   }
@@ -42,16 +46,22 @@ Result<CameraProfile> profile_of(const toml::table& table, const fs::path& file)
   if (!settings) return profile;
   for (const auto& entry : *settings) {
     const auto* pair = entry.as_table();
-    if (!pair || pair->size() != 1) return bad(file, "settings", "not a list of {Feature = value}", "write [{Width = 640}, ...]");
+    if (!pair || pair->size() != 1)
+      return bad(file, "settings", "not a list of {Feature = value}", "write [{Width = 640}, ...]");
     const auto first = pair->begin();
     const toml::key& feature = first->first;
     const toml::node& value = first->second;
     FeatureValue setting;
-    if (auto b = value.value_exact<bool>()) setting = *b;
-    else if (auto i = value.value_exact<std::int64_t>()) setting = *i;
-    else if (auto d = value.value_exact<double>()) setting = *d;
-    else if (auto s = value.value_exact<std::string>()) setting = *s;
-    else return bad(file, std::string(feature.str()), "not a value", "a boolean, number or string");
+    if (auto b = value.value_exact<bool>())
+      setting = *b;
+    else if (auto i = value.value_exact<std::int64_t>())
+      setting = *i;
+    else if (auto d = value.value_exact<double>())
+      setting = *d;
+    else if (auto s = value.value_exact<std::string>())
+      setting = *s;
+    else
+      return bad(file, std::string(feature.str()), "not a value", "a boolean, number or string");
     profile.settings.emplace_back(std::string(feature.str()), setting);
   }
   return profile;
@@ -93,13 +103,15 @@ Result<CameraProfile> named_profile(const fs::path& folder, const std::string& n
 
 Result<CameraProfile> find_profile(const fs::path& folder, const std::string& model) {
   const std::vector<fs::path> files = profile_files(folder);
-  Result<CameraProfile> generic = fail(ErrorKind::input, folder.string(), "no profile for \"" + model + "\" and no generic one",
-                                       "restore config/cameras/generic.toml");
+  Result<CameraProfile> generic =
+      fail(ErrorKind::input, folder.string(), "no profile for \"" + model + "\" and no generic one",
+           "restore config/cameras/generic.toml");
   for (const fs::path& file : files) {
     ORBITFUSE_ASSIGN(CameraProfile profile, read_profile(file));
-    const bool fits = std::any_of(profile.models.begin(), profile.models.end(), [&](const std::string& part) {
-      return !part.empty() && model.find(part) != std::string::npos;
-    });
+    const bool fits =
+        std::any_of(profile.models.begin(), profile.models.end(), [&](const std::string& part) {
+          return !part.empty() && model.find(part) != std::string::npos;
+        });
     if (fits) return profile;
     if (profile.name == "generic") generic = profile;
   }

@@ -24,11 +24,11 @@ using FeatureValue = std::variant<bool, std::int64_t, double, std::string>;
 /// verified, also after a reconnection.
 struct CameraProfile {
   std::string name;
-  std::vector<std::string> models;   ///< substrings of the model name that it is for
+  std::vector<std::string> models;  ///< substrings of the model name that it is for
   std::vector<std::pair<std::string, FeatureValue>> settings;
   SampleScale scale = SampleScale::none;
   double kelvin_per_dn = 0;
-  std::string nuc_command;           ///< empty: the camera has none
+  std::string nuc_command;  ///< empty: the camera has none
 };
 
 /// A profile file; an unknown key is an error that names it.

@@ -13,22 +13,28 @@ namespace orbitfuse::aravis {
 
 Status PlanckParameters::validate() const {
   const std::array<std::pair<const char*, bool>, 7> checks{
-      {{"R", r > 0}, {"B", b > 0}, {"J1", j1 != 0 && std::isfinite(j1)},
+      {{"R", r > 0},
+       {"B", b > 0},
+       {"J1", j1 != 0 && std::isfinite(j1)},
        {"ObjectEmissivity", emissivity > 0 && emissivity <= 1},
        {"ReflectedTemperature", reflected_k > 0},
        {"transmission", transmission > 0 && transmission <= 1},
        {"AtmosphericTemperature", atmosphere_k > 0}}};
   for (const auto& [field, good] : checks) {
-    if (!good) return fail(ErrorKind::device, field, "a value without physical meaning", "check the camera's calibration nodes");
+    if (!good)
+      return fail(ErrorKind::device, field, "a value without physical meaning",
+                  "check the camera's calibration nodes");
   }
-  if (!std::isfinite(f) || !std::isfinite(j0)) return fail(ErrorKind::device, "F, J0", "not finite", "check the camera");
+  if (!std::isfinite(f) || !std::isfinite(j0))
+    return fail(ErrorKind::device, "F, J0", "not finite", "check the camera");
   return {};
 }
 
 std::vector<std::uint16_t> linear_table(double kelvin_per_dn) {
   std::vector<std::uint16_t> table(65536);
   for (std::size_t dn = 0; dn < table.size(); ++dn) {
-    table[dn] = centikelvin_from_kelvin(static_cast<float>(kelvin_per_dn * static_cast<double>(dn)));
+    table[dn] =
+        centikelvin_from_kelvin(static_cast<float>(kelvin_per_dn * static_cast<double>(dn)));
   }
   return table;
 }
@@ -40,9 +46,11 @@ Result<std::vector<std::uint16_t>> planck_table(const PlanckParameters& p) {
   const double atmosphere = (1 - p.transmission) * signal(p.atmosphere_k);
   std::vector<std::uint16_t> table(65536);
   for (std::size_t raw = 0; raw < table.size(); ++raw) {
-    const double s = ((static_cast<double>(raw) - p.j0) / p.j1 - reflected - atmosphere) / (p.emissivity * p.transmission);
+    const double s = ((static_cast<double>(raw) - p.j0) / p.j1 - reflected - atmosphere) /
+                     (p.emissivity * p.transmission);
     const double argument = p.r / s + p.f;
-    if (s > 0 && argument > 1) table[raw] = centikelvin_from_kelvin(static_cast<float>(p.b / std::log(argument)));
+    if (s > 0 && argument > 1)
+      table[raw] = centikelvin_from_kelvin(static_cast<float>(p.b / std::log(argument)));
   }
   return table;
 }

@@ -9,8 +9,8 @@
 
 #include "capture/recording/resumed_event.hpp"
 #include "capture/recording/resumed_ids.hpp"
-#include "core/system/file_io.hpp"
 #include "core/image/image_codec.hpp"
+#include "core/system/file_io.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -26,8 +26,9 @@ class ReplaySource : public FrameSource {
       if (frame.device == device) records_.push_back(frame);
     }
     // The manifest has the order in which frames reached the disk; a stream has that of its ids.
-    std::stable_sort(records_.begin(), records_.end(),
-                     [](const FrameRecord& a, const FrameRecord& b) { return a.sequence < b.sequence; });
+    std::stable_sort(
+        records_.begin(), records_.end(),
+        [](const FrameRecord& a, const FrameRecord& b) { return a.sequence < b.sequence; });
     session_.frames.clear();
   }
 
@@ -35,8 +36,8 @@ class ReplaySource : public FrameSource {
 
   Status start() override {
     if (records_.empty()) {
-      return fail(ErrorKind::input, session_.folder.string(), "no frames of device \"" + device_.id + "\"",
-                  "choose a device of the session");
+      return fail(ErrorKind::input, session_.folder.string(),
+                  "no frames of device \"" + device_.id + "\"", "choose a device of the session");
     }
     next_ = 0;
     started_ = Clock::now();
@@ -44,7 +45,8 @@ class ReplaySource : public FrameSource {
   }
 
   /// Goes on after the last frame that the earlier recording has, in that recording's count.
-  bool resume(const DeviceInfo&, const std::vector<FrameRecord>& frames, std::uint64_t next_id) override {
+  bool resume(const DeviceInfo&, const std::vector<FrameRecord>& frames,
+              std::uint64_t next_id) override {
     std::map<std::pair<std::string, std::int64_t>, std::uint64_t> recorded;
     for (const FrameRecord& frame : frames)
       recorded[{frame.content_hash, frame.host_time_ns}] = frame.sequence;
@@ -74,7 +76,8 @@ class ReplaySource : public FrameSource {
       if (!wait_for(record, timeout)) return delivery;  // kind timeout
       ++next_;
       load(record, delivery);
-      if (delivery.kind == Delivery::Kind::rejected && ids_.settled(record.sequence)) continue;  // lost then, too
+      if (delivery.kind == Delivery::Kind::rejected && ids_.settled(record.sequence))
+        continue;  // lost then, too
       delivery.frame.id = ids_.give(record.sequence);
       return delivery;
     }
@@ -89,8 +92,8 @@ class ReplaySource : public FrameSource {
   /// False when the frame's moment is further away than the timeout.
   bool wait_for(const FrameRecord& record, std::chrono::milliseconds timeout) {
     if (speed_ == ReplaySpeed::full || record.host_time_ns == 0) return true;
-    const auto due = started_ + std::chrono::nanoseconds(
-                                    std::max<std::int64_t>(0, record.host_time_ns - records_[first_].host_time_ns));
+    const auto due = started_ + std::chrono::nanoseconds(std::max<std::int64_t>(
+                                    0, record.host_time_ns - records_[first_].host_time_ns));
     const auto deadline = Clock::now() + timeout;
     std::this_thread::sleep_until(std::min(due, deadline));
     return due <= deadline;
@@ -113,10 +116,12 @@ class ReplaySource : public FrameSource {
     delivery.reason.clear();
     frame.encoded = *std::move(bytes);
     const std::filesystem::path file(record.file);
-    const auto counts = session_.folder / file.parent_path() / "originals" / (file.stem().string() + ".tiff");
+    const auto counts =
+        session_.folder / file.parent_path() / "originals" / (file.stem().string() + ".tiff");
     if (record.has_flag(FrameFlag::raw_counts)) {
       if (const Result<std::string> tiff = read_file(counts)) {
-        if (const Result<cv::Mat> original = decode_tiff(*tiff, counts.string())) frame.original = *original;
+        if (const Result<cv::Mat> original = decode_tiff(*tiff, counts.string()))
+          frame.original = *original;
       }
     }
     frame.extension = std::filesystem::path(record.file).extension().string();
@@ -137,19 +142,22 @@ class ReplaySource : public FrameSource {
   std::vector<FrameRecord> records_;
   std::size_t next_ = 0, first_ = 0;  ///< first_: of this recording; waiting counts from it
   ResumedIds ids_;
-  std::optional<Delivery> resumed_;   ///< to be told first
+  std::optional<Delivery> resumed_;  ///< to be told first
   Clock::time_point started_;
 };
 
 }  // namespace
 
-std::unique_ptr<FrameSource> make_replay_source(const Session& session, const std::string& device, ReplaySpeed speed) {
+std::unique_ptr<FrameSource> make_replay_source(const Session& session, const std::string& device,
+                                                ReplaySpeed speed) {
   return std::make_unique<ReplaySource>(session, device, speed);
 }
 
-std::vector<std::unique_ptr<FrameSource>> make_replay_sources(const Session& session, ReplaySpeed speed) {
+std::vector<std::unique_ptr<FrameSource>> make_replay_sources(const Session& session,
+                                                              ReplaySpeed speed) {
   std::vector<std::unique_ptr<FrameSource>> sources;
-  for (const DeviceInfo& device : session.devices) sources.push_back(make_replay_source(session, device.id, speed));
+  for (const DeviceInfo& device : session.devices)
+    sources.push_back(make_replay_source(session, device.id, speed));
   return sources;
 }
 

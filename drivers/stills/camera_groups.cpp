@@ -10,18 +10,21 @@ namespace orbitfuse {
 
 Result<CameraGroup*> CameraGroups::of(StillPhoto& still, const Source& source) {
   const Modality modality = still.camera.modality;
-  const auto& focal = modality == Modality::visible ? options_.visible_focal_px : options_.thermal_focal_px;
+  const auto& focal =
+      modality == Modality::visible ? options_.visible_focal_px : options_.thermal_focal_px;
   if (focal) still.camera.lens.focal_px = focal;
   const std::string key = still.key();
   for (CameraGroup& group : groups_) {
     if (group.modality != modality) continue;
     if (group.key == key) return &group;
     if (focal) {
-      return fail(ErrorKind::input, source.short_name(),
-                  fmt::format("is of {}, but {} of {}", still.described(), group.first_file, group.described),
-                  fmt::format("one focal length of {:g} px is not true of both: import them one by one, "
-                              "or leave the option away",
-                              *focal));
+      return fail(
+          ErrorKind::input, source.short_name(),
+          fmt::format("is of {}, but {} of {}", still.described(), group.first_file,
+                      group.described),
+          fmt::format("one focal length of {:g} px is not true of both: import them one by one, "
+                      "or leave the option away",
+                      *focal));
     }
   }
   groups_.push_back({modality, key, still.described(), source.short_name(), {}, 0});
@@ -43,7 +46,8 @@ std::optional<std::string> CameraGroups::described(Modality modality) const {
   }
   if (list.size() < 2) return std::nullopt;
   return fmt::format(
-      "{}: {} cameras, lenses or image sizes, each calibrated on its own: {}; leave out what is not of this orbit",
+      "{}: {} cameras, lenses or image sizes, each calibrated on its own: {}; leave out what is "
+      "not of this orbit",
       name(modality), list.size(), fmt::join(list, "; "));
 }
 

@@ -26,8 +26,8 @@ struct CameraGroup {
 class CameraGroups {
  public:
   explicit CameraGroups(const ImportOptions& options) : options_(options) {}
-  /// The group of a photo, new when it is the first of its kind. Gives the photo the focal length of
-  /// the options; input error when that can't be true of several groups.
+  /// The group of a photo, new when it is the first of its kind. Gives the photo the focal length
+  /// of the options; input error when that can't be true of several groups.
   Result<CameraGroup*> of(StillPhoto& still, const Source& source);
   std::string next_device_id(Modality modality) const;
   /// A sentence when a modality has several groups.

@@ -13,9 +13,12 @@ int stations_per_loop(const DeclaredStations& declared) {
 
 }  // namespace
 
-int station_count(const DeclaredStations& declared) { return declared.loops * stations_per_loop(declared); }
+int station_count(const DeclaredStations& declared) {
+  return declared.loops * stations_per_loop(declared);
+}
 
-Station station_at(const DeclaredStations& declared, int position, std::optional<double> known_elevation_deg) {
+Station station_at(const DeclaredStations& declared, int position,
+                   std::optional<double> known_elevation_deg) {
   const int per_loop = stations_per_loop(declared);
   Station station;
   station.loop = position / per_loop;

@@ -12,6 +12,7 @@ int station_count(const DeclaredStations& declared);
 
 /// The station of the frame at this position in capture order; an elevation known otherwise serves
 /// where none is declared.
-Station station_at(const DeclaredStations& declared, int position, std::optional<double> known_elevation_deg);
+Station station_at(const DeclaredStations& declared, int position,
+                   std::optional<double> known_elevation_deg);
 
 }  // namespace orbitfuse

@@ -69,7 +69,8 @@ std::string join_segments(std::string_view jpeg) {
       continue;
     }
     if (marker == 0xDA || marker == 0xD9) break;  // image data: no more headers
-    const std::size_t length = static_cast<std::size_t>(static_cast<unsigned char>(jpeg[at + 2])) << 8 |
+    const std::size_t length = static_cast<std::size_t>(static_cast<unsigned char>(jpeg[at + 2]))
+                                   << 8 |
                                static_cast<unsigned char>(jpeg[at + 3]);
     if (length < 2 || at + 2 + length > jpeg.size()) break;
     const std::string_view payload = jpeg.substr(at + 4, length - 2);
@@ -100,7 +101,8 @@ Result<Records> read_directory(std::string_view file, const std::string& where) 
   const auto plausible = [](std::uint32_t version) { return version >= 100 && version < 200; };
   Order order = Order::big;
   if (!plausible(Block(file, Order::big).u32(0x14))) {
-    if (!plausible(Block(file, Order::little).u32(0x14))) return broken(where, "unknown FLIR version");
+    if (!plausible(Block(file, Order::little).u32(0x14)))
+      return broken(where, "unknown FLIR version");
     order = Order::little;
   }
   const Block header(file, order);
@@ -155,7 +157,8 @@ void read_camera_info(std::string_view record, FlirImage& image) {
   const std::int64_t seconds = info.u32(0x384);
   if (seconds > 0) {
     const std::int64_t milliseconds = info.u32(0x388) & 0xffff;
-    image.taken_ns = seconds * 1'000'000'000LL + std::min<std::int64_t>(milliseconds, 999) * 1'000'000LL;
+    image.taken_ns =
+        seconds * 1'000'000'000LL + std::min<std::int64_t>(milliseconds, 999) * 1'000'000LL;
   }
 }
 
@@ -176,7 +179,8 @@ double roughness(const cv::Mat& image) {
   return cv::mean(difference)[0] / std::max(deviation[0], 1e-9);
 }
 
-/// PNGs hold samples in either byte order. CameraInfo's raw median decides; without one, smoothness.
+/// PNGs hold samples in either byte order. CameraInfo's raw median decides; without one,
+/// smoothness.
 cv::Mat in_right_order(const cv::Mat& image, std::string_view camera_record) {
   cv::Mat swapped(image.size(), CV_16UC1);
   for (int y = 0; y < image.rows; ++y) {
@@ -189,16 +193,19 @@ cv::Mat in_right_order(const cv::Mat& image, std::string_view camera_record) {
   const double median = info.u16(0x338);
   const double low = info.u16(0x310), high = info.u16(0x312);
   if (median > 0 && median >= low && median <= high) {
-    return std::abs(median_of(swapped) - median) < std::abs(median_of(image) - median) ? swapped : image;
+    return std::abs(median_of(swapped) - median) < std::abs(median_of(image) - median) ? swapped
+                                                                                       : image;
   }
   return image.cols > 1 && roughness(swapped) < roughness(image) ? swapped : image;
 }
 
-Result<cv::Mat> read_raw_data(std::string_view record, std::string_view camera_record, const std::string& where) {
+Result<cv::Mat> read_raw_data(std::string_view record, std::string_view camera_record,
+                              const std::string& where) {
   const Order order = record_order(record);
   const Block raw(record, order);
   const int width = raw.u16(0x02), height = raw.u16(0x04);
-  if (width == 0 || height == 0 || record.size() < 0x20) return broken(where, "no size in the raw thermal record");
+  if (width == 0 || height == 0 || record.size() < 0x20)
+    return broken(where, "no size in the raw thermal record");
   const std::string_view pixels = record.substr(0x20);
   if (is_jpeg_ls(pixels)) return decode_jpeg_ls(pixels, where + " (raw thermal JPEG-LS)");
   if (image_format(pixels) == ImageFormat::png) {
@@ -206,9 +213,11 @@ Result<cv::Mat> read_raw_data(std::string_view record, std::string_view camera_r
     if (image.type() != CV_16UC1) return broken(where, "the raw thermal PNG is not 16-bit grey");
     return in_right_order(image, camera_record);
   }
-  const std::size_t needed = 2ul * static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  const std::size_t needed =
+      2ul * static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   if (pixels.size() < needed) {
-    return broken(where, fmt::format("raw thermal data of {} bytes, {}x{} needs {}", pixels.size(), width, height, needed));
+    return broken(where, fmt::format("raw thermal data of {} bytes, {}x{} needs {}", pixels.size(),
+                                     width, height, needed));
   }
   cv::Mat image(height, width, CV_16UC1);
   std::memcpy(image.data, pixels.data(), needed);  // always little-endian
@@ -239,7 +248,8 @@ std::vector<std::string_view> flir_recording_frames(std::string_view bytes) {
     const std::string_view rest = bytes.substr(at);
     const auto records = read_directory(rest, "");
     if (!records) break;
-    // The magic may also occur among samples: look for the next frame behind all records of this one.
+    // The magic may also occur among samples: look for the next frame behind all records of this
+    // one.
     std::size_t end = 64;
     for (const auto& [type, record] : records->by_type)
       end = std::max(end, static_cast<std::size_t>(record.data() + record.size() - rest.data()));
@@ -261,7 +271,8 @@ Result<FlirImage> read_flir_file(std::string_view file, const std::string& where
   FlirImage image;
   read_camera_info(info->second, image);
   ORBITFUSE_ASSIGN(image.signal, read_raw_data(raw->second, info->second, where));
-  if (const auto e = records.by_type.find(embedded_image); e != records.by_type.end() && e->second.size() > 0x20) {
+  if (const auto e = records.by_type.find(embedded_image);
+      e != records.by_type.end() && e->second.size() > 0x20) {
     image.embedded_visible = e->second.substr(0x20);
   }
   return image;

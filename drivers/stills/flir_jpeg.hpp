@@ -15,12 +15,12 @@ namespace orbitfuse {
 
 /// What a FLIR radiometric JPEG holds.
 struct FlirImage {
-  cv::Mat signal;                             ///< CV_16UC1, raw sensor counts
+  cv::Mat signal;  ///< CV_16UC1, raw sensor counts
   FlirCalibration calibration;
   std::string camera_model, camera_serial;
   std::optional<double> horizontal_fov_deg;
-  std::optional<std::int64_t> taken_ns;       ///< UTC
-  std::string embedded_visible;               ///< JPEG or PNG file, empty if absent
+  std::optional<std::int64_t> taken_ns;  ///< UTC
+  std::string embedded_visible;          ///< JPEG or PNG file, empty if absent
 };
 
 /// True when the JPEG carries FLIR segments (then read_flir_jpeg says what is in them).

@@ -15,13 +15,15 @@ namespace {
 /// Water vapour in air, g/m3, from relative humidity; polynomial of FLIR's documentation.
 double water_vapour(double relative_humidity, double air_k) {
   const double t = celsius_from_kelvin(air_k);
-  return relative_humidity * std::exp(1.5587 + 0.06939 * t - 0.00027816 * t * t + 0.00000068455 * t * t * t);
+  return relative_humidity *
+         std::exp(1.5587 + 0.06939 * t - 0.00027816 * t * t + 0.00000068455 * t * t * t);
 }
 
 double transmission(const AtmosphereConstants& a, const ObjectParameters& o) {
   const double d = std::sqrt(o.distance_m);
   const double w = std::sqrt(water_vapour(o.relative_humidity, o.atmospheric_k));
-  return a.x * std::exp(-d * (a.alpha1 + a.beta1 * w)) + (1 - a.x) * std::exp(-d * (a.alpha2 + a.beta2 * w));
+  return a.x * std::exp(-d * (a.alpha1 + a.beta1 * w)) +
+         (1 - a.x) * std::exp(-d * (a.alpha2 + a.beta2 * w));
 }
 
 }  // namespace
@@ -50,13 +52,15 @@ Status FlirCalibration::validate(const std::string& where) const {
                                       {"atmosphere X", atmosphere.x, -10, 10}}};
   for (const Range& r : ranges) {
     if (!(r.value >= r.low && r.value <= r.high)) {
-      return fail(ErrorKind::input, where + ": " + r.name, fmt::format("{} is out of range", r.value),
+      return fail(ErrorKind::input, where + ": " + r.name,
+                  fmt::format("{} is out of range", r.value),
                   "the camera did not write it; give the object parameters on import");
     }
   }
   if (const double tau = transmission(atmosphere, object); !(tau > 0.01 && tau <= 1.5)) {
     return fail(ErrorKind::input, where + ": atmosphere",
-                fmt::format("transmission {} at {} m", tau, object.distance_m), "correct the object distance");
+                fmt::format("transmission {} at {} m", tau, object.distance_m),
+                "correct the object distance");
   }
   return {};
 }
@@ -78,7 +82,8 @@ double FlirThermometer::signal_of(double kelvin) const {
 std::vector<double> kelvin_table(const FlirCalibration& calibration) {
   const FlirThermometer thermometer(calibration);
   std::vector<double> table(65536);
-  for (std::size_t s = 0; s < table.size(); ++s) table[s] = thermometer.kelvin(static_cast<std::uint16_t>(s));
+  for (std::size_t s = 0; s < table.size(); ++s)
+    table[s] = thermometer.kelvin(static_cast<std::uint16_t>(s));
   return table;
 }
 

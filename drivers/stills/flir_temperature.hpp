@@ -15,8 +15,8 @@ struct PlanckConstants {
   double o = 0;
 };
 
-/// Transmission of air: tau = X e^(-sqrt(d) (a1 + b1 sqrt(w))) + (1 - X) e^(-sqrt(d) (a2 + b2 sqrt(w)))
-/// with d in metres and w the water vapour content in g/m3.
+/// Transmission of air: tau = X e^(-sqrt(d) (a1 + b1 sqrt(w))) + (1 - X) e^(-sqrt(d) (a2 + b2
+/// sqrt(w))) with d in metres and w the water vapour content in g/m3.
 struct AtmosphereConstants {
   double alpha1 = 0.006569, alpha2 = 0.01262, beta1 = -0.002276, beta2 = -0.00667, x = 1.9;
 };

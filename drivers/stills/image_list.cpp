@@ -23,8 +23,9 @@ std::string extension_of(const fs::path& path) {
 }
 
 bool has_image_extension(Modality modality, const fs::path& path) {
-  constexpr std::array<std::string_view, 9> known{".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp",
-                                                  ".seq", ".csq",  ".fff"};  // the last three: thermal
+  constexpr std::array<std::string_view, 9> known{
+      ".jpg", ".jpeg", ".png", ".tif", ".tiff",
+      ".bmp", ".seq",  ".csq", ".fff"};  // the last three: thermal
   const auto end = modality == Modality::thermal ? known.end() : known.end() - 3;
   return std::find(known.begin(), end, extension_of(path)) != end;
 }
@@ -75,7 +76,8 @@ bool natural_less(const std::string& a, const std::string& b) {
 std::string unread_kind(const fs::path& file) {
   const std::string extension = extension_of(file) + ".";
   for (const UnreadFormat& format : unread_formats) {
-    if (extension.size() > 2 && format.extensions.find(extension) != std::string_view::npos) return format.kind;
+    if (extension.size() > 2 && format.extensions.find(extension) != std::string_view::npos)
+      return format.kind;
   }
   return {};
 }
@@ -96,16 +98,20 @@ Result<ImageList> list_images(Modality modality, const std::vector<fs::path>& pa
     const std::size_t before = files.size(), unread_before = list.unread.size();
     for (const fs::directory_entry& entry : folder) {
       if (!entry.is_regular_file(error)) continue;
-      if (has_image_extension(modality, entry.path())) files.push_back(entry.path());
-      else if (!unread_kind(entry.path()).empty()) list.unread.push_back(entry.path());
+      if (has_image_extension(modality, entry.path()))
+        files.push_back(entry.path());
+      else if (!unread_kind(entry.path()).empty())
+        list.unread.push_back(entry.path());
     }
     if (files.size() == before) {
       const bool other = list.unread.size() > unread_before;
-      return fail(ErrorKind::input, path.string(),
-                  other ? fmt::format("no JPEG, PNG, TIFF or BMP in the folder, but {} of another format ({})",
-                                      list.unread.size() - unread_before, list.unread.back().filename().string())
-                        : "no images (jpg, png, tif, bmp) in the folder",
-                  other ? "convert them to JPEG" : "give the folder that holds the images themselves");
+      return fail(
+          ErrorKind::input, path.string(),
+          other ? fmt::format(
+                      "no JPEG, PNG, TIFF or BMP in the folder, but {} of another format ({})",
+                      list.unread.size() - unread_before, list.unread.back().filename().string())
+                : "no images (jpg, png, tif, bmp) in the folder",
+          other ? "convert them to JPEG" : "give the folder that holds the images themselves");
     }
   }
   std::set<fs::path> seen;

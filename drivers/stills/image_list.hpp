@@ -17,8 +17,8 @@ struct ImageList {
 };
 
 /// Image files named by the paths: files as given, folders without their sub-folders. In natural
-/// name order ("9.jpg" before "10.jpg"). FLIR recordings are thermal images. Input error when a path
-/// is missing or has no images.
+/// name order ("9.jpg" before "10.jpg"). FLIR recordings are thermal images. Input error when a
+/// path is missing or has no images.
 Result<ImageList> list_images(Modality modality, const std::vector<std::filesystem::path>& paths);
 
 /// "HEIC", "video" and the like for the name of a picture or video that is not read; else empty.

@@ -13,8 +13,8 @@
 #include "capture/recording/frame_encoding.hpp"
 #include "capture/recording/session_folder.hpp"
 #include "capture/recording/session_writer.hpp"
-#include "core/system/file_io.hpp"
 #include "core/image/image_codec.hpp"
+#include "core/system/file_io.hpp"
 #include "core/temperature.hpp"
 #include "drivers/stills/camera_groups.hpp"
 #include "drivers/stills/declared_stations.hpp"
@@ -41,20 +41,29 @@ std::optional<Camera> fitted(const Camera& camera, cv::Size size) {
 class Importer {
  public:
   /// Without a writer everything is done but the writing.
-  Importer(const ImportOptions& options, const fs::path& folder, SessionWriter* writer, const Progress& progress)
-      : options_(options), folder_(folder), writer_(writer), progress_(progress), decoder_(options), groups_(options) {}
+  Importer(const ImportOptions& options, const fs::path& folder, SessionWriter* writer,
+           const Progress& progress)
+      : options_(options),
+        folder_(folder),
+        writer_(writer),
+        progress_(progress),
+        decoder_(options),
+        groups_(options) {}
 
   Status run() {
     ORBITFUSE_ASSIGN(known_, read_known_poses(options_));
     ORBITFUSE_ASSIGN(const auto visible_files, visible_sources());
-    ORBITFUSE_ASSIGN(const auto visible_tracking_files, listed(Modality::visible, options_.visible_tracking));
+    ORBITFUSE_ASSIGN(const auto visible_tracking_files,
+                     listed(Modality::visible, options_.visible_tracking));
     ORBITFUSE_ASSIGN(const auto thermal_files, thermal_sources());
-    ORBITFUSE_ASSIGN(const auto thermal_tracking_files, listed(Modality::thermal, options_.thermal_tracking));
+    ORBITFUSE_ASSIGN(const auto thermal_tracking_files,
+                     listed(Modality::thermal, options_.thermal_tracking));
     ORBITFUSE_TRY(check_known(Modality::visible, {&visible_files, &visible_tracking_files}));
     ORBITFUSE_TRY(check_known(Modality::thermal, {&thermal_files, &thermal_tracking_files}));
     ORBITFUSE_TRY(check_disk({&visible_files, &visible_tracking_files}));
     // First every thermal file is looked at: what its samples mean is decided for all of them.
-    std::vector<Source> thermal = observed(thermal_files), thermal_tracking = observed(thermal_tracking_files);
+    std::vector<Source> thermal = observed(thermal_files),
+                        thermal_tracking = observed(thermal_tracking_files);
     ORBITFUSE_TRY(check_object_parameters());
     std::vector<Source> visible = photo_sources(visible_files);
     std::vector<Source> visible_tracking = photo_sources(visible_tracking_files);
@@ -66,7 +75,8 @@ class Importer {
     ORBITFUSE_TRY(add_thermal(in_capture_order(std::move(thermal)), false));
     ORBITFUSE_TRY(add_thermal(in_capture_order(std::move(thermal_tracking)), true));
     if (report_.visible + report_.thermal + report_.tracking == 0) {
-      return fail(ErrorKind::input, "import", first_failure_.empty() ? "no readable image" : first_failure_,
+      return fail(ErrorKind::input, "import",
+                  first_failure_.empty() ? "no readable image" : first_failure_,
                   "give folders with JPEG, PNG or TIFF images");
     }
     return finish();
@@ -79,8 +89,9 @@ class Importer {
     if (paths.empty()) return std::vector<fs::path>{};
     ORBITFUSE_ASSIGN(ImageList list, list_images(modality, paths));
     for (const fs::path& file : list.unread) {
-      report_.warnings.push_back(fmt::format("left out: {}: {} files are not read; convert it to JPEG, PNG or TIFF",
-                                             file.string(), unread_kind(file)));
+      report_.warnings.push_back(
+          fmt::format("left out: {}: {} files are not read; convert it to JPEG, PNG or TIFF",
+                      file.string(), unread_kind(file)));
     }
     return std::move(list.images);
   }
@@ -117,13 +128,15 @@ class Importer {
       for (const fs::path& file : *files) with_pose += known->second.find(file) != nullptr;
     }
     if (images == 0 || with_pose == images) return {};
-    const std::string found = fmt::format("{} of {} images have a pose among the {} given", with_pose, images,
-                                          known->second.all().size());
+    const std::string found = fmt::format("{} of {} images have a pose among the {} given",
+                                          with_pose, images, known->second.all().size());
     if (with_pose == 0)
       return fail(ErrorKind::input, fmt::format("known poses, {}", name(modality)),
-                  fmt::format("{}; the first given is for {}", found, known->second.all().front().file.string()),
+                  fmt::format("{}; the first given is for {}", found,
+                              known->second.all().front().file.string()),
                   "give the poses of these images, or none");
-    report_.warnings.push_back(fmt::format("{}: {}; the others are left to the pose stage", name(modality), found));
+    report_.warnings.push_back(
+        fmt::format("{}: {}; the others are left to the pose stage", name(modality), found));
     return {};
   }
 
@@ -161,19 +174,23 @@ class Importer {
   void take_out_copies(Modality modality, std::initializer_list<std::vector<Source>*> lists) {
     CopyFilter filter(known_[modality]);
     for (std::vector<Source>* sources : lists) {
-      for (std::string& told : filter.take_out(*sources)) report_.warnings.push_back(std::move(told));
+      for (std::string& told : filter.take_out(*sources))
+        report_.warnings.push_back(std::move(told));
     }
   }
 
-  /// Only radiometric JPEGs say what was assumed of the object; temperatures of others are as they are.
+  /// Only radiometric JPEGs say what was assumed of the object; temperatures of others are as they
+  /// are.
   Status check_object_parameters() {
     if (!options_.object.any() || decoder_.radiometric_jpegs() == decoder_.files()) return {};
     const int others = decoder_.files() - decoder_.radiometric_jpegs();
-    const std::string found = fmt::format("emissivity, distance, reflected or air temperature or humidity is given, but "
-                                          "{} of {} thermal files are no radiometric JPEGs",
-                                          others, decoder_.files());
+    const std::string found = fmt::format(
+        "emissivity, distance, reflected or air temperature or humidity is given, but "
+        "{} of {} thermal files are no radiometric JPEGs",
+        others, decoder_.files());
     if (decoder_.radiometric_jpegs() == 0) {
-      return fail(ErrorKind::usage, "import.object", found, "their temperatures can't be corrected: leave it out");
+      return fail(ErrorKind::usage, "import.object", found,
+                  "their temperatures can't be corrected: leave it out");
     }
     report_.warnings.push_back(found + ": their temperatures stay as they are");
     return {};
@@ -250,16 +267,16 @@ class Importer {
 
   void tell_lost_samples(const StillPhoto& still, const Source& source) {
     if (still.without_temperature == 0) return;
-    report_.warnings.push_back(fmt::format("{}: {} of {} samples have no temperature that can be stored (above 0 K, at "
-                                           "most {:.0f} C): dead pixels",
-                                           source.short_name(), still.without_temperature,
-                                           still.size.width * still.size.height,
-                                           celsius_from_kelvin(65535 * still.frame.kelvin_per_count)));
+    report_.warnings.push_back(fmt::format(
+        "{}: {} of {} samples have no temperature that can be stored (above 0 K, at "
+        "most {:.0f} C): dead pixels",
+        source.short_name(), still.without_temperature, still.size.width * still.size.height,
+        celsius_from_kelvin(65535 * still.frame.kelvin_per_count)));
   }
 
   Status add_frame(StillPhoto still, const Source& source, bool tracking,
                    const std::optional<DeclaredStations>& stations) {
-    ORBITFUSE_ASSIGN(CameraGroup* group, groups_.of(still, source));
+    ORBITFUSE_ASSIGN(CameraGroup * group, groups_.of(still, source));
     Frame& frame = still.frame;
     DeviceInfo& device = still.camera;
     frame.source = source.short_name();
@@ -273,7 +290,8 @@ class Importer {
     }
     if (stations && !frame.tracking) {
       const bool priors = options_.ground_truth_priors_only && view;
-      frame.station = station_at(*stations, source.position, priors ? view->elevation_deg : std::nullopt);
+      frame.station =
+          station_at(*stations, source.position, priors ? view->elevation_deg : std::nullopt);
     }
     if (group->id.empty()) {
       group->id = device.id = groups_.next_device_id(device.modality);
@@ -306,9 +324,9 @@ class Importer {
   void apply_known(const KnownView& view, cv::Size size, Frame& frame, DeviceInfo& device) {
     const std::optional<Camera> camera = fitted(view.camera, size);
     if (!camera) {
-      report_.warnings.push_back(fmt::format("{}: {}x{} does not fit its known camera of {}x{}; pose not used",
-                                             frame.source, size.width, size.height, view.camera.width,
-                                             view.camera.height));
+      report_.warnings.push_back(fmt::format(
+          "{}: {}x{} does not fit its known camera of {}x{}; pose not used", frame.source,
+          size.width, size.height, view.camera.width, view.camera.height));
       return;
     }
     if (options_.ground_truth_priors_only) {
@@ -320,7 +338,7 @@ class Importer {
   }
 
   void count(const FrameRecord& record) {
-    int& counter = record.tracking ? report_.tracking
+    int& counter = record.tracking                        ? report_.tracking
                    : record.modality == Modality::visible ? report_.visible
                                                           : report_.thermal;
     ++counter;
@@ -331,27 +349,31 @@ class Importer {
   Status finish() {
     for (const CameraGroup& group : groups_.all()) {
       if (group.frames > 0 && writer_)
-        ORBITFUSE_TRY(writer_->append(StreamRecord{group.id, 0, group.frames - 1, group.frames, 0}));
+        ORBITFUSE_TRY(
+            writer_->append(StreamRecord{group.id, 0, group.frames - 1, group.frames, 0}));
     }
     for (const Modality modality : {Modality::visible, Modality::thermal}) {
-      if (auto several = groups_.described(modality)) report_.warnings.push_back(*std::move(several));
+      if (auto several = groups_.described(modality))
+        report_.warnings.push_back(*std::move(several));
     }
     for (const auto& [modality, stations, frames] :
          {std::tuple(Modality::visible, &options_.visible_stations, report_.visible),
           std::tuple(Modality::thermal, &options_.thermal_stations, report_.thermal)}) {
       if (!*stations || frames == station_count(**stations)) continue;
-      report_.warnings.push_back(
-          fmt::format("{}: {} frames, but {} stations declared", name(modality), frames, station_count(**stations)));
+      report_.warnings.push_back(fmt::format("{}: {} frames, but {} stations declared",
+                                             name(modality), frames, station_count(**stations)));
     }
     if (options_.embedded_visible && embedded_ == 0)
-      report_.warnings.push_back("no thermal image has a photo embedded: there are no visible frames from them");
+      report_.warnings.push_back(
+          "no thermal image has a photo embedded: there are no visible frames from them");
     if (report_.has_temperatures) {
       report_.kelvin_per_count = decoder_.kelvin_per_count();
       for (std::string& remark : decoder_.remarks()) report_.warnings.push_back(std::move(remark));
     }
     if (decoder_.samples_are_raw_counts() && !decoder_.has_temperatures()) {
-      report_.warnings.push_back("thermal samples are raw counts without a known scale: kept as grey intensities, "
-                                 "no temperatures (give their scale if you know it)");
+      report_.warnings.push_back(
+          "thermal samples are raw counts without a known scale: kept as grey intensities, "
+          "no temperatures (give their scale if you know it)");
     }
     return writer_ ? writer_->close() : Status{};
   }

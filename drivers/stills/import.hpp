@@ -24,14 +24,15 @@ enum class ThermalScale {
 
 /// Replaces object parameters written in FLIR radiometric JPEGs. Absent = as in the file.
 struct ObjectParameterOverrides {
-  std::optional<double> emissivity;              ///< 0 < e <= 1
-  std::optional<double> distance_m;              ///< >= 0
+  std::optional<double> emissivity;  ///< 0 < e <= 1
+  std::optional<double> distance_m;  ///< >= 0
   std::optional<double> reflected_temperature_k;
   std::optional<double> atmospheric_temperature_k;
-  std::optional<double> relative_humidity;       ///< 0..1
+  std::optional<double> relative_humidity;  ///< 0..1
 
   bool any() const {
-    return emissivity || distance_m || reflected_temperature_k || atmospheric_temperature_k || relative_humidity;
+    return emissivity || distance_m || reflected_temperature_k || atmospheric_temperature_k ||
+           relative_humidity;
   }
 };
 
@@ -40,8 +41,8 @@ struct ObjectParameterOverrides {
 struct DeclaredStations {
   double spacing_deg = 30;
   int loops = 1;
-  std::vector<double> elevations_deg;   ///< one per loop; empty = unknown (sigma 90)
-  double elevation_sigma_deg = 5;       ///< of the elevations given
+  std::vector<double> elevations_deg;  ///< one per loop; empty = unknown (sigma 90)
+  double elevation_sigma_deg = 5;      ///< of the elevations given
 };
 
 struct ImportOptions {
@@ -69,7 +70,7 @@ struct ImportOptions {
   std::optional<DeclaredStations> visible_stations, thermal_stations;
 
   ThermalScale thermal_scale = ThermalScale::automatic;
-  double kelvin_per_count = 0;     ///< for ThermalScale::linear, which needs it
+  double kelvin_per_count = 0;  ///< for ThermalScale::linear, which needs it
   double kelvin_offset = 0;
   ObjectParameterOverrides object;
 
@@ -80,7 +81,7 @@ struct ImportOptions {
 };
 
 struct ImportReport {
-  Session session;                    ///< as opened again from disk
+  Session session;  ///< as opened again from disk
   int visible = 0, thermal = 0, tracking = 0;
   int with_pose = 0, with_station = 0;
   bool has_temperatures = false;
@@ -91,9 +92,9 @@ struct ImportReport {
 /// Imports into a new session folder (which must not exist or be empty). Photos are copied byte
 /// for byte; thermal images become 16-bit TIFF of one scale for the session, centikelvin unless the
 /// scene is too hot for it (or stay 8-bit grey). A file that can't be read, a copy of another and a
-/// thermal file without temperatures among files that have them is left out with a warning; the import
-/// fails only when nothing is left, and then, or when it is cancelled, leaves nothing behind. What an
-/// import that was killed left in the folder is replaced.
+/// thermal file without temperatures among files that have them is left out with a warning; the
+/// import fails only when nothing is left, and then, or when it is cancelled, leaves nothing
+/// behind. What an import that was killed left in the folder is replaced.
 Result<ImportReport> import_session(const ImportOptions& options,
                                     const std::filesystem::path& session_folder,
                                     const Progress& progress = {});

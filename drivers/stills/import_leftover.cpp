@@ -39,8 +39,9 @@ bool is_cut_import(const fs::path& folder) {
   if (!session || session->complete) return false;
   const auto by = session->notes.find("recorded_by");
   if (by == session->notes.end() || by->second != "import") return false;
-  const bool gone_on_with = std::any_of(session->events.begin(), session->events.end(),
-                                        [](const EventRecord& event) { return event.kind == "resumed"; });
+  const bool gone_on_with =
+      std::any_of(session->events.begin(), session->events.end(),
+                  [](const EventRecord& event) { return event.kind == "resumed"; });
   // An import that still runs holds its manifest.
   return !gone_on_with && SessionWriter::try_resume(folder).has_value();
 }

@@ -24,7 +24,8 @@ Result<cv::Mat> decode_jpeg_ls(std::string_view bytes, const std::string& where)
     decoder.read_header();
     const charls::frame_info frame = decoder.frame_info();
     if (frame.component_count != 1 || frame.bits_per_sample < 9 || frame.bits_per_sample > 16)
-      return damaged(fmt::format("JPEG-LS of {} components with {} bits", frame.component_count, frame.bits_per_sample));
+      return damaged(fmt::format("JPEG-LS of {} components with {} bits", frame.component_count,
+                                 frame.bits_per_sample));
     if (frame.width == 0 || frame.height == 0 || frame.width > 65536 || frame.height > 65536 ||
         1LL * frame.width * frame.height > max_image_samples)
       return damaged(fmt::format("JPEG-LS of {}x{}", frame.width, frame.height));

@@ -25,18 +25,23 @@ fs::path resolve(const fs::path& base, const std::string& name) {
 Status add_transforms(const fs::path& file, std::map<Modality, KnownViews>& known) {
   ORBITFUSE_ASSIGN(const Transforms transforms, read_transforms_json(file));
   for (const TransformsFrame& frame : transforms.frames) {
-    known[Modality::visible].add({resolve(file.parent_path(), frame.file_path), frame.camera, frame.cam_from_world, {}});
+    known[Modality::visible].add(
+        {resolve(file.parent_path(), frame.file_path), frame.camera, frame.cam_from_world, {}});
     if (frame.thermal_file_path) {
-      known[Modality::thermal].add(
-          {resolve(file.parent_path(), *frame.thermal_file_path), frame.camera, frame.cam_from_world, {}});
+      known[Modality::thermal].add({resolve(file.parent_path(), *frame.thermal_file_path),
+                                    frame.camera,
+                                    frame.cam_from_world,
+                                    {}});
     }
   }
   return {};
 }
 
-Status add_colmap(const fs::path& folder, Modality modality, std::map<Modality, KnownViews>& known) {
+Status add_colmap(const fs::path& folder, Modality modality,
+                  std::map<Modality, KnownViews>& known) {
   ORBITFUSE_ASSIGN(const Reconstruction model, read_colmap_model(folder, modality));
-  for (const PosedView& view : model.views) known[modality].add({view.name, view.camera, view.cam_from_world, {}});
+  for (const PosedView& view : model.views)
+    known[modality].add({view.name, view.camera, view.cam_from_world, {}});
   return {};
 }
 
@@ -62,8 +67,10 @@ void KnownViews::add(KnownView view) {
 }
 
 const KnownView* KnownViews::find(const fs::path& file) const {
-  if (const auto same = by_file_.find(canonical_name(file)); same != by_file_.end()) return &views_[same->second];
-  for (const auto& [names, name] : {std::pair{&by_name_, file.filename().string()}, {&by_stem_, file.stem().string()}}) {
+  if (const auto same = by_file_.find(canonical_name(file)); same != by_file_.end())
+    return &views_[same->second];
+  for (const auto& [names, name] :
+       {std::pair{&by_name_, file.filename().string()}, {&by_stem_, file.stem().string()}}) {
     const auto found = names->find(name);
     if (found == names->end()) continue;
     // Ambiguous: no pose is better than a wrong one.
@@ -85,8 +92,8 @@ Result<std::map<Modality, KnownViews>> read_ground_truth_views(const fs::path& f
   std::map<Modality, KnownViews> known;
   for (const auto& [modality, views] : truth.views) {
     for (const TrueView& view : views) {
-      known[modality].add({(file.parent_path() / view.name).lexically_normal(), view.camera, view.cam_from_world,
-                           view.elevation_deg});
+      known[modality].add({(file.parent_path() / view.name).lexically_normal(), view.camera,
+                           view.cam_from_world, view.elevation_deg});
     }
   }
   return known;
@@ -98,8 +105,10 @@ Result<std::map<Modality, KnownViews>> read_known_poses(const ImportOptions& opt
     ORBITFUSE_ASSIGN(known, read_ground_truth_views(*options.ground_truth));
   }
   if (options.transforms_json) ORBITFUSE_TRY(add_transforms(*options.transforms_json, known));
-  if (options.visible_colmap) ORBITFUSE_TRY(add_colmap(*options.visible_colmap, Modality::visible, known));
-  if (options.thermal_colmap) ORBITFUSE_TRY(add_colmap(*options.thermal_colmap, Modality::thermal, known));
+  if (options.visible_colmap)
+    ORBITFUSE_TRY(add_colmap(*options.visible_colmap, Modality::visible, known));
+  if (options.thermal_colmap)
+    ORBITFUSE_TRY(add_colmap(*options.thermal_colmap, Modality::thermal, known));
   return known;
 }
 

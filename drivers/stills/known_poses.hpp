@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "core/geometry/camera.hpp"
+#include "core/geometry/transform.hpp"
 #include "core/modality.hpp"
 #include "core/result.hpp"
-#include "core/geometry/transform.hpp"
 #include "drivers/stills/import.hpp"
 
 namespace orbitfuse {

@@ -35,8 +35,8 @@ std::vector<Source> photo_sources(const std::vector<std::filesystem::path>& file
 }
 
 std::vector<Source> in_capture_order(std::vector<Source> sources) {
-  const bool all_timed =
-      std::all_of(sources.begin(), sources.end(), [](const Source& s) { return s.taken_ns.has_value(); });
+  const bool all_timed = std::all_of(sources.begin(), sources.end(),
+                                     [](const Source& s) { return s.taken_ns.has_value(); });
   if (all_timed) {
     std::stable_sort(sources.begin(), sources.end(),
                      [](const Source& a, const Source& b) { return *a.taken_ns < *b.taken_ns; });
@@ -49,11 +49,13 @@ std::vector<std::string> CopyFilter::take_out(std::vector<Source>& sources) {
   std::vector<std::string> told;
   std::erase_if(sources, [&](const Source& source) {
     if (source.hash.empty()) return false;
-    const auto [first, is_new] = first_.emplace(fmt::format("{}#{}", source.hash, source.page), source);
+    const auto [first, is_new] =
+        first_.emplace(fmt::format("{}#{}", source.hash, source.page), source);
     if (is_new) return false;
     const KnownView* own = known_.find(source.file);
     if (own && own->cam_from_world && own != known_.find(first->second.file)) return false;
-    told.push_back(fmt::format("left out: {}: the same image as {}", source.short_name(), first->second.short_name()));
+    told.push_back(fmt::format("left out: {}: the same image as {}", source.short_name(),
+                               first->second.short_name()));
     return true;
   });
   return told;

@@ -80,7 +80,8 @@ Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& 
     still.camera.model = file.flir->camera_model;
     still.camera.serial = file.flir->camera_serial;
     if (const auto fov = file.flir->horizontal_fov_deg) {
-      still.camera.lens.focal_px = 0.5 * still.size.width / std::tan(0.5 * *fov * std::numbers::pi / 180);
+      still.camera.lens.focal_px =
+          0.5 * still.size.width / std::tan(0.5 * *fov * std::numbers::pi / 180);
       still.lens = fmt::format("{:.1f} degrees", *fov);
     }
   }
@@ -99,15 +100,16 @@ Result<StillPhoto> read_thermal_still(const std::filesystem::path& path, Thermal
 }
 
 std::string StillPhoto::key() const {
-  return fmt::format("{}|{}|{}|{}x{}|{}", camera.model, camera.serial, lens, size.width, size.height,
-                     frame.thermal_is_gray);
+  return fmt::format("{}|{}|{}|{}x{}|{}", camera.model, camera.serial, lens, size.width,
+                     size.height, frame.thermal_is_gray);
 }
 
 std::string StillPhoto::described() const {
   std::string text = camera.model.empty() ? "unknown camera" : camera.model;
   if (!camera.serial.empty()) text += " " + camera.serial;
   if (!lens.empty()) text += ", lens " + lens;
-  return text + fmt::format(", {}x{}{}", size.width, size.height, frame.thermal_is_gray ? ", grey" : "");
+  return text +
+         fmt::format(", {}x{}{}", size.width, size.height, frame.thermal_is_gray ? ", grey" : "");
 }
 
 bool is_radiometric(const std::filesystem::path& file) {

@@ -13,8 +13,8 @@ namespace orbitfuse {
 struct StillPhoto {
   Frame frame;  ///< host time from the file's own clock, 0 if it has none
   DeviceInfo camera;
-  std::string lens;  ///< "4.2 mm (35 mm: 26 mm)", "25.0 degrees"; empty when unknown
-  cv::Size size;     ///< upright
+  std::string lens;             ///< "4.2 mm (35 mm: 26 mm)", "25.0 degrees"; empty when unknown
+  cv::Size size;                ///< upright
   int without_temperature = 0;  ///< samples of a thermal image that none stands for
 
   std::string key() const;        ///< same key: same camera, lens, image size and kind of samples
@@ -26,8 +26,8 @@ double focal_px_of_35mm(double focal_35mm, cv::Size size);
 
 /// The bytes of a photo (JPEG, PNG, TIFF). Input error naming `where` when they don't decode.
 Result<StillPhoto> visible_still(std::string bytes, const std::string& where);
-/// A thermal image turned into counts of temperature, or kept as it is when it is 8-bit; counts without a
-/// scale stay as the frame's original.
+/// A thermal image turned into counts of temperature, or kept as it is when it is 8-bit; counts
+/// without a scale stay as the frame's original.
 Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& decoder,
                                  const std::string& where);
 

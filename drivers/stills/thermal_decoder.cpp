@@ -60,13 +60,17 @@ bool is_plausible(const CountHistogram& histogram, ThermalScaleTag scale) {
   return kelvin_of(percentile(histogram, 5), scale) >= coldest_plausible_k;
 }
 
-tl::unexpected<Error> too_cold(const std::string& where, const CountHistogram& histogram, ThermalScaleTag scale) {
+tl::unexpected<Error> too_cold(const std::string& where, const CountHistogram& histogram,
+                               ThermalScaleTag scale) {
   const double coldest_k = kelvin_of(percentile(histogram, 5), scale);
-  return fail(ErrorKind::input, where,
-              fmt::format("{:g} K per count and an offset of {:g} K make {:.0f} C of its cold part ({:g} K)",
-                          scale.scale, scale.offset, celsius_from_kelvin(coldest_k), coldest_k),
-              "kelvin = scale * count + offset (an offset of -273.15 makes Celsius): correct its tag or sidecar, or "
-              "give --thermal-scale linear with --kelvin-per-count and --kelvin-offset");
+  return fail(
+      ErrorKind::input, where,
+      fmt::format(
+          "{:g} K per count and an offset of {:g} K make {:.0f} C of its cold part ({:g} K)",
+          scale.scale, scale.offset, celsius_from_kelvin(coldest_k), coldest_k),
+      "kelvin = scale * count + offset (an offset of -273.15 makes Celsius): correct its tag or "
+      "sidecar, or "
+      "give --thermal-scale linear with --kelvin-per-count and --kelvin-offset");
 }
 
 constexpr const char* by_themselves =
@@ -81,16 +85,19 @@ Result<ThermalFile> read_thermal_file(const std::filesystem::path& path, std::op
 }
 
 int thermal_page_count(std::string_view bytes) {
-  if (is_flir_recording(bytes)) return std::max(1, static_cast<int>(flir_recording_frames(bytes).size()));
+  if (is_flir_recording(bytes))
+    return std::max(1, static_cast<int>(flir_recording_frames(bytes).size()));
   return image_format(bytes) == ImageFormat::tiff ? std::max(1, tiff_page_count(bytes)) : 1;
 }
 
 namespace {
 
-Result<FlirImage> recorded_image(std::string_view bytes, const std::string& where, std::optional<int> page) {
+Result<FlirImage> recorded_image(std::string_view bytes, const std::string& where,
+                                 std::optional<int> page) {
   const auto frames = flir_recording_frames(bytes);
   if (!page && frames.size() > 1) {
-    return fail(ErrorKind::input, where, fmt::format("a recording of {} images, one expected", frames.size()),
+    return fail(ErrorKind::input, where,
+                fmt::format("a recording of {} images, one expected", frames.size()),
                 "import it: every image becomes a frame");
   }
   const auto index = static_cast<std::size_t>(page.value_or(0));
@@ -99,13 +106,15 @@ Result<FlirImage> recorded_image(std::string_view bytes, const std::string& wher
 
 }  // namespace
 
-Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::path& path, std::optional<int> page) {
+Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::path& path,
+                                 std::optional<int> page) {
   ThermalFile file;
   const std::string where = path.string();
   const bool recording = is_flir_recording(bytes);
   if (recording || is_flir_jpeg(bytes)) {
     file.kind = ThermalFile::Kind::radiometric_jpeg;
-    ORBITFUSE_ASSIGN(file.flir, recording ? recorded_image(bytes, where, page) : read_flir_jpeg(bytes, where));
+    ORBITFUSE_ASSIGN(file.flir,
+                     recording ? recorded_image(bytes, where, page) : read_flir_jpeg(bytes, where));
     file.taken_ns = file.flir->taken_ns;
     return file;
   }
@@ -121,9 +130,10 @@ Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::
     return file;
   }
   if (file.image.type() != CV_16UC1) {
-    return fail(ErrorKind::input, where,
-                fmt::format("{} channels of {} bits", file.image.channels(), 8 * file.image.elemSize1()),
-                "thermal images are 16-bit grey, 8-bit or FLIR radiometric JPEGs");
+    return fail(
+        ErrorKind::input, where,
+        fmt::format("{} channels of {} bits", file.image.channels(), 8 * file.image.elemSize1()),
+        "thermal images are 16-bit grey, 8-bit or FLIR radiometric JPEGs");
   }
   file.kind = ThermalFile::Kind::samples16;
   ORBITFUSE_ASSIGN(file.tag, thermal_scale_of_description(description, where));
@@ -138,10 +148,14 @@ Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::
 
 std::optional<ThermalScaleTag> ThermalDecoder::scale_of(const ThermalFile& file) const {
   switch (options_.thermal_scale) {
-    case ThermalScale::linear: return ThermalScaleTag{options_.kelvin_per_count, options_.kelvin_offset};
-    case ThermalScale::centikelvin: return ThermalScaleTag{};
-    case ThermalScale::raw_counts: return std::nullopt;
-    case ThermalScale::automatic: break;
+    case ThermalScale::linear:
+      return ThermalScaleTag{options_.kelvin_per_count, options_.kelvin_offset};
+    case ThermalScale::centikelvin:
+      return ThermalScaleTag{};
+    case ThermalScale::raw_counts:
+      return std::nullopt;
+    case ThermalScale::automatic:
+      break;
   }
   return file.tag;
 }
@@ -189,7 +203,8 @@ void ThermalDecoder::observe_samples(const ThermalFile& file, const std::string&
 bool ThermalDecoder::samples_are_raw_counts() const { return like_counts_ > like_centikelvin_; }
 
 bool ThermalDecoder::has_temperatures() const {
-  return radiometric_jpegs_ + with_scale_ > 0 || (like_centikelvin_ > 0 && !samples_are_raw_counts());
+  return radiometric_jpegs_ + with_scale_ > 0 ||
+         (like_centikelvin_ > 0 && !samples_are_raw_counts());
 }
 
 double ThermalDecoder::kelvin_per_count() const { return kelvin_per_count_for(hottest_k_); }
@@ -197,22 +212,26 @@ double ThermalDecoder::kelvin_per_count() const { return kelvin_per_count_for(ho
 std::vector<std::string> ThermalDecoder::remarks() const {
   std::vector<std::string> list;
   if (kelvin_per_count() > kelvin_per_dn) {
-    list.push_back(fmt::format("the hottest sample is {:.0f} C, so thermal files hold {:g} K a count, not {:g}; their "
-                               "tag says so",
-                               celsius_from_kelvin(hottest_k_), kelvin_per_count(), kelvin_per_dn));
+    list.push_back(fmt::format(
+        "the hottest sample is {:.0f} C, so thermal files hold {:g} K a count, not {:g}; their "
+        "tag says so",
+        celsius_from_kelvin(hottest_k_), kelvin_per_count(), kelvin_per_dn));
   }
   if (!glowing_.empty()) {
-    list.push_back(fmt::format("half of {} ({} such files) is hotter than 500 C: if it is no furnace, its scale is wrong "
-                               "(--thermal-scale centikelvin, or linear with --kelvin-per-count)",
-                               glowing_.front(), glowing_.size()));
+    list.push_back(fmt::format(
+        "half of {} ({} such files) is hotter than 500 C: if it is no furnace, its scale is wrong "
+        "(--thermal-scale centikelvin, or linear with --kelvin-per-count)",
+        glowing_.front(), glowing_.size()));
   }
   return list;
 }
 
-Result<ThermalDecoder::Converted> ThermalDecoder::convert(const ThermalFile& file, const std::string& where) const {
+Result<ThermalDecoder::Converted> ThermalDecoder::convert(const ThermalFile& file,
+                                                          const std::string& where) const {
   if (file.kind == ThermalFile::Kind::gray8) {
     if (has_temperatures()) {
-      return fail(ErrorKind::input, where, "8-bit without temperatures, among thermal files that have them",
+      return fail(ErrorKind::input, where,
+                  "8-bit without temperatures, among thermal files that have them",
                   "import it by itself, or with --visible if it is a photo");
     }
     Converted out;
@@ -233,12 +252,14 @@ Result<ThermalDecoder::Converted> ThermalDecoder::convert_samples(const ThermalF
   if (scale && !is_plausible(histogram, *scale)) return too_cold(where, histogram, *scale);
   if (!scale && !has_temperatures()) return stretched(file.image);
   if (!scale && (samples_are_raw_counts() || !is_plausible(histogram, {}))) {
-    return fail(ErrorKind::input, where, "16-bit counts without a known scale, among thermal files with temperatures",
+    return fail(ErrorKind::input, where,
+                "16-bit counts without a known scale, among thermal files with temperatures",
                 by_themselves);
   }
   const ThermalScaleTag tag = scale.value_or(ThermalScaleTag{});
   std::vector<double> kelvin(65536, std::nan(""));
-  for (std::size_t dn = 1; dn < kelvin.size(); ++dn) kelvin[dn] = kelvin_of(static_cast<double>(dn), tag);
+  for (std::size_t dn = 1; dn < kelvin.size(); ++dn)
+    kelvin[dn] = kelvin_of(static_cast<double>(dn), tag);
   return stored(file.image, kelvin);
 }
 
@@ -251,15 +272,16 @@ ThermalDecoder::Converted ThermalDecoder::stretched(const cv::Mat& counts) const
   return out;
 }
 
-ThermalDecoder::Converted ThermalDecoder::stored(const cv::Mat& counts, const std::vector<double>& kelvin) const {
+ThermalDecoder::Converted ThermalDecoder::stored(const cv::Mat& counts,
+                                                 const std::vector<double>& kelvin) const {
   Converted out;
   out.kelvin_per_count = kelvin_per_count();
   std::vector<std::uint16_t> table(kelvin.size());
   std::transform(kelvin.begin(), kelvin.end(), table.begin(),
                  [&](double t) { return count_from_kelvin(t, out.kelvin_per_count); });
   out.counts.create(counts.size(), CV_16UC1);
-  std::transform(counts.begin<std::uint16_t>(), counts.end<std::uint16_t>(), out.counts.begin<std::uint16_t>(),
-                 [&](std::uint16_t dn) { return table[dn]; });
+  std::transform(counts.begin<std::uint16_t>(), counts.end<std::uint16_t>(),
+                 out.counts.begin<std::uint16_t>(), [&](std::uint16_t dn) { return table[dn]; });
   // 0 was no sample before either.
   cv::Mat lost = (out.counts == 0) & (counts != 0);
   out.without_temperature = cv::countNonZero(lost);

@@ -18,17 +18,22 @@ namespace orbitfuse {
 
 /// One thermal file, before the session-wide decision what its samples mean.
 struct ThermalFile {
-  enum class Kind { radiometric_jpeg, samples16, gray8 };  ///< the first: any image of a FLIR camera
+  enum class Kind {
+    radiometric_jpeg,
+    samples16,
+    gray8
+  };  ///< the first: any image of a FLIR camera
   Kind kind = Kind::gray8;
-  std::string bytes;                  ///< gray8: the file
+  std::string bytes;  ///< gray8: the file
   std::optional<std::int64_t> taken_ns;
-  cv::Mat image;                      ///< samples16: CV_16UC1; gray8: CV_8U
+  cv::Mat image;  ///< samples16: CV_16UC1; gray8: CV_8U
   std::optional<FlirImage> flir;
-  std::optional<ThermalScaleTag> tag; ///< from the file or its sidecar
+  std::optional<ThermalScaleTag> tag;  ///< from the file or its sidecar
 };
 
 /// Without a page the file must hold a single image.
-Result<ThermalFile> read_thermal_file(const std::filesystem::path& file, std::optional<int> page = {});
+Result<ThermalFile> read_thermal_file(const std::filesystem::path& file,
+                                      std::optional<int> page = {});
 /// The same of bytes that were read from `file`.
 Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::path& file,
                                  std::optional<int> page = {});
@@ -57,13 +62,14 @@ class ThermalDecoder {
   std::vector<std::string> remarks() const;
 
   struct Converted {
-    cv::Mat counts;        ///< of temperature, 0 = invalid; empty for grey
+    cv::Mat counts;  ///< of temperature, 0 = invalid; empty for grey
     double kelvin_per_count = 0.01;
     int without_temperature = 0;  ///< samples that no temperature or stored count stands for
-    cv::Mat gray;          ///< raw counts under one stretch for the session
-    bool keep_bytes = false;  ///< 8-bit file: copy it
+    cv::Mat gray;                 ///< raw counts under one stretch for the session
+    bool keep_bytes = false;      ///< 8-bit file: copy it
   };
-  /// Input error when the file's samples can't be temperatures, or are of another kind than the rest.
+  /// Input error when the file's samples can't be temperatures, or are of another kind than the
+  /// rest.
   Result<Converted> convert(const ThermalFile& file, const std::string& where) const;
 
  private:
@@ -77,9 +83,11 @@ class ThermalDecoder {
   const ImportOptions& options_;
   int files_ = 0, radiometric_jpegs_ = 0, with_scale_ = 0;
   int like_centikelvin_ = 0, like_counts_ = 0;  ///< 16-bit files without a scale
-  CountHistogram counts_ = CountHistogram(65536), centikelvin_ = CountHistogram(65536);  ///< of these
+  CountHistogram counts_ = CountHistogram(65536),
+                 centikelvin_ = CountHistogram(65536);  ///< of these
   double hottest_k_ = 0;
-  std::vector<std::string> glowing_;  ///< files of which one half is hotter than anything but a furnace
+  std::vector<std::string>
+      glowing_;  ///< files of which one half is hotter than anything but a furnace
 };
 
 }  // namespace orbitfuse

@@ -73,7 +73,8 @@ Status WatchSource::start() {
   return reader_->watch.open(options_.existing);
 }
 
-bool WatchSource::resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames, std::uint64_t) {
+bool WatchSource::resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames,
+                         std::uint64_t) {
   const std::lock_guard lock(mutex_);
   const std::string id = info_.id;
   info_ = device;
@@ -100,10 +101,11 @@ std::vector<Delivery> WatchSource::unfinished() {
   const auto unread = [&](const fs::path& file) {
     std::error_code error;
     const bool empty = fs::file_size(file, error) == 0 && !error;
-    list.push_back(event_delivery(EventKind::ignored, file.filename().string() +
-                                        (empty ? ": an empty file"
-                                               : ": not read before the recording ended; go on with "
-                                                 "--resume and existing=yes")));
+    list.push_back(event_delivery(
+        EventKind::ignored,
+        file.filename().string() + (empty ? ": an empty file"
+                                          : ": not read before the recording ended; go on with "
+                                            "--resume and existing=yes")));
   };
   for (const Attempt& attempt : queue_) {
     if (attempt.why.empty())
@@ -112,8 +114,8 @@ std::vector<Delivery> WatchSource::unfinished() {
       list.push_back(rejection(attempt.file.filename().string(), attempt.why));
   }
   for (const fs::path& file : reader_->watch.untold()) {
-    const bool waiting = std::any_of(queue_.begin(), queue_.end(),
-                                     [&](const Attempt& a) { return a.file == file; });
+    const bool waiting =
+        std::any_of(queue_.begin(), queue_.end(), [&](const Attempt& a) { return a.file == file; });
     if (!waiting && has_image_name(file)) unread(file);
   }
   queue_.clear();
@@ -155,11 +157,12 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
   const std::string name = attempt.file.filename().string();
   if (!has_image_name(attempt.file)) {
     return event_delivery(EventKind::ignored,
-                 name + ": not a JPEG, PNG, TIFF or BMP (set the camera to one of these)");
+                          name + ": not a JPEG, PNG, TIFF or BMP (set the camera to one of these)");
   }
   const bool thermal = options_.modality == Modality::thermal;
   const bool radiometric = is_radiometric(attempt.file);
-  if (!thermal && radiometric) return event_delivery(EventKind::ignored, name + ": a thermal image, not a photo");
+  if (!thermal && radiometric)
+    return event_delivery(EventKind::ignored, name + ": a thermal image, not a photo");
   Result<StillPhoto> still = thermal ? read_thermal_still(attempt.file, reader_->decoder)
                                      : read_visible_still(attempt.file);
   Delivery delivery;
@@ -176,7 +179,8 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
     return rejection(name, still.error().found);
   }
   if (thermal && still->frame.thermal_is_gray && !options_.accept_gray) {
-    return event_delivery(EventKind::ignored, name + ": no temperatures in it (gray=yes takes it all the same)");
+    return event_delivery(EventKind::ignored,
+                          name + ": no temperatures in it (gray=yes takes it all the same)");
   }
   const Result<std::string> bytes = read_file(attempt.file, max_image_bytes);
   if (!bytes || !seen_hashes_.insert(content_hash(*bytes)).second) {
@@ -197,8 +201,8 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
     const std::lock_guard lock(mutex_);
     if (resumed_ && (still->camera.model != info_.model || still->camera.serial != info_.serial)) {
       delivery.kind = Delivery::Kind::rejected;
-      delivery.reason = name + ": of " + still->camera.model + " " + still->camera.serial + ", the session's are of " +
-                        info_.model + " " + info_.serial;
+      delivery.reason = name + ": of " + still->camera.model + " " + still->camera.serial +
+                        ", the session's are of " + info_.model + " " + info_.serial;
       return delivery;
     }
     if (camera_key_.empty()) {
@@ -208,9 +212,8 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
       info_.lens = still->camera.lens;
     } else if (still->key() != camera_key_) {
       delivery.kind = Delivery::Kind::rejected;
-      delivery.reason =
-          name + ": another camera, lens or image size than the first (" + still->described() +
-          "; give it a folder of its own)";
+      delivery.reason = name + ": another camera, lens or image size than the first (" +
+                        still->described() + "; give it a folder of its own)";
       return delivery;
     }
   }

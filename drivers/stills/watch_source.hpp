@@ -35,8 +35,8 @@ struct WatchOptions {
 /// name comes once (event "duplicate"); files of the other modality and of other formats are passed
 /// over (event "ignored"), so that one folder can serve a visible and a thermal source. All photos
 /// of one source are of one camera, lens and size, because they share intrinsics: others are
-/// rejected. After resume() neither photos of the earlier recording nor those of another camera come.
-/// Frames carry the flag "still". Files are read, never changed.
+/// rejected. After resume() neither photos of the earlier recording nor those of another camera
+/// come. Frames carry the flag "still". Files are read, never changed.
 class WatchSource final : public FrameSource {
  public:
   explicit WatchSource(WatchOptions options);
@@ -49,7 +49,8 @@ class WatchSource final : public FrameSource {
   void stop() override;
   std::vector<Delivery> unfinished() override;
   bool can_wait() const override { return true; }
-  bool resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames, std::uint64_t next_id) override;
+  bool resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames,
+              std::uint64_t next_id) override;
 
  private:
   struct Reader;
@@ -68,8 +69,9 @@ class WatchSource final : public FrameSource {
   std::string camera_key_;  ///< of the first photo; empty before
   std::deque<Attempt> queue_;
   std::set<std::string> seen_hashes_;
-  std::set<std::pair<std::string, std::int64_t>> seen_files_;  ///< of an earlier recording: name, time
-  bool resumed_ = false;                                       ///< info_ is the session's word
+  std::set<std::pair<std::string, std::int64_t>>
+      seen_files_;        ///< of an earlier recording: name, time
+  bool resumed_ = false;  ///< info_ is the session's word
   std::uint64_t next_id_ = 0;
   bool gone_told_ = false;
 };

@@ -15,15 +15,23 @@ std::vector<Solid> make_car(std::uint64_t seed) {
     next_seed = mix(next_seed);
     parts.push_back(solid.with(material, next_seed));
   };
-  add(Solid::prism({{-2.05, 0.28}, {2.05, 0.26}, {2.12, 0.60}, {1.98, 0.78}, {0.95, 0.93}, {-1.90, 0.98}, {-2.12, 0.72}},
+  add(Solid::prism({{-2.05, 0.28},
+                    {2.05, 0.26},
+                    {2.12, 0.60},
+                    {1.98, 0.78},
+                    {0.95, 0.93},
+                    {-1.90, 0.98},
+                    {-2.12, 0.72}},
                    0.86, 0.08, 0.6),
       Material::paint);
-  add(Solid::prism({{-1.80, 0.93}, {1.00, 0.90}, {0.20, 1.42}, {-1.15, 1.45}}, 0.83, 0.30, 0.93), Material::cabin);
+  add(Solid::prism({{-1.80, 0.93}, {1.00, 0.90}, {0.20, 1.42}, {-1.15, 1.45}}, 0.83, 0.30, 0.93),
+      Material::cabin);
   for (const double x : {1.28, -1.30}) {
     for (const double y : {0.80, -0.80}) {
       const double out = y > 0 ? 1 : -1;
       add(Solid::cylinder({x, y, 0.32}, Vector3d::UnitY(), 0.32, 0.11), Material::tyre);
-      add(Solid::cylinder({x, y + out * 0.015, 0.32}, Vector3d::UnitY(), 0.20, 0.11), Material::rim);
+      add(Solid::cylinder({x, y + out * 0.015, 0.32}, Vector3d::UnitY(), 0.20, 0.11),
+          Material::rim);
     }
   }
   add(Solid::box({2.10, 0, 0.40}, {0.06, 0.78, 0.09}), Material::trim);

@@ -39,7 +39,8 @@ double value_noise(const Eigen::Vector3d& x, std::uint64_t seed) {
   double value = 0;
   for (int k = 0; k < 8; ++k) {
     const int dx = k & 1, dy = k >> 1 & 1, dz = k >> 2;
-    value += (dx ? s.x() : 1 - s.x()) * (dy ? s.y() : 1 - s.y()) * (dz ? s.z() : 1 - s.z()) * corner(dx, dy, dz);
+    value += (dx ? s.x() : 1 - s.x()) * (dy ? s.y() : 1 - s.y()) * (dz ? s.z() : 1 - s.z()) *
+             corner(dx, dy, dz);
   }
   return value;
 }

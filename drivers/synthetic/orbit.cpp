@@ -23,17 +23,19 @@ Status check(bool ok, const std::string& field, double value, const std::string&
 Status OrbitOptions::validate() const {
   ORBITFUSE_TRY(check(width >= 16 && width <= 8192, "width", width, "must be 16 to 8192"));
   ORBITFUSE_TRY(check(height >= 16 && height <= 8192, "height", height, "must be 16 to 8192"));
-  ORBITFUSE_TRY(check(horizontal_fov_deg > 1 && horizontal_fov_deg < 150, "horizontal_fov_deg", horizontal_fov_deg,
-                      "must be 1 to 150"));
+  ORBITFUSE_TRY(check(horizontal_fov_deg > 1 && horizontal_fov_deg < 150, "horizontal_fov_deg",
+                      horizontal_fov_deg, "must be 1 to 150"));
   ORBITFUSE_TRY(check(station_spacing_deg >= 1 && station_spacing_deg <= 180, "station_spacing_deg",
                       station_spacing_deg, "must be 1 to 180"));
   ORBITFUSE_TRY(check(!elevations_deg.empty(), "elevations_deg", 0, "give one elevation per loop"));
-  for (double e : elevations_deg) ORBITFUSE_TRY(check(e > 0 && e < 85, "elevations_deg", e, "must be 0 to 85"));
+  for (double e : elevations_deg)
+    ORBITFUSE_TRY(check(e > 0 && e < 85, "elevations_deg", e, "must be 0 to 85"));
   ORBITFUSE_TRY(check(distance_m >= 4 && distance_m <= 16, "distance_m", distance_m,
                       "must be 4 to 16 (outside the car, inside the buildings)"));
-  ORBITFUSE_TRY(check(tracking_per_station >= 0 && tracking_per_station <= 100, "tracking_per_station",
-                      tracking_per_station, "must be 0 to 100"));
-  for (double jitter : {azimuth_jitter_deg, elevation_jitter_deg, distance_jitter, aim_jitter_deg, roll_jitter_deg}) {
+  ORBITFUSE_TRY(check(tracking_per_station >= 0 && tracking_per_station <= 100,
+                      "tracking_per_station", tracking_per_station, "must be 0 to 100"));
+  for (double jitter : {azimuth_jitter_deg, elevation_jitter_deg, distance_jitter, aim_jitter_deg,
+                        roll_jitter_deg}) {
     ORBITFUSE_TRY(check(jitter >= 0 && jitter <= 30, "jitter", jitter, "must be 0 to 30"));
   }
   return synthetic::camera_of(*this).validate("synthetic camera");
@@ -42,12 +44,16 @@ Status OrbitOptions::validate() const {
 Status SyntheticOptions::validate() const {
   ORBITFUSE_TRY(visible.validate());
   ORBITFUSE_TRY(thermal.validate());
-  for (double d : {defects.noise_k, defects.fixed_pattern_k, defects.vignetting_k, defects.drift_k, visible_noise}) {
+  for (double d : {defects.noise_k, defects.fixed_pattern_k, defects.vignetting_k, defects.drift_k,
+                   visible_noise}) {
     ORBITFUSE_TRY(check(d >= 0 && d <= 100, "defects", d, "must be 0 to 100"));
   }
-  ORBITFUSE_TRY(check(samples_per_axis >= 1 && samples_per_axis <= 16, "samples_per_axis", samples_per_axis, "must be 1 to 16"));
-  ORBITFUSE_TRY(check(jpeg_quality >= 1 && jpeg_quality <= 100, "jpeg_quality", jpeg_quality, "must be 1 to 100"));
-  return check(test_views >= 0 && test_views <= 1000, "test_views", test_views, "must be 0 to 1000");
+  ORBITFUSE_TRY(check(samples_per_axis >= 1 && samples_per_axis <= 16, "samples_per_axis",
+                      samples_per_axis, "must be 1 to 16"));
+  ORBITFUSE_TRY(check(jpeg_quality >= 1 && jpeg_quality <= 100, "jpeg_quality", jpeg_quality,
+                      "must be 1 to 100"));
+  return check(test_views >= 0 && test_views <= 1000, "test_views", test_views,
+               "must be 0 to 1000");
 }
 
 SyntheticOptions replay_orbit_options() {
@@ -83,22 +89,26 @@ Rigid3d look_at(const Vector3d& center, const Vector3d& target, double roll_deg)
   Eigen::Matrix3d world_from_cam;
   world_from_cam << right, forward.cross(right), forward;
   const Eigen::Quaterniond rotation =
-      (Eigen::Quaterniond(world_from_cam) * Eigen::AngleAxisd(roll_deg * deg, Vector3d::UnitZ())).normalized();
+      (Eigen::Quaterniond(world_from_cam) * Eigen::AngleAxisd(roll_deg * deg, Vector3d::UnitZ()))
+          .normalized();
   return Rigid3d{rotation, center}.inverse();
 }
 
 Vector3d on_orbit(double azimuth_deg, double elevation_deg, double distance) {
   const double a = azimuth_deg * deg, e = elevation_deg * deg;
-  return aim_point + distance * Vector3d(std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e));
+  return aim_point +
+         distance * Vector3d(std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e));
 }
 
 Rigid3d jittered_pose(const OrbitOptions& o, Random& random, Exposure& exposure) {
   exposure.azimuth_deg += o.azimuth_jitter_deg * random.gaussian();
   exposure.elevation_deg += o.elevation_jitter_deg * random.gaussian();
-  const double distance = o.distance_m * (1 + std::clamp(o.distance_jitter * random.gaussian(), -0.2, 0.2));
+  const double distance =
+      o.distance_m * (1 + std::clamp(o.distance_jitter * random.gaussian(), -0.2, 0.2));
   const Vector3d center = on_orbit(exposure.azimuth_deg, exposure.elevation_deg, distance);
   const double aim_m = distance * std::tan(o.aim_jitter_deg * deg);
-  const Vector3d target = aim_point + aim_m * Vector3d(random.gaussian(), random.gaussian(), 0.5 * random.gaussian());
+  const Vector3d target =
+      aim_point + aim_m * Vector3d(random.gaussian(), random.gaussian(), 0.5 * random.gaussian());
   return look_at(center, target, o.roll_jitter_deg * random.gaussian());
 }
 
@@ -144,19 +154,22 @@ std::vector<Exposure> walk(const SyntheticOptions& options, Modality modality) {
 
 std::vector<Rigid3d> test_poses(const SyntheticOptions& options) {
   std::vector<Rigid3d> poses;
-  const double low = options.visible.elevations_deg.front(), high = options.visible.elevations_deg.back();
+  const double low = options.visible.elevations_deg.front(),
+               high = options.visible.elevations_deg.back();
   for (int i = 0; i < options.test_views; ++i) {
     // Between stations in azimuth and between loops in elevation.
     const double azimuth = 360.0 * (i + 0.37) / std::max(1, options.test_views);
     const double elevation = low + (high - low) * (i % 2 == 0 ? 0.3 : 0.7);
-    poses.push_back(look_at(on_orbit(azimuth, elevation, 1.05 * options.visible.distance_m), aim_point, 0));
+    poses.push_back(
+        look_at(on_orbit(azimuth, elevation, 1.05 * options.visible.distance_m), aim_point, 0));
   }
   return poses;
 }
 
 Camera test_camera(const SyntheticOptions& options) {
   const double scale = static_cast<double>(options.thermal.width) / options.visible.width;
-  return Camera::from_fov(options.thermal.width, static_cast<int>(std::lround(options.visible.height * scale)),
+  return Camera::from_fov(options.thermal.width,
+                          static_cast<int>(std::lround(options.visible.height * scale)),
                           options.visible.horizontal_fov_deg);
 }
 

@@ -18,7 +18,8 @@ class RayMaker {
   RayMaker(const Camera& camera, const Rigid3d& cam_from_world)
       : camera_(camera), world_from_cam_(cam_from_world.inverse()) {}
   Ray at(double u, double v) const {
-    return {world_from_cam_.translation, (world_from_cam_.rotation * camera_.ray_of({u, v})).normalized()};
+    return {world_from_cam_.translation,
+            (world_from_cam_.rotation * camera_.ray_of({u, v})).normalized()};
   }
   Vector3d forward() const { return world_from_cam_.rotation * Vector3d::UnitZ(); }
 
@@ -43,30 +44,33 @@ double srgb(double linear) {
 
 }  // namespace
 
-cv::Mat render_visible(const Scene& scene, const Camera& camera, const Rigid3d& cam_from_world, int samples_per_axis) {
+cv::Mat render_visible(const Scene& scene, const Camera& camera, const Rigid3d& cam_from_world,
+                       int samples_per_axis) {
   const RayMaker rays(camera, cam_from_world);
   cv::Mat image(camera.height, camera.width, CV_8UC3);
   parallel_for(camera.height, [&](int y) {
     for (int x = 0; x < camera.width; ++x) {
-      const Vector3d rgb = mean_over_pixel(rays, x, y, samples_per_axis, Vector3d(Vector3d::Zero()), [&](const Ray& ray) {
-        return visible_radiance(scene, ray, scene.intersect(ray));
-      });
+      const Vector3d rgb = mean_over_pixel(
+          rays, x, y, samples_per_axis, Vector3d(Vector3d::Zero()),
+          [&](const Ray& ray) { return visible_radiance(scene, ray, scene.intersect(ray)); });
       for (int c = 0; c < 3; ++c) {
-        image.at<cv::Vec3b>(y, x)[2 - c] = static_cast<unsigned char>(std::lround(255 * srgb(rgb[c])));
+        image.at<cv::Vec3b>(y, x)[2 - c] =
+            static_cast<unsigned char>(std::lround(255 * srgb(rgb[c])));
       }
     }
   });
   return image;
 }
 
-cv::Mat render_thermal(const Scene& scene, const Camera& camera, const Rigid3d& cam_from_world, int samples_per_axis) {
+cv::Mat render_thermal(const Scene& scene, const Camera& camera, const Rigid3d& cam_from_world,
+                       int samples_per_axis) {
   const RayMaker rays(camera, cam_from_world);
   cv::Mat kelvin(camera.height, camera.width, CV_32FC1);
   parallel_for(camera.height, [&](int y) {
     for (int x = 0; x < camera.width; ++x) {
-      kelvin.at<float>(y, x) = static_cast<float>(mean_over_pixel(rays, x, y, samples_per_axis, 0.0, [&](const Ray& ray) {
-        return temperature_k(scene, ray, scene.intersect(ray));
-      }));
+      kelvin.at<float>(y, x) = static_cast<float>(mean_over_pixel(
+          rays, x, y, samples_per_axis, 0.0,
+          [&](const Ray& ray) { return temperature_k(scene, ray, scene.intersect(ray)); }));
     }
   });
   return kelvin;
@@ -79,8 +83,9 @@ cv::Mat render_depth(const Scene& scene, const Camera& camera, const Rigid3d& ca
     for (int x = 0; x < camera.width; ++x) {
       const Ray ray = rays.at(x + 0.5, y + 0.5);
       const Hit hit = scene.intersect(ray);
-      depth.at<float>(y, x) = hit.solid < 0 ? std::numeric_limits<float>::quiet_NaN()
-                                            : static_cast<float>(hit.distance * ray.direction.dot(rays.forward()));
+      depth.at<float>(y, x) =
+          hit.solid < 0 ? std::numeric_limits<float>::quiet_NaN()
+                        : static_cast<float>(hit.distance * ray.direction.dot(rays.forward()));
     }
   });
   return depth;

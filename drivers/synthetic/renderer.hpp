@@ -10,9 +10,11 @@
 namespace orbitfuse::synthetic {
 
 /// CV_8UC3 BGR (sRGB), the mean of samples_per_axis^2 rays a pixel.
-cv::Mat render_visible(const Scene& scene, const Camera& camera, const Rigid3d& cam_from_world, int samples_per_axis);
+cv::Mat render_visible(const Scene& scene, const Camera& camera, const Rigid3d& cam_from_world,
+                       int samples_per_axis);
 /// CV_32FC1 kelvin, likewise.
-cv::Mat render_thermal(const Scene& scene, const Camera& camera, const Rigid3d& cam_from_world, int samples_per_axis);
+cv::Mat render_thermal(const Scene& scene, const Camera& camera, const Rigid3d& cam_from_world,
+                       int samples_per_axis);
 /// CV_32FC1, z along the optical axis at pixel centres, metres; NaN = sky.
 cv::Mat render_depth(const Scene& scene, const Camera& camera, const Rigid3d& cam_from_world);
 

@@ -41,8 +41,9 @@ void add_buildings(Random& random, std::vector<Solid>& solids) {
     const double azimuth = 360.0 * i / 17 + random.uniform(-6, 6);
     const double height = random.uniform(1.2, 4.6);
     const Vector3d half(random.uniform(1.0, 3.2), random.uniform(1.0, 2.6), height);
-    solids.push_back(Solid::box(polar(azimuth, random.uniform(19, 30), height), half, random.uniform(0, 180))
-                         .with(Material::building, mix(static_cast<std::uint64_t>(2000 + i))));
+    solids.push_back(
+        Solid::box(polar(azimuth, random.uniform(19, 30), height), half, random.uniform(0, 180))
+            .with(Material::building, mix(static_cast<std::uint64_t>(2000 + i))));
   }
 }
 

@@ -6,9 +6,11 @@
 
 namespace orbitfuse::synthetic {
 
-cv::Mat spoil_thermal(const cv::Mat& kelvin, const ThermalDefects& defects, std::uint64_t seed, std::uint64_t index) {
+cv::Mat spoil_thermal(const cv::Mat& kelvin, const ThermalDefects& defects, std::uint64_t seed,
+                      std::uint64_t index) {
   cv::Mat out(kelvin.size(), CV_16UC1);
-  Random noise(mix(seed, 1000 + index)), pattern(mix(seed, 1)), columns(mix(seed, 2)), drift(mix(seed, 500 + index));
+  Random noise(mix(seed, 1000 + index)), pattern(mix(seed, 1)), columns(mix(seed, 2)),
+      drift(mix(seed, 500 + index));
   const double frame_offset_k = defects.drift_k * drift.gaussian();
   std::vector<double> column_k(static_cast<std::size_t>(kelvin.cols));
   for (double& c : column_k) c = 0.5 * defects.fixed_pattern_k * columns.gaussian();
@@ -17,8 +19,10 @@ cv::Mat spoil_thermal(const cv::Mat& kelvin, const ThermalDefects& defects, std:
     for (int x = 0; x < kelvin.cols; ++x) {
       const double dx = x + 0.5 - cx, dy = y + 0.5 - cy;
       const double t = static_cast<double>(kelvin.at<float>(y, x)) + frame_offset_k +
-                       defects.noise_k * noise.gaussian() + defects.fixed_pattern_k * pattern.gaussian() +
-                       column_k[static_cast<std::size_t>(x)] - defects.vignetting_k * (dx * dx + dy * dy) / corner2;
+                       defects.noise_k * noise.gaussian() +
+                       defects.fixed_pattern_k * pattern.gaussian() +
+                       column_k[static_cast<std::size_t>(x)] -
+                       defects.vignetting_k * (dx * dx + dy * dy) / corner2;
       out.at<std::uint16_t>(y, x) = centikelvin_from_kelvin(static_cast<float>(t));
     }
   }

@@ -24,7 +24,8 @@ Solid Solid::box(const Vector3d& center, const Vector3d& half_size, double yaw_d
   return s;
 }
 
-Solid Solid::prism(const std::vector<Eigen::Vector2d>& polygon, double half_width, double lean, double lean_from) {
+Solid Solid::prism(const std::vector<Eigen::Vector2d>& polygon, double half_width, double lean,
+                   double lean_from) {
   Solid s;
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   for (const auto& p : polygon) middle += p / static_cast<double>(polygon.size());
@@ -42,7 +43,8 @@ Solid Solid::prism(const std::vector<Eigen::Vector2d>& polygon, double half_widt
   return s;
 }
 
-Solid Solid::cylinder(const Vector3d& center, const Vector3d& axis, double radius, double half_length) {
+Solid Solid::cylinder(const Vector3d& center, const Vector3d& axis, double radius,
+                      double half_length) {
   Solid s;
   s.center_ = center;
   s.axis_ = axis.normalized();
@@ -76,7 +78,8 @@ bool Solid::intersect(const Ray& ray, double min_distance, Hit& hit) const {
   const double along = to_center.dot(ray.direction);
   const double r2 = bounding_radius_ * bounding_radius_;
   if (to_center.squaredNorm() - along * along > r2) return false;
-  if (along + bounding_radius_ < min_distance || along - bounding_radius_ > hit.distance) return false;
+  if (along + bounding_radius_ < min_distance || along - bounding_radius_ > hit.distance)
+    return false;
 
   double enter = -std::numeric_limits<double>::infinity(), leave = hit.distance;
   Vector3d normal = Vector3d::UnitZ();

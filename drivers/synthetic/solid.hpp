@@ -19,7 +19,20 @@ struct Hit {
   int solid = -1;  ///< index in the scene; -1 = nothing
 };
 
-enum class Material { ground, paint, cabin, tyre, rim, trim, lamp, exhaust, crate, brick, barrel, building };
+enum class Material {
+  ground,
+  paint,
+  cabin,
+  tyre,
+  rim,
+  trim,
+  lamp,
+  exhaust,
+  crate,
+  brick,
+  barrel,
+  building
+};
 
 /// A convex body: an intersection of half-spaces n.x <= d, and for a cylinder also the tube.
 class Solid {
@@ -27,11 +40,12 @@ class Solid {
   Material material = Material::brick;
   std::uint64_t seed = 0;  ///< of its texture
 
-  static Solid box(const Eigen::Vector3d& center, const Eigen::Vector3d& half_size, double yaw_deg = 0);
+  static Solid box(const Eigen::Vector3d& center, const Eigen::Vector3d& half_size,
+                   double yaw_deg = 0);
   /// A convex polygon in (x, z), counter-clockwise, between y = -half_width and half_width; the
   /// sides lean inwards by `lean` (y per z) above z = lean_from.
-  static Solid prism(const std::vector<Eigen::Vector2d>& polygon, double half_width, double lean = 0,
-                     double lean_from = 0);
+  static Solid prism(const std::vector<Eigen::Vector2d>& polygon, double half_width,
+                     double lean = 0, double lean_from = 0);
   static Solid cylinder(const Eigen::Vector3d& center, const Eigen::Vector3d& axis, double radius,
                         double half_length);
 

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "core/geometry/camera.hpp"
+#include "core/geometry/transform.hpp"
 #include "core/modality.hpp"
 #include "core/session/session.hpp"
-#include "core/geometry/transform.hpp"
 #include "drivers/synthetic/orbit.hpp"
 
 namespace orbitfuse::synthetic {
@@ -18,7 +18,7 @@ struct Exposure {
   double azimuth_deg = 0, elevation_deg = 0;  ///< true
   Station nominal;
   bool tracking = false;
-  double time_s = 0;                          ///< since the walk began
+  double time_s = 0;  ///< since the walk began
 };
 
 Camera camera_of(const OrbitOptions& orbit);

@@ -14,14 +14,17 @@
 namespace orbitfuse {
 namespace {
 
-/// A date for the recording; the thermal walk follows the visible one by two hours, as in the field.
+/// A date for the recording; the thermal walk follows the visible one by two hours, as in the
+/// field.
 constexpr std::int64_t visible_start_ns = 1'790'000'000'000'000'000;
 constexpr std::int64_t thermal_delay_ns = 7200ll * 1'000'000'000;
 
 class SyntheticSource : public FrameSource {
  public:
   SyntheticSource(const SyntheticOptions& options, Modality modality)
-      : options_(options), modality_(modality), camera_(synthetic::camera_of(synthetic::orbit_of(options, modality))),
+      : options_(options),
+        modality_(modality),
+        camera_(synthetic::camera_of(synthetic::orbit_of(options, modality))),
         scene_(options.seed) {}
 
   DeviceInfo describe() const override {
@@ -29,7 +32,8 @@ class SyntheticSource : public FrameSource {
     device.id = std::string(name(modality_)) + "0";
     device.modality = modality_;
     device.driver = "synthetic";
-    device.model = modality_ == Modality::visible ? "rendered colour camera" : "rendered microbolometer";
+    device.model =
+        modality_ == Modality::visible ? "rendered colour camera" : "rendered microbolometer";
     device.serial = "seed " + std::to_string(options_.seed);
     // The data sheet's focal length, as EXIF or a lens label would give it; not the distortion.
     device.lens.focal_px = camera_.fx;
@@ -44,7 +48,8 @@ class SyntheticSource : public FrameSource {
   }
 
   /// Goes on after the last frame of the same walk that the earlier recording has.
-  bool resume(const DeviceInfo&, const std::vector<FrameRecord>& frames, std::uint64_t next_id) override {
+  bool resume(const DeviceInfo&, const std::vector<FrameRecord>& frames,
+              std::uint64_t next_id) override {
     std::size_t known = 0;
     for (std::size_t i = 0; i < walk_.size(); ++i) {
       const auto found = std::find_if(frames.begin(), frames.end(),
@@ -71,7 +76,8 @@ class SyntheticSource : public FrameSource {
     Frame& frame = delivery.frame;
     frame.id = ids_.give(next_);
     frame.device_time_ns = device_time_ns(exposure);
-    frame.host_time_ns = visible_start_ns + frame.device_time_ns + (modality_ == Modality::thermal ? thermal_delay_ns : 0);
+    frame.host_time_ns = visible_start_ns + frame.device_time_ns +
+                         (modality_ == Modality::thermal ? thermal_delay_ns : 0);
     frame.tracking = exposure.tracking;
     if (!exposure.tracking) frame.station = exposure.nominal;
     ORBITFUSE_TRY(render(exposure.cam_from_world, next_, frame));
@@ -88,17 +94,20 @@ class SyntheticSource : public FrameSource {
   }
 
   bool is_of(const FrameRecord& f, const synthetic::Exposure& exposure) const {
-    if (f.device_time_ns != device_time_ns(exposure) || f.width != camera_.width || f.height != camera_.height)
+    if (f.device_time_ns != device_time_ns(exposure) || f.width != camera_.width ||
+        f.height != camera_.height)
       return false;
-    return exposure.tracking || (f.station && f.station->azimuth_deg == exposure.nominal.azimuth_deg &&
-                                 f.station->elevation_deg == exposure.nominal.elevation_deg);
+    return exposure.tracking ||
+           (f.station && f.station->azimuth_deg == exposure.nominal.azimuth_deg &&
+            f.station->elevation_deg == exposure.nominal.elevation_deg);
   }
 
   Status render(const Rigid3d& cam_from_world, std::uint64_t index, Frame& frame) const {
     const int samples = options_.samples_per_axis;
     if (modality_ == Modality::thermal) {
-      frame.pixels = synthetic::spoil_thermal(synthetic::render_thermal(scene_, camera_, cam_from_world, samples),
-                                              options_.defects, options_.seed, index);
+      frame.pixels = synthetic::spoil_thermal(
+          synthetic::render_thermal(scene_, camera_, cam_from_world, samples), options_.defects,
+          options_.seed, index);
       return {};
     }
     cv::Mat image = synthetic::render_visible(scene_, camera_, cam_from_world, samples);
@@ -121,7 +130,8 @@ class SyntheticSource : public FrameSource {
 
 }  // namespace
 
-std::unique_ptr<FrameSource> make_synthetic_source(const SyntheticOptions& options, Modality modality) {
+std::unique_ptr<FrameSource> make_synthetic_source(const SyntheticOptions& options,
+                                                   Modality modality) {
   return std::make_unique<SyntheticSource>(options, modality);
 }
 

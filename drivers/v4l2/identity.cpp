@@ -18,10 +18,14 @@ constexpr std::array<std::pair<const char*, CameraName::By>, 3> prefixes{
 
 bool matches(const VideoSystem::Node& node, const CameraName& name) {
   switch (name.by) {
-    case CameraName::By::node: return node.path == name.value;
-    case CameraName::By::serial: return node.serial == name.value;
-    case CameraName::By::usb_path: return node.usb_path == name.value;
-    case CameraName::By::usb_id: return node.usb_id == name.value;
+    case CameraName::By::node:
+      return node.path == name.value;
+    case CameraName::By::serial:
+      return node.serial == name.value;
+    case CameraName::By::usb_path:
+      return node.usb_path == name.value;
+    case CameraName::By::usb_id:
+      return node.usb_id == name.value;
   }
   return false;
 }
@@ -63,7 +67,12 @@ Result<VideoSystem::Node> find_camera(VideoSystem& system, const CameraName& nam
   }
   // A node without sysfs entry (a container, a test) may still open.
   if (name.by == CameraName::By::node && seen.empty()) {
-    return VideoSystem::Node{.path = name.value, .serial = {}, .usb_path = {}, .usb_id = {}, .product = {}, .function = {}};
+    return VideoSystem::Node{.path = name.value,
+                             .serial = {},
+                             .usb_path = {},
+                             .usb_id = {},
+                             .product = {},
+                             .function = {}};
   }
   return fail(ErrorKind::device, "camera " + text(name),
               seen.empty() ? "no video device is connected" : "not connected; there is " + seen,

@@ -72,7 +72,8 @@ Status unpack(std::span<const std::uint8_t> bytes, const Layout& layout, Frame& 
   const auto stride = static_cast<std::size_t>(std::max(layout.bytes_per_line, row_bytes));
   const int rows = nv12 ? layout.height * 3 / 2 : layout.height;
   // The last row may come without its padding.
-  const std::size_t needed = stride * static_cast<std::size_t>(rows - 1) + static_cast<std::size_t>(row_bytes);
+  const std::size_t needed =
+      stride * static_cast<std::size_t>(rows - 1) + static_cast<std::size_t>(row_bytes);
   if (layout.width <= 0 || layout.height <= 0 || bytes.size() < needed) {
     return damaged(layout, fmt::format("{} bytes, {} needed for {}x{}", bytes.size(), needed,
                                        layout.width, layout.height));
@@ -80,9 +81,15 @@ Status unpack(std::span<const std::uint8_t> bytes, const Layout& layout, Frame& 
   auto* data = const_cast<std::uint8_t*>(bytes.data());  // cv::Mat has no const view; only read
   const auto view = [&](int type) { return cv::Mat(rows, layout.width, type, data, stride); };
   switch (layout.fourcc) {
-    case V4L2_PIX_FMT_YUYV: cv::cvtColor(view(CV_8UC2), frame.pixels, cv::COLOR_YUV2BGR_YUYV); break;
-    case V4L2_PIX_FMT_NV12: cv::cvtColor(view(CV_8UC1), frame.pixels, cv::COLOR_YUV2BGR_NV12); break;
-    case V4L2_PIX_FMT_GREY: frame.pixels = view(CV_8UC1).clone(); break;
+    case V4L2_PIX_FMT_YUYV:
+      cv::cvtColor(view(CV_8UC2), frame.pixels, cv::COLOR_YUV2BGR_YUYV);
+      break;
+    case V4L2_PIX_FMT_NV12:
+      cv::cvtColor(view(CV_8UC1), frame.pixels, cv::COLOR_YUV2BGR_NV12);
+      break;
+    case V4L2_PIX_FMT_GREY:
+      frame.pixels = view(CV_8UC1).clone();
+      break;
     default:
       frame.pixels = y16_pixels(view(CV_16UC1), layout.kelvin_per_dn);
       if (layout.kelvin_per_dn <= 0) frame.flag(FrameFlag::raw_counts);

@@ -13,10 +13,10 @@ namespace orbitfuse::v4l2 {
 
 /// The format the driver agreed to (VIDIOC_S_FMT's answer).
 struct Layout {
-  std::uint32_t fourcc = 0;   ///< V4L2_PIX_FMT_*
+  std::uint32_t fourcc = 0;  ///< V4L2_PIX_FMT_*
   int width = 0, height = 0;
   int bytes_per_line = 0;
-  double kelvin_per_dn = 0;   ///< Y16 thermal: T[K] = kelvin_per_dn * DN; 0 = raw counts
+  double kelvin_per_dn = 0;  ///< Y16 thermal: T[K] = kelvin_per_dn * DN; 0 = raw counts
 };
 
 std::string fourcc_text(std::uint32_t fourcc);

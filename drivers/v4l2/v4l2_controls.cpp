@@ -25,10 +25,20 @@ std::vector<V4l2Source::Lock> V4l2Source::locks() const {
            V4L2_CID_EXPOSURE_ABSOLUTE,
            options_.exposure_100us,
            "exposure"},
-          {options_.lock_focus, V4L2_CID_FOCUS_AUTO, 0, {1}, V4L2_CID_FOCUS_ABSOLUTE,
-           options_.focus, "focus"},
-          {options_.lock_white_balance, V4L2_CID_AUTO_WHITE_BALANCE, 0, {1},
-           V4L2_CID_WHITE_BALANCE_TEMPERATURE, options_.white_balance_k, "white balance"}};
+          {options_.lock_focus,
+           V4L2_CID_FOCUS_AUTO,
+           0,
+           {1},
+           V4L2_CID_FOCUS_ABSOLUTE,
+           options_.focus,
+           "focus"},
+          {options_.lock_white_balance,
+           V4L2_CID_AUTO_WHITE_BALANCE,
+           0,
+           {1},
+           V4L2_CID_WHITE_BALANCE_TEMPERATURE,
+           options_.white_balance_k,
+           "white balance"}};
 }
 
 /// A camera that was switched off comes back with other values: the first ones hold.

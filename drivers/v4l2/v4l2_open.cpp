@@ -136,14 +136,12 @@ Status V4l2Source::choose_format() {
   if (got.width == 0 || got.height == 0)
     return fail(ErrorKind::device, node_.path, "has images of 0 pixels",
                 "name a size (size=1280x720; v4l2-ctl --list-formats-ext)");
-  if (got.pixelformat != chosen ||
-      (width > 0 &&
-       (static_cast<int>(got.width) != width || static_cast<int>(got.height) != height))) {
-    return fail(
-        ErrorKind::device, node_.path,
-        fmt::format("gives {} {}x{}, asked for {} {}x{}", fourcc_text(got.pixelformat), got.width,
-                    got.height, fourcc_text(chosen), width, height),
-        "choose a size that the camera has (v4l2-ctl --list-formats-ext)");
+  if (got.pixelformat != chosen || (width > 0 && (static_cast<int>(got.width) != width ||
+                                                  static_cast<int>(got.height) != height))) {
+    return fail(ErrorKind::device, node_.path,
+                fmt::format("gives {} {}x{}, asked for {} {}x{}", fourcc_text(got.pixelformat),
+                            got.width, got.height, fourcc_text(chosen), width, height),
+                "choose a size that the camera has (v4l2-ctl --list-formats-ext)");
   }
   layout_ = Layout{got.pixelformat, static_cast<int>(got.width), static_cast<int>(got.height),
                    static_cast<int>(got.bytesperline), options_.kelvin_per_dn};

@@ -90,16 +90,17 @@ std::optional<Delivery> V4l2Source::try_reopen() {
   // Ids leave room for what the outage cost, so that it counts as lost.
   const std::uint64_t cost = rhythm_.frames_in(outage_s);
   next_id_ = base_id_ += cost;  // also if it is lost again before a frame
-  Delivery delivery = event_delivery(
-      EventKind::reconnected,
-      fmt::format("{} after {:.1f} s, about {} frames", node_.path, outage_s, cost));
+  Delivery delivery =
+      event_delivery(EventKind::reconnected,
+                     fmt::format("{} after {:.1f} s, about {} frames", node_.path, outage_s, cost));
   moved_ = node_.usb_path != identity_->node.usb_path;
   ports_looked_at_ = Clock::now();
   if (moved_) {
     tell(EventKind::moved,
-         fmt::format("the camera of serial {} is at usb:{} now, it was at usb:{}; if this is another "
-                     "camera of that serial, stop and put the first one back",
-                     node_.serial, node_.usb_path, identity_->node.usb_path));
+         fmt::format(
+             "the camera of serial {} is at usb:{} now, it was at usb:{}; if this is another "
+             "camera of that serial, stop and put the first one back",
+             node_.serial, node_.usb_path, identity_->node.usb_path));
   } else if (identity_->port_only && !node_.usb_path.empty()) {
     delivery.detail += fmt::format("; known by its port usb:{} alone", node_.usb_path);
   }
@@ -143,9 +144,10 @@ Result<Delivery> V4l2Source::next(std::chrono::milliseconds timeout) {
   if (fd_ < 0) return fail(ErrorKind::device, options_.camera, "not started", "call start() first");
   if (original_is_back()) {
     identity_->port_only = true;
-    return lose(EventKind::twin, fmt::format("there are two cameras of serial {}; going back to the one at "
-                                    "usb:{}; frames flagged other-port are the other's",
-                                    identity_->node.serial, identity_->node.usb_path));
+    return lose(EventKind::twin,
+                fmt::format("there are two cameras of serial {}; going back to the one at "
+                            "usb:{}; frames flagged other-port are the other's",
+                            identity_->node.serial, identity_->node.usb_path));
   }
   pollfd waiter{fd_, POLLIN, 0};
   const int ready = system_->poll(&waiter, 1, static_cast<int>(timeout.count()));
@@ -164,15 +166,18 @@ Result<Delivery> V4l2Source::dequeue() {
     if (errno == EAGAIN) return Delivery{};
     // A stream that breaks before its first frame would break again after mere reopening.
     if (errno == EIO && !last_sequence_) return stall("the stream broke before its first frame");
-    return lose(EventKind::disconnected, std::strerror(errno));  // ENODEV: unplugged; EIO: the stream broke
+    return lose(EventKind::disconnected,
+                std::strerror(errno));  // ENODEV: unplugged; EIO: the stream broke
   }
-  if (buffer.index >= buffers_.size()) return lose(EventKind::disconnected, "the driver answers nonsense");
+  if (buffer.index >= buffers_.size())
+    return lose(EventKind::disconnected, "the driver answers nonsense");
   // When a transfer fails uvcvideo hands every buffer back empty, with the number of an old frame.
   const bool old =
       last_sequence_ && static_cast<std::int32_t>(buffer.sequence - *last_sequence_) <= 0;
   if ((buffer.flags & V4L2_BUF_FLAG_ERROR) && buffer.bytesused == 0) {
     if (old)
-      return lose(EventKind::disconnected, "a transfer failed: the driver gave its buffers back empty");
+      return lose(EventKind::disconnected,
+                  "a transfer failed: the driver gave its buffers back empty");
     if (!last_sequence_) return empty_at_start(buffer);
   }
   last_frame_ = Clock::now();
@@ -222,10 +227,11 @@ void V4l2Source::watch_rhythm(std::uint64_t id, std::int64_t stamp_ns) {
   // A camera of unsteady rate (phones) would fill the manifest.
   if (Clock::now() - last_late_event_ < std::chrono::seconds(10)) return;
   last_late_event_ = Clock::now();
-  tell(EventKind::late_frame,
-       fmt::format("frame {} is late by {} though none is missing in the driver's count; {} so far: "
-                   "lost whole on USB, or the camera slowed down",
-                   id, missing, late_frames_));
+  tell(
+      EventKind::late_frame,
+      fmt::format("frame {} is late by {} though none is missing in the driver's count; {} so far: "
+                  "lost whole on USB, or the camera slowed down",
+                  id, missing, late_frames_));
 }
 
 void V4l2Source::tell(EventKind kind, std::string detail) {
@@ -274,7 +280,8 @@ Delivery V4l2Source::delivery_of(std::uint32_t index, std::uint32_t bytes, std::
   const bool counts = layout_.fourcc == V4L2_PIX_FMT_Y16;
   delivery.frame.thermal_is_gray = options_.modality == Modality::thermal && !counts;
   if (counts && layout_.kelvin_per_dn <= 0) {
-    if (const auto stretch = raw_counts_.apply(delivery.frame)) tell(EventKind::raw_counts, *stretch);
+    if (const auto stretch = raw_counts_.apply(delivery.frame))
+      tell(EventKind::raw_counts, *stretch);
   }
   return delivery;
 }

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "capture/clock/clock_map.hpp"
-#include "capture/recording/frame_rhythm.hpp"
 #include "capture/frame_source.hpp"
+#include "capture/recording/frame_rhythm.hpp"
 #include "capture/recording/freeze_watch.hpp"
 #include "capture/recording/lasting_failure.hpp"
 #include "capture/recording/raw_counts.hpp"
@@ -29,20 +29,20 @@ struct V4l2Options {
   std::string camera = "/dev/video0";  ///< see CameraName
   std::string device_id = "visible0";  ///< key in the session
   Modality modality = Modality::visible;
-  int width = 0, height = 0;           ///< 0: what the driver has set now
-  double rate_hz = 0;                  ///< 0: as above
-  std::string format;                  ///< "MJPG", "YUYV", "NV12", "GREY", "Y16 "; empty: the first
-                                       ///< of these that the camera has (Y16 first for thermal)
-  int buffers = 4;                     ///< fewer lose frames while one is stored
-  double kelvin_per_dn = 0;            ///< UVC thermal cameras with linear output, e.g. 0.01
+  int width = 0, height = 0;  ///< 0: what the driver has set now
+  double rate_hz = 0;         ///< 0: as above
+  std::string format;         ///< "MJPG", "YUYV", "NV12", "GREY", "Y16 "; empty: the first
+                              ///< of these that the camera has (Y16 first for thermal)
+  int buffers = 4;            ///< fewer lose frames while one is stored
+  double kelvin_per_dn = 0;   ///< UVC thermal cameras with linear output, e.g. 0.01
   /// Locked by default: a camera that adapts between stations changes colours between views.
   bool lock_exposure = true, lock_focus = true, lock_white_balance = true;
   /// Absent: the value that the camera's automatic had found after `adapt`.
   std::optional<int> exposure_100us, focus, white_balance_k;
-  std::chrono::milliseconds adapt{1000};  ///< of streaming on automatic before locking
-  std::chrono::milliseconds stall{2000};       ///< silence after which the stream is reopened
-  std::chrono::milliseconds reopen_every{250}; ///< while the camera is away
-  std::chrono::milliseconds nuc_settle{500};   ///< thermal frames right after a freeze still drift
+  std::chrono::milliseconds adapt{1000};        ///< of streaming on automatic before locking
+  std::chrono::milliseconds stall{2000};        ///< silence after which the stream is reopened
+  std::chrono::milliseconds reopen_every{250};  ///< while the camera is away
+  std::chrono::milliseconds nuc_settle{500};    ///< thermal frames right after a freeze still drift
   /// Resets the camera's USB port ("1-4.2"); called when reopening alone did not end a stall.
   std::function<Status(const std::string& usb_path)> reset_port;
 
@@ -51,12 +51,13 @@ struct V4l2Options {
 
 /// A UVC (or other V4L2 streaming) camera. Frames that the driver flags as damaged, or that are
 /// shorter than their format, are rejected deliveries; sequence gaps show as id gaps. When the
-/// camera is unplugged or stalls, everything is closed, and it is looked for (find_again) until it is
-/// back, with the size and format that it had: events "disconnected", "stalled",
-/// "reopen-failed" (back, but taken, forbidden or without bandwidth), "reconnected" tell, settings are pushed again and verified ("setting-lost" when one is not).
-/// Serials are not always unique, so the port counts too. A camera of the same serial in another
-/// port is taken ("moved", and its frames are flagged "other-port") unless one like it was plugged
-/// in at the same time; when another one turns up in the first port, that one is the session's
+/// camera is unplugged or stalls, everything is closed, and it is looked for (find_again) until it
+/// is back, with the size and format that it had: events "disconnected", "stalled", "reopen-failed"
+/// (back, but taken, forbidden or without bandwidth), "reconnected" tell, settings are pushed again
+/// and verified ("setting-lost" when one is not). Serials are not always unique, so the port counts
+/// too. A camera of the same serial in another port is taken ("moved", and its frames are flagged
+/// "other-port") unless one like it was plugged in at the same time; when another one turns up in
+/// the first port, that one is the session's
 /// ("twin"). Without a serial, and once there was a twin, only the port counts: a camera like it
 /// elsewhere is not taken ("look-alike").
 /// Frozen thermal frames are flagged "nuc" (FreezeWatch).
@@ -110,24 +111,24 @@ class V4l2Source final : public FrameSource {
   mutable std::mutex node_mutex_;  ///< describe() comes from other threads while a camera reopens
   VideoSystem::Node node_;
   Layout layout_;
-  std::optional<Layout> first_layout_;      ///< a session keeps its size
+  std::optional<Layout> first_layout_;  ///< a session keeps its size
   ClockMap clock_;
   int fd_ = -1;
   bool away_ = false;
-  bool moved_ = false;                  ///< found again in another port, by its serial
-  bool look_alike_told_ = false;        ///< in this outage
+  bool moved_ = false;            ///< found again in another port, by its serial
+  bool look_alike_told_ = false;  ///< in this outage
   Clock::time_point ports_looked_at_{};
   std::vector<Mapping> buffers_;
   RawCounts raw_counts_;
   FreezeWatch freeze_;
-  std::vector<Delivery> pending_;       ///< events to tell before the next frame
+  std::vector<Delivery> pending_;  ///< events to tell before the next frame
   Clock::time_point last_frame_{}, last_attempt_{}, lost_at_{};
   std::uint64_t next_id_ = 0, base_id_ = 0;
   int stalls_in_a_row_ = 0, empty_at_start_ = 0;
-  LastingFailure failure_;              ///< to reopen
-  std::map<std::uint32_t, int> locked_; ///< controls and the values they were locked at
-  bool adapting_ = false;               ///< some are automatic still
-  std::int64_t adapting_since_ns_ = 0;  ///< monotonic; 0: no frame yet
+  LastingFailure failure_;               ///< to reopen
+  std::map<std::uint32_t, int> locked_;  ///< controls and the values they were locked at
+  bool adapting_ = false;                ///< some are automatic still
+  std::int64_t adapting_since_ns_ = 0;   ///< monotonic; 0: no frame yet
   FrameRhythm rhythm_;
   int late_frames_ = 0;
   Clock::time_point last_late_event_{};

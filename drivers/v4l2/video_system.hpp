@@ -26,12 +26,12 @@ class VideoSystem {
 
   /// What sysfs says of every /dev/video* node.
   struct Node {
-    std::string path;        ///< "/dev/video2"; changes when a camera is plugged in again
-    std::string serial;      ///< of the USB device, may be empty
-    std::string usb_path;    ///< the port, e.g. "1-4.2"; stays when the node changes
-    std::string usb_id;      ///< "046d:0825"
+    std::string path;      ///< "/dev/video2"; changes when a camera is plugged in again
+    std::string serial;    ///< of the USB device, may be empty
+    std::string usb_path;  ///< the port, e.g. "1-4.2"; stays when the node changes
+    std::string usb_id;    ///< "046d:0825"
     std::string product;
-    std::string function;    ///< which of the device's cameras: USB interface and index, "1.0/0"
+    std::string function;  ///< which of the device's cameras: USB interface and index, "1.0/0"
   };
   virtual std::vector<Node> nodes() = 0;
   /// Of CLOCK_REALTIME or CLOCK_MONOTONIC.

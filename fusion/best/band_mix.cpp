@@ -10,21 +10,23 @@
 namespace orbitfuse::fusion {
 namespace {
 
-constexpr float nothing = 1e-4F;       // gray levels squared; far below what a sensor resolves
-constexpr float darkest_level = 10;    // gray levels; ratios of levels below say nothing
+constexpr float nothing = 1e-4F;     // gray levels squared; far below what a sensor resolves
+constexpr float darkest_level = 10;  // gray levels; ratios of levels below say nothing
 constexpr float largest_gain = 1.5F;
 
 float above_dark(float level) { return std::max(0.0F, level) + darkest_level; }
 
 }  // namespace
 
-Plane mix_band(const BandSource& visible, const BandSource& thermal, const Plane& level, const BandMix& rule) {
+Plane mix_band(const BandSource& visible, const BandSource& thermal, const Plane& level,
+               const BandMix& rule) {
   Plane fused(level.size());
   parallel_blocks(level.rows, 32, [&](int begin, int end) {
     const int n = level.cols;
     std::vector<float> power(static_cast<std::size_t>(n));
     for (int y = begin; y < end; ++y) {
-      const float *ev = visible.energy[y], *et = thermal.energy[y], *bv = visible.band[y], *bt = thermal.band[y];
+      const float *ev = visible.energy[y], *et = thermal.energy[y], *bv = visible.band[y],
+                  *bt = thermal.band[y];
       const float *lv = visible.level[y], *lt = thermal.level[y], *lf = level[y];
       float *p = power.data(), *out = fused[y];
       // (E_t / E_v)^exponent, by logarithms: a whole row at a time is many times faster than pow.

@@ -21,6 +21,7 @@ struct BandMix {
 /// A detail that moves to another level than its own looks stronger or weaker (Weber's law; Toet
 /// 1990's contrast pyramid keeps the ratio whole): gain goes `contrast_kept` of the way from 1 to
 /// the ratio of the levels, within 2/3 and 3/2. `level` is the fused low pass below the band.
-Plane mix_band(const BandSource& visible, const BandSource& thermal, const Plane& level, const BandMix& rule);
+Plane mix_band(const BandSource& visible, const BandSource& thermal, const Plane& level,
+               const BandMix& rule);
 
 }  // namespace orbitfuse::fusion

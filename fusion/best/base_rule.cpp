@@ -26,7 +26,8 @@ Plane fuse_base(const Plane& visible, const Plane& thermal, const BaseRule& rule
   parallel_blocks(rows, 4, [&](int begin, int end) {
     for (int y = begin; y < end; ++y)
       for (int x = 0; x < columns; ++x) {
-        const float v = activity(visible, x, y, rule.brightness_weight) + samples * rule.visible_preference;
+        const float v =
+            activity(visible, x, y, rule.brightness_weight) + samples * rule.visible_preference;
         const float t = activity(thermal, x, y, rule.brightness_weight);
         votes(y + side - 1, x + side - 1) = v > t ? 1.0F : v < t ? 0.0F : 0.5F;
         patches(y + side - 1, x + side - 1) = 1;

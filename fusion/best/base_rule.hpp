@@ -10,8 +10,8 @@ struct BaseRule {
   float brightness_weight;
 };
 
-/// Sparse-representation base fusion (Liu, Liu, Wang 2015, section 3.2) with the 2-D DCT in place of
-/// a learned dictionary, so no pursuit is needed: every 8x8 patch votes for the source with the
+/// Sparse-representation base fusion (Liu, Liu, Wang 2015, section 3.2) with the 2-D DCT in place
+/// of a learned dictionary, so no pursuit is needed: every 8x8 patch votes for the source with the
 /// larger activity, a pixel's weight is the mean vote of the patches that hold it. Activity of a
 /// patch of N = 64 samples:
 ///   sum of |c_k| over all k but the mean + N (brightness_weight * mean + visible_preference),

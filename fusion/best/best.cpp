@@ -49,9 +49,11 @@ Status BestOptions::validate() const {
     return fail(ErrorKind::usage, std::string("best.") + field, fmt::format("{}", value), rule);
   };
   if (levels < 0 || levels > 12) return bad("levels", levels, "must be in 0..12");
-  if (energy_radius_px < 0 || energy_radius_px > 15) return bad("energy_radius_px", energy_radius_px, "must be in 0..15");
+  if (energy_radius_px < 0 || energy_radius_px > 15)
+    return bad("energy_radius_px", energy_radius_px, "must be in 0..15");
   if (!(sharpness > 0 && sharpness <= 64)) return bad("sharpness", sharpness, "must be in (0, 64]");
-  if (!(contrast_kept >= 0 && contrast_kept <= 1)) return bad("contrast_kept", contrast_kept, "must be in 0..1");
+  if (!(contrast_kept >= 0 && contrast_kept <= 1))
+    return bad("contrast_kept", contrast_kept, "must be in 0..1");
   if (!(visible_preference >= 0 && visible_preference <= 255))
     return bad("visible_preference", visible_preference, "must be in 0..255");
   if (!(brightness_weight >= 0 && brightness_weight <= 1))
@@ -59,7 +61,8 @@ Status BestOptions::validate() const {
   return {};
 }
 
-Result<Plane> fuse_best(const Plane& visible, const Plane& thermal, const BestOptions& options, BestReport* report) {
+Result<Plane> fuse_best(const Plane& visible, const Plane& thermal, const BestOptions& options,
+                        BestReport* report) {
   ORBITFUSE_TRY(options.validate());
   ORBITFUSE_TRY(check_pair(visible, thermal));
   BestReport own;
@@ -83,11 +86,14 @@ Result<Plane> fuse_best(const Plane& visible, const Plane& thermal, const BestOp
   parallel_for(2, [&](int k) {
     Source& source = sources[static_cast<std::size_t>(k)];
     for (std::size_t i = 0; i < source.bands.size(); ++i)
-      if (!skip[i]) source.bands[i].energy = energy_of(source.bands[i].band, options.energy_radius_px);
+      if (!skip[i])
+        source.bands[i].energy = energy_of(source.bands[i].band, options.energy_radius_px);
   });
-  Plane fused = fuse_base(v.base, t.base, {static_cast<float>(options.visible_preference),
-                                           static_cast<float>(options.brightness_weight)});
-  const BandMix rule{static_cast<float>(options.sharpness / 2), static_cast<float>(options.contrast_kept)};
+  Plane fused = fuse_base(v.base, t.base,
+                          {static_cast<float>(options.visible_preference),
+                           static_cast<float>(options.brightness_weight)});
+  const BandMix rule{static_cast<float>(options.sharpness / 2),
+                     static_cast<float>(options.contrast_kept)};
   for (std::size_t i = v.bands.size(); i-- > 0;) {
     Plane level;
     cv::pyrUp(fused, level, v.bands[i].band.size());

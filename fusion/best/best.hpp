@@ -10,8 +10,8 @@ namespace orbitfuse::fusion {
 /// moves to. Base: by votes of patches on which source holds more. See docs/notes/fusion.md
 /// for what each constant does to the scores.
 struct BestOptions {
-  int levels = 4;            ///< of the pyramid; fewer where the base would be below 8 px
-  double sharpness = 12;     ///< exponent of the amplitude ratio in the weights; larger: harder choice
+  int levels = 4;         ///< of the pyramid; fewer where the base would be below 8 px
+  double sharpness = 12;  ///< exponent of the amplitude ratio in the weights; larger: harder choice
   int energy_radius_px = 5;  ///< of the window over which energies are averaged
   /// Share of the way to constant contrast that a detail's strength goes when its level changes.
   double contrast_kept = 0.5;

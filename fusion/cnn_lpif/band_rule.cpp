@@ -39,7 +39,8 @@ Plane fuse_band(const Plane& visible, const Plane& thermal, const Plane& weight,
     for (int y = begin; y < end; ++y)
       for (int x = 0; x < visible.cols; ++x)
         // Running sums may leave a trace below zero.
-        share(y, x) = thermal_share(std::max(0.0F, ev(y, x)), std::max(0.0F, et(y, x)), prior(y, x));
+        share(y, x) =
+            thermal_share(std::max(0.0F, ev(y, x)), std::max(0.0F, et(y, x)), prior(y, x));
   });
   cv::boxFilter(share, voted, CV_32F, {rule.vote_px, rule.vote_px});
   parallel_blocks(visible.rows, row_block, [&](int begin, int end) {

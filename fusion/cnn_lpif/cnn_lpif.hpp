@@ -23,8 +23,9 @@ struct CnnLpifOptions {
   /// Gray levels up to which the sources count as the same; patches that don't differ are not sent
   /// through the network, their weight is 1/2. -1 = off.
   double same_within = 1;
-  /// Gray levels between a patch's darkest and brightest pixel up to which it counts as flat: against
-  /// a flat patch the other source has all the weight, and the network is not asked. -1 = off.
+  /// Gray levels between a patch's darkest and brightest pixel up to which it counts as flat:
+  /// against a flat patch the other source has all the weight, and the network is not asked. -1 =
+  /// off.
   double flat_within = 8;
 
   Status validate() const;
@@ -38,11 +39,12 @@ struct CnnLpifReport {
 
 /// Weight of the thermal image, 0..1: the network's answer, overlapping patches averaged.
 Plane thermal_weight(const Plane& visible, const Plane& thermal, const CnnLpifOptions& options,
-                     CnnLpifReport& report, const cnn::Parameters& network = cnn::shipped_network());
+                     CnnLpifReport& report,
+                     const cnn::Parameters& network = cnn::shipped_network());
 
 /// Errors: check_pair's, usage. Same bits for any thread count.
-Result<Plane> fuse_cnn_lpif(const Plane& visible, const Plane& thermal, const CnnLpifOptions& options,
-                            CnnLpifReport* report = nullptr,
+Result<Plane> fuse_cnn_lpif(const Plane& visible, const Plane& thermal,
+                            const CnnLpifOptions& options, CnnLpifReport* report = nullptr,
                             const cnn::Parameters& network = cnn::shipped_network());
 
 }  // namespace orbitfuse::fusion

@@ -13,11 +13,13 @@ namespace orbitfuse::fusion::cnn {
 Result<Parameters> parameters_of_bytes(std::string_view bytes) {
   Parameters parameters;
   if (bytes.size() != sizeof parameters)
-    return fail(ErrorKind::input, "network", std::to_string(bytes.size()) + " bytes",
-                "must be " + std::to_string(sizeof parameters) + ": train it anew with train_network");
+    return fail(
+        ErrorKind::input, "network", std::to_string(bytes.size()) + " bytes",
+        "must be " + std::to_string(sizeof parameters) + ": train it anew with train_network");
   std::memcpy(parameters.data(), bytes.data(), bytes.size());
   if (!std::all_of(parameters.begin(), parameters.end(), [](float v) { return std::isfinite(v); }))
-    return fail(ErrorKind::input, "network", "weights that are not finite", "train it anew with train_network");
+    return fail(ErrorKind::input, "network", "weights that are not finite",
+                "train it anew with train_network");
   return parameters;
 }
 

@@ -49,7 +49,8 @@ T score(const T* p, const T* in, Activations<T>& a) {
     for (int y = 0; y < side1; ++y)
       for (int x = 0; x < side1; ++x) {
         T sum = p[Layout::bias1 + c];
-        for (int k = 0; k < 9; ++k) sum += p[Layout::conv1 + c * 9 + k] * in[(y + k / 3) * patch + x + k % 3];
+        for (int k = 0; k < 9; ++k)
+          sum += p[Layout::conv1 + c * 9 + k] * in[(y + k / 3) * patch + x + k % 3];
         a.conv1[static_cast<std::size_t>((c * side1 + y) * side1 + x)] = sum > 0 ? sum : 0;
       }
   for (int c = 0; c < width1; ++c)
@@ -57,7 +58,8 @@ T score(const T* p, const T* in, Activations<T>& a) {
       for (int x = 0; x < pooled; ++x) {
         int best = (c * side1 + 2 * y) * side1 + 2 * x;
         for (const int other : {best + 1, best + side1, best + side1 + 1})
-          if (a.conv1[static_cast<std::size_t>(other)] > a.conv1[static_cast<std::size_t>(best)]) best = other;
+          if (a.conv1[static_cast<std::size_t>(other)] > a.conv1[static_cast<std::size_t>(best)])
+            best = other;
         const auto i = static_cast<std::size_t>((c * pooled + y) * pooled + x);
         a.winner[i] = best;
         a.pooled1[i] = a.conv1[static_cast<std::size_t>(best)];
@@ -69,8 +71,9 @@ T score(const T* p, const T* in, Activations<T>& a) {
         T sum = p[Layout::bias2 + c];
         for (int d = 0; d < width1; ++d)
           for (int k = 0; k < 9; ++k)
-            sum += p[Layout::conv2 + (c * width1 + d) * 9 + k] *
-                   a.pooled1[static_cast<std::size_t>((d * pooled + y + k / 3) * pooled + x + k % 3)];
+            sum +=
+                p[Layout::conv2 + (c * width1 + d) * 9 + k] *
+                a.pooled1[static_cast<std::size_t>((d * pooled + y + k / 3) * pooled + x + k % 3)];
         const auto i = static_cast<std::size_t>((c * side2 + y) * side2 + x);
         a.conv2[i] = sum > 0 ? sum : 0;
         result += p[Layout::head + static_cast<int>(i)] * a.conv2[i];

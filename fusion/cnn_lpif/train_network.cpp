@@ -30,7 +30,8 @@ std::vector<Pair> make_pairs(int count, std::uint32_t seed) {
     if (pairs.size() % 200 == 0) {
       sharp = dead_leaves({200, 200}, random());
       const auto gain = static_cast<float>(uniform(random, 0.3, 1));
-      sharp = sharp * gain + static_cast<float>(uniform(random, 0, 255 * (1 - static_cast<double>(gain))));
+      sharp = sharp * gain +
+              static_cast<float>(uniform(random, 0, 255 * (1 - static_cast<double>(gain))));
       // Sensors blur and have noise: the sharp side is a little soft, both are a little noisy.
       cv::GaussianBlur(sharp, sharp, {}, uniform(random, 0.3, 0.8));
       cv::GaussianBlur(sharp, blurred, {}, uniform(random, 1, 4));
@@ -55,7 +56,8 @@ std::vector<Pair> make_pairs(int count, std::uint32_t seed) {
 /// Logistic loss of "the sharp one scores higher" and its gradient.
 double loss_of(const cnn::Parameters& p, const Pair& pair, cnn::Parameters* gradient) {
   cnn::Activations<float> a, b;
-  const float d = cnn::score(p.data(), pair.sharp.data(), a) - cnn::score(p.data(), pair.blurred.data(), b);
+  const float d =
+      cnn::score(p.data(), pair.sharp.data(), a) - cnn::score(p.data(), pair.blurred.data(), b);
   if (gradient) {
     const float slope = -1 / (1 + std::exp(d));
     cnn::backward(p.data(), pair.sharp.data(), a, slope, gradient->data());
@@ -69,7 +71,8 @@ cnn::Parameters random_start(std::uint32_t seed) {
   cnn::Parameters p{};
   const auto fill = [&](int begin, int end, int fan_in) {
     const double bound = std::sqrt(6.0 / fan_in);  // He et al. 2015
-    for (int i = begin; i < end; ++i) p[static_cast<std::size_t>(i)] = static_cast<float>(uniform(random, -bound, bound));
+    for (int i = begin; i < end; ++i)
+      p[static_cast<std::size_t>(i)] = static_cast<float>(uniform(random, -bound, bound));
   };
   fill(cnn::Layout::conv1, cnn::Layout::bias1, 9);
   fill(cnn::Layout::conv2, cnn::Layout::bias2, 9 * cnn::width1);
@@ -82,7 +85,8 @@ struct Adam {
   int step = 0;
   void apply(cnn::Parameters& p, const cnn::Parameters& g, float rate) {
     ++step;
-    const float c1 = 1 - std::pow(0.9F, static_cast<float>(step)), c2 = 1 - std::pow(0.999F, static_cast<float>(step));
+    const float c1 = 1 - std::pow(0.9F, static_cast<float>(step)),
+                c2 = 1 - std::pow(0.999F, static_cast<float>(step));
     for (std::size_t i = 0; i < p.size(); ++i) {
       first[i] = 0.9F * first[i] + 0.1F * g[i];
       second[i] = 0.999F * second[i] + 0.001F * g[i] * g[i];
@@ -98,9 +102,11 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "train_network OUT.bin [PAIRS] [EPOCHS]\n");
     return 2;
   }
-  const int count = argc > 2 ? std::atoi(argv[2]) : 20000, epochs = argc > 3 ? std::atoi(argv[3]) : 6;
+  const int count = argc > 2 ? std::atoi(argv[2]) : 20000,
+            epochs = argc > 3 ? std::atoi(argv[3]) : 6;
   constexpr int batch = 64, lanes = 8;
-  const std::vector<Pair> train = make_pairs(count, 1), validation = make_pairs(std::max(200, count / 10), 2);
+  const std::vector<Pair> train = make_pairs(count, 1),
+                          validation = make_pairs(std::max(200, count / 10), 2);
   cnn::Parameters parameters = random_start(3);
   Adam adam;
   std::vector<int> order(train.size());
@@ -108,9 +114,11 @@ int main(int argc, char** argv) {
   std::mt19937 random(4);
   fmt::print("epoch,train_loss,validation_accuracy\n");
   for (int epoch = 1; epoch <= epochs; ++epoch) {
-    for (std::size_t i = order.size() - 1; i > 0; --i) std::swap(order[i], order[random() % (i + 1)]);
+    for (std::size_t i = order.size() - 1; i > 0; --i)
+      std::swap(order[i], order[random() % (i + 1)]);
     double total = 0;
-    const float rate = 2e-3F * (1 - 0.9F * static_cast<float>(epoch - 1) / static_cast<float>(epochs));
+    const float rate =
+        2e-3F * (1 - 0.9F * static_cast<float>(epoch - 1) / static_cast<float>(epochs));
     for (std::size_t begin = 0; begin + batch <= order.size(); begin += batch) {
       // Fixed lanes, summed in order: the same network for any thread count.
       std::array<cnn::Parameters, lanes> gradients{};
@@ -118,7 +126,8 @@ int main(int argc, char** argv) {
       parallel_for(lanes, [&](int lane) {
         const auto l = static_cast<std::size_t>(lane);
         for (std::size_t i = l; i < batch; i += lanes)
-          losses[l] += loss_of(parameters, train[static_cast<std::size_t>(order[begin + i])], &gradients[l]);
+          losses[l] +=
+              loss_of(parameters, train[static_cast<std::size_t>(order[begin + i])], &gradients[l]);
       });
       for (std::size_t l = 1; l < lanes; ++l) {
         losses[0] += losses[l];

@@ -32,12 +32,14 @@ Result<cv::Mat> palette_colors(const fusion::Plane& gray, const std::string& nam
 Status TemperatureOverlay::validate() const {
   if (!palette.empty()) ORBITFUSE_TRY(orbitfuse::palette(palette));
   if (!(strength >= 0 && strength <= 1))
-    return fail(ErrorKind::usage, "overlay.strength", fmt::format("{}", strength), "must be in 0..1");
+    return fail(ErrorKind::usage, "overlay.strength", fmt::format("{}", strength),
+                "must be in 0..1");
   return {};
 }
 
-Result<cv::Mat> colored(const fusion::Plane& fused, const cv::Mat& visible, const fusion::Plane& thermal,
-                        const fusion::Plane& measured, const TemperatureOverlay& overlay) {
+Result<cv::Mat> colored(const fusion::Plane& fused, const cv::Mat& visible,
+                        const fusion::Plane& thermal, const fusion::Plane& measured,
+                        const TemperatureOverlay& overlay) {
   cv::Mat bgr = visible;
   if (visible.channels() == 1) cv::cvtColor(visible, bgr, cv::COLOR_GRAY2BGR);
   cv::Mat result = ycrcb_of(bgr);

@@ -49,20 +49,19 @@ struct SkippedShares {
 
 struct FusionReport {
   SkippedShares skipped;
-  double unmeasured = 0;  ///< share of the image where the thermal one holds nothing
+  double unmeasured = 0;          ///< share of the image where the thermal one holds nothing
   std::optional<HeatScale> heat;  ///< by which heat coloured the image
   std::vector<Skip> skips;
   double wall_s = 0;
 };
 
-/// visible: CV_8U or CV_16U, 1 or 3 channels (BGR). thermal: gray, three channels, or floats such as
-/// kelvin with NaN where there is nothing (see thermal_gray); of one size with visible, pixels
-/// corresponding. valid: CV_8UC1, 0 where the thermal image holds nothing (a rendered hole); empty =
-/// wherever it is finite. There the result is the visible image, into which the fused one fades (see
-/// feathered), and the hole's values never reach its surroundings. Returns CV_8UC1, or CV_8UC3 with
-/// color, an overlay or by heat.
-/// Errors (input): types, sizes that differ, below 16 x 16 (heat: any size), no valid pixel; (usage):
-/// options.
+/// visible: CV_8U or CV_16U, 1 or 3 channels (BGR). thermal: gray, three channels, or floats such
+/// as kelvin with NaN where there is nothing (see thermal_gray); of one size with visible, pixels
+/// corresponding. valid: CV_8UC1, 0 where the thermal image holds nothing (a rendered hole); empty
+/// = wherever it is finite. There the result is the visible image, into which the fused one fades
+/// (see feathered), and the hole's values never reach its surroundings. Returns CV_8UC1, or CV_8UC3
+/// with color, an overlay or by heat. Errors (input): types, sizes that differ, below 16 x 16
+/// (heat: any size), no valid pixel; (usage): options.
 Result<cv::Mat> fuse(const cv::Mat& visible, const cv::Mat& thermal, const cv::Mat& valid,
                      const FusionOptions& options, FusionReport* report = nullptr);
 

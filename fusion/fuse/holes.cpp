@@ -16,7 +16,8 @@ Plane filled(const Plane& image, const cv::Mat1b& valid) {
   weighted = image.mul(weight);
   weighted.setTo(0, ~valid);
   const int levels = fusion::pyramid_levels(image.size(), 16, 1);
-  const auto weights = fusion::gaussian_pyramid(weight, levels), sums = fusion::gaussian_pyramid(weighted, levels);
+  const auto weights = fusion::gaussian_pyramid(weight, levels),
+             sums = fusion::gaussian_pyramid(weighted, levels);
   Plane result;
   for (int i = levels; i >= 0; --i) {
     const auto k = static_cast<std::size_t>(i);
@@ -35,7 +36,8 @@ Plane filled(const Plane& image, const cv::Mat1b& valid) {
 }
 
 Plane feathered(const cv::Mat1b& valid) {
-  constexpr double reach = 1.0 / 80;  // of the width: the ramp is seen as soft, and no wider than that
+  constexpr double reach =
+      1.0 / 80;  // of the width: the ramp is seen as soft, and no wider than that
   Plane share, weight;
   valid.convertTo(share, CV_32F, 1.0 / 255);
   cv::GaussianBlur(share, weight, {}, std::max(1.0, reach * valid.cols), 0, cv::BORDER_REPLICATE);
@@ -51,11 +53,16 @@ cv::Rect needed_part(const cv::Mat1b& valid) {
   const cv::Rect box = cv::boundingRect(valid);
   const auto down = [](int i) { return std::max(0, i - reach) / grid * grid; };
   const cv::Point first(down(box.x), down(box.y));
-  const auto up = [](int end, int size) { return std::min(size, (end + reach + grid - 1) / grid * grid); };
-  const cv::Rect part(first, cv::Point(up(box.x + box.width, valid.cols), up(box.y + box.height, valid.rows)));
+  const auto up = [](int end, int size) {
+    return std::min(size, (end + reach + grid - 1) / grid * grid);
+  };
+  const cv::Rect part(
+      first, cv::Point(up(box.x + box.width, valid.cols), up(box.y + box.height, valid.rows)));
   // A strip of the last grid cell may be too narrow for a pyramid.
   const bool large_enough = part.width >= fusion::min_side_px && part.height >= fusion::min_side_px;
-  return large_enough && part.area() < worth * static_cast<double>(valid.total()) ? part : cv::Rect({}, valid.size());
+  return large_enough && part.area() < worth * static_cast<double>(valid.total())
+             ? part
+             : cv::Rect({}, valid.size());
 }
 
 }  // namespace orbitfuse

@@ -14,7 +14,8 @@
 namespace orbitfuse::fusion {
 namespace {
 
-/// Share of the palette left out at its dark end: a faint dark tint reads as a shadow, not as warmth.
+/// Share of the palette left out at its dark end: a faint dark tint reads as a shadow, not as
+/// warmth.
 constexpr double dark_share = 0.35;
 
 struct Coloring {
@@ -27,10 +28,12 @@ struct Coloring {
 /// Of one pixel; `known` is 0..1.
 cv::Vec3f colored_pixel(const cv::Vec3f& visible, double level, double known, const Coloring& how) {
   if (!(known > 0)) return visible;
-  const double share = std::clamp((level - how.scale.usual) / (how.scale.hot - how.scale.usual), 0.0, 1.0);
+  const double share =
+      std::clamp((level - how.scale.usual) / (how.scale.hot - how.scale.usual), 0.0, 1.0);
   const auto weight = static_cast<float>(known * how.opacity * how.scale.strength(level));
   const double luma = 0.114 * visible[0] + 0.587 * visible[1] + 0.299 * visible[2];
-  const auto shade = static_cast<float>(1 - how.shading + how.shading * std::clamp(luma / 255, 0.0, 1.0));
+  const auto shade =
+      static_cast<float>(1 - how.shading + how.shading * std::clamp(luma / 255, 0.0, 1.0));
   const cv::Vec3f color = how.colors[static_cast<std::size_t>(std::lround(255 * share))] * shade;
   return visible + weight * (color - visible);
 }
@@ -48,9 +51,11 @@ bool on_hatching(int x, int y, int period) { return (x + y) % period < std::max(
 
 Status HeatOptions::validate() const {
   ORBITFUSE_TRY(orbitfuse::palette(palette));
-  for (const auto& [field, value] : {std::pair{"opacity", opacity}, {"shading", shading}, {"hatching", hatching}})
+  for (const auto& [field, value] :
+       {std::pair{"opacity", opacity}, {"shading", shading}, {"hatching", hatching}})
     if (!(value >= 0 && value <= 1))
-      return fail(ErrorKind::usage, std::string("heat.") + field, fmt::format("{}", value), "must be in 0..1");
+      return fail(ErrorKind::usage, std::string("heat.") + field, fmt::format("{}", value),
+                  "must be in 0..1");
   if (scale && !scale->is_valid())
     return fail(ErrorKind::usage, "heat.scale", fmt::format("{} to {}", scale->usual, scale->hot),
                 "must rise and be finite");
@@ -76,7 +81,8 @@ Result<cv::Mat> colored_by_heat(const cv::Mat& visible, const Plane& thermal, co
     if (!std::isfinite(thermal(y, x))) return 0.0;
     return measured.empty() ? 1.0 : static_cast<double>(measured(y, x));
   };
-  Coloring how{{}, {}, options.opacity, options.shading, options.hatching, std::max(8, visible.cols / 50)};
+  Coloring how{
+      {}, {}, options.opacity, options.shading, options.hatching, std::max(8, visible.cols / 50)};
   if (options.scale) {
     how.scale = *options.scale;
   } else {
@@ -85,14 +91,15 @@ Result<cv::Mat> colored_by_heat(const cv::Mat& visible, const Plane& thermal, co
     how.scale = heat_scale({seen});
   }
   ORBITFUSE_ASSIGN(const cv::Mat colors, heat_colors(options.palette));
-  for (int i = 0; i < 256; ++i) how.colors[static_cast<std::size_t>(i)] = colors.at<cv::Vec3b>(0, i);
+  for (int i = 0; i < 256; ++i)
+    how.colors[static_cast<std::size_t>(i)] = colors.at<cv::Vec3b>(0, i);
   cv::Mat result(visible.size(), CV_32FC3);
   parallel_blocks(visible.rows, 32, [&](int begin, int end) {
     for (int y = begin; y < end; ++y)
       for (int x = 0; x < visible.cols; ++x) {
         const double share = known(y, x);
-        const cv::Vec3f shown =
-            colored_pixel(visible.at<cv::Vec3f>(y, x), static_cast<double>(thermal(y, x)), share, how);
+        const cv::Vec3f shown = colored_pixel(visible.at<cv::Vec3f>(y, x),
+                                              static_cast<double>(thermal(y, x)), share, how);
         result.at<cv::Vec3f>(y, x) = share < 1 ? hatched(shown, x, y, 1 - share, how) : shown;
       }
   });

@@ -9,18 +9,20 @@
 #include "fusion/pyramid/image_pair.hpp"
 
 // The visible picture with what is warmer than its surroundings coloured: read from a distance, and
-// without a change where nothing is warm. Every pixel is coloured by its own temperature, so there is
-// nothing that could ring or glow round an edge.
+// without a change where nothing is warm. Every pixel is coloured by its own temperature, so there
+// is nothing that could ring or glow round an edge.
 namespace orbitfuse::fusion {
 
 struct HeatOptions {
   std::string palette = "inferno";  ///< one of palette_names()
-  double opacity = 0.85;            ///< of the colour where it is hot; the rest is the visible picture
-  /// Share of the colour's brightness that follows the visible one, so that texture shows through it.
+  double opacity = 0.85;  ///< of the colour where it is hot; the rest is the visible picture
+  /// Share of the colour's brightness that follows the visible one, so that texture shows through
+  /// it.
   double shading = 0.3;
   /// Contrast of the hatching where nothing was measured; 0 = none.
   double hatching = 0.1;
-  /// Of the whole scene, so that equal temperatures look alike in all its views; none: the image's own.
+  /// Of the whole scene, so that equal temperatures look alike in all its views; none: the image's
+  /// own.
   std::optional<HeatScale> scale;
 
   Status validate() const;  ///< usage error naming the field
@@ -32,8 +34,8 @@ struct HeatOptions {
 Result<cv::Mat> colored_by_heat(const cv::Mat& visible, const Plane& thermal, const Plane& measured,
                                 const HeatOptions& options);
 
-/// The colour of a strength (0..1) on its own, BGR 0..255: from where the palette leaves black, which
-/// would look like a shadow, to its end.
+/// The colour of a strength (0..1) on its own, BGR 0..255: from where the palette leaves black,
+/// which would look like a shadow, to its end.
 Result<cv::Mat> heat_colors(const std::string& palette);
 
 /// 0..1 along diagonal stripes, for a pixel where nothing was measured.

@@ -20,8 +20,8 @@ double HeatScale::strength(double level) const {
 }
 
 bool HeatScale::is_valid() const {
-  return std::isfinite(usual) && std::isfinite(hot) && std::isfinite(hot - usual) && hot > usual && spread >= 0 &&
-         std::isfinite(spread);
+  return std::isfinite(usual) && std::isfinite(hot) && std::isfinite(hot - usual) && hot > usual &&
+         spread >= 0 && std::isfinite(spread);
 }
 
 HeatScale heat_scale(const std::vector<cv::Mat>& images, const HeatScaleOptions& options) {
@@ -30,13 +30,15 @@ HeatScale heat_scale(const std::vector<cv::Mat>& images, const HeatScaleOptions&
     CV_Assert(image.empty() || image.type() == CV_32FC1);
     for (int y = 0; y < image.rows; ++y) {
       const float* row = image.ptr<float>(y);
-      std::copy_if(row, row + image.cols, std::back_inserter(samples), [](float v) { return std::isfinite(v); });
+      std::copy_if(row, row + image.cols, std::back_inserter(samples),
+                   [](float v) { return std::isfinite(v); });
     }
   }
   if (samples.empty()) return {0, 0, options.min_width};
   const auto at = [&](double share) {
-    const auto nth = samples.begin() +
-                     static_cast<std::ptrdiff_t>(std::floor(share * static_cast<double>(samples.size() - 1)));
+    const auto nth =
+        samples.begin() +
+        static_cast<std::ptrdiff_t>(std::floor(share * static_cast<double>(samples.size() - 1)));
     std::nth_element(samples.begin(), nth, samples.end());
     return static_cast<double>(*nth);
   };

@@ -12,15 +12,15 @@ struct HeatScale {
   double spread = 0;  ///< how far the surroundings scatter round it
   double hot = 0;     ///< colour at its full strength
 
-  /// 0..1: how unusual a level is. Rises strictly from `usual` to `hot`: a level within the scatter of
-  /// the surroundings counts little, one that stands out counts by its height.
+  /// 0..1: how unusual a level is. Rises strictly from `usual` to `hot`: a level within the scatter
+  /// of the surroundings counts little, one that stands out counts by its height.
   double strength(double level) const;
   bool is_valid() const;  ///< finite, rising, spread not negative
 };
 
 struct HeatScaleOptions {
-  /// Share of samples above `hot`: a bolt as small as 1e-4 of a view still has its own colour, while
-  /// single noisy pixels don't stretch the scale.
+  /// Share of samples above `hot`: a bolt as small as 1e-4 of a view still has its own colour,
+  /// while single noisy pixels don't stretch the scale.
   double hotter_share = 1e-4;
   /// Least `hot` - `usual`, in the image's unit: below it colour would show nothing but noise.
   double min_width = 2;
@@ -30,8 +30,8 @@ struct HeatScaleOptions {
 inline constexpr double min_heat_gray_levels = 16;
 
 /// One scale for all images of a scene (CV_32FC1, NaN and infinite = nothing measured): `usual` is
-/// their median, `spread` the smaller distance to a quartile (the larger one reaches into the sky or
-/// the hot object). Without a finite sample: 0, 0, min_width.
+/// their median, `spread` the smaller distance to a quartile (the larger one reaches into the sky
+/// or the hot object). Without a finite sample: 0, 0, min_width.
 HeatScale heat_scale(const std::vector<cv::Mat>& images, const HeatScaleOptions& options = {});
 
 }  // namespace orbitfuse

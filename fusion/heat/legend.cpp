@@ -20,8 +20,12 @@ struct Layout {
   double font_scale;
 
   explicit Layout(int total)
-      : width(total), margin(std::max(2, total / 40)), bar_height(std::max(4, total / 36)), height(0),
-        swatch(total / 5), font_scale(std::max(0.2, total / 1400.0)) {
+      : width(total),
+        margin(std::max(2, total / 40)),
+        bar_height(std::max(4, total / 36)),
+        height(0),
+        swatch(total / 5),
+        font_scale(std::max(0.2, total / 1400.0)) {
     height = 2 * margin + bar_height + text_height();
   }
   int text_height() const { return static_cast<int>(30 * font_scale) + 2; }
@@ -31,13 +35,15 @@ struct Layout {
 void write(cv::Mat& strip, const std::string& text, cv::Point center_top, const Layout& layout) {
   int baseline = 0;
   const cv::Size size = cv::getTextSize(text, font, layout.font_scale, 1, &baseline);
-  const int x = std::clamp(center_top.x - size.width / 2, 0, std::max(0, layout.width - size.width));
-  cv::putText(strip, text, {x, center_top.y + size.height + 2}, font, layout.font_scale, cv::Scalar::all(32), 1,
-              cv::LINE_AA);
+  const int x =
+      std::clamp(center_top.x - size.width / 2, 0, std::max(0, layout.width - size.width));
+  cv::putText(strip, text, {x, center_top.y + size.height + 2}, font, layout.font_scale,
+              cv::Scalar::all(32), 1, cv::LINE_AA);
 }
 
 std::string label(double level, HeatUnit unit, bool last) {
-  const std::string number = fmt::format("{:.0f}", unit == HeatUnit::kelvin ? celsius_from_kelvin(level) : level);
+  const std::string number =
+      fmt::format("{:.0f}", unit == HeatUnit::kelvin ? celsius_from_kelvin(level) : level);
   return last && unit == HeatUnit::kelvin ? number + " C" : number;
 }
 
@@ -48,8 +54,10 @@ Result<cv::Mat> heat_ramp(const HeatLegend& legend, int width) {
   how.scale = legend.scale;
   Plane level(1, std::max(1, width));
   for (int x = 0; x < level.cols; ++x)
-    level(0, x) = static_cast<float>(legend.scale.usual + (legend.scale.hot - legend.scale.usual) * x / std::max(1, level.cols - 1));
-  ORBITFUSE_ASSIGN(cv::Mat colors, colored_by_heat(cv::Mat(level.size(), CV_32FC3, mid_gray), level, {}, how));
+    level(0, x) = static_cast<float>(legend.scale.usual + (legend.scale.hot - legend.scale.usual) *
+                                                              x / std::max(1, level.cols - 1));
+  ORBITFUSE_ASSIGN(cv::Mat colors,
+                   colored_by_heat(cv::Mat(level.size(), CV_32FC3, mid_gray), level, {}, how));
   colors.convertTo(colors, CV_8U);
   return colors;
 }
@@ -62,7 +70,8 @@ Result<cv::Mat> heat_legend(const HeatLegend& legend, int width) {
   // To the right of the bar the hatching.
   const cv::Size swatches(bar + layout.margin + layout.swatch, layout.bar_height);
   const Plane usual(swatches, static_cast<float>(legend.scale.usual));
-  ORBITFUSE_ASSIGN(cv::Mat colors, colored_by_heat(cv::Mat(swatches, CV_32FC3, mid_gray), usual, Plane::zeros(swatches), how));
+  ORBITFUSE_ASSIGN(cv::Mat colors, colored_by_heat(cv::Mat(swatches, CV_32FC3, mid_gray), usual,
+                                                   Plane::zeros(swatches), how));
   colors.convertTo(colors, CV_8U);
   ORBITFUSE_ASSIGN(const cv::Mat ramp, heat_ramp(legend, bar));
   cv::repeat(ramp, layout.bar_height, 1, colors.colRange(0, bar));
@@ -76,7 +85,8 @@ Result<cv::Mat> heat_legend(const HeatLegend& legend, int width) {
   for (int i = 0; i < ticks; ++i)
     write(strip,
           (i == 0 ? "usual " : "") +
-              label(legend.scale.usual + (legend.scale.hot - legend.scale.usual) * i / (ticks - 1), legend.unit, i + 1 == ticks),
+              label(legend.scale.usual + (legend.scale.hot - legend.scale.usual) * i / (ticks - 1),
+                    legend.unit, i + 1 == ticks),
           {place.x + (bar - 1) * i / (ticks - 1), below}, layout);
   write(strip, "not measured", {place.x + place.width - layout.swatch / 2, below}, layout);
   return strip;

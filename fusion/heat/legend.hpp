@@ -19,11 +19,13 @@ struct HeatLegend {
   HeatOptions how;  ///< as the pictures were coloured
 };
 
-/// The colours alone, CV_8UC3 `width` x 1, from the usual level to the hot one. Usage errors: options.
+/// The colours alone, CV_8UC3 `width` x 1, from the usual level to the hot one. Usage errors:
+/// options.
 Result<cv::Mat> heat_ramp(const HeatLegend& legend, int width);
 
-/// A strip of `width` pixels (CV_8UC3) to put under a picture: the colours over mid gray from the usual
-/// level to the hot one with ticks, and the hatching of "not measured". Usage errors: options.
+/// A strip of `width` pixels (CV_8UC3) to put under a picture: the colours over mid gray from the
+/// usual level to the hot one with ticks, and the hatching of "not measured". Usage errors:
+/// options.
 Result<cv::Mat> heat_legend(const HeatLegend& legend, int width);
 
 /// The picture (CV_8UC3) with the legend of its width below.

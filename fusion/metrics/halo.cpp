@@ -8,9 +8,9 @@
 namespace orbitfuse::metrics {
 namespace {
 
-constexpr int patch_px = 15;             // side of the window that a level is the median of
-constexpr double least_edge = 32;        // gray levels: what counts as an edge of levels
-constexpr double unseen = 8;             // gray levels: a level this near to a source's is that source's
+constexpr int patch_px = 15;       // side of the window that a level is the median of
+constexpr double least_edge = 32;  // gray levels: what counts as an edge of levels
+constexpr double unseen = 8;       // gray levels: a level this near to a source's is that source's
 
 /// Median of the patch round each pixel: textures go, edges stay where they are.
 cv::Mat1b levels(const Plane& plane) {
@@ -31,7 +31,8 @@ cv::Mat1b near_edge(const cv::Mat1b& level) {
 }  // namespace
 
 double halo(const Plane& visible, const Plane& thermal, const Plane& fused) {
-  const cv::Mat1b v = levels(visible), t = levels(thermal), f = levels(fused), near = near_edge(v) | near_edge(t);
+  const cv::Mat1b v = levels(visible), t = levels(thermal), f = levels(fused),
+                  near = near_edge(v) | near_edge(t);
   double sum = 0;
   int count = 0;
   for (int y = 0; y < f.rows; ++y)

@@ -34,7 +34,8 @@ double mutual_information_nats(const Plane& a, const Plane& b) {
   std::array<double, 256> pa{}, pb{};
   for (int y = 0; y < a.rows; ++y) {
     for (int x = 0; x < a.cols; ++x) {
-      const auto i = static_cast<std::size_t>(bin(a(y, x))), j = static_cast<std::size_t>(bin(b(y, x)));
+      const auto i = static_cast<std::size_t>(bin(a(y, x))),
+                 j = static_cast<std::size_t>(bin(b(y, x)));
       joint[256 * i + j] += 1;
       pa[i] += 1;
       pb[j] += 1;

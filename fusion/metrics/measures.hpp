@@ -9,37 +9,42 @@ namespace orbitfuse::metrics {
 
 // statistics.cpp
 double mean(const Plane& f);
-double standard_deviation(const Plane& f);        ///< sqrt(sum (F-mean)^2 / N)
-double spatial_frequency(const Plane& f);         ///< Eskicioglu and Fisher 1995, N = all pixels
-double average_gradient(const Plane& f);          ///< Cui et al. 2015; / ((m-1)(n-1))
-double edge_intensity(const Plane& f);            ///< mean 3x3 Sobel magnitude, border repeated
+double standard_deviation(const Plane& f);  ///< sqrt(sum (F-mean)^2 / N)
+double spatial_frequency(const Plane& f);   ///< Eskicioglu and Fisher 1995, N = all pixels
+double average_gradient(const Plane& f);    ///< Cui et al. 2015; / ((m-1)(n-1))
+double edge_intensity(const Plane& f);      ///< mean 3x3 Sobel magnitude, border repeated
 double mean_squared_error(const Plane& a, const Plane& b);
 double correlation(const Plane& a, const Plane& b);  ///< Pearson; 0 when one is constant
-double psnr_db(double mean_squared);              ///< peak 255, at most identical_psnr_db
+double psnr_db(double mean_squared);                 ///< peak 255, at most identical_psnr_db
 
 // information.cpp
-double entropy_bits(const Plane& f);              ///< 256 bins of the rounded samples, log2
+double entropy_bits(const Plane& f);  ///< 256 bins of the rounded samples, log2
 double mutual_information_nats(const Plane& a, const Plane& b);  ///< 256 bins each, of 0..255
-double cross_entropy_bits(const Plane& source, const Plane& f);  ///< bins that are empty in one: skipped
-double histogram_intersection(const Plane& a, const Plane& b);   ///< sum min(p, q), 256 bins
+double cross_entropy_bits(const Plane& source,
+                          const Plane& f);  ///< bins that are empty in one: skipped
+double histogram_intersection(const Plane& a, const Plane& b);  ///< sum min(p, q), 256 bins
 
 // structure.cpp
-double structural_similarity(const Plane& a, const Plane& b);    ///< Wang 2004: 11x11, sigma 1.5, valid
-/// Xydeas and Petrovic 2000. Without any edge in the sources: 1 if the fused image has none, else 0.
+double structural_similarity(const Plane& a,
+                             const Plane& b);  ///< Wang 2004: 11x11, sigma 1.5, valid
+/// Xydeas and Petrovic 2000. Without any edge in the sources: 1 if the fused image has none, else
+/// 0.
 double edge_transfer(const Plane& visible, const Plane& thermal, const Plane& fused);
 
 // perception.cpp
 struct Perception {
   double qcb = 0;  ///< Chen and Blum 2009; no contrast in source and fused counts as kept
-  double qcv = 0;  ///< Chen and Varshney 2007; lower is better; without edges all blocks weigh alike
+  double qcv =
+      0;  ///< Chen and Varshney 2007; lower is better; without edges all blocks weigh alike
 };
 /// Of planes that went through `stretched`.
 Perception perception(const Plane& visible, const Plane& thermal, const Plane& fused);
 
 // halo.cpp
-/// How far the fused level lies from both sources' within a patch's reach of an edge, gray levels beyond
-/// 8; levels are medians of 15x15 patches. 0: every level beside an edge is one of the sources'. A glow
-/// round a hot part, or a sky half taken from each source, is far from both. 0 without edges.
+/// How far the fused level lies from both sources' within a patch's reach of an edge, gray levels
+/// beyond 8; levels are medians of 15x15 patches. 0: every level beside an edge is one of the
+/// sources'. A glow round a hot part, or a sky half taken from each source, is far from both. 0
+/// without edges.
 double halo(const Plane& visible, const Plane& thermal, const Plane& fused);
 
 }  // namespace orbitfuse::metrics

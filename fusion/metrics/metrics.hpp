@@ -19,8 +19,8 @@ struct MetricValue {
   double value = 0;
 };
 
-/// MV SD EN SF AG EI Qabf MI PSNR RMSE SSIM CE Qcb Qcv SCD CC PSNR_vifb RMSE_vifb SSIM_sum halo of one
-/// fused pair. Images: CV_8U or CV_16U (scaled to 0..255), or CV_32F in 0..255; 1 or 3 channels
+/// MV SD EN SF AG EI Qabf MI PSNR RMSE SSIM CE Qcb Qcv SCD CC PSNR_vifb RMSE_vifb SSIM_sum halo of
+/// one fused pair. Images: CV_8U or CV_16U (scaled to 0..255), or CV_32F in 0..255; 1 or 3 channels
 /// (a gray source beside a colour fused image is repeated); colour: mean over the channels. All
 /// of one size, at least 16 x 16. Errors name the image ("visible", "thermal", "fused").
 Result<std::vector<MetricValue>> fusion_metrics(const cv::Mat& visible, const cv::Mat& thermal,

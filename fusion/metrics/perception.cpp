@@ -44,7 +44,8 @@ std::pair<Plane, Plane> planes_from(const Spectrum& spectrum) {
 /// Frequency of a DFT index in MATLAB's freqspace, -1..1 (1 = Nyquist), here without the shift.
 double unit_frequency(int index, int count) {
   const int half = count / 2;
-  const int signed_index = count % 2 == 0 ? (index < half ? index : index - count) : (index <= half ? index : index - count);
+  const int signed_index = count % 2 == 0 ? (index < half ? index : index - count)
+                                          : (index <= half ? index : index - count);
   return 2.0 * signed_index / count;
 }
 
@@ -113,7 +114,8 @@ double chen_blum(const Plane& cv_, const Plane& ci, const Plane& cf) {
       const double a = cv_(y, x), b = ci(y, x), f = cf(y, x);
       // Saliency a^2 / (a^2 + b^2), without overflow and defined for a = b = 0.
       const double larger = std::max(a, b);
-      const double wa = larger > 0 ? (a / larger) * (a / larger) : 1, wb = larger > 0 ? (b / larger) * (b / larger) : 1;
+      const double wa = larger > 0 ? (a / larger) * (a / larger) : 1,
+                   wb = larger > 0 ? (b / larger) * (b / larger) : 1;
       row += (wa * contrast_kept(a, f) + wb * contrast_kept(b, f)) / (wa + wb);
     }
     sum += row;
@@ -179,7 +181,9 @@ Perception perception(const Plane& v, const Plane& i, const Plane& f) {
       for (int y = 0; y < single.rows; ++y) {
         for (int x = 0; x < single.cols; ++x) {
           const std::complex<double> s = single(y, x);
-          difference(y, x) = sources(y, x) - std::complex<double>(s.real() - s.imag(), s.real() + s.imag());  // (1 + i) s
+          difference(y, x) =
+              sources(y, x) -
+              std::complex<double>(s.real() - s.imag(), s.real() + s.imag());  // (1 + i) s
         }
       }
       std::tie(dv, di) = planes_from(times(difference, sensitivity));

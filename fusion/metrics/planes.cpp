@@ -9,15 +9,24 @@
 namespace orbitfuse::metrics {
 
 Result<std::vector<Plane>> planes_of(const cv::Mat& image, const std::string& name) {
-  if (image.empty()) return fail(ErrorKind::input, name, "empty image", "give an image with pixels");
+  if (image.empty())
+    return fail(ErrorKind::input, name, "empty image", "give an image with pixels");
   double scale = 1;
   switch (image.depth()) {
-    case CV_8U: case CV_32F: case CV_64F: break;
-    case CV_16U: scale = 255.0 / 65535.0; break;
-    default: return fail(ErrorKind::input, name, "samples of an unknown type", "give 8- or 16-bit or float samples");
+    case CV_8U:
+    case CV_32F:
+    case CV_64F:
+      break;
+    case CV_16U:
+      scale = 255.0 / 65535.0;
+      break;
+    default:
+      return fail(ErrorKind::input, name, "samples of an unknown type",
+                  "give 8- or 16-bit or float samples");
   }
   if (image.channels() != 1 && image.channels() != 3) {
-    return fail(ErrorKind::input, name, fmt::format("{} channels", image.channels()), "give 1 or 3 channels");
+    return fail(ErrorKind::input, name, fmt::format("{} channels", image.channels()),
+                "give 1 or 3 channels");
   }
   cv::Mat samples;
   image.convertTo(samples, CV_64F, scale);
@@ -33,14 +42,16 @@ Result<std::vector<Plane>> planes_of(const cv::Mat& image, const std::string& na
 }
 
 Result<std::vector<std::vector<Plane>>> matched_planes(const std::vector<cv::Mat>& images,
-                                                       const std::vector<std::string>& names, int min_side) {
+                                                       const std::vector<std::string>& names,
+                                                       int min_side) {
   std::vector<std::vector<Plane>> all;
   std::size_t channels = 1;
   for (std::size_t i = 0; i < images.size(); ++i) {
     ORBITFUSE_ASSIGN(std::vector<Plane> planes, planes_of(images[i], names[i]));
     if (images[i].size() != images[0].size()) {
       return fail(ErrorKind::input, names[i],
-                  fmt::format("{}x{}, but {} is {}x{}", images[i].cols, images[i].rows, names[0], images[0].cols, images[0].rows),
+                  fmt::format("{}x{}, but {} is {}x{}", images[i].cols, images[i].rows, names[0],
+                              images[0].cols, images[0].rows),
                   "register or resize the images first");
     }
     channels = std::max(channels, planes.size());
@@ -62,7 +73,8 @@ Plane stretched(const Plane& plane) {
   const double span = high - low;
   for (int y = 0; y < plane.rows; ++y) {
     const double* from = plane[y];
-    std::transform(from, from + plane.cols, out[y], [=](double v) { return std::floor((v - low) / span * 255 + 0.5); });
+    std::transform(from, from + plane.cols, out[y],
+                   [=](double v) { return std::floor((v - low) / span * 255 + 0.5); });
   }
   return out;
 }

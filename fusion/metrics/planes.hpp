@@ -17,7 +17,8 @@ Result<std::vector<Plane>> planes_of(const cv::Mat& image, const std::string& na
 
 /// Channels of several images, gray ones repeated to the largest count; error on different sizes.
 Result<std::vector<std::vector<Plane>>> matched_planes(const std::vector<cv::Mat>& images,
-                                                       const std::vector<std::string>& names, int min_side);
+                                                       const std::vector<std::string>& names,
+                                                       int min_side);
 
 /// Stretched to 0..255 and rounded; a constant plane becomes 0 (VIFB leaves it as it is, but then
 /// only zero is defined).

@@ -51,7 +51,8 @@ double average_gradient(const Plane& f) {
     double row = 0;
     for (int x = 0; x < f.cols; ++x) {
       const int left = std::max(0, x - 1), right = std::min(f.cols - 1, x + 1);
-      const double gx = (p[right] - p[left]) / std::max(1, right - left), gy = (b[x] - a[x]) * step_y;
+      const double gx = (p[right] - p[left]) / std::max(1, right - left),
+                   gy = (b[x] - a[x]) * step_y;
       row += std::sqrt((gx * gx + gy * gy) / 2);
     }
     sum += row;

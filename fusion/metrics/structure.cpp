@@ -46,7 +46,8 @@ double preserved(double g, double a, double g_fused, double a_fused) {
   // VIFB's code puts the fused strength itself where both strengths are equal.
   const double strength = g > g_fused ? g_fused / g : g == g_fused ? g_fused : g / g_fused;
   const double direction = 1 - std::abs(a - a_fused) / (std::numbers::pi / 2);
-  return 0.9994 / (1 + std::exp(-15 * (strength - 0.5))) * (0.9879 / (1 + std::exp(-22 * (direction - 0.8))));
+  return 0.9994 / (1 + std::exp(-15 * (strength - 0.5))) *
+         (0.9879 / (1 + std::exp(-22 * (direction - 0.8))));
 }
 
 }  // namespace
@@ -60,7 +61,8 @@ double structural_similarity(const Plane& a, const Plane& b) {
     double row = 0;
     for (int x = 0; x < ma.cols; ++x) {
       const double u = ma(y, x), v = mb(y, x), uv = u * v, uu_vv = u * u + v * v;
-      row += (2 * uv + c1) * (2 * (ab(y, x) - uv) + c2) / ((uu_vv + c1) * (aa(y, x) + bb(y, x) - uu_vv + c2));
+      row += (2 * uv + c1) * (2 * (ab(y, x) - uv) + c2) /
+             ((uu_vv + c1) * (aa(y, x) + bb(y, x) - uu_vv + c2));
     }
     sum += row;
   }
@@ -69,12 +71,14 @@ double structural_similarity(const Plane& a, const Plane& b) {
 
 double edge_transfer(const Plane& visible, const Plane& thermal, const Plane& fused) {
   const Edges v = edges_of(visible), i = edges_of(thermal), f = edges_of(fused);
-  std::vector<double> kept(static_cast<std::size_t>(fused.rows)), total(kept.size()), in_fused(kept.size());
+  std::vector<double> kept(static_cast<std::size_t>(fused.rows)), total(kept.size()),
+      in_fused(kept.size());
   parallel_blocks(fused.rows, 16, [&](int begin, int end) {
     for (int y = begin; y < end; ++y) {
       double row_kept = 0, row_total = 0, row_fused = 0;
       for (int x = 0; x < fused.cols; ++x) {
-        const double gv = v.strength(y, x), gi = i.strength(y, x), gf = f.strength(y, x), af = f.angle(y, x);
+        const double gv = v.strength(y, x), gi = i.strength(y, x), gf = f.strength(y, x),
+                     af = f.angle(y, x);
         if (gv > 0) row_kept += gv * preserved(gv, v.angle(y, x), gf, af);
         if (gi > 0) row_kept += gi * preserved(gi, i.angle(y, x), gf, af);
         row_total += gv + gi;

@@ -16,7 +16,8 @@ void BatchOmp::solve(const Eigen::VectorXf& signal, const OmpStop& stop, SparseC
   code.atoms.clear();
   code.weights.clear();
   const float energy = signal.squaredNorm();
-  const float bound = std::max(stop.residual * stop.residual, stop.relative_residual * stop.relative_residual * energy);
+  const float bound = std::max(stop.residual * stop.residual,
+                               stop.relative_residual * stop.relative_residual * energy);
   code.residual = std::sqrt(energy);
   if (energy <= bound) return;
 
@@ -57,7 +58,10 @@ void BatchOmp::solve(const Eigen::VectorXf& signal, const OmpStop& stop, SparseC
     if (energy - explained <= bound) break;
   }
   auto weights = coefficients_.head(chosen);
-  cholesky_.topLeftCorner(chosen, chosen).triangularView<Eigen::Lower>().transpose().solveInPlace(weights);
+  cholesky_.topLeftCorner(chosen, chosen)
+      .triangularView<Eigen::Lower>()
+      .transpose()
+      .solveInPlace(weights);
   code.weights.assign(weights.data(), weights.data() + chosen);
   code.residual = std::sqrt(std::max(0.0F, energy - explained));
 }

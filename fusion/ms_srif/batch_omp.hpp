@@ -19,8 +19,8 @@ struct SparseCode {
 
 struct OmpStop {
   int max_atoms = patch_size - 1;
-  float residual = 0.8F;           ///< norm at which to stop
-  float relative_residual = 0;     ///< of the signal's norm; the larger of both holds
+  float residual = 0.8F;        ///< norm at which to stop
+  float relative_residual = 0;  ///< of the signal's norm; the larger of both holds
 };
 
 /// Reusable work space of one thread.

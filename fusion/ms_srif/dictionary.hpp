@@ -11,7 +11,8 @@ namespace orbitfuse::fusion {
 inline constexpr int patch_side = 8;
 inline constexpr int patch_size = patch_side * patch_side;
 
-/// Atoms of 8x8 patches in columns (row-major samples), unit length, mean 0, with their Gram matrix.
+/// Atoms of 8x8 patches in columns (row-major samples), unit length, mean 0, with their Gram
+/// matrix.
 class Dictionary {
  public:
   /// Input error for another row count, no atom, or samples that are not finite. Atoms of length

@@ -10,7 +10,7 @@ namespace orbitfuse::fusion {
 
 struct KsvdOptions {
   int atoms = 256;
-  int nonzeros = 6;      ///< a patch while training
+  int nonzeros = 6;  ///< a patch while training
   int iterations = 20;
   std::uint32_t seed = 1;
 };

@@ -39,7 +39,8 @@ struct Coder {
       : certain_ratio(static_cast<float>(options.certain_ratio)),
         stop{options.max_atoms, static_cast<float>(options.residual * patch_side),
              static_cast<float>(options.relative_residual)},
-        dictionary(dictionary_), omp(dictionary_) {}
+        dictionary(dictionary_),
+        omp(dictionary_) {}
 
   void fuse_coded(float mean_v, float mean_t, Tally& tally) {
     omp.solve(v, stop, code_v);
@@ -48,7 +49,9 @@ struct Coder {
     tally.atoms += static_cast<long>(code_v.atoms.size() + code_t.atoms.size());
     const float activity_v = code_v.l1(), activity_t = code_t.l1();
     // Two flat patches have no winner; their mean level doesn't flicker between the sources.
-    const float mean = activity_v > activity_t ? mean_v : activity_t > activity_v ? mean_t : (mean_v + mean_t) / 2;
+    const float mean = activity_v > activity_t   ? mean_v
+                       : activity_t > activity_v ? mean_t
+                                                 : (mean_v + mean_t) / 2;
     const SparseCode& code = activity_v > activity_t ? code_v : code_t;
     fused.setConstant(mean);
     for (std::size_t i = 0; i < code.atoms.size(); ++i)
@@ -59,7 +62,8 @@ struct Coder {
     const float mean_v = cut(visible, x, y, v), mean_t = cut(thermal, x, y, t);
     tally.patches += 2;
     if (certain_ratio > 0) {
-      const float a = patch_activity(visible, x, y).structure, b = patch_activity(thermal, x, y).structure;
+      const float a = patch_activity(visible, x, y).structure,
+                  b = patch_activity(thermal, x, y).structure;
       if (std::max(a, b) > certain_ratio * std::min(a, b)) {
         fused = a > b ? v.array() + mean_v : t.array() + mean_t;
         tally.certain += 2;
@@ -78,8 +82,9 @@ struct Coder {
 };
 
 /// Fused patches of one row of corners, in the order of `xs`.
-std::vector<Eigen::VectorXf> fuse_row(const Plane& visible, const Plane& thermal, const std::vector<int>& xs, int y,
-                                      Coder& coder, Tally& tally) {
+std::vector<Eigen::VectorXf> fuse_row(const Plane& visible, const Plane& thermal,
+                                      const std::vector<int>& xs, int y, Coder& coder,
+                                      Tally& tally) {
   std::vector<Eigen::VectorXf> fused;
   for (const int x : xs) {
     coder.fuse(visible, thermal, x, y, tally);
@@ -90,7 +95,8 @@ std::vector<Eigen::VectorXf> fuse_row(const Plane& visible, const Plane& thermal
 
 Plane fuse_base(const Plane& visible, const Plane& thermal, const MsSrifOptions& options,
                 const Dictionary& dictionary, MsSrifReport& report) {
-  const std::vector<int> xs = corners(visible.cols, options.stride_px), ys = corners(visible.rows, options.stride_px);
+  const std::vector<int> xs = corners(visible.cols, options.stride_px),
+                         ys = corners(visible.rows, options.stride_px);
   std::vector<std::vector<Eigen::VectorXf>> rows(ys.size());
   std::vector<Tally> tallies(ys.size());
   parallel_for(static_cast<int>(ys.size()), [&](int i) {
@@ -122,8 +128,10 @@ Status MsSrifOptions::validate() const {
     return fail(ErrorKind::usage, std::string("ms_srif.") + field, fmt::format("{}", value), rule);
   };
   if (levels < 0 || levels > 12) return bad("levels", levels, "must be in 0..12");
-  if (stride_px < 1 || stride_px > patch_side) return bad("stride_px", stride_px, "must be in 1..8");
-  if (max_atoms < 1 || max_atoms > patch_size) return bad("max_atoms", max_atoms, "must be in 1..64");
+  if (stride_px < 1 || stride_px > patch_side)
+    return bad("stride_px", stride_px, "must be in 1..8");
+  if (max_atoms < 1 || max_atoms > patch_size)
+    return bad("max_atoms", max_atoms, "must be in 1..64");
   if (!(residual >= 0 && residual <= 255)) return bad("residual", residual, "must be in 0..255");
   if (!(certain_ratio == 0 || (certain_ratio >= 1 && certain_ratio <= 1e6)))
     return bad("certain_ratio", certain_ratio, "must be 0 (off) or in 1..1e6");
@@ -145,15 +153,16 @@ Result<Plane> fuse_ms_srif(const Plane& visible, const Plane& thermal, const MsS
   }
   const int levels = pyramid_levels(visible.size(), options.levels, patch_side);
   LaplacianPyramid v, t;
-  parallel_for(2, [&](int i) {
-    (i == 0 ? v : t) = laplacian_pyramid(i == 0 ? visible : thermal, levels);
-  });
+  parallel_for(
+      2, [&](int i) { (i == 0 ? v : t) = laplacian_pyramid(i == 0 ? visible : thermal, levels); });
   LaplacianPyramid fused;
   for (std::size_t i = 0; i < v.bands.size(); ++i) {
     const bool skip = silent(v.bands[i], t.bands[i]);
     if (skip) said.levels_skipped += 1.0 / levels;
-    fused.bands.push_back(skip ? t.bands[i]
-                               : Plane(t.bands[i] + share_by_magnitude(v.bands[i], t.bands[i]).mul(v.bands[i] - t.bands[i])));
+    fused.bands.push_back(
+        skip ? t.bands[i]
+             : Plane(t.bands[i] +
+                     share_by_magnitude(v.bands[i], t.bands[i]).mul(v.bands[i] - t.bands[i])));
   }
   fused.base = fuse_base(v.base, t.base, options, dictionary, said);
   return collapse(fused);

@@ -9,15 +9,17 @@
 namespace orbitfuse::fusion {
 
 struct MsSrifOptions {
-  int levels = 4;         ///< of the pyramid; fewer where the base would be smaller than a patch
-  int stride_px = 2;      ///< between patches of the base
+  int levels = 4;     ///< of the pyramid; fewer where the base would be smaller than a patch
+  int stride_px = 2;  ///< between patches of the base
   int max_atoms = 63;
-  double residual = 0.1;  ///< gray levels RMS at which a patch counts as coded; flat patches end here
+  double residual =
+      0.1;  ///< gray levels RMS at which a patch counts as coded; flat patches end here
   /// A patch is coded when this share of its norm is left: textured patches need no finer code to
   /// be compared. 0 = the reference's stop. See docs/notes/fusion.md.
   double relative_residual = 0.01;
   /// No code is sought where the structure of one patch (L1 norm of its DCT) is this many times the
-  /// other's: the codes would agree, and the winner itself is what its code comes close to. 0 = off.
+  /// other's: the codes would agree, and the winner itself is what its code comes close to. 0 =
+  /// off.
   double certain_ratio = 1.5;
 
   Status validate() const;  ///< usage error naming the field

@@ -25,8 +25,10 @@ Eigen::MatrixXf cut_patches(int count) {
       const int reductions = static_cast<int>(random() % 4);
       image = gaussian_pyramid(dead_leaves({256, 256}, random()), reductions).back();
     }
-    const int x = static_cast<int>(random() % static_cast<std::uint32_t>(image.cols - patch_side + 1));
-    const int y = static_cast<int>(random() % static_cast<std::uint32_t>(image.rows - patch_side + 1));
+    const int x =
+        static_cast<int>(random() % static_cast<std::uint32_t>(image.cols - patch_side + 1));
+    const int y =
+        static_cast<int>(random() % static_cast<std::uint32_t>(image.rows - patch_side + 1));
     Eigen::VectorXf patch(patch_size);
     for (int i = 0; i < patch_size; ++i) patch[i] = image(y + i / patch_side, x + i % patch_side);
     patch.array() -= patch.mean();

@@ -28,11 +28,12 @@ cv::Vec2d pca_weights(const Plane& a, const Plane& b) {
   const double angle = 0.5 * std::atan2(2 * ab, aa - bb);
   double wa = std::cos(angle), wb = std::sin(angle);
   if (wa * wb < 0) wa = std::sqrt(aa), wb = std::sqrt(bb);
-  return {std::abs(wa) / (std::abs(wa) + std::abs(wb)), std::abs(wb) / (std::abs(wa) + std::abs(wb))};
+  return {std::abs(wa) / (std::abs(wa) + std::abs(wb)),
+          std::abs(wb) / (std::abs(wa) + std::abs(wb))};
 }
 
-Result<Plane> fuse_pca_msif(const Plane& visible, const Plane& thermal, const PcaMsifOptions& options,
-                            PcaMsifReport* report) {
+Result<Plane> fuse_pca_msif(const Plane& visible, const Plane& thermal,
+                            const PcaMsifOptions& options, PcaMsifReport* report) {
   ORBITFUSE_TRY(options.validate());
   ORBITFUSE_TRY(check_pair(visible, thermal));
   PcaMsifReport own;

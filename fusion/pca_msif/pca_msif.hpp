@@ -4,8 +4,8 @@
 #include "fusion/pca_msif/smoother.hpp"
 
 // PCA-MSIF: base and detail by fourth-order diffusion, details weighted by the principal component
-// of their covariance, bases averaged (Bavirisetti, Xiao, Liu 2017, "Multi-sensor image fusion based
-// on fourth order partial differential equations").
+// of their covariance, bases averaged (Bavirisetti, Xiao, Liu 2017, "Multi-sensor image fusion
+// based on fourth order partial differential equations").
 namespace orbitfuse::fusion {
 
 struct PcaMsifOptions {
@@ -19,12 +19,12 @@ struct PcaMsifOptions {
 cv::Vec2d pca_weights(const Plane& a, const Plane& b);
 
 struct PcaMsifReport {
-  cv::Vec2d weights;  ///< visible, thermal
+  cv::Vec2d weights;     ///< visible, thermal
   bool skipped = false;  ///< the images are identical: returned as they are
 };
 
 /// Errors: check_pair's, usage.
-Result<Plane> fuse_pca_msif(const Plane& visible, const Plane& thermal, const PcaMsifOptions& options,
-                            PcaMsifReport* report = nullptr);
+Result<Plane> fuse_pca_msif(const Plane& visible, const Plane& thermal,
+                            const PcaMsifOptions& options, PcaMsifReport* report = nullptr);
 
 }  // namespace orbitfuse::fusion

@@ -22,8 +22,12 @@ constexpr int pad = 2;  // columns beside a row, so that the inner loops have no
 class PaddedRows {
  public:
   PaddedRows(int count, int cols)
-      : count_(count), cols_(cols), data_(static_cast<std::size_t>(count) * static_cast<std::size_t>(cols + 2 * pad)) {}
-  float* row(int y) { return data_.data() + static_cast<std::ptrdiff_t>(y % count_) * (cols_ + 2 * pad) + pad; }
+      : count_(count),
+        cols_(cols),
+        data_(static_cast<std::size_t>(count) * static_cast<std::size_t>(cols + 2 * pad)) {}
+  float* row(int y) {
+    return data_.data() + static_cast<std::ptrdiff_t>(y % count_) * (cols_ + 2 * pad) + pad;
+  }
   void mirror_ends(int y) {
     float* r = row(y);
     for (int i = 1; i <= pad; ++i) {
@@ -44,16 +48,20 @@ struct Field {
   float inverse_k2;
 };
 
-/// One time step on its way down the image. Row y of the flux needs image rows y -+ reach before the
-/// step, row y of the step needs flux rows y -+ reach; so the step follows `reach` rows behind the
-/// flux, and only 2 reach + 1 rows of flux are kept. The stencil's scale is in inverse_k2 and in dt.
+/// One time step on its way down the image. Row y of the flux needs image rows y -+ reach before
+/// the step, row y of the step needs flux rows y -+ reach; so the step follows `reach` rows behind
+/// the flux, and only 2 reach + 1 rows of flux are kept. The stencil's scale is in inverse_k2 and
+/// in dt.
 template <int reach>
 class TimeStep {
  public:
   /// new_conductivity: taken from the image before this step; otherwise the last taken one holds.
   TimeStep(Field& field, float dt, bool new_conductivity)
-      : field_(&field), dt_(dt), new_conductivity_(new_conductivity),
-        xx_(2 * reach + 1, field.size.width), yy_(2 * reach + 1, field.size.width) {}
+      : field_(&field),
+        dt_(dt),
+        new_conductivity_(new_conductivity),
+        xx_(2 * reach + 1, field.size.width),
+        yy_(2 * reach + 1, field.size.width) {}
 
   void advance(int y) {
     const int rows = field_->size.height;
@@ -67,7 +75,8 @@ class TimeStep {
   void flux(int y) {
     const cv::Size size = field_->size;
     const float inverse_k2 = field_->inverse_k2;
-    const float *c = field_->image.row(y), *up = field_->image.row(mirrored(y - reach, size.height)),
+    const float *c = field_->image.row(y),
+                *up = field_->image.row(mirrored(y - reach, size.height)),
                 *down = field_->image.row(mirrored(y + reach, size.height));
     float *xx = xx_.row(y), *yy = yy_.row(y), *conductivity = field_->conductivity.row(y);
 #pragma GCC ivdep  // too many rows for the compiler's own overlap checks
@@ -109,7 +118,8 @@ constexpr std::size_t steps_at_once = 10;
 std::vector<std::vector<double>> schedule(const SmootherOptions& options) {
   const auto count = static_cast<std::size_t>(options.iterations);
   if (options.cycles == 0 || count == 0) return std::vector(count, std::vector{options.time_step});
-  const double limit = largest_stable_step(options.stencil), time = options.iterations * options.time_step;
+  const double limit = largest_stable_step(options.stencil),
+               time = options.iterations * options.time_step;
   const double cycles = std::max<double>(options.cycles, std::ceil(time / longest_cycle(limit)));
   return std::vector(static_cast<std::size_t>(cycles), fast_explicit_steps(time / cycles, limit));
 }
@@ -131,7 +141,8 @@ Plane diffused(const Plane& input, const SmootherOptions& options) {
     const int count = static_cast<int>(std::min(steps_at_once, steps.size() - first));
     // A step may work on row y once the one before has left row y + reach, 2 reach rows ahead.
     for (int front = 0; front < input.rows + reach + 2 * reach * (count - 1); ++front)
-      for (int k = 0; k < count; ++k) steps[first + static_cast<std::size_t>(k)].advance(front - 2 * reach * k);
+      for (int k = 0; k < count; ++k)
+        steps[first + static_cast<std::size_t>(k)].advance(front - 2 * reach * k);
   }
   Plane result(input.size());
   for (int y = 0; y < input.rows; ++y) std::copy_n(field.image.row(y), input.cols, result[y]);
@@ -144,21 +155,25 @@ double largest_stable_step(Stencil stencil) { return stencil == Stencil::wide ? 
 
 Status SmootherOptions::validate() const {
   const auto bad = [](const char* field, double value, const std::string& rule) {
-    return fail(ErrorKind::usage, std::string("pca_msif.smoother.") + field, fmt::format("{}", value), rule);
+    return fail(ErrorKind::usage, std::string("pca_msif.smoother.") + field,
+                fmt::format("{}", value), rule);
   };
-  if (iterations < 0 || iterations > 10000) return bad("iterations", iterations, "must be in 0..10000");
+  if (iterations < 0 || iterations > 10000)
+    return bad("iterations", iterations, "must be in 0..10000");
   if (cycles < 0 || cycles > 10000) return bad("cycles", cycles, "must be in 0..10000");
   const double limit = largest_stable_step(stencil);
   if (!(time_step > 0 && time_step <= limit))
     return bad("time_step", time_step,
                fmt::format("must be in (0, {}]: beyond it the {} stencil diverges", limit,
                            stencil == Stencil::wide ? "wide" : "compact"));
-  if (!(edge_scale > 0 && edge_scale <= 1e6)) return bad("edge_scale", edge_scale, "must be in (0, 1e6]");
+  if (!(edge_scale > 0 && edge_scale <= 1e6))
+    return bad("edge_scale", edge_scale, "must be in (0, 1e6]");
   return {};
 }
 
 Plane smooth(const Plane& image, const SmootherOptions& options) {
-  return options.stencil == Stencil::wide ? diffused<2>(image, options) : diffused<1>(image, options);
+  return options.stencil == Stencil::wide ? diffused<2>(image, options)
+                                          : diffused<1>(image, options);
 }
 
 }  // namespace orbitfuse::fusion

@@ -20,7 +20,7 @@ struct SmootherOptions {
   /// Cycles of fast explicit diffusion that reach the time iterations * time_step in far fewer
   /// steps; conductivities are taken once a cycle. 0 = the paper's plain steps.
   int cycles = 2;
-  double edge_scale = 4;   ///< k, gray levels: second differences above it are kept as edges
+  double edge_scale = 4;  ///< k, gray levels: second differences above it are kept as edges
   Stencil stencil = Stencil::wide;
 
   /// Usage error naming the field; a time step beyond the stencil's limit diverges and is refused.

@@ -9,9 +9,9 @@ namespace orbitfuse::fusion {
 /// Neither band exceeds a quarter of a gray level anywhere: no choice between them can be seen.
 bool silent(const Plane& visible, const Plane& thermal);
 
-/// Weight of the visible coefficient, 0..1: the larger maximum of |.| over 3x3 chooses, the majority
-/// of 5x5 choices holds (reference: 3x3), which removes lone switches, and choices are averaged over
-/// 3x3, so that a border between sources is a ramp instead of a seam.
+/// Weight of the visible coefficient, 0..1: the larger maximum of |.| over 3x3 chooses, the
+/// majority of 5x5 choices holds (reference: 3x3), which removes lone switches, and choices are
+/// averaged over 3x3, so that a border between sources is a ramp instead of a seam.
 Plane share_by_magnitude(const Plane& visible, const Plane& thermal);
 
 }  // namespace orbitfuse::fusion

@@ -10,7 +10,8 @@ namespace orbitfuse::fusion {
 Status check_pair(const cv::Mat& visible, const cv::Mat& thermal) {
   for (const auto& [image, name] : {std::pair{&visible, "visible"}, {&thermal, "thermal"}}) {
     if (image->type() != CV_32FC1)
-      return fail(ErrorKind::input, name, "not one channel of floats", "convert it to CV_32FC1, 0..255");
+      return fail(ErrorKind::input, name, "not one channel of floats",
+                  "convert it to CV_32FC1, 0..255");
     if (image->cols < min_side_px || image->rows < min_side_px)
       return fail(ErrorKind::input, name, fmt::format("{}x{} pixels", image->cols, image->rows),
                   fmt::format("fusion needs at least {0}x{0}", min_side_px));

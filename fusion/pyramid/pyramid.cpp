@@ -8,8 +8,8 @@ namespace orbitfuse::fusion {
 
 int pyramid_levels(cv::Size size, int wanted, int min_base_px) {
   int levels = 0;
-  for (int side = std::min(size.width, size.height); levels < wanted && (side + 1) / 2 >= min_base_px;
-       side = (side + 1) / 2)
+  for (int side = std::min(size.width, size.height);
+       levels < wanted && (side + 1) / 2 >= min_base_px; side = (side + 1) / 2)
     ++levels;
   return levels;
 }

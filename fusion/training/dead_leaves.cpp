@@ -24,11 +24,14 @@ cv::Mat1b leaf(cv::Size size, cv::Point center, double radius, std::mt19937& ran
   const double angle = uniform(random, 0, 360), aspect = uniform(random, 0.3, 1);
   const cv::Size2d axes(radius, radius * aspect);
   if (uniform(random, 0, 1) < 0.5) {
-    cv::ellipse(mask, cv::RotatedRect(center, cv::Size2d(2 * axes.width, 2 * axes.height), static_cast<float>(angle)),
+    cv::ellipse(mask,
+                cv::RotatedRect(center, cv::Size2d(2 * axes.width, 2 * axes.height),
+                                static_cast<float>(angle)),
                 255, cv::FILLED, cv::LINE_AA);
   } else {
     cv::Point2f corners[4];
-    cv::RotatedRect(center, cv::Size2d(2 * axes.width, 2 * axes.height), static_cast<float>(angle)).points(corners);
+    cv::RotatedRect(center, cv::Size2d(2 * axes.width, 2 * axes.height), static_cast<float>(angle))
+        .points(corners);
     std::vector<cv::Point> polygon(corners, corners + 4);
     cv::fillConvexPoly(mask, polygon, 255, cv::LINE_AA);
   }
@@ -49,22 +52,25 @@ Plane dead_leaves(cv::Size size, std::uint32_t seed) {
   for (int i = 0; i < 700; ++i) {
     // Cubic law of sizes: the image looks alike at every scale.
     const double u = uniform(random, 0, 1);
-    const double radius = smallest / std::sqrt(1 - u * (1 - (smallest / largest) * (smallest / largest)));
+    const double radius =
+        smallest / std::sqrt(1 - u * (1 - (smallest / largest) * (smallest / largest)));
     const cv::Point center(static_cast<int>(uniform(random, 0, size.width)),
                            static_cast<int>(uniform(random, 0, size.height)));
     const auto reach = static_cast<int>(1.5 * radius) + 2;
-    const cv::Rect box = cv::Rect(center.x - reach, center.y - reach, 2 * reach, 2 * reach) &
-                         cv::Rect({}, size);
+    const cv::Rect box =
+        cv::Rect(center.x - reach, center.y - reach, 2 * reach, 2 * reach) & cv::Rect({}, size);
     if (box.empty()) continue;
     const cv::Mat1b mask = leaf(box.size(), center - box.tl(), radius, random);
-    const double shade = uniform(random, 0, 255), strength = std::pow(uniform(random, 0, 1), 3) * 60;
+    const double shade = uniform(random, 0, 255),
+                 strength = std::pow(uniform(random, 0, 1), 3) * 60;
     const double gx = uniform(random, -0.6, 0.6), gy = uniform(random, -0.6, 0.6);
     const Plane texture = grains[random() % 3](box);
     for (int y = 0; y < box.height; ++y)
       for (int x = 0; x < box.width; ++x) {
         const float a = static_cast<float>(mask(y, x)) / 255;
-        const auto v = static_cast<float>(shade + gx * (x - box.width / 2.0) + gy * (y - box.height / 2.0)) +
-                       static_cast<float>(strength) * texture(y, x);
+        const auto v =
+            static_cast<float>(shade + gx * (x - box.width / 2.0) + gy * (y - box.height / 2.0)) +
+            static_cast<float>(strength) * texture(y, x);
         float& pixel = image(box.y + y, box.x + x);
         pixel += a * (std::clamp(v, 0.0F, 255.0F) - pixel);
       }

@@ -10,7 +10,8 @@ namespace {
 
 float percentile(cv::Mat values, double share) {
   std::vector<float> v(values.begin<float>(), values.end<float>());
-  const auto place = v.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(v.size() - 1));
+  const auto place =
+      v.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(v.size() - 1));
   std::nth_element(v.begin(), place, v.end());
   return *place;
 }

@@ -210,9 +210,8 @@ class KeyframeScene {
       const double finer = key.camera.fx / camera.fx;
       const double wide = (key.camera.width / key.camera.fx) / (camera.width / camera.fx);
       if (finer < 0.97 || wide < 1) continue;
-      const double turned = std::max(
-          apart_deg(key.cam_from_world, cam),
-          rotation_angle_deg(key.cam_from_world.rotation, cam.rotation));
+      const double turned = std::max(apart_deg(key.cam_from_world, cam),
+                                     rotation_angle_deg(key.cam_from_world.rotation, cam.rotation));
       const double nearer = std::abs(std::log(distance(cam) / distance(key.cam_from_world)));
       if (turned > least || nearer > options_.max_distance_change) continue;
       best = &key, least = turned;

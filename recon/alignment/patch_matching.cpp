@@ -41,8 +41,8 @@ struct FieldPlanes {
 };
 
 /// Correlation of edge pixels with the image over a square of shifts.
-cv::Mat1f correlation(const std::vector<EdgePixel>& pixels, const FieldPlanes& field, int cx, int cy,
-                      int reach) {
+cv::Mat1f correlation(const std::vector<EdgePixel>& pixels, const FieldPlanes& field, int cx,
+                      int cy, int reach) {
   cv::Mat1f score = cv::Mat1f::zeros(2 * reach + 1, 2 * reach + 1);
   for (const EdgePixel& p : pixels)
     for (int dy = -reach; dy <= reach; ++dy) {
@@ -59,7 +59,8 @@ cv::Mat1f correlation(const std::vector<EdgePixel>& pixels, const FieldPlanes& f
 
 double strength_squared(const std::vector<EdgePixel>& pixels) {
   double sum = 0;
-  for (const EdgePixel& p : pixels) sum += static_cast<double>(p.strength) * static_cast<double>(p.strength);
+  for (const EdgePixel& p : pixels)
+    sum += static_cast<double>(p.strength) * static_cast<double>(p.strength);
   return sum;
 }
 
@@ -68,7 +69,7 @@ struct Peak {
   Eigen::Vector2d shift;
   Eigen::Matrix2d curvature;  ///< minus the Hessian, positive definite at a true peak
   double value = 0;
-  bool inside = false;        ///< not on the border of the search
+  bool inside = false;  ///< not on the border of the search
 };
 
 Peak peak_of(const cv::Mat1f& score, int reach) {
@@ -86,7 +87,8 @@ Peak peak_of(const cv::Mat1f& score, int reach) {
   const double xy = (s(1, 1) - s(1, -1) - s(-1, 1) + s(-1, -1)) / 4;
   peak.curvature << -xx, -xy, -xy, -yy;
   const Eigen::Vector2d gradient((s(1, 0) - s(-1, 0)) / 2, (s(0, 1) - s(0, -1)) / 2);
-  if (peak.curvature.determinant() > 1e-6 * peak.curvature.squaredNorm() && peak.curvature.trace() > 0) {
+  if (peak.curvature.determinant() > 1e-6 * peak.curvature.squaredNorm() &&
+      peak.curvature.trace() > 0) {
     const Eigen::Vector2d step = peak.curvature.inverse() * gradient;
     if (step.cwiseAbs().maxCoeff() <= 1) peak.shift += step;
   }
@@ -116,7 +118,8 @@ cv::Mat rendered_edges(const SceneRender& render) {
       const float z = render.depth.at<float>(y, x);
       inverse.at<float>(y, x) = z > 0 ? 1 / z : 0;
     }
-  const cv::Mat form = orientation_field(inverse, 1.0), shade = orientation_field(render.brightness, 1.0);
+  const cv::Mat form = orientation_field(inverse, 1.0),
+                shade = orientation_field(render.brightness, 1.0);
   // An edge of form shows in both modalities, one of paint perhaps: form counts more.
   constexpr float paint = 0.6F;
   cv::Mat edges = form.clone();
@@ -129,14 +132,16 @@ cv::Mat rendered_edges(const SceneRender& render) {
   return edges;
 }
 
-std::vector<PatchMatch> match_patches(const SceneRender& render, const cv::Mat& edges, const Camera& camera,
-                                      const cv::Mat& field, const PatchMatchOptions& options) {
+std::vector<PatchMatch> match_patches(const SceneRender& render, const cv::Mat& edges,
+                                      const Camera& camera, const cv::Mat& field,
+                                      const PatchMatchOptions& options) {
   const std::vector<EdgePixel> all = edge_pixels(edges, 0.25F);
   std::vector<PatchMatch> matches;
   if (all.size() < 20) return matches;
   const FieldPlanes planes(field);
   const Peak whole = peak_of(correlation(all, planes, 0, 0, options.search_px), options.search_px);
-  const int sx = static_cast<int>(std::lround(whole.shift.x())), sy = static_cast<int>(std::lround(whole.shift.y()));
+  const int sx = static_cast<int>(std::lround(whole.shift.x())),
+            sy = static_cast<int>(std::lround(whole.shift.y()));
   const cv::Mat energy = planes.re.mul(planes.re) + planes.im.mul(planes.im);
   const int r = options.radius_px;
   for (int cy = options.spacing_px / 2; cy < edges.rows; cy += options.spacing_px)
@@ -145,14 +150,17 @@ std::vector<PatchMatch> match_patches(const SceneRender& render, const cv::Mat& 
       for (const EdgePixel& p : all)
         if (std::abs(p.x - cx) <= r && std::abs(p.y - cy) <= r) patch.push_back(p);
       if (patch.size() < 12) continue;
-      const Peak peak = peak_of(correlation(patch, planes, sx, sy, options.patch_search_px), options.patch_search_px);
+      const Peak peak = peak_of(correlation(patch, planes, sx, sy, options.patch_search_px),
+                                options.patch_search_px);
       if (!peak.inside || !(peak.value > 0)) continue;
       // Normalised by the image's own strength under the patch's edge pixels.
       double there = 0;
       const Eigen::Vector2d shift = peak.shift + Eigen::Vector2d(sx, sy);
       for (const EdgePixel& p : patch) {
-        const int x = p.x + static_cast<int>(std::lround(shift.x())), y = p.y + static_cast<int>(std::lround(shift.y()));
-        if (x >= 0 && y >= 0 && x < field.cols && y < field.rows) there += static_cast<double>(energy.at<float>(y, x));
+        const int x = p.x + static_cast<int>(std::lround(shift.x())),
+                  y = p.y + static_cast<int>(std::lround(shift.y()));
+        if (x >= 0 && y >= 0 && x < field.cols && y < field.rows)
+          there += static_cast<double>(energy.at<float>(y, x));
       }
       const double score = peak.value / std::sqrt(std::max(1e-9, there * strength_squared(patch)));
       // Edges that the image shows only faintly must not count as a perfect match.
@@ -161,7 +169,8 @@ std::vector<PatchMatch> match_patches(const SceneRender& render, const cv::Mat& 
       const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(peak.curvature);
       const Eigen::Vector2d values = eigen.eigenvalues().cwiseMax(0);
       if (!(values.maxCoeff() > 0)) continue;
-      const Eigen::Matrix2d root = eigen.eigenvectors() * (values / values.maxCoeff()).cwiseSqrt().asDiagonal() *
+      const Eigen::Matrix2d root = eigen.eigenvectors() *
+                                   (values / values.maxCoeff()).cwiseSqrt().asDiagonal() *
                                    eigen.eigenvectors().transpose();
       // The strongest edge pixel nearest to the patch's centre stands for it.
       const EdgePixel* anchor = nullptr;
@@ -169,12 +178,13 @@ std::vector<PatchMatch> match_patches(const SceneRender& render, const cv::Mat& 
       for (const EdgePixel& p : patch) {
         const double distance = std::hypot(p.x - cx, p.y - cy);
         const double value = static_cast<double>(p.strength) / (1 + distance / r);
-        if (value > best && std::isfinite(near_depth(render.depth, p.x, p.y))) best = value, anchor = &p;
+        if (value > best && std::isfinite(near_depth(render.depth, p.x, p.y)))
+          best = value, anchor = &p;
       }
       if (!anchor) continue;
       const Eigen::Vector2d pixel(anchor->x + 0.5, anchor->y + 0.5);
-      matches.push_back({camera.ray_of(pixel) * near_depth(render.depth, anchor->x, anchor->y), pixel + shift, root,
-                         score * std::min(1.0, coverage)});
+      matches.push_back({camera.ray_of(pixel) * near_depth(render.depth, anchor->x, anchor->y),
+                         pixel + shift, root, score * std::min(1.0, coverage)});
     }
   return matches;
 }

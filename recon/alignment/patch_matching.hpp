@@ -11,10 +11,11 @@ namespace orbitfuse {
 
 /// A rendered patch found in an image.
 struct PatchMatch {
-  Eigen::Vector3d point;       ///< in the rendering camera
-  Eigen::Vector2d seen;        ///< pixel of the image
-  Eigen::Matrix2d sqrt_weight; ///< root of the peak's curvature, largest part 1: along an edge little is known
-  double score = 0;            ///< normalised correlation at the peak
+  Eigen::Vector3d point;  ///< in the rendering camera
+  Eigen::Vector2d seen;   ///< pixel of the image
+  Eigen::Matrix2d
+      sqrt_weight;  ///< root of the peak's curvature, largest part 1: along an edge little is known
+  double score = 0;  ///< normalised correlation at the peak
 };
 
 struct PatchMatchOptions {
@@ -26,8 +27,9 @@ struct PatchMatchOptions {
 cv::Mat rendered_edges(const SceneRender& render);
 
 /// `edges`: rendered_edges; `field`: orientation_field of the image at the same size.
-std::vector<PatchMatch> match_patches(const SceneRender& render, const cv::Mat& edges, const Camera& camera,
-                                      const cv::Mat& field, const PatchMatchOptions& options);
+std::vector<PatchMatch> match_patches(const SceneRender& render, const cv::Mat& edges,
+                                      const Camera& camera, const cv::Mat& field,
+                                      const PatchMatchOptions& options);
 
 /// Mean agreement of the rendered edges with the image's, -1..1.
 double edge_agreement(const cv::Mat& edges, const cv::Mat& field);

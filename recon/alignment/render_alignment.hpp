@@ -4,8 +4,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "core/progress.hpp"
 #include "core/geometry/reconstruction.hpp"
+#include "core/progress.hpp"
 #include "recon/alignment/scene_renderer.hpp"
 #include "recon/alignment/view_verdict.hpp"
 

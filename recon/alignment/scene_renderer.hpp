@@ -17,6 +17,7 @@ struct SceneRender {
   cv::Mat brightness;  ///< CV_32FC1
   cv::Mat depth;       ///< CV_32FC1, along the optical axis; NaN = nothing there
 };
-using SceneRenderer = std::function<Result<SceneRender>(const Camera&, const Rigid3d& cam_from_world)>;
+using SceneRenderer =
+    std::function<Result<SceneRender>(const Camera&, const Rigid3d& cam_from_world)>;
 
 }  // namespace orbitfuse

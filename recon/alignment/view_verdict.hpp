@@ -24,15 +24,24 @@ enum class DoubtReason {
 
 constexpr std::string_view name(DoubtReason reason) {
   switch (reason) {
-    case DoubtReason::none: return "none";
-    case DoubtReason::not_found: return "not_found";
-    case DoubtReason::weak_support: return "weak_support";
-    case DoubtReason::off_its_loop: return "off_its_loop";
-    case DoubtReason::temperatures_elsewhere: return "temperatures_elsewhere";
-    case DoubtReason::temperatures_unlike: return "temperatures_unlike";
-    case DoubtReason::temperatures_contradict: return "temperatures_contradict";
-    case DoubtReason::undecided: return "undecided";
-    case DoubtReason::loop_in_doubt: return "loop_in_doubt";
+    case DoubtReason::none:
+      return "none";
+    case DoubtReason::not_found:
+      return "not_found";
+    case DoubtReason::weak_support:
+      return "weak_support";
+    case DoubtReason::off_its_loop:
+      return "off_its_loop";
+    case DoubtReason::temperatures_elsewhere:
+      return "temperatures_elsewhere";
+    case DoubtReason::temperatures_unlike:
+      return "temperatures_unlike";
+    case DoubtReason::temperatures_contradict:
+      return "temperatures_contradict";
+    case DoubtReason::undecided:
+      return "undecided";
+    case DoubtReason::loop_in_doubt:
+      return "loop_in_doubt";
   }
   return "unknown";
 }

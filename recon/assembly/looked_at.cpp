@@ -9,7 +9,8 @@
 namespace orbitfuse {
 namespace {
 
-constexpr double least_share = 0.05;  // of the measured samples, for an orbit's centre to be believed
+constexpr double least_share =
+    0.05;  // of the measured samples, for an orbit's centre to be believed
 
 /// One view's part within `radius` of `center`.
 cv::Mat near_part(const ThermalView& seen, const Eigen::Vector3d& center, double radius) {
@@ -34,20 +35,22 @@ int finite_samples(const std::vector<cv::Mat>& images) {
 
 }  // namespace
 
-std::vector<cv::Mat> within_orbit(const std::vector<ThermalView>& views, const std::vector<PosedView>& orbit,
-                                  double reach) {
+std::vector<cv::Mat> within_orbit(const std::vector<ThermalView>& views,
+                                  const std::vector<PosedView>& orbit, double reach) {
   std::vector<cv::Mat> whole, parts;
   for (const ThermalView& view : views) whole.push_back(view.thermal);
   const auto geometry = orbit_geometry(orbit);
   if (!geometry) return whole;
   for (const ThermalView& view : views) {
-    CV_Assert(view.thermal.type() == CV_32FC1 && view.depth.type() == CV_32FC1 && view.depth.size() == view.thermal.size());
+    CV_Assert(view.thermal.type() == CV_32FC1 && view.depth.type() == CV_32FC1 &&
+              view.depth.size() == view.thermal.size());
     parts.push_back(near_part(view, geometry->center, reach * geometry->radius));
   }
   return finite_samples(parts) >= least_share * finite_samples(whole) ? parts : whole;
 }
 
-TemperatureSpan object_span(const std::vector<ThermalView>& views, const std::vector<PosedView>& orbit) {
+TemperatureSpan object_span(const std::vector<ThermalView>& views,
+                            const std::vector<PosedView>& orbit) {
   return common_span(within_orbit(views, orbit, object_reach), 0.5, 99.99);
 }
 

@@ -8,8 +8,8 @@
 
 #include <fmt/format.h>
 
-#include "core/option_range.hpp"
 #include "core/numeric/median.hpp"
+#include "core/option_range.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -23,7 +23,8 @@ Eigen::Vector3d axis(const PosedView& view, int row) {
 }
 
 /// cam_from_world of a camera at `eye` that looks at `target`.
-Rigid3d look_at(const Eigen::Vector3d& eye, const Eigen::Vector3d& target, const Eigen::Vector3d& up) {
+Rigid3d look_at(const Eigen::Vector3d& eye, const Eigen::Vector3d& target,
+                const Eigen::Vector3d& up) {
   const Eigen::Vector3d z = (target - eye).normalized();
   const Eigen::Vector3d x = z.cross(up).normalized();
   Eigen::Matrix3d cam_from_world;
@@ -54,7 +55,8 @@ NewViews along_orbit(const std::vector<PosedView>& posed, const OrbitGeometry& o
     result.views.push_back({fmt::format("{:03}", i), render_camera(posed, options.width_px),
                             look_at(orbit.center + radius * out, orbit.center, orbit.up)});
   }
-  result.described = fmt::format("orbit of {} views, elevation {:.0f}°", options.views, elevation / deg);
+  result.described =
+      fmt::format("orbit of {} views, elevation {:.0f}°", options.views, elevation / deg);
   return result;
 }
 
@@ -105,8 +107,7 @@ Result<OrbitGeometry> orbit_geometry(const std::vector<PosedView>& views) {
     return fail(ErrorKind::input, "cameras", "all look in one direction: their axes meet nowhere",
                 "render along their path: --path path");
   OrbitGeometry orbit;
-  orbit.center = eigen.eigenvectors() *
-                 eigen.eigenvalues().cwiseInverse().asDiagonal() *
+  orbit.center = eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
                  (eigen.eigenvectors().transpose() * rhs);
   orbit.up = mean_up.normalized();
 
@@ -118,7 +119,8 @@ Result<OrbitGeometry> orbit_geometry(const std::vector<PosedView>& views) {
     if (azimuths.empty()) orbit.first = flat.normalized();
     radii.push_back(out.norm());
     elevations.push_back(std::atan2(height, flat.norm()) / deg);
-    azimuths.push_back(std::atan2(flat.dot(orbit.up.cross(orbit.first)), flat.dot(orbit.first)) / deg);
+    azimuths.push_back(std::atan2(flat.dot(orbit.up.cross(orbit.first)), flat.dot(orbit.first)) /
+                       deg);
   }
   orbit.radius = median(radii);
   orbit.elevation_deg = median(elevations);
@@ -142,8 +144,9 @@ Result<NewViews> new_views(const std::vector<PosedView>& posed, const NewViewOpt
     return along_orbit(posed, *orbit, options);
   NewViews result = along_path(posed, options);
   if (options.path == PathKind::automatic)
-    result.described += orbit ? fmt::format(": they cover only {:.0f}° of azimuth", orbit->azimuth_span_deg)
-                              : ": their axes meet nowhere";
+    result.described +=
+        orbit ? fmt::format(": they cover only {:.0f}° of azimuth", orbit->azimuth_span_deg)
+              : ": their axes meet nowhere";
   return result;
 }
 

@@ -36,10 +36,9 @@ Result<FieldRegistration> register_fields(const ThermalEvidence& thermal,
   ORBITFUSE_ASSIGN(result.clouds,
                    register_clouds(thermal.cloud, visible.cloud, options, progress, explained));
   ORBITFUSE_TRY(views_failed);
-  ORBITFUSE_ASSIGN(result.images,
-                   search_similarity(visible.renderer, thermal.images, thermal.views,
-                                     result.clouds.target_from_source, left_open(result.clouds),
-                                     progress));
+  ORBITFUSE_ASSIGN(result.images, search_similarity(visible.renderer, thermal.images, thermal.views,
+                                                    result.clouds.target_from_source,
+                                                    left_open(result.clouds), progress));
   return result;
 }
 

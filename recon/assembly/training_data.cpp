@@ -55,8 +55,9 @@ Result<nerf::Dataset> training_data(const std::filesystem::path& folder,
       data.views[k] = std::move(full);
     } else {
       const double scale = static_cast<double>(max_width_px) / view.camera.width;
-      data.views[k] = nerf::resized(full, max_width_px,
-                                    std::max(1, static_cast<int>(std::lround(scale * view.camera.height))));
+      data.views[k] =
+          nerf::resized(full, max_width_px,
+                        std::max(1, static_cast<int>(std::lround(scale * view.camera.height))));
     }
   });
   ORBITFUSE_TRY(progress.check("train"));

@@ -4,17 +4,17 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "core/progress.hpp"
 #include "core/geometry/reconstruction.hpp"
+#include "core/progress.hpp"
 #include "core/result.hpp"
 #include "recon/depth/options.hpp"
 
 namespace orbitfuse::depth {
 
 struct DepthReport {
-  double known = 0;        ///< share of all pixels with a confirmed depth
-  double matched = 0;      ///< share that matched before other views were asked
-  int views_without = 0;   ///< views that have no neighbour to match with
+  double known = 0;       ///< share of all pixels with a confirmed depth
+  double matched = 0;     ///< share that matched before other views were asked
+  int views_without = 0;  ///< views that have no neighbour to match with
   std::vector<Skip> skips;
 };
 

@@ -8,21 +8,21 @@
 namespace orbitfuse::depth {
 
 struct DepthOptions {
-  /// Width of the depth maps (4:3; other formats get as many pixels). Geometry is smoother than texture: beyond this it costs more than it
-  /// gives.
+  /// Width of the depth maps (4:3; other formats get as many pixels). Geometry is smoother than
+  /// texture: beyond this it costs more than it gives.
   int width_px = 400;
   int neighbours = 5;  ///< views each view is matched with
   /// Of these, the best so many count: the others may be occluded. Orbits of 30 degrees rarely show
   /// a surface well in more.
   int best_neighbours = 2;
-  double max_angle_deg = 75;    ///< between viewing directions; beyond it patches don't match
-  double min_angle_deg = 3;     ///< below it there is no parallax
-  int coarse_iterations = 5;    ///< at half width, from random planes and sparse points
-  int fine_iterations = 2;      ///< at full width, from the coarse planes
-  double max_cost = 0.5;        ///< 1 - NCC above which a match is none
-  double agreement = 0.012;     ///< relative depth difference below which two views agree
-  double agreement_px = 2.0;    ///< and distance after projecting there and back
-  int min_agreeing = 1;         ///< views that must agree with a depth
+  double max_angle_deg = 75;  ///< between viewing directions; beyond it patches don't match
+  double min_angle_deg = 3;   ///< below it there is no parallax
+  int coarse_iterations = 5;  ///< at half width, from random planes and sparse points
+  int fine_iterations = 2;    ///< at full width, from the coarse planes
+  double max_cost = 0.5;      ///< 1 - NCC above which a match is none
+  double agreement = 0.012;   ///< relative depth difference below which two views agree
+  double agreement_px = 2.0;  ///< and distance after projecting there and back
+  int min_agreeing = 1;       ///< views that must agree with a depth
   std::uint64_t seed = 1;
 
   Status validate() const;

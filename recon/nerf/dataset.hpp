@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "core/geometry/camera.hpp"
-#include "core/modality.hpp"
 #include "core/geometry/reconstruction.hpp"
-#include "core/result.hpp"
 #include "core/geometry/transform.hpp"
+#include "core/modality.hpp"
+#include "core/result.hpp"
 
 namespace orbitfuse::nerf {
 
@@ -38,7 +38,8 @@ struct Dataset {
   std::vector<DepthMap> depth;      ///< optional; DepthMap::view indexes `views`
 
   double known_depth() const;  ///< share of the depth maps' pixels
-  /// Depth maps know enough of the scene to say where it is empty; below this they are like sparse points.
+  /// Depth maps know enough of the scene to say where it is empty; below this they are like sparse
+  /// points.
   bool has_dense_depth() const { return known_depth() > 0.1; }
   /// Names the view and the field that is malformed: sizes, types, cameras, poses, values.
   Status validate() const;

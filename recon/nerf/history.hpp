@@ -11,8 +11,8 @@ namespace orbitfuse::nerf {
 struct CurvePoint {
   double cpu_s = 0, wall_s = 0;  ///< spent training, evaluation excluded
   std::int64_t step = 0;         ///< as wide as the others: stored as it lies, without padding
-  double heldout_psnr = 0;  ///< dB; NaN without held-out views
-  double train_psnr = 0;    ///< dB, running mean over recent steps
+  double heldout_psnr = 0;       ///< dB; NaN without held-out views
+  double train_psnr = 0;         ///< dB, running mean over recent steps
   double samples_per_ray = 0;
 };
 

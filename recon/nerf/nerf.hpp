@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/geometry/point_cloud.hpp"
-#include "core/progress.hpp"
 #include "core/geometry/reconstruction.hpp"
+#include "core/progress.hpp"
 #include "recon/nerf/dataset.hpp"
 #include "recon/nerf/field.hpp"
 #include "recon/nerf/history.hpp"
@@ -24,13 +24,15 @@ const char* name(StopReason reason);
 struct TrainReport : History {
   int iterations = 0;
   StopReason stop = StopReason::iterations;
-  int best_step = 0;         ///< the step whose parameters the field holds
-  double best_psnr = 0;      ///< held-out, dB; NaN without held-out views
-  std::vector<std::string> heldout;  ///< names of the views that measured
+  int best_step = 0;                    ///< the step whose parameters the field holds
+  double best_psnr = 0;                 ///< held-out, dB; NaN without held-out views
+  std::vector<std::string> heldout;     ///< names of the views that measured
   std::vector<double> image_offsets_k;  ///< per view that was not dropped (per_image_offset)
-  /// R, G, B of a view against the common exposure, which the field shows (even_exposure); empty: steady.
+  /// R, G, B of a view against the common exposure, which the field shows (even_exposure); empty:
+  /// steady.
   std::map<std::string, std::array<double, 3>> image_gains;
-  std::map<std::string, Rigid3d> refined_poses;  ///< cam_from_world by view, as training left it (refine_poses)
+  std::map<std::string, Rigid3d>
+      refined_poses;  ///< cam_from_world by view, as training left it (refine_poses)
   std::vector<Skip> skips;
   std::vector<std::string> warnings;  ///< views that were dropped, a target that was missed
 
@@ -43,10 +45,10 @@ struct TrainReport : History {
 /// options.shared_geometry is set. The same dataset, options and seed give the same field for any
 /// thread count on one instruction set, unless budget_s ends the run.
 ///
-/// The place in every schedule (learning rates, annealed losses) is step / iterations, or time spent
-/// / budget_s if that is further, of the options in force. A run that goes on with more of either
-/// therefore finds itself earlier in a longer schedule: its learning rates rise to where that has
-/// them, and fall to the end as if the run had been that long from its start.
+/// The place in every schedule (learning rates, annealed losses) is step / iterations, or time
+/// spent / budget_s if that is further, of the options in force. A run that goes on with more of
+/// either therefore finds itself earlier in a longer schedule: its learning rates rise to where
+/// that has them, and fall to the end as if the run had been that long from its start.
 ///
 /// A thermal view of which more than half the pixels are NaN is dropped with a warning that names
 /// it; fewer dead pixels are left out one by one, and a skip names the view that has most.
@@ -56,13 +58,16 @@ Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
                           const Progress& progress, Field& field, const Field* guide = nullptr);
 
 /// Writes a finished run as a checkpoint, from which train() with `resume` and more iterations or
-/// budget extends it. It goes on from the field, i.e. the best step's parameters, with the optimiser's
-/// moments of the last step; a field no better on held-out views doesn't replace that one.
-Status save_checkpoint(Field finished, const TrainReport& report, const std::filesystem::path& checkpoint);
+/// budget extends it. It goes on from the field, i.e. the best step's parameters, with the
+/// optimiser's moments of the last step; a field no better on held-out views doesn't replace that
+/// one.
+Status save_checkpoint(Field finished, const TrainReport& report,
+                       const std::filesystem::path& checkpoint);
 
 struct RenderOptions {
   double stop_transmittance = 1e-3;  ///< a ray ends when less light than this is left
-  double sample_factor = 1;          ///< samples per ray, as a multiple of those in training (Sampling::occupancy)
+  double sample_factor =
+      1;  ///< samples per ray, as a multiple of those in training (Sampling::occupancy)
   /// Rays spread their samples over the way to a little behind what their neighbours met, and go on
   /// to the end only if nothing stopped them: finer samples, a third less time.
   bool look_ahead = true;
@@ -76,24 +81,23 @@ struct RenderedView {
   cv::Mat opacity;  ///< CV_32FC1, 0..1
 };
 
-/// The field as the camera sees it, at the camera's size; pose in the world frame of the training views.
-/// Errors: usage (options), input (camera, pose, a field that is empty), cancelled.
-Result<RenderedView> render(const Field& field, const Camera& camera,
-                            const Rigid3d& cam_from_world, const RenderOptions& options,
-                            const Progress& progress);
+/// The field as the camera sees it, at the camera's size; pose in the world frame of the training
+/// views. Errors: usage (options), input (camera, pose, a field that is empty), cancelled.
+Result<RenderedView> render(const Field& field, const Camera& camera, const Rigid3d& cam_from_world,
+                            const RenderOptions& options, const Progress& progress);
 
 struct ExportOptions {
-  int max_width = 320;           ///< depth maps are rendered at this width
-  int min_consistent_views = 2;  ///< other views that must agree with a point's depth
-  double depth_tolerance = 0.01; ///< relative agreement
-  double max_distance = 3.0;     ///< from the field's centre, in field radii; sheds background
-  double voxel = 0.004;          ///< one point per cube of this size, in field radii; 0 = all
+  int max_width = 320;            ///< depth maps are rendered at this width
+  int min_consistent_views = 2;   ///< other views that must agree with a point's depth
+  double depth_tolerance = 0.01;  ///< relative agreement
+  double max_distance = 3.0;      ///< from the field's centre, in field radii; sheds background
+  double voxel = 0.004;           ///< one point per cube of this size, in field radii; 0 = all
   Status validate() const;
 };
 
 /// Points with normals from rendered depth, kept where other views agree; colours (visible) or
-/// temperatures (thermal). In the world frame of the views. Errors: usage (options), input (no view),
-/// cancelled.
+/// temperatures (thermal). In the world frame of the views. Errors: usage (options), input (no
+/// view), cancelled.
 Result<PointCloud> export_point_cloud(const Field& field, const std::vector<PosedView>& views,
                                       const ExportOptions& options, const Progress& progress);
 

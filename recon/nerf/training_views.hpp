@@ -13,7 +13,8 @@ namespace orbitfuse::nerf {
 /// Views that don't train: those marked so, and every n-th of the others (0 = none).
 std::vector<bool> heldout_views(const Dataset& dataset, int holdout_every);
 
-/// Thermal views of which more than half is no temperature: a broken transfer, a shutter in the way.
+/// Thermal views of which more than half is no temperature: a broken transfer, a shutter in the
+/// way.
 std::vector<bool> broken_views(const Dataset& dataset);
 /// Share of an image's pixels that hold no value.
 double invalid_share(const cv::Mat& image);

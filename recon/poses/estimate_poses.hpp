@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "core/progress.hpp"
 #include "core/geometry/reconstruction.hpp"
+#include "core/progress.hpp"
 #include "core/result.hpp"
 #include "core/session/session.hpp"
 #include "recon/alignment/scene_renderer.hpp"
@@ -96,7 +96,7 @@ struct ThermalPoses : ModalityPoses {
 /// The visible world that thermal views are localised in; images come from the session's paths.
 struct VisibleScene {
   Reconstruction reconstruction;
-  SceneRenderer renderer;       ///< of its trained field; may be empty (less accurate)
+  SceneRenderer renderer;  ///< of its trained field; may be empty (less accurate)
 };
 
 /// Visible views: known poses, else COLMAP with orbit-limited pairs and ever more relaxed

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <algorithm>
 #include <Eigen/Core>
+#include <algorithm>
 #include <vector>
 
 #include "core/geometry/reconstruction.hpp"
+#include "core/geometry/transform.hpp"
 #include "core/result.hpp"
 #include "core/session/session.hpp"
-#include "core/geometry/transform.hpp"
 
 // The world of a reconstruction is free up to a similarity. Ours is chosen so that orbits, crops
 // and cameras mean something in it: z up, the origin where the cameras look, median distance 1.
@@ -51,10 +51,10 @@ StationFit fit_stations(const std::vector<PosedView>& views, const Session& sess
 /// neither leaps across its orbit between two frames nor turns back all the time; a model that
 /// merged front and back of a near-symmetric object has it do so.
 struct CaptureOrder {
-  int steps = 0;      ///< between successive posed frames of one stream
-  int leaps = 0;      ///< more than 60 deg off the usual step, without a change of loop
-  int reversals = 0;  ///< more than 5 deg against the usual direction
-  bool dense = false; ///< frames between the stations too: steps under 20 deg
+  int steps = 0;       ///< between successive posed frames of one stream
+  int leaps = 0;       ///< more than 60 deg off the usual step, without a change of loop
+  int reversals = 0;   ///< more than 5 deg against the usual direction
+  bool dense = false;  ///< frames between the stations too: steps under 20 deg
   /// Among stations alone, one made up for at the end is a leap, and one view astray is two.
   bool contradicted() const {
     return leaps > (dense ? steps / 50 : std::max(2, steps / 16)) || 4 * reversals > steps;

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "core/geometry/point_cloud.hpp"
+#include "core/geometry/transform.hpp"
 #include "core/progress.hpp"
 #include "core/result.hpp"
-#include "core/geometry/transform.hpp"
 
 // Registration of two clouds of one object by a similarity (scale, R, t). Every length in the
 // options is relative to the target's robust diameter, so that units do not matter.
@@ -94,8 +94,8 @@ Result<RegistrationReport> register_clouds(const PointCloud& source, const Point
                                            const Progress& progress,
                                            const ViewScore& view_score = {});
 
-/// Refinement alone, from a start within a few degrees and percent (of the target's diameter). Errors:
-/// register_clouds', and usage for a start that is not finite.
+/// Refinement alone, from a start within a few degrees and percent (of the target's diameter).
+/// Errors: register_clouds', and usage for a start that is not finite.
 Result<RegistrationReport> refine_registration(const PointCloud& source, const PointCloud& target,
                                                const Similarity3d& start,
                                                const RegistrationOptions& options);

@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "core/result.hpp"
 #include "core/geometry/transform.hpp"
+#include "core/result.hpp"
 
 namespace orbitfuse::registration {
 

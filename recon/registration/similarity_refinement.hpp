@@ -32,13 +32,10 @@ Result<SimilarityRefinement> refine_similarity(const SceneRenderer& visible,
 
 /// The same from a `start` found elsewhere, judged against `visible_from_thermal`, which stays if
 /// that explains the images better.
-Result<SimilarityRefinement> refine_similarity(const SceneRenderer& visible,
-                                               const std::vector<cv::Mat>& images,
-                                               const std::vector<PosedView>& thermal,
-                                               const Similarity3d& visible_from_thermal,
-                                               const Similarity3d& start,
-                                               const std::vector<RenderRound>& rounds,
-                                               const Progress& progress);
+Result<SimilarityRefinement> refine_similarity(
+    const SceneRenderer& visible, const std::vector<cv::Mat>& images,
+    const std::vector<PosedView>& thermal, const Similarity3d& visible_from_thermal,
+    const Similarity3d& start, const std::vector<RenderRound>& rounds, const Progress& progress);
 
 /// How well the visible scene, seen from where the similarity puts the thermal cameras, explains
 /// their images: the mean, over at most eight views, of the normalised correlation of all edges at

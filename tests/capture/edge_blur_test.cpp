@@ -7,9 +7,9 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "capture/guide/coverage.hpp"
 #include "capture/image_quality/frame_motion.hpp"
 #include "capture/image_quality/frame_quality.hpp"
-#include "capture/guide/coverage.hpp"
 
 namespace orbitfuse {
 namespace {

@@ -11,7 +11,8 @@ namespace {
 cv::Mat checkers(int type, double low, double high) {
   cv::Mat image(240, 320, type, cv::Scalar::all(low));
   for (int y = 0; y < 240; y += 16) {
-    for (int x = (y / 16 % 2) * 16; x < 320; x += 32) image(cv::Rect(x, y, 16, 16)).setTo(cv::Scalar::all(high));
+    for (int x = (y / 16 % 2) * 16; x < 320; x += 32)
+      image(cv::Rect(x, y, 16, 16)).setTo(cv::Scalar::all(high));
   }
   return image;
 }

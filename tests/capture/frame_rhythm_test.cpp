@@ -57,14 +57,16 @@ TEST(FrameRhythm, OutagesAreCountedInFramesAndNotAsLate) {
 TEST(FrameRhythm, APauseChangesNothingOfWhatWasLearnt) {
   FrameRhythm rhythm = settled_at_10_hz(20);
   std::int64_t stamp = 1000 * ms + 1900 * ms;
-  EXPECT_EQ(rhythm.note(20, stamp += 60'100 * ms), 600);  // a minute without a frame, no hole in the ids
+  EXPECT_EQ(rhythm.note(20, stamp += 60'100 * ms),
+            600);  // a minute without a frame, no hole in the ids
   const auto in_ten_s = static_cast<double>(rhythm.frames_in(10));
   EXPECT_NEAR(in_ten_s, 100, 10);
   for (std::uint64_t id = 21; id < 40; ++id) EXPECT_EQ(rhythm.note(id, stamp += 100 * ms), 0) << id;
   EXPECT_EQ(rhythm.note(40, stamp += 300 * ms), 2);
   rhythm.interrupt();
   EXPECT_EQ(rhythm.note(900, stamp += 3'600'000 * ms), 0);
-  for (std::uint64_t id = 901; id < 920; ++id) EXPECT_EQ(rhythm.note(id, stamp += 100 * ms), 0) << id;
+  for (std::uint64_t id = 901; id < 920; ++id)
+    EXPECT_EQ(rhythm.note(id, stamp += 100 * ms), 0) << id;
   EXPECT_NEAR(static_cast<double>(rhythm.frames_in(10)), 100, 5);
 }
 

@@ -17,7 +17,8 @@ namespace {
   auto writer = *SessionWriter::create(folder);
   if (!writer->add_device({"thermal0", Modality::thermal, "test", "", "", {}})) _exit(1);
   for (std::uint64_t id = 0;; ++id) {
-    if (!writer->append("thermal0", test::frame_delivery(id, test::thermal_pixels(96, 64)).frame)) _exit(1);
+    if (!writer->append("thermal0", test::frame_delivery(id, test::thermal_pixels(96, 64)).frame))
+      _exit(1);
     const std::uint64_t done = id + 1;
     if (::write(acknowledge_fd, &done, sizeof done) != sizeof done) _exit(1);
   }
@@ -42,14 +43,16 @@ TEST(Kill, EveryAcknowledgedFrameIsReadableAfterSigkillAtRandomMoments) {
     ::usleep(state % 20000);
     ::kill(child, SIGKILL);
     ::waitpid(child, nullptr, 0);
-    while (::read(fds[0], &value, sizeof value) == static_cast<ssize_t>(sizeof value)) acknowledged = value;
+    while (::read(fds[0], &value, sizeof value) == static_cast<ssize_t>(sizeof value))
+      acknowledged = value;
     ::close(fds[0]);
 
     const auto session = open_session(folder / "s");
     ASSERT_TRUE(session) << session.error().message();
     EXPECT_FALSE(session->complete);
     ASSERT_GE(session->frames.size(), acknowledged);
-    for (const FrameRecord& frame : session->frames) ASSERT_TRUE(read_thermal_k(session->path_of(frame)));
+    for (const FrameRecord& frame : session->frames)
+      ASSERT_TRUE(read_thermal_k(session->path_of(frame)));
     ASSERT_TRUE(SessionWriter::resume(folder / "s"));
   }
 }

@@ -5,8 +5,8 @@
 
 #include <atomic>
 
-#include "core/system/file_io.hpp"
 #include "core/image/image_io.hpp"
+#include "core/system/file_io.hpp"
 #include "tests/capture/scripted_source.hpp"
 #include "tests/core/session_account.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -41,15 +41,17 @@ struct Recording {
 TEST(Recorder, TwoCamerasEveryIdAccountedFor) {
   Recording r;
   std::deque<Delivery> script;
-  for (std::uint64_t id : {10, 11, 12, 15, 16}) script.push_back(frame_delivery(id, thermal_pixels()));
+  for (std::uint64_t id : {10, 11, 12, 15, 16})
+    script.push_back(frame_delivery(id, thermal_pixels()));
   script.push_back(rejected_delivery(17, "short"));
   script.push_back(rejected_delivery(18, "short"));
   script.push_back(frame_delivery(20, thermal_pixels()));
-  script.push_back(frame_delivery(20, thermal_pixels()));              // a duplicate has no place
-  script.push_back(frame_delivery(21, cv::Mat(3, 3, CV_8UC3)));        // not a thermal image
+  script.push_back(frame_delivery(20, thermal_pixels()));        // a duplicate has no place
+  script.push_back(frame_delivery(21, cv::Mat(3, 3, CV_8UC3)));  // not a thermal image
   ScriptedSource thermal("thermal0", Modality::thermal, script);
   std::deque<Delivery> photos;
-  for (std::uint64_t id = 0; id < 8; ++id) photos.push_back(frame_delivery(id, cv::Mat(20, 20, CV_8UC3, cv::Scalar(4, 5, 6))));
+  for (std::uint64_t id = 0; id < 8; ++id)
+    photos.push_back(frame_delivery(id, cv::Mat(20, 20, CV_8UC3, cv::Scalar(4, 5, 6))));
   ScriptedSource visible("visible0", Modality::visible, photos);
 
   RecorderOptions options;
@@ -89,12 +91,15 @@ TEST(Recorder, TwoCamerasEveryIdAccountedFor) {
 TEST(Recorder, SlowDiskDropsByPolicyAndCounts) {
   Recording r;
   std::deque<Delivery> script;
-  for (std::uint64_t id = 1; id <= 200; ++id) script.push_back(frame_delivery(id, thermal_pixels(320, 240)));
+  for (std::uint64_t id = 1; id <= 200; ++id)
+    script.push_back(frame_delivery(id, thermal_pixels(320, 240)));
   ScriptedSource source("thermal0", Modality::thermal, script);
   RecorderOptions options;
   options.queue_frames = 2;
   Recorder recorder(*r.writer, options);
-  recorder.on_frame = [](const FrameRecord&, const cv::Mat&) { std::this_thread::sleep_for(std::chrono::milliseconds(5)); };
+  recorder.on_frame = [](const FrameRecord&, const cv::Mat&) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  };
   ASSERT_TRUE(recorder.run({&source}));
   const Session session = r.open();
   expect_exact_accounts(session);
@@ -110,8 +115,8 @@ TEST(Recorder, EventsDoNotWaitForTheWriterAndKeepTheirPlace) {
   Recording r;
   const Delivery event = event_delivery(EventKind::nuc, "");
   ScriptedSource source("thermal0", Modality::thermal,
-                        {frame_delivery(1, thermal_pixels()), frame_delivery(2, thermal_pixels()), event,
-                         frame_delivery(3, thermal_pixels()), Delivery{}});
+                        {frame_delivery(1, thermal_pixels()), frame_delivery(2, thermal_pixels()),
+                         event, frame_delivery(3, thermal_pixels()), Delivery{}});
   std::atomic<int> taken{0};
   source.before_next = [&] { ++taken; };
   Recorder recorder(*r.writer, {});
@@ -178,7 +183,8 @@ TEST(Recorder, FramesThatCannotBeWrittenAreLostOnlyToACamera) {
   for (const bool waits : {false, true}) {
     Recording r;
     std::deque<Delivery> script;
-    for (std::uint64_t id : {1, 2, 5, 6, 7, 10}) script.push_back(frame_delivery(id, thermal_pixels()));
+    for (std::uint64_t id : {1, 2, 5, 6, 7, 10})
+      script.push_back(frame_delivery(id, thermal_pixels()));
     script.push_back(rejected_delivery(11, "short"));
     ScriptedSource source("thermal0", Modality::thermal, script);
     source.waits = waits;
@@ -186,7 +192,8 @@ TEST(Recorder, FramesThatCannotBeWrittenAreLostOnlyToACamera) {
     const auto images = r.folder / "s" / "thermal";
     recorder.on_frame = [&](const FrameRecord& f, const cv::Mat&) {
       if (f.sequence != 5) return;
-      while (recorder.status()[0].last_id < 11) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      while (recorder.status()[0].last_id < 11)
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
       std::filesystem::rename(images, r.folder / "kept");
       test::put(images, "no folder");
     };
@@ -237,7 +244,8 @@ TEST(Recorder, OneCameraFailsTheOtherGoesOn) {
   ScriptedSource broken("thermal0", Modality::thermal, {frame_delivery(3, thermal_pixels())});
   broken.fail_at_end = true;
   std::deque<Delivery> photos;
-  for (std::uint64_t id = 0; id < 20; ++id) photos.push_back(frame_delivery(id, cv::Mat(20, 20, CV_8UC3, cv::Scalar(1, 2, 3))));
+  for (std::uint64_t id = 0; id < 20; ++id)
+    photos.push_back(frame_delivery(id, cv::Mat(20, 20, CV_8UC3, cv::Scalar(1, 2, 3))));
   ScriptedSource visible("visible0", Modality::visible, photos);
   visible.pause = std::chrono::milliseconds(2);
   RecorderOptions options;
@@ -263,14 +271,16 @@ TEST(Recorder, CameraThatDoesNotStart) {
   EXPECT_TRUE(r.open().streams.empty());
 }
 
-/// Photos come when they come; a camera that sends nothing is silent, and so is a folder that is gone.
+/// Photos come when they come; a camera that sends nothing is silent, and so is a folder that is
+/// gone.
 TEST(Recorder, SilenceIsAnAlarmForCamerasAndForFoldersThatAreGone) {
   for (const bool waits : {false, true}) {
     Recording r;
     const Delivery gone = event_delivery(EventKind::disconnected, "unplugged"),
                    back = event_delivery(EventKind::reconnected, "");
-    ScriptedSource source("thermal0", Modality::thermal,
-                          {Delivery{}, gone, Delivery{}, back, Delivery{}, frame_delivery(1, thermal_pixels())});
+    ScriptedSource source(
+        "thermal0", Modality::thermal,
+        {Delivery{}, gone, Delivery{}, back, Delivery{}, frame_delivery(1, thermal_pixels())});
     source.waits = waits;
     RecorderOptions options;
     options.silence = std::chrono::milliseconds(0);
@@ -285,9 +295,10 @@ TEST(Recorder, SilenceIsAnAlarmForCamerasAndForFoldersThatAreGone) {
 /// One damaged frame holds up those behind it for a third of a second: that is no silence.
 TEST(Recorder, AMomentWithoutAFrameIsNoSilence) {
   Recording r;
-  ScriptedSource source("thermal0", Modality::thermal,
-                        {frame_delivery(1, thermal_pixels()), Delivery{}, rejected_delivery(2, "short"),
-                         Delivery{}, frame_delivery(3, thermal_pixels())});
+  ScriptedSource source(
+      "thermal0", Modality::thermal,
+      {frame_delivery(1, thermal_pixels()), Delivery{}, rejected_delivery(2, "short"), Delivery{},
+       frame_delivery(3, thermal_pixels())});
   RecorderOptions options;
   options.silence = std::chrono::hours(1);
   Recorder recorder(*r.writer, options);
@@ -378,7 +389,8 @@ TEST(Recorder, FramesThatComeAgainAreNoFilesAndCorrectionsAreTold) {
 TEST(Recorder, CancelKeepsWhatWasQueued) {
   Recording r;
   std::deque<Delivery> script;
-  for (std::uint64_t id = 1; id <= 1000; ++id) script.push_back(frame_delivery(id, thermal_pixels()));
+  for (std::uint64_t id = 1; id <= 1000; ++id)
+    script.push_back(frame_delivery(id, thermal_pixels()));
   ScriptedSource source("thermal0", Modality::thermal, script);
   source.pause = std::chrono::milliseconds(1);
   std::atomic<bool> cancel{false};
@@ -416,8 +428,7 @@ TEST(Recorder, FilesPassedOverAreCountedAndTheLastAreNamed) {
   Recording r;
   std::deque<Delivery> script;
   for (const char* name : {"1", "2", "3", "4"}) {
-    script.push_back(
-        event_delivery(*name % 2 ? EventKind::ignored : EventKind::duplicate, name));
+    script.push_back(event_delivery(*name % 2 ? EventKind::ignored : EventKind::duplicate, name));
   }
   ScriptedSource photos("visible0", Modality::visible, script);
   Recorder recorder(*r.writer, {});

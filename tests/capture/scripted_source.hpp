@@ -32,7 +32,8 @@ inline Delivery rejected_delivery(std::uint64_t id, const std::string& reason) {
 inline cv::Mat thermal_pixels(int width = 32, int height = 24) {
   cv::Mat image(height, width, CV_16UC1);
   for (int i = 0; i < width * height; ++i) {
-    image.at<std::uint16_t>(i / width, i % width) = static_cast<std::uint16_t>(29000 + (i * 37) % 900);
+    image.at<std::uint16_t>(i / width, i % width) =
+        static_cast<std::uint16_t>(29000 + (i * 37) % 900);
   }
   return image;
 }

@@ -8,9 +8,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include "capture/recording/raw_counts.hpp"
-#include "core/system/file_io.hpp"
 #include "core/image/image_codec.hpp"
 #include "core/image/image_io.hpp"
+#include "core/system/file_io.hpp"
 #include "tests/capture/scripted_source.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -57,10 +57,14 @@ TEST(SessionWriter, ThermalAndVisibleComeBackBitExact) {
   EXPECT_EQ(session->frames[0].sequence, 5u);
   EXPECT_EQ(session->frames[1].width, 60);
   EXPECT_EQ(session->frames[2].file, "visible/track_000000.png");
-  EXPECT_EQ(cv::norm(*read_image(folder / "s/thermal/000000.tiff"), thermal_pixels(), cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(*read_image(folder / "s/thermal/000000.tiff"), thermal_pixels(), cv::NORM_INF),
+            0);
   EXPECT_NEAR(read_thermal_k(folder / "s/thermal/000000.tiff")->at<float>(0, 0), 290.0, 1e-3);
-  EXPECT_EQ(content_hash(*read_file(folder / "s/visible/000000.jpg")), session->frames[1].content_hash);
-  EXPECT_EQ(cv::norm(*read_visible(folder / "s/visible/track_000000.png"), visible.pixels, cv::NORM_INF), 0);
+  EXPECT_EQ(content_hash(*read_file(folder / "s/visible/000000.jpg")),
+            session->frames[1].content_hash);
+  EXPECT_EQ(
+      cv::norm(*read_visible(folder / "s/visible/track_000000.png"), visible.pixels, cv::NORM_INF),
+      0);
 }
 
 TEST(SessionWriter, NeverIntoAFolderWithContent) {
@@ -112,7 +116,8 @@ TEST(SessionWriter, ResumeAfterACrashContinuesAndOverwritesNothing) {
   }
   // The crash: an image without its line, and half a line.
   test::put(folder / "s/thermal/000001.tiff", "orphan");
-  test::put(folder / "s/manifest.jsonl", test::get(folder / "s/manifest.jsonl") + "{\"type\":\"fra");
+  test::put(folder / "s/manifest.jsonl",
+            test::get(folder / "s/manifest.jsonl") + "{\"type\":\"fra");
   {
     auto writer = SessionWriter::resume(folder / "s");
     ASSERT_TRUE(writer) << writer.error().message();
@@ -183,7 +188,8 @@ TEST(SessionWriter, CountsOfUnknownScaleAreNeverTemperatures) {
     EXPECT_FALSE(std::filesystem::exists(folder / ("s/" + record->file + ".json")));
   }
   EXPECT_GT(mean[1], mean[0] + 20);  // one stretch: brighter counts are brighter
-  EXPECT_EQ(cv::norm(*read_image(folder / "s/thermal/originals/000001.tiff"), bright, cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(*read_image(folder / "s/thermal/originals/000001.tiff"), bright, cv::NORM_INF),
+            0);
 }
 
 TEST(SessionWriter, ScaleOfHotScenesIsInTagSidecarAndQuality) {
@@ -204,7 +210,8 @@ TEST(SessionWriter, ScaleOfHotScenesIsInTagSidecarAndQuality) {
     ASSERT_TRUE(record) << record.error().message();
     EXPECT_NEAR(record->quality->mean_level, 1173.14, 1e-6);
     EXPECT_NEAR(read_thermal_k(folder / "s" / record->file)->at<float>(0, 0), 1173.14, 1e-3);
-    EXPECT_NE(test::get(folder / "s" / (record->file + ".json")).find("\"scale\":0.02"), std::string::npos);
+    EXPECT_NE(test::get(folder / "s" / (record->file + ".json")).find("\"scale\":0.02"),
+              std::string::npos);
   }
 }
 

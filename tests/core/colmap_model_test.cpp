@@ -19,7 +19,8 @@ Reconstruction small_model() {
   camera.p2 = 0.003;
   for (int i = 0; i < 3; ++i) {
     const Eigen::Quaterniond q = Eigen::Quaterniond(1, 0.1 * i, -0.2, 0.3).normalized();
-    model.views.push_back({"visible/00000" + std::to_string(i) + " x.jpg", camera, {q, {i + 0.25, 2, -3}}});
+    model.views.push_back(
+        {"visible/00000" + std::to_string(i) + " x.jpg", camera, {q, {i + 0.25, 2, -3}}});
   }
   SparsePoint point{{1.5, -2.5, 1.0 / 3}, {10, 20, 250}, 0.7, {{0, {100.5, 7.25}}, {2, {3, 4}}}};
   model.points = {point, {{0, 0, 1}, {1, 2, 3}, 0.1, {{1, {5, 6}}}}};
@@ -31,7 +32,9 @@ void expect_equal(const Reconstruction& a, const Reconstruction& b) {
   for (std::size_t i = 0; i < a.views.size(); ++i) {
     EXPECT_EQ(a.views[i].name, b.views[i].name);
     EXPECT_EQ(a.views[i].camera, b.views[i].camera);
-    EXPECT_LT(rotation_angle_deg(a.views[i].cam_from_world.rotation, b.views[i].cam_from_world.rotation), 1e-6);
+    EXPECT_LT(
+        rotation_angle_deg(a.views[i].cam_from_world.rotation, b.views[i].cam_from_world.rotation),
+        1e-6);
     EXPECT_EQ(a.views[i].cam_from_world.translation, b.views[i].cam_from_world.translation);
   }
   ASSERT_EQ(a.points.size(), b.points.size());
@@ -77,14 +80,19 @@ TEST_P(ColmapModel, EveryTruncationIsAnErrorOrASmallerModel) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Formats, ColmapModel, ::testing::Values(ColmapFormat::text, ColmapFormat::binary));
+INSTANTIATE_TEST_SUITE_P(Formats, ColmapModel,
+                         ::testing::Values(ColmapFormat::text, ColmapFormat::binary));
 
 TEST(ColmapText, ReadsEveryKnownCameraModelAndOddNames) {
   const TempFolder folder;
-  put(folder / "m/cameras.txt", "# c\n1 SIMPLE_PINHOLE 10 20 5 4 9\n2 PINHOLE 10 20 5 6 4 9\n3 SIMPLE_RADIAL 10 20 5 4 9 0.1\n"
-                                "4 RADIAL 10 20 5 4 9 0.1 0.2\n5 OPENCV 10 20 5 6 4 9 .1 .2 .3 .4\n");
+  put(folder / "m/cameras.txt",
+      "# c\n1 SIMPLE_PINHOLE 10 20 5 4 9\n2 PINHOLE 10 20 5 6 4 9\n3 SIMPLE_RADIAL 10 20 5 4 9 "
+      "0.1\n"
+      "4 RADIAL 10 20 5 4 9 0.1 0.2\n5 OPENCV 10 20 5 6 4 9 .1 .2 .3 .4\n");
   std::string images = "# i\n";
-  for (int i = 1; i <= 5; ++i) images += std::to_string(i) + " 1 0 0 0 1 2 3 " + std::to_string(i) + " a b" + std::to_string(i) + ".jpg\n\n";
+  for (int i = 1; i <= 5; ++i)
+    images += std::to_string(i) + " 1 0 0 0 1 2 3 " + std::to_string(i) + " a b" +
+              std::to_string(i) + ".jpg\n\n";
   put(folder / "m/images.txt", images);
   const auto model = read_colmap_model(folder / "m", Modality::visible);
   ASSERT_TRUE(model) << model.error().message();
@@ -101,9 +109,11 @@ TEST(ColmapText, UnknownModelAndDanglingIdsAreNamed) {
   const TempFolder folder;
   put(folder / "m/cameras.txt", "1 FISHEYE 10 20 5 4 9\n");
   put(folder / "m/images.txt", "1 1 0 0 0 1 2 3 7 a.jpg\n\n");
-  EXPECT_NE(read_colmap_model(folder / "m", Modality::visible).error().message().find("FISHEYE"), std::string::npos);
+  EXPECT_NE(read_colmap_model(folder / "m", Modality::visible).error().message().find("FISHEYE"),
+            std::string::npos);
   put(folder / "m/cameras.txt", "1 PINHOLE 10 20 5 5 4 9\n");
-  EXPECT_NE(read_colmap_model(folder / "m", Modality::visible).error().message().find("camera 7"), std::string::npos);
+  EXPECT_NE(read_colmap_model(folder / "m", Modality::visible).error().message().find("camera 7"),
+            std::string::npos);
   EXPECT_FALSE(read_colmap_model(folder / "none", Modality::visible));
 }
 

@@ -9,21 +9,23 @@
 namespace orbitfuse {
 namespace {
 
+using test::put;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-using test::put;
 
 const std::string k = R"("K": {"fx": 90, "fy": 90, "cx": 50, "cy": 40, "w": 100, "h": 80})";
 
 std::string truth_with(const std::string& c2w, const std::string& camera = k) {
-  return R"({"visible": {)" + camera + R"(, "frames": [{"file": "visible/0.jpg", "el": 20, "c2w": )" + c2w + "}]}}";
+  return R"({"visible": {)" + camera +
+         R"(, "frames": [{"file": "visible/0.jpg", "el": 20, "c2w": )" + c2w + "}]}}";
 }
 
 TEST(GroundTruth, IsReadWithTestViewsAndElevations) {
   const test::TempFolder folder;
   const std::string pose = "[[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]]";
-  put(folder / "t.json", R"({"thermal": {)" + k + R"(, "frames": [{"file": "a.tiff", "az": 5, "c2w": )" + pose +
-                             R"(}]}, "test": {)" + k + R"(, "frames": [{"visible": "v.jpg", "c2w": )" + pose + "}]}}");
+  put(folder / "t.json",
+      R"({"thermal": {)" + k + R"(, "frames": [{"file": "a.tiff", "az": 5, "c2w": )" + pose +
+          R"(}]}, "test": {)" + k + R"(, "frames": [{"visible": "v.jpg", "c2w": )" + pose + "}]}}");
   const auto truth = read_ground_truth(folder / "t.json");
   ASSERT_TRUE(truth) << truth.error().message();
   ASSERT_EQ(truth->views.at(Modality::thermal).size(), 1u);
@@ -50,13 +52,15 @@ TEST(GroundTruth, PosesThatAreNotRigidAndNumbersThatAreNoneAreNamed) {
     put(folder / "t.json", text);
     const auto truth = read_ground_truth(folder / "t.json");
     ASSERT_FALSE(truth) << text;
-    EXPECT_THAT(truth.error().message(), AllOf(HasSubstr("visible.frames[0].c2w"), HasSubstr(words)));
+    EXPECT_THAT(truth.error().message(),
+                AllOf(HasSubstr("visible.frames[0].c2w"), HasSubstr(words)));
   }
   const std::string identity = "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
-  for (const char* camera : {R"("K": {"fx": 1e300, "fy": 90, "cx": 50, "cy": 40, "w": 100, "h": 80})",
-                             R"("K": {"fx": 90, "fy": 90, "cx": 50, "cy": 40, "w": 1e300, "h": 80})",
-                             R"("K": {"fx": 90, "fy": 90, "cx": 50, "cy": 40, "w": 100, "h": 80, "k1": 1e300})",
-                             R"("K": {"fx": 90, "fy": 90, "cx": 50, "w": 100, "h": 80})", R"("K": 7)"}) {
+  for (const char* camera :
+       {R"("K": {"fx": 1e300, "fy": 90, "cx": 50, "cy": 40, "w": 100, "h": 80})",
+        R"("K": {"fx": 90, "fy": 90, "cx": 50, "cy": 40, "w": 1e300, "h": 80})",
+        R"("K": {"fx": 90, "fy": 90, "cx": 50, "cy": 40, "w": 100, "h": 80, "k1": 1e300})",
+        R"("K": {"fx": 90, "fy": 90, "cx": 50, "w": 100, "h": 80})", R"("K": 7)"}) {
     put(folder / "t.json", truth_with(identity, camera));
     EXPECT_FALSE(read_ground_truth(folder / "t.json")) << camera;
   }

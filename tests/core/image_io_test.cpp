@@ -7,8 +7,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "core/system/file_io.hpp"
 #include "core/image/image_codec.hpp"
+#include "core/system/file_io.hpp"
 #include "core/temperature.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -22,7 +22,9 @@ using test::TempFolder;
 cv::Mat gradient_bgr(int width = 64, int height = 48) {
   cv::Mat image(height, width, CV_8UC3);
   for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) image.at<cv::Vec3b>(y, x) = cv::Vec3b(static_cast<uchar>(3 * x), static_cast<uchar>(4 * y), 90);
+    for (int x = 0; x < width; ++x)
+      image.at<cv::Vec3b>(y, x) =
+          cv::Vec3b(static_cast<uchar>(3 * x), static_cast<uchar>(4 * y), 90);
   }
   return image;
 }
@@ -49,7 +51,9 @@ TEST(ImageIo, PngAndJpegRoundTrip) {
   ASSERT_TRUE(write_jpeg(folder / "a.jpg", image, 98));
   EXPECT_EQ(max_difference(*read_visible(folder / "a.png"), image), 0);
   EXPECT_LT(max_difference(*read_visible(folder / "a.jpg"), image), 16);
-  EXPECT_LT(cv::norm(*read_visible(folder / "a.jpg"), image, cv::NORM_L1) / static_cast<double>(image.total()), 6);
+  EXPECT_LT(cv::norm(*read_visible(folder / "a.jpg"), image, cv::NORM_L1) /
+                static_cast<double>(image.total()),
+            6);
 }
 
 TEST(ImageIo, GreyPhotoBecomesBgr) {
@@ -68,9 +72,12 @@ TEST(ImageIo, ExifOrientationIsAppliedOnce) {
   stored(cv::Rect(0, 0, 32, 20)).setTo(cv::Scalar(255, 255, 255));  // marks the stored top left
   const std::string jpeg = *encode_jpeg(stored, 95);
   // Where the stored top-left quarter appears upright, and whether sides swap (TIFF 6.0, tag 274).
-  const struct { int orientation; bool right, bottom, swapped; } cases[] = {
-      {1, false, false, false}, {2, true, false, false}, {3, true, true, false}, {4, false, true, false},
-      {5, false, false, true},  {6, true, false, true},  {7, true, true, true},  {8, false, true, true}};
+  const struct {
+    int orientation;
+    bool right, bottom, swapped;
+  } cases[] = {{1, false, false, false}, {2, true, false, false}, {3, true, true, false},
+               {4, false, true, false},  {5, false, false, true}, {6, true, false, true},
+               {7, true, true, true},    {8, false, true, true}};
   for (const auto& c : cases) {
     put(folder / "o.jpg", with_orientation(jpeg, c.orientation));
     const auto image = read_visible(folder / "o.jpg");
@@ -78,7 +85,8 @@ TEST(ImageIo, ExifOrientationIsAppliedOnce) {
     EXPECT_EQ(image->cols, c.swapped ? 40 : 64) << c.orientation;
     const int x = c.right ? image->cols - 6 : 5, y = c.bottom ? image->rows - 6 : 5;
     EXPECT_GT(image->at<cv::Vec3b>(y, x)[0], 200) << c.orientation;
-    EXPECT_LT(image->at<cv::Vec3b>(image->rows - 1 - y, image->cols - 1 - x)[0], 50) << c.orientation;
+    EXPECT_LT(image->at<cv::Vec3b>(image->rows - 1 - y, image->cols - 1 - x)[0], 50)
+        << c.orientation;
   }
   put(folder / "o.jpg", with_orientation(jpeg, 99));
   EXPECT_EQ(read_visible(folder / "o.jpg")->cols, 64);
@@ -88,9 +96,10 @@ TEST(ImageIo, EveryTruncationIsAnErrorThatNamesTheFile) {
   const TempFolder folder;
   const cv::Mat thermal(48, 64, CV_16UC1, cv::Scalar(29315));
   const cv::Mat noise = gradient_bgr();
-  for (const auto& [file, bytes] : {std::pair<std::string, std::string>{"t.jpg", *encode_jpeg(noise, 95)},
-                                    {"t.png", *encode_png(noise)},
-                                    {"t.tiff", *encode_thermal_tiff(thermal)}}) {
+  for (const auto& [file, bytes] :
+       {std::pair<std::string, std::string>{"t.jpg", *encode_jpeg(noise, 95)},
+        {"t.png", *encode_png(noise)},
+        {"t.tiff", *encode_thermal_tiff(thermal)}}) {
     for (std::size_t keep = 0; keep + 3 < bytes.size(); keep += 1 + bytes.size() / 97) {
       put(folder / file, bytes.substr(0, keep));
       const auto image = read_image(folder / file);
@@ -105,7 +114,8 @@ TEST(ImageIo, DamagedBytesNeverCrash) {
   const TempFolder folder;
   const cv::Mat thermal(48, 64, CV_16UC1, cv::Scalar(29315));
   std::uint32_t state = 12345;
-  for (const std::string& whole : {*encode_jpeg(gradient_bgr(), 90), *encode_png(gradient_bgr()), *encode_thermal_tiff(thermal)}) {
+  for (const std::string& whole : {*encode_jpeg(gradient_bgr(), 90), *encode_png(gradient_bgr()),
+                                   *encode_thermal_tiff(thermal)}) {
     for (int round = 0; round < 150; ++round) {
       std::string bytes = whole;
       for (int k = 0; k < 4; ++k) {
@@ -140,9 +150,10 @@ TEST(ImageIo, SixteenBitWhereEightIsExpected) {
 TEST(ImageIo, ThermalTiffKeepsEveryTemperature) {
   const TempFolder folder;
   cv::Mat kelvin(31, 47, CV_32FC1);
-  for (int i = 0; i < 31 * 47; ++i) kelvin.at<float>(i / 47, i % 47) = static_cast<float>(250 + 0.07 * i);
+  for (int i = 0; i < 31 * 47; ++i)
+    kelvin.at<float>(i / 47, i % 47) = static_cast<float>(250 + 0.07 * i);
   kelvin.at<float>(3, 5) = invalid_k;
-  kelvin.at<float>(3, 6) = -4;       // no such temperature
+  kelvin.at<float>(3, 6) = -4;  // no such temperature
   kelvin.at<float>(3, 7) = 1e9F;
   ASSERT_TRUE(write_thermal_tiff(folder / "t.tiff", kelvin));
   const auto back = read_thermal_k(folder / "t.tiff");
@@ -190,12 +201,15 @@ TEST(ImageIo, HotThermalTiffsTakeACoarserScale) {
 
 TEST(ImageIo, ATemperatureBelowZeroKelvinIsNone) {
   const TempFolder folder;
-  put(folder / "t.tiff", *encode_tiff(cv::Mat(4, 4, CV_16UC1, cv::Scalar(20000)), R"({"scale":0.01,"offset":-273.15})"));
+  put(folder / "t.tiff", *encode_tiff(cv::Mat(4, 4, CV_16UC1, cv::Scalar(20000)),
+                                      R"({"scale":0.01,"offset":-273.15})"));
   EXPECT_TRUE(std::isnan(read_thermal_k(folder / "t.tiff")->at<float>(0, 0)));
-  put(folder / "t.tiff", *encode_tiff(cv::Mat(4, 4, CV_16UC1, cv::Scalar(20000)), R"({"scale":1e300})"));
+  put(folder / "t.tiff",
+      *encode_tiff(cv::Mat(4, 4, CV_16UC1, cv::Scalar(20000)), R"({"scale":1e300})"));
   EXPECT_FALSE(read_thermal_k(folder / "t.tiff"));
   // What other programs write into the description is none of our business.
-  put(folder / "t.tiff", *encode_tiff(cv::Mat(4, 4, CV_16UC1, cv::Scalar(20000)), "taken in the cold"));
+  put(folder / "t.tiff",
+      *encode_tiff(cv::Mat(4, 4, CV_16UC1, cv::Scalar(20000)), "taken in the cold"));
   EXPECT_TRUE(read_thermal_k(folder / "t.tiff"));
 }
 
@@ -213,7 +227,9 @@ TEST(ImageIo, AJpegWithAShiftedScanIsDamaged) {
   }
   EXPECT_GE(told, 10);  // of 11: a scan may fall into step again
   // A few bytes of padding before the end are what some cameras write.
-  EXPECT_TRUE(decode_jpeg(whole.substr(0, whole.size() - 2) + std::string(8, '\0') + whole.substr(whole.size() - 2), "padded"));
+  EXPECT_TRUE(decode_jpeg(
+      whole.substr(0, whole.size() - 2) + std::string(8, '\0') + whole.substr(whole.size() - 2),
+      "padded"));
 }
 
 TEST(ImageIo, FloatTiffKeepsNanAndExtremes) {

@@ -21,7 +21,8 @@ TEST(Palette, AllHave256DistinctlyOrderedColours) {
   for (const char* name : {"inferno", "ironbow", "white-hot"}) {
     const cv::Mat c = *palette(name);
     for (int i = 8; i < 256; i += 8) {
-      EXPECT_GT(brightness(c.at<cv::Vec3b>(0, i)), brightness(c.at<cv::Vec3b>(0, i - 8))) << name << " " << i;
+      EXPECT_GT(brightness(c.at<cv::Vec3b>(0, i)), brightness(c.at<cv::Vec3b>(0, i - 8)))
+          << name << " " << i;
     }
   }
 }
@@ -40,7 +41,8 @@ TEST(Palette, UnknownNameListsTheKnownOnes) {
 }
 
 TEST(Palette, ColorizeClampsAndBlackensNan) {
-  cv::Mat kelvin = (cv::Mat_<float>(1, 5) << 280.F, 290.F, 400.F, 100.F, std::numeric_limits<float>::quiet_NaN());
+  cv::Mat kelvin = (cv::Mat_<float>(1, 5) << 280.F, 290.F, 400.F, 100.F,
+                    std::numeric_limits<float>::quiet_NaN());
   const cv::Mat white = *palette("white-hot");
   const cv::Mat image = colorize(kelvin, {280, 300}, white);
   EXPECT_EQ(image.at<cv::Vec3b>(0, 0), cv::Vec3b(0, 0, 0));
@@ -53,7 +55,8 @@ TEST(Palette, ColorizeClampsAndBlackensNan) {
 
 TEST(Palette, CommonSpanIgnoresOutliersNanAndIsNeverEmpty) {
   cv::Mat a(100, 100, CV_32FC1), b(10, 10, CV_32FC1, cv::Scalar(295));
-  for (int i = 0; i < 10000; ++i) a.at<float>(i / 100, i % 100) = static_cast<float>(290 + 0.001 * i);
+  for (int i = 0; i < 10000; ++i)
+    a.at<float>(i / 100, i % 100) = static_cast<float>(290 + 0.001 * i);
   a.at<float>(0, 0) = 5000;
   a.at<float>(0, 1) = std::numeric_limits<float>::quiet_NaN();
   a.at<float>(0, 2) = std::numeric_limits<float>::infinity();

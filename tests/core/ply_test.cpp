@@ -45,9 +45,12 @@ TEST(Ply, EmptyCloud) {
 TEST(Ply, AsciiWithForeignElementsAndProperties) {
   const TempFolder folder;
   put(folder / "a.ply",
-      "ply\r\nformat ascii 1.0\r\ncomment x\r\nelement camera 1\r\nproperty list uchar int ids\r\nproperty float f\r\n"
-      "element vertex 2\r\nproperty float x\r\nproperty float y\r\nproperty float z\r\nproperty float confidence\r\n"
-      "property list uchar float extra\r\nelement face 1\r\nproperty list uchar int vertex_indices\r\nend_header\r\n"
+      "ply\r\nformat ascii 1.0\r\ncomment x\r\nelement camera 1\r\nproperty list uchar int "
+      "ids\r\nproperty float f\r\n"
+      "element vertex 2\r\nproperty float x\r\nproperty float y\r\nproperty float z\r\nproperty "
+      "float confidence\r\n"
+      "property list uchar float extra\r\nelement face 1\r\nproperty list uchar int "
+      "vertex_indices\r\nend_header\r\n"
       "3 7 8 9 1.5\r\n1 2 3 0.5 0\r\n-1e2 nan +4 0.5 2 7 8\r\n3 0 1 1\r\n");
   const auto cloud = read_ply(folder / "a.ply");
   ASSERT_TRUE(cloud) << cloud.error().message();
@@ -61,9 +64,10 @@ TEST(Ply, AsciiWithForeignElementsAndProperties) {
 
 TEST(Ply, BigEndian) {
   const TempFolder folder;
-  put(folder / "b.ply", std::string("ply\nformat binary_big_endian 1.0\nelement vertex 1\nproperty float x\n"
-                                    "property short y\nproperty uchar z\nend_header\n") +
-                            std::string("\x3F\x80\x00\x00\xFF\xFE\x05", 7));
+  put(folder / "b.ply",
+      std::string("ply\nformat binary_big_endian 1.0\nelement vertex 1\nproperty float x\n"
+                  "property short y\nproperty uchar z\nend_header\n") +
+          std::string("\x3F\x80\x00\x00\xFF\xFE\x05", 7));
   const auto cloud = read_ply(folder / "b.ply");
   ASSERT_TRUE(cloud) << cloud.error().message();
   EXPECT_EQ(cloud->positions[0], Eigen::Vector3d(1, -2, 5));
@@ -83,11 +87,15 @@ TEST(Ply, TruncatedAtAnyByteIsAnError) {
 
 TEST(Ply, CountsLargerThanTheFileTakeNoMemory) {
   const TempFolder folder;
-  for (const char* header : {
-           "ply\nformat binary_little_endian 1.0\nelement vertex 18446744073709551615\nproperty float x\nproperty float y\nproperty float z\nend_header\nabc",
-           "ply\nformat ascii 1.0\nelement vertex 999999999999\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n",
-           "ply\nformat binary_little_endian 1.0\nelement junk 99999999999\nelement vertex 1\nproperty float x\nend_header\n",
-           "ply\nformat ascii 1.0\nelement vertex -3\nproperty float x\nproperty float y\nproperty float z\nend_header\n"}) {
+  for (const char* header :
+       {"ply\nformat binary_little_endian 1.0\nelement vertex 18446744073709551615\nproperty float "
+        "x\nproperty float y\nproperty float z\nend_header\nabc",
+        "ply\nformat ascii 1.0\nelement vertex 999999999999\nproperty float x\nproperty float "
+        "y\nproperty float z\nend_header\n1 2 3\n",
+        "ply\nformat binary_little_endian 1.0\nelement junk 99999999999\nelement vertex "
+        "1\nproperty float x\nend_header\n",
+        "ply\nformat ascii 1.0\nelement vertex -3\nproperty float x\nproperty float y\nproperty "
+        "float z\nend_header\n"}) {
     put(folder / "h.ply", header);
     EXPECT_FALSE(read_ply(folder / "h.ply")) << header;
   }
@@ -95,18 +103,23 @@ TEST(Ply, CountsLargerThanTheFileTakeNoMemory) {
 
 TEST(Ply, WrongTypesAreNamed) {
   const TempFolder folder;
-  put(folder / "t.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty text x\nend_header\n1\n");
+  put(folder / "t.ply",
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty text x\nend_header\n1\n");
   EXPECT_NE(read_ply(folder / "t.ply").error().message().find("text"), std::string::npos);
   put(folder / "n.ply", "solid cube\n");
   EXPECT_FALSE(read_ply(folder / "n.ply"));
-  put(folder / "x.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nend_header\n1 2\n");
+  put(folder / "x.ply",
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nend_header\n1 "
+      "2\n");
   EXPECT_FALSE(read_ply(folder / "x.ply"));
 }
 
 TEST(Ply, PositionsThatCannotBeComputedWithAreNone) {
   const TempFolder folder;
-  put(folder / "c.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\n"
-                        "end_header\n1 2 3\n1e300 0 0\nnan 1 1\n");
+  put(folder / "c.ply",
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty "
+      "double z\n"
+      "end_header\n1 2 3\n1e300 0 0\nnan 1 1\n");
   const auto cloud = read_ply(folder / "c.ply");
   ASSERT_TRUE(cloud) << cloud.error().message();
   EXPECT_EQ(cloud->positions.at(0), Eigen::Vector3d(1, 2, 3));

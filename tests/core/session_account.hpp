@@ -10,7 +10,8 @@
 
 namespace orbitfuse::test {
 
-/// Each id of each device is either a frame's or in a gap, exactly once, from the first to the last.
+/// Each id of each device is either a frame's or in a gap, exactly once, from the first to the
+/// last.
 inline void expect_each_id_once(const Session& session) {
   std::map<std::string, std::map<std::uint64_t, int>> times;
   for (const FrameRecord& f : session.frames) ++times[f.device][f.sequence];

@@ -28,7 +28,8 @@ FrameRecord full_frame() {
   f.thermal_is_gray = true;
   f.flags = {"nuc", "of-a-later-version"};
   f.content_hash = "ab";
-  f.cam_from_world = Rigid3d{Eigen::Quaterniond(0.3, -0.5, 0.2, 0.7).normalized(), {1.0 / 3, -2, 3}};
+  f.cam_from_world =
+      Rigid3d{Eigen::Quaterniond(0.3, -0.5, 0.2, 0.7).normalized(), {1.0 / 3, -2, 3}};
   f.camera = Camera::from_fov(640, 480, 25);
   f.source = "thermal/x \"quoted\".tiff";
   f.quality = FrameQuality{0.25, 295.5, 0.001, EdgeBlur{1.25, 70}};
@@ -43,10 +44,12 @@ std::string manifest() {
   DeviceInfo device{"thermal0", Modality::thermal, "test", "M", "S", {}};
   device.lens.focal_px = 1443.5;
   device.lens.calibrated = Camera::from_fov(640, 480, 25);
-  return manifest_header_line(session) + "\n" + manifest_line(device) + "\n" + manifest_line(full_frame()) + "\n" +
+  return manifest_header_line(session) + "\n" + manifest_line(device) + "\n" +
+         manifest_line(full_frame()) + "\n" +
          manifest_line(GapRecord{"thermal0", 3, 9, "missing"}) + "\n" +
          manifest_line(StreamRecord{"thermal0", 1, 20, 11, 9}) + "\n" +
-         manifest_line(EventRecord{"thermal0", 77, "nuc", "shutter"}) + "\n" + manifest_end_line(session) + "\n";
+         manifest_line(EventRecord{"thermal0", 77, "nuc", "shutter"}) + "\n" +
+         manifest_end_line(session) + "\n";
 }
 
 class SessionTest : public ::testing::Test {
@@ -76,7 +79,8 @@ TEST_F(SessionTest, EveryFieldComesBack) {
   EXPECT_EQ(f.device_time_ns, -5);
   EXPECT_EQ(f.station->azimuth_deg, 210.5);
   EXPECT_EQ(f.station->loop, 1);
-  EXPECT_TRUE(f.tracking && f.thermal_is_gray && f.has_flag(FrameFlag::nuc) && !f.has_flag(FrameFlag::still) && f.flags.size() == 2);
+  EXPECT_TRUE(f.tracking && f.thermal_is_gray && f.has_flag(FrameFlag::nuc) &&
+              !f.has_flag(FrameFlag::still) && f.flags.size() == 2);
   EXPECT_EQ(f.camera, e.camera);
   EXPECT_EQ(f.cam_from_world->translation, e.cam_from_world->translation);
   EXPECT_EQ(f.quality->sharpness, 0.25);
@@ -117,9 +121,12 @@ TEST_F(SessionTest, DamageInTheMiddleNamesTheLine) {
 
 TEST_F(SessionTest, WrongTypesNameTheField) {
   const std::pair<const char*, const char*> edits[] = {
-      {"\"width\":640", "\"width\":\"640\""},   {"\"width\":640", "\"width\":-1"},
-      {"\"loop\":1", "\"loop\":1.5"},           {"\"modality\":\"thermal\",\"q", "\"modality\":\"x\",\"q"},
-      {"\"translation\":[", "\"translation\":[null,"}, {"\"azimuth_deg\":210.5", "\"azimuth_deg\":null"}};
+      {"\"width\":640", "\"width\":\"640\""},
+      {"\"width\":640", "\"width\":-1"},
+      {"\"loop\":1", "\"loop\":1.5"},
+      {"\"modality\":\"thermal\",\"q", "\"modality\":\"x\",\"q"},
+      {"\"translation\":[", "\"translation\":[null,"},
+      {"\"azimuth_deg\":210.5", "\"azimuth_deg\":null"}};
   for (const auto& [from, to] : edits) {
     std::string text = manifest();
     // The frame's line; the device's carries a width too.
@@ -142,7 +149,8 @@ TEST_F(SessionTest, PathsThatLeaveTheFolderAreRefused) {
     FrameRecord f = full_frame();
     f.file = file;
     std::string text = manifest();
-    text.insert(text.find('\n', text.find("\"device\"") == 0 ? 0 : text.find('\n') + 1) + 1, manifest_line(f) + "\n");
+    text.insert(text.find('\n', text.find("\"device\"") == 0 ? 0 : text.find('\n') + 1) + 1,
+                manifest_line(f) + "\n");
     EXPECT_FALSE(open(text)) << file;
   }
 }
@@ -170,7 +178,8 @@ TEST_F(SessionTest, LaterLineAboutAFileAmendsIt) {
   chosen.tracking = false;
   chosen.station = Station{2, 3, 90, 55, 1, 1};
   std::string text = manifest();
-  text.insert(text.rfind('\n', text.size() - 2) + 1, manifest_line(chosen) + "\n");  // before the end line
+  text.insert(text.rfind('\n', text.size() - 2) + 1,
+              manifest_line(chosen) + "\n");  // before the end line
   const auto s = open(text);
   ASSERT_TRUE(s) << s.error().message();
   ASSERT_EQ(s->frames.size(), 1u);

@@ -8,7 +8,8 @@ namespace {
 
 TEST(Transform, RebaseKeepsWhatTheCameraSees) {
   const Rigid3d cam_from_a{Eigen::Quaterniond(0.3, -0.5, 0.2, 0.7).normalized(), {1, -2, 3}};
-  const Similarity3d b_from_a{2.5, Eigen::Quaterniond(0.1, 0.9, -0.3, 0.2).normalized(), {4, 5, -6}};
+  const Similarity3d b_from_a{
+      2.5, Eigen::Quaterniond(0.1, 0.9, -0.3, 0.2).normalized(), {4, 5, -6}};
   const Eigen::Vector3d x_in_a(0.3, 0.8, -1.2);
   const Eigen::Vector3d in_cam_a = cam_from_a * x_in_a;
   const Eigen::Vector3d in_cam_b = rebase(cam_from_a, b_from_a) * (b_from_a * x_in_a);
@@ -27,7 +28,9 @@ TEST(Transform, OpenGlRoundTrip) {
   const Rigid3d cam_from_world{Eigen::Quaterniond(0.3, -0.5, 0.2, 0.7).normalized(), {1, -2, 3}};
   const Eigen::Matrix4d gl = opengl_of_cam_from_world(cam_from_world);
   // An OpenGL camera looks along its -z, ours along +z: the viewing directions must be equal.
-  EXPECT_LT((-gl.col(2).head<3>() - cam_from_world.inverse().rotation * Eigen::Vector3d::UnitZ()).norm(), 1e-12);
+  EXPECT_LT(
+      (-gl.col(2).head<3>() - cam_from_world.inverse().rotation * Eigen::Vector3d::UnitZ()).norm(),
+      1e-12);
   const Rigid3d back = cam_from_world_of_opengl(gl);
   EXPECT_LT(rotation_angle_deg(back.rotation, cam_from_world.rotation), 1e-6);
   EXPECT_LT((back.translation - cam_from_world.translation).norm(), 1e-12);

@@ -28,15 +28,19 @@ TEST(TransformsJson, RoundTrip) {
   ASSERT_EQ(back->frames.size(), 2u);
   EXPECT_EQ(back->frames[1].thermal_file_path, "thermal/a.png");
   EXPECT_EQ(back->frames[1].camera, frame.camera);
-  EXPECT_LT((back->frames[1].cam_from_world.translation - frame.cam_from_world.translation).norm(), 1e-12);
-  EXPECT_LT(rotation_angle_deg(back->frames[1].cam_from_world.rotation, frame.cam_from_world.rotation), 1e-5);
+  EXPECT_LT((back->frames[1].cam_from_world.translation - frame.cam_from_world.translation).norm(),
+            1e-12);
+  EXPECT_LT(
+      rotation_angle_deg(back->frames[1].cam_from_world.rotation, frame.cam_from_world.rotation),
+      1e-5);
 }
 
 TEST(TransformsJson, FieldOfViewAndPerFrameIntrinsics) {
   const TempFolder folder;
-  put(folder / "t.json", std::string(R"({"camera_angle_x":1.5707963267948966,"w":200,"h":100,"frames":[)") +
-                             R"({"file_path":"a","transform_matrix":)" + identity + R"(},)" +
-                             R"({"file_path":"b","fl_x":77,"w":50,"transform_matrix":)" + identity + "}]}");
+  put(folder / "t.json",
+      std::string(R"({"camera_angle_x":1.5707963267948966,"w":200,"h":100,"frames":[)") +
+          R"({"file_path":"a","transform_matrix":)" + identity + R"(},)" +
+          R"({"file_path":"b","fl_x":77,"w":50,"transform_matrix":)" + identity + "}]}");
   const auto t = read_transforms_json(folder / "t.json");
   ASSERT_TRUE(t) << t.error().message();
   EXPECT_NEAR(t->frames[0].camera.fx, 100, 1e-9);
@@ -45,7 +49,10 @@ TEST(TransformsJson, FieldOfViewAndPerFrameIntrinsics) {
   EXPECT_EQ(t->frames[1].camera.cx, 25);
   // An OpenGL camera with the identity stands at its translation and looks along world -z.
   EXPECT_LT((camera_center(t->frames[0].cam_from_world) - Eigen::Vector3d(4, 5, 6)).norm(), 1e-12);
-  EXPECT_LT((t->frames[0].cam_from_world.inverse().rotation * Eigen::Vector3d::UnitZ() + Eigen::Vector3d::UnitZ()).norm(), 1e-12);
+  EXPECT_LT((t->frames[0].cam_from_world.inverse().rotation * Eigen::Vector3d::UnitZ() +
+             Eigen::Vector3d::UnitZ())
+                .norm(),
+            1e-12);
 }
 
 TEST(TransformsJson, WhereverItIsCutItIsRefused) {
@@ -66,12 +73,19 @@ TEST(TransformsJson, WhereverItIsCutItIsRefused) {
 TEST(TransformsJson, BadInputNamesFrameAndField) {
   const TempFolder folder;
   const std::pair<std::string, std::string> cases[] = {
-      {R"({"frames":[{"file_path":"a","transform_matrix":)" + std::string(identity) + "}]}", "size"},
-      {R"({"w":4,"h":4,"frames":[{"file_path":"a","transform_matrix":)" + std::string(identity) + "}]}", "focal"},
+      {R"({"frames":[{"file_path":"a","transform_matrix":)" + std::string(identity) + "}]}",
+       "size"},
+      {R"({"w":4,"h":4,"frames":[{"file_path":"a","transform_matrix":)" + std::string(identity) +
+           "}]}",
+       "focal"},
       {R"({"w":4,"h":4,"fl_x":3,"frames":[{"file_path":"a"}]})", "transform_matrix"},
-      {R"({"w":4,"h":4,"fl_x":3,"frames":[{"file_path":"a","transform_matrix":[[1,0,0,0],[0,"x",0,0],[0,0,1,0]]}]})", "transform_matrix"},
-      {R"({"w":4,"h":4,"fl_x":3,"frames":[{"file_path":"a","transform_matrix":[[2,0,0,0],[0,2,0,0],[0,0,2,0]]}]})", "transform_matrix"},
-      {R"({"w":4,"h":4,"fl_x":3,"k3":0.1,"frames":[{"file_path":"a","transform_matrix":)" + std::string(identity) + "}]}", "k3"},
+      {R"({"w":4,"h":4,"fl_x":3,"frames":[{"file_path":"a","transform_matrix":[[1,0,0,0],[0,"x",0,0],[0,0,1,0]]}]})",
+       "transform_matrix"},
+      {R"({"w":4,"h":4,"fl_x":3,"frames":[{"file_path":"a","transform_matrix":[[2,0,0,0],[0,2,0,0],[0,0,2,0]]}]})",
+       "transform_matrix"},
+      {R"({"w":4,"h":4,"fl_x":3,"k3":0.1,"frames":[{"file_path":"a","transform_matrix":)" +
+           std::string(identity) + "}]}",
+       "k3"},
       {R"({"frames":[]})", "frames"},
       {R"({"frames":7})", "frames"},
       {R"({"frames":[{"file_p)", "cut off"},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Every seed, thousands of damaged ones, and every input that was ever found at fault: no reader may
-// crash. Under the address sanitizer (preset asan) this also finds reads beyond the end.
+// Every seed, thousands of damaged ones, and every input that was ever found at fault: no reader
+// may crash. Under the address sanitizer (preset asan) this also finds reads beyond the end.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -21,13 +21,24 @@ std::string damaged(std::string bytes, std::mt19937& random) {
   for (std::size_t i = 0; i < changes && !bytes.empty(); ++i) {
     const std::size_t at = below(bytes.size());
     switch (below(6)) {
-      case 0: bytes[at] = static_cast<char>(random()); break;
-      case 1: bytes[at] = static_cast<char>(bytes[at] ^ (1 << below(8))); break;
-      case 2: bytes.resize(at); break;
-      case 3: bytes.insert(at, bytes.substr(below(bytes.size()), 1 + below(40))); break;
-      case 4: bytes.erase(at, 1 + below(40)); break;
+      case 0:
+        bytes[at] = static_cast<char>(random());
+        break;
+      case 1:
+        bytes[at] = static_cast<char>(bytes[at] ^ (1 << below(8)));
+        break;
+      case 2:
+        bytes.resize(at);
+        break;
+      case 3:
+        bytes.insert(at, bytes.substr(below(bytes.size()), 1 + below(40)));
+        break;
+      case 4:
+        bytes.erase(at, 1 + below(40));
+        break;
       default:
-        for (std::size_t k = at; k < std::min(bytes.size(), at + 4); ++k) bytes[k] = static_cast<char>(below(2) ? 0xff : 0);
+        for (std::size_t k = at; k < std::min(bytes.size(), at + 4); ++k)
+          bytes[k] = static_cast<char>(below(2) ? 0xff : 0);
     }
   }
   return bytes;

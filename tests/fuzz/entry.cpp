@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What libFuzzer calls. One program holds the targets of one list; the name it was started under, a
-// link to it, says which: fuzz_tiff.run runs the target "tiff". `fuzz_tiff.run --write-seeds FOLDER`
-// writes the seeds and stops; any other name lists the targets.
+// link to it, says which: fuzz_tiff.run runs the target "tiff". `fuzz_tiff.run --write-seeds
+// FOLDER` writes the seeds and stops; any other name lists the targets.
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -30,7 +30,8 @@ extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
     int index = 0;
     std::filesystem::create_directories((*argv)[2]);
     for (const std::string& seed : chosen->seeds())
-      std::ofstream(std::string((*argv)[2]) + "/seed" + std::to_string(index++), std::ios::binary) << seed;
+      std::ofstream(std::string((*argv)[2]) + "/seed" + std::to_string(index++), std::ios::binary)
+          << seed;
     std::exit(0);
   }
   return 0;

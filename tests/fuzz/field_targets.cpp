@@ -30,11 +30,16 @@ std::vector<std::string> field_seeds() {
     pose.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY()));
     pose.translation = {0, 0, 3};
     cv::Mat image(12, 16, CV_32FC1, cv::Scalar(290 + i));
-    data.views.push_back({"thermal/" + std::to_string(i) + ".tiff", Camera::from_fov(16, 12, 50), pose, image, false});
+    data.views.push_back({"thermal/" + std::to_string(i) + ".tiff", Camera::from_fov(16, 12, 50),
+                          pose, image, false});
   }
   nerf::TrainOptions options;
-  for (const auto& [key, value] : {std::pair{"iterations", "2"}, {"log2_table", "8"}, {"levels", "2"},
-                                   {"occupancy_resolution", "16"}, {"hidden", "16"}, {"color_hidden", "16"},
+  for (const auto& [key, value] : {std::pair{"iterations", "2"},
+                                   {"log2_table", "8"},
+                                   {"levels", "2"},
+                                   {"occupancy_resolution", "16"},
+                                   {"hidden", "16"},
+                                   {"color_hidden", "16"},
                                    {"samples_per_step", "256"}})
     static_cast<void>(options.set(key, value));
   nerf::Field trained;

@@ -26,7 +26,9 @@ void write(const std::string& file, std::string_view bytes) {
 
 void ply(std::string_view bytes) { static_cast<void>(read_ply(scratch().with(bytes))); }
 
-void transforms(std::string_view bytes) { static_cast<void>(read_transforms_json(scratch().with(bytes))); }
+void transforms(std::string_view bytes) {
+  static_cast<void>(read_transforms_json(scratch().with(bytes)));
+}
 
 void truth(std::string_view bytes) {
   static_cast<void>(read_ground_truth(scratch().with(bytes)));
@@ -92,19 +94,25 @@ std::vector<std::string> ply_seeds() {
   }
   const std::string file = scratch_folder() + "/seed.ply";
   static_cast<void>(write_ply(file, cloud));
-  return {read_file(file).value(),
-          "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
-          "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 2 3\n3 0 1 1\n",
-          "ply\nformat binary_big_endian 1.0\nelement face 1\nproperty list uchar int i\nelement vertex 1\n"
-          "property double x\nproperty double y\nproperty double z\nend_header\n" + std::string(29, '\0')};
+  return {
+      read_file(file).value(),
+      "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float "
+      "z\n"
+      "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 2 3\n3 0 1 1\n",
+      "ply\nformat binary_big_endian 1.0\nelement face 1\nproperty list uchar int i\nelement "
+      "vertex 1\n"
+      "property double x\nproperty double y\nproperty double z\nend_header\n" +
+          std::string(29, '\0')};
 }
 
 std::vector<std::string> colmap_seeds(ColmapFormat format) {
-  const std::string folder = scratch_folder() + "/seed_model", extension = format == ColmapFormat::text ? ".txt" : ".bin";
+  const std::string folder = scratch_folder() + "/seed_model",
+                    extension = format == ColmapFormat::text ? ".txt" : ".bin";
   static_cast<void>(write_colmap_model(folder, small_model(), format));
   std::string seed;
   for (const char* name : {"/cameras", "/images", "/points3D"})
-    seed += (seed.empty() ? "" : std::string(parting)) + read_file(folder + name + extension).value();
+    seed +=
+        (seed.empty() ? "" : std::string(parting)) + read_file(folder + name + extension).value();
   return {seed};
 }
 std::vector<std::string> colmap_text_seeds() { return colmap_seeds(ColmapFormat::text); }
@@ -112,18 +120,21 @@ std::vector<std::string> colmap_binary_seeds() { return colmap_seeds(ColmapForma
 
 std::vector<std::string> transforms_seeds() {
   Transforms t;
-  for (const PosedView& view : small_model().views) t.frames.push_back({view.name, "t.tiff", view.camera, view.cam_from_world});
+  for (const PosedView& view : small_model().views)
+    t.frames.push_back({view.name, "t.tiff", view.camera, view.cam_from_world});
   const std::string file = scratch_folder() + "/seed.json";
   static_cast<void>(write_transforms_json(file, t));
-  return {read_file(file).value(),
-          R"({"camera_angle_x":0.7,"w":40,"h":30,"frames":[{"file_path":"a","transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,4]]}]})"};
+  return {
+      read_file(file).value(),
+      R"({"camera_angle_x":0.7,"w":40,"h":30,"frames":[{"file_path":"a","transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,4]]}]})"};
 }
 
 std::vector<std::string> truth_seeds() {
-  return {R"({"visible":{"K":{"fx":90,"fy":90,"cx":50,"cy":40,"w":100,"h":80},"frames":[{"file":"v.jpg","az":3,"el":20,)"
-          R"("c2w":[[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]]}]},"test":{"K":{"fx":90,"fy":90,"cx":50,"cy":40,"w":100,)"
-          R"("h":80},"frames":[{"visible":"a.jpg","thermal":"b.tiff","c2w":[[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]]}]}})",
-          R"({"K":{"fx":90,"fy":90,"cx":50,"cy":40,"w":100,"h":80,"k1":0.1},"frames":[]})"};
+  return {
+      R"({"visible":{"K":{"fx":90,"fy":90,"cx":50,"cy":40,"w":100,"h":80},"frames":[{"file":"v.jpg","az":3,"el":20,)"
+      R"("c2w":[[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]]}]},"test":{"K":{"fx":90,"fy":90,"cx":50,"cy":40,"w":100,)"
+      R"("h":80},"frames":[{"visible":"a.jpg","thermal":"b.tiff","c2w":[[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]]}]}})",
+      R"({"K":{"fx":90,"fy":90,"cx":50,"cy":40,"w":100,"h":80,"k1":0.1},"frames":[]})"};
 }
 
 std::vector<std::string> manifest_seeds() {
@@ -144,10 +155,13 @@ std::vector<std::string> manifest_seeds() {
   frame.camera = device.lens.calibrated;
   frame.flags = {"still"};
   frame.quality = FrameQuality{0.5, 100, 0.1, EdgeBlur{1.2, 30}};
-  const std::string lines[] = {manifest_header_line(session), manifest_line(device), manifest_line(frame),
+  const std::string lines[] = {manifest_header_line(session),
+                               manifest_line(device),
+                               manifest_line(frame),
                                manifest_line(GapRecord{"visible0", 3, 2, "network"}),
                                manifest_line(StreamRecord{"visible0", 0, 5, 4, 2}),
-                               manifest_line(EventRecord{"visible0", 7, "nuc", ""}), manifest_end_line(session)};
+                               manifest_line(EventRecord{"visible0", 7, "nuc", ""}),
+                               manifest_end_line(session)};
   std::string seed;
   for (const std::string& line : lines) seed += line + "\n";
   return {seed};
@@ -155,7 +169,9 @@ std::vector<std::string> manifest_seeds() {
 
 std::vector<std::string> toml_seeds() {
   return {"[a]\nnumber = 1.5 # half\ncount = 7\n[b]\nflag = true\n[b.c]\ntext = \"x\\u00e9\"\n",
-          "a = {number = 3, count = [1, 2]}\nb.c.text = '''long\ntext'''\ndate = 2024-01-02T03:04:05Z\n", "a.number=2"};
+          "a = {number = 3, count = [1, 2]}\nb.c.text = '''long\ntext'''\ndate = "
+          "2024-01-02T03:04:05Z\n",
+          "a.number=2"};
 }
 
 }  // namespace

@@ -51,14 +51,16 @@ void sidecar(std::string_view bytes) {
 
 cv::Mat counts() {
   cv::Mat image(12, 16, CV_16UC1);
-  for (int i = 0; i < 192; ++i) image.at<std::uint16_t>(i / 16, i % 16) = static_cast<std::uint16_t>(29000 + 13 * i);
+  for (int i = 0; i < 192; ++i)
+    image.at<std::uint16_t>(i / 16, i % 16) = static_cast<std::uint16_t>(29000 + 13 * i);
   return image;
 }
 
 cv::Mat color() {
   cv::Mat image(12, 16, CV_8UC3);
   for (int i = 0; i < 192; ++i)
-    image.at<cv::Vec3b>(i / 16, i % 16) = cv::Vec3b(static_cast<uchar>(i), static_cast<uchar>(3 * i), 90);
+    image.at<cv::Vec3b>(i / 16, i % 16) =
+        cv::Vec3b(static_cast<uchar>(i), static_cast<uchar>(3 * i), 90);
   return image;
 }
 
@@ -69,7 +71,8 @@ std::string jpeg_with_exif() {
   const auto number = [&tiff](std::uint32_t value, int bytes) {
     for (int i = 0; i < bytes; ++i) tiff += static_cast<char>(value >> (8 * i));
   };
-  const auto entry = [&](std::uint32_t tag, std::uint32_t type, std::uint32_t count, std::uint32_t value) {
+  const auto entry = [&](std::uint32_t tag, std::uint32_t type, std::uint32_t count,
+                         std::uint32_t value) {
     number(tag, 2), number(type, 2), number(count, 4), number(value, 4);
   };
   number(2, 2);
@@ -102,20 +105,24 @@ std::vector<std::string> rjpeg_seeds() {
 
 std::vector<std::string> tiff_seeds() {
   cv::Mat depth(12, 16, CV_32FC1, cv::Scalar(2.5)), gray(12, 16, CV_8UC1, cv::Scalar(7));
-  return {*encode_thermal_tiff(counts()), *encode_thermal_tiff(counts(), {0.04, 10}), *encode_tiff(depth, ""),
-          made::tiff_of_pages({counts(), counts()}, R"({"scale":0.01,"offset":0})"), made::tiff_of_pages({gray})};
+  return {*encode_thermal_tiff(counts()), *encode_thermal_tiff(counts(), {0.04, 10}),
+          *encode_tiff(depth, ""),
+          made::tiff_of_pages({counts(), counts()}, R"({"scale":0.01,"offset":0})"),
+          made::tiff_of_pages({gray})};
 }
 
 std::vector<std::string> photo_seeds() {
   cv::Mat gray;
   cv::extractChannel(color(), gray, 0);
-  return {*encode_jpeg(color(), 90), *encode_jpeg(gray, 60), *encode_png(color()), *encode_png(counts()), jpeg_with_exif()};
+  return {*encode_jpeg(color(), 90), *encode_jpeg(gray, 60), *encode_png(color()),
+          *encode_png(counts()), jpeg_with_exif()};
 }
 
 std::vector<std::string> exif_seeds() { return {jpeg_with_exif()}; }
 
 std::vector<std::string> sidecar_seeds() {
-  return {thermal_sidecar_json(), R"({"scale":0.04,"offset":-273.15})", R"({"scale":1e300})", R"({"scale":"x"})"};
+  return {thermal_sidecar_json(), R"({"scale":0.04,"offset":-273.15})", R"({"scale":1e300})",
+          R"({"scale":"x"})"};
 }
 
 }  // namespace

@@ -16,7 +16,8 @@ ScratchFile::ScratchFile() : fd_(::memfd_create("fuzz", 0)) {
 ScratchFile::~ScratchFile() { ::close(fd_); }
 
 std::string ScratchFile::with(std::string_view bytes) const {
-  if (::ftruncate(fd_, 0) != 0 || ::pwrite(fd_, bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
+  if (::ftruncate(fd_, 0) != 0 ||
+      ::pwrite(fd_, bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
     std::abort();
   return "/proc/self/fd/" + std::to_string(fd_);
 }

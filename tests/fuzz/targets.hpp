@@ -5,9 +5,9 @@
 #include <string_view>
 #include <vector>
 
-// Everything that reads bytes from outside, as functions of bytes that must return: a crash, a report
-// of a sanitizer, more than 2 GiB or more than 10 s is a finding. The same functions run under
-// libFuzzer (run.sh) and, over the seeds, their mutations and all that was found before, in
+// Everything that reads bytes from outside, as functions of bytes that must return: a crash, a
+// report of a sanitizer, more than 2 GiB or more than 10 s is a finding. The same functions run
+// under libFuzzer (run.sh) and, over the seeds, their mutations and all that was found before, in
 // fuzz_cases_test.
 namespace orbitfuse::fuzz {
 
@@ -18,7 +18,8 @@ struct Target {
   std::vector<std::string> (*seeds)();
 };
 
-const std::vector<Target>& image_targets();   ///< radiometric JPEG, TIFF, JPEG and PNG, EXIF, sidecars
+const std::vector<Target>&
+image_targets();  ///< radiometric JPEG, TIFF, JPEG and PNG, EXIF, sidecars
 const std::vector<Target>& format_targets();  ///< PLY, COLMAP, transforms, truth, manifest, TOML
 const std::vector<Target>& field_targets();   ///< field.bin with its checksum repaired
 

@@ -37,7 +37,8 @@ Outcome run(const fs::path& program, const std::vector<fs::path>& arguments) {
   FILE* pipe = popen((command + " 2>&1").c_str(), "r");
   if (!pipe) return outcome;
   std::array<char, 4096> part;
-  for (std::size_t n = 0; (n = fread(part.data(), 1, part.size(), pipe)) > 0;) outcome.output.append(part.data(), n);
+  for (std::size_t n = 0; (n = fread(part.data(), 1, part.size(), pipe)) > 0;)
+    outcome.output.append(part.data(), n);
   outcome.status = pclose(pipe);
   return outcome;
 }
@@ -74,19 +75,22 @@ class Clouds : public ::testing::Test {
 };
 
 TEST_F(Clouds, ExampleFindsTheSimilarity) {
-  const Outcome outcome = run("examples/01_register_clouds", {folder / "source.ply", folder / "target.ply"});
+  const Outcome outcome =
+      run("examples/01_register_clouds", {folder / "source.ply", folder / "target.ply"});
   ASSERT_EQ(outcome.status, 0) << outcome.output;
   EXPECT_LT(error_percent(outcome.output), 1) << outcome.output;
 }
 
 TEST_F(Clouds, ProjectOfTheDocumentationFindsIt) {
-  const Outcome outcome = run("stranger/build/my_registration", {folder / "source.ply", folder / "target.ply"});
+  const Outcome outcome =
+      run("stranger/build/my_registration", {folder / "source.ply", folder / "target.ply"});
   ASSERT_EQ(outcome.status, 0) << outcome.output;
   EXPECT_LT(error_percent(outcome.output), 1) << outcome.output;
 }
 
 TEST_F(Clouds, MissingFileIsNamed) {
-  const Outcome outcome = run("examples/01_register_clouds", {folder / "absent.ply", folder / "target.ply"});
+  const Outcome outcome =
+      run("examples/01_register_clouds", {folder / "absent.ply", folder / "target.ply"});
   EXPECT_NE(outcome.status, 0);
   EXPECT_NE(outcome.output.find("absent.ply"), std::string::npos) << outcome.output;
 }
@@ -94,13 +98,15 @@ TEST_F(Clouds, MissingFileIsNamed) {
 TEST(Examples, FuseImages) {
   const fs::path folder = data_folder("fuse");
   // A bright square only the visible image has, a disc only the thermal one has.
-  cv::Mat visible(120, 160, CV_8UC3, cv::Scalar(60, 80, 100)), thermal(120, 160, CV_8UC1, cv::Scalar(40));
+  cv::Mat visible(120, 160, CV_8UC3, cv::Scalar(60, 80, 100)),
+      thermal(120, 160, CV_8UC1, cv::Scalar(40));
   cv::rectangle(visible, cv::Rect(20, 40, 30, 30), cv::Scalar(220, 220, 220), cv::FILLED);
   cv::circle(thermal, {120, 60}, 15, cv::Scalar(230), cv::FILLED);
   ASSERT_TRUE(write_png(folder / "visible.png", visible));
   ASSERT_TRUE(write_png(folder / "thermal.png", thermal));
   const Outcome outcome =
-      run("examples/02_fuse_images", {folder / "visible.png", folder / "thermal.png", folder / "fused.png"});
+      run("examples/02_fuse_images",
+          {folder / "visible.png", folder / "thermal.png", folder / "fused.png"});
   ASSERT_EQ(outcome.status, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("Qabf"), std::string::npos) << outcome.output;
   const auto fused = read_image(folder / "fused.png");
@@ -142,7 +148,8 @@ TEST(Examples, HottestKelvinOfARadiometricJpeg) {
   std::ofstream(folder / "photo.jpg", std::ios::binary) << test::flir_jpeg_file(counts, planck);
   const Outcome outcome = run("examples/04_import_radiometric_jpeg", {folder / "photo.jpg"});
   ASSERT_EQ(outcome.status, 0) << outcome.output;
-  const double expected = planck.b / std::log(planck.r1 / (planck.r2 * (16000 + planck.o)) + planck.f);
+  const double expected =
+      planck.b / std::log(planck.r1 / (planck.r2 * (16000 + planck.o)) + planck.f);
   EXPECT_NEAR(std::stod(outcome.output), expected, 0.01);
 }
 

@@ -9,7 +9,8 @@ namespace orbitfuse::test {
 namespace {
 
 void put(std::string& block, std::size_t at, std::uint64_t value, int bytes) {
-  for (int i = 0; i < bytes; ++i) block.at(at + static_cast<std::size_t>(i)) = static_cast<char>(value >> (8 * i));
+  for (int i = 0; i < bytes; ++i)
+    block.at(at + static_cast<std::size_t>(i)) = static_cast<char>(value >> (8 * i));
 }
 
 void put_float(std::string& block, std::size_t at, double value) {

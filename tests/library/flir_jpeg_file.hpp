@@ -8,8 +8,8 @@
 
 namespace orbitfuse::test {
 
-/// A radiometric JPEG of these raw counts (CV_16UC1, at most 30,000 pixels), as a FLIR camera with this
-/// calibration and the object right before it would write it.
+/// A radiometric JPEG of these raw counts (CV_16UC1, at most 30,000 pixels), as a FLIR camera with
+/// this calibration and the object right before it would write it.
 std::string flir_jpeg_file(const cv::Mat& counts, const PlanckConstants& planck);
 
 }  // namespace orbitfuse::test

@@ -41,14 +41,16 @@ class CodeOnly {
     return at_ == 0 || before == std::string::npos || source_[before] == '\n';
   }
   bool between_digits() const {  // 100'000
-    return at_ > 0 && at_ + 1 < source_.size() && std::isxdigit(static_cast<unsigned char>(source_[at_ - 1])) &&
+    return at_ > 0 && at_ + 1 < source_.size() &&
+           std::isxdigit(static_cast<unsigned char>(source_[at_ - 1])) &&
            std::isxdigit(static_cast<unsigned char>(source_[at_ + 1])) &&
            (at_ + 2 >= source_.size() || source_[at_ + 2] != '\'');
   }
   void skip_to(std::size_t end) {
     end = std::min(end, source_.size());
-    code_.append(static_cast<std::size_t>(std::count(source_.begin() + static_cast<std::ptrdiff_t>(at_),
-                                                     source_.begin() + static_cast<std::ptrdiff_t>(end), '\n')),
+    code_.append(static_cast<std::size_t>(
+                     std::count(source_.begin() + static_cast<std::ptrdiff_t>(at_),
+                                source_.begin() + static_cast<std::ptrdiff_t>(end), '\n')),
                  '\n');
     at_ = end;
   }
@@ -72,11 +74,16 @@ class CodeOnly {
   std::size_t at_ = 0;
 };
 
-enum class Opens { function, room, value };  // a room: namespace or type, where functions may follow
+enum class Opens {
+  function,
+  room,
+  value
+};  // a room: namespace or type, where functions may follow
 
 /// What a brace opens, by the words before it back to the last ; { or }.
 Opens opened_by(const std::string& head) {
-  static const std::regex room(R"(\b(?:namespace|extern)\b|\b(?:struct|class|enum|union)\b[^()]*$)"),
+  static const std::regex room(
+      R"(\b(?:namespace|extern)\b|\b(?:struct|class|enum|union)\b[^()]*$)"),
       function(R"(\)\s*(?:(?:const|noexcept|override|final|try)\s*|->[^()]*|:[^:][^]*\)\s*)*$)");
   if (std::regex_search(head, room)) return Opens::room;
   return std::regex_search(head, function) ? Opens::function : Opens::value;
@@ -111,7 +118,8 @@ std::vector<Function> functions_of(const std::string& source) {
       continue;
     }
     parentheses += c == '(' ? 1 : c == ')' ? -1 : 0;
-    const Opens opens = c == '{' ? (parentheses > 0 ? Opens::value : opened_by(head)) : Opens::value;
+    const Opens opens =
+        c == '{' ? (parentheses > 0 ? Opens::value : opened_by(head)) : Opens::value;
     if (c == '{' && opens != Opens::room) {
       skipped = 1;
       in_function = opens == Opens::function;

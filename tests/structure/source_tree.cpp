@@ -32,7 +32,8 @@ SourceFile read_source(const fs::path& root, const fs::path& path) {
 
 }  // namespace
 
-std::vector<SourceFile> read_sources(const std::string& root, const std::vector<std::string>& folders) {
+std::vector<SourceFile> read_sources(const std::string& root,
+                                     const std::vector<std::string>& folders) {
   std::vector<SourceFile> files;
   for (const std::string& folder : folders) {
     for (const auto& entry : fs::recursive_directory_iterator(fs::path(root) / folder)) {
@@ -41,14 +42,16 @@ std::vector<SourceFile> read_sources(const std::string& root, const std::vector<
         files.push_back(read_source(root, entry.path()));
     }
   }
-  std::sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return a.path < b.path; });
+  std::sort(files.begin(), files.end(),
+            [](const auto& a, const auto& b) { return a.path < b.path; });
   return files;
 }
 
 std::string module_of(const std::string& folder) {
   const std::size_t first = folder.find('/');
   const std::string top = folder.substr(0, first);
-  if (first == std::string::npos || (top != "recon" && top != "drivers" && top != "bench")) return top;
+  if (first == std::string::npos || (top != "recon" && top != "drivers" && top != "bench"))
+    return top;
   return folder.substr(0, folder.find('/', first + 1));
 }
 

@@ -19,7 +19,8 @@ struct SourceFile {
 };
 
 /// C++ sources under these folders of the root, in order of their paths.
-std::vector<SourceFile> read_sources(const std::string& root, const std::vector<std::string>& folders);
+std::vector<SourceFile> read_sources(const std::string& root,
+                                     const std::vector<std::string>& folders);
 
 /// "recon/nerf/field" -> "recon/nerf"; "core/image" -> "core"; "app/stages" -> "app".
 std::string module_of(const std::string& folder);

@@ -30,8 +30,8 @@ const std::vector<SourceFile>& all_sources() {
   return files;
 }
 
-/// Rooms of a module from the bottom up; those of one floor don't include each other. The headers in
-/// the module's own folder lie below all of them, its other sources above.
+/// Rooms of a module from the bottom up; those of one floor don't include each other. The headers
+/// in the module's own folder lie below all of them, its other sources above.
 using Floors = std::vector<std::set<std::string>>;
 const std::map<std::string, Floors> floors_of{
     {"core", {{"numeric", "system"}, {"geometry"}, {"image", "session"}, {"formats"}}},
@@ -42,7 +42,11 @@ const std::map<std::string, Floors> floors_of{
     {"recon/nerf", {{"kernels"}, {"field"}, {"rendering"}, {"training"}}},
     {"recon/poses", {{"sfm"}, {"cross_modal", "global_sfm"}, {"rig"}, {"estimate"}}},
     {"recon/registration", {{"clouds", "images"}}},
-    {"fusion", {{"metrics", "pyramid"}, {"training"}, {"best", "cnn_lpif", "heat", "ms_srif", "pca_msif"}, {"fuse"}}},
+    {"fusion",
+     {{"metrics", "pyramid"},
+      {"training"},
+      {"best", "cnn_lpif", "heat", "ms_srif", "pca_msif"},
+      {"fuse"}}},
     {"app",
      {{"config", "doctor", "fusion_batch", "pipeline", "recording", "terminal"},
       {"report"},
@@ -104,8 +108,9 @@ TEST(Structure, NoFileIncludesARoomAboveIt) {
       if (module_of(folder_of(included)) != module || other == room) continue;
       ++checked;
       if (other.empty()) continue;  // a header of the module's own folder
-      const bool downwards = room.empty() ? !file.is_header()
-                                          : floor_of(floors->second, other) < floor_of(floors->second, room);
+      const bool downwards = room.empty()
+                                 ? !file.is_header()
+                                 : floor_of(floors->second, other) < floor_of(floors->second, room);
       if (!downwards) wrong.push_back(file.path + " includes " + included);
     }
   }
@@ -134,7 +139,8 @@ TEST(Structure, RoomsInsideAModuleAreItsOwn) {
       const std::string module = module_of(folder_of(included));
       if (!is_internal(folder_of(included)) || module_of(from) == module) continue;
       const std::string name = module.substr(module.rfind('/') + 1);
-      const bool looks_inside = from == "tests/support" || from.starts_with("tests/" + module) || from.starts_with("bench/" + name) ||
+      const bool looks_inside = from == "tests/support" || from.starts_with("tests/" + module) ||
+                                from.starts_with("bench/" + name) ||
                                 (module == "fusion" && from.starts_with("bench/cnn_lpif"));
       if (!looks_inside) wrong.push_back(file.path + " includes " + included);
     }
@@ -146,7 +152,8 @@ TEST(Structure, NoFolderHoldsMoreThanTwentyFiveFilesOfAKind) {
   namespace fs = std::filesystem;
   std::map<std::string, int> files;
   std::vector<std::string> folders = product;
-  for (const char* more : {"tests", "bench", "examples", "docs", "cmake", "config"}) folders.emplace_back(more);
+  for (const char* more : {"tests", "bench", "examples", "docs", "cmake", "config"})
+    folders.emplace_back(more);
   for (const std::string& folder : folders) {
     for (const auto& entry : fs::recursive_directory_iterator(fs::path(root) / folder)) {
       if (entry.is_regular_file())
@@ -157,8 +164,8 @@ TEST(Structure, NoFolderHoldsMoreThanTwentyFiveFilesOfAKind) {
 }
 
 TEST(Structure, NoTwoTypesShareAName) {
-  // A type of an inner namespace that is named as one of `orbitfuse` hides it there, and a reader who
-  // sees the name takes one for the other.
+  // A type of an inner namespace that is named as one of `orbitfuse` hides it there, and a reader
+  // who sees the name takes one for the other.
   std::map<std::string, std::vector<std::string>> places;
   for (const SourceFile& file : product_sources()) {
     if (!file.is_header()) continue;
@@ -181,7 +188,8 @@ TEST(Structure, NoTwoHeadersOfANamespaceShareAName) {
     if (!file.is_header()) continue;
     const std::size_t start = file.text.find("\nnamespace ");
     if (start == std::string::npos) continue;
-    const std::string space = file.text.substr(start + 11, file.text.find(' ', start + 11) - start - 11);
+    const std::string space =
+        file.text.substr(start + 11, file.text.find(' ', start + 11) - start - 11);
     places[space + " " + file.name].insert(file.path);
   }
   for (const auto& [name, where] : places) {
@@ -196,8 +204,8 @@ TEST(Structure, FunctionsStayUnderAHundredLines) {
     for (const Function& function : functions_of(file.text)) {
       ++functions;
       if (function.lines < 100) continue;
-      wrong.push_back(file.path + ":" + std::to_string(function.first_line) + " " + function.head + ": " +
-                      std::to_string(function.lines) + " lines");
+      wrong.push_back(file.path + ":" + std::to_string(function.first_line) + " " + function.head +
+                      ": " + std::to_string(function.lines) + " lines");
     }
   }
   EXPECT_TRUE(wrong.empty()) << list(wrong);
@@ -233,7 +241,8 @@ auto g(int i = int{3}) -> std::vector<int> {
 
 TEST(Structure, CirclesAreFound) {
   EXPECT_TRUE(find_circle({{"a", {"b"}}, {"b", {"c"}}, {"c", {}}}).empty());
-  EXPECT_EQ(find_circle({{"a", {"b"}}, {"b", {"c"}}, {"c", {"b"}}}), (std::vector<std::string>{"b", "c", "b"}));
+  EXPECT_EQ(find_circle({{"a", {"b"}}, {"b", {"c"}}, {"c", {"b"}}}),
+            (std::vector<std::string>{"b", "c", "b"}));
 }
 
 }  // namespace

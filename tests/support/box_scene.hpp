@@ -12,7 +12,7 @@ namespace orbitfuse::testing_orbit {
 /// container would render. `hot` gives other values to the faces, as a thermal camera sees them.
 inline SceneRender box_view(const Camera& camera, const Rigid3d& cam_from_world, bool hot) {
   SceneRender view{cv::Mat(camera.height, camera.width, CV_32F),
-                 cv::Mat(camera.height, camera.width, CV_32F)};
+                   cv::Mat(camera.height, camera.width, CV_32F)};
   const Rigid3d world_from_cam = cam_from_world.inverse();
   const Eigen::Vector3d origin = world_from_cam.translation;
   const Eigen::Vector3d boxes[][2] = {{{-0.4, -0.15, -0.15}, {0.4, 0.15, 0.15}},

@@ -20,12 +20,13 @@ namespace {
 
 constexpr std::uint32_t xml_address = 0x10000;
 constexpr std::uint16_t gvcp_port = 3956;
-constexpr std::uint32_t heartbeat_register = 0x0938, ccp = 0x0a00, stream_port = 0x0d00, packet_size = 0x0d04,
-                        stream_address = 0x0d18;
+constexpr std::uint32_t heartbeat_register = 0x0938, ccp = 0x0a00, stream_port = 0x0d00,
+                        packet_size = 0x0d04, stream_address = 0x0d18;
 
 std::int64_t steady_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::steady_clock::now().time_since_epoch()).count();
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
 }
 
 void put16(std::uint8_t* p, std::uint32_t v) {
@@ -43,7 +44,8 @@ std::uint16_t following(std::uint16_t id) {
   return id == 65535 ? std::uint16_t{1} : static_cast<std::uint16_t>(id + 1);
 }
 
-std::vector<std::uint8_t> reply(std::uint32_t status, std::uint32_t command, std::uint32_t id, std::size_t payload) {
+std::vector<std::uint8_t> reply(std::uint32_t status, std::uint32_t command, std::uint32_t id,
+                                std::size_t payload) {
   std::vector<std::uint8_t> packet(8 + payload);
   put16(&packet[0], status);
   put16(&packet[2], command);
@@ -54,7 +56,8 @@ std::vector<std::uint8_t> reply(std::uint32_t status, std::uint32_t command, std
 
 }  // namespace
 
-GevSimulator::GevSimulator(GevOptions options) : options_(std::move(options)), xml_(gev_genicam_xml()) {}
+GevSimulator::GevSimulator(GevOptions options)
+    : options_(std::move(options)), xml_(gev_genicam_xml()) {}
 
 GevSimulator::~GevSimulator() { kill(); }
 
@@ -68,8 +71,12 @@ void GevSimulator::reset_memory() {
   const auto text = [&](std::uint32_t address, const std::string& value) {
     std::copy(value.begin(), value.end(), memory_.begin() + address);
   };
-  const auto number = [&](std::uint32_t address, std::uint32_t value) { put32(&memory_[address], value); };
-  const auto real = [&](std::uint32_t address, float value) { number(address, std::bit_cast<std::uint32_t>(value)); };
+  const auto number = [&](std::uint32_t address, std::uint32_t value) {
+    put32(&memory_[address], value);
+  };
+  const auto real = [&](std::uint32_t address, float value) {
+    number(address, std::bit_cast<std::uint32_t>(value));
+  };
   number(0x0000, 0x00020000);  // GigE Vision 2.0
   number(0x0004, 0x80000001);  // big endian, UTF-8
   number(0x000c, 0x00010203);
@@ -90,7 +97,8 @@ void GevSimulator::reset_memory() {
   number(gev_registers::width, static_cast<std::uint32_t>(options_.width));
   number(gev_registers::height, static_cast<std::uint32_t>(options_.height));
   number(gev_registers::pixel_format, 0x01100007);
-  number(gev_registers::payload_size, static_cast<std::uint32_t>(2 * options_.width * options_.height));
+  number(gev_registers::payload_size,
+         static_cast<std::uint32_t>(2 * options_.width * options_.height));
   real(gev_registers::planck_r, 16000);
   real(gev_registers::planck_b, 1430);
   real(gev_registers::planck_f, 1);
@@ -169,8 +177,8 @@ void GevSimulator::step_clock(double seconds) {
 
 std::uint64_t GevSimulator::device_clock_ns() {
   const double t = static_cast<double>(steady_ns()) * 1e-9;
-  return static_cast<std::uint64_t>((t * (1 + options_.clock_drift_ppm * 1e-6) + options_.clock_offset_s +
-                                     clock_step_s_) * 1e9);
+  return static_cast<std::uint64_t>(
+      (t * (1 + options_.clock_drift_ppm * 1e-6) + options_.clock_offset_s + clock_step_s_) * 1e9);
 }
 
 void GevSimulator::control_loop() {
@@ -192,7 +200,8 @@ void GevSimulator::control_loop() {
     std::lock_guard lock(mutex_);
     // A controller that falls silent loses control (heartbeat), and the stream stops.
     if (get32(&memory_[ccp]) != 0 &&
-        steady_ns() - last_control_ns_ > std::int64_t{get32(&memory_[heartbeat_register])} * 1'000'000) {
+        steady_ns() - last_control_ns_ >
+            std::int64_t{get32(&memory_[heartbeat_register])} * 1'000'000) {
       put32(&memory_[ccp], 0);
       acquiring_ = false;
     }
@@ -203,7 +212,8 @@ void GevSimulator::answer_datagram(int fd) {
   std::array<std::uint8_t, 2048> buffer{};
   sockaddr_in from{};
   socklen_t length = sizeof from;
-  const ssize_t size = recvfrom(fd, buffer.data(), buffer.size(), 0, reinterpret_cast<sockaddr*>(&from), &length);
+  const ssize_t size =
+      recvfrom(fd, buffer.data(), buffer.size(), 0, reinterpret_cast<sockaddr*>(&from), &length);
   if (size < 8 || buffer[0] != 0x42) return;
   if ((ntohl(from.sin_addr.s_addr) >> 24) != 127) return;  // broadcasts of others: loopback only
   std::lock_guard lock(mutex_);
@@ -247,9 +257,11 @@ void GevSimulator::write_register(std::uint32_t address, std::uint32_t value) {
   }
 }
 
-std::vector<std::uint8_t> GevSimulator::answer(const std::uint8_t* request, std::size_t size, const sockaddr_in& from) {
+std::vector<std::uint8_t> GevSimulator::answer(const std::uint8_t* request, std::size_t size,
+                                               const sockaddr_in& from) {
   const std::uint32_t command = get16(request + 2), id = get16(request + 6);
-  const bool same = from.sin_port == controller_.sin_port && from.sin_addr.s_addr == controller_.sin_addr.s_addr;
+  const bool same =
+      from.sin_port == controller_.sin_port && from.sin_addr.s_addr == controller_.sin_addr.s_addr;
   const bool controlled = get32(&memory_[ccp]) != 0;
   if (controlled && same) last_control_ns_ = steady_ns();
   switch (command) {
@@ -286,32 +298,38 @@ std::vector<std::uint8_t> GevSimulator::answer(const std::uint8_t* request, std:
       if (address + count > memory_.size() + 8) return reply(0x8003, 0x0085, id, 0);
       auto packet = reply(0, 0x0085, id, 4 + count);
       put32(&packet[8], address);
-      for (std::uint32_t i = 0; i < count && address + i < memory_.size(); ++i) packet[12 + i] = memory_[address + i];
+      for (std::uint32_t i = 0; i < count && address + i < memory_.size(); ++i)
+        packet[12 + i] = memory_[address + i];
       return packet;
     }
     case 0x0086: {  // write memory
       if (controlled && !same && options_.enforce_control) return reply(0x8006, 0x0087, id, 4);
       const std::uint32_t address = get32(request + 8);
-      for (std::size_t i = 12; i + 4 <= size; i += 4) write_register(address + static_cast<std::uint32_t>(i) - 12, get32(request + i));
+      for (std::size_t i = 12; i + 4 <= size; i += 4)
+        write_register(address + static_cast<std::uint32_t>(i) - 12, get32(request + i));
       return reply(0, 0x0087, id, 4);
     }
     case 0x0040: {  // packet resend: block id, first and last packet
       if (!faults_.answer_resend || size < 20) return {};
       const auto frame = history_.find(static_cast<std::uint16_t>(get16(request + 10)));
       if (frame == history_.end()) return {};
-      const std::size_t first = get32(request + 12) & 0xffffff, last = get32(request + 16) & 0xffffff;
+      const std::size_t first = get32(request + 12) & 0xffffff,
+                        last = get32(request + 16) & 0xffffff;
       for (std::size_t i = first; i <= last && i < frame->second.packets.size(); ++i) {
         ++resends_;
         send_packet(frame->second.packets[i]);
       }
       return {};
     }
-    default: return reply(0x8001, command + 1, id, 0);  // not implemented
+    default:
+      return reply(0x8001, command + 1, id, 0);  // not implemented
   }
 }
 
 GevSimulator::SentFrame GevSimulator::make_frame(std::uint64_t number, std::uint16_t id) {
-  const auto every = [&](int n) { return n > 0 && number % static_cast<std::uint64_t>(n) == static_cast<std::uint64_t>(n) - 1; };
+  const auto every = [&](int n) {
+    return n > 0 && number % static_cast<std::uint64_t>(n) == static_cast<std::uint64_t>(n) - 1;
+  };
   const std::uint32_t width = get32(&memory_[gev_registers::width]);
   std::uint32_t height = get32(&memory_[gev_registers::height]);
   if (every(faults_.wrong_size_every)) height -= 8;
@@ -332,7 +350,8 @@ GevSimulator::SentFrame GevSimulator::make_frame(std::uint64_t number, std::uint
   const auto add = [&](std::uint8_t format, std::size_t payload) -> std::uint8_t* {
     std::vector<std::uint8_t> packet(8 + payload);
     put16(&packet[2], id);
-    put32(&packet[4], static_cast<std::uint32_t>(format) << 24 | static_cast<std::uint32_t>(frame.packets.size()));
+    put32(&packet[4], static_cast<std::uint32_t>(format) << 24 |
+                          static_cast<std::uint32_t>(frame.packets.size()));
     frame.packets.push_back(std::move(packet));
     return frame.packets.back().data() + 8;
   };
@@ -373,7 +392,8 @@ void GevSimulator::send_packet(const std::vector<std::uint8_t>& packet) {
   to.sin_addr.s_addr = htonl(get32(&memory_[stream_address]));
   const int copies = chance(faults_.duplicate) ? 2 : 1;
   for (int i = 0; i < copies; ++i) {
-    sendto(stream_fd_, packet.data(), packet.size(), 0, reinterpret_cast<sockaddr*>(&to), sizeof to);
+    sendto(stream_fd_, packet.data(), packet.size(), 0, reinterpret_cast<sockaddr*>(&to),
+           sizeof to);
   }
 }
 

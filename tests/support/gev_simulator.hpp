@@ -16,18 +16,18 @@ namespace orbitfuse::testing {
 
 /// What goes wrong on the stream and the control channel; may be changed while it runs.
 struct GevFaults {
-  double packet_loss = 0;          ///< probability per stream packet
+  double packet_loss = 0;  ///< probability per stream packet
   bool answer_resend = true;
   double reorder = 0, duplicate = 0;  ///< probability per stream packet
-  bool mute_control = false;       ///< GVCP requests get no answer
-  bool link_down = false;          ///< neither control nor stream
-  bool freeze = false;             ///< it does nothing; requests lie there and are answered after it
-  bool stall = false;              ///< it sends no frames, but counts them
-  bool pause = false;              ///< it takes no frames: its numbers go on afterwards
-  int short_frame_every = 0;       ///< every n-th frame lacks its second half (trailer included)
-  int wrong_size_every = 0;        ///< every n-th frame is 8 rows lower than announced
-  int too_large_every = 0;         ///< every n-th frame is 8 rows taller
-  int wrong_format_every = 0;      ///< every n-th frame says Mono8
+  bool mute_control = false;          ///< GVCP requests get no answer
+  bool link_down = false;             ///< neither control nor stream
+  bool freeze = false;         ///< it does nothing; requests lie there and are answered after it
+  bool stall = false;          ///< it sends no frames, but counts them
+  bool pause = false;          ///< it takes no frames: its numbers go on afterwards
+  int short_frame_every = 0;   ///< every n-th frame lacks its second half (trailer included)
+  int wrong_size_every = 0;    ///< every n-th frame is 8 rows lower than announced
+  int too_large_every = 0;     ///< every n-th frame is 8 rows taller
+  int wrong_format_every = 0;  ///< every n-th frame says Mono8
 };
 
 struct GevOptions {
@@ -86,7 +86,8 @@ class GevSimulator {
   void control_loop();
   void answer_datagram(int fd);
   void stream_loop();
-  std::vector<std::uint8_t> answer(const std::uint8_t* request, std::size_t size, const sockaddr_in& from);
+  std::vector<std::uint8_t> answer(const std::uint8_t* request, std::size_t size,
+                                   const sockaddr_in& from);
   void write_register(std::uint32_t address, std::uint32_t value);
   std::uint32_t read_register(std::uint32_t address);
   SentFrame make_frame(std::uint64_t number, std::uint16_t id);

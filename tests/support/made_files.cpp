@@ -12,8 +12,10 @@ namespace orbitfuse::made {
 namespace {
 
 void put_number(std::string& to, std::size_t at, std::uint64_t value, int bytes) {
-  if (to.size() < at + static_cast<std::size_t>(bytes)) to.resize(at + static_cast<std::size_t>(bytes));
-  for (int i = 0; i < bytes; ++i) to[at + static_cast<std::size_t>(i)] = static_cast<char>(value >> (8 * i));
+  if (to.size() < at + static_cast<std::size_t>(bytes))
+    to.resize(at + static_cast<std::size_t>(bytes));
+  for (int i = 0; i < bytes; ++i)
+    to[at + static_cast<std::size_t>(i)] = static_cast<char>(value >> (8 * i));
 }
 
 void put_float(std::string& to, std::size_t at, double value) {
@@ -32,13 +34,15 @@ void put_big(std::string& to, std::size_t at, std::uint64_t value, int bytes) {
 std::string samples_of(const cv::Mat& image) {
   std::string bytes;
   for (int y = 0; y < image.rows; ++y)
-    bytes.append(reinterpret_cast<const char*>(image.ptr(y)), static_cast<std::size_t>(image.cols) * image.elemSize());
+    bytes.append(reinterpret_cast<const char*>(image.ptr(y)),
+                 static_cast<std::size_t>(image.cols) * image.elemSize());
   return bytes;
 }
 
 std::string jpeg_ls(const cv::Mat& signal) {
   charls::jpegls_encoder encoder;
-  encoder.frame_info({static_cast<std::uint32_t>(signal.cols), static_cast<std::uint32_t>(signal.rows), 16, 1});
+  encoder.frame_info(
+      {static_cast<std::uint32_t>(signal.cols), static_cast<std::uint32_t>(signal.rows), 16, 1});
   std::string bytes(encoder.estimated_destination_size(), '\0');
   encoder.destination(bytes.data(), bytes.size());
   const cv::Mat whole = signal.clone();
@@ -62,13 +66,23 @@ std::string raw_record(const cv::Mat& signal, FlirPixels pixels) {
 std::string camera_record(const cv::Mat& signal, const FlirCalibration& c) {
   std::string record(0x400, '\0');
   put_number(record, 0, 2, 2);
-  const std::pair<std::size_t, double> numbers[] = {
-      {0x20, c.object.emissivity},    {0x24, c.object.distance_m},          {0x28, c.object.reflected_k},
-      {0x2c, c.object.atmospheric_k}, {0x30, c.object.window_k},            {0x34, c.object.window_transmission},
-      {0x3c, c.object.relative_humidity}, {0x58, c.planck.r1},              {0x5c, c.planck.b},
-      {0x60, c.planck.f},             {0x70, c.atmosphere.alpha1},          {0x74, c.atmosphere.alpha2},
-      {0x78, c.atmosphere.beta1},     {0x7c, c.atmosphere.beta2},           {0x80, c.atmosphere.x},
-      {0x30c, c.planck.r2},           {0x1b4, 25.0}};
+  const std::pair<std::size_t, double> numbers[] = {{0x20, c.object.emissivity},
+                                                    {0x24, c.object.distance_m},
+                                                    {0x28, c.object.reflected_k},
+                                                    {0x2c, c.object.atmospheric_k},
+                                                    {0x30, c.object.window_k},
+                                                    {0x34, c.object.window_transmission},
+                                                    {0x3c, c.object.relative_humidity},
+                                                    {0x58, c.planck.r1},
+                                                    {0x5c, c.planck.b},
+                                                    {0x60, c.planck.f},
+                                                    {0x70, c.atmosphere.alpha1},
+                                                    {0x74, c.atmosphere.alpha2},
+                                                    {0x78, c.atmosphere.beta1},
+                                                    {0x7c, c.atmosphere.beta2},
+                                                    {0x80, c.atmosphere.x},
+                                                    {0x30c, c.planck.r2},
+                                                    {0x1b4, 25.0}};
   for (const auto& [at, value] : numbers) put_float(record, at, value);
   put_number(record, 0x308, static_cast<std::uint32_t>(static_cast<std::int32_t>(c.planck.o)), 4);
   record.replace(0xd4, 12, "Made T640 IR");

@@ -17,10 +17,11 @@ FlirCalibration flir_calibration();
 std::uint16_t flir_signal(double kelvin, const FlirCalibration& calibration);
 
 enum class FlirPixels { raw, png, jpeg_ls };
-/// A FLIR radiometric JPEG: raw thermal record (CV_16UC1), camera record, and an embedded photo unless
-/// empty, in APP1 segments of at most `segment_bytes`.
-std::string flir_jpeg(const cv::Mat& signal, const FlirCalibration& calibration, FlirPixels pixels = FlirPixels::raw,
-                      const std::string& embedded_photo = {}, std::size_t segment_bytes = 60000);
+/// A FLIR radiometric JPEG: raw thermal record (CV_16UC1), camera record, and an embedded photo
+/// unless empty, in APP1 segments of at most `segment_bytes`.
+std::string flir_jpeg(const cv::Mat& signal, const FlirCalibration& calibration,
+                      FlirPixels pixels = FlirPixels::raw, const std::string& embedded_photo = {},
+                      std::size_t segment_bytes = 60000);
 
 /// The FFF file inside it; several in a row are a recording.
 std::string flir_file(const cv::Mat& signal, const FlirCalibration& calibration, FlirPixels pixels,

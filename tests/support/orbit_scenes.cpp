@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tests/support/orbit_scenes.hpp"
 
-
+#include <fmt/format.h>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <fmt/format.h>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 
@@ -47,8 +46,8 @@ Scene container_scene(const fs::path& data, const ContainerOptions& options) {
   scene.session.folder = data / "orbits" / options.scene;
   const GroundTruth truth = truth_of(scene.session.folder / "ground_truth.json");
   for (const auto& [modality, views] : truth.views) {
-    const double error = modality == Modality::visible ? options.visible_focal_error
-                                                       : options.thermal_focal_error;
+    const double error =
+        modality == Modality::visible ? options.visible_focal_error : options.thermal_focal_error;
     scene.session.devices.push_back(device(modality, views.at(0).camera.fx * (1.0 + error)));
     int index = 0;
     for (const TrueView& view : views) {
@@ -70,7 +69,8 @@ Scene container_scene(const fs::path& data, const ContainerOptions& options) {
   const auto tracking = read_true_views(scene.session.folder / "tracking.json").value();
   std::uint64_t index = 24;
   for (const TrueView& view : tracking) {
-    FrameRecord record = frame(Modality::thermal, view.name, view.camera.width, view.camera.height, index++);
+    FrameRecord record =
+        frame(Modality::thermal, view.name, view.camera.width, view.camera.height, index++);
     record.tracking = true;
     scene.session.frames.push_back(record);
     scene.truth.views[record.file] = view;
@@ -118,7 +118,8 @@ Result<Scene> run_scene(const fs::path& session, const fs::path& truth_file) {
       if (found != by_name.end()) scene.truth.views[frame->file] = found->second;
     }
   }
-  for (const TrueTestView& view : truth.test) scene.test.push_back({"", view.camera, view.cam_from_world});
+  for (const TrueTestView& view : truth.test)
+    scene.test.push_back({"", view.camera, view.cam_from_world});
   return scene;
 }
 
@@ -150,8 +151,8 @@ Scene folder_scene(const fs::path& folder) {
     for (const fs::path& file : files) {
       const cv::Mat image = cv::imread(file.string(), cv::IMREAD_UNCHANGED);
       if (image.empty()) continue;
-      FrameRecord record = frame(modality, fs::relative(file, folder).string(), image.cols,
-                                 image.rows, index++);
+      FrameRecord record =
+          frame(modality, fs::relative(file, folder).string(), image.cols, image.rows, index++);
       record.thermal_is_gray = modality == Modality::thermal;
       scene.session.frames.push_back(record);
     }
@@ -167,7 +168,8 @@ std::optional<Similarity3d> model_from_truth(const Reconstruction& model, const 
   Eigen::Matrix3Xd ours(3, static_cast<Eigen::Index>(pairs.size())), theirs = ours;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     ours.col(static_cast<Eigen::Index>(i)) = camera_center(pairs[i]->cam_from_world);
-    theirs.col(static_cast<Eigen::Index>(i)) = camera_center(truth.views.at(pairs[i]->name).cam_from_world);
+    theirs.col(static_cast<Eigen::Index>(i)) =
+        camera_center(truth.views.at(pairs[i]->name).cam_from_world);
   }
   const Eigen::Matrix4d m = Eigen::umeyama(theirs, ours, true);
   Similarity3d fit;

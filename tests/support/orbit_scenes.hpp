@@ -55,9 +55,9 @@ struct PoseError {
   int views = 0;
   std::vector<ViewError> each;
   double mean_rotation_deg = 0;
-  double ate_percent = 0;       ///< RMS of centres, share of the truth's extent
+  double ate_percent = 0;  ///< RMS of centres, share of the truth's extent
   double median_percent = 0, worst_percent = 0;
-  double rotation_deg = 0;      ///< median
+  double rotation_deg = 0;  ///< median
   double worst_rotation_deg = 0;
 };
 /// The similarity that brings true camera centres onto the model's.

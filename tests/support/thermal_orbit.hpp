@@ -21,7 +21,8 @@ struct ThermalOrbit {
     const Camera camera = testing_orbit::camera(1000).scaled_to(320, 240);
     for (int i = 0; i < 6; ++i) {
       OrbitPose pose;
-      pose.azimuth_deg = apart_deg * i, pose.elevation_deg = i % 2 == 0 ? 12 : 25, pose.radius = 2.5;
+      pose.azimuth_deg = apart_deg * i, pose.elevation_deg = i % 2 == 0 ? 12 : 25,
+      pose.radius = 2.5;
       const Rigid3d in_visible = cam_from_world_of(pose, camera);
       images.push_back(box_view(camera, in_visible, true).brightness);
       views.push_back({"view", camera, rebase(in_visible, visible_from_thermal.inverse())});

@@ -19,8 +19,8 @@ struct Seen {
   bool hides = false;  ///< the point lies clearly in front of what the other view matched well
 };
 
-Seen seen_from(const DepthView& from, const Eigen::Vector2d& pixel, float depth, const DepthView& other,
-               const PlaneMap& planes, const DepthOptions& options) {
+Seen seen_from(const DepthView& from, const Eigen::Vector2d& pixel, float depth,
+               const DepthView& other, const PlaneMap& planes, const DepthOptions& options) {
   const Eigen::Vector3f x = world_of(from, pixel, depth);
   const Eigen::Vector3f c = other.world_rotation * x + other.translation;
   if (!(c.z() > 0)) return {};

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <mutex>
 
-#include "core/system/parallel.hpp"
 #include "core/geometry/scene_ball.hpp"
+#include "core/system/parallel.hpp"
 #include "recon/depth/stereo/consistency.hpp"
 #include "recon/depth/stereo/neighbours.hpp"
 #include "recon/depth/stereo/patch_match.hpp"
@@ -27,7 +27,8 @@ SceneBall scene_of(const Reconstruction& model) {
   return scene_ball(poses, std::move(points));
 }
 
-std::vector<Seed> seeds_of(const Reconstruction& model, int index, const DepthView& view, const SceneBall& scene) {
+std::vector<Seed> seeds_of(const Reconstruction& model, int index, const DepthView& view,
+                           const SceneBall& scene) {
   std::vector<Seed> seeds;
   for (const SparsePoint& point : model.points) {
     const bool seen = std::any_of(point.track.begin(), point.track.end(),
@@ -45,8 +46,8 @@ std::vector<Seed> seeds_of(const Reconstruction& model, int index, const DepthVi
 
 Status check(const Reconstruction& model, const std::vector<cv::Mat>& images) {
   if (images.size() != model.views.size())
-    return fail(ErrorKind::input, "depth", fmt::format("{} images for {} views", images.size(),
-                                                       model.views.size()),
+    return fail(ErrorKind::input, "depth",
+                fmt::format("{} images for {} views", images.size(), model.views.size()),
                 "give one image per view");
   for (std::size_t i = 0; i < images.size(); ++i) {
     const PosedView& view = model.views[i];
@@ -97,7 +98,8 @@ Result<DenseDepth> dense_depth(const Reconstruction& model, const std::vector<cv
   DenseDepth out;
   for (const auto& some : neighbours) out.report.views_without += some.empty();
   if (out.report.views_without == count)
-    return fail(ErrorKind::quality, "depth", "no two views look at one place from different directions",
+    return fail(ErrorKind::quality, "depth",
+                "no two views look at one place from different directions",
                 "record more views round the object");
 
   constexpr DepthRange range;

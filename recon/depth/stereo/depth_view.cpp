@@ -20,7 +20,8 @@ cv::Mat undistorted(const cv::Mat& gray, const Camera& from, const Camera& to) {
   for (int y = 0; y < to.height; ++y)
     for (int x = 0; x < to.width; ++x) {
       const Eigen::Vector2d at = from.pixel_of(to.normalized_of({x + 0.5, y + 0.5}));
-      map.at<cv::Vec2f>(y, x) = {static_cast<float>(at.x() - 0.5), static_cast<float>(at.y() - 0.5)};
+      map.at<cv::Vec2f>(y, x) = {static_cast<float>(at.x() - 0.5),
+                                 static_cast<float>(at.y() - 0.5)};
     }
   cv::remap(gray, out, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
   return out;

@@ -14,8 +14,8 @@ namespace orbitfuse::depth {
 struct DepthView {
   Camera camera;
   cv::Mat gray;  ///< CV_8UC1, continuous, with rows_padding more rows that may be read, not used
-  Eigen::Matrix3f world_rotation;    ///< camera axes from world axes
-  Eigen::Vector3f translation;       ///< x_cam = world_rotation * x + translation
+  Eigen::Matrix3f world_rotation;  ///< camera axes from world axes
+  Eigen::Vector3f translation;     ///< x_cam = world_rotation * x + translation
   Eigen::Vector3f center() const { return -(world_rotation.transpose() * translation); }
   Eigen::Vector3f axis() const { return world_rotation.row(2).transpose(); }
 };

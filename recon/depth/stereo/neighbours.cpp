@@ -20,8 +20,9 @@ double overlap(const DepthView& a, const DepthView& b) {
   for (int z = -2; z <= 2; ++z)
     for (int y = -2; y <= 2; ++y)
       for (int x = -2; x <= 2; ++x) {
-        const Eigen::Vector3f at = 0.2f * Eigen::Vector3f(static_cast<float>(x), static_cast<float>(y),
-                                                          static_cast<float>(z));
+        const Eigen::Vector3f at =
+            0.2f *
+            Eigen::Vector3f(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z));
         if (!holds(a, at)) continue;
         ++first;
         both += holds(b, at);

@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "recon/depth/stereo/depth_view.hpp"
 #include "recon/depth/options.hpp"
+#include "recon/depth/stereo/depth_view.hpp"
 
 namespace orbitfuse::depth {
 

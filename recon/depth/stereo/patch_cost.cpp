@@ -105,7 +105,8 @@ float patch_cost(const ReferencePatch& patch, const SourceView& s, const Eigen::
   const Eigen::Vector3f at = h * Eigen::Vector3f(patch.x, patch.y, 1.0f);
   if (!(at.z() > 1e-6f)) return worst_cost;
   const float cx = at.x() / at.z(), cy = at.y() / at.z();
-  if (!(cx >= 0 && cy >= 0 && cx < static_cast<float>(s.width) && cy < static_cast<float>(s.height)))
+  if (!(cx >= 0 && cy >= 0 && cx < static_cast<float>(s.width) &&
+        cy < static_cast<float>(s.height)))
     return worst_cost;
 
   const Offsets& o = offsets();

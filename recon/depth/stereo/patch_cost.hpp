@@ -10,11 +10,12 @@ namespace orbitfuse::depth {
 
 /// A plane through the surface seen at one pixel.
 struct Plane {
-  float depth = 1;            ///< z at the pixel
-  Eigen::Vector3f normal;     ///< unit, camera axes, towards the camera
+  float depth = 1;         ///< z at the pixel
+  Eigen::Vector3f normal;  ///< unit, camera axes, towards the camera
 };
 
-inline constexpr int patch_samples = 32;  ///< every other pixel of 9 x 7 is 31; the last has no weight
+inline constexpr int patch_samples =
+    32;  ///< every other pixel of 9 x 7 is 31; the last has no weight
 inline constexpr float worst_cost = 2.0f;
 
 /// The patch round one reference pixel, sampled and weighed once for all hypotheses.

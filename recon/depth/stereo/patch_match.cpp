@@ -63,8 +63,7 @@ struct Match {
     // n . X over the plane is constant: depth * n . ray. In pixels: K^-T n / that.
     const float scale = 1.0f / (plane.depth * plane.normal.dot(ray));
     const Eigen::Vector3f n = plane.normal * scale;
-    const Eigen::Vector3f pixels(n.x() * ifx, n.y() * ify,
-                                 n.z() - n.x() * icx - n.y() * icy);
+    const Eigen::Vector3f pixels(n.x() * ifx, n.y() * ify, n.z() - n.x() * icx - n.y() * icy);
     std::array<float, 16> costs;
     const int count = static_cast<int>(sources.size());
     for (int i = 0; i < count; ++i) {
@@ -83,8 +82,13 @@ struct Match {
 
 Match match_of(const DepthView& view, const std::vector<SourceView>& sources, int best) {
   const Camera& c = view.camera;
-  return {view, sources, best, static_cast<float>(1 / c.fx), static_cast<float>(1 / c.fy),
-          static_cast<float>(c.cx / c.fx), static_cast<float>(c.cy / c.fy)};
+  return {view,
+          sources,
+          best,
+          static_cast<float>(1 / c.fx),
+          static_cast<float>(1 / c.fy),
+          static_cast<float>(c.cx / c.fx),
+          static_cast<float>(c.cy / c.fy)};
 }
 
 PlaneMap blank_map(const DepthView& view) {
@@ -109,9 +113,9 @@ PlaneMap random_planes(const DepthView& view, DepthRange range, const std::vecto
       const float u = random.uniform();
       plane.depth = 1 / ((1 - u) / range.near + u / range.far);
       const Eigen::Vector3f ray = ray_of(view, x, y);
-      plane.normal = facing(Eigen::Vector3f(random.spread(1), random.spread(1), random.spread(1)) -
-                                ray.normalized(),
-                            ray);
+      plane.normal = facing(
+          Eigen::Vector3f(random.spread(1), random.spread(1), random.spread(1)) - ray.normalized(),
+          ray);
     }
   // A seed speaks for its surroundings: half of the pixels there start at its depth.
   constexpr int reach = 8;
@@ -136,10 +140,10 @@ PlaneMap doubled(const PlaneMap& coarse, const DepthView& fine, DepthRange range
       Plane& to = map.plane[map.at(x, y)];
       to = from;
       // The coarse pixel's ray in the fine camera.
-      const Eigen::Vector3f own =
-          fine.camera
-              .ray_of({(cx + 0.5) * map.width / coarse.width, (cy + 0.5) * map.height / coarse.height})
-              .cast<float>();
+      const Eigen::Vector3f own = fine.camera
+                                      .ray_of({(cx + 0.5) * map.width / coarse.width,
+                                               (cy + 0.5) * map.height / coarse.height})
+                                      .cast<float>();
       const float depth = depth_on(from, own, ray_of(fine, x, y));
       if (std::isfinite(depth)) to.depth = std::clamp(depth, range.near, range.far);
     }
@@ -153,7 +157,8 @@ void improve(PlaneMap& map, const DepthView& view, const std::vector<SourceView>
   std::vector<Eigen::Vector3f> rays(map.plane.size());
   for (int y = 0; y < map.height; ++y)
     for (int x = 0; x < map.width; ++x) rays[map.at(x, y)] = ray_of(view, x, y);
-  static constexpr int offers[8][2] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-5, 0}, {5, 0}, {0, -5}, {0, 5}};
+  static constexpr int offers[8][2] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1},
+                                       {-5, 0}, {5, 0}, {0, -5}, {0, 5}};
   for (int iteration = 0; iteration <= iterations; ++iteration) {
     // Round 0 only prices what is there; changes shrink by half each round.
     const float width = std::ldexp(0.5f, -iteration);
@@ -193,15 +198,17 @@ void improve(PlaneMap& map, const DepthView& view, const std::vector<SourceView>
                                         1 / range.near);
           offer(change);
           change = best;
-          change.normal = facing(best.normal + Eigen::Vector3f(random.spread(width), random.spread(width),
-                                                               random.spread(width)),
-                                 ray);
+          change.normal =
+              facing(best.normal + Eigen::Vector3f(random.spread(width), random.spread(width),
+                                                   random.spread(width)),
+                     ray);
           offer(change);
           change = best;
           change.depth = best.depth * (1 + random.spread(0.1f * width));
-          change.normal = facing(best.normal + Eigen::Vector3f(random.spread(width), random.spread(width),
-                                                               random.spread(width)),
-                                 ray);
+          change.normal =
+              facing(best.normal + Eigen::Vector3f(random.spread(width), random.spread(width),
+                                                   random.spread(width)),
+                     ray);
           offer(change);
           map.plane[here] = best;
           map.cost[here] = best_cost;

@@ -15,8 +15,8 @@ Result<FieldState> load_state(const std::filesystem::path& path);
 
 std::vector<ViewRecord> records_of(const Dataset& dataset, const std::vector<bool>& heldout);
 
-/// A checkpoint goes on only with the data and the options that give its parameters their meaning; the
-/// error names the first that differs.
+/// A checkpoint goes on only with the data and the options that give its parameters their meaning;
+/// the error names the first that differs.
 Status check_resumable(const FieldState& state, const Dataset& dataset,
                        const std::vector<ViewRecord>& views, const TrainOptions& options);
 

@@ -5,14 +5,14 @@
 #include <vector>
 
 #include "core/modality.hpp"
-#include "recon/nerf/history.hpp"
+#include "recon/nerf/field/march_settings.hpp"
 #include "recon/nerf/field/network.hpp"
 #include "recon/nerf/field/occupancy.hpp"
-#include "recon/nerf/field/march_settings.hpp"
-#include "recon/nerf/options.hpp"
 #include "recon/nerf/field/refined_pose.hpp"
-#include "recon/nerf/value_span.hpp"
 #include "recon/nerf/field/space.hpp"
+#include "recon/nerf/history.hpp"
+#include "recon/nerf/options.hpp"
+#include "recon/nerf/value_span.hpp"
 
 namespace orbitfuse::nerf {
 
@@ -49,8 +49,8 @@ struct FieldState {
 
   DensityNetwork main;
   Mlp color;
-  std::vector<DensityNetwork> proposals;  ///< Sampling::proposal
-  Parameters image_offsets;               ///< per training view, in units of the span
+  std::vector<DensityNetwork> proposals;   ///< Sampling::proposal
+  Parameters image_offsets;                ///< per training view, in units of the span
   std::vector<RefinedPose> refined_poses;  ///< per view of the dataset (refine_poses)
   Occupancy occupancy;
 
@@ -66,7 +66,7 @@ struct FieldState {
   /// All trainable sets in a fixed order.
   std::vector<Parameters*> parameters();
   std::vector<DensityNetwork*> density_networks();  ///< the main one, then the proposals
-  void refresh();  ///< derived layouts after parameters changed
+  void refresh();                                   ///< derived layouts after parameters changed
   Snapshot snapshot(double psnr);
   void restore(const Snapshot& from);
   MarchSettings march_settings() const;

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "core/system/memory.hpp"
 #include "core/numeric/random.hpp"
+#include "core/system/memory.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
@@ -71,7 +71,8 @@ void HashEncoding::encode(const Kernels& kernels, const float* position01, int c
                           float* out) const {
   const int used = static_cast<int>(levels.size()) * features;
   if (used < width)
-    for (int s = 0; s < count; ++s) std::fill_n(out + static_cast<long>(s) * width + used, width - used, 0.0f);
+    for (int s = 0; s < count; ++s)
+      std::fill_n(out + static_cast<long>(s) * width + used, width - used, 0.0f);
   for (std::size_t l = 0; l < levels.size(); ++l) {
     float* column = out + static_cast<int>(l) * features;
     const float weight = level_weight[l];
@@ -94,7 +95,8 @@ bool all_finite(const float* values, std::size_t count) {
 
 void by_level(const HashEncoding& grid, const std::vector<float>& rows, std::size_t count,
               std::vector<float>& levels) {
-  const auto features = static_cast<std::size_t>(grid.features), width = static_cast<std::size_t>(grid.width);
+  const auto features = static_cast<std::size_t>(grid.features),
+             width = static_cast<std::size_t>(grid.width);
   const std::size_t need = grid.levels.size() * count * features;
   if (levels.size() < need) levels.resize(need + need / 4);
   for (std::size_t l = 0; l < grid.levels.size(); ++l) {
@@ -160,7 +162,8 @@ void Mlp::forward(const Kernels& kernels, int rows, const float* in, Activations
     const std::size_t offset = static_cast<std::size_t>(first_row) * out;
     const std::size_t need = offset + static_cast<std::size_t>(rows) * out;
     if (a[l].size() < need) a[l].resize(need + need / 4);
-    kernels.forward(view(static_cast<int>(l)), rows, from, a[l].data() + offset, l + 1 < layers.size());
+    kernels.forward(view(static_cast<int>(l)), rows, from, a[l].data() + offset,
+                    l + 1 < layers.size());
     from = a[l].data() + offset;
   }
 }
@@ -173,7 +176,8 @@ void Mlp::backward(const Kernels& kernels, int rows, const float* in, const Acti
   for (int l = static_cast<int>(layers.size()) - 1; l >= 0; --l) {
     const LayerView layer = view(l);
     const float* input = l > 0 ? a[static_cast<std::size_t>(l - 1)].data() : in;
-    kernels.backward_weights(layer, rows, input, d, dweights + layers[static_cast<std::size_t>(l)].offset);
+    kernels.backward_weights(layer, rows, input, d,
+                             dweights + layers[static_cast<std::size_t>(l)].offset);
     if (l == 0) {
       if (din) kernels.backward_input(layer, rows, d, din, nullptr);
       return;

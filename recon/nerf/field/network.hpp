@@ -21,8 +21,8 @@ struct HashEncoding {
   std::vector<GridLevel> levels;
   int features = 0, width = 0;  ///< features per level; padded row width
   Parameters table;
-  std::vector<std::uint16_t> half;    ///< what the kernels read
-  std::vector<float> level_weight;    ///< coarse-to-fine: 0..1 per level
+  std::vector<std::uint16_t> half;  ///< what the kernels read
+  std::vector<float> level_weight;  ///< coarse-to-fine: 0..1 per level
 
   void create(int level_count, int features_per_level, int log2_table, int base_resolution,
               int max_resolution, std::uint64_t seed);

@@ -34,7 +34,8 @@ int Occupancy::coordinates_of(std::int64_t cell, int i[3]) const {
   const std::int64_t blocks = resolution / 4, block = cell >> 6;
   const int low[3] = {static_cast<int>(cell & 3), static_cast<int>(cell >> 2 & 3),
                       static_cast<int>(cell >> 4 & 3)};
-  const std::int64_t high[3] = {block % blocks, block / blocks % blocks, block / (blocks * blocks) % blocks};
+  const std::int64_t high[3] = {block % blocks, block / blocks % blocks,
+                                block / (blocks * blocks) % blocks};
   for (int d = 0; d < 3; ++d) i[d] = static_cast<int>(high[d]) * 4 + low[d];
   return static_cast<int>(block / (blocks * blocks * blocks));
 }
@@ -43,7 +44,8 @@ void Occupancy::center_of(std::int64_t cell, float x[3]) const {
   int i[3];
   const int cascade = coordinates_of(cell, i);
   for (int d = 0; d < 3; ++d)
-    x[d] = (static_cast<float>(i[d]) + 0.5f) * cell_size(cascade) - static_cast<float>(1 << cascade);
+    x[d] =
+        (static_cast<float>(i[d]) + 0.5f) * cell_size(cascade) - static_cast<float>(1 << cascade);
 }
 
 namespace {
@@ -58,7 +60,8 @@ std::uint8_t code_of(float density) {
 struct Decoded {
   float density[256];
   Decoded() {
-    for (int i = 0; i < 256; ++i) density[i] = std::exp2(static_cast<float>(i) / codes_per_octave) - 1;
+    for (int i = 0; i < 256; ++i)
+      density[i] = std::exp2(static_cast<float>(i) / codes_per_octave) - 1;
   }
 };
 
@@ -86,7 +89,8 @@ void Occupancy::refresh() {
 void Occupancy::show(std::int64_t cell) {
   const auto i = static_cast<std::size_t>(cell);
   put(coded_, cell, code[i] > 0);
-  look[i] = test(on, cell) ? static_cast<std::uint8_t>(1 + std::min<int>(code[i], 254)) : std::uint8_t{0};
+  look[i] =
+      test(on, cell) ? static_cast<std::uint8_t>(1 + std::min<int>(code[i], 254)) : std::uint8_t{0};
 }
 
 void Occupancy::sum_up(std::int64_t block) {
@@ -95,7 +99,8 @@ void Occupancy::sum_up(std::int64_t block) {
   put(plain, block, on[b] == ~std::uint64_t{0} && coded_[b] == 0);
 }
 
-void Occupancy::restore(const std::vector<std::uint64_t>& cells_on, const std::vector<std::uint8_t>& codes) {
+void Occupancy::restore(const std::vector<std::uint64_t>& cells_on,
+                        const std::vector<std::uint8_t>& codes) {
   on = cells_on;
   for (std::size_t i = 0; i < density.size(); ++i) density[i] = densities_of_codes()[codes[i]];
   refresh();

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <vector>
 
-
 namespace orbitfuse::nerf {
 
 /// Which cells of space may hold matter: nested cubes ("cascades") of half extent 1, 2, 4, ...
@@ -18,9 +17,9 @@ struct Occupancy {
   /// Decaying maximum of T * sigma: the density that the best of the rays through a cell sees. What
   /// is hidden behind surfaces is not worth samples either.
   std::vector<float> density;
-  std::vector<std::uint8_t> code;          ///< density in steps of 5 %, for marching
-  std::vector<float> window;               ///< maximum since the last update; -1 = not visited
-  std::vector<std::int64_t> visited;       ///< cells whose window is set
+  std::vector<std::uint8_t> code;     ///< density in steps of 5 %, for marching
+  std::vector<float> window;          ///< maximum since the last update; -1 = not visited
+  std::vector<std::int64_t> visited;  ///< cells whose window is set
 
   void create(int cells_per_axis, int cascade_count);
   std::int64_t cell_count() const {
@@ -63,7 +62,8 @@ struct Occupancy {
 
   /// What marching reads of a cell: 0 = off, else 1 + code. A block is one cache line.
   std::vector<std::uint8_t> look;
-  /// Bits per block, small enough for the L1 cache: a cell of it is on; all are, and nothing else is known.
+  /// Bits per block, small enough for the L1 cache: a cell of it is on; all are, and nothing else
+  /// is known.
   std::vector<std::uint64_t> any, plain;
   double fraction_on() const;
 
@@ -74,8 +74,8 @@ struct Occupancy {
   void update(float decay, float threshold);
 
  private:
-  void sum_up(std::int64_t block);  ///< its bits in `any` and `plain`
-  void show(std::int64_t cell);     ///< sets its byte in `look`
+  void sum_up(std::int64_t block);    ///< its bits in `any` and `plain`
+  void show(std::int64_t cell);       ///< sets its byte in `look`
   std::vector<std::uint64_t> coded_;  ///< bit per cell: its code isn't 0
 };
 

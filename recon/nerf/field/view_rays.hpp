@@ -28,7 +28,8 @@ class ViewRays {
   bool project(const float point[3], double& x, double& y, double& depth) const;
   /// What lies at a distance (normalised units) on that ray, in camera axes from the camera.
   Eigen::Vector3d in_camera(double x, double y, double distance) const;
-  /// The scene seen from here is turned by `turn` (axis times radians) and then shifted, both in camera axes.
+  /// The scene seen from here is turned by `turn` (axis times radians) and then shifted, both in
+  /// camera axes.
   void move(const Eigen::Vector3d& shift, const Eigen::Vector3d& turn);
   Rigid3d cam_from_world(const Space& space) const;
   /// Angle of one pixel, radians.
@@ -44,7 +45,8 @@ class ViewRays {
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   float pixel_angle_ = 0;
   int lattice_width_ = 0;
-  std::vector<Eigen::Vector2f> lattice_;  ///< normalised coordinates every 8 px; empty: no distortion
+  std::vector<Eigen::Vector2f>
+      lattice_;  ///< normalised coordinates every 8 px; empty: no distortion
 };
 
 }  // namespace orbitfuse::nerf

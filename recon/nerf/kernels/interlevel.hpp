@@ -8,7 +8,8 @@
 // them in double.
 namespace orbitfuse::nerf {
 
-/// Distances spaced evenly up to 1 and evenly in disparity beyond, as in nerfacto: [0, inf) to [0, 1).
+/// Distances spaced evenly up to 1 and evenly in disparity beyond, as in nerfacto: [0, inf) to [0,
+/// 1).
 template <class T>
 T spaced_of(T t) {
   return t < 1 ? t / 2 : 1 - 1 / (2 * t);
@@ -46,8 +47,8 @@ void resample(int bins, const T* edges, const T* weights, T padding, T jitter, i
 }
 
 /// Mip-NeRF 360, eq. 13: sum_i max(0, w_i - bound_i)^2 / w_i, where bound_i is the mass of the
-/// proposal's bins that fine interval i ([low_i, high_i], ascending) overlaps. Adds scale * gradient
-/// to dproposal (`bins` values) and returns the loss. `slope`: scratch of bins + 1 values.
+/// proposal's bins that fine interval i ([low_i, high_i], ascending) overlaps. Adds scale *
+/// gradient to dproposal (`bins` values) and returns the loss. `slope`: scratch of bins + 1 values.
 template <class T>
 T interlevel(int fine, const T* low, const T* high, const T* w, int bins, const T* edges,
              const T* proposal, T scale, T* dproposal, std::vector<T>& slope) {

@@ -13,21 +13,21 @@ namespace orbitfuse::nerf {
 /// axis; a level whose nodes fit into the table is stored densely, others are hashed (Müller et
 /// al. 2022, eq. 4).
 struct GridLevel {
-  int resolution = 0;          ///< cells per axis over [0, 1]
+  int resolution = 0;  ///< cells per axis over [0, 1]
   bool dense = false;
-  std::uint32_t mask = 0;      ///< table entries - 1 (hashed levels)
-  std::uint32_t entries = 0;   ///< in the table
-  std::int64_t offset = 0;     ///< first float of this level in the parameter vector
-  int features = 4;            ///< 2 or 4
+  std::uint32_t mask = 0;     ///< table entries - 1 (hashed levels)
+  std::uint32_t entries = 0;  ///< in the table
+  std::int64_t offset = 0;    ///< first float of this level in the parameter vector
+  int features = 4;           ///< 2 or 4
 };
 
 /// A dense layer's weights in the layouts the kernels read; refreshed after each optimiser step.
 struct LayerView {
   int in = 0, out = 0;
-  const float* weights = nullptr;             ///< [in][out]
-  const float* transposed = nullptr;          ///< [out][in]
-  const std::uint16_t* paired = nullptr;      ///< bf16 [in/2][out][2]
-  const std::uint16_t* paired_t = nullptr;    ///< bf16 [out/2][in][2]
+  const float* weights = nullptr;           ///< [in][out]
+  const float* transposed = nullptr;        ///< [out][in]
+  const std::uint16_t* paired = nullptr;    ///< bf16 [in/2][out][2]
+  const std::uint16_t* paired_t = nullptr;  ///< bf16 [out/2][in][2]
 };
 
 struct AdamStep {
@@ -52,8 +52,9 @@ struct Kernels {
   /// dweights[in][out] += in^T * dout.
   void (*backward_weights)(const LayerView& layer, int rows, const float* in, const float* dout,
                            float* dweights);
-  /// Adam (Kingma & Ba 2015) on [0, count), count a multiple of 8; entries whose gradient is exactly 0 keep their state,
-  /// as in instant-ngp. Clears the gradient; writes half-precision copies if `half` is not null.
+  /// Adam (Kingma & Ba 2015) on [0, count), count a multiple of 8; entries whose gradient is
+  /// exactly 0 keep their state, as in instant-ngp. Clears the gradient; writes half-precision
+  /// copies if `half` is not null.
   void (*adam)(const AdamStep& step, std::int64_t count, float* parameter, float* first,
                float* second, float* grad, std::uint16_t* half);
 };

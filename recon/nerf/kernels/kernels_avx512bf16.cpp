@@ -46,8 +46,9 @@ inline void tile_bf16(const std::uint16_t* a, long a_row, long a_pair, const std
       __m512 v = sum[r][j];
       if constexpr (E == Epilogue::relu) v = _mm512_max_ps(v, _mm512_setzero_ps());
       if constexpr (E == Epilogue::mask)
-        v = _mm512_maskz_mov_ps(_mm512_cmp_ps_mask(_mm512_loadu_ps(mask + (out - c)),
-                                                   _mm512_setzero_ps(), _CMP_GT_OQ), v);
+        v = _mm512_maskz_mov_ps(
+            _mm512_cmp_ps_mask(_mm512_loadu_ps(mask + (out - c)), _mm512_setzero_ps(), _CMP_GT_OQ),
+            v);
       if constexpr (E == Epilogue::add) v = _mm512_add_ps(v, _mm512_loadu_ps(out));
       _mm512_storeu_ps(out, v);
     }
@@ -74,8 +75,8 @@ inline void rows_bf16(int rows, int depth, const float* in, const std::uint16_t*
 }
 
 template <Epilogue E>
-inline void multiply_bf16(int rows, int columns, int depth, const float* in,
-                          const std::uint16_t* b, float* out, const float* mask) {
+inline void multiply_bf16(int rows, int columns, int depth, const float* in, const std::uint16_t* b,
+                          float* out, const float* mask) {
   int n = 0;
   const auto at = [&](const float* p) { return p ? p + n : nullptr; };
   for (; n + 64 <= columns; n += 64)
@@ -96,8 +97,7 @@ void forward_bf16(const LayerView& layer, int rows, const float* in, float* out,
 void backward_input_bf16(const LayerView& layer, int rows, const float* dout, float* din,
                          const float* activation) {
   if (activation)
-    multiply_bf16<Epilogue::mask>(rows, layer.in, layer.out, dout, layer.paired_t, din,
-                                  activation);
+    multiply_bf16<Epilogue::mask>(rows, layer.in, layer.out, dout, layer.paired_t, din, activation);
   else
     multiply_bf16<Epilogue::store>(rows, layer.in, layer.out, dout, layer.paired_t, din, nullptr);
 }
@@ -134,8 +134,8 @@ void backward_weights_bf16(const LayerView& layer, int rows, const float* in, co
 }  // namespace
 
 const Kernels& kernels_avx512bf16() {
-  static constexpr Kernels table{Isa::avx512bf16,   encode_grid,         scatter_grid,
-                                 forward_bf16,      backward_input_bf16, backward_weights_bf16,
+  static constexpr Kernels table{Isa::avx512bf16, encode_grid,         scatter_grid,
+                                 forward_bf16,    backward_input_bf16, backward_weights_bf16,
                                  adam_update};
   return table;
 }

@@ -32,7 +32,7 @@ inline void tile(const float* a, long rs, long ks, const float* b, long ldb, flo
 #pragma GCC unroll 16
   for (int r = 0; r < R; ++r)
 #pragma GCC unroll 16
-    for (int j = 0; j < C; ++j) sum[r][j] = Vec{} ;
+    for (int j = 0; j < C; ++j) sum[r][j] = Vec{};
   for (int k = 0; k < depth; ++k) {
     Vec row[C];
 #pragma GCC unroll 16
@@ -101,8 +101,8 @@ inline void backward_input_f32(const LayerView& layer, int rows, const float* do
     multiply<Epilogue::mask>(rows, layer.in, layer.out, dout, layer.out, 1, layer.transposed, din,
                              activation);
   else
-    multiply<Epilogue::store>(rows, layer.in, layer.out, dout, layer.out, 1, layer.transposed,
-                              din, nullptr);
+    multiply<Epilogue::store>(rows, layer.in, layer.out, dout, layer.out, 1, layer.transposed, din,
+                              nullptr);
 }
 
 inline void backward_weights_f32(const LayerView& layer, int rows, const float* in,
@@ -173,11 +173,11 @@ inline void corners_of(const GridLevel& level, const float* position, int count,
 inline void encode_point4(const Corners& corners, int i, const std::uint16_t* table, float* out) {
   __m256 sum = _mm256_setzero_ps();  // low half: x corners 0, high half: x corners 1
   for (int c = 0; c < 4; ++c) {
-    const __m128i low = _mm_loadl_epi64(
-        reinterpret_cast<const __m128i*>(table + 4ul * corners.entry[2 * c][i]));
+    const __m128i low =
+        _mm_loadl_epi64(reinterpret_cast<const __m128i*>(table + 4ul * corners.entry[2 * c][i]));
     const __m128i both = _mm_castps_si128(
-        _mm_loadh_pi(_mm_castsi128_ps(low), reinterpret_cast<const __m64*>(
-                                                table + 4ul * corners.entry[2 * c + 1][i])));
+        _mm_loadh_pi(_mm_castsi128_ps(low),
+                     reinterpret_cast<const __m64*>(table + 4ul * corners.entry[2 * c + 1][i])));
     sum = _mm256_fmadd_ps(_mm256_cvtph_ps(both), _mm256_broadcast_ss(&corners.yz[c][i]), sum);
   }
   const __m128 x0 = _mm256_castps256_ps128(sum), x1 = _mm256_extractf128_ps(sum, 1);
@@ -187,9 +187,9 @@ inline void encode_point4(const Corners& corners, int i, const std::uint16_t* ta
 inline void encode_point2(const Corners& corners, int i, const std::uint16_t* table, float* out) {
   __m128 sum = _mm_setzero_ps();
   for (int c = 0; c < 4; ++c) {
-    const __m128i both = _mm_unpacklo_epi32(
-        _mm_loadu_si32(table + 2ul * corners.entry[2 * c][i]),
-        _mm_loadu_si32(table + 2ul * corners.entry[2 * c + 1][i]));
+    const __m128i both =
+        _mm_unpacklo_epi32(_mm_loadu_si32(table + 2ul * corners.entry[2 * c][i]),
+                           _mm_loadu_si32(table + 2ul * corners.entry[2 * c + 1][i]));
     sum = _mm_fmadd_ps(_mm_cvtph_ps(both), _mm_broadcast_ss(&corners.yz[c][i]), sum);
   }
   const __m128 x1 = _mm_movehl_ps(sum, sum);
@@ -197,15 +197,16 @@ inline void encode_point2(const Corners& corners, int i, const std::uint16_t* ta
                 _mm_fmadd_ps(_mm_sub_ps(x1, sum), _mm_broadcast_ss(&corners.x[i]), sum));
 }
 
-/// Points are looked up in groups of 8: while one group's corners are read, the next one's are on their way
-/// from memory. A table that fits into the L2 cache with the others' gains nothing.
+/// Points are looked up in groups of 8: while one group's corners are read, the next one's are on
+/// their way from memory. A table that fits into the L2 cache with the others' gains nothing.
 constexpr unsigned long prefetched_from = 1ul << 19;  ///< bytes
 
 template <typename T>
 inline void prefetch(const Corners& corners, const T* table, int features) {
   for (int c = 0; c < 8; ++c)
     for (int i = 0; i < 8; ++i)
-      _mm_prefetch(reinterpret_cast<const char*>(table + static_cast<unsigned long>(features) * corners.entry[c][i]),
+      _mm_prefetch(reinterpret_cast<const char*>(table + static_cast<unsigned long>(features) *
+                                                             corners.entry[c][i]),
                    _MM_HINT_T0);
 }
 
@@ -213,7 +214,8 @@ inline void prefetch(const Corners& corners, const T* table, int features) {
 template <typename T, typename Visit>
 inline void visit_groups(const GridLevel& level, const T* table, const float* position, int count,
                          const Visit& visit) {
-  const bool ahead = level.entries * static_cast<unsigned long>(level.features) * sizeof(T) >= prefetched_from;
+  const bool ahead =
+      level.entries * static_cast<unsigned long>(level.features) * sizeof(T) >= prefetched_from;
   Corners corners[2];
   const auto look_up = [&](int begin, Corners& group) {
     const int n = count - begin < 8 ? count - begin : 8;
@@ -238,9 +240,11 @@ inline void encode_grid(const GridLevel& level, const std::uint16_t* table, cons
   visit_groups(level, table, position, count, [&](const Corners& corners, int begin, int n) {
     float* row = out + static_cast<long>(begin) * stride;
     if (level.features == 4)
-      for (int i = 0; i < n; ++i) encode_point4(corners, i, table, row + static_cast<long>(i) * stride);
+      for (int i = 0; i < n; ++i)
+        encode_point4(corners, i, table, row + static_cast<long>(i) * stride);
     else
-      for (int i = 0; i < n; ++i) encode_point2(corners, i, table, row + static_cast<long>(i) * stride);
+      for (int i = 0; i < n; ++i)
+        encode_point2(corners, i, table, row + static_cast<long>(i) * stride);
   });
 }
 
@@ -271,11 +275,13 @@ inline void scatter_grid(const GridLevel& level, float* grad, const float* posit
                          const float* dfeatures) {
   visit_groups(level, grad, position, count, [&](const Corners& corners, int begin, int n) {
     if (level.features == 4)
-      for (int i = 0; i < n; ++i) scatter_point4(corners, i, _mm_loadu_ps(dfeatures + 4l * (begin + i)), grad);
+      for (int i = 0; i < n; ++i)
+        scatter_point4(corners, i, _mm_loadu_ps(dfeatures + 4l * (begin + i)), grad);
     else
       for (int i = 0; i < n; ++i)
         scatter_point2(corners, i,
-                       _mm_castsi128_ps(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(dfeatures + 2l * (begin + i)))),
+                       _mm_castsi128_ps(_mm_loadl_epi64(
+                           reinterpret_cast<const __m128i*>(dfeatures + 2l * (begin + i)))),
                        grad);
   });
 }
@@ -297,12 +303,12 @@ inline void adam_update(const AdamStep& step, std::int64_t count, float* paramet
     const __m256 g = _mm256_fmadd_ps(_mm256_set1_ps(step.weight_decay), p, bounded);
     const __m256 m0 = _mm256_loadu_ps(first + i), v0 = _mm256_loadu_ps(second + i);
     const __m256 m = _mm256_fmadd_ps(_mm256_set1_ps(1 - step.beta1), _mm256_sub_ps(g, m0), m0);
-    const __m256 v = _mm256_fmadd_ps(_mm256_set1_ps(1 - step.beta2),
-                                     _mm256_sub_ps(_mm256_mul_ps(g, g), v0), v0);
+    const __m256 v =
+        _mm256_fmadd_ps(_mm256_set1_ps(1 - step.beta2), _mm256_sub_ps(_mm256_mul_ps(g, g), v0), v0);
     const __m256 root = _mm256_sqrt_ps(_mm256_mul_ps(v, _mm256_set1_ps(step.correction2)));
-    const __m256 change = _mm256_div_ps(
-        _mm256_mul_ps(m, _mm256_set1_ps(step.learning_rate * step.correction1)),
-        _mm256_add_ps(root, _mm256_set1_ps(step.epsilon)));
+    const __m256 change =
+        _mm256_div_ps(_mm256_mul_ps(m, _mm256_set1_ps(step.learning_rate * step.correction1)),
+                      _mm256_add_ps(root, _mm256_set1_ps(step.epsilon)));
     __m256 next = _mm256_sub_ps(p, change);
     if (half) next = _mm256_max_ps(minus_limit, _mm256_min_ps(limit, next));
     next = _mm256_blendv_ps(p, next, used);

@@ -7,8 +7,8 @@
 #include <opencv2/imgproc.hpp>
 #include <unordered_set>
 
-#include "recon/nerf/nerf.hpp"
 #include "core/option_range.hpp"
+#include "recon/nerf/nerf.hpp"
 #include "recon/nerf/rendering/render.hpp"
 
 namespace orbitfuse::nerf {

@@ -23,8 +23,8 @@ void even_edges(int bins, float jitter, float* out) {
 }
 
 /// Densities and weights of a level whose edges are set.
-void evaluate(const DensityNetwork& network, const Kernels& kernels, const std::vector<DrawnRay>& rays,
-              ProposalBlock::Level& level) {
+void evaluate(const DensityNetwork& network, const Kernels& kernels,
+              const std::vector<DrawnRay>& rays, ProposalBlock::Level& level) {
   const auto bins = static_cast<std::size_t>(level.bins);
   const std::size_t count = rays.size() * bins;
   level.dt.resize(count);
@@ -39,7 +39,8 @@ void evaluate(const DensityNetwork& network, const Kernels& kernels, const std::
       level.dt[r * bins + i] = edge[1] - edge[0];
     }
   level.features.resize(count * static_cast<std::size_t>(network.grid.width));
-  network.grid.encode(kernels, level.position01.data(), static_cast<int>(count), level.features.data());
+  network.grid.encode(kernels, level.position01.data(), static_cast<int>(count),
+                      level.features.data());
   network.mlp.forward(kernels, static_cast<int>(count), level.features.data(), level.density);
   level.sigma.resize(count);
   for (std::size_t i = 0; i < count; ++i)
@@ -47,20 +48,21 @@ void evaluate(const DensityNetwork& network, const Kernels& kernels, const std::
   level.weight.assign(count, 0);
   level.light.assign(count, 0);
   for (std::size_t r = 0; r < rays.size(); ++r)
-    composite(level.bins, &level.sigma[r * bins], &level.dt[r * bins], 0.0f, &level.weight[r * bins],
-              &level.light[r * bins]);
+    composite(level.bins, &level.sigma[r * bins], &level.dt[r * bins], 0.0f,
+              &level.weight[r * bins], &level.light[r * bins]);
 }
 
 void distances_of(const std::vector<float>& spaced, const ProposalSettings& settings,
                   std::vector<float>& out) {
   const float low = spaced_of(settings.near), high = spaced_of(settings.far);
   out.resize(spaced.size());
-  for (std::size_t i = 0; i < spaced.size(); ++i) out[i] = distance_of(low + spaced[i] * (high - low));
+  for (std::size_t i = 0; i < spaced.size(); ++i)
+    out[i] = distance_of(low + spaced[i] * (high - low));
 }
 
 /// Edges of the next finer sampling.
-void resample_rays(const ProposalBlock::Level& from, const std::vector<DrawnRay>& rays, float anneal,
-                   int count, std::vector<float>& out) {
+void resample_rays(const ProposalBlock::Level& from, const std::vector<DrawnRay>& rays,
+                   float anneal, int count, std::vector<float>& out) {
   const auto bins = static_cast<std::size_t>(from.bins);
   std::vector<float> flattened(bins);
   out.resize(rays.size() * static_cast<std::size_t>(count + 1));
@@ -69,21 +71,23 @@ void resample_rays(const ProposalBlock::Level& from, const std::vector<DrawnRay>
       const float w = from.weight[r * bins + i];
       flattened[i] = anneal == 1 ? w : std::pow(w, anneal);
     }
-    resample(from.bins, &from.spaced[r * (bins + 1)], flattened.data(), histogram_padding, rays[r].jitter,
-             count, &out[r * static_cast<std::size_t>(count + 1)]);
+    resample(from.bins, &from.spaced[r * (bins + 1)], flattened.data(), histogram_padding,
+             rays[r].jitter, count, &out[r * static_cast<std::size_t>(count + 1)]);
   }
 }
 
 }  // namespace
 
-void add_proposed(const FieldState& field, const Kernels& kernels, const std::vector<DrawnRay>& rays, const ProposalSettings& settings,
+void add_proposed(const FieldState& field, const Kernels& kernels,
+                  const std::vector<DrawnRay>& rays, const ProposalSettings& settings,
                   ProposalBlock& proposals, RayBlock& block) {
   auto& [first, second] = proposals.levels;
   first.bins = field.options.proposal_samples_1;
   second.bins = field.options.proposal_samples_2;
   first.spaced.resize(rays.size() * static_cast<std::size_t>(first.bins + 1));
   for (std::size_t r = 0; r < rays.size(); ++r)
-    even_edges(first.bins, rays[r].jitter, &first.spaced[r * static_cast<std::size_t>(first.bins + 1)]);
+    even_edges(first.bins, rays[r].jitter,
+               &first.spaced[r * static_cast<std::size_t>(first.bins + 1)]);
   distances_of(first.spaced, settings, first.edge);
   evaluate(field.proposals[0], kernels, rays, first);
   resample_rays(first, rays, settings.anneal, second.bins, second.spaced);
@@ -140,7 +144,8 @@ double backward_proposals(const FieldState& field, const Kernels& kernels, const
     network.mlp.backward(kernels, static_cast<int>(count), level.features.data(), level.density,
                          level.ddensity.data(), level.dfeatures.data(), p.scratch_a, p.scratch_b,
                          dweights[k].data());
-    if (!all_finite(level.dfeatures.data(), count * width)) loss = std::numeric_limits<double>::quiet_NaN();
+    if (!all_finite(level.dfeatures.data(), count * width))
+      loss = std::numeric_limits<double>::quiet_NaN();
     by_level(network.grid, level.dfeatures, count, level.grid);
   }
   return loss;

@@ -18,12 +18,14 @@ struct ProposalBlock {
     std::vector<float> dt, position01, features, sigma, weight, light;
     Mlp::Activations density;
     std::vector<float> dweight, ddensity, dfeatures;
-    std::vector<float> grid;    ///< gradient of the encoded features, [level][sample][feature]
+    std::vector<float> grid;  ///< gradient of the encoded features, [level][sample][feature]
   };
   std::array<Level, 2> levels;
   std::vector<float> fine_edge, low, high, slope, scratch_a, scratch_b;
 
-  int samples(int level) const { return static_cast<int>(levels[static_cast<std::size_t>(level)].dt.size()); }
+  int samples(int level) const {
+    return static_cast<int>(levels[static_cast<std::size_t>(level)].dt.size());
+  }
 };
 
 struct ProposalSettings {
@@ -33,8 +35,9 @@ struct ProposalSettings {
 };
 
 /// Adds `rays` with field.options.fine_samples samples each to `block`.
-void add_proposed(const FieldState& field, const Kernels& kernels, const std::vector<DrawnRay>& rays,
-                  const ProposalSettings& settings, ProposalBlock& proposals, RayBlock& block);
+void add_proposed(const FieldState& field, const Kernels& kernels,
+                  const std::vector<DrawnRay>& rays, const ProposalSettings& settings,
+                  ProposalBlock& proposals, RayBlock& block);
 
 /// Gradients of the interlevel loss for a block that add_proposed() and forward() have filled:
 /// added to dweights[level], the grids' into proposals. Returns the loss, NaN if a gradient is not

@@ -51,7 +51,8 @@ void RayBlock::add(const Ray& ray, const float* t_mid, const float* dt_in, int c
   first.push_back(static_cast<int>(t.size()));
 }
 
-void RayBlock::add(const Occupancy& occupancy, const MarchSettings& settings, const std::vector<DrawnRay>& marched) {
+void RayBlock::add(const Occupancy& occupancy, const MarchSettings& settings,
+                   const std::vector<DrawnRay>& marched) {
   thread_local std::vector<Marched> samples(march_lanes);
   const int count = static_cast<int>(marched.size());
   for (int begin = 0; begin < count; begin += march_lanes) {
@@ -115,7 +116,8 @@ void evaluate_front_to_back(const FieldState& field, const Kernels& kernels,
         const auto row = static_cast<std::size_t>(done) + at;
         // As composite(): what lies behind the sample that stops the ray doesn't count.
         if (b.ray_light[r] * std::exp(-depth) >= settings.stop)
-          depth += density_of(out[row * density_outputs]) * b.dt[static_cast<std::size_t>(b.round[at])];
+          depth +=
+              density_of(out[row * density_outputs]) * b.dt[static_cast<std::size_t>(b.round[at])];
         b.next[r] = b.round[at] + 1;
       }
       b.ray_light[r] *= std::exp(-depth);
@@ -136,7 +138,8 @@ void drop_unseen(const FieldState& field, const ForwardSettings& settings, RayBl
   b.background_known.assign(b.rays.size(), 0);
   std::size_t kept = 0;
   for (std::size_t r = 0; r < b.rays.size(); ++r) {
-    const auto begin = static_cast<std::size_t>(b.first[r]), end = static_cast<std::size_t>(b.first[r + 1]);
+    const auto begin = static_cast<std::size_t>(b.first[r]),
+               end = static_cast<std::size_t>(b.first[r + 1]);
     b.first[r] = static_cast<int>(kept);
     b.background_known[r] = b.row_of[end - 1] >= 0;
     for (std::size_t i = begin; i < end; ++i) {
@@ -147,8 +150,10 @@ void drop_unseen(const FieldState& field, const ForwardSettings& settings, RayBl
       b.dt[kept] = b.dt[i];
       std::copy_n(&b.position[3 * i], 3, &b.position[3 * kept]);
       std::copy_n(&b.position01[3 * i], 3, &b.position01[3 * kept]);
-      if (settings.gradients) std::copy_n(&b.round_features[from * width], width, &b.features[kept * width]);
-      for (std::size_t l = settings.gradients ? 0 : b.density.size() - 1; l < b.density.size(); ++l) {
+      if (settings.gradients)
+        std::copy_n(&b.round_features[from * width], width, &b.features[kept * width]);
+      for (std::size_t l = settings.gradients ? 0 : b.density.size() - 1; l < b.density.size();
+           ++l) {
         const auto out = static_cast<std::size_t>(field.main.mlp.layers[l].out);
         std::copy_n(&b.round_density[l][from * out], out, &b.density[l][kept * out]);
       }
@@ -176,7 +181,8 @@ void forward(const FieldState& field, const Kernels& kernels, const ForwardSetti
   b.used.resize(b.rays.size());
   b.active.clear();
   const float* out = n > 0 ? b.density.back().data() : nullptr;
-  for (int i = 0; i < n; ++i) b.sigma[static_cast<std::size_t>(i)] = density_of(out[i * density_outputs]);
+  for (int i = 0; i < n; ++i)
+    b.sigma[static_cast<std::size_t>(i)] = density_of(out[i * density_outputs]);
 
   for (std::size_t r = 0; r < b.rays.size(); ++r) {
     const int begin = b.first[r], end = b.first[r + 1] - 1;  // end: the background
@@ -220,9 +226,11 @@ void ray_value(const FieldState& field, const RayBlock& b, int ray, int& row, fl
   const int channels = field.channels();
   std::fill_n(out, channels, 0.0f);
   const int end = b.first[static_cast<std::size_t>(ray) + 1];
-  for (; row < static_cast<int>(b.active.size()) && b.active[static_cast<std::size_t>(row)] < end; ++row) {
+  for (; row < static_cast<int>(b.active.size()) && b.active[static_cast<std::size_t>(row)] < end;
+       ++row) {
     const float w = b.weight[static_cast<std::size_t>(b.active[static_cast<std::size_t>(row)])];
-    for (int c = 0; c < channels; ++c) out[c] += w * b.value[static_cast<std::size_t>(row * channels + c)];
+    for (int c = 0; c < channels; ++c)
+      out[c] += w * b.value[static_cast<std::size_t>(row * channels + c)];
   }
 }
 
@@ -230,9 +238,11 @@ void densities(const DensityNetwork& network, const Kernels& kernels, const floa
                int count, float* sigma) {
   thread_local std::vector<float> features, contracted;
   thread_local Mlp::Activations activations;
-  reserve_floats(features, static_cast<std::size_t>(count) * static_cast<std::size_t>(network.grid.width));
+  reserve_floats(features,
+                 static_cast<std::size_t>(count) * static_cast<std::size_t>(network.grid.width));
   reserve_floats(contracted, static_cast<std::size_t>(count) * 3);
-  for (int i = 0; i < count; ++i) contract01(position + 3 * i, &contracted[static_cast<std::size_t>(3 * i)]);
+  for (int i = 0; i < count; ++i)
+    contract01(position + 3 * i, &contracted[static_cast<std::size_t>(3 * i)]);
   network.grid.encode(kernels, contracted.data(), count, features.data());
   network.mlp.forward(kernels, count, features.data(), activations);
   for (int i = 0; i < count; ++i)

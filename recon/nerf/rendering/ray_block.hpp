@@ -21,7 +21,7 @@ struct RayBlock {
   std::vector<int> used;                    ///< per ray: samples before it went dark
   std::vector<int> active;                  ///< samples that got a colour
   std::vector<float> color_in;
-  std::vector<float> value;                 ///< [active][channels], activated
+  std::vector<float> value;  ///< [active][channels], activated
 
   // Scratch of the density pass: samples in the order of evaluation.
   std::vector<int> row_of, next, round;
@@ -36,7 +36,8 @@ struct RayBlock {
   int samples() const { return first.empty() ? 0 : first.back(); }
   void clear();
   /// Adds rays and their samples (occupancy marching).
-  void add(const Occupancy& occupancy, const MarchSettings& settings, const std::vector<DrawnRay>& marched);
+  void add(const Occupancy& occupancy, const MarchSettings& settings,
+           const std::vector<DrawnRay>& marched);
   /// Adds a ray with given samples.
   void add(const Ray& ray, const float* t_mid, const float* dt_in, int count);
 };

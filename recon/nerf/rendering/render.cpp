@@ -55,15 +55,19 @@ Status RenderOptions::validate() const {
 
 namespace {
 
-constexpr int limit_stride = 4;          // one ray of 16 looks ahead for its neighbours
+constexpr int limit_stride = 4;  // one ray of 16 looks ahead for its neighbours
 constexpr float limit_margin = 1.03f;
 constexpr float no_limit = std::numeric_limits<float>::max();
 
 /// Renders the pixels of one image, block by block.
 class ImageRenderer {
  public:
-  ImageRenderer(const FieldState& field, const ViewRays& rays, int stride, const RenderOptions& options)
-      : field_(field), rays_(rays), stride_(stride), kernels_(kernels_for(best_isa())),
+  ImageRenderer(const FieldState& field, const ViewRays& rays, int stride,
+                const RenderOptions& options)
+      : field_(field),
+        rays_(rays),
+        stride_(stride),
+        kernels_(kernels_for(best_isa())),
         march_(field.march_settings()),
         limits_{static_cast<float>(options.stop_transmittance), 1e-4f, false} {
     const Camera& camera = rays.camera();
@@ -133,17 +137,21 @@ class ImageRenderer {
  private:
   void add(int pixel, float far, std::vector<int>& pixels) const {
     const Camera& camera = rays_.camera();
-    const int x = pixel % width_ * stride_ + stride_ / 2, y = pixel / width_ * stride_ + stride_ / 2;
+    const int x = pixel % width_ * stride_ + stride_ / 2,
+              y = pixel / width_ * stride_ + stride_ / 2;
     Ray ray;
-    if (!rays_.ray(std::min(camera.width - 1, x) + 0.5, std::min(camera.height - 1, y) + 0.5, ray)) return;
+    if (!rays_.ray(std::min(camera.width - 1, x) + 0.5, std::min(camera.height - 1, y) + 0.5, ray))
+      return;
     drawn().push_back({ray, far, 0.5f});
     pixels.push_back(pixel);
   }
   /// The samples of all rays that add() noted.
   void place(RayBlock& block) const {
     thread_local ProposalBlock proposals;
-    if (proposing_) add_proposed(field_, kernels_, drawn(), {.near = march_.near}, proposals, block);
-    else block.add(field_.occupancy, march_, drawn());
+    if (proposing_)
+      add_proposed(field_, kernels_, drawn(), {.near = march_.near}, proposals, block);
+    else
+      block.add(field_.occupancy, march_, drawn());
     drawn().clear();
   }
   static std::vector<DrawnRay>& drawn() {
@@ -170,7 +178,8 @@ class ImageRenderer {
 RenderedView render_strided(const FieldState& field, const ViewRays& rays, int stride,
                             const RenderOptions& options) {
   ImageRenderer renderer(field, rays, stride, options);
-  const int width = (rays.camera().width + stride - 1) / stride, height = (rays.camera().height + stride - 1) / stride;
+  const int width = (rays.camera().width + stride - 1) / stride,
+            height = (rays.camera().height + stride - 1) / stride;
   // Proposal networks know where surfaces are.
   if (!options.look_ahead || field.options.sampling == Sampling::proposal ||
       std::min(width, height) < 8 * limit_stride)
@@ -187,9 +196,8 @@ RenderedView render_strided(const FieldState& field, const ViewRays& rays, int s
   return renderer.image(far);
 }
 
-Result<RenderedView> render(const Field& field, const Camera& camera,
-                            const Rigid3d& cam_from_world, const RenderOptions& options,
-                            const Progress& progress) {
+Result<RenderedView> render(const Field& field, const Camera& camera, const Rigid3d& cam_from_world,
+                            const RenderOptions& options, const Progress& progress) {
   ORBITFUSE_TRY(options.validate());
   ORBITFUSE_TRY(camera.validate("render.camera"));
   ORBITFUSE_TRY(progress.check("render"));

@@ -59,10 +59,13 @@ void BlockGradients::add(const BlockGradients& other) {
 }
 
 bool BlockGradients::all_parts_finite() const {
-  const auto numbers = [](const std::vector<float>& part) { return all_finite(part.data(), part.size()); };
+  const auto numbers = [](const std::vector<float>& part) {
+    return all_finite(part.data(), part.size());
+  };
   return finite && numbers(mlp) && numbers(color) && numbers(offsets) &&
-         std::all_of(std::begin(proposals), std::end(proposals), numbers) && std::isfinite(squared_error) &&
-         std::isfinite(distortion) && std::isfinite(depth) && std::isfinite(interlevel);
+         std::all_of(std::begin(proposals), std::end(proposals), numbers) &&
+         std::isfinite(squared_error) && std::isfinite(distortion) && std::isfinite(depth) &&
+         std::isfinite(interlevel);
 }
 
 void backward(const FieldState& field, const Kernels& kernels, const LossSettings& settings,
@@ -100,7 +103,8 @@ void backward(const FieldState& field, const Kernels& kernels, const LossSetting
     for (int c = 0; c < channels; ++c) {
       const float error = value[c] + offset - target.value[c];
       gradients.squared_error += error * error;
-      const float pull = settings.huber > 0 ? std::clamp(error, -settings.huber, settings.huber) : error;
+      const float pull =
+          settings.huber > 0 ? std::clamp(error, -settings.huber, settings.huber) : error;
       dvalue[c] = 2 * pull * settings.per_ray / static_cast<float>(channels);
       gradients.offsets[static_cast<std::size_t>(target.view)] += dvalue[c];
     }
@@ -128,15 +132,16 @@ void backward(const FieldState& field, const Kernels& kernels, const LossSetting
         behind += b.weight[a] * b.dweight[a];
         --i_active;
       }
-      const bool colored = i_active >= first_row && b.active[static_cast<std::size_t>(i_active)] == i;
+      const bool colored =
+          i_active >= first_row && b.active[static_cast<std::size_t>(i_active)] == i;
       const auto k = static_cast<std::size_t>(i);
       if (!colored && b.light[k] > 1e-6f) b.dweight[k] = behind / b.light[k];
     }
     const auto at = static_cast<std::size_t>(begin);
     if (settings.distortion_weight > 0)
-      gradients.distortion += distortion(used, &b.weight[at], &b.s[at], &b.ds[at],
-                                         settings.distortion_weight * settings.per_ray,
-                                         &b.dweight[at]);
+      gradients.distortion +=
+          distortion(used, &b.weight[at], &b.s[at], &b.ds[at],
+                     settings.distortion_weight * settings.per_ray, &b.dweight[at]);
     if (target.distance > 0 && target.depth_weight > 0)
       gradients.depth += depth_loss(target, used, &b.t[at], &b.dt[at], &b.weight[at],
                                     settings.per_ray, &b.dweight[at]);
@@ -152,7 +157,8 @@ void backward(const FieldState& field, const Kernels& kernels, const LossSetting
   for (std::size_t i = 0; i < rows; ++i)
     std::copy_n(&b.dcolor_in[i * color_inputs], density_outputs,
                 &b.ddensity[static_cast<std::size_t>(b.active[i]) * density_outputs]);
-  for (std::size_t i = 0; i < count; ++i) b.ddensity[i * density_outputs] += b.dsigma[i] * b.sigma[i];
+  for (std::size_t i = 0; i < count; ++i)
+    b.ddensity[i * density_outputs] += b.dsigma[i] * b.sigma[i];
 
   const auto width = static_cast<std::size_t>(field.main.grid.width);
   ensure(b.dfeatures, count * width);

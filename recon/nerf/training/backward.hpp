@@ -12,14 +12,14 @@ namespace orbitfuse::nerf {
 struct RayTarget {
   float value[3] = {0, 0, 0};
   int view = 0, x = 0, y = 0;  ///< where it comes from
-  float distance = 0;      ///< known distance along the ray (normalised), 0 = unknown
-  float depth_weight = 0;  ///< of the depth loss on this ray
+  float distance = 0;          ///< known distance along the ray (normalised), 0 = unknown
+  float depth_weight = 0;      ///< of the depth loss on this ray
 };
 
 struct LossSettings {
-  float per_ray = 1;            ///< 1 / rays of the step
+  float per_ray = 1;  ///< 1 / rays of the step
   float distortion_weight = 0;
-  float huber = 0;              ///< errors beyond it count linearly; 0 = squared error
+  float huber = 0;  ///< errors beyond it count linearly; 0 = squared error
 };
 
 /// Sums over a block; gradients are added, losses are means once divided by the rays.

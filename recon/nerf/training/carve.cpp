@@ -15,7 +15,8 @@ struct Votes {
   int solid = 0;  ///< ... at a known surface
 };
 
-Votes vote(const std::vector<const NormalisedView*>& voters, const float x[3], float half_diagonal) {
+Votes vote(const std::vector<const NormalisedView*>& voters, const float x[3],
+           float half_diagonal) {
   Votes votes;
   for (const NormalisedView* voter : voters) {
     const NormalisedView& view = *voter;

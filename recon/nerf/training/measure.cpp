@@ -38,7 +38,8 @@ double psnr_of(const RenderedView& picture, const cv::Mat& target, int stride) {
                    : std::numeric_limits<double>::quiet_NaN();
 }
 
-PoseSums sums_of(const RenderedView& picture, int stride, const Space& space, const NormalisedView& view) {
+PoseSums sums_of(const RenderedView& picture, int stride, const Space& space,
+                 const NormalisedView& view) {
   PoseSums sums;
   const int channels = picture.color.channels();
   for (int y = 0; y < picture.depth.rows; ++y)
@@ -48,12 +49,14 @@ PoseSums sums_of(const RenderedView& picture, int stride, const Space& space, co
       Ray ray;
       const float z = picture.depth.at<float>(y, x);
       if (!std::isfinite(z) || !view.rays.ray(px + 0.5, py + 0.5, ray)) continue;
-      add_ray(view, px, py, picture.color.ptr<float>(y) + x * channels, z / ray.forward / static_cast<float>(space.radius), sums);
+      add_ray(view, px, py, picture.color.ptr<float>(y) + x * channels,
+              z / ray.forward / static_cast<float>(space.radius), sums);
     }
   return sums;
 }
 
-double heldout_psnr(FieldState& field, std::vector<NormalisedView>& views, const std::vector<bool>& heldout, bool align) {
+double heldout_psnr(FieldState& field, std::vector<NormalisedView>& views,
+                    const std::vector<bool>& heldout, bool align) {
   double sum = 0;
   int count = 0;
   for (std::size_t i = 0; i < views.size(); ++i) {
@@ -61,7 +64,9 @@ double heldout_psnr(FieldState& field, std::vector<NormalisedView>& views, const
     const int stride = measuring_stride(views[i].target);
     RenderedView picture = render_strided(field, views[i].rays, stride, {});
     for (int turn = 0; align && turn < 3; ++turn) {
-      if (!take_step(sums_of(picture, stride, field.space, views[i]), field.space, field.refined_poses[i], views[i])) break;
+      if (!take_step(sums_of(picture, stride, field.space, views[i]), field.space,
+                     field.refined_poses[i], views[i]))
+        break;
       picture = render_strided(field, views[i].rays, stride, {});
     }
     sum += psnr_of(picture, views[i].target, stride);

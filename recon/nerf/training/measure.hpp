@@ -11,7 +11,8 @@ namespace orbitfuse::nerf {
 double psnr_of(const RenderedView& picture, const cv::Mat& target, int stride);
 
 /// How a strided picture of the view's scene asks its camera to move.
-PoseSums sums_of(const RenderedView& picture, int stride, const Space& space, const NormalisedView& view);
+PoseSums sums_of(const RenderedView& picture, int stride, const Space& space,
+                 const NormalisedView& view);
 
 /// Mean PSNR in dB over the held-out views; NaN without any. With `align`, they first follow the
 /// field, which moves with the views that train.

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "core/system/parallel.hpp"
 #include "core/geometry/scene_ball.hpp"
+#include "core/system/parallel.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
@@ -138,7 +138,8 @@ ValueSpan estimate_span(const Dataset& training) {
   return {low, std::max(high, low + 1.0)};
 }
 
-std::vector<NormalisedView> prepare_views(const Dataset& dataset, const Space& space, ValueSpan span) {
+std::vector<NormalisedView> prepare_views(const Dataset& dataset, const Space& space,
+                                          ValueSpan span) {
   std::vector<NormalisedView> out(dataset.views.size());
   parallel_for(static_cast<int>(out.size()), [&](int i) {
     const TrainingView& view = dataset.views[static_cast<std::size_t>(i)];

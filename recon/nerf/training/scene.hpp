@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "recon/nerf/field/occupancy.hpp"
-#include "recon/nerf/options.hpp"
 #include "recon/nerf/field/space.hpp"
 #include "recon/nerf/field/view_rays.hpp"
+#include "recon/nerf/options.hpp"
 #include "recon/nerf/training_views.hpp"
 
 namespace orbitfuse::nerf {
@@ -25,11 +25,13 @@ struct NormalisedView {
 /// The ball of the scene that these views and points show (core/geometry/scene_ball.hpp).
 Space estimate_space(const Dataset& training);
 
-std::vector<NormalisedView> prepare_views(const Dataset& dataset, const Space& space, ValueSpan span);
+std::vector<NormalisedView> prepare_views(const Dataset& dataset, const Space& space,
+                                          ValueSpan span);
 
 /// Switches off cells that too few training views see and cells in front of depth that these know
-/// (SfM tracks, depth maps; `dense_depth` as Dataset::has_dense_depth). Returns the fraction left on.
-double carve(bool dense_depth, const std::vector<NormalisedView>& views, const std::vector<bool>& heldout,
-             const TrainOptions& options, Occupancy& occupancy);
+/// (SfM tracks, depth maps; `dense_depth` as Dataset::has_dense_depth). Returns the fraction left
+/// on.
+double carve(bool dense_depth, const std::vector<NormalisedView>& views,
+             const std::vector<bool>& heldout, const TrainOptions& options, Occupancy& occupancy);
 
 }  // namespace orbitfuse::nerf

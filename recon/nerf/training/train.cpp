@@ -17,8 +17,9 @@ void report_broken(const Dataset& dataset, const std::vector<bool>& broken, Trai
   for (std::size_t i = 0; dataset.modality == Modality::thermal && i < broken.size(); ++i) {
     const double invalid = invalid_share(dataset.views[i].image);
     if (broken[i]) {
-      report.warnings.push_back(fmt::format("{} dropped: {:.0f} % of its pixels hold no temperature",
-                                            dataset.views[i].name, 100 * invalid));
+      report.warnings.push_back(
+          fmt::format("{} dropped: {:.0f} % of its pixels hold no temperature",
+                      dataset.views[i].name, 100 * invalid));
     } else if (invalid > 0) {
       ++partly;
       if (invalid > most) worst = i;
@@ -26,20 +27,27 @@ void report_broken(const Dataset& dataset, const std::vector<bool>& broken, Trai
     }
   }
   if (partly > 0)
-    report.skips.push_back({"dead pixels", fmt::format("no temperature, in {} of {} views, most in {}: {:.2g} %", partly,
-                                                       broken.size(), dataset.views[worst].name, 100 * most),
-                            "they neither train nor measure"});
+    report.skips.push_back(
+        {"dead pixels",
+         fmt::format("no temperature, in {} of {} views, most in {}: {:.2g} %", partly,
+                     broken.size(), dataset.views[worst].name, 100 * most),
+         "they neither train nor measure"});
 }
 
 }  // namespace
 
 const char* name(StopReason reason) {
   switch (reason) {
-    case StopReason::iterations: return "iterations";
-    case StopReason::budget: return "budget";
-    case StopReason::target_psnr: return "target PSNR";
-    case StopReason::plateau: return "plateau";
-    case StopReason::cancelled: return "cancelled";
+    case StopReason::iterations:
+      return "iterations";
+    case StopReason::budget:
+      return "budget";
+    case StopReason::target_psnr:
+      return "target PSNR";
+    case StopReason::plateau:
+      return "plateau";
+    case StopReason::cancelled:
+      return "cancelled";
   }
   return "";
 }
@@ -48,9 +56,7 @@ std::string TrainReport::brief() const {
   std::string text = fmt::format("{} steps, {:.1f} CPU s", iterations, cpu_s);
   if (std::isfinite(best_psnr))
     text += fmt::format(", held-out {:.2f} dB (step {})", best_psnr, best_step);
-  text += fmt::format(", {:.1f} samples a ray, stopped by {}",
-                      samples_per_ray(),
-                      name(stop));
+  text += fmt::format(", {:.1f} samples a ray, stopped by {}", samples_per_ray(), name(stop));
   if (skipped_steps > 0) text += fmt::format(", {} steps skipped (not finite)", skipped_steps);
   return text;
 }
@@ -63,7 +69,8 @@ Result<TrainingData> split(const Dataset& given, const TrainOptions& options, Tr
   TrainingData data;
   data.dataset = training_part(given, broken);
   if (data.dataset.views.empty())
-    return fail(ErrorKind::input, given.views[0].name, "no view has temperatures in half of its pixels",
+    return fail(ErrorKind::input, given.views[0].name,
+                "no view has temperatures in half of its pixels",
                 "look at the frames and their radiometric scale");
   data.heldout = heldout_views(data.dataset, options.holdout_every);
   for (std::size_t i = 0; i < data.heldout.size(); ++i)

@@ -6,8 +6,8 @@
 #include <limits>
 #include <numbers>
 
-#include "core/system/parallel.hpp"
 #include "core/numeric/random.hpp"
+#include "core/system/parallel.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
@@ -16,7 +16,8 @@ constexpr int rays_per_block = 32;
 constexpr int shard_count = 16;  ///< of weight gradients; fixed, so sums do not depend on threads
 constexpr int occupancy_every = 16;
 constexpr int occupancy_warmup = 64;
-constexpr int pose_every = 25;  ///< steps; where views are many, the rays of several such turns make a step
+constexpr int pose_every =
+    25;  ///< steps; where views are many, the rays of several such turns make a step
 constexpr double poses_move_until = 0.9;  ///< of the run: the last details are of poses that stay
 constexpr float known_depth_margin = 1.08f;  ///< a wrong depth must be able to move
 
@@ -61,9 +62,12 @@ Trainer::Trainer(FieldState& field, std::vector<NormalisedView>& views,
     known_ends_.push_back(known);
   }
   shards_.resize(shard_count);
-  if (field.options.refine_poses) pose_shards_.assign(shard_count, std::vector<PoseSums>(views.size()));
+  if (field.options.refine_poses)
+    pose_shards_.assign(shard_count, std::vector<PoseSums>(views.size()));
   if (field_.rays_per_step == 0)
-    field_.rays_per_step = proposing() ? std::max(1, field_.options.samples_per_step / field_.options.fine_samples) : 512;
+    field_.rays_per_step =
+        proposing() ? std::max(1, field_.options.samples_per_step / field_.options.fine_samples)
+                    : 512;
 }
 
 void Trainer::draw(Block& block, int begin, int end, double progress) {
@@ -85,13 +89,14 @@ void Trainer::draw(Block& block, int begin, int end, double progress) {
       const bool at_known = sparse && supervision > 0 && i % 4 == 0;
       const auto& ends = at_known ? known_ends_ : pixel_ends_;
       const auto pick = static_cast<std::int64_t>(bits % static_cast<std::uint64_t>(ends.back()));
-      const auto slot = static_cast<std::size_t>(
-          std::upper_bound(ends.begin(), ends.end(), pick) - ends.begin());
+      const auto slot =
+          static_cast<std::size_t>(std::upper_bound(ends.begin(), ends.end(), pick) - ends.begin());
       const int index = training_[slot];
       const NormalisedView& view = views_[static_cast<std::size_t>(index)];
       std::int64_t pixel = pick - (slot > 0 ? ends[slot - 1] : 0);
       if (at_known) pixel = view.known[static_cast<std::size_t>(pixel)];
-      const int x = static_cast<int>(pixel % view.target.cols), y = static_cast<int>(pixel / view.target.cols);
+      const int x = static_cast<int>(pixel % view.target.cols),
+                y = static_cast<int>(pixel / view.target.cols);
       RayTarget target;
       const float* stored = view.target.ptr<float>(y) + x * field_.channels();
       DrawnRay drawn;
@@ -114,8 +119,9 @@ void Trainer::draw(Block& block, int begin, int end, double progress) {
     }
   }
   if (proposing())
-    add_proposed(field_, kernels_, block.drawn, {.near = settings.near, .anneal = proposal_anneal(progress)},
-                 block.proposals, block.rays);
+    add_proposed(field_, kernels_, block.drawn,
+                 {.near = settings.near, .anneal = proposal_anneal(progress)}, block.proposals,
+                 block.rays);
   else
     block.rays.add(field_.occupancy, settings, block.drawn);
 }
@@ -182,7 +188,8 @@ bool Trainer::step(double progress) {
     network.learning_rate = static_cast<float>(o.network_learning_rate * scheduled);
     network.weight_decay = 1e-6f;
     apply(adam, network, gradients, with_proposals);
-    const double mse = gradients.squared_error / static_cast<double>(std::max(1l, gradients.channels));
+    const double mse =
+        gradients.squared_error / static_cast<double>(std::max(1l, gradients.channels));
     const double psnr = -10 * std::log10(std::max(mse, 1e-12));
     field_.train_psnr = field_.step == 0 ? psnr : 0.98 * field_.train_psnr + 0.02 * psnr;
   }
@@ -207,7 +214,8 @@ void Trainer::watch_poses(const Block& block, std::vector<PoseSums>& sums) const
     float value[3];
     ray_value(field_, b, static_cast<int>(r), row, value);
     float opacity = 0, distance = 0;
-    for (auto i = static_cast<std::size_t>(b.first[r]); i < static_cast<std::size_t>(b.first[r] + b.used[r]); ++i) {
+    for (auto i = static_cast<std::size_t>(b.first[r]);
+         i < static_cast<std::size_t>(b.first[r] + b.used[r]); ++i) {
       opacity += b.weight[i];
       distance += b.weight[i] * b.t[i];
     }
@@ -248,7 +256,8 @@ void Trainer::apply(const AdamStep& grid_step, const AdamStep& network_step,
         if (block.rays.samples() == 0) continue;
         const LevelGradient g = gradient_of(block);
         kernels_.scatter(level, grad, g.position01, g.count,
-                         g.gradient + index * static_cast<std::size_t>(g.count) * static_cast<std::size_t>(grid.features));
+                         g.gradient + index * static_cast<std::size_t>(g.count) *
+                                          static_cast<std::size_t>(grid.features));
       }
       kernels_.adam(grid_step, static_cast<std::int64_t>(level.entries) * level.features,
                     grid.table.value.data() + offset, grid.table.first.data() + offset,
@@ -271,7 +280,8 @@ void Trainer::apply(const AdamStep& grid_step, const AdamStep& network_step,
     DensityNetwork& network = field_.proposals[k];
     update_grid(network.grid, [k](const Block& block) {
       const ProposalBlock::Level& level = block.proposals.levels[k];
-      return LevelGradient{block.proposals.samples(static_cast<int>(k)), level.position01.data(), level.grid.data()};
+      return LevelGradient{block.proposals.samples(static_cast<int>(k)), level.position01.data(),
+                           level.grid.data()};
     });
     update(network.mlp.weights, gradients.proposals[k], network_step);
     network.mlp.refresh();
@@ -314,16 +324,17 @@ void Trainer::probe_cells() {
   std::vector<float> position, sigma(probes);
   const auto cells = static_cast<std::uint64_t>(grid.cell_count());
   for (int i = 0; i < probes * 16 && static_cast<int>(position.size()) < 3 * probes; ++i) {
-    const std::uint64_t bits =
-        random_bits(field_.options.seed, probe_stream,
-                    static_cast<std::uint64_t>(field_.step) * probes * 16 + static_cast<unsigned>(i));
+    const std::uint64_t bits = random_bits(
+        field_.options.seed, probe_stream,
+        static_cast<std::uint64_t>(field_.step) * probes * 16 + static_cast<unsigned>(i));
     const auto cell = static_cast<std::int64_t>(bits % cells);
     if (!Occupancy::test(grid.on, cell)) continue;
     float x[3];
     grid.center_of(cell, x);
     const int cascade = static_cast<int>(cell / (grid.cell_count() / grid.cascades));
     for (int d = 0; d < 3; ++d)
-      x[d] += grid.cell_size(cascade) * 3.0f * (uniform01(random_bits(bits, 7, static_cast<unsigned>(d))) - 0.5f);
+      x[d] += grid.cell_size(cascade) * 3.0f *
+              (uniform01(random_bits(bits, 7, static_cast<unsigned>(d))) - 0.5f);
     const int at = Occupancy::cascade_of(x);
     if (at >= grid.cascades || Occupancy::test(grid.on, grid.cell_of(at, x))) continue;
     position.insert(position.end(), x, x + 3);

@@ -4,10 +4,10 @@
 #include <memory>
 #include <vector>
 
-#include "recon/nerf/training/backward.hpp"
 #include "recon/nerf/field/field_state.hpp"
-#include "recon/nerf/training/pose_steps.hpp"
 #include "recon/nerf/rendering/proposal.hpp"
+#include "recon/nerf/training/backward.hpp"
+#include "recon/nerf/training/pose_steps.hpp"
 #include "recon/nerf/training/scene.hpp"
 
 namespace orbitfuse::nerf {
@@ -39,8 +39,8 @@ class Trainer {
   void draw(Block& block, int begin, int end, double progress);
   bool proposing() const { return field_.options.sampling == Sampling::proposal; }
   bool proposals_learn(double progress) const;
-  void apply(const AdamStep& grid_step, const AdamStep& network_step, const BlockGradients& gradients,
-             bool with_proposals);
+  void apply(const AdamStep& grid_step, const AdamStep& network_step,
+             const BlockGradients& gradients, bool with_proposals);
   void update_occupancy(double progress);
   void probe_cells();
   void watch_poses(const Block& block, std::vector<PoseSums>& sums) const;

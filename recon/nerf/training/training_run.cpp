@@ -14,8 +14,8 @@
 namespace orbitfuse::nerf {
 namespace {
 
-/// Share of the pixels whose depth has to be known for few samples to suffice in the rest (nerf.md: at 0.7 and
-/// 0.64 eight are as good as 24 or better, at 0.18 they cost 4 dB).
+/// Share of the pixels whose depth has to be known for few samples to suffice in the rest (nerf.md:
+/// at 0.7 and 0.64 eight are as good as 24 or better, at 0.18 they cost 4 dB).
 constexpr double mostly_known = 0.5;
 
 /// Starts a field from another one's geometry: its space, density network and occupied cells. The
@@ -27,10 +27,10 @@ Status inherit_geometry(const FieldState& guide, FieldState& state) {
   for (const char* key : {"levels", "features_per_level", "log2_table", "base_resolution",
                           "max_resolution", "hidden", "occupancy_resolution", "sampling"})
     if (differs(key))
-      return fail(ErrorKind::usage, fmt::format("nerf.{}", key),
-                  fmt::format("{}, the guide field has {}", state.options.get(key),
-                              guide.options.get(key)),
-                  "train both fields with one architecture or set shared_geometry = false");
+      return fail(
+          ErrorKind::usage, fmt::format("nerf.{}", key),
+          fmt::format("{}, the guide field has {}", state.options.get(key), guide.options.get(key)),
+          "train both fields with one architecture or set shared_geometry = false");
   state.space = guide.space;
   state.main.grid.table.value = guide.main.grid.table.value;
   state.main.mlp.weights.value = guide.main.mlp.weights.value;
@@ -46,10 +46,13 @@ Status inherit_geometry(const FieldState& guide, FieldState& state) {
 }
 
 void report_exposure(const Exposure& exposure, const Dataset& dataset, TrainReport& report) {
-  const auto skip = [&](std::string why) { report.skips.push_back({"even exposure", std::move(why), "images are used as they are"}); };
+  const auto skip = [&](std::string why) {
+    report.skips.push_back({"even exposure", std::move(why), "images are used as they are"});
+  };
   if (exposure.points == 0) return skip("no point is known to be seen by two views");
   if (!exposure.varies())
-    return skip(fmt::format("views agree within {:.1f} % on {} points", 100 * exposure.spread, exposure.points));
+    return skip(fmt::format("views agree within {:.1f} % on {} points", 100 * exposure.spread,
+                            exposure.points));
   for (std::size_t i = 0; i < dataset.views.size(); ++i) {
     const Eigen::Array3d gain = exposure.log_gain[i].exp();
     report.image_gains[dataset.views[i].name] = {gain[0], gain[1], gain[2]};
@@ -57,7 +60,8 @@ void report_exposure(const Exposure& exposure, const Dataset& dataset, TrainRepo
 }
 
 /// Whether held-out views at `psnr` end the run.
-std::optional<StopReason> reason_to_stop(const TrainOptions& options, const Snapshot& best, double psnr) {
+std::optional<StopReason> reason_to_stop(const TrainOptions& options, const Snapshot& best,
+                                         double psnr) {
   if (options.target_psnr > 0 && psnr >= options.target_psnr) return StopReason::target_psnr;
   if (options.plateau_db > 0 && !best.empty() && psnr < best.psnr - options.plateau_db)
     return StopReason::plateau;
@@ -114,8 +118,8 @@ void TrainingRun::prepare_views_of_run() {
     if (exposure.varies()) even_out(exposure, views_);
   }
   if (!resumed_ && !options_.shared_geometry && options_.sampling == Sampling::occupancy) {
-    const double left = carve(data_.training.has_dense_depth(), views_, data_.heldout, options_,
-                              state_->occupancy);
+    const double left =
+        carve(data_.training.has_dense_depth(), views_, data_.heldout, options_, state_->occupancy);
     report_.skips.push_back(
         {"empty space",
          fmt::format("{:.1f} % of the cells seen by enough views and not in front of known depth",
@@ -165,7 +169,8 @@ Status TrainingRun::save() {
 }
 
 void TrainingRun::tell(double fraction, double wall_s) const {
-  progress_.report({stage_, fraction * options_.iterations, static_cast<double>(options_.iterations),
+  progress_.report({stage_, fraction * options_.iterations,
+                    static_cast<double>(options_.iterations),
                     wall_s / std::max(1e-9, fraction) * (1 - fraction), errors_of(*state_)});
 }
 
@@ -232,7 +237,8 @@ Status TrainingRun::loop() {
     const double now = fraction();
     ORBITFUSE_ASSIGN(const bool stepped, step(now));
     if (!stepped || measure_if_due(now)) break;
-    if (!options_.checkpoint.empty() && wall_seconds() - last_saved_ > options_.checkpoint_every_s) {
+    if (!options_.checkpoint.empty() &&
+        wall_seconds() - last_saved_ > options_.checkpoint_every_s) {
       pause();
       ORBITFUSE_TRY(save());
       watch_.go_on();

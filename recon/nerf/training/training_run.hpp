@@ -44,7 +44,10 @@ class TrainingRun {
  public:
   TrainingRun(const TrainingData& data, const TrainOptions& options, const Progress& progress,
               TrainReport& report)
-      : data_(data), options_(options), progress_(progress), report_(report),
+      : data_(data),
+        options_(options),
+        progress_(progress),
+        report_(report),
         stage_(fmt::format("train.{}", orbitfuse::name(data.dataset.modality))) {}
 
   /// The field from nothing, from the guide's geometry or from its checkpoint, and the views.
@@ -64,7 +67,7 @@ class TrainingRun {
   Status save();  ///< while paused
   double evaluate(double fraction);
   void tell(double fraction, double wall_s) const;
-  Result<bool> step(double fraction);  ///< false: the budget ended the run before it
+  Result<bool> step(double fraction);    ///< false: the budget ended the run before it
   bool measure_if_due(double fraction);  ///< true: what it measured ends the run
 
   const TrainingData& data_;

@@ -90,21 +90,22 @@ Result<std::vector<const FrameRecord*>> stations_of(const std::vector<const Fram
   for (const FrameRecord* frame : frames) {
     if (frame->tracking) continue;
     if (frame->station) stations.push_back(frame);
-    if (ordered.empty() || (frame->device == ordered.front()->device &&
-                            frame->width == ordered.front()->width &&
-                            frame->height == ordered.front()->height))
+    if (ordered.empty() ||
+        (frame->device == ordered.front()->device && frame->width == ordered.front()->width &&
+         frame->height == ordered.front()->height))
       ordered.push_back(frame);
   }
   if (stations.size() >= min_stations) return stations;
-  std::stable_sort(
-      ordered.begin(), ordered.end(),
-      [](const FrameRecord* a, const FrameRecord* b) { return a->sequence < b->sequence; });
+  std::stable_sort(ordered.begin(), ordered.end(), [](const FrameRecord* a, const FrameRecord* b) {
+    return a->sequence < b->sequence;
+  });
   if (ordered.size() >= min_unknown_stations) return ordered;
-  return fail(ErrorKind::quality, "poses.thermal",
-              fmt::format("{} thermal frames carry stations, {} are needed to place an orbit ({} "
-                          "where only their order is known)",
-                          stations.size(), min_stations, min_unknown_stations),
-              "import again and say how the views were taken, e.g. --station-spacing-deg 30 --loops 2");
+  return fail(
+      ErrorKind::quality, "poses.thermal",
+      fmt::format("{} thermal frames carry stations, {} are needed to place an orbit ({} "
+                  "where only their order is known)",
+                  stations.size(), min_stations, min_unknown_stations),
+      "import again and say how the views were taken, e.g. --station-spacing-deg 30 --loops 2");
 }
 
 /// The ways the views may have been taken: as declared, or any even walk in their order.
@@ -168,9 +169,8 @@ Result<std::vector<OrbitHypothesis>> search(const Evidence& evidence, bool rende
   for (const std::vector<Station>& layout : layouts_of(evidence.work.frames))
     for (OrbitHypothesis& hypothesis : search_orbit(table, layout, options))
       found.push_back(std::move(hypothesis));
-  std::stable_sort(found.begin(), found.end(), [](const auto& x, const auto& y) {
-    return x.score > y.score;
-  });
+  std::stable_sort(found.begin(), found.end(),
+                   [](const auto& x, const auto& y) { return x.score > y.score; });
   constexpr std::size_t most = 6;
   if (found.size() > most) found.resize(most);
   return found;
@@ -180,13 +180,15 @@ std::string words(const SelectedOrbit& selected) {
   std::string text;
   for (const HypothesisSupport& one : selected.supports)
     if (!one.repeats)
-      text += fmt::format("; start at {:.0f} deg{}, distance {:.2f}: support {:.1f}", one.offset_deg,
-                          one.mirrored ? " clockwise" : "", one.radius, one.support);
+      text +=
+          fmt::format("; start at {:.0f} deg{}, distance {:.2f}: support {:.1f}", one.offset_deg,
+                      one.mirrored ? " clockwise" : "", one.radius, one.support);
   return text;
 }
 
 /// The scene for alignment: most of its views are made of a few renders.
-Result<SceneRenderer> scene_of(const VisibleScene& visible, const Similarity3d& canonical_from_visible,
+Result<SceneRenderer> scene_of(const VisibleScene& visible,
+                               const Similarity3d& canonical_from_visible,
                                const Progress& progress) {
   std::vector<PosedView> views;
   const auto count = static_cast<int>(visible.reconstruction.views.size());
@@ -229,7 +231,8 @@ Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene&
   progress.report({"poses.thermal", 3, 4, -1, "alignment with renders"});
   ORBITFUSE_TRY(refine_orbit(renderer, orbit, rendered, focal_sigma, progress));
   if (!tracking.empty())
-    ORBITFUSE_TRY(pose_tracking(session, evidence.work, tracking, renderer, orbit, rendered, progress));
+    ORBITFUSE_TRY(
+        pose_tracking(session, evidence.work, tracking, renderer, orbit, rendered, progress));
   ORBITFUSE_ASSIGN(const std::vector<int> doubted,
                    judge_views({renderer, orbit, progress}, rendered));
   if (!doubted.empty()) placed.warnings.push_back(loops_in_doubt(doubted));
@@ -303,8 +306,9 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
   ORBITFUSE_ASSIGN(const std::vector<OrbitHypothesis> hypotheses,
                    search(evidence, renders, progress));
   const Result<PlacedViews> placed =
-      renders ? place_by_renders(session, visible, evidence, hypotheses, tracking, progress)
-              : place_by_lines(evidence.work, hypotheses, evidence.canonical_from_visible, progress);
+      renders
+          ? place_by_renders(session, visible, evidence, hypotheses, tracking, progress)
+          : place_by_lines(evidence.work, hypotheses, evidence.canonical_from_visible, progress);
   LadderStep step{"cross-modal, orbit prior", false, "", 0, static_cast<int>(wanted), 0};
   step.why = fmt::format("{} lines", evidence.work.lines.size());
   const auto finish = [&] {

@@ -84,8 +84,8 @@ bool find_edge(const cv::Mat& field, const LineModel::Sample& sample, double rea
   return true;
 }
 
-std::vector<EdgeMatch> matches_of(const LineModel& lines, const AlignmentView& view, double reach_px,
-                                  const AlignmentOptions& options, int* total) {
+std::vector<EdgeMatch> matches_of(const LineModel& lines, const AlignmentView& view,
+                                  double reach_px, const AlignmentOptions& options, int* total) {
   std::vector<EdgeMatch> matches;
   const auto samples = lines.samples(view.view.camera, view.view.cam_from_world, options.step_px);
   if (total != nullptr) *total = static_cast<int>(samples.size());
@@ -199,21 +199,19 @@ Result<AlignmentReport> align_edges(const LineModel& lines, std::vector<Alignmen
       if (matches[i].size() < 20) continue;
       any = true;
       for (const EdgeMatch& match : matches[i])
-        problem.AddResidualBlock(
-            new ceres::AutoDiffCostFunction<EdgeDistance, 1, 4, 3, 1>(
-                new EdgeDistance{match, lens[i]}),
-            new ceres::CauchyLoss(std::max(0.7, 0.3 * reach)), rotation[i].coeffs().data(),
-            center[i].data(), &focal);
+        problem.AddResidualBlock(new ceres::AutoDiffCostFunction<EdgeDistance, 1, 4, 3, 1>(
+                                     new EdgeDistance{match, lens[i]}),
+                                 new ceres::CauchyLoss(std::max(0.7, 0.3 * reach)),
+                                 rotation[i].coeffs().data(), center[i].data(), &focal);
       problem.SetManifold(rotation[i].coeffs().data(), new ceres::EigenQuaternionManifold);
     }
     if (!any)
       return fail(ErrorKind::quality, "poses.thermal",
                   "no thermal view has edges where the visible scene's lines fall",
                   "check that both modalities show the same object, and the focal length");
-    problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<FocalPrior, 1, 1>(
-            new FocalPrior{std::max(options.focal_relative_sigma, 1e-9), prior}),
-        nullptr, &focal);
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<FocalPrior, 1, 1>(new FocalPrior{
+                                 std::max(options.focal_relative_sigma, 1e-9), prior}),
+                             nullptr, &focal);
     if (options.focal_relative_sigma == 0) problem.SetParameterBlockConstant(&focal);
     ceres::Solver::Options solver;
     solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
@@ -244,8 +242,8 @@ Result<AlignmentReport> align_edges(const LineModel& lines, std::vector<Alignmen
     const auto matches = matches_of(lines, view, options.last_reach_px, options, &total);
     std::vector<double> distances;
     for (const EdgeMatch& m : matches)
-      distances.push_back(std::abs(m.normal.dot(
-          view.view.camera.project(view.view.cam_from_world * m.point) - m.target)));
+      distances.push_back(std::abs(
+          m.normal.dot(view.view.camera.project(view.view.cam_from_world * m.point) - m.target)));
     report.samples.push_back(total);
     report.matched_share.push_back(static_cast<double>(matches.size()) / std::max(total, 1));
     report.residual_px.push_back(median(std::move(distances)));

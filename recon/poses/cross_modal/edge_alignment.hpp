@@ -4,8 +4,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "core/progress.hpp"
 #include "core/geometry/reconstruction.hpp"
+#include "core/progress.hpp"
 #include "core/result.hpp"
 #include "recon/poses/cross_modal/line_model.hpp"
 #include "recon/poses/cross_modal/orbit_search.hpp"
@@ -45,18 +45,18 @@ struct AlignmentView {
 struct AlignmentOptions {
   double first_reach_px = 14, last_reach_px = 3;
   int rounds = 10;
-  double step_px = 6;               ///< between samples on a line
-  double min_agreement = 0.25;      ///< of an image edge that a line may be drawn to
-  double focal_px = 0;              ///< prior; 0 = the views' own
+  double step_px = 6;           ///< between samples on a line
+  double min_agreement = 0.25;  ///< of an image edge that a line may be drawn to
+  double focal_px = 0;          ///< prior; 0 = the views' own
   double focal_relative_sigma = 0.03;
 };
 
 struct AlignmentReport {
   double focal_px = 0;
-  double focal_relative_sigma = 0;       ///< from the covariance
-  std::vector<double> residual_px;       ///< per view: robust (median) distance of matched samples
-  std::vector<double> matched_share;     ///< per view: samples with an image edge within reach
-  std::vector<int> samples;              ///< per view
+  double focal_relative_sigma = 0;    ///< from the covariance
+  std::vector<double> residual_px;    ///< per view: robust (median) distance of matched samples
+  std::vector<double> matched_share;  ///< per view: samples with an image edge within reach
+  std::vector<int> samples;           ///< per view
 };
 
 /// Refines all poses and the shared focal.

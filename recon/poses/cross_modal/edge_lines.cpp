@@ -81,11 +81,10 @@ int matching_segment(const LineView& view, const Eigen::Vector3d& a, const Eigen
   return best;
 }
 
-std::vector<int> neighbours(const std::vector<LineView>& views, int index, const Eigen::Vector3d& focus,
-                            double max_angle_deg) {
+std::vector<int> neighbours(const std::vector<LineView>& views, int index,
+                            const Eigen::Vector3d& focus, double max_angle_deg) {
   std::vector<std::pair<double, int>> by_angle;
-  const Eigen::Vector3d own =
-      (views[static_cast<std::size_t>(index)].center - focus).normalized();
+  const Eigen::Vector3d own = (views[static_cast<std::size_t>(index)].center - focus).normalized();
   for (std::size_t j = 0; j < views.size(); ++j) {
     const double angle =
         std::acos(std::clamp(own.dot((views[j].center - focus).normalized()), -1.0, 1.0)) / radians;
@@ -124,8 +123,7 @@ std::optional<Hypothesis> best_line(const std::vector<LineView>& views, int v, i
       const double length = (match.b - match.a).norm();
       const double ta = along.dot(ac.head<2>() / ac.z() - match.a);
       const double tb = along.dot(bc.head<2>() / bc.z() - match.a);
-      const double overlap =
-          std::min(length, std::max(ta, tb)) - std::max(0.0, std::min(ta, tb));
+      const double overlap = std::min(length, std::max(ta, tb)) - std::max(0.0, std::min(ta, tb));
       if (overlap < 0.5 * std::min(length, std::abs(tb - ta))) continue;
 
       Hypothesis line{a, b, v, s, {{v, s}, {j, static_cast<int>(t)}}, segment.length_px};
@@ -223,8 +221,7 @@ std::vector<EdgeLine> triangulate_lines(const std::vector<PosedView>& posed,
 
   std::vector<std::vector<Hypothesis>> found(views.size());
   parallel_for(static_cast<int>(views.size()), [&](int v) {
-    const std::vector<int> near_views =
-        neighbours(views, v, focus, options.max_view_angle_deg);
+    const std::vector<int> near_views = neighbours(views, v, focus, options.max_view_angle_deg);
     const auto count = static_cast<int>(segments[static_cast<std::size_t>(v)].size());
     for (int s = 0; s < count; ++s)
       if (auto line = best_line(views, v, s, near_views, options))
@@ -260,9 +257,8 @@ Result<std::vector<EdgeLine>> visible_edge_lines(const Session& session,
   std::vector<std::vector<ImageSegment>> segments;
   for (const PosedView& view : visible.views) {
     ORBITFUSE_TRY(progress.check("poses.thermal"));
-    const auto frame =
-        std::find_if(session.frames.begin(), session.frames.end(),
-                     [&](const FrameRecord& f) { return f.file == view.name; });
+    const auto frame = std::find_if(session.frames.begin(), session.frames.end(),
+                                    [&](const FrameRecord& f) { return f.file == view.name; });
     if (frame == session.frames.end())
       return fail(ErrorKind::input, view.name, "a posed view that the session does not have",
                   "run the visible poses again");

@@ -5,8 +5,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "core/progress.hpp"
 #include "core/geometry/reconstruction.hpp"
+#include "core/progress.hpp"
 #include "core/result.hpp"
 #include "core/session/session.hpp"
 

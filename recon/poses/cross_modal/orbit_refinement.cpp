@@ -114,8 +114,8 @@ bool same_place(const OrbitViews& orbit, const Rigid3d& a, const Rigid3d& b) {
 }
 
 Result<Fit> OrbitRefinement::restart(const std::vector<std::size_t>& chosen,
-                              const std::vector<PosedView>& starts,
-                              std::vector<RenderRound> rounds) const {
+                                     const std::vector<PosedView>& starts,
+                                     std::vector<RenderRound> rounds) const {
   std::vector<cv::Mat> images;
   for (const std::size_t i : chosen) images.push_back(orbit.images[i]);
   RenderAlignmentOptions options;
@@ -125,12 +125,12 @@ Result<Fit> OrbitRefinement::restart(const std::vector<std::size_t>& chosen,
 }
 
 Status OrbitRefinement::together(Fit& alignment, double focal_relative_sigma,
-                          std::vector<RenderRound> rounds) const {
+                                 std::vector<RenderRound> rounds) const {
   RenderAlignmentOptions options;
   options.focal_relative_sigma = focal_relative_sigma;
   options.rounds = std::move(rounds);
-  ORBITFUSE_ASSIGN(Fit aligned,
-                   align_with_renders(renderer, orbit.images, alignment.poses(), options, progress));
+  ORBITFUSE_ASSIGN(Fit aligned, align_with_renders(renderer, orbit.images, alignment.poses(),
+                                                   options, progress));
   for (std::size_t i = 0; i < aligned.views.size(); ++i)
     aligned.views[i].verdict = std::move(alignment.views[i].verdict);
   alignment = std::move(aligned);
@@ -138,13 +138,13 @@ Status OrbitRefinement::together(Fit& alignment, double focal_relative_sigma,
 }
 
 Result<std::vector<PosedView>> OrbitRefinement::search(const std::vector<std::size_t>& chosen,
-                                                const Fit& alignment) const {
+                                                       const Fit& alignment) const {
   const LoopModel model = loop_model(orbit, alignment);
   std::vector<PosedView> found;
   for (const std::size_t i : chosen) {
     found.push_back(predicted(orbit, alignment, model, i));
-    ORBITFUSE_TRY(climb(renderer, orbit.canonical_from_world, orbit.images[i], found.back(), {},
-                        progress));
+    ORBITFUSE_TRY(
+        climb(renderer, orbit.canonical_from_world, orbit.images[i], found.back(), {}, progress));
   }
   return found;
 }

@@ -4,8 +4,8 @@
 #include <map>
 #include <vector>
 
-#include "recon/poses/cross_modal/orbit_views.hpp"
 #include "recon/alignment/render_alignment.hpp"
+#include "recon/poses/cross_modal/orbit_views.hpp"
 
 // What refining an orbit against renders works with; internal to recon/poses.
 namespace orbitfuse {

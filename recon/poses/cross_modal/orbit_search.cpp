@@ -40,8 +40,8 @@ cv::Mat spectrum(const cv::Mat& cells, cv::Size size) {
   return padded;
 }
 
-OrbitPeak peak_of(const cv::Mat& view_spectrum, const cv::Mat& model_spectrum, float norms, int max_dx,
-             int max_dy) {
+OrbitPeak peak_of(const cv::Mat& view_spectrum, const cv::Mat& model_spectrum, float norms,
+                  int max_dx, int max_dy) {
   cv::Mat product, correlation;
   cv::mulSpectrums(view_spectrum, model_spectrum, product, 0, true);
   cv::dft(product, correlation, cv::DFT_INVERSE | cv::DFT_SCALE);
@@ -59,16 +59,16 @@ OrbitPeak peak_of(const cv::Mat& view_spectrum, const cv::Mat& model_spectrum, f
 
 /// Best score of a view near a nominal azimuth, at one elevation and radius. Leaving the nominal
 /// place costs a little: without it all starts within the tolerance would score alike.
-double best_near(const OrbitTable& table, std::size_t view, double azimuth_deg, double tolerance_deg,
-                 int e, int r, double step_deg) {
+double best_near(const OrbitTable& table, std::size_t view, double azimuth_deg,
+                 double tolerance_deg, int e, int r, double step_deg) {
   constexpr double cost_at_tolerance = 0.04;
   const int center = static_cast<int>(std::lround(azimuth_deg / step_deg));
   const int reach = std::max(1, static_cast<int>(std::floor(tolerance_deg / step_deg)));
   double best = -1;
   for (int a = center - reach; a <= center + reach; ++a) {
     const double away = (a * step_deg - azimuth_deg) / tolerance_deg;
-    best = std::max(best, static_cast<double>(table.at(view, a, e, r).score) -
-                              cost_at_tolerance * away * away);
+    best = std::max(
+        best, static_cast<double>(table.at(view, a, e, r).score) - cost_at_tolerance * away * away);
   }
   return best;
 }
@@ -127,9 +127,9 @@ void evaluate(const OrbitTable& table, const std::vector<Station>& stations,
       for (int r = 0; r < radii; ++r) {
         const double sigmas =
             (r - common) * std::log(options.radius_ratio) / options.distance_log_sigma;
-        const double value = of_loop.sum[static_cast<std::size_t>(r)] -
-                             static_cast<double>(of_loop.members) * options.distance_cost *
-                                 sigmas * sigmas;
+        const double value =
+            of_loop.sum[static_cast<std::size_t>(r)] -
+            static_cast<double>(of_loop.members) * options.distance_cost * sigmas * sigmas;
         if (value <= best) continue;
         best = value;
         candidate.loop_place[loop] = {of_loop.elevation[static_cast<std::size_t>(r)], r};
@@ -165,16 +165,15 @@ std::vector<OrbitPose> start_poses(const OrbitTable& table, std::size_t view,
     OrbitPeak peak;
   };
   const auto [le, lr] = candidate.loop_place.at(station.loop);
-  const double nominal =
-      candidate.offset_deg + (candidate.mirrored ? -1 : 1) * station.azimuth_deg;
+  const double nominal = candidate.offset_deg + (candidate.mirrored ? -1 : 1) * station.azimuth_deg;
   const int center = static_cast<int>(std::lround(nominal / options.azimuth_step_deg));
   const int reach = std::max(
       1, static_cast<int>(std::floor(options.max_station_error_deg / options.azimuth_step_deg)));
   std::vector<Place> places;
   for (int a = center - reach; a <= center + reach; ++a)
     for (int e = std::max(0, le - 1); e <= std::min(table.elevations - 1, le + 1); ++e)
-      for (int r = std::max(0, lr - 1); r <= std::min(static_cast<int>(table.radii.size()) - 1, lr + 1);
-           ++r)
+      for (int r = std::max(0, lr - 1);
+           r <= std::min(static_cast<int>(table.radii.size()) - 1, lr + 1); ++r)
         places.push_back({a, e, r, table.at(view, a, e, r)});
   const auto value = [&](const Place& p) {
     return p.peak.score - 0.01F * static_cast<float>((p.a - center) * (p.a - center));
@@ -223,10 +222,10 @@ Rigid3d cam_from_world_of(const OrbitPose& pose, const Camera& camera) {
 
 const OrbitPeak& OrbitTable::at(std::size_t view, int azimuth, int elevation, int radius) const {
   const auto a = static_cast<std::size_t>((azimuth % azimuths + azimuths) % azimuths);
-  return of_view[view][(a * static_cast<std::size_t>(elevations) +
-                        static_cast<std::size_t>(elevation)) *
-                           radii.size() +
-                       static_cast<std::size_t>(radius)];
+  return of_view[view]
+                [(a * static_cast<std::size_t>(elevations) + static_cast<std::size_t>(elevation)) *
+                     radii.size() +
+                 static_cast<std::size_t>(radius)];
 }
 
 Result<OrbitTable> tabulate_orbit(const LineModel& lines, const std::vector<SearchView>& views,
@@ -273,8 +272,8 @@ Result<OrbitTable> tabulate_orbit(const LineModel& lines, const std::vector<Sear
         const cv::Mat model = spectrum(cells, padded);
         for (std::size_t i = 0; i < views.size(); ++i)
           if (norms[i] > 0)
-            table.of_view[i][place] = peak_of(spectra[i], model,
-                                              static_cast<float>(norm * norms[i]), max_dx, max_dy);
+            table.of_view[i][place] =
+                peak_of(spectra[i], model, static_cast<float>(norm * norms[i]), max_dx, max_dy);
       }
   });
   ORBITFUSE_TRY(progress.check("poses.thermal"));
@@ -325,7 +324,8 @@ std::vector<std::vector<Station>> station_layouts(std::size_t views) {
   // Fewer than six a loop leave steps of more than 60 deg: no order to hold a view to.
   constexpr std::size_t least_a_loop = 6;
   std::vector<std::vector<Station>> layouts;
-  for (std::size_t loops = 1; loops <= 3 && (loops == 1 || views >= least_a_loop * loops); ++loops) {
+  for (std::size_t loops = 1; loops <= 3 && (loops == 1 || views >= least_a_loop * loops);
+       ++loops) {
     std::vector<Station> stations(views);
     for (std::size_t i = 0; i < views; ++i) {
       const std::size_t loop = i * loops / views;

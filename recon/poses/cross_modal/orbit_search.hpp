@@ -5,9 +5,9 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "core/geometry/transform.hpp"
 #include "core/progress.hpp"
 #include "core/session/session.hpp"
-#include "core/geometry/transform.hpp"
 #include "recon/poses/cross_modal/line_model.hpp"
 
 // Where on its orbit was a loop of views taken? Rendered lines are correlated with the views over
@@ -33,11 +33,11 @@ struct OrbitSearchOptions {
   double azimuth_step_deg = 7.5;
   std::vector<double> elevations_deg = {4, 12, 20, 28, 37, 48, 62};
   double nearest = 0.5, farthest = 3, radius_ratio = 1.12;  ///< world units
-  int columns = 80;              ///< cells of the correlated fields
-  double max_shift = 0.25;       ///< of the image's width
+  int columns = 80;                                         ///< cells of the correlated fields
+  double max_shift = 0.25;                                  ///< of the image's width
   double max_station_error_deg = 16;
-  int hypotheses = 2;            ///< returned at most
-  int starts = 5;                ///< of a view, at most
+  int hypotheses = 2;  ///< returned at most
+  int starts = 5;      ///< of a view, at most
   /// Loops of one operator are walked at one distance, give or take: mean correlation that a view
   /// costs whose loop leaves the common distance by `distance_log_sigma`. Alone, a low loop whose
   /// strongest edge (the horizon) has no line in the visible scene settled at half its distance.
@@ -52,10 +52,10 @@ struct OrbitHypothesis {
   std::vector<std::vector<OrbitPose>> starts;
   /// Where each view's loop has it, at its nominal azimuth.
   std::vector<OrbitPose> nominal;
-  double offset_deg = 0;         ///< world azimuth of station azimuth 0
-  double radius = 0;             ///< common to the loops
-  bool mirrored = false;         ///< stations run clockwise
-  double score = 0;              ///< mean correlation less what the distances cost, [-1, 1]
+  double offset_deg = 0;  ///< world azimuth of station azimuth 0
+  double radius = 0;      ///< common to the loops
+  bool mirrored = false;  ///< stations run clockwise
+  double score = 0;       ///< mean correlation less what the distances cost, [-1, 1]
 };
 
 /// Peak correlation of a view and a candidate, and the image shift it is reached at.
@@ -80,8 +80,8 @@ Result<OrbitTable> tabulate_orbit(const LineModel& lines, const std::vector<Sear
 
 /// The best hypotheses, best first, whose starts differ by 40 deg, in direction or by a third in
 /// distance; at most two of one start and direction. A near-symmetric object gives two of nearly
-/// equal score, and so does a near orbit that lays another edge on the horizon: which is right shows
-/// only against renders.
+/// equal score, and so does a near orbit that lays another edge on the horizon: which is right
+/// shows only against renders.
 std::vector<OrbitHypothesis> search_orbit(const OrbitTable& table,
                                           const std::vector<Station>& stations,
                                           const OrbitSearchOptions& options);

@@ -11,9 +11,7 @@ namespace orbitfuse {
 namespace {
 
 /// A start and its first correction; what is in place after it is the support.
-std::vector<RenderRound> opening_rounds() {
-  return {{160, 30, 14, 22, 12}, {160, 12, 10, 16, 12}};
-}
+std::vector<RenderRound> opening_rounds() { return {{160, 30, 14, 22, 12}, {160, 12, 10, 16, 12}}; }
 /// Places of one view are compared after one more.
 constexpr RenderRound comparing_round{160, 6, 7, 10, 8};
 
@@ -42,8 +40,7 @@ class Selection {
                                   std::vector<RenderRound> rounds) const {
     std::vector<std::size_t> chosen;
     std::vector<PosedView> views;
-    const Similarity3d world_from_canonical =
-        refinement_.orbit.canonical_from_world.inverse();
+    const Similarity3d world_from_canonical = refinement_.orbit.canonical_from_world.inverse();
     for (const Start& start : starts) {
       chosen.push_back(start.view);
       views.push_back(blank_[start.view]);
@@ -135,7 +132,8 @@ bool same_orbit(const OrbitViews& orbit, const RenderAlignment& a, const RenderA
   constexpr double same_deg = 2;
   std::vector<double> apart;
   for (std::size_t i = 0; i < a.views.size(); ++i)
-    apart.push_back(apart_deg(orbit, a.views[i].view.cam_from_world, b.views[i].view.cam_from_world));
+    apart.push_back(
+        apart_deg(orbit, a.views[i].view.cam_from_world, b.views[i].view.cam_from_world));
   return median(apart) < same_deg;
 }
 
@@ -155,9 +153,9 @@ Result<SelectedOrbit> select_by_renders(const SceneRenderer& renderer, OrbitView
     ORBITFUSE_ASSIGN(RenderAlignment opened,
                      selection.aligned(best_of_search(hypothesis, every), opening_rounds()));
     const double support = mean_support(opened);
-    const bool repeats =
-        std::any_of(openings.begin(), openings.end(),
-                    [&](const RenderAlignment& before) { return same_orbit(orbit, before, opened); });
+    const bool repeats = std::any_of(
+        openings.begin(), openings.end(),
+        [&](const RenderAlignment& before) { return same_orbit(orbit, before, opened); });
     openings.push_back(std::move(opened));
     selected.supports.push_back(
         {hypothesis.offset_deg, hypothesis.radius, hypothesis.mirrored, support, repeats});
@@ -169,8 +167,7 @@ Result<SelectedOrbit> select_by_renders(const SceneRenderer& renderer, OrbitView
   }
   double best = -1;
   for (std::size_t h = 0; h < hypotheses.size(); ++h) {
-    if (selected.supports[h].repeats ||
-        selected.supports[h].support < rival_share * best_opening)
+    if (selected.supports[h].repeats || selected.supports[h].support < rival_share * best_opening)
       continue;
     ORBITFUSE_ASSIGN(RenderAlignment one, best_starts(selection, hypotheses[h]));
     selected.supports[h].support = mean_support(one);

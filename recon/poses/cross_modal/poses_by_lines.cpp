@@ -99,8 +99,9 @@ Result<PlacedViews> place_by_lines(const OrbitWork& work,
   PlacedViews placed;
   placed.method = "cross-modal, orbit prior";
   for (const AlignedOrbit& one : aligned)
-    placed.why += fmt::format("; start at {:.0f} deg{}: agreement {:.3f}", one.hypothesis.offset_deg,
-                              one.hypothesis.mirrored ? " clockwise" : "", one.mean_support());
+    placed.why +=
+        fmt::format("; start at {:.0f} deg{}: agreement {:.3f}", one.hypothesis.offset_deg,
+                    one.hypothesis.mirrored ? " clockwise" : "", one.mean_support());
   placed.why += fmt::format("; {:.1f} standard errors apart", decisiveness);
   if (decisiveness < min_decisiveness)
     return fail(ErrorKind::quality, "poses.thermal", placed.why.substr(2) + ": undecided",

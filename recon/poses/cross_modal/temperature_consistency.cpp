@@ -54,7 +54,8 @@ Usual usual_support(const OrbitViews& orbit, const std::vector<std::size_t>& ask
 
 /// Views whose place isn't confirmed by the temperatures of the settled ones. Each is given the
 /// place that both agree on from there, if there is one. `usual` is filled where empty.
-Result<std::vector<std::size_t>> unconfirmed(const OrbitRefinement& visible, const OrbitRefinement& painted,
+Result<std::vector<std::size_t>> unconfirmed(const OrbitRefinement& visible,
+                                             const OrbitRefinement& painted,
                                              const std::vector<std::size_t>& asked, Usual& usual,
                                              Fit& alignment) {
   const OrbitViews& orbit = visible.orbit;
@@ -123,8 +124,8 @@ Result<Contradicted> contradicted(const OrbitRefinement& refinement, const Fit& 
 }
 
 /// Where temperatures place each view best: from where it is, or searched as a whole.
-Result<Fit> best_by_temperatures(const OrbitRefinement& painted, const std::vector<std::size_t>& lost,
-                         const Fit& alignment) {
+Result<Fit> best_by_temperatures(const OrbitRefinement& painted,
+                                 const std::vector<std::size_t>& lost, const Fit& alignment) {
   std::vector<PosedView> places;
   for (const std::size_t i : lost) places.push_back(alignment.views[i].view);
   ORBITFUSE_ASSIGN(const std::vector<PosedView> starts, painted.search(lost, alignment));
@@ -145,7 +146,8 @@ Result<SceneRenderer> painted_by_others(const OrbitRefinement& refinement, const
 
 MoveDecision verdict(const PlaceEvidence& seen) {
   const bool found = seen.temperatures_there > settled_share;
-  // Two scenes that show nothing of the view agree as easily as two that do: one must know it there.
+  // Two scenes that show nothing of the view agree as easily as two that do: one must know it
+  // there.
   const bool better_by_form =
       seen.form_there > vouched_share && seen.form_there >= seen.form_before;
   if (seen.agree && (found || better_by_form)) return MoveDecision::both;
@@ -166,7 +168,8 @@ double share_of_usual(double support, double usual) {
   return usual > least_support ? support / usual : 0;
 }
 
-Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refinement, Fit& alignment) {
+Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refinement,
+                                                 Fit& alignment) {
   const OrbitViews& orbit = refinement.orbit;
   ORBITFUSE_ASSIGN(const Contradicted found, contradicted(refinement, alignment));
   const std::vector<std::size_t>& lost = found.views;
@@ -190,7 +193,8 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
                    painted_by(refinement, alignment, rest, own_turn_deg));
   ORBITFUSE_ASSIGN(const Fit by_temperatures,
                    best_by_temperatures({renderer, orbit, refinement.progress}, lost, alignment));
-  ORBITFUSE_ASSIGN(const Fit by_form, refinement.restart(lost, by_temperatures.poses(), fine_rounds()));
+  ORBITFUSE_ASSIGN(const Fit by_form,
+                   refinement.restart(lost, by_temperatures.poses(), fine_rounds()));
   std::vector<std::size_t> all(alignment.views.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
   const Usual usual_form = usual_support(orbit, all, alignment);
@@ -219,10 +223,11 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
             !same_place(orbit, view.view.cam_from_world, form.view.cam_from_world))
           view.verdict = {
               Confidence::doubtful, DoubtReason::temperatures_elsewhere,
-              fmt::format("the other views' temperatures place it {:.1f} deg away, where the visible "
-                          "scene supports it less: {:.2f} of the usual support, {:.2f} before",
-                          apart_deg(orbit, view.view.cam_from_world, form.view.cam_from_world),
-                          seen.form_there, seen.form_before)};
+              fmt::format(
+                  "the other views' temperatures place it {:.1f} deg away, where the visible "
+                  "scene supports it less: {:.2f} of the usual support, {:.2f} before",
+                  apart_deg(orbit, view.view.cam_from_world, form.view.cam_from_world),
+                  seen.form_there, seen.form_before)};
         view.view = form.view;
         ++check.moved;
         break;
@@ -234,10 +239,11 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
       case MoveDecision::form_alone:
         view.verdict = {
             Confidence::doubtful, DoubtReason::temperatures_contradict,
-            fmt::format("the other views' temperatures contradict its place and find it nowhere (at "
-                        "best {:.2f} of the usual support); the visible scene alone keeps it, at "
-                        "{:.2f} of its usual support",
-                        seen.temperatures_there, seen.form_before)};
+            fmt::format(
+                "the other views' temperatures contradict its place and find it nowhere (at "
+                "best {:.2f} of the usual support); the visible scene alone keeps it, at "
+                "{:.2f} of its usual support",
+                seen.temperatures_there, seen.form_before)};
         break;
       case MoveDecision::nobody:
         view.verdict = {
@@ -250,7 +256,8 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
   return check;
 }
 
-Status confirm_by_temperatures(const OrbitRefinement& refinement, std::size_t first_new, Fit& alignment) {
+Status confirm_by_temperatures(const OrbitRefinement& refinement, std::size_t first_new,
+                               Fit& alignment) {
   const OrbitViews& orbit = refinement.orbit;
   std::vector<std::size_t> settled, added;
   for (std::size_t i = 0; i < first_new; ++i)

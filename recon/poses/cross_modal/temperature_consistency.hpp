@@ -15,11 +15,11 @@ namespace orbitfuse {
 /// A view that the others' temperatures contradict, from where they place it best. Supports are
 /// shares of its loop's usual one in the same scene.
 struct PlaceEvidence {
-  bool agree = false;      ///< form, started there, stays within a degree
-  double temperatures_there = 0;   ///< among temperatures
-  double form_there = 0;   ///< in the visible scene
-  double form_before = 0;  ///< in the visible scene, where it was
-  bool stays = false;      ///< temperatures place it within a degree of where it was
+  bool agree = false;             ///< form, started there, stays within a degree
+  double temperatures_there = 0;  ///< among temperatures
+  double form_there = 0;          ///< in the visible scene
+  double form_before = 0;         ///< in the visible scene, where it was
+  bool stays = false;             ///< temperatures place it within a degree of where it was
 };
 
 /// Whose word places the view. It only moves to a place that temperatures find or
@@ -51,6 +51,7 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
 
 /// Every added view, from `first_new` on, confirmed by what the settled ones before it measured;
 /// those that are not are searched as wholes in it, and dropped if that fails.
-Status confirm_by_temperatures(const OrbitRefinement& refinement, std::size_t first_new, Fit& alignment);
+Status confirm_by_temperatures(const OrbitRefinement& refinement, std::size_t first_new,
+                               Fit& alignment);
 
 }  // namespace orbitfuse

@@ -6,8 +6,8 @@
 #include <numeric>
 
 #include "core/numeric/median.hpp"
-#include "recon/poses/cross_modal/temperature_consistency.hpp"
 #include "recon/alignment/whole_view.hpp"
+#include "recon/poses/cross_modal/temperature_consistency.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -47,13 +47,15 @@ Result<std::vector<std::size_t>> unsettled(const OrbitRefinement& refinement, Fi
   std::vector<std::size_t> all(alignment.views.size()), lost;
   std::iota(all.begin(), all.end(), std::size_t{0});
   std::vector<PosedView> starts, places;
-  for (const std::size_t i : all) starts.push_back(predicted(refinement.orbit, alignment, model, i));
+  for (const std::size_t i : all)
+    starts.push_back(predicted(refinement.orbit, alignment, model, i));
   ORBITFUSE_ASSIGN(const Fit tried,
                    refinement.restart(all, starts, {{160, 12, 10, 16}, {256, 8, 8, 12}}));
   const double typical = median_support(alignment, all.size());
   for (const std::size_t i : all) {
     const RenderAlignedView& view = alignment.views[i];
-    if (same_place(refinement.orbit, view.view.cam_from_world, tried.views[i].view.cam_from_world) &&
+    if (same_place(refinement.orbit, view.view.cam_from_world,
+                   tried.views[i].view.cam_from_world) &&
         view.support() > lost_share * typical)
       continue;
     lost.push_back(i);

@@ -57,7 +57,8 @@ double painted_correlation(const cv::Mat& painting, const cv::Mat& image) {
 
 /// Pixels from which the orbit's centre is seen to the principal point, by the image's width.
 double aim_off(const OrbitViews& orbit, const PosedView& view) {
-  const Eigen::Vector3d center = rebase(view.cam_from_world, orbit.canonical_from_world).translation;
+  const Eigen::Vector3d center =
+      rebase(view.cam_from_world, orbit.canonical_from_world).translation;
   if (!(center.z() > 0)) return 1;
   return view.camera.fx * center.head<2>().norm() / center.z() / view.camera.width;
 }
@@ -114,13 +115,13 @@ ViewVerdict judged(const ViewEvidence& seen, const ViewVerdict& before) {
     return ViewVerdict{Confidence::doubtful, reason, std::move(detail)};
   };
   if (!(seen.support_share >= min_support_share))
-    return doubtful(DoubtReason::weak_support,
-                    fmt::format("its edges have {:.2f} of the usual support of all loops",
-                                seen.support_share));
+    return doubtful(
+        DoubtReason::weak_support,
+        fmt::format("its edges have {:.2f} of the usual support of all loops", seen.support_share));
   if (!(seen.aim_off <= max_aim_off))
-    return doubtful(DoubtReason::off_its_loop,
-                    fmt::format("it looks {:.0f} % of its width past the orbit's centre",
-                                100 * seen.aim_off));
+    return doubtful(
+        DoubtReason::off_its_loop,
+        fmt::format("it looks {:.0f} % of its width past the orbit's centre", 100 * seen.aim_off));
   if (!(seen.azimuth_off_deg <= max_azimuth_off_deg &&
         seen.elevation_off_deg <= max_elevation_off_deg))
     return doubtful(DoubtReason::off_its_loop,

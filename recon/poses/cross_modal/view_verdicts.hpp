@@ -23,7 +23,8 @@ struct ViewEvidence {
 };
 
 /// One entry a view. Errors: the renderer's, cancelled.
-Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement, const Fit& alignment);
+Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
+                                              const Fit& alignment);
 
 /// `before` is what restarts and temperatures said. A view that passed there may still fail here.
 ViewVerdict judged(const ViewEvidence& evidence, const ViewVerdict& before);

@@ -22,7 +22,8 @@ bool at_one_place(const Reconstruction& model) {
   const Rigid3d& first = model.views.front().cam_from_world;
   return std::all_of(model.views.begin(), model.views.end(), [&](const PosedView& view) {
     const Rigid3d& cam = view.cam_from_world;
-    const double rounding = 1e-12 * std::max(cam.translation.norm(), first.translation.norm()) + 1e-12;
+    const double rounding =
+        1e-12 * std::max(cam.translation.norm(), first.translation.norm()) + 1e-12;
     return (camera_center(cam) - camera_center(first)).norm() <= rounding;
   });
 }
@@ -58,9 +59,10 @@ Result<ModalityPoses> known_poses(const Session& session, Modality modality) {
   if (posed >= 2 && at_one_place(poses.reconstruction))
     return fail(ErrorKind::input, fmt::format("known {} poses", name(modality)),
                 fmt::format("all {} cameras stand at one place", posed),
-                "form needs views from several: correct the imported poses, or set poses.use_known_poses = false (--set)");
-  poses.ladder.push_back({"known poses", true, "the session carries them", posed,
-                          poses.frame_count, 0.0});
+                "form needs views from several: correct the imported poses, or set "
+                "poses.use_known_poses = false (--set)");
+  poses.ladder.push_back(
+      {"known poses", true, "the session carries them", posed, poses.frame_count, 0.0});
   poses.gates["posed_ratio"] = poses.posed_ratio();
   poses.skips.push_back({fmt::format("{} pose estimation", name(modality)),
                          fmt::format("the session carries {} poses", posed),

@@ -19,8 +19,7 @@ Result<ThermalPoses> estimate_thermal_poses(const Session& session, const Visibl
   if (options.use_known_poses && has_known_poses(session, Modality::thermal)) {
     ORBITFUSE_ASSIGN(ModalityPoses poses, known_poses(session, Modality::thermal));
     // Known poses of a session share one world; estimated visible ones do not live in it.
-    const bool shares =
-        visible != nullptr && has_known_poses(session, Modality::visible);
+    const bool shares = visible != nullptr && has_known_poses(session, Modality::visible);
     return ThermalPoses{std::move(poses), shares};
   }
   const auto frames = session.frames_of(Modality::thermal, options.use_tracking_frames);
@@ -46,9 +45,11 @@ Result<ThermalPoses> estimate_thermal_poses(const Session& session, const Visibl
       steps.push_back({"cross-modal, orbit prior", false, localised.error().found, 0,
                        static_cast<int>(frames.size()), 0});
   }
-  auto alone = structure_from_motion(session, frames, options, workdir / "thermal", progress, steps);
+  auto alone =
+      structure_from_motion(session, frames, options, workdir / "thermal", progress, steps);
   if (!alone && visible != nullptr && alone.error().kind == ErrorKind::unavailable)
-    alone.error().found = steps.front().rung + ": " + steps.front().why + "; " + alone.error().found;
+    alone.error().found =
+        steps.front().rung + ": " + steps.front().why + "; " + alone.error().found;
   if (!alone) return tl::unexpected(std::move(alone.error()));
   ModalityPoses poses = *std::move(alone);
   poses.ladder = std::move(steps);

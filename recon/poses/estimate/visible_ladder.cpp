@@ -92,8 +92,13 @@ class VisibleLadder {
   VisibleLadder(const Session& session, const std::vector<const FrameRecord*>& frames,
                 const PoseOptions& options, const fs::path& workdir, const Progress& progress,
                 std::vector<LadderStep>& steps)
-      : session_(session), frames_(frames), options_(options), workdir_(workdir),
-        progress_(progress), steps_(steps), total_(static_cast<int>(frames.size())) {}
+      : session_(session),
+        frames_(frames),
+        options_(options),
+        workdir_(workdir),
+        progress_(progress),
+        steps_(steps),
+        total_(static_cast<int>(frames.size())) {}
 
   Result<ModalityPoses> climb() {
     const std::vector<ViewPair> orbit = orbit_pairs(frames_);
@@ -124,8 +129,8 @@ class VisibleLadder {
     return none_held(steps_, Modality::visible);
   }
 
-  /// Frames in which nothing can be matched can't be posed: no step is taken for them. Where neither
-  /// size nor number of features was limited, full settings would find the same ones again.
+  /// Frames in which nothing can be matched can't be posed: no step is taken for them. Where
+  /// neither size nor number of features was limited, full settings would find the same ones again.
   Status look_at_features(const FeatureLevel& level) {
     ORBITFUSE_ASSIGN(const FeatureGraph graph, level.graph());
     limited_ = graph.pixel_scale > 1;
@@ -139,7 +144,8 @@ class VisibleLadder {
   }
 
   bool complete() const {
-    return best_ && best_->poses.reconstruction.views.size() + featureless_.size() >= frames_.size();
+    return best_ &&
+           best_->poses.reconstruction.views.size() + featureless_.size() >= frames_.size();
   }
   std::set<std::string> posed() const {
     std::set<std::string> names;
@@ -222,21 +228,21 @@ class VisibleLadder {
     for (auto& [pair, matches] : confirmed_matches(graph, posed, 3 * graph.pixel_scale))
       if (matches.size() > graph.verified[pair].size()) graph.verified[pair] = matches;
     ORBITFUSE_ASSIGN(const std::vector<int> added, resect(graph, posed, {}, progress_));
-    const std::string found = fmt::format("{} of {} views found a place", added.size(),
-                                          missing().size());
+    const std::string found =
+        fmt::format("{} of {} views found a place", added.size(), missing().size());
     Reconstruction model;
     if (!added.empty()) {
       TrackOptions track;
       track.max_error_px *= graph.pixel_scale;
-      model = reconstruction_of(graph, posed, triangulate_tracks(graph, graph.verified, posed, track),
-                                Modality::visible);
+      model = reconstruction_of(
+          graph, posed, triangulate_tracks(graph, graph.verified, posed, track), Modality::visible);
     }
     consider(rung, found, std::move(model), level.options());
     return {};
   }
 
-  /// Pairs of the views left out, and of those next to them in the recording; all of them while there
-  /// is no model.
+  /// Pairs of the views left out, and of those next to them in the recording; all of them while
+  /// there is no model.
   std::vector<ViewPair> remaining_pairs() const {
     if (!best_) return exhaustive_pairs(total_);
     std::set<int> wanted;
@@ -291,8 +297,7 @@ class VisibleLadder {
     steps_[best_step_].held = true;
     ModalityPoses& poses = best_->poses;
     for (DroppedView& view : poses.dropped)
-      if (featureless_.contains(view.name))
-        view.why = fmt::format("it {}", featureless_why);
+      if (featureless_.contains(view.name)) view.why = fmt::format("it {}", featureless_why);
     const auto all = static_cast<int>(exhaustive_pairs(total_).size());
     if (pairs < all)
       poses.skips.push_back({"exhaustive matching", fmt::format("{} of {} pairs held", pairs, all),
@@ -320,8 +325,7 @@ class VisibleLadder {
 Result<ModalityPoses> pose_visible_views(const Session& session,
                                          const std::vector<const FrameRecord*>& frames,
                                          const PoseOptions& options, const fs::path& workdir,
-                                         const Progress& progress,
-                                         std::vector<LadderStep>& steps) {
+                                         const Progress& progress, std::vector<LadderStep>& steps) {
   return VisibleLadder(session, frames, options, workdir, progress, steps).climb();
 }
 

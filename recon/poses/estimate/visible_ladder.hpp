@@ -17,7 +17,6 @@ Result<ModalityPoses> pose_visible_views(const Session& session,
                                          const std::vector<const FrameRecord*>& frames,
                                          const PoseOptions& options,
                                          const std::filesystem::path& workdir,
-                                         const Progress& progress,
-                                         std::vector<LadderStep>& steps);
+                                         const Progress& progress, std::vector<LadderStep>& steps);
 
 }  // namespace orbitfuse

@@ -34,9 +34,9 @@ struct OrbitResidual {
 
 }  // namespace
 
-std::vector<Eigen::Vector3d> estimate_centers(
-    const std::vector<Eigen::Quaterniond>& cam_from_world, const std::vector<RelativePose>& pairs,
-    const CenterOptions& options) {
+std::vector<Eigen::Vector3d> estimate_centers(const std::vector<Eigen::Quaterniond>& cam_from_world,
+                                              const std::vector<RelativePose>& pairs,
+                                              const CenterOptions& options) {
   std::vector<Eigen::Vector3d> centers;
   for (const Eigen::Quaterniond& rotation : cam_from_world)
     centers.push_back(rotation.conjugate() * -Eigen::Vector3d::UnitZ());

@@ -17,8 +17,8 @@ struct CenterOptions {
 /// Camera centres whose differences have the directions that the pairs saw, with known rotations,
 /// robustly; from an orbit of radius 1 that every camera looks inwards from, which also fixes the
 /// scale.
-std::vector<Eigen::Vector3d> estimate_centers(
-    const std::vector<Eigen::Quaterniond>& cam_from_world, const std::vector<RelativePose>& pairs,
-    const CenterOptions& options);
+std::vector<Eigen::Vector3d> estimate_centers(const std::vector<Eigen::Quaterniond>& cam_from_world,
+                                              const std::vector<RelativePose>& pairs,
+                                              const CenterOptions& options);
 
 }  // namespace orbitfuse

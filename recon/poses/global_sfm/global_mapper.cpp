@@ -18,9 +18,8 @@ PairCandidates candidates_of(const FeatureGraph& graph, const RelativePoseOption
   std::vector<ViewPair> pairs;
   for (const auto& [pair, matches] : graph.proposed) pairs.push_back(pair);
   PairCandidates candidates(pairs.size());
-  parallel_for(static_cast<int>(pairs.size()), [&](int p) {
-    candidates[at(p)] = relative_poses(graph, pairs[at(p)], options);
-  });
+  parallel_for(static_cast<int>(pairs.size()),
+               [&](int p) { candidates[at(p)] = relative_poses(graph, pairs[at(p)], options); });
   std::erase_if(candidates, [](const auto& of_pair) { return of_pair.empty(); });
   return candidates;
 }
@@ -71,8 +70,8 @@ std::vector<RelativePose> chosen_pairs(const FeatureGraph& graph,
   std::vector<RelativePose> pairs;
   if (all_have_stations(graph)) {
     centers = estimate_centers(rotations.cam_from_world, {}, {});
-    pairs = by_direction(rotations.kept, rotations.cam_from_world, centers,
-                         options.max_direction_deg);
+    pairs =
+        by_direction(rotations.kept, rotations.cam_from_world, centers, options.max_direction_deg);
   } else {
     for (const auto& of_pair : rotations.kept) pairs.push_back(of_pair.front());
   }
@@ -94,8 +93,7 @@ std::vector<bool> largest_part(int count, const std::vector<ViewPair>& edges) {
   }
   std::vector<int> size(at(count), 0);
   for (const int p : part) ++size[at(p)];
-  const int largest =
-      static_cast<int>(std::max_element(size.begin(), size.end()) - size.begin());
+  const int largest = static_cast<int>(std::max_element(size.begin(), size.end()) - size.begin());
   std::vector<bool> inside;
   for (const int p : part) inside.push_back(p == largest);
   return inside;
@@ -129,9 +127,8 @@ void guide(const FeatureGraph& graph, const PosedFrames& posed, double band_px,
     if (cosine > std::cos(max_angle_deg * EIGEN_PI / 180)) pairs.push_back(pair);
   }
   std::vector<std::vector<FeatureMatch>> found(pairs.size());
-  parallel_for(static_cast<int>(pairs.size()), [&](int p) {
-    found[at(p)] = guided_matches(graph, pairs[at(p)], posed, band_px);
-  });
+  parallel_for(static_cast<int>(pairs.size()),
+               [&](int p) { found[at(p)] = guided_matches(graph, pairs[at(p)], posed, band_px); });
   for (std::size_t p = 0; p < pairs.size(); ++p)
     if (found[p].size() > matches[pairs[p]].size()) matches[pairs[p]] = std::move(found[p]);
 }
@@ -168,8 +165,7 @@ Result<GlobalModel> map_globally(FeatureGraph& graph, const Adjuster& adjust,
   // From where averaged pairs leave the rays to where features lie, in pixels of the proxies.
   for (const double max_error_px : {40.0, 12.0, guided_at_px}) {
     ORBITFUSE_TRY(progress.check("poses.global"));
-    if (max_error_px <= guided_at_px)
-      guide(graph, result.posed, 3 * graph.pixel_scale, matches);
+    if (max_error_px <= guided_at_px) guide(graph, result.posed, 3 * graph.pixel_scale, matches);
     TrackOptions track;
     track.max_error_px = max_error_px * graph.pixel_scale;
     std::vector<FeatureTrack> tracks = triangulate_tracks(graph, matches, result.posed, track);
@@ -191,7 +187,8 @@ Result<GlobalModel> map_globally(FeatureGraph& graph, const Adjuster& adjust,
     result.model = *std::move(adjusted);
     result.posed = posed_frames(graph, result.model);
     if (max_error_px > guided_at_px)
-      matches = confirmed_matches(graph, result.posed, std::min(8.0, max_error_px) * graph.pixel_scale);
+      matches =
+          confirmed_matches(graph, result.posed, std::min(8.0, max_error_px) * graph.pixel_scale);
   }
   graph.verified = std::move(matches);
   return result;

@@ -16,8 +16,8 @@ using Adjuster = std::function<Result<Reconstruction>(Reconstruction)>;
 struct GlobalMapperOptions {
   RelativePoseOptions pairs;
   RotationOptions rotations;
-  /// Where stations say that the cameras look inwards from an orbit, a pair whose direction leaves it
-  /// by more is thrown out: one pillar taken for the next leaves the rotation as it is.
+  /// Where stations say that the cameras look inwards from an orbit, a pair whose direction leaves
+  /// it by more is thrown out: one pillar taken for the next leaves the rotation as it is.
   double max_direction_deg = 35;
   /// Below this many points in common two frames don't hold each other.
   int min_shared_points = 15;
@@ -29,8 +29,8 @@ struct GlobalModel {
   std::string found;     ///< figures, in words
 };
 
-/// All views at once, where the incremental mapper finds no pair to begin with or follows a wrong one:
-/// relative poses of the pairs (several where structure repeats), rotations averaged with the
+/// All views at once, where the incremental mapper finds no pair to begin with or follows a wrong
+/// one: relative poses of the pairs (several where structure repeats), rotations averaged with the
 /// stations as prior, pairs that the loop contradicts thrown out, centres, tracks, and bundle
 /// adjustment without the prior. Matches that the poses confirm replace `graph.verified`.
 /// Errors: cancelled.

@@ -11,7 +11,7 @@ namespace orbitfuse {
 /// One way in which two frames may stand to each other, up to the distance between them.
 struct RelativePose {
   int first = 0, second = 0;
-  Rigid3d second_from_first;  ///< translation of length 1
+  Rigid3d second_from_first;          ///< translation of length 1
   std::vector<FeatureMatch> matches;  ///< that it explains
 };
 

@@ -60,8 +60,10 @@ Rotations along_tree(const PairCandidates& candidates, int count) {
       const bool a = reached[at(edge->first)], b = reached[at(edge->second)];
       if (a == b) continue;
       const Eigen::Quaterniond& turn = edge->second_from_first.rotation;
-      if (a) rotation[at(edge->second)] = turn * rotation[at(edge->first)];
-      else rotation[at(edge->first)] = turn.conjugate() * rotation[at(edge->second)];
+      if (a)
+        rotation[at(edge->second)] = turn * rotation[at(edge->first)];
+      else
+        rotation[at(edge->first)] = turn.conjugate() * rotation[at(edge->second)];
       reached[at(edge->first)] = reached[at(edge->second)] = true;
       return true;
     }
@@ -109,7 +111,8 @@ void step(const PairCandidates& candidates,
   }
   const Eigen::VectorXd x = a.ldlt().solve(b);
   for (std::size_t f = 0; f < rotation.size(); ++f)
-    rotation[f] = (exp_of(x.segment<3>(3 * static_cast<Eigen::Index>(f))) * rotation[f]).normalized();
+    rotation[f] =
+        (exp_of(x.segment<3>(3 * static_cast<Eigen::Index>(f))) * rotation[f]).normalized();
 }
 
 }  // namespace
@@ -155,13 +158,16 @@ std::vector<double> loop_elevations_deg(const std::vector<const FrameRecord*>& f
         Eigen::Vector3d turn = log_of(pose.second_from_first.rotation);
         const double expected =
             std::abs(std::remainder(a->azimuth_deg - b->azimuth_deg, 360.0)) * radians;
-        if (std::abs(turn.norm() - expected) > 0.3 * expected || turn.norm() < 5 * radians) continue;
+        if (std::abs(turn.norm() - expected) > 0.3 * expected || turn.norm() < 5 * radians)
+          continue;
         turn.normalize();
         if (turn.y() > 0) turn = -turn;  // up is against y in the camera
         if (std::abs(turn.x()) < 0.3) seen.push_back(std::atan2(-turn.z(), -turn.y()) / radians);
       }
-    if (!declared.empty()) result[at(loop)] = median(declared);
-    else if (seen.size() >= 3) result[at(loop)] = std::clamp(median(seen), -30.0, 80.0);
+    if (!declared.empty())
+      result[at(loop)] = median(declared);
+    else if (seen.size() >= 3)
+      result[at(loop)] = std::clamp(median(seen), -30.0, 80.0);
   }
   return result;
 }
@@ -183,8 +189,8 @@ AveragedRotations average_rotations(const PairCandidates& candidates,
   constexpr int passes = 40;
   for (int pass = 0; pass < passes; ++pass) {
     const double done = static_cast<double>(pass) / (passes - 1);
-    const double scale = options.first_scale_deg *
-                         std::pow(options.last_scale_deg / options.first_scale_deg, done);
+    const double scale =
+        options.first_scale_deg * std::pow(options.last_scale_deg / options.first_scale_deg, done);
     step(candidates, used, options, scale * radians, result.cam_from_world);
   }
   result.placed.assign(at(count), false);
@@ -197,7 +203,8 @@ AveragedRotations average_rotations(const PairCandidates& candidates,
     if (miss > options.max_pair_residual_deg) continue;
     result.kept.emplace_back();
     for (const RelativePose& candidate : of_pair)
-      if (residual(candidate, result.cam_from_world).norm() <= options.max_pair_residual_deg * radians)
+      if (residual(candidate, result.cam_from_world).norm() <=
+          options.max_pair_residual_deg * radians)
         result.kept.back().push_back(candidate);
     result.placed[at(pair->first)] = result.placed[at(pair->second)] = true;
   }

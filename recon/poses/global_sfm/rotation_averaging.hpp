@@ -31,8 +31,8 @@ struct AveragedRotations {
   double cost = 0;
 };
 
-/// Where cameras at these stations would look from, level and aimed at the axis: rotations in a z-up
-/// world. `elevations_deg` by loop. Frames without a station have none.
+/// Where cameras at these stations would look from, level and aimed at the axis: rotations in a
+/// z-up world. `elevations_deg` by loop. Frames without a station have none.
 std::vector<std::optional<Eigen::Quaterniond>> nominal_rotations(
     const std::vector<const FrameRecord*>& frames, const std::vector<double>& elevations_deg,
     bool clockwise);
@@ -44,8 +44,8 @@ std::vector<double> loop_elevations_deg(const std::vector<const FrameRecord*>& f
 
 /// Robust averaging of all pairs on SO(3), from the prior where every frame has one, else along the
 /// tree of the strongest pairs.
-AveragedRotations average_rotations(
-    const PairCandidates& candidates,
-    const std::vector<std::optional<Eigen::Quaterniond>>& prior, const RotationOptions& options);
+AveragedRotations average_rotations(const PairCandidates& candidates,
+                                    const std::vector<std::optional<Eigen::Quaterniond>>& prior,
+                                    const RotationOptions& options);
 
 }  // namespace orbitfuse

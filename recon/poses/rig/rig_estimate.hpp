@@ -9,20 +9,21 @@
 #include "core/progress.hpp"
 #include "core/result.hpp"
 
-// Two cameras on one body: the transform between them and the thermal lens are the same in every pair,
-// so all pairs are aligned as one. No field is needed: what the thermal camera sees is what the
-// visible photo of the same moment shows, turned by the rig, with depths from the sparse points.
+// Two cameras on one body: the transform between them and the thermal lens are the same in every
+// pair, so all pairs are aligned as one. No field is needed: what the thermal camera sees is what
+// the visible photo of the same moment shows, turned by the rig, with depths from the sparse
+// points.
 namespace orbitfuse {
 
 struct RigView {
-  std::string name;               ///< of the thermal frame
-  cv::Mat visible, thermal;       ///< CV_32FC1
+  std::string name;          ///< of the thermal frame
+  cv::Mat visible, thermal;  ///< CV_32FC1
   Camera visible_camera;
   std::vector<Eigen::Vector3d> points;  ///< scene points that the visible view shows, in its axes
 };
 
 struct RigOptions {
-  Camera thermal_lens;            ///< as known before; its size is the frames'
+  Camera thermal_lens;  ///< as known before; its size is the frames'
   /// Of the focal length; above `search_from` fields of view from 12 to 90 degrees are searched.
   double focal_relative_sigma = 0.03;
   double search_from = 0.1;

@@ -18,8 +18,7 @@ cv::Mat seen_from(const cv::Mat& source, const Camera& source_camera,
       std::max(1, static_cast<int>(std::lround(source_camera.height * ratio))));
   cv::Mat small;
   cv::resize(source, small, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
-  const Eigen::Matrix3d source_from_target =
-      target_from_source.conjugate().toRotationMatrix();
+  const Eigen::Matrix3d source_from_target = target_from_source.conjugate().toRotationMatrix();
   cv::Mat map_x(target.height, target.width, CV_32F), map_y = map_x.clone();
   for (int y = 0; y < target.height; ++y)
     for (int x = 0; x < target.width; ++x) {

@@ -18,9 +18,9 @@ struct RigPairs {
 /// The session's note that says whether its cameras are one rig ("yes"); import --rig writes it.
 inline constexpr const char* rig_note = "rig";
 
-/// Pairs by the names of the files that frames came from (an embedded photo bears its thermal file's),
-/// else by times within a second, where four fifths of the thermal frames have a partner. Without
-/// the note, stations of the thermal frames' own say that they were shot apart: no pairs.
+/// Pairs by the names of the files that frames came from (an embedded photo bears its thermal
+/// file's), else by times within a second, where four fifths of the thermal frames have a partner.
+/// Without the note, stations of the thermal frames' own say that they were shot apart: no pairs.
 RigPairs find_rig_pairs(const Session& session);
 
 }  // namespace orbitfuse

@@ -66,8 +66,7 @@ Result<ThermalPoses> pose_by_rig(const Session& session, const Reconstruction& v
   const auto frames = session.frames_of(Modality::thermal, false);
   result.frame_count = step.total = static_cast<int>(frames.size());
   const LensGuess lens = lens_of(session, *rig.pairs.front().second);
-  ORBITFUSE_ASSIGN(const Gathered gathered,
-                   gather(session, visible, rig, lens.camera, result));
+  ORBITFUSE_ASSIGN(const Gathered gathered, gather(session, visible, rig, lens.camera, result));
   RigOptions options;
   options.thermal_lens = lens.camera;
   options.focal_relative_sigma = lens.focal_relative_sigma;

@@ -7,9 +7,9 @@
 
 namespace orbitfuse {
 
-/// Thermal poses of a rig from the visible ones: one transform and one lens for all pairs. A pair that
-/// agrees no better than shuffled ones is kept and contested.
-/// Errors: input, quality (fewer than 4 pairs with a posed photo; no support), cancelled.
+/// Thermal poses of a rig from the visible ones: one transform and one lens for all pairs. A pair
+/// that agrees no better than shuffled ones is kept and contested. Errors: input, quality (fewer
+/// than 4 pairs with a posed photo; no support), cancelled.
 Result<ThermalPoses> pose_by_rig(const Session& session, const Reconstruction& visible,
                                  const RigPairs& rig, const Progress& progress,
                                  std::vector<LadderStep>& steps);

@@ -3,11 +3,11 @@
 
 #include <ceres/ceres.h>
 
+#include <fmt/format.h>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fmt/format.h>
 #include <limits>
 #include <utility>
 
@@ -55,8 +55,8 @@ struct LensPriorResidual {
   template <class T>
   bool operator()(const T* lens, T* residual) const {
     for (int i = 0; i < 8; ++i)
-      residual[i] = (lens[i] - T(mean[static_cast<std::size_t>(i)])) /
-                    T(sigma[static_cast<std::size_t>(i)]);
+      residual[i] =
+          (lens[i] - T(mean[static_cast<std::size_t>(i)])) / T(sigma[static_cast<std::size_t>(i)]);
     residual[1] = (lens[1] / lens[0] - T(mean[1] / mean[0])) / T(aspect_sigma);
     return true;
   }
@@ -66,9 +66,9 @@ double triangulation_angle_deg(const SparsePoint& point, const std::vector<Posed
   double widest = 0;
   std::vector<Eigen::Vector3d> rays;
   for (const Observation& o : point.track)
-    rays.push_back((camera_center(views[static_cast<std::size_t>(o.view)].cam_from_world) -
-                    point.position)
-                       .normalized());
+    rays.push_back(
+        (camera_center(views[static_cast<std::size_t>(o.view)].cam_from_world) - point.position)
+            .normalized());
   for (std::size_t i = 0; i < rays.size(); ++i)
     for (std::size_t j = i + 1; j < rays.size(); ++j)
       widest = std::max(widest, std::atan2(rays[i].cross(rays[j]).norm(), rays[i].dot(rays[j])));
@@ -89,8 +89,8 @@ Status check_input(const Reconstruction& model, const std::vector<int>& group,
   if (group.size() != model.views.size()) return bad("views and lens groups differ in number");
   for (std::size_t v = 0; v < model.views.size(); ++v) {
     if (group[v] < 0 || group[v] >= static_cast<int>(lenses.size()))
-      return bad(fmt::format("{}: lens group {} of {}", model.views[v].name, group[v],
-                             lenses.size()));
+      return bad(
+          fmt::format("{}: lens group {} of {}", model.views[v].name, group[v], lenses.size()));
     if (!model.views[v].cam_from_world.is_finite())
       return bad(model.views[v].name + ": pose is not finite");
     ORBITFUSE_TRY(model.views[v].camera.validate(model.views[v].name));
@@ -232,8 +232,8 @@ class Problem {
     const double focal = lens.focal_px > 0 ? lens.focal_px : camera.fx;
     const double sigma = lens.focal_px > 0 ? lens.focal_relative_sigma : 0.5;
     const double offset = options_.principal_point_sigma * camera.width;
-    prior.mean = {focal, focal * camera.fy / camera.fx, camera.width / 2.0, camera.height / 2.0,
-                  0, 0, 0, 0};
+    prior.mean = {
+        focal, focal * camera.fy / camera.fx, camera.width / 2.0, camera.height / 2.0, 0, 0, 0, 0};
     prior.sigma = {focal * std::max(sigma, 1e-9), 1, offset, offset, 0.1, 0.1, 0.005, 0.005};
     double* values = parameters_.lens[g].data();
     std::vector<int> held;
@@ -262,8 +262,7 @@ class Problem {
       for (const Observation& o : model_.points[i].track) {
         const auto v = static_cast<std::size_t>(o.view);
         problem_.AddResidualBlock(
-            new ceres::AutoDiffCostFunction<Reprojection, 2, 4, 3, 8, 3>(
-                new Reprojection{o.pixel}),
+            new ceres::AutoDiffCostFunction<Reprojection, 2, 4, 3, 8, 3>(new Reprojection{o.pixel}),
             new ceres::CauchyLoss(options_.loss_scale_px), parameters_.rotation[v].coeffs().data(),
             parameters_.center[v].data(),
             parameters_.lens[static_cast<std::size_t>(group_[v])].data(),
@@ -355,8 +354,7 @@ Result<BundleReport> adjust_bundle(Reconstruction& model, const std::vector<int>
   }
   report.outliers += prune(work, groups, options, options.max_error_px, report.dropped_views);
   ORBITFUSE_TRY(check_support(work, report.dropped_views));
-  for (const PosedView& view : work.views)
-    ORBITFUSE_TRY(view.camera.validate(view.name));
+  for (const PosedView& view : work.views) ORBITFUSE_TRY(view.camera.validate(view.name));
 
   // The longest tracks decide the focal; all of them would make the covariance the dearest step.
   Problem of_focal(work, groups, lenses, options, 1500);

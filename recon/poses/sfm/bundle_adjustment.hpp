@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "core/progress.hpp"
 #include "core/geometry/reconstruction.hpp"
+#include "core/progress.hpp"
 #include "core/result.hpp"
 
 namespace orbitfuse {
@@ -33,7 +33,7 @@ struct BundleOptions {
 };
 
 struct BundleReport {
-  double rms_px = 0;               ///< over kept observations
+  double rms_px = 0;  ///< over kept observations
   int observations = 0, outliers = 0;
   bool converged = false;
   double median_triangulation_angle_deg = 0;

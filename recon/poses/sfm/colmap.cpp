@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/poses/sfm/colmap.hpp"
 
-#include <algorithm>
 #include <fmt/format.h>
+#include <algorithm>
 #include <map>
 #include <tuple>
 
@@ -23,8 +23,10 @@ std::string camera_parameters(const Session& session, const ProxyImage& image) {
   double focal = 1.2 * std::max(image.width, image.height);
   if (device != nullptr && image.frame->width > 0) {
     const double scale = static_cast<double>(image.width) / image.frame->width;
-    if (device->lens.calibrated) focal = device->lens.calibrated->fx * scale;
-    else if (device->lens.focal_px) focal = *device->lens.focal_px * scale;
+    if (device->lens.calibrated)
+      focal = device->lens.calibrated->fx * scale;
+    else if (device->lens.focal_px)
+      focal = *device->lens.focal_px * scale;
   }
   return fmt::format("{},{},{},0", focal, image.width / 2.0, image.height / 2.0);
 }
@@ -114,8 +116,8 @@ Status ColmapProject::run(std::vector<std::string> arguments, const Progress& pr
 }
 
 std::vector<std::string> ColmapProject::seed_and(const std::string& verb) const {
-  return {verb, "--random_seed", fmt::format("{}", options_.seed % 2147483647u),
-          "--database_path", database_.string()};
+  return {verb, "--random_seed", fmt::format("{}", options_.seed % 2147483647u), "--database_path",
+          database_.string()};
 }
 
 Result<DatabaseCounts> ColmapProject::extract(const Session& session,
@@ -147,10 +149,12 @@ Result<DatabaseCounts> ColmapProject::extract(const Session& session,
     return error;
   };
   ORBITFUSE_TRY(number_images_by_name(database_).map_error(with_last_words));
-  ORBITFUSE_ASSIGN(const DatabaseCounts counts, count_database(database_).map_error(with_last_words));
+  ORBITFUSE_ASSIGN(const DatabaseCounts counts,
+                   count_database(database_).map_error(with_last_words));
   if (counts.images_with_features == 0)
     return fail(ErrorKind::quality, "COLMAP",
-                fmt::format("no features in {} images{}", images.size(), last_words(folder_ / "colmap.log")),
+                fmt::format("no features in {} images{}", images.size(),
+                            last_words(folder_ / "colmap.log")),
                 "check that the images are sharp and show more than one flat surface");
   return counts;
 }
@@ -171,7 +175,8 @@ Result<DatabaseCounts> ColmapProject::match(const std::vector<ProxyImage>& image
     std::string& block = blocks[static_cast<std::size_t>(p)];
     block = images[static_cast<std::size_t>(i)].name + " " +
             images[static_cast<std::size_t>(j)].name + "\n";
-    for (const auto& [a, b] : match_descriptors(of(i), of(j))) block += fmt::format("{} {}\n", a, b);
+    for (const auto& [a, b] : match_descriptors(of(i), of(j)))
+      block += fmt::format("{} {}\n", a, b);
     block += "\n";
   });
   ORBITFUSE_TRY(progress.check("poses.colmap"));
@@ -204,8 +209,8 @@ Result<Reconstruction> ColmapProject::map(const Session& session,
     arguments.push_back(std::string("--Mapper.") + name);
     arguments.push_back(value);
   };
-  arguments.insert(arguments.end(), {"--image_path", image_folder_.string(), "--output_path",
-                                     sparse.string()});
+  arguments.insert(arguments.end(),
+                   {"--image_path", image_folder_.string(), "--output_path", sparse.string()});
   add("num_threads", "1");  // sums in another order end in another model
   add("ba_refine_focal_length", flag(!calibrated));
   add("init_min_tri_angle", fmt::format("{}", settings.init_min_tri_angle_deg));

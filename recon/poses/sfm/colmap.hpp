@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "core/progress.hpp"
 #include "core/geometry/reconstruction.hpp"
+#include "core/progress.hpp"
 #include "core/result.hpp"
 #include "recon/poses/sfm/colmap_database.hpp"
 #include "recon/poses/sfm/pair_selection.hpp"

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/poses/sfm/colmap_database.hpp"
 
+#include <fmt/format.h>
+#include <sqlite3.h>
 #include <algorithm>
 #include <cstdint>
-#include <fmt/format.h>
 #include <functional>
 #include <memory>
-#include <sqlite3.h>
 #include <vector>
 
 namespace orbitfuse {
@@ -23,7 +23,8 @@ class Database {
     const int status = sqlite3_open_v2(path.c_str(), &handle, flags, nullptr);
     Database database(handle, path);
     if (status == SQLITE_OK) return database;
-    return fail(ErrorKind::input, path.string(), "no COLMAP database", "COLMAP wrote none: see whether it runs by hand (colmap feature_extractor -h)");
+    return fail(ErrorKind::input, path.string(), "no COLMAP database",
+                "COLMAP wrote none: see whether it runs by hand (colmap feature_extractor -h)");
   }
 
   /// Calls `row` for each row of the answer.
@@ -46,7 +47,8 @@ class Database {
   }
 
  private:
-  Database(sqlite3* handle, fs::path path) : handle_(handle, sqlite3_close), path_(std::move(path)) {}
+  Database(sqlite3* handle, fs::path path)
+      : handle_(handle, sqlite3_close), path_(std::move(path)) {}
 
   std::unique_ptr<sqlite3, int (*)(sqlite3*)> handle_;
   fs::path path_;
@@ -85,7 +87,8 @@ Status number_images_by_name(const fs::path& path) {
   ORBITFUSE_TRY(execute(ranks));
   for (const char* table : {"images", "keypoints", "descriptors"}) {
     ORBITFUSE_TRY(execute(fmt::format(
-        "UPDATE {} SET image_id = 1000000000 + (SELECT new FROM ranks WHERE old = image_id)", table)));
+        "UPDATE {} SET image_id = 1000000000 + (SELECT new FROM ranks WHERE old = image_id)",
+        table)));
     ORBITFUSE_TRY(execute(fmt::format("UPDATE {} SET image_id = image_id - 1000000000", table)));
   }
   return execute("COMMIT");
@@ -155,7 +158,8 @@ Result<NamedMatches> read_matches(const fs::path& path, MatchKind kind) {
     std::string first = reinterpret_cast<const char*>(sqlite3_column_text(row, 0)),
                 second = reinterpret_cast<const char*>(sqlite3_column_text(row, 1));
     const int rows = sqlite3_column_int(row, 2);
-    whole = whole && sqlite3_column_bytes(row, 3) == rows * 2 * static_cast<int>(sizeof(std::uint32_t));
+    whole =
+        whole && sqlite3_column_bytes(row, 3) == rows * 2 * static_cast<int>(sizeof(std::uint32_t));
     if (!whole) return;
     const auto* data = static_cast<const std::uint32_t*>(sqlite3_column_blob(row, 3));
     const bool in_order = first < second;

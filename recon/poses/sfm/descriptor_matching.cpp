@@ -22,7 +22,9 @@ struct Nearest {
   }
 };
 
-double angle_rad(float product) { return std::acos(std::clamp(product / (512.0 * 512.0), 0.0, 1.0)); }
+double angle_rad(float product) {
+  return std::acos(std::clamp(product / (512.0 * 512.0), 0.0, 1.0));
+}
 
 bool passes(const Nearest& nearest, const DescriptorMatchOptions& options) {
   if (nearest.index < 0) return false;
@@ -33,8 +35,7 @@ bool passes(const Nearest& nearest, const DescriptorMatchOptions& options) {
 
 template <class Admits>
 std::vector<FeatureMatch> match_where(const Descriptors& first, const Descriptors& second,
-                                      const DescriptorMatchOptions& options,
-                                      const Admits& admits) {
+                                      const DescriptorMatchOptions& options, const Admits& admits) {
   if (first.rows() == 0 || second.rows() == 0) return {};  // a blank view has none
   std::vector<Nearest> of_first(static_cast<std::size_t>(first.rows())),
       of_second(static_cast<std::size_t>(second.rows()));

@@ -51,9 +51,9 @@ std::vector<ViewPair> orbit_pairs(const std::vector<const FrameRecord*>& frames)
   for (const auto& [i, j] : exhaustive_pairs(count)) {
     const auto& a = *frames[static_cast<std::size_t>(i)];
     const auto& b = *frames[static_cast<std::size_t>(j)];
-    candidates.emplace_back(stations ? station_distance_deg(*a.station, *b.station)
-                                     : order_distance(i, j, count),
-                            i, j);
+    candidates.emplace_back(
+        stations ? station_distance_deg(*a.station, *b.station) : order_distance(i, j, count), i,
+        j);
   }
   std::sort(candidates.begin(), candidates.end());
 

@@ -22,7 +22,7 @@ struct ProxyOptions {
 
 struct ProxyImage {
   const FrameRecord* frame = nullptr;
-  std::string name;      ///< file in the proxy folder, "000000.png"
+  std::string name;  ///< file in the proxy folder, "000000.png"
   int width = 0, height = 0;
 };
 

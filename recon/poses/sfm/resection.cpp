@@ -51,8 +51,7 @@ struct Resected {
 };
 
 std::optional<Resected> solve(const FeatureGraph& graph, int frame, const Camera& camera,
-                              const Correspondences& given,
-                              const std::vector<FeatureTrack>& tracks,
+                              const Correspondences& given, const std::vector<FeatureTrack>& tracks,
                               const ResectionOptions& options) {
   const int count = static_cast<int>(given.feature.size());
   if (count < options.min_inliers) return std::nullopt;
@@ -61,8 +60,7 @@ std::optional<Resected> solve(const FeatureGraph& graph, int frame, const Camera
   for (int i = 0; i < count; ++i) {
     const Eigen::Vector3d& x = tracks[at(given.track[at(i)])].position;
     points.emplace_back(x.x(), x.y(), x.z());
-    const Eigen::Vector3d ray =
-        camera.ray_of(graph.pixels[at(frame)].col(given.feature[at(i)]));
+    const Eigen::Vector3d ray = camera.ray_of(graph.pixels[at(frame)].col(given.feature[at(i)]));
     // A pixel outside the lens model has no ray; far away it is an outlier like any other.
     plane.emplace_back(ray.allFinite() ? ray.x() : 1e3, ray.allFinite() ? ray.y() : 1e3);
   }
@@ -87,9 +85,9 @@ std::optional<Resected> solve(const FeatureGraph& graph, int frame, const Camera
                              rotation.at<double>(2));
   Resected result;
   result.inliers = agreed;
-  result.pose.rotation = Eigen::AngleAxisd(turn.norm(), turn.norm() > 1e-12
-                                                            ? Eigen::Vector3d(turn.normalized())
-                                                            : Eigen::Vector3d::UnitX());
+  result.pose.rotation =
+      Eigen::AngleAxisd(turn.norm(), turn.norm() > 1e-12 ? Eigen::Vector3d(turn.normalized())
+                                                         : Eigen::Vector3d::UnitX());
   result.pose.translation = {translation.at<double>(0), translation.at<double>(1),
                              translation.at<double>(2)};
   if (!result.pose.is_finite()) return std::nullopt;
@@ -123,7 +121,8 @@ std::vector<int> nearest_posed(const PosedFrames& posed, int frame, std::size_t 
     if (f != frame && posed.poses[at(f)]) order.emplace_back(-axis(f).dot(axis(frame)), f);
   std::sort(order.begin(), order.end());
   std::vector<int> nearest;
-  for (std::size_t i = 0; i < std::min(count, order.size()); ++i) nearest.push_back(order[i].second);
+  for (std::size_t i = 0; i < std::min(count, order.size()); ++i)
+    nearest.push_back(order[i].second);
   return nearest;
 }
 

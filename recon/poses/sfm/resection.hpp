@@ -18,10 +18,10 @@ struct ResectionOptions {
   double max_error_px = 4;
 };
 
-/// Poses the frames that have none on the points of those that do: by matches with every posed frame
-/// (exact, also those that no two-view geometry held), robustly; the frame with most correspondences
-/// first, whose points then help the next. Their guided matches join `graph.verified`.
-/// Returns the frames that it posed.
+/// Poses the frames that have none on the points of those that do: by matches with every posed
+/// frame (exact, also those that no two-view geometry held), robustly; the frame with most
+/// correspondences first, whose points then help the next. Their guided matches join
+/// `graph.verified`. Returns the frames that it posed.
 Result<std::vector<int>> resect(FeatureGraph& graph, PosedFrames& posed,
                                 const ResectionOptions& options, const Progress& progress);
 

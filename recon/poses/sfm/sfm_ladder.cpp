@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/poses/sfm/sfm_ladder.hpp"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fmt/format.h>
 #include <map>
 #include <numbers>
 #include <set>
@@ -56,8 +56,8 @@ Lenses lens_groups(const Reconstruction& model, const Session& session) {
   for (const PosedView& view : model.views) {
     const auto found = by_name.find(view.name);
     const std::string device = found == by_name.end() ? "" : found->second->device;
-    const auto [place, is_new] = index.try_emplace(
-        {device, view.camera.width, view.camera.height}, static_cast<int>(index.size()));
+    const auto [place, is_new] = index.try_emplace({device, view.camera.width, view.camera.height},
+                                                   static_cast<int>(index.size()));
     result.group.push_back(place->second);
     if (!is_new) continue;
     LensGroup lens;
@@ -161,8 +161,7 @@ bool passes_gates(ModalityPoses& poses, const Session& session, const PoseOption
   const StationFit fit = fit_stations(poses.reconstruction.views, session);
   if (fit.views >= 3) {
     // Chord of the median residual, in radii.
-    const double residual =
-        2 * std::sin(fit.median_residual_deg / 2 * std::numbers::pi / 180.0);
+    const double residual = 2 * std::sin(fit.median_residual_deg / 2 * std::numbers::pi / 180.0);
     const double outliers = static_cast<double>(fit.outliers) / fit.views;
     poses.gates["station_residual_deg"] = fit.median_residual_deg;
     poses.gates["station_outlier_ratio"] = outliers;
@@ -202,7 +201,7 @@ Result<ModalityPoses> structure_from_motion(const Session& session,
   const int total = static_cast<int>(frames.size());
   for (const Attempt& attempt :
        attempts(options, orbit_pairs(frames).size() ==
-                                       exhaustive_pairs(static_cast<int>(frames.size())).size())) {
+                             exhaustive_pairs(static_cast<int>(frames.size())).size())) {
     const auto start = Clock::now();
     const fs::path folder = workdir / (attempt.exhaustive ? "all_pairs" : "orbit_pairs");
     const auto tell = [&](double done, const std::string& what) {

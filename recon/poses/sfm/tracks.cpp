@@ -45,7 +45,8 @@ std::vector<Features> connected(const FeatureGraph& graph, const PairMatches& ma
   Sets sets(first.back());
   for (const auto& [pair, list] : matches)
     if (poses[at(pair.first)] && poses[at(pair.second)])
-      for (const auto& [a, b] : list) sets.join(first[at(pair.first)] + a, first[at(pair.second)] + b);
+      for (const auto& [a, b] : list)
+        sets.join(first[at(pair.first)] + a, first[at(pair.second)] + b);
   std::map<int, Features> by_root;
   for (int f = 0; f < graph.count(); ++f) {
     if (!poses[at(f)]) continue;
@@ -86,7 +87,8 @@ struct Seen {
 
 double error_px(const PosedFrames& posed, int frame, const Eigen::Vector3d& point,
                 const Eigen::Vector2d& pixel) {
-  const double e = (posed.cameras[at(frame)].project(*posed.poses[at(frame)] * point) - pixel).norm();
+  const double e =
+      (posed.cameras[at(frame)].project(*posed.poses[at(frame)] * point) - pixel).norm();
   return std::isfinite(e) ? e : 1e9;
 }
 
@@ -94,7 +96,8 @@ Features agreeing(const FeatureGraph& graph, const PosedFrames& posed, const Fea
                   const Eigen::Vector3d& point, double max_error_px) {
   Features kept;
   for (const auto& [f, i] : features)
-    if (error_px(posed, f, point, graph.pixels[at(f)].col(i)) <= max_error_px) kept.emplace_back(f, i);
+    if (error_px(posed, f, point, graph.pixels[at(f)].col(i)) <= max_error_px)
+      kept.emplace_back(f, i);
   return kept;
 }
 

@@ -69,7 +69,8 @@ void vote_pair(float* bins, const Eigen::Vector3f& between, float distance,
   const Eigen::Vector3f w = normal.cross(v_unit);
   vote(bins, v_unit.dot(other_normal), false, 1);
   vote(bins + histogram_bins, normal.dot(direction), false, 1);
-  vote(bins + 2 * histogram_bins, angle_over_pi(w.dot(other_normal), normal.dot(other_normal)), true, 1);
+  vote(bins + 2 * histogram_bins, angle_over_pi(w.dot(other_normal), normal.dot(other_normal)),
+       true, 1);
 }
 
 void normalise_parts(float* bins) {

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double scale_slack = 1.22;   // either way: the descriptor radii stand 1.25 apart
 constexpr double normal_slack = 0.30;  // of cosines
-constexpr double shortest = 0.25;     // segments below say little about scale or direction
+constexpr double shortest = 0.25;      // segments below say little about scale or direction
 constexpr double clique_scale_slack = 1.10;
 
 /// A square table of bits.

@@ -14,8 +14,8 @@ namespace orbitfuse::registration {
 namespace {
 
 constexpr std::size_t neighbour_count = 31;  // the point itself and thirty
-constexpr std::size_t spanning = 13;    // planes go through two of the nearest of these
-constexpr double slab_share = 0.03;           // half thickness in which points support a plane
+constexpr std::size_t spanning = 13;         // planes go through two of the nearest of these
+constexpr double slab_share = 0.03;          // half thickness in which points support a plane
 
 using Neighbourhood = std::array<std::size_t, neighbour_count>;
 

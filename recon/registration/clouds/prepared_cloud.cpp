@@ -146,7 +146,8 @@ Result<PreparedCloud> prepare(const PointCloud& cloud, const RegistrationOptions
                 "registration needs a cloud that fills space: use views from more sides");
   };
   const auto too_few = [&](std::size_t count, const char* kind) {
-    return unusable(fmt::format("{} {} points, at least {} are needed", count, kind, fewest_points_of_cloud));
+    return unusable(
+        fmt::format("{} {} points, at least {} are needed", count, kind, fewest_points_of_cloud));
   };
   PreparedCloud prepared;
   Points points;
@@ -175,7 +176,8 @@ Result<PreparedCloud> prepare(const PointCloud& cloud, const RegistrationOptions
   const Similarity3d fine = unit_frame(points);
   for (auto& p : points) p = fine * p;
   prepared.points = thinned_to(points, options.points);
-  if (prepared.points.size() < fewest_points_of_cloud) return too_few(prepared.points.size(), "distinct");
+  if (prepared.points.size() < fewest_points_of_cloud)
+    return too_few(prepared.points.size(), "distinct");
   if (const std::string flat = flatness(prepared.points); !flat.empty()) return unusable(flat);
   prepared.unit_from_cloud = fine * rough * from_origin;
   estimate_normals(prepared);

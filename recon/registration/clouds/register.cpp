@@ -50,8 +50,7 @@ void measure_spread(const Search& search, const Similarity3d& answer,
     Vector7 kick;
     for (int k = 0; k < 7; ++k) kick[k] = 0.035 * unit(random);
     const Similarity3d start = updated(without_warp, without_warp.translation, kick);
-    widen_spread(answer,
-                 search.refine_with(start, 600, restart_refinement).target_from_source,
+    widen_spread(answer, search.refine_with(start, 600, restart_refinement).target_from_source,
                  report);
   }
 }
@@ -114,7 +113,8 @@ RegistrationReport reported(const Search& search, const Similarity3d& start) {
   RegistrationReport report;
   if (search.options.estimate_warp) {
     const Similarity3d beside = beside_warp(search, plain, report);
-    if (report.warp_percent_of_diameter > 0) best = search.measured_at(beside, all_points, last_refinement);
+    if (report.warp_percent_of_diameter > 0)
+      best = search.measured_at(beside, all_points, last_refinement);
   }
   const Similarity3d target_from_unit = search.target.unit_from_cloud.inverse();
   report.target_from_source =

@@ -38,7 +38,8 @@ Candidates grid_candidates(const PreparedCloud& source, const PreparedCloud& tar
   for (const double scale : {1.0, 0.8, 1.25}) {
     if (scale < options.min_scale || scale > options.max_scale) continue;
     for (const auto& rotation : rotation_spiral(scale == 1.0 ? 600 : 300)) {
-      candidates.push_back({{scale, rotation, Eigen::Vector3d::Zero()}, 0, 0, "rotation grid", 0, false});
+      candidates.push_back(
+          {{scale, rotation, Eigen::Vector3d::Zero()}, 0, 0, "rotation grid", 0, false});
     }
   }
   constexpr Round rounds[] = {

@@ -66,15 +66,21 @@ constexpr int all_points = 1 << 30;
 
 /// Candidates begin far off, and only need to be told apart: a table cell's error and a steady
 /// bound do.
-constexpr RefineOptions brief_refinement{.start_bound = 0.25, .end_bound = 0.12, .iterations = 6,
-                                         .polish = 0, .exact_partners = false,
+constexpr RefineOptions brief_refinement{.start_bound = 0.25,
+                                         .end_bound = 0.12,
+                                         .iterations = 6,
+                                         .polish = 0,
+                                         .exact_partners = false,
                                          .adapt_bound = false};
 /// Of the few that are left, ranked by what they end at.
 constexpr RefineOptions full_refinement{
     .start_bound = 0.15, .end_bound = 0.06, .iterations = 8, .polish = 6, .settled = 2e-4};
 /// From a quarter turn away: wider than brief, since the turned cloud overlaps only in part.
-constexpr RefineOptions turned_refinement{.start_bound = 0.35, .end_bound = 0.2, .iterations = 5,
-                                          .polish = 0, .exact_partners = false,
+constexpr RefineOptions turned_refinement{.start_bound = 0.35,
+                                          .end_bound = 0.2,
+                                          .iterations = 5,
+                                          .polish = 0,
+                                          .exact_partners = false,
                                           .adapt_bound = false};
 
 /// Coarse scores for all, a short refinement for the best, full refinement for the best of those.
@@ -128,9 +134,8 @@ Candidates turned(const Search& search, const Candidate& best) {
         turn.rotation = Eigen::AngleAxisd(quarters * std::numbers::pi / 2, axes.col(axis));
         turn.translation = mean - turn.rotation * mean + shift * axes.col(2);
         const Similarity3d start = best.target_from_source * turn;
-        all.push_back(
-            {search.refine_with(start, 150, turned_refinement).target_from_source, 0,
-             0, best.origin + ", turned", 0, false});
+        all.push_back({search.refine_with(start, 150, turned_refinement).target_from_source, 0, 0,
+                       best.origin + ", turned", 0, false});
       }
     }
   }
@@ -159,7 +164,8 @@ Candidates feature_candidates(const Search& search) {
   const Descriptors target_descriptors = describe(target, neighbourhood_radius);
   const auto at_scale = [&](double scale) -> Candidates {
     if (scale < search.options.min_scale || scale > search.options.max_scale) return {};
-    const auto matches = mutual_matches(describe(source, neighbourhood_radius / scale), target_descriptors, 500);
+    const auto matches =
+        mutual_matches(describe(source, neighbourhood_radius / scale), target_descriptors, 500);
     return consensus_candidates(source, target, matches, scale, 40);
   };
   Candidates all = narrowed(search, at_scale(1));

@@ -203,7 +203,8 @@ Points paired_points(const PreparedCloud& source, const PreparedCloud& target,
 
 Unwarped refine_beside_warp(const PreparedCloud& source, const PreparedCloud& target,
                             const Refined& start, const WarpOptions& options) {
-  constexpr double node_spacing = 1.2;  // of the length: finer gains nothing and costs its sixth power
+  constexpr double node_spacing =
+      1.2;  // of the length: finer gains nothing and costs its sixth power
   constexpr int fewest_points = 8;
   constexpr std::size_t most_nodes = 120;  // objects have about 60; bounds the time for others
   constexpr int amplitude_rounds = 3;      // then it stays, or the updates would not settle

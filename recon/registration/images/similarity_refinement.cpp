@@ -7,8 +7,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "recon/alignment/edge_field.hpp"
-#include "recon/registration/images/similarity_round.hpp"
 #include "recon/alignment/whole_view.hpp"
+#include "recon/registration/images/similarity_round.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -32,13 +32,10 @@ Result<SimilarityRefinement> refine_similarity(const SceneRenderer& visible,
                            rounds, progress);
 }
 
-Result<SimilarityRefinement> refine_similarity(const SceneRenderer& visible,
-                                               const std::vector<cv::Mat>& images,
-                                               const std::vector<PosedView>& thermal,
-                                               const Similarity3d& visible_from_thermal,
-                                               const Similarity3d& start,
-                                               const std::vector<RenderRound>& rounds,
-                                               const Progress& progress) {
+Result<SimilarityRefinement> refine_similarity(
+    const SceneRenderer& visible, const std::vector<cv::Mat>& images,
+    const std::vector<PosedView>& thermal, const Similarity3d& visible_from_thermal,
+    const Similarity3d& start, const std::vector<RenderRound>& rounds, const Progress& progress) {
   ORBITFUSE_TRY(one_image_each(images, thermal));
   SimilarityRefinement result;
   result.visible_from_thermal = visible_from_thermal;

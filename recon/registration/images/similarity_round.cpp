@@ -63,7 +63,7 @@ Similarity3d similarity_of(const Parameters& p) {
 }  // namespace
 
 Similarity3d agreed_similarity(const std::vector<ScenePatch>& patches,
-                   const Similarity3d& thermal_from_visible) {
+                               const Similarity3d& thermal_from_visible) {
   Parameters p = parameters_of(thermal_from_visible);
   for (const double scale_px : {8.0, 4.0, 2.0, 1.0}) {
     ceres::Problem problem;
@@ -95,10 +95,11 @@ int SimilarityRound::matches(const Similarity3d& thermal_from_visible) const {
   return near;
 }
 
-Result<SimilarityRound> match_scene(const SceneRenderer& visible, const std::vector<cv::Mat>& images,
-                             const std::vector<PosedView>& thermal,
-                             const Similarity3d& visible_from_thermal,
-                             const RenderRound& round, const Progress& progress) {
+Result<SimilarityRound> match_scene(const SceneRenderer& visible,
+                                    const std::vector<cv::Mat>& images,
+                                    const std::vector<PosedView>& thermal,
+                                    const Similarity3d& visible_from_thermal,
+                                    const RenderRound& round, const Progress& progress) {
   SimilarityRound seen;
   std::vector<std::vector<ScenePatch>> of_view(thermal.size());
   std::vector<double> agreement(thermal.size());

@@ -7,7 +7,8 @@
 #include "recon/alignment/render_alignment.hpp"
 
 // One round of bringing two reconstructions together by images: render the visible scene from the
-// thermal cameras, find its patches in their images, and solve for the one similarity they agree on.
+// thermal cameras, find its patches in their images, and solve for the one similarity they agree
+// on.
 namespace orbitfuse {
 
 /// One patch of the visible scene in one thermal view.
@@ -30,10 +31,11 @@ struct SimilarityRound {
 inline constexpr std::size_t fewest_patches = 30;
 
 /// Errors: the renderer's, cancelled.
-Result<SimilarityRound> match_scene(const SceneRenderer& visible, const std::vector<cv::Mat>& images,
-                             const std::vector<PosedView>& thermal,
-                             const Similarity3d& visible_from_thermal, const RenderRound& round,
-                             const Progress& progress);
+Result<SimilarityRound> match_scene(const SceneRenderer& visible,
+                                    const std::vector<cv::Mat>& images,
+                                    const std::vector<PosedView>& thermal,
+                                    const Similarity3d& visible_from_thermal,
+                                    const RenderRound& round, const Progress& progress);
 
 /// The similarity that the patches agree on, the robust scale lowered step by step; the given one
 /// where they determine none.

@@ -27,8 +27,8 @@ constexpr RenderRound judging_round{search_width_px, 3, 4, 8};
 /// A place on its way, and how well the images support it.
 struct Climber {
   Similarity3d visible_from_thermal;
-  double support = 0;  ///< agreement of edges times patches in place
-  double share = 0;    ///< of the patches, in place
+  double support = 0;                    ///< agreement of edges times patches in place
+  double share = 0;                      ///< of the patches, in place
   std::vector<ScenePatch> patches = {};  ///< of its last round
 };
 
@@ -41,8 +41,9 @@ struct Evidence {
 
 /// Moves by one round; false where the images show too little.
 Result<bool> step(const Evidence& seen, const RenderRound& round, Climber& climber) {
-  ORBITFUSE_ASSIGN(SimilarityRound found, match_scene(seen.visible, seen.images, seen.thermal,
-                                               climber.visible_from_thermal, round, seen.progress));
+  ORBITFUSE_ASSIGN(SimilarityRound found,
+                   match_scene(seen.visible, seen.images, seen.thermal,
+                               climber.visible_from_thermal, round, seen.progress));
   if (found.patches.size() < fewest_patches) {
     climber.support = 0;
     return false;
@@ -100,9 +101,9 @@ std::vector<Climber> starts_round(const Similarity3d& visible_from_thermal,
     for (int axis = 0; axis < 3; ++axis)
       starts.push_back({about(center, sign * options.turn_deg, Eigen::Vector3d::Unit(axis), 1) *
                         visible_from_thermal});
-    starts.push_back({about(center, 0, Eigen::Vector3d::UnitX(),
-                            std::pow(1 + options.growth, sign)) *
-                      visible_from_thermal});
+    starts.push_back(
+        {about(center, 0, Eigen::Vector3d::UnitX(), std::pow(1 + options.growth, sign)) *
+         visible_from_thermal});
   }
   return starts;
 }
@@ -140,8 +141,7 @@ Result<SimilarityRefinement> search_similarity(const SceneRenderer& visible,
     return finish(visible_from_thermal, similarity_rounds());
 
   Evidence seen{visible, {}, {}, progress};
-  const std::size_t count =
-      std::min(static_cast<std::size_t>(options.most_views), thermal.size());
+  const std::size_t count = std::min(static_cast<std::size_t>(options.most_views), thermal.size());
   for (std::size_t k = 0; k < count; ++k) {
     seen.images.push_back(images[k * thermal.size() / count]);
     seen.thermal.push_back(thermal[k * thermal.size() / count]);
@@ -183,9 +183,9 @@ Result<SimilarityRefinement> search_similarity(const SceneRenderer& visible,
   climbers.resize(std::min(climbers.size(), static_cast<std::size_t>(options.finalists)));
   for (Climber& climber : climbers) {
     ORBITFUSE_TRY(close(seen, climber));
-    progress.report({"register", 0, 0, -1,
-                     fmt::format("finalist: support {:.0f}, {:.2f} in place", climber.support,
-                                 climber.share)});
+    progress.report(
+        {"register", 0, 0, -1,
+         fmt::format("finalist: support {:.0f}, {:.2f} in place", climber.support, climber.share)});
   }
   climbers.push_back(std::move(first));
   std::erase_if(climbers, lost);

@@ -8,8 +8,8 @@
 #include <fstream>
 #include <map>
 
-#include "core/system/file_io.hpp"
 #include "core/image/image_io.hpp"
+#include "core/system/file_io.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/app/cli/session_fixture.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -164,8 +164,8 @@ TEST_F(BadInput, OptionsOfAFailedCallAreForgotten) {
   const auto options_of = [&] {
     return nlohmann::json::parse(*read_file(out / "run.json")).value("config", nlohmann::json());
   };
-  const Outcome outcome = orbitfuse_program({"poses", session.string(), "--out", out.string(), "--set",
-                                             "poses.colmap=/no/such/colmap"});
+  const Outcome outcome = orbitfuse_program(
+      {"poses", session.string(), "--out", out.string(), "--set", "poses.colmap=/no/such/colmap"});
   EXPECT_EQ(outcome.code, 6) << outcome.err;
   EXPECT_TRUE(options_of().is_null()) << options_of();
   fs::remove_all(session);
@@ -174,9 +174,12 @@ TEST_F(BadInput, OptionsOfAFailedCallAreForgotten) {
   ASSERT_EQ(poses().code, 0);
   const auto good = options_of();
   ASSERT_TRUE(good.is_object());
-  for (const auto& entry : fs::directory_iterator(session / "visible")) fs::resize_file(entry.path(), 20);
+  for (const auto& entry : fs::directory_iterator(session / "visible"))
+    fs::resize_file(entry.path(), 20);
   EXPECT_NE(orbitfuse_program({"poses", session.string(), "--out", out.string(), "--set",
-                               "poses.max_features=17"}).code, 0);
+                               "poses.max_features=17"})
+                .code,
+            0);
   EXPECT_EQ(options_of(), good);
 }
 
@@ -237,13 +240,16 @@ TEST_F(BadInput, TrainingOptionsAreNamedAsTheyAreWritten) {
   make_session();
   const std::pair<const char*, const char*> cases[] = {
       {"train.visible.iterations=many", "must be an integer in 1..10000000"},
-      {"train.thermal.iterations=0", "train.thermal.iterations: 0; choose an integer in 1..10000000"},
-      {"train.visible.color_hidden=40", "train.visible.color_hidden: 40; choose an integer in 16..256, a multiple of 16"},
+      {"train.thermal.iterations=0",
+       "train.thermal.iterations: 0; choose an integer in 1..10000000"},
+      {"train.visible.color_hidden=40",
+       "train.visible.color_hidden: 40; choose an integer in 16..256, a multiple of 16"},
       {"train.visible.sampling=all", "must be occupancy or proposal"},
       {"train.visible.carve=2", "must be true or false"},
       {"render.palette=\xff", "UTF-8"}};
   for (const auto& [set, mention] : cases) {
-    const Outcome refused = orbitfuse_program({"poses", session.string(), "--out", out.string(), "--set", set});
+    const Outcome refused =
+        orbitfuse_program({"poses", session.string(), "--out", out.string(), "--set", set});
     EXPECT_EQ(refused.code, 2) << refused.err;
     EXPECT_THAT(refused.err, HasSubstr(mention));
     EXPECT_FALSE(fs::exists(out));
@@ -253,8 +259,8 @@ TEST_F(BadInput, TrainingOptionsAreNamedAsTheyAreWritten) {
 TEST_F(BadInput, ImportOfNothingReadable) {
   fs::create_directories(temp.path() / "photos");
   std::ofstream(temp.path() / "photos/a.jpg") << "text";
-  const Outcome outcome =
-      orbitfuse_program({"import", session.string(), "--visible", (temp.path() / "photos").string()});
+  const Outcome outcome = orbitfuse_program(
+      {"import", session.string(), "--visible", (temp.path() / "photos").string()});
   EXPECT_EQ(outcome.code, 3) << outcome.err;
   EXPECT_THAT(outcome.err, HasSubstr("a.jpg"));
 }

@@ -14,8 +14,8 @@
 #include "core/image/image_io.hpp"
 #include "drivers/aravis/aravis_source.hpp"
 #include "tests/app/cli/refusal.hpp"
-#include "tests/support/temp_folder.hpp"
 #include "tests/support/gev_simulator.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -38,8 +38,8 @@ class RefusedGigE : public ::testing::Test {
 
 TEST_F(RefusedGigE, ProfileWithAFeatureThatTheCameraLacks) {
   // TemperatureLinearMode is of another family than the simulated camera.
-  const Outcome outcome =
-      orbitfuse_program({"capture", session, "--thermal", "aravis:127.0.0.1,profile=flir-ax5", "--seconds", "1"});
+  const Outcome outcome = orbitfuse_program(
+      {"capture", session, "--thermal", "aravis:127.0.0.1,profile=flir-ax5", "--seconds", "1"});
   EXPECT_EQ(outcome.code, 4) << outcome.err;
   EXPECT_THAT(outcome.err, HasSubstr("flir-ax5"));
   EXPECT_FALSE(std::filesystem::exists(session));
@@ -47,9 +47,11 @@ TEST_F(RefusedGigE, ProfileWithAFeatureThatTheCameraLacks) {
 
 TEST_F(RefusedGigE, UnknownFeatureInAProfileOfTheUser) {
   std::filesystem::create_directory(temp.path() / "profiles");
-  std::ofstream(temp.path() / "profiles/mine.toml") << "name = \"mine\"\nmodels = []\nsettings = [{NoSuchThing = 3}]\n";
-  const Outcome outcome = orbitfuse_program({"capture", session, "--thermal", "aravis:127.0.0.1,profile=mine",
-                                             "--profiles", temp.path() / "profiles", "--seconds", "1"});
+  std::ofstream(temp.path() / "profiles/mine.toml")
+      << "name = \"mine\"\nmodels = []\nsettings = [{NoSuchThing = 3}]\n";
+  const Outcome outcome =
+      orbitfuse_program({"capture", session, "--thermal", "aravis:127.0.0.1,profile=mine",
+                         "--profiles", temp.path() / "profiles", "--seconds", "1"});
   EXPECT_EQ(outcome.code, 2) << outcome.err;
   EXPECT_THAT(outcome.err, AllOf(HasSubstr("NoSuchThing"), HasSubstr("correct the profile")));
   EXPECT_FALSE(std::filesystem::exists(session));
@@ -79,7 +81,8 @@ TEST_F(RefusedGigE, CameraThatAnotherProgramControls) {
   options.profiles = std::string(ORBITFUSE_SOURCE_DIR) + "/config/cameras";
   aravis::AravisSource first(options);
   ASSERT_TRUE(first.start());
-  const Outcome outcome = orbitfuse_program({"capture", session, "--thermal", "aravis:127.0.0.1", "--seconds", "1"});
+  const Outcome outcome =
+      orbitfuse_program({"capture", session, "--thermal", "aravis:127.0.0.1", "--seconds", "1"});
   EXPECT_EQ(outcome.code, 4) << outcome.err;
   EXPECT_THAT(outcome.err, HasSubstr("another program"));
   EXPECT_FALSE(std::filesystem::exists(session));
@@ -105,7 +108,8 @@ TEST(Refused, PageAtAPortInUse) {
   ASSERT_EQ(::getsockname(holder, reinterpret_cast<sockaddr*>(&address), &length), 0);
   const std::string port = std::to_string(ntohs(address.sin_port));
   expect_refused({"capture", temp.path() / "s", "--visible", tiny, "--page", port}, 4, port);
-  expect_refused({"capture", temp.path() / "s", "--visible", tiny, "--page", port}, 4, "choose another with --page");
+  expect_refused({"capture", temp.path() / "s", "--visible", tiny, "--page", port}, 4,
+                 "choose another with --page");
   ::close(holder);
   EXPECT_FALSE(std::filesystem::exists(temp.path() / "s"));
 }
@@ -115,7 +119,8 @@ Outcome as_nobody(const std::vector<std::string>& arguments) {
   std::vector<std::string> command{ORBITFUSE_BINARY_DIR "/app/orbitfuse"};
   command.insert(command.end(), arguments.begin(), arguments.end());
   if (::geteuid() == 0) {
-    const std::vector<std::string> drop{"setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"};
+    const std::vector<std::string> drop{"setpriv", "--reuid=65534", "--regid=65534",
+                                        "--clear-groups"};
     command.insert(command.begin(), drop.begin(), drop.end());
   }
   return run_program(command);
@@ -123,18 +128,21 @@ Outcome as_nobody(const std::vector<std::string>& arguments) {
 
 TEST(Refused, DeviceAndFolderWithoutPermission) {
   const test::TempFolder temp;
-  std::filesystem::permissions(temp.path(), std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec |
-                                              std::filesystem::perms::others_read |
-                                              std::filesystem::perms::others_exec);
+  std::filesystem::permissions(
+      temp.path(), std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec |
+                       std::filesystem::perms::others_read | std::filesystem::perms::others_exec);
   const std::string session = temp.path() / "s";
-  if (as_nobody({"--version"}).code != 0) GTEST_SKIP() << "setpriv, or the program for other users, is missing";
-  expect_refused({"capture", session, "--visible", tiny}, 4, session + ": Permission denied", as_nobody);
+  if (as_nobody({"--version"}).code != 0)
+    GTEST_SKIP() << "setpriv, or the program for other users, is missing";
+  expect_refused({"capture", session, "--visible", tiny}, 4, session + ": Permission denied",
+                 as_nobody);
   // Any device that only root may open stands for a camera.
   if (std::filesystem::exists("/dev/loop-control")) {
     const test::TempFolder open_to_all;
     std::filesystem::permissions(open_to_all.path(), std::filesystem::perms::all);
     const std::string never = open_to_all.path() / "never";
-    const Outcome device = as_nobody({"capture", never, "--visible", "v4l2:/dev/loop-control", "--seconds", "1"});
+    const Outcome device =
+        as_nobody({"capture", never, "--visible", "v4l2:/dev/loop-control", "--seconds", "1"});
     EXPECT_EQ(device.code, 4) << device.err;
     EXPECT_THAT(device.err, HasSubstr("group video"));
     EXPECT_FALSE(std::filesystem::exists(never));
@@ -147,7 +155,8 @@ TEST(Refused, SessionThatMayNotBeRead) {
   const test::TempFolder temp;
   std::ofstream(temp.path() / "manifest.jsonl") << "x";
   std::filesystem::permissions(temp.path(), std::filesystem::perms::none);
-  if (as_nobody({"--version"}).code != 0) GTEST_SKIP() << "setpriv, or the program for other users, is missing";
+  if (as_nobody({"--version"}).code != 0)
+    GTEST_SKIP() << "setpriv, or the program for other users, is missing";
   const Outcome outcome = as_nobody({"inspect", temp.path()});
   std::filesystem::permissions(temp.path(), std::filesystem::perms::owner_all);
   EXPECT_EQ(outcome.code, 3) << outcome.err;
@@ -161,12 +170,14 @@ TEST(Refused, DiskWithTooLittleSpace) {
   const std::string photo = temp.path().string() + "-photo.png";
   ASSERT_TRUE(write_png(photo, cv::Mat(30, 40, CV_8UC3, cv::Scalar(9, 80, 7))));
   const Runner run = [&](const std::vector<std::string>& arguments) {
-    std::string line = "mount -t tmpfs -o size=16m none '" + disk + "' && '" ORBITFUSE_BINARY_DIR "/app/orbitfuse'";
+    std::string line = "mount -t tmpfs -o size=16m none '" + disk +
+                       "' && '" ORBITFUSE_BINARY_DIR "/app/orbitfuse'";
     for (const std::string& word : arguments) line += " '" + word + "'";
     line += "; code=$?; [ -z \"$(ls -A '" + disk + "')\" ] && exit $code || exit 99";
     return run_program({"unshare", "--map-root-user", "--mount", "sh", "-c", line});
   };
-  if (run({"--version"}).code != 0) GTEST_SKIP() << "no disk of its own can be mounted here (unshare)";
+  if (run({"--version"}).code != 0)
+    GTEST_SKIP() << "no disk of its own can be mounted here (unshare)";
   const std::string words = "16 MiB free on the disk, 64 MiB needed; free disk space, or ";
   expect_refused({"capture", session, "--visible", tiny}, 4, words + "record to another disk", run);
   expect_refused({"import", session, "--visible", photo}, 4, words + "import to another disk", run);

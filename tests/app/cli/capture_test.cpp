@@ -5,9 +5,9 @@
 
 #include <fstream>
 
-#include "core/system/file_io.hpp"
 #include "core/image/image_io.hpp"
 #include "core/session/session.hpp"
+#include "core/system/file_io.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -41,9 +41,11 @@ TEST(Inspect, EachCameraAndSizeIsListed) {
   const std::string session = temp.path() / "s";
   const Outcome imported = orbitfuse_program({"import", session, "--visible", temp.path() / "in"});
   ASSERT_EQ(imported.code, 0) << imported.err;
-  EXPECT_THAT(imported.err, testing::AllOf(HasSubstr("in/a.png"), HasSubstr("in/c.png"), HasSubstr("64x30")));
+  EXPECT_THAT(imported.err,
+              testing::AllOf(HasSubstr("in/a.png"), HasSubstr("in/c.png"), HasSubstr("64x30")));
   const Outcome words = orbitfuse_program({"inspect", session});
-  EXPECT_THAT(words.out, testing::AllOf(HasSubstr("visible0: 2 frames of 40x30"), HasSubstr("visible1: 1 frames of 64x30")));
+  EXPECT_THAT(words.out, testing::AllOf(HasSubstr("visible0: 2 frames of 40x30"),
+                                        HasSubstr("visible1: 1 frames of 64x30")));
   const auto visible = orbitfuse_program({"inspect", session, "--json"}).result().at("visible");
   EXPECT_EQ(visible.at("size"), "40x30, 64x30");
   ASSERT_EQ(visible.at("groups").size(), 2u);
@@ -131,7 +133,8 @@ TEST(Mat, IsWrittenWholeOrNotAtAll) {
   EXPECT_EQ(outcome.result().at("tags_per_side"), 5);
   EXPECT_GT(std::filesystem::file_size(file), 1000u);
   EXPECT_EQ(orbitfuse_program({"mat", "--out", temp.path() / "no.pdf", "--tags", "99"}).code, 2);
-  EXPECT_EQ(orbitfuse_program({"mat", "--out", temp.path() / "no.pdf", "--paper", "letter"}).code, 2);
+  EXPECT_EQ(orbitfuse_program({"mat", "--out", temp.path() / "no.pdf", "--paper", "letter"}).code,
+            2);
   EXPECT_FALSE(std::filesystem::exists(temp.path() / "no.pdf"));
 }
 
@@ -172,7 +175,9 @@ TEST(Mat, OverwritesAndMakesNothingUnasked) {
   EXPECT_FALSE(std::filesystem::exists(temp.path() / "none"));
   EXPECT_EQ(orbitfuse_program({"mat", "--out", file, "--force"}).code, 0);
   EXPECT_THAT(*read_file(file), testing::StartsWith("%PDF"));
-  EXPECT_EQ(orbitfuse_program({"mat", "--out", "here.PDF", "--tags", "0"}, {.folder = temp.path()}).code, 2);
+  EXPECT_EQ(
+      orbitfuse_program({"mat", "--out", "here.PDF", "--tags", "0"}, {.folder = temp.path()}).code,
+      2);
   EXPECT_EQ(orbitfuse_program({"mat", "--out", "here.PDF"}, {.folder = temp.path()}).code, 0);
 }
 
@@ -185,13 +190,16 @@ TEST(Capture, FilesPassedOverAreNamed) {
   ASSERT_TRUE(write_png(card / "a.png", image));
   std::filesystem::copy(card / "a.png", card / "b.png");
   std::ofstream(card / "c.heic") << "x";
-  const std::vector<std::string> words = {"capture", temp.path() / "s",  "--visible", "stills:" + card.string() + ",existing=yes",
-                                          "--seconds", "2.5", "--guide", "off"};
+  const std::vector<std::string> words = {"capture",   temp.path() / "s",
+                                          "--visible", "stills:" + card.string() + ",existing=yes",
+                                          "--seconds", "2.5",
+                                          "--guide",   "off"};
   const Outcome outcome = orbitfuse_program(words);
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   for (const std::string& text : {outcome.err, outcome.out})
     EXPECT_THAT(text, testing::AllOf(HasSubstr("passed over"), HasSubstr("c.heic: not a JPEG")));
-  EXPECT_THAT(outcome.out, testing::AllOf(HasSubstr("visible0: 2 files passed over"), HasSubstr("b.png: the same image")));
+  EXPECT_THAT(outcome.out, testing::AllOf(HasSubstr("visible0: 2 files passed over"),
+                                          HasSubstr("b.png: the same image")));
   EXPECT_THAT(outcome.err, HasSubstr("stills, camera known from its first photo"));
 }
 
@@ -204,13 +212,17 @@ TEST(Capture, PhotoThatWasNotWholeAtTheEndIsAccountedFor) {
   std::ofstream(card / "cut.png", std::ios::binary) << read_file(card / "a.png")->substr(0, 60);
   std::ofstream(card / "zero.png").flush();
   const std::string camera = "stills:" + card.string() + ",existing=yes";
-  const Outcome short_one = orbitfuse_program({"capture", temp.path() / "short", "--visible", camera, "--seconds", "0.5"});
-  EXPECT_THAT(short_one.out, testing::AllOf(HasSubstr("no frame came"), HasSubstr("3 files passed over"),
-                                            HasSubstr("a.png: not read before the recording ended"),
-                                            HasSubstr("zero.png: an empty file")));
-  const Outcome outcome = orbitfuse_program({"capture", temp.path() / "s", "--visible", camera, "--seconds", "2.5"});
+  const Outcome short_one = orbitfuse_program(
+      {"capture", temp.path() / "short", "--visible", camera, "--seconds", "0.5"});
+  EXPECT_THAT(short_one.out,
+              testing::AllOf(HasSubstr("no frame came"), HasSubstr("3 files passed over"),
+                             HasSubstr("a.png: not read before the recording ended"),
+                             HasSubstr("zero.png: an empty file")));
+  const Outcome outcome =
+      orbitfuse_program({"capture", temp.path() / "s", "--visible", camera, "--seconds", "2.5"});
   EXPECT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_THAT(outcome.out, HasSubstr("1 received, 1 lost (0 missing, 1 rejected, 0 dropped) of ids 0 to 1"));
+  EXPECT_THAT(outcome.out,
+              HasSubstr("1 received, 1 lost (0 missing, 1 rejected, 0 dropped) of ids 0 to 1"));
   EXPECT_THAT(outcome.out, HasSubstr("1 file passed over, last zero.png"));
   const Session session = opened(temp.path() / "s");
   ASSERT_EQ(session.gaps.size(), 1u);
@@ -219,7 +231,9 @@ TEST(Capture, PhotoThatWasNotWholeAtTheEndIsAccountedFor) {
 
 TEST(Capture, NamesThatAreNotUtf8) {
   const test::TempFolder temp;
-  const std::string session = temp.path() / "gr\xf6\xdf" "e";
+  const std::string session = temp.path() /
+                              "gr\xf6\xdf"
+                              "e";
   const Outcome captured = orbitfuse_program({"capture", session, "--visible", tiny, "--json"});
   EXPECT_EQ(captured.code, 0) << captured.err;
   EXPECT_EQ(captured.result().at("ok"), true);
@@ -234,8 +248,9 @@ TEST(Capture, NamesThatAreNotUtf8) {
 
 TEST(Capture, WithoutAFrameTheAccountHasNoIds) {
   const test::TempFolder temp;
-  const std::vector<std::string> words = {"capture", temp.path() / "s", "--visible", "stills:" + temp.path().string(),
-                                          "--seconds", "0.2", "--guide", "off"};
+  const std::vector<std::string> words = {
+      "capture", temp.path() / "s", "--visible", "stills:" + temp.path().string(), "--seconds",
+      "0.2",     "--guide",         "off"};
   const Outcome outcome = orbitfuse_program(words);
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("visible0: no frame came"));
@@ -244,8 +259,10 @@ TEST(Capture, WithoutAFrameTheAccountHasNoIds) {
 TEST(Capture, WithoutAGuideThereIsNoEnterKey) {
   const test::TempFolder temp;
   const auto words = [&](const char* guide) {
-    return orbitfuse_program({"capture", temp / guide, "--visible", "stills:" + temp.path().string(),
-                              "--seconds", "0.2", "--guide", guide}).err;
+    return orbitfuse_program({"capture", temp / guide, "--visible",
+                              "stills:" + temp.path().string(), "--seconds", "0.2", "--guide",
+                              guide})
+        .err;
   };
   EXPECT_THAT(words("off"), testing::Not(HasSubstr("Enter")));
   EXPECT_THAT(words("key"), HasSubstr("Enter: at the next station"));
@@ -274,21 +291,33 @@ TEST(Capture, MistakesHaveARemedyAndLeaveNothing) {
       {{"--driver", "replay:/nowhere"}, 3, "no such folder"},
       {{"--driver", tiny, "--spacing-deg", "31"}, 2, "guide.spacing_deg"},
       {{"--driver", tiny, "--turntable", "500"}, 2, "--turntable: 500"},
-      {{"--driver", tiny, "--turntable", "0"}, 2, "--turntable: 0; give the table's step, -120 to 120 and not 0"},
+      {{"--driver", tiny, "--turntable", "0"},
+       2,
+       "--turntable: 0; give the table's step, -120 to 120 and not 0"},
       {{"--driver", tiny, "--turntable", "15"}, 2, "don't wait for a key"},
       {{"--driver", tiny, "--spacing-deg", "0"}, 2, "--spacing-deg: 0; give 1 to 120"},
-      {{"--driver", tiny, "--seconds", "-1"}, 2, "--seconds: -1; give 0 (until it is stopped) to 10000000"},
+      {{"--driver", tiny, "--seconds", "-1"},
+       2,
+       "--seconds: -1; give 0 (until it is stopped) to 10000000"},
       {{"--driver", tiny, "--seconds", "nan"}, 2, "--seconds: nan"},
       {{"--driver", tiny, "--max-edge-px", "0", "3"}, 2, "--max-edge-px: 0; give more than 0"},
       {{"--driver", tiny, "--elevations-deg", "10", "12"}, 2, "degrees apart or more"},
       {{"--driver", tiny, "--elevations-deg", "100"}, 2, "--elevations-deg: 100"},
       {{"--driver", tiny, "--mat-tags", "7"}, 2, "the frames carry their stations"},
       {{"--driver", tiny, "--mat", "foil"}, 2, "--mat: no mat is looked for"},
-      {{"--visible", "stills:.", "--guide", "key", "--mat-tags", "7"}, 2, "use --guide auto without --turntable"},
+      {{"--visible", "stills:.", "--guide", "key", "--mat-tags", "7"},
+       2,
+       "use --guide auto without --turntable"},
       {{"--visible", "stills:.", "--mat-tags", "0"}, 2, "mat.tags_per_side: 0; must be 2 to 15"},
-      {{"--driver", tiny, "--guide", "key"}, 2, "--guide key: replayed and synthetic frames don't wait for a key"},
-      {{"--driver", tiny, "--guide", "off", "--spacing-deg", "60"}, 2, "--spacing-deg: given with --guide off"},
-      {{"--driver", tiny, "--visible", tiny, "--thermal", tiny}, 2, "leave it out: --visible and --thermal"},
+      {{"--driver", tiny, "--guide", "key"},
+       2,
+       "--guide key: replayed and synthetic frames don't wait for a key"},
+      {{"--driver", tiny, "--guide", "off", "--spacing-deg", "60"},
+       2,
+       "--spacing-deg: given with --guide off"},
+      {{"--driver", tiny, "--visible", tiny, "--thermal", tiny},
+       2,
+       "leave it out: --visible and --thermal"},
       {{"--visible", "", "--thermal", tiny}, 2, "--visible: given without a name"},
       {{"--visible", tiny, "--page", ""}, 2, "--page: given without a name"},
       {{"--visible", "stills:.,existing=yes,existing=no"}, 2, "existing is given twice"},

@@ -15,9 +15,9 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
-const std::vector<std::string> verbs = {"run",    "import", "inspect", "poses",  "train",
-                                        "register", "render", "fuse",    "metrics", "report",
-                                        "eval",   "replay", "capture", "devices", "mat", "doctor"};
+const std::vector<std::string> verbs = {
+    "run",     "import", "inspect", "poses",  "train",   "register", "render", "fuse",
+    "metrics", "report", "eval",    "replay", "capture", "devices",  "mat",    "doctor"};
 
 TEST(Cli, HelpBeginsWithAnExampleAndGoesToStdout) {
   for (const std::string& verb : verbs) {
@@ -98,8 +98,7 @@ TEST(Cli, ShippedConfigHoldsTheBuiltInDefaults) {
   ASSERT_EQ(printed.code, 0);
   const auto shipped = read_file(ORBITFUSE_SOURCE_DIR "/config/orbitfuse.toml");
   ASSERT_TRUE(shipped);
-  EXPECT_THAT(*shipped, HasSubstr(printed.out))
-      << "regenerate with: cmake/write_reference.sh";
+  EXPECT_THAT(*shipped, HasSubstr(printed.out)) << "regenerate with: cmake/write_reference.sh";
   const Outcome again = orbitfuse_program(
       {"run", "--print-config", "--config", ORBITFUSE_SOURCE_DIR "/config/orbitfuse.toml"});
   EXPECT_EQ(again.out, printed.out);
@@ -107,16 +106,18 @@ TEST(Cli, ShippedConfigHoldsTheBuiltInDefaults) {
 
 /// A recipe's field that was changed is part of what is run.
 TEST(Cli, PrintedConfigHoldsTheRecipesChangedFields) {
-  const Outcome printed = orbitfuse_program(
-      {"run", "--print-config", "--set", "train.visible.iterations=123"});
+  const Outcome printed =
+      orbitfuse_program({"run", "--print-config", "--set", "train.visible.iterations=123"});
   ASSERT_EQ(printed.code, 0) << printed.err;
   const std::size_t visible = printed.out.find("[train.visible]");
   ASSERT_NE(visible, std::string::npos);
-  EXPECT_LT(printed.out.find("\niterations = 123\n", visible), printed.out.find("\n[", visible + 1));
+  EXPECT_LT(printed.out.find("\niterations = 123\n", visible),
+            printed.out.find("\n[", visible + 1));
   EXPECT_EQ(printed.out.find("iterations = 123"), printed.out.rfind("iterations = 123"));
   const test::TempFolder temp;
   std::ofstream(temp / "mine.toml") << printed.out;
-  const Outcome again = orbitfuse_program({"run", "--print-config", "--config", temp / "mine.toml"});
+  const Outcome again =
+      orbitfuse_program({"run", "--print-config", "--config", temp / "mine.toml"});
   EXPECT_EQ(again.out, printed.out);
 }
 

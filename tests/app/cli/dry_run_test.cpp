@@ -127,9 +127,9 @@ TEST_F(DryRun, SaysWhatImportWouldMake) {
 }
 
 TEST_F(DryRun, WatchedFolderMayStillBeEmpty) {
-  const Outcome dry =
-      orbitfuse_program({"capture", fresh, "--visible", "stills:" + (temp.path() / "empty").string(),
-                         "--dry-run", "--seconds", "0.3"});
+  const Outcome dry = orbitfuse_program({"capture", fresh, "--visible",
+                                         "stills:" + (temp.path() / "empty").string(), "--dry-run",
+                                         "--seconds", "0.3"});
   EXPECT_EQ(dry.code, 0) << dry.err;
   EXPECT_THAT(dry.err, HasSubstr("no new photo came meanwhile"));
 }

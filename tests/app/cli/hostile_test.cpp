@@ -53,7 +53,9 @@ TEST_F(Hostile, FuseWritesWhereItIsToldAndNowhereElse) {
   refused(fuse({"--out", path("f.gif")}), 2, "end it in .png or .jpg");
   EXPECT_EQ(fuse({"--out", path("f.png"), "--dry-run"}).code, 0);
   EXPECT_FALSE(fs::exists(path("f.png")));
-  for (const auto& [name, format] : {std::pair{"f.png", ImageFormat::png}, {"f.jpg", ImageFormat::jpeg}, {"f.JPEG", ImageFormat::jpeg}}) {
+  for (const auto& [name, format] : {std::pair{"f.png", ImageFormat::png},
+                                     {"f.jpg", ImageFormat::jpeg},
+                                     {"f.JPEG", ImageFormat::jpeg}}) {
     const Outcome done = fuse({"--out", path(name)});
     EXPECT_EQ(done.code, 0) << done.err;
     EXPECT_EQ(image_format(*read_file(path(name))), format) << name;
@@ -66,7 +68,8 @@ TEST_F(Hostile, FoldersOfPairsAreNotWrittenOver) {
   fs::copy_file(path("v.png"), path("pairs/vi/a.png"));
   fs::copy_file(path("t.png"), path("pairs/ir/a.png"));
   const auto run = [&](std::vector<std::string> more) {
-    more.insert(more.begin(), {"fuse", "--visible", path("pairs/vi"), "--thermal", path("pairs/ir")});
+    more.insert(more.begin(),
+                {"fuse", "--visible", path("pairs/vi"), "--thermal", path("pairs/ir")});
     return orbitfuse_program(more, {.folder = temp.path()});
   };
   refused(run({}), 2, "--out: not given");
@@ -77,7 +80,8 @@ TEST_F(Hostile, FoldersOfPairsAreNotWrittenOver) {
 TEST_F(Hostile, EmptyValuesAreNoValues) {
   write_fixture_session(path("s"));
   for (const char* option : {"--budget", "--config", "--out", "--cameras"})
-    refused(orbitfuse_program({"run", path("s"), option, ""}, {.folder = temp.path()}), 2, std::string(option) + ": empty");
+    refused(orbitfuse_program({"run", path("s"), option, ""}, {.folder = temp.path()}), 2,
+            std::string(option) + ": empty");
   refused(orbitfuse_program({"inspect", ""}), 2, "empty");
 }
 
@@ -113,7 +117,8 @@ TEST_F(Hostile, NamesDoNotReachTheTerminalAsCommands) {
   std::ofstream(name) << "no image";
   const Outcome outcome = orbitfuse_program({"import", path("s"), "--visible", name});
   EXPECT_EQ(outcome.code, 3);
-  EXPECT_THAT(outcome.err, AllOf(Not(HasSubstr("\x1b")), Not(HasSubstr("\x07")), HasSubstr("a\\x1b[2J\\x07.jpg")));
+  EXPECT_THAT(outcome.err, AllOf(Not(HasSubstr("\x1b")), Not(HasSubstr("\x07")),
+                                 HasSubstr("a\\x1b[2J\\x07.jpg")));
   const Outcome word = orbitfuse_program({"insp\x1b[31mect"});
   EXPECT_THAT(word.err, Not(HasSubstr("\x1b")));
 }
@@ -126,7 +131,8 @@ TEST_F(Hostile, InspectLooksAtTheFrames) {
   const Outcome outcome = orbitfuse_program({"inspect", path("s"), "--json"});
   EXPECT_EQ(outcome.code, 3);
   EXPECT_EQ(outcome.result().at("damaged").size(), 2u);
-  EXPECT_THAT(outcome.err, AllOf(HasSubstr("visible/000003.png"), HasSubstr("thermal/000001.tiff"), HasSubstr("2 of 24")));
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("visible/000003.png"), HasSubstr("thermal/000001.tiff"),
+                                 HasSubstr("2 of 24")));
 }
 
 TEST_F(Hostile, ReportTellsWhatIsThereAndMakesNothing) {
@@ -147,34 +153,41 @@ TEST_F(Hostile, WhyColmapFailedIsInTheMessage) {
   write_fixture_session(path("s"), {.known_poses = false});
   std::ofstream(path("boom.sh")) << "#!/bin/sh\necho 'boom: no GPU' >&2\nexit 3\n";
   fs::permissions(path("boom.sh"), fs::perms::owner_all);
-  const Outcome outcome = orbitfuse_program({"poses", path("s"), "--out", path("o"), "--set", "poses.colmap=" + path("boom.sh")});
+  const Outcome outcome = orbitfuse_program(
+      {"poses", path("s"), "--out", path("o"), "--set", "poses.colmap=" + path("boom.sh")});
   EXPECT_NE(outcome.code, 0);
   EXPECT_THAT(outcome.err, AllOf(HasSubstr("boom: no GPU"), Not(HasSubstr("colmap.log"))));
 }
 
 TEST_F(Hostile, ConfigurationsThatNeverEndAreRefused) {
   write_fixture_session(path("s"));
-  refused(orbitfuse_program({"run", path("s"), "--out", path("o"), "--config", "/dev/zero"}), 3, "a device, not a file");
-  refused(orbitfuse_program({"register", "--source", "/dev/zero", "--target", "/dev/zero"}), 3, "a device, not a file");
+  refused(orbitfuse_program({"run", path("s"), "--out", path("o"), "--config", "/dev/zero"}), 3,
+          "a device, not a file");
+  refused(orbitfuse_program({"register", "--source", "/dev/zero", "--target", "/dev/zero"}), 3,
+          "a device, not a file");
   std::ofstream(path("huge.toml")).close();
   fs::resize_file(path("huge.toml"), 8ull << 30);
-  refused(orbitfuse_program({"run", path("s"), "--out", path("o"), "--config", path("huge.toml")}), 3, "8192 MiB");
+  refused(orbitfuse_program({"run", path("s"), "--out", path("o"), "--config", path("huge.toml")}),
+          3, "8192 MiB");
 }
 
 /// Options named in messages are options of the program.
 TEST(Messages, NameOptionsThatExist) {
   const std::string reference = *read_file(fs::path(ORBITFUSE_SOURCE_DIR) / "docs/cli.md");
   // Of other programs that are told to run: v4l2-ctl, COLMAP, apt-get, and our recorder of scenes.
-  const std::regex literal(R"lit("((?:[^"\\]|\\.)*)")lit"), option(R"((^|[^\w-])(--[a-z][a-z0-9-]*[a-z0-9]))");
+  const std::regex literal(R"lit("((?:[^"\\]|\\.)*)")lit"),
+      option(R"((^|[^\w-])(--[a-z][a-z0-9-]*[a-z0-9]))");
   for (const char* folder : {"app", "core", "capture", "drivers", "fusion", "recon"}) {
-    for (const auto& entry : fs::recursive_directory_iterator(fs::path(ORBITFUSE_SOURCE_DIR) / folder)) {
+    for (const auto& entry :
+         fs::recursive_directory_iterator(fs::path(ORBITFUSE_SOURCE_DIR) / folder)) {
       if (entry.path().extension() != ".cpp" || entry.path().filename() == "record_main.cpp" ||
           entry.path().filename() == "colmap.cpp")
         continue;
       std::istringstream lines(*read_file(entry.path()));
       for (std::string line; std::getline(lines, line);) {
         if (line.find("v4l2-ctl") != std::string::npos) continue;
-        for (std::sregex_iterator text(line.begin(), line.end(), literal), end; text != end; ++text) {
+        for (std::sregex_iterator text(line.begin(), line.end(), literal), end; text != end;
+             ++text) {
           const std::string words = (*text)[1];
           for (std::sregex_iterator o(words.begin(), words.end(), option); o != end; ++o)
             EXPECT_THAT(reference, HasSubstr((*o)[2].str())) << entry.path() << ": " << line;

@@ -15,8 +15,8 @@ namespace {
 namespace fs = std::filesystem;
 
 Outcome run_car(const fs::path& out, const std::string& interrupt_after = {}) {
-  std::vector<std::string> words = {"run",   ORBITFUSE_SOURCE_DIR "/replay_data/car",
-                                    "--out", out.string(), "--json", "--resume"};
+  std::vector<std::string> words = {
+      "run", ORBITFUSE_SOURCE_DIR "/replay_data/car", "--out", out.string(), "--json", "--resume"};
   for (const char* set : {"train.visible.iterations=300", "train.thermal.iterations=100",
                           "train.visible.eval_count=0", "train.thermal.eval_count=0",
                           "render.views=4", "render.width_px=160"})
@@ -24,7 +24,8 @@ Outcome run_car(const fs::path& out, const std::string& interrupt_after = {}) {
   return orbitfuse_program(words, {.interrupt_after = interrupt_after});
 }
 
-/// Hashes of all results; what tells of times (records of stages and run, training curves, the report) is left out.
+/// Hashes of all results; what tells of times (records of stages and run, training curves, the
+/// report) is left out.
 std::map<std::string, std::string> results(const fs::path& out) {
   const std::set<std::string> timed = {"stage.json", "run.json", "report.html", "curve.json"};
   std::map<std::string, std::string> hashes;
@@ -41,10 +42,11 @@ TEST(Interrupt, InEveryStageThenResumedEqualsUnbroken) {
   const test::TempFolder temp;
   int interruptions = 0;
   // What each stage prints on its way, in the order of the stages.
-  for (const char* sign : {"orbit pairs: features", "orbit pairs: mapping", "\"stage\":\"depth\",\"total\"",
-                           "training views", "\"stage\":\"export\"", "alignment with renders",
-                           "\"stage\":\"train.thermal\"", "\"stage\":\"register\"",
-                           "\"stage\":\"render\",\"total\"", "\"stage\":\"metrics\",\"total\""}) {
+  for (const char* sign :
+       {"orbit pairs: features", "orbit pairs: mapping", "\"stage\":\"depth\",\"total\"",
+        "training views", "\"stage\":\"export\"", "alignment with renders",
+        "\"stage\":\"train.thermal\"", "\"stage\":\"register\"", "\"stage\":\"render\",\"total\"",
+        "\"stage\":\"metrics\",\"total\""}) {
     const Outcome stopped = run_car(temp.path() / "broken", sign);
     if (stopped.code == 0) break;  // the last stages may end before the signal reaches them
     ASSERT_EQ(stopped.code, 130) << sign << '\n' << stopped.err;

@@ -26,7 +26,8 @@ struct RunOptions {
 };
 
 /// Runs the built `orbitfuse` with the arguments.
-Outcome orbitfuse_program(const std::vector<std::string>& arguments, const RunOptions& options = {});
+Outcome orbitfuse_program(const std::vector<std::string>& arguments,
+                          const RunOptions& options = {});
 /// Any program on PATH.
 Outcome run_program(const std::vector<std::string>& command, const RunOptions& options = {});
 

@@ -8,8 +8,8 @@
 
 #include "core/session/session.hpp"
 #include "tests/app/cli/program.hpp"
-#include "tests/support/temp_folder.hpp"
 #include "tests/core/session_account.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {

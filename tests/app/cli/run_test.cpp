@@ -6,10 +6,10 @@
 #include <fstream>
 #include <map>
 
-#include "core/system/file_io.hpp"
-#include "core/image/image_io.hpp"
 #include "core/formats/ply.hpp"
 #include "core/formats/transforms_json.hpp"
+#include "core/image/image_io.hpp"
+#include "core/system/file_io.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/app/cli/session_fixture.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -25,10 +25,11 @@ class Run : public testing::Test {
               const std::string& verb = "run") {
     std::vector<std::string> words = {verb, session.string(), "--out", out.string(), "--json"};
     for (const char* set :
-         {"train.visible.iterations=200", "train.thermal.iterations=200", "train.visible.eval_count=0",
-          "train.thermal.eval_count=0", "train.visible.cloud_width_px=32",
-          "train.thermal.cloud_width_px=32",
-          "train.visible.cloud_tolerance=0.2", "train.thermal.cloud_tolerance=0.2", "render.views=2", "render.width_px=64"}) {
+         {"train.visible.iterations=200", "train.thermal.iterations=200",
+          "train.visible.eval_count=0", "train.thermal.eval_count=0",
+          "train.visible.cloud_width_px=32", "train.thermal.cloud_width_px=32",
+          "train.visible.cloud_tolerance=0.2", "train.thermal.cloud_tolerance=0.2",
+          "render.views=2", "render.width_px=64"}) {
       words.insert(words.end(), {"--set", set});
     }
     words.insert(words.end(), more.begin(), more.end());
@@ -87,8 +88,8 @@ TEST_F(Run, WhatNobodyCanMeasureIsAnErrorAndCamerasAreReadFirst) {
   ASSERT_TRUE(write_file_atomic(truth, R"({"visible": {"K": {"w": 64, "h": 48, "fx": 60, "fy": 60,
       "cx": 32, "cy": 24}, "frames": [{"file": "of/another/scene.jpg",
       "c2w": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]}})"));
-  const Outcome foreign = orbitfuse_program({"eval", session.string(), "--out", out.string(),
-                                             "--ground-truth", truth.string()});
+  const Outcome foreign = orbitfuse_program(
+      {"eval", session.string(), "--out", out.string(), "--ground-truth", truth.string()});
   EXPECT_EQ(foreign.code, 3) << foreign.err;
   EXPECT_THAT(foreign.err, HasSubstr("truth.json"));
 }
@@ -100,7 +101,8 @@ TEST_F(Run, AFinishedRunKeepsItsOptions) {
   ASSERT_EQ(again.code, 0) << again.err;
   for (const auto& [stage, state] : states(again))
     EXPECT_TRUE(stage == "report" || state != "ran") << stage;
-  const Outcome changed = orbitfuse_program({"render", out.string(), "--json", "--set", "render.views=1"});
+  const Outcome changed =
+      orbitfuse_program({"render", out.string(), "--json", "--set", "render.views=1"});
   ASSERT_EQ(changed.code, 0) << changed.err;
   EXPECT_EQ(states(changed).at("train_visible"), "unchanged");
   EXPECT_EQ(states(changed).at("render"), "ran");

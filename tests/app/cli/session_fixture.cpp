@@ -49,8 +49,8 @@ cv::Mat picture(const Camera& camera, const Rigid3d& cam_from_world, Modality mo
       const auto hit = hit_cube(eye, ray);
       const double v = hit ? pattern(*hit) : 0.1;
       if (visible)
-        image.at<cv::Vec3b>(y, x) = cv::Vec3b(cv::saturate_cast<uchar>(255 * v),
-                                              cv::saturate_cast<uchar>(200 * v), 60);
+        image.at<cv::Vec3b>(y, x) =
+            cv::Vec3b(cv::saturate_cast<uchar>(255 * v), cv::saturate_cast<uchar>(200 * v), 60);
       else
         image.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(29000 + 2000 * v);
     }
@@ -78,7 +78,8 @@ void write_fixture_session(const std::filesystem::path& folder, const FixtureOpt
     check((*writer)->add_device(device));
     for (int i = 0; i < count; ++i) {
       const double offset = modality == Modality::visible ? 0 : 11;
-      const double azimuth_deg = 360.0 * i / count + offset, a = azimuth_deg * std::numbers::pi / 180;
+      const double azimuth_deg = 360.0 * i / count + offset,
+                   a = azimuth_deg * std::numbers::pi / 180;
       const Camera camera = Camera::from_fov(options.width, options.height, 50);
       const Rigid3d pose = look_at_origin({5 * std::cos(a), 5 * std::sin(a), 1.5});
       Frame frame;

@@ -8,7 +8,7 @@
 namespace orbitfuse {
 
 struct FixtureOptions {
-  int visible = 12, thermal = 12;   ///< views on one loop
+  int visible = 12, thermal = 12;  ///< views on one loop
   int width = 96, height = 72;
   bool known_poses = true;
   bool stations = true;

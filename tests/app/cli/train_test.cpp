@@ -17,21 +17,27 @@ using testing::HasSubstr;
 class Train : public testing::Test {
  protected:
   Train() { write_fixture_session(session, {.visible = 8, .thermal = 0}); }
-  Outcome run(std::vector<std::string> more, const std::string& verb = "train", const RunOptions& options = {}) {
-    std::vector<std::string> words = {verb, session.string(), "--out", out.string(), "--json", "--verbose"};
-    for (const char* set : {"train.visible.eval_count=2", "train.visible.cloud_width_px=32", "train.visible.log2_table=12",
-                            "train.visible.samples_per_step=2048", "depth.width_px=64"})
+  Outcome run(std::vector<std::string> more, const std::string& verb = "train",
+              const RunOptions& options = {}) {
+    std::vector<std::string> words = {verb,         session.string(), "--out",
+                                      out.string(), "--json",         "--verbose"};
+    for (const char* set : {"train.visible.eval_count=2", "train.visible.cloud_width_px=32",
+                            "train.visible.log2_table=12", "train.visible.samples_per_step=2048",
+                            "depth.width_px=64"})
       words.insert(words.end(), {"--set", set});
     words.insert(words.end(), more.begin(), more.end());
     return orbitfuse_program(words, options);
   }
   static std::vector<std::string> steps(int iterations) {
-    return {"--modality", "visible", "--set", "train.visible.iterations=" + std::to_string(iterations)};
+    return {"--modality", "visible", "--set",
+            "train.visible.iterations=" + std::to_string(iterations)};
   }
   json stage() const { return json::parse(*read_file(out / "train_visible/stage.json")); }
   json curve() const { return json::parse(*read_file(out / "train_visible/curve.json")); }
   std::string field() const { return *file_hash(out / "train_visible/field.bin"); }
-  bool extended() const { return stage().at("skips").dump().find("training goes on from there") != std::string::npos; }
+  bool extended() const {
+    return stage().at("skips").dump().find("training goes on from there") != std::string::npos;
+  }
 
   test::TempFolder temp;
   fs::path session = temp.path() / "session", out = temp.path() / "out";
@@ -49,7 +55,8 @@ TEST_F(Train, MoreStepsGoOnFromTheResultAndForceDoesNot) {
   EXPECT_EQ(stage().at("metrics").at("iterations"), 120);
   ASSERT_EQ(curve().size(), 3u);  // two a run: 30, 60 and 120
   EXPECT_EQ(curve()[1], first[1]);
-  EXPECT_GE(stage().at("metrics").at("heldout_psnr_db").get<double>(), first[1].at("heldout_psnr").get<double>());
+  EXPECT_GE(stage().at("metrics").at("heldout_psnr_db").get<double>(),
+            first[1].at("heldout_psnr").get<double>());
   const std::string longer = field();
 
   auto forced = steps(120);
@@ -84,7 +91,8 @@ TEST_F(Train, ProgressTellsWhatIsLeftAndTheHeldOutError) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   bool told = false;
   for (const json& event : outcome.events())
-    if (event.at("event") == "progress" && event.at("stage") == "train.visible" && event.contains("detail"))
+    if (event.at("event") == "progress" && event.at("stage") == "train.visible" &&
+        event.contains("detail"))
       told = told || (event.at("eta_s").is_number() &&
                       event.at("detail").get<std::string>().find("held-out ") != std::string::npos);
   EXPECT_TRUE(told);
@@ -102,11 +110,13 @@ TEST_F(Train, ATargetStopsOrWarnsAndNeedsHeldOutViews) {
   ASSERT_EQ(missed.code, 0);
   EXPECT_THAT(missed.err, HasSubstr("the target of 60.00 dB was not reached"));
   for (const char* verb : {"train", "run"}) {
-    const Outcome refused = run({"--target-psnr", "20", "--set", "train.visible.holdout_every=0"}, verb);
+    const Outcome refused =
+        run({"--target-psnr", "20", "--set", "train.visible.holdout_every=0"}, verb);
     EXPECT_EQ(refused.code, 2);
     EXPECT_THAT(refused.err, HasSubstr("--set train.visible.holdout_every=12"));
     EXPECT_EQ(run({"--budget", "soon"}, verb).code, 2);
-    EXPECT_EQ(run({"--budget", "0.0001s", "--modality", "visible"}).code, 2) << "no step fits in it";
+    EXPECT_EQ(run({"--budget", "0.0001s", "--modality", "visible"}).code, 2)
+        << "no step fits in it";
     EXPECT_EQ(run({"--target-psnr", "0"}, verb).code, 2);
   }
 }

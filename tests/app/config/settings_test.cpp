@@ -46,8 +46,9 @@ struct SettingsTest : testing::Test {
 };
 
 TEST_F(SettingsTest, ReadsEveryType) {
-  ASSERT_TRUE(read("[train.visible]\nbudget_s = 5\nweight = 0.25\n[render]\nviews = 3\npalette = 'x'\n"
-                   "[train]\nshared = false\nkind = 'faithful'\n[fusion]\nmethods = ['c']\n"));
+  ASSERT_TRUE(
+      read("[train.visible]\nbudget_s = 5\nweight = 0.25\n[render]\nviews = 3\npalette = 'x'\n"
+           "[train]\nshared = false\nkind = 'faithful'\n[fusion]\nmethods = ['c']\n"));
   EXPECT_EQ(options.budget_s, 5);
   EXPECT_EQ(options.weight, 0.25F);
   EXPECT_EQ(options.views, 3);
@@ -67,7 +68,8 @@ TEST_F(SettingsTest, UnknownKeyNamesLineAndSuggestion) {
 
 TEST_F(SettingsTest, WrongTypeSaysWhatItMustBe) {
   EXPECT_THAT(read("[render]\nviews = 2.5\n").error().message(), HasSubstr("must be integer"));
-  EXPECT_THAT(read("[train]\nkind = 'slow'\n").error().message(), HasSubstr("one of fast faithful"));
+  EXPECT_THAT(read("[train]\nkind = 'slow'\n").error().message(),
+              HasSubstr("one of fast faithful"));
   EXPECT_THAT(read("[render]\nviews = 99999999999999999999\n").error().message(), HasSubstr(":2"));
   EXPECT_THAT(read("[fusion]\nmethods = [1]\n").error().message(), HasSubstr("list"));
 }
@@ -97,17 +99,19 @@ TEST_F(SettingsTest, WhatARecordCannotHoldIsRefused) {
 
 TEST_F(SettingsTest, RecordsOfWrongTypesNameTheKey) {
   using nlohmann::json;
-  const std::pair<const char*, const char*> cases[] = {{R"({"train":7})", "train = 7"},
-                                                       {R"({"train":{"visible":[1]}})", "train.visible = [1]"},
-                                                       {R"({"render":{"views":"x"}})", "render.views = \"x\""},
-                                                       {R"({"render":{"views":null}})", "render.views = null"}};
+  const std::pair<const char*, const char*> cases[] = {
+      {R"({"train":7})", "train = 7"},
+      {R"({"train":{"visible":[1]}})", "train.visible = [1]"},
+      {R"({"render":{"views":"x"}})", "render.views = \"x\""},
+      {R"({"render":{"views":null}})", "render.views = null"}};
   for (const auto& [text, named] : cases) {
     const Status status = settings.read_json(json::parse(text), "run.json");
     ASSERT_FALSE(status) << text;
     EXPECT_THAT(status.error().message(), HasSubstr("run.json: "));
     EXPECT_THAT(status.error().message(), HasSubstr(named));
   }
-  EXPECT_TRUE(settings.read_json(json::parse(R"({"of another version":{"x":1},"render":{}})"), "run.json"));
+  EXPECT_TRUE(
+      settings.read_json(json::parse(R"({"of another version":{"x":1},"render":{}})"), "run.json"));
 }
 
 TEST_F(SettingsTest, TomlReferenceReadsBackToTheSameValues) {

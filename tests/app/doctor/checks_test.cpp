@@ -104,11 +104,13 @@ TEST_F(DoctorTest, UsbMemoryAndDriver) {
 }
 
 TEST_F(DoctorTest, CamerasThatShareASlowBus) {
-  const auto plug = [&](const std::string& port, const std::string& speed, const std::string& product) {
+  const auto plug = [&](const std::string& port, const std::string& speed,
+                        const std::string& product) {
     const std::string at = "sys/bus/usb/devices/" + port;
     put(folder / (at + "/speed"), speed + "\n");
     put(folder / (at + "/product"), product + "\n");
-    for (const char* interface : {":1.0", ":1.1"}) put(folder / (at + interface + "/bInterfaceClass"), "0e\n");
+    for (const char* interface : {":1.0", ":1.1"})
+      put(folder / (at + interface + "/bInterfaceClass"), "0e\n");
   };
   plug("1-4", "480", "Webcam");
   plug("2-1", "5000", "Fast");

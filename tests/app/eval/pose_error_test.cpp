@@ -23,7 +23,9 @@ std::vector<PosePair> orbit(int count, const Similarity3d& estimate_from_truth) 
 }
 
 const Similarity3d moved{
-    0.37, Eigen::Quaterniond(Eigen::AngleAxisd(2.1, Eigen::Vector3d(1, 2, 3).normalized())), {4, -5, 60}};
+    0.37,
+    Eigen::Quaterniond(Eigen::AngleAxisd(2.1, Eigen::Vector3d(1, 2, 3).normalized())),
+    {4, -5, 60}};
 
 TEST(PoseError, SimilarityIsRecoveredAndErrorsVanish) {
   const auto pairs = orbit(12, moved);
@@ -40,8 +42,9 @@ TEST(PoseError, OneTurnedCameraShowsInTheMaximumOnly) {
   auto pairs = orbit(12, moved);
   Rigid3d& cam = pairs[3].cam_from_estimate;
   const Eigen::Vector3d center = camera_center(cam);
-  cam.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 18, Eigen::Vector3d::UnitX())) *
-                 cam.rotation;
+  cam.rotation =
+      Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 18, Eigen::Vector3d::UnitX())) *
+      cam.rotation;
   cam.translation = -(cam.rotation * center);
   const PoseError error = pose_error(pairs, *truth_from_estimate(pairs));
   EXPECT_NEAR(error.rotation_max_deg, 10, 1e-6);

@@ -27,7 +27,8 @@ cv::Mat noise(cv::Size size, int type, std::uint64_t seed) {
 cv::Mat1f warm_scene(cv::Size size) {
   cv::Mat1f kelvin(size);
   for (int y = 0; y < size.height; ++y)
-    for (int x = 0; x < size.width; ++x) kelvin(y, x) = 290 + 0.2F * static_cast<float>(x) + std::sin(static_cast<float>(y));
+    for (int x = 0; x < size.width; ++x)
+      kelvin(y, x) = 290 + 0.2F * static_cast<float>(x) + std::sin(static_cast<float>(y));
   return kelvin;
 }
 
@@ -66,12 +67,16 @@ TEST_F(FusionBatch, WritesTheLayoutAndTheScores) {
   EXPECT_EQ(reports, 2);
   for (const char* stem : {"a.png", "b.png"})
     for (const char* folder : {"vi", "ir", "fused"})
-      EXPECT_EQ(read_image(temp.path() / "out" / folder / stem).value().size(), cv::Size(40, 32)) << folder << stem;
+      EXPECT_EQ(read_image(temp.path() / "out" / folder / stem).value().size(), cv::Size(40, 32))
+          << folder << stem;
   const std::string csv = text_of(temp.path() / "out" / metrics_file);
   EXPECT_EQ(csv.find("pair,method,metric,value\na,best,MV,"), 0U);
-  const auto values = fusion_metrics(read_image(temp.path() / "out/vi/a.png").value(), read_image(temp.path() / "out/ir/a.png").value(),
-                                     read_image(temp.path() / "out/fused/a.png").value()).value();
-  EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), 1 + 2 * values.size());
+  const auto values = fusion_metrics(read_image(temp.path() / "out/vi/a.png").value(),
+                                     read_image(temp.path() / "out/ir/a.png").value(),
+                                     read_image(temp.path() / "out/fused/a.png").value())
+                          .value();
+  EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')),
+            1 + 2 * values.size());
 }
 
 TEST_F(FusionBatch, RadiometricImagesAreSpreadOverTheirTemperatures) {
@@ -103,7 +108,8 @@ TEST_F(FusionBatch, BadPairsAreToldAndLeftOut) {
 }
 
 TEST_F(FusionBatch, NothingToFuseAndCancellingAreErrors) {
-  const auto missing = fuse_folder(temp.path() / "v", temp.path() / "nowhere", temp.path() / "out", {}, {});
+  const auto missing =
+      fuse_folder(temp.path() / "v", temp.path() / "nowhere", temp.path() / "out", {}, {});
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().kind, ErrorKind::input);
   fs::create_directories(temp.path() / "empty");

@@ -19,7 +19,8 @@ using testing::HasSubstr;
 /// A chain of stages a -> b -> c and a -> d that write text files and count their runs.
 class RunnerTest : public testing::Test {
  protected:
-  Stage text_stage(const std::string& name, std::vector<std::string> needs, nlohmann::json options) {
+  Stage text_stage(const std::string& name, std::vector<std::string> needs,
+                   nlohmann::json options) {
     Stage stage{.name = name, .needs = needs, .options = options, .inputs_hash = session};
     stage.run = [this, name, needs, options](const StageContext& context) -> Result<StageOutput> {
       ++runs[name];
@@ -40,9 +41,10 @@ class RunnerTest : public testing::Test {
     runs.clear();
     Progress progress;
     progress.cancel = &cancel;
-    Runner runner({text_stage("a", {}, {{"x", a_option}}), text_stage("b", {"a"}, {{"y", b_option}}),
-                   text_stage("c", {"b"}, {}), text_stage("d", {"a"}, {})},
-                  options, progress);
+    Runner runner(
+        {text_stage("a", {}, {{"x", a_option}}), text_stage("b", {"a"}, {{"y", b_option}}),
+         text_stage("c", {"b"}, {}), text_stage("d", {"a"}, {})},
+        options, progress);
     return runner.run();
   }
 
@@ -51,7 +53,9 @@ class RunnerTest : public testing::Test {
     for (const auto& [name, count] : runs) names.push_back(name);
     return names;
   }
-  std::string text(const std::string& stage) { return *read_file(temp.path() / "out" / stage / "text"); }
+  std::string text(const std::string& stage) {
+    return *read_file(temp.path() / "out" / stage / "text");
+  }
 
   test::TempFolder temp;
   std::string session = "session";
@@ -235,7 +239,9 @@ TEST(Runner, AStageSeesWhatOtherOptionsMadeOfTheSameInputs) {
 TEST(Runner, AbsentIsNotAFailure) {
   const test::TempFolder temp;
   Stage absent{.name = "thermal"};
-  absent.absent = [](const StageContext&) { return std::optional<std::string>("no thermal frames"); };
+  absent.absent = [](const StageContext&) {
+    return std::optional<std::string>("no thermal frames");
+  };
   absent.run = [](const StageContext&) -> Result<StageOutput> {
     ADD_FAILURE() << "must not run";
     return StageOutput{};

@@ -12,8 +12,8 @@
 #include "capture/mat/mat_finder.hpp"
 #include "capture/page/page_server.hpp"
 #include "tests/capture/mat/rendered_mat.hpp"
-#include "tests/support/temp_folder.hpp"
 #include "tests/support/gev_simulator.hpp"
+#include "tests/support/temp_folder.hpp"
 
 // Last: its <resolv.h> defines a macro _res that Eigen trips over.
 #pragma GCC diagnostic push

@@ -239,7 +239,8 @@ TEST(Recording, PicturesAreShownBeforeTheStartAndNothingIsRecorded) {
   std::vector<std::unique_ptr<FrameSource>> sources;
   sources.push_back(std::make_unique<LiveCameraSource>());
   Recording recording(std::move(sources), options);
-  ASSERT_TRUE(recording.show_until([&] { return recording.latest(Modality::thermal).has_value(); }));
+  ASSERT_TRUE(
+      recording.show_until([&] { return recording.latest(Modality::thermal).has_value(); }));
   EXPECT_FALSE(recording.latest(Modality::thermal)->pixels.empty());
   EXPECT_FALSE(recording.latest(Modality::visible));
   EXPECT_FALSE(recording.operator_at_station());  // nothing is being recorded
@@ -251,7 +252,8 @@ TEST(Recording, PicturesAreShownBeforeTheStartAndNothingIsRecorded) {
   EXPECT_TRUE(session.complete);
   ASSERT_EQ(session.streams.size(), 1u);
   // On a slow disk frames are dropped; none is missing between those shown and those recorded.
-  for (const GapRecord& gap : session.gaps) EXPECT_TRUE(gap.reason.starts_with("dropped")) << gap.reason;
+  for (const GapRecord& gap : session.gaps)
+    EXPECT_TRUE(gap.reason.starts_with("dropped")) << gap.reason;
   EXPECT_GT(session.streams[0].first_sequence, 0u);
 }
 

@@ -41,7 +41,8 @@ Model full_model() {
   m.views.push_back(view);
   m.poses.push_back({"Thermal", 20, 24, {{"colmap", "failed", "no initial pair"}}, "record more"});
   m.registration_note = "skipped";
-  m.tables.push_back({"Fusion", {{"method", ""}, {"Qabf", "Xydeas & Petrovic"}}, {{"ms-srif", "0.65"}}});
+  m.tables.push_back(
+      {"Fusion", {{"method", ""}, {"Qabf", "Xydeas & Petrovic"}}, {{"ms-srif", "0.65"}}});
   pipeline::StageStatus ran;
   ran.stage = "poses_visible";
   ran.state = pipeline::StageState::ran;
@@ -58,10 +59,10 @@ Model full_model() {
 
 TEST(Report, ShowsEverythingItIsGiven) {
   const std::string html = to_html(full_model());
-  for (const char* text : {"container &lt;1&gt;", "24 of 24", "0.0 °C", "50.0 °C", "20 of 24 views",
-                           "no initial pair", "record more", "Xydeas &amp; Petrovic", "0.65", "12.5 s",
-                           "saved 200 s", "12 of 24 posed", "one &lt;warning&gt;", "id=\"swipe\"",
-                           "kelvin_per_count"})
+  for (const char* text :
+       {"container &lt;1&gt;", "24 of 24", "0.0 °C", "50.0 °C", "20 of 24 views", "no initial pair",
+        "record more", "Xydeas &amp; Petrovic", "0.65", "12.5 s", "saved 200 s", "12 of 24 posed",
+        "one &lt;warning&gt;", "id=\"swipe\"", "kelvin_per_count"})
     EXPECT_THAT(html, HasSubstr(text));
 }
 

@@ -20,12 +20,14 @@ struct Camera30Hz {
   std::int64_t true_ns(int frame) const { return 1'700'000'000 * second + frame * second / 30; }
   std::int64_t device_ns(int frame) const {
     const double t = frame / 30.0;
-    const auto exact = true_ns(frame) + static_cast<std::int64_t>((offset_s + drift_ppm * 1e-6 * t) * 1e9);
+    const auto exact =
+        true_ns(frame) + static_cast<std::int64_t>((offset_s + drift_ppm * 1e-6 * t) * 1e9);
     return exact / 1'000'000 * 1'000'000;
   }
   std::int64_t arrival_ns(int frame) {
     std::uniform_real_distribution<double> delay(0.002, 0.022);
-    return true_ns(frame) + static_cast<std::int64_t>(((random() % 50 ? 0 : 0.08) + delay(random)) * 1e9);
+    return true_ns(frame) +
+           static_cast<std::int64_t>(((random() % 50 ? 0 : 0.08) + delay(random)) * 1e9);
   }
 };
 
@@ -93,10 +95,10 @@ TEST(GvspFrameCounter, WrapsFrom65535To1) {
   EXPECT_EQ(counter.unwrap(65534), 0u);
   EXPECT_EQ(counter.unwrap(65535), 1u);
   EXPECT_EQ(counter.unwrap(1), 2u);
-  EXPECT_EQ(counter.unwrap(4), 5u);           // two lost
-  EXPECT_EQ(counter.unwrap(3), std::nullopt); // late
-  EXPECT_EQ(counter.unwrap(4), std::nullopt); // twice
-  EXPECT_EQ(counter.unwrap(0), std::nullopt); // never sent
+  EXPECT_EQ(counter.unwrap(4), 5u);            // two lost
+  EXPECT_EQ(counter.unwrap(3), std::nullopt);  // late
+  EXPECT_EQ(counter.unwrap(4), std::nullopt);  // twice
+  EXPECT_EQ(counter.unwrap(0), std::nullopt);  // never sent
   counter.restart();
   EXPECT_EQ(counter.unwrap(65400), 6u);
 }

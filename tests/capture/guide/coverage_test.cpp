@@ -9,7 +9,8 @@
 namespace orbitfuse {
 namespace {
 
-FrameAssessment good_frame(double azimuth_deg, double elevation_deg, Modality modality = Modality::visible) {
+FrameAssessment good_frame(double azimuth_deg, double elevation_deg,
+                           Modality modality = Modality::visible) {
   FrameAssessment frame;
   frame.modality = modality;
   frame.file = "visible/000001.jpg";
@@ -49,14 +50,23 @@ TEST(Coverage, NoFalseGreen) {
       {Refusal::moving, [&](auto& f) { f.position->speed_deg_s = nan; }},
       {Refusal::blurred, [](auto& f) { f.sharpness = 0.2; }},
       {Refusal::blurred, [&](auto& f) { f.sharpness = nan; }},
-      {Refusal::blurred, [](auto& f) { f.edge_blur = EdgeBlur{1.8, 100}; }},
-      {Refusal::blurred, [&](auto& f) { f.edge_blur = EdgeBlur{nan, 100}; }},
+      {Refusal::blurred,
+       [](auto& f) {
+         f.edge_blur = EdgeBlur{1.8, 100};
+       }},
+      {Refusal::blurred,
+       [&](auto& f) {
+         f.edge_blur = EdgeBlur{nan, 100};
+       }},
       {Refusal::blurred,
        [](auto& f) {
          f.edge_blur = EdgeBlur{3.3, 100};
          f.modality = Modality::thermal;
        }},
-      {Refusal::featureless, [](auto& f) { f.edge_blur = EdgeBlur{0, 0}; }},
+      {Refusal::featureless,
+       [](auto& f) {
+         f.edge_blur = EdgeBlur{0, 0};
+       }},
       {Refusal::badly_exposed, [](auto& f) { f.underexposed = 0.6; }},
       {Refusal::between_stations, [](auto& f) { f.position->azimuth_deg = 15; }},
       {Refusal::between_stations, [&](auto& f) { f.position->azimuth_deg = nan; }},
@@ -116,9 +126,12 @@ TEST(Coverage, SaysWhereToGo) {
   plan.loop_elevations_deg = {10, 40};
   Coverage coverage(plan);
   EXPECT_EQ(coverage.instruction(Modality::visible, std::nullopt), "show the mat to the camera");
-  EXPECT_EQ(coverage.instruction(Modality::visible, OrbitPosition{12, 1, 0, 0}), "12° further left, 9° higher");
-  EXPECT_EQ(coverage.instruction(Modality::visible, OrbitPosition{348, 10, 0, 0}), "12° further right");
-  EXPECT_EQ(coverage.instruction(Modality::visible, OrbitPosition{1, 10, 0, 0}, Refusal::blurred), "blurred, hold still");
+  EXPECT_EQ(coverage.instruction(Modality::visible, OrbitPosition{12, 1, 0, 0}),
+            "12° further left, 9° higher");
+  EXPECT_EQ(coverage.instruction(Modality::visible, OrbitPosition{348, 10, 0, 0}),
+            "12° further right");
+  EXPECT_EQ(coverage.instruction(Modality::visible, OrbitPosition{1, 10, 0, 0}, Refusal::blurred),
+            "blurred, hold still");
   for (int i = 0; i < 12; ++i) coverage.add(good_frame(30 * i, 10));
   EXPECT_EQ(coverage.instruction(Modality::visible, OrbitPosition{0, 10, 0, 0}), "30° higher");
 }

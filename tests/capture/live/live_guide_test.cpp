@@ -347,10 +347,10 @@ TEST_F(LiveGuideTest, PhotosWhoseTimeDoesNotTellTheirKeyAreRefused) {
     guide.add(photo);
     return guide.cameras()[0].refusal;
   };
-  EXPECT_EQ(judged(-1000, ""), Refusal::position_unsure);    // no time
+  EXPECT_EQ(judged(-1000, ""), Refusal::position_unsure);        // no time
   EXPECT_EQ(judged(25, "file-time"), Refusal::position_unsure);  // when it was copied
-  EXPECT_EQ(judged(-5, ""), Refusal::position_unsure);       // before the first key
-  EXPECT_EQ(judged(10, ""), Refusal::position_unsure);       // some time in the second of a key
+  EXPECT_EQ(judged(-5, ""), Refusal::position_unsure);           // before the first key
+  EXPECT_EQ(judged(10, ""), Refusal::position_unsure);           // some time in the second of a key
   EXPECT_EQ(guide.done_count(Modality::visible), 0);
   EXPECT_EQ(judged(10.7, ""), Refusal::none);
   EXPECT_NEAR(guide.cameras()[0].position->azimuth_deg, 30, 1e-9);

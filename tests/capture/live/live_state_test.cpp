@@ -181,7 +181,8 @@ TEST(LiveState, FilesPassedOverAreShown) {
   const Json page = Json::parse(json_of(state));
   EXPECT_EQ(page["streams"][0]["passed_over"], 7);
   EXPECT_EQ(page["streams"][0]["passed_over_last"].size(), 2u);
-  EXPECT_NE(terminal_view(state).find("7 passed over, last a.heic: not a JPEG; b.jpg: the same image came before"),
+  EXPECT_NE(terminal_view(state).find(
+                "7 passed over, last a.heic: not a JPEG; b.jpg: the same image came before"),
             std::string::npos);
 }
 

@@ -40,7 +40,8 @@ double noise(const Eigen::Vector3d& p) {
   double sum = 0;
   for (int corner = 0; corner < 8; ++corner) {
     const int i = corner & 1, j = corner >> 1 & 1, k = corner >> 2;
-    sum += hash(x + i, y + j, z + k) * (i ? f.x() : 1 - f.x()) * (j ? f.y() : 1 - f.y()) * (k ? f.z() : 1 - f.z());
+    sum += hash(x + i, y + j, z + k) * (i ? f.x() : 1 - f.x()) * (j ? f.y() : 1 - f.y()) *
+           (k ? f.z() : 1 - f.z());
   }
   return sum;
 }
@@ -60,7 +61,8 @@ double hit(const Box& box, const Eigen::Vector3d& eye, const Eigen::Vector3d& ra
 
 }  // namespace
 
-cv::Mat view_of_room(const cv::Mat& mat, double mat_size_m, const Camera& camera, const Rigid3d& cam_from_mat) {
+cv::Mat view_of_room(const cv::Mat& mat, double mat_size_m, const Camera& camera,
+                     const Rigid3d& cam_from_mat) {
   const Eigen::Vector3d eye = camera_center(cam_from_mat);
   const Eigen::Matrix3d world_from_cam = cam_from_mat.rotation.conjugate().toRotationMatrix();
   cv::Mat image(camera.height, camera.width, CV_8UC1);
@@ -74,15 +76,17 @@ cv::Mat view_of_room(const cv::Mat& mat, double mat_size_m, const Camera& camera
     const Eigen::Vector3d p = eye + along * ray;
     const int u = static_cast<int>(std::floor((p.x() / mat_size_m + 0.5) * mat.cols));
     const int v = static_cast<int>(std::floor((0.5 - p.y() / mat_size_m) * mat.rows));
-    if (floor && u >= 0 && u < mat.cols && v >= 0 && v < mat.rows) return double{mat.at<std::uint8_t>(v, u) * 1.0};
+    if (floor && u >= 0 && u < mat.cols && v >= 0 && v < mat.rows)
+      return double{mat.at<std::uint8_t>(v, u) * 1.0};
     return texture(p);
   };
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
       double sum = 0;
       for (int s = 0; s < 4; ++s) {
-        sum += value(world_from_cam * Eigen::Vector3d((x + 0.25 + 0.5 * (s % 2) - camera.cx) / camera.fx,
-                                                      (y + 0.25 + 0.5 * (s / 2) - camera.cy) / camera.fy, 1));
+        sum += value(world_from_cam *
+                     Eigen::Vector3d((x + 0.25 + 0.5 * (s % 2) - camera.cx) / camera.fx,
+                                     (y + 0.25 + 0.5 * (s / 2) - camera.cy) / camera.fy, 1));
       }
       image.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(sum / 4);
     }

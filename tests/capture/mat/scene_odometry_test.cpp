@@ -45,7 +45,8 @@ TEST_P(OdometryWalk, AzimuthIsKeptWhileTheMatIsHidden) {
     // A hand is no rail: nearer and further, up and down, the aim wanders.
     const double elevation = walk.elevation_deg + 1.5 * std::sin(0.2 * azimuth);
     Rigid3d pose = test::orbit_pose(azimuth, elevation, 1.2 + 0.05 * std::sin(0.13 * azimuth));
-    const Eigen::Quaterniond aim(Eigen::AngleAxisd(0.03 * std::sin(0.31 * azimuth), Eigen::Vector3d(0.6, 0.8, 0)));
+    const Eigen::Quaterniond aim(
+        Eigen::AngleAxisd(0.03 * std::sin(0.31 * azimuth), Eigen::Vector3d(0.6, 0.8, 0)));
     pose = {aim * pose.rotation, aim * pose.translation};
     const cv::Mat image = test::view_of_room(hidden ? cv::Mat() : mat, design.size_m, camera, pose);
     const std::clock_t started = std::clock();
@@ -77,10 +78,12 @@ TEST_P(OdometryWalk, AzimuthIsKeptWhileTheMatIsHidden) {
     const double seen_from_deg = elevation_deg(eye);
     false_green += error > 1 || std::abs(sighting->position.elevation_deg - seen_from_deg) > 1;
   }
-  std::printf("%s: %d of %d looks followed over 90 deg (mat read %d times), worst azimuth error %.2f deg, %.2f sigma; sigma at the end %.2f deg; %d green, %d of them false; "
-              "%.0f CPU ms a look with the mat, %.0f without\n",
-              walk.name, followed, looks, read, worst_deg, worst_in_sigmas, last_sigma_deg, green, false_green,
-              1e3 * seen_s / seen_looks, 1e3 * hidden_s / looks);
+  std::printf(
+      "%s: %d of %d looks followed over 90 deg (mat read %d times), worst azimuth error %.2f deg, "
+      "%.2f sigma; sigma at the end %.2f deg; %d green, %d of them false; "
+      "%.0f CPU ms a look with the mat, %.0f without\n",
+      walk.name, followed, looks, read, worst_deg, worst_in_sigmas, last_sigma_deg, green,
+      false_green, 1e3 * seen_s / seen_looks, 1e3 * hidden_s / looks);
   EXPECT_GE(read, 10);
   EXPECT_GE(followed, looks * 9 / 10);
   EXPECT_LE(worst_deg, 2);
@@ -91,8 +94,8 @@ TEST_P(OdometryWalk, AzimuthIsKeptWhileTheMatIsHidden) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, OdometryWalk,
-                         testing::Values(Walk{"SlowAt30", 30, 2}, Walk{"SlowAt20", 20, 2}, Walk{"SlowAt55", 55, 2},
-                                         Walk{"BriskAt30", 30, 5}),
+                         testing::Values(Walk{"SlowAt30", 30, 2}, Walk{"SlowAt20", 20, 2},
+                                         Walk{"SlowAt55", 55, 2}, Walk{"BriskAt30", 30, 5}),
                          [](const auto& test) { return std::string(test.param.name); });
 
 TEST(SceneOdometry, SaysNothingWithoutAReadingOrWithoutAScene) {
@@ -114,9 +117,11 @@ TEST(SceneOdometry, AnotherSceneOrSizeIsNotFollowed) {
     const Rigid3d pose = test::orbit_pose(azimuth, 30, 1.2);
     odometry.remember(test::view_of_room({}, 0.6, camera, pose), camera.fx, pose, 0.1);
   }
-  EXPECT_FALSE(odometry.follow(test::view_of_room({}, 0.6, camera, test::orbit_pose(120, 30, 1.2)), camera.fx));
+  EXPECT_FALSE(odometry.follow(test::view_of_room({}, 0.6, camera, test::orbit_pose(120, 30, 1.2)),
+                               camera.fx));
   EXPECT_FALSE(odometry.follow(cv::Mat(120, 160, CV_8UC1, cv::Scalar(7)), camera.fx / 2));
-  const auto back = odometry.follow(test::view_of_room({}, 0.6, camera, test::orbit_pose(9, 30, 1.2)), camera.fx);
+  const auto back =
+      odometry.follow(test::view_of_room({}, 0.6, camera, test::orbit_pose(9, 30, 1.2)), camera.fx);
   ASSERT_TRUE(back) << "two bad looks are ridden over";
   EXPECT_GT(back->landmarks, 14);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "capture/page/connection_gate.hpp"
 #include "capture/page/page_server.hpp"
+#include "capture/page/connection_gate.hpp"
 #include "capture/page/reachable.hpp"
 
 #include <arpa/inet.h>
@@ -219,8 +219,8 @@ std::string answer_to(int port, const std::string& request, int patience_ms = 30
 TEST_F(PageTest, PostWithoutALengthIsAnsweredAtOnce) {
   serve({});
   const auto post = [&](const char* method, const char* path, const char* header) {
-    return answer_to(server->port(),
-                     std::string(method) + " " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\n" + header + "\r\n");
+    return answer_to(server->port(), std::string(method) + " " + path +
+                                         " HTTP/1.1\r\nHost: 127.0.0.1\r\n" + header + "\r\n");
   };
   EXPECT_THAT(post("POST", "/stop", "X-OrbitFuse: 1\r\n"), HasSubstr(" 200 "));
   EXPECT_EQ(stops, 1);
@@ -238,7 +238,8 @@ TEST_F(PageTest, EveryButtonSaysWhatCameOfIt) {
   serve({});
   const httplib::Headers ours{{"X-OrbitFuse", "1"}};
   const auto stopped = client().Post("/stop", ours, "", "text/plain");
-  EXPECT_EQ(nlohmann::json::parse(stopped->body), (nlohmann::json{{"done", true}, {"message", "stopping"}}));
+  EXPECT_EQ(nlohmann::json::parse(stopped->body),
+            (nlohmann::json{{"done", true}, {"message", "stopping"}}));
   const auto refused = client().Post("/nuc", ours, "", "text/plain");
   const auto said = nlohmann::json::parse(refused->body);
   EXPECT_EQ(said.at("done"), false);
@@ -255,10 +256,12 @@ class SlowPeers {
       address.sin_family = AF_INET;
       address.sin_port = htons(static_cast<std::uint16_t>(port));
       address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-      if (::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0) fds_.push_back(fd);
+      if (::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0)
+        fds_.push_back(fd);
     }
     drip_ = std::jthread([this](const std::stop_token& over) {
-      const std::string request = "GET /state HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: " + std::string(4000, 'x');
+      const std::string request =
+          "GET /state HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: " + std::string(4000, 'x');
       for (std::size_t at = 0; !over.stop_requested() && at < request.size(); ++at) {
         for (const int fd : fds_) (void)!::send(fd, &request[at], 1, MSG_NOSIGNAL);
         std::this_thread::sleep_for(std::chrono::milliseconds(50));
@@ -307,7 +310,8 @@ TEST_F(PageTest, ARequestThatIsNotDoneInTimeIsCutOff) {
   serve({});
   const std::string begun = "GET /state HTTP/1.1\r\nHost: 127.0.0.1\r\n";
   EXPECT_EQ(answer_to(server->port(), begun, 20000), "");  // closed, not waited for
-  EXPECT_THAT(answer_to(server->port(), begun + "X: " + std::string(20000, 'x')), HasSubstr(" 413 "));
+  EXPECT_THAT(answer_to(server->port(), begun + "X: " + std::string(20000, 'x')),
+              HasSubstr(" 413 "));
   EXPECT_THAT(answer_to(server->port(), "nonsense\r\n\r\n"), HasSubstr(" 400 "));
 }
 
@@ -315,13 +319,15 @@ TEST(RequestSize, IsHeadAndBody) {
   EXPECT_EQ(request_size("GET / HTTP/1.1\r\nHost: x\r\n"), 0u);
   EXPECT_EQ(request_size("GET / HTTP/1.1\r\n\r\n"), 18u);
   EXPECT_EQ(request_size("POST / HTTP/1.1\r\ncontent-LENGTH: 7\r\n\r\nabc"), 38u + 7u);
-  EXPECT_GT(request_size("POST / HTTP/1.1\r\nContent-Length: 99999999999999999999\r\n\r\n"), 1u << 29);
+  EXPECT_GT(request_size("POST / HTTP/1.1\r\nContent-Length: 99999999999999999999\r\n\r\n"),
+            1u << 29);
 }
 
 TEST_F(PageTest, PreviewsAndTemperatures) {
   serve({});
   EXPECT_EQ(client().Get("/preview/visible")->status, 404);
-  visible = LatestFrame{Modality::visible, cv::Mat(900, 1200, CV_8UC3, cv::Scalar(10, 200, 30)), "a"};
+  visible =
+      LatestFrame{Modality::visible, cv::Mat(900, 1200, CV_8UC3, cv::Scalar(10, 200, 30)), "a"};
   const auto picture = client().Get("/preview/visible");
   ASSERT_EQ(picture->status, 200);
   EXPECT_EQ(picture->get_header_value("Content-Type"), "image/jpeg");
@@ -353,7 +359,8 @@ TEST_F(PageTest, PreviewsAndTemperatures) {
 }
 
 TEST_F(PageTest, TenViewersAreServed) {
-  visible = LatestFrame{Modality::visible, cv::Mat(300, 400, CV_8UC3, cv::Scalar(10, 200, 30)), "a"};
+  visible =
+      LatestFrame{Modality::visible, cv::Mat(300, 400, CV_8UC3, cv::Scalar(10, 200, 30)), "a"};
   serve({});
   std::atomic<int> good{0};
   std::vector<std::jthread> viewers;

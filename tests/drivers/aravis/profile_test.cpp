@@ -29,7 +29,8 @@ TEST(CameraProfile, SettingsKeepTheirOrder) {
 
 TEST(CameraProfile, BadFilesAreNamed) {
   const fs::path file = fs::path(testing::TempDir()) / "profile.toml";
-  for (const char* content : {"nonsense = 1", "scale = \"cubic\"", "scale = \"linear\"", "settings = [1]", "name = [", "settings = [{A = 1, B = 2}]"}) {
+  for (const char* content : {"nonsense = 1", "scale = \"cubic\"", "scale = \"linear\"",
+                              "settings = [1]", "name = [", "settings = [{A = 1, B = 2}]"}) {
     std::ofstream(file) << content;
     const auto profile = read_profile(file);
     ASSERT_FALSE(profile) << content;

@@ -41,15 +41,18 @@ class AravisSoak : public ::testing::Test {
 void AravisSoak::expect_every_frame(double packet_loss) {
   const auto source = started(packet_loss, true);
   ASSERT_TRUE(source);
-  const Tally tally = drain(*source, std::chrono::seconds(count / 10), [&](const Tally& t) { return t.frames + t.rejected >= count; });
+  const Tally tally = drain(*source, std::chrono::seconds(count / 10),
+                            [&](const Tally& t) { return t.frames + t.rejected >= count; });
   EXPECT_EQ(tally.frames, count);
   EXPECT_EQ(tally.span(), count);
   EXPECT_EQ(tally.rejected + tally.wrong_bits + tally.not_rising, 0u);
   EXPECT_NEAR(tally.rate_hz(), 30, 0.3);  // by the camera's stamps
-  std::printf("frames %llu, dropped packets %llu, resent %llu, clock residual %.2f ms, drift %.1f ppm\n",
-              static_cast<unsigned long long>(tally.frames), static_cast<unsigned long long>(camera.packets_dropped()),
-              static_cast<unsigned long long>(camera.resends_answered()), 1000 * source->clock().residual_rms_s(),
-              source->clock().drift_ppm());
+  std::printf(
+      "frames %llu, dropped packets %llu, resent %llu, clock residual %.2f ms, drift %.1f ppm\n",
+      static_cast<unsigned long long>(tally.frames),
+      static_cast<unsigned long long>(camera.packets_dropped()),
+      static_cast<unsigned long long>(camera.resends_answered()),
+      1000 * source->clock().residual_rms_s(), source->clock().drift_ppm());
 }
 
 TEST_F(AravisSoak, CleanMinute) { expect_every_frame(0); }
@@ -59,13 +62,16 @@ TEST_F(AravisSoak, OnePercentLossWithResend) { expect_every_frame(0.01); }
 TEST_F(AravisSoak, HalfPercentLossWithoutResend) {
   const auto source = started(0.005, false);
   ASSERT_TRUE(source);
-  const Tally tally = drain(*source, std::chrono::seconds(count / 10), [&](const Tally& t) { return t.span() >= count; });
+  const Tally tally = drain(*source, std::chrono::seconds(count / 10),
+                            [&](const Tally& t) { return t.span() >= count; });
   const std::uint64_t sent = camera.frames_sent(), whole = sent - camera.frames_damaged();
-  std::printf("span %llu of %llu sent: %llu frames stored of %llu whole ones, %llu rejected, %llu missing\n",
-              static_cast<unsigned long long>(tally.span()), static_cast<unsigned long long>(sent),
-              static_cast<unsigned long long>(tally.frames), static_cast<unsigned long long>(whole),
-              static_cast<unsigned long long>(tally.rejected),
-              static_cast<unsigned long long>(tally.span() - tally.frames - tally.rejected));
+  std::printf(
+      "span %llu of %llu sent: %llu frames stored of %llu whole ones, %llu rejected, %llu "
+      "missing\n",
+      static_cast<unsigned long long>(tally.span()), static_cast<unsigned long long>(sent),
+      static_cast<unsigned long long>(tally.frames), static_cast<unsigned long long>(whole),
+      static_cast<unsigned long long>(tally.rejected),
+      static_cast<unsigned long long>(tally.span() - tally.frames - tally.rejected));
   EXPECT_EQ(tally.wrong_bits + tally.not_rising, 0u);
   // Frames under way at either end are the difference.
   EXPECT_NEAR(static_cast<double>(tally.span()), static_cast<double>(sent), 20);
@@ -91,7 +97,8 @@ TEST_F(AravisSoak, OutagesLeaveNoThreadsBehind) {
     EXPECT_TRUE(drain(*source, 10s, three).has("reconnected"));
   }
   const auto limit = testing_clock::now() + 10s;
-  while (threads_of_this_process() > streaming && testing_clock::now() < limit) drain(*source, 100ms);
+  while (threads_of_this_process() > streaming && testing_clock::now() < limit)
+    drain(*source, 100ms);
   EXPECT_LE(threads_of_this_process(), streaming);
   camera.kill();
   drain(*source, 5s, [](const Tally& t) { return t.has("disconnected"); });

@@ -55,17 +55,21 @@ inline std::optional<std::uint64_t> number_of(const Frame& frame) {
 }
 
 /// Delivers until `enough` says so or the time is up.
-inline Tally drain(AravisSource& source, std::chrono::milliseconds limit, const std::function<bool(const Tally&)>& enough = {}) {
+inline Tally drain(AravisSource& source, std::chrono::milliseconds limit,
+                   const std::function<bool(const Tally&)>& enough = {}) {
   Tally tally;
   const auto end = testing_clock::now() + limit;
   while (testing_clock::now() < end && !(enough && enough(tally))) {
     const Result<Delivery> delivery = source.next(std::chrono::milliseconds(200));
     EXPECT_TRUE(delivery);
     if (!delivery) break;
-    const bool counted = delivery->kind == Delivery::Kind::frame || delivery->kind == Delivery::Kind::rejected;
+    const bool counted =
+        delivery->kind == Delivery::Kind::frame || delivery->kind == Delivery::Kind::rejected;
     if (counted) {
-      if (tally.frames + tally.rejected == 0) tally.first_id = delivery->frame.id;
-      else if (delivery->frame.id <= tally.last_id) ++tally.not_rising;
+      if (tally.frames + tally.rejected == 0)
+        tally.first_id = delivery->frame.id;
+      else if (delivery->frame.id <= tally.last_id)
+        ++tally.not_rising;
       tally.last_id = delivery->frame.id;
     }
     if (delivery->kind == Delivery::Kind::frame) {

@@ -4,9 +4,9 @@
 #include <thread>
 
 #include "drivers/aravis/gvcp_probe.hpp"
-#include "tests/support/temp_folder.hpp"
 #include "tests/drivers/aravis/stream_harness.hpp"
 #include "tests/support/gev_genicam_xml.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse::aravis {
 namespace {
@@ -43,8 +43,9 @@ TEST_F(AravisStream, CleanStreamIsBitExactAcrossTheIdWrap) {
   AravisSource source(options);
   ASSERT_TRUE(source.start());
   EXPECT_EQ(source.describe().serial, "SIM0001");
-  EXPECT_EQ(camera.register_value(registers::ir_format), 2u);  // TemperatureLinear10mK, by the profile
-  const Tally tally = drain(source, 20s, frames(200));          // ids 65400 .. 65535, 1 ..
+  EXPECT_EQ(camera.register_value(registers::ir_format),
+            2u);                                        // TemperatureLinear10mK, by the profile
+  const Tally tally = drain(source, 20s, frames(200));  // ids 65400 .. 65535, 1 ..
   EXPECT_EQ(tally.frames, 200u);
   EXPECT_EQ(tally.rejected + tally.wrong_bits + tally.not_rising, 0u);
   EXPECT_EQ(tally.span(), 200u);
@@ -112,7 +113,8 @@ TEST_F(AravisStream, KilledCameraIsToldAndComesBackWithItsSettings) {
   const Tally before = drain(source, 10s, frames(20));
   camera.kill();
   const auto killed = testing_clock::now();
-  const Tally silent = drain(source, 5s, [](const Tally& t) { return t.has("silent") || t.has("disconnected"); });
+  const Tally silent =
+      drain(source, 5s, [](const Tally& t) { return t.has("silent") || t.has("disconnected"); });
   EXPECT_FALSE(silent.events.empty());
   EXPECT_LT(testing_clock::now() - killed, 2s);  // generous: the bench measures the 0.5 s bar
   drain(source, 2s);
@@ -235,7 +237,8 @@ TEST_F(AravisStream, FrameNumbersThatStartAgainAreALostStreamNotAFloodOfDuplicat
   ASSERT_TRUE(source.start());
   drain(source, 10s, frames(200));  // past the wrap: ids from 1 are the past
   camera.restart_ids();
-  const Tally tally = drain(source, 20s, [](const Tally& t) { return t.has("reconnected") && t.frames > 20; });
+  const Tally tally =
+      drain(source, 20s, [](const Tally& t) { return t.has("reconnected") && t.frames > 20; });
   EXPECT_TRUE(tally.has("disconnected"));
   EXPECT_LE(tally.times("repeated-id"), 3);
   EXPECT_TRUE(tally.has("reconnected"));
@@ -252,7 +255,8 @@ TEST_F(AravisStream, CorrectionOfAMuteCameraDoesNotHoldUpItsStream) {
   const Tally told = drain(source, 10s, [](const Tally& t) { return t.has("control-silent"); });
   ASSERT_TRUE(told.has("control-silent"));
   source.request_correction();
-  const Tally after = drain(source, 10s, [](const Tally& t) { return t.has("nuc-failed") && t.frames >= 10; });
+  const Tally after =
+      drain(source, 10s, [](const Tally& t) { return t.has("nuc-failed") && t.frames >= 10; });
   EXPECT_TRUE(after.has("nuc-failed"));
   EXPECT_EQ(after.span(), after.frames);  // waiting for its answer would cost frames
   EXPECT_FALSE(after.has("disconnected"));
@@ -280,7 +284,8 @@ TEST_F(AravisStream, ClockStepIsReportedAndHostTimeRises) {
   ASSERT_TRUE(source.start());
   drain(source, 10s, frames(60));
   camera.step_clock(-7);
-  const Tally tally = drain(source, 20s, [](const Tally& t) { return t.has("clock") && t.frames > 30; });
+  const Tally tally =
+      drain(source, 20s, [](const Tally& t) { return t.has("clock") && t.frames > 30; });
   EXPECT_TRUE(tally.has("clock"));
   EXPECT_EQ(tally.not_rising, 0u);
 }
@@ -291,7 +296,8 @@ TEST_F(AravisStream, SecondControllerIsRefusedWithAReason) {
   const Status status = second.start();
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().kind, ErrorKind::device);
-  EXPECT_NE(status.error().message().find("another program"), std::string::npos) << status.error().message();
+  EXPECT_NE(status.error().message().find("another program"), std::string::npos)
+      << status.error().message();
   EXPECT_EQ(drain(first, 10s, frames(20)).frames, 20u);
 }
 
@@ -318,19 +324,23 @@ TEST_F(AravisStream, NucAskedForFromAnotherThreadIsToldAndCountersAreReported) {
   drain(source, 10s, frames(10));
   const auto completed = source.statistics().completed;
   EXPECT_GE(completed, 15u);
-  EXPECT_NE(source.transport_report().find(fmt::format("{} buffers completed", completed)), std::string::npos);
+  EXPECT_NE(source.transport_report().find(fmt::format("{} buffers completed", completed)),
+            std::string::npos);
 }
 
 TEST_F(AravisStream, UnknownFeatureInTheProfileIsNamed) {
   const test::TempFolder folder;
-  test::put(folder / "mine.toml", "name = \"mine\"\nmodels = []\nsettings = [{PixelFormat = \"Mono16\"}, {NoSuchThing = 3}]\n");
+  test::put(
+      folder / "mine.toml",
+      "name = \"mine\"\nmodels = []\nsettings = [{PixelFormat = \"Mono16\"}, {NoSuchThing = 3}]\n");
   options.profiles = folder.path();
   options.profile = "mine";
   AravisSource source(options);
   const Status status = source.start();
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().kind, ErrorKind::usage);
-  EXPECT_NE(status.error().where.find("NoSuchThing"), std::string::npos) << status.error().message();
+  EXPECT_NE(status.error().where.find("NoSuchThing"), std::string::npos)
+      << status.error().message();
 }
 
 TEST_F(AravisStream, RegistersAreReadWithoutControl) {
@@ -338,14 +348,16 @@ TEST_F(AravisStream, RegistersAreReadWithoutControl) {
   AravisSource source(options);
   ASSERT_TRUE(source.start());
   EXPECT_NE(read_register("127.0.0.1", GvcpRegister::control_privilege, 500ms).value_or(0), 0u);
-  EXPECT_GT(read_register("127.0.0.1", GvcpRegister::packet_size, 500ms).value_or(0) & 0xffff, 500u);
+  EXPECT_GT(read_register("127.0.0.1", GvcpRegister::packet_size, 500ms).value_or(0) & 0xffff,
+            500u);
   EXPECT_FALSE(read_register("127.0.0.99", GvcpRegister::packet_size, 50ms));
   EXPECT_FALSE(read_register("no address", GvcpRegister::packet_size, 50ms));
 }
 
 TEST_F(AravisStream, DiscoveryFindsItAndItsSerialOpensIt) {
   const std::vector<FoundCamera> found = discover();
-  const auto ours = std::find_if(found.begin(), found.end(), [](const FoundCamera& c) { return c.serial == "SIM0001"; });
+  const auto ours = std::find_if(found.begin(), found.end(),
+                                 [](const FoundCamera& c) { return c.serial == "SIM0001"; });
   ASSERT_NE(ours, found.end()) << found.size() << " others";
   EXPECT_EQ(ours->address, "127.0.0.1");
   EXPECT_NE(ours->model.find("A70"), std::string::npos);
@@ -502,7 +514,8 @@ TEST_F(AravisStream, ACorrectionThatTheProfileDoesNotKnowIsRefused) {
 TEST_F(AravisStream, NumbersThatTheCameraRoundsAreTakenAndOthersAreNamed) {
   const test::TempFolder folder;
   const auto settings = [&](const std::string& setting) {
-    test::put(folder / "mine.toml", "name = \"mine\"\nmodels = []\nsettings = [{" + setting + "}]\n");
+    test::put(folder / "mine.toml",
+              "name = \"mine\"\nmodels = []\nsettings = [{" + setting + "}]\n");
   };
   options.profiles = folder.path();
   options.profile = "mine";

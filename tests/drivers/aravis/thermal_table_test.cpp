@@ -22,7 +22,8 @@ PlanckParameters camera() {
 /// The raw value that an object would give: the forward model, written independently.
 double raw_of(const PlanckParameters& p, double kelvin) {
   const auto s = [&](double t) { return p.r / (std::exp(p.b / t) - p.f); };
-  const double seen = p.emissivity * p.transmission * s(kelvin) + (1 - p.emissivity) * p.transmission * s(p.reflected_k) +
+  const double seen = p.emissivity * p.transmission * s(kelvin) +
+                      (1 - p.emissivity) * p.transmission * s(p.reflected_k) +
                       (1 - p.transmission) * s(p.atmosphere_k);
   return p.j0 + p.j1 * seen;
 }
@@ -46,7 +47,8 @@ TEST(ThermalTable, PlanckInvertsTheForwardModel) {
         const double raw = raw_of(p, kelvin);
         const double slope = raw_of(p, kelvin + 1) - raw;  // counts per kelvin
         const auto dn = static_cast<std::size_t>(std::lround(raw));
-        EXPECT_NEAR((*table)[dn] * 0.01, kelvin, 0.6 / slope + 0.006) << emissivity << " " << kelvin;
+        EXPECT_NEAR((*table)[dn] * 0.01, kelvin, 0.6 / slope + 0.006)
+            << emissivity << " " << kelvin;
       }
     }
   }

@@ -55,8 +55,8 @@ class HostileImport : public ::testing::Test {
 };
 
 TEST_F(HostileImport, GlowingSpotsKeepTheirTemperature) {
-  cv::Mat hot = counts(29300 / 4, 1);             // 293 K at 0.04 K a count
-  hot.at<std::uint16_t>(3, 7) = 1173 * 25;        // 900 C
+  cv::Mat hot = counts(29300 / 4, 1);       // 293 K at 0.04 K a count
+  hot.at<std::uint16_t>(3, 7) = 1173 * 25;  // 900 C
   put("in/0.tiff", *encode_tiff(hot, R"({"scale":0.04,"offset":0})"));
   put_centikelvin("in/1.tiff", 2);
   FlirCalibration camera = made::flir_calibration();
@@ -70,7 +70,8 @@ TEST_F(HostileImport, GlowingSpotsKeepTheirTemperature) {
   ASSERT_EQ(report->thermal, 3);
   EXPECT_NEAR(kelvin_of(*report, 0).at<float>(3, 7), 1173, 0.02);
   EXPECT_NEAR(kelvin_of(*report, 0).at<float>(0, 0), hot.at<std::uint16_t>(0, 0) * 0.04, 0.02);
-  EXPECT_NEAR(kelvin_of(*report, 1).at<float>(0, 0), counts(29500, 2).at<std::uint16_t>(0, 0) * 0.01, 0.0101);
+  EXPECT_NEAR(kelvin_of(*report, 1).at<float>(0, 0),
+              counts(29500, 2).at<std::uint16_t>(0, 0) * 0.01, 0.0101);
   EXPECT_NEAR(kelvin_of(*report, 2).at<float>(5, 6), 1173.15, 0.5);  // one signal is 0.1 K there
   EXPECT_NEAR(kelvin_of(*report, 2).at<float>(0, 0), 300, 0.1);
   for (const FrameRecord& frame : report->session.frames) {
@@ -87,7 +88,8 @@ TEST_F(HostileImport, OrdinarySessionsStayCentikelvin) {
   const auto report = import();
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_EQ(report->kelvin_per_count, 0.01);
-  EXPECT_EQ(kelvin_of(*report, 0).at<float>(1, 1), static_cast<float>(counts(29500, 1).at<std::uint16_t>(1, 1) * 0.01));
+  EXPECT_EQ(kelvin_of(*report, 0).at<float>(1, 1),
+            static_cast<float>(counts(29500, 1).at<std::uint16_t>(1, 1) * 0.01));
 }
 
 TEST_F(HostileImport, WhatNoScaleHoldsIsTold) {
@@ -98,18 +100,21 @@ TEST_F(HostileImport, WhatNoScaleHoldsIsTold) {
   const auto report = import();
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_TRUE(std::isnan(kelvin_of(*report, 0).at<float>(3, 7)));
-  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("in/0.tiff"), HasSubstr("1 of 1200 samples"))));
+  EXPECT_THAT(report->warnings,
+              Contains(AllOf(HasSubstr("in/0.tiff"), HasSubstr("1 of 1200 samples"))));
 }
 
 TEST_F(HostileImport, CountsAmongTemperaturesAreLeftOutByName) {
-  for (int i = 0; i < 4; ++i) put_centikelvin("in/" + std::to_string(i) + ".tiff", static_cast<std::uint64_t>(i));
+  for (int i = 0; i < 4; ++i)
+    put_centikelvin("in/" + std::to_string(i) + ".tiff", static_cast<std::uint64_t>(i));
   put("in/raw.tiff", *encode_tiff(counts(8000, 9), ""));
   options.thermal = {folder / "in"};
   const auto report = import();
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_TRUE(report->has_temperatures);
   EXPECT_EQ(report->thermal, 4);
-  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("left out"), HasSubstr("raw.tiff"), HasSubstr("--kelvin-per-count"))));
+  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("left out"), HasSubstr("raw.tiff"),
+                                               HasSubstr("--kelvin-per-count"))));
   EXPECT_NEAR(kelvin_of(*report, 0).at<float>(0, 0), 295, 2.1);
 }
 
@@ -121,12 +126,16 @@ TEST_F(HostileImport, EightBitAmongTemperaturesIsLeftOutByName) {
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_TRUE(report->has_temperatures);
   EXPECT_EQ(report->thermal, 1);
-  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("left out"), HasSubstr("DC_1.jpg"), HasSubstr("--visible"))));
+  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("left out"), HasSubstr("DC_1.jpg"),
+                                               HasSubstr("--visible"))));
 }
 
 TEST_F(HostileImport, AWholeFolderOfCountsStaysGrey) {
-  for (int i = 0; i < 3; ++i) put("in/" + std::to_string(i) + ".tiff", *encode_tiff(counts(9000, static_cast<std::uint64_t>(i)), ""));
-  put("in/warm.tiff", *encode_tiff(counts(18000, 9), ""));  // counts of the same camera, by the others' word
+  for (int i = 0; i < 3; ++i)
+    put("in/" + std::to_string(i) + ".tiff",
+        *encode_tiff(counts(9000, static_cast<std::uint64_t>(i)), ""));
+  put("in/warm.tiff",
+      *encode_tiff(counts(18000, 9), ""));  // counts of the same camera, by the others' word
   options.thermal = {folder / "in"};
   const auto report = import();
   ASSERT_TRUE(report) << report.error().message();
@@ -175,7 +184,8 @@ TEST_F(HostileImport, EveryPageOfATiffIsAFrame) {
   const auto report = import();
   ASSERT_TRUE(report) << report.error().message();
   ASSERT_EQ(report->thermal, 4);
-  for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(cv::mean(kelvin_of(*report, i))[0], 295 + static_cast<double>(i), 0.2);
+  for (std::size_t i = 0; i < 4; ++i)
+    EXPECT_NEAR(cv::mean(kelvin_of(*report, i))[0], 295 + static_cast<double>(i), 0.2);
   EXPECT_EQ(report->session.frames[1].source, "in/0.tiff#2");
   // Elsewhere one image is expected, and the first of several would be a guess.
   const auto image = read_image(folder / "in/0.tiff");
@@ -183,22 +193,27 @@ TEST_F(HostileImport, EveryPageOfATiffIsAFrame) {
   EXPECT_THAT(image.error().message(), HasSubstr("3 pages"));
 }
 
-// Written by an encoder of the project's own, after the published layout: no public sample was at hand.
+// Written by an encoder of the project's own, after the published layout: no public sample was at
+// hand.
 TEST_F(HostileImport, RecordingsAndJpegLsOfFlirCamerasAreRead) {
   const FlirCalibration camera = made::flir_calibration();
-  const auto shot = [&](double kelvin) { return cv::Mat(30, 40, CV_16UC1, cv::Scalar(made::flir_signal(kelvin, camera))); };
+  const auto shot = [&](double kelvin) {
+    return cv::Mat(30, 40, CV_16UC1, cv::Scalar(made::flir_signal(kelvin, camera)));
+  };
   put("in/0.jpg", made::flir_jpeg(shot(300), camera, made::FlirPixels::jpeg_ls));
   put("in/1.seq", made::flir_file(shot(310), camera, made::FlirPixels::raw, {}) +
                       made::flir_file(shot(320), camera, made::FlirPixels::raw, {}));
   put("in/2.csq", made::flir_file(shot(330), camera, made::FlirPixels::jpeg_ls, {}) +
                       made::flir_file(shot(340), camera, made::FlirPixels::jpeg_ls, {}));
-  put("in/3.csq", made::flir_file(shot(350), camera, made::FlirPixels::jpeg_ls, {}).substr(0, 700));  // cut
+  put("in/3.csq",
+      made::flir_file(shot(350), camera, made::FlirPixels::jpeg_ls, {}).substr(0, 700));  // cut
   options.thermal = {folder / "in"};
   const auto report = import();
   ASSERT_TRUE(report) << report.error().message();
   ASSERT_EQ(report->thermal, 5);
   EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("left out"), HasSubstr("3.csq"))));
-  for (std::size_t i = 0; i < 5; ++i) EXPECT_NEAR(kelvin_of(*report, i).at<float>(9, 9), 300 + 10 * static_cast<double>(i), 0.1);
+  for (std::size_t i = 0; i < 5; ++i)
+    EXPECT_NEAR(kelvin_of(*report, i).at<float>(9, 9), 300 + 10 * static_cast<double>(i), 0.1);
   EXPECT_EQ(report->session.frames[4].source, "in/2.csq#2");
 }
 
@@ -216,14 +231,18 @@ TEST_F(HostileImport, CopiesAreImportedOnce) {
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_EQ(report->visible, 2);
   EXPECT_EQ(report->thermal, 1);
-  EXPECT_EQ(report->session.frames_of(Modality::visible)[1]->station->index, 1) << "a copy is no station";
-  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("a copy.jpg"), HasSubstr("same image as"))));
+  EXPECT_EQ(report->session.frames_of(Modality::visible)[1]->station->index, 1)
+      << "a copy is no station";
+  EXPECT_THAT(report->warnings,
+              Contains(AllOf(HasSubstr("a copy.jpg"), HasSubstr("same image as"))));
   EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("t/1.tiff"), HasSubstr("t/0.tiff"))));
 }
 
 TEST_F(HostileImport, UnreadFormatsAreNamed) {
   put_photo("in/a.jpg", 1);
-  put("in/IMG_3.HEIC", std::string("\0\0\0\x18" "ftypheic", 12));
+  put("in/IMG_3.HEIC", std::string("\0\0\0\x18"
+                                   "ftypheic",
+                                   12));
   for (const char* name : {"in/b.dng", "in/c.webp", "in/d.mp4", "in/notes.txt"}) put(name, "x");
   options.visible = {folder / "in"};
   auto report = import();
@@ -251,7 +270,8 @@ TEST_F(HostileImport, ObjectParametersNeedRadiometricJpegs) {
   put("in/1.jpg", made::flir_jpeg(counts(made::flir_signal(300, camera), 3), camera));
   report = import();
   ASSERT_TRUE(report) << report.error().message();
-  EXPECT_THAT(report->warnings, Contains(HasSubstr("1 of 2 thermal files are no radiometric JPEGs")));
+  EXPECT_THAT(report->warnings,
+              Contains(HasSubstr("1 of 2 thermal files are no radiometric JPEGs")));
 }
 
 TEST_F(HostileImport, APhotoWithADamagedScanIsLeftOut) {
@@ -259,7 +279,8 @@ TEST_F(HostileImport, APhotoWithADamagedScanIsLeftOut) {
   cv::Mat image(240, 320, CV_8UC3);
   cv::RNG(5).fill(image, cv::RNG::UNIFORM, 0, 255);
   std::string bytes = *encode_jpeg(image, 90);
-  for (std::size_t i = bytes.size() / 2; i < bytes.size() / 2 + 64; ++i) bytes[i] = static_cast<char>(bytes[i] ^ 0x55);
+  for (std::size_t i = bytes.size() / 2; i < bytes.size() / 2 + 64; ++i)
+    bytes[i] = static_cast<char>(bytes[i] ^ 0x55);
   put("in/b.jpg", bytes);
   options.visible = {folder / "in"};
   const auto report = import();
@@ -285,13 +306,15 @@ TEST_F(HostileImport, EndlessFilesAreRefusedAndLeaveTheWayFree) {
   report = import();
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_EQ(report->visible, 1);
-  for (const char* name : {"/dev/zero", "pipe", "huge.jpg"}) EXPECT_THAT(report->warnings, Contains(HasSubstr(name)));
+  for (const char* name : {"/dev/zero", "pipe", "huge.jpg"})
+    EXPECT_THAT(report->warnings, Contains(HasSubstr(name)));
 }
 
 TEST_F(HostileImport, WhatAKilledImportLeftIsReplaced) {
   put_photo("in/a.jpg", 1);
   options.visible = {folder / "in"};
-  ASSERT_TRUE(SessionWriter::create(folder / "session", {{"recorded_by", "import"}}));  // and not closed
+  ASSERT_TRUE(
+      SessionWriter::create(folder / "session", {{"recorded_by", "import"}}));  // and not closed
   put("session/visible/000000.jpg", "half");
   EXPECT_TRUE(import());
   EXPECT_FALSE(import()) << "a finished session stays";
@@ -302,7 +325,8 @@ TEST_F(HostileImport, WhatAKilledImportLeftIsReplaced) {
 TEST_F(HostileImport, ThousandsOfMissingFramesAreLookedUpByName) {
   Transforms transforms;
   for (int i = 0; i < 4000; ++i)
-    transforms.frames.push_back({"images/" + std::to_string(i) + ".jpg", {}, Camera::from_fov(40, 30, 50), {}});
+    transforms.frames.push_back(
+        {"images/" + std::to_string(i) + ".jpg", {}, Camera::from_fov(40, 30, 50), {}});
   ASSERT_TRUE(write_transforms_json(folder / "transforms.json", transforms));
   put_photo("images/17.jpg", 1);
   options.transforms_json = folder / "transforms.json";
@@ -310,11 +334,13 @@ TEST_F(HostileImport, ThousandsOfMissingFramesAreLookedUpByName) {
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_EQ(report->with_pose, 1);
   EXPECT_EQ(std::count_if(report->warnings.begin(), report->warnings.end(),
-                          [](const std::string& w) { return w.starts_with("left out"); }), 3999);
+                          [](const std::string& w) { return w.starts_with("left out"); }),
+            3999);
 }
 
 TEST_F(HostileImport, ASessionThatWouldNotOpenIsNotWritten) {
-  for (int i = 1; i <= 2; ++i) put_photo("in/" + std::to_string(i) + ".jpg", static_cast<std::uint64_t>(i));
+  for (int i = 1; i <= 2; ++i)
+    put_photo("in/" + std::to_string(i) + ".jpg", static_cast<std::uint64_t>(i));
   put("model/cameras.txt", "1 PINHOLE 40 30 40 40 20 15\n");
   put("model/images.txt", "1 1e200 0 0 0 1 2 3 1 1.jpg\n\n2 1 0 0 0 0 0 1 1 2.jpg\n\n");
   options.visible = {folder / "in"};

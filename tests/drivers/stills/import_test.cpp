@@ -11,12 +11,12 @@
 #include <sstream>
 
 #include "core/formats/colmap_model.hpp"
-#include "core/system/file_io.hpp"
+#include "core/formats/transforms_json.hpp"
 #include "core/image/image_codec.hpp"
 #include "core/image/image_io.hpp"
-#include "core/formats/transforms_json.hpp"
-#include "tests/support/temp_folder.hpp"
+#include "core/system/file_io.hpp"
 #include "tests/support/shared_data.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -49,7 +49,8 @@ void append(std::string& to, std::uint32_t value, int bytes) {
 /// A JPEG whose EXIF tells the 35 mm equivalent of its focal length.
 std::string jpeg_with_focal(int width, int height, int focal_35mm, int scene = 0) {
   cv::Mat image(height, width, CV_8UC3);
-  cv::RNG(static_cast<std::uint64_t>(width + focal_35mm + scene)).fill(image, cv::RNG::UNIFORM, 0, 255);
+  cv::RNG(static_cast<std::uint64_t>(width + focal_35mm + scene))
+      .fill(image, cv::RNG::UNIFORM, 0, 255);
   std::string jpeg = *encode_jpeg(image, 90);
   std::string exif("Exif\0\0II*\0", 10);
   const auto directory = [&exif](int tag, int type, int value) {  // of one entry
@@ -61,7 +62,7 @@ std::string jpeg_with_focal(int width, int height, int focal_35mm, int scene = 0
     append(exif, 0, 4);
   };
   append(exif, 8, 4);
-  directory(0x8769, 4, 26);           // the EXIF directory follows this one
+  directory(0x8769, 4, 26);  // the EXIF directory follows this one
   directory(0xa405, 3, focal_35mm);
   std::string segment("\xff\xe1", 2);
   segment += static_cast<char>((exif.size() + 2) >> 8);
@@ -80,7 +81,8 @@ std::vector<std::vector<double>> celsius_table(const fs::path& file) {
     std::istringstream cells(line);
     rows.emplace_back();
     for (std::string cell; std::getline(cells, cell, ',');)
-      if (cell.find_first_of("0123456789") != std::string::npos) rows.back().push_back(std::stod(cell));
+      if (cell.find_first_of("0123456789") != std::string::npos)
+        rows.back().push_back(std::stod(cell));
   }
   return rows;
 }
@@ -96,18 +98,23 @@ TEST_F(ImportTest, PhotosOfSeveralLensesAndSizesAreKeptApartAndNamed) {
   ASSERT_EQ(report->session.devices.size(), 3u);
   std::map<std::string, int> frames;
   for (const FrameRecord& frame : report->session.frames) ++frames[frame.device];
-  EXPECT_EQ(frames, (std::map<std::string, int>{{"visible0", 2}, {"visible1", 1}, {"visible2", 1}}));
-  EXPECT_NEAR(*report->session.device("visible1")->lens.focal_px / *report->session.device("visible0")->lens.focal_px,
+  EXPECT_EQ(frames,
+            (std::map<std::string, int>{{"visible0", 2}, {"visible1", 1}, {"visible2", 1}}));
+  EXPECT_NEAR(*report->session.device("visible1")->lens.focal_px /
+                  *report->session.device("visible0")->lens.focal_px,
               70.0 / 24, 1e-9);
-  const auto tells = ::testing::AllOf(HasSubstr("in/a.jpg"), HasSubstr("in/c.jpg"), HasSubstr("70 mm"),
-                                      HasSubstr("in/d.jpg"), HasSubstr("48x32"), HasSubstr("leave out"));
+  const auto tells =
+      ::testing::AllOf(HasSubstr("in/a.jpg"), HasSubstr("in/c.jpg"), HasSubstr("70 mm"),
+                       HasSubstr("in/d.jpg"), HasSubstr("48x32"), HasSubstr("leave out"));
   EXPECT_THAT(report->warnings, ::testing::Contains(tells));
   // One focal length in pixels can't be true of all of them.
   options.visible_focal_px = 35;
   fs::remove_all(folder / "session");
   report = import();
   ASSERT_FALSE(report);
-  EXPECT_THAT(report.error().message(), ::testing::AllOf(HasSubstr("in/a.jpg"), HasSubstr("in/c.jpg"), HasSubstr("one by one")));
+  EXPECT_THAT(
+      report.error().message(),
+      ::testing::AllOf(HasSubstr("in/a.jpg"), HasSubstr("in/c.jpg"), HasSubstr("one by one")));
   EXPECT_FALSE(fs::exists(folder / "session"));
 }
 
@@ -118,7 +125,8 @@ TEST_F(ImportTest, ThermalFilesOfSeveralCamerasAreKeptApartAndNamed) {
   const auto report = import();
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_GE(report->session.devices.size(), 4u);
-  EXPECT_THAT(report->warnings, ::testing::Contains(::testing::AllOf(HasSubstr("T640"), HasSubstr("b60"), HasSubstr("E40"))));
+  EXPECT_THAT(report->warnings, ::testing::Contains(::testing::AllOf(
+                                    HasSubstr("T640"), HasSubstr("b60"), HasSubstr("E40"))));
   for (const DeviceInfo& device : report->session.devices) {
     std::set<std::pair<int, int>> sizes;
     for (const FrameRecord& frame : report->session.frames)
@@ -143,8 +151,9 @@ TEST_F(ImportTest, RadiometricJpegMatchesThePublishedTemperatures) {
   for (int y = 0; y < kelvin->rows; ++y) {
     ASSERT_EQ(static_cast<int>(expected[static_cast<std::size_t>(y)].size()), kelvin->cols);
     for (int x = 0; x < kelvin->cols; ++x)
-      worst = std::max(worst, std::abs(kelvin->at<float>(y, x) - 273.15 -
-                                       expected[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)]));
+      worst = std::max(
+          worst, std::abs(kelvin->at<float>(y, x) - 273.15 -
+                          expected[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)]));
   }
   EXPECT_LT(worst, 0.02);  // degrees Celsius; the bar is 0.2
 }
@@ -218,7 +227,8 @@ TEST_F(ImportTest, SixteenBitIsCentikelvinAndEightBitHasNoTemperatures) {
 
 TEST_F(ImportTest, CountsStayWithTheirFrameWhereFilesShareAName) {
   cv::Mat station(30, 40, CV_16UC1), tracking;
-  for (int i = 0; i < 1200; ++i) station.at<std::uint16_t>(i / 40, i % 40) = static_cast<std::uint16_t>(5000 + i);
+  for (int i = 0; i < 1200; ++i)
+    station.at<std::uint16_t>(i / 40, i % 40) = static_cast<std::uint16_t>(5000 + i);
   tracking = station + 2000;
   put("in/stations/IR.tiff", *encode_tiff(station, "counts"));
   put("in/tracking/IR.tiff", *encode_tiff(tracking, "counts"));
@@ -266,7 +276,10 @@ TEST_F(ImportTest, PosesComeFromTransformsAndFromColmapModels) {
       const FrameRecord& frame = report->session.frames.at(static_cast<std::size_t>(i));
       ASSERT_TRUE(frame.cam_from_world.has_value());
       const auto k = static_cast<std::size_t>(i);
-      EXPECT_LT((camera_center(*frame.cam_from_world) - camera_center(model.views[k].cam_from_world)).norm(), 1e-9);
+      EXPECT_LT(
+          (camera_center(*frame.cam_from_world) - camera_center(model.views[k].cam_from_world))
+              .norm(),
+          1e-9);
     }
   };
   options.transforms_json = folder / "transforms.json";

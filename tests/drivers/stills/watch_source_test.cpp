@@ -8,10 +8,10 @@
 #include <thread>
 
 #include "capture/recording/recorder.hpp"
-#include "core/system/file_io.hpp"
 #include "core/image/image_codec.hpp"
-#include "tests/support/temp_folder.hpp"
+#include "core/system/file_io.hpp"
 #include "tests/support/shared_data.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {

@@ -18,7 +18,8 @@ int failure(int error) {
 }  // namespace
 
 int FakeVideoSystem::open(const std::string& path, int) {
-  const bool other = std::any_of(others.begin(), others.end(), [&](const Node& n) { return n.path == path; });
+  const bool other =
+      std::any_of(others.begin(), others.end(), [&](const Node& n) { return n.path == path; });
   if (!other && (!plugged || path != camera.path)) return failure(ENOENT);
   if (open_error) return failure(open_error);
   ++open_descriptors;
@@ -38,7 +39,8 @@ std::vector<VideoSystem::Node> FakeVideoSystem::nodes() {
 }
 
 std::int64_t FakeVideoSystem::now_ns(clockid_t clock) {
-  return VideoSystem::now_ns(clock) + monotonic_step_ns + (clock == CLOCK_REALTIME ? wall_step_ns : 0);
+  return VideoSystem::now_ns(clock) + monotonic_step_ns +
+         (clock == CLOCK_REALTIME ? wall_step_ns : 0);
 }
 
 void* FakeVideoSystem::mmap(std::size_t length, int, off_t offset) {
@@ -75,7 +77,8 @@ int FakeVideoSystem::dequeue(void* argument) {
   buffer->index = queued_.front();
   queued_.pop_front();
   std::copy(shot.bytes.begin(), shot.bytes.end(), memory_[buffer->index].begin());
-  buffer->bytesused = shot.claimed_bytes ? shot.claimed_bytes : static_cast<std::uint32_t>(shot.bytes.size());
+  buffer->bytesused =
+      shot.claimed_bytes ? shot.claimed_bytes : static_cast<std::uint32_t>(shot.bytes.size());
   buffer->sequence = shot.sequence;
   buffer->flags = shot.flags;
   buffer->timestamp.tv_sec = shot.stamp_us / 1'000'000;
@@ -109,7 +112,8 @@ int FakeVideoSystem::ioctl(int, unsigned long request, void* argument) {
       entry->pixelformat = fourcc;
       return 0;
     }
-    case VIDIOC_G_FMT: return 0;
+    case VIDIOC_G_FMT:
+      return 0;
     case VIDIOC_S_FMT: {
       auto& pixels = static_cast<v4l2_format*>(argument)->fmt.pix;
       asked_width = static_cast<int>(pixels.width);
@@ -119,24 +123,33 @@ int FakeVideoSystem::ioctl(int, unsigned long request, void* argument) {
       pixels.bytesperline = 0;
       return 0;
     }
-    case VIDIOC_S_PARM: return 0;
-    case VIDIOC_REQBUFS: queued_.clear(); return 0;
+    case VIDIOC_S_PARM:
+      return 0;
+    case VIDIOC_REQBUFS:
+      queued_.clear();
+      return 0;
     case VIDIOC_QUERYBUF: {
       auto* buffer = static_cast<v4l2_buffer*>(argument);
       buffer->length = buffer_length;
       buffer->m.offset = buffer->index;
       return 0;
     }
-    case VIDIOC_QBUF: queued_.push_back(static_cast<v4l2_buffer*>(argument)->index); return 0;
-    case VIDIOC_DQBUF: return dequeue(argument);
+    case VIDIOC_QBUF:
+      queued_.push_back(static_cast<v4l2_buffer*>(argument)->index);
+      return 0;
+    case VIDIOC_DQBUF:
+      return dequeue(argument);
     case VIDIOC_STREAMON:
       if (stream_on_error) return failure(stream_on_error);
       ++streams_started;
       return 0;
-    case VIDIOC_STREAMOFF: return 0;
+    case VIDIOC_STREAMOFF:
+      return 0;
     case VIDIOC_G_CTRL:
-    case VIDIOC_S_CTRL: return control(request, argument);
-    default: return failure(ENOTTY);
+    case VIDIOC_S_CTRL:
+      return control(request, argument);
+    default:
+      return failure(ENOTTY);
   }
 }
 

@@ -19,7 +19,8 @@ TEST(V4l2Identity, ParsesEveryForm) {
   EXPECT_EQ(parse_camera_name("usb:1-4.2")->by, CameraName::By::usb_path);
   EXPECT_EQ(parse_camera_name("id:046d:0825")->value, "046d:0825");
   EXPECT_EQ(parse_camera_name("/dev/video3")->by, CameraName::By::node);
-  for (const char* wrong : {"", "serial:", "video0", "0"}) EXPECT_FALSE(parse_camera_name(wrong)) << wrong;
+  for (const char* wrong : {"", "serial:", "video0", "0"})
+    EXPECT_FALSE(parse_camera_name(wrong)) << wrong;
   EXPECT_EQ(text(*parse_camera_name("usb:1-4.2")), "usb:1-4.2");
 }
 

@@ -24,7 +24,9 @@ class V4l2SourceTest : public testing::Test {
     options.reopen_every = 1ms;
   }
   void shoot(std::uint32_t sequence, std::uint32_t flags = 0, std::size_t bytes = 32) {
-    system->shots.push_back({sequence, flags, std::vector<std::uint8_t>(bytes, static_cast<std::uint8_t>(sequence)), 0});
+    system->shots.push_back({sequence, flags,
+                             std::vector<std::uint8_t>(bytes, static_cast<std::uint8_t>(sequence)),
+                             0});
   }
   /// The next delivery that is not a timeout; at most a second.
   Delivery deliver(V4l2Source& source) {
@@ -82,7 +84,7 @@ TEST_F(V4l2SourceTest, DamagedFramesAreRejectedNeverStored) {
   V4l2Source source(options, system);
   ASSERT_TRUE(source.start());
   shoot(0, V4L2_BUF_FLAG_ERROR);
-  shoot(1, 0, 31);  // one byte short of 8x4
+  shoot(1, 0, 31);                                                       // one byte short of 8x4
   system->shots.push_back({2, 0, std::vector<std::uint8_t>(32), 5000});  // more than its buffer
   shoot(3);
   for (std::uint64_t id : {0u, 1u, 2u}) {
@@ -145,7 +147,8 @@ TEST_F(V4l2SourceTest, EveryOutageCostsItsTimeInIds) {
   V4l2Source source(options, system);
   ASSERT_TRUE(source.start());
   // 100 Hz by the driver's stamps.
-  for (std::uint32_t i = 0; i < 20; ++i) shoot(i), system->shots.back().stamp_us = 1'000'000 + 10'000 * i;
+  for (std::uint32_t i = 0; i < 20; ++i)
+    shoot(i), system->shots.back().stamp_us = 1'000'000 + 10'000 * i;
   std::uint64_t last = 0;
   for (int i = 0; i < 20; ++i) last = deliver(source).frame.id;
   const auto outage = [&](std::chrono::milliseconds away) {
@@ -233,7 +236,7 @@ TEST_F(V4l2SourceTest, UnpluggedAndBackUnderAnotherNode) {
   const Delivery back = deliver(source);
   EXPECT_EQ(back.reason, "reconnected");
   EXPECT_NE(back.detail.find("/dev/video6"), std::string::npos);
-  shoot(0);  // the driver counts from 0 again
+  shoot(0);                                 // the driver counts from 0 again
   EXPECT_EQ(deliver(source).frame.id, 2u);  // one frame's time at least was lost
 }
 
@@ -411,8 +414,8 @@ TEST_F(V4l2SourceTest, LocksExposureAndTellsWhenItDoesNotHold) {
 }
 
 TEST_F(V4l2SourceTest, ControlsAreLockedOnceTheCameraHasAdaptedAndHoldAfterReplug) {
-  const std::map<std::uint32_t, int> switched_on = {
-      {V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL}, {V4L2_CID_EXPOSURE_ABSOLUTE, 10}};
+  const std::map<std::uint32_t, int> switched_on = {{V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL},
+                                                    {V4L2_CID_EXPOSURE_ABSOLUTE, 10}};
   system->controls = switched_on;
   V4l2Source source(options, system);
   ASSERT_TRUE(source.start());
@@ -472,7 +475,8 @@ TEST_F(V4l2SourceTest, ComesBackWithItsSizeOrNotAtAll) {
 
 TEST_F(V4l2SourceTest, ImagesOfNoPixelsAreRefused) {
   system->width = 0;
-  EXPECT_NE(V4l2Source(options, system).start().error().message().find("0 pixels"), std::string::npos);
+  EXPECT_NE(V4l2Source(options, system).start().error().message().find("0 pixels"),
+            std::string::npos);
 }
 
 TEST_F(V4l2SourceTest, HostTimesRiseWhenTheClockIsSetBackAndTheStepIsTold) {

@@ -45,15 +45,18 @@ TEST(BestBaseRule, SmallestBaseIsOnePatch) {
 }
 
 TEST(BestBandMix, TheStrongerBandIsTakenAtItsOwnLevel) {
-  const BandSource v{constant(10), constant(100), constant(80)}, t{constant(-3), constant(9), constant(160)};
+  const BandSource v{constant(10), constant(100), constant(80)},
+      t{constant(-3), constant(9), constant(160)};
   const Plane fused = mix_band(v, t, constant(80), {6, 1});
   EXPECT_NEAR(fused(5, 5), 90, 1e-3);
 }
 
 TEST(BestBandMix, ContrastIsKeptWhenTheLevelChanges) {
-  const BandSource v{constant(10), constant(100), constant(90)}, t{constant(0), constant(0), constant(20)};
+  const BandSource v{constant(10), constant(100), constant(90)},
+      t{constant(0), constant(0), constant(20)};
   EXPECT_NEAR(mix_band(v, t, constant(110), {6, 0})(5, 5), 120, 1e-3);
-  EXPECT_NEAR(mix_band(v, t, constant(110), {6, 1})(5, 5), 122, 1e-3) << "(110 + 10) / (90 + 10) of 10";
+  EXPECT_NEAR(mix_band(v, t, constant(110), {6, 1})(5, 5), 122, 1e-3)
+      << "(110 + 10) / (90 + 10) of 10";
   EXPECT_NEAR(mix_band(v, t, constant(110), {6, 0.5F})(5, 5), 121, 1e-3);
   EXPECT_NEAR(mix_band(v, t, constant(1e6F), {6, 1})(5, 5), 1e6F + 15, 1) << "never more than 3/2";
 }
@@ -64,8 +67,10 @@ TEST(BestBandMix, NothingTinyAndHugeStayFinite) {
         t{constant(-scale), constant(0), constant(1e6F)};
     EXPECT_TRUE(cv::checkRange(mix_band(v, t, constant(0), {32, 1}))) << scale;
   }
-  const BandSource one{constant(5), constant(0), constant(50)}, two{constant(9), constant(0), constant(50)};
-  EXPECT_NEAR(mix_band(one, two, constant(50), {6, 0.35F})(3, 3), 57, 1e-3) << "without energy: the mean";
+  const BandSource one{constant(5), constant(0), constant(50)},
+      two{constant(9), constant(0), constant(50)};
+  EXPECT_NEAR(mix_band(one, two, constant(50), {6, 0.35F})(3, 3), 57, 1e-3)
+      << "without energy: the mean";
 }
 
 TEST(Best, BlackHotImagesNeedNoBrightness) {

@@ -46,7 +46,9 @@ TEST(BandRule, ExchangeOfSourcesExchangesNothingElse) {
 }
 
 TEST(BandRule, NothingAndTinyBandsStayFinite) {
-  EXPECT_EQ(cv::norm(fuse_band(constant(0), constant(0), constant(0.5F), constant(1), rule), cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(fuse_band(constant(0), constant(0), constant(0.5F), constant(1), rule),
+                     cv::NORM_INF),
+            0);
   const Plane one(1, 1, 5.0F), two(1, 1, -7.0F), half(1, 1, 0.5F);
   EXPECT_TRUE(cv::checkRange(fuse_band(one, two, half, half, rule)));
 }

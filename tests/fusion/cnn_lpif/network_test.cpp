@@ -31,7 +31,8 @@ TEST(Network, GradientsMatchFiniteDifferences) {
     p[i] = kept - h;
     const double down = cnn::score(p.data(), in.data(), a);
     p[i] = kept;
-    EXPECT_NEAR(gradient[i], (up - down) / (2 * h), 1e-6 * std::max(1.0, std::abs(gradient[i]))) << i;
+    EXPECT_NEAR(gradient[i], (up - down) / (2 * h), 1e-6 * std::max(1.0, std::abs(gradient[i])))
+        << i;
     largest = std::max(largest, std::abs(gradient[i]));
   }
   EXPECT_GT(largest, 0.1);
@@ -46,7 +47,8 @@ TEST(ScoreMap, IsTheNetworkOnEveryPatch) {
     for (int x = 0; x < map.cols; x += 5) {
       std::array<float, cnn::patch * cnn::patch> in;
       for (int i = 0; i < cnn::patch * cnn::patch; ++i)
-        in[static_cast<std::size_t>(i)] = image(2 * y + i / cnn::patch, 2 * x + i % cnn::patch) / 255;
+        in[static_cast<std::size_t>(i)] =
+            image(2 * y + i / cnn::patch, 2 * x + i % cnn::patch) / 255;
       cnn::Activations<float> a;
       const float expected = cnn::score(p.data(), in.data(), a);
       EXPECT_NEAR(map(y, x), expected, 1e-3F * std::max(1.0F, std::abs(expected)));
@@ -55,10 +57,13 @@ TEST(ScoreMap, IsTheNetworkOnEveryPatch) {
 
 TEST(ScoreMap, InstructionSetsAgreeToTheBit) {
   if (best_isa() < Isa::avx512) GTEST_SKIP() << "this processor has no AVX-512";
-  for (const cv::Size size : {cv::Size(16, 16), cv::Size(17, 31), cv::Size(130, 49), cv::Size(301, 77)}) {
+  for (const cv::Size size :
+       {cv::Size(16, 16), cv::Size(17, 31), cv::Size(130, 49), cv::Size(301, 77)}) {
     const Plane image = dead_leaves(size, 4);
     const auto& p = cnn::shipped_network();
-    EXPECT_EQ(cv::norm(cnn::score_map(image, p, {}, Isa::avx2), cnn::score_map(image, p, {}, Isa::avx512), cv::NORM_INF), 0);
+    EXPECT_EQ(cv::norm(cnn::score_map(image, p, {}, Isa::avx2),
+                       cnn::score_map(image, p, {}, Isa::avx512), cv::NORM_INF),
+              0);
   }
 }
 
@@ -81,7 +86,8 @@ TEST(Network, PrefersTheSharpSideOfUnseenImages) {
     const Plane sharp = dead_leaves({128, 128}, seed);
     Plane soft;
     cv::GaussianBlur(sharp, soft, {}, 2);
-    const Plane a = cnn::score_map(sharp, cnn::shipped_network()), b = cnn::score_map(soft, cnn::shipped_network());
+    const Plane a = cnn::score_map(sharp, cnn::shipped_network()),
+                b = cnn::score_map(soft, cnn::shipped_network());
     right += cv::countNonZero(a > b);
     all += static_cast<int>(a.total());
   }

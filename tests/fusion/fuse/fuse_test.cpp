@@ -13,7 +13,8 @@ namespace orbitfuse {
 namespace {
 
 TEST(FusionMethodNames, RoundTripAndUnknown) {
-  for (const std::string& text : fusion_method_names()) EXPECT_EQ(name(fusion_method(text).value()), text);
+  for (const std::string& text : fusion_method_names())
+    EXPECT_EQ(name(fusion_method(text).value()), text);
   const auto unknown = fusion_method("fancy");
   ASSERT_FALSE(unknown);
   EXPECT_EQ(unknown.error().kind, ErrorKind::usage);
@@ -59,12 +60,14 @@ TEST(FusionOptions, EveryMistakeNamesItsField) {
     return status ? std::string("valid") : status.error().where;
   };
   EXPECT_EQ(where([](auto& o) { o.ms_srif.stride_px = 0; }), "ms_srif.stride_px");
-  EXPECT_EQ(where([](auto& o) { o.pca_msif.smoother.time_step = 1.01; }), "pca_msif.smoother.time_step");
+  EXPECT_EQ(where([](auto& o) { o.pca_msif.smoother.time_step = 1.01; }),
+            "pca_msif.smoother.time_step");
   EXPECT_EQ(where([](auto& o) { o.cnn_lpif.match_threshold = 2; }), "cnn_lpif.match_threshold");
   EXPECT_EQ(where([](auto& o) { o.best.sharpness = 0; }), "best.sharpness");
   EXPECT_EQ(where([](auto& o) { o.best.contrast_kept = 1.5; }), "best.contrast_kept");
   EXPECT_EQ(where([](auto& o) { o.best.visible_preference = -1; }), "best.visible_preference");
-  EXPECT_EQ(where([](auto& o) { o.best.brightness_weight = std::nan(""); }), "best.brightness_weight");
+  EXPECT_EQ(where([](auto& o) { o.best.brightness_weight = std::nan(""); }),
+            "best.brightness_weight");
   EXPECT_EQ(where([](auto&) {}), "valid");
 }
 

@@ -35,9 +35,13 @@ inline cv::Mat1b checkerboard(cv::Size size) {
 
 /// Images on which ratios, logarithms and covariances are undefined.
 inline std::vector<NamedImage> awkward_images(cv::Size size) {
-  return {{"black", cv::Mat1b(size, 0)},   {"white", cv::Mat1b(size, 255)}, {"constant", cv::Mat1b(size, 97)},
-          {"ramp", ramp(size)},            {"inverted ramp", 255 - ramp(size)},
-          {"checkerboard", checkerboard(size)}, {"noise", noise(size, 5)}};
+  return {{"black", cv::Mat1b(size, 0)},
+          {"white", cv::Mat1b(size, 255)},
+          {"constant", cv::Mat1b(size, 97)},
+          {"ramp", ramp(size)},
+          {"inverted ramp", 255 - ramp(size)},
+          {"checkerboard", checkerboard(size)},
+          {"noise", noise(size, 5)}};
 }
 
 }  // namespace orbitfuse::testing

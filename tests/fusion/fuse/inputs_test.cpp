@@ -51,7 +51,8 @@ TEST(FusionKelvin, NotANumberIsAHole) {
   EXPECT_EQ(difference(fused(hole), v(hole)), 0);
   cv::Mat1b other(t.size(), uchar{255});
   other.row(3) = 0;
-  EXPECT_EQ(difference(fuse(v, kelvin, other, options).value().row(3), v.row(3)), 0) << "both masks hold";
+  EXPECT_EQ(difference(fuse(v, kelvin, other, options).value().row(3), v.row(3)), 0)
+      << "both masks hold";
 }
 
 TEST(FusionKelvin, NothingFiniteAndFallingSpansAreErrors) {
@@ -59,7 +60,8 @@ TEST(FusionKelvin, NothingFiniteAndFallingSpansAreErrors) {
   const auto empty = fuse(v, cv::Mat1f(32, 32, nan), {}, {});
   ASSERT_FALSE(empty);
   EXPECT_EQ(empty.error().where, "thermal");
-  for (const TemperatureSpan span : {TemperatureSpan{300, 280}, {280, 280}, {280, std::numeric_limits<double>::infinity()}}) {
+  for (const TemperatureSpan span :
+       {TemperatureSpan{300, 280}, {280, 280}, {280, std::numeric_limits<double>::infinity()}}) {
     FusionOptions options;
     options.span = span;
     const auto bad = fuse(v, kelvin_of(v), {}, options);

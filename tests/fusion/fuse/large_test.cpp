@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Large images: indices must not overflow, and the answer is the small image's wherever it sees no more.
+// Large images: indices must not overflow, and the answer is the small image's wherever it sees no
+// more.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -34,9 +34,13 @@ class FusionQuality : public ::testing::Test {
     for (std::string line; std::getline(file, line);) {
       std::istringstream fields(line);
       std::string pair, method, metric, value;
-      for (std::string* field : {&pair, &method, &metric, &value}) std::getline(fields, *field, ',');
+      for (std::string* field : {&pair, &method, &metric, &value})
+        std::getline(fields, *field, ',');
       // VIFB's SSIM is the sum over the sources; ours is the mean.
-      if (method == wanted) sums[metric == "SSIM_mean" ? "SSIM" : metric == "SSIM" ? "SSIM_sum" : metric] += std::stod(value);
+      if (method == wanted)
+        sums[metric == "SSIM_mean" ? "SSIM"
+             : metric == "SSIM"    ? "SSIM_sum"
+                                   : metric] += std::stod(value);
     }
     for (auto& [metric, sum] : sums) sum /= static_cast<double>(names_.size());
     return sums;
@@ -50,7 +54,8 @@ class FusionQuality : public ::testing::Test {
       const cv::Mat v = cv::imread(folder_ / "pairs" / (name + "_vis.png"), cv::IMREAD_GRAYSCALE),
                     t = cv::imread(folder_ / "pairs" / (name + "_ir.png"), cv::IMREAD_GRAYSCALE);
       const auto values = fusion_metrics(v, t, fuse(v, t, {}, options).value()).value();
-      for (const MetricValue& m : values) sums[m.name] += m.value / static_cast<double>(names_.size());
+      for (const MetricValue& m : values)
+        sums[m.name] += m.value / static_cast<double>(names_.size());
     }
     return sums;
   }
@@ -61,9 +66,11 @@ class FusionQuality : public ::testing::Test {
 };
 
 TEST_F(FusionQuality, MethodsReachTheirReferences) {
-  for (const auto& [method, name] : {std::pair{"ms-srif", "LP_SR"}, {"pca-msif", "FPDE"}, {"cnn-lpif", "CNN"}}) {
+  for (const auto& [method, name] :
+       {std::pair{"ms-srif", "LP_SR"}, {"pca-msif", "FPDE"}, {"cnn-lpif", "CNN"}}) {
     Scores mine = ours(method), theirs = reference(name);
-    for (const char* metric : {"Qabf", "Qcb", "SSIM"}) EXPECT_GE(mine[metric], theirs[metric]) << method << " " << metric;
+    for (const char* metric : {"Qabf", "Qcb", "SSIM"})
+      EXPECT_GE(mine[metric], theirs[metric]) << method << " " << metric;
     EXPECT_LE(mine["Qcv"], 1.02 * theirs["Qcv"]) << method;
   }
 }

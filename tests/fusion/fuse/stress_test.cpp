@@ -37,8 +37,9 @@ TEST_P(EveryMethod, AwkwardPairsStayNearTheSources) {
       if (v.name == t.name) {
         EXPECT_EQ(cv::norm(result, v.image, cv::NORM_INF), 0) << v.name;
       }
-      const bool flat = v.name != "noise" && v.name != "checkerboard" && t.name != "noise" && t.name != "checkerboard" &&
-                        v.name.find("ramp") == std::string::npos && t.name.find("ramp") == std::string::npos;
+      const bool flat = v.name != "noise" && v.name != "checkerboard" && t.name != "noise" &&
+                        t.name != "checkerboard" && v.name.find("ramp") == std::string::npos &&
+                        t.name.find("ramp") == std::string::npos;
       if (!flat) continue;
       // Two constants: some value between them, the same everywhere.
       double low = 0, high = 0;
@@ -57,7 +58,8 @@ TEST_P(EveryMethod, OnePixelDifferenceStaysLocal) {
 }
 
 TEST_P(EveryMethod, SizesFromSixteenUpAndOddOnes) {
-  for (const cv::Size size : {cv::Size(16, 16), cv::Size(17, 16), cv::Size(16, 31), cv::Size(33, 129), cv::Size(101, 47)}) {
+  for (const cv::Size size : {cv::Size(16, 16), cv::Size(17, 16), cv::Size(16, 31),
+                              cv::Size(33, 129), cv::Size(101, 47)}) {
     const cv::Mat result = fused(noise(size, 1), noise(size, 2));
     EXPECT_EQ(result.size(), size);
   }
@@ -110,7 +112,8 @@ TEST_P(EveryMethod, MistakesAreNamed) {
   EXPECT_NE(sizes.error().remedy.find("resize"), std::string::npos);
   const auto floats = fuse(cv::Mat1f::zeros(40, 40), noise({40, 40}, 2), {}, options());
   EXPECT_FALSE(floats);
-  const auto hidden = fuse(noise({40, 40}, 1), noise({40, 40}, 2), cv::Mat1b::zeros(40, 40), options());
+  const auto hidden =
+      fuse(noise({40, 40}, 1), noise({40, 40}, 2), cv::Mat1b::zeros(40, 40), options());
   ASSERT_FALSE(hidden);
   EXPECT_EQ(hidden.error().where, "mask");
 }
@@ -122,7 +125,8 @@ TEST_P(EveryMethod, SixteenBitSamples) {
   EXPECT_LE(cv::norm(fused(v, t), fused(noise({40, 40}, 1), noise({40, 40}, 2)), cv::NORM_INF), 1);
 }
 
-INSTANTIATE_TEST_SUITE_P(Fusion, EveryMethod, ::testing::Values("best", "ms-srif", "pca-msif", "cnn-lpif"),
+INSTANTIATE_TEST_SUITE_P(Fusion, EveryMethod,
+                         ::testing::Values("best", "ms-srif", "pca-msif", "cnn-lpif"),
                          [](const auto& method) {
                            std::string text = method.param;
                            std::replace(text.begin(), text.end(), '-', '_');

@@ -12,7 +12,8 @@ namespace orbitfuse {
 namespace {
 using namespace testing;
 
-constexpr float nan = std::numeric_limits<float>::quiet_NaN(), infinite = std::numeric_limits<float>::infinity(),
+constexpr float nan = std::numeric_limits<float>::quiet_NaN(),
+                infinite = std::numeric_limits<float>::infinity(),
                 largest = std::numeric_limits<float>::max();
 
 FusionOptions by_heat() {
@@ -33,14 +34,16 @@ TEST(HeatStress, AwkwardPairsGiveAPicture) {
       std::vector<cv::Mat> channels;
       cv::split(*shown, channels);
       if (flat) {
-        EXPECT_EQ(cv::norm(channels[0], v.image, cv::NORM_INF), 0) << "nothing is unusual: " << t.name;
+        EXPECT_EQ(cv::norm(channels[0], v.image, cv::NORM_INF), 0)
+            << "nothing is unusual: " << t.name;
       }
     }
 }
 
 TEST(HeatStress, OnePixel) {
   const cv::Mat1b v(1, 1, uchar{100});
-  EXPECT_EQ(fuse(v, cv::Mat1f(1, 1, 300.0F), {}, by_heat()).value().at<cv::Vec3b>(0, 0), cv::Vec3b::all(100));
+  EXPECT_EQ(fuse(v, cv::Mat1f(1, 1, 300.0F), {}, by_heat()).value().at<cv::Vec3b>(0, 0),
+            cv::Vec3b::all(100));
   EXPECT_FALSE(fuse(v, cv::Mat1f(1, 1, nan), {}, by_heat()));
   EXPECT_FALSE(fuse(cv::Mat(), cv::Mat(), {}, by_heat()));
 }
@@ -52,7 +55,9 @@ TEST(HeatStress, NothingValidIsAnErrorAndInfinityIsAHole) {
     ASSERT_FALSE(nothing);
     EXPECT_EQ(nothing.error().where, "thermal");
   }
-  EXPECT_EQ(fuse(v, cv::Mat1f(v.size(), 300.0F), cv::Mat1b::zeros(v.size()), by_heat()).error().where, "mask");
+  EXPECT_EQ(
+      fuse(v, cv::Mat1f(v.size(), 300.0F), cv::Mat1b::zeros(v.size()), by_heat()).error().where,
+      "mask");
   cv::Mat1f kelvin(v.size(), 300.0F);
   kelvin(3, 4) = infinite;
   kelvin(20, 20) = nan;
@@ -60,21 +65,28 @@ TEST(HeatStress, NothingValidIsAnErrorAndInfinityIsAHole) {
   fusion::HeatOptions plain;
   plain.hatching = 0;
   const cv::Mat3f bgr(30, 40, cv::Vec3f(10, 20, 30));
-  EXPECT_EQ(cv::norm(fusion::colored_by_heat(bgr, cv::Mat1f(bgr.size(), nan), {}, plain).value(), bgr, cv::NORM_INF), 0)
+  EXPECT_EQ(cv::norm(fusion::colored_by_heat(bgr, cv::Mat1f(bgr.size(), nan), {}, plain).value(),
+                     bgr, cv::NORM_INF),
+            0)
       << "nothing measured: the visible picture";
 }
 
 TEST(HeatStress, ExtremeScalesStayFinite) {
   const cv::Mat1b v = noise({40, 30}, 1);
-  for (const auto& [usual, hot] : {std::pair{-largest, largest}, {0.0F, largest}, {1e30F, 1.0001e30F}, {0.0F, 1e-38F},
-                                   {-1e-30F, 1e-30F}, {300.0F, 300.0001F}}) {
+  for (const auto& [usual, hot] : {std::pair{-largest, largest},
+                                   {0.0F, largest},
+                                   {1e30F, 1.0001e30F},
+                                   {0.0F, 1e-38F},
+                                   {-1e-30F, 1e-30F},
+                                   {300.0F, 300.0001F}}) {
     cv::Mat1f thermal(v.size(), usual);
     thermal(cv::Rect(5, 5, 8, 8)) = hot;
     const auto shown = fuse(v, thermal, {}, by_heat());
     ASSERT_TRUE(shown) << usual << " to " << hot << ": " << shown.error().message();
     std::vector<cv::Mat> channels;
     cv::split(*shown, channels);
-    EXPECT_EQ(cv::norm(channels[0].colRange(20, 40), v.colRange(20, 40), cv::NORM_INF), 0) << usual << " to " << hot;
+    EXPECT_EQ(cv::norm(channels[0].colRange(20, 40), v.colRange(20, 40), cv::NORM_INF), 0)
+        << usual << " to " << hot;
   }
 }
 

@@ -79,7 +79,8 @@ TEST(Heat, WhatIsUsualOrColdStaysTheVisiblePicture) {
   cv::Mat3b shown = fuse(v, kelvin, {}, by_heat()).value();
   EXPECT_GT(cv::norm(shown(hot), v(hot), cv::NORM_L1) / hot.area(), 60);
   v(hot).copyTo(shown(hot));
-  EXPECT_EQ(cv::norm(shown, v, cv::NORM_INF), 0) << "no halo: not one pixel beside the hot square changes";
+  EXPECT_EQ(cv::norm(shown, v, cv::NORM_INF), 0)
+      << "no halo: not one pixel beside the hot square changes";
 }
 
 TEST(Heat, TheDetailOfTheVisiblePictureShowsThrough) {
@@ -99,8 +100,9 @@ TEST(Heat, EqualTemperaturesLookAlikeInAllViewsOfAScene) {
   FusionOptions options = by_heat();
   options.heat.scale = heat_scale({first, second});
   const cv::Rect same(5, 60, 10, 10);
-  EXPECT_EQ(cv::norm(fuse(v, first, {}, options).value()(same), fuse(v, second, {}, options).value()(same),
-                     cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(fuse(v, first, {}, options).value()(same),
+                     fuse(v, second, {}, options).value()(same), cv::NORM_INF),
+            0);
 }
 
 TEST(Heat, GrayLevelsWithoutTemperaturesWork) {
@@ -114,8 +116,11 @@ TEST(Heat, GrayLevelsWithoutTemperaturesWork) {
   cv::Mat1b noisy = gray.clone();
   noisy(person) = 70;
   for (int y = 0; y < noisy.rows; ++y)
-    for (int x = 0; x < noisy.cols; ++x) noisy(y, x) = static_cast<uchar>(70 + (x * 7 + y * 13) % 3);
-  EXPECT_LT(cv::norm(fuse(v, noisy, {}, by_heat()).value(), v, cv::NORM_L1) / (3.0 * static_cast<double>(v.total())), 16)
+    for (int x = 0; x < noisy.cols; ++x)
+      noisy(y, x) = static_cast<uchar>(70 + (x * 7 + y * 13) % 3);
+  EXPECT_LT(cv::norm(fuse(v, noisy, {}, by_heat()).value(), v, cv::NORM_L1) /
+                (3.0 * static_cast<double>(v.total())),
+            16)
       << "noise of an 8-bit image stays faint";
 }
 
@@ -129,7 +134,9 @@ TEST(Heat, HolesFadeAndAreHatched) {
   FusionReport report;
   const cv::Mat3b shown = fuse(v, kelvin, {}, options, &report).value();
   EXPECT_NEAR(report.unmeasured, 50.0 / 120, 1e-6);
-  const auto change = [&](int row) { return cv::norm(shown.row(row), v.row(row), cv::NORM_L1) / v.cols; };
+  const auto change = [&](int row) {
+    return cv::norm(shown.row(row), v.row(row), cv::NORM_L1) / v.cols;
+  };
   EXPECT_LT(change(50), 0.5 * change(60)) << "faint at the edge";
   EXPECT_GT(change(110), 100);
   EXPECT_GT(cv::norm(shown.row(10), v.row(10), cv::NORM_INF), 10) << "hatching";

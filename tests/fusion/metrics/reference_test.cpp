@@ -47,7 +47,8 @@ TEST(MetricsReference, EveryValueOfVifb) {
     const cv::Mat fused = cv::imread(file, cv::IMREAD_UNCHANGED);
     // The stored image must be the one that the figures were made from: its mean says so to one
     // gray level in one pixel (VIFB_labMan, CNN is off by just that).
-    const double levels_off = (expected.at("MV") - cv::mean(fused)[0]) * static_cast<double>(fused.total());
+    const double levels_off =
+        (expected.at("MV") - cv::mean(fused)[0]) * static_cast<double>(fused.total());
     const bool other_image = std::abs(levels_off) > 0.5;
     const auto values = fusion_metrics(v, i, fused);
     ASSERT_TRUE(values) << values.error().message();
@@ -55,7 +56,8 @@ TEST(MetricsReference, EveryValueOfVifb) {
       if (m.name == "halo") continue;  // our own
       const auto alias = name_in_csv.find(m.name);
       const double truth = expected.at(alias == name_in_csv.end() ? m.name : alias->second);
-      EXPECT_NEAR(m.value, truth, (other_image ? 1e-4 : 1e-9) * std::abs(truth)) << pair << " " << method << " " << m.name;
+      EXPECT_NEAR(m.value, truth, (other_image ? 1e-4 : 1e-9) * std::abs(truth))
+          << pair << " " << method << " " << m.name;
       ++checked;
     }
     others += other_image;

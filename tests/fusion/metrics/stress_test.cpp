@@ -35,11 +35,13 @@ double value(const std::vector<MetricValue>& values, const std::string& name) {
 }
 
 TEST(MetricsStress, EveryValueIsFinite) {
-  const cv::Mat black = cv::Mat::zeros(40, 33, CV_8UC1), white(40, 33, CV_8UC1, cv::Scalar(255)), gray(40, 33, CV_8UC1, cv::Scalar(77));
+  const cv::Mat black = cv::Mat::zeros(40, 33, CV_8UC1), white(40, 33, CV_8UC1, cv::Scalar(255)),
+                gray(40, 33, CV_8UC1, cv::Scalar(77));
   cv::Mat one_pixel = gray.clone();
   one_pixel.at<std::uint8_t>(20, 11) = 78;
   const cv::Mat random = noise(33, 40);
-  const std::vector<cv::Mat> images{black, white, gray, one_pixel, random, 255 - random, checkerboard(33, 40)};
+  const std::vector<cv::Mat> images{
+      black, white, gray, one_pixel, random, 255 - random, checkerboard(33, 40)};
   for (const cv::Mat& v : images) {
     for (const cv::Mat& i : images) {
       for (const cv::Mat& f : images) {
@@ -76,7 +78,9 @@ TEST(MetricsStress, ConstantImagesHaveDefinedAnswers) {
 
 TEST(MetricsStress, AllSizesFrom16AndColour) {
   for (const cv::Size size : {cv::Size(16, 16), {17, 31}, {640, 16}, {127, 129}}) {
-    const auto values = fusion_metrics(noise(size.width, size.height, 1, CV_8UC3), noise(size.width, size.height, 2), noise(size.width, size.height, 3, CV_8UC3));
+    const auto values = fusion_metrics(noise(size.width, size.height, 1, CV_8UC3),
+                                       noise(size.width, size.height, 2),
+                                       noise(size.width, size.height, 3, CV_8UC3));
     ASSERT_TRUE(values) << size;
     for (const MetricValue& m : *values) EXPECT_TRUE(std::isfinite(m.value)) << m.name << size;
   }
@@ -90,7 +94,9 @@ TEST(MetricsStress, SixteenBitsAreScaled) {
   f.convertTo(f16, CV_16U, 257);
   const auto a = fusion_metrics(v, i, f), b = fusion_metrics(v16, i16, f16);
   ASSERT_TRUE(a && b);
-  for (std::size_t m = 0; m < a->size(); ++m) EXPECT_NEAR((*a)[m].value, (*b)[m].value, 1e-8 * std::abs((*a)[m].value) + 1e-10) << (*a)[m].name;
+  for (std::size_t m = 0; m < a->size(); ++m)
+    EXPECT_NEAR((*a)[m].value, (*b)[m].value, 1e-8 * std::abs((*a)[m].value) + 1e-10)
+        << (*a)[m].name;
 }
 
 TEST(MetricsStress, SameForAnyNumberOfThreads) {
@@ -101,7 +107,8 @@ TEST(MetricsStress, SameForAnyNumberOfThreads) {
   const auto four = fusion_metrics(v, i, f);
   set_thread_count(0);
   ASSERT_TRUE(one && four);
-  for (std::size_t m = 0; m < one->size(); ++m) EXPECT_EQ((*one)[m].value, (*four)[m].value) << (*one)[m].name;
+  for (std::size_t m = 0; m < one->size(); ++m)
+    EXPECT_EQ((*one)[m].value, (*four)[m].value) << (*one)[m].name;
 }
 
 TEST(MetricsStress, BadInputIsNamed) {

@@ -69,7 +69,8 @@ TEST(BatchOmp, ResidualIsThatOfTheCodeAndFallsWithAtoms) {
     SparseCode code;
     BatchOmp(dictionary).solve(signal, {atoms, 0, 0}, code);
     Eigen::VectorXf rest = signal;
-    for (std::size_t i = 0; i < code.atoms.size(); ++i) rest -= code.weights[i] * dictionary.atoms().col(code.atoms[i]);
+    for (std::size_t i = 0; i < code.atoms.size(); ++i)
+      rest -= code.weights[i] * dictionary.atoms().col(code.atoms[i]);
     EXPECT_NEAR(rest.norm(), code.residual, 0.02F * signal.norm());
     EXPECT_LT(code.residual, before);
     before = code.residual;
@@ -92,7 +93,8 @@ TEST(Ksvd, ErrorFallsAndSeedsRepeat) {
   std::mt19937 random(6);
   Eigen::MatrixXf patches(patch_size, 600);
   for (int i = 0; i < 600; ++i)
-    patches.col(i) = 3 * hidden->atoms().col(static_cast<int>(random() % 12)) + hidden->atoms().col(static_cast<int>(random() % 12));
+    patches.col(i) = 3 * hidden->atoms().col(static_cast<int>(random() % 12)) +
+                     hidden->atoms().col(static_cast<int>(random() % 12));
   std::vector<double> errors;
   const KsvdOptions options{.atoms = 16, .nonzeros = 2, .iterations = 8, .seed = 1};
   const auto first = train_ksvd(patches, options, [&](int, double rms) { errors.push_back(rms); });

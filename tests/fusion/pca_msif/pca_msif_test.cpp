@@ -35,7 +35,11 @@ Plane fastest_pattern(Stencil stencil) {
 class Smoother : public ::testing::TestWithParam<Stencil> {};
 
 TEST_P(Smoother, StableAtItsLimitAndKeepsTheMean) {
-  SmootherOptions o{.iterations = 200, .time_step = largest_stable_step(GetParam()), .cycles = 0, .edge_scale = 1e5, .stencil = GetParam()};
+  SmootherOptions o{.iterations = 200,
+                    .time_step = largest_stable_step(GetParam()),
+                    .cycles = 0,
+                    .edge_scale = 1e5,
+                    .stencil = GetParam()};
   ASSERT_TRUE(o.validate());
   const Plane image = noise(40, 56, 1);
   const Plane result = smooth(image, o);
@@ -45,7 +49,11 @@ TEST_P(Smoother, StableAtItsLimitAndKeepsTheMean) {
 }
 
 TEST_P(Smoother, BeyondItsLimitIsRefusedBecauseItDiverges) {
-  SmootherOptions o{.iterations = 200, .time_step = 2.1 * largest_stable_step(GetParam()), .cycles = 0, .edge_scale = 1e5, .stencil = GetParam()};
+  SmootherOptions o{.iterations = 200,
+                    .time_step = 2.1 * largest_stable_step(GetParam()),
+                    .cycles = 0,
+                    .edge_scale = 1e5,
+                    .stencil = GetParam()};
   const Status status = o.validate();
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().where, "pca_msif.smoother.time_step");
@@ -61,8 +69,12 @@ cv::Mat1d plain_step(const cv::Mat1d& image, const SmootherOptions& o) {
     const auto inside = [](int i, int n) { return i < 0 ? -1 - i : i >= n ? 2 * n - 1 - i : i; };
     return m(inside(y, m.rows), inside(x, m.cols));
   };
-  const auto dxx = [&](const cv::Mat1d& m, int y, int x) { return scale * (at(m, y, x - r) - 2 * m(y, x) + at(m, y, x + r)); };
-  const auto dyy = [&](const cv::Mat1d& m, int y, int x) { return scale * (at(m, y - r, x) - 2 * m(y, x) + at(m, y + r, x)); };
+  const auto dxx = [&](const cv::Mat1d& m, int y, int x) {
+    return scale * (at(m, y, x - r) - 2 * m(y, x) + at(m, y, x + r));
+  };
+  const auto dyy = [&](const cv::Mat1d& m, int y, int x) {
+    return scale * (at(m, y - r, x) - 2 * m(y, x) + at(m, y + r, x));
+  };
   cv::Mat1d xx(image.size()), yy(image.size()), next(image.size());
   for (int y = 0; y < image.rows; ++y)
     for (int x = 0; x < image.cols; ++x) {
@@ -72,12 +84,17 @@ cv::Mat1d plain_step(const cv::Mat1d& image, const SmootherOptions& o) {
       yy(y, x) = c * b;
     }
   for (int y = 0; y < image.rows; ++y)
-    for (int x = 0; x < image.cols; ++x) next(y, x) = image(y, x) - o.time_step * (dxx(xx, y, x) + dyy(yy, y, x));
+    for (int x = 0; x < image.cols; ++x)
+      next(y, x) = image(y, x) - o.time_step * (dxx(xx, y, x) + dyy(yy, y, x));
   return next;
 }
 
 TEST_P(Smoother, PlainStepsAreThePublishedOnes) {
-  const SmootherOptions o{.iterations = 25, .time_step = 0.9 * largest_stable_step(GetParam()), .cycles = 0, .edge_scale = 4, .stencil = GetParam()};
+  const SmootherOptions o{.iterations = 25,
+                          .time_step = 0.9 * largest_stable_step(GetParam()),
+                          .cycles = 0,
+                          .edge_scale = 4,
+                          .stencil = GetParam()};
   const Plane image = noise(23, 37, 8);
   cv::Mat1d expected;
   image.convertTo(expected, CV_64F);
@@ -91,7 +108,11 @@ TEST_P(Smoother, PlainStepsAreThePublishedOnes) {
 TEST_P(Smoother, CyclesAreStableForAnyTime) {
   for (const int iterations : {1, 2, 7, 40, 1000, 10000})
     for (const int cycles : {1, 2, 9}) {
-      const SmootherOptions o{.iterations = iterations, .time_step = largest_stable_step(GetParam()), .cycles = cycles, .edge_scale = 1e5, .stencil = GetParam()};
+      const SmootherOptions o{.iterations = iterations,
+                              .time_step = largest_stable_step(GetParam()),
+                              .cycles = cycles,
+                              .edge_scale = 1e5,
+                              .stencil = GetParam()};
       for (const Plane& image : {fastest_pattern(GetParam()), noise(40, 56, 1)}) {
         const Plane result = smooth(image, o);
         ASSERT_TRUE(cv::checkRange(result));
@@ -104,9 +125,15 @@ TEST_P(Smoother, CyclesAreStableForAnyTime) {
 TEST_P(Smoother, CyclesReachWhatPlainStepsReach) {
   Plane image(64, 80);
   for (int y = 0; y < 64; ++y)
-    for (int x = 0; x < 80; ++x) image(y, x) = 100 + 50 * std::sin(0.5F * static_cast<float>(x)) * std::cos(0.4F * static_cast<float>(y));
+    for (int x = 0; x < 80; ++x)
+      image(y, x) = 100 + 50 * std::sin(0.5F * static_cast<float>(x)) *
+                              std::cos(0.4F * static_cast<float>(y));
   // So far-reaching an edge scale that conductivities stay at 1: the linear equation.
-  SmootherOptions o{.iterations = 60, .time_step = largest_stable_step(GetParam()), .cycles = 0, .edge_scale = 1e5, .stencil = GetParam()};
+  SmootherOptions o{.iterations = 60,
+                    .time_step = largest_stable_step(GetParam()),
+                    .cycles = 0,
+                    .edge_scale = 1e5,
+                    .stencil = GetParam()};
   const Plane plain = smooth(image, o);
   o.cycles = 2;
   const double change = cv::norm(plain, image);

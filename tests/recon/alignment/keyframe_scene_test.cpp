@@ -21,7 +21,8 @@ PosedView at(double azimuth, double elevation = 14, double radius = 2.5) {
 /// The box, and how often it was rendered.
 struct Counted {
   int renders = 0;
-  SceneRenderer renderer = [this](const Camera& camera, const Rigid3d& pose) -> Result<SceneRender> {
+  SceneRenderer renderer = [this](const Camera& camera,
+                                  const Rigid3d& pose) -> Result<SceneRender> {
     ++renders;
     return testing_orbit::box_view(camera, pose, false);
   };
@@ -41,7 +42,8 @@ Likeness likeness(const SceneRender& seen, const SceneRender& truth) {
       ++likeness.on_box;
       likeness.depth_close += std::abs(ours - z) < 0.02F * z ? 1 : 0;
       likeness.shade_close +=
-          std::abs(seen.brightness.at<float>(y, x) - truth.brightness.at<float>(y, x)) < 0.1F ? 1 : 0;
+          std::abs(seen.brightness.at<float>(y, x) - truth.brightness.at<float>(y, x)) < 0.1F ? 1
+                                                                                              : 0;
     }
   return likeness;
 }

@@ -16,7 +16,8 @@ constexpr double radius = 5;
 PosedView looking_in(double azimuth_deg) {
   const double a = azimuth_deg * std::numbers::pi / 180;
   const Eigen::Vector3d eye = target + radius * Eigen::Vector3d(std::cos(a), std::sin(a), 0.3);
-  const Eigen::Vector3d z = (target - eye).normalized(), x = z.cross(Eigen::Vector3d::UnitZ()).normalized();
+  const Eigen::Vector3d z = (target - eye).normalized(),
+                        x = z.cross(Eigen::Vector3d::UnitZ()).normalized();
   Eigen::Matrix3d r;
   r << x.transpose(), z.cross(x).transpose(), z.transpose();
   const Eigen::Quaterniond q(r);
@@ -42,7 +43,8 @@ ThermalView seen_from(const PosedView& view, float sky_depth) {
 }
 
 TEST(ObjectSpan, IsTheObjectsNotTheSkys) {
-  for (const float sky : {30.0F, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+  for (const float sky :
+       {30.0F, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
     const TemperatureSpan span =
         object_span({seen_from(orbit()[0], sky), seen_from(orbit()[4], sky)}, orbit());
     EXPECT_NEAR(span.low_k, 293, 1.5) << sky;
@@ -78,7 +80,8 @@ TEST(ObjectSpan, ConstantAndUnmeasuredImagesHaveASpan) {
 
 TEST(WithinOrbit, FartherReachHoldsMore) {
   const std::vector<ThermalView> views{seen_from(orbit()[0], 300)};
-  const auto near = within_orbit(views, orbit(), object_reach)[0], around = within_orbit(views, orbit(), surroundings_reach)[0];
+  const auto near = within_orbit(views, orbit(), object_reach)[0],
+             around = within_orbit(views, orbit(), surroundings_reach)[0];
   EXPECT_EQ(cv::countNonZero(near == near), 400) << "the object";
   EXPECT_GT(cv::countNonZero(around == around), 2000) << "and the ground";
   EXPECT_EQ(cv::countNonZero(around < 250), 0) << "but no sky";

@@ -15,8 +15,9 @@ const Eigen::Vector3d target(1, 2, 3);
 
 PosedView looking_in(double azimuth_deg, double elevation_deg, double radius) {
   const double a = azimuth_deg * deg, e = elevation_deg * deg;
-  const Eigen::Vector3d eye = target + radius * Eigen::Vector3d(std::cos(e) * std::cos(a),
-                                                                std::cos(e) * std::sin(a), std::sin(e));
+  const Eigen::Vector3d eye =
+      target +
+      radius * Eigen::Vector3d(std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e));
   const Eigen::Vector3d z = (target - eye).normalized();
   const Eigen::Vector3d x = z.cross(Eigen::Vector3d::UnitZ()).normalized();
   Eigen::Matrix3d r;

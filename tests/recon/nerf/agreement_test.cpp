@@ -9,13 +9,13 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
+#include "core/numeric/random.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/nerf/kernels/compositing.hpp"
 #include "recon/nerf/rendering/ray_block.hpp"
-#include "core/numeric/random.hpp"
 #include "recon/nerf/rendering/render.hpp"
-#include "recon/nerf/training/trainer.hpp"
 #include "recon/nerf/training/measure.hpp"
+#include "recon/nerf/training/trainer.hpp"
 #include "tests/recon/nerf/emulated_amx.hpp"
 #include "tests/recon/nerf/toy_scene.hpp"
 
@@ -39,10 +39,12 @@ TEST(Agreement, TransmittanceAndItsGradientInFloatFollowDouble) {
     }
     const int used = composite(count, sigma.data(), dt.data(), 1e-4f, w.data(), light.data());
     composite_backward(used, dt.data(), w.data(), light.data(), pull.data(), 0.1f, slope.data());
-    const std::vector<double> sigma_d(sigma.begin(), sigma.end()), dt_d(dt.begin(), dt.end()), pull_d(pull.begin(), pull.end());
+    const std::vector<double> sigma_d(sigma.begin(), sigma.end()), dt_d(dt.begin(), dt.end()),
+        pull_d(pull.begin(), pull.end());
     std::vector<double> w_d(48), light_d(48), slope_d(48);
     composite(used, sigma_d.data(), dt_d.data(), 0.0, w_d.data(), light_d.data());
-    composite_backward(used, dt_d.data(), w_d.data(), light_d.data(), pull_d.data(), 0.1, slope_d.data());
+    composite_backward(used, dt_d.data(), w_d.data(), light_d.data(), pull_d.data(), 0.1,
+                       slope_d.data());
     for (std::size_t i = 0; i < static_cast<std::size_t>(used); ++i) {
       EXPECT_NEAR(w[i], w_d[i], 2e-6) << ray;
       EXPECT_NEAR(light[i], light_d[i], 2e-6) << ray;
@@ -107,12 +109,14 @@ TEST(Agreement, LookingAheadIsAsNearToTheWholePictureAsNotLooking) {
     return render(field, data.views[1].camera, data.views[1].cam_from_world, options, {}).value();
   };
   const RenderedView quick = shown({}), slow = shown({.look_ahead = false});
-  const RenderedView fine = shown({.stop_transmittance = 1e-5, .sample_factor = 8, .look_ahead = false});
+  const RenderedView fine =
+      shown({.stop_transmittance = 1e-5, .sample_factor = 8, .look_ahead = false});
   EXPECT_GT(cv::norm(quick.color, slow.color, cv::NORM_INF), 0) << "nothing was skipped";
   // Its samples lie closer, since they are spread over less.
   EXPECT_LT(rms_of(quick.color, fine.color), 1.05 * rms_of(slow.color, fine.color));
   EXPECT_LT(rms_of(quick.opacity, fine.opacity), 1.05 * rms_of(slow.opacity, fine.opacity) + 1e-3);
-  // Beside the ball's edge, where neighbours stop and the ray itself goes on, no background is lost.
+  // Beside the ball's edge, where neighbours stop and the ray itself goes on, no background is
+  // lost.
   int solid = 0, deep_quick = 0, deep_slow = 0, edge = 0;
   double edge_quick = 0, edge_slow = 0;
   const cv::Mat ball = data.depth[1].depth == data.depth[1].depth;
@@ -152,11 +156,14 @@ TEST(Agreement, LookingAheadSeesThroughAHoleThatItsNeighboursMiss) {
     state.main.mlp.weights.value[static_cast<std::size_t>(last.offset + i * last.out)] *= 2;
   state.refresh();
   const auto shown = [&](bool look_ahead) {
-    return render(field, data.views[0].camera, data.views[0].cam_from_world, {.look_ahead = look_ahead}, {}).value();
+    return render(field, data.views[0].camera, data.views[0].cam_from_world,
+                  {.look_ahead = look_ahead}, {})
+        .value();
   };
   const cv::Rect hole(47, 47, 2, 2);
   const cv::Mat closed = shown(true).color(hole);
-  // A tunnel of 2 x 2 cells along the first camera's axis, narrower than the rays that look ahead are apart.
+  // A tunnel of 2 x 2 cells along the first camera's axis, narrower than the rays that look ahead
+  // are apart.
   Occupancy& grid = state.occupancy;
   for (float along = -1 + grid.cell_size(0) / 2; along < 1; along += grid.cell_size(0))
     for (const float y : {-0.5f, 0.5f})
@@ -171,8 +178,8 @@ TEST(Agreement, LookingAheadSeesThroughAHoleThatItsNeighboursMiss) {
 }
 
 // Every kernel in double, from its definition. What lies between them is stored as in any training:
-// parameters and activations in float, the table in half precision. Compositing and its gradient in float
-// are held to double above.
+// parameters and activations in float, the table in half precision. Compositing and its gradient in
+// float are held to double above.
 
 struct Corner {
   std::size_t first;  ///< its first feature in the level
@@ -198,25 +205,28 @@ std::array<Corner, 8> corners_of(const GridLevel& level, const float* position) 
       weight *= up ? part[d] : 1 - part[d];
     }
     const auto n = static_cast<std::uint32_t>(level.resolution) + 1;
-    const std::uint32_t entry = level.dense ? at[0] + n * (at[1] + n * at[2])
-                                            : (at[0] ^ at[1] * 2654435761u ^ at[2] * 805459861u) & level.mask;
+    const std::uint32_t entry =
+        level.dense ? at[0] + n * (at[1] + n * at[2])
+                    : (at[0] ^ at[1] * 2654435761u ^ at[2] * 805459861u) & level.mask;
     out[corner] = {std::size_t{entry} * static_cast<std::size_t>(level.features), weight};
   }
   return out;
 }
 
-void double_encode(const GridLevel& level, const std::uint16_t* table, const float* position, int count,
-                   float* out, int stride) {
+void double_encode(const GridLevel& level, const std::uint16_t* table, const float* position,
+                   int count, float* out, int stride) {
   for (int s = 0; s < count; ++s) {
     double sum[4] = {0, 0, 0, 0};
     for (const Corner& corner : corners_of(level, position + 3 * s))
       for (int f = 0; f < level.features; ++f)
-        sum[f] += corner.weight * static_cast<float>(std::bit_cast<cv::float16_t>(table[corner.first + static_cast<std::size_t>(f)]));
+        sum[f] += corner.weight * static_cast<float>(std::bit_cast<cv::float16_t>(
+                                      table[corner.first + static_cast<std::size_t>(f)]));
     for (int f = 0; f < level.features; ++f) out[s * stride + f] = static_cast<float>(sum[f]);
   }
 }
 
-void double_scatter(const GridLevel& level, float* grad, const float* position, int count, const float* dfeatures) {
+void double_scatter(const GridLevel& level, float* grad, const float* position, int count,
+                    const float* dfeatures) {
   for (int s = 0; s < count; ++s)
     for (const Corner& corner : corners_of(level, position + 3 * s))
       for (int f = 0; f < level.features; ++f) {
@@ -226,14 +236,15 @@ void double_scatter(const GridLevel& level, float* grad, const float* position, 
 }
 
 /// Kingma & Ba, algorithm 1, for the entries that have a gradient.
-void double_adam(const AdamStep& step, std::int64_t count, float* parameter, float* first, float* second, float* grad,
-                 std::uint16_t* half) {
+void double_adam(const AdamStep& step, std::int64_t count, float* parameter, float* first,
+                 float* second, float* grad, std::uint16_t* half) {
   for (std::int64_t i = 0; i < count; ++i) {
     if (grad[i] == 0) continue;
     const double g = double{grad[i]} + double{step.weight_decay} * parameter[i];
     const double m = double{step.beta1} * first[i] + (1.0 - step.beta1) * g;
     const double v = double{step.beta2} * second[i] + (1.0 - step.beta2) * g * g;
-    const double change = step.learning_rate * (m * step.correction1) / (std::sqrt(v * step.correction2) + step.epsilon);
+    const double change = step.learning_rate * (m * step.correction1) /
+                          (std::sqrt(v * step.correction2) + step.epsilon);
     parameter[i] = static_cast<float>(parameter[i] - change);
     first[i] = static_cast<float>(m);
     second[i] = static_cast<float>(v);
@@ -248,7 +259,8 @@ void double_forward(const LayerView& layer, int rows, const float* in, float* ou
     std::fill(sum.begin(), sum.end(), 0.0);
     for (int i = 0; i < layer.in; ++i)
       for (int o = 0; o < layer.out; ++o)
-        sum[static_cast<std::size_t>(o)] += double{in[r * layer.in + i]} * layer.weights[i * layer.out + o];
+        sum[static_cast<std::size_t>(o)] +=
+            double{in[r * layer.in + i]} * layer.weights[i * layer.out + o];
     for (int o = 0; o < layer.out; ++o) {
       const double value = sum[static_cast<std::size_t>(o)];
       out[r * layer.out + o] = static_cast<float>(relu ? std::max(0.0, value) : value);
@@ -256,13 +268,15 @@ void double_forward(const LayerView& layer, int rows, const float* in, float* ou
   }
 }
 
-void double_backward_input(const LayerView& layer, int rows, const float* dout, float* din, const float* activation) {
+void double_backward_input(const LayerView& layer, int rows, const float* dout, float* din,
+                           const float* activation) {
   std::vector<double> sum(static_cast<std::size_t>(layer.in));
   for (int r = 0; r < rows; ++r) {
     std::fill(sum.begin(), sum.end(), 0.0);
     for (int o = 0; o < layer.out; ++o)
       for (int i = 0; i < layer.in; ++i)
-        sum[static_cast<std::size_t>(i)] += double{dout[r * layer.out + o]} * layer.transposed[o * layer.in + i];
+        sum[static_cast<std::size_t>(i)] +=
+            double{dout[r * layer.out + o]} * layer.transposed[o * layer.in + i];
     for (int i = 0; i < layer.in; ++i) {
       const bool off = activation != nullptr && activation[r * layer.in + i] <= 0;
       din[r * layer.in + i] = off ? 0.0f : static_cast<float>(sum[static_cast<std::size_t>(i)]);
@@ -270,12 +284,14 @@ void double_backward_input(const LayerView& layer, int rows, const float* dout, 
   }
 }
 
-void double_backward_weights(const LayerView& layer, int rows, const float* in, const float* dout, float* dweights) {
+void double_backward_weights(const LayerView& layer, int rows, const float* in, const float* dout,
+                             float* dweights) {
   std::vector<double> sum(dweights, dweights + layer.in * layer.out);
   for (int r = 0; r < rows; ++r)
     for (int i = 0; i < layer.in; ++i)
       for (int o = 0; o < layer.out; ++o)
-        sum[static_cast<std::size_t>(i * layer.out + o)] += double{in[r * layer.in + i]} * dout[r * layer.out + o];
+        sum[static_cast<std::size_t>(i * layer.out + o)] +=
+            double{in[r * layer.in + i]} * dout[r * layer.out + o];
   for (std::size_t i = 0; i < sum.size(); ++i) dweights[i] = static_cast<float>(sum[i]);
 }
 
@@ -295,7 +311,8 @@ double psnr_with(Dataset data, const Kernels& kernels) {
   auto views = prepare_views(data, state.space, state.span);
   carve(training.has_dense_depth(), views, heldout, options, state.occupancy);
   Trainer trainer(state, views, heldout, kernels);
-  for (int i = 0; i < options.iterations; ++i) EXPECT_TRUE(trainer.step(i / double(options.iterations)));
+  for (int i = 0; i < options.iterations; ++i)
+    EXPECT_TRUE(trainer.step(i / double(options.iterations)));
   return psnr_of(render_strided(state, views[0].rays, 1, {}), views[0].target, 1);
 }
 
@@ -357,7 +374,8 @@ TEST(Agreement, EightBitThermalKeepsItsGrayValues) {
   const auto view = render(field, data.views[0].camera, data.views[0].cam_from_world, {}, {});
   ASSERT_TRUE(view);
   const int middle = data.views[0].camera.width / 2;
-  EXPECT_NEAR(view->color.at<float>(middle, middle), data.views[0].image.at<float>(middle, middle), 20);
+  EXPECT_NEAR(view->color.at<float>(middle, middle), data.views[0].image.at<float>(middle, middle),
+              20);
   EXPECT_NEAR(view->color.at<float>(1, 1), 50, 20);
 }
 
@@ -370,12 +388,15 @@ TEST(Agreement, GridParametersStayWithinHalfPrecision) {
     AdamStep step;
     step.learning_rate = 1e9f;
     // A step past the range of half precision, then gradients whose squares are infinite, and NaN.
-    for (const float gradient : {1.0f, 1e30f, std::numeric_limits<float>::infinity(), std::nanf("")}) {
-      for (std::size_t i = 0; i < grid.table.size(); ++i) grid.table.grad[i] = i % 2 ? gradient : -gradient;
+    for (const float gradient :
+         {1.0f, 1e30f, std::numeric_limits<float>::infinity(), std::nanf("")}) {
+      for (std::size_t i = 0; i < grid.table.size(); ++i)
+        grid.table.grad[i] = i % 2 ? gradient : -gradient;
       kernels_for(isa).adam(step, count, grid.table.value.data(), grid.table.first.data(),
                             grid.table.second.data(), grid.table.grad.data(), grid.half.data());
       if (gradient == 1.0f) {
-        EXPECT_EQ(std::abs(grid.table.value[0]), max_half) << "the step was to pass it, " << name(isa);
+        EXPECT_EQ(std::abs(grid.table.value[0]), max_half)
+            << "the step was to pass it, " << name(isa);
       }
     }
     for (std::size_t i = 0; i < grid.table.size(); ++i) {

@@ -10,8 +10,8 @@
 #include <limits>
 #include <stdexcept>
 
-#include "recon/nerf/field/network.hpp"
 #include "core/numeric/random.hpp"
+#include "recon/nerf/field/network.hpp"
 #include "recon/nerf/kernels/tile_layers.hpp"
 #include "tests/recon/nerf/emulated_amx.hpp"
 #include "tests/recon/nerf/tile_machine.hpp"

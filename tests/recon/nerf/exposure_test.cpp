@@ -14,7 +14,8 @@ constexpr int view_count = 12;
 
 Eigen::Array3d log_gain_of(std::size_t view) {
   const double a = static_cast<double>(view);
-  return {0.3 * std::sin(a), 0.3 * std::sin(a) + 0.05 * std::cos(2 * a), 0.3 * std::sin(a) - 0.04 * std::cos(3 * a)};
+  return {0.3 * std::sin(a), 0.3 * std::sin(a) + 0.05 * std::cos(2 * a),
+          0.3 * std::sin(a) - 0.04 * std::cos(3 * a)};
 }
 
 /// Each view stored with a gain of its own, clipped as cameras clip.
@@ -104,7 +105,8 @@ TEST(Exposure, OfAViewWithAFewWrongMatchesIsOne) {
   Dataset data = varied_scene();
   data.depth.pop_back();
   for (int p = 0; p < 3; ++p)  // all that ties the last view to another
-    data.points.push_back({{0, 0, 0.4}, {}, 0, {{view_count - 1, {20.0 + p, 30}}, {2, {40, 30.0 + p}}}});
+    data.points.push_back(
+        {{0, 0, 0.4}, {}, 0, {{view_count - 1, {20.0 + p, 30}}, {2, {40, 30.0 + p}}}});
   const Exposure exposure = estimate_exposure(data, none_heldout());
   EXPECT_TRUE((exposure.log_gain.back() == 0).all()) << exposure.log_gain.back().transpose();
   EXPECT_TRUE(exposure.varies());
@@ -139,7 +141,8 @@ TEST(Exposure, OfViewsWithNothingInCommonIsOne) {
 }
 
 TEST(Exposure, EvenedOutIsThatOfEveryViewAndLeavesOutWhatWasClipped) {
-  const Dataset plain = test::toy_scene(Modality::visible, view_count, 1, 64), varied = varied_scene();
+  const Dataset plain = test::toy_scene(Modality::visible, view_count, 1, 64),
+                varied = varied_scene();
   std::vector<NormalisedView> views = prepare_views(varied, {}, {});
   Exposure exposure;
   for (std::size_t i = 0; i < view_count; ++i) exposure.log_gain.push_back(log_gain_of(i));
@@ -157,7 +160,8 @@ TEST(Exposure, EvenedOutIsThatOfEveryViewAndLeavesOutWhatWasClipped) {
           continue;
         }
         // A gain within 3 % keeps its highlights.
-        for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen[c], truth[c], stored[c] < 1 ? 1e-5 : 0.03) << i;
+        for (int c = 0; c < 3; ++c)
+          EXPECT_NEAR(seen[c], truth[c], stored[c] < 1 ? 1e-5 : 0.03) << i;
       }
   EXPECT_GT(unknown, 0);
 }

@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "recon/nerf/training/backward.hpp"
-#include "recon/nerf/kernels/compositing.hpp"
 #include "core/numeric/random.hpp"
+#include "recon/nerf/kernels/compositing.hpp"
+#include "recon/nerf/training/backward.hpp"
 #include "tests/recon/nerf/slope.hpp"
 
 namespace orbitfuse::nerf {
@@ -27,12 +27,13 @@ TEST(Compositing, DensityGradientMatchesDifferencesInDouble) {
   const auto loss = [&] {
     composite<double>(n, sigma.data(), dt.data(), 0.0, w.data(), light.data());
     double sum = light.back() * behind_value;
-    for (int i = 0; i < n; ++i) sum += w[static_cast<std::size_t>(i)] * g[static_cast<std::size_t>(i)];
+    for (int i = 0; i < n; ++i)
+      sum += w[static_cast<std::size_t>(i)] * g[static_cast<std::size_t>(i)];
     return sum;
   };
   loss();
-  composite_backward<double>(n, dt.data(), w.data(), light.data(), g.data(), light.back() * behind_value,
-                             gradient.data());
+  composite_backward<double>(n, dt.data(), w.data(), light.data(), g.data(),
+                             light.back() * behind_value, gradient.data());
   for (std::size_t i = 0; i < n; ++i) {
     const double kept = sigma[i], h = 1e-6;
     sigma[i] = kept + h;
@@ -77,7 +78,8 @@ TEST(Distortion, IsTheDoubleSumOfEquation15AndItsGradient) {
     return sum;
   };
   std::vector<double> gradient(n);
-  EXPECT_NEAR(distortion<double>(n, w.data(), s.data(), ds.data(), 1.0, gradient.data()), naive(), 1e-12);
+  EXPECT_NEAR(distortion<double>(n, w.data(), s.data(), ds.data(), 1.0, gradient.data()), naive(),
+              1e-12);
   for (std::size_t i = 0; i < n; ++i) {
     const double kept = w[i], h = 1e-6;
     w[i] = kept + h;
@@ -130,8 +132,9 @@ class FieldGradient : public ::testing::TestWithParam<Modality> {
     gradients.reset(field_);
     forward(field_, kernels_, {1e-9f, 0.0f}, block_);
     backward(field_, kernels_, settings_, targets_, block_, gradients, grid_);
-    return settings_.per_ray * (color_loss() / field_.channels() +
-                                settings_.distortion_weight * gradients.distortion + gradients.depth);
+    return settings_.per_ray *
+           (color_loss() / field_.channels() + settings_.distortion_weight * gradients.distortion +
+            gradients.depth);
   }
 
   /// From the definition: squared error, beyond `huber` its tangent.
@@ -142,8 +145,10 @@ class FieldGradient : public ::testing::TestWithParam<Modality> {
       float value[3];
       ray_value(field_, block_, static_cast<int>(r), row, value);
       for (int c = 0; c < field_.channels(); ++c) {
-        const double offset = field_.image_offsets.value[static_cast<std::size_t>(targets_[r].view)];
-        const double error = std::abs(double{value[c]} + offset - targets_[r].value[c]), h = settings_.huber;
+        const double offset =
+            field_.image_offsets.value[static_cast<std::size_t>(targets_[r].view)];
+        const double error = std::abs(double{value[c]} + offset - targets_[r].value[c]),
+                     h = settings_.huber;
         sum += h > 0 && error > h ? 2 * h * error - h * h : error * error;
       }
     }
@@ -155,7 +160,8 @@ class FieldGradient : public ::testing::TestWithParam<Modality> {
     const int n = block_.samples();
     std::vector<float> table(grid.table.size());
     for (std::size_t l = 0; l < grid.levels.size(); ++l)
-      kernels_.scatter(grid.levels[l], table.data() + grid.levels[l].offset, block_.position01.data(), n,
+      kernels_.scatter(grid.levels[l], table.data() + grid.levels[l].offset,
+                       block_.position01.data(), n,
                        grid_.data() + l * static_cast<std::size_t>(n * grid.features));
     return table;
   }
@@ -194,7 +200,8 @@ TEST_P(FieldGradient, OfTheHashTableMatchesDifferences) {
   BlockGradients gradients;
   loss(gradients);
   // The table is read in half precision, so the step must be large against 2^-11.
-  test::expect_slope(field_.main.grid.table.value, table_gradient(), 0.05, 0.03, [&] { return moved_loss(); });
+  test::expect_slope(field_.main.grid.table.value, table_gradient(), 0.05, 0.03,
+                     [&] { return moved_loss(); });
 }
 
 TEST_P(FieldGradient, OfEachPartAloneMatchesDifferencesAlongAnyDirection) {
@@ -216,15 +223,18 @@ TEST_P(FieldGradient, OfEachPartAloneMatchesDifferencesAlongAnyDirection) {
     }
     {
       SCOPED_TRACE("density network");
-      check_parts(field_.main.mlp.weights.value, gradients.mlp, test::layers_of(field_.main.mlp), 1e-4f);
+      check_parts(field_.main.mlp.weights.value, gradients.mlp, test::layers_of(field_.main.mlp),
+                  1e-4f);
     }
     {
       SCOPED_TRACE("colour network");
-      check_parts(field_.color.weights.value, gradients.color, test::layers_of(field_.color), 1e-4f);
+      check_parts(field_.color.weights.value, gradients.color, test::layers_of(field_.color),
+                  1e-4f);
     }
     {
       SCOPED_TRACE("offsets");
-      check_parts(field_.image_offsets.value, gradients.offsets, {{"one", 1, 1}, {"another", 2, 1}}, 1e-3f);
+      check_parts(field_.image_offsets.value, gradients.offsets, {{"one", 1, 1}, {"another", 2, 1}},
+                  1e-3f);
     }
   }
 }

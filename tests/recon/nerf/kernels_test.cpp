@@ -6,8 +6,8 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "recon/nerf/field/network.hpp"
 #include "core/numeric/random.hpp"
+#include "recon/nerf/field/network.hpp"
 #include "recon/nerf/kernels/spherical_harmonics.hpp"
 
 namespace orbitfuse::nerf {
@@ -41,12 +41,13 @@ std::vector<double> encode_reference(const HashEncoding& grid, std::size_t l, co
       weight *= up ? part[d] : 1 - part[d];
     }
     const auto n = static_cast<std::uint32_t>(level.resolution) + 1;
-    const std::uint32_t entry = level.dense
-                                    ? at[0] + n * (at[1] + n * at[2])
-                                    : (at[0] ^ at[1] * 2654435761u ^ at[2] * 805459861u) & level.mask;
+    const std::uint32_t entry =
+        level.dense ? at[0] + n * (at[1] + n * at[2])
+                    : (at[0] ^ at[1] * 2654435761u ^ at[2] * 805459861u) & level.mask;
     for (int f = 0; f < level.features; ++f)
       out[static_cast<std::size_t>(f)] +=
-          weight * half(grid.half[static_cast<std::size_t>(level.offset) + entry * static_cast<std::size_t>(level.features) +
+          weight * half(grid.half[static_cast<std::size_t>(level.offset) +
+                                  entry * static_cast<std::size_t>(level.features) +
                                   static_cast<std::size_t>(f)]);
   }
   return out;
@@ -63,7 +64,8 @@ class KernelsTest : public ::testing::TestWithParam<Isa> {
 };
 
 TEST_P(KernelsTest, EncodingIsTrilinearAndHashedAsPublished) {
-  for (const auto& [features, log2_table] : {std::pair{2, 10}, {4, 10}, {2, 18}, {4, 17}}) {  // in and beyond the caches
+  for (const auto& [features, log2_table] :
+       {std::pair{2, 10}, {4, 10}, {2, 18}, {4, 17}}) {  // in and beyond the caches
     HashEncoding grid;
     grid.create(6, features, log2_table, 4, 128, 3);
     grid.table.value = noise(grid.table.size(), 5);
@@ -75,9 +77,11 @@ TEST_P(KernelsTest, EncodingIsTrilinearAndHashedAsPublished) {
     grid.encode(kernels(), positions.data(), count, out.data());
     for (int s = 0; s < count; ++s)
       for (std::size_t l = 0; l < grid.levels.size(); ++l) {
-        const auto expected = encode_reference(grid, l, &positions[static_cast<std::size_t>(3 * s)]);
+        const auto expected =
+            encode_reference(grid, l, &positions[static_cast<std::size_t>(3 * s)]);
         for (std::size_t f = 0; f < expected.size(); ++f)
-          ASSERT_NEAR(out[static_cast<std::size_t>(s * grid.width) + l * expected.size() + f], expected[f], 1e-4)
+          ASSERT_NEAR(out[static_cast<std::size_t>(s * grid.width) + l * expected.size() + f],
+                      expected[f], 1e-4)
               << "sample " << s << " level " << l;
       }
   }
@@ -96,7 +100,8 @@ TEST_P(KernelsTest, ScatterIsTheAdjointOfTheEncoding) {
     for (const GridLevel& level : grid.levels) {
       const auto d = noise(static_cast<std::size_t>(count * features), 17);
       std::vector<float> out(static_cast<std::size_t>(count * features)), grad(grid.table.size());
-      kernels().encode(level, grid.half.data() + level.offset, positions.data(), count, out.data(), features);
+      kernels().encode(level, grid.half.data() + level.offset, positions.data(), count, out.data(),
+                       features);
       kernels().scatter(level, grad.data() + level.offset, positions.data(), count, d.data());
       double left = 0, right = 0;
       for (std::size_t i = 0; i < d.size(); ++i) left += double{out[i]} * d[i];
@@ -110,8 +115,10 @@ TEST_P(KernelsTest, LayersMatchDoublePrecision) {
   for (const int rows : {1, 7, 64, 130}) {
     Mlp mlp;
     mlp.create({32, 48}, 4);
-    const auto in = noise(static_cast<std::size_t>(rows) * 32, 21), dout = noise(static_cast<std::size_t>(rows) * 48, 22);
-    std::vector<float> out(static_cast<std::size_t>(rows) * 48), din(static_cast<std::size_t>(rows) * 32), dw(32 * 48);
+    const auto in = noise(static_cast<std::size_t>(rows) * 32, 21),
+               dout = noise(static_cast<std::size_t>(rows) * 48, 22);
+    std::vector<float> out(static_cast<std::size_t>(rows) * 48),
+        din(static_cast<std::size_t>(rows) * 32), dw(32 * 48);
     kernels().forward(mlp.view(0), rows, in.data(), out.data(), true);
     kernels().backward_input(mlp.view(0), rows, dout.data(), din.data(), in.data());
     kernels().backward_weights(mlp.view(0), rows, in.data(), dout.data(), dw.data());
@@ -119,12 +126,14 @@ TEST_P(KernelsTest, LayersMatchDoublePrecision) {
     for (int r = 0; r < rows; ++r) {
       for (int o = 0; o < 48; ++o) {
         double sum = 0;
-        for (int i = 0; i < 32; ++i) sum += double{in[static_cast<std::size_t>(r * 32 + i)]} * w[i * 48 + o];
+        for (int i = 0; i < 32; ++i)
+          sum += double{in[static_cast<std::size_t>(r * 32 + i)]} * w[i * 48 + o];
         ASSERT_NEAR(out[static_cast<std::size_t>(r * 48 + o)], std::max(0.0, sum), 4 * tolerance());
       }
       for (int i = 0; i < 32; ++i) {
         double sum = 0;
-        for (int o = 0; o < 48; ++o) sum += double{dout[static_cast<std::size_t>(r * 48 + o)]} * w[i * 48 + o];
+        for (int o = 0; o < 48; ++o)
+          sum += double{dout[static_cast<std::size_t>(r * 48 + o)]} * w[i * 48 + o];
         if (in[static_cast<std::size_t>(r * 32 + i)] <= 0) sum = 0;
         ASSERT_NEAR(din[static_cast<std::size_t>(r * 32 + i)], sum, 4 * tolerance());
       }
@@ -133,8 +142,10 @@ TEST_P(KernelsTest, LayersMatchDoublePrecision) {
       for (int o = 0; o < 48; ++o) {
         double sum = 0;
         for (int r = 0; r < rows; ++r)
-          sum += double{in[static_cast<std::size_t>(r * 32 + i)]} * dout[static_cast<std::size_t>(r * 48 + o)];
-        ASSERT_NEAR(dw[static_cast<std::size_t>(i * 48 + o)], sum, 4 * tolerance() * std::sqrt(rows));
+          sum += double{in[static_cast<std::size_t>(r * 32 + i)]} *
+                 dout[static_cast<std::size_t>(r * 48 + o)];
+        ASSERT_NEAR(dw[static_cast<std::size_t>(i * 48 + o)], sum,
+                    4 * tolerance() * std::sqrt(rows));
       }
   }
 }
@@ -172,7 +183,8 @@ TEST(SphericalHarmonics, AreOrthonormal) {
   double gram[max_sh][max_sh] = {};
   for (int k = 0; k < n; ++k) {  // Fibonacci lattice
     const double z = 1 - (2 * k + 1.0) / n, r = std::sqrt(1 - z * z), a = k * 2.39996322972865332;
-    const float d[3] = {static_cast<float>(r * std::cos(a)), static_cast<float>(r * std::sin(a)), static_cast<float>(z)};
+    const float d[3] = {static_cast<float>(r * std::cos(a)), static_cast<float>(r * std::sin(a)),
+                        static_cast<float>(z)};
     float y[max_sh];
     spherical_harmonics(4, d, y);
     for (int i = 0; i < max_sh; ++i)

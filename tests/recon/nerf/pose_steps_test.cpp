@@ -16,7 +16,8 @@ constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 
 /// A wavy surface with a smooth pattern, as any camera near the origin sees it.
 float pattern(const Eigen::Vector3d& p) {
-  return static_cast<float>(0.5 + 0.2 * std::sin(9 * p.x() + 3 * p.y()) + 0.2 * std::cos(8 * p.y() - 2 * p.x()));
+  return static_cast<float>(0.5 + 0.2 * std::sin(9 * p.x() + 3 * p.y()) +
+                            0.2 * std::cos(8 * p.y() - 2 * p.x()));
 }
 
 double surface_z(double x, double y) { return 1 + 0.15 * std::sin(4 * x) * std::cos(3 * y); }
@@ -33,18 +34,21 @@ double distance_to_surface(const Ray& ray) {
 }
 
 Eigen::Vector3d point_at(const Ray& ray, double t) {
-  return {ray.origin[0] + t * ray.direction[0], ray.origin[1] + t * ray.direction[1], ray.origin[2] + t * ray.direction[2]};
+  return {ray.origin[0] + t * ray.direction[0], ray.origin[1] + t * ray.direction[1],
+          ray.origin[2] + t * ray.direction[2]};
 }
 
 NormalisedView photo_from(const Rigid3d& cam_from_world, double k1) {
   Camera camera = Camera::from_fov(80, 60, 50);
   camera.k1 = k1;
-  NormalisedView view{"photo", ViewRays(camera, cam_from_world, {}), cv::Mat(60, 80, CV_32FC1), {}, {}};
+  NormalisedView view{
+      "photo", ViewRays(camera, cam_from_world, {}), cv::Mat(60, 80, CV_32FC1), {}, {}};
   Ray ray;
   for (int y = 0; y < 60; ++y)
     for (int x = 0; x < 80; ++x)
-      view.target.at<float>(y, x) =
-          view.rays.ray(x + 0.5, y + 0.5, ray) ? pattern(point_at(ray, distance_to_surface(ray))) : nan;
+      view.target.at<float>(y, x) = view.rays.ray(x + 0.5, y + 0.5, ray)
+                                        ? pattern(point_at(ray, distance_to_surface(ray)))
+                                        : nan;
   return view;
 }
 
@@ -69,7 +73,8 @@ double picture_error(const NormalisedView& view) {
   for (int y = 0; y < view.target.rows; ++y)
     for (int x = 0; x < view.target.cols; ++x)
       if (view.rays.ray(x + 0.5, y + 0.5, ray))
-        sum += std::pow(pattern(point_at(ray, distance_to_surface(ray))) - view.target.at<float>(y, x), 2);
+        sum += std::pow(
+            pattern(point_at(ray, distance_to_surface(ray))) - view.target.at<float>(y, x), 2);
   return std::sqrt(sum / static_cast<double>(view.target.total()));
 }
 
@@ -84,8 +89,10 @@ TEST(PoseSteps, FindTheWayHome) {
     NormalisedView view = photo_from(pose(0, 0), k1);
     view.rays = ViewRays(view.rays.camera(), pose(0.8, 0.012), {});
     RefinedPose refined = unmoved(pose(0.8, 0.012));
-    for (int i = 0; i < 40; ++i) ASSERT_TRUE(take_step(sums_of_truth(view), {}, refined, view, {.noise = 1e-3}));
-    EXPECT_LT(rotation_angle_deg(refined.pose().rotation, Eigen::Quaterniond::Identity()), 0.01) << k1;
+    for (int i = 0; i < 40; ++i)
+      ASSERT_TRUE(take_step(sums_of_truth(view), {}, refined, view, {.noise = 1e-3}));
+    EXPECT_LT(rotation_angle_deg(refined.pose().rotation, Eigen::Quaterniond::Identity()), 0.01)
+        << k1;
     EXPECT_LT(camera_center(refined.pose()).norm(), 1e-4) << k1;
   }
 }
@@ -169,7 +176,9 @@ Dataset shaken_scene(Modality modality, double turn_deg) {
     }
     const auto draw = [&](unsigned k) { return turn_deg * 0.03 * (random_uniform(5, k, i) - 0.5); };
     const Eigen::Vector3d turn(draw(0), draw(1), draw(2)), shift(draw(3), draw(4), draw(5));
-    view.cam_from_world = Rigid3d{Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized())), shift} * view.cam_from_world;
+    view.cam_from_world =
+        Rigid3d{Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized())), shift} *
+        view.cam_from_world;
   }
   return data;
 }
@@ -210,7 +219,9 @@ TEST(PoseRefinement, GoesOnWhereACheckpointLeftIt) {
     EXPECT_EQ(pose.rotation.coeffs(), second->refined_poses.at(view).rotation.coeffs()) << view;
   }
   const TrainingView& moved = data.views[1];
-  EXPECT_GT((first->refined_poses.at(moved.name).translation - moved.cam_from_world.translation).norm(), 1e-5);
+  EXPECT_GT(
+      (first->refined_poses.at(moved.name).translation - moved.cam_from_world.translation).norm(),
+      1e-5);
 }
 
 }  // namespace

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/numeric/random.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/nerf/kernels/compositing.hpp"
 #include "recon/nerf/kernels/interlevel.hpp"
-#include "core/numeric/random.hpp"
 #include "tests/recon/nerf/slope.hpp"
 #include "tests/recon/nerf/toy_scene.hpp"
 
@@ -42,7 +42,8 @@ TEST(Resample, AnyWeightsGiveAscendingEdgesInside) {
     for (const double padding : {0.0, 0.01}) {
       std::vector<double> edges(17), weights(16), out(9);
       std::iota(edges.begin(), edges.end(), 0.0);
-      for (std::size_t i = 0; i < weights.size(); ++i) weights[i] = i % 3 == 0 ? scale * uniform(1, i) : 0.0;
+      for (std::size_t i = 0; i < weights.size(); ++i)
+        weights[i] = i % 3 == 0 ? scale * uniform(1, i) : 0.0;
       resample(16, edges.data(), weights.data(), padding, 0.3, 8, out.data());
       for (std::size_t i = 0; i < out.size(); ++i) {
         EXPECT_TRUE(out[i] >= 0 && out[i] <= 16) << scale << ' ' << padding << ' ' << out[i];
@@ -57,7 +58,8 @@ struct Histograms {
   std::vector<double> edges, proposal, low, high, w;
   Histograms() {
     double at = 0.1;
-    for (int i = 0; i <= 12; ++i) edges.push_back(at += 0.05 + uniform(2, static_cast<unsigned>(i)));
+    for (int i = 0; i <= 12; ++i)
+      edges.push_back(at += 0.05 + uniform(2, static_cast<unsigned>(i)));
     for (int i = 0; i < 12; ++i) proposal.push_back(0.15 * uniform(3, static_cast<unsigned>(i)));
     at = edges.front() - 0.5;  // reaches beyond the proposal on both sides
     for (int i = 0; i < 20; ++i) {
@@ -110,9 +112,10 @@ TrainOptions proposing(Modality modality, int iterations) {
   return options;
 }
 
-/// One level's interlevel loss from its definition, in double after the density; edges stay as they are.
-double loss_of(const FieldState& field, const Kernels& kernels, const RayBlock& fine, const ProposalBlock& asked,
-               std::size_t k) {
+/// One level's interlevel loss from its definition, in double after the density; edges stay as they
+/// are.
+double loss_of(const FieldState& field, const Kernels& kernels, const RayBlock& fine,
+               const ProposalBlock& asked, std::size_t k) {
   const ProposalBlock::Level& level = asked.levels[k];
   const auto bins = static_cast<std::size_t>(level.bins);
   double sum = 0;
@@ -121,9 +124,11 @@ double loss_of(const FieldState& field, const Kernels& kernels, const RayBlock& 
     std::vector<float> position, sigma(bins);
     for (std::size_t i = 0; i < bins; ++i)
       for (int d = 0; d < 3; ++d)
-        position.push_back(fine.rays[r].origin[d] + 0.5f * (edge[i] + edge[i + 1]) * fine.rays[r].direction[d]);
+        position.push_back(fine.rays[r].origin[d] +
+                           0.5f * (edge[i] + edge[i + 1]) * fine.rays[r].direction[d]);
     densities(field.proposals[k], kernels, position.data(), level.bins, sigma.data());
-    std::vector<double> edges(edge, edge + bins + 1), dt, density(sigma.begin(), sigma.end()), w(bins), light(bins);
+    std::vector<double> edges(edge, edge + bins + 1), dt, density(sigma.begin(), sigma.end()),
+        w(bins), light(bins);
     for (std::size_t i = 0; i < bins; ++i) dt.push_back(edges[i + 1] - edges[i]);
     composite(level.bins, density.data(), dt.data(), 0.0, w.data(), light.data());
     std::vector<double> low, high, fine_w, unused(bins), scratch;
@@ -133,8 +138,8 @@ double loss_of(const FieldState& field, const Kernels& kernels, const RayBlock& 
       high.push_back(double{fine.t[s]} + 0.5 * fine.dt[s]);
       fine_w.push_back(fine.weight[s]);
     }
-    sum += interlevel(static_cast<int>(low.size()), low.data(), high.data(), fine_w.data(), level.bins, edges.data(),
-                      w.data(), 1.0, unused.data(), scratch);
+    sum += interlevel(static_cast<int>(low.size()), low.data(), high.data(), fine_w.data(),
+                      level.bins, edges.data(), w.data(), 1.0, unused.data(), scratch);
   }
   return sum;
 }
@@ -150,7 +155,8 @@ TEST(Proposals, GradientOfEachNetworkMatchesDifferencesAlongAnyDirection) {
   std::vector<DrawnRay> rays;
   for (int r = 0; r < 8; ++r) {
     const float a = 0.7f * static_cast<float>(r);
-    const Ray ray{{std::cos(a), std::sin(a), 0.1f}, {-std::cos(a + 0.1f), -std::sin(a + 0.1f), 0}, 1};
+    const Ray ray{
+        {std::cos(a), std::sin(a), 0.1f}, {-std::cos(a + 0.1f), -std::sin(a + 0.1f), 0}, 1};
     rays.push_back({.ray = ray, .jitter = 0.1f * static_cast<float>(r)});
   }
   RayBlock fine;
@@ -163,7 +169,9 @@ TEST(Proposals, GradientOfEachNetworkMatchesDifferencesAlongAnyDirection) {
   std::array<std::vector<float>, 2> gradient;
   for (std::size_t k = 0; k < 2; ++k) gradient[k].assign(field.proposals[k].mlp.weights.size(), 0);
   const double total = backward_proposals(field, kernels, fine, 1.0f, asked, gradient);
-  EXPECT_NEAR(total, loss_of(field, kernels, fine, asked, 0) + loss_of(field, kernels, fine, asked, 1), 1e-4 * total);
+  EXPECT_NEAR(total,
+              loss_of(field, kernels, fine, asked, 0) + loss_of(field, kernels, fine, asked, 1),
+              1e-4 * total);
   for (std::size_t k = 0; k < 2; ++k) {
     SCOPED_TRACE("proposal " + std::to_string(k));
     const auto moved = [&] {
@@ -171,15 +179,18 @@ TEST(Proposals, GradientOfEachNetworkMatchesDifferencesAlongAnyDirection) {
       return loss_of(field, kernels, fine, asked, k);
     };
     DensityNetwork& network = field.proposals[k];
-    test::expect_random_slopes(network.mlp.weights.value, gradient[k], test::layers_of(network.mlp), 1e-4f, 0.06, moved);
+    test::expect_random_slopes(network.mlp.weights.value, gradient[k], test::layers_of(network.mlp),
+                               1e-4f, 0.06, moved);
     HashEncoding& grid = network.grid;
     std::vector<float> table(grid.table.size());
     const auto count = static_cast<std::size_t>(asked.samples(static_cast<int>(k)));
     for (std::size_t l = 0; l < grid.levels.size(); ++l)
-      kernels.scatter(grid.levels[l], table.data() + grid.levels[l].offset, asked.levels[k].position01.data(),
-                      static_cast<int>(count),
-                      asked.levels[k].grid.data() + l * count * static_cast<std::size_t>(grid.features));
-    test::expect_random_slopes(grid.table.value, table, test::levels_of(grid), 1.0f / 2048, 0.06, moved);
+      kernels.scatter(
+          grid.levels[l], table.data() + grid.levels[l].offset, asked.levels[k].position01.data(),
+          static_cast<int>(count),
+          asked.levels[k].grid.data() + l * count * static_cast<std::size_t>(grid.features));
+    test::expect_random_slopes(grid.table.value, table, test::levels_of(grid), 1.0f / 2048, 0.06,
+                               moved);
   }
 }
 

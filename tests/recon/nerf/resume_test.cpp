@@ -8,8 +8,8 @@
 #include "recon/nerf/field/checkpoint.hpp"
 #include "recon/nerf/field/field_state.hpp"
 #include "recon/nerf/training/measure.hpp"
-#include "tests/support/temp_folder.hpp"
 #include "tests/recon/nerf/toy_scene.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
@@ -103,7 +103,8 @@ TEST(Extension, ByNothingChangesNothingAndAWorseEndKeepsTheField) {
   const auto same = [&](Field& other) {
     const auto left = run.field.state().parameters(), right = other.state().parameters();
     bool equal = true;
-    for (std::size_t i = 0; i < left.size(); ++i) equal = equal && left[i]->value == right[i]->value;
+    for (std::size_t i = 0; i < left.size(); ++i)
+      equal = equal && left[i]->value == right[i]->value;
     return equal;
   };
   Field none, worse;
@@ -114,7 +115,8 @@ TEST(Extension, ByNothingChangesNothingAndAWorseEndKeepsTheField) {
   TrainOptions spoiling = run.options;
   spoiling.iterations = 60;
   spoiling.learning_rate = spoiling.network_learning_rate = 1;
-  ASSERT_TRUE(save_checkpoint(Field::load(run.folder / "field.bin").value(), run.report, spoiling.checkpoint));
+  ASSERT_TRUE(save_checkpoint(Field::load(run.folder / "field.bin").value(), run.report,
+                              spoiling.checkpoint));
   const auto report = train(run.data, spoiling, {}, worse);
   ASSERT_TRUE(report);
   EXPECT_EQ(report->iterations, 60);
@@ -134,7 +136,8 @@ TEST(Extension, OfABudgetCountsTheTimeSpent) {
   EXPECT_GT(report->iterations, 40);
   EXPECT_GE(report->wall_s, options.budget_s);
   // What was spent is not granted again.
-  ASSERT_TRUE(save_checkpoint(Field::load(run.folder / "field.bin").value(), run.report, options.checkpoint));
+  ASSERT_TRUE(save_checkpoint(Field::load(run.folder / "field.bin").value(), run.report,
+                              options.checkpoint));
   options.budget_s = run.report.wall_s;
   const auto spent = train(run.data, options, {}, field);
   ASSERT_TRUE(spent);
@@ -155,8 +158,8 @@ TEST(Extension, OfATargetAlreadyReachedEndsAtOnce) {
 
 /// Another value that the option accepts.
 TrainOptions altered(const TrainOptions& from, const std::string& key) {
-  for (const char* value : {"true", "false", "proposal", "2", "4", "16", "32", "48", "256", "4096", "0.5", "0.25",
-                            "1", "0", "elsewhere"}) {
+  for (const char* value : {"true", "false", "proposal", "2", "4", "16", "32", "48", "256", "4096",
+                            "0.5", "0.25", "1", "0", "elsewhere"}) {
     TrainOptions other = from;
     if (other.set(key, value) && other.get(key) != from.get(key) && other.validate()) return other;
   }
@@ -175,15 +178,20 @@ TEST(Resume, EveryOptionIsEitherComparedOrFreeToChange) {
     const Status same = check_resumable(state, run.data, state.views, other);
     EXPECT_EQ(same.has_value(), TrainOptions::free_to_change(key));
     if (!same) {
-      EXPECT_NE(same.error().found.find("nerf." + key + " = "), std::string::npos) << same.error().message();
+      EXPECT_NE(same.error().found.find("nerf." + key + " = "), std::string::npos)
+          << same.error().message();
     }
-    // Whatever changes the shape of the parameters or how they came to be from the data is compared.
+    // Whatever changes the shape of the parameters or how they came to be from the data is
+    // compared.
     FieldState shaped;
     shaped.create(other, state.modality, 6);
     const auto left = state.parameters(), right = shaped.parameters();
-    bool equal = left.size() == right.size() && state.occupancy.resolution == shaped.occupancy.resolution &&
-                 heldout_views(run.data, other.holdout_every) == heldout_views(run.data, run.options.holdout_every);
-    for (std::size_t i = 0; equal && i < left.size(); ++i) equal = left[i]->size() == right[i]->size();
+    bool equal = left.size() == right.size() &&
+                 state.occupancy.resolution == shaped.occupancy.resolution &&
+                 heldout_views(run.data, other.holdout_every) ==
+                     heldout_views(run.data, run.options.holdout_every);
+    for (std::size_t i = 0; equal && i < left.size(); ++i)
+      equal = left[i]->size() == right[i]->size();
     for (std::size_t l = 0; equal && l < state.main.grid.levels.size(); ++l)
       equal = state.main.grid.levels[l].resolution == shaped.main.grid.levels[l].resolution;
     if (!equal) {
@@ -198,7 +206,8 @@ TEST(Resume, EveryOptionIsEitherComparedOrFreeToChange) {
     Field field;
     const auto report = train(run.data, on, {}, field);
     ASSERT_TRUE(report) << report.error().message();
-    for (const Parameters* p : field.state().parameters()) EXPECT_TRUE(all_finite(p->value.data(), p->size()));
+    for (const Parameters* p : field.state().parameters())
+      EXPECT_TRUE(all_finite(p->value.data(), p->size()));
   }
 }
 
@@ -234,7 +243,8 @@ TEST(Resume, OtherDataAreNamed) {
 
 /// A field file with its options rewritten by `edit`, which gets and returns (key, value) pairs.
 template <class Edit>
-void rewrite_options(const std::filesystem::path& from, const std::filesystem::path& to, const Edit& edit) {
+void rewrite_options(const std::filesystem::path& from, const std::filesystem::path& to,
+                     const Edit& edit) {
   const std::string bytes = read_file(from).value();
   std::size_t at = 8;  // after the magic
   const auto number = [&] {
@@ -255,7 +265,9 @@ void rewrite_options(const std::filesystem::path& from, const std::filesystem::p
   }
   edit(options);
   std::string out = bytes.substr(0, 8);
-  const auto put = [&](std::uint64_t value) { out.append(reinterpret_cast<const char*>(&value), 8); };
+  const auto put = [&](std::uint64_t value) {
+    out.append(reinterpret_cast<const char*>(&value), 8);
+  };
   put(options.size());
   for (const auto& [key, value] : options) {
     put(key.size());
@@ -272,7 +284,8 @@ TEST(FieldFile, OptionsAreReadByName) {
   const auto file = run.folder / "field.bin", other = run.folder / "other.bin";
   using Options = std::vector<std::pair<std::string, std::string>>;
   const auto of = [](Options& options, const std::string& key) {
-    return std::find_if(options.begin(), options.end(), [&](const auto& o) { return o.first == key; });
+    return std::find_if(options.begin(), options.end(),
+                        [&](const auto& o) { return o.first == key; });
   };
   rewrite_options(file, other, [](Options&) {});
   EXPECT_EQ(read_file(other).value(), read_file(file).value()) << "the test reads the format";

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "recon/nerf/field/network.hpp"
 #include "core/numeric/random.hpp"
+#include "recon/nerf/field/network.hpp"
 
 namespace orbitfuse::nerf::test {
 
@@ -41,8 +41,9 @@ struct Part {
 inline std::vector<Part> levels_of(const HashEncoding& grid) {
   std::vector<Part> parts;
   for (std::size_t l = 0; l < grid.levels.size(); ++l)
-    parts.push_back({"level " + std::to_string(l), static_cast<std::size_t>(grid.levels[l].offset),
-                     std::size_t{grid.levels[l].entries} * static_cast<std::size_t>(grid.features)});
+    parts.push_back(
+        {"level " + std::to_string(l), static_cast<std::size_t>(grid.levels[l].offset),
+         std::size_t{grid.levels[l].entries} * static_cast<std::size_t>(grid.features)});
   return parts;
 }
 
@@ -54,18 +55,19 @@ inline std::vector<Part> layers_of(const Mlp& mlp) {
   return parts;
 }
 
-/// Slopes along directions that know nothing of the gradient: random signs over one part, over each in
-/// turn and over all. A gradient that lacks something is seen even where it is zero. The error is
-/// measured against the slope's standard deviation over such directions, the gradient's length. ReLUs that
-/// switch within a step leave 5 % of it at the steps used here; it falls with the step.
+/// Slopes along directions that know nothing of the gradient: random signs over one part, over each
+/// in turn and over all. A gradient that lacks something is seen even where it is zero. The error
+/// is measured against the slope's standard deviation over such directions, the gradient's length.
+/// ReLUs that switch within a step leave 5 % of it at the steps used here; it falls with the step.
 template <class Loss>
-void expect_random_slopes(std::vector<float>& values, const std::vector<float>& gradient, std::vector<Part> parts,
-                          float step, double tolerance, const Loss& loss) {
+void expect_random_slopes(std::vector<float>& values, const std::vector<float>& gradient,
+                          std::vector<Part> parts, float step, double tolerance, const Loss& loss) {
   parts.push_back({"all", 0, values.size()});
   const std::vector<float> kept = values;
   for (const Part& part : parts) {
     double length = 0;
-    for (std::size_t i = part.begin; i < part.begin + part.count; ++i) length += double{gradient[i]} * gradient[i];
+    for (std::size_t i = part.begin; i < part.begin + part.count; ++i)
+      length += double{gradient[i]} * gradient[i];
     length = std::sqrt(length);
     EXPECT_GT(length, 1e-5) << part.name << " learns nothing";
     for (std::uint64_t seed = 0; seed < 4; ++seed) {

@@ -29,9 +29,7 @@ Error error_of(const Dataset& data) {
   return report ? Error{} : report.error();
 }
 
-TEST(Stress, NoViewsIsAnInputError) {
-  EXPECT_EQ(error_of({}).kind, ErrorKind::input);
-}
+TEST(Stress, NoViewsIsAnInputError) { EXPECT_EQ(error_of({}).kind, ErrorKind::input); }
 
 TEST(Stress, MalformedViewIsNamed) {
   Dataset data = toy_scene(Modality::visible, 4);
@@ -77,7 +75,8 @@ TEST(Stress, ABrokenThermalViewIsDroppedWithItsNameAndDeadPixelsAreTold) {
   const auto report = train(data, options, {}, with);
   ASSERT_TRUE(report) << report.error().message();
   ASSERT_EQ(report->warnings.size(), 1u);
-  EXPECT_NE(report->warnings[0].find("broken.tiff dropped: 53 %"), std::string::npos) << report->warnings[0];
+  EXPECT_NE(report->warnings[0].find("broken.tiff dropped: 53 %"), std::string::npos)
+      << report->warnings[0];
   EXPECT_EQ(report->image_offsets_k.size(), 6u);
   ASSERT_TRUE(train(good, options, {}, without));
   EXPECT_EQ(with.state().main.grid.table.value, without.state().main.grid.table.value);
@@ -99,9 +98,13 @@ TEST(Stress, ACameraInsideTheObjectTrains) {
     // Two stand in the ball and see its dark inside; depth, where known, is a hand's breadth.
     for (const std::size_t i : {1u, 5u}) {
       data.views[i].cam_from_world.translation *= 0.1;
-      data.views[i].image = modality == Modality::visible ? cv::Scalar(0.05, 0.05, 0.05) : cv::Scalar(300);
-      data.depth.push_back({static_cast<int>(i), data.views[i].camera,
-                            cv::Mat(32, 32, CV_32FC1, cv::Scalar(0.3)), {}, {}});
+      data.views[i].image =
+          modality == Modality::visible ? cv::Scalar(0.05, 0.05, 0.05) : cv::Scalar(300);
+      data.depth.push_back({static_cast<int>(i),
+                            data.views[i].camera,
+                            cv::Mat(32, 32, CV_32FC1, cv::Scalar(0.3)),
+                            {},
+                            {}});
     }
     Field field;
     const auto report = train(data, toy_options(modality, 80), {}, field);
@@ -238,7 +241,8 @@ TEST(Occupancy, SamplesCoverTheOccupiedLengthInOrder) {
     double edge = 1e9;
     for (int d = 0; d < 3; ++d)
       if (std::abs(ray.direction[d]) > 1e-6f)
-        edge = std::min(edge, (4.0 - std::copysign(1.0, ray.direction[d]) * ray.origin[d]) / std::abs(ray.direction[d]));
+        edge = std::min(edge, (4.0 - std::copysign(1.0, ray.direction[d]) * ray.origin[d]) /
+                                  std::abs(ray.direction[d]));
     EXPECT_NEAR(covered, edge - 0.1, 0.05 * edge);
   }
 }
@@ -252,14 +256,17 @@ TEST(Occupancy, WholeBlocksAreCrossedAsTheirCellsWouldBe) {
     grid.on[block] = kind == 0 ? 0 : ~std::uint64_t{0};
     for (std::size_t cell = 64 * block; cell < 64 * (block + 1); ++cell) {
       if (kind >= 2) grid.density[cell] = random.uniform(0.0f, 3.0f);
-      if (kind == 3) Occupancy::put(grid.on, static_cast<std::int64_t>(cell), random.uniform(0, 2) == 1);
+      if (kind == 3)
+        Occupancy::put(grid.on, static_cast<std::int64_t>(cell), random.uniform(0, 2) == 1);
     }
   }
   grid.refresh();
   for (int k = 0; k < 50; ++k) {
     Ray ray{{random.uniform(-0.9f, 0.9f), random.uniform(-0.9f, 0.9f), -1.5f},
-            {random.uniform(-0.4f, 0.4f), random.uniform(-0.4f, 0.4f), 1}, 1};
-    const float norm = std::sqrt(ray.direction[0] * ray.direction[0] + ray.direction[1] * ray.direction[1] + 1);
+            {random.uniform(-0.4f, 0.4f), random.uniform(-0.4f, 0.4f), 1},
+            1};
+    const float norm =
+        std::sqrt(ray.direction[0] * ray.direction[0] + ray.direction[1] * ray.direction[1] + 1);
     for (float& d : ray.direction) d /= norm;
     constexpr double step = 1e-3;
     double occupied = 0;
@@ -298,7 +305,7 @@ TEST(Occupancy, ARayDoesNotDependOnThoseBesideIt) {
     drawn.far = random.uniform(0.5f, 9.0f);
     drawn.jitter = random.uniform(0.0f, 1.0f);
   }
-  rays[2].ray.origin[1] = 50;           // outside, away from the scene or towards it
+  rays[2].ray.origin[1] = 50;                // outside, away from the scene or towards it
   rays[5].ray.direction[0] = std::nanf("");  // a camera model's failure must stay its own
   rays[6].far = 0;
   std::vector<Marched> together(march_lanes);

@@ -26,13 +26,15 @@ Dataset toy_scene(Modality modality, int views, double scale, int pixels) {
     view.image.create(pixels, pixels, modality == Modality::visible ? CV_32FC3 : CV_32FC1);
     for (int y = 0; y < pixels; ++y)
       for (int x = 0; x < pixels; ++x) {
-        const Eigen::Vector3d d = (world_from_cam * view.camera.ray_of({x + 0.5, y + 0.5})).normalized();
+        const Eigen::Vector3d d =
+            (world_from_cam * view.camera.ray_of({x + 0.5, y + 0.5})).normalized();
         const double along = -eye.dot(d), gap = along * along - eye.squaredNorm() + ball * ball;
         Eigen::Vector3d p = Eigen::Vector3d::Zero();
         if (gap > 0) p = (eye + (along - std::sqrt(gap)) * d) / ball;
         if (modality == Modality::visible)
           view.image.at<cv::Vec3f>(y, x) =
-              gap > 0 ? cv::Vec3f(static_cast<float>(0.5 + 0.4 * p.x()), static_cast<float>(0.5 + 0.4 * p.y()),
+              gap > 0 ? cv::Vec3f(static_cast<float>(0.5 + 0.4 * p.x()),
+                                  static_cast<float>(0.5 + 0.4 * p.y()),
                                   static_cast<float>(0.5 + 0.4 * std::sin(6 * p.z())))
                       : cv::Vec3f(0.1f, 0.2f, 0.3f);
         else
@@ -55,8 +57,10 @@ std::vector<DepthMap> toy_depth(const Dataset& data, double scale) {
       for (int x = 0; x < map.depth.cols; ++x) {
         const Eigen::Vector3d ray = view.camera.ray_of({x + 0.5, y + 0.5});
         const Eigen::Vector3d d = view.cam_from_world.rotation.conjugate() * ray;
-        const double a = d.squaredNorm(), b = eye.dot(d), gap = b * b - a * (eye.squaredNorm() - ball * ball);
-        map.depth.at<float>(y, x) = gap > 0 ? static_cast<float>((-b - std::sqrt(gap)) / a) : std::nanf("");
+        const double a = d.squaredNorm(), b = eye.dot(d),
+                     gap = b * b - a * (eye.squaredNorm() - ball * ball);
+        map.depth.at<float>(y, x) =
+            gap > 0 ? static_cast<float>((-b - std::sqrt(gap)) / a) : std::nanf("");
       }
     maps.push_back(std::move(map));
   }

@@ -5,8 +5,8 @@
 
 #include "core/system/parallel.hpp"
 #include "recon/nerf/field/field_state.hpp"
-#include "tests/support/temp_folder.hpp"
 #include "tests/recon/nerf/toy_scene.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
@@ -17,7 +17,8 @@ using test::toy_scene;
 void expect_same_parameters(Field& a, Field& b) {
   const auto left = a.state().parameters(), right = b.state().parameters();
   ASSERT_EQ(left.size(), right.size());
-  for (std::size_t i = 0; i < left.size(); ++i) EXPECT_EQ(left[i]->value, right[i]->value) << "set " << i;
+  for (std::size_t i = 0; i < left.size(); ++i)
+    EXPECT_EQ(left[i]->value, right[i]->value) << "set " << i;
   EXPECT_EQ(a.state().occupancy.on, b.state().occupancy.on);
 }
 
@@ -59,13 +60,15 @@ TEST(Training, IsTheSameForOneAndTwoThreads) {
   EXPECT_NE(different.state().color.weights.value, fields[0].state().color.weights.value);
 }
 
-/// A view that would spoil a training: absurd values from inside the object, with depth and a point.
+/// A view that would spoil a training: absurd values from inside the object, with depth and a
+/// point.
 void add_hostile_view(Dataset& data, bool first) {
   TrainingView view = data.views[0];
   view.name = "hostile.png";
   view.measure_only = true;
   view.cam_from_world.translation = {0.01, 0.02, 0.03};
-  const cv::Scalar value = data.modality == Modality::thermal ? cv::Scalar(5000) : cv::Scalar(1, 0, 1);
+  const cv::Scalar value =
+      data.modality == Modality::thermal ? cv::Scalar(5000) : cv::Scalar(1, 0, 1);
   view.image = cv::Mat(view.image.size(), view.image.type(), value);
   const int at = first ? 0 : static_cast<int>(data.views.size());
   if (first) {
@@ -96,7 +99,8 @@ TEST(Training, AViewThatOnlyMeasuresChangesNothing) {
       options.keep_best = false;
       options.holdout_every = 3;
       for (std::size_t i = 0; modality == Modality::visible && i < data.views.size(); ++i)
-        data.views[i].image = data.views[i].image * (i % 2 ? 0.6 : 1.0);  // exposures to be evened out
+        data.views[i].image =
+            data.views[i].image * (i % 2 ? 0.6 : 1.0);  // exposures to be evened out
       Field without;
       ASSERT_TRUE(train(data, options, {}, without));
       for (const bool first : {false, true}) {
@@ -132,7 +136,9 @@ TEST(Training, ResumedAfterACancelEndsAsAnUnbrokenRun) {
   std::atomic<bool> cancel = false;
   Progress progress;
   progress.cancel = &cancel;
-  progress.report = [&](const ProgressEvent& event) { cancel = event.done >= 80; };  // between two turns of the poses
+  progress.report = [&](const ProgressEvent& event) {
+    cancel = event.done >= 80;
+  };  // between two turns of the poses
   Field field;
   const auto stopped = train(data, options, progress, field);
   ASSERT_FALSE(stopped);
@@ -176,7 +182,8 @@ TEST(Training, SavedFieldRendersTheSameAndACutFileIsNamed) {
 
 TEST(Training, SharedGeometryStartsFromTheGuide) {
   Field guide, with, without;
-  ASSERT_TRUE(train(toy_scene(Modality::visible, 12), toy_options(Modality::visible, 300), {}, guide));
+  ASSERT_TRUE(
+      train(toy_scene(Modality::visible, 12), toy_options(Modality::visible, 300), {}, guide));
   const Dataset thermal = toy_scene(Modality::thermal, 12);
   TrainOptions options = toy_options(Modality::thermal, 20);
   ASSERT_TRUE(train(thermal, options, {}, without));
@@ -240,7 +247,8 @@ TEST(Options, PresetsHoldThePublishedValues) {
     int hidden, color_hidden, features, first, second, fine;
     double distortion;
   };
-  for (const Row& row : {Row{"nerfacto", 64, 64, 2, 256, 96, 48, 0.002}, Row{"nerf-rgb", 128, 128, 4, 256, 128, 64, 0.002},
+  for (const Row& row : {Row{"nerfacto", 64, 64, 2, 256, 96, 48, 0.002},
+                         Row{"nerf-rgb", 128, 128, 4, 256, 128, 64, 0.002},
                          Row{"nerf-ir", 64, 32, 2, 128, 64, 32, 0.01}}) {
     const TrainOptions o = preset(row.name).value();
     EXPECT_TRUE(o.validate());

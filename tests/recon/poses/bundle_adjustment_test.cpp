@@ -18,7 +18,8 @@ void disturb(Reconstruction& model, double angle_deg, double shift, unsigned see
   std::normal_distribution<double> normal(0.0, 1.0);
   for (std::size_t v = 1; v < model.views.size(); ++v) {
     Rigid3d& pose = model.views[v].cam_from_world;
-    const Eigen::Vector3d axis = Eigen::Vector3d(normal(rng), normal(rng), normal(rng)).normalized();
+    const Eigen::Vector3d axis =
+        Eigen::Vector3d(normal(rng), normal(rng), normal(rng)).normalized();
     pose.rotation = Eigen::AngleAxisd(angle_deg * 0.0174533, axis) * pose.rotation;
     pose.translation += shift * Eigen::Vector3d(normal(rng), normal(rng), normal(rng));
   }
@@ -73,8 +74,7 @@ TEST(BundleAdjustment, WrongFocalIsFoundWhereTheOrbitTellsIt) {
   const auto truth = two_loops();
   Reconstruction model = seen_cube(truth, 300, 0.3);
   for (PosedView& view : model.views) view.camera.fx = view.camera.fy = 600 * 1.1;
-  const auto report =
-      adjust_bundle(model, std::vector<int>(24, 0), {{660, 0.3, false, false}}, {});
+  const auto report = adjust_bundle(model, std::vector<int>(24, 0), {{660, 0.3, false, false}}, {});
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_NEAR(model.views[0].camera.fx, 600, 6);
 }
@@ -82,10 +82,10 @@ TEST(BundleAdjustment, WrongFocalIsFoundWhereTheOrbitTellsIt) {
 TEST(BundleAdjustment, PureRotationIsAQualityErrorAndLeavesTheModel) {
   std::vector<PosedView> views = two_loops();
   for (PosedView& view : views)
-    view.cam_from_world = {Eigen::Quaterniond(Eigen::AngleAxisd(
-                               0.01 * static_cast<double>(&view - views.data()),
-                               Eigen::Vector3d::UnitY())),
-                           {0, 0, 4}};
+    view.cam_from_world = {
+        Eigen::Quaterniond(Eigen::AngleAxisd(0.01 * static_cast<double>(&view - views.data()),
+                                             Eigen::Vector3d::UnitY())),
+        {0, 0, 4}};
   for (PosedView& view : views)  // one centre
     view.cam_from_world.translation = view.cam_from_world.rotation * Eigen::Vector3d(0, 0, 4);
   Reconstruction model = seen_cube(views, 200, 0.3);

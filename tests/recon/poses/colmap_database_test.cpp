@@ -15,15 +15,18 @@ void make_database(const std::filesystem::path& path, int cols = 128) {
   ASSERT_EQ(sqlite3_open(path.c_str(), &handle), SQLITE_OK);
   const std::string sql =
       "CREATE TABLE images (image_id INTEGER PRIMARY KEY, name TEXT UNIQUE);"
-      "CREATE TABLE keypoints (image_id INTEGER PRIMARY KEY, rows INTEGER, cols INTEGER, data BLOB);"
-      "CREATE TABLE descriptors (image_id INTEGER PRIMARY KEY, rows INTEGER, cols INTEGER, data BLOB);"
+      "CREATE TABLE keypoints (image_id INTEGER PRIMARY KEY, rows INTEGER, cols INTEGER, data "
+      "BLOB);"
+      "CREATE TABLE descriptors (image_id INTEGER PRIMARY KEY, rows INTEGER, cols INTEGER, data "
+      "BLOB);"
       "CREATE TABLE matches (pair_id INTEGER PRIMARY KEY, rows INTEGER);"
       "CREATE TABLE two_view_geometries (pair_id INTEGER PRIMARY KEY, rows INTEGER);"
       "INSERT INTO images VALUES (1, 'c.png'), (2, 'a.png'), (3, 'b.png');"
       "INSERT INTO keypoints VALUES (1, 1, 2, ''), (2, 2, 2, ''), (3, 0, 2, '');"
-      "INSERT INTO descriptors VALUES (1, 1, " + std::to_string(cols) + ", CAST(printf('%.*c', " +
-      std::to_string(cols) + ", 'A') AS BLOB));";
-  ASSERT_EQ(sqlite3_exec(handle, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(handle);
+      "INSERT INTO descriptors VALUES (1, 1, " +
+      std::to_string(cols) + ", CAST(printf('%.*c', " + std::to_string(cols) + ", 'A') AS BLOB));";
+  ASSERT_EQ(sqlite3_exec(handle, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK)
+      << sqlite3_errmsg(handle);
   sqlite3_close(handle);
 }
 
@@ -46,19 +49,23 @@ TEST(ColmapDatabase, ImagesAreNumberedByNameAndKeepTheirFeatures) {
   sqlite3* handle = nullptr;
   ASSERT_EQ(sqlite3_open((folder / "db").c_str(), &handle), SQLITE_OK);
   std::string order;
-  sqlite3_exec(handle, "SELECT name FROM images ORDER BY image_id",
-               [](void* text, int, char** columns, char**) {
-                 *static_cast<std::string*>(text) += columns[0];
-                 return 0;
-               }, &order, nullptr);
+  sqlite3_exec(
+      handle, "SELECT name FROM images ORDER BY image_id",
+      [](void* text, int, char** columns, char**) {
+        *static_cast<std::string*>(text) += columns[0];
+        return 0;
+      },
+      &order, nullptr);
   sqlite3_close(handle);
   EXPECT_EQ(order, "a.pngb.pngc.png");
 }
 
 TEST(ColmapDatabase, OtherFilesAreNamed) {
   const test::TempFolder folder;
-  test::put(folder / "text", "this is a text file, long enough to be taken for a header of a database");
-  for (const auto& failed : {number_images_by_name(folder / "text"), number_images_by_name(folder / "none")}) {
+  test::put(folder / "text",
+            "this is a text file, long enough to be taken for a header of a database");
+  for (const auto& failed :
+       {number_images_by_name(folder / "text"), number_images_by_name(folder / "none")}) {
     ASSERT_FALSE(failed);
     EXPECT_EQ(failed.error().kind, ErrorKind::input);
   }

@@ -2,11 +2,11 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "recon/poses/estimate_poses.hpp"
+#include "recon/poses/sfm/colmap.hpp"
+#include "recon/poses/sfm/sfm_ladder.hpp"
 #include "tests/support/orbit_scenes.hpp"
 #include "tests/support/shared_data.hpp"
-#include "recon/poses/sfm/colmap.hpp"
-#include "recon/poses/estimate_poses.hpp"
-#include "recon/poses/sfm/sfm_ladder.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
@@ -36,9 +36,9 @@ scenes::Scene tracking_scene(const std::filesystem::path& data) {
   return scene;
 }
 
-/// Local contrast, a low peak threshold, every pair and the most relaxed mapper. Pairs of neighbours
-/// alone (three to each side, one across the loops) give a right model of 29 frames: what merges
-/// front and back are the matches between them.
+/// Local contrast, a low peak threshold, every pair and the most relaxed mapper. Pairs of
+/// neighbours alone (three to each side, one across the loops) give a right model of 29 frames:
+/// what merges front and back are the matches between them.
 Result<Reconstruction> colmap_model(const Session& session,
                                     const std::vector<const FrameRecord*>& frames,
                                     const std::filesystem::path& folder) {

@@ -39,10 +39,13 @@ std::vector<FeatureMatch> by_definition(const Descriptors& a, const Descriptors&
     double best = 1e9, second = 1e9;
     int index = -1;
     for (Eigen::Index c = 0; c < to.rows(); ++c) {
-      const double cosine = from.row(r).cast<double>().dot(to.row(c).cast<double>()) / (512.0 * 512.0);
+      const double cosine =
+          from.row(r).cast<double>().dot(to.row(c).cast<double>()) / (512.0 * 512.0);
       const double angle = std::acos(std::clamp(cosine, 0.0, 1.0));
-      if (angle < best) second = best, best = angle, index = static_cast<int>(c);
-      else second = std::min(second, angle);
+      if (angle < best)
+        second = best, best = angle, index = static_cast<int>(c);
+      else
+        second = std::min(second, angle);
     }
     const bool good = index >= 0 && best <= options.max_distance_rad &&
                       (to.rows() < 2 || best < options.max_ratio * second);
@@ -77,11 +80,13 @@ TEST(DescriptorMatching, EqualTwinsAreNoMatch) {
     EXPECT_NE(i, 4);
     EXPECT_EQ(i, j);
   }
-  EXPECT_EQ(match_descriptors(a, b).size(), 18u);  // without 4, whose twins tie, and 5, which is gone
+  EXPECT_EQ(match_descriptors(a, b).size(),
+            18u);  // without 4, whose twins tie, and 5, which is gone
 }
 
 TEST(DescriptorMatching, EmptyAndBlankSetsMatchNothing) {
-  const Descriptors none(0, 128), some = random_descriptors(4, 1), blank = Descriptors::Zero(4, 128);
+  const Descriptors none(0, 128), some = random_descriptors(4, 1),
+                                  blank = Descriptors::Zero(4, 128);
   EXPECT_TRUE(match_descriptors(none, some).empty());
   EXPECT_TRUE(match_descriptors(some, none).empty());
   EXPECT_TRUE(match_descriptors(none, none).empty());

@@ -46,8 +46,7 @@ TEST(EstimatePoses, NoColmapIsUnavailableAndNamesTheRemedy) {
 
 TEST(EstimatePoses, OneImageIsAnInputError) {
   const test::TempFolder folder;
-  const auto poses =
-      estimate_visible_poses(session_of(folder.path(), 1), {}, folder / "work", {});
+  const auto poses = estimate_visible_poses(session_of(folder.path(), 1), {}, folder / "work", {});
   ASSERT_FALSE(poses);
   EXPECT_EQ(poses.error().kind, ErrorKind::input);
   EXPECT_NE(poses.error().found.find("1 visible"), std::string::npos);

@@ -7,8 +7,8 @@
 #include "recon/poses/sfm/tracks.hpp"
 #include "tests/support/orbit_fixture.hpp"
 
-// What feature detection and matching would say of a machine inside four equal walls of equal pillars:
-// the machine's points are distinct, a pillar's are those of any other.
+// What feature detection and matching would say of a machine inside four equal walls of equal
+// pillars: the machine's points are distinct, a pillar's are those of any other.
 namespace orbitfuse::testing_orbit {
 
 struct FeatureScene {
@@ -21,8 +21,8 @@ struct FeatureScene {
 
 struct FeatureSceneOptions {
   int machine_points = 240;
-  int pillar_points = 18;    ///< of each of the seven pillars of each wall
-  double wrong_pillar = 0.6; ///< share of pairs in which each pillar is taken for its neighbour
+  int pillar_points = 18;     ///< of each of the seven pillars of each wall
+  double wrong_pillar = 0.6;  ///< share of pairs in which each pillar is taken for its neighbour
   double false_matches = 0.1;
   unsigned seed = 1;
 };
@@ -83,7 +83,8 @@ class FeatureSceneMaker {
       const Eigen::AngleAxisd turn(wall * EIGEN_PI / 2, Eigen::Vector3d::UnitZ());
       for (int p = 0; p < pillars; ++p)
         for (const Eigen::Vector3d& x : pattern)
-          points_.push_back(turn * Eigen::Vector3d(1.4 * (p - pillars / 2) + x.x(), 5.2 - x.y(), x.z()));
+          points_.push_back(turn *
+                            Eigen::Vector3d(1.4 * (p - pillars / 2) + x.x(), 5.2 - x.y(), x.z()));
     }
   }
 
@@ -157,8 +158,9 @@ inline double worst_center(const Reconstruction& model, const std::vector<PosedV
   const Eigen::Matrix4d m = Eigen::umeyama(from, to, true);
   double worst = 0;
   for (std::size_t i = 0; i < found.size(); ++i)
-    worst = std::max(worst, (m.topLeftCorner<3, 3>() * found[i] + m.topRightCorner<3, 1>() - known[i])
-                                    .norm() / known[i].norm());
+    worst = std::max(
+        worst, (m.topLeftCorner<3, 3>() * found[i] + m.topRightCorner<3, 1>() - known[i]).norm() /
+                   known[i].norm());
   return worst;
 }
 

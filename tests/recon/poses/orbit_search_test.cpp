@@ -23,7 +23,9 @@ Camera small_camera() {
 /// A wire scene without symmetry: a box, a mast at one corner, a ramp on one side.
 std::vector<EdgeLine> wires() {
   std::vector<EdgeLine> lines;
-  const auto add = [&](Eigen::Vector3d a, Eigen::Vector3d b) { lines.push_back({a, b, {0, 1, 2}}); };
+  const auto add = [&](Eigen::Vector3d a, Eigen::Vector3d b) {
+    lines.push_back({a, b, {0, 1, 2}});
+  };
   const Eigen::Vector3d low(-0.35, -0.2, -0.15), high(0.35, 0.2, 0.15);
   for (int corner = 0; corner < 8; ++corner)
     for (int axis = 0; axis < 3; ++axis) {
@@ -90,8 +92,9 @@ TEST(OrbitPose, RoundTripsThroughItsCamera) {
   const OrbitPose pose = true_pose(2);
   const Rigid3d cam = cam_from_world_of(pose, small_camera());
   EXPECT_NEAR(camera_center(cam).norm(), pose.radius, 1e-12);
-  EXPECT_LT((small_camera().project(cam * Eigen::Vector3d::Zero()) - Eigen::Vector2d(160, 120)).norm(),
-            1e-9);
+  EXPECT_LT(
+      (small_camera().project(cam * Eigen::Vector3d::Zero()) - Eigen::Vector2d(160, 120)).norm(),
+      1e-9);
   EXPECT_LT((cam.rotation * Eigen::Vector3d::UnitZ()).y(), 0) << "z is up, image y is down";
   OrbitPose shifted = pose;
   shifted.shift_x_px = 20, shifted.shift_y_px = -10;
@@ -126,7 +129,9 @@ TEST(OrbitSearch, FindsTheStartAndDirectionOfAWireOrbit) {
   ASSERT_EQ(found.front().poses.size(), 8u);
   for (int i = 0; i < 8; ++i)
     EXPECT_NEAR(std::remainder(found.front().poses[static_cast<std::size_t>(i)].azimuth_deg -
-                                   true_pose(i).azimuth_deg, 360), 0, 12)
+                                   true_pose(i).azimuth_deg,
+                               360),
+                0, 12)
         << "view " << i;
 }
 
@@ -158,8 +163,10 @@ TEST(OrbitSearch, ALoopDoesNotLeaveTheCommonDistanceForASlightlyBetterScore) {
   const std::size_t far = nearest_radius(2.2), near = nearest_radius(1.12);
   const auto set = [&](std::size_t view, int azimuth, std::size_t elevation, std::size_t radius,
                        float score) {
-    const auto place = (static_cast<std::size_t>(azimuth) * options.elevations_deg.size() +
-                        elevation) * table.radii.size() + radius;
+    const auto place =
+        (static_cast<std::size_t>(azimuth) * options.elevations_deg.size() + elevation) *
+            table.radii.size() +
+        radius;
     table.of_view[view][place].score = score;
   };
   std::vector<Station> stations(24);
@@ -206,7 +213,8 @@ TEST(EdgeAlignment, DrawsViewsOntoTheirEdgesAndFindsTheFocal) {
     view.field = ridges(cam_from_world_of(true_pose(i), small_camera()), 1.2);
     view.view.camera = small_camera();
     OrbitPose start = true_pose(i);
-    start.azimuth_deg += 0.6, start.elevation_deg -= 0.4, start.radius *= 1.01, start.roll_deg = 0.4;
+    start.azimuth_deg += 0.6, start.elevation_deg -= 0.4, start.radius *= 1.01,
+        start.roll_deg = 0.4;
     view.view.cam_from_world = cam_from_world_of(start, small_camera());
     views.push_back(view);
   }

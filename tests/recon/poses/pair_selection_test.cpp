@@ -67,7 +67,9 @@ INSTANTIATE_TEST_SUITE_P(Orbits, OrbitPairs,
 TEST(OrbitPairs, StationsGiveNeighboursTheClosureAndTheOtherLoop) {
   const auto frames = two_loops(12, true);
   const auto pairs = orbit_pairs(pointers(frames));
-  const auto has = [&](ViewPair p) { return std::find(pairs.begin(), pairs.end(), p) != pairs.end(); };
+  const auto has = [&](ViewPair p) {
+    return std::find(pairs.begin(), pairs.end(), p) != pairs.end();
+  };
   EXPECT_TRUE(has({0, 1}));
   EXPECT_TRUE(has({0, 11}));
   EXPECT_TRUE(has({0, 12}));

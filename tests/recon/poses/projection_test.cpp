@@ -18,8 +18,8 @@ Camera distorted() {
 TEST(Projection, IsCoresCamera) {
   const Camera camera = distorted();
   const Intrinsics lens = intrinsics_of(camera);
-  for (const Eigen::Vector3d& x : {Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0.3, -0.2, 1.1),
-                                   Eigen::Vector3d(-2, 1.5, 6)})
+  for (const Eigen::Vector3d& x :
+       {Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0.3, -0.2, 1.1), Eigen::Vector3d(-2, 1.5, 6)})
     EXPECT_LT((project<double>(x, lens.data()) - camera.project(x)).norm(), 1e-9);
 }
 
@@ -29,7 +29,8 @@ TEST(Projection, DerivativesAgreeWithFiniteDifferences) {
   std::array<double, 11> values{0.3, -0.2, 1.1};
   std::copy(lens.begin(), lens.end(), values.begin() + 3);
   std::array<Jet, 11> jets;
-  for (int i = 0; i < 11; ++i) jets[static_cast<std::size_t>(i)] = Jet(values[static_cast<std::size_t>(i)], i);
+  for (int i = 0; i < 11; ++i)
+    jets[static_cast<std::size_t>(i)] = Jet(values[static_cast<std::size_t>(i)], i);
   const Eigen::Matrix<Jet, 3, 1> x(jets[0], jets[1], jets[2]);
   const Eigen::Matrix<Jet, 2, 1> pixel = project<Jet>(x, jets.data() + 3);
   const auto at = [](const std::array<double, 11>& v) {

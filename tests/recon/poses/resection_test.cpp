@@ -32,9 +32,10 @@ FeatureScene described_scene() {
     rows.resize(static_cast<Eigen::Index>(scene.point_of[v].size()), 128);
     for (std::size_t i = 0; i < scene.point_of[v].size(); ++i) {
       const int point = scene.point_of[v][i];
-      const int look = point < options.machine_points
-                           ? point
-                           : options.machine_points + (point - options.machine_points) % options.pillar_points;
+      const int look =
+          point < options.machine_points
+              ? point
+              : options.machine_points + (point - options.machine_points) % options.pillar_points;
       if (!of_point.contains(look)) of_point[look] = random_row();
       const Eigen::RowVectorXf noisy = of_point[look] + 0.2f * random_row();
       rows.row(static_cast<Eigen::Index>(i)) = (512 * noisy.normalized()).array().round();
@@ -46,7 +47,8 @@ FeatureScene described_scene() {
 
 PosedFrames posed_but(const FeatureScene& scene, const std::vector<int>& left_out) {
   PosedFrames posed{FramePoses(scene.truth.size()), scene.graph.cameras};
-  for (std::size_t v = 0; v < scene.truth.size(); ++v) posed.poses[v] = scene.truth[v].cam_from_world;
+  for (std::size_t v = 0; v < scene.truth.size(); ++v)
+    posed.poses[v] = scene.truth[v].cam_from_world;
   for (const int v : left_out) posed.poses[static_cast<std::size_t>(v)].reset();
   return posed;
 }
@@ -59,13 +61,16 @@ TEST(Resection, ViewsLeftOutFindTheirPlace) {
   EXPECT_EQ(added->size(), 3u);
   for (const std::size_t v : {3u, 4u, 17u}) {
     ASSERT_TRUE(posed.poses[v]) << v;
-    EXPECT_LT((camera_center(*posed.poses[v]) - camera_center(scene.truth[v].cam_from_world)).norm(),
-              0.04)
+    EXPECT_LT(
+        (camera_center(*posed.poses[v]) - camera_center(scene.truth[v].cam_from_world)).norm(),
+        0.04)
         << v;
-    EXPECT_LT(posed.poses[v]->rotation.angularDistance(scene.truth[v].cam_from_world.rotation), 0.01)
+    EXPECT_LT(posed.poses[v]->rotation.angularDistance(scene.truth[v].cam_from_world.rotation),
+              0.01)
         << v;
   }
-  EXPECT_TRUE(scene.graph.verified.contains({3, 4})) << "its guided matches hold it in the adjustment";
+  EXPECT_TRUE(scene.graph.verified.contains({3, 4}))
+      << "its guided matches hold it in the adjustment";
 }
 
 TEST(Resection, AViewOfSomethingElseOrOfNothingGetsNoPose) {
@@ -77,9 +82,8 @@ TEST(Resection, AViewOfSomethingElseOrOfNothingGetsNoPose) {
   scene.graph.pixels[9].resize(2, 0);
   scene.graph.descriptors[9].resize(0, 128);
   for (auto* list : {&scene.graph.proposed, &scene.graph.verified})
-    std::erase_if(*list, [](const auto& entry) {
-      return entry.first.first == 9 || entry.first.second == 9;
-    });
+    std::erase_if(
+        *list, [](const auto& entry) { return entry.first.first == 9 || entry.first.second == 9; });
   PosedFrames posed = posed_but(scene, {7, 9});
   const auto added = resect(scene.graph, posed, {}, {});
   ASSERT_TRUE(added) << added.error().message();

@@ -19,8 +19,10 @@ cv::Mat shapes(unsigned seed) {
   for (int i = 0; i < 60; ++i) {
     const cv::Scalar shade(20 + draw(200));
     const cv::Point at(draw(640), draw(480));
-    if (i % 2 == 0) cv::circle(image, at, 8 + draw(40), shade, cv::FILLED);
-    else cv::rectangle(image, {at.x, at.y, 10 + draw(90), 10 + draw(90)}, shade, cv::FILLED);
+    if (i % 2 == 0)
+      cv::circle(image, at, 8 + draw(40), shade, cv::FILLED);
+    else
+      cv::rectangle(image, {at.x, at.y, 10 + draw(90), 10 + draw(90)}, shade, cv::FILLED);
   }
   cv::GaussianBlur(image, image, {}, 1.0);
   return image;
@@ -54,8 +56,8 @@ struct RigScene {
   }
 };
 
-/// Of the scene's points in the thermal image. At one depth a turn and a shift, and a step back and a
-/// shorter lens, look alike: only what they do together can be known.
+/// Of the scene's points in the thermal image. At one depth a turn and a shift, and a step back and
+/// a shorter lens, look alike: only what they do together can be known.
 double misplacement_px(const RigEstimate& rig, const RigScene& scene) {
   double sum = 0;
   int count = 0;

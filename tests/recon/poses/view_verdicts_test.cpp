@@ -23,7 +23,8 @@ TEST(ViewVerdicts, WhatSpeaksAgainstAViewIsNamed) {
     EXPECT_EQ(verdict.confidence == Confidence::sure, verdict.reason == DoubtReason::none);
     return verdict.reason;
   };
-  // As measured on a loop at half its distance: support 7 of 43, correlation .42, aim 133 of 640 px.
+  // As measured on a loop at half its distance: support 7 of 43, correlation .42, aim 133 of 640
+  // px.
   EXPECT_EQ(reason(&ViewEvidence::support_share, 7.0 / 43), DoubtReason::weak_support);
   EXPECT_EQ(reason(&ViewEvidence::correlation, 0.42), DoubtReason::temperatures_unlike);
   EXPECT_EQ(reason(&ViewEvidence::aim_off, 133.0 / 640), DoubtReason::off_its_loop);

@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "recon/alignment/edge_field.hpp"
-#include "recon/poses/cross_modal/view_recovery.hpp"
 #include "recon/alignment/patch_matching.hpp"
+#include "recon/poses/cross_modal/view_recovery.hpp"
 #include "recon/poses/world_frame.hpp"
 #include "tests/support/box_scene.hpp"
 #include "tests/support/orbit_fixture.hpp"

@@ -9,7 +9,8 @@ namespace orbitfuse {
 namespace {
 
 Similarity3d some_world() {
-  return {7.0, Eigen::Quaterniond(Eigen::AngleAxisd(1.1, Eigen::Vector3d(1, 2, -1).normalized())),
+  return {7.0,
+          Eigen::Quaterniond(Eigen::AngleAxisd(1.1, Eigen::Vector3d(1, 2, -1).normalized())),
           {100, -30, 4}};
 }
 
@@ -51,8 +52,9 @@ TEST(WorldFrame, StationsOfAMergedFrontAndBackContradictThePoses) {
   EXPECT_EQ(good.outliers, 0);
   // A third of the views turned to the other side, as a near-symmetric object does to SfM.
   for (std::size_t i = 0; i < 8; ++i) {
-    const Rigid3d half_turn{Eigen::Quaterniond(Eigen::AngleAxisd(3.14159265, Eigen::Vector3d::UnitZ())),
-                            Eigen::Vector3d::Zero()};
+    const Rigid3d half_turn{
+        Eigen::Quaterniond(Eigen::AngleAxisd(3.14159265, Eigen::Vector3d::UnitZ())),
+        Eigen::Vector3d::Zero()};
     views[i].cam_from_world = views[i].cam_from_world * half_turn;
   }
   EXPECT_GE(fit_stations(views, session).outliers, 8);

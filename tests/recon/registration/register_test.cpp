@@ -3,9 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/cloud_scenes.hpp"
 #include "core/system/parallel.hpp"
 #include "tests/recon/registration/shapes.hpp"
+#include "tests/support/cloud_scenes.hpp"
 
 namespace orbitfuse {
 namespace {

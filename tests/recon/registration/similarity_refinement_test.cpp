@@ -53,7 +53,8 @@ TEST(SimilaritySupport, TellsHalfTurnsFromTheTruth) {
   const double right = support(off * orbit.visible_from_thermal);
   for (const Eigen::Vector3d& axis :
        {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(0, 0, 1)}) {
-    const Similarity3d half_turn{1, Eigen::Quaterniond(Eigen::AngleAxisd(EIGEN_PI, axis)), {0, 0, 0}};
+    const Similarity3d half_turn{
+        1, Eigen::Quaterniond(Eigen::AngleAxisd(EIGEN_PI, axis)), {0, 0, 0}};
     EXPECT_LT(support(off * half_turn * orbit.visible_from_thermal), 0.9 * right)
         << axis.transpose();
   }

@@ -15,7 +15,8 @@ namespace {
 using testing_orbit::ThermalOrbit;
 
 Similarity3d off_by(double degrees, const Eigen::Vector3d& axis, double scale) {
-  return {scale, Eigen::Quaterniond(Eigen::AngleAxisd(degrees * EIGEN_PI / 180, axis.normalized())),
+  return {scale,
+          Eigen::Quaterniond(Eigen::AngleAxisd(degrees * EIGEN_PI / 180, axis.normalized())),
           {0.01, -0.01, 0.01}};
 }
 
@@ -51,8 +52,8 @@ TEST(SimilaritySearch, ComesHomeFromWhereOneStartDoesNot) {
                                         start, similarity_rounds(), {});
   ASSERT_TRUE(single) << single.error().message();
   ASSERT_GT(turn_deg(left(*single, orbit)), 2) << "one start is enough: this shows nothing";
-  const auto searched = search_similarity(testing_orbit::box_renderer(), orbit.images, orbit.views,
-                                          start, {}, {});
+  const auto searched =
+      search_similarity(testing_orbit::box_renderer(), orbit.images, orbit.views, start, {}, {});
   ASSERT_TRUE(searched) << searched.error().message();
   EXPECT_TRUE(searched->improved);
   EXPECT_EQ(searched->starts, 9);
@@ -99,14 +100,13 @@ TEST(SimilaritySearch, NoViewsLeaveItToo) {
 
 TEST(SimilaritySearch, BadInputIsNamed) {
   const ThermalOrbit orbit;
-  const auto counts =
-      search_similarity(testing_orbit::box_renderer(), {}, orbit.views, {}, {}, {});
+  const auto counts = search_similarity(testing_orbit::box_renderer(), {}, orbit.views, {}, {}, {});
   ASSERT_FALSE(counts);
   EXPECT_EQ(counts.error().kind, ErrorKind::input);
   SimilaritySearchOptions options;
   options.turn_deg = std::nan("");
-  const auto turn = search_similarity(testing_orbit::box_renderer(), orbit.images, orbit.views, {},
-                                      options, {});
+  const auto turn =
+      search_similarity(testing_orbit::box_renderer(), orbit.images, orbit.views, {}, options, {});
   ASSERT_FALSE(turn);
   EXPECT_EQ(turn.error().kind, ErrorKind::usage);
   EXPECT_EQ(turn.error().where, "similarity_search.turn_deg");

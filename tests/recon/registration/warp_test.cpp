@@ -5,9 +5,9 @@
 
 #include <cmath>
 
-#include "recon/registration/register.hpp"
 #include "recon/registration/clouds/thinning.hpp"
 #include "recon/registration/clouds/warp_grid.hpp"
+#include "recon/registration/register.hpp"
 #include "tests/recon/registration/shapes.hpp"
 
 namespace orbitfuse::registration {

@@ -10,7 +10,9 @@ namespace orbitfuse::v4l2::guest {
 using namespace std::chrono_literals;
 
 Recording::Recording(V4l2Options options)
-    : writer_(*SessionWriter::create(folder_ / "s")), source_(std::move(options)), recorder_(*writer_, {}) {
+    : writer_(*SessionWriter::create(folder_ / "s")),
+      source_(std::move(options)),
+      recorder_(*writer_, {}) {
   Progress progress;
   progress.cancel = &cancelled_;
   thread_ = std::thread([this, progress] { outcome_ = recorder_.run({&source_}, progress); });
@@ -46,7 +48,8 @@ Session Recording::finish() {
   thread_.join();
   // A camera that is away at the end says so; its accounts are exact all the same.
   const bool away = status().away.has_value();
-  EXPECT_TRUE(outcome_ || outcome_.error().kind == (away ? ErrorKind::device : ErrorKind::cancelled))
+  EXPECT_TRUE(outcome_ ||
+              outcome_.error().kind == (away ? ErrorKind::device : ErrorKind::cancelled))
       << outcome_.error().message();
   EXPECT_TRUE(writer_->close());
   const auto session = open_session(folder_ / "s");

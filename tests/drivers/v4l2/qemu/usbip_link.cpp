@@ -17,8 +17,8 @@ namespace orbitfuse::v4l2::guest {
 namespace {
 
 const std::string host_controller = "/sys/devices/platform/vhci_hcd.0/";
-constexpr int high_speed = 3;     // enum usb_device_speed
-constexpr int port_is_free = 4;   // VDEV_ST_NULL
+constexpr int high_speed = 3;    // enum usb_device_speed
+constexpr int port_is_free = 4;  // VDEV_ST_NULL
 
 constexpr std::size_t header_words = 12;
 using Header = std::array<std::uint32_t, header_words>;  // big-endian on the wire
@@ -52,7 +52,8 @@ UsbipLink::UsbipLink() {
   fd_ = ends[0];
   const int port = free_high_speed_port();
   std::ofstream attach(host_controller + "attach");
-  attach << port << ' ' << ends[1] << ' ' << (1 << 16 | (port + 2)) << ' ' << high_speed << std::flush;
+  attach << port << ' ' << ends[1] << ' ' << (1 << 16 | (port + 2)) << ' ' << high_speed
+         << std::flush;
   const bool attached = attach.good();
   ::close(ends[1]);  // the kernel has its own
   if (!attached) throw std::runtime_error("vhci_hcd did not take the device");
@@ -110,8 +111,10 @@ void UsbipLink::send(const Bytes& bytes) {
   std::size_t sent = 0;
   while (plugged() && sent < bytes.size()) {
     const ssize_t count = ::send(fd_, bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL);
-    if (count <= 0) unplug();
-    else sent += static_cast<std::size_t>(count);
+    if (count <= 0)
+      unplug();
+    else
+      sent += static_cast<std::size_t>(count);
   }
 }
 

@@ -27,7 +27,7 @@ class UsbipLink {
     bool in = false;
     std::uint32_t length = 0;
     std::array<std::uint8_t, 8> setup{};
-    Bytes data;                         ///< of an OUT transfer
+    Bytes data;  ///< of an OUT transfer
   };
   /// Nothing within the time; plugged() tells whether the host is still there.
   std::optional<Request> receive(int timeout_ms);

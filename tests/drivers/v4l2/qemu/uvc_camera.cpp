@@ -9,11 +9,25 @@
 namespace orbitfuse::v4l2::guest {
 namespace {
 
-enum Get : std::uint8_t { set_cur = 0x01, get_cur = 0x81, get_min, get_max, get_res, get_len, get_info, get_def };
+enum Get : std::uint8_t {
+  set_cur = 0x01,
+  get_cur = 0x81,
+  get_min,
+  get_max,
+  get_res,
+  get_len,
+  get_info,
+  get_def
+};
 constexpr std::uint8_t commit_control = 0x02;
 
 // Payload header (UVC 1.1, section 2.4.3.3).
-enum HeaderBit : std::uint8_t { frame_id = 1, end_of_frame = 2, error_bit = 0x40, end_of_header = 0x80 };
+enum HeaderBit : std::uint8_t {
+  frame_id = 1,
+  end_of_frame = 2,
+  error_bit = 0x40,
+  end_of_header = 0x80
+};
 constexpr std::size_t header_bytes = 2;
 
 constexpr int bits = 16, block = width / bits;
@@ -23,10 +37,10 @@ constexpr int bits = 16, block = width / bits;
 UvcCamera::UvcCamera(std::string serial, double rate_hz)
     : serial_(std::move(serial)),
       interval_100ns_(static_cast<std::uint32_t>(std::lround(1e7 / rate_hz))),
-      controls_{{{camera_terminal, 0x02}, {1, 0, 0, 0x09, 8, 8}},          // automatic
+      controls_{{{camera_terminal, 0x02}, {1, 0, 0, 0x09, 8, 8}},  // automatic
                 {{camera_terminal, 0x04}, {4, 1, 10000, 1, 156, 156}},
                 {{processing_unit, 0x0a}, {2, 2800, 6500, 1, 4600, 4600}},
-                {{processing_unit, 0x0b}, {1, 0, 1, 1, 1, 1}}} {           // automatic
+                {{processing_unit, 0x0b}, {1, 0, 1, 1, 1, 1}}} {  // automatic
   settle_stream(Bytes(34, 0));
   thread_ = std::thread([this] { serve(); });
 }
@@ -86,9 +100,12 @@ void UvcCamera::handle_control(const Request& request) {
   const auto& setup = request.setup;
   const bool of_class = (setup[0] & 0x60) == 0x20;
   std::optional<Bytes> answer;
-  if (!of_class) answer = standard_request(request);
-  else if (setup[4] == streaming_interface) answer = stream_request(request);
-  else answer = control_request(request);
+  if (!of_class)
+    answer = standard_request(request);
+  else if (setup[4] == streaming_interface)
+    answer = stream_request(request);
+  else
+    answer = control_request(request);
   if (!answer) return link_.answer(request, -EPIPE);  // a stall: not supported
   if (answer->size() > request.length) answer->resize(request.length);
   link_.answer(request, 0, *answer);
@@ -98,12 +115,17 @@ std::optional<Bytes> UvcCamera::standard_request(const Request& request) {
   const auto& setup = request.setup;
   if (setup[1] != 0x06) return request.in ? Bytes{0, 0} : Bytes{};  // status, features, interfaces
   switch (setup[3]) {
-    case 1: return device_descriptor();
-    case 2: return configuration_descriptor(interval_100ns_);
+    case 1:
+      return device_descriptor();
+    case 2:
+      return configuration_descriptor(interval_100ns_);
     case 3:
       if (setup[2] == 0) return language_descriptor();
-      return string_descriptor(setup[2] == 1 ? "OrbitFuse" : setup[2] == 2 ? "Software camera" : serial_);
-    default: return std::nullopt;
+      return string_descriptor(setup[2] == 1   ? "OrbitFuse"
+                               : setup[2] == 2 ? "Software camera"
+                                               : serial_);
+    default:
+      return std::nullopt;
   }
 }
 
@@ -130,10 +152,17 @@ std::optional<Bytes> UvcCamera::stream_request(const Request& request) {
         sending_ = false;
       }
       return Bytes{};
-    case get_cur: case get_min: case get_max: case get_def: return stream_settings_;
-    case get_len: return Bytes{34, 0};
-    case get_info: return Bytes{3};
-    default: return std::nullopt;
+    case get_cur:
+    case get_min:
+    case get_max:
+    case get_def:
+      return stream_settings_;
+    case get_len:
+      return Bytes{34, 0};
+    case get_info:
+      return Bytes{3};
+    default:
+      return std::nullopt;
   }
 }
 
@@ -144,15 +173,31 @@ std::optional<Bytes> UvcCamera::control_request(const Request& request) {
   Control& control = found->second;
   Bytes answer;
   switch (request.setup[1]) {
-    case set_cur: control.current = get(request.data, 0, control.bytes); return answer;
-    case get_cur: put(answer, control.current, control.bytes); return answer;
-    case get_min: put(answer, control.minimum, control.bytes); return answer;
-    case get_max: put(answer, control.maximum, control.bytes); return answer;
-    case get_res: put(answer, control.step, control.bytes); return answer;
-    case get_def: put(answer, control.initial, control.bytes); return answer;
-    case get_len: put(answer, static_cast<std::uint64_t>(control.bytes), 2); return answer;
-    case get_info: return Bytes{3};
-    default: return std::nullopt;
+    case set_cur:
+      control.current = get(request.data, 0, control.bytes);
+      return answer;
+    case get_cur:
+      put(answer, control.current, control.bytes);
+      return answer;
+    case get_min:
+      put(answer, control.minimum, control.bytes);
+      return answer;
+    case get_max:
+      put(answer, control.maximum, control.bytes);
+      return answer;
+    case get_res:
+      put(answer, control.step, control.bytes);
+      return answer;
+    case get_def:
+      put(answer, control.initial, control.bytes);
+      return answer;
+    case get_len:
+      put(answer, static_cast<std::uint64_t>(control.bytes), 2);
+      return answer;
+    case get_info:
+      return Bytes{3};
+    default:
+      return std::nullopt;
   }
 }
 
@@ -189,9 +234,11 @@ void UvcCamera::send_payloads() {
     const bool last = sent_ + count == sendable_;
     Bytes payload(header_bytes + count);
     payload[0] = header_bytes;
-    payload[1] = static_cast<std::uint8_t>(end_of_header | (frame_bit_ ? frame_id : 0) |
-                                           (last ? end_of_frame : 0) | (marked_bad_ ? error_bit : 0));
-    std::copy_n(picture_.begin() + static_cast<std::ptrdiff_t>(sent_), count, payload.begin() + header_bytes);
+    payload[1] =
+        static_cast<std::uint8_t>(end_of_header | (frame_bit_ ? frame_id : 0) |
+                                  (last ? end_of_frame : 0) | (marked_bad_ ? error_bit : 0));
+    std::copy_n(picture_.begin() + static_cast<std::ptrdiff_t>(sent_), count,
+                payload.begin() + header_bytes);
     sent_ += count;
     sending_ = !last;
     link_.answer(transfer, 0, payload);
@@ -203,7 +250,8 @@ Bytes picture(Format format, int number) {
     Bytes bytes;
     bytes.reserve(frame_bytes);
     for (int y = 0; y < height; ++y) {
-      for (int x = 0; x < width; ++x) put(bytes, static_cast<std::uint64_t>(29315 + number + x % 7), 2);
+      for (int x = 0; x < width; ++x)
+        put(bytes, static_cast<std::uint64_t>(29315 + number + x % 7), 2);
     }
     return bytes;
   }
@@ -224,7 +272,8 @@ std::optional<int> shown_number(const cv::Mat& stored) {
   if (stored.cols != width || stored.rows != height) return std::nullopt;
   cv::Mat first = stored.row(0), all;
   cv::repeat(first, height, 1, all);
-  if (cv::norm(all, stored, cv::NORM_INF) > (stored.depth() == CV_16U ? 0 : 24)) return std::nullopt;
+  if (cv::norm(all, stored, cv::NORM_INF) > (stored.depth() == CV_16U ? 0 : 24))
+    return std::nullopt;
   if (stored.type() == CV_16UC1) {
     for (int x = 0; x < width; ++x) {
       if (first.at<std::uint16_t>(x) != first.at<std::uint16_t>(0) + x % 7) return std::nullopt;
@@ -234,7 +283,8 @@ std::optional<int> shown_number(const cv::Mat& stored) {
   int number = 0;
   for (int bit = 0; bit < bits; ++bit) {
     const int x = bit * block + block / 2;
-    const int level = stored.channels() == 3 ? first.at<cv::Vec3b>(x)[1] : first.at<std::uint8_t>(x);
+    const int level =
+        stored.channels() == 3 ? first.at<cv::Vec3b>(x)[1] : first.at<std::uint8_t>(x);
     if (level > 128) number |= 1 << bit;
   }
   return number;

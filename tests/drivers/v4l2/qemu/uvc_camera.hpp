@@ -32,8 +32,8 @@ class UvcCamera {
   explicit UvcCamera(std::string serial, double rate_hz = 10);
   ~UvcCamera();
 
-  void fail_next(Fault fault);        ///< the next frame that begins
-  void fall_silent() { silent_ = true; }  ///< until the host commits a format again
+  void fail_next(Fault fault);              ///< the next frame that begins
+  void fall_silent() { silent_ = true; }    ///< until the host commits a format again
   void halt_endpoint() { halted_ = true; }  ///< one transfer fails with a stall
   void unplug();
 
@@ -69,17 +69,17 @@ class UvcCamera {
   const std::string serial_;
   const std::uint32_t interval_100ns_;
   std::atomic<bool> silent_{false}, halted_{false}, unplugging_{false};
-  std::atomic<int> frame_{0};           ///< number of the newest frame
-  mutable std::mutex mutex_;            ///< of what follows
+  std::atomic<int> frame_{0};  ///< number of the newest frame
+  mutable std::mutex mutex_;   ///< of what follows
   std::deque<Fault> faults_;
   std::set<int> faulty_;
   std::map<ControlKey, Control> controls_;
 
   // Only the serving thread's.
   UsbipLink link_;
-  std::deque<Request> transfers_;       ///< waiting for payloads
-  Bytes stream_settings_;               ///< the probe and commit control
-  Bytes picture_;                       ///< of the frame that is being sent
+  std::deque<Request> transfers_;  ///< waiting for payloads
+  Bytes stream_settings_;          ///< the probe and commit control
+  Bytes picture_;                  ///< of the frame that is being sent
   std::size_t sent_ = 0, sendable_ = 0;
   bool sending_ = false, frame_bit_ = false, marked_bad_ = false;
   Clock::time_point next_frame_at_{};

@@ -25,11 +25,14 @@ Bytes totalled(Bytes all, std::size_t offset) {
 
 Bytes control_entities() {
   // VC_HEADER: UVC 1.1, 1 MHz clock, one streaming interface.
-  Bytes all = sized({class_interface, 0x01, 0x10, 0x01, 0, 0, 0x40, 0x42, 0x0f, 0x00, 1, streaming_interface});
+  Bytes all = sized(
+      {class_interface, 0x01, 0x10, 0x01, 0, 0, 0x40, 0x42, 0x0f, 0x00, 1, streaming_interface});
   // Camera terminal: exposure mode (D1) and absolute exposure time (D3); its focus is fixed.
-  append(all, sized({class_interface, 0x02, camera_terminal, 0x01, 0x02, 0, 0, 0, 0, 0, 0, 0, 0, 3, 0x0a, 0, 0}));
+  append(all, sized({class_interface, 0x02, camera_terminal, 0x01, 0x02, 0, 0, 0, 0, 0, 0, 0, 0, 3,
+                     0x0a, 0, 0}));
   // Processing unit: white balance temperature (D6) and its automatic (D12).
-  append(all, sized({class_interface, 0x05, processing_unit, camera_terminal, 0, 0, 2, 0x40, 0x10, 0, 0}));
+  append(all, sized({class_interface, 0x05, processing_unit, camera_terminal, 0, 0, 2, 0x40, 0x10,
+                     0, 0}));
   append(all, sized({class_interface, 0x03, output_terminal, 0x01, 0x01, 0, processing_unit, 0}));
   return totalled(all, 5);
 }
@@ -59,10 +62,12 @@ Bytes frame(std::uint8_t subtype, std::uint32_t interval_100ns) {
 
 Bytes stream_formats(std::uint32_t interval_100ns) {
   // VS_INPUT_HEADER: three formats, no still capture, no per-format controls.
-  Bytes all = sized({class_interface, 0x01, 3, 0, 0, 0x80 | bulk_endpoint, 0, output_terminal, 0, 0, 0, 1, 0, 0, 0});
+  Bytes all = sized({class_interface, 0x01, 3, 0, 0, 0x80 | bulk_endpoint, 0, output_terminal, 0, 0,
+                     0, 1, 0, 0, 0});
   append(all, uncompressed_format(Format::yuyv, "YUY2"));
   append(all, frame(0x05, interval_100ns));
-  append(all, sized({class_interface, 0x06, static_cast<std::uint8_t>(Format::mjpeg), 1, 1, 1, 0, 0, 0, 0}));
+  append(all, sized({class_interface, 0x06, static_cast<std::uint8_t>(Format::mjpeg), 1, 1, 1, 0, 0,
+                     0, 0}));
   append(all, frame(0x07, interval_100ns));
   append(all, uncompressed_format(Format::y16, "Y16 "));
   append(all, frame(0x05, interval_100ns));
@@ -77,7 +82,8 @@ void put(Bytes& bytes, std::uint64_t value, int count) {
 
 std::uint32_t get(const Bytes& bytes, std::size_t offset, int count) {
   std::uint32_t value = 0;
-  for (int i = 0; i < count; ++i) value |= std::uint32_t{bytes.at(offset + static_cast<std::size_t>(i))} << (8 * i);
+  for (int i = 0; i < count; ++i)
+    value |= std::uint32_t{bytes.at(offset + static_cast<std::size_t>(i))} << (8 * i);
   return value;
 }
 
@@ -92,8 +98,8 @@ Bytes device_descriptor() {
 
 Bytes configuration_descriptor(std::uint32_t interval_100ns) {
   Bytes all = sized({0x02, 0, 0, 2, 1, 0, 0x80, 250});
-  append(all, sized({0x0b, 0, 2, 0x0e, 0x03, 0, 0}));           // both interfaces are one function
-  append(all, sized({0x04, 0, 0, 0, 0x0e, 0x01, 0, 0}));        // video control
+  append(all, sized({0x0b, 0, 2, 0x0e, 0x03, 0, 0}));     // both interfaces are one function
+  append(all, sized({0x04, 0, 0, 0, 0x0e, 0x01, 0, 0}));  // video control
   append(all, control_entities());
   append(all, sized({0x04, streaming_interface, 0, 1, 0x0e, 0x02, 0, 0}));
   append(all, stream_formats(interval_100ns));

@@ -83,7 +83,8 @@ std::map<std::uint64_t, int> expect_true_frames(const Session& session, const Uv
   const std::set<int> faulty = camera.faulty_frames();
   std::map<std::uint64_t, int> numbers;
   for (const FrameRecord& frame : session.frames) {
-    const auto number = shown_number(cv::imread(session.path_of(frame).string(), cv::IMREAD_UNCHANGED));
+    const auto number =
+        shown_number(cv::imread(session.path_of(frame).string(), cv::IMREAD_UNCHANGED));
     if (!number) {
       ADD_FAILURE() << frame.file << " is not a frame that was sent";
       continue;
@@ -127,7 +128,8 @@ TEST_F(Uvc, MjpegIsStoredByteForByte) {
   const Session session = recording.finish();
   for (const FrameRecord& frame : session.frames) {
     const std::string stored = test::get(session.path_of(frame));
-    const auto number = shown_number(cv::imread(session.path_of(frame).string(), cv::IMREAD_UNCHANGED));
+    const auto number =
+        shown_number(cv::imread(session.path_of(frame).string(), cv::IMREAD_UNCHANGED));
     ASSERT_TRUE(number);
     const Bytes sent = picture(Format::mjpeg, *number);
     EXPECT_EQ(stored, std::string(sent.begin(), sent.end()));
@@ -187,7 +189,8 @@ TEST_F(Uvc, SlowReaderSeesWhatTheDriverDropped) {
     numbers[delivery->frame.id] = *number;
     if (numbers.size() == 4) {  // longer than the buffers last
       const int begun = camera->frames_begun();
-      for (int wait = 0; wait < 600 && camera->frames_begun() < begun + 8; ++wait) std::this_thread::sleep_for(50ms);
+      for (int wait = 0; wait < 600 && camera->frames_begun() < begun + 8; ++wait)
+        std::this_thread::sleep_for(50ms);
     }
   }
   EXPECT_EQ(numbers.size(), 12u);

@@ -66,7 +66,8 @@ INSTANTIATE_TEST_SUITE_P(All, VividFormats,
 TEST(Vivid, DroppedFramesAreGapsOfTheSequence) {
   set_control("Percentage of Dropped Buffers", 30);
   Recording recording(options_for("GREY", Modality::visible));
-  EXPECT_TRUE(recording.wait_until([](const StreamStatus& s) { return s.received >= 5 && s.missing >= 3; }));
+  EXPECT_TRUE(recording.wait_until(
+      [](const StreamStatus& s) { return s.received >= 5 && s.missing >= 3; }));
   const Session session = recording.finish();
   set_control("Percentage of Dropped Buffers", 0);
   EXPECT_GE(session.streams.at(0).lost, 3u);
@@ -95,16 +96,21 @@ TEST_P(VividFailure, IsFlaggedAndTheStreamResumed) {
   EXPECT_EQ(session.gaps.size(), 1u);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, VividFailure, testing::Values("Inject Fatal Streaming Error", "Disconnect"),
-                         [](const auto& test) { return std::string(test.param[0] == 'D' ? "Disconnect" : "Queue"); });
+INSTANTIATE_TEST_SUITE_P(All, VividFailure,
+                         testing::Values("Inject Fatal Streaming Error", "Disconnect"),
+                         [](const auto& test) {
+                           return std::string(test.param[0] == 'D' ? "Disconnect" : "Queue");
+                         });
 
 TEST(Vivid, HeldByAnotherProgramIsAnErrorWithARemedy) {
-  V4l2Source first(options_for("YUYV", Modality::visible)), second(options_for("YUYV", Modality::visible));
+  V4l2Source first(options_for("YUYV", Modality::visible)),
+      second(options_for("YUYV", Modality::visible));
   ASSERT_TRUE(first.start());
   const Status status = second.start();
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().kind, ErrorKind::device);
-  EXPECT_NE(status.error().remedy.find("other program"), std::string::npos) << status.error().message();
+  EXPECT_NE(status.error().remedy.find("other program"), std::string::npos)
+      << status.error().message();
 }
 
 TEST(Vivid, SizeThatItDoesNotHaveIsRefused) {
@@ -113,7 +119,8 @@ TEST(Vivid, SizeThatItDoesNotHaveIsRefused) {
   V4l2Source source(options);
   const Status status = source.start();
   ASSERT_FALSE(status);
-  EXPECT_NE(status.error().message().find("322x180"), std::string::npos) << status.error().message();
+  EXPECT_NE(status.error().message().find("322x180"), std::string::npos)
+      << status.error().message();
 }
 
 }  // namespace
