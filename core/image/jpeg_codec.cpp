@@ -2,8 +2,10 @@
 #include <csetjmp>
 #include <cstdio>
 
-#include <jerror.h>
 #include <jpeglib.h>
+
+// Its messages depend on what jpeglib.h defines.
+#include <jerror.h>
 
 #include <fmt/format.h>
 
