@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -71,6 +72,8 @@ class Settings {
       return "number";
     else if constexpr (std::is_same_v<T, std::string>)
       return "text";
+    else if constexpr (std::is_same_v<T, std::optional<double>>)
+      return "number or \"auto\"";
     else
       return "list";
   }
@@ -79,11 +82,23 @@ class Settings {
     // 0.1f must read 0.1, not 0.10000000149.
     if constexpr (std::is_same_v<T, float>)
       return std::stod(fmt::format("{}", field));
+    else if constexpr (std::is_same_v<T, std::optional<double>>)
+      return field ? nlohmann::json(*field) : nlohmann::json("auto");
     else
       return field;
   }
   template <class T>
   static bool assign(T& field, const nlohmann::json& j) {
+    if constexpr (std::is_same_v<T, std::optional<double>>) {
+      if (j != "auto" && !j.is_number()) return false;
+      field = j.is_number() ? std::optional(j.get<double>()) : std::nullopt;
+      return true;
+    } else {
+      return assign_plain(field, j);
+    }
+  }
+  template <class T>
+  static bool assign_plain(T& field, const nlohmann::json& j) {
     if constexpr (std::is_same_v<T, bool>) {
       if (!j.is_boolean()) return false;
     } else if constexpr (std::is_integral_v<T>) {

@@ -89,7 +89,7 @@ Status add_poses(Run& run, const Session& session, const GroundTruth& truth, Mod
 }
 
 /// Thermal cameras in the visible frame: the error of the registration as a user meets it.
-/// Also as training left them (rung (e): poses refined against the field).
+/// Also as training left them (poses refined against the field).
 Status add_registration(Run& run, const Session& session, const GroundTruth& truth,
                         const std::vector<PosePair>& thermal) {
   if (!run.done("register") || !run.truth_from_visible || !run.truth_from_thermal) {

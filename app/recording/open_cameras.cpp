@@ -28,7 +28,7 @@ std::optional<OrbitPlan> plan_of(const Session& session) {
   std::map<int, std::pair<double, int>> loops;  // sum of elevations, count
   int last_index = 0;
   for (const FrameRecord& frame : session.frames) {
-    if (frame.tracking || !frame.station || frame.station->elevation_sigma_deg >= 90) continue;
+    if (frame.tracking || !frame.station || !frame.station->elevation_sigma_deg) continue;
     auto& [sum, count] = loops[frame.station->loop];
     sum += frame.station->elevation_deg;
     ++count;

@@ -176,9 +176,9 @@ std::string poses_section(const Model& model) {
     if (p.ladder.empty()) continue;
     html +=
         "<div class=\"scroll\"><table><caption>What was tried, in order</caption><thead><tr>"
-        "<th scope=\"col\">Rung</th><th scope=\"col\" class=\"text\">Outcome</th>"
+        "<th scope=\"col\">Attempt</th><th scope=\"col\" class=\"text\">Outcome</th>"
         "<th scope=\"col\" class=\"text\">Why</th></tr></thead><tbody>\n";
-    for (const Rung& r : p.ladder)
+    for (const PoseAttempt& r : p.ladder)
       html += fmt::format(
           "<tr><th scope=\"row\">{}</th><td class=\"text\">{}</td><td "
           "class=\"text\">{}</td></tr>\n",

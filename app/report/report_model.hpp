@@ -28,15 +28,15 @@ struct View {
   std::vector<FusedImage> fused;
 };
 
-/// One rung of the pose ladder: what was tried and what came of it.
-struct Rung {
+/// One attempt of the pose ladder: what was tried and what came of it.
+struct PoseAttempt {
   std::string name, outcome, detail;
 };
 
 struct PosesSummary {
   std::string modality;
   int posed = 0, total = 0;
-  std::vector<Rung> ladder;
+  std::vector<PoseAttempt> ladder;
   std::string advice;  ///< what to do about the missing ones; empty when all are posed
 };
 

@@ -21,7 +21,7 @@ using pipeline::StageOutput;
 json ladder_json(const std::vector<LadderStep>& ladder) {
   json list = json::array();
   for (const LadderStep& step : ladder)
-    list.push_back({{"rung", step.rung},
+    list.push_back({{"attempt", step.attempt},
                     {"held", step.held},
                     {"why", step.why},
                     {"posed", step.posed},
@@ -30,10 +30,10 @@ json ladder_json(const std::vector<LadderStep>& ladder) {
   return list;
 }
 
-std::string held_rung(const ModalityPoses& poses) {
+std::string held_attempt(const ModalityPoses& poses) {
   for (const LadderStep& step : poses.ladder)
-    if (step.held) return step.rung;
-  return "no rung";
+    if (step.held) return step.attempt;
+  return "no attempt";
 }
 
 StageOutput describe(const ModalityPoses& poses, PoseFrame frame) {
@@ -54,10 +54,10 @@ StageOutput describe(const ModalityPoses& poses, PoseFrame frame) {
   const std::string doubts =
       poses.doubtful.empty() ? "" : fmt::format(", {} of them doubtful", poses.doubtful.size());
   output.metrics = {{"brief", fmt::format("{} of {} views posed by {}{}", posed, poses.frame_count,
-                                          held_rung(poses), doubts)},
+                                          held_attempt(poses), doubts)},
                     {"posed", posed},
                     {"total", poses.frame_count},
-                    {"rung", held_rung(poses)},
+                    {"attempt", held_attempt(poses)},
                     {"ladder", ladder_json(poses.ladder)},
                     {"dropped", dropped},
                     {"doubtful", doubtful},

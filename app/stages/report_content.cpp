@@ -94,10 +94,10 @@ void add_poses(const StageContext& context, const SessionInput& input, report::M
     if (const json* m = context.metrics_of("poses_" + std::string(name(modality)))) {
       poses.posed = m->value("posed", 0);
       poses.total = m->value("total", poses.total);
-      for (const json& rung : m->value("ladder", json::array()))
-        poses.ladder.push_back({rung.value("rung", ""),
-                                rung.value("held", false) ? "held" : "did not hold",
-                                rung.value("why", "")});
+      for (const json& attempt : m->value("ladder", json::array()))
+        poses.ladder.push_back({attempt.value("attempt", ""),
+                                attempt.value("held", false) ? "held" : "did not hold",
+                                attempt.value("why", "")});
     }
     poses.advice = advice(poses);
     model.headline.emplace_back(fmt::format("{} views posed", name(modality)),

@@ -100,7 +100,7 @@ void add_render(Settings& settings, RenderConfig& render) {
   settings.add("render.azimuth_deg", render.path.azimuth_deg,
                "First new camera, from the first recorded one");
   settings.add("render.elevation_deg", render.path.elevation_deg,
-               "Of an orbit; below -89: the median of the recorded cameras");
+               "Of an orbit; auto: the median of the recorded cameras");
   settings.add("render.radius_scale", render.path.radius_scale,
                "Of an orbit, times the recorded cameras' median distance");
   settings.add("render.palette", render.palette, "Colours of temperatures");

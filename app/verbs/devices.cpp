@@ -21,7 +21,7 @@ std::string line_of(const Connected& c) {
                      c.model, c.serial, c.where, c.remark.empty() ? "" : "; " + c.remark);
 }
 
-std::vector<Connected> look(usb::UsbBus* bus) {
+std::vector<Connected> connected_devices(usb::UsbBus* bus) {
   const auto video = v4l2::make_video_system();
   std::vector<usb::UsbDevice> devices;
   if (bus) devices = bus->list().value_or(std::vector<usb::UsbDevice>{});
@@ -42,7 +42,7 @@ void watch(Context& context, usb::UsbBus* bus, std::vector<Connected> known) {
       bus->wait(std::chrono::milliseconds(500));
     else
       std::this_thread::sleep_for(std::chrono::milliseconds(500));
-    std::vector<Connected> now = look(bus);
+    std::vector<Connected> now = connected_devices(bus);
     for (const Connected& camera : recording::added(now, known)) tell("left", "-", camera);
     for (const Connected& camera : recording::added(known, now)) tell("arrived", "+", camera);
     known = std::move(now);
@@ -52,7 +52,7 @@ void watch(Context& context, usb::UsbBus* bus, std::vector<Connected> known) {
 Status run(Context& context, bool keep_watching) {
   const auto bus = usb::make_usb_bus();
   if (!bus) context.console.detail(bus.error().message());
-  const std::vector<Connected> list = look(bus ? bus->get() : nullptr);
+  const std::vector<Connected> list = connected_devices(bus ? bus->get() : nullptr);
   auto devices = nlohmann::json::array();
   for (const Connected& camera : list) {
     context.console.data(line_of(camera));

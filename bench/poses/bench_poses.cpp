@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // bench_poses SCENE [WORKDIR [--visible-truth]]: runs the pose ladder on a shared scene and prints
-// success and error against run time per rung. Scenes: container, tracking, fox,
+// success and error against run time per attempt. Scenes: container, tracking, fox,
 // metu_cloudy_scene_7, metu_sunny_scene_7, arco, car (the session recorded in replay_data).
 
 #include <fmt/format.h>
@@ -20,7 +20,7 @@ using namespace orbitfuse;
 void print(const ModalityPoses& poses, const Reconstruction& anchor, const scenes::Truth& truth,
            double cpu_s) {
   for (const LadderStep& step : poses.ladder)
-    fmt::print("  {} {}: {}/{} in {:.1f} s: {}\n", step.held ? "held " : "fell ", step.rung,
+    fmt::print("  {} {}: {}/{} in {:.1f} s: {}\n", step.held ? "held " : "fell ", step.attempt,
                step.posed, step.total, step.seconds, step.why);
   for (const DroppedView& view : poses.dropped)
     fmt::print("  dropped {}: {}\n", view.name, view.why);
@@ -39,7 +39,7 @@ void print(const ModalityPoses& poses, const Reconstruction& anchor, const scene
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::setvbuf(stdout, nullptr, _IOLBF, 0);  // a run that is cut short keeps its first rungs
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);  // a run that is cut short keeps its first attempts
   const std::filesystem::path data = testing::shared_data();
   if (argc < 2 || !std::filesystem::exists(data)) {
     std::fputs(

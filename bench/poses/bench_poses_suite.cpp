@@ -177,7 +177,7 @@ Row measured(const SceneFolders& folders, const scenes::Perturbation& by,
   else
     row.failure = poses.error().found;
   if (arguments.views && poses) {
-    for (const LadderStep& step : poses->ladder) fmt::print("  {}: {}\n", step.rung, step.why);
+    for (const LadderStep& step : poses->ladder) fmt::print("  {}: {}\n", step.attempt, step.why);
     for (const DroppedView& view : poses->dropped)
       fmt::print("  dropped {}: {}\n", view.name, view.why);
     for (const DoubtfulView& view : poses->doubtful)

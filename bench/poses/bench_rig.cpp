@@ -92,7 +92,7 @@ struct Pairs {
 };
 
 /// One start against several, from the same answer of the clouds.
-struct Refinery {
+struct SimilarityComparison {
   const SceneRenderer& renderer;
   const std::vector<cv::Mat>& images;
   const std::vector<PosedView>& views;
@@ -103,20 +103,20 @@ struct Refinery {
     pairs.print("start", start);
     double before = cpu_seconds();
     ORBITFUSE_ASSIGN(
-        const SimilarityRefinement single,
+        const SimilarityComparison single,
         refine_similarity(renderer, images, views, start, similarity_rounds(), progress));
     report("one start", single, before);
     before = cpu_seconds();
     SimilaritySearchOptions options;
     options.clouds_decide = clouds_decide;
-    ORBITFUSE_ASSIGN(const SimilarityRefinement searched,
+    ORBITFUSE_ASSIGN(const SimilarityComparison searched,
                      search_similarity(renderer, images, views, start, options, progress));
     for (const Skip& skip : searched.skips)
       fmt::print("skipped {}: {}; {}\n", skip.what, skip.why, skip.effect);
     report(fmt::format("search of {} starts", searched.starts).c_str(), searched, before);
     return {};
   }
-  void report(const char* what, const SimilarityRefinement& r, double before) const {
+  void report(const char* what, const SimilarityComparison& r, double before) const {
     pairs.print(what, r.visible_from_thermal);
     fmt::print("  agreement {:.4f} to {:.4f}, patches {} to {}: {}; {:.1f} CPU s\n",
                r.agreement_before, r.agreement_after, r.matches_before, r.matches_after,
@@ -145,14 +145,14 @@ Status compare_with_rig(const Session& session, const fs::path& out, const Recon
                           Eigen::Quaterniond(Eigen::Matrix3d(m.topLeftCorner<3, 3>() / scale)),
                           m.topRightCorner<3, 1>()};
   pairs.print("best similarity of the centres", best);
-  const Refinery refinery{renderer, images, thermal.views, pairs, progress};
+  const SimilarityComparison comparison{renderer, images, thermal.views, pairs, progress};
   const json& metrics = stage.at("metrics");
   fmt::print("from the clouds' answer:\n");
-  ORBITFUSE_TRY(refinery.compare(similarity_of(metrics.at("target_from_source")),
-                                 !metrics.at("ambiguous").get<bool>()));
+  ORBITFUSE_TRY(comparison.compare(similarity_of(metrics.at("target_from_source")),
+                                   !metrics.at("ambiguous").get<bool>()));
   // A higher agreement from there says that the search failed, a lower one that the score does.
   fmt::print("from the best similarity of the centres:\n");
-  return refinery.compare(best, true);
+  return comparison.compare(best, true);
 }
 
 /// Modalities posed in one frame: how far home from similarities that were put wrong.
@@ -162,7 +162,7 @@ Status compare_disturbed(const Reconstruction& thermal, const SceneRenderer& ren
   std::vector<Eigen::Vector3d> all;
   for (const PosedView& view : thermal.views) all.push_back(camera_center(view.cam_from_world));
   const Pairs pairs(all, all);
-  const Refinery refinery{renderer, images, thermal.views, pairs, progress};
+  const SimilarityComparison comparison{renderer, images, thermal.views, pairs, progress};
   const Eigen::Vector3d axes[] = {{1, 2, -1}, {-2, 1, 2}, {0, 0, 1}};
   for (int i = 0; i < 3; ++i) {
     const double sign = i % 2 ? -1 : 1;
@@ -171,7 +171,7 @@ Status compare_disturbed(const Reconstruction& thermal, const SceneRenderer& ren
         1 + sign * degrees / 200,
         Eigen::Quaterniond(Eigen::AngleAxisd(degrees * EIGEN_PI / 180, axis)),
         degrees / 300 * pairs.extent * axis.cross(Eigen::Vector3d(1, 1, 0).normalized())};
-    ORBITFUSE_TRY(refinery.compare(off, true));
+    ORBITFUSE_TRY(comparison.compare(off, true));
   }
   return {};
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // bench_thermal SESSION RUN GROUND_TRUTH [--tracking TRACKING_JSON]
-// [--focal-error RELATIVE] [--views] [--rungs]
+// [--focal-error RELATIVE] [--views] [--attempts]
 // The thermal pose stage alone, on what an earlier run left in its folder RUN (poses_visible,
 // train_visible), so that one stage can be judged without the others. GROUND_TRUTH serves the
 // comparison only. --tracking adds frames recorded between the stations, --focal-error 0.03 makes
-// the thermal focal length known 3 % too long, --views prints each view, --rungs sets what COLMAP,
-// the scene's lines and its renders give alone beside each other, with their time.
+// the thermal focal length known 3 % too long, --views prints each view, --attempts sets what
+// COLMAP, the scene's lines and its renders give alone beside each other, with their time.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -34,7 +34,7 @@ namespace fs = std::filesystem;
 struct Arguments {
   fs::path session, run, truth, tracking;
   double focal_error = 0;
-  bool views = false, rungs = false;
+  bool views = false, attempts = false;
 };
 
 Arguments arguments_of(int argc, char** argv) {
@@ -44,8 +44,8 @@ Arguments arguments_of(int argc, char** argv) {
     const std::string_view word = argv[i];
     if (word == "--views") {
       arguments.views = true;
-    } else if (word == "--rungs") {
-      arguments.rungs = true;
+    } else if (word == "--attempts") {
+      arguments.attempts = true;
     } else if (word == "--tracking" && i + 1 < argc) {
       arguments.tracking = argv[++i];
     } else if (word == "--focal-error" && i + 1 < argc) {
@@ -59,12 +59,12 @@ Arguments arguments_of(int argc, char** argv) {
   return arguments;
 }
 
-/// One rung of the ladder alone: its success and error against its time.
-void print_rung(const char* name, const scenes::Scene& scene, const VisibleScene* seen,
-                const PoseOptions& options) {
+/// One attempt of the ladder alone: its success and error against its time.
+void print_attempt(const char* name, const scenes::Scene& scene, const VisibleScene* seen,
+                   const PoseOptions& options) {
   const double before = cpu_seconds();
-  const auto poses = estimate_thermal_poses(scene.session, seen, options,
-                                            fs::temp_directory_path() / "orbitfuse_bench_rung", {});
+  const auto poses = estimate_thermal_poses(
+      scene.session, seen, options, fs::temp_directory_path() / "orbitfuse_bench_attempt", {});
   const double spent = cpu_seconds() - before;
   if (!poses) {
     fmt::print("| {} | none: {} | | | {:.0f} |\n", name, poses.error().found.substr(0, 120), spent);
@@ -78,14 +78,15 @@ void print_rung(const char* name, const scenes::Scene& scene, const VisibleScene
              error.worst_percent, error.mean_rotation_deg, error.worst_rotation_deg, spent);
 }
 
-void print_rungs(const scenes::Scene& scene, const VisibleScene& seen, const PoseOptions& options) {
+void print_attempts(const scenes::Scene& scene, const VisibleScene& seen,
+                    const PoseOptions& options) {
   fmt::print(
-      "| rung alone | posed | centres RMS / worst, % | rotation mean / worst, deg | CPU s |\n"
+      "| attempt alone | posed | centres RMS / worst, % | rotation mean / worst, deg | CPU s |\n"
       "|---|---|---|---|---|\n");
-  print_rung("COLMAP on the thermal views", scene, nullptr, options);
+  print_attempt("COLMAP on the thermal views", scene, nullptr, options);
   const VisibleScene lines{seen.reconstruction, nullptr};
-  print_rung("lines of the visible scene, else COLMAP", scene, &lines, options);
-  print_rung("lines, then renders and temperatures", scene, &seen, options);
+  print_attempt("lines of the visible scene, else COLMAP", scene, &lines, options);
+  print_attempt("lines, then renders and temperatures", scene, &seen, options);
 }
 
 Status run(const Arguments& arguments) {
@@ -117,8 +118,8 @@ Status run(const Arguments& arguments) {
   const auto start = std::chrono::steady_clock::now();
   PoseOptions options;
   options.use_known_poses = false;
-  if (arguments.rungs) {
-    print_rungs(scene, seen, options);
+  if (arguments.attempts) {
+    print_attempts(scene, seen, options);
     return {};
   }
   ORBITFUSE_ASSIGN(
@@ -128,7 +129,7 @@ Status run(const Arguments& arguments) {
   const double wall =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   for (const LadderStep& step : poses.ladder)
-    fmt::print("{} {}: {}\n", step.held ? "held" : "fell", step.rung, step.why);
+    fmt::print("{} {}: {}\n", step.held ? "held" : "fell", step.attempt, step.why);
   for (const DroppedView& view : poses.dropped) fmt::print("dropped {}: {}\n", view.name, view.why);
   for (const DoubtfulView& view : poses.doubtful)
     fmt::print("doubtful {}: {}\n", view.name, view.why);
@@ -166,7 +167,7 @@ int main(int argc, char** argv) {
   if (arguments.truth.empty()) {
     std::fputs(
         "bench_thermal SESSION RUN GROUND_TRUTH [--tracking TRACKING_JSON] [--focal-error "
-        "RELATIVE] [--views] [--rungs]\n",
+        "RELATIVE] [--views] [--attempts]\n",
         stderr);
     return 2;
   }

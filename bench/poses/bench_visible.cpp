@@ -111,7 +111,7 @@ void print(const scenes::Scene& scene, const Result<ModalityPoses>& poses, doubl
     return;
   }
   for (const LadderStep& step : poses->ladder)
-    fmt::print("  {} {}: {}/{} in {:.1f} s: {}\n", step.held ? "held" : "fell", step.rung,
+    fmt::print("  {} {}: {}/{} in {:.1f} s: {}\n", step.held ? "held" : "fell", step.attempt,
                step.posed, step.total, step.seconds, step.why);
   for (const DroppedView& view : poses->dropped)
     fmt::print("  dropped {}: {}\n", view.name, view.why);

@@ -72,7 +72,7 @@ LiveGuide::LiveGuide(SessionWriter& writer, LiveGuideOptions options, PositionFi
     camera.policy = policy_for(modality);
     say_next(camera, std::nullopt, Refusal::none);
   }
-  if (finder_) looker_ = std::jthread([this] { look(); });
+  if (finder_) looker_ = std::jthread([this] { find_mat_in_frames(); });
 }
 
 std::unique_ptr<PositionPolicy> LiveGuide::policy_for(Modality modality) {
@@ -316,7 +316,7 @@ std::optional<LiveGuide::Look> LiveGuide::Camera::next_to_look() {
 }
 
 /// The looking thread: every photo, and of a video the newest frame, no faster than asked.
-void LiveGuide::look() {
+void LiveGuide::find_mat_in_frames() {
   const auto pause = std::chrono::duration<double>(1 / options_.looks_per_second);
   std::unique_lock lock(mutex_);
   const auto has_photos = [this] {

@@ -113,7 +113,7 @@ class LiveGuide {
     std::map<std::size_t, FrameRecord> chosen;  ///< by sector
   };
   void add_at_station(Camera& camera, const FrameRecord& frame);
-  void look();
+  void find_mat_in_frames();
   void judge(Camera& camera, const FrameRecord& frame,
              const std::optional<OrbitPosition>& position);
   void remember_choice(Camera& camera, const FrameRecord& frame);

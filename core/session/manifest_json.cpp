@@ -111,12 +111,20 @@ Result<Rigid3d> read_pose(const Reader& line) {
 }
 
 Json json_of(const Station& s) {
-  return {{"loop", s.loop},
-          {"index", s.index},
-          {"azimuth_deg", s.azimuth_deg},
-          {"elevation_deg", s.elevation_deg},
-          {"azimuth_sigma_deg", s.azimuth_sigma_deg},
-          {"elevation_sigma_deg", s.elevation_sigma_deg}};
+  Json station = {{"loop", s.loop},
+                  {"index", s.index},
+                  {"azimuth_deg", s.azimuth_deg},
+                  {"elevation_deg", s.elevation_deg}};
+  if (s.azimuth_sigma_deg) station["azimuth_sigma_deg"] = *s.azimuth_sigma_deg;
+  if (s.elevation_sigma_deg) station["elevation_sigma_deg"] = *s.elevation_sigma_deg;
+  return station;
+}
+
+/// Sessions of earlier versions wrote 90 degrees or more for an unknown origin.
+Result<std::optional<double>> station_sigma(const Reader& line, const char* field) {
+  if (!line.has(field)) return std::nullopt;
+  ORBITFUSE_ASSIGN(const double sigma, line.number(field));
+  return sigma >= 90 ? std::nullopt : std::optional(sigma);
 }
 
 Result<Station> read_station(const Reader& line) {
@@ -125,8 +133,8 @@ Result<Station> read_station(const Reader& line) {
   ORBITFUSE_ASSIGN(s.index, small_count(line, "index"));
   ORBITFUSE_ASSIGN(s.azimuth_deg, line.number("azimuth_deg"));
   ORBITFUSE_ASSIGN(s.elevation_deg, line.number("elevation_deg"));
-  ORBITFUSE_ASSIGN(s.azimuth_sigma_deg, line.number("azimuth_sigma_deg"));
-  ORBITFUSE_ASSIGN(s.elevation_sigma_deg, line.number("elevation_sigma_deg"));
+  ORBITFUSE_ASSIGN(s.azimuth_sigma_deg, station_sigma(line, "azimuth_sigma_deg"));
+  ORBITFUSE_ASSIGN(s.elevation_sigma_deg, station_sigma(line, "elevation_sigma_deg"));
   return s;
 }
 

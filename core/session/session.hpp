@@ -36,13 +36,12 @@ struct DeviceInfo {
 
 /// Where the operator (or the guide) says a frame was taken on the orbit.
 /// Azimuth grows counter-clockwise seen from above; elevation is above the object's base plane.
-/// A sigma of 90 degrees or more marks an unknown origin: where the device's orbit began (azimuth)
-/// or its elevations are then unknown, and only differences between its stations hold, to several
-/// degrees.
+/// Without a sigma the origin is unknown: where the device's orbit began (azimuth) or how high it
+/// was (elevation). Only differences between its stations hold then, to several degrees.
 struct Station {
   int loop = 0, index = 0;
   double azimuth_deg = 0, elevation_deg = 0;
-  double azimuth_sigma_deg = 5, elevation_sigma_deg = 5;
+  std::optional<double> azimuth_sigma_deg = 5, elevation_sigma_deg = 5;
 };
 
 /// How wide the edges of one image are, without another image to compare with.

@@ -24,8 +24,8 @@ Station station_at(const DeclaredStations& declared, int position,
   station.loop = position / per_loop;
   station.index = position % per_loop;
   station.azimuth_deg = station.index * declared.spacing_deg;
-  station.azimuth_sigma_deg = 180;  // where the orbit began is unknown
-  station.elevation_sigma_deg = 90;
+  station.azimuth_sigma_deg.reset();  // where the orbit began is unknown
+  station.elevation_sigma_deg.reset();
   if (station.loop < static_cast<int>(declared.elevations_deg.size())) {
     station.elevation_deg = declared.elevations_deg[static_cast<std::size_t>(station.loop)];
     station.elevation_sigma_deg = declared.elevation_sigma_deg;

@@ -57,9 +57,10 @@ WholeMatch match_whole(const cv::Mat& edges, const cv::Mat& field, int reach_px)
   return best;
 }
 
-Result<double> climb(const SceneRenderer& renderer, const Similarity3d& canonical_from_world,
-                     const cv::Mat& image, PosedView& view, const ClimbOptions& options,
-                     const Progress& progress) {
+Result<double> ascend_correlation(const SceneRenderer& renderer,
+                                  const Similarity3d& canonical_from_world, const cv::Mat& image,
+                                  PosedView& view, const ClimbOptions& options,
+                                  const Progress& progress) {
   const int width = std::min(options.width_px, view.camera.width);
   const Camera camera =
       view.camera.scaled_to(width, std::max(1, view.camera.height * width / view.camera.width))

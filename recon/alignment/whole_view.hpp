@@ -31,10 +31,11 @@ struct ClimbOptions {
   double first_step_deg = 4, last_step_deg = 1;
 };
 
-/// Climbs to the highest correlation of `image` (CV_32FC1) from `view`, which takes the place
+/// Ascends to the highest correlation of `image` (CV_32FC1) from `view`, which takes the place
 /// found. Returns the correlation there. Errors: the renderer's, cancelled.
-Result<double> climb(const SceneRenderer& renderer, const Similarity3d& canonical_from_world,
-                     const cv::Mat& image, PosedView& view, const ClimbOptions& options,
-                     const Progress& progress);
+Result<double> ascend_correlation(const SceneRenderer& renderer,
+                                  const Similarity3d& canonical_from_world, const cv::Mat& image,
+                                  PosedView& view, const ClimbOptions& options,
+                                  const Progress& progress);
 
 }  // namespace orbitfuse

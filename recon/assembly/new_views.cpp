@@ -42,8 +42,7 @@ Camera render_camera(const std::vector<PosedView>& posed, int width_px) {
 
 NewViews along_orbit(const std::vector<PosedView>& posed, const OrbitGeometry& orbit,
                      const NewViewOptions& options) {
-  const double elevation =
-      (options.elevation_deg < -89 ? orbit.elevation_deg : options.elevation_deg) * deg;
+  const double elevation = options.elevation_deg.value_or(orbit.elevation_deg) * deg;
   const double radius = orbit.radius * options.radius_scale;
   const Eigen::Vector3d side = orbit.up.cross(orbit.first);
   NewViews result;
@@ -83,7 +82,7 @@ Status NewViewOptions::validate() const {
   const OptionCheck check("render");
   ORBITFUSE_TRY(check("views", views, from_to(1, 10000)));
   ORBITFUSE_TRY(check("width_px", width_px, from_to(16, 8192)));
-  ORBITFUSE_TRY(check("elevation_deg", elevation_deg, from_to(-90, 90)));
+  if (elevation_deg) ORBITFUSE_TRY(check("elevation_deg", *elevation_deg, from_to(-89, 89)));
   ORBITFUSE_TRY(check("radius_scale", radius_scale, between(0.01, 100)));
   return check("azimuth_deg", azimuth_deg, from_to(-1e6, 1e6));
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,11 +18,11 @@ enum class PathKind {
 
 struct NewViewOptions {
   PathKind path = PathKind::automatic;
-  int views = 8;               ///< new cameras along the path
-  int width_px = 640;          ///< of a rendered image; its height follows the visible camera
-  double azimuth_deg = 15;     ///< first view, from the first camera: between 30 degree stations
-  double elevation_deg = -90;  ///< of an orbit; below -89: the cameras' median
-  double radius_scale = 1;     ///< of an orbit, times the cameras' median distance
+  int views = 8;            ///< new cameras along the path
+  int width_px = 640;       ///< of a rendered image; its height follows the visible camera
+  double azimuth_deg = 15;  ///< first view, from the first camera: between 30 degree stations
+  std::optional<double> elevation_deg;  ///< of an orbit; none: the cameras' median
+  double radius_scale = 1;              ///< of an orbit, times the cameras' median distance
 
   Status validate() const;
 };

@@ -15,7 +15,7 @@
 #include "recon/alignment/scene_renderer.hpp"
 #include "recon/alignment/view_verdict.hpp"
 
-// Camera poses of each modality by a ladder of methods; the first rung whose result passes the
+// Camera poses of each modality by a ladder of methods; the first attempt whose result passes the
 // gates holds, and the result says which and why.
 namespace orbitfuse {
 
@@ -34,7 +34,7 @@ struct PoseOptions {
   int max_image_side_px = 800;
   /// SIFT features per view, for the same reason.
   int max_features = 3000;
-  /// Below this share of posed views a rung does not hold and the next one is tried.
+  /// Below this share of posed views an attempt does not hold and the next one is tried.
   double min_posed_ratio = 0.8;
   /// Root mean square reprojection error above which a COLMAP model is not believed.
   double max_reprojection_rms_px = 2.0;
@@ -49,7 +49,7 @@ struct PoseOptions {
 
 /// One method tried, and how it ended.
 struct LadderStep {
-  std::string rung;  ///< "known poses", "COLMAP, default settings", "cross-modal", ...
+  std::string attempt;  ///< "known poses", "COLMAP, default settings", "cross-modal", ...
   bool held = false;
   std::string why;  ///< figures behind the verdict, in words
   int posed = 0, total = 0;
@@ -75,7 +75,7 @@ struct ModalityPoses {
   std::vector<DoubtfulView> doubtful;  ///< among the posed ones
   std::vector<std::string> warnings;   ///< about more than one view
   std::vector<LadderStep> ladder;
-  /// Root mean square over all observations; 0 where the rung has none.
+  /// Root mean square over all observations; 0 where the attempt has none.
   double reprojection_rms_px = 0;
   /// Figures that need no ground truth, by name ("posed_ratio", "median_baseline_deg", ...).
   std::map<std::string, double> gates;
@@ -103,7 +103,7 @@ struct VisibleScene {
 /// settings, then bundle adjustment. World frame: z up, origin at the point the cameras look at,
 /// median camera distance 1 (unless poses are known: then theirs).
 /// Errors: input (no or one frame, unreadable file), unavailable (no COLMAP and no known poses),
-/// quality (no rung held; the message lists each rung and why), cancelled.
+/// quality (no attempt held; the message lists each attempt and why), cancelled.
 Result<ModalityPoses> estimate_visible_poses(const Session& session, const PoseOptions& options,
                                              const std::filesystem::path& workdir,
                                              const Progress& progress);

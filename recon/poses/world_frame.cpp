@@ -133,9 +133,8 @@ StationFit fit_stations(const std::vector<PosedView>& views, const Session& sess
     if (found == by_name.end() || !found->second->station) continue;
     azimuth.push_back(orbit_angles(canonical * camera_center(view.cam_from_world)).azimuth_deg);
     station.push_back(found->second->station->azimuth_deg);
-    // From 90 deg on only the origin is unknown (core/session/session.hpp); it is fitted here.
-    const double declared = found->second->station->azimuth_sigma_deg;
-    sigma.push_back(declared < 90 ? declared : nominal_sigma_deg);
+    // Without a sigma only the origin is unknown (core/session/session.hpp); it is fitted here.
+    sigma.push_back(found->second->station->azimuth_sigma_deg.value_or(nominal_sigma_deg));
   }
   StationFit best;
   if (azimuth.size() < 3) return best;

@@ -58,7 +58,7 @@ Scene container_scene(const fs::path& data, const ContainerOptions& options) {
       station.azimuth_deg = (options.mirrored_stations ? -30.0 : 30.0) * (index % 12) +
                             (index % 2 == 0 ? 1 : -1) * options.station_error_deg;
       station.azimuth_sigma_deg = 8;
-      station.elevation_sigma_deg = 90;  // unknown
+      station.elevation_sigma_deg.reset();
       record.station = station;
       scene.session.frames.push_back(record);
       scene.truth.views[record.file] = view;

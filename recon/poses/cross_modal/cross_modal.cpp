@@ -320,7 +320,7 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
     finish();
     return tl::unexpected(placed.error());
   }
-  step.rung = placed->method;
+  step.attempt = placed->method;
   step.why += placed->why;
 
   ThermalPoses result;

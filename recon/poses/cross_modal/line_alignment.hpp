@@ -8,7 +8,7 @@
 #include "recon/poses/cross_modal/edge_alignment.hpp"
 #include "recon/poses/cross_modal/orbit_search.hpp"
 
-// The rung of lines: one start angle of the orbit taken to aligned views, by the visible scene's
+// Poses by lines: one start angle of the orbit taken to aligned views, by the visible scene's
 // edge lines alone.
 namespace orbitfuse {
 

@@ -143,8 +143,8 @@ Result<std::vector<PosedView>> OrbitRefinement::search(const std::vector<std::si
   std::vector<PosedView> found;
   for (const std::size_t i : chosen) {
     found.push_back(predicted(orbit, alignment, model, i));
-    ORBITFUSE_TRY(
-        climb(renderer, orbit.canonical_from_world, orbit.images[i], found.back(), {}, progress));
+    ORBITFUSE_TRY(ascend_correlation(renderer, orbit.canonical_from_world, orbit.images[i],
+                                     found.back(), {}, progress));
   }
   return found;
 }

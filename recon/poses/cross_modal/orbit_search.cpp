@@ -334,7 +334,7 @@ std::vector<std::vector<Station>> station_layouts(std::size_t views) {
       stations[i].loop = static_cast<int>(loop), stations[i].index = static_cast<int>(i - first);
       stations[i].azimuth_deg =
           360.0 * static_cast<double>(i - first) / static_cast<double>(next - first);
-      stations[i].azimuth_sigma_deg = stations[i].elevation_sigma_deg = 180;
+      stations[i].azimuth_sigma_deg.reset(), stations[i].elevation_sigma_deg.reset();
     }
     layouts.push_back(std::move(stations));
   }

@@ -13,12 +13,12 @@
 namespace orbitfuse {
 namespace {
 
-/// Of their loop's usual support among temperatures. Right places on `container` had 0.7 or more,
+/// Of their loop's median support among temperatures. Right places on `container` had 0.7 or more,
 /// wrong ones 0.4 at most.
 constexpr double found_share = 0.5;
 /// Among stations, which see less of each other's scene: below it a station is searched again.
 constexpr double settled_share = 0.6;
-/// Of their loop's usual support in the visible scene: views that form alone may vouch for.
+/// Of their loop's median support in the visible scene: views that form alone may vouch for.
 constexpr double vouched_share = 0.6;
 /// The same, of views that both scenes leave where they are.
 constexpr double confirmed_share = 0.4;
@@ -29,8 +29,8 @@ constexpr double least_support = 1e-9;
 
 /// Whether the place found among the temperatures of settled views confirms the view's.
 ViewVerdict confirmed(const OrbitViews& orbit, const RenderAlignedView& view,
-                      const RenderAlignedView& second, double usual_support) {
-  if (!(share_of_usual(second.support(), usual_support) > found_share))
+                      const RenderAlignedView& second, double median_supports) {
+  if (!(share_of_median(second.support(), median_supports) > found_share))
     return {Confidence::dropped, DoubtReason::not_found,
             "its edges are not found among the stations' temperatures"};
   const Rigid3d &by_form = view.view.cam_from_world, &by_temperatures = second.view.cam_from_world;
@@ -40,32 +40,33 @@ ViewVerdict confirmed(const OrbitViews& orbit, const RenderAlignedView& view,
                       apart_deg(orbit, by_form, by_temperatures))};
 }
 
-using Usual = std::map<int, double>;  // support by loop: one sees more of the scene than another
+using SupportOfLoop =
+    std::map<int, double>;  // support by loop: one sees more of the scene than another
 
-Usual usual_support(const OrbitViews& orbit, const std::vector<std::size_t>& asked,
-                    const Fit& found) {
+SupportOfLoop median_supports(const OrbitViews& orbit, const std::vector<std::size_t>& asked,
+                              const Fit& found) {
   std::map<int, std::vector<double>> supports;
   for (std::size_t c = 0; c < asked.size(); ++c)
     supports[orbit.stations[asked[c]].loop].push_back(found.views[c].support());
-  Usual usual;
-  for (const auto& [loop, values] : supports) usual[loop] = median(values);
-  return usual;
+  SupportOfLoop median_of_loop;
+  for (const auto& [loop, values] : supports) median_of_loop[loop] = median(values);
+  return median_of_loop;
 }
 
 /// Views whose place isn't confirmed by the temperatures of the settled ones. Each is given the
-/// place that both agree on from there, if there is one. `usual` is filled where empty.
+/// place that both agree on from there, if there is one. `median_of_loop` is filled where empty.
 Result<std::vector<std::size_t>> unconfirmed(const OrbitRefinement& visible,
                                              const OrbitRefinement& painted,
-                                             const std::vector<std::size_t>& asked, Usual& usual,
-                                             Fit& alignment) {
+                                             const std::vector<std::size_t>& asked,
+                                             SupportOfLoop& median_of_loop, Fit& alignment) {
   const OrbitViews& orbit = visible.orbit;
   std::vector<PosedView> starts, places;
   for (const std::size_t i : asked) starts.push_back(alignment.views[i].view);
   ORBITFUSE_ASSIGN(const Fit second, painted.restart(asked, starts, judging_rounds()));
-  if (usual.empty()) usual = usual_support(orbit, asked, second);
+  if (median_of_loop.empty()) median_of_loop = median_supports(orbit, asked, second);
   const auto verdict_of = [&](std::size_t view, const RenderAlignedView& by_form,
                               const RenderAlignedView& by_temperatures) {
-    return confirmed(orbit, by_form, by_temperatures, usual.at(orbit.stations[view].loop));
+    return confirmed(orbit, by_form, by_temperatures, median_of_loop.at(orbit.stations[view].loop));
   };
   std::vector<std::size_t> doubtful, still;
   std::vector<RenderAlignedView> seconds;
@@ -103,7 +104,7 @@ Result<SceneRenderer> painted_by(const OrbitRefinement& refinement, const Fit& a
 
 struct Contradicted {
   std::vector<std::size_t> views;  ///< whose place the temperatures of the others don't confirm
-  Usual usual;                     ///< support of a view in the scene that all others paint
+  SupportOfLoop median_of_loop;    ///< support of a view in the scene that all others paint
 };
 
 Result<Contradicted> contradicted(const OrbitRefinement& refinement, const Fit& alignment) {
@@ -115,9 +116,10 @@ Result<Contradicted> contradicted(const OrbitRefinement& refinement, const Fit& 
                    painted_by(refinement, alignment, all, own_turn_deg));
   const OrbitRefinement painted{renderer, orbit, refinement.progress};
   ORBITFUSE_ASSIGN(const Fit second, painted.restart(all, places, judging_rounds()));
-  Contradicted lost{{}, usual_support(orbit, all, second)};
+  Contradicted lost{{}, median_supports(orbit, all, second)};
   for (const std::size_t i : all)
-    if (second.views[i].support() < settled_share * lost.usual.at(orbit.stations[i].loop) ||
+    if (second.views[i].support() <
+            settled_share * lost.median_of_loop.at(orbit.stations[i].loop) ||
         !same_place(orbit, places[i].cam_from_world, second.views[i].view.cam_from_world))
       lost.views.push_back(i);
   return lost;
@@ -164,8 +166,8 @@ MoveDecision verdict(const PlaceEvidence& seen) {
   return MoveDecision::nobody;
 }
 
-double share_of_usual(double support, double usual) {
-  return usual > least_support ? support / usual : 0;
+double share_of_median(double support, double median) {
+  return median > least_support ? support / median : 0;
 }
 
 Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refinement,
@@ -197,20 +199,21 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
                    refinement.restart(lost, by_temperatures.poses(), fine_rounds()));
   std::vector<std::size_t> all(alignment.views.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
-  const Usual usual_form = usual_support(orbit, all, alignment);
+  const SupportOfLoop median_form = median_supports(orbit, all, alignment);
   for (std::size_t c = 0; c < lost.size(); ++c) {
     const RenderAlignedView &form = by_form.views[c], &warm = by_temperatures.views[c];
     RenderAlignedView& view = alignment.views[lost[c]];
     const int loop = orbit.stations[lost[c]].loop;
     PlaceEvidence seen;
     seen.agree = same_place(orbit, form.view.cam_from_world, warm.view.cam_from_world);
-    seen.form_before = share_of_usual(view.support(), usual_form.at(loop));
-    seen.form_there = share_of_usual(form.support(), usual_form.at(loop));
-    seen.temperatures_there = share_of_usual(warm.support(), found.usual.at(loop));
+    seen.form_before = share_of_median(view.support(), median_form.at(loop));
+    seen.form_there = share_of_median(form.support(), median_form.at(loop));
+    seen.temperatures_there = share_of_median(warm.support(), found.median_of_loop.at(loop));
     seen.stays = same_place(orbit, view.view.cam_from_world, warm.view.cam_from_world);
     refinement.progress.report(
         {"poses.thermal", 3, 4, -1,
-         fmt::format("{}: usual support {:.2f} among temperatures, {:.2f} of form there, {:.2f} "
+         fmt::format("{}: share of the median support {:.2f} among temperatures, {:.2f} of form "
+                     "there, {:.2f} "
                      "before, {:.1f} deg away; {}",
                      view.view.name, seen.temperatures_there, seen.form_there, seen.form_before,
                      apart_deg(orbit, view.view.cam_from_world, warm.view.cam_from_world),
@@ -225,7 +228,7 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
               Confidence::doubtful, DoubtReason::temperatures_elsewhere,
               fmt::format(
                   "the other views' temperatures place it {:.1f} deg away, where the visible "
-                  "scene supports it less: {:.2f} of the usual support, {:.2f} before",
+                  "scene supports it less: {:.2f} of the median support, {:.2f} before",
                   apart_deg(orbit, view.view.cam_from_world, form.view.cam_from_world),
                   seen.form_there, seen.form_before)};
         view.view = form.view;
@@ -241,8 +244,8 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
             Confidence::doubtful, DoubtReason::temperatures_contradict,
             fmt::format(
                 "the other views' temperatures contradict its place and find it nowhere (at "
-                "best {:.2f} of the usual support); the visible scene alone keeps it, at "
-                "{:.2f} of its usual support",
+                "best {:.2f} of the median support); the visible scene alone keeps it, at "
+                "{:.2f} of its loop's median support",
                 seen.temperatures_there, seen.form_before)};
         break;
       case MoveDecision::nobody:
@@ -265,13 +268,13 @@ Status confirm_by_temperatures(const OrbitRefinement& refinement, std::size_t fi
   for (std::size_t i = first_new; i < orbit.images.size(); ++i) added.push_back(i);
   ORBITFUSE_ASSIGN(const SceneRenderer renderer, painted_by(refinement, alignment, settled, 0));
   const OrbitRefinement painted{renderer, orbit, refinement.progress};
-  Usual usual;
+  SupportOfLoop median_of_loop;
   ORBITFUSE_ASSIGN(std::vector<std::size_t> lost,
-                   unconfirmed(refinement, painted, added, usual, alignment));
+                   unconfirmed(refinement, painted, added, median_of_loop, alignment));
   ORBITFUSE_ASSIGN(const std::vector<PosedView> starts, painted.search(lost, alignment));
   ORBITFUSE_ASSIGN(const Fit searched, refinement.restart(lost, starts, fine_rounds()));
   for (std::size_t c = 0; c < lost.size(); ++c) alignment.views[lost[c]] = searched.views[c];
-  ORBITFUSE_ASSIGN(lost, unconfirmed(refinement, painted, lost, usual, alignment));
+  ORBITFUSE_ASSIGN(lost, unconfirmed(refinement, painted, lost, median_of_loop, alignment));
   refinement.progress.report(
       {"poses.thermal", 3, 4, -1,
        fmt::format("{} of {} added views are not confirmed", lost.size(), added.size())});

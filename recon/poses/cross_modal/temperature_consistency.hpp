@@ -13,7 +13,7 @@
 namespace orbitfuse {
 
 /// A view that the others' temperatures contradict, from where they place it best. Supports are
-/// shares of its loop's usual one in the same scene.
+/// shares of its loop's median one in the same scene.
 struct PlaceEvidence {
   bool agree = false;             ///< form, started there, stays within a degree
   double temperatures_there = 0;  ///< among temperatures
@@ -27,8 +27,8 @@ struct PlaceEvidence {
 enum class MoveDecision { both, temperatures_alone, form_alone, nobody };
 MoveDecision verdict(const PlaceEvidence& seen);
 
-/// Of its loop's usual support; 0 where the loop usually has none: shares of nothing say nothing.
-double share_of_usual(double support, double usual);
+/// Of its loop's median support; 0 where the loop has none: shares of nothing say nothing.
+double share_of_median(double support, double median);
 
 /// The scene that the chosen views paint, for views that are turned far enough not to be one of
 /// them.

@@ -81,12 +81,12 @@ Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
   std::vector<double> radii;
   for (const auto& [loop, radius] : model.radius) radii.push_back(radius);
   const double common = radii.empty() ? 1 : median(radii);
-  const double usual = median_support(alignment);
+  const double median = median_support(alignment);
   std::vector<ViewEvidence> evidence;
   for (const std::size_t i : all) {
     const PosedView& view = alignment.views[i].view;
     ViewEvidence seen;
-    seen.support_share = share_of_usual(alignment.views[i].support(), usual);
+    seen.support_share = share_of_median(alignment.views[i].support(), median);
     const int width = std::min(judged_width_px, view.camera.width);
     const Camera camera =
         view.camera.scaled_to(width, std::max(1, view.camera.height * width / view.camera.width))
@@ -115,9 +115,9 @@ ViewVerdict judged(const ViewEvidence& seen, const ViewVerdict& before) {
     return ViewVerdict{Confidence::doubtful, reason, std::move(detail)};
   };
   if (!(seen.support_share >= min_support_share))
-    return doubtful(
-        DoubtReason::weak_support,
-        fmt::format("its edges have {:.2f} of the usual support of all loops", seen.support_share));
+    return doubtful(DoubtReason::weak_support,
+                    fmt::format("its edges have {:.2f} of the median support of all loops",
+                                seen.support_share));
   if (!(seen.aim_off <= max_aim_off))
     return doubtful(
         DoubtReason::off_its_loop,

@@ -49,7 +49,7 @@ Result<ThermalPoses> estimate_thermal_poses(const Session& session, const Visibl
       structure_from_motion(session, frames, options, workdir / "thermal", progress, steps);
   if (!alone && visible != nullptr && alone.error().kind == ErrorKind::unavailable)
     alone.error().found =
-        steps.front().rung + ": " + steps.front().why + "; " + alone.error().found;
+        steps.front().attempt + ": " + steps.front().why + "; " + alone.error().found;
   if (!alone) return tl::unexpected(std::move(alone.error()));
   ModalityPoses poses = *std::move(alone);
   poses.ladder = std::move(steps);

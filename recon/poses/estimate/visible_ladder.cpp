@@ -100,7 +100,7 @@ class VisibleLadder {
         steps_(steps),
         total_(static_cast<int>(frames.size())) {}
 
-  Result<ModalityPoses> climb() {
+  Result<ModalityPoses> run() {
     const std::vector<ViewPair> orbit = orbit_pairs(frames_);
     const bool all_are_few = orbit.size() == exhaustive_pairs(total_).size();
     tell(0, "features");
@@ -165,9 +165,9 @@ class VisibleLadder {
 
   /// Judges a model and keeps it where it is believed and poses more views (or as many, at a lower
   /// error) than the best one.
-  void consider(const std::string& rung, const std::string& found, Reconstruction model,
+  void consider(const std::string& attempt, const std::string& found, Reconstruction model,
                 const PoseOptions& options) {
-    LadderStep step{rung, false, found, 0, total_, 0};
+    LadderStep step{attempt, false, found, 0, total_, 0};
     if (model.views.size() < 2) {
       step.why += "; no model";
     } else {
@@ -206,8 +206,8 @@ class VisibleLadder {
   }
 
   Status try_global(const FeatureLevel& level, const std::string& name) {
-    const std::string rung = "global mapper, " + name.substr(name.find(", ") + 2);
-    tell(2, rung);
+    const std::string attempt = "global mapper, " + name.substr(name.find(", ") + 2);
+    tell(2, attempt);
     ORBITFUSE_ASSIGN(FeatureGraph graph, level.graph());
     const Adjuster adjust = [&](Reconstruction model) -> Result<Reconstruction> {
       ORBITFUSE_ASSIGN(JudgedModel judged,
@@ -215,13 +215,13 @@ class VisibleLadder {
       return std::move(judged.poses.reconstruction);
     };
     ORBITFUSE_ASSIGN(GlobalModel global, map_globally(graph, adjust, {}, progress_));
-    consider(rung, global.found, std::move(global.model), level.options());
+    consider(attempt, global.found, std::move(global.model), level.options());
     return {};
   }
 
   /// The views left out, on the points of the best model.
-  Status try_resection(const FeatureLevel& level, const std::string& rung) {
-    tell(3, rung);
+  Status try_resection(const FeatureLevel& level, const std::string& attempt) {
+    tell(3, attempt);
     ORBITFUSE_ASSIGN(FeatureGraph graph, level.graph());
     PosedFrames posed = posed_frames(graph, best_->poses.reconstruction);
     // The model knows better than two-view geometry which matches hold.
@@ -237,7 +237,7 @@ class VisibleLadder {
       model = reconstruction_of(
           graph, posed, triangulate_tracks(graph, graph.verified, posed, track), Modality::visible);
     }
-    consider(rung, found, std::move(model), level.options());
+    consider(attempt, found, std::move(model), level.options());
     return {};
   }
 
@@ -326,7 +326,7 @@ Result<ModalityPoses> pose_visible_views(const Session& session,
                                          const std::vector<const FrameRecord*>& frames,
                                          const PoseOptions& options, const fs::path& workdir,
                                          const Progress& progress, std::vector<LadderStep>& steps) {
-  return VisibleLadder(session, frames, options, workdir, progress, steps).climb();
+  return VisibleLadder(session, frames, options, workdir, progress, steps).run();
 }
 
 }  // namespace orbitfuse

@@ -12,7 +12,7 @@ namespace orbitfuse {
 /// the ones before left views out, on the features and matches in the database; the believed model
 /// with the most views is the answer.
 /// The ladder of a failure is in `steps` as well as in the error's message.
-/// Errors: input, unavailable (no COLMAP), quality (no rung held), cancelled.
+/// Errors: input, unavailable (no COLMAP), quality (no attempt held), cancelled.
 Result<ModalityPoses> pose_visible_views(const Session& session,
                                          const std::vector<const FrameRecord*>& frames,
                                          const PoseOptions& options,

@@ -149,7 +149,7 @@ std::vector<double> loop_elevations_deg(const std::vector<const FrameRecord*>& f
     std::vector<double> declared, seen;
     for (const FrameRecord* frame : frames)
       if (frame->station && frame->station->loop == loop &&
-          frame->station->elevation_sigma_deg < known_sigma_deg)
+          frame->station->elevation_sigma_deg.value_or(180) < known_sigma_deg)
         declared.push_back(frame->station->elevation_deg);
     for (const auto& of_pair : candidates)
       for (const RelativePose& pose : of_pair) {

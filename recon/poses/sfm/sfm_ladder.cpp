@@ -138,7 +138,7 @@ Result<ModalityPoses> adjusted(Reconstruction model, const Session& session,
 tl::unexpected<Error> none_held(const std::vector<LadderStep>& steps, Modality modality) {
   std::string found;
   for (const LadderStep& step : steps)
-    found += fmt::format("{}{}: {}", found.empty() ? "" : "; ", step.rung, step.why);
+    found += fmt::format("{}{}: {}", found.empty() ? "" : "; ", step.attempt, step.why);
   return fail(ErrorKind::quality, fmt::format("poses.{}", name(modality)), found,
               modality == Modality::visible
                   ? "take sharp views every 10-15 deg with textured surroundings in sight, or "
@@ -230,7 +230,7 @@ Result<ModalityPoses> structure_from_motion(const Session& session,
         fmt::format("{:.0f} features a view, {} of {} pairs verified", matches.mean_features,
                     matches.verified_pairs, matches.matched_pairs);
 
-    auto rung_start = start;
+    auto attempt_start = start;
     for (const MapperSettings& settings : mapper_ladder()) {
       tell(2, "mapping, " + settings.name);
       ORBITFUSE_ASSIGN(Reconstruction model, project.map(session, images, settings, progress));
@@ -243,7 +243,7 @@ Result<ModalityPoses> structure_from_motion(const Session& session,
           step.held = judged->believed;
           step.posed = static_cast<int>(judged->poses.reconstruction.views.size());
         }
-        step.seconds = seconds_since(rung_start);
+        step.seconds = seconds_since(attempt_start);
         steps.push_back(step);
         if (step.held) {
           if (!attempt.exhaustive && pairs.size() < exhaustive_pairs(total).size())
@@ -257,10 +257,10 @@ Result<ModalityPoses> structure_from_motion(const Session& session,
         }
       } else {
         step.why += "; no model";
-        step.seconds = seconds_since(rung_start);
+        step.seconds = seconds_since(attempt_start);
         steps.push_back(step);
       }
-      rung_start = Clock::now();
+      attempt_start = Clock::now();
       ORBITFUSE_TRY(progress.check(stage));
     }
   }

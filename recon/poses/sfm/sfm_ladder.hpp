@@ -9,7 +9,7 @@ namespace orbitfuse {
 /// default, then relaxed settings, exhaustive pairs last. Each model goes through bundle adjustment
 /// and the gates; the first that passes holds. (Visible views: estimate/visible_ladder.hpp.)
 /// The ladder of a failure is in `steps` as well as in the error's message.
-/// Errors: input, unavailable (no COLMAP), quality (no rung held), cancelled.
+/// Errors: input, unavailable (no COLMAP), quality (no attempt held), cancelled.
 Result<ModalityPoses> structure_from_motion(const Session& session,
                                             const std::vector<const FrameRecord*>& frames,
                                             const PoseOptions& options,
@@ -31,7 +31,7 @@ Result<JudgedModel> judge_model(Reconstruction model, const Session& session,
                                 const std::vector<const FrameRecord*>& frames,
                                 const PoseOptions& options);
 
-/// The error of a ladder of which no rung held.
+/// The error of a ladder of which no attempt held.
 tl::unexpected<Error> none_held(const std::vector<LadderStep>& steps, Modality modality);
 
 /// The gates a model must pass without ground truth; `why` says the figures either way.

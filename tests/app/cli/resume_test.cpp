@@ -8,7 +8,7 @@
 
 #include "core/session/session.hpp"
 #include "tests/app/cli/program.hpp"
-#include "tests/core/session_account.hpp"
+#include "tests/core/session/session_account.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {

@@ -16,6 +16,7 @@ enum class Kind { fast, faithful };
 
 struct Options {
   double budget_s = 60;
+  std::optional<double> elevation_deg;
   float weight = 0.1F;
   int views = 12;
   bool shared = true;
@@ -28,6 +29,7 @@ struct SettingsTest : testing::Test {
   SettingsTest() {
     settings.add("train.visible.budget_s", options.budget_s, "time to train");
     settings.add("train.visible.weight", options.weight, "a weight");
+    settings.add("render.elevation_deg", options.elevation_deg, "of the orbit");
     settings.add("render.views", options.views, "views on the orbit");
     settings.add("train.shared", options.shared, "share geometry");
     settings.add("render.palette", options.palette, "colours");
@@ -72,6 +74,16 @@ TEST_F(SettingsTest, WrongTypeSaysWhatItMustBe) {
               HasSubstr("one of fast faithful"));
   EXPECT_THAT(read("[render]\nviews = 99999999999999999999\n").error().message(), HasSubstr(":2"));
   EXPECT_THAT(read("[fusion]\nmethods = [1]\n").error().message(), HasSubstr("list"));
+}
+
+TEST_F(SettingsTest, AnOptionalNumberIsANumberOrAuto) {
+  EXPECT_EQ(settings.to_json("render").at("elevation_deg"), "auto");
+  ASSERT_TRUE(settings.apply("render.elevation_deg=-12.5"));
+  EXPECT_EQ(options.elevation_deg, -12.5);
+  EXPECT_FALSE(settings.apply("render.elevation_deg=low"));
+  EXPECT_EQ(options.elevation_deg, -12.5);
+  ASSERT_TRUE(settings.apply("render.elevation_deg=auto"));
+  EXPECT_FALSE(options.elevation_deg);
 }
 
 TEST_F(SettingsTest, BrokenTomlNamesTheLine) {

@@ -8,7 +8,7 @@
 #include "app/recording/recording.hpp"
 #include "drivers/replay/replay_source.hpp"
 #include "tests/capture/scripted_source.hpp"
-#include "tests/core/session_account.hpp"
+#include "tests/core/session/session_account.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse::recording {

@@ -62,6 +62,20 @@ TEST(NewViews, OrbitViewsLookAtTheCentreFromBetweenTheStations) {
   EXPECT_NEAR(std::atan2(out.y(), out.x()) / deg, 15, 1e-6);
 }
 
+TEST(NewViews, TheElevationIsTheCamerasMedianUnlessOneIsGiven) {
+  const auto elevation = [](const NewViewOptions& options) {
+    const auto made = new_views(orbit(0, 360), options);
+    const Eigen::Vector3d out = camera_center(made->views[0].cam_from_world) - target;
+    return std::asin(out.normalized().z()) / deg;
+  };
+  EXPECT_NEAR(elevation({}), 20, 1e-6);
+  NewViewOptions options;
+  options.elevation_deg = -30;
+  EXPECT_NEAR(elevation(options), -30, 1e-6);
+  options.elevation_deg = 90;
+  EXPECT_FALSE(options.validate());
+}
+
 TEST(NewViews, AnArcGetsItsOwnPathNotAnOrbit) {
   const auto made = new_views(orbit(0, 130), {});
   ASSERT_TRUE(made);

@@ -63,7 +63,7 @@ class FeatureSceneMaker {
       Station station;
       station.loop = static_cast<int>(v) / 12, station.index = static_cast<int>(v) % 12;
       station.azimuth_deg = 30.0 * station.index;
-      station.elevation_sigma_deg = 90;
+      station.elevation_sigma_deg.reset();
       frame.station = station;
       scene.session.frames.push_back(frame);
     }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tests/recon/nerf/emulated_amx.hpp"
+#include "tests/recon/nerf/kernels/emulated_amx.hpp"
 
 #include "recon/nerf/kernels/tile_layers.hpp"
-#include "tests/recon/nerf/tile_machine.hpp"
+#include "tests/recon/nerf/kernels/tile_machine.hpp"
 
 namespace orbitfuse::nerf::test {
 namespace {

@@ -158,9 +158,9 @@ TEST(CorrectByTemperatures, OnlyTemperaturesThatFindAViewMoveIt) {
 }
 
 TEST(CorrectByTemperatures, SharesOfNothingSayNothing) {
-  EXPECT_DOUBLE_EQ(share_of_usual(30, 40), 0.75);
-  EXPECT_EQ(share_of_usual(0, 0), 0);
-  EXPECT_EQ(share_of_usual(5, 0), 0);
+  EXPECT_DOUBLE_EQ(share_of_median(30, 40), 0.75);
+  EXPECT_EQ(share_of_median(0, 0), 0);
+  EXPECT_EQ(share_of_median(5, 0), 0);
 }
 
 TEST(CorrectByTemperatures, AViewKeptByFormAloneCarriesTheObjection) {

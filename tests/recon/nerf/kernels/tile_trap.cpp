@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tests/recon/nerf/tile_trap.hpp"
+#include "tests/recon/nerf/kernels/tile_trap.hpp"
 
 #include <signal.h>
 #include <ucontext.h>
@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "tests/recon/nerf/tile_machine.hpp"
+#include "tests/recon/nerf/kernels/tile_machine.hpp"
 
 namespace orbitfuse::nerf::test {
 namespace {

@@ -23,7 +23,7 @@ FrameRecord full_frame() {
   f.sequence = 18446744073709551615ull;
   f.host_time_ns = 1790000000123456789;
   f.device_time_ns = -5;
-  f.station = Station{1, 7, 210.5, 34.25, 180, 4};
+  f.station = Station{1, 7, 210.5, 34.25, std::nullopt, 4};
   f.tracking = true;
   f.thermal_is_gray = true;
   f.flags = {"nuc", "of-a-later-version"};
@@ -78,6 +78,8 @@ TEST_F(SessionTest, EveryFieldComesBack) {
   EXPECT_EQ(f.host_time_ns, e.host_time_ns);
   EXPECT_EQ(f.device_time_ns, -5);
   EXPECT_EQ(f.station->azimuth_deg, 210.5);
+  EXPECT_FALSE(f.station->azimuth_sigma_deg);
+  EXPECT_EQ(f.station->elevation_sigma_deg, 4);
   EXPECT_EQ(f.station->loop, 1);
   EXPECT_TRUE(f.tracking && f.thermal_is_gray && f.has_flag(FrameFlag::nuc) &&
               !f.has_flag(FrameFlag::still) && f.flags.size() == 2);
@@ -171,6 +173,16 @@ TEST_F(SessionTest, UnknownLinesAreSkippedAndNewerFormatsRefused) {
   text = manifest();
   text.replace(text.find("\"format\":1"), 10, "\"format\":2");
   EXPECT_NE(open(text).error().message().find("update"), std::string::npos);
+}
+
+TEST_F(SessionTest, UnknownOriginsOfEarlierVersionsAreUnknown) {
+  std::string text = manifest();
+  const std::string sigma = "\"elevation_sigma_deg\":4.0";
+  ASSERT_NE(text.find(sigma), std::string::npos);
+  text.replace(text.find(sigma), sigma.size(), "\"elevation_sigma_deg\":90.0");
+  const auto s = open(text);
+  ASSERT_TRUE(s) << s.error().message();
+  EXPECT_FALSE(s->frames[0].station->elevation_sigma_deg);
 }
 
 TEST_F(SessionTest, LaterLineAboutAFileAmendsIt) {

@@ -8,7 +8,7 @@
 #include "core/image/image_io.hpp"
 #include "core/system/file_io.hpp"
 #include "tests/capture/scripted_source.hpp"
-#include "tests/core/session_account.hpp"
+#include "tests/core/session/session_account.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {

@@ -16,7 +16,7 @@
 #include "recon/nerf/rendering/render.hpp"
 #include "recon/nerf/training/measure.hpp"
 #include "recon/nerf/training/trainer.hpp"
-#include "tests/recon/nerf/emulated_amx.hpp"
+#include "tests/recon/nerf/kernels/emulated_amx.hpp"
 #include "tests/recon/nerf/toy_scene.hpp"
 
 namespace orbitfuse::nerf {

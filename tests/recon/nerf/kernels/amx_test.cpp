@@ -13,9 +13,9 @@
 #include "core/numeric/random.hpp"
 #include "recon/nerf/field/network.hpp"
 #include "recon/nerf/kernels/tile_layers.hpp"
-#include "tests/recon/nerf/emulated_amx.hpp"
-#include "tests/recon/nerf/tile_machine.hpp"
-#include "tests/recon/nerf/tile_trap.hpp"
+#include "tests/recon/nerf/kernels/emulated_amx.hpp"
+#include "tests/recon/nerf/kernels/tile_machine.hpp"
+#include "tests/recon/nerf/kernels/tile_trap.hpp"
 
 namespace orbitfuse::nerf {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tests/recon/nerf/tile_machine.hpp"
+#include "tests/recon/nerf/kernels/tile_machine.hpp"
 
 #include <bit>
 #include <cmath>

@@ -61,7 +61,7 @@ TEST(WholeView, ClimbsBackOverTheRibs) {
   const PosedView truth = orbit_view(25, 14);
   PosedView view = orbit_view(30, 18, 2.6);
   const auto correlation =
-      climb(testing_orbit::box_renderer(), {}, thermal_of(truth), view, {}, {});
+      ascend_correlation(testing_orbit::box_renderer(), {}, thermal_of(truth), view, {}, {});
   ASSERT_TRUE(correlation) << correlation.error().message();
   EXPECT_NEAR(angles_of(view).azimuth_deg, 25, 1.5);
   EXPECT_NEAR(angles_of(view).elevation_deg, 14, 1.5);

@@ -84,7 +84,7 @@ TEST(OrbitGates, FrontMergedWithBackIsRefusedByStationsOfUnknownOrigin) {
     Station station;
     station.index = static_cast<int>(i);
     station.azimuth_deg = 10.0 * static_cast<double>(i);
-    station.azimuth_sigma_deg = 180;
+    station.azimuth_sigma_deg.reset();
     frame.station = station;
   }
   EXPECT_TRUE(believed(poses_with(session, as_taken), session));
