@@ -103,20 +103,20 @@ struct SimilarityComparison {
     pairs.print("start", start);
     double before = cpu_seconds();
     ORBITFUSE_ASSIGN(
-        const SimilarityComparison single,
+        const SimilarityRefinement single,
         refine_similarity(renderer, images, views, start, similarity_rounds(), progress));
     report("one start", single, before);
     before = cpu_seconds();
     SimilaritySearchOptions options;
     options.clouds_decide = clouds_decide;
-    ORBITFUSE_ASSIGN(const SimilarityComparison searched,
+    ORBITFUSE_ASSIGN(const SimilarityRefinement searched,
                      search_similarity(renderer, images, views, start, options, progress));
     for (const Skip& skip : searched.skips)
       fmt::print("skipped {}: {}; {}\n", skip.what, skip.why, skip.effect);
     report(fmt::format("search of {} starts", searched.starts).c_str(), searched, before);
     return {};
   }
-  void report(const char* what, const SimilarityComparison& r, double before) const {
+  void report(const char* what, const SimilarityRefinement& r, double before) const {
     pairs.print(what, r.visible_from_thermal);
     fmt::print("  agreement {:.4f} to {:.4f}, patches {} to {}: {}; {:.1f} CPU s\n",
                r.agreement_before, r.agreement_after, r.matches_before, r.matches_after,

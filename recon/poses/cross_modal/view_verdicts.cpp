@@ -81,12 +81,12 @@ Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
   std::vector<double> radii;
   for (const auto& [loop, radius] : model.radius) radii.push_back(radius);
   const double common = radii.empty() ? 1 : median(radii);
-  const double median = median_support(alignment);
+  const double median_of_all = median_support(alignment);
   std::vector<ViewEvidence> evidence;
   for (const std::size_t i : all) {
     const PosedView& view = alignment.views[i].view;
     ViewEvidence seen;
-    seen.support_share = share_of_median(alignment.views[i].support(), median);
+    seen.support_share = share_of_median(alignment.views[i].support(), median_of_all);
     const int width = std::min(judged_width_px, view.camera.width);
     const Camera camera =
         view.camera.scaled_to(width, std::max(1, view.camera.height * width / view.camera.width))
