@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -35,9 +36,17 @@ bool is_simulated(const cv::Mat& image) {
   return false;
 }
 
+/// Counts of unknown scale are shown as gray; the camera's own samples lie beside them.
+std::filesystem::path samples_of(const json& line) {
+  const std::filesystem::path file = line.at("file").get<std::string>();
+  const json flags = line.value("flags", json::array());
+  if (std::find(flags.begin(), flags.end(), "raw-counts") == flags.end()) return file;
+  return file.parent_path() / "originals" / (file.stem().string() + ".tiff");
+}
+
 void check_image(const std::filesystem::path& folder, const json& line,
                  std::vector<std::string>& bad) {
-  const std::string name = line.at("file");
+  const std::string name = samples_of(line);
   const cv::Mat image = cv::imread((folder / name).string(), cv::IMREAD_UNCHANGED);
   if (image.empty()) {
     bad.push_back(name + " cannot be read");

@@ -4,21 +4,30 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <utility>
+#include <vector>
 
 namespace orbitfuse {
 namespace {
 
-float percentile(cv::Mat values, double share) {
+/// The values below which a smaller and a larger share of all lie.
+std::pair<float, float> percentiles(const cv::Mat& values, double smaller, double larger) {
   std::vector<float> v(values.begin<float>(), values.end<float>());
-  const auto place =
-      v.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(v.size() - 1));
-  std::nth_element(v.begin(), place, v.end());
-  return *place;
+  const auto place = [&](double share) {
+    return v.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(v.size() - 1));
+  };
+  const auto high = place(larger), low = place(smaller);
+  std::nth_element(v.begin(), high, v.end());
+  const float high_value = *high;
+  std::nth_element(v.begin(), low, high);
+  return {*low, high_value};
 }
 
 /// Invalid samples take the image's median: no gradient of their own where they are few.
 cv::Mat filled(const cv::Mat& values) {
   cv::Mat copy = values.clone();
+  if (std::all_of(copy.begin<float>(), copy.end<float>(), [](float v) { return std::isfinite(v); }))
+    return copy;
   std::vector<float> good;
   for (const float v : cv::Mat_<float>(copy))
     if (std::isfinite(v)) good.push_back(v);
@@ -38,7 +47,7 @@ cv::Mat filled(const cv::Mat& values) {
 cv::Mat orientation_field(const cv::Mat& values, double sigma_px) {
   cv::Mat image = filled(values), dx, dy;
   // A saturated or empty region (sky) far below the scene would set the scale of everything.
-  const float low = percentile(image, 0.02), high = percentile(image, 0.98);
+  const auto [low, high] = percentiles(image, 0.02, 0.98);
   cv::max(image, low, image);
   cv::min(image, high, image);
   cv::GaussianBlur(image, image, {}, sigma_px);
@@ -47,8 +56,7 @@ cv::Mat orientation_field(const cv::Mat& values, double sigma_px) {
   cv::Mat magnitude;
   cv::magnitude(dx, dy, magnitude);
   cv::Mat field(image.size(), CV_32FC2, cv::Scalar::all(0));
-  const float noise = percentile(magnitude, 0.5);
-  const float strong = percentile(magnitude, 0.99);
+  const auto [noise, strong] = percentiles(magnitude, 0.5, 0.99);
   const float unit = std::max(3.0f * noise, 0.02f * strong);
   if (!(strong > 0) || !(unit > 0)) return field;
   const float full = std::log1p(strong / unit);

@@ -7,55 +7,11 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
+#include "recon/alignment/edge_correlation.hpp"
 #include "recon/alignment/edge_field.hpp"
 
 namespace orbitfuse {
 namespace {
-
-struct EdgePixel {
-  int x = 0, y = 0;
-  float re = 0, im = 0;  ///< of the field
-  float strength = 0;
-};
-
-/// Pixels that carry the edges; the rest of a patch says nothing.
-std::vector<EdgePixel> edge_pixels(const cv::Mat& edges, float threshold) {
-  std::vector<EdgePixel> list;
-  for (int y = 0; y < edges.rows; ++y)
-    for (int x = 0; x < edges.cols; ++x) {
-      const auto& v = edges.at<cv::Vec2f>(y, x);
-      const float s = std::hypot(v[0], v[1]);
-      if (s > threshold) list.push_back({x, y, v[0], v[1], s});
-    }
-  return list;
-}
-
-/// The image's field as two planes: rows of each are summed eight at a time.
-struct FieldPlanes {
-  cv::Mat1f re, im;
-  explicit FieldPlanes(const cv::Mat& field) {
-    cv::Mat parts[2];
-    cv::split(field, parts);
-    re = parts[0], im = parts[1];
-  }
-};
-
-/// Correlation of edge pixels with the image over a square of shifts.
-cv::Mat1f correlation(const std::vector<EdgePixel>& pixels, const FieldPlanes& field, int cx,
-                      int cy, int reach) {
-  cv::Mat1f score = cv::Mat1f::zeros(2 * reach + 1, 2 * reach + 1);
-  for (const EdgePixel& p : pixels)
-    for (int dy = -reach; dy <= reach; ++dy) {
-      const int y = p.y + cy + dy;
-      if (y < 0 || y >= field.re.rows) continue;
-      const int first = std::max(-reach, -(p.x + cx));
-      const int last = std::min(reach, field.re.cols - 1 - (p.x + cx));
-      const float *re = field.re[y] + p.x + cx, *im = field.im[y] + p.x + cx;
-      float* out = score[dy + reach] + reach;
-      for (int dx = first; dx <= last; ++dx) out[dx] += p.re * re[dx] + p.im * im[dx];
-    }
-  return score;
-}
 
 double strength_squared(const std::vector<EdgePixel>& pixels) {
   double sum = 0;
@@ -138,11 +94,10 @@ std::vector<PatchMatch> match_patches(const SceneRender& render, const cv::Mat& 
   const std::vector<EdgePixel> all = edge_pixels(edges, 0.25F);
   std::vector<PatchMatch> matches;
   if (all.size() < 20) return matches;
-  const FieldPlanes planes(field);
-  const Peak whole = peak_of(correlation(all, planes, 0, 0, options.search_px), options.search_px);
+  const FieldPlanes planes(field, options.search_px + options.patch_search_px + 1);
+  const Peak whole = peak_of(planes.correlation(all, 0, 0, options.search_px), options.search_px);
   const int sx = static_cast<int>(std::lround(whole.shift.x())),
             sy = static_cast<int>(std::lround(whole.shift.y()));
-  const cv::Mat energy = planes.re.mul(planes.re) + planes.im.mul(planes.im);
   const int r = options.radius_px;
   for (int cy = options.spacing_px / 2; cy < edges.rows; cy += options.spacing_px)
     for (int cx = options.spacing_px / 2; cx < edges.cols; cx += options.spacing_px) {
@@ -150,17 +105,15 @@ std::vector<PatchMatch> match_patches(const SceneRender& render, const cv::Mat& 
       for (const EdgePixel& p : all)
         if (std::abs(p.x - cx) <= r && std::abs(p.y - cy) <= r) patch.push_back(p);
       if (patch.size() < 12) continue;
-      const Peak peak = peak_of(correlation(patch, planes, sx, sy, options.patch_search_px),
+      const Peak peak = peak_of(planes.correlation(patch, sx, sy, options.patch_search_px),
                                 options.patch_search_px);
       if (!peak.inside || !(peak.value > 0)) continue;
       // Normalised by the image's own strength under the patch's edge pixels.
       double there = 0;
       const Eigen::Vector2d shift = peak.shift + Eigen::Vector2d(sx, sy);
       for (const EdgePixel& p : patch) {
-        const int x = p.x + static_cast<int>(std::lround(shift.x())),
-                  y = p.y + static_cast<int>(std::lround(shift.y()));
-        if (x >= 0 && y >= 0 && x < field.cols && y < field.rows)
-          there += static_cast<double>(energy.at<float>(y, x));
+        there += static_cast<double>(planes.energy(p.x + static_cast<int>(std::lround(shift.x())),
+                                                   p.y + static_cast<int>(std::lround(shift.y()))));
       }
       const double score = peak.value / std::sqrt(std::max(1e-9, there * strength_squared(patch)));
       // Edges that the image shows only faintly must not count as a perfect match.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <opencv2/imgproc.hpp>
 
 #include "core/system/parallel.hpp"
@@ -73,6 +74,29 @@ cv::Mat reduced(const cv::Mat& image, const Camera& camera) {
   return small;
 }
 
+/// Orientation fields of the images at one width: many starts share an image, and rounds a width.
+class ImageFields {
+ public:
+  void prepare(const std::vector<cv::Mat>& images, const Camera& camera) {
+    if (camera.width != width_) fields_.clear();
+    width_ = camera.width;
+    std::vector<std::pair<const cv::Mat*, cv::Mat*>> missing;
+    for (const cv::Mat& image : images) {
+      const auto [field, added] = fields_.try_emplace(image.data);
+      if (added) missing.emplace_back(&image, &field->second);
+    }
+    parallel_for(static_cast<int>(missing.size()), [&](int index) {
+      const auto& [image, field] = missing[static_cast<std::size_t>(index)];
+      *field = orientation_field(reduced(*image, camera), 1.0);
+    });
+  }
+  const cv::Mat& of(const cv::Mat& image) const { return fields_.at(image.data); }
+
+ private:
+  int width_ = 0;
+  std::map<const uchar*, cv::Mat> fields_;  ///< by the image's samples
+};
+
 /// Residuals of the matches after the correction, and how many are small.
 void judge(const ViewMatches& matched, const Correction& correction, double log_focal,
            const Camera& camera, RenderAlignedView& view) {
@@ -112,6 +136,7 @@ Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer,
   if (views.empty()) return result;
   const double prior_focal = views.front().camera.fx;
   double focal = prior_focal;
+  ImageFields fields;
   for (const RenderRound& round : options.rounds) {
     std::vector<ViewMatches> matched(views.size());
     const Camera full = result.views.front().view.camera;
@@ -126,10 +151,11 @@ Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer,
     }
     const PatchMatchOptions matching{round.search_px, round.patch_search_px, round.patch_radius_px,
                                      round.patch_spacing_px};
+    fields.prepare(images, camera);
     parallel_for(static_cast<int>(views.size()), [&](int index) {
       const auto i = static_cast<std::size_t>(index);
       const cv::Mat edges = rendered_edges(renders[i]);
-      const cv::Mat field = orientation_field(reduced(images[i], camera), 1.0);
+      const cv::Mat& field = fields.of(images[i]);
       matched[i].matches = match_patches(renders[i], edges, seen_by, field, matching);
       result.views[i].agreement = edge_agreement(edges, field);
     });
