@@ -153,6 +153,7 @@ class Campaign {
   double slowest_exit_s_ = 0;
   bool may_resume_ = false;
   std::map<std::string, int> faults_;
+  std::string last_fault_;
 };
 
 void Campaign::violation(const std::string& what) {
@@ -176,7 +177,7 @@ pid_t Campaign::start(const fs::path& session, bool resume) {
 
 void Campaign::camera_fault(GevSimulator& camera, const char* name, GevFaults fault,
                             std::chrono::milliseconds for_ms) {
-  ++faults_[name];
+  ++faults_[last_fault_ = name];
   camera.set_faults(fault);
   std::this_thread::sleep_for(for_ms);
   if (chance() < 0.85) camera.set_faults({});  // else it ends like this
@@ -220,15 +221,15 @@ void Campaign::spoil(GevSimulator& camera) {
       fault.wrong_format_every = 5;
       return camera_fault(camera, "format", fault, some_ms(500, 3000));
     case 11:
-      ++faults_["clock step"];
+      ++faults_[last_fault_ = "clock step"];
       camera.step_clock(chance() < 0.5 ? -3.2 : 5);
       return;
     case 12:
-      ++faults_["numbers restart"];
+      ++faults_[last_fault_ = "numbers restart"];
       camera.restart_ids();
       return;
     default:
-      ++faults_["restart"];
+      ++faults_[last_fault_ = "restart"];
       camera.kill();
       std::this_thread::sleep_for(some_ms(200, 4000));
       if (chance() < 0.85) camera.start_when_free();
@@ -237,7 +238,7 @@ void Campaign::spoil(GevSimulator& camera) {
 
 /// As if the disk were full: nothing can be written into the images' folder.
 void Campaign::spoil_disk(const fs::path& session) {
-  ++faults_["disk"];
+  ++faults_[last_fault_ = "disk"];
   std::error_code error;
   fs::rename(session / "thermal", session / "thermal.kept", error);
   if (!error) std::ofstream(session / "thermal") << "no folder";
@@ -261,7 +262,8 @@ int Campaign::end(pid_t child, bool kill_it, bool over_already) {
   const double took_s = std::chrono::duration<double>(Clock::now() - asked).count();
   if (!over_already && !kill_it) {
     slowest_exit_s_ = std::max(slowest_exit_s_, took_s);
-    if (took_s > most_s) violation(fmt::format("it took {:.2f} s to end", took_s));
+    if (took_s > most_s)
+      violation(fmt::format("it took {:.2f} s to end, {} last", took_s, last_fault_));
   }
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }

@@ -46,6 +46,7 @@ void AravisSource::bury_link() {
   earlier_ += link_statistics();
   Teardowns::all().begin(address_, std::move(link_));
   link_ = nullptr;
+  going_ = true;
 }
 
 Delivery AravisSource::lose(const std::string& why) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <ctime>
+#include <utility>
 
 #include "drivers/aravis/link.hpp"
 #include "drivers/aravis/teardown.hpp"
@@ -62,8 +63,8 @@ Status AravisSource::start() {
 
 void AravisSource::stop() {
   bury_link();
-  // A camera that answers takes milliseconds; nobody waits for one that is gone.
-  Teardowns::all().wait(address_, std::chrono::seconds(1));
+  // A camera that answers takes milliseconds; nobody waits long for one that is gone, nor twice.
+  if (std::exchange(going_, false)) Teardowns::all().wait(address_, std::chrono::seconds(1));
   state_ = State::streaming;
 }
 

@@ -131,6 +131,7 @@ class AravisSource final : public FrameSource {
   FrameRhythm rhythm_;  ///< tells how many frames an outage cost
   int duplicates_in_a_row_ = 0;
   State state_ = State::streaming;
+  bool going_ = false;  ///< a connection was given to Teardowns since the last stop()
   bool silent_told_ = false, mute_told_ = false;
   int fruitless_ = 0;                               ///< reopenings of this outage without a frame
   Clock::time_point last_frame_{};                  ///< or the opening of its connection

@@ -39,10 +39,17 @@ void correlate_row(std::size_t blocks, const std::vector<EdgePixel>& pixels, con
   while (blocks > 0) {
     const std::size_t now = std::min<std::size_t>(blocks, 4);
     switch (now) {
-      case 1: correlate_row<1>(pixels, re, im, stride, sums); break;
-      case 2: correlate_row<2>(pixels, re, im, stride, sums); break;
-      case 3: correlate_row<3>(pixels, re, im, stride, sums); break;
-      default: correlate_row<4>(pixels, re, im, stride, sums);
+      case 1:
+        correlate_row<1>(pixels, re, im, stride, sums);
+        break;
+      case 2:
+        correlate_row<2>(pixels, re, im, stride, sums);
+        break;
+      case 3:
+        correlate_row<3>(pixels, re, im, stride, sums);
+        break;
+      default:
+        correlate_row<4>(pixels, re, im, stride, sums);
     }
     blocks -= now, re += now * lanes, im += now * lanes, sums += now * lanes;
   }

@@ -481,6 +481,20 @@ TEST_F(AravisStream, AnOutageAtTheEndIsCountedByTimeAndStoppingDoesNotWait) {
   EXPECT_LT(testing_clock::now() - stopping, 2s);  // the bar; Aravis alone needs 5 s
 }
 
+/// Whoever stops it stops it again when it goes: only the first waits for the old connection.
+TEST_F(AravisStream, StoppedTwiceASilentCameraIsWaitedForOnce) {
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  drain(source, 10s, frames(20));
+  GevFaults mute;
+  mute.mute_control = mute.freeze = true;
+  camera.set_faults(mute);
+  source.stop();
+  const auto again = testing_clock::now();
+  source.stop();
+  EXPECT_LT(testing_clock::now() - again, 500ms);
+}
+
 /// Damaged frames that are still waited for when the recording ends are counted, too.
 TEST_F(AravisStream, FramesUnderWayAtTheEndAreInTheCount) {
   AravisSource source(options);
