@@ -13,6 +13,36 @@
 namespace orbitfuse {
 namespace {
 
+/// Edge pixels by the row they lie in.
+class PixelRows {
+ public:
+  PixelRows(const std::vector<EdgePixel>& pixels, int rows) {
+    auto first = pixels.begin();
+    for (int y = 0; y <= rows; ++y) {
+      while (first != pixels.end() && first->y < y) ++first;
+      begins_.push_back(first);
+    }
+  }
+  /// Those in the square of `radius` round a pixel, in their order.
+  std::vector<EdgePixel> around(int cx, int cy, int radius) const {
+    std::vector<EdgePixel> found;
+    const int rows = static_cast<int>(begins_.size()) - 1;
+    for (int y = std::max(0, cy - radius); y <= std::min(rows - 1, cy + radius); ++y) {
+      const auto begin = begins_[static_cast<std::size_t>(y)],
+                 end = begins_[static_cast<std::size_t>(y) + 1];
+      const auto first =
+          std::partition_point(begin, end, [&](const EdgePixel& p) { return p.x < cx - radius; });
+      const auto last =
+          std::partition_point(first, end, [&](const EdgePixel& p) { return p.x <= cx + radius; });
+      found.insert(found.end(), first, last);
+    }
+    return found;
+  }
+
+ private:
+  std::vector<std::vector<EdgePixel>::const_iterator> begins_;  ///< of each row, and the end
+};
+
 double strength_squared(const std::vector<EdgePixel>& pixels) {
   double sum = 0;
   for (const EdgePixel& p : pixels)
@@ -99,11 +129,10 @@ std::vector<PatchMatch> match_patches(const SceneRender& render, const cv::Mat& 
   const int sx = static_cast<int>(std::lround(whole.shift.x())),
             sy = static_cast<int>(std::lround(whole.shift.y()));
   const int r = options.radius_px;
+  const PixelRows rows(all, edges.rows);
   for (int cy = options.spacing_px / 2; cy < edges.rows; cy += options.spacing_px)
     for (int cx = options.spacing_px / 2; cx < edges.cols; cx += options.spacing_px) {
-      std::vector<EdgePixel> patch;
-      for (const EdgePixel& p : all)
-        if (std::abs(p.x - cx) <= r && std::abs(p.y - cy) <= r) patch.push_back(p);
+      const std::vector<EdgePixel> patch = rows.around(cx, cy, r);
       if (patch.size() < 12) continue;
       const Peak peak = peak_of(planes.correlation(patch, sx, sy, options.patch_search_px),
                                 options.patch_search_px);
