@@ -52,6 +52,19 @@ class Reader {
   template <class T>
   requires std::is_trivially_copyable_v<T>
   void operator()(T& value) { take(&value, sizeof value); }
+  // Not every byte is a value of these.
+  void operator()(bool& value) {
+    std::uint8_t byte = 0;
+    take(&byte, sizeof byte);
+    if (byte > 1) refuse("a flag that is neither 0 nor 1");
+    value = byte == 1;
+  }
+  void operator()(Modality& value) {
+    std::underlying_type_t<Modality> number = 0;
+    take(&number, sizeof number);
+    if (number < 0 || number > static_cast<int>(Modality::thermal)) refuse("an unknown modality");
+    value = number == 0 ? Modality::visible : Modality::thermal;
+  }
   template <class T>
   void operator()(std::vector<T>& values) {
     std::uint64_t count = 0;
@@ -68,6 +81,7 @@ class Reader {
     bytes_.remove_prefix(count);
   }
   bool at_end() const { return ok && bytes_.empty(); }
+  std::size_t remaining() const { return bytes_.size(); }
 
  private:
   void take(void* to, std::size_t size) {
@@ -175,7 +189,8 @@ void visit(Archive& io, std::vector<ViewRecord>& views) {
   std::uint64_t count = views.size();
   io(count);
   if constexpr (Archive::reading) {
-    if (!io.ok || count > 1000000) return void(io.ok = false);
+    constexpr std::size_t least_bytes = 17;  // two empty texts and a flag
+    if (!io.ok || count > io.remaining() / least_bytes) return void(io.ok = false);
     views.resize(count);
   }
   for (ViewRecord& view : views) {
@@ -211,6 +226,16 @@ bool fits(const Snapshot& best, FieldState& state) {
   return same;
 }
 
+/// What the largest parts take in a file: asked before memory is taken for them.
+std::size_t least_size(const TrainOptions& options) {
+  HashEncoding grid;
+  const auto entries = static_cast<std::size_t>(
+      grid.lay_out(options.levels, options.features_per_level, options.log2_table,
+                   options.base_resolution, options.max_resolution));
+  const auto cells = static_cast<std::size_t>(options.occupancy_resolution);
+  return 3 * sizeof(float) * entries + 3 * occupancy_cascades * cells * cells * cells / 8;
+}
+
 template <class Archive>
 void visit(Archive& io, FieldState& state) {
   visit_options(io, state.options);
@@ -220,6 +245,7 @@ void visit(Archive& io, FieldState& state) {
     if (!io.ok) return;
     if (const Status valid = state.options.validate(); !valid)
       return io.refuse(valid.error().message());
+    if (io.remaining() < least_size(state.options)) return io.refuse("cut short");
     state.create(state.options, state.modality, static_cast<int>(state.views.size()));
   }
   io(state.thermal_is_gray);

@@ -25,7 +25,7 @@ void FieldState::create(const TrainOptions& with, Modality what, int view_count)
     }
   }
   image_offsets.resize(static_cast<std::size_t>((view_count + 7) / 8 * 8));
-  occupancy.create(with.occupancy_resolution, 5);
+  occupancy.create(with.occupancy_resolution, occupancy_cascades);
 }
 
 std::vector<Parameters*> FieldState::parameters() {

@@ -40,6 +40,9 @@ struct Snapshot {
   bool empty() const { return values.empty(); }
 };
 
+/// Cubes round the scene, each twice as wide as the one before.
+inline constexpr int occupancy_cascades = 5;
+
 struct FieldState {
   Modality modality = Modality::visible;
   bool thermal_is_gray = false;

@@ -30,8 +30,8 @@ void Parameters::resize(std::size_t count) {
   }
 }
 
-void HashEncoding::create(int level_count, int features_per_level, int log2_table,
-                          int base_resolution, int max_resolution, std::uint64_t seed) {
+std::int64_t HashEncoding::lay_out(int level_count, int features_per_level, int log2_table,
+                                   int base_resolution, int max_resolution) {
   features = features_per_level;
   width = (level_count * features + 15) / 16 * 16;
   levels.clear();
@@ -54,7 +54,13 @@ void HashEncoding::create(int level_count, int features_per_level, int log2_tabl
     offset += static_cast<std::int64_t>(level.entries) * features;
     levels.push_back(level);
   }
-  table.resize(static_cast<std::size_t>(offset));
+  return offset;
+}
+
+void HashEncoding::create(int level_count, int features_per_level, int log2_table,
+                          int base_resolution, int max_resolution, std::uint64_t seed) {
+  table.resize(static_cast<std::size_t>(
+      lay_out(level_count, features_per_level, log2_table, base_resolution, max_resolution)));
   for (std::size_t i = 0; i < table.size(); ++i)
     table.value[i] = 2e-4f * (random_uniform(seed, 11, i) - 0.5f);
   level_weight.assign(levels.size(), 1.0f);

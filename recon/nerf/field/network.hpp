@@ -24,6 +24,9 @@ struct HashEncoding {
   std::vector<std::uint16_t> half;  ///< what the kernels read
   std::vector<float> level_weight;  ///< coarse-to-fine: 0..1 per level
 
+  /// The levels alone; returns the length of their table.
+  std::int64_t lay_out(int level_count, int features_per_level, int log2_table, int base_resolution,
+                       int max_resolution);
   void create(int level_count, int features_per_level, int log2_table, int base_resolution,
               int max_resolution, std::uint64_t seed);
   void refresh_half();

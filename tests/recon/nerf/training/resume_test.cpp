@@ -315,6 +315,30 @@ TEST(FieldFile, OptionsAreReadByName) {
   refused("nerf.levels: 99");
   rewrite_options(file, other, [&](Options& options) { of(options, "levels")->second = "4"; });
   refused("malformed content");
+  // Tables of gigabytes, of which the file holds nothing: refused before memory is taken.
+  rewrite_options(file, other, [&](Options& options) {
+    of(options, "levels")->second = "16";
+    of(options, "log2_table")->second = "22";
+    of(options, "max_resolution")->second = "8192";
+  });
+  refused("cut short");
+}
+
+TEST(FieldFile, BytesThatAreNoModalityAreRefused) {
+  Finished run;
+  std::string bytes = read_file(run.options.checkpoint).value();
+  bytes.resize(bytes.size() - 32);
+  // The modality follows the last option's value.
+  const std::string key = TrainOptions::keys().back();
+  const std::string value = Field::load(run.options.checkpoint)->state().options.get(key);
+  const std::size_t at = bytes.find(key) + key.size() + 8 + value.size();
+  ASSERT_EQ(bytes[at + 1] | bytes[at + 2] | bytes[at + 3], 0) << "the test reads the format";
+  bytes[at] = 7;
+  const auto file = run.folder / "other.bin";
+  ASSERT_TRUE(write_file_atomic(file, bytes + content_hash(bytes)));
+  const auto field = Field::load(file);
+  ASSERT_FALSE(field);
+  EXPECT_EQ(field.error().found, "an unknown modality");
 }
 
 TEST(FieldFile, WhatIsNoFieldOrCutIsToldApart) {
