@@ -4,7 +4,7 @@
 // posed, errors in the visible frame, views that are sure and wrong, right views doubted or
 // dropped, CPU seconds. RUNS (default ../runs) holds a session and a run folder for each scene;
 // those that are missing are made with the program beside this one (import, train --modality
-// visible).
+// visible). A scene with a / in its name is a folder with visible/, thermal/, ground_truth.json.
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -79,9 +79,17 @@ std::vector<SceneFolders> scene_folders(const Arguments& arguments) {
                     orbits / name / "ground_truth.json"});
   const fs::path car = fs::path(ORBITFUSE_SOURCE_DIR) / "replay_data/car";
   list.push_back({"car", car, arguments.runs / "car/run", car / "ground_truth.json"});
+  // Scenes of one's own, as ../shared/scenes renders and exports them.
+  for (const std::string& scene : arguments.scenes) {
+    const std::string name = fs::path(scene).filename();
+    if (scene.find('/') != std::string::npos)
+      list.push_back({name, arguments.runs / name / "session", arguments.runs / name / "run",
+                      fs::path(scene) / "ground_truth.json"});
+  }
   std::erase_if(list, [&](const SceneFolders& scene) {
     return !fs::exists(scene.truth) ||
-           (!arguments.scenes.empty() && !arguments.scenes.contains(scene.name));
+           (!arguments.scenes.empty() && !arguments.scenes.contains(scene.name) &&
+            !arguments.scenes.contains(scene.truth.parent_path().string()));
   });
   return list;
 }

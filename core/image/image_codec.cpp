@@ -112,8 +112,9 @@ Result<cv::Mat> decode_image(std::string_view bytes, const std::string& where) {
       if (bytes.size() < 33 || !png_is_whole(bytes)) {
         return fail(ErrorKind::input, where, "truncated PNG", "copy the file again");
       }
-      const long long samples = 1LL * big_endian_u32(bytes, 16) * big_endian_u32(bytes, 20);
-      if (samples <= 0 || samples > max_image_samples) {
+      const std::uint64_t samples =
+          std::uint64_t{big_endian_u32(bytes, 16)} * big_endian_u32(bytes, 20);
+      if (samples == 0 || samples > std::uint64_t{max_image_samples}) {
         return fail(ErrorKind::input, where, "PNG with a damaged size", "copy the file again");
       }
       return decode_with_opencv(bytes, where);
