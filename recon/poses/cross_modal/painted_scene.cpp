@@ -85,6 +85,34 @@ std::vector<const Painter*> nearest(const Painters& painters, const Rigid3d& cam
   return near;
 }
 
+/// Compared at this width.
+constexpr int correlated_width_px = 160;
+/// Fewer painted pixels say nothing.
+constexpr double min_painted_share = 0.08;
+
+/// Over the pixels that are painted; nothing where they are too few.
+std::optional<double> painted_correlation(const cv::Mat& painting, const cv::Mat& image) {
+  double n = 0, sx = 0, sy = 0, sxx = 0, syy = 0, sxy = 0;
+  for (int y = 0; y < painting.rows; ++y)
+    for (int x = 0; x < painting.cols; ++x) {
+      const auto a = static_cast<double>(painting.at<float>(y, x));
+      const auto b = static_cast<double>(image.at<float>(y, x));
+      if (!std::isfinite(a) || !std::isfinite(b)) continue;
+      n += 1, sx += a, sy += b;
+    }
+  if (n < min_painted_share * static_cast<double>(painting.total())) return std::nullopt;
+  const double mx = sx / n, my = sy / n;
+  for (int y = 0; y < painting.rows; ++y)
+    for (int x = 0; x < painting.cols; ++x) {
+      const double a = static_cast<double>(painting.at<float>(y, x)) - mx;
+      const double b = static_cast<double>(image.at<float>(y, x)) - my;
+      if (!std::isfinite(a) || !std::isfinite(b)) continue;
+      sxx += a * a, syy += b * b, sxy += a * b;
+    }
+  if (!(sxx > 0 && syy > 0)) return std::nullopt;
+  return sxy / std::sqrt(sxx * syy);
+}
+
 }  // namespace
 
 Result<SceneRenderer> painted_scene(const SceneRenderer& renderer,
@@ -119,6 +147,18 @@ Result<SceneRenderer> painted_scene(const SceneRenderer& renderer,
     }
     return view;
   };
+}
+
+Result<std::optional<double>> correlation_with(const SceneRenderer& painted, const cv::Mat& image,
+                                               const PosedView& view) {
+  const int width = std::min(correlated_width_px, view.camera.width);
+  const Camera camera =
+      view.camera.scaled_to(width, std::max(1, view.camera.height * width / view.camera.width))
+          .without_distortion();
+  ORBITFUSE_ASSIGN(const SceneRender painting, painted(camera, view.cam_from_world));
+  cv::Mat reduced;
+  cv::resize(image, reduced, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
+  return painted_correlation(painting.brightness, reduced);
 }
 
 }  // namespace orbitfuse

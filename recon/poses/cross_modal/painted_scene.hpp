@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "core/geometry/reconstruction.hpp"
@@ -27,5 +28,10 @@ Result<SceneRenderer> painted_scene(const SceneRenderer& renderer,
                                     const std::vector<PosedView>& views,
                                     const std::vector<cv::Mat>& images,
                                     const PaintedSceneOptions& options, const Progress& progress);
+
+/// Normalised correlation, -1 to 1, of a view's image with what a painted scene shows from its
+/// place; nothing where too little of it is painted. Errors: the renderer's.
+Result<std::optional<double>> correlation_with(const SceneRenderer& painted, const cv::Mat& image,
+                                               const PosedView& view);
 
 }  // namespace orbitfuse

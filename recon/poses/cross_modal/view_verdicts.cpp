@@ -8,9 +8,9 @@
 #include <map>
 #include <numbers>
 #include <numeric>
-#include <opencv2/imgproc.hpp>
 
 #include "core/numeric/median.hpp"
+#include "recon/poses/cross_modal/painted_scene.hpp"
 #include "recon/poses/cross_modal/temperature_consistency.hpp"
 #include "recon/poses/world_frame.hpp"
 
@@ -28,32 +28,6 @@ constexpr double max_azimuth_off_deg = 12, max_elevation_off_deg = 8;
 constexpr double max_log_distance_off = 0.22;
 /// The operator looks at the object: 10 px of 640 in the median where right, 133 where wrong.
 constexpr double max_aim_off = 0.16;
-/// Compared at this width.
-constexpr int judged_width_px = 160;
-/// Fewer painted pixels say nothing.
-constexpr double min_painted_share = 0.08;
-
-/// Normalised correlation over the pixels that are painted; -1 where they are too few.
-double painted_correlation(const cv::Mat& painting, const cv::Mat& image) {
-  double n = 0, sx = 0, sy = 0, sxx = 0, syy = 0, sxy = 0;
-  for (int y = 0; y < painting.rows; ++y)
-    for (int x = 0; x < painting.cols; ++x) {
-      const auto a = static_cast<double>(painting.at<float>(y, x));
-      const auto b = static_cast<double>(image.at<float>(y, x));
-      if (!std::isfinite(a) || !std::isfinite(b)) continue;
-      n += 1, sx += a, sy += b;
-    }
-  if (n < min_painted_share * static_cast<double>(painting.total())) return -1;
-  const double mx = sx / n, my = sy / n;
-  for (int y = 0; y < painting.rows; ++y)
-    for (int x = 0; x < painting.cols; ++x) {
-      const double a = static_cast<double>(painting.at<float>(y, x)) - mx;
-      const double b = static_cast<double>(image.at<float>(y, x)) - my;
-      if (!std::isfinite(a) || !std::isfinite(b)) continue;
-      sxx += a * a, syy += b * b, sxy += a * b;
-    }
-  return sxx > 0 && syy > 0 ? sxy / std::sqrt(sxx * syy) : -1;
-}
 
 /// Pixels from which the orbit's centre is seen to the principal point, by the image's width.
 double aim_off(const OrbitViews& orbit, const PosedView& view) {
@@ -87,14 +61,7 @@ Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
     const PosedView& view = alignment.views[i].view;
     ViewEvidence seen;
     seen.support_share = share_of_median(alignment.views[i].support(), median_of_all);
-    const int width = std::min(judged_width_px, view.camera.width);
-    const Camera camera =
-        view.camera.scaled_to(width, std::max(1, view.camera.height * width / view.camera.width))
-            .without_distortion();
-    ORBITFUSE_ASSIGN(const SceneRender painting, painted(camera, view.cam_from_world));
-    cv::Mat image;
-    cv::resize(orbit.images[i], image, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
-    seen.correlation = painted_correlation(painting.brightness, image);
+    ORBITFUSE_ASSIGN(seen.correlation, correlation_with(painted, orbit.images[i], view));
     const OrbitAngles at =
         orbit_angles(camera_center(rebase(view.cam_from_world, orbit.canonical_from_world)));
     const int loop = orbit.stations[i].loop;
@@ -132,11 +99,11 @@ ViewVerdict judged(const ViewEvidence& seen, const ViewVerdict& before) {
     return doubtful(DoubtReason::off_its_loop,
                     fmt::format("its distance is {:.0f} % off that of the loops in common",
                                 100 * seen.log_distance_off));
-  if (seen.correlation >= -0.99 && !(seen.correlation >= min_correlation))
+  if (seen.correlation && !(*seen.correlation >= min_correlation))
     return doubtful(DoubtReason::temperatures_unlike,
                     fmt::format("its image correlates with what the other views measured there at "
                                 "{:.2f} only",
-                                seen.correlation));
+                                *seen.correlation));
   return before;
 }
 
@@ -171,8 +138,9 @@ Result<std::vector<int>> judge_views(const OrbitRefinement& refinement, Fit& ali
         {"poses.thermal", 3, 4, -1,
          fmt::format("evidence {}: support {:.2f}, temperatures {:.2f}, azimuth {:.1f}, elevation "
                      "{:.1f} deg, distance {:.3f}, aim {:.3f}",
-                     view.view.name, seen.support_share, seen.correlation, seen.azimuth_off_deg,
-                     seen.elevation_off_deg, seen.log_distance_off, seen.aim_off)});
+                     view.view.name, seen.support_share, seen.correlation.value_or(-1),
+                     seen.azimuth_off_deg, seen.elevation_off_deg, seen.log_distance_off,
+                     seen.aim_off)});
   }
   return doubt_whole_loops(refinement.orbit, alignment);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "recon/poses/cross_modal/orbit_refinement.hpp"
@@ -14,9 +15,9 @@ struct ViewEvidence {
   /// Support against renders, as a share of the median of all loops: a low loop sees less form (0.7
   /// where it is right), a wrong one has next to none (0.16).
   double support_share = 0;
-  /// Of its image with what the other views' temperatures show from there; -1 where too little is
-  /// painted to say.
-  double correlation = -1;
+  /// Of its image with what the other views' temperatures show from there; none where too little
+  /// is painted to say.
+  std::optional<double> correlation;
   double azimuth_off_deg = 0, elevation_off_deg = 0;  ///< from where its loop has it
   double log_distance_off = 0;                        ///< from the common distance of all loops
   double aim_off = 0;  ///< orbit's centre from the principal point, share of the image's width
