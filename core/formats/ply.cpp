@@ -210,7 +210,8 @@ bool skip_entry(Reader& reader, const Element& element, PlyFormat format) {
   for (const Property& p : element.properties) {
     std::uint64_t count = 1;
     if (p.list_count) {
-      if (!reader.next(*p.list_count, value) || !(value >= 0)) return false;
+      constexpr double most = 1e15;  // more than any file holds; no overflow of the bytes it takes
+      if (!reader.next(*p.list_count, value) || !(value >= 0 && value <= most)) return false;
       count = static_cast<std::uint64_t>(value);
     }
     if (format != PlyFormat::ascii) {

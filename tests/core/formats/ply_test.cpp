@@ -95,7 +95,9 @@ TEST(Ply, CountsLargerThanTheFileTakeNoMemory) {
         "ply\nformat binary_little_endian 1.0\nelement junk 99999999999\nelement vertex "
         "1\nproperty float x\nend_header\n",
         "ply\nformat ascii 1.0\nelement vertex -3\nproperty float x\nproperty float y\nproperty "
-        "float z\nend_header\n"}) {
+        "float z\nend_header\n",
+        "ply\nformat ascii 1.0\nelement face 1\nproperty list double int i\nelement vertex "
+        "1\nproperty float x\nproperty float y\nproperty float z\nend_header\n4e102 1\n1 2 3\n"}) {
     put(folder / "h.ply", header);
     EXPECT_FALSE(read_ply(folder / "h.ply")) << header;
   }

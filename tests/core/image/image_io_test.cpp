@@ -137,6 +137,14 @@ TEST(ImageIo, OtherContentUnderTheNameIsToldApart) {
   EXPECT_TRUE(read_visible(folder / "png.jpg"));
 }
 
+TEST(ImageIo, APngOfImpossibleSizeIsRefused) {
+  std::string bytes = *encode_png(gradient_bgr());
+  for (std::size_t at = 16; at < 24; ++at) bytes[at] = '\xff';
+  const auto image = decode_image(bytes, "huge.png");
+  ASSERT_FALSE(image);
+  EXPECT_EQ(image.error().found, "PNG with a damaged size");
+}
+
 TEST(ImageIo, SixteenBitWhereEightIsExpected) {
   const TempFolder folder;
   ASSERT_TRUE(write_png(folder / "deep.png", cv::Mat(8, 8, CV_16UC1, cv::Scalar(30000))));
