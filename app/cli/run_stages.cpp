@@ -189,7 +189,8 @@ Status run_stages(Context& context, const StageFolders& given,
                 {"stages", list}};
     if (summary.error && !keeps_options(summary.error->kind)) {
       const json before = earlier_run(folders.out).value_or(json());
-      const bool known = before.is_object() && before.value("session", "") == session;
+      const bool known =
+          before.is_object() && before.contains("session") && before["session"] == session;
       for (const char* key : {"config", "seed"}) {
         if (known && before.contains(key))
           run[key] = before[key];

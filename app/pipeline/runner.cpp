@@ -34,8 +34,11 @@ struct Attempt {
 Attempt read_attempt(const fs::path& file) {
   const auto text = read_file(file);
   const json j = text ? json::parse(*text, nullptr, false) : json();
-  if (!j.is_object()) return {};
-  return {j.value("key", std::string()), j.value("cpu_s", 0.0), j.value("wall_s", 0.0)};
+  const auto is_number = [&](const char* key) { return j.contains(key) && j[key].is_number(); };
+  if (!j.is_object() || !j.contains("key") || !j["key"].is_string() || !is_number("cpu_s") ||
+      !is_number("wall_s"))
+    return {};
+  return {j["key"], j["cpu_s"], j["wall_s"]};
 }
 
 Status write_attempt(const fs::path& file, const Attempt& attempt) {

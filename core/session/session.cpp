@@ -128,7 +128,8 @@ Result<Session> open_session(const std::filesystem::path& folder) {
       return fail(ErrorKind::input, where, "not a JSON object",
                   "restore the manifest from a backup");
     }
-    if (number == 1 && json.value("type", "") != std::string("session")) {
+    const auto type = json.find("type");
+    if (number == 1 && (type == json.end() || *type != "session")) {
       return fail(ErrorKind::input, where, "the first line is not a session header",
                   "restore the manifest from a backup");
     }

@@ -185,6 +185,15 @@ TEST_F(SessionTest, UnknownOriginsOfEarlierVersionsAreUnknown) {
   EXPECT_FALSE(s->frames[0].station->elevation_sigma_deg);
 }
 
+TEST_F(SessionTest, ATypeThatIsNoWordIsNamed) {
+  for (const char* first : {"{\"type\":0}", "{\"type\":[]}", "{}"})
+    EXPECT_EQ(open(std::string(first) + "\n").error().found,
+              "the first line is not a session header");
+  std::string text = manifest();
+  text.insert(text.find('\n') + 1, "{\"type\":7}\n");
+  EXPECT_FALSE(open(text));
+}
+
 TEST_F(SessionTest, LaterLineAboutAFileAmendsIt) {
   FrameRecord chosen = full_frame();
   chosen.tracking = false;
