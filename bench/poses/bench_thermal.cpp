@@ -84,8 +84,6 @@ void print_attempts(const scenes::Scene& scene, const VisibleScene& seen,
       "| attempt alone | posed | centres RMS / worst, % | rotation mean / worst, deg | CPU s |\n"
       "|---|---|---|---|---|\n");
   print_attempt("COLMAP on the thermal views", scene, nullptr, options);
-  const VisibleScene lines{seen.reconstruction, nullptr};
-  print_attempt("lines of the visible scene, else COLMAP", scene, &lines, options);
   print_attempt("lines, then renders and temperatures", scene, &seen, options);
 }
 

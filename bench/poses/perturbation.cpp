@@ -50,7 +50,7 @@ Status rewrite(Scene& scene, FrameRecord& frame, const Perturbation& by, cv::RNG
   frame.thermal_is_gray = by.gray_gain;
   scene.truth.views[frame.file] = moved;
   return by.gray_gain ? write_png(frame.file, gray_of(kelvin))
-                      : write_float_tiff(frame.file, kelvin);
+                      : write_thermal_tiff(frame.file, kelvin);
 }
 
 }  // namespace

@@ -30,9 +30,9 @@ Status check_stations(const std::optional<DeclaredStations>& stations, const std
     ORBITFUSE_TRY(check(e >= -90 && e <= 90, field + ".elevations_deg", fmt::format("{}", e),
                         "must be -90 to 90"));
   }
-  return check(s.elevation_sigma_deg > 0 && s.elevation_sigma_deg <= 180,
+  return check(s.elevation_sigma_deg > 0 && s.elevation_sigma_deg < 90,
                field + ".elevation_sigma_deg", fmt::format("{}", s.elevation_sigma_deg),
-               "must be > 0");
+               "must be above 0 and below 90; leave the elevations out where they are unknown");
 }
 
 Status check_range(const std::optional<double>& value, double low, double high,

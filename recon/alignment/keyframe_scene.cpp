@@ -49,12 +49,15 @@ float cross(const Vertex& a, const Vertex& b, float x, float y) {
 void draw_triangle(const Vertex& a, const Vertex& b, const Vertex& c, Canvas& canvas) {
   const float area = cross(a, b, c.x, c.y);
   if (!(area > 1e-9F)) return;
-  const int x0 = std::max(0, static_cast<int>(std::ceil(std::min({a.x, b.x, c.x}) - 0.5F)));
-  const int x1 = std::min(canvas.depth.cols - 1,
-                          static_cast<int>(std::floor(std::max({a.x, b.x, c.x}) - 0.5F)));
-  const int y0 = std::max(0, static_cast<int>(std::ceil(std::min({a.y, b.y, c.y}) - 0.5F)));
-  const int y1 = std::min(canvas.depth.rows - 1,
-                          static_cast<int>(std::floor(std::max({a.y, b.y, c.y}) - 0.5F)));
+  // Clamped before they become integers: a vertex near the camera's plane is anywhere.
+  const auto pixel = [](float at, int count) {
+    return static_cast<int>(std::clamp(at, -1.0F, static_cast<float>(count)));
+  };
+  const int w = canvas.depth.cols, h = canvas.depth.rows;
+  const int x0 = std::max(0, pixel(std::ceil(std::min({a.x, b.x, c.x}) - 0.5F), w));
+  const int x1 = std::min(w - 1, pixel(std::floor(std::max({a.x, b.x, c.x}) - 0.5F), w));
+  const int y0 = std::max(0, pixel(std::ceil(std::min({a.y, b.y, c.y}) - 0.5F), h));
+  const int y1 = std::min(h - 1, pixel(std::floor(std::max({a.y, b.y, c.y}) - 0.5F), h));
   for (int y = y0; y <= y1; ++y)
     for (int x = x0; x <= x1; ++x) {
       const float px = static_cast<float>(x) + 0.5F, py = static_cast<float>(y) + 0.5F;

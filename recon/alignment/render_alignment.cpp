@@ -114,12 +114,6 @@ void judge(const ViewMatches& matched, const Correction& correction, double log_
 
 }  // namespace
 
-double RenderAlignment::mean_agreement() const {
-  double sum = 0;
-  for (const RenderAlignedView& v : views) sum += v.agreement;
-  return views.empty() ? 0 : sum / static_cast<double>(views.size());
-}
-
 std::vector<PosedView> RenderAlignment::poses() const {
   std::vector<PosedView> poses;
   for (const RenderAlignedView& v : views) poses.push_back(v.view);
@@ -134,8 +128,9 @@ Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer,
   RenderAlignment result;
   for (const PosedView& view : views) result.views.push_back({view, 0, 0, 0, {}});
   if (views.empty()) return result;
-  const double prior_focal = views.front().camera.fx;
-  double focal = prior_focal;
+  double focal = views.front().camera.fx;
+  const double prior_focal = options.prior_focal_px > 0 ? options.prior_focal_px : focal;
+  const double aspect = views.front().camera.fy / focal;  // of a pixel
   ImageFields fields;
   for (const RenderRound& round : options.rounds) {
     std::vector<ViewMatches> matched(views.size());
@@ -165,12 +160,14 @@ Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer,
     focal *= std::exp(log_focal);
     for (std::size_t i = 0; i < views.size(); ++i) {
       RenderAlignedView& view = result.views[i];
-      judge(matched[i], corrections[i], log_focal, seen_by, view);
       // Too few patches would turn the camera anywhere; it stays where it is for this round.
-      if (matched[i].matches.size() < 12) continue;
+      constexpr std::size_t least_matches = 12;
+      if (matched[i].matches.size() < least_matches) corrections[i] = {};
+      judge(matched[i], corrections[i], log_focal, seen_by, view);
       view.view.cam_from_world = rigid_of(corrections[i]) * view.view.cam_from_world;
     }
-    for (RenderAlignedView& view : result.views) view.view.camera.fx = view.view.camera.fy = focal;
+    for (RenderAlignedView& view : result.views)
+      view.view.camera.fx = focal, view.view.camera.fy = focal * aspect;
   }
   result.focal_px = focal;
   return result;

@@ -33,13 +33,14 @@ inline std::vector<RenderRound> fine_rounds() { return {{320, 6, 7, 12}, {320, 4
 struct RenderAlignmentOptions {
   std::vector<RenderRound> rounds = coarse_rounds();
   double focal_relative_sigma = 0.03;
+  /// Of the prior, at the images' size; 0: the focal length that the first view comes with.
+  double prior_focal_px = 0;
 };
 
 struct RenderAlignedView {
   PosedView view;
-  double agreement =
-      0;            ///< mean agreement of rendered edges with the image's, after the last round
-  int matches = 0;  ///< patches within 2 px of the bundle's answer
+  double agreement = 0;  ///< mean, of rendered edges with the image's, as the last round found them
+  int matches = 0;       ///< patches within 2 px of that round's answer
   double median_px = 0;  ///< their residual, in pixels of the last round
   ViewVerdict verdict;
   /// Compares places of one view. Agreement alone favours a place with few edges, the number of
@@ -49,8 +50,7 @@ struct RenderAlignedView {
 
 struct RenderAlignment {
   std::vector<RenderAlignedView> views;
-  double focal_px = 0, focal_relative_sigma = 0;
-  double mean_agreement() const;
+  double focal_px = 0;
   std::vector<PosedView> poses() const;
 };
 

@@ -96,7 +96,7 @@ struct ThermalPoses : ModalityPoses {
 /// The visible world that thermal views are localised in; images come from the session's paths.
 struct VisibleScene {
   Reconstruction reconstruction;
-  SceneRenderer renderer;  ///< of its trained field; may be empty (less accurate)
+  SceneRenderer renderer;  ///< of its trained field; without it no thermal view is placed
 };
 
 /// Visible views: known poses, else COLMAP with orbit-limited pairs and ever more relaxed
@@ -109,8 +109,8 @@ Result<ModalityPoses> estimate_visible_poses(const Session& session, const PoseO
                                              const Progress& progress);
 
 /// Thermal views: known poses; else localisation in `visible` (nullptr: none) from the orbit prior
-/// of capture order or stations; else COLMAP on the thermal views alone.
-/// Errors as above.
+/// of capture order or stations, or by its rig with the visible camera; else COLMAP on the thermal
+/// views alone. Errors as above.
 Result<ThermalPoses> estimate_thermal_poses(const Session& session, const VisibleScene* visible,
                                             const PoseOptions& options,
                                             const std::filesystem::path& workdir,

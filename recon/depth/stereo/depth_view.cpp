@@ -5,6 +5,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "core/image/undistorted.hpp"
+
 namespace orbitfuse::depth {
 namespace {
 
@@ -13,18 +15,6 @@ cv::Mat padded(const cv::Mat& gray) {
   cv::Mat room(gray.rows + rows_padding, gray.cols, CV_8UC1, cv::Scalar(0));
   gray.copyTo(room.rowRange(0, gray.rows));
   return room.rowRange(0, gray.rows);
-}
-
-cv::Mat undistorted(const cv::Mat& gray, const Camera& from, const Camera& to) {
-  cv::Mat map(to.height, to.width, CV_32FC2), out;
-  for (int y = 0; y < to.height; ++y)
-    for (int x = 0; x < to.width; ++x) {
-      const Eigen::Vector2d at = from.pixel_of(to.normalized_of({x + 0.5, y + 0.5}));
-      map.at<cv::Vec2f>(y, x) = {static_cast<float>(at.x() - 0.5),
-                                 static_cast<float>(at.y() - 0.5)};
-    }
-  cv::remap(gray, out, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
-  return out;
 }
 
 }  // namespace

@@ -5,18 +5,20 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
+#include "core/image/undistorted.hpp"
 #include "core/numeric/median.hpp"
 #include "recon/alignment/edge_field.hpp"
 #include "recon/alignment/keyframe_scene.hpp"
 #include "recon/alignment/luminance.hpp"
 #include "recon/poses/cross_modal/edge_lines.hpp"
-#include "recon/poses/cross_modal/line_alignment.hpp"
+#include "recon/poses/cross_modal/orbit_frames.hpp"
 #include "recon/poses/cross_modal/orbit_selection.hpp"
-#include "recon/poses/cross_modal/poses_by_lines.hpp"
 #include "recon/poses/cross_modal/tracking_views.hpp"
 #include "recon/poses/cross_modal/view_recovery.hpp"
 #include "recon/poses/cross_modal/view_verdicts.hpp"
+#include "recon/poses/thermal_lens.hpp"
 #include "recon/poses/world_frame.hpp"
 
 namespace orbitfuse {
@@ -26,10 +28,27 @@ namespace {
 constexpr int max_tracking_frames = 96;
 /// Below this share of sure views the answer as a whole is not one.
 constexpr double min_sure_ratio = 0.5;
-/// Views of a walk that place each other; more where nothing but their order is known.
-constexpr std::size_t min_stations = 4, min_unknown_stations = 8;
+/// Lead of the best start over a rival, in standard errors: below the first nobody knows which is
+/// right, below the second nobody is sure.
+constexpr double undecided_lead = 1, sure_lead = 2;
 /// Visible views that the scene is first rendered at: more would show the same from nearer by.
 constexpr int max_keyframes = 36;
+
+/// As a lens without distortion would have seen it: edges are compared with straight renders.
+Result<cv::Mat> straight_luminance(const Session& session, const FrameRecord& frame,
+                                   const Camera& lens) {
+  ORBITFUSE_ASSIGN(cv::Mat image, read_luminance(session, frame));
+  if (!lens.has_distortion()) return image;
+  return undistorted(image, lens, lens.without_distortion());
+}
+
+/// Thermal stations and what they are looked for in.
+struct OrbitWork {
+  LensGuess lens;
+  LineModel lines;
+  std::vector<const FrameRecord*> frames;
+  std::vector<cv::Mat> images;
+};
 
 /// Lines that enough views confirm: as many witnesses as still leave a few hundred lines.
 std::vector<EdgeLine> confirmed(const std::vector<EdgeLine>& lines) {
@@ -59,7 +78,7 @@ Status pose_tracking(const Session& session, const OrbitWork& work,
     orbit.stations.push_back(station);
   const std::size_t first = rendered.views.size();
   for (const FrameRecord* frame : tracking) {
-    ORBITFUSE_ASSIGN(cv::Mat image, read_luminance(session, *frame));
+    ORBITFUSE_ASSIGN(cv::Mat image, straight_luminance(session, *frame, work.lens.camera));
     orbit.images.push_back(std::move(image));
     RenderAlignedView view;
     view.view = rendered.views.front().view;
@@ -67,55 +86,6 @@ Status pose_tracking(const Session& session, const OrbitWork& work,
     rendered.views.push_back(view);
   }
   return add_views(renderer, orbit, first, rendered, progress);
-}
-
-/// Tracking frames of the stations' own camera, in capture order.
-std::vector<const FrameRecord*> tracking_of(const std::vector<const FrameRecord*>& frames,
-                                            const FrameRecord& like) {
-  std::vector<const FrameRecord*> tracking;
-  for (const FrameRecord* frame : frames)
-    if (frame->tracking && frame->device == like.device && frame->width == like.width &&
-        frame->height == like.height)
-      tracking.push_back(frame);
-  std::stable_sort(
-      tracking.begin(), tracking.end(),
-      [](const FrameRecord* a, const FrameRecord* b) { return a->sequence < b->sequence; });
-  return thinned(tracking, max_tracking_frames);
-}
-
-/// Frames in which the orbit is searched: those with a station, else all of one camera, in the
-/// order of capture.
-Result<std::vector<const FrameRecord*>> stations_of(const std::vector<const FrameRecord*>& frames) {
-  std::vector<const FrameRecord*> stations, ordered;
-  for (const FrameRecord* frame : frames) {
-    if (frame->tracking) continue;
-    if (frame->station) stations.push_back(frame);
-    if (ordered.empty() ||
-        (frame->device == ordered.front()->device && frame->width == ordered.front()->width &&
-         frame->height == ordered.front()->height))
-      ordered.push_back(frame);
-  }
-  if (stations.size() >= min_stations) return stations;
-  std::stable_sort(ordered.begin(), ordered.end(), [](const FrameRecord* a, const FrameRecord* b) {
-    return a->sequence < b->sequence;
-  });
-  if (ordered.size() >= min_unknown_stations) return ordered;
-  return fail(
-      ErrorKind::quality, "poses.thermal",
-      fmt::format("{} thermal frames carry stations, {} are needed to place an orbit ({} "
-                  "where only their order is known)",
-                  stations.size(), min_stations, min_unknown_stations),
-      "import again and say how the views were taken, e.g. --station-spacing-deg 30 --loops 2");
-}
-
-/// The ways the views may have been taken: as declared, or any even walk in their order.
-std::vector<std::vector<Station>> layouts_of(const std::vector<const FrameRecord*>& stations) {
-  const bool declared = std::all_of(stations.begin(), stations.end(),
-                                    [](const FrameRecord* f) { return f->station.has_value(); });
-  if (!declared) return station_layouts(stations.size());
-  std::vector<Station> layout;
-  for (const FrameRecord* frame : stations) layout.push_back(*frame->station);
-  return {layout};
 }
 
 /// All that placing the stations needs, read once.
@@ -146,9 +116,10 @@ Result<Evidence> gather(const Session& session, const Reconstruction& visible,
                     {},
                     canonical_from_visible,
                     1};
-  const Camera& lens = evidence.work.lens.camera;
+  const Camera lens = evidence.work.lens.camera.without_distortion();
   for (const FrameRecord* frame : stations) {
-    ORBITFUSE_ASSIGN(cv::Mat values, read_luminance(session, *frame));
+    ORBITFUSE_ASSIGN(cv::Mat values,
+                     straight_luminance(session, *frame, evidence.work.lens.camera));
     evidence.search.push_back({orientation_field(values, 2.0 * frame->width / 640.0), lens});
     evidence.work.images.push_back(std::move(values));
   }
@@ -157,12 +128,10 @@ Result<Evidence> gather(const Session& session, const Reconstruction& visible,
   return evidence;
 }
 
-Result<std::vector<OrbitHypothesis>> search(const Evidence& evidence, bool renders_decide,
-                                            const Progress& progress) {
+Result<std::vector<OrbitHypothesis>> search(const Evidence& evidence, const Progress& progress) {
   OrbitSearchOptions options;
   options.nearest = 0.4 * evidence.similar_distance;
   options.farthest = 1.8 * evidence.similar_distance;
-  options.hypotheses = renders_decide ? 4 : 2;
   ORBITFUSE_ASSIGN(const OrbitTable table,
                    tabulate_orbit(evidence.work.lines, evidence.search, options, progress));
   std::vector<OrbitHypothesis> found;
@@ -207,6 +176,16 @@ std::string loops_in_doubt(const std::vector<int>& loops) {
   return text;
 }
 
+/// The object looks much alike from another start: no view is sure of its place.
+void doubt_all(double lead, RenderAlignment& rendered) {
+  for (RenderAlignedView& view : rendered.views)
+    if (view.verdict.sure())
+      view.verdict = {Confidence::doubtful, DoubtReason::undecided,
+                      fmt::format("another start of the orbit explains the views almost as well "
+                                  "({:.1f} standard errors apart)",
+                                  lead)};
+}
+
 /// Places the views against renders: the hypothesis and the starts, then each view to the end, then
 /// the frames recorded between the stations, then the verdicts.
 Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene& visible,
@@ -220,13 +199,27 @@ Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene&
   OrbitViews orbit{evidence.work.images, {}, evidence.canonical_from_visible, false};
   std::vector<PosedView> blank;
   for (const FrameRecord* frame : evidence.work.frames)
-    blank.push_back({frame->file, evidence.work.lens.camera, {}});
+    blank.push_back({frame->file, evidence.work.lens.camera.without_distortion(), {}});
   ORBITFUSE_ASSIGN(SelectedOrbit selected,
                    select_by_renders(renderer, orbit, blank, hypotheses, progress));
   PlacedViews placed;
   placed.method = "cross-modal, orbit prior and renders";
   placed.why = words(selected);
   RenderAlignment& rendered = selected.alignment;
+  const double lead =
+      selected.lead_standard_errors.value_or(std::numeric_limits<double>::infinity());
+  if (std::isfinite(lead)) placed.gates["start_lead_standard_errors"] = lead;
+  if (!(lead >= undecided_lead))
+    return fail(ErrorKind::quality, "poses.thermal",
+                fmt::format("two starts of the orbit explain the thermal views about equally well "
+                            "({:.1f} standard errors apart){}",
+                            lead, placed.why),
+                "record more thermal stations, or give known poses: the object looks alike from "
+                "both sides");
+  if (evidence.work.lens.guessed)
+    placed.warnings.push_back(
+        "the thermal lens is unknown: 33 degrees were assumed to begin with; give its focal length "
+        "(import --thermal-focal-px)");
   const double focal_sigma = std::max(1e-4, evidence.work.lens.focal_relative_sigma);
   progress.report({"poses.thermal", 3, 4, -1, "alignment with renders"});
   ORBITFUSE_TRY(refine_orbit(renderer, orbit, rendered, focal_sigma, progress));
@@ -234,23 +227,35 @@ Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene&
     ORBITFUSE_TRY(
         pose_tracking(session, evidence.work, tracking, renderer, orbit, rendered, progress));
   ORBITFUSE_ASSIGN(const std::vector<int> doubted,
-                   judge_views({renderer, orbit, progress}, rendered));
+                   judge_views({renderer, orbit, progress}, blank.size(), rendered));
+  if (lead < sure_lead) doubt_all(lead, rendered);
   if (!doubted.empty()) placed.warnings.push_back(loops_in_doubt(doubted));
-  for (const RenderAlignedView& view : rendered.views)
+  for (const RenderAlignedView& view : rendered.views) {
     placed.views.push_back({view.view, view.verdict, view.agreement, view.median_px});
+    // The images are as their lens has distorted them.
+    Camera& camera = placed.views.back().view.camera;
+    const double fx = camera.fx, fy = camera.fy;
+    camera = evidence.work.lens.camera;
+    camera.fx = fx, camera.fy = fy;
+  }
   placed.gates["focal_px"] = rendered.focal_px;
   placed.gates["loops_in_doubt"] = static_cast<double>(doubted.size());
   return placed;
 }
 
-/// The answer as a whole: enough views, and most of them sure.
-Status believed(const PlacedViews& placed, const ThermalPoses& result, const LadderStep& step,
+/// The answer as a whole: enough stations, and most of them sure. Frames between them come and go.
+Status believed(const PlacedViews& placed, std::size_t stations, const LadderStep& step,
                 const PoseOptions& options) {
-  const double sure = result.gates.at("views_sure");
-  if (result.posed_ratio() >= options.min_posed_ratio && sure >= min_sure_ratio * step.total)
-    return {};
-  std::string found = fmt::format("{} of {} thermal views are placed, {:.0f} of them for sure",
-                                  step.posed, step.total, sure);
+  double posed = 0, sure = 0;
+  for (std::size_t i = 0; i < stations; ++i) {
+    posed += placed.views[i].verdict.confidence != Confidence::dropped ? 1 : 0;
+    sure += placed.views[i].verdict.sure() ? 1 : 0;
+  }
+  const auto all = static_cast<double>(stations);
+  if (posed >= options.min_posed_ratio * all && sure >= min_sure_ratio * all) return {};
+  std::string found =
+      fmt::format("{} of {} thermal views are placed, {:.0f} of {} stations for sure", step.posed,
+                  step.total, sure, stations);
   for (const std::string& warning : placed.warnings) found += "; " + warning;
   std::map<std::string, int> reasons;
   for (const PlacedView& view : placed.views)
@@ -294,21 +299,20 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
   const auto tell = [&](double done, const std::string& what) {
     progress.report({"poses.thermal", done, 4, -1, what});
   };
-  ORBITFUSE_ASSIGN(const std::vector<const FrameRecord*> stations, stations_of(frames));
-  const std::vector<const FrameRecord*> tracking =
-      visible.renderer ? tracking_of(frames, *stations.front()) : std::vector<const FrameRecord*>{};
-  const std::size_t wanted = stations.size() + tracking.size();
+  if (!visible.renderer)
+    return fail(ErrorKind::quality, "poses.thermal",
+                "there is no renderer of the visible scene to place thermal views in",
+                "train the visible field first");
+  ORBITFUSE_ASSIGN(const OrbitFrames orbit, orbit_frames(frames, max_tracking_frames));
+  const std::vector<const FrameRecord*>& stations = orbit.stations;
+  const std::size_t wanted = stations.size() + orbit.tracking.size() + orbit.left_out.size();
   tell(0, "lines of the visible scene");
   ORBITFUSE_ASSIGN(const Evidence evidence,
                    gather(session, visible.reconstruction, stations, progress));
   tell(1, "search of the orbit");
-  const bool renders = static_cast<bool>(visible.renderer);
-  ORBITFUSE_ASSIGN(const std::vector<OrbitHypothesis> hypotheses,
-                   search(evidence, renders, progress));
+  ORBITFUSE_ASSIGN(const std::vector<OrbitHypothesis> hypotheses, search(evidence, progress));
   const Result<PlacedViews> placed =
-      renders
-          ? place_by_renders(session, visible, evidence, hypotheses, tracking, progress)
-          : place_by_lines(evidence.work, hypotheses, evidence.canonical_from_visible, progress);
+      place_by_renders(session, visible, evidence, hypotheses, orbit.tracking, progress);
   LadderStep step{"cross-modal, orbit prior", false, "", 0, static_cast<int>(wanted), 0};
   step.why = fmt::format("{} lines", evidence.work.lines.size());
   const auto finish = [&] {
@@ -327,18 +331,18 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
   result.shares_visible_frame = true;
   result.frame_count = static_cast<int>(wanted);
   result.reconstruction.modality = Modality::thermal;
+  for (const auto& [name, why] : orbit.left_out) result.dropped.push_back({name, why});
   take_verdicts(*placed, result);
   step.posed = static_cast<int>(result.reconstruction.views.size());
-  const Status good = believed(*placed, result, step, options);
+  const Status good = believed(*placed, stations.size(), step, options);
   step.held = good.has_value();
   if (!good) step.why += "; " + good.error().found;
   finish();
   if (!good) return tl::unexpected(good.error());
   if (frames.size() > wanted)
-    result.skips.push_back(
-        {"poses of further tracking frames",
-         fmt::format("{} of {} frames are posed", wanted, frames.size()),
-         visible.renderer ? "they lie between the others" : "they need a trained visible field"});
+    result.skips.push_back({"poses of further tracking frames",
+                            fmt::format("{} of {} frames are posed", wanted, frames.size()),
+                            "they lie between the others"});
   result.skips.push_back({"thermal COLMAP", "thermal views were placed in the visible scene",
                           "no feature matching; one frame for both modalities"});
   return result;

@@ -124,10 +124,11 @@ Result<Fit> OrbitRefinement::restart(const std::vector<std::size_t>& chosen,
   return align_with_renders(renderer, images, starts, options, progress);
 }
 
-Status OrbitRefinement::together(Fit& alignment, double focal_relative_sigma,
+Status OrbitRefinement::together(Fit& alignment, const FocalGuess& prior,
                                  std::vector<RenderRound> rounds) const {
   RenderAlignmentOptions options;
-  options.focal_relative_sigma = focal_relative_sigma;
+  options.focal_relative_sigma = prior.relative_sigma;
+  options.prior_focal_px = prior.focal_px;
   options.rounds = std::move(rounds);
   ORBITFUSE_ASSIGN(Fit aligned, align_with_renders(renderer, orbit.images, alignment.poses(),
                                                    options, progress));

@@ -12,6 +12,11 @@ namespace orbitfuse {
 
 using Fit = RenderAlignment;
 
+/// What is known of the lens before anything is aligned.
+struct FocalGuess {
+  double focal_px = 0, relative_sigma = 0.03;
+};
+
 /// How much better a restart must be: two places this close in score are one, seen twice.
 constexpr double clearly_better = 1.02;
 
@@ -48,8 +53,7 @@ struct OrbitRefinement {
   Result<Fit> restart(const std::vector<std::size_t>& chosen, const std::vector<PosedView>& starts,
                       std::vector<RenderRound> rounds) const;
   /// All views from where they are, with their common lens.
-  Status together(Fit& alignment, double focal_relative_sigma,
-                  std::vector<RenderRound> rounds) const;
+  Status together(Fit& alignment, const FocalGuess& prior, std::vector<RenderRound> rounds) const;
   /// The chosen views searched as wholes from where their loop predicts them; not aligned yet.
   Result<std::vector<PosedView>> search(const std::vector<std::size_t>& chosen,
                                         const Fit& alignment) const;

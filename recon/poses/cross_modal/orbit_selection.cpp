@@ -4,6 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
 
 #include "core/numeric/median.hpp"
 
@@ -137,6 +140,24 @@ bool same_orbit(const OrbitViews& orbit, const RenderAlignment& a, const RenderA
   return median(apart) < same_deg;
 }
 
+/// Whether another start or direction: another distance is the same walk, seen less well.
+bool is_rival(const OrbitHypothesis& a, const OrbitHypothesis& b) {
+  constexpr double other_start_deg = 40;
+  return a.mirrored != b.mirrored ||
+         std::abs(std::remainder(a.offset_deg - b.offset_deg, 360)) >= other_start_deg;
+}
+
+double lead_standard_errors(const RenderAlignment& better, const RenderAlignment& other) {
+  double sum = 0, squares = 0;
+  for (std::size_t i = 0; i < better.views.size(); ++i) {
+    const double d = better.views[i].support() - other.views[i].support();
+    sum += d, squares += d * d;
+  }
+  const auto n = static_cast<double>(better.views.size());
+  const double variance = std::max(squares / n - (sum / n) * (sum / n), 1e-12);
+  return (sum / n) / std::sqrt(variance / n);
+}
+
 }  // namespace
 
 Result<SelectedOrbit> select_by_renders(const SceneRenderer& renderer, OrbitViews& orbit,
@@ -146,37 +167,53 @@ Result<SelectedOrbit> select_by_renders(const SceneRenderer& renderer, OrbitView
   const OrbitRefinement refinement{renderer, orbit, progress};
   const Selection selection(refinement, blank);
   SelectedOrbit selected;
-  double best_opening = 0;
   std::vector<RenderAlignment> openings;
   const std::size_t every = blank.size() >= 2 * least_opened ? 2 : 1;
   for (const OrbitHypothesis& hypothesis : hypotheses) {
     ORBITFUSE_ASSIGN(RenderAlignment opened,
                      selection.aligned(best_of_search(hypothesis, every), opening_rounds()));
     const double support = mean_support(opened);
-    const bool repeats = std::any_of(
-        openings.begin(), openings.end(),
-        [&](const RenderAlignment& before) { return same_orbit(orbit, before, opened); });
-    openings.push_back(std::move(opened));
     selected.supports.push_back(
-        {hypothesis.offset_deg, hypothesis.radius, hypothesis.mirrored, support, repeats});
-    best_opening = std::max(best_opening, support);
+        {hypothesis.offset_deg, hypothesis.radius, hypothesis.mirrored, support, false});
+    // Of two that end at the same places the better supported one goes on.
+    for (std::size_t before = 0; before < openings.size(); ++before) {
+      HypothesisSupport& other = selected.supports[before];
+      if (other.repeats || !same_orbit(orbit, openings[before], opened)) continue;
+      (other.support < support ? other : selected.supports.back()).repeats = true;
+    }
+    openings.push_back(std::move(opened));
     progress.report({"poses.thermal", 2, 4, -1,
                      fmt::format("start at {:.0f} deg{}, distance {:.2f}: support {:.1f}",
                                  hypothesis.offset_deg, hypothesis.mirrored ? " clockwise" : "",
                                  hypothesis.radius, support)});
   }
-  double best = -1;
+  double best_opening = 0;
+  for (const HypothesisSupport& one : selected.supports)
+    if (!one.repeats) best_opening = std::max(best_opening, one.support);
+  double best = 0;
+  std::vector<std::pair<std::size_t, RenderAlignment>> finished;
   for (std::size_t h = 0; h < hypotheses.size(); ++h) {
     if (selected.supports[h].repeats || selected.supports[h].support < rival_share * best_opening)
       continue;
     ORBITFUSE_ASSIGN(RenderAlignment one, best_starts(selection, hypotheses[h]));
     selected.supports[h].support = mean_support(one);
+    finished.emplace_back(h, one);
     if (selected.supports[h].support <= best) continue;
     best = selected.supports[h].support;
     selected.hypothesis = h;
     selected.alignment = std::move(one);
   }
-  if (hypotheses.empty()) return selected;
+  if (!(best > 0))
+    return fail(ErrorKind::quality, "poses.thermal",
+                fmt::format("nothing of any of {} views is in place in renders of the visible "
+                            "scene, wherever the orbit is started",
+                            blank.size()),
+                "thermal views of the same object, or known poses");
+  for (const auto& [h, alignment] : finished)
+    if (is_rival(hypotheses[h], hypotheses[selected.hypothesis]))
+      selected.lead_standard_errors =
+          std::min(selected.lead_standard_errors.value_or(std::numeric_limits<double>::infinity()),
+                   lead_standard_errors(selected.alignment, alignment));
   orbit.clockwise = hypotheses[selected.hypothesis].mirrored;
   orbit.stations = hypotheses[selected.hypothesis].stations;
   return selected;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "recon/poses/cross_modal/orbit_refinement.hpp"
@@ -23,13 +24,16 @@ struct SelectedOrbit {
   RenderAlignment alignment;                ///< to about a degree
   std::size_t hypothesis = 0;               ///< index of the chosen one
   std::vector<HypothesisSupport> supports;  ///< of each, in the search's order
+  /// How far the best one leads the next that starts elsewhere or turns the other way, taken to the
+  /// same end: mean difference of the views' supports in its own standard errors. None: no rival.
+  std::optional<double> lead_standard_errors;
 };
 
 /// The best supported hypothesis, with the best supported of several starts of each view: its own
 /// best places in the search's table, and its loop's nominal place a little before, at and after
 /// its station. `blank` names the views and carries their camera. Sets orbit.clockwise and
 /// orbit.stations.
-/// Errors: the renderer's, cancelled.
+/// Errors: quality (nothing of any view is in place), the renderer's, cancelled.
 Result<SelectedOrbit> select_by_renders(const SceneRenderer& renderer, OrbitViews& orbit,
                                         const std::vector<PosedView>& blank,
                                         const std::vector<OrbitHypothesis>& hypotheses,

@@ -22,11 +22,14 @@ constexpr double settled_share = 0.6;
 constexpr double vouched_share = 0.6;
 /// The same, of views that both scenes leave where they are.
 constexpr double confirmed_share = 0.4;
-/// Where a view's image correlates less with what the others paint at its place it is searched
-/// again: wrong views of `sedan` had .56, right ones .84 and more unless a wrong neighbour painted.
-constexpr double asked_correlation = 0.7;
+/// Of the views' median correlation with what the others paint at their places; a view with less is
+/// searched again. A wrong view of `sedan` had .56 of .96, right ones .84 and more unless a wrong
+/// neighbour painted.
+constexpr double asked_correlation_share = 0.75;
 /// Two views turned by less are one station's: its own temperatures confirm any place.
 constexpr double own_turn_deg = 8;
+/// Fewer sure views paint nothing to judge others by.
+constexpr std::size_t least_painters = 3;
 /// Rounding of no support at all.
 constexpr double least_support = 1e-9;
 
@@ -51,8 +54,14 @@ SupportOfLoop median_supports(const OrbitViews& orbit, const std::vector<std::si
   std::map<int, std::vector<double>> supports;
   for (std::size_t c = 0; c < asked.size(); ++c)
     supports[orbit.stations[asked[c]].loop].push_back(found.views[c].support());
+  std::vector<double> of_all;
+  for (const auto& [loop, values] : supports)
+    of_all.insert(of_all.end(), values.begin(), values.end());
+  // A loop of one or two views would be measured against themselves.
+  constexpr std::size_t least_of_loop = 3;
   SupportOfLoop median_of_loop;
-  for (const auto& [loop, values] : supports) median_of_loop[loop] = median(values);
+  for (const auto& [loop, values] : supports)
+    median_of_loop[loop] = median(values.size() < least_of_loop ? of_all : values);
   return median_of_loop;
 }
 
@@ -120,15 +129,21 @@ Result<Contradicted> contradicted(const OrbitRefinement& refinement, const Fit& 
   const OrbitRefinement painted{renderer, orbit, refinement.progress};
   ORBITFUSE_ASSIGN(const Fit second, painted.restart(all, places, judging_rounds()));
   Contradicted lost{{}, median_supports(orbit, all, second)};
+  std::vector<std::optional<double>> correlations;
+  std::vector<double> known;
   for (const std::size_t i : all) {
     ORBITFUSE_ASSIGN(const std::optional<double> correlation,
                      correlation_with(renderer, orbit.images[i], places[i]));
+    correlations.push_back(correlation);
+    if (correlation) known.push_back(*correlation);
+  }
+  const double asked_below = known.empty() ? -1 : asked_correlation_share * median(known);
+  for (const std::size_t i : all)
     if (second.views[i].support() <
             settled_share * lost.median_of_loop.at(orbit.stations[i].loop) ||
         !same_place(orbit, places[i].cam_from_world, second.views[i].view.cam_from_world) ||
-        correlation.value_or(1) < asked_correlation)
+        correlations[i].value_or(1) < asked_below)
       lost.views.push_back(i);
-  }
   return lost;
 }
 
@@ -257,10 +272,14 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
         break;
       case MoveDecision::nobody:
         view.verdict = {
-            Confidence::dropped, DoubtReason::temperatures_elsewhere,
-            fmt::format("the visible scene and the other views' temperatures place it {:.1f} deg "
-                        "apart",
-                        apart_deg(orbit, view.view.cam_from_world, warm.view.cam_from_world))};
+            Confidence::dropped,
+            seen.agree ? DoubtReason::not_found : DoubtReason::temperatures_elsewhere,
+            seen.agree
+                ? "neither the visible scene nor the other views' temperatures show its edges"
+                : fmt::format(
+                      "the visible scene and the other views' temperatures place it {:.1f} deg "
+                      "apart",
+                      apart_deg(orbit, view.view.cam_from_world, warm.view.cam_from_world))};
     }
   }
   return check;
@@ -273,6 +292,14 @@ Status confirm_by_temperatures(const OrbitRefinement& refinement, std::size_t fi
   for (std::size_t i = 0; i < first_new; ++i)
     if (alignment.views[i].verdict.sure()) settled.push_back(i);
   for (std::size_t i = first_new; i < orbit.images.size(); ++i) added.push_back(i);
+  if (settled.size() < least_painters) {
+    for (const std::size_t i : added)
+      alignment.views[i].verdict = {
+          Confidence::doubtful, DoubtReason::undecided,
+          fmt::format("{} of {} stations are sure: too few temperatures to confirm it by",
+                      settled.size(), first_new)};
+    return {};
+  }
   ORBITFUSE_ASSIGN(const SceneRenderer renderer, painted_by(refinement, alignment, settled, 0));
   const OrbitRefinement painted{renderer, orbit, refinement.progress};
   SupportOfLoop median_of_loop;

@@ -102,28 +102,49 @@ Status nudge(const OrbitRefinement& refinement, std::size_t first, Fit& alignmen
   return {};
 }
 
+/// Views that temperatures alone know and that form has pulled away again go back, with the support
+/// that form has for them there.
+Status keep_by_temperatures(const OrbitRefinement& refinement, const TemperatureCheck& check,
+                            Fit& alignment) {
+  std::vector<std::size_t> pulled;
+  std::vector<PosedView> places;
+  for (const auto& [i, cam_from_world] : check.by_temperatures_alone) {
+    if (same_place(refinement.orbit, alignment.views[i].view.cam_from_world, cam_from_world))
+      continue;
+    pulled.push_back(i);
+    places.push_back(alignment.views[i].view);
+    places.back().cam_from_world = cam_from_world;
+  }
+  ORBITFUSE_ASSIGN(const Fit there, refinement.restart(pulled, places, {judging_rounds().back()}));
+  for (std::size_t c = 0; c < pulled.size(); ++c) {
+    ViewVerdict verdict = std::move(alignment.views[pulled[c]].verdict);
+    alignment.views[pulled[c]] = there.views[c];
+    alignment.views[pulled[c]].view = places[c];
+    alignment.views[pulled[c]].verdict = std::move(verdict);
+  }
+  return {};
+}
+
 }  // namespace
 
 Status refine_orbit(const SceneRenderer& renderer, const OrbitViews& orbit,
                     RenderAlignment& alignment, double focal_relative_sigma,
                     const Progress& progress) {
+  if (alignment.views.empty()) return {};
+  const FocalGuess prior{alignment.views.front().view.camera.fx, focal_relative_sigma};
   const OrbitRefinement refinement{renderer, orbit, progress};
-  ORBITFUSE_TRY(refinement.together(alignment, focal_relative_sigma, approach_rounds()));
+  ORBITFUSE_TRY(refinement.together(alignment, prior, approach_rounds()));
   ORBITFUSE_ASSIGN(const std::vector<std::size_t> lost, unsettled(refinement, alignment));
   progress.report({"poses.thermal", 3, 4, -1,
                    fmt::format("{} views don't come back to their place", lost.size())});
   ORBITFUSE_TRY(search_whole(refinement, lost, judging_rounds(), alignment));
-  ORBITFUSE_TRY(refinement.together(alignment, focal_relative_sigma, fine_rounds()));
+  ORBITFUSE_TRY(refinement.together(alignment, prior, fine_rounds()));
   ORBITFUSE_TRY(nudge(refinement, 0, alignment));
-  ORBITFUSE_TRY(refinement.together(alignment, focal_relative_sigma, {fine_rounds().back()}));
+  ORBITFUSE_TRY(refinement.together(alignment, prior, {fine_rounds().back()}));
   ORBITFUSE_ASSIGN(const TemperatureCheck check, correct_by_temperatures(refinement, alignment));
   if (check.moved == 0) return {};
-  ORBITFUSE_TRY(refinement.together(alignment, focal_relative_sigma, {fine_rounds().back()}));
-  for (const auto& [i, cam_from_world] : check.by_temperatures_alone) {
-    Rigid3d& now = alignment.views[i].view.cam_from_world;
-    if (!same_place(orbit, now, cam_from_world)) now = cam_from_world;
-  }
-  return {};
+  ORBITFUSE_TRY(refinement.together(alignment, prior, {fine_rounds().back()}));
+  return keep_by_temperatures(refinement, check, alignment);
 }
 
 double station_offset_deg(const OrbitViews& orbit, const RenderAlignment& alignment) {

@@ -50,7 +50,10 @@ Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
   const OrbitViews& orbit = refinement.orbit;
   std::vector<std::size_t> all(alignment.views.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
-  ORBITFUSE_ASSIGN(const SceneRenderer painted, painted_by_others(refinement, alignment, all));
+  std::vector<std::size_t> painters;
+  for (const std::size_t i : all)
+    if (alignment.views[i].verdict.sure()) painters.push_back(i);
+  ORBITFUSE_ASSIGN(const SceneRenderer painted, painted_by_others(refinement, alignment, painters));
   const LoopModel model = loop_model(orbit, alignment);
   std::vector<double> radii;
   for (const auto& [loop, radius] : model.radius) radii.push_back(radius);
@@ -99,6 +102,9 @@ ViewVerdict judged(const ViewEvidence& seen, const ViewVerdict& before) {
     return doubtful(DoubtReason::off_its_loop,
                     fmt::format("its distance is {:.0f} % off that of the loops in common",
                                 100 * seen.log_distance_off));
+  if (!seen.correlation && before.sure())
+    return doubtful(DoubtReason::undecided,
+                    "no other sure view measured enough of what it shows to confirm it");
   if (seen.correlation && !(*seen.correlation >= min_correlation))
     return doubtful(DoubtReason::temperatures_unlike,
                     fmt::format("its image correlates with what the other views measured there at "
@@ -107,9 +113,9 @@ ViewVerdict judged(const ViewEvidence& seen, const ViewVerdict& before) {
   return before;
 }
 
-std::vector<int> doubt_whole_loops(const OrbitViews& orbit, Fit& alignment) {
+std::vector<int> doubt_whole_loops(const OrbitViews& orbit, std::size_t stations, Fit& alignment) {
   std::map<int, std::pair<int, int>> loops;  // loop -> views not sure, views
-  for (std::size_t i = 0; i < alignment.views.size(); ++i) {
+  for (std::size_t i = 0; i < stations; ++i) {
     auto& [doubted, count] = loops[orbit.stations[i].loop];
     doubted += alignment.views[i].verdict.sure() ? 0 : 1;
     ++count;
@@ -128,7 +134,8 @@ std::vector<int> doubt_whole_loops(const OrbitViews& orbit, Fit& alignment) {
   return in_doubt;
 }
 
-Result<std::vector<int>> judge_views(const OrbitRefinement& refinement, Fit& alignment) {
+Result<std::vector<int>> judge_views(const OrbitRefinement& refinement, std::size_t stations,
+                                     Fit& alignment) {
   ORBITFUSE_ASSIGN(const std::vector<ViewEvidence> evidence, evidence_of(refinement, alignment));
   for (std::size_t i = 0; i < evidence.size(); ++i) {
     const ViewEvidence& seen = evidence[i];
@@ -142,7 +149,7 @@ Result<std::vector<int>> judge_views(const OrbitRefinement& refinement, Fit& ali
                      seen.azimuth_off_deg, seen.elevation_off_deg, seen.log_distance_off,
                      seen.aim_off)});
   }
-  return doubt_whole_loops(refinement.orbit, alignment);
+  return doubt_whole_loops(refinement.orbit, stations, alignment);
 }
 
 }  // namespace orbitfuse

@@ -31,9 +31,11 @@ Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
 ViewVerdict judged(const ViewEvidence& evidence, const ViewVerdict& before);
 
 /// Where most of a loop's stations are not sure, none of its views is. Returns those loops.
-std::vector<int> doubt_whole_loops(const OrbitViews& orbit, Fit& alignment);
+/// Stations are the first so many views.
+std::vector<int> doubt_whole_loops(const OrbitViews& orbit, std::size_t stations, Fit& alignment);
 
 /// Evidence gathered and verdicts given, in alignment.views. Returns the loops in doubt.
-Result<std::vector<int>> judge_views(const OrbitRefinement& refinement, Fit& alignment);
+Result<std::vector<int>> judge_views(const OrbitRefinement& refinement, std::size_t stations,
+                                     Fit& alignment);
 
 }  // namespace orbitfuse

@@ -113,13 +113,25 @@ class VisibleLadder {
     ORBITFUSE_TRY(quick->match(orbit, progress_));
     ORBITFUSE_TRY(try_mapper(*quick, "COLMAP, orbit pairs"));
     if (complete()) return answer(quick->pairs());
-    if (best_) ORBITFUSE_TRY(try_resection(*quick, "resection on the quick model"));
-    if (!complete() && !all_are_few) ORBITFUSE_TRY(try_more_pairs(*quick));
-    if (!complete() && limited_) ORBITFUSE_TRY(try_full_settings());
+    ORBITFUSE_TRY(improve(*quick, all_are_few));
     return answer(quick->pairs());
   }
 
  private:
+  /// What further attempts add. One that breaks down costs no model that is believed already.
+  Status improve(FeatureLevel& quick, bool all_are_few) {
+    const auto attempted = [&]() -> Status {
+      if (best_) ORBITFUSE_TRY(try_resection(quick, "resection on the quick model"));
+      if (!complete() && !all_are_few) ORBITFUSE_TRY(try_more_pairs(quick));
+      if (!complete() && limited_) ORBITFUSE_TRY(try_full_settings());
+      return {};
+    };
+    Status done = attempted();
+    if (done || !best_ || done.error().kind == ErrorKind::cancelled) return done;
+    steps_.push_back({"a further attempt", false, done.error().message(), 0, total_, 0});
+    return {};
+  }
+
   void tell(double done, const std::string& what) const {
     progress_.report({"poses.visible", done, 4, -1, what});
   }
@@ -143,10 +155,7 @@ class VisibleLadder {
     return {};
   }
 
-  bool complete() const {
-    return best_ &&
-           best_->poses.reconstruction.views.size() + featureless_.size() >= frames_.size();
-  }
+  bool complete() const { return best_ && missing().empty(); }
   std::set<std::string> posed() const {
     std::set<std::string> names;
     if (best_)
@@ -163,8 +172,8 @@ class VisibleLadder {
     return result;
   }
 
-  /// Judges a model and keeps it where it is believed and poses more views (or as many, at a lower
-  /// error) than the best one.
+  /// Judges a model and keeps it where it is believed and poses more views than
+  /// the best one.
   void consider(const std::string& attempt, const std::string& found, Reconstruction model,
                 const PoseOptions& options) {
     LadderStep step{attempt, false, found, 0, total_, 0};

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "recon/alignment/luminance.hpp"
-#include "recon/poses/cross_modal/line_alignment.hpp"
+#include "recon/poses/thermal_lens.hpp"
 
 namespace orbitfuse {
 namespace {

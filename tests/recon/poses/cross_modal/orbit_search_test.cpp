@@ -6,7 +6,6 @@
 #include <opencv2/imgproc.hpp>
 
 #include "recon/alignment/edge_field.hpp"
-#include "recon/poses/cross_modal/edge_alignment.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -205,32 +204,6 @@ TEST(OrbitSearch, ViewsInOrderAloneMayBeOneLoopOrMore) {
   EXPECT_NEAR(layouts[2][23].azimuth_deg, 315, 1e-9);
 }
 
-TEST(EdgeAlignment, DrawsViewsOntoTheirEdgesAndFindsTheFocal) {
-  const LineModel model = wire_model();
-  std::vector<AlignmentView> views;
-  for (int i = 0; i < 8; ++i) {
-    AlignmentView view;
-    view.field = ridges(cam_from_world_of(true_pose(i), small_camera()), 1.2);
-    view.view.camera = small_camera();
-    OrbitPose start = true_pose(i);
-    start.azimuth_deg += 0.6, start.elevation_deg -= 0.4, start.radius *= 1.01,
-        start.roll_deg = 0.4;
-    view.view.cam_from_world = cam_from_world_of(start, small_camera());
-    views.push_back(view);
-  }
-  AlignmentOptions options;
-  options.step_px = 3;
-  const auto report = align_edges(model, views, options, {});
-  ASSERT_TRUE(report) << report.error().message();
-  EXPECT_NEAR(report->focal_px, 500, 10);
-  for (int i = 0; i < 8; ++i) {
-    const Rigid3d truth = cam_from_world_of(true_pose(i), small_camera());
-    const Rigid3d& ours = views[static_cast<std::size_t>(i)].view.cam_from_world;
-    EXPECT_LT(rotation_angle_deg(ours.rotation, truth.rotation), 0.3) << "view " << i;
-    EXPECT_LT((camera_center(ours) - camera_center(truth)).norm(), 0.03) << "view " << i;
-  }
-}
-
 TEST(EdgeField, IsBlindToTheSignOfContrast) {
   cv::Mat image(240, 320, CV_32F, cv::Scalar(300));
   cv::rectangle(image, cv::Rect(100, 60, 90, 70), cv::Scalar(310), cv::FILLED);
@@ -245,15 +218,6 @@ TEST(EdgeField, NothingToSeeIsZeroAndFinite) {
   EXPECT_EQ(cv::norm(orientation_field(constant, 1.5)), 0.0);
   cv::Mat invalid(60, 80, CV_32F, cv::Scalar(std::nan("")));
   EXPECT_EQ(cv::norm(orientation_field(invalid, 1.5)), 0.0);
-}
-
-TEST(EdgeAlignment, ViewsWithoutEdgesAreAQualityError) {
-  std::vector<AlignmentView> views(1);
-  views[0].field = cv::Mat(240, 320, CV_32FC2, cv::Scalar::all(0));
-  views[0].view = {"blank", small_camera(), cam_from_world_of(true_pose(0), small_camera())};
-  const auto report = align_edges(wire_model(), views, {}, {});
-  ASSERT_FALSE(report);
-  EXPECT_EQ(report.error().kind, ErrorKind::quality);
 }
 
 }  // namespace

@@ -178,7 +178,7 @@ TEST(CorrectByTemperatures, AViewKeptByFormAloneCarriesTheObjection) {
     ASSERT_TRUE(check) << check.error().message();
     EXPECT_EQ(check->undecided, 0);
     EXPECT_EQ(off_deg(alignment.views[4], at(120)), 0);
-    ASSERT_TRUE(refinement.together(alignment, 1e-4, {judging_rounds().front()}));
+    ASSERT_TRUE(refinement.together(alignment, {0, 1e-4}, {judging_rounds().front()}));
     for (std::size_t i = 0; i < 12; ++i)
       EXPECT_EQ(alignment.views[i].verdict.reason == DoubtReason::temperatures_contradict,
                 i == 4 && known_to_form)
@@ -186,7 +186,7 @@ TEST(CorrectByTemperatures, AViewKeptByFormAloneCarriesTheObjection) {
     EXPECT_EQ(alignment.views[4].verdict.confidence,
               known_to_form ? Confidence::doubtful : Confidence::dropped);
     const std::string& told = alignment.views[4].verdict.detail;
-    EXPECT_EQ(told.find("1.00 of its usual") != std::string::npos, known_to_form) << told;
+    EXPECT_EQ(told.find("1.00 of its loop") != std::string::npos, known_to_form) << told;
   }
 }
 

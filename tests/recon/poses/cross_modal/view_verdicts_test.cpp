@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+
 #include <limits>
 
 #include "recon/poses/cross_modal/orbit_selection.hpp"
@@ -34,7 +37,7 @@ TEST(ViewVerdicts, WhatSpeaksAgainstAViewIsNamed) {
   EXPECT_EQ(reason(&ViewEvidence::elevation_off_deg, 12), DoubtReason::off_its_loop);
   ViewEvidence alone = good;
   alone.correlation.reset();  // nothing was painted
-  EXPECT_TRUE(judged(alone, {}).sure());
+  EXPECT_EQ(judged(alone, {}).reason, DoubtReason::undecided);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_NE(reason(&ViewEvidence::support_share, nan), DoubtReason::none);
   EXPECT_NE(reason(&ViewEvidence::aim_off, nan), DoubtReason::none);
@@ -54,7 +57,7 @@ TEST(ViewVerdicts, ALoopThatIsMostlyInDoubtIsSoAsAWhole) {
     if (i < 4) view.verdict = {Confidence::doubtful, DoubtReason::weak_support, ""};
     alignment.views.push_back(view);
   }
-  EXPECT_EQ(doubt_whole_loops(orbit, alignment), std::vector<int>{0});
+  EXPECT_EQ(doubt_whole_loops(orbit, alignment.views.size(), alignment), std::vector<int>{0});
   for (std::size_t i = 0; i < 12; ++i) EXPECT_EQ(alignment.views[i].verdict.sure(), i >= 6) << i;
   EXPECT_EQ(alignment.views[5].verdict.reason, DoubtReason::loop_in_doubt);
 }
@@ -104,6 +107,65 @@ TEST(SelectByRenders, ANearImpostorThatLinesPreferIsNotTaken) {
     EXPECT_LT((camera_center(found) - camera_center(truth[i].cam_from_world)).norm(), 0.15) << i;
     EXPECT_EQ(selected->alignment.views[i].view.name, blank[i].name);
   }
+}
+
+/// Looks the same from the other side, exactly.
+Result<SceneRender> two_fold(const Camera& camera, const Rigid3d& cam_from_world, bool hot) {
+  const Rigid3d half_turn{
+      Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitZ())),
+      Eigen::Vector3d::Zero()};
+  const bool behind = camera_center(cam_from_world).y() < 0;
+  return testing_orbit::box_view(camera, behind ? cam_from_world * half_turn : cam_from_world, hot);
+}
+
+TEST(SelectByRenders, TwoStartsThatExplainTheViewsAlikeAreToldApartByNothing) {
+  OrbitViews orbit;
+  std::vector<PosedView> blank;
+  for (int i = 0; i < 12; ++i) {
+    const PosedView truth = at(60.0 * (i % 6) + (i % 2 == 0 ? 3 : -3), i < 6 ? 10 : 32, 2.5);
+    orbit.images.push_back(two_fold(truth.camera, truth.cam_from_world, true)->brightness);
+    blank.push_back({"view" + std::to_string(i), truth.camera, {}});
+  }
+  const OrbitHypothesis right = hypothesis(2.4, 12);
+  OrbitHypothesis turned = right;
+  turned.offset_deg += 180;
+  for (std::vector<OrbitPose>* poses : {&turned.poses, &turned.nominal})
+    for (OrbitPose& pose : *poses) pose.azimuth_deg += 180;
+  for (auto& starts : turned.starts)
+    for (OrbitPose& pose : starts) pose.azimuth_deg += 180;
+  const SceneRenderer renderer = [](const Camera& camera, const Rigid3d& pose) {
+    return two_fold(camera, pose, false);
+  };
+  const auto alike = select_by_renders(renderer, orbit, blank, {right, turned}, {});
+  ASSERT_TRUE(alike) << alike.error().message();
+  ASSERT_TRUE(alike->lead_standard_errors);
+  EXPECT_LT(std::abs(*alike->lead_standard_errors), 1);
+
+  // The same two starts of a scene with a front: the lead is clear, or the rival isn't one.
+  for (int i = 0; i < 12; ++i) {
+    const PosedView truth = at(60.0 * (i % 6) + (i % 2 == 0 ? 3 : -3), i < 6 ? 10 : 32, 2.5);
+    orbit.images[static_cast<std::size_t>(i)] =
+        testing_orbit::box_view(truth.camera, truth.cam_from_world, true).brightness;
+  }
+  const auto told =
+      select_by_renders(testing_orbit::box_renderer(), orbit, blank, {turned, right}, {});
+  ASSERT_TRUE(told);
+  EXPECT_EQ(told->hypothesis, 1u);
+  EXPECT_GT(told->lead_standard_errors.value_or(9), 2);
+}
+
+TEST(SelectByRenders, ImagesInWhichNothingIsInPlaceAreAQualityError) {
+  OrbitViews orbit;
+  std::vector<PosedView> blank;
+  for (int i = 0; i < 12; ++i) {
+    const PosedView truth = at(60.0 * (i % 6), i < 6 ? 10 : 32, 2.5);
+    orbit.images.emplace_back(truth.camera.height, truth.camera.width, CV_32F, cv::Scalar(290));
+    blank.push_back({"view" + std::to_string(i), truth.camera, {}});
+  }
+  const auto selected = select_by_renders(testing_orbit::box_renderer(), orbit, blank,
+                                          {hypothesis(2.4, 12), hypothesis(1.5, 4)}, {});
+  ASSERT_FALSE(selected);
+  EXPECT_EQ(selected.error().kind, ErrorKind::quality);
 }
 
 }  // namespace
