@@ -20,9 +20,9 @@ enum class ErrorKind {
 /// An expected failure: where it is, what was found there, what to do about it.
 struct Error {
   ErrorKind kind = ErrorKind::input;
-  std::string where;   ///< the file or field, e.g. "thermal/003.tiff" or "registration.voxel_m"
+  std::string where;   ///< the file or field, e.g. "thermal/003.tiff" or "render.views"
   std::string found;   ///< e.g. "8-bit samples, 16 expected"
-  std::string remedy;  ///< e.g. "import it with --thermal-8bit"
+  std::string remedy;  ///< e.g. "import it as 8-bit thermal"
 
   /// "where: found; remedy" on one line.
   std::string message() const;

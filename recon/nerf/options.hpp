@@ -66,7 +66,7 @@ struct TrainOptions {
   /// Adam's peak for the hash tables: few rays meet an entry, so it has to move far each time.
   double learning_rate = 4e-2;
   double network_learning_rate = 1.2e-2;  ///< Adam's peak for the perceptrons
-  double distortion_weight = 0.008;       ///< Mip-NeRF 360, eq. 15
+  double distortion_weight = 0.008;       ///< Mip-NeRF 360, eq. 15; presets differ (options.cpp)
   double depth_weight = 0.05;             ///< SfM and dense depth, annealed
   double depth_end = 0.5;           ///< fraction of the run at which depth_weight reaches its end
   double depth_final_weight = 0.0;  ///< what remains of depth_weight after depth_end

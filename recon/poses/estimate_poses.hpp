@@ -30,7 +30,8 @@ struct PoseOptions {
   int threads = 0;
   std::uint64_t seed = 1;
   /// Longest image side given to COLMAP. Features grow with the area and matching with their
-  /// square; 800 px poses an orbit of 24 views to 0.03 % of its extent (docs/benchmarks/poses.md).
+  /// square; 800 px poses an orbit of 24 views to 0.03 % of its extent
+  /// (docs/benchmarks/poses_visible.md).
   int max_image_side_px = 800;
   /// SIFT features per view, for the same reason.
   int max_features = 3000;

@@ -35,9 +35,9 @@ Lens most_common(const std::vector<const FrameRecord*>& frames, const Asked& ask
 }
 
 void in_capture_order(std::vector<const FrameRecord*>& frames) {
-  std::stable_sort(
-      frames.begin(), frames.end(),
-      [](const FrameRecord* a, const FrameRecord* b) { return a->sequence < b->sequence; });
+  std::stable_sort(frames.begin(), frames.end(), [](const FrameRecord* a, const FrameRecord* b) {
+    return a->sequence < b->sequence;
+  });
 }
 
 }  // namespace

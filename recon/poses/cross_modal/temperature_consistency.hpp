@@ -44,9 +44,9 @@ struct TemperatureCheck {
 
 /// Each view judged by the temperatures of the others. Those that they contradict are searched as
 /// wholes in the scene that the rest paints, and go where both scenes then agree or temperatures
-/// are sure. One that temperatures find nowhere stays where form knows it well, and keeps an
-/// `objection`; the others keep a `doubt`. Where most are contradicted nobody is left to judge, and
-/// none goes.
+/// are sure. One that temperatures find nowhere stays where form knows it well, as doubtful; what
+/// neither knows is dropped. Where most are contradicted nobody is left to judge: they stay, as
+/// doubtful.
 Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refinement, Fit& alignment);
 
 /// Every added view, from `first_new` on, confirmed by what the settled ones before it measured;

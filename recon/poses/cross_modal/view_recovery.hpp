@@ -25,8 +25,8 @@ double station_offset_deg(const OrbitViews& orbit, const RenderAlignment& alignm
 /// The views of `orbit` from index `first_new` on, which have a station but no pose yet, posed
 /// among the others, which stay as they are; the lens is theirs. Each must be found at the same
 /// place by the visible scene and by the temperatures of the views posed before
-/// (painted_scene.hpp); one that isn't after a search from either place and as a whole keeps a
-/// `doubt`. Errors as above.
+/// (painted_scene.hpp); one that isn't after a search from either place and as a whole is dropped.
+/// Errors as above.
 Status add_views(const SceneRenderer& renderer, const OrbitViews& orbit, std::size_t first_new,
                  RenderAlignment& alignment, const Progress& progress);
 

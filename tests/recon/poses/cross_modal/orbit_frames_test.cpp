@@ -46,7 +46,8 @@ TEST(OrbitFrames, ViewsOfAnotherCameraOrSizeAreNamed) {
 
 TEST(OrbitFrames, WithoutStationsTheOrderCounts) {
   Frames frames;
-  for (int i = 0; i < 8; ++i) frames.add("thermal0", 640, false).sequence = 100 - frames.list.size();
+  for (int i = 0; i < 8; ++i)
+    frames.add("thermal0", 640, false).sequence = 100 - frames.list.size();
   const auto orbit = orbit_frames(frames.list, 96);
   ASSERT_TRUE(orbit) << orbit.error().message();
   ASSERT_EQ(orbit->stations.size(), 8U);
