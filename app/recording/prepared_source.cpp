@@ -81,6 +81,7 @@ void PreparedSource::drop_before(std::int64_t all_run_ns) {
 }
 
 void PreparedSource::stop() {
+  if (abandoned_) return;
   source_->stop();
   started_ = false;
 }

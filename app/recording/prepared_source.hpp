@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -20,6 +21,8 @@ class PreparedSource final : public FrameSource {
   DeviceInfo describe() const override;
   Status start() override;
   Result<Delivery> next(std::chrono::milliseconds timeout) override;
+  /// Its start() hangs: the thread that is in it has it now, and stop() does nothing.
+  void abandon() { abandoned_ = true; }
   void stop() override;
   bool can_wait() const override { return source_->can_wait(); }
   Status request_correction() override { return source_->request_correction(); }
@@ -43,6 +46,7 @@ class PreparedSource final : public FrameSource {
 
   std::unique_ptr<FrameSource> source_;
   std::deque<Result<Delivery>> waiting_;  ///< delivered before what the source has next
+  std::atomic<bool> abandoned_ = false;
   bool started_ = false, tracking_ = false;
   std::optional<std::string> device_id_;
   std::int64_t started_ns_ = 0;  ///< UTC

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <future>
 #include <iterator>
 #include <set>
 #include <thread>
@@ -70,7 +71,7 @@ Recording::Recording(std::vector<std::unique_ptr<FrameSource>> sources, Recordin
                      PositionFinder finder)
     : options_(std::move(options)), finder_(std::move(finder)) {
   for (auto& source : sources)
-    sources_.push_back(std::make_unique<PreparedSource>(std::move(source)));
+    sources_.push_back(std::make_shared<PreparedSource>(std::move(source)));
 }
 
 Recording::~Recording() {
@@ -104,7 +105,23 @@ Status Recording::fit_into(const std::optional<Session>& earlier) {
   return {};
 }
 
-Status Recording::prepare() {
+/// On a thread of its own: a camera that is silent can hold up its opening for ten seconds, and who
+/// presses Ctrl-C meanwhile has nothing to lose. The source is then left to that thread.
+Status Recording::start(const std::shared_ptr<PreparedSource>& source,
+                        const std::atomic<bool>* cancel) {
+  auto started = std::make_shared<std::promise<Status>>();
+  std::future<Status> done = started->get_future();
+  std::thread([source, started] { started->set_value(source->start()); }).detach();
+  while (done.wait_for(std::chrono::milliseconds(20)) != std::future_status::ready) {
+    if (cancel == nullptr || !*cancel) continue;
+    source->abandon();
+    return fail(ErrorKind::cancelled, "capture", "stopped while a camera was being opened",
+                "nothing was recorded");
+  }
+  return done.get();
+}
+
+Status Recording::prepare(const std::atomic<bool>* cancel) {
   if (sources_.empty())
     return fail(ErrorKind::usage, "cameras", "none given", "give --visible or --thermal");
   ORBITFUSE_TRY(check_folder(options_));
@@ -112,7 +129,7 @@ Status Recording::prepare() {
   if (options_.resume) {
     ORBITFUSE_ASSIGN(earlier, open_session(options_.session));
   }
-  for (const auto& source : sources_) ORBITFUSE_TRY(source->start());
+  for (const auto& source : sources_) ORBITFUSE_TRY(start(source, cancel));
   const std::int64_t all_run_ns = utc_now_ns();
   ORBITFUSE_TRY(fit_into(earlier));
   if (options_.resume) {

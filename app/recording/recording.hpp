@@ -50,8 +50,9 @@ class Recording {
   /// Starts the cameras and shows what those that don't wait see (latest()) until `over` says so.
   /// Nothing is recorded; for an operator who aims first. May be left out.
   Status show_until(const std::function<bool()>& over);
-  /// Starts the cameras, then makes or reopens the session. Nothing is left behind on failure.
-  Status prepare();
+  /// Starts the cameras, then makes or reopens the session. Nothing is left behind on failure, nor
+  /// where `cancel` comes true: a camera that is just then being opened is not waited for.
+  Status prepare(const std::atomic<bool>* cancel = nullptr);
   /// Records until the sources end, the time is over, the guide is complete, request_stop() or
   /// `cancel`; then closes the session. On an error the accounting is in the manifest and the
   /// session stays incomplete. `tick` is called a few times a second.
@@ -77,6 +78,8 @@ class Recording {
     std::uint64_t received = 0;
     double hz = 0;
   };
+  static Status start(const std::shared_ptr<PreparedSource>& source,
+                      const std::atomic<bool>* cancel);
   Status fit_into(const std::optional<Session>& earlier);
   void show(FrameSource& source, const std::atomic<bool>& over);
   void keep_latest(LatestFrame frame);
@@ -84,7 +87,7 @@ class Recording {
 
   RecordingOptions options_;
   PositionFinder finder_;
-  std::vector<std::unique_ptr<PreparedSource>> sources_;
+  std::vector<std::shared_ptr<PreparedSource>> sources_;  ///< outlived by one that hangs
   std::vector<DeviceInfo> devices_;
   std::map<std::string, std::uint64_t> next_ids_;  ///< RecorderOptions::next_ids
   std::unique_ptr<SessionWriter> writer_;

@@ -165,7 +165,7 @@ Status run(Context& context, const CaptureOptions& o) {
   recording::Recording recording(std::move(cameras.sources), options, std::move(finder));
   Page page;
   ORBITFUSE_TRY(open_page(context, o, recording, page));
-  ORBITFUSE_TRY(recording.prepare());
+  ORBITFUSE_TRY(recording.prepare(context.progress.cancel));
   for (const DeviceInfo& device : recording.devices())
     context.console.info(device.id + ": " + described(device));
   if (options.live)

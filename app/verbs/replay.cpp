@@ -50,7 +50,7 @@ Status run(Context& context, const Options& o) {
     return {};
   }
   recording::Recording recording(std::move(sources), options);
-  ORBITFUSE_TRY(recording.prepare());
+  ORBITFUSE_TRY(recording.prepare(context.progress.cancel));
   const auto ending = recording.run(context.progress.cancel, [&] {
     std::uint64_t written = 0;
     for (const StreamStatus& s : recording.status()) written += s.received;

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <thread>
 
 #include "app/recording/rehearsal.hpp"
@@ -51,6 +52,42 @@ TEST(Recording, ResumeGoesOnWithTheIdsOfTheSameCamera) {
   EXPECT_EQ(session->streams[1].first_sequence, 12u);
   for (const StreamRecord& s : session->streams)
     EXPECT_EQ(s.received + s.lost, s.last_sequence - s.first_sequence + 1);
+}
+
+/// A camera that answers, but only after a while.
+class SlowToOpen final : public ScriptedSource {
+ public:
+  using ScriptedSource::ScriptedSource;
+  Status start() override {
+    opening = true;
+    std::this_thread::sleep_for(std::chrono::seconds(3));
+    return ScriptedSource::start();
+  }
+  static inline std::atomic<bool> opening = false;
+};
+
+TEST(Recording, ACameraThatIsBeingOpenedIsNotWaitedForWhenItIsStopped) {
+  const test::TempFolder folder;
+  RecordingOptions options;
+  options.session = folder / "s";
+  std::vector<std::unique_ptr<FrameSource>> sources;
+  sources.push_back(
+      std::make_unique<SlowToOpen>("thermal0", Modality::thermal, std::deque<Delivery>{}));
+  std::atomic<bool> cancel = false;
+  const std::jthread ctrl_c([&] {
+    while (!SlowToOpen::opening) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    cancel = true;
+  });
+  const auto before = std::chrono::steady_clock::now();
+  {
+    Recording recording(std::move(sources), options);
+    const Status prepared = recording.prepare(&cancel);
+    ASSERT_FALSE(prepared);
+    EXPECT_EQ(prepared.error().kind, ErrorKind::cancelled);
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - before, std::chrono::seconds(2));
+  EXPECT_FALSE(std::filesystem::exists(folder / "s"));
+  std::this_thread::sleep_for(std::chrono::seconds(3));  // its thread ends before the test's heap
 }
 
 /// Frames with ids below 110 are from right after its start, the others from much later.
