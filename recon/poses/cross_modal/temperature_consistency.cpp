@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "core/numeric/median.hpp"
+#include "recon/alignment/whole_view.hpp"
 #include "recon/poses/cross_modal/painted_scene.hpp"
 
 namespace orbitfuse {
@@ -147,6 +148,38 @@ Result<Contradicted> contradicted(const OrbitRefinement& refinement, const Fit& 
   return lost;
 }
 
+/// The loop predicts a view as well as its station was kept: the best supported of places round
+/// the prediction, at low resolution.
+Result<std::vector<PosedView>> best_beside(const OrbitRefinement& painted,
+                                           const std::vector<std::size_t>& lost,
+                                           const Fit& alignment) {
+  constexpr double azimuth_deg = 7, elevation_deg = 4;
+  const LoopModel model = loop_model(painted.orbit, alignment);
+  std::vector<std::size_t> owner;
+  std::vector<PosedView> starts;
+  for (std::size_t c = 0; c < lost.size(); ++c)
+    for (const double a : {-azimuth_deg, 0.0, azimuth_deg})
+      for (const double e : {-elevation_deg, 0.0, elevation_deg}) {
+        owner.push_back(lost[c]);
+        starts.push_back(predicted(painted.orbit, alignment, model, lost[c]));
+        starts.back().cam_from_world =
+            moved(starts.back().cam_from_world, painted.orbit.canonical_from_world, {a, e, 0});
+      }
+  ORBITFUSE_ASSIGN(const Fit tried,
+                   painted.restart(owner, starts, {{160, 16, 12, 18}, {160, 8, 8, 12}}));
+  const std::size_t each = lost.empty() ? 0 : tried.views.size() / lost.size();
+  std::vector<PosedView> best;
+  for (std::size_t c = 0; c < lost.size(); ++c) {
+    const auto first = tried.views.begin() + static_cast<std::ptrdiff_t>(c * each);
+    best.push_back(std::max_element(first, first + static_cast<std::ptrdiff_t>(each),
+                                    [](const RenderAlignedView& x, const RenderAlignedView& y) {
+                                      return x.support() < y.support();
+                                    })
+                       ->view);
+  }
+  return best;
+}
+
 /// Where temperatures place each view best: from where it is, or searched as a whole.
 Result<Fit> best_by_temperatures(const OrbitRefinement& painted,
                                  const std::vector<std::size_t>& lost, const Fit& alignment) {
@@ -155,9 +188,15 @@ Result<Fit> best_by_temperatures(const OrbitRefinement& painted,
   ORBITFUSE_ASSIGN(const std::vector<PosedView> starts, painted.search(lost, alignment));
   ORBITFUSE_ASSIGN(Fit best, painted.restart(lost, places, judging_rounds()));
   ORBITFUSE_ASSIGN(const Fit searched, painted.restart(lost, starts, judging_rounds()));
-  for (std::size_t c = 0; c < lost.size(); ++c)
-    if (searched.views[c].support() > clearly_better * best.views[c].support())
-      best.views[c] = searched.views[c];
+  const auto keep_better = [&](const Fit& tried) {
+    for (std::size_t c = 0; c < lost.size(); ++c)
+      if (tried.views[c].support() > clearly_better * best.views[c].support())
+        best.views[c] = tried.views[c];
+  };
+  keep_better(searched);
+  ORBITFUSE_ASSIGN(const std::vector<PosedView> beside, best_beside(painted, lost, alignment));
+  ORBITFUSE_ASSIGN(const Fit tried, painted.restart(lost, beside, judging_rounds()));
+  keep_better(tried);
   return best;
 }
 
@@ -175,6 +214,9 @@ MoveDecision verdict(const PlaceEvidence& seen) {
   const bool better_by_form =
       seen.form_there > vouched_share && seen.form_there >= seen.form_before;
   if (seen.agree && (found || better_by_form)) return MoveDecision::both;
+  // Both know it there, temperatures a little less well than most.
+  if (seen.agree && seen.temperatures_there > found_share && seen.form_there > vouched_share)
+    return MoveDecision::both;
   // Searched as a whole and found where it was: a weak view, but not a wrong one.
   if (seen.agree && seen.stays && seen.temperatures_there > confirmed_share &&
       seen.form_before > confirmed_share)

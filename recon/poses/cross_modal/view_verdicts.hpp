@@ -21,6 +21,8 @@ struct ViewEvidence {
   double azimuth_off_deg = 0, elevation_off_deg = 0;  ///< from where its loop has it
   double log_distance_off = 0;                        ///< from the common distance of all loops
   double aim_off = 0;  ///< orbit's centre from the principal point, share of the image's width
+  double azimuth_scatter_deg = 0;  ///< of all views, robust sigma: how well stations were kept
+  double median_correlation = 0;   ///< of all views
 };
 
 /// One entry a view. Errors: the renderer's, cancelled.

@@ -38,6 +38,21 @@ TEST(ViewVerdicts, WhatSpeaksAgainstAViewIsNamed) {
   ViewEvidence alone = good;
   alone.correlation.reset();  // nothing was painted
   EXPECT_EQ(judged(alone, {}).reason, DoubtReason::undecided);
+  ViewEvidence weak = good;
+  weak.median_correlation = 0.96;
+  weak.support_share = 0.5, weak.correlation = 0.57;
+  EXPECT_EQ(judged(weak, {}).reason, DoubtReason::weak_support);
+  weak.support_share = 0.8;
+  EXPECT_TRUE(judged(weak, {}).sure()) << "one of both is no reason";
+  weak.support_share = 0.5, weak.correlation = 0.9;
+  EXPECT_TRUE(judged(weak, {}).sure());
+  ViewEvidence loose = good;
+  loose.azimuth_off_deg = 15;
+  EXPECT_FALSE(judged(loose, {}).sure());
+  loose.azimuth_scatter_deg = 7;
+  EXPECT_TRUE(judged(loose, {}).sure()) << "all stations were kept to 7 degrees only";
+  loose.azimuth_off_deg = 26, loose.azimuth_scatter_deg = 60;
+  EXPECT_FALSE(judged(loose, {}).sure());
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_NE(reason(&ViewEvidence::support_share, nan), DoubtReason::none);
   EXPECT_NE(reason(&ViewEvidence::aim_off, nan), DoubtReason::none);
