@@ -19,13 +19,9 @@ tl::unexpected<Error> unfit(const std::string& where, const cv::Mat& image, Moda
 
 Status check_type(const cv::Mat& image, const Frame& frame, Modality modality,
                   const std::string& where) {
-  if (modality == Modality::visible) {
-    if (image.depth() != CV_8U) return unfit(where, image, modality);
-  } else if (frame.thermal_is_gray) {
-    if (image.depth() != CV_8U) return unfit(where, image, modality);
-  } else if (image.type() != CV_16UC1) {
-    return unfit(where, image, modality);
-  }
+  const bool gray = modality == Modality::visible || frame.thermal_is_gray;
+  const bool fits = gray ? image.depth() == CV_8U : image.type() == CV_16UC1;
+  if (!fits) return unfit(where, image, modality);
   return {};
 }
 

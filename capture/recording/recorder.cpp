@@ -393,7 +393,7 @@ Status RecorderOptions::validate() const {
 }
 
 Recorder::Recorder(SessionWriter& writer, RecorderOptions options)
-    : writer_(writer), options_(options) {}
+    : writer_(writer), options_(std::move(options)) {}
 
 Status Recorder::run(const std::vector<FrameSource*>& sources, const Progress& progress) {
   ORBITFUSE_TRY(options_.validate());

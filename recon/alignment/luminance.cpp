@@ -3,7 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <vector>
 
 #include "core/image/image_io.hpp"
 
@@ -28,6 +31,26 @@ Result<cv::Mat> read_luminance(const Session& session, const FrameRecord& frame)
                             frame.width, frame.height),
                 "import the session again");
   return values;
+}
+
+cv::Mat without_glare(const cv::Mat& values) {
+  constexpr float ranges = 8;
+  std::vector<float> sorted;
+  for (const float v : cv::Mat_<float>(values))
+    if (std::isfinite(v)) sorted.push_back(v);
+  if (sorted.empty()) return values;
+  const auto quantile = [&](std::size_t quarter) {
+    const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(quarter * (sorted.size() - 1) / 4);
+    std::nth_element(sorted.begin(), at, sorted.end());
+    return *at;
+  };
+  const float median = quantile(2), knee = ranges * (quantile(3) - quantile(1));
+  const float most = *std::max_element(sorted.begin(), sorted.end()) - median;
+  if (!(knee > 0) || !(most > knee)) return values;
+  cv::Mat calm = values.clone();
+  for (float& v : cv::Mat_<float>(calm))
+    if (v - median > knee) v = median + knee * (1 + std::log((v - median) / knee));
+  return calm;
 }
 
 }  // namespace orbitfuse

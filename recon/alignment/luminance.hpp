@@ -11,4 +11,9 @@ namespace orbitfuse {
 /// Frames as floats: visible luma 0..255, thermal kelvin (or grey); NaN = invalid.
 Result<cv::Mat> read_luminance(const Session& session, const FrameRecord& frame);
 
+/// Thermal values whose hottest parts don't drown the rest: beyond eight interquartile ranges above
+/// the median they rise by their logarithm only (a flame of 900 C among walls of 10 to 30 C would
+/// otherwise be the only edge). Order is kept; images without such values are returned as they are.
+cv::Mat without_glare(const cv::Mat& values);
+
 }  // namespace orbitfuse

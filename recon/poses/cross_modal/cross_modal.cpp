@@ -37,7 +37,8 @@ constexpr int max_keyframes = 36;
 /// As a lens without distortion would have seen it: edges are compared with straight renders.
 Result<cv::Mat> straight_luminance(const Session& session, const FrameRecord& frame,
                                    const Camera& lens) {
-  ORBITFUSE_ASSIGN(cv::Mat image, read_luminance(session, frame));
+  ORBITFUSE_ASSIGN(const cv::Mat values, read_luminance(session, frame));
+  cv::Mat image = without_glare(values);
   if (!lens.has_distortion()) return image;
   return undistorted(image, lens, lens.without_distortion());
 }
