@@ -88,7 +88,7 @@ Eigen::Vector2d Camera::pixel_of(const Eigen::Vector2d& normalized) const {
 }
 
 Eigen::Vector2d Camera::normalized_of(const Eigen::Vector2d& pixel) const {
-  const Eigen::Vector2d target((pixel.x() - cx) / fx, (pixel.y() - cy) / fy);
+  Eigen::Vector2d target((pixel.x() - cx) / fx, (pixel.y() - cy) / fy);
   if (!has_distortion()) return target;
   Eigen::Vector2d p = target;
   for (int i = 0; i < 20; ++i) {  // Newton

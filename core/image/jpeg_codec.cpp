@@ -84,7 +84,7 @@ cv::Mat bgr_of_inverted_cmyk(const cv::Mat& cmyk) {
   cv::Mat out(cmyk.size(), CV_8UC3);
   for (int y = 0; y < cmyk.rows; ++y) {
     for (int x = 0; x < cmyk.cols; ++x) {
-      const cv::Vec4b p = cmyk.at<cv::Vec4b>(y, x);
+      const auto& p = cmyk.at<cv::Vec4b>(y, x);
       for (int c = 0; c < 3; ++c) {
         out.at<cv::Vec3b>(y, x)[2 - c] = static_cast<unsigned char>(p[c] * p[3] / 255);
       }
