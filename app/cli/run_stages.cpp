@@ -198,7 +198,7 @@ Status run_stages(Context& context, const StageFolders& given,
           run.erase(key);
       }
     }
-    const Status written = write_file_atomic(fs::path(folders.out) / run_file, run.dump(2) + "\n");
+    Status written = write_file_atomic(fs::path(folders.out) / run_file, run.dump(2) + "\n");
     if (!written && !summary.error) return written;
   }
   if (summary.error) return tl::unexpected(*summary.error);
