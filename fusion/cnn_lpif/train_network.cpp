@@ -139,7 +139,8 @@ int main(int argc, char** argv) {
     }
     int right = 0;
     for (const Pair& pair : validation) right += loss_of(parameters, pair, nullptr) < std::log(2.0);
-    fmt::print("{},{:.5f},{:.4f}\n", epoch, total / static_cast<double>(order.size() / batch),
+    const std::size_t batches = order.size() / batch;
+    fmt::print("{},{:.5f},{:.4f}\n", epoch, total / static_cast<double>(batches),
                right / static_cast<double>(validation.size()));
   }
   const Status written = write_file_atomic(argv[1], cnn::bytes_of(parameters));
