@@ -25,7 +25,8 @@ trap 'rm -rf "$folder"' EXIT
 sed -E 's/ -Wno-(stringop-overflow|restrict|maybe-uninitialized)| -fpch-preprocess| -Winvalid-pch| -include [^ ]*cmake_pch\.hxx//g' \
   "$commands" > "$folder/compile_commands.json"
 printf '%s\0' "${sources[@]}" |
-  xargs -0 -n 1 -P "$(nproc)" "$tidy" -p "$folder" --quiet --extra-arg=-Wno-unknown-warning-option 2> "$folder/errors" || {
+  xargs -0 -n 1 -P "$(nproc)" "$tidy" -p "$folder" --quiet --extra-arg=-Wno-unknown-warning-option \
+    --extra-arg=-Wno-unknown-pragmas 2> "$folder/errors" || {
     grep -E "error:" "$folder/errors" || true
     exit 1
   }
