@@ -32,6 +32,10 @@ Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
 /// `before` is what restarts and temperatures said. A view that passed there may still fail here.
 ViewVerdict judged(const ViewEvidence& evidence, const ViewVerdict& before);
 
+/// The same of a frame recorded between stations: it is predicted by its neighbours' places alone,
+/// so that it must be supported nearly as well as they are.
+ViewVerdict judged_between(const ViewEvidence& evidence, const ViewVerdict& before);
+
 /// Where most of a loop's stations are not sure, none of its views is. Returns those loops.
 /// Stations are the first so many views.
 std::vector<int> doubt_whole_loops(const OrbitViews& orbit, std::size_t stations, Fit& alignment);

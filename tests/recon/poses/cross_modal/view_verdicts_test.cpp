@@ -46,6 +46,11 @@ TEST(ViewVerdicts, WhatSpeaksAgainstAViewIsNamed) {
   EXPECT_TRUE(judged(weak, {}).sure()) << "one of both is no reason";
   weak.support_share = 0.5, weak.correlation = 0.9;
   EXPECT_TRUE(judged(weak, {}).sure());
+  ViewEvidence between = good;
+  between.support_share = 0.67;
+  EXPECT_TRUE(judged(between, {}).sure());
+  EXPECT_EQ(judged_between(between, {}).reason, DoubtReason::weak_support);
+  EXPECT_TRUE(judged_between(good, {}).sure());
   ViewEvidence loose = good;
   loose.azimuth_off_deg = 15;
   EXPECT_FALSE(judged(loose, {}).sure());
