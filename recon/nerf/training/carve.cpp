@@ -98,9 +98,10 @@ double carve(bool dense_depth, const std::vector<NormalisedView>& views,
     for (const NormalisedView* view : voters)
       for (const std::int32_t pixel : view->known) {
         const int width = view->rays.camera().width;
+        const int x = pixel % width, y = pixel / width;
         Ray ray;
-        if (!view->rays.ray(pixel % width + 0.5, pixel / width + 0.5, ray)) continue;
-        const float end = view->distance.at<float>(pixel / width, pixel % width);
+        if (!view->rays.ray(x + 0.5, y + 0.5, ray)) continue;
+        const float end = view->distance.at<float>(y, x);
         clear_segment(occupancy, ray, 0.96f * end - 0.02f, 0.03f);
       }
   occupancy.on = occupancy.allowed;

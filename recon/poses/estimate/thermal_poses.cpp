@@ -31,8 +31,11 @@ Result<ThermalPoses> estimate_thermal_poses(const Session& session, const Visibl
   if (visible != nullptr) {
     if (const RigPairs rig = find_rig_pairs(session); !rig.pairs.empty()) {
       auto by_rig = pose_by_rig(session, visible->reconstruction, rig, progress, steps);
-      if (by_rig) by_rig->ladder = std::move(steps);
-      if (by_rig || by_rig.error().kind != ErrorKind::quality) return by_rig;
+      if (!by_rig && by_rig.error().kind != ErrorKind::quality) return by_rig;
+      if (by_rig) {
+        by_rig->ladder = std::move(steps);
+        return by_rig;
+      }
     }
     const std::size_t tried = steps.size();
     auto localised = localise_in_visible(session, *visible, frames, options, progress, steps);
