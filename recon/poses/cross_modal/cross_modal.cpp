@@ -133,6 +133,7 @@ Result<std::vector<OrbitHypothesis>> search(const Evidence& evidence, const Prog
   OrbitSearchOptions options;
   options.nearest = 0.4 * evidence.similar_distance;
   options.farthest = 1.8 * evidence.similar_distance;
+  options.hypotheses = 4;  // renders decide; a rival that isn't opened can't be told from the best
   ORBITFUSE_ASSIGN(const OrbitTable table,
                    tabulate_orbit(evidence.work.lines, evidence.search, options, progress));
   std::vector<OrbitHypothesis> found;
