@@ -34,11 +34,11 @@ struct Attempt {
 Attempt read_attempt(const fs::path& file) {
   const auto text = read_file(file);
   const json j = text ? json::parse(*text, nullptr, false) : json();
-  const auto is_number = [&](const char* key) { return j.contains(key) && j[key].is_number(); };
-  if (!j.is_object() || !j.contains("key") || !j["key"].is_string() || !is_number("cpu_s") ||
-      !is_number("wall_s"))
+  try {
+    return {j.at("key"), j.at("cpu_s"), j.at("wall_s")};
+  } catch (const json::exception&) {
     return {};
-  return {j["key"], j["cpu_s"], j["wall_s"]};
+  }
 }
 
 Status write_attempt(const fs::path& file, const Attempt& attempt) {

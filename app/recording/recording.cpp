@@ -175,8 +175,8 @@ void Recording::show(FrameSource& source, const std::atomic<bool>& over) {
   }
 }
 
-Status Recording::show_until(const std::function<bool()>& over) {
-  for (const auto& source : sources_) ORBITFUSE_TRY(source->start());
+Status Recording::show_until(const std::function<bool()>& over, const std::atomic<bool>* cancel) {
+  for (const auto& source : sources_) ORBITFUSE_TRY(start(source, cancel));
   shown_ = showing_ = true;
   std::atomic<bool> stop{false};
   {

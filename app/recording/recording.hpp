@@ -49,7 +49,7 @@ class Recording {
 
   /// Starts the cameras and shows what those that don't wait see (latest()) until `over` says so.
   /// Nothing is recorded; for an operator who aims first. May be left out.
-  Status show_until(const std::function<bool()>& over);
+  Status show_until(const std::function<bool()>& over, const std::atomic<bool>* cancel = nullptr);
   /// Starts the cameras, then makes or reopens the session. Nothing is left behind on failure, nor
   /// where `cancel` comes true: a camera that is just then being opened is not waited for.
   Status prepare(const std::atomic<bool>* cancel = nullptr);

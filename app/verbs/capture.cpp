@@ -95,9 +95,10 @@ Status open_page(Context& context, const CaptureOptions& o, recording::Recording
   context.console.event({{"event", "page"}, {"url", page.server->url()}});
   if (o.wait_for_start) {
     context.console.info("waiting for Start on the page");
-    ORBITFUSE_TRY(recording.show_until([&] {
+    const auto over = [&] {
       return page.started || recording.stop_requested() || context.progress.cancelled();
-    }));
+    };
+    ORBITFUSE_TRY(recording.show_until(over, context.progress.cancel));
   }
   if (!context.progress.cancelled() && !recording.stop_requested()) return {};
   return fail(ErrorKind::cancelled, "capture", "stopped before it began",

@@ -20,6 +20,8 @@ struct FocalGuess {
 /// How much better a restart must be: two places this close in score are one, seen twice.
 constexpr double clearly_better = 1.02;
 
+/// From where a loop predicts a view, several degrees off.
+inline std::vector<RenderRound> wide_rounds() { return {{160, 16, 12, 18}, {160, 8, 8, 12}}; }
 /// To a fraction of a degree, and where places are compared.
 inline std::vector<RenderRound> judging_rounds() { return {{256, 8, 8, 12}, {256, 5, 6, 10}}; }
 

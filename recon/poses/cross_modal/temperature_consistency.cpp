@@ -165,8 +165,7 @@ Result<std::vector<PosedView>> best_beside(const OrbitRefinement& painted,
         starts.back().cam_from_world =
             moved(starts.back().cam_from_world, painted.orbit.canonical_from_world, {a, e, 0});
       }
-  ORBITFUSE_ASSIGN(const Fit tried,
-                   painted.restart(owner, starts, {{160, 16, 12, 18}, {160, 8, 8, 12}}));
+  ORBITFUSE_ASSIGN(const Fit tried, painted.restart(owner, starts, wide_rounds()));
   const std::size_t each = lost.empty() ? 0 : tried.views.size() / lost.size();
   std::vector<PosedView> best;
   for (std::size_t c = 0; c < lost.size(); ++c) {

@@ -163,7 +163,7 @@ Status add_views(const SceneRenderer& renderer, const OrbitViews& orbit, std::si
     added.push_back(i);
     starts.push_back(predicted(orbit, alignment, model, i));
   }
-  std::vector<RenderRound> rounds = {{160, 16, 12, 18}, {160, 8, 8, 12}};
+  std::vector<RenderRound> rounds = wide_rounds();
   for (const RenderRound& round : fine_rounds()) rounds.push_back(round);
   ORBITFUSE_ASSIGN(const Fit tried, refinement.restart(added, starts, rounds));
   for (std::size_t c = 0; c < added.size(); ++c) {
