@@ -124,6 +124,7 @@ Json json_of(const Station& s) {
 Result<std::optional<double>> station_sigma(const Reader& line, const char* field) {
   if (!line.has(field)) return std::nullopt;
   ORBITFUSE_ASSIGN(const double sigma, line.number(field));
+  if (sigma < 0) return line.wrong(field, "a number of degrees, 0 or more");
   return sigma >= 90 ? std::nullopt : std::optional(sigma);
 }
 

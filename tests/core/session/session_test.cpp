@@ -183,6 +183,9 @@ TEST_F(SessionTest, UnknownOriginsOfEarlierVersionsAreUnknown) {
   const auto s = open(text);
   ASSERT_TRUE(s) << s.error().message();
   EXPECT_FALSE(s->frames[0].station->elevation_sigma_deg);
+  text.replace(text.find("\"elevation_sigma_deg\":90.0"), sigma.size() + 1,
+               "\"elevation_sigma_deg\":-5.0");
+  EXPECT_FALSE(open(text));
 }
 
 TEST_F(SessionTest, ATypeThatIsNoWordIsNamed) {
