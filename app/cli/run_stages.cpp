@@ -173,7 +173,7 @@ Status run_stages(Context& context, const StageFolders& given,
     announce(context.console, status, options.dry_run);
     json event = status_json(status);
     event["event"] = "stage";
-    context.console.event(std::move(event));
+    context.console.event(event);
   };
   const pipeline::RunSummary summary = runner.run();
 

@@ -93,9 +93,9 @@ bool stops_everything(ErrorKind kind) {
 std::string changed_option(const json& before, const json& now, const std::string& prefix = "") {
   if (before.is_object() && now.is_object()) {
     for (const auto& [key, value] : now.items()) {
-      const std::string path = prefix.empty() ? key : prefix + "." + key;
+      std::string path = prefix.empty() ? key : prefix + "." + key;
       if (!before.contains(key)) return path;
-      if (const std::string inner = changed_option(before.at(key), value, path); !inner.empty())
+      if (std::string inner = changed_option(before.at(key), value, path); !inner.empty())
         return inner;
     }
     return before.size() > now.size() ? (prefix.empty() ? "options" : prefix) : "";

@@ -47,8 +47,9 @@ void add_train(Settings& settings, const std::string& table, TrainConfig& config
                 [&config](const json& value) {
                   if (!value.is_string()) return false;
                   auto options = nerf::preset(value.get<std::string>());
-                  if (options) config.options = *std::move(options);
-                  return options.has_value();
+                  if (!options) return false;
+                  config.options = *std::move(options);
+                  return true;
                 }});
   settings.add(table + ".max_width_px", config.max_width_px,
                "Training images are reduced to this width");

@@ -137,7 +137,7 @@ void Console::data(const std::string& line) {
   write_stdout(printable(line));
 }
 
-void Console::event(nlohmann::json event) {
+void Console::event(const nlohmann::json& event) {
   if (!options_.json) return;
   const std::lock_guard lock(mutex_);
   write_stdout(line_of(event));
@@ -147,7 +147,7 @@ void Console::result(const std::string& verb, nlohmann::json body) {
   body["event"] = "result";
   body["schema"] = json_schema;
   body["verb"] = verb;
-  event(std::move(body));
+  event(body);
 }
 
 }  // namespace orbitfuse::terminal

@@ -41,7 +41,7 @@ class Console {
   /// A line of data for people; nothing with --json.
   void data(const std::string& line);
   /// An intermediate event; nothing without --json.
-  void event(nlohmann::json event);
+  void event(const nlohmann::json& event);
   /// The last line of --json: {"event":"result","schema":1,"verb":...,"ok":...}.
   void result(const std::string& verb, nlohmann::json body);
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// bench_visible SCENE... [--focal-error R] [--no-stations] [--colmap]: poses of the visible views
-// alone, and their error where the truth is known. A scene is one of shared data's orbits
-// (container, sedan, van, fox, flowerpot, ...), one of its pairs (metu_sunny_scene_7, ...), or the
-// path of a folder rendered like them. --colmap poses with COLMAP's mapper on all pairs at full
-// settings instead.
+// bench_visible SCENE... [--focal-error R] [--no-stations] [--colmap | --global] [--views]: poses
+// of the visible views alone, and their error where the truth is known; --views: of each view. A
+// scene is one of shared data's orbits (container, sedan, van, fox, flowerpot, ...), one of its
+// pairs (metu_sunny_scene_7, ...), or the path of a folder rendered like them. --colmap poses with
+// COLMAP's mapper on all pairs at full settings instead, --global by the global mapper on the
+// orbit's pairs alone.
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -18,6 +19,7 @@
 #include "core/system/cpu.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/poses/estimate_poses.hpp"
+#include "recon/poses/global_sfm/global_mapper.hpp"
 #include "recon/poses/sfm/colmap.hpp"
 #include "recon/poses/sfm/sfm_ladder.hpp"
 #include "tests/support/orbit_scenes.hpp"
@@ -31,7 +33,7 @@ namespace fs = std::filesystem;
 struct Request {
   std::vector<std::string> scenes;
   double focal_error = 0.03;
-  bool stations = true, colmap = false;
+  bool stations = true, colmap = false, global = false, views = false;
 };
 
 /// Visible images of a folder, or of its folder visible/, in the order of their names.
@@ -105,7 +107,53 @@ Result<ModalityPoses> colmap_poses(const Session& session, const fs::path& workd
   return std::move(judged.poses);
 }
 
-void print(const scenes::Scene& scene, const Result<ModalityPoses>& poses, double cpu_s) {
+/// What each view is off by, and how many points hold it.
+void print_views(const ModalityPoses& poses, const scenes::PoseError& error) {
+  for (const scenes::ViewError& view : error.each) {
+    std::size_t points = 0;
+    for (const SparsePoint& point : poses.reconstruction.points)
+      for (const Observation& seen : point.track)
+        points += poses.reconstruction.views[static_cast<std::size_t>(seen.view)].name == view.name;
+    fmt::print("    {}: centre {:.3f} % (outward {:.3f}), rotation {:.3f} deg, {} points\n",
+               view.name, view.center_percent, view.outward_percent, view.rotation_deg, points);
+  }
+  const Camera& camera = poses.reconstruction.views.front().camera;
+  fmt::print("    {}x{}, focal length {:.1f} px, {} points\n", camera.width, camera.height,
+             camera.fx, poses.reconstruction.points.size());
+}
+
+/// What stands in where COLMAP finds nothing.
+Result<ModalityPoses> global_poses(const Session& session, const fs::path& workdir) {
+  const auto frames = session.frames_of(Modality::visible);
+  const PoseOptions options;
+  ProxyOptions proxies;
+  proxies.max_side_px = options.max_image_side_px;
+  ColmapOptions engine;
+  engine.max_features = options.max_features;
+  ORBITFUSE_ASSIGN(const auto images,
+                   write_proxies(session, frames, proxies, workdir / "images", {}));
+  ORBITFUSE_ASSIGN(ColmapProject project,
+                   ColmapProject::create(workdir / "colmap", workdir / "images", engine));
+  ORBITFUSE_TRY(project.extract(session, images, {}));
+  ORBITFUSE_TRY(project.match(images, orbit_pairs(frames), {}));
+  ORBITFUSE_ASSIGN(FeatureGraph graph, read_feature_graph(project.database(), session, images));
+  const Adjuster adjust = [&](Reconstruction model) -> Result<Reconstruction> {
+    ORBITFUSE_ASSIGN(JudgedModel judged, judge_model(std::move(model), session, frames, options));
+    return std::move(judged.poses.reconstruction);
+  };
+  ORBITFUSE_ASSIGN(GlobalModel global, map_globally(graph, adjust, {}, {}));
+  if (global.model.views.size() < 2)
+    return fail(ErrorKind::quality, "global mapper", global.found, "see the ladder");
+  ORBITFUSE_ASSIGN(JudgedModel judged,
+                   judge_model(std::move(global.model), session, frames, options));
+  judged.poses.ladder.push_back({"global mapper", judged.believed, global.found + "; " + judged.why,
+                                 static_cast<int>(judged.poses.reconstruction.views.size()),
+                                 static_cast<int>(frames.size()), 0});
+  return std::move(judged.poses);
+}
+
+void print(const scenes::Scene& scene, const Result<ModalityPoses>& poses, double cpu_s,
+           bool views) {
   if (!poses) {
     fmt::print("  {}; {:.1f} CPU s\n", poses.error().message(), cpu_s);
     return;
@@ -125,6 +173,7 @@ void print(const scenes::Scene& scene, const Result<ModalityPoses>& poses, doubl
         "{:.3f} deg",
         error.ate_percent, error.worst_percent, error.mean_rotation_deg, error.worst_rotation_deg);
   fmt::print("\n");
+  if (views) print_views(*poses, error);
 }
 
 Request parsed(int argc, char** argv) {
@@ -137,6 +186,10 @@ Request parsed(int argc, char** argv) {
       request.stations = false;
     else if (word == "--colmap")
       request.colmap = true;
+    else if (word == "--global")
+      request.global = true;
+    else if (word == "--views")
+      request.views = true;
     else
       request.scenes.emplace_back(word);
   }
@@ -151,8 +204,9 @@ int main(int argc, char** argv) {
   const Request request = parsed(argc, argv);
   if (request.scenes.empty() || !fs::exists(data)) {
     std::fputs(
-        "bench_visible SCENE... [--focal-error R] [--no-stations] [--colmap]; needs the "
-        "shared data (ORBITFUSE_SHARED)\n",
+        "bench_visible SCENE... [--focal-error R] [--no-stations] [--colmap | --global] [--views]; "
+        "needs "
+        "the shared data (ORBITFUSE_SHARED)\n",
         stderr);
     return 2;
   }
@@ -163,10 +217,11 @@ int main(int argc, char** argv) {
     const fs::path workdir =
         fs::temp_directory_path() / fmt::format("orbitfuse_bench_visible_{}", ::getpid());
     const double before = cpu_seconds();
-    const auto poses = request.colmap
-                           ? colmap_poses(scene.session, workdir)
+    const auto poses = request.colmap ? colmap_poses(scene.session, workdir)
+                       : request.global
+                           ? global_poses(scene.session, workdir)
                            : estimate_visible_poses(scene.session, PoseOptions{}, workdir, {});
-    print(scene, poses, cpu_seconds() - before);
+    print(scene, poses, cpu_seconds() - before, request.views);
     std::error_code ignored;
     if (std::getenv("ORBITFUSE_KEEP") == nullptr) fs::remove_all(workdir, ignored);
   }

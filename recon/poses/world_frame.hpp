@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <string>
 #include <vector>
 
 #include "core/geometry/reconstruction.hpp"
@@ -41,7 +42,7 @@ struct StationFit {
   double offset_deg = 0;  ///< azimuth = +-station + offset
   double median_residual_deg = 0;
   double worst_residual_deg = 0;
-  int outliers = 0;  ///< residual above 20 deg + 3 sigma
+  std::vector<std::string> contradicting;  ///< views with a residual above 20 deg + 3 sigma
 };
 /// nullopt-like: views = 0 when fewer than three views have stations. Azimuths are the views' in
 /// their own canonical frame, so nothing of the world has to be right.

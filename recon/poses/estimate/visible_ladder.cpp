@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <set>
+#include <utility>
 
 #include "recon/poses/global_sfm/global_mapper.hpp"
 #include "recon/poses/sfm/colmap.hpp"
@@ -202,14 +203,17 @@ class VisibleLadder {
     return views > best;
   }
 
-  /// The mapper's default settings, then ever more relaxed ones until a model is believed.
+  /// The mapper's default settings, then ever more relaxed ones until a model is believed. A
+  /// relaxed model may have followed a repeated pillar: the global mapper is asked as well then.
   Status try_mapper(FeatureLevel& level, const std::string& name) {
-    for (const MapperSettings& settings : mapper_ladder()) {
+    const std::vector<MapperSettings> ladder = mapper_ladder();
+    for (const MapperSettings& settings : ladder) {
       tell(2, name + ", " + settings.name);
       ORBITFUSE_ASSIGN(Reconstruction model, level.map(settings, progress_));
       consider(name + ", " + settings.name, level.found(), std::move(model), level.options());
       ORBITFUSE_TRY(progress_.check("poses.visible"));
-      if (best_) return {};
+      if (best_ && &settings == &ladder.front()) return {};
+      if (best_) break;
     }
     return try_global(level, name);
   }
@@ -224,7 +228,15 @@ class VisibleLadder {
       return std::move(judged.poses.reconstruction);
     };
     ORBITFUSE_ASSIGN(GlobalModel global, map_globally(graph, adjust, {}, progress_));
+    std::optional<JudgedModel> colmaps;
+    if (best_) {
+      const int held = explained_matches(graph, posed_frames(graph, best_->poses.reconstruction));
+      const int found = explained_matches(graph, global.posed);
+      global.found += fmt::format("; {} matches explained, {} by COLMAP's model", found, held);
+      if (found > held) colmaps = std::exchange(best_, std::nullopt);
+    }
     consider(attempt, global.found, std::move(global.model), level.options());
+    if (!best_) best_ = std::move(colmaps);
     return {};
   }
 

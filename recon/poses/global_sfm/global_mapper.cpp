@@ -8,6 +8,7 @@
 
 #include "core/system/parallel.hpp"
 #include "recon/poses/global_sfm/center_estimation.hpp"
+#include "recon/poses/sfm/resection.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -114,7 +115,8 @@ void keep_connected(const std::vector<FeatureTrack>& tracks, int min_shared, Fra
     if (!inside[f]) poses[f].reset();
 }
 
-/// Matches along the epipolar lines of posed views that look in nearly the same direction.
+/// Matches along the epipolar lines of posed views that look in nearly the same direction: repeated
+/// structure fails Lowe's test against the whole image, not against one line of it.
 void guide(const FeatureGraph& graph, const PosedFrames& posed, double band_px,
            PairMatches& matches) {
   constexpr double max_angle_deg = 50;  // beyond, descriptors of one point have little in common
@@ -130,7 +132,61 @@ void guide(const FeatureGraph& graph, const PosedFrames& posed, double band_px,
   parallel_for(static_cast<int>(pairs.size()),
                [&](int p) { found[at(p)] = guided_matches(graph, pairs[at(p)], posed, band_px); });
   for (std::size_t p = 0; p < pairs.size(); ++p)
-    if (found[p].size() > matches[pairs[p]].size()) matches[pairs[p]] = std::move(found[p]);
+    if (!found[p].empty()) matches[pairs[p]] = std::move(found[p]);
+}
+
+/// Whether more than the poses speaks for a track: a match of two views that was looked for along
+/// their epipolar lines agrees with any pose they have, so it needs a third view or Lowe's test
+/// against the whole image.
+bool confirmed(const FeatureGraph& graph, const FeatureTrack& track) {
+  if (track.features.size() > 2) return true;
+  const auto& [a, i] = track.features.front();
+  const auto& [b, j] = track.features.back();
+  const auto proposed = graph.proposed.find({a, b});  // features go by frame
+  if (proposed == graph.proposed.end()) return false;
+  const std::vector<FeatureMatch>& matches = proposed->second;
+  return std::find(matches.begin(), matches.end(), FeatureMatch{i, j}) != matches.end();
+}
+
+/// Each frame where the others' points have it.
+void pose_by_others(const FeatureGraph& graph, const PairMatches& matches, PosedFrames& posed) {
+  FramePoses moved = posed.poses;
+  parallel_for(graph.count(), [&](int f) {
+    if (!moved[at(f)]) return;
+    if (const auto pose = resect_by_others(graph, matches, posed, f, {})) moved[at(f)] = pose;
+  });
+  posed.poses = std::move(moved);
+}
+
+/// Averaged rotations and the centres that go with them, of the frames that the pairs connect.
+FramePoses averaged_poses(const AveragedRotations& rotations,
+                          const std::vector<Eigen::Vector3d>& centers,
+                          const std::vector<ViewPair>& edges) {
+  const auto count = static_cast<int>(centers.size());
+  const std::vector<bool> inside = largest_part(count, edges);
+  FramePoses poses(at(count));
+  for (int f = 0; f < count; ++f) {
+    if (!inside[at(f)] || !rotations.placed[at(f)]) continue;
+    const Eigen::Quaterniond& q = rotations.cam_from_world[at(f)];
+    poses[at(f)] = Rigid3d{q, -(q * centers[at(f)])};
+  }
+  return poses;
+}
+
+/// Points of the matches, as far as the poses allow `max_error_px` (recorded), adjusted with them.
+Result<Reconstruction> adjusted(const FeatureGraph& graph, const PairMatches& matches,
+                                double max_error_px, int min_shared_points, PosedFrames& posed,
+                                const Adjuster& adjust) {
+  const TrackOptions options{.max_error_px = max_error_px};
+  keep_connected(triangulate_tracks(graph, matches, posed, options), min_shared_points,
+                 posed.poses);
+  std::vector<FeatureTrack> tracks = triangulate_tracks(graph, matches, posed, options);
+  std::erase_if(tracks, [&](const FeatureTrack& track) { return !confirmed(graph, track); });
+  Reconstruction model = reconstruction_of(graph, posed, tracks, graph.frames.front()->modality);
+  if (model.views.size() < 2)
+    return fail(ErrorKind::quality, "global mapper", "no two views hold each other",
+                "take views every 30 deg or closer");
+  return adjust(std::move(model));
 }
 
 }  // namespace
@@ -145,50 +201,35 @@ Result<GlobalModel> map_globally(FeatureGraph& graph, const Adjuster& adjust,
   const std::vector<RelativePose> kept = chosen_pairs(graph, rotations, options, centers);
   result.found = fmt::format("{} of {} pairs have a geometry, the loop confirms {}",
                              candidates.size(), graph.proposed.size(), kept.size());
-  result.posed.cameras = graph.cameras;
   PairMatches matches;
   std::vector<ViewPair> edges;
   for (const RelativePose& pair : kept) {
     matches[{pair.first, pair.second}] = pair.matches;
     edges.emplace_back(pair.first, pair.second);
   }
-  const std::vector<bool> inside = largest_part(graph.count(), edges);
-  for (int f = 0; f < graph.count(); ++f) {
-    result.posed.poses.emplace_back();
-    if (!inside[at(f)] || !rotations.placed[at(f)]) continue;
-    const Eigen::Quaterniond& q = rotations.cam_from_world[at(f)];
-    result.posed.poses.back() = Rigid3d{q, -(q * centers[at(f)])};
-  }
-  // Repeated structure fails Lowe's test against the whole image, not against one line of it: once
-  // poses are near, matches of near views are looked for along the lines.
-  constexpr double guided_at_px = 4;
-  // From where averaged pairs leave the rays to where features lie, in pixels of the proxies.
-  for (const double max_error_px : {40.0, 12.0, guided_at_px}) {
+  result.posed = {averaged_poses(rotations, centers, edges), graph.cameras};
+  // In pixels of the proxies, from where averaged pairs leave the rays to where features lie; from
+  // `guided_from_px` poses are near enough to match along their lines.
+  constexpr double guided_from_px = 6, last_px = 2;
+  for (const double round_px : {40.0, 12.0, guided_from_px, 4.0, 2.5, last_px}) {
     ORBITFUSE_TRY(progress.check("poses.global"));
-    if (max_error_px <= guided_at_px) guide(graph, result.posed, 3 * graph.pixel_scale, matches);
-    TrackOptions track;
-    track.max_error_px = max_error_px * graph.pixel_scale;
-    std::vector<FeatureTrack> tracks = triangulate_tracks(graph, matches, result.posed, track);
-    keep_connected(tracks, options.min_shared_points, result.posed.poses);
-    tracks = triangulate_tracks(graph, matches, result.posed, track);
-    Reconstruction model =
-        reconstruction_of(graph, result.posed, tracks, graph.frames.front()->modality);
-    if (model.views.size() < 2) {
-      result.found += "; no two views hold each other";
+    const double max_error_px = round_px * graph.pixel_scale;
+    const bool guided = round_px <= guided_from_px;
+    if (guided) guide(graph, result.posed, max_error_px, matches);
+    Result<Reconstruction> model =
+        adjusted(graph, matches, max_error_px, options.min_shared_points, result.posed, adjust);
+    if (!model && model.error().kind == ErrorKind::cancelled) return tl::unexpected(model.error());
+    if (!model) {
+      result.found += "; " + model.error().found;
       result.model = {};
       return result;
     }
-    Result<Reconstruction> adjusted = adjust(std::move(model));
-    if (!adjusted) {
-      result.found += "; " + adjusted.error().found;
-      result.model = {};
-      return result;
-    }
-    result.model = *std::move(adjusted);
+    result.model = *std::move(model);
     result.posed = posed_frames(graph, result.model);
-    if (max_error_px > guided_at_px)
-      matches =
-          confirmed_matches(graph, result.posed, std::min(8.0, max_error_px) * graph.pixel_scale);
+    if (!guided)
+      matches = confirmed_matches(graph, result.posed, std::min(8.0, round_px) * graph.pixel_scale);
+    else if (round_px > last_px)
+      pose_by_others(graph, matches, result.posed);
   }
   graph.verified = std::move(matches);
   return result;

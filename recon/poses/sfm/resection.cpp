@@ -163,4 +163,38 @@ Result<std::vector<int>> resect(FeatureGraph& graph, PosedFrames& posed,
   return added;
 }
 
+std::optional<Rigid3d> resect_by_others(const FeatureGraph& graph, const PairMatches& matches,
+                                        const PosedFrames& posed, int frame,
+                                        const ResectionOptions& options) {
+  PosedFrames others = posed;
+  others.poses[at(frame)].reset();
+  TrackOptions track;
+  track.max_error_px *= graph.pixel_scale;
+  const std::vector<FeatureTrack> tracks = triangulate_tracks(graph, matches, others, track);
+  const Camera& camera = posed.cameras[at(frame)];
+  const auto miss_px = [&](const Rigid3d& pose, int feature, int t) {
+    return (camera.project(pose * tracks[at(t)].position) - graph.pixels[at(frame)].col(feature))
+        .norm();
+  };
+  const Rigid3d& here = *posed.poses[at(frame)];
+  const Correspondences all = correspondences(graph, frame, index_of(tracks));
+  Correspondences near;
+  for (std::size_t i = 0; i < all.feature.size(); ++i) {
+    constexpr double reach = 0.05;  // of the width; repeated structure fits elsewhere as well
+    if (!(miss_px(here, all.feature[i], all.track[i]) <= reach * camera.width)) continue;
+    near.feature.push_back(all.feature[i]);
+    near.track.push_back(all.track[i]);
+  }
+  const auto found = solve(graph, frame, camera, near, tracks, options);
+  if (!found) return std::nullopt;
+  int agree_there = 0, agree_here = 0;
+  for (std::size_t i = 0; i < near.feature.size(); ++i) {
+    const double limit_px = options.max_error_px * graph.pixel_scale;
+    agree_there += miss_px(found->pose, near.feature[i], near.track[i]) <= limit_px;
+    agree_here += miss_px(here, near.feature[i], near.track[i]) <= limit_px;
+  }
+  if (agree_there < agree_here) return std::nullopt;
+  return found->pose;
+}
+
 }  // namespace orbitfuse

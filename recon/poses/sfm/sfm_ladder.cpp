@@ -19,6 +19,9 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
+/// Share of the views that may contradict their stations; beyond, the model is refused as a whole.
+constexpr double max_contradicting = 0.15;
+
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
@@ -133,6 +136,44 @@ Result<ModalityPoses> adjusted(Reconstruction model, const Session& session,
   return poses;
 }
 
+/// The model of the other views.
+Reconstruction without(const Reconstruction& model, const std::vector<std::string>& names) {
+  Reconstruction rest;
+  rest.modality = model.modality;
+  std::vector<int> place;
+  for (const PosedView& view : model.views) {
+    const bool kept = std::find(names.begin(), names.end(), view.name) == names.end();
+    place.push_back(kept ? static_cast<int>(rest.views.size()) : -1);
+    if (kept) rest.views.push_back(view);
+  }
+  for (const SparsePoint& point : model.points) {
+    SparsePoint kept = point;
+    std::erase_if(kept.track, [&](const Observation& o) {
+      return place[static_cast<std::size_t>(o.view)] < 0;
+    });
+    for (Observation& o : kept.track) o.view = place[static_cast<std::size_t>(o.view)];
+    if (kept.track.size() >= 2) rest.points.push_back(std::move(kept));
+  }
+  return rest;
+}
+
+/// Views folded onto another side of a near-symmetric scene leave a model, and are named.
+Status drop_contradicting(const Session& session, const std::vector<const FrameRecord*>& frames,
+                          const PoseOptions& options, ModalityPoses& poses) {
+  const StationFit fit = fit_stations(poses.reconstruction.views, session);
+  if (fit.contradicting.empty() ||
+      static_cast<double>(fit.contradicting.size()) > max_contradicting * fit.views)
+    return {};
+  ORBITFUSE_ASSIGN(
+      poses, adjusted(without(poses.reconstruction, fit.contradicting), session, frames, options));
+  for (DroppedView& view : poses.dropped)
+    if (std::find(fit.contradicting.begin(), fit.contradicting.end(), view.name) !=
+        fit.contradicting.end())
+      view.why =
+          "its matches place it far from its station, as another side that looks alike would";
+  return {};
+}
+
 }  // namespace
 
 tl::unexpected<Error> none_held(const std::vector<LadderStep>& steps, Modality modality) {
@@ -162,13 +203,13 @@ bool passes_gates(ModalityPoses& poses, const Session& session, const PoseOption
   if (fit.views >= 3) {
     // Chord of the median residual, in radii.
     const double residual = 2 * std::sin(fit.median_residual_deg / 2 * std::numbers::pi / 180.0);
-    const double outliers = static_cast<double>(fit.outliers) / fit.views;
+    const double outliers = static_cast<double>(fit.contradicting.size()) / fit.views;
     poses.gates["station_residual_deg"] = fit.median_residual_deg;
     poses.gates["station_outlier_ratio"] = outliers;
     why += fmt::format(", {:.1f} deg from the stations in the median, {} of {} contradict them{}",
-                       fit.median_residual_deg, fit.outliers, fit.views,
+                       fit.median_residual_deg, fit.contradicting.size(), fit.views,
                        fit.mirrored ? " (which run the other way round)" : "");
-    good = good && residual <= options.max_station_residual && outliers <= 0.15;
+    good = good && residual <= options.max_station_residual && outliers <= max_contradicting;
   }
   const CaptureOrder order = capture_order(poses.reconstruction.views, session);
   if (order.steps >= 8) {
@@ -187,6 +228,7 @@ Result<JudgedModel> judge_model(Reconstruction model, const Session& session,
                                 const PoseOptions& options) {
   JudgedModel judged;
   ORBITFUSE_ASSIGN(judged.poses, adjusted(std::move(model), session, frames, options));
+  ORBITFUSE_TRY(drop_contradicting(session, frames, options, judged.poses));
   judged.believed = passes_gates(judged.poses, session, options, judged.why);
   return judged;
 }

@@ -165,6 +165,16 @@ std::vector<FeatureTrack> triangulate_tracks(const FeatureGraph& graph, const Pa
   return tracks;
 }
 
+int explained_matches(const FeatureGraph& graph, const PosedFrames& posed) {
+  TrackOptions options;
+  options.max_error_px *= graph.pixel_scale;
+  const PairMatches matches = confirmed_matches(graph, posed, options.max_error_px);
+  int explained = 0;
+  for (const FeatureTrack& track : triangulate_tracks(graph, matches, posed, options))
+    explained += static_cast<int>(track.features.size()) - 1;
+  return explained;
+}
+
 Reconstruction reconstruction_of(const FeatureGraph& graph, const PosedFrames& posed,
                                  const std::vector<FeatureTrack>& tracks, Modality modality) {
   Reconstruction model;

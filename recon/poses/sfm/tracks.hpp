@@ -36,6 +36,9 @@ std::optional<Eigen::Vector3d> meet(const Rigid3d& first, const Eigen::Vector3d&
                                     const Rigid3d& second, const Eigen::Vector3d& second_ray,
                                     double min_angle_deg);
 
+/// How many of `graph.proposed` the poses can mean, as tracks: features but one of each.
+int explained_matches(const FeatureGraph& graph, const PosedFrames& posed);
+
 /// Frames and tracks as views and points; frames without a pose are left out.
 Reconstruction reconstruction_of(const FeatureGraph& graph, const PosedFrames& posed,
                                  const std::vector<FeatureTrack>& tracks, Modality modality);

@@ -5,6 +5,7 @@
 
 #include "recon/poses/sfm/sfm_ladder.hpp"
 #include "recon/poses/world_frame.hpp"
+#include "tests/recon/poses/feature_scene.hpp"
 #include "tests/support/orbit_fixture.hpp"
 
 // What COLMAP makes of thermal frames of the container: front and back of a near-symmetric object
@@ -91,7 +92,7 @@ TEST(OrbitGates, FrontMergedWithBackIsRefusedByStationsOfUnknownOrigin) {
   const ModalityPoses merged = poses_with(session, front_on_back);
   EXPECT_FALSE(believed(merged, session));
   const StationFit fit = fit_stations(merged.reconstruction.views, session);
-  EXPECT_GE(fit.outliers, 15) << "an unknown origin says nothing against differences";
+  EXPECT_GE(fit.contradicting.size(), 15U) << "an unknown origin says nothing against differences";
 }
 
 TEST(OrbitGates, APartOfTheFramesIsNotEnough) {
@@ -109,6 +110,41 @@ TEST(OrbitGates, PhotosWithoutStationsHaveNoOrderToContradict) {
       poses_with(session, [](double a) { return std::fmod(a * 7.3, 360.0); });
   EXPECT_EQ(capture_order(poses.reconstruction.views, session).steps, 0);
   EXPECT_TRUE(believed(poses, session));
+}
+
+TEST(OrbitGates, ViewsFoldedOntoTheOtherSideAreDroppedByName) {
+  testing_orbit::FeatureSceneOptions options;
+  options.wrong_pillar = options.false_matches = 0;
+  const auto scene = testing_orbit::FeatureSceneMaker(options).make();
+  PosedFrames posed{FramePoses(24), scene.graph.cameras};
+  for (std::size_t v = 0; v < 24; ++v) posed.poses[v] = scene.truth[v].cam_from_world;
+  Reconstruction model = reconstruction_of(
+      scene.graph, posed, triangulate_tracks(scene.graph, scene.graph.proposed, posed, {}),
+      Modality::visible);
+  const auto judged = [&] {
+    return judge_model(model, scene.session, scene.session.frames_of(Modality::visible), {});
+  };
+  const auto whole = judged();
+  ASSERT_TRUE(whole && whole->believed) << whole->why;
+  EXPECT_TRUE(whole->poses.dropped.empty());
+
+  // Each stands where the other was seen, so all its matches agree.
+  std::swap(model.views[4].name, model.views[10].name);
+  const auto rest = judged();
+  ASSERT_TRUE(rest) << rest.error().message();
+  EXPECT_TRUE(rest->believed) << rest->why;
+  EXPECT_EQ(rest->poses.reconstruction.views.size(), 22u);
+  ASSERT_EQ(rest->poses.dropped.size(), 2u);
+  for (const DroppedView& view : rest->poses.dropped) {
+    EXPECT_TRUE(view.name == scene.truth[4].name || view.name == scene.truth[10].name);
+    EXPECT_NE(view.why.find("station"), std::string::npos);
+  }
+
+  // A fifth of all folded: nothing of the model is believed.
+  for (const std::size_t v : {0u, 1u, 14u}) std::swap(model.views[v].name, model.views[v + 6].name);
+  const auto none = judged();
+  ASSERT_TRUE(none) << none.error().message();
+  EXPECT_FALSE(none->believed) << none->why;
 }
 
 }  // namespace

@@ -90,6 +90,47 @@ TEST(Resection, AViewOfSomethingElseOrOfNothingGetsNoPose) {
   EXPECT_TRUE(added->empty());
 }
 
+TEST(Resection, AFrameHeldByItsOwnLinesGoesWhereTheOthersHaveIt) {
+  const FeatureScene scene = described_scene();
+  PosedFrames posed = posed_but(scene, {});
+  const Rigid3d right = *posed.poses[5];
+  // Two degrees aside on the orbit, and matches along the lines of that place.
+  Rigid3d aside = right;
+  aside.rotation = right.rotation * Eigen::AngleAxisd(0.035, Eigen::Vector3d::UnitZ());
+  posed.poses[5] = aside;
+  PairMatches matches = scene.graph.verified;
+  for (auto& [pair, list] : matches)
+    if (pair.first == 5 || pair.second == 5) list = guided_matches(scene.graph, pair, posed, 6);
+  ASSERT_GT((camera_center(aside) - camera_center(right)).norm(), 0.02);
+
+  const auto found = resect_by_others(scene.graph, matches, posed, 5, {});
+  ASSERT_TRUE(found);
+  EXPECT_LT((camera_center(*found) - camera_center(right)).norm(), 0.01);
+  EXPECT_LT(found->rotation.angularDistance(right.rotation), 0.003);
+}
+
+TEST(Resection, WithoutMatchesOfItsOwnAFrameStaysWhereItIs) {
+  FeatureScene scene = described_scene();
+  const PosedFrames posed = posed_but(scene, {});
+  const PairMatches matches = scene.graph.verified;
+  std::erase_if(scene.graph.proposed, [](const auto& entry) {
+    return entry.first.first == 9 || entry.first.second == 9;
+  });
+  EXPECT_FALSE(resect_by_others(scene.graph, matches, posed, 9, {}));
+}
+
+TEST(Tracks, TheRightPosesExplainMoreMatchesThanFoldedOnes) {
+  const FeatureScene scene = described_scene();
+  const PosedFrames right = posed_but(scene, {});
+  PosedFrames folded = right;
+  std::swap(folded.poses[2], folded.poses[8]);
+  const int explained = explained_matches(scene.graph, right);
+  EXPECT_GT(explained, 1000);
+  EXPECT_LT(explained_matches(scene.graph, folded), 0.9 * explained);
+  EXPECT_EQ(explained_matches(scene.graph, posed_but(scene, {})), explained);
+  EXPECT_EQ(explained_matches(scene.graph, {FramePoses(24), scene.graph.cameras}), 0);
+}
+
 TEST(Tracks, AreTriangulatedWhereTheTruthIs) {
   const FeatureScene scene = described_scene();
   const auto tracks =
