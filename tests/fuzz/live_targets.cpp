@@ -157,8 +157,7 @@ void camera_frame(Front in) {
     static_cast<void>(samples.apply(frame, 0x3fff));
   }
   frame.thermal_is_gray = thermal && frame.pixels.depth() == CV_8U;
-  static_cast<void>(
-      encode_frame(frame, thermal ? Modality::thermal : Modality::visible, "fuzz"));
+  static_cast<void>(encode_frame(frame, thermal ? Modality::thermal : Modality::visible, "fuzz"));
 }
 
 void camera_constants(Front in) {
@@ -216,24 +215,24 @@ void profile(std::string_view bytes) {
 std::vector<std::string> http_seeds() {
   const std::string head = std::string("\r\nHost: 127.0.0.1:8470\r\nX-Token: ") + token + "\r\n";
   const std::string post = head + "X-OrbitFuse: 1\r\n";
-  return {"GET / HTTP/1.1" + head + "\r\n",
-          "GET /state HTTP/1.1" + head + "Accept: */*\r\n\r\n",
-          "GET /preview/thermal?palette=inferno&low=280&high=343 HTTP/1.1" + head + "\r\n",
-          "HEAD /preview/visible HTTP/1.0" + head + "Range: bytes=0-10,20-\r\n\r\n",
-          "GET /temperature?u=0.5&v=%30.5&token=" + std::string(token) +
-              " HTTP/1.1\r\nHost: [::1]:1\r\n\r\n",
-          "POST /stop HTTP/1.1" + post + "\r\n",
-          "POST /nuc HTTP/1.1" + post + "Content-Length: 3\r\n\r\na=b",
-          "POST /start HTTP/1.1" + post +
-              "Content-Type: multipart/form-data; boundary=x\r\nContent-Length: "
-              "75\r\n\r\n--x\r\nContent-Disposition: form-data; name=\"a\"; "
-              "filename=\"b\"\r\n\r\nc\r\n--x--\r\n",
-          "POST /station HTTP/1.1" + post +
-              "Transfer-Encoding: chunked\r\n\r\n3\r\nabc\r\n0\r\n\r\n",
-          "POST /stop HTTP/1.1" + post +
-              "Content-Encoding: gzip\r\nContent-Length: 4\r\n\r\n\x1f\x8b\x08",
-          "GET /" + std::string(8000, 'a') + " HTTP/1.1" + head + "\r\n",
-          "OPTIONS * HTTP/1.1" + head + "Expect: 100-continue\r\n\r\n"};
+  return {
+      "GET / HTTP/1.1" + head + "\r\n",
+      "GET /state HTTP/1.1" + head + "Accept: */*\r\n\r\n",
+      "GET /preview/thermal?palette=inferno&low=280&high=343 HTTP/1.1" + head + "\r\n",
+      "HEAD /preview/visible HTTP/1.0" + head + "Range: bytes=0-10,20-\r\n\r\n",
+      "GET /temperature?u=0.5&v=%30.5&token=" + std::string(token) +
+          " HTTP/1.1\r\nHost: [::1]:1\r\n\r\n",
+      "POST /stop HTTP/1.1" + post + "\r\n",
+      "POST /nuc HTTP/1.1" + post + "Content-Length: 3\r\n\r\na=b",
+      "POST /start HTTP/1.1" + post +
+          "Content-Type: multipart/form-data; boundary=x\r\nContent-Length: "
+          "75\r\n\r\n--x\r\nContent-Disposition: form-data; name=\"a\"; "
+          "filename=\"b\"\r\n\r\nc\r\n--x--\r\n",
+      "POST /station HTTP/1.1" + post + "Transfer-Encoding: chunked\r\n\r\n3\r\nabc\r\n0\r\n\r\n",
+      "POST /stop HTTP/1.1" + post +
+          "Content-Encoding: gzip\r\nContent-Length: 4\r\n\r\n\x1f\x8b\x08",
+      "GET /" + std::string(8000, 'a') + " HTTP/1.1" + head + "\r\n",
+      "OPTIONS * HTTP/1.1" + head + "Expect: 100-continue\r\n\r\n"};
 }
 
 template <class T>

@@ -27,7 +27,7 @@ for program in images formats live field; do
     ln -sf "fuzz_$program" "$bin/fuzz_$target.run"
   done
 done
-[ ${#targets[@]} -gt 0 ] || targets=(rjpeg tiff photo exif sidecar ply colmap_text colmap_binary transforms truth manifest toml http camera profile field)
+[ ${#targets[@]} -gt 0 ] || targets=(rjpeg tiff photo heic exif sidecar ply colmap_text colmap_binary transforms truth manifest toml http camera profile field)
 
 export ASAN_OPTIONS=detect_leaks=1:allocator_may_return_null=1
 # Findings in libraries that read files for us are theirs; what they do to us is ours.
