@@ -15,7 +15,8 @@ namespace {
 
 constexpr unsigned char app3 = 0xe3, app4 = 0xe4;
 /// Of DJI's thermal sensors; 2 bytes a sample.
-constexpr std::array<std::array<int, 2>, 4> sizes{{{640, 512}, {1280, 1024}, {320, 256}, {160, 120}}};
+constexpr std::array<std::array<int, 2>, 4> sizes{
+    {{640, 512}, {1280, 1024}, {320, 256}, {160, 120}}};
 
 /// The segments of one marker before the picture's data, joined.
 std::string joined(std::string_view jpeg, unsigned char marker) {

@@ -117,8 +117,7 @@ ExifInfo heif_exif(std::string_view bytes) {
   if (heif_image_handle_get_metadata(handle, id, block.data()).code != heif_error_Ok) return {};
   // Four bytes say where the TIFF header is behind them (ISO/IEC 23008-12, A.2.1).
   std::size_t offset = 0;
-  for (std::size_t i = 0; i < 4; ++i)
-    offset = offset << 8 | static_cast<unsigned char>(block[i]);
+  for (std::size_t i = 0; i < 4; ++i) offset = offset << 8 | static_cast<unsigned char>(block[i]);
   if (offset > size - 4) return {};
   ExifInfo info = read_exif(std::string_view(block).substr(4 + offset));
   info.orientation = 1;

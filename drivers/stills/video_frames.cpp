@@ -100,8 +100,8 @@ struct Look {
   double sharpness = 0;  ///< below 0: no frame of this video's size
 };
 
-std::vector<Look> look_at_all(Reader& reader, const VideoOptions& options,
-                              const Progress& progress, VideoAccount& account, Status& status) {
+std::vector<Look> look_at_all(Reader& reader, const VideoOptions& options, const Progress& progress,
+                              VideoAccount& account, Status& status) {
   std::vector<Look> looks;
   cv::Mat image, small, before;
   cv::Size size;
@@ -168,9 +168,9 @@ Status VideoOptions::validate() const {
 }
 
 std::string VideoAccount::words() const {
-  std::string text = fmt::format(
-      "{} of {} frames taken, {} passed over for a sharper one of nearly the same view", taken,
-      frames, less_sharp());
+  std::string text =
+      fmt::format("{} of {} frames taken, {} passed over for a sharper one of nearly the same view",
+                  taken, frames, less_sharp());
   if (blurred > 0)
     text += fmt::format(", {} blurred though the sharpest of their stretch: film slower", blurred);
   if (featureless > 0) text += fmt::format(", {} with nothing to see", featureless);
@@ -187,8 +187,8 @@ std::string VideoAccount::words() const {
 bool has_video_extension(const fs::path& file) {
   std::string extension = file.extension().string();
   for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  constexpr std::array<std::string_view, 10> known{".mp4",  ".mov", ".m4v",  ".mkv", ".webm",
-                                                   ".avi",  ".mpg", ".mpeg", ".mts", ".3gp"};
+  constexpr std::array<std::string_view, 10> known{".mp4", ".mov", ".m4v",  ".mkv", ".webm",
+                                                   ".avi", ".mpg", ".mpeg", ".mts", ".3gp"};
   return std::find(known.begin(), known.end(), extension) != known.end();
 }
 
@@ -200,7 +200,8 @@ bool is_video(std::string_view b) {
   };
   for (const std::string_view box : {"ftyp"sv, "moov"sv, "mdat"sv, "wide"sv, "free"sv, "skip"sv})
     if (at(4, box)) return true;
-  const bool transport = (at(0, "\x47"sv) && at(188, "\x47"sv)) || (at(4, "\x47"sv) && at(196, "\x47"sv));
+  const bool transport =
+      (at(0, "\x47"sv) && at(188, "\x47"sv)) || (at(4, "\x47"sv) && at(196, "\x47"sv));
   return transport || at(0, "\x1a\x45\xdf\xa3"sv) || (at(0, "RIFF"sv) && at(8, "AVI "sv)) ||
          at(0, "\0\0\1\xba"sv) || at(0, "\0\0\1\xb3"sv);
 }

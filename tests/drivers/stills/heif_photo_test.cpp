@@ -46,8 +46,7 @@ class HeifPhoto : public ::testing::Test {
 
 TEST_F(HeifPhoto, IsReadUprightInEveryOrientation) {
   for (int orientation = 1; orientation <= 8; ++orientation) {
-    const std::string bytes =
-        made::heic(quarters(), orientation, made::exif_block(orientation));
+    const std::string bytes = made::heic(quarters(), orientation, made::exif_block(orientation));
     ASSERT_TRUE(is_heif(bytes));
     const auto image = decode_heif(bytes, "f");
     ASSERT_TRUE(image) << image.error().message();
@@ -104,9 +103,10 @@ TEST_F(HeifPhoto, WhatIsCutOrDamagedIsNamed) {
 
 TEST(HeifPhotoBytes, NothingAndOtherBrandsAreNone) {
   EXPECT_FALSE(is_heif(""));
-  EXPECT_FALSE(is_heif(std::string("\0\0\0\x18"
-                                   "ftypisom",
-                                   12)));
+  EXPECT_FALSE(
+      is_heif(std::string("\0\0\0\x18"
+                          "ftypisom",
+                          12)));
   EXPECT_FALSE(decode_heif("", "f"));
   EXPECT_EQ(heif_exif("").orientation, 1);
 }

@@ -86,8 +86,7 @@ TEST_F(VideoFrames, TheSharpestOfEachStretchIsTakenAndEveryFrameIsAccountedFor) 
     EXPECT_NEAR(static_cast<double>(frame.time_ns), 1e9 * static_cast<double>(frame.index) / 30,
                 0.04e9);
   }
-  for (std::size_t i = 1; i < taken.size(); ++i)
-    EXPECT_GT(taken[i].index, taken[i - 1].index);
+  for (std::size_t i = 1; i < taken.size(); ++i) EXPECT_GT(taken[i].index, taken[i - 1].index);
 }
 
 TEST_F(VideoFrames, NoMoreThanAskedForAndSpreadOverTheWay) {
@@ -110,8 +109,8 @@ TEST_F(VideoFrames, BlurredStretchesAndEmptyOnesAreToldAndNotTaken) {
   EXPECT_THAT(account->words(), HasSubstr("film slower"));
   for (const VideoFrame& frame : taken) EXPECT_LT(frame.index, 22);
 
-  account = take(write("gray.mp4", std::vector<cv::Mat>(
-                                       10, cv::Mat(height, width, CV_8UC3, cv::Scalar::all(90)))));
+  account = take(write(
+      "gray.mp4", std::vector<cv::Mat>(10, cv::Mat(height, width, CV_8UC3, cv::Scalar::all(90)))));
   ASSERT_TRUE(account);
   EXPECT_EQ(account->taken, 0);
   EXPECT_EQ(account->featureless, 1);
