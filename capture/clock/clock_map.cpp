@@ -87,8 +87,9 @@ void ClockMap::fit() {
   constexpr int slices = 16;
   std::optional<Sample> best[slices];
   for (const Sample& s : samples_) {
-    const int slice =
-        span > 0 ? std::min(slices - 1, static_cast<int>(slices * (s.device_s - first) / span)) : 0;
+    // After a step the first few frames may be in any order, and far apart.
+    const double place = span > 0 ? slices * (s.device_s - first) / span : 0;
+    const int slice = static_cast<int>(std::clamp(place, 0.0, slices - 1.0));
     if (!best[slice] || s.arrival_s - s.device_s < best[slice]->arrival_s - best[slice]->device_s)
       best[slice] = s;
   }

@@ -48,9 +48,8 @@ Status NetworkOptions::validate() const {
     return fail(ErrorKind::usage, "network.url", "not an address of a stream",
                 "write network:http://ADDRESS:PORT/PATH (MJPEG) or network:rtsp://ADDRESS/PATH");
   }
-  for (const auto& [field, time] : {std::pair{"open", feed.open},
-                                    {"stall", feed.stall},
-                                    {"reopen_every", feed.reopen_every}}) {
+  for (const auto& [field, time] :
+       {std::pair{"open", feed.open}, {"stall", feed.stall}, {"reopen_every", feed.reopen_every}}) {
     if (time.count() <= 0)
       return fail(ErrorKind::usage, std::string("network.") + field,
                   fmt::format("{} ms", time.count()), "must be > 0");
@@ -58,7 +57,9 @@ Status NetworkOptions::validate() const {
   return {};
 }
 
-NetworkSource::NetworkSource(NetworkOptions options) : options_(std::move(options)) {}
+NetworkSource::NetworkSource(NetworkOptions options) : options_(std::move(options)) {
+  set_up_ffmpeg();
+}
 
 NetworkSource::~NetworkSource() { stop(); }
 
@@ -132,8 +133,8 @@ Delivery NetworkSource::frame_of(FeedItem item) {
     away_ = false;
     failure_.clear();
     Delivery event =
-        event_delivery(EventKind::reconnected, fmt::format("after {:.1f} s, about {} frames lost",
-                                                           outage_s, cost));
+        event_delivery(EventKind::reconnected,
+                       fmt::format("after {:.1f} s, about {} frames lost", outage_s, cost));
     last_frame_ = item.at;
     item.skipped = 0;
     pending_.push_back(frame_of(std::move(item)));

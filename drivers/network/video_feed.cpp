@@ -64,10 +64,9 @@ void put(Shared& shared, FeedItem::Kind kind, std::string why, cv::Size size = {
 bool open(cv::VideoCapture& capture, const FeedOptions& options, bool first) {
   const auto deadline = first ? options.open : std::min(options.open, options.stall);
   try {
-    return capture.open(
-        options.url, cv::CAP_FFMPEG,
-        {cv::CAP_PROP_OPEN_TIMEOUT_MSEC, static_cast<int>(deadline.count()),
-         cv::CAP_PROP_READ_TIMEOUT_MSEC, static_cast<int>(options.stall.count())});
+    return capture.open(options.url, cv::CAP_FFMPEG,
+                        {cv::CAP_PROP_OPEN_TIMEOUT_MSEC, static_cast<int>(deadline.count()),
+                         cv::CAP_PROP_READ_TIMEOUT_MSEC, static_cast<int>(options.stall.count())});
   } catch (const cv::Exception&) {
     return false;
   }
@@ -112,9 +111,6 @@ std::string read_all(Shared& shared, cv::VideoCapture& capture) {
 }
 
 void run(const std::shared_ptr<Shared>& shared) {
-  // Lossy transports tear pictures, and what FFmpeg says of that belongs to no terminal.
-  ::setenv("OPENCV_FFMPEG_CAPTURE_OPTIONS", "rtsp_transport;tcp|analyzeduration;1000000", 0);
-  ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
   bool first = true;
   while (!shared->is_over()) {
     cv::VideoCapture capture;
@@ -134,6 +130,12 @@ void run(const std::shared_ptr<Shared>& shared) {
 }
 
 }  // namespace
+
+void set_up_ffmpeg() {
+  // Lossy transports tear pictures, and what FFmpeg says of that belongs to no terminal.
+  ::setenv("OPENCV_FFMPEG_CAPTURE_OPTIONS", "rtsp_transport;tcp|analyzeduration;1000000", 0);
+  ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
+}
 
 VideoFeed::VideoFeed(FeedOptions options) : shared_(std::make_shared<Shared>()) {
   shared_->options = std::move(options);

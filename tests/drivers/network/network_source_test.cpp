@@ -43,20 +43,19 @@ class Phone {
         response.status = 503;
         return;
       }
-      response.set_chunked_content_provider(
-          "multipart/x-mixed-replace; boundary=frame",
-          [this](std::size_t, httplib::DataSink& sink) {
-            const auto write = [&](const std::string& bytes) {
-              return sink.write(bytes.data(), bytes.size());
-            };
-            for (int k = 0; !over && !hang_up; ++k) {
-              if (!part(number++, write)) break;
-              std::this_thread::sleep_for(20ms);
-            }
-            hang_up = false;
-            sink.done();
-            return false;
-          });
+      response.set_chunked_content_provider("multipart/x-mixed-replace; boundary=frame",
+                                            [this](std::size_t, httplib::DataSink& sink) {
+                                              const auto write = [&](const std::string& bytes) {
+                                                return sink.write(bytes.data(), bytes.size());
+                                              };
+                                              for (int k = 0; !over && !hang_up; ++k) {
+                                                if (!part(number++, write)) break;
+                                                std::this_thread::sleep_for(20ms);
+                                              }
+                                              hang_up = false;
+                                              sink.done();
+                                              return false;
+                                            });
     });
     server.set_keep_alive_max_count(1);
     port = server.bind_to_any_port("127.0.0.1");
@@ -170,9 +169,8 @@ TEST_F(NetworkTest, AnEndedConnectionIsToldReopenedAndCostsItsTime) {
   ASSERT_TRUE(source.start());
   drain(source, frames(15));
   phone.hang_up = true;
-  const Came came = drain(source, [](const Came& c) {
-    return c.has("reconnected") && c.frames.size() > 5;
-  });
+  const Came came =
+      drain(source, [](const Came& c) { return c.has("reconnected") && c.frames.size() > 5; });
   EXPECT_TRUE(came.has("disconnected"));
   EXPECT_TRUE(came.has("reconnected"));
   EXPECT_EQ(came.events.front(), "disconnected");
@@ -261,8 +259,8 @@ TEST_F(NetworkTest, OneThatIsAwayAtTheEndIsCountedAndNobodyWaits) {
 TEST_F(NetworkTest, WhatIsNoStreamIsRefusedInTimeAndSecretsStayUntold) {
   Phone phone;
   phone.refuse = true;
-  NetworkOptions o = options("http://me:secret@127.0.0.1:" + std::to_string(phone.port) +
-                             "/video?key=hidden");
+  NetworkOptions o =
+      options("http://me:secret@127.0.0.1:" + std::to_string(phone.port) + "/video?key=hidden");
   NetworkSource refused(o);
   const Status status = refused.start();
   ASSERT_FALSE(status);
