@@ -8,7 +8,7 @@ packages=(
   g++ cmake ninja-build pkg-config git
   libeigen3-dev libceres-dev libopencv-dev libtbb-dev
   libcli11-dev nlohmann-json3-dev libtomlplusplus-dev libexpected-dev libfmt-dev libspdlog-dev
-  libtiff-dev libpng-dev libjpeg-dev libcharls-dev libexiv2-dev libsqlite3-dev libxxhash-dev libnanoflann-dev
+  libtiff-dev libpng-dev libjpeg-dev libcharls-dev libheif-dev libexiv2-dev libsqlite3-dev libxxhash-dev libnanoflann-dev
   libaravis-dev libusb-1.0-0-dev libopencv-contrib-dev libcpp-httplib-dev libhpdf-dev
   libgtest-dev libgmock-dev libbenchmark-dev
   colmap

@@ -15,6 +15,7 @@ const std::map<std::string, std::vector<std::string>> drivers{
     {"aravis", {"profile"}},
     {"v4l2",
      {"exposure", "focus", "format", "kelvin-per-dn", "lock", "rate", "size", "white-balance"}},
+    {"network", {}},
     {"stills", {"existing", "gray"}},
     {"replay", {"speed"}},
     {"synthetic", {"size", "spacing"}}};
@@ -40,7 +41,8 @@ std::string CameraSpec::value(const std::string& key) const {
 
 Result<CameraSpec> parse_camera_spec(const std::string& text) {
   CameraSpec spec;
-  std::size_t comma = text.find(',');
+  // Nothing but settings needs a comma, and addresses may hold one.
+  std::size_t comma = text.starts_with("network:") ? std::string::npos : text.find(',');
   const std::string head = text.substr(0, comma);
   const std::size_t colon = head.find(':');
   spec.driver = head.substr(0, colon);

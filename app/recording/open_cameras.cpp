@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "drivers/aravis/aravis_source.hpp"
+#include "drivers/network/network_source.hpp"
 #include "drivers/replay/replay_source.hpp"
 #include "drivers/stills/watch_source.hpp"
 #include "drivers/synthetic/orbit.hpp"
@@ -150,6 +151,20 @@ Status add_v4l2(const CameraSpec& spec, Modality modality, Cameras& cameras) {
   return {};
 }
 
+Status add_network(const CameraSpec& spec, Modality modality, Cameras& cameras) {
+  if (modality == Modality::thermal) {
+    return fail(ErrorKind::usage, "network", "as thermal camera",
+                "what phones send is a picture without temperatures: give it as --visible");
+  }
+  network::NetworkOptions options;
+  options.feed.url = spec.camera;
+  options.device_id = device_id(modality);
+  ORBITFUSE_TRY(options.validate());
+  cameras.live = true;
+  cameras.sources.push_back(std::make_unique<network::NetworkSource>(options));
+  return {};
+}
+
 Status add_stills(const CameraSpec& spec, Modality modality, Cameras& cameras) {
   WatchOptions options;
   options.folder = spec.camera;
@@ -180,6 +195,7 @@ Status add_cameras(const CameraSpec& spec, Modality modality, const fs::path& pr
                    Cameras& cameras) {
   if (spec.driver == "replay") return add_replay(spec, modality, cameras);
   if (spec.driver == "synthetic") return add_synthetic(spec, modality, cameras);
+  if (spec.driver == "network") return add_network(spec, modality, cameras);
   if (spec.driver == "stills") return add_stills(spec, modality, cameras);
   if (spec.driver == "aravis") return add_aravis(spec, modality, profiles, cameras);
   return add_v4l2(spec, modality, cameras);

@@ -150,9 +150,10 @@ Status Recording::prepare(const std::atomic<bool>* cancel) {
   recorder_options.next_ids = next_ids_;
   if (!options_.live) recorder_options.backpressure = Backpressure::wait;
   recorder_ = std::make_unique<Recorder>(*writer_, recorder_options);
-  recorder_->on_frame = [this](const FrameRecord& frame, const cv::Mat& pixels) {
-    keep_latest({frame.modality, pixels, frame.file});
-    if (guide_) guide_->add(frame, pixels);
+  recorder_->on_frame = [this](const StoredFrame& frame) {
+    const FrameRecord& record = frame.record;
+    keep_latest({record.modality, frame.pixels, record.file, frame.scale});
+    if (guide_) guide_->add(record, frame.pixels);
   };
   return {};
 }
@@ -169,9 +170,11 @@ void Recording::show(FrameSource& source, const std::atomic<bool>& over) {
     const Result<Delivery> delivery = source.next(std::chrono::milliseconds(100));
     if (!delivery || delivery->kind == Delivery::Kind::end) return;
     if (delivery->kind != Delivery::Kind::frame) continue;
-    const auto pixels = upright_pixels(delivery->frame, modality, "preview");
-    if (pixels)
-      keep_latest({modality, *pixels, fmt::format("before recording {}", delivery->frame.id)});
+    const auto upright = upright_frame(delivery->frame, modality, "preview");
+    if (upright) {
+      keep_latest({modality, upright->pixels,
+                   fmt::format("before recording {}", delivery->frame.id), upright->scale});
+    }
   }
 }
 

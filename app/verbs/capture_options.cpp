@@ -181,8 +181,8 @@ void add_capture_options(CLI::App& app, CaptureOptions& options) {
   app.add_option(
       "--visible", options.visible,
       "Visible camera: DRIVER[:CAMERA][,KEY=VALUE]...; drivers are aravis (GigE Vision), v4l2 "
-      "(USB video), stills (stills:FOLDER takes photos that arrive there), replay and "
-      "synthetic");
+      "(USB video), network (network:http://PHONE:8080/video, or rtsp:), stills (stills:FOLDER "
+      "takes photos that arrive there), replay and synthetic");
   app.add_option("--thermal", options.thermal,
                  "Thermal camera, written alike, e.g. aravis:192.168.1.20 or stills:FOLDER for "
                  "radiometric JPEGs");

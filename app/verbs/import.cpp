@@ -28,7 +28,13 @@ const std::vector<std::pair<std::string, ThermalScale>> scales = {
 
 void add_sources(CLI::App& app, Options& o) {
   constexpr const char* group = "Sources";
-  app.add_option("--visible", o.import.visible, "Photos: folders or files")->group(group);
+  app.add_option("--visible", o.import.visible,
+                 "Photos (JPEG, PNG, TIFF, HEIC) and videos of an orbit: folders or files")
+      ->group(group);
+  app.add_option("--video-frames", o.import.video.max_frames,
+                 "Take at most this many frames of a video, the sharpest along the way")
+      ->capture_default_str()
+      ->group(group);
   app.add_option("--thermal", o.import.thermal,
                  "Radiometric JPEG, 16-bit TIFF or PNG, 8-bit images: folders or files")
       ->group(group);
@@ -103,6 +109,7 @@ Status check_ranges(const Options& o) {
                           {"--emissivity", o.import.object.emissivity, 0.01, 1},
                           {"--distance-m", o.import.object.distance_m, 0, 1e5},
                           {"--kelvin-offset", o.kelvin_offset, -10000, 10000},
+                          {"--video-frames", o.import.video.max_frames, 2, 5000},
                           {"--visible-focal-px", o.import.visible_focal_px, 1, 1e6},
                           {"--thermal-focal-px", o.import.thermal_focal_px, 1, 1e6}};
   for (const Range& r : ranges) {

@@ -11,6 +11,9 @@ namespace {
 constexpr double ns = 1e-9;
 /// Below this spread of device times a slope means nothing.
 constexpr double min_span_s = 2.0;
+/// 146 years. A camera's stamp is 64 bits from the wire; beyond this it is no time, and differences
+/// would overflow.
+constexpr std::int64_t latest_ns = std::int64_t{1} << 62;
 /// Crystal oscillators stay within 200 ppm; a steeper slope is noise.
 constexpr double max_drift = 500e-6;
 
@@ -35,7 +38,7 @@ ClockMap::Stamp ClockMap::add(std::int64_t device_ns, std::int64_t arrival_ns) {
     stamp.host_time_ns = last_host_ns_;
     return stamp;
   };
-  if (device_ns == 0) return finish(arrival_ns);
+  if (device_ns <= 0 || device_ns > latest_ns) return finish(arrival_ns);
   if (samples_.empty()) begin_segment(device_ns, arrival_ns);
 
   const double device_s = static_cast<double>(device_ns - device_origin_ns_) * ns;
@@ -84,8 +87,9 @@ void ClockMap::fit() {
   constexpr int slices = 16;
   std::optional<Sample> best[slices];
   for (const Sample& s : samples_) {
-    const int slice =
-        span > 0 ? std::min(slices - 1, static_cast<int>(slices * (s.device_s - first) / span)) : 0;
+    // After a step the first few frames may be in any order, and far apart.
+    const double place = span > 0 ? slices * (s.device_s - first) / span : 0;
+    const int slice = static_cast<int>(std::clamp(place, 0.0, slices - 1.0));
     if (!best[slice] || s.arrival_s - s.device_s < best[slice]->arrival_s - best[slice]->device_s)
       best[slice] = s;
   }

@@ -247,6 +247,14 @@ struct PageServer::Impl {
 PageServer::PageServer(PageOptions options, PageHooks hooks) : impl_(std::make_unique<Impl>()) {
   impl_->options = std::move(options);
   impl_->hooks = std::move(hooks);
+  impl_->needs_token = impl_->options.require_token || !is_loopback(impl_->options.host);
+  if (impl_->needs_token && impl_->options.token.empty()) {
+    std::random_device random;
+    impl_->options.token =
+        fmt::format("{:08x}{:08x}{:08x}{:08x}", random(), random(), random(), random());
+  }
+  impl_->server.set_payload_max_length(1024);
+  impl_->add_routes();
 }
 
 PageServer::~PageServer() { stop(); }
@@ -254,19 +262,11 @@ PageServer::~PageServer() { stop(); }
 Status PageServer::start() {
   Impl& self = *impl_;
   ORBITFUSE_TRY(self.options.validate());
-  self.needs_token = self.options.require_token || !is_loopback(self.options.host);
-  if (self.needs_token && self.options.token.empty()) {
-    std::random_device random;
-    self.options.token =
-        fmt::format("{:08x}{:08x}{:08x}{:08x}", random(), random(), random(), random());
-  }
-  self.server.set_payload_max_length(1024);
   self.server.set_socket_options([](int socket) {
     // Not SO_REUSEPORT, httplib's default: a second recorder would share the port unnoticed.
     const int yes = 1;
     setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
   });
-  self.add_routes();
   if (self.options.port == 0) {
     self.port = self.server.bind_to_any_port(self.options.host.c_str());
   } else {
@@ -282,9 +282,11 @@ Status PageServer::start() {
   }
   self.gate = std::make_unique<ConnectionGate>(
       self.server.take_listener(), GateLimits{},
-      [&self](const std::string& request) { return self.server.answer(request); });
+      [this](const std::string& request) { return answer(request); });
   return {};
 }
+
+std::string PageServer::answer(const std::string& request) { return impl_->server.answer(request); }
 
 void PageServer::stop() { impl_->gate.reset(); }
 

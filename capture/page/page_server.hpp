@@ -47,6 +47,9 @@ class PageServer {
   /// Device error with the remedy when the port is taken or the address is not this machine's.
   Status start();
   void stop();
+  /// The answer, head and body, to the bytes of one request, without a connection; what start()
+  /// serves. From any thread.
+  std::string answer(const std::string& request);
   int port() const;
   /// What to open, the token included where one is needed: the first of urls().
   std::string url() const;

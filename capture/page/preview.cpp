@@ -24,11 +24,11 @@ cv::Mat reduced(const cv::Mat& image) {
   return small;
 }
 
-/// Centikelvin to kelvin; invalid samples become NaN.
-cv::Mat kelvin_of(const cv::Mat& centikelvin) {
+/// Invalid samples become NaN.
+cv::Mat kelvin_of(const cv::Mat& counts, ThermalScaleTag scale) {
   cv::Mat kelvin;
-  centikelvin.convertTo(kelvin, CV_32FC1, 0.01);
-  kelvin.setTo(std::numeric_limits<float>::quiet_NaN(), centikelvin == 0);
+  counts.convertTo(kelvin, CV_32FC1, scale.scale, scale.offset);
+  kelvin.setTo(std::numeric_limits<float>::quiet_NaN(), counts == 0);
   return kelvin;
 }
 
@@ -47,8 +47,8 @@ Result<Preview> PreviewCache::get(const LatestFrame& frame, const std::string& p
   cv::Mat picture = reduced(frame.pixels);
   if (picture.depth() == CV_16U) {
     ORBITFUSE_ASSIGN(const cv::Mat colours, palette(palette_name));
-    preview.span = span ? *span : common_span({kelvin_of(frame.pixels)});
-    picture = colorize(kelvin_of(picture), *preview.span, colours);
+    preview.span = span ? *span : common_span({kelvin_of(frame.pixels, frame.scale)});
+    picture = colorize(kelvin_of(picture, frame.scale), *preview.span, colours);
   }
   ORBITFUSE_ASSIGN(preview.jpeg, encode_jpeg(picture, 80));
   if (entries_.size() >= most_entries) entries_.clear();
@@ -59,9 +59,10 @@ Result<Preview> PreviewCache::get(const LatestFrame& frame, const std::string& p
 std::optional<double> kelvin_at(const LatestFrame& frame, double u, double v) {
   const cv::Mat& image = frame.pixels;
   if (!(u >= 0 && u < 1 && v >= 0 && v < 1) || image.depth() != CV_16U) return std::nullopt;
-  const int centikelvin =
+  const int count =
       image.at<std::uint16_t>(static_cast<int>(v * image.rows), static_cast<int>(u * image.cols));
-  return centikelvin > 0 ? std::optional<double>(0.01 * centikelvin) : std::nullopt;
+  if (count == 0) return std::nullopt;
+  return frame.scale.scale * count + frame.scale.offset;
 }
 
 }  // namespace orbitfuse

@@ -25,51 +25,43 @@ Status check_type(const cv::Mat& image, const Frame& frame, Modality modality,
   return {};
 }
 
-/// A frame's image, upright, with what its file says of itself.
-struct DecodedFrame {
-  cv::Mat pixels;
-  std::string description;  ///< of a TIFF
-};
+}  // namespace
 
-Result<DecodedFrame> decode_frame(const Frame& frame, Modality modality, const std::string& where) {
-  DecodedFrame decoded;
+Result<UprightFrame> upright_frame(const Frame& frame, Modality modality,
+                                   const std::string& where) {
+  UprightFrame upright;
+  upright.scale = {frame.kelvin_per_count, 0};
   if (frame.encoded.empty()) {
     if (frame.pixels.empty())
       return fail(ErrorKind::input, where, "an empty frame", "check the driver");
     ORBITFUSE_TRY(check_type(frame.pixels, frame, modality, where));
-    decoded.pixels = frame.pixels;
-    return decoded;
+    upright.pixels = frame.pixels;
+    return upright;
   }
   cv::Mat image;
+  std::string description;  // of a TIFF
   if (image_format(frame.encoded) == ImageFormat::tiff) {
-    ORBITFUSE_ASSIGN(image, decode_tiff(frame.encoded, where, &decoded.description));
+    ORBITFUSE_ASSIGN(image, decode_tiff(frame.encoded, where, &description));
   } else {
     ORBITFUSE_ASSIGN(image, decode_image(frame.encoded, where));
   }
   ORBITFUSE_TRY(check_type(image, frame, modality, where));
-  decoded.pixels = apply_orientation(
+  if (modality == Modality::thermal && !frame.thermal_is_gray) {
+    ORBITFUSE_ASSIGN(const auto tag, thermal_scale_of_description(description, where));
+    if (tag) upright.scale = *tag;
+  }
+  upright.pixels = apply_orientation(
       image, modality == Modality::visible ? read_exif(frame.encoded).orientation : 1);
-  return decoded;
-}
-
-}  // namespace
-
-Result<cv::Mat> upright_pixels(const Frame& frame, Modality modality, const std::string& where) {
-  ORBITFUSE_ASSIGN(DecodedFrame decoded, decode_frame(frame, modality, where));
-  return std::move(decoded.pixels);
+  return upright;
 }
 
 Result<EncodedFrame> encode_frame(const Frame& frame, Modality modality, const std::string& where) {
-  ORBITFUSE_ASSIGN(DecodedFrame decoded, decode_frame(frame, modality, where));
+  ORBITFUSE_ASSIGN(UprightFrame upright, upright_frame(frame, modality, where));
   EncodedFrame out;
   out.has_temperature = modality == Modality::thermal && !frame.thermal_is_gray;
-  out.pixels = std::move(decoded.pixels);
-  out.scale = {frame.kelvin_per_count, 0};
+  out.pixels = std::move(upright.pixels);
+  out.scale = upright.scale;
   if (!frame.encoded.empty()) {
-    if (out.has_temperature) {
-      ORBITFUSE_ASSIGN(const auto tag, thermal_scale_of_description(decoded.description, where));
-      if (tag) out.scale = *tag;
-    }
     out.bytes = frame.encoded;
     out.extension = frame.extension;
     return out;

@@ -19,8 +19,13 @@ struct EncodedFrame {
   ThermalScaleTag scale;  ///< of the pixels, when they are temperatures
 };
 
+struct UprightFrame {
+  cv::Mat pixels;
+  ThermalScaleTag scale;  ///< of 16-bit thermal pixels
+};
+
 /// The frame's image, upright; input error when it isn't one of its modality.
-Result<cv::Mat> upright_pixels(const Frame& frame, Modality modality, const std::string& where);
+Result<UprightFrame> upright_frame(const Frame& frame, Modality modality, const std::string& where);
 
 /// Encodes `pixels` without loss, or checks that `encoded` decodes as the modality demands.
 /// Input error (the frame is bad) otherwise.

@@ -301,7 +301,7 @@ struct Recorder::Channel {
       const std::lock_guard lock(mutex);
       latest = stored->record;
     }
-    if (on_frame) on_frame(stored->record, stored->pixels);
+    if (on_frame) on_frame(*stored);
   }
 
   void give_up(const Frame& frame, const Error& cause) {

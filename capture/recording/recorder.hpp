@@ -74,7 +74,7 @@ class Recorder {
  public:
   Recorder(SessionWriter& writer, RecorderOptions options);
   /// `on_frame` (optional) is called from writer threads after the frame is on disk.
-  using OnFrame = std::function<void(const FrameRecord&, const cv::Mat& pixels)>;
+  using OnFrame = std::function<void(const StoredFrame&)>;
   OnFrame on_frame;
 
   /// Runs until every source ended, `progress` is cancelled or an error occurs. All accounting is

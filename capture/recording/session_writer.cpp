@@ -229,7 +229,7 @@ Result<StoredFrame> SessionWriter::store(const std::string& device_id, const Fra
   }
   ORBITFUSE_TRY(write_file_atomic(folder_ / record.file, encoded.bytes));
   ORBITFUSE_TRY(append_line(manifest_line(record)));
-  return StoredFrame{std::move(record), encoded.pixels};
+  return StoredFrame{std::move(record), encoded.pixels, encoded.scale};
 }
 
 Status SessionWriter::amend(const FrameRecord& record) {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "capture/frame_source.hpp"
+#include "core/image/image_codec.hpp"
 #include "core/result.hpp"
 #include "core/session/session.hpp"
 
@@ -16,6 +17,7 @@ namespace orbitfuse {
 struct StoredFrame {
   FrameRecord record;
   cv::Mat pixels;
+  ThermalScaleTag scale;  ///< of 16-bit thermal pixels
 };
 
 /// Appends to a session folder. When append() returns, the frame's file and its manifest line are

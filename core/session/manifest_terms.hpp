@@ -31,6 +31,7 @@ enum class EventKind {
   nuc,
   nuc_failed,
   raw_counts,
+  clipped,
   clock,
   stale,
   late_frame,
@@ -47,6 +48,7 @@ enum class FrameFlag {
   file_time,   ///< a photo without a time of its own
   other_port,  ///< from a camera of the same serial in another USB port
   raw_counts,  ///< a picture of counts of unknown scale
+  clipped,     ///< some of its samples were at the end of the camera's scale, and are dead pixels
 };
 
 template <class Term>
@@ -55,7 +57,7 @@ struct NamedTerm {
   std::string_view name;
 };
 
-inline constexpr std::array<NamedTerm<EventKind>, 27> event_kinds{{
+inline constexpr std::array<NamedTerm<EventKind>, 28> event_kinds{{
     {EventKind::resumed, "resumed"},
     {EventKind::ignored, "ignored"},
     {EventKind::duplicate, "duplicate"},
@@ -76,6 +78,7 @@ inline constexpr std::array<NamedTerm<EventKind>, 27> event_kinds{{
     {EventKind::nuc, "nuc"},
     {EventKind::nuc_failed, "nuc-failed"},
     {EventKind::raw_counts, "raw-counts"},
+    {EventKind::clipped, "clipped"},
     {EventKind::clock, "clock"},
     {EventKind::stale, "stale"},
     {EventKind::late_frame, "late-frame"},
@@ -85,12 +88,13 @@ inline constexpr std::array<NamedTerm<EventKind>, 27> event_kinds{{
     {EventKind::stream_error, "stream-error"},
 }};
 
-inline constexpr std::array<NamedTerm<FrameFlag>, 5> frame_flags{{
+inline constexpr std::array<NamedTerm<FrameFlag>, 6> frame_flags{{
     {FrameFlag::nuc, "nuc"},
     {FrameFlag::still, "still"},
     {FrameFlag::file_time, "file-time"},
     {FrameFlag::other_port, "other-port"},
     {FrameFlag::raw_counts, "raw-counts"},
+    {FrameFlag::clipped, "clipped"},
 }};
 
 /// The tables are in the order of their enums: a test holds them to it.

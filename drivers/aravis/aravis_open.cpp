@@ -24,12 +24,15 @@ void prefer_receiving(void* /*data*/, ArvStreamCallbackType type, ArvBuffer* /*b
 std::optional<Format> format_of(ArvPixelFormat format) {
   switch (format) {
     case ARV_PIXEL_FORMAT_MONO_8:
-      return Format{CV_8UC1, 1};
+      return Format{CV_8UC1, 1, 0xff};
     case ARV_PIXEL_FORMAT_MONO_10:
+      return Format{CV_16UC1, 2, 0x3ff};
     case ARV_PIXEL_FORMAT_MONO_12:
+      return Format{CV_16UC1, 2, 0xfff};
     case ARV_PIXEL_FORMAT_MONO_14:
+      return Format{CV_16UC1, 2, 0x3fff};
     case ARV_PIXEL_FORMAT_MONO_16:
-      return Format{CV_16UC1, 2};
+      return Format{CV_16UC1, 2, 0xffff};
     default:
       return std::nullopt;
   }
@@ -84,7 +87,7 @@ Status AravisSource::open() {
   arv_camera_stop_acquisition(link->camera, nullptr);
   const auto prepare = [&]() -> Status {
     ORBITFUSE_TRY(push_settings());
-    ORBITFUSE_ASSIGN(table_, temperature_table());
+    ORBITFUSE_ASSIGN(temperatures_, temperatures());
     ORBITFUSE_TRY(settle_image(*link, where));
     const std::optional<Format> format = format_of(link->pixel_format);
     if (!format) {
@@ -201,9 +204,9 @@ Status AravisSource::push_settings() {
   return {};
 }
 
-Result<std::vector<std::uint16_t>> AravisSource::temperature_table() {
-  if (profile_.scale == SampleScale::none) return std::vector<std::uint16_t>{};
-  if (profile_.scale == SampleScale::linear) return linear_table(profile_.kelvin_per_dn);
+Result<std::optional<ThermalSamples>> AravisSource::temperatures() {
+  if (profile_.scale == SampleScale::none) return std::nullopt;
+  if (profile_.scale == SampleScale::linear) return ThermalSamples::linear(profile_.kelvin_per_dn);
   PlanckParameters parameters;
   for (const auto& [node, field] : {std::pair<const char*, double*>{"R", &parameters.r},
                                     {"B", &parameters.b},
@@ -218,7 +221,8 @@ Result<std::vector<std::uint16_t>> AravisSource::temperature_table() {
       return fail(ErrorKind::device, std::string("node ") + node, take_text(error),
                   "choose a profile with scale = \"linear\"");
   }
-  return planck_table(parameters);
+  ORBITFUSE_ASSIGN(std::vector<double> kelvin, planck_table(parameters));
+  return ThermalSamples::table(std::move(kelvin));
 }
 
 }  // namespace orbitfuse::aravis

@@ -186,11 +186,11 @@ Delivery AravisSource::inspect(void* handle, const Arrival& arrival) {
     pending_.push_back(event_delivery(EventKind::nuc, "the image is frozen"));
   if (format.bytes == 1) {
     frame.thermal_is_gray = options_.modality == Modality::thermal;
-  } else if (table_.empty()) {
+  } else if (!temperatures_) {
     if (const auto stretch = raw_counts_.apply(frame))
       pending_.push_back(event_delivery(EventKind::raw_counts, *stretch));
-  } else {
-    frame.pixels.forEach<std::uint16_t>([this](std::uint16_t& dn, const int*) { dn = table_[dn]; });
+  } else if (const auto clipped = temperatures_->apply(frame, format.full_scale)) {
+    pending_.push_back(event_delivery(EventKind::clipped, *clipped));
   }
   return delivery;
 }

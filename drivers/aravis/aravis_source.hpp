@@ -18,6 +18,7 @@
 #include "capture/recording/freeze_watch.hpp"
 #include "capture/recording/lasting_failure.hpp"
 #include "capture/recording/raw_counts.hpp"
+#include "capture/recording/thermal_samples.hpp"
 #include "drivers/aravis/profile.hpp"
 
 namespace orbitfuse::aravis {
@@ -86,7 +87,7 @@ class AravisSource final : public FrameSource {
   Status open();
   Status push_settings();
   Status settle_image(Link& link, const std::string& where);
-  Result<std::vector<std::uint16_t>> temperature_table();
+  Result<std::optional<ThermalSamples>> temperatures();
   void bury_link();
   void watch_control();
   Delivery lose(const std::string& why);
@@ -114,8 +115,8 @@ class AravisSource final : public FrameSource {
   std::optional<Image> first_image_;  ///< a session keeps its size
   std::jthread control_watch_;
   std::atomic<bool> control_mute_{false}, correction_wanted_{false};
-  StreamStatistics earlier_;  ///< of connections that are gone
-  std::vector<std::uint16_t> table_;
+  StreamStatistics earlier_;                    ///< of connections that are gone
+  std::optional<ThermalSamples> temperatures_;  ///< nothing: counts of unknown scale
   std::vector<Delivery> pending_;
   mutable std::mutex info_mutex_;  ///< others ask while a camera reopens
   DeviceInfo info_;

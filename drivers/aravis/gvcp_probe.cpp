@@ -15,15 +15,16 @@ namespace {
 
 using Reply = std::array<std::uint8_t, 512>;
 
-/// Sends one request of id 0x6f66 and returns the size of its acknowledgement; 0: none came.
-std::size_t ask(const std::string& ip_address, const void* request, std::size_t size,
-                std::chrono::milliseconds timeout, Reply& reply) {
+/// Sends one request of id 0x6f66 and returns what came back; nothing: none came.
+std::span<const std::uint8_t> ask(const std::string& ip_address, const void* request,
+                                  std::size_t size, std::chrono::milliseconds timeout,
+                                  Reply& reply) {
   sockaddr_in to{};
   to.sin_family = AF_INET;
   to.sin_port = htons(3956);
-  if (inet_pton(AF_INET, ip_address.c_str(), &to.sin_addr) != 1) return 0;
+  if (inet_pton(AF_INET, ip_address.c_str(), &to.sin_addr) != 1) return {};
   const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (fd < 0) return 0;
+  if (fd < 0) return {};
   ssize_t received = 0;
   if (sendto(fd, request, size, 0, reinterpret_cast<sockaddr*>(&to), sizeof to) > 0) {
     pollfd waiter{fd, POLLIN, 0};
@@ -31,17 +32,31 @@ std::size_t ask(const std::string& ip_address, const void* request, std::size_t 
       received = recv(fd, reply.data(), reply.size(), 0);
   }
   close(fd);
-  const bool ours = received >= 8 && reply[6] == 0x6f && reply[7] == 0x66;
-  return ours ? static_cast<std::size_t>(received) : 0;
+  if (received <= 0) return {};
+  return std::span<const std::uint8_t>(reply).first(static_cast<std::size_t>(received));
+}
+
+bool is_ours(std::span<const std::uint8_t> datagram) {
+  return datagram.size() >= 8 && datagram[6] == 0x6f && datagram[7] == 0x66;
 }
 
 }  // namespace
+
+bool is_discovery_answer(std::span<const std::uint8_t> datagram) {
+  return is_ours(datagram) && datagram[3] == 0x03;
+}
+
+std::optional<std::uint32_t> register_in_answer(std::span<const std::uint8_t> d) {
+  // READREG_ACK, status success.
+  if (!is_ours(d) || d.size() < 12 || d[0] != 0 || d[1] != 0 || d[3] != 0x81) return std::nullopt;
+  return std::uint32_t{d[8]} << 24 | std::uint32_t{d[9]} << 16 | std::uint32_t{d[10]} << 8 | d[11];
+}
 
 bool answers(const std::string& ip_address, std::chrono::milliseconds timeout) {
   // Key 0x42, acknowledge wanted, DISCOVERY_CMD, no payload, request id 0x6f66.
   const std::array<std::uint8_t, 8> request{0x42, 0x01, 0x00, 0x02, 0x00, 0x00, 0x6f, 0x66};
   Reply reply{};
-  return ask(ip_address, request.data(), request.size(), timeout, reply) > 0 && reply[3] == 0x03;
+  return is_discovery_answer(ask(ip_address, request.data(), request.size(), timeout, reply));
 }
 
 std::optional<std::uint32_t> read_register(const std::string& ip_address, GvcpRegister address,
@@ -55,11 +70,7 @@ std::optional<std::uint32_t> read_register(const std::string& ip_address, GvcpRe
                                              0x00,        0x04,        0x6f,       0x66,
                                              byte(a, 24), byte(a, 16), byte(a, 8), byte(a, 0)};
   Reply reply{};
-  const std::size_t size = ask(ip_address, request.data(), request.size(), timeout, reply);
-  // READREG_ACK, status success.
-  if (size < 12 || reply[0] != 0 || reply[1] != 0 || reply[3] != 0x81) return std::nullopt;
-  return std::uint32_t{reply[8]} << 24 | std::uint32_t{reply[9]} << 16 |
-         std::uint32_t{reply[10]} << 8 | reply[11];
+  return register_in_answer(ask(ip_address, request.data(), request.size(), timeout, reply));
 }
 
 }  // namespace orbitfuse::aravis

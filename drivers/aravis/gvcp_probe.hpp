@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 
 namespace orbitfuse::aravis {
@@ -11,6 +12,10 @@ namespace orbitfuse::aravis {
 /// Whether a GigE Vision device answers a discovery request at this address in time. Opening a
 /// camera that is away blocks Aravis for seconds; this asks first.
 bool answers(const std::string& ip_address, std::chrono::milliseconds timeout);
+
+/// What an acknowledgement holds, of the request id that is always ours. Anything else is none.
+bool is_discovery_answer(std::span<const std::uint8_t> datagram);
+std::optional<std::uint32_t> register_in_answer(std::span<const std::uint8_t> datagram);
 
 /// Registers that every GigE Vision device has.
 enum class GvcpRegister : std::uint32_t {

@@ -25,6 +25,7 @@ inline std::string text(const char* value) { return value ? value : ""; }
 /// How a pixel format lies in memory.
 struct Format {
   int cv_type, bytes;
+  int full_scale;  ///< the highest sample
 };
 /// Nothing for formats that are not supported.
 std::optional<Format> format_of(ArvPixelFormat format);

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "drivers/aravis/profile.hpp"
 
+#include <fmt/format.h>
 #include <toml++/toml.h>
+
 #include <algorithm>
 #include <array>
+
+#include "capture/recording/thermal_samples.hpp"
 
 namespace orbitfuse::aravis {
 namespace {
@@ -38,8 +42,11 @@ Result<CameraProfile> profile_of(const toml::table& table, const fs::path& file)
     profile.scale = SampleScale::radiometric;
   else if (scale != "none")
     return bad(file, "scale", scale, "one of none, linear, radiometric");
-  if (profile.scale == SampleScale::linear && !(profile.kelvin_per_dn > 0)) {
-    return bad(file, "kelvin_per_dn", "missing", "scale = \"linear\" needs it, e.g. 0.01");
+  if (profile.scale == SampleScale::linear &&
+      !(profile.kelvin_per_dn > 0 && profile.kelvin_per_dn <= max_kelvin_per_sample)) {
+    const bool given = table.contains("kelvin_per_dn");
+    return bad(file, "kelvin_per_dn", given ? fmt::format("{}", profile.kelvin_per_dn) : "missing",
+               "scale = \"linear\" needs it, above 0 and at most 10, e.g. 0.01");
   }
   // An array of one-entry tables, because the order matters and TOML tables have none.
   const auto* settings = table["settings"].as_array();

@@ -7,8 +7,6 @@
 #include <cmath>
 #include <utility>
 
-#include "core/temperature.hpp"
-
 namespace orbitfuse::aravis {
 
 Status PlanckParameters::validate() const {
@@ -30,27 +28,17 @@ Status PlanckParameters::validate() const {
   return {};
 }
 
-std::vector<std::uint16_t> linear_table(double kelvin_per_dn) {
-  std::vector<std::uint16_t> table(65536);
-  for (std::size_t dn = 0; dn < table.size(); ++dn) {
-    table[dn] =
-        centikelvin_from_kelvin(static_cast<float>(kelvin_per_dn * static_cast<double>(dn)));
-  }
-  return table;
-}
-
-Result<std::vector<std::uint16_t>> planck_table(const PlanckParameters& p) {
+Result<std::vector<double>> planck_table(const PlanckParameters& p) {
   ORBITFUSE_TRY(p.validate());
   const auto signal = [&](double kelvin) { return p.r / (std::exp(p.b / kelvin) - p.f); };
   const double reflected = (1 - p.emissivity) * p.transmission * signal(p.reflected_k);
   const double atmosphere = (1 - p.transmission) * signal(p.atmosphere_k);
-  std::vector<std::uint16_t> table(65536);
+  std::vector<double> table(65536, std::nan(""));
   for (std::size_t raw = 0; raw < table.size(); ++raw) {
     const double s = ((static_cast<double>(raw) - p.j0) / p.j1 - reflected - atmosphere) /
                      (p.emissivity * p.transmission);
     const double argument = p.r / s + p.f;
-    if (s > 0 && argument > 1)
-      table[raw] = centikelvin_from_kelvin(static_cast<float>(p.b / std::log(argument)));
+    if (s > 0 && argument > 1) table[raw] = p.b / std::log(argument);
   }
   return table;
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "core/result.hpp"
@@ -18,8 +17,7 @@ struct PlanckParameters {
   Status validate() const;
 };
 
-/// Centikelvin of every 16-bit sample; 0 where the signal has no temperature.
-std::vector<std::uint16_t> linear_table(double kelvin_per_dn);
-Result<std::vector<std::uint16_t>> planck_table(const PlanckParameters& parameters);
+/// Kelvin of every 16-bit sample; NaN where the signal has no temperature.
+Result<std::vector<double>> planck_table(const PlanckParameters& parameters);
 
 }  // namespace orbitfuse::aravis

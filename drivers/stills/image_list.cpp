@@ -9,6 +9,8 @@
 #include <set>
 #include <string_view>
 
+#include "drivers/stills/video_frames.hpp"
+
 namespace orbitfuse {
 namespace {
 
@@ -20,14 +22,6 @@ std::string extension_of(const fs::path& path) {
   std::string extension = path.extension().string();
   for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   return extension;
-}
-
-bool has_image_extension(Modality modality, const fs::path& path) {
-  constexpr std::array<std::string_view, 9> known{
-      ".jpg", ".jpeg", ".png", ".tif", ".tiff",
-      ".bmp", ".seq",  ".csq", ".fff"};  // the last three: thermal
-  const auto end = modality == Modality::thermal ? known.end() : known.end() - 3;
-  return std::find(known.begin(), end, extension_of(path)) != end;
 }
 
 struct UnreadFormat {
@@ -52,6 +46,16 @@ std::pair<std::size_t, std::size_t> digit_run(const std::string& s, std::size_t 
 }
 
 }  // namespace
+
+bool has_image_extension(Modality modality, const fs::path& path) {
+  constexpr std::array<std::string_view, 6> both{".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp"};
+  constexpr std::array<std::string_view, 3> photos{".heic", ".heif", ".hif"},
+      recordings{".seq", ".csq", ".fff"};
+  const auto is_one_of = [extension = extension_of(path)](const auto& list) {
+    return std::find(list.begin(), list.end(), extension) != list.end();
+  };
+  return is_one_of(both) || is_one_of(modality == Modality::thermal ? recordings : photos);
+}
 
 bool natural_less(const std::string& a, const std::string& b) {
   std::size_t i = 0, j = 0;
@@ -98,7 +102,8 @@ Result<ImageList> list_images(Modality modality, const std::vector<fs::path>& pa
     const std::size_t before = files.size(), unread_before = list.unread.size();
     for (const fs::directory_entry& entry : folder) {
       if (!entry.is_regular_file(error)) continue;
-      if (has_image_extension(modality, entry.path()))
+      if (has_image_extension(modality, entry.path()) ||
+          (modality == Modality::visible && has_video_extension(entry.path())))
         files.push_back(entry.path());
       else if (!unread_kind(entry.path()).empty())
         list.unread.push_back(entry.path());
@@ -107,10 +112,11 @@ Result<ImageList> list_images(Modality modality, const std::vector<fs::path>& pa
       const bool other = list.unread.size() > unread_before;
       return fail(
           ErrorKind::input, path.string(),
-          other ? fmt::format(
-                      "no JPEG, PNG, TIFF or BMP in the folder, but {} of another format ({})",
-                      list.unread.size() - unread_before, list.unread.back().filename().string())
-                : "no images (jpg, png, tif, bmp) in the folder",
+          other ? fmt::format("no JPEG, PNG, TIFF, BMP, HEIC or video in the folder, but {} of "
+                              "another format ({})",
+                              list.unread.size() - unread_before,
+                              list.unread.back().filename().string())
+                : "no images (jpg, png, tif, bmp, heic) or videos in the folder",
           other ? "convert them to JPEG" : "give the folder that holds the images themselves");
     }
   }

@@ -17,9 +17,13 @@ struct ImageList {
 };
 
 /// Image files named by the paths: files as given, folders without their sub-folders. In natural
-/// name order ("9.jpg" before "10.jpg"). FLIR recordings are thermal images. Input error when a
+/// name order ("9.jpg" before "10.jpg"). FLIR recordings are thermal images,
+/// videos and HEIC visible ones. Input error when a
 /// path is missing or has no images.
 Result<ImageList> list_images(Modality modality, const std::vector<std::filesystem::path>& paths);
+
+/// By its name's ending: ".jpg" in any case of letters, ".heic" for photos, ".seq" for thermal.
+bool has_image_extension(Modality modality, const std::filesystem::path& file);
 
 /// "HEIC", "video" and the like for the name of a picture or video that is not read; else empty.
 std::string unread_kind(const std::filesystem::path& file);

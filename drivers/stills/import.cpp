@@ -60,6 +60,7 @@ class Importer {
                      listed(Modality::thermal, options_.thermal_tracking));
     ORBITFUSE_TRY(check_known(Modality::visible, {&visible_files, &visible_tracking_files}));
     ORBITFUSE_TRY(check_known(Modality::thermal, {&thermal_files, &thermal_tracking_files}));
+    ORBITFUSE_TRY(check_stations_of({&visible_files}));
     ORBITFUSE_TRY(check_disk({&visible_files, &visible_tracking_files}));
     // First every thermal file is looked at: what its samples mean is decided for all of them.
     std::vector<Source> thermal = observed(thermal_files),
@@ -105,17 +106,31 @@ class Importer {
     return files_of_transforms(Modality::thermal);
   }
 
-  /// Photos are copied as they are.
+  /// Photos are copied as they are; HEIC grows as JPEG.
   Status check_disk(std::initializer_list<const std::vector<fs::path>*> photos) const {
     std::uint64_t needed = min_free_session_bytes;
     for (const auto* files : photos) {
       for (const fs::path& file : *files) {
         std::error_code unreadable;
         const std::uintmax_t size = fs::file_size(file, unreadable);
-        if (!unreadable) needed += size;
+        if (!unreadable) needed += unread_kind(file) == "HEIC" ? 4 * size : size;
       }
     }
     return check_free_space(folder_, needed, "free disk space, or import to another disk");
+  }
+
+  /// Where the frames of a video were taken is nobody's word.
+  Status check_stations_of(std::initializer_list<const std::vector<fs::path>*> photos) const {
+    if (!options_.visible_stations) return {};
+    for (const auto* files : photos) {
+      for (const fs::path& file : *files) {
+        if (!has_video_extension(file)) continue;
+        return fail(ErrorKind::usage, file.string(),
+                    "a video, but the photos are declared to be at stations",
+                    "leave --station-spacing-deg out, or import the video by itself");
+      }
+    }
+    return {};
   }
 
   /// Poses that were given belong to the images that were given.
@@ -210,12 +225,39 @@ class Importer {
   Status add_visible(const std::vector<Source>& sources, bool tracking) {
     for (const Source& source : sources) {
       ORBITFUSE_TRY(step());
+      if (source.video) {
+        ORBITFUSE_TRY(add_video(source, tracking));
+        continue;
+      }
       const Result<std::string> bytes = read_file(source.file, max_image_bytes);
       if (!bytes) {
         pass_over(bytes.error());
         continue;
       }
       ORBITFUSE_TRY(add_visible_frame(*bytes, source, tracking, options_.visible_stations));
+    }
+    return {};
+  }
+
+  Status add_video(const Source& source, bool tracking) {
+    const auto account = take_video_frames(
+        source.file, options_.video, progress_, [&](const VideoFrame& frame) -> Status {
+          ORBITFUSE_ASSIGN(StillPhoto still, still_of_video(frame.image));
+          still.frame.device_time_ns = frame.time_ns;
+          Source one = source;
+          one.page = static_cast<int>(frame.index);
+          one.pages = one.page + 2;  // so that its number is in its name
+          return add_frame(std::move(still), one, tracking, {});
+        });
+    if (!account && account.error().kind != ErrorKind::input)
+      return tl::unexpected(account.error());
+    if (!account) {
+      pass_over(account.error());
+    } else if (account->taken == 0) {
+      pass_over({ErrorKind::input, source.file.string(), account->words(),
+                 "film more slowly, in more light"});
+    } else {
+      report_.warnings.push_back(source.short_name() + ": " + account->words());
     }
     return {};
   }
@@ -368,8 +410,8 @@ class Importer {
           "no thermal image has a photo embedded: there are no visible frames from them");
     if (report_.has_temperatures) {
       report_.kelvin_per_count = decoder_.kelvin_per_count();
-      for (std::string& remark : decoder_.remarks()) report_.warnings.push_back(std::move(remark));
     }
+    for (std::string& remark : decoder_.remarks()) report_.warnings.push_back(std::move(remark));
     if (decoder_.samples_are_raw_counts() && !decoder_.has_temperatures()) {
       report_.warnings.push_back(
           "thermal samples are raw counts without a known scale: kept as grey intensities, "

@@ -9,6 +9,7 @@
 #include "core/progress.hpp"
 #include "core/result.hpp"
 #include "core/session/session.hpp"
+#include "drivers/stills/video_frames.hpp"
 
 // Makes a session from files that other cameras and tools left. docs/formats.md lists the sources.
 namespace orbitfuse {
@@ -46,7 +47,8 @@ struct DeclaredStations {
 };
 
 struct ImportOptions {
-  /// Folders or files. A folder is read without its sub-folders, sorted by time, then name.
+  /// Folders or files; of videos (visible) some frames are taken. A folder is read without its
+  /// sub-folders, sorted by time, then name.
   std::vector<std::filesystem::path> visible, thermal;
   /// Thermal (or visible) frames recorded between stations; stored with tracking = true.
   std::vector<std::filesystem::path> visible_tracking, thermal_tracking;
@@ -73,6 +75,8 @@ struct ImportOptions {
   double kelvin_per_count = 0;  ///< for ThermalScale::linear, which needs it
   double kelvin_offset = 0;
   ObjectParameterOverrides object;
+
+  VideoOptions video;  ///< which frames of videos are taken
 
   /// Focal length priors in pixels where the files have none.
   std::optional<double> visible_focal_px, thermal_focal_px;

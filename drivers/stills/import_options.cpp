@@ -74,6 +74,7 @@ Status ImportOptions::validate() const {
       check(!object.any() || !thermal.empty() || !thermal_tracking.empty() || transforms_json,
             "object", "object parameters, but no thermal files",
             "give the radiometric JPEGs as thermal, or leave it out"));
+  ORBITFUSE_TRY(video.validate());
   ORBITFUSE_TRY(check_range(object.emissivity, 0.01, 1, "object.emissivity"));
   ORBITFUSE_TRY(check_range(object.distance_m, 0, 1e5, "object.distance_m"));
   ORBITFUSE_TRY(

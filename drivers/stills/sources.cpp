@@ -5,8 +5,9 @@
 
 #include <algorithm>
 
-#include "core/image/exif.hpp"
 #include "core/system/file_io.hpp"
+#include "drivers/stills/still_photo.hpp"
+#include "drivers/stills/video_frames.hpp"
 
 namespace orbitfuse {
 
@@ -22,12 +23,18 @@ std::string Source::where() const {
 std::vector<Source> photo_sources(const std::vector<std::filesystem::path>& files) {
   std::vector<Source> sources;
   for (const std::filesystem::path& file : files) {
-    const Result<std::string> bytes = read_file(file, max_image_bytes);
     Source source;
     source.file = file;
+    source.video = has_video_extension(file);
+    if (source.video) {
+      source.hash = video_fingerprint(file);
+      sources.push_back(std::move(source));
+      continue;
+    }
+    const Result<std::string> bytes = read_file(file, max_image_bytes);
     if (bytes) {
       source.hash = content_hash(*bytes);
-      source.taken_ns = read_exif(*bytes).taken_ns;
+      source.taken_ns = exif_of_photo(*bytes).taken_ns;
     }
     sources.push_back(std::move(source));
   }

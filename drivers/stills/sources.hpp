@@ -16,7 +16,8 @@ namespace orbitfuse {
 struct Source {
   std::filesystem::path file;
   int page = 0, pages = 1;
-  std::string hash;  ///< of the file's bytes; empty: it can't be read
+  bool video = false;  ///< some of its frames become images
+  std::string hash;    ///< of the file's bytes; empty: it can't be read
   std::optional<std::int64_t> taken_ns;
   int position = 0;  ///< in capture order, counting files that turn out unreadable
 
@@ -26,7 +27,7 @@ struct Source {
   std::string where() const;
 };
 
-/// Photos with the times that they name themselves.
+/// Photos and videos with the times that they name themselves.
 std::vector<Source> photo_sources(const std::vector<std::filesystem::path>& files);
 
 /// Capture order: by time where every file has one (file name breaks ties of one-second clocks),

@@ -8,12 +8,17 @@
 
 #include "core/image/exif.hpp"
 #include "core/system/file_io.hpp"
+#include "drivers/stills/heif_photo.hpp"
 
 namespace orbitfuse {
 namespace {
 
 /// Diagonal of the 36 x 24 mm frame that "35 mm equivalent" refers to.
 constexpr double full_frame_diagonal_mm = 43.2666;
+
+/// HEIC and frames of videos: next to none of what a phone's compression left is lost; PNG would be
+/// ten times as large.
+constexpr int as_jpeg_quality = 97;
 
 std::string extension_of(const std::string& bytes) {
   switch (image_format(bytes)) {
@@ -34,10 +39,20 @@ double focal_px_of_35mm(double focal_35mm, cv::Size size) {
   return focal_35mm * std::hypot(size.width, size.height) / full_frame_diagonal_mm;
 }
 
+ExifInfo exif_of_photo(std::string_view bytes) {
+  return is_heif(bytes) ? heif_exif(bytes) : read_exif(bytes);
+}
+
 Result<StillPhoto> visible_still(std::string bytes, const std::string& where) {
   StillPhoto still;
-  ORBITFUSE_ASSIGN(const cv::Mat image, decode_image(bytes, where));
-  const ExifInfo exif = read_exif(bytes);
+  const ExifInfo exif = exif_of_photo(bytes);
+  cv::Mat image;
+  if (is_heif(bytes)) {
+    ORBITFUSE_ASSIGN(image, decode_heif(bytes, where));
+    ORBITFUSE_ASSIGN(bytes, encode_jpeg(image, as_jpeg_quality));
+  } else {
+    ORBITFUSE_ASSIGN(image, decode_image(bytes, where));
+  }
   still.size = apply_orientation(image, exif.orientation).size();
   still.frame.extension = extension_of(bytes);
   still.frame.encoded = std::move(bytes);
@@ -50,6 +65,17 @@ Result<StillPhoto> visible_still(std::string bytes, const std::string& where) {
   still.lens = exif.focal_mm ? fmt::format("{:g} mm", *exif.focal_mm) : "";
   // A digital zoom changes only the equivalent.
   if (exif.focal_35mm) still.lens += fmt::format(" (35 mm: {:g} mm)", *exif.focal_35mm);
+  return still;
+}
+
+Result<StillPhoto> still_of_video(const cv::Mat& image) {
+  StillPhoto still;
+  ORBITFUSE_ASSIGN(still.frame.encoded, encode_jpeg(image, as_jpeg_quality));
+  still.frame.extension = ".jpg";
+  still.size = image.size();
+  still.camera.modality = Modality::visible;
+  still.camera.driver = "stills";
+  still.lens = "of its videos";  // phones crop and stabilise them
   return still;
 }
 
@@ -76,6 +102,14 @@ Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& 
   frame.host_time_ns = file.taken_ns.value_or(0);
   still.camera.modality = Modality::thermal;
   still.camera.driver = "stills";
+  if (file.dji) {
+    const ExifInfo& exif = file.dji->exif;
+    still.camera.model = exif.model.empty() ? exif.make : exif.make + " " + exif.model;
+    still.camera.serial = exif.serial;
+    if (exif.focal_mm) still.lens = fmt::format("{:g} mm", *exif.focal_mm);
+    if (exif.focal_35mm)
+      still.camera.lens.focal_px = focal_px_of_35mm(*exif.focal_35mm, still.size);
+  }
   if (file.flir) {
     still.camera.model = file.flir->camera_model;
     still.camera.serial = file.flir->camera_serial;

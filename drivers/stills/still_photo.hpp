@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "capture/frame_source.hpp"
+#include "core/image/exif.hpp"
 #include "drivers/stills/thermal_decoder.hpp"
 
 namespace orbitfuse {
@@ -24,14 +25,20 @@ struct StillPhoto {
 /// Size of the upright image at 35 mm equivalent focal length, in pixels.
 double focal_px_of_35mm(double focal_35mm, cv::Size size);
 
-/// The bytes of a photo (JPEG, PNG, TIFF). Input error naming `where` when they don't decode.
+/// What a photo of any format that is read says of itself. Never fails.
+ExifInfo exif_of_photo(std::string_view bytes);
+
+/// The bytes of a photo (JPEG, PNG, TIFF, HEIC). Input error naming `where` when they don't decode.
 Result<StillPhoto> visible_still(std::string bytes, const std::string& where);
+/// A frame of a video (CV_8UC3, upright), which is stored as JPEG.
+Result<StillPhoto> still_of_video(const cv::Mat& image);
 /// A thermal image turned into counts of temperature, or kept as it is when it is 8-bit; counts
 /// without a scale stay as the frame's original.
 Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& decoder,
                                  const std::string& where);
 
-/// A photo (JPEG, PNG, TIFF) kept byte for byte. Input error when it doesn't decode.
+/// A photo (JPEG, PNG, TIFF) kept byte for byte; HEIC becomes an upright JPEG, which everything
+/// reads. Input error when it doesn't decode.
 Result<StillPhoto> read_visible_still(const std::filesystem::path& file);
 /// As above; `decoder` gets to see 16-bit samples of unknown scale first.
 Result<StillPhoto> read_thermal_still(const std::filesystem::path& file, ThermalDecoder& decoder);

@@ -119,7 +119,10 @@ Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::
     return file;
   }
   std::string description;
-  if (image_format(bytes) == ImageFormat::tiff) {
+  if (is_dji_thermal(bytes)) {
+    ORBITFUSE_ASSIGN(file.dji, read_dji_thermal(bytes, where));
+    file.image = file.dji->counts;
+  } else if (image_format(bytes) == ImageFormat::tiff) {
     ORBITFUSE_ASSIGN(file.image, decode_tiff(bytes, where, &description, page));
   } else {
     ORBITFUSE_ASSIGN(file.image, decode_image(bytes, where));
@@ -137,7 +140,7 @@ Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::
   }
   file.kind = ThermalFile::Kind::samples16;
   ORBITFUSE_ASSIGN(file.tag, thermal_scale_of_description(description, where));
-  const std::filesystem::path sidecar = where + ".json";
+  const std::filesystem::path sidecar = where + ".json";  // also of a DJI file: the user's word
   std::error_code ignored;
   if (!file.tag && std::filesystem::exists(sidecar, ignored)) {
     ORBITFUSE_ASSIGN(const std::string text, read_file(sidecar, max_settings_bytes));
@@ -191,16 +194,21 @@ void ThermalDecoder::observe_samples(const ThermalFile& file, const std::string&
     ++with_scale_;
     hottest_k_ = std::max(hottest_k_, kelvin_of(percentile(histogram, 100), *scale));
     if (kelvin_of(percentile(histogram, 50), *scale) > glowing_k) glowing_.push_back(where);
-  } else if (is_plausible(histogram, {}) && options_.thermal_scale == ThermalScale::automatic) {
+  } else if (!file.dji && is_plausible(histogram, {}) &&
+             options_.thermal_scale == ThermalScale::automatic) {
     ++like_centikelvin_;
     add(histogram, centikelvin_);
   } else {
     ++like_counts_;
+    dji_ += file.dji.has_value();
     add(histogram, counts_);
   }
 }
 
-bool ThermalDecoder::samples_are_raw_counts() const { return like_counts_ > like_centikelvin_; }
+/// What a DJI drone wrote says nothing of other files.
+bool ThermalDecoder::samples_are_raw_counts() const {
+  return like_counts_ - dji_ > like_centikelvin_;
+}
 
 bool ThermalDecoder::has_temperatures() const {
   return radiometric_jpegs_ + with_scale_ > 0 ||
@@ -216,6 +224,13 @@ std::vector<std::string> ThermalDecoder::remarks() const {
         "the hottest sample is {:.0f} C, so thermal files hold {:g} K a count, not {:g}; their "
         "tag says so",
         celsius_from_kelvin(hottest_k_), kelvin_per_count(), kelvin_per_dn));
+  }
+  if (dji_ > 0) {
+    list.push_back(fmt::format(
+        "{} thermal files of DJI drones hold counts; how they become temperatures is not "
+        "published: "
+        "export temperatures with DJI's own program, or give a scale (--thermal-scale linear)",
+        dji_));
   }
   if (!glowing_.empty()) {
     list.push_back(fmt::format(
@@ -251,7 +266,7 @@ Result<ThermalDecoder::Converted> ThermalDecoder::convert_samples(const ThermalF
   const CountHistogram histogram = histogram_of(file.image);
   if (scale && !is_plausible(histogram, *scale)) return too_cold(where, histogram, *scale);
   if (!scale && !has_temperatures()) return stretched(file.image);
-  if (!scale && (samples_are_raw_counts() || !is_plausible(histogram, {}))) {
+  if (!scale && (file.dji || samples_are_raw_counts() || !is_plausible(histogram, {}))) {
     return fail(ErrorKind::input, where,
                 "16-bit counts without a known scale, among thermal files with temperatures",
                 by_themselves);

@@ -11,6 +11,7 @@
 
 #include "core/image/image_codec.hpp"
 #include "core/result.hpp"
+#include "drivers/stills/dji_jpeg.hpp"
 #include "drivers/stills/flir_jpeg.hpp"
 #include "drivers/stills/import.hpp"
 
@@ -28,6 +29,7 @@ struct ThermalFile {
   std::optional<std::int64_t> taken_ns;
   cv::Mat image;  ///< samples16: CV_16UC1; gray8: CV_8U
   std::optional<FlirImage> flir;
+  std::optional<DjiImage> dji;         ///< samples16: never temperatures unless the user says how
   std::optional<ThermalScaleTag> tag;  ///< from the file or its sidecar
 };
 
@@ -82,6 +84,7 @@ class ThermalDecoder {
 
   const ImportOptions& options_;
   int files_ = 0, radiometric_jpegs_ = 0, with_scale_ = 0;
+  int dji_ = 0;  ///< files of DJI drones whose counts nobody gave a scale
   int like_centikelvin_ = 0, like_counts_ = 0;  ///< 16-bit files without a scale
   CountHistogram counts_ = CountHistogram(65536),
                  centikelvin_ = CountHistogram(65536);  ///< of these

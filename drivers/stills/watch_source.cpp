@@ -2,7 +2,6 @@
 #include "drivers/stills/watch_source.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <ctime>
 
 #include "core/system/file_io.hpp"
@@ -17,13 +16,9 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds retry_every{250};
 
-bool has_image_name(const fs::path& file) {
-  std::string extension = file.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  for (const char* known : {".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp"}) {
-    if (extension == known) return true;
-  }
-  return false;
+/// A recording of a FLIR camera grows while it is made: import reads it when it is whole.
+bool has_image_name(Modality modality, const fs::path& file) {
+  return has_image_extension(modality, file) && unread_kind(file) != "FLIR recording";
 }
 
 std::int64_t written_ns(const fs::path& file) {
@@ -116,7 +111,7 @@ std::vector<Delivery> WatchSource::unfinished() {
   for (const fs::path& file : reader_->watch.untold()) {
     const bool waiting =
         std::any_of(queue_.begin(), queue_.end(), [&](const Attempt& a) { return a.file == file; });
-    if (!waiting && has_image_name(file)) unread(file);
+    if (!waiting && has_image_name(options_.modality, file)) unread(file);
   }
   queue_.clear();
   return list;
@@ -155,9 +150,10 @@ Result<Delivery> WatchSource::next(std::chrono::milliseconds timeout) {
 /// One look at a file; nothing when it has to be tried again.
 std::optional<Delivery> WatchSource::take(Attempt attempt) {
   const std::string name = attempt.file.filename().string();
-  if (!has_image_name(attempt.file)) {
-    return event_delivery(EventKind::ignored,
-                          name + ": not a JPEG, PNG, TIFF or BMP (set the camera to one of these)");
+  if (!has_image_name(options_.modality, attempt.file)) {
+    return event_delivery(
+        EventKind::ignored,
+        name + ": not a JPEG, PNG, TIFF, BMP or (photos) HEIC (set the camera to one of these)");
   }
   const bool thermal = options_.modality == Modality::thermal;
   const bool radiometric = is_radiometric(attempt.file);

@@ -107,8 +107,8 @@ Status record_synthetic_session(const SyntheticOptions& options, const fs::path&
   const double total = static_cast<double>(synthetic::walk(options, Modality::visible).size() +
                                            synthetic::walk(options, Modality::thermal).size());
   std::atomic<int> done{0};
-  recorder.on_frame = [&](const FrameRecord& record, const cv::Mat&) {
-    progress.report({"record", static_cast<double>(++done), total, -1, record.file});
+  recorder.on_frame = [&](const StoredFrame& stored) {
+    progress.report({"record", static_cast<double>(++done), total, -1, stored.record.file});
   };
   ORBITFUSE_TRY(recorder.run({visible.get(), thermal.get()}, progress));
   ORBITFUSE_TRY(writer->close());

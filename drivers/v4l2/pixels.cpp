@@ -6,11 +6,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstring>
 #include <opencv2/imgproc.hpp>
-
-#include "core/temperature.hpp"
 
 namespace orbitfuse::v4l2 {
 namespace {
@@ -33,17 +30,6 @@ Status unpack_mjpeg(std::span<const std::uint8_t> bytes, const Layout& layout, F
   frame.encoded.assign(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(end));
   frame.extension = ".jpg";
   return {};
-}
-
-cv::Mat y16_pixels(const cv::Mat& counts, double kelvin_per_dn) {
-  if (kelvin_per_dn <= 0) return counts.clone();
-  cv::Mat centikelvin(counts.size(), CV_16UC1);
-  const float scale = static_cast<float>(kelvin_per_dn);
-  std::transform(counts.begin<std::uint16_t>(), counts.end<std::uint16_t>(),
-                 centikelvin.begin<std::uint16_t>(), [scale](std::uint16_t dn) {
-                   return centikelvin_from_kelvin(scale * static_cast<float>(dn));
-                 });
-  return centikelvin;
 }
 
 }  // namespace
@@ -78,6 +64,15 @@ Status unpack(std::span<const std::uint8_t> bytes, const Layout& layout, Frame& 
     return damaged(layout, fmt::format("{} bytes, {} needed for {}x{}", bytes.size(), needed,
                                        layout.width, layout.height));
   }
+  // What only a broken driver says; the conversions below would end the program over it.
+  const bool whole_samples = layout.fourcc != V4L2_PIX_FMT_Y16 || stride % 2 == 0;
+  const bool whole_colors = layout.fourcc == V4L2_PIX_FMT_GREY ||
+                            layout.fourcc == V4L2_PIX_FMT_Y16 ||
+                            (layout.width % 2 == 0 && (!nv12 || layout.height % 2 == 0));
+  if (!whole_samples || !whole_colors) {
+    return damaged(layout, fmt::format("{}x{} with {} bytes a row", layout.width, layout.height,
+                                       layout.bytes_per_line));
+  }
   auto* data = const_cast<std::uint8_t*>(bytes.data());  // cv::Mat has no const view; only read
   const auto view = [&](int type) { return cv::Mat(rows, layout.width, type, data, stride); };
   switch (layout.fourcc) {
@@ -91,8 +86,7 @@ Status unpack(std::span<const std::uint8_t> bytes, const Layout& layout, Frame& 
       frame.pixels = view(CV_8UC1).clone();
       break;
     default:
-      frame.pixels = y16_pixels(view(CV_16UC1), layout.kelvin_per_dn);
-      if (layout.kelvin_per_dn <= 0) frame.flag(FrameFlag::raw_counts);
+      frame.pixels = view(CV_16UC1).clone();
   }
   return {};
 }

@@ -16,7 +16,6 @@ struct Layout {
   std::uint32_t fourcc = 0;  ///< V4L2_PIX_FMT_*
   int width = 0, height = 0;
   int bytes_per_line = 0;
-  double kelvin_per_dn = 0;  ///< Y16 thermal: T[K] = kelvin_per_dn * DN; 0 = raw counts
 };
 
 std::string fourcc_text(std::uint32_t fourcc);
@@ -24,8 +23,7 @@ bool is_supported(std::uint32_t fourcc);
 
 /// Puts one buffer's bytes into frame.pixels or, for MJPEG, byte for byte into frame.encoded.
 /// The error says why the buffer is damaged: too short for its format, or a JPEG without its
-/// start or end marker. YUYV and NV12 become BGR (BT.601); Y16 becomes centikelvin, or stays raw
-/// counts with the flag "raw-counts" when the scale is unknown (RawCounts).
+/// start or end marker. YUYV and NV12 become BGR (BT.601); Y16 stays as it is.
 Status unpack(std::span<const std::uint8_t> bytes, const Layout& layout, Frame& frame);
 
 }  // namespace orbitfuse::v4l2

@@ -48,8 +48,8 @@ Status V4l2Options::validate() const {
     return bad("format", format, "one of MJPG, YUYV, NV12, GREY, Y16");
   }
   if (buffers < 2) return bad("buffers", fmt::format("{}", buffers), "must be >= 2");
-  if (!(kelvin_per_dn >= 0))
-    return bad("kelvin_per_dn", fmt::format("{}", kelvin_per_dn), "must be >= 0");
+  if (!(kelvin_per_dn >= 0 && kelvin_per_dn <= max_kelvin_per_sample))
+    return bad("kelvin_per_dn", fmt::format("{}", kelvin_per_dn), "must be 0 to 10");
   if (stall.count() <= 0 || reopen_every.count() <= 0)
     return bad("stall", "not positive", "must be > 0");
   if (nuc_settle.count() < 0) return bad("nuc_settle", "negative", "must be >= 0");
@@ -144,7 +144,7 @@ Status V4l2Source::choose_format() {
                 "choose a size that the camera has (v4l2-ctl --list-formats-ext)");
   }
   layout_ = Layout{got.pixelformat, static_cast<int>(got.width), static_cast<int>(got.height),
-                   static_cast<int>(got.bytesperline), options_.kelvin_per_dn};
+                   static_cast<int>(got.bytesperline)};
   return {};
 }
 

@@ -11,7 +11,10 @@
 namespace orbitfuse::v4l2 {
 
 V4l2Source::V4l2Source(V4l2Options options, std::shared_ptr<VideoSystem> system)
-    : options_(std::move(options)), system_(std::move(system)), freeze_(options_.nuc_settle) {}
+    : options_(std::move(options)),
+      system_(std::move(system)),
+      temperatures_(ThermalSamples::linear(options_.kelvin_per_dn)),
+      freeze_(options_.nuc_settle) {}
 
 V4l2Source::~V4l2Source() { stop(); }
 
@@ -279,7 +282,10 @@ Delivery V4l2Source::delivery_of(std::uint32_t index, std::uint32_t bytes, std::
   }
   const bool counts = layout_.fourcc == V4L2_PIX_FMT_Y16;
   delivery.frame.thermal_is_gray = options_.modality == Modality::thermal && !counts;
-  if (counts && layout_.kelvin_per_dn <= 0) {
+  if (counts && options_.kelvin_per_dn > 0) {
+    if (const auto clipped = temperatures_.apply(delivery.frame, 0xffff))
+      tell(EventKind::clipped, *clipped);
+  } else if (counts) {
     if (const auto stretch = raw_counts_.apply(delivery.frame))
       tell(EventKind::raw_counts, *stretch);
   }

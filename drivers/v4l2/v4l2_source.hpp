@@ -17,6 +17,7 @@
 #include "capture/recording/freeze_watch.hpp"
 #include "capture/recording/lasting_failure.hpp"
 #include "capture/recording/raw_counts.hpp"
+#include "capture/recording/thermal_samples.hpp"
 #include "drivers/v4l2/identity.hpp"
 #include "drivers/v4l2/pixels.hpp"
 #include "drivers/v4l2/video_system.hpp"
@@ -120,6 +121,7 @@ class V4l2Source final : public FrameSource {
   Clock::time_point ports_looked_at_{};
   std::vector<Mapping> buffers_;
   RawCounts raw_counts_;
+  ThermalSamples temperatures_;  ///< of Y16, where its scale is given
   FreezeWatch freeze_;
   std::vector<Delivery> pending_;  ///< events to tell before the next frame
   Clock::time_point last_frame_{}, last_attempt_{}, lost_at_{};

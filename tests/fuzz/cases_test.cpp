@@ -66,6 +66,7 @@ void run_all(const std::vector<Target>& targets) {
 
 TEST(FuzzCases, Images) { run_all(image_targets()); }
 TEST(FuzzCases, Formats) { run_all(format_targets()); }
+TEST(FuzzCases, Live) { run_all(live_targets()); }
 TEST(FuzzCases, Fields) { run_all(field_targets()); }
 
 }  // namespace

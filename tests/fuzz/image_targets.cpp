@@ -42,6 +42,11 @@ void photo(std::string_view bytes) {
   static_cast<void>(visible_still(std::string(bytes), "fuzz"));
 }
 
+void heic(std::string_view bytes) {
+  static_cast<void>(exif_of_photo(bytes));
+  static_cast<void>(visible_still(std::string(bytes), "fuzz"));
+}
+
 void exif(std::string_view bytes) { static_cast<void>(read_exif(bytes)); }
 
 void sidecar(std::string_view bytes) {
@@ -67,26 +72,7 @@ cv::Mat color() {
 /// An APP1 segment with orientation, time and focal length, before a JPEG's own segments.
 std::string jpeg_with_exif() {
   const std::string jpeg = *encode_jpeg(color(), 80);
-  std::string tiff("II*\0\10\0\0\0", 8);
-  const auto number = [&tiff](std::uint32_t value, int bytes) {
-    for (int i = 0; i < bytes; ++i) tiff += static_cast<char>(value >> (8 * i));
-  };
-  const auto entry = [&](std::uint32_t tag, std::uint32_t type, std::uint32_t count,
-                         std::uint32_t value) {
-    number(tag, 2), number(type, 2), number(count, 4), number(value, 4);
-  };
-  number(2, 2);
-  entry(0x112, 3, 1, 6);
-  entry(0x8769, 4, 1, 38);
-  number(0, 4);
-  number(3, 2);
-  entry(0x9003, 2, 20, 80);
-  entry(0x920a, 5, 1, 100);
-  entry(0xa405, 3, 1, 26);
-  number(0, 4);
-  tiff += std::string("2024:05:06 07:08:09\0", 20);
-  number(43, 4), number(10, 4);
-  const std::string payload = std::string("Exif\0\0", 6) + tiff;
+  const std::string payload = std::string("Exif\0\0", 6) + made::exif_block(6);
   std::string segment("\xff\xe1", 2);
   segment += static_cast<char>((payload.size() + 2) >> 8);
   segment += static_cast<char>((payload.size() + 2) & 0xff);
@@ -96,9 +82,11 @@ std::string jpeg_with_exif() {
 std::vector<std::string> rjpeg_seeds() {
   const FlirCalibration camera = made::flir_calibration();
   cv::Mat signal = counts() / 2;
-  return {made::flir_jpeg(signal, camera), made::flir_jpeg(signal, camera, made::FlirPixels::png),
+  return {made::flir_jpeg(signal, camera),
+          made::flir_jpeg(signal, camera, made::FlirPixels::png),
           made::flir_jpeg(signal, camera, made::FlirPixels::raw, *encode_jpeg(color(), 70), 700),
           made::flir_jpeg(signal, camera, made::FlirPixels::jpeg_ls),
+          made::dji_jpeg(cv::Mat(120, 160, CV_16UC1, cv::Scalar(18500))),
           made::flir_file(signal, camera, made::FlirPixels::jpeg_ls, {}) +
               made::flir_file(signal, camera, made::FlirPixels::raw, {})};
 }
@@ -118,6 +106,19 @@ std::vector<std::string> photo_seeds() {
           *encode_png(counts()), jpeg_with_exif()};
 }
 
+/// Without an encoder on this machine one that is cut after its brand.
+std::vector<std::string> heic_seeds() {
+  std::vector<std::string> seeds{
+      std::string("\0\0\0\x18"
+                  "ftypheic\0\0\0\0mif1heic",
+                  24)};
+  for (const int orientation : {1, 6}) {
+    std::string photo = made::heic(color(), orientation, made::exif_block(orientation));
+    if (!photo.empty()) seeds.push_back(std::move(photo));
+  }
+  return seeds;
+}
+
 std::vector<std::string> exif_seeds() { return {jpeg_with_exif()}; }
 
 std::vector<std::string> sidecar_seeds() {
@@ -128,11 +129,10 @@ std::vector<std::string> sidecar_seeds() {
 }  // namespace
 
 const std::vector<Target>& image_targets() {
-  static const std::vector<Target> list{{"rjpeg", rjpeg, rjpeg_seeds},
-                                        {"tiff", tiff, tiff_seeds},
-                                        {"photo", photo, photo_seeds},
-                                        {"exif", exif, exif_seeds},
-                                        {"sidecar", sidecar, sidecar_seeds}};
+  static const std::vector<Target> list{
+      {"rjpeg", rjpeg, rjpeg_seeds}, {"tiff", tiff, tiff_seeds},
+      {"photo", photo, photo_seeds}, {"heic", heic, heic_seeds},
+      {"exif", exif, exif_seeds},    {"sidecar", sidecar, sidecar_seeds}};
   return list;
 }
 

@@ -18,16 +18,16 @@ while [ $# -gt 0 ]; do
 done
 
 [ -f build/fuzz/build.ninja ] || cmake --preset fuzz
-cmake --build --preset fuzz --target fuzz_images fuzz_formats fuzz_field
+cmake --build --preset fuzz --target fuzz_images fuzz_formats fuzz_live fuzz_field
 bin=build/fuzz/tests/fuzz
 declare -A part
-for program in images formats field; do
+for program in images formats live field; do
   for target in $("$bin/fuzz_$program" 2>/dev/null || true); do
     part[$target]=$program
     ln -sf "fuzz_$program" "$bin/fuzz_$target.run"
   done
 done
-[ ${#targets[@]} -gt 0 ] || targets=(rjpeg tiff photo exif sidecar ply colmap_text colmap_binary transforms truth manifest toml field)
+[ ${#targets[@]} -gt 0 ] || targets=(rjpeg tiff photo heic exif sidecar ply colmap_text colmap_binary transforms truth manifest toml http camera profile field)
 
 export ASAN_OPTIONS=detect_leaks=1:allocator_may_return_null=1
 # Findings in libraries that read files for us are theirs; what they do to us is ours.

@@ -21,6 +21,7 @@ struct Target {
 const std::vector<Target>&
 image_targets();  ///< radiometric JPEG, TIFF, JPEG and PNG, EXIF, sidecars
 const std::vector<Target>& format_targets();  ///< PLY, COLMAP, transforms, truth, manifest, TOML
+const std::vector<Target>& live_targets();    ///< requests to the page, what cameras send, profiles
 const std::vector<Target>& field_targets();   ///< field.bin with its checksum repaired
 
 /// Null when there is no such target in the list.

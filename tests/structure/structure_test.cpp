@@ -55,6 +55,7 @@ const std::map<std::string, Floors> floors_of{
       {"cli"},
       {"verbs"}}},
     {"drivers/aravis", {}},
+    {"drivers/network", {}},
     {"drivers/replay", {}},
     {"drivers/stills", {}},
     {"drivers/synthetic", {}},

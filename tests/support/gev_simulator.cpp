@@ -103,7 +103,7 @@ void GevSimulator::reset_memory() {
   real(gev_registers::planck_b, 1430);
   real(gev_registers::planck_f, 1);
   real(gev_registers::j0, 100);
-  real(gev_registers::j1, 40);
+  real(gev_registers::j1, static_cast<float>(options_.planck_j1));
   real(gev_registers::emissivity, 0.95f);
   real(gev_registers::reflected_k, 293.15f);
 }
@@ -337,7 +337,7 @@ GevSimulator::SentFrame GevSimulator::make_frame(std::uint64_t number, std::uint
   const bool mono8 = every(faults_.wrong_format_every);
   std::vector<std::uint8_t> data(std::size_t{width} * height * (mono8 ? 1 : 2));
   for (std::size_t i = 0; i < data.size() / (mono8 ? 1 : 2); ++i) {
-    const std::uint16_t value = pixel(number, i);
+    const std::uint16_t value = i == 0 && options_.spot > 0 ? options_.spot : pixel(number, i);
     if (mono8) {
       data[i] = static_cast<std::uint8_t>(value);
     } else {  // GVSP pixels are little endian

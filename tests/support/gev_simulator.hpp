@@ -37,6 +37,8 @@ struct GevOptions {
   double rate_hz = 30;
   std::uint16_t first_frame_id = 65400;  ///< wraps early, as GVSP ids do
   double clock_offset_s = 40, clock_drift_ppm = 50;
+  std::uint16_t spot = 0;       ///< the first pixel's sample in every frame; 0: as its number says
+  double planck_j1 = 40;        ///< counts of signal: at 10 the samples reach 900 C
   bool enforce_control = true;  ///< false: whoever writes a register is obeyed
 };
 

@@ -27,6 +27,16 @@ std::string flir_jpeg(const cv::Mat& signal, const FlirCalibration& calibration,
 std::string flir_file(const cv::Mat& signal, const FlirCalibration& calibration, FlirPixels pixels,
                       const std::string& embedded_photo);
 
+/// A thermal JPEG of a DJI drone: counts of a known size in APP3, parameters in APP4 as newer ones
+/// have them, DJI as maker.
+std::string dji_jpeg(const cv::Mat& counts, bool with_parameters = true);
+
+/// A HEIC photo of CV_8UC3 that is shown turned as EXIF's `orientation` says, by the file's own
+/// rotation and mirroring; `exif`: a TIFF block, or empty. Empty when this machine has no encoder.
+std::string heic(const cv::Mat& image, int orientation = 1, const std::string& exif = {});
+/// The TIFF block of an EXIF: orientation, time 2024-05-06 07:08:09, 4.3 mm, 26 mm at 35 mm.
+std::string exif_block(int orientation);
+
 /// An uncompressed little-endian TIFF of several CV_16UC1 or CV_8UC1 pages, with descriptions.
 std::string tiff_of_pages(const std::vector<cv::Mat>& pages, const std::string& description = {});
 

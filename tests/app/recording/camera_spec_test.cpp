@@ -49,6 +49,23 @@ TEST(OpenCameras, WhatCannotBeOpenedIsSaidBeforeAnythingRuns) {
   EXPECT_TRUE(cameras.sources.empty());
 }
 
+TEST(OpenCameras, AddressesOfPhonesMayHoldAnythingAndAreForPhotosOnly) {
+  const auto spec = parse_camera_spec("network:rtsp://me:secret@10.0.0.7:554/s?a=b,c=d");
+  ASSERT_TRUE(spec) << spec.error().message();
+  EXPECT_EQ(spec->camera, "rtsp://me:secret@10.0.0.7:554/s?a=b,c=d");
+  EXPECT_TRUE(spec->settings.empty());
+  Cameras cameras;
+  EXPECT_EQ(add_cameras(*spec, Modality::thermal, {}, cameras).error().kind, ErrorKind::usage);
+  for (const char* bad : {"network", "network:/dev/video0", "network:http://", "network:file:///x"})
+    EXPECT_EQ(add_cameras(*parse_camera_spec(bad), Modality::visible, {}, cameras).error().kind,
+              ErrorKind::usage)
+        << bad;
+  EXPECT_TRUE(cameras.sources.empty());
+  ASSERT_TRUE(add_cameras(*spec, Modality::visible, {}, cameras));
+  EXPECT_TRUE(cameras.live);
+  EXPECT_EQ(cameras.sources.at(0)->describe().serial, "rtsp://10.0.0.7:554/s");
+}
+
 TEST(OpenCameras, ControlsOfAVideoCameraAreChecked) {
   Cameras cameras;
   const auto add = [&](const std::string& settings) {

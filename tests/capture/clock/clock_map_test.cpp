@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include <cmath>
 #include <random>
 
@@ -49,6 +51,19 @@ TEST(ClockMap, OffsetAndDriftWithinFiveMilliseconds) {
   EXPECT_LE(map.residual_rms_s(), 0.005);
   EXPECT_GT(map.residual_rms_s(), 0);
   EXPECT_EQ(map.jumps(), 0);
+}
+
+TEST(ClockMap, StampsThatAreNoTimeCountAsNone) {
+  ClockMap clock;
+  std::int64_t arrival = 1'800'000'000'000'000'000, last = 0;
+  for (const std::int64_t stamp :
+       {std::numeric_limits<std::int64_t>::min(), std::int64_t{-1}, std::int64_t{5},
+        std::numeric_limits<std::int64_t>::max(), std::int64_t{1} << 62, std::int64_t{7}}) {
+    const std::int64_t taken = clock.add(stamp, arrival += 1'000'000).host_time_ns;
+    EXPECT_GT(taken, last);
+    EXPECT_LE(taken, arrival);
+    last = taken;
+  }
 }
 
 TEST(ClockMap, StepsAreToldOnceAndTimeNeverGoesBack) {

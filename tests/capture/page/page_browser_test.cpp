@@ -16,11 +16,11 @@ namespace {
 bool has_chromium() { return std::system("command -v chromium > /dev/null 2>&1") == 0; }
 
 struct Shown {
-  int green = 0, magenta = 0;
+  int green = 0, magenta = 0, red = 0;
 };
 
 /// A screenshot after two seconds of page time, and how many pixels have the colours of done
-/// sectors and of the picture.
+/// sectors, of the picture and of the alarm.
 Shown screenshot(const std::string& url, const std::string& size,
                  const std::filesystem::path& folder) {
   const auto file = folder / "shot.png";
@@ -42,6 +42,7 @@ Shown screenshot(const std::string& url, const std::string& size,
     for (int x = 0; x < image->cols; ++x) {
       const cv::Vec3b p = image->at<cv::Vec3b>(y, x);
       shown.green += cv::norm(cv::Vec3i(p[0] - 0x4c, p[1] - 0xc2, p[2] - 0x27)) < 12;
+      shown.red += cv::norm(cv::Vec3i(p[0] - 0x1e, p[1] - 0x26, p[2] - 0xb3)) < 12;
       shown.magenta += p[0] > 220 && p[1] < 40 && p[2] > 220;
     }
   }
@@ -64,6 +65,11 @@ class BrowserTest : public ::testing::Test {
       state.sectors = Coverage(OrbitPlan{}).sectors();
       state.cameras.resize(2);
       state.cameras[1].modality = Modality::thermal;
+      StreamStatus stream;
+      stream.device = "thermal0";
+      stream.modality = Modality::thermal;
+      if (away) stream.away = Absence{8.2, "no frame for a second"};
+      state.streams = {stream};
       for (int i = 0; i < done; ++i) state.sectors[static_cast<std::size_t>(i)].file = {"v", "t"};
       return state;
     };
@@ -79,6 +85,7 @@ class BrowserTest : public ::testing::Test {
 
   test::TempFolder folder;
   std::atomic<int> done{0};
+  std::atomic<bool> away{false};
   std::unique_ptr<PageServer> server;
 };
 
@@ -99,6 +106,13 @@ TEST_F(BrowserTest, FitsAPhone) {
   const Shown phone = screenshot(server->url(), "400,1800", folder.path());
   EXPECT_GT(phone.green, 3000);
   EXPECT_GT(phone.magenta, 10000);
+}
+
+TEST_F(BrowserTest, ACameraThatIsAwayIsARedBanner) {
+  const Shown there = screenshot(server->url(), "900,900", folder.path());
+  away = true;
+  const Shown gone = screenshot(server->url(), "900,900", folder.path());
+  EXPECT_GT(gone.red, there.red + 5000);
 }
 
 TEST_F(BrowserTest, WithoutTokenNothingIsShown) {

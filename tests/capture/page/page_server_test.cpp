@@ -351,6 +351,12 @@ TEST_F(PageTest, PreviewsAndTemperatures) {
                   .at("kelvin")
                   .get<double>(),
               312, 0.02);
+  thermal = LatestFrame{
+      Modality::thermal, cv::Mat(48, 64, CV_16UC1, cv::Scalar(29330)), "hot", {0.04, 0}};
+  EXPECT_NEAR(nlohmann::json::parse(client().Get("/temperature?u=0.5&v=0.5")->body)
+                  .at("kelvin")
+                  .get<double>(),
+              1173.2, 0.01);
   for (const char* bad : {"/temperature", "/temperature?u=2&v=0", "/temperature?u=nan&v=0",
                           "/temperature?u=x&v=0", "/preview/thermal?palette=mud"}) {
     EXPECT_EQ(client().Get(bad)->status, 400) << bad;

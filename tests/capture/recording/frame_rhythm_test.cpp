@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <limits>
+
 namespace orbitfuse {
 namespace {
 
@@ -68,6 +71,14 @@ TEST(FrameRhythm, APauseChangesNothingOfWhatWasLearnt) {
   for (std::uint64_t id = 901; id < 920; ++id)
     EXPECT_EQ(rhythm.note(id, stamp += 100 * ms), 0) << id;
   EXPECT_NEAR(static_cast<double>(rhythm.frames_in(10)), 100, 5);
+}
+
+TEST(FrameRhythm, StampsThatAreNoTimeSayNothing) {
+  FrameRhythm rhythm = settled_at_10_hz(20);
+  for (const std::int64_t stamp : {std::numeric_limits<std::int64_t>::min(), std::int64_t{-1},
+                                   std::numeric_limits<std::int64_t>::max()})
+    EXPECT_EQ(rhythm.note(20, stamp), 0);
+  EXPECT_EQ(rhythm.frames_in(1), 10u);
 }
 
 TEST(FrameRhythm, StampsThatDoNotRiseSayNothing) {

@@ -58,7 +58,7 @@ TEST(Recorder, TwoCamerasEveryIdAccountedFor) {
   options.backpressure = Backpressure::wait;
   Recorder recorder(*r.writer, options);
   std::atomic<int> announced{0};
-  recorder.on_frame = [&](const FrameRecord&, const cv::Mat&) { ++announced; };
+  recorder.on_frame = [&](const StoredFrame&) { ++announced; };
   const Status status = recorder.run({&thermal, &visible});
   ASSERT_TRUE(status) << status.error().message();
   ASSERT_TRUE(r.writer->close());
@@ -97,7 +97,7 @@ TEST(Recorder, SlowDiskDropsByPolicyAndCounts) {
   RecorderOptions options;
   options.queue_frames = 2;
   Recorder recorder(*r.writer, options);
-  recorder.on_frame = [](const FrameRecord&, const cv::Mat&) {
+  recorder.on_frame = [](const StoredFrame&) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   };
   ASSERT_TRUE(recorder.run({&source}));
@@ -120,7 +120,7 @@ TEST(Recorder, EventsDoNotWaitForTheWriterAndKeepTheirPlace) {
   std::atomic<int> taken{0};
   source.before_next = [&] { ++taken; };
   Recorder recorder(*r.writer, {});
-  recorder.on_frame = [&](const FrameRecord&, const cv::Mat&) {
+  recorder.on_frame = [&](const StoredFrame&) {
     while (taken < 5) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   };
   ASSERT_TRUE(recorder.run({&source}));
@@ -141,7 +141,7 @@ TEST(Recorder, WhereverTheManifestEndsItAccountsForEveryIdUpToThere) {
   ScriptedSource source("thermal0", Modality::thermal, script);
   Recorder recorder(*r.writer, {});
   int looks = 0;
-  recorder.on_frame = [&](const FrameRecord&, const cv::Mat&) {
+  recorder.on_frame = [&](const StoredFrame&) {
     ++looks;
     test::expect_each_id_once(*open_session(r.folder / "s"));
   };
@@ -164,8 +164,8 @@ TEST(Recorder, StoppingLosesNoFrameOfASourceThatWaits) {
   RecorderOptions options;
   options.queue_frames = 1;
   Recorder recorder(*r.writer, options);
-  recorder.on_frame = [&](const FrameRecord& f, const cv::Mat&) {
-    if (f.sequence != 1) return;
+  recorder.on_frame = [&](const StoredFrame& f) {
+    if (f.record.sequence != 1) return;
     while (taken < 3) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     cancel = true;  // 2 is queued, 3 in hand
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
@@ -190,8 +190,8 @@ TEST(Recorder, FramesThatCannotBeWrittenAreLostOnlyToACamera) {
     source.waits = waits;
     Recorder recorder(*r.writer, {});
     const auto images = r.folder / "s" / "thermal";
-    recorder.on_frame = [&](const FrameRecord& f, const cv::Mat&) {
-      if (f.sequence != 5) return;
+    recorder.on_frame = [&](const StoredFrame& f) {
+      if (f.record.sequence != 5) return;
       while (recorder.status()[0].last_id < 11)
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
       std::filesystem::rename(images, r.folder / "kept");
@@ -397,7 +397,7 @@ TEST(Recorder, CancelKeepsWhatWasQueued) {
   Progress progress;
   progress.cancel = &cancel;
   Recorder recorder(*r.writer, {});
-  recorder.on_frame = [&](const FrameRecord& f, const cv::Mat&) { cancel = f.sequence >= 5; };
+  recorder.on_frame = [&](const StoredFrame& f) { cancel = f.record.sequence >= 5; };
   const Status status = recorder.run({&source}, progress);
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().kind, ErrorKind::cancelled);

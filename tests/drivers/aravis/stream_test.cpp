@@ -330,6 +330,70 @@ TEST_F(AravisStream, NucAskedForFromAnotherThreadIsToldAndCountersAreReported) {
             std::string::npos);
 }
 
+/// What a camera with one spot of this sample delivers first, and the words about clipping.
+struct SpotSeen {
+  std::optional<Frame> frame;
+  std::string clipped;
+};
+
+class AravisHot : public AravisStream {
+ protected:
+  SpotSeen see(std::uint16_t spot, const std::string& profile) {
+    camera.kill();
+    GevOptions o = small();
+    o.spot = spot;
+    o.planck_j1 = 10;
+    GevSimulator hot(o);
+    SpotSeen seen;
+    if (!hot.start_when_free()) return seen;
+    options.profile = profile;
+    AravisSource source(options);
+    const Status status = source.start();
+    EXPECT_TRUE(status) << status.error().message();
+    const auto end = testing_clock::now() + 10s;
+    while (status && testing_clock::now() < end) {
+      const Result<Delivery> delivery = source.next(200ms);
+      if (!delivery) break;
+      if (delivery->kind == Delivery::Kind::event && delivery->event == EventKind::clipped)
+        seen.clipped = delivery->detail;
+      if (delivery->kind != Delivery::Kind::frame) continue;
+      if (seen.frame) break;
+      seen.frame = delivery->frame;
+    }
+    return seen;
+  }
+  static double spot_k(const Frame& frame) {
+    return frame.pixels.at<std::uint16_t>(0, 0) * frame.kelvin_per_count;
+  }
+};
+
+TEST_F(AravisHot, NineHundredDegreesKeepTheirTemperature) {
+  const SpotSeen seen = see(11732, "flir-a50-a70-hot");
+  ASSERT_TRUE(seen.frame);
+  EXPECT_NEAR(spot_k(*seen.frame), 1173.2, 1e-6);
+  EXPECT_EQ(seen.frame->kelvin_per_count, 0.1);
+  EXPECT_EQ(seen.clipped, "");
+  EXPECT_TRUE(seen.frame->flags.empty());
+}
+
+TEST_F(AravisHot, RadiometricSamplesTakeTheScaleThatHoldsThem) {
+  const SpotSeen seen = see(65000, "flir-radiometric");
+  ASSERT_TRUE(seen.frame);
+  const auto signal = [](double kelvin) { return 16000 / (std::exp(1430 / kelvin) - 1); };
+  EXPECT_NEAR(100 + 10 * (0.95 * signal(spot_k(*seen.frame)) + 0.05 * signal(293.15)), 65000, 2);
+  EXPECT_EQ(seen.frame->kelvin_per_count, 0.02);  // 1180 K
+  EXPECT_EQ(seen.clipped, "");
+}
+
+TEST_F(AravisHot, ASampleAtTheEndOfTheScaleIsADeadPixelAndTold) {
+  const SpotSeen seen = see(65535, "flir-a50-a70");
+  ASSERT_TRUE(seen.frame);
+  EXPECT_EQ(spot_k(*seen.frame), 0);
+  EXPECT_NE(seen.clipped.find("382 C or hotter"), std::string::npos) << seen.clipped;
+  EXPECT_EQ(seen.frame->flags, std::vector<std::string>{"clipped"});
+  EXPECT_NEAR(seen.frame->pixels.at<std::uint16_t>(0, 1) * seen.frame->kelvin_per_count, 300, 21);
+}
+
 TEST_F(AravisStream, UnknownFeatureInTheProfileIsNamed) {
   const test::TempFolder folder;
   test::put(

@@ -12,6 +12,7 @@
 #include "core/formats/transforms_json.hpp"
 #include "core/image/image_codec.hpp"
 #include "core/image/image_io.hpp"
+#include "drivers/stills/dji_jpeg.hpp"
 #include "drivers/stills/import.hpp"
 #include "tests/support/made_files.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -240,10 +241,12 @@ TEST_F(HostileImport, CopiesAreImportedOnce) {
 
 TEST_F(HostileImport, UnreadFormatsAreNamed) {
   put_photo("in/a.jpg", 1);
+  // It says HEIC and is none.
   put("in/IMG_3.HEIC", std::string("\0\0\0\x18"
                                    "ftypheic",
                                    12));
-  for (const char* name : {"in/b.dng", "in/c.webp", "in/d.mp4", "in/notes.txt"}) put(name, "x");
+  for (const char* name : {"in/b.dng", "in/c.webp", "in/d.mp4", "in/notes.txt"})
+    put(name, "x");  // no video
   options.visible = {folder / "in"};
   auto report = import();
   ASSERT_TRUE(report) << report.error().message();
@@ -252,10 +255,57 @@ TEST_F(HostileImport, UnreadFormatsAreNamed) {
   EXPECT_THAT(report->warnings, Not(Contains(HasSubstr("notes.txt"))));
 
   fs::remove(folder / "in/a.jpg");
+  fs::remove(folder / "in/IMG_3.HEIC");
+  fs::remove(folder / "in/d.mp4");
   fs::remove_all(folder / "session");
   report = import();
   ASSERT_FALSE(report);
   EXPECT_THAT(report.error().message(), HasSubstr("convert them"));
+}
+
+TEST_F(HostileImport, DjiCountsAreNeverTemperaturesUnlessTheUserSaysHow) {
+  // As centikelvin they would be a plausible 180 to 212 K.
+  cv::Mat counts(120, 160, CV_16UC1);
+  cv::RNG(3).fill(counts, cv::RNG::UNIFORM, 18073, 21222);
+  const std::string bytes = made::dji_jpeg(counts);
+  const auto dji = read_dji_thermal(bytes, "f");
+  ASSERT_TRUE(dji) << dji.error().message();
+  EXPECT_EQ(cv::countNonZero(dji->counts != counts), 0);
+  ASSERT_TRUE(dji->parameters);
+  EXPECT_NEAR(dji->parameters->emissivity, 0.95, 1e-6);
+  EXPECT_NEAR(dji->parameters->distance_m, 5, 1e-6);
+  put("in/DJI_1_T.JPG", bytes);
+  put("in/DJI_2_T.JPG", made::dji_jpeg(counts + 5, false));
+  options.thermal = {folder / "in"};
+  auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->thermal, 2);
+  EXPECT_FALSE(report->has_temperatures);
+  EXPECT_THAT(report->warnings,
+              Contains(AllOf(HasSubstr("2 thermal files of DJI"), HasSubstr("not published"))));
+  EXPECT_EQ(report->session.frames.at(0).width, 160);
+  EXPECT_EQ(report->session.devices.at(0).model, "DJI");
+
+  fs::remove_all(folder / "session");
+  put_centikelvin("in/a.tiff", 1);
+  report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->thermal, 1) << "counts are left out beside temperatures";
+  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("left out"), HasSubstr("DJI_1_T.JPG"))));
+
+  fs::remove_all(folder / "session");
+  fs::remove(folder / "in/a.tiff");
+  options.thermal_scale = ThermalScale::linear;
+  options.kelvin_per_count = 1.0 / 64;
+  report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_TRUE(report->has_temperatures);
+  EXPECT_NEAR(kelvin_of(*report, 0).at<float>(0, 0), counts.at<std::uint16_t>(0, 0) / 64.0, 0.011);
+
+  EXPECT_TRUE(is_dji_thermal(bytes));
+  const std::string odd = made::dji_jpeg(cv::Mat(130, 160, CV_16UC1, cv::Scalar(5)));
+  EXPECT_TRUE(is_dji_thermal(odd));
+  EXPECT_FALSE(read_dji_thermal(odd, "f")) << "no size of its cameras";
 }
 
 TEST_F(HostileImport, ObjectParametersNeedRadiometricJpegs) {

@@ -166,7 +166,7 @@ TEST_F(WatchTest, DuplicatesOtherFormatsAndTemporaryFilesAreNotFrames) {
   EXPECT_EQ(soon(source).kind, Delivery::Kind::frame);
   put("copy of a.jpg", photo(6));
   EXPECT_EQ(soon(source).reason, "duplicate");
-  put("b.heic", "ftypheic");
+  put("b.webp", "RIFF");
   EXPECT_EQ(soon(source).reason, "ignored");
   put("c.jpg.part", photo(7).substr(0, 100));
   put(".c.jpg.swp", "x");
@@ -261,7 +261,7 @@ TEST_F(WatchTest, AllOfACardJoinsTheSession) {
   Recorder recorder(**writer, recorder_options);
   std::atomic<bool> stop{false};
   std::atomic<int> stored{0};
-  recorder.on_frame = [&](const FrameRecord&, const cv::Mat&) { stop = ++stored == 40; };
+  recorder.on_frame = [&](const StoredFrame&) { stop = ++stored == 40; };
   Progress progress;
   progress.cancel = &stop;
   (void)recorder.run({&source}, progress);

@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <cerrno>
+#include <cmath>
 #include <thread>
 
 #include "tests/drivers/v4l2/fake_video_system.hpp"
@@ -559,6 +560,37 @@ TEST_F(V4l2SourceTest, AnOutageAtTheEndIsCountedByTime) {
   ASSERT_EQ(end.size(), 1u);
   EXPECT_EQ(end[0].kind, Kind::lost);
   EXPECT_GE(end[0].frame.id, 19u + 20u);  // a fifth of a second of 100 Hz
+}
+
+TEST_F(V4l2SourceTest, HotSamplesKeepTheirTemperatureAndTheEndOfTheScaleIsTold) {
+  system->fourcc = V4L2_PIX_FMT_Y16;
+  options.modality = Modality::thermal;
+  options.kelvin_per_dn = 0.04;
+  V4l2Source source(options, system);
+  ASSERT_TRUE(source.start());
+  std::vector<std::uint8_t> bytes(64, 0x1d);  // 8 x 4 samples of 0x1d1d: 298 K
+  bytes[0] = 29330 & 0xff;
+  bytes[1] = 29330 >> 8;  // 900 C
+  system->shots.push_back({1, 0, bytes, 0});
+  bytes[2] = bytes[3] = 0xff;
+  system->shots.push_back({2, 0, bytes, 0});
+  const Delivery first = deliver(source);
+  ASSERT_EQ(first.kind, Kind::frame);
+  EXPECT_EQ(first.frame.kelvin_per_count, 0.04);
+  EXPECT_NEAR(first.frame.pixels.at<std::uint16_t>(0, 0) * 0.04, 1173.2, 1e-6);
+  Delivery second = deliver(source), word = deliver(source);
+  if (second.kind == Kind::event) std::swap(second, word);
+  ASSERT_EQ(second.kind, Kind::frame);
+  EXPECT_EQ(second.frame.pixels.at<std::uint16_t>(0, 1), 0);
+  EXPECT_EQ(word.reason, "clipped");
+  EXPECT_NE(word.detail.find("1 samples"), std::string::npos) << word.detail;
+}
+
+TEST_F(V4l2SourceTest, AScaleThatNoCameraHasIsRefused) {
+  for (const double scale : {-0.01, 11.0, std::nan(""), 1e300}) {
+    options.kelvin_per_dn = scale;
+    EXPECT_FALSE(options.validate()) << scale;
+  }
 }
 
 }  // namespace

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "drivers/network/video_feed.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdlib>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "core/system/utc_now.hpp"
+
+namespace orbitfuse::network {
+
+struct VideoFeed::Shared {
+  FeedOptions options;
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::deque<FeedItem> items;
+  bool over = false, ended = false;
+  int skipped = 0;
+
+  /// Frames that nobody takes are counted, not hoarded.
+  void put(FeedItem item) {
+    constexpr std::size_t most = 32;
+    item.at = std::chrono::steady_clock::now();
+    item.utc_ns = utc_now_ns();
+    const std::lock_guard lock(mutex);
+    if (item.kind == FeedItem::Kind::frame) {
+      if (items.size() >= most) {
+        ++skipped;
+        return;
+      }
+      item.skipped = std::exchange(skipped, 0);
+    }
+    items.push_back(std::move(item));
+    changed.notify_all();
+  }
+  /// False when the feed goes.
+  bool pause() {
+    std::unique_lock lock(mutex);
+    return !changed.wait_for(lock, options.reopen_every, [&] { return over; });
+  }
+  bool is_over() {
+    const std::lock_guard lock(mutex);
+    return over;
+  }
+};
+
+namespace {
+
+using Shared = VideoFeed::Shared;
+
+void put(Shared& shared, FeedItem::Kind kind, std::string why, cv::Size size = {}) {
+  FeedItem item;
+  item.kind = kind;
+  item.why = std::move(why);
+  item.size = size;
+  shared.put(std::move(item));
+}
+
+bool open(cv::VideoCapture& capture, const FeedOptions& options, bool first) {
+  const auto deadline = first ? options.open : std::min(options.open, options.stall);
+  try {
+    return capture.open(options.url, cv::CAP_FFMPEG,
+                        {cv::CAP_PROP_OPEN_TIMEOUT_MSEC, static_cast<int>(deadline.count()),
+                         cv::CAP_PROP_READ_TIMEOUT_MSEC, static_cast<int>(options.stall.count())});
+  } catch (const cv::Exception&) {
+    return false;
+  }
+}
+
+/// FFmpeg calls them "MJPG", "mjpe" and more.
+bool holds_jpegs(const cv::VideoCapture& capture) {
+  const auto code = static_cast<std::uint32_t>(capture.get(cv::CAP_PROP_FOURCC));
+  std::string name;
+  for (int i = 0; i < 4; ++i) {
+    const auto letter = static_cast<unsigned char>(code >> (8 * i));
+    name += static_cast<char>(std::tolower(letter));
+  }
+  return name.starts_with("mjp") || name == "jpeg";
+}
+
+/// Until the connection ends; returns why.
+std::string read_all(Shared& shared, cv::VideoCapture& capture) {
+  // Photos of a stream of JPEGs are kept as they were sent.
+  const bool jpegs = holds_jpegs(capture) && capture.set(cv::CAP_PROP_FORMAT, -1);
+  while (!shared.is_over()) {
+    const auto asked = std::chrono::steady_clock::now();
+    FeedItem item;
+    try {
+      if (!capture.read(item.image) || item.image.empty()) {
+        const bool silent = std::chrono::steady_clock::now() - asked >= shared.options.stall;
+        return silent ? "no frame came" : "the stream ended or broke";
+      }
+    } catch (const cv::Exception& error) {
+      return error.what();
+    }
+    if (jpegs) {
+      item.jpeg.assign(reinterpret_cast<const char*>(item.image.data),
+                       item.image.total() * item.image.elemSize());
+      item.image.release();
+    } else if (item.image.channels() == 1) {
+      cv::cvtColor(item.image, item.image, cv::COLOR_GRAY2BGR);
+    }
+    shared.put(std::move(item));
+  }
+  return {};
+}
+
+void run(const std::shared_ptr<Shared>& shared) {
+  bool first = true;
+  while (!shared->is_over()) {
+    cv::VideoCapture capture;
+    if (open(capture, shared->options, std::exchange(first, false))) {
+      const cv::Size size(static_cast<int>(capture.get(cv::CAP_PROP_FRAME_WIDTH)),
+                          static_cast<int>(capture.get(cv::CAP_PROP_FRAME_HEIGHT)));
+      put(*shared, FeedItem::Kind::opened, {}, size);
+      put(*shared, FeedItem::Kind::closed, read_all(*shared, capture));
+    } else {
+      put(*shared, FeedItem::Kind::refused, "no video can be had from it");
+    }
+    if (!shared->pause()) break;
+  }
+  const std::lock_guard lock(shared->mutex);
+  shared->ended = true;
+  shared->changed.notify_all();
+}
+
+}  // namespace
+
+void set_up_ffmpeg() {
+  // Lossy transports tear pictures, and what FFmpeg says of that belongs to no terminal.
+  ::setenv("OPENCV_FFMPEG_CAPTURE_OPTIONS", "rtsp_transport;tcp|analyzeduration;1000000", 0);
+  ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
+}
+
+VideoFeed::VideoFeed(FeedOptions options) : shared_(std::make_shared<Shared>()) {
+  shared_->options = std::move(options);
+  std::thread(run, shared_).detach();
+}
+
+VideoFeed::~VideoFeed() {
+  std::unique_lock lock(shared_->mutex);
+  shared_->over = true;
+  shared_->changed.notify_all();
+  shared_->changed.wait_for(lock, shared_->options.stall + std::chrono::milliseconds(200),
+                            [&] { return shared_->ended; });
+}
+
+std::optional<FeedItem> VideoFeed::take(std::chrono::milliseconds timeout) {
+  std::unique_lock lock(shared_->mutex);
+  if (!shared_->changed.wait_for(lock, timeout, [&] { return !shared_->items.empty(); }))
+    return std::nullopt;
+  FeedItem item = std::move(shared_->items.front());
+  shared_->items.pop_front();
+  return item;
+}
+
+}  // namespace orbitfuse::network

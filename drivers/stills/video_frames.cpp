@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "drivers/stills/video_frames.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+#include <optional>
+
+#include "capture/image_quality/frame_motion.hpp"
+#include "capture/image_quality/frame_quality.hpp"
+#include "core/image/image_codec.hpp"
+#include "core/system/file_io.hpp"
+
+namespace orbitfuse {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int looked_at_px = 640;  // what sharpness and motion are measured at
+
+tl::unexpected<Error> unreadable(const fs::path& file, const std::string& found) {
+  return fail(ErrorKind::input, file.string(), found,
+              "copy it again from the phone, or export it as MP4 with H.264");
+}
+
+/// A video from its first frame on.
+class Reader {
+ public:
+  static Result<Reader> open(const fs::path& file) {
+    std::error_code error;
+    if (!fs::is_regular_file(file, error)) return unreadable(file, "not a file");
+    std::array<char, 400> head{};
+    std::ifstream stream(file, std::ios::binary);
+    stream.read(head.data(), head.size());
+    if (!is_video({head.data(), static_cast<std::size_t>(stream.gcount())}))
+      return unreadable(file, "not a video (MP4, MOV, MKV, AVI or MPEG)");
+    // Its remarks on damaged packets would go to the terminal; what matters of them is counted.
+    ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
+    Reader reader;
+    try {
+      reader.capture_.open(file.string(), cv::CAP_FFMPEG);
+    } catch (const cv::Exception&) {
+      reader.capture_.release();
+    }
+    if (!reader.capture_.isOpened())
+      return unreadable(file, "a video that can't be read (is its end missing?)");
+    reader.capture_.set(cv::CAP_PROP_ORIENTATION_AUTO, 0);
+    reader.clockwise_deg_ = clockwise_deg(reader.capture_);
+    const double samples = 3 * reader.capture_.get(cv::CAP_PROP_FRAME_WIDTH) *
+                           reader.capture_.get(cv::CAP_PROP_FRAME_HEIGHT);
+    if (!(samples > 0 && samples <= static_cast<double>(max_image_samples)))
+      return unreadable(file, "a video without a size that can be");
+    return reader;
+  }
+
+  /// False at the end, or where nothing more can be decoded.
+  bool next(cv::Mat& image) {
+    try {
+      if (!capture_.read(image) || image.empty()) return false;
+    } catch (const cv::Exception&) {
+      return false;
+    }
+    if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
+    if (clockwise_deg_ == 90) cv::rotate(image, image, cv::ROTATE_90_CLOCKWISE);
+    if (clockwise_deg_ == 180) cv::rotate(image, image, cv::ROTATE_180);
+    if (clockwise_deg_ == 270) cv::rotate(image, image, cv::ROTATE_90_COUNTERCLOCKWISE);
+    return image.type() == CV_8UC3;
+  }
+  std::int64_t time_ns() const {
+    const double ms = capture_.get(cv::CAP_PROP_POS_MSEC);
+    return ms > 0 && ms < 1e9 ? std::llround(ms * 1e6) : 0;
+  }
+  std::int64_t announced() const {
+    const double count = capture_.get(cv::CAP_PROP_FRAME_COUNT);
+    return count > 0 && count < 1e9 ? std::llround(count) : 0;
+  }
+
+ private:
+  /// OpenCV before 4.7 takes FFmpeg's angle for clockwise, and would turn the picture by it.
+  static int clockwise_deg(const cv::VideoCapture& capture) {
+    const int told = cvRound(capture.get(cv::CAP_PROP_ORIENTATION_META));
+    const bool reversed = CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR < 7;
+    return ((reversed ? -told : told) % 360 + 360) % 360;
+  }
+
+  cv::VideoCapture capture_;
+  int clockwise_deg_ = 0;
+};
+
+/// What is kept of each frame of the first reading.
+struct Look {
+  double way = 0;        ///< of the picture since the first frame, in widths
+  double sharpness = 0;  ///< below 0: no frame of this video's size
+};
+
+std::vector<Look> look_at_all(Reader& reader, const VideoOptions& options, const Progress& progress,
+                              VideoAccount& account, Status& status) {
+  std::vector<Look> looks;
+  cv::Mat image, small, before;
+  cv::Size size;
+  double way = 0;
+  while (reader.next(image)) {
+    if (account.frames == options.max_looked_at) {
+      account.cut_off = true;
+      break;
+    }
+    ++account.frames;
+    if (status = progress.check("import"); !status) break;
+    if (size.empty()) size = image.size();
+    if (image.size() != size) {
+      looks.push_back({way, -1});
+      ++account.other_size;
+      continue;
+    }
+    const int width = std::min(looked_at_px, image.cols);
+    cv::resize(image, small, {width, std::max(1, image.rows * width / image.cols)}, 0, 0,
+               cv::INTER_AREA);
+    if (!before.empty()) way += apparent_motion(before, small);
+    looks.push_back({way, measure_quality(small).sharpness});
+    cv::swap(before, small);
+  }
+  return looks;
+}
+
+/// The sharpest frame of each stretch.
+std::vector<bool> choose(const std::vector<Look>& looks, const VideoOptions& options) {
+  std::vector<bool> chosen(looks.size(), false);
+  const double step = std::max(options.min_step, looks.back().way / options.max_frames);
+  std::optional<std::size_t> best;
+  double stretch = 0;
+  for (std::size_t i = 0; i < looks.size(); ++i) {
+    if (looks[i].sharpness < 0) continue;
+    const double here = std::floor(looks[i].way / step);
+    if (best && here != stretch) {
+      chosen[*best] = true;
+      best.reset();
+    }
+    stretch = here;
+    if (!best || looks[i].sharpness > looks[*best].sharpness) best = i;
+  }
+  if (best) chosen[*best] = true;
+  return chosen;
+}
+
+}  // namespace
+
+Status VideoOptions::validate() const {
+  if (max_frames < 2 || max_frames > 5000)
+    return fail(ErrorKind::usage, "video.max_frames", fmt::format("{}", max_frames),
+                "must be 2 to 5000");
+  if (!(min_step > 0 && min_step <= 1))
+    return fail(ErrorKind::usage, "video.min_step", fmt::format("{}", min_step),
+                "must be above 0 and at most 1");
+  if (!(max_edge_px > 0))
+    return fail(ErrorKind::usage, "video.max_edge_px", fmt::format("{}", max_edge_px),
+                "must be above 0");
+  if (max_looked_at < 1)
+    return fail(ErrorKind::usage, "video.max_looked_at", fmt::format("{}", max_looked_at),
+                "must be at least 1");
+  return {};
+}
+
+std::string VideoAccount::words() const {
+  std::string text =
+      fmt::format("{} of {} frames taken, {} passed over for a sharper one of nearly the same view",
+                  taken, frames, less_sharp());
+  if (blurred > 0)
+    text += fmt::format(", {} blurred though the sharpest of their stretch: film slower", blurred);
+  if (featureless > 0) text += fmt::format(", {} with nothing to see", featureless);
+  if (other_size > 0) text += fmt::format(", {} of another size", other_size);
+  if (cut_off) text += "; the video goes on, the rest is not looked at: cut it to the orbit";
+  // Containers count a frame more or less.
+  if (!cut_off && announced > frames + std::max<std::int64_t>(2, announced / 50))
+    text += fmt::format("; {} more are announced and can't be read: it is cut off or damaged",
+                        announced - frames);
+  if (taken == 1) text += "; the camera hardly moved";
+  return text;
+}
+
+bool has_video_extension(const fs::path& file) {
+  std::string extension = file.extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  constexpr std::array<std::string_view, 10> known{".mp4", ".mov", ".m4v",  ".mkv", ".webm",
+                                                   ".avi", ".mpg", ".mpeg", ".mts", ".3gp"};
+  return std::find(known.begin(), known.end(), extension) != known.end();
+}
+
+/// FFmpeg also reads play lists, which name other files: none of these begins so.
+bool is_video(std::string_view b) {
+  using namespace std::string_view_literals;
+  const auto at = [&](std::size_t place, std::string_view word) {
+    return b.size() >= place + word.size() && b.substr(place, word.size()) == word;
+  };
+  for (const std::string_view box : {"ftyp"sv, "moov"sv, "mdat"sv, "wide"sv, "free"sv, "skip"sv})
+    if (at(4, box)) return true;
+  const bool transport =
+      (at(0, "\x47"sv) && at(188, "\x47"sv)) || (at(4, "\x47"sv) && at(196, "\x47"sv));
+  return transport || at(0, "\x1a\x45\xdf\xa3"sv) || (at(0, "RIFF"sv) && at(8, "AVI "sv)) ||
+         at(0, "\0\0\1\xba"sv) || at(0, "\0\0\1\xb3"sv);
+}
+
+std::string video_fingerprint(const fs::path& file) {
+  std::error_code error;
+  const std::uintmax_t size = fs::file_size(file, error);
+  std::ifstream stream(file, std::ios::binary);
+  if (error || !stream) return {};
+  std::string ends(std::size_t{1} << 20, '\0');
+  stream.read(ends.data(), static_cast<std::streamsize>(ends.size() / 2));
+  const auto head = static_cast<std::size_t>(stream.gcount());
+  if (size > ends.size()) {
+    stream.seekg(-static_cast<std::streamoff>(ends.size() / 2), std::ios::end);
+    stream.read(ends.data() + head, static_cast<std::streamsize>(ends.size() / 2));
+  }
+  return content_hash(fmt::format("{} {}", size, ends));
+}
+
+Result<VideoAccount> take_video_frames(const fs::path& file, const VideoOptions& options,
+                                       const Progress& progress,
+                                       const std::function<Status(VideoFrame)>& take) {
+  ORBITFUSE_TRY(options.validate());
+  VideoAccount account;
+  std::vector<bool> chosen;
+  {
+    ORBITFUSE_ASSIGN(Reader reader, Reader::open(file));
+    account.announced = reader.announced();
+    Status status;
+    const std::vector<Look> looks = look_at_all(reader, options, progress, account, status);
+    ORBITFUSE_TRY(status);
+    if (looks.empty()) return unreadable(file, "a video without frames");
+    chosen = choose(looks, options);
+  }
+  ORBITFUSE_ASSIGN(Reader reader, Reader::open(file));
+  cv::Mat image;
+  for (std::size_t i = 0; i < chosen.size() && reader.next(image); ++i) {
+    ORBITFUSE_TRY(progress.check("import"));
+    if (!chosen[i]) continue;
+    const EdgeBlur blur = measure_edges(image);
+    if (blur.edges == 0) {
+      ++account.featureless;
+    } else if (blur.sigma_px > options.max_edge_px) {
+      ++account.blurred;
+    } else {
+      ORBITFUSE_TRY(take({static_cast<std::int64_t>(i), reader.time_ns(), image}));
+      ++account.taken;
+    }
+  }
+  return account;
+}
+
+}  // namespace orbitfuse
