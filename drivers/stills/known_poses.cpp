@@ -12,11 +12,11 @@ namespace fs = std::filesystem;
 
 /// A missing file may be named without its extension (NeRF's synthetic scenes).
 fs::path resolve(const fs::path& base, const std::string& name) {
-  const fs::path path = (base / name).lexically_normal();
+  fs::path path = (base / name).lexically_normal();
   std::error_code ignored;
   if (fs::exists(path, ignored)) return path;
   for (const char* extension : {".png", ".jpg", ".jpeg", ".JPG", ".tiff", ".tif"}) {
-    const fs::path candidate = path.string() + extension;
+    fs::path candidate = path.string() + extension;
     if (fs::exists(candidate, ignored)) return candidate;
   }
   return path;

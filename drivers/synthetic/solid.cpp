@@ -31,7 +31,7 @@ Solid Solid::prism(const std::vector<Eigen::Vector2d>& polygon, double half_widt
   for (const auto& p : polygon) middle += p / static_cast<double>(polygon.size());
   s.center_ = {middle.x(), 0, middle.y()};
   for (std::size_t i = 0; i < polygon.size(); ++i) {
-    const Eigen::Vector2d a = polygon[i], b = polygon[(i + 1) % polygon.size()];
+    const Eigen::Vector2d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
     const Vector3d n = Vector3d(b.y() - a.y(), 0, a.x() - b.x()).normalized();
     s.half_spaces_.push_back({n, n.dot(Vector3d(a.x(), 0, a.y()))});
     s.bounding_radius_ = std::max(s.bounding_radius_, std::hypot((a - middle).norm(), half_width));
