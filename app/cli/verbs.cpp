@@ -25,6 +25,7 @@ const std::vector<Verb>& verbs() {
        "orbitfuse metrics --visible a.png --thermal b.png --fused f.png --json", add_metrics},
       {"report", "Write report.html from what a run has left",
        "orbitfuse report replay_data/car --out out/", add_report},
+      {"view", "Walk round the result of a run in a browser", "orbitfuse view out/", add_view},
       {"eval", "Measure a run against ground truth",
        "orbitfuse eval out/ --ground-truth replay_data/car/ground_truth.json", add_eval},
       {"replay", "Play a recorded session through the recorder, as hardware would",
