@@ -26,6 +26,8 @@ const std::vector<Verb>& verbs() {
       {"report", "Write report.html from what a run has left",
        "orbitfuse report replay_data/car --out out/", add_report},
       {"view", "Walk round the result of a run in a browser", "orbitfuse view out/", add_view},
+      {"measure", "Say how hot something is in a finished run, and how sure that is",
+       "orbitfuse measure out/ --hottest 3", add_measure},
       {"eval", "Measure a run against ground truth",
        "orbitfuse eval out/ --ground-truth replay_data/car/ground_truth.json", add_eval},
       {"replay", "Play a recorded session through the recorder, as hardware would",

@@ -8,7 +8,7 @@ namespace orbitfuse {
 namespace embedded {
 extern const std::string_view view_html, view_css, view_three, view_orbit_controls;
 extern const std::string_view view_units_js, view_thermal_js, view_scene_js, view_layers_js,
-    view_panels_js, view_main_js, view_keeping_js;
+    view_panels_js, view_measure_js, view_main_js, view_keeping_js;
 }  // namespace embedded
 
 namespace view {
@@ -29,7 +29,7 @@ std::string page_html() {
   std::string page(view_html), scripts;
   for (const std::string_view text :
        {view_three, view_orbit_controls, view_units_js, view_thermal_js, view_scene_js,
-        view_layers_js, view_panels_js, view_main_js, view_keeping_js})
+        view_layers_js, view_panels_js, view_measure_js, view_main_js, view_keeping_js})
     scripts += script(text);
   fill(page, "/*STYLE*/", std::string(view_css));
   fill(page, "<!--SCRIPTS-->", scripts);

@@ -6,6 +6,7 @@
 #include "app/view/bookmarks.hpp"
 #include "app/view/film.hpp"
 #include "app/view/json_fields.hpp"
+#include "app/view/measuring.hpp"
 #include "app/view/page.hpp"
 #include "app/view/photo.hpp"
 #include "app/view/picture_parts.hpp"
@@ -48,6 +49,7 @@ struct ViewServer::Impl {
   LayerRenderer layers{run};
   Bookmarks bookmarks{run.out};
   FilmMaker films{run, layers, turns};
+  Measuring measuring{run};
   std::string page = page_html(), scene = scene_json(run).dump(),
               surface = packed(run.surface, surface_kelvin_per_count(run));
   WebServer server;
@@ -104,6 +106,19 @@ struct ViewServer::Impl {
     return list_of_bookmarks();
   }
 
+  Result<json> pick(const WebRequest& request) {
+    ORBITFUSE_ASSIGN(const json body, json_body(request.body));
+    ORBITFUSE_ASSIGN(const Shot shot, shot_of(body, run));
+    ORBITFUSE_ASSIGN(const double u, number_field(body, "u", 0, shot.camera.width));
+    ORBITFUSE_ASSIGN(const double v, number_field(body, "v", 0, shot.camera.height));
+    return measuring.point_at(shot, {u, v});
+  }
+
+  Result<json> measure(const WebRequest& request, bool keep) {
+    ORBITFUSE_ASSIGN(const json body, json_body(request.body));
+    return keep ? measuring.add(body) : measuring.answer(body);
+  }
+
   Result<json> begin_film(const WebRequest& request) {
     ORBITFUSE_ASSIGN(const json body, json_body(request.body));
     ORBITFUSE_ASSIGN(const FilmOrder order, film_order_of(body, run));
@@ -144,6 +159,8 @@ struct ViewServer::Impl {
         {"/bookmarks",
          [this](const WebRequest&) { return answer_of(list_of_bookmarks(), json_answer); }},
         {"/film", [this](const WebRequest&) { return json_answer(films.state()); }},
+        {"/measurements",
+         [this](const WebRequest&) { return answer_of(measuring.list(), json_answer); }},
     };
     site.post = {
         {"/render",
@@ -159,6 +176,16 @@ struct ViewServer::Impl {
         {"/bookmarks/remove",
          [this](const WebRequest& request) {
            return answer_of(drop_bookmark(request), json_answer);
+         }},
+        {"/pick",
+         [this](const WebRequest& request) { return answer_of(pick(request), json_answer); }},
+        {"/measure",
+         [this](const WebRequest& request) {
+           return answer_of(measure(request, false), json_answer);
+         }},
+        {"/measurements/add",
+         [this](const WebRequest& request) {
+           return answer_of(measure(request, true), json_answer);
          }},
         {"/film",
          [this](const WebRequest& request) { return answer_of(begin_film(request), json_answer); }},
@@ -181,6 +208,7 @@ Status ViewServer::start() { return impl_->server.start(); }
 
 void ViewServer::stop() {
   impl_->turns.close();
+  impl_->measuring.close();
   impl_->films.stop();
   impl_->server.stop();
 }

@@ -47,6 +47,7 @@ async function begin() {
   new ResizeObserver(fit).observe($("stage"));
   $("menu").onclick = () => { const open = $("panel").hidden; $("panel").hidden = !open; $("menu").setAttribute("aria-expanded", open); };
   surface.addFrusta();
+  viewer.measuring = new Measuring(scene, surface, rest);
   keepingPanel(scene, surface, rest, () => layer);
   if (scene.surface.points) surface.addPoints(await (await ask("/surface")).arrayBuffer());
 }
