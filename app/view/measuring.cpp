@@ -26,44 +26,64 @@ Result<const measurement::ThermalScene*> Measuring::scene() {
   return scene_.get();
 }
 
+template <class Work>
+auto Measuring::in_turn(Work work) -> decltype(work()) {
+  if (!places_.try_acquire())
+    return fail(ErrorKind::unavailable, "measurements", "others are being measured",
+                "try again in a moment");
+  decltype(work()) result = work();
+  places_.release();
+  return result;
+}
+
 Result<json> Measuring::point_at(const Shot& shot, const Eigen::Vector2d& pixel) {
-  ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
-  const PosedView view{"the viewer's picture", shot.camera, shot.cam_from_world};
-  ORBITFUSE_ASSIGN(const measurement::SurfacePoint found,
-                   scene->surface_at(view, pixel, progress()));
-  const Eigen::Vector3d& p = found.position;
-  return json{{"point", {p.x(), p.y(), p.z()}}};
+  return in_turn([&]() -> Result<json> {
+    ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
+    const PosedView view{"the viewer's picture", shot.camera, shot.cam_from_world};
+    ORBITFUSE_ASSIGN(const measurement::SurfacePoint found,
+                     scene->surface_at(view, pixel, progress()));
+    const Eigen::Vector3d& p = found.position;
+    return json{{"point", {p.x(), p.y(), p.z()}}};
+  });
 }
 
 Result<json> Measuring::answer(const json& asked) {
-  ORBITFUSE_ASSIGN(const measurement::Request request, measurement::request_of_json(asked));
-  ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
-  ORBITFUSE_ASSIGN(const measurement::Answer answer, measure(*scene, request, progress()));
-  return json{{"request", to_json(request)}, {"answer", to_json(answer)}};
+  return in_turn([&]() -> Result<json> {
+    ORBITFUSE_ASSIGN(const measurement::Request request, measurement::request_of_json(asked));
+    ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
+    ORBITFUSE_ASSIGN(const measurement::Answer answer, measure(*scene, request, progress()));
+    return json{{"request", to_json(request)}, {"answer", to_json(answer)}};
+  });
 }
 
 Result<json> Measuring::add(const json& asked) {
-  ORBITFUSE_ASSIGN(const measurement::Request request, measurement::request_of_json(asked));
-  ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
-  ORBITFUSE_ASSIGN(const measurement::Answer answer, measure(*scene, request, progress()));
-  ORBITFUSE_TRY(measurement::add_measurement(run_.out / measurement::measurements_file,
-                                             scene->identity(),
-                                             {request.name, "", request, to_json(answer)}));
+  const Status saved = in_turn([&]() -> Status {
+    ORBITFUSE_ASSIGN(const measurement::Request request, measurement::request_of_json(asked));
+    ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
+    ORBITFUSE_ASSIGN(const measurement::Answer answer, measure(*scene, request, progress()));
+    ORBITFUSE_TRY(measurement::add_measurement(run_.out / measurement::measurements_file,
+                                               scene->identity(),
+                                               {request.name, "", request, to_json(answer)}));
+    return {};
+  });
+  ORBITFUSE_TRY(saved);
   return list();
 }
 
 Result<json> Measuring::list() {
-  ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
-  ORBITFUSE_ASSIGN(
-      const measurement::Measurements saved,
-      measurement::load_measurements(run_.out / measurement::measurements_file, scene->identity()));
-  json entries = json::array();
-  for (const measurement::SavedMeasurement& m : saved.list)
-    entries.push_back({{"name", m.name},
-                       {"created", m.created},
-                       {"request", to_json(m.request)},
-                       {"answer", m.answer}});
-  return entries;
+  return in_turn([&]() -> Result<json> {
+    ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
+    ORBITFUSE_ASSIGN(const measurement::Measurements saved,
+                     measurement::load_measurements(run_.out / measurement::measurements_file,
+                                                    scene->identity()));
+    json entries = json::array();
+    for (const measurement::SavedMeasurement& m : saved.list)
+      entries.push_back({{"name", m.name},
+                         {"created", m.created},
+                         {"request", to_json(m.request)},
+                         {"answer", m.answer}});
+    return entries;
+  });
 }
 
 }  // namespace orbitfuse::view

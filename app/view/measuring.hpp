@@ -5,6 +5,7 @@
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <semaphore>
 
 #include "app/view/finished_run.hpp"
 #include "app/view/layers.hpp"
@@ -13,7 +14,8 @@
 namespace orbitfuse::view {
 
 /// Measurements of the run that the viewer shows, by recon/measurement and in the same
-/// measurements.json as the command line's. Their world is the viewer's frame.
+/// measurements.json as the command line's. Their world is the viewer's frame. Unavailable error
+/// where several are being measured already: each holds a thread of the server.
 class Measuring {
  public:
   /// The run must outlive it.
@@ -32,10 +34,13 @@ class Measuring {
 
  private:
   Result<const measurement::ThermalScene*> scene();
+  template <class Work>
+  auto in_turn(Work work) -> decltype(work());
   Progress progress() const;
 
   const FinishedRun& run_;
   std::atomic<bool> closed_{false};
+  std::counting_semaphore<4> places_{4};
   std::mutex mutex_;  ///< of the first use, which loads the scene
   std::unique_ptr<measurement::ThermalScene> scene_;
 };

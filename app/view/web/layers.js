@@ -39,9 +39,9 @@ class RestingView {
   }
 
   steps(layers) {
-    // Temperatures at half the width come with the full picture, their last half a step later.
+    // Coarse temperatures come with the full picture, their own detail a step later.
     const two = layers.some(l => l !== "thermal") && layers.includes("thermal");
-    const steps = [{ share: 1 / 8, divisor: 1 }, { share: 1 / 4, divisor: 1 }, { share: 1, divisor: two ? 2 : 1 }];
+    const steps = [{ share: 1 / 8, divisor: 1 }, { share: 1 / 5, divisor: 1 }, { share: 1, divisor: two ? 3 : 1 }];
     if (two) steps.push({ share: 1, divisor: 1 });
     return steps;
   }

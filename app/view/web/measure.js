@@ -11,6 +11,16 @@ const measureTools = {
   coldest: { words: "Coldest", places: 0 },
 };
 
+/// Several viewers may measure; who is refused for now asks again.
+async function askInTurn(path, body) {
+  for (let tries = 0; ; ++tries) {
+    try { return await (await ask(path, body)).json(); } catch (error) {
+      if (error.status !== 503 || tries > 60) throw error;
+      await new Promise(done => setTimeout(done, 500));
+    }
+  }
+}
+
 class Measuring {
   constructor(scene, surface, rest) {
     this.facts = scene; this.surface = surface; this.rest = rest;
@@ -49,7 +59,7 @@ class Measuring {
   async place(place) {
     const kind = this.tool, tool = measureTools[kind], { width, height } = this.surface;
     try {
-      const found = await (await ask("/pick", { ...this.surface.shot(Math.round(width), Math.round(height)), u: place.u * Math.round(width), v: place.v * Math.round(height) })).json();
+      const found = await askInTurn("/pick", { ...this.surface.shot(Math.round(width), Math.round(height)), u: place.u * Math.round(width), v: place.v * Math.round(height) });
       if (this.tool !== kind) return;
       this.places.push(found.point);
       if (this.places.length < tool.places) { this.say(tool.say[this.places.length]); this.drawMarks(); return; }
@@ -69,7 +79,7 @@ class Measuring {
   async measure(request) {
     this.say("measuring …");
     try {
-      const measured = await (await ask("/measure", request)).json();
+      const measured = await askInTurn("/measure", request);
       this.list.push({ ...measured, name: "" });
       this.say("");
       this.show();
@@ -81,14 +91,14 @@ class Measuring {
     if (!open.length) { this.say("everything is saved"); return; }
     this.say("saving …");
     try {
-      for (const m of open) { await ask("/measurements/add", m.request); m.name = "saved"; }
+      for (const m of open) { await askInTurn("/measurements/add", m.request); m.name = "saved"; }
       await this.reload();
       this.say("saved");
     } catch (error) { this.say(error.message, true); }
   }
   async reload() {
     try {
-      const saved = await (await ask("/measurements")).json();
+      const saved = await askInTurn("/measurements");
       this.list = [...saved, ...this.list.filter(m => !m.name)];
       this.say("");
     } catch (error) { this.say(error.message, true); }

@@ -40,7 +40,6 @@ class Surface {
     this.share = 1;  // of the points, drawn while the camera moves
     this.material = new THREE.ShaderMaterial({ vertexShader, fragmentShader, uniforms: {
       size: { value: 1 }, low: { value: 0 }, high: { value: 1 }, share: { value: 0 }, isoLow: { value: 0 }, isoHigh: { value: 0 }, isotherm: { value: 0 }, palette: { value: null } } });
-    this.reset();
   }
 
   /// app/view/surface.hpp has the format.
@@ -109,11 +108,12 @@ class Surface {
   }
 
   resize(width, height) {
+    const first = !this.width;
     this.width = width; this.height = height;
     this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio || 1));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height; this.camera.updateProjectionMatrix();
-    this.draw();
+    if (first) this.reset(); else this.draw();
   }
 
   /// Under a rendered picture the points only say what hides a frustum.
@@ -139,29 +139,31 @@ class Surface {
   draw() {
     if (this.asked || !this.width) return;
     this.asked = true;
-    requestAnimationFrame(now => {
+    requestAnimationFrame(() => {
       this.asked = false;
-      if (this.moving) this.keepPace(now - this.drawn);
-      this.drawn = now;
       // The points lie in no order, so that the first of them are spread over the whole.
-      const share = this.moving ? this.share : 1;
+      const share = this.moving ? this.share : 1, begun = performance.now();
       if (this.points) this.points.geometry.setDrawRange(0, Math.ceil(share * this.facts.surface.points));
-      this.material.uniforms.size.value = this.facts.radius * 0.006 / Math.sqrt(share) * this.renderer.domElement.height / Math.tan(this.camera.fov * Math.PI / 360);
+      this.material.uniforms.size.value = this.facts.radius * 0.004 / Math.sqrt(share) * this.renderer.domElement.height / Math.tan(this.camera.fov * Math.PI / 360);
       this.renderer.render(this.world, this.camera);
+      if (!this.moving || !this.points) return;
+      // A pixel that is read back waits for the picture.
+      const gl = this.renderer.getContext();
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+      this.keepPace(performance.now() - begun);
     });
   }
 
   /// Fewer points where this machine draws fewer than 30 pictures a second, more where it has time.
-  keepPace(pause_ms) {
-    if (pause_ms > 300) return;  // the first of a movement
-    if (pause_ms > 34) this.share = Math.max(0.02, this.share * 0.75);
-    else if (pause_ms < 22) this.share = Math.min(1, this.share * 1.05);
+  keepPace(taken_ms) {
+    if (taken_ms > 25) this.share = Math.max(0.02, this.share * Math.max(0.3, 20 / taken_ms));
+    else if (taken_ms < 12) this.share = Math.min(1, this.share * 1.1);
   }
 
   reset() {
     const up = new THREE.Vector3(...this.facts.up), center = new THREE.Vector3(...this.facts.center);
     const first = this.facts.views.length ? new THREE.Vector3(...this.facts.views[0].position) : center.clone().add(new THREE.Vector3(1, 0, 0.4));
-    const away = first.sub(center).addScaledVector(up, 0.15 * this.facts.radius).setLength(this.facts.radius * 1.05);
+    const away = first.sub(center).addScaledVector(up, 0.15 * this.facts.radius).setLength(this.facts.radius * 1.05 * Math.min(2.2, Math.max(1, 1 / this.camera.aspect)));
     this.stand({ position: center.clone().add(away).toArray(), target: center.toArray(), fov_deg: 45 });
   }
 

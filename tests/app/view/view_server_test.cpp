@@ -17,6 +17,7 @@
 
 #include "app/view/shot_request.hpp"
 #include "core/image/image_codec.hpp"
+#include "core/image/image_io.hpp"
 #include "tests/app/view/toy_run.hpp"
 #include "tests/support/slow_peers.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -221,6 +222,14 @@ TEST_F(ViewServerTest, HostileRequestsAreNamed) {
        {std::string(), std::string("{"), std::string("[]"), std::string("nan"), deep,
         std::string("{\"position\":[NaN,0,0]}"), std::string("\xff\xfe{}", 4)})
     EXPECT_EQ(post("/render", body)->status, 400) << body.substr(0, 20);
+  for (const char* path : {"/pick", "/measure", "/measurements/add", "/bookmarks/add",
+                           "/bookmarks/remove", "/film", "/temperatures.tiff"})
+    for (const std::string& body : {std::string(), std::string("{}"), std::string("[1]"), deep,
+                                    std::string("{\"kind\":1,\"name\":[],\"u\":\"x\"}")})
+      EXPECT_EQ(post(path, body)->status, 400) << path << " " << body.substr(0, 20);
+  json outside = shot(64, 64);
+  outside.update({{"u", 65}, {"v", 3}});
+  EXPECT_EQ(post("/pick", outside.dump())->status, 400);
   EXPECT_EQ(post("/render", std::string(400'000, ' '))->status, 413);
   for (const char* path : {"/photo/99", "/photo/x", "/photo/../scene", "/nowhere", "/photo/0"})
     EXPECT_EQ(client().Get(path)->status, 404) << path;  // the toy has no session
@@ -267,6 +276,38 @@ TEST_F(ViewServerTest, TenViewersAndSlowPeersAreServedTogether) {
       });
   }
   EXPECT_EQ(good, 30);
+}
+
+TEST_F(ViewServerTest, TemperaturesAreTakenAwayAsSessionsHoldThem) {
+  serve();
+  const Parts parts = parts_of(render(shot(64, 48))->body);
+  const auto tiff = post("/temperatures.tiff", shot(64, 48).dump());
+  ASSERT_EQ(tiff->status, 200);
+  orbitfuse::test::put(folder / "view.tiff", tiff->body);
+  const auto kelvin = read_thermal_k(folder / "view.tiff");
+  ASSERT_TRUE(kelvin) << kelvin.error().message();
+  ASSERT_EQ(kelvin->size(), cv::Size(64, 48));
+  int alike = 0;
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 64; ++x)
+      alike += std::abs(static_cast<double>(kelvin->at<float>(y, x)) -
+                        parts.level("thermal", x, y)) < 0.011;
+  EXPECT_GT(alike, 500);
+}
+
+TEST_F(ViewServerTest, WhatIsKeptComesBackToEveryViewer) {
+  serve();
+  const json mark = {
+      {"name", "a"}, {"position", {1, 0, 0}}, {"target", {0, 0, 0}}, {"fov_deg", 45}};
+  EXPECT_EQ(post("/bookmarks/add", mark.dump())->status, 200);
+  EXPECT_EQ(post("/bookmarks/add", mark.dump())->status, 400);  // the name is taken
+  EXPECT_EQ(json::parse(client().Get("/bookmarks")->body).size(), 1u);
+  EXPECT_EQ(post("/bookmarks/remove", R"({"name":"a"})")->status, 200);
+  EXPECT_TRUE(json::parse(client().Get("/bookmarks")->body).empty());
+  // The toy has no session to measure in.
+  const auto refused = post("/measure", R"({"kind":"spot","places":[{"point":[0,0,0]}]})");
+  EXPECT_EQ(refused->status, 404);
+  EXPECT_THAT(refused->body, HasSubstr("session"));
 }
 
 /// Renders of whoever left are not gone on with, and nobody's render holds up the end.
