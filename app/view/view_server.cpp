@@ -145,8 +145,6 @@ struct ViewServer::Impl {
          [this](const WebRequest&) -> WebAnswer {
            return {200, "text/html; charset=utf-8", page};
          }},
-        {"/favicon.ico",
-         [](const WebRequest&) -> WebAnswer { return {.status = 204, .type = {}, .body = {}}; }},
         {"/scene",
          [this](const WebRequest&) -> WebAnswer {
            return {200, "application/json", scene};

@@ -47,13 +47,13 @@ class ViewBrowserTest : public ::testing::Test {
     } else {
       make_run();
     }
-    const auto run = load_finished_run(out, stages::RunConfig(), {});
+    auto run = load_finished_run(out, stages::RunConfig(), {});
     ASSERT_TRUE(run) << run.error().message();
     PageOptions options;
     options.port = 0;
     options.token = "browser-token";
     options.require_token = true;
-    server = std::make_unique<ViewServer>(*load_finished_run(out, {}, {}), options);
+    server = std::make_unique<ViewServer>(*std::move(run), options);
     ASSERT_TRUE(server->start());
     url = server->urls().front();
   }
@@ -124,6 +124,8 @@ TEST_F(ViewBrowserTest, LoadsTurnsSwitchesMeasuresSavesAndReloads) {
   ASSERT_TRUE(rests(page));
   EXPECT_NE(page.evaluate("viewer.surface.pose().position"), before);
 
+  // No frustum in the way of what is touched now.
+  page.evaluate("$('show-visible').click(); $('show-thermal').click()");
   // What stands under the pointer is a temperature of the scene, in each unit.
   page.press(640, 400);
   const double kelvin = page.evaluate("viewer.rest.temperature(.5, .5)").get<double>();
@@ -205,6 +207,30 @@ TEST_F(ViewBrowserTest, FitsAPhone) {
       R"(Array.from(document.querySelectorAll('button, select')).filter(e => e.offsetParent && (e.getBoundingClientRect().height < 44 || e.getBoundingClientRect().width < 40)).map(e => e.id || e.textContent))");
   EXPECT_TRUE(small.empty()) << small.dump();
   EXPECT_TRUE(page.errors().empty()) << page.errors().front();
+}
+
+/// Ctrl-C is how it ends; what cannot be shown is named.
+TEST_F(ViewBrowserTest, TheProgramSaysWhatItShowsAndHowItEnds) {
+  const auto run = [](std::vector<std::string> words, const std::string& until) {
+    RunOptions options;
+    options.interrupt_after = until;
+    words.insert(words.begin(), "view");
+    return orbitfuse_program(words, options);
+  };
+  const Outcome shown = run({out.string(), "--page", "0"}, "Ctrl-C ends it");
+  EXPECT_EQ(shown.code, 0) << shown.err;
+  EXPECT_NE(shown.err.find("http:"), std::string::npos);
+  const Outcome taken = run({out.string(), "--page", std::to_string(server->port())}, "");
+  EXPECT_EQ(taken.code, 4);
+  EXPECT_NE(taken.err.find("--page"), std::string::npos);
+  EXPECT_EQ(run({out.string(), "--page", "x"}, "").code, 2);
+  const Outcome nothing = run({folder.path().string()}, "");
+  EXPECT_EQ(nothing.code, 3);
+  EXPECT_NE(nothing.err.find("run.json"), std::string::npos);
+  fs::resize_file(out / "train_thermal" / "field.bin", 1000);
+  const Outcome damaged = run({out.string(), "--page", "0"}, "");
+  EXPECT_EQ(damaged.code, 3);
+  EXPECT_NE(damaged.err.find("field.bin"), std::string::npos);
 }
 
 TEST_F(ViewBrowserTest, WithoutTheTokenNothingIsShown) {

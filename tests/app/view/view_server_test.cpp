@@ -101,7 +101,8 @@ TEST_F(ViewServerTest, PageHasAllItNeedsAndAsksNobody) {
   const auto page = client().Get("/");
   ASSERT_TRUE(page);
   ASSERT_EQ(page->status, 200);
-  for (const char* outside : {" src=", "<link", "@import", "importScripts", "navigator.sendBeacon"})
+  for (const char* outside :
+       {" src=", "href=\"/", "href=\"h", "@import", "importScripts", "navigator.sendBeacon"})
     EXPECT_THAT(page->body, Not(HasSubstr(outside)));
   EXPECT_THAT(page->body, HasSubstr("THREE.OrbitControls"));
   EXPECT_THAT(page->body, Not(HasSubstr("/*STYLE*/")));
