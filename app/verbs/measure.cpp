@@ -97,9 +97,12 @@ Status run(Context& context, const Options& options) {
   }
   ORBITFUSE_ASSIGN(const Answer answer, measure(scene, *request, context.progress));
   std::string name = request->name;
-  if (options.words.save) {
-    ORBITFUSE_ASSIGN(name, add_measurement(file, scene.identity(),
-                                           {request->name, "", *request, to_json(answer)}));
+  if (options.words.save && context.common.dry_run) {
+    context.console.info("would be saved in " + file.string());
+  } else if (options.words.save) {
+    ORBITFUSE_ASSIGN(name,
+                     add_measurement(file, scene.identity(),
+                                     {name, "", anchored(*request, answer), to_json(answer)}));
     context.console.info(fmt::format("saved as '{}' in {}", name, file.string()));
   }
   if (name.empty()) name = std::string(measurement::name(request->kind));

@@ -70,7 +70,11 @@ Result<Place> point_of(const std::string& option, const std::string& word) {
 /// A word that may be a pixel, a point, or the name of a saved measurement.
 Result<Request> spot_or_saved(const std::string& option, const std::string& word,
                               const ThermalScene& scene, const Measurements& saved) {
-  if (const auto* known = saved.find(word)) return known->request;
+  if (const auto* known = saved.find(word)) {
+    if (known->request.kind != Kind::polygon) return known->request;
+    return fail(ErrorKind::usage, option, "'" + word + "' is a polygon in a view",
+                "ask for it again with --polygon: the run may have rendered other views since");
+  }
   Request request;
   const std::vector<std::string> parts = split(word);
   if (parts.size() != 3)

@@ -32,6 +32,7 @@ struct Options {
   fs::path run, truth, csv;
   int count = 200;
   unsigned seed = 7;
+  MeasurementOptions measurement;
 };
 
 /// The similarity that brings the run's visible cameras nearest to the true ones.
@@ -73,7 +74,8 @@ Result<Scene> load(const Options& options) {
   ORBITFUSE_ASSIGN(const Session session, open_session(run.at("session").get<std::string>()));
   ORBITFUSE_ASSIGN(const GroundTruth truth, read_ground_truth(options.truth));
   ORBITFUSE_ASSIGN(const Similarity3d fit, truth_from_run(options.run, session, truth));
-  ORBITFUSE_ASSIGN(ThermalScene scene, stages::load_measurement_scene(options.run, session));
+  ORBITFUSE_ASSIGN(ThermalScene scene,
+                   stages::load_measurement_scene(options.run, session, options.measurement));
   Scene result{std::move(scene), {}, {}};
   for (const TrueTestView& test : truth.test) {
     result.views.push_back({test.thermal.filename().string(), test.camera.without_distortion(),
@@ -131,7 +133,7 @@ Status run(const Options& options) {
   if (!options.csv.empty()) {
     csv.open(options.csv);
     csv << "view,u,v,truth_k,temperature_k,field_k,uncertainty_k,spread_k,frames,angle_deg,"
-           "readings\n";
+           "variation_k,readings\n";
   }
   double first_s = 0;
   UsageClock clock;
@@ -160,10 +162,11 @@ Status run(const Options& options) {
     for (const FrameReading& r : frames.frames)
       list += fmt::format("{:.4f}:{:.2f}:{:.4f}:{:.5f}:{};", r.temperature_k, r.angle_deg,
                           r.gradient_k_per_px, r.weight, r.frame);
-    csv << fmt::format("{},{},{},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{},{:.2f},{}\n", spot.view,
-                       spot.pixel.x(), spot.pixel.y(), spot.truth_k, reading.temperature_k,
-                       reading.field_k, reading.uncertainty_k, reading.spread_k,
-                       reading.frames.size(), reading.angle_deg, list);
+    csv << fmt::format("{},{},{},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{},{:.2f},{:.4f},{}\n",
+                       spot.view, spot.pixel.x(), spot.pixel.y(), spot.truth_k,
+                       reading.temperature_k, reading.field_k, reading.uncertainty_k,
+                       reading.spread_k, reading.frames.size(), reading.angle_deg,
+                       surface.variation_k, list);
   }
   report(options, tally, first_s,
          clock.cpu_s() / std::max<double>(1, static_cast<double>(spots.size()) - 1));
@@ -181,6 +184,12 @@ int main(int argc, char** argv) {
   app.add_option("--count", options.count, "Random pixels of the object")->capture_default_str();
   app.add_option("--seed", options.seed, "Of the random pixels")->capture_default_str();
   app.add_option("--csv", options.csv, "Every spot with every frame's reading");
+  app.add_option("--depth-width", options.measurement.depth_width_px, "Of the depth maps")
+      ->capture_default_str();
+  app.add_option("--depth-tolerance", options.measurement.depth_tolerance, "Share of the distance")
+      ->capture_default_str();
+  app.add_option("--max-angle", options.measurement.max_angle_deg, "To the normal, degrees")
+      ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   const orbitfuse::Status status = orbitfuse::run(options);
   if (status) return 0;

@@ -60,6 +60,7 @@ json to_json(const Answer& answer) {
   if (has_reading(answer.kind)) j["reading"] = json_of(answer.reading);
   if (answer.position) j["point"] = json_of(*answer.position);
   if (answer.normal) j["normal"] = json_of(*answer.normal);
+  for (const Eigen::Vector3d& end : answer.ends) j["ends"].push_back(json_of(end));
   if (answer.kind == Kind::hottest || answer.kind == Kind::coldest) {
     j["spots"] = json::array();
     for (const PlacedReading& spot : answer.spots) j["spots"].push_back(json_of(spot));

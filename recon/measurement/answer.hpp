@@ -59,8 +59,9 @@ struct Answer {
   Kind kind = Kind::spot;
   TemperatureReading reading;  ///< of spot, box, polygon, line (its points together)
   std::optional<Eigen::Vector3d> position, normal;  ///< of a spot; of a region the middle
-  std::vector<PlacedReading> spots;                 ///< hottest, coldest: in that order
+  std::vector<PlacedReading> spots;  ///< hottest, coldest; by what is sure (region.hpp)
   std::vector<ProfilePoint> profile;
+  std::vector<Eigen::Vector3d> ends;  ///< of a line or distance, where both meet the surface
   double difference_k = unknown, difference_uncertainty_k = unknown;
   std::vector<Answer> of;            ///< of a difference
   double distance = unknown;         ///< world units

@@ -40,7 +40,7 @@ bool lens_holds(const Camera& camera, const Eigen::Vector2d& pixel, const Eigen:
 }
 
 /// RMS change of temperature over a step of `reach` pixels, a pixel.
-double gradient(const cv::Mat& image, const Eigen::Vector2d& pixel, double reach) {
+double gradient_over(const cv::Mat& image, const Eigen::Vector2d& pixel, double reach) {
   double sum = 0;
   const double center = bilinear(image, pixel);
   int count = 0;
@@ -52,6 +52,15 @@ double gradient(const cv::Mat& image, const Eigen::Vector2d& pixel, double reach
     ++count;
   }
   return count > 0 ? std::sqrt(sum / count) / reach : 0;
+}
+
+/// The steepest within three pose errors: an edge nearby, too, may be where the point really is.
+double gradient(const cv::Mat& image, const Eigen::Vector2d& pixel, double pose_sigma_px) {
+  double steepest = 0;
+  for (const double reach : {1.0, 2.0, 3.0})
+    steepest =
+        std::max(steepest, gradient_over(image, pixel, reach * std::max(0.5, pose_sigma_px)));
+  return steepest;
 }
 
 enum class Depth { same, nearer, farther };
@@ -119,8 +128,10 @@ Result<std::optional<FrameReading>> read_frame(const ThermalScene& scene, std::s
     why = Hidden::no_temperature;
     return std::nullopt;
   }
-  reading.gradient_k_per_px = gradient(image, reading.pixel, std::max(1.0, options.pose_sigma_px));
-  const double pose_k = reading.gradient_k_per_px * options.pose_sigma_px;
+  reading.gain = radiometry.gain(index, stored_k);
+  const double step_k = gradient(image, reading.pixel, options.pose_sigma_px);
+  const double pose_k = step_k * options.pose_sigma_px;
+  reading.gradient_k_per_px = step_k * reading.gain;
   reading.weight = std::cos(reading.angle_deg * std::numbers::pi / 180) *
                    (frame.doubtful() ? options.doubtful_weight : 1) /
                    (options.noise_sigma_k * options.noise_sigma_k +

@@ -18,6 +18,7 @@ struct FrameReading {
   double temperature_k = 0;
   double angle_deg = 0;          ///< of the line of sight to the surface's normal
   double gradient_k_per_px = 0;  ///< steepest within a pose error's reach
+  double gain = 1;               ///< of changed object parameters (Reradiometry)
   double weight = 0;             ///< against the other frames; all of a point's sum to 1
 };
 

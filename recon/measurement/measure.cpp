@@ -65,7 +65,10 @@ Result<SurfacePoint> surface_at_point(const ThermalScene& scene, const Eigen::Ve
   // The field at the point, as the frame that sees it straightest has it.
   const PosedView& posed = scene.frames()[best->frame].view;
   const auto surface = scene.surface_at(posed, best->pixel, progress);
-  if (surface) point.field_k = surface->field_k;
+  if (surface) {
+    point.field_k = surface->field_k;
+    point.variation_k = surface->variation_k;
+  }
   return point;
 }
 
@@ -182,6 +185,8 @@ Result<Answer> measure_line(const ThermalScene& scene, const Request& request,
     answer.profile.push_back(std::move(point));
   }
   ORBITFUSE_ASSIGN(answer.reading, read_region(scene, points, radiometry, progress));
+  const auto &first = answer.profile.front().at, &last = answer.profile.back().at;
+  if (first && last) answer.ends = {first->position, last->position};
   if (points.empty()) answer.reading.hidden = "the field has no surface along it";
   if (const std::size_t holes = answer.profile.size() - points.size(); holes > 0)
     answer.notes.push_back(
@@ -235,6 +240,7 @@ Result<Answer> measure_distance(const ThermalScene& scene, const Request& reques
   ORBITFUSE_ASSIGN(const SurfacePoint a, surface_of(scene, request.places[0], progress));
   ORBITFUSE_ASSIGN(const SurfacePoint b, surface_of(scene, request.places[1], progress));
   answer.distance = (a.position - b.position).norm();
+  answer.ends = {a.position, b.position};
   answer.position = 0.5 * (a.position + b.position);
   if (scene.metres_per_unit())
     answer.distance_m = answer.distance * *scene.metres_per_unit();
@@ -269,6 +275,14 @@ Result<Answer> dispatch(const ThermalScene& scene, const Request& request,
 }
 
 }  // namespace
+
+Request anchored(Request request, const Answer& answer) {
+  for (std::size_t i = 0; i < std::min(request.of.size(), answer.of.size()); ++i)
+    request.of[i] = anchored(std::move(request.of[i]), answer.of[i]);
+  if (request.kind == Kind::spot && answer.position) request.places = {*answer.position};
+  if (answer.ends.size() == 2) request.places = {answer.ends[0], answer.ends[1]};
+  return request;
+}
 
 Result<SurfacePoint> surface_of(const ThermalScene& scene, const Place& place,
                                 const Progress& progress) {

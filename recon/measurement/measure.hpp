@@ -12,6 +12,10 @@ namespace orbitfuse::measurement {
 /// scene, a frame that can't be read), cancelled.
 Result<Answer> measure(const ThermalScene& scene, const Request& request, const Progress& progress);
 
+/// The request to keep: pixels of spots, lines and distances become the points that they showed,
+/// because a view's name may stand for another camera when the run renders anew. Polygons stay.
+Request anchored(Request request, const Answer& answer);
+
 /// The surface at a place: of a point, with the normal that the frames which see it agree on and a
 /// NaN field_k where none does. Errors: as measure().
 Result<SurfacePoint> surface_of(const ThermalScene& scene, const Place& place,

@@ -17,6 +17,7 @@ Status MeasurementOptions::validate() const {
   ORBITFUSE_TRY(check("statistical_share", statistical_share, from_to(0, 100)));
   ORBITFUSE_TRY(check("gradient_share", gradient_share, from_to(0, 100)));
   ORBITFUSE_TRY(check("disagreement_share", disagreement_share, from_to(0, 100)));
+  ORBITFUSE_TRY(check("variation_share", variation_share, from_to(0, 100)));
   return check("coverage_factor", coverage_factor, above_up_to(0, 100));
 }
 

@@ -13,13 +13,19 @@ namespace orbitfuse::measurement {
 namespace {
 
 constexpr int points_per_block = 256;
+/// Extremes are looked for where their temperature is sure: at an edge frames mix two surfaces, and
+/// among thousands of points one in ten is farther off than its uncertainty says.
+constexpr double certainty = 2;
 
-Estimate estimate_of(const PointReadings& readings, double field_k,
+Estimate estimate_of(const PointReadings& readings, double field_k, double variation_k,
                      const MeasurementOptions& options) {
   std::vector<WeightedReading> list;
-  for (const FrameReading& r : readings.frames)
+  double gain = 0;
+  for (const FrameReading& r : readings.frames) {
     list.push_back({r.temperature_k, r.gradient_k_per_px, r.weight});
-  return estimate(list, field_k, options);
+    gain += r.weight * r.gain;
+  }
+  return estimate(list, {field_k, gain * variation_k, gain}, options);
 }
 
 double weighted_angle(const std::vector<FrameLine>& frames) {
@@ -56,6 +62,7 @@ Result<std::vector<PointReadings>> read_all(const ThermalScene& scene,
 /// What one frame saw of a region.
 struct FrameSum {
   double area = 0, temperature = 0, offset = 0, angle = 0, gradient2 = 0, weight = 0;
+  double gain = 0;
   double min_k = std::numeric_limits<double>::infinity(), max_k = -min_k;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
 
@@ -66,6 +73,7 @@ struct FrameSum {
     angle += point_area * r.angle_deg;
     gradient2 += point_area * r.gradient_k_per_px * r.gradient_k_per_px;
     weight += point_area * r.weight;
+    gain += point_area * r.weight * r.gain;
     pixel += point_area * r.pixel;
     min_k = std::min(min_k, r.temperature_k);
     max_k = std::max(max_k, r.temperature_k);
@@ -110,7 +118,7 @@ Result<TemperatureReading> read_spot(const ThermalScene& scene, const SurfacePoi
   result.field_k = radiometry.field_k(surface.field_k);
   result.hidden = readings.why_hidden();
   if (!readings.seen()) return result;
-  const Estimate e = estimate_of(readings, result.field_k, scene.options());
+  const Estimate e = estimate_of(readings, result.field_k, surface.variation_k, scene.options());
   result.temperature_k = e.temperature_k;
   result.uncertainty_k = e.uncertainty_k;
   result.spread_k = e.spread_k;
@@ -151,7 +159,7 @@ Result<TemperatureReading> read_region(const ThermalScene& scene,
     if (std::isfinite(field_k)) field.add(field_k, area, 0);
     for (std::size_t k = 0; k < hidden_kinds; ++k) hidden[k] += readings[i].hidden[k];
     if (!readings[i].seen()) continue;
-    const double point_k = estimate_of(readings[i], field_k, scene.options()).temperature_k;
+    const double point_k = estimate_of(readings[i], field_k, 0, scene.options()).temperature_k;
     if (std::isnan(reference_k)) reference_k = point_k;
     seen.add(point_k, area, reference_k);
     for (const FrameReading& r : readings[i].frames) frames[r.frame].add(r, point_k, area);
@@ -167,13 +175,14 @@ Result<TemperatureReading> read_region(const ThermalScene& scene,
   result.max_k = seen.max_k;
   result.standard_deviation_k = std::sqrt(std::max(0.0, seen.squares / seen.area - mean * mean));
   std::vector<WeightedReading> offsets;
-  for (const auto& [frame, s] : frames) all_weight += s.weight;
+  double gain = 0;
+  for (const auto& [frame, s] : frames) all_weight += s.weight, gain += s.gain;
   for (const auto& [frame, s] : frames) {
     result.frames.push_back(line_of(scene, frame, s, seen.area, all_weight));
     offsets.push_back({result.mean_k + s.offset / s.area, std::sqrt(s.gradient2 / s.area),
                        s.weight / all_weight});
   }
-  const Estimate e = estimate(offsets, result.field_k, scene.options());
+  const Estimate e = estimate(offsets, {result.field_k, 0, gain / all_weight}, scene.options());
   result.temperature_k = result.mean_k;
   result.uncertainty_k = e.uncertainty_k;
   result.spread_k = e.spread_k;
@@ -191,8 +200,10 @@ Result<std::vector<PlacedReading>> extremes(const ThermalScene& scene,
   std::vector<std::pair<double, std::size_t>> order;
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (readings[i].frames.size() < enough) continue;
-    const double kelvin = estimate_of(readings[i], unknown, scene.options()).temperature_k;
-    order.emplace_back(hottest ? -kelvin : kelvin, i);
+    const Estimate e = estimate_of(readings[i], radiometry.field_k(points[i].field_k),
+                                   points[i].variation_k, scene.options());
+    order.emplace_back(certainty * e.uncertainty_k + (hottest ? -e.temperature_k : e.temperature_k),
+                       i);
   }
   std::sort(order.begin(), order.end());
   std::vector<PlacedReading> found;

@@ -18,8 +18,10 @@ Result<TemperatureReading> read_region(const ThermalScene& scene,
                                        const std::vector<SurfacePoint>& points,
                                        const Reradiometry& radiometry, const Progress& progress);
 
-/// Up to `count` of the points, hottest or coldest first, at least `apart` from each other, of
-/// those that two frames see (one, where the scene has no more).
+/// Up to `count` of the points, at least `apart` from each other, of those that two frames see
+/// (one, where the scene has no more). In the order of what is sure: temperature less its
+/// uncertainty for the hottest, and with it for the coldest; else edges, where frames mix two
+/// surfaces, would come first.
 Result<std::vector<PlacedReading>> extremes(const ThermalScene& scene,
                                             const std::vector<SurfacePoint>& points, bool hottest,
                                             int count, double apart, const Reradiometry& radiometry,

@@ -68,6 +68,12 @@ double Reradiometry::frame_k(std::size_t frame, double kelvin) const {
   return changes() ? changed(frames_.at(frame), kelvin) : kelvin;
 }
 
+double Reradiometry::gain(std::size_t frame, double kelvin) const {
+  if (!changes()) return 1;
+  constexpr double step = 0.05;
+  return (frame_k(frame, kelvin + step) - frame_k(frame, kelvin - step)) / (2 * step);
+}
+
 double Reradiometry::field_k(double kelvin) const {
   if (!changes()) return kelvin;
   return alike_ ? changed(frames_.front(), kelvin) : std::numeric_limits<double>::quiet_NaN();

@@ -33,6 +33,8 @@ class Reradiometry {
   /// Of the field, which has learnt from all frames: known where all were converted alike, else
   /// NaN.
   double field_k(double kelvin) const;
+  /// By how much a small change of the recorded temperature grows; 1 where nothing changes.
+  double gain(std::size_t frame, double kelvin) const;
   /// What was taken for granted; empty: nothing.
   const std::string& assumption() const { return assumption_; }
 

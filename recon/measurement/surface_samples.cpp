@@ -65,6 +65,7 @@ Result<std::vector<SurfacePoint>> seen_in(const ThermalScene& scene, double cell
         if (!normal) continue;  // a lone pixel
         point.normal = world_from_cam.rotation * *normal;
         point.field_k = static_cast<double>(seen.temperature_k.at<float>(y, x));
+        point.variation_k = variation_at(seen.temperature_k, x, y, 1);
         const double cosine = std::abs(normal->dot(camera.ray_of({x + 0.5, y + 0.5}).normalized()));
         grid.add(point, z / camera.fx / std::max(0.05, cosine));
       }

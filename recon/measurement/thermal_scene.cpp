@@ -55,6 +55,20 @@ std::string alike(const std::string& name, const std::vector<std::string>& known
 
 }  // namespace
 
+double variation_at(const cv::Mat& temperature_k, int x, int y, int reach) {
+  const auto center = static_cast<double>(temperature_k.at<float>(y, x));
+  double sum = 0;
+  int count = 0;
+  for (int j = std::max(0, y - reach); j <= std::min(temperature_k.rows - 1, y + reach); ++j)
+    for (int i = std::max(0, x - reach); i <= std::min(temperature_k.cols - 1, x + reach); ++i) {
+      const double change = static_cast<double>(temperature_k.at<float>(j, i)) - center;
+      if (!std::isfinite(change)) continue;
+      sum += change * change;
+      ++count;
+    }
+  return count > 0 ? std::sqrt(sum / count) : 0;
+}
+
 struct ThermalScene::Cached {
   std::mutex making_image, making_view;
   cv::Mat image;
@@ -180,6 +194,7 @@ Result<SurfacePoint> ThermalScene::surface_at(const PosedView& view, const Eigen
   // A thread of a surface: it faces whoever sees it.
   point.normal = world_from_cam.rotation * normal.value_or(-in_cam.normalized());
   point.field_k = static_cast<double>(seen.temperature_k.at<float>(middle, middle));
+  point.variation_k = variation_at(seen.temperature_k, middle, middle, window_reach);
   return point;
 }
 

@@ -51,7 +51,10 @@ struct SurfacePoint {
   Eigen::Vector3d position;
   Eigen::Vector3d normal;  ///< unit length, to the outside
   double field_k = 0;      ///< NaN: not known
-  double weight = 1;       ///< the area it stands for, in a region; only ratios matter
+  /// How far the field's temperature is from field_k within a pose error's reach of the point, RMS:
+  /// near an edge a small error of the poses is a large one of the temperature. 0: not known.
+  double variation_k = 0;
+  double weight = 1;  ///< the area it stands for, in a region; only ratios matter
 };
 
 /// Loaded once and asked often. All functions are const and safe to call from several threads at
@@ -105,6 +108,9 @@ class ThermalScene {
   std::optional<Middle> middle_;
   std::unique_ptr<std::vector<Cached>> cached_;
 };
+
+/// SurfacePoint::variation_k of a pixel in a rendered view.
+double variation_at(const cv::Mat& temperature_k, int x, int y, int reach);
 
 /// Unit normal, in the camera's axes and towards it, of the plane through the depths round a pixel
 /// of a map; none where fewer than three lie on one surface.

@@ -35,7 +35,7 @@ TEST(Measure, ASpotIsWhatTheFramesThatSeeItShow) {
   EXPECT_NEAR(answer.reading.field_k, end_k, 1e-3);
   EXPECT_NEAR(answer.reading.spread_k, 0, 1e-3);
   EXPECT_GT(answer.reading.uncertainty_k, 0);
-  EXPECT_LT(answer.reading.uncertainty_k, 0.5);
+  EXPECT_LT(answer.reading.uncertainty_k, 1);
   ASSERT_TRUE(answer.normal);
   EXPECT_GT(answer.normal->x(), 0.99);
   EXPECT_TRUE(answer.notes.empty());
@@ -194,7 +194,7 @@ TEST(Measure, HottestAreTheRibsAndColdestTheEnds) {
   ASSERT_EQ(hottest.spots.size(), 4u);
   for (const PlacedReading& spot : hottest.spots) {
     EXPECT_NEAR(spot.reading.temperature_k, rib_k, 0.3);
-    EXPECT_NEAR(std::abs(spot.position.y()), 0.15, 0.01) << "ribs are on the sides";
+    EXPECT_GT(std::abs(spot.normal.y()), 0.9) << "ribs are on the sides of both boxes";
     for (const PlacedReading& other : hottest.spots)
       EXPECT_TRUE(&other == &spot || (other.position - spot.position).norm() >= 0.1);
   }
@@ -226,6 +226,30 @@ TEST(Measure, DifferenceAndDistanceOfTwo) {
   parts.metres_per_unit = 2.5;
   const Answer scaled = ask(box_orbit(std::move(parts)), request);
   EXPECT_NEAR(scaled.distance_m.value_or(0), 0.25, 1e-9);
+}
+
+TEST(Measure, WhatIsKeptNamesPointsNotPixels) {
+  const ThermalScene scene = box_orbit();
+  const PosedView& view = scene.frames()[0].view;
+  const auto pixel = [&](double y) {
+    return PixelPlace{view.name,
+                      view.camera.project(view.cam_from_world * Eigen::Vector3d(0.4, y, 0.01))};
+  };
+  Request spot, line;
+  spot.places = {pixel(0.02)};
+  line.kind = Kind::line;
+  line.profile = 5;
+  line.places = {pixel(-0.1), pixel(0.1)};
+  Request both;
+  both.kind = Kind::difference;
+  both.of = {spot, line};
+  const Request kept = anchored(both, ask(scene, both));
+  for (const Request& part : kept.of)
+    for (const Place& place : part.places) {
+      ASSERT_TRUE(std::holds_alternative<Eigen::Vector3d>(place));
+      EXPECT_NEAR(std::get<Eigen::Vector3d>(place).x(), 0.4, 1e-4);
+    }
+  EXPECT_TRUE(kept.validate());
 }
 
 TEST(Measure, SeveralThreadsGetTheSameAnswers) {
