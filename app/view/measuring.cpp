@@ -61,9 +61,9 @@ Result<json> Measuring::add(const json& asked) {
     ORBITFUSE_ASSIGN(const measurement::Request request, measurement::request_of_json(asked));
     ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
     ORBITFUSE_ASSIGN(const measurement::Answer answer, measure(*scene, request, progress()));
-    ORBITFUSE_TRY(measurement::add_measurement(run_.out / measurement::measurements_file,
-                                               scene->identity(),
-                                               {request.name, "", request, to_json(answer)}));
+    ORBITFUSE_TRY(measurement::add_measurement(
+        run_.out / measurement::measurements_file, scene->identity(),
+        {request.name, "", measurement::anchored(request, answer), to_json(answer)}));
     return {};
   });
   ORBITFUSE_TRY(saved);
