@@ -39,6 +39,7 @@ Status resolve_config(const cli::CommonOptions& common, const CLI::App& verb,
                       stages::RunConfig& config) {
   config::Settings settings = config.settings();
   const CLI::Option* session = verb.get_option_no_throw("session");
+  if (session == nullptr) session = verb.get_option_no_throw("run");
   std::optional<std::uint64_t> seed;
   if (session != nullptr && session->count() > 0) {
     ORBITFUSE_ASSIGN(seed, cli::read_earlier_options(session->as<std::string>(), settings));

@@ -34,7 +34,8 @@ struct Frame {
   std::vector<std::string> flags;
   std::optional<Rigid3d> cam_from_world;
   std::optional<Camera> camera;
-  std::string source;  ///< original file name, if there was one
+  std::string source;                         ///< original file name, if there was one
+  std::optional<FlirCalibration> radiometry;  ///< behind the temperatures, where the file has it
 
   void flag(FrameFlag with) { flags.emplace_back(name(with)); }
 };

@@ -2,8 +2,9 @@
 # orbitfuse_embed(fusion_ms_srif dictionary.bin ms_srif_dictionary): the file's bytes as
 # `extern const std::string_view orbitfuse::embedded::<symbol>`, so that programs need no data folder.
 function(orbitfuse_embed target file symbol)
-  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${file})
-  file(READ ${CMAKE_CURRENT_SOURCE_DIR}/${file} hex HEX)
+  cmake_path(ABSOLUTE_PATH file)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
+  file(READ ${file} hex HEX)
   string(REGEX REPLACE "(..)" "0x\\1," bytes "${hex}")
   set(source ${CMAKE_CURRENT_BINARY_DIR}/${symbol}.cpp)
   file(CONFIGURE OUTPUT ${source} CONTENT

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # The link rule: core <- capture <- drivers; core <- recon; core <- fusion; only app sees all.
 # Siblings inside drivers/ or recon/ stay independent, so that each can be read alone; what poses
-# and registration share is recon/alignment, and recon/assembly joins them all.
+# and registration share is recon/alignment, recon/assembly joins them all, and recon/measurement
+# reads what they made.
 file(STRINGS ${GRAPH} edges)
 if(NOT edges)
   message(FATAL_ERROR "no link graph in ${GRAPH}")
@@ -18,13 +19,17 @@ foreach(edge ${edges})
   set(ok FALSE)
   if(from MATCHES "^app")
     set(ok TRUE)
-  elseif(from MATCHES "^capture" AND to MATCHES "^(core|capture.*)$")
+  elseif(from STREQUAL "core_http" AND to STREQUAL "core")
+    set(ok TRUE)
+  elseif(from MATCHES "^capture" AND to MATCHES "^(core|core_http|capture.*)$")
     set(ok TRUE)
   elseif(from MATCHES "^drivers_" AND to MATCHES "^(core|capture.*)$")
     set(ok TRUE)
   elseif(from MATCHES "^recon_" AND to STREQUAL "core")
     set(ok TRUE)
   elseif(from STREQUAL "recon_assembly" AND to MATCHES "^(core|recon_.*)$")
+    set(ok TRUE)
+  elseif(from STREQUAL "recon_measurement" AND to MATCHES "^(core|recon_(assembly|nerf))$")
     set(ok TRUE)
   elseif(from MATCHES "^recon_(poses|registration)$" AND to STREQUAL "recon_alignment")
     set(ok TRUE)

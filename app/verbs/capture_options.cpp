@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <set>
@@ -157,21 +156,7 @@ Result<PositionFinder> finder_of(const CaptureOptions& o, const recording::Camer
 }
 
 Result<PageOptions> page_of(const CaptureOptions& o) {
-  PageOptions page;
-  page.token = o.token;
-  page.require_token = !o.token.empty();
-  const std::size_t colon = o.page.rfind(':');
-  const std::string port = colon == std::string::npos ? o.page : o.page.substr(colon + 1);
-  if (colon != std::string::npos) page.host = o.page.substr(0, colon);
-  if (page.host.starts_with("[") && page.host.ends_with("]"))
-    page.host = page.host.substr(1, page.host.size() - 2);
-  const auto [end, error] = std::from_chars(port.data(), port.data() + port.size(), page.port);
-  if (error != std::errc{} || end != port.data() + port.size() || page.host.empty()) {
-    return fail(ErrorKind::usage, "--page " + o.page, "not an address",
-                "write PORT or HOST:PORT, e.g. 0.0.0.0:8470");
-  }
-  ORBITFUSE_TRY(page.validate());
-  return page;
+  return page_options_of("--page", o.page, o.token);
 }
 
 void add_capture_options(CLI::App& app, CaptureOptions& options) {

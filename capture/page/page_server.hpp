@@ -9,18 +9,9 @@
 
 #include "capture/live/live_state.hpp"
 #include "capture/recording/latest_frame.hpp"
+#include "core/http/page_options.hpp"
 
 namespace orbitfuse {
-
-struct PageOptions {
-  std::string host =
-      "127.0.0.1";             ///< the address to listen on; anything but loopback needs a token
-  int port = 8470;             ///< 0: any free one
-  std::string token;           ///< empty off loopback: a random one is made
-  bool require_token = false;  ///< on loopback too
-
-  Status validate() const;
-};
 
 /// What a button does: in words for whoever pressed it what came of it, or why nothing did.
 using PageAction = std::function<Result<std::string>()>;
@@ -33,12 +24,9 @@ struct PageHooks {
   PageAction start, stop, at_station, correct;  ///< may be empty
 };
 
-/// The capture page. It answers with one page without any outside address, its state as JSON,
-/// previews as JPEG and temperatures; a content security policy keeps browsers from asking anybody
-/// else. Requests without the token (where one is needed) get 401; requests for another host name
-/// than an address or localhost get 403 (DNS rebinding); changes need a POST with the header
-/// X-OrbitFuse, which other sites' pages cannot send. Peers that are slow or silent hold up neither
-/// other viewers nor the end of the program (ConnectionGate).
+/// The capture page on a WebServer. It answers with one page without any outside address, its state
+/// as JSON, previews as JPEG and temperatures; a content security policy keeps browsers from asking
+/// anybody else.
 class PageServer {
  public:
   PageServer(PageOptions options, PageHooks hooks);

@@ -215,6 +215,7 @@ Result<StoredFrame> SessionWriter::store(const std::string& device_id, const Fra
   record.cam_from_world = frame.cam_from_world;
   record.camera = frame.camera;
   record.source = frame.source;
+  record.radiometry = frame.radiometry;
   record.quality = measure_quality(encoded.pixels, encoded.scale.scale);
   ORBITFUSE_TRY(check_readable(record));
   if (encoded.has_temperature) {

@@ -174,6 +174,10 @@ Status read_optional_parts(const Reader& line, FrameRecord& frame) {
     }
     frame.quality = quality;
   }
+  if (line.has("radiometry")) {
+    ORBITFUSE_ASSIGN(const Reader child, line.child("radiometry"));
+    ORBITFUSE_ASSIGN(frame.radiometry, read_radiometry(child));
+  }
   if (line.has("flags")) {
     if (!line.json()["flags"].is_array()) return line.wrong("flags", "a list of texts");
     for (const Json& flag : line.json()["flags"]) {
@@ -318,6 +322,7 @@ std::string manifest_line(const FrameRecord& frame) {
   if (frame.cam_from_world) json["cam_from_world"] = manifest::json_of(*frame.cam_from_world);
   if (frame.camera) json["camera"] = manifest::json_of(*frame.camera);
   if (!frame.source.empty()) json["source"] = frame.source;
+  if (frame.radiometry) json["radiometry"] = manifest::json_of_radiometry(*frame.radiometry);
   if (frame.quality) {
     json["quality"] = {{"sharpness", frame.quality->sharpness},
                        {"mean_level", frame.quality->mean_level},

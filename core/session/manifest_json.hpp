@@ -42,6 +42,10 @@ class Reader {
   std::string where_;
 };
 
+/// Of a frame's "radiometry" (radiometry_json.cpp).
+Json json_of_radiometry(const FlirCalibration& calibration);
+Result<FlirCalibration> read_radiometry(const Reader& line);
+
 Status read_header(const Reader& line, Session& session);
 Result<DeviceInfo> read_device(const Reader& line);
 Result<FrameRecord> read_frame(const Reader& line);

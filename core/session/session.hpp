@@ -11,6 +11,7 @@
 #include "core/geometry/camera.hpp"
 #include "core/geometry/transform.hpp"
 #include "core/modality.hpp"
+#include "core/radiometry/flir_temperature.hpp"
 #include "core/result.hpp"
 #include "core/session/manifest_terms.hpp"
 
@@ -78,6 +79,8 @@ struct FrameRecord {
   std::optional<Camera> camera;           ///< known intrinsics of this frame
   std::string source;                     ///< imported frames: "folder/name" of the original file
   std::optional<FrameQuality> quality;
+  /// By what the sensor's signal became the stored temperatures; absent: the file says nothing.
+  std::optional<FlirCalibration> radiometry;
 
   bool has_flag(FrameFlag flag) const;
 };

@@ -134,6 +134,7 @@ class ReplaySource : public FrameSource {
     frame.cam_from_world = record.cam_from_world;
     frame.camera = record.camera;
     frame.source = record.source;
+    frame.radiometry = record.radiometry;
   }
 
   Session session_;

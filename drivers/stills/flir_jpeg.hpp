@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "core/radiometry/flir_temperature.hpp"
 #include "core/result.hpp"
-#include "drivers/stills/flir_temperature.hpp"
 
 namespace orbitfuse {
 

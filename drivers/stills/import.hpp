@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/progress.hpp"
+#include "core/radiometry/flir_temperature.hpp"
 #include "core/result.hpp"
 #include "core/session/session.hpp"
 #include "drivers/stills/video_frames.hpp"
@@ -21,20 +22,6 @@ enum class ThermalScale {
   centikelvin,  ///< T[K] = 0.01 DN
   linear,       ///< T[K] = kelvin_per_count DN + kelvin_offset
   raw_counts,   ///< 16-bit without a known scale: kept as grey intensities, never as temperatures
-};
-
-/// Replaces object parameters written in FLIR radiometric JPEGs. Absent = as in the file.
-struct ObjectParameterOverrides {
-  std::optional<double> emissivity;  ///< 0 < e <= 1
-  std::optional<double> distance_m;  ///< >= 0
-  std::optional<double> reflected_temperature_k;
-  std::optional<double> atmospheric_temperature_k;
-  std::optional<double> relative_humidity;  ///< 0..1
-
-  bool any() const {
-    return emissivity || distance_m || reflected_temperature_k || atmospheric_temperature_k ||
-           relative_humidity;
-  }
 };
 
 /// The user's word that the frames, in capture order, were taken at nominal stations.

@@ -86,6 +86,7 @@ Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& 
   Frame& frame = still.frame;
   frame.thermal_is_gray = converted.counts.empty();
   frame.kelvin_per_count = converted.kelvin_per_count;
+  frame.radiometry = converted.radiometry;
   still.without_temperature = converted.without_temperature;
   still.size = file.image.size();
   if (converted.keep_bytes) {

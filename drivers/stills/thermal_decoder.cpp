@@ -18,15 +18,6 @@ constexpr double coldest_plausible_k = 173.15;
 /// 500 C: half an image that glows is a wrong scale, or a furnace.
 constexpr double glowing_k = 773.15;
 
-ObjectParameters with_overrides(ObjectParameters o, const ObjectParameterOverrides& over) {
-  o.emissivity = over.emissivity.value_or(o.emissivity);
-  o.distance_m = over.distance_m.value_or(o.distance_m);
-  o.reflected_k = over.reflected_temperature_k.value_or(o.reflected_k);
-  o.atmospheric_k = over.atmospheric_temperature_k.value_or(o.atmospheric_k);
-  o.relative_humidity = over.relative_humidity.value_or(o.relative_humidity);
-  return o;
-}
-
 CountHistogram histogram_of(const cv::Mat& counts) {
   CountHistogram histogram(65536);
   for (int y = 0; y < counts.rows; ++y) {
@@ -257,7 +248,9 @@ Result<ThermalDecoder::Converted> ThermalDecoder::convert(const ThermalFile& fil
   FlirCalibration calibration = file.flir->calibration;
   calibration.object = with_overrides(calibration.object, options_.object);
   ORBITFUSE_TRY(calibration.validate(where));
-  return stored(file.flir->signal, kelvin_table(calibration));
+  Converted out = stored(file.flir->signal, kelvin_table(calibration));
+  out.radiometry = calibration;
+  return out;
 }
 
 Result<ThermalDecoder::Converted> ThermalDecoder::convert_samples(const ThermalFile& file,

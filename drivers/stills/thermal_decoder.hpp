@@ -69,6 +69,7 @@ class ThermalDecoder {
     int without_temperature = 0;  ///< samples that no temperature or stored count stands for
     cv::Mat gray;                 ///< raw counts under one stretch for the session
     bool keep_bytes = false;      ///< 8-bit file: copy it
+    std::optional<FlirCalibration> radiometry;  ///< as converted, of a FLIR file
   };
   /// Input error when the file's samples can't be temperatures, or are of another kind than the
   /// rest.

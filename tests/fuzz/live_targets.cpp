@@ -12,12 +12,12 @@
 #include <cstring>
 
 #include "capture/clock/clock_map.hpp"
-#include "capture/page/connection_gate.hpp"
 #include "capture/page/page_server.hpp"
 #include "capture/recording/frame_encoding.hpp"
 #include "capture/recording/frame_rhythm.hpp"
 #include "capture/recording/raw_counts.hpp"
 #include "capture/recording/thermal_samples.hpp"
+#include "core/http/connection_gate.hpp"
 #include "core/system/file_io.hpp"
 #include "drivers/aravis/gvcp_probe.hpp"
 #include "drivers/aravis/profile.hpp"
@@ -82,7 +82,10 @@ void over_a_connection(std::string_view bytes, Page& page) {
         ::listen(fd, 64);
         return fd;
       }(),
-      GateLimits{}, [&page](const std::string& request) { return page.server.answer(request); });
+      GateLimits{},
+      [&page](const std::string& request, const std::atomic<bool>&) {
+        return page.server.answer(request);
+      });
   const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
   must(::connect(fd, reinterpret_cast<const sockaddr*>(&address), size) == 0);
   for (std::size_t at = 0; at < bytes.size(); at += 1000) {

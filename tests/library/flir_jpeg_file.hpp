@@ -4,7 +4,7 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "drivers/stills/flir_temperature.hpp"
+#include "core/radiometry/flir_temperature.hpp"
 
 namespace orbitfuse::test {
 

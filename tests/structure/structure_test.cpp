@@ -34,11 +34,16 @@ const std::vector<SourceFile>& all_sources() {
 /// in the module's own folder lie below all of them, its other sources above.
 using Floors = std::vector<std::set<std::string>>;
 const std::map<std::string, Floors> floors_of{
-    {"core", {{"numeric", "system"}, {"geometry"}, {"image", "session"}, {"formats"}}},
+    {"core",
+     {{"http", "numeric", "radiometry", "system"},
+      {"geometry"},
+      {"image", "session"},
+      {"formats"}}},
     {"capture", {{"clock", "guide", "image_quality"}, {"recording"}, {"live"}, {"mat", "page"}}},
     {"recon/alignment", {}},
     {"recon/assembly", {}},
     {"recon/depth", {{"stereo"}}},
+    {"recon/measurement", {}},
     {"recon/nerf", {{"kernels"}, {"field"}, {"rendering"}, {"training"}}},
     {"recon/poses", {{"sfm"}, {"cross_modal", "global_sfm"}, {"rig"}, {"estimate"}}},
     {"recon/registration", {{"clouds", "images"}}},
@@ -51,7 +56,7 @@ const std::map<std::string, Floors> floors_of{
      {{"config", "doctor", "fusion_batch", "pipeline", "recording", "terminal"},
       {"report"},
       {"stages"},
-      {"eval"},
+      {"eval", "view"},
       {"cli"},
       {"verbs"}}},
     {"drivers/aravis", {}},

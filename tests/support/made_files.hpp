@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/stills/flir_temperature.hpp"
+#include "core/radiometry/flir_temperature.hpp"
 
 // Files of cameras and programs that are not at hand, written as their formats are documented: for
 // tests and as seeds of the fuzzers.

@@ -1,14 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "capture/page/page_server.hpp"
-#include "capture/page/connection_gate.hpp"
-#include "capture/page/reachable.hpp"
 
-#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <poll.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <nlohmann/json.hpp>
@@ -23,6 +17,7 @@
 
 #include "core/image/image_codec.hpp"
 #include "core/image/image_io.hpp"
+#include "tests/support/slow_peers.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -97,18 +92,6 @@ TEST_F(PageTest, PageAsksNobodyElse) {
   EXPECT_THAT(page->get_header_value("Content-Security-Policy"), HasSubstr("default-src 'none'"));
   EXPECT_THAT(page->get_header_value("Content-Security-Policy"), HasSubstr("connect-src 'self'"));
   EXPECT_EQ(server->url().find("token"), std::string::npos);
-}
-
-TEST(ReachableHosts, WildcardsBecomeAddressesToType) {
-  EXPECT_EQ(reachable_hosts("192.168.7.9"), std::vector<std::string>{"192.168.7.9"});
-  const std::vector<std::string> v4 = reachable_hosts("0.0.0.0"), v6 = reachable_hosts("::");
-  EXPECT_EQ(v4.back(), "127.0.0.1");
-  EXPECT_EQ(v6.back(), "::1");
-  for (const std::string& host : v4) {
-    EXPECT_NE(host, "0.0.0.0");
-    EXPECT_EQ(host.find(':'), std::string::npos);
-  }
-  for (const std::string& host : v6) EXPECT_FALSE(host.starts_with("fe80:")) << host;
 }
 
 TEST_F(PageTest, EveryAddressOfAWildcardAnswers) {
@@ -193,34 +176,13 @@ TEST_F(PageTest, OtherSitesCannotPressItsButtons) {
             404);  // no such hook
 }
 
-/// The answer to a request that is sent as it stands here, without closing the connection.
-std::string answer_to(int port, const std::string& request, int patience_ms = 3000) {
-  const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(static_cast<std::uint16_t>(port));
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  std::string answer;
-  if (::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0 &&
-      ::send(fd, request.data(), request.size(), 0) == static_cast<ssize_t>(request.size())) {
-    char bytes[4096];
-    pollfd ready{fd, POLLIN, 0};
-    while (::poll(&ready, 1, patience_ms) > 0) {
-      const ssize_t count = ::recv(fd, bytes, sizeof bytes, 0);
-      if (count <= 0) break;
-      answer.append(bytes, static_cast<std::size_t>(count));
-    }
-  }
-  ::close(fd);
-  return answer;
-}
-
 /// RFC 9110: a request without a length has no body, so that nothing more is to be waited for.
 TEST_F(PageTest, PostWithoutALengthIsAnsweredAtOnce) {
   serve({});
   const auto post = [&](const char* method, const char* path, const char* header) {
-    return answer_to(server->port(), std::string(method) + " " + path +
-                                         " HTTP/1.1\r\nHost: 127.0.0.1\r\n" + header + "\r\n");
+    return test::answer_to(
+        server->port(),
+        std::string(method) + " " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\n" + header + "\r\n");
   };
   EXPECT_THAT(post("POST", "/stop", "X-OrbitFuse: 1\r\n"), HasSubstr(" 200 "));
   EXPECT_EQ(stops, 1);
@@ -246,43 +208,10 @@ TEST_F(PageTest, EveryButtonSaysWhatCameOfIt) {
   EXPECT_THAT(said.at("message").get<std::string>(), HasSubstr("the profile names no command"));
 }
 
-/// Peers that send a byte now and then, or nothing, or never read.
-class SlowPeers {
- public:
-  SlowPeers(int port, int count) {
-    for (int i = 0; i < count; ++i) {
-      const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
-      sockaddr_in address{};
-      address.sin_family = AF_INET;
-      address.sin_port = htons(static_cast<std::uint16_t>(port));
-      address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-      if (::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0)
-        fds_.push_back(fd);
-    }
-    drip_ = std::jthread([this](const std::stop_token& over) {
-      const std::string request =
-          "GET /state HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: " + std::string(4000, 'x');
-      for (std::size_t at = 0; !over.stop_requested() && at < request.size(); ++at) {
-        for (const int fd : fds_) (void)!::send(fd, &request[at], 1, MSG_NOSIGNAL);
-        std::this_thread::sleep_for(std::chrono::milliseconds(50));
-      }
-    });
-  }
-  ~SlowPeers() {
-    drip_ = {};
-    for (const int fd : fds_) ::close(fd);
-  }
-  std::size_t count() const { return fds_.size(); }
-
- private:
-  std::vector<int> fds_;
-  std::jthread drip_;
-};
-
 TEST_F(PageTest, SlowPeersHoldUpNeitherViewersNorTheEnd) {
   using Clock = std::chrono::steady_clock;
   serve({});
-  const SlowPeers peers(server->port(), 20);
+  const test::SlowPeers peers(server->port(), 20);
   EXPECT_EQ(peers.count(), 20u);
   const auto asked = Clock::now();
   for (int i = 0; i < 10; ++i) {
@@ -298,7 +227,7 @@ TEST_F(PageTest, SlowPeersHoldUpNeitherViewersNorTheEnd) {
 
 TEST_F(PageTest, MorePeersThanThereIsRoomForDoNotShutAViewerOut) {
   serve({});
-  const SlowPeers peers(server->port(), 200);
+  const test::SlowPeers peers(server->port(), 200);
   for (int i = 0; i < 10; ++i) {
     const auto answer = client().Get("/state");
     ASSERT_TRUE(answer);
@@ -309,18 +238,10 @@ TEST_F(PageTest, MorePeersThanThereIsRoomForDoNotShutAViewerOut) {
 TEST_F(PageTest, ARequestThatIsNotDoneInTimeIsCutOff) {
   serve({});
   const std::string begun = "GET /state HTTP/1.1\r\nHost: 127.0.0.1\r\n";
-  EXPECT_EQ(answer_to(server->port(), begun, 20000), "");  // closed, not waited for
-  EXPECT_THAT(answer_to(server->port(), begun + "X: " + std::string(20000, 'x')),
+  EXPECT_EQ(test::answer_to(server->port(), begun, 20000), "");  // closed, not waited for
+  EXPECT_THAT(test::answer_to(server->port(), begun + "X: " + std::string(20000, 'x')),
               HasSubstr(" 413 "));
-  EXPECT_THAT(answer_to(server->port(), "nonsense\r\n\r\n"), HasSubstr(" 400 "));
-}
-
-TEST(RequestSize, IsHeadAndBody) {
-  EXPECT_EQ(request_size("GET / HTTP/1.1\r\nHost: x\r\n"), 0u);
-  EXPECT_EQ(request_size("GET / HTTP/1.1\r\n\r\n"), 18u);
-  EXPECT_EQ(request_size("POST / HTTP/1.1\r\ncontent-LENGTH: 7\r\n\r\nabc"), 38u + 7u);
-  EXPECT_GT(request_size("POST / HTTP/1.1\r\nContent-Length: 99999999999999999999\r\n\r\n"),
-            1u << 29);
+  EXPECT_THAT(test::answer_to(server->port(), "nonsense\r\n\r\n"), HasSubstr(" 400 "));
 }
 
 TEST_F(PageTest, PreviewsAndTemperatures) {

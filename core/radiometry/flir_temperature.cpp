@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "drivers/stills/flir_temperature.hpp"
+#include "core/radiometry/flir_temperature.hpp"
 
 #include <fmt/format.h>
 
@@ -27,6 +27,15 @@ double transmission(const AtmosphereConstants& a, const ObjectParameters& o) {
 }
 
 }  // namespace
+
+ObjectParameters with_overrides(ObjectParameters o, const ObjectParameterOverrides& over) {
+  o.emissivity = over.emissivity.value_or(o.emissivity);
+  o.distance_m = over.distance_m.value_or(o.distance_m);
+  o.reflected_k = over.reflected_temperature_k.value_or(o.reflected_k);
+  o.atmospheric_k = over.atmospheric_temperature_k.value_or(o.atmospheric_k);
+  o.relative_humidity = over.relative_humidity.value_or(o.relative_humidity);
+  return o;
+}
 
 Status FlirCalibration::validate(const std::string& where) const {
   struct Range {
@@ -83,11 +92,15 @@ std::vector<double> kelvin_table(const FlirCalibration& calibration) {
   const FlirThermometer thermometer(calibration);
   std::vector<double> table(65536);
   for (std::size_t s = 0; s < table.size(); ++s)
-    table[s] = thermometer.kelvin(static_cast<std::uint16_t>(s));
+    table[s] = thermometer.kelvin(static_cast<double>(s));
   return table;
 }
 
-double FlirThermometer::kelvin(std::uint16_t signal) const {
+double FlirThermometer::signal(double kelvin) const {
+  return (signal_of(kelvin) - offset_) / gain_;
+}
+
+double FlirThermometer::kelvin(double signal) const {
   const double s = gain_ * signal + offset_ + planck_.o;
   const double argument = planck_.r1 / (planck_.r2 * s) + planck_.f;
   if (!(s > 0) || !(argument > 1)) return std::numeric_limits<double>::quiet_NaN();

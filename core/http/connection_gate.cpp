@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "capture/page/connection_gate.hpp"
+#include "core/http/connection_gate.hpp"
 
 #include <fcntl.h>
 #include <poll.h>
@@ -16,6 +16,7 @@
 #include <cstdlib>
 #include <deque>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -36,6 +37,13 @@ struct Connection {
   Clock::time_point deadline;
   std::string request, answer;
   std::size_t sent = 0;
+  std::shared_ptr<std::atomic<bool>> gone = std::make_shared<std::atomic<bool>>(false);
+};
+
+struct WholeRequest {
+  std::uint64_t key = 0;
+  std::string text;
+  std::shared_ptr<std::atomic<bool>> gone;
 };
 
 std::string lower(std::string text) {
@@ -68,7 +76,8 @@ struct ConnectionGate::Impl {
 
   std::mutex mutex;
   std::condition_variable changed;
-  std::deque<std::pair<std::uint64_t, std::string>> requests, answers;
+  std::deque<WholeRequest> requests;
+  std::deque<std::pair<std::uint64_t, std::string>> answers;
   bool over = false;
   std::vector<std::thread> threads;
 
@@ -79,7 +88,7 @@ struct ConnectionGate::Impl {
 
   void work() {
     while (true) {
-      std::pair<std::uint64_t, std::string> request;
+      WholeRequest request;
       {
         std::unique_lock lock(mutex);
         changed.wait(lock, [&] { return over || !requests.empty(); });
@@ -87,10 +96,10 @@ struct ConnectionGate::Impl {
         request = std::move(requests.front());
         requests.pop_front();
       }
-      std::string text = answer(request.second);
+      std::string text = answer(request.text, *request.gone);
       {
         const std::lock_guard lock(mutex);
-        answers.emplace_back(request.first, std::move(text));
+        answers.emplace_back(request.key, std::move(text));
       }
       wake_up();
     }
@@ -133,7 +142,7 @@ struct ConnectionGate::Impl {
   void hand_on(std::uint64_t key, Connection& c) {
     c.state = Connection::State::answering;
     const std::lock_guard lock(mutex);
-    requests.emplace_back(key, std::move(c.request));
+    requests.push_back({key, std::move(c.request), c.gone});
     changed.notify_one();
   }
 
@@ -203,8 +212,9 @@ struct ConnectionGate::Impl {
       for (const auto& [key, c] : connections) {
         const bool writing = c.state == Connection::State::writing;
         const bool answering = c.state == Connection::State::answering;
-        waiters.push_back(
-            {answering ? -1 : c.fd, static_cast<short>(writing ? POLLOUT : POLLIN), 0});
+        // While an answer is made only its peer's leaving is of interest, and that once.
+        const int wanted = writing ? POLLOUT : answering ? POLLRDHUP : POLLIN;
+        waiters.push_back({answering && *c.gone ? -1 : c.fd, static_cast<short>(wanted), 0});
         keys.push_back(key);
       }
       ::poll(waiters.data(), waiters.size(), 100);
@@ -212,7 +222,9 @@ struct ConnectionGate::Impl {
         const auto found = connections.find(keys[i]);
         Connection& c = found->second;
         bool stays = true;
-        if (waiters[i + 2].revents != 0)
+        if (waiters[i + 2].revents != 0 && c.state == Connection::State::answering)
+          *c.gone = true;
+        else if (waiters[i + 2].revents != 0)
           stays = c.state == Connection::State::writing ? write(c) : read(keys[i], c);
         const bool late = c.state != Connection::State::answering && Clock::now() > c.deadline;
         if (!stays || late) forget(found);
@@ -220,6 +232,7 @@ struct ConnectionGate::Impl {
       take_answers();
       if (waiters[1].revents != 0) accept_all();
     }
+    for (const auto& [key, c] : connections) *c.gone = true;
   }
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,12 +13,14 @@ namespace orbitfuse {
 struct PlanckConstants {
   double r1 = 0, r2 = 0, b = 0, f = 1;
   double o = 0;
+  bool operator==(const PlanckConstants&) const = default;
 };
 
 /// Transmission of air: tau = X e^(-sqrt(d) (a1 + b1 sqrt(w))) + (1 - X) e^(-sqrt(d) (a2 + b2
 /// sqrt(w))) with d in metres and w the water vapour content in g/m3.
 struct AtmosphereConstants {
   double alpha1 = 0.006569, alpha2 = 0.01262, beta1 = -0.002276, beta2 = -0.00667, x = 1.9;
+  bool operator==(const AtmosphereConstants&) const = default;
 };
 
 /// What the operator set in the camera.
@@ -28,7 +30,23 @@ struct ObjectParameters {
   double reflected_k = 293.15, atmospheric_k = 293.15, window_k = 293.15;
   double window_transmission = 1;
   double relative_humidity = 0.5;  ///< 0..1
+  bool operator==(const ObjectParameters&) const = default;
 };
+
+/// Other object parameters than a file has. Absent = as in the file.
+struct ObjectParameterOverrides {
+  std::optional<double> emissivity;  ///< 0 < e <= 1
+  std::optional<double> distance_m;  ///< >= 0
+  std::optional<double> reflected_temperature_k;
+  std::optional<double> atmospheric_temperature_k;
+  std::optional<double> relative_humidity;  ///< 0..1
+
+  bool any() const {
+    return emissivity || distance_m || reflected_temperature_k || atmospheric_temperature_k ||
+           relative_humidity;
+  }
+};
+ObjectParameters with_overrides(ObjectParameters o, const ObjectParameterOverrides& over);
 
 struct FlirCalibration {
   PlanckConstants planck;
@@ -37,6 +55,7 @@ struct FlirCalibration {
 
   /// Input error naming the parameter that is not finite or out of range.
   Status validate(const std::string& where) const;
+  bool operator==(const FlirCalibration&) const = default;
 };
 
 /// Radiometric chain of FLIR's tools:
@@ -46,7 +65,9 @@ class FlirThermometer {
  public:
   explicit FlirThermometer(const FlirCalibration& calibration);
   /// NaN where the signal is outside what any temperature gives.
-  double kelvin(std::uint16_t signal) const;
+  double kelvin(double signal) const;
+  /// The other way: what the sensor reads of an object at `kelvin`.
+  double signal(double kelvin) const;
   double atmospheric_transmission() const { return tau_; }
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "capture/page/reachable.hpp"
+#include "core/http/reachable.hpp"
 
 #include <arpa/inet.h>
 #include <ifaddrs.h>

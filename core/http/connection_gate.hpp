@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <functional>
@@ -22,8 +23,10 @@ struct GateLimits {
 /// carries one request, has a deadline, and their number is bounded. Stopping waits for no peer.
 class ConnectionGate {
  public:
-  /// The answer, head and body, to a request; called from the workers' threads.
-  using Answer = std::function<std::string(const std::string& request)>;
+  /// The answer, head and body, to a request; called from the workers' threads. `gone` turns true
+  /// when nobody waits for it any more: the peer closed, or the gate is stopping.
+  using Answer =
+      std::function<std::string(const std::string& request, const std::atomic<bool>& gone)>;
 
   /// Takes the listening socket.
   ConnectionGate(int listening_socket, GateLimits limits, Answer answer);

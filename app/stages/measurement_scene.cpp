@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/stages/measurement_scene.hpp"
+
+#include <algorithm>
+#include <map>
+#include <memory>
+
+#include "app/pipeline/stage_record.hpp"
+#include "app/stages/artifacts.hpp"
+#include "app/stages/rendered_views.hpp"
+#include "app/stages/stage_list.hpp"
+#include "core/formats/transforms_json.hpp"
+#include "core/image/image_io.hpp"
+#include "core/system/file_io.hpp"
+#include "recon/measurement/field_source.hpp"
+
+namespace orbitfuse::stages {
+namespace {
+namespace fs = std::filesystem;
+using measurement::SceneParts;
+using measurement::ThermalFrame;
+using measurement::ThermalScene;
+
+/// A run's folder as it lies there.
+struct Folder {
+  fs::path out;
+  bool done(const char* stage) const {
+    std::error_code unreadable;
+    return fs::exists(out / stage / pipeline::stage_record_file, unreadable);
+  }
+};
+
+/// Which views the poses stage doubts, and why.
+Result<std::map<std::string, std::string>> doubts_of(const Folder& folder) {
+  std::map<std::string, std::string> doubts;
+  ORBITFUSE_ASSIGN(const pipeline::StageRecord record,
+                   pipeline::read_stage_record(folder.out / "poses_thermal"));
+  const nlohmann::json& metrics = record.output.metrics;
+  if (!metrics.contains("doubtful") || !metrics["doubtful"].is_array()) return doubts;
+  for (const nlohmann::json& entry : metrics["doubtful"])
+    if (entry.is_object() && entry.contains("view") && entry["view"].is_string())
+      doubts[entry["view"]] = entry.value("why", "doubtful");
+  return doubts;
+}
+
+/// The thermal field, its frames, and how both come into the run's world.
+Status add_thermal(const Folder& folder, const Session& session, SceneParts& parts) {
+  ORBITFUSE_ASSIGN(nerf::Field field, nerf::Field::load(folder.out / "train_thermal" / field_file));
+  Similarity3d world_from_thermal;
+  if (folder.done("poses_visible") && folder.done("register")) {
+    ORBITFUSE_ASSIGN(const RegistrationRecord record, load_registration(folder.out / "register"));
+    world_from_thermal = record.visible_from_thermal;
+  }
+  parts.field = measurement::field_renderer(std::make_shared<const nerf::Field>(std::move(field)),
+                                            world_from_thermal);
+  const bool moved = fs::exists(folder.out / "train_thermal" / "model");
+  ORBITFUSE_ASSIGN(
+      const Reconstruction model,
+      load_poses(folder.out / (moved ? "train_thermal" : "poses_thermal"), Modality::thermal));
+  ORBITFUSE_ASSIGN(const auto doubts, doubts_of(folder));
+  for (PosedView view : model.views) {
+    view.cam_from_world = rebase(view.cam_from_world, world_from_thermal);
+    ThermalFrame frame{std::move(view), {}, {}};
+    if (const auto doubt = doubts.find(frame.view.name); doubt != doubts.end())
+      frame.doubt = doubt->second;
+    for (const FrameRecord& record : session.frames)
+      if (record.file == frame.view.name) frame.radiometry = record.radiometry;
+    parts.frames.push_back(std::move(frame));
+  }
+  parts.read_frame = [root = session.folder](const ThermalFrame& frame) {
+    return read_thermal_k(root / frame.view.name);
+  };
+  return {};
+}
+
+Status add_named_views(const Folder& folder, SceneParts& parts) {
+  for (const ThermalFrame& frame : parts.frames) parts.orbit.push_back(frame.view);
+  if (folder.done("poses_visible")) {
+    ORBITFUSE_ASSIGN(const Reconstruction visible,
+                     load_poses(folder.out / "poses_visible", Modality::visible));
+    parts.views = parts.orbit = visible.views;
+  }
+  if (!folder.done("render")) return {};
+  ORBITFUSE_ASSIGN(const RenderedViews rendered, load_rendered_views(folder.out / "render"));
+  ORBITFUSE_ASSIGN(const Transforms transforms,
+                   read_transforms_json(folder.out / "render" / "transforms.json"));
+  for (std::size_t i = 0; i < std::min(rendered.views.size(), transforms.frames.size()); ++i)
+    parts.views.push_back(
+        {rendered.views[i].name, transforms.frames[i].camera, transforms.frames[i].cam_from_world});
+  return {};
+}
+
+/// Of everything that a measurement's coordinates and temperatures depend on.
+Result<std::string> identity_of(const Folder& folder, const Session& session) {
+  std::string text = session.id;
+  for (const char* stage : {"poses_visible", "poses_thermal", "train_thermal", "register"}) {
+    if (!folder.done(stage)) continue;
+    ORBITFUSE_ASSIGN(const pipeline::StageRecord record,
+                     pipeline::read_stage_record(folder.out / stage));
+    text += " " + record.outputs_hash();
+  }
+  return content_hash(text);
+}
+
+}  // namespace
+
+Result<ThermalScene> load_measurement_scene(const fs::path& out, const Session& session,
+                                            const measurement::MeasurementOptions& options) {
+  const Folder folder{out};
+  for (const char* stage : {"poses_thermal", "train_thermal"})
+    if (!folder.done(stage))
+      return fail(ErrorKind::input, out.string(), std::string(stage) + " is not finished in it",
+                  "run the session first: orbitfuse run " + session.folder.string() + " --out " +
+                      out.string());
+  // Two fields whose frames nobody could relate have no world in common.
+  if (folder.done("poses_visible") && !folder.done("register"))
+    return fail(ErrorKind::input, out.string(), "the two fields are not registered",
+                "see why in " + (out / "register.failed").string() + " or the report");
+  const auto frames = session.frames_of(Modality::thermal);
+  if (std::any_of(frames.begin(), frames.end(),
+                  [](const FrameRecord* f) { return f->thermal_is_gray; }))
+    return fail(ErrorKind::input, session.folder.string(),
+                "its thermal frames are gray levels, no temperatures",
+                "record with a camera that gives temperatures, or import its radiometric files");
+  SceneParts parts;
+  ORBITFUSE_TRY(add_thermal(folder, session, parts));
+  ORBITFUSE_TRY(add_named_views(folder, parts));
+  ORBITFUSE_ASSIGN(parts.identity, identity_of(folder, session));
+  return ThermalScene::make(std::move(parts), options);
+}
+
+}  // namespace orbitfuse::stages

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+
+#include "core/session/session.hpp"
+#include "recon/measurement/thermal_scene.hpp"
+
+namespace orbitfuse::stages {
+
+/// What a finished run measures from: its thermal field, every posed thermal frame of the session
+/// with its doubts and radiometry, and as named views the frames of both orbits ("thermal/...",
+/// "visible/...": their files in the session) and the rendered ones ("000", ...), all in the
+/// visible world (the thermal one, where nothing visible is posed). Small: images and depth maps
+/// come when they are asked for.
+/// Errors: input (no thermal field, no poses, a session of gray levels; each says what to do).
+Result<measurement::ThermalScene> load_measurement_scene(
+    const std::filesystem::path& out, const Session& session,
+    const measurement::MeasurementOptions& options = {});
+
+}  // namespace orbitfuse::stages

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include "app/cli/run_stages.hpp"
+#include "app/cli/verb.hpp"
+#include "app/stages/measurement_scene.hpp"
+#include "app/verbs/measure_options.hpp"
+#include "core/temperature.hpp"
+#include "recon/measurement/measure.hpp"
+#include "recon/measurement/table.hpp"
+
+namespace orbitfuse::cli {
+namespace {
+namespace fs = std::filesystem;
+using namespace measurement;
+using nlohmann::json;
+
+struct Options {
+  std::string out, session;
+  MeasureWords words;
+};
+
+/// The session that a run's folder names, or the one that was given.
+Result<Session> session_of(const Options& options) {
+  if (!fs::is_directory(options.out))
+    return fail(ErrorKind::input, options.out, "no such folder", "name the --out folder of a run");
+  StageFolders folders{options.out, options.out};
+  if (!options.session.empty()) folders.session = options.session;
+  if (options.session.empty()) {
+    if (!fs::exists(fs::path(options.out) / "run.json"))
+      return fail(ErrorKind::input, options.out, "no run.json in it",
+                  "name the --out folder of a run, or give --session too");
+    ORBITFUSE_TRY(resolve(folders));
+  }
+  return open_session(folders.session).map_error([](Error error) {
+    error.remedy += "; or say where the session is with --session";
+    return error;
+  });
+}
+
+std::string brief(const SavedMeasurement& saved) {
+  const json& a = saved.answer;
+  const auto value = [](const json& j, const char* key) {
+    return j.is_object() && j.contains(key) && j[key].is_number()
+               ? std::optional(j[key].get<double>())
+               : std::nullopt;
+  };
+  std::string text = fmt::format("{:<20} {:<10}", saved.name, name(saved.request.kind));
+  if (const auto k = value(a.value("reading", json()), "temperature_k"))
+    text += fmt::format(" {:.2f} C", celsius_from_kelvin(*k));
+  if (const auto k = value(a, "difference_k")) text += fmt::format(" {:+.2f} K", *k);
+  if (const auto d = value(a, "distance")) text += fmt::format(" {:.4f} units", *d);
+  return text + "  " + saved.created;
+}
+
+/// Without a question: what was saved.
+void list(Context& context, const Measurements& saved, const std::string& file) {
+  context.result["measurements"] = json::array();
+  for (const SavedMeasurement& m : saved.list) {
+    context.console.data(brief(m));
+    context.result["measurements"].push_back({{"name", m.name},
+                                              {"created", m.created},
+                                              {"request", to_json(m.request)},
+                                              {"answer", m.answer}});
+  }
+  if (saved.list.empty())
+    context.console.info("no saved measurements in " + file +
+                         "; ask for one, e.g. --hottest 3 (--help lists the kinds)");
+}
+
+void tell(Context& context, const Options& options, const std::string& name, const Answer& answer) {
+  if (options.words.csv) {
+    context.console.data(csv_header());
+    for (const std::string& row : csv_rows(name, answer)) context.console.data(row);
+    for (const std::string& note : answer.notes) context.console.info("note: " + note);
+    return;
+  }
+  for (const std::string& line : described(answer)) context.console.data(line);
+}
+
+Status run(Context& context, const Options& options) {
+  if (options.words.csv && context.common.json)
+    return fail(ErrorKind::usage, "--csv", "together with --json", "choose one of them");
+  ORBITFUSE_ASSIGN(const Session session, session_of(options));
+  ORBITFUSE_ASSIGN(const ThermalScene scene, stages::load_measurement_scene(options.out, session));
+  const fs::path file = fs::path(options.out) / measurements_file;
+  // Others' measurements stand in the way of names and of saving, not of looking.
+  const auto saved = load_measurements(file, scene.identity());
+  if (!saved && options.words.save) return tl::unexpected(saved.error());
+  if (!saved) context.console.warning(saved.error().message());
+  const Measurements known = saved.value_or(Measurements{});
+  ORBITFUSE_ASSIGN(const auto request, request_of(options.words, scene, known));
+  if (!request) {
+    if (!saved) return tl::unexpected(saved.error());
+    list(context, known, file.string());
+    return {};
+  }
+  ORBITFUSE_ASSIGN(const Answer answer, measure(scene, *request, context.progress));
+  std::string name = request->name;
+  if (options.words.save && context.common.dry_run) {
+    context.console.info("would be saved in " + file.string());
+  } else if (options.words.save) {
+    ORBITFUSE_ASSIGN(name,
+                     add_measurement(file, scene.identity(),
+                                     {name, "", anchored(*request, answer), to_json(answer)}));
+    context.console.info(fmt::format("saved as '{}' in {}", name, file.string()));
+  }
+  if (name.empty()) name = std::string(measurement::name(request->kind));
+  context.result["name"] = name;
+  context.result["request"] = to_json(*request);
+  context.result["answer"] = to_json(answer);
+  tell(context, options, name, answer);
+  return {};
+}
+
+}  // namespace
+
+Action add_measure(CLI::App& app) {
+  const auto options = std::make_shared<Options>();
+  app.add_option("out", options->out, "The --out folder of a finished run")->required();
+  app.add_option("--session", options->session, "Where the session is, if it was moved");
+  add_measure_options(app, options->words);
+  return [options](Context& context) { return run(context, *options); };
+}
+
+}  // namespace orbitfuse::cli

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "recon/measurement/measurement_file.hpp"
+#include "recon/measurement/thermal_scene.hpp"
+
+namespace orbitfuse::cli {
+
+/// `orbitfuse measure` as it was typed.
+struct MeasureWords {
+  std::string pixel, point, box, polygon, request, name;
+  std::vector<std::string> line, distance, difference;  ///< two words each
+  std::optional<int> hottest, coldest;
+  double apart = 0;
+  int profile = 50;
+  std::optional<double> emissivity, reflected_c, distance_m, air_c, humidity_percent;
+  std::optional<double> recorded_emissivity, recorded_reflected_c;
+  bool save = false, csv = false;
+};
+
+void add_measure_options(CLI::App& app, MeasureWords& words);
+
+/// The one request among the options; none where none asks for a measurement. Usage error where two
+/// do, or for words that are no place. Names of saved measurements stand for what was asked then.
+Result<std::optional<measurement::Request>> request_of(const MeasureWords& words,
+                                                       const measurement::ThermalScene& scene,
+                                                       const measurement::Measurements& saved);
+
+}  // namespace orbitfuse::cli

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/view/bookmarks.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "app/view/json_fields.hpp"
+#include "core/system/file_io.hpp"
+
+namespace orbitfuse::view {
+using nlohmann::json;
+
+namespace {
+
+constexpr int schema = 1;
+constexpr std::size_t most_bookmarks = 500;
+constexpr std::size_t longest_name = 80;
+
+}  // namespace
+
+json to_json(const Bookmark& b) {
+  return {{"name", b.name},
+          {"position", {b.position.x(), b.position.y(), b.position.z()}},
+          {"target", {b.target.x(), b.target.y(), b.target.z()}},
+          {"fov_deg", b.fov_deg}};
+}
+
+Result<Bookmark> bookmark_of(const json& j) {
+  Bookmark bookmark;
+  ORBITFUSE_ASSIGN(bookmark.name, text_field(j, "name", longest_name));
+  ORBITFUSE_ASSIGN(const auto position, (number_fields<3>(j, "position")));
+  ORBITFUSE_ASSIGN(const auto target, (number_fields<3>(j, "target")));
+  ORBITFUSE_ASSIGN(bookmark.fov_deg, number_field(j, "fov_deg", 1, 150));
+  bookmark.position = {position[0], position[1], position[2]};
+  bookmark.target = {target[0], target[1], target[2]};
+  if (!((bookmark.position - bookmark.target).norm() > 1e-9))
+    return fail(ErrorKind::usage, "target", "where the camera stands", "must be another point");
+  return bookmark;
+}
+
+Result<std::vector<Bookmark>> Bookmarks::read() const {
+  std::error_code unreadable;
+  std::vector<Bookmark> list;
+  if (!std::filesystem::exists(file_, unreadable)) return list;
+  ORBITFUSE_ASSIGN(const std::string text, read_file(file_, max_settings_bytes));
+  const auto damaged = [&](const std::string& found) {
+    return fail(ErrorKind::input, file_.string(), found,
+                "mend it, or move it away and keep the views again");
+  };
+  const json j = json::parse(text, nullptr, false);
+  if (!j.is_object() || !j.contains("bookmarks") || !j["bookmarks"].is_array())
+    return damaged("not JSON, or no bookmarks in it");
+  if (j.value("schema", json()) != schema) return damaged("of another version");
+  for (const json& entry : j["bookmarks"]) {
+    const Result<Bookmark> bookmark = bookmark_of(entry);
+    if (!bookmark)
+      return damaged(fmt::format("bookmarks[{}]: {}", list.size(), bookmark.error().message()));
+    list.push_back(*bookmark);
+  }
+  return list;
+}
+
+Status Bookmarks::write(const std::vector<Bookmark>& list) const {
+  json entries = json::array();
+  for (const Bookmark& bookmark : list) entries.push_back(to_json(bookmark));
+  return write_file_atomic(file_, json{{"schema", schema}, {"bookmarks", entries}}.dump(2) + "\n");
+}
+
+Result<std::vector<Bookmark>> Bookmarks::list() const {
+  const std::lock_guard lock(mutex_);
+  return read();
+}
+
+Status Bookmarks::add(const Bookmark& bookmark) {
+  const std::lock_guard lock(mutex_);
+  ORBITFUSE_ASSIGN(std::vector<Bookmark> list, read());
+  if (std::any_of(list.begin(), list.end(),
+                  [&](const Bookmark& b) { return b.name == bookmark.name; }))
+    return fail(ErrorKind::usage, bookmark.name, "a view of this name is kept already",
+                "choose another name, or remove that one first");
+  if (list.size() >= most_bookmarks)
+    return fail(ErrorKind::usage, "bookmarks", fmt::format("{} are kept already", list.size()),
+                "remove some first");
+  list.push_back(bookmark);
+  return write(list);
+}
+
+Status Bookmarks::remove(const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  ORBITFUSE_ASSIGN(std::vector<Bookmark> list, read());
+  const auto found =
+      std::find_if(list.begin(), list.end(), [&](const Bookmark& b) { return b.name == name; });
+  if (found == list.end())
+    return fail(ErrorKind::usage, name, "no view of this name is kept", "look at the list again");
+  list.erase(found);
+  return write(list);
+}
+
+}  // namespace orbitfuse::view

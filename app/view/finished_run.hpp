@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/stages/run_config.hpp"
+#include "core/geometry/point_cloud.hpp"
+#include "core/geometry/reconstruction.hpp"
+#include "core/image/palette.hpp"
+#include "core/session/session.hpp"
+#include "fusion/heat/heat_scale.hpp"
+#include "recon/assembly/training_data.hpp"
+#include "recon/nerf/nerf.hpp"
+
+namespace orbitfuse::view {
+
+/// A recorded camera, posed in the frame that the viewer shows.
+struct RecordedView {
+  Modality modality = Modality::visible;
+  PosedView view;     ///< name: its file in the session
+  std::string doubt;  ///< why its pose may be wrong; empty: it is sure
+};
+
+/// What the viewer needs of a run, held in memory: the run's folder may change meanwhile.
+/// Everything is in one frame, `frame`: the visible field's, or the thermal one's where there is no
+/// visible field.
+struct FinishedRun {
+  std::filesystem::path out;
+  std::optional<Session> session;  ///< nothing: it is not where the run read it
+  nerf::Field visible, thermal;    ///< one may be empty
+  Modality frame = Modality::visible;
+  Similarity3d frame_from_thermal;
+  std::vector<RecordedView> views;
+  Eigen::Vector3d center = Eigen::Vector3d::Zero(), up = Eigen::Vector3d::UnitZ();
+  double radius = 1;   ///< of the recorded cameras round the centre
+  PointCloud surface;  ///< colours, temperatures or both
+  bool thermal_is_gray = false;
+  TemperatureSpan span;  ///< the run's, one for all its pictures
+  HeatScale heat;
+  stages::RunConfig config;
+  std::vector<std::string> notes;  ///< what is not there, and why
+
+  bool has(Modality modality) const {
+    return !(modality == Modality::visible ? visible : thermal).empty();
+  }
+  Samples samples() const { return thermal_is_gray ? Samples::gray : Samples::kelvin; }
+};
+
+/// Errors: input (no run, none of its fields, damaged files), cancelled.
+Result<FinishedRun> load_finished_run(const std::filesystem::path& out,
+                                      const stages::RunConfig& config, const Progress& progress);
+
+}  // namespace orbitfuse::view

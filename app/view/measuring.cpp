@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/view/measuring.hpp"
+
+#include "app/stages/measurement_scene.hpp"
+#include "recon/measurement/measure.hpp"
+#include "recon/measurement/measurement_file.hpp"
+
+namespace orbitfuse::view {
+using nlohmann::json;
+
+Progress Measuring::progress() const {
+  Progress progress;
+  progress.cancel = &closed_;
+  return progress;
+}
+
+Result<const measurement::ThermalScene*> Measuring::scene() {
+  const std::lock_guard lock(mutex_);
+  if (scene_) return scene_.get();
+  if (!run_.session)
+    return fail(ErrorKind::input, "measurements", "the session is not where the run read it",
+                "bring it back, and open the viewer again");
+  ORBITFUSE_ASSIGN(measurement::ThermalScene loaded,
+                   stages::load_measurement_scene(run_.out, *run_.session));
+  scene_ = std::make_unique<measurement::ThermalScene>(std::move(loaded));
+  return scene_.get();
+}
+
+template <class Work>
+auto Measuring::in_turn(Work work) -> decltype(work()) {
+  if (!places_.try_acquire())
+    return fail(ErrorKind::unavailable, "measurements", "others are being measured",
+                "try again in a moment");
+  decltype(work()) result = work();
+  places_.release();
+  return result;
+}
+
+Result<json> Measuring::point_at(const Shot& shot, const Eigen::Vector2d& pixel) {
+  return in_turn([&]() -> Result<json> {
+    ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
+    const PosedView view{"the viewer's picture", shot.camera, shot.cam_from_world};
+    ORBITFUSE_ASSIGN(const measurement::SurfacePoint found,
+                     scene->surface_at(view, pixel, progress()));
+    const Eigen::Vector3d& p = found.position;
+    return json{{"point", {p.x(), p.y(), p.z()}}};
+  });
+}
+
+Result<json> Measuring::answer(const json& asked) {
+  return in_turn([&]() -> Result<json> {
+    ORBITFUSE_ASSIGN(const measurement::Request request, measurement::request_of_json(asked));
+    ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
+    ORBITFUSE_ASSIGN(const measurement::Answer answer, measure(*scene, request, progress()));
+    return json{{"request", to_json(request)}, {"answer", to_json(answer)}};
+  });
+}
+
+Result<json> Measuring::add(const json& asked) {
+  const Status saved = in_turn([&]() -> Status {
+    ORBITFUSE_ASSIGN(const measurement::Request request, measurement::request_of_json(asked));
+    ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
+    ORBITFUSE_ASSIGN(const measurement::Answer answer, measure(*scene, request, progress()));
+    ORBITFUSE_TRY(measurement::add_measurement(
+        run_.out / measurement::measurements_file, scene->identity(),
+        {request.name, "", measurement::anchored(request, answer), to_json(answer)}));
+    return {};
+  });
+  ORBITFUSE_TRY(saved);
+  return list();
+}
+
+Result<json> Measuring::list() {
+  return in_turn([&]() -> Result<json> {
+    ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
+    ORBITFUSE_ASSIGN(const measurement::Measurements saved,
+                     measurement::load_measurements(run_.out / measurement::measurements_file,
+                                                    scene->identity()));
+    json entries = json::array();
+    for (const measurement::SavedMeasurement& m : saved.list)
+      entries.push_back({{"name", m.name},
+                         {"created", m.created},
+                         {"request", to_json(m.request)},
+                         {"answer", m.answer}});
+    return entries;
+  });
+}
+
+}  // namespace orbitfuse::view

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/view/scene_json.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <opencv2/core.hpp>
+
+#include "app/view/shot_request.hpp"
+#include "core/temperature.hpp"
+#include "fusion/heat/heat.hpp"
+
+namespace orbitfuse::view {
+namespace {
+using nlohmann::json;
+
+/// "rrggbb" 256 times.
+std::string hex_of(const cv::Mat& colors_bgr) {
+  std::string text;
+  for (int i = 0; i < colors_bgr.cols; ++i) {
+    const auto c = colors_bgr.at<cv::Vec3b>(0, i);
+    text += fmt::format("{:02x}{:02x}{:02x}", c[2], c[1], c[0]);
+  }
+  return text;
+}
+
+}  // namespace
+
+double surface_kelvin_per_count(const FinishedRun& run) {
+  double hottest_k = 0;
+  for (const float k : run.surface.temperatures_k)
+    hottest_k = std::max(hottest_k, static_cast<double>(k));
+  return orbitfuse::kelvin_per_count_for(hottest_k);
+}
+
+json scene_json(const FinishedRun& run) {
+  json views = json::array();
+  for (const RecordedView& recorded : run.views) {
+    json view = browser_camera(recorded.view.camera, recorded.view.cam_from_world);
+    view["modality"] = name(recorded.modality);
+    view["name"] = recorded.view.name;
+    view["width"] = recorded.view.camera.width;
+    view["height"] = recorded.view.camera.height;
+    if (!recorded.doubt.empty()) view["doubt"] = recorded.doubt;
+    views.push_back(std::move(view));
+  }
+  json palettes = json::object();
+  for (const std::string& palette_name : palette_names())
+    palettes[palette_name] = hex_of(*palette(palette_name));
+  const Eigen::Vector3d &c = run.center, &u = run.up;
+  return {{"name", std::filesystem::absolute(run.out).lexically_normal().string()},
+          {"visible", run.has(Modality::visible)},
+          {"thermal", run.has(Modality::thermal)},
+          {"gray", run.thermal_is_gray},
+          {"span", {run.span.low_k, run.span.high_k}},
+          {"heat", {{"usual", run.heat.usual}, {"hot", run.heat.hot}}},
+          {"center", {c.x(), c.y(), c.z()}},
+          {"up", {u.x(), u.y(), u.z()}},
+          {"radius", run.radius},
+          {"surface",
+           {{"points", run.surface.size()},
+            {"kelvin_per_count", surface_kelvin_per_count(run)},
+            {"colored", !run.surface.colors.empty()},
+            {"temperatures", !run.surface.temperatures_k.empty()}}},
+          {"views", views},
+          {"palettes", palettes},
+          {"palette", run.config.render.palette},
+          {"notes", run.notes}};
+}
+
+}  // namespace orbitfuse::view

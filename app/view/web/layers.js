@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: BSD-3-Clause
+"use strict";
+// While the camera rests: both fields as seen from there, coarse first, each finer picture in the place of the last.
+class RestingView {
+  constructor(canvas, surface, scene) {
+    this.canvas = canvas; this.surface = surface; this.facts = scene;
+    this.layer = "visible"; this.other = null; this.divider = 0.5;
+    this.pictures = {}; this.asking = null; this.timer = 0;
+    this.thermal = document.createElement("canvas"); this.coloured = document.createElement("canvas"); this.overlay = document.createElement("canvas");
+    this.onChange = () => {};
+  }
+
+  /// The camera moves: the surface stands in, and what is being rendered is of no use.
+  moved() {
+    this.canvas.classList.remove("shown");
+    this.surface.moving = true; this.surface.behindPicture(false);
+    this.drop();
+    this.pictures = {}; this.level = -1;
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => { this.surface.moving = false; this.surface.draw(); this.render(); }, 60);
+    this.onChange();
+  }
+
+  drop() { if (this.asking) this.asking.abort(); this.asking = null; }
+
+  wanted() {
+    const layers = new Set(this.facts.thermal ? ["thermal"] : []);
+    for (const layer of [this.layer, this.other]) {
+      if (layer === "mix") layers.add("visible");
+      else if (layer) layers.add(layer);
+    }
+    return [...layers];
+  }
+
+  /// Sizes keep the stage's shape; the last has about as many pixels as 640 x 480.
+  size(share) {
+    const { width, height } = this.surface, s = Math.min(1, Math.sqrt(307200 / (width * height))) * share;
+    return [Math.max(16, Math.round(width * s)), Math.max(16, Math.round(height * s))];
+  }
+
+  steps(layers) {
+    // Coarse temperatures come with the full picture, their own detail a step later.
+    const two = layers.some(l => l !== "thermal") && layers.includes("thermal");
+    const steps = [{ share: 1 / 8, divisor: 1 }, { share: 1 / 5, divisor: 1 }, { share: 1, divisor: two ? 3 : 1 }];
+    if (two) steps.push({ share: 1, divisor: 1 });
+    return steps;
+  }
+
+  async render() {
+    this.drop();
+    const asking = this.asking = new AbortController(), layers = this.wanted();
+    if (!layers.length) return;
+    const steps = this.steps(layers);
+    for (let i = 0; i < steps.length; ++i) {
+      const [width, height] = this.size(steps[i].share);
+      try {
+        const answer = await ask("/render", { client: clientName, ...this.surface.shot(width, height), layers, thermal_divisor: steps[i].divisor }, asking.signal);
+        const pictures = await pictureParts(answer);
+        if (asking.signal.aborted) return;
+        this.pictures = pictures; this.level = i; this.finished = i + 1 === steps.length;
+        this.width = width; this.height = height;
+        $("hint").textContent = "";
+        this.paint();
+      } catch (error) {
+        if (asking.signal.aborted || error.name === "AbortError") return;
+        if (error.status === 503) { await new Promise(done => setTimeout(done, 500)); --i; continue; }
+        if (error.status !== 409) $("hint").textContent = error.status ? error.message : "no answer from the viewer: is it still running?";
+        return;
+      }
+    }
+    this.asking = null;
+    this.onChange();
+  }
+
+  /// A layer was chosen: what is there is shown, what is missing is asked for.
+  choose(layer, other) {
+    this.layer = layer; this.other = other;
+    if (this.level === undefined || this.level < 0) return;
+    if (this.wanted().every(l => this.pictures[l])) this.paint();
+    else this.render();
+  }
+
+  paint() {
+    const thermal = this.pictures.thermal;
+    if (thermal && show.auto) {
+      const span = spanOf(thermal);
+      if (span) { show.low = span.low; show.high = span.high; }
+    }
+    this.canvas.width = this.width; this.canvas.height = this.height;
+    this.drawn = {};
+    this.put(this.layer, 0, this.other ? this.divider : 1);
+    if (this.other) this.put(this.other, this.divider, 1);
+    this.canvas.classList.add("shown");
+    this.surface.behindPicture(true);
+    this.onChange();
+  }
+
+  /// A layer on the part of the width from one share to another.
+  put(layer, from, to) {
+    const context = this.canvas.getContext("2d"), { width, height } = this, { visible, thermal, fused } = this.pictures;
+    context.save();
+    context.beginPath(); context.rect(from * width, 0, (to - from) * width, height); context.clip();
+    const image = { visible, fused, mix: visible }[layer];
+    if (image) context.drawImage(image.image, 0, 0, width, height);
+    if (thermal && layer === "thermal") {
+      context.fillStyle = "#222"; context.fillRect(0, 0, width, height);
+      context.drawImage(this.painted("thermal", this.coloured, false), 0, 0, width, height);
+    }
+    if (thermal && layer === "mix") {
+      context.globalAlpha = show.opacity;
+      context.drawImage(this.painted("mix", this.overlay, true), 0, 0, width, height);
+    }
+    context.restore();
+  }
+
+  painted(key, canvas, overlay) {
+    if (!this.drawn[key]) this.drawn[key] = paintThermal(this.pictures.thermal, canvas, overlay);
+    return this.drawn[key];
+  }
+
+  /// Kelvin at a place of the stage given as shares; nothing while the camera moves.
+  temperature(u, v) { return this.level >= 0 && this.pictures.thermal ? temperatureAt(this.pictures.thermal, u, v) : null; }
+}

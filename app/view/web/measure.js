@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: BSD-3-Clause
+"use strict";
+// Measurements: places are touched on the picture, temperatures come from the field and from every frame that sees them.
+const measureTools = {
+  spot: { words: "Spot", places: 1, say: ["touch the place"] },
+  box: { words: "Box", places: 2, say: ["touch one corner", "touch the corner across"] },
+  line: { words: "Line", places: 2, say: ["touch where it begins", "touch where it ends"] },
+  difference: { words: "Difference", places: 2, say: ["touch the first place", "touch the place to take from it"] },
+  distance: { words: "Distance", places: 2, say: ["touch where it begins", "touch where it ends"] },
+  hottest: { words: "Hottest", places: 0 },
+  coldest: { words: "Coldest", places: 0 },
+};
+
+/// Several viewers may measure; who is refused for now asks again.
+async function askInTurn(path, body) {
+  for (let tries = 0; ; ++tries) {
+    try { return await (await ask(path, body)).json(); } catch (error) {
+      if (error.status !== 503 || tries > 60) throw error;
+      await new Promise(done => setTimeout(done, 500));
+    }
+  }
+}
+
+class Measuring {
+  constructor(scene, surface, rest) {
+    this.facts = scene; this.surface = surface; this.rest = rest;
+    this.list = []; this.tool = null; this.places = [];
+    $("measure-section").hidden = !scene.thermal || scene.gray;
+    if ($("measure-section").hidden) return;
+    this.markTool = choices($("tools"), Object.entries(measureTools).map(([k, t]) => [k, t.words]), null, kind => this.take(kind));
+    $("save-measurements").onclick = () => this.save();
+    $("reload-measurements").onclick = () => this.reload();
+    viewer.onPlace = place => this.touched(place);
+    viewer.drawMarks = (context, width, height) => this.drawOn(context, width, height);
+    surface.controls.addEventListener("change", () => this.drawMarks());
+    viewer.onPicture.push(() => this.drawMarks());
+    this.reload();
+  }
+
+  say(words, bad) { $("measure-words").textContent = words; $("measure-words").className = bad ? "warning" : ""; $("hint").textContent = this.tool && $("panel").hidden ? words : ""; }
+
+  take(kind) {
+    const tool = measureTools[kind];
+    this.places = [];
+    if (!tool.places) { this.tool = null; this.markTool(null); this.measure({ kind, count: 3 }); return; }
+    this.tool = this.tool === kind ? null : kind;
+    this.markTool(this.tool);
+    this.say(this.tool ? tool.say[0] : "");
+    if (this.tool && innerWidth < 600) { $("panel").hidden = true; $("menu").setAttribute("aria-expanded", false); this.say(tool.say[0]); }
+    this.drawMarks();
+  }
+
+  /// True when a tool is in hand: the touch was its.
+  touched(place) {
+    if (!this.tool) return false;
+    this.place(place);
+    return true;
+  }
+  async place(place) {
+    const kind = this.tool, tool = measureTools[kind], { width, height } = this.surface;
+    try {
+      const found = await askInTurn("/pick", { ...this.surface.shot(Math.round(width), Math.round(height)), u: place.u * Math.round(width), v: place.v * Math.round(height) });
+      if (this.tool !== kind) return;
+      this.places.push(found.point);
+      if (this.places.length < tool.places) { this.say(tool.say[this.places.length]); this.drawMarks(); return; }
+      const places = this.places.map(point => ({ point }));
+      this.tool = null; this.places = []; this.markTool(null);
+      await this.measure(kind === "box" ? { kind, box: this.boxOf(places[0].point, places[1].point) }
+        : kind === "difference" ? { kind, of: places.map(p => ({ kind: "spot", places: [p] })) } : { kind, places });
+    } catch (error) { this.say(error.message, true); }
+  }
+
+  /// Along the world's axes; flat ones get a tenth of their diagonal, or they would hold no surface.
+  boxOf(a, b) {
+    const diagonal = Math.hypot(...a.map((x, i) => x - b[i]));
+    return { center: a.map((x, i) => (x + b[i]) / 2), size: a.map((x, i) => Math.max(Math.abs(x - b[i]), 0.1 * diagonal)) };
+  }
+
+  async measure(request) {
+    this.say("measuring …");
+    try {
+      const measured = await askInTurn("/measure", request);
+      this.list.push({ ...measured, name: "" });
+      this.say("");
+      this.show();
+    } catch (error) { this.say(error.message, true); }
+  }
+
+  async save() {
+    const open = this.list.filter(m => !m.name);
+    if (!open.length) { this.say("everything is saved"); return; }
+    this.say("saving …");
+    try {
+      for (const m of open) { await askInTurn("/measurements/add", m.request); m.name = "saved"; }
+      await this.reload();
+      this.say("saved");
+    } catch (error) { this.say(error.message, true); }
+  }
+  async reload() {
+    try {
+      const saved = await askInTurn("/measurements");
+      this.list = [...saved, ...this.list.filter(m => !m.name)];
+      this.say("");
+    } catch (error) { this.say(error.message, true); }
+    this.show();
+  }
+
+  readingWords(reading) {
+    if (!reading) return "";
+    const frames = reading.frame_count, field = reading.field_k === null ? "" : `field ${shownTemperature(reading.field_k)}`;
+    if (reading.temperature_k === null) return "no frame sees it" + (field ? "; " + field : "");
+    const range = reading.points > 1 ? ` (${shownTemperature(reading.min_k)} to ${shownTemperature(reading.max_k)})` : "";
+    return `${shownTemperature(reading.temperature_k)}${reading.uncertainty_k === null ? "" : " ± " + shownDifference(reading.uncertainty_k)}${range} · ${frames} frame${frames === 1 ? "" : "s"} · ${field}`;
+  }
+  words(m) {
+    const a = m.answer;
+    if (a.kind === "difference") return `${shownDifference(a.difference_k)}${a.uncertainty_k === null ? "" : " ± " + shownDifference(a.uncertainty_k)}`;
+    if (a.kind === "distance") return a.distance_m === null ? `${a.distance.toFixed(3)} units: the run's scale is not known` : `${a.distance_m.toFixed(3)} m`;
+    if (a.spots) return a.spots.map(s => this.readingWords(s)).join("\n");
+    return this.readingWords(a.reading);
+  }
+
+  show() {
+    $("measurements").replaceChildren(...this.list.map((m, index) => {
+      const item = element("div", undefined, "item measurement"), words = element("div", undefined, "words");
+      words.append(element("strong", `${index + 1} ${m.name || m.answer.kind + ", not saved"}`));
+      for (const line of this.words(m).split("\n")) words.append(element("div", line));
+      for (const note of m.answer.notes || []) words.append(element("small", note));
+      if (m.answer.profile) words.append(this.profile(m.answer.profile));
+      item.append(words);
+      if (!m.name) item.append(button("Drop", () => { this.list.splice(index, 1); this.show(); }));
+      return item;
+    }));
+    this.drawMarks();
+  }
+
+  profile(points) {
+    const canvas = element("canvas"), known = points.filter(p => p.temperature_k !== undefined && p.temperature_k !== null);
+    canvas.width = 320; canvas.height = 90; canvas.style.width = "100%";
+    if (known.length < 2) return element("small", "too few places along it have a temperature");
+    const low = Math.min(...known.map(p => p.temperature_k)), high = Math.max(low + 0.5, ...known.map(p => p.temperature_k)), end = points[points.length - 1].along || 1;
+    const context = canvas.getContext("2d"), style = getComputedStyle(document.body);
+    context.strokeStyle = context.fillStyle = style.color; context.lineWidth = 2; context.font = "12px system-ui, sans-serif";
+    context.beginPath();
+    let pen = false;
+    for (const p of points) {
+      if (p.temperature_k === undefined || p.temperature_k === null) { pen = false; continue; }
+      const x = 4 + 312 * p.along / end, y = 74 - 58 * (p.temperature_k - low) / (high - low);
+      if (pen) context.lineTo(x, y); else context.moveTo(x, y);
+      pen = true;
+    }
+    context.stroke();
+    context.fillText(shownTemperature(high), 4, 12); context.fillText(shownTemperature(low), 4, 88);
+    return canvas;
+  }
+
+  /// Every mark as lists of points in the world with a number and a temperature.
+  marks() {
+    const marks = this.places.map(p => ({ points: [p], words: "" }));
+    this.list.forEach((m, index) => {
+      const a = m.answer, r = m.request, n = String(index + 1), at = reading => reading && reading.temperature_k !== null ? " " + shownTemperature(reading.temperature_k) : "";
+      if (a.spots) a.spots.forEach(s => marks.push({ points: [s.point], words: n + at(s) }));
+      else if (a.kind === "box") marks.push({ points: this.corners(r.box), box: true, words: n + at(a.reading) });
+      else if (a.kind === "difference") marks.push({ points: r.of.map(o => o.places[0].point).filter(Boolean), words: n + " " + shownDifference(a.difference_k) });
+      else if (a.kind === "spot") marks.push({ points: [a.point || (r.places[0] || {}).point].filter(Boolean), words: n + at(a.reading) });
+      else marks.push({ points: (r.places || []).map(p => p.point).filter(Boolean), words: n + at(a.reading) });
+    });
+    return marks.filter(m => m.points.length);
+  }
+  corners(box) {
+    const [w, x, y, z] = box.rotation_wxyz || [1, 0, 0, 0], turn = new THREE.Quaternion(x, y, z, w), corners = [];
+    for (let i = 0; i < 8; ++i) corners.push(new THREE.Vector3(...[1, 2, 4].map((bit, d) => (i & bit ? 0.5 : -0.5) * box.size[d])).applyQuaternion(turn).add(new THREE.Vector3(...box.center)).toArray());
+    return corners;
+  }
+  /// On the stage; each mark as dots, strokes and words.
+  drawn() {
+    return this.marks().map(mark => {
+      const dots = mark.points.map(p => this.surface.onScreen(new THREE.Vector3(...p))), strokes = [];
+      if (mark.box) { for (let i = 0; i < 8; ++i) for (const bit of [1, 2, 4]) if (!(i & bit)) strokes.push([dots[i], dots[i | bit]]); }
+      else if (dots.length > 1) strokes.push([dots[0], dots[dots.length - 1]]);
+      return { dots: mark.box ? [] : dots.filter(Boolean), strokes: strokes.filter(([a, b]) => a && b), words: mark.words, at: dots.find(Boolean) };
+    });
+  }
+  drawMarks() {
+    const svg = $("marks"), make = (tag, attributes, words) => { const e = document.createElementNS(svg.namespaceURI, tag); for (const [k, v] of Object.entries(attributes)) e.setAttribute(k, v); if (words) e.textContent = words; return e; };
+    svg.replaceChildren();
+    for (const mark of this.drawn()) {
+      for (const [a, b] of mark.strokes) for (const [stroke, w] of [["#000", 4], ["#fff", 2]]) svg.append(make("line", { x1: a.x, y1: a.y, x2: b.x, y2: b.y, stroke, "stroke-width": w }));
+      for (const d of mark.dots) svg.append(make("circle", { cx: d.x, cy: d.y, r: 6, fill: "none", stroke: "#000", "stroke-width": 4 }), make("circle", { cx: d.x, cy: d.y, r: 6, fill: "none", stroke: "#fff", "stroke-width": 2 }));
+      if (mark.at && mark.words) svg.append(make("text", { x: mark.at.x + 10, y: mark.at.y - 8 }, mark.words));
+    }
+  }
+  drawOn(context, width, height) {
+    const sx = width / this.surface.width, sy = height / this.surface.height;
+    context.font = "600 13px system-ui, sans-serif"; context.textBaseline = "alphabetic";
+    for (const mark of this.drawn()) for (const [colour, w] of [["#000", 3], ["#fff", 1.5]]) {
+      context.strokeStyle = colour; context.lineWidth = w;
+      for (const [a, b] of mark.strokes) { context.beginPath(); context.moveTo(a.x * sx, a.y * sy); context.lineTo(b.x * sx, b.y * sy); context.stroke(); }
+      for (const d of mark.dots) { context.beginPath(); context.arc(d.x * sx, d.y * sy, 5, 0, 7); context.stroke(); }
+      if (mark.at) { if (colour === "#000") context.strokeText(mark.words, mark.at.x * sx + 8, mark.at.y * sy - 6); else { context.fillStyle = colour; context.fillText(mark.words, mark.at.x * sx + 8, mark.at.y * sy - 6); } }
+    }
+  }
+}

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/measurement/answer.hpp"
+
+#include <cmath>
+
+namespace orbitfuse::measurement {
+namespace {
+using nlohmann::json;
+
+/// NaN is no number of JSON: null.
+json json_of(double value) { return std::isfinite(value) ? json(value) : json(); }
+json json_of(const Eigen::Vector3d& v) { return {json_of(v.x()), json_of(v.y()), json_of(v.z())}; }
+
+json json_of(const FrameLine& line) {
+  return {{"frame", line.frame},
+          {"u", json_of(line.pixel.x())},
+          {"v", json_of(line.pixel.y())},
+          {"mean_k", json_of(line.mean_k)},
+          {"min_k", json_of(line.min_k)},
+          {"max_k", json_of(line.max_k)},
+          {"angle_deg", json_of(line.angle_deg)},
+          {"weight", json_of(line.weight)},
+          {"covered", json_of(line.covered)},
+          {"doubtful", line.doubtful}};
+}
+
+json json_of(const TemperatureReading& reading) {
+  json frames = json::array();
+  for (const FrameLine& line : reading.frames) frames.push_back(json_of(line));
+  return {{"temperature_k", json_of(reading.temperature_k)},
+          {"uncertainty_k", json_of(reading.uncertainty_k)},
+          {"field_k", json_of(reading.field_k)},
+          {"mean_k", json_of(reading.mean_k)},
+          {"min_k", json_of(reading.min_k)},
+          {"max_k", json_of(reading.max_k)},
+          {"standard_deviation_k", json_of(reading.standard_deviation_k)},
+          {"spread_k", json_of(reading.spread_k)},
+          {"angle_deg", json_of(reading.angle_deg)},
+          {"points", reading.points},
+          {"frame_count", reading.frames.size()},
+          {"frames", frames},
+          {"hidden", reading.hidden}};
+}
+
+json json_of(const PlacedReading& spot) {
+  json j = json_of(spot.reading);
+  j["point"] = json_of(spot.position);
+  j["normal"] = json_of(spot.normal);
+  return j;
+}
+
+bool has_reading(Kind kind) {
+  return kind == Kind::spot || kind == Kind::box || kind == Kind::polygon || kind == Kind::line;
+}
+
+}  // namespace
+
+json to_json(const Answer& answer) {
+  json j = {{"kind", name(answer.kind)}, {"notes", answer.notes}};
+  if (has_reading(answer.kind)) j["reading"] = json_of(answer.reading);
+  if (answer.position) j["point"] = json_of(*answer.position);
+  if (answer.normal) j["normal"] = json_of(*answer.normal);
+  for (const Eigen::Vector3d& end : answer.ends) j["ends"].push_back(json_of(end));
+  if (answer.kind == Kind::hottest || answer.kind == Kind::coldest) {
+    j["spots"] = json::array();
+    for (const PlacedReading& spot : answer.spots) j["spots"].push_back(json_of(spot));
+  }
+  if (answer.kind == Kind::line) {
+    j["profile"] = json::array();
+    for (const ProfilePoint& point : answer.profile) {
+      json p = {{"along", json_of(point.along)}};
+      if (point.at) {
+        p["point"] = json_of(point.at->position);
+        p["temperature_k"] = json_of(point.at->reading.temperature_k);
+        p["uncertainty_k"] = json_of(point.at->reading.uncertainty_k);
+        p["field_k"] = json_of(point.at->reading.field_k);
+        p["frame_count"] = point.at->reading.frames.size();
+      }
+      j["profile"].push_back(std::move(p));
+    }
+  }
+  if (answer.kind == Kind::difference) {
+    j["difference_k"] = json_of(answer.difference_k);
+    j["uncertainty_k"] = json_of(answer.difference_uncertainty_k);
+    for (const Answer& part : answer.of) j["of"].push_back(to_json(part));
+  }
+  if (answer.kind == Kind::distance) {
+    j["distance"] = json_of(answer.distance);
+    j["distance_m"] = answer.distance_m ? json_of(*answer.distance_m) : json();
+  }
+  return j;
+}
+
+}  // namespace orbitfuse::measurement

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "recon/measurement/request.hpp"
+
+namespace orbitfuse::measurement {
+
+inline constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+/// What one original frame says of a spot or region. Kelvin; of a spot mean = min = max.
+struct FrameLine {
+  std::string frame;      ///< file in the session
+  Eigen::Vector2d pixel;  ///< of the spot, or of the region's middle
+  double mean_k = unknown, min_k = unknown, max_k = unknown;
+  double angle_deg = unknown;  ///< of the line of sight to the surface's normal; region: mean
+  double weight = 0;           ///< of all frames: 1
+  double covered = 1;          ///< share of the region's points that it sees
+  bool doubtful = false;       ///< its pose
+};
+
+/// The temperature of a spot or region.
+struct TemperatureReading {
+  /// The frames' weighted mean at the place (of a region: of its points, by area); NaN: no frame
+  /// sees it. The field isn't mixed in.
+  double temperature_k = unknown;
+  /// The error of temperature_k, apart from the camera's own calibration and the object parameters,
+  /// is below this in 90 of 100 cases. From the spread between frames, what an error of the poses
+  /// makes of the gradient there, noise, and the difference of field and frames. NaN: unknown.
+  double uncertainty_k = unknown;
+  double field_k = unknown;  ///< of the trained field; also where no frame sees the place
+  /// Over the frames' readings of a spot; over the points of a region.
+  double mean_k = unknown, min_k = unknown, max_k = unknown, standard_deviation_k = unknown;
+  double spread_k = unknown;   ///< standard deviation between frames; NaN: fewer than two
+  double angle_deg = unknown;  ///< weighted mean over frames
+  int points = 1;              ///< surface points behind it
+  std::vector<FrameLine> frames;
+  std::string hidden;  ///< what hides it from the others: "13 outside of their picture, 5 occluded"
+  bool seen() const { return !frames.empty(); }
+};
+
+/// A spot with its place.
+struct PlacedReading {
+  Eigen::Vector3d position, normal;
+  TemperatureReading reading;
+};
+
+struct ProfilePoint {
+  double along = 0;  ///< world units from the line's start, over the surface's points
+  std::optional<PlacedReading> at;  ///< none: no surface there
+};
+
+struct Answer {
+  Kind kind = Kind::spot;
+  TemperatureReading reading;  ///< of spot, box, polygon, line (its points together)
+  std::optional<Eigen::Vector3d> position, normal;  ///< of a spot; of a region the middle
+  std::vector<PlacedReading> spots;  ///< hottest, coldest; by what is sure (region.hpp)
+  std::vector<ProfilePoint> profile;
+  std::vector<Eigen::Vector3d> ends;  ///< of a line or distance, where both meet the surface
+  double difference_k = unknown, difference_uncertainty_k = unknown;
+  std::vector<Answer> of;            ///< of a difference
+  double distance = unknown;         ///< world units
+  std::optional<double> distance_m;  ///< where the run's scale is known
+  std::vector<std::string> notes;    ///< what the reader must know: nothing seen, assumptions
+};
+
+nlohmann::json to_json(const Answer& answer);
+
+}  // namespace orbitfuse::measurement

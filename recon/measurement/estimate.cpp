@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/measurement/estimate.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+
+namespace orbitfuse::measurement {
+namespace {
+
+constexpr double outlier_sigmas = 3;
+
+double squared(double x) { return x * x; }
+
+}  // namespace
+
+double weighted_median(std::vector<std::pair<double, double>> list) {
+  assert(!list.empty());
+  std::sort(list.begin(), list.end());
+  double total = 0, below = 0;
+  for (const auto& [value, weight] : list) total += weight;
+  for (const auto& [value, weight] : list) {
+    below += weight;
+    if (below >= 0.5 * total) return value;
+  }
+  return list.back().first;
+}
+
+Estimate estimate(const std::vector<WeightedReading>& readings, const FieldReading& field,
+                  const MeasurementOptions& options) {
+  std::vector<std::pair<double, double>> values, deviations;
+  for (const WeightedReading& r : readings) values.emplace_back(r.temperature_k, r.weight);
+  const double middle = weighted_median(values);
+  for (const auto& [value, weight] : values)
+    deviations.emplace_back(std::abs(value - middle), weight);
+  const double sigma = std::max(1.4826 * weighted_median(deviations), options.noise_sigma_k);
+  const auto belongs = [&](const WeightedReading& r) {
+    const double expected = std::hypot(sigma, options.pose_sigma_px * r.gradient_k_per_px);
+    return std::abs(r.temperature_k - middle) <= outlier_sigmas * expected;
+  };
+
+  double sum = 0, mean = 0, squares = 0, gradient = 0;
+  int count = 0;
+  for (const WeightedReading& r : readings) {
+    if (!belongs(r)) continue;
+    sum += r.weight;
+    mean += r.weight * (r.temperature_k - middle);
+    squares += r.weight * r.weight;
+    gradient += r.weight * squared(r.gradient_k_per_px);
+    ++count;
+  }
+  Estimate result;
+  result.temperature_k = middle + mean / sum;
+  double deviation = 0;
+  for (const WeightedReading& r : readings)
+    if (belongs(r)) deviation += r.weight / sum * squared(r.temperature_k - result.temperature_k);
+  const double effective = sum * sum / squares;  // frames of equal weight that say as much
+  result.spread_k = count < 2 ? std::numeric_limits<double>::quiet_NaN()
+                              : std::sqrt(deviation * count / (count - 1));
+  const double single = std::max(count < 2 ? 0 : result.spread_k, options.noise_sigma_k);
+  result.statistical_k = single / std::sqrt(effective);
+  result.gradient_k = options.pose_sigma_px * std::sqrt(gradient / sum);
+  result.variation_k = field.variation_k;
+  result.disagreement_k =
+      std::isfinite(field.temperature_k) ? std::abs(field.temperature_k - result.temperature_k) : 0;
+  const double variance = squared(options.common_sigma_k * field.gain) +
+                          squared(options.statistical_share * result.statistical_k) +
+                          squared(options.gradient_share * result.gradient_k) +
+                          squared(options.disagreement_share * result.disagreement_k) +
+                          squared(options.variation_share * result.variation_k);
+  result.uncertainty_k = options.coverage_factor * std::sqrt(variance);
+  return result;
+}
+
+}  // namespace orbitfuse::measurement

@@ -1,0 +1,307 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/measurement/measure.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "recon/assembly/looked_at.hpp"
+#include "recon/measurement/frame_readings.hpp"
+#include "recon/measurement/region.hpp"
+#include "recon/measurement/surface_samples.hpp"
+
+namespace orbitfuse::measurement {
+namespace {
+
+constexpr int normal_reach = 2;
+constexpr double default_apart = 0.1;  // of the object's reach
+
+std::string words(const Eigen::Vector3d& p) {
+  return fmt::format("{:.4g},{:.4g},{:.4g}", p.x(), p.y(), p.z());
+}
+
+/// Points of no scene: farther off than its surroundings, and in no picture.
+Status check_within(const ThermalScene& scene, const Eigen::Vector3d& point) {
+  if (!scene.middle()) return {};
+  const ThermalScene::Middle& middle = *scene.middle();
+  const double distance = (point - middle.center).norm();
+  if (distance <= surroundings_reach * middle.radius) return {};
+  return fail(ErrorKind::input, "point " + words(point),
+              fmt::format("outside of the scene: {:.3g} from its middle, the cameras stand {:.3g} "
+                          "from it",
+                          distance, middle.radius),
+              fmt::format("give coordinates of this run's world; the scene's middle is {}",
+                          words(middle.center)));
+}
+
+/// Normal and field temperature of a point, from the frames that see it.
+Result<SurfacePoint> surface_at_point(const ThermalScene& scene, const Eigen::Vector3d& position,
+                                      const Progress& progress) {
+  ORBITFUSE_TRY(check_within(scene, position));
+  SurfacePoint point;
+  point.position = position;
+  point.normal.setZero();
+  point.field_k = unknown;
+  ORBITFUSE_ASSIGN(const PointReadings seen, read_frames(scene, point, {}, progress));
+  if (!seen.seen()) return point;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double best_cosine = 0;
+  const FrameReading* best = &seen.frames.front();
+  for (const FrameReading& reading : seen.frames) {
+    ORBITFUSE_ASSIGN(const FieldView view, scene.seen(reading.frame, progress));
+    const PosedView& posed = scene.frames()[reading.frame].view;
+    const Camera camera = scene.reduced_camera(reading.frame);
+    const Eigen::Vector2d in_map = camera.project(posed.cam_from_world * position);
+    const int x = std::clamp(static_cast<int>(in_map.x()), 0, view.depth.cols - 1),
+              y = std::clamp(static_cast<int>(in_map.y()), 0, view.depth.rows - 1);
+    const auto normal = normal_at(view.depth, camera, x, y, normal_reach);
+    if (!normal) continue;
+    const double cosine = std::abs(normal->dot((posed.cam_from_world * position).normalized()));
+    sum += cosine * (posed.cam_from_world.rotation.conjugate() * *normal);
+    if (cosine > best_cosine) best_cosine = cosine, best = &reading;
+  }
+  if (sum.norm() > 1e-6) point.normal = sum.normalized();
+  // The field at the point, as the frame that sees it straightest has it.
+  const PosedView& posed = scene.frames()[best->frame].view;
+  const auto surface = scene.surface_at(posed, best->pixel, progress);
+  if (surface) {
+    point.field_k = surface->field_k;
+    point.variation_k = surface->variation_k;
+  }
+  return point;
+}
+
+void say_unseen(const TemperatureReading& reading, std::vector<std::string>& notes) {
+  if (reading.seen()) return;
+  notes.push_back(
+      fmt::format("no thermal frame sees it{}: there is no measured temperature{}",
+                  reading.hidden.empty() ? "" : " (" + reading.hidden + ")",
+                  std::isfinite(reading.field_k) ? ", the field's own is a guess" : ""));
+}
+
+void say_doubtful(const TemperatureReading& reading, std::vector<std::string>& notes) {
+  const auto doubtful = std::count_if(reading.frames.begin(), reading.frames.end(),
+                                      [](const FrameLine& line) { return line.doubtful; });
+  if (reading.seen() && doubtful == static_cast<long>(reading.frames.size()))
+    notes.emplace_back("only frames with doubtful poses see it");
+}
+
+void say(const TemperatureReading& reading, std::vector<std::string>& notes) {
+  say_unseen(reading, notes);
+  say_doubtful(reading, notes);
+}
+
+Result<Answer> measure_spot(const ThermalScene& scene, const Request& request,
+                            const Reradiometry& radiometry, const Progress& progress) {
+  ORBITFUSE_ASSIGN(const SurfacePoint surface, surface_of(scene, request.places[0], progress));
+  Answer answer;
+  answer.position = surface.position;
+  if (!surface.normal.isZero()) answer.normal = surface.normal;
+  ORBITFUSE_ASSIGN(answer.reading, read_spot(scene, surface, radiometry, progress));
+  say(answer.reading, answer.notes);
+  return answer;
+}
+
+Result<Answer> measure_points(const ThermalScene& scene, const std::vector<SurfacePoint>& points,
+                              const Reradiometry& radiometry, const std::string& nothing,
+                              const Progress& progress) {
+  Answer answer;
+  ORBITFUSE_ASSIGN(answer.reading, read_region(scene, points, radiometry, progress));
+  if (points.empty()) {
+    answer.reading.hidden = nothing;
+  } else {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const SurfacePoint& point : points) sum += point.position;
+    answer.position = sum / static_cast<double>(points.size());
+  }
+  say(answer.reading, answer.notes);
+  return answer;
+}
+
+Result<Answer> measure_polygon(const ThermalScene& scene, const Request& request,
+                               const Reradiometry& radiometry, const Progress& progress) {
+  std::vector<Eigen::Vector2d> corners;
+  for (const Place& place : request.places) corners.push_back(std::get<PixelPlace>(place).pixel);
+  ORBITFUSE_ASSIGN(const PosedView* view, scene.view(std::get<PixelPlace>(request.places[0]).view));
+  ORBITFUSE_ASSIGN(const auto points, polygon_samples(scene, *view, corners, progress));
+  return measure_points(scene, points, radiometry, "the field has no surface in it", progress);
+}
+
+/// A camera that sees both ends of a line, and where.
+struct LineView {
+  const PosedView* view = nullptr;
+  Eigen::Vector2d begin, end;
+};
+
+Result<LineView> line_view(const ThermalScene& scene, const Request& request,
+                           const Progress& progress) {
+  const auto* a = std::get_if<PixelPlace>(&request.places[0]);
+  const auto* b = std::get_if<PixelPlace>(&request.places[1]);
+  if (a != nullptr && b != nullptr && a->view == b->view) {
+    ORBITFUSE_ASSIGN(const PosedView* view, scene.view(a->view));
+    return LineView{view, a->pixel, b->pixel};
+  }
+  ORBITFUSE_ASSIGN(const SurfacePoint begin, surface_of(scene, request.places[0], progress));
+  ORBITFUSE_ASSIGN(const SurfacePoint end, surface_of(scene, request.places[1], progress));
+  ORBITFUSE_ASSIGN(const PointReadings from, read_frames(scene, begin, {}, progress));
+  ORBITFUSE_ASSIGN(const PointReadings to, read_frames(scene, end, {}, progress));
+  LineView best;
+  double best_weight = 0;
+  for (const FrameReading& r : from.frames)
+    for (const FrameReading& s : to.frames)
+      if (r.frame == s.frame && std::min(r.weight, s.weight) > best_weight) {
+        best_weight = std::min(r.weight, s.weight);
+        best = {&scene.frames()[r.frame].view, r.pixel, s.pixel};
+      }
+  if (best.view != nullptr) return best;
+  return fail(ErrorKind::input, "line", "no thermal frame sees both of its ends",
+              "choose ends on one side of the object, or give both as pixels of one view");
+}
+
+Result<Answer> measure_line(const ThermalScene& scene, const Request& request,
+                            const Reradiometry& radiometry, const Progress& progress) {
+  ORBITFUSE_ASSIGN(const LineView line, line_view(scene, request, progress));
+  Answer answer;
+  std::vector<SurfacePoint> points;
+  double along = 0;
+  for (int i = 0; i < request.profile; ++i) {
+    ORBITFUSE_TRY(progress.check("measure"));
+    const double t = static_cast<double>(i) / (request.profile - 1);
+    const auto surface =
+        scene.surface_at(*line.view, (1 - t) * line.begin + t * line.end, progress);
+    if (!surface && surface.error().kind == ErrorKind::cancelled)
+      return tl::unexpected(surface.error());
+    ProfilePoint point;
+    if (surface) {
+      if (!points.empty()) along += (surface->position - points.back().position).norm();
+      points.push_back(*surface);
+      point.at.emplace();
+      point.at->position = surface->position;
+      point.at->normal = surface->normal;
+      ORBITFUSE_ASSIGN(point.at->reading, read_spot(scene, *surface, radiometry, progress));
+    }
+    point.along = along;
+    answer.profile.push_back(std::move(point));
+  }
+  ORBITFUSE_ASSIGN(answer.reading, read_region(scene, points, radiometry, progress));
+  const auto &first = answer.profile.front().at, &last = answer.profile.back().at;
+  if (first && last) answer.ends = {first->position, last->position};
+  if (points.empty()) answer.reading.hidden = "the field has no surface along it";
+  if (const std::size_t holes = answer.profile.size() - points.size(); holes > 0)
+    answer.notes.push_back(
+        fmt::format("{} of {} points of the line meet no surface", holes, answer.profile.size()));
+  answer.notes.push_back("as seen from " + line.view->name);
+  say(answer.reading, answer.notes);
+  return answer;
+}
+
+Result<Answer> measure_extremes(const ThermalScene& scene, const Request& request,
+                                const Reradiometry& radiometry, const Progress& progress) {
+  ORBITFUSE_ASSIGN(const auto points, object_samples(scene, progress));
+  const double apart =
+      request.apart > 0 ? request.apart : default_apart * object_radius(*scene.middle());
+  Answer answer;
+  ORBITFUSE_ASSIGN(answer.spots, extremes(scene, points, request.kind == Kind::hottest,
+                                          request.count, apart, radiometry, progress));
+  if (answer.spots.size() < static_cast<std::size_t>(request.count))
+    answer.notes.push_back(
+        fmt::format("{} of {} found: no more places {:.3g} apart that two thermal frames see",
+                    answer.spots.size(), request.count, apart));
+  return answer;
+}
+
+/// The temperature that stands for an answer in a difference.
+const TemperatureReading& headline(const Answer& answer) {
+  return answer.spots.empty() ? answer.reading : answer.spots.front().reading;
+}
+
+Result<Answer> measure_difference(const ThermalScene& scene, const Request& request,
+                                  const Progress& progress) {
+  Answer answer;
+  for (const Request& part : request.of) {
+    ORBITFUSE_ASSIGN(Answer measured, measure(scene, part, progress));
+    answer.of.push_back(std::move(measured));
+  }
+  const TemperatureReading &a = headline(answer.of[0]), &b = headline(answer.of[1]);
+  answer.difference_k = a.temperature_k - b.temperature_k;
+  answer.difference_uncertainty_k = std::hypot(a.uncertainty_k, b.uncertainty_k);
+  for (std::size_t i = 0; i < 2; ++i)
+    if (!headline(answer.of[i]).seen())
+      answer.notes.push_back(
+          fmt::format("no thermal frame sees the {} of the two: there is no difference",
+                      i == 0 ? "first" : "second"));
+  return answer;
+}
+
+Result<Answer> measure_distance(const ThermalScene& scene, const Request& request,
+                                const Progress& progress) {
+  Answer answer;
+  ORBITFUSE_ASSIGN(const SurfacePoint a, surface_of(scene, request.places[0], progress));
+  ORBITFUSE_ASSIGN(const SurfacePoint b, surface_of(scene, request.places[1], progress));
+  answer.distance = (a.position - b.position).norm();
+  answer.ends = {a.position, b.position};
+  answer.position = 0.5 * (a.position + b.position);
+  if (scene.metres_per_unit())
+    answer.distance_m = answer.distance * *scene.metres_per_unit();
+  else
+    answer.notes.emplace_back("no scale: the run doesn't know its unit in metres");
+  return answer;
+}
+
+Result<Answer> dispatch(const ThermalScene& scene, const Request& request,
+                        const Reradiometry& radiometry, const Progress& progress) {
+  switch (request.kind) {
+    case Kind::spot:
+      return measure_spot(scene, request, radiometry, progress);
+    case Kind::box: {
+      ORBITFUSE_ASSIGN(const auto points, box_samples(scene, request.box, progress));
+      return measure_points(scene, points, radiometry, "no surface that one sees lies in it",
+                            progress);
+    }
+    case Kind::polygon:
+      return measure_polygon(scene, request, radiometry, progress);
+    case Kind::line:
+      return measure_line(scene, request, radiometry, progress);
+    case Kind::hottest:
+    case Kind::coldest:
+      return measure_extremes(scene, request, radiometry, progress);
+    case Kind::difference:
+      return measure_difference(scene, request, progress);
+    case Kind::distance:
+      break;
+  }
+  return measure_distance(scene, request, progress);
+}
+
+}  // namespace
+
+Request anchored(Request request, const Answer& answer) {
+  for (std::size_t i = 0; i < std::min(request.of.size(), answer.of.size()); ++i)
+    request.of[i] = anchored(std::move(request.of[i]), answer.of[i]);
+  if (request.kind == Kind::spot && answer.position) request.places = {*answer.position};
+  if (answer.ends.size() == 2) request.places = {answer.ends[0], answer.ends[1]};
+  return request;
+}
+
+Result<SurfacePoint> surface_of(const ThermalScene& scene, const Place& place,
+                                const Progress& progress) {
+  if (const auto* point = std::get_if<Eigen::Vector3d>(&place))
+    return surface_at_point(scene, *point, progress);
+  const auto& pixel = std::get<PixelPlace>(place);
+  ORBITFUSE_ASSIGN(const PosedView* view, scene.view(pixel.view));
+  return scene.surface_at(*view, pixel.pixel, progress);
+}
+
+Result<Answer> measure(const ThermalScene& scene, const Request& request,
+                       const Progress& progress) {
+  ORBITFUSE_TRY(request.validate());
+  ORBITFUSE_ASSIGN(const Reradiometry radiometry,
+                   Reradiometry::make(scene.frames(), request.object, request.recorded));
+  ORBITFUSE_ASSIGN(Answer answer, dispatch(scene, request, radiometry, progress));
+  answer.kind = request.kind;
+  if (!radiometry.assumption().empty()) answer.notes.push_back(radiometry.assumption());
+  return answer;
+}
+
+}  // namespace orbitfuse::measurement

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/measurement/measurement_file.hpp"
+
+#include <fcntl.h>
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <ctime>
+#include <set>
+
+#include "core/system/file_io.hpp"
+
+namespace orbitfuse::measurement {
+namespace {
+using nlohmann::json;
+
+constexpr const char* put_away = "nothing was changed: mend it, or move it away and measure again";
+
+tl::unexpected<Error> damaged(const std::filesystem::path& file, const std::string& found) {
+  return fail(ErrorKind::input, file.string(), found, put_away);
+}
+
+/// Held while a list is changed: of the file's folder, so that nothing is left behind. The kernel
+/// releases it when the process dies.
+class ChangeLock {
+ public:
+  ChangeLock() = default;
+  ChangeLock(const ChangeLock&) = delete;
+  ChangeLock& operator=(const ChangeLock&) = delete;
+  ~ChangeLock() {
+    if (descriptor_ >= 0) close(descriptor_);
+  }
+  Status acquire(const std::filesystem::path& file) {
+    const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+    descriptor_ = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (descriptor_ >= 0 && flock(descriptor_, LOCK_EX) == 0) return {};
+    return fail(ErrorKind::device, folder.string(), std::strerror(errno),
+                "give a folder that can be written to");
+  }
+
+ private:
+  int descriptor_ = -1;
+};
+
+Result<SavedMeasurement> parse(const json& j, const std::string& where) {
+  SavedMeasurement saved;
+  if (!j.is_object() || !j.contains("name") || !j["name"].is_string() || j["name"] == "")
+    return fail(ErrorKind::input, where, "no name in it", put_away);
+  saved.name = j["name"];
+  if (j.contains("created") && j["created"].is_string()) saved.created = j["created"];
+  if (!j.contains("request")) return fail(ErrorKind::input, where, "no request in it", put_away);
+  const auto request = request_of_json(j["request"]);
+  if (!request)
+    return fail(ErrorKind::input, where + ": " + request.error().where, request.error().found,
+                put_away);
+  saved.request = *request;
+  if (!j.contains("answer") || !j["answer"].is_object())
+    return fail(ErrorKind::input, where, "no answer in it", put_away);
+  saved.answer = j["answer"];
+  return saved;
+}
+
+}  // namespace
+
+const SavedMeasurement* Measurements::find(const std::string& name) const {
+  const auto at = std::find_if(list.begin(), list.end(),
+                               [&](const SavedMeasurement& m) { return m.name == name; });
+  return at == list.end() ? nullptr : &*at;
+}
+
+std::string Measurements::put(SavedMeasurement measurement) {
+  const std::string_view kind = measurement::name(measurement.request.kind);
+  for (int i = 1; measurement.name.empty(); ++i) {
+    const std::string name = fmt::format("{} {}", kind, i);
+    if (find(name) == nullptr) measurement.name = name;
+  }
+  std::string name = measurement.name;
+  measurement.request.name = name;
+  const auto at = std::find_if(list.begin(), list.end(),
+                               [&](const SavedMeasurement& m) { return m.name == name; });
+  if (at == list.end())
+    list.push_back(std::move(measurement));
+  else
+    *at = std::move(measurement);
+  return name;
+}
+
+Result<Measurements> load_measurements(const std::filesystem::path& file,
+                                       const std::string& identity) {
+  Measurements result;
+  result.identity = identity;
+  std::error_code unreadable;  // read_file says why
+  if (!std::filesystem::exists(file, unreadable) && !unreadable) return result;
+  ORBITFUSE_ASSIGN(const std::string text, read_file(file, max_text_bytes));
+  const json j = json::parse(text, nullptr, false);
+  if (j.is_discarded() || !j.is_object()) return damaged(file, "not JSON, or cut off");
+  if (!j.contains("schema") || j["schema"] != measurement_schema)
+    return damaged(file, fmt::format("schema {}, this program writes {}",
+                                     j.contains("schema") ? j["schema"].dump() : "missing",
+                                     measurement_schema));
+  if (!j.contains("run") || !j["run"].is_string()) return damaged(file, "no run named in it");
+  if (j["run"] != identity)
+    return fail(ErrorKind::input, file.string(),
+                "measurements of another run: poses or fields have been made anew since",
+                "nothing was changed: move the file away to keep it, and measure again");
+  if (!j.contains("measurements") || !j["measurements"].is_array())
+    return damaged(file, "no list of measurements in it");
+  std::set<std::string> names;
+  for (const json& entry : j["measurements"]) {
+    const std::string where =
+        fmt::format("{}: measurements[{}]", file.string(), result.list.size());
+    ORBITFUSE_ASSIGN(SavedMeasurement saved, parse(entry, where));
+    if (!names.insert(saved.name).second)
+      return damaged(file, "two measurements named '" + saved.name + "'");
+    result.list.push_back(std::move(saved));
+  }
+  return result;
+}
+
+Result<std::string> add_measurement(const std::filesystem::path& file, const std::string& identity,
+                                    SavedMeasurement measurement) {
+  ChangeLock lock;
+  ORBITFUSE_TRY(lock.acquire(file));
+  ORBITFUSE_ASSIGN(Measurements all, load_measurements(file, identity));
+  if (measurement.created.empty())
+    measurement.created = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+  std::string name = all.put(std::move(measurement));
+  ORBITFUSE_TRY(save_measurements(file, all));
+  return name;
+}
+
+Status save_measurements(const std::filesystem::path& file, const Measurements& measurements) {
+  json list = json::array();
+  for (const SavedMeasurement& saved : measurements.list)
+    list.push_back({{"name", saved.name},
+                    {"created", saved.created},
+                    {"request", to_json(saved.request)},
+                    {"answer", saved.answer}});
+  const json j = {{"schema", measurement_schema},
+                  {"conventions",
+                   {{"frame",
+                     "the visible reconstruction's world; the thermal one's in a run "
+                     "without visible poses"},
+                    {"length", "units of that world, which are free; *_m: metres"},
+                    {"temperature", "kelvin"},
+                    {"pixel", "the centre of the top-left pixel is (0.5, 0.5)"},
+                    {"uncertainty", "covers the error in 90 of 100 cases"}}},
+                  {"run", measurements.identity},
+                  {"measurements", list}};
+  return write_file_atomic(file, j.dump(2, ' ', false, json::error_handler_t::replace) + "\n");
+}
+
+}  // namespace orbitfuse::measurement

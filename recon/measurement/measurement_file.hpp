@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "recon/measurement/request.hpp"
+
+// measurements.json: what was measured in a run, to be shown, changed and measured again
+// (docs/formats.md).
+namespace orbitfuse::measurement {
+
+inline constexpr int measurement_schema = 1;
+inline constexpr const char* measurements_file = "measurements.json";
+
+struct SavedMeasurement {
+  std::string name;     ///< unique in the file, never empty
+  std::string created;  ///< ISO 8601 UTC
+  Request request;
+  nlohmann::json answer;  ///< to_json(Answer) of that time
+};
+
+struct Measurements {
+  std::string identity;  ///< ThermalScene::identity of the run that they belong to
+  std::vector<SavedMeasurement> list;
+
+  const SavedMeasurement* find(const std::string& name) const;
+  /// Adds it, or takes the place of the one of that name. Without a name it gets the first free of
+  /// "spot 1", "spot 2" ...; returns the name.
+  std::string put(SavedMeasurement measurement);
+};
+
+/// An absent file is an empty list. Input errors, each naming the file and what to do: cut or
+/// damaged JSON, another schema, a measurement that isn't one, two of one name, and measurements of
+/// another run (`identity` differs): the file is left as it is.
+Result<Measurements> load_measurements(const std::filesystem::path& file,
+                                       const std::string& identity);
+/// Loads, puts (Measurements::put) and saves, as one step: programs that do so at once wait for
+/// each other. `created` is set to now where it is empty. Returns the name. Errors: both's.
+Result<std::string> add_measurement(const std::filesystem::path& file, const std::string& identity,
+                                    SavedMeasurement measurement);
+/// Atomic: readers see the old list or the new one.
+Status save_measurements(const std::filesystem::path& file, const Measurements& measurements);
+
+}  // namespace orbitfuse::measurement

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// `orbitfuse measure` on a small run of the real program.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <sstream>
+
+#include "tests/app/cli/program.hpp"
+#include "tests/app/cli/session_fixture.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace orbitfuse {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+using testing::HasSubstr;
+
+/// One run for all tests: they read it, and each removes what it saved.
+class Measure : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder = std::make_unique<test::TempFolder>();
+    write_fixture_session(session());
+    std::vector<std::string> words = {"run", session().string(), "--out", out().string()};
+    for (const char* set : {"train.visible.iterations=300", "train.thermal.iterations=300",
+                            "train.visible.eval_count=0", "train.thermal.eval_count=0",
+                            "render.views=2", "render.width_px=64", "fuse.methods=[\"heat\"]"})
+      words.insert(words.end(), {"--set", set});
+    const Outcome run = orbitfuse_program(words);
+    ASSERT_EQ(run.code, 0) << run.err;
+  }
+  static void TearDownTestSuite() { folder.reset(); }
+  void SetUp() override { fs::remove(file()); }
+
+  static fs::path session() { return *folder / "session"; }
+  static fs::path out() { return *folder / "out"; }
+  static fs::path file() { return out() / "measurements.json"; }
+  static Outcome measure(std::vector<std::string> more) {
+    more.insert(more.begin(), {"measure", out().string()});
+    return orbitfuse_program(more);
+  }
+  static void expect_refused(const std::vector<std::string>& words, int code,
+                             const std::string& said) {
+    const Outcome refused = measure(words);
+    EXPECT_EQ(refused.code, code) << refused.out << refused.err;
+    EXPECT_THAT(refused.err, HasSubstr(said));
+    EXPECT_EQ(refused.out, "");
+  }
+
+  static std::unique_ptr<test::TempFolder> folder;
+};
+std::unique_ptr<test::TempFolder> Measure::folder;
+
+TEST_F(Measure, ASpotIsTheFixturesTemperature) {
+  const Outcome spot = measure({"--pixel", "thermal/000000.tiff,48,36", "--json"});
+  ASSERT_EQ(spot.code, 0) << spot.err;
+  const json answer = spot.result().at("answer");
+  const json reading = answer.at("reading");
+  // 290 to 310 K by a pattern on the cube.
+  EXPECT_GT(reading.at("temperature_k").get<double>(), 290);
+  EXPECT_LT(reading.at("temperature_k").get<double>(), 310);
+  EXPECT_NEAR(reading.at("temperature_k").get<double>(), reading.at("field_k").get<double>(), 3);
+  EXPECT_GT(reading.at("uncertainty_k").get<double>(), 0);
+  EXPECT_GE(reading.at("frames").size(), 1u);
+  // The same place by its point.
+  const json p = answer.at("point");
+  std::ostringstream word;
+  word.precision(12);
+  word << p[0].get<double>() << "," << p[1].get<double>() << "," << p[2].get<double>();
+  const Outcome point = measure({"--point=" + word.str(), "--json"});
+  ASSERT_EQ(point.code, 0) << point.err;
+  EXPECT_NEAR(point.result()["answer"]["reading"]["temperature_k"].get<double>(),
+              reading.at("temperature_k").get<double>(), 0.5);
+}
+
+TEST_F(Measure, RenderedAndVisibleViewsNamePlacesToo) {
+  for (const char* pixel : {"000,32,24", "visible/000001.png,48,36"}) {
+    const Outcome spot = measure({"--pixel", pixel});
+    EXPECT_EQ(spot.code, 0) << spot.err;
+    EXPECT_THAT(spot.out, HasSubstr(" C +- "));
+  }
+  EXPECT_EQ(measure({"--distance", "000,32,24", "001,32,24"}).code, 0);
+  const Outcome line = measure({"--line", "000,28,24", "000,36,24", "--profile", "5", "--csv"});
+  ASSERT_EQ(line.code, 0) << line.err;
+  EXPECT_EQ(std::count(line.out.begin(), line.out.end(), '\n'), 7) << line.out;
+  EXPECT_TRUE(line.out.starts_with("name,kind,temperature_c"));
+}
+
+TEST_F(Measure, WhatIsSavedIsListedAndStandsForItsPlace) {
+  ASSERT_EQ(measure({"--pixel", "000,32,24", "--name", "front", "--save"}).code, 0);
+  ASSERT_EQ(measure({"--hottest", "2", "--save"}).code, 0);
+  const Outcome list = measure({});
+  EXPECT_EQ(list.code, 0);
+  EXPECT_THAT(list.out, HasSubstr("front"));
+  EXPECT_THAT(list.out, HasSubstr("hottest 1"));
+  const Outcome difference = measure({"--difference", "hottest 1", "front", "--json"});
+  ASSERT_EQ(difference.code, 0) << difference.err;
+  EXPECT_GE(difference.result()["answer"]["difference_k"].get<double>(), -1);
+  const std::string before = test::get(file());
+  ASSERT_EQ(measure({"--hottest", "1"}).code, 0);
+  EXPECT_EQ(test::get(file()), before) << "without --save nothing is written";
+}
+
+TEST_F(Measure, DamagedAndForeignMeasurementsAreNamedAndKept) {
+  ASSERT_EQ(measure({"--pixel", "000,32,24", "--save"}).code, 0);
+  json foreign = json::parse(test::get(file()));
+  foreign["run"] = "another";
+  for (const auto& [bytes, said] : {std::pair(std::string("{\"schema\": 1, "), "cut off"),
+                                    std::pair(foreign.dump(), "another run")}) {
+    test::put(file(), bytes);
+    expect_refused({"--pixel", "000,32,24", "--save"}, 3, said);
+    expect_refused({}, 3, said);
+    EXPECT_EQ(test::get(file()), bytes);
+    const Outcome looking = measure({"--pixel", "000,32,24"});
+    EXPECT_EQ(looking.code, 0) << "looking goes on";
+    EXPECT_THAT(looking.err, HasSubstr(said));
+  }
+}
+
+TEST_F(Measure, WhatIsWrongIsNamedWithTheRemedy) {
+  expect_refused({"--pixel", "thermal/9.tiff,1,1"}, 3, "thermal/00");
+  expect_refused({"--pixel", "000,9999,1"}, 3, "outside of the picture");
+  expect_refused({"--point=99,99,99"}, 3, "outside of the scene");
+  expect_refused({"--pixel", "000"}, 2, "VIEW,U,V");
+  expect_refused({"--point", "1,2"}, 2, "X,Y,Z");
+  expect_refused({"--point", "1,nan,2"}, 2, "point");
+  expect_refused({"--box", "0,0,0,1,0,1"}, 2, "size");
+  expect_refused({"--hottest", "0"}, 2, "count");
+  expect_refused({"--hottest", "1", "--coldest", "1"}, 2, "together with");
+  expect_refused({"--request", "{\"kind\":\"spit\"}"}, 2, "spit");
+}
+
+TEST_F(Measure, ASessionWithoutRadiometryRefusesAnEmissivityByName) {
+  expect_refused({"--pixel", "000,32,24", "--emissivity", "0.6"}, 2, "thermal/000000.tiff");
+  const Outcome told =
+      measure({"--pixel", "000,32,24", "--emissivity", "0.6", "--recorded-emissivity", "1"});
+  EXPECT_EQ(told.code, 0) << told.err;
+  EXPECT_THAT(told.out, HasSubstr("grey body"));
+}
+
+TEST_F(Measure, FoldersThatAreNoRunAreNamed) {
+  for (const fs::path& wrong : {session(), *folder / "nowhere", fs::path("/dev/null")}) {
+    const Outcome refused = orbitfuse_program({"measure", wrong.string(), "--hottest", "1"});
+    EXPECT_EQ(refused.code, 3) << refused.err;
+    EXPECT_THAT(refused.err, HasSubstr(wrong.filename().string()));
+  }
+}
+
+}  // namespace
+}  // namespace orbitfuse

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a viewer keeps in the run's folder, and the way of its camera along kept views.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "app/view/bookmarks.hpp"
+#include "app/view/film.hpp"
+#include "core/image/image_io.hpp"
+#include "tests/app/view/toy_run.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace orbitfuse::view {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+using ::testing::HasSubstr;
+
+Bookmark at(const std::string& name, double x, double y, double z) {
+  return {name, {x, y, z}, {0, 0, 0}, 45};
+}
+
+TEST(Bookmarks, ComeBackAsTheyWereKept) {
+  const orbitfuse::test::TempFolder folder;
+  Bookmarks first(folder.path());
+  EXPECT_TRUE(first.list()->empty());
+  ASSERT_TRUE(first.add(at("façade \"A\"", 1, 2, 3)));
+  // Another viewer of the same run.
+  Bookmarks second(folder.path());
+  ASSERT_TRUE(second.add(at("b", 3, 2, 1)));
+  const auto list = *first.list();
+  ASSERT_EQ(list.size(), 2u);
+  EXPECT_EQ(list[0].name, "façade \"A\"");
+  EXPECT_EQ(list[0].position, Eigen::Vector3d(1, 2, 3));
+  EXPECT_FALSE(first.add(at("b", 1, 1, 1)));
+  EXPECT_FALSE(first.remove("c"));
+  ASSERT_TRUE(first.remove("b"));
+  EXPECT_EQ(second.list()->size(), 1u);
+}
+
+TEST(Bookmarks, ADamagedFileIsNamedAndLeftAsItIs) {
+  const orbitfuse::test::TempFolder folder;
+  Bookmarks bookmarks(folder.path());
+  for (const char* text :
+       {"", "{", "[]", "{\"schema\":1}", "{\"schema\":9,\"bookmarks\":[]}",
+        "{\"schema\":1,\"bookmarks\":[{\"name\":\"a\"}]}",
+        "{\"schema\":1,\"bookmarks\":[{\"name\":\"a\",\"position\":[1,2,null],\"target\":[0,0,0],"
+        "\"fov_deg\":45}]}"}) {
+    orbitfuse::test::put(folder / "bookmarks.json", text);
+    const auto list = bookmarks.list();
+    ASSERT_FALSE(list) << text;
+    EXPECT_THAT(list.error().where, HasSubstr("bookmarks.json"));
+    EXPECT_FALSE(bookmarks.add(at("b", 1, 1, 1)));
+    EXPECT_EQ(orbitfuse::test::get(folder / "bookmarks.json"), text);
+  }
+}
+
+TEST(Bookmarks, WhatIsNoViewIsNamed) {
+  const json good = to_json(at("a", 1, 2, 3));
+  ASSERT_TRUE(bookmark_of(good));
+  for (const auto& [field, value] :
+       std::vector<std::pair<std::string, json>>{{"name", ""},
+                                                 {"name", std::string(81, 'x')},
+                                                 {"name", 1},
+                                                 {"position", json::array({1, 2})},
+                                                 {"position", json::array({1, 2, 1e9})},
+                                                 {"target", json::array({1, 2, 3})},
+                                                 {"fov_deg", 0},
+                                                 {"fov_deg", "wide"}}) {
+    json wrong = good;
+    wrong[field] = value;
+    const auto refused = bookmark_of(wrong);
+    ASSERT_FALSE(refused) << wrong;
+    EXPECT_EQ(refused.error().where, field);
+  }
+}
+
+TEST(Way, GoesRoundAndNotThrough) {
+  const auto way = way_along({at("a", 2, 0, 0), at("b", 0, 2, 0), at("c", 0, 0, 8)}, 10);
+  ASSERT_EQ(way.size(), 21u);
+  EXPECT_TRUE(way.front().position.isApprox(Eigen::Vector3d(2, 0, 0)));
+  EXPECT_TRUE(way[10].position.isApprox(Eigen::Vector3d(0, 2, 0)));
+  EXPECT_TRUE(way.back().position.isApprox(Eigen::Vector3d(0, 0, 8)));
+  for (int i = 0; i <= 10; ++i)
+    EXPECT_NEAR(way[static_cast<std::size_t>(i)].position.norm(), 2, 1e-9);
+  for (std::size_t i = 11; i < way.size(); ++i)
+    EXPECT_GE(way[i].position.norm(), way[i - 1].position.norm());
+  // From one side to the other: any way round, at its distance.
+  for (const Bookmark& b : way_along({at("a", 2, 0, 0), at("b", -2, 0, 0)}, 8)) {
+    EXPECT_TRUE(b.position.allFinite());
+    EXPECT_NEAR(b.position.norm(), 2, 1e-9);
+  }
+}
+
+TEST(Way, CamerasLookAtTheirTargetsAndStandUpright) {
+  for (const Bookmark& b : {at("a", 2, 0, 0), at("b", 1, 1, 1), at("top", 0, 0, 3)}) {
+    const Shot shot = shot_of_bookmark(b, Eigen::Vector3d::UnitZ(), 64, 48);
+    ASSERT_TRUE(shot.cam_from_world.is_finite());
+    const Eigen::Vector2d middle = shot.camera.project(shot.cam_from_world * b.target);
+    EXPECT_TRUE(middle.isApprox(Eigen::Vector2d(32, 24), 1e-9)) << middle.transpose();
+    const Eigen::Vector3d up = shot.cam_from_world.rotation * Eigen::Vector3d::UnitZ();
+    EXPECT_LE(up.y(), 1e-9);  // y is down
+    EXPECT_NEAR(up.x(), 0, 1e-9);
+  }
+}
+
+class FilmTest : public ::testing::Test {
+ protected:
+  json finished() {
+    for (int i = 0; i < 3000 && films.state().at("making") == true; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    return films.state();
+  }
+  orbitfuse::test::TempFolder folder;
+  FinishedRun run = test::toy_run(folder.path());
+  RenderTurns turns;
+  LayerRenderer layers{run};
+  FilmMaker films{run, layers, turns};
+  const std::vector<Bookmark> views{at("a", 1, 0, 0.2), at("b", 0, 1, 0.2)};
+  FilmOrder order{FilmKind::pictures, FilmLayer::thermal, "inferno", {290, 305}, 0.5, 6, 64, 64};
+};
+
+TEST_F(FilmTest, PicturesAreNumberedAndComplete) {
+  ASSERT_TRUE(films.begin(order, views));
+  const json state = finished();
+  ASSERT_TRUE(state.contains("file")) << state;
+  EXPECT_EQ(state.at("done"), 4);
+  for (int i = 0; i < 4; ++i) {
+    const auto image = read_image(folder / "films/001" / ("0000" + std::to_string(i) + ".png"));
+    ASSERT_TRUE(image);
+    EXPECT_EQ(image->size(), cv::Size(64, 64));
+  }
+  ASSERT_TRUE(films.begin(order, views));
+  EXPECT_THAT(finished().at("file").get<std::string>(), HasSubstr("002"));
+}
+
+TEST_F(FilmTest, Mp4IsAFilm) {
+  order.kind = FilmKind::mp4;
+  order.layer = FilmLayer::fused;
+  ASSERT_TRUE(films.begin(order, views));
+  const json state = finished();
+  if (state.contains("error")) GTEST_SKIP() << state.at("error");  // no encoder in this OpenCV
+  const std::string bytes = orbitfuse::test::get(folder / "films/001.mp4");
+  EXPECT_EQ(bytes.substr(4, 4), "ftyp");
+  EXPECT_GT(bytes.size(), 500u);
+}
+
+TEST_F(FilmTest, StoppedLeavesNothing) {
+  order.seconds_a_view = 60;
+  order.fps = 60;
+  ASSERT_TRUE(films.begin(order, views));
+  EXPECT_FALSE(films.begin(order, views));  // one at a time
+  films.stop();
+  EXPECT_EQ(films.state().at("error"), "stopped");
+  EXPECT_TRUE(!fs::exists(folder / "films") || fs::is_empty(folder / "films"));
+}
+
+TEST_F(FilmTest, OrdersThatCannotBeMadeAreNamed) {
+  EXPECT_FALSE(films.begin(order, {views[0]}));
+  EXPECT_FALSE(films.begin(order, {}));
+  const json good = {{"kind", "png"},      {"layer", "thermal"}, {"palette", "inferno"},
+                     {"span", {290, 305}}, {"width", 64},        {"height", 64}};
+  ASSERT_TRUE(film_order_of(good, run));
+  for (const auto& [field, value] :
+       std::vector<std::pair<std::string, json>>{{"kind", "gif"},
+                                                 {"layer", "mud"},
+                                                 {"palette", "mud"},
+                                                 {"span", json::array({300})},
+                                                 {"span", {300, 290}},
+                                                 {"width", 1e9},
+                                                 {"height", -1},
+                                                 {"fps", 0},
+                                                 {"seconds_a_view", 0},
+                                                 {"width", nullptr}}) {
+    json wrong = good;
+    wrong[field] = value;
+    EXPECT_FALSE(film_order_of(wrong, run)) << wrong;
+  }
+}
+
+}  // namespace
+}  // namespace orbitfuse::view

@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The viewer of a real run in a real browser without a screen: pixels and values are looked at.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <opencv2/imgcodecs.hpp>
+
+#include "app/view/view_server.hpp"
+#include "core/temperature.hpp"
+#include "tests/app/cli/program.hpp"
+#include "tests/app/cli/session_fixture.hpp"
+#include "tests/support/browser.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace orbitfuse::view {
+namespace {
+namespace fs = std::filesystem;
+
+/// Pixels of a part of the picture that are not of its most frequent colour: something is drawn.
+double lit_share(const cv::Mat& image, const cv::Rect& part) {
+  std::map<std::tuple<int, int, int>, int> counts;
+  const cv::Mat inside = image(part & cv::Rect({}, image.size()));
+  for (int y = 0; y < inside.rows; ++y)
+    for (int x = 0; x < inside.cols; ++x) {
+      const auto p = inside.at<cv::Vec3b>(y, x);
+      ++counts[{p[0] / 8, p[1] / 8, p[2] / 8}];
+    }
+  int most = 0;
+  for (const auto& [color, count] : counts) most = std::max(most, count);
+  return 1 - static_cast<double>(most) / static_cast<double>(inside.total());
+}
+
+double difference(const cv::Mat& a, const cv::Mat& b, const cv::Rect& part) {
+  return cv::norm(a(part), b(part), cv::NORM_L1) / static_cast<double>(part.area());
+}
+
+class ViewBrowserTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!orbitfuse::test::Browser::is_here()) GTEST_SKIP() << "chromium is not installed";
+    // ORBITFUSE_VIEW_RUN: another finished run to look at, e.g. of a container.
+    if (const char* given = std::getenv("ORBITFUSE_VIEW_RUN")) {
+      out = folder.path() / "copy";
+      fs::copy(given, out, fs::copy_options::recursive);
+      fs::remove(out / "measurements.json");
+      fs::remove(out / "bookmarks.json");
+    } else {
+      make_run();
+    }
+    auto run = load_finished_run(out, stages::RunConfig(), {});
+    ASSERT_TRUE(run) << run.error().message();
+    PageOptions options;
+    options.port = 0;
+    options.token = "browser-token";
+    options.require_token = true;
+    server = std::make_unique<ViewServer>(*std::move(run), options);
+    ASSERT_TRUE(server->start());
+    url = server->urls().front();
+  }
+
+  void make_run() {
+    const fs::path session = folder.path() / "session";
+    write_fixture_session(session);
+    std::vector<std::string> words = {"run", session.string(), "--out", out.string()};
+    for (const char* set :
+         {"train.visible.iterations=400", "train.thermal.iterations=400",
+          "train.visible.eval_count=0", "train.thermal.eval_count=0",
+          "train.visible.cloud_width_px=96", "train.thermal.cloud_width_px=96",
+          "train.visible.cloud_tolerance=0.2", "train.thermal.cloud_tolerance=0.2",
+          "render.views=2", "render.width_px=64"})
+      words.insert(words.end(), {"--set", set});
+    const Outcome made = orbitfuse_program(words);
+    ASSERT_EQ(made.code, 0) << made.err;
+  }
+
+  /// For a person to look at, where ORBITFUSE_SHOTS names a folder.
+  static cv::Mat kept(const std::string& name, const cv::Mat& shot) {
+    if (const char* to = std::getenv("ORBITFUSE_SHOTS"))
+      cv::imwrite((fs::path(to) / (name + ".png")).string(), shot);
+    return shot;
+  }
+
+  static bool rests(orbitfuse::test::Browser& page) {
+    return page.becomes("viewer.rest.finished && viewer.rest.level >= 2");
+  }
+  static void choose(orbitfuse::test::Browser& page, const std::string& layer) {
+    page.evaluate("document.querySelector('[data-value=" + layer + "]').click()");
+    EXPECT_TRUE(rests(page));
+  }
+
+  orbitfuse::test::TempFolder folder;
+  fs::path out = folder.path() / "out";
+  std::unique_ptr<ViewServer> server;
+  std::string url;
+};
+
+TEST_F(ViewBrowserTest, LoadsTurnsSwitchesMeasuresSavesAndReloads) {
+  orbitfuse::test::Browser page(folder.path() / "profile", 1280, 800, false);
+  page.open(url);
+  ASSERT_TRUE(page.becomes("viewer.surface.points")) << page.evaluate("$('hint').textContent");
+  ASSERT_TRUE(rests(page));
+  const cv::Rect middle(440, 200, 400, 400);
+
+  // The points alone, then the rendered picture in their place.
+  page.evaluate("viewer.rest.moved(); clearTimeout(viewer.rest.timer)");
+  ASSERT_TRUE(page.becomes("!$('rest').classList.contains('shown')"));
+  page.evaluate("new Promise(done => setTimeout(done, 300))");
+  EXPECT_GT(lit_share(kept("surface", page.screenshot()), middle), 0.2);
+  page.evaluate("viewer.rest.moved()");
+  ASSERT_TRUE(rests(page));
+  choose(page, "visible");
+  const cv::Mat visible = kept("visible", page.screenshot());
+  EXPECT_GT(lit_share(visible, middle), 0.2);
+
+  choose(page, "thermal");
+  const cv::Mat thermal = kept("thermal", page.screenshot());
+  EXPECT_GT(difference(visible, thermal, middle), 20);
+  page.evaluate("$('palette').value = 'rainbow'; $('palette').onchange()");
+  EXPECT_GT(difference(page.screenshot(), thermal, middle), 20);
+
+  // Turning moves the camera and the picture; the render comes again from there.
+  const auto before = page.evaluate("viewer.surface.pose().position");
+  page.drag(640, 400, 800, 420);
+  ASSERT_TRUE(rests(page));
+  EXPECT_NE(page.evaluate("viewer.surface.pose().position"), before);
+
+  // No frustum in the way of what is touched now.
+  page.evaluate("$('show-visible').click(); $('show-thermal').click()");
+  // What stands under the pointer is a temperature of the scene, in each unit.
+  page.press(640, 400);
+  const double kelvin = page.evaluate("viewer.rest.temperature(.5, .5)").get<double>();
+  EXPECT_GT(kelvin, 250);
+  EXPECT_LT(kelvin, 1500);
+  page.evaluate("$('unit').value = 'F'; $('unit').onchange()");
+  EXPECT_NEAR(std::stod(page.evaluate("$('readout').textContent").get<std::string>()),
+              celsius_from_kelvin(kelvin) * 1.8 + 32, 0.06);
+  page.evaluate("$('unit').value = 'C'; $('unit').onchange()");
+
+  // A spot there, from field and frames.
+  page.evaluate("document.querySelector('[data-value=spot]').click()");
+  page.press(640, 400);
+  ASSERT_TRUE(page.becomes("viewer.measuring.list.length === 1"))
+      << page.evaluate("$('measure-words').textContent");
+  const auto reading = page.evaluate("viewer.measuring.list[0].answer.reading");
+  EXPECT_NEAR(reading.at("field_k").get<double>(), kelvin, 2);
+  EXPECT_GT(reading.at("frame_count").get<int>(), 0);
+  EXPECT_NEAR(reading.at("temperature_k").get<double>(), kelvin, 5);
+  EXPECT_GT(page.evaluate("$('marks').childElementCount").get<int>(), 1);
+  page.evaluate("$('menu').click()");
+  kept("measured", page.screenshot());
+  page.evaluate("$('save-measurements').click()");
+  ASSERT_TRUE(
+      page.becomes("viewer.measuring.list.length === 1 && viewer.measuring.list[0].created"));
+  EXPECT_TRUE(fs::exists(out / "measurements.json"));
+  page.evaluate("$('bookmark-name').value = 'from the left'; $('bookmark').click()");
+  ASSERT_TRUE(page.becomes("viewer.bookmarks.length === 1"));
+  const auto pose = page.evaluate("viewer.surface.pose()");
+
+  page.open(url);
+  ASSERT_TRUE(page.becomes("viewer.measuring.list.length === 1 && viewer.bookmarks.length === 1"));
+  EXPECT_EQ(page.evaluate("viewer.measuring.list[0].answer.reading.temperature_k"),
+            reading.at("temperature_k"));
+  page.evaluate("viewer.surface.stand(viewer.bookmarks[0])");
+  const auto again = page.evaluate("viewer.surface.pose()");
+  for (int i = 0; i < 3; ++i)
+    EXPECT_NEAR(again["position"][i].get<double>(), pose["position"][i].get<double>(), 1e-6);
+  EXPECT_TRUE(page.errors().empty()) << page.errors().front();
+}
+
+TEST_F(ViewBrowserTest, PhotosLieBesideTheirRenders) {
+  orbitfuse::test::Browser page(folder.path() / "profile", 1280, 800, false);
+  page.open(url);
+  ASSERT_TRUE(page.becomes("viewer.surface.points"));
+  for (const char* modality : {"visible", "thermal"}) {
+    page.evaluate(
+        std::string("viewer.photo.open(viewer.scene.views.findIndex(v => v.modality === '") +
+        modality + "'))");
+    ASSERT_TRUE(page.becomes("viewer.photo.shown.recorded && viewer.photo.shown.rendered"));
+    // Alike: the mean difference of the two canvases, of 255 levels.
+    const auto apart = page.evaluate(R"((() => {
+      const a = $('photo-recorded'), b = document.createElement('canvas');
+      b.width = a.width; b.height = a.height;
+      b.getContext('2d').drawImage($('photo-rendered'), 0, 0, a.width, a.height);
+      const x = a.getContext('2d').getImageData(0, 0, a.width, a.height).data, y = b.getContext('2d').getImageData(0, 0, a.width, a.height).data;
+      let sum = 0;
+      for (let i = 0; i < x.length; ++i) if (i % 4 < 3) sum += Math.abs(x[i] - y[i]);
+      return sum / (0.75 * x.length);
+    })())")
+                           .get<double>();
+    EXPECT_LT(apart, 40) << modality;
+    kept(std::string("photo_") + modality, page.screenshot());
+  }
+  EXPECT_TRUE(page.errors().empty()) << page.errors().front();
+}
+
+TEST_F(ViewBrowserTest, FitsAPhone) {
+  orbitfuse::test::Browser page(folder.path() / "profile", 390, 844, true);
+  page.open(url);
+  ASSERT_TRUE(page.becomes("viewer.surface.points"));
+  ASSERT_TRUE(rests(page));
+  EXPECT_GT(lit_share(kept("phone", page.screenshot()), {60, 250, 270, 330}), 0.2);
+  EXPECT_LE(page.evaluate("document.documentElement.scrollWidth").get<int>(), 390);
+  page.evaluate("$('menu').click()");
+  kept("phone_tools", page.screenshot());
+  // Fingers hit every button that is shown.
+  const auto small = page.evaluate(
+      R"(Array.from(document.querySelectorAll('button, select')).filter(e => e.offsetParent && (e.getBoundingClientRect().height < 44 || e.getBoundingClientRect().width < 40)).map(e => e.id || e.textContent))");
+  EXPECT_TRUE(small.empty()) << small.dump();
+  EXPECT_TRUE(page.errors().empty()) << page.errors().front();
+}
+
+/// Ctrl-C is how it ends; what cannot be shown is named.
+TEST_F(ViewBrowserTest, TheProgramSaysWhatItShowsAndHowItEnds) {
+  const auto run = [](std::vector<std::string> words, const std::string& until) {
+    RunOptions options;
+    options.interrupt_after = until;
+    words.insert(words.begin(), "view");
+    return orbitfuse_program(words, options);
+  };
+  const Outcome shown = run({out.string(), "--page", "0"}, "Ctrl-C ends it");
+  EXPECT_EQ(shown.code, 0) << shown.err;
+  EXPECT_NE(shown.err.find("http:"), std::string::npos);
+  const Outcome taken = run({out.string(), "--page", std::to_string(server->port())}, "");
+  EXPECT_EQ(taken.code, 4);
+  EXPECT_NE(taken.err.find("--page"), std::string::npos);
+  EXPECT_EQ(run({out.string(), "--page", "x"}, "").code, 2);
+  const Outcome nothing = run({folder.path().string()}, "");
+  EXPECT_EQ(nothing.code, 3);
+  EXPECT_NE(nothing.err.find("run.json"), std::string::npos);
+  fs::resize_file(out / "train_thermal" / "field.bin", 1000);
+  const Outcome damaged = run({out.string(), "--page", "0"}, "");
+  EXPECT_EQ(damaged.code, 3);
+  EXPECT_NE(damaged.err.find("field.bin"), std::string::npos);
+}
+
+TEST_F(ViewBrowserTest, WithoutTheTokenNothingIsShown) {
+  orbitfuse::test::Browser page(folder.path() / "profile", 800, 600, false);
+  page.open(url.substr(0, url.find('?')));
+  ASSERT_TRUE(page.becomes("document.body.textContent.includes('token')"));
+  EXPECT_EQ(page.evaluate("document.querySelectorAll('canvas').length"), 0);
+}
+
+}  // namespace
+}  // namespace orbitfuse::view

@@ -1,0 +1,353 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/view/view_server.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wold-style-cast"
+#pragma GCC diagnostic ignored "-Wshadow"
+#include <httplib.h>
+#pragma GCC diagnostic pop
+
+#include "app/view/shot_request.hpp"
+#include "core/image/image_codec.hpp"
+#include "core/image/image_io.hpp"
+#include "tests/app/view/toy_run.hpp"
+#include "tests/support/slow_peers.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace orbitfuse::view {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using Clock = std::chrono::steady_clock;
+
+/// What the page reads out of several pictures in one answer.
+struct Parts {
+  json head;
+  std::map<std::string, std::string> bytes;
+  json of(const std::string& name) const {
+    for (const json& part : head.at("parts"))
+      if (part.at("name") == name) return part;
+    return {};
+  }
+  double level(const std::string& name, int x, int y) const {
+    const json part = of(name);
+    std::uint16_t count = 0;
+    std::memcpy(&count, bytes.at(name).data() + 2 * (y * part.at("width").get<int>() + x), 2);
+    return count == 0 ? std::nan("")
+                      : count * part.at("scale").get<double>() + part.at("offset").get<double>();
+  }
+};
+
+Parts parts_of(const std::string& body) {
+  Parts parts;
+  std::uint32_t length = 0;
+  std::memcpy(&length, body.data(), 4);
+  parts.head = json::parse(body.substr(4, length));
+  std::size_t at = 4 + length;
+  for (const json& part : parts.head.at("parts")) {
+    parts.bytes[part.at("name")] = body.substr(at, part.at("bytes"));
+    at += part.at("bytes").get<std::size_t>();
+  }
+  EXPECT_EQ(at, body.size());
+  return parts;
+}
+
+class ViewServerTest : public ::testing::Test {
+ protected:
+  void serve(PageOptions options = {}) {
+    options.port = 0;
+    FinishedRun run = test::toy_run(folder.path());
+    views = run.views;
+    for (const RecordedView& view : run.views)
+      cameras.push_back(browser_camera(view.view.camera, view.view.cam_from_world));
+    server = std::make_unique<ViewServer>(std::move(run), options);
+    const Status status = server->start();
+    ASSERT_TRUE(status) << status.error().message();
+  }
+  httplib::Client client() const {
+    httplib::Client asking("127.0.0.1", server->port());
+    asking.set_read_timeout(60);
+    return asking;
+  }
+  httplib::Result render(const json& body) const { return post("/render", body.dump()); }
+  httplib::Result post(const std::string& path, const std::string& body) const {
+    return client().Post(path.c_str(), {{"X-OrbitFuse", "1"}}, body, "application/json");
+  }
+  /// As the page asks for the first recorded camera's place.
+  json shot(int width, int height) const {
+    json j = {{"client", "test"}, {"width", width}, {"height", height}};
+    for (const char* key : {"position", "rotation_wxyz", "fov_deg"}) j[key] = cameras[0].at(key);
+    return j;
+  }
+
+  orbitfuse::test::TempFolder folder;
+  std::vector<RecordedView> views;
+  std::vector<json> cameras;
+  std::unique_ptr<ViewServer> server;
+};
+
+TEST_F(ViewServerTest, PageHasAllItNeedsAndAsksNobody) {
+  serve();
+  const auto page = client().Get("/");
+  ASSERT_TRUE(page);
+  ASSERT_EQ(page->status, 200);
+  for (const char* outside :
+       {" src=", "href=\"/", "href=\"h", "@import", "importScripts", "navigator.sendBeacon"})
+    EXPECT_THAT(page->body, Not(HasSubstr(outside)));
+  EXPECT_THAT(page->body, HasSubstr("THREE.OrbitControls"));
+  EXPECT_THAT(page->body, Not(HasSubstr("/*STYLE*/")));
+  const std::string policy = page->get_header_value("Content-Security-Policy");
+  EXPECT_THAT(policy, HasSubstr("default-src 'none'"));
+  EXPECT_THAT(policy, HasSubstr("connect-src 'self'"));
+  EXPECT_THAT(policy, Not(HasSubstr("http")));
+  EXPECT_EQ(server->urls().front().find("token"), std::string::npos);
+}
+
+TEST_F(ViewServerTest, SceneTellsWhatThereIs) {
+  serve();
+  const json scene = json::parse(client().Get("/scene")->body);
+  EXPECT_EQ(scene.at("visible"), true);
+  EXPECT_EQ(scene.at("thermal"), true);
+  ASSERT_EQ(scene.at("views").size(), 12u);
+  EXPECT_EQ(scene.at("views").at(1).at("doubt"), "a doubt");
+  EXPECT_FALSE(scene.at("views").at(0).contains("doubt"));
+  EXPECT_EQ(scene.at("palettes").at("inferno").get<std::string>().size(), 6u * 256);
+  EXPECT_EQ(scene.at("span"), (json{290.0, 305.0}));
+  const std::string surface = client().Get("/surface")->body;
+  std::uint32_t count = 0;
+  std::memcpy(&count, surface.data(), 4);
+  EXPECT_EQ(count, 1000u);
+  EXPECT_EQ(surface.size(), 28u + 1000 * 11);
+}
+
+/// The page's camera and the recorded one are the same, and so are the temperatures that reach it
+/// and the field's.
+TEST_F(ViewServerTest, PicturesAreTheFieldsOwn) {
+  serve();
+  const FinishedRun run = test::toy_run(folder.path());  // trained alike: the same, bit for bit
+  const auto answer = render(shot(64, 64));
+  ASSERT_TRUE(answer);
+  ASSERT_EQ(answer->status, 200) << answer->body;
+  const Parts parts = parts_of(answer->body);
+  const Camera camera = views[0].view.camera.scaled_to(64, 64);
+  const auto truth = nerf::render(run.thermal, camera, views[0].view.cam_from_world,
+                                  run.config.render.quality, {});
+  ASSERT_TRUE(truth);
+  int seen = 0;
+  for (int y = 0; y < 64; ++y)
+    for (int x = 0; x < 64; ++x) {
+      if (!(std::abs(truth->opacity.at<float>(y, x) - 0.5f) > 0.01f)) continue;
+      const double level = parts.level("thermal", x, y);
+      ASSERT_EQ(std::isnan(level), truth->opacity.at<float>(y, x) < 0.5f) << x << " " << y;
+      if (std::isnan(level)) continue;
+      ++seen;
+      EXPECT_NEAR(level, static_cast<double>(truth->color.at<float>(y, x)), 0.02);
+    }
+  EXPECT_GT(seen, 500);
+  for (const char* layer : {"visible", "fused"}) {
+    const auto image = decode_image(parts.bytes.at(layer), layer);
+    ASSERT_TRUE(image);
+    EXPECT_EQ(image->size(), cv::Size(64, 64));
+    EXPECT_GT(cv::countNonZero(image->reshape(1) > 30), 1000);
+  }
+  json recorded = {{"client", "test"}, {"view", 0}, {"width", 64}};
+  const Parts same = parts_of(render(recorded)->body);
+  int alike = 0;
+  for (int y = 0; y < 64; ++y)
+    for (int x = 0; x < 64; ++x)
+      alike += std::abs(same.level("thermal", x, y) - parts.level("thermal", x, y)) < 0.02;
+  EXPECT_GT(alike, 500);
+}
+
+TEST_F(ViewServerTest, LayersAndSizesAreAsAsked) {
+  serve();
+  json asked = shot(48, 32);
+  asked["layers"] = {"thermal", "fused"};
+  asked["thermal_divisor"] = 2;
+  const Parts parts = parts_of(render(asked)->body);
+  EXPECT_EQ(parts.bytes.size(), 2u);
+  EXPECT_EQ(parts.of("thermal").at("width"), 24);
+  EXPECT_EQ(parts.of("fused").at("width"), 48);
+}
+
+TEST_F(ViewServerTest, HostileRequestsAreNamed) {
+  serve();
+  struct Case {
+    const char* changed;
+    const char* named;
+  };
+  const std::vector<Case> cases = {
+      {R"({"position":[1,2]})", "position"},
+      {R"({"position":[1,2,"x"]})", "position"},
+      {R"({"position":[1,2,1e300]})", "position"},
+      {R"({"position":null})", "position"},
+      {R"({"rotation_wxyz":[0,0,0,0]})", "rotation_wxyz"},
+      {R"({"rotation_wxyz":[9,0,0,0]})", "rotation_wxyz"},
+      {R"({"fov_deg":0})", "fov_deg"},
+      {R"({"fov_deg":180})", "fov_deg"},
+      {R"({"fov_deg":"wide"})", "fov_deg"},
+      {R"({"width":0})", "width"},
+      {R"({"width":-5})", "width"},
+      {R"({"width":1e9})", "width"},
+      {R"({"width":8000,"height":8000})", "width, height"},
+      {R"({"client":""})", "client"},
+      {R"({"client":7})", "client"},
+      {R"({"layers":"visible"})", "layers"},
+      {R"({"layers":["mud"]})", "layers"},
+      {R"({"thermal_divisor":0})", "thermal_divisor"},
+      {R"({"view":-1})", "view"},
+      {R"({"view":12})", "view"},
+      {R"({"view":18446744073709551615})", "view"},
+      {R"({"view":1.5})", "view"},
+  };
+  for (const Case& c : cases) {
+    json body = shot(16, 16);
+    body.update(json::parse(c.changed));
+    const auto answer = render(body);
+    ASSERT_TRUE(answer) << c.changed;
+    EXPECT_EQ(answer->status, 400) << c.changed;
+    EXPECT_THAT(answer->body, HasSubstr(c.named)) << c.changed;
+  }
+  const std::string deep = std::string(100000, '[') + std::string(100000, ']');
+  for (const std::string& body :
+       {std::string(), std::string("{"), std::string("[]"), std::string("nan"), deep,
+        std::string("{\"position\":[NaN,0,0]}"), std::string("\xff\xfe{}", 4)})
+    EXPECT_EQ(post("/render", body)->status, 400) << body.substr(0, 20);
+  for (const char* path : {"/pick", "/measure", "/measurements/add", "/bookmarks/add",
+                           "/bookmarks/remove", "/film", "/temperatures.tiff"})
+    for (const std::string& body : {std::string(), std::string("{}"), std::string("[1]"), deep,
+                                    std::string("{\"kind\":1,\"name\":[],\"u\":\"x\"}")})
+      EXPECT_EQ(post(path, body)->status, 400) << path << " " << body.substr(0, 20);
+  json outside = shot(64, 64);
+  outside.update({{"u", 65}, {"v", 3}});
+  EXPECT_EQ(post("/pick", outside.dump())->status, 400);
+  EXPECT_EQ(post("/render", std::string(400'000, ' '))->status, 413);
+  for (const char* path : {"/photo/99", "/photo/x", "/photo/../scene", "/nowhere", "/photo/0"})
+    EXPECT_EQ(client().Get(path)->status, 404) << path;  // the toy has no session
+  EXPECT_THAT(client().Get("/photo/0")->body, HasSubstr("session"));
+}
+
+TEST_F(ViewServerTest, TokenIsAskedForEverything) {
+  PageOptions options;
+  options.token = "right-token-1";
+  options.require_token = true;
+  serve(options);
+  for (const char* path : {"/", "/scene", "/surface", "/photo/0", "/nonsense"}) {
+    EXPECT_EQ(client().Get(path)->status, 401) << path;
+    EXPECT_NE(client().Get(path, {{"X-Token", "right-token-1"}})->status, 401) << path;
+  }
+  EXPECT_EQ(render(shot(16, 16))->status, 401);
+  EXPECT_EQ(client().Get("/?token=right-token-1")->status, 200);
+  EXPECT_EQ(client().Get("/?token=right-token-2")->status, 401);
+  EXPECT_EQ(
+      client().Get("/scene", {{"Host", "evil.example"}, {"X-Token", "right-token-1"}})->status,
+      403);
+  EXPECT_EQ(client()
+                .Post("/render", {{"X-Token", "right-token-1"}}, shot(16, 16).dump(), "text/plain")
+                ->status,
+            403);
+}
+
+TEST_F(ViewServerTest, TenViewersAndSlowPeersAreServedTogether) {
+  serve();
+  const orbitfuse::test::SlowPeers peers(server->port(), 20);
+  ASSERT_EQ(peers.count(), 20u);
+  std::atomic<int> good{0};
+  {
+    std::vector<std::jthread> viewers;
+    for (int v = 0; v < 10; ++v)
+      viewers.emplace_back([&, v] {
+        for (int n = 0; n < 3; ++n) {
+          json asked = shot(32 + v, 32);
+          asked["client"] = "viewer " + std::to_string(v);
+          const auto picture = render(asked);
+          const auto scene = client().Get("/scene");
+          good += picture && picture->status == 200 && scene && scene->status == 200;
+        }
+      });
+  }
+  EXPECT_EQ(good, 30);
+}
+
+TEST_F(ViewServerTest, TemperaturesAreTakenAwayAsSessionsHoldThem) {
+  serve();
+  const Parts parts = parts_of(render(shot(64, 48))->body);
+  const auto tiff = post("/temperatures.tiff", shot(64, 48).dump());
+  ASSERT_EQ(tiff->status, 200);
+  orbitfuse::test::put(folder / "view.tiff", tiff->body);
+  const auto kelvin = read_thermal_k(folder / "view.tiff");
+  ASSERT_TRUE(kelvin) << kelvin.error().message();
+  ASSERT_EQ(kelvin->size(), cv::Size(64, 48));
+  int alike = 0;
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 64; ++x)
+      alike += std::abs(static_cast<double>(kelvin->at<float>(y, x)) -
+                        parts.level("thermal", x, y)) < 0.011;
+  EXPECT_GT(alike, 500);
+}
+
+TEST_F(ViewServerTest, WhatIsKeptComesBackToEveryViewer) {
+  serve();
+  const json mark = {
+      {"name", "a"}, {"position", {1, 0, 0}}, {"target", {0, 0, 0}}, {"fov_deg", 45}};
+  EXPECT_EQ(post("/bookmarks/add", mark.dump())->status, 200);
+  EXPECT_EQ(post("/bookmarks/add", mark.dump())->status, 400);  // the name is taken
+  EXPECT_EQ(json::parse(client().Get("/bookmarks")->body).size(), 1u);
+  EXPECT_EQ(post("/bookmarks/remove", R"({"name":"a"})")->status, 200);
+  EXPECT_TRUE(json::parse(client().Get("/bookmarks")->body).empty());
+  // The toy has no session to measure in.
+  const auto refused = post("/measure", R"({"kind":"spot","places":[{"point":[0,0,0]}]})");
+  EXPECT_EQ(refused->status, 404);
+  EXPECT_THAT(refused->body, HasSubstr("session"));
+}
+
+/// Renders of whoever left are not gone on with, and nobody's render holds up the end.
+TEST_F(ViewServerTest, EndsWhileViewersAreRenderedFor) {
+  serve();
+  std::vector<int> open;
+  for (int i = 0; i < 12; ++i) {
+    json asked = shot(1100, 1100);
+    asked["client"] = "viewer " + std::to_string(i);
+    asked["width"] = 1100 - i;
+    const std::string body = asked.dump();
+    const std::string request =
+        "POST /render HTTP/1.1\r\nHost: 127.0.0.1\r\nX-OrbitFuse: 1\r\nContent-Length: " +
+        std::to_string(body.size()) + "\r\n\r\n" + body;
+    const int fd = orbitfuse::test::connected_to(server->port());
+    ASSERT_GE(fd, 0);
+    ASSERT_EQ(::send(fd, request.data(), request.size(), 0), static_cast<ssize_t>(request.size()));
+    if (i < 4)
+      ::close(fd);  // in the middle
+    else
+      open.push_back(fd);
+  }
+  EXPECT_EQ(client().Get("/scene")->status, 200);
+  const auto ending = Clock::now();
+  server->stop();
+  EXPECT_LT(Clock::now() - ending, std::chrono::seconds(2));  // the bar
+  for (const int fd : open) ::close(fd);
+}
+
+TEST_F(ViewServerTest, PortInUseHasARemedy) {
+  serve();
+  PageOptions options;
+  options.port = server->port();
+  ViewServer second(test::toy_run(folder.path()), options);
+  const Status taken = second.start();
+  ASSERT_FALSE(taken);
+  EXPECT_EQ(taken.error().kind, ErrorKind::device);
+  EXPECT_THAT(taken.error().remedy, HasSubstr("--page"));
+}
+
+}  // namespace
+}  // namespace orbitfuse::view

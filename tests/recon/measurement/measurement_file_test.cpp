@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/measurement/measurement_file.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "tests/support/temp_folder.hpp"
+
+namespace orbitfuse::measurement {
+namespace {
+using nlohmann::json;
+using testing::HasSubstr;
+
+SavedMeasurement spot(const std::string& name) {
+  SavedMeasurement saved;
+  saved.name = name;
+  saved.request.places = {Eigen::Vector3d(1, 2, 3)};
+  saved.answer = {{"kind", "spot"}, {"reading", {{"temperature_k", 300.5}}}};
+  return saved;
+}
+
+class MeasurementFile : public testing::Test {
+ protected:
+  void expect_refused(const std::string& bytes, const std::string& found) const {
+    test::put(file, bytes);
+    const auto loaded = load_measurements(file, "run a");
+    ASSERT_FALSE(loaded) << bytes;
+    EXPECT_EQ(loaded.error().kind, ErrorKind::input);
+    EXPECT_THAT(loaded.error().where, HasSubstr("measurements.json"));
+    EXPECT_THAT(loaded.error().message(), HasSubstr(found));
+    EXPECT_FALSE(loaded.error().remedy.empty());
+    EXPECT_FALSE(add_measurement(file, "run a", spot("new")));
+    EXPECT_EQ(test::get(file), bytes) << "nothing is lost";
+  }
+  test::TempFolder temp;
+  std::filesystem::path file = temp / "measurements.json";
+};
+
+TEST_F(MeasurementFile, HoldsWhatWasPut) {
+  EXPECT_TRUE(load_measurements(file, "run a")->list.empty()) << "an absent file is an empty list";
+  EXPECT_EQ(add_measurement(file, "run a", spot("")).value(), "spot 1");
+  EXPECT_EQ(add_measurement(file, "run a", spot("")).value(), "spot 2");
+  EXPECT_EQ(add_measurement(file, "run a", spot("a \"valve\", hot\n")).value(),
+            "a \"valve\", hot\n");
+  SavedMeasurement again = spot("spot 1");
+  again.answer["reading"]["temperature_k"] = 310;
+  EXPECT_TRUE(add_measurement(file, "run a", again));
+  const auto loaded = load_measurements(file, "run a");
+  ASSERT_TRUE(loaded) << loaded.error().message();
+  ASSERT_EQ(loaded->list.size(), 3u);
+  EXPECT_EQ(loaded->list[0].answer["reading"]["temperature_k"], 310);
+  EXPECT_EQ(loaded->list[0].created.size(), 20u);
+  EXPECT_EQ(std::get<Eigen::Vector3d>(loaded->list[2].request.places.at(0)).z(), 3);
+  EXPECT_EQ(loaded->find("none"), nullptr);
+}
+
+TEST_F(MeasurementFile, DamageIsNamedAndNothingIsLost) {
+  ASSERT_TRUE(add_measurement(file, "run a", spot("one")));
+  const std::string whole = test::get(file);
+  expect_refused("", "not JSON");
+  expect_refused("[]", "not JSON");
+  expect_refused(whole.substr(0, whole.size() / 2), "cut off");
+  json j = json::parse(whole);
+  j["schema"] = 99;
+  expect_refused(j.dump(), "99");
+  j = json::parse(whole);
+  j["measurements"] = 5;
+  expect_refused(j.dump(), "no list");
+  j = json::parse(whole);
+  j["measurements"].push_back(j["measurements"][0]);
+  expect_refused(j.dump(), "two measurements named 'one'");
+  j = json::parse(whole);
+  j["measurements"][0].erase("name");
+  expect_refused(j.dump(), "measurements[0]");
+  j = json::parse(whole);
+  j["measurements"][0]["request"]["kind"] = "sport";
+  expect_refused(j.dump(), "sport");
+  j = json::parse(whole);
+  j.erase("run");
+  expect_refused(j.dump(), "no run");
+}
+
+TEST_F(MeasurementFile, AnotherRunsAreNotTaken) {
+  ASSERT_TRUE(add_measurement(file, "run b", spot("one")));
+  expect_refused(test::get(file), "another run");
+}
+
+TEST_F(MeasurementFile, ProgramsThatSaveAtOnceLoseNothing) {
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 4; ++t)
+    threads.emplace_back([&, t] {
+      for (int i = 0; i < 5; ++i)
+        EXPECT_TRUE(add_measurement(file, "run a", spot(std::to_string(10 * t + i))));
+    });
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(load_measurements(file, "run a")->list.size(), 20u);
+}
+
+TEST_F(MeasurementFile, AFolderInItsPlaceIsSaid) {
+  std::filesystem::create_directories(file);
+  EXPECT_FALSE(load_measurements(file, "run a"));
+  EXPECT_FALSE(add_measurement(temp / "gone" / "measurements.json", "run a", spot("x")));
+}
+
+}  // namespace
+}  // namespace orbitfuse::measurement
