@@ -217,6 +217,10 @@ Result<std::vector<PlacedReading>> extremes(const ThermalScene& scene,
     ORBITFUSE_ASSIGN(TemperatureReading reading, read_spot(scene, points[i], radiometry, progress));
     found.push_back({position, points[i].normal, std::move(reading)});
   }
+  std::stable_sort(found.begin(), found.end(), [&](const auto& one, const auto& other) {
+    const double difference = one.reading.temperature_k - other.reading.temperature_k;
+    return hottest ? difference > 0 : difference < 0;
+  });
   return found;
 }
 

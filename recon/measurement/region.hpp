@@ -19,9 +19,9 @@ Result<TemperatureReading> read_region(const ThermalScene& scene,
                                        const Reradiometry& radiometry, const Progress& progress);
 
 /// Up to `count` of the points, at least `apart` from each other, of those that two frames see
-/// (one, where the scene has no more). In the order of what is sure: temperature less its
+/// (one, where the scene has no more). Chosen by what is sure: temperature less twice its
 /// uncertainty for the hottest, and with it for the coldest; else edges, where frames mix two
-/// surfaces, would come first.
+/// surfaces, would come first. In the order of their temperatures.
 Result<std::vector<PlacedReading>> extremes(const ThermalScene& scene,
                                             const std::vector<SurfacePoint>& points, bool hottest,
                                             int count, double apart, const Reradiometry& radiometry,
