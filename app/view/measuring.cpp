@@ -31,9 +31,11 @@ auto Measuring::in_turn(Work work) -> decltype(work()) {
   if (!places_.try_acquire())
     return fail(ErrorKind::unavailable, "measurements", "others are being measured",
                 "try again in a moment");
-  decltype(work()) result = work();
-  places_.release();
-  return result;
+  struct Release {
+    std::counting_semaphore<4>& places;
+    ~Release() { places.release(); }
+  } const release{places_};
+  return work();
 }
 
 Result<json> Measuring::point_at(const Shot& shot, const Eigen::Vector2d& pixel) {
