@@ -138,8 +138,8 @@ Result<ModalityPoses> global_poses(const Session& session, const fs::path& workd
   ORBITFUSE_TRY(project.match(images, orbit_pairs(frames), {}));
   ORBITFUSE_ASSIGN(FeatureGraph graph, read_feature_graph(project.database(), session, images));
   const Adjuster adjust = [&](Reconstruction model) -> Result<Reconstruction> {
-    ORBITFUSE_ASSIGN(JudgedModel judged, judge_model(std::move(model), session, frames, options));
-    return std::move(judged.poses.reconstruction);
+    ORBITFUSE_ASSIGN(ModalityPoses poses, adjust_model(std::move(model), session, frames, options));
+    return std::move(poses.reconstruction);
   };
   ORBITFUSE_ASSIGN(GlobalModel global, map_globally(graph, adjust, {}, {}));
   if (global.model.views.size() < 2)

@@ -127,13 +127,15 @@ StationFit fit_stations(const std::vector<PosedView>& views, const Session& sess
   std::map<std::string, const FrameRecord*> by_name;
   for (const FrameRecord& frame : session.frames) by_name[frame.file] = &frame;
   const Similarity3d canonical = canonical_from_world(views, {});
-  std::vector<double> azimuth, station, sigma;
+  std::vector<double> azimuth, across, station, sigma;
   std::vector<std::string> names;
   for (const PosedView& view : views) {
     const auto found = by_name.find(view.name);
     if (found == by_name.end() || !found->second->station) continue;
+    const OrbitAngles angles = orbit_angles(canonical * camera_center(view.cam_from_world));
     names.push_back(view.name);
-    azimuth.push_back(orbit_angles(canonical * camera_center(view.cam_from_world)).azimuth_deg);
+    azimuth.push_back(angles.azimuth_deg);
+    across.push_back(std::cos(angles.elevation_deg / degrees));
     station.push_back(found->second->station->azimuth_deg);
     // Without a sigma only the origin is unknown (core/session/session.hpp); it is fitted here.
     sigma.push_back(found->second->station->azimuth_sigma_deg.value_or(nominal_sigma_deg));
@@ -151,7 +153,9 @@ StationFit fit_stations(const std::vector<PosedView>& views, const Session& sess
     fit.offset_deg = robust_offset_deg(difference);
     for (std::size_t i = 0; i < difference.size(); ++i) {
       residual.push_back(std::abs(wrapped_deg(difference[i] - fit.offset_deg)));
-      if (residual.back() > 20.0 + 3.0 * sigma[i]) fit.contradicting.push_back(names[i]);
+      if (residual.back() <= 20.0 + 3.0 * sigma[i]) continue;
+      ++fit.outliers;
+      if (residual.back() * across[i] > 45) fit.folded.push_back(names[i]);
     }
     fit.median_residual_deg = median(residual);
     fit.worst_residual_deg = *std::max_element(residual.begin(), residual.end());

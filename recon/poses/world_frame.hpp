@@ -42,7 +42,10 @@ struct StationFit {
   double offset_deg = 0;  ///< azimuth = +-station + offset
   double median_residual_deg = 0;
   double worst_residual_deg = 0;
-  std::vector<std::string> contradicting;  ///< views with a residual above 20 deg + 3 sigma
+  int outliers = 0;  ///< residual above 20 deg + 3 sigma
+  /// Outliers that look from another side: more than 45 deg as directions, which a station
+  /// miscounted by one, or any azimuth of a view from high above, is not.
+  std::vector<std::string> folded;
 };
 /// nullopt-like: views = 0 when fewer than three views have stations. Azimuths are the views' in
 /// their own canonical frame, so nothing of the world has to be right.

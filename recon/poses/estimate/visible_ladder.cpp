@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <set>
-#include <utility>
 
 #include "recon/poses/global_sfm/global_mapper.hpp"
 #include "recon/poses/sfm/colmap.hpp"
@@ -119,7 +119,7 @@ class VisibleLadder {
   }
 
  private:
-  /// What further attempts add. One that breaks down costs no model that is believed already.
+  /// What further attempts add.
   Status improve(FeatureLevel& quick, bool all_are_few) {
     const auto attempted = [&]() -> Status {
       if (best_) ORBITFUSE_TRY(try_resection(quick, "resection on the quick model"));
@@ -127,7 +127,11 @@ class VisibleLadder {
       if (!complete() && limited_) ORBITFUSE_TRY(try_full_settings());
       return {};
     };
-    Status done = attempted();
+    return spared(attempted());
+  }
+
+  /// An attempt that breaks down costs no model that is believed already.
+  Status spared(Status done) {
     if (done || !best_ || done.error().kind == ErrorKind::cancelled) return done;
     steps_.push_back({"a further attempt", false, done.error().message(), 0, total_, 0});
     return {};
@@ -173,10 +177,15 @@ class VisibleLadder {
     return result;
   }
 
-  /// Judges a model and keeps it where it is believed and poses more views than
-  /// the best one.
+  using Better = std::function<bool(const Reconstruction& model, const Reconstruction& best)>;
+
+  static bool more_views(const Reconstruction& model, const Reconstruction& best) {
+    return model.views.size() > best.views.size();
+  }
+
+  /// Judges a model and keeps it where it is believed and better than the best one.
   void consider(const std::string& attempt, const std::string& found, Reconstruction model,
-                const PoseOptions& options) {
+                const PoseOptions& options, const Better& better = more_views) {
     LadderStep step{attempt, false, found, 0, total_, 0};
     if (model.views.size() < 2) {
       step.why += "; no model";
@@ -184,11 +193,12 @@ class VisibleLadder {
       Result<JudgedModel> judged = judge_model(std::move(model), session_, frames_, options);
       step.why += "; " + (judged ? judged->why : judged.error().found);
       if (judged) step.posed = static_cast<int>(judged->poses.reconstruction.views.size());
-      if (judged && judged->believed && better(*judged)) {
+      if (judged && judged->believed &&
+          (!best_ || better(judged->poses.reconstruction, best_->poses.reconstruction))) {
         best_ = std::move(*judged);
         best_step_ = steps_.size();
       } else if (judged && judged->believed) {
-        step.why += "; no more views than before";
+        step.why += "; no better than the model before";
       }
     }
     step.seconds = std::chrono::duration<double>(Clock::now() - since_).count();
@@ -196,26 +206,19 @@ class VisibleLadder {
     steps_.push_back(std::move(step));
   }
 
-  bool better(const JudgedModel& judged) const {
-    if (!best_) return true;
-    const std::size_t views = judged.poses.reconstruction.views.size(),
-                      best = best_->poses.reconstruction.views.size();
-    return views > best;
-  }
-
   /// The mapper's default settings, then ever more relaxed ones until a model is believed. A
   /// relaxed model may have followed a repeated pillar: the global mapper is asked as well then.
   Status try_mapper(FeatureLevel& level, const std::string& name) {
-    const std::vector<MapperSettings> ladder = mapper_ladder();
-    for (const MapperSettings& settings : ladder) {
+    bool relaxed = false;
+    for (const MapperSettings& settings : mapper_ladder()) {
       tell(2, name + ", " + settings.name);
       ORBITFUSE_ASSIGN(Reconstruction model, level.map(settings, progress_));
       consider(name + ", " + settings.name, level.found(), std::move(model), level.options());
       ORBITFUSE_TRY(progress_.check("poses.visible"));
-      if (best_ && &settings == &ladder.front()) return {};
       if (best_) break;
+      relaxed = true;
     }
-    return try_global(level, name);
+    return best_ && !relaxed ? Status{} : spared(try_global(level, name));
   }
 
   Status try_global(const FeatureLevel& level, const std::string& name) {
@@ -223,20 +226,17 @@ class VisibleLadder {
     tell(2, attempt);
     ORBITFUSE_ASSIGN(FeatureGraph graph, level.graph());
     const Adjuster adjust = [&](Reconstruction model) -> Result<Reconstruction> {
-      ORBITFUSE_ASSIGN(JudgedModel judged,
-                       judge_model(std::move(model), session_, frames_, level.options()));
-      return std::move(judged.poses.reconstruction);
+      ORBITFUSE_ASSIGN(ModalityPoses poses,
+                       adjust_model(std::move(model), session_, frames_, level.options()));
+      return std::move(poses.reconstruction);
     };
     ORBITFUSE_ASSIGN(GlobalModel global, map_globally(graph, adjust, {}, progress_));
-    std::optional<JudgedModel> colmaps;
-    if (best_) {
-      const int held = explained_matches(graph, posed_frames(graph, best_->poses.reconstruction));
-      const int found = explained_matches(graph, global.posed);
-      global.found += fmt::format("; {} matches explained, {} by COLMAP's model", found, held);
-      if (found > held) colmaps = std::exchange(best_, std::nullopt);
-    }
-    consider(attempt, global.found, std::move(global.model), level.options());
-    if (!best_) best_ = std::move(colmaps);
+    const Better explains_more = [&](const Reconstruction& model, const Reconstruction& best) {
+      return model.views.size() >= best.views.size() &&
+             explained_matches(graph, posed_frames(graph, model)) >
+                 explained_matches(graph, posed_frames(graph, best));
+    };
+    consider(attempt, global.found, std::move(global.model), level.options(), explains_more);
     return {};
   }
 

@@ -131,8 +131,11 @@ void guide(const FeatureGraph& graph, const PosedFrames& posed, double band_px,
   std::vector<std::vector<FeatureMatch>> found(pairs.size());
   parallel_for(static_cast<int>(pairs.size()),
                [&](int p) { found[at(p)] = guided_matches(graph, pairs[at(p)], posed, band_px); });
-  for (std::size_t p = 0; p < pairs.size(); ++p)
-    if (!found[p].empty()) matches[pairs[p]] = std::move(found[p]);
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    // Many fewer than before: the lines are off, not the matches.
+    std::vector<FeatureMatch>& of_pair = matches[pairs[p]];
+    if (2 * found[p].size() >= of_pair.size()) of_pair = std::move(found[p]);
+  }
 }
 
 /// Whether more than the poses speaks for a track: a match of two views that was looked for along
@@ -150,10 +153,13 @@ bool confirmed(const FeatureGraph& graph, const FeatureTrack& track) {
 
 /// Each frame where the others' points have it.
 void pose_by_others(const FeatureGraph& graph, const PairMatches& matches, PosedFrames& posed) {
+  TrackOptions options;
+  options.max_error_px *= graph.pixel_scale;
+  const std::vector<FeatureTrack> tracks = triangulate_tracks(graph, matches, posed, options);
   FramePoses moved = posed.poses;
   parallel_for(graph.count(), [&](int f) {
     if (!moved[at(f)]) return;
-    if (const auto pose = resect_by_others(graph, matches, posed, f, {})) moved[at(f)] = pose;
+    if (const auto pose = resect_by_others(graph, tracks, posed, f, {})) moved[at(f)] = pose;
   });
   posed.poses = std::move(moved);
 }
@@ -177,12 +183,16 @@ FramePoses averaged_poses(const AveragedRotations& rotations,
 Result<Reconstruction> adjusted(const FeatureGraph& graph, const PairMatches& matches,
                                 double max_error_px, int min_shared_points, PosedFrames& posed,
                                 const Adjuster& adjust) {
-  const TrackOptions options{.max_error_px = max_error_px};
-  keep_connected(triangulate_tracks(graph, matches, posed, options), min_shared_points,
-                 posed.poses);
-  std::vector<FeatureTrack> tracks = triangulate_tracks(graph, matches, posed, options);
-  std::erase_if(tracks, [&](const FeatureTrack& track) { return !confirmed(graph, track); });
-  Reconstruction model = reconstruction_of(graph, posed, tracks, graph.frames.front()->modality);
+  const auto confirmed_tracks = [&] {
+    TrackOptions options;
+    options.max_error_px = max_error_px;
+    std::vector<FeatureTrack> tracks = triangulate_tracks(graph, matches, posed, options);
+    std::erase_if(tracks, [&](const FeatureTrack& track) { return !confirmed(graph, track); });
+    return tracks;
+  };
+  keep_connected(confirmed_tracks(), min_shared_points, posed.poses);
+  Reconstruction model =
+      reconstruction_of(graph, posed, confirmed_tracks(), graph.frames.front()->modality);
   if (model.views.size() < 2)
     return fail(ErrorKind::quality, "global mapper", "no two views hold each other",
                 "take views every 30 deg or closer");

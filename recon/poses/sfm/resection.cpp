@@ -163,14 +163,11 @@ Result<std::vector<int>> resect(FeatureGraph& graph, PosedFrames& posed,
   return added;
 }
 
-std::optional<Rigid3d> resect_by_others(const FeatureGraph& graph, const PairMatches& matches,
+std::optional<Rigid3d> resect_by_others(const FeatureGraph& graph,
+                                        const std::vector<FeatureTrack>& all_tracks,
                                         const PosedFrames& posed, int frame,
                                         const ResectionOptions& options) {
-  PosedFrames others = posed;
-  others.poses[at(frame)].reset();
-  TrackOptions track;
-  track.max_error_px *= graph.pixel_scale;
-  const std::vector<FeatureTrack> tracks = triangulate_tracks(graph, matches, others, track);
+  const std::vector<FeatureTrack> tracks = without_frame(graph, posed, all_tracks, frame);
   const Camera& camera = posed.cameras[at(frame)];
   const auto miss_px = [&](const Rigid3d& pose, int feature, int t) {
     return (camera.project(pose * tracks[at(t)].position) - graph.pixels[at(frame)].col(feature))

@@ -25,11 +25,12 @@ struct ResectionOptions {
 Result<std::vector<int>> resect(FeatureGraph& graph, PosedFrames& posed,
                                 const ResectionOptions& options, const Progress& progress);
 
-/// Where a posed frame stands by the points that `matches` of the other frames make, near where it
-/// stands now (points that it misses by more than a twentieth of the width aren't asked): matches
-/// found along its own epipolar lines hold a frame where it is, right or not, and these don't.
-/// nullopt where nothing is found, or fewer of its exact matches agree with it than with its pose.
-std::optional<Rigid3d> resect_by_others(const FeatureGraph& graph, const PairMatches& matches,
+/// Where a posed frame stands by the others' share in `tracks`, near where it stands now (points
+/// that it misses by more than a twentieth of the width aren't asked): matches found along its own
+/// epipolar lines hold a frame where it is, right or not, and these don't. nullopt where nothing is
+/// found, or fewer of its exact matches agree with it than with its pose.
+std::optional<Rigid3d> resect_by_others(const FeatureGraph& graph,
+                                        const std::vector<FeatureTrack>& tracks,
                                         const PosedFrames& posed, int frame,
                                         const ResectionOptions& options);
 

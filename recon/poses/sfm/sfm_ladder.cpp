@@ -94,9 +94,57 @@ void name_dropped(const std::vector<const FrameRecord*>& frames,
   }
 }
 
-Result<ModalityPoses> adjusted(Reconstruction model, const Session& session,
-                               const std::vector<const FrameRecord*>& frames,
-                               const PoseOptions& options) {
+/// The model of the other views.
+Reconstruction without(const Reconstruction& model, const std::vector<std::string>& names) {
+  Reconstruction rest;
+  rest.modality = model.modality;
+  std::vector<int> place;
+  for (const PosedView& view : model.views) {
+    const bool kept = std::find(names.begin(), names.end(), view.name) == names.end();
+    place.push_back(kept ? static_cast<int>(rest.views.size()) : -1);
+    if (kept) rest.views.push_back(view);
+  }
+  for (const SparsePoint& point : model.points) {
+    SparsePoint kept = point;
+    std::erase_if(kept.track, [&](const Observation& o) {
+      return place[static_cast<std::size_t>(o.view)] < 0;
+    });
+    for (Observation& o : kept.track) o.view = place[static_cast<std::size_t>(o.view)];
+    if (kept.track.size() >= 2) rest.points.push_back(std::move(kept));
+  }
+  return rest;
+}
+
+/// Views folded onto another side of a near-symmetric scene leave a model, and are named.
+Status drop_folded(const Session& session, const std::vector<const FrameRecord*>& frames,
+                   const PoseOptions& options, ModalityPoses& poses) {
+  const std::size_t all = poses.reconstruction.views.size();
+  std::set<std::string> folded;
+  for (;;) {
+    const StationFit fit = fit_stations(poses.reconstruction.views, session);
+    if (fit.folded.empty()) break;
+    folded.insert(fit.folded.begin(), fit.folded.end());
+    if (static_cast<double>(folded.size()) > max_contradicting * static_cast<double>(all))
+      return fail(ErrorKind::quality, "poses",
+                  fmt::format("{} of {} views look from another side than their stations",
+                              folded.size(), all),
+                  "check the stations, or import without them");
+    ORBITFUSE_ASSIGN(
+        poses, adjust_model(without(poses.reconstruction, fit.folded), session, frames, options));
+  }
+  for (DroppedView& view : poses.dropped)
+    if (folded.contains(view.name))
+      view.why =
+          "its matches place it on another side than its station, as one that looks alike "
+          "would";
+  return {};
+}
+
+}  // namespace
+
+Result<ModalityPoses> adjust_model(Reconstruction model, const Session& session,
+                                   const std::vector<const FrameRecord*>& frames,
+                                   const PoseOptions& options) {
   const Lenses lenses = lens_groups(model, session);
   for (std::size_t v = 0; v < model.views.size(); ++v) {
     const LensGroup& lens = lenses.lenses[static_cast<std::size_t>(lenses.group[v])];
@@ -136,46 +184,6 @@ Result<ModalityPoses> adjusted(Reconstruction model, const Session& session,
   return poses;
 }
 
-/// The model of the other views.
-Reconstruction without(const Reconstruction& model, const std::vector<std::string>& names) {
-  Reconstruction rest;
-  rest.modality = model.modality;
-  std::vector<int> place;
-  for (const PosedView& view : model.views) {
-    const bool kept = std::find(names.begin(), names.end(), view.name) == names.end();
-    place.push_back(kept ? static_cast<int>(rest.views.size()) : -1);
-    if (kept) rest.views.push_back(view);
-  }
-  for (const SparsePoint& point : model.points) {
-    SparsePoint kept = point;
-    std::erase_if(kept.track, [&](const Observation& o) {
-      return place[static_cast<std::size_t>(o.view)] < 0;
-    });
-    for (Observation& o : kept.track) o.view = place[static_cast<std::size_t>(o.view)];
-    if (kept.track.size() >= 2) rest.points.push_back(std::move(kept));
-  }
-  return rest;
-}
-
-/// Views folded onto another side of a near-symmetric scene leave a model, and are named.
-Status drop_contradicting(const Session& session, const std::vector<const FrameRecord*>& frames,
-                          const PoseOptions& options, ModalityPoses& poses) {
-  const StationFit fit = fit_stations(poses.reconstruction.views, session);
-  if (fit.contradicting.empty() ||
-      static_cast<double>(fit.contradicting.size()) > max_contradicting * fit.views)
-    return {};
-  ORBITFUSE_ASSIGN(
-      poses, adjusted(without(poses.reconstruction, fit.contradicting), session, frames, options));
-  for (DroppedView& view : poses.dropped)
-    if (std::find(fit.contradicting.begin(), fit.contradicting.end(), view.name) !=
-        fit.contradicting.end())
-      view.why =
-          "its matches place it far from its station, as another side that looks alike would";
-  return {};
-}
-
-}  // namespace
-
 tl::unexpected<Error> none_held(const std::vector<LadderStep>& steps, Modality modality) {
   std::string found;
   for (const LadderStep& step : steps)
@@ -203,11 +211,11 @@ bool passes_gates(ModalityPoses& poses, const Session& session, const PoseOption
   if (fit.views >= 3) {
     // Chord of the median residual, in radii.
     const double residual = 2 * std::sin(fit.median_residual_deg / 2 * std::numbers::pi / 180.0);
-    const double outliers = static_cast<double>(fit.contradicting.size()) / fit.views;
+    const double outliers = static_cast<double>(fit.outliers) / fit.views;
     poses.gates["station_residual_deg"] = fit.median_residual_deg;
     poses.gates["station_outlier_ratio"] = outliers;
     why += fmt::format(", {:.1f} deg from the stations in the median, {} of {} contradict them{}",
-                       fit.median_residual_deg, fit.contradicting.size(), fit.views,
+                       fit.median_residual_deg, fit.outliers, fit.views,
                        fit.mirrored ? " (which run the other way round)" : "");
     good = good && residual <= options.max_station_residual && outliers <= max_contradicting;
   }
@@ -227,8 +235,8 @@ Result<JudgedModel> judge_model(Reconstruction model, const Session& session,
                                 const std::vector<const FrameRecord*>& frames,
                                 const PoseOptions& options) {
   JudgedModel judged;
-  ORBITFUSE_ASSIGN(judged.poses, adjusted(std::move(model), session, frames, options));
-  ORBITFUSE_TRY(drop_contradicting(session, frames, options, judged.poses));
+  ORBITFUSE_ASSIGN(judged.poses, adjust_model(std::move(model), session, frames, options));
+  ORBITFUSE_TRY(drop_folded(session, frames, options, judged.poses));
   judged.believed = passes_gates(judged.poses, session, options, judged.why);
   return judged;
 }

@@ -24,9 +24,15 @@ struct JudgedModel {
   std::string why;  ///< the figures behind the verdict
 };
 
-/// How the ladder judges each model, which may come from elsewhere too: bundle adjustment with the
-/// session's lenses, then the gates. `frames` are all that could have been posed.
-/// Errors: those of adjust_bundle.
+/// Bundle adjustment with the session's lenses, in the canonical world. Errors: those of
+/// adjust_bundle.
+Result<ModalityPoses> adjust_model(Reconstruction model, const Session& session,
+                                   const std::vector<const FrameRecord*>& frames,
+                                   const PoseOptions& options);
+
+/// How the ladder judges each model, which may come from elsewhere too: adjusted, without
+/// the views that it folded onto another side than their stations', then the gates. `frames` are
+/// all that could have been posed. Errors: those of adjust_bundle; quality (too many folded).
 Result<JudgedModel> judge_model(Reconstruction model, const Session& session,
                                 const std::vector<const FrameRecord*>& frames,
                                 const PoseOptions& options);

@@ -85,6 +85,17 @@ struct Seen {
   std::vector<Eigen::Vector3d> center, direction;  ///< in the world
 };
 
+Seen seen_along(const FeatureGraph& graph, const PosedFrames& posed, const Features& features) {
+  Seen seen;
+  for (const auto& [f, i] : features) {
+    const Rigid3d world = posed.poses[at(f)]->inverse();
+    const Eigen::Vector3d ray = posed.cameras[at(f)].ray_of(graph.pixels[at(f)].col(i));
+    seen.center.push_back(world.translation);
+    seen.direction.push_back((world.rotation * ray).normalized());
+  }
+  return seen;
+}
+
 double error_px(const PosedFrames& posed, int frame, const Eigen::Vector3d& point,
                 const Eigen::Vector2d& pixel) {
   const double e =
@@ -103,14 +114,9 @@ Features agreeing(const FeatureGraph& graph, const PosedFrames& posed, const Fea
 
 std::optional<FeatureTrack> triangulated(const FeatureGraph& graph, const PosedFrames& posed,
                                          const Features& features, const TrackOptions& options) {
-  Seen seen;
   std::vector<Eigen::Vector3d> rays;
-  for (const auto& [f, i] : features) {
-    const Rigid3d world = posed.poses[at(f)]->inverse();
+  for (const auto& [f, i] : features)
     rays.push_back(posed.cameras[at(f)].ray_of(graph.pixels[at(f)].col(i)));
-    seen.center.push_back(world.translation);
-    seen.direction.push_back((world.rotation * rays.back()).normalized());
-  }
   FeatureTrack best;
   // Pairs of all in short tracks; of the first few in long ones, which hold many right pairs.
   const std::size_t tried = std::min<std::size_t>(features.size(), 8);
@@ -123,13 +129,8 @@ std::optional<FeatureTrack> triangulated(const FeatureGraph& graph, const PosedF
       if (kept.size() > best.features.size()) best = {*point, std::move(kept)};
     }
   if (best.features.size() < 2) return std::nullopt;
-  Seen of_kept;
-  for (std::size_t i = 0; i < features.size(); ++i)
-    if (std::find(best.features.begin(), best.features.end(), features[i]) != best.features.end()) {
-      of_kept.center.push_back(seen.center[i]);
-      of_kept.direction.push_back(seen.direction[i]);
-    }
-  const Eigen::Vector3d refined = nearest_point(of_kept.center, of_kept.direction);
+  const Seen seen = seen_along(graph, posed, best.features);
+  const Eigen::Vector3d refined = nearest_point(seen.center, seen.direction);
   Features kept = agreeing(graph, posed, features, refined, options.max_error_px);
   if (kept.size() >= best.features.size()) best = {refined, std::move(kept)};
   return best;
@@ -162,6 +163,19 @@ std::vector<FeatureTrack> triangulate_tracks(const FeatureGraph& graph, const Pa
   std::vector<FeatureTrack> tracks;
   for (auto& track : found)
     if (track) tracks.push_back(std::move(*track));
+  return tracks;
+}
+
+std::vector<FeatureTrack> without_frame(const FeatureGraph& graph, const PosedFrames& posed,
+                                        std::vector<FeatureTrack> tracks, int frame) {
+  std::erase_if(tracks, [&](FeatureTrack& track) {
+    if (std::erase_if(track.features, [&](const auto& seen) { return seen.first == frame; }) == 0)
+      return false;
+    if (track.features.size() < 2) return true;
+    const Seen seen = seen_along(graph, posed, track.features);
+    track.position = nearest_point(seen.center, seen.direction);
+    return !track.position.allFinite();
+  });
   return tracks;
 }
 

@@ -31,6 +31,10 @@ struct PosedFrames {
 std::vector<FeatureTrack> triangulate_tracks(const FeatureGraph& graph, const PairMatches& matches,
                                              const PosedFrames& posed, const TrackOptions& options);
 
+/// The tracks as the other frames alone place them; those that `frame` shared with one other go.
+std::vector<FeatureTrack> without_frame(const FeatureGraph& graph, const PosedFrames& posed,
+                                        std::vector<FeatureTrack> tracks, int frame);
+
 /// A point seen along two rays: nullopt where they meet at less than `min_angle_deg` or behind.
 std::optional<Eigen::Vector3d> meet(const Rigid3d& first, const Eigen::Vector3d& first_ray,
                                     const Rigid3d& second, const Eigen::Vector3d& second_ray,

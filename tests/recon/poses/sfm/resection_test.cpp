@@ -103,7 +103,8 @@ TEST(Resection, AFrameHeldByItsOwnLinesGoesWhereTheOthersHaveIt) {
     if (pair.first == 5 || pair.second == 5) list = guided_matches(scene.graph, pair, posed, 6);
   ASSERT_GT((camera_center(aside) - camera_center(right)).norm(), 0.02);
 
-  const auto found = resect_by_others(scene.graph, matches, posed, 5, {});
+  const auto found = resect_by_others(
+      scene.graph, triangulate_tracks(scene.graph, matches, posed, {}), posed, 5, {});
   ASSERT_TRUE(found);
   EXPECT_LT((camera_center(*found) - camera_center(right)).norm(), 0.01);
   EXPECT_LT(found->rotation.angularDistance(right.rotation), 0.003);
@@ -112,11 +113,32 @@ TEST(Resection, AFrameHeldByItsOwnLinesGoesWhereTheOthersHaveIt) {
 TEST(Resection, WithoutMatchesOfItsOwnAFrameStaysWhereItIs) {
   FeatureScene scene = described_scene();
   const PosedFrames posed = posed_but(scene, {});
-  const PairMatches matches = scene.graph.verified;
+  const auto tracks = triangulate_tracks(scene.graph, scene.graph.verified, posed, {});
   std::erase_if(scene.graph.proposed, [](const auto& entry) {
     return entry.first.first == 9 || entry.first.second == 9;
   });
-  EXPECT_FALSE(resect_by_others(scene.graph, matches, posed, 9, {}));
+  EXPECT_FALSE(resect_by_others(scene.graph, tracks, posed, 9, {}));
+}
+
+TEST(Tracks, OfTheOtherFramesAloneDoNotFollowTheOneLeftOut) {
+  const FeatureScene scene = described_scene();
+  const PosedFrames right = posed_but(scene, {});
+  const auto tracks = triangulate_tracks(scene.graph, scene.graph.verified, right, {});
+  PosedFrames aside = right;
+  aside.poses[5]->translation.x() += 0.3;
+  const auto others = without_frame(scene.graph, aside, tracks, 5);
+  ASSERT_FALSE(others.empty());
+  EXPECT_LT(others.size(), tracks.size()) << "tracks of two frames that are left with one";
+  for (const FeatureTrack& track : others) {
+    EXPECT_GE(track.features.size(), 2u);
+    for (const auto& [f, i] : track.features) {
+      EXPECT_NE(f, 5);
+      const auto v = static_cast<std::size_t>(f);
+      const Eigen::Vector2d pixel =
+          scene.graph.cameras[v].project(*right.poses[v] * track.position);
+      EXPECT_LT((pixel - scene.graph.pixels[v].col(i)).norm(), 4);
+    }
+  }
 }
 
 TEST(Tracks, TheRightPosesExplainMoreMatchesThanFoldedOnes) {
