@@ -5,7 +5,7 @@
 set -euo pipefail
 
 packages=(
-  g++ cmake ninja-build pkg-config git
+  g++ cmake ninja-build pkg-config git python3
   libeigen3-dev libceres-dev libopencv-dev libtbb-dev
   libcli11-dev nlohmann-json3-dev libtomlplusplus-dev libexpected-dev libfmt-dev libspdlog-dev
   libtiff-dev libpng-dev libjpeg-dev libcharls-dev libheif-dev libexiv2-dev libsqlite3-dev libxxhash-dev libnanoflann-dev

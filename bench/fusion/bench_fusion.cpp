@@ -6,7 +6,7 @@
 // bench_fusion --speed : wall and CPU time of methods and metrics, for the best instructions and
 // AVX2. bench_fusion --skipping : what each method skips on each pair, and what that loses.
 // bench_fusion --cross : constants of `best` chosen on half of the pairs, scored on the others.
-// bench_fusion --out DIR : with the first two also DIR/fusion.json and DIR/fusion.svg.
+// bench_fusion --out DIR : with the first two also DIR/fusion.json and DIR/curves/fusion_knobs.svg.
 #include <fmt/format.h>
 
 #include <cstdio>

@@ -10,7 +10,7 @@
 namespace orbitfuse::bench {
 
 /// The methods at their defaults beside the references, and with `knobs` every knob. `out`, if not
-/// empty: fusion.json (all rows) and fusion.svg (Qabf and Qcb against CPU time) there.
+/// empty: fusion.json (all rows) and curves/fusion_knobs.svg (Qabf and Qcb against CPU time) there.
 int sweep(const std::filesystem::path& folder, bool knobs, const std::filesystem::path& out);
 
 /// Wall and CPU milliseconds of every method and of the metrics, for the instruction set in use

@@ -86,7 +86,7 @@ void print(const Row& row) {
 
 Status write_reports(const std::filesystem::path& folder, const std::vector<Row>& rows) {
   ORBITFUSE_TRY(write_file_atomic(folder / "fusion.json", json(rows)));
-  return write_file_atomic(folder / "fusion.svg", svg(rows));
+  return write_file_atomic(folder / "curves" / "fusion_knobs.svg", svg(rows));
 }
 
 }  // namespace orbitfuse::bench

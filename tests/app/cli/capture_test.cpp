@@ -189,7 +189,7 @@ TEST(Capture, FilesPassedOverAreNamed) {
   cv::randu(image, 0, 255);
   ASSERT_TRUE(write_png(card / "a.png", image));
   std::filesystem::copy(card / "a.png", card / "b.png");
-  std::ofstream(card / "c.heic") << "x";
+  std::ofstream(card / "c.webp") << "x";
   const std::vector<std::string> words = {"capture",   temp.path() / "s",
                                           "--visible", "stills:" + card.string() + ",existing=yes",
                                           "--seconds", "2.5",
@@ -197,7 +197,7 @@ TEST(Capture, FilesPassedOverAreNamed) {
   const Outcome outcome = orbitfuse_program(words);
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   for (const std::string& text : {outcome.err, outcome.out})
-    EXPECT_THAT(text, testing::AllOf(HasSubstr("passed over"), HasSubstr("c.heic: not a JPEG")));
+    EXPECT_THAT(text, testing::AllOf(HasSubstr("passed over"), HasSubstr("c.webp: not a JPEG")));
   EXPECT_THAT(outcome.out, testing::AllOf(HasSubstr("visible0: 2 files passed over"),
                                           HasSubstr("b.png: the same image")));
   EXPECT_THAT(outcome.err, HasSubstr("stills, camera known from its first photo"));

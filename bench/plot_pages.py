@@ -1,0 +1,490 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Draws each benchmark page's plot from the page's own table: docs/benchmarks/PAGE.svg.
+
+python3 bench/plot_pages.py            # draws all
+python3 bench/plot_pages.py --check    # exit code 1, and names, where a plot is not its table's
+"""
+import math
+import re
+import sys
+import textwrap
+from dataclasses import dataclass
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+PAGES = Path(__file__).resolve().parent.parent / "docs" / "benchmarks"
+
+# GitHub shows a page's images about this wide: one user unit is one pixel there.
+WIDTH = 700
+EDGE = 12
+FIRST, SECOND, ASKED, FRAME, GRID = "#2471a3", "#ca6f1e", "#c0392b", "#555555", "#e2e2e2"
+LEGEND_Y = 22
+PANEL_TOP = 44
+
+
+# ---- the page's tables ------------------------------------------------------------------------
+
+
+@dataclass
+class Table:
+    heads: list
+    rows: list
+    first_line: int  # of the rows, in the page
+
+    def column(self, start):
+        """Index of the first column whose head starts so; heads go on with units and a direction."""
+        for i, head in enumerate(self.heads):
+            if head.startswith(start):
+                return i
+        raise ValueError(f"no column '{start}' among {self.heads}")
+
+
+def cells_of(line):
+    return [plain(cell) for cell in line.strip().strip("|").split("|")]
+
+
+def plain(text):
+    return re.sub(r"[`*]", "", text).strip()
+
+
+def tables_of(page):
+    lines = page.splitlines()
+    tables = []
+    for i in range(len(lines) - 1):
+        if lines[i].startswith("|") and re.fullmatch(r"\|[-:| ]+\|", lines[i + 1].strip()):
+            end = i + 2
+            while end < len(lines) and lines[end].startswith("|"):
+                end += 1
+            tables.append(Table(cells_of(lines[i]), [cells_of(row) for row in lines[i + 2:end]], i + 2))
+    return tables
+
+
+def table_with(page, *starts):
+    """The page's first table that has columns whose heads start so."""
+    for table in tables_of(page):
+        if all(any(head.startswith(start) for head in table.heads) for start in starts):
+            if not all(len(row) == len(table.heads) for row in table.rows):
+                raise ValueError(f"rows and heads {table.heads} differ in length")
+            return table
+    raise ValueError(f"no table with columns {starts}")
+
+
+def numbers(cell):
+    return [float(n) for n in re.findall(r"[-+]?(?:\d+\.?\d*|\.\d+)", cell)]
+
+
+def number(cell):
+    """The first number, or None."""
+    return next(iter(numbers(cell)), None)
+
+
+# ---- drawing ----------------------------------------------------------------------------------
+
+
+def text_width(text):
+    """Of 12 px sans-serif, about: no font is at hand to ask."""
+    return 6.0 * len(text)
+
+
+class Drawing:
+    def __init__(self):
+        self.parts = []
+
+    def text(self, x, y, text, anchor="start", fill="#222222"):
+        self.parts.append(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{fill}">'
+                          f'{escape(text)}</text>')
+
+    def line(self, x1, y1, x2, y2, stroke=FRAME, dash=False):
+        dashes = ' stroke-dasharray="5 3"' if dash else ""
+        self.parts.append(f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" '
+                          f'stroke="{stroke}"{dashes}/>')
+
+    def bar(self, x1, x2, y, height, fill):
+        self.parts.append(f'<rect x="{min(x1, x2):.1f}" y="{y:.1f}" width="{abs(x2 - x1):.1f}" '
+                          f'height="{height}" fill="{fill}"/>')
+
+    def dot(self, x, y, color, ring=False):
+        fill = "#ffffff" if ring else color
+        self.parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4.5" fill="{fill}" '
+                          f'stroke="{color}" stroke-width="1.5"/>')
+
+    def turned_text(self, x, y, text):
+        self.parts.append(f'<text transform="translate({x:.1f} {y:.1f}) rotate(-90)" '
+                          f'text-anchor="middle" fill="#222222">{escape(text)}</text>')
+
+    def svg(self, height):
+        # A white panel of its own: black text stays readable on a dark page.
+        return "\n".join(
+            [f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{height:.0f}" '
+             f'viewBox="0 0 {WIDTH} {height:.0f}" font-family="sans-serif" font-size="12">',
+             f'<rect width="{WIDTH}" height="{height:.0f}" fill="#ffffff"/>'] + self.parts
+            + ["</svg>", ""])
+
+
+def short(value):
+    return f"{value:g}"
+
+
+@dataclass
+class Axis:
+    """From values to pixels; logarithmic where low is above 0 and so asked for."""
+    low: float
+    high: float
+    start: float
+    end: float
+    log: bool = False
+
+    def at(self, value):
+        if self.log:
+            share = math.log(max(value, self.low) / self.low) / math.log(self.high / self.low)
+        else:
+            share = (value - self.low) / (self.high - self.low)
+        return self.start + (self.end - self.start) * share
+
+    def ticks(self):
+        if self.log:
+            decades = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)
+            every = [m * 10.0 ** d for d in decades for m in (1, 2, 5)]
+            return [float(f"{t:.6g}") for t in every if self.low * 0.999 <= t <= self.high * 1.001]
+        step = round_step((self.high - self.low) / 5)
+        first, last = math.ceil(self.low / step - 1e-9), math.floor(self.high / step + 1e-9)
+        return [float(f"{i * step:.6g}") for i in range(first, last + 1)]
+
+
+def round_step(least):
+    """The least of 1, 2, 5 times a power of ten that is not below."""
+    power = 10.0 ** math.floor(math.log10(least))
+    return next(m * power for m in (1, 2, 5, 10) if m * power >= least * 0.999)
+
+
+def from_zero(values, start, end):
+    return Axis(0.0, max(values) * 1.05, start, end)
+
+
+def logarithmic(values, start, end):
+    """From one 1, 2 or 5 to another round the values; what is 0 lies on the low end."""
+    least = min((v for v in values if v > 0), default=0.01)
+    return Axis(round_down(least), round_step(max(values)), start, end, log=True)
+
+
+def round_down(value):
+    return float(f"{1 / round_step(1 / value):.6g}")
+
+
+def frame_below(drawing, axis, top, bottom, label):
+    """Grid, ticks and label of an axis that runs to the right."""
+    for tick in axis.ticks():
+        drawing.line(axis.at(tick), top, axis.at(tick), bottom, GRID)
+        drawing.text(axis.at(tick), bottom + 16, short(tick), "middle")
+    drawing.line(axis.start, bottom, axis.end, bottom)
+    drawing.text((axis.start + axis.end) / 2, bottom + 34, label, "middle")
+
+
+def frame_left(drawing, axis, left, right, label, label_x):
+    """The same of one that runs upwards."""
+    for tick in axis.ticks():
+        drawing.line(left, axis.at(tick), right, axis.at(tick), GRID)
+        drawing.text(left - 6, axis.at(tick) + 4, short(tick), "end")
+    drawing.line(left, axis.start, left, axis.end)
+    drawing.turned_text(label_x, (axis.start + axis.end) / 2, label)
+
+
+def legend(drawing, x, entries):
+    """Entries of a kind (bar, dot, ring, line), a colour and a text, one after the other."""
+    for kind, color, text in entries:
+        if kind == "bar":
+            drawing.bar(x, x + 14, LEGEND_Y - 10, 11, color)
+        elif kind == "line":
+            drawing.line(x, LEGEND_Y - 4, x + 16, LEGEND_Y - 4, color, dash=True)
+        else:
+            drawing.dot(x + 8, LEGEND_Y - 4, color, ring=kind == "ring")
+        drawing.text(x + 20, LEGEND_Y, text)
+        x += 20 + text_width(text) + 14
+
+
+def row_label(drawing, right, middle, lines):
+    for i, line in enumerate(lines):
+        drawing.text(right, middle + 4 + 14 * (i - (len(lines) - 1) / 2), line, "end")
+
+
+def overlap(a, b):
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+def label_points(drawing, points, area, written=()):
+    """Writes each point's text beside it: the first place that covers no point and no text."""
+    taken = [(x - 6, y - 6, x + 6, y + 6) for x, y, _ in points] + list(written)
+    for x, y, text in points:
+        wide = text_width(text)
+        places = [(x + 9, y + 4), (x - 9 - wide, y + 4), (x - wide / 2, y - 10), (x - wide / 2, y + 20),
+                  (x + 6, y - 10), (x + 6, y + 20), (x - 6 - wide, y - 10), (x - 6 - wide, y + 20)]
+        boxes = [(px, py - 11, px + wide, py + 3) for px, py in places]
+        free = [i for i, box in enumerate(boxes)
+                if box[0] >= area[0] and box[2] <= area[2] and box[1] >= area[1]
+                and box[3] <= area[3] and not any(overlap(box, other) for other in taken)]
+        best = free[0] if free else 0
+        taken.append(boxes[best])
+        drawing.text(places[best][0], places[best][1], text)
+
+
+# ---- a page's plot ----------------------------------------------------------------------------
+
+
+def seconds(cell):
+    minutes = re.search(r"([\d.]+) min (\d+)", cell)
+    return 60 * float(minutes[1]) + float(minutes[2]) if minutes else number(cell)
+
+
+def draw_run(page):
+    """A row a stage, a bar a session, what the stage's error is beside its bar."""
+    table = table_with(page, "stage")
+    sessions = [(i, head[:head.index(", s")]) for i, head in enumerate(table.heads) if ", s" in head]
+    stages = [row for row in table.rows if row[0] != "all"]
+    whole = [row for row in table.rows if row[0] == "all"]
+    left, bar, row_height = 168, 15, 42
+    # What follows a semicolon in the table is too long to stand beside a bar.
+    texts = {(r, i): f"{row[i]} s" + (f", {row[i + 1].split(';')[0]}" if row[i + 1] else "")
+             for r, row in enumerate(stages) for i, _ in sessions if seconds(row[i]) is not None}
+    # As many pixels a second as leave room for the text behind each bar.
+    per_second = min((WIDTH - EDGE - 6 - left - text_width(text)) / max(seconds(stages[r][i]), 1)
+                     for (r, i), text in texts.items())
+    longest = max(seconds(stages[r][i]) for r, i in texts)
+    axis = Axis(0, longest, left, left + per_second * longest)
+    drawing = Drawing()
+    bottom = PANEL_TOP + row_height * len(stages)
+    frame_below(drawing, axis, PANEL_TOP, bottom, "wall seconds (lower is better)")
+    entries = []
+    for color, (i, name) in zip((FIRST, SECOND), sessions):
+        total = f", all: {whole[0][i]}" if whole else ""
+        entries.append(("bar", color, f"{name}{total}"))
+    legend(drawing, left, entries)
+    for r, row in enumerate(stages):
+        y = PANEL_TOP + row_height * r + 5
+        row_label(drawing, left - 8, y + bar, textwrap.wrap(row[0], 24))
+        for k, (i, _) in enumerate(sessions):
+            if (r, i) in texts:
+                end = axis.at(seconds(row[i]))
+                drawing.bar(left, end, y + k * (bar + 1), bar, (FIRST, SECOND)[k % 2])
+                drawing.text(end + 6, y + k * (bar + 1) + 12, texts[r, i])
+    return drawing.svg(bottom + 46)
+
+
+def draw_registration(page):
+    """CPU time against the error of rotation, a point a level."""
+    table = table_with(page, "level", "success", "rotation", "CPU ms")
+    right, rotation, time = (table.column(c) for c in ("success", "rotation", "CPU ms"))
+    rows = [row for row in table.rows
+            if number(row[rotation]) is not None and number(row[time]) is not None]
+    left, bottom = 70, 380
+    across = from_zero([number(row[time]) for row in rows], left, WIDTH - 30)
+    upwards = logarithmic([number(row[rotation]) for row in rows], bottom, PANEL_TOP)
+    drawing = Drawing()
+    frame_below(drawing, across, PANEL_TOP, bottom, "CPU ms, median (lower is better)")
+    frame_left(drawing, upwards, left, WIDTH - 30,
+               "rotation error of right answers, deg, median (lower is better), log", 24)
+    legend(drawing, left, [("dot", FIRST, "a level, with its right answers")])
+    points = []
+    for row in rows:
+        x, y = across.at(number(row[time])), upwards.at(number(row[rotation]))
+        drawing.dot(x, y, FIRST)
+        points.append((x, y, f"{row[0]}: {row[right].split()[0]}"))
+    label_points(drawing, points, (left, PANEL_TOP - 8, WIDTH, bottom))
+    return drawing.svg(bottom + 46)
+
+
+def error_panel(drawing, cells, middles, axis, bottom, asked, label):
+    """A row's usual error as a dot and its worst as a ring; a line at what is asked."""
+    frame_below(drawing, axis, PANEL_TOP, bottom, label)
+    drawing.line(axis.at(asked), PANEL_TOP, axis.at(asked), bottom, ASKED, dash=True)
+    for cell, y in zip(cells, middles):
+        found = numbers(cell)
+        if not found:
+            drawing.text(axis.start + 6, y + 4, cell or "-")
+            continue
+        drawing.line(axis.at(found[0]), y, axis.at(found[-1]), y, FIRST)
+        drawing.dot(axis.at(found[-1]), y, FIRST, ring=True)
+        drawing.dot(axis.at(found[0]), y, FIRST)
+
+
+def error_axis(cells, asked, start, end):
+    """From 0; logarithmic where small errors would lie on one heap."""
+    values = [asked] + [v for cell in cells for v in numbers(cell)]
+    if max(values) > 15 * min(values):
+        return logarithmic(values, start, end)
+    return from_zero(values, start, end)
+
+
+def draw_poses(page):
+    """A row a scene: its centres' and its rotations' errors, CPU seconds at the right."""
+    table = table_with(page, "scene", "centres", "rotation", "CPU s")
+    scene, centres, rotation, time = (
+        table.column(c) for c in ("scene", "centres", "rotation", "CPU s"))
+    posed = next((i for i, head in enumerate(table.heads) if head in ("posed", "now")), None)
+    names = [row[scene] + (f", {row[posed]}" if posed is not None else "") for row in table.rows]
+    labels = [textwrap.wrap(name, 26) for name in names]
+    middles, y = [], PANEL_TOP
+    for lines in labels:
+        high = max(28, 14 * len(lines) + 8)
+        middles.append(y + high / 2)
+        y += high
+    drawing = Drawing()
+    legend(drawing, 184, [("dot", FIRST, "centres: RMS, rotation: mean"), ("ring", FIRST, "worst view"),
+                          ("line", ASKED, "1 % and 1 deg")])
+    panels = ((centres, 184, 390, "centres, %"), (rotation, 432, 638, "rotation, deg"))
+    for column, start, end, unit in panels:
+        cells = [row[column] for row in table.rows]
+        axis = error_axis(cells, 1.0, start, end)
+        label = f"{unit} (lower is better)" + (", log" if axis.log else "")
+        error_panel(drawing, cells, middles, axis, y, 1.0, label)
+    drawing.text(WIDTH - EDGE, PANEL_TOP - 6, "CPU s", "end")
+    for row, lines, middle in zip(table.rows, labels, middles):
+        row_label(drawing, 174, middle, lines)
+        drawing.text(WIDTH - EDGE, middle + 4, row[time].split()[0] if row[time] else "-", "end")
+    return drawing.svg(y + 46)
+
+
+def quality_panel(drawing, table, column, left, right, bottom):
+    time = table.column("CPU ms")
+    timed = [row for row in table.rows if number(row[time]) is not None]
+    values = [number(row[column]) for row in table.rows if number(row[column]) is not None]
+    across = from_zero([number(row[time]) for row in timed], left, right)
+    low, high = min(values), max(values)
+    upwards = Axis(low - 0.08 * (high - low), high + 0.08 * (high - low), bottom, PANEL_TOP)
+    frame_below(drawing, across, PANEL_TOP, bottom, "CPU ms (lower is better)")
+    frame_left(drawing, upwards, left, right, f"{table.heads[column].split()[0]} (higher is better)",
+               left - 44)
+    points, written = [], []
+    for row in table.rows:
+        quality = number(row[column])
+        if quality is None:
+            continue
+        y = upwards.at(quality)
+        if row in timed:
+            drawing.dot(across.at(number(row[time])), y, FIRST)
+            points.append((across.at(number(row[time])), y, row[0]))
+        else:
+            drawing.line(left, y, right, y, SECOND, dash=True)
+            name = row[0].removeprefix("reference ")
+            drawing.text(left + 4, y - 4, name, fill=SECOND)
+            written.append((left + 4, y - 15, left + 4 + text_width(name), y))
+    label_points(drawing, points, (left, PANEL_TOP - 8, right, bottom), written)
+
+
+def draw_fusion(page):
+    """CPU time against Qabf and Qcb; references without a time are lines."""
+    table = table_with(page, "method", "Qabf", "Qcb", "CPU ms")
+    drawing, bottom = Drawing(), 360
+    legend(drawing, 70, [("dot", FIRST, "ours"), ("line", SECOND, "reference's result, no time known")])
+    quality_panel(drawing, table, table.column("Qabf"), 70, 346, bottom)
+    quality_panel(drawing, table, table.column("Qcb"), 412, 688, bottom)
+    return drawing.svg(bottom + 46)
+
+
+def better_by(value, reference, head):
+    """Percent; the column's head says which way is better."""
+    if "higher" not in head and "lower" not in head:
+        raise ValueError(f"head '{head}' does not say which way is better")
+    return (100.0 if "higher" in head else -100.0) * (value / reference - 1.0)
+
+
+def draw_cnn_lpif(page):
+    """Percent better than the reference, metric by metric, and what is asked."""
+    table = table_with(page, "method", "Qabf", "Qcb", "Qcv", "SSIM")
+    rows = {row[0].split()[0].rstrip(","): row for row in table.rows}
+    metrics = [table.column(name) for name in ("Qabf", "Qcb", "Qcv", "SSIM")]
+    shares = {name: [better_by(number(rows[name][i]), number(rows["reference"][i]), table.heads[i])
+                     for i in metrics] for name in ("ours", "bar")}
+    values = shares["ours"] + shares["bar"] + [0.0]
+    pad = 0.12 * (max(values) - min(values))
+    room_for_text = 190
+    axis = Axis(min(values) - pad, max(values), 70, WIDTH - room_for_text)
+    drawing, row_height = Drawing(), 38
+    bottom = PANEL_TOP + row_height * len(metrics)
+    frame_below(drawing, axis, PANEL_TOP, bottom, "better than the reference by, % (higher is better)")
+    legend(drawing, 70, [("bar", FIRST, "ours"), ("line", ASKED, "asked")])
+    for k, i in enumerate(metrics):
+        y = PANEL_TOP + row_height * k
+        row_label(drawing, 60, y + row_height / 2, [table.heads[i].split()[0]])
+        end = axis.at(shares["ours"][k])
+        drawing.bar(axis.at(0), end, y + 10, 18, FIRST)
+        asked = axis.at(shares["bar"][k])
+        drawing.line(asked, y + 4, asked, y + row_height - 4, ASKED, dash=True)
+        drawing.text(max(end, axis.at(0), asked) + 6, y + row_height / 2 + 4,
+                     f'{shares["ours"][k]:+.1f} % ({rows["ours"][i]}, reference {rows["reference"][i]})')
+    drawing.line(axis.at(0), PANEL_TOP, axis.at(0), bottom)
+    return drawing.svg(bottom + 46)
+
+
+def draw_capture(page):
+    """The ways of losing a camera: how soon it is told, how soon frames come again."""
+    table = table_with(page, "case", "told after", "back after")
+    told, back = table.column("told after"), table.column("back after")
+    left, bar, row_height = 190, 12, 34
+    limits = ((told, 0.5, FIRST), (back, 3.0, SECOND))
+    values = [number(row[i]) for row in table.rows for i in (told, back) if number(row[i]) is not None]
+    axis = from_zero(values + [limit for _, limit, _ in limits], left, WIDTH - 40)
+    drawing, bottom = Drawing(), PANEL_TOP + row_height * len(table.rows)
+    frame_below(drawing, axis, PANEL_TOP, bottom, "seconds, the worst of each case (lower is better)")
+    legend(drawing, left - 60, [("bar", FIRST, "told"), ("bar", SECOND, "back after its return"),
+                                 ("line", ASKED, "asked: told in 0.5 s, back in 3 s")])
+    for _, limit, _ in limits:
+        drawing.line(axis.at(limit), PANEL_TOP, axis.at(limit), bottom, ASKED, dash=True)
+    for r, row in enumerate(table.rows):
+        y = PANEL_TOP + row_height * r + 5
+        row_label(drawing, left - 8, y + bar, textwrap.wrap(row[0], 28))
+        for k, (i, _, color) in enumerate(limits):
+            if number(row[i]) is None:
+                continue
+            end = axis.at(number(row[i]))
+            drawing.bar(left, end, y + k * bar, bar, color)
+            beyond = [axis.at(limit) for _, limit, _ in limits if 0 <= axis.at(limit) - end < 40]
+            drawing.text(max([end] + beyond) + 6, y + k * bar + 10, f"{row[i]} s")
+    return drawing.svg(bottom + 46)
+
+
+@dataclass
+class Plot:
+    draw: object
+    heads: tuple  # starts of its table's heads
+    shown: tuple  # starts of the heads whose figures are drawn
+    rows: str = ""  # a pattern of the first cells of the rows that are drawn; all without one
+
+
+POSES = Plot(draw_poses, ("scene", "centres", "rotation", "CPU s"), ("centres", "rotation", "CPU s"))
+PLOTS = {
+    "run": Plot(draw_run, ("stage",), ("container", "error", "car"), rows="(?!all)"),
+    "registration": Plot(draw_registration, ("level", "success", "rotation", "CPU ms"),
+                         ("success", "rotation", "CPU ms")),
+    "poses": POSES,
+    "poses_visible": POSES,
+    "fusion": Plot(draw_fusion, ("method", "Qabf", "Qcb", "CPU ms"), ("Qabf", "Qcb", "CPU ms")),
+    "cnn_lpif": Plot(draw_cnn_lpif, ("method", "Qabf", "Qcb", "Qcv", "SSIM"),
+                     ("Qabf", "Qcb", "Qcv", "SSIM"), rows="reference|bar|ours"),
+    "capture": Plot(draw_capture, ("case", "told after", "back after"), ("told after", "back after")),
+}
+
+
+def main(arguments):
+    if arguments not in ([], ["--check"]):
+        print(__doc__.strip(), file=sys.stderr)
+        return 2
+    stale = []
+    for name, plot in PLOTS.items():
+        target = PAGES / f"{name}.svg"
+        try:
+            svg = plot.draw((PAGES / f"{name}.md").read_text(encoding="utf-8"))
+            if not arguments:
+                target.write_text(svg, encoding="utf-8")
+            elif not target.exists() or target.read_text(encoding="utf-8") != svg:
+                stale.append(target)
+        except (OSError, ValueError) as error:
+            print(f"{name}.md: {error}", file=sys.stderr)
+            return 3
+    for target in stale:
+        print(f"{target}: not its page's table; draw it with bench/plot_pages.py", file=sys.stderr)
+    return 1 if stale else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
