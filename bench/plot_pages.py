@@ -9,7 +9,7 @@ import math
 import re
 import sys
 import textwrap
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.sax.saxutils import escape
 
@@ -315,7 +315,7 @@ def error_axis(cells, asked, start, end):
     return from_zero(values, start, end)
 
 
-def draw_poses(page):
+def draw_poses(page, bars=(1.0, 1.0)):
     """A row a scene: its centres' and its rotations' errors, CPU seconds at the right."""
     table = table_with(page, "scene", "centres", "rotation", "CPU s")
     scene, centres, rotation, time = (
@@ -330,13 +330,14 @@ def draw_poses(page):
         y += high
     drawing = Drawing()
     legend(drawing, 184, [("dot", FIRST, "centres: RMS, rotation: mean"), ("ring", FIRST, "worst view"),
-                          ("line", ASKED, "1 % and 1 deg")])
-    panels = ((centres, 184, 390, "centres, %"), (rotation, 432, 638, "rotation, deg"))
-    for column, start, end, unit in panels:
+                          ("line", ASKED, f"bar: {bars[0]:g} %, {bars[1]:g} deg")])
+    panels = ((centres, 184, 390, "centres, %", bars[0]),
+              (rotation, 432, 638, "rotation, deg", bars[1]))
+    for column, start, end, unit, bar in panels:
         cells = [row[column] for row in table.rows]
-        axis = error_axis(cells, 1.0, start, end)
+        axis = error_axis(cells, bar, start, end)
         label = f"{unit} (lower is better)" + (", log" if axis.log else "")
-        error_panel(drawing, cells, middles, axis, y, 1.0, label)
+        error_panel(drawing, cells, middles, axis, y, bar, label)
     drawing.text(WIDTH - EDGE, PANEL_TOP - 6, "CPU s", "end")
     for row, lines, middle in zip(table.rows, labels, middles):
         row_label(drawing, 174, middle, lines)
@@ -452,12 +453,13 @@ class Plot:
 
 
 POSES = Plot(draw_poses, ("scene", "centres", "rotation", "CPU s"), ("centres", "rotation", "CPU s"))
+VISIBLE_BARS = (0.1, 0.15)
 PLOTS = {
     "run": Plot(draw_run, ("stage",), ("container", "error", "car"), rows="(?!all)"),
     "registration": Plot(draw_registration, ("level", "success", "rotation", "CPU ms"),
                          ("success", "rotation", "CPU ms")),
     "poses": POSES,
-    "poses_visible": POSES,
+    "poses_visible": replace(POSES, draw=lambda page: draw_poses(page, VISIBLE_BARS)),
     "fusion": Plot(draw_fusion, ("method", "Qabf", "Qcb", "CPU ms"), ("Qabf", "Qcb", "CPU ms")),
     "cnn_lpif": Plot(draw_cnn_lpif, ("method", "Qabf", "Qcb", "Qcv", "SSIM"),
                      ("Qabf", "Qcb", "Qcv", "SSIM"), rows="reference|bar|ours"),
