@@ -207,7 +207,8 @@ class VisibleLadder {
   }
 
   /// The mapper's default settings, then ever more relaxed ones until a model is believed. A
-  /// relaxed model may have followed a repeated pillar: the global mapper is asked as well then.
+  /// relaxed model that holds few of the verified matches may have followed a repeated pillar: the
+  /// global mapper is asked as well then.
   Status try_mapper(FeatureLevel& level, const std::string& name) {
     bool relaxed = false;
     for (const MapperSettings& settings : mapper_ladder()) {
@@ -225,16 +226,25 @@ class VisibleLadder {
     const std::string attempt = "global mapper, " + name.substr(name.find(", ") + 2);
     tell(2, attempt);
     ORBITFUSE_ASSIGN(FeatureGraph graph, level.graph());
+    // Of matches that two views alone agree on, `sedan`'s relaxed model held .98, that of a walled
+    // yard, with views on a wrong side, .89.
+    constexpr double plainly_right = 0.95;
+    if (best_ &&
+        held_share(graph, posed_frames(graph, best_->poses.reconstruction)) > plainly_right)
+      return {};
     const Adjuster adjust = [&](Reconstruction model) -> Result<Reconstruction> {
       ORBITFUSE_ASSIGN(ModalityPoses poses,
                        adjust_model(std::move(model), session_, frames_, level.options()));
       return std::move(poses.reconstruction);
     };
     ORBITFUSE_ASSIGN(GlobalModel global, map_globally(graph, adjust, {}, progress_));
+    // On the views of both: more views explain more matches, right or not.
     const Better explains_more = [&](const Reconstruction& model, const Reconstruction& best) {
+      PosedFrames ours = posed_frames(graph, model), colmaps = posed_frames(graph, best);
+      for (std::size_t f = 0; f < ours.poses.size(); ++f)
+        if (!ours.poses[f] || !colmaps.poses[f]) ours.poses[f].reset(), colmaps.poses[f].reset();
       return model.views.size() >= best.views.size() &&
-             explained_matches(graph, posed_frames(graph, model)) >
-                 explained_matches(graph, posed_frames(graph, best));
+             explained_matches(graph, ours) > explained_matches(graph, colmaps);
     };
     consider(attempt, global.found, std::move(global.model), level.options(), explains_more);
     return {};

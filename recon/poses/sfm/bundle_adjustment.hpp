@@ -27,8 +27,9 @@ struct BundleOptions {
   int min_observations = 15;
   /// Points whose rays meet at less than this carry no depth and are dropped.
   double min_triangulation_angle_deg = 1.0;
-  /// Prior of the principal point about the image centre, share of the width.
-  double principal_point_sigma = 0.02;
+  /// Prior of the principal point about the image centre, share of the width: lenses are off by up
+  /// to about a hundredth. Looser, a poorly held scene trades it for a common turn of all cameras.
+  double principal_point_sigma = 0.01;
   int max_iterations = 60;
 };
 

@@ -189,6 +189,18 @@ int explained_matches(const FeatureGraph& graph, const PosedFrames& posed) {
   return explained;
 }
 
+double held_share(const FeatureGraph& graph, const PosedFrames& posed) {
+  std::size_t all = 0, held = 0;
+  for (const auto& [pair, matches] : graph.verified) {
+    if (!posed.poses[at(pair.first)] || !posed.poses[at(pair.second)]) continue;
+    const EpipolarBand band =
+        epipolar_band(graph, pair, posed, TrackOptions{}.max_error_px * graph.pixel_scale);
+    all += matches.size();
+    for (const auto& [i, j] : matches) held += band.distance(i, j) <= band.half_width;
+  }
+  return all == 0 ? 1 : static_cast<double>(held) / static_cast<double>(all);
+}
+
 Reconstruction reconstruction_of(const FeatureGraph& graph, const PosedFrames& posed,
                                  const std::vector<FeatureTrack>& tracks, Modality modality) {
   Reconstruction model;

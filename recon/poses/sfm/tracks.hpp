@@ -43,6 +43,9 @@ std::optional<Eigen::Vector3d> meet(const Rigid3d& first, const Eigen::Vector3d&
 /// How many of `graph.proposed` the poses can mean, as tracks: features but one of each.
 int explained_matches(const FeatureGraph& graph, const PosedFrames& posed);
 
+/// Share of the matches that two-view geometry held, between posed frames, which their poses hold.
+double held_share(const FeatureGraph& graph, const PosedFrames& posed);
+
 /// Frames and tracks as views and points; frames without a pose are left out.
 Reconstruction reconstruction_of(const FeatureGraph& graph, const PosedFrames& posed,
                                  const std::vector<FeatureTrack>& tracks, Modality modality);
