@@ -12,6 +12,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/image/image_codec.hpp"
+#include "core/image/jpeg_size.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -79,6 +80,14 @@ bool decode(std::string_view bytes, jpeg_decompress_struct& info, JpegErrors& er
   return true;
 }
 
+/// As plain as decode(), for the same reason.
+bool read_size(std::string_view bytes, jpeg_decompress_struct& info, JpegErrors& errors) {
+  if (setjmp(errors.jump)) return false;
+  jpeg_create_decompress(&info);
+  jpeg_mem_src(&info, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
+  return jpeg_read_header(&info, TRUE) == JPEG_HEADER_OK;
+}
+
 /// Adobe writes CMYK inverted, so that K scales what is left of each ink.
 cv::Mat bgr_of_inverted_cmyk(const cv::Mat& cmyk) {
   cv::Mat out(cmyk.size(), CV_8UC3);
@@ -94,6 +103,20 @@ cv::Mat bgr_of_inverted_cmyk(const cv::Mat& cmyk) {
 }
 
 }  // namespace
+
+std::optional<cv::Size> jpeg_size(std::string_view bytes) {
+  if (bytes.empty()) return std::nullopt;
+  jpeg_decompress_struct info{};
+  JpegErrors errors{};
+  info.err = jpeg_std_error(&errors.base);
+  errors.base.error_exit = on_fatal;
+  errors.base.emit_message = on_message;
+  std::optional<cv::Size> size;
+  if (read_size(bytes, info, errors))
+    size.emplace(static_cast<int>(info.image_width), static_cast<int>(info.image_height));
+  jpeg_destroy_decompress(&info);
+  return size;
+}
 
 Result<cv::Mat> decode_jpeg(std::string_view bytes, const std::string& where) {
   jpeg_decompress_struct info{};

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/image/image_codec.hpp"
+#include "core/image/jpeg_size.hpp"
 
 namespace orbitfuse::network {
 namespace {
@@ -93,7 +94,6 @@ Status NetworkSource::start() {
     stop();
     return fail(ErrorKind::device, where, found, remedy);
   }
-  size_ = first->size;
   away_ = false;
   last_frame_ = Clock::now();
   return {};
@@ -101,11 +101,10 @@ Status NetworkSource::start() {
 
 void NetworkSource::stop() { feed_.reset(); }
 
-Delivery NetworkSource::lose(const std::string& why) {
+Delivery NetworkSource::lose(EventKind kind, const std::string& why) {
   away_ = true;
   rhythm_.interrupt();
-  return event_delivery(why == "no frame came" ? EventKind::stalled : EventKind::disconnected,
-                        why + "; opening it again");
+  return event_delivery(kind, why + "; opening it again");
 }
 
 std::optional<Delivery> NetworkSource::refused(const std::string& why) {
@@ -113,22 +112,34 @@ std::optional<Delivery> NetworkSource::refused(const std::string& why) {
   return event_delivery(EventKind::reopen_failed, why);
 }
 
-std::optional<Delivery> NetworkSource::opened(const FeedItem& item) {
-  refused_size_ = item.size != size_;
-  if (!refused_size_) return std::nullopt;
-  return refused(fmt::format("came back with {}x{}, the session's is {}x{}: set it as before",
-                             item.size.width, item.size.height, size_.width, size_.height));
+/// A camera that was set anew or turned. It may be set back, which only a new connection tells of
+/// every kind of stream; what came meanwhile is part of the outage.
+std::optional<Delivery> NetworkSource::of_another_size(const FeedItem& item, cv::Size size) {
+  refused_size_ = true;
+  feed_->reopen();
+  const std::string why =
+      fmt::format("a picture of {}x{}, the session's are {}x{}: set it as before", size.width,
+                  size.height, size_.width, size_.height);
+  if (away_) return refused(why);
+  Delivery delivery;
+  delivery.kind = Delivery::Kind::rejected;
+  next_id_ += static_cast<std::uint64_t>(item.skipped);
+  delivery.frame.id = next_id_++;
+  delivery.reason = why;
+  last_frame_ = item.at;
+  pending_.push_back(lose(EventKind::disconnected, why));
+  return delivery;
 }
 
 Delivery NetworkSource::frame_of(FeedItem item) {
-  // What nobody took in time is lost between two ids.
-  next_id_ += static_cast<std::uint64_t>(item.skipped);
   Delivery delivery;
   delivery.kind = Delivery::Kind::frame;
   Frame& frame = delivery.frame;
   if (away_) {
     const double outage_s = seconds(item.at - last_frame_);
-    const std::uint64_t cost = rhythm_.known() ? rhythm_.frames_in(outage_s) - 1 : 0;
+    // What nobody took in time before it lies in the same time.
+    const std::uint64_t cost = std::max(rhythm_.known() ? rhythm_.frames_in(outage_s) - 1 : 0,
+                                        static_cast<std::uint64_t>(item.skipped));
     next_id_ += cost;
     away_ = false;
     failure_.clear();
@@ -140,6 +151,8 @@ Delivery NetworkSource::frame_of(FeedItem item) {
     pending_.push_back(frame_of(std::move(item)));
     return event;
   }
+  // What nobody took in time is lost between two ids.
+  next_id_ += static_cast<std::uint64_t>(item.skipped);
   frame.id = next_id_++;
   last_frame_ = item.at;
   frame.host_time_ns = clock_.add(0, item.utc_ns).host_time_ns;
@@ -164,7 +177,7 @@ Delivery NetworkSource::frame_of(FeedItem item) {
                     frame.id, missing, late_frames_)));
   }
   const std::string_view bytes = item.jpeg;
-  const bool whole = bytes.size() > 4 && bytes.starts_with("\xff\xd8") &&
+  const bool whole = bytes.starts_with("\xff\xd8") && jpeg_size(bytes) &&
                      bytes.substr(0, bytes.find_last_not_of('\0') + 1).ends_with("\xff\xd9");
   if (!whole) {
     delivery.kind = Delivery::Kind::rejected;
@@ -173,6 +186,31 @@ Delivery NetworkSource::frame_of(FeedItem item) {
   }
   frame.encoded = std::move(item.jpeg);
   return delivery;
+}
+
+std::optional<Delivery> NetworkSource::delivery_of(FeedItem item) {
+  switch (item.kind) {
+    case FeedItem::Kind::opened:
+      refused_size_ = false;
+      break;
+    case FeedItem::Kind::refused:
+      return refused(item.why);
+    case FeedItem::Kind::closed:
+      if (!away_) return lose(EventKind::disconnected, item.why);
+      break;
+    case FeedItem::Kind::silent:
+      if (!away_) return lose(EventKind::stalled, item.why);
+      break;
+    case FeedItem::Kind::frame: {
+      if (refused_size_) break;
+      const std::optional<cv::Size> size =
+          item.jpeg.empty() ? item.image.size() : jpeg_size(item.jpeg);
+      if (size && size_.empty()) size_ = *size;
+      if (size && *size != size_) return of_another_size(item, *size);
+      return frame_of(std::move(item));
+    }
+  }
+  return std::nullopt;
 }
 
 Result<Delivery> NetworkSource::next(std::chrono::milliseconds timeout) {
@@ -186,42 +224,31 @@ Result<Delivery> NetworkSource::next(std::chrono::milliseconds timeout) {
                 "call start() first");
   std::optional<FeedItem> item = feed_->take(timeout);
   if (!item) return Delivery{};
-  std::optional<Delivery> delivery;
-  switch (item->kind) {
-    case FeedItem::Kind::opened:
-      delivery = opened(*item);
-      break;
-    case FeedItem::Kind::refused:
-      delivery = refused(item->why);
-      break;
-    case FeedItem::Kind::closed:
-      if (!away_) delivery = lose(item->why);
-      break;
-    case FeedItem::Kind::frame:
-      if (!refused_size_) delivery = frame_of(std::move(*item));
-      break;
-  }
-  return delivery ? std::move(*delivery) : Delivery{};
+  return delivery_of(std::move(*item)).value_or(Delivery{});
 }
 
 std::vector<Delivery> NetworkSource::unfinished() {
   std::vector<Delivery> list = std::exchange(pending_, {});
-  while (feed_) {
-    std::optional<FeedItem> item = feed_->take(std::chrono::milliseconds(0));
-    if (!item) break;
-    if (item->kind == FeedItem::Kind::frame && !refused_size_)
-      list.push_back(frame_of(std::move(*item)));
-    if (item->kind == FeedItem::Kind::closed && !away_) list.push_back(lose(item->why));
+  if (!feed_) return list;
+  const int skipped = feed_->close();
+  while (std::optional<FeedItem> item = feed_->take(std::chrono::milliseconds(0))) {
+    if (std::optional<Delivery> delivery = delivery_of(std::move(*item)))
+      list.push_back(std::move(*delivery));
     std::move(pending_.begin(), pending_.end(), std::back_inserter(list));
     pending_.clear();
   }
   const double quiet_s = seconds(Clock::now() - last_frame_);
   const bool gone = away_ || quiet_s > seconds(options_.feed.stall) / 2;
-  if (!gone || !rhythm_.known()) return list;
+  const std::uint64_t by_time = gone && rhythm_.known() ? rhythm_.frames_in(quiet_s) : 0;
+  const std::uint64_t missing = std::max(by_time, static_cast<std::uint64_t>(skipped));
+  if (missing == 0) return list;
   Delivery lost;
   lost.kind = Delivery::Kind::lost;
-  lost.frame.id = next_id_ + rhythm_.frames_in(quiet_s) - 1;
-  lost.reason = fmt::format("no frame for the last {:.1f} s, counted by time", quiet_s);
+  lost.frame.id = next_id_ + missing - 1;
+  lost.reason =
+      missing > by_time
+          ? fmt::format("{} frames at the end that came faster than they were stored", skipped)
+          : fmt::format("no frame for the last {:.1f} s, counted by time", quiet_s);
   list.push_back(std::move(lost));
   return list;
 }

@@ -42,15 +42,16 @@ class NetworkSource final : public FrameSource {
 
  private:
   using Clock = std::chrono::steady_clock;
-  std::optional<Delivery> opened(const FeedItem& item);
   std::optional<Delivery> refused(const std::string& why);
-  Delivery lose(const std::string& why);
+  Delivery lose(EventKind kind, const std::string& why);
+  std::optional<Delivery> delivery_of(FeedItem item);
+  std::optional<Delivery> of_another_size(const FeedItem& item, cv::Size size);
   Delivery frame_of(FeedItem item);
 
   NetworkOptions options_;
   std::unique_ptr<VideoFeed> feed_;
-  cv::Size size_;  ///< of the session; empty before the first connection
-  bool away_ = false, refused_size_ = false;
+  cv::Size size_;  ///< of the first frame, and so of all; empty before it
+  bool away_ = false, refused_size_ = false;  ///< the latter until the connection ends
   std::uint64_t next_id_ = 0;
   std::vector<Delivery> pending_;
   FrameRhythm rhythm_;

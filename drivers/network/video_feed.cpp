@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "drivers/network/video_feed.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <cstdlib>
+#include <exception>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 #include <thread>
@@ -19,22 +22,26 @@ struct VideoFeed::Shared {
   std::mutex mutex;
   std::condition_variable changed;
   std::deque<FeedItem> items;
-  bool over = false, ended = false;
+  bool over = false, ended = false, reopen = false;
   int skipped = 0;
+  std::size_t queued_bytes = 0;
 
   /// Frames that nobody takes are counted, not hoarded.
   void put(FeedItem item) {
     constexpr std::size_t most = 32;
     item.at = std::chrono::steady_clock::now();
     item.utc_ns = utc_now_ns();
+    const std::size_t bytes = item.bytes();
     const std::lock_guard lock(mutex);
+    if (over) return;
     if (item.kind == FeedItem::Kind::frame) {
-      if (items.size() >= most) {
+      if (items.size() >= most || queued_bytes + bytes > options.max_queued_bytes) {
         ++skipped;
         return;
       }
       item.skipped = std::exchange(skipped, 0);
     }
+    queued_bytes += bytes;
     items.push_back(std::move(item));
     changed.notify_all();
   }
@@ -46,6 +53,10 @@ struct VideoFeed::Shared {
   bool is_over() {
     const std::lock_guard lock(mutex);
     return over;
+  }
+  bool must_end() {
+    const std::lock_guard lock(mutex);
+    return over || std::exchange(reopen, false);
   }
 };
 
@@ -83,20 +94,25 @@ bool holds_jpegs(const cv::VideoCapture& capture) {
   return name.starts_with("mjp") || name == "jpeg";
 }
 
-/// Until the connection ends; returns why.
-std::string read_all(Shared& shared, cv::VideoCapture& capture) {
+/// Until the connection ends; returns what is to be told of that.
+FeedItem read_all(Shared& shared, cv::VideoCapture& capture) {
   // Photos of a stream of JPEGs are kept as they were sent.
   const bool jpegs = holds_jpegs(capture) && capture.set(cv::CAP_PROP_FORMAT, -1);
-  while (!shared.is_over()) {
+  FeedItem ending;
+  ending.kind = FeedItem::Kind::closed;
+  ending.why = "the stream ended or broke";
+  while (!shared.must_end()) {
     const auto asked = std::chrono::steady_clock::now();
     FeedItem item;
-    try {
-      if (!capture.read(item.image) || item.image.empty()) {
-        const bool silent = std::chrono::steady_clock::now() - asked >= shared.options.stall;
-        return silent ? "no frame came" : "the stream ended or broke";
-      }
-    } catch (const cv::Exception& error) {
-      return error.what();
+    if (!capture.read(item.image) || item.image.empty()) {
+      if (std::chrono::steady_clock::now() - asked < shared.options.stall) return ending;
+      ending.kind = FeedItem::Kind::silent;
+      ending.why = "no frame came";
+      return ending;
+    }
+    if (item.bytes() > shared.options.max_queued_bytes) {
+      ending.why = fmt::format("a frame of {} bytes came", item.bytes());
+      return ending;
     }
     if (jpegs) {
       item.jpeg.assign(reinterpret_cast<const char*>(item.image.data),
@@ -107,20 +123,33 @@ std::string read_all(Shared& shared, cv::VideoCapture& capture) {
     }
     shared.put(std::move(item));
   }
-  return {};
+  return ending;
+}
+
+void read_connection(Shared& shared, bool first) {
+  cv::VideoCapture capture;
+  if (!open(capture, shared.options, first))
+    return put(shared, FeedItem::Kind::refused, "no video can be had from it");
+  // OpenCV before 4.7 turns by it the wrong way round, and the JPEGs of a stream not at all.
+  if (const int turned = cvRound(capture.get(cv::CAP_PROP_ORIENTATION_META)); turned != 0) {
+    return put(shared, FeedItem::Kind::refused,
+               fmt::format("a video that is to be turned by {} degrees: send it upright", turned));
+  }
+  const cv::Size size(static_cast<int>(capture.get(cv::CAP_PROP_FRAME_WIDTH)),
+                      static_cast<int>(capture.get(cv::CAP_PROP_FRAME_HEIGHT)));
+  shared.must_end();  // what was asked of the connection before is done
+  put(shared, FeedItem::Kind::opened, {}, size);
+  shared.put(read_all(shared, capture));
 }
 
 void run(const std::shared_ptr<Shared>& shared) {
   bool first = true;
   while (!shared->is_over()) {
-    cv::VideoCapture capture;
-    if (open(capture, shared->options, std::exchange(first, false))) {
-      const cv::Size size(static_cast<int>(capture.get(cv::CAP_PROP_FRAME_WIDTH)),
-                          static_cast<int>(capture.get(cv::CAP_PROP_FRAME_HEIGHT)));
-      put(*shared, FeedItem::Kind::opened, {}, size);
-      put(*shared, FeedItem::Kind::closed, read_all(*shared, capture));
-    } else {
-      put(*shared, FeedItem::Kind::refused, "no video can be had from it");
+    // A thread has nobody to throw to: memory that ran out ends the connection, not the recording.
+    try {
+      read_connection(*shared, std::exchange(first, false));
+    } catch (const std::exception& error) {
+      put(*shared, FeedItem::Kind::closed, error.what());
     }
     if (!shared->pause()) break;
   }
@@ -150,12 +179,26 @@ VideoFeed::~VideoFeed() {
                             [&] { return shared_->ended; });
 }
 
+void VideoFeed::reopen() {
+  const std::lock_guard lock(shared_->mutex);
+  shared_->reopen = true;
+}
+
+int VideoFeed::close() {
+  const std::lock_guard lock(shared_->mutex);
+  shared_->over = true;
+  shared_->changed.notify_all();
+  return std::exchange(shared_->skipped, 0);
+}
+
 std::optional<FeedItem> VideoFeed::take(std::chrono::milliseconds timeout) {
   std::unique_lock lock(shared_->mutex);
-  if (!shared_->changed.wait_for(lock, timeout, [&] { return !shared_->items.empty(); }))
-    return std::nullopt;
-  FeedItem item = std::move(shared_->items.front());
-  shared_->items.pop_front();
+  std::deque<FeedItem>& items = shared_->items;
+  shared_->changed.wait_for(lock, timeout, [&] { return !items.empty() || shared_->over; });
+  if (items.empty()) return std::nullopt;
+  FeedItem item = std::move(items.front());
+  items.pop_front();
+  shared_->queued_bytes -= item.bytes();
   return item;
 }
 

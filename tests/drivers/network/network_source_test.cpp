@@ -121,8 +121,9 @@ class NetworkTest : public ::testing::Test {
     return o;
   }
   static Came drain(NetworkSource& source, const std::function<bool(const Came&)>& enough,
-                    std::chrono::seconds limit = 30s) {
+                    std::chrono::seconds limit = 30s, std::uint64_t next_id = 0) {
     Came came;
+    came.next_id = next_id;
     const auto end = Clock::now() + limit;
     while (Clock::now() < end && !enough(came)) {
       const Result<Delivery> delivery = source.next(100ms);
@@ -167,14 +168,15 @@ TEST_F(NetworkTest, AnEndedConnectionIsToldReopenedAndCostsItsTime) {
   Phone phone;
   NetworkSource source(options(phone.url()));
   ASSERT_TRUE(source.start());
-  drain(source, frames(15));
+  const std::uint64_t next = drain(source, frames(15)).next_id;
   phone.hang_up = true;
-  const Came came =
-      drain(source, [](const Came& c) { return c.has("reconnected") && c.frames.size() > 5; });
+  const Came came = drain(
+      source, [](const Came& c) { return c.has("reconnected") && c.frames.size() > 5; }, 30s, next);
   EXPECT_TRUE(came.has("disconnected"));
   EXPECT_TRUE(came.has("reconnected"));
   EXPECT_EQ(came.events.front(), "disconnected");
   EXPECT_TRUE(came.rising);
+  EXPECT_GE(came.gaps, 1u) << "50 ms and more at some 50 Hz";
   EXPECT_EQ(phone.connections, 2);
 }
 
@@ -252,8 +254,105 @@ TEST_F(NetworkTest, OneThatIsAwayAtTheEndIsCountedAndNobodyWaits) {
   const std::vector<Delivery> rest = source.unfinished();
   ASSERT_FALSE(rest.empty());
   EXPECT_EQ(rest.back().kind, Delivery::Kind::lost);
-  EXPECT_GE(rest.back().frame.id, came.next_id);
+  EXPECT_GE(rest.back().frame.id, came.next_id + 3) << "four attempts at some 50 Hz";
   source.stop();
+}
+
+TEST_F(NetworkTest, FramesThatNobodyTookAreLostByCount) {
+  Phone phone;
+  NetworkOptions o = options(phone.url());
+  o.feed.stall = 20s;  // nothing is counted by time
+  NetworkSource source(o);
+  ASSERT_TRUE(source.start());
+  while (phone.number < 70) std::this_thread::sleep_for(5ms);
+  Came came;
+  const std::vector<Delivery> rest = source.unfinished();
+  const int sent = phone.number;
+  for (const Delivery& d : rest) came.note(d);
+  ASSERT_FALSE(rest.empty());
+  EXPECT_EQ(came.frames.size(), 32u);
+  EXPECT_EQ(came.gaps, 0u);
+  ASSERT_EQ(rest.back().kind, Delivery::Kind::lost);
+  EXPECT_NEAR(static_cast<double>(rest.back().frame.id) + 1, sent, 15);
+  EXPECT_FALSE(source.next(0ms)->kind == Delivery::Kind::frame);
+}
+
+TEST_F(NetworkTest, NothingComesAfterTheEnd) {
+  Phone phone;
+  phone.part = [](int number, const auto& write) {  // as fast as the line
+    for (int i = 0; i < 50; ++i)
+      if (!Phone::whole(number, write)) return false;
+    return true;
+  };
+  VideoFeed feed(options(phone.url()).feed);
+  ASSERT_TRUE(feed.take(5s));
+  ASSERT_TRUE(feed.take(5s));
+  feed.close();
+  for (int i = 0; i < 33 && feed.take(0ms); ++i) {
+  }
+  std::this_thread::sleep_for(200ms);  // the reader may be within a frame
+  EXPECT_FALSE(feed.take(0ms));
+}
+
+TEST_F(NetworkTest, WhatNobodyTookBeforeAnOutageIsCountedOnce) {
+  Phone phone;
+  NetworkSource source(options(phone.url()));
+  ASSERT_TRUE(source.start());
+  while (phone.number < 150) std::this_thread::sleep_for(5ms);  // over 100 of them not taken
+  phone.hang_up = true;
+  while (phone.connections < 2) std::this_thread::sleep_for(5ms);
+  Came came = drain(source, [](const Came& c) { return c.has("reconnected") && c.gaps > 0; });
+  EXPECT_GE(came.next_id, 140u);
+  EXPECT_LE(came.next_id, static_cast<std::uint64_t>(phone.number) + 60) << "about 100 twice";
+}
+
+TEST_F(NetworkTest, WaitingFramesAreBoundedInBytes) {
+  Phone phone;
+  NetworkOptions o = options(phone.url());
+  o.feed.max_queued_bytes = 4 * jpeg_of(63).size();
+  o.feed.stall = 20s;
+  NetworkSource source(o);
+  ASSERT_TRUE(source.start());
+  while (phone.number < 40) std::this_thread::sleep_for(5ms);
+  Came came;
+  for (const Delivery& d : source.unfinished()) came.note(d);
+  EXPECT_GE(came.frames.size(), 2u);
+  EXPECT_LE(came.frames.size(), 5u);
+
+  o.feed.max_queued_bytes = 100;
+  NetworkSource small(o);
+  ASSERT_TRUE(small.start());
+  const Result<Delivery> refused = small.next(10s);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->reason, "disconnected");
+  EXPECT_THAT(refused->detail, HasSubstr("bytes came"));
+}
+
+TEST_F(NetworkTest, PicturesOfAnotherSizeAreRefusedByWordsUntilTheSizeIsBack) {
+  Phone phone;
+  std::atomic<bool> small{false};
+  phone.part = [&](int number, const auto& write) {
+    const std::string jpeg = jpeg_of(number, small ? cv::Size(32, 24) : cv::Size(64, 48));
+    return write(Phone::head(jpeg.size()) + jpeg + "\r\n");
+  };
+  NetworkSource source(options(phone.url()));
+  ASSERT_TRUE(source.start());
+  std::uint64_t next = drain(source, frames(15)).next_id;
+  small = true;
+  const Came odd = drain(
+      source, [](const Came& c) { return c.has("reopen-failed"); }, 30s, next);
+  EXPECT_EQ(odd.rejected, 1u);
+  EXPECT_TRUE(odd.has("disconnected"));
+  EXPECT_TRUE(odd.has("reopen-failed")) << "told once it lasts";
+  EXPECT_GE(phone.connections, 4);
+  small = false;
+  const Came back = drain(source, frames(5), 30s, odd.next_id);
+  EXPECT_TRUE(back.has("reconnected"));
+  EXPECT_GE(back.gaps, 1u);
+  for (const Came* came : {&odd, &back}) {
+    for (const Frame& frame : came->frames)
+      EXPECT_EQ(decode_jpeg(frame.encoded, "f")->size(), cv::Size(64, 48));
+  }
 }
 
 TEST_F(NetworkTest, WhatIsNoStreamIsRefusedInTimeAndSecretsStayUntold) {
