@@ -7,6 +7,7 @@
 
 #include "app/view/json_fields.hpp"
 #include "core/system/file_io.hpp"
+#include "core/system/folder_change_lock.hpp"
 
 namespace orbitfuse::view {
 using nlohmann::json;
@@ -39,7 +40,7 @@ Result<Bookmark> bookmark_of(const json& j) {
   return bookmark;
 }
 
-Result<std::vector<Bookmark>> Bookmarks::read() const {
+Result<std::vector<Bookmark>> Bookmarks::list() const {
   std::error_code unreadable;
   std::vector<Bookmark> list;
   if (!std::filesystem::exists(file_, unreadable)) return list;
@@ -67,14 +68,10 @@ Status Bookmarks::write(const std::vector<Bookmark>& list) const {
   return write_file_atomic(file_, json{{"schema", schema}, {"bookmarks", entries}}.dump(2) + "\n");
 }
 
-Result<std::vector<Bookmark>> Bookmarks::list() const {
-  const std::lock_guard lock(mutex_);
-  return read();
-}
-
 Status Bookmarks::add(const Bookmark& bookmark) {
-  const std::lock_guard lock(mutex_);
-  ORBITFUSE_ASSIGN(std::vector<Bookmark> list, read());
+  FolderChangeLock lock;
+  ORBITFUSE_TRY(lock.acquire(file_.parent_path()));
+  ORBITFUSE_ASSIGN(std::vector<Bookmark> list, this->list());
   if (std::any_of(list.begin(), list.end(),
                   [&](const Bookmark& b) { return b.name == bookmark.name; }))
     return fail(ErrorKind::usage, bookmark.name, "a view of this name is kept already",
@@ -87,8 +84,9 @@ Status Bookmarks::add(const Bookmark& bookmark) {
 }
 
 Status Bookmarks::remove(const std::string& name) {
-  const std::lock_guard lock(mutex_);
-  ORBITFUSE_ASSIGN(std::vector<Bookmark> list, read());
+  FolderChangeLock lock;
+  ORBITFUSE_TRY(lock.acquire(file_.parent_path()));
+  ORBITFUSE_ASSIGN(std::vector<Bookmark> list, this->list());
   const auto found =
       std::find_if(list.begin(), list.end(), [&](const Bookmark& b) { return b.name == name; });
   if (found == list.end())

@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <filesystem>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -24,7 +23,8 @@ nlohmann::json to_json(const Bookmark& bookmark);
 Result<Bookmark> bookmark_of(const nlohmann::json& j);
 
 /// OUT/bookmarks.json (docs/formats.md). Every call reads the file anew and writes it whole and
-/// atomically, so that two viewers of one run don't lose each other's.
+/// atomically; who changes it locks the folder, so that two viewers of one run, threads or
+/// processes, don't lose each other's.
 class Bookmarks {
  public:
   explicit Bookmarks(const std::filesystem::path& out) : file_(out / "bookmarks.json") {}
@@ -36,11 +36,9 @@ class Bookmarks {
   Status remove(const std::string& name);
 
  private:
-  Result<std::vector<Bookmark>> read() const;
   Status write(const std::vector<Bookmark>& list) const;
 
   std::filesystem::path file_;
-  mutable std::mutex mutex_;
 };
 
 }  // namespace orbitfuse::view

@@ -2,15 +2,19 @@
 #include "app/view/film.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <exception>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 
 #include "app/view/json_fields.hpp"
 #include "core/image/image_io.hpp"
 #include "core/option_range.hpp"
+#include "core/system/folder_change_lock.hpp"
 
 namespace orbitfuse::view {
 namespace fs = std::filesystem;
@@ -20,6 +24,9 @@ namespace {
 
 constexpr double radians_per_degree = 3.14159265358979323846 / 180;
 constexpr std::size_t most_pictures = 5000;
+/// A page's name is never empty (shot_request.cpp): none can end the film's jobs by its own.
+constexpr const char* film_client = "";
+constexpr std::chrono::milliseconds before_asking_again{100};
 
 /// Great circle from a to b (unit length), t in 0..1; any way round for opposite directions.
 Eigen::Vector3d between_directions(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double t) {
@@ -43,6 +50,29 @@ fs::path free_name(const fs::path& folder, const std::string& extension) {
     if (!fs::exists(folder / number, ignored) && !fs::exists(folder / (number + ".mp4"), ignored))
       return folder / (number + extension);
   }
+}
+
+/// Under the next free name. Two viewers of one run may finish at once.
+Result<fs::path> put_there(const fs::path& partial, const fs::path& folder,
+                           const std::string& extension) {
+  FolderChangeLock lock;
+  ORBITFUSE_TRY(lock.acquire(folder));
+  const fs::path finished = free_name(folder, extension);
+  std::error_code error;
+  fs::rename(partial, finished, error);
+  if (error)
+    return fail(ErrorKind::device, finished.string(), error.message(), "make room, and try again");
+  return finished;
+}
+
+/// cv::VideoWriter says nothing of a full disk.
+Status check_film(const fs::path& file, std::size_t pictures) {
+  cv::VideoCapture film(file.string(), cv::CAP_FFMPEG);
+  const double count = film.isOpened() ? film.get(cv::CAP_PROP_FRAME_COUNT) : 0;
+  if (count == static_cast<double>(pictures)) return {};
+  return fail(ErrorKind::device, file.parent_path().string(),
+              fmt::format("{:.0f} of {} pictures came to lie in the film", count, pictures),
+              "make room on that disk, and try again");
 }
 
 }  // namespace
@@ -134,13 +164,22 @@ Shot shot_of_bookmark(const Bookmark& from, const Eigen::Vector3d& up, int width
   return shot;
 }
 
-Result<cv::Mat> FilmMaker::picture(const FilmOrder& order, const Bookmark& from,
-                                   RenderTurns::Job& job) const {
+Result<cv::Mat> FilmMaker::picture(const FilmOrder& order, const Bookmark& from) const {
   const LayerWish wish{order.layer == FilmLayer::visible, order.layer == FilmLayer::thermal,
                        order.layer == FilmLayer::fused, 1};
-  ORBITFUSE_ASSIGN(
-      const Layers seen,
-      layers_.render(shot_of_bookmark(from, run_.up, order.width, order.height), wish, job));
+  const Shot shot = shot_of_bookmark(from, run_.up, order.width, order.height);
+  // A job a picture: none of them has waited longer than the viewers that came meanwhile. Where too
+  // many wait, the film waits until there are fewer.
+  const auto render = [&] {
+    RenderTurns::Job job(turns_, film_client, &over_);
+    return layers_.render(shot, wish, job);
+  };
+  Result<Layers> rendered = render();
+  while (!rendered && rendered.error().kind == ErrorKind::unavailable && !over_) {
+    std::this_thread::sleep_for(before_asking_again);
+    rendered = render();
+  }
+  ORBITFUSE_ASSIGN(const Layers seen, std::move(rendered));
   if (order.layer == FilmLayer::visible) return seen.visible;
   if (order.layer == FilmLayer::fused) return seen.fused;
   ORBITFUSE_ASSIGN(const cv::Mat colors, palette(order.palette));
@@ -154,19 +193,17 @@ Result<fs::path> FilmMaker::make(const FilmOrder& order, const std::vector<Bookm
   if (error)
     return fail(ErrorKind::device, folder.string(), error.message(), "make room, or check rights");
   const bool mp4 = order.kind == FilmKind::mp4;
-  const fs::path finished = free_name(folder, mp4 ? ".mp4" : "");
-  const Unfinished partial{folder / (mp4 ? ".partial.mp4" : ".partial")};
+  const std::string extension = mp4 ? ".mp4" : "";
+  const Unfinished partial{folder / fmt::format(".partial-{}{}", ::getpid(), extension)};
   fs::remove_all(partial.path, error);
   cv::VideoWriter writer;
   if (mp4 && !writer.open(partial.path.string(), cv::CAP_FFMPEG,
                           cv::VideoWriter::fourcc('a', 'v', 'c', '1'), order.fps,
                           {order.width, order.height}))
-    return fail(ErrorKind::unavailable, finished.string(), "no H.264 encoder here",
+    return fail(ErrorKind::unavailable, folder.string(), "no H.264 encoder here",
                 "make pictures instead");
   for (std::size_t i = 0; i < way.size(); ++i) {
-    // A job a picture: none of them has waited longer than the viewers that came meanwhile.
-    RenderTurns::Job job(turns_, "film", &over_);
-    ORBITFUSE_ASSIGN(const cv::Mat image, picture(order, way[i], job));
+    ORBITFUSE_ASSIGN(const cv::Mat image, picture(order, way[i]));
     if (mp4)
       writer.write(image);
     else
@@ -175,10 +212,18 @@ Result<fs::path> FilmMaker::make(const FilmOrder& order, const std::vector<Bookm
     done_ = i + 1;
   }
   writer.release();
-  fs::rename(partial.path, finished, error);
-  if (error)
-    return fail(ErrorKind::device, finished.string(), error.message(), "make room, and try again");
-  return finished;
+  if (mp4) ORBITFUSE_TRY(check_film(partial.path, way.size()));
+  return put_there(partial.path, folder, extension);
+}
+
+/// OpenCV and the standard library throw where memory is short; a thread that throws ends the
+/// viewer.
+Result<fs::path> FilmMaker::made(const FilmOrder& order, const std::vector<Bookmark>& way) {
+  try {
+    return make(order, way);
+  } catch (const std::exception& thrown) {
+    return fail(ErrorKind::device, "film", thrown.what(), "try again, or make a smaller one");
+  }
 }
 
 Status FilmMaker::begin(const FilmOrder& order, const std::vector<Bookmark>& bookmarks) {
@@ -202,22 +247,22 @@ Status FilmMaker::begin(const FilmOrder& order, const std::vector<Bookmark>& boo
   file_.clear();
   error_.clear();
   worker_ = std::thread([this, order, way = std::move(way)] {
-    const Result<fs::path> made = make(order, way);
+    const Result<fs::path> film = made(order, way);
     const std::lock_guard finished(mutex_);
     making_ = false;
-    if (made)
-      file_ = fs::absolute(*made).lexically_normal().string();
+    if (film)
+      file_ = fs::absolute(*film).lexically_normal().string();
     else
-      error_ = made.error().kind == ErrorKind::cancelled ? "stopped" : made.error().message();
+      error_ = film.error().kind == ErrorKind::cancelled ? "stopped" : film.error().message();
   });
   return {};
 }
 
 void FilmMaker::stop() {
-  over_ = true;
   std::thread ending;
   {
     const std::lock_guard lock(mutex_);
+    over_ = true;  // of the film whose thread is taken here: begin() makes it false again
     ending = std::move(worker_);
   }
   if (ending.joinable()) ending.join();

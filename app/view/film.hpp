@@ -56,8 +56,8 @@ class FilmMaker {
 
  private:
   Result<std::filesystem::path> make(const FilmOrder& order, const std::vector<Bookmark>& way);
-  Result<cv::Mat> picture(const FilmOrder& order, const Bookmark& from,
-                          RenderTurns::Job& job) const;
+  Result<std::filesystem::path> made(const FilmOrder& order, const std::vector<Bookmark>& way);
+  Result<cv::Mat> picture(const FilmOrder& order, const Bookmark& from) const;
 
   const FinishedRun& run_;
   LayerRenderer& layers_;

@@ -59,33 +59,29 @@ Result<json> Measuring::answer(const json& asked) {
 }
 
 Result<json> Measuring::add(const json& asked) {
-  const Status saved = in_turn([&]() -> Status {
+  return in_turn([&]() -> Result<json> {
     ORBITFUSE_ASSIGN(const measurement::Request request, measurement::request_of_json(asked));
     ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
     ORBITFUSE_ASSIGN(const measurement::Answer answer, measure(*scene, request, progress()));
     ORBITFUSE_TRY(measurement::add_measurement(
         run_.out / measurement::measurements_file, scene->identity(),
         {request.name, "", measurement::anchored(request, answer), to_json(answer)}));
-    return {};
+    return list();
   });
-  ORBITFUSE_TRY(saved);
-  return list();
 }
 
 Result<json> Measuring::list() {
-  return in_turn([&]() -> Result<json> {
-    ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
-    ORBITFUSE_ASSIGN(const measurement::Measurements saved,
-                     measurement::load_measurements(run_.out / measurement::measurements_file,
-                                                    scene->identity()));
-    json entries = json::array();
-    for (const measurement::SavedMeasurement& m : saved.list)
-      entries.push_back({{"name", m.name},
-                         {"created", m.created},
-                         {"request", to_json(m.request)},
-                         {"answer", m.answer}});
-    return entries;
-  });
+  ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
+  ORBITFUSE_ASSIGN(
+      const measurement::Measurements saved,
+      measurement::load_measurements(run_.out / measurement::measurements_file, scene->identity()));
+  json entries = json::array();
+  for (const measurement::SavedMeasurement& m : saved.list)
+    entries.push_back({{"name", m.name},
+                       {"created", m.created},
+                       {"request", to_json(m.request)},
+                       {"answer", m.answer}});
+  return entries;
 }
 
 }  // namespace orbitfuse::view

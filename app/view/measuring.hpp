@@ -25,9 +25,9 @@ class Measuring {
   Result<nlohmann::json> point_at(const Shot& shot, const Eigen::Vector2d& pixel);
   /// {"request", "answer"} of a request as docs/formats.md has it.
   Result<nlohmann::json> answer(const nlohmann::json& request);
-  /// Measured again and saved; then as list().
+  /// Measured again and saved; then as list(). Unavailable: nothing was saved.
   Result<nlohmann::json> add(const nlohmann::json& request);
-  /// [{"name", "created", "request", "answer"}]: what is saved.
+  /// [{"name", "created", "request", "answer"}]: what is saved. Never unavailable.
   Result<nlohmann::json> list();
   /// What is being measured ends soon.
   void close() { closed_ = true; }

@@ -59,6 +59,11 @@ void RenderTurns::close() {
   impl_->changed.notify_all();
 }
 
+std::size_t RenderTurns::waiting() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->waiting.size();
+}
+
 RenderTurns::Turn::~Turn() {
   if (turns_ == nullptr) return;
   const std::lock_guard lock(turns_->impl_->mutex);

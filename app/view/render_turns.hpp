@@ -53,6 +53,8 @@ class RenderTurns {
     std::atomic<bool> superseded_{false};
   };
 
+  /// How many jobs wait for their turn.
+  std::size_t waiting() const;
   /// Ends all jobs, and those that come later at once.
   void close();
 

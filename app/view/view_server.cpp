@@ -24,9 +24,12 @@ using nlohmann::json;
 
 constexpr int jpeg_quality = 90;
 
-WebAnswer json_answer(const json& j) {
-  return {200, "application/json", j.dump(-1, ' ', false, json::error_handler_t::replace)};
+/// Names of files and folders may be no UTF-8; they are for reading only.
+std::string shown_json(const json& j) {
+  return j.dump(-1, ' ', false, json::error_handler_t::replace);
 }
+
+WebAnswer json_answer(const json& j) { return {200, "application/json", shown_json(j)}; }
 
 WebAnswer bytes_answer(std::string bytes) {
   return {200, "application/octet-stream", std::move(bytes)};
@@ -50,7 +53,7 @@ struct ViewServer::Impl {
   Bookmarks bookmarks{run.out};
   FilmMaker films{run, layers, turns};
   Measuring measuring{run};
-  std::string page = page_html(), scene = scene_json(run).dump(),
+  std::string page = page_html(), scene = shown_json(scene_json(run)),
               surface = packed(run.surface, surface_kelvin_per_count(run));
   WebServer server;
 

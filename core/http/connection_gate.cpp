@@ -35,6 +35,7 @@ struct Connection {
   enum class State { reading, answering, writing, leaving } state = State::reading;
   int fd = -1;
   Clock::time_point deadline;
+  Clock::time_point answered;  ///< when the answer's first byte could go
   std::string request, answer;
   std::size_t sent = 0;
   std::shared_ptr<std::atomic<bool>> gone = std::make_shared<std::atomic<bool>>(false);
@@ -149,7 +150,8 @@ struct ConnectionGate::Impl {
   void say(Connection& c, std::string text) {
     c.answer = std::move(text);
     c.state = Connection::State::writing;
-    c.deadline = Clock::now() + limits.answer;
+    c.answered = Clock::now();
+    c.deadline = c.answered + limits.answer;
   }
 
   /// False when the connection is over.
@@ -174,6 +176,8 @@ struct ConnectionGate::Impl {
         ::send(c.fd, c.answer.data() + c.sent, c.answer.size() - c.sent, MSG_NOSIGNAL);
     if (count < 0) return errno == EAGAIN || errno == EINTR;
     c.sent += static_cast<std::size_t>(count);
+    c.deadline = c.answered + limits.answer +
+                 std::chrono::milliseconds(1000 * c.sent / limits.least_bytes_per_s);
     if (c.sent < c.answer.size()) return true;
     ::shutdown(c.fd, SHUT_WR);
     c.state = Connection::State::leaving;

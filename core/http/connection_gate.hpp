@@ -14,7 +14,11 @@ struct GateLimits {
   std::size_t connections = 64;       ///< the one that has been at its request longest makes room
   std::size_t request_bytes = 16384;  ///< head and body
   std::chrono::milliseconds request{3000};  ///< from the connection to the request's last byte
-  std::chrono::milliseconds answer{5000};   ///< from the answer's first byte to its last
+  /// From the answer's first byte to its last, and for what has gone the time it takes at
+  /// `least_bytes_per_s`: a large answer over a slow network arrives, a peer that stops does not
+  /// stay.
+  std::chrono::milliseconds answer{5000};
+  std::size_t least_bytes_per_s = 16 << 10;
   int workers = 4;
 };
 

@@ -8,7 +8,7 @@ function keepingPanel(scene, surface, rest) {
 
   $("save-png").onclick = () => {
     // What is on the stage, at the picture's own size, with what it stands for below.
-    const source = rest.level >= 0 ? rest.canvas : surface.renderer.domElement, strip = scene.thermal ? 44 : 0;
+    const source = rest.level >= 0 ? rest.canvas : surface.renderer.domElement, strip = shownScale() ? 44 : 0;
     const picture = document.createElement("canvas"), context = picture.getContext("2d");
     picture.width = source.width; picture.height = source.height + strip;
     context.fillStyle = "#14161a"; context.fillRect(0, 0, picture.width, picture.height);
@@ -18,8 +18,8 @@ function keepingPanel(scene, surface, rest) {
       context.imageSmoothingEnabled = false;
       context.drawImage($("bar"), 8, source.height + 6, picture.width - 16, 14);
       context.fillStyle = "#fff"; context.font = "14px system-ui, sans-serif"; context.textBaseline = "top";
-      context.fillText(shownTemperature(show.low), 8, source.height + 24);
-      const high = shownTemperature(show.high);
+      context.fillText($("bar-low").textContent, 8, source.height + 24);
+      const high = $("bar-high").textContent;
       context.fillText(high, picture.width - 8 - context.measureText(high).width, source.height + 24);
     }
     picture.toBlob(blob => download(blob, base + ".png"), "image/png");

@@ -6,7 +6,7 @@ async function begin() {
   const scene = await (await ask("/scene")).json();
   viewer.scene = scene; gray = scene.gray;
   document.title = scene.name.split("/").pop() + " · OrbitFuse view";
-  readPalettes(scene.palettes); show.palette = scene.palette; [show.low, show.high] = scene.span;
+  readPalettes(scene.palettes); viewer.heatColours = coloursOf(scene.heat.colors); show.palette = scene.palette; [show.low, show.high] = scene.span;
   if (localStorage.getItem("unit")) $("unit").value = unit = localStorage.getItem("unit");
   $("run-words").textContent = [scene.name, `${scene.surface.points} surface points`, ...scene.notes].join(" · ");
 
@@ -17,7 +17,7 @@ async function begin() {
     .filter(([l]) => l === "visible" ? scene.visible : l === "thermal" ? scene.thermal : scene.visible && scene.thermal);
   let layer = scene.visible && scene.thermal ? "fused" : layers[0][0];
   const both = () => $("compare").getAttribute("aria-pressed") === "true" ? $("other").value : null;
-  const chosen = () => { surface.style(layer); rest.choose(layer, both()); rest.layer = layer; rest.other = both(); placeDivider(); };
+  const chosen = () => { surface.style(layer); rest.choose(layer, both()); rest.layer = layer; rest.other = both(); fillSpan(); placeDivider(); };
   choices($("layers"), layers, layer, value => { layer = value; chosen(); });
   options($("other"), layers, scene.thermal ? "thermal" : layer);
   $("other").onchange = chosen;
@@ -29,7 +29,6 @@ async function begin() {
     chosen();
   };
   const fillSpan = temperaturePanel(scene, () => { surface.style(layer); if (rest.level >= 0) rest.paint(); photo.paint(); showReadout(); });
-  $("legend").hidden = !scene.thermal;
   cameraPanel(scene, surface, photo);
   surface.onMove = () => rest.moved();
   rest.onChange = () => {
@@ -40,6 +39,7 @@ async function begin() {
   };
   viewer.onPicture = [];
   rest.layer = layer;
+  fillSpan();
   surface.style(layer);
   dividerByHand(rest);
   pointer(surface, photo);

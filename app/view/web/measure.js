@@ -57,9 +57,10 @@ class Measuring {
     return true;
   }
   async place(place) {
-    const kind = this.tool, tool = measureTools[kind], { width, height } = this.surface;
+    // At the size of the rested picture, which was touched: a stage may have more pixels than the server renders.
+    const kind = this.tool, tool = measureTools[kind], [width, height] = this.rest.size(1);
     try {
-      const found = await askInTurn("/pick", { ...this.surface.shot(Math.round(width), Math.round(height)), u: place.u * Math.round(width), v: place.v * Math.round(height) });
+      const found = await askInTurn("/pick", { ...this.surface.shot(width, height), u: place.u * width, v: place.v * height });
       if (this.tool !== kind) return;
       this.places.push(found.point);
       if (this.places.length < tool.places) { this.say(tool.say[this.places.length]); this.drawMarks(); return; }

@@ -31,7 +31,10 @@ function temperaturePanel(scene, onChange) {
       if (document.activeElement !== $(id)) $(id).value = fromKelvin(k).toFixed(1);
     $("iso-low-label").hidden = !["above", "between"].includes(show.isotherm);
     $("iso-high-label").hidden = !["below", "between"].includes(show.isotherm);
-    $("low").disabled = $("high").disabled = show.auto;
+    // What none of the layers on the stage follows is not to be set.
+    const followed = [viewer.rest.layer, viewer.rest.other].some(layer => layer === "thermal" || layer === "mix");
+    $("palette").disabled = $("auto-span").disabled = $("run-span").disabled = !followed;
+    $("low").disabled = $("high").disabled = show.auto || !followed;
     drawLegend();
   };
   const changed = () => { fill(); onChange(); };

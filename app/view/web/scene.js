@@ -128,10 +128,11 @@ class Surface {
     const u = this.material.uniforms;
     if (!this.facts.surface.colored && this.facts.surface.temperatures) u.share.value = 1;
     else u.share.value = { visible: 0, thermal: 1, fused: 0.5, mix: show.opacity }[layer];
-    u.low.value = show.low; u.high.value = show.high; u.isoLow.value = show.isoLow; u.isoHigh.value = show.isoHigh;
+    const scale = scaleOf(layer) || scaleOf("thermal");
+    u.low.value = scale.low; u.high.value = scale.high; u.isoLow.value = show.isoLow; u.isoHigh.value = show.isoHigh;
     u.isotherm.value = layer === "thermal" || layer === "mix" ? ["off", "above", "below", "between"].indexOf(show.isotherm) : 0;
     if (u.palette.value) u.palette.value.dispose();
-    u.palette.value = new THREE.DataTexture(palettes[show.palette].slice(), 256, 1, THREE.RGBFormat);
+    u.palette.value = new THREE.DataTexture(scale.colours.slice(), 256, 1, THREE.RGBFormat);
     u.palette.value.needsUpdate = true;
     this.draw();
   }

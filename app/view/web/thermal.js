@@ -5,12 +5,16 @@ const palettes = {};  // name -> Uint8Array of 256 R, G, B
 const show = { palette: "inferno", low: 273, high: 300, auto: false, isotherm: "off", isoLow: 0, isoHigh: 0, opacity: 0.6 };
 const isothermColour = [25, 227, 200];
 
-function readPalettes(hex) {
-  for (const [name, text] of Object.entries(hex)) {
-    const colours = palettes[name] = new Uint8Array(768);
-    for (let i = 0; i < 768; ++i) colours[i] = parseInt(text.substr(2 * i, 2), 16);
-  }
+function coloursOf(hex) { return Uint8Array.from({ length: 768 }, (_, i) => parseInt(hex.substr(2 * i, 2), 16)); }
+function readPalettes(hex) { for (const [name, text] of Object.entries(hex)) palettes[name] = coloursOf(text); }
+/// The scale of a layer's colours: the fused picture has the run's own, whatever is chosen for the others.
+function scaleOf(layer) {
+  const heat = viewer.scene.heat;
+  if (layer === "fused") return { low: heat.usual, high: heat.hot, colours: viewer.heatColours, marks: false };
+  return layer === "visible" || !layer ? null : { low: show.low, high: show.high, colours: palettes[show.palette], marks: true };
 }
+/// Of the first layer on the stage that shows temperatures; null where none does.
+const shownScale = () => viewer.scene.thermal ? scaleOf(viewer.rest.layer) || scaleOf(viewer.rest.other) : null;
 const levelOf = (part, count) => count ? part.scale * count + part.offset : NaN;
 const meetsIsotherm = k => show.isotherm === "above" ? k >= show.isoLow : show.isotherm === "below" ? k <= show.isoHigh
   : show.isotherm === "between" ? k >= show.isoLow && k <= show.isoHigh : false;
@@ -53,11 +57,16 @@ function temperatureAt(part, u, v) {
 }
 
 function drawLegend() {
-  const context = $("bar").getContext("2d"), image = context.createImageData(256, 1), colours = palettes[show.palette];
+  const scale = shownScale();
+  $("legend").hidden = !scale;
+  if (!scale) return;
+  const context = $("bar").getContext("2d"), image = context.createImageData(256, 1), { low, high, colours, marks } = scale;
   for (let i = 0; i < 256; ++i) {
-    const k = show.low + (show.high - show.low) * i / 255;
-    image.data.set(meetsIsotherm(k) ? [...isothermColour, 255] : [colours[3 * i], colours[3 * i + 1], colours[3 * i + 2], 255], 4 * i);
+    const k = low + (high - low) * i / 255;
+    image.data.set(marks && meetsIsotherm(k) ? [...isothermColour, 255] : [colours[3 * i], colours[3 * i + 1], colours[3 * i + 2], 255], 4 * i);
   }
   context.putImageData(image, 0, 0);
-  $("bar-low").textContent = shownTemperature(show.low); $("bar-high").textContent = shownTemperature(show.high);
+  // Two scales may be on the stage: which of them the bar is.
+  const of = viewer.rest.other && scaleOf(viewer.rest.other) && scaleOf(viewer.rest.layer) ? { fused: "Heat ", thermal: "Thermal ", mix: "Overlay " }[viewer.rest.layer] : "";
+  $("bar-low").textContent = of + shownTemperature(low); $("bar-high").textContent = shownTemperature(high);
 }

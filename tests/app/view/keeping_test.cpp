@@ -2,9 +2,13 @@
 // What a viewer keeps in the run's folder, and the way of its camera along kept views.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <cmath>
+#include <csignal>
 #include <limits>
+#include <optional>
+#include <thread>
 
 #include "app/view/bookmarks.hpp"
 #include "app/view/film.hpp"
@@ -38,6 +42,23 @@ TEST(Bookmarks, ComeBackAsTheyWereKept) {
   EXPECT_FALSE(first.remove("c"));
   ASSERT_TRUE(first.remove("b"));
   EXPECT_EQ(second.list()->size(), 1u);
+}
+
+/// Each viewer of a run has its own Bookmarks: the folder's lock keeps them apart.
+TEST(Bookmarks, OfViewersAtOnceAreAllKept) {
+  const orbitfuse::test::TempFolder folder;
+  std::atomic<int> failed{0};
+  {
+    std::vector<std::jthread> viewers;
+    for (int v = 0; v < 4; ++v)
+      viewers.emplace_back([&, v] {
+        Bookmarks own(folder.path());
+        for (int i = 0; i < 15; ++i)
+          failed += !own.add(at(std::to_string(v) + " " + std::to_string(i), 1, 2, 3));
+      });
+  }
+  EXPECT_EQ(failed, 0);
+  EXPECT_EQ(Bookmarks(folder.path()).list()->size(), 60u);
 }
 
 TEST(Bookmarks, ADamagedFileIsNamedAndLeftAsItIs) {
@@ -141,10 +162,75 @@ TEST_F(FilmTest, Mp4IsAFilm) {
   order.layer = FilmLayer::fused;
   ASSERT_TRUE(films.begin(order, views));
   const json state = finished();
-  if (state.contains("error")) GTEST_SKIP() << state.at("error");  // no encoder in this OpenCV
+  if (state.contains("error")) {
+    EXPECT_THAT(state.at("error").get<std::string>(), HasSubstr("no H.264 encoder here"));
+    GTEST_SKIP() << state.at("error");
+  }
   const std::string bytes = orbitfuse::test::get(folder / "films/001.mp4");
   EXPECT_EQ(bytes.substr(4, 4), "ftyp");
   EXPECT_GT(bytes.size(), 500u);
+}
+
+/// As on a full disk: no file may grow beyond some bytes.
+TEST_F(FilmTest, Mp4ThatCannotBeWrittenIsNotMade) {
+  order.kind = FilmKind::mp4;
+  struct rlimit before {};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  const struct rlimit small { 200, before.rlim_max };
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  const Status begun = films.begin(order, views);
+  const json state = finished();
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  ASSERT_TRUE(begun);
+  EXPECT_FALSE(state.contains("file")) << state;
+  EXPECT_TRUE(state.contains("error")) << state;
+  EXPECT_TRUE(fs::is_empty(folder / "films"));
+}
+
+/// Who is refused a turn while too many wait asks again; nobody's name ends the film's jobs.
+TEST_F(FilmTest, IsMadeAlthoughTooManyViewersWait) {
+  std::optional<RenderTurns::Turn> held;
+  RenderTurns::Job holder(turns, "film", nullptr);
+  held.emplace(std::move(*holder.turn(1)));
+  std::atomic<int> refused{0}, served{0};
+  std::vector<std::jthread> viewers;
+  for (int v = 0; v < 17; ++v)
+    viewers.emplace_back([&, v] {
+      RenderTurns::Job job(turns, std::to_string(v), nullptr);
+      ++(job.turn(1) ? served : refused);
+    });
+  while (refused == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  // 16 wait now.
+  ASSERT_TRUE(films.begin(order, views));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  const json waiting = films.state();
+  EXPECT_EQ(waiting.at("making"), true) << waiting;
+  held.reset();
+  while (films.state().at("making") == true) const RenderTurns::Job page(turns, "film", nullptr);
+  const json state = finished();
+  EXPECT_TRUE(state.contains("file")) << state;
+}
+
+TEST_F(FilmTest, ThatThrowsIsAnErrorAndNoEnd) {
+  run.thermal = {};  // of which film_order_of would not let an order be made
+  ASSERT_TRUE(films.begin(order, views));
+  EXPECT_TRUE(finished().contains("error"));
+}
+
+/// A stop that comes while a film begins ends it, or comes before it: it never waits for the whole
+/// of one.
+TEST_F(FilmTest, StopsAndBeginsMayMeet) {
+  order.seconds_a_view = 60;
+  order.fps = 60;
+  for (int i = 0; i < 50; ++i) {
+    std::jthread begins([&] { (void)films.begin(order, views); });
+    films.stop();
+    begins.join();
+    films.stop();
+    EXPECT_EQ(films.state().at("making"), false);
+  }
 }
 
 TEST_F(FilmTest, StoppedLeavesNothing) {

@@ -3,45 +3,47 @@
 
 #include <gtest/gtest.h>
 
-#include <mutex>
+#include <atomic>
 #include <optional>
+#include <string>
 #include <thread>
 #include <vector>
 
 namespace orbitfuse::view {
 namespace {
 
-void pause() { std::this_thread::sleep_for(std::chrono::milliseconds(20)); }
+void wait_for_waiting(const RenderTurns& turns, int count) {
+  while (turns.waiting() != static_cast<std::size_t>(count)) std::this_thread::yield();
+}
 
 /// Who came with much to do doesn't hold up who comes with little.
 TEST(RenderTurns, TheLeastServedComesNext) {
   RenderTurns turns;
-  std::mutex mutex;
-  std::string order;
   std::optional<RenderTurns::Turn> held;
   RenderTurns::Job first(turns, "first", nullptr);
   held.emplace(std::move(*first.turn(1)));
+  std::string order;  // of who holds the turn
+  std::atomic<int> at_work{2};
   const auto work = [&](const char* client, int pieces) {
     return std::jthread([&, client, pieces] {
       RenderTurns::Job job(turns, client, nullptr);
-      for (int i = 0; i < pieces; ++i) {
+      for (int left = pieces; left > 0; --left) {
         const auto turn = job.turn(1);
         ASSERT_TRUE(turn);
-        const std::lock_guard lock(mutex);
         order += *client;
-        pause();
+        wait_for_waiting(turns, at_work - 1);  // whoever wants more has asked for it
+        if (left == 1) --at_work;
       }
     });
   };
   {
     const std::jthread a = work("a", 6);
-    pause();
+    wait_for_waiting(turns, 1);
     const std::jthread b = work("b", 2);
-    pause();
+    wait_for_waiting(turns, 2);
     held.reset();
   }
-  ASSERT_EQ(order.size(), 8u);
-  EXPECT_LE(order.rfind('b'), 4u) << order;  // not behind all of a's
+  EXPECT_EQ(order, "ababaaaa");
 }
 
 TEST(RenderTurns, OneAtATime) {
@@ -84,7 +86,7 @@ TEST(RenderTurns, WhoeverLeftIsNotWaitedFor) {
   RenderTurns::Job holder(turns, "holder", nullptr), leaving(turns, "leaving", &gone);
   auto held = std::make_unique<RenderTurns::Turn>(std::move(*holder.turn(1)));
   std::jthread waits([&] { EXPECT_FALSE(leaving.turn(1)); });
-  pause();
+  wait_for_waiting(turns, 1);
   gone = true;
   waits.join();  // although the turn is still held
   held.reset();
@@ -104,7 +106,7 @@ TEST(RenderTurns, TooManyAreRefusedAndClosingEndsAll) {
       ASSERT_FALSE(turn);
       ++(turn.error().kind == ErrorKind::unavailable ? unavailable : cancelled);
     });
-  while (unavailable < 4) pause();
+  while (unavailable < 4) std::this_thread::yield();
   turns.close();
   clients.clear();
   EXPECT_EQ(unavailable, 4);

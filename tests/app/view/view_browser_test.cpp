@@ -129,8 +129,10 @@ TEST_F(ViewBrowserTest, LoadsTurnsSwitchesMeasuresSavesAndReloads) {
   // What stands under the pointer is a temperature of the scene, in each unit.
   page.press(640, 400);
   const double kelvin = page.evaluate("viewer.rest.temperature(.5, .5)").get<double>();
-  EXPECT_GT(kelvin, 250);
-  EXPECT_LT(kelvin, 1500);
+  // The fixture's box has 290 to 310 K; what another run has there is not known.
+  const bool fixture = std::getenv("ORBITFUSE_VIEW_RUN") == nullptr;
+  EXPECT_GT(kelvin, fixture ? 289 : 250);
+  EXPECT_LT(kelvin, fixture ? 311 : 1500);
   page.evaluate("$('unit').value = 'F'; $('unit').onchange()");
   EXPECT_NEAR(std::stod(page.evaluate("$('readout').textContent").get<std::string>()),
               celsius_from_kelvin(kelvin) * 1.8 + 32, 0.06);
@@ -165,6 +167,62 @@ TEST_F(ViewBrowserTest, LoadsTurnsSwitchesMeasuresSavesAndReloads) {
   for (int i = 0; i < 3; ++i)
     EXPECT_NEAR(again["position"][i].get<double>(), pose["position"][i].get<double>(), 1e-6);
   EXPECT_TRUE(page.errors().empty()) << page.errors().front();
+}
+
+/// The bar is the picture's above it; what doesn't follow palette and span doesn't offer them.
+TEST_F(ViewBrowserTest, TheBarIsThatOfTheLayer) {
+  orbitfuse::test::Browser page(folder.path() / "profile", 1920, 1080, false);
+  page.open(url);
+  ASSERT_TRUE(page.becomes("viewer.surface.points"));
+  ASSERT_TRUE(rests(page));
+  const auto low = [&] { return page.evaluate("$('bar-low').textContent"); };
+  const auto first_color = [&] {
+    return page.evaluate("Array.from($('bar').getContext('2d').getImageData(0, 0, 1, 1).data)");
+  };
+  ASSERT_EQ(page.evaluate("viewer.rest.layer"), "fused");
+  page.evaluate("$('palette').value = 'rainbow'; $('palette').onchange(); $('run-span').onclick()");
+  EXPECT_EQ(low(), page.evaluate("shownTemperature(viewer.scene.heat.usual)"));
+  EXPECT_EQ(first_color(), page.evaluate("[...viewer.heatColours.slice(0, 3), 255]"));
+  EXPECT_EQ(page.evaluate("['palette', 'low', 'high', 'run-span'].every(i => $(i).disabled)"),
+            true);
+  choose(page, "thermal");
+  EXPECT_EQ(low(), page.evaluate("shownTemperature(viewer.scene.span[0])"));
+  EXPECT_EQ(first_color(), page.evaluate("[...palettes.rainbow.slice(0, 3), 255]"));
+  EXPECT_EQ(page.evaluate("['palette', 'low', 'high', 'run-span'].some(i => $(i).disabled)"),
+            false);
+  choose(page, "visible");
+  EXPECT_EQ(page.evaluate("$('legend').hidden"), true);
+  EXPECT_TRUE(page.errors().empty()) << page.errors().front();
+}
+
+/// More pixels than the server renders; and who is told that the viewer is busy saved nothing.
+TEST_F(ViewBrowserTest, ALargeStageIsMeasuredInByManyAtOnce) {
+  orbitfuse::test::Browser page(folder.path() / "profile", 1920, 1080, false);
+  page.open(url);
+  ASSERT_TRUE(page.becomes("viewer.surface.points"));
+  ASSERT_TRUE(rests(page));
+  page.evaluate("$('show-visible').click(); $('show-thermal').click()");
+  const double width = page.evaluate("viewer.surface.width").get<double>();
+  const double height = page.evaluate("viewer.surface.height").get<double>();
+  ASSERT_GT(width * height, 1.4e6);
+  page.evaluate("document.querySelector('[data-value=spot]').click()");
+  page.press(0.5 * width, 0.5 * height);
+  ASSERT_TRUE(
+      page.becomes("viewer.measuring.list.length === 1 || "
+                   "$('measure-words').className === 'warning'"));
+  ASSERT_EQ(page.evaluate("viewer.measuring.list.length"), 1)
+      << page.evaluate("$('measure-words').textContent");
+  // Where it was touched.
+  const auto at = page.evaluate("viewer.measuring.drawn()[0].at");
+  EXPECT_NEAR(at.at("x").get<double>(), 0.5 * width, 0.01 * width);
+  EXPECT_NEAR(at.at("y").get<double>(), 0.5 * height, 0.01 * width);
+  EXPECT_TRUE(page.errors().empty()) << page.errors().front();
+  const auto saved = page.evaluate(R"(Promise.all(Array.from({ length: 6 }, async () => {
+      for (let saved = 0; saved < 5;) try {
+        await ask("/measurements/add", viewer.measuring.list[0].request); ++saved;
+      } catch (error) { if (error.status !== 503) throw error; }
+    })).then(() => ask("/measurements")).then(a => a.json()).then(list => list.length))");
+  EXPECT_EQ(saved, 30);
 }
 
 TEST_F(ViewBrowserTest, PhotosLieBesideTheirRenders) {

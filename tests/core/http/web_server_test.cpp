@@ -6,6 +6,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <thread>
+#include <vector>
+
 #include "core/http/reachable.hpp"
 #include "tests/support/slow_peers.hpp"
 
@@ -46,8 +52,9 @@ TEST(PageAddress, IsPortOrHostAndPort) {
 
 class WebServerTest : public ::testing::Test {
  protected:
-  void serve(WebHandler handler) {
+  void serve(WebHandler handler, const GateLimits& limits = {}) {
     WebSite site;
+    site.limits = limits;
     site.get = {{"/wait", std::move(handler)}};
     site.post = {{"/echo", [](const WebRequest& request) {
                     return text_answer(200, request.body + request.parameter("a"));
@@ -68,6 +75,27 @@ TEST_F(WebServerTest, BodiesAndParametersArrive) {
   const std::string head = "POST /echo?a=b%20c HTTP/1.1\r\nHost: 127.0.0.1\r\nX-OrbitFuse: 1\r\n";
   EXPECT_THAT(ask(head + "Content-Length: 3\r\n\r\nxyz"), HasSubstr("\r\n\r\nxyzb c\n"));
   EXPECT_THAT(ask(head + "\r\n"), HasSubstr("\r\n\r\nb c\n"));
+}
+
+/// An answer that flows is not cut off by the clock: here after a tenth of a second.
+TEST_F(WebServerTest, ALargeAnswerArrivesOverASlowNetwork) {
+  const std::string body(32u << 20, 'x');
+  GateLimits limits;
+  limits.answer = std::chrono::milliseconds(100);
+  limits.least_bytes_per_s = 1;
+  serve([&](const WebRequest&) { return text_answer(200, body); }, limits);
+  const int fd = test::connected_to(server->port());
+  const std::string request = "GET /wait HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n";
+  ASSERT_EQ(::send(fd, request.data(), request.size(), 0), static_cast<ssize_t>(request.size()));
+  std::vector<char> bytes(1 << 20);
+  std::size_t got = 0;
+  for (ssize_t count = 1; count > 0;) {
+    if (got < 2'000'000) std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    count = ::recv(fd, bytes.data(), got < 2'000'000 ? 500'000 : bytes.size(), 0);
+    if (count > 0) got += static_cast<std::size_t>(count);
+  }
+  ::close(fd);
+  EXPECT_GT(got, body.size());
 }
 
 /// Long work ends when nobody waits for it: the peer left, or the server stops.
