@@ -8,6 +8,7 @@
 #include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
 #include "app/stages/rendered_views.hpp"
+#include "app/stages/session_input.hpp"
 #include "app/stages/stage_list.hpp"
 #include "core/formats/transforms_json.hpp"
 #include "core/image/image_io.hpp"
@@ -43,6 +44,19 @@ Result<std::map<std::string, std::string>> doubts_of(const Folder& folder) {
   return doubts;
 }
 
+/// Poses of one session's frames tell nothing of another's, even where the files are called alike.
+Status check_session(const Folder& folder, const Session& session) {
+  ORBITFUSE_ASSIGN(const pipeline::StageRecord record,
+                   pipeline::read_stage_record(folder.out / "poses_thermal"));
+  const auto outside = record.inputs.find("outside");
+  if (outside == record.inputs.end()) return {};
+  ORBITFUSE_ASSIGN(const std::string content, modality_content(session, Modality::thermal));
+  if (content == outside->second) return {};
+  return fail(ErrorKind::input, session.folder.string(),
+              "its thermal frames are not those that " + folder.out.string() + " was made of",
+              "name the session of that run, or run this one again");
+}
+
 /// The thermal field, its frames, and how both come into the run's world.
 Status add_thermal(const Folder& folder, const Session& session, SceneParts& parts) {
   ORBITFUSE_ASSIGN(nerf::Field field, nerf::Field::load(folder.out / "train_thermal" / field_file));
@@ -63,8 +77,16 @@ Status add_thermal(const Folder& folder, const Session& session, SceneParts& par
     ThermalFrame frame{std::move(view), {}, {}};
     if (const auto doubt = doubts.find(frame.view.name); doubt != doubts.end())
       frame.doubt = doubt->second;
-    for (const FrameRecord& record : session.frames)
-      if (record.file == frame.view.name) frame.radiometry = record.radiometry;
+    const auto record =
+        std::find_if(session.frames.begin(), session.frames.end(), [&](const FrameRecord& r) {
+          return r.modality == Modality::thermal && r.file == frame.view.name;
+        });
+    // Its name becomes a path in the session's folder, so it must be one that the session lists.
+    if (record == session.frames.end())
+      return fail(ErrorKind::input, frame.view.name,
+                  "a posed view that is no thermal frame of " + session.folder.string(),
+                  "name the session of that run, or run this one again");
+    frame.radiometry = record->radiometry;
     parts.frames.push_back(std::move(frame));
   }
   parts.read_frame = [root = session.folder](const ThermalFrame& frame) {
@@ -122,6 +144,7 @@ Result<ThermalScene> load_measurement_scene(const fs::path& out, const Session& 
     return fail(ErrorKind::input, session.folder.string(),
                 "its thermal frames are gray levels, no temperatures",
                 "record with a camera that gives temperatures, or import its radiometric files");
+  ORBITFUSE_TRY(check_session(folder, session));
   SceneParts parts;
   ORBITFUSE_TRY(add_thermal(folder, session, parts));
   ORBITFUSE_TRY(add_named_views(folder, parts));

@@ -13,7 +13,8 @@ namespace orbitfuse::stages {
 /// "visible/...": their files in the session) and the rendered ones ("000", ...), all in the
 /// visible world (the thermal one, where nothing visible is posed). Small: images and depth maps
 /// come when they are asked for.
-/// Errors: input (no thermal field, no poses, a session of gray levels; each says what to do).
+/// Errors: input (no thermal field, no poses, a session of gray levels or not the run's; each says
+/// what to do).
 Result<measurement::ThermalScene> load_measurement_scene(
     const std::filesystem::path& out, const Session& session,
     const measurement::MeasurementOptions& options = {});

@@ -39,6 +39,18 @@ Status check_frame(const Session& session, const FrameRecord& frame, std::string
   return check_size(frame, path, image.cols, image.rows);
 }
 
+/// `hashes`: of the frames' files.
+std::string content_of(const Session& session, Modality modality,
+                       const std::vector<std::string>& hashes) {
+  std::string text;
+  for (const DeviceInfo& device : session.devices)
+    if (device.modality == modality) text += manifest_line(device) + "\n";
+  for (std::size_t i = 0; i < session.frames.size(); ++i)
+    if (session.frames[i].modality == modality)
+      text += manifest_line(session.frames[i]) + hashes[i] + "\n";
+  return content_hash(text);
+}
+
 }  // namespace
 
 int SessionInput::count(Modality modality) const {
@@ -70,6 +82,15 @@ Result<std::vector<Error>> damaged_frames(const Session& session, const Progress
   return found;
 }
 
+Result<std::string> modality_content(const Session& session, Modality modality) {
+  std::vector<std::string> hashes(session.frames.size());
+  for (std::size_t i = 0; i < hashes.size(); ++i) {
+    if (session.frames[i].modality != modality) continue;
+    ORBITFUSE_ASSIGN(hashes[i], file_hash(session.path_of(session.frames[i])));
+  }
+  return content_of(session, modality, hashes);
+}
+
 Result<SessionInput> open_session_input(const fs::path& folder, const Progress& progress) {
   SessionInput input;
   ORBITFUSE_ASSIGN(input.session, open_session(folder));
@@ -87,15 +108,8 @@ Result<SessionInput> open_session_input(const fs::path& folder, const Progress& 
   ORBITFUSE_TRY(progress.check("session"));
   for (const Status& problem : problems) ORBITFUSE_TRY(problem);
 
-  for (const Modality modality : {Modality::visible, Modality::thermal}) {
-    std::string text;
-    for (const DeviceInfo& device : session.devices)
-      if (device.modality == modality) text += manifest_line(device) + "\n";
-    for (std::size_t i = 0; i < session.frames.size(); ++i)
-      if (session.frames[i].modality == modality)
-        text += manifest_line(session.frames[i]) + hashes[i] + "\n";
-    input.content[modality] = content_hash(text);
-  }
+  for (const Modality modality : {Modality::visible, Modality::thermal})
+    input.content[modality] = content_of(session, modality, hashes);
   return input;
 }
 

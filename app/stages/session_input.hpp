@@ -24,6 +24,9 @@ struct SessionInput {
   Samples samples(Modality modality) const;
 };
 
+/// SessionInput::content of one modality, without decoding its frames.
+Result<std::string> modality_content(const Session& session, Modality modality);
+
 /// What is wrong with each frame whose file is cut, changed beyond use or of another kind; every
 /// frame is looked at.
 Result<std::vector<Error>> damaged_frames(const Session& session, const Progress& progress);

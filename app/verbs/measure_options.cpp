@@ -135,6 +135,8 @@ Result<Request> json_request(const std::string& text) {
 
 /// Object parameters that were typed, in the library's units.
 void add_parameters(const MeasureWords& words, Request& request) {
+  for (Request& part : request.of) add_parameters(words, part);
+  if (request.kind == Kind::difference) return;  // has none of its own
   const auto kelvin = [](std::optional<double> celsius) {
     return celsius ? std::optional(kelvin_from_celsius(*celsius)) : std::nullopt;
   };
@@ -147,7 +149,6 @@ void add_parameters(const MeasureWords& words, Request& request) {
   if (words.recorded_emissivity) request.recorded.emissivity = words.recorded_emissivity;
   if (words.recorded_reflected_c)
     request.recorded.reflected_temperature_k = kelvin(words.recorded_reflected_c);
-  for (Request& part : request.of) add_parameters(words, part);
 }
 
 /// The option that asks, of those that were given.

@@ -20,6 +20,7 @@ json json_of(const FrameLine& line) {
           {"max_k", json_of(line.max_k)},
           {"angle_deg", json_of(line.angle_deg)},
           {"weight", json_of(line.weight)},
+          {"used", line.used},
           {"covered", json_of(line.covered)},
           {"doubtful", line.doubtful}};
 }
@@ -29,6 +30,7 @@ json json_of(const TemperatureReading& reading) {
   for (const FrameLine& line : reading.frames) frames.push_back(json_of(line));
   return {{"temperature_k", json_of(reading.temperature_k)},
           {"uncertainty_k", json_of(reading.uncertainty_k)},
+          {"assumed_k", json_of(reading.assumed_k)},
           {"field_k", json_of(reading.field_k)},
           {"mean_k", json_of(reading.mean_k)},
           {"min_k", json_of(reading.min_k)},
@@ -37,6 +39,10 @@ json json_of(const TemperatureReading& reading) {
           {"spread_k", json_of(reading.spread_k)},
           {"angle_deg", json_of(reading.angle_deg)},
           {"points", reading.points},
+          {"seen_points", reading.seen_points},
+          {"seen_share", json_of(reading.seen_share)},
+          {"doubtful_share", json_of(reading.doubtful_share())},
+          {"outliers", reading.outliers},
           {"frame_count", reading.frames.size()},
           {"frames", frames},
           {"hidden", reading.hidden}};
@@ -54,6 +60,12 @@ bool has_reading(Kind kind) {
 }
 
 }  // namespace
+
+double TemperatureReading::doubtful_share() const {
+  double share = 0;
+  for (const FrameLine& line : frames) share += line.doubtful ? line.weight : 0;
+  return share;
+}
 
 json to_json(const Answer& answer) {
   json j = {{"kind", name(answer.kind)}, {"notes", answer.notes}};
@@ -75,6 +87,8 @@ json to_json(const Answer& answer) {
         p["uncertainty_k"] = json_of(point.at->reading.uncertainty_k);
         p["field_k"] = json_of(point.at->reading.field_k);
         p["frame_count"] = point.at->reading.frames.size();
+        p["doubtful_share"] = json_of(point.at->reading.doubtful_share());
+        p["outliers"] = point.at->reading.outliers;
       }
       j["profile"].push_back(std::move(p));
     }

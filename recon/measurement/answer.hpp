@@ -19,7 +19,8 @@ struct FrameLine {
   Eigen::Vector2d pixel;  ///< of the spot, or of the region's middle
   double mean_k = unknown, min_k = unknown, max_k = unknown;
   double angle_deg = unknown;  ///< of the line of sight to the surface's normal; region: mean
-  double weight = 0;           ///< of all frames: 1
+  double weight = 0;           ///< of all frames: 1; 0: left out
+  bool used = true;            ///< false: it shows something else than most (another surface)
   double covered = 1;          ///< share of the region's points that it sees
   bool doubtful = false;       ///< its pose
 };
@@ -33,15 +34,23 @@ struct TemperatureReading {
   /// is below this in 90 of 100 cases. From the spread between frames, what an error of the poses
   /// makes of the gradient there, noise, and the difference of field and frames. NaN: unknown.
   double uncertainty_k = unknown;
+  /// What it would be by the constant for the camera alone (common_sigma_k): assumed, because no
+  /// frame shows what all of them share.
+  double assumed_k = unknown;
   double field_k = unknown;  ///< of the trained field; also where no frame sees the place
   /// Over the frames' readings of a spot; over the points of a region.
   double mean_k = unknown, min_k = unknown, max_k = unknown, standard_deviation_k = unknown;
   double spread_k = unknown;   ///< standard deviation between frames; NaN: fewer than two
   double angle_deg = unknown;  ///< weighted mean over frames
-  int points = 1;              ///< surface points behind it
+  int points = 1;              ///< surface points that were asked for
+  int seen_points = 0;         ///< of those, such that a frame sees
+  double seen_share = 0;       ///< of the area, that a frame sees
   std::vector<FrameLine> frames;
+  std::string outliers;  ///< "4 of 10 frames left out: 36.9 C against 26.9 C"; empty: none
   std::string hidden;  ///< what hides it from the others: "13 outside of their picture, 5 occluded"
   bool seen() const { return !frames.empty(); }
+  /// Of the weight: frames whose pose is doubtful.
+  double doubtful_share() const;
 };
 
 /// A spot with its place.
@@ -62,6 +71,8 @@ struct Answer {
   std::vector<PlacedReading> spots;  ///< hottest, coldest; by what is sure (region.hpp)
   std::vector<ProfilePoint> profile;
   std::vector<Eigen::Vector3d> ends;  ///< of a line or distance, where both meet the surface
+  /// The camera's part of both uncertainties counts in full: two places lie on different samples
+  /// of the sensor, and of what is assumed only drift, a part unknown, is the same for both.
   double difference_k = unknown, difference_uncertainty_k = unknown;
   std::vector<Answer> of;            ///< of a difference
   double distance = unknown;         ///< world units

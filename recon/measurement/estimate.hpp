@@ -21,6 +21,17 @@ struct Estimate {
   double spread_k = 0;       ///< NaN: one frame
   // What the uncertainty is made of, one sigma each; for bench/measurement.
   double statistical_k = 0, gradient_k = 0, disagreement_k = 0, variation_k = 0;
+  double assumed_k = 0;  ///< TemperatureReading::assumed_k
+};
+
+/// Which readings an estimate is made of.
+struct Agreement {
+  std::vector<bool> near;  ///< those that agree with the weighted median
+  /// Too few to tell who is right, or too many against the median: none is left out, and the
+  /// spread of all is how unsure the place is.
+  bool two_camps = false;
+  bool uses(std::size_t reading) const { return two_camps || near[reading]; }
+  bool all_near() const;
 };
 
 /// What the field has at the place.
@@ -30,11 +41,14 @@ struct FieldReading {
   double gain = 1;           ///< of changed object parameters: what no frame shows grows by it
 };
 
-/// The weighted mean of the readings near their weighted median: what lies 3 robust sigmas off it,
-/// more than its gradient explains, is another surface. `readings` isn't empty, and holds finite
-/// numbers.
-Estimate estimate(const std::vector<WeightedReading>& readings, const FieldReading& field,
-                  const MeasurementOptions& options);
+/// A reading 3 robust sigmas off the weighted median, more than its gradient explains, is another
+/// surface. `readings` isn't empty, and holds finite numbers.
+Agreement agreement_of(const std::vector<WeightedReading>& readings,
+                       const MeasurementOptions& options);
+
+/// The weighted mean of the readings that `agreement` uses.
+Estimate estimate(const std::vector<WeightedReading>& readings, const Agreement& agreement,
+                  const FieldReading& field, const MeasurementOptions& options);
 
 /// The value below which half of the weight lies.
 double weighted_median(std::vector<std::pair<double, double>> value_and_weight);

@@ -20,6 +20,7 @@ struct FrameReading {
   double gradient_k_per_px = 0;  ///< steepest within a pose error's reach
   double gain = 1;               ///< of changed object parameters (Reradiometry)
   double weight = 0;             ///< against the other frames; all of a point's sum to 1
+  bool used = true;              ///< in the point's estimate
 };
 
 /// Why a frame doesn't see a point.

@@ -80,16 +80,28 @@ void say_unseen(const TemperatureReading& reading, std::vector<std::string>& not
                   std::isfinite(reading.field_k) ? ", the field's own is a guess" : ""));
 }
 
-void say_doubtful(const TemperatureReading& reading, std::vector<std::string>& notes) {
+/// What stands behind a reading and is less than it seems. `whose` names it among several.
+void say_weak(const TemperatureReading& reading, std::vector<std::string>& notes,
+              const std::string& whose = "") {
+  if (!reading.seen()) return;
+  const int unseen = reading.points - reading.seen_points;
+  if (unseen > 0)
+    notes.push_back(fmt::format("{}no thermal frame sees {} of {} points ({:.0f} % of the area)",
+                                whose, unseen, reading.points, 100 * (1 - reading.seen_share)));
+  if (!reading.outliers.empty()) notes.push_back(whose + reading.outliers);
   const auto doubtful = std::count_if(reading.frames.begin(), reading.frames.end(),
                                       [](const FrameLine& line) { return line.doubtful; });
-  if (reading.seen() && doubtful == static_cast<long>(reading.frames.size()))
-    notes.emplace_back("only frames with doubtful poses see it");
+  if (doubtful == static_cast<long>(reading.frames.size()))
+    notes.push_back(whose + "only frames with doubtful poses see it");
+  else if (doubtful > 0)
+    notes.push_back(fmt::format("{}{} of {} frames have doubtful poses, {:.0f} % of the weight",
+                                whose, doubtful, reading.frames.size(),
+                                100 * reading.doubtful_share()));
 }
 
 void say(const TemperatureReading& reading, std::vector<std::string>& notes) {
   say_unseen(reading, notes);
-  say_doubtful(reading, notes);
+  say_weak(reading, notes);
 }
 
 Result<Answer> measure_spot(const ThermalScene& scene, const Request& request,
@@ -206,8 +218,10 @@ Result<Answer> measure_extremes(const ThermalScene& scene, const Request& reques
                                           request.count, apart, radiometry, progress));
   if (answer.spots.size() < static_cast<std::size_t>(request.count))
     answer.notes.push_back(
-        fmt::format("{} of {} found: no more places {:.3g} apart that two thermal frames see",
+        fmt::format("{} of {} found: no more places {:.3g} apart that two thermal frames see alike",
                     answer.spots.size(), request.count, apart));
+  for (std::size_t i = 0; i < answer.spots.size(); ++i)
+    say_weak(answer.spots[i].reading, answer.notes, fmt::format("place {}: ", i + 1));
   return answer;
 }
 

@@ -152,7 +152,14 @@ Status save_measurements(const std::filesystem::path& file, const Measurements& 
                     {"uncertainty", "covers the error in 90 of 100 cases"}}},
                   {"run", measurements.identity},
                   {"measurements", list}};
-  return write_file_atomic(file, j.dump(2, ' ', false, json::error_handler_t::replace) + "\n");
+  const std::string text = j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
+  // What is larger could be written, and never be read again.
+  if (text.size() > max_text_bytes)
+    return fail(ErrorKind::input, file.string(),
+                fmt::format("{} measurements of {} MB together, it may hold {} MB",
+                            measurements.list.size(), text.size() >> 20, max_text_bytes >> 20),
+                "nothing was changed: move the file away to keep it, and measure again");
+  return write_file_atomic(file, text);
 }
 
 }  // namespace orbitfuse::measurement

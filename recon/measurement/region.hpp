@@ -13,15 +13,17 @@ Result<TemperatureReading> read_spot(const ThermalScene& scene, const SurfacePoi
                                      const Reradiometry& radiometry, const Progress& progress);
 
 /// Of several points together, weighted by SurfacePoint::weight: those that no frame sees count in
-/// `points` and field_k only.
+/// `points`, `hidden` and field_k only, and FrameLine::covered is of all.
 Result<TemperatureReading> read_region(const ThermalScene& scene,
                                        const std::vector<SurfacePoint>& points,
                                        const Reradiometry& radiometry, const Progress& progress);
 
 /// Up to `count` of the points, at least `apart` from each other, of those that two frames see
-/// (one, where the scene has no more). Chosen by what is sure: temperature less twice its
-/// uncertainty for the hottest, and with it for the coldest; else edges, where frames mix two
-/// surfaces, would come first. In the order of their temperatures.
+/// (one, where the scene has no more), in the order of their temperatures. Not where frames are in
+/// two camps (Agreement): that is an edge, where their mean is nobody's temperature. The hottest
+/// are chosen by temperature alone, because what is small and hot is unsure, and looked for; the
+/// coldest by temperature and twice its uncertainty, because a rim that mixes with the sky would
+/// come first.
 Result<std::vector<PlacedReading>> extremes(const ThermalScene& scene,
                                             const std::vector<SurfacePoint>& points, bool hottest,
                                             int count, double apart, const Reradiometry& radiometry,

@@ -102,12 +102,15 @@ Status Request::validate() const {
       return check_polygon(*this);
     case Kind::hottest:
     case Kind::coldest:
-      ORBITFUSE_TRY(check("count", count, from_to(1, 1000)));
+      ORBITFUSE_TRY(check("count", count, from_to(1, 100)));
       return check("apart", apart, from_to(0, max_coordinate));
     case Kind::difference:
       if (of.size() != 2)
         return fail(ErrorKind::usage, "measure.difference",
                     fmt::format("{} measurements", of.size()), "give two");
+      if (object.any() || recorded.any())
+        return fail(ErrorKind::usage, object.any() ? "measure.object" : "measure.recorded",
+                    "given for the difference itself", "give it in each of its two measurements");
       for (const Request& part : of) {
         if (part.kind == Kind::difference || part.kind == Kind::distance)
           return fail(ErrorKind::usage, "measure.difference",

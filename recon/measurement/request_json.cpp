@@ -104,6 +104,10 @@ Result<Place> place_of(const json& j, const std::string& where) {
   const Table table(j, where);
   ORBITFUSE_TRY(table.check_keys({"view", "u", "v", "point"}));
   if (table.has("point")) {
+    for (const char* key : {"view", "u", "v"})
+      if (table.has(key))
+        return fail(ErrorKind::usage, table.at(key), "beside a point",
+                    "give either a point, or a view with u and v");
     Eigen::Vector3d point;
     ORBITFUSE_TRY(table.vector("point", point));
     return point;

@@ -36,21 +36,20 @@ Result<Reradiometry> Reradiometry::make(const std::vector<ThermalFrame>& frames,
   if (!object.any()) return result;
   bool assumed = false;
   for (const ThermalFrame& frame : frames) {
-    Change change;
-    ORBITFUSE_ASSIGN(change.from, recorded_with(frame, recorded));
+    ORBITFUSE_ASSIGN(const FlirCalibration from, recorded_with(frame, recorded));
     assumed = assumed || !frame.radiometry;
-    change.to = change.from;
-    change.to.object = with_overrides(change.from.object, object);
-    for (const FlirCalibration* side : {&change.from, &change.to})
-      ORBITFUSE_TRY(side->validate("measure").map_error([](Error error) {
+    FlirCalibration to = from;
+    to.object = with_overrides(from.object, object);
+    for (const FlirCalibration& side : {from, to})
+      ORBITFUSE_TRY(side.validate("measure").map_error([](Error error) {
         error.kind = ErrorKind::usage;
         error.remedy = "choose a value that a camera would take";
         return error;
       }));
-    result.frames_.push_back(change);
+    result.frames_.push_back({from, FlirThermometer(from), FlirThermometer(to)});
   }
   result.alike_ = std::all_of(result.frames_.begin(), result.frames_.end(), [&](const Change& c) {
-    return c.from == result.frames_.front().from;
+    return c.recorded == result.frames_.front().recorded;
   });
   if (assumed)
     result.assumption_ = fmt::format(
@@ -61,7 +60,7 @@ Result<Reradiometry> Reradiometry::make(const std::vector<ThermalFrame>& frames,
 }
 
 double Reradiometry::changed(const Change& change, double kelvin) {
-  return FlirThermometer(change.to).kelvin(FlirThermometer(change.from).signal(kelvin));
+  return change.to.kelvin(change.from.signal(kelvin));
 }
 
 double Reradiometry::frame_k(std::size_t frame, double kelvin) const {

@@ -40,7 +40,8 @@ class Reradiometry {
 
  private:
   struct Change {
-    FlirCalibration from, to;
+    FlirCalibration recorded;
+    FlirThermometer from, to;
   };
   static double changed(const Change& change, double kelvin);
   std::vector<Change> frames_;

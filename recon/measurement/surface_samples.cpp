@@ -66,6 +66,8 @@ Result<std::vector<SurfacePoint>> seen_in(const ThermalScene& scene, double cell
         point.normal = world_from_cam.rotation * *normal;
         point.field_k = static_cast<double>(seen.temperature_k.at<float>(y, x));
         point.variation_k = variation_at(seen.temperature_k, x, y, 1);
+        // A plane meets a grid's cells as often as their walls: more of them where it is aslant.
+        point.weight = 1 / point.normal.cwiseAbs().sum();
         const double cosine = std::abs(normal->dot(camera.ray_of({x + 0.5, y + 0.5}).normalized()));
         grid.add(point, z / camera.fx / std::max(0.05, cosine));
       }

@@ -102,10 +102,10 @@ std::string described(const TemperatureReading& r) {
                        std::isfinite(r.field_k)
                            ? fmt::format(" (field {:.2f} C)", celsius_from_kelvin(r.field_k))
                            : "");
-  std::string text = fmt::format("{:.2f} C +- {:.2f} ({} frame{} {:.2f} to {:.2f}",
-                                 celsius_from_kelvin(r.temperature_k), r.uncertainty_k,
-                                 r.frames.size(), r.frames.size() == 1 ? "" : "s",
-                                 celsius_from_kelvin(r.min_k), celsius_from_kelvin(r.max_k));
+  std::string text = fmt::format(
+      "{:.2f} C +- {:.2f}, of which {:.2f} assumed for the camera ({} frame{} {:.2f} to {:.2f}",
+      celsius_from_kelvin(r.temperature_k), r.uncertainty_k, r.assumed_k, r.frames.size(),
+      r.frames.size() == 1 ? "" : "s", celsius_from_kelvin(r.min_k), celsius_from_kelvin(r.max_k));
   if (std::isfinite(r.field_k))
     text += fmt::format("; field {:.2f}", celsius_from_kelvin(r.field_k));
   return text + fmt::format("; {:.0f} deg to the surface)", r.angle_deg);

@@ -141,6 +141,40 @@ TEST_F(Measure, ASessionWithoutRadiometryRefusesAnEmissivityByName) {
   EXPECT_THAT(told.out, HasSubstr("grey body"));
 }
 
+TEST_F(Measure, AnotherSessionWithTheSameFileNamesIsRefused) {
+  const fs::path moved = *folder / "moved";
+  fs::copy(session(), moved, fs::copy_options::recursive);
+  const Outcome same = measure({"--pixel", "000,32,24", "--session", moved.string()});
+  EXPECT_EQ(same.code, 0) << same.err;
+  const fs::path other = *folder / "other";
+  FixtureOptions smaller;
+  smaller.thermal = 11;
+  write_fixture_session(other, smaller);
+  expect_refused({"--pixel", "000,32,24", "--session", other.string()}, 3, "was made of");
+}
+
+TEST_F(Measure, PosesOfFilesThatTheSessionDoesNotListAreRefused) {
+  // As a crafted run would: the model names a file, the session has no frame of that name.
+  const fs::path crafted = *folder / "crafted", record = crafted / "poses_thermal/stage.json";
+  fs::copy(out(), crafted, fs::copy_options::recursive);
+  for (const char* stage : {"poses_thermal", "train_thermal"}) {
+    const fs::path model = crafted / stage / "model/images.bin";
+    if (!fs::exists(model)) continue;
+    std::string bytes = test::get(model);
+    const std::size_t at = bytes.find("thermal/000000.tiff");
+    ASSERT_NE(at, std::string::npos);
+    bytes.replace(at, 19, "thermal/../../x.tif");
+    test::put(model, bytes);
+  }
+  json stage = json::parse(test::get(record));
+  stage["inputs"].erase("outside");
+  test::put(record, stage.dump());
+  const Outcome refused = orbitfuse_program({"measure", crafted.string(), "--hottest", "1"});
+  EXPECT_EQ(refused.code, 3) << refused.out << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("thermal/../../x.tif"));
+  EXPECT_THAT(refused.err, HasSubstr("no thermal frame of"));
+}
+
 TEST_F(Measure, FoldersThatAreNoRunAreNamed) {
   for (const fs::path& wrong : {session(), *folder / "nowhere", fs::path("/dev/null")}) {
     const Outcome refused = orbitfuse_program({"measure", wrong.string(), "--hottest", "1"});

@@ -5,9 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 #include <set>
 #include <thread>
 
+#include "recon/measurement/region.hpp"
+#include "recon/measurement/surface_samples.hpp"
 #include "recon/measurement/table.hpp"
 #include "tests/recon/measurement/box_orbit.hpp"
 
@@ -128,6 +131,162 @@ TEST(Measure, AFrameThatIsOffCountsAsSpreadAndDoesNotDecide) {
   const Answer answer = ask(box_orbit(std::move(parts)), spot_at({0.4, 0.02, 0.01}));
   EXPECT_NEAR(answer.reading.temperature_k, end_k, 1e-3);
   EXPECT_NEAR(answer.reading.max_k, end_k + 30, 1e-3) << "all that was read is told";
+  for (const FrameLine& line : answer.reading.frames) {
+    EXPECT_EQ(line.used, line.frame != off);
+    EXPECT_EQ(line.weight > 0, line.used);
+  }
+  EXPECT_EQ(answer.notes.size(), 1u);
+  EXPECT_THAT(answer.notes.at(0), HasSubstr("left out: 56.9 C against 26.9 C"));
+}
+
+/// Half of the frames that see the end (every second, by name) read `off_k` more.
+SceneParts contradicted_parts(double off_k) {
+  SceneParts parts = box_parts();
+  const Answer all = ask(box_orbit(), spot_at({0.4, 0.02, 0.01}));
+  std::set<std::string> off;
+  for (std::size_t i = 0; i < all.reading.frames.size(); i += 2)
+    off.insert(all.reading.frames[i].frame);
+  const auto read = parts.read_frame;
+  parts.read_frame = [=](const ThermalFrame& frame) -> Result<cv::Mat> {
+    ORBITFUSE_ASSIGN(cv::Mat image, read(frame));
+    if (off.count(frame.view.name) > 0) image += off_k;
+    return image;
+  };
+  return parts;
+}
+
+std::string joined(const std::vector<std::string>& notes) {
+  std::string text;
+  for (const std::string& note : notes) text += note + "\n";
+  return text;
+}
+
+TEST(Measure, FramesThatContradictEachOtherAreAllUsedAndTold) {
+  const ThermalScene scene = box_orbit(contradicted_parts(10));
+  const Answer answer = ask(scene, spot_at({0.4, 0.02, 0.01}));
+  EXPECT_LT(answer.reading.temperature_k - answer.reading.uncertainty_k, end_k);
+  EXPECT_GT(answer.reading.temperature_k + answer.reading.uncertainty_k, end_k + 10);
+  EXPECT_THAT(joined(answer.notes), HasSubstr("frames contradict the others"));
+  for (const FrameLine& line : answer.reading.frames) EXPECT_TRUE(line.used);
+  Request region;
+  region.kind = Kind::box;
+  region.box.center = {0.4, 0, 0};
+  region.box.size = {0.02, 0.2, 0.2};
+  const Answer box = ask(scene, region);
+  EXPECT_LT(box.reading.temperature_k - box.reading.uncertainty_k, end_k);
+  EXPECT_THAT(joined(box.notes), HasSubstr("frames contradict each other at"));
+}
+
+TEST(Measure, WhatNoFrameSeesOfARegionIsTold) {
+  // Frames of one side only: they see one half of a box round both ends, the field has all of it.
+  SceneParts parts = box_parts();
+  std::erase_if(parts.frames, [](const ThermalFrame& frame) {
+    return camera_center(frame.view.cam_from_world).x() < 0.5;
+  });
+  const ThermalScene scene = box_orbit(std::move(parts));
+  std::vector<SurfacePoint> points;
+  for (int i = 0; i < 30; ++i) {
+    SurfacePoint point;
+    const bool front = i < 10;
+    point.position = {front ? 0.4 : -0.4, 0.01 * (i % 10) - 0.05, 0.01};
+    point.normal = {front ? 1.0 : -1.0, 0, 0};
+    point.field_k = front ? end_k : end_k + 20;
+    points.push_back(point);
+  }
+  const auto reading = read_region(scene, points, {}, {});
+  ASSERT_TRUE(reading) << reading.error().message();
+  EXPECT_EQ(reading->points, 30);
+  EXPECT_EQ(reading->seen_points, 10);
+  EXPECT_NEAR(reading->seen_share, 1.0 / 3, 1e-9);
+  EXPECT_THAT(reading->hidden, HasSubstr("too flat"));
+  for (const FrameLine& line : reading->frames) EXPECT_LE(line.covered, 1.0 / 3 + 1e-9);
+  EXPECT_LT(reading->uncertainty_k, 1) << "the unseen half's field doesn't say how sure this is";
+  Answer answer;
+  answer.reading = *reading;
+  EXPECT_EQ(to_json(answer)["reading"]["seen_points"], 10);
+}
+
+TEST(Measure, APolygonOfAnUnseenSideSaysHowMuch) {
+  SceneParts parts = box_parts();
+  // A camera from above sees the top and both ends' edges; no frame at -x is left.
+  for (const ThermalFrame& frame : parts.frames) {
+    PosedView view = frame.view;
+    view.name = "unposed " + view.name;
+    parts.views.push_back(view);
+  }
+  std::erase_if(parts.frames, [](const ThermalFrame& frame) {
+    return camera_center(frame.view.cam_from_world).x() < 0.5;
+  });
+  const PosedView* side = nullptr;
+  for (const PosedView& view : parts.views)
+    if (camera_center(view.cam_from_world).x() < -1.2 &&
+        std::abs(camera_center(view.cam_from_world).y()) > 0.5)
+      side = &view;
+  ASSERT_NE(side, nullptr);
+  Request request;
+  request.kind = Kind::polygon;
+  for (const auto& [u, v] : {std::pair(0, 0), {320, 0}, {320, 240}, {0, 240}})
+    request.places.emplace_back(PixelPlace{side->name, Eigen::Vector2d(u, v)});
+  const Answer answer = ask(box_orbit(std::move(parts)), request);
+  ASSERT_TRUE(answer.reading.seen());
+  EXPECT_LT(answer.reading.seen_share, 0.9);
+  EXPECT_THAT(joined(answer.notes), HasSubstr("no thermal frame sees"));
+}
+
+TEST(Measure, ASmallHotSpotIsTheHottest) {
+  // Three pixels wide in the frames, and 60 K above all else: steep, so less sure than the panel.
+  const Eigen::Vector3d terminal(0.4, 0.02, 0.01);
+  SceneParts parts = box_parts();
+  const auto read = parts.read_frame;
+  parts.read_frame = [=](const ThermalFrame& frame) -> Result<cv::Mat> {
+    ORBITFUSE_ASSIGN(cv::Mat image, read(frame));
+    const Eigen::Vector2d p = frame.view.camera.project(frame.view.cam_from_world * terminal);
+    cv::circle(image, {static_cast<int>(p.x()), static_cast<int>(p.y())}, 1, end_k + 60, -1);
+    return image;
+  };
+  const ThermalScene scene = box_orbit(std::move(parts));
+  Request request;
+  request.kind = Kind::hottest;
+  request.count = 2;
+  const Answer answer = ask(scene, request);
+  ASSERT_EQ(answer.spots.size(), 2u);
+  EXPECT_LT((answer.spots[0].position - terminal).norm(), 0.02);
+  EXPECT_GT(answer.spots[0].reading.temperature_k, rib_k);
+  EXPECT_GE(answer.spots[0].reading.temperature_k, answer.spots[1].reading.temperature_k);
+}
+
+TEST(Measure, PointsOfARegionWeighWhatTheirSurfaceDoes) {
+  // As many cells of a grid meet an axis-parallel square as a smaller one turned by 45 degrees.
+  const ThermalScene scene = box_orbit();
+  OrientedBox box;
+  box.size = {3, 3, 3};
+  const auto points = box_samples(scene, box, {});
+  ASSERT_TRUE(points);
+  int straight = 0;
+  for (const SurfacePoint& point : *points) {
+    const double cells = point.normal.cwiseAbs().sum();
+    EXPECT_NEAR(point.weight * cells, 1, 1e-9);
+    straight += cells < 1.01;
+  }
+  EXPECT_GT(straight, 10);
+}
+
+TEST(Measure, DoubtIsToldWithItsWeight) {
+  SceneParts parts = box_parts();
+  const std::string doubted = ask(box_orbit(), spot_at({0.4, 0.02, 0.01})).reading.frames[0].frame;
+  for (ThermalFrame& frame : parts.frames)
+    if (frame.view.name == doubted) frame.doubt = "temperatures place it elsewhere";
+  const ThermalScene scene = box_orbit(std::move(parts));
+  const Answer spot = ask(scene, spot_at({0.4, 0.02, 0.01}));
+  EXPECT_THAT(joined(spot.notes), HasSubstr("1 of "));
+  EXPECT_THAT(joined(spot.notes), HasSubstr("doubtful poses"));
+  Request coldest;
+  coldest.kind = Kind::coldest;
+  coldest.count = 8;
+  const Answer cold = ask(scene, coldest);
+  EXPECT_THAT(joined(cold.notes), HasSubstr("place "));
+  EXPECT_THAT(joined(cold.notes), HasSubstr("doubtful poses"));
+  EXPECT_THAT(described(spot).front(), HasSubstr("assumed for the camera"));
 }
 
 TEST(Measure, ABoxHoldsTheSurfaceInIt) {
@@ -194,17 +353,17 @@ TEST(Measure, HottestAreTheRibsAndColdestTheEnds) {
   ASSERT_EQ(hottest.spots.size(), 4u);
   for (const PlacedReading& spot : hottest.spots) {
     EXPECT_NEAR(spot.reading.temperature_k, rib_k, 0.3);
-    EXPECT_GT(std::abs(spot.normal.y()), 0.9) << "ribs are on the sides of both boxes";
+    EXPECT_GT(std::abs(spot.normal.y()), 0.5) << "ribs are on the sides of both boxes";
     for (const PlacedReading& other : hottest.spots)
       EXPECT_TRUE(&other == &spot || (other.position - spot.position).norm() >= 0.1);
   }
   request.kind = Kind::coldest;
-  request.count = 1000;
+  request.count = 100;
   const Answer coldest = ask(scene, request);
   EXPECT_NEAR(coldest.spots.at(0).reading.temperature_k, end_k, 0.3);
-  EXPECT_LT(coldest.spots.size(), 1000u);
+  EXPECT_LT(coldest.spots.size(), 100u);
   ASSERT_FALSE(coldest.notes.empty());
-  EXPECT_THAT(coldest.notes[0], HasSubstr("of 1000 found"));
+  EXPECT_THAT(coldest.notes[0], HasSubstr("of 100 found"));
 }
 
 TEST(Measure, DifferenceAndDistanceOfTwo) {

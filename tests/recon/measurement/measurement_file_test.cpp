@@ -98,6 +98,17 @@ TEST_F(MeasurementFile, ProgramsThatSaveAtOnceLoseNothing) {
   EXPECT_EQ(load_measurements(file, "run a")->list.size(), 20u);
 }
 
+TEST_F(MeasurementFile, WhatCouldNotBeReadAgainIsNotWritten) {
+  ASSERT_TRUE(add_measurement(file, "run a", spot("one")));
+  const std::string before = test::get(file);
+  SavedMeasurement large = spot("large");
+  large.answer["hidden"] = std::string(257u << 20, 'x');
+  const auto refused = add_measurement(file, "run a", large);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().found, HasSubstr("it may hold 256 MB"));
+  EXPECT_EQ(test::get(file), before);
+}
+
 TEST_F(MeasurementFile, AFolderInItsPlaceIsSaid) {
   std::filesystem::create_directories(file);
   EXPECT_FALSE(load_measurements(file, "run a"));

@@ -176,5 +176,24 @@ TEST(MeasurementStress, ACancelledOneLeavesNothingHalfMade) {
   EXPECT_TRUE(measure(scene, hottest, progress));
 }
 
+TEST(MeasurementStress, ReadingManyPointsStopsWhenAsked) {
+  const ThermalScene scene = box_orbit();
+  ASSERT_TRUE(measure(scene, spot_at({0.4, 0, 0}), {}))
+      << "all frames' images and depths are there";
+  SurfacePoint point;
+  point.position = {0.4, 0, 0};
+  point.normal = {1, 0, 0};
+  std::atomic<bool> stop{true};
+  Progress progress;
+  progress.cancel = &stop;
+  const auto stopped = read_region(scene, std::vector<SurfacePoint>(10000, point), {}, progress);
+  ASSERT_FALSE(stopped);
+  EXPECT_EQ(stopped.error().kind, ErrorKind::cancelled);
+  stop = false;
+  const auto read = read_region(scene, std::vector<SurfacePoint>(10000, point), {}, progress);
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->seen_points, 10000) << "in several lots";
+}
+
 }  // namespace
 }  // namespace orbitfuse::measurement
