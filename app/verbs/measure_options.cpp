@@ -41,7 +41,8 @@ tl::unexpected<Error> wrong(const std::string& option, const std::string& word,
 }
 
 Result<std::vector<double>> numbers(const std::string& option, const std::string& word,
-                                    std::vector<std::size_t> counts, const std::string& form) {
+                                    const std::vector<std::size_t>& counts,
+                                    const std::string& form) {
   std::vector<double> values;
   for (const std::string& part : split(word)) {
     const auto value = number(part);

@@ -176,10 +176,16 @@ Result<SurfacePoint> ThermalScene::surface_at(const PosedView& view, const Eigen
     return fail(
         ErrorKind::input, where, "outside of the picture",
         fmt::format("choose u within 0..{} and v within 0..{}", camera.width, camera.height));
+  // As wide as a picture of 640 px would have it, whatever the view's own resolution; and no
+  // narrower than a camera may be.
+  constexpr double narrowest = 100;  // focal lengths per width
+  const double step = std::max(
+      {1.0, camera.width / 640.0, std::max(camera.fx, camera.fy) / (narrowest * window_px)});
   Camera window = camera;
   window.width = window.height = window_px;
-  window.cx -= pixel.x() - 0.5 * window_px;
-  window.cy -= pixel.y() - 0.5 * window_px;
+  window.fx /= step, window.fy /= step;
+  window.cx = (camera.cx - pixel.x()) / step + 0.5 * window_px;
+  window.cy = (camera.cy - pixel.y()) / step + 0.5 * window_px;
   ORBITFUSE_ASSIGN(const FieldView seen, parts_.field(window, view.cam_from_world, progress));
   constexpr int middle = window_px / 2;
   const auto z = static_cast<double>(seen.depth.at<float>(middle, middle));

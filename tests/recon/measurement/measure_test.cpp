@@ -57,6 +57,34 @@ TEST(Measure, ASpotIsWhatTheFramesThatSeeItShow) {
   EXPECT_NEAR(weights, 1, 1e-9);
 }
 
+/// 25 degrees on 640 px; a phone's 4000. What a pixel's neighbourhood is must not hang on either.
+TEST(Measure, APixelOfANarrowOrALargeViewIsTheSamePlace) {
+  struct Validated {
+    FieldRenderer field = box_field();
+    Result<FieldView> operator()(const Camera& camera, const Rigid3d& pose,
+                                 const Progress& progress) const {
+      ORBITFUSE_TRY(camera.validate("window"));
+      return field(camera, pose, progress);
+    }
+  };
+  SceneParts parts = box_parts();
+  parts.field = Validated{};
+  const ThermalScene scene = box_orbit(std::move(parts));
+  PosedView view = scene.frames().front().view;
+  const Eigen::Vector3d on_end{0.4, 0.02, 0.01};
+  for (const double scale : {1.0, 12.0}) {
+    PosedView other = view;
+    other.camera =
+        view.camera.scaled_to(static_cast<int>(320 * scale), static_cast<int>(240 * scale));
+    if (scale == 1) other.camera.fx = other.camera.fy = 5 * other.camera.width;
+    const Eigen::Vector2d pixel = other.camera.project(other.cam_from_world * on_end);
+    const auto there = scene.surface_at(other, pixel, {});
+    ASSERT_TRUE(there) << there.error().message();
+    EXPECT_LT((there->position - on_end).norm(), 0.01) << scale;
+    EXPECT_GT(there->normal.x(), 0.99) << scale;
+  }
+}
+
 TEST(Measure, WhatStandsInTheWayHidesTheSpot) {
   const ThermalScene scene = box_orbit();
   // On the large box's top, close behind the small box as cameras at +x see it.
