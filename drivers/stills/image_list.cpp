@@ -100,14 +100,19 @@ Result<ImageList> list_images(Modality modality, const std::vector<fs::path>& pa
     fs::directory_iterator folder(path, error);
     if (error) return fail(ErrorKind::input, path.string(), error.message(), "check the path");
     const std::size_t before = files.size(), unread_before = list.unread.size();
+    std::vector<fs::path> videos;
     for (const fs::directory_entry& entry : folder) {
       if (!entry.is_regular_file(error)) continue;
-      if (has_image_extension(modality, entry.path()) ||
-          (modality == Modality::visible && has_video_extension(entry.path())))
+      if (has_image_extension(modality, entry.path()))
         files.push_back(entry.path());
+      else if (modality == Modality::visible && has_video_extension(entry.path()))
+        videos.push_back(entry.path());
       else if (!unread_kind(entry.path()).empty())
         list.unread.push_back(entry.path());
     }
+    // Phones leave a clip of seconds beside each photo: among photos a video is taken for one.
+    std::vector<fs::path>& wanted = files.size() == before ? files : list.videos_among_photos;
+    wanted.insert(wanted.end(), videos.begin(), videos.end());
     if (files.size() == before) {
       const bool other = list.unread.size() > unread_before;
       return fail(
@@ -131,6 +136,7 @@ Result<ImageList> list_images(Modality modality, const std::vector<fs::path>& pa
     return natural_less(a.filename().string(), b.filename().string());
   });
   std::sort(list.unread.begin(), list.unread.end());
+  std::sort(list.videos_among_photos.begin(), list.videos_among_photos.end());
   return list;
 }
 

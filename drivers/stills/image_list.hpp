@@ -14,12 +14,14 @@ struct ImageList {
   std::vector<std::filesystem::path> images;
   /// Pictures and videos in formats that are not read: who put them there expects them.
   std::vector<std::filesystem::path> unread;
+  /// In a folder that also holds photos: they may be parts of those (Live Photos), so they are
+  /// taken only where they are named, or from a folder of videos alone.
+  std::vector<std::filesystem::path> videos_among_photos;
 };
 
 /// Image files named by the paths: files as given, folders without their sub-folders. In natural
 /// name order ("9.jpg" before "10.jpg"). FLIR recordings are thermal images,
-/// videos and HEIC visible ones. Input error when a
-/// path is missing or has no images.
+/// videos and HEIC visible ones. Input error when a path is missing or has no images.
 Result<ImageList> list_images(Modality modality, const std::vector<std::filesystem::path>& paths);
 
 /// By its name's ending: ".jpg" in any case of letters, ".heic" for photos, ".seq" for thermal.

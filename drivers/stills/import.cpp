@@ -8,6 +8,7 @@
 #include <cmath>
 #include <deque>
 #include <map>
+#include <set>
 #include <tuple>
 
 #include "capture/recording/frame_encoding.hpp"
@@ -94,7 +95,23 @@ class Importer {
           fmt::format("left out: {}: {} files are not read; convert it to JPEG, PNG or TIFF",
                       file.string(), unread_kind(file)));
     }
+    tell_videos_among_photos(list.videos_among_photos, list.images);
     return std::move(list.images);
+  }
+
+  void tell_videos_among_photos(const std::vector<fs::path>& videos,
+                                const std::vector<fs::path>& images) {
+    const std::set<fs::path> named(images.begin(), images.end());
+    std::vector<std::string> names;
+    for (const fs::path& video : videos)
+      if (!named.count(video)) names.push_back(video.filename().string());
+    if (names.empty()) return;
+    report_.warnings.push_back(
+        fmt::format("left out: {}: {} among photos ({}{}): perhaps parts of those (Live Photos); "
+                    "name a video itself to take it",
+                    videos.front().parent_path().string(),
+                    names.size() == 1 ? "a video" : fmt::format("{} videos", names.size()),
+                    names.front(), names.size() > 1 ? ", ..." : ""));
   }
 
   Result<std::vector<fs::path>> visible_sources() {

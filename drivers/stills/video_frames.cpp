@@ -11,7 +11,6 @@
 #include <fstream>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
-#include <optional>
 
 #include "capture/image_quality/frame_motion.hpp"
 #include "capture/image_quality/frame_quality.hpp"
@@ -45,7 +44,8 @@ class Reader {
     ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
     Reader reader;
     try {
-      reader.capture_.open(file.string(), cv::CAP_FFMPEG);
+      // FFmpeg takes what stands before a colon in a relative name for a protocol.
+      reader.capture_.open(fs::absolute(file).string(), cv::CAP_FFMPEG);
     } catch (const cv::Exception&) {
       reader.capture_.release();
     }
@@ -129,23 +129,30 @@ std::vector<Look> look_at_all(Reader& reader, const VideoOptions& options, const
   return looks;
 }
 
-/// The sharpest frame of each stretch.
+/// The sharpest frame of each stretch that lies half a step and more behind the last one taken: two
+/// neighbours on both sides of a border are one view.
 std::vector<bool> choose(const std::vector<Look>& looks, const VideoOptions& options) {
   std::vector<bool> chosen(looks.size(), false);
   const double step = std::max(options.min_step, looks.back().way / options.max_frames);
-  std::optional<std::size_t> best;
-  double stretch = 0;
+  const std::size_t none = looks.size();
+  std::size_t best = none;
+  double stretch = 0, nearest_way = 0;
+  const auto take_best = [&] {
+    if (best == none) return;
+    chosen[best] = true;
+    nearest_way = looks[best].way + step / 2;
+    best = none;
+  };
   for (std::size_t i = 0; i < looks.size(); ++i) {
     if (looks[i].sharpness < 0) continue;
-    const double here = std::floor(looks[i].way / step);
-    if (best && here != stretch) {
-      chosen[*best] = true;
-      best.reset();
-    }
+    // The end of the way belongs to the last stretch.
+    const double here = std::min(std::floor(looks[i].way / step), options.max_frames - 1.0);
+    if (here != stretch) take_best();
     stretch = here;
-    if (!best || looks[i].sharpness > looks[*best].sharpness) best = i;
+    if (looks[i].way < nearest_way) continue;
+    if (best == none || looks[i].sharpness > looks[best].sharpness) best = i;
   }
-  if (best) chosen[*best] = true;
+  take_best();
   return chosen;
 }
 
@@ -180,6 +187,9 @@ std::string VideoAccount::words() const {
   if (!cut_off && announced > frames + std::max<std::int64_t>(2, announced / 50))
     text += fmt::format("; {} more are announced and can't be read: it is cut off or damaged",
                         announced - frames);
+  if (not_read_again > 0)
+    text += fmt::format("; {} of the sharpest could not be read a second time: copy it again",
+                        not_read_again);
   if (taken == 1) text += "; the camera hardly moved";
   return text;
 }
@@ -214,9 +224,10 @@ std::string video_fingerprint(const fs::path& file) {
   std::string ends(std::size_t{1} << 20, '\0');
   stream.read(ends.data(), static_cast<std::streamsize>(ends.size() / 2));
   const auto head = static_cast<std::size_t>(stream.gcount());
-  if (size > ends.size()) {
-    stream.seekg(-static_cast<std::streamoff>(ends.size() / 2), std::ios::end);
-    stream.read(ends.data() + head, static_cast<std::streamsize>(ends.size() / 2));
+  if (size > head) {
+    const std::uintmax_t rest = std::min<std::uintmax_t>(size - head, ends.size() / 2);
+    stream.seekg(-static_cast<std::streamoff>(rest), std::ios::end);
+    stream.read(ends.data() + head, static_cast<std::streamsize>(rest));
   }
   return content_hash(fmt::format("{} {}", size, ends));
 }
@@ -238,8 +249,10 @@ Result<VideoAccount> take_video_frames(const fs::path& file, const VideoOptions&
   }
   ORBITFUSE_ASSIGN(Reader reader, Reader::open(file));
   cv::Mat image;
+  account.not_read_again = std::count(chosen.begin(), chosen.end(), true);
   for (std::size_t i = 0; i < chosen.size() && reader.next(image); ++i) {
     ORBITFUSE_TRY(progress.check("import"));
+    account.not_read_again -= chosen[i];
     if (!chosen[i]) continue;
     const EdgeBlur blur = measure_edges(image);
     if (blur.edges == 0) {

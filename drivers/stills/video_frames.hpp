@@ -32,10 +32,15 @@ struct VideoAccount {
   std::int64_t taken = 0;
   std::int64_t blurred = 0, featureless = 0;  ///< sharpest of their stretch, and yet
   std::int64_t other_size = 0;                ///< than the first
-  bool cut_off = false;                       ///< there are more than max_looked_at
+  /// Chosen at the first reading and not reached at the second: the medium fails, or the file was
+  /// changed meanwhile.
+  std::int64_t not_read_again = 0;
+  bool cut_off = false;  ///< there are more than max_looked_at
 
   /// Passed over for a sharper frame of nearly the same view.
-  std::int64_t less_sharp() const { return frames - taken - blurred - featureless - other_size; }
+  std::int64_t less_sharp() const {
+    return frames - taken - blurred - featureless - other_size - not_read_again;
+  }
   /// One sentence.
   std::string words() const;
 };

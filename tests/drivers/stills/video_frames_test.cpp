@@ -2,12 +2,15 @@
 // Videos are made here, with OpenCV's writer over FFmpeg.
 #include "drivers/stills/video_frames.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
+#include <utility>
 
 #include "core/image/image_io.hpp"
 #include "core/system/file_io.hpp"
@@ -21,6 +24,7 @@ namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr int width = 320, height = 180;
 
@@ -65,7 +69,8 @@ class VideoFrames : public ::testing::Test {
   }
   static void expect_exact(const VideoAccount& a) {
     EXPECT_GE(a.less_sharp(), 0);
-    EXPECT_EQ(a.frames, a.taken + a.less_sharp() + a.blurred + a.featureless + a.other_size);
+    EXPECT_EQ(a.frames, a.taken + a.less_sharp() + a.blurred + a.featureless + a.other_size +
+                            a.not_read_again);
   }
 
   test::TempFolder folder;
@@ -95,8 +100,88 @@ TEST_F(VideoFrames, NoMoreThanAskedForAndSpreadOverTheWay) {
   const auto account = take(write("orbit.mp4", walk()), options);
   ASSERT_TRUE(account);
   EXPECT_GE(taken.size(), 4u);
-  EXPECT_LE(taken.size(), 7u);  // a step more where the last one is not whole
+  EXPECT_LE(taken.size(), 6u);
   EXPECT_GT(taken.back().index, 50);
+}
+
+TEST_F(VideoFrames, NeverMoreThanAskedForWhateverTheNumber) {
+  const std::string file = write("orbit.mp4", walk());
+  for (int most = 2; most < 10; ++most) {
+    VideoOptions options;
+    options.max_frames = most;
+    ASSERT_TRUE(take(file, options));
+    EXPECT_LE(taken.size(), static_cast<std::size_t>(most));
+  }
+}
+
+TEST_F(VideoFrames, TwoNeighboursAreOneView) {
+  // A steady walk of 8 px (0.025 widths) a frame; the sharpest are pairs, one after the other.
+  std::vector<cv::Mat> frames;
+  for (int i = 0; i < 60; ++i) frames.push_back(view(8 * i, i % 8 > 1));
+  VideoOptions options;
+  options.max_edge_px = 100;
+  for (const double step : {0.06, 0.08, 0.1, 0.12, 0.15, 0.2}) {
+    options.min_step = step;
+    ASSERT_TRUE(take(write("pairs.mp4", frames), options));
+    ASSERT_GE(taken.size(), 3u);
+    for (std::size_t i = 1; i < taken.size(); ++i)
+      EXPECT_GT(taken[i].index, taken[i - 1].index + 1) << "step " << step;
+  }
+}
+
+TEST_F(VideoFrames, WhatIsNotReachedTheSecondTimeIsTold) {
+  const std::string file = write("orbit.avi", walk(), "MJPG");
+  const std::string whole = *read_file(file);
+  Progress progress;
+  bool cut = false;
+  const auto account = take_video_frames(file, {}, progress, [&](const VideoFrame&) -> Status {
+    if (!std::exchange(cut, true)) fs::resize_file(file, whole.size() / 2);
+    return {};
+  });
+  ASSERT_TRUE(account) << account.error().message();
+  expect_exact(*account);
+  EXPECT_GT(account->not_read_again, 0);
+  EXPECT_THAT(account->words(), HasSubstr("could not be read a second time"));
+}
+
+TEST_F(VideoFrames, ANameWithAColonIsAFile) {
+  const std::string file = write("orbit.mp4", walk());
+  const fs::path before = fs::current_path();
+  fs::current_path(folder.path());
+  fs::rename("orbit.mp4", "tcp:walk.mp4");
+  const auto account = take("tcp:walk.mp4");
+  fs::current_path(before);
+  EXPECT_TRUE(account) << account.error().message();
+}
+
+TEST_F(VideoFrames, TheFingerprintTellsWhatDiffersAtTheEnd) {
+  for (const std::size_t size : {100u, 600'000u, 1'048'576u, 3'000'000u}) {
+    std::string bytes(size, 'x');
+    test::put(folder / "a.mp4", bytes);
+    bytes.back() = 'y';
+    test::put(folder / "b.mp4", bytes);
+    EXPECT_NE(video_fingerprint(folder / "a.mp4"), video_fingerprint(folder / "b.mp4")) << size;
+  }
+}
+
+TEST_F(VideoFrames, AClipAmongPhotosIsLeftOutByWordsUnlessItIsNamed) {
+  for (int i = 0; i < 4; ++i)
+    cv::imwrite((folder / fmt::format("IMG_{}.JPG", i)).string(), view(9 * i));
+  const std::string clip = write("IMG_2.MOV", walk());
+  ImportOptions options;
+  options.visible = {folder.path()};
+  options.visible_stations = DeclaredStations{};
+  const auto photos = import_session(options, folder / "photos");
+  ASSERT_TRUE(photos) << photos.error().message();
+  EXPECT_EQ(photos->visible, 4);
+  EXPECT_THAT(photos->warnings, Contains(AllOf(HasSubstr("left out"), HasSubstr("IMG_2.MOV"),
+                                               HasSubstr("name a video itself"))));
+  options.visible_stations.reset();
+  options.visible = {folder.path(), clip};
+  const auto both = import_session(options, folder / "both");
+  ASSERT_TRUE(both) << both.error().message();
+  EXPECT_GT(both->visible, 8);
+  EXPECT_THAT(both->warnings, Not(Contains(HasSubstr("name a video itself"))));
 }
 
 TEST_F(VideoFrames, BlurredStretchesAndEmptyOnesAreToldAndNotTaken) {
