@@ -60,11 +60,7 @@ Status check_session(const Folder& folder, const Session& session) {
 /// The thermal field, its frames, and how both come into the run's world.
 Status add_thermal(const Folder& folder, const Session& session, SceneParts& parts) {
   ORBITFUSE_ASSIGN(nerf::Field field, nerf::Field::load(folder.out / "train_thermal" / field_file));
-  Similarity3d world_from_thermal;
-  if (folder.done("poses_visible") && folder.done("register")) {
-    ORBITFUSE_ASSIGN(const RegistrationRecord record, load_registration(folder.out / "register"));
-    world_from_thermal = record.visible_from_thermal;
-  }
+  ORBITFUSE_ASSIGN(const Similarity3d world_from_thermal, load_world_from_thermal(folder.out));
   parts.field = measurement::field_renderer(std::make_shared<const nerf::Field>(std::move(field)),
                                             world_from_thermal);
   const bool moved = fs::exists(folder.out / "train_thermal" / "model");
@@ -125,6 +121,17 @@ Result<std::string> identity_of(const Folder& folder, const Session& session) {
 }
 
 }  // namespace
+
+bool is_in_visible_world(const fs::path& out) {
+  const Folder folder{out};
+  return folder.done("poses_visible") && folder.done("register");
+}
+
+Result<Similarity3d> load_world_from_thermal(const fs::path& out) {
+  if (!is_in_visible_world(out)) return Similarity3d();
+  ORBITFUSE_ASSIGN(const RegistrationRecord record, load_registration(out / "register"));
+  return record.visible_from_thermal;
+}
 
 Result<ThermalScene> load_measurement_scene(const fs::path& out, const Session& session,
                                             const measurement::MeasurementOptions& options) {

@@ -5,6 +5,7 @@
 
 #include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
+#include "app/stages/measurement_scene.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
 #include "app/view/surface.hpp"
@@ -41,20 +42,18 @@ Status load_fields(const pipeline::StageContext& context, FinishedRun& run) {
     return fail(
         ErrorKind::input, context.out.string(), "no trained field in it",
         "name the --out folder of a run, or finish it: orbitfuse run " + context.out.string());
-  run.frame = run.visible.empty() ? Modality::thermal : Modality::visible;
-  if (run.visible.empty() || run.thermal.empty()) {
+  if (run.visible.empty() || run.thermal.empty())
     run.notes.push_back(run.visible.empty() ? "the run has no visible field"
                                             : "the run has no thermal field");
-    return {};
-  }
-  if (!context.has("register")) {
+  else if (!context.has("register")) {
     run.thermal = nerf::Field();
     run.notes.push_back("the thermal field is not shown: nothing relates it to the visible one");
-    return {};
   }
-  ORBITFUSE_ASSIGN(const stages::RegistrationRecord record,
-                   stages::load_registration(context.of("register")));
-  run.frame_from_thermal = record.visible_from_thermal;
+  if (!run.thermal.empty()) {
+    ORBITFUSE_ASSIGN(run.frame_from_thermal, stages::load_world_from_thermal(context.out));
+  }
+  run.frame = run.visible.empty() && !stages::is_in_visible_world(context.out) ? Modality::thermal
+                                                                               : Modality::visible;
   return {};
 }
 
@@ -94,7 +93,7 @@ void set_orbit(FinishedRun& run) {
   std::vector<PosedView> of_frame;
   std::vector<Rigid3d> poses;
   for (const RecordedView& v : run.views) {
-    if (v.modality == run.frame) of_frame.push_back(v.view);
+    if (v.modality == run.frame || !run.has(run.frame)) of_frame.push_back(v.view);
     poses.push_back(v.view.cam_from_world);
   }
   if (const auto orbit = orbit_geometry(of_frame)) {

@@ -25,8 +25,8 @@ struct RecordedView {
 };
 
 /// What the viewer needs of a run, held in memory: the run's folder may change meanwhile.
-/// Everything is in one frame, `frame`: the visible field's, or the thermal one's where there is no
-/// visible field.
+/// Everything is in one frame, `frame`, which is also the world of measurements: the visible
+/// poses', or the thermal ones' where nothing relates these to visible ones.
 struct FinishedRun {
   std::filesystem::path out;
   std::optional<Session> session;  ///< nothing: it is not where the run read it

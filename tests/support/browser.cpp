@@ -65,8 +65,13 @@ Browser::Browser(const std::filesystem::path& profile, int width, int height, bo
   to_ = in[1];
   from_ = out[0];
   json page;
-  for (const json& target : call("Target.getTargets").at("targetInfos"))
-    if (target.at("type") == "page") page = target;
+  // On a busy machine the browser answers before it has its first page.
+  for (int tries = 0; page.is_null() && tries < 600; ++tries) {
+    for (const json& target : call("Target.getTargets").at("targetInfos"))
+      if (target.at("type") == "page") page = target;
+    if (page.is_null()) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+  if (page.is_null()) throw std::runtime_error("the browser has no page");
   session_ = call("Target.attachToTarget", {{"targetId", page.at("targetId")}, {"flatten", true}})
                  .at("sessionId");
   call("Page.enable");

@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <opencv2/imgcodecs.hpp>
 
+#include "app/stages/artifacts.hpp"
+#include "app/stages/measurement_scene.hpp"
 #include "app/view/view_server.hpp"
 #include "core/temperature.hpp"
 #include "tests/app/cli/program.hpp"
@@ -265,6 +267,36 @@ TEST_F(ViewBrowserTest, FitsAPhone) {
       R"(Array.from(document.querySelectorAll('button, select')).filter(e => e.offsetParent && (e.getBoundingClientRect().height < 44 || e.getBoundingClientRect().width < 40)).map(e => e.id || e.textContent))");
   EXPECT_TRUE(small.empty()) << small.dump();
   EXPECT_TRUE(page.errors().empty()) << page.errors().front();
+}
+
+/// Also where the visible field is not there: places touched in the viewer are the program's.
+TEST_F(ViewBrowserTest, ShowsAndMeasuresInOneWorld) {
+  stages::RegistrationRecord record;
+  record.how = "of this test";
+  record.visible_from_thermal.scale = 2;
+  record.visible_from_thermal.translation = {1, 2, 3};
+  ASSERT_TRUE(stages::save_registration(out / "register", record));
+  for (const bool visible : {true, false}) {
+    if (!visible) fs::remove_all(out / "train_visible");
+    const auto run = load_finished_run(out, stages::RunConfig(), {});
+    ASSERT_TRUE(run) << run.error().message();
+    ASSERT_TRUE(run->session);
+    EXPECT_EQ(run->frame, Modality::visible);
+    const auto scene = stages::load_measurement_scene(out, *run->session);
+    ASSERT_TRUE(scene) << scene.error().message();
+    int compared = 0;
+    for (const RecordedView& shown : run->views) {
+      if (shown.modality != Modality::thermal) continue;
+      const auto measured = scene->view(shown.view.name);
+      ASSERT_TRUE(measured);
+      EXPECT_LT(
+          (camera_center((*measured)->cam_from_world) - camera_center(shown.view.cam_from_world))
+              .norm(),
+          1e-6);
+      ++compared;
+    }
+    EXPECT_GT(compared, 5);
+  }
 }
 
 /// Ctrl-C is how it ends; what cannot be shown is named.
