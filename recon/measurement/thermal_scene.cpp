@@ -17,6 +17,7 @@ namespace {
 
 constexpr int window_px = 9;  // rays round a pixel that say where its surface is and how it lies
 constexpr int window_reach = 3;
+constexpr int window_of_width = 640;  // those rays are a pixel apart in a picture this wide
 /// Depths round a pixel that differ more than this are of another surface.
 constexpr double same_surface = 0.03;
 
@@ -178,8 +179,11 @@ Result<SurfacePoint> ThermalScene::surface_at(const PosedView& view, const Eigen
         fmt::format("choose u within 0..{} and v within 0..{}", camera.width, camera.height));
   Camera window = camera;
   window.width = window.height = window_px;
-  window.cx -= pixel.x() - 0.5 * window_px;
-  window.cy -= pixel.y() - 0.5 * window_px;
+  // The same angle round the place, whatever the picture's size: that of a thermal camera's pixel.
+  const double scale = static_cast<double>(window_of_width) / camera.width;
+  window.fx *= scale, window.fy *= scale;
+  window.cx = (camera.cx - pixel.x()) * scale + 0.5 * window_px;
+  window.cy = (camera.cy - pixel.y()) * scale + 0.5 * window_px;
   ORBITFUSE_ASSIGN(const FieldView seen, parts_.field(window, view.cam_from_world, progress));
   constexpr int middle = window_px / 2;
   const auto z = static_cast<double>(seen.depth.at<float>(middle, middle));
