@@ -108,7 +108,7 @@ std::string described(const TemperatureReading& r) {
       r.frames.size() == 1 ? "" : "s", celsius_from_kelvin(r.min_k), celsius_from_kelvin(r.max_k));
   if (std::isfinite(r.field_k))
     text += fmt::format("; field {:.2f}", celsius_from_kelvin(r.field_k));
-  return text + fmt::format("; {:.0f} deg to the surface)", r.angle_deg);
+  return text + fmt::format("; seen {:.0f} deg from the normal)", r.angle_deg);
 }
 
 std::vector<std::string> described(const Answer& answer) {

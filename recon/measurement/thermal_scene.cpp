@@ -17,6 +17,7 @@ namespace {
 
 constexpr int window_px = 9;  // rays round a pixel that say where its surface is and how it lies
 constexpr int window_reach = 3;
+constexpr int window_of_width = 640;  // those rays are a pixel apart in a picture this wide
 /// Depths round a pixel that differ more than this are of another surface.
 constexpr double same_surface = 0.03;
 
@@ -181,6 +182,12 @@ Result<SurfacePoint> ThermalScene::surface_at(const PosedView& view, const Eigen
   constexpr double narrowest = 100;  // focal lengths per width
   const double step = std::max(
       {1.0, camera.width / 640.0, std::max(camera.fx, camera.fy) / (narrowest * window_px)});
+  Camera window = camera;
+  window.width = window.height = window_px;
+  // The same rays whatever the resolution of the view; no narrower a camera than there may be.
+  constexpr double narrowest = 100;  // focal lengths per width
+  const double step = std::max(static_cast<double>(camera.width) / window_of_width,
+                               std::max(camera.fx, camera.fy) / (narrowest * window_px));
   Camera window = camera;
   window.width = window.height = window_px;
   window.fx /= step, window.fy /= step;

@@ -110,6 +110,25 @@ TEST(Measure, APixelIsTheSurfaceThatItShows) {
   EXPECT_NEAR(answer.reading.temperature_k, end_k, 1e-3);
 }
 
+TEST(Measure, ThePicturesSizeDoesNotChangeTheSurface) {
+  const ThermalScene scene = box_orbit();
+  PosedView view = scene.frames()[0].view;
+  const Eigen::Vector3d near_edge(0.4, 0.145, 0.01);
+  std::vector<SurfacePoint> found;
+  for (const int width : {320, 640, 1920}) {
+    view.camera = view.camera.scaled_to(width, width * 3 / 4);
+    const auto surface =
+        scene.surface_at(view, view.camera.project(view.cam_from_world * near_edge), {});
+    ASSERT_TRUE(surface) << surface.error().message();
+    found.push_back(*surface);
+  }
+  EXPECT_GT(found[0].variation_k, 0.01) << "the edge is within reach";
+  for (const SurfacePoint& other : found) {
+    EXPECT_NEAR(other.variation_k, found[0].variation_k, 1e-3);
+    EXPECT_LT((other.normal - found[0].normal).norm(), 1e-3);
+  }
+}
+
 TEST(Measure, WhatNoFrameSeesSaysSo) {
   const ThermalScene scene = box_orbit();
   for (const Eigen::Vector3d& hidden : {Eigen::Vector3d(0, 0, -0.15), Eigen::Vector3d(0, 0, 0)}) {
