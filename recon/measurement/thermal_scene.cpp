@@ -177,13 +177,6 @@ Result<SurfacePoint> ThermalScene::surface_at(const PosedView& view, const Eigen
     return fail(
         ErrorKind::input, where, "outside of the picture",
         fmt::format("choose u within 0..{} and v within 0..{}", camera.width, camera.height));
-  // As wide as a picture of 640 px would have it, whatever the view's own resolution; and no
-  // narrower than a camera may be.
-  constexpr double narrowest = 100;  // focal lengths per width
-  const double step = std::max(
-      {1.0, camera.width / 640.0, std::max(camera.fx, camera.fy) / (narrowest * window_px)});
-  Camera window = camera;
-  window.width = window.height = window_px;
   // The same rays whatever the resolution of the view; no narrower a camera than there may be.
   constexpr double narrowest = 100;  // focal lengths per width
   const double step = std::max(static_cast<double>(camera.width) / window_of_width,
