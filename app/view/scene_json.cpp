@@ -18,7 +18,7 @@ using nlohmann::json;
 std::string hex_of(const cv::Mat& colors_bgr) {
   std::string text;
   for (int i = 0; i < colors_bgr.cols; ++i) {
-    const auto c = colors_bgr.at<cv::Vec3b>(0, i);
+    const auto& c = colors_bgr.at<cv::Vec3b>(0, i);
     text += fmt::format("{:02x}{:02x}{:02x}", c[2], c[1], c[0]);
   }
   return text;

@@ -73,7 +73,7 @@ void append(std::string& bytes, Number value) {
 
 }  // namespace
 
-PointCloud surface_of(PointCloud visible, PointCloud thermal) {
+PointCloud surface_of(const PointCloud& visible, PointCloud thermal) {
   PointCloud surface = thinned(visible.empty() ? thermal : visible);
   if (visible.empty() || thermal.empty()) return surface;
   thermal = thinned(thermal);

@@ -12,7 +12,7 @@ namespace orbitfuse::view {
 /// none is near (three times the thermal points' median spacing). One empty: the other as it is.
 /// At most what a phone draws at 30 pictures a second, in an order in which the first n points are
 /// spread over the whole, for any n. Points that are not finite are left out.
-PointCloud surface_of(PointCloud visible, PointCloud thermal);
+PointCloud surface_of(const PointCloud& visible, PointCloud thermal);
 
 /// For the browser, little-endian: uint32 count, float32 low[3], float32 step[3] (position = low +
 /// step * integer), then uint16 positions[3 * count], uint8 colours[3 * count] (128 where there are
