@@ -123,7 +123,7 @@ Status load_surface(const pipeline::StageContext& context, FinishedRun& run) {
     ORBITFUSE_ASSIGN(thermal, cloud_of(context, "train_thermal"));
   }
   for (Eigen::Vector3d& p : thermal.positions) p = run.frame_from_thermal * p;
-  run.surface = surface_of(std::move(visible), std::move(thermal));
+  run.surface = surface_of(visible, std::move(thermal));
   if (run.surface.empty())
     run.notes.push_back(
         "the run has no point cloud: while the camera moves there is nothing to see");
