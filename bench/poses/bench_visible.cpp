@@ -81,30 +81,65 @@ scenes::Scene load(const fs::path& data, const std::string& which, const Request
   return scene;
 }
 
-/// What the ladder must not fall behind.
-Result<ModalityPoses> colmap_poses(const Session& session, const fs::path& workdir) {
-  const auto frames = session.frames_of(Modality::visible);
-  PoseOptions options;
-  options.max_image_side_px = 3200;
-  options.max_features = 8192;
-  options.min_posed_ratio = 0;
+struct Matched {
+  std::vector<ProxyImage> images;
+  ColmapProject project;
+};
+
+Result<Matched> matched(const Session& session, const std::vector<ViewPair>& pairs,
+                        const PoseOptions& options, const fs::path& workdir) {
   ProxyOptions proxies;
   proxies.max_side_px = options.max_image_side_px;
   ColmapOptions engine;
   engine.max_features = options.max_features;
-  ORBITFUSE_ASSIGN(const auto images,
-                   write_proxies(session, frames, proxies, workdir / "images", {}));
-  ORBITFUSE_ASSIGN(ColmapProject project,
+  Matched result;
+  ORBITFUSE_ASSIGN(result.images, write_proxies(session, session.frames_of(Modality::visible),
+                                                proxies, workdir / "images", {}));
+  ORBITFUSE_ASSIGN(result.project,
                    ColmapProject::create(workdir / "colmap", workdir / "images", engine));
-  ORBITFUSE_TRY(project.extract(session, images, {}));
-  ORBITFUSE_TRY(project.match(images, exhaustive_pairs(static_cast<int>(frames.size())), {}));
-  ORBITFUSE_ASSIGN(Reconstruction model, project.map(session, images, {}, {}));
-  if (model.views.size() < 2) return fail(ErrorKind::quality, "colmap", "no model", "see its log");
+  ORBITFUSE_TRY(result.project.extract(session, result.images, {}));
+  ORBITFUSE_TRY(result.project.match(result.images, pairs, {}));
+  return result;
+}
+
+/// A model and the gates' word on it, as the ladder's one step.
+Result<ModalityPoses> only_step(const std::string& attempt, const std::string& found,
+                                Reconstruction model, const Session& session,
+                                const PoseOptions& options) {
+  if (model.views.size() < 2) return fail(ErrorKind::quality, attempt, "no model", "see its log");
+  const auto frames = session.frames_of(Modality::visible);
   ORBITFUSE_ASSIGN(JudgedModel judged, judge_model(std::move(model), session, frames, options));
-  judged.poses.ladder.push_back({"COLMAP, all pairs, full settings", judged.believed, judged.why,
+  judged.poses.ladder.push_back({attempt, judged.believed, found + judged.why,
                                  static_cast<int>(judged.poses.reconstruction.views.size()),
                                  static_cast<int>(frames.size()), 0});
   return std::move(judged.poses);
+}
+
+/// What the ladder must not fall behind.
+Result<ModalityPoses> colmap_poses(const Session& session, const fs::path& workdir) {
+  PoseOptions options;
+  options.max_image_side_px = 3200;
+  options.max_features = 8192;
+  options.min_posed_ratio = 0;
+  const auto count = static_cast<int>(session.frames_of(Modality::visible).size());
+  ORBITFUSE_ASSIGN(Matched all, matched(session, exhaustive_pairs(count), options, workdir));
+  ORBITFUSE_ASSIGN(Reconstruction model, all.project.map(session, all.images, {}, {}));
+  return only_step("COLMAP, all pairs, full settings", "", std::move(model), session, options);
+}
+
+/// What stands in where COLMAP finds nothing.
+Result<ModalityPoses> global_poses(const Session& session, const fs::path& workdir) {
+  const auto frames = session.frames_of(Modality::visible);
+  const PoseOptions options;
+  ORBITFUSE_ASSIGN(const Matched orbit, matched(session, orbit_pairs(frames), options, workdir));
+  ORBITFUSE_ASSIGN(FeatureGraph graph,
+                   read_feature_graph(orbit.project.database(), session, orbit.images));
+  const Adjuster adjust = [&](Reconstruction model) -> Result<Reconstruction> {
+    ORBITFUSE_ASSIGN(ModalityPoses poses, adjust_model(std::move(model), session, frames, options));
+    return std::move(poses.reconstruction);
+  };
+  ORBITFUSE_ASSIGN(GlobalModel global, map_globally(graph, adjust, {}, {}));
+  return only_step("global mapper", global.found + "; ", std::move(global.model), session, options);
 }
 
 /// What each view is off by, and how many points hold it.
@@ -120,36 +155,6 @@ void print_views(const ModalityPoses& poses, const scenes::PoseError& error) {
   const Camera& camera = poses.reconstruction.views.front().camera;
   fmt::print("    {}x{}, focal length {:.1f} px, {} points\n", camera.width, camera.height,
              camera.fx, poses.reconstruction.points.size());
-}
-
-/// What stands in where COLMAP finds nothing.
-Result<ModalityPoses> global_poses(const Session& session, const fs::path& workdir) {
-  const auto frames = session.frames_of(Modality::visible);
-  const PoseOptions options;
-  ProxyOptions proxies;
-  proxies.max_side_px = options.max_image_side_px;
-  ColmapOptions engine;
-  engine.max_features = options.max_features;
-  ORBITFUSE_ASSIGN(const auto images,
-                   write_proxies(session, frames, proxies, workdir / "images", {}));
-  ORBITFUSE_ASSIGN(ColmapProject project,
-                   ColmapProject::create(workdir / "colmap", workdir / "images", engine));
-  ORBITFUSE_TRY(project.extract(session, images, {}));
-  ORBITFUSE_TRY(project.match(images, orbit_pairs(frames), {}));
-  ORBITFUSE_ASSIGN(FeatureGraph graph, read_feature_graph(project.database(), session, images));
-  const Adjuster adjust = [&](Reconstruction model) -> Result<Reconstruction> {
-    ORBITFUSE_ASSIGN(ModalityPoses poses, adjust_model(std::move(model), session, frames, options));
-    return std::move(poses.reconstruction);
-  };
-  ORBITFUSE_ASSIGN(GlobalModel global, map_globally(graph, adjust, {}, {}));
-  if (global.model.views.size() < 2)
-    return fail(ErrorKind::quality, "global mapper", global.found, "see the ladder");
-  ORBITFUSE_ASSIGN(JudgedModel judged,
-                   judge_model(std::move(global.model), session, frames, options));
-  judged.poses.ladder.push_back({"global mapper", judged.believed, global.found + "; " + judged.why,
-                                 static_cast<int>(judged.poses.reconstruction.views.size()),
-                                 static_cast<int>(frames.size()), 0});
-  return std::move(judged.poses);
 }
 
 void print(const scenes::Scene& scene, const Result<ModalityPoses>& poses, double cpu_s,
