@@ -48,7 +48,8 @@ json scene_json(const FinishedRun& run) {
   for (const std::string& palette_name : palette_names())
     palettes[palette_name] = hex_of(*palette(palette_name));
   const Eigen::Vector3d &c = run.center, &u = run.up;
-  return {{"name", std::filesystem::absolute(run.out).lexically_normal().string()},
+  std::error_code ignored;
+  return {{"name", std::filesystem::weakly_canonical(run.out, ignored).string()},
           {"visible", run.has(Modality::visible)},
           {"thermal", run.has(Modality::thermal)},
           {"gray", run.thermal_is_gray},
