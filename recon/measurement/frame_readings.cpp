@@ -5,13 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 namespace orbitfuse::measurement {
 namespace {
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 /// Between the four samples round a pixel; NaN where one of them is, or outside.
 double bilinear(const cv::Mat& image, const Eigen::Vector2d& pixel) {
