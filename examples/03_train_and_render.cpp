@@ -31,7 +31,6 @@ of::Status train_and_render(const std::filesystem::path& file, int steps, const 
   cv::cvtColor(rgb8, bgr8, cv::COLOR_RGB2BGR);
   return of::write_png(view_file, bgr8);
 }
-
 int main(int argc, char** argv) {
   if (argc != 4) return 2;
   const of::Status done = train_and_render(argv[1], std::atoi(argv[2]), argv[3]);
