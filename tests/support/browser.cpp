@@ -67,7 +67,8 @@ Browser::Browser(const std::filesystem::path& profile, int width, int height, bo
   json page;
   // On a busy machine the browser answers before it has its first page.
   for (int tries = 0; page.is_null() && tries < 600; ++tries) {
-    for (const json& target : call("Target.getTargets").at("targetInfos"))
+    const json targets = call("Target.getTargets");
+    for (const json& target : targets.at("targetInfos"))
       if (target.at("type") == "page") page = target;
     if (page.is_null()) std::this_thread::sleep_for(std::chrono::milliseconds(100));
   }
