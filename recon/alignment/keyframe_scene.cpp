@@ -71,21 +71,65 @@ void draw_triangle(const Vertex& a, const Vertex& b, const Vertex& c, Canvas& ca
     }
 }
 
-std::vector<Vertex> vertices_of(const Keyframe& key, const Camera& camera,
-                                const Rigid3d& cam_from_world) {
-  const Rigid3d cam_from_key = cam_from_world * key.cam_from_world.inverse();
-  const Eigen::Matrix3f rotation = cam_from_key.rotation.toRotationMatrix().cast<float>();
-  const Eigen::Vector3f translation = cam_from_key.translation.cast<float>();
-  const auto fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
-  const auto cx = static_cast<float>(camera.cx), cy = static_cast<float>(camera.cy);
+/// From a keyframe's camera to the pixels of the one that it is drawn for.
+class Projection {
+ public:
+  Projection(const Keyframe& key, const Camera& camera, const Rigid3d& cam_from_world)
+      : fx_(static_cast<float>(camera.fx)),
+        fy_(static_cast<float>(camera.fy)),
+        cx_(static_cast<float>(camera.cx)),
+        cy_(static_cast<float>(camera.cy)) {
+    const Rigid3d cam_from_key = cam_from_world * key.cam_from_world.inverse();
+    rotation_ = cam_from_key.rotation.toRotationMatrix().cast<float>();
+    translation_ = cam_from_key.translation.cast<float>();
+  }
+  /// z stays negative for what lies behind.
+  Vertex vertex(const Eigen::Vector3f& in_key, float value) const {
+    const Eigen::Vector3f p = rotation_ * in_key + translation_;
+    if (!(p.z() > 1e-6F)) return {};
+    return {fx_ * p.x() / p.z() + cx_, fy_ * p.y() / p.z() + cy_, p.z(), value};
+  }
+
+ private:
+  float fx_, fy_, cx_, cy_;
+  Eigen::Matrix3f rotation_;
+  Eigen::Vector3f translation_;
+};
+
+std::vector<Vertex> vertices_of(const Keyframe& key, const Projection& projection) {
   std::vector<Vertex> vertices(key.points.size());
   const float* values = key.brightness.ptr<float>();
-  for (std::size_t i = 0; i < vertices.size(); ++i) {
-    const Eigen::Vector3f p = rotation * key.points[i] + translation;
-    if (!(p.z() > 1e-6F)) continue;
-    vertices[i] = {fx * p.x() / p.z() + cx, fy * p.y() / p.z() + cy, p.z(), values[i]};
-  }
+  for (std::size_t i = 0; i < vertices.size(); ++i)
+    vertices[i] = projection.vertex(key.points[i], values[i]);
   return vertices;
+}
+
+/// A square of pixels, corners by rows.
+void draw_square(const std::array<Vertex, 4>& corners, Canvas& canvas) {
+  const auto& [a, b, c, d] = corners;
+  if (a.z <= 0 || b.z <= 0 || c.z <= 0 || d.z <= 0) return;
+  draw_triangle(a, b, d, canvas);
+  draw_triangle(a, d, c, canvas);
+}
+
+/// A square that holds an outline: each of its four pixels reaches half-way across it, at its own
+/// depth. Left out, outlines would lie half a pixel inside the object, all of them: it would look
+/// smaller than it is, and cameras aligned with it would stand too near.
+void draw_outline(const Keyframe& key, int x, int y, const Projection& projection, Canvas& canvas) {
+  for (int v = 0; v <= 1; ++v)
+    for (int u = 0; u <= 1; ++u) {
+      const auto at = static_cast<std::size_t>((y + v) * key.depth.cols + x + u);
+      const Eigen::Vector3f& point = key.points[at];
+      const Eigen::Vector3f right(0.5F * point.z() / static_cast<float>(key.camera.fx), 0, 0);
+      const Eigen::Vector3f down(0, 0.5F * point.z() / static_cast<float>(key.camera.fy), 0);
+      const Eigen::Vector3f first =
+          point - static_cast<float>(u) * right - static_cast<float>(v) * down;
+      const float value = key.brightness.ptr<float>()[at];
+      draw_square(
+          {projection.vertex(first, value), projection.vertex(first + right, value),
+           projection.vertex(first + down, value), projection.vertex(first + right + down, value)},
+          canvas);
+    }
 }
 
 /// The render as a surface.
@@ -107,18 +151,19 @@ Keyframe keyframe_of(const Camera& camera, const Rigid3d& cam_from_world, const 
   return key;
 }
 
-Canvas drawn(const Keyframe& key, const Camera& camera, const Rigid3d& cam_from_world) {
+Canvas drawn(const Keyframe& key, const Camera& camera, const Rigid3d& cam_from_world,
+             bool outlines) {
   Canvas canvas(camera);
-  const std::vector<Vertex> vertices = vertices_of(key, camera, cam_from_world);
+  const Projection projection(key, camera, cam_from_world);
+  const std::vector<Vertex> vertices = vertices_of(key, projection);
   const int columns = key.depth.cols;
   for (int y = 0; y + 1 < key.depth.rows; ++y)
     for (int x = 0; x + 1 < columns; ++x) {
-      if (key.whole(y, x) == 0) continue;
       const Vertex* v = &vertices[static_cast<std::size_t>(y * columns + x)];
-      const Vertex &a = v[0], &b = v[1], &c = v[columns], &d = v[columns + 1];
-      if (a.z <= 0 || b.z <= 0 || c.z <= 0 || d.z <= 0) continue;
-      draw_triangle(a, b, d, canvas);
-      draw_triangle(a, d, c, canvas);
+      if (key.whole(y, x) != 0)
+        draw_square({v[0], v[1], v[columns], v[columns + 1]}, canvas);
+      else if (outlines)
+        draw_outline(key, x, y, projection, canvas);
     }
   return canvas;
 }
@@ -227,7 +272,7 @@ class KeyframeScene {
     std::vector<Canvas> layers(used.size(), Canvas(Camera{}));
     parallel_for(static_cast<int>(used.size()), [&](int i) {
       const auto k = static_cast<std::size_t>(i);
-      layers[k] = drawn(*used[k], camera, cam_from_world);
+      layers[k] = drawn(*used[k], camera, cam_from_world, used.size() == 1);
     });
     Canvas& all = layers.front();
     // The nearest keyframe has the word; another one only where it sees something clearly before.

@@ -69,6 +69,44 @@ TEST(KeyframeScene, AViewWithinADegreeIsMadeOfTheSameRender) {
   EXPECT_EQ(box.renders, 2) << "too far for the first";
 }
 
+/// Pixels of a surface, and those of them that have none beside them.
+struct Outline {
+  double area = 0, length = 0;
+};
+
+Outline outline_of(const cv::Mat& depth) {
+  Outline outline;
+  const auto surface = [&](int y, int x) { return std::isfinite(depth.at<float>(y, x)); };
+  for (int y = 1; y + 1 < depth.rows; ++y)
+    for (int x = 1; x + 1 < depth.cols; ++x) {
+      if (!surface(y, x)) continue;
+      ++outline.area;
+      if (!surface(y, x - 1) || !surface(y, x + 1) || !surface(y - 1, x) || !surface(y + 1, x))
+        ++outline.length;
+    }
+  return outline;
+}
+
+// Outlines half a pixel inside the object, as they were, put thermal cameras 0.6 % too near.
+TEST(KeyframeScene, OutlinesOfAViewNearByStayWhereTheyAre) {
+  Counted box;
+  const auto scene = keyframe_scene(box.renderer, {}, Eigen::Vector3d::Zero(), {}, {});
+  ASSERT_TRUE(scene);
+  const Camera camera = at(0).camera;
+  ASSERT_TRUE((*scene)(camera, at(30).cam_from_world));
+  double area = 0, true_area = 0, length = 0;
+  for (int i = 0; i < 12; ++i) {
+    const Rigid3d pose = at(30 + 0.31 * std::cos(i), 14 + 0.29 * std::sin(i)).cam_from_world;
+    const auto near = (*scene)(camera, pose);
+    ASSERT_TRUE(near);
+    const Outline truth = outline_of(testing_orbit::box_view(camera, pose, false).depth);
+    area += outline_of(near->depth).area, true_area += truth.area, length += truth.length;
+  }
+  ASSERT_EQ(box.renders, 1);
+  ASSERT_GT(length, 12 * 200);
+  EXPECT_NEAR((area - true_area) / length, 0, 0.1) << "pixels outwards";
+}
+
 TEST(KeyframeScene, CoarseViewsAreMadeOfGivenOnesHoweverFar) {
   Counted box;
   std::vector<PosedView> views;
