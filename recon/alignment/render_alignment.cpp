@@ -12,28 +12,18 @@
 #include "recon/alignment/edge_field.hpp"
 #include "recon/alignment/patch_matching.hpp"
 #include "recon/alignment/patch_residual.hpp"
+#include "recon/alignment/pose_correction.hpp"
 
 namespace orbitfuse {
 namespace {
-
-struct FocalPrior {
-  double offset, sigma;
-  template <class T>
-  bool operator()(const T* log_focal, T* residual) const {
-    residual[0] = (log_focal[0] - T(offset)) / T(sigma);
-    return true;
-  }
-};
 
 struct ViewMatches {
   std::vector<PatchMatch> matches;
 };
 
-using Correction = std::array<double, 6>;
-
 /// All corrections and the common focal, the robust scale lowered step by step.
 double solve(const std::vector<ViewMatches>& views, const Camera& camera, double prior_offset,
-             double sigma, std::vector<Correction>& corrections) {
+             double sigma, std::vector<PoseCorrection>& corrections) {
   double log_focal = 0;
   for (const double scale_px : {8.0, 4.0, 2.0, 1.0}) {
     ceres::Problem problem;
@@ -46,7 +36,7 @@ double solve(const std::vector<ViewMatches>& views, const Camera& camera, double
                                  corrections[i].data(), &log_focal);
     if (problem.NumResidualBlocks() == 0) return 0;
     problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<FocalPrior, 1, 1>(new FocalPrior{prior_offset, sigma}),
+        new ceres::AutoDiffCostFunction<ValuePrior, 1, 1>(new ValuePrior{prior_offset, sigma}),
         nullptr, &log_focal);
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::SPARSE_SCHUR;
@@ -57,15 +47,6 @@ double solve(const std::vector<ViewMatches>& views, const Camera& camera, double
     ceres::Solve(options, &problem, &summary);
   }
   return log_focal;
-}
-
-Rigid3d rigid_of(const Correction& c) {
-  const Eigen::Vector3d axis(c[0], c[1], c[2]);
-  const double angle = axis.norm();
-  const Eigen::Quaterniond q = angle > 0
-                                   ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis / angle))
-                                   : Eigen::Quaterniond::Identity();
-  return {q, {c[3], c[4], c[5]}};
 }
 
 cv::Mat reduced(const cv::Mat& image, const Camera& camera) {
@@ -98,7 +79,7 @@ class ImageFields {
 };
 
 /// Residuals of the matches after the correction, and how many are small.
-void judge(const ViewMatches& matched, const Correction& correction, double log_focal,
+void judge(const ViewMatches& matched, const PoseCorrection& correction, double log_focal,
            const Camera& camera, RenderAlignedView& view) {
   std::vector<double> distances;
   for (const PatchMatch& match : matched.matches) {
@@ -126,7 +107,7 @@ Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer,
                                            const RenderAlignmentOptions& options,
                                            const Progress& progress) {
   RenderAlignment result;
-  for (const PosedView& view : views) result.views.push_back({view, 0, 0, 0, {}});
+  for (const PosedView& view : views) result.views.push_back({view, 0, 0, 0, {}, 0});
   if (views.empty()) return result;
   double focal = views.front().camera.fx;
   const double prior_focal = options.prior_focal_px > 0 ? options.prior_focal_px : focal;
@@ -154,7 +135,7 @@ Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer,
       matched[i].matches = match_patches(renders[i], edges, seen_by, field, matching);
       result.views[i].agreement = edge_agreement(edges, field);
     });
-    std::vector<Correction> corrections(views.size(), Correction{});
+    std::vector<PoseCorrection> corrections(views.size(), PoseCorrection{});
     const double log_focal = solve(matched, seen_by, std::log(prior_focal / focal),
                                    options.focal_relative_sigma, corrections);
     focal *= std::exp(log_focal);

@@ -10,12 +10,6 @@
 namespace orbitfuse {
 namespace {
 
-struct Painter {
-  Camera camera;
-  Rigid3d cam_from_world;
-  cv::Mat image, depth;
-};
-
 using Painters = std::vector<Painter>;
 
 constexpr float unpainted = std::numeric_limits<float>::quiet_NaN();
@@ -50,6 +44,14 @@ std::vector<Eigen::Vector3d> world_points(const cv::Mat& depth, const Camera& ca
                        Eigen::Vector3d(camera.ray_of({x + 0.5, y + 0.5}) *
                                        static_cast<double>(depth.at<float>(y, x))));
   return points;
+}
+
+cv::Mat layer_of(const Painter& painter, const std::vector<Eigen::Vector3d>& points,
+                 const cv::Size& size, double depth_tolerance) {
+  cv::Mat layer(size, CV_32F);
+  for (std::size_t p = 0; p < points.size(); ++p)
+    layer.ptr<float>()[p] = seen_by(painter, points[p], depth_tolerance);
+  return layer;
 }
 
 /// Fills what is not painted yet, brought to the level of what is.
@@ -115,6 +117,12 @@ std::optional<double> painted_correlation(const cv::Mat& painting, const cv::Mat
 
 }  // namespace
 
+cv::Mat painted_by(const Painter& painter, const cv::Mat& depth, const Camera& camera,
+                   const Rigid3d& cam_from_world, double depth_tolerance) {
+  return layer_of(painter, world_points(depth, camera, cam_from_world), depth.size(),
+                  depth_tolerance);
+}
+
 Result<SceneRenderer> painted_scene(const SceneRenderer& renderer,
                                     const std::vector<PosedView>& views,
                                     const std::vector<cv::Mat>& images,
@@ -139,12 +147,9 @@ Result<SceneRenderer> painted_scene(const SceneRenderer& renderer,
     ORBITFUSE_ASSIGN(SceneRender view, renderer(camera, cam_from_world));
     const auto points = world_points(view.depth, camera, cam_from_world);
     view.brightness = cv::Mat(view.depth.size(), CV_32F, cv::Scalar(unpainted));
-    for (const Painter* painter : nearest(*painters, cam_from_world, options)) {
-      cv::Mat layer(view.depth.size(), CV_32F);
-      for (std::size_t p = 0; p < points.size(); ++p)
-        layer.ptr<float>()[p] = seen_by(*painter, points[p], options.depth_tolerance);
-      paint(layer, view.brightness);
-    }
+    for (const Painter* painter : nearest(*painters, cam_from_world, options))
+      paint(layer_of(*painter, points, view.depth.size(), options.depth_tolerance),
+            view.brightness);
     return view;
   };
 }

@@ -21,6 +21,18 @@ struct PaintedSceneOptions {
   double min_turn_deg = 0;
 };
 
+/// A view that lends its image to others.
+struct Painter {
+  Camera camera;  ///< without distortion, of the image's size
+  Rigid3d cam_from_world;
+  cv::Mat image, depth;  ///< CV_32FC1; NaN where there is no surface
+};
+
+/// What the painter saw of a depth map's pixels, CV_32FC1; NaN where it saw something else, or
+/// nothing. `depth_tolerance`: relative.
+cv::Mat painted_by(const Painter& painter, const cv::Mat& depth, const Camera& camera,
+                   const Rigid3d& cam_from_world, double depth_tolerance);
+
 /// Renders with `renderer`'s depth and brightness from `images` (CV_32FC1) of `views`, NaN where no
 /// painter sees. Painters differ by an offset (drift), which is taken out. `renderer` must outlive
 /// the result. Errors: the renderer's, cancelled.

@@ -222,9 +222,8 @@ MoveDecision verdict(const PlaceEvidence& seen) {
     return MoveDecision::both;
   // Temperatures know more edges: where they are sure, form alone doesn't pull a view away.
   if (!seen.agree && found) return MoveDecision::temperatures_alone;
-  // Where they find it nowhere they don't speak against a place that form knows well.
-  if (seen.temperatures_there < found_share && seen.form_before > vouched_share &&
-      seen.form_before > seen.form_there)
+  // Where they don't find it they don't speak against a place that form knows well, and better.
+  if (!found && seen.form_before > vouched_share && seen.form_before > seen.form_there)
     return MoveDecision::form_alone;
   return MoveDecision::nobody;
 }
@@ -306,8 +305,8 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
         view.verdict = {
             Confidence::doubtful, DoubtReason::temperatures_contradict,
             fmt::format(
-                "the other views' temperatures contradict its place and find it nowhere (at "
-                "best {:.2f} of the median support); the visible scene alone keeps it, at "
+                "the other views' temperatures contradict its place and don't find it elsewhere "
+                "(at best {:.2f} of the median support); the visible scene alone keeps it, at "
                 "{:.2f} of its loop's median support",
                 seen.temperatures_there, seen.form_before)};
         break;

@@ -8,6 +8,7 @@
 #include "core/numeric/median.hpp"
 #include "recon/alignment/whole_view.hpp"
 #include "recon/poses/cross_modal/temperature_consistency.hpp"
+#include "recon/poses/cross_modal/thermal_bundle.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -142,9 +143,11 @@ Status refine_orbit(const SceneRenderer& renderer, const OrbitViews& orbit,
   ORBITFUSE_TRY(nudge(refinement, 0, alignment));
   ORBITFUSE_TRY(refinement.together(alignment, prior, {fine_rounds().back()}));
   ORBITFUSE_ASSIGN(const TemperatureCheck check, correct_by_temperatures(refinement, alignment));
-  if (check.moved == 0) return {};
-  ORBITFUSE_TRY(refinement.together(alignment, prior, {fine_rounds().back()}));
-  return keep_by_temperatures(refinement, check, alignment);
+  if (check.moved > 0) {
+    ORBITFUSE_TRY(refinement.together(alignment, prior, {fine_rounds().back()}));
+    ORBITFUSE_TRY(keep_by_temperatures(refinement, check, alignment));
+  }
+  return bundle_thermal(refinement, prior, {}, alignment);
 }
 
 double station_offset_deg(const OrbitViews& orbit, const RenderAlignment& alignment) {

@@ -29,6 +29,10 @@ constexpr double weak_support_share = 0.65, weak_correlation_share = 0.75;
 /// Of frames between stations: two of 72 of `sedan` were 2.5 and 3.6 % off with 0.67 and 0.50.
 /// Chosen on that scene alone; it doubts nine right ones there.
 constexpr double min_between_share = 0.7;
+/// Of the median view's patches found again in other thermal views: they overrule the doubt that a
+/// painted scene raised. A view elsewhere has next to none.
+constexpr double confirming_share = 0.4;
+constexpr double least_median_patches = 30;
 /// Stations are good to several degrees (sigma 2 to 3), loops to two in elevation. Where an
 /// operator kept them less well, all views say so.
 constexpr double max_azimuth_off_deg = 12, azimuth_sigmas = 3, most_azimuth_off_deg = 25;
@@ -85,7 +89,12 @@ Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
     seen.aim_off = aim_off(orbit, view);
     evidence.push_back(seen);
   }
-  std::vector<double> off_deg, correlations;
+  std::vector<double> off_deg, correlations, confirmed;
+  for (const RenderAlignedView& view : alignment.views) confirmed.push_back(view.confirmed_patches);
+  const double median_patches = median(confirmed);
+  for (std::size_t i = 0; i < evidence.size(); ++i)
+    if (median_patches >= least_median_patches)
+      evidence[i].confirmed_share = confirmed[i] / median_patches;
   for (const ViewEvidence& seen : evidence) {
     off_deg.push_back(seen.azimuth_off_deg);
     if (seen.correlation) correlations.push_back(*seen.correlation);
@@ -138,6 +147,9 @@ ViewVerdict judged(const ViewEvidence& seen, const ViewVerdict& before) {
                                 "image correlates with what the other views measured there at "
                                 "{:.2f}, the median view at {:.2f}",
                                 seen.support_share, *seen.correlation, seen.median_correlation));
+  const bool by_painting = before.reason == DoubtReason::temperatures_elsewhere ||
+                           before.reason == DoubtReason::temperatures_contradict;
+  if (by_painting && seen.confirmed_share >= confirming_share) return {};
   return before;
 }
 
@@ -181,10 +193,10 @@ Result<std::vector<int>> judge_views(const OrbitRefinement& refinement, std::siz
     refinement.progress.report(
         {"poses.thermal", 3, 4, -1,
          fmt::format("evidence {}: support {:.2f}, temperatures {:.2f}, azimuth {:.1f}, elevation "
-                     "{:.1f} deg, distance {:.3f}, aim {:.3f}",
+                     "{:.1f} deg, distance {:.3f}, aim {:.3f}, {} patches confirmed",
                      view.view.name, seen.support_share, seen.correlation.value_or(-1),
                      seen.azimuth_off_deg, seen.elevation_off_deg, seen.log_distance_off,
-                     seen.aim_off)});
+                     seen.aim_off, view.confirmed_patches)});
   }
   return doubt_whole_loops(refinement.orbit, stations, alignment);
 }

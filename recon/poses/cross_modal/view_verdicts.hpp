@@ -23,6 +23,9 @@ struct ViewEvidence {
   double aim_off = 0;  ///< orbit's centre from the principal point, share of the image's width
   double azimuth_scatter_deg = 0;  ///< of all views, robust sigma: how well stations were kept
   double median_correlation = 0;   ///< of all views
+  /// Patches that other thermal views show where the pose has them, as a share of the median
+  /// view's; 0 where that has too few.
+  double confirmed_share = 0;
 };
 
 /// One entry a view. Errors: the renderer's, cancelled.

@@ -149,8 +149,11 @@ TEST(CorrectByTemperatures, OnlyTemperaturesThatFindAViewMoveIt) {
   // Found nowhere; that both scenes agree on a place where neither knows it says nothing.
   EXPECT_EQ(verdict({true, 0.03, 0.2, 0.7}), MoveDecision::form_alone);
   EXPECT_EQ(verdict({false, 0.03, 0.2, 0.7}), MoveDecision::form_alone);
-  // Half found elsewhere, or known to neither: nobody's word.
-  EXPECT_EQ(verdict({false, 0.55, 0.2, 0.7}), MoveDecision::nobody);
+  // Half found elsewhere: the place that form knows better stays, in doubt.
+  EXPECT_EQ(verdict({false, 0.55, 0.2, 0.7}), MoveDecision::form_alone);
+  EXPECT_EQ(verdict({true, 0.58, 0.51, 0.92}), MoveDecision::form_alone);
+  // Half found elsewhere where form knows it better, or known to neither: nobody's word.
+  EXPECT_EQ(verdict({false, 0.55, 0.8, 0.7}), MoveDecision::nobody);
   EXPECT_EQ(verdict({false, 0.1, 0.2, 0.4}), MoveDecision::nobody);
   EXPECT_EQ(verdict({}), MoveDecision::nobody);
   const double nan = std::numeric_limits<double>::quiet_NaN();

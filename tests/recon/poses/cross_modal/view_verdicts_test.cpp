@@ -46,6 +46,16 @@ TEST(ViewVerdicts, WhatSpeaksAgainstAViewIsNamed) {
   EXPECT_TRUE(judged(weak, {}).sure()) << "one of both is no reason";
   weak.support_share = 0.5, weak.correlation = 0.9;
   EXPECT_TRUE(judged(weak, {}).sure());
+  // A painted scene's doubt is overruled by what neighbours measured, not by anything else.
+  const ViewVerdict painted{Confidence::doubtful, DoubtReason::temperatures_elsewhere, "1 deg"};
+  ViewEvidence confirmed = good;
+  confirmed.confirmed_share = 0.39;
+  EXPECT_FALSE(judged(confirmed, painted).sure());
+  confirmed.confirmed_share = 0.9;
+  EXPECT_TRUE(judged(confirmed, painted).sure());
+  EXPECT_FALSE(judged(confirmed, {Confidence::doubtful, DoubtReason::undecided, ""}).sure());
+  confirmed.support_share = 0.2;
+  EXPECT_FALSE(judged(confirmed, painted).sure());
   ViewEvidence between = good;
   between.support_share = 0.67;
   EXPECT_TRUE(judged(between, {}).sure());

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/cross_modal/thermal_bundle.hpp"
+
+#include <ceres/ceres.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "core/numeric/median.hpp"
+#include "core/system/parallel.hpp"
+#include "recon/alignment/edge_field.hpp"
+#include "recon/alignment/patch_matching.hpp"
+#include "recon/alignment/patch_residual.hpp"
+#include "recon/alignment/pose_correction.hpp"
+
+namespace orbitfuse {
+namespace {
+
+/// A view with fewer patches found again is held by edges alone.
+constexpr int least_patches = 12;
+/// A sighting within this of where the bundle has it confirms the view's pose.
+constexpr double confirmed_px = 1;
+/// Wide first: the poses may be a few pixels off; then from where the first bundle has them.
+constexpr std::array<int, 2> reaches_px = {6, 3};
+
+/// Ceres residual of two weighted pixels. `lens`: logarithm of what the focal length is scaled by;
+/// `offset`: of the point from the surface, world.
+struct SightingResidual {
+  Eigen::Vector3d surface;
+  Rigid3d cam_from_world;
+  Camera camera;
+  ThermalSighting sighting;
+
+  template <class T>
+  bool operator()(const T* correction, const T* log_focal, const T* offset, T* residual) const {
+    const Eigen::Matrix<T, 3, 1> world(T(surface.x()) + offset[0], T(surface.y()) + offset[1],
+                                       T(surface.z()) + offset[2]);
+    const Eigen::Matrix<T, 3, 1> in_cam =
+        cam_from_world.rotation.toRotationMatrix().cast<T>() * world +
+        cam_from_world.translation.cast<T>();
+    T moved[3];
+    ceres::AngleAxisRotatePoint(correction, in_cam.data(), moved);
+    for (int i = 0; i < 3; ++i) moved[i] += correction[3 + i];
+    if (!(moved[2] > T(1e-6))) return false;
+    const T scale = exp(log_focal[0]);
+    const T dx = scale * T(camera.fx) * moved[0] / moved[2] + T(camera.cx - sighting.pixel.x());
+    const T dy = scale * T(camera.fy) * moved[1] / moved[2] + T(camera.cy - sighting.pixel.y());
+    const Eigen::Matrix2d& w = sighting.sqrt_weight;
+    residual[0] = T(w(0, 0)) * dx + T(w(0, 1)) * dy;
+    residual[1] = T(w(1, 0)) * dx + T(w(1, 1)) * dy;
+    return true;
+  }
+};
+
+/// How far the point has left the surface along the line of sight, in sigmas.
+struct SurfaceResidual {
+  Eigen::Vector3d sight;
+  double sigma;
+
+  template <class T>
+  bool operator()(const T* offset, T* residual) const {
+    const T along =
+        offset[0] * T(sight.x()) + offset[1] * T(sight.y()) + offset[2] * T(sight.z());
+    residual[0] = along / T(sigma);
+    return true;
+  }
+};
+
+/// What one solve is made of, at the options' width.
+struct BundleRound {
+  ThermalViews views;
+  std::vector<ThermalTrack> tracks;
+  std::vector<std::vector<PatchMatch>> edges;  ///< of each view, in the visible scene
+};
+
+struct BundleSolution {
+  std::vector<PoseCorrection> corrections;
+  double log_focal = 0;
+  double median_px = 0;        ///< of the sightings' residuals
+  std::vector<int> confirmed;  ///< sightings of each view within confirmed_px
+};
+
+class Bundle {
+ public:
+  Bundle(const BundleRound& round, const ThermalBundleOptions& options)
+      : round_(round), options_(options), offsets_(round.tracks.size(), {0, 0, 0}) {
+    solution_.corrections.resize(round.views.images.size(), PoseCorrection{});
+    for (std::size_t t = 0; t < round.tracks.size(); ++t) add(round.tracks[t], offsets_[t]);
+    for (std::size_t v = 0; v < round.edges.size(); ++v)
+      for (const PatchMatch& match : round.edges[v]) add(v, match);
+  }
+
+  BundleSolution solve(const ValuePrior& log_focal) {
+    problem_.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<ValuePrior, 1, 1>(new ValuePrior(log_focal)), nullptr,
+        &solution_.log_focal);
+    ceres::Solver::Options solver;
+    solver.linear_solver_type = ceres::SPARSE_SCHUR;
+    solver.max_num_iterations = options_.max_iterations;
+    solver.num_threads = 1;  // more sum in any order
+    solver.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(solver, &problem_, &summary);
+    judge();
+    return solution_;
+  }
+
+ private:
+  void add(const ThermalTrack& track, std::array<double, 3>& offset) {
+    for (const ThermalSighting& seen : track.sightings)
+      sightings_.emplace_back(
+          seen.view,
+          problem_.AddResidualBlock(
+              new ceres::AutoDiffCostFunction<SightingResidual, 2, 6, 1, 3>(
+                  new SightingResidual{track.surface, round_.views.cam_from_world[seen.view],
+                                       round_.views.camera, seen}),
+              new ceres::CauchyLoss(options_.loss_px), solution_.corrections[seen.view].data(),
+              &solution_.log_focal, offset.data()));
+    problem_.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<SurfaceResidual, 1, 3>(
+            new SurfaceResidual{track.sight, options_.surface_sigma * track.distance}),
+        new ceres::CauchyLoss(1), offset.data());
+  }
+
+  void add(std::size_t view, const PatchMatch& match) {
+    problem_.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<PatchResidual, 2, 6, 1>(
+            new PatchResidual{match, round_.views.camera}),
+        new ceres::ScaledLoss(new ceres::CauchyLoss(1), options_.edge_weight * match.score,
+                              ceres::TAKE_OWNERSHIP),
+        solution_.corrections[view].data(), &solution_.log_focal);
+  }
+
+  void judge() {
+    solution_.confirmed.assign(solution_.corrections.size(), 0);
+    std::vector<double> residuals;
+    for (const auto& [view, block] : sightings_) {
+      double r[2];
+      if (!problem_.EvaluateResidualBlock(block, false, nullptr, r, nullptr)) continue;
+      residuals.push_back(std::hypot(r[0], r[1]));
+      solution_.confirmed[view] += residuals.back() < confirmed_px ? 1 : 0;
+    }
+    solution_.median_px = residuals.empty() ? 0 : median(residuals);
+  }
+
+  const BundleRound& round_;
+  const ThermalBundleOptions& options_;
+  std::vector<std::array<double, 3>> offsets_;
+  BundleSolution solution_;
+  ceres::Problem problem_;
+  std::vector<std::pair<std::size_t, ceres::ResidualBlockId>> sightings_;
+};
+
+Result<BundleRound> prepared(const OrbitRefinement& refinement, const Fit& alignment,
+                             const std::vector<std::size_t>& chosen,
+                             const ThermalBundleOptions& options, int reach_px) {
+  const Camera& full = alignment.views.front().view.camera;
+  const int width = std::min(options.width_px, full.width);
+  BundleRound round;
+  ThermalViews& views = round.views;
+  views.camera =
+      full.scaled_to(width, std::max(1, full.height * width / full.width)).without_distortion();
+  std::vector<SceneRender> renders;
+  for (std::size_t i = 0; i < alignment.views.size(); ++i) {
+    ORBITFUSE_TRY(refinement.progress.check("poses.thermal"));
+    views.cam_from_world.push_back(alignment.views[i].view.cam_from_world);
+    cv::Mat image;
+    cv::resize(refinement.orbit.images[i], image, {views.camera.width, views.camera.height}, 0, 0,
+               cv::INTER_AREA);
+    views.images.push_back(image);
+    ORBITFUSE_ASSIGN(SceneRender render,
+                     refinement.renderer(views.camera, views.cam_from_world.back()));
+    views.depth.push_back(render.depth);
+    renders.push_back(std::move(render));
+  }
+  ThermalTrackOptions tracks = options.tracks;
+  tracks.reach_px = reach_px;
+  round.tracks = thermal_tracks(views, chosen, tracks);
+  round.edges.resize(renders.size());
+  const RenderRound fine = fine_rounds().back();
+  parallel_for(static_cast<int>(renders.size()), [&](int index) {
+    const auto i = static_cast<std::size_t>(index);
+    round.edges[i] = match_patches(renders[i], rendered_edges(renders[i]), views.camera,
+                                   orientation_field(views.images[i], 1.0),
+                                   {fine.search_px, fine.patch_search_px, fine.patch_radius_px,
+                                    fine.patch_spacing_px});
+  });
+  return round;
+}
+
+/// Views with enough sightings to hold them.
+std::size_t held_views(const BundleRound& round) {
+  std::vector<int> sightings(round.views.images.size(), 0);
+  for (const ThermalTrack& track : round.tracks)
+    for (const ThermalSighting& seen : track.sightings) ++sightings[seen.view];
+  return static_cast<std::size_t>(std::count_if(sightings.begin(), sightings.end(),
+                                                [](int n) { return n >= least_patches; }));
+}
+
+void take(const BundleSolution& solution, Fit& alignment) {
+  const double scale = std::exp(solution.log_focal);
+  for (std::size_t i = 0; i < alignment.views.size(); ++i) {
+    RenderAlignedView& view = alignment.views[i];
+    view.confirmed_patches = solution.confirmed[i];
+    view.view.cam_from_world = rigid_of(solution.corrections[i]) * view.view.cam_from_world;
+    view.view.camera.fx *= scale, view.view.camera.fy *= scale;
+  }
+  alignment.focal_px = alignment.views.front().view.camera.fx;
+}
+
+}  // namespace
+
+Status bundle_thermal(const OrbitRefinement& refinement, const FocalGuess& prior,
+                      const ThermalBundleOptions& options, Fit& alignment) {
+  std::vector<std::size_t> chosen;
+  for (std::size_t i = 0; i < alignment.views.size(); ++i)
+    if (alignment.views[i].verdict.confidence != Confidence::dropped) chosen.push_back(i);
+  if (chosen.empty()) return {};
+  for (const int reach_px : reaches_px) {
+    ORBITFUSE_ASSIGN(const BundleRound round,
+                     prepared(refinement, alignment, chosen, options, reach_px));
+    if (2 * held_views(round) < chosen.size()) return {};
+    const double focal_px = alignment.views.front().view.camera.fx;
+    const BundleSolution solution = Bundle(round, options)
+                                        .solve({std::log(prior.focal_px / focal_px),
+                                                prior.relative_sigma});
+    take(solution, alignment);
+    refinement.progress.report(
+        {"poses.thermal", 3, 4, -1,
+         fmt::format("{} places seen by several thermal views, {:.2f} px; focal length {:+.2f} %",
+                     round.tracks.size(), solution.median_px,
+                     100 * (std::exp(solution.log_focal) - 1))});
+  }
+  return {};
+}
+
+}  // namespace orbitfuse

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "recon/poses/cross_modal/orbit_refinement.hpp"
+#include "recon/poses/cross_modal/thermal_tracks.hpp"
+
+// Thermal views bundled with each other. Edges that two modalities share lie a little beside each
+// other (heat spreads, paint ends elsewhere than form), all round the orbit in the same way, which a
+// focal length and a distance that are both too short explain well. Patches of a thermal view found
+// again in its neighbours have no such bias: they hold the views against each other and the lens,
+// and the visible scene's surface and edges hold where that is. Internal to recon/poses; errors:
+// the renderer's, cancelled.
+namespace orbitfuse {
+
+struct ThermalBundleOptions {
+  int width_px = 320;  ///< of images and depth
+  ThermalTrackOptions tracks;
+  double surface_sigma = 0.02;  ///< of the visible field's surface, share of the distance
+  double loss_px = 0.5;         ///< Cauchy scale of a patch found again
+  double edge_weight = 0.03;    ///< of an edge found in the visible scene: biased, and many
+  int max_iterations = 40;
+};
+
+/// All views and their common focal length. Patches are looked for among views that are not
+/// dropped; those are held by the visible scene's edges alone. Each view says how many of its
+/// patches others confirm. Where fewer than half of the views have enough of them nothing moves.
+Status bundle_thermal(const OrbitRefinement& refinement, const FocalGuess& prior,
+                      const ThermalBundleOptions& options, Fit& alignment);
+
+}  // namespace orbitfuse
