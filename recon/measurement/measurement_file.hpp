@@ -22,6 +22,9 @@ struct SavedMeasurement {
   nlohmann::json answer;  ///< to_json(Answer) of that time
 };
 
+/// {"name", "created", "request", "answer"}.
+nlohmann::json to_json(const SavedMeasurement& saved);
+
 struct Measurements {
   std::string identity;  ///< ThermalScene::identity of the run that they belong to
   std::vector<SavedMeasurement> list;
