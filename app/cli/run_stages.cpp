@@ -133,17 +133,6 @@ Status resolve(StageFolders& folders) {
   return {};
 }
 
-namespace {
-
-bool any_stage_finished(const fs::path& out) {
-  std::error_code unreadable;
-  for (const auto& entry : fs::directory_iterator(out, unreadable))
-    if (fs::exists(entry.path() / pipeline::stage_record_file, unreadable)) return true;
-  return false;
-}
-
-}  // namespace
-
 Status run_stages(Context& context, const StageFolders& given,
                   const std::vector<std::string>& targets, Missing missing) {
   StageFolders folders = given;
@@ -158,7 +147,7 @@ Status run_stages(Context& context, const StageFolders& given,
         fmt::format("{} holds results of {}: what this run doesn't reach stays that session's; "
                     "give each session an --out of its own",
                     folders.out, (*earlier)["session"].get<std::string>()));
-  if (missing == Missing::leave_out && !any_stage_finished(folders.out))
+  if (missing == Missing::leave_out && pipeline::finished_stages(folders.out).empty())
     return fail(
         ErrorKind::input, folders.out, "no finished stage in it",
         "run the session first: orbitfuse run " + folders.session + " --out " + folders.out);

@@ -108,6 +108,15 @@ Status write_stage_record(const fs::path& folder, const StageRecord& record) {
   return write_file_atomic(folder / stage_record_file, to_json(record).dump(2) + "\n");
 }
 
+std::set<std::string> finished_stages(const fs::path& out) {
+  std::set<std::string> names;
+  std::error_code unreadable;
+  for (const auto& entry : fs::directory_iterator(out, unreadable))
+    if (fs::exists(entry.path() / stage_record_file, unreadable))
+      names.insert(entry.path().filename().string());
+  return names;
+}
+
 Result<std::vector<OutputFile>> list_outputs(const fs::path& folder) {
   std::vector<OutputFile> outputs;
   std::error_code ec;

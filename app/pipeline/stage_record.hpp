@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,10 @@ struct StageRecord {
 nlohmann::json to_json(const StageRecord& record);
 Result<StageRecord> read_stage_record(const std::filesystem::path& folder);
 Status write_stage_record(const std::filesystem::path& folder, const StageRecord& record);
+
+/// Folders of a run that have a done mark, as they lie there: files may be damaged or out of date.
+/// None where the run's folder can't be read.
+std::set<std::string> finished_stages(const std::filesystem::path& out);
 
 /// Every file below the folder except the done mark, sorted by name.
 Result<std::vector<OutputFile>> list_outputs(const std::filesystem::path& folder);

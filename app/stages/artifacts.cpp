@@ -5,6 +5,7 @@
 
 #include <array>
 
+#include "app/pipeline/stage_record.hpp"
 #include "core/formats/colmap_model.hpp"
 #include "core/formats/transforms_json.hpp"
 #include "core/image/image_io.hpp"
@@ -53,6 +54,13 @@ Result<json> read_json(const fs::path& file) {
   return j;
 }
 
+pipeline::StageContext context_of_run(const fs::path& out) {
+  pipeline::StageContext context;
+  context.out = out;
+  context.finished = pipeline::finished_stages(out);
+  return context;
+}
+
 Status save_poses(const fs::path& folder, const Reconstruction& model) {
   ORBITFUSE_TRY(write_colmap_model(folder / "model", model, ColmapFormat::binary));
   Transforms transforms;
@@ -74,6 +82,20 @@ Result<Reconstruction> load_trained_poses(const pipeline::StageContext& context,
   if (context.has("train_" + of) && fs::exists(context.of("train_" + of) / "model"))
     return load_poses(context.of("train_" + of), modality);
   return load_poses(context.of("poses_" + of), modality);
+}
+
+Result<std::map<std::string, std::string>> load_doubts(const fs::path& folder) {
+  ORBITFUSE_ASSIGN(const pipeline::StageRecord record, pipeline::read_stage_record(folder));
+  std::map<std::string, std::string> doubts;
+  const json& metrics = record.output.metrics;
+  if (!metrics.contains("doubtful")) return doubts;
+  const auto is_text = [](const json& entry, const char* key) {
+    return entry.is_object() && entry.contains(key) && entry[key].is_string();
+  };
+  for (const json& entry : metrics["doubtful"])
+    if (is_text(entry, "view"))
+      doubts[entry["view"]] = is_text(entry, "why") ? entry["why"] : json("doubtful");
+  return doubts;
 }
 
 Status save_depth_maps(const fs::path& folder, const std::vector<DepthMap>& maps) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -14,11 +15,18 @@
 // What stages leave for each other, in formats that other tools read (docs/formats.md).
 namespace orbitfuse::stages {
 
+/// To read what the finished stages of a run left, outside of any run.
+pipeline::StageContext context_of_run(const std::filesystem::path& out);
+
 /// model/ (COLMAP, binary), transforms.json.
 Status save_poses(const std::filesystem::path& folder, const Reconstruction& model);
 Result<Reconstruction> load_poses(const std::filesystem::path& folder, Modality modality);
 /// Of the views as the field of this modality sees them: where training moved them, else as posed.
 Result<Reconstruction> load_trained_poses(const pipeline::StageContext& context, Modality modality);
+
+/// Why the stage that posed them doubts views, by their names; `folder` is that finished stage's.
+/// Errors: input (its record is cut or of another version).
+Result<std::map<std::string, std::string>> load_doubts(const std::filesystem::path& folder);
 
 /// Which world the poses of a stage live in (poses.json).
 enum class PoseFrame { own, visible };

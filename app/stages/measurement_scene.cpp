@@ -22,52 +22,28 @@ using measurement::SceneParts;
 using measurement::ThermalFrame;
 using measurement::ThermalScene;
 
-/// A run's folder as it lies there.
-struct Folder {
-  fs::path out;
-  bool done(const char* stage) const {
-    std::error_code unreadable;
-    return fs::exists(out / stage / pipeline::stage_record_file, unreadable);
-  }
-};
-
-/// Which views the poses stage doubts, and why.
-Result<std::map<std::string, std::string>> doubts_of(const Folder& folder) {
-  std::map<std::string, std::string> doubts;
-  ORBITFUSE_ASSIGN(const pipeline::StageRecord record,
-                   pipeline::read_stage_record(folder.out / "poses_thermal"));
-  const nlohmann::json& metrics = record.output.metrics;
-  if (!metrics.contains("doubtful") || !metrics["doubtful"].is_array()) return doubts;
-  for (const nlohmann::json& entry : metrics["doubtful"])
-    if (entry.is_object() && entry.contains("view") && entry["view"].is_string())
-      doubts[entry["view"]] = entry.value("why", "doubtful");
-  return doubts;
-}
-
 /// Poses of one session's frames tell nothing of another's, even where the files are called alike.
-Status check_session(const Folder& folder, const Session& session) {
+Status check_session(const pipeline::StageContext& context, const Session& session) {
   ORBITFUSE_ASSIGN(const pipeline::StageRecord record,
-                   pipeline::read_stage_record(folder.out / "poses_thermal"));
+                   pipeline::read_stage_record(context.of("poses_thermal")));
   const auto outside = record.inputs.find("outside");
   if (outside == record.inputs.end()) return {};
   ORBITFUSE_ASSIGN(const std::string content, modality_content(session, Modality::thermal));
   if (content == outside->second) return {};
   return fail(ErrorKind::input, session.folder.string(),
-              "its thermal frames are not those that " + folder.out.string() + " was made of",
+              "its thermal frames are not those that " + context.out.string() + " was made of",
               "name the session of that run, or run this one again");
 }
 
 /// The thermal field, its frames, and how both come into the run's world.
-Status add_thermal(const Folder& folder, const Session& session, SceneParts& parts) {
-  ORBITFUSE_ASSIGN(nerf::Field field, nerf::Field::load(folder.out / "train_thermal" / field_file));
-  ORBITFUSE_ASSIGN(const Similarity3d world_from_thermal, load_world_from_thermal(folder.out));
+Status add_thermal(const pipeline::StageContext& context, const Session& session,
+                   SceneParts& parts) {
+  ORBITFUSE_ASSIGN(nerf::Field field, nerf::Field::load(context.of("train_thermal") / field_file));
+  ORBITFUSE_ASSIGN(const Similarity3d world_from_thermal, load_world_from_thermal(context));
   parts.field = measurement::field_renderer(std::make_shared<const nerf::Field>(std::move(field)),
                                             world_from_thermal);
-  const bool moved = fs::exists(folder.out / "train_thermal" / "model");
-  ORBITFUSE_ASSIGN(
-      const Reconstruction model,
-      load_poses(folder.out / (moved ? "train_thermal" : "poses_thermal"), Modality::thermal));
-  ORBITFUSE_ASSIGN(const auto doubts, doubts_of(folder));
+  ORBITFUSE_ASSIGN(const Reconstruction model, load_trained_poses(context, Modality::thermal));
+  ORBITFUSE_ASSIGN(const auto doubts, load_doubts(context.of("poses_thermal")));
   for (PosedView view : model.views) {
     view.cam_from_world = rebase(view.cam_from_world, world_from_thermal);
     ThermalFrame frame{std::move(view), {}, {}};
@@ -91,17 +67,17 @@ Status add_thermal(const Folder& folder, const Session& session, SceneParts& par
   return {};
 }
 
-Status add_named_views(const Folder& folder, SceneParts& parts) {
+Status add_named_views(const pipeline::StageContext& context, SceneParts& parts) {
   for (const ThermalFrame& frame : parts.frames) parts.orbit.push_back(frame.view);
-  if (folder.done("poses_visible")) {
+  if (context.has("poses_visible")) {
     ORBITFUSE_ASSIGN(const Reconstruction visible,
-                     load_poses(folder.out / "poses_visible", Modality::visible));
+                     load_poses(context.of("poses_visible"), Modality::visible));
     parts.views = parts.orbit = visible.views;
   }
-  if (!folder.done("render")) return {};
-  ORBITFUSE_ASSIGN(const RenderedViews rendered, load_rendered_views(folder.out / "render"));
+  if (!context.has("render")) return {};
+  ORBITFUSE_ASSIGN(const RenderedViews rendered, load_rendered_views(context.of("render")));
   ORBITFUSE_ASSIGN(const Transforms transforms,
-                   read_transforms_json(folder.out / "render" / "transforms.json"));
+                   read_transforms_json(context.of("render") / "transforms.json"));
   for (std::size_t i = 0; i < std::min(rendered.views.size(), transforms.frames.size()); ++i)
     parts.views.push_back(
         {rendered.views[i].name, transforms.frames[i].camera, transforms.frames[i].cam_from_world});
@@ -109,12 +85,12 @@ Status add_named_views(const Folder& folder, SceneParts& parts) {
 }
 
 /// Of everything that a measurement's coordinates and temperatures depend on.
-Result<std::string> identity_of(const Folder& folder, const Session& session) {
+Result<std::string> identity_of(const pipeline::StageContext& context, const Session& session) {
   std::string text = session.id;
   for (const char* stage : {"poses_visible", "poses_thermal", "train_thermal", "register"}) {
-    if (!folder.done(stage)) continue;
+    if (!context.has(stage)) continue;
     ORBITFUSE_ASSIGN(const pipeline::StageRecord record,
-                     pipeline::read_stage_record(folder.out / stage));
+                     pipeline::read_stage_record(context.of(stage)));
     text += " " + record.outputs_hash();
   }
   return content_hash(text);
@@ -122,27 +98,26 @@ Result<std::string> identity_of(const Folder& folder, const Session& session) {
 
 }  // namespace
 
-bool is_in_visible_world(const fs::path& out) {
-  const Folder folder{out};
-  return folder.done("poses_visible") && folder.done("register");
+bool is_in_visible_world(const pipeline::StageContext& context) {
+  return context.has("poses_visible") && context.has("register");
 }
 
-Result<Similarity3d> load_world_from_thermal(const fs::path& out) {
-  if (!is_in_visible_world(out)) return Similarity3d();
-  ORBITFUSE_ASSIGN(const RegistrationRecord record, load_registration(out / "register"));
+Result<Similarity3d> load_world_from_thermal(const pipeline::StageContext& context) {
+  if (!is_in_visible_world(context)) return Similarity3d();
+  ORBITFUSE_ASSIGN(const RegistrationRecord record, load_registration(context.of("register")));
   return record.visible_from_thermal;
 }
 
 Result<ThermalScene> load_measurement_scene(const fs::path& out, const Session& session,
                                             const measurement::MeasurementOptions& options) {
-  const Folder folder{out};
+  const pipeline::StageContext context = context_of_run(out);
   for (const char* stage : {"poses_thermal", "train_thermal"})
-    if (!folder.done(stage))
+    if (!context.has(stage))
       return fail(ErrorKind::input, out.string(), std::string(stage) + " is not finished in it",
                   "run the session first: orbitfuse run " + session.folder.string() + " --out " +
                       out.string());
   // Two fields whose frames nobody could relate have no world in common.
-  if (folder.done("poses_visible") && !folder.done("register"))
+  if (context.has("poses_visible") && !context.has("register"))
     return fail(ErrorKind::input, out.string(), "the two fields are not registered",
                 "see why in " + (out / "register.failed").string() + " or the report");
   const auto frames = session.frames_of(Modality::thermal);
@@ -151,11 +126,11 @@ Result<ThermalScene> load_measurement_scene(const fs::path& out, const Session& 
     return fail(ErrorKind::input, session.folder.string(),
                 "its thermal frames are gray levels, no temperatures",
                 "record with a camera that gives temperatures, or import its radiometric files");
-  ORBITFUSE_TRY(check_session(folder, session));
+  ORBITFUSE_TRY(check_session(context, session));
   SceneParts parts;
-  ORBITFUSE_TRY(add_thermal(folder, session, parts));
-  ORBITFUSE_TRY(add_named_views(folder, parts));
-  ORBITFUSE_ASSIGN(parts.identity, identity_of(folder, session));
+  ORBITFUSE_TRY(add_thermal(context, session, parts));
+  ORBITFUSE_TRY(add_named_views(context, parts));
+  ORBITFUSE_ASSIGN(parts.identity, identity_of(context, session));
   return ThermalScene::make(std::move(parts), options);
 }
 

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "app/pipeline/stage.hpp"
 #include "core/geometry/transform.hpp"
 #include "core/session/session.hpp"
 #include "recon/measurement/thermal_scene.hpp"
@@ -11,9 +12,9 @@ namespace orbitfuse::stages {
 
 /// Whether a run's world is that of its visible poses, thermal ones being registered with them.
 /// Where it isn't, the world is that of the poses that the run has.
-bool is_in_visible_world(const std::filesystem::path& out);
+bool is_in_visible_world(const pipeline::StageContext& context);
 /// Takes thermal poses and the thermal field into the run's world.
-Result<Similarity3d> load_world_from_thermal(const std::filesystem::path& out);
+Result<Similarity3d> load_world_from_thermal(const pipeline::StageContext& context);
 
 /// What a finished run measures from: its thermal field, every posed thermal frame of the session
 /// with its doubts and radiometry, and as named views the frames of both orbits ("thermal/...",

@@ -70,13 +70,6 @@ Result<NewViews> choose_views(const StageContext& context, const RenderConfig& c
   return views;
 }
 
-cv::Mat bgr8_of_rgb(const cv::Mat& rgb) {
-  cv::Mat bytes, bgr;
-  rgb.convertTo(bytes, CV_8U, 255.0);
-  cv::cvtColor(bytes, bgr, cv::COLOR_RGB2BGR);
-  return bgr;
-}
-
 /// Where a ray met nothing the field knows, there is no temperature.
 cv::Mat masked(const cv::Mat& kelvin, const cv::Mat& opacity, double min_opacity) {
   cv::Mat result = kelvin.clone();

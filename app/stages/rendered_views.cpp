@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "app/stages/rendered_views.hpp"
 
+#include <opencv2/imgproc.hpp>
+
 #include "app/stages/artifacts.hpp"
 
 namespace orbitfuse::stages {
@@ -23,6 +25,14 @@ void visit_files(View& view, Visit visit) {
 }
 
 }  // namespace
+
+cv::Mat bgr8_of_rgb(const cv::Mat& rgb) {
+  cv::Mat known = rgb.clone(), bytes, bgr;
+  cv::patchNaNs(known, 0);
+  known.convertTo(bytes, CV_8U, 255.0);
+  cv::cvtColor(bytes, bgr, cv::COLOR_RGB2BGR);
+  return bgr;
+}
 
 HeatScaleOptions heat_scale_options(Samples samples) {
   HeatScaleOptions options;

@@ -37,6 +37,9 @@ struct RenderedViews {
 /// Least width of a scale: 2 K, or the gray levels that noise doesn't reach.
 HeatScaleOptions heat_scale_options(Samples samples);
 
+/// A rendered colour (CV_32FC3, R, G, B in 0..1; NaN becomes black) as a picture, CV_8UC3 BGR.
+cv::Mat bgr8_of_rgb(const cv::Mat& rgb);
+
 Status save_rendered_views(const std::filesystem::path& folder, const RenderedViews& views);
 Result<RenderedViews> load_rendered_views(const std::filesystem::path& folder);
 

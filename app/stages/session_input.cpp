@@ -39,6 +39,19 @@ Status check_frame(const Session& session, const FrameRecord& frame, std::string
   return check_size(frame, path, image.cols, image.rows);
 }
 
+/// Every frame looked at, and by its number what is wrong with it. Error: cancelled.
+Result<std::vector<Status>> check_frames(const Session& session, const Progress& progress,
+                                         std::vector<std::string>& hashes) {
+  std::vector<Status> problems(session.frames.size());
+  hashes.resize(problems.size());
+  parallel_for(static_cast<int>(problems.size()), [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (!progress.cancelled()) problems[k] = check_frame(session, session.frames[k], hashes[k]);
+  });
+  ORBITFUSE_TRY(progress.check("session"));
+  return problems;
+}
+
 /// `hashes`: of the frames' files.
 std::string content_of(const Session& session, Modality modality,
                        const std::vector<std::string>& hashes) {
@@ -69,13 +82,8 @@ bool SessionInput::has_temperatures() const {
 }
 
 Result<std::vector<Error>> damaged_frames(const Session& session, const Progress& progress) {
-  std::vector<Status> problems(session.frames.size());
-  parallel_for(static_cast<int>(problems.size()), [&](int i) {
-    const auto k = static_cast<std::size_t>(i);
-    std::string hash;
-    if (!progress.cancelled()) problems[k] = check_frame(session, session.frames[k], hash);
-  });
-  ORBITFUSE_TRY(progress.check("session"));
+  std::vector<std::string> hashes;
+  ORBITFUSE_ASSIGN(const std::vector<Status> problems, check_frames(session, progress, hashes));
   std::vector<Error> found;
   for (const Status& problem : problems)
     if (!problem) found.push_back(problem.error());
@@ -99,13 +107,8 @@ Result<SessionInput> open_session_input(const fs::path& folder, const Progress& 
     return fail(ErrorKind::input, folder.string(), "the session has no frames",
                 "record or import some first");
 
-  std::vector<std::string> hashes(session.frames.size());
-  std::vector<Status> problems(session.frames.size());
-  parallel_for(static_cast<int>(session.frames.size()), [&](int i) {
-    const auto k = static_cast<std::size_t>(i);
-    if (!progress.cancelled()) problems[k] = check_frame(session, session.frames[k], hashes[k]);
-  });
-  ORBITFUSE_TRY(progress.check("session"));
+  std::vector<std::string> hashes;
+  ORBITFUSE_ASSIGN(const std::vector<Status> problems, check_frames(session, progress, hashes));
   for (const Status& problem : problems) ORBITFUSE_TRY(problem);
 
   for (const Modality modality : {Modality::visible, Modality::thermal})

@@ -65,7 +65,7 @@ Status rehearse(Context& context, const CaptureOptions& o, const recording::Came
 
 /// The page, and what its start button waits for.
 struct Page {
-  std::unique_ptr<PageServer> server;
+  std::unique_ptr<WebServer> server;
   std::atomic<bool> started{false};
 };
 
@@ -89,7 +89,7 @@ Status open_page(Context& context, const CaptureOptions& o, recording::Recording
   hooks.stop = button([&recording] { return recording.request_stop(); });
   hooks.at_station = button([&recording] { return recording.operator_at_station(); });
   hooks.correct = button([&recording] { return recording.request_correction(); });
-  page.server = std::make_unique<PageServer>(options, std::move(hooks));
+  page.server = std::make_unique<WebServer>(options, capture_page(std::move(hooks)));
   ORBITFUSE_TRY(page.server->start());
   for (const std::string& url : page.server->urls()) context.console.info("page: " + url);
   context.console.event({{"event", "page"}, {"url", page.server->url()}});
@@ -111,7 +111,7 @@ Status try_page(const CaptureOptions& o) {
   ORBITFUSE_ASSIGN(const PageOptions options, page_of(o));
   PageHooks hooks;
   hooks.state = [] { return LiveState{}; };
-  return PageServer(options, std::move(hooks)).start();
+  return WebServer(options, capture_page(std::move(hooks))).start();
 }
 
 std::string absence(const StreamStatus& s) {

@@ -8,7 +8,7 @@
 #include "app/cli/verb.hpp"
 #include "app/recording/open_cameras.hpp"
 #include "app/recording/recording.hpp"
-#include "capture/page/page_server.hpp"
+#include "capture/page/capture_page.hpp"
 
 namespace orbitfuse::cli {
 

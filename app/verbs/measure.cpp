@@ -58,10 +58,7 @@ void list(Context& context, const Measurements& saved, const std::string& file) 
   context.result["measurements"] = json::array();
   for (const SavedMeasurement& m : saved.list) {
     context.console.data(brief(m));
-    context.result["measurements"].push_back({{"name", m.name},
-                                              {"created", m.created},
-                                              {"request", to_json(m.request)},
-                                              {"answer", m.answer}});
+    context.result["measurements"].push_back(to_json(m));
   }
   if (saved.list.empty())
     context.console.info("no saved measurements in " + file +

@@ -12,6 +12,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "app/view/json_fields.hpp"
+#include "app/view/shot_request.hpp"
 #include "core/image/image_io.hpp"
 #include "core/option_range.hpp"
 #include "core/system/folder_change_lock.hpp"
@@ -22,7 +23,6 @@ using nlohmann::json;
 
 namespace {
 
-constexpr double radians_per_degree = 3.14159265358979323846 / 180;
 constexpr std::size_t most_pictures = 5000;
 /// A page's name is never empty (shot_request.cpp): none can end the film's jobs by its own.
 constexpr const char* film_client = "";
@@ -155,12 +155,7 @@ Shot shot_of_bookmark(const Bookmark& from, const Eigen::Vector3d& up, int width
   world_from_cam.col(1) = ahead.cross(world_from_cam.col(0));
   Shot shot;
   shot.cam_from_world = Rigid3d{Eigen::Quaterniond(world_from_cam), from.position}.inverse();
-  shot.camera.width = width;
-  shot.camera.height = height;
-  shot.camera.fx = shot.camera.fy =
-      0.5 * height / std::tan(0.5 * from.fov_deg * radians_per_degree);
-  shot.camera.cx = 0.5 * width;
-  shot.camera.cy = 0.5 * height;
+  shot.camera = camera_of(from.fov_deg, width, height);
   return shot;
 }
 

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
 #include "app/stages/measurement_scene.hpp"
 #include "app/stages/rendered_views.hpp"
@@ -16,18 +15,6 @@
 namespace orbitfuse::view {
 namespace fs = std::filesystem;
 namespace {
-
-pipeline::StageContext context_of(const fs::path& out) {
-  pipeline::StageContext context;
-  context.out = out;
-  for (const char* stage :
-       {"poses_visible", "poses_thermal", "train_visible", "train_thermal", "register", "render"}) {
-    std::error_code unreadable;
-    if (fs::exists(out / stage / pipeline::stage_record_file, unreadable))
-      context.finished.insert(stage);
-  }
-  return context;
-}
 
 Status load_fields(const pipeline::StageContext& context, FinishedRun& run) {
   if (context.has("train_visible")) {
@@ -50,24 +37,11 @@ Status load_fields(const pipeline::StageContext& context, FinishedRun& run) {
     run.notes.push_back("the thermal field is not shown: nothing relates it to the visible one");
   }
   if (!run.thermal.empty()) {
-    ORBITFUSE_ASSIGN(run.frame_from_thermal, stages::load_world_from_thermal(context.out));
+    ORBITFUSE_ASSIGN(run.frame_from_thermal, stages::load_world_from_thermal(context));
   }
-  run.frame = run.visible.empty() && !stages::is_in_visible_world(context.out) ? Modality::thermal
-                                                                               : Modality::visible;
+  run.frame = run.visible.empty() && !stages::is_in_visible_world(context) ? Modality::thermal
+                                                                           : Modality::visible;
   return {};
-}
-
-/// Reasons by view, from the record of the stage that posed them.
-std::map<std::string, std::string> doubts_of(const fs::path& stage) {
-  std::map<std::string, std::string> doubts;
-  const auto record = pipeline::read_stage_record(stage);
-  if (!record || !record->output.metrics.contains("doubtful")) return doubts;
-  try {
-    for (const auto& entry : record->output.metrics.at("doubtful"))
-      doubts[entry.at("view").get<std::string>()] = entry.at("why").get<std::string>();
-  } catch (const nlohmann::json::exception&) {  // of another version: the poses still hold
-  }
-  return doubts;
 }
 
 Status load_views(const pipeline::StageContext& context, FinishedRun& run) {
@@ -75,7 +49,7 @@ Status load_views(const pipeline::StageContext& context, FinishedRun& run) {
     const std::string stage = "poses_" + std::string(name(modality));
     if (!run.has(modality) || !context.has(stage)) continue;
     ORBITFUSE_ASSIGN(const Reconstruction model, stages::load_trained_poses(context, modality));
-    const auto doubts = doubts_of(context.of(stage));
+    ORBITFUSE_ASSIGN(const auto doubts, stages::load_doubts(context.of(stage)));
     for (const PosedView& posed : model.views) {
       RecordedView recorded{modality, posed, {}};
       if (modality != run.frame)
@@ -161,7 +135,7 @@ Result<FinishedRun> load_finished_run(const fs::path& out, const stages::RunConf
   FinishedRun run;
   run.out = out;
   run.config = config;
-  const pipeline::StageContext context = context_of(out);
+  const pipeline::StageContext context = stages::context_of_run(out);
   ORBITFUSE_TRY(load_fields(context, run));
   ORBITFUSE_TRY(progress.check("view"));
   ORBITFUSE_ASSIGN(const auto record, stages::read_json(out / "run.json"));

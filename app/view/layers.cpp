@@ -7,6 +7,7 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
+#include "app/stages/rendered_views.hpp"
 #include "fusion/fuse/fuse.hpp"
 
 namespace orbitfuse::view {
@@ -24,14 +25,6 @@ std::string key_of(Modality modality, const Shot& shot) {
   return fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {}", static_cast<int>(modality),
                      c.width, c.height, c.fx, c.fy, c.cx, c.cy, q.w(), q.x(), q.y(), q.z(), t.x(),
                      t.y(), t.z());
-}
-
-cv::Mat bgr8_of(const cv::Mat& rgb) {
-  cv::Mat known = rgb.clone(), bytes, bgr;
-  cv::patchNaNs(known, 0);
-  known.convertTo(bytes, CV_8U, 255.0);
-  cv::cvtColor(bytes, bgr, cv::COLOR_RGB2BGR);
-  return bgr;
 }
 
 }  // namespace
@@ -61,7 +54,7 @@ Result<LayerRenderer::Plane> LayerRenderer::rendered(Modality modality, const Sh
     y += count;
   }
   if (modality == Modality::visible) {
-    plane.image = bgr8_of(color);
+    plane.image = stages::bgr8_of_rgb(color);
   } else {
     color.setTo(std::numeric_limits<float>::quiet_NaN(),
                 plane.opacity < run_.config.render.min_opacity);

@@ -76,11 +76,7 @@ Result<json> Measuring::list() {
       const measurement::Measurements saved,
       measurement::load_measurements(run_.out / measurement::measurements_file, scene->identity()));
   json entries = json::array();
-  for (const measurement::SavedMeasurement& m : saved.list)
-    entries.push_back({{"name", m.name},
-                       {"created", m.created},
-                       {"request", to_json(m.request)},
-                       {"answer", m.answer}});
+  for (const measurement::SavedMeasurement& m : saved.list) entries.push_back(to_json(m));
   return entries;
 }
 

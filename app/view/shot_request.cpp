@@ -59,11 +59,7 @@ Result<Shot> shot_of(const json& j, const FinishedRun& run) {
   if (!(std::abs(given.norm() - 1) < 1e-3))
     return wrong("rotation_wxyz", shown(j["rotation_wxyz"]), "must be a unit quaternion");
   Shot shot;
-  shot.camera.width = width;
-  shot.camera.height = height;
-  shot.camera.fx = shot.camera.fy = 0.5 * height / std::tan(0.5 * fov_deg / degrees_per_radian);
-  shot.camera.cx = 0.5 * width;
-  shot.camera.cy = 0.5 * height;
+  shot.camera = camera_of(fov_deg, width, height);
   const Rigid3d world_from_cam{(given.normalized() * half_turn_x).normalized(),
                                {position[0], position[1], position[2]}};
   shot.cam_from_world = world_from_cam.inverse();
@@ -93,6 +89,16 @@ Result<ShotRequest> shot_request_of(const json& j, const FinishedRun& run) {
     request.wish.thermal_divisor = static_cast<int>(divisor);
   }
   return request;
+}
+
+Camera camera_of(double fov_deg, int width, int height) {
+  Camera camera;
+  camera.width = width;
+  camera.height = height;
+  camera.fx = camera.fy = 0.5 * height / std::tan(0.5 * fov_deg / degrees_per_radian);
+  camera.cx = 0.5 * width;
+  camera.cy = 0.5 * height;
+  return camera;
 }
 
 json browser_camera(const Camera& camera, const Rigid3d& cam_from_world) {

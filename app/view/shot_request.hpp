@@ -26,6 +26,9 @@ Result<Shot> shot_of(const nlohmann::json& j, const FinishedRun& run);
 /// As above with "client" (1 to 40 characters), and if given "layers" and "thermal_divisor".
 Result<ShotRequest> shot_request_of(const nlohmann::json& j, const FinishedRun& run);
 
+/// A pinhole whose axis goes through the middle; `fov_deg` is of the height.
+Camera camera_of(double fov_deg, int width, int height);
+
 /// A camera as the browser has it: {"position", "rotation_wxyz", "fov_deg", "aspect"}.
 nlohmann::json browser_camera(const Camera& camera, const Rigid3d& cam_from_world);
 

@@ -26,7 +26,7 @@
 #include "app/recording/recording.hpp"
 #include "bench/capture/manifest_check.hpp"
 #include "bench/capture/paced_video.hpp"
-#include "capture/page/page_server.hpp"
+#include "capture/page/capture_page.hpp"
 #include "core/system/file_io.hpp"
 #include "drivers/aravis/aravis_source.hpp"
 #include "drivers/v4l2/v4l2_source.hpp"
@@ -70,7 +70,7 @@ int record(const fs::path& folder, bool resume, std::uint32_t seed) {
   hooks.state = [&] { return recording.state(); };
   hooks.latest = [&](Modality modality) { return recording.latest(modality); };
   hooks.correct = [&] { return recording.request_correction(); };
-  PageServer server(page, hooks);
+  WebServer server(page, capture_page(hooks));
   const auto tell = [](const Error& error) {
     std::fprintf(stderr, "%s\n", error.message().c_str());
   };

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <ctime>
 #include <filesystem>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
@@ -13,6 +12,7 @@
 #include "capture/guide/coverage.hpp"
 #include "capture/image_quality/frame_quality.hpp"
 #include "core/image/image_io.hpp"
+#include "core/system/clock.hpp"
 #include "drivers/stills/thermal_decoder.hpp"
 #include "tests/support/shared_data.hpp"
 
@@ -104,9 +104,9 @@ int main(int argc, char** argv) {
         const cv::Mat frame = frame_of(file, set.modality);
         if (frame.empty()) continue;
         const cv::Mat image = blurred(frame, blur);
-        const std::clock_t before = std::clock();
+        const double before_s = cpu_seconds();
         const EdgeBlur edges = measure_edges(image);
-        cpu_s += static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC;
+        cpu_s += cpu_seconds() - before_s;
         ++measured;
         const double floor = set.modality == Modality::visible ? floors.max_visible_edge_px
                                                                : floors.max_thermal_edge_px;

@@ -5,13 +5,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
-#include <ctime>
 #include <filesystem>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/system/clock.hpp"
 #include "core/system/cpu.hpp"
 #include "core/system/parallel.hpp"
 #include "fusion/cnn_lpif/cnn_lpif.hpp"
@@ -68,13 +67,10 @@ void show(const std::string& what, const std::vector<Pair>& pairs, const CnnLpif
   cv::resize(floats(pairs[0].thermal), t, {640, 480}, 0, 0, cv::INTER_AREA);
   double wall_ms = 1e9, cpu_ms = 1e9;
   for (int i = 0; i < 7; ++i) {
-    const auto start = std::chrono::steady_clock::now();
-    const std::clock_t cpu = std::clock();
+    const UsageClock clock;
     if (!fusion::fuse_cnn_lpif(v, t, options)) std::exit(3);
-    cpu_ms = std::min(cpu_ms, 1e3 * static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC);
-    wall_ms = std::min(
-        wall_ms, std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-                     .count());
+    cpu_ms = std::min(cpu_ms, 1e3 * clock.cpu_s());
+    wall_ms = std::min(wall_ms, 1e3 * clock.wall_s());
   }
   fmt::print("| {} | {:.4f} | {:.4f} | {:.1f} | {:.4f} | {:.1f} % | {:.1f} | {:.1f} |\n", what,
              mean["Qabf"], mean["Qcb"], mean["Qcv"], mean["SSIM"], 100 * skipped, wall_ms, cpu_ms);

@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bench/fusion/pairs.hpp"
 
-#include "core/system/clock.hpp"
-
 #include <fmt/format.h>
 
-#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <sstream>
 
 #include "fusion/metrics/metrics.hpp"
+#include "tests/support/fusion_reference.hpp"
 
 namespace orbitfuse::bench {
 namespace {
@@ -57,25 +54,18 @@ std::vector<std::string> scored_methods() {
 
 std::map<std::string, std::vector<Scores>> reference_scores(const fs::path& folder,
                                                             const std::vector<Pair>& pairs) {
-  std::ifstream file(folder / "reference" / "metrics.csv");
   std::map<std::string, std::vector<Scores>> result;
-  std::string line;
-  std::getline(file, line);
-  while (std::getline(file, line)) {
-    std::istringstream fields(line);
-    std::string pair, method, metric, value;
-    std::getline(fields, pair, ',');
-    std::getline(fields, method, ',');
-    std::getline(fields, metric, ',');
-    std::getline(fields, value, ',');
-    if (metric == "SSIM") continue;  // VIFB's sum over the sources; ours is the mean
-    if (metric == "SSIM_mean") metric = "SSIM";
-    const auto found =
-        std::find_if(pairs.begin(), pairs.end(), [&](const Pair& p) { return p.name == pair; });
+  const auto reference = testing::fusion_reference(folder / "reference" / "metrics.csv");
+  for (const auto& [key, metrics] : reference) {
+    const auto& [pair_name, method] = key;
+    const auto found = std::find_if(pairs.begin(), pairs.end(),
+                                    [&](const Pair& p) { return p.name == pair_name; });
     if (found == pairs.end()) continue;
     auto& of_method = result[method];
     of_method.resize(pairs.size());
-    of_method[static_cast<std::size_t>(found - pairs.begin())][metric] = std::stod(value);
+    Scores& of_pair = of_method[static_cast<std::size_t>(found - pairs.begin())];
+    of_pair = metrics;
+    of_pair["SSIM"] = metrics.at("SSIM_mean");  // VIFB's own is the sum over the sources
   }
   for (auto& [method, of_method] : result)
     for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -111,7 +101,5 @@ Scores mean(const std::vector<Scores>& scores) {
     for (const auto& [name, value] : s) result[name] += value / static_cast<double>(scores.size());
   return result;
 }
-
-double process_cpu_ms() { return 1e3 * cpu_seconds(); }
 
 }  // namespace orbitfuse::bench

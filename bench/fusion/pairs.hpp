@@ -2,13 +2,13 @@
 #pragma once
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <map>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
+#include "core/system/clock.hpp"
 #include "fusion/fuse/fuse.hpp"
 
 namespace orbitfuse::bench {
@@ -38,9 +38,6 @@ std::vector<Scores> scores(const std::vector<Pair>& pairs, const FusionOptions& 
                            std::vector<FusionReport>* reports = nullptr);
 Scores mean(const std::vector<Scores>& scores);
 
-/// CPU time of all threads.
-double process_cpu_ms();
-
 /// Least of several runs. CPU time holds on a machine with other work, wall time only on an idle
 /// one.
 struct Times {
@@ -48,15 +45,12 @@ struct Times {
 };
 template <class Work>
 Times times_of(int runs, const Work& work) {
-  using Clock = std::chrono::steady_clock;
   Times best;
   for (int i = 0; i < runs; ++i) {
-    const auto start = Clock::now();
-    const double cpu = process_cpu_ms();
+    const UsageClock clock;
     work();
-    best.cpu_ms = std::min(best.cpu_ms, process_cpu_ms() - cpu);
-    best.wall_ms = std::min(
-        best.wall_ms, std::chrono::duration<double, std::milli>(Clock::now() - start).count());
+    best.cpu_ms = std::min(best.cpu_ms, 1e3 * clock.cpu_s());
+    best.wall_ms = std::min(best.wall_ms, 1e3 * clock.wall_s());
   }
   return best;
 }

@@ -4,10 +4,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <ctime>
 #include <opencv2/imgproc.hpp>
 
 #include "core/image/image_io.hpp"
+#include "core/system/clock.hpp"
 #include "fusion/metrics/metrics.hpp"
 #include "recon/nerf/training_views.hpp"
 
@@ -122,9 +122,9 @@ Result<double> add_depth(nerf::Dataset& data, const depth::DepthOptions& options
     model.views.push_back({view.name, view.camera, view.cam_from_world});
     index.push_back(static_cast<int>(i));
   }
-  const std::clock_t start = std::clock();
+  const UsageClock clock;
   ORBITFUSE_ASSIGN(depth::DenseDepth found, depth::dense_depth(model, images, options, {}));
-  const double cpu_s = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+  const double cpu_s = clock.cpu_s();
   fmt::print("depth: {:.1f} CPU s, {:.1f} % of the pixels matched, {:.1f} % confirmed\n", cpu_s,
              100 * found.report.matched, 100 * found.report.known);
   for (DepthMap& map : found.maps) {

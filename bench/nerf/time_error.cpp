@@ -5,13 +5,12 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <ctime>
 #include <opencv2/core.hpp>
 
 #include "bench/nerf/experiment.hpp"
 #include "bench/nerf/scenes.hpp"
+#include "core/system/clock.hpp"
 #include "core/system/cpu.hpp"
 #include "core/system/parallel.hpp"
 
@@ -46,16 +45,14 @@ Status time_render(const nerf::Field& field, const nerf::Dataset& data) {
   const auto view = std::find_if(data.views.begin(), data.views.end(),
                                  [](const auto& v) { return v.measure_only; });
   if (view == data.views.end()) return {};
-  const auto start = std::chrono::steady_clock::now();
-  const std::clock_t cpu = std::clock();
+  const UsageClock clock;
   ORBITFUSE_ASSIGN(
       const nerf::RenderedView out,
       nerf::render(field,
                    view->camera.scaled_to(640, 640 * view->camera.height / view->camera.width),
                    view->cam_from_world, {}, {}));
   fmt::print("render {}x{}: {:.2f} s wall, {:.2f} CPU s\n", out.color.cols, out.color.rows,
-             std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(),
-             static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC);
+             clock.wall_s(), clock.cpu_s());
   return {};
 }
 

@@ -12,6 +12,7 @@
 #include "recon/poses/estimate_poses.hpp"
 #include "tests/support/orbit_scenes.hpp"
 #include "tests/support/shared_data.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace {
 
@@ -48,8 +49,8 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::string which = argv[1];
-  const std::filesystem::path workdir =
-      argc > 2 ? argv[2] : std::filesystem::temp_directory_path() / "orbitfuse_bench_poses";
+  const test::TempFolder temp;
+  const std::filesystem::path workdir = argc > 2 ? argv[2] : temp.path();
   scenes::Scene scene;
   if (which == "container" || which == "tracking") {
     scenes::ContainerOptions options;

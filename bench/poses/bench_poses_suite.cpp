@@ -24,6 +24,7 @@
 #include "recon/poses/estimate_poses.hpp"
 #include "recon/poses/sfm/process.hpp"
 #include "tests/support/shared_data.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace {
 
@@ -153,11 +154,9 @@ Row measured(const SceneFolders& folders, const scenes::Perturbation& by,
   Row row;
   row.scene = folders.name, row.perturbation = by.name;
   auto scene = scenes::run_scene(folders.session, folders.truth);
-  const fs::path images =
-      fs::temp_directory_path() / fmt::format("orbitfuse_suite_{}_{}", folders.name, by.name);
-  fs::create_directories(images);
+  const test::TempFolder work;
   const Status perturbed =
-      scene ? scenes::perturb(*scene, by, images) : Status(tl::unexpected(scene.error()));
+      scene ? scenes::perturb(*scene, by, work.path()) : Status(tl::unexpected(scene.error()));
   if (!perturbed) {
     row.failure = perturbed.error().message();
     return row;
@@ -178,7 +177,7 @@ Row measured(const SceneFolders& folders, const scenes::Perturbation& by,
   options.use_known_poses = false;
   const double before = cpu_seconds();
   const auto poses =
-      estimate_thermal_poses(scene->session, &seen, options, images / "work", progress);
+      estimate_thermal_poses(scene->session, &seen, options, work / "poses", progress);
   row.cpu_s = cpu_seconds() - before;
   if (poses)
     judge(*poses, visible, *scene, row);
@@ -194,8 +193,6 @@ Row measured(const SceneFolders& folders, const scenes::Perturbation& by,
       fmt::print("  {} centre {:.2f} %, outwards {:+.2f} %, rotation {:.2f} deg\n", view.name,
                  view.center_percent, view.outward_percent, view.rotation_deg);
   }
-  std::error_code ignored;
-  fs::remove_all(images, ignored);
   return row;
 }
 

@@ -7,9 +7,8 @@
 #include <fmt/format.h>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
-#include <nlohmann/json.hpp>
 
+#include "core/formats/ground_truth.hpp"
 #include "core/image/image_io.hpp"
 #include "core/system/clock.hpp"
 #include "core/system/cpu.hpp"
@@ -28,22 +27,23 @@ struct TestPairs {
 };
 
 Result<TestPairs> read(const fs::path& folder) {
-  std::ifstream stream(folder / "ground_truth.json");
-  const nlohmann::json test = nlohmann::json::parse(stream).at("test");
+  ORBITFUSE_ASSIGN(const GroundTruth truth, read_ground_truth(folder / "ground_truth.json"));
+  if (truth.test.empty())
+    return fail(ErrorKind::input, folder.string(), "no test views in its truth", "name another");
   TestPairs pairs;
-  const auto& k = test.at("K");
-  pairs.camera.width = k.at("w"), pairs.camera.height = k.at("h");
-  pairs.camera.fx = k.at("fx"), pairs.camera.fy = k.at("fy");
-  pairs.camera.cx = k.at("cx"), pairs.camera.cy = k.at("cy");
+  pairs.camera = truth.test.front().camera;
   Session session;
   session.folder = folder;
-  for (const auto& entry : test.at("frames")) {
+  const auto relative = [&](const fs::path& file) {
+    return file.lexically_relative(folder).string();
+  };
+  for (const TrueTestView& pair : truth.test) {
     RigView view;
     FrameRecord frame;
     frame.width = pairs.camera.width, frame.height = pairs.camera.height;
-    frame.file = view.name = entry.at("visible");
+    frame.file = view.name = relative(pair.visible);
     ORBITFUSE_ASSIGN(view.visible, read_luminance(session, frame));
-    frame.file = entry.at("thermal");
+    frame.file = relative(pair.thermal);
     frame.modality = Modality::thermal;
     ORBITFUSE_ASSIGN(view.thermal, read_luminance(session, frame));
     view.visible_camera = pairs.camera;

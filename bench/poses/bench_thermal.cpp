@@ -25,6 +25,7 @@
 #include "recon/nerf/nerf.hpp"
 #include "recon/poses/estimate_poses.hpp"
 #include "tests/support/orbit_scenes.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace {
 
@@ -62,9 +63,9 @@ Arguments arguments_of(int argc, char** argv) {
 /// One attempt of the ladder alone: its success and error against its time.
 void print_attempt(const char* name, const scenes::Scene& scene, const VisibleScene* seen,
                    const PoseOptions& options) {
+  const test::TempFolder work;
   const double before = cpu_seconds();
-  const auto poses = estimate_thermal_poses(
-      scene.session, seen, options, fs::temp_directory_path() / "orbitfuse_bench_attempt", {});
+  const auto poses = estimate_thermal_poses(scene.session, seen, options, work.path(), {});
   const double spent = cpu_seconds() - before;
   if (!poses) {
     fmt::print("| {} | none: {} | | | {:.0f} |\n", name, poses.error().found.substr(0, 120), spent);
@@ -120,10 +121,9 @@ Status run(const Arguments& arguments) {
     print_attempts(scene, seen, options);
     return {};
   }
-  ORBITFUSE_ASSIGN(
-      const ThermalPoses poses,
-      estimate_thermal_poses(scene.session, &seen, options,
-                             fs::temp_directory_path() / "orbitfuse_bench_thermal", progress));
+  const test::TempFolder work;
+  ORBITFUSE_ASSIGN(const ThermalPoses poses,
+                   estimate_thermal_poses(scene.session, &seen, options, work.path(), progress));
   const double wall =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   for (const LadderStep& step : poses.ladder)

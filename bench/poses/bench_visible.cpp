@@ -7,7 +7,6 @@
 // orbit's pairs alone.
 
 #include <fmt/format.h>
-#include <unistd.h>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -24,6 +23,7 @@
 #include "recon/poses/sfm/sfm_ladder.hpp"
 #include "tests/support/orbit_scenes.hpp"
 #include "tests/support/shared_data.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace {
 
@@ -219,16 +219,13 @@ int main(int argc, char** argv) {
   for (const std::string& which : request.scenes) {
     fmt::print("{}\n", which);
     const scenes::Scene scene = load(data, which, request);
-    const fs::path workdir =
-        fs::temp_directory_path() / fmt::format("orbitfuse_bench_visible_{}", ::getpid());
+    const test::TempFolder work;
     const double before = cpu_seconds();
-    const auto poses = request.colmap ? colmap_poses(scene.session, workdir)
+    const auto poses = request.colmap ? colmap_poses(scene.session, work.path())
                        : request.global
-                           ? global_poses(scene.session, workdir)
-                           : estimate_visible_poses(scene.session, PoseOptions{}, workdir, {});
+                           ? global_poses(scene.session, work.path())
+                           : estimate_visible_poses(scene.session, PoseOptions{}, work.path(), {});
     print(scene, poses, cpu_seconds() - before, request.views);
-    std::error_code ignored;
-    if (std::getenv("ORBITFUSE_KEEP") == nullptr) fs::remove_all(workdir, ignored);
   }
   return 0;
 }

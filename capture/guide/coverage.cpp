@@ -7,6 +7,8 @@
 #include <cassert>
 #include <cmath>
 
+#include "core/option_range.hpp"
+
 namespace orbitfuse {
 namespace {
 
@@ -33,49 +35,41 @@ int OrbitPlan::sectors_per_loop() const {
 }
 
 Status OrbitPlan::validate() const {
-  const auto bad = [](const char* field, double found, const std::string& remedy) {
-    return fail(ErrorKind::usage, std::string("guide.") + field, fmt::format("{}", found), remedy);
-  };
+  const OptionCheck check("guide");
+  ORBITFUSE_TRY(check("spacing_deg", spacing_deg, from_to(1, 120)));
   const double count = 360.0 / spacing_deg;
-  if (!(spacing_deg >= 1 && spacing_deg <= 120) || std::abs(count - std::round(count)) > 1e-9) {
-    return bad("spacing_deg", spacing_deg, "must divide 360 and lie in 1..120");
-  }
-  if (!(azimuth_tolerance_deg > 0 && azimuth_tolerance_deg <= spacing_deg / 2)) {
-    return bad("azimuth_tolerance_deg", azimuth_tolerance_deg,
-               "must be > 0 and at most half the spacing");
-  }
-  if (!(elevation_tolerance_deg > 0))
-    return bad("elevation_tolerance_deg", elevation_tolerance_deg, "must be > 0");
-  if (loop_elevations_deg.empty()) return bad("loop_elevations_deg", 0, "give at least one loop");
-  for (double elevation : loop_elevations_deg) {
-    if (!(elevation > -90 && elevation < 90))
-      return bad("loop_elevations_deg", elevation, "must lie in -90..90");
-  }
+  if (std::abs(count - std::round(count)) > 1e-9)
+    return fail(ErrorKind::usage, "guide.spacing_deg", fmt::format("{}", spacing_deg),
+                "must divide 360");
+  ORBITFUSE_TRY(
+      check("azimuth_tolerance_deg", azimuth_tolerance_deg, above_up_to(0, spacing_deg / 2)));
+  ORBITFUSE_TRY(check("elevation_tolerance_deg", elevation_tolerance_deg, above(0)));
+  const auto none = [](const char* field) {
+    return fail(ErrorKind::usage, field, "none", "give at least one");
+  };
+  if (loop_elevations_deg.empty()) return none("guide.loop_elevations_deg");
+  for (const double elevation : loop_elevations_deg)
+    ORBITFUSE_TRY(check("loop_elevations_deg", elevation, between(-90, 90)));
   std::vector<double> sorted = loop_elevations_deg;
   std::sort(sorted.begin(), sorted.end());
   for (std::size_t i = 1; i < sorted.size(); ++i) {
-    if (sorted[i] - sorted[i - 1] < 2 * elevation_tolerance_deg) {
-      return bad("loop_elevations_deg", sorted[i],
-                 fmt::format("loops must be {:g} degrees apart or more, or a frame fits both",
-                             2 * elevation_tolerance_deg));
-    }
+    if (sorted[i] - sorted[i - 1] < 2 * elevation_tolerance_deg)
+      return fail(ErrorKind::usage, "guide.loop_elevations_deg", fmt::format("{}", sorted[i]),
+                  fmt::format("loops must be {:g} degrees apart or more, or a frame fits both",
+                              2 * elevation_tolerance_deg));
   }
-  if (modalities.empty()) return bad("modalities", 0, "give at least one");
+  if (modalities.empty()) return none("guide.modalities");
   return {};
 }
 
 Status CoverageOptions::validate() const {
-  const auto bad = [](const char* field, double found) {
-    return fail(ErrorKind::usage, std::string("guide.") + field, fmt::format("{}", found),
-                "must be > 0 (shares <= 1)");
-  };
-  if (!(min_sharpness > 0 && min_sharpness <= 1)) return bad("min_sharpness", min_sharpness);
-  if (!(max_visible_edge_px > 0)) return bad("max_visible_edge_px", max_visible_edge_px);
-  if (!(max_thermal_edge_px > 0)) return bad("max_thermal_edge_px", max_thermal_edge_px);
-  if (!(max_clipped > 0 && max_clipped <= 1)) return bad("max_clipped", max_clipped);
-  if (!(rest_speed_deg_s > 0)) return bad("rest_speed_deg_s", rest_speed_deg_s);
-  if (!(max_sigma_deg > 0)) return bad("max_sigma_deg", max_sigma_deg);
-  return {};
+  const OptionCheck check("guide");
+  ORBITFUSE_TRY(check("min_sharpness", min_sharpness, above_up_to(0, 1)));
+  ORBITFUSE_TRY(check("max_visible_edge_px", max_visible_edge_px, above(0)));
+  ORBITFUSE_TRY(check("max_thermal_edge_px", max_thermal_edge_px, above(0)));
+  ORBITFUSE_TRY(check("max_clipped", max_clipped, above_up_to(0, 1)));
+  ORBITFUSE_TRY(check("rest_speed_deg_s", rest_speed_deg_s, above(0)));
+  return check("max_sigma_deg", max_sigma_deg, above(0));
 }
 
 std::string text(Refusal refusal) {

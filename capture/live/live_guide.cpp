@@ -12,6 +12,7 @@
 #include "capture/image_quality/frame_quality.hpp"
 #include "core/image/exif.hpp"
 #include "core/image/image_codec.hpp"
+#include "core/option_range.hpp"
 #include "core/system/file_io.hpp"
 #include "core/system/utc_now.hpp"
 
@@ -41,23 +42,11 @@ void note_edges(FrameRecord& frame, const cv::Mat& image) {
 Status LiveGuideOptions::validate() const {
   ORBITFUSE_TRY(plan.validate());
   ORBITFUSE_TRY(coverage.validate());
-  if (!(looks_per_second > 0 && looks_per_second <= 100)) {
-    return fail(ErrorKind::usage, "guide.looks_per_second", fmt::format("{}", looks_per_second),
-                "must be > 0, at most 100");
-  }
-  if (!(std::abs(turntable_step_deg) <= 120)) {
-    return fail(ErrorKind::usage, "guide.turntable_step_deg", fmt::format("{}", turntable_step_deg),
-                "must be within 120 degrees, 0 for no turntable");
-  }
-  if (!(key_motion > 0 && key_motion < 1)) {
-    return fail(ErrorKind::usage, "guide.key_motion", fmt::format("{}", key_motion),
-                "must be > 0 and < 1");
-  }
-  if (!(unseen_after_s > 0)) {
-    return fail(ErrorKind::usage, "guide.unseen_after_s", fmt::format("{}", unseen_after_s),
-                "must be > 0");
-  }
-  return {};
+  const OptionCheck check("guide");
+  ORBITFUSE_TRY(check("looks_per_second", looks_per_second, above_up_to(0, 100)));
+  ORBITFUSE_TRY(check("turntable_step_deg", turntable_step_deg, from_to(-120, 120)));  // 0: none
+  ORBITFUSE_TRY(check("key_motion", key_motion, between(0, 1)));
+  return check("unseen_after_s", unseen_after_s, above(0));
 }
 
 LiveGuide::LiveGuide(SessionWriter& writer, LiveGuideOptions options, PositionFinder finder)

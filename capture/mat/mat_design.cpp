@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "capture/mat/mat_design.hpp"
 
-#include <fmt/format.h>
-
 #include "capture/mat/aruco_dictionary.hpp"
+#include "core/option_range.hpp"
 
 namespace orbitfuse {
 
@@ -17,18 +16,10 @@ MatDesign MatDesign::for_thermal(double size_m) {
 }
 
 Status MatDesign::validate() const {
-  const auto bad = [](const char* field, const std::string& found, const char* remedy) {
-    return fail(ErrorKind::usage, std::string("mat.") + field, found, remedy);
-  };
-  if (!(size_m >= 0.05 && size_m <= 20))
-    return bad("size_m", fmt::format("{}", size_m), "must be 0.05 to 20");
-  if (tags_per_side < 2 || tags() > 250)
-    return bad("tags_per_side", fmt::format("{}", tags_per_side), "must be 2 to 15");
-  if (!(tag_share >= 0.3 && tag_share <= 0.85)) {
-    return bad("tag_share", fmt::format("{}", tag_share),
-               "must be 0.3 to 0.85: tags need a quiet zone");
-  }
-  return {};
+  const OptionCheck check("mat");
+  ORBITFUSE_TRY(check("size_m", size_m, from_to(0.05, 20)));
+  ORBITFUSE_TRY(check("tags_per_side", tags_per_side, from_to(2, 15)));  // 250 tags in all
+  return check("tag_share", tag_share, from_to(0.3, 0.85));              // tags need a quiet zone
 }
 
 std::array<Eigen::Vector3d, 4> MatDesign::corners_m(int id) const {

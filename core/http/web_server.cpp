@@ -263,6 +263,8 @@ void WebServer::stop() { impl_->gate.reset(); }
 int WebServer::port() const { return impl_->port; }
 const std::string& WebServer::token() const { return impl_->options.token; }
 
+std::string WebServer::url() const { return urls().front(); }
+
 std::vector<std::string> WebServer::urls() const {
   std::vector<std::string> list;
   for (const std::string& host : reachable_hosts(impl_->options.host)) {

@@ -71,8 +71,9 @@ class WebServer {
   /// serves. From any thread.
   std::string answer(const std::string& request);
   int port() const;
-  /// What to open, the token included where one is needed. For a wildcard address one for each of
-  /// the machine's own, the loopback's last.
+  /// What to open, the token included where one is needed: the first of urls().
+  std::string url() const;
+  /// For a wildcard address one for each of the machine's own, the loopback's last.
   std::vector<std::string> urls() const;
   const std::string& token() const;
 

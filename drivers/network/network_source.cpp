@@ -9,6 +9,7 @@
 
 #include "core/image/image_codec.hpp"
 #include "core/image/jpeg_size.hpp"
+#include "core/option_range.hpp"
 
 namespace orbitfuse::network {
 namespace {
@@ -49,13 +50,10 @@ Status NetworkOptions::validate() const {
     return fail(ErrorKind::usage, "network.url", "not an address of a stream",
                 "write network:http://ADDRESS:PORT/PATH (MJPEG) or network:rtsp://ADDRESS/PATH");
   }
-  for (const auto& [field, time] :
-       {std::pair{"open", feed.open}, {"stall", feed.stall}, {"reopen_every", feed.reopen_every}}) {
-    if (time.count() <= 0)
-      return fail(ErrorKind::usage, std::string("network.") + field,
-                  fmt::format("{} ms", time.count()), "must be > 0");
-  }
-  return {};
+  const OptionCheck check("network");
+  ORBITFUSE_TRY(check("open", seconds(feed.open), above(0)));
+  ORBITFUSE_TRY(check("stall", seconds(feed.stall), above(0)));
+  return check("reopen_every", seconds(feed.reopen_every), above(0));
 }
 
 NetworkSource::NetworkSource(NetworkOptions options) : options_(std::move(options)) {

@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "core/image/image_codec.hpp"
+#include "drivers/stills/jpeg_segments.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -21,21 +22,8 @@ constexpr std::array<std::array<int, 2>, 4> sizes{
 /// The segments of one marker before the picture's data, joined.
 std::string joined(std::string_view jpeg, unsigned char marker) {
   std::string all;
-  std::size_t at = 2;
-  while (at + 4 <= jpeg.size() && static_cast<unsigned char>(jpeg[at]) == 0xff) {
-    const auto kind = static_cast<unsigned char>(jpeg[at + 1]);
-    if (kind == 0xff) {
-      ++at;  // fill byte
-      continue;
-    }
-    if (kind == 0xda || kind == 0xd9) break;
-    const std::size_t length = static_cast<std::size_t>(static_cast<unsigned char>(jpeg[at + 2]))
-                                   << 8 |
-                               static_cast<unsigned char>(jpeg[at + 3]);
-    if (length < 2 || at + 2 + length > jpeg.size()) break;
-    if (kind == marker) all += jpeg.substr(at + 4, length - 2);
-    at += 2 + length;
-  }
+  for (const JpegSegment& segment : jpeg_segments(jpeg))
+    if (segment.marker == marker) all += segment.payload;
   return all;
 }
 

@@ -12,6 +12,7 @@
 
 #include "core/image/image_codec.hpp"
 #include "drivers/stills/jpeg_ls.hpp"
+#include "drivers/stills/jpeg_segments.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -60,24 +61,11 @@ tl::unexpected<Error> broken(const std::string& where, const std::string& found)
 /// The FLIR file: payloads of the "FLIR\0" APP1 segments, joined by their index.
 std::string join_segments(std::string_view jpeg) {
   using namespace std::string_view_literals;
+  constexpr unsigned char app1 = 0xe1;
   std::map<int, std::string_view> parts;
-  std::size_t at = 2;
-  while (at + 4 <= jpeg.size() && static_cast<unsigned char>(jpeg[at]) == 0xFF) {
-    const auto marker = static_cast<unsigned char>(jpeg[at + 1]);
-    if (marker == 0xFF) {
-      ++at;  // fill byte
-      continue;
-    }
-    if (marker == 0xDA || marker == 0xD9) break;  // image data: no more headers
-    const std::size_t length = static_cast<std::size_t>(static_cast<unsigned char>(jpeg[at + 2]))
-                                   << 8 |
-                               static_cast<unsigned char>(jpeg[at + 3]);
-    if (length < 2 || at + 2 + length > jpeg.size()) break;
-    const std::string_view payload = jpeg.substr(at + 4, length - 2);
-    if (marker == 0xE1 && payload.size() > 8 && payload.substr(0, 5) == "FLIR\0"sv) {
+  for (const auto& [marker, payload] : jpeg_segments(jpeg)) {
+    if (marker == app1 && payload.size() > 8 && payload.substr(0, 5) == "FLIR\0"sv)
       parts.emplace(static_cast<unsigned char>(payload[6]), payload.substr(8));
-    }
-    at += 2 + length;
   }
   std::string joined;
   for (const auto& [index, part] : parts) joined += part;

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <numbers>
 
 #include "core/image/exif.hpp"
 #include "core/system/file_io.hpp"
@@ -115,8 +114,7 @@ Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& 
     still.camera.model = file.flir->camera_model;
     still.camera.serial = file.flir->camera_serial;
     if (const auto fov = file.flir->horizontal_fov_deg) {
-      still.camera.lens.focal_px =
-          0.5 * still.size.width / std::tan(0.5 * *fov * std::numbers::pi / 180);
+      still.camera.lens.focal_px = Camera::from_fov(still.size.width, still.size.height, *fov).fx;
       still.lens = fmt::format("{:.1f} degrees", *fov);
     }
   }

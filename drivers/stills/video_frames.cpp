@@ -15,6 +15,7 @@
 #include "capture/image_quality/frame_motion.hpp"
 #include "capture/image_quality/frame_quality.hpp"
 #include "core/image/image_codec.hpp"
+#include "core/option_range.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse {
@@ -159,19 +160,11 @@ std::vector<bool> choose(const std::vector<Look>& looks, const VideoOptions& opt
 }  // namespace
 
 Status VideoOptions::validate() const {
-  if (max_frames < 2 || max_frames > 5000)
-    return fail(ErrorKind::usage, "video.max_frames", fmt::format("{}", max_frames),
-                "must be 2 to 5000");
-  if (!(min_step > 0 && min_step <= 1))
-    return fail(ErrorKind::usage, "video.min_step", fmt::format("{}", min_step),
-                "must be above 0 and at most 1");
-  if (!(max_edge_px > 0))
-    return fail(ErrorKind::usage, "video.max_edge_px", fmt::format("{}", max_edge_px),
-                "must be above 0");
-  if (max_looked_at < 1)
-    return fail(ErrorKind::usage, "video.max_looked_at", fmt::format("{}", max_looked_at),
-                "must be at least 1");
-  return {};
+  const OptionCheck check("video");
+  ORBITFUSE_TRY(check("max_frames", max_frames, from_to(2, 5000)));
+  ORBITFUSE_TRY(check("min_step", min_step, above_up_to(0, 1)));
+  ORBITFUSE_TRY(check("max_edge_px", max_edge_px, above(0)));
+  return check("max_looked_at", static_cast<double>(max_looked_at), at_least(1));
 }
 
 std::string VideoAccount::words() const {

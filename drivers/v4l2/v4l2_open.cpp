@@ -11,6 +11,8 @@
 
 #include "drivers/v4l2/v4l2_source.hpp"
 
+#include "core/option_range.hpp"
+
 namespace orbitfuse::v4l2 {
 namespace {
 
@@ -37,23 +39,19 @@ std::uint32_t fourcc_of(std::string text) {
 
 Status V4l2Options::validate() const {
   ORBITFUSE_TRY(parse_camera_name(camera));
-  const auto bad = [](const char* field, std::string found, const char* remedy) {
-    return fail(ErrorKind::usage, std::string("v4l2.") + field, std::move(found), remedy);
-  };
-  if (width < 0 || height < 0 || (width == 0) != (height == 0)) {
-    return bad("width", fmt::format("{}x{}", width, height), "give both or neither");
-  }
-  if (!(rate_hz >= 0)) return bad("rate_hz", fmt::format("{}", rate_hz), "must be >= 0");
-  if (!format.empty() && !is_supported(fourcc_of(format))) {
-    return bad("format", format, "one of MJPG, YUYV, NV12, GREY, Y16");
-  }
-  if (buffers < 2) return bad("buffers", fmt::format("{}", buffers), "must be >= 2");
-  if (!(kelvin_per_dn >= 0 && kelvin_per_dn <= max_kelvin_per_sample))
-    return bad("kelvin_per_dn", fmt::format("{}", kelvin_per_dn), "must be 0 to 10");
-  if (stall.count() <= 0 || reopen_every.count() <= 0)
-    return bad("stall", "not positive", "must be > 0");
-  if (nuc_settle.count() < 0) return bad("nuc_settle", "negative", "must be >= 0");
-  return {};
+  if (width < 0 || height < 0 || (width == 0) != (height == 0))
+    return fail(ErrorKind::usage, "v4l2.width", fmt::format("{}x{}", width, height),
+                "give both or neither");
+  if (!format.empty() && !is_supported(fourcc_of(format)))
+    return fail(ErrorKind::usage, "v4l2.format", format, "one of MJPG, YUYV, NV12, GREY, Y16");
+  const OptionCheck check("v4l2");
+  ORBITFUSE_TRY(check("rate_hz", rate_hz, at_least(0)));
+  ORBITFUSE_TRY(check("buffers", buffers, at_least(2)));
+  ORBITFUSE_TRY(check("kelvin_per_dn", kelvin_per_dn, from_to(0, max_kelvin_per_sample)));
+  const auto ms = [](auto time) { return std::chrono::duration<double, std::milli>(time).count(); };
+  ORBITFUSE_TRY(check("stall", ms(stall), above(0)));
+  ORBITFUSE_TRY(check("reopen_every", ms(reopen_every), above(0)));
+  return check("nuc_settle", ms(nuc_settle), at_least(0));
 }
 
 Status V4l2Source::open_and_stream(const VideoSystem::Node& node) {

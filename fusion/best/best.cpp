@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fusion/best/best.hpp"
 
-#include <fmt/format.h>
-
 #include <array>
 #include <opencv2/imgproc.hpp>
 
+#include "core/option_range.hpp"
 #include "core/system/parallel.hpp"
 #include "fusion/best/band_mix.hpp"
 #include "fusion/best/base_rule.hpp"
@@ -45,20 +44,13 @@ Plane energy_of(const Plane& band, int radius) {
 }  // namespace
 
 Status BestOptions::validate() const {
-  const auto bad = [](const char* field, double value, const char* rule) {
-    return fail(ErrorKind::usage, std::string("best.") + field, fmt::format("{}", value), rule);
-  };
-  if (levels < 0 || levels > 12) return bad("levels", levels, "must be in 0..12");
-  if (energy_radius_px < 0 || energy_radius_px > 15)
-    return bad("energy_radius_px", energy_radius_px, "must be in 0..15");
-  if (!(sharpness > 0 && sharpness <= 64)) return bad("sharpness", sharpness, "must be in (0, 64]");
-  if (!(contrast_kept >= 0 && contrast_kept <= 1))
-    return bad("contrast_kept", contrast_kept, "must be in 0..1");
-  if (!(visible_preference >= 0 && visible_preference <= 255))
-    return bad("visible_preference", visible_preference, "must be in 0..255");
-  if (!(brightness_weight >= 0 && brightness_weight <= 1))
-    return bad("brightness_weight", brightness_weight, "must be in 0..1");
-  return {};
+  const OptionCheck check("best");
+  ORBITFUSE_TRY(check("levels", levels, from_to(0, 12)));
+  ORBITFUSE_TRY(check("energy_radius_px", energy_radius_px, from_to(0, 15)));
+  ORBITFUSE_TRY(check("sharpness", sharpness, above_up_to(0, 64)));
+  ORBITFUSE_TRY(check("contrast_kept", contrast_kept, from_to(0, 1)));
+  ORBITFUSE_TRY(check("visible_preference", visible_preference, from_to(0, 255)));
+  return check("brightness_weight", brightness_weight, from_to(0, 1));
 }
 
 Result<Plane> fuse_best(const Plane& visible, const Plane& thermal, const BestOptions& options,

@@ -17,7 +17,7 @@ struct TemperatureOverlay {
 
 /// The fused luma with the visible image's colour differences (1 or 3 channels of floats, 0..255),
 /// and with the overlay's where `measured` is 1 (0..1; empty = everywhere). Returns three channels
-/// of floats.
+/// of floats. Usage errors: the overlay's.
 Result<cv::Mat> colored(const fusion::Plane& fused, const cv::Mat& visible,
                         const fusion::Plane& thermal, const fusion::Plane& measured,
                         const TemperatureOverlay& overlay);

@@ -18,7 +18,7 @@ class Dictionary {
   /// Input error for another row count, no atom, or samples that are not finite. Atoms of length
   /// zero and repeats of an earlier atom are left out: OMP would divide by zero on them.
   static Result<Dictionary> from_atoms(const Eigen::MatrixXf& atoms);
-  /// Bytes as written by `quantised`.
+  /// Bytes as written by `quantised`. Errors: input (another size), from_atoms'.
   static Result<Dictionary> from_bytes(std::string_view bytes);
   /// The one the project trained and ships.
   static const Dictionary& shipped();

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fusion/ms_srif/ms_srif.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 
+#include "core/option_range.hpp"
 #include "core/system/parallel.hpp"
 #include "fusion/pyramid/bands.hpp"
 #include "fusion/pyramid/patch_dct.hpp"
@@ -124,20 +123,15 @@ Plane fuse_base(const Plane& visible, const Plane& thermal, const MsSrifOptions&
 }  // namespace
 
 Status MsSrifOptions::validate() const {
-  const auto bad = [](const char* field, double value, const char* rule) {
-    return fail(ErrorKind::usage, std::string("ms_srif.") + field, fmt::format("{}", value), rule);
-  };
-  if (levels < 0 || levels > 12) return bad("levels", levels, "must be in 0..12");
-  if (stride_px < 1 || stride_px > patch_side)
-    return bad("stride_px", stride_px, "must be in 1..8");
-  if (max_atoms < 1 || max_atoms > patch_size)
-    return bad("max_atoms", max_atoms, "must be in 1..64");
-  if (!(residual >= 0 && residual <= 255)) return bad("residual", residual, "must be in 0..255");
-  if (!(certain_ratio == 0 || (certain_ratio >= 1 && certain_ratio <= 1e6)))
-    return bad("certain_ratio", certain_ratio, "must be 0 (off) or in 1..1e6");
-  if (!(relative_residual >= 0 && relative_residual < 1))
-    return bad("relative_residual", relative_residual, "must be in [0, 1)");
-  return {};
+  const OptionCheck check("ms_srif");
+  ORBITFUSE_TRY(check("levels", levels, from_to(0, 12)));
+  ORBITFUSE_TRY(check("stride_px", stride_px, from_to(1, patch_side)));
+  ORBITFUSE_TRY(check("max_atoms", max_atoms, from_to(1, patch_size)));
+  ORBITFUSE_TRY(check("residual", residual, from_to(0, 255)));
+  if (certain_ratio != 0)  // 0: off
+    ORBITFUSE_TRY(check("certain_ratio", certain_ratio, from_to(1, 1e6)));
+  return check("relative_residual", relative_residual,
+               OptionRange{.low = 0, .high = 1, .low_included = true, .high_included = false});
 }
 
 Result<Plane> fuse_ms_srif(const Plane& visible, const Plane& thermal, const MsSrifOptions& options,

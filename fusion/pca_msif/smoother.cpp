@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fusion/pca_msif/smoother.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "core/option_range.hpp"
 #include "fusion/pca_msif/fast_explicit_diffusion.hpp"
 
 namespace orbitfuse::fusion {
@@ -154,21 +153,12 @@ Plane diffused(const Plane& input, const SmootherOptions& options) {
 double largest_stable_step(Stencil stencil) { return stencil == Stencil::wide ? 1.0 : 1.0 / 16; }
 
 Status SmootherOptions::validate() const {
-  const auto bad = [](const char* field, double value, const std::string& rule) {
-    return fail(ErrorKind::usage, std::string("pca_msif.smoother.") + field,
-                fmt::format("{}", value), rule);
-  };
-  if (iterations < 0 || iterations > 10000)
-    return bad("iterations", iterations, "must be in 0..10000");
-  if (cycles < 0 || cycles > 10000) return bad("cycles", cycles, "must be in 0..10000");
-  const double limit = largest_stable_step(stencil);
-  if (!(time_step > 0 && time_step <= limit))
-    return bad("time_step", time_step,
-               fmt::format("must be in (0, {}]: beyond it the {} stencil diverges", limit,
-                           stencil == Stencil::wide ? "wide" : "compact"));
-  if (!(edge_scale > 0 && edge_scale <= 1e6))
-    return bad("edge_scale", edge_scale, "must be in (0, 1e6]");
-  return {};
+  const OptionCheck check("pca_msif.smoother");
+  ORBITFUSE_TRY(check("iterations", iterations, from_to(0, 10000)));
+  ORBITFUSE_TRY(check("cycles", cycles, from_to(0, 10000)));
+  // Beyond it the stencil diverges.
+  ORBITFUSE_TRY(check("time_step", time_step, above_up_to(0, largest_stable_step(stencil))));
+  return check("edge_scale", edge_scale, above_up_to(0, 1e6));
 }
 
 Plane smooth(const Plane& image, const SmootherOptions& options) {

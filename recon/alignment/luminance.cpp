@@ -18,10 +18,8 @@ Result<cv::Mat> read_luminance(const Session& session, const FrameRecord& frame)
   if (frame.modality == Modality::thermal && !frame.thermal_is_gray) {
     ORBITFUSE_ASSIGN(values, read_thermal_k(path));
   } else {
-    ORBITFUSE_ASSIGN(cv::Mat image, read_image(path));
-    if (frame.modality == Modality::visible) {
-      ORBITFUSE_ASSIGN(image, read_visible(path));
-    }
+    ORBITFUSE_ASSIGN(cv::Mat image,
+                     frame.modality == Modality::visible ? read_visible(path) : read_image(path));
     if (image.channels() == 3) cv::cvtColor(image, image, cv::COLOR_BGR2GRAY);
     image.convertTo(values, CV_32F);
   }

@@ -8,7 +8,8 @@
 
 namespace orbitfuse {
 
-/// Frames as floats: visible luma 0..255, thermal kelvin (or grey); NaN = invalid.
+/// A frame as floats (CV_32FC1): visible luma 0..255, thermal kelvin (or grey); NaN = invalid.
+/// Errors: input (unreadable, or not of the size that the session says).
 Result<cv::Mat> read_luminance(const Session& session, const FrameRecord& frame);
 
 /// Thermal values whose hottest parts don't drown the rest: beyond eight interquartile ranges above

@@ -59,7 +59,7 @@ WholeMatch match_whole(const cv::Mat& edges, const cv::Mat& field, int reach_px)
 
 Result<double> ascend_correlation(const SceneRenderer& renderer,
                                   const Similarity3d& canonical_from_world, const cv::Mat& image,
-                                  PosedView& view, const ClimbOptions& options,
+                                  PosedView& view, const AscentOptions& options,
                                   const Progress& progress) {
   const int width = std::min(options.width_px, view.camera.width);
   const Camera camera =

@@ -25,7 +25,7 @@ struct OrbitMove {
 Rigid3d moved(const Rigid3d& cam_from_world, const Similarity3d& canonical_from_world,
               const OrbitMove& move);
 
-struct ClimbOptions {
+struct AscentOptions {
   int width_px = 160;
   int reach_px = 12;  ///< of the image shift
   double first_step_deg = 4, last_step_deg = 1;
@@ -35,7 +35,7 @@ struct ClimbOptions {
 /// found. Returns the correlation there. Errors: the renderer's, cancelled.
 Result<double> ascend_correlation(const SceneRenderer& renderer,
                                   const Similarity3d& canonical_from_world, const cv::Mat& image,
-                                  PosedView& view, const ClimbOptions& options,
+                                  PosedView& view, const AscentOptions& options,
                                   const Progress& progress);
 
 }  // namespace orbitfuse

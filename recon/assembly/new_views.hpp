@@ -44,7 +44,8 @@ struct NewViews {
   std::string described;  ///< "orbit of 8 views at 24 deg elevation"
 };
 
-/// Cameras for rendering, in the frame of `posed`, without distortion.
+/// Cameras for rendering, in the frame of `posed`, without distortion. Errors: usage (options),
+/// orbit_geometry's.
 Result<NewViews> new_views(const std::vector<PosedView>& posed, const NewViewOptions& options);
 
 }  // namespace orbitfuse

@@ -1,19 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/measurement/measurement_file.hpp"
 
-#include <fcntl.h>
 #include <fmt/chrono.h>
 #include <fmt/format.h>
-#include <sys/file.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <ctime>
 #include <set>
 
 #include "core/system/file_io.hpp"
+#include "core/system/folder_change_lock.hpp"
 
 namespace orbitfuse::measurement {
 namespace {
@@ -24,28 +20,6 @@ constexpr const char* put_away = "nothing was changed: mend it, or move it away 
 tl::unexpected<Error> damaged(const std::filesystem::path& file, const std::string& found) {
   return fail(ErrorKind::input, file.string(), found, put_away);
 }
-
-/// Held while a list is changed: of the file's folder, so that nothing is left behind. The kernel
-/// releases it when the process dies.
-class ChangeLock {
- public:
-  ChangeLock() = default;
-  ChangeLock(const ChangeLock&) = delete;
-  ChangeLock& operator=(const ChangeLock&) = delete;
-  ~ChangeLock() {
-    if (descriptor_ >= 0) close(descriptor_);
-  }
-  Status acquire(const std::filesystem::path& file) {
-    const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
-    descriptor_ = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (descriptor_ >= 0 && flock(descriptor_, LOCK_EX) == 0) return {};
-    return fail(ErrorKind::device, folder.string(), std::strerror(errno),
-                "give a folder that can be written to");
-  }
-
- private:
-  int descriptor_ = -1;
-};
 
 Result<SavedMeasurement> parse(const json& j, const std::string& where) {
   SavedMeasurement saved;
@@ -66,6 +40,13 @@ Result<SavedMeasurement> parse(const json& j, const std::string& where) {
 }
 
 }  // namespace
+
+json to_json(const SavedMeasurement& saved) {
+  return {{"name", saved.name},
+          {"created", saved.created},
+          {"request", to_json(saved.request)},
+          {"answer", saved.answer}};
+}
 
 const SavedMeasurement* Measurements::find(const std::string& name) const {
   const auto at = std::find_if(list.begin(), list.end(),
@@ -124,8 +105,8 @@ Result<Measurements> load_measurements(const std::filesystem::path& file,
 
 Result<std::string> add_measurement(const std::filesystem::path& file, const std::string& identity,
                                     SavedMeasurement measurement) {
-  ChangeLock lock;
-  ORBITFUSE_TRY(lock.acquire(file));
+  FolderChangeLock lock;
+  ORBITFUSE_TRY(lock.acquire(file.parent_path()));
   ORBITFUSE_ASSIGN(Measurements all, load_measurements(file, identity));
   if (measurement.created.empty())
     measurement.created = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
@@ -136,11 +117,7 @@ Result<std::string> add_measurement(const std::filesystem::path& file, const std
 
 Status save_measurements(const std::filesystem::path& file, const Measurements& measurements) {
   json list = json::array();
-  for (const SavedMeasurement& saved : measurements.list)
-    list.push_back({{"name", saved.name},
-                    {"created", saved.created},
-                    {"request", to_json(saved.request)},
-                    {"answer", saved.answer}});
+  for (const SavedMeasurement& saved : measurements.list) list.push_back(to_json(saved));
   const json j = {{"schema", measurement_schema},
                   {"conventions",
                    {{"frame",

@@ -22,6 +22,9 @@ struct SavedMeasurement {
   nlohmann::json answer;  ///< to_json(Answer) of that time
 };
 
+/// {"name", "created", "request", "answer"}.
+nlohmann::json to_json(const SavedMeasurement& saved);
+
 struct Measurements {
   std::string identity;  ///< ThermalScene::identity of the run that they belong to
   std::vector<SavedMeasurement> list;
@@ -41,7 +44,8 @@ Result<Measurements> load_measurements(const std::filesystem::path& file,
 /// each other. `created` is set to now where it is empty. Returns the name. Errors: both's.
 Result<std::string> add_measurement(const std::filesystem::path& file, const std::string& identity,
                                     SavedMeasurement measurement);
-/// Atomic: readers see the old list or the new one.
+/// Atomic: readers see the old list or the new one. Errors: input (larger than what is read again),
+/// device (it can't be written); the file is left as it is then.
 Status save_measurements(const std::filesystem::path& file, const Measurements& measurements);
 
 }  // namespace orbitfuse::measurement

@@ -143,7 +143,20 @@ struct PointSum {
     min_k = std::min(min_k, kelvin);
     max_k = std::max(max_k, kelvin);
   }
+  void tell(double reference_k, TemperatureReading& reading) const {
+    const double mean = sum / area;
+    reading.mean_k = reference_k + mean;
+    reading.min_k = min_k;
+    reading.max_k = max_k;
+    reading.standard_deviation_k = std::sqrt(std::max(0.0, squares / area - mean * mean));
+  }
 };
+
+void tell_unsure(const Estimate& estimate, TemperatureReading& reading) {
+  reading.uncertainty_k = estimate.uncertainty_k;
+  reading.assumed_k = estimate.assumed_k;
+  reading.spread_k = estimate.spread_k;
+}
 
 FrameLine line_of(const ThermalScene& scene, std::size_t frame, const FrameSum& s, double all_area,
                   double all_weight) {
@@ -175,9 +188,7 @@ Result<TemperatureReading> read_spot(const ThermalScene& scene, const SurfacePoi
   result.seen_share = 1;
   result.outliers = settled.outliers;
   result.temperature_k = e.temperature_k;
-  result.uncertainty_k = e.uncertainty_k;
-  result.assumed_k = e.assumed_k;
-  result.spread_k = e.spread_k;
+  tell_unsure(e, result);
   PointSum sum;
   for (const FrameReading& r : readings.frames) {
     sum.add(r.temperature_k, 1, e.temperature_k);
@@ -191,11 +202,7 @@ Result<TemperatureReading> read_spot(const ThermalScene& scene, const SurfacePoi
                              .used = r.used,
                              .doubtful = scene.frames()[r.frame].doubtful()});
   }
-  const double offset = sum.sum / sum.area;
-  result.mean_k = e.temperature_k + offset;
-  result.min_k = sum.min_k;
-  result.max_k = sum.max_k;
-  result.standard_deviation_k = std::sqrt(std::max(0.0, sum.squares / sum.area - offset * offset));
+  sum.tell(e.temperature_k, result);
   result.angle_deg = weighted_angle(result.frames);
   return result;
 }
@@ -276,22 +283,14 @@ Result<TemperatureReading> read_region(const ThermalScene& scene,
   if (sum.field.area > 0) result.field_k = sum.field.sum / sum.field.area;
   result.hidden = PointReadings{{}, sum.hidden}.why_hidden();
   if (sum.frames.empty()) return result;
-  const PointSum& seen = sum.seen;
-  result.seen_share = seen.area / sum.all_area;
-  const double mean = seen.sum / seen.area;
-  result.mean_k = sum.reference_k + mean;
-  result.min_k = seen.min_k;
-  result.max_k = seen.max_k;
-  result.standard_deviation_k = std::sqrt(std::max(0.0, seen.squares / seen.area - mean * mean));
+  result.seen_share = sum.seen.area / sum.all_area;
+  sum.seen.tell(sum.reference_k, result);
   double all_weight = 0;
   for (const auto& [frame, s] : sum.frames) all_weight += s.weight;
   for (const auto& [frame, s] : sum.frames)
     result.frames.push_back(line_of(scene, frame, s, sum.all_area, all_weight));
-  const Estimate e = region_estimate(sum, result.mean_k, all_weight, scene.options());
+  tell_unsure(region_estimate(sum, result.mean_k, all_weight, scene.options()), result);
   result.temperature_k = result.mean_k;
-  result.uncertainty_k = e.uncertainty_k;
-  result.assumed_k = e.assumed_k;
-  result.spread_k = e.spread_k;
   result.outliers = sum.outliers();
   result.angle_deg = weighted_angle(result.frames);
   return result;

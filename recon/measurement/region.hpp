@@ -8,6 +8,8 @@
 
 namespace orbitfuse::measurement {
 
+// Errors of all three: those of read_frames.
+
 /// The temperature at one point of the surface.
 Result<TemperatureReading> read_spot(const ThermalScene& scene, const SurfacePoint& surface,
                                      const Reradiometry& radiometry, const Progress& progress);

@@ -27,6 +27,7 @@ Eigen::Vector3d up_direction(const std::vector<PosedView>& views);
 Similarity3d canonical_from_world(const std::vector<PosedView>& views,
                                   const std::vector<const FrameRecord*>& frames);
 
+/// Takes poses and points into another world.
 void move_world(Reconstruction& model, const Similarity3d& new_from_old);
 
 struct OrbitAngles {

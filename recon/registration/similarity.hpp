@@ -23,7 +23,8 @@ struct RobustSimilarity {
   double inlier_ratio = 0;
 };
 /// Graduated non-convexity with truncated least squares (Yang et al. 2020) round umeyama; pairs
-/// further off than the bound (target units) end with weight 0.
+/// further off than the bound (target units) end with weight 0. Errors: umeyama's, and usage for a
+/// bound that is not above 0.
 Result<RobustSimilarity> robust_umeyama(const Points& source, const Points& target,
                                         double inlier_bound);
 

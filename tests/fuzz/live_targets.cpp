@@ -12,7 +12,7 @@
 #include <cstring>
 
 #include "capture/clock/clock_map.hpp"
-#include "capture/page/page_server.hpp"
+#include "capture/page/capture_page.hpp"
 #include "capture/recording/frame_encoding.hpp"
 #include "capture/recording/frame_rhythm.hpp"
 #include "capture/recording/raw_counts.hpp"
@@ -37,7 +37,7 @@ void must(bool holds) {
 /// A page with all its hooks, which needs a token. Notes whether a button was pressed.
 struct Page {
   std::atomic<bool> pressed{false};
-  PageServer server;
+  WebServer server;
 
   static PageOptions options() {
     PageOptions o;
@@ -59,7 +59,7 @@ struct Page {
     };
     return h;
   }
-  Page() : server(options(), hooks()) {}
+  Page() : server(options(), capture_page(hooks())) {}
 };
 
 std::string lower(std::string text) {

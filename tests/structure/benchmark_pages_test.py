@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pages of docs/benchmarks: command, processor, date, a plot that is its table's, a link from the index."""
+"""Pages of docs/benchmarks: command, processor, date, limits, a plot that is its table's, a link from the index."""
 import importlib.util
 import re
 import unittest
@@ -50,6 +50,7 @@ class BenchmarkPages(unittest.TestCase):
                 self.assertRegex(page, r"bench_|build/release/bench|bench/app|tests/|nerf_")
                 self.assertRegex(page, r"Intel|AMD")
                 self.assertRegex(page, r"20\d\d-\d\d-\d\d")
+                self.assertRegex(page, r"\n## Limits\n\n\S", "what the figures don't say")
                 self.assertIn(f"benchmarks/{file.name}", index)
                 images = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", page)
                 self.assertTrue(images or file.name in WITHOUT_PLOT, "no plot")

@@ -21,6 +21,16 @@ const std::vector<SourceFile>& product_sources() {
   return files;
 }
 
+/// What is no test.
+const std::vector<SourceFile>& own_sources() {
+  static const std::vector<SourceFile> files = [] {
+    std::vector<std::string> folders = product;
+    for (const char* more : {"bench", "examples"}) folders.emplace_back(more);
+    return read_sources(root, folders);
+  }();
+  return files;
+}
+
 const std::vector<SourceFile>& all_sources() {
   static const std::vector<SourceFile> files = [] {
     std::vector<std::string> folders = product;
@@ -154,6 +164,24 @@ TEST(Structure, RoomsInsideAModuleAreItsOwn) {
   EXPECT_TRUE(wrong.empty()) << list(wrong);
 }
 
+TEST(Structure, NobodyBuildsOnWhatIsAboveIt) {
+  // Nothing depends on what measures or shows the product, and the product on no test.
+  std::vector<std::string> wrong;
+  const auto of = [](const std::string& path, const char* folder) {
+    return path.starts_with(std::string(folder) + "/");
+  };
+  for (const SourceFile& file : all_sources()) {
+    for (const std::string& included : file.includes) {
+      const bool measures = of(included, "bench") && !of(file.path, "bench");
+      const bool shows = of(included, "examples") && !of(file.path, "examples");
+      const bool tests =
+          of(included, "tests") && !of(file.path, "tests") && !of(file.path, "bench");
+      if (measures || shows || tests) wrong.push_back(file.path + " includes " + included);
+    }
+  }
+  EXPECT_TRUE(wrong.empty()) << list(wrong);
+}
+
 TEST(Structure, NoFolderHoldsMoreThanTwentyFiveFilesOfAKind) {
   namespace fs = std::filesystem;
   std::map<std::string, int> files;
@@ -173,7 +201,7 @@ TEST(Structure, NoTwoTypesShareAName) {
   // A type of an inner namespace that is named as one of `orbitfuse` hides it there, and a reader
   // who sees the name takes one for the other.
   std::map<std::string, std::vector<std::string>> places;
-  for (const SourceFile& file : product_sources()) {
+  for (const SourceFile& file : own_sources()) {
     if (!file.is_header()) continue;
     for (const std::string& type : types_of(file)) places[type].push_back(file.path);
   }
@@ -190,7 +218,7 @@ TEST(Structure, NoTwoTypesShareAName) {
 
 TEST(Structure, NoTwoHeadersOfANamespaceShareAName) {
   std::map<std::string, std::set<std::string>> places;  // by namespace and file name
-  for (const SourceFile& file : product_sources()) {
+  for (const SourceFile& file : own_sources()) {
     if (!file.is_header()) continue;
     const std::size_t start = file.text.find("\nnamespace ");
     if (start == std::string::npos) continue;
@@ -206,7 +234,7 @@ TEST(Structure, NoTwoHeadersOfANamespaceShareAName) {
 TEST(Structure, FunctionsStayUnderAHundredLines) {
   std::vector<std::string> wrong;
   int functions = 0;
-  for (const SourceFile& file : product_sources()) {
+  for (const SourceFile& file : own_sources()) {
     for (const Function& function : functions_of(file.text)) {
       ++functions;
       if (function.lines < 100) continue;

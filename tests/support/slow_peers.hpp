@@ -26,6 +26,27 @@ inline int connected_to(int port) {
   return -1;
 }
 
+/// Listens on a free port of this machine; who connects hears nothing.
+class SilentListener {
+ public:
+  SilentListener() {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof address;
+    auto* const at = reinterpret_cast<sockaddr*>(&address);
+    if (::bind(fd_, at, size) == 0 && ::listen(fd_, 4) == 0 && ::getsockname(fd_, at, &size) == 0)
+      port_ = ntohs(address.sin_port);
+  }
+  SilentListener(const SilentListener&) = delete;
+  SilentListener& operator=(const SilentListener&) = delete;
+  ~SilentListener() { ::close(fd_); }
+  int port() const { return port_; }  ///< 0: none was free
+
+ private:
+  int fd_ = ::socket(AF_INET, SOCK_STREAM, 0), port_ = 0;
+};
+
 /// The answer to a request that is sent as it stands here, without closing the connection.
 inline std::string answer_to(int port, const std::string& request, int patience_ms = 3000) {
   const int fd = connected_to(port);

@@ -25,7 +25,7 @@ constexpr RenderRound closing_round{search_width_px, 7, 7, 10};
 constexpr RenderRound judging_round{search_width_px, 3, 4, 8};
 
 /// A place on its way, and how well the images support it.
-struct Climber {
+struct Candidate {
   Similarity3d visible_from_thermal;
   double support = 0;                    ///< agreement of edges times patches in place
   double share = 0;                      ///< of the patches, in place
@@ -40,36 +40,36 @@ struct Evidence {
 };
 
 /// Moves by one round; false where the images show too little.
-Result<bool> step(const Evidence& seen, const RenderRound& round, Climber& climber) {
+Result<bool> step(const Evidence& seen, const RenderRound& round, Candidate& candidate) {
   ORBITFUSE_ASSIGN(SimilarityRound found,
                    match_scene(seen.visible, seen.images, seen.thermal,
-                               climber.visible_from_thermal, round, seen.progress));
+                               candidate.visible_from_thermal, round, seen.progress));
   if (found.patches.size() < fewest_patches) {
-    climber.support = 0;
+    candidate.support = 0;
     return false;
   }
   const Similarity3d moved =
-      agreed_similarity(found.patches, climber.visible_from_thermal.inverse());
+      agreed_similarity(found.patches, candidate.visible_from_thermal.inverse());
   const int matches = found.matches(moved);
-  climber.visible_from_thermal = moved.inverse();
-  climber.share = matches / static_cast<double>(found.patches.size());
-  climber.support = std::max(0.0, found.agreement) * matches;
-  climber.patches = std::move(found.patches);
+  candidate.visible_from_thermal = moved.inverse();
+  candidate.share = matches / static_cast<double>(found.patches.size());
+  candidate.support = std::max(0.0, found.agreement) * matches;
+  candidate.patches = std::move(found.patches);
   return moved.is_finite() && moved.scale > 0;
 }
 
-Status open(const Evidence& seen, Climber& climber) {
+Status open(const Evidence& seen, Candidate& candidate) {
   for (const RenderRound& round : opening_rounds()) {
-    ORBITFUSE_ASSIGN(const bool moves, step(seen, round, climber));
+    ORBITFUSE_ASSIGN(const bool moves, step(seen, round, candidate));
     if (!moves) break;
   }
   return {};
 }
 
-Status close(const Evidence& seen, Climber& climber) {
-  if (!(climber.support > 0)) return {};
+Status close(const Evidence& seen, Candidate& candidate) {
+  if (!(candidate.support > 0)) return {};
   for (const RenderRound& round : {closing_round, judging_round})
-    ORBITFUSE_TRY(step(seen, round, climber));
+    ORBITFUSE_TRY(step(seen, round, candidate));
   return {};
 }
 
@@ -93,10 +93,10 @@ Similarity3d about(const Eigen::Vector3d& center, double turn_deg, const Eigen::
   return {growth, turn, center - growth * (turn * center)};
 }
 
-std::vector<Climber> starts_round(const Similarity3d& visible_from_thermal,
-                                  const Eigen::Vector3d& center,
-                                  const SimilaritySearchOptions& options) {
-  std::vector<Climber> starts;
+std::vector<Candidate> starts_round(const Similarity3d& visible_from_thermal,
+                                    const Eigen::Vector3d& center,
+                                    const SimilaritySearchOptions& options) {
+  std::vector<Candidate> starts;
   for (const double sign : {-1.0, 1.0}) {
     for (int axis = 0; axis < 3; ++axis)
       starts.push_back({about(center, sign * options.turn_deg, Eigen::Vector3d::Unit(axis), 1) *
@@ -146,10 +146,10 @@ Result<SimilarityRefinement> search_similarity(const SceneRenderer& visible,
     seen.images.push_back(images[k * thermal.size() / count]);
     seen.thermal.push_back(thermal[k * thermal.size() / count]);
   }
-  Climber first{visible_from_thermal};
+  Candidate first{visible_from_thermal};
   ORBITFUSE_TRY(open(seen, first));
   if (!(first.support > 0)) return finish(visible_from_thermal, similarity_rounds());
-  std::vector<Climber> climbers =
+  std::vector<Candidate> candidates =
       starts_round(visible_from_thermal, middle(first.patches), options);
   ORBITFUSE_TRY(close(seen, first));
   const double moved = steps_between(first.visible_from_thermal, visible_from_thermal, options);
@@ -165,32 +165,33 @@ Result<SimilarityRefinement> search_similarity(const SceneRenderer& visible,
          fmt::format("images and clouds agree: {:.0f} % of the patches in place, {:.1f} of a "
                      "start's step from the clouds' answer",
                      100 * first.share, moved),
-         fmt::format("{} starts not tried", climbers.size())});
+         fmt::format("{} starts not tried", candidates.size())});
     return result;
   }
-  for (Climber& climber : climbers) {
-    ORBITFUSE_TRY(open(seen, climber));
-    progress.report({"register", 0, 0, -1, fmt::format("start: support {:.0f}", climber.support)});
-  }
-  const int starts = 1 + static_cast<int>(climbers.size());
-  // Clutter can draw a start to where the clouds don't meet at all.
-  const auto lost = [&](const Climber& climber) {
-    return steps_between(climber.visible_from_thermal, visible_from_thermal, options) > farthest;
-  };
-  const auto better = [](const Climber& a, const Climber& b) { return a.support > b.support; };
-  std::erase_if(climbers, lost);
-  std::stable_sort(climbers.begin(), climbers.end(), better);
-  climbers.resize(std::min(climbers.size(), static_cast<std::size_t>(options.finalists)));
-  for (Climber& climber : climbers) {
-    ORBITFUSE_TRY(close(seen, climber));
+  for (Candidate& candidate : candidates) {
+    ORBITFUSE_TRY(open(seen, candidate));
     progress.report(
-        {"register", 0, 0, -1,
-         fmt::format("finalist: support {:.0f}, {:.2f} in place", climber.support, climber.share)});
+        {"register", 0, 0, -1, fmt::format("start: support {:.0f}", candidate.support)});
   }
-  climbers.push_back(std::move(first));
-  std::erase_if(climbers, lost);
-  if (climbers.empty()) climbers.push_back({visible_from_thermal});
-  const Climber& best = *std::min_element(climbers.begin(), climbers.end(), better);
+  const int starts = 1 + static_cast<int>(candidates.size());
+  // Clutter can draw a start to where the clouds don't meet at all.
+  const auto lost = [&](const Candidate& candidate) {
+    return steps_between(candidate.visible_from_thermal, visible_from_thermal, options) > farthest;
+  };
+  const auto better = [](const Candidate& a, const Candidate& b) { return a.support > b.support; };
+  std::erase_if(candidates, lost);
+  std::stable_sort(candidates.begin(), candidates.end(), better);
+  candidates.resize(std::min(candidates.size(), static_cast<std::size_t>(options.finalists)));
+  for (Candidate& candidate : candidates) {
+    ORBITFUSE_TRY(close(seen, candidate));
+    progress.report({"register", 0, 0, -1,
+                     fmt::format("finalist: support {:.0f}, {:.2f} in place", candidate.support,
+                                 candidate.share)});
+  }
+  candidates.push_back(std::move(first));
+  std::erase_if(candidates, lost);
+  if (candidates.empty()) candidates.push_back({visible_from_thermal});
+  const Candidate& best = *std::min_element(candidates.begin(), candidates.end(), better);
   ORBITFUSE_ASSIGN(SimilarityRefinement result, finish(best.visible_from_thermal, last_rounds));
   result.starts = starts;
   return result;

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What `orbitfuse capture` says, and with which exit code, when a camera, a port or a folder is not
 // to be had; nothing is left behind.
-#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <fstream>
@@ -15,6 +12,7 @@
 #include "drivers/aravis/aravis_source.hpp"
 #include "tests/app/cli/refusal.hpp"
 #include "tests/support/gev_simulator.hpp"
+#include "tests/support/slow_peers.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
@@ -98,19 +96,12 @@ TEST_F(RefusedGigE, CameraThatAnotherProgramControls) {
 
 TEST(Refused, PageAtAPortInUse) {
   const test::TempFolder temp;
-  const int holder = ::socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t length = sizeof address;
-  ASSERT_EQ(::bind(holder, reinterpret_cast<sockaddr*>(&address), length), 0);
-  ASSERT_EQ(::listen(holder, 1), 0);
-  ASSERT_EQ(::getsockname(holder, reinterpret_cast<sockaddr*>(&address), &length), 0);
-  const std::string port = std::to_string(ntohs(address.sin_port));
+  const test::SilentListener holder;
+  ASSERT_NE(holder.port(), 0);
+  const std::string port = std::to_string(holder.port());
   expect_refused({"capture", temp.path() / "s", "--visible", tiny, "--page", port}, 4, port);
   expect_refused({"capture", temp.path() / "s", "--visible", tiny, "--page", port}, 4,
                  "choose another with --page");
-  ::close(holder);
   EXPECT_FALSE(std::filesystem::exists(temp.path() / "s"));
 }
 

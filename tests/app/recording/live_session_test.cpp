@@ -10,7 +10,7 @@
 #include "app/recording/open_cameras.hpp"
 #include "app/recording/recording.hpp"
 #include "capture/mat/mat_finder.hpp"
-#include "capture/page/page_server.hpp"
+#include "capture/page/capture_page.hpp"
 #include "tests/capture/mat/rendered_mat.hpp"
 #include "tests/support/gev_simulator.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -52,7 +52,7 @@ TEST(LiveSession, TenViewersCostNoFrame) {
   PageHooks hooks;
   hooks.state = [&] { return recording.state(); };
   hooks.latest = [&](Modality modality) { return recording.latest(modality); };
-  PageServer server(page, hooks);
+  WebServer server(page, capture_page(hooks));
   ASSERT_TRUE(server.start());
   ASSERT_TRUE(recording.prepare());
   std::atomic<bool> over{false};

@@ -5,9 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <ctime>
 
 #include "capture/mat/mat_finder.hpp"
+#include "core/system/clock.hpp"
 #include "tests/capture/mat/rendered_mat.hpp"
 #include "tests/capture/mat/rendered_room.hpp"
 
@@ -49,9 +49,9 @@ TEST_P(OdometryWalk, AzimuthIsKeptWhileTheMatIsHidden) {
         Eigen::AngleAxisd(0.03 * std::sin(0.31 * azimuth), Eigen::Vector3d(0.6, 0.8, 0)));
     pose = {aim * pose.rotation, aim * pose.translation};
     const cv::Mat image = test::view_of_room(hidden ? cv::Mat() : mat, design.size_m, camera, pose);
-    const std::clock_t started = std::clock();
+    const double before_s = cpu_seconds();
     const auto sighting = finder.find(image, Modality::visible);
-    (hidden ? hidden_s : seen_s) += static_cast<double>(std::clock() - started) / CLOCKS_PER_SEC;
+    (hidden ? hidden_s : seen_s) += cpu_seconds() - before_s;
     if (!hidden) {
       ++seen_looks;
       read += sighting && !sighting->followed;

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <opencv2/core.hpp>
 
-#include "capture/page/page_server.hpp"
+#include "capture/page/capture_page.hpp"
 #include "core/image/image_io.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -79,14 +79,14 @@ class BrowserTest : public ::testing::Test {
                  ? std::optional(LatestFrame{Modality::visible, magenta, "a"})
                  : std::nullopt;
     };
-    server = std::make_unique<PageServer>(options, hooks);
+    server = std::make_unique<WebServer>(options, capture_page(hooks));
     ASSERT_TRUE(server->start());
   }
 
   test::TempFolder folder;
   std::atomic<int> done{0};
   std::atomic<bool> away{false};
-  std::unique_ptr<PageServer> server;
+  std::unique_ptr<WebServer> server;
 };
 
 TEST_F(BrowserTest, SectorsTurnGreenAndThePictureShows) {

@@ -16,6 +16,7 @@
 #pragma GCC diagnostic pop
 
 #include "core/image/image_codec.hpp"
+#include "tests/support/slow_peers.hpp"
 
 namespace orbitfuse::network {
 namespace {
@@ -374,21 +375,13 @@ TEST_F(NetworkTest, WhatIsNoStreamIsRefusedInTimeAndSecretsStayUntold) {
 
 /// Accepts connections and says nothing.
 TEST_F(NetworkTest, OneThatNeverAnswersIsGivenUpAtTheDeadline) {
-  const int listener = ::socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  ASSERT_EQ(::bind(listener, reinterpret_cast<sockaddr*>(&address), size), 0);
-  ASSERT_EQ(::listen(listener, 4), 0);
-  ::getsockname(listener, reinterpret_cast<sockaddr*>(&address), &size);
-  NetworkOptions o =
-      options("http://127.0.0.1:" + std::to_string(ntohs(address.sin_port)) + "/video");
+  const test::SilentListener listener;
+  ASSERT_NE(listener.port(), 0);
+  NetworkOptions o = options("http://127.0.0.1:" + std::to_string(listener.port()) + "/video");
   o.feed.open = 600ms;
   NetworkSource source(o);
   const Status status = source.start();  // hangs for ever without a deadline
   EXPECT_FALSE(status);
-  ::close(listener);
 }
 
 TEST(NetworkOptionsTest, OnlyAddressesOfStreams) {

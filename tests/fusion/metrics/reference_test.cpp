@@ -2,35 +2,15 @@
 // Every value of VIFB's code on 12 real pairs and five methods, to 1e-9 relative.
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
-#include <sstream>
 
 #include "fusion/metrics/metrics.hpp"
+#include "tests/support/fusion_reference.hpp"
 #include "tests/support/shared_data.hpp"
 
 namespace orbitfuse {
 namespace {
-
-using Key = std::pair<std::string, std::string>;  // pair, method
-
-std::map<Key, std::map<std::string, double>> reference(const std::filesystem::path& file) {
-  std::map<Key, std::map<std::string, double>> values;
-  std::ifstream in(file);
-  std::string line;
-  std::getline(in, line);
-  while (std::getline(in, line)) {
-    std::stringstream cells(line);
-    std::string pair, method, metric, value;
-    std::getline(cells, pair, ',');
-    std::getline(cells, method, ',');
-    std::getline(cells, metric, ',');
-    std::getline(cells, value, ',');
-    values[{pair, method}][metric] = std::stod(value);
-  }
-  return values;
-}
 
 TEST(MetricsReference, EveryValueOfVifb) {
   const auto folder = testing::shared_data() / "fusion";
@@ -38,7 +18,7 @@ TEST(MetricsReference, EveryValueOfVifb) {
   const std::map<std::string, std::string> name_in_csv{
       {"PSNR", "PSNR_std"}, {"RMSE", "RMSE_std"}, {"SSIM", "SSIM_mean"}};
   int checked = 0, others = 0;
-  for (const auto& [key, expected] : reference(folder / "reference/metrics.csv")) {
+  for (const auto& [key, expected] : testing::fusion_reference(folder / "reference/metrics.csv")) {
     const auto& [pair, method] = key;
     const auto file = folder / "reference" / method / (pair + ".png");
     if (!std::filesystem::exists(file)) continue;  // the trivial average and maximum have no image

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "capture/page/page_server.hpp"
+#include "capture/page/capture_page.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -69,7 +69,7 @@ class PageTest : public ::testing::Test {
       ++corrections;
       return fail(ErrorKind::unavailable, "thermal0", "the profile names no command", "set it");
     };
-    server = std::make_unique<PageServer>(options, hooks);
+    server = std::make_unique<WebServer>(options, capture_page(hooks));
     const Status status = server->start();
     ASSERT_TRUE(status) << status.error().message();
   }
@@ -77,7 +77,7 @@ class PageTest : public ::testing::Test {
 
   std::optional<LatestFrame> visible, thermal;
   std::atomic<int> stops{0}, corrections{0};
-  std::unique_ptr<PageServer> server;
+  std::unique_ptr<WebServer> server;
 };
 
 TEST_F(PageTest, PageAsksNobodyElse) {
@@ -307,7 +307,7 @@ TEST_F(PageTest, PortInUseAndBadOptionsHaveARemedy) {
   serve({});
   PageOptions options;
   options.port = server->port();
-  PageServer second(options, {});
+  WebServer second(options, capture_page({}));
   const Status taken = second.start();
   ASSERT_FALSE(taken);
   EXPECT_EQ(taken.error().kind, ErrorKind::device);

@@ -1,26 +1,27 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "capture/page/page_server.hpp"
+#include "capture/page/capture_page.hpp"
 
 #include <fmt/format.h>
 
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <string_view>
 
 #include "capture/page/preview.hpp"
-#include "core/http/web_server.hpp"
 
 namespace orbitfuse {
 namespace embedded {
 extern const std::string_view capture_page_html;
 }
 
-struct PageServer::Impl {
-  Impl(PageOptions options, PageHooks h)
-      : hooks(std::move(h)), server(std::move(options), site()) {}
+namespace {
+
+/// What the handlers share.
+struct PageHandlers {
+  explicit PageHandlers(PageHooks h) : hooks(std::move(h)) {}
 
   PageHooks hooks;
   PreviewCache previews;
-  WebServer server;
 
   static WebAnswer act(const PageAction& action) {
     if (!action) return {.status = 404, .type = {}, .body = {}};
@@ -63,46 +64,36 @@ struct PageServer::Impl {
     return {200, "application/json",
             kelvin ? fmt::format("{{\"kelvin\":{:.2f}}}", *kelvin) : "{\"kelvin\":null}"};
   }
-
-  WebSite site() {
-    WebSite site;
-    site.opened_by = "orbitfuse capture";
-    site.port_option = "--page HOST:PORT";
-    site.content_security_policy =
-        "default-src 'none'; img-src 'self' blob:; connect-src 'self'; style-src 'unsafe-inline'; "
-        "script-src 'unsafe-inline'; frame-ancestors 'none'";
-    site.get = {
-        {"/",
-         [](const WebRequest&) -> WebAnswer {
-           return {200, "text/html; charset=utf-8", std::string(embedded::capture_page_html)};
-         }},
-        {"/state",
-         [this](const WebRequest&) -> WebAnswer {
-           return {200, "application/json", json_of(hooks.state())};
-         }},
-        {"/preview/(visible|thermal)",
-         [this](const WebRequest& request) { return preview(request); }},
-        {"/temperature", [this](const WebRequest& request) { return temperature(request); }}};
-    site.post = {{"/start", [this](const WebRequest&) { return act(hooks.start); }},
-                 {"/stop", [this](const WebRequest&) { return act(hooks.stop); }},
-                 {"/station", [this](const WebRequest&) { return act(hooks.at_station); }},
-                 {"/nuc", [this](const WebRequest&) { return act(hooks.correct); }}};
-    return site;
-  }
 };
 
-PageServer::PageServer(PageOptions options, PageHooks hooks)
-    : impl_(std::make_unique<Impl>(std::move(options), std::move(hooks))) {}
+}  // namespace
 
-PageServer::~PageServer() { stop(); }
-
-Status PageServer::start() { return impl_->server.start(); }
-void PageServer::stop() { impl_->server.stop(); }
-int PageServer::port() const { return impl_->server.port(); }
-const std::string& PageServer::token() const { return impl_->server.token(); }
-std::string PageServer::answer(const std::string& request) { return impl_->server.answer(request); }
-
-std::string PageServer::url() const { return urls().front(); }
-std::vector<std::string> PageServer::urls() const { return impl_->server.urls(); }
+WebSite capture_page(PageHooks hooks) {
+  const auto page = std::make_shared<PageHandlers>(std::move(hooks));
+  WebSite site;
+  site.opened_by = "orbitfuse capture";
+  site.port_option = "--page HOST:PORT";
+  site.content_security_policy =
+      "default-src 'none'; img-src 'self' blob:; connect-src 'self'; style-src 'unsafe-inline'; "
+      "script-src 'unsafe-inline'; frame-ancestors 'none'";
+  site.get = {
+      {"/",
+       [](const WebRequest&) -> WebAnswer {
+         return {200, "text/html; charset=utf-8", std::string(embedded::capture_page_html)};
+       }},
+      {"/state",
+       [page](const WebRequest&) -> WebAnswer {
+         return {200, "application/json", json_of(page->hooks.state())};
+       }},
+      {"/preview/(visible|thermal)",
+       [page](const WebRequest& request) { return page->preview(request); }},
+      {"/temperature", [page](const WebRequest& request) { return page->temperature(request); }}};
+  site.post = {
+      {"/start", [page](const WebRequest&) { return PageHandlers::act(page->hooks.start); }},
+      {"/stop", [page](const WebRequest&) { return PageHandlers::act(page->hooks.stop); }},
+      {"/station", [page](const WebRequest&) { return PageHandlers::act(page->hooks.at_station); }},
+      {"/nuc", [page](const WebRequest&) { return PageHandlers::act(page->hooks.correct); }}};
+  return site;
+}
 
 }  // namespace orbitfuse
