@@ -58,9 +58,7 @@ Status NetworkOptions::validate() const {
   return {};
 }
 
-NetworkSource::NetworkSource(NetworkOptions options) : options_(std::move(options)) {
-  set_up_ffmpeg();
-}
+NetworkSource::NetworkSource(NetworkOptions options) : options_(std::move(options)) {}
 
 NetworkSource::~NetworkSource() { stop(); }
 
