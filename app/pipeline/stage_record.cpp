@@ -79,7 +79,7 @@ Result<StageRecord> read_stage_record(const fs::path& folder) {
   const fs::path file = folder / stage_record_file;
   ORBITFUSE_ASSIGN(const std::string text, read_file(file));
   try {
-    const json j = parse_json(text);
+    const json j = nests_too_deep(text) ? json() : json::parse(text);
     StageRecord r;
     if (j.at("schema").get<int>() != stage_record_schema)
       return fail(ErrorKind::input, file.string(), "schema " + j.at("schema").dump(),
