@@ -159,7 +159,17 @@ int run(const std::vector<const char*>& words) {
 }  // namespace
 }  // namespace orbitfuse
 
+/// OpenCV asks the environment how to use FFmpeg. Before any thread: setenv races with every
+/// getenv.
+static void set_up_ffmpeg() {
+  // Lossy transports tear pictures.
+  ::setenv("OPENCV_FFMPEG_CAPTURE_OPTIONS", "rtsp_transport;tcp|analyzeduration;1000000", 0);
+  // Its remarks on damaged packets belong to no terminal; what matters of them is counted.
+  ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
+}
+
 int main(int argc, char** argv) {
+  set_up_ffmpeg();
   int code = orbitfuse::terminal::exit_internal;
   try {
     code = orbitfuse::run(orbitfuse::words_of(argc, argv));

@@ -87,6 +87,9 @@ class FrameSource {
                       std::uint64_t /*next_id*/) {
     return false;
   }
+  /// The session holds frames of this scale (K a count): a source that chooses the scale of its
+  /// thermal frames takes none finer. Before the first next(), beside resume().
+  virtual void store_no_finer_than(double /*kelvin_per_count*/) {}
   /// Asks for a shutter correction (NUC) as soon as can be; from any thread, after start(). Events
   /// of the stream (nuc, nuc_failed) tell what came of it. Unavailable error where none is known.
   virtual Status request_correction() {

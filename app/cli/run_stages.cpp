@@ -5,6 +5,8 @@
 
 #include "app/pipeline/runner.hpp"
 #include "app/stages/build_stages.hpp"
+#include "core/formats/nested_text.hpp"
+#include "core/modality.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse::cli {
@@ -74,7 +76,7 @@ Result<json> earlier_run(const std::string& folder) {
   std::error_code unreadable;  // whoever opens the session says why
   if (folder.empty() || !fs::exists(record, unreadable)) return json();
   ORBITFUSE_ASSIGN(const std::string text, read_file(record));
-  json run = json::parse(text, nullptr, false);
+  json run = parse_json(text);
   if (run.is_discarded())
     return fail(ErrorKind::input, record.string(), "not JSON, or cut off",
                 "give the session folder and --out");
@@ -87,6 +89,16 @@ Result<json> earlier_run(const std::string& folder) {
 }  // namespace
 
 namespace {
+
+/// The session's own folder, or one for its images.
+bool lies_among_frames(const fs::path& out, const fs::path& session) {
+  std::error_code unreadable;  // whoever opens the session says why
+  if (!fs::exists(session / "manifest.jsonl", unreadable)) return false;
+  const fs::path inside = fs::weakly_canonical(out, unreadable)
+                              .lexically_relative(fs::weakly_canonical(session, unreadable));
+  return inside == "." || (!inside.empty() && (*inside.begin() == name(Modality::visible) ||
+                                               *inside.begin() == name(Modality::thermal)));
+}
 
 /// Whether a call that ended like this is gone on with. What made one fail must not make the next
 /// one fail too, which doesn't name it.
@@ -127,9 +139,13 @@ Status resolve(StageFolders& folders) {
     if (!config::is_utf8(folder))
       return fail(ErrorKind::usage, folder, "its name is not UTF-8", "rename the folder");
   }
-  if (run.is_null()) return {};
-  if (folders.out == StageFolders{}.out) folders.out = folders.session;
-  folders.session = run["session"];
+  if (!run.is_null()) {
+    if (folders.out == StageFolders{}.out) folders.out = folders.session;
+    folders.session = run["session"];
+  }
+  if (lies_among_frames(folders.out, folders.session))
+    return fail(ErrorKind::usage, "--out " + folders.out, "holds the session itself",
+                "choose another folder");
   return {};
 }
 

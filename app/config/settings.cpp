@@ -7,6 +7,7 @@
 
 #include <algorithm>
 
+#include "core/formats/nested_text.hpp"
 #include "core/near_word.hpp"
 #include "core/system/file_io.hpp"
 
@@ -105,7 +106,7 @@ Status Settings::set(const std::string& key, const json& value, const std::strin
 }
 
 Status Settings::read_toml(const std::filesystem::path& file) {
-  ORBITFUSE_ASSIGN(const std::string text, read_file(file, max_settings_bytes));
+  ORBITFUSE_ASSIGN(const std::string text, read_toml_text(file));
   std::vector<Entry> entries;
   try {
     const toml::table table = toml::parse(text, file.string());
@@ -142,7 +143,7 @@ Status Settings::apply(const std::string& assignment) {
   const std::string where = "--set " + assignment;
   if (!is_utf8(assignment))
     return fail(ErrorKind::usage, where, "it is not UTF-8", "write it as UTF-8");
-  json value = json::parse(text, nullptr, false);
+  json value = parse_json(text);
   if (value.is_discarded()) value = text;
   return set(key, value, where);
 }

@@ -9,6 +9,7 @@
 #include <ctime>
 
 #include "app/pipeline/folder_lock.hpp"
+#include "core/formats/nested_text.hpp"
 #include "core/system/clock.hpp"
 #include "core/system/file_io.hpp"
 
@@ -33,7 +34,7 @@ struct Attempt {
 
 Attempt read_attempt(const fs::path& file) {
   const auto text = read_file(file);
-  const json j = text ? json::parse(*text, nullptr, false) : json();
+  const json j = text ? parse_json(*text) : json();
   try {
     return {j.at("key"), j.at("cpu_s"), j.at("wall_s")};
   } catch (const json::exception&) {

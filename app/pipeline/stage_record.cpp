@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/formats/nested_text.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse::pipeline {
@@ -78,7 +79,7 @@ Result<StageRecord> read_stage_record(const fs::path& folder) {
   const fs::path file = folder / stage_record_file;
   ORBITFUSE_ASSIGN(const std::string text, read_file(file));
   try {
-    const json j = json::parse(text);
+    const json j = nests_too_deep(text) ? json() : json::parse(text);
     StageRecord r;
     if (j.at("schema").get<int>() != stage_record_schema)
       return fail(ErrorKind::input, file.string(), "schema " + j.at("schema").dump(),

@@ -32,6 +32,9 @@ class PreparedSource final : public FrameSource {
               std::uint64_t next_id) override {
     return source_->resume(device, frames, next_id);
   }
+  void store_no_finer_than(double kelvin_per_count) override {
+    source_->store_no_finer_than(kelvin_per_count);
+  }
 
   /// Cameras start one after the other, and the first one's queue fills meanwhile. Leaves out what
   /// lies there from between its start and `all_run_ns` (UTC, by the frames' own times) and tells

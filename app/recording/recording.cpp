@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "capture/recording/frame_encoding.hpp"
+#include "core/image/thermal_counts.hpp"
 #include "core/system/utc_now.hpp"
 
 namespace orbitfuse::recording {
@@ -44,6 +45,17 @@ std::vector<FrameRecord> frames_of(const Session& session, const std::string& de
   std::copy_if(session.frames.begin(), session.frames.end(), std::back_inserter(frames),
                [&](const FrameRecord& frame) { return frame.device == device; });
   return frames;
+}
+
+/// Of the newest frame of the device with temperatures that can be read.
+std::optional<double> stored_kelvin_per_count(const Session& session, const std::string& device) {
+  for (auto frame = session.frames.rbegin(); frame != session.frames.rend(); ++frame) {
+    if (frame->device != device || frame->modality != Modality::thermal || frame->thermal_is_gray)
+      continue;
+    if (const auto counts = read_thermal_counts(session.path_of(*frame)))
+      return counts->scale.scale;
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -94,6 +106,10 @@ Status Recording::fit_into(const std::optional<Session>& earlier) {
         const bool ids_go_on = source->resume(*known, frames_of(*earlier, device.id), next);
         first_id = ids_go_on ? 0 : next;
         if (next > 0) next_ids_[device.id] = next;
+        if (const auto scale = stored_kelvin_per_count(*earlier, device.id)) {
+          stored_kelvin_per_count_[device.id] = *scale;
+          source->store_no_finer_than(*scale);
+        }
         device = *known;
       }
       break;
@@ -148,12 +164,13 @@ Status Recording::prepare(const std::atomic<bool>* cancel) {
   RecorderOptions recorder_options;
   recorder_options.min_free_bytes = options_.min_free_bytes;
   recorder_options.next_ids = next_ids_;
+  recorder_options.stored_kelvin_per_count = stored_kelvin_per_count_;
   if (!options_.live) recorder_options.backpressure = Backpressure::wait;
   recorder_ = std::make_unique<Recorder>(*writer_, recorder_options);
   recorder_->on_frame = [this](const StoredFrame& frame) {
     const FrameRecord& record = frame.record;
     keep_latest({record.modality, frame.pixels, record.file, frame.scale});
-    if (guide_) guide_->add(record, frame.pixels);
+    if (guide_) guide_->add(record, frame.pixels, frame.scale.scale);
   };
   return {};
 }

@@ -89,7 +89,8 @@ class Recording {
   PositionFinder finder_;
   std::vector<std::shared_ptr<PreparedSource>> sources_;  ///< outlived by one that hangs
   std::vector<DeviceInfo> devices_;
-  std::map<std::string, std::uint64_t> next_ids_;  ///< RecorderOptions::next_ids
+  std::map<std::string, std::uint64_t> next_ids_;          ///< RecorderOptions::next_ids
+  std::map<std::string, double> stored_kelvin_per_count_;  ///< the same
   std::unique_ptr<SessionWriter> writer_;
   std::unique_ptr<LiveGuide> guide_;
   std::unique_ptr<Recorder> recorder_;

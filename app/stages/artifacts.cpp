@@ -7,6 +7,7 @@
 
 #include "app/pipeline/stage_record.hpp"
 #include "core/formats/colmap_model.hpp"
+#include "core/formats/nested_text.hpp"
 #include "core/formats/transforms_json.hpp"
 #include "core/image/image_io.hpp"
 #include "core/system/file_io.hpp"
@@ -48,7 +49,7 @@ Status write_json(const fs::path& file, const json& j) {
 
 Result<json> read_json(const fs::path& file) {
   ORBITFUSE_ASSIGN(const std::string text, read_file(file));
-  json j = json::parse(text, nullptr, false);
+  json j = parse_json(text);
   if (j.is_discarded())
     return fail(ErrorKind::input, file.string(), "not JSON", "run the stage that writes it again");
   return j;

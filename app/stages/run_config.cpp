@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/formats/nested_text.hpp"
 #include "core/image/palette.hpp"
 
 namespace orbitfuse::stages {
@@ -28,7 +29,7 @@ void add_train_fields(Settings& settings, const std::string& table, nerf::TrainO
     };
     setting.get = [&options, key] {
       const std::string text = options.get(key);
-      const json value = json::parse(text, nullptr, false);
+      const json value = parse_json(text);
       return value.is_discarded() ? json(text) : value;
     };
     setting.set = [&options, key](const json& value) {

@@ -5,6 +5,7 @@
 
 #include <charconv>
 
+#include "core/formats/nested_text.hpp"
 #include "core/temperature.hpp"
 
 namespace orbitfuse::cli {
@@ -128,7 +129,7 @@ Result<Request> box_of(const std::string& word) {
 }
 
 Result<Request> json_request(const std::string& text) {
-  const nlohmann::json j = nlohmann::json::parse(text, nullptr, false);
+  const nlohmann::json j = parse_json(text);
   if (j.is_discarded())
     return fail(ErrorKind::usage, "--request", "not JSON", "docs/formats.md has the form");
   return measurement::request_of_json(j);

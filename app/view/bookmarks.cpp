@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "app/view/json_fields.hpp"
+#include "core/formats/nested_text.hpp"
 #include "core/system/file_io.hpp"
 #include "core/system/folder_change_lock.hpp"
 
@@ -49,7 +50,7 @@ Result<std::vector<Bookmark>> Bookmarks::list() const {
     return fail(ErrorKind::input, file_.string(), found,
                 "mend it, or move it away and keep the views again");
   };
-  const json j = json::parse(text, nullptr, false);
+  const json j = parse_json(text);
   if (!j.is_object() || !j.contains("bookmarks") || !j["bookmarks"].is_array())
     return damaged("not JSON, or no bookmarks in it");
   if (j.value("schema", json()) != schema) return damaged("of another version");

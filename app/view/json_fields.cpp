@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "core/formats/nested_text.hpp"
+
 namespace orbitfuse::view {
 using nlohmann::json;
 
@@ -24,7 +26,7 @@ std::string shown(const json& j) {
 }
 
 Result<json> json_body(const std::string& body) {
-  json j = json::parse(body, nullptr, false);
+  json j = parse_json(body);
   if (!j.is_object()) return fail(ErrorKind::usage, "the request", "no JSON object", "send one");
   return j;
 }

@@ -103,7 +103,7 @@ void LiveGuide::add_at_station(Camera& camera, const FrameRecord& frame) {
   judge(camera, frame, camera.position);
 }
 
-void LiveGuide::add(const FrameRecord& stored, const cv::Mat& pixels) {
+void LiveGuide::add(const FrameRecord& stored, const cv::Mat& pixels, double kelvin_per_count) {
   FrameRecord frame = stored;
   const bool at_station = frame.station && !frame.tracking;
   // Measuring takes long: the other camera's frames and the page don't wait for it.
@@ -122,12 +122,13 @@ void LiveGuide::add(const FrameRecord& stored, const cv::Mat& pixels) {
     camera.stations_come = true;
     add_at_station(camera, frame);
   } else {
-    place(camera, frame, image);
+    place(camera, {frame, image, kelvin_per_count});
   }
 }
 
 /// A frame that doesn't carry its station.
-void LiveGuide::place(Camera& camera, const FrameRecord& frame, const cv::Mat& image) {
+void LiveGuide::place(Camera& camera, const Look& look) {
+  const auto& [frame, image, kelvin_per_count] = look;
   const bool photo = frame.has_flag(FrameFlag::still);
   const std::optional<OrbitPosition> told = photo ? camera.policy->of_photo(frame) : std::nullopt;
   if (told) {
@@ -137,12 +138,13 @@ void LiveGuide::place(Camera& camera, const FrameRecord& frame, const cv::Mat& i
   } else if (camera.announced && photo) {
     judge_announced(camera, frame);
   } else if (camera.announced) {
-    if (!image.empty()) judge_between_neighbours(camera, frame, image);
+    if (!image.empty()) judge_between_neighbours(camera, look);
   } else if (camera.policy->finder()) {
     if (photo)
-      camera.photos.push_back({frame, camera.photos.size() < photos_in_memory ? image : cv::Mat()});
+      camera.photos.push_back(
+          {frame, camera.photos.size() < photos_in_memory ? image : cv::Mat(), kelvin_per_count});
     else
-      camera.waiting = Look{frame, image};
+      camera.waiting = look;
     changed_.notify_all();
   }
 }
@@ -155,20 +157,23 @@ bool LiveGuide::needs_image(const FrameRecord& frame) {
 }
 
 /// A frame that is shaken differs from its neighbours.
-void LiveGuide::judge_between_neighbours(Camera& camera, const FrameRecord& frame,
-                                         const cv::Mat& image) {
+void LiveGuide::judge_between_neighbours(Camera& camera, const Look& look) {
   std::deque<Look>& looks = camera.since_key;
-  const auto agrees = [&](const cv::Mat& before) {
-    return before.size() == image.size() && before.type() == image.type() &&
-           apparent_motion(before, image) <= options_.key_motion;
+  const auto agrees = [&](const Look& before) {
+    if (before.image.size() != look.image.size() || before.image.type() != look.image.type())
+      return false;
+    cv::Mat same_scale = before.image;
+    if (before.kelvin_per_count != look.kelvin_per_count)
+      before.image.convertTo(same_scale, -1, before.kelvin_per_count / look.kelvin_per_count);
+    return apparent_motion(same_scale, look.image) <= options_.key_motion;
   };
-  if (!looks.empty() && !agrees(looks.back().image)) {
+  if (!looks.empty() && !agrees(looks.back())) {
     looks.clear();
     camera.shown.refusal = Refusal::moving;
     camera.shown.instruction = text(Refusal::moving);
     camera.shown.awaits = Awaited::nothing;
   }
-  looks.push_back({frame, image});
+  looks.push_back(look);
   if (looks.size() < 3) return;
   looks.pop_front();
   note_edges(looks.front().frame, looks.front().image);

@@ -19,6 +19,7 @@
 #include "capture/live/sharpness_reference.hpp"
 #include "capture/live/turntable.hpp"
 #include "capture/recording/session_writer.hpp"
+#include "core/temperature.hpp"
 
 namespace orbitfuse {
 
@@ -73,8 +74,10 @@ class LiveGuide {
   /// filled stay filled, and the turntable goes on one step after the last recorded station.
   void resume(const std::vector<FrameRecord>& earlier);
   /// From any thread; fast unless the frame carries a station. `pixels`: its image as it was
-  /// decoded for the disk, upright; empty: it is read back when it is needed.
-  void add(const FrameRecord& frame, const cv::Mat& pixels = {});
+  /// decoded for the disk, upright; empty: it is read back when it is needed. `kelvin_per_count`
+  /// of thermal ones: neighbours of another scale are compared in kelvin.
+  void add(const FrameRecord& frame, const cv::Mat& pixels = {},
+           double kelvin_per_count = kelvin_per_dn);
   /// The operator stands at the next station, or has turned the table by a step: for each modality
   /// the next good frame is it; of a video, the next between two that show the same.
   /// `time_ns`: when (UTC epoch); 0: now. In words what is taken next; usage error where the frames
@@ -97,6 +100,7 @@ class LiveGuide {
   struct Look {
     FrameRecord frame;
     cv::Mat image;  ///< empty: to be read back
+    double kelvin_per_count = kelvin_per_dn;
   };
   struct Camera {
     LiveCamera shown;
@@ -120,8 +124,8 @@ class LiveGuide {
   void note_choice(Camera& camera, const FrameRecord& frame);
   std::unique_ptr<PositionPolicy> policy_for(Modality modality);
   void say_next(Camera& camera, const std::optional<OrbitPosition>& position, Refusal last) const;
-  void place(Camera& camera, const FrameRecord& frame, const cv::Mat& image);
-  void judge_between_neighbours(Camera& camera, const FrameRecord& frame, const cv::Mat& image);
+  void place(Camera& camera, const Look& look);
+  void judge_between_neighbours(Camera& camera, const Look& look);
   bool needs_image(const FrameRecord& frame);
   void judge_announced(Camera& camera, const FrameRecord& frame);
   void set_position(Camera& camera, OrbitPosition position, std::int64_t time_ns);

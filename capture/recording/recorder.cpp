@@ -10,6 +10,7 @@
 
 #include "capture/recording/stream_account.hpp"
 #include "core/system/utc_now.hpp"
+#include "core/temperature.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -57,7 +58,11 @@ struct Recorder::Channel {
         progress(p),
         on_frame(f),
         device(s.describe()),
-        account(device.id, next_id_in(o, device.id)) {}
+        account(device.id, next_id_in(o, device.id)) {
+    if (const auto known = o.stored_kelvin_per_count.find(device.id);
+        known != o.stored_kelvin_per_count.end())
+      kelvin_per_count = known->second;
+  }
 
   FrameSource& source;
   SessionWriter& writer;
@@ -88,6 +93,7 @@ struct Recorder::Channel {
   std::optional<FrameRecord> latest;
   std::string notice, correction;
   std::uint64_t passed_over = 0, repeated = 0, corrections = 0;
+  double kelvin_per_count = kelvin_per_dn;  ///< of the newest stored temperatures
   std::vector<std::string> passed_over_last;
 
   bool stopping() {
@@ -284,6 +290,20 @@ struct Recorder::Channel {
     if (const Status s = writer.update_device(device); !s) keep_first(s.error());
   }
 
+  /// Programs that compare counts of neighbouring frames must know. Written by the writer thread.
+  void tell_scale(const StoredFrame& stored) {
+    if (stored.record.modality != Modality::thermal || stored.record.thermal_is_gray ||
+        stored.scale.scale == kelvin_per_count)
+      return;
+    const EventRecord event{
+        device.id, utc_now_ns(), std::string(name(EventKind::scale)),
+        fmt::format("from {} on thermal files hold {:g} K a count (before: {:g}): up to {:.0f} C",
+                    stored.record.file, stored.scale.scale, kelvin_per_count,
+                    celsius_from_kelvin(65535 * stored.scale.scale + stored.scale.offset))};
+    kelvin_per_count = stored.scale.scale;
+    if (const Status s = writer.append(event); !s) keep_first(s.error());
+  }
+
   void store(const Frame& frame) {
     if (const Status space = check_free_space(writer.folder(), options.min_free_bytes, when_full);
         !space) {
@@ -297,6 +317,7 @@ struct Recorder::Channel {
     }
     if (!stored) return give_up(frame, stored.error());
     account.receive();
+    tell_scale(*stored);
     {
       const std::lock_guard lock(mutex);
       latest = stored->record;

@@ -34,6 +34,9 @@ struct RecorderOptions {
   /// Per device, the id after all that earlier recordings of the session account for: ids that its
   /// stream skips from there on are missing.
   std::map<std::string, std::uint64_t> next_ids;
+  /// Per device, K a count of its newest thermal frame in the session; none: centikelvin. Frames of
+  /// another scale are told by an event.
+  std::map<std::string, double> stored_kelvin_per_count;
   /// Below this recording stops with an error.
   std::uint64_t min_free_bytes = min_free_session_bytes;
 

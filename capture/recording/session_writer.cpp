@@ -5,6 +5,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -123,8 +124,27 @@ Result<std::unique_ptr<SessionWriter>> SessionWriter::resume(const fs::path& fol
   return writer;
 }
 
+/// With the mutex held.
+Status SessionWriter::check_in_place() const {
+  struct stat open {
+  }, named{};
+  const fs::path file = folder_ / "manifest.jsonl";
+  const auto failure = [&](const char* found) {
+    return fail(ErrorKind::device, file.string(), found,
+                "leave a session where it is while it is recorded; record again into a new folder");
+  };
+  if (::fstat(manifest_fd_, &open) != 0) return manifest_failure(folder_, errno);
+  if (::stat(file.c_str(), &named) != 0 || named.st_ino != open.st_ino ||
+      named.st_dev != open.st_dev)
+    return failure("was moved or deleted while it was recorded");
+  if (manifest_bytes_ >= 0 && open.st_size != manifest_bytes_)
+    return failure("was changed by another program while it was recorded");
+  return {};
+}
+
 Status SessionWriter::append_line(const std::string& line) {
   const std::lock_guard lock(mutex_);
+  ORBITFUSE_TRY(check_in_place());
   const off_t before = ::lseek(manifest_fd_, 0, SEEK_END);
   const std::string bytes = line + "\n";
   std::size_t done = 0;
@@ -141,6 +161,7 @@ Status SessionWriter::append_line(const std::string& line) {
     done += static_cast<std::size_t>(n);
   }
   if (::fdatasync(manifest_fd_) != 0) return manifest_failure(folder_, errno);
+  manifest_bytes_ = before + static_cast<off_t>(bytes.size());
   return {};
 }
 
@@ -192,6 +213,7 @@ Result<StoredFrame> SessionWriter::store(const std::string& device_id, const Fra
   FrameRecord record;
   {
     const std::lock_guard lock(mutex_);
+    ORBITFUSE_TRY(check_in_place());  // before a folder is made anew for the image
     const DeviceInfo* device = session_.device(device_id);
     if (!device)
       return fail(ErrorKind::input, "device " + device_id, "was not announced", "add it first");

@@ -22,7 +22,9 @@ struct StoredFrame {
 
 /// Appends to a session folder. When append() returns, the frame's file and its manifest line are
 /// on disk (fsynced): a kill at any moment leaves every acknowledged frame readable. Existing
-/// files are never overwritten. All functions may be called from several threads.
+/// files are never overwritten. A session that is moved, deleted or written by others meanwhile is
+/// an error of the next call: what came after would be lost in silence. All functions may be called
+/// from several threads.
 class SessionWriter {
  public:
   /// A new session: the folder must not exist or be empty. On an error nothing is left behind.
@@ -57,11 +59,13 @@ class SessionWriter {
 
  private:
   SessionWriter(std::filesystem::path folder, int manifest_fd);
+  Status check_in_place() const;
   Status append_line(const std::string& line);
   std::string next_file_name(Modality modality, bool tracking, const std::string& extension);
 
   std::filesystem::path folder_;
   int manifest_fd_ = -1;
+  std::int64_t manifest_bytes_ = -1;  ///< that were written; -1: not known yet
   std::mutex mutex_;
   Session session_;  ///< devices and identity; frames are not kept
   std::map<std::string, int> next_index_;

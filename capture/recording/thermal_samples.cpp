@@ -9,13 +9,16 @@
 #include <cstdint>
 #include <utility>
 
-#include "core/temperature.hpp"
-
 namespace orbitfuse {
+namespace {
+
+constexpr double hottest_stored_k = 65535 * stored_kelvin_per_count.back();
+
+}  // namespace
 
 ThermalSamples ThermalSamples::linear(double kelvin_per_sample) {
   ThermalSamples samples;
-  samples.kelvin_per_sample_ = kelvin_per_sample;
+  samples.kelvin_per_sample_ = samples.kelvin_per_count_ = kelvin_per_sample;
   return samples;
 }
 
@@ -26,8 +29,12 @@ ThermalSamples ThermalSamples::table(std::vector<double> kelvin) {
   return samples;
 }
 
+void ThermalSamples::store_no_finer_than(double kelvin_per_count) {
+  if (!kelvin_.empty()) kelvin_per_count_ = std::max(kelvin_per_count_, kelvin_per_count);
+}
+
 /// Returns how many samples were too hot to say.
-int ThermalSamples::to_counts(Frame& frame, int full_scale) const {
+int ThermalSamples::to_counts(Frame& frame, int full_scale) {
   cv::Mat& pixels = frame.pixels;
   const cv::Mat clipped = pixels >= full_scale;
   int count = cv::countNonZero(clipped);
@@ -38,9 +45,12 @@ int ThermalSamples::to_counts(Frame& frame, int full_scale) const {
   }
   double hottest_k = 0;
   std::for_each(pixels.begin<std::uint16_t>(), pixels.end<std::uint16_t>(), [&](auto sample) {
-    if (sample < full_scale && kelvin_[sample] > hottest_k) hottest_k = kelvin_[sample];
+    // What no scale holds decides nothing: it is not stored in any case.
+    if (sample < full_scale && kelvin_[sample] > hottest_k && kelvin_[sample] <= hottest_stored_k)
+      hottest_k = kelvin_[sample];
   });
-  frame.kelvin_per_count = kelvin_per_count_for(hottest_k);
+  store_no_finer_than(kelvin_per_count_for(hottest_k));
+  frame.kelvin_per_count = kelvin_per_count_;
   std::transform(pixels.begin<std::uint16_t>(), pixels.end<std::uint16_t>(),
                  pixels.begin<std::uint16_t>(), [&](std::uint16_t sample) {
                    if (sample >= full_scale) return std::uint16_t{0};
@@ -52,7 +62,8 @@ int ThermalSamples::to_counts(Frame& frame, int full_scale) const {
   return count;
 }
 
-std::optional<std::string> ThermalSamples::apply(Frame& frame, int full_scale) {
+std::optional<std::string> ThermalSamples::apply(Frame& frame, int full_scale,
+                                                 std::string_view remedy) {
   const int clipped = to_counts(frame, full_scale);
   if (clipped == 0) return std::nullopt;
   frame.flag(FrameFlag::clipped);
@@ -61,9 +72,10 @@ std::optional<std::string> ThermalSamples::apply(Frame& frame, int full_scale) {
                                        : kelvin_[static_cast<std::size_t>(full_scale) - 1];
   return fmt::format(
       "{} samples at the end of the camera's scale{}: dead pixels, here and in all frames with the "
-      "flag clipped; set a hotter range, or a profile of more kelvin a count",
+      "flag clipped; {}",
       clipped,
-      std::isfinite(end_k) ? fmt::format(" ({:.0f} C or hotter)", celsius_from_kelvin(end_k)) : "");
+      std::isfinite(end_k) ? fmt::format(" ({:.0f} C or hotter)", celsius_from_kelvin(end_k)) : "",
+      remedy);
 }
 
 }  // namespace orbitfuse

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "core/formats/nested_text.hpp"
 #include "core/formats/rigid_matrix.hpp"
 #include "core/system/file_io.hpp"
 
@@ -108,7 +109,7 @@ Result<std::vector<TrueTestView>> test_views_of(const Json& object,
 
 Result<Json> read_object(const std::filesystem::path& file) {
   ORBITFUSE_ASSIGN(const std::string text, read_file(file, max_text_bytes));
-  Json root = Json::parse(text, nullptr, false);
+  Json root = parse_json(text);
   if (!root.is_object()) return bad(file.string(), "not a JSON object (cut off?)");
   return root;
 }

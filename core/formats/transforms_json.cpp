@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "core/formats/nested_text.hpp"
 #include "core/formats/rigid_matrix.hpp"
 #include "core/system/file_io.hpp"
 
@@ -76,6 +77,11 @@ Json json_of(const Eigen::Matrix4d& m) {
 
 Result<Transforms> read_transforms_json(const std::filesystem::path& file) {
   ORBITFUSE_ASSIGN(const std::string text, read_file(file, max_text_bytes));
+  if (nests_too_deep(text)) {
+    return fail(ErrorKind::input, file.string(),
+                fmt::format("lists within lists, more than {} deep", max_nesting),
+                "give a nerfstudio or instant-ngp transforms.json");
+  }
   Json root;
   try {
     root = Json::parse(text);

@@ -8,6 +8,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/formats/nested_text.hpp"
+
 namespace orbitfuse {
 namespace {
 
@@ -178,7 +180,7 @@ cv::Mat apply_orientation(const cv::Mat& image, int orientation) {
 
 Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_view text,
                                                                     const std::string& where) {
-  const auto value = nlohmann::json::parse(text, nullptr, false);
+  const auto value = parse_json(text);
   if (!value.is_object() || !value.contains("scale")) return std::nullopt;
   ThermalScaleTag tag;
   const auto read = [&](const char* key, double& number) -> Status {

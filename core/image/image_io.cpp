@@ -7,6 +7,7 @@
 
 #include "core/image/exif.hpp"
 #include "core/image/image_codec.hpp"
+#include "core/image/thermal_counts.hpp"
 #include "core/system/file_io.hpp"
 #include "core/temperature.hpp"
 
@@ -35,19 +36,19 @@ Result<cv::Mat> read_visible(const fs::path& path) {
   return apply_orientation(image, read_exif(bytes).orientation);
 }
 
-Result<cv::Mat> read_thermal_k(const fs::path& path) {
+Result<ThermalCounts> read_thermal_counts(const fs::path& path) {
   ORBITFUSE_ASSIGN(const std::string bytes, read_file(path, max_image_bytes));
   std::string description;
-  cv::Mat image;
+  ThermalCounts out;
   if (image_format(bytes) == ImageFormat::tiff) {
-    ORBITFUSE_ASSIGN(image, decode_tiff(bytes, path.string(), &description));
+    ORBITFUSE_ASSIGN(out.image, decode_tiff(bytes, path.string(), &description));
   } else {
-    ORBITFUSE_ASSIGN(image, decode_image(bytes, path.string()));
+    ORBITFUSE_ASSIGN(out.image, decode_image(bytes, path.string()));
   }
-  if (image.type() != CV_16UC1) {
+  if (out.image.type() != CV_16UC1) {
     return fail(ErrorKind::input, path.string(),
                 fmt::format("{}-bit samples in {} channels, 16-bit grey expected",
-                            8 * image.elemSize1(), image.channels()),
+                            8 * out.image.elemSize1(), out.image.channels()),
                 "this is no radiometric image: give a 16-bit TIFF or PNG");
   }
   ORBITFUSE_ASSIGN(std::optional<ThermalScaleTag> tag,
@@ -57,7 +58,13 @@ Result<cv::Mat> read_thermal_k(const fs::path& path) {
     ORBITFUSE_ASSIGN(const std::string sidecar, read_file(sidecar_of(path), max_settings_bytes));
     ORBITFUSE_ASSIGN(tag, thermal_scale_of_sidecar(sidecar, sidecar_of(path).string()));
   }
-  const ThermalScaleTag scale = tag.value_or(ThermalScaleTag{});
+  out.scale = tag.value_or(ThermalScaleTag{});
+  return out;
+}
+
+Result<cv::Mat> read_thermal_k(const fs::path& path) {
+  ORBITFUSE_ASSIGN(const ThermalCounts counts, read_thermal_counts(path));
+  const auto& [image, scale] = counts;
   cv::Mat kelvin(image.size(), CV_32FC1);
   for (int y = 0; y < image.rows; ++y) {
     const auto* from = image.ptr<std::uint16_t>(y);

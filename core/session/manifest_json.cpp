@@ -31,9 +31,15 @@ Result<double> Reader::number(const char* key) const {
   return value;
 }
 
+// Times of bigger size would overflow where they are subtracted.
+static constexpr std::int64_t largest = std::int64_t{1} << 62;
+
 Result<std::int64_t> Reader::integer(const char* key) const {
   if (!has(key) || !object_[key].is_number_integer()) return wrong(key, "an integer");
-  return object_[key].get<std::int64_t>();
+  const auto value = object_[key].get<std::int64_t>();
+  const bool too_big = object_[key].is_number_unsigned() && value < 0;  // wrapped
+  if (too_big || value > largest || value < -largest) return wrong(key, "at most 2^62 either way");
+  return value;
 }
 
 Result<std::uint64_t> Reader::count(const char* key) const {

@@ -32,6 +32,7 @@ enum class EventKind {
   nuc_failed,
   raw_counts,
   clipped,
+  scale,
   clock,
   stale,
   late_frame,
@@ -57,7 +58,7 @@ struct NamedTerm {
   std::string_view name;
 };
 
-inline constexpr std::array<NamedTerm<EventKind>, 28> event_kinds{{
+inline constexpr std::array<NamedTerm<EventKind>, 29> event_kinds{{
     {EventKind::resumed, "resumed"},
     {EventKind::ignored, "ignored"},
     {EventKind::duplicate, "duplicate"},
@@ -79,6 +80,7 @@ inline constexpr std::array<NamedTerm<EventKind>, 28> event_kinds{{
     {EventKind::nuc_failed, "nuc-failed"},
     {EventKind::raw_counts, "raw-counts"},
     {EventKind::clipped, "clipped"},
+    {EventKind::scale, "scale"},
     {EventKind::clock, "clock"},
     {EventKind::stale, "stale"},
     {EventKind::late_frame, "late-frame"},

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <unordered_map>
 
+#include "core/formats/nested_text.hpp"
 #include "core/session/manifest_json.hpp"
 #include "core/system/file_io.hpp"
 
@@ -117,7 +118,7 @@ Result<Session> open_session(const std::filesystem::path& folder) {
     const bool is_last = end == std::string::npos;
     const std::string_view line(text.data() + at, (is_last ? text.size() : end) - at);
     const std::string where = fmt::format("{}:{}", file.string(), number);
-    const Json json = Json::parse(line, nullptr, false);
+    const Json json = parse_json(line);
     if (json.is_discarded() && is_last && number > 1) {
       session.complete = false;
       session.warnings.push_back(where +

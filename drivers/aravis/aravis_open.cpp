@@ -87,7 +87,10 @@ Status AravisSource::open() {
   arv_camera_stop_acquisition(link->camera, nullptr);
   const auto prepare = [&]() -> Status {
     ORBITFUSE_TRY(push_settings());
-    ORBITFUSE_ASSIGN(temperatures_, temperatures());
+    ORBITFUSE_ASSIGN(std::optional<ThermalSamples> fresh, temperatures());
+    if (temperatures_) store_no_finer_than(temperatures_->kelvin_per_count());
+    if (fresh) fresh->store_no_finer_than(least_kelvin_per_count_);
+    temperatures_ = std::move(fresh);
     ORBITFUSE_TRY(settle_image(*link, where));
     const std::optional<Format> format = format_of(link->pixel_format);
     if (!format) {

@@ -189,10 +189,18 @@ Delivery AravisSource::inspect(void* handle, const Arrival& arrival) {
   } else if (!temperatures_) {
     if (const auto stretch = raw_counts_.apply(frame))
       pending_.push_back(event_delivery(EventKind::raw_counts, *stretch));
-  } else if (const auto clipped = temperatures_->apply(frame, format.full_scale)) {
+  } else if (const auto clipped = temperatures_->apply(
+                 frame, format.full_scale,
+                 "set a hotter range in the camera, and a profile of more kelvin a count "
+                 "(config/cameras/*-hot.toml)")) {
     pending_.push_back(event_delivery(EventKind::clipped, *clipped));
   }
   return delivery;
+}
+
+void AravisSource::store_no_finer_than(double kelvin_per_count) {
+  least_kelvin_per_count_ = std::max(least_kelvin_per_count_, kelvin_per_count);
+  if (temperatures_) temperatures_->store_no_finer_than(least_kelvin_per_count_);
 }
 
 Status AravisSource::request_correction() {

@@ -68,6 +68,7 @@ class AravisSource final : public FrameSource {
   Status request_correction() override;
   std::vector<Delivery> unfinished() override;
   std::string transport_report() const override;
+  void store_no_finer_than(double kelvin_per_count) override;
   /// Asks the camera for a shutter correction now; frames until it settles are flagged.
   Status correct_nonuniformity();
   /// Of all connections since the source was made.
@@ -115,8 +116,9 @@ class AravisSource final : public FrameSource {
   std::optional<Image> first_image_;  ///< a session keeps its size
   std::jthread control_watch_;
   std::atomic<bool> control_mute_{false}, correction_wanted_{false};
-  StreamStatistics earlier_;                    ///< of connections that are gone
-  std::optional<ThermalSamples> temperatures_;  ///< nothing: counts of unknown scale
+  StreamStatistics earlier_;                       ///< of connections that are gone
+  std::optional<ThermalSamples> temperatures_;     ///< nothing: counts of unknown scale
+  double least_kelvin_per_count_ = kelvin_per_dn;  ///< of earlier connections and recordings
   std::vector<Delivery> pending_;
   mutable std::mutex info_mutex_;  ///< others ask while a camera reopens
   DeviceInfo info_;

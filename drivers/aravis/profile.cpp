@@ -8,6 +8,7 @@
 #include <array>
 
 #include "capture/recording/thermal_samples.hpp"
+#include "core/formats/nested_text.hpp"
 
 namespace orbitfuse::aravis {
 namespace {
@@ -77,8 +78,9 @@ Result<CameraProfile> profile_of(const toml::table& table, const fs::path& file)
 }  // namespace
 
 Result<CameraProfile> read_profile(const fs::path& file) {
+  ORBITFUSE_ASSIGN(const std::string text, read_toml_text(file));
   try {
-    return profile_of(toml::parse_file(file.string()), file);
+    return profile_of(toml::parse(text, file.string()), file);
   } catch (const toml::parse_error& error) {
     return bad(file, "", std::string(error.description()), "correct the TOML");
   }

@@ -56,9 +56,7 @@ Status NetworkOptions::validate() const {
   return check("reopen_every", seconds(feed.reopen_every), above(0));
 }
 
-NetworkSource::NetworkSource(NetworkOptions options) : options_(std::move(options)) {
-  set_up_ffmpeg();
-}
+NetworkSource::NetworkSource(NetworkOptions options) : options_(std::move(options)) {}
 
 NetworkSource::~NetworkSource() { stop(); }
 

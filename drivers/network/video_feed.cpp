@@ -160,12 +160,6 @@ void run(const std::shared_ptr<Shared>& shared) {
 
 }  // namespace
 
-void set_up_ffmpeg() {
-  // Lossy transports tear pictures, and what FFmpeg says of that belongs to no terminal.
-  ::setenv("OPENCV_FFMPEG_CAPTURE_OPTIONS", "rtsp_transport;tcp|analyzeduration;1000000", 0);
-  ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
-}
-
 VideoFeed::VideoFeed(FeedOptions options) : shared_(std::make_shared<Shared>()) {
   shared_->options = std::move(options);
   std::thread(run, shared_).detach();

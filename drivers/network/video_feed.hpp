@@ -38,9 +38,6 @@ struct FeedItem {
   std::size_t bytes() const { return jpeg.size() + image.total() * image.elemSize(); }
 };
 
-/// Once, before other threads read the environment, which is how OpenCV is told.
-void set_up_ffmpeg();
-
 /// Reads a stream from the network on a thread of its own, through OpenCV over FFmpeg: its calls
 /// wait for the network and can't be interrupted, so nobody else waits for them. When the feed goes
 /// while a call hangs (a name server that does not answer), the thread is left behind and ends with

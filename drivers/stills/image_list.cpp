@@ -102,7 +102,11 @@ Result<ImageList> list_images(Modality modality, const std::vector<fs::path>& pa
     const std::size_t before = files.size(), unread_before = list.unread.size();
     std::vector<fs::path> videos;
     for (const fs::directory_entry& entry : folder) {
-      if (!entry.is_regular_file(error)) continue;
+      if (!entry.is_regular_file(error)) {
+        if (!entry.is_directory(error) && has_image_extension(modality, entry.path()))
+          list.no_files.push_back(entry.path());
+        continue;
+      }
       if (has_image_extension(modality, entry.path()))
         files.push_back(entry.path());
       else if (modality == Modality::visible && has_video_extension(entry.path()))
@@ -136,6 +140,7 @@ Result<ImageList> list_images(Modality modality, const std::vector<fs::path>& pa
     return natural_less(a.filename().string(), b.filename().string());
   });
   std::sort(list.unread.begin(), list.unread.end());
+  std::sort(list.no_files.begin(), list.no_files.end());
   std::sort(list.videos_among_photos.begin(), list.videos_among_photos.end());
   return list;
 }

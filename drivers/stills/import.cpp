@@ -90,6 +90,10 @@ class Importer {
   Result<std::vector<fs::path>> listed(Modality modality, const std::vector<fs::path>& paths) {
     if (paths.empty()) return std::vector<fs::path>{};
     ORBITFUSE_ASSIGN(ImageList list, list_images(modality, paths));
+    for (const fs::path& file : list.no_files) {
+      report_.warnings.push_back(fmt::format(
+          "left out: {}: no file (a link to nothing, a pipe or a device)", file.string()));
+    }
     for (const fs::path& file : list.unread) {
       report_.warnings.push_back(
           fmt::format("left out: {}: {} files are not read; convert it to JPEG, PNG or TIFF",
@@ -328,7 +332,7 @@ class Importer {
     if (still.without_temperature == 0) return;
     report_.warnings.push_back(fmt::format(
         "{}: {} of {} samples have no temperature that can be stored (above 0 K, at "
-        "most {:.0f} C): dead pixels",
+        "most {:.0f} C, and not the last count, which means that or hotter): dead pixels",
         source.short_name(), still.without_temperature, still.size.width * still.size.height,
         celsius_from_kelvin(65535 * still.frame.kelvin_per_count)));
   }

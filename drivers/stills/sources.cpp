@@ -17,7 +17,8 @@ std::string Source::short_name() const {
 }
 
 std::string Source::where() const {
-  return pages > 1 ? fmt::format("{} (page {})", file.string(), page + 1) : file.string();
+  if (pages == 1) return file.string();
+  return fmt::format("{} ({} {})", file.string(), video ? "frame" : "image", page + 1);
 }
 
 std::vector<Source> photo_sources(const std::vector<std::filesystem::path>& files) {

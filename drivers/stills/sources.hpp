@@ -23,7 +23,7 @@ struct Source {
 
   /// Folder and file: enough to tell "visible/000.jpg" from "thermal/000.jpg" on any machine.
   std::string short_name() const;
-  /// The whole path; of one page among several also its number.
+  /// The whole path; of one image among several also its number.
   std::string where() const;
 };
 

@@ -68,6 +68,16 @@ constexpr const char* by_themselves =
     "import files without temperatures by themselves, or give their scale: --thermal-scale linear "
     "--kelvin-per-count K --kelvin-offset K";
 
+/// For whoever converts the counts: nothing here does.
+std::string words_of(const std::optional<DjiParameters>& set) {
+  if (!set)
+    return "What was set in the drone (emissivity, distance ...) is at no place that is known";
+  return fmt::format(
+      "Set in the drone, applied to nothing here: emissivity {:.2f}, distance {:.1f} m, humidity "
+      "{:.0f} %, reflected {:.1f} C, ambient {:.1f} C",
+      set->emissivity, set->distance_m, 100 * set->humidity, set->reflected_c, set->ambient_c);
+}
+
 }  // namespace
 
 Result<ThermalFile> read_thermal_file(const std::filesystem::path& path, std::optional<int> page) {
@@ -169,7 +179,8 @@ void ThermalDecoder::observe_jpeg(const FlirImage& image) {
   double low = 0, high = 0;
   cv::minMaxLoc(image.signal, &low, &high);
   // The hottest signals may be ones that no temperature gives.
-  for (int signal = static_cast<int>(high); signal >= static_cast<int>(low); --signal) {
+  for (int signal = std::min(static_cast<int>(high), 65534); signal >= static_cast<int>(low);
+       --signal) {
     const double kelvin = thermometer.kelvin(static_cast<std::uint16_t>(signal));
     if (!std::isfinite(kelvin)) continue;
     hottest_k_ = std::max(hottest_k_, kelvin);
@@ -178,7 +189,8 @@ void ThermalDecoder::observe_jpeg(const FlirImage& image) {
 }
 
 void ThermalDecoder::observe_samples(const ThermalFile& file, const std::string& where) {
-  const CountHistogram histogram = histogram_of(file.image);
+  CountHistogram histogram = histogram_of(file.image);
+  histogram.back() = 0;
   const auto scale = scale_of(file);
   if (scale) {
     if (!is_plausible(histogram, *scale)) return;  // convert() says so
@@ -191,7 +203,10 @@ void ThermalDecoder::observe_samples(const ThermalFile& file, const std::string&
     add(histogram, centikelvin_);
   } else {
     ++like_counts_;
-    dji_ += file.dji.has_value();
+    if (file.dji) {
+      ++dji_;
+      dji_parameters_.insert(words_of(file.dji->parameters));
+    }
     add(histogram, counts_);
   }
 }
@@ -206,7 +221,13 @@ bool ThermalDecoder::has_temperatures() const {
          (like_centikelvin_ > 0 && !samples_are_raw_counts());
 }
 
-double ThermalDecoder::kelvin_per_count() const { return kelvin_per_count_for(hottest_k_); }
+double ThermalDecoder::kelvin_per_count() const {
+  return std::max(least_kelvin_per_count_, kelvin_per_count_for(hottest_k_));
+}
+
+void ThermalDecoder::store_no_finer_than(double kelvin_per_count) {
+  least_kelvin_per_count_ = std::max(least_kelvin_per_count_, kelvin_per_count);
+}
 
 std::vector<std::string> ThermalDecoder::remarks() const {
   std::vector<std::string> list;
@@ -220,8 +241,12 @@ std::vector<std::string> ThermalDecoder::remarks() const {
     list.push_back(fmt::format(
         "{} thermal files of DJI drones hold counts; how they become temperatures is not "
         "published: "
-        "export temperatures with DJI's own program, or give a scale (--thermal-scale linear)",
-        dji_));
+        "export temperatures with DJI's own program, or give a scale (--thermal-scale linear). "
+        "{}{}",
+        dji_, *dji_parameters_.begin(),
+        dji_parameters_.size() > 1
+            ? fmt::format(" (and {} other settings)", dji_parameters_.size() - 1)
+            : ""));
   }
   if (!glowing_.empty()) {
     list.push_back(fmt::format(
@@ -248,7 +273,9 @@ Result<ThermalDecoder::Converted> ThermalDecoder::convert(const ThermalFile& fil
   FlirCalibration calibration = file.flir->calibration;
   calibration.object = with_overrides(calibration.object, options_.object);
   ORBITFUSE_TRY(calibration.validate(where));
-  Converted out = stored(file.flir->signal, kelvin_table(calibration));
+  std::vector<double> kelvin = kelvin_table(calibration);
+  kelvin.back() = std::nan("");
+  ORBITFUSE_ASSIGN(Converted out, stored(file.flir->signal, kelvin, where));
   out.radiometry = calibration;
   return out;
 }
@@ -266,9 +293,9 @@ Result<ThermalDecoder::Converted> ThermalDecoder::convert_samples(const ThermalF
   }
   const ThermalScaleTag tag = scale.value_or(ThermalScaleTag{});
   std::vector<double> kelvin(65536, std::nan(""));
-  for (std::size_t dn = 1; dn < kelvin.size(); ++dn)
+  for (std::size_t dn = 1; dn + 1 < kelvin.size(); ++dn)
     kelvin[dn] = kelvin_of(static_cast<double>(dn), tag);
-  return stored(file.image, kelvin);
+  return stored(file.image, kelvin, where);
 }
 
 ThermalDecoder::Converted ThermalDecoder::stretched(const cv::Mat& counts) const {
@@ -280,8 +307,9 @@ ThermalDecoder::Converted ThermalDecoder::stretched(const cv::Mat& counts) const
   return out;
 }
 
-ThermalDecoder::Converted ThermalDecoder::stored(const cv::Mat& counts,
-                                                 const std::vector<double>& kelvin) const {
+Result<ThermalDecoder::Converted> ThermalDecoder::stored(const cv::Mat& counts,
+                                                         const std::vector<double>& kelvin,
+                                                         const std::string& where) const {
   Converted out;
   out.kelvin_per_count = kelvin_per_count();
   std::vector<std::uint16_t> table(kelvin.size());
@@ -290,6 +318,10 @@ ThermalDecoder::Converted ThermalDecoder::stored(const cv::Mat& counts,
   out.counts.create(counts.size(), CV_16UC1);
   std::transform(counts.begin<std::uint16_t>(), counts.end<std::uint16_t>(),
                  out.counts.begin<std::uint16_t>(), [&](std::uint16_t dn) { return table[dn]; });
+  if (cv::countNonZero(out.counts) == 0) {
+    return fail(ErrorKind::input, where, "not one sample has a temperature that can be stored",
+                "an empty frame? Leave it out");
+  }
   // 0 was no sample before either.
   cv::Mat lost = (out.counts == 0) & (counts != 0);
   out.without_temperature = cv::countNonZero(lost);

@@ -6,11 +6,13 @@
 #include <filesystem>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "core/image/image_codec.hpp"
 #include "core/result.hpp"
+#include "core/temperature.hpp"
 #include "drivers/stills/dji_jpeg.hpp"
 #include "drivers/stills/flir_jpeg.hpp"
 #include "drivers/stills/import.hpp"
@@ -45,6 +47,7 @@ int thermal_page_count(std::string_view bytes);
 /// How often each count occurs.
 using CountHistogram = std::vector<std::uint64_t>;
 
+/// The last of 65536 counts means "that or more": it is no temperature.
 /// What thermal samples mean, decided once for all files, so that a session never mixes meanings:
 /// first every file is observed, then each is converted. Temperatures are what a session is for, so
 /// files that have none (8-bit, raw counts) are refused beside files that have them, each by name;
@@ -58,6 +61,8 @@ class ThermalDecoder {
   bool samples_are_raw_counts() const;  ///< 16-bit samples without a scale
   bool has_temperatures() const;        ///< so will the session
   double kelvin_per_count() const;      ///< in which the session stores them: one for all files
+  /// A session that goes on has files of this scale.
+  void store_no_finer_than(double kelvin_per_count);
   int files() const { return files_; }
   int radiometric_jpegs() const { return radiometric_jpegs_; }
   /// What is worth telling of the temperatures: a coarser scale, and a doubtful one.
@@ -81,15 +86,17 @@ class ThermalDecoder {
   void observe_samples(const ThermalFile& file, const std::string& where);
   Result<Converted> convert_samples(const ThermalFile& file, const std::string& where) const;
   Converted stretched(const cv::Mat& counts) const;
-  Converted stored(const cv::Mat& counts, const std::vector<double>& kelvin) const;
+  Result<Converted> stored(const cv::Mat& counts, const std::vector<double>& kelvin,
+                           const std::string& where) const;
 
   const ImportOptions& options_;
   int files_ = 0, radiometric_jpegs_ = 0, with_scale_ = 0;
-  int dji_ = 0;  ///< files of DJI drones whose counts nobody gave a scale
+  int dji_ = 0;                           ///< files of DJI drones whose counts nobody gave a scale
+  std::set<std::string> dji_parameters_;  ///< what their operators set for temperatures, in words
   int like_centikelvin_ = 0, like_counts_ = 0;  ///< 16-bit files without a scale
   CountHistogram counts_ = CountHistogram(65536),
                  centikelvin_ = CountHistogram(65536);  ///< of these
-  double hottest_k_ = 0;
+  double hottest_k_ = 0, least_kelvin_per_count_ = kelvin_per_dn;
   std::vector<std::string>
       glowing_;  ///< files of which one half is hotter than anything but a furnace
 };

@@ -41,8 +41,6 @@ class Reader {
     stream.read(head.data(), head.size());
     if (!is_video({head.data(), static_cast<std::size_t>(stream.gcount())}))
       return unreadable(file, "not a video (MP4, MOV, MKV, AVI or MPEG)");
-    // Its remarks on damaged packets would go to the terminal; what matters of them is counted.
-    ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
     Reader reader;
     try {
       // FFmpeg takes what stands before a colon in a relative name for a protocol.

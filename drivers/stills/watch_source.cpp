@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "drivers/stills/watch_source.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <ctime>
+#include <utility>
 
 #include "core/system/file_io.hpp"
+#include "core/temperature.hpp"
 #include "drivers/stills/folder_watch.hpp"
 #include "drivers/stills/image_list.hpp"
 #include "drivers/stills/still_photo.hpp"
@@ -82,6 +86,10 @@ bool WatchSource::resume(const DeviceInfo& device, const std::vector<FrameRecord
   return false;
 }
 
+void WatchSource::store_no_finer_than(double kelvin_per_count) {
+  reader_->decoder.store_no_finer_than(kelvin_per_count);
+}
+
 Delivery WatchSource::rejection(const std::string& name, const std::string& why) {
   Delivery delivery;
   delivery.kind = Delivery::Kind::rejected;
@@ -122,6 +130,7 @@ void WatchSource::stop() { reader_->watch.close(); }
 Result<Delivery> WatchSource::next(std::chrono::milliseconds timeout) {
   const auto deadline = Clock::now() + timeout;
   while (true) {
+    if (pending_) return *std::exchange(pending_, std::nullopt);
     const auto due = std::find_if(queue_.begin(), queue_.end(),
                                   [](const Attempt& a) { return a.next_try <= Clock::now(); });
     if (due != queue_.end()) {
@@ -215,6 +224,17 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
   }
   delivery.kind = Delivery::Kind::frame;
   delivery.frame.flag(FrameFlag::still);
+  if (still->without_temperature > 0) {
+    delivery.frame.flag(FrameFlag::clipped);
+    if (!std::exchange(clipped_told_, true)) {
+      pending_ = event_delivery(
+          EventKind::clipped,
+          fmt::format("{}: {} samples without a temperature, or hotter than {:.0f} C: dead pixels, "
+                      "here and in all frames with the flag clipped",
+                      name, still->without_temperature,
+                      celsius_from_kelvin(65535 * delivery.frame.kelvin_per_count)));
+    }
+  }
   return delivery;
 }
 

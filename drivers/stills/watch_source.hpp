@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -51,6 +52,7 @@ class WatchSource final : public FrameSource {
   bool can_wait() const override { return true; }
   bool resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames,
               std::uint64_t next_id) override;
+  void store_no_finer_than(double kelvin_per_count) override;
 
  private:
   struct Reader;
@@ -73,7 +75,8 @@ class WatchSource final : public FrameSource {
       seen_files_;        ///< of an earlier recording: name, time
   bool resumed_ = false;  ///< info_ is the session's word
   std::uint64_t next_id_ = 0;
-  bool gone_told_ = false;
+  bool gone_told_ = false, clipped_told_ = false;
+  std::optional<Delivery> pending_;  ///< goes before the next photo
 };
 
 }  // namespace orbitfuse

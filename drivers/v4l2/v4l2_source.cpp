@@ -283,7 +283,9 @@ Delivery V4l2Source::delivery_of(std::uint32_t index, std::uint32_t bytes, std::
   const bool counts = layout_.fourcc == V4L2_PIX_FMT_Y16;
   delivery.frame.thermal_is_gray = options_.modality == Modality::thermal && !counts;
   if (counts && options_.kelvin_per_dn > 0) {
-    if (const auto clipped = temperatures_.apply(delivery.frame, 0xffff))
+    if (const auto clipped = temperatures_.apply(
+            delivery.frame, 0xffff,
+            "set a hotter range in the camera, and kelvin-per-dn to that range's kelvin a count"))
       tell(EventKind::clipped, *clipped);
   } else if (counts) {
     if (const auto stretch = raw_counts_.apply(delivery.frame))

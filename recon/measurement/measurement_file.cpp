@@ -8,6 +8,7 @@
 #include <ctime>
 #include <set>
 
+#include "core/formats/nested_text.hpp"
 #include "core/system/file_io.hpp"
 #include "core/system/folder_change_lock.hpp"
 
@@ -78,7 +79,7 @@ Result<Measurements> load_measurements(const std::filesystem::path& file,
   std::error_code unreadable;  // read_file says why
   if (!std::filesystem::exists(file, unreadable) && !unreadable) return result;
   ORBITFUSE_ASSIGN(const std::string text, read_file(file, max_text_bytes));
-  const json j = json::parse(text, nullptr, false);
+  const json j = parse_json(text);
   if (j.is_discarded() || !j.is_object()) return damaged(file, "not JSON, or cut off");
   if (!j.contains("schema") || j["schema"] != measurement_schema)
     return damaged(file, fmt::format("schema {}, this program writes {}",

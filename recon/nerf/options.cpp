@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/nerf/options.hpp"
 
+#include "core/formats/nested_text.hpp"
 #include "core/near_word.hpp"
 
 #include <fmt/format.h>
@@ -265,9 +266,10 @@ Result<TrainOptions> preset(const std::string& name) {
 }
 
 Result<TrainOptions> load_options(const std::filesystem::path& file) {
+  ORBITFUSE_ASSIGN(const std::string toml_text, read_toml_text(file));
   toml::table config;
   try {
-    config = toml::parse_file(file.string());
+    config = toml::parse(toml_text, file.string());
   } catch (const toml::parse_error& error) {
     return fail(ErrorKind::usage, file.string(),
                 fmt::format("line {}: {}", error.source().begin.line, error.description()),

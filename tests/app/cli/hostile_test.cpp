@@ -159,6 +159,43 @@ TEST_F(Hostile, WhyColmapFailedIsInTheMessage) {
   EXPECT_THAT(outcome.err, AllOf(HasSubstr("boom: no GPU"), Not(HasSubstr("colmap.log"))));
 }
 
+TEST_F(Hostile, TextOfManyLevelsIsRefused) {
+  const std::string deep = std::string(200'000, '[') + std::string(200'000, ']');
+  std::string key = "a";
+  for (int i = 0; i < 50'000; ++i) key += ".a";
+  const auto put = [&](const char* name, const std::string& text) {
+    std::ofstream(path(name), std::ios::binary) << text;
+    return path(name);
+  };
+  const std::string session = path("session");
+  write_fixture_session(session);
+  for (const std::string& text : {key + " = 1", "[" + key + "]\nb = 1", "a = {" + key + " = 1}"})
+    refused(orbitfuse_program({"run", session, "--config", put("c.toml", text), "--print-config"}),
+            3, "c.toml:1: a key of more than 100 parts");
+  refused(
+      orbitfuse_program({"run", session, "--set", "render.views=" + deep.substr(150'000, 100'000)}),
+      2, "render.views");
+  const std::string photo = path("v.png");
+  put_pair();
+  refused(
+      orbitfuse_program(
+          {"import", path("new"), "--visible", photo, "--transforms",
+           put("t.json", R"({"frames":[{"file_path":"v.png","transform_matrix":)" + deep + "}]}")}),
+      3, "t.json: lists within lists");
+  std::ofstream(session + "/manifest.jsonl", std::ios::app | std::ios::binary)
+      << "{\"type\":\"frame\",\"file\":" << deep << "}\n";
+  refused(orbitfuse_program({"inspect", session}), 3, "not a JSON object");
+}
+
+TEST_F(Hostile, RunsDoNotWriteAmongTheFramesOfTheirSession) {
+  const std::string session = path("session");
+  write_fixture_session(session);
+  for (const char* out : {"", "/visible", "/thermal/x", "/../session"})
+    refused(orbitfuse_program({"run", session, "--out", session + out}), 2, "holds the session");
+  EXPECT_FALSE(fs::exists(session + "/run.json"));
+  EXPECT_FALSE(fs::exists(session + "/thermal/x"));
+}
+
 TEST_F(Hostile, ConfigurationsThatNeverEndAreRefused) {
   write_fixture_session(path("s"));
   refused(orbitfuse_program({"run", path("s"), "--out", path("o"), "--config", "/dev/zero"}), 3,

@@ -4,10 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cmath>
 #include <thread>
 
 #include "app/recording/rehearsal.hpp"
+#include "capture/recording/thermal_samples.hpp"
 #include "core/image/image_codec.hpp"
+#include "core/image/image_io.hpp"
+#include "core/image/thermal_counts.hpp"
 #include "core/system/utc_now.hpp"
 #include "drivers/stills/watch_source.hpp"
 #include "tests/capture/scripted_source.hpp"
@@ -52,6 +56,71 @@ TEST(Recording, ResumeGoesOnWithTheIdsOfTheSameCamera) {
   EXPECT_EQ(session->streams[1].first_sequence, 12u);
   for (const StreamRecord& s : session->streams)
     EXPECT_EQ(s.received + s.lost, s.last_sequence - s.first_sequence + 1);
+}
+
+/// A thermal camera of which sample s is s / 50 K.
+class HotCamera final : public ScriptedSource {
+ public:
+  explicit HotCamera(const std::vector<double>& spots_k)
+      : ScriptedSource("thermal0", Modality::thermal, script_of(spots_k)) {
+    std::vector<double> table(65536);
+    for (std::size_t i = 0; i < table.size(); ++i) table[i] = 0.02 * static_cast<double>(i);
+    samples_ = ThermalSamples::table(std::move(table));
+  }
+  Result<Delivery> next(std::chrono::milliseconds timeout) override {
+    Result<Delivery> delivery = ScriptedSource::next(timeout);
+    if (delivery && delivery->kind == Delivery::Kind::frame) samples_.apply(delivery->frame, 65535);
+    return delivery;
+  }
+  void store_no_finer_than(double kelvin_per_count) override {
+    samples_.store_no_finer_than(kelvin_per_count);
+  }
+
+ private:
+  static std::deque<Delivery> script_of(const std::vector<double>& spots_k) {
+    std::deque<Delivery> script;
+    for (const double kelvin : spots_k) {
+      cv::Mat image(24, 32, CV_16UC1, cv::Scalar(50 * 300));
+      image.at<std::uint16_t>(3, 4) = static_cast<std::uint16_t>(std::lround(50 * kelvin));
+      script.push_back(test::frame_delivery(script.size(), image));
+    }
+    return script;
+  }
+  ThermalSamples samples_ = ThermalSamples::linear(0.01);
+};
+
+TEST(Recording, FramesAcrossTheEndOfAScaleKeepTheirTemperaturesAndDoNotGoBack) {
+  const test::TempFolder folder;
+  RecordingOptions options;
+  options.session = folder / "s";
+  const std::vector<std::vector<double>> recordings{{640, 700, 640, 1100, 300}, {300, 640}};
+  std::vector<double> spots_k;
+  for (const auto& spots : recordings) {
+    std::vector<std::unique_ptr<FrameSource>> sources;
+    sources.push_back(std::make_unique<HotCamera>(spots));
+    const auto ending = record(std::move(sources), options);
+    ASSERT_TRUE(ending) << ending.error().message();
+    options.resume = true;
+    spots_k.insert(spots_k.end(), spots.begin(), spots.end());
+  }
+  const auto session = open_session(folder / "s");
+  ASSERT_TRUE(session) << session.error().message();
+  ASSERT_EQ(session->frames.size(), spots_k.size());
+  for (std::size_t i = 0; i < spots_k.size(); ++i) {
+    const auto counts = read_thermal_counts(session->path_of(session->frames[i]));
+    ASSERT_TRUE(counts) << counts.error().message();
+    EXPECT_EQ(counts->scale.scale, i == 0 ? 0.01 : 0.02) << i;
+    const cv::Mat kelvin = *read_thermal_k(session->path_of(session->frames[i]));
+    EXPECT_NEAR(kelvin.at<float>(3, 4), spots_k[i], 0.0101) << i;
+    EXPECT_NEAR(kelvin.at<float>(0, 0), 300, 0.0101) << i;
+  }
+  std::vector<std::string> told;
+  for (const EventRecord& event : session->events)
+    if (event.kind == "scale") told.push_back(event.detail);
+  ASSERT_EQ(told.size(), 1u);  // not again by the resumed recording
+  EXPECT_EQ(told[0],
+            "from thermal/000001.tiff on thermal files hold 0.02 K a count (before: 0.01): up to "
+            "1038 C");
 }
 
 /// A camera that answers, but only after a while.

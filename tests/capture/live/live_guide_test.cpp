@@ -157,6 +157,30 @@ TEST_F(LiveGuideTest, OperatorsKeyFillsTheNextStation) {
   EXPECT_FALSE(guide.error());
 }
 
+TEST_F(LiveGuideTest, AnotherScaleOfThermalCountsIsNoMotion) {
+  DeviceInfo thermal;
+  thermal.id = "thermal0";
+  thermal.modality = Modality::thermal;
+  ASSERT_TRUE(writer->add_device(thermal));
+  options.plan.modalities = {Modality::thermal};
+  LiveGuide guide(*writer, options);
+  guide.operator_at_station();
+  // The same squares, 300 K on 290 K, from the second frame on at 0.02 K a count.
+  for (const double scale : {0.01, 0.02, 0.02}) {
+    Frame frame;
+    frame.id = next_id++;
+    frame.host_time_ns = at_ns(++now_s);
+    frame.tracking = true;
+    boxes(150, 100).convertTo(frame.pixels, CV_16U, 0.2 / scale, 270 / scale);
+    frame.kelvin_per_count = scale;
+    const auto kept = writer->store("thermal0", frame);
+    ASSERT_TRUE(kept) << kept.error().message();
+    guide.add(kept->record, kept->pixels, kept->scale.scale);
+    EXPECT_NE(guide.cameras()[0].refusal, Refusal::moving) << scale;
+  }
+  EXPECT_EQ(guide.done_count(Modality::thermal), 1);
+}
+
 TEST_F(LiveGuideTest, ABlurredFirstFrameIsNoStation) {
   LiveGuide guide(*writer, options);
   guide.operator_at_station();

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "capture/recording/session_writer.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
 
+#include <functional>
 #include <opencv2/imgproc.hpp>
 
 #include "capture/recording/raw_counts.hpp"
@@ -213,6 +215,41 @@ TEST(SessionWriter, ScaleOfHotScenesIsInTagSidecarAndQuality) {
     EXPECT_NE(test::get(folder / "s" / (record->file + ".json")).find("\"scale\":0.02"),
               std::string::npos);
   }
+}
+
+TEST(SessionWriter, ASessionThatIsMovedDeletedOrChangedMeanwhileIsAnError) {
+  const TempFolder folder;
+  const auto after = [&](const std::string& name, const std::function<void()>& change) {
+    auto writer = *SessionWriter::create(folder / name);
+    DeviceInfo device;
+    device.id = "visible0";
+    EXPECT_TRUE(writer->add_device(device));
+    Frame frame;
+    frame.pixels = cv::Mat(8, 8, CV_8UC1, cv::Scalar(7));
+    EXPECT_TRUE(writer->append("visible0", frame));
+    change();
+    const auto stored = writer->append("visible0", frame);
+    EXPECT_FALSE(stored) << name;
+    EXPECT_FALSE(writer->append(EventRecord{"", 1, "nuc", ""})) << name;
+    EXPECT_FALSE(writer->close()) << name;
+    return stored ? std::string() : stored.error().message();
+  };
+  using ::testing::HasSubstr;
+  namespace fs = std::filesystem;
+  EXPECT_THAT(after("a", [&] { fs::remove_all(folder / "a"); }), HasSubstr("moved or deleted"));
+  EXPECT_FALSE(fs::exists(folder / "a"));
+  EXPECT_THAT(after("b", [&] { fs::rename(folder / "b", folder / "b2"); }),
+              HasSubstr("moved or deleted"));
+  EXPECT_FALSE(fs::exists(folder / "b"));
+  EXPECT_EQ(open_session(folder / "b2")->frames.size(), 1u);
+  EXPECT_THAT(after("c", [&] { fs::resize_file(folder / "c/manifest.jsonl", 0); }),
+              HasSubstr("changed by another program"));
+  EXPECT_THAT(after("d",
+                    [&] {
+                      test::put(folder / "d/manifest.jsonl.new", "{}\n");
+                      fs::rename(folder / "d/manifest.jsonl.new", folder / "d/manifest.jsonl");
+                    }),
+              HasSubstr("moved or deleted"));
 }
 
 TEST(SessionWriter, ARecordThatWouldNotOpenLeavesNoFile) {

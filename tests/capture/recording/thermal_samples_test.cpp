@@ -53,7 +53,7 @@ TEST(ThermalSamples, TheEndOfTheScaleIsNoTemperatureAndToldOnce) {
   EXPECT_EQ(second.flags, std::vector<std::string>{"clipped"});
 }
 
-TEST(ThermalSamples, OfATableEachFrameTakesTheFinestScaleThatHoldsIt) {
+TEST(ThermalSamples, OfATableTheScaleHoldsTheHottestSampleUpToNow) {
   std::vector<double> table(65536, std::nan(""));
   table[100] = 300;
   table[200] = kelvin_from_celsius(900);
@@ -77,8 +77,39 @@ TEST(ThermalSamples, OfATableEachFrameTakesTheFinestScaleThatHoldsIt) {
   const auto words = samples.apply(beyond, 65535);
   ASSERT_TRUE(words);
   EXPECT_NE(words->find("3 samples"), std::string::npos) << *words;
-  EXPECT_NEAR(kelvin(beyond, 0), 300, 0.051);
+  EXPECT_EQ(beyond.kelvin_per_count, 0.04);  // what no scale holds decides nothing
+  EXPECT_NEAR(kelvin(beyond, 0), 300, 0.021);
   for (int x = 1; x < 4; ++x) EXPECT_EQ(kelvin(beyond, x), 0) << x;
+}
+
+TEST(ThermalSamples, FramesThatCrossTheEndOfAScaleDoNotGoBack) {
+  std::vector<double> table(65536);
+  for (std::size_t i = 0; i < table.size(); ++i) table[i] = 0.013 * static_cast<double>(i);
+  const std::uint16_t at_limit = 50411, above = 50412;  // 655.343 K and 655.356 K: 65535.6 counts
+  ThermalSamples samples = ThermalSamples::table(table);
+  std::vector<double> scales;
+  for (const std::uint16_t hottest : {at_limit, above, at_limit, above, std::uint16_t{20000}}) {
+    Frame frame = frame_of({20000, hottest});
+    EXPECT_FALSE(samples.apply(frame, 65535));
+    scales.push_back(frame.kelvin_per_count);
+    EXPECT_NEAR(kelvin(frame, 0), 260, frame.kelvin_per_count / 2 + 1e-9);
+    EXPECT_NEAR(kelvin(frame, 1), table[hottest], frame.kelvin_per_count / 2 + 1e-9);
+  }
+  EXPECT_EQ(scales, (std::vector<double>{0.01, 0.02, 0.02, 0.02, 0.02}));
+}
+
+TEST(ThermalSamples, ASessionThatGoesOnKeepsItsScale) {
+  ThermalSamples table = ThermalSamples::table(std::vector<double>(65536, 300.0));
+  table.store_no_finer_than(0.04);
+  table.store_no_finer_than(0.02);  // not back
+  Frame cool = frame_of({100}), counted = frame_of({7500});
+  EXPECT_FALSE(table.apply(cool, 65535));
+  EXPECT_EQ(cool.kelvin_per_count, 0.04);
+  EXPECT_NEAR(kelvin(cool, 0), 300, 1e-9);
+  ThermalSamples linear = ThermalSamples::linear(0.04);
+  linear.store_no_finer_than(0.1);
+  EXPECT_FALSE(linear.apply(counted, 65535));
+  EXPECT_EQ(counted.kelvin_per_count, 0.04);  // the camera's own counts
 }
 
 }  // namespace

@@ -128,7 +128,9 @@ TEST_F(SessionTest, WrongTypesNameTheField) {
       {"\"loop\":1", "\"loop\":1.5"},
       {"\"modality\":\"thermal\",\"q", "\"modality\":\"x\",\"q"},
       {"\"translation\":[", "\"translation\":[null,"},
-      {"\"azimuth_deg\":210.5", "\"azimuth_deg\":null"}};
+      {"\"azimuth_deg\":210.5", "\"azimuth_deg\":null"},
+      {"\"host_time_ns\":", "\"host_time_ns\":18446744073709551615,\"x\":"},
+      {"\"host_time_ns\":", "\"host_time_ns\":-9223372036854775808,\"x\":"}};
   for (const auto& [from, to] : edits) {
     std::string text = manifest();
     // The frame's line; the device's carries a width too.

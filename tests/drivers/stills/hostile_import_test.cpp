@@ -3,6 +3,7 @@
 // without a word.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <fstream>
@@ -282,7 +283,10 @@ TEST_F(HostileImport, DjiCountsAreNeverTemperaturesUnlessTheUserSaysHow) {
   EXPECT_EQ(report->thermal, 2);
   EXPECT_FALSE(report->has_temperatures);
   EXPECT_THAT(report->warnings,
-              Contains(AllOf(HasSubstr("2 thermal files of DJI"), HasSubstr("not published"))));
+              Contains(AllOf(HasSubstr("2 thermal files of DJI"), HasSubstr("not published"),
+                             HasSubstr("emissivity 0.95, distance 5.0 m, humidity 70 %, reflected "
+                                       "23.0 C, ambient 21.0 C"),
+                             HasSubstr("(and 1 other settings)"))));
   EXPECT_EQ(report->session.frames.at(0).width, 160);
   EXPECT_EQ(report->session.devices.at(0).model, "DJI");
 
@@ -306,6 +310,65 @@ TEST_F(HostileImport, DjiCountsAreNeverTemperaturesUnlessTheUserSaysHow) {
   const std::string odd = made::dji_jpeg(cv::Mat(130, 160, CV_16UC1, cv::Scalar(5)));
   EXPECT_TRUE(is_dji_thermal(odd));
   EXPECT_FALSE(read_dji_thermal(odd, "f")) << "no size of its cameras";
+}
+
+TEST_F(HostileImport, TheLastCountOfAFileIsNoTemperature) {
+  const FlirCalibration camera = made::flir_calibration();
+  cv::Mat signal(30, 40, CV_16UC1, cv::Scalar(made::flir_signal(300, camera)));
+  signal(cv::Rect(4, 5, 3, 2)).setTo(65535);
+  put("in/0.jpg", made::flir_jpeg(signal, camera));
+  cv::Mat centikelvin = counts(29500, 1);
+  centikelvin(cv::Rect(4, 5, 1, 2)).setTo(65535);
+  put("in/1.tiff", *encode_tiff(centikelvin, ""));
+  options.thermal = {folder / "in"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  ASSERT_EQ(report->thermal, 2);
+  EXPECT_TRUE(std::isnan(kelvin_of(*report, 0).at<float>(5, 4)));
+  EXPECT_TRUE(std::isnan(kelvin_of(*report, 1).at<float>(5, 4)));
+  EXPECT_NEAR(kelvin_of(*report, 0).at<float>(0, 0), 300, 0.1);
+  EXPECT_THAT(report->warnings,
+              Contains(AllOf(HasSubstr("0.jpg: 6 of 1200 samples"), HasSubstr("that or hotter"))));
+  EXPECT_THAT(report->warnings, Contains(HasSubstr("1.tiff: 2 of 1200 samples")));
+}
+
+TEST_F(HostileImport, LinksToNothingAndPipesAreNamed) {
+  put_photo("in/a.jpg", 1);
+  fs::create_symlink("nowhere.jpg", folder / "in/link.jpg");
+  fs::create_symlink("self.png", folder / "in/self.png");
+  ASSERT_EQ(::mkfifo((folder / "in/pipe.jpg").c_str(), 0600), 0);
+  fs::create_directory(folder / "in/folder.jpg");
+  options.visible = {folder / "in"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->visible, 1);
+  for (const char* file : {"link.jpg: no file", "self.png: no file", "pipe.jpg: no file"})
+    EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("left out"), HasSubstr(file))));
+  EXPECT_THAT(report->warnings, Not(Contains(HasSubstr("folder.jpg"))));
+}
+
+TEST_F(HostileImport, ThermalFramesWithoutOneSampleAreLeftOut) {
+  put_centikelvin("in/a.tiff", 1);
+  put("in/b.tiff", *encode_tiff(cv::Mat::zeros(30, 40, CV_16UC1), ""));
+  options.thermal = {folder / "in"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->thermal, 1);
+  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("b.tiff"), HasSubstr("not one sample"))));
+}
+
+TEST_F(HostileImport, SidecarsOfManyLevelsAreRefused) {
+  const std::string deep = std::string(200'000, '[') + std::string(200'000, ']');
+  put_centikelvin("in/a.tiff", 1);
+  put_centikelvin("in/b.tiff", 2);
+  put("in/b.tiff.json", "{\"scale\":" + deep + "}");
+  put("in/c.tiff",
+      *encode_tiff(counts(29500, 3), "{\"scale\":" + deep.substr(190'000, 20'000) + "}"));
+  options.thermal = {folder / "in"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->thermal, 2);  // what names no scale in c.tiff's description is a remark
+  EXPECT_THAT(report->warnings, Contains(HasSubstr("b.tiff.json")));
 }
 
 TEST_F(HostileImport, ObjectParametersNeedRadiometricJpegs) {

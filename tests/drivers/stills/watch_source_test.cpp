@@ -10,6 +10,7 @@
 #include "capture/recording/recorder.hpp"
 #include "core/image/image_codec.hpp"
 #include "core/system/file_io.hpp"
+#include "tests/support/made_files.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -74,6 +75,47 @@ TEST_F(WatchTest, NewPhotosComeByteForByteAndOldOnesStay) {
   EXPECT_THAT(first.frame.source, HasSubstr("IMG_1.jpg"));
   put("IMG_2.jpg", photo(2));
   EXPECT_EQ(soon(source).frame.id, 1u);
+}
+
+TEST_F(WatchTest, HotThermalPhotosTakeACoarserScaleForGoodAndTellDeadPixels) {
+  options.modality = Modality::thermal;
+  const FlirCalibration camera = made::flir_calibration();
+  const auto shot = [&](double spot_k, int number) {
+    cv::Mat signal(30, 40, CV_16UC1, cv::Scalar(made::flir_signal(300, camera)));
+    signal.at<std::uint16_t>(5, 6) = made::flir_signal(spot_k, camera);
+    signal.at<std::uint16_t>(0, 0) =
+        static_cast<std::uint16_t>(signal.at<std::uint16_t>(0, 0) + number);
+    return made::flir_jpeg(signal, camera);
+  };
+  const auto scale_of = [&](FrameSource& source, const std::string& name, double spot_k,
+                            int number) {
+    put(name, shot(spot_k, number));
+    const Delivery delivery = soon(source);
+    EXPECT_EQ(delivery.kind, Delivery::Kind::frame) << delivery.reason << delivery.detail;
+    const Frame& frame = delivery.frame;
+    if (frame.pixels.empty()) return 0.0;
+    EXPECT_NEAR(frame.pixels.at<std::uint16_t>(5, 6) * frame.kelvin_per_count, spot_k, 0.1);
+    return frame.kelvin_per_count;
+  };
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  EXPECT_EQ(scale_of(source, "1.jpg", 320, 1), 0.01);
+  EXPECT_EQ(scale_of(source, "2.jpg", 700, 2), 0.02);
+  EXPECT_EQ(scale_of(source, "3.jpg", 320, 3), 0.02);
+  source.stop();
+  WatchSource resumed(options);
+  ASSERT_TRUE(resumed.start());
+  resumed.store_no_finer_than(0.02);
+  EXPECT_EQ(scale_of(resumed, "4.jpg", 320, 4), 0.02);
+  // Below its offset the signal stands for no temperature.
+  cv::Mat signal(30, 40, CV_16UC1, cv::Scalar(made::flir_signal(300, camera)));
+  signal(cv::Rect(0, 0, 3, 2)).setTo(1);
+  put("5.jpg", made::flir_jpeg(signal, camera));
+  const Delivery holed = soon(resumed), told = soon(resumed);
+  ASSERT_EQ(holed.kind, Delivery::Kind::frame) << holed.reason;
+  EXPECT_THAT(holed.frame.flags, ::testing::Contains("clipped"));
+  EXPECT_EQ(told.reason, "clipped");
+  EXPECT_THAT(told.detail, HasSubstr("5.jpg: 6 samples"));
 }
 
 TEST_F(WatchTest, ResumedSessionGetsNoPhotoTwice) {

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <opencv2/core.hpp>
+
+#include "core/image/image_codec.hpp"
+#include "core/result.hpp"
+
+namespace orbitfuse {
+
+/// A thermal file as it is stored.
+struct ThermalCounts {
+  cv::Mat image;  ///< CV_16UC1, 0: invalid
+  ThermalScaleTag scale;
+};
+
+/// From a 16-bit TIFF or PNG; read_thermal_k() is the same as kelvin. The scale comes from the
+/// file's own tag, else from its sidecar <file>.json, else centikelvin is assumed. Input errors
+/// name the file.
+Result<ThermalCounts> read_thermal_counts(const std::filesystem::path& path);
+
+}  // namespace orbitfuse
