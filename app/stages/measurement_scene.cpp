@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <set>
 
 #include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
@@ -108,6 +109,14 @@ Status add_named_views(const Folder& folder, SceneParts& parts) {
   return {};
 }
 
+void add_unposed(const Session& session, SceneParts& parts) {
+  std::set<std::string> posed;
+  for (const ThermalFrame& frame : parts.frames) posed.insert(frame.view.name);
+  for (const PosedView& view : parts.views) posed.insert(view.name);
+  for (const FrameRecord& frame : session.frames)
+    if (!posed.contains(frame.file)) parts.unposed.push_back(frame.file);
+}
+
 /// Of everything that a measurement's coordinates and temperatures depend on.
 Result<std::string> identity_of(const Folder& folder, const Session& session) {
   std::string text = session.id;
@@ -133,6 +142,10 @@ Result<Similarity3d> load_world_from_thermal(const fs::path& out) {
   return record.visible_from_thermal;
 }
 
+Result<std::string> measurement_identity(const fs::path& out, const Session& session) {
+  return identity_of(Folder{out}, session);
+}
+
 Result<ThermalScene> load_measurement_scene(const fs::path& out, const Session& session,
                                             const measurement::MeasurementOptions& options) {
   const Folder folder{out};
@@ -155,6 +168,7 @@ Result<ThermalScene> load_measurement_scene(const fs::path& out, const Session& 
   SceneParts parts;
   ORBITFUSE_TRY(add_thermal(folder, session, parts));
   ORBITFUSE_TRY(add_named_views(folder, parts));
+  add_unposed(session, parts);
   ORBITFUSE_ASSIGN(parts.identity, identity_of(folder, session));
   return ThermalScene::make(std::move(parts), options);
 }
