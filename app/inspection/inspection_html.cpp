@@ -145,16 +145,17 @@ std::string picture(const cv::Mat& image, const std::string& caption) {
                      report::data_uri(image, picture_width_px), caption);
 }
 
-std::string pictures(const FindingPictures& p) {
+/// `measured`: it has a temperature to be seen, unlike a distance.
+std::string pictures(const FindingPictures& p, bool measured) {
   if (p.view.empty())
     return "<p class=\"notice\">No recorded view sees this place: there is no picture of it.</p>\n";
   const std::string from = escape(p.view);
   std::string html = "<div class=\"three\">\n" + picture(p.visible, "Visible, rendered from there");
-  html +=
-      p.thermal_view
-          ? picture(p.thermal, "Thermal, the frame as recorded") +
-                picture(p.fused, "Fused, rendered from there")
-          : "<p class=\"notice\">No thermal frame sees this place: it has no thermal picture.</p>";
+  if (p.thermal_view)
+    html += picture(p.thermal, "Thermal, the frame as recorded") +
+            picture(p.fused, "Fused, rendered from there");
+  else if (measured)
+    html += "<p class=\"notice\">No thermal frame sees this place: it has no thermal picture.</p>";
   return html + "</div>\n<p class=\"note\">" +
          fmt::format("{} {}{}; {}.", p.thermal_view ? "Seen best by" : "Seen from", from,
                      p.doubtful ? ", whose pose is in doubt" : "", p.marks) +
@@ -206,7 +207,7 @@ std::string finding_block(const ShownFinding& shown) {
   std::string html =
       fmt::format("<article class=\"finding\"><h3><b>{}</b> {}</h3>\n", f.number, escape(f.title));
   if (!f.component.empty()) html += "<p>Component: " + escape(f.component) + "</p>\n";
-  html += pictures(shown.pictures) + reading_table(f);
+  html += pictures(shown.pictures, f.answer.kind != Kind::distance) + reading_table(f);
   if (f.answer.kind == Kind::distance) html += "<p>" + headline(f) + "</p>\n";
   if (f.comparison)
     html += "<p class=\"result\">" + escape(comparison_words(*f.comparison)) + "</p>\n";

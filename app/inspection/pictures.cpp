@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 
 #include "app/view/layers.hpp"
@@ -65,17 +66,23 @@ Result<double> fineness(const RecordedView& view, const Eigen::Vector3d& point,
   return camera.fx * whole.width / width / in_cam.z();
 }
 
-/// The visible view that sees the point nearest; sure poses come first.
-Result<const RecordedView*> visible_view_of(const Eigen::Vector3d& point, const FinishedRun& run,
-                                            const ThermalScene& scene, const Progress& progress) {
+/// The visible view that sees all of the points, and the least of them finest; sure poses come
+/// first.
+Result<const RecordedView*> visible_view_of(const std::vector<Eigen::Vector3d>& points,
+                                            const FinishedRun& run, const ThermalScene& scene,
+                                            const Progress& progress) {
   const RecordedView* best = nullptr;
   std::pair<bool, double> most{false, 0};
   for (const RecordedView& view : run.views) {
     if (view.modality != Modality::visible) continue;
     ORBITFUSE_TRY(progress.check("inspection"));
-    ORBITFUSE_ASSIGN(const double fine, fineness(view, point, scene, progress));
-    const std::pair rank{view.doubt.empty(), fine};
-    if (fine > 0 && rank > most) most = rank, best = &view;
+    double least = std::numeric_limits<double>::infinity();
+    for (const Eigen::Vector3d& point : points) {
+      ORBITFUSE_ASSIGN(const double fine, fineness(view, point, scene, progress));
+      least = std::min(least, fine);
+    }
+    const std::pair rank{view.doubt.empty(), least};
+    if (least > 0 && rank > most) most = rank, best = &view;
   }
   return best;
 }
@@ -208,8 +215,12 @@ Result<FindingPictures> pictures_of(const InspectionFinding& finding, const Fini
   const FrameLine* best = finding.reading().best();
   const RecordedView* view = best != nullptr ? view_named(run, best->frame) : nullptr;
   pictures.thermal_view = view != nullptr;
-  if (view == nullptr && finding.position()) {
-    ORBITFUSE_ASSIGN(view, visible_view_of(*finding.position(), run, scene, progress));
+  const Answer& answer = finding.answer;
+  // The middle between a distance's ends lies on no surface.
+  std::vector<Eigen::Vector3d> shown = answer.ends;
+  if (shown.empty() && finding.position()) shown = {*finding.position()};
+  if (view == nullptr && !shown.empty()) {
+    ORBITFUSE_ASSIGN(view, visible_view_of(shown, run, scene, progress));
   }
   if (view == nullptr) return pictures;
   pictures.view = view->view.name;
@@ -226,7 +237,7 @@ Result<FindingPictures> pictures_of(const InspectionFinding& finding, const Fini
     ORBITFUSE_ASSIGN(pictures.thermal, recorded_thermal(*view, camera, run, scene));
   }
   Marker marker(camera, pose);
-  pictures.marks = mark(finding.answer, finding.request, scene, progress, marker);
+  pictures.marks = mark(answer, finding.request, scene, progress, marker);
   for (cv::Mat* picture : {&pictures.visible, &pictures.thermal, &pictures.fused})
     marker.draw(*picture);
   return pictures;

@@ -62,11 +62,11 @@ TEST_F(Inspection, ShowsTheSavedMeasurementsOfTheRun) {
         "<svg", "Seen best by thermal/0000", "emissivity not recorded", "fixture"})
     EXPECT_THAT(page, HasSubstr(said));
   EXPECT_THAT(page, Not(HasSubstr("hot <b>")));
-  // Two findings of three pictures each, and the plan's.
+  // Two findings of three pictures each, and the plan's two drawings.
   std::size_t pictures = 0;
   for (std::size_t at = 0; (at = page.find("data:image/jpeg", at)) != std::string::npos; ++at)
     ++pictures;
-  EXPECT_EQ(pictures, 7u);
+  EXPECT_EQ(pictures, 8u);
 
   // The ordinary report lists them too.
   ASSERT_EQ(orbitfuse_program({"report", out().string()}).code, 0);
