@@ -57,6 +57,7 @@ const std::map<std::string, Floors> floors_of{
       {"report"},
       {"stages"},
       {"eval", "view"},
+      {"inspection"},
       {"cli"},
       {"verbs"}}},
     {"drivers/aravis", {}},
