@@ -10,6 +10,7 @@
 #include "app/report/html.hpp"
 #include "app/report/report_model.hpp"
 #include "core/image/image_io.hpp"
+#include "core/numeric/percent.hpp"
 #include "core/temperature.hpp"
 
 namespace orbitfuse::report {
@@ -167,11 +168,12 @@ std::string poses_section(const Model& model) {
   if (model.poses.empty()) return {};
   std::string html = "<section aria-labelledby=\"h-poses\"><h2 id=\"h-poses\">Posed views</h2>\n";
   for (const PosesSummary& p : model.poses) {
-    const double percent = p.total > 0 ? 100.0 * p.posed / p.total : 0;
+    const double share = p.total > 0 ? 1.0 * p.posed / p.total : 0;
     html += fmt::format(
-        "<h3>{}: {} of {} views ({:.0f} %)</h3><div class=\"meter{}\"><i style=\"width:"
+        "<h3>{}: {} of {} views ({})</h3><div class=\"meter{}\"><i style=\"width:"
         "{:.1f}%\"></i></div>\n",
-        escape(p.modality), p.posed, p.total, percent, p.posed < p.total ? " part" : "", percent);
+        escape(p.modality), p.posed, p.total, percent(share), p.posed < p.total ? " part" : "",
+        100 * share);
     if (!p.advice.empty()) html += fmt::format("<p class=\"notice\">{}</p>\n", escape(p.advice));
     if (p.ladder.empty()) continue;
     html +=
@@ -204,8 +206,8 @@ std::string registration_section(const Model& model) {
 }
 
 std::string table(const Table& t) {
-  std::string html =
-      fmt::format("<h3>{}</h3><div class=\"scroll\"><table><thead><tr>", escape(t.title));
+  std::string html = t.title.empty() ? "" : fmt::format("<h3>{}</h3>", escape(t.title));
+  html += "<div class=\"scroll\"><table><thead><tr>";
   for (const Column& c : t.columns)
     html +=
         fmt::format("<th scope=\"col\" title=\"{}\">{}</th>", escape(c.definition), escape(c.name));
@@ -279,6 +281,10 @@ std::string to_html(const Model& model) {
   for (const auto& [key, value] : model.headline)
     html += fmt::format("<li><b>{}</b><span>{}</span></li>", escape(value), escape(key));
   html += "</ul>\n" + viewer(model, views) + poses_section(model) + registration_section(model);
+  if (!model.measurements.rows.empty())
+    html +=
+        "<section aria-labelledby=\"h-measured\"><h2 id=\"h-measured\">Saved measurements</h2>\n" +
+        table(model.measurements) + "</section>\n";
   if (!model.tables.empty()) {
     html += "<section aria-labelledby=\"h-metrics\"><h2 id=\"h-metrics\">Metrics</h2>\n";
     for (const Table& t : model.tables) html += table(t);

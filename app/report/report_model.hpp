@@ -66,6 +66,7 @@ struct Model {
   std::string registration_note;
   Facts registration;
   std::vector<Table> tables;
+  Table measurements;  ///< saved in the run's folder; no rows: none
   std::vector<pipeline::StageStatus> stages;
   std::vector<std::string> warnings;
   std::string software, created, configuration;  ///< configuration: resolved, as TOML or JSON

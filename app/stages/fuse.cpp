@@ -10,6 +10,7 @@
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
 #include "core/image/image_io.hpp"
+#include "core/numeric/percent.hpp"
 #include "fusion/heat/legend.hpp"
 #include "recon/assembly/training_data.hpp"
 
@@ -105,13 +106,12 @@ Result<StageOutput> fuse_views(const StageContext& context, const RunConfig& con
   if (std::count(methods.begin(), methods.end(), FusionMethod::heat) > 0)
     ORBITFUSE_TRY(write_legend(context, rendered, config.fuse.options));
   const double measured_share = measured_sum / static_cast<double>(rendered.views.size());
-  output.metrics = {
-      {"brief", fmt::format("{} images by {} methods, {:.0f} % of them with a temperature",
-                            fused_images, methods.size(), 100 * measured_share)},
-      {"methods", list},
-      {"milliseconds_a_view", times},
-      {"measured_share", measured_share},
-      {"measured_share_by_view", measured}};
+  output.metrics = {{"brief", fmt::format("{} images by {} methods, {} of them with a temperature",
+                                          fused_images, methods.size(), percent(measured_share))},
+                    {"methods", list},
+                    {"milliseconds_a_view", times},
+                    {"measured_share", measured_share},
+                    {"measured_share_by_view", measured}};
   return output;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <set>
 
 #include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
@@ -84,6 +85,14 @@ Status add_named_views(const pipeline::StageContext& context, SceneParts& parts)
   return {};
 }
 
+void add_unposed(const Session& session, SceneParts& parts) {
+  std::set<std::string> posed;
+  for (const ThermalFrame& frame : parts.frames) posed.insert(frame.view.name);
+  for (const PosedView& view : parts.views) posed.insert(view.name);
+  for (const FrameRecord& frame : session.frames)
+    if (!posed.contains(frame.file)) parts.unposed.push_back(frame.file);
+}
+
 /// Of everything that a measurement's coordinates and temperatures depend on.
 Result<std::string> identity_of(const pipeline::StageContext& context, const Session& session) {
   std::string text = session.id;
@@ -108,6 +117,10 @@ Result<Similarity3d> load_world_from_thermal(const pipeline::StageContext& conte
   return record.visible_from_thermal;
 }
 
+Result<std::string> measurement_identity(const fs::path& out, const Session& session) {
+  return identity_of(Folder{out}, session);
+}
+
 Result<ThermalScene> load_measurement_scene(const fs::path& out, const Session& session,
                                             const measurement::MeasurementOptions& options) {
   const pipeline::StageContext context = context_of_run(out);
@@ -130,6 +143,7 @@ Result<ThermalScene> load_measurement_scene(const fs::path& out, const Session& 
   SceneParts parts;
   ORBITFUSE_TRY(add_thermal(context, session, parts));
   ORBITFUSE_TRY(add_named_views(context, parts));
+  add_unposed(session, parts);
   ORBITFUSE_ASSIGN(parts.identity, identity_of(context, session));
   return ThermalScene::make(std::move(parts), options);
 }

@@ -27,4 +27,7 @@ Result<measurement::ThermalScene> load_measurement_scene(
     const std::filesystem::path& out, const Session& session,
     const measurement::MeasurementOptions& options = {});
 
+/// ThermalScene::identity of a run, of its records alone. Errors: input (a damaged record).
+Result<std::string> measurement_identity(const std::filesystem::path& out, const Session& session);
+
 }  // namespace orbitfuse::stages

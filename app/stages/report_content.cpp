@@ -8,7 +8,9 @@
 #include "app/pipeline/runner.hpp"
 #include "app/stages/artifacts.hpp"
 #include "app/stages/rendered_views.hpp"
+#include "app/stages/saved_measurements.hpp"
 #include "core/image/image_io.hpp"
+#include "core/numeric/percent.hpp"
 #include "core/system/cpu.hpp"
 #include "core/system/parallel.hpp"
 #include "core/temperature.hpp"
@@ -150,6 +152,16 @@ void add_metric_tables(const StageContext& context, report::Model& model) {
   }
 }
 
+/// What others measured in the run since; of another run, or damaged, it is named and left out.
+void add_measurements(const StageContext& context, const SessionInput& input,
+                      report::Model& model) {
+  auto table = measurement_table(context.out, input.session);
+  if (table)
+    model.measurements = *std::move(table);
+  else
+    model.warnings.push_back("saved measurements are not shown: " + table.error().message());
+}
+
 /// What the data did not allow, once per reason.
 void add_notices(const StageContext& context, const SessionInput& input, report::Model& model) {
   for (const Modality modality : {Modality::visible, Modality::thermal})
@@ -180,6 +192,7 @@ Result<report::Model> report_content(const StageContext& context, const StageInp
   add_registration(context, model);
   add_fields(context, model);
   add_metric_tables(context, model);
+  add_measurements(context, input, model);
   add_notices(context, input, model);
   model.stages = *context.earlier;
   double wall_s = 0;
@@ -191,9 +204,8 @@ Result<report::Model> report_content(const StageContext& context, const StageInp
         fmt::format("{:.0f} to {:.0f} °C", celsius_from_kelvin(model.span.low_k),
                     celsius_from_kelvin(model.span.high_k)));
   if (const json* fused = context.metrics_of("fuse"); fused && fused->contains("measured_share"))
-    model.headline.emplace_back(
-        "of the new views has a temperature",
-        fmt::format("{:.0f} %", 100 * fused->at("measured_share").get<double>()));
+    model.headline.emplace_back("of the new views has a temperature",
+                                percent(fused->at("measured_share").get<double>()));
   model.headline.emplace_back("run time", fmt::format("{:.0f} s", wall_s));
   model.warnings.insert(model.warnings.end(), input.session.warnings.begin(),
                         input.session.warnings.end());

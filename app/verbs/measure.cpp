@@ -73,11 +73,16 @@ void tell(Context& context, const Options& options, const std::string& name, con
     return;
   }
   for (const std::string& line : described(answer)) context.console.data(line);
+  if (answer.kind != Kind::distance) context.console.info(std::string("+- ") + uncertainty_words);
 }
 
 Status run(Context& context, const Options& options) {
   if (options.words.csv && context.common.json)
     return fail(ErrorKind::usage, "--csv", "together with --json", "choose one of them");
+  const MeasureWords& words = options.words;
+  if (!words.save && !(words.remark + words.component + words.reference).empty())
+    return fail(ErrorKind::usage, "--remark, --component or --reference", "without --save",
+                "add --save: they are kept with the measurement");
   ORBITFUSE_ASSIGN(const Session session, session_of(options));
   ORBITFUSE_ASSIGN(const ThermalScene scene, stages::load_measurement_scene(options.out, session));
   const fs::path file = fs::path(options.out) / measurements_file;
@@ -86,6 +91,7 @@ Status run(Context& context, const Options& options) {
   if (!saved && options.words.save) return tl::unexpected(saved.error());
   if (!saved) context.console.warning(saved.error().message());
   const Measurements known = saved.value_or(Measurements{});
+  for (const std::string& note : known.notes) context.console.warning(note);
   ORBITFUSE_ASSIGN(const auto request, request_of(options.words, scene, known));
   if (!request) {
     if (!saved) return tl::unexpected(saved.error());
@@ -97,10 +103,14 @@ Status run(Context& context, const Options& options) {
   if (options.words.save && context.common.dry_run) {
     context.console.info("would be saved in " + file.string());
   } else if (options.words.save) {
-    ORBITFUSE_ASSIGN(name,
+    ORBITFUSE_ASSIGN(const Kept kept,
                      add_measurement(file, scene.identity(),
-                                     {name, "", anchored(*request, answer), to_json(answer)}));
-    context.console.info(fmt::format("saved as '{}' in {}", name, file.string()));
+                                     {name, "", anchored(*request, answer), to_json(answer),
+                                      words.remark, words.component, words.reference}));
+    name = kept.name;
+    context.console.info(fmt::format("saved as '{}' in {}{}", name, file.string(),
+                                     kept.replaced ? ", in place of the one of that name" : ""));
+    context.result["replaced"] = kept.replaced;
   }
   if (name.empty()) name = std::string(measurement::name(request->kind));
   context.result["name"] = name;

@@ -252,6 +252,11 @@ void add_measure_options(CLI::App& app, MeasureWords& w) {
   app.add_option("--recorded-reflected-c", w.recorded_reflected_c, "Likewise")->group(radiometry);
 
   app.add_option("--name", w.name, "What the measurement is called");
+  constexpr const char* report = "With --save, for the inspection report";
+  app.add_option("--remark", w.remark, "What was noticed")->group(report);
+  app.add_option("--component", w.component, "What the place is part of")->group(report);
+  app.add_option("--reference", w.reference, "Name of the saved measurement to compare with")
+      ->group(report);
   app.add_flag("--save", w.save, "Keep it in measurements.json of the run");
   app.add_flag("--csv", w.csv, "CSV on stdout");
 }

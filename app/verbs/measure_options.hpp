@@ -20,6 +20,7 @@ struct MeasureWords {
   int profile = 50;
   std::optional<double> emissivity, reflected_c, distance_m, air_c, humidity_percent;
   std::optional<double> recorded_emissivity, recorded_reflected_c;
+  std::string remark, component, reference;
   bool save = false, csv = false;
 };
 

@@ -1,15 +1,79 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
+#include "app/inspection/inspection.hpp"
+#include "app/inspection/print_pdf.hpp"
+#include "core/system/file_io.hpp"
 
 namespace orbitfuse::cli {
+namespace {
+namespace fs = std::filesystem;
+
+struct Options {
+  StageFolders folders;
+  std::string inspection;
+  bool pdf = false, print_template = false;
+};
+
+Status write_inspection(Context& context, Options options) {
+  ORBITFUSE_TRY(resolve(options.folders));
+  const fs::path out = options.folders.out;
+  ORBITFUSE_ASSIGN(const Session session, open_session(options.folders.session));
+  ORBITFUSE_ASSIGN(const auto details, inspection::read_details(options.inspection));
+  ORBITFUSE_ASSIGN(
+      const inspection::InspectionModel model,
+      inspection::inspection_of(out, session, details, context.config, context.progress));
+  const fs::path html = out / inspection::inspection_file,
+                 pdf = out / inspection::inspection_pdf_file;
+  context.result["findings"] = model.findings.size();
+  if (model.findings.empty())
+    context.console.warning(
+        "no measurement is saved in " + out.string() +
+        ": the report has no findings; save some with orbitfuse measure --save");
+  if (context.common.dry_run) {
+    context.console.info("would write " + html.string());
+    if (options.pdf) ORBITFUSE_TRY(inspection::find_browser());
+    return {};
+  }
+  ORBITFUSE_TRY(write_file_atomic(html, to_html(model)));
+  context.console.info("inspection report: " + html.string());
+  context.result["html"] = html.string();
+  if (!options.pdf) return {};
+  ORBITFUSE_TRY(inspection::print_pdf(html, pdf, context.progress));
+  context.console.info("inspection report: " + pdf.string());
+  context.result["pdf"] = pdf.string();
+  return {};
+}
+
+Status report(Context& context, const Options& options) {
+  if (options.print_template) {
+    context.console.data(std::string(inspection::details_template()));
+    context.result["template"] = inspection::details_template();
+    return {};
+  }
+  if (!options.inspection.empty()) return write_inspection(context, options);
+  if (options.pdf)
+    return fail(ErrorKind::usage, "--pdf", "without --inspection",
+                "name the details: --inspection FILE; --print-template prints one to fill in");
+  return run_stages(context, options.folders, {"report"}, Missing::leave_out);
+}
+
+}  // namespace
 
 Action add_report(CLI::App& app) {
-  const auto folders = std::make_shared<StageFolders>();
-  add_folders(app, *folders);
-  return [folders](Context& context) {
-    return run_stages(context, *folders, {"report"}, Missing::leave_out);
-  };
+  const auto options = std::make_shared<Options>();
+  add_folders(app, options->folders);
+  constexpr const char* group = "For a client (docs/inspection.md)";
+  app.add_option("--inspection", options->inspection,
+                 "Write inspection.html into the run's folder: its saved measurements as findings, "
+                 "with the details of this TOML file")
+      ->type_name("FILE")
+      ->group(group);
+  app.add_flag("--pdf", options->pdf, "And inspection.pdf, by headless Chromium")->group(group);
+  app.add_flag("--print-template", options->print_template,
+               "Print a file for --inspection, to be filled in")
+      ->group(group);
+  return [options](Context& context) { return report(context, *options); };
 }
 
 }  // namespace orbitfuse::cli

@@ -19,10 +19,10 @@
 #include "core/system/clock.hpp"
 #include "core/system/cpu.hpp"
 #include "core/system/parallel.hpp"
+#include "core/system/process.hpp"
 #include "recon/assembly/field_renderer.hpp"
 #include "recon/nerf/nerf.hpp"
 #include "recon/poses/estimate_poses.hpp"
-#include "recon/poses/sfm/process.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temp_folder.hpp"
 

@@ -64,6 +64,23 @@ tl::unexpected<Error> too_cold(const std::string& where, const CountHistogram& h
       "give --thermal-scale linear with --kelvin-per-count and --kelvin-offset");
 }
 
+/// A palette's picture or a photograph; grey that was stored as three channels is none, nor is a
+/// maker's small coloured mark in it.
+bool has_colors(const cv::Mat& image) {
+  if (image.channels() < 3) return false;
+  constexpr int clear_of_compression = 24;  // levels
+  constexpr double least_share = 0.02;
+  std::size_t colored = 0;
+  for (int y = 0; y < image.rows; ++y) {
+    const std::uint8_t* row = image.ptr<std::uint8_t>(y);
+    for (int x = 0; x < image.cols; ++x, row += image.channels()) {
+      const auto [low, high] = std::minmax({row[0], row[1], row[2]});
+      colored += high - low > clear_of_compression;
+    }
+  }
+  return static_cast<double>(colored) > least_share * static_cast<double>(image.total());
+}
+
 constexpr const char* by_themselves =
     "import files without temperatures by themselves, or give their scale: --thermal-scale linear "
     "--kelvin-per-count K --kelvin-offset K";
@@ -168,6 +185,7 @@ void ThermalDecoder::observe(const ThermalFile& file, const std::string& where) 
   ++files_;
   if (file.kind == ThermalFile::Kind::radiometric_jpeg) observe_jpeg(*file.flir);
   if (file.kind == ThermalFile::Kind::samples16) observe_samples(file, where);
+  if (file.kind == ThermalFile::Kind::gray8 && has_colors(file.image)) colored_.push_back(where);
 }
 
 void ThermalDecoder::observe_jpeg(const FlirImage& image) {
@@ -247,6 +265,16 @@ std::vector<std::string> ThermalDecoder::remarks() const {
         dji_parameters_.size() > 1
             ? fmt::format(" (and {} other settings)", dji_parameters_.size() - 1)
             : ""));
+  }
+  // Beside files with temperatures convert() refuses them.
+  if (!colored_.empty() && !has_temperatures()) {
+    list.push_back(fmt::format(
+        "{}{}: in colour, so a palette's picture or a photograph: its colours are no temperatures, "
+        "only its brightness is used; import the camera's radiometric files (or, if it is a photo, "
+        "give it with --visible)",
+        colored_.front(),
+        colored_.size() == 1 ? ""
+                             : fmt::format(" and {} more thermal files", colored_.size() - 1)));
   }
   if (!glowing_.empty()) {
     list.push_back(fmt::format(

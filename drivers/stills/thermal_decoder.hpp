@@ -97,6 +97,7 @@ class ThermalDecoder {
   CountHistogram counts_ = CountHistogram(65536),
                  centikelvin_ = CountHistogram(65536);  ///< of these
   double hottest_k_ = 0, least_kelvin_per_count_ = kelvin_per_dn;
+  std::vector<std::string> colored_;  ///< 8-bit files whose channels differ
   std::vector<std::string>
       glowing_;  ///< files of which one half is hotter than anything but a furnace
 };

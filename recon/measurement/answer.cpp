@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/measurement/answer.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <tuple>
 
 namespace orbitfuse::measurement {
 namespace {
@@ -19,6 +22,7 @@ json json_of(const FrameLine& line) {
           {"min_k", json_of(line.min_k)},
           {"max_k", json_of(line.max_k)},
           {"angle_deg", json_of(line.angle_deg)},
+          {"pixels_per_unit", json_of(line.pixels_per_unit)},
           {"weight", json_of(line.weight)},
           {"used", line.used},
           {"covered", json_of(line.covered)},
@@ -67,8 +71,26 @@ double TemperatureReading::doubtful_share() const {
   return share;
 }
 
+const FrameLine* TemperatureReading::best() const {
+  const auto rank = [](const FrameLine& line) {
+    const double fineness = std::isfinite(line.pixels_per_unit)
+                                ? line.pixels_per_unit
+                                : std::cos(line.angle_deg * std::numbers::pi / 180);
+    return std::tuple(line.used, !line.doubtful,
+                      std::isfinite(fineness) ? fineness * line.covered : 0);
+  };
+  const auto best =
+      std::max_element(frames.begin(), frames.end(),
+                       [&](const FrameLine& a, const FrameLine& b) { return rank(a) < rank(b); });
+  return best == frames.end() ? nullptr : &*best;
+}
+
 json to_json(const Answer& answer) {
   json j = {{"kind", name(answer.kind)}, {"notes", answer.notes}};
+  if (!answer.radiometry.words.empty())
+    j["radiometry"] = {{"emissivity", json_of(answer.radiometry.emissivity)},
+                       {"reflected_k", json_of(answer.radiometry.reflected_k)},
+                       {"words", answer.radiometry.words}};
   if (has_reading(answer.kind)) j["reading"] = json_of(answer.reading);
   if (answer.position) j["point"] = json_of(*answer.position);
   if (answer.normal) j["normal"] = json_of(*answer.normal);

@@ -19,10 +19,13 @@ struct FrameLine {
   Eigen::Vector2d pixel;  ///< of the spot, or of the region's middle
   double mean_k = unknown, min_k = unknown, max_k = unknown;
   double angle_deg = unknown;  ///< of the line of sight to the surface's normal; region: mean
-  double weight = 0;           ///< of all frames: 1; 0: left out
-  bool used = true;            ///< false: it shows something else than most (another surface)
-  double covered = 1;          ///< share of the region's points that it sees
-  bool doubtful = false;       ///< its pose
+  /// How finely it sees the place: pixels of the frame along a world unit of the surface, shortened
+  /// by the angle. NaN: not known (saved by an earlier version).
+  double pixels_per_unit = unknown;
+  double weight = 0;      ///< of all frames: 1; 0: left out
+  bool used = true;       ///< false: it shows something else than most (another surface)
+  double covered = 1;     ///< share of the region's points that it sees
+  bool doubtful = false;  ///< its pose
 };
 
 /// The temperature of a spot or region.
@@ -51,12 +54,24 @@ struct TemperatureReading {
   bool seen() const { return !frames.empty(); }
   /// Of the weight: frames whose pose is doubtful.
   double doubtful_share() const;
+  /// The frame that sees the place best: finest by distance and angle, most of a region, and of
+  /// those whose pose is sure, while there is one. None: no frame sees it.
+  const FrameLine* best() const;
 };
 
 /// A spot with its place.
 struct PlacedReading {
   Eigen::Vector3d position, normal;
   TemperatureReading reading;
+};
+
+/// Object parameters behind an answer's temperatures.
+struct UsedParameters {
+  /// Of all frames alike; NaN: not recorded, or not alike.
+  double emissivity = unknown, reflected_k = unknown;
+  /// "emissivity 0.95, reflected temperature 20.0 C, as recorded"; empty: nothing was asked that
+  /// has a temperature of its own.
+  std::string words;
 };
 
 struct ProfilePoint {
@@ -77,9 +92,13 @@ struct Answer {
   std::vector<Answer> of;            ///< of a difference
   double distance = unknown;         ///< world units
   std::optional<double> distance_m;  ///< where the run's scale is known
+  UsedParameters radiometry;         ///< of a difference: in its parts
   std::vector<std::string> notes;    ///< what the reader must know: nothing seen, assumptions
 };
 
 nlohmann::json to_json(const Answer& answer);
+/// What to_json() wrote, but for what stands behind the points of a profile. What is null or absent
+/// is not known. Input error naming the key that has another type.
+Result<Answer> answer_of_json(const nlohmann::json& json);
 
 }  // namespace orbitfuse::measurement

@@ -129,8 +129,9 @@ Result<std::optional<FrameReading>> read_frame(const ThermalScene& scene, std::s
   const double step_k = gradient(image, reading.pixel, options.pose_sigma_px);
   const double pose_k = step_k * options.pose_sigma_px;
   reading.gradient_k_per_px = step_k * reading.gain;
-  reading.weight = std::cos(reading.angle_deg * std::numbers::pi / 180) *
-                   (frame.doubtful() ? options.doubtful_weight : 1) /
+  const double cosine = std::cos(reading.angle_deg * std::numbers::pi / 180);
+  reading.pixels_per_unit = cosine * std::sqrt(camera.fx * camera.fy) / in_cam.z();
+  reading.weight = cosine * (frame.doubtful() ? options.doubtful_weight : 1) /
                    (options.noise_sigma_k * options.noise_sigma_k +
                     options.common_sigma_k * options.common_sigma_k + pose_k * pose_k);
   return reading;

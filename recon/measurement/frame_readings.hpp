@@ -17,6 +17,7 @@ struct FrameReading {
   Eigen::Vector2d pixel;  ///< in the frame, as in Camera
   double temperature_k = 0;
   double angle_deg = 0;          ///< of the line of sight to the surface's normal
+  double pixels_per_unit = 0;    ///< FrameLine::pixels_per_unit
   double gradient_k_per_px = 0;  ///< steepest within a pose error's reach
   double gain = 1;               ///< of changed object parameters (Reradiometry)
   double weight = 0;             ///< against the other frames; all of a point's sum to 1

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/numeric/percent.hpp"
 #include "recon/assembly/looked_at.hpp"
 #include "recon/measurement/frame_readings.hpp"
 #include "recon/measurement/region.hpp"
@@ -86,17 +87,17 @@ void say_weak(const TemperatureReading& reading, std::vector<std::string>& notes
   if (!reading.seen()) return;
   const int unseen = reading.points - reading.seen_points;
   if (unseen > 0)
-    notes.push_back(fmt::format("{}no thermal frame sees {} of {} points ({:.0f} % of the area)",
-                                whose, unseen, reading.points, 100 * (1 - reading.seen_share)));
+    notes.push_back(fmt::format("{}no thermal frame sees {} of {} points ({} of the area)", whose,
+                                unseen, reading.points, percent(1 - reading.seen_share)));
   if (!reading.outliers.empty()) notes.push_back(whose + reading.outliers);
   const auto doubtful = std::count_if(reading.frames.begin(), reading.frames.end(),
                                       [](const FrameLine& line) { return line.doubtful; });
   if (doubtful == static_cast<long>(reading.frames.size()))
     notes.push_back(whose + "only frames with doubtful poses see it");
   else if (doubtful > 0)
-    notes.push_back(fmt::format("{}{} of {} frames have doubtful poses, {:.0f} % of the weight",
-                                whose, doubtful, reading.frames.size(),
-                                100 * reading.doubtful_share()));
+    notes.push_back(fmt::format("{}{} of {} frames have doubtful poses, {} of the weight", whose,
+                                doubtful, reading.frames.size(),
+                                percent(reading.doubtful_share())));
 }
 
 void say(const TemperatureReading& reading, std::vector<std::string>& notes) {
@@ -315,6 +316,8 @@ Result<Answer> measure(const ThermalScene& scene, const Request& request,
   ORBITFUSE_ASSIGN(Answer answer, dispatch(scene, request, radiometry, progress));
   answer.kind = request.kind;
   if (!radiometry.assumption().empty()) answer.notes.push_back(radiometry.assumption());
+  if (request.kind != Kind::difference && request.kind != Kind::distance)
+    answer.radiometry = used_parameters(scene.frames(), request.object, request.recorded);
   return answer;
 }
 

@@ -22,14 +22,47 @@ tl::unexpected<Error> damaged(const std::filesystem::path& file, const std::stri
   return fail(ErrorKind::input, file.string(), found, put_away);
 }
 
-Result<SavedMeasurement> parse(const json& j, const std::string& where) {
+/// Earlier versions took more places at once. What was found stays; asked again, it is fewer.
+bool fit_count(json& request) {
+  bool fitted = false;
+  if (!request.is_object()) return fitted;
+  if (const auto count = request.find("count");
+      count != request.end() && count->is_number_integer() && *count > most_places) {
+    *count = most_places;
+    fitted = true;
+  }
+  if (const auto of = request.find("of"); of != request.end() && of->is_array())
+    for (json& part : *of) fitted = fit_count(part) || fitted;
+  return fitted;
+}
+
+Status read_words(const json& j, const std::string& where, SavedMeasurement& saved) {
+  for (const auto& [key, words] : {std::pair("remark", &SavedMeasurement::remark),
+                                   std::pair("component", &SavedMeasurement::component),
+                                   std::pair("reference", &SavedMeasurement::reference)}) {
+    if (!j.contains(key)) continue;
+    if (!j[key].is_string())
+      return fail(ErrorKind::input, where + "." + key, "not a text", put_away);
+    saved.*words = j[key].get<std::string>();
+  }
+  return {};
+}
+
+Result<SavedMeasurement> parse(const json& j, const std::string& where,
+                               std::vector<std::string>& notes) {
   SavedMeasurement saved;
   if (!j.is_object() || !j.contains("name") || !j["name"].is_string() || j["name"] == "")
     return fail(ErrorKind::input, where, "no name in it", put_away);
   saved.name = j["name"];
   if (j.contains("created") && j["created"].is_string()) saved.created = j["created"];
   if (!j.contains("request")) return fail(ErrorKind::input, where, "no request in it", put_away);
-  const auto request = request_of_json(j["request"]);
+  json asked = j["request"];
+  if (fit_count(asked))
+    notes.push_back(
+        fmt::format("{} '{}': asked for more than {} places, as earlier versions "
+                    "could; all that were found are kept",
+                    where, saved.name, most_places));
+  const auto request = request_of_json(asked);
   if (!request)
     return fail(ErrorKind::input, where + ": " + request.error().where, request.error().found,
                 put_away);
@@ -37,16 +70,21 @@ Result<SavedMeasurement> parse(const json& j, const std::string& where) {
   if (!j.contains("answer") || !j["answer"].is_object())
     return fail(ErrorKind::input, where, "no answer in it", put_away);
   saved.answer = j["answer"];
+  ORBITFUSE_TRY(read_words(j, where, saved));
   return saved;
 }
 
 }  // namespace
 
 json to_json(const SavedMeasurement& saved) {
-  return {{"name", saved.name},
-          {"created", saved.created},
-          {"request", to_json(saved.request)},
-          {"answer", saved.answer}};
+  json entry = {{"name", saved.name},
+                {"created", saved.created},
+                {"request", to_json(saved.request)},
+                {"answer", saved.answer}};
+  if (!saved.remark.empty()) entry["remark"] = saved.remark;
+  if (!saved.component.empty()) entry["component"] = saved.component;
+  if (!saved.reference.empty()) entry["reference"] = saved.reference;
+  return entry;
 }
 
 const SavedMeasurement* Measurements::find(const std::string& name) const {
@@ -55,21 +93,26 @@ const SavedMeasurement* Measurements::find(const std::string& name) const {
   return at == list.end() ? nullptr : &*at;
 }
 
-std::string Measurements::put(SavedMeasurement measurement) {
+Kept Measurements::put(SavedMeasurement measurement) {
   const std::string_view kind = measurement::name(measurement.request.kind);
   for (int i = 1; measurement.name.empty(); ++i) {
     const std::string name = fmt::format("{} {}", kind, i);
     if (find(name) == nullptr) measurement.name = name;
   }
-  std::string name = measurement.name;
-  measurement.request.name = name;
+  measurement.request.name = measurement.name;
+  Kept kept{measurement.name, false};
   const auto at = std::find_if(list.begin(), list.end(),
-                               [&](const SavedMeasurement& m) { return m.name == name; });
-  if (at == list.end())
+                               [&](const SavedMeasurement& m) { return m.name == kept.name; });
+  if (at == list.end()) {
     list.push_back(std::move(measurement));
-  else
-    *at = std::move(measurement);
-  return name;
+    return kept;
+  }
+  for (std::string SavedMeasurement::*words :
+       {&SavedMeasurement::remark, &SavedMeasurement::component, &SavedMeasurement::reference})
+    if ((measurement.*words).empty()) measurement.*words = (*at).*words;
+  *at = std::move(measurement);
+  kept.replaced = true;
+  return kept;
 }
 
 Result<Measurements> load_measurements(const std::filesystem::path& file,
@@ -96,7 +139,7 @@ Result<Measurements> load_measurements(const std::filesystem::path& file,
   for (const json& entry : j["measurements"]) {
     const std::string where =
         fmt::format("{}: measurements[{}]", file.string(), result.list.size());
-    ORBITFUSE_ASSIGN(SavedMeasurement saved, parse(entry, where));
+    ORBITFUSE_ASSIGN(SavedMeasurement saved, parse(entry, where, result.notes));
     if (!names.insert(saved.name).second)
       return damaged(file, "two measurements named '" + saved.name + "'");
     result.list.push_back(std::move(saved));
@@ -104,16 +147,16 @@ Result<Measurements> load_measurements(const std::filesystem::path& file,
   return result;
 }
 
-Result<std::string> add_measurement(const std::filesystem::path& file, const std::string& identity,
-                                    SavedMeasurement measurement) {
+Result<Kept> add_measurement(const std::filesystem::path& file, const std::string& identity,
+                             SavedMeasurement measurement) {
   FolderChangeLock lock;
   ORBITFUSE_TRY(lock.acquire(file.parent_path()));
   ORBITFUSE_ASSIGN(Measurements all, load_measurements(file, identity));
   if (measurement.created.empty())
     measurement.created = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
-  std::string name = all.put(std::move(measurement));
+  Kept kept = all.put(std::move(measurement));
   ORBITFUSE_TRY(save_measurements(file, all));
-  return name;
+  return kept;
 }
 
 Status save_measurements(const std::filesystem::path& file, const Measurements& measurements) {

@@ -20,6 +20,15 @@ struct SavedMeasurement {
   std::string created;  ///< ISO 8601 UTC
   Request request;
   nlohmann::json answer;  ///< to_json(Answer) of that time
+  /// For reports, each may be empty: what was noticed, what it is of, and the name of the
+  /// measurement that it is compared with.
+  std::string remark = {}, component = {}, reference = {};
+};
+
+/// What became of one that was added.
+struct Kept {
+  std::string name;
+  bool replaced = false;  ///< one of that name was there before
 };
 
 /// {"name", "created", "request", "answer"}.
@@ -28,11 +37,13 @@ nlohmann::json to_json(const SavedMeasurement& saved);
 struct Measurements {
   std::string identity;  ///< ThermalScene::identity of the run that they belong to
   std::vector<SavedMeasurement> list;
+  std::vector<std::string> notes;  ///< what was read otherwise than it stands in the file
 
   const SavedMeasurement* find(const std::string& name) const;
-  /// Adds it, or takes the place of the one of that name. Without a name it gets the first free of
-  /// "spot 1", "spot 2" ...; returns the name.
-  std::string put(SavedMeasurement measurement);
+  /// Adds it, or takes the place of the one of that name, whose remark, component and reference
+  /// stay where the new one has none. Without a name it gets the first free of "spot 1", "spot 2"
+  /// ...
+  Kept put(SavedMeasurement measurement);
 };
 
 /// An absent file is an empty list. Input errors, each naming the file and what to do: cut or
@@ -41,9 +52,9 @@ struct Measurements {
 Result<Measurements> load_measurements(const std::filesystem::path& file,
                                        const std::string& identity);
 /// Loads, puts (Measurements::put) and saves, as one step: programs that do so at once wait for
-/// each other. `created` is set to now where it is empty. Returns the name. Errors: both's.
-Result<std::string> add_measurement(const std::filesystem::path& file, const std::string& identity,
-                                    SavedMeasurement measurement);
+/// each other. `created` is set to now where it is empty. Errors: both's.
+Result<Kept> add_measurement(const std::filesystem::path& file, const std::string& identity,
+                             SavedMeasurement measurement);
 /// Atomic: readers see the old list or the new one. Errors: input (larger than what is read again),
 /// device (it can't be written); the file is left as it is then.
 Status save_measurements(const std::filesystem::path& file, const Measurements& measurements);

@@ -109,7 +109,7 @@ Status read_all(const ThermalScene& scene, const std::vector<SurfacePoint>& poin
 
 /// What one frame saw of a region.
 struct FrameSum {
-  double area = 0, temperature = 0, angle = 0;  // of all points that it sees
+  double area = 0, temperature = 0, angle = 0, fineness = 0;  // of all points that it sees
   double used_area = 0, offset = 0, gradient2 = 0, weight = 0, gain = 0;  // of those it counts in
   double min_k = std::numeric_limits<double>::infinity(), max_k = -min_k;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
@@ -118,6 +118,7 @@ struct FrameSum {
     area += point_area;
     temperature += point_area * r.temperature_k;
     angle += point_area * r.angle_deg;
+    fineness += point_area * r.pixels_per_unit;
     pixel += point_area * r.pixel;
     min_k = std::min(min_k, r.temperature_k);
     max_k = std::max(max_k, r.temperature_k);
@@ -167,6 +168,7 @@ FrameLine line_of(const ThermalScene& scene, std::size_t frame, const FrameSum& 
           .min_k = s.min_k,
           .max_k = s.max_k,
           .angle_deg = s.angle / s.area,
+          .pixels_per_unit = s.fineness / s.area,
           .weight = s.weight / all_weight,
           .used = s.used_area > 0,
           .covered = s.area / all_area,
@@ -198,6 +200,7 @@ Result<TemperatureReading> read_spot(const ThermalScene& scene, const SurfacePoi
                              .min_k = r.temperature_k,
                              .max_k = r.temperature_k,
                              .angle_deg = r.angle_deg,
+                             .pixels_per_unit = r.pixels_per_unit,
                              .weight = r.weight,
                              .used = r.used,
                              .doubtful = scene.frames()[r.frame].doubtful()});

@@ -102,7 +102,7 @@ Status Request::validate() const {
       return check_polygon(*this);
     case Kind::hottest:
     case Kind::coldest:
-      ORBITFUSE_TRY(check("count", count, from_to(1, 100)));
+      ORBITFUSE_TRY(check("count", count, from_to(1, most_places)));
       return check("apart", apart, from_to(0, max_coordinate));
     case Kind::difference:
       if (of.size() != 2)

@@ -31,6 +31,9 @@ struct OrientedBox {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
 };
 
+/// Of hottest and coldest.
+inline constexpr int most_places = 100;
+
 /// What is asked; the same from the command line and from JSON (docs/formats.md).
 struct Request {
   Kind kind = Kind::spot;

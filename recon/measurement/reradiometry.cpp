@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/temperature.hpp"
+
 namespace orbitfuse::measurement {
 namespace {
 
@@ -76,6 +78,65 @@ double Reradiometry::gain(std::size_t frame, double kelvin) const {
 double Reradiometry::field_k(double kelvin) const {
   if (!changes()) return kelvin;
   return alike_ ? changed(frames_.front(), kelvin) : std::numeric_limits<double>::quiet_NaN();
+}
+
+namespace {
+
+/// What frames have of one parameter.
+struct Range {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  bool all = true;  ///< every frame has it
+  void add(double value) { low = std::min(low, value), high = std::max(high, value); }
+  double same() const { return all && low == high ? low : unknown; }
+};
+
+std::string words_of(const Range& r, const char* what, int digits, const char* unit,
+                     const char* source) {
+  if (!r.all) return fmt::format("{} not recorded", what);
+  return r.low == r.high ? fmt::format("{} {:.{}f}{}{}", what, r.low, digits, unit, source)
+                         : fmt::format("{} {:.{}f} to {:.{}f}{}{}", what, r.low, digits, r.high,
+                                       digits, unit, source);
+}
+
+}  // namespace
+
+UsedParameters used_parameters(const std::vector<ThermalFrame>& frames,
+                               const ObjectParameterOverrides& object,
+                               const ObjectParameterOverrides& recorded) {
+  Range emissivity, reflected_k;
+  const auto add = [](Range& range, const std::optional<double>& asked,
+                      const std::optional<double>& known) {
+    if (asked || known)
+      range.add(asked ? *asked : *known);
+    else
+      range.all = false;
+  };
+  for (const ThermalFrame& frame : frames) {
+    const auto known = [&](double ObjectParameters::*of) {
+      return frame.radiometry ? std::optional(frame.radiometry->object.*of) : std::nullopt;
+    };
+    const auto e = known(&ObjectParameters::emissivity);
+    const auto t = known(&ObjectParameters::reflected_k);
+    add(emissivity, object.emissivity, e ? e : recorded.emissivity);
+    add(reflected_k, object.reflected_temperature_k, t ? t : recorded.reflected_temperature_k);
+  }
+  UsedParameters used;
+  if (frames.empty()) return used;
+  used.emissivity = emissivity.same();
+  used.reflected_k = reflected_k.same();
+  if (!emissivity.all && !reflected_k.all) {
+    used.words = "emissivity not recorded: temperatures as the camera gave them";
+    return used;
+  }
+  Range celsius = reflected_k;
+  celsius.low = celsius_from_kelvin(celsius.low);
+  celsius.high = celsius_from_kelvin(celsius.high);
+  used.words =
+      words_of(emissivity, "emissivity", 2, "", object.emissivity ? " as asked" : " as recorded") +
+      ", " +
+      words_of(celsius, "reflected temperature", 1, " C",
+               object.reflected_temperature_k ? " as asked" : " as recorded");
+  return used;
 }
 
 }  // namespace orbitfuse::measurement

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "recon/measurement/answer.hpp"
 #include "recon/measurement/thermal_scene.hpp"
 
 namespace orbitfuse::measurement {
@@ -48,5 +49,10 @@ class Reradiometry {
   bool alike_ = true;
   std::string assumption_;
 };
+
+/// The object parameters that temperatures stand for, with `object` and `recorded` as above.
+UsedParameters used_parameters(const std::vector<ThermalFrame>& frames,
+                               const ObjectParameterOverrides& object,
+                               const ObjectParameterOverrides& recorded);
 
 }  // namespace orbitfuse::measurement

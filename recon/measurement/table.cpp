@@ -27,21 +27,27 @@ struct Row {
   std::optional<Eigen::Vector3d> position = {};
   const TemperatureReading* reading = nullptr;
   double along = unknown, distance = unknown, distance_m = unknown, difference_k = unknown,
-         difference_uncertainty_k = unknown;
+         difference_uncertainty_k = unknown, emissivity = unknown;
   std::string note = {};
 };
 
 std::string line(const Row& row) {
   static const TemperatureReading none;
   const TemperatureReading& r = row.reading != nullptr ? *row.reading : none;
+  const FrameLine* best = r.best();
   const auto at = [&](int i) { return row.position ? number((*row.position)[i], 5) : ""; };
-  return fmt::format(
-      "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}", quoted(row.name), row.kind,
-      celsius(r.temperature_k), number(r.uncertainty_k), celsius(r.field_k), celsius(r.mean_k),
-      celsius(r.min_k), celsius(r.max_k), number(r.standard_deviation_k), number(r.spread_k),
-      row.reading != nullptr ? fmt::format("{}", r.frames.size()) : "", number(r.angle_deg, 1),
-      at(0), at(1), at(2), number(row.along, 5), number(row.distance, 5), number(row.distance_m, 4),
-      number(row.difference_k), number(row.difference_uncertainty_k), quoted(row.note));
+  return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                     quoted(row.name), row.kind, celsius(r.temperature_k), number(r.uncertainty_k),
+                     celsius(r.field_k), celsius(r.mean_k), celsius(r.min_k), celsius(r.max_k),
+                     number(r.standard_deviation_k), number(r.spread_k),
+                     row.reading != nullptr ? fmt::format("{}", r.frames.size()) : "",
+                     number(r.angle_deg, 1), at(0), at(1), at(2), number(row.along, 5),
+                     number(row.distance, 5), number(row.distance_m, 4), number(row.difference_k),
+                     number(row.difference_uncertainty_k),
+                     best != nullptr ? quoted(best->frame) : "",
+                     number(best != nullptr ? best->pixel.x() : unknown, 1),
+                     number(best != nullptr ? best->pixel.y() : unknown, 1), number(row.emissivity),
+                     quoted(row.note));
 }
 
 std::string joined(const std::vector<std::string>& notes) {
@@ -55,13 +61,17 @@ std::string joined(const std::vector<std::string>& notes) {
 std::string csv_header() {
   return "name,kind,temperature_c,uncertainty_k,field_c,mean_c,min_c,max_c,standard_deviation_k,"
          "spread_k,frames,angle_deg,x,y,z,along,distance,distance_m,difference_k,"
-         "difference_uncertainty_k,note";
+         "difference_uncertainty_k,best_view,best_u,best_v,emissivity,note";
 }
 
 std::vector<std::string> csv_rows(const std::string& name, const Answer& answer) {
   const std::string kind(measurement::name(answer.kind));
   std::vector<std::string> rows;
-  Row row{.name = name, .kind = kind, .position = answer.position, .note = joined(answer.notes)};
+  Row row{.name = name,
+          .kind = kind,
+          .position = answer.position,
+          .emissivity = answer.radiometry.emissivity,
+          .note = joined(answer.notes)};
   switch (answer.kind) {
     case Kind::hottest:
     case Kind::coldest:
@@ -70,6 +80,7 @@ std::vector<std::string> csv_rows(const std::string& name, const Answer& answer)
                              .kind = kind,
                              .position = answer.spots[i].position,
                              .reading = &answer.spots[i].reading,
+                             .emissivity = row.emissivity,
                              .note = row.note}));
       return rows;
     case Kind::difference:
@@ -88,7 +99,8 @@ std::vector<std::string> csv_rows(const std::string& name, const Answer& answer)
       row.reading = &answer.reading;
       rows.push_back(line(row));
       for (const ProfilePoint& point : answer.profile) {
-        Row at{.name = name, .kind = "line point", .along = point.along};
+        Row at{
+            .name = name, .kind = "line point", .along = point.along, .emissivity = row.emissivity};
         if (point.at) at.position = point.at->position, at.reading = &point.at->reading;
         rows.push_back(line(at));
       }
@@ -108,7 +120,10 @@ std::string described(const TemperatureReading& r) {
       r.frames.size() == 1 ? "" : "s", celsius_from_kelvin(r.min_k), celsius_from_kelvin(r.max_k));
   if (std::isfinite(r.field_k))
     text += fmt::format("; field {:.2f}", celsius_from_kelvin(r.field_k));
-  return text + fmt::format("; seen {:.0f} deg from the normal)", r.angle_deg);
+  text += fmt::format("; seen {:.0f} deg from the normal)", r.angle_deg);
+  const FrameLine* best = r.best();
+  return text + fmt::format(", best seen at {},{:.1f},{:.1f};", best->frame, best->pixel.x(),
+                            best->pixel.y());
 }
 
 std::vector<std::string> described(const Answer& answer) {
@@ -137,6 +152,7 @@ std::vector<std::string> described(const Answer& answer) {
     default:
       lines.push_back(described(answer.reading) + (answer.position ? at(*answer.position) : ""));
   }
+  if (!answer.radiometry.words.empty()) lines.push_back(answer.radiometry.words);
   for (const std::string& note : answer.notes) lines.push_back("note: " + note);
   return lines;
 }

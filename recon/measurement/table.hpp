@@ -18,6 +18,10 @@ std::vector<std::string> csv_rows(const std::string& name, const Answer& answer)
 
 /// For people, e.g. "36.12 C +- 0.31 (14 frames 35.90 to 36.41; field 36.05; 31 deg)".
 std::string described(const TemperatureReading& reading);
+/// What "+-" stands for in these, as a sentence's end.
+inline constexpr const char* uncertainty_words =
+    "covers the error in 90 of 100 cases, apart from the camera's calibration and the object "
+    "parameters";
 /// The whole answer, a line each.
 std::vector<std::string> described(const Answer& answer);
 

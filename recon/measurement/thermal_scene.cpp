@@ -127,6 +127,12 @@ Result<const PosedView*> ThermalScene::view(const std::string& name) const {
   std::vector<std::string> known;
   for (const ThermalFrame& frame : parts_.frames) known.push_back(frame.view.name);
   for (const PosedView& view : parts_.views) known.push_back(view.name);
+  if (std::find(parts_.unposed.begin(), parts_.unposed.end(), name) != parts_.unposed.end())
+    return fail(ErrorKind::input, "view " + name,
+                "a frame of the session that this run has found no pose for: nothing relates its "
+                "pixels to the scene",
+                "choose a posed view that shows the place, e.g. " + alike(name, known) +
+                    ", or give the place as --point; the run's report says why it has no pose");
   return fail(ErrorKind::input, "view " + name, "no view of this run has that name",
               "name a rendered or a posed view, e.g. " + alike(name, known));
 }

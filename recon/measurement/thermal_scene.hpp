@@ -40,6 +40,8 @@ struct SceneParts {
   /// Kelvin of frames[i], CV_32FC1 of its camera's size, NaN = dead pixel.
   std::function<Result<cv::Mat>(const ThermalFrame&)> read_frame;
   std::vector<PosedView> views;  ///< others that a pixel may be given in: rendered, visible
+  /// Frames of the session that have no pose, so that nothing can be measured in them.
+  std::vector<std::string> unposed = {};
   std::vector<PosedView>
       orbit;  ///< cameras that say where the object is (recon/assembly/looked_at)
   std::optional<double> metres_per_unit;  ///< none: the run's scale is unknown

@@ -67,6 +67,7 @@ const std::map<std::string, Floors> floors_of{
       {"report"},
       {"stages"},
       {"eval", "view"},
+      {"inspection"},
       {"cli"},
       {"verbs"}}},
     {"drivers/aravis", {}},

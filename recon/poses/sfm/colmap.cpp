@@ -9,7 +9,7 @@
 #include "core/formats/colmap_model.hpp"
 #include "core/system/file_io.hpp"
 #include "core/system/parallel.hpp"
-#include "recon/poses/sfm/process.hpp"
+#include "core/system/process.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -110,7 +110,14 @@ Result<ColmapProject> ColmapProject::create(const fs::path& folder, const fs::pa
 Status ColmapProject::run(std::vector<std::string> arguments, const Progress& progress) const {
   arguments.insert(arguments.begin(), options_.command);
   ORBITFUSE_ASSIGN(const int status,
-                   run_process(arguments, folder_ / "colmap.log", "poses.colmap", progress));
+                   run_process(arguments, folder_ / "colmap.log", "poses.colmap", progress)
+                       .map_error([](Error error) {
+                         if (error.kind == ErrorKind::unavailable)
+                           error.remedy =
+                               "install it (Debian: apt-get install colmap), put it on PATH or "
+                               "name it with --set poses.colmap=FILE";
+                         return error;
+                       }));
   static_cast<void>(status);  // never believed: callers count what was written
   return {};
 }

@@ -10,6 +10,7 @@
 
 #include "tests/app/cli/program.hpp"
 #include "tests/app/cli/session_fixture.hpp"
+#include "tests/app/cli/small_run.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
@@ -24,12 +25,7 @@ class Measure : public testing::Test {
   static void SetUpTestSuite() {
     folder = std::make_unique<test::TempFolder>();
     write_fixture_session(session());
-    std::vector<std::string> words = {"run", session().string(), "--out", out().string()};
-    for (const char* set : {"train.visible.iterations=300", "train.thermal.iterations=300",
-                            "train.visible.eval_count=0", "train.thermal.eval_count=0",
-                            "render.views=2", "render.width_px=64", "fuse.methods=[\"heat\"]"})
-      words.insert(words.end(), {"--set", set});
-    const Outcome run = orbitfuse_program(words);
+    const Outcome run = orbitfuse_program(small_run(session(), out()));
     ASSERT_EQ(run.code, 0) << run.err;
   }
   static void TearDownTestSuite() { folder.reset(); }
@@ -81,6 +77,9 @@ TEST_F(Measure, RenderedAndVisibleViewsNamePlacesToo) {
     const Outcome spot = measure({"--pixel", pixel});
     EXPECT_EQ(spot.code, 0) << spot.err;
     EXPECT_THAT(spot.out, HasSubstr(" C +- "));
+    EXPECT_THAT(spot.out, HasSubstr("), best seen at thermal/0000"));
+    EXPECT_THAT(spot.out, HasSubstr("emissivity not recorded"));
+    EXPECT_THAT(spot.err, HasSubstr("+- covers the error in 90 of 100 cases"));
   }
   EXPECT_EQ(measure({"--distance", "000,32,24", "001,32,24"}).code, 0);
   const Outcome line = measure({"--line", "000,28,24", "000,36,24", "--profile", "5", "--csv"});
@@ -99,6 +98,8 @@ TEST_F(Measure, WhatIsSavedIsListedAndStandsForItsPlace) {
   const Outcome difference = measure({"--difference", "hottest 1", "front", "--json"});
   ASSERT_EQ(difference.code, 0) << difference.err;
   EXPECT_GE(difference.result()["answer"]["difference_k"].get<double>(), -1);
+  EXPECT_THAT(measure({"--pixel", "000,32,24", "--name", "front", "--save"}).err,
+              HasSubstr("in place of the one of that name"));
   const std::string before = test::get(file());
   ASSERT_EQ(measure({"--hottest", "1"}).code, 0);
   EXPECT_EQ(test::get(file()), before) << "without --save nothing is written";
@@ -131,6 +132,7 @@ TEST_F(Measure, WhatIsWrongIsNamedWithTheRemedy) {
   expect_refused({"--hottest", "0"}, 2, "count");
   expect_refused({"--hottest", "1", "--coldest", "1"}, 2, "together with");
   expect_refused({"--request", "{\"kind\":\"spit\"}"}, 2, "spit");
+  expect_refused({"--hottest", "1", "--remark", "warm"}, 2, "without --save");
 }
 
 TEST_F(Measure, ASessionWithoutRadiometryRefusesAnEmissivityByName) {

@@ -43,6 +43,7 @@ Model full_model() {
   m.registration_note = "skipped";
   m.tables.push_back(
       {"Fusion", {{"method", ""}, {"Qabf", "Xydeas & Petrovic"}}, {{"ms-srif", "0.65"}}});
+  m.measurements = {"", {{"Measurement", ""}, {"°C", "mean <of> frames"}}, {{"valve <1>", "36.1"}}};
   pipeline::StageStatus ran;
   ran.stage = "poses_visible";
   ran.state = pipeline::StageState::ran;
@@ -62,7 +63,8 @@ TEST(Report, ShowsEverythingItIsGiven) {
   for (const char* text :
        {"container &lt;1&gt;", "24 of 24", "0.0 °C", "50.0 °C", "20 of 24 views", "no initial pair",
         "record more", "Xydeas &amp; Petrovic", "0.65", "12.5 s", "saved 200 s", "12 of 24 posed",
-        "one &lt;warning&gt;", "id=\"swipe\"", "kelvin_per_count"})
+        "one &lt;warning&gt;", "id=\"swipe\"", "kelvin_per_count", "Saved measurements",
+        "valve &lt;1&gt;", "mean &lt;of&gt; frames"})
     EXPECT_THAT(html, HasSubstr(text));
 }
 

@@ -4,9 +4,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <map>
+#include <opencv2/imgproc.hpp>
 #include <set>
 #include <sstream>
 
@@ -223,6 +225,31 @@ TEST_F(ImportTest, SixteenBitIsCentikelvinAndEightBitHasNoTemperatures) {
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_FALSE(report->has_temperatures);
   EXPECT_TRUE(report->session.frames.at(0).thermal_is_gray);
+}
+
+TEST_F(ImportTest, ColouredThermalPicturesAreNamed) {
+  const auto warns = [&](const std::string& what) {
+    fs::remove_all(folder / "session");
+    const auto report = import();
+    EXPECT_TRUE(report) << report.error().message();
+    return report && std::any_of(report->warnings.begin(), report->warnings.end(),
+                                 [&](const std::string& w) { return w.find(what) != w.npos; });
+  };
+  cv::Mat gray(30, 40, CV_8UC1), colors;
+  for (int i = 0; i < 1200; ++i)
+    gray.at<std::uint8_t>(i / 40, i % 40) = static_cast<std::uint8_t>(i / 5);
+  cv::merge(std::vector<cv::Mat>{gray, gray, gray}, colors);
+  ASSERT_TRUE(write_png(folder / "in/same.png", colors));
+  options.thermal = {folder / "in/same.png"};
+  EXPECT_FALSE(warns("in colour")) << "grey in three channels";
+  colors(cv::Rect(0, 0, 4, 4)).setTo(cv::Scalar(0, 0, 255));
+  ASSERT_TRUE(write_png(folder / "in/logo.png", colors));
+  options.thermal = {folder / "in/logo.png"};
+  EXPECT_FALSE(warns("in colour")) << "a small mark";
+  cv::applyColorMap(gray, colors, cv::COLORMAP_INFERNO);
+  ASSERT_TRUE(write_png(folder / "in/palette.png", colors));
+  options.thermal = {folder / "in/same.png", folder / "in/palette.png"};
+  EXPECT_TRUE(warns("palette.png: in colour"));
 }
 
 TEST_F(ImportTest, CountsStayWithTheirFrameWhereFilesShareAName) {

@@ -40,20 +40,31 @@ class MeasurementFile : public testing::Test {
 
 TEST_F(MeasurementFile, HoldsWhatWasPut) {
   EXPECT_TRUE(load_measurements(file, "run a")->list.empty()) << "an absent file is an empty list";
-  EXPECT_EQ(add_measurement(file, "run a", spot("")).value(), "spot 1");
-  EXPECT_EQ(add_measurement(file, "run a", spot("")).value(), "spot 2");
-  EXPECT_EQ(add_measurement(file, "run a", spot("a \"valve\", hot\n")).value(),
+  SavedMeasurement first = spot("");
+  first.remark = "loose";
+  first.component = "clamp";
+  first.reference = "spot 2";
+  EXPECT_EQ(add_measurement(file, "run a", first).value().name, "spot 1");
+  EXPECT_EQ(add_measurement(file, "run a", spot("")).value().name, "spot 2");
+  EXPECT_EQ(add_measurement(file, "run a", spot("a \"valve\", hot\n")).value().name,
             "a \"valve\", hot\n");
   SavedMeasurement again = spot("spot 1");
   again.answer["reading"]["temperature_k"] = 310;
-  EXPECT_TRUE(add_measurement(file, "run a", again));
+  again.remark = "tightened";
+  const auto kept = add_measurement(file, "run a", again);
+  ASSERT_TRUE(kept);
+  EXPECT_TRUE(kept->replaced) << "the caller can say so";
   const auto loaded = load_measurements(file, "run a");
   ASSERT_TRUE(loaded) << loaded.error().message();
   ASSERT_EQ(loaded->list.size(), 3u);
   EXPECT_EQ(loaded->list[0].answer["reading"]["temperature_k"], 310);
   EXPECT_EQ(loaded->list[0].created.size(), 20u);
   EXPECT_EQ(std::get<Eigen::Vector3d>(loaded->list[2].request.places.at(0)).z(), 3);
+  EXPECT_EQ(loaded->list[0].remark, "tightened");
+  EXPECT_EQ(loaded->list[0].component, "clamp") << "measured again, it is still of the clamp";
+  EXPECT_EQ(loaded->list[0].reference, "spot 2");
   EXPECT_EQ(loaded->find("none"), nullptr);
+  EXPECT_TRUE(loaded->notes.empty());
 }
 
 TEST_F(MeasurementFile, DamageIsNamedAndNothingIsLost) {
@@ -80,6 +91,27 @@ TEST_F(MeasurementFile, DamageIsNamedAndNothingIsLost) {
   j = json::parse(whole);
   j.erase("run");
   expect_refused(j.dump(), "no run");
+}
+
+TEST_F(MeasurementFile, MorePlacesThanAreMeasuredNowAreReadAndNamed) {
+  SavedMeasurement many = spot("many");
+  many.request.kind = Kind::hottest;
+  many.request.places.clear();
+  many.answer = {{"kind", "hottest"}, {"spots", json::array()}};
+  ASSERT_TRUE(add_measurement(file, "run a", many));
+  json j = json::parse(test::get(file));
+  j["measurements"][0]["request"]["count"] = 250;
+  test::put(file, j.dump());
+  const auto loaded = load_measurements(file, "run a");
+  ASSERT_TRUE(loaded) << loaded.error().message();
+  EXPECT_EQ(loaded->list.at(0).request.count, most_places);
+  ASSERT_EQ(loaded->notes.size(), 1u);
+  EXPECT_THAT(loaded->notes[0], HasSubstr("measurements[0] 'many'"));
+  j["measurements"][0]["request"]["count"] = -3;
+  expect_refused(j.dump(), "count");
+  j["measurements"][0]["request"]["count"] = 5;
+  j["measurements"][0]["remark"] = 7;
+  expect_refused(j.dump(), "not a text");
 }
 
 TEST_F(MeasurementFile, AnotherRunsAreNotTaken) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/sfm/process.hpp"
+#include "core/system/process.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/sfm/process.hpp"
+#include "core/system/process.hpp"
 
 #include <fcntl.h>
 #include <signal.h>
@@ -40,8 +40,7 @@ Result<pid_t> start(const std::vector<std::string>& command, const std::filesyst
   if (error != 0)
     return fail(ErrorKind::unavailable, command.front(),
                 fmt::format("cannot be started: {}", std::strerror(error)),
-                "install it (Debian: apt-get install colmap), put it on PATH or name it with "
-                "--set poses.colmap=FILE");
+                "install it, or put it on PATH");
   return pid;
 }
 
