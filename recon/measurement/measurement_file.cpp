@@ -134,6 +134,17 @@ Result<std::string> add_measurement(const std::filesystem::path& file, const std
   return name;
 }
 
+Status remove_measurement(const std::filesystem::path& file, const std::string& identity,
+                          const std::string& name) {
+  ChangeLock lock;
+  ORBITFUSE_TRY(lock.acquire(file));
+  ORBITFUSE_ASSIGN(Measurements all, load_measurements(file, identity));
+  if (std::erase_if(all.list, [&](const SavedMeasurement& m) { return m.name == name; }) == 0)
+    return fail(ErrorKind::input, file.string(), "no measurement named '" + name + "'",
+                "look at what is saved: another program may have removed it");
+  return save_measurements(file, all);
+}
+
 Status save_measurements(const std::filesystem::path& file, const Measurements& measurements) {
   json list = json::array();
   for (const SavedMeasurement& saved : measurements.list)

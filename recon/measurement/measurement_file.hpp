@@ -41,6 +41,10 @@ Result<Measurements> load_measurements(const std::filesystem::path& file,
 /// each other. `created` is set to now where it is empty. Returns the name. Errors: both's.
 Result<std::string> add_measurement(const std::filesystem::path& file, const std::string& identity,
                                     SavedMeasurement measurement);
+/// Loads, takes the measurement of that name out and saves, as one step. Errors: both's; input:
+/// there is none.
+Status remove_measurement(const std::filesystem::path& file, const std::string& identity,
+                          const std::string& name);
 /// Atomic: readers see the old list or the new one.
 Status save_measurements(const std::filesystem::path& file, const Measurements& measurements);
 
