@@ -92,15 +92,19 @@ int report(const std::string& out, int views, const std::string& layer) {
   }
   fmt::print(
       "{}, {} threads; {}, layer {}, {} views: median (most)\n\n"
-      "| first picture ms | {}x{} s, coarse temperatures | whole s | CPU s of the server | pictures a second while moving "
+      "| first picture ms | {}x{} s, coarse temperatures | whole s | CPU s of the server | "
+      "pictures a second while moving "
       "| of the points |\n|---|---|---|---|---|---|\n",
-      cpu_description(), thread_count(), out, layer, views, last[3].get<int>(),
-      last[4].get<int>());
-  const auto most = [](const std::vector<double>& v) { return *std::max_element(v.begin(), v.end()); };
-  fmt::print("| {:.0f} ({:.0f}) | {:.2f} ({:.2f}) | {:.2f} ({:.2f}) | {:.2f} | {:.0f} (least {:.0f}) | {:.0f} % |\n",
-             median(first), most(first), median(full) / 1e3, most(full) / 1e3, median(whole) / 1e3,
-             most(whole) / 1e3, median(cpu_s), median(rate), *std::min_element(rate.begin(), rate.end()),
-             100 * share);
+      cpu_description(), thread_count(), out, layer, views, last[3].get<int>(), last[4].get<int>());
+  const auto most = [](const std::vector<double>& v) {
+    return *std::max_element(v.begin(), v.end());
+  };
+  fmt::print(
+      "| {:.0f} ({:.0f}) | {:.2f} ({:.2f}) | {:.2f} ({:.2f}) | {:.2f} | {:.0f} (least {:.0f}) | "
+      "{:.0f} % |\n",
+      median(first), most(first), median(full) / 1e3, most(full) / 1e3, median(whole) / 1e3,
+      most(whole) / 1e3, median(cpu_s), median(rate), *std::min_element(rate.begin(), rate.end()),
+      100 * share);
   return 0;
 }
 

@@ -83,7 +83,8 @@ class ViewPeersTest : public ::testing::Test {
     ASSERT_TRUE(server->start());
   }
   std::string render_request(int viewer, int size) const {
-    json asked = {{"client", "viewer " + std::to_string(viewer)}, {"width", size}, {"height", size}};
+    json asked = {
+        {"client", "viewer " + std::to_string(viewer)}, {"width", size}, {"height", size}};
     for (const char* key : {"position", "rotation_wxyz", "fov_deg"}) asked[key] = camera.at(key);
     const std::string body = asked.dump();
     return "POST /render HTTP/1.1\r\nHost: 127.0.0.1\r\nX-OrbitFuse: 1\r\nContent-Length: " +
