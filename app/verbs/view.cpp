@@ -13,11 +13,18 @@ struct Options {
   std::string run, page = "8471", token;
 };
 
+/// Of what was stopped while it was read: there is nothing to go on with.
+Error without_resume(Error error) {
+  if (error.kind == ErrorKind::cancelled) error.remedy = "nothing was changed: open it again";
+  return error;
+}
+
 /// Serves until Ctrl-C, which is how a viewer ends: no error.
 Status view_run(Context& context, const Options& o) {
   ORBITFUSE_ASSIGN(const PageOptions page, page_options_of("--page", o.page, o.token));
-  ORBITFUSE_ASSIGN(view::FinishedRun run,
-                   view::load_finished_run(o.run, context.config, context.progress));
+  ORBITFUSE_ASSIGN(
+      view::FinishedRun run,
+      view::load_finished_run(o.run, context.config, context.progress).map_error(without_resume));
   for (const std::string& note : run.notes) context.console.warning(note);
   context.result = {{"run", o.run}, {"views", run.views.size()}, {"points", run.surface.size()}};
   view::ViewServer server(std::move(run), page);

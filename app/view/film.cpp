@@ -160,8 +160,10 @@ Shot shot_of_bookmark(const Bookmark& from, const Eigen::Vector3d& up, int width
 }
 
 Result<cv::Mat> FilmMaker::picture(const FilmOrder& order, const Bookmark& from) const {
-  const LayerWish wish{order.layer == FilmLayer::visible, order.layer == FilmLayer::thermal,
-                       order.layer == FilmLayer::fused, 1};
+  const LayerWish wish{.visible = order.layer == FilmLayer::visible,
+                       .thermal = order.layer == FilmLayer::thermal,
+                       .fused = order.layer == FilmLayer::fused,
+                       .every_pixel = true};
   const Shot shot = shot_of_bookmark(from, run_.up, order.width, order.height);
   // A job a picture: none of them has waited longer than the viewers that came meanwhile. Where too
   // many wait, the film waits until there are fewer.

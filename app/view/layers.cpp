@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
@@ -17,19 +18,22 @@ namespace {
 constexpr int piece_pixels = 48'000;
 constexpr int least_rows = 32;  ///< below it the look ahead of nerf::render pays no more
 constexpr std::size_t kept_bytes = 96u << 20;
+/// Of the value range: neighbours that differ by less look alike on a screen of 256 levels.
+constexpr double alike = 1.5 / 255;
 
-std::string key_of(Modality modality, const Shot& shot) {
+std::string key_of(Modality modality, const Shot& shot, bool every_pixel) {
   const Camera& c = shot.camera;
   const Eigen::Quaterniond& q = shot.cam_from_world.rotation;
   const Eigen::Vector3d& t = shot.cam_from_world.translation;
-  return fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {}", static_cast<int>(modality),
-                     c.width, c.height, c.fx, c.fy, c.cx, c.cy, q.w(), q.x(), q.y(), q.z(), t.x(),
-                     t.y(), t.z());
+  return fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {} {}", static_cast<int>(modality),
+                     every_pixel, c.width, c.height, c.fx, c.fy, c.cx, c.cy, q.w(), q.x(), q.y(),
+                     q.z(), t.x(), t.y(), t.z());
 }
 
 }  // namespace
 
 Result<LayerRenderer::Plane> LayerRenderer::rendered(Modality modality, const Shot& shot,
+                                                     bool every_pixel,
                                                      RenderTurns::Job& job) const {
   const nerf::Field& field = modality == Modality::visible ? run_.visible : run_.thermal;
   const Rigid3d cam_from_field =
@@ -38,6 +42,8 @@ Result<LayerRenderer::Plane> LayerRenderer::rendered(Modality modality, const Sh
   const int width = shot.camera.width, height = shot.camera.height;
   const int rows = std::max(least_rows, piece_pixels / width);
   cv::Mat color(height, width, modality == Modality::visible ? CV_32FC3 : CV_32FC1);
+  nerf::RenderOptions quality = run_.config.render.quality;
+  if (!every_pixel) quality.alike = alike;
   Plane plane;
   plane.opacity.create(height, width, CV_32FC1);
   for (int y = 0; y < height;) {
@@ -48,7 +54,7 @@ Result<LayerRenderer::Plane> LayerRenderer::rendered(Modality modality, const Sh
     piece.cy -= y;
     ORBITFUSE_ASSIGN(const RenderTurns::Turn turn, job.turn(static_cast<double>(count) * width));
     ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
-                     nerf::render(field, piece, cam_from_field, run_.config.render.quality, {}));
+                     nerf::render(field, piece, cam_from_field, quality, {}));
     seen.color.copyTo(color.rowRange(y, y + count));
     seen.opacity.copyTo(plane.opacity.rowRange(y, y + count));
     y += count;
@@ -64,8 +70,8 @@ Result<LayerRenderer::Plane> LayerRenderer::rendered(Modality modality, const Sh
 }
 
 Result<LayerRenderer::Plane> LayerRenderer::plane(Modality modality, const Shot& shot,
-                                                  RenderTurns::Job& job) {
-  const std::string key = key_of(modality, shot);
+                                                  bool every_pixel, RenderTurns::Job& job) {
+  const std::string key = key_of(modality, shot, every_pixel);
   {
     const std::lock_guard lock(mutex_);
     const auto known = std::find_if(kept_.begin(), kept_.end(),
@@ -75,7 +81,7 @@ Result<LayerRenderer::Plane> LayerRenderer::plane(Modality modality, const Shot&
       return kept_.front().second;
     }
   }
-  ORBITFUSE_ASSIGN(const Plane made, rendered(modality, shot, job));
+  ORBITFUSE_ASSIGN(const Plane made, rendered(modality, shot, every_pixel, job));
   const std::lock_guard lock(mutex_);
   kept_.emplace_front(key, made);
   std::size_t bytes = 0;
@@ -110,17 +116,23 @@ Result<Layers> LayerRenderer::render(const Shot& shot, const LayerWish& wish,
   Layers layers;
   const bool both = run_.has(Modality::visible) && run_.has(Modality::thermal);
   const bool fuses = wish.fused && both;
+  const auto seen_by = [&](Modality modality, int divisor) {
+    Shot sized = shot;
+    const auto share = [&](int px) {
+      return std::max(1, static_cast<int>(std::lround(px / static_cast<double>(divisor))));
+    };
+    sized.camera = shot.camera.scaled_to(share(shot.camera.width), share(shot.camera.height));
+    return plane(modality, sized, wish.every_pixel, job);
+  };
+  const int divisor = std::clamp(wish.divisor, 1, most_divisor);
   Plane visible, thermal;
   if (run_.has(Modality::visible) && (wish.visible || fuses)) {
-    ORBITFUSE_ASSIGN(visible, plane(Modality::visible, shot, job));
+    ORBITFUSE_ASSIGN(visible, seen_by(Modality::visible, divisor));
     if (wish.visible) layers.visible = visible.image;
   }
   if (run_.has(Modality::thermal) && (wish.thermal || fuses)) {
-    Shot coarse = shot;
-    const int divisor = std::clamp(wish.thermal_divisor, 1, 8);
-    coarse.camera = shot.camera.scaled_to(std::max(1, shot.camera.width / divisor),
-                                          std::max(1, shot.camera.height / divisor));
-    ORBITFUSE_ASSIGN(thermal, plane(Modality::thermal, coarse, job));
+    const int coarser = std::clamp(wish.thermal_divisor, divisor, most_divisor);
+    ORBITFUSE_ASSIGN(thermal, seen_by(Modality::thermal, coarser));
     if (wish.thermal) layers.kelvin = thermal.image;
   }
   if (fuses) {

@@ -18,11 +18,16 @@ struct Shot {
   Rigid3d cam_from_world;
 };
 
+inline constexpr int most_divisor = 8;
+
 struct LayerWish {
   bool visible = true, thermal = true, fused = true;
-  /// The thermal field at a share of the width: thermal cameras see less, and the picture comes
-  /// sooner. The fused picture takes what there is.
-  int thermal_divisor = 1;
+  /// All at this share of the shot's width, and the thermal field at that one where it is less: the
+  /// picture comes sooner. The fused picture takes what there is.
+  int divisor = 1, thermal_divisor = 1;
+  /// Every pixel by its own ray, for what is kept; a picture to look at takes plain ones from their
+  /// neighbours.
+  bool every_pixel = false;
 };
 
 /// What a shot shows; a layer that was not wished, or has no field, is empty.
@@ -46,8 +51,9 @@ class LayerRenderer {
   struct Plane {
     cv::Mat image, opacity;
   };
-  Result<Plane> plane(Modality modality, const Shot& shot, RenderTurns::Job& job);
-  Result<Plane> rendered(Modality modality, const Shot& shot, RenderTurns::Job& job) const;
+  Result<Plane> plane(Modality modality, const Shot& shot, bool every_pixel, RenderTurns::Job& job);
+  Result<Plane> rendered(Modality modality, const Shot& shot, bool every_pixel,
+                         RenderTurns::Job& job) const;
   Result<cv::Mat> fused(const Plane& visible, const Plane& thermal) const;
 
   const FinishedRun& run_;

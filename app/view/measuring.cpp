@@ -8,11 +8,15 @@
 namespace orbitfuse::view {
 using nlohmann::json;
 
-Progress Measuring::progress() const {
+namespace {
+
+Progress until(const std::atomic<bool>* gone) {
   Progress progress;
-  progress.cancel = &closed_;
+  progress.cancel = gone;
   return progress;
 }
+
+}  // namespace
 
 Result<const measurement::ThermalScene*> Measuring::scene() {
   const std::lock_guard lock(mutex_);
@@ -38,36 +42,44 @@ auto Measuring::in_turn(Work work) -> decltype(work()) {
   return work();
 }
 
-Result<json> Measuring::point_at(const Shot& shot, const Eigen::Vector2d& pixel) {
+Result<json> Measuring::point_at(const Shot& shot, const Eigen::Vector2d& pixel,
+                                 const std::atomic<bool>* gone) {
   return in_turn([&]() -> Result<json> {
     ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
     const PosedView view{"the viewer's picture", shot.camera, shot.cam_from_world};
     ORBITFUSE_ASSIGN(const measurement::SurfacePoint found,
-                     scene->surface_at(view, pixel, progress()));
+                     scene->surface_at(view, pixel, until(gone)));
     const Eigen::Vector3d& p = found.position;
     return json{{"point", {p.x(), p.y(), p.z()}}};
   });
 }
 
-Result<json> Measuring::answer(const json& asked) {
+Result<json> Measuring::answer(const json& asked, const std::atomic<bool>* gone) {
   return in_turn([&]() -> Result<json> {
     ORBITFUSE_ASSIGN(const measurement::Request request, measurement::request_of_json(asked));
     ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
-    ORBITFUSE_ASSIGN(const measurement::Answer answer, measure(*scene, request, progress()));
+    ORBITFUSE_ASSIGN(const measurement::Answer answer, measure(*scene, request, until(gone)));
     return json{{"request", to_json(request)}, {"answer", to_json(answer)}};
   });
 }
 
-Result<json> Measuring::add(const json& asked) {
+Result<json> Measuring::add(const json& asked, const std::atomic<bool>* gone) {
   return in_turn([&]() -> Result<json> {
     ORBITFUSE_ASSIGN(const measurement::Request request, measurement::request_of_json(asked));
     ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
-    ORBITFUSE_ASSIGN(const measurement::Answer answer, measure(*scene, request, progress()));
+    ORBITFUSE_ASSIGN(const measurement::Answer answer, measure(*scene, request, until(gone)));
     ORBITFUSE_TRY(measurement::add_measurement(
         run_.out / measurement::measurements_file, scene->identity(),
         {request.name, "", measurement::anchored(request, answer), to_json(answer)}));
     return list();
   });
+}
+
+Result<json> Measuring::remove(const std::string& name) {
+  ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
+  ORBITFUSE_TRY(measurement::remove_measurement(run_.out / measurement::measurements_file,
+                                                scene->identity(), name));
+  return list();
 }
 
 Result<json> Measuring::list() {

@@ -22,24 +22,25 @@ class Measuring {
   explicit Measuring(const FinishedRun& run) : run_(run) {}
 
   /// Where the thermal field's surface is under a pixel. Input error: there is none.
-  Result<nlohmann::json> point_at(const Shot& shot, const Eigen::Vector2d& pixel);
+  /// `gone`, here and below: set when nobody waits any more (WebRequest::gone); the error is then
+  /// "cancelled".
+  Result<nlohmann::json> point_at(const Shot& shot, const Eigen::Vector2d& pixel,
+                                  const std::atomic<bool>* gone);
   /// {"request", "answer"} of a request as docs/formats.md has it.
-  Result<nlohmann::json> answer(const nlohmann::json& request);
-  /// Measured again and saved; then as list(). Unavailable: nothing was saved.
-  Result<nlohmann::json> add(const nlohmann::json& request);
+  Result<nlohmann::json> answer(const nlohmann::json& request, const std::atomic<bool>* gone);
+  /// Measured again and saved; then as list(). Unavailable, cancelled: nothing was saved.
+  Result<nlohmann::json> add(const nlohmann::json& request, const std::atomic<bool>* gone);
+  /// As list(), without the one of that name.
+  Result<nlohmann::json> remove(const std::string& name);
   /// [{"name", "created", "request", "answer"}]: what is saved. Never unavailable.
   Result<nlohmann::json> list();
-  /// What is being measured ends soon.
-  void close() { closed_ = true; }
 
  private:
   Result<const measurement::ThermalScene*> scene();
   template <class Work>
   auto in_turn(Work work) -> decltype(work());
-  Progress progress() const;
 
   const FinishedRun& run_;
-  std::atomic<bool> closed_{false};
   std::counting_semaphore<4> places_{4};
   std::mutex mutex_;  ///< of the first use, which loads the scene
   std::unique_ptr<measurement::ThermalScene> scene_;

@@ -71,7 +71,7 @@ Result<ShotRequest> shot_request_of(const json& j, const FinishedRun& run) {
   ORBITFUSE_ASSIGN(request.client, text_field(j, "client", 40));
   ORBITFUSE_ASSIGN(request.shot, shot_of(j, run));
   if (const auto layers = j.find("layers"); layers != j.end()) {
-    request.wish = {false, false, false, 1};
+    request.wish = {.visible = false, .thermal = false, .fused = false};
     if (!layers->is_array()) return wrong("layers", shown(*layers), "must be a list of names");
     for (const json& layer : *layers) {
       if (layer == "visible")
@@ -84,10 +84,12 @@ Result<ShotRequest> shot_request_of(const json& j, const FinishedRun& run) {
         return wrong("layers", shown(layer), "must be visible, thermal or fused");
     }
   }
-  if (j.contains("thermal_divisor")) {
-    ORBITFUSE_ASSIGN(const double divisor, number_field(j, "thermal_divisor", 1, 8));
-    request.wish.thermal_divisor = static_cast<int>(divisor);
-  }
+  for (const auto& [field, to] : {std::pair{"divisor", &request.wish.divisor},
+                                  {"thermal_divisor", &request.wish.thermal_divisor}})
+    if (j.contains(field)) {
+      ORBITFUSE_ASSIGN(const double divisor, number_field(j, field, 1, most_divisor));
+      *to = static_cast<int>(divisor);
+    }
   return request;
 }
 

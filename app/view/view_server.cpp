@@ -78,7 +78,9 @@ struct ViewServer::Impl {
     ORBITFUSE_ASSIGN(const json body, json_body(request.body));
     ORBITFUSE_ASSIGN(const ShotRequest asked, shot_request_of(body, run));
     RenderTurns::Job job(turns, asked.client, request.gone);
-    ORBITFUSE_ASSIGN(const Layers seen, layers.render(asked.shot, {false, true, false, 1}, job));
+    ORBITFUSE_ASSIGN(
+        const Layers seen,
+        layers.render(asked.shot, {.visible = false, .fused = false, .every_pixel = true}, job));
     const double scale = kelvin_per_count_for(std::vector<cv::Mat>{seen.kelvin});
     cv::Mat counts(seen.kelvin.size(), CV_16UC1);
     for (int y = 0; y < counts.rows; ++y)
@@ -114,12 +116,18 @@ struct ViewServer::Impl {
     ORBITFUSE_ASSIGN(const Shot shot, shot_of(body, run));
     ORBITFUSE_ASSIGN(const double u, number_field(body, "u", 0, shot.camera.width));
     ORBITFUSE_ASSIGN(const double v, number_field(body, "v", 0, shot.camera.height));
-    return measuring.point_at(shot, {u, v});
+    return measuring.point_at(shot, {u, v}, request.gone);
   }
 
   Result<json> measure(const WebRequest& request, bool keep) {
     ORBITFUSE_ASSIGN(const json body, json_body(request.body));
-    return keep ? measuring.add(body) : measuring.answer(body);
+    return keep ? measuring.add(body, request.gone) : measuring.answer(body, request.gone);
+  }
+
+  Result<json> drop_measurement(const WebRequest& request) {
+    ORBITFUSE_ASSIGN(const json body, json_body(request.body));
+    ORBITFUSE_ASSIGN(const std::string name, text_field(body, "name", 200));
+    return measuring.remove(name);
   }
 
   Result<json> begin_film(const WebRequest& request) {
@@ -188,6 +196,10 @@ struct ViewServer::Impl {
          [this](const WebRequest& request) {
            return answer_of(measure(request, true), json_answer);
          }},
+        {"/measurements/remove",
+         [this](const WebRequest& request) {
+           return answer_of(drop_measurement(request), json_answer);
+         }},
         {"/film",
          [this](const WebRequest& request) { return answer_of(begin_film(request), json_answer); }},
         {"/film/stop",
@@ -209,7 +221,6 @@ Status ViewServer::start() { return impl_->server.start(); }
 
 void ViewServer::stop() {
   impl_->turns.close();
-  impl_->measuring.close();
   impl_->films.stop();
   impl_->server.stop();
 }

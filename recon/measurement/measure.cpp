@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 
 #include "core/numeric/percent.hpp"
 #include "recon/assembly/looked_at.hpp"
@@ -132,49 +134,71 @@ Result<Answer> measure_points(const ThermalScene& scene, const std::vector<Surfa
   return answer;
 }
 
-Result<Answer> measure_polygon(const ThermalScene& scene, const Request& request,
-                               const Reradiometry& radiometry, const Progress& progress) {
-  std::vector<Eigen::Vector2d> corners;
-  for (const Place& place : request.places) corners.push_back(std::get<PixelPlace>(place).pixel);
-  ORBITFUSE_ASSIGN(const PosedView* view, scene.view(std::get<PixelPlace>(request.places[0]).view));
-  ORBITFUSE_ASSIGN(const auto points, polygon_samples(scene, *view, corners, progress));
-  return measure_points(scene, points, radiometry, "the field has no surface in it", progress);
-}
-
-/// A camera that sees both ends of a line, and where.
-struct LineView {
+/// A camera that sees all places of a line or polygon, and where.
+struct CommonView {
   const PosedView* view = nullptr;
-  Eigen::Vector2d begin, end;
+  std::vector<Eigen::Vector2d> pixels;
 };
 
-Result<LineView> line_view(const ThermalScene& scene, const Request& request,
-                           const Progress& progress) {
-  const auto* a = std::get_if<PixelPlace>(&request.places[0]);
-  const auto* b = std::get_if<PixelPlace>(&request.places[1]);
-  if (a != nullptr && b != nullptr && a->view == b->view) {
-    ORBITFUSE_ASSIGN(const PosedView* view, scene.view(a->view));
-    return LineView{view, a->pixel, b->pixel};
+/// The view that the places are pixels of; else the thermal frame that sees the one it sees worst
+/// best.
+Result<CommonView> common_view(const ThermalScene& scene, const Request& request,
+                               const Progress& progress) {
+  CommonView common;
+  std::set<std::string> named;
+  for (const Place& place : request.places) {
+    const auto* pixel = std::get_if<PixelPlace>(&place);
+    named.insert(pixel != nullptr ? pixel->view : "");
+    if (pixel != nullptr) common.pixels.push_back(pixel->pixel);
   }
-  ORBITFUSE_ASSIGN(const SurfacePoint begin, surface_of(scene, request.places[0], progress));
-  ORBITFUSE_ASSIGN(const SurfacePoint end, surface_of(scene, request.places[1], progress));
-  ORBITFUSE_ASSIGN(const PointReadings from, read_frames(scene, begin, {}, progress));
-  ORBITFUSE_ASSIGN(const PointReadings to, read_frames(scene, end, {}, progress));
-  LineView best;
-  double best_weight = 0;
-  for (const FrameReading& r : from.frames)
-    for (const FrameReading& s : to.frames)
-      if (r.frame == s.frame && std::min(r.weight, s.weight) > best_weight) {
-        best_weight = std::min(r.weight, s.weight);
-        best = {&scene.frames()[r.frame].view, r.pixel, s.pixel};
-      }
-  if (best.view != nullptr) return best;
-  return fail(ErrorKind::input, "line", "no thermal frame sees both of its ends",
-              "choose ends on one side of the object, or give both as pixels of one view");
+  if (named.size() == 1 && !named.begin()->empty()) {
+    ORBITFUSE_ASSIGN(common.view, scene.view(*named.begin()));
+    return common;
+  }
+  struct Seen {
+    double weight = HUGE_VAL;
+    std::vector<Eigen::Vector2d> pixels;
+  };
+  std::map<std::size_t, Seen> frames;
+  for (std::size_t i = 0; i < request.places.size(); ++i) {
+    ORBITFUSE_ASSIGN(const SurfacePoint point, surface_of(scene, request.places[i], progress));
+    ORBITFUSE_ASSIGN(const PointReadings readings, read_frames(scene, point, {}, progress));
+    for (const FrameReading& r : readings.frames) {
+      Seen& seen = frames[r.frame];
+      if (seen.pixels.size() != i) continue;  // it missed one before
+      seen.weight = std::min(seen.weight, r.weight);
+      seen.pixels.push_back(r.pixel);
+    }
+  }
+  double best = 0;
+  for (const auto& [frame, seen] : frames)
+    if (seen.pixels.size() == request.places.size() && seen.weight > best) {
+      best = seen.weight;
+      common = {&scene.frames()[frame].view, seen.pixels};
+    }
+  if (common.view != nullptr) return common;
+  const bool line = request.kind == Kind::line;
+  return fail(
+      ErrorKind::input, std::string(name(request.kind)),
+      line ? "no thermal frame sees both of its ends" : "no thermal frame sees all of its corners",
+      fmt::format("choose {} on one side of the object, or give {} as pixels of one view",
+                  line ? "ends" : "corners", line ? "both" : "all"));
+}
+
+Result<Answer> measure_polygon(const ThermalScene& scene, const Request& request,
+                               const Reradiometry& radiometry, const Progress& progress) {
+  ORBITFUSE_ASSIGN(const CommonView common, common_view(scene, request, progress));
+  ORBITFUSE_ASSIGN(const auto points,
+                   polygon_samples(scene, *common.view, common.pixels, progress));
+  ORBITFUSE_ASSIGN(Answer answer, measure_points(scene, points, radiometry,
+                                                 "the field has no surface in it", progress));
+  answer.notes.push_back("as seen from " + common.view->name);
+  return answer;
 }
 
 Result<Answer> measure_line(const ThermalScene& scene, const Request& request,
                             const Reradiometry& radiometry, const Progress& progress) {
-  ORBITFUSE_ASSIGN(const LineView line, line_view(scene, request, progress));
+  ORBITFUSE_ASSIGN(const CommonView line, common_view(scene, request, progress));
   Answer answer;
   std::vector<SurfacePoint> points;
   double along = 0;
@@ -182,7 +206,7 @@ Result<Answer> measure_line(const ThermalScene& scene, const Request& request,
     ORBITFUSE_TRY(progress.check("measure"));
     const double t = static_cast<double>(i) / (request.profile - 1);
     const auto surface =
-        scene.surface_at(*line.view, (1 - t) * line.begin + t * line.end, progress);
+        scene.surface_at(*line.view, (1 - t) * line.pixels[0] + t * line.pixels[1], progress);
     if (!surface && surface.error().kind == ErrorKind::cancelled)
       return tl::unexpected(surface.error());
     ProfilePoint point;

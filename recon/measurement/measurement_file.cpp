@@ -159,6 +159,17 @@ Result<Kept> add_measurement(const std::filesystem::path& file, const std::strin
   return kept;
 }
 
+Status remove_measurement(const std::filesystem::path& file, const std::string& identity,
+                          const std::string& name) {
+  ChangeLock lock;
+  ORBITFUSE_TRY(lock.acquire(file));
+  ORBITFUSE_ASSIGN(Measurements all, load_measurements(file, identity));
+  if (std::erase_if(all.list, [&](const SavedMeasurement& m) { return m.name == name; }) == 0)
+    return fail(ErrorKind::input, file.string(), "no measurement named '" + name + "'",
+                "look at what is saved: another program may have removed it");
+  return save_measurements(file, all);
+}
+
 Status save_measurements(const std::filesystem::path& file, const Measurements& measurements) {
   json list = json::array();
   for (const SavedMeasurement& saved : measurements.list) list.push_back(to_json(saved));

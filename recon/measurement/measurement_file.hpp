@@ -55,6 +55,10 @@ Result<Measurements> load_measurements(const std::filesystem::path& file,
 /// each other. `created` is set to now where it is empty. Errors: both's.
 Result<Kept> add_measurement(const std::filesystem::path& file, const std::string& identity,
                              SavedMeasurement measurement);
+/// Loads, takes the measurement of that name out and saves, as one step. Errors: both's; input:
+/// there is none.
+Status remove_measurement(const std::filesystem::path& file, const std::string& identity,
+                          const std::string& name);
 /// Atomic: readers see the old list or the new one. Errors: input (larger than what is read again),
 /// device (it can't be written); the file is left as it is then.
 Status save_measurements(const std::filesystem::path& file, const Measurements& measurements);

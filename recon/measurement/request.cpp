@@ -22,8 +22,13 @@ Status check_place(const Place& place) {
   if (const auto* pixel = std::get_if<PixelPlace>(&place)) {
     if (pixel->view.empty())
       return fail(ErrorKind::usage, "measure.view", "empty", "name a view of the run");
-    ORBITFUSE_TRY(check("u", pixel->pixel.x(), from_to(0, 1e6)));
-    return check("v", pixel->pixel.y(), from_to(0, 1e6));
+    constexpr double widest = 1e6;  // of no camera; what is within is looked up in the view
+    for (int i = 0; i < 2; ++i)
+      if (const double at = pixel->pixel[i]; !(at >= 0 && at <= widest))
+        return fail(ErrorKind::usage, i == 0 ? "measure.u" : "measure.v",
+                    fmt::format("{:g}, outside of the picture of {}", at, pixel->view),
+                    "count pixels from the top left corner, which is 0,0");
+    return {};
   }
   for (const double value : std::get<Eigen::Vector3d>(place))
     ORBITFUSE_TRY(check("point", value, from_to(-max_coordinate, max_coordinate)));
@@ -67,11 +72,13 @@ Status check_overrides(const ObjectParameterOverrides& o, const char* table) {
 
 Status check_polygon(const Request& request) {
   ORBITFUSE_TRY(check_places(request, 3, 1000));
+  const auto* first = std::get_if<PixelPlace>(&request.places[0]);
   for (const Place& place : request.places) {
     const auto* pixel = std::get_if<PixelPlace>(&place);
-    if (pixel == nullptr || pixel->view != std::get<PixelPlace>(request.places[0]).view)
-      return fail(ErrorKind::usage, "measure.polygon", "corners that are not pixels of one view",
-                  "give all corners in the same view");
+    if ((pixel == nullptr) != (first == nullptr) || (pixel && pixel->view != first->view))
+      return fail(ErrorKind::usage, "measure.polygon",
+                  "corners that are neither pixels of one view nor all points",
+                  "give all corners in the same view, or each as a point");
   }
   return {};
 }
@@ -95,10 +102,6 @@ Status Request::validate() const {
     case Kind::distance:
       return check_places(*this, 2, 2);
     case Kind::polygon:
-      // The first corner says which view, so that it must be a pixel.
-      if (!places.empty() && !std::holds_alternative<PixelPlace>(places[0]))
-        return fail(ErrorKind::usage, "measure.polygon", "a corner that is no pixel",
-                    "give all corners in the same view");
       return check_polygon(*this);
     case Kind::hottest:
     case Kind::coldest:

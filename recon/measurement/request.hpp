@@ -37,13 +37,14 @@ inline constexpr int most_places = 100;
 /// What is asked; the same from the command line and from JSON (docs/formats.md).
 struct Request {
   Kind kind = Kind::spot;
-  std::string name;           ///< of the measurement; empty: none
-  std::vector<Place> places;  ///< spot 1; line, distance 2; polygon 3 or more pixels of one view
-  OrientedBox box;            ///< of a box
-  int count = 5;              ///< hottest, coldest
-  double apart = 0;         ///< least distance between those, world units; 0: a tenth of the object
-  int profile = 50;         ///< points along a line
-  std::vector<Request> of;  ///< difference: the first less the second
+  std::string name;  ///< of the measurement; empty: none
+  std::vector<Place>
+      places;        ///< spot 1; line, distance 2; polygon 3 or more, pixels of one view or points
+  OrientedBox box;   ///< of a box
+  int count = 5;     ///< hottest, coldest
+  double apart = 0;  ///< least distance between those, world units; 0: a tenth of the object
+  int profile = 50;  ///< points along a line
+  std::vector<Request> of;            ///< difference: the first less the second
   ObjectParameterOverrides object;    ///< told after capture; absent: as recorded
   ObjectParameterOverrides recorded;  ///< what frames without radiometry were made with
 

@@ -39,26 +39,24 @@ class RestingView {
   }
 
   steps(layers) {
-    // Coarse temperatures come with the full picture, their own detail a step later.
+    // Coarse temperatures, which are there by then, come with the full picture; their own detail a step later.
     const two = layers.some(l => l !== "thermal") && layers.includes("thermal");
-    const steps = [{ share: 1 / 8, divisor: 1 }, { share: 1 / 5, divisor: 1 }, { share: 1, divisor: two ? 3 : 1 }];
-    if (two) steps.push({ share: 1, divisor: 1 });
-    return steps;
+    return [[8, 8], [5, 5], ...(two ? [[1, 5]] : []), [1, 1]].map(([divisor, thermal_divisor]) => ({ divisor, thermal_divisor }));
   }
 
   async render() {
     this.drop();
+    this.finished = false;
     const asking = this.asking = new AbortController(), layers = this.wanted();
     if (!layers.length) return;
-    const steps = this.steps(layers);
+    const steps = this.steps(layers), [width, height] = this.size(1);
     for (let i = 0; i < steps.length; ++i) {
-      const [width, height] = this.size(steps[i].share);
       try {
-        const answer = await ask("/render", { client: clientName, ...this.surface.shot(width, height), layers, thermal_divisor: steps[i].divisor }, asking.signal);
+        const answer = await ask("/render", { client: clientName, ...this.surface.shot(width, height), layers, ...steps[i] }, asking.signal);
         const pictures = await pictureParts(answer);
         if (asking.signal.aborted) return;
         this.pictures = pictures; this.level = i; this.finished = i + 1 === steps.length;
-        this.width = width; this.height = height;
+        this.width = Math.round(width / steps[i].divisor); this.height = Math.round(height / steps[i].divisor);
         $("hint").textContent = "";
         this.paint();
       } catch (error) {

@@ -5,6 +5,7 @@ const measureTools = {
   spot: { words: "Spot", places: 1, say: ["touch the place"] },
   box: { words: "Box", places: 2, say: ["touch one corner", "touch the corner across"] },
   line: { words: "Line", places: 2, say: ["touch where it begins", "touch where it ends"] },
+  polygon: { words: "Polygon", places: 3, open: true, say: ["touch the first corner", "touch the next corner", "touch the next corner"] },
   difference: { words: "Difference", places: 2, say: ["touch the first place", "touch the place to take from it"] },
   distance: { words: "Distance", places: 2, say: ["touch where it begins", "touch where it ends"] },
   hottest: { words: "Hottest", places: 0 },
@@ -30,6 +31,7 @@ class Measuring {
     this.markTool = choices($("tools"), Object.entries(measureTools).map(([k, t]) => [k, t.words]), null, kind => this.take(kind));
     $("save-measurements").onclick = () => this.save();
     $("reload-measurements").onclick = () => this.reload();
+    $("close-polygon").onclick = () => this.finish();
     viewer.onPlace = place => this.touched(place);
     viewer.drawMarks = (context, width, height) => this.drawOn(context, width, height);
     surface.controls.addEventListener("change", () => this.drawMarks());
@@ -46,6 +48,7 @@ class Measuring {
     this.tool = this.tool === kind ? null : kind;
     this.markTool(this.tool);
     this.say(this.tool ? tool.say[0] : "");
+    $("close-polygon").hidden = true;
     if (this.tool && innerWidth < 600) { $("panel").hidden = true; $("menu").setAttribute("aria-expanded", false); this.say(tool.say[0]); }
     this.drawMarks();
   }
@@ -59,16 +62,45 @@ class Measuring {
   async place(place) {
     // At the size of the rested picture, which was touched: a stage may have more pixels than the server renders.
     const kind = this.tool, tool = measureTools[kind], [width, height] = this.rest.size(1);
+    if (tool.open && this.places.length >= tool.places) {
+      const first = this.surface.onScreen(new THREE.Vector3(...this.places[0]));
+      if (first && Math.hypot(first.x - place.x, first.y - place.y) < 20) { this.finish(); return; }
+    }
     try {
       const found = await askInTurn("/pick", { ...this.surface.shot(width, height), u: place.u * width, v: place.v * height });
       if (this.tool !== kind) return;
       this.places.push(found.point);
       if (this.places.length < tool.places) { this.say(tool.say[this.places.length]); this.drawMarks(); return; }
-      const places = this.places.map(point => ({ point }));
-      this.tool = null; this.places = []; this.markTool(null);
-      await this.measure(kind === "box" ? { kind, box: this.boxOf(places[0].point, places[1].point) }
-        : kind === "difference" ? { kind, of: places.map(p => ({ kind: "spot", places: [p] })) } : { kind, places });
+      if (!tool.open) { await this.finish(); return; }
+      $("close-polygon").hidden = false;
+      this.say("touch the next corner, or the first one again to end");
+      this.drawMarks();
     } catch (error) { this.say(error.message, true); }
+  }
+  /// All places are there: they are measured.
+  async finish() {
+    const kind = this.tool, places = this.places.map(point => ({ point }));
+    this.tool = null; this.places = []; this.markTool(null);
+    $("close-polygon").hidden = true;
+    await this.measure(kind === "box" ? { kind, box: this.boxOf(places[0].point, places[1].point) }
+      : kind === "difference" ? { kind, of: places.map(p => ({ kind: "spot", places: [p] })) } : { kind, places });
+  }
+
+  /// What was typed of the surface and of what the camera was set to; absent: as recorded.
+  parameters() {
+    const table = (emissivity, reflected) => {
+      const values = {}, number = id => { const text = $(id).value.trim(), value = Number(text); if (text && !Number.isFinite(value)) throw new Error(`${$(id).dataset.words}: '${text}' is no number`); return text ? value : null; };
+      if (number(emissivity) !== null) values.emissivity = number(emissivity);
+      if (number(reflected) !== null) values.reflected_k = toKelvin(number(reflected));
+      return Object.keys(values).length ? values : null;
+    };
+    const object = table("emissivity", "reflected"), recorded = table("recorded-emissivity", "recorded-reflected");
+    return { ...(object && { object }), ...(recorded && { recorded }) };
+  }
+  withParameters(request) {
+    const { object, recorded, ...plain } = request;
+    if (plain.kind === "distance") return plain;
+    return plain.of ? { ...plain, of: plain.of.map(part => this.withParameters(part)) } : { ...plain, ...this.parameters() };
   }
 
   /// Along the world's axes; flat ones get a tenth of their diagonal, or they would hold no surface.
@@ -80,30 +112,46 @@ class Measuring {
   async measure(request) {
     this.say("measuring …");
     try {
-      const measured = await askInTurn("/measure", request);
-      this.list.push({ ...measured, name: "" });
+      const measured = await askInTurn("/measure", this.withParameters(request));
+      this.list.push({ ...measured, name: "", label: "" });
       this.say("");
       this.show();
     } catch (error) { this.say(error.message, true); }
   }
 
+  /// The same place by the parameters that stand there now; what is saved is replaced.
+  async again(m) {
+    this.say("measuring …");
+    try {
+      const request = this.withParameters(m.request);
+      if (m.name) { this.saved(await askInTurn("/measurements/add", { ...request, name: m.name })); return; }
+      Object.assign(m, await askInTurn("/measure", request));
+      this.say("");
+      this.show();
+    } catch (error) { this.say(error.message, true); }
+  }
+  async remove(m) {
+    try { this.saved(await askInTurn("/measurements/remove", { name: m.name })); } catch (error) { this.say(error.message, true); }
+  }
+  saved(list) { this.list = [...list, ...this.list.filter(m => !m.name)]; this.say(""); this.show(); }
+
   async save() {
     const open = this.list.filter(m => !m.name);
     if (!open.length) { this.say("everything is saved"); return; }
+    // The server would put it in the other's place.
+    const taken = open.find((m, i) => m.label && (this.list.some(o => o.name === m.label) || open.findIndex(o => o.label === m.label) < i));
+    if (taken) { this.say(`the name '${taken.label}' is taken: choose another, or remove that measurement`, true); return; }
     this.say("saving …");
     try {
-      for (const m of open) { await askInTurn("/measurements/add", m.request); m.name = "saved"; }
+      for (const m of open) { await askInTurn("/measurements/add", m.label ? { ...m.request, name: m.label } : m.request); m.name = m.label || "saved"; }
       await this.reload();
       this.say("saved");
     } catch (error) { this.say(error.message, true); }
   }
   async reload() {
     try {
-      const saved = await askInTurn("/measurements");
-      this.list = [...saved, ...this.list.filter(m => !m.name)];
-      this.say("");
-    } catch (error) { this.say(error.message, true); }
-    this.show();
+      this.saved(await askInTurn("/measurements"));
+    } catch (error) { this.say(error.message, true); this.show(); }
   }
 
   readingWords(reading) {
@@ -121,15 +169,28 @@ class Measuring {
     return this.readingWords(a.reading);
   }
 
+  toldWords(request) {
+    const o = (request.of || [request])[0].object || {};
+    return [o.emissivity === undefined ? "" : "emissivity " + o.emissivity, o.reflected_k === undefined ? "" : "reflected " + shownTemperature(o.reflected_k)].filter(Boolean).join(", ");
+  }
+
   show() {
     $("measurements").replaceChildren(...this.list.map((m, index) => {
       const item = element("div", undefined, "item measurement"), words = element("div", undefined, "words");
       words.append(element("strong", `${index + 1} ${m.name || m.answer.kind + ", not saved"}`));
       for (const line of this.words(m).split("\n")) words.append(element("div", line));
+      if (this.toldWords(m.request)) words.append(element("small", this.toldWords(m.request)));
       for (const note of m.answer.notes || []) words.append(element("small", note));
       if (m.answer.profile) words.append(this.profile(m.answer.profile));
+      if (!m.name) {
+        const label = element("input");
+        label.placeholder = "name"; label.maxLength = 80; label.value = m.label; label.setAttribute("aria-label", `name of measurement ${index + 1}`);
+        label.oninput = () => { m.label = label.value.trim(); this.drawMarks(); };
+        words.append(label);
+      }
       item.append(words);
-      if (!m.name) item.append(button("Drop", () => { this.list.splice(index, 1); this.show(); }));
+      if (m.answer.kind !== "distance") item.append(button("Again", () => this.again(m)));
+      item.append(m.name ? button("Remove", () => this.remove(m)) : button("Drop", () => { this.list.splice(index, 1); this.show(); }));
       return item;
     }));
     this.drawMarks();
@@ -159,12 +220,12 @@ class Measuring {
   marks() {
     const marks = this.places.map(p => ({ points: [p], words: "" }));
     this.list.forEach((m, index) => {
-      const a = m.answer, r = m.request, n = String(index + 1), at = reading => reading && reading.temperature_k !== null ? " " + shownTemperature(reading.temperature_k) : "";
+      const a = m.answer, r = m.request, n = m.name || m.label || String(index + 1), at = reading => reading && reading.temperature_k !== null ? " " + shownTemperature(reading.temperature_k) : "";
       if (a.spots) a.spots.forEach(s => marks.push({ points: [s.point], words: n + at(s) }));
       else if (a.kind === "box") marks.push({ points: this.corners(r.box), box: true, words: n + at(a.reading) });
       else if (a.kind === "difference") marks.push({ points: r.of.map(o => o.places[0].point).filter(Boolean), words: n + " " + shownDifference(a.difference_k) });
       else if (a.kind === "spot") marks.push({ points: [a.point || (r.places[0] || {}).point].filter(Boolean), words: n + at(a.reading) });
-      else marks.push({ points: (r.places || []).map(p => p.point).filter(Boolean), words: n + at(a.reading) });
+      else marks.push({ points: (r.places || []).map(p => p.point).filter(Boolean), closed: a.kind === "polygon", words: n + at(a.reading) });
     });
     return marks.filter(m => m.points.length);
   }
@@ -178,6 +239,7 @@ class Measuring {
     return this.marks().map(mark => {
       const dots = mark.points.map(p => this.surface.onScreen(new THREE.Vector3(...p))), strokes = [];
       if (mark.box) { for (let i = 0; i < 8; ++i) for (const bit of [1, 2, 4]) if (!(i & bit)) strokes.push([dots[i], dots[i | bit]]); }
+      else if (mark.closed) dots.forEach((dot, i) => strokes.push([dot, dots[(i + 1) % dots.length]]));
       else if (dots.length > 1) strokes.push([dots[0], dots[dots.length - 1]]);
       return { dots: mark.box ? [] : dots.filter(Boolean), strokes: strokes.filter(([a, b]) => a && b), words: mark.words, at: dots.find(Boolean) };
     });

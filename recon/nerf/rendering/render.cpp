@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
 
 #include "core/option_range.hpp"
@@ -50,6 +52,7 @@ void write_ray(const FieldState& field, const RayBlock& block, int r, int& row, 
 Status RenderOptions::validate() const {
   const OptionCheck check("render");
   ORBITFUSE_TRY(check("stop_transmittance", stop_transmittance, between(0, 0.5)));
+  ORBITFUSE_TRY(check("alike", alike, from_to(0, 0.5)));
   return check("sample_factor", sample_factor, from_to(0.1, 16));
 }
 
@@ -58,6 +61,20 @@ namespace {
 constexpr int limit_stride = 4;  // one ray of 16 looks ahead for its neighbours
 constexpr float limit_margin = 1.03f;
 constexpr float no_limit = std::numeric_limits<float>::max();
+
+/// How far to look: a little behind the farthest of what one ray of each square of limit_stride
+/// pixels and its neighbours met.
+cv::Mat limits_from(const cv::Mat& ends, cv::Size size) {
+  cv::Mat farthest, far(size, CV_32FC1);
+  cv::dilate(ends, farthest, cv::Mat::ones(3, 3, CV_8U));
+  for (int y = 0; y < size.height; ++y)
+    for (int x = 0; x < size.width; ++x) {
+      const float end = farthest.at<float>(std::min(y / limit_stride, ends.rows - 1),
+                                           std::min(x / limit_stride, ends.cols - 1));
+      far.at<float>(y, x) = end < no_limit ? limit_margin * end : no_limit;
+    }
+  return far;
+}
 
 /// Renders the pixels of one image, block by block.
 class ImageRenderer {
@@ -89,24 +106,69 @@ class ImageRenderer {
       place(block);
       forward(field_, kernels_, limits_, block);
       for (std::size_t r = 0; r < pixels.size(); ++r)
-        if (stopped(block, static_cast<int>(r))) {
-          const auto last = static_cast<std::size_t>(block.first[r] + block.used[r] - 1);
-          out.at<float>(pixels[r] / width_, pixels[r] % width_) = block.t[last] + block.dt[last];
-        }
+        out.at<float>(pixels[r] / width_, pixels[r] % width_) = end_of(block, r);
     });
     return out;
   }
 
-  /// `far`: per pixel how far to look first; a ray that isn't stopped by then looks on to the end.
-  RenderedView image(const cv::Mat& far) {
-    const int channels = field_.channels();
+  RenderedView empty_view() const {
     RenderedView view;
-    view.color.create(height_, width_, CV_32FC(channels));
+    view.color.create(height_, width_, CV_32FC(field_.channels()));
     view.color.setTo(cv::Scalar::all(nan));  // stays outside the lens model's field of view
     view.depth.create(height_, width_, CV_32FC1);
     view.depth.setTo(nan);
     view.opacity = cv::Mat::zeros(height_, width_, CV_32FC1);
-    parallel_blocks(width_ * height_, rays_per_block, [&](int begin, int end) {
+    return view;
+  }
+
+  /// `far`: per pixel how far to look first; a ray that isn't stopped by then looks on to the end.
+  RenderedView image(const cv::Mat& far) {
+    RenderedView view = empty_view();
+    std::vector<int> all(static_cast<std::size_t>(width_ * height_));
+    std::iota(all.begin(), all.end(), 0);
+    render(all, far, view);
+    return view;
+  }
+
+  /// Every other pixel, and of the rest those whose neighbours aren't alike; these are their mean.
+  RenderedView sparse_image(double alike) {
+    RenderedView view = empty_view();
+    cv::Mat far(height_, width_, CV_32FC1, cv::Scalar(no_limit)), ends = far.clone();
+    const auto inside = [&](int x, int y) {
+      return x > 0 && y > 0 && x + 1 < width_ && y + 1 < height_;
+    };
+    std::array<std::vector<int>, 3> passes;  // the first looks ahead for the others
+    for (int y = 0; y < height_; ++y)
+      for (int x = 0; x < width_; ++x) {
+        const bool ahead = x % limit_stride == 0 && y % limit_stride == 0;
+        if (ahead || (x + y) % 2 == 0 || !inside(x, y))
+          passes[ahead ? 0 : 1].push_back(y * width_ + x);
+      }
+    render(passes[0], far, view, &ends);
+    cv::Mat coarse((height_ + limit_stride - 1) / limit_stride,
+                   (width_ + limit_stride - 1) / limit_stride, CV_32FC1);
+    for (int y = 0; y < coarse.rows; ++y)
+      for (int x = 0; x < coarse.cols; ++x)
+        coarse.at<float>(y, x) = ends.at<float>(y * limit_stride, x * limit_stride);
+    far = limits_from(coarse, far.size());
+    render(passes[1], far, view);
+    for (int y = 1; y + 1 < height_; ++y)
+      for (int x = 1 + y % 2; x + 1 < width_; x += 2)
+        if (!from_neighbours(view, x, y, static_cast<float>(alike)))
+          passes[2].push_back(y * width_ + x);
+    render(passes[2], far, view);
+    return view;
+  }
+
+ private:
+  /// The listed pixels, each by its own ray; `ends`: as ends(), of these.
+  void render(const std::vector<int>& wanted, const cv::Mat& far, RenderedView& view,
+              cv::Mat* ends = nullptr) {
+    const int channels = field_.channels();
+    const auto at = [&](const cv::Mat& plane, int p) {
+      return plane.at<float>(p / width_, p % width_);
+    };
+    parallel_blocks(static_cast<int>(wanted.size()), rays_per_block, [&](int begin, int end) {
       thread_local RayBlock block;
       thread_local std::vector<int> pixels, again;
       again.clear();
@@ -114,7 +176,10 @@ class ImageRenderer {
         block.clear();
         pixels.clear();
         if (limited)
-          for (int p = begin; p < end; ++p) add(p, far.at<float>(p / width_, p % width_), pixels);
+          for (int i = begin; i < end; ++i) {
+            const int p = wanted[static_cast<std::size_t>(i)];
+            add(p, at(far, p), pixels);
+          }
         else
           for (const int p : again) add(p, no_limit, pixels);
         if (pixels.empty()) continue;
@@ -126,15 +191,48 @@ class ImageRenderer {
           write_ray(field_, block, static_cast<int>(r), row,
                     {view.color.ptr<float>(y) + x * channels, view.depth.ptr<float>(y) + x,
                      view.opacity.ptr<float>(y) + x});
-          if (limited && far.at<float>(y, x) < no_limit && !stopped(block, static_cast<int>(r)))
+          const float stop = end_of(block, r);
+          if (ends != nullptr) ends->at<float>(y, x) = stop;
+          if (limited && at(far, pixels[r]) < no_limit && stop == no_limit)
             again.push_back(pixels[r]);
         }
       }
     });
-    return view;
   }
 
- private:
+  /// The mean of the four neighbours, where nothing tells that there is more to be seen.
+  bool from_neighbours(RenderedView& view, int x, int y, float alike) const {
+    constexpr float alike_depth = 0.03F;  // of it; a step from one surface to another is more
+    const std::array<cv::Point, 4> around = {{{x - 1, y}, {x + 1, y}, {x, y - 1}, {x, y + 1}}};
+    const auto mean = [&](const cv::Mat& plane, int channels, int c, auto most, float& out) {
+      float low = std::numeric_limits<float>::max(), high = -low, sum = 0;
+      for (const cv::Point& p : around) {
+        const float value = plane.ptr<float>(p.y)[p.x * channels + c];
+        low = std::min(low, value);
+        high = std::max(high, value);
+        sum += value;
+      }
+      out = 0.25F * sum;
+      return high - low <= most(high) && !std::isnan(sum);
+    };
+    const auto within = [alike](float) { return alike; };
+    const int channels = field_.channels();
+    std::array<float, 3> color{};
+    for (int c = 0; c < channels; ++c)
+      if (!mean(view.color, channels, c, within, color[static_cast<std::size_t>(c)])) return false;
+    float opacity = 0, depth = nan;
+    if (!mean(view.opacity, 1, 0, within, opacity)) return false;
+    const auto is_sky = [&](const cv::Point& p) { return std::isnan(view.depth.at<float>(p)); };
+    if (!std::all_of(around.begin(), around.end(), is_sky) &&
+        !mean(
+            view.depth, 1, 0, [](float z) { return alike_depth * z; }, depth))
+      return false;
+    std::copy_n(color.data(), channels, view.color.ptr<float>(y) + x * channels);
+    view.opacity.at<float>(y, x) = opacity;
+    view.depth.at<float>(y, x) = depth;
+    return true;
+  }
+
   void add(int pixel, float far, std::vector<int>& pixels) const {
     const Camera& camera = rays_.camera();
     const int x = pixel % width_ * stride_ + stride_ / 2,
@@ -158,10 +256,11 @@ class ImageRenderer {
     thread_local std::vector<DrawnRay> rays;
     return rays;
   }
-  bool stopped(const RayBlock& block, int ray) const {
-    const auto r = static_cast<std::size_t>(ray);
-    return block.used[r] > 0 &&
-           block.light[static_cast<std::size_t>(block.first[r] + block.used[r] - 1)] < limits_.stop;
+  /// Of ray r, as ends().
+  float end_of(const RayBlock& block, std::size_t r) const {
+    const auto last = static_cast<std::size_t>(block.first[r] + block.used[r] - 1);
+    if (block.used[r] == 0 || !(block.light[last] < limits_.stop)) return no_limit;
+    return block.t[last] + block.dt[last];
   }
 
   const FieldState& field_;
@@ -180,20 +279,15 @@ RenderedView render_strided(const FieldState& field, const ViewRays& rays, int s
   ImageRenderer renderer(field, rays, stride, options);
   const int width = (rays.camera().width + stride - 1) / stride,
             height = (rays.camera().height + stride - 1) / stride;
+  if (options.alike > 0) return renderer.sparse_image(options.alike);
   // Proposal networks know where surfaces are.
   if (!options.look_ahead || field.options.sampling == Sampling::proposal ||
       std::min(width, height) < 8 * limit_stride)
     return renderer.image(cv::Mat(height, width, CV_32FC1, cv::Scalar(no_limit)));
   // What lies behind opaque surfaces is half of most rays. Look where they are at a sixteenth of
-  // the pixels; the farthest of the neighbours is the limit.
+  // the pixels.
   const cv::Mat ends = ImageRenderer(field, rays, stride * limit_stride, options).ends();
-  cv::Mat farthest, far;
-  cv::dilate(ends, farthest, cv::Mat::ones(3, 3, CV_8U));
-  cv::resize(farthest, far, {width, height}, 0, 0, cv::INTER_NEAREST);
-  for (int y = 0; y < height; ++y)
-    for (float *f = far.ptr<float>(y), *e = f + width; f != e; ++f)
-      if (*f < no_limit) *f *= limit_margin;
-  return renderer.image(far);
+  return renderer.image(limits_from(ends, {width, height}));
 }
 
 Result<RenderedView> render(const Field& field, const Camera& camera, const Rigid3d& cam_from_world,

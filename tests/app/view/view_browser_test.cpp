@@ -47,7 +47,7 @@ class ViewBrowserTest : public ::testing::Test {
       fs::remove(out / "measurements.json");
       fs::remove(out / "bookmarks.json");
     } else {
-      make_run();
+      fs::copy(made_once(), out, fs::copy_options::recursive);
     }
     auto run = load_finished_run(out, stages::RunConfig(), {});
     ASSERT_TRUE(run) << run.error().message();
@@ -60,10 +60,16 @@ class ViewBrowserTest : public ::testing::Test {
     url = server->urls().front();
   }
 
-  void make_run() {
-    const fs::path session = folder.path() / "session";
+  static fs::path made_once() {
+    static const orbitfuse::test::TempFolder made;
+    if (!fs::exists(made / "out" / "report")) make_run(made.path());
+    return made / "out";
+  }
+
+  static void make_run(const fs::path& in) {
+    const fs::path session = in / "session";
     write_fixture_session(session);
-    std::vector<std::string> words = {"run", session.string(), "--out", out.string()};
+    std::vector<std::string> words = {"run", session.string(), "--out", (in / "out").string()};
     for (const char* set :
          {"train.visible.iterations=400", "train.thermal.iterations=400",
           "train.visible.eval_count=0", "train.thermal.eval_count=0",
@@ -168,6 +174,62 @@ TEST_F(ViewBrowserTest, LoadsTurnsSwitchesMeasuresSavesAndReloads) {
   const auto again = page.evaluate("viewer.surface.pose()");
   for (int i = 0; i < 3; ++i)
     EXPECT_NEAR(again["position"][i].get<double>(), pose["position"][i].get<double>(), 1e-6);
+  EXPECT_TRUE(page.errors().empty()) << page.errors().front();
+}
+
+/// A region with corners of one's own, its name and its emissivity; what was saved can go again.
+TEST_F(ViewBrowserTest, PolygonsHaveNamesAndParameters) {
+  orbitfuse::test::Browser page(folder.path() / "profile", 1280, 800, false);
+  page.open(url);
+  ASSERT_TRUE(page.becomes("viewer.surface.points"));
+  ASSERT_TRUE(rests(page));
+  page.evaluate("$('show-visible').click(); $('show-thermal').click(); $('menu').click()");
+  page.evaluate("document.querySelector('[data-value=polygon]').click()");
+  EXPECT_EQ(page.evaluate("$('close-polygon').hidden"), true);
+  int corners = 0;
+  for (const auto& [x, y] : {std::pair(600, 380), {680, 380}, {680, 430}, {600, 430}, {602, 382}}) {
+    page.press(x, y);  // the last: the first again
+    if (++corners < 5) {
+      ASSERT_TRUE(page.becomes("viewer.measuring.places.length === " + std::to_string(corners)))
+          << page.evaluate("$('measure-words').textContent");
+    }
+  }
+  ASSERT_TRUE(page.becomes("viewer.measuring.list.length === 1"))
+      << page.evaluate("$('measure-words').textContent");
+  const auto answer = page.evaluate("viewer.measuring.list[0].answer");
+  EXPECT_EQ(answer.at("kind"), "polygon");
+  EXPECT_GT(answer.at("reading").at("points").get<int>(), 10);
+  EXPECT_EQ(page.evaluate("viewer.measuring.drawn()[0].strokes.length"), 4);
+
+  page.evaluate(
+      "(i => { i.value = 'lid'; i.oninput(); })(document.querySelector('.measurement input'))");
+  EXPECT_NE(page.evaluate("$('marks').textContent").get<std::string>().find("lid"),
+            std::string::npos);
+  page.evaluate("$('save-measurements').click()");
+  ASSERT_TRUE(page.becomes("viewer.measuring.list[0].name === 'lid'"))
+      << page.evaluate("$('measure-words').textContent");
+  EXPECT_NE(page.evaluate("$('marks').textContent").get<std::string>().find("lid"),
+            std::string::npos);
+
+  // Of another surface: what was saved under its name is measured again.
+  page.evaluate("$('emissivity').value = 'much'");
+  page.evaluate("viewer.measuring.again(viewer.measuring.list[0])");
+  EXPECT_NE(page.evaluate("$('measure-words').textContent").get<std::string>().find("emissivity"),
+            std::string::npos);
+  page.evaluate("$('emissivity').value = '0.8'; $('recorded-emissivity').value = '0.95'");
+  page.evaluate("viewer.measuring.again(viewer.measuring.list[0])");
+  EXPECT_EQ(page.evaluate("viewer.measuring.list.length"), 1);
+  const auto again = page.evaluate("viewer.measuring.list[0]");
+  EXPECT_EQ(again.at("request").at("object").at("emissivity"), 0.8);
+  EXPECT_EQ(again.at("name"), "lid");
+  EXPECT_NE(again.at("answer").at("reading").at("temperature_k"),
+            answer.at("reading").at("temperature_k"));
+  kept("polygon", page.screenshot());
+
+  page.evaluate("viewer.measuring.remove(viewer.measuring.list[0])");
+  EXPECT_EQ(page.evaluate("viewer.measuring.list.length"), 0);
+  page.evaluate("viewer.measuring.reload()");
+  EXPECT_EQ(page.evaluate("viewer.measuring.list.length"), 0);
   EXPECT_TRUE(page.errors().empty()) << page.errors().front();
 }
 

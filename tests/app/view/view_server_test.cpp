@@ -145,16 +145,20 @@ TEST_F(ViewServerTest, PicturesAreTheFieldsOwn) {
                                   run.config.render.quality, {});
   ASSERT_TRUE(truth);
   int seen = 0;
+  double off = 0;
   for (int y = 0; y < 64; ++y)
     for (int x = 0; x < 64; ++x) {
-      if (!(std::abs(truth->opacity.at<float>(y, x) - 0.5f) > 0.01f)) continue;
+      if (!(std::abs(truth->opacity.at<float>(y, x) - 0.5f) > 0.03f)) continue;
       const double level = parts.level("thermal", x, y);
       ASSERT_EQ(std::isnan(level), truth->opacity.at<float>(y, x) < 0.5f) << x << " " << y;
       if (std::isnan(level)) continue;
       ++seen;
-      EXPECT_NEAR(level, static_cast<double>(truth->color.at<float>(y, x)), 0.02);
+      const double error = std::abs(level - static_cast<double>(truth->color.at<float>(y, x)));
+      EXPECT_LT(error, 0.3);  // of 15 K; some pixels are their neighbours' mean
+      off += error;
     }
   EXPECT_GT(seen, 500);
+  EXPECT_LT(off / seen, 0.02);
   for (const char* layer : {"visible", "fused"}) {
     const auto image = decode_image(parts.bytes.at(layer), layer);
     ASSERT_TRUE(image);

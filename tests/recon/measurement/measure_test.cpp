@@ -370,6 +370,25 @@ TEST(Measure, APolygonHoldsWhatItsViewShows) {
   EXPECT_LT((*answer.position - Eigen::Vector3d(0.4, 0, 0)).norm(), 0.02);
 }
 
+/// Its corners as places of the scene: as the frame shows them that sees all of them.
+TEST(Measure, APolygonOfPointsIsWhatTheyEnclose) {
+  const ThermalScene scene = box_orbit();
+  Request request;
+  request.kind = Kind::polygon;
+  for (const auto& [y, z] : {std::pair(-0.1, -0.1), {0.1, -0.1}, {0.1, 0.1}, {-0.1, 0.1}})
+    request.places.emplace_back(Eigen::Vector3d(0.4, y, z));
+  const Answer answer = ask(scene, request);
+  EXPECT_NEAR(answer.reading.temperature_k, end_k, 0.05);
+  ASSERT_TRUE(answer.position);
+  EXPECT_LT((*answer.position - Eigen::Vector3d(0.4, 0, 0)).norm(), 0.02);
+  EXPECT_THAT(joined(answer.notes), HasSubstr("as seen from"));
+  // On the box's other end: no frame sees both.
+  request.places.emplace_back(Eigen::Vector3d(-0.4, 0, 0));
+  const auto nowhere = measure(scene, request, {});
+  ASSERT_FALSE(nowhere);
+  EXPECT_THAT(nowhere.error().message(), HasSubstr("no thermal frame sees all of its corners"));
+}
+
 TEST(Measure, ALineGivesItsProfile) {
   const ThermalScene scene = box_orbit();
   Request request;

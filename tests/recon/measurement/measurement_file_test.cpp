@@ -67,6 +67,19 @@ TEST_F(MeasurementFile, HoldsWhatWasPut) {
   EXPECT_TRUE(loaded->notes.empty());
 }
 
+TEST_F(MeasurementFile, OneIsTakenOutByItsName) {
+  for (const char* name : {"one", "two"}) ASSERT_TRUE(add_measurement(file, "run a", spot(name)));
+  EXPECT_TRUE(remove_measurement(file, "run a", "one"));
+  ASSERT_EQ(load_measurements(file, "run a")->list.size(), 1u);
+  EXPECT_EQ(load_measurements(file, "run a")->list[0].name, "two");
+  const std::string bytes = test::get(file);
+  const Status gone = remove_measurement(file, "run a", "one");
+  ASSERT_FALSE(gone);
+  EXPECT_THAT(gone.error().found, HasSubstr("'one'"));
+  EXPECT_FALSE(remove_measurement(file, "run b", "two"));
+  EXPECT_EQ(test::get(file), bytes);
+}
+
 TEST_F(MeasurementFile, DamageIsNamedAndNothingIsLost) {
   ASSERT_TRUE(add_measurement(file, "run a", spot("one")));
   const std::string whole = test::get(file);

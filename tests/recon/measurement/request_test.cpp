@@ -26,6 +26,7 @@ TEST(MeasurementRequest, EveryKindGoesThroughJsonUnchanged) {
        {"box", {{"center", {0, 0, 1}}, {"size", {1, 2, 3}}, {"rotation_wxyz", {1, 0, 0, 0}}}}},
       {{"kind", "line"}, {"places", {point, pixel(1, 2)}}, {"profile", 12}},
       {{"kind", "polygon"}, {"places", {pixel(0, 0), pixel(5, 0), pixel(5, 5)}}},
+      {{"kind", "polygon"}, {"places", {point, point, point}}},
       {{"kind", "hottest"}, {"count", 3}, {"apart", 0.25}},
       {{"kind", "coldest"}, {"count", 1}},
       {{"kind", "distance"}, {"places", {point, point}}},

@@ -143,6 +143,39 @@ TEST(Agreement, LookingAheadIsAsNearToTheWholePictureAsNotLooking) {
   EXPECT_GT(deep_quick, 0.8 * solid);
 }
 
+/// Of a picture that is waited for: nearly as good, and no pixel is missing.
+TEST(Agreement, PixelsBetweenAlikeNeighboursAreTheirMean) {
+  for (const Modality modality : {Modality::visible, Modality::thermal}) {
+    Dataset data = toy_scene(modality, 8, 1.0, 96);
+    data.depth = test::toy_depth(data);
+    const Field field = trained(data, 150);
+    const auto shown = [&](double alike) {
+      return render(field, data.views[1].camera, data.views[1].cam_from_world, {.alike = alike}, {})
+          .value();
+    };
+    const RenderedView all = shown(0), exact = shown(1e-9), quick = shown(0.006);
+    const double range =
+        modality == Modality::visible ? 1 : field.state().span.high - field.state().span.low;
+    // Where none are alike all are rendered, apart from what is looked ahead.
+    EXPECT_LT(rms_of(exact.color, all.color), 0.01 * range);
+    EXPECT_LT(rms_of(quick.color, exact.color), 0.003 * range);
+    EXPECT_LT(cv::norm(quick.color, exact.color, cv::NORM_INF), 0.05 * range);
+    const cv::Mat known = quick.opacity >= 0;
+    EXPECT_EQ(cv::countNonZero(known), 96 * 96);
+    EXPECT_EQ(cv::countNonZero(quick.color.reshape(1) == quick.color.reshape(1)),
+              96 * 96 * quick.color.channels());
+    int meant = 0, off_checkerboard = 0;
+    for (int y = 1; y < 95; ++y)
+      for (int x = 1; x < 95; ++x) {
+        const bool same = quick.opacity.at<float>(y, x) == exact.opacity.at<float>(y, x);
+        meant += !same;
+        off_checkerboard += !same && (x + y) % 2 != 0;
+      }
+    EXPECT_GT(meant, 500) << "nothing was spared";
+    EXPECT_EQ(meant, off_checkerboard);
+  }
+}
+
 TEST(Agreement, LookingAheadSeesThroughAHoleThatItsNeighboursMiss) {
   Dataset data = toy_scene(Modality::visible, 8, 1.0, 96);
   data.depth = test::toy_depth(data);
