@@ -161,8 +161,8 @@ Result<Kept> add_measurement(const std::filesystem::path& file, const std::strin
 
 Status remove_measurement(const std::filesystem::path& file, const std::string& identity,
                           const std::string& name) {
-  ChangeLock lock;
-  ORBITFUSE_TRY(lock.acquire(file));
+  FolderChangeLock lock;
+  ORBITFUSE_TRY(lock.acquire(file.parent_path()));
   ORBITFUSE_ASSIGN(Measurements all, load_measurements(file, identity));
   if (std::erase_if(all.list, [&](const SavedMeasurement& m) { return m.name == name; }) == 0)
     return fail(ErrorKind::input, file.string(), "no measurement named '" + name + "'",

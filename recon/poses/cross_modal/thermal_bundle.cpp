@@ -62,8 +62,7 @@ struct SurfaceResidual {
 
   template <class T>
   bool operator()(const T* offset, T* residual) const {
-    const T along =
-        offset[0] * T(sight.x()) + offset[1] * T(sight.y()) + offset[2] * T(sight.z());
+    const T along = offset[0] * T(sight.x()) + offset[1] * T(sight.y()) + offset[2] * T(sight.z());
     residual[0] = along / T(sigma);
     return true;
   }
@@ -183,10 +182,10 @@ Result<BundleRound> prepared(const OrbitRefinement& refinement, const Fit& align
   const RenderRound fine = fine_rounds().back();
   parallel_for(static_cast<int>(renders.size()), [&](int index) {
     const auto i = static_cast<std::size_t>(index);
-    round.edges[i] = match_patches(renders[i], rendered_edges(renders[i]), views.camera,
-                                   orientation_field(views.images[i], 1.0),
-                                   {fine.search_px, fine.patch_search_px, fine.patch_radius_px,
-                                    fine.patch_spacing_px});
+    round.edges[i] = match_patches(
+        renders[i], rendered_edges(renders[i]), views.camera,
+        orientation_field(views.images[i], 1.0),
+        {fine.search_px, fine.patch_search_px, fine.patch_radius_px, fine.patch_spacing_px});
   });
   return round;
 }
@@ -196,8 +195,8 @@ std::size_t held_views(const BundleRound& round) {
   std::vector<int> sightings(round.views.images.size(), 0);
   for (const ThermalTrack& track : round.tracks)
     for (const ThermalSighting& seen : track.sightings) ++sightings[seen.view];
-  return static_cast<std::size_t>(std::count_if(sightings.begin(), sightings.end(),
-                                                [](int n) { return n >= least_patches; }));
+  return static_cast<std::size_t>(
+      std::count_if(sightings.begin(), sightings.end(), [](int n) { return n >= least_patches; }));
 }
 
 void take(const BundleSolution& solution, Fit& alignment) {
@@ -224,9 +223,8 @@ Status bundle_thermal(const OrbitRefinement& refinement, const FocalGuess& prior
                      prepared(refinement, alignment, chosen, options, reach_px));
     if (2 * held_views(round) < chosen.size()) return {};
     const double focal_px = alignment.views.front().view.camera.fx;
-    const BundleSolution solution = Bundle(round, options)
-                                        .solve({std::log(prior.focal_px / focal_px),
-                                                prior.relative_sigma});
+    const BundleSolution solution =
+        Bundle(round, options).solve({std::log(prior.focal_px / focal_px), prior.relative_sigma});
     take(solution, alignment);
     refinement.progress.report(
         {"poses.thermal", 3, 4, -1,

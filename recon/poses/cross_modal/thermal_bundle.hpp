@@ -5,11 +5,11 @@
 #include "recon/poses/cross_modal/thermal_tracks.hpp"
 
 // Thermal views bundled with each other. Edges that two modalities share lie a little beside each
-// other (heat spreads, paint ends elsewhere than form), all round the orbit in the same way, which a
-// focal length and a distance that are both too short explain well. Patches of a thermal view found
-// again in its neighbours have no such bias: they hold the views against each other and the lens,
-// and the visible scene's surface and edges hold where that is. Internal to recon/poses; errors:
-// the renderer's, cancelled.
+// other (heat spreads, paint ends elsewhere than form), all round the orbit in the same way, which
+// a focal length and a distance that are both too short explain well. Patches of a thermal view
+// found again in its neighbours have no such bias: they hold the views against each other and the
+// lens, and the visible scene's surface and edges hold where that is. Internal to recon/poses;
+// errors: the renderer's, cancelled.
 namespace orbitfuse {
 
 struct ThermalBundleOptions {

@@ -60,8 +60,7 @@ std::optional<FoundPatch> peak(const cv::Mat1f& score, double least) {
       if (!std::isfinite(s(u, v))) return std::nullopt;
   const double across = (s(1, -1) + s(-1, 1) - s(1, 1) - s(-1, -1)) / 4;
   Eigen::Matrix2d curvature;
-  curvature << 2 * s(0, 0) - s(1, 0) - s(-1, 0), across, across,
-      2 * s(0, 0) - s(0, 1) - s(0, -1);
+  curvature << 2 * s(0, 0) - s(1, 0) - s(-1, 0), across, across, 2 * s(0, 0) - s(0, 1) - s(0, -1);
   if (!(curvature.determinant() > 1e-6 * curvature.squaredNorm() && curvature.trace() > 0))
     return std::nullopt;
   const Eigen::Vector2d gradient((s(1, 0) - s(-1, 0)) / 2, (s(0, 1) - s(0, -1)) / 2);
@@ -70,16 +69,14 @@ std::optional<FoundPatch> peak(const cv::Mat1f& score, double least) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(curvature);
   const Eigen::Vector2d values = eigen.eigenvalues().cwiseMax(0);
   return FoundPatch{Eigen::Vector2d(at.x - reach, at.y - reach) + step,
-                    eigen.eigenvectors() *
-                        (values / values.maxCoeff()).cwiseSqrt().asDiagonal() *
+                    eigen.eigenvectors() * (values / values.maxCoeff()).cwiseSqrt().asDiagonal() *
                         eigen.eigenvectors().transpose()};
 }
 
-std::optional<FoundPatch> find_patch(const cv::Mat1f& image, const cv::Mat1f& painted,
-                                     cv::Point at, const ThermalTrackOptions& options) {
+std::optional<FoundPatch> find_patch(const cv::Mat1f& image, const cv::Mat1f& painted, cv::Point at,
+                                     const ThermalTrackOptions& options) {
   const int reach = options.reach_px, margin = options.radius_px + reach;
-  if (at.x < margin || at.y < margin || at.x >= image.cols - margin ||
-      at.y >= image.rows - margin)
+  if (at.x < margin || at.y < margin || at.x >= image.cols - margin || at.y >= image.rows - margin)
     return std::nullopt;
   // Never a peak, and no neighbour of one.
   constexpr float unknown = -std::numeric_limits<float>::infinity();
@@ -150,10 +147,9 @@ std::vector<ThermalTrack> tracks_of(const ThermalViews& views, std::size_t view,
                             cv::noArray(), corner_block_px);
   std::vector<cv::Mat> paintings;
   for (const std::size_t other : neighbours)
-    paintings.push_back(painted_by({views.camera, views.cam_from_world[other], views.images[other],
-                                    views.depth[other]},
-                                   views.depth[view], views.camera, views.cam_from_world[view],
-                                   options.depth_tolerance));
+    paintings.push_back(painted_by(
+        {views.camera, views.cam_from_world[other], views.images[other], views.depth[other]},
+        views.depth[view], views.camera, views.cam_from_world[view], options.depth_tolerance));
   const Rigid3d world_from_cam = views.cam_from_world[view].inverse();
   std::vector<ThermalTrack> tracks;
   for (const cv::Point corner : std::vector<cv::Point>(corners.begin(), corners.end())) {

@@ -14,8 +14,8 @@ namespace {
 
 constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
 
-/// A ball on a floor. Both cameras see its stripes and its outline, the thermal one temperatures that
-/// vary over the surface besides.
+/// A ball on a floor. Both cameras see its stripes and its outline, the thermal one temperatures
+/// that vary over the surface besides.
 SceneRender ball_view(const Camera& camera, const Rigid3d& cam_from_world, bool hot) {
   SceneRender view{cv::Mat(camera.height, camera.width, CV_32F, cv::Scalar(0)),
                    cv::Mat(camera.height, camera.width, CV_32F, cv::Scalar(nothing))};
@@ -42,8 +42,7 @@ SceneRender ball_view(const Camera& camera, const Rigid3d& cam_from_world, bool 
 }
 
 struct Ball {
-  SceneRenderer form = [](const Camera& camera,
-                          const Rigid3d& pose) -> Result<SceneRender> {
+  SceneRenderer form = [](const Camera& camera, const Rigid3d& pose) -> Result<SceneRender> {
     return ball_view(camera, pose, false);
   };
   OrbitViews orbit;
@@ -71,10 +70,10 @@ struct Ball {
     for (RenderAlignedView& view : alignment.views) {
       Rigid3d& pose = view.view.cam_from_world;
       pose.translation *= 1 - share;
-      const Rigid3d turn{Eigen::Quaterniond(
-                             Eigen::AngleAxisd(noise(rng), Eigen::Vector3d::UnitX()) *
+      const Rigid3d turn{
+          Eigen::Quaterniond(Eigen::AngleAxisd(noise(rng), Eigen::Vector3d::UnitX()) *
                              Eigen::AngleAxisd(noise(rng), Eigen::Vector3d::UnitY())),
-                         Eigen::Vector3d::Zero()};
+          Eigen::Vector3d::Zero()};
       pose = turn * pose;
       view.view.camera.fx *= 1 - share, view.view.camera.fy *= 1 - share;
     }
