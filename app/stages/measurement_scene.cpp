@@ -118,7 +118,7 @@ Result<Similarity3d> load_world_from_thermal(const pipeline::StageContext& conte
 }
 
 Result<std::string> measurement_identity(const fs::path& out, const Session& session) {
-  return identity_of(Folder{out}, session);
+  return identity_of(context_of_run(out), session);
 }
 
 Result<ThermalScene> load_measurement_scene(const fs::path& out, const Session& session,
