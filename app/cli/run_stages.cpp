@@ -5,8 +5,8 @@
 
 #include "app/pipeline/runner.hpp"
 #include "app/stages/build_stages.hpp"
-#include "core/formats/nested_text.hpp"
 #include "core/modality.hpp"
+#include "core/nested_text.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse::cli {

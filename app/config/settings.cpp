@@ -7,8 +7,8 @@
 
 #include <algorithm>
 
-#include "core/formats/nested_text.hpp"
 #include "core/near_word.hpp"
+#include "core/nested_text.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse::config {

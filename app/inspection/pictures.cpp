@@ -230,7 +230,8 @@ Result<FindingPictures> pictures_of(const InspectionFinding& finding, const Fini
   view::LayerRenderer renderer(run);
   view::RenderTurns turns;
   view::RenderTurns::Job job(turns, "inspection", progress.cancel);
-  ORBITFUSE_ASSIGN(view::Layers layers, renderer.render({camera, pose}, {.thermal = false}, job));
+  ORBITFUSE_ASSIGN(view::Layers layers,
+                   renderer.render({camera, pose}, {.thermal = false, .every_pixel = true}, job));
   pictures.visible = layers.visible.clone();
   if (pictures.thermal_view) {
     pictures.fused = layers.fused.clone();

@@ -9,7 +9,7 @@
 #include <ctime>
 
 #include "app/pipeline/folder_lock.hpp"
-#include "core/formats/nested_text.hpp"
+#include "core/nested_text.hpp"
 #include "core/system/clock.hpp"
 #include "core/system/file_io.hpp"
 

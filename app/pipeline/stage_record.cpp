@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "core/formats/nested_text.hpp"
+#include "core/nested_text.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse::pipeline {

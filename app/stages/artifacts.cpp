@@ -7,9 +7,9 @@
 
 #include "app/pipeline/stage_record.hpp"
 #include "core/formats/colmap_model.hpp"
-#include "core/formats/nested_text.hpp"
 #include "core/formats/transforms_json.hpp"
 #include "core/image/image_io.hpp"
+#include "core/nested_text.hpp"
 #include "core/system/file_io.hpp"
 #include "core/temperature.hpp"
 

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "core/formats/nested_text.hpp"
 #include "core/image/palette.hpp"
+#include "core/nested_text.hpp"
 
 namespace orbitfuse::stages {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <charconv>
 
-#include "core/formats/nested_text.hpp"
+#include "core/nested_text.hpp"
 #include "core/temperature.hpp"
 
 namespace orbitfuse::cli {

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "app/view/json_fields.hpp"
-#include "core/formats/nested_text.hpp"
+#include "core/nested_text.hpp"
 #include "core/system/file_io.hpp"
 #include "core/system/folder_change_lock.hpp"
 

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "core/formats/nested_text.hpp"
+#include "core/nested_text.hpp"
 
 namespace orbitfuse::view {
 using nlohmann::json;

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "core/formats/nested_text.hpp"
 #include "core/formats/rigid_matrix.hpp"
+#include "core/nested_text.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse {

@@ -8,7 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "core/formats/nested_text.hpp"
+#include "core/nested_text.hpp"
 
 namespace orbitfuse {
 namespace {

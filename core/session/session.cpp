@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <unordered_map>
 
-#include "core/formats/nested_text.hpp"
+#include "core/nested_text.hpp"
 #include "core/session/manifest_json.hpp"
 #include "core/system/file_io.hpp"
 

@@ -5,6 +5,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <cassert>
 #include <cerrno>
 #include <cstring>
 
@@ -15,6 +16,7 @@ FolderChangeLock::~FolderChangeLock() {
 }
 
 Status FolderChangeLock::acquire(const std::filesystem::path& folder) {
+  assert(descriptor_ < 0 && "a lock is taken once");
   const std::filesystem::path named = folder.empty() ? "." : folder;
   descriptor_ = open(named.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   int locked = -1;

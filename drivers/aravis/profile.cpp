@@ -8,7 +8,7 @@
 #include <array>
 
 #include "capture/recording/thermal_samples.hpp"
-#include "core/formats/nested_text.hpp"
+#include "core/nested_text.hpp"
 
 namespace orbitfuse::aravis {
 namespace {

@@ -272,6 +272,7 @@ class KeyframeScene {
     std::vector<Canvas> layers(used.size(), Canvas(Camera{}));
     parallel_for(static_cast<int>(used.size()), [&](int i) {
       const auto k = static_cast<std::size_t>(i);
+      // Of keyframes far away every slanted surface is a stair: its outlines would be edges.
       layers[k] = drawn(*used[k], camera, cam_from_world, used.size() == 1);
     });
     Canvas& all = layers.front();

@@ -107,7 +107,7 @@ Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer,
                                            const RenderAlignmentOptions& options,
                                            const Progress& progress) {
   RenderAlignment result;
-  for (const PosedView& view : views) result.views.push_back({view, 0, 0, 0, {}, 0});
+  for (const PosedView& view : views) result.views.push_back({view, 0, 0, 0, {}, {}});
   if (views.empty()) return result;
   double focal = views.front().camera.fx;
   const double prior_focal = options.prior_focal_px > 0 ? options.prior_focal_px : focal;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "core/geometry/reconstruction.hpp"
@@ -43,7 +44,9 @@ struct RenderAlignedView {
   int matches = 0;       ///< patches within 2 px of that round's answer
   double median_px = 0;  ///< their residual, in pixels of the last round
   ViewVerdict verdict;
-  int confirmed_patches = 0;  ///< that other views of its modality show where its pose has them
+  /// Patches that other views of its modality show where its pose has them; none where nobody was
+  /// asked.
+  std::optional<int> confirmed_patches;
   /// Compares places of one view. Agreement alone favours a place with few edges, the number of
   /// patches alone one with many.
   double support() const { return agreement * matches; }

@@ -8,7 +8,7 @@
 #include <ctime>
 #include <set>
 
-#include "core/formats/nested_text.hpp"
+#include "core/nested_text.hpp"
 #include "core/system/file_io.hpp"
 #include "core/system/folder_change_lock.hpp"
 

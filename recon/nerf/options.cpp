@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/nerf/options.hpp"
 
-#include "core/formats/nested_text.hpp"
 #include "core/near_word.hpp"
+#include "core/nested_text.hpp"
 
 #include <fmt/format.h>
 

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "core/numeric/median.hpp"
 #include "core/system/parallel.hpp"
@@ -79,7 +80,7 @@ struct BundleSolution {
   std::vector<PoseCorrection> corrections;
   double log_focal = 0;
   double median_px = 0;        ///< of the sightings' residuals
-  std::vector<int> confirmed;  ///< sightings of each view within confirmed_px
+  std::vector<int> confirmed;  ///< patches of each view
 };
 
 class Bundle {
@@ -92,7 +93,8 @@ class Bundle {
       for (const PatchMatch& match : round.edges[v]) add(v, match);
   }
 
-  BundleSolution solve(const ValuePrior& log_focal) {
+  /// Nothing where no usable answer is found.
+  std::optional<BundleSolution> solve(const ValuePrior& log_focal) {
     problem_.AddResidualBlock(
         new ceres::AutoDiffCostFunction<ValuePrior, 1, 1>(new ValuePrior(log_focal)), nullptr,
         &solution_.log_focal);
@@ -103,21 +105,20 @@ class Bundle {
     solver.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;
     ceres::Solve(solver, &problem_, &summary);
+    if (!summary.IsSolutionUsable()) return std::nullopt;
     judge();
     return solution_;
   }
 
  private:
   void add(const ThermalTrack& track, std::array<double, 3>& offset) {
+    blocks_.emplace_back();
     for (const ThermalSighting& seen : track.sightings)
-      sightings_.emplace_back(
-          seen.view,
-          problem_.AddResidualBlock(
-              new ceres::AutoDiffCostFunction<SightingResidual, 2, 6, 1, 3>(
-                  new SightingResidual{track.surface, round_.views.cam_from_world[seen.view],
-                                       round_.views.camera, seen}),
-              new ceres::CauchyLoss(options_.loss_px), solution_.corrections[seen.view].data(),
-              &solution_.log_focal, offset.data()));
+      blocks_.back().push_back(problem_.AddResidualBlock(
+          new ceres::AutoDiffCostFunction<SightingResidual, 2, 6, 1, 3>(new SightingResidual{
+              track.surface, round_.views.cam_from_world[seen.view], round_.views.camera, seen}),
+          new ceres::CauchyLoss(options_.loss_px), solution_.corrections[seen.view].data(),
+          &solution_.log_focal, offset.data()));
     problem_.AddResidualBlock(
         new ceres::AutoDiffCostFunction<SurfaceResidual, 1, 3>(
             new SurfaceResidual{track.sight, options_.surface_sigma * track.distance}),
@@ -133,14 +134,25 @@ class Bundle {
         solution_.corrections[view].data(), &solution_.log_focal);
   }
 
+  /// A patch confirms the view that it was taken from, and each that shows it, where both have it
+  /// within confirmed_px: a view doesn't confirm itself.
   void judge() {
     solution_.confirmed.assign(solution_.corrections.size(), 0);
     std::vector<double> residuals;
-    for (const auto& [view, block] : sightings_) {
-      double r[2];
-      if (!problem_.EvaluateResidualBlock(block, false, nullptr, r, nullptr)) continue;
-      residuals.push_back(std::hypot(r[0], r[1]));
-      solution_.confirmed[view] += residuals.back() < confirmed_px ? 1 : 0;
+    for (std::size_t t = 0; t < blocks_.size(); ++t) {
+      std::vector<bool> near;
+      for (const ceres::ResidualBlockId block : blocks_[t]) {
+        double r[2] = {confirmed_px, confirmed_px};
+        problem_.EvaluateResidualBlock(block, false, nullptr, r, nullptr);
+        residuals.push_back(std::hypot(r[0], r[1]));
+        near.push_back(residuals.back() < confirmed_px);
+      }
+      if (!near.front()) continue;
+      const auto& sightings = round_.tracks[t].sightings;
+      for (std::size_t s = 1; s < sightings.size(); ++s)
+        solution_.confirmed[sightings[s].view] += near[s] ? 1 : 0;
+      solution_.confirmed[sightings.front().view] +=
+          std::count(near.begin() + 1, near.end(), true) > 0 ? 1 : 0;
     }
     solution_.median_px = residuals.empty() ? 0 : median(residuals);
   }
@@ -150,7 +162,7 @@ class Bundle {
   std::vector<std::array<double, 3>> offsets_;
   BundleSolution solution_;
   ceres::Problem problem_;
-  std::vector<std::pair<std::size_t, ceres::ResidualBlockId>> sightings_;
+  std::vector<std::vector<ceres::ResidualBlockId>> blocks_;  ///< of each track, by its sightings
 };
 
 Result<BundleRound> prepared(const OrbitRefinement& refinement, const Fit& alignment,
@@ -199,14 +211,14 @@ std::size_t held_views(const BundleRound& round) {
       std::count_if(sightings.begin(), sightings.end(), [](int n) { return n >= least_patches; }));
 }
 
-void take(const BundleSolution& solution, Fit& alignment) {
+void take(const BundleSolution& solution, const std::vector<std::size_t>& chosen, Fit& alignment) {
   const double scale = std::exp(solution.log_focal);
   for (std::size_t i = 0; i < alignment.views.size(); ++i) {
-    RenderAlignedView& view = alignment.views[i];
-    view.confirmed_patches = solution.confirmed[i];
-    view.view.cam_from_world = rigid_of(solution.corrections[i]) * view.view.cam_from_world;
-    view.view.camera.fx *= scale, view.view.camera.fy *= scale;
+    PosedView& view = alignment.views[i].view;
+    view.cam_from_world = rigid_of(solution.corrections[i]) * view.cam_from_world;
+    view.camera.fx *= scale, view.camera.fy *= scale;
   }
+  for (const std::size_t i : chosen) alignment.views[i].confirmed_patches = solution.confirmed[i];
   alignment.focal_px = alignment.views.front().view.camera.fx;
 }
 
@@ -218,20 +230,30 @@ Status bundle_thermal(const OrbitRefinement& refinement, const FocalGuess& prior
   for (std::size_t i = 0; i < alignment.views.size(); ++i)
     if (alignment.views[i].verdict.confidence != Confidence::dropped) chosen.push_back(i);
   if (chosen.empty()) return {};
+  Fit bundled = alignment;
   for (const int reach_px : reaches_px) {
     ORBITFUSE_ASSIGN(const BundleRound round,
-                     prepared(refinement, alignment, chosen, options, reach_px));
-    if (2 * held_views(round) < chosen.size()) return {};
-    const double focal_px = alignment.views.front().view.camera.fx;
-    const BundleSolution solution =
-        Bundle(round, options).solve({std::log(prior.focal_px / focal_px), prior.relative_sigma});
-    take(solution, alignment);
+                     prepared(refinement, bundled, chosen, options, reach_px));
+    const double focal_px = bundled.views.front().view.camera.fx;
+    std::optional<BundleSolution> solution;
+    if (2 * held_views(round) >= chosen.size())
+      solution =
+          Bundle(round, options).solve({std::log(prior.focal_px / focal_px), prior.relative_sigma});
+    if (!solution) {
+      refinement.progress.report(
+          {"poses.thermal", 3, 4, -1,
+           fmt::format("{} places seen by several thermal views: too few to bundle them",
+                       round.tracks.size())});
+      return {};
+    }
+    take(*solution, chosen, bundled);
     refinement.progress.report(
         {"poses.thermal", 3, 4, -1,
          fmt::format("{} places seen by several thermal views, {:.2f} px; focal length {:+.2f} %",
-                     round.tracks.size(), solution.median_px,
-                     100 * (std::exp(solution.log_focal) - 1))});
+                     round.tracks.size(), solution->median_px,
+                     100 * (std::exp(solution->log_focal) - 1))});
   }
+  alignment = std::move(bundled);
   return {};
 }
 

@@ -22,8 +22,9 @@ struct ThermalBundleOptions {
 };
 
 /// All views and their common focal length. Patches are looked for among views that are not
-/// dropped; those are held by the visible scene's edges alone. Each view says how many of its
-/// patches others confirm. Where fewer than half of the views have enough of them nothing moves.
+/// dropped; those are held by the visible scene's edges alone. Each of them says how many of its
+/// patches others confirm. Where fewer than half of the views have enough of them, or the solve
+/// fails, nothing moves. `agreement`, `matches` and `median_px` stay those of the edges before.
 Status bundle_thermal(const OrbitRefinement& refinement, const FocalGuess& prior,
                       const ThermalBundleOptions& options, Fit& alignment);
 

@@ -137,14 +137,25 @@ std::vector<std::size_t> neighbours_of(const ThermalViews& views, std::size_t vi
   return found;
 }
 
+/// Corners away from dead pixels, which would blind the detector down their columns.
+std::vector<cv::Point2f> corners_of(const cv::Mat& image, const ThermalTrackOptions& options) {
+  std::vector<cv::Point2f> corners;
+  const cv::Mat known = image == image;
+  if (cv::countNonZero(known) == 0) return corners;
+  cv::Mat filled = image.clone(), usable;
+  filled.setTo(cv::mean(image, known), ~known);
+  cv::erode(known, usable, cv::Mat(), {-1, -1}, corner_block_px);
+  cv::goodFeaturesToTrack(filled, corners, options.max_patches, corner_quality, corner_spacing_px,
+                          usable, corner_block_px);
+  return corners;
+}
+
 std::vector<ThermalTrack> tracks_of(const ThermalViews& views, std::size_t view,
                                     const std::vector<std::size_t>& neighbours,
                                     const ThermalTrackOptions& options) {
   const cv::Mat& image = views.images[view];
-  std::vector<cv::Point2f> corners;
-  if (!neighbours.empty())
-    cv::goodFeaturesToTrack(image, corners, options.max_patches, corner_quality, corner_spacing_px,
-                            cv::noArray(), corner_block_px);
+  if (neighbours.empty()) return {};
+  const std::vector<cv::Point2f> corners = corners_of(image, options);
   std::vector<cv::Mat> paintings;
   for (const std::size_t other : neighbours)
     paintings.push_back(painted_by(

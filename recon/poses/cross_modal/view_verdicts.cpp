@@ -90,11 +90,13 @@ Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
     evidence.push_back(seen);
   }
   std::vector<double> off_deg, correlations, confirmed;
-  for (const RenderAlignedView& view : alignment.views) confirmed.push_back(view.confirmed_patches);
-  const double median_patches = median(confirmed);
+  for (const RenderAlignedView& view : alignment.views)
+    if (view.confirmed_patches) confirmed.push_back(*view.confirmed_patches);
+  const double median_patches = confirmed.empty() ? 0 : median(confirmed);
   for (std::size_t i = 0; i < evidence.size(); ++i)
     if (median_patches >= least_median_patches)
-      evidence[i].confirmed_share = confirmed[i] / median_patches;
+      evidence[i].confirmed_share =
+          alignment.views[i].confirmed_patches.value_or(0) / median_patches;
   for (const ViewEvidence& seen : evidence) {
     off_deg.push_back(seen.azimuth_off_deg);
     if (seen.correlation) correlations.push_back(*seen.correlation);
@@ -196,7 +198,7 @@ Result<std::vector<int>> judge_views(const OrbitRefinement& refinement, std::siz
                      "{:.1f} deg, distance {:.3f}, aim {:.3f}, {} patches confirmed",
                      view.view.name, seen.support_share, seen.correlation.value_or(-1),
                      seen.azimuth_off_deg, seen.elevation_off_deg, seen.log_distance_off,
-                     seen.aim_off, view.confirmed_patches)});
+                     seen.aim_off, view.confirmed_patches.value_or(0))});
   }
   return doubt_whole_loops(refinement.orbit, stations, alignment);
 }

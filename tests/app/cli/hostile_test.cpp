@@ -211,14 +211,15 @@ TEST_F(Hostile, ConfigurationsThatNeverEndAreRefused) {
 /// Options named in messages are options of the program.
 TEST(Messages, NameOptionsThatExist) {
   const std::string reference = *read_file(fs::path(ORBITFUSE_SOURCE_DIR) / "docs/cli.md");
-  // Of other programs that are told to run: v4l2-ctl, COLMAP, apt-get, and our recorder of scenes.
+  // Of other programs that are told to run: v4l2-ctl, COLMAP, Chromium, apt-get, and our recorder
+  // of scenes.
   const std::regex literal(R"lit("((?:[^"\\]|\\.)*)")lit"),
       option(R"((^|[^\w-])(--[a-z][a-z0-9-]*[a-z0-9]))");
   for (const char* folder : {"app", "core", "capture", "drivers", "fusion", "recon"}) {
     for (const auto& entry :
          fs::recursive_directory_iterator(fs::path(ORBITFUSE_SOURCE_DIR) / folder)) {
       if (entry.path().extension() != ".cpp" || entry.path().filename() == "record_main.cpp" ||
-          entry.path().filename() == "colmap.cpp")
+          entry.path().filename() == "colmap.cpp" || entry.path().filename() == "print_pdf.cpp")
         continue;
       std::istringstream lines(*read_file(entry.path()));
       for (std::string line; std::getline(lines, line);) {

@@ -58,7 +58,7 @@ struct Ball {
       truth.push_back({"view" + std::to_string(i), camera, cam_from_world_of(pose, camera)});
       orbit.images.push_back(ball_view(camera, truth.back().cam_from_world, true).brightness);
       orbit.stations.push_back({});
-      alignment.views.push_back({truth.back(), 0.3, 100, 0.5, {}, 0});
+      alignment.views.push_back({truth.back(), 0.3, 100, 0.5, {}, {}});
     }
     alignment.focal_px = camera.fx;
   }
@@ -98,7 +98,7 @@ TEST(ThermalBundle, ACommonErrorOfFocalLengthAndDistanceGoes) {
   EXPECT_NEAR(ball.focal_error(), 0, 0.004);
   for (std::size_t i = 0; i < ball.truth.size(); ++i) {
     EXPECT_LT(ball.center_error(i), 0.006 * 2.5) << i;
-    EXPECT_GT(ball.alignment.views[i].confirmed_patches, 50) << i;
+    EXPECT_GT(ball.alignment.views[i].confirmed_patches.value_or(0), 50) << i;
     EXPECT_DOUBLE_EQ(ball.alignment.views[i].view.camera.fx, ball.alignment.focal_px);
   }
 }
@@ -110,8 +110,8 @@ TEST(ThermalBundle, AViewElsewhereIsConfirmedByNobodyAndMovesNobody) {
   PosedView& wrong = ball.alignment.views[4].view;
   wrong.cam_from_world = cam_from_world_of(elsewhere, wrong.camera);
   ASSERT_TRUE(ball.bundle());
-  EXPECT_LT(ball.alignment.views[4].confirmed_patches,
-            0.4 * ball.alignment.views[8].confirmed_patches);
+  EXPECT_LT(ball.alignment.views[4].confirmed_patches.value(),
+            0.4 * ball.alignment.views[8].confirmed_patches.value());
   for (std::size_t i = 0; i < ball.truth.size(); ++i)
     EXPECT_LT(i == 4 ? 0 : ball.center_error(i), 0.006 * 2.5) << i;
 }
@@ -127,7 +127,7 @@ TEST(ThermalBundle, WithoutAnythingToFindNothingMoves) {
     for (std::size_t i = 0; i < before.views.size(); ++i) {
       EXPECT_EQ(ball.alignment.views[i].view.cam_from_world.translation,
                 before.views[i].view.cam_from_world.translation);
-      EXPECT_EQ(ball.alignment.views[i].confirmed_patches, 0);
+      EXPECT_FALSE(ball.alignment.views[i].confirmed_patches);
     }
   }
   Ball blind(6);
@@ -141,12 +141,23 @@ TEST(ThermalBundle, WithoutAnythingToFindNothingMoves) {
   EXPECT_TRUE(none.bundle());
 }
 
+TEST(ThermalBundle, DeadPixelsBlindNobody) {
+  Ball ball;
+  for (cv::Mat& image : ball.orbit.images)
+    for (int x = 5; x < 320; x += 40) image.at<float>(3, x) = nothing;
+  ball.orbit.images[2].at<float>(120, 160) = nothing;
+  ASSERT_TRUE(ball.bundle());
+  for (const RenderAlignedView& view : ball.alignment.views)
+    EXPECT_GT(view.confirmed_patches.value_or(0), 50) << view.view.name;
+}
+
 TEST(ThermalBundle, DroppedViewsLendNothing) {
   Ball ball;
   ball.alignment.views[3].verdict = {Confidence::dropped, DoubtReason::not_found, ""};
   ASSERT_TRUE(ball.bundle());
-  EXPECT_EQ(ball.alignment.views[3].confirmed_patches, 0);
-  EXPECT_GT(ball.alignment.views[2].confirmed_patches, 50);
+  EXPECT_FALSE(ball.alignment.views[3].confirmed_patches);
+  EXPECT_GT(ball.alignment.views[2].confirmed_patches.value_or(0), 50);
+  EXPECT_LT(ball.center_error(3), 0.03 * 2.5) << "edges alone hold it";
 }
 
 TEST(ThermalBundle, ARendererThatFailsIsPassedOn) {

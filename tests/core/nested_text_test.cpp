@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/formats/nested_text.hpp"
+#include "core/nested_text.hpp"
 
 #include <gtest/gtest.h>
 
