@@ -5,11 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "app/config/settings.hpp"
 
 namespace orbitfuse::inspection {
 namespace {
+
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 using measurement::Answer;
 using measurement::Kind;
 using measurement::Measurements;
@@ -149,7 +152,11 @@ Result<std::vector<InspectionFinding>> findings_of(const Measurements& saved,
     const auto& [of, said] = order[i];
     const std::string& reference =
         said != nullptr && !said->reference.empty() ? said->reference : of->reference;
-    if (!reference.empty()) {
+    const bool said_here = said != nullptr && !said->reference.empty();
+    if (!reference.empty() && !said_here && saved.find(reference) == nullptr) {
+      // Removed since: the user who saved it can't mend that here, and the rest is right.
+      finding.comparison = Comparison{reference + " (no longer saved)", unknown, unknown, {}, {}};
+    } else if (!reference.empty()) {
       ORBITFUSE_ASSIGN(
           finding.comparison,
           comparison_of(finding, reference, where_of(said, finding.measurement), findings, saved));

@@ -96,7 +96,10 @@ std::string headline(const InspectionFinding& f) {
                                : fmt::format("{:.4f} units of the run", f.answer.distance);
   const auto& r = f.reading();
   if (!r.seen()) return "not measured";
-  return fmt::format("{} ± {} °C", celsius_words(r.temperature_k), number_words(r.uncertainty_k));
+  const std::string degrees = celsius_words(r.temperature_k);
+  return std::isfinite(r.uncertainty_k)
+             ? fmt::format("{} ± {} °C", degrees, number_words(r.uncertainty_k))
+             : degrees + " °C";
 }
 
 std::string summary(const InspectionModel& model) {

@@ -150,17 +150,19 @@ void mark_box(const measurement::OrientedBox& box, Marker& marker) {
       if ((i & axis) == 0) marker.line(corner(i), corner(i | axis));
 }
 
-/// The outline in the world, where the run still has the view that it was drawn in.
-void mark_polygon(const measurement::Request& request, const ThermalScene& scene,
+/// The outline in the world, where the run still has the view that it was drawn in. False where a
+/// corner shows no surface any more.
+bool mark_polygon(const measurement::Request& request, const ThermalScene& scene,
                   const Progress& progress, Marker& marker) {
   std::vector<Eigen::Vector3d> corners;
   for (const measurement::Place& place : request.places) {
     const auto surface = measurement::surface_of(scene, place, progress);
-    if (!surface) return;
+    if (!surface) return false;
     corners.push_back(surface->position);
   }
   for (std::size_t i = 0; i < corners.size(); ++i)
     marker.line(corners[i], corners[(i + 1) % corners.size()]);
+  return true;
 }
 
 std::string mark(const Answer& answer, const measurement::Request& request,
@@ -190,9 +192,10 @@ std::string mark(const Answer& answer, const measurement::Request& request,
       mark_box(request.box, marker);
       return "box: the region";
     case Kind::polygon:
-      mark_polygon(request, scene, progress, marker);
       if (answer.position) marker.ring(*answer.position, "");
-      return "outline: the region; ring: its middle";
+      return mark_polygon(request, scene, progress, marker)
+                 ? "outline: the region; ring: its middle"
+                 : "ring: the region's middle";
     case Kind::difference:
       for (std::size_t i = 0; i < std::min(answer.of.size(), request.of.size()); ++i) {
         const Answer& part = answer.of[i];

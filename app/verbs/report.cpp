@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <optional>
+
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
 #include "app/inspection/inspection.hpp"
@@ -11,15 +13,16 @@ namespace fs = std::filesystem;
 
 struct Options {
   StageFolders folders;
-  std::string inspection;
+  std::optional<std::string> inspection;
   bool pdf = false, print_template = false;
 };
 
 Status write_inspection(Context& context, Options options) {
+  if (options.pdf) ORBITFUSE_TRY(inspection::find_browser());
   ORBITFUSE_TRY(resolve(options.folders));
   const fs::path out = options.folders.out;
   ORBITFUSE_ASSIGN(const Session session, open_session(options.folders.session));
-  ORBITFUSE_ASSIGN(const auto details, inspection::read_details(options.inspection));
+  ORBITFUSE_ASSIGN(const auto details, inspection::read_details(*options.inspection));
   ORBITFUSE_ASSIGN(
       const inspection::InspectionModel model,
       inspection::inspection_of(out, session, details, context.config, context.progress));
@@ -32,9 +35,11 @@ Status write_inspection(Context& context, Options options) {
         ": the report has no findings; save some with orbitfuse measure --save");
   if (context.common.dry_run) {
     context.console.info("would write " + html.string());
-    if (options.pdf) ORBITFUSE_TRY(inspection::find_browser());
     return {};
   }
+  // One of an earlier call would tell other findings.
+  std::error_code ignored;
+  fs::remove(pdf, ignored);
   ORBITFUSE_TRY(write_file_atomic(html, to_html(model)));
   context.console.info("inspection report: " + html.string());
   context.result["html"] = html.string();
@@ -51,7 +56,10 @@ Status report(Context& context, const Options& options) {
     context.result["template"] = inspection::details_template();
     return {};
   }
-  if (!options.inspection.empty()) return write_inspection(context, options);
+  if (options.inspection && options.inspection->empty())
+    return fail(ErrorKind::usage, "--inspection", "an empty file name",
+                "name the details; --print-template prints some to fill in");
+  if (options.inspection) return write_inspection(context, options);
   if (options.pdf)
     return fail(ErrorKind::usage, "--pdf", "without --inspection",
                 "name the details: --inspection FILE; --print-template prints one to fill in");

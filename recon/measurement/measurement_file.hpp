@@ -31,7 +31,8 @@ struct Kept {
   bool replaced = false;  ///< one of that name was there before
 };
 
-/// {"name", "created", "request", "answer"}.
+/// {"name", "created", "request", "answer"}, and "remark", "component", "reference" where they were
+/// given.
 nlohmann::json to_json(const SavedMeasurement& saved);
 
 struct Measurements {

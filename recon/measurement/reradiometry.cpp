@@ -11,6 +11,9 @@
 namespace orbitfuse::measurement {
 namespace {
 
+/// Assumed where a user tells the emissivity of the recording and nothing else.
+constexpr double assumed_reflected_k = 293.15;
+
 /// A grey body at one wavelength: S = 1 / (e^(B/T) - 1). B = c2 / 10 um; long-wave cameras have
 /// 1380 to 1510 K.
 constexpr PlanckConstants ten_micrometres{.r1 = 1, .r2 = 1, .b = 1438.8, .f = 1, .o = 0};
@@ -57,7 +60,8 @@ Result<Reradiometry> Reradiometry::make(const std::vector<ThermalFrame>& frames,
     result.assumption_ = fmt::format(
         "the session has no radiometry: taken as a grey body at 10 um, recorded with emissivity "
         "{:g}, reflected temperature {:.1f} C",
-        *recorded.emissivity, recorded.reflected_temperature_k.value_or(293.15) - 273.15);
+        *recorded.emissivity,
+        recorded.reflected_temperature_k.value_or(assumed_reflected_k) - 273.15);
   return result;
 }
 
@@ -82,20 +86,27 @@ double Reradiometry::field_k(double kelvin) const {
 
 namespace {
 
-/// What frames have of one parameter.
+/// What frames have of one parameter, and where from.
 struct Range {
   double low = std::numeric_limits<double>::infinity(), high = -low;
-  bool all = true;  ///< every frame has it
-  void add(double value) { low = std::min(low, value), high = std::max(high, value); }
-  double same() const { return all && low == high ? low : unknown; }
+  int known = 0, frames = 0;
+  const char* source = " as recorded";
+  void add(const std::optional<double>& value) {
+    ++frames;
+    if (!value) return;
+    ++known;
+    low = std::min(low, *value), high = std::max(high, *value);
+  }
+  double same() const { return known == frames && low == high ? low : unknown; }
 };
 
-std::string words_of(const Range& r, const char* what, int digits, const char* unit,
-                     const char* source) {
-  if (!r.all) return fmt::format("{} not recorded", what);
-  return r.low == r.high ? fmt::format("{} {:.{}f}{}{}", what, r.low, digits, unit, source)
-                         : fmt::format("{} {:.{}f} to {:.{}f}{}{}", what, r.low, digits, r.high,
-                                       digits, unit, source);
+std::string words_of(const Range& r, const char* what, int digits, const char* unit) {
+  if (r.known == 0) return fmt::format("{} not recorded", what);
+  std::string text = fmt::format("{} {:.{}f}", what, r.low, digits);
+  if (r.low != r.high) text += fmt::format(" to {:.{}f}", r.high, digits);
+  text += fmt::format("{}{}", unit, r.source);
+  if (r.known < r.frames) text += fmt::format(" in {} of {} frames", r.known, r.frames);
+  return text;
 }
 
 }  // namespace
@@ -104,38 +115,40 @@ UsedParameters used_parameters(const std::vector<ThermalFrame>& frames,
                                const ObjectParameterOverrides& object,
                                const ObjectParameterOverrides& recorded) {
   Range emissivity, reflected_k;
-  const auto add = [](Range& range, const std::optional<double>& asked,
-                      const std::optional<double>& known) {
-    if (asked || known)
-      range.add(asked ? *asked : *known);
-    else
-      range.all = false;
+  const auto note = [](Range& range, const std::optional<double>& asked,
+                       const std::optional<double>& of_frame, const std::optional<double>& told,
+                       const char* told_words) {
+    if (asked)
+      range.source = " as asked";
+    else if (!of_frame && told)
+      range.source = told_words;
+    range.add(asked ? asked : of_frame ? of_frame : told);
   };
+  const std::optional<double> assumed =
+      recorded.emissivity ? std::optional(assumed_reflected_k) : std::nullopt;
   for (const ThermalFrame& frame : frames) {
     const auto known = [&](double ObjectParameters::*of) {
       return frame.radiometry ? std::optional(frame.radiometry->object.*of) : std::nullopt;
     };
-    const auto e = known(&ObjectParameters::emissivity);
-    const auto t = known(&ObjectParameters::reflected_k);
-    add(emissivity, object.emissivity, e ? e : recorded.emissivity);
-    add(reflected_k, object.reflected_temperature_k, t ? t : recorded.reflected_temperature_k);
+    note(emissivity, object.emissivity, known(&ObjectParameters::emissivity), recorded.emissivity,
+         " as told of the recording");
+    note(reflected_k, object.reflected_temperature_k, known(&ObjectParameters::reflected_k),
+         recorded.reflected_temperature_k ? recorded.reflected_temperature_k : assumed,
+         recorded.reflected_temperature_k ? " as told of the recording" : " assumed");
   }
   UsedParameters used;
   if (frames.empty()) return used;
   used.emissivity = emissivity.same();
   used.reflected_k = reflected_k.same();
-  if (!emissivity.all && !reflected_k.all) {
+  if (emissivity.known == 0 && reflected_k.known == 0) {
     used.words = "emissivity not recorded: temperatures as the camera gave them";
     return used;
   }
   Range celsius = reflected_k;
   celsius.low = celsius_from_kelvin(celsius.low);
   celsius.high = celsius_from_kelvin(celsius.high);
-  used.words =
-      words_of(emissivity, "emissivity", 2, "", object.emissivity ? " as asked" : " as recorded") +
-      ", " +
-      words_of(celsius, "reflected temperature", 1, " C",
-               object.reflected_temperature_k ? " as asked" : " as recorded");
+  used.words = words_of(emissivity, "emissivity", 2, "") + ", " +
+               words_of(celsius, "reflected temperature", 1, " C");
   return used;
 }
 

@@ -153,13 +153,14 @@ TEST(Agreement, PixelsBetweenAlikeNeighboursAreTheirMean) {
       return render(field, data.views[1].camera, data.views[1].cam_from_world, {.alike = alike}, {})
           .value();
     };
-    const RenderedView all = shown(0), exact = shown(1e-9), quick = shown(0.006);
+    const RenderedView all = shown(0), exact = shown(1e-9), quick = shown(0.05);
     const double range =
         modality == Modality::visible ? 1 : field.state().span.high - field.state().span.low;
     // Where none are alike all are rendered, apart from what is looked ahead.
     EXPECT_LT(rms_of(exact.color, all.color), 0.01 * range);
-    EXPECT_LT(rms_of(quick.color, exact.color), 0.003 * range);
-    EXPECT_LT(cv::norm(quick.color, exact.color, cv::NORM_INF), 0.05 * range);
+    EXPECT_LT(rms_of(quick.color, exact.color), 0.005 * range);
+    // A detail between four alike neighbours is missed.
+    EXPECT_LT(cv::norm(quick.color, exact.color, cv::NORM_INF), 0.15 * range);
     const cv::Mat known = quick.opacity >= 0;
     EXPECT_EQ(cv::countNonZero(known), 96 * 96);
     EXPECT_EQ(cv::countNonZero(quick.color.reshape(1) == quick.color.reshape(1)),
