@@ -106,7 +106,14 @@ TEST(UsedParameters, AreTheRecordedOnesUnlessOthersAreAsked) {
   EXPECT_THAT(unlike.words, HasSubstr("0.90 to 0.95 as recorded"));
   EXPECT_TRUE(std::isnan(unlike.emissivity));
   parts.frames.front().radiometry.reset();
+  EXPECT_THAT(used_parameters(parts.frames, {}, {}).words,
+              HasSubstr("emissivity 0.95 as recorded in 23 of 24 frames"));
+  for (ThermalFrame& frame : parts.frames) frame.radiometry.reset();
   EXPECT_THAT(used_parameters(parts.frames, {}, {}).words, HasSubstr("not recorded"));
+  ObjectParameterOverrides told;
+  told.emissivity = 0.9;
+  EXPECT_EQ(used_parameters(parts.frames, {}, told).words,
+            "emissivity 0.90 as told of the recording, reflected temperature 20.0 C assumed");
   EXPECT_EQ(used_parameters({}, {}, {}).words, "");
   EXPECT_THAT(ask(box_orbit(), spot_at({0.4, 0.02, 0.01})).radiometry.words,
               HasSubstr("as the camera gave them"));
