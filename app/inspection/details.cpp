@@ -194,12 +194,13 @@ class Reading {
         {"component", &one.component},     {"reference", &one.reference},
         {"remark", &one.remark},           {"recommendation", &one.recommendation}};
     for (const auto& [key, node] : table) {
+      const std::string_view named = key.str();
       const auto* known = std::find_if(std::begin(texts), std::end(texts),
-                                       [&](const auto& t) { return key.str() == t.first; });
+                                       [&](const auto& t) { return named == t.first; });
       if (known == std::end(texts)) {
         std::vector<std::string> names;
         for (const auto& t : texts) names.emplace_back(t.first);
-        return unknown(std::string(key.str()), node, names);
+        return unknown(std::string(named), node, names);
       }
       ORBITFUSE_ASSIGN(*known->second, text(known->first, node));
     }

@@ -53,14 +53,14 @@ Result<double> fineness(const RecordedView& view, const Eigen::Vector3d& point,
             y = static_cast<int>(std::floor(pixel.y()));
   if (!pixel.allFinite() || x < 0 || y < 0 || x >= camera.width || y >= camera.height) return 0;
   // Only what lies round the pixel is needed.
-  constexpr int window_px = 5;
+  constexpr int reach_px = 2, window_px = 2 * reach_px + 1;
   Camera window = camera;
   window.width = window.height = window_px;
-  window.cx += window_px / 2 - x;
-  window.cy += window_px / 2 - y;
+  window.cx += reach_px - x;
+  window.cy += reach_px - y;
   ORBITFUSE_ASSIGN(const measurement::FieldView seen,
                    scene.render(window, view.view.cam_from_world, progress));
-  const auto z = static_cast<double>(seen.depth.at<float>(window_px / 2, window_px / 2));
+  const auto z = static_cast<double>(seen.depth.at<float>(reach_px, reach_px));
   // NaN: the thermal field holds nothing there, so that nothing of it is before the point either.
   if (z < in_cam.z() * (1 - scene.options().depth_tolerance)) return 0;
   return camera.fx * whole.width / width / in_cam.z();
