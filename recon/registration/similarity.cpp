@@ -26,7 +26,8 @@ Result<Similarity3d> umeyama(const Points& source, const Points& target,
   if (n < 3) return degenerate(fmt::format("{} pairs", n));
   const auto weight = [&](std::size_t i) { return weights.empty() ? 1.0 : weights[i]; };
   // Sums about the first point: at offsets of 4e8 the coordinates themselves would cancel.
-  const Eigen::Vector3d& source_origin = source[0], target_origin = target[0];
+  const Eigen::Vector3d& source_origin = source[0];
+  const Eigen::Vector3d& target_origin = target[0];
   double total = 0;
   Eigen::Vector3d source_mean = Eigen::Vector3d::Zero(), target_mean = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < n; ++i) {
