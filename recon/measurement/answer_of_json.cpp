@@ -41,7 +41,7 @@ class Reader {
   std::optional<Eigen::Vector3d> vector(const char* key) {
     const json* found = find(key);
     if (found == nullptr) return std::nullopt;
-    const auto value = vector_of(*found);
+    auto value = vector_of(*found);
     if (!value) complain(key, "three numbers");
     return value;
   }
