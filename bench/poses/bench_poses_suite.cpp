@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <string_view>
@@ -48,7 +49,8 @@ std::set<std::string> words(const std::string& list) {
   return set;
 }
 
-Arguments arguments_of(int argc, char** argv) {
+/// Nothing where a word is not understood: an option taken for RUNS would be a folder of that name.
+std::optional<Arguments> arguments_of(int argc, char** argv) {
   Arguments arguments;
   arguments.program = fs::path(argv[0]).parent_path() / "../../app/orbitfuse";
   for (int i = 1; i < argc; ++i) {
@@ -61,8 +63,10 @@ Arguments arguments_of(int argc, char** argv) {
       arguments.perturbations = words(argv[++i]);
     else if (word == "--json" && i + 1 < argc)
       arguments.json_file = argv[++i];
-    else
+    else if (!word.starts_with('-'))
       arguments.runs = word;
+    else
+      return std::nullopt;
   }
   return arguments;
 }
@@ -257,7 +261,14 @@ Status run_scene(const SceneFolders& folders, const Arguments& arguments, json& 
 
 int main(int argc, char** argv) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
-  const Arguments arguments = arguments_of(argc, argv);
+  const std::optional<Arguments> asked = arguments_of(argc, argv);
+  if (!asked) {
+    fmt::print(stderr,
+               "bench_poses_suite [RUNS] [--scenes A,B] [--perturbations A,B|all] [--views] "
+               "[--json FILE]\n");
+    return 2;
+  }
+  const Arguments& arguments = *asked;
   fmt::print("{}; {} threads\n\n", cpu_description(), thread_count());
   fmt::print(
       "| scene | perturbation | posed | centres RMS / median / worst, % | rotation mean / worst, "

@@ -7,12 +7,13 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/image/image_io.hpp"
+#include "core/image/undistorted.hpp"
 
 namespace orbitfuse::scenes {
 namespace {
 
 bool changes_images(const Perturbation& by) {
-  return by.noise_k > 0 || by.blur_px > 0 || by.width_px > 0 || by.gray_gain;
+  return by.noise_k > 0 || by.blur_px > 0 || by.width_px > 0 || by.gray_gain || by.radial != 0;
 }
 
 /// Each image stretched between its own 1 and 99 per cent, as a camera without radiometry does.
@@ -36,6 +37,11 @@ Status rewrite(Scene& scene, FrameRecord& frame, const Perturbation& by, cv::RNG
     truth.camera = truth.camera.scaled_to(by.width_px, frame.height * by.width_px / frame.width);
     cv::resize(kelvin, kelvin, {truth.camera.width, truth.camera.height}, 0, 0, cv::INTER_AREA);
   }
+  if (by.radial != 0) {
+    const Camera straight = truth.camera;
+    truth.camera.k1 = by.radial;
+    kelvin = undistorted(kelvin, straight, truth.camera);
+  }
   if (by.noise_k > 0) {
     cv::Mat noise(kelvin.size(), CV_32F);
     random.fill(noise, cv::RNG::NORMAL, 0, by.noise_k);
@@ -57,7 +63,7 @@ Status rewrite(Scene& scene, FrameRecord& frame, const Perturbation& by, cv::RNG
 
 const std::vector<Perturbation>& perturbations() {
   static const std::vector<Perturbation> all = [] {
-    std::vector<Perturbation> list(13);
+    std::vector<Perturbation> list(15);
     list[1].name = "focal+3", list[1].focal_error = 0.03;
     list[2].name = "focal-3", list[2].focal_error = -0.03;
     list[3].name = "stations5", list[3].station_error_deg = 5;
@@ -70,6 +76,8 @@ const std::vector<Perturbation>& perturbations() {
     list[10].name = "gray8", list[10].gray_gain = true;
     list[11].name = "order", list[11].order_alone = true;
     list[12].name = "tracking", list[12].tracking = true;
+    list[13].name = "barrel", list[13].radial = -0.15;
+    list[14].name = "pincushion", list[14].radial = 0.1;
     return list;
   }();
   return all;

@@ -20,6 +20,7 @@ struct Perturbation {
   int missing_stations = 0;      ///< recorded frames that are not there
   double noise_k = 0;            ///< standard deviation added
   double blur_px = 0;            ///< at full width
+  double radial = 0;             ///< k1 that the lens has and the session doesn't know
   int width_px = 0;              ///< reduced to; 0: as it is
   bool tracking = false;         ///< with the frames recorded between the stations
   bool order_alone = false;      ///< nothing declared of the thermal orbit

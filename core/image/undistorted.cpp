@@ -17,4 +17,11 @@ cv::Mat undistorted(const cv::Mat& image, const Camera& from, const Camera& to) 
   return out;
 }
 
+cv::Mat straightened(const cv::Mat& image, const Camera& camera, double k1) {
+  if (k1 == 0) return image;
+  Camera bent = camera;
+  bent.k1 += k1;
+  return undistorted(image, bent, camera);
+}
+
 }  // namespace orbitfuse

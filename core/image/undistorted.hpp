@@ -11,4 +11,8 @@ namespace orbitfuse {
 /// place; what lies outside repeats the border. 8-bit or float samples.
 cv::Mat undistorted(const cv::Mat& image, const Camera& from, const Camera& to);
 
+/// The same of an image whose lens has this k1 (Brown) beside what `camera` says, at the camera's
+/// size; the image itself where it has none.
+cv::Mat straightened(const cv::Mat& image, const Camera& camera, double k1);
+
 }  // namespace orbitfuse

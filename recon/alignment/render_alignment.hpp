@@ -55,6 +55,10 @@ struct RenderAlignedView {
 struct RenderAlignment {
   std::vector<RenderAlignedView> views;
   double focal_px = 0;
+  /// k1 of the images' lens (Brown, normalised coordinates), where somebody has looked for it: the
+  /// cameras here are straight.
+  double radial = 0;
+  double radial_px = 0;  ///< by how much it shifts what was found far out
   std::vector<PosedView> poses() const;
 };
 

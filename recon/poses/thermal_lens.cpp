@@ -9,7 +9,7 @@ LensGuess lens_of(const Session& session, const FrameRecord& frame) {
   const DeviceInfo* device = session.device(frame.device);
   if (device != nullptr && device->lens.calibrated) {
     guess.camera = device->lens.calibrated->scaled_to(frame.width, frame.height);
-    guess.focal_relative_sigma = 0;
+    guess.focal_relative_sigma = guess.radial_sigma = 0;
     return guess;
   }
   double focal = usual_focal_by_width * frame.width;

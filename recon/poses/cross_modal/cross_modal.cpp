@@ -222,12 +222,13 @@ Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene&
     placed.warnings.push_back(
         "the thermal lens is unknown: 33 degrees were assumed to begin with; give its focal length "
         "(import --thermal-focal-px)");
-  const double focal_sigma = std::max(1e-4, evidence.work.lens.focal_relative_sigma);
   progress.report({"poses.thermal", 3, 4, -1, "alignment with renders"});
-  ORBITFUSE_TRY(refine_orbit(renderer, orbit, rendered, focal_sigma, progress));
+  OrbitWork work = evidence.work;
+  ORBITFUSE_TRY(refine_orbit(renderer, orbit, rendered,
+                             {work.lens.focal_relative_sigma, work.lens.radial_sigma}, progress));
+  work.lens.camera.k1 += rendered.radial;
   if (!tracking.empty())
-    ORBITFUSE_TRY(
-        pose_tracking(session, evidence.work, tracking, renderer, orbit, rendered, progress));
+    ORBITFUSE_TRY(pose_tracking(session, work, tracking, renderer, orbit, rendered, progress));
   ORBITFUSE_ASSIGN(const std::vector<int> doubted,
                    judge_views({renderer, orbit, progress}, blank.size(), rendered));
   if (lead < sure_lead) doubt_all(lead, rendered);
@@ -237,10 +238,11 @@ Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene&
     // The images are as their lens has distorted them.
     Camera& camera = placed.views.back().view.camera;
     const double fx = camera.fx, fy = camera.fy;
-    camera = evidence.work.lens.camera;
+    camera = work.lens.camera;
     camera.fx = fx, camera.fy = fy;
   }
   placed.gates["focal_px"] = rendered.focal_px;
+  placed.gates["lens_k1"] = work.lens.camera.k1;
   placed.gates["loops_in_doubt"] = static_cast<double>(doubted.size());
   return placed;
 }

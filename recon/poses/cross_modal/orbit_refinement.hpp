@@ -15,6 +15,7 @@ using Fit = RenderAlignment;
 /// What is known of the lens before anything is aligned.
 struct FocalGuess {
   double focal_px = 0, relative_sigma = 0.03;
+  double radial_sigma = 0;  ///< of k1 about none; 0: the images are straight
 };
 
 /// How much better a restart must be: two places this close in score are one, seen twice.

@@ -5,11 +5,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "core/image/undistorted.hpp"
 #include "core/numeric/median.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/alignment/edge_field.hpp"
@@ -24,11 +24,8 @@ namespace {
 constexpr int least_patches = 12;
 /// A sighting within this of where the bundle has it confirms the view's pose.
 constexpr double confirmed_px = 1;
-/// Wide first: the poses may be a few pixels off; then from where the first bundle has them.
-constexpr std::array<int, 2> reaches_px = {6, 3};
 
-/// Ceres residual of two weighted pixels. `lens`: logarithm of what the focal length is scaled by;
-/// `offset`: of the point from the surface, world.
+/// Ceres residual of two weighted pixels; `offset`: of the point from the surface, world.
 struct SightingResidual {
   Eigen::Vector3d surface;
   Rigid3d cam_from_world;
@@ -36,19 +33,17 @@ struct SightingResidual {
   ThermalSighting sighting;
 
   template <class T>
-  bool operator()(const T* correction, const T* log_focal, const T* offset, T* residual) const {
+  bool operator()(const T* correction, const T* log_focal, const T* radial, const T* offset,
+                  T* residual) const {
     const Eigen::Matrix<T, 3, 1> world(T(surface.x()) + offset[0], T(surface.y()) + offset[1],
                                        T(surface.z()) + offset[2]);
     const Eigen::Matrix<T, 3, 1> in_cam =
         cam_from_world.rotation.toRotationMatrix().cast<T>() * world +
         cam_from_world.translation.cast<T>();
-    T moved[3];
-    ceres::AngleAxisRotatePoint(correction, in_cam.data(), moved);
-    for (int i = 0; i < 3; ++i) moved[i] += correction[3 + i];
-    if (!(moved[2] > T(1e-6))) return false;
-    const T scale = exp(log_focal[0]);
-    const T dx = scale * T(camera.fx) * moved[0] / moved[2] + T(camera.cx - sighting.pixel.x());
-    const T dy = scale * T(camera.fy) * moved[1] / moved[2] + T(camera.cy - sighting.pixel.y());
+    T pixel[2];
+    if (!corrected_pixel(camera, correction, log_focal, radial[0], in_cam.data(), pixel))
+      return false;
+    const T dx = pixel[0] - T(sighting.pixel.x()), dy = pixel[1] - T(sighting.pixel.y());
     const Eigen::Matrix2d& w = sighting.sqrt_weight;
     residual[0] = T(w(0, 0)) * dx + T(w(0, 1)) * dy;
     residual[1] = T(w(1, 0)) * dx + T(w(1, 1)) * dy;
@@ -79,6 +74,8 @@ struct BundleRound {
 struct BundleSolution {
   std::vector<PoseCorrection> corrections;
   double log_focal = 0;
+  double radial = 0;           ///< k1 that straightened images still had
+  double radial_reach_px = 0;  ///< by how much a k1 of 1 shifts the outer tenth of the patches
   double median_px = 0;        ///< of the sightings' residuals
   std::vector<int> confirmed;  ///< patches of each view
 };
@@ -94,10 +91,18 @@ class Bundle {
   }
 
   /// Nothing where no usable answer is found.
-  std::optional<BundleSolution> solve(const ValuePrior& log_focal) {
-    problem_.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<ValuePrior, 1, 1>(new ValuePrior(log_focal)), nullptr,
-        &solution_.log_focal);
+  std::optional<BundleSolution> solve(const ValuePrior& log_focal, const ValuePrior& radial) {
+    const auto expect = [&](const ValuePrior& prior, double* value) {
+      problem_.AddParameterBlock(value, 1);
+      if (prior.sigma == 0)
+        problem_.SetParameterBlockConstant(value);
+      else
+        problem_.AddResidualBlock(
+            new ceres::AutoDiffCostFunction<ValuePrior, 1, 1>(new ValuePrior(prior)), nullptr,
+            value);
+    };
+    expect(log_focal, &solution_.log_focal);
+    expect(radial, &solution_.radial);
     ceres::Solver::Options solver;
     solver.linear_solver_type = ceres::SPARSE_SCHUR;
     solver.max_num_iterations = options_.max_iterations;
@@ -115,10 +120,10 @@ class Bundle {
     blocks_.emplace_back();
     for (const ThermalSighting& seen : track.sightings)
       blocks_.back().push_back(problem_.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<SightingResidual, 2, 6, 1, 3>(new SightingResidual{
+          new ceres::AutoDiffCostFunction<SightingResidual, 2, 6, 1, 1, 3>(new SightingResidual{
               track.surface, round_.views.cam_from_world[seen.view], round_.views.camera, seen}),
           new ceres::CauchyLoss(options_.loss_px), solution_.corrections[seen.view].data(),
-          &solution_.log_focal, offset.data()));
+          &solution_.log_focal, &solution_.radial, offset.data()));
     problem_.AddResidualBlock(
         new ceres::AutoDiffCostFunction<SurfaceResidual, 1, 3>(
             new SurfaceResidual{track.sight, options_.surface_sigma * track.distance}),
@@ -127,11 +132,11 @@ class Bundle {
 
   void add(std::size_t view, const PatchMatch& match) {
     problem_.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<PatchResidual, 2, 6, 1>(
+        new ceres::AutoDiffCostFunction<PatchResidual, 2, 6, 1, 1>(
             new PatchResidual{match, round_.views.camera}),
         new ceres::ScaledLoss(new ceres::CauchyLoss(1), options_.edge_weight * match.score,
                               ceres::TAKE_OWNERSHIP),
-        solution_.corrections[view].data(), &solution_.log_focal);
+        solution_.corrections[view].data(), &solution_.log_focal, &solution_.radial);
   }
 
   /// A patch confirms the view that it was taken from, and each that shows it, where both have it
@@ -153,6 +158,16 @@ class Bundle {
         solution_.confirmed[sightings[s].view] += near[s] ? 1 : 0;
       solution_.confirmed[sightings.front().view] +=
           std::count(near.begin() + 1, near.end(), true) > 0 ? 1 : 0;
+    }
+    std::vector<double> radii;
+    for (const ThermalTrack& track : round_.tracks)
+      radii.push_back(round_.views.camera.normalized_of(track.sightings.front().pixel).norm());
+    if (!radii.empty()) {
+      constexpr double most = 0.9;
+      const auto far =
+          radii.begin() + static_cast<std::ptrdiff_t>(most * static_cast<double>(radii.size()));
+      std::nth_element(radii.begin(), far, radii.end());
+      solution_.radial_reach_px = std::pow(*far, 3) * round_.views.camera.fx;
     }
     solution_.median_px = residuals.empty() ? 0 : median(residuals);
   }
@@ -181,7 +196,7 @@ Result<BundleRound> prepared(const OrbitRefinement& refinement, const Fit& align
     cv::Mat image;
     cv::resize(refinement.orbit.images[i], image, {views.camera.width, views.camera.height}, 0, 0,
                cv::INTER_AREA);
-    views.images.push_back(image);
+    views.images.push_back(straightened(image, views.camera, alignment.radial));
     ORBITFUSE_ASSIGN(SceneRender render,
                      refinement.renderer(views.camera, views.cam_from_world.back()));
     views.depth.push_back(render.depth);
@@ -220,6 +235,66 @@ void take(const BundleSolution& solution, const std::vector<std::size_t>& chosen
   }
   for (const std::size_t i : chosen) alignment.views[i].confirmed_patches = solution.confirmed[i];
   alignment.focal_px = alignment.views.front().view.camera.fx;
+  alignment.radial += solution.radial;
+  alignment.radial_px = std::abs(alignment.radial) * solution.radial_reach_px;
+}
+
+/// The most that a chosen view has turned, about itself or about the object.
+double most_turned_deg(const OrbitViews& orbit, const std::vector<std::size_t>& chosen,
+                       const Fit& before, const Fit& after) {
+  double most = 0;
+  for (const std::size_t i : chosen)
+    most = std::max(most, apart_deg(orbit, before.views[i].view.cam_from_world,
+                                    after.views[i].view.cam_from_world));
+  return most;
+}
+
+/// One round from where the views are: by how much it has turned them at most; nothing where
+/// nothing could be solved.
+Result<std::optional<double>> solve_round(const OrbitRefinement& refinement,
+                                          const FocalGuess& prior,
+                                          const std::vector<std::size_t>& chosen, int reach_px,
+                                          const ThermalBundleOptions& options, Fit& bundled) {
+  ORBITFUSE_ASSIGN(const BundleRound round,
+                   prepared(refinement, bundled, chosen, options, reach_px));
+  const double focal_px = bundled.views.front().view.camera.fx;
+  std::optional<BundleSolution> solution;
+  if (2 * held_views(round) >= chosen.size())
+    solution = Bundle(round, options)
+                   .solve({std::log(prior.focal_px / focal_px), prior.relative_sigma},
+                          {-bundled.radial, prior.radial_sigma});
+  const auto tell = [&](const std::string& words) {
+    refinement.progress.report(
+        {"poses.thermal", 3, 4, -1,
+         fmt::format("{} places seen by several thermal views{}", round.tracks.size(), words)});
+  };
+  if (!solution) {
+    tell(": too few to bundle them");
+    return std::nullopt;
+  }
+  const Fit before = bundled;
+  take(*solution, chosen, bundled);
+  const double turned_deg = most_turned_deg(refinement.orbit, chosen, before, bundled);
+  tell(fmt::format(
+      ", {:.2f} px; focal length {:+.2f} %, k1 {:+.3f}, {:.2f} px far out, views turned by up to "
+      "{:.2f} deg",
+      solution->median_px, 100 * (std::exp(solution->log_focal) - 1), bundled.radial,
+      bundled.radial_px, turned_deg));
+  return turned_deg;
+}
+
+/// Rounds of one kind; false where one could not be solved.
+Result<bool> solve_rounds(const OrbitRefinement& refinement, const FocalGuess& prior,
+                          const std::vector<std::size_t>& chosen, const BundleStep& step,
+                          const ThermalBundleOptions& options, Fit& bundled) {
+  double turned_deg = step.settled_deg;
+  for (int i = 0; i < step.max_rounds && turned_deg >= step.settled_deg; ++i) {
+    ORBITFUSE_ASSIGN(const std::optional<double> turned,
+                     solve_round(refinement, prior, chosen, step.reach_px, options, bundled));
+    if (!turned) return false;
+    turned_deg = *turned;
+  }
+  return true;
 }
 
 }  // namespace
@@ -231,27 +306,17 @@ Status bundle_thermal(const OrbitRefinement& refinement, const FocalGuess& prior
     if (alignment.views[i].verdict.confidence != Confidence::dropped) chosen.push_back(i);
   if (chosen.empty()) return {};
   Fit bundled = alignment;
-  for (const int reach_px : reaches_px) {
-    ORBITFUSE_ASSIGN(const BundleRound round,
-                     prepared(refinement, bundled, chosen, options, reach_px));
-    const double focal_px = bundled.views.front().view.camera.fx;
-    std::optional<BundleSolution> solution;
-    if (2 * held_views(round) >= chosen.size())
-      solution =
-          Bundle(round, options).solve({std::log(prior.focal_px / focal_px), prior.relative_sigma});
-    if (!solution) {
-      refinement.progress.report(
-          {"poses.thermal", 3, 4, -1,
-           fmt::format("{} places seen by several thermal views: too few to bundle them",
-                       round.tracks.size())});
-      return {};
-    }
-    take(*solution, chosen, bundled);
-    refinement.progress.report(
-        {"poses.thermal", 3, 4, -1,
-         fmt::format("{} places seen by several thermal views, {:.2f} px; focal length {:+.2f} %",
-                     round.tracks.size(), solution->median_px,
-                     100 * (std::exp(solution->log_focal) - 1))});
+  for (const BundleStep& step : options.steps) {
+    ORBITFUSE_ASSIGN(const bool solved,
+                     solve_rounds(refinement, prior, chosen, step, options, bundled));
+    if (!solved) return {};
+  }
+  if (prior.radial_sigma > 0 && bundled.radial_px < options.least_radial_px) {
+    FocalGuess straight = prior;
+    bundled.radial = straight.radial_sigma = 0;
+    ORBITFUSE_ASSIGN(const bool solved, solve_rounds(refinement, straight, chosen,
+                                                     options.steps.back(), options, bundled));
+    if (!solved) return {};
   }
   alignment = std::move(bundled);
   return {};

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
+
 #include "recon/poses/cross_modal/orbit_refinement.hpp"
 #include "recon/poses/cross_modal/thermal_tracks.hpp"
 
@@ -12,19 +14,33 @@
 // errors: the renderer's, cancelled.
 namespace orbitfuse {
 
+/// Rounds of one kind, until no view moves any more.
+struct BundleStep {
+  int reach_px;  ///< of the search for a patch about where the poses have it
+  int max_rounds;
+  double settled_deg;  ///< no view turns by more: enough
+};
+
 struct ThermalBundleOptions {
   int width_px = 320;  ///< of images and depth
   ThermalTrackOptions tracks;
   double surface_sigma = 0.02;  ///< of the visible field's surface, share of the distance
   double loss_px = 0.5;         ///< Cauchy scale of a patch found again
-  double edge_weight = 0.03;    ///< of an edge found in the visible scene: biased, and many
+  /// Wide first: poses may be a few pixels off, single ones 6 degrees; then to the end.
+  std::array<BundleStep, 2> steps = {{{6, 4, 0.3}, {3, 3, 0.1}}};
+  /// A k1 that moves the outer tenth of the patches by less is none: straight lenses of eight
+  /// scenes came out with up to 0.3 px, depth being a little off everywhere.
+  double least_radial_px = 0.5;
+  double edge_weight = 0.03;  ///< of an edge found in the visible scene: biased, and many
   int max_iterations = 40;
 };
 
-/// All views and their common focal length. Patches are looked for among views that are not
+/// All views, their common focal length, and the k1 that `orbit`'s images show beside it
+/// (`alignment.radial`). Patches are looked for among views that are not
 /// dropped; those are held by the visible scene's edges alone. Each of them says how many of its
 /// patches others confirm. Where fewer than half of the views have enough of them, or the solve
-/// fails, nothing moves. `agreement`, `matches` and `median_px` stay those of the edges before.
+/// fails, nothing moves. `agreement`, `matches` and `median_px` stay those of the edges before:
+/// the caller measures them again.
 Status bundle_thermal(const OrbitRefinement& refinement, const FocalGuess& prior,
                       const ThermalBundleOptions& options, Fit& alignment);
 

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/poses/cross_modal/thermal_tracks.hpp"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Dense>
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
@@ -18,28 +19,61 @@ namespace {
 constexpr double corner_quality = 0.002, corner_spacing_px = 5;
 constexpr int corner_block_px = 5;
 
-/// Pearson's correlation of a patch with the painting, shifted; nothing where too little is painted
-/// or nothing varies.
-std::optional<double> correlation(const cv::Mat1f& image, const cv::Mat1f& painted, cv::Point at,
-                                  cv::Point shift, const ThermalTrackOptions& options) {
-  const int r = options.radius_px;
-  double n = 0, sa = 0, sb = 0, saa = 0, sbb = 0, sab = 0;
-  const auto level = static_cast<double>(image(at));  // sums of squares keep their digits
-  for (int v = -r; v <= r; ++v) {
-    const float* ours = image[at.y + v] + at.x;
-    const float* theirs = painted[at.y + shift.y + v] + at.x + shift.x;
-    for (int u = -r; u <= r; ++u) {
-      if (!std::isfinite(theirs[u])) continue;
-      const double a = static_cast<double>(ours[u]) - level;
-      const double b = static_cast<double>(theirs[u]) - level;
-      n += 1, sa += a, sb += b, saa += a * a, sbb += b * b, sab += a * b;
-    }
+/// A row of a patch; what is left over weighs nothing.
+using Lanes = Eigen::Array<float, 16, 1>;
+
+/// A patch and the part of a painting that it is looked for in, each about a level of its own, so
+/// that sums of squares keep their digits; rows of images are columns here.
+class PatchSearch {
+ public:
+  PatchSearch(const cv::Mat1f& image, const cv::Mat1f& painted, cv::Point at,
+              const ThermalTrackOptions& options)
+      : side_(2 * options.radius_px + 1), least_painted_(options.min_painted * side_ * side_) {
+    assert(side_ <= Lanes::SizeAtCompileTime);
+    const int reach = options.reach_px, across = side_ + 2 * reach;
+    patch_ = Eigen::ArrayXXf::Zero(Lanes::SizeAtCompileTime, side_);
+    inside_ = Lanes::Zero();
+    inside_.head(side_) = 1;
+    const cv::Point corner = at - cv::Point(options.radius_px, options.radius_px);
+    for (int v = 0; v < side_; ++v)
+      for (int u = 0; u < side_; ++u) patch_(u, v) = image(corner.y + v, corner.x + u) - image(at);
+    values_ = known_ = Eigen::ArrayXXf::Zero(2 * reach + Lanes::SizeAtCompileTime, across);
+    const float level = painted(at);
+    const float about = std::isfinite(level) ? level : image(at);
+    for (int v = 0; v < across; ++v)
+      for (int u = 0; u < across; ++u) {
+        const float value = painted(corner.y - reach + v, corner.x - reach + u);
+        if (!std::isfinite(value)) continue;
+        values_(u, v) = value - about;
+        known_(u, v) = 1;
+      }
   }
-  if (n < options.min_painted * (2 * r + 1) * (2 * r + 1)) return std::nullopt;
-  const double va = saa - sa * sa / n, vb = sbb - sb * sb / n;
-  if (!(va > 0 && vb > 0)) return std::nullopt;
-  return (sab - sa * sb / n) / std::sqrt(va * vb);
-}
+
+  /// Pearson's correlation, shifted from the search's first corner; nothing where too little is
+  /// painted or nothing varies.
+  std::optional<double> correlation(int x, int y) const {
+    Lanes n = Lanes::Zero(), sa = n, sb = n, saa = n, sbb = n, sab = n;
+    for (int v = 0; v < side_; ++v) {
+      const Lanes weight = known_.col(y + v).segment<Lanes::SizeAtCompileTime>(x) * inside_;
+      const Lanes a = patch_.col(v) * weight;
+      const Lanes b = values_.col(y + v).segment<Lanes::SizeAtCompileTime>(x) * weight;
+      n += weight, sa += a, sb += b, saa += a * a, sbb += b * b, sab += a * b;
+    }
+    const auto sum = [](const Lanes& lanes) { return lanes.cast<double>().sum(); };
+    const double count = sum(n);
+    if (count < least_painted_) return std::nullopt;
+    const double a = sum(sa), b = sum(sb);
+    const double va = sum(saa) - a * a / count, vb = sum(sbb) - b * b / count;
+    const double value = (sum(sab) - a * b / count) / std::sqrt(va * vb);
+    return va > 0 && vb > 0 && std::isfinite(value) ? std::optional(value) : std::nullopt;
+  }
+
+ private:
+  int side_;
+  double least_painted_;
+  Lanes inside_;
+  Eigen::ArrayXXf patch_, values_, known_;
+};
 
 struct FoundPatch {
   Eigen::Vector2d shift;
@@ -81,10 +115,10 @@ std::optional<FoundPatch> find_patch(const cv::Mat1f& image, const cv::Mat1f& pa
   // Never a peak, and no neighbour of one.
   constexpr float unknown = -std::numeric_limits<float>::infinity();
   cv::Mat1f score(2 * reach + 1, 2 * reach + 1, unknown);
-  for (int dy = -reach; dy <= reach; ++dy)
-    for (int dx = -reach; dx <= reach; ++dx)
-      if (const auto value = correlation(image, painted, at, {dx, dy}, options))
-        score(dy + reach, dx + reach) = static_cast<float>(*value);
+  const PatchSearch search(image, painted, at, options);
+  for (int y = 0; y <= 2 * reach; ++y)
+    for (int x = 0; x <= 2 * reach; ++x)
+      if (const auto value = search.correlation(x, y)) score(y, x) = static_cast<float>(*value);
   return peak(score, options.min_correlation);
 }
 
@@ -137,14 +171,32 @@ std::vector<std::size_t> neighbours_of(const ThermalViews& views, std::size_t vi
   return found;
 }
 
-/// Corners away from dead pixels, which would blind the detector down their columns.
-std::vector<cv::Point2f> corners_of(const cv::Mat& image, const ThermalTrackOptions& options) {
+/// Where the depth jumps within a patch. A nearer surface's outline is painted where the pose has
+/// it, not where the neighbour saw it, so that such a patch says that the pose is right.
+cv::Mat jumps_of(const cv::Mat& depth, const ThermalTrackOptions& options) {
+  const cv::Mat known = depth == depth;
+  cv::Mat nearest = depth.clone(), farthest = depth.clone(), near, far;
+  nearest.setTo(std::numeric_limits<float>::max(), ~known);
+  farthest.setTo(0, ~known);
+  cv::erode(nearest, near, cv::Mat());
+  cv::dilate(farthest, far, cv::Mat());
+  cv::Mat jumps;
+  cv::dilate(far > (1 + options.depth_tolerance) * near, jumps,
+             cv::Mat::ones(2 * options.radius_px + 1, 2 * options.radius_px + 1, CV_8U));
+  return jumps;
+}
+
+/// Corners away from dead pixels, which would blind the detector down their columns, and from jumps
+/// of the depth.
+std::vector<cv::Point2f> corners_of(const cv::Mat& image, const cv::Mat& depth,
+                                    const ThermalTrackOptions& options) {
   std::vector<cv::Point2f> corners;
   const cv::Mat known = image == image;
   if (cv::countNonZero(known) == 0) return corners;
   cv::Mat filled = image.clone(), usable;
   filled.setTo(cv::mean(image, known), ~known);
   cv::erode(known, usable, cv::Mat(), {-1, -1}, corner_block_px);
+  usable.setTo(0, jumps_of(depth, options));
   cv::goodFeaturesToTrack(filled, corners, options.max_patches, corner_quality, corner_spacing_px,
                           usable, corner_block_px);
   return corners;
@@ -155,7 +207,7 @@ std::vector<ThermalTrack> tracks_of(const ThermalViews& views, std::size_t view,
                                     const ThermalTrackOptions& options) {
   const cv::Mat& image = views.images[view];
   if (neighbours.empty()) return {};
-  const std::vector<cv::Point2f> corners = corners_of(image, options);
+  const std::vector<cv::Point2f> corners = corners_of(image, views.depth[view], options);
   std::vector<cv::Mat> paintings;
   for (const std::size_t other : neighbours)
     paintings.push_back(painted_by(

@@ -19,7 +19,7 @@ struct ThermalTrackOptions {
   /// sees other surfaces.
   double min_turn_deg = 8, max_turn_deg = 55;
   int max_patches = 220;  ///< of a view
-  int radius_px = 7;      ///< of a patch
+  int radius_px = 7;      ///< of a patch, at most 7: its rows are summed 16 pixels at once
   int reach_px = 6;       ///< of the search about where the poses have it
   double min_correlation = 0.8;
   double min_painted = 0.8;  ///< share of a patch

@@ -3,8 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <numeric>
 
+#include "core/image/undistorted.hpp"
 #include "core/numeric/median.hpp"
 #include "recon/alignment/whole_view.hpp"
 #include "recon/poses/cross_modal/temperature_consistency.hpp"
@@ -126,13 +128,49 @@ Status keep_by_temperatures(const OrbitRefinement& refinement, const Temperature
   return {};
 }
 
+/// The images, as a lens without the k1 that was found would have taken them.
+void straighten(OrbitViews& orbit, const Fit& alignment) {
+  const Camera& camera = alignment.views.front().view.camera;
+  for (std::size_t i = 0; i < orbit.images.size(); ++i)
+    orbit.images[i] = straightened(orbit.images[i], camera, alignment.radial);
+}
+
+/// The support that form has where the bundle has put the views. One that it has moved elsewhere,
+/// to where form knows less of it, is not sure.
+Status judge_bundled(const OrbitRefinement& refinement, const Fit& before, Fit& alignment) {
+  std::vector<std::size_t> all(alignment.views.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  ORBITFUSE_ASSIGN(const Fit there,
+                   refinement.restart(all, alignment.poses(), {judging_rounds().back()}));
+  for (const std::size_t i : all) {
+    RenderAlignedView& view = alignment.views[i];
+    const RenderAlignedView &form_alone = before.views[i], &here = there.views[i];
+    const bool moved =
+        !same_place(refinement.orbit, form_alone.view.cam_from_world, view.view.cam_from_world);
+    // Within one place, edges beside the temperatures' say no less for it.
+    if (!moved && here.support() < form_alone.support()) continue;
+    view.agreement = here.agreement, view.matches = here.matches, view.median_px = here.median_px;
+    if (!moved || !view.verdict.sure() || clearly_better * view.support() >= form_alone.support())
+      continue;
+    view.verdict = {
+        Confidence::doubtful, DoubtReason::temperatures_elsewhere,
+        fmt::format(
+            "its neighbours' temperatures place it {:.1f} deg away, where the visible "
+            "scene supports it less: {:.2f} times",
+            apart_deg(refinement.orbit, form_alone.view.cam_from_world, view.view.cam_from_world),
+            view.support() / form_alone.support())};
+  }
+  return {};
+}
+
 }  // namespace
 
-Status refine_orbit(const SceneRenderer& renderer, const OrbitViews& orbit,
-                    RenderAlignment& alignment, double focal_relative_sigma,
-                    const Progress& progress) {
+Status refine_orbit(const SceneRenderer& renderer, OrbitViews& orbit, RenderAlignment& alignment,
+                    const LensSigmas& lens, const Progress& progress) {
   if (alignment.views.empty()) return {};
-  const FocalGuess prior{alignment.views.front().view.camera.fx, focal_relative_sigma};
+  constexpr double least_focal_sigma = 1e-4;
+  const FocalGuess prior{alignment.views.front().view.camera.fx,
+                         std::max(least_focal_sigma, lens.focal_relative), lens.radial};
   const OrbitRefinement refinement{renderer, orbit, progress};
   ORBITFUSE_TRY(refinement.together(alignment, prior, approach_rounds()));
   ORBITFUSE_ASSIGN(const std::vector<std::size_t> lost, unsettled(refinement, alignment));
@@ -147,7 +185,10 @@ Status refine_orbit(const SceneRenderer& renderer, const OrbitViews& orbit,
     ORBITFUSE_TRY(refinement.together(alignment, prior, {fine_rounds().back()}));
     ORBITFUSE_TRY(keep_by_temperatures(refinement, check, alignment));
   }
-  return bundle_thermal(refinement, prior, {}, alignment);
+  const Fit before = alignment;
+  ORBITFUSE_TRY(bundle_thermal(refinement, prior, {}, alignment));
+  straighten(orbit, alignment);
+  return judge_bundled(refinement, before, alignment);
 }
 
 double station_offset_deg(const OrbitViews& orbit, const RenderAlignment& alignment) {

@@ -10,14 +10,18 @@
 // neighbours on the loop say where it should be.
 namespace orbitfuse {
 
+/// How well the lens is known; sigmas of 0 are taken for tiny ones.
+struct LensSigmas {
+  double focal_relative = 0.03, radial = 0;  ///< k1 about none
+};
+
 /// From views aligned to a degree or so to the end. Every view must come back to its place from
 /// where its loop, judged by the better half of its views, predicts it; one that doesn't is
 /// searched as a whole (whole_view.hpp), and what is supported better is kept. Then all views
-/// together. The lens' focal length changes in every view of `alignment`. Errors: the renderer's,
-/// cancelled.
-Status refine_orbit(const SceneRenderer& renderer, const OrbitViews& orbit,
-                    RenderAlignment& alignment, double focal_relative_sigma,
-                    const Progress& progress);
+/// together. The lens' focal length changes in every view of `alignment`; where its k1 shows
+/// (`alignment.radial`), the images of `orbit` are straightened. Errors: the renderer's, cancelled.
+Status refine_orbit(const SceneRenderer& renderer, OrbitViews& orbit, RenderAlignment& alignment,
+                    const LensSigmas& lens, const Progress& progress);
 
 /// Azimuth less nominal azimuth of the orbit's stations, by its better supported views.
 double station_offset_deg(const OrbitViews& orbit, const RenderAlignment& alignment);

@@ -97,6 +97,11 @@ Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
     if (median_patches >= least_median_patches)
       evidence[i].confirmed_share =
           alignment.views[i].confirmed_patches.value_or(0) / median_patches;
+  std::map<int, std::vector<double>> of_loop;
+  for (std::size_t i = 0; i < evidence.size(); ++i)
+    of_loop[orbit.stations[i].loop].push_back(evidence[i].support_share);
+  for (std::size_t i = 0; i < evidence.size(); ++i)
+    evidence[i].loop_support_share = median(of_loop[orbit.stations[i].loop]);
   for (const ViewEvidence& seen : evidence) {
     off_deg.push_back(seen.azimuth_off_deg);
     if (seen.correlation) correlations.push_back(*seen.correlation);
@@ -114,7 +119,10 @@ ViewVerdict judged(const ViewEvidence& seen, const ViewVerdict& before) {
   const auto doubtful = [](DoubtReason reason, std::string detail) {
     return ViewVerdict{Confidence::doubtful, reason, std::move(detail)};
   };
-  if (!(seen.support_share >= min_support_share))
+  // Views of a wrong loop confirm each other: only where form knows the loop's others well.
+  const bool confirmed_among_known =
+      seen.confirmed_share >= confirming_share && seen.loop_support_share >= weak_support_share;
+  if (!(seen.support_share >= min_support_share) && !confirmed_among_known)
     return doubtful(DoubtReason::weak_support,
                     fmt::format("its edges have {:.2f} of the median support of all loops",
                                 seen.support_share));

@@ -26,6 +26,7 @@ struct ViewEvidence {
   /// Patches that other thermal views show where the pose has them, as a share of the median
   /// view's; 0 where that has too few.
   double confirmed_share = 0;
+  double loop_support_share = 0;  ///< the median of its loop's views' support_share
 };
 
 /// One entry a view. Errors: the renderer's, cancelled.

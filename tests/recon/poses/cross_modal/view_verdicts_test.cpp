@@ -56,6 +56,10 @@ TEST(ViewVerdicts, WhatSpeaksAgainstAViewIsNamed) {
   EXPECT_FALSE(judged(confirmed, {Confidence::doubtful, DoubtReason::undecided, ""}).sure());
   confirmed.support_share = 0.2;
   EXPECT_FALSE(judged(confirmed, painted).sure());
+  confirmed.loop_support_share = 0.16;  // of a wrong loop, whose views confirm each other
+  EXPECT_FALSE(judged(confirmed, {}).sure());
+  confirmed.loop_support_share = 0.9;
+  EXPECT_TRUE(judged(confirmed, {}).sure()) << "form knows its loop, and neighbours know it";
   ViewEvidence between = good;
   between.support_share = 0.67;
   EXPECT_TRUE(judged(between, {}).sure());

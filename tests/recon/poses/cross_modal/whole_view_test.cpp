@@ -85,7 +85,7 @@ TEST(RefineOrbit, ViewsOnTheNextRibComeHomeAndTrackingFramesFollow) {
     view.view = orbit_view(60.0 * i + (i % 2 == 0 ? 2 : -2) + off, i == 2 ? 18 : 14.5);
     alignment.views.push_back(view);
   }
-  ASSERT_TRUE(refine_orbit(testing_orbit::box_renderer(), orbit, alignment, 1e-3, {}));
+  ASSERT_TRUE(refine_orbit(testing_orbit::box_renderer(), orbit, alignment, {1e-3}, {}));
   const auto off_deg = [&](std::size_t i) {
     return std::acos(camera_center(alignment.views[i].view.cam_from_world)
                          .normalized()
@@ -115,7 +115,7 @@ TEST(RefineOrbit, ARendererThatFailsIsPassedOn) {
   const SceneRenderer broken = [](const Camera&, const Rigid3d&) -> Result<SceneRender> {
     return fail(ErrorKind::input, "field", "cut", "train again");
   };
-  const Status done = refine_orbit(broken, orbit, alignment, 0.03, {});
+  const Status done = refine_orbit(broken, orbit, alignment, {0.03}, {});
   ASSERT_FALSE(done);
   EXPECT_EQ(done.error().where, "field");
 }
@@ -132,7 +132,7 @@ TEST(RefineOrbit, ConstantImagesChangeNothingAndStayFinite) {
     station.azimuth_deg = 60 * i;
     orbit.stations.push_back(station);
   }
-  ASSERT_TRUE(refine_orbit(testing_orbit::box_renderer(), orbit, alignment, 0.03, {}));
+  ASSERT_TRUE(refine_orbit(testing_orbit::box_renderer(), orbit, alignment, {0.03}, {}));
   for (const RenderAlignedView& view : alignment.views) {
     EXPECT_TRUE(view.view.cam_from_world.is_finite());
     EXPECT_EQ(view.support(), 0);
