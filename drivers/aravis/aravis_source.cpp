@@ -99,7 +99,8 @@ Result<Delivery> AravisSource::next(std::chrono::milliseconds timeout) {
 
 Delivery AravisSource::on_silence() {
   const auto quiet = Clock::now() - last_frame_;
-  if (quiet > options_.give_up) return lose("no frame for a second; reopening it");
+  if (quiet > options_.give_up)
+    return lose(fmt::format("no frame for {} ms; reopening it", options_.give_up.count()));
   if (quiet <= options_.silence || silent_told_ || state_ == State::proving) return {};
   silent_told_ = true;
   return event_delivery(EventKind::silent,
