@@ -444,6 +444,30 @@ def draw_capture(page):
     return drawing.svg(bottom + 46)
 
 
+def draw_measurement(page):
+    """A row a scene: errors of spots, and how many of them the stated uncertainty covers."""
+    table = table_with(page, "scene", "median error", "90 % of errors", "stated uncertainty covers")
+    median, most, covers = (
+        table.column(c) for c in ("median error", "90 % of errors", "stated uncertainty covers"))
+    asked = next(row for row in table.rows if row[0] == "bar")
+    rows = [row for row in table.rows if row is not asked]
+    left, row_height, middle = 168, 30, 430
+    drawing, bottom = Drawing(), PANEL_TOP + row_height * len(rows)
+    middles = [PANEL_TOP + row_height * (r + 0.5) for r in range(len(rows))]
+    legend(drawing, 120, [("dot", FIRST, "median"), ("ring", FIRST, "90 % are below"),
+                          ("line", ASKED, f"asked: median {asked[median]} K, {asked[covers]} covered")])
+    for row, y in zip(rows, middles):
+        row_label(drawing, left - 8, y, [row[0]])
+    errors = [f"{row[median]} / {row[most]}" for row in rows]
+    error_panel(drawing, errors, middles, from_zero([number(row[most]) for row in rows], left, middle - 40),
+                bottom, number(asked[median]), "error of a spot, K (lower is better)")
+    shares = [row[covers] for row in rows]
+    low = min(number(cell) for cell in [*shares, asked[covers]])
+    error_panel(drawing, shares, middles, Axis(low - 2, 100, middle, WIDTH - 30), bottom,
+                number(asked[covers]), "errors within the stated uncertainty, %")
+    return drawing.svg(bottom + 46)
+
+
 @dataclass
 class Plot:
     draw: object
@@ -463,6 +487,8 @@ PLOTS = {
     "fusion": Plot(draw_fusion, ("method", "Qabf", "Qcb", "CPU ms"), ("Qabf", "Qcb", "CPU ms")),
     "cnn_lpif": Plot(draw_cnn_lpif, ("method", "Qabf", "Qcb", "Qcv", "SSIM"),
                      ("Qabf", "Qcb", "Qcv", "SSIM"), rows="reference|bar|ours"),
+    "measurement": Plot(draw_measurement, ("scene", "median error", "stated uncertainty covers"),
+                        ("median error", "90 % of errors", "stated uncertainty covers"), rows="(?!bar)"),
     "capture": Plot(draw_capture, ("case", "told after", "back after"), ("told after", "back after")),
 }
 

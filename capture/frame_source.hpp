@@ -15,6 +15,10 @@
 // The seam to hardware. A driver implements four functions: describe, start, next, stop.
 namespace orbitfuse {
 
+/// 146 years. A camera's stamp is 64 bits from the wire; beyond this it is no time, and differences
+/// would overflow.
+inline constexpr std::int64_t latest_stamp_ns = std::int64_t{1} << 62;
+
 /// One frame as a driver delivers it. Either `encoded` holds a whole file (JPEG, PNG, TIFF),
 /// which is stored byte for byte, or `pixels` holds samples, which are stored without loss:
 /// CV_8UC3 BGR or CV_8UC1 for visible, CV_16UC1 counts of temperature (0 = invalid) or CV_8UC1 for

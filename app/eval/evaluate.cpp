@@ -9,11 +9,11 @@
 #include <optional>
 
 #include "app/eval/image_error.hpp"
-#include "app/eval/pose_error.hpp"
 #include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
+#include "core/geometry/pose_error.hpp"
 #include "core/temperature.hpp"
 #include "recon/assembly/training_data.hpp"
 #include "recon/nerf/nerf.hpp"

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "app/view/picture_parts.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 
 #include "core/image/image_codec.hpp"
 #include "core/image/image_io.hpp"
-#include "core/temperature.hpp"
 
 namespace orbitfuse::view {
 
@@ -27,22 +24,16 @@ void PictureParts::add_levels(const std::string& name, const cv::Mat& levels, bo
   // Gray levels may be 0, which is a level: counts begin at 1.
   const double scale = gray ? 0.01 : kelvin_per_count_for(std::vector<cv::Mat>{levels});
   const double offset = gray ? -scale : 0;
-  std::string counts(levels.total() * 2, '\0');
-  char* out = counts.data();
-  for (int y = 0; y < levels.rows; ++y)
-    for (int x = 0; x < levels.cols; ++x, out += 2) {
-      const auto level = static_cast<double>(levels.at<float>(y, x));
-      const std::uint16_t count = count_from_kelvin(level - offset, scale);
-      std::memcpy(out, &count, 2);
-    }
+  const cv::Mat counts = counts_of_kelvin(levels - offset, scale);
+  std::string bytes(reinterpret_cast<const char*>(counts.data), counts.total() * counts.elemSize());
   parts_.push_back({{"name", name},
                     {"encoding", "uint16"},
                     {"width", levels.cols},
                     {"height", levels.rows},
-                    {"bytes", counts.size()},
+                    {"bytes", bytes.size()},
                     {"scale", scale},
                     {"offset", offset}});
-  contents_.push_back(std::move(counts));
+  contents_.push_back(std::move(bytes));
 }
 
 std::string PictureParts::bytes() const {

@@ -16,7 +16,6 @@
 #include "core/http/web_server.hpp"
 #include "core/image/image_codec.hpp"
 #include "core/image/image_io.hpp"
-#include "core/temperature.hpp"
 
 namespace orbitfuse::view {
 namespace {
@@ -82,12 +81,7 @@ struct ViewServer::Impl {
         const Layers seen,
         layers.render(asked.shot, {.visible = false, .fused = false, .every_pixel = true}, job));
     const double scale = kelvin_per_count_for(std::vector<cv::Mat>{seen.kelvin});
-    cv::Mat counts(seen.kelvin.size(), CV_16UC1);
-    for (int y = 0; y < counts.rows; ++y)
-      for (int x = 0; x < counts.cols; ++x)
-        counts.at<std::uint16_t>(y, x) =
-            count_from_kelvin(static_cast<double>(seen.kelvin.at<float>(y, x)), scale);
-    return encode_thermal_tiff(counts, {scale, 0});
+    return encode_thermal_tiff(counts_of_kelvin(seen.kelvin, scale), {scale, 0});
   }
 
   Result<json> list_of_bookmarks() const {

@@ -8,10 +8,10 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
-#include <ctime>
 
 #include "app/view/view_server.hpp"
 #include "core/numeric/median.hpp"
+#include "core/system/clock.hpp"
 #include "core/system/cpu.hpp"
 #include "core/system/parallel.hpp"
 #include "tests/support/browser.hpp"
@@ -79,9 +79,9 @@ int report(const std::string& out, int views, const std::string& layer) {
   nlohmann::json last;
   double share = 0;
   for (int i = 0; i < views; ++i) {
-    const std::clock_t before = std::clock();
+    const UsageClock spent;
     last = page.evaluate(timed_rest);
-    cpu_s.push_back(static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC);
+    cpu_s.push_back(spent.cpu_s());
     first.push_back(last[0].get<double>());
     full.push_back(last[1].get<double>());
     whole.push_back(last[2].get<double>());

@@ -12,10 +12,10 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "app/eval/pose_error.hpp"
 #include "app/stages/artifacts.hpp"
 #include "app/stages/measurement_scene.hpp"
 #include "core/formats/ground_truth.hpp"
+#include "core/geometry/pose_error.hpp"
 #include "core/image/image_io.hpp"
 #include "core/numeric/median.hpp"
 #include "core/system/clock.hpp"
@@ -40,14 +40,14 @@ Result<Similarity3d> truth_from_run(const fs::path& run, const Session& session,
                                     const GroundTruth& truth) {
   ORBITFUSE_ASSIGN(const Reconstruction model,
                    stages::load_poses(run / "poses_visible", Modality::visible));
-  std::vector<eval::PosePair> pairs;
+  std::vector<PosePair> pairs;
   for (const PosedView& view : model.views)
     for (const FrameRecord& frame : session.frames)
       if (frame.file == view.name)
         for (const TrueView& known : truth.views.at(Modality::visible))
           if (fs::path(known.name).filename() == fs::path(frame.source).filename())
             pairs.push_back({view.cam_from_world, known.cam_from_world});
-  return eval::truth_from_estimate(pairs);
+  return truth_from_estimate(pairs);
 }
 
 struct Spot {

@@ -28,13 +28,13 @@ void print(const ModalityPoses& poses, const Reconstruction& anchor, const scene
   for (const auto& [gate, value] : poses.gates) fmt::print("  {} = {:.4g}\n", gate, value);
   fmt::print("  posed {}/{}, {:.1f} CPU s, {:.2f} px\n", poses.reconstruction.views.size(),
              poses.frame_count, cpu_s, poses.reprojection_rms_px);
-  const scenes::PoseError error = scenes::pose_error(poses.reconstruction, anchor, truth);
+  const PoseError error = scenes::pose_error(poses.reconstruction, anchor, truth);
   if (error.views > 0)
     fmt::print(
         "  against the truth: ATE {:.3f} %, median {:.3f} %, worst {:.3f} % of the extent; "
         "rotation median {:.3f}, worst {:.3f} deg\n",
-        error.ate_percent, error.median_percent, error.worst_percent, error.rotation_deg,
-        error.worst_rotation_deg);
+        error.ate_percent, error.ate_median_percent, error.ate_max_percent,
+        error.rotation_median_deg, error.rotation_max_deg);
 }
 
 }  // namespace

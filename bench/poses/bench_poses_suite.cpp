@@ -126,7 +126,7 @@ Status prepare(const Arguments& arguments, const SceneFolders& scene) {
 struct Row {
   std::string scene, perturbation, failure;
   int posed = 0, total = 0, sure = 0, wrong_but_sure = 0, needlessly_doubted = 0, dropped = 0;
-  scenes::PoseError error;
+  PoseError error;
   double cpu_s = 0, focal_percent = 0;
   double rendering_s = 0, rays = 0;  ///< CPU, millions
 };
@@ -141,7 +141,7 @@ void judge(const ThermalPoses& poses, const Reconstruction& visible, const scene
                          poses.shares_visible_frame ? visible : poses.reconstruction, scene.truth);
   std::set<std::string> doubtful;
   for (const DoubtfulView& view : poses.doubtful) doubtful.insert(view.name);
-  for (const scenes::ViewError& view : row.error.each) {
+  for (const ViewError& view : row.error.each) {
     const bool sure = !doubtful.contains(view.name);
     const bool right = view.center_percent <= right_percent && view.rotation_deg <= right_deg;
     row.sure += sure ? 1 : 0;
@@ -193,7 +193,7 @@ Row measured(const SceneFolders& folders, const scenes::Perturbation& by,
       fmt::print("  dropped {}: {}\n", view.name, view.why);
     for (const DoubtfulView& view : poses->doubtful)
       fmt::print("  doubtful {}: {}, {}\n", view.name, name(view.reason), view.why);
-    for (const scenes::ViewError& view : row.error.each)
+    for (const ViewError& view : row.error.each)
       fmt::print("  {} centre {:.2f} %, outwards {:+.2f} %, rotation {:.2f} deg\n", view.name,
                  view.center_percent, view.outward_percent, view.rotation_deg);
   }
@@ -210,8 +210,8 @@ void print(const Row& row) {
       "| {} | {} | {}/{} | {:.2f} / {:.2f} / {:.2f} | {:.2f} / {:.2f} | {:+.2f} | {} | {} | {:.0f} "
       "({:.0f}, {:.1f} M) |\n",
       row.scene, row.perturbation, row.posed, row.total, row.error.ate_percent,
-      row.error.median_percent, row.error.worst_percent, row.error.mean_rotation_deg,
-      row.error.worst_rotation_deg, row.focal_percent, row.wrong_but_sure,
+      row.error.ate_median_percent, row.error.ate_max_percent, row.error.rotation_mean_deg,
+      row.error.rotation_max_deg, row.focal_percent, row.wrong_but_sure,
       row.needlessly_doubted + row.dropped, row.cpu_s, row.rendering_s, row.rays);
 }
 
@@ -226,10 +226,10 @@ json json_of(const Row& row) {
           {"needlessly_doubted", row.needlessly_doubted},
           {"dropped", row.dropped},
           {"centres_rms_percent", row.error.ate_percent},
-          {"centres_median_percent", row.error.median_percent},
-          {"centres_worst_percent", row.error.worst_percent},
-          {"rotation_mean_deg", row.error.mean_rotation_deg},
-          {"rotation_worst_deg", row.error.worst_rotation_deg},
+          {"centres_median_percent", row.error.ate_median_percent},
+          {"centres_worst_percent", row.error.ate_max_percent},
+          {"rotation_mean_deg", row.error.rotation_mean_deg},
+          {"rotation_worst_deg", row.error.rotation_max_deg},
           {"focal_percent", row.focal_percent},
           {"cpu_s", row.cpu_s},
           {"rendering_cpu_s", row.rendering_s},

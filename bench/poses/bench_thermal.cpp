@@ -71,12 +71,12 @@ void print_attempt(const char* name, const scenes::Scene& scene, const VisibleSc
     fmt::print("| {} | none: {} | | | {:.0f} |\n", name, poses.error().found.substr(0, 120), spent);
     return;
   }
-  const scenes::PoseError error = scenes::pose_error(
+  const PoseError error = scenes::pose_error(
       poses->reconstruction,
       poses->shares_visible_frame ? seen->reconstruction : poses->reconstruction, scene.truth);
   fmt::print("| {} | {}/{} | {:.2f} / {:.2f} | {:.2f} / {:.2f} | {:.0f} |\n", name,
              poses->reconstruction.views.size(), poses->frame_count, error.ate_percent,
-             error.worst_percent, error.mean_rotation_deg, error.worst_rotation_deg, spent);
+             error.ate_max_percent, error.rotation_mean_deg, error.rotation_max_deg, spent);
 }
 
 void print_attempts(const scenes::Scene& scene, const VisibleScene& seen,
@@ -135,14 +135,14 @@ Status run(const Arguments& arguments) {
   fmt::print("{}/{} posed, {:.1f} s, {:.1f} CPU s, {:.1f} of them in {} renders\n",
              poses.reconstruction.views.size(), poses.frame_count, wall, cpu_seconds() - before,
              rendering_s, renders);
-  const scenes::PoseError error = scenes::pose_error(
+  const PoseError error = scenes::pose_error(
       poses.reconstruction, poses.shares_visible_frame ? seen.reconstruction : poses.reconstruction,
       scene.truth);
   fmt::print(
       "centres ATE {:.3f} %, median {:.3f} %, worst {:.3f} % of the extent; rotation mean "
       "{:.3f}, median {:.3f}, worst {:.3f} deg\n",
-      error.ate_percent, error.median_percent, error.worst_percent, error.mean_rotation_deg,
-      error.rotation_deg, error.worst_rotation_deg);
+      error.ate_percent, error.ate_median_percent, error.ate_max_percent, error.rotation_mean_deg,
+      error.rotation_median_deg, error.rotation_max_deg);
   ORBITFUSE_ASSIGN(
       const scenes::Misalignment apart,
       scenes::misalignment(scene, seen.reconstruction, poses.reconstruction, seen.renderer));
@@ -151,7 +151,7 @@ Status run(const Arguments& arguments) {
       "{:.2f} px\n",
       scene.test.size(), apart.median(), apart.share(0.9));
   if (arguments.views)
-    for (const scenes::ViewError& view : error.each)
+    for (const ViewError& view : error.each)
       fmt::print("{} centre {:.2f} %, outwards {:+.2f} %, rotation {:.2f} deg\n", view.name,
                  view.center_percent, view.outward_percent, view.rotation_deg);
   return {};

@@ -143,8 +143,8 @@ Result<ModalityPoses> global_poses(const Session& session, const fs::path& workd
 }
 
 /// What each view is off by, and how many points hold it.
-void print_views(const ModalityPoses& poses, const scenes::PoseError& error) {
-  for (const scenes::ViewError& view : error.each) {
+void print_views(const ModalityPoses& poses, const PoseError& error) {
+  for (const ViewError& view : error.each) {
     std::size_t points = 0;
     for (const SparsePoint& point : poses.reconstruction.points)
       for (const Observation& seen : point.track)
@@ -170,13 +170,13 @@ void print(const scenes::Scene& scene, const Result<ModalityPoses>& poses, doubl
     fmt::print("  dropped {}: {}\n", view.name, view.why);
   fmt::print("  posed {}/{}, {:.1f} CPU s", poses->reconstruction.views.size(), poses->frame_count,
              cpu_s);
-  const scenes::PoseError error =
+  const PoseError error =
       scenes::pose_error(poses->reconstruction, poses->reconstruction, scene.truth);
   if (error.views > 0)
     fmt::print(
         "; centres RMS {:.3f} %, worst {:.3f} % of the extent; rotation mean {:.3f}, worst "
         "{:.3f} deg",
-        error.ate_percent, error.worst_percent, error.mean_rotation_deg, error.worst_rotation_deg);
+        error.ate_percent, error.ate_max_percent, error.rotation_mean_deg, error.rotation_max_deg);
   fmt::print("\n");
   if (views) print_views(*poses, error);
 }

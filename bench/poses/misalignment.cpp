@@ -22,10 +22,9 @@ std::vector<const PosedView*> nearest_first(const Reconstruction& model,
 /// Where the modality shows a scene point, less where it is, in the new camera's pixels.
 std::optional<Eigen::Vector2d> displacement(const std::vector<const PosedView*>& views,
                                             const Truth& truth,
-                                            const Similarity3d& model_from_truth,
+                                            const Similarity3d& truth_from_model,
                                             const PosedView& seen_by,
                                             const Eigen::Vector3d& point) {
-  const Similarity3d truth_from_model = model_from_truth.inverse();
   Eigen::Vector2d sum(0, 0);
   int count = 0;
   for (const PosedView* view : views) {
@@ -53,14 +52,15 @@ std::optional<Eigen::Vector2d> displacement(const std::vector<const PosedView*>&
 Result<Misalignment> misalignment(const Scene& scene, const Reconstruction& visible,
                                   const Reconstruction& thermal, const SceneRenderer& renderer) {
   Misalignment result;
-  const auto fit = model_from_truth(visible, scene.truth);
-  if (!fit) return result;
+  const auto truth_from_visible = truth_from_model(visible, scene.truth);
+  if (!truth_from_visible) return result;
+  const Similarity3d visible_from_truth = truth_from_visible->inverse();
   for (const PosedView& test : scene.test) {
     PosedView small = test;
     small.camera =
         test.camera.scaled_to(80, std::max(1, 80 * test.camera.height / test.camera.width))
             .without_distortion();
-    small.cam_from_world = rebase(test.cam_from_world, *fit);
+    small.cam_from_world = rebase(test.cam_from_world, visible_from_truth);
     ORBITFUSE_ASSIGN(const SceneRender seen, renderer(small.camera, small.cam_from_world));
     const Eigen::Vector3d center = camera_center(small.cam_from_world);
     const Rigid3d world_from_cam = small.cam_from_world.inverse();
@@ -76,8 +76,10 @@ Result<Misalignment> misalignment(const Scene& scene, const Reconstruction& visi
       for (int x = 0; x < small.camera.width; ++x) {
         const Eigen::Vector3d point = at(x, y);
         if (!point.allFinite()) continue;
-        const auto of_visible = displacement(visible_views, scene.truth, *fit, small, point);
-        const auto of_thermal = displacement(thermal_views, scene.truth, *fit, small, point);
+        const auto of_visible =
+            displacement(visible_views, scene.truth, *truth_from_visible, small, point);
+        const auto of_thermal =
+            displacement(thermal_views, scene.truth, *truth_from_visible, small, point);
         if (of_visible && of_thermal)
           result.px.push_back((*of_thermal - *of_visible).norm() * 640 / small.camera.width);
       }

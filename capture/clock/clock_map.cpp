@@ -5,15 +5,14 @@
 #include <cmath>
 #include <cstdio>
 
+#include "capture/frame_source.hpp"
+
 namespace orbitfuse {
 namespace {
 
 constexpr double ns = 1e-9;
 /// Below this spread of device times a slope means nothing.
 constexpr double min_span_s = 2.0;
-/// 146 years. A camera's stamp is 64 bits from the wire; beyond this it is no time, and differences
-/// would overflow.
-constexpr std::int64_t latest_ns = std::int64_t{1} << 62;
 /// Crystal oscillators stay within 200 ppm; a steeper slope is noise.
 constexpr double max_drift = 500e-6;
 
@@ -38,7 +37,7 @@ ClockMap::Stamp ClockMap::add(std::int64_t device_ns, std::int64_t arrival_ns) {
     stamp.host_time_ns = last_host_ns_;
     return stamp;
   };
-  if (device_ns <= 0 || device_ns > latest_ns) return finish(arrival_ns);
+  if (device_ns <= 0 || device_ns > latest_stamp_ns) return finish(arrival_ns);
   if (samples_.empty()) begin_segment(device_ns, arrival_ns);
 
   const double device_s = static_cast<double>(device_ns - device_origin_ns_) * ns;

@@ -4,18 +4,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "capture/frame_source.hpp"
+
 namespace orbitfuse {
 
 namespace {
-constexpr int settled = 8;     // the first intervals of a stream are irregular
-constexpr double late = 1.75;  // of the usual interval
-constexpr std::int64_t latest_ns = std::int64_t{1} << 62;  // 146 years: differences stay numbers
+constexpr int settled = 8;      // the first intervals of a stream are irregular
+constexpr double late = 1.75;   // of the usual interval
 constexpr double weight = 0.1;  // a rate that changes with the light is followed in some frames
 }  // namespace
 
 int FrameRhythm::note(std::uint64_t id, std::int64_t stamp_ns) {
   // A camera's stamp may be anything; without a time a frame tells nothing of the rhythm.
-  if (stamp_ns < 0 || stamp_ns > latest_ns) return 0;
+  if (stamp_ns < 0 || stamp_ns > latest_stamp_ns) return 0;
   const std::optional<Seen> before = last_;
   last_ = Seen{id, stamp_ns};
   if (!before || id <= before->id || stamp_ns <= before->stamp_ns) return 0;

@@ -104,19 +104,25 @@ double kelvin_per_count_for(const std::vector<cv::Mat>& kelvin_images) {
   return kelvin_per_count_for(hottest_k);
 }
 
+cv::Mat counts_of_kelvin(const cv::Mat& kelvin, double kelvin_per_count) {
+  CV_Assert(kelvin.type() == CV_32FC1);
+  cv::Mat counts(kelvin.size(), CV_16UC1);
+  for (int y = 0; y < kelvin.rows; ++y) {
+    for (int x = 0; x < kelvin.cols; ++x) {
+      counts.at<std::uint16_t>(y, x) =
+          count_from_kelvin(static_cast<double>(kelvin.at<float>(y, x)), kelvin_per_count);
+    }
+  }
+  return counts;
+}
+
 Status write_thermal_tiff(const fs::path& path, const cv::Mat& kelvin,
                           std::optional<double> kelvin_per_count) {
   CV_Assert(kelvin.type() == CV_32FC1);
   const double scale =
       kelvin_per_count ? *kelvin_per_count : kelvin_per_count_for(std::vector<cv::Mat>{kelvin});
-  cv::Mat counts(kelvin.size(), CV_16UC1);
-  for (int y = 0; y < kelvin.rows; ++y) {
-    for (int x = 0; x < kelvin.cols; ++x) {
-      counts.at<std::uint16_t>(y, x) =
-          count_from_kelvin(static_cast<double>(kelvin.at<float>(y, x)), scale);
-    }
-  }
-  ORBITFUSE_TRY(write_encoded(path, encode_thermal_tiff(counts, {scale, 0})));
+  ORBITFUSE_TRY(
+      write_encoded(path, encode_thermal_tiff(counts_of_kelvin(kelvin, scale), {scale, 0})));
   return write_file_atomic(sidecar_of(path), thermal_sidecar_json({scale, 0}) + "\n");
 }
 

@@ -26,6 +26,8 @@ Status write_png(const std::filesystem::path& path, const cv::Mat& image);
 Status write_jpeg(const std::filesystem::path& path, const cv::Mat& image, int quality = 95);
 /// The finest stored scale (core/temperature.hpp) that holds every temperature of the images.
 double kelvin_per_count_for(const std::vector<cv::Mat>& kelvin_images);
+/// CV_16UC1 of kelvin (CV_32FC1); 0 = invalid or outside the scale.
+cv::Mat counts_of_kelvin(const cv::Mat& kelvin, double kelvin_per_count);
 /// 16-bit TIFF with the scale in ImageDescription, and its sidecar. Without a scale the finest that
 /// holds the image: 0.01 K a count (centikelvin) up to 382 C.
 Status write_thermal_tiff(const std::filesystem::path& path, const cv::Mat& kelvin,

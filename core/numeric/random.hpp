@@ -5,14 +5,20 @@
 
 namespace orbitfuse {
 
-/// Counter-based random numbers (SplitMix64 finaliser): the value depends on the key alone, so
-/// draws are the same for any thread count and after a resume.
-inline std::uint64_t random_bits(std::uint64_t seed, std::uint64_t stream, std::uint64_t counter) {
-  std::uint64_t x = seed * 0x9E3779B97F4A7C15ull ^ stream * 0xD1B54A32D192ED03ull;
-  x += counter * 0xBF58476D1CE4E5B9ull + 0x9E3779B97F4A7C15ull;
+/// SplitMix64 (Steele, Lea, Flood, OOPSLA 2014): the state of a stream goes up by the step.
+inline constexpr std::uint64_t split_mix_step = 0x9E3779B97F4A7C15ull;
+inline std::uint64_t split_mix(std::uint64_t state) {
+  std::uint64_t x = state + split_mix_step;
   x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9ull;
   x = (x ^ (x >> 27)) * 0x94D049BB133111EBull;
-  x ^= x >> 31;
+  return x ^ (x >> 31);
+}
+
+/// Counter-based random numbers: the value depends on the key alone, so
+/// draws are the same for any thread count and after a resume.
+inline std::uint64_t random_bits(std::uint64_t seed, std::uint64_t stream, std::uint64_t counter) {
+  const std::uint64_t key = seed * split_mix_step ^ stream * 0xD1B54A32D192ED03ull;
+  std::uint64_t x = split_mix(key + counter * 0xBF58476D1CE4E5B9ull);
   x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9ull;
   return x ^ (x >> 27);
 }

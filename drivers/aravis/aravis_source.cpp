@@ -99,7 +99,8 @@ Result<Delivery> AravisSource::next(std::chrono::milliseconds timeout) {
 
 Delivery AravisSource::on_silence() {
   const auto quiet = Clock::now() - last_frame_;
-  if (quiet > options_.give_up) return lose("no frame for a second; reopening it");
+  if (quiet > options_.give_up)
+    return lose(fmt::format("no frame for {} ms; reopening it", options_.give_up.count()));
   if (quiet <= options_.silence || silent_told_ || state_ == State::proving) return {};
   silent_told_ = true;
   return event_delivery(EventKind::silent,
@@ -120,8 +121,8 @@ Delivery AravisSource::take(void* handle) {
   return delivery;
 }
 
-/// Why Aravis' buffer is no frame of this stream; empty: it is one.
-std::string AravisSource::damage(void* handle) {
+/// Why Aravis' buffer is no frame of this stream, if it is none.
+std::optional<std::string> AravisSource::damage(void* handle) {
   auto* buffer = static_cast<ArvBuffer*>(handle);
   const ArvBufferStatus status = arv_buffer_get_status(buffer);
   const guint64 mismatches =
@@ -145,7 +146,8 @@ std::string AravisSource::damage(void* handle) {
   std::size_t size = 0;
   arv_buffer_get_data(buffer, &size);
   const std::size_t needed = link_->image_bytes();
-  return size < needed ? fmt::format("{} bytes where {} are needed", size, needed) : "";
+  if (size < needed) return fmt::format("{} bytes where {} are needed", size, needed);
+  return std::nullopt;
 }
 
 Delivery AravisSource::inspect(void* handle, const Arrival& arrival) {
@@ -167,8 +169,10 @@ Delivery AravisSource::inspect(void* handle, const Arrival& arrival) {
       delivery.frame.id,
       std::chrono::duration_cast<std::chrono::nanoseconds>(arrival.at.time_since_epoch()).count());
   delivery.kind = Delivery::Kind::rejected;
-  delivery.reason = damage(buffer);
-  if (!delivery.reason.empty()) return delivery;
+  if (const std::optional<std::string> found = damage(buffer)) {
+    delivery.reason = *found;
+    return delivery;
+  }
 
   const Format format = *format_of(link_->pixel_format);
   const std::size_t needed = link_->image_bytes();

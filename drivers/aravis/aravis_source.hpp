@@ -103,7 +103,7 @@ class AravisSource final : public FrameSource {
   };
   Delivery come_back(void* buffer, const Arrival& arrival);
   Delivery inspect(void* buffer, const Arrival& arrival);
-  std::string damage(void* buffer);
+  std::optional<std::string> damage(void* buffer);
   void drain(std::vector<Delivery>& list);
 
   AravisOptions options_;

@@ -111,10 +111,10 @@ std::vector<Delivery> WatchSource::unfinished() {
                                             "--resume and existing=yes")));
   };
   for (const Attempt& attempt : queue_) {
-    if (attempt.why.empty())
-      unread(attempt.file);
+    if (attempt.why)
+      list.push_back(rejection(attempt.file.filename().string(), *attempt.why));
     else
-      list.push_back(rejection(attempt.file.filename().string(), attempt.why));
+      unread(attempt.file);
   }
   for (const fs::path& file : reader_->watch.untold()) {
     const bool waiting =

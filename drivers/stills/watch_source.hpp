@@ -59,7 +59,7 @@ class WatchSource final : public FrameSource {
   struct Attempt {
     std::filesystem::path file;
     std::chrono::steady_clock::time_point first_try, next_try;
-    std::string why;  ///< it could not be read; empty: it was not looked at yet
+    std::optional<std::string> why = {};  ///< it could not be read, if it was tried
   };
   Delivery rejection(const std::string& name, const std::string& why);
   std::optional<Delivery> take(Attempt attempt);

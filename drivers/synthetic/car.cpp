@@ -12,7 +12,7 @@ std::vector<Solid> make_car(std::uint64_t seed) {
   std::vector<Solid> parts;
   std::uint64_t next_seed = mix(seed, 17);
   const auto add = [&](const Solid& solid, Material material) {
-    next_seed = mix(next_seed);
+    next_seed = split_mix(next_seed);
     parts.push_back(solid.with(material, next_seed));
   };
   add(Solid::prism({{-2.05, 0.28},

@@ -6,18 +6,11 @@
 
 namespace orbitfuse::synthetic {
 
-std::uint64_t mix(std::uint64_t x) {
-  x += 0x9E3779B97F4A7C15ull;
-  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9ull;
-  x = (x ^ (x >> 27)) * 0x94D049BB133111EBull;
-  return x ^ (x >> 31);
-}
-
 double uniform(std::uint64_t hash) { return static_cast<double>(hash >> 11) * 0x1p-53; }
 
 double Random::uniform() {
-  state_ += 0x9E3779B97F4A7C15ull;
-  return synthetic::uniform(mix(state_));
+  state_ += split_mix_step;
+  return synthetic::uniform(split_mix(state_));
 }
 
 double Random::gaussian() {

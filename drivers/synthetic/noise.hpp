@@ -4,13 +4,12 @@
 #include <Eigen/Core>
 #include <cstdint>
 
+#include "core/numeric/random.hpp"
+
 // Own random numbers: std's distributions may differ between libraries, and the scene must not.
 namespace orbitfuse::synthetic {
 
-/// splitmix64 (Steele, Lea, Flood, OOPSLA 2014).
-std::uint64_t mix(std::uint64_t x);
-
-inline std::uint64_t mix(std::uint64_t a, std::uint64_t b) { return mix(a ^ mix(b)); }
+inline std::uint64_t mix(std::uint64_t a, std::uint64_t b) { return split_mix(a ^ split_mix(b)); }
 
 /// Uniform in [0, 1).
 double uniform(std::uint64_t hash);

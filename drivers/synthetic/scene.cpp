@@ -27,10 +27,10 @@ void add_clutter(Random& random, std::vector<Solid>& solids) {
     if (i % 5 == 3) {
       const double r = random.uniform(0.10, 0.17), h = random.uniform(0.12, 0.26);
       solids.push_back(Solid::cylinder({center.x(), center.y(), h}, Vector3d::UnitZ(), r, h)
-                           .with(Material::barrel, mix(seed)));
+                           .with(Material::barrel, split_mix(seed)));
     } else {
       solids.push_back(Solid::box(center, half, random.uniform(0, 180))
-                           .with(i % 3 == 0 ? Material::crate : Material::brick, mix(seed)));
+                           .with(i % 3 == 0 ? Material::crate : Material::brick, split_mix(seed)));
     }
   }
 }
@@ -43,7 +43,7 @@ void add_buildings(Random& random, std::vector<Solid>& solids) {
     const Vector3d half(random.uniform(1.0, 3.2), random.uniform(1.0, 2.6), height);
     solids.push_back(
         Solid::box(polar(azimuth, random.uniform(19, 30), height), half, random.uniform(0, 180))
-            .with(Material::building, mix(static_cast<std::uint64_t>(2000 + i))));
+            .with(Material::building, split_mix(static_cast<std::uint64_t>(2000 + i))));
   }
 }
 

@@ -10,7 +10,6 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / "docs" / "benchmarks"
 WITHOUT_PLOT = {
     "hostile.md": "says what the program answers; runs of a fuzzer measure how fast a parser is",
-    "measurement.md": "six scenes by five figures: the table is as short as a plot",
 }
 
 spec = importlib.util.spec_from_file_location("plot_pages", ROOT / "bench" / "plot_pages.py")

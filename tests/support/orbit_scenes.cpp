@@ -160,65 +160,26 @@ Scene folder_scene(const fs::path& folder) {
   return scene;
 }
 
-std::optional<Similarity3d> model_from_truth(const Reconstruction& model, const Truth& truth) {
-  std::vector<const PosedView*> pairs;
-  for (const PosedView& view : model.views)
-    if (truth.views.contains(view.name)) pairs.push_back(&view);
-  if (pairs.size() < 3) return std::nullopt;
-  Eigen::Matrix3Xd ours(3, static_cast<Eigen::Index>(pairs.size())), theirs = ours;
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    ours.col(static_cast<Eigen::Index>(i)) = camera_center(pairs[i]->cam_from_world);
-    theirs.col(static_cast<Eigen::Index>(i)) =
-        camera_center(truth.views.at(pairs[i]->name).cam_from_world);
+namespace {
+std::vector<PosePair> pairs_of(const Reconstruction& model, const Truth& truth) {
+  std::vector<PosePair> pairs;
+  for (const PosedView& view : model.views) {
+    const auto found = truth.views.find(view.name);
+    if (found != truth.views.end())
+      pairs.push_back({view.cam_from_world, found->second.cam_from_world, view.name});
   }
-  const Eigen::Matrix4d m = Eigen::umeyama(theirs, ours, true);
-  Similarity3d fit;
-  fit.scale = std::cbrt(m.topLeftCorner<3, 3>().determinant());
-  fit.rotation = Eigen::Quaterniond(Eigen::Matrix3d(m.topLeftCorner<3, 3>() / fit.scale));
-  fit.translation = m.topRightCorner<3, 1>();
-  return fit;
+  return pairs;
+}
+}  // namespace
+
+Result<Similarity3d> truth_from_model(const Reconstruction& model, const Truth& truth) {
+  return truth_from_estimate(pairs_of(model, truth));
 }
 
 PoseError pose_error(const Reconstruction& model, const Reconstruction& anchor,
                      const Truth& truth) {
-  PoseError error;
-  const std::optional<Similarity3d> fit = model_from_truth(anchor, truth);
-  if (!fit) return error;
-  const Similarity3d truth_from_model = fit->inverse();
-
-  // Extent: the greatest distance between two true camera centres of the judged modality.
-  std::vector<Eigen::Vector3d> centers;
-  std::vector<double> offsets, angles;
-  for (const PosedView& view : model.views) {
-    const auto found = truth.views.find(view.name);
-    if (found == truth.views.end()) continue;
-    centers.push_back(camera_center(found->second.cam_from_world));
-    const Rigid3d moved = rebase(view.cam_from_world, truth_from_model);
-    offsets.push_back((camera_center(moved) - centers.back()).norm());
-    angles.push_back(rotation_angle_deg(moved.rotation, found->second.cam_from_world.rotation));
-    const Eigen::Vector3d off = camera_center(moved) - centers.back();
-    const Eigen::Vector3d back =
-        -(found->second.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ());
-    error.each.push_back({view.name, off.norm(), off.dot(back), angles.back()});
-    error.mean_rotation_deg += angles.back();
-  }
-  if (offsets.empty()) return error;
-  double extent = 0, sum = 0;
-  for (const auto& a : centers)
-    for (const auto& b : centers) extent = std::max(extent, (a - b).norm());
-  for (const double d : offsets) sum += d * d;
-  for (ViewError& view : error.each)
-    view.center_percent *= 100 / extent, view.outward_percent *= 100 / extent;
-  error.mean_rotation_deg /= static_cast<double>(angles.size());
-  std::sort(offsets.begin(), offsets.end());
-  std::sort(angles.begin(), angles.end());
-  error.views = static_cast<int>(offsets.size());
-  error.ate_percent = 100 * std::sqrt(sum / static_cast<double>(offsets.size())) / extent;
-  error.median_percent = 100 * offsets[offsets.size() / 2] / extent;
-  error.worst_percent = 100 * offsets.back() / extent;
-  error.rotation_deg = angles[angles.size() / 2];
-  error.worst_rotation_deg = angles.back();
-  return error;
+  const auto fit = truth_from_model(anchor, truth);
+  return fit ? pose_error(pairs_of(model, truth), *fit) : PoseError{};
 }
 
 }  // namespace orbitfuse::scenes

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/geometry/pose_error.hpp"
 #include "core/geometry/reconstruction.hpp"
 #include "core/session/session.hpp"
 
@@ -45,26 +46,11 @@ Result<Scene> run_scene(const std::filesystem::path& session, const std::filesys
 /// Thermal frames recorded between the stations, in their order, without stations of their own.
 void add_tracking(Scene& scene, const std::filesystem::path& tracking_json);
 
-struct ViewError {
-  std::string name;
-  double center_percent = 0, outward_percent = 0;  ///< of the extent; along the true optical axis
-  double rotation_deg = 0;
-};
-
-struct PoseError {
-  int views = 0;
-  std::vector<ViewError> each;
-  double mean_rotation_deg = 0;
-  double ate_percent = 0;  ///< RMS of centres, share of the truth's extent
-  double median_percent = 0, worst_percent = 0;
-  double rotation_deg = 0;  ///< median
-  double worst_rotation_deg = 0;
-};
-/// The similarity that brings true camera centres onto the model's.
-std::optional<Similarity3d> model_from_truth(const Reconstruction& model, const Truth& truth);
+/// The similarity that brings the model's camera centres onto the true ones.
+Result<Similarity3d> truth_from_model(const Reconstruction& model, const Truth& truth);
 
 /// After the similarity that fits `anchor`'s centres to the truth (the visible cameras, when
-/// thermal poses are judged in the visible frame).
+/// thermal poses are judged in the visible frame). Without such a fit no view is counted.
 PoseError pose_error(const Reconstruction& model, const Reconstruction& anchor, const Truth& truth);
 
 }  // namespace orbitfuse::scenes

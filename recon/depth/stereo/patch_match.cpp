@@ -6,19 +6,19 @@
 #include <cmath>
 #include <limits>
 
+#include "core/numeric/random.hpp"
+
 namespace orbitfuse::depth {
 namespace {
 
-/// Splitmix64: a small stream per pixel.
+/// A small stream per pixel.
 class Random {
  public:
-  Random(std::uint64_t seed, std::uint64_t key) : state_(seed * 0x9E3779B97F4A7C15ull ^ key) {}
+  Random(std::uint64_t seed, std::uint64_t key) : state_(seed * split_mix_step ^ key) {}
   float uniform() {  // [0, 1)
-    state_ += 0x9E3779B97F4A7C15ull;
-    std::uint64_t z = state_;
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBull;
-    return static_cast<float>((z ^ (z >> 31)) >> 40) * 0x1p-24f;
+    const std::uint64_t bits = split_mix(state_);
+    state_ += split_mix_step;
+    return uniform01(bits);
   }
   float spread(float width) { return width * (2 * uniform() - 1); }
 

@@ -153,10 +153,11 @@ Result<SimilarityRefinement> search_similarity(const SceneRenderer& visible,
       starts_round(visible_from_thermal, middle(first.patches), options);
   ORBITFUSE_TRY(close(seen, first));
   const double moved = steps_between(first.visible_from_thermal, visible_from_thermal, options);
-  progress.report({"register", 0, 0, -1,
-                   fmt::format("from the clouds' answer: support {:.0f}, {:.2f} of the patches in "
-                               "place, moved by {:.2f} steps",
-                               first.support, first.share, moved)});
+  progress.report(
+      {.stage = "register",
+       .detail = fmt::format("from the clouds' answer: support {:.0f}, {:.2f} of the patches in "
+                             "place, moved by {:.2f} steps",
+                             first.support, first.share, moved)});
   const std::vector<RenderRound> last_rounds{{160, 8, 8, 12}, {256, 8, 8, 12}, {320, 6, 7, 12}};
   if (options.clouds_decide && first.share >= options.decisive_share && moved < 0.5) {
     ORBITFUSE_ASSIGN(SimilarityRefinement result, finish(first.visible_from_thermal, last_rounds));
@@ -171,7 +172,7 @@ Result<SimilarityRefinement> search_similarity(const SceneRenderer& visible,
   for (Candidate& candidate : candidates) {
     ORBITFUSE_TRY(open(seen, candidate));
     progress.report(
-        {"register", 0, 0, -1, fmt::format("start: support {:.0f}", candidate.support)});
+        {.stage = "register", .detail = fmt::format("start: support {:.0f}", candidate.support)});
   }
   const int starts = 1 + static_cast<int>(candidates.size());
   // Clutter can draw a start to where the clouds don't meet at all.
@@ -184,9 +185,9 @@ Result<SimilarityRefinement> search_similarity(const SceneRenderer& visible,
   candidates.resize(std::min(candidates.size(), static_cast<std::size_t>(options.finalists)));
   for (Candidate& candidate : candidates) {
     ORBITFUSE_TRY(close(seen, candidate));
-    progress.report({"register", 0, 0, -1,
-                     fmt::format("finalist: support {:.0f}, {:.2f} in place", candidate.support,
-                                 candidate.share)});
+    progress.report({.stage = "register",
+                     .detail = fmt::format("finalist: support {:.0f}, {:.2f} in place",
+                                           candidate.support, candidate.share)});
   }
   candidates.push_back(std::move(first));
   std::erase_if(candidates, lost);

@@ -76,10 +76,10 @@ TEST(ContainerSlow, MergedThermalTrackingModelIsNotBelieved) {
     const auto judged = judge_model(*model, scene.session, frames, options);
     ASSERT_TRUE(judged) << judged.error().message();
     const Reconstruction& adjusted = judged->poses.reconstruction;
-    const scenes::PoseError error = scenes::pose_error(adjusted, adjusted, scene.truth);
+    const PoseError error = scenes::pose_error(adjusted, adjusted, scene.truth);
     fmt::print("{:.2f} px; centres {:.0f} % of the extent and {:.0f} deg off; gates: {}\n",
                judged->poses.gates.at("reprojection_rms_proxy_px"), error.ate_percent,
-               error.mean_rotation_deg, judged->why);
+               error.rotation_mean_deg, judged->why);
     ASSERT_GT(error.ate_percent, 10) << "a right model proves nothing here";
     EXPECT_LT(judged->poses.gates.at("reprojection_rms_proxy_px"), options.max_reprojection_rms_px)
         << "wrong, and not to be told by its residuals";

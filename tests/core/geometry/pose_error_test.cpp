@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "app/eval/pose_error.hpp"
+#include "core/geometry/pose_error.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
-namespace orbitfuse::eval {
+namespace orbitfuse {
 namespace {
 
 /// Cameras on a circle, seen from a world that differs by a similarity.
@@ -50,6 +50,8 @@ TEST(PoseError, OneTurnedCameraShowsInTheMaximumOnly) {
   EXPECT_NEAR(error.rotation_max_deg, 10, 1e-6);
   EXPECT_NEAR(error.rotation_mean_deg, 10.0 / 12, 1e-6);
   EXPECT_LT(error.rotation_median_deg, 1e-5);
+  ASSERT_EQ(error.each.size(), 12u);
+  EXPECT_NEAR(error.each[3].rotation_deg, 10, 1e-6);
   EXPECT_LT(error.ate_percent, 1e-7);
 }
 
@@ -65,6 +67,20 @@ TEST(PoseError, AteIsInPercentOfTheExtent) {
   EXPECT_NEAR(pose_error(pairs, *truth_from_estimate(pairs)).ate_percent, 1.0, 0.05);
 }
 
+TEST(PoseError, EachViewSaysHowFarAndWhichWay) {
+  auto pairs = orbit(12, moved);
+  pairs[5].name = "005";
+  // Backwards along its own axis by 1 of the extent's 6, in the estimate's units.
+  pairs[5].cam_from_estimate.translation.z() += 0.37;
+  const PoseError error = pose_error(pairs, moved.inverse());
+  const double percent = 100 / extent(pairs);
+  EXPECT_EQ(error.each[5].name, "005");
+  EXPECT_NEAR(error.each[5].center_percent, percent, 1e-6);
+  EXPECT_NEAR(error.each[5].outward_percent, percent, 1e-6);
+  EXPECT_NEAR(error.ate_max_percent, percent, 1e-6);
+  EXPECT_LT(error.ate_median_percent, 1e-6);
+}
+
 TEST(PoseError, UndeterminedFitsAreErrors) {
   EXPECT_FALSE(truth_from_estimate({}));
   EXPECT_FALSE(truth_from_estimate(orbit(2, {})));
@@ -78,4 +94,4 @@ TEST(PoseError, UndeterminedFitsAreErrors) {
 }
 
 }  // namespace
-}  // namespace orbitfuse::eval
+}  // namespace orbitfuse

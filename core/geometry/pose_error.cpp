@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "app/eval/pose_error.hpp"
+#include "core/geometry/pose_error.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <numeric>
 
-namespace orbitfuse::eval {
+namespace orbitfuse {
 
 Result<Similarity3d> truth_from_estimate(const std::vector<PosePair>& pairs) {
   const auto n = static_cast<Eigen::Index>(pairs.size());
@@ -49,22 +49,28 @@ PoseError pose_error(const std::vector<PosePair>& pairs, const Similarity3d& tru
   error.views = static_cast<int>(pairs.size());
   if (pairs.empty()) return error;
   const double size = extent(pairs);
-  std::vector<double> angles;
-  double sum = 0;
+  std::vector<double> offsets, angles;
+  double squares = 0;
   for (const PosePair& pair : pairs) {
     const Rigid3d cam = rebase(pair.cam_from_estimate, truth_from_estimate);
-    const double distance = (camera_center(cam) - camera_center(pair.cam_from_truth)).norm();
-    sum += distance * distance;
-    error.ate_max_percent = std::max(error.ate_max_percent, 100 * distance / size);
+    const Eigen::Vector3d off = (camera_center(cam) - camera_center(pair.cam_from_truth)) / size;
+    const Eigen::Vector3d outward =
+        -(pair.cam_from_truth.rotation.conjugate() * Eigen::Vector3d::UnitZ());
+    squares += off.squaredNorm();
+    offsets.push_back(100 * off.norm());
     angles.push_back(rotation_angle_deg(cam.rotation, pair.cam_from_truth.rotation));
+    error.each.push_back({pair.name, offsets.back(), 100 * off.dot(outward), angles.back()});
   }
+  std::sort(offsets.begin(), offsets.end());
   std::sort(angles.begin(), angles.end());
   const auto n = static_cast<double>(pairs.size());
-  error.ate_percent = 100 * std::sqrt(sum / n) / size;
+  error.ate_percent = 100 * std::sqrt(squares / n);
+  error.ate_median_percent = offsets[offsets.size() / 2];
+  error.ate_max_percent = offsets.back();
   error.rotation_mean_deg = std::accumulate(angles.begin(), angles.end(), 0.0) / n;
   error.rotation_median_deg = angles[angles.size() / 2];
   error.rotation_max_deg = angles.back();
   return error;
 }
 
-}  // namespace orbitfuse::eval
+}  // namespace orbitfuse
