@@ -214,6 +214,8 @@ std::string finding_block(const ShownFinding& shown) {
   if (f.answer.kind == Kind::distance) html += "<p>" + headline(f) + "</p>\n";
   if (f.comparison)
     html += "<p class=\"result\">" + escape(comparison_words(*f.comparison)) + "</p>\n";
+  if (f.comparison && f.comparison->known() && !f.comparison->caution.empty())
+    html += "<p class=\"notice\">Beware: " + escape(f.comparison->caution) + ".</p>\n";
   for (const std::string& of : f.reference_of)
     html += "<p>Reference of '" + escape(of) + "'.</p>\n";
   if (!f.remark.empty()) html += "<p>Remark: " + escape(f.remark) + "</p>\n";
@@ -265,9 +267,10 @@ constexpr const char* signature =
     "<section class=\"sign\"><h2>Signature</h2><table class=\"facts\"><tbody><tr><th "
     "scope=\"row\">Date</th><td>&nbsp;</td></tr><tr><th scope=\"row\">Name and signature</th><td>"
     "&nbsp;</td></tr></tbody></table><p class=\"standard\">EN 13187, test report: date and "
-    "signature.</p><p class=\"note\">This report is laid out along the subjects that EN 13187:1998 "
-    "and ISO 18434-1:2008 ask a report for. Whether the inspection follows a standard is the "
-    "operator's to declare, not the program's.</p></section>\n";
+    "signature.</p><p class=\"note\">The subjects named in italics are those of EN 13187:1998 as a "
+    "public summary has them, and of ISO 18434-1:2008 without such a source; neither were checked "
+    "against the standards' text. Whether the inspection follows a standard is the operator's to "
+    "declare, not the program's.</p></section>\n";
 
 }  // namespace
 
