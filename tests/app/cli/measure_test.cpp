@@ -127,6 +127,18 @@ TEST_F(Measure, DamagedAndForeignMeasurementsAreNamedAndKept) {
   }
 }
 
+TEST_F(Measure, WhatIsStoppedSaysNothingOfResuming) {
+  test::put(file(), "{}");  // a warning before the work begins
+  RunOptions options;
+  options.interrupt_after = "measurements.json";
+  const Outcome stopped =
+      orbitfuse_program({"measure", out().string(), "--hottest", "100"}, options);
+  EXPECT_TRUE(stopped.code == 0 || stopped.code == 130) << stopped.code << stopped.err;
+  EXPECT_EQ(stopped.code == 130, stopped.err.find("call it again") != std::string::npos)
+      << stopped.err;
+  EXPECT_EQ(stopped.err.find("--resume"), std::string::npos);
+}
+
 TEST_F(Measure, WhatIsWrongIsNamedWithTheRemedy) {
   expect_refused({"--pixel", "thermal/9.tiff,1,1"}, 3, "thermal/00");
   expect_refused({"--pixel", "000,9999,1"}, 3, "outside of the picture");
