@@ -279,7 +279,7 @@ constexpr const char* plan_words =
     "finding's pictures are of. The page's up is an axis of the run, not north.</p>\n";
 
 constexpr const char* signature =
-    "<section class=\"sign\"><h2>Signature</h2><table class=\"facts\"><tbody><tr><th "
+    "<div class=\"end\"><section><h2>Signature</h2><table class=\"facts\"><tbody><tr><th "
     "scope=\"row\">Date</th><td>&nbsp;</td></tr><tr><th scope=\"row\">Name and signature</th><td>"
     "&nbsp;</td></tr></tbody></table><p class=\"standard\">EN 13187, test report: date and "
     "signature.</p><p class=\"note\">The subjects named in italics are those of EN 13187:1998 as a "
@@ -327,7 +327,7 @@ std::string to_html(const InspectionModel& model) {
                 "result. ISO 18434-1: sources of error.",
                 limits(model.limits));
   return html + signature +
-         fmt::format("</main>\n<footer>OrbitFuse {} · {} · {}</footer>\n</body></html>\n",
+         fmt::format("<footer>OrbitFuse {} · {} · {}</footer>\n</div></main>\n</body></html>\n",
                      escape(model.software), escape(model.run), escape(model.created));
 }
 
