@@ -149,6 +149,11 @@ Status resolve(StageFolders& folders) {
   return {};
 }
 
+Error without_resume(Error error) {
+  if (error.kind == ErrorKind::cancelled) error.remedy = "nothing was changed: call it again";
+  return error;
+}
+
 Status run_stages(Context& context, const StageFolders& given,
                   const std::vector<std::string>& targets, Missing missing) {
   StageFolders folders = given;

@@ -24,7 +24,10 @@ const std::vector<Verb>& verbs() {
       {"metrics", "Score fused images",
        "orbitfuse metrics --visible a.png --thermal b.png --fused f.png --json", add_metrics},
       {"report", "Write report.html from what a run has left, or an inspection report for a client",
-       "orbitfuse report replay_data/car --out out/", add_report},
+       "orbitfuse report replay_data/car --out out/\n"
+       "  orbitfuse report --print-template > inspection.toml\n"
+       "  orbitfuse report out/ --inspection inspection.toml --pdf",
+       add_report},
       {"view", "Walk round the result of a run in a browser", "orbitfuse view out/", add_view},
       {"measure", "Say how hot something is in a finished run, and how sure that is",
        "orbitfuse measure out/ --hottest 3", add_measure},

@@ -199,8 +199,11 @@ void add_pose_limits(const Session& session, const view::FinishedRun& run,
     std::string list;
     for (const std::string& one : doubtful) list += (list.empty() ? "" : "; ") + one;
     if (!doubtful.empty())
-      limits.push_back(fmt::format("{} of {} posed {} views are doubtful and count for less: {}.",
-                                   doubtful.size(), posed.size(), name(modality), list));
+      limits.push_back(fmt::format("{} of {} posed {} views {}: {}.", doubtful.size(), posed.size(),
+                                   name(modality),
+                                   doubtful.size() == 1 ? "is doubtful and counts for less"
+                                                        : "are doubtful and count for less",
+                                   list));
   }
 }
 

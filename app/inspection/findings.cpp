@@ -104,11 +104,15 @@ Result<Comparison> comparison_of(const InspectionFinding& finding, const std::st
                               measurement::name(part->answer.kind)),
                   "compare spots, boxes, lines, polygons or hottest places");
   const auto &a = finding.reading(), &b = other->reading();
-  return Comparison{reference,
-                    a.temperature_k - b.temperature_k,
-                    std::hypot(a.uncertainty_k, b.uncertainty_k),
-                    {},
-                    {}};
+  Comparison comparison{reference,
+                        a.temperature_k - b.temperature_k,
+                        std::hypot(a.uncertainty_k, b.uncertainty_k),
+                        {},
+                        {}};
+  comparison.caution =
+      measurement::parameters_differ(finding.answer.radiometry, other->answer.radiometry)
+          .value_or("");
+  return comparison;
 }
 
 }  // namespace
@@ -165,6 +169,11 @@ Result<std::vector<InspectionFinding>> findings_of(const Measurements& saved,
     } else if (finding.answer.kind == Kind::difference) {
       finding.comparison = Comparison{
           "", finding.answer.difference_k, finding.answer.difference_uncertainty_k, {}, {}};
+      if (finding.answer.of.size() == 2)
+        finding.comparison->caution =
+            measurement::parameters_differ(finding.answer.of[0].radiometry,
+                                           finding.answer.of[1].radiometry)
+                .value_or("");
     }
     if (finding.comparison) classify(*finding.comparison, details.classes);
   }

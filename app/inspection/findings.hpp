@@ -19,6 +19,7 @@ struct Comparison {
   std::optional<PriorityClass> priority;  ///< none: below all classes, or not known
   /// What it may be as well within the uncertainty, in words; empty: the class is sure.
   std::string or_else;
+  std::string caution = {};  ///< the two stand for different object parameters, in words; or empty
   bool known() const;
 };
 

@@ -77,9 +77,8 @@ std::string bars(const InspectionModel& model) {
 
 std::string difference_words(const Comparison& c) {
   if (!c.known()) return "not known";
-  std::string text = fmt::format("{:+.1f} K", c.difference_k);
-  if (std::isfinite(c.uncertainty_k)) text += fmt::format(" ± {:.1f}", c.uncertainty_k);
-  return text;
+  if (!std::isfinite(c.uncertainty_k)) return fmt::format("{:+.1f} K", c.difference_k);
+  return fmt::format("{:+.1f} ± {:.1f} K", c.difference_k, c.uncertainty_k);
 }
 
 std::string priority_words(const std::optional<Comparison>& c) {
@@ -98,7 +97,7 @@ std::string headline(const InspectionFinding& f) {
   if (!r.seen()) return "not measured";
   const std::string degrees = celsius_words(r.temperature_k);
   return std::isfinite(r.uncertainty_k)
-             ? fmt::format("{} ± {} °C", degrees, number_words(r.uncertainty_k))
+             ? fmt::format("{} °C ± {} K", degrees, number_words(r.uncertainty_k))
              : degrees + " °C";
 }
 
@@ -178,8 +177,9 @@ std::string reading_table(const InspectionFinding& f) {
   const auto places = stages::places_of(f.measurement, f.answer);
   if (places.empty()) return {};
   std::string html = fmt::format(
-      "<table{}><thead><tr><th class=\"text\">Place</th><th>Frames °C</th><th>± K</th><th>Lowest"
-      "</th><th>Highest</th><th>Spread K</th><th>Field °C</th><th class=\"text\">Frames</th><th>"
+      "<table{}><thead><tr><th class=\"text\">Place</th><th>Mean °C</th><th>± K</th>"
+      "<th>Lowest °C</th><th>Highest °C</th><th>Spread K</th><th>Field °C</th><th "
+      "class=\"text\">Frames</th><th>"
       "Angle</th></tr></thead><tbody>\n",
       places.size() > long_table_rows ? " class=\"long\"" : "");
   for (const stages::ReadPlace& place : places) {
@@ -205,6 +205,20 @@ std::string comparison_words(const Comparison& c) {
   return text + ".";
 }
 
+/// "2026-11-22T23:31:34Z" as a reader's time; what is written otherwise stays.
+std::string when(const std::string& iso) {
+  if (iso.size() != 20 || iso[10] != 'T' || iso.back() != 'Z') return iso;
+  return iso.substr(0, 10) + " " + iso.substr(11, 5) + " UTC";
+}
+
+/// A note of a measurement begins small and has no end.
+std::string sentence(std::string note) {
+  if (note.empty()) return note;
+  if (note.front() >= 'a' && note.front() <= 'z')
+    note.front() = static_cast<char>(note.front() - 32);
+  return note + ".";
+}
+
 std::string finding_block(const ShownFinding& shown) {
   const InspectionFinding& f = shown.finding;
   std::string html =
@@ -214,6 +228,8 @@ std::string finding_block(const ShownFinding& shown) {
   if (f.answer.kind == Kind::distance) html += "<p>" + headline(f) + "</p>\n";
   if (f.comparison)
     html += "<p class=\"result\">" + escape(comparison_words(*f.comparison)) + "</p>\n";
+  if (f.comparison && f.comparison->known() && !f.comparison->caution.empty())
+    html += "<p class=\"notice\">Beware: " + escape(f.comparison->caution) + ".</p>\n";
   for (const std::string& of : f.reference_of)
     html += "<p>Reference of '" + escape(of) + "'.</p>\n";
   if (!f.remark.empty()) html += "<p>Remark: " + escape(f.remark) + "</p>\n";
@@ -226,10 +242,10 @@ std::string finding_block(const ShownFinding& shown) {
   }
   if (!f.answer.radiometry.words.empty()) notes.push_back(f.answer.radiometry.words);
   notes.push_back(fmt::format("{} '{}' of measurements.json, {}", measurement::name(f.answer.kind),
-                              f.measurement, f.created));
+                              f.measurement, when(f.created)));
   std::string list;
-  for (const std::string& note : notes) list += (list.empty() ? "" : "; ") + note;
-  return html + "<p class=\"note\">" + escape(list) + ".</p></article>\n";
+  for (const std::string& note : notes) list += sentence(note) + " ";
+  return html + "<p class=\"note\">" + escape(list) + "</p></article>\n";
 }
 
 std::string finding_blocks(const InspectionModel& model) {
@@ -238,7 +254,8 @@ std::string finding_blocks(const InspectionModel& model) {
   for (const ShownFinding& shown : model.findings) html += finding_block(shown);
   return html +
          fmt::format(
-             "<p class=\"note\">± {}. Frames: their weighted mean. Lowest, highest: over the "
+             "<p class=\"note\">± {}. Mean: of the frames, by their weight. Lowest, highest: "
+             "over the "
              "frames of a spot, over the "
              "points of a region. Spread: between frames. Field: of the trained thermal "
              "field, beside the frames and not in their mean. Angle: of the line of sight "
@@ -262,12 +279,13 @@ constexpr const char* plan_words =
     "finding's pictures are of. The page's up is an axis of the run, not north.</p>\n";
 
 constexpr const char* signature =
-    "<section class=\"sign\"><h2>Signature</h2><table class=\"facts\"><tbody><tr><th "
+    "<div class=\"end\"><section><h2>Signature</h2><table class=\"facts\"><tbody><tr><th "
     "scope=\"row\">Date</th><td>&nbsp;</td></tr><tr><th scope=\"row\">Name and signature</th><td>"
     "&nbsp;</td></tr></tbody></table><p class=\"standard\">EN 13187, test report: date and "
-    "signature.</p><p class=\"note\">This report is laid out along the subjects that EN 13187:1998 "
-    "and ISO 18434-1:2008 ask a report for. Whether the inspection follows a standard is the "
-    "operator's to declare, not the program's.</p></section>\n";
+    "signature.</p><p class=\"note\">The subjects named in italics are those of EN 13187:1998 as a "
+    "public summary has them, and of ISO 18434-1:2008 without such a source; neither were checked "
+    "against the standards' text. Whether the inspection follows a standard is the operator's to "
+    "declare, not the program's.</p></section>\n";
 
 }  // namespace
 
@@ -309,7 +327,7 @@ std::string to_html(const InspectionModel& model) {
                 "result. ISO 18434-1: sources of error.",
                 limits(model.limits));
   return html + signature +
-         fmt::format("</main>\n<footer>OrbitFuse {} · {} · {}</footer>\n</body></html>\n",
+         fmt::format("<footer>OrbitFuse {} · {} · {}</footer>\n</div></main>\n</body></html>\n",
                      escape(model.software), escape(model.run), escape(model.created));
 }
 

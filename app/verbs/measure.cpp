@@ -98,6 +98,7 @@ Status run(Context& context, const Options& options) {
     list(context, known, file.string());
     return {};
   }
+  if (words.save) ORBITFUSE_TRY(check_name(request->name));  // before it takes its time
   ORBITFUSE_ASSIGN(const Answer answer, measure(scene, *request, context.progress));
   std::string name = request->name;
   if (options.words.save && context.common.dry_run) {
@@ -110,7 +111,9 @@ Status run(Context& context, const Options& options) {
     name = kept.name;
     context.console.info(fmt::format("saved as '{}' in {}{}", name, file.string(),
                                      kept.replaced ? ", in place of the one of that name" : ""));
+    if (!kept.words.empty()) context.console.info("of the one before: " + kept.words);
     context.result["replaced"] = kept.replaced;
+    context.result["earlier_words"] = kept.words;
   }
   if (name.empty()) name = std::string(measurement::name(request->kind));
   context.result["name"] = name;
@@ -127,7 +130,7 @@ Action add_measure(CLI::App& app) {
   app.add_option("out", options->out, "The --out folder of a finished run")->required();
   app.add_option("--session", options->session, "Where the session is, if it was moved");
   add_measure_options(app, options->words);
-  return [options](Context& context) { return run(context, *options); };
+  return [options](Context& context) { return run(context, *options).map_error(without_resume); };
 }
 
 }  // namespace orbitfuse::cli

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <thread>
 
+#include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
 
 namespace orbitfuse::cli {
@@ -12,12 +13,6 @@ namespace {
 struct Options {
   std::string run, page = "8471", token;
 };
-
-/// Of what was stopped while it was read: there is nothing to go on with.
-Error without_resume(Error error) {
-  if (error.kind == ErrorKind::cancelled) error.remedy = "nothing was changed: open it again";
-  return error;
-}
 
 /// Serves until Ctrl-C, which is how a viewer ends: no error.
 Status view_run(Context& context, const Options& o) {

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <opencv2/core.hpp>
 
 #include "app/view/shot_request.hpp"
@@ -22,6 +23,21 @@ std::string hex_of(const cv::Mat& colors_bgr) {
     text += fmt::format("{:02x}{:02x}{:02x}", c[2], c[1], c[0]);
   }
   return text;
+}
+
+/// The heat picture's scale: colours, and 256 times how strongly each is laid over the visible one,
+/// "ss" of 255, both from the usual level to the hot one.
+json heat_json(const FinishedRun& run) {
+  const fusion::HeatOptions& how = run.config.fuse.options.heat;
+  std::string strengths;
+  for (int i = 0; i < 256; ++i) {
+    const double level = run.heat.usual + (run.heat.hot - run.heat.usual) * i / 255;
+    strengths += fmt::format("{:02x}", std::lround(255 * how.opacity * run.heat.strength(level)));
+  }
+  return {{"usual", run.heat.usual},
+          {"hot", run.heat.hot},
+          {"colors", hex_of(fusion::heat_colors(how.palette).value())},
+          {"strengths", strengths}};
 }
 
 }  // namespace
@@ -54,10 +70,7 @@ json scene_json(const FinishedRun& run) {
           {"thermal", run.has(Modality::thermal)},
           {"gray", run.thermal_is_gray},
           {"span", {run.span.low_k, run.span.high_k}},
-          {"heat",
-           {{"usual", run.heat.usual},
-            {"hot", run.heat.hot},
-            {"colors", hex_of(fusion::heat_colors(run.config.fuse.options.heat.palette).value())}}},
+          {"heat", heat_json(run)},
           {"center", {c.x(), c.y(), c.z()}},
           {"up", {u.x(), u.y(), u.z()}},
           {"radius", run.radius},

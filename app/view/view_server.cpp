@@ -120,7 +120,7 @@ struct ViewServer::Impl {
 
   Result<json> drop_measurement(const WebRequest& request) {
     ORBITFUSE_ASSIGN(const json body, json_body(request.body));
-    ORBITFUSE_ASSIGN(const std::string name, text_field(body, "name", 200));
+    ORBITFUSE_ASSIGN(const std::string name, text_field(body, "name", request.body.size()));
     return measuring.remove(name);
   }
 

@@ -2,13 +2,15 @@
 // How soon the viewer of a finished run shows its pictures, in a browser without a screen.
 //   viewer_speed RUN [--views 6] [--layer fused]
 // RUN: --out folder of `orbitfuse run`. Chromium draws by software on the same cores. Wall times
-// mean something on an idle machine only; CPU seconds always.
+// mean something on an idle machine only; CPU seconds always, so first come those of rendering
+// alone.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 
+#include "app/view/layers.hpp"
 #include "app/view/view_server.hpp"
 #include "core/numeric/median.hpp"
 #include "core/system/clock.hpp"
@@ -55,12 +57,51 @@ constexpr const char* timed_turn = R"(new Promise(done => {
   requestAnimationFrame(turn);
 }))";
 
+/// CPU seconds of rendering, without a browser, up to each picture that the page asks for
+/// (RestingView.steps in app/view/web/layers.js): from recorded visible poses at 640x480 and the
+/// page's field of view.
+void report_rendering(const view::FinishedRun& run, int views) {
+  constexpr int steps[][2] = {{8, 8}, {5, 5}, {1, 5}, {1, 1}};
+  constexpr double page_horizontal_fov_deg = 57.8;  // 45 upright
+  view::LayerRenderer renderer(run);
+  view::RenderTurns turns;
+  std::vector<double> first_s, full_s, whole_s;
+  int skipped = 0;
+  for (const view::RecordedView& recorded : run.views) {
+    if (recorded.modality != Modality::visible || skipped++ % 4 != 0) continue;
+    if (static_cast<int>(first_s.size()) == views) break;
+    const view::Shot shot{Camera::from_fov(640, 480, page_horizontal_fov_deg),
+                          recorded.view.cam_from_world};
+    view::RenderTurns::Job job(turns, "bench", nullptr);
+    const UsageClock clock;
+    for (const auto& [divisor, thermal_divisor] : steps) {
+      const auto seen = renderer.render(shot,
+                                        {.visible = false,
+                                         .thermal = true,
+                                         .fused = true,
+                                         .divisor = divisor,
+                                         .thermal_divisor = thermal_divisor},
+                                        job);
+      if (!seen) fmt::print(stderr, "{}\n", seen.error().message());
+      if (divisor == 8) first_s.push_back(clock.cpu_s());
+      if (divisor == 1 && thermal_divisor == 5) full_s.push_back(clock.cpu_s());
+    }
+    whole_s.push_back(clock.cpu_s());
+  }
+  if (first_s.empty()) return;
+  fmt::print(
+      "CPU s of rendering at 640x480, median of {} views: first picture {:.3f}, full size with "
+      "coarse temperatures {:.2f}, whole {:.2f}\n\n",
+      first_s.size(), median(first_s), median(full_s), median(whole_s));
+}
+
 int report(const std::string& out, int views, const std::string& layer) {
   auto run = view::load_finished_run(out, stages::RunConfig(), {});
   if (!run) {
     fmt::print(stderr, "{}\n", run.error().message());
     return 3;
   }
+  report_rendering(*run, views);
   PageOptions options;
   options.port = 0;
   view::ViewServer server(*std::move(run), options);

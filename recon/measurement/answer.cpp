@@ -85,6 +85,17 @@ const FrameLine* TemperatureReading::best() const {
   return best == frames.end() ? nullptr : &*best;
 }
 
+std::optional<std::string> parameters_differ(const UsedParameters& a, const UsedParameters& b) {
+  const auto known_alike = [](double x, double y) { return std::abs(x - y) < 1e-6; };
+  const bool unknown_of_one = a.words.empty() || b.words.empty();  // saved by an earlier version
+  const bool alike =
+      unknown_of_one || a.words == b.words ||
+      (known_alike(a.emissivity, b.emissivity) && known_alike(a.reflected_k, b.reflected_k));
+  if (alike) return std::nullopt;
+  return "the two stand for different object parameters, which make part of the difference: " +
+         a.words + "; against " + b.words;
+}
+
 json to_json(const Answer& answer) {
   json j = {{"kind", name(answer.kind)}, {"notes", answer.notes}};
   if (!answer.radiometry.words.empty())
@@ -119,6 +130,9 @@ json to_json(const Answer& answer) {
     j["difference_k"] = json_of(answer.difference_k);
     j["uncertainty_k"] = json_of(answer.difference_uncertainty_k);
     for (const Answer& part : answer.of) j["of"].push_back(to_json(part));
+    j["parameters_differ"] =
+        answer.of.size() == 2 &&
+        parameters_differ(answer.of[0].radiometry, answer.of[1].radiometry).has_value();
   }
   if (answer.kind == Kind::distance) {
     j["distance"] = json_of(answer.distance);

@@ -97,6 +97,9 @@ struct Answer {
 };
 
 nlohmann::json to_json(const Answer& answer);
+/// Temperatures of other object parameters are not to be compared without a word: those words,
+/// where emissivity or reflected temperature of the two differ or may. None: they are alike.
+std::optional<std::string> parameters_differ(const UsedParameters& a, const UsedParameters& b);
 /// What to_json() wrote, but for what stands behind the points of a profile. What is null or absent
 /// is not known. Input error naming the key that has another type.
 Result<Answer> answer_of_json(const nlohmann::json& json);

@@ -270,6 +270,8 @@ Result<Answer> measure_difference(const ThermalScene& scene, const Request& requ
       answer.notes.push_back(
           fmt::format("no thermal frame sees the {} of the two: there is no difference",
                       i == 0 ? "first" : "second"));
+  if (auto note = parameters_differ(answer.of[0].radiometry, answer.of[1].radiometry))
+    answer.notes.push_back(*std::move(note));
   return answer;
 }
 
@@ -318,8 +320,13 @@ Result<Answer> dispatch(const ThermalScene& scene, const Request& request,
 Request anchored(Request request, const Answer& answer) {
   for (std::size_t i = 0; i < std::min(request.of.size(), answer.of.size()); ++i)
     request.of[i] = anchored(std::move(request.of[i]), answer.of[i]);
-  if (request.kind == Kind::spot && answer.position) request.places = {*answer.position};
-  if (answer.ends.size() == 2) request.places = {answer.ends[0], answer.ends[1]};
+  // What is a point already stays one: asked again and again, it must not wander.
+  const auto anchor = [&](std::size_t i, const Eigen::Vector3d& point) {
+    if (i < request.places.size() && std::holds_alternative<PixelPlace>(request.places[i]))
+      request.places[i] = point;
+  };
+  if (request.kind == Kind::spot && answer.position) anchor(0, *answer.position);
+  for (std::size_t i = 0; i < answer.ends.size(); ++i) anchor(i, answer.ends[i]);
   return request;
 }
 

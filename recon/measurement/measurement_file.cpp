@@ -36,10 +36,24 @@ bool fit_count(json& request) {
   return fitted;
 }
 
+constexpr std::pair<const char*, std::string SavedMeasurement::*> word_fields[] = {
+    {"remark", &SavedMeasurement::remark},
+    {"component", &SavedMeasurement::component},
+    {"reference", &SavedMeasurement::reference}};
+
+/// What is measured, apart from its name and the object parameters.
+json place_asked(const Request& request) {
+  json place = to_json(request);
+  for (const char* other : {"name", "object", "recorded"}) place.erase(other);
+  if (place.contains("of")) {
+    place["of"] = json::array();
+    for (const Request& part : request.of) place["of"].push_back(place_asked(part));
+  }
+  return place;
+}
+
 Status read_words(const json& j, const std::string& where, SavedMeasurement& saved) {
-  for (const auto& [key, words] : {std::pair("remark", &SavedMeasurement::remark),
-                                   std::pair("component", &SavedMeasurement::component),
-                                   std::pair("reference", &SavedMeasurement::reference)}) {
+  for (const auto& [key, words] : word_fields) {
     if (!j.contains(key)) continue;
     if (!j[key].is_string())
       return fail(ErrorKind::input, where + "." + key, "not a text", put_away);
@@ -81,10 +95,16 @@ json to_json(const SavedMeasurement& saved) {
                 {"created", saved.created},
                 {"request", to_json(saved.request)},
                 {"answer", saved.answer}};
-  if (!saved.remark.empty()) entry["remark"] = saved.remark;
-  if (!saved.component.empty()) entry["component"] = saved.component;
-  if (!saved.reference.empty()) entry["reference"] = saved.reference;
+  for (const auto& [key, words] : word_fields)
+    if (!(saved.*words).empty()) entry[key] = saved.*words;
   return entry;
+}
+
+Status check_name(const std::string& name) {
+  if (name.size() <= longest_name_bytes) return {};
+  return fail(ErrorKind::usage, "the measurement's name", fmt::format("{} bytes long", name.size()),
+              fmt::format("choose one of up to {} bytes (letters beyond ASCII have two to four)",
+                          longest_name_bytes));
 }
 
 const SavedMeasurement* Measurements::find(const std::string& name) const {
@@ -107,9 +127,13 @@ Kept Measurements::put(SavedMeasurement measurement) {
     list.push_back(std::move(measurement));
     return kept;
   }
-  for (std::string SavedMeasurement::*words :
-       {&SavedMeasurement::remark, &SavedMeasurement::component, &SavedMeasurement::reference})
-    if ((measurement.*words).empty()) measurement.*words = (*at).*words;
+  const bool same = place_asked(measurement.request) == place_asked(at->request);
+  for (const auto& [what, words] : word_fields) {
+    if (((*at).*words).empty() || !(measurement.*words).empty()) continue;
+    if (same) measurement.*words = (*at).*words;
+    kept.words += fmt::format("{}{} '{}' {}", kept.words.empty() ? "" : ", ", what, (*at).*words,
+                              same ? "stays" : "went with the place that it was said of");
+  }
   *at = std::move(measurement);
   kept.replaced = true;
   return kept;
@@ -149,6 +173,7 @@ Result<Measurements> load_measurements(const std::filesystem::path& file,
 
 Result<Kept> add_measurement(const std::filesystem::path& file, const std::string& identity,
                              SavedMeasurement measurement) {
+  ORBITFUSE_TRY(check_name(measurement.name));
   FolderChangeLock lock;
   ORBITFUSE_TRY(lock.acquire(file.parent_path()));
   ORBITFUSE_ASSIGN(Measurements all, load_measurements(file, identity));

@@ -14,6 +14,9 @@ namespace orbitfuse::measurement {
 
 inline constexpr int measurement_schema = 1;
 inline constexpr const char* measurements_file = "measurements.json";
+/// Of a name that is saved: reports and the viewer write it into tables and pictures. Longer ones
+/// of earlier versions are read, and can be removed.
+inline constexpr std::size_t longest_name_bytes = 200;
 
 struct SavedMeasurement {
   std::string name;     ///< unique in the file, never empty
@@ -29,7 +32,12 @@ struct SavedMeasurement {
 struct Kept {
   std::string name;
   bool replaced = false;  ///< one of that name was there before
+  /// What happened to that one's words, for the user: "remark 'loose' stays". Empty: it had none.
+  std::string words = {};
 };
+
+/// Usage error: longer than longest_name_bytes.
+Status check_name(const std::string& name);
 
 /// {"name", "created", "request", "answer"}, and "remark", "component", "reference" where they were
 /// given.
@@ -41,9 +49,10 @@ struct Measurements {
   std::vector<std::string> notes;  ///< what was read otherwise than it stands in the file
 
   const SavedMeasurement* find(const std::string& name) const;
-  /// Adds it, or takes the place of the one of that name, whose remark, component and reference
-  /// stay where the new one has none. Without a name it gets the first free of "spot 1", "spot 2"
-  /// ...
+  /// Adds it, or takes the place of the one of that name. That one's remark, component and
+  /// reference stay where the new one has none and measures the same place, whatever the object
+  /// parameters; of another place they would be wrong. Without a name it gets the first free of
+  /// "spot 1", "spot 2" ...
   Kept put(SavedMeasurement measurement);
 };
 
@@ -53,7 +62,7 @@ struct Measurements {
 Result<Measurements> load_measurements(const std::filesystem::path& file,
                                        const std::string& identity);
 /// Loads, puts (Measurements::put) and saves, as one step: programs that do so at once wait for
-/// each other. `created` is set to now where it is empty. Errors: both's.
+/// each other. `created` is set to now where it is empty. Errors: both's, and check_name's.
 Result<Kept> add_measurement(const std::filesystem::path& file, const std::string& identity,
                              SavedMeasurement measurement);
 /// Loads, takes the measurement of that name out and saves, as one step. Errors: both's; input:

@@ -71,9 +71,9 @@ struct RenderOptions {
   /// Rays spread their samples over the way to a little behind what their neighbours met, and go on
   /// to the end only if nothing stopped them: finer samples, a third less time.
   bool look_ahead = true;
-  /// For pictures that are waited for: of every other pixel, those whose four neighbours differ by
-  /// no more than this share of the value range, and lie on one surface, are their mean instead of
-  /// being rendered. 0 = all are rendered.
+  /// For pictures that are waited for: of nine pixels in sixteen, those whose four neighbours
+  /// differ by no more than this share of the value range, and lie on one surface, are their mean
+  /// instead of being rendered. 0 = all are rendered.
   double alike = 0;
   Status validate() const;
 };

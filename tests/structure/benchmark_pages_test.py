@@ -10,6 +10,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / "docs" / "benchmarks"
 WITHOUT_PLOT = {
     "hostile.md": "says what the program answers; runs of a fuzzer measure how fast a parser is",
+    "view.md": "wall times of a shared machine, which a plot would make look surer than they are",
 }
 
 spec = importlib.util.spec_from_file_location("plot_pages", ROOT / "bench" / "plot_pages.py")

@@ -169,6 +169,12 @@ void Browser::press(double x, double y) {
   mouse("mouseReleased", x, y);
 }
 
+void Browser::touch(double x, double y) {
+  call("Input.dispatchTouchEvent",
+       {{"type", "touchStart"}, {"touchPoints", json::array({{{"x", x}, {"y", y}}})}});
+  call("Input.dispatchTouchEvent", {{"type", "touchEnd"}, {"touchPoints", json::array()}});
+}
+
 void Browser::drag(double x, double y, double to_x, double to_y) {
   mouse("mousePressed", x, y);
   for (int i = 1; i <= 5; ++i) mouse("mouseMoved", x + (to_x - x) * i / 5, y + (to_y - y) * i / 5);

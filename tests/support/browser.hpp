@@ -27,6 +27,7 @@ class Browser {
   bool becomes(const std::string& script, int seconds = 120);
   cv::Mat screenshot();
   void press(double x, double y);  ///< left button, down and up
+  void touch(double x, double y);  ///< one finger, down and up; of a phone
   void drag(double x, double y, double to_x, double to_y);
   /// Messages of the page's console that tell of an error.
   const std::vector<std::string>& errors() const { return errors_; }

@@ -184,7 +184,7 @@ class Measuring {
       if (m.answer.profile) words.append(this.profile(m.answer.profile));
       if (!m.name) {
         const label = element("input");
-        label.placeholder = "name"; label.maxLength = 80; label.value = m.label; label.setAttribute("aria-label", `name of measurement ${index + 1}`);
+        label.placeholder = "name"; label.maxLength = 200; label.value = m.label; label.setAttribute("aria-label", `name of measurement ${index + 1}`);
         label.oninput = () => { m.label = label.value.trim(); this.drawMarks(); };
         words.append(label);
       }

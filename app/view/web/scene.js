@@ -20,8 +20,8 @@ const fragmentShader = `
 uniform sampler2D palette;
 varying vec3 seen; varying float heat, weight, marked;
 void main() {
-  vec3 colour = texture2D(palette, vec2((heat * 255.0 + 0.5) / 256.0, 0.5)).rgb;
-  gl_FragColor = vec4(mix(mix(seen, colour, weight), vec3(0.098, 0.89, 0.784), marked), 1.0);
+  vec4 colour = texture2D(palette, vec2((heat * 255.0 + 0.5) / 256.0, 0.5));
+  gl_FragColor = vec4(mix(mix(seen, colour.rgb, weight * colour.a), vec3(0.098, 0.89, 0.784), marked), 1.0);
 }`;
 
 class Surface {
@@ -127,12 +127,15 @@ class Surface {
   style(layer) {
     const u = this.material.uniforms;
     if (!this.facts.surface.colored && this.facts.surface.temperatures) u.share.value = 1;
-    else u.share.value = { visible: 0, thermal: 1, fused: 0.5, mix: show.opacity }[layer];
+    // 1: temperatures alone. The heat picture shows the visible one where it has none.
+    else u.share.value = { visible: 0, thermal: 1, fused: 0.99, mix: Math.min(0.99, show.opacity) }[layer];
     const scale = scaleOf(layer) || scaleOf("thermal");
     u.low.value = scale.low; u.high.value = scale.high; u.isoLow.value = show.isoLow; u.isoHigh.value = show.isoHigh;
     u.isotherm.value = layer === "thermal" || layer === "mix" ? ["off", "above", "below", "between"].indexOf(show.isotherm) : 0;
     if (u.palette.value) u.palette.value.dispose();
-    u.palette.value = new THREE.DataTexture(scale.colours.slice(), 256, 1, THREE.RGBFormat);
+    // Of each colour how strongly it is laid over the visible one, as in the heat picture.
+    const table = Uint8Array.from({ length: 1024 }, (_, i) => i % 4 < 3 ? scale.colours[3 * (i >> 2) + i % 4] : scale.strengths ? scale.strengths[i >> 2] : 255);
+    u.palette.value = new THREE.DataTexture(table, 256, 1, THREE.RGBAFormat);
     u.palette.value.needsUpdate = true;
     this.draw();
   }

@@ -5,12 +5,12 @@ const palettes = {};  // name -> Uint8Array of 256 R, G, B
 const show = { palette: "inferno", low: 273, high: 300, auto: false, isotherm: "off", isoLow: 0, isoHigh: 0, opacity: 0.6 };
 const isothermColour = [25, 227, 200];
 
-function coloursOf(hex) { return Uint8Array.from({ length: 768 }, (_, i) => parseInt(hex.substr(2 * i, 2), 16)); }
-function readPalettes(hex) { for (const [name, text] of Object.entries(hex)) palettes[name] = coloursOf(text); }
+function bytesOf(hex) { return Uint8Array.from({ length: hex.length / 2 }, (_, i) => parseInt(hex.substr(2 * i, 2), 16)); }
+function readPalettes(hex) { for (const [name, text] of Object.entries(hex)) palettes[name] = bytesOf(text); }
 /// The scale of a layer's colours: the fused picture has the run's own, whatever is chosen for the others.
 function scaleOf(layer) {
   const heat = viewer.scene.heat;
-  if (layer === "fused") return { low: heat.usual, high: heat.hot, colours: viewer.heatColours, marks: false };
+  if (layer === "fused") return { low: heat.usual, high: heat.hot, colours: viewer.heatColours, strengths: viewer.heatStrengths, marks: false };
   return layer === "visible" || !layer ? null : { low: show.low, high: show.high, colours: palettes[show.palette], marks: true };
 }
 /// Of the first layer on the stage that shows temperatures; null where none does.

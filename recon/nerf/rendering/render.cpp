@@ -131,32 +131,38 @@ class ImageRenderer {
   }
 
   /// Every other pixel, and of the rest those whose neighbours aren't alike; these are their mean.
+  /// So are the pixels that look ahead for the others: what they saw was sampled too thinly.
   RenderedView sparse_image(double alike) {
     RenderedView view = empty_view();
     cv::Mat far(height_, width_, CV_32FC1, cv::Scalar(no_limit)), ends = far.clone();
     const auto inside = [&](int x, int y) {
       return x > 0 && y > 0 && x + 1 < width_ && y + 1 < height_;
     };
-    std::array<std::vector<int>, 3> passes;  // the first looks ahead for the others
+    std::vector<int> ahead, every_other, unlike;
     for (int y = 0; y < height_; ++y)
       for (int x = 0; x < width_; ++x) {
-        const bool ahead = x % limit_stride == 0 && y % limit_stride == 0;
-        if (ahead || (x + y) % 2 == 0 || !inside(x, y))
-          passes[ahead ? 0 : 1].push_back(y * width_ + x);
+        const bool looks = x % limit_stride == 0 && y % limit_stride == 0;
+        if (looks) ahead.push_back(y * width_ + x);
+        if (!inside(x, y) || (!looks && (x + y) % 2 == 0)) every_other.push_back(y * width_ + x);
       }
-    render(passes[0], far, view, &ends);
+    render(ahead, far, view, &ends);
     cv::Mat coarse((height_ + limit_stride - 1) / limit_stride,
                    (width_ + limit_stride - 1) / limit_stride, CV_32FC1);
     for (int y = 0; y < coarse.rows; ++y)
       for (int x = 0; x < coarse.cols; ++x)
         coarse.at<float>(y, x) = ends.at<float>(y * limit_stride, x * limit_stride);
     far = limits_from(coarse, far.size());
-    render(passes[1], far, view);
+    render(every_other, far, view);
+    const auto most = static_cast<float>(alike);
+    for (const int p : ahead)
+      if (inside(p % width_, p / width_) && !from_neighbours(view, p, diagonal, most))
+        unlike.push_back(p);
+    render(unlike, far, view);
+    unlike.clear();
     for (int y = 1; y + 1 < height_; ++y)
       for (int x = 1 + y % 2; x + 1 < width_; x += 2)
-        if (!from_neighbours(view, x, y, static_cast<float>(alike)))
-          passes[2].push_back(y * width_ + x);
-    render(passes[2], far, view);
+        if (!from_neighbours(view, y * width_ + x, beside, most)) unlike.push_back(y * width_ + x);
+    render(unlike, far, view);
     return view;
   }
 
@@ -200,10 +206,16 @@ class ImageRenderer {
     });
   }
 
+  using Neighbours = std::array<std::array<int, 2>, 4>;
+  static constexpr Neighbours beside = {{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}},
+                              diagonal = {{{-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
+
   /// The mean of the four neighbours, where nothing tells that there is more to be seen.
-  bool from_neighbours(RenderedView& view, int x, int y, float alike) const {
+  bool from_neighbours(RenderedView& view, int pixel, const Neighbours& of, float alike) const {
     constexpr float alike_depth = 0.03F;  // of it; a step from one surface to another is more
-    const std::array<cv::Point, 4> around = {{{x - 1, y}, {x + 1, y}, {x, y - 1}, {x, y + 1}}};
+    const int x = pixel % width_, y = pixel / width_;
+    std::array<cv::Point, 4> around;
+    for (std::size_t i = 0; i < 4; ++i) around[i] = {x + of[i][0], y + of[i][1]};
     const auto mean = [&](const cv::Mat& plane, int channels, int c, auto most, float& out) {
       float low = std::numeric_limits<float>::max(), high = -low, sum = 0;
       for (const cv::Point& p : around) {

@@ -100,6 +100,12 @@ TEST_F(Measure, WhatIsSavedIsListedAndStandsForItsPlace) {
   EXPECT_GE(difference.result()["answer"]["difference_k"].get<double>(), -1);
   EXPECT_THAT(measure({"--pixel", "000,32,24", "--name", "front", "--save"}).err,
               HasSubstr("in place of the one of that name"));
+  ASSERT_EQ(
+      measure({"--pixel", "000,32,24", "--name", "front", "--save", "--remark", "glows"}).code, 0);
+  EXPECT_THAT(measure({"--pixel", "000,32,24", "--name", "front", "--save"}).err,
+              HasSubstr("remark 'glows' stays"));
+  EXPECT_THAT(measure({"--pixel", "001,32,24", "--name", "front", "--save"}).err,
+              HasSubstr("remark 'glows' went with the place"));
   const std::string before = test::get(file());
   ASSERT_EQ(measure({"--hottest", "1"}).code, 0);
   EXPECT_EQ(test::get(file()), before) << "without --save nothing is written";
@@ -121,6 +127,18 @@ TEST_F(Measure, DamagedAndForeignMeasurementsAreNamedAndKept) {
   }
 }
 
+TEST_F(Measure, WhatIsStoppedSaysNothingOfResuming) {
+  test::put(file(), "{}");  // a warning before the work begins
+  RunOptions options;
+  options.interrupt_after = "measurements.json";
+  const Outcome stopped =
+      orbitfuse_program({"measure", out().string(), "--hottest", "100"}, options);
+  EXPECT_TRUE(stopped.code == 0 || stopped.code == 130) << stopped.code << stopped.err;
+  EXPECT_EQ(stopped.code == 130, stopped.err.find("call it again") != std::string::npos)
+      << stopped.err;
+  EXPECT_EQ(stopped.err.find("--resume"), std::string::npos);
+}
+
 TEST_F(Measure, WhatIsWrongIsNamedWithTheRemedy) {
   expect_refused({"--pixel", "thermal/9.tiff,1,1"}, 3, "thermal/00");
   expect_refused({"--pixel", "000,9999,1"}, 3, "outside of the picture");
@@ -133,6 +151,7 @@ TEST_F(Measure, WhatIsWrongIsNamedWithTheRemedy) {
   expect_refused({"--hottest", "1", "--coldest", "1"}, 2, "together with");
   expect_refused({"--request", "{\"kind\":\"spit\"}"}, 2, "spit");
   expect_refused({"--hottest", "1", "--remark", "warm"}, 2, "without --save");
+  expect_refused({"--hottest", "1", "--save", "--name", std::string(300, 'n')}, 2, "300 bytes");
 }
 
 TEST_F(Measure, ASessionWithoutRadiometryRefusesAnEmissivityByName) {
@@ -141,6 +160,14 @@ TEST_F(Measure, ASessionWithoutRadiometryRefusesAnEmissivityByName) {
       measure({"--pixel", "000,32,24", "--emissivity", "0.6", "--recorded-emissivity", "1"});
   EXPECT_EQ(told.code, 0) << told.err;
   EXPECT_THAT(told.out, HasSubstr("grey body"));
+  // Beside one as recorded, the difference isn't of the two places alone.
+  ASSERT_EQ(measure({"--pixel", "000,32,24", "--emissivity", "0.6", "--recorded-emissivity", "1",
+                     "--save", "--name", "told"})
+                .code,
+            0);
+  const Outcome both = measure({"--difference", "told", "000,30,24"});
+  ASSERT_EQ(both.code, 0) << both.err;
+  EXPECT_THAT(both.out, HasSubstr("different object parameters"));
 }
 
 TEST_F(Measure, AnotherSessionWithTheSameFileNamesIsRefused) {

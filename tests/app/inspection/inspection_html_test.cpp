@@ -85,9 +85,9 @@ TEST(InspectionHtml, WhatIsKnownIsSaidAndWhatIsNotSaysSo) {
   for (const char* said :
        {"Pump 7", "not recorded", "A &lt;70&gt;", "123&amp;4",
         "2026-11-22 10:00:00 to 10:01:00 UTC",  // the thermal orbit's time
-        "0.95 as recorded; 0.80 as told by the operator", "<td>46.85</td>", "± 0.4", "+20.0 K",
-        "repair at once", "Remark: loose", "Reference of",
-        "1 of 1 posed thermal views are doubtful", "1 of 2 thermal frames have no pose",
+        "0.95 as recorded; 0.80 as told by the operator", "<td>46.85</td>", "46.9 °C ± 0.3 K",
+        "+20.0 ± 0.4 K", "repair at once", "Remark: loose", "Reference of",
+        "1 of 1 posed thermal views is doubtful", "1 of 2 thermal frames have no pose",
         "No calibration of the thermal camera is recorded", "is not the recorded one", "EN 13187",
         "ISO 18434-1", "covers the error in 90 of 100 cases"})
     EXPECT_THAT(html, HasSubstr(said));

@@ -188,6 +188,12 @@ TEST_F(ViewServerTest, SceneTellsTheFusedPicturesOwnScale) {
     EXPECT_EQ(hex.substr(6 * static_cast<std::size_t>(i), 6),
               fmt::format("{:02x}{:02x}{:02x}", c[2], c[1], c[0]));
   }
+  // What is usual is not coloured, what is hot as strongly as in the picture.
+  const std::string strengths = heat.at("strengths");
+  ASSERT_EQ(strengths.size(), 2u * 256);
+  EXPECT_EQ(strengths.substr(0, 2), "00");
+  const double most = stages::RunConfig().fuse.options.heat.opacity;
+  EXPECT_NEAR(std::stoi(strengths.substr(510), nullptr, 16), 255 * most, 2);
 }
 
 TEST_F(ViewServerTest, AFolderWhoseNameIsNoUtf8IsShown) {

@@ -441,6 +441,17 @@ TEST(Measure, DifferenceAndDistanceOfTwo) {
   const Answer difference = ask(scene, request);
   EXPECT_NEAR(difference.difference_k, top_k - end_k, 0.05);
   EXPECT_GT(difference.difference_uncertainty_k, difference.of[0].reading.uncertainty_k);
+  EXPECT_TRUE(difference.notes.empty());
+  EXPECT_EQ(to_json(difference).at("parameters_differ"), false);
+  // One of them converted for another emissivity.
+  Request unlike = request;
+  unlike.of[1].object.emissivity = 0.6;
+  for (Request& part : unlike.of) part.recorded.emissivity = 0.95;
+  const Answer cautious = ask(scene, unlike);
+  ASSERT_EQ(cautious.notes.size(), 1u);
+  EXPECT_THAT(cautious.notes[0], HasSubstr("different object parameters"));
+  EXPECT_THAT(cautious.notes[0], HasSubstr("emissivity 0.60 as asked"));
+  EXPECT_EQ(to_json(cautious).at("parameters_differ"), true);
   request.kind = Kind::distance;
   request.of.clear();
   request.places = {Eigen::Vector3d(0.4, 0, 0), Eigen::Vector3d(0.4, 0.1, 0)};
@@ -475,6 +486,20 @@ TEST(Measure, WhatIsKeptNamesPointsNotPixels) {
       EXPECT_NEAR(std::get<Eigen::Vector3d>(place).x(), 0.4, 1e-4);
     }
   EXPECT_TRUE(kept.validate());
+  EXPECT_EQ(to_json(anchored(kept, ask(scene, kept))), to_json(kept)) << "again: it stays there";
+}
+
+TEST(Measure, OnlyParametersThatAreKnownToDifferAreSaidToDiffer) {
+  const UsedParameters recorded{0.95, 293.15, "emissivity 0.95 as recorded"},
+      asked{0.95, 293.15, "emissivity 0.95 as asked"},
+      other{0.6, 293.15, "emissivity 0.60 as asked"},
+      camera{unknown, unknown, "emissivity not recorded"}, old{unknown, unknown, ""};
+  EXPECT_FALSE(parameters_differ(recorded, recorded));
+  EXPECT_FALSE(parameters_differ(recorded, asked)) << "the same numbers";
+  EXPECT_FALSE(parameters_differ(camera, camera));
+  EXPECT_FALSE(parameters_differ(recorded, old)) << "nothing is known to differ";
+  EXPECT_TRUE(parameters_differ(recorded, other));
+  EXPECT_TRUE(parameters_differ(camera, other));
 }
 
 TEST(Measure, SeveralThreadsGetTheSameAnswers) {

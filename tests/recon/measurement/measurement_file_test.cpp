@@ -51,9 +51,11 @@ TEST_F(MeasurementFile, HoldsWhatWasPut) {
   SavedMeasurement again = spot("spot 1");
   again.answer["reading"]["temperature_k"] = 310;
   again.remark = "tightened";
+  again.request.object.emissivity = 0.6;
   const auto kept = add_measurement(file, "run a", again);
   ASSERT_TRUE(kept);
   EXPECT_TRUE(kept->replaced) << "the caller can say so";
+  EXPECT_EQ(kept->words, "component 'clamp' stays, reference 'spot 2' stays");
   const auto loaded = load_measurements(file, "run a");
   ASSERT_TRUE(loaded) << loaded.error().message();
   ASSERT_EQ(loaded->list.size(), 3u);
@@ -65,6 +67,40 @@ TEST_F(MeasurementFile, HoldsWhatWasPut) {
   EXPECT_EQ(loaded->list[0].reference, "spot 2");
   EXPECT_EQ(loaded->find("none"), nullptr);
   EXPECT_TRUE(loaded->notes.empty());
+}
+
+TEST_F(MeasurementFile, WordsOfAnotherPlaceGoWithIt) {
+  SavedMeasurement first = spot("valve");
+  first.remark = "loose";
+  first.component = "clamp";
+  ASSERT_TRUE(add_measurement(file, "run a", first));
+  SavedMeasurement elsewhere = spot("valve");
+  elsewhere.request.places = {Eigen::Vector3d(1, 2, 3.5)};
+  elsewhere.component = "hinge";
+  const auto kept = add_measurement(file, "run a", elsewhere);
+  ASSERT_TRUE(kept);
+  EXPECT_EQ(kept->words, "remark 'loose' went with the place that it was said of");
+  const auto loaded = load_measurements(file, "run a");
+  ASSERT_TRUE(loaded);
+  EXPECT_EQ(loaded->list.at(0).remark, "");
+  EXPECT_EQ(loaded->list.at(0).component, "hinge");
+}
+
+TEST_F(MeasurementFile, NamesHaveOneBound) {
+  EXPECT_TRUE(add_measurement(file, "run a", spot(std::string(longest_name_bytes, 'n'))));
+  const std::string before = test::get(file), longer(longest_name_bytes + 1, 'n');
+  const auto refused = add_measurement(file, "run a", spot(longer));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::usage);
+  EXPECT_THAT(refused.error().message(), HasSubstr("201 bytes"));
+  EXPECT_THAT(refused.error().remedy, HasSubstr("up to 200 bytes"));
+  EXPECT_EQ(test::get(file), before);
+  // Of an earlier version: read, and can go.
+  json j = json::parse(before);
+  j["measurements"][0]["name"] = longer;
+  test::put(file, j.dump());
+  EXPECT_EQ(load_measurements(file, "run a")->list.at(0).name, longer);
+  EXPECT_TRUE(remove_measurement(file, "run a", longer));
 }
 
 TEST_F(MeasurementFile, OneIsTakenOutByItsName) {
