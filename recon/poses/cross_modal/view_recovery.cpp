@@ -136,12 +136,17 @@ void straighten(OrbitViews& orbit, const Fit& alignment) {
 }
 
 /// The support that form has where the bundle has put the views. One that it has moved elsewhere,
-/// to where form knows less of it, is not sure.
+/// to where form knows much less of it, is not sure.
 Status judge_bundled(const OrbitRefinement& refinement, const Fit& before, Fit& alignment) {
   std::vector<std::size_t> all(alignment.views.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
   ORBITFUSE_ASSIGN(const Fit there,
                    refinement.restart(all, alignment.poses(), {judging_rounds().back()}));
+  std::vector<double> ratios;
+  for (const std::size_t i : all)
+    ratios.push_back(share_of_median(there.views[i].support(), before.views[i].support()));
+  // A lens that has changed changes the support of all.
+  const double usual = median(ratios);
   for (const std::size_t i : all) {
     RenderAlignedView& view = alignment.views[i];
     const RenderAlignedView &form_alone = before.views[i], &here = there.views[i];
@@ -150,15 +155,14 @@ Status judge_bundled(const OrbitRefinement& refinement, const Fit& before, Fit& 
     // Within one place, edges beside the temperatures' say no less for it.
     if (!moved && here.support() < form_alone.support()) continue;
     view.agreement = here.agreement, view.matches = here.matches, view.median_px = here.median_px;
-    if (!moved || !view.verdict.sure() || clearly_better * view.support() >= form_alone.support())
-      continue;
+    if (!moved || !view.verdict.sure() || ratios[i] >= lost_share * usual) continue;
     view.verdict = {
         Confidence::doubtful, DoubtReason::temperatures_elsewhere,
         fmt::format(
             "its neighbours' temperatures place it {:.1f} deg away, where the visible "
             "scene supports it less: {:.2f} times",
             apart_deg(refinement.orbit, form_alone.view.cam_from_world, view.view.cam_from_world),
-            view.support() / form_alone.support())};
+            ratios[i])};
   }
   return {};
 }
