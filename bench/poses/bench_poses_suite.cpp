@@ -139,6 +139,7 @@ void judge(const ThermalPoses& poses, const Reconstruction& visible, const scene
   row.error =
       scenes::pose_error(poses.reconstruction,
                          poses.shares_visible_frame ? visible : poses.reconstruction, scene.truth);
+  if (row.error.views == 0) row.failure = "no similarity to the truth: nothing can be measured";
   std::set<std::string> doubtful;
   for (const DoubtfulView& view : poses.doubtful) doubtful.insert(view.name);
   for (const ViewError& view : row.error.each) {

@@ -74,6 +74,10 @@ void print_attempt(const char* name, const scenes::Scene& scene, const VisibleSc
   const PoseError error = scenes::pose_error(
       poses->reconstruction,
       poses->shares_visible_frame ? seen->reconstruction : poses->reconstruction, scene.truth);
+  if (error.views == 0) {
+    fmt::print("| {} | no similarity to the truth: nothing can be measured |\n", name);
+    return;
+  }
   fmt::print("| {} | {}/{} | {:.2f} / {:.2f} | {:.2f} / {:.2f} | {:.0f} |\n", name,
              poses->reconstruction.views.size(), poses->frame_count, error.ate_percent,
              error.ate_max_percent, error.rotation_mean_deg, error.rotation_max_deg, spent);

@@ -46,9 +46,9 @@ double extent(const std::vector<PosePair>& pairs) {
 
 PoseError pose_error(const std::vector<PosePair>& pairs, const Similarity3d& truth_from_estimate) {
   PoseError error;
-  error.views = static_cast<int>(pairs.size());
-  if (pairs.empty()) return error;
   const double size = extent(pairs);
+  if (!(size > 0)) return error;  // nothing to measure centres by
+  error.views = static_cast<int>(pairs.size());
   std::vector<double> offsets, angles;
   double squares = 0;
   for (const PosePair& pair : pairs) {

@@ -17,6 +17,7 @@ enum class DoubtReason {
   off_its_loop,             ///< far from where its station and its loop have it, or aimed elsewhere
   temperatures_elsewhere,   ///< the other views' temperatures place it elsewhere
   temperatures_unlike,      ///< its image is not what the other views' temperatures show there
+  neighbours_elsewhere,     ///< patches of its neighbours place it where form doesn't hold it
   temperatures_contradict,  ///< they find it nowhere; form alone keeps it
   undecided,                ///< so many are contradicted that nobody is left to judge
   loop_in_doubt,            ///< most of its loop is in doubt
@@ -36,6 +37,8 @@ constexpr std::string_view name(DoubtReason reason) {
       return "temperatures_elsewhere";
     case DoubtReason::temperatures_unlike:
       return "temperatures_unlike";
+    case DoubtReason::neighbours_elsewhere:
+      return "neighbours_elsewhere";
     case DoubtReason::temperatures_contradict:
       return "temperatures_contradict";
     case DoubtReason::undecided:

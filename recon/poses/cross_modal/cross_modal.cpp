@@ -63,7 +63,7 @@ std::vector<EdgeLine> confirmed(const std::vector<EdgeLine>& lines) {
 }
 
 /// Frames recorded between the stations, posed among them; appended to `rendered`.
-Status pose_tracking(const Session& session, const OrbitWork& work,
+Status pose_tracking(const Session& session, const OrbitWork& work, const Camera& lens,
                      const std::vector<const FrameRecord*>& tracking, const SceneRenderer& renderer,
                      OrbitViews& orbit, RenderAlignment& rendered, const Progress& progress) {
   std::vector<PassedStation> passed;
@@ -79,7 +79,7 @@ Status pose_tracking(const Session& session, const OrbitWork& work,
     orbit.stations.push_back(station);
   const std::size_t first = rendered.views.size();
   for (const FrameRecord* frame : tracking) {
-    ORBITFUSE_ASSIGN(cv::Mat image, straight_luminance(session, *frame, work.lens.camera));
+    ORBITFUSE_ASSIGN(cv::Mat image, straight_luminance(session, *frame, lens));
     orbit.images.push_back(std::move(image));
     RenderAlignedView view;
     view.view = rendered.views.front().view;
@@ -223,12 +223,16 @@ Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene&
         "the thermal lens is unknown: 33 degrees were assumed to begin with; give its focal length "
         "(import --thermal-focal-px)");
   progress.report({"poses.thermal", 3, 4, -1, "alignment with renders"});
-  OrbitWork work = evidence.work;
+  LensGuess lens = evidence.work.lens;
   ORBITFUSE_TRY(refine_orbit(renderer, orbit, rendered,
-                             {work.lens.focal_relative_sigma, work.lens.radial_sigma}, progress));
-  work.lens.camera.k1 += rendered.radial;
+                             {lens.focal_relative_sigma, lens.radial_sigma}, progress));
+  // k1 belongs to the focal length that it was found with.
+  lens.camera.fx = rendered.views.front().view.camera.fx;
+  lens.camera.fy = rendered.views.front().view.camera.fy;
+  lens.camera.k1 += rendered.radial;
   if (!tracking.empty())
-    ORBITFUSE_TRY(pose_tracking(session, work, tracking, renderer, orbit, rendered, progress));
+    ORBITFUSE_TRY(pose_tracking(session, evidence.work, lens.camera, tracking, renderer, orbit,
+                                rendered, progress));
   ORBITFUSE_ASSIGN(const std::vector<int> doubted,
                    judge_views({renderer, orbit, progress}, blank.size(), rendered));
   if (lead < sure_lead) doubt_all(lead, rendered);
@@ -238,11 +242,11 @@ Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene&
     // The images are as their lens has distorted them.
     Camera& camera = placed.views.back().view.camera;
     const double fx = camera.fx, fy = camera.fy;
-    camera = work.lens.camera;
+    camera = lens.camera;
     camera.fx = fx, camera.fy = fy;
   }
   placed.gates["focal_px"] = rendered.focal_px;
-  placed.gates["lens_k1"] = work.lens.camera.k1;
+  placed.gates["lens_k1"] = lens.camera.k1;
   placed.gates["loops_in_doubt"] = static_cast<double>(doubted.size());
   return placed;
 }

@@ -235,7 +235,8 @@ void take(const BundleSolution& solution, const std::vector<std::size_t>& chosen
   }
   for (const std::size_t i : chosen) alignment.views[i].confirmed_patches = solution.confirmed[i];
   alignment.focal_px = alignment.views.front().view.camera.fx;
-  alignment.radial += solution.radial;
+  // What was straightened before was so in coordinates of the old focal length.
+  alignment.radial = alignment.radial * scale * scale + solution.radial;
   alignment.radial_px = std::abs(alignment.radial) * solution.radial_reach_px;
 }
 
@@ -283,6 +284,17 @@ Result<std::optional<double>> solve_round(const OrbitRefinement& refinement,
   return turned_deg;
 }
 
+/// A k1 below none folds the image over beyond some radius: a lens whose corners lie there is not
+/// described by it.
+bool reaches_corners(const Fit& bundled) {
+  Camera bent = bundled.views.front().view.camera;
+  bent.k1 = bundled.radial;
+  for (const double x : {0.0, static_cast<double>(bent.width)})
+    for (const double y : {0.0, static_cast<double>(bent.height)})
+      if (!bent.normalized_of({x, y}).allFinite()) return false;
+  return true;
+}
+
 /// Rounds of one kind; false where one could not be solved.
 Result<bool> solve_rounds(const OrbitRefinement& refinement, const FocalGuess& prior,
                           const std::vector<std::size_t>& chosen, const BundleStep& step,
@@ -311,7 +323,8 @@ Status bundle_thermal(const OrbitRefinement& refinement, const FocalGuess& prior
                      solve_rounds(refinement, prior, chosen, step, options, bundled));
     if (!solved) return {};
   }
-  if (prior.radial_sigma > 0 && bundled.radial_px < options.least_radial_px) {
+  if (prior.radial_sigma > 0 &&
+      (bundled.radial_px < options.least_radial_px || !reaches_corners(bundled))) {
     FocalGuess straight = prior;
     bundled.radial = straight.radial_sigma = 0;
     ORBITFUSE_ASSIGN(const bool solved, solve_rounds(refinement, straight, chosen,

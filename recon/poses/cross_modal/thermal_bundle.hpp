@@ -14,7 +14,7 @@
 // errors: the renderer's, cancelled.
 namespace orbitfuse {
 
-/// Rounds of one kind, until no view moves any more.
+/// Rounds of one kind, at most so many, until no view moves any more.
 struct BundleStep {
   int reach_px;  ///< of the search for a patch about where the poses have it
   int max_rounds;

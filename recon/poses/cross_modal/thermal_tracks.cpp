@@ -172,7 +172,8 @@ std::vector<std::size_t> neighbours_of(const ThermalViews& views, std::size_t vi
 }
 
 /// Where the depth jumps within a patch. A nearer surface's outline is painted where the pose has
-/// it, not where the neighbour saw it, so that such a patch says that the pose is right.
+/// it, not where the neighbour saw it, so that such a patch says that the pose is right. Unknown
+/// depth is no jump: what isn't painted isn't compared.
 cv::Mat jumps_of(const cv::Mat& depth, const ThermalTrackOptions& options) {
   const cv::Mat known = depth == depth;
   cv::Mat nearest = depth.clone(), farthest = depth.clone(), near, far;

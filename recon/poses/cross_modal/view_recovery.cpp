@@ -140,13 +140,9 @@ void straighten(OrbitViews& orbit, const Fit& alignment) {
 Status judge_bundled(const OrbitRefinement& refinement, const Fit& before, Fit& alignment) {
   std::vector<std::size_t> all(alignment.views.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
+  // The round that `before` was measured by: support grows with resolution.
   ORBITFUSE_ASSIGN(const Fit there,
-                   refinement.restart(all, alignment.poses(), {judging_rounds().back()}));
-  std::vector<double> ratios;
-  for (const std::size_t i : all)
-    ratios.push_back(share_of_median(there.views[i].support(), before.views[i].support()));
-  // A lens that has changed changes the support of all.
-  const double usual = median(ratios);
+                   refinement.restart(all, alignment.poses(), {fine_rounds().back()}));
   for (const std::size_t i : all) {
     RenderAlignedView& view = alignment.views[i];
     const RenderAlignedView &form_alone = before.views[i], &here = there.views[i];
@@ -155,14 +151,17 @@ Status judge_bundled(const OrbitRefinement& refinement, const Fit& before, Fit& 
     // Within one place, edges beside the temperatures' say no less for it.
     if (!moved && here.support() < form_alone.support()) continue;
     view.agreement = here.agreement, view.matches = here.matches, view.median_px = here.median_px;
-    if (!moved || !view.verdict.sure() || ratios[i] >= lost_share * usual) continue;
+    const bool held =
+        same_place(refinement.orbit, here.view.cam_from_world, view.view.cam_from_world) &&
+        here.support() >= lost_share * form_alone.support();
+    if (!moved || !view.verdict.sure() || held) continue;
     view.verdict = {
-        Confidence::doubtful, DoubtReason::temperatures_elsewhere,
+        Confidence::doubtful, DoubtReason::neighbours_elsewhere,
         fmt::format(
             "its neighbours' temperatures place it {:.1f} deg away, where the visible "
             "scene supports it less: {:.2f} times",
             apart_deg(refinement.orbit, form_alone.view.cam_from_world, view.view.cam_from_world),
-            ratios[i])};
+            share_of_median(here.support(), form_alone.support()))};
   }
   return {};
 }

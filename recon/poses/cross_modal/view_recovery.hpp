@@ -10,7 +10,8 @@
 // neighbours on the loop say where it should be.
 namespace orbitfuse {
 
-/// How well the lens is known; sigmas of 0 are taken for tiny ones.
+/// How well the lens is known. A focal sigma of 0 counts as 1e-4; a radial one of 0 holds k1 at
+/// none.
 struct LensSigmas {
   double focal_relative = 0.03, radial = 0;  ///< k1 about none
 };

@@ -33,6 +33,8 @@ constexpr double min_between_share = 0.7;
 /// painted scene raised. A view elsewhere has next to none.
 constexpr double confirming_share = 0.4;
 constexpr double least_median_patches = 30;
+/// Below it nobody confirms a view: form knows nothing of it.
+constexpr double least_support_share = 0.1;
 /// Stations are good to several degrees (sigma 2 to 3), loops to two in elevation. Where an
 /// operator kept them less well, all views say so.
 constexpr double max_azimuth_off_deg = 12, azimuth_sigmas = 3, most_azimuth_off_deg = 25;
@@ -50,6 +52,20 @@ double aim_off(const OrbitViews& orbit, const PosedView& view) {
   return view.camera.fx * center.head<2>().norm() / center.z() / view.camera.width;
 }
 
+/// Median support_share of the loop's other stations (ViewEvidence::loop_support_share).
+double support_of_others(const OrbitViews& orbit, std::size_t stations,
+                         const std::vector<ViewEvidence>& evidence, std::size_t view) {
+  constexpr std::size_t least_others = 3;
+  std::vector<double> others;
+  bool other_loop = false;
+  for (std::size_t i = 0; i < std::min(stations, evidence.size()); ++i) {
+    const bool same = orbit.stations[i].loop == orbit.stations[view].loop;
+    other_loop |= !same;
+    if (same && i != view) others.push_back(evidence[i].support_share);
+  }
+  return other_loop && others.size() >= least_others ? median(others) : 0;
+}
+
 double median_support(const Fit& alignment) {
   std::vector<double> supports;
   for (const RenderAlignedView& view : alignment.views) supports.push_back(view.support());
@@ -59,7 +75,7 @@ double median_support(const Fit& alignment) {
 }  // namespace
 
 Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
-                                              const Fit& alignment) {
+                                              std::size_t stations, const Fit& alignment) {
   const OrbitViews& orbit = refinement.orbit;
   std::vector<std::size_t> all(alignment.views.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
@@ -97,11 +113,8 @@ Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
     if (median_patches >= least_median_patches)
       evidence[i].confirmed_share =
           alignment.views[i].confirmed_patches.value_or(0) / median_patches;
-  std::map<int, std::vector<double>> of_loop;
   for (std::size_t i = 0; i < evidence.size(); ++i)
-    of_loop[orbit.stations[i].loop].push_back(evidence[i].support_share);
-  for (std::size_t i = 0; i < evidence.size(); ++i)
-    evidence[i].loop_support_share = median(of_loop[orbit.stations[i].loop]);
+    evidence[i].loop_support_share = support_of_others(orbit, stations, evidence, i);
   for (const ViewEvidence& seen : evidence) {
     off_deg.push_back(seen.azimuth_off_deg);
     if (seen.correlation) correlations.push_back(*seen.correlation);
@@ -120,8 +133,9 @@ ViewVerdict judged(const ViewEvidence& seen, const ViewVerdict& before) {
     return ViewVerdict{Confidence::doubtful, reason, std::move(detail)};
   };
   // Views of a wrong loop confirm each other: only where form knows the loop's others well.
-  const bool confirmed_among_known =
-      seen.confirmed_share >= confirming_share && seen.loop_support_share >= weak_support_share;
+  const bool confirmed_among_known = seen.support_share >= least_support_share &&
+                                     seen.confirmed_share >= confirming_share &&
+                                     seen.loop_support_share >= weak_support_share;
   if (!(seen.support_share >= min_support_share) && !confirmed_among_known)
     return doubtful(DoubtReason::weak_support,
                     fmt::format("its edges have {:.2f} of the median support of all loops",
@@ -195,7 +209,8 @@ std::vector<int> doubt_whole_loops(const OrbitViews& orbit, std::size_t stations
 
 Result<std::vector<int>> judge_views(const OrbitRefinement& refinement, std::size_t stations,
                                      Fit& alignment) {
-  ORBITFUSE_ASSIGN(const std::vector<ViewEvidence> evidence, evidence_of(refinement, alignment));
+  ORBITFUSE_ASSIGN(const std::vector<ViewEvidence> evidence,
+                   evidence_of(refinement, stations, alignment));
   for (std::size_t i = 0; i < evidence.size(); ++i) {
     const ViewEvidence& seen = evidence[i];
     RenderAlignedView& view = alignment.views[i];

@@ -26,12 +26,14 @@ struct ViewEvidence {
   /// Patches that other thermal views show where the pose has them, as a share of the median
   /// view's; 0 where that has too few.
   double confirmed_share = 0;
-  double loop_support_share = 0;  ///< the median of its loop's views' support_share
+  /// The median of its loop's other stations' support_share; 0 where they are fewer than three, or
+  /// there is no other loop to compare them with.
+  double loop_support_share = 0;
 };
 
-/// One entry a view. Errors: the renderer's, cancelled.
+/// One entry a view; stations are the first so many. Errors: the renderer's, cancelled.
 Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
-                                              const Fit& alignment);
+                                              std::size_t stations, const Fit& alignment);
 
 /// `before` is what restarts and temperatures said. A view that passed there may still fail here.
 ViewVerdict judged(const ViewEvidence& evidence, const ViewVerdict& before);

@@ -60,6 +60,11 @@ TEST(ViewVerdicts, WhatSpeaksAgainstAViewIsNamed) {
   EXPECT_FALSE(judged(confirmed, {}).sure());
   confirmed.loop_support_share = 0.9;
   EXPECT_TRUE(judged(confirmed, {}).sure()) << "form knows its loop, and neighbours know it";
+  // Patches that moved a view confirm it by themselves.
+  EXPECT_FALSE(
+      judged(confirmed, {Confidence::doubtful, DoubtReason::neighbours_elsewhere, ""}).sure());
+  confirmed.support_share = 0.05;
+  EXPECT_FALSE(judged(confirmed, {}).sure()) << "form knows nothing of it";
   ViewEvidence between = good;
   between.support_share = 0.67;
   EXPECT_TRUE(judged(between, {}).sure());
