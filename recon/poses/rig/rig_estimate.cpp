@@ -238,7 +238,10 @@ void judge(const RoundResult& round, const std::array<double, 6>& correction, do
         fit.control += edge_agreement(round.edges[at(i)], round.fields[at(j)]) / (count - 1);
   }
   double sum = 0, squares = 0;
+  rig.agreement = rig.control = 0;
   for (const RigPairFit& fit : rig.pairs) {
+    rig.agreement += fit.agreement / count;
+    rig.control += fit.control / count;
     const double d = fit.agreement - fit.control;
     sum += d, squares += d * d;
   }
@@ -256,12 +259,9 @@ double median_depth(const std::vector<RigView>& views) {
 }  // namespace
 
 std::string RigEstimate::words() const {
-  double agreement = 0, control = 0;
   std::vector<double> residuals;
   int matches = 0;
   for (const RigPairFit& fit : pairs) {
-    agreement += fit.agreement / static_cast<double>(pairs.size());
-    control += fit.control / static_cast<double>(pairs.size());
     residuals.push_back(fit.median_px);
     matches += fit.matches;
   }
@@ -317,7 +317,8 @@ Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOpt
     rig.thermal_from_visible.translation = {correction[3], correction[4], correction[5]};
     rig.thermal.fx = rig.thermal.fy = rig.thermal.fx * std::exp(log_focal);
   }
-  if (rig.decisiveness < options.min_decisiveness || best.score <= wrong)
+  if (!(rig.decisiveness >= options.min_decisiveness &&
+        rig.agreement >= options.min_agreement_ratio * rig.control && best.score > wrong))
     return refused(
         fmt::format("{}; correlation of all edges {:.3f}, of shuffled pairs {:.3f} at best",
                     rig.words(), best.score, wrong));
