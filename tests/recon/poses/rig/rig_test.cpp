@@ -97,6 +97,19 @@ TEST(Rig, ShuffledPairsAreRefused) {
   EXPECT_EQ(rig.error().where, "poses.rig");
 }
 
+TEST(Rig, PairsThatAgreeLittleBetterThanShuffledOnesAreNone) {
+  RigScene scene(6);
+  const auto believed = estimate_rig(scene.views, scene.options, {});
+  ASSERT_TRUE(believed);
+  ASSERT_GT(believed->control, 0);
+  const double ratio = believed->agreement / believed->control;
+  EXPECT_GT(ratio, scene.options.min_agreement_ratio);
+  scene.options.min_agreement_ratio = 1.05 * ratio;
+  const auto refused = estimate_rig(scene.views, scene.options, {});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::quality);
+}
+
 TEST(Rig, ThreePairsAreTooFew) {
   const RigScene scene(3);
   const auto rig = estimate_rig(scene.views, scene.options, {});
