@@ -159,7 +159,7 @@ Status judge_bundled(const OrbitRefinement& refinement, const Fit& before, Fit& 
         Confidence::doubtful, DoubtReason::neighbours_elsewhere,
         fmt::format(
             "its neighbours' temperatures place it {:.1f} deg away, where the visible "
-            "scene supports it less: {:.2f} times",
+            "scene doesn't hold it ({:.2f} of the support it had)",
             apart_deg(refinement.orbit, form_alone.view.cam_from_world, view.view.cam_from_world),
             share_of_median(here.support(), form_alone.support()))};
   }
