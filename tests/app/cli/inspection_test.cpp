@@ -59,7 +59,7 @@ TEST_F(Inspection, ShowsTheSavedMeasurementsOfTheRun) {
   const std::string page = test::get(html());
   for (const char* said :
        {"the box", "hot &lt;b&gt;", "glows", "Difference against &#39;front&#39;", "not recorded",
-        "<svg", "Seen best by thermal/0000", "emissivity not recorded", "fixture"})
+        "<svg", "Seen best by thermal/0000", "Emissivity not recorded", "fixture"})
     EXPECT_THAT(page, HasSubstr(said));
   EXPECT_THAT(page, Not(HasSubstr("hot <b>")));
   // Two findings of three pictures each, and the plan's two drawings.
