@@ -110,8 +110,7 @@ Result<Comparison> comparison_of(const InspectionFinding& finding, const std::st
                         {},
                         {}};
   comparison.caution =
-      measurement::parameters_differ(finding.answer.radiometry, other->answer.radiometry)
-          .value_or("");
+      measurement::parameters_differ(finding.answer.radiometry, other->answer.radiometry);
   return comparison;
 }
 
@@ -170,10 +169,8 @@ Result<std::vector<InspectionFinding>> findings_of(const Measurements& saved,
       finding.comparison = Comparison{
           "", finding.answer.difference_k, finding.answer.difference_uncertainty_k, {}, {}};
       if (finding.answer.of.size() == 2)
-        finding.comparison->caution =
-            measurement::parameters_differ(finding.answer.of[0].radiometry,
-                                           finding.answer.of[1].radiometry)
-                .value_or("");
+        finding.comparison->caution = measurement::parameters_differ(
+            finding.answer.of[0].radiometry, finding.answer.of[1].radiometry);
     }
     if (finding.comparison) classify(*finding.comparison, details.classes);
   }

@@ -19,7 +19,8 @@ struct Comparison {
   std::optional<PriorityClass> priority;  ///< none: below all classes, or not known
   /// What it may be as well within the uncertainty, in words; empty: the class is sure.
   std::string or_else;
-  std::string caution = {};  ///< the two stand for different object parameters, in words; or empty
+  /// That the two stand for different object parameters, in words; none: they don't.
+  std::optional<std::string> caution = {};
   bool known() const;
 };
 

@@ -228,8 +228,8 @@ std::string finding_block(const ShownFinding& shown) {
   if (f.answer.kind == Kind::distance) html += "<p>" + headline(f) + "</p>\n";
   if (f.comparison)
     html += "<p class=\"result\">" + escape(comparison_words(*f.comparison)) + "</p>\n";
-  if (f.comparison && f.comparison->known() && !f.comparison->caution.empty())
-    html += "<p class=\"notice\">Beware: " + escape(f.comparison->caution) + ".</p>\n";
+  if (f.comparison && f.comparison->known() && f.comparison->caution)
+    html += "<p class=\"notice\">Beware: " + escape(*f.comparison->caution) + ".</p>\n";
   for (const std::string& of : f.reference_of)
     html += "<p>Reference of '" + escape(of) + "'.</p>\n";
   if (!f.remark.empty()) html += "<p>Remark: " + escape(f.remark) + "</p>\n";

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 namespace orbitfuse {
@@ -34,7 +35,7 @@ Result<Similarity3d> truth_from_estimate(const std::vector<PosePair>& pairs) {
       m.topRightCorner<3, 1>()};
 }
 
-double extent(const std::vector<PosePair>& pairs) {
+double extent_of_truth(const std::vector<PosePair>& pairs) {
   double largest = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i)
     for (std::size_t j = 0; j < i; ++j)
@@ -46,7 +47,7 @@ double extent(const std::vector<PosePair>& pairs) {
 
 PoseError pose_error(const std::vector<PosePair>& pairs, const Similarity3d& truth_from_estimate) {
   PoseError error;
-  const double size = extent(pairs);
+  const double size = extent_of_truth(pairs);
   if (!(size > 0)) return error;  // nothing to measure centres by
   error.views = static_cast<int>(pairs.size());
   std::vector<double> offsets, angles;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "core/geometry/reconstruction.hpp"
@@ -38,6 +37,6 @@ Result<Similarity3d> truth_from_estimate(const std::vector<PosePair>& pairs);
 /// The extent is the largest distance between two true camera centres of `pairs`.
 PoseError pose_error(const std::vector<PosePair>& pairs, const Similarity3d& truth_from_estimate);
 
-double extent(const std::vector<PosePair>& pairs);
+double extent_of_truth(const std::vector<PosePair>& pairs);
 
 }  // namespace orbitfuse

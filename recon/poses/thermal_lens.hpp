@@ -9,8 +9,8 @@ namespace orbitfuse {
 struct LensGuess {
   Camera camera;
   double focal_relative_sigma = 0.03;
-  double radial_sigma =
-      0.2;               ///< of k1 beside the camera's: lenses of 25 to 45 degrees have -0.3 to 0
+  /// Of k1 beside the camera's: lenses of 25 to 45 degrees have -0.3 to 0.
+  double radial_sigma = 0.2;
   bool guessed = false;  ///< nothing was known
 };
 /// What the session knows of the lens that took a thermal frame; without any prior 33 degrees,

@@ -123,7 +123,7 @@ TEST(InspectionFindings, OtherObjectParametersAreSaidBesideTheDifference) {
   auto hot = spot_at("hot", 310), like = spot_at("like", 300), two = spot_at("two", 300);
   const auto same = findings({hot, like}, finding_toml("hot", "like"));
   ASSERT_TRUE(same);
-  EXPECT_EQ((*same)[0].comparison->caution, "");
+  EXPECT_EQ((*same)[0].comparison->caution, std::nullopt);
   like.answer["radiometry"] = {
       {"emissivity", 0.6}, {"reflected_k", 293.15}, {"words", "emissivity 0.60 as asked"}};
   two.answer = {{"kind", "difference"},
@@ -133,7 +133,7 @@ TEST(InspectionFindings, OtherObjectParametersAreSaidBesideTheDifference) {
   const auto list = findings({hot, like, two}, finding_toml("hot", "like"));
   ASSERT_TRUE(list) << list.error().message();
   for (const std::size_t i : {0u, 2u})
-    EXPECT_THAT((*list)[i].comparison->caution,
+    EXPECT_THAT((*list)[i].comparison->caution.value_or(""),
                 HasSubstr("emissivity 0.95, as recorded; against emissivity 0.60 as asked"));
 }
 

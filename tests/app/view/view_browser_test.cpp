@@ -336,9 +336,18 @@ TEST_F(ViewBrowserTest, FitsAPhone) {
   const auto small = page.evaluate(
       R"(Array.from(document.querySelectorAll('button, select')).filter(e => e.offsetParent && (e.getBoundingClientRect().height < 44 || e.getBoundingClientRect().width < 40)).map(e => e.id || e.textContent))");
   EXPECT_TRUE(small.empty()) << small.dump();
+  EXPECT_TRUE(page.errors().empty()) << page.errors().front();
+}
 
-  // On the fixture's run a finger in the middle measures nothing; why is not known yet.
-  if (std::getenv("ORBITFUSE_VIEW_RUN") == nullptr) return;
+TEST_F(ViewBrowserTest, AFingerMeasuresOnAPhone) {
+  if (std::getenv("ORBITFUSE_VIEW_RUN") == nullptr)
+    GTEST_SKIP() << "on the fixture's run a finger in the middle measures nothing; why is not "
+                    "known yet: name a run with ORBITFUSE_VIEW_RUN";
+  orbitfuse::test::Browser page(folder.path() / "profile", 390, 844, true);
+  page.open(url);
+  ASSERT_TRUE(page.becomes("viewer.surface.points"));
+  ASSERT_TRUE(rests(page));
+  page.evaluate("$('menu').click()");
   // A tool that is chosen gives the picture back, a finger measures there, and the list has it.
   choose(page, "thermal");
   page.evaluate(

@@ -57,7 +57,7 @@ TEST(PoseError, OneTurnedCameraShowsInTheMaximumOnly) {
 
 TEST(PoseError, AteIsInPercentOfTheExtent) {
   auto pairs = orbit(12, {});
-  EXPECT_NEAR(extent(pairs), 6, 0.05);
+  EXPECT_NEAR(extent_of_truth(pairs), 6, 0.05);
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     // Up and down in turn: no similarity explains it.
     const Eigen::Vector3d shift(0, 0, i % 2 ? 0.06 : -0.06);
@@ -73,7 +73,7 @@ TEST(PoseError, EachViewSaysHowFarAndWhichWay) {
   // Backwards along its own axis by 1 of the extent's 6, in the estimate's units.
   pairs[5].cam_from_estimate.translation.z() += 0.37;
   const PoseError error = pose_error(pairs, moved.inverse());
-  const double percent = 100 / extent(pairs);
+  const double percent = 100 / extent_of_truth(pairs);
   EXPECT_EQ(error.each[5].name, "005");
   EXPECT_NEAR(error.each[5].center_percent, percent, 1e-6);
   EXPECT_NEAR(error.each[5].outward_percent, percent, 1e-6);

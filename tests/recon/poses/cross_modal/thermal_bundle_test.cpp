@@ -36,7 +36,7 @@ TEST(ThermalBundle, AViewElsewhereComesHome) {
   ASSERT_GT(ball.center_error(4), 0.2);
   ASSERT_TRUE(ball.bundle());
   for (std::size_t i = 0; i < ball.truth.size(); ++i)
-    EXPECT_LT(ball.center_error(i), 0.008 * 2.5) << i;
+    EXPECT_LT(ball.center_error(i), 0.007 * 2.5) << i;
 }
 
 TEST(ThermalBundle, AViewOfSomethingElseIsConfirmedByNobodyAndMovesNobody) {
@@ -46,7 +46,7 @@ TEST(ThermalBundle, AViewOfSomethingElseIsConfirmedByNobodyAndMovesNobody) {
   EXPECT_LT(ball.alignment.views[4].confirmed_patches.value(),
             0.2 * ball.alignment.views[8].confirmed_patches.value());
   for (std::size_t i = 0; i < ball.truth.size(); ++i)
-    EXPECT_LT(i == 4 ? 0 : ball.center_error(i), 0.008 * 2.5) << i;
+    EXPECT_LT(i == 4 ? 0 : ball.center_error(i), 0.006 * 2.5) << i;
 }
 
 TEST(ThermalBundle, ALensThatBendsIsFoundOut) {
