@@ -40,12 +40,12 @@ LiveState some_state() {
   second.instruction = "show the mat to the camera";
   state.cameras = {first, second};
   for (int loop = 0; loop < 2; ++loop) {
-    for (int i = 0; i < 4; ++i)
-      state.sectors.push_back({loop, i, 90.0 * i, 10 + 20.0 * loop, {}, {}});
+    for (int i = 0; i < 4; ++i) state.sectors.push_back({loop, i, 90.0 * i, 10 + 20.0 * loop});
   }
-  state.sectors[0].file = {"visible/0.jpg", "thermal/0.tiff"};
-  state.sectors[1].file = {"visible/1.jpg", ""};
-  state.sectors[6].file = {"", "thermal/1.tiff"};
+  state.sectors[0].best = {{Modality::visible, {"visible/0.jpg"}},
+                           {Modality::thermal, {"thermal/0.tiff"}}};
+  state.sectors[1].best = {{Modality::visible, {"visible/1.jpg"}}};
+  state.sectors[6].best = {{Modality::thermal, {"thermal/1.tiff"}}};
   state.warnings = warnings_of(state);
   return state;
 }
