@@ -24,6 +24,9 @@ namespace {
 constexpr int least_patches = 12;
 /// A sighting within this of where the bundle has it confirms the view's pose.
 constexpr double confirmed_px = 1;
+/// A lens that bends by less than this share of what counts, as the wide rounds see it, is
+/// straight.
+constexpr double straight_share = 0.5;
 
 /// Ceres residual of two weighted pixels; `offset`: of the point from the surface, world.
 struct SightingResidual {
@@ -318,18 +321,23 @@ Status bundle_thermal(const OrbitRefinement& refinement, const FocalGuess& prior
     if (alignment.views[i].verdict.confidence != Confidence::dropped) chosen.push_back(i);
   if (chosen.empty()) return {};
   Fit bundled = alignment;
-  for (const BundleStep& step : options.steps) {
-    ORBITFUSE_ASSIGN(const bool solved,
-                     solve_rounds(refinement, prior, chosen, step, options, bundled));
-    if (!solved) return {};
-  }
-  if (prior.radial_sigma > 0 &&
-      (bundled.radial_px < options.least_radial_px || !reaches_corners(bundled))) {
-    FocalGuess straight = prior;
-    bundled.radial = straight.radial_sigma = 0;
-    ORBITFUSE_ASSIGN(const bool solved, solve_rounds(refinement, straight, chosen,
-                                                     options.steps.back(), options, bundled));
-    if (!solved) return {};
+  FocalGuess lens = prior;
+  const auto solve = [&](const BundleStep& step) {
+    return solve_rounds(refinement, lens, chosen, step, options, bundled);
+  };
+  const auto bends_less = [&](double least_px) {
+    return lens.radial_sigma > 0 && bundled.radial_px < least_px;
+  };
+  const auto straighten = [&] { bundled.radial = bundled.radial_px = lens.radial_sigma = 0; };
+  ORBITFUSE_ASSIGN(const bool found, solve(options.wide));
+  if (!found) return {};
+  if (bends_less(straight_share * options.least_radial_px)) straighten();
+  ORBITFUSE_ASSIGN(const bool refined, solve(options.fine));
+  if (!refined) return {};
+  if (bends_less(options.least_radial_px) || !reaches_corners(bundled)) {
+    straighten();
+    ORBITFUSE_ASSIGN(const bool again, solve(options.fine));
+    if (!again) return {};
   }
   alignment = std::move(bundled);
   return {};
