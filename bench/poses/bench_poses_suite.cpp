@@ -68,6 +68,10 @@ std::optional<Arguments> arguments_of(int argc, char** argv) {
     else
       return std::nullopt;
   }
+  std::set<std::string> known = {"all"};
+  for (const scenes::Perturbation& one : scenes::perturbations()) known.insert(one.name);
+  for (const std::string& name : arguments.perturbations)
+    if (!known.contains(name)) return std::nullopt;
   return arguments;
 }
 
@@ -269,7 +273,10 @@ int main(int argc, char** argv) {
   if (!asked) {
     fmt::print(stderr,
                "bench_poses_suite [RUNS] [--scenes A,B] [--perturbations A,B|all] [--views] "
-               "[--json FILE]\n");
+               "[--json FILE]\nperturbations:");
+    for (const scenes::Perturbation& one : scenes::perturbations())
+      fmt::print(stderr, " {}", one.name);
+    fmt::print(stderr, "\n");
     return 2;
   }
   const Arguments& arguments = *asked;
