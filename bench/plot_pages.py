@@ -320,8 +320,8 @@ def draw_poses(page, bars=(1.0, 1.0)):
     table = table_with(page, "scene", "centres", "rotation", "CPU s")
     scene, centres, rotation, time = (
         table.column(c) for c in ("scene", "centres", "rotation", "CPU s"))
-    posed = next((i for i, head in enumerate(table.heads) if head in ("posed", "now")), None)
-    names = [row[scene] + (f", {row[posed]}" if posed is not None else "") for row in table.rows]
+    told = [i for i, head in enumerate(table.heads) if head in ("perturbation", "posed", "now")]
+    names = [", ".join([row[scene]] + [row[i] for i in told]) for row in table.rows]
     labels = [textwrap.wrap(name, 26) for name in names]
     middles, y = [], PANEL_TOP
     for lines in labels:
@@ -417,7 +417,7 @@ def draw_cnn_lpif(page):
     return drawing.svg(bottom + 46)
 
 
-def draw_capture(page):
+def draw_outages(page):
     """The ways of losing a camera: how soon it is told, how soon frames come again."""
     table = table_with(page, "case", "told after", "back after")
     told, back = table.column("told after"), table.column("back after")
@@ -469,11 +469,76 @@ def draw_measurement(page):
 
 
 @dataclass
+class Bar:
+    """One bar a row: which figure of which column, and what the legend calls it."""
+    head: str
+    name: str
+    which: int = 0  # of a cell's numbers
+
+
+def draw_bars(page, labels, bars, unit, asked=None):
+    """A row a row of the table, named by the columns `labels`: an empty cell means the row's before."""
+    table = table_with(page, *labels, *(bar.head for bar in bars))
+    at = [table.column(bar.head) for bar in bars]
+    figures = [[value_at(row[i], bar.which) for i, bar in zip(at, bars)] for row in table.rows]
+    left, thick = 230, 13
+    row_height = len(bars) * (thick + 1) + 12
+    axis = from_zero([v for row in figures for v in row if v is not None] + [asked or 0], left, WIDTH - 60)
+    drawing, bottom = Drawing(), PANEL_TOP + row_height * len(table.rows)
+    frame_below(drawing, axis, PANEL_TOP, bottom, unit)
+    colors = (FIRST, SECOND, FRAME)
+    entries = [("bar", color, bar.name) for color, bar in zip(colors, bars)]
+    if asked is not None:
+        entries.append(("line", ASKED, f"asked: {short(asked)}"))
+        drawing.line(axis.at(asked), PANEL_TOP, axis.at(asked), bottom, ASKED, dash=True)
+    legend(drawing, EDGE, entries)
+    names = [""] * len(labels)
+    for r, row in enumerate(table.rows):
+        names = [row[table.column(label)] or before for label, before in zip(labels, names)]
+        y = PANEL_TOP + row_height * r + 6
+        row_label(drawing, left - 8, y + row_height / 2 - 6, textwrap.wrap(", ".join(names), 36)[:2])
+        for k, (value, color) in enumerate(zip(figures[r], colors)):
+            if value is None:
+                continue
+            drawing.bar(left, axis.at(value), y + k * (thick + 1), thick, color)
+            drawing.text(axis.at(value) + 5, y + k * (thick + 1) + 11, short(value))
+    return drawing.svg(bottom + 46)
+
+
+def value_at(cell, which):
+    found = numbers(cell)
+    return found[which] if which < len(found) else None
+
+
+def draw_heat(page):
+    """A row a scene: rank correlation of colour and temperature, the median view's and the worst's."""
+    table = table_with(page, "scene", "median view", "worst view")
+    median, worst = table.column("median view"), table.column("worst view")
+    asked, left, row_height = 0.9, 168, 28
+    drawing, bottom = Drawing(), PANEL_TOP + row_height * len(table.rows)
+    middles = [PANEL_TOP + row_height * (r + 0.5) for r in range(len(table.rows))]
+    legend(drawing, left, [("dot", FIRST, "median view"), ("ring", FIRST, "worst view"),
+                           ("line", ASKED, f"asked: {short(asked)}")])
+    for row, y in zip(table.rows, middles):
+        row_label(drawing, left - 8, y, [row[0]])
+    low = min([asked] + [number(row[worst]) for row in table.rows])
+    error_panel(drawing, [f"{row[median]} / {row[worst]}" for row in table.rows], middles,
+                Axis(low - 0.02, 1, left, WIDTH - 30), bottom, asked,
+                "rank correlation over the warmer pixels (higher is better)")
+    return drawing.svg(bottom + 46)
+
+
+@dataclass
 class Plot:
     draw: object
     heads: tuple  # starts of its table's heads
     shown: tuple  # starts of the heads whose figures are drawn
     rows: str = ""  # a pattern of the first cells of the rows that are drawn; all without one
+
+
+def bar_plot(labels, bars, unit, asked=None):
+    heads = tuple(dict.fromkeys(bar.head for bar in bars))
+    return Plot(lambda page: draw_bars(page, labels, bars, unit, asked), (*labels, *heads), heads)
 
 
 POSES = Plot(draw_poses, ("scene", "centres", "rotation", "CPU s"), ("centres", "rotation", "CPU s"))
@@ -483,13 +548,27 @@ PLOTS = {
     "registration": Plot(draw_registration, ("level", "success", "rotation", "CPU ms"),
                          ("success", "rotation", "CPU ms")),
     "poses": POSES,
+    "poses_perturbed": replace(POSES, heads=("scene", "perturbation", "centres", "rotation", "CPU s")),
+    "rigs": bar_plot(("scene",), [Bar("edges agree", "right pairs"), Bar("edges agree", "shuffled pairs", 1)],
+                     "agreement of the thermal edges with the photo's (higher is better)"),
     "poses_visible": replace(POSES, draw=lambda page: draw_poses(page, VISIBLE_BARS)),
     "fusion": Plot(draw_fusion, ("method", "Qabf", "Qcb", "CPU ms"), ("Qabf", "Qcb", "CPU ms")),
     "cnn_lpif": Plot(draw_cnn_lpif, ("method", "Qabf", "Qcb", "Qcv", "SSIM"),
                      ("Qabf", "Qcb", "Qcv", "SSIM"), rows="reference|bar|ours"),
     "measurement": Plot(draw_measurement, ("scene", "median error", "stated uncertainty covers"),
                         ("median error", "90 % of errors", "stated uncertainty covers"), rows="(?!bar)"),
-    "capture": Plot(draw_capture, ("case", "told after", "back after"), ("told after", "back after")),
+    "capture_outages": Plot(draw_outages, ("case", "told after", "back after"), ("told after", "back after")),
+    "capture_odometry": bar_plot(
+        ("walk",), [Bar("worst azimuth error", "worst error"), Bar("stated at the end", "stated at the end")],
+        "degrees of azimuth (lower is better)"),
+    "capture_sharpness": bar_plot(
+        ("images",), [Bar("as it is", "as it is"), Bar("Gaussian 1", "Gaussian 1"), Bar("motion 9", "motion 9")],
+        "width of the edges, sigma in pixels at 640, median"),
+    "heat": Plot(draw_heat, ("scene", "median view", "worst view"), ("median view", "worst view")),
+    "nerf_refinement": bar_plot(("scene", "error put in"), [Bar("left alone", "left alone"), Bar("set right", "set right")],
+                                "dB on test views (higher is better)"),
+    "nerf_recipes": bar_plot(("scene",), [Bar("nerfacto", "nerfacto"), Bar("nerf-rgb", "nerf-rgb, nerf-ir"), Bar("ours", "ours")],
+                             "dB on test views (higher is better)"),
 }
 
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pages of docs/benchmarks: command, processor, date, limits, a plot that is its table's, a link from the index."""
+"""Pages of docs/benchmarks: command, processor, date, one table, its plot, limits, a link from the index."""
 import importlib.util
 import re
 import unittest
@@ -9,7 +9,11 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / "docs" / "benchmarks"
 WITHOUT_PLOT = {
-    "hostile.md": "says what the program answers; runs of a fuzzer measure how fast a parser is",
+    "capture.md": "cases that hold or don't, without a figure in common",
+    "capture_v4l2.md": "the same",
+    "fuzzing.md": "runs of a fuzzer measure how fast a parser is",
+    "hostile.md": "says what the program answers",
+    "run_real.md": "what came of four recordings, without truth",
     "view.md": "wall times of a shared machine, which a plot would make look surer than they are",
 }
 
@@ -52,10 +56,19 @@ class BenchmarkPages(unittest.TestCase):
                 self.assertRegex(page, r"20\d\d-\d\d-\d\d")
                 self.assertRegex(page, r"\n## Limits\n\n\S", "what the figures don't say")
                 self.assertIn(f"benchmarks/{file.name}", index)
+                self.assertEqual(len(plot_pages.tables_of(page)), 1, "one question, one table")
                 images = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", page)
                 self.assertTrue(images or file.name in WITHOUT_PLOT, "no plot")
                 for image in images:
                     self.assertTrue((PAGES / image).exists(), image)
+
+    def test_links_lead_to_files(self):
+        pages = [*sorted((ROOT / "docs").rglob("*.md")), *sorted(ROOT.glob("*.md"))]
+        self.assertGreater(len(pages), 20)
+        for file in pages:
+            for link in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", file.read_text(encoding="utf-8")):
+                with self.subTest(page=str(file.relative_to(ROOT)), link=link):
+                    self.assertTrue((file.parent / link).exists())
 
 
 if __name__ == "__main__":
