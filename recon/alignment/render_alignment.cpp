@@ -28,7 +28,7 @@ void add_residuals(const ViewMatches& view, const Camera& camera, double scale_p
                    PoseCorrection& correction, double& log_focal, ceres::Problem& problem) {
   for (const PatchMatch& match : view.matches)
     problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<PatchResidual, 2, 6, 1>(new PatchResidual{match, camera}),
+        new PatchCost(match, camera),
         new ceres::ScaledLoss(new ceres::CauchyLoss(scale_px), match.score, ceres::TAKE_OWNERSHIP),
         correction.data(), &log_focal);
 }
@@ -110,10 +110,8 @@ void judge(const ViewMatches& matched, const PoseCorrection& correction, double 
            const Camera& camera, RenderAlignedView& view) {
   std::vector<double> distances;
   for (const PatchMatch& match : matched.matches) {
-    double r[2];
-    if (!PatchResidual{match, camera}(correction.data(), &log_focal, r)) continue;
-    const double d = std::hypot(r[0], r[1]);
-    if (d < 2) distances.push_back(d);
+    const auto residual = patch_residual(match, camera, correction.data(), log_focal);
+    if (residual && residual->norm() < 2) distances.push_back(residual->norm());
   }
   view.matches = static_cast<int>(distances.size());
   std::sort(distances.begin(), distances.end());
