@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "core/result.hpp"
@@ -12,8 +13,8 @@ namespace orbitfuse {
 struct ProgressEvent {
   std::string stage;  ///< e.g. "train.visible"
   double done = 0, total = 0;
-  double eta_s = -1;   ///< < 0: unknown
-  std::string detail;  ///< e.g. "held-out 24.3 dB"
+  std::optional<double> eta_s = {};  ///< to the end; absent: unknown
+  std::string detail = {};           ///< e.g. "held-out 24.3 dB"
 };
 
 /// Passed down every long operation: where to report, and whether to stop. The app owns it.

@@ -187,7 +187,7 @@ void add_pose_limits(const Session& session, const view::FinishedRun& run,
     for (const view::RecordedView& v : run.views) {
       if (v.modality != modality) continue;
       posed.insert(v.view.name);
-      if (!v.doubt.empty()) doubtful.push_back(v.view.name + " (" + v.doubt + ")");
+      if (v.doubt) doubtful.push_back(v.view.name + " (" + *v.doubt + ")");
     }
     const auto frames = session.frames_of(modality);
     const auto missing = std::count_if(frames.begin(), frames.end(), [&](const FrameRecord* f) {

@@ -22,7 +22,7 @@ Status add_findings(const std::vector<InspectionFinding>& findings, const view::
   for (const InspectionFinding& finding : findings) {
     ORBITFUSE_TRY(progress.check("inspection"));
     progress.report({"inspection", static_cast<double>(model.findings.size()),
-                     static_cast<double>(findings.size()), -1, ""});
+                     static_cast<double>(findings.size())});
     ORBITFUSE_ASSIGN(FindingPictures pictures, pictures_of(finding, run, scene, progress));
     model.findings.push_back({finding, std::move(pictures)});
   }

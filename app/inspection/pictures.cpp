@@ -81,7 +81,7 @@ Result<const RecordedView*> visible_view_of(const std::vector<Eigen::Vector3d>& 
       ORBITFUSE_ASSIGN(const double fine, fineness(view, point, scene, progress));
       least = std::min(least, fine);
     }
-    const std::pair rank{view.doubt.empty(), least};
+    const std::pair rank{!view.doubt, least};
     if (least > 0 && rank > most) most = rank, best = &view;
   }
   return best;
@@ -227,7 +227,7 @@ Result<FindingPictures> pictures_of(const InspectionFinding& finding, const Fini
   }
   if (view == nullptr) return pictures;
   pictures.view = view->view.name;
-  pictures.doubtful = !view->doubt.empty();
+  pictures.doubtful = view->doubt.has_value();
   const Camera camera = picture_camera(view->view.camera);
   const Rigid3d& pose = view->view.cam_from_world;
   view::LayerRenderer renderer(run);

@@ -113,15 +113,15 @@ std::string camera_mark(const RecordedView& v, const Projection& projection) {
       "<g stroke=\"{0}\" stroke-width=\"2\"><title>{1}{2}</title><line x1=\"{3:.1f}\" "
       "y1=\"{4:.1f}\" "
       "x2=\"{5:.1f}\" y2=\"{6:.1f}\"/>",
-      color, report::escape(v.view.name), v.doubt.empty() ? "" : ": doubtful", at.x(), at.y(),
-      look.x(), look.y());
+      color, report::escape(v.view.name), v.doubt ? ": doubtful" : "", at.x(), at.y(), look.x(),
+      look.y());
   if (visible)
     svg += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\" fill=\"{}\"/>", at.x(), at.y(),
                        color);
   else
     svg += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"9\" height=\"9\" fill=\"{}\"/>",
                        at.x() - 4.5, at.y() - 4.5, color);
-  if (!v.doubt.empty())
+  if (v.doubt)
     svg += fmt::format(
         "<path d=\"M{0:.1f} {1:.1f}L{2:.1f} {3:.1f}M{0:.1f} {3:.1f}L{2:.1f} {1:.1f}\" "
         "stroke=\"#000\" stroke-width=\"2.5\"/>",

@@ -8,6 +8,7 @@
 
 #include "core/system/file_io.hpp"
 #include "core/system/process.hpp"
+#include "core/system/scratch_folder.hpp"
 
 namespace orbitfuse::inspection {
 namespace fs = std::filesystem;
@@ -16,27 +17,6 @@ namespace {
 constexpr const char* instead =
     "open the HTML in any browser and print it to a file, or install chromium (Debian: apt-get "
     "install chromium) and call again";
-
-/// Its profile, log and output; gone when it ends.
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    std::error_code unknown;
-    const fs::path base = fs::temp_directory_path(unknown);
-    std::string pattern = ((unknown ? fs::path("/tmp") : base) / "orbitfuse-print-XXXXXX").string();
-    if (::mkdtemp(pattern.data()) != nullptr) path_ = pattern;
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    if (!path_.empty()) fs::remove_all(path_, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 /// A path as a URL: names may hold what means something else there.
 std::string file_url(const fs::path& path) {
@@ -75,9 +55,8 @@ Result<std::string> find_browser() {
 
 Status print_pdf(const fs::path& html, const fs::path& pdf, const Progress& progress) {
   ORBITFUSE_ASSIGN(const std::string browser, find_browser());
-  const ScratchFolder scratch;
-  if (scratch.path().empty())
-    return fail(ErrorKind::device, "/tmp", "no folder can be made in it", "check disk and rights");
+  // The browser's profile, log and output.
+  ORBITFUSE_ASSIGN(const ScratchFolder scratch, ScratchFolder::make());
   const fs::path printed = scratch.path() / "page.pdf", log = scratch.path() / "log";
   std::error_code unknown;
   const fs::path page = fs::absolute(html, unknown);

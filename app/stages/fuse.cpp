@@ -64,8 +64,10 @@ Result<StageOutput> fuse_views(const StageContext& context, const RunConfig& con
   double measured_sum = 0;
   for (const ViewFiles& files : rendered.views) {
     ORBITFUSE_TRY(context.progress.check("fuse"));
-    context.progress.report({"fuse", static_cast<double>(fused_images),
-                             static_cast<double>(rendered.views.size() * methods.size()), -1,
+    context.progress.report({"fuse",
+                             static_cast<double>(fused_images),
+                             static_cast<double>(rendered.views.size() * methods.size()),
+                             {},
                              files.name});
     ORBITFUSE_ASSIGN(const cv::Mat visible, read_visible(folder / files.visible));
     ORBITFUSE_ASSIGN(const cv::Mat thermal,

@@ -71,8 +71,11 @@ Status score_fused(const StageContext& context, MetricMeans& means) {
   for (std::size_t i = 0; i < rendered.views.size(); ++i) {
     const ViewFiles& files = rendered.views[i];
     ORBITFUSE_TRY(context.progress.check("metrics"));
-    context.progress.report({"metrics", static_cast<double>(i),
-                             static_cast<double>(rendered.views.size()), -1, files.name});
+    context.progress.report({"metrics",
+                             static_cast<double>(i),
+                             static_cast<double>(rendered.views.size()),
+                             {},
+                             files.name});
     ORBITFUSE_ASSIGN(const cv::Mat visible, read_image(context.of("render") / files.visible));
     ORBITFUSE_ASSIGN(const cv::Mat thermal,
                      read_image(context.of("fuse") / "thermal" / (files.name + ".png")));

@@ -5,6 +5,7 @@
 
 #include "core/image/palette.hpp"
 #include "core/nested_text.hpp"
+#include "core/option_range.hpp"
 
 namespace orbitfuse::stages {
 namespace {
@@ -203,9 +204,7 @@ Status RunConfig::validate() const {
       return fail(ErrorKind::usage, table + ".target_psnr", "no view is held out to measure it",
                   "hold some out, e.g. --set " + table + ".holdout_every=12");
     ORBITFUSE_TRY(train->cloud.validate());
-    if (train->max_width_px < 16)
-      return fail(ErrorKind::usage, table + ".max_width_px", std::to_string(train->max_width_px),
-                  "must be at least 16");
+    ORBITFUSE_TRY(OptionCheck(table)("max_width_px", train->max_width_px, at_least(16)));
   }
   if (const int width = train_thermal.depth_width_px; width != 0 && (width < 32 || width > 8192))
     return fail(ErrorKind::usage, "train.thermal.depth_width_px", std::to_string(width),
@@ -215,10 +214,7 @@ Status RunConfig::validate() const {
   ORBITFUSE_TRY(palette(render.palette));
   ORBITFUSE_TRY(fuse.chosen());
   ORBITFUSE_TRY(fuse.options.validate());
-  if (!(render.min_opacity >= 0 && render.min_opacity <= 1))
-    return fail(ErrorKind::usage, "render.min_opacity", std::to_string(render.min_opacity),
-                "must be in 0..1");
-  return {};
+  return OptionCheck("render")("min_opacity", render.min_opacity, from_to(0, 1));
 }
 
 Settings RunConfig::settings() {

@@ -22,7 +22,7 @@ std::string bar_line(const ProgressEvent& e) {
   const int filled = static_cast<int>(std::lround(share * bar_width));
   std::string line = fmt::format("{:<14} [{}{}] {:3.0f} %", e.stage, std::string(filled, '='),
                                  std::string(bar_width - filled, ' '), 100 * share);
-  if (e.eta_s >= 0) line += "  " + format_duration(e.eta_s) + " left";
+  if (e.eta_s) line += "  " + format_duration(*e.eta_s) + " left";
   if (!e.detail.empty()) line += "  " + e.detail;
   return line.size() > 110 ? line.substr(0, 110) : line;
 }
@@ -120,7 +120,7 @@ void Console::progress(const ProgressEvent& e) {
   if (options_.json) {
     nlohmann::json j = {
         {"event", "progress"}, {"stage", e.stage}, {"done", e.done}, {"total", e.total}};
-    j["eta_s"] = e.eta_s >= 0 ? nlohmann::json(e.eta_s) : nlohmann::json(nullptr);
+    j["eta_s"] = e.eta_s ? nlohmann::json(*e.eta_s) : nlohmann::json(nullptr);
     if (!e.detail.empty()) j["detail"] = e.detail;
     write_stdout(line_of(j));
   } else if (options_.terminal && options_.verbosity >= 0) {

@@ -115,7 +115,7 @@ Result<std::optional<LiveGuideOptions>> guide_of(const CaptureOptions& o,
   if (o.spacing_deg) guide.plan.spacing_deg = *o.spacing_deg;
   guide.plan.azimuth_tolerance_deg =
       std::min(guide.plan.azimuth_tolerance_deg, guide.plan.spacing_deg / 2);
-  guide.turntable_step_deg = o.turntable_deg.value_or(0);
+  guide.turntable_step_deg = o.turntable_deg;
   guide.stations_come_with_frames = cameras.stations && !cameras.live;
   if (!o.max_edge_px.empty()) {
     guide.coverage.max_visible_edge_px = o.max_edge_px[0];

@@ -54,8 +54,8 @@ Status run(Context& context, const Options& o) {
   const auto ending = recording.run(context.progress.cancel, [&] {
     std::uint64_t written = 0;
     for (const StreamStatus& s : recording.status()) written += s.received;
-    context.progress.report({"replay", static_cast<double>(written),
-                             static_cast<double>(session.frames.size()), -1, ""});
+    context.progress.report(
+        {"replay", static_cast<double>(written), static_cast<double>(session.frames.size())});
   });
   auto streams = nlohmann::json::array();
   for (const StreamStatus& s : recording.status()) {

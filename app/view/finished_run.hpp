@@ -20,8 +20,8 @@ namespace orbitfuse::view {
 /// A recorded camera, posed in the frame that the viewer shows.
 struct RecordedView {
   Modality modality = Modality::visible;
-  PosedView view;     ///< name: its file in the session
-  std::string doubt;  ///< why its pose may be wrong; empty: it is sure
+  PosedView view;                    ///< name: its file in the session
+  std::optional<std::string> doubt;  ///< why its pose may be wrong; absent: it is sure
 };
 
 /// What the viewer needs of a run, held in memory: the run's folder may change meanwhile.

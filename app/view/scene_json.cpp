@@ -57,7 +57,7 @@ json scene_json(const FinishedRun& run) {
     view["name"] = recorded.view.name;
     view["width"] = recorded.view.camera.width;
     view["height"] = recorded.view.camera.height;
-    if (!recorded.doubt.empty()) view["doubt"] = recorded.doubt;
+    if (recorded.doubt) view["doubt"] = *recorded.doubt;
     views.push_back(std::move(view));
   }
   json palettes = json::object();

@@ -12,8 +12,6 @@
 namespace orbitfuse {
 namespace {
 
-std::size_t slot(Modality modality) { return modality == Modality::visible ? 0 : 1; }
-
 std::string sideways(double degrees) {
   // Azimuth grows counter-clockwise seen from above; facing the object that is to the right.
   return fmt::format("{:.0f}° further {}", std::abs(degrees), degrees > 0 ? "right" : "left");
@@ -105,12 +103,8 @@ Coverage::Coverage(OrbitPlan plan, CoverageOptions options)
   assert(plan_.validate() && options_.validate());
   for (std::size_t loop = 0; loop < plan_.loop_elevations_deg.size(); ++loop) {
     for (int i = 0; i < plan_.sectors_per_loop(); ++i) {
-      sectors_.push_back({static_cast<int>(loop),
-                          i,
-                          i * plan_.spacing_deg,
-                          plan_.loop_elevations_deg[loop],
-                          {},
-                          {}});
+      sectors_.push_back(
+          {static_cast<int>(loop), i, i * plan_.spacing_deg, plan_.loop_elevations_deg[loop]});
     }
   }
 }
@@ -141,24 +135,18 @@ Refusal Coverage::add(const FrameAssessment& frame) {
     if (!(std::abs(angle_difference_deg(p.azimuth_deg, sector.azimuth_deg)) <=
           plan_.azimuth_tolerance_deg))
       continue;
-    const std::size_t s = slot(frame.modality);
-    const double rank = frame.rank > 0 ? frame.rank : frame.sharpness;
-    if (sector.file[s].empty() || rank > sector.rank[s]) {
-      sector.file[s] = frame.file;
-      sector.rank[s] = rank;
-    }
+    const double rank = frame.rank.value_or(frame.sharpness);
+    const auto before = sector.best.find(frame.modality);
+    if (before == sector.best.end() || rank > before->second.rank)
+      sector.best[frame.modality] = {frame.file, rank};
     return Refusal::none;
   }
   return in_band ? Refusal::between_stations : Refusal::out_of_band;
 }
 
-bool Coverage::done(const Sector& sector, Modality modality) const {
-  return !sector.file[slot(modality)].empty();
-}
-
 int Coverage::done_count(Modality modality) const {
   return static_cast<int>(std::count_if(sectors_.begin(), sectors_.end(),
-                                        [&](const Sector& s) { return done(s, modality); }));
+                                        [&](const Sector& s) { return s.done(modality); }));
 }
 
 bool Coverage::complete() const {
@@ -169,7 +157,7 @@ bool Coverage::complete() const {
 std::vector<const Sector*> Coverage::missing(Modality modality) const {
   std::vector<const Sector*> list;
   for (const Sector& sector : sectors_) {
-    if (!done(sector, modality)) list.push_back(&sector);
+    if (!sector.done(modality)) list.push_back(&sector);
   }
   return list;
 }

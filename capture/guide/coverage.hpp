@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -39,7 +39,7 @@ struct FrameAssessment {
   std::optional<OrbitPosition> position;     ///< absent: the camera is lost
   std::optional<EdgeBlur> edge_blur;         ///< absent: not measured
   double sharpness = 0;                      ///< relative to what this view can have, 0..1
-  double rank = 0;                           ///< of two good frames the higher stays; 0: sharpness
+  std::optional<double> rank;                ///< the higher of two stays; absent: by sharpness
   double overexposed = 0, underexposed = 0;  ///< shares of pixels
   bool nuc = false;                          ///< during or right after a shutter correction
 };
@@ -73,12 +73,19 @@ enum class Refusal {
 /// A short text for the operator: "too fast", "blurred", ...
 std::string text(Refusal refusal);
 
+/// The frame that stands for a sector.
+struct SectorFrame {
+  std::string file;
+  double rank = 0;
+};
+
 struct Sector {
   int loop = 0, index = 0;
   double azimuth_deg = 0, elevation_deg = 0;
-  /// Per modality: the best frame so far that passed every test; empty = missing.
-  std::array<std::string, 2> file;
-  std::array<double, 2> rank{};
+  /// The best frame so far that passed every test; absent: the sector is missing.
+  std::map<Modality, SectorFrame> best = {};
+
+  bool done(Modality modality) const { return best.count(modality) > 0; }
 };
 
 /// Which sectors are done. A sector is done for a modality only by a frame that is on disk, at
@@ -93,7 +100,6 @@ class Coverage {
 
   const OrbitPlan& plan() const { return plan_; }
   const std::vector<Sector>& sectors() const { return sectors_; }
-  bool done(const Sector& sector, Modality modality) const;
   int done_count(Modality modality) const;
   bool complete() const;
   std::vector<const Sector*> missing(Modality modality) const;

@@ -22,8 +22,6 @@ namespace {
 constexpr double darkest_mean_level = 8;     // of 255
 constexpr std::size_t photos_in_memory = 4;  // of 36 MB each; those behind them are read back
 
-std::size_t slot(Modality modality) { return modality == Modality::visible ? 0 : 1; }
-
 /// The image of a frame on disk, upright.
 std::optional<cv::Mat> read_back(const std::filesystem::path& file) {
   const Result<std::string> bytes = read_file(file);
@@ -44,7 +42,9 @@ Status LiveGuideOptions::validate() const {
   ORBITFUSE_TRY(coverage.validate());
   const OptionCheck check("guide");
   ORBITFUSE_TRY(check("looks_per_second", looks_per_second, above_up_to(0, 100)));
-  ORBITFUSE_TRY(check("turntable_step_deg", turntable_step_deg, from_to(-120, 120)));  // 0: none
+  if (turntable_step_deg) {
+    ORBITFUSE_TRY(check("turntable_step_deg", std::abs(*turntable_step_deg), above_up_to(0, 120)));
+  }
   ORBITFUSE_TRY(check("key_motion", key_motion, between(0, 1)));
   return check("unseen_after_s", unseen_after_s, above(0));
 }
@@ -53,8 +53,8 @@ LiveGuide::LiveGuide(SessionWriter& writer, LiveGuideOptions options, PositionFi
     : writer_(writer),
       options_(std::move(options)),
       finder_(std::move(finder)),
-      coverage_(options_.plan, options_.coverage),
-      table_(options_.turntable_step_deg) {
+      coverage_(options_.plan, options_.coverage) {
+  if (options_.turntable_step_deg) table_.emplace(*options_.turntable_step_deg);
   for (const Modality modality : options_.plan.modalities) {
     Camera& camera = cameras_[modality];
     camera.shown.modality = modality;
@@ -66,8 +66,7 @@ LiveGuide::LiveGuide(SessionWriter& writer, LiveGuideOptions options, PositionFi
 
 std::unique_ptr<PositionPolicy> LiveGuide::policy_for(Modality modality) {
   if (options_.stations_come_with_frames) return carried_stations(coverage_, modality);
-  if (options_.turntable_step_deg != 0)
-    return turntable_steps(coverage_, table_, options_.turntable_step_deg);
+  if (table_) return turntable_steps(coverage_, *table_);
   return finder_ ? mat_in_view(coverage_, modality, finder_) : operator_key(coverage_, modality);
 }
 
@@ -90,7 +89,7 @@ void LiveGuide::resume(const std::vector<FrameRecord>& earlier) {
     known->second.shown.latest_file = frame.file;
     add_at_station(known->second, frame);
     known->second.policy->resume_at(*frame.station);
-    remember_choice(known->second, frame);
+    known->second.chosen.remember(frame, coverage_.sectors());
   }
   for (auto& [modality, camera] : cameras_) say_next(camera, camera.position, Refusal::none);
 }
@@ -180,10 +179,10 @@ void LiveGuide::judge_between_neighbours(Camera& camera, const Look& look) {
   judge_announced(camera, looks.front().frame);
 }
 
-Result<std::string> LiveGuide::operator_at_station(std::int64_t time_ns) {
+Result<std::string> LiveGuide::operator_at_station(std::optional<std::int64_t> time_ns) {
   const std::lock_guard lock(mutex_);
-  KeyPress key{time_ns == 0 ? utc_now_ns() : time_ns, 0};
-  if (options_.turntable_step_deg != 0) key.number = table_.key(key.time_ns);
+  KeyPress key{time_ns ? *time_ns : utc_now_ns(), std::nullopt};
+  if (table_) key.number = table_->key(key.time_ns);
   std::string words;
   for (auto& [modality, camera] : cameras_) {
     const std::optional<OrbitPosition> there = camera.policy->at_key(key);
@@ -231,9 +230,9 @@ void LiveGuide::judge(Camera& camera, const FrameRecord& frame,
   assessment.modality = frame.modality;
   assessment.file = frame.file;
   assessment.position = position;
-  assessment.rank = frame.quality ? frame.quality->sharpness : 0;
+  if (frame.quality) assessment.rank = frame.quality->sharpness;
   if (frame.quality) assessment.edge_blur = frame.quality->edge_blur;
-  assessment.sharpness = camera.sharpness.relative(assessment.rank, position);
+  assessment.sharpness = camera.sharpness.relative(assessment.rank.value_or(0), position);
   // Thermal frames clip where the scene leaves the sensor's range, which is no exposure fault.
   if (frame.quality && frame.modality == Modality::visible) {
     assessment.overexposed = frame.quality->clipped_fraction;
@@ -245,7 +244,10 @@ void LiveGuide::judge(Camera& camera, const FrameRecord& frame,
   if (assessment.position && frame.has_flag(FrameFlag::still)) assessment.position->speed_deg_s = 0;
   camera.shown.judged_file = frame.file;
   camera.shown.refusal = coverage_.add(assessment);
-  if (camera.shown.refusal == Refusal::none) note_choice(camera, frame);
+  if (camera.shown.refusal == Refusal::none) {
+    const Status noted = camera.chosen.choose(frame, coverage_.sectors(), camera.position, writer_);
+    if (!noted && !error_) error_ = noted.error();
+  }
   say_next(camera, position, camera.shown.refusal);
 }
 
@@ -258,44 +260,6 @@ void LiveGuide::say_next(Camera& camera, const std::optional<OrbitPosition>& pos
         {position, last, camera.announced.has_value(), !camera.shown.latest_file.empty()});
   camera.shown.instruction = step.words;
   camera.shown.awaits = step.awaits;
-}
-
-/// Of an earlier recording: to be demoted when a better one comes.
-void LiveGuide::remember_choice(Camera& camera, const FrameRecord& frame) {
-  const std::vector<Sector>& sectors = coverage_.sectors();
-  for (std::size_t i = 0; i < sectors.size(); ++i) {
-    if (sectors[i].file[slot(frame.modality)] == frame.file) camera.chosen[i] = frame;
-  }
-}
-
-void LiveGuide::note_choice(Camera& camera, const FrameRecord& frame) {
-  const std::vector<Sector>& sectors = coverage_.sectors();
-  for (std::size_t i = 0; i < sectors.size(); ++i) {
-    if (sectors[i].file[slot(frame.modality)] != frame.file) continue;
-    const auto amend = [this](const FrameRecord& record) {
-      if (const Status status = writer_.amend(record); !status && !error_) error_ = status.error();
-    };
-    if (frame.station && !frame.tracking) return;  // written with its station
-    FrameRecord chosen = frame;
-    chosen.tracking = false;
-    chosen.station =
-        Station{sectors[i].loop,
-                sectors[i].index,
-                camera.position ? camera.position->azimuth_deg : sectors[i].azimuth_deg,
-                camera.position ? camera.position->elevation_deg : sectors[i].elevation_deg,
-                1,
-                1};
-    // The new one first: a crash between the two leaves two stations, never none.
-    amend(chosen);
-    const auto before = camera.chosen.find(i);
-    if (before != camera.chosen.end()) {
-      FrameRecord replaced = before->second;
-      replaced.tracking = true;
-      amend(replaced);
-    }
-    camera.chosen[i] = chosen;
-    return;
-  }
 }
 
 std::optional<LiveGuide::Look> LiveGuide::Camera::next_to_look() {
@@ -359,7 +323,7 @@ std::vector<LiveCamera> LiveGuide::cameras() const {
     shown.position = camera.position;
     shown.done = coverage_.done_count(modality);
     shown.of = static_cast<int>(coverage_.sectors().size());
-    const bool by_place = camera.policy->finder() || options_.turntable_step_deg != 0;
+    const bool by_place = camera.policy->finder() || table_;
     if (const Sector* next = coverage_.target(modality, by_place ? camera.position : std::nullopt))
       shown.target = OrbitPosition{next->azimuth_deg, next->elevation_deg, 0, 0};
   }

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "capture/guide/coverage.hpp"
+#include "capture/live/chosen_frames.hpp"
 #include "capture/live/position_policy.hpp"
 #include "capture/live/sharpness_reference.hpp"
 #include "capture/live/turntable.hpp"
@@ -34,8 +35,8 @@ struct LiveGuideOptions {
   /// The object stands on a turntable: each key is this much further in azimuth, negative for a
   /// table that turns the other way; a full turn later it is the next loop. A photo shows the table
   /// where the last key before its time put it, however late it arrives; one whose time does not
-  /// tell is refused. Without keys each photo of a camera is a step. 0: none.
-  double turntable_step_deg = 0;
+  /// tell is refused. Without keys each photo of a camera is a step. Absent: there is no turntable.
+  std::optional<double> turntable_step_deg;
   /// Every frame will carry its station (replay, synthetic): no key is asked for.
   bool stations_come_with_frames = false;
 
@@ -80,9 +81,9 @@ class LiveGuide {
            double kelvin_per_count = kelvin_per_dn);
   /// The operator stands at the next station, or has turned the table by a step: for each modality
   /// the next good frame is it; of a video, the next between two that show the same.
-  /// `time_ns`: when (UTC epoch); 0: now. In words what is taken next; usage error where the frames
-  /// or photos tell by themselves.
-  Result<std::string> operator_at_station(std::int64_t time_ns = 0);
+  /// `time_ns`: when (UTC epoch); absent: now. In words what is taken next; usage error where the
+  /// frames or photos tell by themselves.
+  Result<std::string> operator_at_station(std::optional<std::int64_t> time_ns = {});
 
   /// Judges what was stored and ends the looking; call it before the writer closes the session.
   void finish();
@@ -112,16 +113,14 @@ class LiveGuide {
     std::optional<Look> waiting;  ///< newest frame of a video not looked at yet
     std::deque<Look> photos;      ///< not looked at yet: each was taken on purpose
     std::optional<Look> next_to_look();
-    std::optional<OrbitPosition> announced;     ///< where the next good frame is
-    std::deque<Look> since_key;                 ///< video frames, the newest up to three
-    std::map<std::size_t, FrameRecord> chosen;  ///< by sector
+    std::optional<OrbitPosition> announced;  ///< where the next good frame is
+    std::deque<Look> since_key;              ///< video frames, the newest up to three
+    ChosenFrames chosen;
   };
   void add_at_station(Camera& camera, const FrameRecord& frame);
   void find_mat_in_frames();
   void judge(Camera& camera, const FrameRecord& frame,
              const std::optional<OrbitPosition>& position);
-  void remember_choice(Camera& camera, const FrameRecord& frame);
-  void note_choice(Camera& camera, const FrameRecord& frame);
   std::unique_ptr<PositionPolicy> policy_for(Modality modality);
   void say_next(Camera& camera, const std::optional<OrbitPosition>& position, Refusal last) const;
   void place(Camera& camera, const Look& look);
@@ -137,7 +136,7 @@ class LiveGuide {
   std::condition_variable changed_;
   Coverage coverage_;
   std::map<Modality, Camera> cameras_;
-  Turntable table_;
+  std::optional<Turntable> table_;
   std::optional<Error> error_;
   bool over_ = false;
   std::jthread looker_;

@@ -130,8 +130,8 @@ std::string json_of(const LiveState& state) {
       json["loops"].push_back(
           {{"elevation_deg", sector.elevation_deg}, {"sectors", Json::array()}});
     json["loops"][loop]["sectors"].push_back({{"azimuth_deg", sector.azimuth_deg},
-                                              {"visible", !sector.file[0].empty()},
-                                              {"thermal", !sector.file[1].empty()}});
+                                              {"visible", sector.done(Modality::visible)},
+                                              {"thermal", sector.done(Modality::thermal)}});
   }
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -162,7 +162,7 @@ std::string terminal_view(const LiveState& state) {
   for (const Sector& sector : state.sectors) {
     auto& [elevation, marks] = loops[sector.loop];
     elevation = sector.elevation_deg;
-    const bool visible = !sector.file[0].empty(), thermal = !sector.file[1].empty();
+    const bool visible = sector.done(Modality::visible), thermal = sector.done(Modality::thermal);
     const bool wants_both = state.cameras.size() > 1;
     marks += visible && thermal ? '#'
              : visible          ? (wants_both ? 'v' : '#')

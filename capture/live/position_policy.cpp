@@ -73,12 +73,11 @@ class MatInView final : public OperatorKey {
 
 class TurntableSteps final : public PositionPolicy {
  public:
-  TurntableSteps(const Coverage& coverage, Turntable& table, double step_deg)
-      : coverage_(coverage), table_(table), step_deg_(step_deg) {}
+  TurntableSteps(const Coverage& coverage, Turntable& table) : coverage_(coverage), table_(table) {}
 
   std::optional<OrbitPosition> at_key(const KeyPress& key) override {
     if (view_.counts_photos) return std::nullopt;  // its photos tell, and may come late
-    return at_count(key.number);
+    return at_count(key.number.value());
   }
 
   std::optional<OrbitPosition> of_photo(const FrameRecord& photo) override {
@@ -104,7 +103,7 @@ class TurntableSteps final : public PositionPolicy {
                                              : Awaited::key_or_photo;
     if (!view_.start_deg && !table_.begun()) return {"put the table at its start", then};
     std::string words = repeat ? text(sight.last) + "; " : "";
-    words += fmt::format("turn the table by {:g}°", std::abs(step_deg_));
+    words += fmt::format("turn the table by {:g}°", std::abs(table_.step_deg()));
     const double elevation_deg = loop_of(table_.turn_after_step(view_));
     if (sight.position && elevation_deg != sight.position->elevation_deg)
       words += fmt::format(", move the camera to {:g}° high", elevation_deg);
@@ -122,7 +121,6 @@ class TurntableSteps final : public PositionPolicy {
 
   const Coverage& coverage_;
   Turntable& table_;
-  const double step_deg_;
   TableView view_;
 };
 
@@ -141,9 +139,8 @@ std::unique_ptr<PositionPolicy> mat_in_view(const Coverage& coverage, Modality m
   return std::make_unique<MatInView>(coverage, modality, finder);
 }
 
-std::unique_ptr<PositionPolicy> turntable_steps(const Coverage& coverage, Turntable& table,
-                                                double step_deg) {
-  return std::make_unique<TurntableSteps>(coverage, table, step_deg);
+std::unique_ptr<PositionPolicy> turntable_steps(const Coverage& coverage, Turntable& table) {
+  return std::make_unique<TurntableSteps>(coverage, table);
 }
 
 }  // namespace orbitfuse

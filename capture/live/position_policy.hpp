@@ -38,7 +38,7 @@ struct CameraSight {
 /// The operator's key.
 struct KeyPress {
   std::int64_t time_ns = 0;
-  int number = 0;  ///< on a turntable, counted from 1
+  std::optional<int> number = {};  ///< of a turntable's keys, counted from 1
 };
 
 class PositionPolicy {
@@ -67,7 +67,6 @@ std::unique_ptr<PositionPolicy> mat_in_view(const Coverage& coverage, Modality m
 /// A turntable, which all cameras share. A photo shows the table where the last key before its time
 /// put it, however late it arrives; one whose time does not tell is of no sure position. Without
 /// keys each photo of the camera is a step.
-std::unique_ptr<PositionPolicy> turntable_steps(const Coverage& coverage, Turntable& table,
-                                                double step_deg);
+std::unique_ptr<PositionPolicy> turntable_steps(const Coverage& coverage, Turntable& table);
 
 }  // namespace orbitfuse

@@ -26,6 +26,7 @@ class Turntable {
  public:
   /// `step_deg`: the azimuth's change per step, negative for a table that turns the other way.
   explicit Turntable(double step_deg) : step_deg_(step_deg) {}
+  double step_deg() const { return step_deg_; }
 
   /// The operator's key: the table was turned by a step (the first key: it stands at its start).
   /// Returns its number, from 1.

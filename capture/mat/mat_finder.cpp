@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "capture/mat/mat_finder.hpp"
 
-#include <fmt/format.h>
-
 #include <Eigen/LU>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
@@ -10,6 +8,7 @@
 
 #include "capture/mat/aruco_dictionary.hpp"
 #include "capture/mat/pose_sigma.hpp"
+#include "core/option_range.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -112,15 +111,10 @@ OrbitPosition position_of(const Eigen::Vector2d& angles) {
 }  // namespace
 
 Status MatFinderOptions::validate() const {
-  if (min_tags < 1)
-    return fail(ErrorKind::usage, "mat.min_tags", fmt::format("{}", min_tags), "must be >= 1");
-  if (!(max_error_px > 0))
-    return fail(ErrorKind::usage, "mat.max_error_px", fmt::format("{}", max_error_px),
-                "must be > 0");
-  if (largest_side_px < 320)
-    return fail(ErrorKind::usage, "mat.largest_side_px", fmt::format("{}", largest_side_px),
-                "must be >= 320");
-  return {};
+  const OptionCheck check("mat");
+  ORBITFUSE_TRY(check("min_tags", min_tags, at_least(1)));
+  ORBITFUSE_TRY(check("max_error_px", max_error_px, above(0)));
+  return check("largest_side_px", largest_side_px, at_least(320));
 }
 
 MatFinder::MatFinder(const MatDesign& design, MatFinderOptions options)

@@ -9,6 +9,8 @@
 #include <variant>
 
 #include "capture/recording/stream_account.hpp"
+#include "capture/recording/stream_watch.hpp"
+#include "core/option_range.hpp"
 #include "core/system/utc_now.hpp"
 #include "core/temperature.hpp"
 
@@ -17,29 +19,8 @@ namespace {
 
 using Loss = StreamAccount::Loss;
 
-using Clock = std::chrono::steady_clock;
-
 constexpr const char* when_full =
     "free disk space and resume the session; every frame acknowledged is safe";
-
-/// What the operator should look into until the camera is back.
-bool asks_for_operator(EventKind kind) {
-  switch (kind) {
-    case EventKind::moved:
-    case EventKind::twin:
-    case EventKind::look_alike:
-    case EventKind::reopen_failed:
-    case EventKind::setting_lost:
-    case EventKind::nothing_new:
-      return true;
-    default:
-      return false;
-  }
-}
-
-bool loses_stream(EventKind kind) {
-  return kind == EventKind::disconnected || kind == EventKind::stalled || kind == EventKind::twin;
-}
 
 std::optional<std::uint64_t> next_id_in(const RecorderOptions& options, const std::string& device) {
   const auto found = options.next_ids.find(device);
@@ -81,20 +62,10 @@ struct Recorder::Channel {
   bool capture_over = false;
   bool writer_failed = false;
   std::optional<std::uint64_t> first_unwritten;  ///< the frame at which the writer failed
-  bool silent = false;
-  struct Away {
-    Clock::time_point since;
-    std::string why;
-  };
-  std::optional<Away> away;
-  std::optional<Clock::time_point> over_at;  ///< when the capture thread stopped listening
-  Clock::time_point last_frame = Clock::now();
+  StreamWatch watch;
   std::optional<Error> error;
   std::optional<FrameRecord> latest;
-  std::string notice, correction;
-  std::uint64_t passed_over = 0, repeated = 0, corrections = 0;
   double kelvin_per_count = kelvin_per_dn;  ///< of the newest stored temperatures
-  std::vector<std::string> passed_over_last;
 
   bool stopping() {
     const std::lock_guard lock(mutex);
@@ -137,48 +108,6 @@ struct Recorder::Channel {
     changed.notify_all();
   }
 
-  /// What the operator sees of an event; with the mutex held.
-  void note(const Delivery& delivery) {
-    if (delivery.kind != Delivery::Kind::event) return;
-    if (asks_for_operator(delivery.event)) notice = delivery.detail;
-    if (loses_stream(delivery.event)) away = Away{last_frame, delivery.detail};
-    switch (delivery.event) {
-      case EventKind::ignored:
-      case EventKind::duplicate: {
-        constexpr std::size_t shown = 3;
-        ++passed_over;
-        if (passed_over_last.size() == shown) passed_over_last.erase(passed_over_last.begin());
-        passed_over_last.push_back(delivery.detail);
-        break;
-      }
-      case EventKind::repeated_id:
-        ++repeated;
-        break;
-      case EventKind::reconnected:
-        notice.clear();
-        away.reset();
-        break;
-      case EventKind::nuc:
-      case EventKind::nuc_failed:
-        correction = (delivery.event == EventKind::nuc ? "shutter correction (NUC): "
-                                                       : "no shutter correction (NUC): ") +
-                     delivery.detail;
-        ++corrections;
-        break;
-      default:
-        break;
-    }
-  }
-
-  /// A timeout alone is no silence: one damaged frame holds up those behind it.
-  void watch_silence(Delivery::Kind kind) {
-    if (kind == Delivery::Kind::frame || kind == Delivery::Kind::rejected)
-      last_frame = Clock::now();
-    // Files come when they come, unless their folder is gone.
-    silent = kind == Delivery::Kind::timeout && Clock::now() - last_frame > options.silence &&
-             (!source.can_wait() || away);
-  }
-
   void take(Delivery delivery) {
     switch (delivery.kind) {
       case Delivery::Kind::frame:
@@ -217,8 +146,7 @@ struct Recorder::Channel {
       }
       {
         const std::lock_guard lock(mutex);
-        note(*delivery);
-        watch_silence(delivery->kind);
+        watch.see(*delivery, options.silence, source.can_wait());
       }
       if (delivery->kind == Delivery::Kind::end) {
         ended_by_itself = true;
@@ -229,7 +157,7 @@ struct Recorder::Channel {
     for (Delivery& late : started ? source.unfinished() : std::vector<Delivery>{}) {
       {
         const std::lock_guard lock(mutex);
-        note(late);
+        watch.note(late);
       }
       take(std::move(late));
     }
@@ -237,7 +165,7 @@ struct Recorder::Channel {
       log_event(EventKind::transport, counted);
     {
       const std::lock_guard lock(mutex);
-      over_at = Clock::now();
+      watch.end();
     }
     source.stop();
     if (status && !ended_by_itself) status = expect_stream();
@@ -250,16 +178,12 @@ struct Recorder::Channel {
     changed.notify_all();
   }
 
-  double away_s(const Away& outage) const {
-    return std::chrono::duration<double>(over_at.value_or(Clock::now()) - outage.since).count();
-  }
-
   /// When a recording is stopped: whether the camera still is there.
   Status expect_stream() {
     const std::lock_guard lock(mutex);
-    if (away) {
+    if (const std::optional<Absence> away = watch.away()) {
       return fail(ErrorKind::device, device.id,
-                  fmt::format("away for the last {:.1f} s ({})", away_s(*away), away->why),
+                  fmt::format("away for the last {:.1f} s ({})", away->seconds, away->why),
                   "what is recorded is safe; check its power and cable, then go on with --resume");
     }
     if (source_waits() || account.counts().any || writer_failed) return {};
@@ -383,34 +307,18 @@ struct Recorder::Channel {
     s.rejected = c.rejected;
     s.dropped = c.dropped;
     s.unwritten = c.unwritten;
-    s.silent = silent;
     s.ended = capture_over && queue.empty();
-    if (away) s.away = Absence{away_s(*away), away->why};
-    s.passed_over = passed_over;
-    s.passed_over_last = passed_over_last;
-    s.repeated = repeated;
-    s.notice = notice;
-    s.correction = correction;
-    s.corrections = corrections;
+    watch.tell(s);
     s.latest = latest;
     return s;
   }
 };
 
 Status RecorderOptions::validate() const {
-  if (queue_frames < 1 || queue_frames > 100000) {
-    return fail(ErrorKind::usage, "recorder.queue_frames", fmt::format("{}", queue_frames),
-                "must be 1 to 100000");
-  }
-  if (next_timeout.count() < 1) {
-    return fail(ErrorKind::usage, "recorder.next_timeout",
-                fmt::format("{} ms", next_timeout.count()), "must be > 0");
-  }
-  if (silence.count() < 0) {
-    return fail(ErrorKind::usage, "recorder.silence", fmt::format("{} ms", silence.count()),
-                "must be >= 0");
-  }
-  return {};
+  const OptionCheck check("recorder");
+  ORBITFUSE_TRY(check("queue_frames", queue_frames, from_to(1, 100000)));
+  ORBITFUSE_TRY(check("next_timeout", static_cast<double>(next_timeout.count()), at_least(1)));
+  return check("silence", static_cast<double>(silence.count()), at_least(0));
 }
 
 Recorder::Recorder(SessionWriter& writer, RecorderOptions options)

@@ -2,24 +2,19 @@
 #include "drivers/stills/import.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
-#include <algorithm>
 #include <cmath>
-#include <deque>
 #include <map>
-#include <set>
 #include <tuple>
 
 #include "capture/recording/frame_encoding.hpp"
 #include "capture/recording/session_folder.hpp"
 #include "capture/recording/session_writer.hpp"
-#include "core/image/image_codec.hpp"
 #include "core/system/file_io.hpp"
 #include "core/temperature.hpp"
 #include "drivers/stills/camera_groups.hpp"
 #include "drivers/stills/declared_stations.hpp"
-#include "drivers/stills/image_list.hpp"
+#include "drivers/stills/import_inputs.hpp"
 #include "drivers/stills/import_leftover.hpp"
 #include "drivers/stills/known_poses.hpp"
 #include "drivers/stills/sources.hpp"
@@ -52,30 +47,14 @@ class Importer {
         groups_(options) {}
 
   Status run() {
-    ORBITFUSE_ASSIGN(known_, read_known_poses(options_));
-    ORBITFUSE_ASSIGN(const auto visible_files, visible_sources());
-    ORBITFUSE_ASSIGN(const auto visible_tracking_files,
-                     listed(Modality::visible, options_.visible_tracking));
-    ORBITFUSE_ASSIGN(const auto thermal_files, thermal_sources());
-    ORBITFUSE_ASSIGN(const auto thermal_tracking_files,
-                     listed(Modality::thermal, options_.thermal_tracking));
-    ORBITFUSE_TRY(check_known(Modality::visible, {&visible_files, &visible_tracking_files}));
-    ORBITFUSE_TRY(check_known(Modality::thermal, {&thermal_files, &thermal_tracking_files}));
-    ORBITFUSE_TRY(check_stations_of({&visible_files}));
-    ORBITFUSE_TRY(check_disk({&visible_files, &visible_tracking_files}));
-    // First every thermal file is looked at: what its samples mean is decided for all of them.
-    std::vector<Source> thermal = observed(thermal_files),
-                        thermal_tracking = observed(thermal_tracking_files);
-    ORBITFUSE_TRY(check_object_parameters());
-    std::vector<Source> visible = photo_sources(visible_files);
-    std::vector<Source> visible_tracking = photo_sources(visible_tracking_files);
-    take_out_copies(Modality::visible, {&visible, &visible_tracking});
-    take_out_copies(Modality::thermal, {&thermal, &thermal_tracking});
-    total_ = visible.size() + visible_tracking.size() + thermal.size() + thermal_tracking.size();
-    ORBITFUSE_TRY(add_visible(in_capture_order(std::move(visible)), false));
-    ORBITFUSE_TRY(add_visible(in_capture_order(std::move(visible_tracking)), true));
-    ORBITFUSE_TRY(add_thermal(in_capture_order(std::move(thermal)), false));
-    ORBITFUSE_TRY(add_thermal(in_capture_order(std::move(thermal_tracking)), true));
+    ORBITFUSE_ASSIGN(ImportInputs inputs,
+                     gather_inputs(options_, folder_, decoder_, report_.warnings));
+    known_ = std::move(inputs.known);
+    total_ = inputs.size();
+    ORBITFUSE_TRY(add_visible(inputs.visible, false));
+    ORBITFUSE_TRY(add_visible(inputs.visible_tracking, true));
+    ORBITFUSE_TRY(add_thermal(inputs.thermal, false));
+    ORBITFUSE_TRY(add_thermal(inputs.thermal_tracking, true));
     if (report_.visible + report_.thermal + report_.tracking == 0) {
       return fail(ErrorKind::input, "import",
                   first_failure_.empty() ? "no readable image" : first_failure_,
@@ -87,151 +66,6 @@ class Importer {
   ImportReport take_report() { return std::move(report_); }
 
  private:
-  Result<std::vector<fs::path>> listed(Modality modality, const std::vector<fs::path>& paths) {
-    if (paths.empty()) return std::vector<fs::path>{};
-    ORBITFUSE_ASSIGN(ImageList list, list_images(modality, paths));
-    for (const fs::path& file : list.no_files) {
-      report_.warnings.push_back(fmt::format(
-          "left out: {}: no file (a link to nothing, a pipe or a device)", file.string()));
-    }
-    for (const fs::path& file : list.unread) {
-      report_.warnings.push_back(
-          fmt::format("left out: {}: {} files are not read; convert it to JPEG, PNG or TIFF",
-                      file.string(), unread_kind(file)));
-    }
-    tell_videos_among_photos(list.videos_among_photos, list.images);
-    return std::move(list.images);
-  }
-
-  void tell_videos_among_photos(const std::vector<fs::path>& videos,
-                                const std::vector<fs::path>& images) {
-    const std::set<fs::path> named(images.begin(), images.end());
-    std::vector<std::string> names;
-    for (const fs::path& video : videos)
-      if (!named.count(video)) names.push_back(video.filename().string());
-    if (names.empty()) return;
-    report_.warnings.push_back(
-        fmt::format("left out: {}: {} among photos ({}{}): perhaps parts of those (Live Photos); "
-                    "name a video itself to take it",
-                    videos.front().parent_path().string(),
-                    names.size() == 1 ? "a video" : fmt::format("{} videos", names.size()),
-                    names.front(), names.size() > 1 ? ", ..." : ""));
-  }
-
-  Result<std::vector<fs::path>> visible_sources() {
-    if (!options_.visible.empty()) return listed(Modality::visible, options_.visible);
-    return files_of_transforms(Modality::visible);
-  }
-  Result<std::vector<fs::path>> thermal_sources() {
-    if (!options_.thermal.empty()) return listed(Modality::thermal, options_.thermal);
-    return files_of_transforms(Modality::thermal);
-  }
-
-  /// Photos are copied as they are; HEIC grows as JPEG.
-  Status check_disk(std::initializer_list<const std::vector<fs::path>*> photos) const {
-    std::uint64_t needed = min_free_session_bytes;
-    for (const auto* files : photos) {
-      for (const fs::path& file : *files) {
-        std::error_code unreadable;
-        const std::uintmax_t size = fs::file_size(file, unreadable);
-        if (!unreadable) needed += unread_kind(file) == "HEIC" ? 4 * size : size;
-      }
-    }
-    return check_free_space(folder_, needed, "free disk space, or import to another disk");
-  }
-
-  /// Where the frames of a video were taken is nobody's word.
-  Status check_stations_of(std::initializer_list<const std::vector<fs::path>*> photos) const {
-    if (!options_.visible_stations) return {};
-    for (const auto* files : photos) {
-      for (const fs::path& file : *files) {
-        if (!has_video_extension(file)) continue;
-        return fail(ErrorKind::usage, file.string(),
-                    "a video, but the photos are declared to be at stations",
-                    "leave --station-spacing-deg out, or import the video by itself");
-      }
-    }
-    return {};
-  }
-
-  /// Poses that were given belong to the images that were given.
-  Status check_known(Modality modality, std::initializer_list<const std::vector<fs::path>*> lists) {
-    const auto known = known_.find(modality);
-    if (known == known_.end() || known->second.all().empty()) return {};
-    std::size_t images = 0, with_pose = 0;
-    for (const auto* files : lists) {
-      images += files->size();
-      for (const fs::path& file : *files) with_pose += known->second.find(file) != nullptr;
-    }
-    if (images == 0 || with_pose == images) return {};
-    const std::string found = fmt::format("{} of {} images have a pose among the {} given",
-                                          with_pose, images, known->second.all().size());
-    if (with_pose == 0)
-      return fail(ErrorKind::input, fmt::format("known poses, {}", name(modality)),
-                  fmt::format("{}; the first given is for {}", found,
-                              known->second.all().front().file.string()),
-                  "give the poses of these images, or none");
-    report_.warnings.push_back(
-        fmt::format("{}: {}; the others are left to the pose stage", name(modality), found));
-    return {};
-  }
-
-  std::vector<fs::path> files_of_transforms(Modality modality) const {
-    std::vector<fs::path> files;
-    if (!options_.transforms_json || !known_.count(modality)) return files;
-    for (const KnownView& view : known_.at(modality).all()) files.push_back(view.file);
-    return files;
-  }
-
-  std::vector<Source> observed(const std::vector<fs::path>& files) {
-    std::vector<Source> sources;
-    for (const fs::path& file : files) {
-      Source source;
-      source.file = file;
-      Result<std::string> bytes = read_file(file, max_image_bytes);
-      if (!bytes) {
-        sources.push_back(source);
-        continue;
-      }
-      source.hash = content_hash(*bytes);
-      source.pages = thermal_page_count(*bytes);
-      for (source.page = 0; source.page < source.pages; ++source.page) {
-        source.taken_ns.reset();
-        if (const Result<ThermalFile> thermal = thermal_file(*bytes, file, source.page)) {
-          decoder_.observe(*thermal, source.short_name());
-          source.taken_ns = thermal->taken_ns;
-        }
-        sources.push_back(source);
-      }
-    }
-    return sources;
-  }
-
-  void take_out_copies(Modality modality, std::initializer_list<std::vector<Source>*> lists) {
-    CopyFilter filter(known_[modality]);
-    for (std::vector<Source>* sources : lists) {
-      for (std::string& told : filter.take_out(*sources))
-        report_.warnings.push_back(std::move(told));
-    }
-  }
-
-  /// Only radiometric JPEGs say what was assumed of the object; temperatures of others are as they
-  /// are.
-  Status check_object_parameters() {
-    if (!options_.object.any() || decoder_.radiometric_jpegs() == decoder_.files()) return {};
-    const int others = decoder_.files() - decoder_.radiometric_jpegs();
-    const std::string found = fmt::format(
-        "emissivity, distance, reflected or air temperature or humidity is given, but "
-        "{} of {} thermal files are no radiometric JPEGs",
-        others, decoder_.files());
-    if (decoder_.radiometric_jpegs() == 0) {
-      return fail(ErrorKind::usage, "import.object", found,
-                  "their temperatures can't be corrected: leave it out");
-    }
-    report_.warnings.push_back(found + ": their temperatures stay as they are");
-    return {};
-  }
-
   void pass_over(const Error& error) {
     if (first_failure_.empty()) first_failure_ = error.message();
     report_.warnings.push_back("left out: " + error.message());
@@ -239,7 +73,7 @@ class Importer {
 
   Status step() {
     ++done_;
-    progress_.report({"import", static_cast<double>(done_), static_cast<double>(total_), -1, ""});
+    progress_.report({"import", static_cast<double>(done_), static_cast<double>(total_)});
     return progress_.check("import");
   }
 

@@ -108,7 +108,7 @@ Status record_synthetic_session(const SyntheticOptions& options, const fs::path&
                                            synthetic::walk(options, Modality::thermal).size());
   std::atomic<int> done{0};
   recorder.on_frame = [&](const StoredFrame& stored) {
-    progress.report({"record", static_cast<double>(++done), total, -1, stored.record.file});
+    progress.report({"record", static_cast<double>(++done), total, {}, stored.record.file});
   };
   ORBITFUSE_TRY(recorder.run({visible.get(), thermal.get()}, progress));
   ORBITFUSE_TRY(writer->close());

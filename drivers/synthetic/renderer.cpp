@@ -84,8 +84,8 @@ cv::Mat render_depth(const Scene& scene, const Camera& camera, const Rigid3d& ca
       const Ray ray = rays.at(x + 0.5, y + 0.5);
       const Hit hit = scene.intersect(ray);
       depth.at<float>(y, x) =
-          hit.solid < 0 ? std::numeric_limits<float>::quiet_NaN()
-                        : static_cast<float>(hit.distance * ray.direction.dot(rays.forward()));
+          hit.solid ? static_cast<float>(hit.distance * ray.direction.dot(rays.forward()))
+                    : std::numeric_limits<float>::quiet_NaN();
     }
   });
   return depth;

@@ -159,10 +159,10 @@ double car_body_k(const Vector3d& x, const Vector3d& n) {
 }  // namespace
 
 Vector3d visible_radiance(const Scene& scene, const Ray& ray, const Hit& hit) {
-  if (hit.solid < 0) return sky_radiance(ray.direction);
+  if (!hit.solid) return sky_radiance(ray.direction);
   const Vector3d x = ray.origin + hit.distance * ray.direction;
   const Vector3d& n = hit.normal;
-  const Surface s = surface_at(scene.solid(hit.solid), x, n);
+  const Surface s = surface_at(scene.solid(*hit.solid), x, n);
   const double facing = std::max(0.0, n.dot(Scene::sun_direction()));
   const bool lit = facing > 0 && !scene.is_shadowed(x + 1e-4 * n);
   // Less sky is seen close to the ground beside and under the car.
@@ -187,8 +187,8 @@ Vector3d visible_radiance(const Scene& scene, const Ray& ray, const Hit& hit) {
 
 double temperature_k(const Scene& scene, const Ray& ray, const Hit& hit) {
   constexpr double air_k = 288.5;
-  if (hit.solid < 0) return 258.0 + 14 * std::exp(-6 * std::max(0.0, ray.direction.z()));
-  const Solid& solid = scene.solid(hit.solid);
+  if (!hit.solid) return 258.0 + 14 * std::exp(-6 * std::max(0.0, ray.direction.z()));
+  const Solid& solid = scene.solid(*hit.solid);
   const Vector3d x = ray.origin + hit.distance * ray.direction;
   const double sun = std::max(0.0, hit.normal.dot(Scene::sun_direction()));
   const double own = uniform(mix(solid.seed, 77));

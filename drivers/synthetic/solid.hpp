@@ -16,7 +16,7 @@ struct Ray {
 struct Hit {
   double distance = std::numeric_limits<double>::infinity();
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
-  int solid = -1;  ///< index in the scene; -1 = nothing
+  std::optional<int> solid = {};  ///< index in the scene; absent: nothing is hit
 };
 
 enum class Material {

@@ -28,10 +28,10 @@ using FieldRenderer =
 
 /// A recorded thermal frame.
 struct ThermalFrame {
-  PosedView view;     ///< in the scene's world; its name is the file in the session
-  std::string doubt;  ///< why its pose is doubtful; empty: it is sure
+  PosedView view;                    ///< in the scene's world; its name is the file in the session
+  std::optional<std::string> doubt;  ///< why its pose may be wrong; absent: it is sure
   std::optional<FlirCalibration> radiometry;  ///< behind its temperatures, where the session has it
-  bool doubtful() const { return !doubt.empty(); }
+  bool doubtful() const { return doubt.has_value(); }
 };
 
 struct SceneParts {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <stdlib.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <cstring>
-#include <filesystem>
 
+#include "core/system/scratch_folder.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace orbitfuse::fuzz {
@@ -23,18 +23,8 @@ std::string ScratchFile::with(std::string_view bytes) const {
 }
 
 const std::string& scratch_folder() {
-  struct Folder {
-    std::string path = "/dev/shm/orbitfuse-fuzz-XXXXXX";
-    Folder() {
-      if (!::mkdtemp(path.data())) std::abort();
-    }
-    ~Folder() {
-      std::error_code ignored;
-      std::filesystem::remove_all(path, ignored);
-    }
-  };
-  static const Folder folder;
-  return folder.path;
+  static const ScratchFolder folder = ScratchFolder::make("/dev/shm").value();
+  return folder.path().native();
 }
 
 const Target* find(const std::vector<Target>& targets, std::string_view name) {

@@ -117,7 +117,7 @@ Result<DenseDepth> dense_depth(const Reconstruction& model, const std::vector<cv
     improve(planes[k], fine[k], sources_of(fine, k, neighbours[k]), range, options.fine_iterations,
             options, key + 2);
     const std::lock_guard lock(reporting);
-    progress.report({"depth", static_cast<double>(++done), static_cast<double>(count), -1, ""});
+    progress.report({"depth", static_cast<double>(++done), static_cast<double>(count)});
   });
   ORBITFUSE_TRY(progress.check("depth"));
 

@@ -117,8 +117,11 @@ Result<PointCloud> export_point_cloud(const Field& field, const std::vector<Pose
     out.view.camera = view.camera.scaled_to(width, height).without_distortion();
     ORBITFUSE_ASSIGN(out.image, render(field, out.view.camera, view.cam_from_world, {}, progress));
     rendered.push_back(std::move(out));
-    progress.report({"export", static_cast<double>(rendered.size()),
-                     static_cast<double>(views.size()), -1, view.name});
+    progress.report({"export",
+                     static_cast<double>(rendered.size()),
+                     static_cast<double>(views.size()),
+                     {},
+                     view.name});
   }
 
   const int needed =

@@ -195,7 +195,7 @@ Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene&
                                      const std::vector<OrbitHypothesis>& hypotheses,
                                      const std::vector<const FrameRecord*>& tracking,
                                      const Progress& progress) {
-  progress.report({"poses.thermal", 2, 4, -1, "views of the scene"});
+  progress.report({"poses.thermal", 2, 4, {}, "views of the scene"});
   ORBITFUSE_ASSIGN(const SceneRenderer renderer,
                    scene_of(visible, evidence.canonical_from_visible, progress));
   OrbitViews orbit{evidence.work.images, {}, evidence.canonical_from_visible, false};
@@ -222,7 +222,7 @@ Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene&
     placed.warnings.push_back(
         "the thermal lens is unknown: 33 degrees were assumed to begin with; give its focal length "
         "(import --thermal-focal-px)");
-  progress.report({"poses.thermal", 3, 4, -1, "alignment with renders"});
+  progress.report({"poses.thermal", 3, 4, {}, "alignment with renders"});
   LensGuess lens = evidence.work.lens;
   ORBITFUSE_TRY(refine_orbit(renderer, orbit, rendered,
                              {lens.focal_relative_sigma, lens.radial_sigma}, progress));
@@ -305,7 +305,7 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
                                          std::vector<LadderStep>& steps) {
   const auto start = std::chrono::steady_clock::now();
   const auto tell = [&](double done, const std::string& what) {
-    progress.report({"poses.thermal", done, 4, -1, what});
+    progress.report({"poses.thermal", done, 4, {}, what});
   };
   if (!visible.renderer)
     return fail(ErrorKind::quality, "poses.thermal",

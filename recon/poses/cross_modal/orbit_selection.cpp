@@ -182,7 +182,10 @@ Result<SelectedOrbit> select_by_renders(const SceneRenderer& renderer, OrbitView
       (other.support < support ? other : selected.supports.back()).repeats = true;
     }
     openings.push_back(std::move(opened));
-    progress.report({"poses.thermal", 2, 4, -1,
+    progress.report({"poses.thermal",
+                     2,
+                     4,
+                     {},
                      fmt::format("start at {:.0f} deg{}, distance {:.2f}: support {:.1f}",
                                  hypothesis.offset_deg, hypothesis.mirrored ? " clockwise" : "",
                                  hypothesis.radius, support)});

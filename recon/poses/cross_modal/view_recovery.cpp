@@ -179,7 +179,10 @@ Status refine_orbit(const SceneRenderer& renderer, OrbitViews& orbit, RenderAlig
   const OrbitRefinement refinement{renderer, orbit, progress};
   ORBITFUSE_TRY(refinement.together(alignment, prior, approach_rounds()));
   ORBITFUSE_ASSIGN(const std::vector<std::size_t> lost, unsettled(refinement, alignment));
-  progress.report({"poses.thermal", 3, 4, -1,
+  progress.report({"poses.thermal",
+                   3,
+                   4,
+                   {},
                    fmt::format("{} views don't come back to their place", lost.size())});
   ORBITFUSE_TRY(search_whole(refinement, lost, judging_rounds(), alignment));
   ORBITFUSE_TRY(refinement.together(alignment, prior, fine_rounds()));

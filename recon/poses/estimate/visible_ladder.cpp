@@ -159,7 +159,7 @@ class VisibleLadder {
   }
 
   void tell(double done, const std::string& what) const {
-    progress_.report({"poses.visible", done, 4, -1, what});
+    progress_.report({"poses.visible", done, 4, {}, what});
   }
 
   Result<ModalityPoses> without_features(const Error& error) {

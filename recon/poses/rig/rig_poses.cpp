@@ -58,7 +58,7 @@ Result<ThermalPoses> pose_by_rig(const Session& session, const Reconstruction& v
                                  const RigPairs& rig, const Progress& progress,
                                  std::vector<LadderStep>& steps) {
   const auto start = std::chrono::steady_clock::now();
-  progress.report({"poses.thermal", 0, 2, -1, "rig of " + rig.found_by});
+  progress.report({"poses.thermal", 0, 2, {}, "rig of " + rig.found_by});
   LadderStep step{"rig, " + rig.found_by, false, "", 0, 0, 0};
   ThermalPoses result;
   result.shares_visible_frame = true;

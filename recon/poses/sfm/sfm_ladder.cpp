@@ -255,7 +255,7 @@ Result<ModalityPoses> structure_from_motion(const Session& session,
     const auto start = Clock::now();
     const fs::path folder = workdir / (attempt.exhaustive ? "all_pairs" : "orbit_pairs");
     const auto tell = [&](double done, const std::string& what) {
-      progress.report({stage, done, 4, -1, attempt.name + ": " + what});
+      progress.report({stage, done, 4, {}, attempt.name + ": " + what});
     };
     tell(0, "features");
     ORBITFUSE_ASSIGN(const std::vector<ProxyImage> images,

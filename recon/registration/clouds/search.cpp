@@ -83,10 +83,13 @@ constexpr RefineOptions turned_refinement{.start_bound = 0.35,
                                           .exact_partners = false,
                                           .adapt_bound = false};
 
+/// Candidates begin far off: partners count from far away, and nothing contradicts them yet.
+constexpr ScoreBounds first_look{.pair = 0.2, .plane = 0.2, .reach = 0};
+
 /// Coarse scores for all, a short refinement for the best, full refinement for the best of those.
 Candidates narrowed(const Search& search, Candidates candidates) {
   for (Candidate& c : candidates)
-    c.score = search.agree(c.target_from_source, 200, {0.2, 0.2, 0}).score;
+    c.score = search.agree(c.target_from_source, 200, first_look).score;
   candidates = best_distinct(std::move(candidates), 30);
   for (Candidate& c : candidates) {
     if (!c.refined) {

@@ -22,7 +22,7 @@ inline FinishedRun toy_run(const std::filesystem::path& out) {
     for (std::size_t i = 0; i < data.views.size(); ++i)
       run.views.push_back({modality,
                            {data.views[i].name, data.views[i].camera, data.views[i].cam_from_world},
-                           i == 1 ? "a doubt" : ""});
+                           i == 1 ? std::optional<std::string>("a doubt") : std::nullopt});
   }
   for (int i = 0; i < 1000; ++i) {
     const double z = 1 - (2 * i + 1) / 1000.0, r = std::sqrt(1 - z * z), a = 2.4 * i;

@@ -30,8 +30,8 @@ TEST(Coverage, FillsTheSectorAcrossNorth) {
   Coverage coverage({});
   EXPECT_EQ(coverage.sectors().size(), 36u);
   EXPECT_EQ(coverage.add(good_frame(356, 12)), Refusal::none);
-  EXPECT_TRUE(coverage.done(coverage.sectors()[0], Modality::visible));
-  EXPECT_FALSE(coverage.done(coverage.sectors()[0], Modality::thermal));
+  EXPECT_TRUE(coverage.sectors()[0].done(Modality::visible));
+  EXPECT_FALSE(coverage.sectors()[0].done(Modality::thermal));
 }
 
 TEST(Coverage, NoFalseGreen) {
@@ -106,7 +106,7 @@ TEST(Coverage, KeepsTheSharpest) {
   frame.file = "visible/softer.jpg";
   frame.sharpness = 0.6;
   coverage.add(frame);
-  EXPECT_EQ(coverage.sectors()[1].file[0], "visible/sharper.jpg");
+  EXPECT_EQ(coverage.sectors()[1].best.at(Modality::visible).file, "visible/sharper.jpg");
 }
 
 TEST(Coverage, CompleteNeedsEveryModality) {

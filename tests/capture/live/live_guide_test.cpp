@@ -220,7 +220,7 @@ TEST_F(LiveGuideTest, FramesThatDifferFromTheirNeighboursAreNoStation) {
     EXPECT_EQ(guide.done_count(Modality::visible), 0);
     guide.add(resting.back());
   }
-  EXPECT_EQ(guide.sectors()[0].file[0], resting[1].file);
+  EXPECT_EQ(guide.sectors()[0].best.at(Modality::visible).file, resting[1].file);
 }
 
 TEST_F(LiveGuideTest, StationsThatFramesCarryCountAtOnce) {
@@ -586,7 +586,10 @@ TEST_F(LiveGuideTest, FramesAreNotDecodedAgain) {
 TEST_F(LiveGuideTest, OptionsAreChecked) {
   options.turntable_step_deg = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(options.validate().error().where, "guide.turntable_step_deg");
-  options.turntable_step_deg = 0;
+  options = {};
+  options.turntable_step_deg = 0;  // no table turns so; without one it is left out
+  EXPECT_EQ(options.validate().error().where, "guide.turntable_step_deg");
+  options = {};
   options.looks_per_second = 0;
   EXPECT_EQ(options.validate().error().where, "guide.looks_per_second");
   options = {};

@@ -47,7 +47,7 @@ LiveState some_state() {
   state.cameras = {camera};
   OrbitPlan plan;
   state.sectors = Coverage(plan).sectors();
-  state.sectors[0].file[0] = "visible/000000.jpg";
+  state.sectors[0].best[Modality::visible].file = "visible/000000.jpg";
   state.warnings = warnings_of(state);
   return state;
 }

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "drivers/stills/import_inputs.hpp"
+
+#include <fmt/format.h>
+
+#include <set>
+
+#include "capture/recording/session_folder.hpp"
+#include "core/image/image_codec.hpp"
+#include "core/system/file_io.hpp"
+#include "drivers/stills/image_list.hpp"
+
+namespace orbitfuse {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Gathering {
+ public:
+  Gathering(const ImportOptions& options, const fs::path& folder, ThermalDecoder& decoder,
+            std::vector<std::string>& warnings)
+      : options_(options), folder_(folder), decoder_(decoder), warnings_(warnings) {}
+
+  Result<ImportInputs> run() {
+    ORBITFUSE_ASSIGN(inputs_.known, read_known_poses(options_));
+    ORBITFUSE_ASSIGN(const auto visible, visible_sources());
+    ORBITFUSE_ASSIGN(const auto visible_tracking,
+                     listed(Modality::visible, options_.visible_tracking));
+    ORBITFUSE_ASSIGN(const auto thermal, thermal_sources());
+    ORBITFUSE_ASSIGN(const auto thermal_tracking,
+                     listed(Modality::thermal, options_.thermal_tracking));
+    ORBITFUSE_TRY(check_known(Modality::visible, {&visible, &visible_tracking}));
+    ORBITFUSE_TRY(check_known(Modality::thermal, {&thermal, &thermal_tracking}));
+    ORBITFUSE_TRY(check_stations_of(visible));
+    ORBITFUSE_TRY(check_disk({&visible, &visible_tracking}));
+    inputs_.thermal = observed(thermal);
+    inputs_.thermal_tracking = observed(thermal_tracking);
+    ORBITFUSE_TRY(check_object_parameters());
+    inputs_.visible = photo_sources(visible);
+    inputs_.visible_tracking = photo_sources(visible_tracking);
+    take_out_copies(Modality::visible, {&inputs_.visible, &inputs_.visible_tracking});
+    take_out_copies(Modality::thermal, {&inputs_.thermal, &inputs_.thermal_tracking});
+    for (std::vector<Source>* sources :
+         {&inputs_.visible, &inputs_.visible_tracking, &inputs_.thermal, &inputs_.thermal_tracking})
+      *sources = in_capture_order(std::move(*sources));
+    return std::move(inputs_);
+  }
+
+ private:
+  Result<std::vector<fs::path>> listed(Modality modality, const std::vector<fs::path>& paths) {
+    if (paths.empty()) return std::vector<fs::path>{};
+    ORBITFUSE_ASSIGN(ImageList list, list_images(modality, paths));
+    for (const fs::path& file : list.no_files) {
+      warnings_.push_back(fmt::format(
+          "left out: {}: no file (a link to nothing, a pipe or a device)", file.string()));
+    }
+    for (const fs::path& file : list.unread) {
+      warnings_.push_back(
+          fmt::format("left out: {}: {} files are not read; convert it to JPEG, PNG or TIFF",
+                      file.string(), unread_kind(file)));
+    }
+    tell_videos_among_photos(list.videos_among_photos, list.images);
+    return std::move(list.images);
+  }
+
+  void tell_videos_among_photos(const std::vector<fs::path>& videos,
+                                const std::vector<fs::path>& images) {
+    const std::set<fs::path> named(images.begin(), images.end());
+    std::vector<std::string> names;
+    for (const fs::path& video : videos)
+      if (!named.count(video)) names.push_back(video.filename().string());
+    if (names.empty()) return;
+    warnings_.push_back(
+        fmt::format("left out: {}: {} among photos ({}{}): perhaps parts of those (Live Photos); "
+                    "name a video itself to take it",
+                    videos.front().parent_path().string(),
+                    names.size() == 1 ? "a video" : fmt::format("{} videos", names.size()),
+                    names.front(), names.size() > 1 ? ", ..." : ""));
+  }
+
+  Result<std::vector<fs::path>> visible_sources() {
+    if (!options_.visible.empty()) return listed(Modality::visible, options_.visible);
+    return files_of_transforms(Modality::visible);
+  }
+  Result<std::vector<fs::path>> thermal_sources() {
+    if (!options_.thermal.empty()) return listed(Modality::thermal, options_.thermal);
+    return files_of_transforms(Modality::thermal);
+  }
+
+  /// Photos are copied as they are; HEIC grows as JPEG.
+  Status check_disk(std::initializer_list<const std::vector<fs::path>*> photos) const {
+    std::uint64_t needed = min_free_session_bytes;
+    for (const auto* files : photos) {
+      for (const fs::path& file : *files) {
+        std::error_code unreadable;
+        const std::uintmax_t size = fs::file_size(file, unreadable);
+        if (!unreadable) needed += unread_kind(file) == "HEIC" ? 4 * size : size;
+      }
+    }
+    return check_free_space(folder_, needed, "free disk space, or import to another disk");
+  }
+
+  /// Where the frames of a video were taken is nobody's word.
+  Status check_stations_of(const std::vector<fs::path>& photos) const {
+    if (!options_.visible_stations) return {};
+    for (const fs::path& file : photos) {
+      if (!has_video_extension(file)) continue;
+      return fail(ErrorKind::usage, file.string(),
+                  "a video, but the photos are declared to be at stations",
+                  "leave --station-spacing-deg out, or import the video by itself");
+    }
+    return {};
+  }
+
+  /// Poses that were given belong to the images that were given.
+  Status check_known(Modality modality, std::initializer_list<const std::vector<fs::path>*> lists) {
+    const auto known = inputs_.known.find(modality);
+    if (known == inputs_.known.end() || known->second.all().empty()) return {};
+    std::size_t images = 0, with_pose = 0;
+    for (const auto* files : lists) {
+      images += files->size();
+      for (const fs::path& file : *files) with_pose += known->second.find(file) != nullptr;
+    }
+    if (images == 0 || with_pose == images) return {};
+    const std::string found = fmt::format("{} of {} images have a pose among the {} given",
+                                          with_pose, images, known->second.all().size());
+    if (with_pose == 0)
+      return fail(ErrorKind::input, fmt::format("known poses, {}", name(modality)),
+                  fmt::format("{}; the first given is for {}", found,
+                              known->second.all().front().file.string()),
+                  "give the poses of these images, or none");
+    warnings_.push_back(
+        fmt::format("{}: {}; the others are left to the pose stage", name(modality), found));
+    return {};
+  }
+
+  std::vector<fs::path> files_of_transforms(Modality modality) const {
+    std::vector<fs::path> files;
+    if (!options_.transforms_json || !inputs_.known.count(modality)) return files;
+    for (const KnownView& view : inputs_.known.at(modality).all()) files.push_back(view.file);
+    return files;
+  }
+
+  std::vector<Source> observed(const std::vector<fs::path>& files) {
+    std::vector<Source> sources;
+    for (const fs::path& file : files) {
+      Source source;
+      source.file = file;
+      Result<std::string> bytes = read_file(file, max_image_bytes);
+      if (!bytes) {
+        sources.push_back(source);
+        continue;
+      }
+      source.hash = content_hash(*bytes);
+      source.pages = thermal_page_count(*bytes);
+      for (source.page = 0; source.page < source.pages; ++source.page) {
+        source.taken_ns.reset();
+        if (const Result<ThermalFile> thermal = thermal_file(*bytes, file, source.page)) {
+          decoder_.observe(*thermal, source.short_name());
+          source.taken_ns = thermal->taken_ns;
+        }
+        sources.push_back(source);
+      }
+    }
+    return sources;
+  }
+
+  void take_out_copies(Modality modality, std::initializer_list<std::vector<Source>*> lists) {
+    CopyFilter filter(inputs_.known[modality]);
+    for (std::vector<Source>* sources : lists) {
+      for (std::string& told : filter.take_out(*sources)) warnings_.push_back(std::move(told));
+    }
+  }
+
+  /// Only radiometric JPEGs say what was assumed of the object; temperatures of others are as they
+  /// are.
+  Status check_object_parameters() {
+    if (!options_.object.any() || decoder_.radiometric_jpegs() == decoder_.files()) return {};
+    const int others = decoder_.files() - decoder_.radiometric_jpegs();
+    const std::string found = fmt::format(
+        "emissivity, distance, reflected or air temperature or humidity is given, but "
+        "{} of {} thermal files are no radiometric JPEGs",
+        others, decoder_.files());
+    if (decoder_.radiometric_jpegs() == 0) {
+      return fail(ErrorKind::usage, "import.object", found,
+                  "their temperatures can't be corrected: leave it out");
+    }
+    warnings_.push_back(found + ": their temperatures stay as they are");
+    return {};
+  }
+
+  const ImportOptions& options_;
+  const fs::path& folder_;
+  ThermalDecoder& decoder_;
+  std::vector<std::string>& warnings_;
+  ImportInputs inputs_;
+};
+
+}  // namespace
+
+Result<ImportInputs> gather_inputs(const ImportOptions& options, const fs::path& folder,
+                                   ThermalDecoder& decoder, std::vector<std::string>& warnings) {
+  return Gathering(options, folder, decoder, warnings).run();
+}
+
+}  // namespace orbitfuse
