@@ -68,6 +68,10 @@ std::optional<Arguments> arguments_of(int argc, char** argv) {
     else
       return std::nullopt;
   }
+  std::set<std::string> known = {"all"};
+  for (const scenes::Perturbation& one : scenes::perturbations()) known.insert(one.name);
+  for (const std::string& name : arguments.perturbations)
+    if (!known.contains(name)) return std::nullopt;
   return arguments;
 }
 
@@ -168,8 +172,12 @@ Row measured(const SceneFolders& folders, const scenes::Perturbation& by,
   }
   if (by.tracking) scenes::add_tracking(*scene, folders.truth.parent_path() / "tracking.json");
   Progress progress;
+  const double before = cpu_seconds();
   if (arguments.views)
-    progress.report = [](const ProgressEvent& e) { fmt::print("  {}\n", e.detail); };
+    progress.report = [before, &row](const ProgressEvent& e) {
+      fmt::print("  {:5.1f} CPU s, {:.1f} M rays: {}\n", cpu_seconds() - before, row.rays,
+                 e.detail);
+    };
   const SceneRenderer renderer = edge_renderer(field, progress);
   const VisibleScene seen{visible, [&](const Camera& camera, const Rigid3d& pose) {
                             const double start = cpu_seconds();
@@ -180,7 +188,6 @@ Row measured(const SceneFolders& folders, const scenes::Perturbation& by,
                           }};
   PoseOptions options;
   options.use_known_poses = false;
-  const double before = cpu_seconds();
   const auto poses =
       estimate_thermal_poses(scene->session, &seen, options, work / "poses", progress);
   row.cpu_s = cpu_seconds() - before;
@@ -266,7 +273,10 @@ int main(int argc, char** argv) {
   if (!asked) {
     fmt::print(stderr,
                "bench_poses_suite [RUNS] [--scenes A,B] [--perturbations A,B|all] [--views] "
-               "[--json FILE]\n");
+               "[--json FILE]\nperturbations:");
+    for (const scenes::Perturbation& one : scenes::perturbations())
+      fmt::print(stderr, " {}", one.name);
+    fmt::print(stderr, "\n");
     return 2;
   }
   const Arguments& arguments = *asked;

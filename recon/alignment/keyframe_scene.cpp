@@ -96,14 +96,6 @@ class Projection {
   Eigen::Vector3f translation_;
 };
 
-std::vector<Vertex> vertices_of(const Keyframe& key, const Projection& projection) {
-  std::vector<Vertex> vertices(key.points.size());
-  const float* values = key.brightness.ptr<float>();
-  for (std::size_t i = 0; i < vertices.size(); ++i)
-    vertices[i] = projection.vertex(key.points[i], values[i]);
-  return vertices;
-}
-
 /// A square of pixels, corners by rows.
 void draw_square(const std::array<Vertex, 4>& corners, Canvas& canvas) {
   const auto& [a, b, c, d] = corners;
@@ -151,21 +143,64 @@ Keyframe keyframe_of(const Camera& camera, const Rigid3d& cam_from_world, const 
   return key;
 }
 
-Canvas drawn(const Keyframe& key, const Camera& camera, const Rigid3d& cam_from_world,
-             bool outlines) {
+/// A keyframe is drawn in this many bands of its rows, whatever the number of threads.
+constexpr int bands = 4;
+
+Canvas drawn_band(const Keyframe& key, int band, const Camera& camera,
+                  const Rigid3d& cam_from_world, bool outlines) {
   Canvas canvas(camera);
   const Projection projection(key, camera, cam_from_world);
-  const std::vector<Vertex> vertices = vertices_of(key, projection);
-  const int columns = key.depth.cols;
-  for (int y = 0; y + 1 < key.depth.rows; ++y)
+  const int columns = key.depth.cols, squares = key.depth.rows - 1;
+  const int first = squares * band / bands, last = squares * (band + 1) / bands;
+  const auto row_of = [&](int y) {
+    std::vector<Vertex> row;
+    row.reserve(static_cast<std::size_t>(columns));
+    const Eigen::Vector3f* points = &key.points[static_cast<std::size_t>(y * columns)];
+    for (int x = 0; x < columns; ++x)
+      row.push_back(projection.vertex(points[x], key.brightness(y, x)));
+    return row;
+  };
+  std::vector<Vertex> upper, lower;
+  if (first < last) lower = row_of(first);
+  for (int y = first; y < last; ++y) {
+    upper = std::move(lower);
+    lower = row_of(y + 1);
     for (int x = 0; x + 1 < columns; ++x) {
-      const Vertex* v = &vertices[static_cast<std::size_t>(y * columns + x)];
+      const auto i = static_cast<std::size_t>(x);
       if (key.whole(y, x) != 0)
-        draw_square({v[0], v[1], v[columns], v[columns + 1]}, canvas);
+        draw_square({upper[i], upper[i + 1], lower[i], lower[i + 1]}, canvas);
       else if (outlines)
         draw_outline(key, x, y, projection, canvas);
     }
+  }
   return canvas;
+}
+
+/// What of `other` lies before what is drawn, nearer than `share` of its depth.
+void draw_over(const Canvas& other, float share, Canvas& canvas) {
+  float *z = canvas.depth.ptr<float>(), *value = canvas.brightness.ptr<float>();
+  const float *other_z = other.depth.ptr<float>(), *other_value = other.brightness.ptr<float>();
+  for (std::size_t p = 0; p < canvas.depth.total(); ++p)
+    if (other_z[p] < share * z[p]) z[p] = other_z[p], value[p] = other_value[p];
+}
+
+/// Each keyframe's surface.
+std::vector<Canvas> drawn(const std::vector<const Keyframe*>& keys, const Camera& camera,
+                          const Rigid3d& cam_from_world) {
+  std::vector<Canvas> all(keys.size() * bands, Canvas(Camera{}));
+  // Of keyframes far away every slanted surface is a stair: its outlines would be edges.
+  const bool outlines = keys.size() == 1;
+  parallel_for(static_cast<int>(all.size()), [&](int i) {
+    all[static_cast<std::size_t>(i)] = drawn_band(*keys[static_cast<std::size_t>(i / bands)],
+                                                  i % bands, camera, cam_from_world, outlines);
+  });
+  std::vector<Canvas> layers;
+  for (std::size_t k = 0; k < keys.size(); ++k) {
+    layers.push_back(std::move(all[k * bands]));
+    for (std::size_t band = 1; band < bands; ++band)
+      draw_over(all[k * bands + band], 1, layers.back());
+  }
+  return layers;
 }
 
 /// What no keyframe saw lies behind what hides it: a hole takes the farthest of the four surfaces
@@ -253,7 +288,8 @@ class KeyframeScene {
   /// The nearest keyframe that shows all that the camera sees, from where it stands but for little.
   const Keyframe* settled(const Camera& camera, const Rigid3d& cam) const {
     const Keyframe* best = nullptr;
-    double least = options_.max_turn_deg * (1 + 1e-9);
+    const double looser = camera.width < options_.fine_width_px ? options_.looser : 1;
+    double least = looser * options_.max_turn_deg * (1 + 1e-9);
     for (const Keyframe& key : keyframes_) {
       const double finer = key.camera.fx / camera.fx;
       const double wide = (key.camera.width / key.camera.fx) / (camera.width / camera.fx);
@@ -261,7 +297,7 @@ class KeyframeScene {
       const double turned = std::max(apart_deg(key.cam_from_world, cam),
                                      rotation_angle_deg(key.cam_from_world.rotation, cam.rotation));
       const double nearer = std::abs(std::log(distance(cam) / distance(key.cam_from_world)));
-      if (turned > least || nearer > options_.max_distance_change) continue;
+      if (turned > least || nearer > looser * options_.max_distance_change) continue;
       best = &key, least = turned;
     }
     return best;
@@ -269,23 +305,11 @@ class KeyframeScene {
 
   Result<SceneRender> composed(const std::vector<const Keyframe*>& used, const Camera& camera,
                                const Rigid3d& cam_from_world) const {
-    std::vector<Canvas> layers(used.size(), Canvas(Camera{}));
-    parallel_for(static_cast<int>(used.size()), [&](int i) {
-      const auto k = static_cast<std::size_t>(i);
-      // Of keyframes far away every slanted surface is a stair: its outlines would be edges.
-      layers[k] = drawn(*used[k], camera, cam_from_world, used.size() == 1);
-    });
+    std::vector<Canvas> layers = drawn(used, camera, cam_from_world);
     Canvas& all = layers.front();
     // The nearest keyframe has the word; another one only where it sees something clearly before.
-    const auto before = static_cast<float>(1 - options_.max_depth_step);
     for (std::size_t k = 1; k < layers.size(); ++k)
-      for (std::size_t p = 0; p < all.depth.total(); ++p) {
-        float& z = all.depth.ptr<float>()[p];
-        const float other = layers[k].depth.ptr<float>()[p];
-        if (!(other < before * z)) continue;
-        z = other;
-        all.brightness.ptr<float>()[p] = layers[k].brightness.ptr<float>()[p];
-      }
+      draw_over(layers[k], static_cast<float>(1 - options_.max_depth_step), all);
     fill_holes(all);
     const auto sky = static_cast<float>(0.3 * sky_radii * distance(cam_from_world));
     for (float& z : all.depth)

@@ -21,6 +21,7 @@ struct KeyframeOptions {
   /// the camera's axes; where there is none yet, the scene is rendered once more.
   double max_turn_deg = 1.0;
   double max_distance_change = 0.03;  ///< relative to the orbit's centre
+  double looser = 2;                  ///< these two, for renders narrower than `fine_width_px`
   int fine_width_px = 320;            ///< of those keyframes, without their margin
   /// Between neighbouring pixels of one surface, relative; larger steps are edges of occlusion.
   double max_depth_step = 0.06;

@@ -21,32 +21,59 @@ struct ViewMatches {
   std::vector<PatchMatch> matches;
 };
 
-/// All corrections and the common focal, the robust scale lowered step by step.
-double solve(const std::vector<ViewMatches>& views, const Camera& camera, double prior_offset,
-             double sigma, std::vector<PoseCorrection>& corrections) {
+/// The robust scale is lowered step by step, from where patches are to where they fit.
+constexpr double robust_scales_px[] = {8, 4, 2, 1};
+
+void add_residuals(const ViewMatches& view, const Camera& camera, double scale_px,
+                   PoseCorrection& correction, double& log_focal, ceres::Problem& problem) {
+  for (const PatchMatch& match : view.matches)
+    problem.AddResidualBlock(
+        new PatchCost(match, camera),
+        new ceres::ScaledLoss(new ceres::CauchyLoss(scale_px), match.score, ceres::TAKE_OWNERSHIP),
+        correction.data(), &log_focal);
+}
+
+void solve(ceres::LinearSolverType by, ceres::Problem& problem) {
+  ceres::Solver::Options options;
+  options.linear_solver_type = by;
+  options.max_num_iterations = 25;
+  options.num_threads = 1;  // more sum in any order
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+}
+
+/// All corrections and the common focal length's, as a logarithm.
+double solve_together(const std::vector<ViewMatches>& views, const Camera& camera,
+                      const ValuePrior& prior, std::vector<PoseCorrection>& corrections) {
   double log_focal = 0;
-  for (const double scale_px : {8.0, 4.0, 2.0, 1.0}) {
+  for (const double scale_px : robust_scales_px) {
     ceres::Problem problem;
     for (std::size_t i = 0; i < views.size(); ++i)
-      for (const PatchMatch& match : views[i].matches)
-        problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PatchResidual, 2, 6, 1>(
-                                     new PatchResidual{match, camera}),
-                                 new ceres::ScaledLoss(new ceres::CauchyLoss(scale_px), match.score,
-                                                       ceres::TAKE_OWNERSHIP),
-                                 corrections[i].data(), &log_focal);
+      add_residuals(views[i], camera, scale_px, corrections[i], log_focal, problem);
     if (problem.NumResidualBlocks() == 0) return 0;
     problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<ValuePrior, 1, 1>(new ValuePrior{prior_offset, sigma}),
-        nullptr, &log_focal);
-    ceres::Solver::Options options;
-    options.linear_solver_type = ceres::SPARSE_SCHUR;
-    options.max_num_iterations = 25;
-    options.num_threads = 1;  // more sum in any order
-    options.logging_type = ceres::SILENT;
-    ceres::Solver::Summary summary;
-    ceres::Solve(options, &problem, &summary);
+        new ceres::AutoDiffCostFunction<ValuePrior, 1, 1>(new ValuePrior(prior)), nullptr,
+        &log_focal);
+    solve(ceres::SPARSE_SCHUR, problem);
   }
   return log_focal;
+}
+
+/// The corrections, with the lens as it is: nothing is shared.
+void solve_each(const std::vector<ViewMatches>& views, const Camera& camera,
+                std::vector<PoseCorrection>& corrections) {
+  parallel_for(static_cast<int>(views.size()), [&](int index) {
+    const auto i = static_cast<std::size_t>(index);
+    if (views[i].matches.empty()) return;
+    for (const double scale_px : robust_scales_px) {
+      double log_focal = 0;
+      ceres::Problem problem;
+      add_residuals(views[i], camera, scale_px, corrections[i], log_focal, problem);
+      problem.SetParameterBlockConstant(&log_focal);
+      solve(ceres::DENSE_NORMAL_CHOLESKY, problem);
+    }
+  });
 }
 
 cv::Mat reduced(const cv::Mat& image, const Camera& camera) {
@@ -83,10 +110,8 @@ void judge(const ViewMatches& matched, const PoseCorrection& correction, double 
            const Camera& camera, RenderAlignedView& view) {
   std::vector<double> distances;
   for (const PatchMatch& match : matched.matches) {
-    double r[2];
-    if (!PatchResidual{match, camera}(correction.data(), &log_focal, r)) continue;
-    const double d = std::hypot(r[0], r[1]);
-    if (d < 2) distances.push_back(d);
+    const auto residual = patch_residual(match, camera, correction.data(), log_focal);
+    if (residual && residual->norm() < 2) distances.push_back(residual->norm());
   }
   view.matches = static_cast<int>(distances.size());
   std::sort(distances.begin(), distances.end());
@@ -136,8 +161,13 @@ Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer,
       result.views[i].agreement = edge_agreement(edges, field);
     });
     std::vector<PoseCorrection> corrections(views.size(), PoseCorrection{});
-    const double log_focal = solve(matched, seen_by, std::log(prior_focal / focal),
-                                   options.focal_relative_sigma, corrections);
+    double log_focal = 0;
+    if (options.focal_relative_sigma > 0)
+      log_focal = solve_together(matched, seen_by,
+                                 {std::log(prior_focal / focal), options.focal_relative_sigma},
+                                 corrections);
+    else
+      solve_each(matched, seen_by, corrections);
     focal *= std::exp(log_focal);
     for (std::size_t i = 0; i < views.size(); ++i) {
       RenderAlignedView& view = result.views[i];

@@ -33,7 +33,7 @@ inline std::vector<RenderRound> fine_rounds() { return {{320, 6, 7, 12}, {320, 4
 
 struct RenderAlignmentOptions {
   std::vector<RenderRound> rounds = coarse_rounds();
-  double focal_relative_sigma = 0.03;
+  double focal_relative_sigma = 0.03;  ///< 0: the lens is settled, each view is solved alone
   /// Of the prior, at the images' size; 0: the focal length that the first view comes with.
   double prior_focal_px = 0;
 };

@@ -17,6 +17,18 @@ namespace {
 
 constexpr double radians = 3.14159265358979323846 / 180.0;
 
+/// First ends of eight segments side by side; of those that aren't there or have no direction, far
+/// away.
+struct SegmentGroup {
+  static constexpr std::size_t size = 8;
+  using Array = Eigen::Array<double, size, 1>;
+  Array x = Array::Constant(1e30), y = Array::Constant(1e30);
+};
+
+bool has_direction(const ImageSegment& segment) {
+  return segment.a.allFinite() && segment.b.allFinite() && segment.a != segment.b;
+}
+
 /// A view's segments with what matching asks of them again and again.
 struct LineView {
   Eigen::Vector3d center;
@@ -25,6 +37,7 @@ struct LineView {
   double near = 0, far = 0;  ///< depths of its sparse surroundings
   const std::vector<ImageSegment>* segments = nullptr;
   std::vector<Eigen::Vector3d> plane;  ///< unit world normal of the plane through each segment
+  std::vector<SegmentGroup> groups;
 };
 
 struct Hypothesis {
@@ -39,9 +52,8 @@ Eigen::Vector3d ray(const LineView& view, const Eigen::Vector2d& p) {
 }
 
 /// Depth (z in the view) at which a pixel's ray meets a world plane; NaN when nearly parallel.
-double depth_on_plane(const LineView& view, const Eigen::Vector2d& p, const Eigen::Vector3d& point,
+double depth_on_plane(const LineView& view, const Eigen::Vector3d& d, const Eigen::Vector3d& point,
                       const Eigen::Vector3d& normal) {
-  const Eigen::Vector3d d = ray(view, p);
   const double across = normal.dot(d);
   if (std::abs(across) < 0.04 * d.norm()) return std::nan("");
   return normal.dot(point - view.center) / across;
@@ -57,26 +69,34 @@ int matching_segment(const LineView& view, const Eigen::Vector3d& a, const Eigen
   if (length * view.focal_px < 6) return -1;
   const Eigen::Vector2d along = (pb - pa) / length;
   const double max_sine = std::sin(options.max_angle_deg * radians);
-  const double max_distance = options.max_distance_px / view.focal_px;
   int best = -1;
-  double best_distance = max_distance;
-  for (std::size_t s = 0; s < view.segments->size(); ++s) {
+  double best_distance = options.max_distance_px / view.focal_px;
+  const auto try_segment = [&](std::size_t s) {
     const ImageSegment& segment = (*view.segments)[s];
-    const Eigen::Vector2d toward = segment.a - pa;
+    if (!has_direction(segment)) return;
+    const Eigen::Vector2d toward = segment.a - pa, other = segment.b - pa;
     const double da = along.x() * toward.y() - along.y() * toward.x();
-    if (std::abs(da) > 3 * max_distance) continue;
-    const Eigen::Vector2d other = segment.b - pa;
     const double db = along.x() * other.y() - along.y() * other.x();
     const double distance = std::max(std::abs(da), std::abs(db));
-    if (distance >= best_distance) continue;
+    if (distance >= best_distance) return;
     const Eigen::Vector2d span = segment.b - segment.a;
     const double own = span.norm();
-    if (std::abs(along.x() * span.y() - along.y() * span.x()) > max_sine * own) continue;
+    if (std::abs(along.x() * span.y() - along.y() * span.x()) > max_sine * own) return;
     const double ta = along.dot(toward), tb = along.dot(other);
     const double overlap = std::min(length, std::max(ta, tb)) - std::max(0.0, std::min(ta, tb));
-    if (overlap < 0.5 * std::min(length, own)) continue;
+    if (overlap < 0.5 * std::min(length, own)) return;
     best = static_cast<int>(s);
     best_distance = distance;
+  };
+  // Few of hundreds of segments begin near the line: eight are passed over at once.
+  for (std::size_t g = 0; g < view.groups.size(); ++g) {
+    const SegmentGroup::Array away =
+        along.x() * (view.groups[g].y - pa.y()) - along.y() * (view.groups[g].x - pa.x());
+    if (away.abs().minCoeff() >= best_distance) continue;
+    const std::size_t first = g * SegmentGroup::size;
+    for (std::size_t s = first; s < std::min(view.segments->size(), first + SegmentGroup::size);
+         ++s)
+      try_segment(s);
   }
   return best;
 }
@@ -105,16 +125,18 @@ std::optional<Hypothesis> best_line(const std::vector<LineView>& views, int v, i
   const ImageSegment& segment = (*view.segments)[static_cast<std::size_t>(s)];
   const std::size_t partners = std::min<std::size_t>(near_views.size(), 4);
   const std::size_t witnesses = std::min<std::size_t>(near_views.size(), 10);
+  if (!has_direction(segment)) return std::nullopt;
+  const Eigen::Vector3d ray_a = ray(view, segment.a), ray_b = ray(view, segment.b);
   std::optional<Hypothesis> best;
   for (std::size_t n = 0; n < partners; ++n) {
     const int j = near_views[n];
     const LineView& other = views[static_cast<std::size_t>(j)];
     for (std::size_t t = 0; t < other.segments->size(); ++t) {
-      const double za = depth_on_plane(view, segment.a, other.center, other.plane[t]);
-      const double zb = depth_on_plane(view, segment.b, other.center, other.plane[t]);
+      const double za = depth_on_plane(view, ray_a, other.center, other.plane[t]);
+      const double zb = depth_on_plane(view, ray_b, other.center, other.plane[t]);
       if (!(za > view.near && za < view.far && zb > view.near && zb < view.far)) continue;
-      const Eigen::Vector3d a = view.center + za * ray(view, segment.a);
-      const Eigen::Vector3d b = view.center + zb * ray(view, segment.b);
+      const Eigen::Vector3d a = view.center + za * ray_a;
+      const Eigen::Vector3d b = view.center + zb * ray_b;
       // The planes meet everywhere along the line: the two segments must also overlap on it.
       const Eigen::Vector3d ac = other.cam_from_world * a, bc = other.cam_from_world * b;
       if (ac.z() <= 1e-6 || bc.z() <= 1e-6) continue;
@@ -127,14 +149,15 @@ std::optional<Hypothesis> best_line(const std::vector<LineView>& views, int v, i
       if (overlap < 0.5 * std::min(length, std::abs(tb - ta))) continue;
 
       Hypothesis line{a, b, v, s, {{v, s}, {j, static_cast<int>(t)}}, segment.length_px};
-      for (std::size_t w = 0; w < witnesses; ++w) {
+      const std::size_t wanted = std::max<std::size_t>(static_cast<std::size_t>(options.min_views),
+                                                       best ? best->support.size() + 1 : 0);
+      for (std::size_t w = 0; w < witnesses && line.support.size() + witnesses - w >= wanted; ++w) {
         if (near_views[w] == j) continue;
         const int found =
             matching_segment(views[static_cast<std::size_t>(near_views[w])], a, b, options);
         if (found >= 0) line.support.emplace_back(near_views[w], found);
       }
-      if (static_cast<int>(line.support.size()) < options.min_views) continue;
-      if (!best || line.support.size() > best->support.size()) best = std::move(line);
+      if (line.support.size() >= wanted) best = std::move(line);
     }
   }
   return best;
@@ -214,8 +237,13 @@ std::vector<EdgeLine> triangulate_lines(const std::vector<PosedView>& posed,
     const double distance = (view.center - focus).norm();
     view.near = 0.15 * distance, view.far = 3.0 * distance;
     view.segments = &segments[v];
-    for (const ImageSegment& s : segments[v])
+    for (const ImageSegment& s : segments[v]) {
+      const auto in_group = static_cast<Eigen::Index>(view.plane.size() % SegmentGroup::size);
+      if (in_group == 0) view.groups.emplace_back();
+      if (has_direction(s))
+        view.groups.back().x[in_group] = s.a.x(), view.groups.back().y[in_group] = s.a.y();
       view.plane.push_back(ray(view, s.a).cross(ray(view, s.b)).normalized());
+    }
     views.push_back(std::move(view));
   }
 
@@ -250,23 +278,40 @@ std::vector<EdgeLine> triangulate_lines(const std::vector<PosedView>& posed,
   return lines;
 }
 
+namespace {
+
+Result<std::vector<ImageSegment>> segments_of(const Session& session, const PosedView& view,
+                                              const EdgeLineOptions& options) {
+  const auto frame = std::find_if(session.frames.begin(), session.frames.end(),
+                                  [&](const FrameRecord& f) { return f.file == view.name; });
+  if (frame == session.frames.end())
+    return fail(ErrorKind::input, view.name, "a posed view that the session does not have",
+                "run the visible poses again");
+  ORBITFUSE_ASSIGN(const cv::Mat values, read_luminance(session, *frame));
+  cv::Mat gray;
+  values.convertTo(gray, CV_8U);
+  return detect_segments(gray, view.camera, options);
+}
+
+}  // namespace
+
 Result<std::vector<EdgeLine>> visible_edge_lines(const Session& session,
                                                  const Reconstruction& visible,
                                                  const EdgeLineOptions& options,
                                                  const Progress& progress) {
-  std::vector<std::vector<ImageSegment>> segments;
-  for (const PosedView& view : visible.views) {
-    ORBITFUSE_TRY(progress.check("poses.thermal"));
-    const auto frame = std::find_if(session.frames.begin(), session.frames.end(),
-                                    [&](const FrameRecord& f) { return f.file == view.name; });
-    if (frame == session.frames.end())
-      return fail(ErrorKind::input, view.name, "a posed view that the session does not have",
-                  "run the visible poses again");
-    ORBITFUSE_ASSIGN(const cv::Mat values, read_luminance(session, *frame));
-    cv::Mat gray;
-    values.convertTo(gray, CV_8U);
-    segments.push_back(detect_segments(gray, view.camera, options));
-  }
+  std::vector<std::vector<ImageSegment>> segments(visible.views.size());
+  std::vector<Status> found(visible.views.size());
+  parallel_for(static_cast<int>(visible.views.size()), [&](int index) {
+    const auto i = static_cast<std::size_t>(index);
+    found[i] = progress.check("poses.thermal");
+    if (!found[i]) return;
+    auto of_view = segments_of(session, visible.views[i], options);
+    if (of_view)
+      segments[i] = std::move(*of_view);
+    else
+      found[i] = tl::unexpected(of_view.error());
+  });
+  for (const Status& one : found) ORBITFUSE_TRY(one);
   return triangulate_lines(visible.views, segments, options);
 }
 

@@ -119,7 +119,7 @@ Result<Fit> OrbitRefinement::restart(const std::vector<std::size_t>& chosen,
   std::vector<cv::Mat> images;
   for (const std::size_t i : chosen) images.push_back(orbit.images[i]);
   RenderAlignmentOptions options;
-  options.focal_relative_sigma = 1e-4;
+  options.focal_relative_sigma = 0;
   options.rounds = std::move(rounds);
   return align_with_renders(renderer, images, starts, options, progress);
 }

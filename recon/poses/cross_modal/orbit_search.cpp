@@ -33,27 +33,41 @@ cv::Mat rendered_cells(const LineModel& lines, const Camera& camera, const Rigid
   return cells;
 }
 
-cv::Mat spectrum(const cv::Mat& cells, cv::Size size) {
-  cv::Mat padded(size, CV_32FC2, cv::Scalar::all(0));
-  cells.copyTo(padded(cv::Rect(0, 0, cells.cols, cells.rows)));
-  cv::dft(padded, padded);
-  return padded;
+/// A field's two planes as spectra. Correlation is the sum of the planes' own, all of them real:
+/// half the work of the complex field's.
+struct Spectrum {
+  cv::Mat1f re, im;
+};
+
+/// The field's first cell comes to `corner` of a frame of `size`.
+Spectrum spectrum(const cv::Mat& cells, cv::Size size, cv::Point corner) {
+  cv::Mat1f planes[2];
+  cv::split(cells, planes);
+  for (cv::Mat1f& plane : planes) {
+    cv::Mat1f padded(size, 0.0F);
+    plane.copyTo(padded(cv::Rect(corner, plane.size())));
+    // Rows below the field are empty: they need no transform of their own.
+    cv::dft(padded, plane, 0, corner.y + plane.rows);
+  }
+  return {planes[0], planes[1]};
 }
 
-OrbitPeak peak_of(const cv::Mat& view_spectrum, const cv::Mat& model_spectrum, float norms,
-                  int max_dx, int max_dy) {
-  cv::Mat product, correlation;
-  cv::mulSpectrums(view_spectrum, model_spectrum, product, 0, true);
-  cv::dft(product, correlation, cv::DFT_INVERSE | cv::DFT_SCALE);
+/// `reach`: of the shift, in cells, which is where the view's field begins in its frame.
+OrbitPeak peak_of(const Spectrum& view, const Spectrum& model, float norms, cv::Point reach) {
+  cv::Mat1f product, of_im, correlation;
+  cv::mulSpectrums(view.re, model.re, product, 0, true);
+  cv::mulSpectrums(view.im, model.im, of_im, 0, true);
+  product += of_im;
+  const int rows = 2 * reach.y + 1;  // no others are looked at
+  cv::dft(product, correlation, cv::DFT_INVERSE | cv::DFT_SCALE | cv::DFT_REAL_OUTPUT, rows);
   OrbitPeak best;
-  for (int dy = -max_dy; dy <= max_dy; ++dy) {
-    const auto* row = correlation.ptr<cv::Vec2f>((dy + correlation.rows) % correlation.rows);
-    for (int dx = -max_dx; dx <= max_dx; ++dx) {
-      const float score = row[(dx + correlation.cols) % correlation.cols][0] / norms;
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x <= 2 * reach.x; ++x) {
+      const float score = correlation(y, x) / norms;
       if (score > best.score)
-        best = {score, static_cast<std::int16_t>(dx), static_cast<std::int16_t>(dy)};
+        best = {score, static_cast<std::int16_t>(x - reach.x),
+                static_cast<std::int16_t>(y - reach.y)};
     }
-  }
   return best;
 }
 
@@ -243,16 +257,17 @@ Result<OrbitTable> tabulate_orbit(const LineModel& lines, const std::vector<Sear
   const int columns = options.columns;
   const int rows = std::max(1, columns * camera.height / camera.width);
   table.cell_px = static_cast<double>(camera.width) / columns;
-  const auto max_dx = static_cast<int>(options.max_shift * columns);
-  const auto max_dy = static_cast<int>(options.max_shift * columns);
-  const cv::Size padded(cv::getOptimalDFTSize(columns + max_dx),
-                        cv::getOptimalDFTSize(rows + max_dy));
-  std::vector<cv::Mat> spectra;
+  const auto max_shift = static_cast<int>(options.max_shift * columns);
+  const cv::Point reach(max_shift, max_shift);
+  // Wide enough that what leaves on one side doesn't meet the view's field on the other.
+  const cv::Size padded(cv::getOptimalDFTSize(columns + reach.x),
+                        cv::getOptimalDFTSize(rows + reach.y));
+  std::vector<Spectrum> spectra;
   std::vector<double> norms;
   for (const SearchView& view : views) {
     const cv::Mat cells = cell_field(view.field, columns, rows);
     norms.push_back(cv::norm(cells));
-    spectra.push_back(spectrum(cells, padded));
+    spectra.push_back(spectrum(cells, padded, reach));
   }
 
   parallel_for(table.azimuths, [&](int a) {
@@ -269,11 +284,11 @@ Result<OrbitTable> tabulate_orbit(const LineModel& lines, const std::vector<Sear
             rendered_cells(lines, camera, cam_from_world_of(pose, camera), columns, rows);
         const double norm = cv::norm(cells);
         if (!(norm > 0)) continue;
-        const cv::Mat model = spectrum(cells, padded);
+        const Spectrum model = spectrum(cells, padded, {0, 0});
         for (std::size_t i = 0; i < views.size(); ++i)
           if (norms[i] > 0)
             table.of_view[i][place] =
-                peak_of(spectra[i], model, static_cast<float>(norm * norms[i]), max_dx, max_dy);
+                peak_of(spectra[i], model, static_cast<float>(norm * norms[i]), reach);
       }
   });
   ORBITFUSE_TRY(progress.check("poses.thermal"));

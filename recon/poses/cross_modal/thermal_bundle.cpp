@@ -24,31 +24,43 @@ namespace {
 constexpr int least_patches = 12;
 /// A sighting within this of where the bundle has it confirms the view's pose.
 constexpr double confirmed_px = 1;
+/// A lens that bends by less than this share of what counts, as the wide rounds see it, is
+/// straight.
+constexpr double straight_share = 0.5;
 
-/// Ceres residual of two weighted pixels; `offset`: of the point from the surface, world.
-struct SightingResidual {
-  Eigen::Vector3d surface;
-  Rigid3d cam_from_world;
-  Camera camera;
-  ThermalSighting sighting;
+/// Ceres cost of two weighted pixels: correction, log_focal, radial, and the point's offset from
+/// the surface (world).
+class SightingCost final : public ceres::SizedCostFunction<2, 6, 1, 1, 3> {
+ public:
+  SightingCost(const Eigen::Vector3d& surface, const Rigid3d& cam_from_world, const Camera& camera,
+               const ThermalSighting& sighting)
+      : rotation_(cam_from_world.rotation.toRotationMatrix()),
+        surface_in_cam_(cam_from_world * surface),
+        camera_(camera),
+        sighting_(sighting) {}
 
-  template <class T>
-  bool operator()(const T* correction, const T* log_focal, const T* radial, const T* offset,
-                  T* residual) const {
-    const Eigen::Matrix<T, 3, 1> world(T(surface.x()) + offset[0], T(surface.y()) + offset[1],
-                                       T(surface.z()) + offset[2]);
-    const Eigen::Matrix<T, 3, 1> in_cam =
-        cam_from_world.rotation.toRotationMatrix().cast<T>() * world +
-        cam_from_world.translation.cast<T>();
-    T pixel[2];
-    if (!corrected_pixel(camera, correction, log_focal, radial[0], in_cam.data(), pixel))
-      return false;
-    const T dx = pixel[0] - T(sighting.pixel.x()), dy = pixel[1] - T(sighting.pixel.y());
-    const Eigen::Matrix2d& w = sighting.sqrt_weight;
-    residual[0] = T(w(0, 0)) * dx + T(w(0, 1)) * dy;
-    residual[1] = T(w(1, 0)) * dx + T(w(1, 1)) * dy;
+  bool Evaluate(const double* const* parameters, double* residuals,
+                double** jacobians) const override {
+    const Eigen::Map<const Eigen::Vector3d> offset(parameters[3]);
+    const auto seen = corrected_pixel(camera_, parameters[0], *parameters[1], *parameters[2],
+                                      surface_in_cam_ + rotation_ * offset);
+    if (!seen) return false;
+    const Eigen::Matrix2d& weight = sighting_.sqrt_weight;
+    Eigen::Map<Eigen::Vector2d> values(residuals);
+    values = weight * (seen->pixel - sighting_.pixel);
+    if (jacobians == nullptr) return true;
+    put_jacobian<6>(weight * seen->by_correction, jacobians[0]);
+    put_jacobian<1>(weight * seen->by_log_focal, jacobians[1]);
+    put_jacobian<1>(weight * seen->by_radial, jacobians[2]);
+    put_jacobian<3>(weight * seen->by_point * rotation_, jacobians[3]);
     return true;
   }
+
+ private:
+  Eigen::Matrix3d rotation_;
+  Eigen::Vector3d surface_in_cam_;
+  Camera camera_;
+  ThermalSighting sighting_;
 };
 
 /// How far the point has left the surface along the line of sight, in sigmas.
@@ -120,8 +132,8 @@ class Bundle {
     blocks_.emplace_back();
     for (const ThermalSighting& seen : track.sightings)
       blocks_.back().push_back(problem_.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<SightingResidual, 2, 6, 1, 1, 3>(new SightingResidual{
-              track.surface, round_.views.cam_from_world[seen.view], round_.views.camera, seen}),
+          new SightingCost(track.surface, round_.views.cam_from_world[seen.view],
+                           round_.views.camera, seen),
           new ceres::CauchyLoss(options_.loss_px), solution_.corrections[seen.view].data(),
           &solution_.log_focal, &solution_.radial, offset.data()));
     problem_.AddResidualBlock(
@@ -132,8 +144,7 @@ class Bundle {
 
   void add(std::size_t view, const PatchMatch& match) {
     problem_.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<PatchResidual, 2, 6, 1, 1>(
-            new PatchResidual{match, round_.views.camera}),
+        new BentPatchCost(match, round_.views.camera),
         new ceres::ScaledLoss(new ceres::CauchyLoss(1), options_.edge_weight * match.score,
                               ceres::TAKE_OWNERSHIP),
         solution_.corrections[view].data(), &solution_.log_focal, &solution_.radial);
@@ -318,18 +329,23 @@ Status bundle_thermal(const OrbitRefinement& refinement, const FocalGuess& prior
     if (alignment.views[i].verdict.confidence != Confidence::dropped) chosen.push_back(i);
   if (chosen.empty()) return {};
   Fit bundled = alignment;
-  for (const BundleStep& step : options.steps) {
-    ORBITFUSE_ASSIGN(const bool solved,
-                     solve_rounds(refinement, prior, chosen, step, options, bundled));
-    if (!solved) return {};
-  }
-  if (prior.radial_sigma > 0 &&
-      (bundled.radial_px < options.least_radial_px || !reaches_corners(bundled))) {
-    FocalGuess straight = prior;
-    bundled.radial = straight.radial_sigma = 0;
-    ORBITFUSE_ASSIGN(const bool solved, solve_rounds(refinement, straight, chosen,
-                                                     options.steps.back(), options, bundled));
-    if (!solved) return {};
+  FocalGuess lens = prior;
+  const auto solve = [&](const BundleStep& step) {
+    return solve_rounds(refinement, lens, chosen, step, options, bundled);
+  };
+  const auto bends_less = [&](double least_px) {
+    return lens.radial_sigma > 0 && bundled.radial_px < least_px;
+  };
+  const auto straighten = [&] { bundled.radial = bundled.radial_px = lens.radial_sigma = 0; };
+  ORBITFUSE_ASSIGN(const bool found, solve(options.wide));
+  if (!found) return {};
+  if (bends_less(straight_share * options.least_radial_px)) straighten();
+  ORBITFUSE_ASSIGN(const bool refined, solve(options.fine));
+  if (!refined) return {};
+  if (bends_less(options.least_radial_px) || !reaches_corners(bundled)) {
+    straighten();
+    ORBITFUSE_ASSIGN(const bool again, solve(options.fine));
+    if (!again) return {};
   }
   alignment = std::move(bundled);
   return {};

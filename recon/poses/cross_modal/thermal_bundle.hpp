@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
-
 #include "recon/poses/cross_modal/orbit_refinement.hpp"
 #include "recon/poses/cross_modal/thermal_tracks.hpp"
 
@@ -26,8 +24,9 @@ struct ThermalBundleOptions {
   ThermalTrackOptions tracks;
   double surface_sigma = 0.02;  ///< of the visible field's surface, share of the distance
   double loss_px = 0.5;         ///< Cauchy scale of a patch found again
-  /// Wide first: poses may be a few pixels off, single ones 6 degrees; then to the end.
-  std::array<BundleStep, 2> steps = {{{6, 4, 0.3}, {3, 3, 0.1}}};
+  /// Poses may be a few pixels off, single ones 6 degrees.
+  BundleStep wide{6, 4, 0.3};
+  BundleStep fine{3, 3, 0.2};  ///< to the end: single views jitter by a tenth of a degree
   /// A k1 that moves the outer tenth of the patches by less is none: straight lenses of eight
   /// scenes came out with up to 0.3 px, depth being a little off everywhere.
   double least_radial_px = 0.5;

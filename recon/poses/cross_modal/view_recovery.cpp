@@ -83,9 +83,10 @@ Status search_whole(const OrbitRefinement& refinement, const std::vector<std::si
 }
 
 /// Low views of a scene can settle a little too high or too low: the weaker ones are tried there,
-/// again as long as that helps.
-Status nudge(const OrbitRefinement& refinement, std::size_t first, Fit& alignment) {
+/// again as long as that helps. Whether it helped any.
+Result<bool> nudge(const OrbitRefinement& refinement, std::size_t first, Fit& alignment) {
   const double typical = median_support(alignment, alignment.views.size());
+  bool helped = false;
   for (const double elevation_deg : {nudge_deg, -nudge_deg}) {
     std::vector<std::size_t> weak;
     for (std::size_t i = first; i < alignment.views.size(); ++i)
@@ -100,9 +101,10 @@ Status nudge(const OrbitRefinement& refinement, std::size_t first, Fit& alignmen
       }
       ORBITFUSE_ASSIGN(const Fit tried, refinement.restart(weak, starts, fine_rounds()));
       weak = keep_better(weak, tried, alignment);
+      helped |= !weak.empty();
     }
   }
-  return {};
+  return helped;
 }
 
 /// Views that temperatures alone know and that form has pulled away again go back, with the support
@@ -184,8 +186,8 @@ Status refine_orbit(const SceneRenderer& renderer, OrbitViews& orbit, RenderAlig
                    fmt::format("{} views don't come back to their place", lost.size())});
   ORBITFUSE_TRY(search_whole(refinement, lost, judging_rounds(), alignment));
   ORBITFUSE_TRY(refinement.together(alignment, prior, fine_rounds()));
-  ORBITFUSE_TRY(nudge(refinement, 0, alignment));
-  ORBITFUSE_TRY(refinement.together(alignment, prior, {fine_rounds().back()}));
+  ORBITFUSE_ASSIGN(const bool nudged, nudge(refinement, 0, alignment));
+  if (nudged) ORBITFUSE_TRY(refinement.together(alignment, prior, {fine_rounds().back()}));
   ORBITFUSE_ASSIGN(const TemperatureCheck check, correct_by_temperatures(refinement, alignment));
   if (check.moved > 0) {
     ORBITFUSE_TRY(refinement.together(alignment, prior, {fine_rounds().back()}));

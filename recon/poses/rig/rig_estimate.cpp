@@ -198,8 +198,7 @@ void solve(const RoundResult& round, const RigOptions& options, double depth, Ri
     ceres::Problem problem;
     for (const auto& matches : round.matches)
       for (const PatchMatch& match : matches)
-        problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PatchResidual, 2, 6, 1>(
-                                     new PatchResidual{match, round.camera}),
+        problem.AddResidualBlock(new PatchCost(match, round.camera),
                                  new ceres::ScaledLoss(new ceres::CauchyLoss(scale_px), match.score,
                                                        ceres::TAKE_OWNERSHIP),
                                  correction.data(), &log_focal);
@@ -226,9 +225,8 @@ void judge(const RoundResult& round, const std::array<double, 6>& correction, do
     RigPairFit& fit = rig.pairs[at(i)];
     std::vector<double> distances;
     for (const PatchMatch& match : round.matches[at(i)]) {
-      double r[2];
-      if (!PatchResidual{match, round.camera}(correction.data(), &log_focal, r)) continue;
-      if (const double d = std::hypot(r[0], r[1]); d < 2) distances.push_back(d);
+      const auto residual = patch_residual(match, round.camera, correction.data(), log_focal);
+      if (residual && residual->norm() < 2) distances.push_back(residual->norm());
     }
     fit.matches = static_cast<int>(distances.size());
     fit.median_px = median(distances);
