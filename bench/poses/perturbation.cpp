@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 
 #include "core/image/image_io.hpp"
@@ -12,8 +13,11 @@
 namespace orbitfuse::scenes {
 namespace {
 
+constexpr std::uint64_t spoilt_every = 24, constant_at = 3, blind_at = 17;
+
 bool changes_images(const Perturbation& by) {
-  return by.noise_k > 0 || by.blur_px > 0 || by.width_px > 0 || by.gray_gain || by.radial != 0;
+  return by.spoilt || by.noise_k > 0 || by.blur_px > 0 || by.width_px > 0 || by.gray_gain ||
+         by.radial != 0;
 }
 
 /// Each image stretched between its own 1 and 99 per cent, as a camera without radiometry does.
@@ -47,6 +51,9 @@ Status rewrite(Scene& scene, FrameRecord& frame, const Perturbation& by, cv::RNG
     random.fill(noise, cv::RNG::NORMAL, 0, by.noise_k);
     kelvin += noise;
   }
+  if (by.spoilt && frame.sequence % spoilt_every == constant_at) kelvin.setTo(300);
+  if (by.spoilt && frame.sequence % spoilt_every == blind_at)
+    kelvin.setTo(std::numeric_limits<float>::quiet_NaN());
   const PosedView moved = truth;
   scene.truth.views.erase(frame.file);
   frame.file =
@@ -59,11 +66,24 @@ Status rewrite(Scene& scene, FrameRecord& frame, const Perturbation& by, cv::RNG
                       : write_thermal_tiff(frame.file, kelvin);
 }
 
+/// Thermal frames that were not recorded.
+void leave_out(Session& session, const Perturbation& by) {
+  int seen = 0, missing = 0;
+  std::erase_if(session.frames, [&](const FrameRecord& frame) {
+    if (frame.modality != Modality::thermal || !frame.station) return false;
+    if (by.one_loop && frame.station->loop != 0) return true;
+    if (frame.station->azimuth_deg >= by.sector_deg) return true;
+    const bool chosen = ++seen % 7 == 5 && missing < by.missing_stations;
+    missing += chosen ? 1 : 0;
+    return chosen;
+  });
+}
+
 }  // namespace
 
 const std::vector<Perturbation>& perturbations() {
   static const std::vector<Perturbation> all = [] {
-    std::vector<Perturbation> list(15);
+    std::vector<Perturbation> list(18);
     list[1].name = "focal+3", list[1].focal_error = 0.03;
     list[2].name = "focal-3", list[2].focal_error = -0.03;
     list[3].name = "stations5", list[3].station_error_deg = 5;
@@ -78,12 +98,16 @@ const std::vector<Perturbation>& perturbations() {
     list[12].name = "tracking", list[12].tracking = true;
     list[13].name = "barrel", list[13].radial = -0.15;
     list[14].name = "pincushion", list[14].radial = 0.1;
+    list[15].name = "half", list[15].sector_deg = 180;
+    list[16].name = "loop", list[16].one_loop = true;
+    list[17].name = "spoilt", list[17].spoilt = true;
     return list;
   }();
   return all;
 }
 
 Status perturb(Scene& scene, const Perturbation& by, const std::filesystem::path& folder) {
+  leave_out(scene.session, by);
   for (DeviceInfo& device : scene.session.devices) {
     if (device.modality != Modality::thermal || !device.lens.focal_px) continue;
     *device.lens.focal_px *= 1 + by.focal_error;
@@ -103,13 +127,6 @@ Status perturb(Scene& scene, const Perturbation& by, const std::filesystem::path
     if (by.order_alone) frame.station.reset();
     if (changes_images(by)) ORBITFUSE_TRY(rewrite(scene, frame, by, random, folder));
   }
-  int seen = 0, left_out = 0;
-  std::erase_if(scene.session.frames, [&](const FrameRecord& frame) {
-    if (frame.modality != Modality::thermal || !frame.station) return false;
-    const bool chosen = ++seen % 7 == 5 && left_out < by.missing_stations;
-    left_out += chosen ? 1 : 0;
-    return chosen;
-  });
   return {};
 }
 

@@ -24,6 +24,9 @@ struct Perturbation {
   int width_px = 0;              ///< reduced to; 0: as it is
   bool tracking = false;         ///< with the frames recorded between the stations
   bool order_alone = false;      ///< nothing declared of the thermal orbit
+  double sector_deg = 360;       ///< of each thermal loop that was walked
+  bool one_loop = false;         ///< the first thermal loop alone
+  bool spoilt = false;           ///< one thermal image constant, one without a single valid pixel
   bool gray_gain = false;        ///< 8-bit with a gain of its own each image, no temperatures
 };
 

@@ -288,8 +288,7 @@ class KeyframeScene {
   /// The nearest keyframe that shows all that the camera sees, from where it stands but for little.
   const Keyframe* settled(const Camera& camera, const Rigid3d& cam) const {
     const Keyframe* best = nullptr;
-    const double looser = camera.width < options_.fine_width_px ? options_.looser : 1;
-    double least = looser * options_.max_turn_deg * (1 + 1e-9);
+    double least = options_.max_turn_deg * (1 + 1e-9);
     for (const Keyframe& key : keyframes_) {
       const double finer = key.camera.fx / camera.fx;
       const double wide = (key.camera.width / key.camera.fx) / (camera.width / camera.fx);
@@ -297,7 +296,7 @@ class KeyframeScene {
       const double turned = std::max(apart_deg(key.cam_from_world, cam),
                                      rotation_angle_deg(key.cam_from_world.rotation, cam.rotation));
       const double nearer = std::abs(std::log(distance(cam) / distance(key.cam_from_world)));
-      if (turned > least || nearer > looser * options_.max_distance_change) continue;
+      if (turned > least || nearer > options_.max_distance_change) continue;
       best = &key, least = turned;
     }
     return best;

@@ -31,6 +31,8 @@ constexpr double min_sure_ratio = 0.5;
 /// Lead of the best start over a rival, in standard errors: below the first nobody knows which is
 /// right, below the second nobody is sure.
 constexpr double undecided_lead = 1, sure_lead = 2;
+/// Below, the search leaves more to renders.
+constexpr std::size_t few_views = 16;
 /// Visible views that the scene is first rendered at: more would show the same from nearer by.
 constexpr int max_keyframes = 36;
 
@@ -133,7 +135,10 @@ Result<std::vector<OrbitHypothesis>> search(const Evidence& evidence, const Prog
   OrbitSearchOptions options;
   options.nearest = 0.4 * evidence.similar_distance;
   options.farthest = 1.8 * evidence.similar_distance;
-  options.hypotheses = 4;  // renders decide; a rival that isn't opened can't be told from the best
+  // Renders decide; a rival that isn't opened can't be told from the best. Few views have few
+  // votes: of half an orbit of `statue` the true start came sixth.
+  const bool few = evidence.search.size() < few_views;
+  options.hypotheses = few ? 10 : 4;
   ORBITFUSE_ASSIGN(const OrbitTable table,
                    tabulate_orbit(evidence.work.lines, evidence.search, options, progress));
   std::vector<OrbitHypothesis> found;
@@ -142,7 +147,7 @@ Result<std::vector<OrbitHypothesis>> search(const Evidence& evidence, const Prog
       found.push_back(std::move(hypothesis));
   std::stable_sort(found.begin(), found.end(),
                    [](const auto& x, const auto& y) { return x.score > y.score; });
-  constexpr std::size_t most = 6;
+  const std::size_t most = few ? 12 : 6;
   if (found.size() > most) found.resize(most);
   return found;
 }

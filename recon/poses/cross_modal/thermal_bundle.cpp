@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
@@ -103,7 +104,8 @@ class Bundle {
   }
 
   /// Nothing where no usable answer is found.
-  std::optional<BundleSolution> solve(const ValuePrior& log_focal, const ValuePrior& radial) {
+  std::optional<BundleSolution> solve(const ValuePrior& log_focal, const ValuePrior& radial,
+                                      const std::vector<double>& losses_px) {
     const auto expect = [&](const ValuePrior& prior, double* value) {
       problem_.AddParameterBlock(value, 1);
       if (prior.sigma == 0)
@@ -120,9 +122,12 @@ class Bundle {
     solver.max_num_iterations = options_.max_iterations;
     solver.num_threads = 1;  // more sum in any order
     solver.logging_type = ceres::SILENT;
-    ceres::Solver::Summary summary;
-    ceres::Solve(solver, &problem_, &summary);
-    if (!summary.IsSolutionUsable()) return std::nullopt;
+    for (const double scale_px : losses_px) {
+      sighting_loss_.Reset(new ceres::CauchyLoss(scale_px), ceres::TAKE_OWNERSHIP);
+      ceres::Solver::Summary summary;
+      ceres::Solve(solver, &problem_, &summary);
+      if (!summary.IsSolutionUsable()) return std::nullopt;
+    }
     judge();
     return solution_;
   }
@@ -134,19 +139,19 @@ class Bundle {
       blocks_.back().push_back(problem_.AddResidualBlock(
           new SightingCost(track.surface, round_.views.cam_from_world[seen.view],
                            round_.views.camera, seen),
-          new ceres::CauchyLoss(options_.loss_px), solution_.corrections[seen.view].data(),
-          &solution_.log_focal, &solution_.radial, offset.data()));
+          &sighting_loss_, solution_.corrections[seen.view].data(), &solution_.log_focal,
+          &solution_.radial, offset.data()));
     problem_.AddResidualBlock(
         new ceres::AutoDiffCostFunction<SurfaceResidual, 1, 3>(
             new SurfaceResidual{track.sight, options_.surface_sigma * track.distance}),
-        new ceres::CauchyLoss(1), offset.data());
+        &surface_loss_, offset.data());
   }
 
   void add(std::size_t view, const PatchMatch& match) {
     problem_.AddResidualBlock(
         new BentPatchCost(match, round_.views.camera),
-        new ceres::ScaledLoss(new ceres::CauchyLoss(1), options_.edge_weight * match.score,
-                              ceres::TAKE_OWNERSHIP),
+        &edge_losses_.emplace_back(new ceres::CauchyLoss(1), options_.edge_weight * match.score,
+                                   ceres::TAKE_OWNERSHIP),
         solution_.corrections[view].data(), &solution_.log_focal, &solution_.radial);
   }
 
@@ -183,11 +188,20 @@ class Bundle {
     solution_.median_px = residuals.empty() ? 0 : median(residuals);
   }
 
+  static ceres::Problem::Options losses_are_ours() {
+    ceres::Problem::Options options;
+    options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    return options;
+  }
+
   const BundleRound& round_;
   const ThermalBundleOptions& options_;
+  ceres::LossFunctionWrapper sighting_loss_{new ceres::CauchyLoss(1), ceres::TAKE_OWNERSHIP};
+  ceres::CauchyLoss surface_loss_{1};
+  std::deque<ceres::ScaledLoss> edge_losses_;
   std::vector<std::array<double, 3>> offsets_;
   BundleSolution solution_;
-  ceres::Problem problem_;
+  ceres::Problem problem_{losses_are_ours()};
   std::vector<std::vector<ceres::ResidualBlockId>> blocks_;  ///< of each track, by its sightings
 };
 
@@ -265,16 +279,17 @@ double most_turned_deg(const OrbitViews& orbit, const std::vector<std::size_t>& 
 /// nothing could be solved.
 Result<std::optional<double>> solve_round(const OrbitRefinement& refinement,
                                           const FocalGuess& prior,
-                                          const std::vector<std::size_t>& chosen, int reach_px,
+                                          const std::vector<std::size_t>& chosen,
+                                          const BundleStep& step,
                                           const ThermalBundleOptions& options, Fit& bundled) {
   ORBITFUSE_ASSIGN(const BundleRound round,
-                   prepared(refinement, bundled, chosen, options, reach_px));
+                   prepared(refinement, bundled, chosen, options, step.reach_px));
   const double focal_px = bundled.views.front().view.camera.fx;
   std::optional<BundleSolution> solution;
   if (2 * held_views(round) >= chosen.size())
     solution = Bundle(round, options)
                    .solve({std::log(prior.focal_px / focal_px), prior.relative_sigma},
-                          {-bundled.radial, prior.radial_sigma});
+                          {-bundled.radial, prior.radial_sigma}, step.losses_px);
   const auto tell = [&](const std::string& words) {
     refinement.progress.report(
         {"poses.thermal", 3, 4, -1,
@@ -313,7 +328,7 @@ Result<bool> solve_rounds(const OrbitRefinement& refinement, const FocalGuess& p
   double turned_deg = step.settled_deg;
   for (int i = 0; i < step.max_rounds && turned_deg >= step.settled_deg; ++i) {
     ORBITFUSE_ASSIGN(const std::optional<double> turned,
-                     solve_round(refinement, prior, chosen, step.reach_px, options, bundled));
+                     solve_round(refinement, prior, chosen, step, options, bundled));
     if (!turned) return false;
     turned_deg = *turned;
   }
