@@ -149,11 +149,6 @@ Status resolve(StageFolders& folders) {
   return {};
 }
 
-Error without_resume(Error error) {
-  if (error.kind == ErrorKind::cancelled) error.remedy = "nothing was changed: call it again";
-  return error;
-}
-
 Status run_stages(Context& context, const StageFolders& given,
                   const std::vector<std::string>& targets, Missing missing) {
   StageFolders folders = given;
@@ -211,7 +206,13 @@ Status run_stages(Context& context, const StageFolders& given,
     Status written = write_file_atomic(fs::path(folders.out) / run_file, run.dump(2) + "\n");
     if (!written && !summary.error) return written;
   }
-  if (summary.error) return tl::unexpected(*summary.error);
+  if (summary.error) {
+    Error error = *summary.error;
+    // A stage that keeps what it has done says so itself.
+    if (error.kind == ErrorKind::cancelled && error.remedy.find("--resume") == std::string::npos)
+      error.remedy = "run again with --resume: what is finished stays";
+    return tl::unexpected(error);
+  }
   const StageStatus* report = summary.find("report");
   if (report && report->done()) {
     const std::string page = (fs::path(folders.out) / "report" / "report.html").string();

@@ -130,7 +130,7 @@ Action add_measure(CLI::App& app) {
   app.add_option("out", options->out, "The --out folder of a finished run")->required();
   app.add_option("--session", options->session, "Where the session is, if it was moved");
   add_measure_options(app, options->words);
-  return [options](Context& context) { return run(context, *options).map_error(without_resume); };
+  return [options](Context& context) { return run(context, *options); };
 }
 
 }  // namespace orbitfuse::cli

@@ -59,7 +59,7 @@ Status report(Context& context, const Options& options) {
   if (options.inspection && options.inspection->empty())
     return fail(ErrorKind::usage, "--inspection", "an empty file name",
                 "name the details; --print-template prints some to fill in");
-  if (options.inspection) return write_inspection(context, options).map_error(without_resume);
+  if (options.inspection) return write_inspection(context, options);
   if (options.pdf)
     return fail(ErrorKind::usage, "--pdf", "without --inspection",
                 "name the details: --inspection FILE; --print-template prints one to fill in");

@@ -17,9 +17,8 @@ struct Options {
 /// Serves until Ctrl-C, which is how a viewer ends: no error.
 Status view_run(Context& context, const Options& o) {
   ORBITFUSE_ASSIGN(const PageOptions page, page_options_of("--page", o.page, o.token));
-  ORBITFUSE_ASSIGN(
-      view::FinishedRun run,
-      view::load_finished_run(o.run, context.config, context.progress).map_error(without_resume));
+  ORBITFUSE_ASSIGN(view::FinishedRun run,
+                   view::load_finished_run(o.run, context.config, context.progress));
   for (const std::string& note : run.notes) context.console.warning(note);
   context.result = {{"run", o.run}, {"views", run.views.size()}, {"points", run.surface.size()}};
   view::ViewServer server(std::move(run), page);
