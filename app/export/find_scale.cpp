@@ -54,7 +54,9 @@ Result<Pointed> pointed_pixel(const view::FinishedRun& run, const PixelPlace& pl
     return fail(ErrorKind::usage, "--distance", "a pixel beyond where the lens is known",
                 "choose one nearer to the middle");
   // A picture of a few pixels round the place is all that has to be rendered.
-  constexpr int side = 5;
+  // As many as the camera's focal length needs for a picture that a lens could have taken.
+  const int half = std::max(2, static_cast<int>(camera.fx / 200));
+  const int side = 2 * half + 1;
   Camera small = camera.without_distortion();
   small.width = small.height = side;
   small.cx = side / 2.0 - small.fx * at.x();
@@ -66,8 +68,8 @@ Result<Pointed> pointed_pixel(const view::FinishedRun& run, const PixelPlace& pl
       nerf::render(visible ? run.visible : run.thermal, small,
                    rebase(found->view.cam_from_world, field_from_frame), {}, progress));
   std::vector<double> depths;
-  for (int y = 1; y < side - 1; ++y)
-    for (int x = 1; x < side - 1; ++x)
+  for (int y = half - 1; y <= half + 1; ++y)
+    for (int x = half - 1; x <= half + 1; ++x)
       if (const float z = seen.depth.at<float>(y, x); std::isfinite(z))
         depths.push_back(static_cast<double>(z) / field_from_frame.scale);
   if (depths.size() < 5)

@@ -9,6 +9,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / "docs" / "benchmarks"
 WITHOUT_PLOT = {
+    "export.md": "two scenes beside their bars: the table is all that there is to show",
     "hostile.md": "says what the program answers; runs of a fuzzer measure how fast a parser is",
     "view.md": "wall times of a shared machine, which a plot would make look surer than they are",
 }
