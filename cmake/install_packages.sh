@@ -9,7 +9,7 @@ packages=(
   libeigen3-dev libceres-dev libopencv-dev libtbb-dev
   libcli11-dev nlohmann-json3-dev libtomlplusplus-dev libexpected-dev libfmt-dev libspdlog-dev
   libtiff-dev libpng-dev libjpeg-dev libcharls-dev libheif-dev libexiv2-dev libsqlite3-dev libxxhash-dev libnanoflann-dev
-  libaravis-dev libusb-1.0-0-dev libopencv-contrib-dev libcpp-httplib-dev libhpdf-dev libjs-three
+  libaravis-dev libusb-1.0-0-dev libopencv-contrib-dev libcpp-httplib-dev libhpdf-dev libjs-three libmeshoptimizer-dev libtinygltf-dev
   libgtest-dev libgmock-dev libbenchmark-dev
   colmap
   "$@"

@@ -31,6 +31,8 @@ const std::vector<Verb>& verbs() {
       {"view", "Walk round the result of a run in a browser", "orbitfuse view out/", add_view},
       {"measure", "Say how hot something is in a finished run, and how sure that is",
        "orbitfuse measure out/ --hottest 3", add_measure},
+      {"export", "Write the surface of a finished run for other programs: GLB, PLY, OBJ, LAS",
+       "orbitfuse export out/ --to van.glb", add_export},
       {"eval", "Measure a run against ground truth",
        "orbitfuse eval out/ --ground-truth replay_data/car/ground_truth.json", add_eval},
       {"replay", "Play a recorded session through the recorder, as hardware would",

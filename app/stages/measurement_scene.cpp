@@ -8,6 +8,7 @@
 
 #include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
+#include "app/stages/metric_scale.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/session_input.hpp"
 #include "app/stages/stage_list.hpp"
@@ -145,6 +146,9 @@ Result<ThermalScene> load_measurement_scene(const fs::path& out, const Session& 
   ORBITFUSE_TRY(add_named_views(context, parts));
   add_unposed(session, parts);
   ORBITFUSE_ASSIGN(parts.identity, identity_of(context, session));
+  ORBITFUSE_ASSIGN(const std::string world, world_identity(out));
+  ORBITFUSE_ASSIGN(const auto scale, load_metric_scale(out, world));
+  if (scale) parts.metres_per_unit = scale->metres_per_unit;
   return ThermalScene::make(std::move(parts), options);
 }
 

@@ -339,15 +339,34 @@ Result<PointCloud> read_ply(const std::filesystem::path& path) {
 }
 
 Status write_ply(const std::filesystem::path& path, const PointCloud& cloud) {
+  return write_ply(path, TriangleMesh{cloud, {}}, {});
+}
+
+Status write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
+                 const PlyWriteOptions& options) {
+  const PointCloud& cloud = mesh.vertices;
   const bool normals = !cloud.normals.empty(), colors = !cloud.colors.empty();
   const bool temperature = !cloud.temperatures_k.empty();
-  std::string out = fmt::format(
-      "ply\nformat binary_little_endian 1.0\ncomment OrbitFuse; temperature in kelvin\n"
-      "element vertex {}\nproperty double x\nproperty double y\nproperty double z\n",
-      cloud.size());
+  if (options.temperature_name.empty() ||
+      options.temperature_name.find_first_of(" \t\r\n") != std::string::npos)
+    return fail(ErrorKind::input, path.string(),
+                "'" + options.temperature_name + "' as the name of a property", "choose one word");
+  std::string out =
+      "ply\nformat binary_little_endian 1.0\ncomment OrbitFuse; temperature in kelvin\n";
+  for (const std::string& comment : options.comments) {
+    if (comment.find_first_of("\r\n") != std::string::npos)
+      return fail(ErrorKind::input, path.string(), "a comment of several lines",
+                  "write one a line");
+    out += "comment " + comment + "\n";
+  }
+  out += fmt::format("element vertex {}\nproperty double x\nproperty double y\nproperty double z\n",
+                     cloud.size());
   if (normals) out += "property float nx\nproperty float ny\nproperty float nz\n";
   if (colors) out += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
-  if (temperature) out += "property float temperature\n";
+  if (temperature) out += "property float " + options.temperature_name + "\n";
+  if (!mesh.empty())
+    out += fmt::format("element face {}\nproperty list uchar uint vertex_indices\n",
+                       mesh.triangles.size());
   out += "end_header\n";
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     for (int k = 0; k < 3; ++k) append_bytes(out, cloud.positions[i][k]);
@@ -358,6 +377,10 @@ Status write_ply(const std::filesystem::path& path, const PointCloud& cloud) {
       for (std::uint8_t c : cloud.colors[i]) append_bytes(out, c);
     }
     if (temperature) append_bytes(out, cloud.temperatures_k[i]);
+  }
+  for (const auto& triangle : mesh.triangles) {
+    append_bytes(out, std::uint8_t{3});
+    for (const std::uint32_t v : triangle) append_bytes(out, v);
   }
   return write_file_atomic(path, out);
 }

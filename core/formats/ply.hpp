@@ -2,8 +2,11 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "core/geometry/point_cloud.hpp"
+#include "core/geometry/triangle_mesh.hpp"
 #include "core/result.hpp"
 
 namespace orbitfuse {
@@ -15,5 +18,17 @@ Result<PointCloud> read_ply(const std::filesystem::path& path);
 
 /// Binary little-endian.
 Status write_ply(const std::filesystem::path& path, const PointCloud& cloud);
+
+struct PlyWriteOptions {
+  /// Of the temperatures in kelvin: what other tools take for a scalar is called "scalar_..." by
+  /// CloudCompare and "quality" by MeshLab.
+  std::string temperature_name = "temperature";
+  std::vector<std::string> comments;  ///< lines of the header: frame, unit
+};
+
+/// Vertices and faces (vertex_indices), binary little-endian; without triangles a cloud. Errors:
+/// input (a name or comment that would break the header), device.
+Status write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
+                 const PlyWriteOptions& options);
 
 }  // namespace orbitfuse

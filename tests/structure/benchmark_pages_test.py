@@ -14,6 +14,7 @@ WITHOUT_PLOT = {
     "fuzzing.md": "runs of a fuzzer measure how fast a parser is",
     "hostile.md": "says what the program answers",
     "run_real.md": "what came of four recordings, without truth",
+    "export.md": "two scenes beside their bars: the table is all that there is to show",
     "view.md": "wall times of a shared machine, which a plot would make look surer than they are",
 }
 

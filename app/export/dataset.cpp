@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/export/dataset.hpp"
+
+#include <fmt/format.h>
+
+#include <limits>
+#include <opencv2/imgproc.hpp>
+
+#include "app/stages/artifacts.hpp"
+#include "core/formats/colmap_model.hpp"
+#include "core/formats/transforms_json.hpp"
+#include "core/image/image_io.hpp"
+#include "core/image/undistorted.hpp"
+#include "core/system/file_io.hpp"
+
+namespace orbitfuse::exporting {
+namespace {
+namespace fs = std::filesystem;
+
+/// Below it a ray met too little of the field for its value to be a surface's.
+constexpr float least_opacity = 0.5F;
+/// Splatting starts from points; more than this many only slow it down.
+constexpr std::size_t most_points = 100'000;
+
+Result<cv::Mat> photo(const view::FinishedRun& run, const PosedView& view) {
+  ORBITFUSE_ASSIGN(const cv::Mat image, read_visible(run.session->folder / view.name));
+  if (image.cols != view.camera.width || image.rows != view.camera.height)
+    return fail(ErrorKind::input, view.name, "not of its camera's size",
+                "name the session that the run was made of");
+  if (!view.camera.has_distortion()) return image;
+  std::vector<cv::Mat> channels;
+  cv::split(image, channels);
+  for (cv::Mat& channel : channels)
+    channel = undistorted(channel, view.camera, view.camera.without_distortion());
+  cv::Mat straight;
+  cv::merge(channels, straight);
+  return straight;
+}
+
+Result<cv::Mat> rendered_color(const view::FinishedRun& run, const PosedView& view,
+                               const Progress& progress) {
+  ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
+                   nerf::render(run.visible, view.camera, view.cam_from_world, {}, progress));
+  cv::Mat bgr;
+  cv::cvtColor(seen.color, bgr, cv::COLOR_RGB2BGR);
+  bgr.convertTo(bgr, CV_8UC3, 255);
+  return bgr;
+}
+
+Result<cv::Mat> rendered_kelvin(const view::FinishedRun& run, const PosedView& view,
+                                const Progress& progress) {
+  ORBITFUSE_ASSIGN(
+      nerf::RenderedView seen,
+      nerf::render(run.thermal, view.camera,
+                   rebase(view.cam_from_world, run.frame_from_thermal.inverse()), {}, progress));
+  seen.color.setTo(std::numeric_limits<float>::quiet_NaN(), seen.opacity < least_opacity);
+  return seen.color;
+}
+
+struct Cameras {
+  std::vector<PosedView> views;  ///< in the run's world
+  std::string described;
+};
+
+Result<Cameras> cameras_of(const view::FinishedRun& run, const DatasetOptions& options) {
+  Cameras cameras;
+  for (const view::RecordedView& v : run.views)
+    if (v.modality == Modality::visible) cameras.views.push_back(v.view);
+  if (options.poses == DatasetPoses::recorded) {
+    if (!run.session)
+      return fail(ErrorKind::input, "dataset", "the session is not where the run read it",
+                  "bring it back, or take new poses: --poses new");
+    cameras.described = fmt::format("{} recorded views", cameras.views.size());
+    return cameras;
+  }
+  ORBITFUSE_ASSIGN(NewViews fresh, new_views(cameras.views, options.path));
+  return Cameras{std::move(fresh.views), std::move(fresh.described)};
+}
+
+/// 8-bit levels between the bounds, 0 where nothing was measured.
+cv::Mat levels_of(const cv::Mat& kelvin, TemperatureSpan span) {
+  cv::Mat levels, known = kelvin == kelvin;
+  cv::Mat scaled = (kelvin - span.low_k) * (255 / (span.high_k - span.low_k));
+  scaled.setTo(0, ~known);
+  scaled.convertTo(levels, CV_8U);
+  return levels;
+}
+
+Status write_model(const fs::path& folder, const view::FinishedRun& run, const ExportFrame& frame,
+                   const Transforms& transforms) {
+  Reconstruction model;
+  for (const TransformsFrame& f : transforms.frames)
+    model.views.push_back({fs::path(f.file_path).filename().string(), f.camera, f.cam_from_world});
+  for (std::size_t i = 0; i < std::min(run.surface.size(), most_points); ++i) {
+    SparsePoint point;
+    point.position = frame.export_from_world * run.surface.positions[i];
+    if (!run.surface.colors.empty()) point.rgb = run.surface.colors[i];
+    model.points.push_back(std::move(point));
+  }
+  return write_colmap_model(folder / "sparse" / "0", model, ColmapFormat::binary);
+}
+
+Status write_pairs(const fs::path& folder, const view::FinishedRun& run, const ExportFrame& frame,
+                   const DatasetOptions& options, const Cameras& cameras,
+                   const Progress& progress) {
+  Transforms transforms;
+  std::vector<cv::Mat> kelvin;
+  for (const PosedView& posed : cameras.views) {
+    ORBITFUSE_TRY(progress.check("dataset"));
+    progress.report({"dataset", static_cast<double>(kelvin.size()),
+                     static_cast<double>(cameras.views.size()), -1, posed.name});
+    PosedView view = posed;
+    view.camera = posed.camera.without_distortion();
+    const std::string file = fmt::format("{:06}.png", kelvin.size());
+    ORBITFUSE_ASSIGN(const cv::Mat image, options.poses == DatasetPoses::recorded
+                                              ? photo(run, posed)
+                                              : rendered_color(run, view, progress));
+    ORBITFUSE_TRY(write_png(folder / "images" / file, image));
+    ORBITFUSE_ASSIGN(cv::Mat seen, rendered_kelvin(run, view, progress));
+    kelvin.push_back(std::move(seen));
+    transforms.frames.push_back({"images/" + file, "thermal/" + file, view.camera,
+                                 rebase(view.cam_from_world, frame.export_from_world)});
+  }
+  // The bounds hold every temperature: what lies outside would be lost to who trains on levels.
+  const TemperatureSpan span = common_span(kelvin, 0, 100);
+  const double kelvin_per_count = kelvin_per_count_for(kelvin);
+  for (std::size_t i = 0; i < kelvin.size(); ++i) {
+    const std::string name = fmt::format("{:06}", i);
+    ORBITFUSE_TRY(write_png(folder / "thermal" / (name + ".png"), levels_of(kelvin[i], span)));
+    if (!run.thermal_is_gray)
+      ORBITFUSE_TRY(write_thermal_tiff(folder / "thermal_kelvin" / (name + ".tiff"), kelvin[i],
+                                       kelvin_per_count));
+  }
+  if (!run.thermal_is_gray)
+    ORBITFUSE_TRY(stages::save_temperature_bounds(folder, span.low_k, span.high_k));
+  ORBITFUSE_TRY(write_transforms_json(folder / "transforms.json", transforms));
+  ORBITFUSE_TRY(write_model(folder, run, frame, transforms));
+  nlohmann::json about = to_json(frame);
+  about["schema"] = 1;
+  about["pairs"] = kelvin.size();
+  about["cameras"] = cameras.described;
+  about["visible"] = options.poses == DatasetPoses::recorded ? "photos without distortion"
+                                                             : "rendered by the visible field";
+  about["thermal"] = "rendered by the thermal field";
+  return stages::write_json(folder / "dataset.json", about);
+}
+
+}  // namespace
+
+Result<Dataset> write_dataset(const fs::path& folder, const view::FinishedRun& run,
+                              const ExportFrame& frame, const DatasetOptions& options,
+                              const Progress& progress) {
+  std::error_code error;
+  if (fs::exists(folder, error) &&
+      !(fs::is_directory(folder, error) && fs::is_empty(folder, error)))
+    return fail(ErrorKind::usage, "--dataset", "'" + folder.string() + "' is there already",
+                "choose a new folder");
+  if (!run.has(Modality::visible) || !run.has(Modality::thermal))
+    return fail(ErrorKind::input, run.out.string(), "not both fields",
+                "pairs need a visible and a thermal orbit that are registered");
+  ORBITFUSE_ASSIGN(const Cameras cameras, cameras_of(run, options));
+  const fs::path partial = folder.string() + ".partial";
+  fs::remove_all(partial, error);
+  if (const Status written = write_pairs(partial, run, frame, options, cameras, progress);
+      !written) {
+    fs::remove_all(partial, error);
+    return tl::unexpected(written.error());
+  }
+  fs::remove(folder, error);  // empty, or not there
+  fs::rename(partial, folder, error);
+  if (error)
+    return fail(ErrorKind::device, folder.string(), error.message(), "see who may write there");
+  return Dataset{cameras.views.size(), cameras.described};
+}
+
+}  // namespace orbitfuse::exporting

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/export/export_frame.hpp"
+
+#include <fmt/format.h>
+
+namespace orbitfuse::exporting {
+namespace {
+using nlohmann::json;
+
+json json_of(const Eigen::Matrix4d& m) {
+  json rows = json::array();
+  for (int r = 0; r < 4; ++r) rows.push_back({m(r, 0), m(r, 1), m(r, 2), m(r, 3)});
+  return rows;
+}
+
+}  // namespace
+
+std::string ExportFrame::words() const {
+  if (!scale) return "no scale is known: lengths are in the run's own unit";
+  return fmt::format("metres, +- {:.1f} % ({})", 100 * scale->relative_uncertainty, scale->source);
+}
+
+Result<ExportFrame> export_frame(const Eigen::Vector3d& up,
+                                 const std::optional<stages::MetricScale>& scale) {
+  ExportFrame frame;
+  frame.scale = scale;
+  if (scale) frame.export_from_world.scale = scale->metres_per_unit;
+  if (up.isZero(0)) return frame;
+  if (!up.allFinite() || !(up.norm() > 1e-9) || !(up.norm() < 1e9))
+    return fail(ErrorKind::usage, "--up", "not a direction", "write X,Y,Z, e.g. 0,0,1");
+  frame.export_from_world.rotation =
+      Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).normalized();
+  return frame;
+}
+
+void transform(const ExportFrame& frame, TriangleMesh& mesh) {
+  for (Eigen::Vector3d& p : mesh.vertices.positions) p = frame.export_from_world * p;
+  const Eigen::Quaternionf rotation = frame.export_from_world.rotation.cast<float>();
+  for (Eigen::Vector3f& n : mesh.vertices.normals) n = rotation * n;
+}
+
+json to_json(const ExportFrame& frame) {
+  json j = {{"unit", frame.unit()},
+            {"up", "z"},
+            {"words", frame.words()},
+            {"world_from_export", json_of(frame.export_from_world.inverse().matrix())}};
+  if (frame.scale) j["scale"] = stages::to_json(*frame.scale);
+  return j;
+}
+
+}  // namespace orbitfuse::exporting

@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/export/find_scale.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "capture/mat/mat_finder.hpp"
+#include "core/image/image_io.hpp"
+#include "core/image/undistorted.hpp"
+#include "core/numeric/median.hpp"
+
+namespace orbitfuse::exporting {
+namespace {
+using measurement::PixelPlace;
+using measurement::Place;
+using stages::MetricScale;
+
+/// A place and how far off it may be (one standard deviation): across the ray and along it.
+struct Pointed {
+  Eigen::Vector3d position, ray;
+  double across = 0, along = 0;
+
+  double variance_along(const Eigen::Vector3d& direction) const {
+    const double part = direction.dot(ray);
+    return across * across * (1 - part * part) + along * along * part * part;
+  }
+};
+
+constexpr double pointing_px = 1;      // how well a pixel is pointed at
+constexpr double depth_share = 0.003;  // of a field's depth at its best (docs/benchmarks/export.md)
+constexpr double point_share = 0.002;  // of the orbit's radius: what a typed point may be off
+
+Result<Pointed> pointed_pixel(const view::FinishedRun& run, const PixelPlace& place,
+                              const Progress& progress) {
+  const auto found = std::find_if(run.views.begin(), run.views.end(),
+                                  [&](const auto& v) { return v.view.name == place.view; });
+  if (found == run.views.end())
+    return fail(ErrorKind::usage, "--distance", "'" + place.view + "', which is no posed view",
+                "name one as the session does, e.g. " +
+                    (run.views.empty() ? "visible/000000.jpg" : run.views.front().view.name));
+  const Camera& camera = found->view.camera;
+  const auto& [u, v] = std::pair(place.pixel.x(), place.pixel.y());
+  if (!(u >= 0 && v >= 0 && u <= camera.width && v <= camera.height))
+    return fail(
+        ErrorKind::usage, "--distance",
+        fmt::format("{},{} in {}, of {}x{} pixels", u, v, place.view, camera.width, camera.height),
+        "choose a pixel of the view");
+  const Eigen::Vector2d at = camera.normalized_of(place.pixel);
+  if (!at.allFinite())
+    return fail(ErrorKind::usage, "--distance", "a pixel beyond where the lens is known",
+                "choose one nearer to the middle");
+  // A picture of a few pixels round the place is all that has to be rendered.
+  // As many as the camera's focal length needs for a picture that a lens could have taken.
+  const int half = std::max(2, static_cast<int>(camera.fx / 200));
+  const int side = 2 * half + 1;
+  Camera small = camera.without_distortion();
+  small.width = small.height = side;
+  small.cx = side / 2.0 - small.fx * at.x();
+  small.cy = side / 2.0 - small.fy * at.y();
+  const bool visible = run.has(Modality::visible);
+  const Similarity3d field_from_frame = visible ? Similarity3d() : run.frame_from_thermal.inverse();
+  ORBITFUSE_ASSIGN(
+      const nerf::RenderedView seen,
+      nerf::render(visible ? run.visible : run.thermal, small,
+                   rebase(found->view.cam_from_world, field_from_frame), {}, progress));
+  std::vector<double> depths;
+  for (int y = half - 1; y <= half + 1; ++y)
+    for (int x = half - 1; x <= half + 1; ++x)
+      if (const float z = seen.depth.at<float>(y, x); std::isfinite(z))
+        depths.push_back(static_cast<double>(z) / field_from_frame.scale);
+  if (depths.size() < 5)
+    return fail(ErrorKind::usage, "--distance",
+                fmt::format("{},{},{} shows nothing that the run knows", place.view, u, v),
+                "choose a pixel on the object");
+  const double z = median(depths);
+  for (double& d : depths) d = std::abs(d - z);
+  const Eigen::Vector3d ray = small.ray_of({side / 2.0, side / 2.0});
+  const Rigid3d world_from_cam = found->view.cam_from_world.inverse();
+  return Pointed{world_from_cam * (z * ray), world_from_cam.rotation * ray.normalized(),
+                 pointing_px * z / small.fx, std::max(depth_share * z, 1.5 * median(depths))};
+}
+
+Result<Pointed> pointed(const view::FinishedRun& run, const Place& place,
+                        const Progress& progress) {
+  if (const auto* pixel = std::get_if<PixelPlace>(&place))
+    return pointed_pixel(run, *pixel, progress);
+  const Eigen::Vector3d& point = std::get<Eigen::Vector3d>(place);
+  if (!point.allFinite() || !(point.norm() < 1e9))
+    return fail(ErrorKind::usage, "--distance", "a point that is not finite", "write X,Y,Z");
+  const double off = point_share * run.radius;
+  return Pointed{point, Eigen::Vector3d::UnitZ(), off, off};
+}
+
+double residual(const Similarity3d& metres_from_world, const PosePair& pair) {
+  return (metres_from_world * camera_center(pair.cam_from_estimate) -
+          camera_center(pair.cam_from_truth))
+      .norm();
+}
+
+/// As the finder wants it: a pinhole with its principal point in the middle.
+cv::Mat straight(const cv::Mat& image, const Camera& camera) {
+  Camera middle = camera.without_distortion();
+  middle.fy = middle.fx;
+  middle.cx = camera.width / 2.0;
+  middle.cy = camera.height / 2.0;
+  cv::Mat gray;
+  if (image.channels() == 3)
+    cv::cvtColor(image, gray, cv::COLOR_BGR2GRAY);
+  else
+    gray = image;
+  return undistorted(gray, camera, middle);
+}
+
+}  // namespace
+
+Result<double> metres_of(const std::string& option, const std::string& words) {
+  double value = 0;
+  const char* const end = words.data() + words.size();
+  const auto [stop, error] = std::from_chars(words.data(), end, value);
+  const std::string unit(stop, end);
+  const double metres = unit == "m" ? 1 : unit == "cm" ? 0.01 : unit == "mm" ? 0.001 : 0;
+  constexpr const char* form = "write a length with its unit, e.g. 1.20m, 35cm or 350mm";
+  if (error != std::errc() || metres == 0)
+    return fail(ErrorKind::usage, option, "'" + words + "'", form);
+  if (!(value * metres >= 1e-4 && value * metres <= 1e4))
+    return fail(ErrorKind::usage, option, "'" + words + "'", "choose 0.1 mm to 10 km");
+  return value * metres;
+}
+
+Result<MetricScale> scale_of_distance(const view::FinishedRun& run, const Place& from,
+                                      const Place& to, double metres, const Progress& progress) {
+  ORBITFUSE_ASSIGN(const Pointed a, pointed(run, from, progress));
+  ORBITFUSE_ASSIGN(const Pointed b, pointed(run, to, progress));
+  const Eigen::Vector3d apart = b.position - a.position;
+  const double length = apart.norm();
+  if (!(length > 1e-6 * run.radius))
+    return fail(ErrorKind::usage, "--distance", "two places that are one",
+                "choose places that are far apart");
+  const Eigen::Vector3d direction = apart / length;
+  MetricScale scale;
+  scale.metres_per_unit = metres / length;
+  scale.relative_uncertainty =
+      std::sqrt(a.variance_along(direction) + b.variance_along(direction)) / length;
+  scale.source = "one distance";
+  scale.how = fmt::format("{:.4f} units are {:.4f} m", length, metres);
+  ORBITFUSE_TRY(scale.validate("--distance"));
+  return scale;
+}
+
+Result<MetricScale> scale_of_cameras(std::vector<PosePair> pairs, const std::string& source) {
+  ORBITFUSE_ASSIGN(Similarity3d fit, truth_from_estimate(pairs));
+  // One wrong camera must not decide: those far off the others' middle are left out once.
+  std::vector<double> off;
+  for (const PosePair& pair : pairs) off.push_back(residual(fit, pair));
+  const double most = std::max(4 * median(off), 1e-9);
+  std::vector<PosePair> kept;
+  for (const PosePair& pair : pairs)
+    if (residual(fit, pair) <= most) kept.push_back(pair);
+  if (kept.size() >= 3 && kept.size() < pairs.size()) {
+    ORBITFUSE_ASSIGN(fit, truth_from_estimate(kept));
+    pairs = std::move(kept);
+  }
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const PosePair& pair : pairs) middle += camera_center(pair.cam_from_truth);
+  middle /= static_cast<double>(pairs.size());
+  double squares = 0, spread = 0;
+  for (const PosePair& pair : pairs) {
+    squares += std::pow(residual(fit, pair), 2);
+    spread += (camera_center(pair.cam_from_truth) - middle).squaredNorm();
+  }
+  const double freedom = std::max(1.0, 3.0 * static_cast<double>(pairs.size()) - 7);
+  const double rms = std::sqrt(squares / static_cast<double>(pairs.size()));
+  if (rms > 0.1 * std::sqrt(spread / static_cast<double>(pairs.size())))
+    return fail(ErrorKind::input, source,
+                fmt::format("its cameras are {:.3f} m off the run's", rms),
+                "see whether both are of this session, and doubtful poses in the report");
+  MetricScale scale{fit.scale, std::sqrt(squares / freedom / spread), source,
+                    fmt::format("{} cameras, {:.4f} m off", pairs.size(), rms)};
+  ORBITFUSE_TRY(scale.validate(source));
+  return scale;
+}
+
+Result<MetricScale> scale_of_mat(const view::FinishedRun& run, const MatDesign& design,
+                                 const Progress& progress) {
+  ORBITFUSE_TRY(design.validate());
+  if (!run.session)
+    return fail(ErrorKind::input, "mat", "the session is not where the run read it",
+                "bring it back");
+  std::vector<PosePair> pairs;
+  int looked = 0;
+  for (const view::RecordedView& v : run.views) {
+    if (v.modality != Modality::visible || !v.doubt.empty()) continue;
+    ORBITFUSE_TRY(progress.check("mat"));
+    ++looked;
+    // A new finder for each: what it would follow from one image to the next is not read.
+    MatFinder finder(design);
+    finder.set_focal_px(Modality::visible, v.view.camera.fx);
+    ORBITFUSE_ASSIGN(const cv::Mat image, read_visible(run.session->folder / v.view.name));
+    if (image.cols != v.view.camera.width || image.rows != v.view.camera.height) continue;
+    const auto sighting = finder.find(straight(image, v.view.camera), Modality::visible);
+    if (sighting && !sighting->followed)
+      pairs.push_back({v.view.cam_from_world, sighting->cam_from_mat, v.view.name});
+  }
+  if (pairs.size() < 3)
+    return fail(ErrorKind::input, "mat",
+                fmt::format("{} of {} visible views show it", pairs.size(), looked),
+                "see that the whole mat lies round the object, or tell one distance: --distance");
+  return scale_of_cameras(std::move(pairs), "mat");
+}
+
+Result<MetricScale> scale_of_known_poses(const view::FinishedRun& run) {
+  if (!run.session)
+    return fail(ErrorKind::input, "known poses", "the session is not where the run read it",
+                "bring it back");
+  std::vector<PosePair> pairs;
+  for (const view::RecordedView& v : run.views)
+    for (const FrameRecord& frame : run.session->frames)
+      if (frame.file == v.view.name && frame.cam_from_world)
+        pairs.push_back({v.view.cam_from_world, *frame.cam_from_world, v.view.name});
+  if (pairs.size() < 3)
+    return fail(ErrorKind::input, "known poses",
+                fmt::format("{} of the session's frames have one", pairs.size()),
+                "import them with their poses, or tell one distance: --distance");
+  return scale_of_cameras(std::move(pairs), "known poses");
+}
+
+}  // namespace orbitfuse::exporting

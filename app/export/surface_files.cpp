@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/export/surface_files.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "app/export/glb.hpp"
+#include "app/stages/artifacts.hpp"
+#include "core/formats/las.hpp"
+#include "core/formats/obj.hpp"
+#include "core/formats/ply.hpp"
+#include "core/image/palette.hpp"
+
+namespace orbitfuse::exporting {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+/// Times the reach of the object: all that the cameras surround and what lies not far behind it.
+constexpr double whole_share = 2 / 0.6;
+
+Result<Eigen::AlignedBox3d> box_of(const SurfaceRequest& request,
+                                   const std::vector<PosedView>& cameras) {
+  if (request.crop == Crop::box) return request.box;
+  auto box = object_box(cameras);
+  if (!box)
+    return fail(box.error().kind, box.error().where, box.error().found,
+                "say which part is wanted: --crop-box");
+  if (request.crop == Crop::object) return box;
+  const Eigen::Vector3d center = box->center(), half = whole_share / 2 * box->sizes();
+  return Eigen::AlignedBox3d(center - half, center + half);
+}
+
+/// Palette colours for temperatures, gray where there is none.
+Status paint_temperatures(const view::FinishedRun& run, const std::string& name,
+                          PointCloud& vertices) {
+  if (vertices.temperatures_k.empty())
+    return fail(ErrorKind::usage, "--colors", "temperature, of which the run has none",
+                "choose visible");
+  ORBITFUSE_ASSIGN(const cv::Mat colors, palette(name));
+  const cv::Mat kelvin(vertices.temperatures_k, false);
+  const cv::Mat painted = colorize(kelvin, run.span, colors);
+  vertices.colors.assign(vertices.size(), {128, 128, 128});
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    if (!std::isfinite(vertices.temperatures_k[i])) continue;
+    const auto bgr = painted.at<cv::Vec3b>(static_cast<int>(i), 0);
+    vertices.colors[i] = {bgr[2], bgr[1], bgr[0]};
+  }
+  return {};
+}
+
+json sidecar(const view::FinishedRun& run, const FieldSurface& surface, const TriangleMesh& mesh,
+             const ExportFrame& frame, const FileOptions& options) {
+  json j = to_json(frame);
+  j["schema"] = 1;
+  j["run"] = fs::absolute(run.out).lexically_normal().string();
+  j["vertices"] = mesh.vertices.size();
+  j["triangles"] = mesh.triangles.size();
+  j["fused_triangles"] = surface.fused_triangles;
+  j["vertices_without_color"] = surface.uncolored;
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& p : mesh.vertices.positions) box.extend(p);
+  j["box"] = {{"low", {box.min().x(), box.min().y(), box.min().z()}},
+              {"high", {box.max().x(), box.max().y(), box.max().z()}}};
+  if (!mesh.vertices.temperatures_k.empty()) {
+    j["vertices_without_temperature"] = surface.without_temperature;
+    j["temperature"] = run.thermal_is_gray ? "gray level 0..255, no temperature" : "kelvin";
+  }
+  if (options.colors == VertexColors::temperature)
+    j["colors"] = {{"palette", options.palette},
+                   {"low_k", run.span.low_k},
+                   {"high_k", run.span.high_k},
+                   {"none", "gray"}};
+  else
+    j["colors"] = "visible";
+  return j;
+}
+
+}  // namespace
+
+Result<FieldSurface> surface_of_run(const view::FinishedRun& run, const SurfaceRequest& request,
+                                    const Progress& progress) {
+  SurfaceFields fields;
+  if (run.has(Modality::visible)) fields.visible = &run.visible;
+  if (run.has(Modality::thermal)) fields.thermal = &run.thermal;
+  fields.world_from_thermal = run.frame_from_thermal;
+  for (const view::RecordedView& v : run.views)
+    (v.modality == Modality::visible ? fields.visible_views : fields.thermal_views)
+        .push_back(v.view);
+  const auto& cameras = fields.visible ? fields.visible_views : fields.thermal_views;
+  ORBITFUSE_ASSIGN(const Eigen::AlignedBox3d box, box_of(request, cameras));
+  return field_surface(fields, box, request.surface, progress);
+}
+
+Status check_extension(const fs::path& file) {
+  const std::string extension = file.extension().string();
+  for (const char* known : {".glb", ".ply", ".obj", ".las"})
+    if (extension == known) return {};
+  return fail(ErrorKind::usage, "--to", "'" + file.string() + "'",
+              "choose a name that ends in .glb, .ply, .obj or .las");
+}
+
+Status write_surface(const fs::path& file, const view::FinishedRun& run,
+                     const FieldSurface& surface, const ExportFrame& frame,
+                     const FileOptions& options) {
+  ORBITFUSE_TRY(check_extension(file));
+  TriangleMesh mesh = surface.mesh;
+  transform(frame, mesh);
+  if (options.colors == VertexColors::temperature)
+    ORBITFUSE_TRY(paint_temperatures(run, options.palette, mesh.vertices));
+  const std::string extension = file.extension().string();
+  if (extension == ".las" || (extension == ".ply" && options.points)) mesh.triangles.clear();
+  const json about = sidecar(run, surface, mesh, frame, options);
+  const std::vector<std::string> comments = {"unit " + frame.unit() + ", up z; " + frame.words()};
+  Status written;
+  if (extension == ".glb") {
+    json extras = about;
+    extras["up"] = "y";
+    extras["temperature_none"] = 0;
+    extras.erase("world_from_export");  // of the sidecar's frame, whose z is up
+    written = write_glb(file, mesh, extras);
+  } else if (extension == ".ply") {
+    written = write_ply(file, mesh, {options.temperature_name, comments});
+  } else if (extension == ".obj") {
+    written = write_obj(file, mesh, comments);
+  } else {
+    written = write_las(file, mesh.vertices);
+  }
+  ORBITFUSE_TRY(written);
+  return stages::write_json(file.string() + ".json", about);
+}
+
+}  // namespace orbitfuse::exporting

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/export/export_frame.hpp"
+#include "app/view/finished_run.hpp"
+#include "recon/assembly/field_surface.hpp"
+
+namespace orbitfuse::exporting {
+
+enum class Crop {
+  object,  ///< what the cameras look at
+  box,     ///< as given
+  whole,   ///< all that the cameras surround, and as much again
+};
+
+struct SurfaceRequest {
+  Crop crop = Crop::object;
+  Eigen::AlignedBox3d box;  ///< of Crop::box, in the run's world
+  FieldSurfaceOptions surface;
+};
+
+/// Errors: field_surface's, object_box's.
+Result<FieldSurface> surface_of_run(const view::FinishedRun& run, const SurfaceRequest& request,
+                                    const Progress& progress);
+
+enum class VertexColors { visible, temperature };
+
+struct FileOptions {
+  VertexColors colors = VertexColors::visible;
+  std::string palette = "inferno";
+  std::string temperature_name = "temperature";  ///< of PLY (PlyWriteOptions)
+  bool points = false;                           ///< PLY without faces
+};
+
+/// One file in the format of its extension (.glb, .ply, .obj, .las) and FILE.json beside it, which
+/// says the frame and what is missing. Errors: usage (another extension, colours by temperature
+/// where there is none), the writers'.
+Status write_surface(const std::filesystem::path& file, const view::FinishedRun& run,
+                     const FieldSurface& surface, const ExportFrame& frame,
+                     const FileOptions& options);
+
+/// Before anything takes its time: whether write_surface knows the extension. Errors: usage.
+Status check_extension(const std::filesystem::path& file);
+
+}  // namespace orbitfuse::exporting

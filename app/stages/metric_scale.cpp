@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/stages/metric_scale.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "app/pipeline/stage_record.hpp"
+#include "app/stages/artifacts.hpp"
+#include "app/stages/measurement_scene.hpp"
+#include "core/system/file_io.hpp"
+
+namespace orbitfuse::stages {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+}  // namespace
+
+Status MetricScale::validate(const std::string& where) const {
+  if (!(metres_per_unit > 1e-6 && metres_per_unit < 1e6))
+    return fail(ErrorKind::input, where, fmt::format("{} metres a unit", metres_per_unit),
+                "check the places and the distance");
+  if (!(relative_uncertainty >= 0 && relative_uncertainty < 1))
+    return fail(ErrorKind::input, where,
+                fmt::format("an uncertainty of {:.0f} %", 100 * relative_uncertainty),
+                "measure a longer distance, between places that are well seen");
+  return {};
+}
+
+json to_json(const MetricScale& scale) {
+  return {{"metres_per_unit", scale.metres_per_unit},
+          {"relative_uncertainty", scale.relative_uncertainty},
+          {"source", scale.source},
+          {"how", scale.how}};
+}
+
+Result<std::string> world_identity(const fs::path& out) {
+  const pipeline::StageContext context = context_of_run(out);
+  const std::string stage = is_in_visible_world(context) || !context.has("poses_thermal")
+                                ? "poses_visible"
+                                : "poses_thermal";
+  if (!context.has(stage))
+    return fail(ErrorKind::input, out.string(), "no finished poses in it",
+                "name the --out folder of a run");
+  ORBITFUSE_ASSIGN(const pipeline::StageRecord record,
+                   pipeline::read_stage_record(context.of(stage)));
+  return stage + " " + record.outputs_hash();
+}
+
+Status save_metric_scale(const fs::path& out, const std::string& world, const MetricScale& scale) {
+  ORBITFUSE_TRY(scale.validate(scale_file));
+  json j = to_json(scale);
+  j["schema"] = 1;
+  j["world"] = content_hash(world);
+  return write_json(out / scale_file, j);
+}
+
+Result<std::optional<MetricScale>> load_metric_scale(const fs::path& out,
+                                                     const std::string& world) {
+  std::error_code unreadable;
+  const fs::path file = out / scale_file;
+  if (!fs::exists(file, unreadable)) return std::nullopt;
+  ORBITFUSE_ASSIGN(const json j, read_json(file));
+  const auto number = [&](const char* key) {
+    return j.is_object() && j.contains(key) && j[key].is_number() ? j[key].get<double>()
+                                                                  : std::nan("");
+  };
+  const auto text = [&](const char* key) {
+    return j.is_object() && j.contains(key) && j[key].is_string() ? j[key].get<std::string>()
+                                                                  : std::string();
+  };
+  constexpr const char* remedy = "tell the scale again, or delete the file";
+  if (number("schema") != 1)
+    return fail(ErrorKind::input, file.string(), "not a scale of schema 1", remedy);
+  if (text("world") != content_hash(world))
+    return fail(ErrorKind::input, file.string(), "a scale of other poses than the run's", remedy);
+  MetricScale scale{number("metres_per_unit"), number("relative_uncertainty"), text("source"),
+                    text("how")};
+  ORBITFUSE_TRY(scale.validate(file.string()));
+  return scale;
+}
+
+}  // namespace orbitfuse::stages

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <charconv>
+
+#include "app/cli/run_stages.hpp"
+#include "app/cli/verb.hpp"
+#include "app/export/dataset.hpp"
+#include "app/export/find_scale.hpp"
+#include "app/export/surface_files.hpp"
+
+namespace orbitfuse::cli {
+namespace {
+namespace fs = std::filesystem;
+using namespace exporting;
+
+struct Options {
+  std::string out, crop_box, up, colors = "visible", palette, flavour = "plain";
+  std::string dataset, poses = "recorded", mat;
+  std::vector<std::string> files, distance;
+  bool whole = false, points = false, known_poses = false;
+  std::optional<int> triangles;
+};
+
+Result<std::vector<double>> numbers(const char* option, const std::string& word, std::size_t count,
+                                    const char* form) {
+  std::vector<double> values;
+  const char* at = word.data();
+  const char* const end = at + word.size();
+  while (values.size() < count) {
+    double value = 0;
+    const auto [stop, error] = std::from_chars(at, end, value);
+    const bool last = values.size() + 1 == count;
+    if (error != std::errc() || !std::isfinite(value) ||
+        (last ? stop != end : stop == end || *stop != ','))
+      return fail(ErrorKind::usage, option, "'" + word + "'", std::string("write ") + form);
+    values.push_back(value);
+    at = stop + (last ? 0 : 1);
+  }
+  return values;
+}
+
+Result<SurfaceRequest> request_of(const Options& o) {
+  SurfaceRequest request;
+  if (o.triangles) request.surface.surface.triangles = *o.triangles;
+  if (o.whole && !o.crop_box.empty())
+    return fail(ErrorKind::usage, "--whole", "together with --crop-box", "choose one of them");
+  if (o.whole) request.crop = Crop::whole;
+  if (!o.crop_box.empty()) {
+    ORBITFUSE_ASSIGN(const auto v,
+                     numbers("--crop-box", o.crop_box, 6,
+                             "CX,CY,CZ,SX,SY,SZ: middle and sides, in the run's unit"));
+    request.crop = Crop::box;
+    const Eigen::Vector3d center(v[0], v[1], v[2]), half(v[3] / 2, v[4] / 2, v[5] / 2);
+    if (!(half.minCoeff() > 0))
+      return fail(ErrorKind::usage, "--crop-box", "a side that is no length",
+                  "give three sides above 0");
+    request.box = {center - half, center + half};
+  }
+  ORBITFUSE_TRY(request.surface.validate());
+  return request;
+}
+
+Result<FileOptions> file_options(const Options& o, const view::FinishedRun& run) {
+  FileOptions files;
+  files.points = o.points;
+  if (o.colors == "temperature") files.colors = VertexColors::temperature;
+  files.palette = o.palette.empty() ? run.config.render.palette : o.palette;
+  ORBITFUSE_TRY(palette(files.palette));
+  if (o.flavour == "cloudcompare") files.temperature_name = "scalar_temperature";
+  if (o.flavour == "meshlab") files.temperature_name = "quality";
+  return files;
+}
+
+/// VIEW,U,V or X,Y,Z: the first word decides.
+Result<measurement::Place> place_of(const std::string& word) {
+  constexpr const char* form = "write VIEW,U,V (a pixel of a recorded view) or X,Y,Z";
+  double first = 0;
+  const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), first);
+  const std::size_t comma = word.find(',');
+  if (comma == std::string::npos || comma == 0)
+    return fail(ErrorKind::usage, "--distance", "'" + word + "'", form);
+  if (error == std::errc() && stop == word.data() + comma) {
+    ORBITFUSE_ASSIGN(const auto v, numbers("--distance", word, 3, "X,Y,Z or VIEW,U,V"));
+    return Eigen::Vector3d(v[0], v[1], v[2]);
+  }
+  ORBITFUSE_ASSIGN(const auto v,
+                   numbers("--distance", word.substr(comma + 1), 2, "VIEW,U,V or X,Y,Z"));
+  return measurement::PixelPlace{word.substr(0, comma), {v[0], v[1]}};
+}
+
+/// The scale that was told now, which stays with the run, or the one that the run has.
+Result<std::optional<stages::MetricScale>> scale_of(Context& context, const Options& o,
+                                                    const view::FinishedRun& run) {
+  ORBITFUSE_ASSIGN(const std::string world, stages::world_identity(o.out));
+  const int told = !o.distance.empty() + !o.mat.empty() + o.known_poses;
+  if (told > 1)
+    return fail(ErrorKind::usage, "--distance, --mat or --known-poses", "more than one of them",
+                "tell the scale in one way");
+  if (told == 0) return stages::load_metric_scale(o.out, world);
+  const auto found = [&]() -> Result<stages::MetricScale> {
+    if (o.known_poses) return scale_of_known_poses(run);
+    if (!o.mat.empty()) {
+      MatDesign design;
+      ORBITFUSE_ASSIGN(design.size_m, metres_of("--mat", o.mat));
+      return scale_of_mat(run, design, context.progress);
+    }
+    ORBITFUSE_ASSIGN(const measurement::Place from, place_of(o.distance.at(0)));
+    ORBITFUSE_ASSIGN(const measurement::Place to, place_of(o.distance.at(1)));
+    ORBITFUSE_ASSIGN(const double metres, metres_of("--distance", o.distance.at(2)));
+    return scale_of_distance(run, from, to, metres, context.progress);
+  };
+  ORBITFUSE_ASSIGN(const stages::MetricScale scale, found());
+  if (scale.relative_uncertainty > 0.05)
+    context.console.warning(
+        fmt::format("the scale is sure to {:.0f} % only: tell a longer distance",
+                    100 * scale.relative_uncertainty));
+  if (!context.common.dry_run) ORBITFUSE_TRY(stages::save_metric_scale(o.out, world, scale));
+  context.result["scale"] = stages::to_json(scale);
+  context.console.info(fmt::format("1 unit is {:.5f} m +- {:.2f} %: {}, {}", scale.metres_per_unit,
+                                   100 * scale.relative_uncertainty, scale.source, scale.how));
+  return scale;
+}
+
+Status export_dataset(Context& context, const Options& o, const view::FinishedRun& run,
+                      const ExportFrame& frame) {
+  DatasetOptions options;
+  options.path = context.config.render.path;
+  if (o.poses == "new") options.poses = DatasetPoses::fresh;
+  ORBITFUSE_ASSIGN(const Dataset dataset,
+                   write_dataset(o.dataset, run, frame, options, context.progress));
+  context.result["dataset"] = {{"folder", o.dataset}, {"pairs", dataset.pairs}};
+  context.console.data(o.dataset);
+  context.console.info(fmt::format("{} pairs: {}", dataset.pairs, dataset.described));
+  return {};
+}
+
+Status export_surface(Context& context, const std::vector<fs::path>& files,
+                      const view::FinishedRun& run, const SurfaceRequest& request,
+                      const ExportFrame& frame, const FileOptions& how) {
+  ORBITFUSE_ASSIGN(const FieldSurface surface, surface_of_run(run, request, context.progress));
+  context.result["vertices"] = surface.mesh.vertices.size();
+  context.result["triangles"] = surface.mesh.triangles.size();
+  context.result["vertices_without_temperature"] = surface.without_temperature;
+  context.result["files"] = nlohmann::json::array();
+  for (const fs::path& file : files) {
+    ORBITFUSE_TRY(write_surface(file, run, surface, frame, how));
+    context.result["files"].push_back(file.string());
+    context.console.data(file.string());
+  }
+  context.console.info(fmt::format("{} triangles, {} vertices, {} of them without temperature",
+                                   surface.mesh.triangles.size(), surface.mesh.vertices.size(),
+                                   surface.without_temperature));
+  return {};
+}
+
+Status run(Context& context, const Options& o) {
+  std::vector<fs::path> files(o.files.begin(), o.files.end());
+  if (files.empty() && o.dataset.empty())
+    files.push_back(fs::path(o.out) / "export" / "surface.glb");
+  for (const fs::path& file : files) ORBITFUSE_TRY(check_extension(file));
+  ORBITFUSE_ASSIGN(const SurfaceRequest request, request_of(o));
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();
+  if (!o.up.empty()) {
+    ORBITFUSE_ASSIGN(const auto v, numbers("--up", o.up, 3, "X,Y,Z, e.g. 0,0,1"));
+    up = {v[0], v[1], v[2]};
+    if (!(up.norm() > 0)) return fail(ErrorKind::usage, "--up", "no direction", "write X,Y,Z");
+  }
+  ORBITFUSE_ASSIGN(const view::FinishedRun run,
+                   view::load_finished_run(o.out, context.config, context.progress));
+  ORBITFUSE_ASSIGN(const FileOptions how, file_options(o, run));
+  for (const std::string& note : run.notes) context.console.warning(note);
+  ORBITFUSE_ASSIGN(const auto scale, scale_of(context, o, run));
+  ORBITFUSE_ASSIGN(const ExportFrame frame, export_frame(up, scale));
+  context.result["unit"] = frame.unit();
+  context.console.info(frame.words());
+  if (context.common.dry_run) {
+    context.console.info("the run can be exported");
+    return {};
+  }
+  if (!files.empty()) ORBITFUSE_TRY(export_surface(context, files, run, request, frame, how));
+  if (!o.dataset.empty()) return export_dataset(context, o, run, frame);
+  return {};
+}
+
+}  // namespace
+
+Action add_export(CLI::App& app) {
+  const auto o = std::make_shared<Options>();
+  app.add_option("out", o->out, "The --out folder of a finished run")->required();
+  app.add_option("--to", o->files,
+                 "File to write, .glb, .ply, .obj or .las; may be given again (default: "
+                 "OUT/export/surface.glb)");
+  app.add_option("--triangles", o->triangles, "Most triangles of the surface (default 200000)");
+  app.add_option("--crop-box", o->crop_box,
+                 "CX,CY,CZ,SX,SY,SZ: export this box of the run's world, in its unit, instead of "
+                 "what the cameras look at");
+  app.add_flag("--whole", o->whole, "Export what lies round the object too");
+  app.add_option("--up", o->up, "X,Y,Z of the run's world that becomes the files' up");
+  app.add_option("--colors", o->colors, "Of the vertices: as seen, or a palette's of temperature")
+      ->check(CLI::IsMember({"visible", "temperature"}));
+  app.add_option("--palette", o->palette, "With --colors temperature (default: render.palette)");
+  app.add_option("--flavour", o->flavour,
+                 "What PLY calls the temperature: temperature, scalar_temperature, quality")
+      ->check(CLI::IsMember({"plain", "cloudcompare", "meshlab"}));
+  app.add_flag("--points", o->points, "PLY: points without triangles");
+  app.add_option("--distance", o->distance,
+                 "A B LENGTH: two places, each VIEW,U,V or X,Y,Z, and how far apart they are, e.g. "
+                 "1.20m; kept in OUT/scale.json")
+      ->expected(3);
+  app.add_option(
+      "--mat", o->mat,
+      "Side of the printed mat in the visible views, e.g. 0.6m: the scale is read from it");
+  app.add_flag("--known-poses", o->known_poses,
+               "The poses that the session came with are in metres: the scale is theirs");
+  app.add_option("--dataset", o->dataset,
+                 "New folder for aligned visible and thermal pairs, to train other methods");
+  app.add_option("--poses", o->poses, "Of the pairs: the visible photos' or new ones (render.*)")
+      ->check(CLI::IsMember({"recorded", "new"}));
+  return [o](Context& context) { return run(context, *o); };
+}
+
+}  // namespace orbitfuse::cli

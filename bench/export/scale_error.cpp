@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The metric scale from one distance, told by random pairs of pixels of the recorded visible views:
+//   scale_error RUN TRUE.ply ground_truth.json [--count 200] [--least 1.0]
+// Each pair lies on the object, in one view, at least `--least` metres apart; its distance is the
+// true surface's. The true scale is that of the cameras.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "app/export/find_scale.hpp"
+#include "bench/export/true_scene.hpp"
+#include "core/numeric/median.hpp"
+#include "recon/surface/surface.hpp"
+
+namespace orbitfuse {
+namespace {
+namespace fs = std::filesystem;
+
+struct Options {
+  fs::path run, true_mesh, truth;
+  int count = 200;
+  double least_m = 1, most_m = 3;
+};
+
+Status run(const Options& o) {
+  ORBITFUSE_ASSIGN(const GroundTruth truth, read_ground_truth(o.truth));
+  ORBITFUSE_ASSIGN(const Similarity3d fit, truth_from_run(o.run, truth));
+  ORBITFUSE_ASSIGN(const TriangleMesh mesh, read_mesh(o.true_mesh));
+  ORBITFUSE_ASSIGN(const view::FinishedRun run,
+                   view::load_finished_run(o.run, stages::RunConfig(), {}));
+  std::mt19937 random(5);
+  std::vector<double> errors;
+  int covered = 0, refused = 0;
+  for (std::size_t i = 0; static_cast<int>(errors.size()) < o.count && i < run.views.size(); ++i) {
+    const view::RecordedView& v = run.views[i];
+    if (v.modality != Modality::visible) continue;
+    // The run's camera in the true world: its pose is as good as the scale that is asked for.
+    const PosedView there{v.view.name, v.view.camera.without_distortion(),
+                          rebase(v.view.cam_from_world, fit)};
+    const cv::Mat depth = mesh_depth(mesh, there);
+    const auto draw = [&]() -> std::optional<std::pair<Eigen::Vector2d, Eigen::Vector3d>> {
+      const int x = static_cast<int>(random() % static_cast<unsigned>(depth.cols)),
+                y = static_cast<int>(random() % static_cast<unsigned>(depth.rows));
+      const Eigen::Vector2d pixel(x + 0.5, y + 0.5);
+      const Eigen::Vector3d p =
+          there.cam_from_world.inverse() *
+          (static_cast<double>(depth.at<float>(y, x)) * there.camera.ray_of(pixel));
+      if (!p.allFinite() || p.z() < 0.05 || p.head<2>().norm() > o.most_m) return std::nullopt;
+      return std::pair(v.view.camera.pixel_of(there.camera.normalized_of(pixel)), p);
+    };
+    for (int tries = 0, got = 0; tries < 4000 && got < 9; ++tries) {
+      const auto a = draw(), b = draw();
+      if (!a || !b || (a->second - b->second).norm() < o.least_m) continue;
+      const auto scale = exporting::scale_of_distance(
+          run, measurement::PixelPlace{v.view.name, a->first},
+          measurement::PixelPlace{v.view.name, b->first}, (a->second - b->second).norm(), {});
+      if (!scale) {
+        ++refused;
+        continue;
+      }
+      ++got;
+      const double error = std::abs(scale->metres_per_unit / fit.scale - 1);
+      covered += error <= 1.645 * scale->relative_uncertainty;
+      errors.push_back(100 * error);
+    }
+  }
+  if (errors.empty())
+    return fail(ErrorKind::input, o.run.string(), "no pairs of pixels", "lower --least");
+  std::sort(errors.begin(), errors.end());
+  fmt::print(
+      "{}: scale from one distance of {} m or more, {} pairs: error median {:.3f} %, 90 % "
+      "{:.3f} %; 1.645 sigma covers {:.1f} %; {} refused\n",
+      o.run.filename().string(), o.least_m, errors.size(), median(errors),
+      errors[errors.size() * 9 / 10], 100.0 * covered / static_cast<double>(errors.size()),
+      refused);
+  return {};
+}
+
+}  // namespace
+}  // namespace orbitfuse
+
+int main(int argc, char** argv) {
+  CLI::App app("The metric scale from one distance against the true one");
+  orbitfuse::Options options;
+  app.add_option("run", options.run, "--out folder of a run")->required();
+  app.add_option("true_mesh", options.true_mesh, "PLY of true_mesh.py")->required();
+  app.add_option("truth", options.truth, "ground_truth.json")->required();
+  app.add_option("--count", options.count, "Pairs")->capture_default_str();
+  app.add_option("--least", options.least_m, "Metres between two places")->capture_default_str();
+  app.add_option("--most", options.most_m, "Metres from the middle")->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  const orbitfuse::Status status = orbitfuse::run(options);
+  if (status) return 0;
+  std::fprintf(stderr, "error: %s\n", status.error().message().c_str());
+  return 1;
+}

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/assembly/field_surface.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "core/option_range.hpp"
+#include "recon/assembly/looked_at.hpp"
+#include "recon/assembly/new_views.hpp"
+#include "recon/surface/surface.hpp"
+
+namespace orbitfuse {
+namespace {
+
+/// Below it a ray met too little of the field for its value to be a surface's.
+constexpr float least_opacity = 0.5F;
+
+struct RenderedOrbit {
+  std::vector<SurfaceView> depths;
+  std::vector<PaintView> pictures;
+};
+
+/// A field as its own cameras see it, in the world.
+Result<RenderedOrbit> rendered(const nerf::Field& field, const std::vector<PosedView>& views,
+                               const Similarity3d& world_from_field, int width_px,
+                               const Progress& progress) {
+  RenderedOrbit result;
+  for (const PosedView& posed : views) {
+    ORBITFUSE_TRY(progress.check("export"));
+    progress.report({"export", static_cast<double>(result.depths.size()),
+                     static_cast<double>(views.size()), -1, posed.name});
+    const Camera& camera = posed.camera;
+    const int width = std::min(camera.width, width_px);
+    const int height = std::max(2, static_cast<int>(std::lround(static_cast<double>(camera.height) *
+                                                                width / camera.width)));
+    PosedView view{posed.name, camera.scaled_to(width, height).without_distortion(),
+                   posed.cam_from_world};
+    ORBITFUSE_ASSIGN(
+        nerf::RenderedView seen,
+        nerf::render(field, view.camera, rebase(view.cam_from_world, world_from_field.inverse()),
+                     {}, progress));
+    seen.color.setTo(cv::Scalar::all(std::numeric_limits<double>::quiet_NaN()),
+                     seen.opacity < least_opacity);
+    result.depths.push_back({view, seen.depth * world_from_field.scale});
+    result.pictures.push_back({std::move(view), seen.color});
+  }
+  return result;
+}
+
+std::uint8_t level(float share) { return cv::saturate_cast<std::uint8_t>(255 * share); }
+
+Status add_colors(const RenderedOrbit& visible, double max_angle_deg, FieldSurface& surface,
+                  const Progress& progress) {
+  ORBITFUSE_ASSIGN(const Painted painted,
+                   paint(surface.mesh, visible.pictures, max_angle_deg, progress));
+  for (const cv::Vec3f& rgb : painted.values) {
+    const bool known = std::isfinite(rgb[0]);
+    surface.uncolored += !known;
+    surface.mesh.vertices.colors.push_back(
+        known ? std::array{level(rgb[0]), level(rgb[1]), level(rgb[2])}
+              : std::array<std::uint8_t, 3>{128, 128, 128});
+  }
+  return {};
+}
+
+Status add_temperatures(const RenderedOrbit& thermal, double max_angle_deg, FieldSurface& surface,
+                        const Progress& progress) {
+  ORBITFUSE_ASSIGN(const Painted painted,
+                   paint(surface.mesh, thermal.pictures, max_angle_deg, progress));
+  for (const cv::Vec3f& kelvin : painted.values) {
+    surface.without_temperature += !std::isfinite(kelvin[0]);
+    surface.mesh.vertices.temperatures_k.push_back(kelvin[0]);
+  }
+  return {};
+}
+
+}  // namespace
+
+Status FieldSurfaceOptions::validate() const {
+  const OptionCheck check("export");
+  ORBITFUSE_TRY(check("visible_width_px", visible_width_px, from_to(16, 8192)));
+  ORBITFUSE_TRY(check("thermal_width_px", thermal_width_px, from_to(16, 8192)));
+  return surface.validate();
+}
+
+Result<Eigen::AlignedBox3d> object_box(const std::vector<PosedView>& views) {
+  ORBITFUSE_ASSIGN(const OrbitGeometry orbit, orbit_geometry(views));
+  const Eigen::Vector3d half = Eigen::Vector3d::Constant(object_reach * orbit.radius);
+  return Eigen::AlignedBox3d(orbit.center - half, orbit.center + half);
+}
+
+Result<FieldSurface> field_surface(const SurfaceFields& fields, const Eigen::AlignedBox3d& box,
+                                   const FieldSurfaceOptions& options, const Progress& progress) {
+  ORBITFUSE_TRY(options.validate());
+  const bool has_visible = fields.visible && !fields.visible->empty(),
+             has_thermal = fields.thermal && !fields.thermal->empty();
+  if (!has_visible && !has_thermal)
+    return fail(ErrorKind::input, "export", "no trained field", "train one first");
+  if ((has_visible ? fields.visible_views : fields.thermal_views).empty())
+    return fail(ErrorKind::input, "export", "no camera to see the field from",
+                "pose the views first");
+  RenderedOrbit visible, thermal;
+  if (has_visible) {
+    ORBITFUSE_ASSIGN(visible, rendered(*fields.visible, fields.visible_views, {},
+                                       options.visible_width_px, progress));
+  }
+  if (has_thermal) {
+    ORBITFUSE_ASSIGN(thermal,
+                     rendered(*fields.thermal, fields.thermal_views, fields.world_from_thermal,
+                              options.thermal_width_px, progress));
+  }
+  ORBITFUSE_ASSIGN(const TriangleMesh fused, fuse_depth((has_visible ? visible : thermal).depths,
+                                                        box, options.surface, progress));
+  FieldSurface result;
+  result.fused_triangles = fused.triangles.size();
+  result.mesh =
+      simplified(without_small_pieces(fused, options.surface.least_piece * box.sizes().maxCoeff()),
+                 options.surface.triangles);
+  if (result.mesh.empty())
+    return fail(ErrorKind::quality, "surface", "only loose pieces of it in the box",
+                "lower surface.least_piece, or choose a larger box");
+  result.mesh.vertices.normals = vertex_normals(result.mesh);
+  const double angle = options.surface.max_angle_deg;
+  if (has_visible) ORBITFUSE_TRY(add_colors(visible, angle, result, progress));
+  if (has_thermal) ORBITFUSE_TRY(add_temperatures(thermal, angle, result, progress));
+  return result;
+}
+
+}  // namespace orbitfuse

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/export/find_scale.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "app/stages/artifacts.hpp"
+#include "core/system/file_io.hpp"
+
+namespace orbitfuse::exporting {
+namespace {
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+TEST(FindScale, LengthsNeedAUnit) {
+  EXPECT_DOUBLE_EQ(*metres_of("--distance", "1.20m"), 1.2);
+  EXPECT_DOUBLE_EQ(*metres_of("--distance", "35cm"), 0.35);
+  EXPECT_DOUBLE_EQ(*metres_of("--distance", "350mm"), 0.35);
+  for (const char* words : {"", "m", "1.20", "1,20m", "-1m", "0m", "nanm", "infm", "1e9m", "1 m",
+                            "1.2m.", "12in", "0x10m"}) {
+    const auto metres = metres_of("--distance", words);
+    ASSERT_FALSE(metres) << words;
+    EXPECT_EQ(metres.error().kind, ErrorKind::usage);
+  }
+}
+
+/// Cameras on a circle in metres, and as a run of 0.25 m a unit has them, each off by `noise_m`.
+std::vector<PosePair> circle(int count, double noise_m) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0, noise_m);
+  const Similarity3d run_from_metres{
+      4,
+      Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized())),
+      {5, -2, 1}};
+  std::vector<PosePair> pairs;
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Vector3d eye(3 * std::cos(0.5 * i), 3 * std::sin(0.5 * i), 1 + 0.5 * (i % 3));
+    const Rigid3d truth{Eigen::Quaterniond::Identity(), -eye};
+    const Rigid3d seen{Eigen::Quaterniond::Identity(),
+                       -(eye + Eigen::Vector3d(noise(random), noise(random), noise(random)))};
+    pairs.push_back({rebase(seen, run_from_metres), truth, "view"});
+  }
+  return pairs;
+}
+
+TEST(FindScale, CamerasGiveItWithItsUncertainty) {
+  const auto exact = scale_of_cameras(circle(12, 0), "mat");
+  ASSERT_TRUE(exact) << exact.error().message();
+  EXPECT_NEAR(exact->metres_per_unit, 0.25, 1e-9);
+  EXPECT_LT(exact->relative_uncertainty, 1e-6);
+  const auto noisy = scale_of_cameras(circle(12, 0.03), "mat");
+  ASSERT_TRUE(noisy);
+  EXPECT_GT(noisy->relative_uncertainty, 0.0005);
+  EXPECT_LT(std::abs(noisy->metres_per_unit / 0.25 - 1), 3 * noisy->relative_uncertainty);
+  EXPECT_EQ(noisy->source, "mat");
+}
+
+TEST(FindScale, OneWrongCameraDoesNotDecide) {
+  auto pairs = circle(12, 0.001);
+  pairs[5].cam_from_truth.translation += Eigen::Vector3d(0, 1.5, 0);
+  const auto scale = scale_of_cameras(pairs, "mat");
+  ASSERT_TRUE(scale);
+  EXPECT_NEAR(scale->metres_per_unit, 0.25, 0.002);
+}
+
+TEST(FindScale, CamerasThatSayNothingAreNamed) {
+  EXPECT_FALSE(scale_of_cameras(circle(2, 0), "mat"));
+  auto still = circle(12, 0);
+  for (PosePair& pair : still) pair.cam_from_truth = still[0].cam_from_truth;
+  EXPECT_FALSE(scale_of_cameras(still, "mat"));
+  auto others = circle(12, 0);
+  for (std::size_t i = 0; i < others.size(); ++i)  // another order: not the same cameras
+    others[i].cam_from_truth = circle(12, 0)[i * 5 % 12].cam_from_truth;
+  const auto scale = scale_of_cameras(others, "mat");
+  ASSERT_FALSE(scale);
+  EXPECT_EQ(scale.error().kind, ErrorKind::input);
+}
+
+TEST(FindScale, PlacesThatAreNoneAreNamed) {
+  view::FinishedRun run;
+  run.radius = 1;
+  const auto metres = [&](const measurement::Place& a, const measurement::Place& b) {
+    return scale_of_distance(run, a, b, 1.2, {});
+  };
+  const Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  const auto good = metres(origin, Eigen::Vector3d(0.3, 0, 0));
+  ASSERT_TRUE(good);
+  EXPECT_NEAR(good->metres_per_unit, 4, 1e-12);
+  EXPECT_GT(good->relative_uncertainty, 0);
+  EXPECT_THAT(metres(origin, origin).error().message(), HasSubstr("that are one"));
+  EXPECT_FALSE(metres(origin, Eigen::Vector3d(std::nan(""), 0, 0)));
+  EXPECT_FALSE(metres(origin, Eigen::Vector3d(1e300, 0, 0)));
+  EXPECT_THAT(metres(origin, measurement::PixelPlace{"visible/9.jpg", {1, 1}}).error().message(),
+              HasSubstr("no posed view"));
+  // So near each other that pointing is as coarse as the distance.
+  EXPECT_FALSE(metres(origin, Eigen::Vector3d(0.001, 0, 0)));
+}
+
+TEST(MetricScaleFile, IsOfItsPosesOnly) {
+  const fs::path out = fs::path(::testing::TempDir()) / "orbitfuse_scale";
+  fs::remove_all(out);
+  fs::create_directories(out);
+  EXPECT_FALSE(stages::load_metric_scale(out, "world")->has_value());
+  const stages::MetricScale scale{0.25, 0.004, "one distance", "words"};
+  ASSERT_TRUE(stages::save_metric_scale(out, "world", scale));
+  const auto back = stages::load_metric_scale(out, "world");
+  ASSERT_TRUE(back && back->has_value());
+  EXPECT_EQ((*back)->metres_per_unit, 0.25);
+  EXPECT_EQ((*back)->relative_uncertainty, 0.004);
+  EXPECT_THAT(stages::load_metric_scale(out, "another").error().message(),
+              HasSubstr("other poses"));
+  EXPECT_FALSE(stages::save_metric_scale(out, "world", {0, 0.1, "", ""}));
+  EXPECT_FALSE(stages::save_metric_scale(out, "world", {std::nan(""), 0.1, "", ""}));
+  EXPECT_FALSE(stages::save_metric_scale(out, "world", {1, 2, "", ""}));
+  for (const char* text : {"", "[]", "{}", "{\"schema\":1}", "{\"schema\":2}", "not JSON",
+                           "{\"schema\":1,\"world\":5,\"metres_per_unit\":\"x\"}"}) {
+    ASSERT_TRUE(write_file_atomic(out / stages::scale_file, text));
+    EXPECT_FALSE(stages::load_metric_scale(out, "world")) << text;
+  }
+}
+
+}  // namespace
+}  // namespace orbitfuse::exporting
