@@ -2,7 +2,7 @@
 // bench_rig_pairs SCENE...: the test pairs of the rendered scenes, where both modalities share one
 // camera, as a rig whose transform nobody knows: error of the transform and the lens, and by how
 // much corners and centre of the thermal image are misplaced. With the pairs shuffled it must
-// refuse.
+// refuse, and so with the frames of the two orbits in their order.
 
 #include <fmt/format.h>
 #include <cstdio>
@@ -47,6 +47,31 @@ Result<TestPairs> read(const fs::path& folder) {
     frame.modality = Modality::thermal;
     ORBITFUSE_ASSIGN(view.thermal, read_luminance(session, frame));
     view.visible_camera = pairs.camera;
+    pairs.views.push_back(std::move(view));
+  }
+  return pairs;
+}
+
+/// Both orbits' frames by their order, as a folder of equal names would pair them: no rig.
+Result<TestPairs> orbits_as_pairs(const fs::path& folder) {
+  ORBITFUSE_ASSIGN(const GroundTruth truth, read_ground_truth(folder / "ground_truth.json"));
+  TestPairs pairs;
+  Session session;
+  session.folder = folder;
+  const auto& visible = truth.views.at(Modality::visible);
+  const auto& thermal = truth.views.at(Modality::thermal);
+  for (std::size_t i = 0; i < std::min(visible.size(), thermal.size()); ++i) {
+    RigView view;
+    FrameRecord frame;
+    frame.file = view.name = visible[i].name;
+    frame.width = visible[i].camera.width, frame.height = visible[i].camera.height;
+    ORBITFUSE_ASSIGN(view.visible, read_luminance(session, frame));
+    view.visible_camera = visible[i].camera;
+    pairs.camera = thermal[i].camera;
+    frame.file = thermal[i].name;
+    frame.width = pairs.camera.width, frame.height = pairs.camera.height;
+    frame.modality = Modality::thermal;
+    ORBITFUSE_ASSIGN(view.thermal, read_luminance(session, frame));
     pairs.views.push_back(std::move(view));
   }
   return pairs;
@@ -109,6 +134,10 @@ int main(int argc, char** argv) {
       pairs->views[v].thermal = pairs->views[v + 1].thermal;
     pairs->views.back().thermal = first;
     print("shuffled", *pairs, 0.05, 0.05);
+    if (const auto orbits = orbits_as_pairs(data / "orbits" / argv[i]))
+      print("two orbits by one counter", *orbits, 0.03, 0.03);
+    else
+      fmt::print("  {}\n", orbits.error().message());
   }
   return 0;
 }

@@ -316,7 +316,8 @@ Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOpt
     rig.thermal.fx = rig.thermal.fy = rig.thermal.fx * std::exp(log_focal);
   }
   if (!(rig.decisiveness >= options.min_decisiveness &&
-        rig.agreement >= options.min_agreement_ratio * rig.control && best.score > wrong))
+        rig.agreement >= options.min_agreement_ratio * rig.control &&
+        rig.agreement >= options.min_agreement && best.score > wrong))
     return refused(
         fmt::format("{}; correlation of all edges {:.3f}, of shuffled pairs {:.3f} at best",
                     rig.words(), best.score, wrong));

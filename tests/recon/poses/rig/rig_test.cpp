@@ -104,10 +104,15 @@ TEST(Rig, PairsThatAgreeLittleBetterThanShuffledOnesAreNone) {
   ASSERT_GT(believed->control, 0);
   const double ratio = believed->agreement / believed->control;
   EXPECT_GT(ratio, scene.options.min_agreement_ratio);
-  scene.options.min_agreement_ratio = 1.05 * ratio;
-  const auto refused = estimate_rig(scene.views, scene.options, {});
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().kind, ErrorKind::quality);
+  EXPECT_GT(believed->agreement, scene.options.min_agreement);
+  RigOptions stricter = scene.options, strict = scene.options;
+  stricter.min_agreement_ratio = 1.05 * ratio;
+  strict.min_agreement = 1.05 * believed->agreement;
+  for (const RigOptions& options : {stricter, strict}) {
+    const auto refused = estimate_rig(scene.views, options, {});
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().kind, ErrorKind::quality);
+  }
 }
 
 TEST(Rig, ThreePairsAreTooFew) {
