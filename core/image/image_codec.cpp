@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -19,26 +20,40 @@ bool starts_with(std::string_view bytes, std::string_view magic) {
   return bytes.substr(0, magic.size()) == magic;
 }
 
-std::uint32_t big_endian_u32(std::string_view bytes, std::size_t at) {
+std::uint32_t little_endian(std::string_view bytes, std::size_t at, std::size_t count) {
   std::uint32_t value = 0;
-  for (std::size_t i = 0; i < 4; ++i)
-    value = value << 8 | static_cast<unsigned char>(bytes[at + i]);
+  for (std::size_t i = count; i > 0; --i)
+    value = value << 8 | static_cast<unsigned char>(bytes[at + i - 1]);
   return value;
 }
 
-/// OpenCV fills what a cut PNG lacks; the chunk list tells whether the file is whole.
-bool png_is_whole(std::string_view bytes) {
-  std::size_t at = 8;
-  while (at + 12 <= bytes.size()) {
-    const std::size_t length = big_endian_u32(bytes, at);
-    if (length > bytes.size() || at + 12 + length > bytes.size()) return false;
-    if (bytes.substr(at + 4, 4) == "IEND") return true;
-    at += 12 + length;
-  }
-  return false;
+/// OpenCV prints what it finds wrong with a BMP, without a file's name: it gets only whole ones.
+bool bmp_is_whole(std::string_view bytes) {
+  if (bytes.size() < 54) return false;
+  const std::uint64_t pixels_at = little_endian(bytes, 10, 4);
+  const std::uint64_t header = little_endian(bytes, 14, 4);
+  const auto width = static_cast<std::int32_t>(little_endian(bytes, 18, 4));
+  const auto height = static_cast<std::int32_t>(little_endian(bytes, 22, 4));
+  const std::uint64_t rows = static_cast<std::uint64_t>(std::abs(std::int64_t{height}));
+  const std::uint32_t bits = little_endian(bytes, 28, 2), compression = little_endian(bytes, 30, 4);
+  std::uint64_t colors = little_endian(bytes, 46, 4);
+  if (header < 40 || header > 200 || width <= 0 || width > 65536 || rows == 0 || rows > 65536)
+    return false;
+  const bool plain = compression == 0 && (bits == 8 || bits == 24 || bits == 32);
+  const bool masked = compression == 3 && bits == 32;
+  if ((!plain && !masked) || colors > 256) return false;
+  if (bits == 8 && colors == 0) colors = 256;
+  const std::uint64_t row_bytes = (static_cast<std::uint64_t>(width) * bits + 31) / 32 * 4;
+  const std::uint64_t palette_end = 14 + header + 4 * colors + (masked ? 12 : 0);
+  return palette_end <= bytes.size() && pixels_at >= 54 && pixels_at <= bytes.size() &&
+         row_bytes * rows <= bytes.size() - pixels_at;
 }
 
-Result<cv::Mat> decode_with_opencv(std::string_view bytes, const std::string& where) {
+Result<cv::Mat> decode_bmp(std::string_view bytes, const std::string& where) {
+  if (!bmp_is_whole(bytes)) {
+    return fail(ErrorKind::input, where, "truncated, damaged or compressed BMP",
+                "copy the file again, or convert it to PNG");
+  }
   cv::Mat image;
   try {
     const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8UC1,
@@ -110,19 +125,10 @@ Result<cv::Mat> decode_image(std::string_view bytes, const std::string& where) {
       }
       return image;
     }
-    case ImageFormat::png: {
-      if (bytes.size() < 33 || !png_is_whole(bytes)) {
-        return fail(ErrorKind::input, where, "truncated PNG", "copy the file again");
-      }
-      const std::uint64_t samples =
-          std::uint64_t{big_endian_u32(bytes, 16)} * big_endian_u32(bytes, 20);
-      if (samples == 0 || samples > std::uint64_t{max_image_samples}) {
-        return fail(ErrorKind::input, where, "PNG with a damaged size", "copy the file again");
-      }
-      return decode_with_opencv(bytes, where);
-    }
+    case ImageFormat::png:
+      return decode_png(bytes, where);
     case ImageFormat::bmp:
-      return decode_with_opencv(bytes, where);
+      return decode_bmp(bytes, where);
     case ImageFormat::unknown:
       break;
   }

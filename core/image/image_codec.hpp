@@ -44,6 +44,8 @@ Result<cv::Mat> decode_tiff(std::string_view bytes, const std::string& where,
 /// CV_16UC1 or CV_32FC1, deflate with the fitting predictor (lossless).
 Result<std::string> encode_tiff(const cv::Mat& image, const std::string& image_description);
 Result<cv::Mat> decode_jpeg(std::string_view bytes, const std::string& where);
+/// Palettes become colours, alpha is dropped, 16-bit samples keep their counts.
+Result<cv::Mat> decode_png(std::string_view bytes, const std::string& where);
 Result<std::string> encode_png(const cv::Mat& image);
 Result<std::string> encode_jpeg(const cv::Mat& image, int quality);
 

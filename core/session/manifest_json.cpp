@@ -42,9 +42,15 @@ Result<std::int64_t> Reader::integer(const char* key) const {
   return value;
 }
 
+// Ids near 2^64 would wrap where they are counted on; JSON's readers keep integers to 2^53. No
+// camera comes there: it would take 285,000 years at 1,000 frames a second.
+static constexpr std::uint64_t largest_count = std::uint64_t{1} << 53;
+
 Result<std::uint64_t> Reader::count(const char* key) const {
   if (!has(key) || !object_[key].is_number_unsigned()) return wrong(key, "an integer >= 0");
-  return object_[key].get<std::uint64_t>();
+  const auto value = object_[key].get<std::uint64_t>();
+  if (value > largest_count) return wrong(key, "at most 2^53");
+  return value;
 }
 
 Result<Reader> Reader::child(const char* key) const {
@@ -85,6 +91,18 @@ Result<Camera> read_camera(const Reader& line) {
   ORBITFUSE_ASSIGN(c.p1, line.number("p1"));
   ORBITFUSE_ASSIGN(c.p2, line.number("p2"));
   ORBITFUSE_TRY(c.validate("manifest camera"));
+  // Corners of a fitted model may lie beyond where it folds; a middle of an edge that does is no
+  // fit.
+  const double w = c.width, h = c.height;
+  for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(0, h / 2), Eigen::Vector2d(w, h / 2),
+                                       Eigen::Vector2d(w / 2, 0), Eigen::Vector2d(w / 2, h)}) {
+    if (!c.normalized_of(pixel).allFinite())
+      return fail(ErrorKind::input, "manifest camera",
+                  fmt::format("a distortion (k1 {:g}, k2 {:g}, p1 {:g}, p2 {:g}) that folds the "
+                              "image over within its edges",
+                              c.k1, c.k2, c.p1, c.p2),
+                  "correct the camera");
+  }
   return c;
 }
 
@@ -140,6 +158,9 @@ Result<Station> read_station(const Reader& line) {
   ORBITFUSE_ASSIGN(s.index, small_count(line, "index"));
   ORBITFUSE_ASSIGN(s.azimuth_deg, line.number("azimuth_deg"));
   ORBITFUSE_ASSIGN(s.elevation_deg, line.number("elevation_deg"));
+  // Azimuths may count several rounds; a number that no orbit has would make a station of noise.
+  if (std::abs(s.azimuth_deg) > 1e5) return line.wrong("azimuth_deg", "at most 100000 either way");
+  if (std::abs(s.elevation_deg) > 90) return line.wrong("elevation_deg", "-90 to 90");
   ORBITFUSE_ASSIGN(s.azimuth_sigma_deg, station_sigma(line, "azimuth_sigma_deg"));
   ORBITFUSE_ASSIGN(s.elevation_sigma_deg, station_sigma(line, "elevation_sigma_deg"));
   return s;

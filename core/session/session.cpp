@@ -143,7 +143,14 @@ Result<Session> open_session(const std::filesystem::path& folder) {
                 "record or import the session again");
   }
   for (const FrameRecord& frame : session.frames) {
-    if (!session.device(frame.device)) {
+    const DeviceInfo* device = session.device(frame.device);
+    if (device && device->modality != frame.modality) {
+      return fail(ErrorKind::input, file.string(),
+                  fmt::format("{} is {}, its device \"{}\" is {}", frame.file, name(frame.modality),
+                              frame.device, name(device->modality)),
+                  "restore the manifest from a backup");
+    }
+    if (!device) {
       return fail(ErrorKind::input, file.string(),
                   frame.file + " is of unknown device \"" + frame.device + "\"",
                   "restore the manifest from a backup");

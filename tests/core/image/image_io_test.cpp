@@ -2,9 +2,11 @@
 #include "core/image/image_io.hpp"
 
 #include <gtest/gtest.h>
+#include <png.h>
 
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "core/image/image_codec.hpp"
@@ -142,7 +144,95 @@ TEST(ImageIo, APngOfImpossibleSizeIsRefused) {
   for (std::size_t at = 16; at < 24; ++at) bytes[at] = '\xff';
   const auto image = decode_image(bytes, "huge.png");
   ASSERT_FALSE(image);
-  EXPECT_EQ(image.error().found, "PNG with a damaged size");
+  EXPECT_EQ(image.error().where, "huge.png");
+  EXPECT_TRUE(image.error().found.find("PNG") != std::string::npos) << image.error().found;
+}
+
+/// A PNG as libpng's own encoder writes it, of any kind; samples are 0, 1, 2 ...
+std::string png_of(int width, int height, int bits, int kind, bool interlaced) {
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png_create_info_struct(png);
+  std::string out;
+  png_set_write_fn(
+      png, &out,
+      [](png_structp p, png_bytep bytes, std::size_t n) {
+        static_cast<std::string*>(png_get_io_ptr(p))->append(reinterpret_cast<char*>(bytes), n);
+      },
+      nullptr);
+  png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), bits,
+               kind, interlaced ? PNG_INTERLACE_ADAM7 : PNG_INTERLACE_NONE, 0, 0);
+  const png_color colors[4] = {{1, 2, 3}, {40, 50, 60}, {70, 80, 90}, {100, 110, 120}};
+  if (kind == PNG_COLOR_TYPE_PALETTE) png_set_PLTE(png, info, colors, 4);
+  png_write_info(png, info);
+  const std::size_t row_bytes = png_get_rowbytes(png, info);
+  std::vector<std::string> samples(static_cast<std::size_t>(height), std::string(row_bytes, 0));
+  std::vector<png_bytep> rows;
+  char value = 0;
+  for (std::string& row : samples) {
+    for (char& c : row) c = bits < 8 ? '\x1b' : value++;  // 2-bit samples 0 1 2 3
+    rows.push_back(reinterpret_cast<png_bytep>(row.data()));
+  }
+  png_write_image(png, rows.data());
+  png_write_end(png, nullptr);
+  png_destroy_write_struct(&png, &info);
+  return out;
+}
+
+TEST(ImageIo, PngsOfEveryKindBecomeWhatTheyShow) {
+  for (const bool interlaced : {false, true}) {
+    const cv::Mat gray = *decode_image(png_of(8, 4, 8, PNG_COLOR_TYPE_GRAY, interlaced), "gray");
+    EXPECT_EQ(gray.type(), CV_8UC1);
+    EXPECT_EQ(gray.at<unsigned char>(1, 2), 10);
+    const cv::Mat rgb = *decode_image(png_of(8, 4, 8, PNG_COLOR_TYPE_RGB, interlaced), "rgb");
+    EXPECT_EQ(rgb.at<cv::Vec3b>(0, 1), cv::Vec3b(5, 4, 3));
+    const cv::Mat rgba =
+        *decode_image(png_of(8, 4, 8, PNG_COLOR_TYPE_RGB_ALPHA, interlaced), "rgba");
+    EXPECT_EQ(rgba.at<cv::Vec3b>(0, 1), cv::Vec3b(6, 5, 4));
+    const cv::Mat deep = *decode_image(png_of(8, 4, 16, PNG_COLOR_TYPE_GRAY, interlaced), "deep");
+    EXPECT_EQ(deep.type(), CV_16UC1);
+    EXPECT_EQ(deep.at<std::uint16_t>(0, 1), 0x0203);
+    const cv::Mat palette =
+        *decode_image(png_of(8, 4, 2, PNG_COLOR_TYPE_PALETTE, interlaced), "palette");
+    EXPECT_EQ(palette.at<cv::Vec3b>(3, 1), cv::Vec3b(60, 50, 40));
+    const cv::Mat few = *decode_image(png_of(8, 4, 2, PNG_COLOR_TYPE_GRAY, interlaced), "few");
+    EXPECT_EQ(few.at<unsigned char>(0, 3), 255);
+  }
+}
+
+TEST(ImageIo, DecodersPrintNothingAndErrorsNameTheFile) {
+  const cv::Mat color = gradient_bgr();
+  cv::Mat deep;
+  color.convertTo(deep, CV_16U, 200);
+  cv::extractChannel(deep, deep, 1);
+  std::vector<unsigned char> bmp;
+  ASSERT_TRUE(cv::imencode(".bmp", color, bmp));
+  testing::internal::CaptureStderr();
+  testing::internal::CaptureStdout();
+  int refused = 0;
+  std::string unnamed;
+  std::uint32_t state = 77;
+  for (const std::string& whole : {*encode_png(color), *encode_png(deep), *encode_jpeg(color, 90),
+                                   *encode_tiff(deep, "t"), std::string(bmp.begin(), bmp.end())}) {
+    for (int round = 0; round < 300; ++round) {
+      std::string bytes = whole;
+      const auto next = [&](std::size_t below) {
+        state = state * 1664525u + 1013904223u;
+        return (state >> 8) % below;
+      };
+      // Headers half of the time, the whole file the other half; cut every fifth time.
+      const std::size_t reach = round % 2 == 0 ? 60 : bytes.size();
+      for (int k = 0; k < 1 + round % 3; ++k) bytes[next(reach)] = static_cast<char>(next(256));
+      if (round % 5 == 0) bytes.resize(next(bytes.size()));
+      const auto image = decode_image(bytes, "hurt file");
+      if (image) continue;
+      ++refused;
+      if (image.error().where.find("hurt file") == std::string::npos) unnamed = image.error().where;
+    }
+  }
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
+  EXPECT_GT(refused, 300);
+  EXPECT_EQ(unnamed, "");
 }
 
 TEST(ImageIo, SixteenBitWhereEightIsExpected) {

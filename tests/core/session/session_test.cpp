@@ -20,7 +20,7 @@ FrameRecord full_frame() {
   f.file = "thermal/000000.tiff";
   f.width = 640;
   f.height = 480;
-  f.sequence = 18446744073709551615ull;
+  f.sequence = 9007199254740992ull;  // 2^53
   f.host_time_ns = 1790000000123456789;
   f.device_time_ns = -5;
   f.station = Station{1, 7, 210.5, 34.25, std::nullopt, 4};
@@ -130,6 +130,8 @@ TEST_F(SessionTest, WrongTypesNameTheField) {
       {"\"translation\":[", "\"translation\":[null,"},
       {"\"azimuth_deg\":210.5", "\"azimuth_deg\":null"},
       {"\"host_time_ns\":", "\"host_time_ns\":18446744073709551615,\"x\":"},
+      {"\"sequence\":9007199254740992", "\"sequence\":18446744073709551615"},
+      {"\"sequence\":9007199254740992", "\"sequence\":9007199254740993"},
       {"\"host_time_ns\":", "\"host_time_ns\":-9223372036854775808,\"x\":"}};
   for (const auto& [from, to] : edits) {
     std::string text = manifest();
@@ -146,6 +148,52 @@ TEST_F(SessionTest, WrongTypesNameTheField) {
     ASSERT_FALSE(s) << to;
     EXPECT_EQ(s.error().kind, ErrorKind::input);
   }
+}
+
+TEST_F(SessionTest, CountsThatWouldWrapAreRefused) {
+  for (const auto& [from, field] : {std::pair{R"("first_sequence":3)", "first_sequence"},
+                                    {R"("count":9)", "count"},
+                                    {R"("last_sequence":20)", "last_sequence"},
+                                    {R"("received":11)", "received"},
+                                    {R"("lost":9)", "lost"}}) {
+    std::string text = manifest();
+    const std::size_t at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    text.replace(at, std::string(from).size(),
+                 "\"" + std::string(field) + "\":18446744073709551610");
+    const auto s = open(text);
+    ASSERT_FALSE(s) << field;
+    EXPECT_NE(s.error().where.find(field), std::string::npos) << s.error().where;
+  }
+}
+
+TEST_F(SessionTest, LensesThatFoldAndStationsOfNoOrbitAreRefused) {
+  const std::pair<const char*, const char*> edits[] = {
+      {"\"k1\":0.0", "\"k1\":-50.0"},
+      {"\"azimuth_deg\":210.5", "\"azimuth_deg\":1e300"},
+      {"\"elevation_deg\":34.25", "\"elevation_deg\":91"}};
+  for (const auto& [from, to] : edits) {
+    std::string text = manifest();
+    const std::size_t at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    text.replace(at, std::string(from).size(), to);
+    EXPECT_FALSE(open(text)) << to;
+  }
+  // A wide lens bends more than most and is one nevertheless.
+  std::string text = manifest();
+  text.replace(text.find("\"k1\":0.0"), 8, "\"k1\":-0.3");
+  EXPECT_TRUE(open(text));
+}
+
+TEST_F(SessionTest, AFrameOfAnotherModalityThanItsDeviceIsNamed) {
+  std::string text = manifest();
+  const std::string from = "\"modality\":\"thermal\"";
+  text.replace(text.find(from, text.find("thermal/000000.tiff")), from.size(),
+               "\"modality\":\"visible\"");
+  const auto s = open(text);
+  ASSERT_FALSE(s);
+  EXPECT_NE(s.error().found.find("thermal/000000.tiff is visible"), std::string::npos)
+      << s.error().found;
 }
 
 TEST_F(SessionTest, PathsThatLeaveTheFolderAreRefused) {
