@@ -147,7 +147,7 @@ Status write_pairs(const fs::path& folder, const view::FinishedRun& run, const E
 
 }  // namespace
 
-Result<Dataset> write_dataset(const fs::path& folder, const view::FinishedRun& run,
+Result<PairSet> write_dataset(const fs::path& folder, const view::FinishedRun& run,
                               const ExportFrame& frame, const DatasetOptions& options,
                               const Progress& progress) {
   std::error_code error;
@@ -170,7 +170,7 @@ Result<Dataset> write_dataset(const fs::path& folder, const view::FinishedRun& r
   fs::rename(partial, folder, error);
   if (error)
     return fail(ErrorKind::device, folder.string(), error.message(), "see who may write there");
-  return Dataset{cameras.views.size(), cameras.described};
+  return PairSet{cameras.views.size(), cameras.described};
 }
 
 }  // namespace orbitfuse::exporting

@@ -19,7 +19,7 @@ struct DatasetOptions {
   NewViewOptions path;  ///< of new cameras
 };
 
-struct Dataset {
+struct PairSet {
   std::size_t pairs = 0;
   std::string described;
 };
@@ -30,7 +30,7 @@ struct Dataset {
 /// thermal_kelvin/ (what the thermal pictures stand for). Poses are in the export's frame. The
 /// folder appears whole or not at all. Errors: usage (the folder exists and is not empty), input
 /// (not both fields, photos that are gone), device, cancelled.
-Result<Dataset> write_dataset(const std::filesystem::path& folder, const view::FinishedRun& run,
+Result<PairSet> write_dataset(const std::filesystem::path& folder, const view::FinishedRun& run,
                               const ExportFrame& frame, const DatasetOptions& options,
                               const Progress& progress);
 

@@ -127,11 +127,11 @@ Status export_dataset(Context& context, const Options& o, const view::FinishedRu
   DatasetOptions options;
   options.path = context.config.render.path;
   if (o.poses == "new") options.poses = DatasetPoses::fresh;
-  ORBITFUSE_ASSIGN(const Dataset dataset,
+  ORBITFUSE_ASSIGN(const PairSet pairs,
                    write_dataset(o.dataset, run, frame, options, context.progress));
-  context.result["dataset"] = {{"folder", o.dataset}, {"pairs", dataset.pairs}};
+  context.result["dataset"] = {{"folder", o.dataset}, {"pairs", pairs.pairs}};
   context.console.data(o.dataset);
-  context.console.info(fmt::format("{} pairs: {}", dataset.pairs, dataset.described));
+  context.console.info(fmt::format("{} pairs: {}", pairs.pairs, pairs.described));
   return {};
 }
 
