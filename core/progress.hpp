@@ -22,10 +22,11 @@ struct Progress {
   const std::atomic<bool>* cancel = nullptr;  ///< set by Ctrl-C
 
   bool cancelled() const { return cancel && cancel->load(std::memory_order_relaxed); }
-  /// Error of kind cancelled when the user asked to stop.
+  /// Error of kind cancelled when the user asked to stop. Whoever keeps half-done work adds how it
+  /// goes on (the stages of a run: --resume); most operations keep none.
   Status check(const std::string& stage) const {
     if (!cancelled()) return {};
-    return fail(ErrorKind::cancelled, stage, "stopped by the user", "run again with --resume");
+    return fail(ErrorKind::cancelled, stage, "stopped by the user", "run it again");
   }
 };
 

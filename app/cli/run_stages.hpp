@@ -31,8 +31,7 @@ enum class Missing {
   leave_out  ///< stays away: the targets work with what is there
 };
 
-/// For verbs that keep nothing half done: after Ctrl-C there is nothing that --resume could go on
-/// with, whatever the work that was stopped advises.
+/// For verbs that keep nothing half done: says that what was there before Ctrl-C still is.
 Error without_resume(Error error);
 
 /// Runs the targets and all they read, says how each stage fared, and fills the --json result.
