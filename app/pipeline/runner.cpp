@@ -320,6 +320,7 @@ StageStatus Runner::execute(const Stage& stage, const Key& key, std::string why)
   }
   status.state = StageState::failed;
   status.error = finished.error();
+  if (status.error->kind == ErrorKind::cancelled) status.error->remedy = "run again with --resume";
   // What was done so far helps --resume after Ctrl-C or a full disk, and a look after a missed
   // gate; it never takes the place of an earlier result.
   if (stops_everything(status.error->kind)) {

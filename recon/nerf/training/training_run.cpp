@@ -200,8 +200,7 @@ Result<bool> TrainingRun::step(double fraction_now) {
     pause();
     ORBITFUSE_TRY(save());
     return fail(ErrorKind::cancelled, stage_,
-                fmt::format("stopped by the user at step {}", state_->step),
-                options_.checkpoint.empty() ? "run again" : "run again with --resume");
+                fmt::format("stopped by the user at step {}", state_->step), "run it again");
   }
   if (!trainer_->step(fraction_now)) ++state_->history.skipped_steps;
   return true;

@@ -163,6 +163,7 @@ TEST_F(RunnerTest, CancelledBeforeAStageKeepsTheRest) {
   cancel = true;
   const RunSummary summary = run();
   EXPECT_EQ(summary.error->kind, ErrorKind::cancelled);
+  EXPECT_EQ(summary.error->remedy, "run again with --resume");
   EXPECT_TRUE(runs.empty());
 }
 

@@ -341,8 +341,8 @@ TEST_F(ViewBrowserTest, FitsAPhone) {
 
 TEST_F(ViewBrowserTest, AFingerMeasuresOnAPhone) {
   if (std::getenv("ORBITFUSE_VIEW_RUN") == nullptr)
-    GTEST_SKIP() << "on the fixture's run a finger in the middle measures nothing; why is not "
-                    "known yet: name a run with ORBITFUSE_VIEW_RUN";
+    GTEST_SKIP() << "the fixture's field has no surface in the middle of a phone's first view, so "
+                    "/pick refuses the touch: name a run with ORBITFUSE_VIEW_RUN";
   orbitfuse::test::Browser page(folder.path() / "profile", 390, 844, true);
   page.open(url);
   ASSERT_TRUE(page.becomes("viewer.surface.points"));
