@@ -206,13 +206,7 @@ Status run_stages(Context& context, const StageFolders& given,
     Status written = write_file_atomic(fs::path(folders.out) / run_file, run.dump(2) + "\n");
     if (!written && !summary.error) return written;
   }
-  if (summary.error) {
-    Error error = *summary.error;
-    // A stage that keeps what it has done says so itself.
-    if (error.kind == ErrorKind::cancelled && error.remedy.find("--resume") == std::string::npos)
-      error.remedy = "run again with --resume: what is finished stays";
-    return tl::unexpected(error);
-  }
+  if (summary.error) return tl::unexpected(*summary.error);
   const StageStatus* report = summary.find("report");
   if (report && report->done()) {
     const std::string page = (fs::path(folders.out) / "report" / "report.html").string();
