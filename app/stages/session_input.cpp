@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <mutex>
+#include <unordered_map>
 
 #include "core/image/image_io.hpp"
 #include "core/system/file_io.hpp"
@@ -39,6 +39,23 @@ Status check_frame(const Session& session, const FrameRecord& frame, std::string
   return check_size(frame, path, image.cols, image.rows);
 }
 
+/// Frames whose file is the one that was recorded for another frame: their times, stations and
+/// poses are another picture's. Equal frames under one hash can't be told apart, and needn't.
+void find_exchanged(const Session& session, const std::vector<std::string>& hashes,
+                    std::vector<Status>& problems) {
+  std::unordered_map<std::string, const FrameRecord*> recorded;
+  for (const FrameRecord& frame : session.frames)
+    if (!frame.content_hash.empty()) recorded.emplace(frame.content_hash, &frame);
+  for (std::size_t i = 0; i < problems.size(); ++i) {
+    const FrameRecord& frame = session.frames[i];
+    if (frame.content_hash.empty() || hashes[i] == frame.content_hash) continue;
+    if (const auto found = recorded.find(hashes[i]); found != recorded.end())
+      problems[i] = fail(ErrorKind::input, session.path_of(frame).string(),
+                         "holds what was recorded as " + found->second->file,
+                         "files were exchanged or copied over each other: restore them");
+  }
+}
+
 /// Every frame looked at, and by its number what is wrong with it. Error: cancelled.
 Result<std::vector<Status>> check_frames(const Session& session, const Progress& progress,
                                          std::vector<std::string>& hashes) {
@@ -49,6 +66,7 @@ Result<std::vector<Status>> check_frames(const Session& session, const Progress&
     if (!progress.cancelled()) problems[k] = check_frame(session, session.frames[k], hashes[k]);
   });
   ORBITFUSE_TRY(progress.check("session"));
+  find_exchanged(session, hashes, problems);
   return problems;
 }
 
@@ -81,12 +99,17 @@ bool SessionInput::has_temperatures() const {
   });
 }
 
-Result<std::vector<Error>> damaged_frames(const Session& session, const Progress& progress) {
+Result<FrameFindings> look_at_frames(const Session& session, const Progress& progress) {
   std::vector<std::string> hashes;
   ORBITFUSE_ASSIGN(const std::vector<Status> problems, check_frames(session, progress, hashes));
-  std::vector<Error> found;
-  for (const Status& problem : problems)
-    if (!problem) found.push_back(problem.error());
+  FrameFindings found;
+  for (std::size_t i = 0; i < problems.size(); ++i) {
+    const FrameRecord& frame = session.frames[i];
+    if (!problems[i])
+      found.damaged.push_back(problems[i].error());
+    else if (!frame.content_hash.empty() && frame.content_hash != hashes[i])
+      found.changed.push_back(frame.file);
+  }
   return found;
 }
 

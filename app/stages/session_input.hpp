@@ -27,9 +27,14 @@ struct SessionInput {
 /// SessionInput::content of one modality, without decoding its frames.
 Result<std::string> modality_content(const Session& session, Modality modality);
 
-/// What is wrong with each frame whose file is cut, changed beyond use or of another kind; every
-/// frame is looked at.
-Result<std::vector<Error>> damaged_frames(const Session& session, const Progress& progress);
+struct FrameFindings {
+  /// What is wrong with each frame whose file is cut, of another kind or another frame's.
+  std::vector<Error> damaged;
+  /// Files that are good images, but not the bytes that were recorded: somebody's edits.
+  std::vector<std::string> changed;
+};
+/// Every frame is looked at. Error: cancelled.
+Result<FrameFindings> look_at_frames(const Session& session, const Progress& progress);
 
 /// Input error that names the first frame whose file is missing, cut, or no image of the kind its
 /// modality needs, and what to do.

@@ -9,6 +9,7 @@
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
 #include "app/pipeline/stage_record.hpp"
+#include "app/stages/artifacts.hpp"
 #include "app/stages/session_input.hpp"
 #include "core/session/session.hpp"
 
@@ -104,6 +105,11 @@ Status inspect_run(Context& context, const fs::path& folder) {
                                      record->output.metrics.value("brief", std::string())));
     stages.push_back(to_json(*record));
   }
+  const auto run = stages::read_json(folder / "run.json");
+  if (!run || !run->is_object()) {
+    damaged.push_back("run.json: not JSON, or cut off");
+    context.console.warning(damaged.back() + "; run again with the session folder and --out");
+  }
   context.result = {{"out", folder.string()}, {"stages", stages}, {"damaged", damaged}};
   if (damaged.empty()) return {};
   return fail(ErrorKind::input, folder.string(), damaged.front(),
@@ -139,8 +145,12 @@ Status inspect_session(Context& context, const fs::path& folder) {
       for (const json& group : j["groups"]) context.console.data(described(group));
   }
   for (const std::string& warning : session.warnings) context.console.warning(warning);
-  ORBITFUSE_ASSIGN(const std::vector<Error> damaged,
-                   stages::damaged_frames(session, context.progress));
+  ORBITFUSE_ASSIGN(const stages::FrameFindings found,
+                   stages::look_at_frames(session, context.progress));
+  const auto& damaged = found.damaged;
+  context.result["changed"] = found.changed;
+  for (const std::string& file : found.changed)
+    context.console.warning(file + ": changed since it was recorded; it is used as it is now");
   context.result["damaged"] = json::array();
   for (const Error& error : damaged) {
     context.result["damaged"].push_back(error.message());

@@ -65,8 +65,14 @@ ExifInfo read_exif(std::string_view bytes) {
   const std::lock_guard lock(mutex);
   try {
     Exiv2::LogMsg::setLevel(Exiv2::LogMsg::mute);
-    const auto image = Exiv2::ImageFactory::open(reinterpret_cast<const Exiv2::byte*>(bytes.data()),
-                                                 static_cast<long>(bytes.size()));
+    const auto* data_begin = reinterpret_cast<const Exiv2::byte*>(bytes.data());
+    const auto size = static_cast<long>(bytes.size());
+    // It also reads videos, for minutes when a size in them is damaged.
+    const int type = Exiv2::ImageFactory::getType(data_begin, size);
+    if (type != Exiv2::ImageType::jpeg && type != Exiv2::ImageType::png &&
+        type != Exiv2::ImageType::tiff)
+      return info;
+    const auto image = Exiv2::ImageFactory::open(data_begin, size);
     image->readMetadata();
     const Exiv2::ExifData& data = image->exifData();
     const double orientation = number_of(data, "Exif.Image.Orientation").value_or(1);

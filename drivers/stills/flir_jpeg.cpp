@@ -138,6 +138,8 @@ void read_camera_info(std::string_view record, FlirImage& image) {
   a.beta1 = info.f32(0x78);
   a.beta2 = info.f32(0x7c);
   a.x = info.f32(0x80);
+  image.lowest_signal = info.u16(0x310);
+  image.highest_signal = info.u16(0x312);
   image.camera_model = info.text(0xd4, 32);
   image.camera_serial = info.text(0x104, 16);
   const double fov = info.f32(0x1b4);
@@ -259,6 +261,14 @@ Result<FlirImage> read_flir_file(std::string_view file, const std::string& where
   FlirImage image;
   read_camera_info(info->second, image);
   ORBITFUSE_ASSIGN(image.signal, read_raw_data(raw->second, info->second, where));
+  // A range that most of the image lies beyond is none (other firmware may keep something else
+  // there).
+  const double median = median_of(image.signal);
+  if (median < image.lowest_signal || median > image.highest_signal ||
+      image.lowest_signal >= image.highest_signal) {
+    image.lowest_signal = 0;
+    image.highest_signal = 65535;
+  }
   if (const auto e = records.by_type.find(embedded_image);
       e != records.by_type.end() && e->second.size() > 0x20) {
     image.embedded_visible = e->second.substr(0x20);

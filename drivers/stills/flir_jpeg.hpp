@@ -16,6 +16,10 @@ namespace orbitfuse {
 /// What a FLIR radiometric JPEG holds.
 struct FlirImage {
   cv::Mat signal;  ///< CV_16UC1, raw sensor counts
+  /// Signals in between are what the camera was calibrated for; at an end, and beyond, they mean
+  /// "that or less" and "that or more". The camera's own range, or all counts where it names none
+  /// that the image fits.
+  int lowest_signal = 0, highest_signal = 65535;
   FlirCalibration calibration;
   std::string camera_model, camera_serial;
   std::optional<double> horizontal_fov_deg;

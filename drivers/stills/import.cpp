@@ -162,11 +162,13 @@ class Importer {
     return thermal_file(paged_bytes_, source.file, source.page);
   }
 
-  void tell_lost_samples(const StillPhoto& still, const Source& source) {
+  void tell_lost_samples(StillPhoto& still, const Source& source) {
     if (still.without_temperature == 0) return;
+    still.frame.flag(FrameFlag::clipped);
     report_.warnings.push_back(fmt::format(
         "{}: {} of {} samples have no temperature that can be stored (above 0 K, at "
-        "most {:.0f} C, and not the last count, which means that or hotter): dead pixels",
+        "most {:.0f} C, and not at an end of the camera's range or counts, which mean that or "
+        "hotter, or colder): dead pixels",
         source.short_name(), still.without_temperature, still.size.width * still.size.height,
         celsius_from_kelvin(65535 * still.frame.kelvin_per_count)));
   }

@@ -197,8 +197,8 @@ void ThermalDecoder::observe_jpeg(const FlirImage& image) {
   double low = 0, high = 0;
   cv::minMaxLoc(image.signal, &low, &high);
   // The hottest signals may be ones that no temperature gives.
-  for (int signal = std::min(static_cast<int>(high), 65534); signal >= static_cast<int>(low);
-       --signal) {
+  for (int signal = std::min(static_cast<int>(high), image.highest_signal - 1);
+       signal >= static_cast<int>(low); --signal) {
     const double kelvin = thermometer.kelvin(static_cast<std::uint16_t>(signal));
     if (!std::isfinite(kelvin)) continue;
     hottest_k_ = std::max(hottest_k_, kelvin);
@@ -302,7 +302,9 @@ Result<ThermalDecoder::Converted> ThermalDecoder::convert(const ThermalFile& fil
   calibration.object = with_overrides(calibration.object, options_.object);
   ORBITFUSE_TRY(calibration.validate(where));
   std::vector<double> kelvin = kelvin_table(calibration);
-  kelvin.back() = std::nan("");
+  const auto end = [&](int signal) { return kelvin.begin() + signal; };
+  std::fill(kelvin.begin(), end(file.flir->lowest_signal + 1), std::nan(""));
+  std::fill(end(file.flir->highest_signal), kelvin.end(), std::nan(""));
   ORBITFUSE_ASSIGN(Converted out, stored(file.flir->signal, kelvin, where));
   out.radiometry = calibration;
   return out;

@@ -69,7 +69,7 @@ std::string raw_record(const cv::Mat& signal, FlirPixels pixels) {
   return record + *encode_png(swapped);
 }
 
-std::string camera_record(const cv::Mat& signal, const FlirCalibration& c) {
+std::string camera_record(const cv::Mat& signal, const FlirCalibration& c, SignalRange range) {
   std::string record(0x400, '\0');
   put_number(record, 0, 2, 2);
   const std::pair<std::size_t, double> numbers[] = {{0x20, c.object.emissivity},
@@ -93,10 +93,8 @@ std::string camera_record(const cv::Mat& signal, const FlirCalibration& c) {
   put_number(record, 0x308, static_cast<std::uint32_t>(static_cast<std::int32_t>(c.planck.o)), 4);
   record.replace(0xd4, 12, "Made T640 IR");
   record.replace(0x104, 6, "000042");
-  double low = 0, high = 0;
-  cv::minMaxLoc(signal, &low, &high);
-  put_number(record, 0x310, static_cast<std::uint64_t>(low), 2);
-  put_number(record, 0x312, static_cast<std::uint64_t>(high), 2);
+  put_number(record, 0x310, static_cast<std::uint64_t>(range.lowest), 2);
+  put_number(record, 0x312, static_cast<std::uint64_t>(range.highest), 2);
   put_number(record, 0x338, signal.at<std::uint16_t>(signal.rows / 2, signal.cols / 2), 2);
   put_number(record, 0x384, 1'700'000'000, 4);
   return record;
@@ -134,9 +132,9 @@ std::uint16_t flir_signal(double kelvin, const FlirCalibration& c) {
 }
 
 std::string flir_file(const cv::Mat& signal, const FlirCalibration& calibration, FlirPixels pixels,
-                      const std::string& embedded_photo) {
-  std::vector<std::pair<int, std::string>> records{{0x01, raw_record(signal, pixels)},
-                                                   {0x20, camera_record(signal, calibration)}};
+                      const std::string& embedded_photo, SignalRange range) {
+  std::vector<std::pair<int, std::string>> records{
+      {0x01, raw_record(signal, pixels)}, {0x20, camera_record(signal, calibration, range)}};
   if (!embedded_photo.empty()) records.emplace_back(0x0e, std::string(0x20, '\0') + embedded_photo);
   std::string file(64 + 32 * records.size(), '\0');
   file.replace(0, 4, "FFF\0", 4);
@@ -153,8 +151,9 @@ std::string flir_file(const cv::Mat& signal, const FlirCalibration& calibration,
 }
 
 std::string flir_jpeg(const cv::Mat& signal, const FlirCalibration& calibration, FlirPixels pixels,
-                      const std::string& embedded_photo, std::size_t segment_bytes) {
-  const std::string file = flir_file(signal, calibration, pixels, embedded_photo);
+                      const std::string& embedded_photo, std::size_t segment_bytes,
+                      SignalRange range) {
+  const std::string file = flir_file(signal, calibration, pixels, embedded_photo, range);
   cv::Mat picture;
   signal.convertTo(picture, CV_8U, 1.0 / 256);
   const std::string jpeg = *encode_jpeg(picture, 80);

@@ -17,15 +17,19 @@ FlirCalibration flir_calibration();
 std::uint16_t flir_signal(double kelvin, const FlirCalibration& calibration);
 
 enum class FlirPixels { raw, png, jpeg_ls };
+/// What the camera record says its calibration reaches over.
+struct SignalRange {
+  int lowest = 1, highest = 65535;
+};
 /// A FLIR radiometric JPEG: raw thermal record (CV_16UC1), camera record, and an embedded photo
 /// unless empty, in APP1 segments of at most `segment_bytes`.
 std::string flir_jpeg(const cv::Mat& signal, const FlirCalibration& calibration,
                       FlirPixels pixels = FlirPixels::raw, const std::string& embedded_photo = {},
-                      std::size_t segment_bytes = 60000);
+                      std::size_t segment_bytes = 60000, SignalRange range = {});
 
 /// The FFF file inside it; several in a row are a recording.
 std::string flir_file(const cv::Mat& signal, const FlirCalibration& calibration, FlirPixels pixels,
-                      const std::string& embedded_photo);
+                      const std::string& embedded_photo, SignalRange range = {});
 
 /// A thermal JPEG of a DJI drone: counts of a known size in APP3, parameters in APP4 as newer ones
 /// have them, DJI as maker.

@@ -135,6 +135,33 @@ TEST_F(Hostile, InspectLooksAtTheFrames) {
                                  HasSubstr("2 of 24")));
 }
 
+TEST_F(Hostile, ExchangedFramesAreToldAndEditedOnesNamed) {
+  write_fixture_session(path("s"));
+  fs::rename(path("s/visible/000003.png"), path("kept"));
+  fs::rename(path("s/visible/000007.png"), path("s/visible/000003.png"));
+  fs::rename(path("kept"), path("s/visible/000007.png"));
+  cv::Mat edited = *read_visible(path("s/visible/000001.png"));
+  edited.at<cv::Vec3b>(3, 3) = {1, 2, 3};
+  ASSERT_TRUE(write_png(path("s/visible/000001.png"), edited));
+  const Outcome outcome = orbitfuse_program({"inspect", path("s"), "--json"});
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_EQ(outcome.result().at("damaged").size(), 2u);
+  EXPECT_EQ(outcome.result().at("changed"), nlohmann::json({"visible/000001.png"}));
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("holds what was recorded as visible/000007.png"),
+                                 HasSubstr("holds what was recorded as visible/000003.png"),
+                                 HasSubstr("visible/000001.png: changed since")));
+  refused(orbitfuse_program({"poses", path("s"), "--out", path("o")}), 3,
+          "holds what was recorded");
+}
+
+TEST_F(Hostile, ADamagedRunJsonIsToldByInspect) {
+  write_fixture_session(path("s"));
+  ASSERT_EQ(orbitfuse_program({"poses", path("s"), "--out", path("o")}).code, 0);
+  EXPECT_EQ(orbitfuse_program({"inspect", path("o")}).code, 0);
+  std::ofstream(path("o/run.json")) << "{\"cut";
+  refused(orbitfuse_program({"inspect", path("o")}), 3, "run.json");
+}
+
 TEST_F(Hostile, ReportTellsWhatIsThereAndMakesNothing) {
   write_fixture_session(path("s"));
   const auto report = [&] { return orbitfuse_program({"report", path("s"), "--out", path("o")}); };

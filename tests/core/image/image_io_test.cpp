@@ -9,6 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/image/exif.hpp"
 #include "core/image/image_codec.hpp"
 #include "core/system/file_io.hpp"
 #include "core/temperature.hpp"
@@ -127,6 +128,15 @@ TEST(ImageIo, DamagedBytesNeverCrash) {
       (void)decode_image(bytes, "damaged");  // an image or an error, within the sanitizers
     }
   }
+}
+
+TEST(ImageIo, AVideoInsideATiffsHeaderIsNotWalkedForItsExif) {
+  // Found by the fuzzer: 102 bytes that kept Exiv2's video reader busy for minutes.
+  const std::string bytes =
+      *read_file(ORBITFUSE_SOURCE_DIR "/tests/fuzz/cases/photo/exif_of_a_video_without_end");
+  ASSERT_EQ(bytes.size(), 102u);
+  EXPECT_FALSE(read_exif(bytes).focal_mm);
+  EXPECT_FALSE(decode_image(bytes, "f"));
 }
 
 TEST(ImageIo, OtherContentUnderTheNameIsToldApart) {

@@ -332,6 +332,35 @@ TEST_F(HostileImport, TheLastCountOfAFileIsNoTemperature) {
   EXPECT_THAT(report->warnings, Contains(HasSubstr("1.tiff: 2 of 1200 samples")));
 }
 
+TEST_F(HostileImport, TheEndsOfAFlirCamerasRangeAreNoTemperatures) {
+  const FlirCalibration camera = made::flir_calibration();
+  const made::SignalRange range{2500, 5000};
+  cv::Mat signal(30, 40, CV_16UC1, cv::Scalar(made::flir_signal(300, camera)));
+  ASSERT_GT(signal.at<std::uint16_t>(0, 0), range.lowest);
+  ASSERT_LT(signal.at<std::uint16_t>(0, 0), range.highest);
+  signal(cv::Rect(4, 5, 3, 2)).setTo(range.highest);
+  signal(cv::Rect(4, 8, 1, 1)).setTo(range.highest + 3000);
+  signal(cv::Rect(4, 9, 2, 2)).setTo(range.lowest);
+  signal(cv::Rect(9, 9, 1, 1)).setTo(range.lowest + 1);
+  signal(cv::Rect(9, 5, 1, 1)).setTo(range.highest - 1);
+  put("in/0.jpg", made::flir_jpeg(signal, camera, made::FlirPixels::raw, {}, 60000, range));
+  // A range beside which the image lies is not believed.
+  put("in/1.jpg", made::flir_jpeg(signal + 1, camera, made::FlirPixels::raw, {}, 60000, {3, 7}));
+  options.thermal = {folder / "in"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  const cv::Mat kelvin = kelvin_of(*report, 0);
+  for (const cv::Point dead : {cv::Point(4, 5), cv::Point(6, 6), cv::Point(4, 8), cv::Point(5, 10)})
+    EXPECT_TRUE(std::isnan(kelvin.at<float>(dead))) << dead;
+  for (const cv::Point good : {cv::Point(0, 0), cv::Point(9, 9), cv::Point(9, 5)})
+    EXPECT_FALSE(std::isnan(kelvin.at<float>(good))) << good;
+  EXPECT_THAT(report->warnings,
+              Contains(AllOf(HasSubstr("0.jpg: 11 of 1200 samples"), HasSubstr("that or hotter"))));
+  EXPECT_TRUE(report->session.frames[0].has_flag(FrameFlag::clipped));
+  EXPECT_FALSE(report->session.frames[1].has_flag(FrameFlag::clipped));
+  EXPECT_FALSE(std::isnan(kelvin_of(*report, 1).at<float>(5, 4)));
+}
+
 TEST_F(HostileImport, LinksToNothingAndPipesAreNamed) {
   put_photo("in/a.jpg", 1);
   fs::create_symlink("nowhere.jpg", folder / "in/link.jpg");
