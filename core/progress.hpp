@@ -23,8 +23,8 @@ struct Progress {
   const std::atomic<bool>* cancel = nullptr;  ///< set by Ctrl-C
 
   bool cancelled() const { return cancel && cancel->load(std::memory_order_relaxed); }
-  /// Error of kind cancelled when the user asked to stop. Who can go on from where it stopped says so
-  /// in its place.
+  /// Error of kind cancelled when the user asked to stop. Who can go on from where it stopped says
+  /// so in its place.
   Status check(const std::string& stage) const {
     if (!cancelled()) return {};
     return fail(ErrorKind::cancelled, stage, "stopped by the user", "call it again");

@@ -193,7 +193,7 @@ Result<MetricScale> scale_of_mat(const view::FinishedRun& run, const MatDesign& 
   std::vector<PosePair> pairs;
   int looked = 0;
   for (const view::RecordedView& v : run.views) {
-    if (v.modality != Modality::visible || !v.doubt.empty()) continue;
+    if (v.modality != Modality::visible || v.doubt) continue;
     ORBITFUSE_TRY(progress.check("mat"));
     ++looked;
     // A new finder for each: what it would follow from one image to the next is not read.

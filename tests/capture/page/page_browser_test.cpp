@@ -70,7 +70,9 @@ class BrowserTest : public ::testing::Test {
       stream.modality = Modality::thermal;
       if (away) stream.away = Absence{8.2, "no frame for a second"};
       state.streams = {stream};
-      for (int i = 0; i < done; ++i) state.sectors[static_cast<std::size_t>(i)].file = {"v", "t"};
+      for (int i = 0; i < done; ++i)
+        state.sectors[static_cast<std::size_t>(i)].best = {{Modality::visible, {"v", 1}},
+                                                           {Modality::thermal, {"t", 1}}};
       return state;
     };
     hooks.latest = [this](Modality modality) {
