@@ -79,12 +79,13 @@ Status score_fused(const StageContext& context, MetricMeans& means) {
     ORBITFUSE_ASSIGN(const cv::Mat visible, read_image(context.of("render") / files.visible));
     ORBITFUSE_ASSIGN(const cv::Mat thermal,
                      read_image(context.of("fuse") / "thermal" / (files.name + ".png")));
+    std::vector<cv::Mat> images;
     for (const std::string& method : methods) {
-      ORBITFUSE_ASSIGN(const cv::Mat image,
+      ORBITFUSE_ASSIGN(images.emplace_back(),
                        read_image(context.of("fuse") / method / (files.name + ".png")));
-      ORBITFUSE_ASSIGN(const auto values, fusion_metrics(visible, thermal, image));
-      means.add(method, files.name, values);
     }
+    ORBITFUSE_ASSIGN(const auto values, fusion_metrics(visible, thermal, images));
+    for (std::size_t m = 0; m < methods.size(); ++m) means.add(methods[m], files.name, values[m]);
   }
   return {};
 }

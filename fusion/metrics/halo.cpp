@@ -30,15 +30,20 @@ cv::Mat1b near_edge(const cv::Mat1b& level) {
 
 }  // namespace
 
-double halo(const Plane& visible, const Plane& thermal, const Plane& fused) {
-  const cv::Mat1b v = levels(visible), t = levels(thermal), f = levels(fused),
-                  near = near_edge(v) | near_edge(t);
+Halo::Halo(const Plane& visible, const Plane& thermal)
+    : visible_(levels(visible)), thermal_(levels(thermal)) {
+  near_edge_ = near_edge(visible_) | near_edge(thermal_);
+}
+
+double Halo::of(const Plane& fused) const {
+  const cv::Mat1b f = levels(fused);
   double sum = 0;
   int count = 0;
   for (int y = 0; y < f.rows; ++y)
     for (int x = 0; x < f.cols; ++x) {
-      if (!near(y, x)) continue;
-      const int distance = std::min(std::abs(f(y, x) - v(y, x)), std::abs(f(y, x) - t(y, x)));
+      if (!near_edge_(y, x)) continue;
+      const int distance =
+          std::min(std::abs(f(y, x) - visible_(y, x)), std::abs(f(y, x) - thermal_(y, x)));
       sum += std::max(0.0, distance - unseen);
       ++count;
     }

@@ -26,6 +26,12 @@ struct MetricValue {
 Result<std::vector<MetricValue>> fusion_metrics(const cv::Mat& visible, const cv::Mat& thermal,
                                                 const cv::Mat& fused);
 
+/// The same of several fused images of one pair, in their order: what depends on the sources alone
+/// is computed once. Errors name "fused image 1" and so on.
+Result<std::vector<std::vector<MetricValue>>> fusion_metrics(const cv::Mat& visible,
+                                                             const cv::Mat& thermal,
+                                                             const std::vector<cv::Mat>& fused);
+
 /// SSIM, cosine similarity, mutual information, PSNR, histogram similarity of a rendered view
 /// against the truth (seed paper, Tables 4 to 6). Same image types.
 Result<std::vector<MetricValue>> render_metrics(const cv::Mat& truth, const cv::Mat& rendered);

@@ -3,7 +3,6 @@
 #include <complex>
 #include <opencv2/imgproc.hpp>
 
-#include "core/system/parallel.hpp"
 #include "fusion/metrics/blur.hpp"
 #include "fusion/metrics/measures.hpp"
 
@@ -11,35 +10,6 @@ namespace orbitfuse::metrics {
 namespace {
 
 using Spectrum = cv::Mat_<std::complex<double>>;
-
-/// Two real planes as one complex plane: filters that are real and even keep them apart.
-Spectrum spectrum_of(const Plane& real, const Plane& imaginary) {
-  cv::Mat packed, out;
-  cv::merge(std::vector<cv::Mat>{real, imaginary}, packed);
-  cv::dft(packed, out, cv::DFT_COMPLEX_OUTPUT);
-  return out;
-}
-
-Spectrum spectrum_of(const Plane& real) {
-  cv::Mat out;
-  cv::dft(real, out, cv::DFT_COMPLEX_OUTPUT);
-  return out;
-}
-
-/// Of a spectrum that spectrum_of(real) gave, filtered by what is real and even.
-Plane plane_from(const Spectrum& spectrum) {
-  cv::Mat out;
-  cv::dft(spectrum, out, cv::DFT_INVERSE | cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
-  return out;
-}
-
-std::pair<Plane, Plane> planes_from(const Spectrum& spectrum) {
-  cv::Mat out;
-  cv::dft(spectrum, out, cv::DFT_INVERSE | cv::DFT_SCALE);
-  std::vector<cv::Mat> parts;
-  cv::split(out, parts);
-  return {Plane(parts[0]), Plane(parts[1])};
-}
 
 /// Frequency of a DFT index in MATLAB's freqspace, -1..1 (1 = Nyquist), here without the shift.
 double unit_frequency(int index, int count) {
@@ -65,12 +35,22 @@ Plane radial_filter(cv::Size size, double divisor, double (*response)(double)) {
   return s;
 }
 
-Spectrum times(const Spectrum& a, const Plane& s) {
-  Spectrum out(a.size());
-  for (int y = 0; y < a.rows; ++y) {
-    for (int x = 0; x < a.cols; ++x) out(y, x) = a(y, x) * s(y, x);
+/// A plane through two filters that are real and even: one transform back gives both, as the real
+/// and the imaginary part.
+std::pair<Plane, Plane> filtered(const Plane& plane, const Plane& a, const Plane& b) {
+  Spectrum spectrum;
+  cv::dft(plane, spectrum, cv::DFT_COMPLEX_OUTPUT);
+  for (int y = 0; y < spectrum.rows; ++y) {
+    for (int x = 0; x < spectrum.cols; ++x) {  // times a + i b; `*=` would look for NaN each time
+      const std::complex<double> s = spectrum(y, x);
+      spectrum(y, x) = {s.real() * a(y, x) - s.imag() * b(y, x),
+                        s.real() * b(y, x) + s.imag() * a(y, x)};
+    }
   }
-  return out;
+  cv::Mat out, parts[2];
+  cv::dft(spectrum, out, cv::DFT_INVERSE | cv::DFT_SCALE);
+  cv::split(out, parts);
+  return {Plane(parts[0]), Plane(parts[1])};
 }
 
 /// Contrast-sensitivity difference of Gaussians of Chen and Blum.
@@ -106,23 +86,6 @@ double contrast_kept(double source, double fused) {
   return source < fused ? source / fused : fused / source;
 }
 
-double chen_blum(const Plane& cv_, const Plane& ci, const Plane& cf) {
-  double sum = 0;
-  for (int y = 0; y < cf.rows; ++y) {
-    double row = 0;
-    for (int x = 0; x < cf.cols; ++x) {
-      const double a = cv_(y, x), b = ci(y, x), f = cf(y, x);
-      // Saliency a^2 / (a^2 + b^2), without overflow and defined for a = b = 0.
-      const double larger = std::max(a, b);
-      const double wa = larger > 0 ? (a / larger) * (a / larger) : 1,
-                   wb = larger > 0 ? (b / larger) * (b / larger) : 1;
-      row += (wa * contrast_kept(a, f) + wb * contrast_kept(b, f)) / (wa + wb);
-    }
-    sum += row;
-  }
-  return sum / static_cast<double>(cf.total());
-}
-
 /// Sums over 16 x 16 blocks; blocks at the border are filled up with zeros, as blkproc does.
 template <class Function>
 Plane block_sums(const Plane& f, const Function& of) {
@@ -141,10 +104,43 @@ Plane edge_energy(const Plane& f) {
   return block_sums(squared, [](double g2) { return g2 * g2 * std::sqrt(g2); });  // |g|^5
 }
 
-double chen_varshney(const Plane& visible, const Plane& thermal, const Plane& dv, const Plane& di) {
+}  // namespace
+
+Perception::Perception(const Plane& visible, const Plane& thermal)
+    : contrast_filter_(radial_filter(visible.size(), 30, chen_blum_response)),
+      sensitivity_filter_(radial_filter(visible.size(), 8, mannos_sakrison_response)),
+      visible_(seen(visible)),
+      thermal_(seen(thermal)),
+      visible_energy_(edge_energy(visible)),
+      thermal_energy_(edge_energy(thermal)) {}
+
+Perception::Seen Perception::seen(const Plane& plane) const {
+  const auto [contrast, sensitivity] = filtered(plane, contrast_filter_, sensitivity_filter_);
+  return {masked_contrast(contrast), sensitivity};
+}
+
+double Perception::chen_blum(const Plane& fused) const {
+  double sum = 0;
+  for (int y = 0; y < fused.rows; ++y) {
+    double row = 0;
+    for (int x = 0; x < fused.cols; ++x) {
+      const double a = visible_.contrast(y, x), b = thermal_.contrast(y, x), f = fused(y, x);
+      // Saliency a^2 / (a^2 + b^2), without overflow and defined for a = b = 0.
+      const double larger = std::max(a, b);
+      const double wa = larger > 0 ? (a / larger) * (a / larger) : 1,
+                   wb = larger > 0 ? (b / larger) * (b / larger) : 1;
+      row += (wa * contrast_kept(a, f) + wb * contrast_kept(b, f)) / (wa + wb);
+    }
+    sum += row;
+  }
+  return sum / static_cast<double>(fused.total());
+}
+
+double Perception::chen_varshney(const Plane& fused) const {
   const auto square = [](double d) { return d * d; };
-  const Plane ev = edge_energy(visible), ei = edge_energy(thermal);
-  const Plane lv = block_sums(dv, square), li = block_sums(di, square);
+  const Plane &ev = visible_energy_, &ei = thermal_energy_;
+  const Plane lv = block_sums(visible_.sensitivity - fused, square),
+              li = block_sums(thermal_.sensitivity - fused, square);
   double sum = 0, weight = 0, plain = 0;
   for (int y = 0; y < ev.rows; ++y) {
     for (int x = 0; x < ev.cols; ++x) {
@@ -156,40 +152,9 @@ double chen_varshney(const Plane& visible, const Plane& thermal, const Plane& dv
   return weight > 0 ? sum / weight : plain / (2 * static_cast<double>(ev.total()));
 }
 
-}  // namespace
-
-Perception perception(const Plane& v, const Plane& i, const Plane& f) {
-  Spectrum sources, single;
-  Plane csf, sensitivity;
-  parallel_for(4, [&](int task) {
-    if (task == 0) sources = spectrum_of(v, i);
-    if (task == 1) single = spectrum_of(f);
-    if (task == 2) csf = radial_filter(f.size(), 30, chen_blum_response);
-    if (task == 3) sensitivity = radial_filter(f.size(), 8, mannos_sakrison_response);
-  });
-  Plane cv_, ci, cf, dv, di;
-  parallel_for(3, [&](int task) {
-    if (task == 0) {
-      const auto [a, b] = planes_from(times(sources, csf));
-      cv_ = masked_contrast(a);
-      ci = masked_contrast(b);
-    } else if (task == 1) {
-      cf = masked_contrast(plane_from(times(single, csf)));
-    } else {
-      // (V - F) + i (I - F) in one transform.
-      Spectrum difference(single.size());
-      for (int y = 0; y < single.rows; ++y) {
-        for (int x = 0; x < single.cols; ++x) {
-          const std::complex<double> s = single(y, x);
-          difference(y, x) =
-              sources(y, x) -
-              std::complex<double>(s.real() - s.imag(), s.real() + s.imag());  // (1 + i) s
-        }
-      }
-      std::tie(dv, di) = planes_from(times(difference, sensitivity));
-    }
-  });
-  return {chen_blum(cv_, ci, cf), chen_varshney(v, i, dv, di)};
+Perception::Quality Perception::of(const Plane& fused) const {
+  const Seen by_eye = seen(fused);
+  return {chen_blum(by_eye.contrast), chen_varshney(by_eye.sensitivity)};
 }
 
 }  // namespace orbitfuse::metrics

@@ -20,28 +20,6 @@ Plane windowed(const Plane& plane) {
   return Plane(blurred(plane, half)(cv::Rect(5, 5, plane.cols - 10, plane.rows - 10)));
 }
 
-/// Sobel responses with zeros outside, in the signs of VIFB's code: they matter where gx == 0.
-struct Edges {
-  Plane strength, angle;
-};
-
-Edges edges_of(const Plane& f) {
-  cv::Mat1d gx, gy;
-  cv::Sobel(f, gx, CV_64F, 1, 0, 3, 1, 0, cv::BORDER_CONSTANT);
-  cv::Sobel(f, gy, CV_64F, 0, 1, 3, 1, 0, cv::BORDER_CONSTANT);
-  Edges e{Plane(f.size()), Plane(f.size())};
-  parallel_blocks(f.rows, 16, [&](int begin, int end) {
-    for (int y = begin; y < end; ++y) {
-      for (int x = 0; x < f.cols; ++x) {
-        const double dx = -gx(y, x), dy = gy(y, x);
-        e.strength(y, x) = std::sqrt(dx * dx + dy * dy);
-        e.angle(y, x) = dx == 0 ? std::numbers::pi / 2 : std::atan(dy / dx);
-      }
-    }
-  });
-  return e;
-}
-
 double preserved(double g, double a, double g_fused, double a_fused) {
   // VIFB's code puts the fused strength itself where both strengths are equal.
   const double strength = g > g_fused ? g_fused / g : g == g_fused ? g_fused : g / g_fused;
@@ -50,27 +28,58 @@ double preserved(double g, double a, double g_fused, double a_fused) {
          (0.9879 / (1 + std::exp(-22 * (direction - 0.8))));
 }
 
-}  // namespace
-
-double structural_similarity(const Plane& a, const Plane& b) {
+double similarity(const Plane& a, const WindowMoments& of_a, const Plane& b,
+                  const WindowMoments& of_b) {
   constexpr double c1 = 6.5025, c2 = 58.5225;  // (0.01 * 255)^2, (0.03 * 255)^2
-  const Plane ma = windowed(a), mb = windowed(b);
-  const Plane aa = windowed(a.mul(a)), bb = windowed(b.mul(b)), ab = windowed(a.mul(b));
+  const Plane product = windowed(a.mul(b));
   double sum = 0;
-  for (int y = 0; y < ma.rows; ++y) {
+  for (int y = 0; y < product.rows; ++y) {
     double row = 0;
-    for (int x = 0; x < ma.cols; ++x) {
-      const double u = ma(y, x), v = mb(y, x), uv = u * v, uu_vv = u * u + v * v;
-      row += (2 * uv + c1) * (2 * (ab(y, x) - uv) + c2) /
-             ((uu_vv + c1) * (aa(y, x) + bb(y, x) - uu_vv + c2));
+    for (int x = 0; x < product.cols; ++x) {
+      const double u = of_a.mean(y, x), v = of_b.mean(y, x), uv = u * v, uu_vv = u * u + v * v;
+      row += (2 * uv + c1) * (2 * (product(y, x) - uv) + c2) /
+             ((uu_vv + c1) * (of_a.square(y, x) + of_b.square(y, x) - uu_vv + c2));
     }
     sum += row;
   }
-  return sum / static_cast<double>(ma.total());
+  return sum / static_cast<double>(product.total());
 }
 
-double edge_transfer(const Plane& visible, const Plane& thermal, const Plane& fused) {
-  const Edges v = edges_of(visible), i = edges_of(thermal), f = edges_of(fused);
+}  // namespace
+
+WindowMoments::WindowMoments(const Plane& plane)
+    : mean(windowed(plane)), square(windowed(plane.mul(plane))) {}
+
+double structural_similarity(const Plane& a, const Plane& b) {
+  return similarity(a, WindowMoments(a), b, WindowMoments(b));
+}
+
+StructuralSimilarity::StructuralSimilarity(const Plane& visible, const Plane& thermal)
+    : visible_(visible), thermal_(thermal), of_visible_(visible), of_thermal_(thermal) {}
+
+SourceSimilarity StructuralSimilarity::of(const Plane& fused) const {
+  const WindowMoments of_fused(fused);
+  return {similarity(visible_, of_visible_, fused, of_fused),
+          similarity(thermal_, of_thermal_, fused, of_fused)};
+}
+
+Edges::Edges(const Plane& plane) : strength(plane.size()), angle(plane.size()) {
+  cv::Mat1d gx, gy;
+  cv::Sobel(plane, gx, CV_64F, 1, 0, 3, 1, 0, cv::BORDER_CONSTANT);
+  cv::Sobel(plane, gy, CV_64F, 0, 1, 3, 1, 0, cv::BORDER_CONSTANT);
+  parallel_blocks(plane.rows, 16, [&](int begin, int end) {
+    for (int y = begin; y < end; ++y) {
+      for (int x = 0; x < plane.cols; ++x) {
+        const double dx = -gx(y, x), dy = gy(y, x);  // VIFB's signs: they matter where gx == 0
+        strength(y, x) = std::sqrt(dx * dx + dy * dy);
+        angle(y, x) = dx == 0 ? std::numbers::pi / 2 : std::atan(dy / dx);
+      }
+    }
+  });
+}
+
+double EdgeTransfer::of(const Plane& fused) const {
+  const Edges &v = visible_, &i = thermal_, f(fused);
   std::vector<double> kept(static_cast<std::size_t>(fused.rows)), total(kept.size()),
       in_fused(kept.size());
   parallel_blocks(fused.rows, 16, [&](int begin, int end) {
