@@ -23,9 +23,12 @@ add_library(orbitfuse_headers INTERFACE)
 add_library(OrbitFuse::headers ALIAS orbitfuse_headers)
 set_target_properties(orbitfuse_headers PROPERTIES EXPORT_NAME headers)
 target_compile_features(orbitfuse_headers INTERFACE cxx_std_20)
-# Public headers hold Eigen types by value. Debian's Ceres is built for SSE2; without this Eigen would
-# align to 32 bytes here and to 16 there, or in the code of a user with other -march flags.
-target_compile_definitions(orbitfuse_headers INTERFACE EIGEN_MAX_ALIGN_BYTES=16)
+# Public headers hold Eigen types by value. Debian's Ceres is built for SSE2, and so is the code of a
+# user without -march flags; Eigen would align types to 16 bytes there and to 32 here. Matrices of
+# any size must be allocated alike too: the linker keeps one copy of what allocates them, and memory
+# that one way took the other does not free.
+target_compile_definitions(orbitfuse_headers INTERFACE EIGEN_MAX_STATIC_ALIGN_BYTES=16
+                           EIGEN_MAX_ALIGN_BYTES=32)
 # Both spellings resolve, installed or not; links to the rooms, so that no folder holds itself.
 foreach(folder core capture drivers recon fusion)
   file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/include/orbitfuse)

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "capture/mat/mat_finder.hpp"
 #include "core/image/image_io.hpp"
@@ -32,7 +34,80 @@ struct Pointed {
 
 constexpr double pointing_px = 1;      // how well a pixel is pointed at
 constexpr double depth_share = 0.003;  // of a field's depth at its best (docs/benchmarks/export.md)
-constexpr double point_share = 0.002;  // of the orbit's radius: what a typed point may be off
+constexpr double off_weight = 1.5;     // of what other views' depths are off by
+constexpr double unconfirmed_share = 0.03;  // of a depth that too few other views see
+constexpr double point_share = 0.002;       // of the orbit's radius: what a typed point may be off
+
+/// The field's depth where a view's ray goes, in the frame's unit, and how much it varies from
+/// pixel to pixel; nothing where too few pixels have one.
+struct SeenDepth {
+  double z = 0, scatter = 0;
+  Eigen::Vector3d ray;  ///< in the camera, z = 1
+  double fx = 0;
+};
+Result<std::optional<SeenDepth>> depth_at(const view::FinishedRun& run, const PosedView& view,
+                                          const Eigen::Vector2d& normalized,
+                                          const Progress& progress) {
+  // A picture of a few pixels round the place is all that has to be rendered.
+  // As many as the camera's focal length needs for a picture that a lens could have taken.
+  Camera small = view.camera.without_distortion();
+  const int half = std::max(2, static_cast<int>(small.fx / 200)), side = 2 * half + 1;
+  small.width = small.height = side;
+  small.cx = side / 2.0 - small.fx * normalized.x();
+  small.cy = side / 2.0 - small.fy * normalized.y();
+  const bool visible = run.has(Modality::visible);
+  const Similarity3d field_from_frame = visible ? Similarity3d() : run.frame_from_thermal.inverse();
+  ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
+                   nerf::render(visible ? run.visible : run.thermal, small,
+                                rebase(view.cam_from_world, field_from_frame), {}, progress));
+  std::vector<double> depths;
+  for (int y = half - 1; y <= half + 1; ++y)
+    for (int x = half - 1; x <= half + 1; ++x)
+      if (const float z = seen.depth.at<float>(y, x); std::isfinite(z))
+        depths.push_back(static_cast<double>(z) / field_from_frame.scale);
+  if (depths.size() < 5) return std::nullopt;
+  SeenDepth found;
+  found.z = median(depths);
+  for (double& d : depths) d = std::abs(d - found.z);
+  found.scatter = median(depths);
+  found.ray = small.ray_of({side / 2.0, side / 2.0});
+  found.fx = small.fx;
+  return found;
+}
+
+/// How far other recorded views' depths are from a point of the surface, as seen from near the same
+/// side: where a field puts glass, gloss or plain paint at another depth from each side, one view
+/// alone does not tell. Nothing where too few views tell.
+Result<std::optional<double>> off_in_other_views(const view::FinishedRun& run,
+                                                 const view::RecordedView& self,
+                                                 const Eigen::Vector3d& point,
+                                                 const Progress& progress) {
+  constexpr double most_turn_deg = 50, hidden_share = 0.1;
+  constexpr std::size_t enough = 6, least = 2;
+  const Eigen::Vector3d from = (camera_center(self.view.cam_from_world) - point).normalized();
+  std::vector<std::pair<double, const view::RecordedView*>> others;
+  for (const view::RecordedView& v : run.views) {
+    if (&v == &self || v.doubt || v.modality != self.modality) continue;
+    const double turn = (camera_center(v.view.cam_from_world) - point).normalized().dot(from);
+    if (turn > std::cos(most_turn_deg * std::numbers::pi / 180)) others.emplace_back(-turn, &v);
+  }
+  std::sort(others.begin(), others.end());
+  std::vector<double> off;
+  for (const auto& [turn, v] : others) {
+    if (off.size() >= enough) break;
+    const Eigen::Vector3d in_cam = v->view.cam_from_world * point;
+    const Eigen::Vector2d pixel = v->view.camera.project(in_cam);
+    if (!(in_cam.z() > 0 && pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < v->view.camera.width &&
+          pixel.y() < v->view.camera.height))
+      continue;
+    ORBITFUSE_ASSIGN(const auto seen,
+                     depth_at(run, v->view, in_cam.head<2>() / in_cam.z(), progress));
+    if (!seen || seen->z < in_cam.z() * (1 - hidden_share)) continue;
+    off.push_back(std::abs(seen->z - in_cam.z()));
+  }
+  if (off.size() < least) return std::nullopt;
+  return median(off);
+}
 
 Result<Pointed> pointed_pixel(const view::FinishedRun& run, const PixelPlace& place,
                               const Progress& progress) {
@@ -53,35 +128,18 @@ Result<Pointed> pointed_pixel(const view::FinishedRun& run, const PixelPlace& pl
   if (!at.allFinite())
     return fail(ErrorKind::usage, "--distance", "a pixel beyond where the lens is known",
                 "choose one nearer to the middle");
-  // A picture of a few pixels round the place is all that has to be rendered.
-  // As many as the camera's focal length needs for a picture that a lens could have taken.
-  const int half = std::max(2, static_cast<int>(camera.fx / 200));
-  const int side = 2 * half + 1;
-  Camera small = camera.without_distortion();
-  small.width = small.height = side;
-  small.cx = side / 2.0 - small.fx * at.x();
-  small.cy = side / 2.0 - small.fy * at.y();
-  const bool visible = run.has(Modality::visible);
-  const Similarity3d field_from_frame = visible ? Similarity3d() : run.frame_from_thermal.inverse();
-  ORBITFUSE_ASSIGN(
-      const nerf::RenderedView seen,
-      nerf::render(visible ? run.visible : run.thermal, small,
-                   rebase(found->view.cam_from_world, field_from_frame), {}, progress));
-  std::vector<double> depths;
-  for (int y = half - 1; y <= half + 1; ++y)
-    for (int x = half - 1; x <= half + 1; ++x)
-      if (const float z = seen.depth.at<float>(y, x); std::isfinite(z))
-        depths.push_back(static_cast<double>(z) / field_from_frame.scale);
-  if (depths.size() < 5)
+  ORBITFUSE_ASSIGN(const auto seen, depth_at(run, found->view, at, progress));
+  if (!seen)
     return fail(ErrorKind::usage, "--distance",
                 fmt::format("{},{},{} shows nothing that the run knows", place.view, u, v),
                 "choose a pixel on the object");
-  const double z = median(depths);
-  for (double& d : depths) d = std::abs(d - z);
-  const Eigen::Vector3d ray = small.ray_of({side / 2.0, side / 2.0});
   const Rigid3d world_from_cam = found->view.cam_from_world.inverse();
-  return Pointed{world_from_cam * (z * ray), world_from_cam.rotation * ray.normalized(),
-                 pointing_px * z / small.fx, std::max(depth_share * z, 1.5 * median(depths))};
+  Pointed out{world_from_cam * (seen->z * seen->ray),
+              world_from_cam.rotation * seen->ray.normalized(), pointing_px * seen->z / seen->fx,
+              std::max(depth_share * seen->z, 1.5 * seen->scatter)};
+  ORBITFUSE_ASSIGN(const auto off, off_in_other_views(run, *found, out.position, progress));
+  out.along = std::max(out.along, off ? off_weight * *off : unconfirmed_share * seen->z);
+  return out;
 }
 
 Result<Pointed> pointed(const view::FinishedRun& run, const Place& place,

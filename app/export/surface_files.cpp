@@ -44,7 +44,7 @@ Status paint_temperatures(const view::FinishedRun& run, const std::string& name,
   vertices.colors.assign(vertices.size(), {128, 128, 128});
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     if (!std::isfinite(vertices.temperatures_k[i])) continue;
-    const auto bgr = painted.at<cv::Vec3b>(static_cast<int>(i), 0);
+    const auto& bgr = painted.at<cv::Vec3b>(static_cast<int>(i), 0);
     vertices.colors[i] = {bgr[2], bgr[1], bgr[0]};
   }
   return {};

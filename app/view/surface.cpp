@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
-#include <nanoflann.hpp>
 #include <numeric>
 
+#include "core/geometry/kd_tree.hpp"
 #include "core/numeric/random.hpp"
 #include "core/temperature.hpp"
 
@@ -17,20 +17,6 @@ namespace {
 
 /// Beyond it a phone's frame rate falls below 30 a second, and the surface looks no denser.
 constexpr std::size_t most_points = 300'000;
-
-struct Points {
-  const std::vector<Eigen::Vector3d>& list;
-  std::size_t kdtree_get_point_count() const { return list.size(); }
-  double kdtree_get_pt(std::size_t i, std::size_t d) const {
-    return list[i][static_cast<Eigen::Index>(d)];
-  }
-  template <class Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-using Tree =
-    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Points>, Points, 3>;
 
 /// At most most_points of a cloud, in no order: the first of them, alone, are spread over the
 /// whole.
@@ -51,12 +37,12 @@ PointCloud thinned(const PointCloud& cloud) {
 }
 
 /// Median distance of points to their nearest neighbours, squared.
-double spacing2(const Tree& tree, const std::vector<Eigen::Vector3d>& points) {
+double spacing2(const KdTree& tree, const std::vector<Eigen::Vector3d>& points) {
   std::vector<double> nearest;
   for (std::size_t i = 0; i < points.size(); i += std::max<std::size_t>(1, points.size() / 1000)) {
-    std::uint32_t index[2];
+    std::size_t index[2];
     double distance2[2];
-    if (tree.knnSearch(points[i].data(), 2, index, distance2) == 2) nearest.push_back(distance2[1]);
+    if (tree.nearest(points[i], 2, index, distance2) == 2) nearest.push_back(distance2[1]);
   }
   if (nearest.empty()) return 0;
   const auto middle = nearest.begin() + static_cast<std::ptrdiff_t>(nearest.size() / 2);
@@ -78,14 +64,13 @@ PointCloud surface_of(const PointCloud& visible, PointCloud thermal) {
   if (visible.empty() || thermal.empty()) return surface;
   thermal = thinned(thermal);
   if (thermal.empty()) return surface;
-  const Points points{thermal.positions};
-  const Tree tree(3, points);
+  const KdTree tree(thermal.positions);
   const double reach2 = 9 * spacing2(tree, thermal.positions);
   surface.temperatures_k.reserve(surface.size());
   for (const Eigen::Vector3d& p : surface.positions) {
-    std::uint32_t index = 0;
+    std::size_t index = 0;
     double distance2 = 0;
-    const bool near = tree.knnSearch(p.data(), 1, &index, &distance2) == 1 && distance2 <= reach2;
+    const bool near = tree.nearest(p, 1, &index, &distance2) == 1 && distance2 <= reach2;
     surface.temperatures_k.push_back(near ? thermal.temperatures_k[index] : invalid_k);
   }
   return surface;

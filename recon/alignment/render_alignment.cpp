@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/alignment/render_alignment.hpp"
 
-#include <ceres/ceres.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -12,6 +10,7 @@
 #include "recon/alignment/edge_field.hpp"
 #include "recon/alignment/patch_matching.hpp"
 #include "recon/alignment/patch_residual.hpp"
+#include "recon/alignment/pose_bundle.hpp"
 #include "recon/alignment/pose_correction.hpp"
 
 namespace orbitfuse {
@@ -24,40 +23,26 @@ struct ViewMatches {
 /// The robust scale is lowered step by step, from where patches are to where they fit.
 constexpr double robust_scales_px[] = {8, 4, 2, 1};
 
-void add_residuals(const ViewMatches& view, const Camera& camera, double scale_px,
-                   PoseCorrection& correction, double& log_focal, ceres::Problem& problem) {
-  for (const PatchMatch& match : view.matches)
-    problem.AddResidualBlock(
-        new PatchCost(match, camera),
-        new ceres::ScaledLoss(new ceres::CauchyLoss(scale_px), match.score, ceres::TAKE_OWNERSHIP),
-        correction.data(), &log_focal);
+/// Corrections of all views given, and what their common focal length is scaled by, as a logarithm.
+double solve(const std::vector<const ViewMatches*>& views, const Camera& camera,
+             const ValuePrior& log_focal, const std::vector<PoseCorrection*>& corrections) {
+  PoseBundle bundle(camera, views.size());
+  for (std::size_t i = 0; i < views.size(); ++i)
+    for (const PatchMatch& match : views[i]->matches) bundle.add(i, match, match.score);
+  constexpr int iterations = 25;
+  for (const double scale_px : robust_scales_px)
+    bundle.solve({log_focal, {}}, {scale_px, 1}, iterations);
+  for (std::size_t i = 0; i < views.size(); ++i) *corrections[i] = bundle.corrections()[i];
+  return bundle.log_focal();
 }
 
-void solve(ceres::LinearSolverType by, ceres::Problem& problem) {
-  ceres::Solver::Options options;
-  options.linear_solver_type = by;
-  options.max_num_iterations = 25;
-  options.num_threads = 1;  // more sum in any order
-  options.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
-}
-
-/// All corrections and the common focal length's, as a logarithm.
 double solve_together(const std::vector<ViewMatches>& views, const Camera& camera,
                       const ValuePrior& prior, std::vector<PoseCorrection>& corrections) {
-  double log_focal = 0;
-  for (const double scale_px : robust_scales_px) {
-    ceres::Problem problem;
-    for (std::size_t i = 0; i < views.size(); ++i)
-      add_residuals(views[i], camera, scale_px, corrections[i], log_focal, problem);
-    if (problem.NumResidualBlocks() == 0) return 0;
-    problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<ValuePrior, 1, 1>(new ValuePrior(prior)), nullptr,
-        &log_focal);
-    solve(ceres::SPARSE_SCHUR, problem);
-  }
-  return log_focal;
+  std::vector<const ViewMatches*> all;
+  std::vector<PoseCorrection*> found;
+  for (const ViewMatches& view : views) all.push_back(&view);
+  for (PoseCorrection& correction : corrections) found.push_back(&correction);
+  return solve(all, camera, prior, found);
 }
 
 /// The corrections, with the lens as it is: nothing is shared.
@@ -65,14 +50,7 @@ void solve_each(const std::vector<ViewMatches>& views, const Camera& camera,
                 std::vector<PoseCorrection>& corrections) {
   parallel_for(static_cast<int>(views.size()), [&](int index) {
     const auto i = static_cast<std::size_t>(index);
-    if (views[i].matches.empty()) return;
-    for (const double scale_px : robust_scales_px) {
-      double log_focal = 0;
-      ceres::Problem problem;
-      add_residuals(views[i], camera, scale_px, corrections[i], log_focal, problem);
-      problem.SetParameterBlockConstant(&log_focal);
-      solve(ceres::DENSE_NORMAL_CHOLESKY, problem);
-    }
+    if (!views[i].matches.empty()) solve({&views[i]}, camera, {0, 0}, {&corrections[i]});
   });
 }
 
@@ -110,7 +88,7 @@ void judge(const ViewMatches& matched, const PoseCorrection& correction, double 
            const Camera& camera, RenderAlignedView& view) {
   std::vector<double> distances;
   for (const PatchMatch& match : matched.matches) {
-    const auto residual = patch_residual(match, camera, correction.data(), log_focal);
+    const auto residual = patch_residual(match, camera, CorrectedPose(correction), log_focal);
     if (residual && residual->norm() < 2) distances.push_back(residual->norm());
   }
   view.matches = static_cast<int>(distances.size());

@@ -8,6 +8,7 @@
 #include <unordered_set>
 
 #include "core/option_range.hpp"
+#include "core/system/parallel.hpp"
 #include "recon/nerf/nerf.hpp"
 #include "recon/nerf/rendering/render.hpp"
 
@@ -74,15 +75,20 @@ std::uint64_t voxel_key(const Eigen::Vector3d& p, double size) {
   return key;
 }
 
-void append(PointCloud& cloud, const DepthView& from, int x, int y, const Eigen::Vector3d& point,
-            const Eigen::Vector3d& normal, Modality modality) {
-  cloud.positions.push_back(point);
-  cloud.normals.push_back(normal.cast<float>());
+/// A pixel's point that other views agree with.
+struct SurfacePoint {
+  int x, y;
+  Eigen::Vector3d point, normal;
+};
+
+void append(PointCloud& cloud, const DepthView& from, const SurfacePoint& p, Modality modality) {
+  cloud.positions.push_back(p.point);
+  cloud.normals.push_back(p.normal.cast<float>());
   if (modality == Modality::thermal) {
-    cloud.temperatures_k.push_back(from.image.color.at<float>(y, x));
+    cloud.temperatures_k.push_back(from.image.color.at<float>(p.y, p.x));
     return;
   }
-  const auto rgb = from.image.color.at<cv::Vec3f>(y, x);
+  const auto rgb = from.image.color.at<cv::Vec3f>(p.y, p.x);
   cloud.colors.push_back({cv::saturate_cast<std::uint8_t>(255 * rgb[0]),
                           cv::saturate_cast<std::uint8_t>(255 * rgb[1]),
                           cv::saturate_cast<std::uint8_t>(255 * rgb[2])});
@@ -132,7 +138,8 @@ Result<PointCloud> export_point_cloud(const Field& field, const std::vector<Pose
   std::unordered_set<std::uint64_t> taken;
   for (std::size_t i = 0; i < rendered.size(); ++i) {
     const cv::Mat& depth = rendered[i].image.depth;
-    for (int y = 0; y < depth.rows; ++y)
+    std::vector<std::vector<SurfacePoint>> rows(static_cast<std::size_t>(depth.rows));
+    parallel_for(depth.rows, [&](int y) {
       for (int x = 0; x < depth.cols; ++x) {
         if (!std::isfinite(depth.at<float>(y, x))) continue;
         const Eigen::Vector3d point = lift(rendered[i], x, y);
@@ -140,10 +147,13 @@ Result<PointCloud> export_point_cloud(const Field& field, const std::vector<Pose
         const Agreement votes = agreement(rendered, i, point, options.depth_tolerance);
         if (votes.agree < needed || votes.see_through > votes.agree) continue;
         const Eigen::Vector3d normal = normal_at(rendered[i], x, y);
-        if (normal.isZero()) continue;
-        if (voxel > 0 && !taken.insert(voxel_key(point, voxel)).second) continue;
-        append(cloud, rendered[i], x, y, point, normal, field.modality());
+        if (!normal.isZero()) rows[static_cast<std::size_t>(y)].push_back({x, y, point, normal});
       }
+    });
+    for (const auto& row : rows)
+      for (const SurfacePoint& p : row)
+        if (voxel <= 0 || taken.insert(voxel_key(p.point, voxel)).second)
+          append(cloud, rendered[i], p, field.modality());
   }
   if (cloud.empty())
     return fail(ErrorKind::quality, "export", "no point is consistent over the views",

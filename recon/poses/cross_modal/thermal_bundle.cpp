@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/poses/cross_modal/thermal_bundle.hpp"
 
-#include <ceres/ceres.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
@@ -15,8 +13,7 @@
 #include "core/system/parallel.hpp"
 #include "recon/alignment/edge_field.hpp"
 #include "recon/alignment/patch_matching.hpp"
-#include "recon/alignment/patch_residual.hpp"
-#include "recon/alignment/pose_correction.hpp"
+#include "recon/alignment/pose_bundle.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -28,54 +25,6 @@ constexpr double confirmed_px = 1;
 /// A lens that bends by less than this share of what counts, as the wide rounds see it, is
 /// straight.
 constexpr double straight_share = 0.5;
-
-/// Ceres cost of two weighted pixels: correction, log_focal, radial, and the point's offset from
-/// the surface (world).
-class SightingCost final : public ceres::SizedCostFunction<2, 6, 1, 1, 3> {
- public:
-  SightingCost(const Eigen::Vector3d& surface, const Rigid3d& cam_from_world, const Camera& camera,
-               const ThermalSighting& sighting)
-      : rotation_(cam_from_world.rotation.toRotationMatrix()),
-        surface_in_cam_(cam_from_world * surface),
-        camera_(camera),
-        sighting_(sighting) {}
-
-  bool Evaluate(const double* const* parameters, double* residuals,
-                double** jacobians) const override {
-    const Eigen::Map<const Eigen::Vector3d> offset(parameters[3]);
-    const auto seen = corrected_pixel(camera_, parameters[0], *parameters[1], *parameters[2],
-                                      surface_in_cam_ + rotation_ * offset);
-    if (!seen) return false;
-    const Eigen::Matrix2d& weight = sighting_.sqrt_weight;
-    Eigen::Map<Eigen::Vector2d> values(residuals);
-    values = weight * (seen->pixel - sighting_.pixel);
-    if (jacobians == nullptr) return true;
-    put_jacobian<6>(weight * seen->by_correction, jacobians[0]);
-    put_jacobian<1>(weight * seen->by_log_focal, jacobians[1]);
-    put_jacobian<1>(weight * seen->by_radial, jacobians[2]);
-    put_jacobian<3>(weight * seen->by_point * rotation_, jacobians[3]);
-    return true;
-  }
-
- private:
-  Eigen::Matrix3d rotation_;
-  Eigen::Vector3d surface_in_cam_;
-  Camera camera_;
-  ThermalSighting sighting_;
-};
-
-/// How far the point has left the surface along the line of sight, in sigmas.
-struct SurfaceResidual {
-  Eigen::Vector3d sight;
-  double sigma;
-
-  template <class T>
-  bool operator()(const T* offset, T* residual) const {
-    const T along = offset[0] * T(sight.x()) + offset[1] * T(sight.y()) + offset[2] * T(sight.z());
-    residual[0] = along / T(sigma);
-    return true;
-  }
-};
 
 /// What one solve is made of, at the options' width.
 struct BundleRound {
@@ -93,117 +42,71 @@ struct BundleSolution {
   std::vector<int> confirmed;  ///< patches of each view
 };
 
-class Bundle {
- public:
-  Bundle(const BundleRound& round, const ThermalBundleOptions& options)
-      : round_(round), options_(options), offsets_(round.tracks.size(), {0, 0, 0}) {
-    solution_.corrections.resize(round.views.images.size(), PoseCorrection{});
-    for (std::size_t t = 0; t < round.tracks.size(); ++t) add(round.tracks[t], offsets_[t]);
-    for (std::size_t v = 0; v < round.edges.size(); ++v)
-      for (const PatchMatch& match : round.edges[v]) add(v, match);
-  }
-
-  /// Nothing where no usable answer is found.
-  std::optional<BundleSolution> solve(const ValuePrior& log_focal, const ValuePrior& radial,
-                                      const std::vector<double>& losses_px) {
-    const auto expect = [&](const ValuePrior& prior, double* value) {
-      problem_.AddParameterBlock(value, 1);
-      if (prior.sigma == 0)
-        problem_.SetParameterBlockConstant(value);
-      else
-        problem_.AddResidualBlock(
-            new ceres::AutoDiffCostFunction<ValuePrior, 1, 1>(new ValuePrior(prior)), nullptr,
-            value);
-    };
-    expect(log_focal, &solution_.log_focal);
-    expect(radial, &solution_.radial);
-    ceres::Solver::Options solver;
-    solver.linear_solver_type = ceres::SPARSE_SCHUR;
-    solver.max_num_iterations = options_.max_iterations;
-    solver.num_threads = 1;  // more sum in any order
-    solver.logging_type = ceres::SILENT;
-    for (const double scale_px : losses_px) {
-      sighting_loss_.Reset(new ceres::CauchyLoss(scale_px), ceres::TAKE_OWNERSHIP);
-      ceres::Solver::Summary summary;
-      ceres::Solve(solver, &problem_, &summary);
-      if (!summary.IsSolutionUsable()) return std::nullopt;
+PoseBundle bundle_of(const BundleRound& round, const ThermalBundleOptions& options) {
+  const ThermalViews& views = round.views;
+  PoseBundle bundle(views.camera, views.images.size());
+  for (const ThermalTrack& track : round.tracks) {
+    SharedPlace place{track.sight, options.surface_sigma * track.distance, {}};
+    for (const ThermalSighting& seen : track.sightings) {
+      const Rigid3d& pose = views.cam_from_world[seen.view];
+      place.sightings.push_back({seen.view, pose * track.surface, pose.rotation.toRotationMatrix(),
+                                 seen.pixel, seen.sqrt_weight});
     }
-    judge();
-    return solution_;
+    bundle.add(std::move(place));
   }
+  for (std::size_t v = 0; v < round.edges.size(); ++v)
+    for (const PatchMatch& match : round.edges[v])
+      bundle.add(v, match, options.edge_weight * match.score);
+  return bundle;
+}
 
- private:
-  void add(const ThermalTrack& track, std::array<double, 3>& offset) {
-    blocks_.emplace_back();
-    for (const ThermalSighting& seen : track.sightings)
-      blocks_.back().push_back(problem_.AddResidualBlock(
-          new SightingCost(track.surface, round_.views.cam_from_world[seen.view],
-                           round_.views.camera, seen),
-          &sighting_loss_, solution_.corrections[seen.view].data(), &solution_.log_focal,
-          &solution_.radial, offset.data()));
-    problem_.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<SurfaceResidual, 1, 3>(
-            new SurfaceResidual{track.sight, options_.surface_sigma * track.distance}),
-        &surface_loss_, offset.data());
-  }
+/// By how much a k1 of 1 shifts the outer tenth of the patches.
+double radial_reach_px(const BundleRound& round) {
+  std::vector<double> radii;
+  for (const ThermalTrack& track : round.tracks)
+    radii.push_back(round.views.camera.normalized_of(track.sightings.front().pixel).norm());
+  if (radii.empty()) return 0;
+  constexpr double most = 0.9;
+  const auto far =
+      radii.begin() + static_cast<std::ptrdiff_t>(most * static_cast<double>(radii.size()));
+  std::nth_element(radii.begin(), far, radii.end());
+  return std::pow(*far, 3) * round.views.camera.fx;
+}
 
-  void add(std::size_t view, const PatchMatch& match) {
-    problem_.AddResidualBlock(
-        new BentPatchCost(match, round_.views.camera),
-        &edge_losses_.emplace_back(new ceres::CauchyLoss(1), options_.edge_weight * match.score,
-                                   ceres::TAKE_OWNERSHIP),
-        solution_.corrections[view].data(), &solution_.log_focal, &solution_.radial);
-  }
-
-  /// A patch confirms the view that it was taken from, and each that shows it, where both have it
-  /// within confirmed_px: a view doesn't confirm itself.
-  void judge() {
-    solution_.confirmed.assign(solution_.corrections.size(), 0);
-    std::vector<double> residuals;
-    for (std::size_t t = 0; t < blocks_.size(); ++t) {
-      std::vector<bool> near;
-      for (const ceres::ResidualBlockId block : blocks_[t]) {
-        double r[2] = {confirmed_px, confirmed_px};
-        problem_.EvaluateResidualBlock(block, false, nullptr, r, nullptr);
-        residuals.push_back(std::hypot(r[0], r[1]));
-        near.push_back(residuals.back() < confirmed_px);
-      }
-      if (!near.front()) continue;
-      const auto& sightings = round_.tracks[t].sightings;
-      for (std::size_t s = 1; s < sightings.size(); ++s)
-        solution_.confirmed[sightings[s].view] += near[s] ? 1 : 0;
-      solution_.confirmed[sightings.front().view] +=
-          std::count(near.begin() + 1, near.end(), true) > 0 ? 1 : 0;
+/// A patch confirms the view that it was taken from, and each that shows it, where both have it
+/// within confirmed_px: a view doesn't confirm itself.
+BundleSolution judged(const BundleRound& round, const PoseBundle& bundle) {
+  BundleSolution solution{
+      bundle.corrections(), bundle.log_focal(), bundle.radial(), radial_reach_px(round), 0, {}};
+  solution.confirmed.assign(solution.corrections.size(), 0);
+  std::vector<double> residuals;
+  const auto residuals_px = bundle.sighting_residuals_px();
+  for (std::size_t t = 0; t < residuals_px.size(); ++t) {
+    std::vector<bool> near;
+    for (const double residual : residuals_px[t]) {
+      near.push_back(residual < confirmed_px);
+      if (std::isfinite(residual)) residuals.push_back(residual);
     }
-    std::vector<double> radii;
-    for (const ThermalTrack& track : round_.tracks)
-      radii.push_back(round_.views.camera.normalized_of(track.sightings.front().pixel).norm());
-    if (!radii.empty()) {
-      constexpr double most = 0.9;
-      const auto far =
-          radii.begin() + static_cast<std::ptrdiff_t>(most * static_cast<double>(radii.size()));
-      std::nth_element(radii.begin(), far, radii.end());
-      solution_.radial_reach_px = std::pow(*far, 3) * round_.views.camera.fx;
-    }
-    solution_.median_px = residuals.empty() ? 0 : median(residuals);
+    if (!near.front()) continue;
+    const auto& sightings = round.tracks[t].sightings;
+    for (std::size_t s = 1; s < sightings.size(); ++s)
+      solution.confirmed[sightings[s].view] += near[s] ? 1 : 0;
+    solution.confirmed[sightings.front().view] +=
+        std::count(near.begin() + 1, near.end(), true) > 0 ? 1 : 0;
   }
+  solution.median_px = residuals.empty() ? 0 : median(residuals);
+  return solution;
+}
 
-  static ceres::Problem::Options losses_are_ours() {
-    ceres::Problem::Options options;
-    options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    return options;
-  }
-
-  const BundleRound& round_;
-  const ThermalBundleOptions& options_;
-  ceres::LossFunctionWrapper sighting_loss_{new ceres::CauchyLoss(1), ceres::TAKE_OWNERSHIP};
-  ceres::CauchyLoss surface_loss_{1};
-  std::deque<ceres::ScaledLoss> edge_losses_;
-  std::vector<std::array<double, 3>> offsets_;
-  BundleSolution solution_;
-  ceres::Problem problem_{losses_are_ours()};
-  std::vector<std::vector<ceres::ResidualBlockId>> blocks_;  ///< of each track, by its sightings
-};
+/// Nothing where no usable answer is found.
+std::optional<BundleSolution> solved(const BundleRound& round, const CommonLensPrior& lens,
+                                     const std::vector<double>& losses_px,
+                                     const ThermalBundleOptions& options) {
+  PoseBundle bundle = bundle_of(round, options);
+  for (const double scale_px : losses_px)
+    if (!bundle.solve(lens, {1, scale_px}, options.max_iterations)) return std::nullopt;
+  return judged(round, bundle);
+}
 
 Result<BundleRound> prepared(const OrbitRefinement& refinement, const Fit& alignment,
                              const std::vector<std::size_t>& chosen,
@@ -287,9 +190,10 @@ Result<std::optional<double>> solve_round(const OrbitRefinement& refinement,
   const double focal_px = bundled.views.front().view.camera.fx;
   std::optional<BundleSolution> solution;
   if (2 * held_views(round) >= chosen.size())
-    solution = Bundle(round, options)
-                   .solve({std::log(prior.focal_px / focal_px), prior.relative_sigma},
-                          {-bundled.radial, prior.radial_sigma}, step.losses_px);
+    solution = solved(round,
+                      {{std::log(prior.focal_px / focal_px), prior.relative_sigma},
+                       {-bundled.radial, prior.radial_sigma}},
+                      step.losses_px, options);
   const auto tell = [&](const std::string& words) {
     refinement.progress.report(
         {"poses.thermal", 3, 4, -1,

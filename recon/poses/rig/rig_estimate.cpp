@@ -225,7 +225,8 @@ void judge(const RoundResult& round, const std::array<double, 6>& correction, do
     RigPairFit& fit = rig.pairs[at(i)];
     std::vector<double> distances;
     for (const PatchMatch& match : round.matches[at(i)]) {
-      const auto residual = patch_residual(match, round.camera, correction.data(), log_focal);
+      const auto residual =
+          patch_residual(match, round.camera, CorrectedPose(correction), log_focal);
       if (residual && residual->norm() < 2) distances.push_back(residual->norm());
     }
     fit.matches = static_cast<int>(distances.size());

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/geometry/kd_tree.hpp"
 #include "core/numeric/median.hpp"
-#include "recon/registration/clouds/kd_tree.hpp"
 
 namespace orbitfuse::registration {
 namespace {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/registration/clouds/prepared_cloud.hpp"
+#include "core/geometry/kd_tree.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +9,6 @@
 #include <cmath>
 #include <queue>
 
-#include "recon/registration/clouds/kd_tree.hpp"
 #include "recon/registration/clouds/outlier_filter.hpp"
 #include "recon/registration/clouds/thinning.hpp"
 

@@ -22,7 +22,7 @@ Camera camera() {
 using Parameters = std::array<double, 11>;
 
 std::optional<CorrectedPixel> seen(const Parameters& p) {
-  return corrected_pixel(camera(), p.data(), p[6], p[7], {p[8], p[9], p[10]});
+  return corrected_pixel(camera(), CorrectedPose(p.data()), p[6], p[7], {p[8], p[9], p[10]});
 }
 
 TEST(CorrectedPixel, IsTheCorrectedCamerasOwn) {
@@ -31,7 +31,7 @@ TEST(CorrectedPixel, IsTheCorrectedCamerasOwn) {
   Camera scaled = camera();
   scaled.fx *= std::exp(0.03), scaled.fy *= std::exp(0.03);
   scaled.k1 = -0.1;
-  const auto found = corrected_pixel(camera(), correction.data(), 0.03, -0.1, point);
+  const auto found = corrected_pixel(camera(), CorrectedPose(correction), 0.03, -0.1, point);
   ASSERT_TRUE(found);
   EXPECT_LT((found->pixel - scaled.project(rigid_of(correction) * point)).norm(), 1e-9);
 }
@@ -74,11 +74,11 @@ TEST(CorrectedPixel, DerivativesAreThoseOfDifferences) {
 TEST(CorrectedPixel, NothingBehindTheCameraOrOfNoNumber) {
   const PoseCorrection none = {};
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(corrected_pixel(camera(), none.data(), 0, 0, {0.1, 0.1, -1}));
-  EXPECT_FALSE(corrected_pixel(camera(), none.data(), 0, 0, {0.1, 0.1, 0}));
-  EXPECT_FALSE(corrected_pixel(camera(), none.data(), 0, 0, {0.1, 0.1, nan}));
+  EXPECT_FALSE(corrected_pixel(camera(), CorrectedPose(none), 0, 0, {0.1, 0.1, -1}));
+  EXPECT_FALSE(corrected_pixel(camera(), CorrectedPose(none), 0, 0, {0.1, 0.1, 0}));
+  EXPECT_FALSE(corrected_pixel(camera(), CorrectedPose(none), 0, 0, {0.1, 0.1, nan}));
   const PoseCorrection backwards = {0, 3.14159, 0, 0, 0, 0};
-  EXPECT_FALSE(corrected_pixel(camera(), backwards.data(), 0, 0, {0.1, 0.1, 1}));
+  EXPECT_FALSE(corrected_pixel(camera(), CorrectedPose(backwards), 0, 0, {0.1, 0.1, 1}));
 }
 
 }  // namespace

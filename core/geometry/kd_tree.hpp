@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <memory>
+#include <Eigen/Core>
+#include <cstddef>
 #include <nanoflann.hpp>
+#include <vector>
 
-#include "recon/registration/similarity.hpp"
-
-namespace orbitfuse::registration {
+namespace orbitfuse {
 
 /// Nearest neighbours among points, which must outlive the tree and be distinct enough for a
 /// k-d tree (thin first).
 class KdTree {
  public:
-  explicit KdTree(const Points& points) : adaptor_{points}, tree_(3, adaptor_, {12}) {
+  explicit KdTree(const std::vector<Eigen::Vector3d>& points)
+      : adaptor_{points}, tree_(3, adaptor_, {12}) {
     tree_.buildIndex();
   }
   /// Indices and squared distances of the k nearest, nearest first; returns how many were found.
@@ -23,7 +24,7 @@ class KdTree {
 
  private:
   struct Adaptor {
-    const Points& points;
+    const std::vector<Eigen::Vector3d>& points;
     std::size_t kdtree_get_point_count() const { return points.size(); }
     double kdtree_get_pt(std::size_t i, std::size_t d) const {
       return points[i][static_cast<Eigen::Index>(d)];
@@ -39,4 +40,4 @@ class KdTree {
       tree_;
 };
 
-}  // namespace orbitfuse::registration
+}  // namespace orbitfuse
