@@ -117,8 +117,8 @@ void PoseBundle::add(SharedPlace place) {
   state_.offsets.push_back(Eigen::Vector3d::Zero());
 }
 
-bool PoseBundle::linearise(const State& at, const CommonLensPrior& lens, const PoseBundleLosses& losses,
-                           Linear& linear) const {
+bool PoseBundle::linearise(const State& at, const CommonLensPrior& lens,
+                           const PoseBundleLosses& losses, Linear& linear) const {
   const std::size_t views = matches_.size();
   std::vector<CorrectedPose> poses;
   for (const PoseCorrection& correction : at.corrections) poses.emplace_back(correction);
@@ -196,8 +196,8 @@ bool PoseBundle::linearise(const State& at, const CommonLensPrior& lens, const P
 
 /// The normal equations of what views share, damped.
 struct PoseBundle::Reduced {
-  Eigen::MatrixXd h;          ///< its lower triangle
-  Eigen::VectorXd g, damped;  ///< gradient; what was added to the diagonal
+  Eigen::MatrixXd h;                           ///< its lower triangle
+  Eigen::VectorXd g, damped;                   ///< gradient; what was added to the diagonal
   std::vector<Eigen::Matrix3d> inverse;        ///< of each place's own part
   std::vector<Eigen::Vector3d> place_damping;  ///< what was added to its diagonal
 
@@ -267,8 +267,7 @@ void PoseBundle::eliminate_places(const Linear& linear, double radius, Reduced& 
     g[part] = Eigen::VectorXd::Zero(reduced.g.size());
     for (std::size_t i = begin; i < end; ++i) {
       Eigen::Matrix3d own = linear.places[i].h;
-      for (Eigen::Index k = 0; k < 3; ++k)
-        reduced.place_damping[i](k) = damping(own(k, k), radius);
+      for (Eigen::Index k = 0; k < 3; ++k) reduced.place_damping[i](k) = damping(own(k, k), radius);
       own.diagonal() += reduced.place_damping[i];
       reduced.inverse[i] = own.inverse();
       eliminate(i, linear.places[i], reduced, h[part], g[part]);
@@ -304,13 +303,13 @@ PoseBundle::Step PoseBundle::step(const Linear& linear, double radius) const {
     for (std::size_t s = 0; s < place.sightings.size(); ++s) {
       const LinearPair& pair = place.sightings[s];
       const Eigen::Index at = Reduced::of_view(places_[i].sightings[s].view);
-      const Eigen::Vector2d moved = pair.by_correction * found.shared.segment<6>(at) +
-                                    pair.by_lens * found.shared.tail<2>();
+      const Eigen::Vector2d moved =
+          pair.by_correction * found.shared.segment<6>(at) + pair.by_lens * found.shared.tail<2>();
       pull += pair.by_offset.transpose() * moved;
     }
     found.offsets[i] = -reduced.inverse[i] * pull;
-    twice += -place.g.dot(found.offsets[i]) +
-             found.offsets[i].cwiseAbs2().dot(reduced.place_damping[i]);
+    twice +=
+        -place.g.dot(found.offsets[i]) + found.offsets[i].cwiseAbs2().dot(reduced.place_damping[i]);
   }
   found.predicted = std::isfinite(twice) ? twice / 2 : 0;
   return found;
@@ -327,7 +326,8 @@ PoseBundle::State PoseBundle::moved(const State& from, const Step& step) const {
   return to;
 }
 
-bool PoseBundle::solve(const CommonLensPrior& lens, const PoseBundleLosses& losses, int max_iterations) {
+bool PoseBundle::solve(const CommonLensPrior& lens, const PoseBundleLosses& losses,
+                       int max_iterations) {
   Linear linear, tried;
   if (!linearise(state_, lens, losses, linear)) return false;
   const auto squared_norm = [](const State& s) {
