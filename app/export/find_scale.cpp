@@ -106,7 +106,8 @@ Result<std::optional<double>> off_in_other_views(const view::FinishedRun& run,
     off.push_back(std::abs(seen->z - in_cam.z()));
   }
   if (off.size() < least) return std::nullopt;
-  return median(off);
+  std::sort(off.begin(), off.end());
+  return off[off.size() * 3 / 4];
 }
 
 Result<Pointed> pointed_pixel(const view::FinishedRun& run, const PixelPlace& place,

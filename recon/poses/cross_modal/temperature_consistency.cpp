@@ -27,6 +27,9 @@ constexpr double confirmed_share = 0.4;
 /// searched again. A wrong view of `sedan` had .56 of .96, right ones .84 and more unless a wrong
 /// neighbour painted.
 constexpr double asked_correlation_share = 0.75;
+/// What form and temperatures say of a view's place are not two places: within reach of the thermal
+/// bundle's search, which decides (a right view of `van` was dropped at 1.1).
+constexpr double close_deg = 2;
 /// Two views turned by less are one station's: its own temperatures confirm any place.
 constexpr double own_turn_deg = 8;
 /// Fewer sure views paint nothing to judge others by.
@@ -310,16 +313,20 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
                 "{:.2f} of its loop's median support",
                 seen.temperatures_there, seen.form_before)};
         break;
-      case MoveDecision::nobody:
+      case MoveDecision::nobody: {
+        const double apart = apart_deg(orbit, view.view.cam_from_world, warm.view.cam_from_world);
+        // Too near each other to be two places: patches of other thermal views will tell.
+        const bool close = !seen.agree && apart < close_deg;
         view.verdict = {
-            Confidence::dropped,
+            close ? Confidence::doubtful : Confidence::dropped,
             seen.agree ? DoubtReason::not_found : DoubtReason::temperatures_elsewhere,
             seen.agree
                 ? "neither the visible scene nor the other views' temperatures show its edges"
                 : fmt::format(
                       "the visible scene and the other views' temperatures place it {:.1f} deg "
                       "apart",
-                      apart_deg(orbit, view.view.cam_from_world, warm.view.cam_from_world))};
+                      apart)};
+      }
     }
   }
   return check;
