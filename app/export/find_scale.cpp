@@ -75,15 +75,18 @@ Result<std::optional<SeenDepth>> depth_at(const view::FinishedRun& run, const Po
   return found;
 }
 
-/// How far other recorded views' depths are from a point of the surface, as seen from near the same
-/// side: where a field puts glass, gloss or plain paint at another depth from each side, one view
-/// alone does not tell. Nothing where too few views tell.
-Result<std::optional<double>> off_in_other_views(const view::FinishedRun& run,
-                                                 const view::RecordedView& self,
-                                                 const Eigen::Vector3d& point,
-                                                 const Progress& progress) {
+/// What other recorded views' depths say of a point of the surface, from near the same side: where
+/// a field puts glass, gloss or plain paint at another depth from each side, one view alone does
+/// not tell.
+struct OtherViews {
+  double farther = 0;      ///< along the ray, middle of all views, the point's own among them
+  double off = 0;          ///< three quarters of them are off by no more
+  std::size_t number = 0;  ///< that see it
+};
+Result<OtherViews> other_views(const view::FinishedRun& run, const view::RecordedView& self,
+                               const Eigen::Vector3d& point, const Progress& progress) {
   constexpr double most_turn_deg = 50, hidden_share = 0.1;
-  constexpr std::size_t enough = 6, least = 2;
+  constexpr std::size_t enough = 6;
   const Eigen::Vector3d from = (camera_center(self.view.cam_from_world) - point).normalized();
   std::vector<std::pair<double, const view::RecordedView*>> others;
   for (const view::RecordedView& v : run.views) {
@@ -92,7 +95,7 @@ Result<std::optional<double>> off_in_other_views(const view::FinishedRun& run,
     if (turn > std::cos(most_turn_deg * std::numbers::pi / 180)) others.emplace_back(-turn, &v);
   }
   std::sort(others.begin(), others.end());
-  std::vector<double> off;
+  std::vector<double> farther{0}, off;
   for (const auto& [turn, v] : others) {
     if (off.size() >= enough) break;
     const Eigen::Vector3d in_cam = v->view.cam_from_world * point;
@@ -103,11 +106,12 @@ Result<std::optional<double>> off_in_other_views(const view::FinishedRun& run,
     ORBITFUSE_ASSIGN(const auto seen,
                      depth_at(run, v->view, in_cam.head<2>() / in_cam.z(), progress));
     if (!seen || seen->z < in_cam.z() * (1 - hidden_share)) continue;
-    off.push_back(std::abs(seen->z - in_cam.z()));
+    farther.push_back(seen->z - in_cam.z());
+    off.push_back(std::abs(farther.back()));
   }
-  if (off.size() < least) return std::nullopt;
+  if (off.empty()) return OtherViews{};
   std::sort(off.begin(), off.end());
-  return off[off.size() * 3 / 4];
+  return OtherViews{median(farther), off[off.size() * 3 / 4], off.size()};
 }
 
 Result<Pointed> pointed_pixel(const view::FinishedRun& run, const PixelPlace& place,
@@ -138,8 +142,11 @@ Result<Pointed> pointed_pixel(const view::FinishedRun& run, const PixelPlace& pl
   Pointed out{world_from_cam * (seen->z * seen->ray),
               world_from_cam.rotation * seen->ray.normalized(), pointing_px * seen->z / seen->fx,
               std::max(depth_share * seen->z, 1.5 * seen->scatter)};
-  ORBITFUSE_ASSIGN(const auto off, off_in_other_views(run, *found, out.position, progress));
-  out.along = std::max(out.along, off ? off_weight * *off : unconfirmed_share * seen->z);
+  ORBITFUSE_ASSIGN(const OtherViews others, other_views(run, *found, out.position, progress));
+  out.position += others.farther * out.ray;
+  constexpr std::size_t least_others = 2;
+  out.along = std::max(out.along, others.number < least_others ? unconfirmed_share * seen->z
+                                                               : off_weight * others.off);
   return out;
 }
 
