@@ -69,6 +69,7 @@ const std::map<std::string, Floors> floors_of{
       {"stages"},
       {"eval", "view"},
       {"export", "inspection"},
+      {"comparison"},
       {"cli"},
       {"verbs"}}},
     {"drivers/aravis", {}},
