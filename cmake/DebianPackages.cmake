@@ -40,8 +40,10 @@ and exports surfaces. The processor needs AVX2.")
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME liborbitfuse-dev)
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION libdevel)
 # What OrbitFuseConfig.cmake finds and the public headers include.
-list(JOIN "libeigen3-dev;libceres-dev;libopencv-dev;libtbb-dev;nlohmann-json3-dev;libtomlplusplus-dev;libexpected-dev;libfmt-dev;libspdlog-dev;libtiff-dev;libpng-dev;libjpeg-dev;libcharls-dev;libheif-dev;libexiv2-dev;libsqlite3-dev;libxxhash-dev;libmeshoptimizer-dev;pkg-config"
-     ", " CPACK_DEBIAN_LIBRARY_PACKAGE_DEPENDS)
+string(JOIN ", " CPACK_DEBIAN_LIBRARY_PACKAGE_DEPENDS
+  libeigen3-dev libceres-dev libopencv-dev libtbb-dev nlohmann-json3-dev libtomlplusplus-dev
+  libexpected-dev libfmt-dev libspdlog-dev libtiff-dev libpng-dev libjpeg-dev libcharls-dev libheif-dev
+  libexiv2-dev libsqlite3-dev libxxhash-dev libmeshoptimizer-dev pkg-config)
 set(CPACK_COMPONENT_LIBRARY_DESCRIPTION
 "registration, fusion and radiance fields of OrbitFuse as libraries
 Static libraries, headers and the CMake package OrbitFuse: similarity between

@@ -6,8 +6,8 @@
 
 namespace orbitfuse::manual {
 
-/// A script that bash sources: completes verbs, each verb's options and the values of options with a
-/// fixed set of them; everything else as file names.
+/// A script that bash sources: completes verbs, each verb's options and the values of options with
+/// a fixed set of them; everything else as file names.
 std::string bash_completion(const CLI::App& app);
 
 }  // namespace orbitfuse::manual

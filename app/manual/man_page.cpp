@@ -15,8 +15,8 @@ std::string upper(std::string text) {
   return text;
 }
 
-/// Text in which roff finds no command: a line that begins with a dot or a quote would be one, and a
-/// bare hyphen is set as one that can't be copied into a shell.
+/// Text in which roff finds no command: a line that begins with a dot or a quote would be one, and
+/// a bare hyphen is set as one that can't be copied into a shell.
 std::string escaped(const std::string& text) {
   std::string out;
   for (const char c : text) {
@@ -90,12 +90,11 @@ class HelpWords : public CLI::Formatter {
 std::string options_of(const CLI::App& app, bool positional, const std::string& group) {
   const HelpWords words;
   std::string out;
-  for (const CLI::Option* option :
-       app.get_options([&](const CLI::Option* o) {
+  for (const CLI::Option* option : app.get_options([&](const CLI::Option* o) {
          return o->get_positional() == positional && (positional || o->get_group() == group);
        })) {
-    out += ".TP\n" + bold(option->get_name(positional, !positional)) +
-           escaped(words.of(*option)) + "\n" + escaped(option->get_description()) + "\n";
+    out += ".TP\n" + bold(option->get_name(positional, !positional)) + escaped(words.of(*option)) +
+           "\n" + escaped(option->get_description()) + "\n";
   }
   return out;
 }
@@ -122,22 +121,21 @@ std::string example(const CLI::App& app) {
 }
 
 std::string head(const std::string& name, const std::string& summary, const ManualFacts& facts) {
-  return fmt::format(
-      ".TH {} 1 {} \"OrbitFuse {}\" \"User Commands\"\n.SH NAME\n{} \\- {}\n", escaped(upper(name)),
-      facts.date, escaped(facts.version), escaped(name), escaped(summary));
+  return fmt::format(".TH {} 1 {} \"OrbitFuse {}\" \"User Commands\"\n.SH NAME\n{} \\- {}\n",
+                     escaped(upper(name)), facts.date, escaped(facts.version), escaped(name),
+                     escaped(summary));
 }
 
 std::string verb_page(const CLI::App& verb, const ManualFacts& facts) {
   std::string usage;
-  for (const CLI::Option* option : verb.get_options([](const CLI::Option* o) {
-         return o->get_positional();
-       })) {
+  for (const CLI::Option* option :
+       verb.get_options([](const CLI::Option* o) { return o->get_positional(); })) {
     const std::string name = "\\fI" + escaped(option->get_name(true)) + "\\fR";
     usage += option->get_required() ? name + " " : "[" + name + "] ";
   }
-  return head("orbitfuse-" + verb.get_name(), verb.get_description(), facts) +
-         ".SH SYNOPSIS\n" + bold("orbitfuse " + verb.get_name()) + " " + usage +
-         "[\\fIOPTIONS\\fR]\n" + all_options(verb) + example(verb) +
+  return head("orbitfuse-" + verb.get_name(), verb.get_description(), facts) + ".SH SYNOPSIS\n" +
+         bold("orbitfuse " + verb.get_name()) + " " + usage + "[\\fIOPTIONS\\fR]\n" +
+         all_options(verb) + example(verb) +
          ".SH SEE ALSO\n.BR orbitfuse (1),\nwhich tells exit codes and the order of options.\n";
 }
 
