@@ -9,7 +9,7 @@ namespace orbitfuse::manual {
 
 /// What the pages tell beside the program's own help.
 struct ManualFacts {
-  std::string version, date;  ///< of the release, e.g. "0.1.0" and "2026-11-23"
+  std::string version, date;  ///< of the release; the date as YYYY-MM-DD
   std::string introduction;   ///< docs/cli_intro.md
 };
 
