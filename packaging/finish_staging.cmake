@@ -2,6 +2,11 @@
 # Run by cpack between installing the components and packing them.
 find_program(GZIP gzip REQUIRED)
 find_program(STRIP strip REQUIRED)
+# Without it CPack makes a package that depends on no library, and says so only in passing.
+find_program(DPKG_SHLIBDEPS dpkg-shlibdeps)
+if(NOT DPKG_SHLIBDEPS)
+  message(FATAL_ERROR "dpkg-shlibdeps is missing: apt-get install dpkg-dev")
+endif()
 
 function(run)
   execute_process(COMMAND ${ARGN} COMMAND_ERROR_IS_FATAL ANY)

@@ -68,7 +68,7 @@ list_files > "$work/before.txt"
 
 say "apt-get install ./$(basename "$ORBITFUSE_PACKAGE")"
 cp "$ORBITFUSE_PACKAGE" "$root/tmp/orbitfuse.deb"
-inside apt-get install -y --no-install-recommends /tmp/orbitfuse.deb > "$work/install.log" 2>&1 ||
+inside apt-get install -y /tmp/orbitfuse.deb > "$work/install.log" 2>&1 ||
   { tail -n 20 "$work/install.log" >&2; fail "apt-get install"; }
 inside dpkg -L orbitfuse > "$work/package_files.txt"
 installed_mb=$(($(inside dpkg-query -W -f='${Installed-Size}\n' | awk '{s += $1} END {print s}') / 1024))
