@@ -6,11 +6,10 @@ set(CPACK_PACKAGE_VENDOR "OrbitFuse")
 set(CPACK_PACKAGE_CONTACT "OrbitFuse developers <maintainers@orbitfuse.invalid>")
 set(CPACK_PACKAGE_DIRECTORY ${PROJECT_BINARY_DIR}/packages)
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
-set(CPACK_STRIP_FILES ON)
 set(CPACK_COMPONENTS_ALL program library)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS
     OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
-# What Debian wants of the files and CMake doesn't do: packed documents, archives without debug symbols.
+# What Debian wants of the files and CMake doesn't do: packed documents, no debug symbols.
 set(CPACK_PRE_BUILD_SCRIPTS ${PROJECT_SOURCE_DIR}/packaging/finish_staging.cmake)
 set(CPACK_ORBITFUSE_CHANGELOG ${PROJECT_SOURCE_DIR}/CHANGELOG.md)
 set(CPACK_ORBITFUSE_DATE ${release_date})
