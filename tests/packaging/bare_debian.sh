@@ -106,7 +106,7 @@ say "apt-get purge"
 inside apt-get remove --purge -y orbitfuse > "$work/purge.log" 2>&1 || fail "apt-get remove --purge"
 left=()
 while read -r file; do
-  [ -e "$root$file" ] || continue
+  [ "$file" != /. ] && [ -e "$root$file" ] || continue
   inside dpkg -S "$file" > /dev/null 2>&1 || left+=("$file")
 done < "$work/package_files.txt"
 while read -r file; do left+=("$file"); done < <(list_files | grep -i orbitfuse || true)
