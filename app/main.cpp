@@ -15,7 +15,6 @@
 #include "app/cli/run_stages.hpp"
 #include "app/terminal/exit_code.hpp"
 #include "app/terminal/interrupt.hpp"
-#include "core/system/cpu.hpp"
 #include "core/system/isa_wish.hpp"
 #include "core/system/memory.hpp"
 #include "core/system/parallel.hpp"
@@ -51,8 +50,6 @@ Status resolve_config(const cli::CommonOptions& common, const CLI::App& verb,
 }
 
 Status check_machine(const cli::CommonOptions& common) {
-  if (!has_baseline())
-    return fail(ErrorKind::unavailable, cpu_description(), "no AVX2", "use a processor with AVX2");
   ORBITFUSE_TRY(check_isa_wish());
   if (common.device == "cuda")
     return fail(ErrorKind::unavailable, "--device cuda", "this build computes on the CPU only",

@@ -13,8 +13,5 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/OrbitFuseConfigVersion.cm
 install(FILES ${PROJECT_BINARY_DIR}/OrbitFuseConfig.cmake
   ${PROJECT_BINARY_DIR}/OrbitFuseConfigVersion.cmake
   DESTINATION ${package_folder} COMPONENT library)
-install(FILES ${PROJECT_SOURCE_DIR}/LICENSE
-  DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/orbitfuse COMPONENT library)
-if(ORBITFUSE_APP)
-  install(TARGETS orbitfuse RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program)
-endif()
+install(FILES ${PROJECT_SOURCE_DIR}/packaging/copyright
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/liborbitfuse-dev COMPONENT library)
