@@ -36,15 +36,16 @@ Status has_what_it_takes(const view::FinishedRun& run) {
 /// recorded photos would do as well, and need not be there any more.
 Result<ThermalEvidence> evidence_of(const view::FinishedRun& run, const Progress& progress) {
   ThermalEvidence evidence;
-  ORBITFUSE_ASSIGN(evidence.cloud, read_ply(run.out / "train_visible" / stages::cloud_file));
+  ORBITFUSE_ASSIGN(evidence.cloud,
+                   read_ply(run.out / "train_visible" / stages::cloud_file));
   const SceneRenderer renderer = edge_renderer(run.visible, progress);
   constexpr int width_px = 320;
   for (PosedView view : fields_of(run).visible_views) {
     ORBITFUSE_TRY(progress.check("compare"));
     const int width = std::min(width_px, view.camera.width);
-    view.camera =
-        view.camera.scaled_to(width, std::max(1, view.camera.height * width / view.camera.width))
-            .without_distortion();
+    view.camera = view.camera.scaled_to(width, std::max(1, view.camera.height * width /
+                                                               view.camera.width))
+                      .without_distortion();
     ORBITFUSE_ASSIGN(const SceneRender seen, renderer(view.camera, view.cam_from_world));
     evidence.images.push_back(seen.brightness);
     evidence.views.push_back(std::move(view));
@@ -52,30 +53,32 @@ Result<ThermalEvidence> evidence_of(const view::FinishedRun& run, const Progress
   return evidence;
 }
 
-/// Where BEFORE's world lies in AFTER's, by what both visible fields show: clouds first, edges
-/// then.
+/// Where BEFORE's world lies in AFTER's, by what both visible fields show: clouds first, edges then.
 Result<FieldRegistration> registered(const view::FinishedRun& before,
                                      const view::FinishedRun& after,
-                                     const RegistrationOptions& options, const Progress& progress) {
+                                     const RegistrationOptions& options,
+                                     const Progress& progress) {
   ORBITFUSE_ASSIGN(const ThermalEvidence earlier, evidence_of(before, progress));
-  ORBITFUSE_ASSIGN(PointCloud cloud, read_ply(after.out / "train_visible" / stages::cloud_file));
+  ORBITFUSE_ASSIGN(PointCloud cloud,
+                   read_ply(after.out / "train_visible" / stages::cloud_file));
   const VisibleEvidence later{std::move(cloud), edge_renderer(after.visible, progress)};
   ORBITFUSE_ASSIGN(FieldRegistration found, register_fields(earlier, later, options, progress));
   if (found.clouds.score < least_score || found.images.agreement_after < least_agreement)
-    return fail(
-        ErrorKind::quality, before.out.string() + " and " + after.out.string(),
-        fmt::format("surfaces that agree at {:.2f} (at least {:.2f} is asked) and edges "
-                    "at {:.2f} ({:.2f})",
-                    found.clouds.score, least_score, found.images.agreement_after, least_agreement),
-        "see that both are of one object, seen from all round");
+    return fail(ErrorKind::quality, before.out.string() + " and " + after.out.string(),
+                fmt::format("surfaces that agree at {:.2f} (at least {:.2f} is asked) and edges "
+                            "at {:.2f} ({:.2f})",
+                            found.clouds.score, least_score, found.images.agreement_after,
+                            least_agreement),
+                "see that both are of one object, seen from all round");
   return found;
 }
 
 double percentile_of_size(std::vector<float> values, double share) {
   std::sort(values.begin(), values.end(),
             [](float a, float b) { return std::abs(a) < std::abs(b); });
-  return static_cast<double>(values[std::min(
-      values.size() - 1, static_cast<std::size_t>(share * static_cast<double>(values.size())))]);
+  return static_cast<double>(
+      values[std::min(values.size() - 1,
+                      static_cast<std::size_t>(share * static_cast<double>(values.size())))]);
 }
 
 /// The surface that did not change: its middle and its scatter.
@@ -117,8 +120,7 @@ std::vector<ComparedRegion> warmer_or_colder(const std::vector<double>& areas, d
   for (std::size_t v = 0; v < areas.size(); ++v) {
     const double beyond = static_cast<double>(c.difference.difference_k[v]) - middle;
     // Where views disagree by more than the difference, it is none that can be stated.
-    const bool stated =
-        std::abs(beyond) > std::max(least, static_cast<double>(c.difference.spread_k[v]));
+    const bool stated = std::abs(beyond) > std::max(least, static_cast<double>(c.difference.spread_k[v]));
     labels.push_back(!stated ? 0 : beyond > 0 ? 1 : -1);
   }
   std::vector<ComparedRegion> found;
@@ -197,11 +199,11 @@ Result<Comparison> compare_runs(const view::FinishedRun& before, const view::Fin
   const SurfaceFields earlier = fields_of(before), later = fields_of(after);
 
   ORBITFUSE_ASSIGN(c.surface, exporting::surface_of_run(after, options.surface, progress));
-  ORBITFUSE_ASSIGN(
-      const std::vector<DifferencePicture> pictures,
-      difference_pictures(later, earlier, after_from_before, options.difference, progress));
-  ORBITFUSE_ASSIGN(c.difference,
-                   surface_difference(c.surface.mesh, pictures, options.difference, progress));
+  ORBITFUSE_ASSIGN(const std::vector<DifferencePicture> pictures,
+                   difference_pictures(later, earlier, after_from_before, options.difference,
+                                       progress));
+  ORBITFUSE_ASSIGN(c.difference, surface_difference(c.surface.mesh, pictures, options.difference,
+                                                    progress));
   const std::vector<double> areas = vertex_areas(c.surface.mesh);
   ORBITFUSE_TRY(settle(areas, options, c));
   double total = 0;

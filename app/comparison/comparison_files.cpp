@@ -67,11 +67,8 @@ Status write_meshes(const fs::path& folder, const ComparedRuns& runs,
   ORBITFUSE_TRY(write_ply(folder / "difference.ply", mesh, ply));
   mesh.vertices.temperatures_k.clear();  // a glTF reader would take differences for temperatures
   json extras = exporting::to_json(frame);
-  extras["colors"] = {{"blue_k", -colors.reach_k()},
-                      {"white_k", 0},
-                      {"red_k", colors.reach_k()},
-                      {"magenta", "changed geometry"},
-                      {"gray", "not compared"}};
+  extras["colors"] = {{"blue_k", -colors.reach_k()}, {"white_k", 0}, {"red_k", colors.reach_k()},
+                      {"magenta", "changed geometry"}, {"gray", "not compared"}};
   return exporting::write_glb(folder / "difference.glb", mesh, extras);
 }
 
@@ -81,13 +78,13 @@ Result<cv::Mat> picture(const ComparedRuns& runs, const PosedView& camera,
                         const Progress& progress) {
   SurfaceDifferenceOptions fine = options.difference;
   fine.width_px = 480;
-  ORBITFUSE_ASSIGN(
-      const DifferencePicture seen,
-      difference_picture(camera, fields_of(runs.after), fields_of(runs.before),
-                         runs.comparison.registration.visible_from_thermal(), fine, progress));
-  ORBITFUSE_ASSIGN(
-      const nerf::RenderedView plain,
-      nerf::render(runs.after.visible, seen.view.camera, seen.view.cam_from_world, {}, progress));
+  ORBITFUSE_ASSIGN(const DifferencePicture seen,
+                   difference_picture(camera, fields_of(runs.after), fields_of(runs.before),
+                                      runs.comparison.registration.visible_from_thermal(), fine,
+                                      progress));
+  ORBITFUSE_ASSIGN(const nerf::RenderedView plain,
+                   nerf::render(runs.after.visible, seen.view.camera, seen.view.cam_from_world, {},
+                                progress));
   cv::Mat bgr;
   cv::cvtColor(plain.color, bgr, cv::COLOR_RGB2BGR);
   const double ambient = runs.comparison.ambient_removed ? runs.comparison.ambient_k : 0;
@@ -127,11 +124,10 @@ json to_json(const ComparedRuns& runs) {
           {"ambient_k", c.ambient_k},
           {"ambient_removed", c.ambient_removed},
           {"noise_k", c.noise_k},
-          {"share",
-           {{"compared", c.same_share},
-            {"changed", c.changed_share},
-            {"not_seen", c.unseen_share},
-            {"beyond_least", c.beyond_share}}},
+          {"share", {{"compared", c.same_share},
+                     {"changed", c.changed_share},
+                     {"not_seen", c.unseen_share},
+                     {"beyond_least", c.beyond_share}}},
           {"differences", regions_json(c.warmer_or_colder, world, true)},
           {"appeared", regions_json(c.appeared, world, false)},
           {"gone", regions_json(c.gone, world, false)}};
@@ -153,8 +149,8 @@ Status write_comparison(const fs::path& folder, const ComparedRuns& runs,
     pictures.push_back({cameras[i].name, image});
   }
   const json numbers = to_json(runs);
-  ORBITFUSE_TRY(
-      write_file_atomic(folder / "comparison.html", comparison_page(numbers, colors, pictures)));
+  ORBITFUSE_TRY(write_file_atomic(folder / "comparison.html",
+                                  comparison_page(numbers, colors, pictures)));
   return write_file_atomic(folder / "differences.json", numbers.dump(2) + "\n");
 }
 

@@ -23,8 +23,7 @@ nlohmann::json to_json(const ComparedRuns& runs);
 /// Into `folder`: differences.json; difference.ply (scalar difference_k, NaN where nothing is said)
 /// and difference.glb, coloured blue (colder) over white to red (warmer), changed geometry magenta,
 /// what was not compared gray; views/NAME.png, the same over pictures of AFTER from its own visible
-/// cameras; comparison.html, one page that needs nothing else. Errors: the renderer's, the
-/// writers'.
+/// cameras; comparison.html, one page that needs nothing else. Errors: the renderer's, the writers'.
 Status write_comparison(const std::filesystem::path& folder, const ComparedRuns& runs,
                         const CompareOptions& options, const Progress& progress);
 

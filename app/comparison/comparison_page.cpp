@@ -111,15 +111,14 @@ std::string comparison_page(const json& numbers, const DifferenceColors& colors,
                             const std::vector<ComparedPicture>& pictures) {
   std::string figures;
   for (const ComparedPicture& p : pictures)
-    figures += fmt::format(
-        "<figure><img src=\"{}\" alt=\"difference over {}\"><figcaption>{}"
-        "</figcaption></figure>\n",
-        report::data_uri(p.image, 640), escape(p.view), escape(p.view));
+    figures += fmt::format("<figure><img src=\"{}\" alt=\"difference over {}\"><figcaption>{}"
+                           "</figcaption></figure>\n",
+                           report::data_uri(p.image, 640), escape(p.view), escape(p.view));
   const json& scale = numbers.at("frame");
-  const std::string lengths = scale.value("unit", "scene") == "metre"
-                                  ? "Lengths are in metres, as sure as AFTER's scale."
-                                  : "No scale is known: lengths are in the unit of AFTER's run "
-                                    "(orbitfuse export tells one).";
+  const std::string lengths =
+      scale.value("unit", "scene") == "metre"
+          ? "Lengths are in metres, as sure as AFTER's scale."
+          : "No scale is known: lengths are in the unit of AFTER's run (orbitfuse export tells one).";
   return fmt::format(
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
       "<meta name=\"viewport\" content=\"width=device-width\"><title>Comparison</title>"

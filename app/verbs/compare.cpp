@@ -69,7 +69,8 @@ Status compare(Context& context, const Options& o) {
     context.console.info("the runs can be compared");
     return {};
   }
-  ORBITFUSE_ASSIGN(const Comparison found, compare_runs(before, after, options, context.progress));
+  ORBITFUSE_ASSIGN(const Comparison found,
+                   compare_runs(before, after, options, context.progress));
   const ComparedRuns runs{before, after, scale, found};
   ORBITFUSE_TRY(write_comparison(o.out, runs, options, context.progress));
   context.result = to_json(runs);

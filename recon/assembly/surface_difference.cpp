@@ -23,10 +23,10 @@ struct Seen {
 Result<Seen> seen_by(const PosedView& view, const SurfaceFields& fields,
                      const Similarity3d& world_from_fields, const Progress& progress) {
   const Similarity3d world_from_thermal = world_from_fields * fields.world_from_thermal;
-  ORBITFUSE_ASSIGN(
-      nerf::RenderedView render,
-      nerf::render(*fields.thermal, view.camera,
-                   rebase(view.cam_from_world, world_from_thermal.inverse()), {}, progress));
+  ORBITFUSE_ASSIGN(nerf::RenderedView render,
+                   nerf::render(*fields.thermal, view.camera,
+                                rebase(view.cam_from_world, world_from_thermal.inverse()), {},
+                                progress));
   Seen seen{render.color, render.depth * world_from_thermal.scale};
   for (int y = 0; y < seen.depth.rows; ++y)
     for (int x = 0; x < seen.depth.cols; ++x)
@@ -64,7 +64,8 @@ Result<DifferencePicture> difference_picture(const PosedView& posed, const Surfa
   const Camera& full = posed.camera;
   const int width = std::min(full.width, options.width_px);
   const int height = std::max(
-      2, static_cast<int>(std::lround(static_cast<double>(full.height) * width / full.width)));
+      2,
+      static_cast<int>(std::lround(static_cast<double>(full.height) * width / full.width)));
   DifferencePicture picture;
   picture.view = {posed.name, full.scaled_to(width, height).without_distortion(),
                   posed.cam_from_world};
@@ -110,11 +111,11 @@ std::vector<DifferencePicture> seen_from_other(const std::vector<DifferencePictu
                                                const Similarity3d& world_from_other) {
   std::vector<DifferencePicture> swapped;
   for (const DifferencePicture& p : pictures)
-    swapped.push_back(
-        {{p.view.name, p.view.camera, rebase(p.view.cam_from_world, world_from_other.inverse())},
-         -p.difference_k,
-         p.only_there,
-         p.only_here});
+    swapped.push_back({{p.view.name, p.view.camera,
+                        rebase(p.view.cam_from_world, world_from_other.inverse())},
+                       -p.difference_k,
+                       p.only_there,
+                       p.only_here});
   return swapped;
 }
 
@@ -148,8 +149,8 @@ Result<SurfaceDifference> surface_difference(const TriangleMesh& mesh,
                             : same  ? SurfaceChange::same
                                     : SurfaceChange::unseen);
     result.difference_k.push_back(same ? value[0] : unknown);
-    result.spread_k.push_back(same ? std::sqrt(std::max(0.0F, value[1] - value[0] * value[0]))
-                                   : unknown);
+    result.spread_k.push_back(
+        same ? std::sqrt(std::max(0.0F, value[1] - value[0] * value[0])) : unknown);
   }
   return result;
 }

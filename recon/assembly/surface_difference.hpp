@@ -22,7 +22,7 @@ struct SurfaceDifferenceOptions {
   double same_depth = 0.01, changed_depth = 0.02;
   /// Of a place's views that must see another surface.
   double changed_share = 0.5;
-  int least_views = 3;        ///< that say so: where one or two see anything, fields make it up
+  int least_views = 3;  ///< that say so: where one or two see anything, fields make it up
   double max_angle_deg = 75;  ///< flatter, a pixel's error of pose shows something else
   Status validate() const;
 };

@@ -212,28 +212,5 @@ TEST_F(Measure, FoldersThatAreNoRunAreNamed) {
   }
 }
 
-TEST_F(Measure, ComparingRefusesByNameWhatItCannotCompare) {
-  const auto compare = [](const fs::path& after, const fs::path& to) {
-    return orbitfuse_program({"compare", out().string(), after.string(), "--out", to.string()});
-  };
-  const fs::path to = *folder / "changes";
-  const Outcome twice = compare(out(), to);
-  EXPECT_EQ(twice.code, 2);
-  EXPECT_THAT(twice.err, HasSubstr("the same run twice"));
-  const Outcome no_run = compare(session(), to);
-  EXPECT_EQ(no_run.code, 3);
-  EXPECT_THAT(no_run.err, HasSubstr(session().string()));
-  const fs::path copy = *folder / "copy";
-  fs::copy(out(), copy, fs::copy_options::recursive);
-  const Outcome into_run = compare(copy, session());
-  EXPECT_EQ(into_run.code, 3);
-  EXPECT_THAT(into_run.err, HasSubstr("something else than a comparison"));
-  fs::remove_all(copy / "train_thermal");
-  const Outcome half = compare(copy, to);
-  EXPECT_EQ(half.code, 3) << half.err;
-  EXPECT_THAT(half.err, HasSubstr("thermal"));
-  EXPECT_FALSE(fs::exists(to));
-}
-
 }  // namespace
 }  // namespace orbitfuse
