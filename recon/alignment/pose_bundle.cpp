@@ -16,9 +16,8 @@ namespace {
 using Vector8d = Eigen::Matrix<double, 8, 1>;
 using Matrix8d = Eigen::Matrix<double, 8, 8>;
 
-/// Places are summed in so many parts, whatever the number of threads; each has a matrix of all
-/// views.
-std::size_t parts_for(std::size_t views) { return views <= 150 ? 8 : 2; }
+/// Places are summed in so many parts, whatever the number of threads.
+constexpr std::size_t parts = 8;
 /// The trust region as Ceres has it: first radius, least share of the predicted gain.
 constexpr double first_radius = 1e4, least_gain = 1e-3;
 constexpr double least_radius = 1e-32, most_damping = 1e32, least_damping = 1e-6;
@@ -79,12 +78,7 @@ double damping(double diagonal, double radius) {
          radius;
 }
 
-/// The places of one part.
-struct Part {
-  std::size_t begin, end;
-  Part(std::size_t index, std::size_t parts, std::size_t count)
-      : begin(count * index / parts), end(count * (index + 1) / parts) {}
-};
+std::size_t first_of(std::size_t part, std::size_t count) { return count * part / parts; }
 
 }  // namespace
 
@@ -125,7 +119,7 @@ void PoseBundle::add(SharedPlace place) {
 
 bool PoseBundle::linearise(const State& at, const CommonLensPrior& lens,
                            const PoseBundleLosses& losses, Linear& linear) const {
-  const std::size_t views = matches_.size(), parts = parts_for(views);
+  const std::size_t views = matches_.size();
   std::vector<CorrectedPose> poses;
   for (const PoseCorrection& correction : at.corrections) poses.emplace_back(correction);
   const auto seen = [&](std::size_t view, const Eigen::Vector3d& point) {
@@ -150,11 +144,11 @@ bool PoseBundle::linearise(const State& at, const CommonLensPrior& lens,
   });
   linear.places.assign(places_.size(), {});
   std::vector<std::vector<ViewPart>> sums(parts, std::vector<ViewPart>(views));
-  parallel_for(static_cast<int>(parts), [&](int index) {
+  parallel_for(parts, [&](int index) {
     const auto part = static_cast<std::size_t>(index);
     double& cost = costs[views + part];
-    const Part range(part, parts, places_.size());
-    for (std::size_t p = range.begin; p < range.end; ++p) {
+    for (std::size_t p = first_of(part, places_.size()); p < first_of(part + 1, places_.size());
+         ++p) {
       const SharedPlace& place = places_[p];
       LinearPlace& out = linear.places[p];
       const Eigen::Vector3d& offset = at.offsets[p];
@@ -263,16 +257,15 @@ void PoseBundle::eliminate(std::size_t index, const LinearPlace& place, const Re
 void PoseBundle::eliminate_places(const Linear& linear, double radius, Reduced& reduced) const {
   reduced.inverse.resize(places_.size());
   reduced.place_damping.resize(places_.size());
-  const std::size_t parts = parts_for(matches_.size());
   std::vector<Eigen::MatrixXd> h(parts);
   std::vector<Eigen::VectorXd> g(parts);
-  parallel_for(static_cast<int>(parts), [&](int index) {
+  parallel_for(parts, [&](int index) {
     const auto part = static_cast<std::size_t>(index);
-    const Part range(part, parts, places_.size());
-    if (range.begin == range.end) return;
+    const auto begin = first_of(part, places_.size()), end = first_of(part + 1, places_.size());
+    if (begin == end) return;
     h[part] = Eigen::MatrixXd::Zero(reduced.h.rows(), reduced.h.cols());
     g[part] = Eigen::VectorXd::Zero(reduced.g.size());
-    for (std::size_t i = range.begin; i < range.end; ++i) {
+    for (std::size_t i = begin; i < end; ++i) {
       Eigen::Matrix3d own = linear.places[i].h;
       for (Eigen::Index k = 0; k < 3; ++k) reduced.place_damping[i](k) = damping(own(k, k), radius);
       own.diagonal() += reduced.place_damping[i];

@@ -69,7 +69,6 @@ const std::map<std::string, Floors> floors_of{
       {"stages"},
       {"eval", "view"},
       {"export", "inspection"},
-      {"comparison"},
       {"cli"},
       {"verbs"},
       {"manual"}}},
