@@ -29,7 +29,7 @@ struct ComparedRuns {
   view::FinishedRun before, after;
   FieldSurface before_surface, after_surface;  ///< each in its run's world
   comparison::SurfaceRegistration registration;
-  double support = 0;  ///< of AFTER's photos by renders of BEFORE
+  double support = 0;                               ///< of AFTER's photos by renders of BEFORE
   std::vector<comparison::SurfaceChange> change;    ///< a vertex of AFTER's surface
   std::vector<comparison::PointDifference> points;  ///< likewise, before anything was taken out
   double common_k = 0;  ///< median difference of what holds still; NaN: nothing was compared
@@ -37,9 +37,10 @@ struct ComparedRuns {
   SurfaceShares shares;
   std::vector<comparison::DifferenceRegion> differences;
   std::vector<comparison::DifferenceRegion> came;  ///< of AFTER's surface: not there before
-  std::vector<comparison::DifferenceRegion> gone;  ///< of BEFORE's, middle and place in AFTER's world
-  std::optional<stages::MetricScale> scale;        ///< of AFTER's world, told in either run
-  double least_difference_k = 0;  ///< of a finding
+  std::vector<comparison::DifferenceRegion>
+      gone;                                  ///< of BEFORE's, middle and place in AFTER's world
+  std::optional<stages::MetricScale> scale;  ///< of AFTER's world, told in either run
+  double least_difference_k = 0;             ///< of a finding
 
   /// NaN where it is not known.
   double difference_k(std::size_t vertex) const { return points[vertex].difference_k - taken_k; }

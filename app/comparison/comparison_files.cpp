@@ -114,7 +114,8 @@ std::string area_words(const ComparedRuns& runs, double area) {
 }
 
 std::string residual_words(const ComparedRuns& runs) {
-  const std::string share = fmt::format("{:.2f} % of the extent", 100 * residual(runs) / extent(runs));
+  const std::string share =
+      fmt::format("{:.2f} % of the extent", 100 * residual(runs) / extent(runs));
   return runs.scale
              ? fmt::format("{:.1f} mm ({})", 1000 * residual(runs) * metres_per_unit(runs), share)
              : share;
@@ -122,11 +123,13 @@ std::string residual_words(const ComparedRuns& runs) {
 
 std::string ambient_words(const ComparedRuns& runs) {
   return runs.taken_k != 0
-             ? fmt::format("{:+.2f} K, the median over the unchanged surface, was taken out of all "
-                           "differences (--ambient)",
-                           runs.taken_k)
-             : fmt::format("nothing was taken out; the median over the unchanged surface is {:+.2f} K",
-                           runs.common_k);
+             ? fmt::format(
+                   "{:+.2f} K, the median over the unchanged surface, was taken out of all "
+                   "differences (--ambient)",
+                   runs.taken_k)
+             : fmt::format(
+                   "nothing was taken out; the median over the unchanged surface is {:+.2f} K",
+                   runs.common_k);
 }
 
 json to_json(const ComparedRuns& runs) {
@@ -159,7 +162,8 @@ json to_json(const ComparedRuns& runs) {
     r["strongest_k"] = region.strongest_k;
     j["differences"].push_back(r);
   }
-  for (const auto& [key, regions] : {std::pair("came", &runs.came), std::pair("gone", &runs.gone)}) {
+  for (const auto& [key, regions] :
+       {std::pair("came", &runs.came), std::pair("gone", &runs.gone)}) {
     j[key] = json::array();
     for (const DifferenceRegion& region : *regions)
       j[key].push_back(region_json(runs, region, static_cast<int>(j[key].size()) + 1));

@@ -18,7 +18,8 @@ constexpr int picture_width_px = 560;
 constexpr std::size_t most_rows = 20;
 
 std::string row(const std::string& what, const std::string& value) {
-  return fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", escape(what), escape(value));
+  return fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", escape(what),
+                     escape(value));
 }
 
 std::string session_words(const view::FinishedRun& run) {
@@ -38,16 +39,17 @@ std::string facts(const ComparedRuns& runs) {
                                 "before and after match"
                               : ""));
   html += row("Difference of the days", ambient_words(runs));
-  html += row("Scale", runs.scale ? fmt::format("1 unit is {:.4f} m ± {:.1f} % ({})",
-                                                runs.scale->metres_per_unit,
-                                                165 * runs.scale->relative_uncertainty,
-                                                runs.scale->source)
-                                  : "no scale is known");
+  html += row("Scale",
+              runs.scale
+                  ? fmt::format("1 unit is {:.4f} m ± {:.1f} % ({})", runs.scale->metres_per_unit,
+                                165 * runs.scale->relative_uncertainty, runs.scale->source)
+                  : "no scale is known");
   const SurfaceShares& s = runs.shares;
-  html += row("Surface after", fmt::format("{:.1f} % compared, {:.1f} % changed geometry, {:.1f} % not "
-                                           "seen before, {:.1f} % without a temperature in both",
-                                           100 * s.compared, 100 * s.changed, 100 * s.not_seen,
-                                           100 * s.without_temperature));
+  html +=
+      row("Surface after", fmt::format("{:.1f} % compared, {:.1f} % changed geometry, {:.1f} % not "
+                                       "seen before, {:.1f} % without a temperature in both",
+                                       100 * s.compared, 100 * s.changed, 100 * s.not_seen,
+                                       100 * s.without_temperature));
   return html + "</tbody></table>\n";
 }
 
@@ -56,16 +58,17 @@ std::string place_words(const Eigen::Vector3d& p) {
 }
 
 std::string more(std::size_t all) {
-  return all > most_rows ? fmt::format("<p class=\"note\">{} more in differences.json.</p>\n",
-                                       all - most_rows)
-                         : "";
+  return all > most_rows
+             ? fmt::format("<p class=\"note\">{} more in differences.json.</p>\n", all - most_rows)
+             : "";
 }
 
 std::string differences(const ComparedRuns& runs) {
   if (runs.differences.empty())
-    return fmt::format("<p>No part of the unchanged surface differs by more than {:.1f} K and its own "
-                       "uncertainty.</p>\n",
-                       runs.least_difference_k);
+    return fmt::format(
+        "<p>No part of the unchanged surface differs by more than {:.1f} K and its own "
+        "uncertainty.</p>\n",
+        runs.least_difference_k);
   std::string html =
       "<table><thead><tr><th>No.</th><th>Difference K</th><th>± K</th><th>Strongest K</th>"
       "<th>Area</th><th class=\"text\">Place</th></tr></thead><tbody>\n";
@@ -78,7 +81,8 @@ std::string differences(const ComparedRuns& runs) {
         place_words(r.place));
   }
   return html + "</tbody></table>\n" + more(runs.differences.size()) +
-         "<p class=\"note\">After minus before, medians over connected parts. ± is met in 90 of 100 "
+         "<p class=\"note\">After minus before, medians over connected parts. ± is met in 90 of "
+         "100 "
          "cases, apart from the calibration of the cameras. Places are in AFTER's world.</p>\n";
 }
 
@@ -87,10 +91,10 @@ std::string changes(const ComparedRuns& runs) {
   const auto add = [&](const char* letter, const char* what,
                        const std::vector<DifferenceRegion>& regions) {
     for (std::size_t i = 0; i < std::min(most_rows, regions.size()); ++i)
-      rows += fmt::format("<tr><td>{}{}</td><td class=\"text\">{}</td><td>{}</td><td "
-                          "class=\"text\">{}</td></tr>\n",
-                          letter, i + 1, what, area_words(runs, regions[i].area),
-                          place_words(regions[i].middle));
+      rows += fmt::format(
+          "<tr><td>{}{}</td><td class=\"text\">{}</td><td>{}</td><td "
+          "class=\"text\">{}</td></tr>\n",
+          letter, i + 1, what, area_words(runs, regions[i].area), place_words(regions[i].middle));
   };
   add("N", "new here, or moved here", runs.came);
   add("G", "gone from here", runs.gone);
@@ -126,7 +130,8 @@ std::string ramp(double span_k) {
 std::string views(const ComparedRuns& runs, const std::vector<ComparisonPictures>& pictures) {
   std::string html = ramp(difference_span_k(runs));
   for (const ComparisonPictures& p : pictures)
-    html += "<div class=\"three\">\n" + figure(p.before, "Before, rendered by the camera of " + p.view) +
+    html += "<div class=\"three\">\n" +
+            figure(p.before, "Before, rendered by the camera of " + p.view) +
             figure(p.after, "After, " + p.view) + figure(p.difference, "Difference") + "</div>\n";
   return html;
 }
@@ -141,7 +146,8 @@ std::string to_html(const ComparedRuns& runs, const std::vector<ComparisonPictur
   std::string html = fmt::format(
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
       "content=\"width=device-width,initial-scale=1\"><meta http-equiv=\"Content-Security-Policy\" "
-      "content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\"><title>Comparison of "
+      "content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\"><title>Comparison "
+      "of "
       "two inspections</title>\n<style>\n{}</style></head>\n<body>\n<header><h1>Comparison of two "
       "inspections</h1></header>\n<main>\n",
       embedded::inspection_css);
@@ -149,10 +155,10 @@ std::string to_html(const ComparedRuns& runs, const std::vector<ComparisonPictur
   html += section("Changed geometry", changes(runs));
   html += section("Views", views(runs, pictures));
   html += section("Runs and registration", facts(runs));
-  return html +
-         fmt::format("</main>\n<footer>{}. The same in differences.json, difference.glb and "
-                     "difference.ply.</footer>\n</body></html>\n",
-                     escape(pipeline::software_version()));
+  return html + fmt::format(
+                    "</main>\n<footer>{}. The same in differences.json, difference.glb and "
+                    "difference.ply.</footer>\n</body></html>\n",
+                    escape(pipeline::software_version()));
 }
 
 }  // namespace orbitfuse::comparing

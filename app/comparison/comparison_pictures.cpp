@@ -52,7 +52,8 @@ void number_regions(const ComparedRuns& runs, const PosedView& view, const cv::M
     if (!hidden_too && in_cam.z() > slack * static_cast<double>(depth.at<float>(at))) return;
     const cv::Point corner(at.x + 5, at.y - 5);
     cv::circle(picture, at, 3, {0, 0, 0}, cv::FILLED, cv::LINE_AA);
-    cv::putText(picture, word, corner, cv::FONT_HERSHEY_SIMPLEX, 0.5, {255, 255, 255}, 3, cv::LINE_AA);
+    cv::putText(picture, word, corner, cv::FONT_HERSHEY_SIMPLEX, 0.5, {255, 255, 255}, 3,
+                cv::LINE_AA);
     cv::putText(picture, word, corner, cv::FONT_HERSHEY_SIMPLEX, 0.5, {0, 0, 0}, 1, cv::LINE_AA);
   };
   int number = 0;
@@ -95,7 +96,8 @@ cv::Mat difference_picture(const ComparedRuns& runs, const KdTree& vertices, con
 /// Evenly over the sure visible views, in the order of their azimuth.
 std::vector<const PosedView*> views_round(const view::FinishedRun& run) {
   std::vector<std::pair<double, const PosedView*>> by_azimuth;
-  const Eigen::Quaterniond level = Eigen::Quaterniond::FromTwoVectors(run.up, Eigen::Vector3d::UnitZ());
+  const Eigen::Quaterniond level =
+      Eigen::Quaterniond::FromTwoVectors(run.up, Eigen::Vector3d::UnitZ());
   for (const view::RecordedView& v : run.views) {
     if (v.modality != Modality::visible || v.doubt) continue;
     const Eigen::Vector3d from = level * (camera_center(v.view.cam_from_world) - run.center);
@@ -117,7 +119,8 @@ cv::Mat difference_colors() {
   for (int i = 0; i < 256; ++i) {
     const double share = std::abs(i - 127.5) / 127.5;
     const cv::Vec3d c = none * (1 - share) + (i < 128 ? cold : warm) * share;
-    for (int k = 0; k < 3; ++k) colors.at<cv::Vec3b>(0, i)[k] = cv::saturate_cast<std::uint8_t>(c[k]);
+    for (int k = 0; k < 3; ++k)
+      colors.at<cv::Vec3b>(0, i)[k] = cv::saturate_cast<std::uint8_t>(c[k]);
   }
   return colors;
 }
@@ -149,10 +152,10 @@ Result<std::vector<ComparisonPictures>> pictures_of(const ComparedRuns& runs,
     ComparisonPictures pictures;
     pictures.view = posed->name;
     ORBITFUSE_ASSIGN(pictures.after, photo_of(runs, *posed, view.camera));
-    ORBITFUSE_ASSIGN(
-        const nerf::RenderedView seen,
-        nerf::render(runs.before.visible, view.camera,
-                     rebase(view.cam_from_world, runs.registration.before_from_after), {}, progress));
+    ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
+                     nerf::render(runs.before.visible, view.camera,
+                                  rebase(view.cam_from_world, runs.registration.before_from_after),
+                                  {}, progress));
     pictures.before = stages::bgr8_of_rgb(seen.color);
     pictures.difference = difference_picture(runs, vertices, view, pictures.after, span_k);
     list.push_back(std::move(pictures));

@@ -75,8 +75,8 @@ class Builder {
   }
 };
 
-tinygltf::Primitive primitive_of(const TriangleMesh& mesh,
-                                 const std::vector<VertexScalar>& scalars, Builder& builder) {
+tinygltf::Primitive primitive_of(const TriangleMesh& mesh, const std::vector<VertexScalar>& scalars,
+                                 Builder& builder) {
   const PointCloud& v = mesh.vertices;
   constexpr int of_vertices = TINYGLTF_TARGET_ARRAY_BUFFER;
   tinygltf::Primitive p;

@@ -16,8 +16,8 @@ struct Options {
 };
 
 void tell(Context& context, const Options& o, const ComparedRuns& runs) {
-  context.console.info(fmt::format("registered: unchanged surfaces lie {} apart",
-                                   residual_words(runs)));
+  context.console.info(
+      fmt::format("registered: unchanged surfaces lie {} apart", residual_words(runs)));
   if (runs.registration.clouds.ambiguous)
     context.console.warning("geometry leaves several placements: " +
                             runs.registration.clouds.ambiguity);
@@ -26,11 +26,12 @@ void tell(Context& context, const Options& o, const ComparedRuns& runs) {
   for (const auto& region : runs.differences)
     context.console.data(fmt::format("{:>3} {:+.2f} +- {:.2f} K, {}", ++number, region.difference_k,
                                      region.uncertainty_k, area_words(runs, region.area)));
-  context.console.info(fmt::format(
-      "{:.1f} % of the surface compared, {:.1f} % changed geometry, {:.1f} % not seen before, {:.1f} "
-      "% without a temperature in both; {} parts came, {} are gone",
-      100 * runs.shares.compared, 100 * runs.shares.changed, 100 * runs.shares.not_seen,
-      100 * runs.shares.without_temperature, runs.came.size(), runs.gone.size()));
+  context.console.info(
+      fmt::format("{:.1f} % of the surface compared, {:.1f} % changed geometry, {:.1f} % not seen "
+                  "before, {:.1f} "
+                  "% without a temperature in both; {} parts came, {} are gone",
+                  100 * runs.shares.compared, 100 * runs.shares.changed, 100 * runs.shares.not_seen,
+                  100 * runs.shares.without_temperature, runs.came.size(), runs.gone.size()));
   context.console.info((fs::path(o.out) / "compare.html").string());
 }
 

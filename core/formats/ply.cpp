@@ -372,8 +372,7 @@ Status write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
   if (normals) out += "property float nx\nproperty float ny\nproperty float nz\n";
   if (colors) out += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   if (temperature) out += "property float " + options.temperature_name + "\n";
-  for (const VertexScalar& scalar : options.scalars)
-    out += "property float " + scalar.name + "\n";
+  for (const VertexScalar& scalar : options.scalars) out += "property float " + scalar.name + "\n";
   if (!mesh.empty())
     out += fmt::format("element face {}\nproperty list uchar uint vertex_indices\n",
                        mesh.triangles.size());

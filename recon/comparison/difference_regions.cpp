@@ -97,8 +97,7 @@ std::vector<DifferenceRegion> changed_regions(const TriangleMesh& surface,
   std::vector<int> labels(surface.vertices.size(), 0);
   for (std::size_t i = 0; i < std::min(labels.size(), change.size()); ++i)
     labels[i] = change[i] == SurfaceChange::changed;
-  auto regions =
-      regions_of(surface, labels, vertex_areas(surface), options.least_region_area);
+  auto regions = regions_of(surface, labels, vertex_areas(surface), options.least_region_area);
   std::sort(regions.begin(), regions.end(),
             [](const auto& a, const auto& b) { return a.area > b.area; });
   return regions;

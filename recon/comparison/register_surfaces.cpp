@@ -20,7 +20,7 @@ using Matrix7 = Eigen::Matrix<double, 7, 7>;
 
 constexpr double start_reach = 0.04, end_reach = 0.01;  // of the diagonal: partners that count
 constexpr int rounds = 20;
-constexpr double tukey = 4.685;  // 95 % efficient for a normal distribution
+constexpr double tukey = 4.685;      // 95 % efficient for a normal distribution
 constexpr double least_alike = 0.7;  // cosine between the normals of partners
 constexpr std::size_t fewest_pairs = 50;
 constexpr std::size_t most_points = 12'000;
@@ -164,8 +164,8 @@ Result<SurfaceRegistration> register_surfaces(const TriangleMesh& after, const T
   RegistrationOptions search;
   search.estimate_warp = false;  // two runs by one kind of camera: what is bent is noise or change
   ORBITFUSE_ASSIGN(const RegistrationReport clouds,
-                   register_clouds(cloud_of(surface_points(after)), cloud_of(surface_points(before)),
-                                   search, progress, view_score));
+                   register_clouds(cloud_of(surface_points(after)),
+                                   cloud_of(surface_points(before)), search, progress, view_score));
   ORBITFUSE_ASSIGN(SurfaceRegistration result,
                    refine_surfaces(after, before, clouds.target_from_source, options));
   result.clouds = clouds;

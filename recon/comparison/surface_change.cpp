@@ -51,8 +51,10 @@ int views_through(const Eigen::Vector3d& x, const Eigen::Vector3d& normal, doubl
     const Eigen::Vector3d in_cam = views[k].cam_from_world * x;
     const Eigen::Vector2d pixel = views[k].camera.project(in_cam);
     const cv::Mat& depth = seen[k].depth;
-    const int u = static_cast<int>(std::floor(pixel.x())), v = static_cast<int>(std::floor(pixel.y()));
-    if (!pixel.allFinite() || u < 1 || v < 1 || u >= depth.cols - 1 || v >= depth.rows - 1) continue;
+    const int u = static_cast<int>(std::floor(pixel.x())),
+              v = static_cast<int>(std::floor(pixel.y()));
+    if (!pixel.allFinite() || u < 1 || v < 1 || u >= depth.cols - 1 || v >= depth.rows - 1)
+      continue;
     // All round it: beside an edge a pixel's error would show another surface.
     bool free = true;
     for (int y = v - 1; y <= v + 1; ++y)
@@ -67,9 +69,12 @@ int views_through(const Eigen::Vector3d& x, const Eigen::Vector3d& normal, doubl
 
 const char* name(SurfaceChange change) {
   switch (change) {
-    case SurfaceChange::same: return "same";
-    case SurfaceChange::changed: return "changed";
-    case SurfaceChange::not_seen: return "not seen";
+    case SurfaceChange::same:
+      return "same";
+    case SurfaceChange::changed:
+      return "changed";
+    case SurfaceChange::not_seen:
+      return "not seen";
   }
   return "";
 }
@@ -88,7 +93,8 @@ Result<std::vector<SurfaceChange>> surface_change(const KnownSurface& surface,
   parallel_for(static_cast<int>(seen.size()), [&](int i) {
     const auto k = static_cast<std::size_t>(i);
     if (progress.cancelled()) return;
-    seen[k] = {mesh_depth(*other.mesh, other.views[k]), camera_center(other.views[k].cam_from_world)};
+    seen[k] = {mesh_depth(*other.mesh, other.views[k]),
+               camera_center(other.views[k].cam_from_world)};
   });
   ORBITFUSE_TRY(progress.check("compare"));
   const SurfacePoints there = surface_points(*other.mesh);
@@ -108,8 +114,8 @@ Result<std::vector<SurfaceChange>> surface_change(const KnownSurface& surface,
       double d2 = 0;
       tree.nearest(x, 1, &nearest, &d2);
       const double tolerance =
-          std::max(least, options.change_sigmas *
-                              std::hypot(other_from_surface.scale * own[i], others[there.index[nearest]]));
+          std::max(least, options.change_sigmas * std::hypot(other_from_surface.scale * own[i],
+                                                             others[there.index[nearest]]));
       if (distance_to(there, tree, x) <= tolerance)
         result[i] = SurfaceChange::same;
       else if (views_through(x, other_from_surface.rotation * vertices.normals[i].cast<double>(),

@@ -86,10 +86,8 @@ Result<std::vector<PointDifference>> temperature_difference(const ComparedSurfac
     point.after_k = later[k].temperature_k;
     point.before_k = earlier[k].temperature_k;
     point.difference_k = point.after_k - point.before_k;
-    const double misplaced =
-        after.options().coverage_factor * slopes[compared[k]] * shift;
-    point.uncertainty_k =
-        std::hypot(later[k].uncertainty_k, earlier[k].uncertainty_k, misplaced);
+    const double misplaced = after.options().coverage_factor * slopes[compared[k]] * shift;
+    point.uncertainty_k = std::hypot(later[k].uncertainty_k, earlier[k].uncertainty_k, misplaced);
   }
   return result;
 }

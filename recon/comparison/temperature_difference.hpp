@@ -25,7 +25,7 @@ struct ComparedSurface {
   const TriangleMesh* after = nullptr;   ///< with normals; temperatures_k where the field has some
   const TriangleMesh* before = nullptr;  ///< the same, of the earlier run, in its own world
   Similarity3d before_from_after;
-  double residual = 0;  ///< SurfaceRegistration::residual, BEFORE's unit
+  double residual = 0;                ///< SurfaceRegistration::residual, BEFORE's unit
   std::vector<SurfaceChange> change;  ///< one a vertex of `after`
 };
 

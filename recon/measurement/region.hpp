@@ -23,7 +23,7 @@ Result<TemperatureReading> read_region(const ThermalScene& scene,
 /// A point's temperature in short, for many points at once.
 struct PointTemperature {
   double temperature_k = unknown, uncertainty_k = unknown;  ///< as in TemperatureReading
-  int frames = 0;          ///< that see it
+  int frames = 0;                                           ///< that see it
   bool two_camps = false;  ///< they contradict each other (Agreement)
   bool seen() const { return frames > 0; }
 };
