@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # The link rule: core <- capture <- drivers; core <- recon; core <- fusion; only app sees all.
 # Siblings inside drivers/ or recon/ stay independent, so that each can be read alone; what poses
-# and registration share is recon/alignment, recon/assembly joins them all, and recon/measurement
-# reads what they made.
+# and registration share is recon/alignment, recon/assembly joins them all, recon/measurement
+# reads what they made, and recon/comparison compares two of them.
 file(STRINGS ${GRAPH} edges)
 if(NOT edges)
   message(FATAL_ERROR "no link graph in ${GRAPH}")
@@ -30,6 +30,8 @@ foreach(edge ${edges})
   elseif(from STREQUAL "recon_assembly" AND to MATCHES "^(core|recon_.*)$")
     set(ok TRUE)
   elseif(from STREQUAL "recon_measurement" AND to MATCHES "^(core|recon_(assembly|nerf))$")
+    set(ok TRUE)
+  elseif(from STREQUAL "recon_comparison" AND to MATCHES "^(core|recon_(measurement|registration|surface))$")
     set(ok TRUE)
   elseif(from MATCHES "^recon_(poses|registration)$" AND to STREQUAL "recon_alignment")
     set(ok TRUE)

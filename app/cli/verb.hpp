@@ -62,6 +62,7 @@ Action add_metrics(CLI::App& app);
 Action add_report(CLI::App& app);
 Action add_measure(CLI::App& app);
 Action add_export(CLI::App& app);
+Action add_compare(CLI::App& app);
 Action add_eval(CLI::App& app);
 Action add_view(CLI::App& app);
 Action add_replay(CLI::App& app);

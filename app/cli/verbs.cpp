@@ -33,6 +33,8 @@ const std::vector<Verb>& verbs() {
        "orbitfuse measure out/ --hottest 3", add_measure},
       {"export", "Write the surface of a finished run for other programs: GLB, PLY, OBJ, LAS",
        "orbitfuse export out/ --to van.glb", add_export},
+      {"compare", "Say what became warmer, colder or moved between two runs of one object",
+       "orbitfuse compare before/ after/ --out difference/", add_compare},
       {"eval", "Measure a run against ground truth",
        "orbitfuse eval out/ --ground-truth replay_data/car/ground_truth.json", add_eval},
       {"replay", "Play a recorded session through the recorder, as hardware would",

@@ -75,7 +75,8 @@ class Builder {
   }
 };
 
-tinygltf::Primitive primitive_of(const TriangleMesh& mesh, Builder& builder) {
+tinygltf::Primitive primitive_of(const TriangleMesh& mesh, const std::vector<VertexScalar>& scalars,
+                                 Builder& builder) {
   const PointCloud& v = mesh.vertices;
   constexpr int of_vertices = TINYGLTF_TARGET_ARRAY_BUFFER;
   tinygltf::Primitive p;
@@ -107,13 +108,14 @@ tinygltf::Primitive primitive_of(const TriangleMesh& mesh, Builder& builder) {
     p.attributes["COLOR_0"] = builder.add(rgba, TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT,
                                           TINYGLTF_TYPE_VEC4, of_vertices, true);
   }
-  if (!v.temperatures_k.empty()) {
-    std::vector<float> kelvin = v.temperatures_k;
-    for (float& k : kelvin)
-      if (!std::isfinite(k)) k = 0;
-    p.attributes["_TEMPERATURE"] =
-        builder.add(kelvin, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_SCALAR, of_vertices);
-  }
+  const auto add_scalar = [&](const std::string& name, std::vector<float> values) {
+    for (float& value : values)
+      if (!std::isfinite(value)) value = 0;
+    p.attributes[name] =
+        builder.add(values, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_SCALAR, of_vertices);
+  };
+  if (!v.temperatures_k.empty()) add_scalar("_TEMPERATURE", v.temperatures_k);
+  for (const VertexScalar& scalar : scalars) add_scalar(scalar.name, scalar.values);
   p.indices = builder.add(mesh.triangles, TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT,
                           TINYGLTF_TYPE_SCALAR, TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER);
   return p;
@@ -122,13 +124,17 @@ tinygltf::Primitive primitive_of(const TriangleMesh& mesh, Builder& builder) {
 }  // namespace
 
 Status write_glb(const std::filesystem::path& path, const TriangleMesh& mesh,
-                 const nlohmann::json& extras) {
+                 const nlohmann::json& extras, const std::vector<VertexScalar>& scalars) {
   if (mesh.empty())
     return fail(ErrorKind::input, path.string(), "a mesh without triangles", "choose a larger box");
   for (const Eigen::Vector3d& p : mesh.vertices.positions)
     if (!p.allFinite())
       return fail(ErrorKind::input, path.string(), "a vertex that is not finite",
                   "leave such vertices out");
+  for (const VertexScalar& scalar : scalars)
+    if (scalar.values.size() != mesh.vertices.size())
+      return fail(ErrorKind::input, path.string(), scalar.name + " that is not one a vertex",
+                  "give each vertex a value");
   Builder builder;
   tinygltf::Model& model = builder.model;
   model.asset.version = "2.0";
@@ -145,7 +151,7 @@ Status write_glb(const std::filesystem::path& path, const TriangleMesh& mesh,
   tinygltf::Mesh shape;
   shape.name = "surface";
   shape.extras = model.asset.extras;
-  shape.primitives.push_back(primitive_of(mesh, builder));
+  shape.primitives.push_back(primitive_of(mesh, scalars, builder));
   model.meshes.push_back(shape);
   tinygltf::Node node;
   node.name = "surface";

@@ -12,8 +12,10 @@ namespace orbitfuse::exporting {
 /// Binary glTF 2.0 of one mesh: POSITION, NORMAL, COLOR_0 (linear, 16 bits) and `_TEMPERATURE`
 /// (float, kelvin; 0 = none, because glTF allows no NaN), shown as it is (KHR_materials_unlit).
 /// The mesh's z is up; the file's y is, as glTF has it: (x, y, z) becomes (x, z, -y). `extras` goes
-/// to the asset and the mesh. Errors: input (an empty mesh, a position that is not finite), device.
+/// to the asset and the mesh. `scalars` become attributes of their names ("_DIFFERENCE"), 0 where
+/// they are not finite. Errors: input (an empty mesh, a position that is not finite, scalars that
+/// are not one a vertex), device.
 Status write_glb(const std::filesystem::path& path, const TriangleMesh& mesh,
-                 const nlohmann::json& extras);
+                 const nlohmann::json& extras, const std::vector<VertexScalar>& scalars = {});
 
 }  // namespace orbitfuse::exporting

@@ -347,10 +347,18 @@ Status write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
   const PointCloud& cloud = mesh.vertices;
   const bool normals = !cloud.normals.empty(), colors = !cloud.colors.empty();
   const bool temperature = !cloud.temperatures_k.empty();
-  if (options.temperature_name.empty() ||
-      options.temperature_name.find_first_of(" \t\r\n") != std::string::npos)
-    return fail(ErrorKind::input, path.string(),
-                "'" + options.temperature_name + "' as the name of a property", "choose one word");
+  const auto one_word = [&](const std::string& name) -> Status {
+    if (!name.empty() && name.find_first_of(" \t\r\n") == std::string::npos) return {};
+    return fail(ErrorKind::input, path.string(), "'" + name + "' as the name of a property",
+                "choose one word");
+  };
+  ORBITFUSE_TRY(one_word(options.temperature_name));
+  for (const VertexScalar& scalar : options.scalars) {
+    ORBITFUSE_TRY(one_word(scalar.name));
+    if (scalar.values.size() != cloud.size())
+      return fail(ErrorKind::input, path.string(), scalar.name + " that is not one a vertex",
+                  "give each vertex a value, NaN where there is none");
+  }
   std::string out =
       "ply\nformat binary_little_endian 1.0\ncomment OrbitFuse; temperature in kelvin\n";
   for (const std::string& comment : options.comments) {
@@ -364,6 +372,7 @@ Status write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
   if (normals) out += "property float nx\nproperty float ny\nproperty float nz\n";
   if (colors) out += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   if (temperature) out += "property float " + options.temperature_name + "\n";
+  for (const VertexScalar& scalar : options.scalars) out += "property float " + scalar.name + "\n";
   if (!mesh.empty())
     out += fmt::format("element face {}\nproperty list uchar uint vertex_indices\n",
                        mesh.triangles.size());
@@ -377,6 +386,7 @@ Status write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
       for (std::uint8_t c : cloud.colors[i]) append_bytes(out, c);
     }
     if (temperature) append_bytes(out, cloud.temperatures_k[i]);
+    for (const VertexScalar& scalar : options.scalars) append_bytes(out, scalar.values[i]);
   }
   for (const auto& triangle : mesh.triangles) {
     append_bytes(out, std::uint8_t{3});

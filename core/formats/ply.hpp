@@ -24,10 +24,12 @@ struct PlyWriteOptions {
   /// CloudCompare and "quality" by MeshLab.
   std::string temperature_name = "temperature";
   std::vector<std::string> comments;  ///< lines of the header: frame, unit
+  std::vector<VertexScalar> scalars;  ///< after the temperatures
 };
 
 /// Vertices and faces (vertex_indices), binary little-endian; without triangles a cloud. Errors:
-/// input (a name or comment that would break the header), device.
+/// input (a name or comment that would break the header, scalars that are not
+/// one a vertex), device.
 Status write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
                  const PlyWriteOptions& options);
 

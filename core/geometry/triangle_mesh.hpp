@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "core/geometry/point_cloud.hpp"
@@ -15,6 +16,12 @@ struct TriangleMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 
   bool empty() const { return triangles.empty(); }
+};
+
+/// A further number at each vertex, for the writers of files.
+struct VertexScalar {
+  std::string name;           ///< one word
+  std::vector<float> values;  ///< one a vertex
 };
 
 }  // namespace orbitfuse

@@ -74,6 +74,20 @@ Status add_temperatures(const RenderedOrbit& thermal, double max_angle_deg, Fiel
   return {};
 }
 
+Status add_depth_noise(const RenderedOrbit& orbit, double max_angle_deg, FieldSurface& surface,
+                       const Progress& progress) {
+  std::vector<PaintView> off;
+  for (const SurfaceView& seen : orbit.depths) {
+    ORBITFUSE_TRY(progress.check("surface"));
+    cv::Mat difference;
+    cv::absdiff(seen.depth, mesh_depth(surface.mesh, seen.view), difference);
+    off.push_back({seen.view, difference});
+  }
+  ORBITFUSE_ASSIGN(const Painted painted, paint(surface.mesh, off, max_angle_deg, progress));
+  for (const cv::Vec3f& value : painted.values) surface.depth_noise.push_back(value[0]);
+  return {};
+}
+
 }  // namespace
 
 Status FieldSurfaceOptions::validate() const {
@@ -121,6 +135,8 @@ Result<FieldSurface> field_surface(const SurfaceFields& fields, const Eigen::Ali
                 "lower surface.least_piece, or choose a larger box");
   result.mesh.vertices.normals = vertex_normals(result.mesh);
   const double angle = options.surface.max_angle_deg;
+  if (options.depth_noise)
+    ORBITFUSE_TRY(add_depth_noise(has_visible ? visible : thermal, angle, result, progress));
   if (has_visible) ORBITFUSE_TRY(add_colors(visible, angle, result, progress));
   if (has_thermal) ORBITFUSE_TRY(add_temperatures(thermal, angle, result, progress));
   return result;

@@ -28,6 +28,7 @@ struct FieldSurfaceOptions {
   SurfaceOptions surface;
   /// Of the pictures and depth maps that fields render: about a voxel a pixel.
   int visible_width_px = 400, thermal_width_px = 320;
+  bool depth_noise = false;  ///< FieldSurface::depth_noise is wanted
   Status validate() const;
 };
 
@@ -36,6 +37,9 @@ struct FieldSurface {
   std::size_t uncolored = 0;            ///< vertices that no visible view sees: gray
   std::size_t without_temperature = 0;  ///< vertices that no thermal view sees: NaN
   std::size_t fused_triangles = 0;      ///< before it was simplified
+  /// How far each view's depth lies from the mesh at each vertex, mean over the views that see it,
+  /// in the poses' unit; NaN: none does. Empty unless asked for.
+  std::vector<float> depth_noise;
 };
 
 /// The box of what cameras went round: a cube about the point that they look at, with the object's

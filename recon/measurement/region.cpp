@@ -299,6 +299,23 @@ Result<TemperatureReading> read_region(const ThermalScene& scene,
   return result;
 }
 
+Result<std::vector<PointTemperature>> read_points(const ThermalScene& scene,
+                                                  const std::vector<SurfacePoint>& points,
+                                                  const Reradiometry& radiometry,
+                                                  const Progress& progress) {
+  std::vector<PointTemperature> result(points.size());
+  ORBITFUSE_TRY(
+      read_all(scene, points, radiometry, progress, [&](std::size_t i, PointReadings& readings) {
+        if (!readings.seen()) return;
+        const int frames = static_cast<int>(readings.frames.size());
+        const Settled settled = settle(readings, radiometry.field_k(points[i].field_k),
+                                       points[i].variation_k, scene.options());
+        result[i] = {settled.estimate.temperature_k, settled.estimate.uncertainty_k, frames,
+                     settled.agreement.two_camps};
+      }));
+  return result;
+}
+
 Result<std::vector<PlacedReading>> extremes(const ThermalScene& scene,
                                             const std::vector<SurfacePoint>& points, bool hottest,
                                             int count, double apart, const Reradiometry& radiometry,

@@ -8,7 +8,7 @@
 
 namespace orbitfuse::measurement {
 
-// Errors of all three: those of read_frames.
+// Errors of all: those of read_frames.
 
 /// The temperature at one point of the surface.
 Result<TemperatureReading> read_spot(const ThermalScene& scene, const SurfacePoint& surface,
@@ -19,6 +19,20 @@ Result<TemperatureReading> read_spot(const ThermalScene& scene, const SurfacePoi
 Result<TemperatureReading> read_region(const ThermalScene& scene,
                                        const std::vector<SurfacePoint>& points,
                                        const Reradiometry& radiometry, const Progress& progress);
+
+/// A point's temperature in short, for many points at once.
+struct PointTemperature {
+  double temperature_k = unknown, uncertainty_k = unknown;  ///< as in TemperatureReading
+  int frames = 0;                                           ///< that see it
+  bool two_camps = false;  ///< they contradict each other (Agreement)
+  bool seen() const { return frames > 0; }
+};
+
+/// Of each point, in their order, as read_spot has it.
+Result<std::vector<PointTemperature>> read_points(const ThermalScene& scene,
+                                                  const std::vector<SurfacePoint>& points,
+                                                  const Reradiometry& radiometry,
+                                                  const Progress& progress);
 
 /// Up to `count` of the points, at least `apart` from each other, of those that two frames see
 /// (one, where the scene has no more), in the order of their temperatures. Not where frames are in

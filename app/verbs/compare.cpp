@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include "app/cli/verb.hpp"
+#include "app/comparison/comparison_files.hpp"
+
+namespace orbitfuse::cli {
+namespace {
+namespace fs = std::filesystem;
+using namespace comparing;
+
+struct Options {
+  std::string before, after, out;
+  bool ambient = false;
+  int triangles = CompareRequest().triangles;
+};
+
+void tell(Context& context, const Options& o, const ComparedRuns& runs) {
+  context.console.info(
+      fmt::format("registered: unchanged surfaces lie {} apart", residual_words(runs)));
+  if (runs.registration.clouds.ambiguous)
+    context.console.warning("geometry leaves several placements: " +
+                            runs.registration.clouds.ambiguity);
+  context.console.info(ambient_words(runs));
+  int number = 0;
+  for (const auto& region : runs.differences)
+    context.console.data(fmt::format("{:>3} {:+.2f} +- {:.2f} K, {}", ++number, region.difference_k,
+                                     region.uncertainty_k, area_words(runs, region.area)));
+  context.console.info(
+      fmt::format("{:.1f} % of the surface compared, {:.1f} % changed geometry, {:.1f} % not seen "
+                  "before, {:.1f} "
+                  "% without a temperature in both; {} parts came, {} are gone",
+                  100 * runs.shares.compared, 100 * runs.shares.changed, 100 * runs.shares.not_seen,
+                  100 * runs.shares.without_temperature, runs.came.size(), runs.gone.size()));
+  context.console.info((fs::path(o.out) / "compare.html").string());
+}
+
+Status run(Context& context, const Options& o) {
+  CompareRequest request;
+  request.ambient = o.ambient;
+  request.triangles = o.triangles;
+  std::error_code unreadable;
+  if (fs::equivalent(o.before, o.after, unreadable))
+    return fail(ErrorKind::usage, "AFTER", "the run that BEFORE is", "name two runs");
+  for (const std::string& run : {o.before, o.after})
+    if (fs::equivalent(run, o.out, unreadable))
+      return fail(ErrorKind::usage, "--out", "'" + o.out + "', which is one of the runs",
+                  "name a new folder");
+  ORBITFUSE_ASSIGN(const ComparedRuns runs,
+                   compare_runs(o.before, o.after, context.config, request, context.progress));
+  context.result["comparison"] = to_json(runs);
+  if (context.common.dry_run) {
+    context.console.info("the runs can be compared");
+    return {};
+  }
+  ORBITFUSE_ASSIGN(const auto pictures, pictures_of(runs, context.progress));
+  ORBITFUSE_TRY(write_comparison(o.out, runs, pictures));
+  tell(context, o, runs);
+  return {};
+}
+
+}  // namespace
+
+Action add_compare(CLI::App& app) {
+  const auto o = std::make_shared<Options>();
+  app.add_option("before", o->before, "The --out folder of the earlier run")->required();
+  app.add_option("after", o->after, "The --out folder of the later run, of the same object")
+      ->required();
+  app.add_option("--out", o->out, "Folder for the page, files and pictures")->required();
+  app.add_flag("--ambient", o->ambient,
+               "Take out what both days differ by as a whole: the median difference over the "
+               "unchanged surface");
+  app.add_option("--triangles", o->triangles, "Most triangles of each surface")
+      ->capture_default_str();
+  return [o](Context& context) { return run(context, *o); };
+}
+
+}  // namespace orbitfuse::cli

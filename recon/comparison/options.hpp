@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "core/result.hpp"
+
+namespace orbitfuse::comparison {
+
+/// Lengths are shares of the diagonal of AFTER's surface, so that units do not matter.
+struct ComparisonOptions {
+  /// Both surfaces hold still where this share of each lies near the other: two objects on one
+  /// flat ground share less.
+  double least_overlap = 0.6;
+  double overlap_distance = 0.01;  ///< what near means there
+  /// How well AFTER's photos fit renders of BEFORE from the same cameras (similarity_support):
+  /// tells objects of one outline apart, and is chosen low enough for another sun.
+  double least_support = 0.2;
+  /// A surface has moved that lies farther from the other than this many times both depths' noise,
+  double change_sigmas = 3;
+  double least_change = 0.006;    ///< and at least this far: a mesh is no finer.
+  int least_views = 2;            ///< that must see through a place where the surface is gone
+  double max_angle_deg = 75;      ///< of a view to the surface: a flatter one says little of depth
+  double least_difference_k = 1;  ///< smaller ones are no finding
+  double least_region_area = 3e-4;  ///< of the surface's area: smaller regions are single vertices
+
+  /// Errors: usage, naming the field.
+  Status validate() const;
+};
+
+}  // namespace orbitfuse::comparison

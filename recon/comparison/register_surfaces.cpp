@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/comparison/register_surfaces.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "core/geometry/kd_tree.hpp"
+#include "core/numeric/median.hpp"
+#include "recon/comparison/surface_points.hpp"
+
+namespace orbitfuse::comparison {
+namespace {
+using Vector7 = Eigen::Matrix<double, 7, 1>;
+using Matrix7 = Eigen::Matrix<double, 7, 7>;
+
+constexpr double start_reach = 0.04, end_reach = 0.01;  // of the diagonal: partners that count
+constexpr int rounds = 20;
+constexpr double tukey = 4.685;      // 95 % efficient for a normal distribution
+constexpr double least_alike = 0.7;  // cosine between the normals of partners
+constexpr std::size_t fewest_pairs = 50;
+constexpr std::size_t most_points = 12'000;
+
+struct Pair {
+  Eigen::Vector3d moved, fixed, normal;  ///< in BEFORE's world
+  double off() const { return normal.dot(moved - fixed); }
+};
+
+SurfacePoints thinned(const TriangleMesh& mesh) {
+  SurfacePoints all = surface_points(mesh), few;
+  const std::size_t step = std::max<std::size_t>(1, (all.size() + most_points - 1) / most_points);
+  for (std::size_t i = 0; i < all.size(); i += step) {
+    few.positions.push_back(all.positions[i]);
+    few.normals.push_back(all.normals[i]);
+  }
+  return few;
+}
+
+/// Each side's points with their nearest ones of the other.
+std::vector<Pair> pairs_of(const SurfacePoints& after, const KdTree& after_tree,
+                           const SurfacePoints& before, const KdTree& before_tree,
+                           const Similarity3d& before_from_after, double reach) {
+  const Similarity3d after_from_before = before_from_after.inverse();
+  std::vector<Pair> pairs;
+  std::size_t j = 0;
+  double d2 = 0;
+  const auto add = [&](std::size_t a, std::size_t b, bool before_plane) {
+    const Eigen::Vector3d moved = before_from_after * after.positions[a],
+                          normal = before_from_after.rotation * after.normals[a];
+    if ((moved - before.positions[b]).norm() > reach ||
+        !(normal.dot(before.normals[b]) > least_alike))
+      return;
+    pairs.push_back({moved, before.positions[b], before_plane ? before.normals[b] : normal});
+  };
+  for (std::size_t a = 0; a < after.size(); ++a)
+    if (before_tree.nearest(before_from_after * after.positions[a], 1, &j, &d2) == 1)
+      add(a, j, true);
+  for (std::size_t b = 0; b < before.size(); ++b)
+    if (after_tree.nearest(after_from_before * before.positions[b], 1, &j, &d2) == 1)
+      add(j, b, false);
+  return pairs;
+}
+
+double sigma_of(const std::vector<Pair>& pairs) {
+  std::vector<double> off;
+  for (const Pair& p : pairs) off.push_back(std::abs(p.off()));
+  return 1.4826 * median(std::move(off));
+}
+
+/// One Gauss-Newton step over turn, scale and shift about the pairs' middle; none where they leave
+/// a direction open.
+std::optional<Similarity3d> step(const std::vector<Pair>& pairs, double bound, double unit) {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Pair& p : pairs) middle += p.moved;
+  middle /= static_cast<double>(pairs.size());
+  Matrix7 normal_matrix = Matrix7::Zero();
+  Vector7 right = Vector7::Zero();
+  for (const Pair& p : pairs) {
+    const double off = p.off() / unit, share = p.off() / bound;
+    if (!(std::abs(share) < 1)) continue;
+    const double weight = std::pow(1 - share * share, 2);
+    const Eigen::Vector3d lever = (p.moved - middle) / unit;
+    Vector7 j;
+    j << lever.cross(p.normal), lever.dot(p.normal), p.normal;
+    normal_matrix += weight * j * j.transpose();
+    right -= weight * off * j;
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix7> spectrum(normal_matrix);
+  if (!(spectrum.eigenvalues()[0] > 1e-7 * spectrum.eigenvalues()[6])) return std::nullopt;
+  const Vector7 x = normal_matrix.ldlt().solve(right);
+  if (!x.allFinite()) return std::nullopt;
+  const Eigen::Vector3d turn = x.head<3>();
+  Similarity3d update;
+  if (turn.norm() > 0) update.rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized());
+  update.scale = std::exp(x[3]);
+  update.translation = middle + unit * x.tail<3>() - update.scale * (update.rotation * middle);
+  return update;
+}
+
+/// The lesser share of both surfaces that lies near the other.
+double overlap_of(const SurfacePoints& after, const KdTree& after_tree, const SurfacePoints& before,
+                  const KdTree& before_tree, const Similarity3d& before_from_after, double reach) {
+  const auto share = [](const SurfacePoints& points, const SurfacePoints& others,
+                        const KdTree& tree, const Similarity3d& other_from_own, double distance) {
+    std::size_t near = 0;
+    for (std::size_t i = 0; i < points.size(); ++i)
+      near += distance_to(others, tree, other_from_own * points.positions[i]) <= distance;
+    return static_cast<double>(near) / static_cast<double>(points.size());
+  };
+  return std::min(share(after, before, before_tree, before_from_after, reach),
+                  share(before, after, after_tree, before_from_after.inverse(),
+                        reach / before_from_after.scale));
+}
+
+PointCloud cloud_of(const SurfacePoints& points) {
+  PointCloud cloud;
+  cloud.positions = points.positions;
+  return cloud;
+}
+
+}  // namespace
+
+Result<SurfaceRegistration> refine_surfaces(const TriangleMesh& after_mesh,
+                                            const TriangleMesh& before_mesh,
+                                            const Similarity3d& start,
+                                            const ComparisonOptions& options) {
+  const SurfacePoints after = thinned(after_mesh), before = thinned(before_mesh);
+  constexpr const char* remedy = "see that both runs show one object, well reconstructed";
+  if (after.size() < fewest_pairs || before.size() < fewest_pairs)
+    return fail(ErrorKind::input, "the registration", "a surface without form", remedy);
+  const KdTree after_tree(after.positions), before_tree(before.positions);
+  const double unit = diagonal(before);
+  SurfaceRegistration result;
+  result.before_from_after = start;
+  for (int round = 0; round < rounds; ++round) {
+    const double progress = std::min(1.0, round / (0.6 * rounds));
+    const double reach = unit * std::pow(start_reach, 1 - progress) * std::pow(end_reach, progress);
+    const auto pairs =
+        pairs_of(after, after_tree, before, before_tree, result.before_from_after, reach);
+    if (pairs.size() < fewest_pairs)
+      return fail(ErrorKind::input, "the registration",
+                  fmt::format("{} places where both surfaces meet", pairs.size()), remedy);
+    result.residual = sigma_of(pairs);
+    const auto update = step(pairs, std::max(tukey * result.residual, 1e-6 * unit), unit);
+    if (!update)
+      return fail(ErrorKind::input, "the registration",
+                  "surfaces on which one can slide along the other", remedy);
+    result.before_from_after = *update * result.before_from_after;
+  }
+  result.overlap = overlap_of(after, after_tree, before, before_tree, result.before_from_after,
+                              options.overlap_distance * unit);
+  return result;
+}
+
+Result<SurfaceRegistration> register_surfaces(const TriangleMesh& after, const TriangleMesh& before,
+                                              const ViewScore& view_score,
+                                              const ComparisonOptions& options,
+                                              const Progress& progress) {
+  ORBITFUSE_TRY(options.validate());
+  RegistrationOptions search;
+  search.estimate_warp = false;  // two runs by one kind of camera: what is bent is noise or change
+  ORBITFUSE_ASSIGN(const RegistrationReport clouds,
+                   register_clouds(cloud_of(surface_points(after)),
+                                   cloud_of(surface_points(before)), search, progress, view_score));
+  ORBITFUSE_ASSIGN(SurfaceRegistration result,
+                   refine_surfaces(after, before, clouds.target_from_source, options));
+  result.clouds = clouds;
+  if (result.overlap < options.least_overlap)
+    return fail(ErrorKind::quality, "the registration",
+                fmt::format("{:.0f} % of the surfaces lie on each other, {:.0f} % are needed",
+                            100 * result.overlap, 100 * options.least_overlap),
+                "compare two runs of one object");
+  return result;
+}
+
+}  // namespace orbitfuse::comparison

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/comparison/register_surfaces.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "tests/recon/comparison/yard.hpp"
+
+namespace orbitfuse::comparison {
+namespace {
+using test::crate;
+using test::house;
+using test::shed;
+using testing::HasSubstr;
+
+Similarity3d some_similarity() {
+  return {1.3,
+          Eigen::Quaterniond(Eigen::AngleAxisd(0.6, Eigen::Vector3d(0.1, 0.2, 1).normalized())),
+          {0.4, -0.7, 0.2}};
+}
+
+/// Largest distance between what two placements make of the yard's corners.
+double apart(const Similarity3d& a, const Similarity3d& b) {
+  double most = 0;
+  for (const double x : {-2.0, 2.0})
+    for (const double y : {-2.0, 2.0})
+      most = std::max(most, (a * Eigen::Vector3d(x, y, 0) - b * Eigen::Vector3d(x, y, 0)).norm());
+  return most;
+}
+
+TEST(RegisterSurfaces, WhatMovedDoesNotPull) {
+  const Similarity3d before_from_after = some_similarity();
+  const TriangleMesh before =
+      test::moved(test::yard({house, shed, crate}, 0.07), before_from_after);
+  const test::Box elsewhere{-1, 0.6, crate.width, crate.depth, crate.height};
+  const auto found = register_surfaces(test::yard({house, shed, elsewhere}), before, {}, {}, {});
+  ASSERT_TRUE(found) << found.error().message();
+  EXPECT_LT(apart(found->before_from_after, before_from_after), 0.01);
+  EXPECT_LT(found->residual, 1e-3);
+  EXPECT_GT(found->overlap, 0.8);
+}
+
+TEST(RegisterSurfaces, AnotherObjectIsRefused) {
+  TriangleMesh ball;  // beside nothing flat that both have
+  for (int i = 0; i < 40; ++i)
+    test::add_face(ball,
+                   Eigen::AngleAxisd(0.16 * i, Eigen::Vector3d(1, 2, 0.5).normalized()) *
+                       Eigen::Vector3d(1.5, -0.1, -0.3),
+                   {0.2, 0.3, 0.1}, {0.1, -0.1, 0.5}, 0.08);
+  const auto found = register_surfaces(ball, test::yard({house, shed, crate}), {}, {}, {});
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().where, "the registration");
+  EXPECT_THAT(found.error().message(), HasSubstr("one object"));
+}
+
+TEST(RegisterSurfaces, FlatGroundAloneCanSlide) {
+  const auto found = refine_surfaces(test::yard({}), test::yard({}), {}, {});
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().kind, ErrorKind::input);
+  EXPECT_THAT(found.error().message(), HasSubstr("slide"));
+}
+
+TEST(RegisterSurfaces, EmptyAndBrokenSurfacesAreNamed) {
+  const TriangleMesh whole = test::yard({house, shed, crate});
+  EXPECT_EQ(refine_surfaces({}, whole, {}, {}).error().kind, ErrorKind::input);
+  EXPECT_EQ(refine_surfaces(whole, {}, {}, {}).error().kind, ErrorKind::input);
+  TriangleMesh broken = whole;
+  for (std::size_t i = 0; i < broken.vertices.size(); ++i)
+    broken.vertices.positions[i].setConstant(i % 2 != 0 ? std::numeric_limits<double>::quiet_NaN()
+                                                        : std::numeric_limits<double>::infinity());
+  EXPECT_EQ(refine_surfaces(broken, whole, {}, {}).error().kind, ErrorKind::input);
+  // Some broken vertices are left out.
+  TriangleMesh scratched = whole;
+  for (std::size_t i = 0; i < scratched.vertices.size(); i += 50)
+    scratched.vertices.positions[i].setConstant(std::numeric_limits<double>::quiet_NaN());
+  const auto found = refine_surfaces(scratched, whole, {}, {});
+  ASSERT_TRUE(found) << found.error().message();
+  EXPECT_LT(apart(found->before_from_after, {}), 1e-6);
+}
+
+TEST(RegisterSurfaces, OptionsAreChecked) {
+  ComparisonOptions options;
+  options.least_overlap = std::numeric_limits<double>::quiet_NaN();
+  const auto found = register_surfaces({}, {}, {}, options, {});
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().kind, ErrorKind::usage);
+  EXPECT_THAT(found.error().message(), HasSubstr("least_overlap"));
+}
+
+}  // namespace
+}  // namespace orbitfuse::comparison
