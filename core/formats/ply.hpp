@@ -23,8 +23,8 @@ struct PlyWriteOptions {
   /// Of the temperatures in kelvin: what other tools take for a scalar is called "scalar_..." by
   /// CloudCompare and "quality" by MeshLab.
   std::string temperature_name = "temperature";
-  std::vector<std::string> comments;  ///< lines of the header: frame, unit
-  std::vector<VertexScalar> scalars;  ///< after the temperatures
+  std::vector<std::string> comments;       ///< lines of the header: frame, unit
+  std::vector<VertexScalar> scalars = {};  ///< after the temperatures
 };
 
 /// Vertices and faces (vertex_indices), binary little-endian; without triangles a cloud. Errors:
