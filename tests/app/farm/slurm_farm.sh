@@ -70,10 +70,15 @@ for _ in $(seq 60); do [ "$(sinfo -h -o %t 2> /dev/null)" = idle ] && break; sle
 # -- sessions and the single run they are held against ---------------------------------------------
 options=(--seed 1)
 for set in train.visible.iterations=60 train.thermal.iterations=60 train.visible.eval_count=0 \
-  train.thermal.eval_count=0 render.views=1 render.width_px=64 'fuse.methods=["heat"]'; do
+  train.thermal.eval_count=0 depth.width_px=96 train.visible.max_width_px=96 \
+  train.thermal.max_width_px=96 train.visible.cloud_width_px=64 train.thermal.cloud_width_px=64 \
+  render.views=1 render.width_px=64 'fuse.methods=["heat"]'; do
   options+=(--set "$set")
 done
-for i in 1 2 3 4 5 6; do cp -r "$session" "$work/car$i"; done
+# Poses are given: what is tested is the farm, and they are half of a run's cost.
+"$program" import "$work/car1" --visible "$session/visible" --thermal "$session/thermal" \
+  --ground-truth "$session/ground_truth.json"
+for i in 2 3 4 5 6; do cp -r "$work/car1" "$work/car$i"; done
 truncate -s 100 "$work/car4/visible/$(ls "$work/car4/visible" | head -1)"
 "$program" run "$work/car1" --out "$work/single" --threads 1 "${options[@]}"
 
