@@ -70,5 +70,6 @@ Action add_capture(CLI::App& app);
 Action add_devices(CLI::App& app);
 Action add_mat(CLI::App& app);
 Action add_doctor(CLI::App& app);
+Action add_farm(CLI::App& app);
 
 }  // namespace orbitfuse::cli

@@ -44,6 +44,8 @@ const std::vector<Verb>& verbs() {
       {"devices", "List the cameras that are connected", "orbitfuse devices", add_devices},
       {"mat", "Print the mat that tells the guide where the cameras are",
        "orbitfuse mat --out mat.pdf", add_mat},
+      {"farm", "Run many sessions, here or as job arrays on Slurm",
+       "orbitfuse farm sessions/* --out results/", add_farm},
       {"doctor", "Check this machine for what OrbitFuse needs", "orbitfuse doctor", add_doctor},
   };
   return list;

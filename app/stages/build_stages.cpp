@@ -22,4 +22,15 @@ std::vector<pipeline::Stage> build_stages(const SessionInput& session, const Run
   };
 }
 
+const std::vector<std::string>& stage_names() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> list;
+    const SessionInput none{.session = {},
+                            .content = {{Modality::visible, {}}, {Modality::thermal, {}}}};
+    for (const pipeline::Stage& stage : build_stages(none, {})) list.push_back(stage.name);
+    return list;
+  }();
+  return names;
+}
+
 }  // namespace orbitfuse::stages

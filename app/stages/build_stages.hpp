@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "app/pipeline/stage.hpp"
@@ -11,5 +12,7 @@ namespace orbitfuse::stages {
 
 /// The whole road, each stage after all it reads.
 std::vector<pipeline::Stage> build_stages(const SessionInput& session, const RunConfig& config);
+/// Their names, in that order.
+const std::vector<std::string>& stage_names();
 
 }  // namespace orbitfuse::stages

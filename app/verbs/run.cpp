@@ -2,6 +2,7 @@
 #include "app/cli/run_stages.hpp"
 #include "app/cli/training_limits.hpp"
 #include "app/cli/verb.hpp"
+#include "app/stages/build_stages.hpp"
 #include "core/formats/transforms_json.hpp"
 
 namespace orbitfuse::cli {
@@ -10,17 +11,23 @@ Action add_run(CLI::App& app) {
   const auto folders = std::make_shared<StageFolders>();
   const auto cameras = std::make_shared<std::string>();
   const auto limits = std::make_shared<TrainingLimits>();
+  const auto stages_wanted = std::make_shared<std::vector<std::string>>();
   add_folders(app, *folders);
   app.add_option("--cameras", *cameras, "transforms.json with the new views, in the visible frame");
   add_limits(app, *limits);
-  return [folders, cameras, limits](Context& context) -> Status {
+  app.add_option("--stage", *stages_wanted,
+                 "End with this stage: it and all it reads, no other; repeatable")
+      ->type_name("STAGE")
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember(stages::stage_names()));
+  return [folders, cameras, limits, stages_wanted](Context& context) -> Status {
     ORBITFUSE_TRY(apply(*limits, {Modality::visible, Modality::thermal}, context.config));
     if (!cameras->empty()) {
       // Read here once, so that a wrong file doesn't cost the hours before it is needed.
       ORBITFUSE_TRY(read_transforms_json(*cameras));
       context.config.render.cameras = *cameras;
     }
-    return run_stages(context, *folders, {});
+    return run_stages(context, *folders, *stages_wanted);
   };
 }
 

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/farm/local_farm.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <list>
+#include <thread>
+
+#include "app/farm/stage_job.hpp"
+
+namespace orbitfuse::farm {
+namespace fs = std::filesystem;
+
+namespace {
+
+/// How far a session is in this farm.
+struct Road {
+  std::size_t next = 0;
+  bool busy = false, ended = false;
+  double memory_factor = 1;  ///< raised after a stage was killed
+};
+
+struct Worker {
+  std::size_t session;
+  StageNeeds needs;
+  StageJob job;
+  bool late = false;
+};
+
+class LocalFarm {
+ public:
+  LocalFarm(const fs::path& out, const FarmPlan& plan, const LocalLimits& limits,
+            const OnOutcome& on_outcome)
+      : out_(out), plan_(plan), on_outcome_(on_outcome), roads_(plan.sessions.size()) {
+    const Machine machine = this_machine();
+    cores_ = limits.cores > 0 ? limits.cores : machine.cores;
+    memory_mb_ = limits.memory_mb > 0 ? limits.memory_mb : 0.9 * machine.memory_mb;
+    workers_ = limits.workers > 0 ? limits.workers : cores_;
+    for (std::size_t i = 0; i < roads_.size(); ++i) {
+      roads_[i].next = next_stage(out, plan, plan.sessions[i].name);
+      roads_[i].ended = roads_[i].next == plan.stages.size();
+    }
+  }
+
+  Status run(const Progress& progress) {
+    Status broken;
+    while (true) {
+      if (progress.cancelled() || !broken) {
+        for (const Worker& worker : running_) worker.job.stop();
+        if (running_.empty()) break;
+      } else {
+        broken = start_all();
+        if (broken && running_.empty()) return {};  // nothing left to start
+      }
+      if (Status gathered = gather(); !gathered && broken) broken = gathered;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    if (!broken) return broken;
+    return fail(ErrorKind::cancelled, out_.string(), "stopped by the user",
+                "orbitfuse farm resume " + out_.string());
+  }
+
+ private:
+  StageNeeds needs_of(const Road& road) const {
+    StageNeeds needs = plan_.needs_of(plan_.stages[road.next]);
+    needs.memory_mb *= road.memory_factor;
+    return needs;
+  }
+
+  /// A stage larger than the machine runs alone: it may do with less than was reckoned.
+  bool fits(const StageNeeds& needs) const {
+    if (running_.empty()) return true;
+    int cores = needs.cores;
+    double memory_mb = needs.memory_mb;
+    for (const Worker& worker : running_) {
+      cores += worker.needs.cores;
+      memory_mb += worker.needs.memory_mb;
+    }
+    return static_cast<int>(running_.size()) < workers_ && cores <= cores_ &&
+           memory_mb <= memory_mb_;
+  }
+
+  Status start_all() {
+    for (std::size_t i = 0; i < roads_.size(); ++i) {
+      Road& road = roads_[i];
+      if (road.busy || road.ended) continue;
+      const StageNeeds needs = needs_of(road);
+      if (!fits(needs)) continue;
+      ORBITFUSE_ASSIGN(StageJob job,
+                       StageJob::start(plan_, out_, plan_.sessions[i], plan_.stages[road.next]));
+      running_.push_back({i, needs, std::move(job)});
+      road.busy = true;
+    }
+    return {};
+  }
+
+  Status gather() {
+    Status status;
+    for (auto it = running_.begin(); it != running_.end();) {
+      if (!it->late && it->job.wall_s() > 60 * it->needs.time_min) {
+        it->late = true;
+        it->job.stop();
+      }
+      const auto outcome = it->job.poll();
+      if (!outcome) {
+        ++it;
+        continue;
+      }
+      const Status kept = settle(*it, *outcome);
+      if (!kept) status = kept;
+      it = running_.erase(it);
+    }
+    return status;
+  }
+
+  Status settle(const Worker& worker, JobOutcome outcome) {
+    Road& road = roads_[worker.session];
+    const FarmSession& session = plan_.sessions[worker.session];
+    const std::string stage = plan_.stages[road.next];
+    road.busy = false;
+    if (worker.late) outcome.cause = "out of time; raise its time in farm.json";
+    if (outcome.state == JobState::done) {
+      ++road.next;
+      road.memory_factor = 1;
+      road.ended = road.next == plan_.stages.size();
+    } else {
+      road.memory_factor *= 2;
+      road.ended =
+          outcome.state == JobState::failed || worker.late || outcome.starts >= plan_.tries;
+    }
+    on_outcome_(session, stage, outcome);
+    return write_outcome(out_, session.name, stage, outcome);
+  }
+
+  const fs::path& out_;
+  const FarmPlan& plan_;
+  const OnOutcome& on_outcome_;
+  std::vector<Road> roads_;
+  std::list<Worker> running_;
+  int cores_ = 1, workers_ = 1;
+  double memory_mb_ = 0;
+};
+
+}  // namespace
+
+Status LocalLimits::validate() const {
+  if (workers >= 0 && cores >= 0 && memory_mb >= 0) return {};
+  return fail(ErrorKind::usage, "--workers, --cores, --memory", "below 0",
+              "0 means what this machine has");
+}
+
+Status run_local(const fs::path& out, const FarmPlan& plan, const LocalLimits& limits,
+                 const OnOutcome& on_outcome, const Progress& progress) {
+  ORBITFUSE_TRY(limits.validate());
+  return LocalFarm(out, plan, limits, on_outcome).run(progress);
+}
+
+}  // namespace orbitfuse::farm

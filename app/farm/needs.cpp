@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/farm/needs.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <string>
+#include <thread>
+
+namespace orbitfuse::farm {
+namespace {
+
+// Margins over the largest that was seen: sessions differ in frames and pixels, and a stage that is
+// killed costs more than memory that lies idle.
+constexpr double memory_margin = 1.5, time_margin = 4;
+constexpr double least_memory_mb = 256, least_time_min = 5;
+
+}  // namespace
+
+std::map<std::string, StageNeeds> default_needs(const std::vector<std::string>& stages, int cores) {
+  std::map<std::string, StageNeeds> needs;
+  for (const std::string& stage : stages) {
+    StageNeeds& n = needs[stage];
+    n.cores = cores;
+    if (stage == "register" || stage == "report") n = {1, 1000, 15, false};
+  }
+  return needs;
+}
+
+void learn_needs(const std::filesystem::path& out, const FarmPlan& finished,
+                 std::map<std::string, StageNeeds>& needs) {
+  for (auto& [stage, n] : needs) {
+    double memory_mb = 0, wall_s = 0;
+    for (const FarmSession& session : finished.sessions) {
+      const JobOutcome outcome = read_outcome(out, session.name, stage);
+      if (outcome.state != JobState::done) continue;
+      memory_mb = std::max(memory_mb, outcome.memory_mb);
+      wall_s = std::max(wall_s, outcome.wall_s);
+    }
+    if (wall_s <= 0) continue;
+    n.memory_mb = std::max(least_memory_mb, std::ceil(memory_margin * memory_mb));
+    n.time_min = std::max(least_time_min, std::ceil(time_margin * wall_s / 60));
+  }
+}
+
+Machine this_machine() {
+  Machine machine;
+  machine.cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  std::ifstream info("/proc/meminfo");
+  std::string key, unit;
+  double kilobytes = 0;
+  while (info >> key >> kilobytes && std::getline(info, unit))
+    if (key == "MemAvailable:") machine.memory_mb = kilobytes / 1024;
+  return machine;
+}
+
+}  // namespace orbitfuse::farm

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/farm/slurm_farm.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <set>
+#include <sstream>
+#include <thread>
+
+#include "app/farm/slurm.hpp"
+#include "app/farm/stage_job.hpp"
+#include "core/system/file_io.hpp"
+
+namespace orbitfuse::farm {
+namespace fs = std::filesystem;
+
+namespace {
+
+/// Slurm's default MaxArraySize admits task ids below 1001.
+constexpr std::size_t array_size = 1000;
+
+/// Whether a round is worth it: what failed by itself fails again.
+bool is_to_run(const fs::path& out, const FarmPlan& plan, const FarmSession& session,
+               bool failed_too) {
+  const std::size_t next = next_stage(out, plan, session.name);
+  if (next == plan.stages.size()) return false;
+  if (failed_too) return true;
+  const JobOutcome outcome = read_outcome(out, session.name, plan.stages[next]);
+  return outcome.state != JobState::failed && outcome.starts < plan.tries;
+}
+
+std::string script(const FarmPlan& plan, const fs::path& out, const std::string& words) {
+  return fmt::format("#!/bin/sh\nexec {} farm {} {}\n", shell_word(plan.program), words,
+                     shell_word(out.string()));
+}
+
+Result<std::string> submit_script(std::vector<std::string> words, const fs::path& file,
+                                  const std::string& text, const Progress& progress) {
+  ORBITFUSE_TRY(write_file_atomic(file, text));
+  words.push_back(file.string());
+  ORBITFUSE_ASSIGN(const std::string id, slurm_output(words, progress));
+  return id.substr(0, id.find(';'));  // "id;cluster" where there are several
+}
+
+Status submit_round(const fs::path& out, const FarmPlan& plan,
+                    const std::vector<std::size_t>& tasks, SlurmRound& round,
+                    const Progress& progress) {
+  const fs::path scripts = out / ".farm" / "slurm";
+  std::string after, all;
+  for (const std::string& stage : plan.stages) {
+    ORBITFUSE_ASSIGN(after, submit_script(array_words(plan, out, stage, index_list(tasks), after),
+                                          scripts / fmt::format("{}-{}.sh", stage, round.first),
+                                          fmt::format("#!/bin/sh\nexec {} farm stage {} {} "
+                                                      "$(({} + SLURM_ARRAY_TASK_ID))\n",
+                                                      shell_word(plan.program),
+                                                      shell_word(out.string()), stage, round.first),
+                                          progress));
+    round.jobs.push_back(after);
+    all += (all.empty() ? "" : ":") + after;
+  }
+  std::vector<std::string> words = {"sbatch",
+                                    "--parsable",
+                                    "--requeue",
+                                    "--job-name=orbitfuse-gather",
+                                    "--mem=200M",
+                                    "--time=10",
+                                    "--dependency=afterany:" + all,
+                                    "--output=" + (scripts / "gather-%A.log").string()};
+  if (!plan.slurm.partition.empty()) words.push_back("--partition=" + plan.slurm.partition);
+  if (!plan.slurm.account.empty()) words.push_back("--account=" + plan.slurm.account);
+  ORBITFUSE_ASSIGN(const std::string gather, submit_script(words, scripts / "gather.sh",
+                                                           script(plan, out, "gather"), progress));
+  round.jobs.push_back(gather);
+  return {};
+}
+
+}  // namespace
+
+Status submit(const fs::path& out, FarmPlan& plan, bool failed_too, const Progress& progress) {
+  std::vector<SlurmRound> rounds;
+  for (std::size_t first = 0; first < plan.sessions.size(); first += array_size) {
+    std::vector<std::size_t> tasks;
+    for (std::size_t i = first; i < std::min(first + array_size, plan.sessions.size()); ++i)
+      if (is_to_run(out, plan, plan.sessions[i], failed_too)) tasks.push_back(i - first);
+    if (tasks.empty()) continue;
+    rounds.push_back({first, {}});
+    Status submitted = submit_round(out, plan, tasks, rounds.back(), progress);
+    if (submitted) continue;
+    for (const SlurmRound& round : rounds) {
+      std::vector<std::string> words = {"scancel"};
+      words.insert(words.end(), round.jobs.begin(), round.jobs.end());
+      if (words.size() > 1) (void)slurm_output(words, Progress{});
+    }
+    return submitted;
+  }
+  plan.rounds = std::move(rounds);
+  return write_plan(out, plan);
+}
+
+Result<std::vector<std::string>> queued_jobs(const FarmPlan& plan, const Progress& progress) {
+  const char* self = std::getenv("SLURM_JOB_ID");
+  std::set<std::string> ours;
+  for (const SlurmRound& round : plan.rounds) ours.insert(round.jobs.begin(), round.jobs.end());
+  if (self != nullptr) ours.erase(self);
+  // All of the user's jobs: asked for one it has forgotten, squeue fails.
+  ORBITFUSE_ASSIGN(const std::string text,
+                   slurm_output({"squeue", "--me", "--noheader", "--format=%F"}, progress));
+  std::istringstream lines(text);
+  std::set<std::string> found;
+  for (std::string id; lines >> id;)
+    if (ours.count(id) > 0) found.insert(id);
+  return std::vector<std::string>(found.begin(), found.end());
+}
+
+Status cancel(const FarmPlan& plan, const Progress& progress) {
+  ORBITFUSE_ASSIGN(std::vector<std::string> words, queued_jobs(plan, progress));
+  if (words.empty()) return {};
+  words.insert(words.begin(), "scancel");
+  ORBITFUSE_TRY(slurm_output(words, progress));
+  return {};
+}
+
+Status run_task(const fs::path& out, const FarmPlan& plan, const std::string& stage,
+                std::size_t session, const Progress& progress) {
+  const FarmSession& s = plan.sessions.at(session);
+  const JobOutcome before = read_outcome(out, s.name, stage);
+  if (before.state == JobState::done) return {};
+  if (before.starts >= plan.tries && before.state != JobState::failed) {
+    JobOutcome given_up = before;
+    given_up.state = JobState::failed;
+    given_up.cause = fmt::format("interrupted {} times; last on {}", before.starts, before.host);
+    ORBITFUSE_TRY(write_outcome(out, s.name, stage, given_up));
+    return fail(ErrorKind::device, s.name + "/" + stage, given_up.cause,
+                "look at the node; then: orbitfuse farm resume " + out.string());
+  }
+  ORBITFUSE_ASSIGN(StageJob job, StageJob::start(plan, out, s, stage));
+  std::optional<JobOutcome> outcome;
+  while (!(outcome = job.poll())) {
+    if (progress.cancelled()) job.stop();
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  ORBITFUSE_TRY(write_outcome(out, s.name, stage, *outcome));
+  if (outcome->state == JobState::done) return {};
+  return fail(outcome->state == JobState::failed ? ErrorKind::input : ErrorKind::cancelled,
+              s.name + "/" + stage, outcome->cause, "orbitfuse farm status " + out.string());
+}
+
+void raise_needs(FarmPlan& plan, const Progress& progress) {
+  for (const SlurmRound& round : plan.rounds)
+    for (std::size_t i = 0; i < plan.stages.size() && i < round.jobs.size(); ++i) {
+      auto states = slurm_output({"sacct", "--noheader", "--parsable2", "--allocations",
+                                  "--format=State", "--jobs=" + round.jobs[i]},
+                                 progress);
+      if (!states)
+        states = slurm_output({"scontrol", "--oneliner", "show", "job", round.jobs[i]}, progress);
+      if (!states) continue;
+      StageNeeds& needs = plan.needs[plan.stages[i]];
+      if (states->find("OUT_OF_MEMORY") != std::string::npos) needs.memory_mb *= 2;
+      if (states->find("TIMEOUT") != std::string::npos) needs.time_min *= 2;
+    }
+}
+
+}  // namespace orbitfuse::farm

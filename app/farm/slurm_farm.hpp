@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "app/farm/job_outcome.hpp"
+#include "core/progress.hpp"
+
+namespace orbitfuse::farm {
+
+/// Submits every stage of the sessions that are not done as job arrays, and one job behind them all
+/// that gathers. What was submitted is in farm.json; when one is refused the others are withdrawn.
+Status submit(const std::filesystem::path& out, FarmPlan& plan, bool failed_too,
+              const Progress& progress);
+
+/// Of the farm's jobs, those that are waiting or running, besides the one we are.
+Result<std::vector<std::string>> queued_jobs(const FarmPlan& plan, const Progress& progress);
+
+Status cancel(const FarmPlan& plan, const Progress& progress);
+
+/// What a task of an array does. Error: the stage's own.
+Status run_task(const std::filesystem::path& out, const FarmPlan& plan, const std::string& stage,
+                std::size_t session, const Progress& progress);
+
+/// Doubles memory or time of stages that Slurm ended for want of it. Where sacct has no database
+/// the controller is asked, which forgets jobs after minutes (MinJobAge).
+void raise_needs(FarmPlan& plan, const Progress& progress);
+
+}  // namespace orbitfuse::farm

@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "app/cli/verb.hpp"
+#include "app/farm/farm_lock.hpp"
+#include "app/farm/folder_probe.hpp"
+#include "app/farm/local_farm.hpp"
+#include "app/farm/overview.hpp"
+#include "app/farm/slurm_farm.hpp"
+#include "app/stages/build_stages.hpp"
+
+namespace orbitfuse::cli {
+namespace {
+namespace fs = std::filesystem;
+using namespace farm;
+using nlohmann::json;
+
+struct FarmOptions {
+  std::vector<std::string> words;  ///< sessions, or status|resume|cancel and the farm's folder
+  std::string out = "farm";
+  std::string like;  ///< an earlier farm, whose stages were measured
+  bool slurm = false;
+  LocalLimits limits;
+  SlurmOptions cluster;
+  int stage_cores = 2, tries = 3;
+};
+
+/// Tells how the sessions stand and writes the page; quality error when some did not end well.
+Status conclude(Context& context, const fs::path& out, const FarmPlan& plan, bool ended) {
+  const std::vector<SessionOverview> rows = look_at_sessions(out, plan);
+  ORBITFUSE_TRY(write_overview(out, plan, rows));
+  json sessions = json::array();
+  std::size_t done = 0;
+  std::string first_bad;
+  for (const SessionOverview& row : rows) {
+    sessions.push_back({{"session", row.name},
+                        {"state", name(row.state)},
+                        {"stage", row.stage},
+                        {"cause", row.cause},
+                        {"starts", row.starts},
+                        {"cpu_s", row.cpu_s},
+                        {"wall_s", row.wall_s}});
+    context.console.data(fmt::format("{:<24} {:<12} {}/{}{}{}", row.name, name(row.state), row.done,
+                                     plan.stages.size(), row.stage.empty() ? "" : "  " + row.stage,
+                                     row.cause.empty() ? "" : ": " + row.cause));
+    if (row.state == JobState::done)
+      ++done;
+    else if (first_bad.empty())
+      first_bad = row.name;
+  }
+  context.result["sessions"] = sessions;
+  context.result["page"] = (out / "farm.html").string();
+  if (!ended || done == rows.size()) return {};
+  return fail(ErrorKind::quality, out.string(),
+              fmt::format("{} of {} sessions are not done, {} the first", rows.size() - done,
+                          rows.size(), first_bad),
+              "mend what is named above, then: orbitfuse farm resume " + out.string());
+}
+
+Status run_here(Context& context, const fs::path& out, const FarmPlan& plan,
+                const FarmOptions& options) {
+  const OnOutcome tell = [&](const FarmSession& session, const std::string& stage,
+                             const JobOutcome& o) {
+    context.console.info(fmt::format("{:<24} {:<14} {:<12} {:>7.1f} s {:>6.0f} MB  {}",
+                                     session.name, stage, name(o.state), o.wall_s, o.memory_mb,
+                                     o.cause));
+  };
+  const Status ran = run_local(out, plan, options.limits, tell, context.progress);
+  const Status concluded = conclude(context, out, plan, true);
+  return ran ? concluded : ran;
+}
+
+/// What every run is given besides its session.
+std::vector<std::string> passed_on(const CommonOptions& common) {
+  std::vector<std::string> words;
+  if (!common.config_file.empty()) words = {"--config", fs::absolute(common.config_file).string()};
+  for (const std::string& set : common.overrides) words.insert(words.end(), {"--set", set});
+  words.insert(words.end(), {"--seed", std::to_string(common.seed), "--device", common.device});
+  return words;
+}
+
+Status start_farm(Context& context, const FarmOptions& options) {
+  ORBITFUSE_TRY(options.limits.validate());
+  ORBITFUSE_TRY(options.cluster.validate());
+  for (const std::string& session : options.words) ORBITFUSE_TRY(answers(session));
+  ORBITFUSE_TRY(answers(options.out));
+  FarmPlan plan;
+  ORBITFUSE_ASSIGN(plan.sessions, name_sessions(options.words));
+  const fs::path out = fs::absolute(options.out).lexically_normal();
+  std::error_code ec;
+  plan.program = fs::read_symlink("/proc/self/exe", ec).string();
+  plan.options = passed_on(context.common);
+  plan.stages = stages::stage_names();
+  plan.tries = options.tries;
+  plan.on_slurm = options.slurm;
+  plan.slurm = options.cluster;
+  plan.needs = default_needs(plan.stages, options.stage_cores);
+  if (!options.like.empty()) {
+    ORBITFUSE_ASSIGN(const FarmPlan earlier, read_plan(options.like));
+    learn_needs(options.like, earlier, plan.needs);
+  }
+  if (context.common.dry_run) {
+    for (const FarmSession& session : plan.sessions)
+      context.console.data(
+          fmt::format("{} would run in {}", session.folder, (out / session.name).string()));
+    return {};
+  }
+  fs::create_directories(out / ".farm", ec);
+  if (ec)
+    return fail(ErrorKind::device, out.string(), ec.message(),
+                "choose a folder you can write to with --out");
+  FarmLock lock;
+  ORBITFUSE_TRY(lock.acquire(out));
+  if (fs::exists(out / plan_file, ec))
+    return fail(ErrorKind::usage, out.string(), "a farm was started in it before",
+                "go on with it: orbitfuse farm resume " + out.string() + "; or another --out");
+  if (!options.slurm) {
+    ORBITFUSE_TRY(write_plan(out, plan));
+    return run_here(context, out, plan, options);
+  }
+  ORBITFUSE_TRY(submit(out, plan, true, context.progress));
+  return conclude(context, out, plan, false);
+}
+
+Status resume_farm(Context& context, const fs::path& out, const FarmOptions& options,
+                   bool by_user) {
+  FarmLock lock;
+  ORBITFUSE_TRY(lock.acquire(out));
+  ORBITFUSE_ASSIGN(FarmPlan plan, read_plan(out));
+  if (!plan.on_slurm) {
+    learn_needs(out, plan, plan.needs);
+    return run_here(context, out, plan, options);
+  }
+  ORBITFUSE_ASSIGN(const auto queued, queued_jobs(plan, context.progress));
+  if (!queued.empty())
+    return fail(ErrorKind::usage, out.string(),
+                fmt::format("{} of its jobs still wait or run in Slurm", queued.size()),
+                "wait for them, or: orbitfuse farm cancel " + out.string());
+  raise_needs(plan, context.progress);
+  ORBITFUSE_TRY(submit(out, plan, by_user, context.progress));
+  return conclude(context, out, plan, plan.rounds.empty());
+}
+
+Status cancel_farm(Context& context, const fs::path& out) {
+  ORBITFUSE_ASSIGN(const FarmPlan plan, read_plan(out));
+  if (!plan.on_slurm)
+    return fail(ErrorKind::usage, out.string(), "it runs on this machine",
+                "stop it with Ctrl-C where it runs, or kill the process that farm.lock names");
+  ORBITFUSE_TRY(cancel(plan, context.progress));
+  return conclude(context, out, plan, false);
+}
+
+Status run_array_task(Context& context, const fs::path& out,
+                      const std::vector<std::string>& words) {
+  ORBITFUSE_ASSIGN(const FarmPlan plan, read_plan(out));
+  const bool known =
+      words.size() == 4 && words[3].size() < 10 && !words[3].empty() &&
+      words[3].find_first_not_of("0123456789") == std::string::npos &&
+      std::stoul(words[3]) < plan.sessions.size() &&
+      std::find(plan.stages.begin(), plan.stages.end(), words[2]) != plan.stages.end();
+  if (!known)
+    return fail(ErrorKind::usage, "farm stage", "no such stage or session in " + out.string(),
+                "farm stage DIR STAGE NUMBER is what the farm's own jobs call");
+  return run_task(out, plan, words[2], std::stoul(words[3]), context.progress);
+}
+
+Status run_farm(Context& context, const FarmOptions& options) {
+  const std::vector<std::string>& words = options.words;
+  const std::string first = words.empty() ? "" : words.front();
+  const bool is_order = first == "status" || first == "resume" || first == "cancel" ||
+                        first == "gather" || first == "stage";
+  if (!is_order) return start_farm(context, options);
+  if (words.size() < 2 || (words.size() > 2 && first != "stage"))
+    return fail(ErrorKind::usage, "farm " + first, fmt::format("{} folders", words.size() - 1),
+                "name the farm's folder, one");
+  const fs::path out = fs::absolute(words[1]).lexically_normal();
+  ORBITFUSE_TRY(answers(out));
+  if (first == "stage") return run_array_task(context, out, words);
+  if (first == "cancel") return cancel_farm(context, out);
+  if (first != "status") {
+    ORBITFUSE_TRY(read_plan(out));
+    return resume_farm(context, out, options, first == "resume");
+  }
+  ORBITFUSE_ASSIGN(const FarmPlan plan, read_plan(out));
+  return conclude(context, out, plan, false);
+}
+
+}  // namespace
+
+Action add_farm(CLI::App& app) {
+  const auto o = std::make_shared<FarmOptions>();
+  app.add_option("sessions", o->words, "Session folders; or status, resume or cancel and a farm");
+  app.add_option("--out", o->out, "Folder of the results, one folder a session")
+      ->capture_default_str();
+  app.add_option("--workers", o->limits.workers, "Stages at a time here; 0 = as many as fit");
+  app.add_option("--cores", o->limits.cores, "Cores to fill here; 0 = all");
+  app.add_option("--memory", o->limits.memory_mb, "Memory to fill here, MB; 0 = what is free");
+  app.add_option("--stage-cores", o->stage_cores, "Cores of a stage")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  app.add_option("--tries", o->tries, "Starts of a stage that is interrupted")
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
+  app.add_option("--like", o->like, "Earlier farm: memory and time of stages as measured there");
+  app.add_flag("--slurm", o->slurm, "Submit to Slurm and return");
+  app.add_option("--partition", o->cluster.partition, "Slurm's partition");
+  app.add_option("--gpu-partition", o->cluster.gpu_partition, "Of stages that use a GPU");
+  app.add_option("--account", o->cluster.account, "Slurm's account");
+  return [o](Context& context) { return run_farm(context, *o); };
+}
+
+}  // namespace orbitfuse::cli

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <thread>
+
+#include "app/farm/farm_lock.hpp"
+#include "app/farm/folder_probe.hpp"
+#include "app/farm/local_farm.hpp"
+#include "app/farm/overview.hpp"
+#include "app/farm/slurm.hpp"
+#include "app/farm/stage_job.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace orbitfuse::farm {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// A farm whose program is a script: $2 is the session's folder, $6 the stage.
+class FarmTest : public ::testing::Test {
+ protected:
+  void program(const std::string& body) {
+    test::put(temp / "program", "#!/bin/sh\nsession=$(basename $2)\nstage=$6\n" + body);
+    fs::permissions(temp / "program", fs::perms::owner_all);
+    plan.program = (temp / "program").string();
+    plan.stages = {"first", "second"};
+    for (const char* name : {"a", "b", "c"}) {
+      fs::create_directories(temp / name);
+      plan.sessions.push_back({name, (temp / name).string()});
+    }
+    fs::create_directories(out);
+  }
+  Status run(LocalLimits limits = {}) {
+    return run_local(
+        out, plan, limits, [](const auto&, const auto&, const auto&) {}, Progress{});
+  }
+  JobOutcome outcome(const std::string& session, const std::string& stage) const {
+    return read_outcome(out, session, stage);
+  }
+
+  test::TempFolder temp;
+  fs::path out = temp / "farm";
+  FarmPlan plan;
+};
+
+TEST_F(FarmTest, OneSessionsFailureIsNamedAndStopsNoOther) {
+  program(
+      "[ $session = b ] || exit 0\n"
+      "echo '{\"event\":\"result\",\"error\":{\"message\":\"visible/003.png: cut off\"}}'\n"
+      "exit 3\n");
+  ASSERT_TRUE(run());
+  for (const char* session : {"a", "c"})
+    for (const char* stage : {"first", "second"}) {
+      EXPECT_EQ(outcome(session, stage).state, JobState::done);
+      EXPECT_EQ(outcome(session, stage).starts, 1);
+    }
+  EXPECT_EQ(outcome("b", "first").state, JobState::failed);
+  EXPECT_EQ(outcome("b", "first").exit_code, 3);
+  EXPECT_EQ(outcome("b", "first").cause, "visible/003.png: cut off");
+  EXPECT_EQ(outcome("b", "second").state, JobState::waiting);
+
+  const auto rows = look_at_sessions(out, plan);
+  EXPECT_THAT(to_csv(rows), HasSubstr("\"b\",failed,first,\"visible/003.png: cut off\",0,1,"));
+  EXPECT_THAT(to_html(rows, plan), HasSubstr("2 done, 1 failed"));
+}
+
+TEST_F(FarmTest, AKilledStageIsTriedAgainBoundedAndAFinishedOneNever) {
+  program(
+      "echo x >> $4.$stage.starts\n"
+      "[ $session$stage = asecond ] && [ ! -e $4.killed ] && touch $4.killed && kill -9 $$\n"
+      "[ $session = c ] && kill -9 $$\n"
+      "exit 0\n");
+  ASSERT_TRUE(run());
+  EXPECT_EQ(outcome("a", "first").starts, 1);
+  EXPECT_EQ(outcome("a", "second").starts, 2);
+  EXPECT_EQ(outcome("a", "second").state, JobState::done);
+  EXPECT_EQ(outcome("c", "first").starts, plan.tries);
+  EXPECT_EQ(outcome("c", "first").state, JobState::interrupted);
+  EXPECT_THAT(outcome("c", "first").cause, HasSubstr("out of memory"));
+
+  ASSERT_TRUE(run());
+  EXPECT_EQ(outcome("a", "first").starts, 1);
+  EXPECT_EQ(outcome("b", "second").starts, 1);
+}
+
+TEST_F(FarmTest, StagesAtATimeAreBoundedByCoresAndMemory) {
+  // Each says when it begins and ends; the largest number between is what ran at a time.
+  program("echo + >> " + (temp / "log").string() + "; sleep 0.2; echo - >> " +
+          (temp / "log").string() + "\n");
+  const auto most = [&] {
+    std::ifstream log(temp / "log");
+    int now = 0, largest = 0;
+    for (std::string line; std::getline(log, line);)
+      largest = std::max(largest, now += line == "+" ? 1 : -1);
+    fs::remove(temp / "log");
+    fs::remove_all(out);
+    return largest;
+  };
+  for (const std::string& stage : plan.stages) plan.needs[stage] = {1, 1000, 60, false};
+  ASSERT_TRUE(run({.workers = 0, .cores = 2, .memory_mb = 9000}));
+  EXPECT_EQ(most(), 2);
+  ASSERT_TRUE(run({.workers = 0, .cores = 8, .memory_mb = 1500}));
+  EXPECT_EQ(most(), 1);
+  ASSERT_TRUE(run({.workers = 1, .cores = 8, .memory_mb = 9000}));
+  EXPECT_EQ(most(), 1);
+}
+
+TEST_F(FarmTest, AProgramThatIsNotThereIsSaid) {
+  program("");
+  plan.program = (temp / "nowhere").string();
+  ASSERT_TRUE(run());
+  EXPECT_EQ(outcome("a", "first").state, JobState::failed);
+  EXPECT_THAT(outcome("a", "first").cause, HasSubstr("program is not there"));
+}
+
+TEST_F(FarmTest, ThePlanComesBackAsItWasWrittenAndABrokenOneIsRefused) {
+  program("");
+  plan.options = {"--set", "render.views=2"};
+  plan.needs["first"] = {4, 8000, 30, true};
+  plan.on_slurm = true;
+  plan.slurm.partition = "long";
+  plan.rounds = {{1000, {"12", "13"}}};
+  ASSERT_TRUE(write_plan(out, plan));
+  const auto read = read_plan(out);
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->options, plan.options);
+  EXPECT_EQ(read->needs, plan.needs);
+  EXPECT_EQ(read->slurm.partition, "long");
+  EXPECT_EQ(read->rounds.at(0).jobs, plan.rounds.at(0).jobs);
+  for (const char* text : {"", "[]", "{\"schema\":1", "{\"schema\":1}", "{\"schema\":9}"}) {
+    test::put(out / plan_file, text);
+    const auto broken = read_plan(out);
+    ASSERT_FALSE(broken) << text;
+    EXPECT_EQ(broken.error().kind, ErrorKind::input);
+    EXPECT_THAT(broken.error().where, HasSubstr("farm.json"));
+  }
+}
+
+TEST_F(FarmTest, TwoSessionsOfOneNameAreRefused) {
+  fs::create_directories(temp / "x/car");
+  fs::create_directories(temp / "y/car");
+  const auto named = name_sessions({(temp / "x/car").string(), (temp / "y/car").string()});
+  ASSERT_FALSE(named);
+  EXPECT_EQ(named.error().kind, ErrorKind::usage);
+  EXPECT_THAT(named.error().found, HasSubstr("called 'car' like"));
+  EXPECT_FALSE(name_sessions({(temp / "nothing").string()}));
+  EXPECT_FALSE(name_sessions({}));
+}
+
+TEST_F(FarmTest, ALiveHolderIsNamedADeadOneIsReplacedAnotherHostsNever) {
+  fs::create_directories(out);
+  {
+    FarmLock first, second;
+    ASSERT_TRUE(first.acquire(out));
+    const Status refused = second.acquire(out);
+    ASSERT_FALSE(refused);
+    EXPECT_THAT(refused.error().found, HasSubstr(std::to_string(getpid())));
+    EXPECT_THAT(refused.error().found, HasSubstr(host_name()));
+  }
+  EXPECT_FALSE(fs::exists(out / "farm.lock"));
+  const auto held_by = [&](const std::string& host) {
+    test::put(out / "farm.lock",
+              "{\"host\":\"" + host + "\",\"boot\":\"earlier\",\"pid\":1,\"start\":\"1\"}");
+  };
+  held_by(host_name());
+  EXPECT_TRUE(FarmLock().acquire(out));
+  held_by("elsewhere");
+  const Status refused = FarmLock().acquire(out);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().found, HasSubstr("elsewhere"));
+  EXPECT_TRUE(fs::exists(out / "farm.lock"));
+}
+
+TEST(FolderProbe, ADeadFileSystemIsNamedAndWaitedForBounded) {
+  const Status dead = answers("/mnt/dead", 0.1, [] { pause(); });
+  ASSERT_FALSE(dead);
+  EXPECT_EQ(dead.error().kind, ErrorKind::device);
+  EXPECT_THAT(dead.error().message(), HasSubstr("/mnt/dead"));
+  EXPECT_TRUE(answers("/tmp"));
+  EXPECT_TRUE(answers("/no/such/folder"));
+}
+
+TEST(Slurm, WordsOfAnArray) {
+  EXPECT_EQ(index_list({0, 1, 2, 5, 7, 8}), "0-2,5,7-8");
+  EXPECT_EQ(shell_word("it's"), "'it'\\''s'");
+  FarmPlan plan;
+  plan.needs["train"] = {4, 3000, 30, true};
+  plan.slurm = {"cpu", "gpu", ""};
+  const auto words = array_words(plan, "/farm", "train", "0-2", "17");
+  for (const char* word :
+       {"--cpus-per-task=4", "--mem=3000M", "--time=30", "--array=0-2", "--partition=gpu",
+        "--dependency=aftercorr:17", "--kill-on-invalid-dep=yes", "--requeue"})
+    EXPECT_THAT(words, ::testing::Contains(word));
+  plan.slurm.gpu_partition.clear();
+  EXPECT_THAT(array_words(plan, "/farm", "train", "0", ""), ::testing::Contains("--partition=cpu"));
+}
+
+TEST(Slurm, NotInstalledIsSaidWithAWayOut) {
+  const auto output = slurm_output({"orbitfuse-no-such-sbatch"}, Progress{});
+  ASSERT_FALSE(output);
+  EXPECT_EQ(output.error().kind, ErrorKind::unavailable);
+  EXPECT_THAT(output.error().remedy, HasSubstr("without --slurm"));
+}
+
+TEST(Slurm, ARefusalCarriesItsOwnWords) {
+  const auto output =
+      slurm_output({"sh", "-c", "echo 'invalid partition specified: x'; exit 1"}, Progress{});
+  ASSERT_FALSE(output);
+  EXPECT_EQ(output.error().kind, ErrorKind::usage);
+  EXPECT_THAT(output.error().found, HasSubstr("invalid partition specified: x"));
+}
+
+}  // namespace
+}  // namespace orbitfuse::farm
