@@ -66,7 +66,7 @@ const std::map<std::string, Floors> floors_of{
     {"app",
      {{"config", "doctor", "fusion_batch", "pipeline", "recording", "terminal"},
       {"report"},
-      {"stages"},
+      {"farm", "stages"},
       {"eval", "view"},
       {"export", "inspection"},
       {"cli"},
