@@ -67,7 +67,7 @@ const std::map<std::string, Floors> floors_of{
     {"app",
      {{"config", "doctor", "fusion_batch", "pipeline", "recording", "terminal"},
       {"report"},
-      {"stages"},
+      {"farm", "stages"},
       {"eval", "view"},
       {"export", "inspection"},
       {"comparison"},

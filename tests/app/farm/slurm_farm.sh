@@ -55,8 +55,8 @@ SlurmdTimeout=10
 ReturnToService=2
 SchedulerParameters=batch_sched_delay=0,sched_min_interval=0,sched_interval=1
 JobRequeue=1
-NodeName=n1 NodeHostname=$(hostname) NodeAddr=127.0.0.1 Port=$((base + 1)) CPUs=1
-NodeName=n2 NodeHostname=$(hostname) NodeAddr=127.0.0.1 Port=$((base + 2)) CPUs=1
+NodeName=n1 NodeHostname=$(hostname) NodeAddr=127.0.0.1 Port=$((base + 1)) CPUs=1 RealMemory=8000
+NodeName=n2 NodeHostname=$(hostname) NodeAddr=127.0.0.1 Port=$((base + 2)) CPUs=1 RealMemory=8000
 PartitionName=all Nodes=n1,n2 Default=YES MaxTime=INFINITE State=UP
 CONF
 export SLURM_CONF=$work/slurm.conf
@@ -69,9 +69,9 @@ for _ in $(seq 60); do [ "$(sinfo -h -o %t 2> /dev/null)" = idle ] && break; sle
 
 # -- sessions and the single run they are held against ---------------------------------------------
 options=(--seed 1)
-for set in train.visible.iterations=60 train.thermal.iterations=60 train.visible.eval_count=0 \
-  train.thermal.eval_count=0 depth.width_px=96 train.visible.max_width_px=96 \
-  train.thermal.max_width_px=96 train.visible.cloud_width_px=64 train.thermal.cloud_width_px=64 \
+for set in train.visible.iterations=20 train.thermal.iterations=20 train.visible.eval_count=0 \
+  train.thermal.eval_count=0 depth.width_px=48 train.visible.max_width_px=48 \
+  train.thermal.max_width_px=48 train.visible.cloud_width_px=32 train.thermal.cloud_width_px=32 \
   render.views=1 render.width_px=64 'fuse.methods=["heat"]'; do
   options+=(--set "$set")
 done
