@@ -51,8 +51,8 @@ json last_line(const fs::path& events) {
   return line.is_object() && line.value("event", "") == "result" ? line : json();
 }
 
-int append_to(const fs::path& file) {
-  return open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+int write_to(const fs::path& file, int how) {
+  return open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | how, 0644);
 }
 
 }  // namespace
@@ -85,8 +85,9 @@ Result<StageJob> StageJob::start(const FarmPlan& plan, const fs::path& out,
   arguments.push_back(nullptr);
 
   job.events_ = records_of(out, session.name) / (stage + ".ndjson");
-  const int events = append_to(job.events_);
-  const int log = append_to(records_of(out, session.name) / (stage + ".log"));
+  // Of this start only: the last line must not be an earlier one's result.
+  const int events = write_to(job.events_, O_TRUNC);
+  const int log = write_to(records_of(out, session.name) / (stage + ".log"), O_APPEND);
   const int error = errno;
   const pid_t self = getpid();
   if (events >= 0 && log >= 0) {

@@ -13,7 +13,7 @@ std::string host_name();
 
 /// One stage of one session as a process of its own, `orbitfuse run SESSION --stage STAGE
 /// --resume`: what kills it (a bug, the memory) kills neither the farm nor another session. Ends
-/// with its maker. Its words are appended to <stage>.log, its events to <stage>.ndjson.
+/// with its maker. Its words are appended to <stage>.log, its events are <stage>.ndjson.
 class StageJob {
  public:
   /// Writes the outcome "running" first, so that a node's death is seen as what it is. Device error
