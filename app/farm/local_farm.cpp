@@ -46,7 +46,7 @@ class LocalFarm {
     Status broken;
     while (true) {
       if (progress.cancelled() || !broken) {
-        for (const Worker& worker : running_) worker.job.stop();
+        for (Worker& worker : running_) worker.job.stop();
         if (running_.empty()) break;
       } else {
         broken = start_all();

@@ -79,6 +79,10 @@ Status submit_round(const fs::path& out, const FarmPlan& plan,
 }  // namespace
 
 Status submit(const fs::path& out, FarmPlan& plan, bool failed_too, const Progress& progress) {
+  // A task reads the plan, and on an idle node the first ones start at once.
+  std::error_code ignored;
+  const bool is_new = !fs::exists(out / plan_file, ignored);
+  ORBITFUSE_TRY(write_plan(out, plan));
   std::vector<SlurmRound> rounds;
   for (std::size_t first = 0; first < plan.sessions.size(); first += array_size) {
     std::vector<std::size_t> tasks;
@@ -93,6 +97,7 @@ Status submit(const fs::path& out, FarmPlan& plan, bool failed_too, const Progre
       words.insert(words.end(), round.jobs.begin(), round.jobs.end());
       if (words.size() > 1) (void)slurm_output(words, Progress{});
     }
+    if (is_new) fs::remove(out / plan_file, ignored);
     return submitted;
   }
   plan.rounds = std::move(rounds);

@@ -108,6 +108,7 @@ StageJob::StageJob(StageJob&& other) noexcept { *this = std::move(other); }
 
 StageJob& StageJob::operator=(StageJob&& other) noexcept {
   std::swap(pid_, other.pid_);
+  std::swap(asked_to_stop_, other.asked_to_stop_);
   std::swap(started_s_, other.started_s_);
   std::swap(stage_, other.stage_);
   std::swap(events_, other.events_);
@@ -117,12 +118,13 @@ StageJob& StageJob::operator=(StageJob&& other) noexcept {
 
 StageJob::~StageJob() {
   if (pid_ <= 0) return;
-  stop();
+  kill(pid_, SIGTERM);  // the farm itself ends: where it was asked before, it ends at once
   waitpid(pid_, nullptr, 0);
 }
 
-void StageJob::stop() const {
-  if (pid_ > 0) kill(pid_, SIGTERM);
+void StageJob::stop() {
+  if (pid_ > 0 && !asked_to_stop_) kill(pid_, SIGTERM);
+  asked_to_stop_ = true;
 }
 
 double StageJob::wall_s() const { return wall_seconds() - started_s_; }

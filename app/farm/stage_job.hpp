@@ -26,8 +26,8 @@ class StageJob {
 
   /// The outcome once the process has ended.
   std::optional<JobOutcome> poll();
-  /// Asks it to stop: it keeps its checkpoint.
-  void stop() const;
+  /// Asks it to stop, once: it keeps its checkpoint, which a second signal would cost.
+  void stop();
   double wall_s() const;
 
  private:
@@ -35,6 +35,7 @@ class StageJob {
   JobOutcome ended(int status, double cpu_s, double memory_mb) const;
 
   pid_t pid_ = -1;
+  bool asked_to_stop_ = false;
   double started_s_ = 0;
   std::string stage_;
   std::filesystem::path events_;

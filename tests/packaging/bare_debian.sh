@@ -26,7 +26,7 @@ say() { echo "== $(date -u +%H:%M:%S) $1"; }
 if [ -z "${ORBITFUSE_OWN_MOUNTS:-}" ]; then
   [ "$(id -u)" -eq 0 ] || skip "run it as root: debootstrap and chroot need that"
   command -v debootstrap > /dev/null || skip "install first: apt-get install debootstrap"
-  package=$(ls "$build"/packages/orbitfuse_*.deb 2> /dev/null | tail -n 1)
+  package=$(ls "$build"/packages/orbitfuse_*.deb 2> /dev/null | tail -n 1 || true)
   [ -n "$package" ] || skip "no package in $build/packages: cmake/build.sh --target deb"
   [ -n "${ORBITFUSE_DEB_CACHE:-}" ] || getent hosts deb.debian.org > /dev/null || skip "no network: deb.debian.org is not found"
   [ ! -e "$root" ] || fail "$root exists; remove it, or name another WORK_FOLDER"

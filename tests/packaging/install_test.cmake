@@ -33,7 +33,7 @@ endfunction()
 
 run_installed("camera profiles" "not in ${prefix}/share/orbitfuse/cameras; use one of"
   capture ${BUILD}/never_made --thermal aravis:none,profile=nonesuch --dry-run)
-run_installed("the orbit that is shipped" "24" inspect ${prefix}/share/orbitfuse/replay_data/car)
+run_installed("the orbit that is shipped" "24 frames" inspect ${prefix}/share/orbitfuse/replay_data/car)
 
 find_program(READELF readelf REQUIRED)
 execute_process(COMMAND ${READELF} -d ${prefix}/bin/orbitfuse OUTPUT_VARIABLE dynamic

@@ -101,8 +101,10 @@ for _ in $(seq 3000); do
       echo "kill n2 with job $job"
       slurmd_pid=$(cat "$work/n2.pid")
       step=$(pgrep -f "slurmstepd: \[${job%% *}\." || true)
-      kill -9 $slurmd_pid $step
-      pkill -9 -P "${step:-0}" 2> /dev/null || true
+      # All below it first: once it is dead they are init's, and would go on working.
+      below=$step
+      for _ in 1 2 3 4 5; do below="$below $(for p in $below; do pgrep -P "$p" || true; done | tr '\n' ' ')"; done
+      kill -9 $slurmd_pid $below 2> /dev/null || true
       killed=$job
       sleep 15
       node n2
