@@ -25,10 +25,10 @@ set_target_properties(orbitfuse_headers PROPERTIES EXPORT_NAME headers)
 target_compile_features(orbitfuse_headers INTERFACE cxx_std_20)
 # Public headers hold Eigen types by value. Debian's Ceres is built for SSE2, and so is the code of a
 # user without -march flags; Eigen would align types to 16 bytes there and to 32 here. Matrices of
-# any size must be allocated alike too: the linker keeps one copy of what allocates them, and memory
-# that one way took the other does not free.
-target_compile_definitions(orbitfuse_headers INTERFACE EIGEN_MAX_STATIC_ALIGN_BYTES=16
-                           EIGEN_MAX_ALIGN_BYTES=32)
+# any size must be allocated alike too, by Eigen's own aligned way: SSE2 code would take malloc, the
+# linker keeps one copy of what allocates them, and memory that one way took the other can't free.
+target_compile_definitions(orbitfuse_headers INTERFACE EIGEN_MAX_ALIGN_BYTES=16
+                           EIGEN_MALLOC_ALREADY_ALIGNED=0)
 # Both spellings resolve, installed or not; links to the rooms, so that no folder holds itself.
 foreach(folder core capture drivers recon fusion)
   file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/include/orbitfuse)
