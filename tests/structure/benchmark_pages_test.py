@@ -8,7 +8,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / "docs" / "benchmarks"
-WITHOUT_PLOT = {"export_scale.md": "three rows", 
+WITHOUT_PLOT = {
+    "compare.md": "one pair",
+    "export_scale.md": "three rows",
     "capture.md": "cases that hold or don't, without a figure in common",
     "capture_v4l2.md": "the same",
     "fuzzing.md": "runs of a fuzzer measure how fast a parser is",

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Renders a scene of ../shared/scenes as it is found days later, with Debian's Blender:
+
+    nice blender -b -P bench/compare/render_again.py -- --renderer ../shared/scenes/render_orbit.py \
+        --scene ../shared/scenes/van.py --changes van --seed 7 --spp 10 --limit 24 --out RAW
+
+The renderer and the scene are run as they are but for what is named here: another start of both orbits and
+other jitter, another sun, one part 5 K warmer, one part moved. Seed and surroundings stay those of the first
+visit, so that nothing else changes; `--limit 24` leaves the test views out.
+"""
+import json
+import sys
+
+arguments = sys.argv[sys.argv.index("--") + 1 :]
+
+
+def named(name):
+    return arguments[arguments.index("--" + name) + 1]
+
+
+def replaced_once(text, old, new):
+    if text.count(old) != 1:
+        raise SystemExit(f"{named('renderer')}: expected one '{old}', found {text.count(old)}")
+    return text.replace(old, new)
+
+
+class Change:
+    """Which boxes and cylinders of a scene are altered: told by where the scene puts them."""
+
+    def __init__(self, warmer, warmer_by_k, moved, moved_to):
+        self.warmer, self.warmer_by_k, self.moved, self.moved_to = warmer, warmer_by_k, moved, moved_to
+        self.made = set()
+
+    def loc(self, loc):
+        if loc == self.moved:
+            self.made.add("moved")
+            return self.moved_to
+        return loc
+
+    def warm(self, loc, material, M):
+        if loc != self.warmer:
+            return material
+        self.made.add("warmer")
+        vis = json.loads(material["vis"])
+        return M("warmer", vis["color"], vis["rough"], vis["metal"], temp=material["temp"] + self.warmer_by_k,
+                 noise=vis["noise"])
+
+
+CHANGES = {
+    # the blue panel of the left side; the pallet in front of the van
+    "van": Change((-0.7, 0.945, 1.35), 5.0, (3.2, 1.9, 0.4), (2.9, -1.9, 0.4)),
+}
+
+change = CHANGES[named("changes")]
+with open(named("renderer")) as file:
+    source = file.read()
+source = replaced_once(
+    source,
+    "exec(compile(open(scene_file).read(),scene_file,'exec'))",
+    "box, cyl = altered(box), altered(cyl)\n"
+    "exec(compile(open(scene_file).read(),scene_file,'exec'))\n"
+    "CONFIG['sun'] = 140.0; rng.seed(1234)",
+)
+source = replaced_once(source, "vis=orbit(vis_r,C['vis_el'],0.0)", "vis=orbit(vis_r,C['vis_el'],13.0)")
+source = replaced_once(source, "rng.uniform(5,25)", "rng.uniform(30,34)")
+
+
+def altered(primitive):
+    def make(loc, first, second, *rest, **named_rest):
+        # box(loc, size, m, ...) and cyl(loc, r, d, m, ...)
+        if primitive.__name__ == "box":
+            return primitive(change.loc(loc), first, change.warm(loc, second, scope["M"]), *rest, **named_rest)
+        return primitive(change.loc(loc), first, second, change.warm(loc, rest[0], scope["M"]), *rest[1:], **named_rest)
+
+    return make
+
+
+scope = {"__name__": "__main__", "altered": altered}
+exec(compile(source, named("renderer"), "exec"), scope)
+if change.made != {"warmer", "moved"}:
+    raise SystemExit(f"{named('scene')}: only {sorted(change.made)} of the changes were found in it")
