@@ -8,9 +8,6 @@
 #include "core/system/parallel.hpp"
 #include "fusion/best/band_mix.hpp"
 #include "fusion/best/base_rule.hpp"
-#include "fusion/best/compact_heat.hpp"
-#include "fusion/best/halo_rule.hpp"
-#include "fusion/best/settle_levels.hpp"
 #include "fusion/pyramid/bands.hpp"
 #include "fusion/pyramid/pyramid.hpp"
 
@@ -37,25 +34,11 @@ Source source_of(const Plane& image, int levels) {
   return source;
 }
 
-Plane local_mean_of_product(const Plane& a, const Plane& b, int radius) {
+Plane energy_of(const Plane& band, int radius) {
   const int window = 2 * radius + 1;
-  Plane mean;
-  cv::GaussianBlur(a.mul(b), mean, {window, window}, 0, 0, cv::BORDER_REFLECT_101);
-  return mean;
-}
-
-/// 1 - compact_heat(): what of the base's choice of the visible source holds in each band.
-std::vector<Plane> not_hot(const Plane& thermal, float least_heat, std::size_t bands) {
-  std::vector<Plane> all;
-  for (std::size_t i = 0; i < bands; ++i) {
-    Plane reduced;
-    if (i == 0)
-      reduced = 1 - compact_heat(thermal, least_heat);
-    else
-      cv::pyrDown(all.back(), reduced);
-    all.push_back(reduced);
-  }
-  return all;
+  Plane energy;
+  cv::GaussianBlur(band.mul(band), energy, {window, window}, 0, 0, cv::BORDER_REFLECT_101);
+  return energy;
 }
 
 }  // namespace
@@ -72,11 +55,6 @@ Status BestOptions::validate() const {
 
 Result<Plane> fuse_best(const Plane& visible, const Plane& thermal, const BestOptions& options,
                         BestReport* report) {
-  return fuse_best(visible, thermal, options, HaloRule{}, report);
-}
-
-Result<Plane> fuse_best(const Plane& visible, const Plane& thermal, const BestOptions& options,
-                        const HaloRule& halo, BestReport* report) {
   ORBITFUSE_TRY(options.validate());
   ORBITFUSE_TRY(check_pair(visible, thermal));
   BestReport own;
@@ -97,32 +75,23 @@ Result<Plane> fuse_best(const Plane& visible, const Plane& thermal, const BestOp
     skip.push_back(silent(v.bands[i].band, t.bands[i].band));
     if (skip[i]) said.levels_skipped += 1.0 / levels;
   }
-  std::vector<Plane> common(v.bands.size()), visible_holds;
-  parallel_for(4, [&](int k) {
-    if (k == 3) visible_holds = not_hot(thermal, halo.least_heat, v.bands.size());
-    for (std::size_t i = 0; k < 3 && i < v.bands.size(); ++i) {
-      if (skip[i]) continue;
-      const Plane &a = (k == 1 ? t : v).bands[i].band, &b = (k == 0 ? v : t).bands[i].band;
-      Plane& target = k == 0 ? v.bands[i].energy : k == 1 ? t.bands[i].energy : common[i];
-      target = local_mean_of_product(a, b, options.energy_radius_px);
-    }
+  parallel_for(2, [&](int k) {
+    Source& source = sources[static_cast<std::size_t>(k)];
+    for (std::size_t i = 0; i < source.bands.size(); ++i)
+      if (!skip[i])
+        source.bands[i].energy = energy_of(source.bands[i].band, options.energy_radius_px);
   });
-  auto [fused, weight] = fuse_base(
-      v.base, t.base,
-      {static_cast<float>(options.visible_preference),
-       static_cast<float>(options.brightness_weight), halo.coherence, halo.decision, halo.lean});
+  Plane fused = fuse_base(v.base, t.base,
+                          {static_cast<float>(options.visible_preference),
+                           static_cast<float>(options.brightness_weight)});
   const BandMix rule{static_cast<float>(options.sharpness / 2),
-                     static_cast<float>(options.contrast_kept), halo.pull, halo.opposite};
+                     static_cast<float>(options.contrast_kept)};
   for (std::size_t i = v.bands.size(); i-- > 0;) {
-    Plane level, wide;
+    Plane level;
     cv::pyrUp(fused, level, v.bands[i].band.size());
-    cv::pyrUp(weight, wide, v.bands[i].band.size());
-    weight = wide;
-    fused = skip[i] ? level
-                    : mix_band(v.bands[i], t.bands[i], common[i], level,
-                               weight.mul(visible_holds[i]), rule);
+    fused = skip[i] ? level : mix_band(v.bands[i], t.bands[i], level, rule);
   }
-  return settle_levels(fused, visible, thermal, halo.passes);
+  return fused;
 }
 
 }  // namespace orbitfuse::fusion

@@ -7,15 +7,14 @@ namespace orbitfuse::fusion {
 
 /// The default method. Details: per band the source with the larger local energy, chosen softly
 /// so that the choice never flickers, at a strength that keeps part of its contrast to the level it
-/// moves to. Base: by votes of patches on which source holds more, agreed within plain regions. So
-/// that no halo shows, bands follow the base's choice, but for small hot things, which are the
-/// thermal source's (halo_rule.hpp). See docs/notes/fusion.md for what each constant does.
+/// moves to. Base: by votes of patches on which source holds more. See docs/notes/fusion.md
+/// for what each constant does to the scores.
 struct BestOptions {
   int levels = 4;         ///< of the pyramid; fewer where the base would be below 8 px
   double sharpness = 12;  ///< exponent of the amplitude ratio in the weights; larger: harder choice
   int energy_radius_px = 5;  ///< of the window over which energies are averaged
   /// Share of the way to constant contrast that a detail's strength goes when its level changes.
-  double contrast_kept = 0.2;
+  double contrast_kept = 0.5;
   /// Gray levels of activity that the visible source has for free in the base: where neither source
   /// holds structure people expect the visible level (a bright sky, not a cold one).
   double visible_preference = 2;

@@ -6,6 +6,7 @@
 
 #include <fstream>
 #include <regex>
+#include <set>
 
 #include "core/image/image_codec.hpp"
 #include "core/image/image_io.hpp"
@@ -238,15 +239,16 @@ TEST_F(Hostile, ConfigurationsThatNeverEndAreRefused) {
 /// Options named in messages are options of the program.
 TEST(Messages, NameOptionsThatExist) {
   const std::string reference = *read_file(fs::path(ORBITFUSE_SOURCE_DIR) / "docs/cli.md");
-  // Of other programs that are told to run: v4l2-ctl, COLMAP, Chromium, apt-get, and our recorder
-  // of scenes.
+  // Of other programs that are told to run: v4l2-ctl, COLMAP, Chromium, apt-get, Slurm's, and our
+  // recorder of scenes.
+  const std::set<std::string> of_others = {"record_main.cpp", "colmap.cpp", "print_pdf.cpp",
+                                           "slurm.cpp", "slurm_farm.cpp"};
   const std::regex literal(R"lit("((?:[^"\\]|\\.)*)")lit"),
       option(R"((^|[^\w-])(--[a-z][a-z0-9-]*[a-z0-9]))");
   for (const char* folder : {"app", "core", "capture", "drivers", "fusion", "recon"}) {
     for (const auto& entry :
          fs::recursive_directory_iterator(fs::path(ORBITFUSE_SOURCE_DIR) / folder)) {
-      if (entry.path().extension() != ".cpp" || entry.path().filename() == "record_main.cpp" ||
-          entry.path().filename() == "colmap.cpp" || entry.path().filename() == "print_pdf.cpp")
+      if (entry.path().extension() != ".cpp" || of_others.contains(entry.path().filename()))
         continue;
       std::istringstream lines(*read_file(entry.path()));
       for (std::string line; std::getline(lines, line);) {
