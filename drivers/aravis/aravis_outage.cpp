@@ -32,8 +32,12 @@ Missed missed_between(std::uint16_t last_number, std::uint16_t number, std::uint
   const std::uint64_t skipped = steps - 1;
   // A camera that counts on misses what it did not send while its stream was set up again, a part
   // of the outage; a new count that happens to follow the old one is further from the time it took.
-  const bool began_anew = number <= first_numbers && 4 * skipped < 3 * by_time;
-  if (began_anew || skipped > by_time + by_time / 4 + 2) return {by_time, false};
+  const bool small = number <= first_numbers;
+  const bool began_anew = small && 4 * skipped < 3 * by_time;
+  // The time between the last frames tells the rate badly when camera or host were busy. A number
+  // that no new count begins with may be further off before it counts as another count's.
+  const std::uint64_t most = small ? by_time + by_time / 4 : 2 * by_time;
+  if (began_anew || skipped > most + 2) return {by_time, false};
   return {skipped, true};
 }
 

@@ -409,7 +409,7 @@ void GevSimulator::stream_loop() {
     }
     if (restart_ids_.exchange(false)) id = 1;
     SentFrame frame;
-    double reorder = 0;
+    double reorder = 0, slow = 1;
     bool silent = false;
     {
       std::lock_guard lock(mutex_);
@@ -431,6 +431,7 @@ void GevSimulator::stream_loop() {
       std::lock_guard lock(mutex_);
       frame = make_frame(number_, id);
       reorder = faults_.reorder;
+      slow = faults_.slow;
       history_[id] = frame;
       history_order_.push_back(id);
       if (history_order_.size() > 16) {
@@ -452,7 +453,7 @@ void GevSimulator::stream_loop() {
     ++number_;
     ++frames_sent_;
     id = following(id);
-    next += period;
+    next += std::chrono::duration_cast<std::chrono::nanoseconds>(slow * period);
     std::this_thread::sleep_until(next);
   }
 }

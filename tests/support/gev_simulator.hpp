@@ -22,6 +22,7 @@ struct GevFaults {
   bool mute_control = false;          ///< GVCP requests get no answer
   bool link_down = false;             ///< neither control nor stream
   bool freeze = false;         ///< it does nothing; requests lie there and are answered after it
+  double slow = 1;             ///< the time between its frames, of the usual
   bool stall = false;          ///< it sends no frames, but counts them
   bool pause = false;          ///< it takes no frames: its numbers go on afterwards
   int short_frame_every = 0;   ///< every n-th frame lacks its second half (trailer included)

@@ -519,6 +519,27 @@ TEST_F(AravisUnguarded, AStallOfItsStreamIsOneReconnection) {
   expect_one_reconnection(fault, 1500ms);
 }
 
+/// A busy host, or a camera that was slow for a while: the last frames tell its rate badly, and its
+/// own count is believed still.
+TEST_F(AravisUnguarded, AStallAfterSlowFramesIsCountedByItsNumbers) {
+  AravisSource source(options);
+  ASSERT_TRUE(source.start());
+  drain(source, 10s, frames(20));
+  GevFaults fault;
+  fault.slow = 1.6;
+  camera_of_all.set_faults(fault);
+  const Tally before = drain(source, 10s, frames(30));
+  ASSERT_TRUE(before.shift);
+  fault = {};
+  fault.stall = true;
+  camera_of_all.set_faults(fault);
+  drain(source, 1500ms);
+  camera_of_all.set_faults({});
+  const Tally after = drain(source, 6s, frames(30));
+  EXPECT_GT(after.frames, 20u);
+  EXPECT_EQ(after.shift, before.shift) << (after.details.empty() ? "" : after.details.front());
+}
+
 /// Its numbers go on: nothing was lost, and nothing is counted.
 TEST_F(AravisUnguarded, APauseWithoutASkippedNumberIsNoLoss) {
   GevFaults fault;
