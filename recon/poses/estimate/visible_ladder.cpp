@@ -29,6 +29,9 @@ constexpr double faint_peak_threshold = 0.0025;
 /// Without any model all pairs at full settings take a CPU second each: up to this many views.
 constexpr int max_exhaustive_views = 60;
 
+/// Share of the views from which on a model that can't stand alone is worth completing.
+constexpr double part_of_a_model = 0.5;
+
 constexpr const char* featureless_why =
     "shows nothing to match (blank, out of focus or overexposed?)";
 
@@ -118,6 +121,7 @@ class VisibleLadder {
     tell(1, "matches of the orbit's pairs");
     ORBITFUSE_TRY(quick->match(orbit, progress_));
     ORBITFUSE_TRY(try_settings(*quick, "COLMAP, orbit pairs", mapper_ladder().front()));
+    if (!best_ && part_) ORBITFUSE_TRY(try_resection(*quick, "resection on part of a model"));
     if (!best_) ORBITFUSE_TRY(spared(add_faint_features(*quick, orbit)));
     if (!best_) ORBITFUSE_TRY(try_mapper(*quick, quick_name_));
     if (complete()) return answer(quick->pairs());
@@ -204,6 +208,14 @@ class VisibleLadder {
     return model.views.size() > best.views.size();
   }
 
+  /// Nothing else speaks against the model: its views agree with their stations and the matches.
+  bool only_too_small(const JudgedModel& judged, PoseOptions options) const {
+    options.min_posed_ratio = part_of_a_model;
+    ModalityPoses poses = judged.poses;
+    std::string why;
+    return passes_gates(poses, session_, options, why);
+  }
+
   /// Judges a model and keeps it where it is believed and better than the best one.
   void consider(const std::string& attempt, const std::string& found, Reconstruction model,
                 const PoseOptions& options, const Better& better = more_views) {
@@ -220,6 +232,9 @@ class VisibleLadder {
         best_step_ = steps_.size();
       } else if (judged && judged->believed) {
         step.why += "; no better than the model before";
+      } else if (judged && (!part_ || more_views(judged->poses.reconstruction, *part_)) &&
+                 only_too_small(*judged, options)) {
+        part_ = std::move(judged->poses.reconstruction);
       }
     }
     step.seconds = std::chrono::duration<double>(Clock::now() - since_).count();
@@ -276,17 +291,18 @@ class VisibleLadder {
     return {};
   }
 
-  /// The views left out, on the points of the best model.
+  /// The views left out, on the points of the best model, or of one that is too small to stand.
   Status try_resection(const FeatureLevel& level, const std::string& attempt) {
     tell(3, attempt);
     ORBITFUSE_ASSIGN(FeatureGraph graph, level.graph());
-    PosedFrames posed = posed_frames(graph, best_->poses.reconstruction);
+    const Reconstruction& known = best_ ? best_->poses.reconstruction : *part_;
+    const auto without = total_ - static_cast<int>(known.views.size());
+    PosedFrames posed = posed_frames(graph, known);
     // The model knows better than two-view geometry which matches hold.
     for (auto& [pair, matches] : confirmed_matches(graph, posed, 3 * graph.pixel_scale))
       if (matches.size() > graph.verified[pair].size()) graph.verified[pair] = matches;
     ORBITFUSE_ASSIGN(const std::vector<int> added, resect(graph, posed, {}, progress_));
-    const std::string found =
-        fmt::format("{} of {} views found a place", added.size(), missing().size());
+    const std::string found = fmt::format("{} of {} views found a place", added.size(), without);
     Reconstruction model;
     if (!added.empty()) {
       TrackOptions track;
@@ -374,6 +390,7 @@ class VisibleLadder {
   std::set<std::string> featureless_;
   bool limited_ = false;
   std::optional<JudgedModel> best_;
+  std::optional<Reconstruction> part_;  ///< the largest model that was too small
   std::size_t best_step_ = 0;
   Clock::time_point since_ = Clock::now();
 };
