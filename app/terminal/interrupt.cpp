@@ -28,11 +28,13 @@ long long now_ms() {
 }
 
 void on_signal(int) {
-  if (interrupted.exchange(true)) {
-    if (now_ms() - first_ms.load() > same_wish_ms) _exit(exit_interrupted);
+  long long first = 0;
+  const long long now = now_ms();
+  if (!first_ms.compare_exchange_strong(first, now)) {
+    if (now - first > same_wish_ms) _exit(exit_interrupted);
     return;
   }
-  first_ms.store(now_ms());
+  interrupted.store(true);
   constexpr char text[] = "\nstopping; what is done so far is kept (again to stop at once)\n";
   (void)!write(STDERR_FILENO, text, sizeof text - 1);
 }
