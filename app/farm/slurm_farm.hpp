@@ -11,8 +11,8 @@ namespace orbitfuse::farm {
 Status submit(const std::filesystem::path& out, FarmPlan& plan, bool failed_too,
               const Progress& progress);
 
-/// Of the farm's jobs, those that Slurm has not ended, besides the one we are: of any user, and also
-/// what a submission sent off that died before it could write farm.json.
+/// Of the farm's jobs, those that Slurm has not ended, besides the one we are: of any user, and
+/// also what a submission sent off that died before it could write farm.json.
 Result<std::vector<std::string>> queued_jobs(const std::filesystem::path& out, const FarmPlan& plan,
                                              const Progress& progress);
 

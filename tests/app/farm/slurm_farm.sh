@@ -63,16 +63,8 @@ kill_a_node() {  # FARM; prints the session and stage whose stage was interrupte
     fi
     sleep 0.1
   done
-  while [ "$(squeue -h -j "${array}_$task" -o %T)" = RUNNING ]; do
-    sinfo -h -n n2 -o %t | grep -q down && break
-    sleep 1
-  done
-  node n2
-  # Slurm starts a requeued job after two minutes.
-  for _ in $(seq 60); do
-    scontrol update "JobId=${array}_$task" StartTime=now 2> /dev/null && [ "$(squeue -h -j "${array}_$task" -o %T)" = PENDING ] && break
-    sleep 1
-  done
+  while [ "$(squeue -h -j "${array}_$task" -o %T)" = RUNNING ]; do sleep 1; done
+  node n2  # Slurm starts the job again after two minutes; made sooner, it forgets the job's end
   echo "car$((task + 1))/${name#orbitfuse-}"
 }
 farm=$work/farm
