@@ -16,16 +16,9 @@ fail() { echo "FAILED: $*"; exit 1; }
 mkdir "$work/disk"
 mount -t tmpfs -o size=3m none "$work/disk" || { echo "skipped: no right to mount"; exit 77; }
 
-options=(--seed 1 --stage-cores 1 --workers 1)
-for set in train.visible.iterations=20 train.thermal.iterations=20 train.visible.eval_count=0 \
-  train.thermal.eval_count=0 depth.width_px=48 train.visible.max_width_px=48 \
-  train.thermal.max_width_px=48 train.visible.cloud_width_px=32 train.thermal.cloud_width_px=32 \
-  render.views=1 render.width_px=64 'fuse.methods=["heat"]'; do
-  options+=(--set "$set")
-done
-"$program" import "$work/car1" --visible "$session/visible" --thermal "$session/thermal" \
-  --ground-truth "$session/ground_truth.json" > /dev/null
-cp -r "$work/car1" "$work/car2"
+. "$(dirname "$0")/short_run.sh"
+options+=(--stage-cores 1 --workers 1)
+import_cars "$program" "$session" "$work" 2
 farm=$work/disk/farm
 ends_with() {  # CODE WORDS...
   local code=0

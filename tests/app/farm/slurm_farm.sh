@@ -21,6 +21,7 @@ clean() {
   [ -n "${KEEP:-}" ] && echo "kept: $work" || rm -rf "$work"
 }
 trap clean EXIT
+trap 'exit 1' INT TERM  # so that the daemons end as well
 fail() { echo "FAILED: $*"; exit 1; }
 check() { python3 "$here/slurm_farm_check.py" "$@" || fail "$1"; }
 state_of() { python3 "$here/slurm_farm_check.py" state "$@"; }  # FARM SESSION STAGE
@@ -28,17 +29,8 @@ wait_until_empty() { while [ -n "$(squeue -h)" ]; do sleep 1; done; }
 start_cluster
 
 # -- sessions and the single run they are held against ---------------------------------------------
-options=(--seed 1)
-for set in train.visible.iterations=60 train.thermal.iterations=20 train.visible.eval_count=0 \
-  train.thermal.eval_count=0 depth.width_px=48 train.visible.max_width_px=48 \
-  train.thermal.max_width_px=48 train.visible.cloud_width_px=32 train.thermal.cloud_width_px=32 \
-  render.views=1 render.width_px=64 'fuse.methods=["heat"]'; do
-  options+=(--set "$set")
-done
-# Poses are given: what is tested is the farm, and they are half of a run's cost.
-"$program" import "$work/car1" --visible "$session/visible" --thermal "$session/thermal" \
-  --ground-truth "$session/ground_truth.json"
-for i in 2 3 4 5 6; do cp -r "$work/car1" "$work/car$i"; done
+. "$here/short_run.sh"
+import_cars "$program" "$session" "$work" 6
 broken=$(ls "$work/car4/visible" | head -1)
 truncate -s 100 "$work/car4/visible/$broken"
 "$program" run "$work/car1" --out "$work/single" --threads 1 "${options[@]}"

@@ -3,6 +3,7 @@
 """What slurm_farm.sh asks of a farm's folder: one order a call, code 1 with what does not hold."""
 import json
 import pathlib
+import re
 import sys
 import time
 
@@ -21,7 +22,10 @@ def plan_of(farm):
 def without_times(value):
     """Of a result, what two runs of the same session must have in common."""
     if isinstance(value, dict):
-        return {k: without_times(v) for k, v in value.items() if not k.endswith(("cpu_s", "wall_s"))}
+        return {k: without_times(v) for k, v in value.items() 
+                if not k.endswith("_s") and not k.startswith("milliseconds")}
+    if isinstance(value, str):  # "brief": "60 steps, 1.5 CPU s, ...", "0.13 s a view"
+        return re.sub(r"[0-9.]+ (CPU s|s a view)", "TIME", value)
     return [without_times(v) for v in value] if isinstance(value, list) else value
 
 
