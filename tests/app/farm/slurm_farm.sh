@@ -70,29 +70,34 @@ wait_until_empty
 check farm "$farm" "$work/single" "$interrupted" "car4=visible/$broken"
 
 # -- cancel and resume -----------------------------------------------------------------------------
+# Longer, so that it is stopped between two steps and has a checkpoint to go on from.
 farm=$work/cancelled
+options+=(--set train.visible.iterations=500)
+"$program" run "$work/car1" --out "$work/single2" --threads 1 "${options[@]}"
 "$program" farm "$work/car1" "$work/car2" --out "$farm" --slurm --stage-cores 1 "${options[@]}"
-until [ "$(state_of "$farm" car1 train_visible)" = running ]; do sleep 0.1; done
-sleep 0.5
+steps='"done":[1-9].*"event":"progress","stage":"train.visible"'
+until grep -q "$steps" "$farm/.farm/car1/train_visible.ndjson" 2> /dev/null; do sleep 0.1; done
 "$program" farm cancel "$farm"
 wait_until_empty
 [ "$(state_of "$farm" car1 train_visible)" != running ] || fail "cancel left a stage as running"
 "$program" farm cancel "$farm"  # nothing to do is no error
 "$program" farm resume "$farm"
 wait_until_empty
-check resumed "$farm" "$work/single"
+check resumed "$farm" "$work/single2"
 
 # -- gather: what was killed, or out of time, is submitted once more with more ------------------------
 # A stand-in for the stages, so that it can hang: `a` fares well, `b` is killed in `depth`, `c` takes
 # longer than Slurm gives it and does not stop when asked.
 cat > "$work/stand_in" << 'SH'
 #!/bin/sh
+[ "$1" = farm ] && exec PROGRAM "$@"
 session=$(basename "$2") stage=$6
 first() { [ ! -e "$4.$stage.started" ] && touch "$4.$stage.started"; }
 [ "$session$stage" = bdepth ] && first "$@" && kill -9 $$
 [ "$session$stage" = cdepth ] && first "$@" && { trap '' TERM; sleep 300; }
 sleep "$(cat "$(dirname "$0")/stage_s")"
 SH
+sed -i "s|PROGRAM|$program|" "$work/stand_in"
 chmod +x "$work/stand_in"
 stand_in() {  # FARM SESSIONS...: sent off with the stand-in in the program's place
   scontrol update NodeName=n1,n2 State=DRAIN Reason=edit

@@ -101,9 +101,10 @@ def check_resumed(farm, single):
     if ("car1", "train_visible") not in twice or len({session for session, _ in twice}) < len(twice):
         bad.append(f"started twice: {twice}; one a session, car1's training among them, expected")
     log = (farm / ".farm" / "car1" / "train_visible.log").read_text()
-    if "stopping; what is done so far is kept" not in log:
-        bad.append("car1's training was not asked to stop")
-    print(f"cancelled and resumed: started twice {twice}")
+    stopped = re.search("stopped by the user at step ([1-9][0-9]*)", log)
+    if not stopped:
+        bad.append("car1's training was not stopped between two steps, with its checkpoint")
+    print(f"cancelled at step {stopped and stopped[1]} and resumed: started twice {twice}")
     return bad
 
 
