@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
+# shellcheck shell=bash
 # Options of a run of seconds, `options`, and the session it is for: sourced by what runs farms.
 options=(--seed 1)
 for set in train.visible.iterations=60 train.thermal.iterations=20 train.visible.eval_count=0 \

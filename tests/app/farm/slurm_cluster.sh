@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
+# shellcheck shell=bash
 # A Slurm of two nodes on this machine, in the folder $work: sourced by slurm_farm.sh. With slurmdbd
 # and mariadbd it has the database that sacct asks; without, sacct says that it has none.
 # SLURM_DEFAULTS=1 leaves Slurm's own times of scheduling, which wait to gather jobs.
