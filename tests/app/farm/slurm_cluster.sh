@@ -2,7 +2,7 @@
 # shellcheck shell=bash
 # A Slurm of two nodes on this machine, in the folder $work: sourced by slurm_farm.sh. With slurmdbd
 # and mariadbd it has the database that sacct asks; without, sacct says that it has none.
-# SLURM_DEFAULTS=1 leaves Slurm's own times of scheduling, which wait to gather jobs.
+# NO_DATABASE=1 leaves it out. SLURM_DEFAULTS=1 leaves Slurm's own times of scheduling, which wait to gather jobs.
 
 # Our own daemons only, by the numbers they wrote.
 stop_cluster() {
@@ -96,7 +96,7 @@ CONF
   [ -n "${SLURM_DEFAULTS:-}" ] ||
     echo "SchedulerParameters=batch_sched_delay=0,sched_min_interval=0,sched_interval=1" >> "$work/slurm.conf"
   start_munge
-  if command -v slurmdbd mariadbd > /dev/null; then
+  if [ -z "${NO_DATABASE:-}" ] && command -v slurmdbd > /dev/null && command -v mariadbd > /dev/null; then
     start_database
   else
     echo "no slurmdbd and mariadb-server-core: the controller is asked instead of sacct"

@@ -113,6 +113,9 @@ scontrol update "JobId=$(squeue -h -n orbitfuse-depth -o %F | sort -u)" TimeLimi
 scontrol update NodeName=n1,n2 State=RESUME
 wait_until_empty
 check gathered "$farm"
+if [ -f "$work/slurmdbd.conf" ]; then  # the farm asked sacct, and not the controller in its place
+  sacct --noheader --allocations --parsable2 --format=State | grep -q TIMEOUT || fail "sacct has no TIMEOUT"
+fi
 
 # -- what Slurm costs a stage ------------------------------------------------------------------------
 stage_s=${STAGE_S:-1}
