@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -47,9 +48,22 @@ json holder_of(const fs::path& file) {
   return text ? parse_json(*text) : json();
 }
 
+std::string variable(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
+
+/// Slurm starts a job again, with a higher count, once it has given up the node it was on.
+bool is_our_earlier_start(const json& holder) {
+  const std::string job = variable("SLURM_JOB_ID");
+  return !job.empty() && holder.value("job", "") == job &&
+         std::atoi(holder.value("restarts", "").c_str()) <
+             std::atoi(variable("SLURM_RESTART_COUNT").c_str());
+}
+
 bool is_dead(const json& holder) {
   try {
-    if (holder.at("host") != host_name()) return false;
+    if (holder.at("host") != host_name()) return is_our_earlier_start(holder);
     return holder.at("boot") != boot_id() || holder.at("start") != start_ticks(holder.at("pid"));
   } catch (const json::exception&) {
     return false;  // cut off or foreign: nobody to ask
@@ -69,7 +83,9 @@ Status FarmLock::acquire(const fs::path& out) {
   const json me = {{"host", host_name()},
                    {"boot", boot_id()},
                    {"pid", getpid()},
-                   {"start", start_ticks(getpid())}};
+                   {"start", start_ticks(getpid())},
+                   {"job", variable("SLURM_JOB_ID")},
+                   {"restarts", variable("SLURM_RESTART_COUNT")}};
   ORBITFUSE_TRY(write_file_atomic(mine, me.dump() + "\n"));
   std::error_code ignored;
   for (int attempt = 0; attempt < 2; ++attempt) {

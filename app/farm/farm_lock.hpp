@@ -10,7 +10,8 @@ namespace orbitfuse::farm {
 
 /// farm.lock: who changes the farm. A file that names host, boot and process, made by link(2),
 /// which is one step on NFS as well; flock is not everywhere one between hosts. A holder that died
-/// is told by its process on the same host, never by the age of a file: clocks of hosts differ.
+/// is told by its process on the same host, never by the age of a file: clocks of hosts differ. A
+/// Slurm job that is started again elsewhere replaces its own earlier start, on the lost node.
 class FarmLock {
  public:
   FarmLock() = default;

@@ -18,6 +18,10 @@ enum class JobState {
 };
 std::string_view name(JobState state);
 
+/// How the cause of a stage begins that its time limit stopped.
+inline constexpr const char* out_of_time = "out of time";
+inline constexpr int exit_killed = 128 + 9;  ///< of a process that SIGKILL ended
+
 /// How a stage of a session fared so far. One file each, with one writer at a time: whoever runs
 /// it.
 struct JobOutcome {

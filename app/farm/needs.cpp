@@ -17,11 +17,13 @@ constexpr double least_memory_mb = 256, least_time_min = 5;
 
 }  // namespace
 
-std::map<std::string, StageNeeds> default_needs(const std::vector<std::string>& stages, int cores) {
+std::map<std::string, StageNeeds> default_needs(const std::vector<std::string>& stages, int cores,
+                                                bool on_gpu) {
   std::map<std::string, StageNeeds> needs;
   for (const std::string& stage : stages) {
     StageNeeds& n = needs[stage];
     n.cores = cores;
+    n.gpu = on_gpu && (stage.starts_with("train_") || stage == "render");
     if (stage == "register" || stage == "report") n = {1, 1000, 15, false};
   }
   return needs;
@@ -40,6 +42,22 @@ void learn_needs(const std::filesystem::path& out, const FarmPlan& finished,
     if (wall_s <= 0) continue;
     n.memory_mb = std::max(least_memory_mb, std::ceil(memory_margin * memory_mb));
     n.time_min = std::max(least_time_min, std::ceil(time_margin * wall_s / 60));
+  }
+}
+
+void raise_interrupted(const std::filesystem::path& out, FarmPlan& plan) {
+  for (const std::string& stage : plan.stages) {
+    StageNeeds needs = plan.needs_of(stage);
+    for (const FarmSession& session : plan.sessions) {
+      const JobOutcome outcome = read_outcome(out, session.name, stage);
+      if (outcome.state != JobState::interrupted) continue;
+      // The kernel kills the largest process of a job that is out of memory: the stage, not us.
+      if (outcome.exit_code == exit_killed)
+        needs.memory_mb = std::max(needs.memory_mb, std::ceil(2 * outcome.memory_mb));
+      if (outcome.cause.starts_with(out_of_time))
+        needs.time_min = std::max(needs.time_min, std::ceil(2 * outcome.wall_s / 60));
+    }
+    plan.needs[stage] = needs;
   }
 }
 

@@ -7,12 +7,18 @@ namespace orbitfuse::farm {
 
 /// Before anything was measured here (docs/scaling.md has the measurements): a stage that needs
 /// more is tried again with more.
-std::map<std::string, StageNeeds> default_needs(const std::vector<std::string>& stages, int cores);
+/// `on_gpu`: the run computes on one, so its training and rendering ask for a node that has it.
+std::map<std::string, StageNeeds> default_needs(const std::vector<std::string>& stages, int cores,
+                                                bool on_gpu);
 
 /// Raises or lowers memory and time to what finished stages of a farm took, with a margin for
 /// larger sessions; stages that finished nowhere keep what they have.
 void learn_needs(const std::filesystem::path& out, const FarmPlan& finished,
                  std::map<std::string, StageNeeds>& needs);
+
+/// Raises memory and time of stages that were killed or ran out of time, to twice what they had
+/// taken by then: called again without a new start, it changes nothing.
+void raise_interrupted(const std::filesystem::path& out, FarmPlan& plan);
 
 /// What this machine can give to stages now.
 struct Machine {

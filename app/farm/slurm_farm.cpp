@@ -9,6 +9,7 @@
 #include <sstream>
 #include <thread>
 
+#include "app/farm/needs.hpp"
 #include "app/farm/slurm.hpp"
 #include "app/farm/stage_job.hpp"
 #include "core/system/file_io.hpp"
@@ -20,6 +21,10 @@ namespace {
 
 /// Slurm's default MaxArraySize admits task ids below 1001.
 constexpr std::size_t array_size = 1000;
+
+/// A stop this near to the limit is Slurm's word that time runs out: 60 s before are asked for
+/// (array_words), sbatch(1) may send it 60 s earlier, and the stage began after the job.
+constexpr double time_warning_s = 130;
 
 /// Whether a round is worth it: what failed by itself fails again.
 bool is_to_run(const fs::path& out, const FarmPlan& plan, const FarmSession& session,
@@ -66,6 +71,7 @@ Status submit_round(const fs::path& out, const FarmPlan& plan,
                                     "--job-name=orbitfuse-gather",
                                     "--mem=200M",
                                     "--time=10",
+                                    "--chdir=" + out.string(),
                                     "--dependency=afterany:" + all,
                                     "--output=" + (scripts / "gather-%A.log").string()};
   if (!plan.slurm.partition.empty()) words.push_back("--partition=" + plan.slurm.partition);
@@ -104,23 +110,29 @@ Status submit(const fs::path& out, FarmPlan& plan, bool failed_too, const Progre
   return write_plan(out, plan);
 }
 
-Result<std::vector<std::string>> queued_jobs(const FarmPlan& plan, const Progress& progress) {
+Result<std::vector<std::string>> queued_jobs(const fs::path& out, const FarmPlan& plan,
+                                             const Progress& progress) {
   const char* self = std::getenv("SLURM_JOB_ID");
   std::set<std::string> ours;
   for (const SlurmRound& round : plan.rounds) ours.insert(round.jobs.begin(), round.jobs.end());
-  if (self != nullptr) ours.erase(self);
-  // All of the user's jobs: asked for one it has forgotten, squeue fails.
+  // All jobs: asked for one it has forgotten, squeue fails. Suspended ones are not listed by
+  // default, and go on later.
   ORBITFUSE_ASSIGN(const std::string text,
-                   slurm_output({"squeue", "--me", "--noheader", "--format=%F"}, progress));
+                   slurm_output({"squeue", "--noheader", "--format=%F %Z",
+                                 "--states=PENDING,CONFIGURING,RUNNING,SUSPENDED,STOPPED,REQUEUED,"
+                                 "COMPLETING"},
+                                progress));
   std::istringstream lines(text);
   std::set<std::string> found;
-  for (std::string id; lines >> id;)
-    if (ours.count(id) > 0) found.insert(id);
+  std::string id, folder;
+  while (lines >> id && std::getline(lines >> std::ws, folder))
+    if ((ours.count(id) > 0 || folder == out.string()) && (self == nullptr || id != self))
+      found.insert(id);
   return std::vector<std::string>(found.begin(), found.end());
 }
 
-Status cancel(const FarmPlan& plan, const Progress& progress) {
-  ORBITFUSE_ASSIGN(std::vector<std::string> words, queued_jobs(plan, progress));
+Status cancel(const fs::path& out, const FarmPlan& plan, const Progress& progress) {
+  ORBITFUSE_ASSIGN(std::vector<std::string> words, queued_jobs(out, plan, progress));
   if (words.empty()) return {};
   words.insert(words.begin(), "scancel");
   ORBITFUSE_TRY(slurm_output(words, progress));
@@ -132,7 +144,9 @@ Status run_task(const fs::path& out, const FarmPlan& plan, const std::string& st
   const FarmSession& s = plan.sessions.at(session);
   const JobOutcome before = read_outcome(out, s.name, stage);
   if (before.state == JobState::done) return {};
-  if (before.starts >= plan.tries && before.state != JobState::failed) {
+  // Slurm's own count, of this job alone: a user's `resume` gives all tries anew.
+  const char* restarts = std::getenv("SLURM_RESTART_COUNT");
+  if (restarts != nullptr && std::atoi(restarts) >= plan.tries) {
     JobOutcome given_up = before;
     given_up.state = JobState::failed;
     given_up.cause = fmt::format("interrupted {} times; last on {}", before.starts, before.host);
@@ -142,17 +156,23 @@ Status run_task(const fs::path& out, const FarmPlan& plan, const std::string& st
   }
   ORBITFUSE_ASSIGN(StageJob job, StageJob::start(plan, out, s, stage));
   std::optional<JobOutcome> outcome;
+  bool late = false;
   while (!(outcome = job.poll())) {
-    if (progress.cancelled()) job.stop();
+    if (progress.cancelled()) {
+      late = late || job.wall_s() > 60 * plan.needs_of(stage).time_min - time_warning_s;
+      job.stop();
+    }
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
+  if (late && outcome->state == JobState::interrupted)
+    outcome->cause = std::string(out_of_time) + " (Slurm's limit)";
   ORBITFUSE_TRY(write_outcome(out, s.name, stage, *outcome));
   if (outcome->state == JobState::done) return {};
   return fail(outcome->state == JobState::failed ? ErrorKind::input : ErrorKind::cancelled,
               s.name + "/" + stage, outcome->cause, "orbitfuse farm status " + out.string());
 }
 
-void raise_needs(FarmPlan& plan, const Progress& progress) {
+void raise_needs(const fs::path& out, FarmPlan& plan, const Progress& progress) {
   for (const SlurmRound& round : plan.rounds)
     for (std::size_t i = 0; i < plan.stages.size() && i < round.jobs.size(); ++i) {
       auto states = slurm_output({"sacct", "--noheader", "--parsable2", "--allocations",
@@ -165,6 +185,7 @@ void raise_needs(FarmPlan& plan, const Progress& progress) {
       if (states->find("OUT_OF_MEMORY") != std::string::npos) needs.memory_mb *= 2;
       if (states->find("TIMEOUT") != std::string::npos) needs.time_min *= 2;
     }
+  raise_interrupted(out, plan);
 }
 
 }  // namespace orbitfuse::farm

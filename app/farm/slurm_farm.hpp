@@ -11,17 +11,20 @@ namespace orbitfuse::farm {
 Status submit(const std::filesystem::path& out, FarmPlan& plan, bool failed_too,
               const Progress& progress);
 
-/// Of the farm's jobs, those that are waiting or running, besides the one we are.
-Result<std::vector<std::string>> queued_jobs(const FarmPlan& plan, const Progress& progress);
+/// Of the farm's jobs, those that Slurm has not ended, besides the one we are: of any user, and
+/// also what a submission sent off that died before it could write farm.json.
+Result<std::vector<std::string>> queued_jobs(const std::filesystem::path& out, const FarmPlan& plan,
+                                             const Progress& progress);
 
-Status cancel(const FarmPlan& plan, const Progress& progress);
+Status cancel(const std::filesystem::path& out, const FarmPlan& plan, const Progress& progress);
 
 /// What a task of an array does. Error: the stage's own.
 Status run_task(const std::filesystem::path& out, const FarmPlan& plan, const std::string& stage,
                 std::size_t session, const Progress& progress);
 
 /// Doubles memory or time of stages that Slurm ended for want of it. Where sacct has no database
-/// the controller is asked, which forgets jobs after minutes (MinJobAge).
-void raise_needs(FarmPlan& plan, const Progress& progress);
+/// the controller is asked, which forgets jobs after minutes (MinJobAge). What the stages' own
+/// records tell is used as well (raise_interrupted).
+void raise_needs(const std::filesystem::path& out, FarmPlan& plan, const Progress& progress);
 
 }  // namespace orbitfuse::farm

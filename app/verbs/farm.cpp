@@ -84,6 +84,10 @@ std::vector<std::string> passed_on(const CommonOptions& common) {
 Status start_farm(Context& context, const FarmOptions& options) {
   ORBITFUSE_TRY(options.limits.validate());
   ORBITFUSE_TRY(options.cluster.validate());
+  const bool on_gpu = context.common.device == "cuda";
+  if (!options.cluster.gpu_partition.empty() && !on_gpu)
+    return fail(ErrorKind::usage, "--gpu-partition",
+                "no stage uses a GPU with --device " + context.common.device, "leave it out");
   for (const std::string& session : options.words) ORBITFUSE_TRY(answers(session));
   ORBITFUSE_TRY(answers(options.out));
   FarmPlan plan;
@@ -96,7 +100,7 @@ Status start_farm(Context& context, const FarmOptions& options) {
   plan.tries = options.tries;
   plan.on_slurm = options.slurm;
   plan.slurm = options.cluster;
-  plan.needs = default_needs(plan.stages, options.stage_cores);
+  plan.needs = default_needs(plan.stages, options.stage_cores, on_gpu);
   if (!options.like.empty()) {
     ORBITFUSE_ASSIGN(const FarmPlan earlier, read_plan(options.like));
     learn_needs(options.like, earlier, plan.needs);
@@ -133,22 +137,25 @@ Status resume_farm(Context& context, const fs::path& out, const FarmOptions& opt
     learn_needs(out, plan, plan.needs);
     return run_here(context, out, plan, options);
   }
-  ORBITFUSE_ASSIGN(const auto queued, queued_jobs(plan, context.progress));
+  ORBITFUSE_ASSIGN(const auto queued, queued_jobs(out, plan, context.progress));
   if (!queued.empty())
     return fail(ErrorKind::usage, out.string(),
                 fmt::format("{} of its jobs still wait or run in Slurm", queued.size()),
                 "wait for them, or: orbitfuse farm cancel " + out.string());
-  raise_needs(plan, context.progress);
+  raise_needs(out, plan, context.progress);
   ORBITFUSE_TRY(submit(out, plan, by_user, context.progress));
   return conclude(context, out, plan, plan.rounds.empty());
 }
 
 Status cancel_farm(Context& context, const fs::path& out) {
+  // A gathering job may be submitting: what it has not named yet would escape.
+  FarmLock lock;
+  ORBITFUSE_TRY(lock.acquire(out));
   ORBITFUSE_ASSIGN(const FarmPlan plan, read_plan(out));
   if (!plan.on_slurm)
     return fail(ErrorKind::usage, out.string(), "it runs on this machine",
                 "stop it with Ctrl-C where it runs, or kill the process that farm.lock names");
-  ORBITFUSE_TRY(cancel(plan, context.progress));
+  ORBITFUSE_TRY(cancel(out, plan, context.progress));
   return conclude(context, out, plan, false);
 }
 

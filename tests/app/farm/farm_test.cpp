@@ -5,7 +5,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <csignal>
+#include <cstdlib>
 #include <fstream>
+#include <map>
 #include <thread>
 
 #include "app/farm/farm_lock.hpp"
@@ -13,7 +16,9 @@
 #include "app/farm/local_farm.hpp"
 #include "app/farm/overview.hpp"
 #include "app/farm/slurm.hpp"
+#include "app/farm/slurm_farm.hpp"
 #include "app/farm/stage_job.hpp"
+#include "app/terminal/interrupt.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse::farm {
@@ -112,6 +117,50 @@ TEST_F(FarmTest, StagesAtATimeAreBoundedByCoresAndMemory) {
   EXPECT_EQ(most(), 1);
 }
 
+TEST_F(FarmTest, RecordsThatCantBeWrittenStopTheFarmAndAreNamed) {
+  program("exit 0\n");
+  test::put(out / ".farm/b", "no folder");
+  const Status stopped = run();
+  ASSERT_FALSE(stopped);
+  EXPECT_EQ(stopped.error().kind, ErrorKind::device);
+  EXPECT_THAT(stopped.error().message(), HasSubstr(".farm/b"));
+  fs::remove(out / ".farm/b");
+  ASSERT_TRUE(run());
+  EXPECT_EQ(outcome("b", "second").state, JobState::done);
+}
+
+TEST_F(FarmTest, WhatWasKilledOrLateGetsMoreOnce) {
+  program("");
+  plan.needs["first"] = {1, 1000, 10, false};
+  JobOutcome killed;
+  killed.state = JobState::interrupted;
+  killed.exit_code = exit_killed;
+  killed.memory_mb = 990;
+  ASSERT_TRUE(write_outcome(out, "a", "first", killed));
+  JobOutcome late = killed;
+  late.exit_code = 130;
+  late.cause = std::string(out_of_time) + " (Slurm's limit)";
+  late.wall_s = 540;
+  ASSERT_TRUE(write_outcome(out, "b", "first", late));
+  for (int i = 0; i < 2; ++i) {
+    raise_interrupted(out, plan);
+    EXPECT_EQ(plan.needs_of("first").memory_mb, 1980);
+    EXPECT_EQ(plan.needs_of("first").time_min, 18);
+    EXPECT_EQ(plan.needs_of("second"), StageNeeds{});
+  }
+}
+
+TEST(Needs, TrainingAndRenderingAskForAGpuWhereTheRunUsesOne) {
+  const std::vector<std::string> stages = {"depth", "train_visible", "render", "report"};
+  for (const bool on_gpu : {false, true}) {
+    const auto needs = default_needs(stages, 2, on_gpu);
+    EXPECT_EQ(needs.at("train_visible").gpu, on_gpu);
+    EXPECT_EQ(needs.at("render").gpu, on_gpu);
+    EXPECT_FALSE(needs.at("depth").gpu);
+    EXPECT_FALSE(needs.at("report").gpu);
+  }
+}
+
 TEST_F(FarmTest, AProgramThatIsNotThereIsSaid) {
   program("");
   plan.program = (temp / "nowhere").string();
@@ -176,6 +225,79 @@ TEST_F(FarmTest, ALiveHolderIsNamedADeadOneIsReplacedAnotherHostsNever) {
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().found, HasSubstr("elsewhere"));
   EXPECT_TRUE(fs::exists(out / "farm.lock"));
+}
+
+/// Variables of Slurm's for the time of a test.
+struct Variables {
+  explicit Variables(std::map<std::string, std::string> values) {
+    for (const auto& [name, value] : values) {
+      const char* old = getenv(name.c_str());
+      before[name] = old == nullptr ? "" : old;
+      setenv(name.c_str(), value.c_str(), 1);
+    }
+  }
+  ~Variables() {
+    for (const auto& [name, value] : before)
+      value.empty() ? unsetenv(name.c_str()) : setenv(name.c_str(), value.c_str(), 1);
+  }
+  std::map<std::string, std::string> before;
+};
+
+TEST_F(FarmTest, ASlurmJobThatIsStartedAgainElsewhereTakesItsOwnLock) {
+  fs::create_directories(out);
+  const auto held_by_job = [&](const std::string& job, const std::string& restarts) {
+    test::put(out / "farm.lock",
+              "{\"host\":\"elsewhere\",\"boot\":\"x\",\"pid\":1,\"start\":\"1\",\"job\":\"" + job +
+                  "\",\"restarts\":\"" + restarts + "\"}");
+  };
+  const Variables slurm({{"SLURM_JOB_ID", "17"}, {"SLURM_RESTART_COUNT", "1"}});
+  held_by_job("17", "");
+  EXPECT_TRUE(FarmLock().acquire(out));
+  held_by_job("17", "1");  // the same start: a second node of one job
+  EXPECT_FALSE(FarmLock().acquire(out));
+  held_by_job("18", "");
+  EXPECT_FALSE(FarmLock().acquire(out));
+}
+
+TEST_F(FarmTest, ATaskThatSlurmStartedTooOftenIsGivenUpAndAResumeTriesAnew) {
+  program("exit 0\n");
+  JobOutcome lost;
+  lost.state = JobState::running;
+  lost.starts = plan.tries;
+  lost.host = "n7";
+  ASSERT_TRUE(write_outcome(out, "a", "first", lost));
+  {
+    const Variables slurm({{"SLURM_RESTART_COUNT", std::to_string(plan.tries)}});
+    EXPECT_FALSE(run_task(out, plan, "first", 0, Progress{}));
+    EXPECT_EQ(outcome("a", "first").state, JobState::failed);
+    EXPECT_EQ(outcome("a", "first").cause, "interrupted 3 times; last on n7");
+  }
+  EXPECT_TRUE(run_task(out, plan, "first", 0, Progress{}));
+  EXPECT_EQ(outcome("a", "first").state, JobState::done);
+}
+
+TEST_F(FarmTest, JobsOfAnotherUserAndOfADeadSubmissionAreQueuedOnes) {
+  fs::create_directories(out);
+  plan.rounds = {{0, {"12", "13"}}};
+  test::put(temp / "bin/squeue", "#!/bin/sh\necho '12 /elsewhere\n13 /elsewhere\n14 " +
+                                     out.string() + "\n15 " + out.string() + "/x'\n");
+  fs::permissions(temp / "bin/squeue", fs::perms::owner_all);
+  const Variables slurm({{"SLURM_JOB_ID", "13"},
+                         {"PATH", (temp / "bin").string() + ":" + std::string(getenv("PATH"))}});
+  const auto queued = queued_jobs(out, plan, Progress{});
+  ASSERT_TRUE(queued) << queued.error().message();
+  EXPECT_THAT(*queued, ::testing::ElementsAre("12", "14"));
+}
+
+TEST(Interrupt, OneWishThatComesTwiceIsOne) {
+  EXPECT_EXIT(
+      {
+        terminal::install_interrupt_handler();
+        raise(SIGTERM);
+        raise(SIGTERM);
+        _exit(terminal::interrupt_flag().load() ? 42 : 1);
+      },
+      ::testing::ExitedWithCode(42), "stopping");
 }
 
 TEST(FolderProbe, ADeadFileSystemIsNamedAndWaitedForBounded) {
