@@ -211,6 +211,14 @@ Status compare_temperatures(const CompareRequest& request, const Progress& progr
 
 }  // namespace
 
+Status check_comparable(const fs::path& before, const fs::path& after,
+                        const stages::RunConfig& config, const CompareRequest& request,
+                        const Progress& progress) {
+  ORBITFUSE_TRY(request.options.validate());
+  for (const fs::path& out : {before, after}) ORBITFUSE_TRY(complete_run(out, config, progress));
+  return {};
+}
+
 Result<ComparedRuns> compare_runs(const fs::path& before, const fs::path& after,
                                   const stages::RunConfig& config, const CompareRequest& request,
                                   const Progress& progress) {

@@ -46,6 +46,12 @@ struct ComparedRuns {
   double difference_k(std::size_t vertex) const { return points[vertex].difference_k - taken_k; }
 };
 
+/// Whether both folders hold what a comparison needs, without the comparison: whether they show one
+/// object is not asked. Errors: input, as compare_runs.
+Status check_comparable(const std::filesystem::path& before, const std::filesystem::path& after,
+                        const stages::RunConfig& config, const CompareRequest& request,
+                        const Progress& progress);
+
 /// Errors: input (a folder that is no finished run, without a visible or thermal field, without its
 /// session, of gray levels; each named), quality (not one object, or not to be registered),
 /// field_surface's, the measurement's, cancelled.

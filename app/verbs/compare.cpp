@@ -46,13 +46,16 @@ Status run(Context& context, const Options& o) {
     if (fs::equivalent(run, o.out, unreadable))
       return fail(ErrorKind::usage, "--out", "'" + o.out + "', which is one of the runs",
                   "name a new folder");
+  if (context.common.dry_run) {
+    ORBITFUSE_TRY(check_comparable(o.before, o.after, context.config, request, context.progress));
+    context.console.info(
+        "both runs hold what a comparison needs; whether they show one object is seen when their "
+        "surfaces are brought together");
+    return {};
+  }
   ORBITFUSE_ASSIGN(const ComparedRuns runs,
                    compare_runs(o.before, o.after, context.config, request, context.progress));
   context.result["comparison"] = to_json(runs);
-  if (context.common.dry_run) {
-    context.console.info("the runs can be compared");
-    return {};
-  }
   ORBITFUSE_ASSIGN(const auto pictures, pictures_of(runs, context.progress));
   ORBITFUSE_TRY(write_comparison(o.out, runs, pictures));
   tell(context, o, runs);

@@ -38,7 +38,8 @@ Rigid3d look_at_origin(const Eigen::Vector3d& eye) {
   return {q, -(q * eye)};
 }
 
-cv::Mat picture(const Camera& camera, const Rigid3d& cam_from_world, Modality modality) {
+cv::Mat picture(const Camera& camera, const Rigid3d& cam_from_world, Modality modality,
+                double warmer_k) {
   const bool visible = modality == Modality::visible;
   cv::Mat image(camera.height, camera.width, visible ? CV_8UC3 : CV_16UC1);
   const Eigen::Vector3d eye = camera_center(cam_from_world);
@@ -52,7 +53,8 @@ cv::Mat picture(const Camera& camera, const Rigid3d& cam_from_world, Modality mo
         image.at<cv::Vec3b>(y, x) =
             cv::Vec3b(cv::saturate_cast<uchar>(255 * v), cv::saturate_cast<uchar>(200 * v), 60);
       else
-        image.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(29000 + 2000 * v);
+        image.at<std::uint16_t>(y, x) =
+            static_cast<std::uint16_t>(29000 + 100 * warmer_k + 2000 * v);
     }
   return image;
 }
@@ -85,7 +87,7 @@ void write_fixture_session(const std::filesystem::path& folder, const FixtureOpt
       Frame frame;
       frame.id = static_cast<std::uint64_t>(i + 1);
       frame.host_time_ns = 1'700'000'000'000'000'000 + 1'000'000'000LL * i;
-      frame.pixels = picture(camera, pose, modality);
+      frame.pixels = picture(camera, pose, modality, options.warmer_k);
       if (options.stations) {
         Station station;
         station.index = i;

@@ -12,6 +12,7 @@ struct FixtureOptions {
   int width = 96, height = 72;
   bool known_poses = true;
   bool stations = true;
+  double warmer_k = 0;  ///< than 290 to 310 K
 };
 
 /// A session of a coloured, heated box seen from an orbit, recorded by the real writer. Aborts the

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// `orbitfuse compare` on small runs of the real program.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <tuple>
+
+#include "tests/app/cli/program.hpp"
+#include "tests/app/cli/session_fixture.hpp"
+#include "tests/app/cli/small_run.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace orbitfuse {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+using testing::HasSubstr;
+
+constexpr double warmer_k = 6;
+
+/// The same box twice, the second time warmer all over.
+class Compare : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder = std::make_unique<test::TempFolder>();
+    for (const char* name : {"before", "after"}) {
+      FixtureOptions options;
+      if (std::string(name) == "after") options.warmer_k = warmer_k;
+      write_fixture_session(*folder / (name + std::string("_session")), options);
+      const Outcome run =
+          orbitfuse_program(small_run(*folder / (name + std::string("_session")), *folder / name));
+      ASSERT_EQ(run.code, 0) << run.err;
+    }
+  }
+  static void TearDownTestSuite() { folder.reset(); }
+
+  static Outcome compare(const std::string& before, const std::string& after,
+                         std::vector<std::string> more) {
+    more.insert(more.begin(), {"compare", (*folder / before).string(), (*folder / after).string()});
+    return orbitfuse_program(more);
+  }
+
+  static std::unique_ptr<test::TempFolder> folder;
+};
+std::unique_ptr<test::TempFolder> Compare::folder;
+
+TEST_F(Compare, WhatBothDaysDifferByIsFoundAndCanBeTakenOut) {
+  const fs::path out = *folder / "plain";
+  const Outcome plain = compare("before", "after", {"--out", out.string(), "--json"});
+  ASSERT_EQ(plain.code, 0) << plain.err;
+  const json found = plain.result().at("comparison");
+  EXPECT_NEAR(found.at("common_difference_k").get<double>(), warmer_k, 0.1);
+  EXPECT_EQ(found.at("taken_out_k"), 0);
+  EXPECT_GT(found.at("surface_shares").at("compared").get<double>(), 0.9);
+  EXPECT_TRUE(found.at("came").empty() && found.at("gone").empty()) << found;
+  ASSERT_GE(found.at("differences").size(), 1u);
+  const json first = found.at("differences")[0];
+  EXPECT_NEAR(first.at("difference_k").get<double>(), warmer_k, 0.5);
+  EXPECT_GT(first.at("uncertainty_k").get<double>(), 0);
+  // What is told is what is written, and the page stands alone.
+  EXPECT_EQ(json::parse(test::get(out / "differences.json")), found);
+  EXPECT_THAT(test::get(out / "compare.html"), HasSubstr("nothing was taken out"));
+
+  const Outcome ambient =
+      compare("before", "after", {"--out", (*folder / "taken").string(), "--ambient", "--json"});
+  ASSERT_EQ(ambient.code, 0) << ambient.err;
+  EXPECT_NEAR(ambient.result().at("comparison").at("taken_out_k").get<double>(), warmer_k, 0.1);
+  EXPECT_TRUE(ambient.result().at("comparison").at("differences").empty());
+}
+
+TEST_F(Compare, ADryRunLooksAtBothRunsAndWritesNothing) {
+  const fs::path out = *folder / "dry";
+  const Outcome dry = compare("before", "after", {"--out", out.string(), "--dry-run"});
+  EXPECT_EQ(dry.code, 0) << dry.err;
+  EXPECT_THAT(dry.err, HasSubstr("both runs hold what a comparison needs"));
+  EXPECT_FALSE(fs::exists(out));
+  EXPECT_NE(compare("before", "after_session", {"--out", out.string(), "--dry-run"}).code, 0);
+}
+
+TEST_F(Compare, WhatCannotBeComparedIsNamedAndNothingIsWritten) {
+  const fs::path out = *folder / "refused";
+  const std::string before = (*folder / "before").string();
+  for (const auto& [after, into, code, said] :
+       {std::tuple("before", out, 2, "name two runs"),
+        std::tuple("after", *folder / "after", 2, "which is one of the runs"),
+        std::tuple("after_session", out, 3, "after_session"), std::tuple("none", out, 3, "none")}) {
+    const Outcome refused = compare("before", after, {"--out", into.string()});
+    EXPECT_EQ(refused.code, code) << after << refused.out << refused.err;
+    EXPECT_THAT(refused.err, HasSubstr(said));
+    EXPECT_EQ(refused.out, "");
+    EXPECT_FALSE(fs::exists(out));
+  }
+  EXPECT_TRUE(fs::exists(fs::path(before) / "run.json"));
+}
+
+}  // namespace
+}  // namespace orbitfuse
