@@ -250,18 +250,16 @@ void Trainer::apply(const AdamStep& grid_step, const AdamStep& network_step,
       const auto index = static_cast<std::size_t>(l);
       const GridLevel& level = grid.levels[index];
       if (grid.level_weight[index] <= 0) return;
-      const auto offset = static_cast<std::size_t>(level.offset);
-      float* grad = grid.table.grad.data() + offset;
+      const GridTable::Level table = grid.table.level(grid.levels, index);
       for (const Block& block : blocks_) {
         if (block.rays.samples() == 0) continue;
         const LevelGradient g = gradient_of(block);
-        kernels_.scatter(level, grad, g.position01, g.count,
+        kernels_.scatter(level, table.lines, table.touched, g.position01, g.count,
                          g.gradient + index * static_cast<std::size_t>(g.count) *
                                           static_cast<std::size_t>(grid.features));
       }
-      kernels_.adam(grid_step, static_cast<std::int64_t>(level.entries) * level.features,
-                    grid.table.value.data() + offset, grid.table.first.data() + offset,
-                    grid.table.second.data() + offset, grad, grid.half.data() + offset);
+      kernels_.adam_lines(grid_step, table.words, table.touched, table.lines,
+                          grid.half.data() + level.offset);
     });
   };
   update_grid(field_.main.grid, [](const Block& block) {
@@ -270,7 +268,7 @@ void Trainer::apply(const AdamStep& grid_step, const AdamStep& network_step,
   const auto update = [&](Parameters& p, const std::vector<float>& grad, AdamStep step) {
     std::copy(grad.begin(), grad.end(), p.grad.begin());
     kernels_.adam(step, static_cast<std::int64_t>(p.size()), p.value.data(), p.first.data(),
-                  p.second.data(), p.grad.data(), nullptr);
+                  p.second.data(), p.grad.data());
   };
   update(field_.main.mlp.weights, gradients.mlp, network_step);
   update(field_.color.weights, gradients.color, network_step);
