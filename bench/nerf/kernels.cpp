@@ -64,9 +64,11 @@ void scatter(benchmark::State& state, const Kernels& kernels, int log2_table, bo
   const auto at = positions(along_rays);
   const std::vector<float> gradient(static_cast<std::size_t>(samples) * 4, 1e-3F);
   for (auto _ : state)
-    for (const GridLevel& level : grid.levels)
-      kernels.scatter(level, grid.table.grad.data() + level.offset, at.data(), samples,
+    for (std::size_t l = 0; l < grid.levels.size(); ++l) {
+      const GridTable::Level table = grid.table.level(grid.levels, l);
+      kernels.scatter(grid.levels[l], table.lines, table.touched, at.data(), samples,
                       gradient.data());
+    }
   per_sample(state);
 }
 
@@ -108,21 +110,31 @@ void forward_and_backward(benchmark::State& state, const Kernels& kernels,
   per_sample(state, 3 * p.flop);
 }
 
-void adam(benchmark::State& state, const Kernels& kernels, int log2_table) {
+/// One step of training on the grid: 4 k samples are scattered, then Adam takes what they touched.
+void scatter_and_adam(benchmark::State& state, const Kernels& kernels, int log2_table,
+                      bool only_adam) {
   HashEncoding grid = grid_of(log2_table);
+  constexpr int of_step = 4096;
+  const auto at = positions(true);
+  const std::vector<float> gradient(static_cast<std::size_t>(of_step) * 4, 1e-3F);
   AdamStep step;
   step.learning_rate = 1e-3F;
-  const auto count = static_cast<std::int64_t>(grid.table.size());
+  int turn = 0;
   for (auto _ : state) {
-    state.PauseTiming();
-    std::fill(grid.table.grad.begin(), grid.table.grad.end(), 1e-3F);
-    state.ResumeTiming();
-    kernels.adam(step, count, grid.table.value.data(), grid.table.first.data(),
-                 grid.table.second.data(), grid.table.grad.data(), grid.half.data());
+    const float* position = at.data() + 3 * of_step * (turn++ % (samples / of_step));
+    for (std::size_t l = 0; l < grid.levels.size(); ++l) {
+      const GridTable::Level table = grid.table.level(grid.levels, l);
+      if (only_adam) state.PauseTiming();
+      kernels.scatter(grid.levels[l], table.lines, table.touched, position, of_step,
+                      gradient.data());
+      if (only_adam) state.ResumeTiming();
+      kernels.adam_lines(step, table.words, table.touched, table.lines,
+                         grid.half.data() + grid.levels[l].offset);
+    }
   }
-  state.counters["ns/parameter"] = benchmark::Counter(
-      static_cast<double>(state.iterations()) * static_cast<double>(count) * 1e-9,
-      benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  state.counters["ns/sample"] =
+      benchmark::Counter(static_cast<double>(state.iterations()) * of_step * 1e-9,
+                         benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
 void register_all(Isa isa) {
@@ -142,7 +154,10 @@ void register_all(Isa isa) {
   add("forward,32-64-64-16", forward, color);
   add("forward+backward,32-64-16", forward_and_backward, density);
   add("forward+backward,32-64-64-16", forward_and_backward, color);
-  for (const int table : {15, 17}) add(fmt::format("adam,8x4,2^{}", table), adam, table);
+  for (const int table : {15, 17})
+    for (const bool only_adam : {false, true})
+      add(fmt::format("{},8x4,2^{}", only_adam ? "adam" : "scatter+adam", table), scatter_and_adam,
+          table, only_adam);
 }
 
 }  // namespace

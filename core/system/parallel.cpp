@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <memory>
 #include <thread>
 
@@ -46,6 +47,13 @@ void parallel_blocks(int count, int block, const std::function<void(int, int)>& 
 
 void parallel_for(int count, const std::function<void(int)>& fn) {
   parallel_blocks(count, 1, [&](int begin, int) { fn(begin); });
+}
+
+void parallel_tasks(const std::vector<std::function<void()>>& tasks) {
+  std::atomic<std::size_t> next = 0;
+  parallel_for(std::min(thread_count(), static_cast<int>(tasks.size())), [&](int) {
+    for (std::size_t i = next++; i < tasks.size(); i = next++) tasks[i]();
+  });
 }
 
 }  // namespace orbitfuse

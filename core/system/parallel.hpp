@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <vector>
 
 namespace orbitfuse {
 
@@ -15,5 +16,8 @@ void parallel_blocks(int count, int block, const std::function<void(int begin, i
 
 /// fn(i) for i in [0, count), one task each.
 void parallel_for(int count, const std::function<void(int)>& fn);
+
+/// Tasks of different lengths, begun in this order: with the longest first, threads end together.
+void parallel_tasks(const std::vector<std::function<void()>>& tasks);
 
 }  // namespace orbitfuse

@@ -115,12 +115,24 @@ void visit_options(Archive& io, TrainOptions& options) {
 
 template <class Archive>
 void visit(Archive& io, Parameters& p) {
-  io(p.value);
-  io(p.first);
-  io(p.second);
-  if constexpr (Archive::reading) {
-    io.ok = io.ok && p.first.size() == p.value.size() && p.second.size() == p.value.size();
-    p.grad.assign(p.value.size(), 0);
+  const std::size_t count = p.size();
+  for (std::vector<float>* part : {&p.value, &p.first, &p.second}) {
+    io(*part);
+    if constexpr (Archive::reading) io.ok = io.ok && part->size() == count;
+  }
+}
+
+/// In a file as Parameters.
+template <class Archive>
+void visit(Archive& io, GridTable& table) {
+  for (const GridTable::Part part : {&GridLine::value, &GridLine::first, &GridLine::second}) {
+    std::vector<float> numbers;
+    if constexpr (!Archive::reading) numbers = table.part(part);
+    io(numbers);
+    if constexpr (Archive::reading) {
+      io.ok = io.ok && numbers.size() == table.size();
+      if (io.ok) table.set_part(part, numbers);
+    }
   }
 }
 
@@ -212,15 +224,14 @@ void visit(Archive& io, Snapshot& best) {
 }
 
 bool fits(const Snapshot& best, FieldState& state) {
-  const auto parameters = state.parameters();
+  std::vector<std::size_t> sizes, kept;
+  state.each_set([&](const auto& set) { sizes.push_back(set.size()); });
+  for (const std::vector<float>& values : best.values) kept.push_back(values.size());
   const auto networks = state.density_networks();
-  bool same = best.values.size() == parameters.size() &&
-              best.level_weights.size() == networks.size() &&
+  bool same = kept == sizes && best.level_weights.size() == networks.size() &&
               best.poses.size() == state.refined_poses.size() &&
               best.occupied.size() == state.occupancy.on.size() &&
               best.codes.size() == state.occupancy.code.size();
-  for (std::size_t i = 0; same && i < parameters.size(); ++i)
-    same = best.values[i].size() == parameters[i]->value.size();
   for (std::size_t i = 0; same && i < networks.size(); ++i)
     same = best.level_weights[i].size() == networks[i]->grid.level_weight.size();
   return same;
@@ -261,14 +272,7 @@ void visit(Archive& io, FieldState& state) {
   visit(io, state.history);
   io(state.refined_poses);
   for (DensityNetwork* network : state.density_networks()) io(network->grid.level_weight);
-  std::vector<std::size_t> sizes;
-  for (const Parameters* p : state.parameters()) sizes.push_back(p->size());
-  std::size_t i = 0;
-  for (Parameters* p : state.parameters()) {
-    visit(io, *p);
-    if constexpr (Archive::reading) io.ok = io.ok && p->size() == sizes[i];
-    ++i;
-  }
+  state.each_set([&](auto& set) { visit(io, set); });
   visit(io, state.occupancy);
   visit(io, state.best);
   if constexpr (Archive::reading) {

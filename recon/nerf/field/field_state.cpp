@@ -28,15 +28,6 @@ void FieldState::create(const TrainOptions& with, Modality what, int view_count)
   occupancy.create(with.occupancy_resolution, occupancy_cascades);
 }
 
-std::vector<Parameters*> FieldState::parameters() {
-  std::vector<Parameters*> all{&main.grid.table, &main.mlp.weights, &color.weights, &image_offsets};
-  for (DensityNetwork& p : proposals) {
-    all.push_back(&p.grid.table);
-    all.push_back(&p.mlp.weights);
-  }
-  return all;
-}
-
 std::vector<DensityNetwork*> FieldState::density_networks() {
   std::vector<DensityNetwork*> all{&main};
   for (DensityNetwork& p : proposals) all.push_back(&p);
@@ -55,7 +46,7 @@ Snapshot FieldState::snapshot(double psnr) {
   Snapshot out;
   out.step = step;
   out.psnr = psnr;
-  for (const Parameters* p : parameters()) out.values.push_back(p->value);
+  each_set([&](const auto& set) { out.values.push_back(set.values()); });
   out.occupied = occupancy.on;
   out.codes = occupancy.code;
   for (const DensityNetwork* network : density_networks())
@@ -65,8 +56,8 @@ Snapshot FieldState::snapshot(double psnr) {
 }
 
 void FieldState::restore(const Snapshot& from) {
-  const auto sets = parameters();
-  for (std::size_t i = 0; i < sets.size(); ++i) sets[i]->value = from.values[i];
+  std::size_t next = 0;
+  each_set([&](auto& set) { set.set_values(from.values[next++]); });
   const auto networks = density_networks();
   for (std::size_t i = 0; i < networks.size(); ++i)
     networks[i]->grid.level_weight = from.level_weights[i];

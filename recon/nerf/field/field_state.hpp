@@ -66,8 +66,18 @@ struct FieldState {
 
   int channels() const { return modality == Modality::visible ? 3 : 1; }
   void create(const TrainOptions& with, Modality what, int view_count);
-  /// All trainable sets in a fixed order.
-  std::vector<Parameters*> parameters();
+  /// act(set) for all trainable sets in a fixed order: GridTable or Parameters.
+  template <class Act>
+  void each_set(const Act& act) {
+    act(main.grid.table);
+    act(main.mlp.weights);
+    act(color.weights);
+    act(image_offsets);
+    for (DensityNetwork& p : proposals) {
+      act(p.grid.table);
+      act(p.mlp.weights);
+    }
+  }
   std::vector<DensityNetwork*> density_networks();  ///< the main one, then the proposals
   void refresh();                                   ///< derived layouts after parameters changed
   Snapshot snapshot(double psnr);

@@ -24,10 +24,7 @@ std::uint16_t half_of(float value) {
 }  // namespace
 
 void Parameters::resize(std::size_t count) {
-  for (std::vector<float>* values : {&value, &first, &second, &grad}) {
-    reserve_huge(*values, count);
-    values->assign(count, 0);
-  }
+  for (std::vector<float>* numbers : {&value, &first, &second, &grad}) numbers->assign(count, 0);
 }
 
 std::int64_t HashEncoding::lay_out(int level_count, int features_per_level, int log2_table,
@@ -59,10 +56,10 @@ std::int64_t HashEncoding::lay_out(int level_count, int features_per_level, int 
 
 void HashEncoding::create(int level_count, int features_per_level, int log2_table,
                           int base_resolution, int max_resolution, std::uint64_t seed) {
-  table.resize(static_cast<std::size_t>(
-      lay_out(level_count, features_per_level, log2_table, base_resolution, max_resolution)));
+  lay_out(level_count, features_per_level, log2_table, base_resolution, max_resolution);
+  table.resize(levels);
   for (std::size_t i = 0; i < table.size(); ++i)
-    table.value[i] = 2e-4f * (random_uniform(seed, 11, i) - 0.5f);
+    table.value(i) = 2e-4f * (random_uniform(seed, 11, i) - 0.5f);
   level_weight.assign(levels.size(), 1.0f);
   refresh_half();
 }
@@ -70,7 +67,7 @@ void HashEncoding::create(int level_count, int features_per_level, int log2_tabl
 void HashEncoding::refresh_half() {
   reserve_huge(half, table.size());
   half.resize(table.size());
-  for (std::size_t i = 0; i < half.size(); ++i) half[i] = half_of(table.value[i]);
+  for (std::size_t i = 0; i < half.size(); ++i) half[i] = half_of(table.value(i));
 }
 
 void HashEncoding::encode(const Kernels& kernels, const float* position01, int count,

@@ -4,15 +4,18 @@
 #include <cstdint>
 #include <vector>
 
+#include "recon/nerf/field/grid_table.hpp"
 #include "recon/nerf/kernels/kernels.hpp"
 
 namespace orbitfuse::nerf {
 
-/// Trainable numbers with their Adam moments and gradient.
+/// A perceptron's or few trainable numbers with their Adam moments and gradient.
 struct Parameters {
   std::vector<float> value, first, second, grad;
   void resize(std::size_t count);
   std::size_t size() const { return value.size(); }
+  const std::vector<float>& values() const { return value; }
+  void set_values(const std::vector<float>& values) { value = values; }
 };
 
 /// Multiresolution hash encoding (Müller et al. 2022): `levels` resolutions growing geometrically,
@@ -20,7 +23,7 @@ struct Parameters {
 struct HashEncoding {
   std::vector<GridLevel> levels;
   int features = 0, width = 0;  ///< features per level; padded row width
-  Parameters table;
+  GridTable table;
   std::vector<std::uint16_t> half;  ///< what the kernels read
   std::vector<float> level_weight;  ///< coarse-to-fine: 0..1 per level
 

@@ -21,6 +21,13 @@ struct GridLevel {
   int features = 4;           ///< 2 or 4
 };
 
+/// Four successive numbers of a grid's table with everything that one step reads and writes of
+/// them. A step touches a fifth of a level's entries in random order: one cache line each, instead
+/// of one in each of four arrays.
+struct alignas(64) GridLine {
+  float value[4] = {}, first[4] = {}, second[4] = {}, grad[4] = {};
+};
+
 /// A dense layer's weights in the layouts the kernels read; refreshed after each optimiser step.
 struct LayerView {
   int in = 0, out = 0;
@@ -41,9 +48,10 @@ struct Kernels {
   /// out[s][0..features) (row stride `stride`) of one level at positions in [0, 1]^3.
   void (*encode)(const GridLevel& level, const std::uint16_t* half_table, const float* position,
                  int count, float* out, int stride);
-  /// grad[entry] += weight * dfeatures[s], samples in order.
-  void (*scatter)(const GridLevel& level, float* grad, const float* position, int count,
-                  const float* dfeatures);
+  /// grad[entry] += weight * dfeatures[s], samples in order. Sets the bits of the lines that it
+  /// writes to; `lines` and `touched` are the level's own.
+  void (*scatter)(const GridLevel& level, GridLine* lines, std::uint64_t* touched,
+                  const float* position, int count, const float* dfeatures);
   /// out = in * weights, then max(0, .) if relu.
   void (*forward)(const LayerView& layer, int rows, const float* in, float* out, bool relu);
   /// din = dout * weights^T, zeroed where activation <= 0 (activation may be null).
@@ -53,10 +61,13 @@ struct Kernels {
   void (*backward_weights)(const LayerView& layer, int rows, const float* in, const float* dout,
                            float* dweights);
   /// Adam (Kingma & Ba 2015) on [0, count), count a multiple of 8; entries whose gradient is
-  /// exactly 0 keep their state, as in instant-ngp. Clears the gradient; writes half-precision
-  /// copies if `half` is not null.
+  /// exactly 0 keep their state, as in instant-ngp. Clears the gradient.
   void (*adam)(const AdamStep& step, std::int64_t count, float* parameter, float* first,
-               float* second, float* grad, std::uint16_t* half);
+               float* second, float* grad);
+  /// The same on the lines whose bits are set in `words` words; clears the bits too. Values stay
+  /// within +-max_half and are copied to `half`, 4 a line.
+  void (*adam_lines)(const AdamStep& step, std::int64_t words, std::uint64_t* touched,
+                     GridLine* lines, std::uint16_t* half);
 };
 
 /// The kernels for an instruction set; a set this build or machine lacks gives the next lower one.

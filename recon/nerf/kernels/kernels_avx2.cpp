@@ -7,7 +7,7 @@ namespace orbitfuse::nerf {
 const Kernels& kernels_avx2() {
   static constexpr Kernels table{Isa::avx2,   encode_grid,        scatter_grid,
                                  forward_f32, backward_input_f32, backward_weights_f32,
-                                 adam_update};
+                                 adam_update, adam_lines};
   return table;
 }
 

@@ -136,7 +136,7 @@ void backward_weights_bf16(const LayerView& layer, int rows, const float* in, co
 const Kernels& kernels_avx512bf16() {
   static constexpr Kernels table{Isa::avx512bf16, encode_grid,         scatter_grid,
                                  forward_bf16,    backward_input_bf16, backward_weights_bf16,
-                                 adam_update};
+                                 adam_update,     adam_lines};
   return table;
 }
 

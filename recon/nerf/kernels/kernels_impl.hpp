@@ -6,6 +6,7 @@
 // that the linker keeps for every processor.
 #include <immintrin.h>
 
+#include "recon/nerf/kernels/adam_impl.hpp"
 #include "recon/nerf/kernels/kernels.hpp"
 
 namespace orbitfuse::nerf {
@@ -201,21 +202,11 @@ inline void encode_point2(const Corners& corners, int i, const std::uint16_t* ta
 /// their way from memory. A table that fits into the L2 cache with the others' gains nothing.
 constexpr unsigned long prefetched_from = 1ul << 19;  ///< bytes
 
-template <typename T>
-inline void prefetch(const Corners& corners, const T* table, int features) {
-  for (int c = 0; c < 8; ++c)
-    for (int i = 0; i < 8; ++i)
-      _mm_prefetch(reinterpret_cast<const char*>(table + static_cast<unsigned long>(features) *
-                                                             corners.entry[c][i]),
-                   _MM_HINT_T0);
-}
-
-/// visit(corners, begin, n) for each group in turn.
-template <typename T, typename Visit>
-inline void visit_groups(const GridLevel& level, const T* table, const float* position, int count,
-                         const Visit& visit) {
-  const bool ahead =
-      level.entries * static_cast<unsigned long>(level.features) * sizeof(T) >= prefetched_from;
+/// visit(corners, begin, n) for each group in turn; an entry is `entry_bytes` of `table`.
+template <typename Visit>
+inline void visit_groups(const GridLevel& level, const void* table, unsigned long entry_bytes,
+                         const float* position, int count, const Visit& visit) {
+  const bool ahead = level.entries * entry_bytes >= prefetched_from;
   Corners corners[2];
   const auto look_up = [&](int begin, Corners& group) {
     const int n = count - begin < 8 ? count - begin : 8;
@@ -227,8 +218,12 @@ inline void visit_groups(const GridLevel& level, const T* table, const float* po
     if (!ahead) {
       look_up(begin, corners[0]);
     } else if (begin + 8 < count) {
-      look_up(begin + 8, corners[turn ^ 1]);
-      prefetch(corners[turn ^ 1], table, level.features);
+      Corners& next = corners[turn ^ 1];
+      look_up(begin + 8, next);
+      for (int c = 0; c < 8; ++c)
+        for (int i = 0; i < 8; ++i)
+          _mm_prefetch(static_cast<const char*>(table) + entry_bytes * next.entry[c][i],
+                       _MM_HINT_T0);
     }
     visit(corners[turn], begin, count - begin < 8 ? count - begin : 8);
     if (ahead) turn ^= 1;
@@ -237,7 +232,8 @@ inline void visit_groups(const GridLevel& level, const T* table, const float* po
 
 inline void encode_grid(const GridLevel& level, const std::uint16_t* table, const float* position,
                         int count, float* out, int stride) {
-  visit_groups(level, table, position, count, [&](const Corners& corners, int begin, int n) {
+  const unsigned long bytes = sizeof(std::uint16_t) * static_cast<unsigned long>(level.features);
+  visit_groups(level, table, bytes, position, count, [&](const Corners& corners, int begin, int n) {
     float* row = out + static_cast<long>(begin) * stride;
     if (level.features == 4)
       for (int i = 0; i < n; ++i)
@@ -248,78 +244,55 @@ inline void encode_grid(const GridLevel& level, const std::uint16_t* table, cons
   });
 }
 
-inline void scatter_point4(const Corners& corners, int i, __m128 d, float* grad) {
+/// Where a level's gradients go.
+struct LineGradients {
+  GridLine* lines;
+  std::uint64_t* touched;
+  float* touch(std::uint32_t line) const {
+    touched[line >> 6] |= std::uint64_t{1} << (line & 63u);
+    return lines[line].grad;
+  }
+};
+
+inline void scatter_point4(const Corners& corners, int i, __m128 d, const LineGradients& out) {
   const __m128 d1 = _mm_mul_ps(d, _mm_broadcast_ss(&corners.x[i]));
   const __m128 d0 = _mm_sub_ps(d, d1);
   for (int c = 0; c < 4; ++c) {
     const __m128 w = _mm_broadcast_ss(&corners.yz[c][i]);
-    float* g0 = grad + 4ul * corners.entry[2 * c][i];
-    _mm_storeu_ps(g0, _mm_fmadd_ps(d0, w, _mm_loadu_ps(g0)));
-    float* g1 = grad + 4ul * corners.entry[2 * c + 1][i];
-    _mm_storeu_ps(g1, _mm_fmadd_ps(d1, w, _mm_loadu_ps(g1)));
+    float* g0 = out.touch(corners.entry[2 * c][i]);
+    _mm_store_ps(g0, _mm_fmadd_ps(d0, w, _mm_load_ps(g0)));
+    float* g1 = out.touch(corners.entry[2 * c + 1][i]);
+    _mm_store_ps(g1, _mm_fmadd_ps(d1, w, _mm_load_ps(g1)));
   }
 }
 
-inline void scatter_point2(const Corners& corners, int i, __m128 d, float* grad) {
+inline void scatter_point2(const Corners& corners, int i, __m128 d, const LineGradients& out) {
   const __m128 d1 = _mm_mul_ps(d, _mm_broadcast_ss(&corners.x[i]));
   const __m128 d0 = _mm_sub_ps(d, d1);
   for (int c = 0; c < 8; ++c) {
-    float* g = grad + 2ul * corners.entry[c][i];
+    const std::uint32_t entry = corners.entry[c][i];
+    float* g = out.touch(entry / 2) + 2 * (entry % 2);
     const __m128 old = _mm_castsi128_ps(_mm_loadl_epi64(reinterpret_cast<__m128i*>(g)));
     _mm_storel_pi(reinterpret_cast<__m64*>(g),
                   _mm_fmadd_ps(c & 1 ? d1 : d0, _mm_broadcast_ss(&corners.yz[c >> 1][i]), old));
   }
 }
 
-inline void scatter_grid(const GridLevel& level, float* grad, const float* position, int count,
-                         const float* dfeatures) {
-  visit_groups(level, grad, position, count, [&](const Corners& corners, int begin, int n) {
+inline void scatter_grid(const GridLevel& level, GridLine* lines, std::uint64_t* touched,
+                         const float* position, int count, const float* dfeatures) {
+  const unsigned long bytes = sizeof(GridLine) / 4 * static_cast<unsigned long>(level.features);
+  const LineGradients out{lines, touched};
+  visit_groups(level, lines, bytes, position, count, [&](const Corners& corners, int begin, int n) {
     if (level.features == 4)
       for (int i = 0; i < n; ++i)
-        scatter_point4(corners, i, _mm_loadu_ps(dfeatures + 4l * (begin + i)), grad);
+        scatter_point4(corners, i, _mm_loadu_ps(dfeatures + 4l * (begin + i)), out);
     else
       for (int i = 0; i < n; ++i)
         scatter_point2(corners, i,
                        _mm_castsi128_ps(_mm_loadl_epi64(
                            reinterpret_cast<const __m128i*>(dfeatures + 2l * (begin + i)))),
-                       grad);
+                       out);
   });
-}
-
-// ---- optimiser -----------------------------------------------------------------------------
-
-inline void adam_update(const AdamStep& step, std::int64_t count, float* parameter, float* first,
-                        float* second, float* grad, std::uint16_t* half) {
-  const __m256 zero = _mm256_setzero_ps();
-  const __m256 largest = _mm256_set1_ps(1e15f), minus_largest = _mm256_set1_ps(-1e15f);
-  const __m256 limit = _mm256_set1_ps(max_half), minus_limit = _mm256_set1_ps(-max_half);
-  for (std::int64_t i = 0; i < count; i += 8) {
-    const __m256 raw = _mm256_loadu_ps(grad + i);
-    const __m256 used = _mm256_cmp_ps(raw, zero, _CMP_NEQ_UQ);
-    if (_mm256_testz_ps(used, used)) continue;
-    const __m256 p = _mm256_loadu_ps(parameter + i);
-    // Its square must stay finite; the order of the operands turns NaN into the bound.
-    const __m256 bounded = _mm256_max_ps(_mm256_min_ps(raw, largest), minus_largest);
-    const __m256 g = _mm256_fmadd_ps(_mm256_set1_ps(step.weight_decay), p, bounded);
-    const __m256 m0 = _mm256_loadu_ps(first + i), v0 = _mm256_loadu_ps(second + i);
-    const __m256 m = _mm256_fmadd_ps(_mm256_set1_ps(1 - step.beta1), _mm256_sub_ps(g, m0), m0);
-    const __m256 v =
-        _mm256_fmadd_ps(_mm256_set1_ps(1 - step.beta2), _mm256_sub_ps(_mm256_mul_ps(g, g), v0), v0);
-    const __m256 root = _mm256_sqrt_ps(_mm256_mul_ps(v, _mm256_set1_ps(step.correction2)));
-    const __m256 change =
-        _mm256_div_ps(_mm256_mul_ps(m, _mm256_set1_ps(step.learning_rate * step.correction1)),
-                      _mm256_add_ps(root, _mm256_set1_ps(step.epsilon)));
-    __m256 next = _mm256_sub_ps(p, change);
-    if (half) next = _mm256_max_ps(minus_limit, _mm256_min_ps(limit, next));
-    next = _mm256_blendv_ps(p, next, used);
-    _mm256_storeu_ps(parameter + i, next);
-    _mm256_storeu_ps(first + i, _mm256_blendv_ps(m0, m, used));
-    _mm256_storeu_ps(second + i, _mm256_blendv_ps(v0, v, used));
-    _mm256_storeu_ps(grad + i, zero);
-    if (half)
-      _mm_storeu_si128(reinterpret_cast<__m128i*>(half + i),
-                       _mm256_cvtps_ph(next, _MM_FROUND_TO_NEAREST_INT));
-  }
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 
@@ -244,48 +245,56 @@ void Trainer::move_views() {
 
 void Trainer::apply(const AdamStep& grid_step, const AdamStep& network_step,
                     const BlockGradients& gradients, bool with_proposals) {
-  // Whole levels per task: no two threads write to one table.
+  // Nothing is written by two of these. Finer levels are larger, and the grids take the longest.
+  std::vector<std::function<void()>> tasks;
   const auto update_grid = [&](HashEncoding& grid, const auto& gradient_of) {
-    parallel_for(static_cast<int>(grid.levels.size()), [&](int l) {
-      const auto index = static_cast<std::size_t>(l);
-      const GridLevel& level = grid.levels[index];
-      if (grid.level_weight[index] <= 0) return;
-      const auto offset = static_cast<std::size_t>(level.offset);
-      float* grad = grid.table.grad.data() + offset;
-      for (const Block& block : blocks_) {
-        if (block.rays.samples() == 0) continue;
-        const LevelGradient g = gradient_of(block);
-        kernels_.scatter(level, grad, g.position01, g.count,
-                         g.gradient + index * static_cast<std::size_t>(g.count) *
-                                          static_cast<std::size_t>(grid.features));
-      }
-      kernels_.adam(grid_step, static_cast<std::int64_t>(level.entries) * level.features,
-                    grid.table.value.data() + offset, grid.table.first.data() + offset,
-                    grid.table.second.data() + offset, grad, grid.half.data() + offset);
-    });
+    for (std::size_t index = grid.levels.size(); index-- > 0;) {
+      if (grid.level_weight[index] <= 0) continue;
+      tasks.emplace_back([this, &grid, &grid_step, gradient_of, index] {
+        const GridLevel& level = grid.levels[index];
+        const GridTable::Level table = grid.table.level(grid.levels, index);
+        for (const Block& block : blocks_) {
+          if (block.rays.samples() == 0) continue;
+          const LevelGradient g = gradient_of(block);
+          kernels_.scatter(level, table.lines, table.touched, g.position01, g.count,
+                           g.gradient + index * static_cast<std::size_t>(g.count) *
+                                            static_cast<std::size_t>(grid.features));
+        }
+        // At once, while the lines are in the cache.
+        kernels_.adam_lines(grid_step, table.words, table.touched, table.lines,
+                            grid.half.data() + level.offset);
+      });
+    }
   };
   update_grid(field_.main.grid, [](const Block& block) {
     return LevelGradient{block.rays.samples(), block.rays.position01.data(), block.grid.data()};
   });
-  const auto update = [&](Parameters& p, const std::vector<float>& grad, AdamStep step) {
-    std::copy(grad.begin(), grad.end(), p.grad.begin());
-    kernels_.adam(step, static_cast<std::int64_t>(p.size()), p.value.data(), p.first.data(),
-                  p.second.data(), p.grad.data(), nullptr);
-  };
-  update(field_.main.mlp.weights, gradients.mlp, network_step);
-  update(field_.color.weights, gradients.color, network_step);
-  field_.main.mlp.refresh();
-  field_.color.refresh();
-  for (std::size_t k = 0; with_proposals && k < field_.proposals.size(); ++k) {
-    DensityNetwork& network = field_.proposals[k];
-    update_grid(network.grid, [k](const Block& block) {
+  for (std::size_t k = 0; with_proposals && k < field_.proposals.size(); ++k)
+    update_grid(field_.proposals[k].grid, [k](const Block& block) {
       const ProposalBlock::Level& level = block.proposals.levels[k];
       return LevelGradient{block.proposals.samples(static_cast<int>(k)), level.position01.data(),
                            level.grid.data()};
     });
-    update(network.mlp.weights, gradients.proposals[k], network_step);
-    network.mlp.refresh();
-  }
+  if (!proposing()) tasks.emplace_back([this] { record_densities(); });
+  tasks.emplace_back([&] { apply_to_networks(network_step, gradients, with_proposals); });
+  parallel_tasks(tasks);
+}
+
+void Trainer::apply_to_networks(const AdamStep& network_step, const BlockGradients& gradients,
+                                bool with_proposals) {
+  const auto update = [&](Parameters& p, const std::vector<float>& grad, const AdamStep& step) {
+    std::copy(grad.begin(), grad.end(), p.grad.begin());
+    kernels_.adam(step, static_cast<std::int64_t>(p.size()), p.value.data(), p.first.data(),
+                  p.second.data(), p.grad.data());
+  };
+  const auto update_network = [&](Mlp& network, const std::vector<float>& grad) {
+    update(network.weights, grad, network_step);
+    network.refresh();
+  };
+  update_network(field_.main.mlp, gradients.mlp);
+  update_network(field_.color, gradients.color);
+  for (std::size_t k = 0; with_proposals && k < field_.proposals.size(); ++k)
+    update_network(field_.proposals[k].mlp, gradients.proposals[k]);
   if (field_.options.per_image_offset) {
     AdamStep slow = network_step;
     slow.learning_rate *= 0.1f;
@@ -300,7 +309,7 @@ void Trainer::apply(const AdamStep& grid_step, const AdamStep& network_step,
   }
 }
 
-void Trainer::update_occupancy(double progress) {
+void Trainer::record_densities() {
   for (const Block& block : blocks_) {
     const RayBlock& b = block.rays;
     for (std::size_t r = 0; r < b.rays.size(); ++r)
@@ -310,6 +319,9 @@ void Trainer::update_occupancy(double progress) {
         field_.occupancy.record(&b.position[3 * k], before * b.sigma[k]);
       }
   }
+}
+
+void Trainer::update_occupancy(double progress) {
   if (field_.step < occupancy_warmup || field_.step % occupancy_every != 0) return;
   // Relaxed late, so that nothing thin is lost once geometry has settled.
   const double threshold = field_.options.occupancy_threshold * (progress < 0.6 ? 1.0 : 0.3);

@@ -41,6 +41,9 @@ class Trainer {
   bool proposals_learn(double progress) const;
   void apply(const AdamStep& grid_step, const AdamStep& network_step,
              const BlockGradients& gradients, bool with_proposals);
+  void apply_to_networks(const AdamStep& network_step, const BlockGradients& gradients,
+                         bool with_proposals);
+  void record_densities();
   void update_occupancy(double progress);
   void probe_cells();
   void watch_poses(const Block& block, std::vector<PoseSums>& sums) const;

@@ -32,10 +32,10 @@ Status inherit_geometry(const FieldState& guide, FieldState& state) {
           fmt::format("{}, the guide field has {}", state.options.get(key), guide.options.get(key)),
           "train both fields with one architecture or set shared_geometry = false");
   state.space = guide.space;
-  state.main.grid.table.value = guide.main.grid.table.value;
+  state.main.grid.table.set_values(guide.main.grid.table.values());
   state.main.mlp.weights.value = guide.main.mlp.weights.value;
   for (std::size_t k = 0; k < state.proposals.size(); ++k) {
-    state.proposals[k].grid.table.value = guide.proposals[k].grid.table.value;
+    state.proposals[k].grid.table.set_values(guide.proposals[k].grid.table.values());
     state.proposals[k].mlp.weights.value = guide.proposals[k].mlp.weights.value;
   }
   state.occupancy.on = guide.occupancy.on;

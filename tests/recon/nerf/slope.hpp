@@ -32,6 +32,21 @@ void expect_slope(std::vector<float>& values, const std::vector<float>& gradient
   EXPECT_NEAR((side[0] - side[1]) / (2 * step), length, tolerance * length);
 }
 
+/// What scatter() adds to a grid's table for gradients [level][sample][feature], as a list.
+inline std::vector<float> table_gradient(const Kernels& kernels, const HashEncoding& grid,
+                                         const float* position01, int count,
+                                         const float* gradients) {
+  GridTable table;
+  table.resize(grid.levels);
+  for (std::size_t l = 0; l < grid.levels.size(); ++l) {
+    const GridTable::Level level = table.level(grid.levels, l);
+    kernels.scatter(
+        grid.levels[l], level.lines, level.touched, position01, count,
+        gradients + l * static_cast<std::size_t>(count) * static_cast<std::size_t>(grid.features));
+  }
+  return table.part(&GridLine::grad);
+}
+
 /// One part of a parameter set.
 struct Part {
   std::string name;

@@ -18,8 +18,8 @@ using test::toy_scene;
 constexpr float nan_value = std::numeric_limits<float>::quiet_NaN();
 
 void expect_finite(Field& field) {
-  for (const Parameters* p : field.state().parameters())
-    for (const float v : p->value) ASSERT_TRUE(std::isfinite(v));
+  for (const std::vector<float>& values : field.state().snapshot(0).values)
+    for (const float v : values) ASSERT_TRUE(std::isfinite(v));
 }
 
 Error error_of(const Dataset& data) {
@@ -79,7 +79,7 @@ TEST(Stress, ABrokenThermalViewIsDroppedWithItsNameAndDeadPixelsAreTold) {
       << report->warnings[0];
   EXPECT_EQ(report->image_offsets_k.size(), 6u);
   ASSERT_TRUE(train(good, options, {}, without));
-  EXPECT_EQ(with.state().main.grid.table.value, without.state().main.grid.table.value);
+  EXPECT_EQ(with.state().main.grid.table.values(), without.state().main.grid.table.values());
 
   data = good;
   data.views[2].image.at<float>(5, 5) = nan_value;

@@ -270,19 +270,21 @@ void double_encode(const GridLevel& level, const std::uint16_t* table, const flo
   }
 }
 
-void double_scatter(const GridLevel& level, float* grad, const float* position, int count,
-                    const float* dfeatures) {
+void double_scatter(const GridLevel& level, GridLine* lines, std::uint64_t* touched,
+                    const float* position, int count, const float* dfeatures) {
   for (int s = 0; s < count; ++s)
     for (const Corner& corner : corners_of(level, position + 3 * s))
       for (int f = 0; f < level.features; ++f) {
-        float& g = grad[corner.first + static_cast<std::size_t>(f)];
+        const std::size_t i = corner.first + static_cast<std::size_t>(f);
+        touched[i / 256] |= std::uint64_t{1} << i / 4 % 64;
+        float& g = lines[i / 4].grad[i % 4];
         g = static_cast<float>(g + corner.weight * dfeatures[s * level.features + f]);
       }
 }
 
 /// Kingma & Ba, algorithm 1, for the entries that have a gradient.
 void double_adam(const AdamStep& step, std::int64_t count, float* parameter, float* first,
-                 float* second, float* grad, std::uint16_t* half) {
+                 float* second, float* grad) {
   for (std::int64_t i = 0; i < count; ++i) {
     if (grad[i] == 0) continue;
     const double g = double{grad[i]} + double{step.weight_decay} * parameter[i];
@@ -294,8 +296,19 @@ void double_adam(const AdamStep& step, std::int64_t count, float* parameter, flo
     first[i] = static_cast<float>(m);
     second[i] = static_cast<float>(v);
     grad[i] = 0;
-    if (half) half[i] = std::bit_cast<std::uint16_t>(cv::float16_t(parameter[i]));
   }
+}
+
+void double_adam_lines(const AdamStep& step, std::int64_t words, std::uint64_t* touched,
+                       GridLine* lines, std::uint16_t* half) {
+  for (std::int64_t i = 0; i < 64 * words; ++i) {
+    if (!(touched[i / 64] >> i % 64 & 1u)) continue;
+    GridLine& line = lines[i];
+    double_adam(step, 4, line.value, line.first, line.second, line.grad);
+    for (int f = 0; f < 4; ++f)
+      half[4 * i + f] = std::bit_cast<std::uint16_t>(cv::float16_t(line.value[f]));
+  }
+  std::fill_n(touched, words, 0);
 }
 
 void double_forward(const LayerView& layer, int rows, const float* in, float* out, bool relu) {
@@ -368,6 +381,7 @@ TEST(Agreement, KernelsInFloatBfloatAndDoubleTrainWithinAFifthOfADecibel) {
   in_double.encode = double_encode;
   in_double.scatter = double_scatter;
   in_double.adam = double_adam;
+  in_double.adam_lines = double_adam_lines;
   in_double.forward = double_forward;
   in_double.backward_input = double_backward_input;
   in_double.backward_weights = double_backward_weights;
@@ -390,7 +404,7 @@ TEST(Agreement, ManyThreadsGiveWhatOneGives) {
     ASSERT_TRUE(train(data, toy_options(Modality::thermal, 60), {}, fields[k]));
   }
   set_thread_count(0);
-  EXPECT_EQ(fields[0].state().main.grid.table.value, fields[1].state().main.grid.table.value);
+  EXPECT_EQ(fields[0].state().main.grid.table.values(), fields[1].state().main.grid.table.values());
 }
 
 TEST(Agreement, WithoutHeldOutViewsTheLastStepIsKept) {
@@ -429,23 +443,24 @@ TEST(Agreement, GridParametersStayWithinHalfPrecision) {
     if (isa > best_isa()) continue;
     HashEncoding grid;
     grid.create(1, 4, 8, 4, 4, 1);
-    const auto count = static_cast<std::int64_t>(grid.table.size());
+    const GridTable::Level table = grid.table.level(grid.levels, 0);
     AdamStep step;
     step.learning_rate = 1e9f;
     // A step past the range of half precision, then gradients whose squares are infinite, and NaN.
     for (const float gradient :
          {1.0f, 1e30f, std::numeric_limits<float>::infinity(), std::nanf("")}) {
       for (std::size_t i = 0; i < grid.table.size(); ++i)
-        grid.table.grad[i] = i % 2 ? gradient : -gradient;
-      kernels_for(isa).adam(step, count, grid.table.value.data(), grid.table.first.data(),
-                            grid.table.second.data(), grid.table.grad.data(), grid.half.data());
+        table.lines[i / 4].grad[i % 4] = i % 2 ? gradient : -gradient;
+      for (std::size_t i = 0; i < grid.table.size() / 4; ++i)
+        table.touched[i / 64] |= std::uint64_t{1} << i % 64;
+      kernels_for(isa).adam_lines(step, table.words, table.touched, table.lines, grid.half.data());
       if (gradient == 1.0f) {
-        EXPECT_EQ(std::abs(grid.table.value[0]), max_half)
+        EXPECT_EQ(std::abs(grid.table.value(0)), max_half)
             << "the step was to pass it, " << name(isa);
       }
     }
     for (std::size_t i = 0; i < grid.table.size(); ++i) {
-      EXPECT_LE(std::abs(grid.table.value[i]), max_half) << name(isa);
+      EXPECT_LE(std::abs(grid.table.value(i)), max_half) << name(isa);
       EXPECT_LT(grid.half[i] & 0x7fff, 0x7c00) << "infinite half, " << name(isa);
     }
   }

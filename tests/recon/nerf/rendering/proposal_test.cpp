@@ -149,7 +149,7 @@ TEST(Proposals, GradientOfEachNetworkMatchesDifferencesAlongAnyDirection) {
   field.create(proposing(Modality::visible, 1), Modality::visible, 1);
   for (DensityNetwork* network : field.density_networks())
     for (std::size_t i = 0; i < network->grid.table.size(); ++i)  // exact in half precision
-      network->grid.table.value[i] = std::round((random_uniform(8, 1, i) - 0.5f) * 256) / 256;
+      network->grid.table.value(i) = std::round((random_uniform(8, 1, i) - 0.5f) * 256) / 256;
   field.refresh();
   const Kernels& kernels = kernels_for(Isa::avx2);
   std::vector<DrawnRay> rays;
@@ -182,15 +182,15 @@ TEST(Proposals, GradientOfEachNetworkMatchesDifferencesAlongAnyDirection) {
     test::expect_random_slopes(network.mlp.weights.value, gradient[k], test::layers_of(network.mlp),
                                1e-4f, 0.06, moved);
     HashEncoding& grid = network.grid;
-    std::vector<float> table(grid.table.size());
-    const auto count = static_cast<std::size_t>(asked.samples(static_cast<int>(k)));
-    for (std::size_t l = 0; l < grid.levels.size(); ++l)
-      kernels.scatter(
-          grid.levels[l], table.data() + grid.levels[l].offset, asked.levels[k].position01.data(),
-          static_cast<int>(count),
-          asked.levels[k].grid.data() + l * count * static_cast<std::size_t>(grid.features));
-    test::expect_random_slopes(grid.table.value, table, test::levels_of(grid), 1.0f / 2048, 0.06,
-                               moved);
+    const std::vector<float> of_table =
+        test::table_gradient(kernels, grid, asked.levels[k].position01.data(),
+                             asked.samples(static_cast<int>(k)), asked.levels[k].grid.data());
+    std::vector<float> values = grid.table.values();
+    test::expect_random_slopes(values, of_table, test::levels_of(grid), 1.0f / 2048, 0.06, [&] {
+      grid.table.set_values(values);
+      return moved();
+    });
+    grid.table.set_values(values);
   }
 }
 
@@ -209,8 +209,7 @@ TEST(Proposals, LearnTheToySceneAndRepeatForAnyThreads) {
     EXPECT_GT(report->best_psnr, 17);
   }
   set_thread_count(0);
-  const auto left = fields[0].state().parameters(), right = fields[1].state().parameters();
-  for (std::size_t i = 0; i < left.size(); ++i) EXPECT_EQ(left[i]->value, right[i]->value) << i;
+  EXPECT_EQ(fields[0].state().snapshot(0).values, fields[1].state().snapshot(0).values);
 }
 
 }  // namespace

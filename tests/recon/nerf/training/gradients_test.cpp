@@ -104,7 +104,7 @@ class FieldGradient : public ::testing::TestWithParam<Modality> {
     field_.create(options, GetParam(), 3);
     // In steps of 2^-8, so that these and what the tests add are exact in half precision.
     for (std::size_t i = 0; i < field_.main.grid.table.size(); ++i)
-      field_.main.grid.table.value[i] = std::round((random_uniform(8, 1, i) - 0.5f) * 256) / 256;
+      field_.main.grid.table.value(i) = std::round((random_uniform(8, 1, i) - 0.5f) * 256) / 256;
     field_.main.grid.level_weight[2] = 0.5f;  // coming in, coarse to fine
     field_.refresh();
     for (int r = 0; r < 12; ++r) {
@@ -156,14 +156,8 @@ class FieldGradient : public ::testing::TestWithParam<Modality> {
   }
 
   std::vector<float> table_gradient() const {
-    const HashEncoding& grid = field_.main.grid;
-    const int n = block_.samples();
-    std::vector<float> table(grid.table.size());
-    for (std::size_t l = 0; l < grid.levels.size(); ++l)
-      kernels_.scatter(grid.levels[l], table.data() + grid.levels[l].offset,
-                       block_.position01.data(), n,
-                       grid_.data() + l * static_cast<std::size_t>(n * grid.features));
-    return table;
+    return test::table_gradient(kernels_, field_.main.grid, block_.position01.data(),
+                                block_.samples(), grid_.data());
   }
 
   double moved_loss() {
@@ -200,8 +194,11 @@ TEST_P(FieldGradient, OfTheHashTableMatchesDifferences) {
   BlockGradients gradients;
   loss(gradients);
   // The table is read in half precision, so the step must be large against 2^-11.
-  test::expect_slope(field_.main.grid.table.value, table_gradient(), 0.05, 0.03,
-                     [&] { return moved_loss(); });
+  std::vector<float> values = field_.main.grid.table.values();
+  test::expect_slope(values, table_gradient(), 0.05, 0.03, [&] {
+    field_.main.grid.table.set_values(values);
+    return moved_loss();
+  });
 }
 
 TEST_P(FieldGradient, OfEachPartAloneMatchesDifferencesAlongAnyDirection) {
@@ -219,7 +216,14 @@ TEST_P(FieldGradient, OfEachPartAloneMatchesDifferencesAlongAnyDirection) {
     {
       SCOPED_TRACE("table");
       HashEncoding& grid = field_.main.grid;
-      check_parts(grid.table.value, table_gradient(), test::levels_of(grid), 1.0f / 2048);
+      std::vector<float> values = grid.table.values();
+      test::expect_random_slopes(values, table_gradient(), test::levels_of(grid), 1.0f / 2048, 0.06,
+                                 [&] {
+                                   grid.table.set_values(values);
+                                   return moved_loss();
+                                 });
+      grid.table.set_values(values);
+      field_.refresh();
     }
     {
       SCOPED_TRACE("density network");

@@ -101,11 +101,7 @@ TEST(Extension, GoesOnFromTheFinishedRunInTheLongerSchedule) {
 TEST(Extension, ByNothingChangesNothingAndAWorseEndKeepsTheField) {
   Finished run;
   const auto same = [&](Field& other) {
-    const auto left = run.field.state().parameters(), right = other.state().parameters();
-    bool equal = true;
-    for (std::size_t i = 0; i < left.size(); ++i)
-      equal = equal && left[i]->value == right[i]->value;
-    return equal;
+    return run.field.state().snapshot(0).values == other.state().snapshot(0).values;
   };
   Field none, worse;
   const auto idle = train(run.data, run.options, {}, none);
@@ -185,13 +181,15 @@ TEST(Resume, EveryOptionIsEitherComparedOrFreeToChange) {
     // compared.
     FieldState shaped;
     shaped.create(other, state.modality, 6);
-    const auto left = state.parameters(), right = shaped.parameters();
-    bool equal = left.size() == right.size() &&
+    const auto sizes = [](FieldState& of) {
+      std::vector<std::size_t> list;
+      of.each_set([&](const auto& set) { list.push_back(set.size()); });
+      return list;
+    };
+    bool equal = sizes(state) == sizes(shaped) &&
                  state.occupancy.resolution == shaped.occupancy.resolution &&
                  heldout_views(run.data, other.holdout_every) ==
                      heldout_views(run.data, run.options.holdout_every);
-    for (std::size_t i = 0; equal && i < left.size(); ++i)
-      equal = left[i]->size() == right[i]->size();
     for (std::size_t l = 0; equal && l < state.main.grid.levels.size(); ++l)
       equal = state.main.grid.levels[l].resolution == shaped.main.grid.levels[l].resolution;
     if (!equal) {
@@ -206,8 +204,8 @@ TEST(Resume, EveryOptionIsEitherComparedOrFreeToChange) {
     Field field;
     const auto report = train(run.data, on, {}, field);
     ASSERT_TRUE(report) << report.error().message();
-    for (const Parameters* p : field.state().parameters())
-      EXPECT_TRUE(all_finite(p->value.data(), p->size()));
+    for (const std::vector<float>& values : field.state().snapshot(0).values)
+      EXPECT_TRUE(all_finite(values.data(), values.size()));
   }
 }
 

@@ -15,10 +15,10 @@ using test::toy_options;
 using test::toy_scene;
 
 void expect_same_parameters(Field& a, Field& b) {
-  const auto left = a.state().parameters(), right = b.state().parameters();
-  ASSERT_EQ(left.size(), right.size());
-  for (std::size_t i = 0; i < left.size(); ++i)
-    EXPECT_EQ(left[i]->value, right[i]->value) << "set " << i;
+  const Snapshot left = a.state().snapshot(0), right = b.state().snapshot(0);
+  ASSERT_EQ(left.values.size(), right.values.size());
+  for (std::size_t i = 0; i < left.values.size(); ++i)
+    EXPECT_EQ(left.values[i], right.values[i]) << "set " << i;
   EXPECT_EQ(a.state().occupancy.on, b.state().occupancy.on);
 }
 
@@ -111,7 +111,8 @@ TEST(Training, AViewThatOnlyMeasuresChangesNothing) {
         ASSERT_TRUE(report) << report.error().message();
         EXPECT_EQ(report->heldout.size(), 3u);
         const FieldState &a = without.state(), &b = with.state();
-        EXPECT_EQ(a.main.grid.table.value, b.main.grid.table.value) << name(modality) << first;
+        EXPECT_EQ(a.main.grid.table.values(), b.main.grid.table.values())
+            << name(modality) << first;
         EXPECT_EQ(a.main.mlp.weights.value, b.main.mlp.weights.value);
         EXPECT_EQ(a.color.weights.value, b.color.weights.value);
         EXPECT_EQ(a.occupancy.on, b.occupancy.on);
@@ -229,8 +230,11 @@ TEST(Training, ARestoredStepRendersAsItDidThen) {
   const cv::Mat then = picture();
   const Snapshot kept = state.snapshot(20);
   // What later steps change: parameters, which cells are on, where samples go, levels.
-  for (Parameters* p : state.parameters())
-    for (float& value : p->value) value *= 0.5f;
+  state.each_set([](auto& set) {
+    std::vector<float> values = set.values();
+    for (float& value : values) value *= 0.5f;
+    set.set_values(values);
+  });
   for (float& density : state.occupancy.density) density = 1;
   std::fill(state.occupancy.on.begin(), state.occupancy.on.end(), ~std::uint64_t{0});
   std::fill(state.main.grid.level_weight.begin(), state.main.grid.level_weight.end(), 1.0f);
