@@ -71,7 +71,7 @@ struct RenderOptions {
   /// Rays spread their samples over the way to a little behind what their neighbours met, and go on
   /// to the end only if nothing stopped them: finer samples, a third less time.
   bool look_ahead = true;
-  /// For pictures that are waited for: of nine pixels in sixteen, those whose four neighbours
+  /// For pictures that are waited for: of thirteen pixels in sixteen, those whose four neighbours
   /// differ by no more than this share of the value range, and lie on one surface, are their mean
   /// instead of being rendered. 0 = all are rendered.
   double alike = 0;
@@ -96,6 +96,8 @@ struct ExportOptions {
   double depth_tolerance = 0.01;  ///< relative agreement
   double max_distance = 3.0;      ///< from the field's centre, in field radii; sheds background
   double voxel = 0.004;           ///< one point per cube of this size, in field radii; 0 = all
+  /// RenderOptions::alike of the depth maps: between pixels of one surface there is nothing to see.
+  double alike = 0.02;
   Status validate() const;
 };
 

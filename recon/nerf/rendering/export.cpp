@@ -102,6 +102,7 @@ Status ExportOptions::validate() const {
   ORBITFUSE_TRY(check("min_consistent_views", min_consistent_views, at_least(0)));
   ORBITFUSE_TRY(check("depth_tolerance", depth_tolerance, between(0, 1)));
   ORBITFUSE_TRY(check("max_distance", max_distance, above(0)));
+  ORBITFUSE_TRY(check("alike", alike, from_to(0, 0.5)));
   return check("voxel", voxel, at_least(0));
 }
 
@@ -121,7 +122,8 @@ Result<PointCloud> export_point_cloud(const Field& field, const std::vector<Pose
     DepthView out;
     out.view = view;
     out.view.camera = view.camera.scaled_to(width, height).without_distortion();
-    ORBITFUSE_ASSIGN(out.image, render(field, out.view.camera, view.cam_from_world, {}, progress));
+    ORBITFUSE_ASSIGN(out.image, render(field, out.view.camera, view.cam_from_world,
+                                       {.alike = options.alike}, progress));
     rendered.push_back(std::move(out));
     progress.report({"export",
                      static_cast<double>(rendered.size()),

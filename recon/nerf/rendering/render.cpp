@@ -130,39 +130,31 @@ class ImageRenderer {
     return view;
   }
 
-  /// Every other pixel, and of the rest those whose neighbours aren't alike; these are their mean.
-  /// So are the pixels that look ahead for the others: what they saw was sampled too thinly.
+  /// A quarter of the pixels, and of the rest, in two rounds, those whose neighbours aren't alike;
+  /// these are their mean. So are the pixels that look ahead for the others: what they saw was
+  /// sampled too thinly.
   RenderedView sparse_image(double alike) {
     RenderedView view = empty_view();
     cv::Mat far(height_, width_, CV_32FC1, cv::Scalar(no_limit)), ends = far.clone();
-    const auto inside = [&](int x, int y) {
-      return x > 0 && y > 0 && x + 1 < width_ && y + 1 < height_;
-    };
-    std::vector<int> ahead, every_other, unlike;
-    for (int y = 0; y < height_; ++y)
-      for (int x = 0; x < width_; ++x) {
-        const bool looks = x % limit_stride == 0 && y % limit_stride == 0;
-        if (looks) ahead.push_back(y * width_ + x);
-        if (!inside(x, y) || (!looks && (x + y) % 2 == 0)) every_other.push_back(y * width_ + x);
-      }
-    render(ahead, far, view, &ends);
-    cv::Mat coarse((height_ + limit_stride - 1) / limit_stride,
-                   (width_ + limit_stride - 1) / limit_stride, CV_32FC1);
-    for (int y = 0; y < coarse.rows; ++y)
-      for (int x = 0; x < coarse.cols; ++x)
-        coarse.at<float>(y, x) = ends.at<float>(y * limit_stride, x * limit_stride);
-    far = limits_from(coarse, far.size());
-    render(every_other, far, view);
+    const auto looks = [](int x, int y) { return x % limit_stride == 0 && y % limit_stride == 0; };
+    const auto even = [](int x, int y) { return x % 2 == 0 && y % 2 == 0; };
+    render(pixels_where(looks), far, view, &ends);
+    far = limits_from(every_fourth(ends), far.size());
+    render(pixels_where([&](int x, int y) {
+             return !inside(x, y, 1) || (even(x, y) && (!looks(x, y) || !inside(x, y, 2)));
+           }),
+           far, view);
     const auto most = static_cast<float>(alike);
-    for (const int p : ahead)
-      if (inside(p % width_, p / width_) && !from_neighbours(view, p, diagonal, most))
-        unlike.push_back(p);
-    render(unlike, far, view);
-    unlike.clear();
-    for (int y = 1; y + 1 < height_; ++y)
-      for (int x = 1 + y % 2; x + 1 < width_; x += 2)
-        if (!from_neighbours(view, y * width_ + x, beside, most)) unlike.push_back(y * width_ + x);
-    render(unlike, far, view);
+    const auto complete = [&](const Neighbours& neighbours, int margin, const auto& chosen) {
+      std::vector<int> unlike;
+      for (const int p :
+           pixels_where([&](int x, int y) { return inside(x, y, margin) && chosen(x, y); }))
+        if (!from_neighbours(view, p, neighbours, most)) unlike.push_back(p);
+      render(unlike, far, view);
+    };
+    complete(beside_by_two, 2, looks);
+    complete(diagonal, 1, [](int x, int y) { return x % 2 == 1 && y % 2 == 1; });
+    complete(beside, 1, [](int x, int y) { return (x + y) % 2 == 1; });
     return view;
   }
 
@@ -206,9 +198,30 @@ class ImageRenderer {
     });
   }
 
+  bool inside(int x, int y, int margin) const {
+    return x >= margin && y >= margin && x + margin < width_ && y + margin < height_;
+  }
+  template <typename Chosen>
+  std::vector<int> pixels_where(const Chosen& chosen) const {
+    std::vector<int> pixels;
+    for (int y = 0; y < height_; ++y)
+      for (int x = 0; x < width_; ++x)
+        if (chosen(x, y)) pixels.push_back(y * width_ + x);
+    return pixels;
+  }
+  static cv::Mat every_fourth(const cv::Mat& ends) {
+    cv::Mat coarse((ends.rows + limit_stride - 1) / limit_stride,
+                   (ends.cols + limit_stride - 1) / limit_stride, CV_32FC1);
+    for (int y = 0; y < coarse.rows; ++y)
+      for (int x = 0; x < coarse.cols; ++x)
+        coarse.at<float>(y, x) = ends.at<float>(y * limit_stride, x * limit_stride);
+    return coarse;
+  }
+
   using Neighbours = std::array<std::array<int, 2>, 4>;
   static constexpr Neighbours beside = {{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}},
-                              diagonal = {{{-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
+                              diagonal = {{{-1, -1}, {1, -1}, {-1, 1}, {1, 1}}},
+                              beside_by_two = {{{-2, 0}, {2, 0}, {0, -2}, {0, 2}}};
 
   /// The mean of the four neighbours, where nothing tells that there is more to be seen.
   bool from_neighbours(RenderedView& view, int pixel, const Neighbours& of, float alike) const {
