@@ -90,7 +90,8 @@ double carve(bool dense_depth, const std::vector<NormalisedView>& views,
   });
   for (std::int64_t cell = 0; cell < occupancy.cell_count(); ++cell) {
     int i[3];
-    const std::int64_t slab = occupancy.coordinates_of(cell, i) * half + i[2] / 2;
+    const int cascade = occupancy.coordinates_of(cell, i);  // before i is read
+    const std::int64_t slab = std::int64_t{cascade} * half + i[2] / 2;
     if (off[static_cast<std::size_t>((slab * half + i[1] / 2) * half + i[0] / 2)])
       Occupancy::put(occupancy.allowed, cell, false);
   }
