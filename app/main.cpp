@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <functional>
 #include <iostream>
 #include <optional>
 #include <vector>
@@ -15,9 +16,11 @@
 #include "app/cli/run_stages.hpp"
 #include "app/terminal/exit_code.hpp"
 #include "app/terminal/interrupt.hpp"
+#include "core/system/file_io.hpp"
 #include "core/system/isa_wish.hpp"
 #include "core/system/memory.hpp"
 #include "core/system/parallel.hpp"
+#include "core/system/trace.hpp"
 
 // The only place that turns errors into exit codes (docs/cli.md).
 namespace orbitfuse {
@@ -94,6 +97,21 @@ Status check_no_empty_values(const CLI::App& verb) {
   return {};
 }
 
+/// The action, its spans kept if a file was named for them. That the file can be written is seen
+/// before the hours it is to tell of.
+Status traced(const std::string& file, const char* verb, const std::function<Status()>& action) {
+  if (file.empty()) return action();
+  start_trace();
+  ORBITFUSE_TRY(write_file_atomic(file, trace_json()));
+  Status status;
+  {
+    const TraceSpan span(verb);
+    status = action();
+  }
+  const Status written = write_file_atomic(file, trace_json());
+  return status ? written : status;
+}
+
 /// "help [VERB]" means "[VERB] --help".
 std::vector<const char*> words_of(int argc, char** argv) {
   std::vector<const char*> words(argv, argv + argc);
@@ -148,7 +166,7 @@ int run(const std::vector<const char*>& words) {
     console.data(config.settings().to_toml());
     context.result = {{"config", config.settings().to_json()}};
   } else if (status) {
-    status = action(context);
+    status = traced(line.common.trace_file, verb->name, [&] { return action(context); });
   }
   return finish(verb->name, console, status, std::move(context.result));
 }

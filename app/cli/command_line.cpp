@@ -49,6 +49,10 @@ void add_common(CLI::App& app, CommonOptions& common) {
       ->check(CLI::IsMember({"cpu", "cuda"}))
       ->capture_default_str()
       ->group(group);
+  app.add_option("--trace", common.trace_file,
+                 "Write where the time goes, in Chrome's trace format (chrome://tracing, Perfetto)")
+      ->type_name("FILE")
+      ->group(group);
   app.add_flag("--force", common.force, "Run again although nothing changed")->group(group);
   app.add_flag("--resume", common.resume, "Go on where an interrupted run stopped")->group(group);
   app.add_flag("--dry-run", common.dry_run, "Say what would be done, write nothing")->group(group);

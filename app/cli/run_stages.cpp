@@ -4,9 +4,12 @@
 #include <fmt/format.h>
 
 #include "app/pipeline/runner.hpp"
+#include "app/planning/machine_speed.hpp"
+#include "app/planning/run_planner.hpp"
 #include "app/stages/build_stages.hpp"
 #include "core/modality.hpp"
 #include "core/nested_text.hpp"
+#include "core/system/clock.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse::cli {
@@ -149,8 +152,40 @@ Status resolve(StageFolders& folders) {
   return {};
 }
 
+namespace {
+
+/// Says the plan before the first stage; a budget that can't be held is a warning.
+Result<std::unique_ptr<planning::RunPlanner>> start_planner(Context& context,
+                                                            const stages::SessionInput& input,
+                                                            const pipeline::RunOptions& options,
+                                                            double budget_s, double start_s) {
+  planning::PlannerInput planned;
+  planned.budget_s = budget_s;
+  ORBITFUSE_ASSIGN(planned.facts, planning::look_at(input, context.config));
+  planned.stages = pipeline::closure(stages::build_stages(input, context.config), options.targets);
+  planned.slowness = planning::measured_slowness();
+  for (const auto& [modality, content] : input.content) planned.session_content += content + " ";
+  planned.spent_s = wall_seconds() - start_s;
+  auto planner = std::make_unique<planning::RunPlanner>(std::move(planned), options.out,
+                                                        context.config, context.common.force);
+  context.console.info(fmt::format("plan for {:.0f} s: {}", budget_s, planner->described()));
+  if (!planner->first().fits)
+    context.console.warning(fmt::format(
+        "--budget: {:.0f} s are too few for this session on this machine; with the least of "
+        "everything it takes about {:.0f} s, and that is done",
+        budget_s, planner->first().expected_s));
+  else if (!planner->first().all_used)
+    context.console.info(
+        fmt::format("more than {:.0f} s would bring nothing that was ever measured",
+                    planner->first().expected_s));
+  return planner;
+}
+
+}  // namespace
+
 Status run_stages(Context& context, const StageFolders& given,
-                  const std::vector<std::string>& targets, Missing missing) {
+                  const std::vector<std::string>& targets, Missing missing, RunBudget budget_s) {
+  const double start_s = wall_seconds();
   StageFolders folders = given;
   ORBITFUSE_TRY(resolve(folders));
   ORBITFUSE_ASSIGN(stages::SessionInput input,
@@ -173,7 +208,23 @@ Status run_stages(Context& context, const StageFolders& given,
                                      .resume = context.common.resume,
                                      .dry_run = context.common.dry_run,
                                      .targets_only = missing == Missing::leave_out};
+  std::unique_ptr<planning::RunPlanner> planner;
+  if (budget_s) {
+    ORBITFUSE_ASSIGN(planner, start_planner(context, input, options, *budget_s, start_s));
+  }
+  if (!budget_s && targets.empty() && !options.dry_run) {
+    std::error_code ignored;  // a plan of an earlier run tells nothing of this one
+    fs::remove(fs::path(folders.out) / planning::plan_file, ignored);
+  }
   pipeline::Runner runner(stages::build_stages(input, context.config), options, context.progress);
+  if (planner)
+    runner.before_stage = [&](pipeline::Stage& stage, const std::vector<StageStatus>& finished) {
+      planner->decide(stage.name, finished);
+      for (pipeline::Stage& now : stages::build_stages(input, context.config))
+        if (now.name == stage.name) stage = now;
+      // The report tells of the plan. A disk that can't be written to stops the stage itself.
+      if (!options.dry_run) (void)planner->save(finished);
+    };
   runner.on_status = [&](const StageStatus& status) {
     announce(context.console, status, options.dry_run);
     json event = status_json(status);
@@ -181,10 +232,14 @@ Status run_stages(Context& context, const StageFolders& given,
     context.console.event(event);
   };
   const pipeline::RunSummary summary = runner.run();
+  if (planner) {
+    context.result["budget_s"] = *budget_s;
+    if (!options.dry_run) ORBITFUSE_TRY(planner->save(summary.stages));
+  }
 
   json list = json::array();
   for (const StageStatus& status : summary.stages) list.push_back(status_json(status));
-  context.result = {{"session", folders.session}, {"out", folders.out}, {"stages", list}};
+  context.result.update({{"session", folders.session}, {"out", folders.out}, {"stages", list}});
   if (!context.common.dry_run && !summary.stages.empty()) {
     json run = {{"schema", 1},
                 {"session", session},

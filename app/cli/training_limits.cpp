@@ -18,6 +18,10 @@ void add_limits(CLI::App& app, TrainingLimits& limits) {
          "--budget", limits.budget,
          "Time to train each field, e.g. 60s, 2m, 1m30s; replaces the recipe's number of steps")
       ->type_name("DURATION");
+  add_target(app, limits);
+}
+
+void add_target(CLI::App& app, TrainingLimits& limits) {
   app.add_option("--target-psnr", limits.target_psnr,
                  "Stop training when the held-out views reach it, in dB")
       ->check(CLI::Range(1.0, 100.0))

@@ -16,6 +16,8 @@ struct TrainingLimits {
 };
 
 void add_limits(CLI::App& app, TrainingLimits& limits);
+/// The error alone, of a verb whose time is planned.
+void add_target(CLI::App& app, TrainingLimits& limits);
 
 /// Puts the limits into the recipes of the fields named ("visible", "thermal").
 Status apply(const TrainingLimits& limits, const std::vector<Modality>& fields,

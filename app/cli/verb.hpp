@@ -24,6 +24,7 @@ struct CommonOptions {
   int threads = 0;
   std::uint64_t seed = 1;
   std::string device = "cpu";
+  std::string trace_file;  ///< empty: no trace
   bool force = false, resume = false, dry_run = false;
 };
 

@@ -40,10 +40,9 @@ std::string facts(const ComparedRuns& runs) {
                               : ""));
   html += row("Difference of the days", ambient_words(runs));
   html += row("Scale",
-              runs.scale
-                  ? fmt::format("1 unit is {:.4f} m ± {:.1f} % ({})", runs.scale->metres_per_unit,
-                                165 * runs.scale->relative_uncertainty, runs.scale->source)
-                  : "no scale is known");
+              runs.scale ? fmt::format("1 unit is {:.4f} m ± {} ({})", runs.scale->metres_per_unit,
+                                       stages::uncertainty_words(*runs.scale), runs.scale->source)
+                         : "no scale is known");
   const SurfaceShares& s = runs.shares;
   html +=
       row("Surface after", fmt::format("{:.1f} % compared, {:.1f} % changed geometry, {:.1f} % not "

@@ -17,7 +17,7 @@ json json_of(const Eigen::Matrix4d& m) {
 
 std::string ExportFrame::words() const {
   if (!scale) return "no scale is known: lengths are in the run's own unit";
-  return fmt::format("metres, +- {:.1f} % ({})", 100 * scale->relative_uncertainty, scale->source);
+  return fmt::format("metres, +- {} ({})", stages::uncertainty_words(*scale), scale->source);
 }
 
 Result<ExportFrame> export_frame(const Eigen::Vector3d& up,

@@ -272,9 +272,9 @@ std::string words_of_scale(const view::FinishedRun& run) {
   if (!scale || !*scale)
     return "Lengths are in the unit of the run; it knows no scale in metres and no north.";
   return fmt::format(
-      "Lengths in metres rest on {}: 1 unit of the run is {:.4f} m, +- {:.1f} % (one standard "
-      "deviation). No north is known.",
-      (*scale)->source, (*scale)->metres_per_unit, 100 * (*scale)->relative_uncertainty);
+      "Lengths in metres rest on {}: 1 unit of the run is {:.4f} m, +- {}. No north is "
+      "known.",
+      (*scale)->source, (*scale)->metres_per_unit, stages::uncertainty_words(**scale));
 }
 
 }  // namespace

@@ -7,11 +7,13 @@
 #include <chrono>
 #include <cstdio>
 #include <ctime>
+#include <set>
 
 #include "app/pipeline/folder_lock.hpp"
 #include "core/nested_text.hpp"
 #include "core/system/clock.hpp"
 #include "core/system/file_io.hpp"
+#include "core/system/trace.hpp"
 
 namespace orbitfuse::pipeline {
 namespace fs = std::filesystem;
@@ -114,15 +116,25 @@ const StageStatus* RunSummary::find(const std::string& stage) const {
   return it == stages.end() ? nullptr : &*it;
 }
 
-Runner::Runner(std::vector<Stage> stages, RunOptions options, Progress progress)
-    : stages_(std::move(stages)), options_(std::move(options)), progress_(std::move(progress)) {
-  for (auto it = stages_.rbegin(); it != stages_.rend(); ++it) {
-    if (!is_target(it->name) && !wanted(it->name)) continue;
-    closure_.push_back(it->name);
-    closure_.insert(closure_.end(), it->needs.begin(), it->needs.end());
-    closure_.insert(closure_.end(), it->uses.begin(), it->uses.end());
+std::vector<std::string> closure(const std::vector<Stage>& stages,
+                                 const std::vector<std::string>& targets) {
+  std::set<std::string> read;
+  std::vector<std::string> names;
+  for (auto it = stages.rbegin(); it != stages.rend(); ++it) {
+    const bool target = targets.empty() || std::count(targets.begin(), targets.end(), it->name) > 0;
+    if (!target && read.count(it->name) == 0) continue;
+    names.insert(names.begin(), it->name);
+    read.insert(it->needs.begin(), it->needs.end());
+    read.insert(it->uses.begin(), it->uses.end());
   }
+  return names;
 }
+
+Runner::Runner(std::vector<Stage> stages, RunOptions options, Progress progress)
+    : stages_(std::move(stages)),
+      options_(std::move(options)),
+      progress_(std::move(progress)),
+      closure_(closure(stages_, options_.targets)) {}
 
 bool Runner::is_target(const std::string& stage) const {
   return options_.targets.empty() || std::find(options_.targets.begin(), options_.targets.end(),
@@ -276,6 +288,7 @@ StageStatus Runner::execute(const Stage& stage, const Key& key, std::string why)
   const bool resume = options_.resume && attempt.key == key.hash && fs::exists(folder);
   if (!resume) attempt = {key.hash, 0, 0};
 
+  const TraceSpan span(stage.name);
   const UsageClock clock;
   const auto work = [&]() -> Result<StageOutput> {
     ORBITFUSE_TRY(progress_.check(stage.name));
@@ -345,8 +358,9 @@ RunSummary Runner::run() {
       return summary;
     }
   }
-  for (const Stage& stage : stages_) {
+  for (Stage& stage : stages_) {
     if (!wanted(stage.name)) continue;
+    before_stage(stage, statuses_);
     statuses_.push_back(visit(stage));
     const StageStatus& status = statuses_.back();
     on_status(status);

@@ -38,6 +38,9 @@ class Runner {
 
   /// Called when a stage starts (state planned) and when its state is known.
   std::function<void(const StageStatus&)> on_status = [](const StageStatus&) {};
+  /// May settle a stage's options anew just before it is looked at, by how the others fared.
+  std::function<void(Stage&, const std::vector<StageStatus>&)> before_stage =
+      [](Stage&, const std::vector<StageStatus>&) {};
   RunSummary run();
 
  private:
@@ -63,6 +66,10 @@ class Runner {
   std::vector<StageStatus> statuses_;
   std::map<std::string, std::string> outputs_;  ///< done stage -> outputs hash
 };
+
+/// The targets (empty: all) and all they read, in order.
+std::vector<std::string> closure(const std::vector<Stage>& stages,
+                                 const std::vector<std::string>& targets);
 
 /// Version string stored with every result.
 std::string software_version();

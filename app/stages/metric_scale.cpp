@@ -80,4 +80,10 @@ Result<std::optional<MetricScale>> load_metric_scale(const fs::path& out,
   return scale;
 }
 
+std::string uncertainty_words(const MetricScale& scale) {
+  constexpr double of_90_percent = 1.645;  // standard deviations
+  return fmt::format("{:.1f} % in 90 of 100 cases",
+                     100 * of_90_percent * scale.relative_uncertainty);
+}
+
 }  // namespace orbitfuse::stages

@@ -35,4 +35,7 @@ Result<std::string> world_identity(const std::filesystem::path& out);
 
 nlohmann::json to_json(const MetricScale& scale);
 
+/// "1.6 % in 90 of 100 cases": what every place says that tells a person of the uncertainty.
+std::string uncertainty_words(const MetricScale& scale);
+
 }  // namespace orbitfuse::stages

@@ -21,9 +21,23 @@ using nlohmann::json;
 using pipeline::StageContext;
 using pipeline::StageOutput;
 
+/// Mean absolute difference where both images have a value.
+struct MeanError {
+  double sum = 0;
+  int count = 0;
+  void add(const cv::Mat& truth, const cv::Mat& rendered) {
+    cv::Mat difference;
+    cv::absdiff(truth, rendered, difference);
+    const cv::Mat valid = difference == difference;
+    sum += cv::sum(cv::Mat(difference.mul(1)).setTo(0, ~valid))[0];
+    count += cv::countNonZero(valid);
+  }
+};
+
 /// Rendered against recorded, on views that did not train (seed paper, Table 4).
 Status score_field(const StageContext& context, const SessionInput& input,
-                   const TrainConfig& config, Modality modality, MetricMeans& means) {
+                   const TrainConfig& config, Modality modality, MetricMeans& means,
+                   MeanError& thermal_k) {
   const std::string train = "train_" + std::string(name(modality));
   if (!context.has(train)) return {};
   const json* trained = context.metrics_of(train);
@@ -52,6 +66,7 @@ Status score_field(const StageContext& context, const SessionInput& input,
       truth.convertTo(truth, CV_8U, 255);
       rendered.convertTo(rendered, CV_8U, 255);
     } else {
+      if (input.has_temperatures()) thermal_k.add(truth, rendered);
       const TemperatureSpan span = common_span({truth}, 0, 100);
       truth = gray_of_kelvin(truth, span);
       rendered = gray_of_kelvin(rendered, span);
@@ -63,19 +78,19 @@ Status score_field(const StageContext& context, const SessionInput& input,
 }
 
 /// Every fused view (Table 7).
-Status score_fused(const StageContext& context, MetricMeans& means) {
+Result<std::size_t> score_fused(const StageContext& context, int scored_views, MetricMeans& means) {
   const json* fused = context.metrics_of("fuse");
-  if (!fused || !context.has("render")) return {};
+  if (!fused || !context.has("render")) return 0;
   const auto methods = fused->value("methods", std::vector<std::string>());
   ORBITFUSE_ASSIGN(const RenderedViews rendered, load_rendered_views(context.of("render")));
-  for (std::size_t i = 0; i < rendered.views.size(); ++i) {
-    const ViewFiles& files = rendered.views[i];
+  const std::size_t all = rendered.views.size();
+  const std::size_t scored =
+      scored_views > 0 ? std::min(all, static_cast<std::size_t>(scored_views)) : all;
+  for (std::size_t i = 0; i < scored; ++i) {
+    const ViewFiles& files = rendered.views[i * all / scored];
     ORBITFUSE_TRY(context.progress.check("metrics"));
-    context.progress.report({"metrics",
-                             static_cast<double>(i),
-                             static_cast<double>(rendered.views.size()),
-                             {},
-                             files.name});
+    context.progress.report(
+        {"metrics", static_cast<double>(i), static_cast<double>(scored), {}, files.name});
     ORBITFUSE_ASSIGN(const cv::Mat visible, read_image(context.of("render") / files.visible));
     ORBITFUSE_ASSIGN(const cv::Mat thermal,
                      read_image(context.of("fuse") / "thermal" / (files.name + ".png")));
@@ -87,7 +102,7 @@ Status score_fused(const StageContext& context, MetricMeans& means) {
     ORBITFUSE_ASSIGN(const auto values, fusion_metrics(visible, thermal, images));
     for (std::size_t m = 0; m < methods.size(); ++m) means.add(methods[m], files.name, values[m]);
   }
-  return {};
+  return all - scored;
 }
 
 /// Share of the fused views that has a temperature; null where nothing was fused.
@@ -99,10 +114,16 @@ json measured_share(const StageContext& context) {
 Result<StageOutput> score(const StageContext& context, const SessionInput& input,
                           const RunConfig& config) {
   MetricMeans fields, fused;
+  MeanError thermal_k;
   for (const Modality modality : {Modality::visible, Modality::thermal})
-    ORBITFUSE_TRY(score_field(context, input, config.train(modality), modality, fields));
-  ORBITFUSE_TRY(score_fused(context, fused));
+    ORBITFUSE_TRY(score_field(context, input, config.train(modality), modality, fields, thermal_k));
+  ORBITFUSE_ASSIGN(const std::size_t unscored,
+                   score_fused(context, config.metrics.scored_views, fused));
   StageOutput output;
+  if (unscored > 0)
+    output.skips.push_back({fmt::format("fusion metrics of {} new views", unscored),
+                            fmt::format("metrics.scored_views = {}", config.metrics.scored_views),
+                            "the means are of the others"});
   auto tables = json::array();
   if (!fields.empty())
     tables.push_back(fields.table("Rendered views against held-out frames", "field"));
@@ -120,6 +141,8 @@ Result<StageOutput> score(const StageContext& context, const SessionInput& input
       {"tables", tables},
       {"fields", fields.to_json()},
       {"fused", fused.to_json()}};
+  if (thermal_k.count > 0)
+    output.metrics["thermal_heldout_mae_k"] = thermal_k.sum / thermal_k.count;
   return output;
 }
 
@@ -128,7 +151,8 @@ Result<StageOutput> score(const StageContext& context, const SessionInput& input
 pipeline::Stage metrics_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "metrics";
-  stage.version = 2;
+  stage.version = 3;
+  stage.options = in.config->settings().to_json("metrics");
   stage.uses = {"poses_visible", "poses_thermal", "train_visible",
                 "train_thermal", "render",        "fuse"};
   stage.absent = [](const StageContext& context) -> std::optional<std::string> {

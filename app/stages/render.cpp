@@ -13,6 +13,7 @@
 #include "core/image/palette.hpp"
 #include "core/system/clock.hpp"
 #include "core/system/file_io.hpp"
+#include "core/system/trace.hpp"
 #include "recon/assembly/looked_at.hpp"
 #include "recon/nerf/nerf.hpp"
 
@@ -124,6 +125,7 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
   std::vector<ThermalView> temperatures;
   Transforms transforms;
   for (const PosedView& view : chosen.views) {
+    const TraceSpan span("new view");
     ORBITFUSE_TRY(context.progress.check("render"));
     const double done = static_cast<double>(files.size()),
                  total = static_cast<double>(chosen.views.size());
@@ -135,7 +137,7 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
     if (!fields.visible.empty()) {
       ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
                        nerf::render(fields.visible, view.camera, view.cam_from_world,
-                                    config.quality, context.progress));
+                                    config.visible, context.progress));
       f.visible = "visible/" + view.name + ".png";
       f.depth = "depth/" + view.name + ".tiff";
       f.visible_opacity = "opacity/" + view.name + "_visible.tiff";
@@ -149,7 +151,7 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
                                            ? view.cam_from_world
                                            : rebase(view.cam_from_world, thermal_from_visible);
       ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
-                       nerf::render(fields.thermal, view.camera, cam_from_thermal, config.quality,
+                       nerf::render(fields.thermal, view.camera, cam_from_thermal, config.thermal,
                                     context.progress));
       f.thermal = "thermal/" + view.name + (gray ? ".png" : ".tiff");
       f.thermal_opacity = "opacity/" + view.name + "_thermal.tiff";

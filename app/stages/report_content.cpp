@@ -10,8 +10,10 @@
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/saved_measurements.hpp"
 #include "core/image/image_io.hpp"
+#include "core/nested_text.hpp"
 #include "core/numeric/percent.hpp"
 #include "core/system/cpu.hpp"
+#include "core/system/file_io.hpp"
 #include "core/system/parallel.hpp"
 #include "core/temperature.hpp"
 #include "recon/assembly/training_data.hpp"
@@ -140,16 +142,19 @@ void add_fields(const StageContext& context, report::Model& model) {
   if (!table.rows.empty()) model.tables.push_back(std::move(table));
 }
 
+report::Table table_of(const json& t) {
+  report::Table table;
+  table.title = t.value("title", "");
+  for (const json& c : t.at("columns")) table.columns.push_back({c.at(0), c.at(1)});
+  table.rows = t.at("rows").get<std::vector<std::vector<std::string>>>();
+  return table;
+}
+
 void add_metric_tables(const StageContext& context, report::Model& model) {
   const json* m = context.metrics_of("metrics");
   if (!m) return;
-  for (const json& t : m->value("tables", json::array())) {
-    report::Table table;
-    table.title = t.value("title", "");
-    for (const json& c : t.at("columns")) table.columns.push_back({c.at(0), c.at(1)});
-    table.rows = t.at("rows").get<std::vector<std::vector<std::string>>>();
-    model.tables.push_back(std::move(table));
-  }
+  for (const json& table : m->value("tables", json::array()))
+    model.tables.push_back(table_of(table));
 }
 
 /// What others measured in the run since; of another run, or damaged, it is named and left out.
@@ -160,6 +165,18 @@ void add_measurements(const StageContext& context, const SessionInput& input,
     model.measurements = *std::move(table);
   else
     model.warnings.push_back("saved measurements are not shown: " + table.error().message());
+}
+
+/// Of a run with a budget: what was planned, and what came of it.
+void add_plan(const StageContext& context, report::Model& model) {
+  const auto text = read_file(context.out / "plan.json");
+  if (!text) return;
+  const json plan = parse_json(*text);
+  try {
+    model.tables.push_back(table_of(plan.at("table")));
+  } catch (const json::exception&) {
+    model.warnings.push_back("plan.json is damaged: what was planned is not shown");
+  }
 }
 
 /// What the data did not allow, once per reason.
@@ -192,6 +209,7 @@ Result<report::Model> report_content(const StageContext& context, const StageInp
   add_registration(context, model);
   add_fields(context, model);
   add_metric_tables(context, model);
+  add_plan(context, model);
   add_measurements(context, input, model);
   add_notices(context, input, model);
   model.stages = *context.earlier;

@@ -107,6 +107,9 @@ void add_render(Settings& settings, RenderConfig& render) {
   settings.add("render.radius_scale", render.path.radius_scale,
                "Of an orbit, times the recorded cameras' median distance");
   settings.add("render.palette", render.palette, "Colours of temperatures");
+  settings.add("render.thermal_alike", render.thermal.alike,
+               "Share of the temperatures' span within which four neighbours stand for the pixel "
+               "between them; 0: every pixel is rendered");
   settings.add("render.min_opacity", render.min_opacity,
                "Pixels less opaque than this have no temperature and are not fused");
 }
@@ -210,10 +213,12 @@ Status RunConfig::validate() const {
     return fail(ErrorKind::usage, "train.thermal.depth_width_px", std::to_string(width),
                 "choose 0 (none) or 32..8192");
   ORBITFUSE_TRY(render.path.validate());
-  ORBITFUSE_TRY(render.quality.validate());
+  ORBITFUSE_TRY(render.visible.validate());
+  ORBITFUSE_TRY(render.thermal.validate());
   ORBITFUSE_TRY(palette(render.palette));
   ORBITFUSE_TRY(fuse.chosen());
   ORBITFUSE_TRY(fuse.options.validate());
+  ORBITFUSE_TRY(OptionCheck("metrics")("scored_views", metrics.scored_views, at_least(0)));
   return OptionCheck("render")("min_opacity", render.min_opacity, from_to(0, 1));
 }
 
@@ -228,6 +233,8 @@ Settings RunConfig::settings() {
       "Depth maps matched in thermal views where no visible field gives the geometry; 0: none");
   add_render(settings, render);
   add_fuse(settings, fuse);
+  settings.add("metrics.scored_views", metrics.scored_views,
+               "New views whose fused pictures are measured; 0: all");
   return settings;
 }
 

@@ -30,7 +30,9 @@ struct RenderConfig {
   std::string cameras;  ///< transforms.json of given cameras; empty = `path`
   std::string palette = "inferno";
   double min_opacity = 0.5;  ///< below it a pixel has no temperature and isn't fused
-  nerf::RenderOptions quality;
+  nerf::RenderOptions visible;
+  /// Temperatures are smooth: most pixels are what their neighbours are (docs/notes/run.md).
+  nerf::RenderOptions thermal{.alike = 0.004};
 };
 
 struct FuseConfig {
@@ -38,6 +40,12 @@ struct FuseConfig {
   FusionOptions options;  ///< its method is each of `methods` in turn
 
   Result<std::vector<FusionMethod>> chosen() const;
+};
+
+struct MetricsConfig {
+  /// New views whose fused pictures are measured, spread over the path; 0 = all. Each costs as much
+  /// as fusing it.
+  int scored_views = 0;
 };
 
 /// Everything a run can be told; its defaults are those of config/orbitfuse.toml.
@@ -50,6 +58,7 @@ struct RunConfig {
   TrainConfig train_visible, train_thermal;
   RenderConfig render;
   FuseConfig fuse;
+  MetricsConfig metrics;
 
   const TrainConfig& train(Modality modality) const {
     return modality == Modality::visible ? train_visible : train_thermal;

@@ -117,8 +117,8 @@ Result<std::optional<stages::MetricScale>> scale_of(Context& context, const Opti
                     100 * scale.relative_uncertainty));
   if (!context.common.dry_run) ORBITFUSE_TRY(stages::save_metric_scale(o.out, world, scale));
   context.result["scale"] = stages::to_json(scale);
-  context.console.info(fmt::format("1 unit is {:.5f} m +- {:.2f} %: {}, {}", scale.metres_per_unit,
-                                   100 * scale.relative_uncertainty, scale.source, scale.how));
+  context.console.info(fmt::format("1 unit is {:.5f} m +- {}: {}, {}", scale.metres_per_unit,
+                                   stages::uncertainty_words(scale), scale.source, scale.how));
   return scale;
 }
 

@@ -42,7 +42,7 @@ Result<LayerRenderer::Plane> LayerRenderer::rendered(Modality modality, const Sh
   const int width = shot.camera.width, height = shot.camera.height;
   const int rows = std::max(least_rows, piece_pixels / width);
   cv::Mat color(height, width, modality == Modality::visible ? CV_32FC3 : CV_32FC1);
-  nerf::RenderOptions quality = run_.config.render.quality;
+  nerf::RenderOptions quality = run_.config.render.visible;
   if (!every_pixel) quality.alike = alike;
   Plane plane;
   plane.opacity.create(height, width, CV_32FC1);

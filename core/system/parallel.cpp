@@ -9,6 +9,8 @@
 #include <memory>
 #include <thread>
 
+#include "core/system/trace.hpp"
+
 namespace orbitfuse {
 namespace {
 
@@ -39,10 +41,14 @@ void parallel_blocks(int count, int block, const std::function<void(int, int)>& 
   if (count <= 0) return;
   const int blocks = (count + block - 1) / block;
   if (blocks == 1 || thread_count() == 1) {
+    const TraceShare share;
     for (int b = 0; b < blocks; ++b) fn(b * block, std::min(count, (b + 1) * block));
     return;
   }
-  tbb::parallel_for(0, blocks, [&](int b) { fn(b * block, std::min(count, (b + 1) * block)); });
+  tbb::parallel_for(0, blocks, [&](int b) {
+    const TraceShare share;
+    fn(b * block, std::min(count, (b + 1) * block));
+  });
 }
 
 void parallel_for(int count, const std::function<void(int)>& fn) {

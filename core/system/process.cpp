@@ -13,6 +13,8 @@
 #include <cstring>
 #include <thread>
 
+#include "core/system/trace.hpp"
+
 namespace orbitfuse {
 namespace {
 
@@ -49,6 +51,8 @@ Result<pid_t> start(const std::vector<std::string>& command, const std::filesyst
 Result<int> run_process(const std::vector<std::string>& command, const std::filesystem::path& log,
                         const std::string& stage, const Progress& progress) {
   ORBITFUSE_TRY(progress.check(stage));
+  const TraceSpan span(std::filesystem::path(command.front()).filename().string() +
+                       (command.size() > 1 ? " " + command[1] : ""));
   ORBITFUSE_ASSIGN(const pid_t pid, start(command, log));
   int status = 0;
   while (true) {

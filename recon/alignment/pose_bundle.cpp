@@ -136,7 +136,7 @@ bool PoseBundle::linearise(const State& at, const CommonLensPrior& lens,
         return;
       }
       LinearPair pair = weighted(*pixel, match.seen, match.sqrt_weight);
-      const Cauchy loss(pair.residual.squaredNorm(), losses.patch_px);
+      const Cauchy loss(pair.residual.squaredNorm(), losses.edge_px);
       costs[v] += weight * loss.cost;
       scale(pair, std::sqrt(weight) * loss.root);
       linear.views[v].add(pair);

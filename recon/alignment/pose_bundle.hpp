@@ -32,7 +32,7 @@ struct SharedPlace {
 
 /// Cauchy scales, pixels: where a residual begins to count less.
 struct PoseBundleLosses {
-  double patch_px = 1, sighting_px = 1;
+  double edge_px = 1, sighting_px = 1;
 };
 
 /// What is believed of the lens; a sigma of 0: it stays as it is.

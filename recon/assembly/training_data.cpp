@@ -9,6 +9,7 @@
 
 #include "core/image/image_io.hpp"
 #include "core/system/parallel.hpp"
+#include "core/system/trace.hpp"
 
 namespace orbitfuse {
 
@@ -27,6 +28,7 @@ Result<cv::Mat> field_image(const std::filesystem::path& file, Samples samples) 
 Result<nerf::Dataset> training_data(const std::filesystem::path& folder,
                                     const Reconstruction& model, Samples samples, int max_width_px,
                                     const Progress& progress) {
+  const TraceSpan span("read training images");
   nerf::Dataset data;
   data.modality = model.modality;
   data.thermal_is_gray = samples == Samples::gray;

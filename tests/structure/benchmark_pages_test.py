@@ -17,6 +17,8 @@ WITHOUT_PLOT = {
     "hostile.md": "says what the program answers",
     "run_real.md": "what came of four recordings, without truth",
     "export.md": "two scenes beside their bars: the table is all that there is to show",
+    "planner.md": "a row a run: whether it came as told is the table",
+    "stability.md": "cases that hold or don't",
     "view.md": "wall times of a shared machine, which a plot would make look surer than they are",
 }
 

@@ -9,6 +9,7 @@
 
 #include "core/option_range.hpp"
 #include "core/system/parallel.hpp"
+#include "core/system/trace.hpp"
 #include "recon/nerf/nerf.hpp"
 #include "recon/nerf/rendering/render.hpp"
 
@@ -112,6 +113,7 @@ Result<PointCloud> export_point_cloud(const Field& field, const std::vector<Pose
   if (views.empty())
     return fail(ErrorKind::input, "export.views", "no camera to see the field from",
                 "pass the training views");
+  const TraceSpan span("point cloud");
   std::vector<DepthView> rendered;
   for (const PosedView& view : views) {
     ORBITFUSE_TRY(progress.check("export"));

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "core/system/trace.hpp"
 #include "recon/nerf/nerf.hpp"
 #include "recon/nerf/training/training_run.hpp"
 
@@ -97,8 +98,14 @@ Result<TrainReport> train(const Dataset& given, const TrainOptions& options,
   TrainReport report;
   ORBITFUSE_ASSIGN(const TrainingData data, split(given, options, report));
   TrainingRun run(data, options, progress, report);
-  ORBITFUSE_TRY(run.prepare(guide));
-  ORBITFUSE_TRY(run.loop());
+  {
+    const TraceSpan span("prepare training");
+    ORBITFUSE_TRY(run.prepare(guide));
+  }
+  {
+    const TraceSpan span("training steps");
+    ORBITFUSE_TRY(run.loop());
+  }
   ORBITFUSE_ASSIGN(out, run.finish());
   return report;
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/system/trace.hpp"
 #include "recon/nerf/field/checkpoint.hpp"
 #include "recon/nerf/training/exposure.hpp"
 #include "recon/nerf/training/measure.hpp"
@@ -176,6 +177,7 @@ void TrainingRun::tell(double fraction, double wall_s) const {
 
 /// The curve's next point, and the best field so far. Returns the held-out PSNR.
 double TrainingRun::evaluate(double fraction) {
+  const TraceSpan span("held-out views");
   pause();
   const double psnr = heldout_psnr(*state_, views_, data_.heldout,
                                    options_.refine_poses && fraction > poses_move_from);

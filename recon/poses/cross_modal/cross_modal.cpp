@@ -9,6 +9,7 @@
 
 #include "core/image/undistorted.hpp"
 #include "core/numeric/median.hpp"
+#include "core/system/trace.hpp"
 #include "recon/alignment/edge_field.hpp"
 #include "recon/alignment/keyframe_scene.hpp"
 #include "recon/alignment/luminance.hpp"
@@ -101,6 +102,7 @@ struct Evidence {
 
 Result<Evidence> gather(const Session& session, const Reconstruction& visible,
                         const std::vector<const FrameRecord*>& stations, const Progress& progress) {
+  const TraceSpan span("edge lines of the visible scene");
   const Similarity3d canonical_from_visible = canonical_from_world(visible.views, {});
   Reconstruction canonical = visible;
   move_world(canonical, canonical_from_visible);
@@ -132,6 +134,7 @@ Result<Evidence> gather(const Session& session, const Reconstruction& visible,
 }
 
 Result<std::vector<OrbitHypothesis>> search(const Evidence& evidence, const Progress& progress) {
+  const TraceSpan span("orbit search");
   OrbitSearchOptions options;
   options.nearest = 0.4 * evidence.similar_distance;
   options.farthest = 1.8 * evidence.similar_distance;
@@ -166,6 +169,7 @@ std::string words(const SelectedOrbit& selected) {
 Result<SceneRenderer> scene_of(const VisibleScene& visible,
                                const Similarity3d& canonical_from_visible,
                                const Progress& progress) {
+  const TraceSpan span("keyframes of the visible field");
   std::vector<PosedView> views;
   const auto count = static_cast<int>(visible.reconstruction.views.size());
   const int kept = std::min(count, max_keyframes);

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "core/numeric/median.hpp"
+#include "core/system/trace.hpp"
 #include "recon/alignment/whole_view.hpp"
 #include "recon/poses/world_frame.hpp"
 
@@ -116,6 +117,7 @@ bool same_place(const OrbitViews& orbit, const Rigid3d& a, const Rigid3d& b) {
 Result<Fit> OrbitRefinement::restart(const std::vector<std::size_t>& chosen,
                                      const std::vector<PosedView>& starts,
                                      std::vector<RenderRound> rounds) const {
+  const TraceSpan span("restart views");
   std::vector<cv::Mat> images;
   for (const std::size_t i : chosen) images.push_back(orbit.images[i]);
   RenderAlignmentOptions options;
@@ -126,6 +128,7 @@ Result<Fit> OrbitRefinement::restart(const std::vector<std::size_t>& chosen,
 
 Status OrbitRefinement::together(Fit& alignment, const FocalGuess& prior,
                                  std::vector<RenderRound> rounds) const {
+  const TraceSpan span("align together");
   RenderAlignmentOptions options;
   options.focal_relative_sigma = prior.relative_sigma;
   options.prior_focal_px = prior.focal_px;
@@ -140,6 +143,7 @@ Status OrbitRefinement::together(Fit& alignment, const FocalGuess& prior,
 
 Result<std::vector<PosedView>> OrbitRefinement::search(const std::vector<std::size_t>& chosen,
                                                        const Fit& alignment) const {
+  const TraceSpan span("search whole views");
   const LoopModel model = loop_model(orbit, alignment);
   std::vector<PosedView> found;
   for (const std::size_t i : chosen) {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/numeric/median.hpp"
+#include "core/system/trace.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -164,6 +165,7 @@ Result<SelectedOrbit> select_by_renders(const SceneRenderer& renderer, OrbitView
                                         const std::vector<PosedView>& blank,
                                         const std::vector<OrbitHypothesis>& hypotheses,
                                         const Progress& progress) {
+  const TraceSpan span("hypotheses by renders");
   const OrbitRefinement refinement{renderer, orbit, progress};
   const Selection selection(refinement, blank);
   SelectedOrbit selected;

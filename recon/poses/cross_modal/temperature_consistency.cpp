@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "core/numeric/median.hpp"
+#include "core/system/trace.hpp"
 #include "recon/alignment/whole_view.hpp"
 #include "recon/poses/cross_modal/painted_scene.hpp"
 
@@ -237,6 +238,7 @@ double share_of_median(double support, double median) {
 
 Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refinement,
                                                  Fit& alignment) {
+  const TraceSpan span("correct by temperatures");
   const OrbitViews& orbit = refinement.orbit;
   ORBITFUSE_ASSIGN(const Contradicted found, contradicted(refinement, alignment));
   const std::vector<std::size_t>& lost = found.views;

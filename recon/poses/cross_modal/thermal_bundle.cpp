@@ -11,6 +11,7 @@
 #include "core/image/undistorted.hpp"
 #include "core/numeric/median.hpp"
 #include "core/system/parallel.hpp"
+#include "core/system/trace.hpp"
 #include "recon/alignment/edge_field.hpp"
 #include "recon/alignment/patch_matching.hpp"
 #include "recon/alignment/pose_bundle.hpp"
@@ -75,7 +76,7 @@ double radial_reach_px(const BundleRound& round) {
 
 /// A patch confirms the view that it was taken from, and each that shows it, where both have it
 /// within confirmed_px: a view doesn't confirm itself.
-BundleSolution judged(const BundleRound& round, const PoseBundle& bundle) {
+BundleSolution summarised(const BundleRound& round, const PoseBundle& bundle) {
   BundleSolution solution{
       bundle.corrections(), bundle.log_focal(), bundle.radial(), radial_reach_px(round), 0, {}};
   solution.confirmed.assign(solution.corrections.size(), 0);
@@ -100,12 +101,12 @@ BundleSolution judged(const BundleRound& round, const PoseBundle& bundle) {
 
 /// Nothing where no usable answer is found.
 std::optional<BundleSolution> solved(const BundleRound& round, const CommonLensPrior& lens,
-                                     const std::vector<double>& losses_px,
+                                     const std::vector<double>& sighting_losses_px,
                                      const ThermalBundleOptions& options) {
   PoseBundle bundle = bundle_of(round, options);
-  for (const double scale_px : losses_px)
+  for (const double scale_px : sighting_losses_px)
     if (!bundle.solve(lens, {1, scale_px}, options.max_iterations)) return std::nullopt;
-  return judged(round, bundle);
+  return summarised(round, bundle);
 }
 
 Result<BundleRound> prepared(const OrbitRefinement& refinement, const Fit& alignment,
@@ -193,7 +194,7 @@ Result<std::optional<double>> solve_round(const OrbitRefinement& refinement,
     solution = solved(round,
                       {{std::log(prior.focal_px / focal_px), prior.relative_sigma},
                        {-bundled.radial, prior.radial_sigma}},
-                      step.losses_px, options);
+                      step.sighting_losses_px, options);
   const auto tell = [&](const std::string& words) {
     refinement.progress.report(
         {"poses.thermal", 3, 4, -1,
@@ -243,6 +244,7 @@ Result<bool> solve_rounds(const OrbitRefinement& refinement, const FocalGuess& p
 
 Status bundle_thermal(const OrbitRefinement& refinement, const FocalGuess& prior,
                       const ThermalBundleOptions& options, Fit& alignment) {
+  const TraceSpan span("thermal bundle");
   std::vector<std::size_t> chosen;
   for (std::size_t i = 0; i < alignment.views.size(); ++i)
     if (alignment.views[i].verdict.confidence != Confidence::dropped) chosen.push_back(i);

@@ -16,8 +16,8 @@ namespace orbitfuse {
 struct BundleStep {
   int reach_px;  ///< of the search for a patch about where the poses have it
   int max_rounds;
-  double settled_deg;             ///< no view turns by more: enough
-  std::vector<double> losses_px;  ///< Cauchy scales of a patch found again, one solve each
+  double settled_deg;                      ///< no view turns by more: enough
+  std::vector<double> sighting_losses_px;  ///< Cauchy scales of a patch found again, one solve each
 };
 
 struct ThermalBundleOptions {

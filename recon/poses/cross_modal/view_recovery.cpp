@@ -8,6 +8,7 @@
 
 #include "core/image/undistorted.hpp"
 #include "core/numeric/median.hpp"
+#include "core/system/trace.hpp"
 #include "recon/alignment/whole_view.hpp"
 #include "recon/poses/cross_modal/temperature_consistency.hpp"
 #include "recon/poses/cross_modal/thermal_bundle.hpp"
@@ -140,6 +141,7 @@ void straighten(OrbitViews& orbit, const Fit& alignment) {
 /// The support that form has where the bundle has put the views. One that it has moved elsewhere,
 /// to where form knows much less of it, is not sure.
 Status judge_bundled(const OrbitRefinement& refinement, const Fit& before, Fit& alignment) {
+  const TraceSpan span("judge bundle");
   std::vector<std::size_t> all(alignment.views.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
   // The round that `before` was measured by: support grows with resolution.

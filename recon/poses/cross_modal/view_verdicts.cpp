@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "core/numeric/median.hpp"
+#include "core/system/trace.hpp"
 #include "recon/poses/cross_modal/painted_scene.hpp"
 #include "recon/poses/cross_modal/temperature_consistency.hpp"
 #include "recon/poses/world_frame.hpp"
@@ -209,6 +210,7 @@ std::vector<int> doubt_whole_loops(const OrbitViews& orbit, std::size_t stations
 
 Result<std::vector<int>> judge_views(const OrbitRefinement& refinement, std::size_t stations,
                                      Fit& alignment) {
+  const TraceSpan span("judge views");
   ORBITFUSE_ASSIGN(const std::vector<ViewEvidence> evidence,
                    evidence_of(refinement, stations, alignment));
   for (std::size_t i = 0; i < evidence.size(); ++i) {

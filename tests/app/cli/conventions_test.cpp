@@ -121,6 +121,19 @@ TEST(Cli, PrintedConfigHoldsTheRecipesChangedFields) {
   EXPECT_EQ(again.out, printed.out);
 }
 
+TEST(Cli, ATraceIsWrittenForAnyVerb) {
+  const test::TempFolder temp;
+  const std::string file = temp / "trace.json";
+  EXPECT_EQ(orbitfuse_program({"devices", "--trace", file}).code, 0);
+  const auto text = read_file(file);
+  ASSERT_TRUE(text);
+  EXPECT_THAT(*text, HasSubstr("\"name\":\"devices\""));
+  const Outcome refused = orbitfuse_program({"devices", "--trace", "/proc/none/trace.json"});
+  EXPECT_NE(refused.code, 0);
+  EXPECT_THAT(refused.err, HasSubstr("/proc/none"));
+  EXPECT_TRUE(refused.out.empty()) << "refused before the work";
+}
+
 TEST(Cli, AMisspeltInstructionSetIsAnError) {
   const Outcome outcome = orbitfuse_program({"devices"}, {.environment = {"ORBITFUSE_ISA=avx-2"}});
   EXPECT_EQ(outcome.code, 2);

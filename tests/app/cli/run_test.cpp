@@ -77,6 +77,41 @@ TEST_F(Run, BothModalitiesThenNothingThenWhatChanged) {
   EXPECT_FALSE(fs::exists(out / "render/visible/001.png"));
 }
 
+/// The plan is said before the first stage, kept, and held to when the run is called again.
+TEST_F(Run, ABudgetIsPlannedSpentAndTold) {
+  write_fixture_session(session);
+  const auto planned = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words = {"run", session.string(), "--out", out.string()};
+    for (const char* set : {"render.views=2", "render.width_px=64", "fuse.methods=[\"heat\"]"})
+      words.insert(words.end(), {"--set", set});
+    words.insert(words.end(), more.begin(), more.end());
+    return orbitfuse_program(words);
+  };
+  const Outcome tried = planned({"--budget", "12s", "--dry-run"});
+  ASSERT_EQ(tried.code, 0) << tried.err;
+  EXPECT_THAT(tried.err, HasSubstr("plan for 12 s: depth at "));
+  EXPECT_FALSE(fs::exists(out)) << "nothing is written";
+
+  const Outcome first = planned({"--budget", "12s"});
+  ASSERT_EQ(first.code, 0) << first.err;
+  EXPECT_THAT(first.err, HasSubstr("plan for 12 s: depth at "));
+  EXPECT_NE(read_file(out / "report/report.html")->find("Plan and outcome"), std::string::npos);
+  EXPECT_THAT(*read_file(out / "train_visible/stage.json"), HasSubstr("budget_s"));
+  // Whole runs of other options are no part of this plan; the same budget is.
+  const Outcome again = planned({"--budget", "12s", "--json"});
+  ASSERT_EQ(again.code, 0) << again.err;
+  for (const auto& [stage, state] : states(again))
+    EXPECT_EQ(state, stage == "report" ? "ran" : "unchanged") << stage;
+
+  const Outcome too_little = planned({"--budget", "1s", "--dry-run"});
+  EXPECT_THAT(too_little.err, HasSubstr("warning: --budget: 1 s are too few"));
+  ASSERT_EQ(
+      planned({"--set", "train.visible.iterations=50", "--set", "train.thermal.iterations=50"})
+          .code,
+      0);
+  EXPECT_FALSE(fs::exists(out / "plan.json")) << "this run had no budget";
+}
+
 TEST_F(Run, WhatNobodyCanMeasureIsAnErrorAndCamerasAreReadFirst) {
   write_fixture_session(session, {.thermal = 0});
   const Outcome no_cameras = run({"--cameras", (temp.path() / "none.json").string()});

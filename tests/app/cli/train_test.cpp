@@ -114,7 +114,7 @@ TEST_F(Train, ATargetStopsOrWarnsAndNeedsHeldOutViews) {
         run({"--target-psnr", "20", "--set", "train.visible.holdout_every=0"}, verb);
     EXPECT_EQ(refused.code, 2);
     EXPECT_THAT(refused.err, HasSubstr("--set train.visible.holdout_every=12"));
-    EXPECT_EQ(run({"--budget", "soon"}, verb).code, 2);
+    EXPECT_EQ(run({"--budget", "soon"}, verb).code, 2) << verb;
     EXPECT_EQ(run({"--budget", "0.0001s", "--modality", "visible"}).code, 2)
         << "no step fits in it";
     EXPECT_EQ(run({"--target-psnr", "0"}, verb).code, 2);

@@ -142,7 +142,7 @@ TEST_F(ViewServerTest, PicturesAreTheFieldsOwn) {
   const Parts parts = parts_of(answer->body);
   const Camera camera = views[0].view.camera.scaled_to(64, 64);
   const auto truth = nerf::render(run.thermal, camera, views[0].view.cam_from_world,
-                                  run.config.render.quality, {});
+                                  run.config.render.visible, {});
   ASSERT_TRUE(truth);
   int seen = 0;
   double off = 0;

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+namespace orbitfuse::planning {
+
+/// What a planner may choose of a run; the defaults are a run's without a budget.
+struct Effort {
+  int depth_width_px = 400;
+  int visible_steps = 4800, thermal_steps = 2400;
+  int scored_views = 0;  ///< new views whose fused pictures are measured; 0: all
+};
+
+/// The least of everything: with a weaker visible field the stages behind it take longer than its
+/// training saves (docs/notes/planner.md).
+inline constexpr Effort least_effort{280, 2400, 600, 2};
+
+}  // namespace orbitfuse::planning

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/planning/error_curves.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+namespace orbitfuse::planning {
+namespace {
+
+/// A measured curve over the logarithm of steps, straight between its points; goes on beyond the
+/// first as it begins, and stays at the last.
+struct Point {
+  double steps, value;
+};
+
+template <std::size_t n>
+double at(const Point (&curve)[n], double steps) {
+  const double x = std::log2(std::clamp(steps, 1.0, curve[n - 1].steps));
+  std::size_t i = 1;
+  while (i + 1 < n && x > std::log2(curve[i].steps)) ++i;
+  const double x0 = std::log2(curve[i - 1].steps), x1 = std::log2(curve[i].steps);
+  return curve[i - 1].value + (curve[i].value - curve[i - 1].value) * (x - x0) / (x1 - x0);
+}
+
+// Against a run without a budget: means of four scenes, bench/app/plan_sweep.sh,
+// docs/notes/planner.md.
+constexpr Point visible_gain_db[] = {{1200, -2.35}, {2400, -1.05}, {4800, 0},
+                                     {9600, 0.77},  {19200, 1.3},  {38400, 1.55}};
+/// Of the logarithm of the mean absolute error. Longer trainings learn the poses' errors: twice the
+/// steps made it 3 % larger.
+constexpr Point thermal_log_gain[] = {{600, 0.31}, {1200, 0.11}, {2400, 0}, {3000, -0.01}};
+/// What a weaker visible field costs the thermal one: its geometry, the poses found with it, and
+/// views that lose their places (`car`: one of 24 with 2400 steps, two with 900).
+constexpr Point thermal_log_gain_of_guide[] = {{1200, 0.25}, {2400, 0.1}, {4800, 0}};
+
+/// Coarser depth costs little (five scenes: 0.16 dB, 5 % of the error), but on one it cost two
+/// thermal views their places: only where nothing else fits.
+constexpr double coarse_depth_db = -0.16, coarse_depth_log_k = 0.25;
+
+/// Of held-out frames, with their noise and drift.
+constexpr double usual_mae_k = 1.05, mae_spread_k = 0.35;
+
+double log_k(const SceneFacts& facts, const Effort& effort) {
+  double value = at(thermal_log_gain, effort.thermal_steps);
+  if (facts.visible_views > 0) {
+    value += at(thermal_log_gain_of_guide, effort.visible_steps);
+    if (effort.depth_width_px < 400) value += coarse_depth_log_k;
+  }
+  return value;
+}
+
+double gain_db(const Effort& effort) {
+  double value = at(visible_gain_db, effort.visible_steps);
+  if (effort.depth_width_px < 400) value += coarse_depth_db;
+  return value;
+}
+
+}  // namespace
+
+ExpectedErrors expected_errors(const SceneFacts& facts, const Effort& effort) {
+  ExpectedErrors errors;
+  errors.visible_psnr_db = 25.5 + 0.75 * (facts.smoothness_db - 27.5) + gain_db(effort);
+  errors.visible_spread_db = 1.9;
+  errors.thermal_mae_k = usual_mae_k * std::exp(log_k(facts, effort));
+  errors.thermal_spread_k = mae_spread_k * std::exp(log_k(facts, effort));
+  return errors;
+}
+
+double loss(const SceneFacts& facts, const Effort& effort) {
+  const double visible = -gain_db(effort) / 20 * std::log(10.0), thermal = log_k(facts, effort);
+  const double fields = facts.visible_views == 0   ? thermal
+                        : facts.thermal_views == 0 ? visible
+                                                   : (visible + thermal) / 2;
+  constexpr double unscored = 0.02;  // of fused pictures: told less of, not worse
+  return fields + (effort.scored_views > 0 ? unscored : 0);
+}
+
+}  // namespace orbitfuse::planning

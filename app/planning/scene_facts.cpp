@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/planning/scene_facts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "core/image/image_io.hpp"
+
+namespace orbitfuse::planning {
+namespace {
+
+constexpr int seen_width_px = 640, coarse_width_px = 100;
+constexpr std::size_t every = 4;  // neighbours show the same
+
+double smoothness_db(const cv::Mat& photo) {
+  const auto scaled = [&](const cv::Mat& from, int width, int how) {
+    cv::Mat to;
+    const int height = std::max(1, width * photo.rows / photo.cols);
+    cv::resize(from, to, {width, height}, 0, 0, how);
+    return to;
+  };
+  cv::Mat fine;
+  scaled(photo, seen_width_px, cv::INTER_AREA).convertTo(fine, CV_32F, 1.0 / 255);
+  cv::Mat coarse = scaled(fine, coarse_width_px, cv::INTER_AREA), again;
+  cv::resize(coarse, again, fine.size(), 0, 0, cv::INTER_LINEAR);
+  const double rms = cv::norm(fine, again) / std::sqrt(static_cast<double>(fine.total()) *
+                                                       static_cast<double>(fine.channels()));
+  constexpr double least_rms = 1e-4;  // a blank wall
+  return -20 * std::log10(std::max(rms, least_rms));
+}
+
+double height_by_width(const std::vector<const FrameRecord*>& frames, double otherwise) {
+  return frames.empty() || frames.front()->width == 0
+             ? otherwise
+             : static_cast<double>(frames.front()->height) / frames.front()->width;
+}
+
+bool all_posed(const std::vector<const FrameRecord*>& frames) {
+  return !frames.empty() && std::all_of(frames.begin(), frames.end(), [](const FrameRecord* frame) {
+    return frame->cam_from_world.has_value();
+  });
+}
+
+}  // namespace
+
+Result<SceneFacts> look_at(const stages::SessionInput& input, const stages::RunConfig& config) {
+  SceneFacts facts;
+  const auto photos = input.session.frames_of(Modality::visible, false),
+             thermal = input.session.frames_of(Modality::thermal, false);
+  facts.visible_views = input.count(Modality::visible);
+  facts.thermal_views = input.count(Modality::thermal);
+  facts.visible_posed = config.poses.use_known_poses && all_posed(photos);
+  facts.thermal_posed = config.poses.use_known_poses && all_posed(thermal);
+  facts.visible_height_by_width = height_by_width(photos, facts.visible_height_by_width);
+  facts.thermal_height_by_width = height_by_width(thermal, facts.thermal_height_by_width);
+  facts.new_views = config.render.path.views;
+  const double width = config.render.path.width_px;
+  facts.new_view_mpx =
+      1e-6 * width * width *
+      (photos.empty() ? facts.thermal_height_by_width : facts.visible_height_by_width);
+  facts.fusion_methods = static_cast<int>(config.fuse.methods.size());
+  double sum = 0;
+  int looked_at = 0;
+  for (std::size_t i = 0; i < photos.size(); i += every) {
+    ORBITFUSE_ASSIGN(const cv::Mat photo, read_visible(input.session.path_of(*photos[i])));
+    sum += smoothness_db(photo);
+    ++looked_at;
+  }
+  if (looked_at > 0) facts.smoothness_db = sum / looked_at;
+  return facts;
+}
+
+}  // namespace orbitfuse::planning

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "app/stages/run_config.hpp"
+#include "app/stages/session_input.hpp"
+
+namespace orbitfuse::planning {
+
+/// What a run's time and errors depend on, as far as it can be seen before anything has run.
+struct SceneFacts {
+  int visible_views = 0, thermal_views = 0;
+  bool visible_posed = false, thermal_posed = false;  ///< the session carries the poses
+  double visible_height_by_width = 0.75, thermal_height_by_width = 0.8;
+  int new_views = 8;
+  double new_view_mpx = 0.3;
+  int fusion_methods = 5;
+  /// PSNR of the photos against themselves at 100 pixels' width: how little detail there is.
+  double smoothness_db = 28;
+};
+
+/// Looks at every fourth photo. Error: one can't be read.
+Result<SceneFacts> look_at(const stages::SessionInput& input, const stages::RunConfig& config);
+
+}  // namespace orbitfuse::planning

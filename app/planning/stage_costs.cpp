@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/planning/stage_costs.hpp"
+
+#include <cmath>
+
+namespace orbitfuse::planning {
+namespace {
+
+// Seconds on two cores of an Intel Xeon (Sapphire Rapids), from the traces of whole runs
+// (bench/app/plan_sweep.sh, docs/notes/planner.md).
+constexpr double start_s = 0.3, known_poses_s = 0.5;
+constexpr double visible_pose_s = 0.55;  // a view: features of 800 pixels, matching, mapping
+/// A view: search, renders, temperatures. 0.9 to 1.4 by scene; what is wrong is made good later, by
+/// the thermal training and the scores.
+constexpr double thermal_pose_s = 1.15;
+constexpr double depth_view_s = 0.62;  // of 400 x 300 pixels
+constexpr double visible_step = 2.85e-3, thermal_step = 3.5e-3;
+constexpr double visible_view_s = 0.12;  // its image, its exposure, its part of the cloud
+constexpr double thermal_view_s = 0.06;
+constexpr double visible_checks_s = 0.5, thermal_checks_s = 1.1;  // of held-out views
+constexpr double new_view_mpx_s = 3.35;                           // both fields
+constexpr double fused_mpx_s = 0.115;                             // a method
+constexpr double scored_mpx_s = 0.545, heldout_view_s = 0.25;
+constexpr int heldout_every = 12;
+constexpr double report_s = 0.5;
+constexpr double usual_steps = 4800, halvings_at_900 = 2.4, fog_power = 1.4;
+constexpr double thermal_pose_fog = 1.7, render_fog = 1.75;
+/// Depth at 200 pixels takes more than a quarter: planes are drawn at half width in any case.
+constexpr double depth_power = 1.7;
+
+/// A field that has learnt little is fog: its renders take longer, and thermal views that are
+/// placed by them are searched longer. Seconds against those with the usual field.
+double fog(const SceneFacts& facts, const Effort& effort, double at_900_steps) {
+  if (facts.visible_views == 0 || effort.visible_steps >= usual_steps) return 1;
+  const double halvings = std::log2(usual_steps / std::max(1.0, 1.0 * effort.visible_steps));
+  return 1 + (at_900_steps - 1) * std::pow(halvings / halvings_at_900, fog_power);
+}
+
+}  // namespace
+
+const std::vector<std::string>& planned_stages() {
+  static const std::vector<std::string> stages = {
+      "poses_visible", "depth",  "train_visible", "poses_thermal", "train_thermal",
+      "register",      "render", "fuse",          "metrics",       "report"};
+  return stages;
+}
+
+double visible_step_s() { return visible_step; }
+double thermal_step_s() { return thermal_step; }
+
+double stage_s(const std::string& stage, const SceneFacts& facts, const Effort& effort) {
+  const double photos = facts.visible_views, thermal = facts.thermal_views;
+  const bool both = photos > 0 && thermal > 0;
+  if (stage == "report") return report_s;
+  if (stage == "render")
+    return start_s + facts.new_views * facts.new_view_mpx * new_view_mpx_s * (both ? 1 : 0.5) *
+                         fog(facts, effort, render_fog);
+  if (stage == "fuse")
+    return both ? facts.new_views * facts.new_view_mpx * facts.fusion_methods * fused_mpx_s : 0;
+  if (stage == "metrics") {
+    const int scored =
+        effort.scored_views > 0 ? std::min(effort.scored_views, facts.new_views) : facts.new_views;
+    const double heldout =
+        heldout_view_s * (std::ceil(photos / heldout_every) + std::ceil(thermal / heldout_every));
+    return heldout + (both ? scored * facts.new_view_mpx * facts.fusion_methods * scored_mpx_s : 0);
+  }
+  if (photos > 0) {
+    if (stage == "poses_visible")
+      return facts.visible_posed ? known_poses_s : start_s + photos * visible_pose_s;
+    if (stage == "depth")
+      return start_s + photos * depth_view_s * facts.visible_height_by_width / 0.75 *
+                           std::pow(effort.depth_width_px / 400.0, depth_power);
+    if (stage == "train_visible")
+      return start_s + photos * visible_view_s + visible_checks_s +
+             effort.visible_steps * visible_step;
+  }
+  if (thermal > 0) {
+    if (stage == "poses_thermal")
+      return facts.thermal_posed
+                 ? known_poses_s
+                 : start_s + thermal * thermal_pose_s * fog(facts, effort, thermal_pose_fog);
+    if (stage == "train_thermal")
+      return start_s + thermal * thermal_view_s + thermal_checks_s +
+             effort.thermal_steps * thermal_step;
+  }
+  return 0;
+}
+
+}  // namespace orbitfuse::planning

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app/planning/plan.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace orbitfuse::planning {
+namespace {
+
+SceneFacts usual_orbit() {
+  SceneFacts facts;
+  facts.visible_views = facts.thermal_views = 24;
+  return facts;
+}
+
+double needed_s(const SceneFacts& facts, const Effort& effort) {
+  double sum = 0;
+  for (const std::string& stage : planned_stages()) sum += stage_s(stage, facts, effort);
+  return sum;
+}
+
+TEST(StageCosts, MoreOfAnythingTakesLonger) {
+  const SceneFacts facts = usual_orbit();
+  const double usual = needed_s(facts, {});
+  for (const Effort& more : {Effort{.depth_width_px = 500}, Effort{.visible_steps = 6000},
+                             Effort{.thermal_steps = 3000}})
+    EXPECT_GT(needed_s(facts, more), usual);
+  EXPECT_LT(needed_s(facts, {.scored_views = 2}), usual);
+  SceneFacts larger = facts;
+  larger.visible_views = 40;
+  EXPECT_GT(needed_s(larger, {}), usual);
+  larger.visible_posed = larger.thermal_posed = true;
+  EXPECT_LT(needed_s(larger, {}), usual) << "poses that are known cost nothing";
+}
+
+TEST(StageCosts, AModalityThatIsNotThereCostsNothing) {
+  SceneFacts facts = usual_orbit();
+  facts.thermal_views = 0;
+  EXPECT_EQ(stage_s("poses_thermal", facts, {}), 0);
+  EXPECT_EQ(stage_s("train_thermal", facts, {}), 0);
+  EXPECT_EQ(stage_s("fuse", facts, {}), 0);
+  facts.visible_views = 0;
+  for (const char* stage : {"poses_visible", "depth", "train_visible"})
+    EXPECT_EQ(stage_s(stage, facts, {}), 0) << stage;
+}
+
+TEST(ErrorCurves, MoreStepsNeverExpectALargerError) {
+  const SceneFacts facts = usual_orbit();
+  Effort effort{.visible_steps = 1, .thermal_steps = 1};
+  double last = std::numeric_limits<double>::infinity();
+  for (int steps = 1; steps < 1'000'000; steps *= 2) {
+    for (int* of : {&effort.visible_steps, &effort.thermal_steps}) {
+      *of = steps;
+      const double now = loss(facts, effort);
+      ASSERT_TRUE(std::isfinite(now));
+      EXPECT_LE(now, last) << steps;
+      last = now;
+    }
+  }
+}
+
+TEST(Plan, UsesWhatThereIsAndNoMore) {
+  const SceneFacts facts = usual_orbit();
+  double last_loss = std::numeric_limits<double>::infinity();
+  for (const double slowness : {0.5, 1.0, 2.0}) {
+    last_loss = std::numeric_limits<double>::infinity();
+    for (double available_s = 100; available_s < 400; available_s += 20) {
+      const Plan plan = make_plan(facts, planned_stages(), {}, slowness, available_s);
+      if (!plan.fits) {
+        EXPECT_TRUE(std::isinf(last_loss)) << "more time, and suddenly too little";
+        continue;
+      }
+      EXPECT_LE(plan.expected_s, available_s);
+      EXPECT_NEAR(plan.expected_s, slowness * needed_s(facts, plan.effort), 1e-6);
+      EXPECT_TRUE(!plan.all_used || plan.expected_s >= 0.95 * available_s) << available_s;
+      const double now = loss(facts, plan.effort);
+      EXPECT_LE(now, last_loss + 1e-9) << available_s;
+      last_loss = now;
+    }
+    EXPECT_TRUE(std::isfinite(last_loss));
+  }
+}
+
+TEST(Plan, TooLittleTimeIsSaidAndGetsTheLeast) {
+  for (const double available_s : {10.0, 0.0, -5.0, -std::numeric_limits<double>::infinity()}) {
+    const Plan plan = make_plan(usual_orbit(), planned_stages(), {}, 1, available_s);
+    EXPECT_FALSE(plan.fits);
+    EXPECT_EQ(plan.effort.visible_steps, least_effort.visible_steps);
+    EXPECT_EQ(plan.effort.depth_width_px, least_effort.depth_width_px);
+    EXPECT_GT(plan.expected_s, available_s);
+  }
+}
+
+TEST(Plan, EndlessTimeIsNotSpent) {
+  const Plan plan = make_plan(usual_orbit(), planned_stages(), {}, 1, 1e6);
+  EXPECT_TRUE(plan.fits);
+  EXPECT_FALSE(plan.all_used);
+  EXPECT_LT(plan.expected_s, 1000);
+}
+
+TEST(Plan, WhatIsSettledStays) {
+  const Settled settled{.depth_width_px = 300, .visible_steps = 1234, .scored_views = 0};
+  for (const double available_s : {20.0, 120.0, 300.0}) {
+    const Plan plan = make_plan(usual_orbit(), planned_stages(), settled, 1, available_s);
+    EXPECT_EQ(plan.effort.depth_width_px, 300);
+    EXPECT_EQ(plan.effort.visible_steps, 1234);
+    EXPECT_EQ(plan.effort.scored_views, 0);
+  }
+}
+
+TEST(Plan, OneModalityGetsAllTheTraining) {
+  SceneFacts facts = usual_orbit();
+  facts.thermal_views = 0;
+  const Plan visible = make_plan(facts, planned_stages(), {}, 1, 60);
+  EXPECT_TRUE(visible.fits);
+  EXPECT_GE(visible.expected_s, 57);
+  facts = usual_orbit();
+  facts.visible_views = 0;
+  const Plan thermal = make_plan(facts, planned_stages(), {}, 1, 60);
+  EXPECT_TRUE(thermal.fits);
+  EXPECT_GT(thermal.effort.thermal_steps, 2400);
+}
+
+TEST(Plan, OfTheLastStagesOnlyThoseAreCounted) {
+  const std::vector<std::string> rest = {"train_thermal", "render", "fuse", "metrics", "report"};
+  const Plan plan = make_plan(usual_orbit(), rest, {.visible_steps = 4800}, 1, 60);
+  EXPECT_TRUE(plan.fits);
+  EXPECT_EQ(plan.effort.visible_steps, 4800);
+  EXPECT_GT(plan.effort.thermal_steps, 2400) << "the rest is the thermal field's";
+  const Plan nothing = make_plan(usual_orbit(), {}, {}, 1, 60);
+  EXPECT_EQ(nothing.expected_s, 0);
+}
+
+}  // namespace
+}  // namespace orbitfuse::planning
