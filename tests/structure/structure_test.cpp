@@ -68,7 +68,7 @@ const std::map<std::string, Floors> floors_of{
      {{"config", "doctor", "fusion_batch", "pipeline", "recording", "terminal"},
       {"report"},
       {"farm", "stages"},
-      {"eval", "view"},
+      {"eval", "planning", "view"},
       {"export", "inspection"},
       {"comparison"},
       {"cli"},
