@@ -2,11 +2,14 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <filesystem>
 #include <functional>
 #include <iostream>
 #include <optional>
@@ -37,8 +40,9 @@ void set_up_logging(int verbosity) {
 }
 
 /// Defaults, then the options of the run whose folder is given, then the file, then --set.
-Status resolve_config(const cli::CommonOptions& common, const CLI::App& verb,
-                      stages::RunConfig& config) {
+Status resolve_config(const CLI::App& verb, cli::Context& context) {
+  const cli::CommonOptions& common = context.common;
+  stages::RunConfig& config = context.config;
   config::Settings settings = config.settings();
   const CLI::Option* session = verb.get_option_no_throw("session");
   if (session == nullptr) session = verb.get_option_no_throw("run");
@@ -48,6 +52,7 @@ Status resolve_config(const cli::CommonOptions& common, const CLI::App& verb,
   }
   if (!common.config_file.empty()) ORBITFUSE_TRY(settings.read_toml(common.config_file));
   for (const std::string& assignment : common.overrides) ORBITFUSE_TRY(settings.apply(assignment));
+  context.given = settings.given();
   config.set_seed(verb.count("--seed") > 0 ? common.seed : seed.value_or(common.seed));
   return config.validate();
 }
@@ -97,12 +102,16 @@ Status check_no_empty_values(const CLI::App& verb) {
   return {};
 }
 
-/// The action, its spans kept if a file was named for them. That the file can be written is seen
-/// before the hours it is to tell of.
+/// The action, its spans kept if a file was named for them. A folder that isn't there is seen
+/// before the hours it is to tell of; it is not made, for it may be the one that the verb makes.
 Status traced(const std::string& file, const char* verb, const std::function<Status()>& action) {
   if (file.empty()) return action();
+  const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
+  std::error_code unreadable;
+  if (!std::filesystem::is_directory(folder, unreadable) || ::access(folder.c_str(), W_OK) != 0)
+    return fail(ErrorKind::usage, "--trace " + file, "no folder that can be written to",
+                "name a file in a folder that exists");
   start_trace();
-  ORBITFUSE_TRY(write_file_atomic(file, trace_json()));
   Status status;
   {
     const TraceSpan span(verb);
@@ -154,19 +163,21 @@ int run(const std::vector<const char*>& words) {
 
   const auto& [verb, action] = line.chosen();
   stages::RunConfig config;
-  cli::Context context{line.common, config, console, {}, {}};
+  cli::Context context{line.common, config, console, {}, {}, {}};
   context.progress.report = [&console](const ProgressEvent& event) { console.progress(event); };
   context.progress.cancel = &interrupt_flag();
 
   const CLI::App& given = *line.app.get_subcommand(verb->name);
   Status status = check_no_empty_values(given);
   if (status) status = check_machine(line.common);
-  if (status) status = resolve_config(line.common, given, config);
+  if (status) status = resolve_config(given, context);
   if (status && line.common.print_config) {
     console.data(config.settings().to_toml());
     context.result = {{"config", config.settings().to_json()}};
   } else if (status) {
-    status = traced(line.common.trace_file, verb->name, [&] { return action(context); });
+    const std::string no_file;
+    status = traced(line.common.dry_run ? no_file : line.common.trace_file, verb->name,
+                    [&] { return action(context); });
   }
   return finish(verb->name, console, status, std::move(context.result));
 }

@@ -47,16 +47,19 @@ def kinds_of(name):
 
 
 def programs():
-    for folder in ("core", "recon", "fusion"):
-        for program in sorted((BUILD / "tests" / folder).rglob("*_test")):
-            if program.is_file():
-                yield program
+    found = [program for folder in ("core", "recon", "fusion")
+             for program in sorted((BUILD / "tests" / folder).rglob("*_test")) if program.is_file()]
+    if not found:
+        sys.exit(f"no test programs in {BUILD}: build them first")
+    return found
 
 
 def tests_of(program):
-    listed = subprocess.run([program, "--gtest_list_tests"], capture_output=True, text=True).stdout
+    listed = subprocess.run([program, "--gtest_list_tests"], capture_output=True, text=True)
+    if listed.returncode != 0:
+        sys.exit(f"{program} can't list its tests")
     suite = ""
-    for line in listed.splitlines():
+    for line in listed.stdout.splitlines():
         if line and not line.startswith(" "):
             suite = line.split("#")[0].strip()
         elif line.strip() and suite.endswith("."):
@@ -64,10 +67,12 @@ def tests_of(program):
 
 
 def gave(program, names):
-    """Those of `names` that passed; a case that crashes is no pass, nor are those behind it."""
+    """Those of `names` that passed, and those this machine can't run; a case that crashes is no pass,
+    nor are those behind it."""
     done = subprocess.run([program, "--gtest_filter=" + ":".join(names)], capture_output=True,
                           text=True)
-    return {name for name in names if f"[       OK ] {name} (" in done.stdout}
+    return [{name for name in names if f"[  {state} ] {name} (" in done.stdout}
+            for state in ("     OK", "SKIPPED")]
 
 
 def main():
@@ -84,14 +89,16 @@ def main():
             for name, kinds in cases.items():
                 print(program.name, name, ", ".join(kinds))
             continue
-        passed = gave(program, list(cases))
-        failed += [name for name in cases if name not in passed]
+        passed, skipped = gave(program, list(cases))
+        failed += [name for name in cases if name not in passed | skipped]
         cells = []
         for kind in KINDS:
             of_kind = [name for name, kinds in cases.items() if kind in kinds]
             totals[kind] += len(of_kind)
             right = sum(name in passed for name in of_kind)
-            cells.append(f"{right} of {len(of_kind)}" if of_kind else "")
+            out = sum(name in skipped for name in of_kind)
+            cells.append((f"{right} of {len(of_kind)}" + (f", {out} not here" if out else ""))
+                         if of_kind else "")
         print(f"| `{program.name}` | " + " | ".join(cells) + " |")
     if "--list" not in sys.argv:
         print("| all | " + " | ".join(str(total) for total in totals.values()) + " |")

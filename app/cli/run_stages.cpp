@@ -154,121 +154,233 @@ Status resolve(StageFolders& folders) {
 
 namespace {
 
-/// Says the plan before the first stage; a budget that can't be held is a warning.
-Result<std::unique_ptr<planning::RunPlanner>> start_planner(Context& context,
-                                                            const stages::SessionInput& input,
-                                                            const pipeline::RunOptions& options,
-                                                            double budget_s, double start_s) {
+/// What run.json says of a plan: the budget, and the user's values of the keys that it sets.
+struct PlannedBefore {
+  double budget_s = 0;
+  json users;
+  std::vector<std::string> given;
+};
+
+PlannedBefore planned_before(const std::string& folder) {
+  const auto run = earlier_run(folder);
+  if (!run || !run->is_object()) return {};
+  try {
+    const json& planned = run->at("planned");
+    return {planned.at("budget_s").get<double>(), planned.at("users").get<json::object_t>(),
+            planned.at("given").get<std::vector<std::string>>()};
+  } catch (const json::exception&) {
+    return {};  // it had none
+  }
+}
+
+json planned_values(stages::RunConfig& config) {
+  json values = json::object();
+  const config::Settings settings = config.settings();
+  for (const config::Setting& setting : settings.list())
+    if (std::count(std::begin(planning::planned_keys), std::end(planning::planned_keys),
+                   setting.key) > 0)
+      values[setting.key] = setting.get();
+  return values;
+}
+
+/// run.json holds what a run was made with, the planner's choices among it: for another plan they
+/// become again what they were.
+Status take_back_plan(Context& context, const PlannedBefore& before) {
+  config::Settings settings = context.config.settings();
+  for (const char* key : planning::planned_keys)
+    if (before.users.contains(key) && context.given.count(key) == 0)
+      ORBITFUSE_TRY(settings.apply(fmt::format("{}={}", key, before.users.at(key).dump())));
+  context.given.insert(before.given.begin(), before.given.end());
+  return context.config.validate();
+}
+
+/// One call of run_stages() or run_planned().
+class StagedRun {
+ public:
+  StagedRun(Context& context, StageFolders folders, Missing missing)
+      : context_(context), folders_(std::move(folders)), missing_(missing) {}
+
+  Status open(const std::vector<std::string>& targets);
+  /// Says the plan before the first stage; a budget that can't be held is a warning.
+  Status plan(double budget_s);
+  /// `whole`: of the verb that runs everything, so that an earlier plan no longer counts.
+  Status run(bool whole);
+
+ private:
+  void before_stage(pipeline::Stage& stage, const std::vector<StageStatus>& finished);
+  Status record(const pipeline::RunSummary& summary, const json& list);
+  void warn_of_overrun() const;
+  double elapsed_s() const { return wall_seconds() - start_s_; }
+
+  Context& context_;
+  StageFolders folders_;
+  const Missing missing_;
+  const double start_s_ = wall_seconds();
+  stages::SessionInput input_;
+  std::string session_;
+  pipeline::RunOptions options_;
+  std::unique_ptr<planning::RunPlanner> planner_;
+  double budget_s_ = 0;
+  json planned_;  ///< for run.json; null: there is no plan
+};
+
+Status StagedRun::open(const std::vector<std::string>& targets) {
+  ORBITFUSE_TRY(resolve(folders_));
+  ORBITFUSE_ASSIGN(input_, stages::open_session_input(folders_.session, context_.progress));
+  for (const std::string& warning : input_.session.warnings) context_.console.warning(warning);
+  session_ = fs::absolute(folders_.session).lexically_normal().string();
+  if (const auto earlier = earlier_run(folders_.out);
+      earlier && !earlier->is_null() && (*earlier)["session"] != session_)
+    context_.console.warning(
+        fmt::format("{} holds results of {}: what this run doesn't reach stays that session's; "
+                    "give each session an --out of its own",
+                    folders_.out, (*earlier)["session"].get<std::string>()));
+  if (missing_ == Missing::leave_out && pipeline::finished_stages(folders_.out).empty())
+    return fail(
+        ErrorKind::input, folders_.out, "no finished stage in it",
+        "run the session first: orbitfuse run " + folders_.session + " --out " + folders_.out);
+  options_ = {.out = folders_.out,
+              .targets = targets,
+              .force = context_.common.force,
+              .resume = context_.common.resume,
+              .dry_run = context_.common.dry_run,
+              .targets_only = missing_ == Missing::leave_out};
+  return {};
+}
+
+Status StagedRun::plan(double budget_s) {
+  budget_s_ = budget_s;
+  planned_ = {{"budget_s", budget_s},
+              {"users", planned_values(context_.config)},
+              {"given", context_.given}};
   planning::PlannerInput planned;
   planned.budget_s = budget_s;
-  ORBITFUSE_ASSIGN(planned.facts, planning::look_at(input, context.config));
-  planned.stages = pipeline::closure(stages::build_stages(input, context.config), options.targets);
+  ORBITFUSE_ASSIGN(planned.facts, planning::look_at(input_, context_.config));
+  planned.stages =
+      pipeline::closure(stages::build_stages(input_, context_.config), options_.targets);
   planned.slowness = planning::measured_slowness();
-  for (const auto& [modality, content] : input.content) planned.session_content += content + " ";
-  planned.spent_s = wall_seconds() - start_s;
-  auto planner = std::make_unique<planning::RunPlanner>(std::move(planned), options.out,
-                                                        context.config, context.common.force);
-  context.console.info(fmt::format("plan for {:.0f} s: {}", budget_s, planner->described()));
-  if (!planner->first().fits)
-    context.console.warning(fmt::format(
+  for (const auto& [modality, content] : input_.content) planned.session_content += content + " ";
+  planned.elapsed_s = [this] { return elapsed_s(); };
+  planned.given = context_.given;
+  planned.afresh = context_.common.force;
+  planner_ =
+      std::make_unique<planning::RunPlanner>(std::move(planned), options_.out, context_.config);
+  context_.result["budget_s"] = budget_s;
+  context_.console.info(fmt::format("plan for {:.0f} s: {}", budget_s, planner_->described()));
+  if (!planner_->first().fits)
+    context_.console.warning(fmt::format(
         "--budget: {:.0f} s are too few for this session on this machine; with the least of "
         "everything it takes about {:.0f} s, and that is done",
-        budget_s, planner->first().expected_s));
-  else if (!planner->first().all_used)
-    context.console.info(
-        fmt::format("more than {:.0f} s would bring nothing that was ever measured",
-                    planner->first().expected_s));
-  return planner;
+        budget_s, planner_->first_total_s()));
+  if (const std::string remark = planner_->remark(); !remark.empty()) context_.console.info(remark);
+  return {};
+}
+
+void StagedRun::before_stage(pipeline::Stage& stage, const std::vector<StageStatus>& finished) {
+  const std::string warning = planner_->decide(stage.name, finished);
+  if (!warning.empty()) context_.console.warning(warning);
+  for (pipeline::Stage& now : stages::build_stages(input_, context_.config))
+    if (now.name == stage.name) stage = now;
+  // The report tells of the plan. A disk that can't be written to stops the stage itself.
+  if (!options_.dry_run) (void)planner_->save(finished);
+}
+
+/// run.json.
+Status StagedRun::record(const pipeline::RunSummary& summary, const json& list) {
+  if (options_.dry_run || summary.stages.empty()) return {};
+  json run = {{"schema", 1},
+              {"session", session_},
+              {"orbitfuse", pipeline::software_version()},
+              {"config", context_.config.settings().to_json()},
+              {"seed", context_.config.seed},
+              {"stages", list}};
+  if (!planned_.is_null()) run["planned"] = planned_;
+  if (summary.error && !keeps_options(summary.error->kind)) {
+    const json before = earlier_run(folders_.out).value_or(json());
+    const bool known =
+        before.is_object() && before.contains("session") && before["session"] == session_;
+    for (const char* key : {"config", "seed", "planned"}) {
+      if (known && before.contains(key))
+        run[key] = before[key];
+      else
+        run.erase(key);
+    }
+  }
+  return write_file_atomic(fs::path(folders_.out) / run_file, run.dump(2) + "\n");
+}
+
+void StagedRun::warn_of_overrun() const {
+  constexpr double late = 1.05;
+  if (planner_ && planner_->expects_to_hold() && elapsed_s() > late * budget_s_)
+    context_.console.warning(fmt::format("--budget: the run took {:.0f} s of the {:.0f} s it had",
+                                         elapsed_s(), budget_s_));
+}
+
+Status StagedRun::run(bool whole) {
+  pipeline::Runner runner(stages::build_stages(input_, context_.config), options_,
+                          context_.progress);
+  runner.before_stage = [&](pipeline::Stage& stage, const std::vector<StageStatus>& finished) {
+    if (planner_) return before_stage(stage, finished);
+    std::error_code ignored;  // a plan of an earlier run tells nothing of this one
+    if (whole && finished.empty() && !options_.dry_run)
+      fs::remove(fs::path(folders_.out) / planning::plan_file, ignored);
+  };
+  runner.on_status = [&](const StageStatus& status) {
+    announce(context_.console, status, options_.dry_run);
+    json event = status_json(status);
+    event["event"] = "stage";
+    context_.console.event(event);
+  };
+  if (!whole && !planner_) {  // the plan of the run whose results these are stays known
+    PlannedBefore before = planned_before(folders_.out);
+    const json values = planned_values(context_.config);
+    for (const auto& [key, value] : values.items())
+      if (context_.given.count(key) > 0) {
+        before.users[key] = value;
+        before.given.push_back(key);
+      }
+    if (before.budget_s > 0)
+      planned_ = {{"budget_s", before.budget_s}, {"users", before.users}, {"given", before.given}};
+  }
+  const pipeline::RunSummary summary = runner.run();
+  warn_of_overrun();
+  json list = json::array();
+  for (const StageStatus& status : summary.stages) list.push_back(status_json(status));
+  context_.result.update({{"session", folders_.session}, {"out", folders_.out}, {"stages", list}});
+  // Locked out, nothing of this folder is ours to write.
+  Status written = record(summary, list);
+  if (written && planner_ && !options_.dry_run && !summary.stages.empty())
+    written = planner_->save(summary.stages);
+  if (summary.error) return tl::unexpected(*summary.error);
+  ORBITFUSE_TRY(written);
+  const StageStatus* report = summary.find("report");
+  if (report && report->done()) {
+    const std::string page = (fs::path(folders_.out) / "report" / "report.html").string();
+    context_.result["report"] = page;
+    context_.console.data(page);
+  }
+  return {};
 }
 
 }  // namespace
 
-Status run_stages(Context& context, const StageFolders& given,
-                  const std::vector<std::string>& targets, Missing missing, RunBudget budget_s) {
-  const double start_s = wall_seconds();
-  StageFolders folders = given;
-  ORBITFUSE_TRY(resolve(folders));
-  ORBITFUSE_ASSIGN(stages::SessionInput input,
-                   stages::open_session_input(folders.session, context.progress));
-  for (const std::string& warning : input.session.warnings) context.console.warning(warning);
-  const std::string session = fs::absolute(folders.session).lexically_normal().string();
-  if (const auto earlier = earlier_run(folders.out);
-      earlier && !earlier->is_null() && (*earlier)["session"] != session)
-    context.console.warning(
-        fmt::format("{} holds results of {}: what this run doesn't reach stays that session's; "
-                    "give each session an --out of its own",
-                    folders.out, (*earlier)["session"].get<std::string>()));
-  if (missing == Missing::leave_out && pipeline::finished_stages(folders.out).empty())
-    return fail(
-        ErrorKind::input, folders.out, "no finished stage in it",
-        "run the session first: orbitfuse run " + folders.session + " --out " + folders.out);
-  const pipeline::RunOptions options{.out = folders.out,
-                                     .targets = targets,
-                                     .force = context.common.force,
-                                     .resume = context.common.resume,
-                                     .dry_run = context.common.dry_run,
-                                     .targets_only = missing == Missing::leave_out};
-  std::unique_ptr<planning::RunPlanner> planner;
-  if (budget_s) {
-    ORBITFUSE_ASSIGN(planner, start_planner(context, input, options, *budget_s, start_s));
-  }
-  if (!budget_s && targets.empty() && !options.dry_run) {
-    std::error_code ignored;  // a plan of an earlier run tells nothing of this one
-    fs::remove(fs::path(folders.out) / planning::plan_file, ignored);
-  }
-  pipeline::Runner runner(stages::build_stages(input, context.config), options, context.progress);
-  if (planner)
-    runner.before_stage = [&](pipeline::Stage& stage, const std::vector<StageStatus>& finished) {
-      planner->decide(stage.name, finished);
-      for (pipeline::Stage& now : stages::build_stages(input, context.config))
-        if (now.name == stage.name) stage = now;
-      // The report tells of the plan. A disk that can't be written to stops the stage itself.
-      if (!options.dry_run) (void)planner->save(finished);
-    };
-  runner.on_status = [&](const StageStatus& status) {
-    announce(context.console, status, options.dry_run);
-    json event = status_json(status);
-    event["event"] = "stage";
-    context.console.event(event);
-  };
-  const pipeline::RunSummary summary = runner.run();
-  if (planner) {
-    context.result["budget_s"] = *budget_s;
-    if (!options.dry_run) ORBITFUSE_TRY(planner->save(summary.stages));
-  }
+Status run_stages(Context& context, const StageFolders& folders,
+                  const std::vector<std::string>& targets, Missing missing) {
+  StagedRun staged(context, folders, missing);
+  ORBITFUSE_TRY(staged.open(targets));
+  return staged.run(false);
+}
 
-  json list = json::array();
-  for (const StageStatus& status : summary.stages) list.push_back(status_json(status));
-  context.result.update({{"session", folders.session}, {"out", folders.out}, {"stages", list}});
-  if (!context.common.dry_run && !summary.stages.empty()) {
-    json run = {{"schema", 1},
-                {"session", session},
-                {"orbitfuse", pipeline::software_version()},
-                {"config", context.config.settings().to_json()},
-                {"seed", context.config.seed},
-                {"stages", list}};
-    if (summary.error && !keeps_options(summary.error->kind)) {
-      const json before = earlier_run(folders.out).value_or(json());
-      const bool known =
-          before.is_object() && before.contains("session") && before["session"] == session;
-      for (const char* key : {"config", "seed"}) {
-        if (known && before.contains(key))
-          run[key] = before[key];
-        else
-          run.erase(key);
-      }
-    }
-    Status written = write_file_atomic(fs::path(folders.out) / run_file, run.dump(2) + "\n");
-    if (!written && !summary.error) return written;
+Status run_planned(Context& context, const StageFolders& folders,
+                   const std::vector<std::string>& targets, std::optional<double> budget_s) {
+  if (const PlannedBefore before = planned_before(folders.session); before.budget_s > 0) {
+    ORBITFUSE_TRY(take_back_plan(context, before));
+    if (!budget_s) budget_s = before.budget_s;
   }
-  if (summary.error) return tl::unexpected(*summary.error);
-  const StageStatus* report = summary.find("report");
-  if (report && report->done()) {
-    const std::string page = (fs::path(folders.out) / "report" / "report.html").string();
-    context.result["report"] = page;
-    context.console.data(page);
-  }
-  return {};
+  StagedRun staged(context, folders, Missing::run);
+  ORBITFUSE_TRY(staged.open(targets));
+  if (budget_s) ORBITFUSE_TRY(staged.plan(*budget_s));
+  return staged.run(targets.empty());
 }
 
 }  // namespace orbitfuse::cli

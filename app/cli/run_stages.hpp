@@ -31,13 +31,14 @@ enum class Missing {
   leave_out  ///< stays away: the targets work with what is there
 };
 
-/// Time for a whole run, that a planner spends; none: stages do what their options say.
-using RunBudget = std::optional<double>;
-
 /// Runs the targets and all they read, says how each stage fared, and fills the --json result.
 /// Empty targets: every stage.
 Status run_stages(Context& context, const StageFolders& folders,
-                  const std::vector<std::string>& targets, Missing missing = Missing::run,
-                  RunBudget budget_s = std::nullopt);
+                  const std::vector<std::string>& targets, Missing missing = Missing::run);
+
+/// The same for a run whose time is planned. Without a budget it is that of the run whose folder is
+/// given; if that had none either, stages do what their options say.
+Status run_planned(Context& context, const StageFolders& folders,
+                   const std::vector<std::string>& targets, std::optional<double> budget_s);
 
 }  // namespace orbitfuse::cli

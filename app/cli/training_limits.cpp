@@ -8,8 +8,7 @@
 namespace orbitfuse::cli {
 namespace {
 
-constexpr int unlimited_steps = 10'000'000;  // the budget ends the run
-constexpr int target_evaluations = 24;       // a target is seen within a 24th of the run
+constexpr int target_evaluations = 24;  // a target is seen within a 24th of the run
 
 }  // namespace
 
@@ -60,7 +59,7 @@ Status apply(const TrainingLimits& limits, const std::vector<Modality>& fields,
         field == Modality::visible ? config.train_visible.options : config.train_thermal.options;
     if (budget_s > 0) {
       options.budget_s = budget_s;
-      options.iterations = unlimited_steps;
+      options.iterations = stages::unlimited_steps;
     }
     if (limits.target_psnr > 0) {
       options.target_psnr = limits.target_psnr;

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,7 @@ struct Context {
   stages::RunConfig& config;
   terminal::Console& console;
   Progress progress;
+  std::set<std::string> given;  ///< keys of `config` that the user gave with this call
   nlohmann::json result = nlohmann::json::object();  ///< body of the last --json line
 };
 

@@ -119,8 +119,10 @@ Status Settings::read_toml(const std::filesystem::path& file) {
   // A preset sets many fields, which the other keys then change.
   std::stable_partition(entries.begin(), entries.end(),
                         [](const Entry& e) { return e.key.ends_with(".preset"); });
-  for (const Entry& e : entries)
+  for (const Entry& e : entries) {
     ORBITFUSE_TRY(set(e.key, e.value, fmt::format("{}:{}", file.string(), e.line)));
+    given_.insert(e.key);
+  }
   return {};
 }
 
@@ -145,7 +147,9 @@ Status Settings::apply(const std::string& assignment) {
     return fail(ErrorKind::usage, where, "it is not UTF-8", "write it as UTF-8");
   json value = parse_json(text);
   if (value.is_discarded()) value = text;
-  return set(key, value, where);
+  ORBITFUSE_TRY(set(key, value, where));
+  given_.insert(key);
+  return {};
 }
 
 json Settings::to_json(const std::string& prefix) const {

@@ -7,6 +7,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -46,6 +47,8 @@ class Settings {
   void add(Setting setting) { list_.push_back(std::move(setting)); }
 
   const std::vector<Setting>& list() const { return list_; }
+  /// Keys that read_toml() and apply() have set: the user's own words.
+  const std::set<std::string>& given() const { return given_; }
 
   /// Usage error naming file, line and key; an unknown key with the nearest known one.
   Status read_toml(const std::filesystem::path& file);
@@ -118,6 +121,7 @@ class Settings {
   }
 
   std::vector<Setting> list_;
+  std::set<std::string> given_;
 };
 
 template <class E>

@@ -9,6 +9,7 @@
 #include "core/system/file_io.hpp"
 #include "core/system/process.hpp"
 #include "core/system/scratch_folder.hpp"
+#include "core/system/trace.hpp"
 
 namespace orbitfuse::inspection {
 namespace fs = std::filesystem;
@@ -77,6 +78,7 @@ Status print_pdf(const fs::path& html, const fs::path& pdf, const Progress& prog
   // Its sandbox refuses to start for root; the page is ours and has no script.
   if (::geteuid() == 0) command.emplace_back("--no-sandbox");
   command.push_back(file_url(page));
+  const TraceSpan span("print pdf");
   ORBITFUSE_ASSIGN(const int status, run_process(command, log, "pdf", progress));
   const auto bytes = read_file(printed);
   if (status != 0 || !bytes || !bytes->starts_with("%PDF"))

@@ -10,7 +10,7 @@ namespace orbitfuse::planning {
 struct ExpectedErrors {
   double visible_psnr_db = 0;
   double thermal_mae_k = 0;
-  /// Half the width of an interval that holds nine scenes of ten, before anything has run.
+  /// How far scenes lay from this that had no part in it: seven of eight, three of four.
   double visible_spread_db = 0, thermal_spread_k = 0;
 };
 

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <optional>
-#include <set>
 #include <string>
+#include <vector>
 
 #include "app/planning/error_curves.hpp"
 #include "app/planning/stage_costs.hpp"

@@ -12,39 +12,14 @@
 namespace orbitfuse::planning {
 namespace {
 using nlohmann::json;
+using pipeline::StageState;
 using pipeline::StageStatus;
 
-constexpr int schema = 1;
+constexpr int schema = 2;
 /// The measured slowness counts like so many seconds of finished stages.
 constexpr double probe_weight_s = 6;
 /// Kept back for what no stage's figure has: a slow disk, a busy neighbour.
 constexpr double reserve = 0.01;
-/// Time ends a training, not steps; a field that takes them faster than expected gets more.
-constexpr double headroom = 1.25;
-/// Whose seconds are this machine's, not the scene's.
-constexpr const char* tell_the_machine[] = {"depth", "train_visible", "train_thermal", "render"};
-
-bool known(const json& plan) {
-  const auto has = [&](const char* key, auto is) {
-    return plan.contains(key) && (plan.at(key).*is)();
-  };
-  return plan.is_object() && has("schema", &json::is_number_integer) &&
-         plan.at("schema") == schema && has("budget_s", &json::is_number) &&
-         has("session_content", &json::is_string) && has("choices", &json::is_object);
-}
-
-json read_plan(const std::filesystem::path& out) {
-  const auto text = read_file(out / plan_file);
-  const json plan = text ? parse_json(*text) : json();
-  return known(plan) ? plan : json();
-}
-
-double wall_s(const std::vector<StageStatus>& finished) {
-  double sum = 0;
-  for (const StageStatus& status : finished)
-    if (status.done() || status.error) sum += status.wall_s;
-  return sum;
-}
 
 const StageStatus* find(const std::vector<StageStatus>& finished, const std::string& stage) {
   const auto it = std::find_if(finished.begin(), finished.end(), [&](const StageStatus& status) {
@@ -53,158 +28,200 @@ const StageStatus* find(const std::vector<StageStatus>& finished, const std::str
   return it == finished.end() ? nullptr : &*it;
 }
 
-/// Dotted keys as a configuration file nests them.
-json nested(const json& choice) {
-  json tree = json::object();
-  for (const auto& [key, value] : choice.items()) {
-    json* at = &tree;
-    std::size_t begin = 0;
-    for (std::size_t dot = key.find('.'); dot != std::string::npos; dot = key.find('.', begin)) {
-      at = &(*at)[key.substr(begin, dot - begin)];
-      begin = dot + 1;
-    }
-    (*at)[key.substr(begin)] = value;
+json to_json(const Plan& plan) {
+  return {{"depth_width_px", plan.effort.depth_width_px},
+          {"visible_steps", plan.effort.visible_steps},
+          {"thermal_steps", plan.effort.thermal_steps},
+          {"scored_views", plan.effort.scored_views},
+          {"expected_s", plan.expected_s},
+          {"fits", plan.fits},
+          {"all_used", plan.all_used}};
+}
+
+std::optional<Plan> plan_of(const json& values) {
+  try {
+    Plan plan;
+    values.at("depth_width_px").get_to(plan.effort.depth_width_px);
+    values.at("visible_steps").get_to(plan.effort.visible_steps);
+    values.at("thermal_steps").get_to(plan.effort.thermal_steps);
+    values.at("scored_views").get_to(plan.effort.scored_views);
+    values.at("expected_s").get_to(plan.expected_s);
+    values.at("fits").get_to(plan.fits);
+    values.at("all_used").get_to(plan.all_used);
+    return plan;
+  } catch (const json::exception&) {
+    return std::nullopt;
   }
-  return tree;
 }
 
 }  // namespace
 
-RunPlanner::RunPlanner(PlannerInput input, std::filesystem::path out, stages::RunConfig& config,
-                       bool afresh)
+RunPlanner::RunPlanner(PlannerInput input, std::filesystem::path out, stages::RunConfig& config)
     : input_(std::move(input)), out_(std::move(out)), config_(config), slowness_(input_.slowness) {
-  const json earlier = read_plan(out_);
-  if (!earlier.is_null()) take_back_earlier_choices(earlier);
   settle_what_the_user_set();
-  first_ = plan_from(input_.stages.empty() ? "" : input_.stages.front(),
-                     (1 - reserve) * input_.budget_s - input_.spent_s);
-  const bool same = !afresh && !earlier.is_null() && earlier.at("budget_s") == input_.budget_s &&
-                    earlier.at("session_content") == input_.session_content;
-  if (same)
-    for (const auto& [stage, choice] : earlier["choices"].items())
-      if (choice.is_object()) choices_[stage] = choice;
+  const auto text = read_file(out_ / plan_file);
+  const json earlier = text ? parse_json(*text) : json();
+  if (!input_.afresh && earlier.is_object()) follow_earlier(earlier);
+  if (followed_) return;
+  first_ = plan_from(input_.stages.empty() ? "" : input_.stages.front());
+  first_total_s_ = first_.expected_s + input_.elapsed_s();
 }
 
-void RunPlanner::take_back_earlier_choices(const json& earlier) {
-  stages::RunConfig defaults;
-  const json now = config_.settings().to_json(), usual = defaults.settings().to_json();
-  const auto at = [](const json& tree, std::string key) {
-    std::replace(key.begin(), key.end(), '.', '/');
-    const json::json_pointer where("/" + key);
-    return tree.contains(where) ? tree.at(where) : json();
-  };
-  for (const auto& [stage, choice] : earlier.at("choices").items()) {
-    if (!choice.is_object()) continue;
-    for (const auto& [key, value] : choice.items())
-      if (at(now, key) == value)
-        (void)config_.settings().read_json(nested({{key, at(usual, key)}}), plan_file);
-  }
+/// All that a plan depends on but the machine, which is never twice as fast as before.
+json RunPlanner::made_for() const {
+  return {{"schema", schema},
+          {"budget_s", input_.budget_s},
+          {"session_content", input_.session_content},
+          {"stages", input_.stages},
+          {"facts", to_json(input_.facts)},
+          {"set by the user", users_}};
+}
+
+void RunPlanner::follow_earlier(const json& earlier) {
+  const auto at = [&](const char* key) { return earlier.contains(key) ? earlier.at(key) : json(); };
+  if (at("made_for") != made_for()) return;
+  const auto plan = plan_of(at("plan"));
+  if (!plan || !at("expected_total_s").is_number()) return;
+  first_ = *plan;
+  first_total_s_ = at("expected_total_s").get<double>();
+  choices_ = choices_of(at("choices"));
+  followed_ = true;
 }
 
 void RunPlanner::settle_what_the_user_set() {
-  const stages::RunConfig usual;
-  const auto given = [](int value, int normal) {
-    return value == normal ? std::optional<int>() : value;
+  stages::RunConfig defaults;
+  const config::Settings now = config_.settings(), usual = defaults.settings();
+  for (std::size_t i = 0; i < now.list().size(); ++i) {
+    const config::Setting& setting = now.list()[i];
+    const bool planned = std::find(std::begin(planned_keys), std::end(planned_keys), setting.key) !=
+                         std::end(planned_keys);
+    if (planned && (input_.given.count(setting.key) > 0 || setting.get() != usual.list()[i].get()))
+      users_[setting.key] = setting.get();
+  }
+  const auto steps = [&](const std::string& table, const nerf::TrainOptions& options,
+                         double step_s) -> std::optional<int> {
+    if (!users_.contains(table + ".budget_s") && !users_.contains(table + ".iterations"))
+      return std::nullopt;
+    const double in_time = options.budget_s > 0 ? options.budget_s / (step_s * slowness_) : 1e9;
+    return static_cast<int>(std::min<double>(options.iterations, in_time));
   };
-  settled_.depth_width_px = given(config_.depth.width_px, usual.depth.width_px);
-  settled_.visible_steps =
-      given(config_.train_visible.options.iterations, usual.train_visible.options.iterations);
-  settled_.thermal_steps =
-      given(config_.train_thermal.options.iterations, usual.train_thermal.options.iterations);
-  settled_.scored_views = given(config_.metrics.scored_views, usual.metrics.scored_views);
+  if (users_.contains("depth.width_px")) settled_.depth_width_px = config_.depth.width_px;
+  settled_.visible_steps = steps("train.visible", config_.train_visible.options, visible_step_s());
+  settled_.thermal_steps = steps("train.thermal", config_.train_thermal.options, thermal_step_s());
+  if (users_.contains("metrics.scored_views")) settled_.scored_views = config_.metrics.scored_views;
 }
 
-Plan RunPlanner::plan_from(const std::string& stage, double available_s) const {
+bool RunPlanner::comes(const char* stage) const {
+  return std::find(input_.stages.begin(), input_.stages.end(), stage) != input_.stages.end();
+}
+
+Plan RunPlanner::plan_from(const std::string& stage) const {
   const auto begin = std::find(input_.stages.begin(), input_.stages.end(), stage);
-  return make_plan(input_.facts, {begin, input_.stages.end()}, settled_, slowness_, available_s);
+  const double left_s = (1 - reserve) * input_.budget_s - input_.elapsed_s();
+  return make_plan(input_.facts, {begin, input_.stages.end()}, settled_, slowness_, left_s);
 }
 
+/// By stages whose seconds are this machine's and not the scene's, as those of poses are.
 double RunPlanner::slowness_after(const std::vector<StageStatus>& finished) const {
   double expected_s = probe_weight_s, took_s = probe_weight_s * input_.slowness;
-  for (const char* stage : tell_the_machine) {
+  const auto ran = [&](const char* stage) {
     const StageStatus* status = find(finished, stage);
-    if (status == nullptr) continue;
-    Effort done;
-    done.depth_width_px = config_.depth.width_px;
-    if (const int steps = status->output.metrics.value("iterations", 0); steps > 0)
-      done.visible_steps = done.thermal_steps = steps;
-    expected_s += stage_s(stage, input_.facts, done);
-    took_s += status->wall_s;
-  }
+    return status != nullptr && status->state == StageState::ran ? status : nullptr;
+  };
+  for (const char* stage : {"depth", "render"})
+    if (const StageStatus* status = ran(stage)) {
+      Effort done;
+      done.depth_width_px = config_.depth.width_px;
+      done.visible_steps = settled_.visible_steps.value_or(done.visible_steps);
+      expected_s += stage_s(stage, input_.facts, done);
+      took_s += status->wall_s;
+    }
+  const auto add_training = [&](const char* stage, double step_s) {
+    const StageStatus* status = ran(stage);
+    if (status == nullptr) return;
+    // Of all steps, those of a training that was extended included.
+    const json& metrics = status->output.metrics;
+    const double steps = metrics.value("iterations", 0.0),
+                 wall_s = metrics.value("train_wall_s", 0.0);
+    if (steps > 0 && wall_s > 0) expected_s += steps * step_s, took_s += wall_s;
+  };
+  add_training("train_visible", visible_step_s());
+  add_training("train_thermal", thermal_step_s());
   return took_s / expected_s;
 }
 
-json RunPlanner::choice_for(const std::string& stage, const Plan& plan) const {
-  json choice = json::object();
-  const Effort& effort = plan.effort;
-  const auto add_training = [&](const std::string& table, int steps, double step_s) {
-    choice[table + ".iterations"] = static_cast<int>(headroom * steps);
-    choice[table + ".budget_s"] = std::round(100 * steps * step_s * slowness_) / 100;
+void RunPlanner::choose(const std::string& stage, const Effort& effort) {
+  const auto time_s = [&](int steps, double step_s) {
+    return std::max(0.01, std::round(100 * steps * step_s * slowness_) / 100);
   };
-  if (stage == "depth" && !settled_.depth_width_px)
-    choice["depth.width_px"] = effort.depth_width_px;
-  if (stage == "train_visible") {
-    if (!settled_.visible_steps)
-      add_training("train.visible", effort.visible_steps, visible_step_s());
-  }
+  if (stage == "depth" && !settled_.depth_width_px) choices_.depth_width_px = effort.depth_width_px;
+  if (stage == "train_visible" && !settled_.visible_steps)
+    choices_.visible_s = time_s(effort.visible_steps, visible_step_s());
   if (stage == "train_thermal" && !settled_.thermal_steps)
-    add_training("train.thermal", effort.thermal_steps, thermal_step_s());
-  if (stage == "metrics" && !settled_.scored_views)
-    choice["metrics.scored_views"] = effort.scored_views;
-  return choice;
+    choices_.thermal_s = time_s(effort.thermal_steps, thermal_step_s());
+  if (stage == "metrics" && !settled_.scored_views) choices_.scored_views = effort.scored_views;
 }
 
-void RunPlanner::apply(const json& choice) {
-  // What doesn't fit any more, of a damaged file, is left as it is: a default.
-  (void)config_.settings().read_json(nested(choice), plan_file);
-  const auto settle = [&](const char* key, double value, std::optional<int>& settled) {
-    if (choice.contains(key)) settled = static_cast<int>(value);
-  };
-  settle("depth.width_px", config_.depth.width_px, settled_.depth_width_px);
-  settle("train.visible.iterations", config_.train_visible.options.iterations / headroom,
-         settled_.visible_steps);
-  settle("train.thermal.iterations", config_.train_thermal.options.iterations / headroom,
-         settled_.thermal_steps);
-  settle("metrics.scored_views", config_.metrics.scored_views, settled_.scored_views);
-}
-
-void RunPlanner::decide(const std::string& stage, const std::vector<StageStatus>& finished) {
-  if (choices_.count(stage) == 0) {
+std::string RunPlanner::decide(const std::string& stage, const std::vector<StageStatus>& finished) {
+  std::string warning;
+  if (!choices_.made_for(stage)) {
     slowness_ = slowness_after(finished);
-    const double available_s = (1 - reserve) * input_.budget_s - input_.spent_s - wall_s(finished);
-    const json choice = choice_for(stage, plan_from(stage, available_s));
-    if (choice.empty()) return;
-    choices_[stage] = choice;
+    const Plan plan = plan_from(stage);
+    choose(stage, plan.effort);
+    if (!plan.fits && first_.fits && !warned_) {
+      warned_ = true;
+      warning = fmt::format(
+          "--budget: {} and what follows take about {:.0f} s with the least of everything; the run "
+          "will end after about {:.0f} s, not {:.0f} s",
+          stage, plan.expected_s, input_.elapsed_s() + plan.expected_s, input_.budget_s);
+    }
   }
-  apply(choices_[stage]);
+  apply(choices_, config_);
+  // What is decided is settled for the stages behind it.
+  if (choices_.depth_width_px) settled_.depth_width_px = choices_.depth_width_px;
+  const auto steps = [&](double time_s, double step_s) {
+    return static_cast<int>(time_s / (step_s * slowness_));
+  };
+  if (choices_.visible_s) settled_.visible_steps = steps(*choices_.visible_s, visible_step_s());
+  if (choices_.thermal_s) settled_.thermal_steps = steps(*choices_.thermal_s, thermal_step_s());
+  return warning;
 }
 
 std::string RunPlanner::described() const {
   const Effort& effort = first_.effort;
   const SceneFacts& facts = input_.facts;
   std::vector<std::string> parts;
-  if (facts.visible_views > 0) {
-    if (facts.visible_views > 1)
-      parts.push_back(fmt::format("depth at {} px", effort.depth_width_px));
-    parts.push_back(fmt::format("visible field {:.0f} s ({} steps)",
-                                effort.visible_steps * visible_step_s() * slowness_,
-                                effort.visible_steps));
-  }
-  if (facts.thermal_views > 0)
-    parts.push_back(fmt::format("thermal field {:.0f} s ({} steps)",
-                                effort.thermal_steps * thermal_step_s() * slowness_,
-                                effort.thermal_steps));
-  if (effort.scored_views > 0 && effort.scored_views < facts.new_views)
+  const auto field = [&](const char* name, int steps, double step_s) {
+    parts.push_back(
+        fmt::format("{} field {:.0f} s ({} steps)", name, steps * step_s * input_.slowness, steps));
+  };
+  if (comes("depth") && facts.visible_views > 1)
+    parts.push_back(fmt::format("depth at {} px", effort.depth_width_px));
+  const bool visible = comes("train_visible") && facts.visible_views > 0,
+             thermal = comes("train_thermal") && facts.thermal_views > 0;
+  if (visible) field("visible", effort.visible_steps, visible_step_s());
+  if (thermal) field("thermal", effort.thermal_steps, thermal_step_s());
+  if (comes("metrics") && effort.scored_views > 0 && effort.scored_views < facts.new_views)
     parts.push_back(
         fmt::format("fusion scored on {} of {} views", effort.scored_views, facts.new_views));
-  std::string text = fmt::format("{}", fmt::join(parts, ", "));
+  std::string text = fmt::format("{}{}; expected {:.0f} s", followed_ ? "as before, " : "",
+                                 fmt::join(parts, ", "), first_total_s_);
   const ExpectedErrors errors = expected_errors(facts, effort);
-  text += fmt::format("; expected {:.0f} s", first_.expected_s + input_.spent_s);
-  if (facts.visible_views > 0)
+  const bool tells_db = visible && facts.visible_measured,
+             tells_k = thermal && comes("metrics") && facts.thermal_measured;
+  if (tells_db)
     text += fmt::format(", {:.1f} +- {:.1f} dB", errors.visible_psnr_db, errors.visible_spread_db);
-  if (facts.thermal_views > 0)
+  if (tells_k)
     text += fmt::format(", {:.2f} +- {:.2f} K", errors.thermal_mae_k, errors.thermal_spread_k);
-  return text + " on held-out views";
+  return tells_db || tells_k ? text + " on held-out views" : text;
+}
+
+std::string RunPlanner::remark() const {
+  const bool free = !settled_.visible_steps && !settled_.thermal_steps && comes("report");
+  if (first_.fits && !first_.all_used && free)
+    return fmt::format("more than {:.0f} s would bring nothing that was ever measured",
+                       first_total_s_);
+  return {};
 }
 
 namespace {
@@ -226,35 +243,37 @@ MeasuredErrors errors_in(const std::vector<StageStatus>& finished) {
 
 json RunPlanner::table(const std::vector<StageStatus>& finished) const {
   auto rows = json::array();
-  const auto row = [&](const std::string& name, const std::string& expected,
-                       const std::string& came) {
-    rows.push_back({name, expected, came});
-  };
-  double took_s = input_.spent_s;
   for (const std::string& stage : input_.stages) {
+    if (stage == "report") continue;  // it holds this table
     const double expected_s = stage_s(stage, input_.facts, first_.effort) * input_.slowness;
     const StageStatus* status = find(finished, stage);
-    if (status != nullptr) took_s += status->wall_s;
-    if (expected_s > 0.05 || (status != nullptr && status->wall_s > 0.05))
-      row(stage, fmt::format("{:.1f} s", expected_s),
-          status != nullptr ? fmt::format("{:.1f} s", status->wall_s) : "");
+    const double took_s = status != nullptr ? status->wall_s : 0;
+    if (expected_s <= 0.05 && took_s <= 0.05) continue;
+    const bool earlier = status != nullptr && status->state == StageState::unchanged;
+    rows.push_back({stage, fmt::format("{:.1f} s", expected_s),
+                    status == nullptr
+                        ? ""
+                        : fmt::format("{:.1f} s{}", took_s, earlier ? ", before this run" : "")});
   }
-  row("all, of " + fmt::format("{:.0f} s", input_.budget_s),
-      fmt::format("{:.1f} s", first_.expected_s + input_.spent_s), fmt::format("{:.1f} s", took_s));
+  rows.push_back({fmt::format("all, of {:.0f} s", input_.budget_s),
+                  fmt::format("{:.1f} s", first_total_s_),
+                  fmt::format("{:.1f} s so far", input_.elapsed_s())});
   const ExpectedErrors errors = expected_errors(input_.facts, first_.effort);
   const MeasuredErrors measured = errors_in(finished);
   if (measured.visible_psnr_db.is_number())
-    row("visible, held-out views",
-        fmt::format("{:.1f} +- {:.1f} dB", errors.visible_psnr_db, errors.visible_spread_db),
-        fmt::format("{:.1f} dB", measured.visible_psnr_db.get<double>()));
+    rows.push_back(
+        {"visible, held-out views",
+         fmt::format("{:.1f} +- {:.1f} dB", errors.visible_psnr_db, errors.visible_spread_db),
+         fmt::format("{:.1f} dB", measured.visible_psnr_db.get<double>())});
   if (measured.thermal_mae_k.is_number())
-    row("thermal, held-out views",
-        fmt::format("{:.2f} +- {:.2f} K", errors.thermal_mae_k, errors.thermal_spread_k),
-        fmt::format("{:.2f} K", measured.thermal_mae_k.get<double>()));
-  const json columns =
-      json::array({json::array({"stage", "Of the run's budget"}),
-                   json::array({"expected", "Before the first stage; +- holds nine scenes of ten"}),
-                   json::array({"came", "Wall seconds, and the errors the run measured"})});
+    rows.push_back(
+        {"thermal, held-out views",
+         fmt::format("{:.2f} +- {:.2f} K", errors.thermal_mae_k, errors.thermal_spread_k),
+         fmt::format("{:.2f} K", measured.thermal_mae_k.get<double>())});
+  const json columns = json::array(
+      {json::array({"stage", "Of the run's budget"}),
+       json::array({"expected", "Before the first stage; +- as far as most scenes lay from it"}),
+       json::array({"came", "Wall seconds, and the errors the run measured"})});
   return {{"title", "Plan and outcome"}, {"columns", columns}, {"rows", rows}};
 }
 
@@ -264,16 +283,17 @@ Status RunPlanner::save(const std::vector<StageStatus>& finished) const {
   const json plan = {
       {"schema", schema},
       {"budget_s", input_.budget_s},
-      {"session_content", input_.session_content},
+      {"made_for", made_for()},
       {"slowness", slowness_},
-      {"fits", first_.fits},
+      {"plan", to_json(first_)},
+      {"expected_total_s", first_total_s_},
       {"expected",
-       {{"wall_s", first_.expected_s + input_.spent_s},
-        {"visible_psnr_db", errors.visible_psnr_db},
-        {"thermal_mae_k", errors.thermal_mae_k}}},
+       {{"visible_psnr_db", errors.visible_psnr_db}, {"thermal_mae_k", errors.thermal_mae_k}}},
       {"measured",
-       {{"visible_psnr_db", measured.visible_psnr_db}, {"thermal_mae_k", measured.thermal_mae_k}}},
-      {"choices", choices_},
+       {{"wall_s", input_.elapsed_s()},
+        {"visible_psnr_db", measured.visible_psnr_db},
+        {"thermal_mae_k", measured.thermal_mae_k}}},
+      {"choices", planning::to_json(choices_)},
       {"table", table(finished)}};
   return write_file_atomic(out_ / plan_file, plan.dump(2) + "\n");
 }

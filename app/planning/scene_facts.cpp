@@ -5,12 +5,13 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "core/formats/transforms_json.hpp"
 #include "core/image/image_io.hpp"
 
 namespace orbitfuse::planning {
 namespace {
 
-constexpr int seen_width_px = 640, coarse_width_px = 100;
+constexpr int most_width_px = 640, coarse_width_px = 100;
 constexpr std::size_t every = 4;  // neighbours show the same
 
 double smoothness_db(const cv::Mat& photo) {
@@ -21,7 +22,9 @@ double smoothness_db(const cv::Mat& photo) {
     return to;
   };
   cv::Mat fine;
-  scaled(photo, seen_width_px, cv::INTER_AREA).convertTo(fine, CV_32F, 1.0 / 255);
+  // Enlarged, a small photo would look as if its scene had no detail.
+  scaled(photo, std::min(most_width_px, photo.cols), cv::INTER_AREA)
+      .convertTo(fine, CV_32F, 1.0 / 255);
   cv::Mat coarse = scaled(fine, coarse_width_px, cv::INTER_AREA), again;
   cv::resize(coarse, again, fine.size(), 0, 0, cv::INTER_LINEAR);
   const double rms = cv::norm(fine, again) / std::sqrt(static_cast<double>(fine.total()) *
@@ -42,7 +45,37 @@ bool all_posed(const std::vector<const FrameRecord*>& frames) {
   });
 }
 
+/// How many new views there will be, and of what size.
+Status look_at_new_views(const stages::RenderConfig& config, double height_by_width,
+                         SceneFacts& facts) {
+  facts.new_views = config.path.views;
+  facts.new_view_mpx = 1e-6 * config.path.width_px * config.path.width_px * height_by_width;
+  if (config.cameras.empty()) return {};
+  ORBITFUSE_ASSIGN(const Transforms given, read_transforms_json(config.cameras));
+  double pixels = 0;
+  for (const TransformsFrame& frame : given.frames)
+    pixels += static_cast<double>(frame.camera.width) * frame.camera.height;
+  facts.new_views = static_cast<int>(given.frames.size());
+  facts.new_view_mpx = 1e-6 * pixels / std::max(1, facts.new_views);
+  return {};
+}
+
 }  // namespace
+
+nlohmann::json to_json(const SceneFacts& facts) {
+  return {{"visible_views", facts.visible_views},
+          {"thermal_views", facts.thermal_views},
+          {"visible_posed", facts.visible_posed},
+          {"thermal_posed", facts.thermal_posed},
+          {"visible_measured", facts.visible_measured},
+          {"thermal_measured", facts.thermal_measured},
+          {"visible_height_by_width", facts.visible_height_by_width},
+          {"thermal_height_by_width", facts.thermal_height_by_width},
+          {"new_views", facts.new_views},
+          {"new_view_mpx", facts.new_view_mpx},
+          {"fusion_methods", facts.fusion_methods},
+          {"smoothness_db", facts.smoothness_db}};
+}
 
 Result<SceneFacts> look_at(const stages::SessionInput& input, const stages::RunConfig& config) {
   SceneFacts facts;
@@ -54,11 +87,13 @@ Result<SceneFacts> look_at(const stages::SessionInput& input, const stages::RunC
   facts.thermal_posed = config.poses.use_known_poses && all_posed(thermal);
   facts.visible_height_by_width = height_by_width(photos, facts.visible_height_by_width);
   facts.thermal_height_by_width = height_by_width(thermal, facts.thermal_height_by_width);
-  facts.new_views = config.render.path.views;
-  const double width = config.render.path.width_px;
-  facts.new_view_mpx =
-      1e-6 * width * width *
-      (photos.empty() ? facts.thermal_height_by_width : facts.visible_height_by_width);
+  facts.visible_measured =
+      facts.visible_views > 0 && config.train_visible.options.holdout_every > 0;
+  facts.thermal_measured = facts.thermal_views > 0 && input.has_temperatures() &&
+                           config.train_thermal.options.holdout_every > 0;
+  ORBITFUSE_TRY(look_at_new_views(
+      config.render, photos.empty() ? facts.thermal_height_by_width : facts.visible_height_by_width,
+      facts));
   facts.fusion_methods = static_cast<int>(config.fuse.methods.size());
   double sum = 0;
   int looked_at = 0;

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "app/planning/stage_costs.hpp"
 
+#include <algorithm>
+#include <cassert>
 #include <cmath>
+
+#include "app/stages/build_stages.hpp"
 
 namespace orbitfuse::planning {
 namespace {
 
 // Seconds on two cores of an Intel Xeon (Sapphire Rapids), from the traces of whole runs
-// (bench/app/plan_sweep.sh, docs/notes/planner.md).
+// (`run --trace`, docs/notes/planner.md).
 constexpr double start_s = 0.3, known_poses_s = 0.5;
 constexpr double visible_pose_s = 0.55;  // a view: features of 800 pixels, matching, mapping
 /// A view: search, renders, temperatures. 0.9 to 1.4 by scene; what is wrong is made good later, by
@@ -23,6 +27,8 @@ constexpr double fused_mpx_s = 0.115;                             // a method
 constexpr double scored_mpx_s = 0.545, heldout_view_s = 0.25;
 constexpr int heldout_every = 12;
 constexpr double report_s = 0.5;
+constexpr double thermal_depth_view_s = 0.19;  // without photos: matched at 260 pixels
+constexpr double clouds_s = 5;                 // two frames of their own are registered
 constexpr double usual_steps = 4800, halvings_at_900 = 2.4, fog_power = 1.4;
 constexpr double thermal_pose_fog = 1.7, render_fog = 1.75;
 /// Depth at 200 pixels takes more than a quarter: planes are drawn at half width in any case.
@@ -38,13 +44,6 @@ double fog(const SceneFacts& facts, const Effort& effort, double at_900_steps) {
 
 }  // namespace
 
-const std::vector<std::string>& planned_stages() {
-  static const std::vector<std::string> stages = {
-      "poses_visible", "depth",  "train_visible", "poses_thermal", "train_thermal",
-      "register",      "render", "fuse",          "metrics",       "report"};
-  return stages;
-}
-
 double visible_step_s() { return visible_step; }
 double thermal_step_s() { return thermal_step; }
 
@@ -52,6 +51,7 @@ double stage_s(const std::string& stage, const SceneFacts& facts, const Effort& 
   const double photos = facts.visible_views, thermal = facts.thermal_views;
   const bool both = photos > 0 && thermal > 0;
   if (stage == "report") return report_s;
+  if (stage == "register") return both && facts.visible_posed && facts.thermal_posed ? clouds_s : 0;
   if (stage == "render")
     return start_s + facts.new_views * facts.new_view_mpx * new_view_mpx_s * (both ? 1 : 0.5) *
                          fog(facts, effort, render_fog);
@@ -80,9 +80,12 @@ double stage_s(const std::string& stage, const SceneFacts& facts, const Effort& 
                  ? known_poses_s
                  : start_s + thermal * thermal_pose_s * fog(facts, effort, thermal_pose_fog);
     if (stage == "train_thermal")
-      return start_s + thermal * thermal_view_s + thermal_checks_s +
-             effort.thermal_steps * thermal_step;
+      return start_s + thermal * (thermal_view_s + (photos > 0 ? 0 : thermal_depth_view_s)) +
+             thermal_checks_s + effort.thermal_steps * thermal_step;
   }
+  const std::vector<std::string>& known = stages::stage_names();
+  assert(std::find(known.begin(), known.end(), stage) != known.end());
+  (void)known;
   return 0;
 }
 

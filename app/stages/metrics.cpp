@@ -77,7 +77,7 @@ Status score_field(const StageContext& context, const SessionInput& input,
   return {};
 }
 
-/// Every fused view (Table 7).
+/// The fused views, or `scored_views` of them (Table 7). Returns how many are left out.
 Result<std::size_t> score_fused(const StageContext& context, int scored_views, MetricMeans& means) {
   const json* fused = context.metrics_of("fuse");
   if (!fused || !context.has("render")) return 0;
@@ -128,7 +128,11 @@ Result<StageOutput> score(const StageContext& context, const SessionInput& input
   if (!fields.empty())
     tables.push_back(fields.table("Rendered views against held-out frames", "field"));
   if (!fused.empty())
-    tables.push_back(fused.table("Fused views, mean over the new cameras", "method"));
+    tables.push_back(fused.table(unscored > 0
+                                     ? fmt::format("Fused views, mean over {} of the new cameras",
+                                                   config.metrics.scored_views)
+                                     : "Fused views, mean over the new cameras",
+                                 "method"));
   ORBITFUSE_TRY(write_file_atomic(context.folder / "metrics.csv",
                                   MetricMeans::csv_header() + fields.csv() + fused.csv()));
   ORBITFUSE_TRY(

@@ -15,6 +15,8 @@
 
 namespace orbitfuse::stages {
 
+inline constexpr int unlimited_steps = 10'000'000;  ///< time ends the training
+
 /// How one modality's field is trained; the fields of `options` come from its preset.
 struct TrainConfig {
   nerf::TrainOptions options;
@@ -31,7 +33,7 @@ struct RenderConfig {
   std::string palette = "inferno";
   double min_opacity = 0.5;  ///< below it a pixel has no temperature and isn't fused
   nerf::RenderOptions visible;
-  /// Temperatures are smooth: most pixels are what their neighbours are (docs/notes/run.md).
+  /// Temperatures are smooth: most pixels are what their neighbours are (docs/formats.md).
   nerf::RenderOptions thermal{.alike = 0.004};
 };
 

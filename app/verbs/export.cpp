@@ -112,9 +112,8 @@ Result<std::optional<stages::MetricScale>> scale_of(Context& context, const Opti
   };
   ORBITFUSE_ASSIGN(const stages::MetricScale scale, found());
   if (scale.relative_uncertainty > 0.05)
-    context.console.warning(
-        fmt::format("the scale is sure to {:.0f} % only: tell a longer distance",
-                    100 * scale.relative_uncertainty));
+    context.console.warning(fmt::format("the scale is sure to {} only: tell a longer distance",
+                                        stages::uncertainty_words(scale)));
   if (!context.common.dry_run) ORBITFUSE_TRY(stages::save_metric_scale(o.out, world, scale));
   context.result["scale"] = stages::to_json(scale);
   context.console.info(fmt::format("1 unit is {:.5f} m +- {}: {}, {}", scale.metres_per_unit,

@@ -26,7 +26,7 @@ Action add_run(CLI::App& app) {
       ->allow_extra_args(false)
       ->check(CLI::IsMember(stages::stage_names()));
   return [folders, cameras, budget, limits, stages_wanted](Context& context) -> Status {
-    RunBudget budget_s;
+    std::optional<double> budget_s;
     if (!budget->empty()) {
       ORBITFUSE_ASSIGN(budget_s, parse_duration(*budget));
     }
@@ -36,7 +36,7 @@ Action add_run(CLI::App& app) {
       ORBITFUSE_TRY(read_transforms_json(*cameras));
       context.config.render.cameras = *cameras;
     }
-    return run_stages(context, *folders, *stages_wanted, Missing::run, budget_s);
+    return run_planned(context, *folders, *stages_wanted, budget_s);
   };
 }
 

@@ -3,7 +3,7 @@
 """What the planner of `run --budget` was made from, and how well it does (docs/benchmarks/planner.md).
 
 python3 bench/app/planner.py sweep SCENE... --out FILE.jsonl    # each knob alone, errors and seconds
-python3 bench/app/planner.py curves FILE.jsonl                  # the means that error_curves.cpp holds
+python3 bench/app/planner.py curves FILE.jsonl                  # what error_curves.cpp was rounded from
 python3 bench/app/planner.py budgets SCENE... --budgets 60 90 120 300 --out FILE.jsonl
 
 SCENE: a recorded session with ground_truth.json (replay_data/*), or image folders with one (shared
@@ -40,7 +40,10 @@ STAGES = ["poses_visible", "depth", "train_visible", "poses_thermal", "train_the
 
 
 def call(*words):
-    return subprocess.run([str(PROGRAM), *map(str, words)], capture_output=True, text=True)
+    done = subprocess.run([str(PROGRAM), *map(str, words)], capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(f"{' '.join(map(str, words))}: exit {done.returncode}\n{done.stderr}")
+    return done
 
 
 def session_of(scene, work):
@@ -48,17 +51,15 @@ def session_of(scene, work):
     if (scene / "manifest.jsonl").exists():
         return scene
     session = work / "session"
-    done = call("import", session, "--visible", scene / "visible", "--thermal", scene / "thermal",
+    call("import", session, "--visible", scene / "visible", "--thermal", scene / "thermal",
                 "--ground-truth", scene / "ground_truth.json", "--priors-only",
                 "--station-spacing-deg", "30", "--loops", "2")
-    if done.returncode != 0:
-        sys.exit(done.stderr)
     return session
 
 
 def errors_of(scene, session, out):
     done = call("eval", session, "--out", out, "--ground-truth", scene / "ground_truth.json", "--json")
-    result = json.loads(done.stdout.splitlines()[-1]) if done.stdout else {}
+    result = json.loads(done.stdout.splitlines()[-1])
     views, moved = result.get("test_views", {}), result.get("registration", {})
     return {"visible_psnr_db": views.get("visible_psnr_db"), "mae_k": views.get("temperature_mae_c"),
             "thermal_centres_percent": moved.get("ate_percent"), "thermal_posed": moved.get("posed")}
@@ -108,7 +109,7 @@ def curves(args):
             base = usual[line["scene"]]
             if line["visible_psnr_db"] is not None:
                 gains.append(line["visible_psnr_db"] - base["visible_psnr_db"])
-            if line["mae_k"]:
+            if line["mae_k"] and base["mae_k"]:
                 logs.append(math.log(line["mae_k"] / base["mae_k"]))
         print(f"{name:14s}", "dB", [round(g, 2) for g in gains], "log K", [round(v, 2) for v in logs])
         if gains:
@@ -123,15 +124,16 @@ def budgets(args):
                 work = Path(temp)
                 session, out = session_of(scene, work), work / "out"
                 begin = time.monotonic()
-                done = call("run", session, "--out", out, "-q",
+                call("run", session, "--out", out, "-q",
                             *(["--budget", f"{budget}s"] if budget else []))
                 wall_s = time.monotonic() - begin
-                line = {"scene": scene.name, "budget_s": budget, "exit": done.returncode,
+                line = {"scene": scene.name, "budget_s": budget,
                         "wall_s": wall_s, "seconds": seconds_of(out),
                         **errors_of(scene, session, out)}
                 if (out / "plan.json").exists():
                     plan = json.loads((out / "plan.json").read_text())
-                    line |= {"fits": plan["fits"], "expected": plan["expected"],
+                    line |= {"fits": plan["plan"]["fits"],
+                             "expected": {"wall_s": plan["expected_total_s"], **plan["expected"]},
                              "choices": plan["choices"], "measured": plan["measured"]}
                 with open(args.out, "a") as file:
                     file.write(json.dumps(line) + "\n")

@@ -51,8 +51,9 @@ Result<pid_t> start(const std::vector<std::string>& command, const std::filesyst
 Result<int> run_process(const std::vector<std::string>& command, const std::filesystem::path& log,
                         const std::string& stage, const Progress& progress) {
   ORBITFUSE_TRY(progress.check(stage));
-  const TraceSpan span(std::filesystem::path(command.front()).filename().string() +
-                       (command.size() > 1 ? " " + command[1] : ""));
+  const std::string_view program(command.front());
+  const TraceSpan span(program.substr(program.rfind('/') + 1),
+                       command.size() > 1 ? std::string_view(command[1]) : std::string_view());
   ORBITFUSE_ASSIGN(const pid_t pid, start(command, log));
   int status = 0;
   while (true) {

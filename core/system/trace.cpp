@@ -56,9 +56,10 @@ void start_trace() {
 
 bool tracing() { return recorder().on.load(std::memory_order_relaxed); }
 
-TraceSpan::TraceSpan(std::string name) {
+TraceSpan::TraceSpan(std::string_view name, std::string_view detail) {
   if (!tracing()) return;
-  name_ = std::move(name);
+  name_ = name;
+  if (!detail.empty()) name_.append(" ").append(detail);
   start_s_ = wall_seconds();
   cpu_start_s_ = cpu_seconds();
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 // Where the time of a run goes, as a picture: spans by thread in Chrome's trace format ("Trace
 // Event Format", complete events), which chrome://tracing, Perfetto and speedscope show. Costs one
@@ -15,7 +16,8 @@ bool tracing();
 /// From its construction to its end, on the thread that made it; spans of a thread nest.
 class TraceSpan {
  public:
-  explicit TraceSpan(std::string name);
+  /// "NAME" or "NAME DETAIL".
+  explicit TraceSpan(std::string_view name, std::string_view detail = {});
   ~TraceSpan();
   TraceSpan(const TraceSpan&) = delete;
   TraceSpan& operator=(const TraceSpan&) = delete;

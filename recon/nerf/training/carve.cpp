@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/system/parallel.hpp"
+#include "recon/nerf/training/plain_background.hpp"
 #include "recon/nerf/training/scene.hpp"
 
 namespace orbitfuse::nerf {
@@ -65,8 +66,13 @@ void clear_segment(Occupancy& occupancy, const Ray& ray, float end, float tube) 
 double carve(bool dense_depth, const std::vector<NormalisedView>& views,
              const std::vector<bool>& heldout, const TrainOptions& options, Occupancy& occupancy) {
   std::vector<const NormalisedView*> voters;
-  for (std::size_t i = 0; i < views.size(); ++i)
-    if (!heldout[i]) voters.push_back(&views[i]);
+  std::vector<Silhouette> silhouettes;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (heldout[i]) continue;
+    voters.push_back(&views[i]);
+    if (!views[i].clearance_px.empty())
+      silhouettes.push_back({&views[i].rays, &views[i].clearance_px});
+  }
   const int n = occupancy.resolution;
   // Votes are cast for 2x2x2 cells at once; their half diagonal is part of the margin.
   const int half = n / 2;
@@ -82,10 +88,14 @@ double carve(bool dense_depth, const std::vector<NormalisedView>& views,
         const float center[3] = {low + (static_cast<float>(x) + 0.5f) * size,
                                  low + (static_cast<float>(y) + 0.5f) * size,
                                  low + (static_cast<float>(slab % half) + 0.5f) * size};
+        std::uint8_t& off_here = off[(static_cast<std::size_t>(slab) * half + y) * half + x];
+        if (sighting_of(silhouettes, center, 0.87f * size) == Sighting::empty) {
+          off_here = 1;
+          continue;
+        }
         const Votes votes = vote(voters, center, 0.87f * size);
         const bool free = options.carve && votes.free >= 2 && votes.free > 2 * votes.solid;
-        off[(static_cast<std::size_t>(slab) * half + y) * half + x] =
-            votes.seen < min_views || free;
+        off_here = votes.seen < min_views || free;
       }
   });
   for (std::int64_t cell = 0; cell < occupancy.cell_count(); ++cell) {

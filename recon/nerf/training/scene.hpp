@@ -20,6 +20,7 @@ struct NormalisedView {
   cv::Mat target;    ///< CV_32FC3 or CV_32FC1, mapped by the span
   cv::Mat distance;  ///< CV_32FC1 at the image's size: known distance along the ray, NaN = none
   std::vector<std::int32_t> known;  ///< pixels (y * width + x) whose distance is known
+  cv::Mat clearance_px = {};  ///< PlainBackground::clearance_px; empty: there is no such background
 };
 
 /// The ball of the scene that these views and points show (core/geometry/scene_ball.hpp).

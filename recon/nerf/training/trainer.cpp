@@ -42,6 +42,14 @@ float proposal_anneal(double progress) {
   return static_cast<float>(10 * part / (9 * part + 1));
 }
 
+/// Far from the object before a plain background: the ray meets no cell. Some are drawn all the
+/// same, for the background's colour.
+constexpr int background_every = 16;
+bool shows_nothing(const NormalisedView& view, int x, int y) {
+  const int rim_px = std::clamp(view.target.cols / 50, 4, 100);
+  return !view.clearance_px.empty() && view.clearance_px.at<std::uint8_t>(y, x) > rim_px;
+}
+
 /// Scatters one level's gradients of a block.
 struct LevelGradient {
   int count;
@@ -98,6 +106,7 @@ void Trainer::draw(Block& block, int begin, int end, double progress) {
       if (at_known) pixel = view.known[static_cast<std::size_t>(pixel)];
       const int x = static_cast<int>(pixel % view.target.cols),
                 y = static_cast<int>(pixel / view.target.cols);
+      if (shows_nothing(view, x, y) && (bits >> 32) % background_every != 0) continue;
       RayTarget target;
       const float* stored = view.target.ptr<float>(y) + x * field_.channels();
       DrawnRay drawn;

@@ -95,6 +95,9 @@ Status TrainingRun::create_or_resume() {
   state_->thermal_is_gray = dataset.thermal_is_gray;
   state_->views = records_of(dataset, data_.heldout);
   state_->space = estimate_space(data_.training);
+  if (background_)
+    for (int tighter = 0; tighter < 2; ++tighter)
+      state_->space = fit_to_silhouettes(*background_, data_.training, state_->space);
   state_->span = estimate_span(data_.training);
   return {};
 }
@@ -113,6 +116,7 @@ Status TrainingRun::start_geometry(const Field* guide) {
 void TrainingRun::prepare_views_of_run() {
   const Dataset& dataset = data_.dataset;
   views_ = prepare_views(dataset, state_->space, state_->span);
+  show_background();
   if (options_.even_exposure && dataset.modality == Modality::visible) {
     const Exposure exposure = estimate_exposure(dataset, data_.heldout);
     report_exposure(exposure, dataset, report_);
@@ -136,7 +140,20 @@ void TrainingRun::prepare_views_of_run() {
   }
 }
 
+void TrainingRun::show_background() {
+  if (!background_) return;
+  auto clearance_px = background_->clearance_px.begin();
+  for (std::size_t i = 0; i < views_.size(); ++i)
+    if (!data_.heldout[i]) views_[i].clearance_px = *clearance_px++;
+  report_.skips.push_back({"plain background",
+                           fmt::format("one colour in {:.0f} % of the pixels, from the border to "
+                                       "the object",
+                                       100 * background_->share),
+                           "silhouettes bound the scene, one background ray in 16 is drawn"});
+}
+
 Status TrainingRun::prepare(const Field* guide) {
+  background_ = find_plain_background(data_.training);
   ORBITFUSE_TRY(create_or_resume());
   ORBITFUSE_TRY(start_geometry(guide));
   prepare_views_of_run();

@@ -12,6 +12,7 @@
 #include "core/system/clock.hpp"
 #include "recon/nerf/field/field_state.hpp"
 #include "recon/nerf/nerf.hpp"
+#include "recon/nerf/training/plain_background.hpp"
 #include "recon/nerf/training/trainer.hpp"
 
 namespace orbitfuse::nerf {
@@ -61,6 +62,7 @@ class TrainingRun {
   Status create_or_resume();
   Status start_geometry(const Field* guide);
   void prepare_views_of_run();
+  void show_background();  ///< to the views that train
 
   double fraction() const;  ///< place in the schedule
   void pause();
@@ -78,6 +80,7 @@ class TrainingRun {
   Stopwatch watch_;
   std::unique_ptr<FieldState> state_ = std::make_unique<FieldState>();
   bool resumed_ = false;
+  std::optional<PlainBackground> background_;
   std::vector<NormalisedView> views_;
   std::optional<Trainer> trainer_;
   long earlier_rays_ = 0, earlier_samples_ = 0;

@@ -129,9 +129,23 @@ TEST(Cli, ATraceIsWrittenForAnyVerb) {
   ASSERT_TRUE(text);
   EXPECT_THAT(*text, HasSubstr("\"name\":\"devices\""));
   const Outcome refused = orbitfuse_program({"devices", "--trace", "/proc/none/trace.json"});
-  EXPECT_NE(refused.code, 0);
+  EXPECT_EQ(refused.code, 2);
   EXPECT_THAT(refused.err, HasSubstr("/proc/none"));
   EXPECT_TRUE(refused.out.empty()) << "refused before the work";
+}
+
+/// The folder a verb makes is not made for it.
+TEST(Cli, ATraceMakesNoFolderAndADryRunNoTrace) {
+  const test::TempFolder temp;
+  const std::string photos = temp / "photos", session = temp / "session";
+  std::filesystem::create_directories(photos);
+  const Outcome inside = orbitfuse_program(
+      {"import", session, "--visible", photos, "--trace", session + "/trace.json"});
+  EXPECT_EQ(inside.code, 2);
+  EXPECT_FALSE(std::filesystem::exists(session));
+  const std::string file = temp / "trace.json";
+  EXPECT_EQ(orbitfuse_program({"devices", "--dry-run", "--trace", file}).code, 0);
+  EXPECT_FALSE(std::filesystem::exists(file));
 }
 
 TEST(Cli, AMisspeltInstructionSetIsAnError) {

@@ -17,6 +17,7 @@
 namespace orbitfuse {
 namespace {
 namespace fs = std::filesystem;
+using nlohmann::json;
 using testing::HasSubstr;
 
 class Run : public testing::Test {
@@ -96,12 +97,31 @@ TEST_F(Run, ABudgetIsPlannedSpentAndTold) {
   ASSERT_EQ(first.code, 0) << first.err;
   EXPECT_THAT(first.err, HasSubstr("plan for 12 s: depth at "));
   EXPECT_NE(read_file(out / "report/report.html")->find("Plan and outcome"), std::string::npos);
-  EXPECT_THAT(*read_file(out / "train_visible/stage.json"), HasSubstr("budget_s"));
+  const json plan = json::parse(*read_file(out / "plan.json"));
+  const auto option = [&](const char* stage, const char* key) {
+    return json::parse(*read_file(out / stage / "stage.json")).at("options").at(key);
+  };
+  EXPECT_EQ(option("train_visible", "budget_s"), plan["choices"]["train.visible.budget_s"]);
+  EXPECT_GT(option("train_visible", "budget_s"), 0);
+  EXPECT_EQ(option("depth", "width_px"), plan["choices"]["depth.width_px"]);
   // Whole runs of other options are no part of this plan; the same budget is.
   const Outcome again = planned({"--budget", "12s", "--json"});
   ASSERT_EQ(again.code, 0) << again.err;
   for (const auto& [stage, state] : states(again))
     EXPECT_EQ(state, stage == "report" ? "ran" : "unchanged") << stage;
+
+  // The folder of the run knows its budget, and what the planner set is not the user's.
+  const Outcome from_folder = orbitfuse_program({"run", out.string(), "--json"});
+  ASSERT_EQ(from_folder.code, 0) << from_folder.err;
+  EXPECT_EQ(from_folder.result()["budget_s"], 12);
+  for (const auto& [stage, state] : states(from_folder))
+    EXPECT_EQ(state, stage == "report" ? "ran" : "unchanged") << stage;
+  const Outcome longer = orbitfuse_program({"run", out.string(), "--budget", "14s", "--dry-run"});
+  EXPECT_THAT(longer.err, HasSubstr("plan for 14 s: depth at 400 px, visible field"));
+  // What the user gives stays, though the earlier plan had another choice.
+  const Outcome given = planned({"--budget", "12s", "--set", "depth.width_px=320"});
+  ASSERT_EQ(given.code, 0) << given.err;
+  EXPECT_EQ(option("depth", "width_px"), 320);
 
   const Outcome too_little = planned({"--budget", "1s", "--dry-run"});
   EXPECT_THAT(too_little.err, HasSubstr("warning: --budget: 1 s are too few"));
@@ -110,6 +130,8 @@ TEST_F(Run, ABudgetIsPlannedSpentAndTold) {
           .code,
       0);
   EXPECT_FALSE(fs::exists(out / "plan.json")) << "this run had no budget";
+  const Outcome damaged = planned({"--budget", "12s", "--dry-run"});
+  EXPECT_EQ(damaged.code, 0);
 }
 
 TEST_F(Run, WhatNobodyCanMeasureIsAnErrorAndCamerasAreReadFirst) {

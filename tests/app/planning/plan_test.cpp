@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "app/stages/build_stages.hpp"
+
 namespace orbitfuse::planning {
 namespace {
 
@@ -17,7 +19,7 @@ SceneFacts usual_orbit() {
 
 double needed_s(const SceneFacts& facts, const Effort& effort) {
   double sum = 0;
-  for (const std::string& stage : planned_stages()) sum += stage_s(stage, facts, effort);
+  for (const std::string& stage : stages::stage_names()) sum += stage_s(stage, facts, effort);
   return sum;
 }
 
@@ -33,6 +35,24 @@ TEST(StageCosts, MoreOfAnythingTakesLonger) {
   EXPECT_GT(needed_s(larger, {}), usual);
   larger.visible_posed = larger.thermal_posed = true;
   EXPECT_LT(needed_s(larger, {}), usual) << "poses that are known cost nothing";
+}
+
+TEST(StageCosts, FieldsInFramesOfTheirOwnAreRegisteredAndThermalOnesAloneMatchDepth) {
+  SceneFacts facts = usual_orbit();
+  EXPECT_EQ(stage_s("register", facts, {}), 0) << "thermal views were posed in the visible scene";
+  facts.visible_posed = facts.thermal_posed = true;
+  EXPECT_GT(stage_s("register", facts, {}), 0);
+  const double with_photos = stage_s("train_thermal", facts, {});
+  facts.visible_views = 0;
+  EXPECT_GT(stage_s("train_thermal", facts, {}), with_photos);
+}
+
+TEST(ErrorCurves, ScenesWithoutAnyDetailArePromisedNoMoreThanTheSmoothestThatWasSeen) {
+  SceneFacts facts = usual_orbit();
+  facts.smoothness_db = 80;
+  EXPECT_LT(expected_errors(facts, {}).visible_psnr_db, 32);
+  facts.smoothness_db = -20;
+  EXPECT_GT(expected_errors(facts, {}).visible_psnr_db, 20);
 }
 
 TEST(StageCosts, AModalityThatIsNotThereCostsNothing) {
@@ -67,7 +87,7 @@ TEST(Plan, UsesWhatThereIsAndNoMore) {
   for (const double slowness : {0.5, 1.0, 2.0}) {
     last_loss = std::numeric_limits<double>::infinity();
     for (double available_s = 100; available_s < 400; available_s += 20) {
-      const Plan plan = make_plan(facts, planned_stages(), {}, slowness, available_s);
+      const Plan plan = make_plan(facts, stages::stage_names(), {}, slowness, available_s);
       if (!plan.fits) {
         EXPECT_TRUE(std::isinf(last_loss)) << "more time, and suddenly too little";
         continue;
@@ -85,7 +105,7 @@ TEST(Plan, UsesWhatThereIsAndNoMore) {
 
 TEST(Plan, TooLittleTimeIsSaidAndGetsTheLeast) {
   for (const double available_s : {10.0, 0.0, -5.0, -std::numeric_limits<double>::infinity()}) {
-    const Plan plan = make_plan(usual_orbit(), planned_stages(), {}, 1, available_s);
+    const Plan plan = make_plan(usual_orbit(), stages::stage_names(), {}, 1, available_s);
     EXPECT_FALSE(plan.fits);
     EXPECT_EQ(plan.effort.visible_steps, least_effort.visible_steps);
     EXPECT_EQ(plan.effort.depth_width_px, least_effort.depth_width_px);
@@ -94,7 +114,7 @@ TEST(Plan, TooLittleTimeIsSaidAndGetsTheLeast) {
 }
 
 TEST(Plan, EndlessTimeIsNotSpent) {
-  const Plan plan = make_plan(usual_orbit(), planned_stages(), {}, 1, 1e6);
+  const Plan plan = make_plan(usual_orbit(), stages::stage_names(), {}, 1, 1e6);
   EXPECT_TRUE(plan.fits);
   EXPECT_FALSE(plan.all_used);
   EXPECT_LT(plan.expected_s, 1000);
@@ -103,7 +123,7 @@ TEST(Plan, EndlessTimeIsNotSpent) {
 TEST(Plan, WhatIsSettledStays) {
   const Settled settled{.depth_width_px = 300, .visible_steps = 1234, .scored_views = 0};
   for (const double available_s : {20.0, 120.0, 300.0}) {
-    const Plan plan = make_plan(usual_orbit(), planned_stages(), settled, 1, available_s);
+    const Plan plan = make_plan(usual_orbit(), stages::stage_names(), settled, 1, available_s);
     EXPECT_EQ(plan.effort.depth_width_px, 300);
     EXPECT_EQ(plan.effort.visible_steps, 1234);
     EXPECT_EQ(plan.effort.scored_views, 0);
@@ -113,12 +133,12 @@ TEST(Plan, WhatIsSettledStays) {
 TEST(Plan, OneModalityGetsAllTheTraining) {
   SceneFacts facts = usual_orbit();
   facts.thermal_views = 0;
-  const Plan visible = make_plan(facts, planned_stages(), {}, 1, 60);
+  const Plan visible = make_plan(facts, stages::stage_names(), {}, 1, 60);
   EXPECT_TRUE(visible.fits);
   EXPECT_GE(visible.expected_s, 57);
   facts = usual_orbit();
   facts.visible_views = 0;
-  const Plan thermal = make_plan(facts, planned_stages(), {}, 1, 60);
+  const Plan thermal = make_plan(facts, stages::stage_names(), {}, 1, 60);
   EXPECT_TRUE(thermal.fits);
   EXPECT_GT(thermal.effort.thermal_steps, 2400);
 }
