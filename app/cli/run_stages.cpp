@@ -248,7 +248,21 @@ Status StagedRun::open(const std::vector<std::string>& targets) {
   return {};
 }
 
+/// What a step of another recipe takes was never measured: its time has to be given.
+Status check_recipes(const stages::RunConfig& config) {
+  for (const Modality modality : {Modality::visible, Modality::thermal}) {
+    const nerf::TrainOptions& options = config.train(modality).options;
+    if (options.preset != nerf::default_preset(modality) && options.budget_s == 0)
+      return fail(ErrorKind::usage, "--budget",
+                  fmt::format("the recipe of train.{} is {}, of which no plan knows the time",
+                              name(modality), options.preset),
+                  fmt::format("set train.{}.budget_s too", name(modality)));
+  }
+  return {};
+}
+
 Status StagedRun::plan(double budget_s) {
+  ORBITFUSE_TRY(check_recipes(context_.config));
   budget_s_ = budget_s;
   planned_ = {{"budget_s", budget_s},
               {"users", planned_values(context_.config)},

@@ -5,6 +5,7 @@
 python3 bench/app/planner.py sweep SCENE... --out FILE.jsonl    # each knob alone, errors and seconds
 python3 bench/app/planner.py curves FILE.jsonl                  # what error_curves.cpp was rounded from
 python3 bench/app/planner.py budgets SCENE... --budgets 60 90 120 300 --out FILE.jsonl
+python3 bench/app/planner.py rows FILE.jsonl                    # of `budgets`, for the page
 
 SCENE: a recorded session with ground_truth.json (replay_data/*), or image folders with one (shared
 data). Runs use all cores: leave the machine alone.
@@ -139,6 +140,24 @@ def budgets(args):
                     file.write(json.dumps(line) + "\n")
 
 
+def rows(args):
+    def pair(line, key, form):
+        """As expected, and as the run measured it on its held-out frames."""
+        if "expected" not in line:
+            return ""
+        came = line["measured"].get(key)
+        return f"{line['expected'][key]:{form}} / " + (f"{came:{form}}" if came is not None else "")
+
+    for line in map(json.loads, open(args.file)):
+        budget = f"{line['budget_s']} s" if line["budget_s"] else "none"
+        if line.get("fits") is False:
+            budget += ", said to be too few"
+        expected = f"{line['expected']['wall_s']:.0f} / " if "expected" in line else ""
+        print(f"| `{line['scene']}` | {budget} | {expected}{line['wall_s']:.1f} | "
+              f"{pair(line, 'visible_psnr_db', '.1f')} | {pair(line, 'thermal_mae_k', '.2f')} | "
+              f"{line['visible_psnr_db']:.1f} dB, {line['mae_k']:.2f} K | {line['thermal_posed']} |")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -151,9 +170,10 @@ def main():
             command.add_argument("--budgets", nargs="+", type=int, default=[60, 90, 120, 300],
                                  help="seconds; 0: a run without a budget")
         command.set_defaults(run=run)
-    command = commands.add_parser("curves")
-    command.add_argument("file")
-    command.set_defaults(run=curves)
+    for name, show in {"curves": curves, "rows": rows}.items():
+        command = commands.add_parser(name)
+        command.add_argument("file")
+        command.set_defaults(run=show)
     args = parser.parse_args()
     args.run(args)
 

@@ -123,6 +123,10 @@ TEST_F(Run, ABudgetIsPlannedSpentAndTold) {
   ASSERT_EQ(given.code, 0) << given.err;
   EXPECT_EQ(option("depth", "width_px"), 320);
 
+  const Outcome other_recipe =
+      planned({"--budget", "12s", "--dry-run", "--set", "train.visible.preset=nerfacto"});
+  EXPECT_EQ(other_recipe.code, 2);
+  EXPECT_THAT(other_recipe.err, HasSubstr("train.visible.budget_s"));
   const Outcome too_little = planned({"--budget", "1s", "--dry-run"});
   EXPECT_THAT(too_little.err, HasSubstr("warning: --budget: 1 s are too few"));
   ASSERT_EQ(
