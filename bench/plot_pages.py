@@ -347,11 +347,11 @@ PLOTS = {
                      ("Qabf", "Qcb", "Qcv", "SSIM"), rows="reference|bar|ours"),
     "measurement": Plot(draw_measurement, ("scene", "median error", "stated uncertainty covers"),
                         ("median error", "90 % of errors", "stated uncertainty covers"), rows="(?!bar)"),
-    "capture_outages": Plot(draw_outages, ("case", "told after", "back after"), ("told after", "back after")),
-    "capture_odometry": bar_plot(
+    "capture/outages": Plot(draw_outages, ("case", "told after", "back after"), ("told after", "back after")),
+    "capture/odometry": bar_plot(
         ("walk",), [Bar("worst azimuth error", "worst error"), Bar("stated at the end", "stated at the end")],
         "degrees of azimuth (lower is better)"),
-    "capture_sharpness": bar_plot(
+    "capture/sharpness": bar_plot(
         ("images",), [Bar("as it is", "as it is"), Bar("Gaussian 1", "Gaussian 1"), Bar("motion 9", "motion 9")],
         "width of the edges, sigma in pixels at 640, median"),
     "heat": Plot(draw_heat, ("scene", "median view", "worst view"), ("median view", "worst view")),

@@ -25,7 +25,7 @@ constexpr double landmark_error_px = 2;
 constexpr std::size_t fewest_landmarks = 15;
 constexpr std::size_t enough_read_landmarks = 40;
 constexpr int most_misses = 8;  // two seconds at the guide's four looks
-/// Beyond the drift that was measured (docs/benchmarks/capture.md).
+/// Beyond the drift that was measured (docs/benchmarks/capture/faults.md).
 constexpr double drift_share = 0.03;
 constexpr double deg = 180 / std::numbers::pi;
 
