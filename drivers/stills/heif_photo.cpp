@@ -14,7 +14,7 @@
 namespace orbitfuse {
 namespace {
 
-constexpr int widest_px = 32768;
+constexpr int widest_px = 16384;  ///< phones of 200 megapixels have 16320
 
 template <auto release>
 struct Released {
@@ -35,8 +35,9 @@ struct Photo {
 };
 
 tl::unexpected<Error> damaged(const std::string& where, const heif_error& error) {
-  return fail(ErrorKind::input, where,
-              fmt::format("damaged HEIC ({})", error.message ? error.message : "unknown"),
+  std::string_view text = error.message ? error.message : "unknown";
+  text = text.substr(0, text.find('\n'));  // some end in one
+  return fail(ErrorKind::input, where, fmt::format("damaged HEIC ({})", text),
               "copy the file again");
 }
 
@@ -94,6 +95,11 @@ Result<cv::Mat> decode_heif(std::string_view bytes, const std::string& where) {
   if (!plane || columns <= 0 || rows <= 0 || stride < 3 * columns) {
     return fail(ErrorKind::input, where, "HEIC without a picture", "copy the file again");
   }
+  // What a file says and what its stream holds are two things: a kilobyte may unfold to gigabytes.
+  if (columns != width || rows != height)
+    return fail(ErrorKind::input, where,
+                fmt::format("HEIC of {}x{} that holds {}x{}", width, height, columns, rows),
+                "copy the file again");
   cv::Mat bgr(rows, columns, CV_8UC3);
   for (int y = 0; y < rows; ++y) {
     const std::uint8_t* from = plane + static_cast<std::ptrdiff_t>(y) * stride;

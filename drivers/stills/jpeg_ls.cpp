@@ -17,9 +17,12 @@ Result<cv::Mat> decode_jpeg_ls(std::string_view bytes, const std::string& where)
   const auto damaged = [&](const std::string& found) {
     return fail(ErrorKind::input, where, found, "copy the file from the camera again");
   };
+  // CharLS 2.4 counts zero bits for seconds where codes run into the end of the bytes; a marker
+  // ends them.
+  const std::string marked = std::string(bytes) + "\xFF\xD9";
   try {
     charls::jpegls_decoder decoder;
-    decoder.source(bytes.data(), bytes.size());
+    decoder.source(marked.data(), marked.size());
     decoder.read_spiff_header();
     decoder.read_header();
     const charls::frame_info frame = decoder.frame_info();
