@@ -108,8 +108,9 @@ Status traced(const std::string& file, const char* verb, const std::function<Sta
   if (file.empty()) return action();
   const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
   std::error_code unreadable;
-  if (!std::filesystem::is_directory(folder, unreadable) || ::access(folder.c_str(), W_OK) != 0)
-    return fail(ErrorKind::usage, "--trace " + file, "no folder that can be written to",
+  if (!std::filesystem::is_directory(folder, unreadable) || ::access(folder.c_str(), W_OK) != 0 ||
+      std::filesystem::is_directory(file, unreadable))
+    return fail(ErrorKind::usage, "--trace " + file, "no file in a folder that can be written to",
                 "name a file in a folder that exists");
   start_trace();
   Status status;

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Every stress case of the computing modules: what it must give, and whether it gave it here.
 
-python3 bench/stability.py            # runs them (about two minutes) and prints the table's rows
+python3 bench/stability.py            # runs them (20 s) and prints the table's rows
 python3 bench/stability.py --list     # names alone
 
 A case is a test whose name tells it: degenerate geometry, extreme scales, values that aren't finite,

@@ -173,23 +173,19 @@ PlannedBefore planned_before(const std::string& folder) {
   }
 }
 
-json planned_values(stages::RunConfig& config) {
-  json values = json::object();
-  const config::Settings settings = config.settings();
-  for (const config::Setting& setting : settings.list())
-    if (std::count(std::begin(planning::planned_keys), std::end(planning::planned_keys),
-                   setting.key) > 0)
-      values[setting.key] = setting.get();
-  return values;
-}
-
 /// run.json holds what a run was made with, the planner's choices among it: for another plan they
 /// become again what they were.
-Status take_back_plan(Context& context, const PlannedBefore& before) {
+Status take_back_plan(Context& context, const std::string& folder, const PlannedBefore& before) {
   config::Settings settings = context.config.settings();
   for (const char* key : planning::planned_keys)
-    if (before.users.contains(key) && context.given.count(key) == 0)
-      ORBITFUSE_TRY(settings.apply(fmt::format("{}={}", key, before.users.at(key).dump())));
+    if (before.users.contains(key) && context.given.count(key) == 0) {
+      const std::string value = before.users.at(key).dump();
+      ORBITFUSE_TRY(settings.apply(fmt::format("{}={}", key, value)).map_error([&](Error error) {
+        error.kind = ErrorKind::input;  // the user didn't write it
+        error.where = (fs::path(folder) / run_file).string();
+        return error;
+      }));
+    }
   context.given.insert(before.given.begin(), before.given.end());
   return context.config.validate();
 }
@@ -265,7 +261,7 @@ Status StagedRun::plan(double budget_s) {
   ORBITFUSE_TRY(check_recipes(context_.config));
   budget_s_ = budget_s;
   planned_ = {{"budget_s", budget_s},
-              {"users", planned_values(context_.config)},
+              {"users", planning::planned_values(context_.config)},
               {"given", context_.given}};
   planning::PlannerInput planned;
   planned.budget_s = budget_s;
@@ -347,7 +343,7 @@ Status StagedRun::run(bool whole) {
   };
   if (!whole && !planner_) {  // the plan of the run whose results these are stays known
     PlannedBefore before = planned_before(folders_.out);
-    const json values = planned_values(context_.config);
+    const json values = planning::planned_values(context_.config);
     for (const auto& [key, value] : values.items())
       if (context_.given.count(key) > 0) {
         before.users[key] = value;
@@ -388,7 +384,7 @@ Status run_stages(Context& context, const StageFolders& folders,
 Status run_planned(Context& context, const StageFolders& folders,
                    const std::vector<std::string>& targets, std::optional<double> budget_s) {
   if (const PlannedBefore before = planned_before(folders.session); before.budget_s > 0) {
-    ORBITFUSE_TRY(take_back_plan(context, before));
+    ORBITFUSE_TRY(take_back_plan(context, folders.session, before));
     if (!budget_s) budget_s = before.budget_s;
   }
   StagedRun staged(context, folders, Missing::run);

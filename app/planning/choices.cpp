@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "app/planning/choices.hpp"
 
+#include <algorithm>
+#include <iterator>
+
 namespace orbitfuse::planning {
 using nlohmann::json;
 
@@ -55,6 +58,15 @@ Choices choices_of(const json& values) {
   const auto ends = [](const std::optional<double>& time_s) { return !time_s || *time_s > 0; };
   return tried.validate() && ends(choices.visible_s) && ends(choices.thermal_s) ? choices
                                                                                 : Choices();
+}
+
+json planned_values(stages::RunConfig& config) {
+  json values = json::object();
+  const config::Settings settings = config.settings();
+  for (const config::Setting& setting : settings.list())
+    if (std::count(std::begin(planned_keys), std::end(planned_keys), setting.key) > 0)
+      values[setting.key] = setting.get();
+  return values;
 }
 
 }  // namespace orbitfuse::planning

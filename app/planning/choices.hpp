@@ -30,4 +30,7 @@ inline constexpr const char* planned_keys[] = {"depth.width_px",         "train.
                                                "train.visible.budget_s", "train.thermal.iterations",
                                                "train.thermal.budget_s", "metrics.scored_views"};
 
+/// Their values, by key.
+nlohmann::json planned_values(stages::RunConfig& config);
+
 }  // namespace orbitfuse::planning

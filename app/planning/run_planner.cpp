@@ -67,7 +67,7 @@ RunPlanner::RunPlanner(PlannerInput input, std::filesystem::path out, stages::Ru
   first_total_s_ = first_.expected_s + input_.elapsed_s();
 }
 
-/// All that a plan depends on but the machine, which is never twice as fast as before.
+/// All that a plan depends on but the machine's speed, which differs from call to call.
 json RunPlanner::made_for() const {
   return {{"schema", schema},
           {"budget_s", input_.budget_s},
@@ -90,14 +90,9 @@ void RunPlanner::follow_earlier(const json& earlier) {
 
 void RunPlanner::settle_what_the_user_set() {
   stages::RunConfig defaults;
-  const config::Settings now = config_.settings(), usual = defaults.settings();
-  for (std::size_t i = 0; i < now.list().size(); ++i) {
-    const config::Setting& setting = now.list()[i];
-    const bool planned = std::find(std::begin(planned_keys), std::end(planned_keys), setting.key) !=
-                         std::end(planned_keys);
-    if (planned && (input_.given.count(setting.key) > 0 || setting.get() != usual.list()[i].get()))
-      users_[setting.key] = setting.get();
-  }
+  const json usual = planned_values(defaults), now = planned_values(config_);
+  for (const auto& [key, value] : now.items())
+    if (input_.given.count(key) > 0 || value != usual.at(key)) users_[key] = value;
   const auto steps = [&](const std::string& table, const nerf::TrainOptions& options,
                          double step_s) -> std::optional<int> {
     if (!users_.contains(table + ".budget_s") && !users_.contains(table + ".iterations"))

@@ -53,8 +53,8 @@ def session_of(scene, work):
         return scene
     session = work / "session"
     call("import", session, "--visible", scene / "visible", "--thermal", scene / "thermal",
-                "--ground-truth", scene / "ground_truth.json", "--priors-only",
-                "--station-spacing-deg", "30", "--loops", "2")
+         "--ground-truth", scene / "ground_truth.json", "--priors-only", "--station-spacing-deg", "30",
+         "--loops", "2")
     return session
 
 
@@ -126,7 +126,7 @@ def budgets(args):
                 session, out = session_of(scene, work), work / "out"
                 begin = time.monotonic()
                 call("run", session, "--out", out, "-q",
-                            *(["--budget", f"{budget}s"] if budget else []))
+                     *(["--budget", f"{budget}s"] if budget else []))
                 wall_s = time.monotonic() - begin
                 line = {"scene": scene.name, "budget_s": budget,
                         "wall_s": wall_s, "seconds": seconds_of(out),

@@ -110,8 +110,9 @@ Sighting sighting_of(const std::vector<Silhouette>& views, const float point[3],
   return 2 * seen < views.size() ? Sighting::unseen : Sighting::matter;
 }
 
-Space fit_to_silhouettes(const PlainBackground& background, const Dataset& dataset,
-                         const Space& space) {
+namespace {
+
+Space fit_once(const PlainBackground& background, const Dataset& dataset, const Space& space) {
   std::vector<ViewRays> rays;
   std::vector<Silhouette> views;
   rays.reserve(dataset.views.size());
@@ -138,6 +139,14 @@ Space fit_to_silhouettes(const PlainBackground& background, const Dataset& datas
   const double radius = 0.5 * box.diagonal().norm() + half_diagonal;
   if (radius >= 1) return space;
   return {space.center + space.radius * box.center().cast<double>(), space.radius * radius};
+}
+
+}  // namespace
+
+Space fit_to_silhouettes(const PlainBackground& background, const Dataset& dataset,
+                         const Space& space) {
+  // Again, with cells as small as the first ball allows.
+  return fit_once(background, dataset, fit_once(background, dataset, space));
 }
 
 }  // namespace orbitfuse::nerf

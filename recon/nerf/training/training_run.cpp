@@ -95,9 +95,7 @@ Status TrainingRun::create_or_resume() {
   state_->thermal_is_gray = dataset.thermal_is_gray;
   state_->views = records_of(dataset, data_.heldout);
   state_->space = estimate_space(data_.training);
-  if (background_)
-    for (int tighter = 0; tighter < 2; ++tighter)
-      state_->space = fit_to_silhouettes(*background_, data_.training, state_->space);
+  if (background_) state_->space = fit_to_silhouettes(*background_, data_.training, state_->space);
   state_->span = estimate_span(data_.training);
   return {};
 }

@@ -134,6 +134,13 @@ TEST(Cli, ATraceIsWrittenForAnyVerb) {
   EXPECT_TRUE(refused.out.empty()) << "refused before the work";
 }
 
+TEST(Cli, ATraceOntoAFolderIsRefusedBeforeTheWork) {
+  const test::TempFolder temp;
+  const Outcome refused = orbitfuse_program({"devices", "--trace", temp.path().string()});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_TRUE(refused.out.empty());
+}
+
 /// The folder a verb makes is not made for it.
 TEST(Cli, ATraceMakesNoFolderAndADryRunNoTrace) {
   const test::TempFolder temp;

@@ -116,6 +116,15 @@ TEST_F(Run, ABudgetIsPlannedSpentAndTold) {
   EXPECT_EQ(from_folder.result()["budget_s"], 12);
   for (const auto& [stage, state] : states(from_folder))
     EXPECT_EQ(state, stage == "report" ? "ran" : "unchanged") << stage;
+  // What is damaged there is named there.
+  json record = json::parse(*read_file(out / "run.json"));
+  record["planned"]["users"]["depth.width_px"] = "wide";
+  fs::create_directories(temp.path() / "damaged");
+  std::ofstream(temp.path() / "damaged/run.json") << record;
+  const Outcome damaged_users =
+      orbitfuse_program({"run", (temp.path() / "damaged").string(), "--dry-run"});
+  EXPECT_EQ(damaged_users.code, 3);
+  EXPECT_THAT(damaged_users.err, HasSubstr("damaged/run.json: depth.width_px = \"wide\""));
   const Outcome longer = orbitfuse_program({"run", out.string(), "--budget", "14s", "--dry-run"});
   EXPECT_THAT(longer.err, HasSubstr("plan for 14 s: depth at ")) << "another, not the one before";
   // What the user gives stays, though the earlier plan had another choice.
