@@ -11,6 +11,7 @@
 #include "app/eval/image_error.hpp"
 #include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
+#include "app/stages/recorded_detail.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
 #include "core/geometry/pose_error.hpp"
@@ -128,10 +129,41 @@ cv::Mat resized(const cv::Mat& image, const Camera& camera) {
   return result;
 }
 
-Status compare_visible(const nerf::Field& field, const TrueTestView& view, const Camera& camera,
+/// A field as the run's new views show it.
+struct Shown {
+  nerf::Field field;
+  nerf::PhotoDetail detail;
+
+  Result<nerf::RenderedView> from(const Camera& camera, const Rigid3d& cam_from_world,
+                                  const Progress& progress) {
+    ORBITFUSE_ASSIGN(nerf::RenderedView seen,
+                     nerf::render(field, camera, cam_from_world, {}, progress));
+    ORBITFUSE_TRY(detail.add(field, camera, cam_from_world, seen, progress));
+    return seen;
+  }
+};
+
+/// Empty where the run has no such field.
+Result<Shown> load_shown(const Run& run, const Session& session, Modality modality, int width_px) {
+  Shown shown;
+  const std::string train = "train_" + std::string(name(modality));
+  if (!run.done(train)) return shown;
+  ORBITFUSE_ASSIGN(shown.field, nerf::Field::load(run.out / train / stages::field_file));
+  nerf::DetailOptions options;
+  if (run.done("render")) {
+    ORBITFUSE_ASSIGN(const pipeline::StageRecord record,
+                     pipeline::read_stage_record(run.out / "render"));
+    options.sources = record.options.value("detail_sources", 0);
+  }
+  const Samples samples = stages::SessionInput{session, {}}.samples(modality);
+  ORBITFUSE_ASSIGN(shown.detail, stages::recorded_detail(stages::context_of_run(run.out), session,
+                                                         modality, samples, width_px, options));
+  return shown;
+}
+
+Status compare_visible(Shown& shown, const TrueTestView& view, const Camera& camera,
                        const Rigid3d& cam_from_visible, const Progress& progress, Sums& sums) {
-  ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
-                   nerf::render(field, camera, cam_from_visible, {}, progress));
+  ORBITFUSE_ASSIGN(const nerf::RenderedView seen, shown.from(camera, cam_from_visible, progress));
   ORBITFUSE_ASSIGN(const cv::Mat truth, field_image(view.visible, Samples::color));
   cv::Mat truth8, seen8;
   resized(truth, camera).convertTo(truth8, CV_8U, 255);
@@ -141,11 +173,10 @@ Status compare_visible(const nerf::Field& field, const TrueTestView& view, const
   return {};
 }
 
-Status compare_thermal(const nerf::Field& field, const TrueTestView& view, const Camera& camera,
+Status compare_thermal(Shown& shown, const TrueTestView& view, const Camera& camera,
                        const Rigid3d& cam_from_thermal, const EvaluateOptions& options,
                        const Progress& progress, Sums& sums) {
-  ORBITFUSE_ASSIGN(nerf::RenderedView seen,
-                   nerf::render(field, camera, cam_from_thermal, {}, progress));
+  ORBITFUSE_ASSIGN(nerf::RenderedView seen, shown.from(camera, cam_from_thermal, progress));
   ORBITFUSE_ASSIGN(const cv::Mat truth, field_image(view.thermal, Samples::kelvin));
   seen.color.setTo(std::nanf(""), seen.opacity < options.min_opacity);
   const ThermalViewError error = thermal_view_error(seen.color, resized(truth, camera),
@@ -158,15 +189,16 @@ Status compare_thermal(const nerf::Field& field, const TrueTestView& view, const
   return {};
 }
 
-Status add_test_views(Run& run, const GroundTruth& truth, const EvaluateOptions& options,
-                      const Progress& progress) {
+Status add_test_views(Run& run, const Session& session, const GroundTruth& truth,
+                      const EvaluateOptions& options, const Progress& progress) {
   if (!run.truth_from_visible || truth.test.empty()) return {};
-  nerf::Field visible, thermal;
-  if (run.done("train_visible")) {
-    ORBITFUSE_ASSIGN(visible, nerf::Field::load(run.out / "train_visible" / stages::field_file));
-  }
-  if (run.done("train_thermal") && run.registered) {
-    ORBITFUSE_ASSIGN(thermal, nerf::Field::load(run.out / "train_thermal" / stages::field_file));
+  int widest = 0;
+  for (const TrueTestView& view : truth.test) widest = std::max(widest, view.camera.width);
+  const int detail_width = std::min(options.max_width_px, widest) * 5 / 4;
+  ORBITFUSE_ASSIGN(Shown visible, load_shown(run, session, Modality::visible, detail_width));
+  Shown thermal;
+  if (run.registered) {
+    ORBITFUSE_ASSIGN(thermal, load_shown(run, session, Modality::thermal, detail_width));
   }
   Sums sums;
   for (std::size_t i = 0; i < truth.test.size(); ++i) {
@@ -177,9 +209,9 @@ Status add_test_views(Run& run, const GroundTruth& truth, const EvaluateOptions&
     const Camera camera =
         view.camera.scaled_to(width, view.camera.height * width / view.camera.width);
     const Rigid3d cam_from_visible = rebase(view.cam_from_world, run.truth_from_visible->inverse());
-    if (!visible.empty() && !view.visible.empty())
+    if (!visible.field.empty() && !view.visible.empty())
       ORBITFUSE_TRY(compare_visible(visible, view, camera, cam_from_visible, progress, sums));
-    if (!thermal.empty() && !view.thermal.empty())
+    if (!thermal.field.empty() && !view.thermal.empty())
       ORBITFUSE_TRY(compare_thermal(thermal, view, camera,
                                     rebase(cam_from_visible, run.visible_from_thermal.inverse()),
                                     options, progress, sums));
@@ -208,7 +240,7 @@ Result<json> evaluate(const fs::path& out, const Session& session, const GroundT
   ORBITFUSE_TRY(add_poses(run, session, truth, Modality::visible, visible));
   ORBITFUSE_TRY(add_poses(run, session, truth, Modality::thermal, thermal));
   ORBITFUSE_TRY(add_registration(run, session, truth, thermal));
-  ORBITFUSE_TRY(add_test_views(run, truth, options, progress));
+  ORBITFUSE_TRY(add_test_views(run, session, truth, options, progress));
   json seconds = json::object();
   for (const auto& entry : fs::directory_iterator(out)) {
     if (!fs::exists(entry.path() / pipeline::stage_record_file)) continue;

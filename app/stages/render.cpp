@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "app/stages/artifacts.hpp"
+#include "app/stages/recorded_detail.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
 #include "core/formats/transforms_json.hpp"
@@ -25,6 +26,7 @@ using pipeline::StageOutput;
 
 struct Fields {
   nerf::Field visible, thermal;
+  nerf::PhotoDetail visible_detail, thermal_detail;
   Similarity3d visible_from_thermal;
 };
 
@@ -43,6 +45,25 @@ Result<Fields> load_fields(const StageContext& context) {
   // Two fields whose frames nobody could relate can't be shown by one camera.
   if (!fields.visible.empty() && !context.has("register")) fields.thermal = nerf::Field();
   return fields;
+}
+
+/// Recorded frames are read a little finer than the new views are, and not finer.
+Status load_detail(const StageContext& context, const SessionInput& input,
+                   const nerf::DetailOptions& options, const NewViews& views, Fields& fields) {
+  int widest = 0;
+  for (const PosedView& view : views.views) widest = std::max(widest, view.camera.width);
+  const int width = widest + widest / 4;
+  const auto of = [&](Modality modality) {
+    return recorded_detail(context, input.session, modality, input.samples(modality), width,
+                           options);
+  };
+  if (!fields.visible.empty()) {
+    ORBITFUSE_ASSIGN(fields.visible_detail, of(Modality::visible));
+  }
+  if (!fields.thermal.empty()) {
+    ORBITFUSE_ASSIGN(fields.thermal_detail, of(Modality::thermal));
+  }
+  return {};
 }
 
 Result<NewViews> choose_views(const StageContext& context, const RenderConfig& config,
@@ -114,9 +135,10 @@ Status write_temperatures(const StageContext& context, const std::vector<Thermal
 
 Result<StageOutput> render(const StageContext& context, const SessionInput& input,
                            const RenderConfig& config) {
-  ORBITFUSE_ASSIGN(const Fields fields, load_fields(context));
+  ORBITFUSE_ASSIGN(Fields fields, load_fields(context));
   const Modality frame = fields.visible.empty() ? Modality::thermal : Modality::visible;
   ORBITFUSE_ASSIGN(const NewViews chosen, choose_views(context, config, frame));
+  ORBITFUSE_TRY(load_detail(context, input, config.detail, chosen, fields));
   const bool gray = !input.has_temperatures();
   const Similarity3d thermal_from_visible = fields.visible_from_thermal.inverse();
 
@@ -124,6 +146,7 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
   std::vector<ViewFiles> files;
   std::vector<ThermalView> temperatures;
   Transforms transforms;
+  double visible_detailed = 0, thermal_detailed = 0;  // shares of the pixels
   for (const PosedView& view : chosen.views) {
     const TraceSpan span("new view");
     ORBITFUSE_TRY(context.progress.check("render"));
@@ -135,9 +158,13 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
     f.name = view.name;
     cv::Mat depth;
     if (!fields.visible.empty()) {
-      ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
+      ORBITFUSE_ASSIGN(nerf::RenderedView seen,
                        nerf::render(fields.visible, view.camera, view.cam_from_world,
                                     config.visible, context.progress));
+      ORBITFUSE_ASSIGN(const double detailed,
+                       fields.visible_detail.add(fields.visible, view.camera, view.cam_from_world,
+                                                 seen, context.progress));
+      visible_detailed += detailed;
       f.visible = "visible/" + view.name + ".png";
       f.depth = "depth/" + view.name + ".tiff";
       f.visible_opacity = "opacity/" + view.name + "_visible.tiff";
@@ -150,9 +177,13 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
       const Rigid3d cam_from_thermal = frame == Modality::thermal
                                            ? view.cam_from_world
                                            : rebase(view.cam_from_world, thermal_from_visible);
-      ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
+      ORBITFUSE_ASSIGN(nerf::RenderedView seen,
                        nerf::render(fields.thermal, view.camera, cam_from_thermal, config.thermal,
                                     context.progress));
+      ORBITFUSE_ASSIGN(const double detailed,
+                       fields.thermal_detail.add(fields.thermal, view.camera, cam_from_thermal,
+                                                 seen, context.progress));
+      thermal_detailed += detailed;
       f.thermal = "thermal/" + view.name + (gray ? ".png" : ".tiff");
       f.thermal_opacity = "opacity/" + view.name + "_thermal.tiff";
       temperatures.push_back({view, masked(seen.color, seen.opacity, config.min_opacity),
@@ -182,6 +213,9 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
                                                                  : "both modalities",
                                         clock.wall_s() / static_cast<double>(files.size()));
   output.metrics["views"] = files.size();
+  const auto count = static_cast<double>(files.size());
+  if (!fields.visible_detail.empty()) output.metrics["visible_detailed"] = visible_detailed / count;
+  if (!fields.thermal_detail.empty()) output.metrics["thermal_detailed"] = thermal_detailed / count;
   RenderedViews rendered;
   rendered.thermal_is_gray = gray;
   if (!temperatures.empty()) {
@@ -199,7 +233,7 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
 pipeline::Stage render_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "render";
-  stage.version = 2;  // hot scenes: a scale that holds them; a span that serves the object
+  stage.version = 3;  // detail of the recorded frames
   stage.uses = {"poses_visible", "poses_thermal", "train_visible", "train_thermal", "register"};
   stage.options = in.config->settings().to_json("render");
   stage.options["cameras"] = in.config->render.cameras;

@@ -110,6 +110,8 @@ void add_render(Settings& settings, RenderConfig& render) {
   settings.add("render.thermal_alike", render.thermal.alike,
                "Share of the temperatures' span within which four neighbours stand for the pixel "
                "between them; 0: every pixel is rendered");
+  settings.add("render.detail_sources", render.detail.sources,
+               "Recorded views that lend each new one the detail its field lacks; 0: none");
   settings.add("render.min_opacity", render.min_opacity,
                "Pixels less opaque than this have no temperature and are not fused");
 }
@@ -215,6 +217,7 @@ Status RunConfig::validate() const {
   ORBITFUSE_TRY(render.path.validate());
   ORBITFUSE_TRY(render.visible.validate());
   ORBITFUSE_TRY(render.thermal.validate());
+  ORBITFUSE_TRY(OptionCheck("render")("detail_sources", render.detail.sources, from_to(0, 64)));
   ORBITFUSE_TRY(palette(render.palette));
   ORBITFUSE_TRY(fuse.chosen());
   ORBITFUSE_TRY(fuse.options.validate());

@@ -11,6 +11,7 @@
 #include "recon/assembly/new_views.hpp"
 #include "recon/depth/options.hpp"
 #include "recon/nerf/nerf.hpp"
+#include "recon/nerf/photo_detail.hpp"
 #include "recon/poses/estimate_poses.hpp"
 
 namespace orbitfuse::stages {
@@ -35,6 +36,7 @@ struct RenderConfig {
   nerf::RenderOptions visible;
   /// Temperatures are smooth: most pixels are what their neighbours are (docs/formats.md).
   nerf::RenderOptions thermal{.alike = 0.004};
+  nerf::DetailOptions detail;
 };
 
 struct FuseConfig {

@@ -4,6 +4,8 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "core/numeric/median.hpp"
+
 namespace orbitfuse {
 namespace {
 
@@ -58,6 +60,16 @@ std::optional<Eigen::Vector2d> patch_residual(const PatchMatch& match, const Cam
   const auto seen = corrected_pixel(camera, correction, log_focal, 0, match.point);
   if (!seen) return std::nullopt;
   return match.sqrt_weight * (seen->pixel - match.seen);
+}
+
+PatchFit patch_fit(const std::vector<PatchMatch>& matches, const Camera& camera,
+                   const CorrectedPose& correction, double log_focal) {
+  std::vector<double> distances;
+  for (const PatchMatch& match : matches) {
+    const auto residual = patch_residual(match, camera, correction, log_focal);
+    if (residual && residual->norm() < 2) distances.push_back(residual->norm());
+  }
+  return {static_cast<int>(distances.size()), median(distances)};
 }
 
 bool PatchCost::Evaluate(const double* const* parameters, double* residuals,

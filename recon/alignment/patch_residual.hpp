@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <optional>
+#include <vector>
 
 #include "core/geometry/camera.hpp"
 #include "recon/alignment/patch_matching.hpp"
@@ -45,6 +46,14 @@ std::optional<CorrectedPixel> corrected_pixel(const Camera& camera, const Correc
 /// where it was found; none behind the camera.
 std::optional<Eigen::Vector2d> patch_residual(const PatchMatch& match, const Camera& camera,
                                               const CorrectedPose& correction, double log_focal);
+
+/// How well patches agree on a correction.
+struct PatchFit {
+  int matches = 0;       ///< within 2 px of it
+  double median_px = 0;  ///< their residual; 0 of none
+};
+PatchFit patch_fit(const std::vector<PatchMatch>& matches, const Camera& camera,
+                   const CorrectedPose& correction, double log_focal);
 
 /// Ceres cost of `patch_residual`: correction, log_focal.
 class PatchCost final : public ceres::SizedCostFunction<2, 6, 1> {

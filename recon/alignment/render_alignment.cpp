@@ -83,19 +83,6 @@ class ImageFields {
   std::map<const uchar*, cv::Mat> fields_;  ///< by the image's samples
 };
 
-/// Residuals of the matches after the correction, and how many are small.
-void judge(const ViewMatches& matched, const PoseCorrection& correction, double log_focal,
-           const Camera& camera, RenderAlignedView& view) {
-  std::vector<double> distances;
-  for (const PatchMatch& match : matched.matches) {
-    const auto residual = patch_residual(match, camera, CorrectedPose(correction), log_focal);
-    if (residual && residual->norm() < 2) distances.push_back(residual->norm());
-  }
-  view.matches = static_cast<int>(distances.size());
-  std::sort(distances.begin(), distances.end());
-  view.median_px = distances.empty() ? 0 : distances[distances.size() / 2];
-}
-
 }  // namespace
 
 std::vector<PosedView> RenderAlignment::poses() const {
@@ -152,7 +139,10 @@ Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer,
       // Too few patches would turn the camera anywhere; it stays where it is for this round.
       constexpr std::size_t least_matches = 12;
       if (matched[i].matches.size() < least_matches) corrections[i] = {};
-      judge(matched[i], corrections[i], log_focal, seen_by, view);
+      const PatchFit fit =
+          patch_fit(matched[i].matches, seen_by, CorrectedPose(corrections[i]), log_focal);
+      view.matches = fit.matches;
+      view.median_px = fit.median_px;
       view.view.cam_from_world = rigid_of(corrections[i]) * view.view.cam_from_world;
     }
     for (RenderAlignedView& view : result.views)

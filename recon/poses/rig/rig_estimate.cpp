@@ -223,14 +223,10 @@ void judge(const RoundResult& round, const std::array<double, 6>& correction, do
   rig.pairs.assign(at(count), {});
   for (int i = 0; i < count; ++i) {
     RigPairFit& fit = rig.pairs[at(i)];
-    std::vector<double> distances;
-    for (const PatchMatch& match : round.matches[at(i)]) {
-      const auto residual =
-          patch_residual(match, round.camera, CorrectedPose(correction), log_focal);
-      if (residual && residual->norm() < 2) distances.push_back(residual->norm());
-    }
-    fit.matches = static_cast<int>(distances.size());
-    fit.median_px = median(distances);
+    const PatchFit patches =
+        patch_fit(round.matches[at(i)], round.camera, CorrectedPose(correction), log_focal);
+    fit.matches = patches.matches;
+    fit.median_px = patches.median_px;
     fit.agreement = edge_agreement(round.edges[at(i)], round.fields[at(i)]);
     for (int j = 0; j < count; ++j)
       if (j != i)

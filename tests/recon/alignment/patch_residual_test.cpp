@@ -81,5 +81,26 @@ TEST(CorrectedPixel, NothingBehindTheCameraOrOfNoNumber) {
   EXPECT_FALSE(corrected_pixel(camera(), CorrectedPose(backwards), 0, 0, {0.1, 0.1, 1}));
 }
 
+TEST(PatchFit, CountsWhatLiesWithinTwoPixelsAndTellsTheirMedian) {
+  const PoseCorrection none = {};
+  std::vector<PatchMatch> matches;
+  for (const double off_px : {0.5, 1.0, 1.5, 2.5, 40.0}) {
+    PatchMatch match;
+    match.point = {0, 0, 2};
+    match.seen = {320 + off_px, 240};
+    match.sqrt_weight.setIdentity();
+    matches.push_back(match);
+  }
+  matches.push_back(matches.front());
+  matches.back().point.z() = -2;  // behind the camera: no patch of it
+  const PatchFit fit = patch_fit(matches, camera(), CorrectedPose(none), 0);
+  EXPECT_EQ(fit.matches, 3);
+  EXPECT_DOUBLE_EQ(fit.median_px, 1);
+
+  const PatchFit empty = patch_fit({}, camera(), CorrectedPose(none), 0);
+  EXPECT_EQ(empty.matches, 0);
+  EXPECT_EQ(empty.median_px, 0);
+}
+
 }  // namespace
 }  // namespace orbitfuse

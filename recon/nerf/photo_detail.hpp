@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "core/geometry/reconstruction.hpp"
+#include "core/progress.hpp"
+#include "recon/nerf/field.hpp"
+#include "recon/nerf/nerf.hpp"
+
+namespace orbitfuse::nerf {
+
+/// A recorded view that may lend detail. `image`: as TrainingView::image, of the camera's size; it
+/// is read when a new view first asks for it.
+struct DetailSource {
+  PosedView view;
+  std::function<Result<cv::Mat>()> image;
+};
+
+struct DetailOptions {
+  /// Recorded views that lend a new view their detail, the nearest by direction; 0 = none. More
+  /// than three gain nothing where views stand 30 degrees apart.
+  int sources = 4;
+  /// The field is rendered at this width where the sources stand. What is finer is the sources'.
+  int base_width_px = 400;
+  double depth_tolerance = 0.01;  ///< relative; a source that is farther off sees another surface
+  double angle_deg = 10;          ///< between rays over which a source's weight falls by e
+  /// A source whose mean over a neighbourhood is this share of the value range off the field's
+  /// shows something else there (a passer-by, a highlight) and hardly counts.
+  double unexplained = 0.1;
+  Status validate() const;
+};
+
+/// What recorded views show and the field, trained on fewer pixels for a limited time, does not.
+/// Each source's difference to the field as its camera sees it is carried to a new view over the
+/// field's depth, and the sources' mean is added to the rendered values. Places that a source can't
+/// see are told by depth, weights fall with the angle between the rays (Buehler et al. 2001,
+/// "Unstructured lumigraph rendering"), with the difference's mean over a neighbourhood, and
+/// towards the edges of pictures and of what is seen.
+class PhotoDetail {
+ public:
+  /// No sources: add() does nothing.
+  PhotoDetail() = default;
+  /// Sources and field share one world frame. Errors: usage (options).
+  static Result<PhotoDetail> of(std::vector<DetailSource> sources, const DetailOptions& options);
+
+  bool empty() const { return sources_.empty(); }
+
+  /// Adds to `seen`, which `field` rendered from there; depth and opacity stay. The source called
+  /// `except` lends nothing: a recorded view is compared with what the others know. Returns the
+  /// share of the pixels that got detail. The same for any thread count. Errors: input (an image
+  /// that can't be read, or isn't of its camera's size), cancelled.
+  Result<double> add(const Field& field, const Camera& camera, const Rigid3d& cam_from_world,
+                     RenderedView& seen, const Progress& progress, const std::string& except = {});
+
+ private:
+  struct Source {
+    DetailSource recorded;
+    cv::Mat difference;  ///< CV_16S, of 32767 value ranges; empty until asked for
+    cv::Mat confidence;  ///< CV_8U
+    cv::Mat depth;       ///< CV_32F, at the base width
+  };
+  class NewView;
+
+  std::vector<Source*> nearest(const Eigen::Vector3d& from, const Eigen::Vector3d& looked_at,
+                               const std::string& except);
+  Status prepare(const Field& field, const Progress& progress, Source& source) const;
+
+  DetailOptions options_;
+  std::vector<Source> sources_;
+};
+
+}  // namespace orbitfuse::nerf

@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/nerf/photo_detail.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+#include "core/numeric/median.hpp"
+#include "core/option_range.hpp"
+#include "core/system/parallel.hpp"
+#include "core/system/trace.hpp"
+#include "recon/nerf/field/field_state.hpp"
+
+namespace orbitfuse::nerf {
+namespace {
+
+constexpr float levels = 32767;  ///< a difference of the whole value range
+/// Pixels at a picture's edge where a source's say grows to its full, as a share of the width: its
+/// end isn't seen in the new view then.
+constexpr double border = 0.03;
+/// Neighbourhoods, as shares of the width: of what a source shows differently, and over which
+/// detail ends where no source sees on.
+constexpr double local_mean = 0.01, feather = 0.005;
+
+cv::Mat blurred(const cv::Mat& values, double sigma) {
+  cv::Mat result;
+  cv::GaussianBlur(values, result, {}, std::max(0.5, sigma));
+  return result;
+}
+
+/// The four pixels round a place and their weights; none where the place isn't among pixels'
+/// centres.
+struct Corners {
+  int x, y;
+  std::array<float, 4> weight;  ///< (x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)
+};
+std::optional<Corners> corners(const cv::Size& size, const Eigen::Vector2d& pixel) {
+  const double x = pixel.x() - 0.5, y = pixel.y() - 0.5;
+  if (!(x >= 0 && y >= 0 && x < size.width - 1 && y < size.height - 1)) return std::nullopt;
+  const int column = static_cast<int>(x), row = static_cast<int>(y);
+  const auto u = static_cast<float>(x - column), v = static_cast<float>(y - row);
+  return Corners{column, row, {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v}};
+}
+
+template <class T>
+float at(const cv::Mat& plane, const Corners& c, int channels = 1, int channel = 0) {
+  const T* upper = plane.ptr<T>(c.y) + c.x * channels + channel;
+  const T* lower = plane.ptr<T>(c.y + 1) + c.x * channels + channel;
+  return c.weight[0] * static_cast<float>(upper[0]) +
+         c.weight[1] * static_cast<float>(upper[channels]) +
+         c.weight[2] * static_cast<float>(lower[0]) +
+         c.weight[3] * static_cast<float>(lower[channels]);
+}
+
+/// How much of each pixel's difference is detail of what the field shows: 0..255.
+cv::Mat confidence_of(const cv::Mat& difference, const cv::Mat& known, double unexplained) {
+  const double sigma = local_mean * difference.cols;
+  const cv::Mat share = blurred(known, sigma), sum = blurred(difference, sigma);
+  cv::Mat result(difference.size(), CV_8U);
+  const int channels = difference.channels();
+  for (int y = 0; y < result.rows; ++y)
+    for (int x = 0; x < result.cols; ++x) {
+      float most = 0;
+      for (int c = 0; c < channels; ++c)
+        most = std::max(most, std::abs(sum.ptr<float>(y)[x * channels + c]));
+      const double off = most / std::max(1e-3F, share.at<float>(y, x)) / unexplained;
+      const int inside =
+          std::min(std::min(x, result.cols - 1 - x), std::min(y, result.rows - 1 - y));
+      const double ramp = std::min(1.0, inside / std::max(1.0, border * result.cols));
+      result.at<uchar>(y, x) =
+          cv::saturate_cast<uchar>(255 * known.at<float>(y, x) * ramp * std::exp(-off * off));
+    }
+  return result;
+}
+
+/// The middle of what a view sees; none where it sees nothing.
+std::optional<Eigen::Vector3d> looked_at(const Camera& camera, const Rigid3d& world_from_cam,
+                                         const cv::Mat& depth) {
+  constexpr int step = 8;
+  std::vector<double> seen;
+  for (int y = depth.rows / 4; y < depth.rows - depth.rows / 4; y += step)
+    for (int x = depth.cols / 4; x < depth.cols - depth.cols / 4; x += step)
+      if (const float z = depth.at<float>(y, x); std::isfinite(z)) seen.push_back(z);
+  if (seen.empty()) return std::nullopt;
+  return world_from_cam * (camera.ray_of({0.5 * camera.width, 0.5 * camera.height}) * median(seen));
+}
+
+}  // namespace
+
+Status DetailOptions::validate() const {
+  const OptionCheck check("detail");
+  ORBITFUSE_TRY(check("sources", sources, from_to(0, 64)));
+  ORBITFUSE_TRY(check("base_width_px", base_width_px, from_to(16, 8192)));
+  ORBITFUSE_TRY(check("depth_tolerance", depth_tolerance, above_up_to(0, 0.5)));
+  ORBITFUSE_TRY(check("angle_deg", angle_deg, above_up_to(0, 180)));
+  return check("unexplained", unexplained, above_up_to(0, 1));
+}
+
+Result<PhotoDetail> PhotoDetail::of(std::vector<DetailSource> sources,
+                                    const DetailOptions& options) {
+  ORBITFUSE_TRY(options.validate());
+  PhotoDetail detail;
+  detail.options_ = options;
+  if (options.sources == 0) return detail;
+  for (DetailSource& source : sources) detail.sources_.push_back({std::move(source), {}, {}, {}});
+  return detail;
+}
+
+/// Renders the field where the source stands, and keeps what the source shows beyond that.
+Status PhotoDetail::prepare(const Field& field, const Progress& progress, Source& source) const {
+  if (!source.depth.empty()) return {};
+  const TraceSpan span("detail of a view");
+  const PosedView& view = source.recorded.view;
+  ORBITFUSE_ASSIGN(const cv::Mat image, source.recorded.image());
+  const Camera& full = view.camera;
+  if (image.cols != full.width || image.rows != full.height)
+    return fail(ErrorKind::input, view.name,
+                fmt::format("{}x{} pixels, its camera has {}x{}", image.cols, image.rows,
+                            full.width, full.height),
+                "frames of one camera must have one size; import the session again");
+  const int width = std::min(options_.base_width_px, full.width);
+  const int height = std::max(
+      1, static_cast<int>(std::lround(static_cast<double>(width) * full.height / full.width)));
+  ORBITFUSE_ASSIGN(const RenderedView base,
+                   render(field, full.scaled_to(width, height), view.cam_from_world, {}, progress));
+  cv::Mat shown;
+  cv::resize(base.color, shown, image.size(), 0, 0, cv::INTER_CUBIC);
+  const ValueSpan range = field.state().span;
+  cv::Mat difference = (image - shown) * (1 / (range.high - range.low)), known;
+  std::vector<cv::Mat> planes;
+  cv::split(difference, planes);
+  cv::Mat(planes[0] == planes[0]).convertTo(known, CV_32F, 1.0 / 255);
+  cv::patchNaNs(difference, 0);
+  source.confidence = confidence_of(difference, known, options_.unexplained);
+  difference.convertTo(source.difference, CV_16S, levels);
+  source.depth = base.depth;
+  return {};
+}
+
+std::vector<PhotoDetail::Source*> PhotoDetail::nearest(const Eigen::Vector3d& from,
+                                                       const Eigen::Vector3d& looked_at,
+                                                       const std::string& except) {
+  const Eigen::Vector3d direction = (from - looked_at).normalized();
+  std::vector<std::pair<double, Source*>> ranked;
+  for (Source& source : sources_) {
+    const Eigen::Vector3d other =
+        source.recorded.view.cam_from_world.inverse().translation - looked_at;
+    const double cosine = other.normalized().dot(direction);
+    if (source.recorded.view.name != except && cosine > 0) ranked.emplace_back(-cosine, &source);
+  }
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<Source*> chosen;
+  for (const auto& [cosine, source] : ranked)
+    if (chosen.size() < static_cast<std::size_t>(options_.sources)) chosen.push_back(source);
+  return chosen;
+}
+
+/// A rendered view whose pixels ask the chosen sources.
+class PhotoDetail::NewView {
+ public:
+  NewView(const Camera& camera, const Rigid3d& world_from_cam, const cv::Mat& depth,
+          const std::vector<Source*>& sources, const DetailOptions& options)
+      : camera_(camera), world_from_cam_(world_from_cam), depth_(depth), options_(options) {
+    for (const Source* source : sources) {
+      const PosedView& view = source->recorded.view;
+      asked_.push_back({*source, view.camera, view.cam_from_world,
+                        view.cam_from_world.inverse().translation,
+                        static_cast<double>(source->depth.cols) / view.camera.width,
+                        static_cast<double>(source->depth.rows) / view.camera.height});
+    }
+  }
+
+  /// The sources' mean, in value ranges, and 1 where there is one.
+  void collect(cv::Mat& mean, cv::Mat& covered) const {
+    const int channels = mean.channels();
+    parallel_blocks(mean.rows, 8, [&](int begin, int end) {
+      for (int y = begin; y < end; ++y)
+        for (int x = 0; x < mean.cols; ++x) {
+          float* values = mean.ptr<float>(y) + x * channels;
+          const float weight = sum(x, y, channels, values);
+          covered.at<float>(y, x) = weight > 0 ? 1.0F : 0.0F;
+          for (int c = 0; c < channels && weight > 0; ++c) values[c] /= weight * levels;
+        }
+    });
+  }
+
+ private:
+  struct Asked {
+    const Source& source;
+    Camera camera;
+    Rigid3d cam_from_world;
+    Eigen::Vector3d center;
+    double base_x, base_y;  ///< base pixels a pixel
+  };
+
+  float sum(int x, int y, int channels, float* values) const {
+    const float z = depth_.at<float>(y, x);
+    if (!std::isfinite(z)) return 0;
+    const Eigen::Vector3d point = world_from_cam_ * (camera_.ray_of({x + 0.5, y + 0.5}) * z);
+    if (!point.allFinite()) return 0;
+    const Eigen::Vector3d ray = (point - world_from_cam_.translation).normalized();
+    float total = 0;
+    for (const Asked& asked : asked_) {
+      const Eigen::Vector3d in_source = asked.cam_from_world * point;
+      if (!(in_source.z() > 0)) continue;
+      const Eigen::Vector2d pixel = asked.camera.project(in_source);
+      const auto base =
+          corners(asked.source.depth.size(), {pixel.x() * asked.base_x, pixel.y() * asked.base_y});
+      if (!base) continue;
+      // Not a number where one of the four has no depth.
+      const double off = at<float>(asked.source.depth, *base) - in_source.z();
+      if (!(std::abs(off) <= options_.depth_tolerance * in_source.z())) continue;
+      const auto full = corners(asked.source.difference.size(), pixel);
+      if (!full) continue;
+      const double cosine = ray.dot((point - asked.center).normalized());
+      const double angle_deg = std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / std::numbers::pi;
+      const float weight = at<uchar>(asked.source.confidence, *full) *
+                           static_cast<float>(std::exp(-angle_deg / options_.angle_deg) / 255);
+      for (int c = 0; c < channels; ++c)
+        values[c] += weight * at<std::int16_t>(asked.source.difference, *full, channels, c);
+      total += weight;
+    }
+    return total;
+  }
+
+  const Camera& camera_;
+  const Rigid3d world_from_cam_;
+  const cv::Mat& depth_;
+  const DetailOptions& options_;
+  std::vector<Asked> asked_;
+};
+
+Result<double> PhotoDetail::add(const Field& field, const Camera& camera,
+                                const Rigid3d& cam_from_world, RenderedView& seen,
+                                const Progress& progress, const std::string& except) {
+  const Rigid3d world_from_cam = cam_from_world.inverse();
+  const auto middle = looked_at(camera, world_from_cam, seen.depth);
+  if (!middle) return 0.0;
+  const std::vector<Source*> chosen = nearest(world_from_cam.translation, *middle, except);
+  for (Source* source : chosen) ORBITFUSE_TRY(prepare(field, progress, *source));
+  if (chosen.empty()) return 0.0;
+
+  const TraceSpan span("detail of a new view");
+  cv::Mat mean = cv::Mat::zeros(seen.color.size(), seen.color.type());
+  cv::Mat covered(mean.size(), CV_32F);
+  NewView(camera, world_from_cam, seen.depth, chosen, options_).collect(mean, covered);
+  const double share = cv::mean(covered)[0];
+  cv::Mat strength = blurred(covered, feather * mean.cols);
+  strength = strength.mul(strength).mul(seen.opacity);
+  const ValueSpan range = field.state().span;
+  const auto width = static_cast<float>(range.high - range.low);
+  const int channels = mean.channels();
+  const bool bounded = channels == 3;  // colours end at black and white
+  parallel_blocks(mean.rows, 8, [&](int begin, int end) {
+    for (int y = begin; y < end; ++y)
+      for (int i = 0; i < mean.cols * channels; ++i) {
+        float& value = seen.color.ptr<float>(y)[i];
+        value += width * strength.ptr<float>(y)[i / channels] * mean.ptr<float>(y)[i];
+        if (bounded) value = std::clamp(value, 0.0F, 1.0F);
+      }
+  });
+  return share;
+}
+
+}  // namespace orbitfuse::nerf

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/nerf/photo_detail.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+
+#include "core/system/parallel.hpp"
+#include "tests/recon/nerf/toy_scene.hpp"
+
+namespace orbitfuse::nerf {
+namespace {
+
+constexpr int pixels = 96, trained_pixels = 32, ring = 16;
+
+/// The toy's ball with a pattern on it that 32 pixels can't show.
+Dataset fine_scene(Modality modality) {
+  Dataset data = test::toy_scene(modality, ring, 1, pixels);
+  const std::vector<DepthMap> depth = test::toy_depth(data);
+  const bool color = modality == Modality::visible;
+  for (std::size_t i = 0; i < data.views.size(); ++i) {
+    TrainingView& view = data.views[i];
+    view.image = view.image.clone();
+    const Rigid3d world_from_cam = view.cam_from_world.inverse();
+    for (int y = 0; y < pixels; ++y)
+      for (int x = 0; x < pixels; ++x) {
+        const float z = depth[i].depth.at<float>(y, x);
+        if (!std::isfinite(z)) continue;
+        const Eigen::Vector3d at = world_from_cam * (view.camera.ray_of({x + 0.5, y + 0.5}) * z);
+        const double wave = std::sin(60 * at.x()) * std::sin(60 * at.y()) * std::sin(60 * at.z());
+        if (color)
+          view.image.at<cv::Vec3f>(y, x) += cv::Vec3f::all(static_cast<float>(0.2 * wave));
+        else
+          view.image.at<float>(y, x) += static_cast<float>(3 * wave);
+      }
+  }
+  return data;
+}
+
+Field trained_on(const Dataset& fine) {
+  Dataset coarse = fine;
+  for (TrainingView& view : coarse.views) view = resized(view, trained_pixels, trained_pixels);
+  TrainOptions options = test::toy_options(fine.modality, 150);
+  Dataset shape = coarse;
+  shape.depth = test::toy_depth(coarse);
+  Field field;
+  const auto report = train(shape, options, {}, field);
+  EXPECT_TRUE(report) << report.error().message();
+  return field;
+}
+
+std::vector<DetailSource> sources_of(const Dataset& data) {
+  std::vector<DetailSource> sources;
+  for (const TrainingView& view : data.views)
+    sources.push_back({{view.name, view.camera, view.cam_from_world},
+                       [image = view.image]() -> Result<cv::Mat> { return image; }});
+  return sources;
+}
+
+DetailOptions small() {
+  DetailOptions options;
+  options.base_width_px = trained_pixels;
+  options.depth_tolerance = 0.03;  // so small a field is a coarse one
+  return options;
+}
+
+PhotoDetail detail_of(std::vector<DetailSource> sources, const DetailOptions& options = small()) {
+  auto detail = PhotoDetail::of(std::move(sources), options);
+  EXPECT_TRUE(detail) << detail.error().message();
+  return std::move(*detail);
+}
+
+RenderedView rendered(const Field& field, const TrainingView& view) {
+  auto seen = render(field, view.camera, view.cam_from_world, {}, {});
+  EXPECT_TRUE(seen) << seen.error().message();
+  return std::move(*seen);
+}
+
+/// RMS over the pixels that have depth, but for the ball's rim.
+double error(const RenderedView& seen, const cv::Mat& truth) {
+  cv::Mat inner, off = seen.color - truth;
+  cv::erode(seen.depth == seen.depth, inner, cv::Mat::ones(9, 9, CV_8U));
+  return cv::norm(off, cv::NORM_L2, inner) / std::sqrt(cv::countNonZero(inner));
+}
+
+class Detail : public testing::TestWithParam<Modality> {
+ protected:
+  Dataset data = fine_scene(GetParam());
+  Field field = trained_on(data);
+};
+
+TEST_P(Detail, OfTheOtherViewsIsNearerToAViewThanTheFieldAlone) {
+  PhotoDetail detail = detail_of(sources_of(data));
+  for (const std::size_t i : {std::size_t{0}, std::size_t{5}}) {
+    const TrainingView& view = data.views[i];
+    const RenderedView plain = rendered(field, view);
+    RenderedView seen = rendered(field, view);
+    const auto share = detail.add(field, view.camera, view.cam_from_world, seen, {}, view.name);
+    ASSERT_TRUE(share) << share.error().message();
+    EXPECT_GT(*share, 0.05);
+    EXPECT_LT(error(seen, view.image), 0.8 * error(plain, view.image));
+    EXPECT_EQ(cv::norm(plain.opacity, seen.opacity, cv::NORM_INF), 0);
+  }
+}
+
+TEST_P(Detail, IsTheSameForAnyThreadCount) {
+  const TrainingView& view = data.views[3];
+  std::vector<cv::Mat> results;
+  for (const int threads : {1, 3}) {
+    set_thread_count(threads);
+    PhotoDetail detail = detail_of(sources_of(data));
+    RenderedView seen = rendered(field, view);
+    ASSERT_TRUE(detail.add(field, view.camera, view.cam_from_world, seen, {}, view.name));
+    results.push_back(seen.color);
+  }
+  set_thread_count(0);
+  EXPECT_EQ(cv::norm(results[0], results[1], cv::NORM_INF), 0);
+}
+
+TEST_P(Detail, OfNoSourceOrOnlyOfTheViewItselfIsNone) {
+  const TrainingView& view = data.views[2];
+  const RenderedView plain = rendered(field, view);
+  DetailOptions none = small();
+  none.sources = 0;
+  std::vector<DetailSource> itself = {sources_of(data)[2]};
+  PhotoDetail nothing, off = detail_of(sources_of(data), none), own = detail_of(itself);
+  EXPECT_TRUE(nothing.empty());
+  EXPECT_TRUE(off.empty());
+  for (PhotoDetail* detail : {&nothing, &off, &own}) {
+    RenderedView seen = rendered(field, view);
+    const auto share = detail->add(field, view.camera, view.cam_from_world, seen, {}, view.name);
+    ASSERT_TRUE(share);
+    EXPECT_EQ(*share, 0);
+    EXPECT_EQ(cv::norm(plain.color, seen.color, cv::NORM_INF), 0);
+  }
+}
+
+TEST_P(Detail, OfSomethingElseThatStoodBeforeASourceHardlyCounts) {
+  Dataset disturbed = data;
+  const double span = GetParam() == Modality::visible ? 1 : 15;
+  for (TrainingView& view : disturbed.views) {
+    view.image = view.image.clone();
+    view.image(cv::Rect(pixels / 3, pixels / 3, pixels / 3, pixels / 3)) += cv::Scalar::all(span);
+  }
+  PhotoDetail detail = detail_of(sources_of(disturbed));
+  const TrainingView& view = data.views[4];
+  const RenderedView plain = rendered(field, view);
+  RenderedView seen = rendered(field, view);
+  ASSERT_TRUE(detail.add(field, view.camera, view.cam_from_world, seen, {}, view.name));
+  EXPECT_LT(cv::norm(plain.color, seen.color, cv::NORM_INF), 0.6 * span);
+  EXPECT_LT(error(seen, view.image), 1.3 * error(plain, view.image));
+}
+
+TEST_P(Detail, StaysFiniteBesideDeadPixelsEmptyPicturesAndEdges) {
+  Dataset broken = data;
+  for (TrainingView& view : broken.views) {
+    view.image = view.image.clone();
+    if (GetParam() == Modality::thermal)
+      for (int x = 0; x < pixels; x += 3) view.image.col(x) = std::nanf("");
+    else
+      view.image = cv::Scalar::all(0);
+  }
+  PhotoDetail detail = detail_of(sources_of(broken));
+  for (const double turn_rad : {0.0, 0.4, 1.5, 3.1}) {  // to where there is nothing to be seen
+    Rigid3d turned = data.views[0].cam_from_world;
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitY()));
+    turned = Rigid3d{turn, Eigen::Vector3d::Zero()} * turned;
+    const Camera& camera = data.views[0].camera;
+    auto seen = render(field, camera, turned, {}, {});
+    ASSERT_TRUE(seen);
+    const auto share = detail.add(field, camera, turned, *seen, {});
+    ASSERT_TRUE(share);
+    EXPECT_TRUE(cv::checkRange(seen->color));
+    EXPECT_GE(*share, 0);
+    EXPECT_LE(*share, 1);
+  }
+}
+
+TEST_P(Detail, NamesASourceThatCantBeReadOrIsOfAnotherSize) {
+  const TrainingView& view = data.views[1];
+  RenderedView seen = rendered(field, view);
+  std::vector<DetailSource> sources = sources_of(data);
+  for (DetailSource& source : sources)
+    source.image = []() -> Result<cv::Mat> {
+      return fail(ErrorKind::input, "gone.png", "not there", "bring it back");
+    };
+  PhotoDetail gone = detail_of(sources);
+  auto share = gone.add(field, view.camera, view.cam_from_world, seen, {});
+  ASSERT_FALSE(share);
+  EXPECT_EQ(share.error().where, "gone.png");
+
+  for (DetailSource& source : sources)
+    source.image = [&]() -> Result<cv::Mat> { return data.views[0].image.rowRange(0, 50); };
+  PhotoDetail cut = detail_of(sources);
+  share = cut.add(field, view.camera, view.cam_from_world, seen, {});
+  ASSERT_FALSE(share);
+  EXPECT_EQ(share.error().where, "001.png");
+  EXPECT_NE(share.error().message().find("96x50"), std::string::npos);
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, Detail, testing::Values(Modality::visible, Modality::thermal),
+                         [](const auto& of) { return std::string(name(of.param)); });
+
+TEST(DetailOptions, OutOfRangeAreUsageErrors) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto refused = [](auto change) {
+    DetailOptions options;
+    change(options);
+    const auto detail = PhotoDetail::of({}, options);
+    return !detail && detail.error().kind == ErrorKind::usage;
+  };
+  EXPECT_TRUE(refused([](DetailOptions& o) { o.sources = -1; }));
+  EXPECT_TRUE(refused([](DetailOptions& o) { o.base_width_px = 0; }));
+  EXPECT_TRUE(refused([](DetailOptions& o) { o.depth_tolerance = 0; }));
+  EXPECT_TRUE(refused([](DetailOptions& o) { o.angle_deg = nan; }));
+  EXPECT_TRUE(refused([](DetailOptions& o) { o.unexplained = 2; }));
+  EXPECT_FALSE(refused([](DetailOptions&) {}));
+}
+
+}  // namespace
+}  // namespace orbitfuse::nerf
