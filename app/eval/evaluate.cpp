@@ -23,6 +23,7 @@ namespace orbitfuse::eval {
 namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
+using stages::DetailedField;
 
 /// The name the truth may know a frame by: its original file, else its place in the session.
 std::string base_name(const FrameRecord& frame) {
@@ -129,41 +130,26 @@ cv::Mat resized(const cv::Mat& image, const Camera& camera) {
   return result;
 }
 
-/// A field as the run's new views show it.
-struct Shown {
-  nerf::Field field;
-  nerf::PhotoDetail detail;
-
-  Result<nerf::RenderedView> from(const Camera& camera, const Rigid3d& cam_from_world,
-                                  const Progress& progress) {
-    ORBITFUSE_ASSIGN(nerf::RenderedView seen,
-                     nerf::render(field, camera, cam_from_world, {}, progress));
-    ORBITFUSE_TRY(detail.add(field, camera, cam_from_world, seen, progress));
-    return seen;
-  }
-};
-
-/// Empty where the run has no such field.
-Result<Shown> load_shown(const Run& run, const Session& session, Modality modality, int width_px) {
-  Shown shown;
+/// As the run's new views show it. Empty where the run has no such field.
+Result<DetailedField> load_shown(const Run& run, const Session& session, Modality modality,
+                                 int width_px) {
+  DetailedField shown;
   const std::string train = "train_" + std::string(name(modality));
   if (!run.done(train)) return shown;
   ORBITFUSE_ASSIGN(shown.field, nerf::Field::load(run.out / train / stages::field_file));
-  nerf::DetailOptions options;
-  if (run.done("render")) {
-    ORBITFUSE_ASSIGN(const pipeline::StageRecord record,
-                     pipeline::read_stage_record(run.out / "render"));
-    options.sources = record.options.value("detail_sources", 0);
-  }
+  const pipeline::StageContext context = stages::context_of_run(run.out);
+  ORBITFUSE_ASSIGN(const nerf::DetailOptions options,
+                   stages::detail_of_new_views(context, modality));
   const Samples samples = stages::SessionInput{session, {}}.samples(modality);
   ORBITFUSE_ASSIGN(shown.detail, stages::recorded_detail(stages::context_of_run(run.out), session,
                                                          modality, samples, width_px, options));
   return shown;
 }
 
-Status compare_visible(Shown& shown, const TrueTestView& view, const Camera& camera,
+Status compare_visible(DetailedField& shown, const TrueTestView& view, const Camera& camera,
                        const Rigid3d& cam_from_visible, const Progress& progress, Sums& sums) {
-  ORBITFUSE_ASSIGN(const nerf::RenderedView seen, shown.from(camera, cam_from_visible, progress));
+  ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
+                   shown.render(camera, cam_from_visible, {}, progress));
   ORBITFUSE_ASSIGN(const cv::Mat truth, field_image(view.visible, Samples::color));
   cv::Mat truth8, seen8;
   resized(truth, camera).convertTo(truth8, CV_8U, 255);
@@ -173,10 +159,10 @@ Status compare_visible(Shown& shown, const TrueTestView& view, const Camera& cam
   return {};
 }
 
-Status compare_thermal(Shown& shown, const TrueTestView& view, const Camera& camera,
+Status compare_thermal(DetailedField& shown, const TrueTestView& view, const Camera& camera,
                        const Rigid3d& cam_from_thermal, const EvaluateOptions& options,
                        const Progress& progress, Sums& sums) {
-  ORBITFUSE_ASSIGN(nerf::RenderedView seen, shown.from(camera, cam_from_thermal, progress));
+  ORBITFUSE_ASSIGN(nerf::RenderedView seen, shown.render(camera, cam_from_thermal, {}, progress));
   ORBITFUSE_ASSIGN(const cv::Mat truth, field_image(view.thermal, Samples::kelvin));
   seen.color.setTo(std::nanf(""), seen.opacity < options.min_opacity);
   const ThermalViewError error = thermal_view_error(seen.color, resized(truth, camera),
@@ -195,8 +181,9 @@ Status add_test_views(Run& run, const Session& session, const GroundTruth& truth
   int widest = 0;
   for (const TrueTestView& view : truth.test) widest = std::max(widest, view.camera.width);
   const int detail_width = std::min(options.max_width_px, widest) * 5 / 4;
-  ORBITFUSE_ASSIGN(Shown visible, load_shown(run, session, Modality::visible, detail_width));
-  Shown thermal;
+  ORBITFUSE_ASSIGN(DetailedField visible,
+                   load_shown(run, session, Modality::visible, detail_width));
+  DetailedField thermal;
   if (run.registered) {
     ORBITFUSE_ASSIGN(thermal, load_shown(run, session, Modality::thermal, detail_width));
   }
@@ -209,9 +196,9 @@ Status add_test_views(Run& run, const Session& session, const GroundTruth& truth
     const Camera camera =
         view.camera.scaled_to(width, view.camera.height * width / view.camera.width);
     const Rigid3d cam_from_visible = rebase(view.cam_from_world, run.truth_from_visible->inverse());
-    if (!visible.field.empty() && !view.visible.empty())
+    if (!visible.empty() && !view.visible.empty())
       ORBITFUSE_TRY(compare_visible(visible, view, camera, cam_from_visible, progress, sums));
-    if (!thermal.field.empty() && !view.thermal.empty())
+    if (!thermal.empty() && !view.thermal.empty())
       ORBITFUSE_TRY(compare_thermal(thermal, view, camera,
                                     rebase(cam_from_visible, run.visible_from_thermal.inverse()),
                                     options, progress, sums));

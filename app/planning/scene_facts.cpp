@@ -48,6 +48,7 @@ bool all_posed(const std::vector<const FrameRecord*>& frames) {
 /// How many new views there will be, and of what size.
 Status look_at_new_views(const stages::RenderConfig& config, double height_by_width,
                          SceneFacts& facts) {
+  facts.detail_sources = config.detail.sources;
   facts.new_views = config.path.views;
   facts.new_view_mpx = 1e-6 * config.path.width_px * config.path.width_px * height_by_width;
   if (config.cameras.empty()) return {};
@@ -73,6 +74,7 @@ nlohmann::json to_json(const SceneFacts& facts) {
           {"thermal_height_by_width", facts.thermal_height_by_width},
           {"new_views", facts.new_views},
           {"new_view_mpx", facts.new_view_mpx},
+          {"detail_sources", facts.detail_sources},
           {"fusion_methods", facts.fusion_methods},
           {"smoothness_db", facts.smoothness_db}};
 }

@@ -17,6 +17,7 @@ struct SceneFacts {
   double visible_height_by_width = 0.75, thermal_height_by_width = 0.8;
   int new_views = 8;
   double new_view_mpx = 0.3;  ///< mean
+  int detail_sources = 4;     ///< recorded views that lend a new one detail
   int fusion_methods = 5;
   /// PSNR of the photos against themselves at 100 pixels' width: how little detail there is.
   double smoothness_db = 28;

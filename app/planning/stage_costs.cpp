@@ -23,7 +23,8 @@ constexpr double visible_view_s = 0.12;  // its image, its exposure, its part of
 constexpr double thermal_view_s = 0.06;
 constexpr double visible_checks_s = 0.5, thermal_checks_s = 1.1;  // of held-out views
 constexpr double new_view_mpx_s = 3.35;                           // both fields
-constexpr double fused_mpx_s = 0.115;                             // a method
+constexpr double lent_view_s = 0.17;   // a recorded view that lends detail
+constexpr double fused_mpx_s = 0.115;  // a method
 constexpr double scored_mpx_s = 0.545, heldout_view_s = 0.25;
 constexpr int heldout_every = 12;
 constexpr double report_s = 0.5;
@@ -52,9 +53,13 @@ double stage_s(const std::string& stage, const SceneFacts& facts, const Effort& 
   const bool both = photos > 0 && thermal > 0;
   if (stage == "report") return report_s;
   if (stage == "register") return both && facts.visible_posed && facts.thermal_posed ? clouds_s : 0;
-  if (stage == "render")
-    return start_s + facts.new_views * facts.new_view_mpx * new_view_mpx_s * (both ? 1 : 0.5) *
+  if (stage == "render") {
+    const double asked = (facts.new_views + 2.0) * facts.detail_sources;  // two are tried on
+    const double lent = std::min(asked, photos) + std::min(asked, thermal);
+    return start_s + (facts.new_views * facts.new_view_mpx * new_view_mpx_s * (both ? 1 : 0.5) +
+                      lent * lent_view_s) *
                          fog(facts, effort, render_fog);
+  }
   if (stage == "fuse")
     return both ? facts.new_views * facts.new_view_mpx * facts.fusion_methods * fused_mpx_s : 0;
   if (stage == "metrics") {

@@ -37,9 +37,9 @@ struct MeanError {
 
 /// Rendered, with the detail of all other recorded views, against recorded, on views that did not
 /// train (seed paper, Table 4).
-Status score_field(const StageContext& context, const SessionInput& input, const RunConfig& run,
-                   Modality modality, MetricMeans& means, MeanError& thermal_k) {
-  const TrainConfig& config = run.train(modality);
+Status score_field(const StageContext& context, const SessionInput& input,
+                   const TrainConfig& config, Modality modality, MetricMeans& means,
+                   MeanError& thermal_k) {
   const std::string train = "train_" + std::string(name(modality));
   if (!context.has(train)) return {};
   const json* trained = context.metrics_of(train);
@@ -55,15 +55,15 @@ Status score_field(const StageContext& context, const SessionInput& input, const
   ORBITFUSE_ASSIGN(const nerf::Dataset data,
                    training_data(input.session.folder, model, input.samples(model.modality),
                                  config.max_width_px, context.progress));
-  ORBITFUSE_ASSIGN(const nerf::Field field, nerf::Field::load(context.of(train) / field_file));
-  ORBITFUSE_ASSIGN(nerf::PhotoDetail detail,
+  DetailedField shown;
+  ORBITFUSE_ASSIGN(shown.field, nerf::Field::load(context.of(train) / field_file));
+  ORBITFUSE_ASSIGN(const nerf::DetailOptions how, detail_of_new_views(context, modality));
+  ORBITFUSE_ASSIGN(shown.detail,
                    recorded_detail(context, input.session, modality, input.samples(modality),
-                                   config.max_width_px, run.render.detail));
+                                   config.max_width_px, how));
   for (const nerf::TrainingView& view : data.views) {
-    ORBITFUSE_ASSIGN(nerf::RenderedView seen,
-                     nerf::render(field, view.camera, view.cam_from_world, {}, context.progress));
-    ORBITFUSE_TRY(
-        detail.add(field, view.camera, view.cam_from_world, seen, context.progress, view.name));
+    ORBITFUSE_ASSIGN(const nerf::RenderedView seen, shown.render(view.camera, view.cam_from_world,
+                                                                 {}, context.progress, view.name));
     cv::Mat truth = view.image, rendered = seen.color;
     if (modality == Modality::visible) {
       if (gains.contains(view.name)) {  // the field shows the common exposure, the frame its own
@@ -123,7 +123,7 @@ Result<StageOutput> score(const StageContext& context, const SessionInput& input
   MetricMeans fields, fused;
   MeanError thermal_k;
   for (const Modality modality : {Modality::visible, Modality::thermal})
-    ORBITFUSE_TRY(score_field(context, input, config, modality, fields, thermal_k));
+    ORBITFUSE_TRY(score_field(context, input, config.train(modality), modality, fields, thermal_k));
   ORBITFUSE_ASSIGN(const std::size_t unscored,
                    score_fused(context, config.metrics.scored_views, fused));
   StageOutput output;
@@ -164,7 +164,6 @@ pipeline::Stage metrics_stage(const StageInputs& in) {
   stage.name = "metrics";
   stage.version = 4;  // held-out views with the detail of the others
   stage.options = in.config->settings().to_json("metrics");
-  stage.options["detail_sources"] = in.config->render.detail.sources;
   stage.uses = {"poses_visible", "poses_thermal", "train_visible",
                 "train_thermal", "render",        "fuse"};
   stage.absent = [](const StageContext& context) -> std::optional<std::string> {

@@ -25,6 +25,19 @@ Result<cv::Mat> image_of(const std::filesystem::path& file, Samples samples, con
 
 }  // namespace
 
+Result<nerf::RenderedView> DetailedField::render(const Camera& camera,
+                                                 const Rigid3d& cam_from_world,
+                                                 const nerf::RenderOptions& options,
+                                                 const Progress& progress,
+                                                 const std::string& except) {
+  ORBITFUSE_ASSIGN(nerf::RenderedView seen,
+                   nerf::render(field, camera, cam_from_world, options, progress));
+  ORBITFUSE_ASSIGN(const double share,
+                   detail.add(field, camera, cam_from_world, seen, progress, except));
+  detailed += share;
+  return seen;
+}
+
 Result<nerf::PhotoDetail> recorded_detail(const pipeline::StageContext& context,
                                           const Session& session, Modality modality,
                                           Samples samples, int width_px,
@@ -50,6 +63,31 @@ Result<nerf::PhotoDetail> recorded_detail(const pipeline::StageContext& context,
     sources.push_back({view, [=] { return image_of(file, samples, view.camera, gain); }});
   }
   return nerf::PhotoDetail::of(std::move(sources), options);
+}
+
+Result<nerf::DetailTrial> try_on_recorded(const pipeline::StageContext& context,
+                                          DetailedField& shown) {
+  ORBITFUSE_ASSIGN(const pipeline::StageRecord trained,
+                   pipeline::read_stage_record(
+                       context.of("train_" + std::string(name(shown.field.modality())))));
+  auto names = trained.output.metrics.value("heldout", std::vector<std::string>());
+  if (names.empty()) names = shown.detail.spread_names(3);
+  return shown.detail.try_on(shown.field, names, context.progress);
+}
+
+std::string detail_key(Modality modality) { return std::string(name(modality)) + "_detail"; }
+
+Result<nerf::DetailOptions> detail_of_new_views(const pipeline::StageContext& context,
+                                                Modality modality) {
+  nerf::DetailOptions options;
+  options.sources = 0;
+  if (!context.has("render")) return options;
+  ORBITFUSE_ASSIGN(const pipeline::StageRecord record,
+                   pipeline::read_stage_record(context.of("render")));
+  const auto& told = record.output.metrics;
+  if (const auto found = told.find(detail_key(modality)); found != told.end())
+    options.sources = found->value("sources", 0);
+  return options;
 }
 
 }  // namespace orbitfuse::stages

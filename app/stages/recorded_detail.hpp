@@ -8,6 +8,19 @@
 
 namespace orbitfuse::stages {
 
+/// A field, and what recorded frames add to its pictures.
+struct DetailedField {
+  nerf::Field field;
+  nerf::PhotoDetail detail;
+  double detailed = 0;  ///< shares of the pixels that got detail, summed over the pictures
+
+  bool empty() const { return field.empty(); }
+  /// As nerf::render() and PhotoDetail::add().
+  Result<nerf::RenderedView> render(const Camera& camera, const Rigid3d& cam_from_world,
+                                    const nerf::RenderOptions& options, const Progress& progress,
+                                    const std::string& except = {});
+};
+
 /// What the recorded frames of a modality add to pictures of its trained field, `width_px` wide:
 /// from where training left the views, at one exposure, without those whose poses are doubted.
 /// Errors: input (a stage's record is cut), usage (options).
@@ -15,5 +28,18 @@ Result<nerf::PhotoDetail> recorded_detail(const pipeline::StageContext& context,
                                           const Session& session, Modality modality,
                                           Samples samples, int width_px,
                                           const nerf::DetailOptions& options);
+
+/// What it does to the views that training held out; without any, to some that it learned from,
+/// which says rather less than it does to new ones.
+Result<nerf::DetailTrial> try_on_recorded(const pipeline::StageContext& context,
+                                          DetailedField& shown);
+
+/// With which options the run's new views got the modality's detail; no sources where they got
+/// none.
+Result<nerf::DetailOptions> detail_of_new_views(const pipeline::StageContext& context,
+                                                Modality modality);
+
+/// Where the render stage says what became of a modality's detail.
+std::string detail_key(Modality modality);
 
 }  // namespace orbitfuse::stages

@@ -25,45 +25,61 @@ using pipeline::StageContext;
 using pipeline::StageOutput;
 
 struct Fields {
-  nerf::Field visible, thermal;
-  nerf::PhotoDetail visible_detail, thermal_detail;
+  DetailedField visible, thermal;
   Similarity3d visible_from_thermal;
 };
 
 Result<Fields> load_fields(const StageContext& context) {
   Fields fields;
   if (context.has("train_visible")) {
-    ORBITFUSE_ASSIGN(fields.visible, nerf::Field::load(context.of("train_visible") / field_file));
+    ORBITFUSE_ASSIGN(fields.visible.field,
+                     nerf::Field::load(context.of("train_visible") / field_file));
   }
   if (context.has("train_thermal")) {
-    ORBITFUSE_ASSIGN(fields.thermal, nerf::Field::load(context.of("train_thermal") / field_file));
+    ORBITFUSE_ASSIGN(fields.thermal.field,
+                     nerf::Field::load(context.of("train_thermal") / field_file));
   }
   if (!fields.visible.empty() && !fields.thermal.empty() && context.has("register")) {
     ORBITFUSE_ASSIGN(const RegistrationRecord record, load_registration(context.of("register")));
     fields.visible_from_thermal = record.visible_from_thermal;
   }
   // Two fields whose frames nobody could relate can't be shown by one camera.
-  if (!fields.visible.empty() && !context.has("register")) fields.thermal = nerf::Field();
+  if (!fields.visible.empty() && !context.has("register")) fields.thermal = {};
   return fields;
 }
 
 /// Recorded frames are read a little finer than the new views are, and not finer.
 Status load_detail(const StageContext& context, const SessionInput& input,
-                   const nerf::DetailOptions& options, const NewViews& views, Fields& fields) {
+                   const nerf::DetailOptions& options, const NewViews& views, Fields& fields,
+                   StageOutput& output) {
   int widest = 0;
   for (const PosedView& view : views.views) widest = std::max(widest, view.camera.width);
   const int width = widest + widest / 4;
-  const auto of = [&](Modality modality) {
-    return recorded_detail(context, input.session, modality, input.samples(modality), width,
-                           options);
+  const auto load = [&](DetailedField& shown) -> Status {
+    if (shown.empty()) return {};
+    const Modality modality = shown.field.modality();
+    ORBITFUSE_ASSIGN(shown.detail, recorded_detail(context, input.session, modality,
+                                                   input.samples(modality), width, options));
+    if (shown.detail.empty()) return {};
+    ORBITFUSE_ASSIGN(const nerf::DetailTrial trial, try_on_recorded(context, shown));
+    if (!trial.helps()) shown.detail = {};
+    output.metrics[detail_key(modality)] = {{"sources", shown.detail.empty() ? 0 : options.sources},
+                                            {"views_tried", trial.views},
+                                            {"error_without", trial.without},
+                                            {"error_with", trial.with}};
+    if (shown.detail.empty())
+      output.skips.push_back(
+          {fmt::format("detail of the {} frames in new views", name(modality)),
+           trial.views > 0
+               ? fmt::format(
+                     "{} recorded ones are {:.1f} % of the range off with it, {:.1f} without",
+                     trial.views, 100 * trial.with, 100 * trial.without)
+               : "there is no recorded view to try it on",
+           "new views show the field alone"});
+    return {};
   };
-  if (!fields.visible.empty()) {
-    ORBITFUSE_ASSIGN(fields.visible_detail, of(Modality::visible));
-  }
-  if (!fields.thermal.empty()) {
-    ORBITFUSE_ASSIGN(fields.thermal_detail, of(Modality::thermal));
-  }
-  return {};
+  ORBITFUSE_TRY(load(fields.visible));
+  return load(fields.thermal);
 }
 
 Result<NewViews> choose_views(const StageContext& context, const RenderConfig& config,
@@ -138,7 +154,8 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
   ORBITFUSE_ASSIGN(Fields fields, load_fields(context));
   const Modality frame = fields.visible.empty() ? Modality::thermal : Modality::visible;
   ORBITFUSE_ASSIGN(const NewViews chosen, choose_views(context, config, frame));
-  ORBITFUSE_TRY(load_detail(context, input, config.detail, chosen, fields));
+  StageOutput output;
+  ORBITFUSE_TRY(load_detail(context, input, config.detail, chosen, fields, output));
   const bool gray = !input.has_temperatures();
   const Similarity3d thermal_from_visible = fields.visible_from_thermal.inverse();
 
@@ -146,7 +163,6 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
   std::vector<ViewFiles> files;
   std::vector<ThermalView> temperatures;
   Transforms transforms;
-  double visible_detailed = 0, thermal_detailed = 0;  // shares of the pixels
   for (const PosedView& view : chosen.views) {
     const TraceSpan span("new view");
     ORBITFUSE_TRY(context.progress.check("render"));
@@ -158,13 +174,9 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
     f.name = view.name;
     cv::Mat depth;
     if (!fields.visible.empty()) {
-      ORBITFUSE_ASSIGN(nerf::RenderedView seen,
-                       nerf::render(fields.visible, view.camera, view.cam_from_world,
-                                    config.visible, context.progress));
-      ORBITFUSE_ASSIGN(const double detailed,
-                       fields.visible_detail.add(fields.visible, view.camera, view.cam_from_world,
-                                                 seen, context.progress));
-      visible_detailed += detailed;
+      ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
+                       fields.visible.render(view.camera, view.cam_from_world, config.visible,
+                                             context.progress));
       f.visible = "visible/" + view.name + ".png";
       f.depth = "depth/" + view.name + ".tiff";
       f.visible_opacity = "opacity/" + view.name + "_visible.tiff";
@@ -177,13 +189,9 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
       const Rigid3d cam_from_thermal = frame == Modality::thermal
                                            ? view.cam_from_world
                                            : rebase(view.cam_from_world, thermal_from_visible);
-      ORBITFUSE_ASSIGN(nerf::RenderedView seen,
-                       nerf::render(fields.thermal, view.camera, cam_from_thermal, config.thermal,
-                                    context.progress));
-      ORBITFUSE_ASSIGN(const double detailed,
-                       fields.thermal_detail.add(fields.thermal, view.camera, cam_from_thermal,
-                                                 seen, context.progress));
-      thermal_detailed += detailed;
+      ORBITFUSE_ASSIGN(
+          const nerf::RenderedView seen,
+          fields.thermal.render(view.camera, cam_from_thermal, config.thermal, context.progress));
       f.thermal = "thermal/" + view.name + (gray ? ".png" : ".tiff");
       f.thermal_opacity = "opacity/" + view.name + "_thermal.tiff";
       temperatures.push_back({view, masked(seen.color, seen.opacity, config.min_opacity),
@@ -206,16 +214,16 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
     files.push_back(std::move(f));
   }
 
-  StageOutput output;
   output.metrics["brief"] = fmt::format("{}, {}, {:.2f} s a view", chosen.described,
                                         fields.thermal.empty()   ? "visible"
                                         : fields.visible.empty() ? "thermal"
                                                                  : "both modalities",
                                         clock.wall_s() / static_cast<double>(files.size()));
   output.metrics["views"] = files.size();
-  const auto count = static_cast<double>(files.size());
-  if (!fields.visible_detail.empty()) output.metrics["visible_detailed"] = visible_detailed / count;
-  if (!fields.thermal_detail.empty()) output.metrics["thermal_detailed"] = thermal_detailed / count;
+  for (const DetailedField* shown : {&fields.visible, &fields.thermal})
+    if (!shown->detail.empty())
+      output.metrics[detail_key(shown->field.modality())]["share"] =
+          shown->detailed / static_cast<double>(files.size());
   RenderedViews rendered;
   rendered.thermal_is_gray = gray;
   if (!temperatures.empty()) {

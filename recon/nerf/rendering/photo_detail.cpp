@@ -21,6 +21,8 @@ namespace orbitfuse::nerf {
 namespace {
 
 constexpr float levels = 32767;  ///< a difference of the whole value range
+/// RenderOptions::alike where sources stand: 0.01 dB worse than without, a fifth faster.
+constexpr double base_alike = 0.01;
 /// Pixels at a picture's edge where a source's say grows to its full, as a share of the width: its
 /// end isn't seen in the new view then.
 constexpr double border = 0.03;
@@ -91,6 +93,16 @@ std::optional<Eigen::Vector3d> looked_at(const Camera& camera, const Rigid3d& wo
   return world_from_cam * (camera.ray_of({0.5 * camera.width, 0.5 * camera.height}) * median(seen));
 }
 
+Result<cv::Mat> image_of(const DetailSource& source) {
+  ORBITFUSE_ASSIGN(cv::Mat image, source.image());
+  const Camera& camera = source.view.camera;
+  if (image.cols == camera.width && image.rows == camera.height) return image;
+  return fail(ErrorKind::input, source.view.name,
+              fmt::format("{}x{} pixels, its camera has {}x{}", image.cols, image.rows,
+                          camera.width, camera.height),
+              "frames of one camera must have one size; import the session again");
+}
+
 }  // namespace
 
 Status DetailOptions::validate() const {
@@ -112,23 +124,20 @@ Result<PhotoDetail> PhotoDetail::of(std::vector<DetailSource> sources,
   return detail;
 }
 
+Camera PhotoDetail::base_of(const Camera& full) const {
+  const int width = std::min(options_.base_width_px, full.width);
+  const double height = static_cast<double>(width) * full.height / full.width;
+  return full.scaled_to(width, std::max(1, static_cast<int>(std::lround(height))));
+}
+
 /// Renders the field where the source stands, and keeps what the source shows beyond that.
 Status PhotoDetail::prepare(const Field& field, const Progress& progress, Source& source) const {
   if (!source.depth.empty()) return {};
   const TraceSpan span("detail of a view");
   const PosedView& view = source.recorded.view;
-  ORBITFUSE_ASSIGN(const cv::Mat image, source.recorded.image());
-  const Camera& full = view.camera;
-  if (image.cols != full.width || image.rows != full.height)
-    return fail(ErrorKind::input, view.name,
-                fmt::format("{}x{} pixels, its camera has {}x{}", image.cols, image.rows,
-                            full.width, full.height),
-                "frames of one camera must have one size; import the session again");
-  const int width = std::min(options_.base_width_px, full.width);
-  const int height = std::max(
-      1, static_cast<int>(std::lround(static_cast<double>(width) * full.height / full.width)));
-  ORBITFUSE_ASSIGN(const RenderedView base,
-                   render(field, full.scaled_to(width, height), view.cam_from_world, {}, progress));
+  ORBITFUSE_ASSIGN(const cv::Mat image, image_of(source.recorded));
+  ORBITFUSE_ASSIGN(const RenderedView base, render(field, base_of(view.camera), view.cam_from_world,
+                                                   {.alike = base_alike}, progress));
   cv::Mat shown;
   cv::resize(base.color, shown, image.size(), 0, 0, cv::INTER_CUBIC);
   const ValueSpan range = field.state().span;
@@ -141,6 +150,14 @@ Status PhotoDetail::prepare(const Field& field, const Progress& progress, Source
   difference.convertTo(source.difference, CV_16S, levels);
   source.depth = base.depth;
   return {};
+}
+
+std::vector<std::string> PhotoDetail::spread_names(std::size_t count) const {
+  count = std::min(count, sources_.size());
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < count; ++i)
+    names.push_back(sources_[i * sources_.size() / count].recorded.view.name);
+  return names;
 }
 
 std::vector<PhotoDetail::Source*> PhotoDetail::nearest(const Eigen::Vector3d& from,
@@ -217,15 +234,21 @@ class PhotoDetail::NewView {
       // Not a number where one of the four has no depth.
       const double off = at<float>(asked.source.depth, *base) - in_source.z();
       if (!(std::abs(off) <= options_.depth_tolerance * in_source.z())) continue;
-      const auto full = corners(asked.source.difference.size(), pixel);
+      auto full = corners(asked.source.difference.size(), pixel);
       if (!full) continue;
       const double cosine = ray.dot((point - asked.center).normalized());
       const double angle_deg = std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / std::numbers::pi;
-      const float weight = at<uchar>(asked.source.confidence, *full) *
-                           static_cast<float>(std::exp(-angle_deg / options_.angle_deg) / 255);
+      const auto near = static_cast<float>(std::exp(-angle_deg / options_.angle_deg) / 255);
+      // A pixel that isn't believed must not come in by its neighbour's confidence.
+      const cv::Mat& confidence = asked.source.confidence;
+      for (std::size_t i = 0; i < 4; ++i) {
+        const auto row = full->y + static_cast<int>(i / 2),
+                   column = full->x + static_cast<int>(i % 2);
+        full->weight[i] *= near * static_cast<float>(confidence.at<uchar>(row, column));
+        total += full->weight[i];
+      }
       for (int c = 0; c < channels; ++c)
-        values[c] += weight * at<std::int16_t>(asked.source.difference, *full, channels, c);
-      total += weight;
+        values[c] += at<std::int16_t>(asked.source.difference, *full, channels, c);
     }
     return total;
   }
@@ -267,6 +290,36 @@ Result<double> PhotoDetail::add(const Field& field, const Camera& camera,
       }
   });
   return share;
+}
+
+Result<DetailTrial> PhotoDetail::try_on(const Field& field, const std::vector<std::string>& names,
+                                        const Progress& progress) {
+  DetailTrial trial;
+  double without = 0, with = 0, count = 0;
+  for (const Source& source : sources_) {
+    const PosedView& view = source.recorded.view;
+    if (std::find(names.begin(), names.end(), view.name) == names.end()) continue;
+    ORBITFUSE_ASSIGN(cv::Mat recorded, image_of(source.recorded));
+    const Camera camera = base_of(view.camera);
+    cv::resize(recorded, recorded, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
+    ORBITFUSE_ASSIGN(RenderedView seen, render(field, camera, view.cam_from_world, {}, progress));
+    const cv::Mat before = seen.color.clone();
+    ORBITFUSE_TRY(add(field, camera, view.cam_from_world, seen, progress, view.name));
+    for (int y = 0; y < recorded.rows; ++y)
+      for (int i = 0; i < recorded.cols * recorded.channels(); ++i) {
+        const float truth = recorded.ptr<float>(y)[i];
+        if (std::isnan(truth)) continue;
+        without += std::abs(before.ptr<float>(y)[i] - truth);
+        with += std::abs(seen.color.ptr<float>(y)[i] - truth);
+        ++count;
+      }
+    ++trial.views;
+  }
+  if (count == 0) return DetailTrial{};
+  const ValueSpan range = field.state().span;
+  trial.without = without / count / (range.high - range.low);
+  trial.with = with / count / (range.high - range.low);
+  return trial;
 }
 
 }  // namespace orbitfuse::nerf

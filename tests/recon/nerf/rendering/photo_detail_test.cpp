@@ -13,7 +13,7 @@
 namespace orbitfuse::nerf {
 namespace {
 
-constexpr int pixels = 96, trained_pixels = 32, ring = 16;
+constexpr int pixels = 96, trained_pixels = 32, ring = 36;
 
 /// The toy's ball with a pattern on it that 32 pixels can't show.
 Dataset fine_scene(Modality modality) {
@@ -42,7 +42,8 @@ Dataset fine_scene(Modality modality) {
 Field trained_on(const Dataset& fine) {
   Dataset coarse = fine;
   for (TrainingView& view : coarse.views) view = resized(view, trained_pixels, trained_pixels);
-  TrainOptions options = test::toy_options(fine.modality, 150);
+  TrainOptions options = test::toy_options(fine.modality, 300);
+  options.depth_final_weight = options.depth_weight;
   Dataset shape = coarse;
   shape.depth = test::toy_depth(coarse);
   Field field;
@@ -72,13 +73,17 @@ PhotoDetail detail_of(std::vector<DetailSource> sources, const DetailOptions& op
   return std::move(*detail);
 }
 
+/// With the ball's exact depth, which tells it from the background.
 RenderedView rendered(const Field& field, const TrainingView& view) {
   auto seen = render(field, view.camera, view.cam_from_world, {}, {});
   EXPECT_TRUE(seen) << seen.error().message();
+  Dataset one;
+  one.views = {view};
+  seen->depth = test::toy_depth(one)[0].depth;
   return std::move(*seen);
 }
 
-/// RMS over the pixels that have depth, but for the ball's rim.
+/// RMS over the ball but for its rim.
 double error(const RenderedView& seen, const cv::Mat& truth) {
   cv::Mat inner, off = seen.color - truth;
   cv::erode(seen.depth == seen.depth, inner, cv::Mat::ones(9, 9, CV_8U));
@@ -93,7 +98,7 @@ class Detail : public testing::TestWithParam<Modality> {
 
 TEST_P(Detail, OfTheOtherViewsIsNearerToAViewThanTheFieldAlone) {
   PhotoDetail detail = detail_of(sources_of(data));
-  for (const std::size_t i : {std::size_t{0}, std::size_t{5}}) {
+  for (const std::size_t i : {std::size_t{0}, std::size_t{15}}) {
     const TrainingView& view = data.views[i];
     const RenderedView plain = rendered(field, view);
     RenderedView seen = rendered(field, view);
@@ -198,6 +203,33 @@ TEST_P(Detail, NamesASourceThatCantBeReadOrIsOfAnotherSize) {
   ASSERT_FALSE(share);
   EXPECT_EQ(share.error().where, "001.png");
   EXPECT_NE(share.error().message().find("96x50"), std::string::npos);
+}
+
+TEST_P(Detail, IsTriedOnTheViewsAskedFor) {
+  PhotoDetail detail = detail_of(sources_of(data));
+  const auto trial = detail.try_on(field, {data.views[3].name, data.views[9].name, "none"}, {});
+  ASSERT_TRUE(trial) << trial.error().message();
+  EXPECT_EQ(trial->views, 2);
+  EXPECT_GT(trial->without, 0);
+  EXPECT_GT(trial->with, 0);
+
+  // The others show the pattern where it isn't: half a period farther.
+  Dataset wrong = data;
+  const Dataset smooth = test::toy_scene(GetParam(), ring, 1, pixels);
+  for (std::size_t i = 0; i < wrong.views.size(); ++i)
+    wrong.views[i].image = 2 * smooth.views[i].image - data.views[i].image;
+  std::vector<DetailSource> mixed = sources_of(wrong);
+  mixed[3] = sources_of(data)[3];
+  DetailOptions fine = small();
+  fine.base_width_px = pixels;  // a trial sees the pattern there
+  const auto harmful = detail_of(mixed, fine).try_on(field, {data.views[3].name}, {});
+  ASSERT_TRUE(harmful);
+  EXPECT_FALSE(harmful->helps());
+
+  const auto none = detail.try_on(field, {}, {});
+  ASSERT_TRUE(none);
+  EXPECT_EQ(none->views, 0);
+  EXPECT_FALSE(none->helps());
 }
 
 INSTANTIATE_TEST_SUITE_P(Of, Detail, testing::Values(Modality::visible, Modality::thermal),
