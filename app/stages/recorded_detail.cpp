@@ -71,7 +71,11 @@ Result<nerf::DetailTrial> try_on_recorded(const pipeline::StageContext& context,
                    pipeline::read_stage_record(
                        context.of("train_" + std::string(name(shown.field.modality())))));
   auto names = trained.output.metrics.value("heldout", std::vector<std::string>());
-  if (names.empty()) names = shown.detail.spread_names(3);
+  constexpr std::size_t most = 3;  // each takes a render, and its neighbours'
+  if (names.empty()) names = shown.detail.spread_names(most);
+  for (std::size_t i = 0; i < most && names.size() > most; ++i)
+    names[i] = names[i * names.size() / most];
+  names.resize(std::min(names.size(), most));
   return shown.detail.try_on(shown.field, names, context.progress);
 }
 

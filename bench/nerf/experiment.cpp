@@ -40,11 +40,14 @@ cv::Mat bytes_of(const cv::Mat& image, Span span) {
 
 /// Calls body(view, rendered) for each view that measures.
 template <class Body>
-Status each_test_view(const nerf::Field& field, const nerf::Dataset& data, const Body& body) {
+Status each_test_view(const nerf::Field& field, const nerf::Dataset& data,
+                      nerf::PhotoDetail* detail, const Body& body) {
   for (const auto& view : data.views) {
     if (!view.measure_only) continue;
-    ORBITFUSE_ASSIGN(const nerf::RenderedView out,
+    ORBITFUSE_ASSIGN(nerf::RenderedView out,
                      nerf::render(field, view.camera, view.cam_from_world, {}, {}));
+    if (detail != nullptr)
+      ORBITFUSE_TRY(detail->add(field, view.camera, view.cam_from_world, out, {}));
     ORBITFUSE_TRY(body(view, out));
   }
   return {};
@@ -52,54 +55,67 @@ Status each_test_view(const nerf::Field& field, const nerf::Dataset& data, const
 
 }  // namespace
 
-Result<TestError> test_error(const nerf::Field& field, const nerf::Dataset& data) {
+Result<nerf::PhotoDetail> detail_of(const nerf::Dataset& data, const nerf::DetailOptions& options) {
+  std::vector<nerf::DetailSource> sources;
+  for (const nerf::TrainingView& view : data.views)
+    if (!view.measure_only)
+      sources.push_back({{view.name, view.camera, view.cam_from_world},
+                         [image = view.image]() -> Result<cv::Mat> { return image; }});
+  return nerf::PhotoDetail::of(std::move(sources), options);
+}
+
+Result<TestError> test_error(const nerf::Field& field, const nerf::Dataset& data,
+                             nerf::PhotoDetail* detail) {
   const Span span = span_of(data);
   TestError sum;
-  ORBITFUSE_TRY(each_test_view(field, data, [&](const auto& view, const auto& out) -> Status {
-    const cv::Mat truth = view.image.reshape(1), found = out.color.reshape(1);
-    double squared = 0, absolute = 0;
-    long count = 0, scene = 0;
-    for (int y = 0; y < truth.rows; ++y)
-      for (int x = 0; x < truth.cols; ++x) {
-        const double error = found.template at<float>(y, x) - truth.template at<float>(y, x);
-        if (!std::isfinite(error)) continue;
-        squared += error * error;
-        ++count;
-        if (truth.template at<float>(y, x) <= 273.15) continue;
-        absolute += std::abs(error);
-        ++scene;
-      }
-    const double width = span.high - span.low;
-    sum.psnr_db += 10 * std::log10(width * width * static_cast<double>(count) / squared);
-    sum.mae_k += absolute / static_cast<double>(std::max(1l, scene));
-    ++sum.views;
-    return {};
-  }));
+  ORBITFUSE_TRY(
+      each_test_view(field, data, detail, [&](const auto& view, const auto& out) -> Status {
+        const cv::Mat truth = view.image.reshape(1), found = out.color.reshape(1);
+        double squared = 0, absolute = 0;
+        long count = 0, scene = 0;
+        for (int y = 0; y < truth.rows; ++y)
+          for (int x = 0; x < truth.cols; ++x) {
+            const double error = found.template at<float>(y, x) - truth.template at<float>(y, x);
+            if (!std::isfinite(error)) continue;
+            squared += error * error;
+            ++count;
+            if (truth.template at<float>(y, x) <= 273.15) continue;
+            absolute += std::abs(error);
+            ++scene;
+          }
+        const double width = span.high - span.low;
+        sum.psnr_db += 10 * std::log10(width * width * static_cast<double>(count) / squared);
+        sum.mae_k += absolute / static_cast<double>(std::max(1l, scene));
+        ++sum.views;
+        return {};
+      }));
   sum.psnr_db /= sum.views;
   sum.mae_k /= sum.views;
   return sum;
 }
 
 Result<std::map<std::string, double>> table_metrics(const nerf::Field& field,
-                                                    const nerf::Dataset& data) {
+                                                    const nerf::Dataset& data,
+                                                    nerf::PhotoDetail* detail) {
   const Span span = span_of(data);
   std::map<std::string, double> mean;
   int views = 0;
-  ORBITFUSE_TRY(each_test_view(field, data, [&](const auto& view, const auto& out) -> Status {
-    ORBITFUSE_ASSIGN(const auto values,
-                     render_metrics(bytes_of(view.image, span), bytes_of(out.color, span)));
-    for (const MetricValue& value : values) mean[value.name] += value.value;
-    ++views;
-    return {};
-  }));
+  ORBITFUSE_TRY(
+      each_test_view(field, data, detail, [&](const auto& view, const auto& out) -> Status {
+        ORBITFUSE_ASSIGN(const auto values,
+                         render_metrics(bytes_of(view.image, span), bytes_of(out.color, span)));
+        for (const MetricValue& value : values) mean[value.name] += value.value;
+        ++views;
+        return {};
+      }));
   for (auto& [name, value] : mean) value /= views;
   return mean;
 }
 
 Status write_pictures(const nerf::Field& field, const nerf::Dataset& data,
-                      const std::string& folder) {
+                      const std::string& folder, nerf::PhotoDetail* detail) {
   const Span span = span_of(data);
-  return each_test_view(field, data, [&](const auto& view, const auto& out) -> Status {
+  return each_test_view(field, data, detail, [&](const auto& view, const auto& out) -> Status {
     cv::Mat picture = bytes_of(out.color, span), depth;
     if (picture.channels() == 3) cv::cvtColor(picture, picture, cv::COLOR_RGB2BGR);
     ORBITFUSE_TRY(write_png(fmt::format("{}/{}.png", folder, view.name), picture));

@@ -7,6 +7,7 @@
 
 #include "recon/depth/dense_depth.hpp"
 #include "recon/nerf/nerf.hpp"
+#include "recon/nerf/photo_detail.hpp"
 
 namespace orbitfuse::bench {
 
@@ -17,16 +18,22 @@ struct TestError {
   int views = 0;
 };
 
-Result<TestError> test_error(const nerf::Field& field, const nerf::Dataset& data);
+/// `detail` may add to what the field shows.
+Result<TestError> test_error(const nerf::Field& field, const nerf::Dataset& data,
+                             nerf::PhotoDetail* detail = nullptr);
+
+/// Of the views that train.
+Result<nerf::PhotoDetail> detail_of(const nerf::Dataset& data, const nerf::DetailOptions& options);
 
 /// SSIM, cosine similarity, mutual information, PSNR and histogram similarity as the seed paper's
 /// tables give them, on 8-bit images (thermal: over the session's span), mean over the views.
 Result<std::map<std::string, double>> table_metrics(const nerf::Field& field,
-                                                    const nerf::Dataset& data);
+                                                    const nerf::Dataset& data,
+                                                    nerf::PhotoDetail* detail = nullptr);
 
 /// Test views, temperatures as gray, and inverse depth as PNG files.
 Status write_pictures(const nerf::Field& field, const nerf::Dataset& data,
-                      const std::string& folder);
+                      const std::string& folder, nerf::PhotoDetail* detail = nullptr);
 
 /// Dense depth of the views that train, added to the data. Returns CPU seconds.
 Result<double> add_depth(nerf::Dataset& data, const depth::DepthOptions& options);

@@ -25,6 +25,8 @@ struct Arguments {
   int threads = 0;
   double exposure = 0, pose_error_deg = 0;
   bool quick = false, depth = false, train = true;
+  std::string detail;
+  nerf::DetailOptions detail_options;
   depth::DepthOptions depth_options;
 };
 
@@ -108,6 +110,30 @@ void print_pose_errors(const std::vector<Rigid3d>& truth, const nerf::Dataset& g
   print("refined", [&](std::size_t i) { return refined.at(given.views[i].name); });
 }
 
+/// Errors of all test views at their full size; with detail of the views that train, if asked.
+Status print_errors(const nerf::Field& field, const nerf::Dataset& data, const char* what,
+                    nerf::PhotoDetail* detail = nullptr) {
+  const UsageClock clock;
+  ORBITFUSE_ASSIGN(const bench::TestError error, bench::test_error(field, data, detail));
+  const double wall_s = clock.wall_s();
+  fmt::print("{}: {:.2f} dB", what, error.psnr_db);
+  if (data.modality == Modality::thermal) fmt::print(", MAE {:.3f} K", error.mae_k);
+  ORBITFUSE_ASSIGN(const auto metrics, bench::table_metrics(field, data, detail));
+  for (const auto& [metric, value] : metrics) fmt::print(", {} {:.4g}", metric, value);
+  fmt::print("; {} views rendered in {:.1f} s\n", error.views, wall_s);
+  return {};
+}
+
+/// The same field on the pictures of another size that scene `a.detail` has, without and with the
+/// detail of its views that train.
+Status print_detail_errors(const nerf::Field& field, const Arguments& a) {
+  ORBITFUSE_ASSIGN(const nerf::Dataset full, bench::load_scene(a.detail, a.data, a.model));
+  ORBITFUSE_ASSIGN(nerf::PhotoDetail detail, bench::detail_of(full, a.detail_options));
+  ORBITFUSE_TRY(print_errors(field, full, "field alone"));
+  ORBITFUSE_TRY(print_errors(field, full, "with detail", &detail));
+  return a.images.empty() ? Status{} : bench::write_pictures(field, full, a.images, &detail);
+}
+
 Status run(const Arguments& a) {
   set_thread_count(a.threads);
   ORBITFUSE_ASSIGN(nerf::Dataset data, bench::load_scene(a.scene, a.data, a.model));
@@ -145,12 +171,8 @@ Status run(const Arguments& a) {
   if (!a.field.empty()) ORBITFUSE_TRY(field.save(a.field));
   if (a.quick) return {};
   ORBITFUSE_TRY(time_render(field, data));
-  ORBITFUSE_ASSIGN(const bench::TestError error, bench::test_error(field, data));
-  fmt::print("full resolution: {:.2f} dB", error.psnr_db);
-  if (data.modality == Modality::thermal) fmt::print(", MAE {:.3f} K", error.mae_k);
-  ORBITFUSE_ASSIGN(const auto metrics, bench::table_metrics(field, data));
-  for (const auto& [metric, value] : metrics) fmt::print(", {} {:.4g}", metric, value);
-  fmt::print("\n");
+  ORBITFUSE_TRY(print_errors(field, data, "full resolution"));
+  if (!a.detail.empty()) return print_detail_errors(field, a);
   return a.images.empty() ? Status{} : bench::write_pictures(field, data, a.images);
 }
 
@@ -178,6 +200,15 @@ int main(int argc, char** argv) {
                  "gains of the training views: sigma of their logarithm");
   app.add_option("--perturb-poses", a.pose_error_deg,
                  "error of the training views' poses: sigma of turn and shift, degrees");
+  app.add_option(
+      "--detail", a.detail,
+      "scene whose test views are also compared without and with its other views' detail, "
+      "e.g. container-full");
+  app.add_option("--detail-sources", a.detail_options.sources);
+  app.add_option("--detail-base-width", a.detail_options.base_width_px);
+  app.add_option("--detail-angle", a.detail_options.angle_deg);
+  app.add_option("--detail-tolerance", a.detail_options.depth_tolerance);
+  app.add_option("--detail-unexplained", a.detail_options.unexplained);
   app.add_flag("--quick", a.quick, "no full-resolution evaluation");
   app.add_option("--threads", a.threads);
   app.add_option("--set", a.set, "training option key=value");
