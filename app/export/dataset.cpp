@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "app/stages/artifacts.hpp"
+#include "app/stages/recorded_detail.hpp"
 #include "core/formats/colmap_model.hpp"
 #include "core/formats/transforms_json.hpp"
 #include "core/image/image_io.hpp"
@@ -37,22 +38,48 @@ Result<cv::Mat> photo(const view::FinishedRun& run, const PosedView& view) {
   return straight;
 }
 
-Result<cv::Mat> rendered_color(const view::FinishedRun& run, const PosedView& view,
-                               const Progress& progress) {
-  ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
+/// What the recorded frames add to pictures of the fields, as in the run's own new views.
+struct RunDetail {
+  nerf::PhotoDetail visible, thermal;
+};
+
+Result<RunDetail> detail_of(const view::FinishedRun& run, DatasetPoses poses,
+                            const std::vector<PosedView>& views) {
+  RunDetail detail;
+  if (!run.session) return detail;
+  int widest = 0;
+  for (const PosedView& view : views) widest = std::max(widest, view.camera.width);
+  const pipeline::StageContext context = stages::context_of_run(run.out);
+  const auto load = [&](Modality modality, Samples samples) -> Result<nerf::PhotoDetail> {
+    ORBITFUSE_ASSIGN(const nerf::DetailOptions options,
+                     stages::detail_of_new_views(context, modality));
+    return stages::recorded_detail(context, *run.session, modality, samples, widest + widest / 4,
+                                   options);
+  };
+  if (poses == DatasetPoses::fresh) {
+    ORBITFUSE_ASSIGN(detail.visible, load(Modality::visible, Samples::color));
+  }
+  ORBITFUSE_ASSIGN(detail.thermal, load(Modality::thermal, run.samples()));
+  return detail;
+}
+
+Result<cv::Mat> rendered_color(const view::FinishedRun& run, RunDetail& detail,
+                               const PosedView& view, const Progress& progress) {
+  ORBITFUSE_ASSIGN(nerf::RenderedView seen,
                    nerf::render(run.visible, view.camera, view.cam_from_world, {}, progress));
+  ORBITFUSE_TRY(detail.visible.add(run.visible, view.camera, view.cam_from_world, seen, progress));
   cv::Mat bgr;
   cv::cvtColor(seen.color, bgr, cv::COLOR_RGB2BGR);
   bgr.convertTo(bgr, CV_8UC3, 255);
   return bgr;
 }
 
-Result<cv::Mat> rendered_kelvin(const view::FinishedRun& run, const PosedView& view,
-                                const Progress& progress) {
-  ORBITFUSE_ASSIGN(
-      nerf::RenderedView seen,
-      nerf::render(run.thermal, view.camera,
-                   rebase(view.cam_from_world, run.frame_from_thermal.inverse()), {}, progress));
+Result<cv::Mat> rendered_kelvin(const view::FinishedRun& run, RunDetail& detail,
+                                const PosedView& view, const Progress& progress) {
+  const Rigid3d cam_from_thermal = rebase(view.cam_from_world, run.frame_from_thermal.inverse());
+  ORBITFUSE_ASSIGN(nerf::RenderedView seen,
+                   nerf::render(run.thermal, view.camera, cam_from_thermal, {}, progress));
+  ORBITFUSE_TRY(detail.thermal.add(run.thermal, view.camera, cam_from_thermal, seen, progress));
   seen.color.setTo(std::numeric_limits<float>::quiet_NaN(), seen.opacity < least_opacity);
   return seen.color;
 }
@@ -103,6 +130,7 @@ Status write_model(const fs::path& folder, const view::FinishedRun& run, const E
 Status write_pairs(const fs::path& folder, const view::FinishedRun& run, const ExportFrame& frame,
                    const DatasetOptions& options, const Cameras& cameras,
                    const Progress& progress) {
+  ORBITFUSE_ASSIGN(RunDetail detail, detail_of(run, options.poses, cameras.views));
   Transforms transforms;
   std::vector<cv::Mat> kelvin;
   for (const PosedView& posed : cameras.views) {
@@ -114,9 +142,9 @@ Status write_pairs(const fs::path& folder, const view::FinishedRun& run, const E
     const std::string file = fmt::format("{:06}.png", kelvin.size());
     ORBITFUSE_ASSIGN(const cv::Mat image, options.poses == DatasetPoses::recorded
                                               ? photo(run, posed)
-                                              : rendered_color(run, view, progress));
+                                              : rendered_color(run, detail, view, progress));
     ORBITFUSE_TRY(write_png(folder / "images" / file, image));
-    ORBITFUSE_ASSIGN(cv::Mat seen, rendered_kelvin(run, view, progress));
+    ORBITFUSE_ASSIGN(cv::Mat seen, rendered_kelvin(run, detail, view, progress));
     kelvin.push_back(std::move(seen));
     transforms.frames.push_back({"images/" + file, "thermal/" + file, view.camera,
                                  rebase(view.cam_from_world, frame.export_from_world)});
@@ -135,13 +163,17 @@ Status write_pairs(const fs::path& folder, const view::FinishedRun& run, const E
     ORBITFUSE_TRY(stages::save_temperature_bounds(folder, span.low_k, span.high_k));
   ORBITFUSE_TRY(write_transforms_json(folder / "transforms.json", transforms));
   ORBITFUSE_TRY(write_model(folder, run, frame, transforms));
+  const auto words = [](const char* field, const nerf::PhotoDetail& lent) {
+    return fmt::format("rendered by the {} field{}", field,
+                       lent.empty() ? "" : ", with detail of the recorded frames");
+  };
   nlohmann::json about = to_json(frame);
   about["schema"] = 1;
   about["pairs"] = kelvin.size();
   about["cameras"] = cameras.described;
   about["visible"] = options.poses == DatasetPoses::recorded ? "photos without distortion"
-                                                             : "rendered by the visible field";
-  about["thermal"] = "rendered by the thermal field";
+                                                             : words("visible", detail.visible);
+  about["thermal"] = words("thermal", detail.thermal);
   return stages::write_json(folder / "dataset.json", about);
 }
 

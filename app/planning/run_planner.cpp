@@ -231,7 +231,8 @@ MeasuredErrors errors_in(const std::vector<StageStatus>& finished) {
     const StageStatus* status = find(finished, stage);
     return status != nullptr ? status->output.metrics.value(key, json()) : json();
   };
-  return {metric("train_visible", "heldout_psnr_db"), metric("metrics", "thermal_heldout_mae_k")};
+  return {metric("train_visible", "heldout_psnr_db"),
+          metric("metrics", "thermal_heldout_field_mae_k")};
 }
 
 }  // namespace

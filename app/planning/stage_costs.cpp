@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "app/stages/build_stages.hpp"
+#include "app/stages/recorded_detail.hpp"
 
 namespace orbitfuse::planning {
 namespace {
@@ -54,7 +55,7 @@ double stage_s(const std::string& stage, const SceneFacts& facts, const Effort& 
   if (stage == "report") return report_s;
   if (stage == "register") return both && facts.visible_posed && facts.thermal_posed ? clouds_s : 0;
   if (stage == "render") {
-    const double asked = (facts.new_views + 2.0) * facts.detail_sources;  // two are tried on
+    const double asked = (facts.new_views + 1.0 * stages::detail_trials) * facts.detail_sources;
     const double lent = std::min(asked, photos) + std::min(asked, thermal);
     return start_s + (facts.new_views * facts.new_view_mpx * new_view_mpx_s * (both ? 1 : 0.5) +
                       lent * lent_view_s) *
@@ -65,8 +66,8 @@ double stage_s(const std::string& stage, const SceneFacts& facts, const Effort& 
   if (stage == "metrics") {
     const int scored =
         effort.scored_views > 0 ? std::min(effort.scored_views, facts.new_views) : facts.new_views;
-    const double heldout =
-        heldout_view_s * (std::ceil(photos / heldout_every) + std::ceil(thermal / heldout_every));
+    const double heldout = (heldout_view_s + facts.detail_sources * lent_view_s) *
+                           (std::ceil(photos / heldout_every) + std::ceil(thermal / heldout_every));
     return heldout + (both ? scored * facts.new_view_mpx * facts.fusion_methods * scored_mpx_s : 0);
   }
   if (photos > 0) {

@@ -33,13 +33,19 @@ struct MeanError {
     sum += cv::sum(cv::Mat(difference.mul(1)).setTo(0, ~valid))[0];
     count += cv::countNonZero(valid);
   }
+  double mean() const { return sum / count; }
+};
+
+/// Without and with detail. What a planner expects is the field's.
+struct HeldoutKelvin {
+  MeanError field_alone, shown;
 };
 
 /// Rendered, with the detail of all other recorded views, against recorded, on views that did not
 /// train (seed paper, Table 4).
 Status score_field(const StageContext& context, const SessionInput& input,
                    const TrainConfig& config, Modality modality, MetricMeans& means,
-                   MeanError& thermal_k) {
+                   HeldoutKelvin& thermal_k) {
   const std::string train = "train_" + std::string(name(modality));
   if (!context.has(train)) return {};
   const json* trained = context.metrics_of(train);
@@ -62,8 +68,12 @@ Status score_field(const StageContext& context, const SessionInput& input,
                    recorded_detail(context, input.session, modality, input.samples(modality),
                                    config.max_width_px, how));
   for (const nerf::TrainingView& view : data.views) {
-    ORBITFUSE_ASSIGN(const nerf::RenderedView seen, shown.render(view.camera, view.cam_from_world,
-                                                                 {}, context.progress, view.name));
+    ORBITFUSE_ASSIGN(
+        nerf::RenderedView seen,
+        nerf::render(shown.field, view.camera, view.cam_from_world, {}, context.progress));
+    const cv::Mat field_alone = seen.color.clone();
+    ORBITFUSE_TRY(shown.detail.add(shown.field, view.camera, view.cam_from_world, seen,
+                                   context.progress, view.name));
     cv::Mat truth = view.image, rendered = seen.color;
     if (modality == Modality::visible) {
       if (gains.contains(view.name)) {  // the field shows the common exposure, the frame its own
@@ -73,7 +83,10 @@ Status score_field(const StageContext& context, const SessionInput& input,
       truth.convertTo(truth, CV_8U, 255);
       rendered.convertTo(rendered, CV_8U, 255);
     } else {
-      if (input.has_temperatures()) thermal_k.add(truth, rendered);
+      if (input.has_temperatures()) {
+        thermal_k.shown.add(truth, rendered);
+        thermal_k.field_alone.add(truth, field_alone);
+      }
       const TemperatureSpan span = common_span({truth}, 0, 100);
       truth = gray_of_kelvin(truth, span);
       rendered = gray_of_kelvin(rendered, span);
@@ -121,7 +134,7 @@ json measured_share(const StageContext& context) {
 Result<StageOutput> score(const StageContext& context, const SessionInput& input,
                           const RunConfig& config) {
   MetricMeans fields, fused;
-  MeanError thermal_k;
+  HeldoutKelvin thermal_k;
   for (const Modality modality : {Modality::visible, Modality::thermal})
     ORBITFUSE_TRY(score_field(context, input, config.train(modality), modality, fields, thermal_k));
   ORBITFUSE_ASSIGN(const std::size_t unscored,
@@ -152,8 +165,10 @@ Result<StageOutput> score(const StageContext& context, const SessionInput& input
       {"tables", tables},
       {"fields", fields.to_json()},
       {"fused", fused.to_json()}};
-  if (thermal_k.count > 0)
-    output.metrics["thermal_heldout_mae_k"] = thermal_k.sum / thermal_k.count;
+  if (thermal_k.shown.count > 0) {
+    output.metrics["thermal_heldout_mae_k"] = thermal_k.shown.mean();
+    output.metrics["thermal_heldout_field_mae_k"] = thermal_k.field_alone.mean();
+  }
   return output;
 }
 

@@ -11,15 +11,23 @@
 namespace orbitfuse::stages {
 namespace {
 
-using Gain = std::array<double, 3>;  ///< R, G, B against the common exposure
+/// What training found of one frame alone.
+struct OwnOfFrame {
+  std::array<double, 3> gain = {1, 1, 1};  ///< R, G, B against the common exposure
+  double offset_k = 0;                     ///< the camera's drift
+};
 
-Result<cv::Mat> image_of(const std::filesystem::path& file, Samples samples, const Camera& camera,
-                         const Gain& gain) {
+/// `camera` may be smaller than `recorded`, the frame's own.
+Result<cv::Mat> image_of(const std::filesystem::path& file, Samples samples, const Camera& recorded,
+                         const Camera& camera, const OwnOfFrame& own) {
   ORBITFUSE_ASSIGN(cv::Mat image, field_image(file, samples));
-  if (image.cols > camera.width)
+  if (image.cols != recorded.width || image.rows != recorded.height) return image;  // is told
+  if (image.cols != camera.width)
     cv::resize(image, image, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
   if (samples == Samples::color)
-    cv::multiply(image, cv::Scalar(1 / gain[0], 1 / gain[1], 1 / gain[2]), image);
+    nerf::even_out(image, Eigen::Array3d(own.gain[0], own.gain[1], own.gain[2]));
+  else
+    image -= own.offset_k;
   return image;
 }
 
@@ -48,21 +56,29 @@ Result<nerf::PhotoDetail> recorded_detail(const pipeline::StageContext& context,
   ORBITFUSE_ASSIGN(const auto doubts, load_doubts(context.of("poses_" + of)));
   ORBITFUSE_ASSIGN(const pipeline::StageRecord trained,
                    pipeline::read_stage_record(context.of("train_" + of)));
-  const nlohmann::json gains =
-      trained.output.metrics.value("image_gains", nlohmann::json::object());
+  const nlohmann::json& told = trained.output.metrics;
+  const auto gains = told.value("image_gains", nlohmann::json::object());
+  const auto offsets = told.value("image_offsets_k", nlohmann::json::object());
   std::vector<nerf::DetailSource> sources;
   for (PosedView view : model.views) {
-    if (doubts.contains(view.name)) continue;
-    Camera& camera = view.camera;
-    if (camera.width > width_px) {
-      const double height = static_cast<double>(width_px) * camera.height / camera.width;
-      camera = camera.scaled_to(width_px, std::max(1, static_cast<int>(std::lround(height))));
-    }
-    const Gain gain = gains.value(view.name, Gain{1, 1, 1});
     const std::filesystem::path file = session.folder / view.name;
-    sources.push_back({view, [=] { return image_of(file, samples, view.camera, gain); }});
+    std::error_code ignored;
+    if (doubts.contains(view.name) || !std::filesystem::exists(file, ignored)) continue;
+    const Camera recorded = view.camera;
+    if (recorded.width > width_px) {
+      const double height = static_cast<double>(width_px) * recorded.height / recorded.width;
+      view.camera =
+          recorded.scaled_to(width_px, std::max(1, static_cast<int>(std::lround(height))));
+    }
+    OwnOfFrame own;
+    own.gain = gains.value(view.name, own.gain);
+    if (offsets.is_object()) own.offset_k = offsets.value(view.name, 0.0);  // an array, once
+    sources.push_back({view, [=] { return image_of(file, samples, recorded, view.camera, own); }});
   }
-  return nerf::PhotoDetail::of(std::move(sources), options);
+  // What the field learned must not come twice.
+  nerf::DetailOptions fitting = options;
+  fitting.base_width_px = std::max(options.base_width_px, told.value("width_px", 0) * 4 / 5);
+  return nerf::PhotoDetail::of(std::move(sources), fitting);
 }
 
 Result<nerf::DetailTrial> try_on_recorded(const pipeline::StageContext& context,
@@ -71,11 +87,11 @@ Result<nerf::DetailTrial> try_on_recorded(const pipeline::StageContext& context,
                    pipeline::read_stage_record(
                        context.of("train_" + std::string(name(shown.field.modality())))));
   auto names = trained.output.metrics.value("heldout", std::vector<std::string>());
-  constexpr std::size_t most = 3;  // each takes a render, and its neighbours'
-  if (names.empty()) names = shown.detail.spread_names(most);
-  for (std::size_t i = 0; i < most && names.size() > most; ++i)
-    names[i] = names[i * names.size() / most];
-  names.resize(std::min(names.size(), most));
+  std::erase_if(names, [&](const std::string& n) { return !shown.detail.has(n); });
+  if (names.empty()) names = shown.detail.spread_names(detail_trials);
+  for (std::size_t i = 0; i < detail_trials && names.size() > detail_trials; ++i)
+    names[i] = names[i * names.size() / detail_trials];
+  names.resize(std::min(names.size(), detail_trials));
   return shown.detail.try_on(shown.field, names, context.progress);
 }
 

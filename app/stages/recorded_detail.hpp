@@ -22,12 +22,16 @@ struct DetailedField {
 };
 
 /// What the recorded frames of a modality add to pictures of its trained field, `width_px` wide:
-/// from where training left the views, at one exposure, without those whose poses are doubted.
+/// from where training left the views, at one exposure and without the camera's drift. Views whose
+/// poses are doubted lend nothing, nor do frames that are no longer there.
 /// Errors: input (a stage's record is cut), usage (options).
 Result<nerf::PhotoDetail> recorded_detail(const pipeline::StageContext& context,
                                           const Session& session, Modality modality,
                                           Samples samples, int width_px,
                                           const nerf::DetailOptions& options);
+
+/// Recorded views that detail is tried on: each takes a render, and its neighbours'.
+inline constexpr std::size_t detail_trials = 3;
 
 /// What it does to the views that training held out; without any, to some that it learned from,
 /// which says rather less than it does to new ones.

@@ -61,6 +61,7 @@ Status load_detail(const StageContext& context, const SessionInput& input,
     ORBITFUSE_ASSIGN(shown.detail, recorded_detail(context, input.session, modality,
                                                    input.samples(modality), width, options));
     if (shown.detail.empty()) return {};
+    context.progress.report({"render", 0, 1, -1, "detail of the recorded frames"});
     ORBITFUSE_ASSIGN(const nerf::DetailTrial trial, try_on_recorded(context, shown));
     if (!trial.helps()) shown.detail = {};
     output.metrics[detail_key(modality)] = {{"sources", shown.detail.empty() ? 0 : options.sources},

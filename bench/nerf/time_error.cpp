@@ -172,6 +172,9 @@ Status run(const Arguments& a) {
   if (a.quick) return {};
   ORBITFUSE_TRY(time_render(field, data));
   ORBITFUSE_TRY(print_errors(field, data, "full resolution"));
+  if (!a.detail.empty() && (a.pose_error_deg > 0 || a.exposure > 0))
+    return fail(ErrorKind::usage, "--detail", "beside --perturb-poses or --vary-exposure",
+                "its views are as they were recorded; choose one");
   if (!a.detail.empty()) return print_detail_errors(field, a);
   return a.images.empty() ? Status{} : bench::write_pictures(field, data, a.images);
 }

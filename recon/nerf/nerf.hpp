@@ -24,10 +24,11 @@ const char* name(StopReason reason);
 struct TrainReport : History {
   int iterations = 0;
   StopReason stop = StopReason::iterations;
-  int best_step = 0;                    ///< the step whose parameters the field holds
-  double best_psnr = 0;                 ///< held-out, dB; NaN without held-out views
-  std::vector<std::string> heldout;     ///< names of the views that measured
-  std::vector<double> image_offsets_k;  ///< per view that was not dropped (per_image_offset)
+  int best_step = 0;                 ///< the step whose parameters the field holds
+  double best_psnr = 0;              ///< held-out, dB; NaN without held-out views
+  std::vector<std::string> heldout;  ///< names of the views that measured
+  std::map<std::string, double>
+      image_offsets_k;  ///< of views that were not dropped (per_image_offset)
   /// R, G, B of a view against the common exposure, which the field shows (even_exposure); empty:
   /// steady.
   std::map<std::string, std::array<double, 3>> image_gains;

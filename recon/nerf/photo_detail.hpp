@@ -21,15 +21,22 @@ struct DetailSource {
   std::function<Result<cv::Mat>()> image;
 };
 
+/// A visible frame (as TrainingView::image) brought to the common exposure as training does:
+/// divided by its gains, R, G, B; NaN where the camera clipped what that exposure would have shown.
+void even_out(cv::Mat& image, const Eigen::Array3d& gain);
+
 struct DetailOptions {
   /// Recorded views that lend a new view their detail, the nearest by direction; 0 = none. More
   /// than three gain nothing where views stand 30 degrees apart.
   int sources = 4;
   /// The field is rendered at this width where the sources stand; what is finer is the sources'
-  /// own. 240 loses 0.3 dB, 640 gains 0.1 for half as much time again.
+  /// own, so that it should not be far below what the field learned from. 240 loses 0.3 dB, 640
+  /// gains 0.1 for half as much time again.
   int base_width_px = 320;
   double depth_tolerance = 0.01;  ///< relative; a source that is farther off sees another surface
   double angle_deg = 10;          ///< between rays over which a source's weight falls by e
+  /// The field's own weight: a lone source 30 degrees off counts half.
+  double field_weight = 0.05;
   /// A source whose mean over a neighbourhood is this share of the value range off the field's
   /// shows something else there (a passer-by, a highlight) and hardly counts.
   double unexplained = 0.1;
@@ -50,7 +57,7 @@ struct DetailTrial {
 /// towards the edges of pictures and of what is seen.
 class PhotoDetail {
  public:
-  /// No sources: add() does nothing.
+  /// No sources: add() does nothing. All calls of one object are for one field.
   PhotoDetail() = default;
   /// Sources and field share one world frame. Errors: usage (options).
   static Result<PhotoDetail> of(std::vector<DetailSource> sources, const DetailOptions& options);
@@ -58,17 +65,20 @@ class PhotoDetail {
   bool empty() const { return sources_.empty(); }
   /// Of `count` sources spread evenly over all; of all where there are fewer.
   std::vector<std::string> spread_names(std::size_t count) const;
+  bool has(const std::string& name) const;
 
   /// Adds to `seen`, which `field` rendered from there; depth and opacity stay. The source called
   /// `except` lends nothing: a recorded view is compared with what the others know. Returns the
-  /// share of the pixels that got detail. The same for any thread count. Errors: input (an image
+  /// share of the pixels that got detail. Sources within a degree of `except` lend nothing either:
+  /// they are as good as that view. The same for any thread count. Errors: input (an image
   /// that can't be read, or isn't of its camera's size), cancelled.
   Result<double> add(const Field& field, const Camera& camera, const Rigid3d& cam_from_world,
                      RenderedView& seen, const Progress& progress, const std::string& except = {});
 
   /// Whether detail helps: views called `names` rendered without and with the others' detail, at
-  /// the base width. Where depth is wrong it lands in the wrong places. Meant for views that the
-  /// field never saw; those it learned from look better without than new ones do. Errors: as add().
+  /// twice the base width. Where depth is wrong it lands in the wrong places. Meant for views that
+  /// the field never saw; those it learned from look better without than new ones do. Names that
+  /// aren't sources' are passed over. Errors: as add().
   Result<DetailTrial> try_on(const Field& field, const std::vector<std::string>& names,
                              const Progress& progress);
 
@@ -78,6 +88,8 @@ class PhotoDetail {
     cv::Mat difference;  ///< CV_16S, of 32767 value ranges; empty until asked for
     cv::Mat confidence;  ///< CV_8U
     cv::Mat depth;       ///< CV_32F, at the base width
+    long last_asked = 0;
+    std::size_t bytes() const;
   };
   class NewView;
 
@@ -85,9 +97,11 @@ class PhotoDetail {
                                const std::string& except);
   Camera base_of(const Camera& full) const;
   Status prepare(const Field& field, const Progress& progress, Source& source) const;
+  void forget_old(const std::vector<Source*>& needed);
 
   DetailOptions options_;
   std::vector<Source> sources_;
+  long asked_ = 0;
 };
 
 }  // namespace orbitfuse::nerf

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -29,6 +30,10 @@ constexpr double border = 0.03;
 /// Neighbourhoods, as shares of the width: of what a source shows differently, and over which
 /// detail ends where no source sees on.
 constexpr double local_mean = 0.01, feather = 0.005;
+/// A view's twins, as bursts and brackets have them.
+const double twin_cosine = std::cos(std::numbers::pi / 180);
+/// Of prepared sources; the least recently asked go first.
+constexpr std::size_t kept_bytes = std::size_t{1} << 30;
 
 cv::Mat blurred(const cv::Mat& values, double sigma) {
   cv::Mat result;
@@ -60,18 +65,29 @@ float at(const cv::Mat& plane, const Corners& c, int channels = 1, int channel =
          c.weight[3] * static_cast<float>(lower[channels]);
 }
 
+/// Mean difference over a neighbourhood, the largest of the channels; found at the base's size.
+cv::Mat local_difference(const cv::Mat& difference, const cv::Mat& known, cv::Size base) {
+  cv::Mat small, share;
+  cv::resize(difference, small, base, 0, 0, cv::INTER_AREA);
+  cv::resize(known, share, base, 0, 0, cv::INTER_AREA);
+  const double sigma = local_mean * base.width;
+  const cv::Mat sum = blurred(small, sigma), weight = blurred(share, sigma);
+  std::vector<cv::Mat> planes;
+  cv::split(cv::abs(sum), planes);
+  for (std::size_t c = 1; c < planes.size(); ++c) planes[0] = cv::max(planes[0], planes[c]);
+  cv::Mat mean = planes[0] / cv::max(weight, 1e-3), result;
+  cv::resize(mean, result, difference.size(), 0, 0, cv::INTER_LINEAR);
+  return result;
+}
+
 /// How much of each pixel's difference is detail of what the field shows: 0..255.
-cv::Mat confidence_of(const cv::Mat& difference, const cv::Mat& known, double unexplained) {
-  const double sigma = local_mean * difference.cols;
-  const cv::Mat share = blurred(known, sigma), sum = blurred(difference, sigma);
+cv::Mat confidence_of(const cv::Mat& difference, const cv::Mat& known, cv::Size base,
+                      double unexplained) {
+  const cv::Mat local = local_difference(difference, known, base);
   cv::Mat result(difference.size(), CV_8U);
-  const int channels = difference.channels();
   for (int y = 0; y < result.rows; ++y)
     for (int x = 0; x < result.cols; ++x) {
-      float most = 0;
-      for (int c = 0; c < channels; ++c)
-        most = std::max(most, std::abs(sum.ptr<float>(y)[x * channels + c]));
-      const double off = most / std::max(1e-3F, share.at<float>(y, x)) / unexplained;
+      const double off = local.at<float>(y, x) / unexplained;
       const int inside =
           std::min(std::min(x, result.cols - 1 - x), std::min(y, result.rows - 1 - y));
       const double ramp = std::min(1.0, inside / std::max(1.0, border * result.cols));
@@ -79,6 +95,20 @@ cv::Mat confidence_of(const cv::Mat& difference, const cv::Mat& known, double un
           cv::saturate_cast<uchar>(255 * known.at<float>(y, x) * ramp * std::exp(-off * off));
     }
   return result;
+}
+
+/// Squared distance from the axis (normalised) beyond which a bent lens folds points back into the
+/// picture.
+double fold_of(const Camera& camera) {
+  constexpr double none = std::numeric_limits<double>::infinity();
+  // The first zero of the radius' derivative, 1 + 3 k1 r^2 + 5 k2 r^4.
+  const double a = 5 * camera.k2, b = 3 * camera.k1, inside = b * b - 4 * a;
+  if (a == 0) return b < 0 ? -1 / b : none;
+  if (inside < 0) return none;
+  double first = none;
+  for (const double root : {(-b + std::sqrt(inside)) / (2 * a), (-b - std::sqrt(inside)) / (2 * a)})
+    if (root > 0) first = std::min(first, root);
+  return first;
 }
 
 /// The middle of what a view sees; none where it sees nothing.
@@ -110,6 +140,7 @@ Status DetailOptions::validate() const {
   ORBITFUSE_TRY(check("sources", sources, from_to(0, 64)));
   ORBITFUSE_TRY(check("base_width_px", base_width_px, from_to(16, 8192)));
   ORBITFUSE_TRY(check("depth_tolerance", depth_tolerance, above_up_to(0, 0.5)));
+  ORBITFUSE_TRY(check("field_weight", field_weight, from_to(0, 1)));
   ORBITFUSE_TRY(check("angle_deg", angle_deg, above_up_to(0, 180)));
   return check("unexplained", unexplained, above_up_to(0, 1));
 }
@@ -144,12 +175,38 @@ Status PhotoDetail::prepare(const Field& field, const Progress& progress, Source
   cv::Mat difference = (image - shown) * (1 / (range.high - range.low)), known;
   std::vector<cv::Mat> planes;
   cv::split(difference, planes);
-  cv::Mat(planes[0] == planes[0]).convertTo(known, CV_32F, 1.0 / 255);
+  cv::Mat finite = planes[0] == planes[0];
+  for (const cv::Mat& plane : planes) finite &= plane == plane;
+  finite.convertTo(known, CV_32F, 1.0 / 255);
   cv::patchNaNs(difference, 0);
-  source.confidence = confidence_of(difference, known, options_.unexplained);
+  source.confidence = confidence_of(difference, known, base.depth.size(), options_.unexplained);
   difference.convertTo(source.difference, CV_16S, levels);
   source.depth = base.depth;
   return {};
+}
+
+bool PhotoDetail::has(const std::string& name) const {
+  return std::any_of(sources_.begin(), sources_.end(),
+                     [&](const Source& source) { return source.recorded.view.name == name; });
+}
+
+std::size_t PhotoDetail::Source::bytes() const {
+  return difference.total() * difference.elemSize() + confidence.total() +
+         depth.total() * sizeof(float);
+}
+
+void PhotoDetail::forget_old(const std::vector<Source*>& needed) {
+  std::size_t bytes = 0;
+  for (const Source& source : sources_) bytes += source.bytes();
+  while (bytes > kept_bytes) {
+    Source* oldest = nullptr;
+    for (Source& source : sources_)
+      if (!source.depth.empty() && std::find(needed.begin(), needed.end(), &source) == needed.end())
+        if (oldest == nullptr || source.last_asked < oldest->last_asked) oldest = &source;
+    if (oldest == nullptr) return;
+    bytes -= oldest->bytes();
+    oldest->difference.release(), oldest->confidence.release(), oldest->depth.release();
+  }
 }
 
 std::vector<std::string> PhotoDetail::spread_names(std::size_t count) const {
@@ -169,7 +226,9 @@ std::vector<PhotoDetail::Source*> PhotoDetail::nearest(const Eigen::Vector3d& fr
     const Eigen::Vector3d other =
         source.recorded.view.cam_from_world.inverse().translation - looked_at;
     const double cosine = other.normalized().dot(direction);
-    if (source.recorded.view.name != except && cosine > 0) ranked.emplace_back(-cosine, &source);
+    const bool twin = !except.empty() && cosine > twin_cosine;
+    if (source.recorded.view.name != except && !twin && cosine > 0)
+      ranked.emplace_back(-cosine, &source);
   }
   std::stable_sort(ranked.begin(), ranked.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
@@ -187,10 +246,10 @@ class PhotoDetail::NewView {
       : camera_(camera), world_from_cam_(world_from_cam), depth_(depth), options_(options) {
     for (const Source* source : sources) {
       const PosedView& view = source->recorded.view;
-      asked_.push_back({*source, view.camera, view.cam_from_world,
-                        view.cam_from_world.inverse().translation,
-                        static_cast<double>(source->depth.cols) / view.camera.width,
-                        static_cast<double>(source->depth.rows) / view.camera.height});
+      asked_.push_back(
+          {*source, view.camera, view.cam_from_world, view.cam_from_world.inverse().translation,
+           static_cast<double>(source->depth.cols) / view.camera.width,
+           static_cast<double>(source->depth.rows) / view.camera.height, fold_of(view.camera)});
     }
   }
 
@@ -203,7 +262,8 @@ class PhotoDetail::NewView {
           float* values = mean.ptr<float>(y) + x * channels;
           const float weight = sum(x, y, channels, values);
           covered.at<float>(y, x) = weight > 0 ? 1.0F : 0.0F;
-          for (int c = 0; c < channels && weight > 0; ++c) values[c] /= weight * levels;
+          const float all = weight + static_cast<float>(options_.field_weight);
+          for (int c = 0; c < channels && weight > 0; ++c) values[c] /= all * levels;
         }
     });
   }
@@ -215,6 +275,7 @@ class PhotoDetail::NewView {
     Rigid3d cam_from_world;
     Eigen::Vector3d center;
     double base_x, base_y;  ///< base pixels a pixel
+    double fold;            ///< fold_of()
   };
 
   float sum(int x, int y, int channels, float* values) const {
@@ -226,7 +287,9 @@ class PhotoDetail::NewView {
     float total = 0;
     for (const Asked& asked : asked_) {
       const Eigen::Vector3d in_source = asked.cam_from_world * point;
-      if (!(in_source.z() > 0)) continue;
+      if (!(in_source.z() > 0) ||
+          in_source.head<2>().squaredNorm() >= asked.fold * in_source.z() * in_source.z())
+        continue;
       const Eigen::Vector2d pixel = asked.camera.project(in_source);
       const auto base =
           corners(asked.source.depth.size(), {pixel.x() * asked.base_x, pixel.y() * asked.base_y});
@@ -267,8 +330,14 @@ Result<double> PhotoDetail::add(const Field& field, const Camera& camera,
   const auto middle = looked_at(camera, world_from_cam, seen.depth);
   if (!middle) return 0.0;
   const std::vector<Source*> chosen = nearest(world_from_cam.translation, *middle, except);
-  for (Source* source : chosen) ORBITFUSE_TRY(prepare(field, progress, *source));
   if (chosen.empty()) return 0.0;
+  ++asked_;
+  for (Source* source : chosen) {
+    ORBITFUSE_TRY(progress.check("render"));
+    ORBITFUSE_TRY(prepare(field, progress, *source));
+    source->last_asked = asked_;
+  }
+  forget_old(chosen);
 
   const TraceSpan span("detail of a new view");
   cv::Mat mean = cv::Mat::zeros(seen.color.size(), seen.color.type());
@@ -300,17 +369,24 @@ Result<DetailTrial> PhotoDetail::try_on(const Field& field, const std::vector<st
     const PosedView& view = source.recorded.view;
     if (std::find(names.begin(), names.end(), view.name) == names.end()) continue;
     ORBITFUSE_ASSIGN(cv::Mat recorded, image_of(source.recorded));
-    const Camera camera = base_of(view.camera);
-    cv::resize(recorded, recorded, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
+    // Finer than the base: what only the sources show is tried too.
+    const Camera base = base_of(view.camera);
+    const Camera camera = view.camera.width > 2 * base.width
+                              ? base.scaled_to(2 * base.width, 2 * base.height)
+                              : view.camera;
+    if (recorded.cols != camera.width)
+      cv::resize(recorded, recorded, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
     ORBITFUSE_ASSIGN(RenderedView seen, render(field, camera, view.cam_from_world, {}, progress));
     const cv::Mat before = seen.color.clone();
     ORBITFUSE_TRY(add(field, camera, view.cam_from_world, seen, progress, view.name));
     for (int y = 0; y < recorded.rows; ++y)
       for (int i = 0; i < recorded.cols * recorded.channels(); ++i) {
         const float truth = recorded.ptr<float>(y)[i];
-        if (std::isnan(truth)) continue;
-        without += std::abs(before.ptr<float>(y)[i] - truth);
-        with += std::abs(seen.color.ptr<float>(y)[i] - truth);
+        const float alone = std::abs(before.ptr<float>(y)[i] - truth),
+                    both = std::abs(seen.color.ptr<float>(y)[i] - truth);
+        if (!std::isfinite(alone) || !std::isfinite(both)) continue;  // outside of a bent lens
+        without += alone;
+        with += both;
         ++count;
       }
     ++trial.views;

@@ -258,21 +258,23 @@ Exposure estimate_exposure(const Dataset& data, const std::vector<bool>& heldout
   return exposure;
 }
 
-void even_out(const Exposure& exposure, std::vector<NormalisedView>& views) {
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    const Eigen::Array3f factor = (-exposure.log_gain[i]).exp().cast<float>();
-    cv::Mat& target = views[i].target;
-    for (int y = 0; y < target.rows; ++y)
-      for (int x = 0; x < target.cols; ++x) {
-        auto& rgb = target.at<cv::Vec3f>(y, x);
-        bool lost = false;
-        for (int c = 0; c < 3; ++c) {
-          lost = lost || (rgb[c] >= brightest && factor[c] < 1 - slight);
-          rgb[c] = std::min(1.0f, rgb[c] * factor[c]);
-        }
-        if (lost) rgb = cv::Vec3f::all(unknown);
+void even_out(cv::Mat& image, const Eigen::Array3d& gain) {
+  const Eigen::Array3f factor = gain.inverse().cast<float>();
+  for (int y = 0; y < image.rows; ++y)
+    for (int x = 0; x < image.cols; ++x) {
+      auto& rgb = image.at<cv::Vec3f>(y, x);
+      bool lost = false;
+      for (int c = 0; c < 3; ++c) {
+        lost = lost || (rgb[c] >= brightest && factor[c] < 1 - slight);
+        rgb[c] = std::min(1.0f, rgb[c] * factor[c]);
       }
-  }
+      if (lost) rgb = cv::Vec3f::all(unknown);
+    }
+}
+
+void even_out(const Exposure& exposure, std::vector<NormalisedView>& views) {
+  for (std::size_t i = 0; i < views.size(); ++i)
+    even_out(views[i].target, exposure.log_gain[i].exp());
 }
 
 }  // namespace orbitfuse::nerf

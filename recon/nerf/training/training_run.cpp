@@ -291,8 +291,8 @@ Result<Field> TrainingRun::finish() {
                     options_.target_psnr, report_.best_psnr));
   const std::vector<TrainingView>& views = data_.dataset.views;
   for (std::size_t i = 0; options_.per_image_offset && i < views.size(); ++i)
-    report_.image_offsets_k.push_back(state_->image_offsets.value[i] *
-                                      (state_->span.high - state_->span.low));
+    report_.image_offsets_k[views[i].name] =
+        state_->image_offsets.value[i] * (state_->span.high - state_->span.low);
   for (std::size_t i = 0; i < state_->refined_poses.size(); ++i)
     report_.refined_poses[views[i].name] = state_->refined_poses[i].pose();
   // How a field came about is the report's; equal fields are equal files.

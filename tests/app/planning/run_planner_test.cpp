@@ -245,7 +245,7 @@ TEST_F(RunPlannerTest, TellsWhatWasExpectedAndWhatCame) {
   auto finished = run(by, "report");
   for (StageStatus& status : finished) {
     if (status.stage == "train_visible") status.output.metrics["heldout_psnr_db"] = 24.5;
-    if (status.stage == "metrics") status.output.metrics["thermal_heldout_mae_k"] = 0.625;
+    if (status.stage == "metrics") status.output.metrics["thermal_heldout_field_mae_k"] = 0.625;
   }
   ASSERT_TRUE(by.save(finished));
   const std::string text = *read_file(temp / plan_file);

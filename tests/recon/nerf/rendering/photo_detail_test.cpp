@@ -233,6 +233,46 @@ TEST_P(Detail, IsTriedOnTheViewsAskedFor) {
   EXPECT_FALSE(none->helps());
 }
 
+TEST_P(Detail, OfALoneSourceThatShowsSomethingElseIsWeak) {
+  const double other = GetParam() == Modality::visible ? 0.2 : 4;  // a good part of the range
+  Dataset disturbed = data;
+  disturbed.views[4].image = data.views[4].image + cv::Scalar::all(other);
+  const TrainingView& view = data.views[3];
+  const RenderedView plain = rendered(field, view);
+  const auto change = [&](const Dataset& of) {
+    RenderedView seen = rendered(field, view);
+    PhotoDetail detail = detail_of({sources_of(of)[4]});
+    EXPECT_TRUE(detail.add(field, view.camera, view.cam_from_world, seen, {}));
+    return cv::norm(seen.color, plain.color, cv::NORM_INF);
+  };
+  EXPECT_GT(change(data), 0);
+  EXPECT_LT(change(disturbed), 0.7 * other);
+}
+
+TEST_P(Detail, IsTriedThroughABentLens) {
+  Dataset bent = data;
+  for (TrainingView& view : bent.views) view.camera.k1 = -0.6;  // its corners have no rays
+  PhotoDetail detail = detail_of(sources_of(bent));
+  const auto trial = detail.try_on(field, {bent.views[2].name}, {});
+  ASSERT_TRUE(trial) << trial.error().message();
+  EXPECT_EQ(trial->views, 1);
+  EXPECT_TRUE(std::isfinite(trial->without));
+  EXPECT_TRUE(std::isfinite(trial->with));
+}
+
+TEST_P(Detail, OfAViewsTwinIsNotAskedFor) {
+  Dataset burst = data;
+  burst.views[6] = data.views[5];
+  burst.views[6].name = "twin.png";
+  const std::vector<DetailSource> all = sources_of(burst);
+  PhotoDetail pair = detail_of({all[5], all[6]});
+  const TrainingView& view = burst.views[5];
+  RenderedView seen = rendered(field, view);
+  const auto share = pair.add(field, view.camera, view.cam_from_world, seen, {}, view.name);
+  ASSERT_TRUE(share);
+  EXPECT_EQ(*share, 0);
+}
+
 INSTANTIATE_TEST_SUITE_P(Of, Detail, testing::Values(Modality::visible, Modality::thermal),
                          [](const auto& of) { return std::string(name(of.param)); });
 
