@@ -357,6 +357,8 @@ PLOTS = {
     "heat": Plot(draw_heat, ("scene", "median view", "worst view"), ("median view", "worst view")),
     "nerf_refinement": bar_plot(("scene", "error put in"), [Bar("left alone", "left alone"), Bar("set right", "set right")],
                                 "dB on test views (higher is better)"),
+    "nerf_detail": bar_plot(("scene",), [Bar("field alone", "field alone"), Bar("with detail", "with detail")],
+                            "dB on views that were not trained on (higher is better)"),
     "nerf_recipes": bar_plot(("scene",), [Bar("nerfacto", "nerfacto"), Bar("nerf-rgb", "nerf-rgb, nerf-ir"), Bar("ours", "ours")],
                              "dB on test views (higher is better)"),
 }
