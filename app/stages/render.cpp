@@ -83,6 +83,18 @@ Status load_detail(const StageContext& context, const SessionInput& input,
   return load(fields.thermal);
 }
 
+/// ", recorded detail: held-out frames 16 % nearer"; empty where there is none.
+std::string words_on_detail(const json& metrics) {
+  for (const Modality modality : {Modality::visible, Modality::thermal}) {
+    const json told = metrics.value(detail_key(modality), json::object());
+    if (told.value("sources", 0) == 0) continue;
+    const double with = told.at("error_with"), without = told.at("error_without");
+    return fmt::format(", detail of recorded frames (held-out ones {:.0f} % nearer)",
+                       100 * (1 - with / without));
+  }
+  return {};
+}
+
 Result<NewViews> choose_views(const StageContext& context, const RenderConfig& config,
                               Modality frame) {
   if (config.cameras.empty()) {
@@ -215,11 +227,12 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
     files.push_back(std::move(f));
   }
 
-  output.metrics["brief"] = fmt::format("{}, {}, {:.2f} s a view", chosen.described,
+  output.metrics["brief"] = fmt::format("{}, {}, {:.2f} s a view{}", chosen.described,
                                         fields.thermal.empty()   ? "visible"
                                         : fields.visible.empty() ? "thermal"
                                                                  : "both modalities",
-                                        clock.wall_s() / static_cast<double>(files.size()));
+                                        clock.wall_s() / static_cast<double>(files.size()),
+                                        words_on_detail(output.metrics));
   output.metrics["views"] = files.size();
   for (const DetailedField* shown : {&fields.visible, &fields.thermal})
     if (!shown->detail.empty())
