@@ -139,7 +139,8 @@ function(orbitfuse_isa_sources name isa)
 endfunction()
 
 # orbitfuse_test(core_test SRCS x_test.cpp LINK core [LABEL fast|slow] [LOCK resource])
-# fast: the README's test command; slow: has its own command (tests/run.sh --slow).
+# fast: the README's test command; slow: has its own command (tests/run.sh --slow). The label ends in
+# the program's name, so that `ctest -L core_test` runs one program's tests.
 function(orbitfuse_test name)
   cmake_parse_arguments(ARG "" "LABEL;LOCK" "SRCS;LINK" ${ARGN})
   if(NOT ARG_LABEL)
@@ -150,7 +151,7 @@ function(orbitfuse_test name)
   target_link_libraries(${name} PRIVATE ${links} GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE
     ORBITFUSE_SOURCE_DIR="${PROJECT_SOURCE_DIR}" ORBITFUSE_BINARY_DIR="${PROJECT_BINARY_DIR}")
-  gtest_discover_tests(${name} PROPERTIES LABELS ${ARG_LABEL} RESOURCE_LOCK "${ARG_LOCK}" DISCOVERY_TIMEOUT 60)
+  gtest_discover_tests(${name} PROPERTIES LABELS ${ARG_LABEL}:${name} RESOURCE_LOCK "${ARG_LOCK}" DISCOVERY_TIMEOUT 60)
 endfunction()
 
 function(orbitfuse_write_link_graph file)

@@ -16,8 +16,9 @@ program=build/release/app/orbitfuse
 {
   cat <<'TEXT'
 # SPDX-License-Identifier: BSD-3-Clause
-# Every key with its default: what `orbitfuse run` does without --config. Copy what you change into
-# a file of your own and give it with --config, or set single keys with --set key=value.
+# Every key but those of training recipes (recon/nerf/options.hpp) with its default: what `orbitfuse run`
+# does without --config. Copy what you change into a file of your own and give it with --config, or set
+# single keys with --set key=value.
 TEXT
   "$program" run --print-config
 } > config/orbitfuse.toml

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <iostream>
 #include <orbitfuse/core/system/file_io.hpp>
-#include <orbitfuse/core/temperature.hpp>
 #include <orbitfuse/drivers/stills/flir_jpeg.hpp>
 
 namespace of = orbitfuse;
@@ -15,10 +14,13 @@ of::Result<double> hottest_kelvin(const char* file) {
   // A pixel's temperature follows from its raw signal by the camera's own calibration and the
   // emissivity, distance and air that the operator set in the camera.
   const of::FlirThermometer thermometer(image.calibration);
-  double hottest = 0;
-  for (const std::uint16_t signal : cv::Mat_<std::uint16_t>(image.signal)) {
-    hottest = std::fmax(hottest, thermometer.kelvin(signal));  // NaN: no temperature gives it
-  }
+  double hottest = std::nan("");
+  for (const std::uint16_t signal : cv::Mat_<std::uint16_t>(image.signal))
+    // At the ends of the camera's range a signal says "that or more": it is no temperature.
+    if (signal > image.lowest_signal && signal < image.highest_signal)
+      hottest = std::fmax(hottest, thermometer.kelvin(signal));
+  if (std::isnan(hottest))
+    return of::fail(of::ErrorKind::input, file, "no sample in range", "choose another range");
   return hottest;
 }
 

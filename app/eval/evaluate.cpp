@@ -137,12 +137,8 @@ Result<DetailedField> load_shown(const Run& run, const Session& session, Modalit
   const std::string train = "train_" + std::string(name(modality));
   if (!run.done(train)) return shown;
   ORBITFUSE_ASSIGN(shown.field, nerf::Field::load(run.out / train / stages::field_file));
-  const pipeline::StageContext context = stages::context_of_run(run.out);
-  ORBITFUSE_ASSIGN(const nerf::DetailOptions options,
-                   stages::detail_of_new_views(context, modality));
-  const Samples samples = stages::SessionInput{session, {}}.samples(modality);
-  ORBITFUSE_ASSIGN(shown.detail, stages::recorded_detail(stages::context_of_run(run.out), session,
-                                                         modality, samples, width_px, options));
+  ORBITFUSE_ASSIGN(shown.detail, stages::detail_of_new_views(stages::context_of_run(run.out),
+                                                             session, modality, width_px));
   return shown;
 }
 
@@ -180,7 +176,7 @@ Status add_test_views(Run& run, const Session& session, const GroundTruth& truth
   if (!run.truth_from_visible || truth.test.empty()) return {};
   int widest = 0;
   for (const TrueTestView& view : truth.test) widest = std::max(widest, view.camera.width);
-  const int detail_width = std::min(options.max_width_px, widest) * 5 / 4;
+  const int detail_width = stages::detail_width_px(std::min(options.max_width_px, widest));
   ORBITFUSE_ASSIGN(DetailedField visible,
                    load_shown(run, session, Modality::visible, detail_width));
   DetailedField thermal;
@@ -191,7 +187,7 @@ Status add_test_views(Run& run, const Session& session, const GroundTruth& truth
   for (std::size_t i = 0; i < truth.test.size(); ++i) {
     const TrueTestView& view = truth.test[i];
     progress.report(
-        {"eval", static_cast<double>(i), static_cast<double>(truth.test.size()), -1, ""});
+        {"eval", static_cast<double>(i), static_cast<double>(truth.test.size()), {}, ""});
     const int width = std::min(options.max_width_px, view.camera.width);
     const Camera camera =
         view.camera.scaled_to(width, view.camera.height * width / view.camera.width);

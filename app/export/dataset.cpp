@@ -18,8 +18,6 @@ namespace orbitfuse::exporting {
 namespace {
 namespace fs = std::filesystem;
 
-/// Below it a ray met too little of the field for its value to be a surface's.
-constexpr float least_opacity = 0.5F;
 /// Splatting starts from points; more than this many only slow it down.
 constexpr std::size_t most_points = 100'000;
 
@@ -50,16 +48,14 @@ Result<RunDetail> detail_of(const view::FinishedRun& run, DatasetPoses poses,
   int widest = 0;
   for (const PosedView& view : views) widest = std::max(widest, view.camera.width);
   const pipeline::StageContext context = stages::context_of_run(run.out);
-  const auto load = [&](Modality modality, Samples samples) -> Result<nerf::PhotoDetail> {
-    ORBITFUSE_ASSIGN(const nerf::DetailOptions options,
-                     stages::detail_of_new_views(context, modality));
-    return stages::recorded_detail(context, *run.session, modality, samples, widest + widest / 4,
-                                   options);
+  const auto load = [&](Modality modality) {
+    return stages::detail_of_new_views(context, *run.session, modality,
+                                       stages::detail_width_px(widest));
   };
   if (poses == DatasetPoses::fresh) {
-    ORBITFUSE_ASSIGN(detail.visible, load(Modality::visible, Samples::color));
+    ORBITFUSE_ASSIGN(detail.visible, load(Modality::visible));
   }
-  ORBITFUSE_ASSIGN(detail.thermal, load(Modality::thermal, run.samples()));
+  ORBITFUSE_ASSIGN(detail.thermal, load(Modality::thermal));
   return detail;
 }
 
@@ -80,7 +76,8 @@ Result<cv::Mat> rendered_kelvin(const view::FinishedRun& run, RunDetail& detail,
   ORBITFUSE_ASSIGN(nerf::RenderedView seen,
                    nerf::render(run.thermal, view.camera, cam_from_thermal, {}, progress));
   ORBITFUSE_TRY(detail.thermal.add(run.thermal, view.camera, cam_from_thermal, seen, progress));
-  seen.color.setTo(std::numeric_limits<float>::quiet_NaN(), seen.opacity < least_opacity);
+  seen.color.setTo(std::numeric_limits<float>::quiet_NaN(),
+                   seen.opacity < run.config.render.min_opacity);
   return seen.color;
 }
 
@@ -135,8 +132,11 @@ Status write_pairs(const fs::path& folder, const view::FinishedRun& run, const E
   std::vector<cv::Mat> kelvin;
   for (const PosedView& posed : cameras.views) {
     ORBITFUSE_TRY(progress.check("dataset"));
-    progress.report({"dataset", static_cast<double>(kelvin.size()),
-                     static_cast<double>(cameras.views.size()), -1, posed.name});
+    progress.report({"dataset",
+                     static_cast<double>(kelvin.size()),
+                     static_cast<double>(cameras.views.size()),
+                     {},
+                     posed.name});
     PosedView view = posed;
     view.camera = posed.camera.without_distortion();
     const std::string file = fmt::format("{:06}.png", kelvin.size());
@@ -200,8 +200,11 @@ Result<PairSet> write_dataset(const fs::path& folder, const view::FinishedRun& r
   }
   fs::remove(folder, error);  // empty, or not there
   fs::rename(partial, folder, error);
-  if (error)
+  if (error) {
+    std::error_code left;
+    fs::remove_all(partial, left);
     return fail(ErrorKind::device, folder.string(), error.message(), "see who may write there");
+  }
   return PairSet{cameras.views.size(), cameras.described};
 }
 

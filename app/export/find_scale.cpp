@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "capture/mat/mat_finder.hpp"
+#include "core/geometry/lens_fold.hpp"
 #include "core/image/image_io.hpp"
 #include "core/image/undistorted.hpp"
 #include "core/numeric/median.hpp"
@@ -100,8 +101,8 @@ Result<OtherViews> other_views(const view::FinishedRun& run, const view::Recorde
     if (off.size() >= enough) break;
     const Eigen::Vector3d in_cam = v->view.cam_from_world * point;
     const Eigen::Vector2d pixel = v->view.camera.project(in_cam);
-    if (!(in_cam.z() > 0 && pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < v->view.camera.width &&
-          pixel.y() < v->view.camera.height))
+    if (!(in_cam.z() > 0 && lens_holds(v->view.camera, in_cam) && pixel.x() >= 0 &&
+          pixel.y() >= 0 && pixel.x() < v->view.camera.width && pixel.y() < v->view.camera.height))
       continue;
     ORBITFUSE_ASSIGN(const auto seen,
                      depth_at(run, v->view, in_cam.head<2>() / in_cam.z(), progress));

@@ -90,7 +90,9 @@ Result<FieldSurface> surface_of_run(const view::FinishedRun& run, const SurfaceR
         .push_back(v.view);
   const auto& cameras = fields.visible ? fields.visible_views : fields.thermal_views;
   ORBITFUSE_ASSIGN(const Eigen::AlignedBox3d box, box_of(request, cameras));
-  return field_surface(fields, box, request.surface, progress);
+  FieldSurfaceOptions options = request.surface;
+  options.min_opacity = run.config.render.min_opacity;
+  return field_surface(fields, box, options, progress);
 }
 
 Status check_extension(const fs::path& file) {

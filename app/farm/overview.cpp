@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "app/pipeline/stage_record.hpp"
+#include "core/formats/csv.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse::farm {
@@ -35,21 +36,6 @@ void add_quality(const fs::path& folder, SessionOverview& row) {
   row.qabf_best = number(metrics_of("metrics"), "/fused/best/Qabf");
   std::error_code unreadable;
   row.report = fs::exists(folder / "report" / "report.html", unreadable);
-}
-
-/// RFC 4180: quoted, quotes doubled; breaks would tear rows for line-wise readers. What a
-/// spreadsheet would take for a formula is kept from it.
-std::string quoted(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  std::replace(text.begin(), text.end(), '\r', ' ');
-  if (!text.empty() && std::string("=+-@").find(text.front()) != std::string::npos)
-    text.insert(0, "'");
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"') out += '"';
-    out += c;
-  }
-  return out + "\"";
 }
 
 std::string cell(const std::optional<double>& value) {
@@ -90,10 +76,10 @@ std::string to_csv(const std::vector<SessionOverview>& sessions) {
       "posed_thermal,doubtful_thermal,psnr_visible_db,psnr_thermal_db,qabf_best\r\n";
   for (const SessionOverview& s : sessions)
     csv += fmt::format("{},{},{},{},{},{},{:.1f},{:.1f},{:.0f},{},{},{},{},{},{}\r\n",
-                       quoted(s.name), name(s.state), s.stage, quoted(s.cause), s.done, s.starts,
-                       s.wall_s, s.cpu_s, s.memory_mb, cell(s.posed_visible), cell(s.posed_thermal),
-                       cell(s.doubtful_thermal), cell(s.psnr_visible_db), cell(s.psnr_thermal_db),
-                       cell(s.qabf_best));
+                       csv_text(s.name), name(s.state), s.stage, csv_text(s.cause), s.done,
+                       s.starts, s.wall_s, s.cpu_s, s.memory_mb, cell(s.posed_visible),
+                       cell(s.posed_thermal), cell(s.doubtful_thermal), cell(s.psnr_visible_db),
+                       cell(s.psnr_thermal_db), cell(s.qabf_best));
   return csv;
 }
 

@@ -68,7 +68,7 @@ Result<Summary> fuse_folder(const fs::path& visible, const fs::path& thermal, co
   for (const auto& [stem, file] : visible_files) {
     ORBITFUSE_TRY(progress.check("fuse"));
     progress.report(
-        {"fuse", static_cast<double>(done++), static_cast<double>(visible_files.size()), -1, stem});
+        {"fuse", static_cast<double>(done++), static_cast<double>(visible_files.size()), {}, stem});
     const auto partner = thermal_files.find(stem);
     if (partner == thermal_files.end()) {
       summary.problems.push_back(file.string() + ": no thermal image of that name");

@@ -108,12 +108,13 @@ Result<StageOutput> fuse_views(const StageContext& context, const RunConfig& con
   if (std::count(methods.begin(), methods.end(), FusionMethod::heat) > 0)
     ORBITFUSE_TRY(write_legend(context, rendered, config.fuse.options));
   const double measured_share = measured_sum / static_cast<double>(rendered.views.size());
-  output.metrics = {{"brief", fmt::format("{} images by {} methods, {} of them with a temperature",
-                                          fused_images, methods.size(), percent(measured_share))},
-                    {"methods", list},
-                    {"milliseconds_a_view", times},
-                    {"measured_share", measured_share},
-                    {"measured_share_by_view", measured}};
+  output.metrics = {
+      {"brief", fmt::format("{} images by {} methods, {} of the pixels seen by the thermal field",
+                            fused_images, methods.size(), percent(measured_share))},
+      {"methods", list},
+      {"milliseconds_a_view", times},
+      {"measured_share", measured_share},
+      {"measured_share_by_view", measured}};
   return output;
 }
 

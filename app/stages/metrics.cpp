@@ -61,19 +61,15 @@ Status score_field(const StageContext& context, const SessionInput& input,
   ORBITFUSE_ASSIGN(const nerf::Dataset data,
                    training_data(input.session.folder, model, input.samples(model.modality),
                                  config.max_width_px, context.progress));
-  DetailedField shown;
-  ORBITFUSE_ASSIGN(shown.field, nerf::Field::load(context.of(train) / field_file));
-  ORBITFUSE_ASSIGN(const nerf::DetailOptions how, detail_of_new_views(context, modality));
-  ORBITFUSE_ASSIGN(shown.detail,
-                   recorded_detail(context, input.session, modality, input.samples(modality),
-                                   config.max_width_px, how));
+  ORBITFUSE_ASSIGN(const nerf::Field field, nerf::Field::load(context.of(train) / field_file));
+  ORBITFUSE_ASSIGN(nerf::PhotoDetail detail,
+                   detail_of_new_views(context, input.session, modality, config.max_width_px));
   for (const nerf::TrainingView& view : data.views) {
-    ORBITFUSE_ASSIGN(
-        nerf::RenderedView seen,
-        nerf::render(shown.field, view.camera, view.cam_from_world, {}, context.progress));
+    ORBITFUSE_ASSIGN(nerf::RenderedView seen,
+                     nerf::render(field, view.camera, view.cam_from_world, {}, context.progress));
     const cv::Mat field_alone = seen.color.clone();
-    ORBITFUSE_TRY(shown.detail.add(shown.field, view.camera, view.cam_from_world, seen,
-                                   context.progress, view.name));
+    ORBITFUSE_TRY(
+        detail.add(field, view.camera, view.cam_from_world, seen, context.progress, view.name));
     cv::Mat truth = view.image, rendered = seen.color;
     if (modality == Modality::visible) {
       if (gains.contains(view.name)) {  // the field shows the common exposure, the frame its own

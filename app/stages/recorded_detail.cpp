@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "app/stages/recorded_detail.hpp"
 
+#include <algorithm>
 #include <array>
-#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
+#include "app/stages/session_input.hpp"
+#include "core/geometry/narrowed.hpp"
 
 namespace orbitfuse::stages {
 namespace {
@@ -36,22 +38,20 @@ Result<cv::Mat> image_of(const std::filesystem::path& file, Samples samples, con
 Result<nerf::RenderedView> DetailedField::render(const Camera& camera,
                                                  const Rigid3d& cam_from_world,
                                                  const nerf::RenderOptions& options,
-                                                 const Progress& progress,
-                                                 const std::string& except) {
+                                                 const Progress& progress) {
   ORBITFUSE_ASSIGN(nerf::RenderedView seen,
                    nerf::render(field, camera, cam_from_world, options, progress));
-  ORBITFUSE_ASSIGN(const double share,
-                   detail.add(field, camera, cam_from_world, seen, progress, except));
+  ORBITFUSE_ASSIGN(const double share, detail.add(field, camera, cam_from_world, seen, progress));
   detailed += share;
   return seen;
 }
 
 Result<nerf::PhotoDetail> recorded_detail(const pipeline::StageContext& context,
-                                          const Session& session, Modality modality,
-                                          Samples samples, int width_px,
+                                          const Session& session, Modality modality, int width_px,
                                           const nerf::DetailOptions& options) {
   if (options.sources == 0) return nerf::PhotoDetail();
   const std::string of(name(modality));
+  const Samples samples = samples_of(session, modality);
   ORBITFUSE_ASSIGN(const Reconstruction model, load_trained_poses(context, modality));
   ORBITFUSE_ASSIGN(const auto doubts, load_doubts(context.of("poses_" + of)));
   ORBITFUSE_ASSIGN(const pipeline::StageRecord trained,
@@ -65,11 +65,7 @@ Result<nerf::PhotoDetail> recorded_detail(const pipeline::StageContext& context,
     std::error_code ignored;
     if (doubts.contains(view.name) || !std::filesystem::exists(file, ignored)) continue;
     const Camera recorded = view.camera;
-    if (recorded.width > width_px) {
-      const double height = static_cast<double>(width_px) * recorded.height / recorded.width;
-      view.camera =
-          recorded.scaled_to(width_px, std::max(1, static_cast<int>(std::lround(height))));
-    }
+    view.camera = narrowed_to(recorded, width_px);
     OwnOfFrame own;
     own.gain = gains.value(view.name, own.gain);
     if (offsets.is_object()) own.offset_k = offsets.value(view.name, 0.0);  // an array, once
@@ -86,28 +82,30 @@ Result<nerf::DetailTrial> try_on_recorded(const pipeline::StageContext& context,
   ORBITFUSE_ASSIGN(const pipeline::StageRecord trained,
                    pipeline::read_stage_record(
                        context.of("train_" + std::string(name(shown.field.modality())))));
-  auto names = trained.output.metrics.value("heldout", std::vector<std::string>());
-  std::erase_if(names, [&](const std::string& n) { return !shown.detail.has(n); });
-  if (names.empty()) names = shown.detail.spread_names(detail_trials);
-  for (std::size_t i = 0; i < detail_trials && names.size() > detail_trials; ++i)
-    names[i] = names[i * names.size() / detail_trials];
-  names.resize(std::min(names.size(), detail_trials));
+  const auto heldout = trained.output.metrics.value("heldout", std::vector<std::string>());
+  const std::vector<std::string> all = shown.detail.names();
+  std::vector<std::string> names;
+  for (const std::string& name : heldout)
+    if (std::find(all.begin(), all.end(), name) != all.end()) names.push_back(name);
+  if (names.empty()) names = all;
+  const std::size_t count = std::min(names.size(), detail_trials);
+  for (std::size_t i = 0; i < count; ++i) names[i] = names[i * names.size() / count];  // spread
+  names.resize(count);
   return shown.detail.try_on(shown.field, names, context.progress);
 }
 
 std::string detail_key(Modality modality) { return std::string(name(modality)) + "_detail"; }
 
-Result<nerf::DetailOptions> detail_of_new_views(const pipeline::StageContext& context,
-                                                Modality modality) {
-  nerf::DetailOptions options;
-  options.sources = 0;
-  if (!context.has("render")) return options;
+Result<nerf::PhotoDetail> detail_of_new_views(const pipeline::StageContext& context,
+                                              const Session& session, Modality modality,
+                                              int width_px) {
+  if (!context.has("render")) return nerf::PhotoDetail();
   ORBITFUSE_ASSIGN(const pipeline::StageRecord record,
                    pipeline::read_stage_record(context.of("render")));
-  const auto& told = record.output.metrics;
-  if (const auto found = told.find(detail_key(modality)); found != told.end())
-    options.sources = found->value("sources", 0);
-  return options;
+  nerf::DetailOptions options;
+  options.sources = record.output.metrics.value(detail_key(modality), nlohmann::json::object())
+                        .value("sources", 0);
+  return recorded_detail(context, session, modality, width_px, options);
 }
 
 }  // namespace orbitfuse::stages

@@ -17,17 +17,18 @@ struct DetailedField {
   bool empty() const { return field.empty(); }
   /// As nerf::render() and PhotoDetail::add().
   Result<nerf::RenderedView> render(const Camera& camera, const Rigid3d& cam_from_world,
-                                    const nerf::RenderOptions& options, const Progress& progress,
-                                    const std::string& except = {});
+                                    const nerf::RenderOptions& options, const Progress& progress);
 };
 
-/// What the recorded frames of a modality add to pictures of its trained field, `width_px` wide:
-/// from where training left the views, at one exposure and without the camera's drift. Views whose
-/// poses are doubted lend nothing, nor do frames that are no longer there.
-/// Errors: input (a stage's record is cut), usage (options).
+/// For pictures that wide, recorded frames are read a little finer, and not finer.
+constexpr int detail_width_px(int picture_width_px) { return picture_width_px * 5 / 4; }
+
+/// What the recorded frames of a modality, read `width_px` wide, add to pictures of its trained
+/// field: from where training left the views, at one exposure and without the camera's drift. Views
+/// whose poses are doubted lend nothing, nor do frames that are no longer there. Errors: input (a
+/// stage's record is cut), usage (options).
 Result<nerf::PhotoDetail> recorded_detail(const pipeline::StageContext& context,
-                                          const Session& session, Modality modality,
-                                          Samples samples, int width_px,
+                                          const Session& session, Modality modality, int width_px,
                                           const nerf::DetailOptions& options);
 
 /// Recorded views that detail is tried on: each takes a render, and its neighbours'.
@@ -38,10 +39,10 @@ inline constexpr std::size_t detail_trials = 3;
 Result<nerf::DetailTrial> try_on_recorded(const pipeline::StageContext& context,
                                           DetailedField& shown);
 
-/// With which options the run's new views got the modality's detail; no sources where they got
-/// none.
-Result<nerf::DetailOptions> detail_of_new_views(const pipeline::StageContext& context,
-                                                Modality modality);
+/// recorded_detail() as the run's new views got it; none where they got none.
+Result<nerf::PhotoDetail> detail_of_new_views(const pipeline::StageContext& context,
+                                              const Session& session, Modality modality,
+                                              int width_px);
 
 /// Where the render stage says what became of a modality's detail.
 std::string detail_key(Modality modality);

@@ -48,20 +48,18 @@ Result<Fields> load_fields(const StageContext& context) {
   return fields;
 }
 
-/// Recorded frames are read a little finer than the new views are, and not finer.
 Status load_detail(const StageContext& context, const SessionInput& input,
                    const nerf::DetailOptions& options, const NewViews& views, Fields& fields,
                    StageOutput& output) {
   int widest = 0;
   for (const PosedView& view : views.views) widest = std::max(widest, view.camera.width);
-  const int width = widest + widest / 4;
   const auto load = [&](DetailedField& shown) -> Status {
     if (shown.empty()) return {};
     const Modality modality = shown.field.modality();
     ORBITFUSE_ASSIGN(shown.detail, recorded_detail(context, input.session, modality,
-                                                   input.samples(modality), width, options));
+                                                   detail_width_px(widest), options));
     if (shown.detail.empty()) return {};
-    context.progress.report({"render", 0, 1, -1, "detail of the recorded frames"});
+    context.progress.report({"render", 0, 1, {}, "detail of the recorded frames"});
     ORBITFUSE_ASSIGN(const nerf::DetailTrial trial, try_on_recorded(context, shown));
     if (!trial.helps()) shown.detail = {};
     output.metrics[detail_key(modality)] = {{"sources", shown.detail.empty() ? 0 : options.sources},
@@ -83,14 +81,14 @@ Status load_detail(const StageContext& context, const SessionInput& input,
   return load(fields.thermal);
 }
 
-/// ", recorded detail: held-out frames 16 % nearer"; empty where there is none.
+/// ", with detail of recorded frames (2 tried: 16 % nearer)"; empty where there is none.
 std::string words_on_detail(const json& metrics) {
   for (const Modality modality : {Modality::visible, Modality::thermal}) {
     const json told = metrics.value(detail_key(modality), json::object());
     if (told.value("sources", 0) == 0) continue;
     const double with = told.at("error_with"), without = told.at("error_without");
-    return fmt::format(", detail of recorded frames (held-out ones {:.0f} % nearer)",
-                       100 * (1 - with / without));
+    return fmt::format(", with detail of recorded frames ({} tried: {:.0f} % nearer)",
+                       told.at("views_tried").get<int>(), 100 * (1 - with / without));
   }
   return {};
 }

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "app/stages/run_config.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <string_view>
 
 #include "core/image/palette.hpp"
 #include "core/nested_text.hpp"
@@ -117,8 +120,9 @@ void add_render(Settings& settings, RenderConfig& render) {
 }
 
 void add_fuse(Settings& settings, FuseConfig& fuse) {
-  settings.add("fuse.methods", fuse.methods,
-               "Any of heat, best, ms-srif, pca-msif, cnn-lpif; the first is shown first");
+  settings.add(
+      "fuse.methods", fuse.methods,
+      fmt::format("Any of {}; the first is shown first", fmt::join(fusion_method_names(), ", ")));
   settings.add("fuse.color", fuse.options.color, "Keep the visible colours; false: gray");
   settings.add("fuse.heat_palette", fuse.options.heat.palette,
                "Colours of what is warmer than its surroundings");
@@ -217,7 +221,10 @@ Status RunConfig::validate() const {
   ORBITFUSE_TRY(render.path.validate());
   ORBITFUSE_TRY(render.visible.validate());
   ORBITFUSE_TRY(render.thermal.validate());
-  ORBITFUSE_TRY(OptionCheck("render")("detail_sources", render.detail.sources, from_to(0, 64)));
+  ORBITFUSE_TRY(render.detail.validate().map_error([](Error error) {
+    error.where = "render.detail_" + error.where.substr(std::string_view("detail.").size());
+    return error;
+  }));
   ORBITFUSE_TRY(palette(render.palette));
   ORBITFUSE_TRY(fuse.chosen());
   ORBITFUSE_TRY(fuse.options.validate());

@@ -88,15 +88,12 @@ int SessionInput::count(Modality modality) const {
   return static_cast<int>(session.frames_of(modality, false).size());
 }
 
-Samples SessionInput::samples(Modality modality) const {
+Samples samples_of(const Session& session, Modality modality) {
   if (modality == Modality::visible) return Samples::color;
-  return has_temperatures() ? Samples::kelvin : Samples::gray;
-}
-
-bool SessionInput::has_temperatures() const {
-  return std::any_of(session.frames.begin(), session.frames.end(), [](const FrameRecord& f) {
-    return f.modality == Modality::thermal && !f.thermal_is_gray;
-  });
+  const bool measured = std::any_of(
+      session.frames.begin(), session.frames.end(),
+      [](const FrameRecord& f) { return f.modality == Modality::thermal && !f.thermal_is_gray; });
+  return measured ? Samples::kelvin : Samples::gray;
 }
 
 Result<FrameFindings> look_at_frames(const Session& session, const Progress& progress) {

@@ -11,6 +11,9 @@
 
 namespace orbitfuse::stages {
 
+/// What the images of a modality hold: thermal ones temperatures, if any frame does.
+Samples samples_of(const Session& session, Modality modality);
+
 /// A session as the pipeline reads it: opened, every frame's file present and as recorded.
 struct SessionInput {
   Session session;
@@ -19,9 +22,8 @@ struct SessionInput {
   int count(Modality modality) const;  ///< frames at stations (tracking frames excluded)
   bool has(Modality modality) const { return count(modality) > 0; }
   /// The thermal frames hold temperatures.
-  bool has_temperatures() const;
-  /// What the images of a modality hold.
-  Samples samples(Modality modality) const;
+  bool has_temperatures() const { return samples(Modality::thermal) == Samples::kelvin; }
+  Samples samples(Modality modality) const { return samples_of(session, modality); }
 };
 
 /// SessionInput::content of one modality, without decoding its frames.

@@ -53,24 +53,20 @@ Result<std::string> photo(const FinishedRun& run, std::size_t index) {
                 "run the session again");
   const auto file = run.session->folder / recorded.view.name;
   PictureParts parts;
-  if (recorded.modality == Modality::visible || run.thermal_is_gray) {
+  const Camera& camera = recorded.view.camera;
+  if (recorded.modality == Modality::visible) {
+    ORBITFUSE_ASSIGN(const cv::Mat bgr, read_visible(file));  // upright, as its pose is
+    ORBITFUSE_TRY(
+        parts.add_jpeg("visible", fitted(without_distortion(bgr, camera), cv::INTER_AREA), 88));
+  } else if (run.thermal_is_gray) {
     ORBITFUSE_ASSIGN(const cv::Mat image, read_image(file));
-    const cv::Mat straight =
-        fitted(without_distortion(image, recorded.view.camera), cv::INTER_AREA);
-    if (recorded.modality == Modality::visible) {
-      cv::Mat bgr = straight;
-      if (bgr.channels() == 1) cv::cvtColor(straight, bgr, cv::COLOR_GRAY2BGR);
-      ORBITFUSE_TRY(parts.add_jpeg("visible", bgr, 88));
-    } else {
-      cv::Mat gray = straight, levels;
-      if (gray.channels() == 3) cv::cvtColor(straight, gray, cv::COLOR_BGR2GRAY);
-      gray.convertTo(levels, CV_32F);
-      parts.add_levels("thermal", levels, true);
-    }
+    cv::Mat gray = fitted(without_distortion(image, camera), cv::INTER_AREA), levels;
+    if (gray.channels() == 3) cv::cvtColor(gray, gray, cv::COLOR_BGR2GRAY);
+    gray.convertTo(levels, CV_32F);
+    parts.add_levels("thermal", levels, true);
   } else {
     ORBITFUSE_ASSIGN(const cv::Mat kelvin, read_thermal_k(file));
-    parts.add_levels("thermal",
-                     fitted(without_distortion(kelvin, recorded.view.camera), cv::INTER_NEAREST),
+    parts.add_levels("thermal", fitted(without_distortion(kelvin, camera), cv::INTER_NEAREST),
                      false);
   }
   return parts.bytes();

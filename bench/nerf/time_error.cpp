@@ -135,6 +135,9 @@ Status print_detail_errors(const nerf::Field& field, const Arguments& a) {
 }
 
 Status run(const Arguments& a) {
+  if (!a.detail.empty() && (a.pose_error_deg > 0 || a.exposure > 0))
+    return fail(ErrorKind::usage, "--detail", "beside --perturb-poses or --vary-exposure",
+                "its views are as they were recorded; choose one");
   set_thread_count(a.threads);
   ORBITFUSE_ASSIGN(nerf::Dataset data, bench::load_scene(a.scene, a.data, a.model));
   ORBITFUSE_ASSIGN(nerf::TrainOptions options,
@@ -172,9 +175,6 @@ Status run(const Arguments& a) {
   if (a.quick) return {};
   ORBITFUSE_TRY(time_render(field, data));
   ORBITFUSE_TRY(print_errors(field, data, "full resolution"));
-  if (!a.detail.empty() && (a.pose_error_deg > 0 || a.exposure > 0))
-    return fail(ErrorKind::usage, "--detail", "beside --perturb-poses or --vary-exposure",
-                "its views are as they were recorded; choose one");
   if (!a.detail.empty()) return print_detail_errors(field, a);
   return a.images.empty() ? Status{} : bench::write_pictures(field, data, a.images);
 }

@@ -4,10 +4,10 @@
 #include <fmt/format.h>
 
 #include <cstdint>
-#include <limits>
 #include <opencv2/imgproc.hpp>
 
 #include "core/image/image_codec.hpp"
+#include "core/image/thermal_counts.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -16,20 +16,12 @@ constexpr std::chrono::milliseconds shortest_life{200};
 constexpr std::size_t most_entries = 16;
 constexpr int widest_px = 640;
 
-cv::Mat reduced(const cv::Mat& image) {
+cv::Mat reduced(const cv::Mat& image, int how) {
   if (image.cols <= widest_px) return image;
   cv::Mat small;
   cv::resize(image, small, {widest_px, std::max(1, image.rows * widest_px / image.cols)}, 0, 0,
-             cv::INTER_AREA);
+             how);
   return small;
-}
-
-/// Invalid samples become NaN.
-cv::Mat kelvin_of(const cv::Mat& counts, ThermalScaleTag scale) {
-  cv::Mat kelvin;
-  counts.convertTo(kelvin, CV_32FC1, scale.scale, scale.offset);
-  kelvin.setTo(std::numeric_limits<float>::quiet_NaN(), counts == 0);
-  return kelvin;
 }
 
 }  // namespace
@@ -44,11 +36,14 @@ Result<Preview> PreviewCache::get(const LatestFrame& frame, const std::string& p
     return known->second.preview;
   }
   Preview preview;
-  cv::Mat picture = reduced(frame.pixels);
-  if (picture.depth() == CV_16U) {
+  cv::Mat picture;
+  if (frame.pixels.depth() == CV_16U) {
     ORBITFUSE_ASSIGN(const cv::Mat colours, palette(palette_name));
-    preview.span = span ? *span : common_span({kelvin_of(frame.pixels, frame.scale)});
-    picture = colorize(kelvin_of(picture, frame.scale), *preview.span, colours);
+    const cv::Mat kelvin = kelvin_of_counts({frame.pixels, frame.scale});
+    preview.span = span ? *span : common_span({kelvin});
+    picture = colorize(reduced(kelvin, cv::INTER_NEAREST), *preview.span, colours);
+  } else {
+    picture = reduced(frame.pixels, cv::INTER_AREA);
   }
   ORBITFUSE_ASSIGN(preview.jpeg, encode_jpeg(picture, 80));
   if (entries_.size() >= most_entries) entries_.clear();

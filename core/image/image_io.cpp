@@ -62,8 +62,7 @@ Result<ThermalCounts> read_thermal_counts(const fs::path& path) {
   return out;
 }
 
-Result<cv::Mat> read_thermal_k(const fs::path& path) {
-  ORBITFUSE_ASSIGN(const ThermalCounts counts, read_thermal_counts(path));
+cv::Mat kelvin_of_counts(const ThermalCounts& counts) {
   const auto& [image, scale] = counts;
   cv::Mat kelvin(image.size(), CV_32FC1);
   for (int y = 0; y < image.rows; ++y) {
@@ -75,6 +74,11 @@ Result<cv::Mat> read_thermal_k(const fs::path& path) {
     }
   }
   return kelvin;
+}
+
+Result<cv::Mat> read_thermal_k(const fs::path& path) {
+  ORBITFUSE_ASSIGN(const ThermalCounts counts, read_thermal_counts(path));
+  return kelvin_of_counts(counts);
 }
 
 Result<cv::Mat> read_image(const fs::path& path) {

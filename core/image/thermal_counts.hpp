@@ -20,4 +20,8 @@ struct ThermalCounts {
 /// name the file.
 Result<ThermalCounts> read_thermal_counts(const std::filesystem::path& path);
 
+/// CV_32FC1; invalid_k where a count is 0 or means no temperature (0 K or less). Reduce the result,
+/// not the counts: their mean with a dead pixel is a temperature that nobody saw.
+cv::Mat kelvin_of_counts(const ThermalCounts& counts);
+
 }  // namespace orbitfuse

@@ -39,6 +39,10 @@ Status AravisOptions::validate() const {
   }
   if (nuc_settle.count() < 0)
     return fail(ErrorKind::usage, "aravis.nuc_settle", "negative", "must be >= 0");
+  if (patience.count() <= 0 || most_patience < patience) {
+    return fail(ErrorKind::usage, "aravis.patience", fmt::format("{} ms", patience.count()),
+                "must be > 0 and <= most_patience");
+  }
   return {};
 }
 

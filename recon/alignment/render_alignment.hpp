@@ -41,7 +41,9 @@ struct RenderAlignmentOptions {
 struct RenderAlignedView {
   PosedView view;
   double agreement = 0;  ///< mean, of rendered edges with the image's, as the last round found them
-  int matches = 0;       ///< patches within 2 px of that round's answer
+  /// Patches within 2 px of that round's answer, across the edges that they hold: along one they
+  /// may be off by more. Finer renders have more of them.
+  int matches = 0;
   double median_px = 0;  ///< their residual, in pixels of the last round
   ViewVerdict verdict;
   /// Patches that other views of its modality show where its pose has them; none where nobody was

@@ -12,9 +12,6 @@
 namespace orbitfuse {
 namespace {
 
-/// Below it a ray met too little of the field for its value to be a surface's.
-constexpr float least_opacity = 0.5F;
-
 struct RenderedOrbit {
   std::vector<SurfaceView> depths;
   std::vector<PaintView> pictures;
@@ -23,12 +20,15 @@ struct RenderedOrbit {
 /// A field as its own cameras see it, in the world.
 Result<RenderedOrbit> rendered(const nerf::Field& field, const std::vector<PosedView>& views,
                                const Similarity3d& world_from_field, int width_px,
-                               const Progress& progress) {
+                               double min_opacity, const Progress& progress) {
   RenderedOrbit result;
   for (const PosedView& posed : views) {
     ORBITFUSE_TRY(progress.check("export"));
-    progress.report({"export", static_cast<double>(result.depths.size()),
-                     static_cast<double>(views.size()), -1, posed.name});
+    progress.report({"export",
+                     static_cast<double>(result.depths.size()),
+                     static_cast<double>(views.size()),
+                     {},
+                     posed.name});
     const Camera& camera = posed.camera;
     const int width = std::min(camera.width, width_px);
     const int height = std::max(2, static_cast<int>(std::lround(static_cast<double>(camera.height) *
@@ -40,7 +40,7 @@ Result<RenderedOrbit> rendered(const nerf::Field& field, const std::vector<Posed
         nerf::render(field, view.camera, rebase(view.cam_from_world, world_from_field.inverse()),
                      {}, progress));
     seen.color.setTo(cv::Scalar::all(std::numeric_limits<double>::quiet_NaN()),
-                     seen.opacity < least_opacity);
+                     seen.opacity < min_opacity);
     result.depths.push_back({view, seen.depth * world_from_field.scale});
     result.pictures.push_back({std::move(view), seen.color});
   }
@@ -94,6 +94,7 @@ Status FieldSurfaceOptions::validate() const {
   const OptionCheck check("export");
   ORBITFUSE_TRY(check("visible_width_px", visible_width_px, from_to(16, 8192)));
   ORBITFUSE_TRY(check("thermal_width_px", thermal_width_px, from_to(16, 8192)));
+  ORBITFUSE_TRY(check("min_opacity", min_opacity, from_to(0.0, 1.0)));
   return surface.validate();
 }
 
@@ -116,12 +117,12 @@ Result<FieldSurface> field_surface(const SurfaceFields& fields, const Eigen::Ali
   RenderedOrbit visible, thermal;
   if (has_visible) {
     ORBITFUSE_ASSIGN(visible, rendered(*fields.visible, fields.visible_views, {},
-                                       options.visible_width_px, progress));
+                                       options.visible_width_px, options.min_opacity, progress));
   }
   if (has_thermal) {
     ORBITFUSE_ASSIGN(thermal,
                      rendered(*fields.thermal, fields.thermal_views, fields.world_from_thermal,
-                              options.thermal_width_px, progress));
+                              options.thermal_width_px, options.min_opacity, progress));
   }
   ORBITFUSE_ASSIGN(const TriangleMesh fused, fuse_depth((has_visible ? visible : thermal).depths,
                                                         box, options.surface, progress));

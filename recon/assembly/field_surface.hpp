@@ -28,6 +28,7 @@ struct FieldSurfaceOptions {
   SurfaceOptions surface;
   /// Of the pictures and depth maps that fields render: about a voxel a pixel.
   int visible_width_px = 400, thermal_width_px = 320;
+  double min_opacity = 0.5;  ///< below it a ray met too little for its value to be a surface's
   bool depth_noise = false;  ///< FieldSurface::depth_noise is wanted
   Status validate() const;
 };

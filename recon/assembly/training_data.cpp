@@ -7,6 +7,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "core/geometry/narrowed.hpp"
 #include "core/image/image_io.hpp"
 #include "core/system/parallel.hpp"
 #include "core/system/trace.hpp"
@@ -53,14 +54,8 @@ Result<nerf::Dataset> training_data(const std::filesystem::path& folder,
       return;
     }
     nerf::TrainingView full{view.name, view.camera, view.cam_from_world, *image};
-    if (view.camera.width <= max_width_px) {
-      data.views[k] = std::move(full);
-    } else {
-      const double scale = static_cast<double>(max_width_px) / view.camera.width;
-      data.views[k] =
-          nerf::resized(full, max_width_px,
-                        std::max(1, static_cast<int>(std::lround(scale * view.camera.height))));
-    }
+    const Camera narrowed = narrowed_to(view.camera, max_width_px);
+    data.views[k] = nerf::resized(full, narrowed.width, narrowed.height);
   });
   ORBITFUSE_TRY(progress.check("train"));
   for (const Status& problem : problems) ORBITFUSE_TRY(problem);

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/geometry/lens_fold.hpp"
+
 namespace orbitfuse::measurement {
 namespace {
 
@@ -27,13 +29,6 @@ double bilinear(const cv::Mat& image, const Eigen::Vector2d& pixel) {
 bool inside(const Eigen::Vector2d& pixel, const Camera& camera) {
   return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() <= camera.width &&
          pixel.y() <= camera.height;
-}
-
-/// A lens model turns back beyond its field of view: points far outside land inside.
-bool lens_holds(const Camera& camera, const Eigen::Vector2d& pixel, const Eigen::Vector3d& in_cam) {
-  if (!camera.has_distortion()) return true;
-  const Eigen::Vector2d back = camera.normalized_of(pixel);
-  return (back - in_cam.head<2>() / in_cam.z()).norm() < 1e-3;
 }
 
 /// RMS change of temperature over a step of `reach` pixels, a pixel.
@@ -89,8 +84,7 @@ Result<std::optional<FrameReading>> read_frame(const ThermalScene& scene, std::s
     why = Hidden::behind_camera;
     return std::nullopt;
   }
-  if (!reading.pixel.allFinite() || !inside(reading.pixel, camera) ||
-      !lens_holds(camera, reading.pixel, in_cam)) {
+  if (!reading.pixel.allFinite() || !inside(reading.pixel, camera) || !lens_holds(camera, in_cam)) {
     why = Hidden::outside_picture;
     return std::nullopt;
   }

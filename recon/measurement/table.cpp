@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "core/formats/csv.hpp"
 #include "core/temperature.hpp"
 
 namespace orbitfuse::measurement {
@@ -14,13 +15,6 @@ std::string number(double value, int digits = 3) {
   return std::isfinite(value) ? fmt::format("{:.{}f}", value, digits) : "";
 }
 std::string celsius(double kelvin) { return number(celsius_from_kelvin(kelvin)); }
-
-std::string quoted(const std::string& text) {
-  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
-  std::string out = "\"";
-  for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return out + "\"";
-}
 
 struct Row {
   std::string name, kind;
@@ -36,18 +30,18 @@ std::string line(const Row& row) {
   const TemperatureReading& r = row.reading != nullptr ? *row.reading : none;
   const FrameLine* best = r.best();
   const auto at = [&](int i) { return row.position ? number((*row.position)[i], 5) : ""; };
-  return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
-                     quoted(row.name), row.kind, celsius(r.temperature_k), number(r.uncertainty_k),
-                     celsius(r.field_k), celsius(r.mean_k), celsius(r.min_k), celsius(r.max_k),
-                     number(r.standard_deviation_k), number(r.spread_k),
-                     row.reading != nullptr ? fmt::format("{}", r.frames.size()) : "",
-                     number(r.angle_deg, 1), at(0), at(1), at(2), number(row.along, 5),
-                     number(row.distance, 5), number(row.distance_m, 4), number(row.difference_k),
-                     number(row.difference_uncertainty_k),
-                     best != nullptr ? quoted(best->frame) : "",
-                     number(best != nullptr ? best->pixel.x() : unknown, 1),
-                     number(best != nullptr ? best->pixel.y() : unknown, 1), number(row.emissivity),
-                     quoted(row.note));
+  return fmt::format(
+      "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+      csv_text(row.name), row.kind, celsius(r.temperature_k), number(r.uncertainty_k),
+      celsius(r.field_k), celsius(r.mean_k), celsius(r.min_k), celsius(r.max_k),
+      number(r.standard_deviation_k), number(r.spread_k),
+      row.reading != nullptr ? fmt::format("{}", r.frames.size()) : "", number(r.angle_deg, 1),
+      at(0), at(1), at(2), number(row.along, 5), number(row.distance, 5), number(row.distance_m, 4),
+      number(row.difference_k), number(row.difference_uncertainty_k),
+      best != nullptr ? csv_text(best->frame) : "",
+      number(best != nullptr ? best->pixel.x() : unknown, 1),
+      number(best != nullptr ? best->pixel.y() : unknown, 1), number(row.emissivity),
+      csv_text(row.note));
 }
 
 std::string joined(const std::vector<std::string>& notes) {

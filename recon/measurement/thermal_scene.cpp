@@ -9,6 +9,7 @@
 #include <limits>
 #include <mutex>
 
+#include "core/geometry/narrowed.hpp"
 #include "core/near_word.hpp"
 #include "recon/assembly/new_views.hpp"
 
@@ -154,11 +155,7 @@ Result<cv::Mat> ThermalScene::image(std::size_t frame) const {
 }
 
 Camera ThermalScene::reduced_camera(std::size_t frame) const {
-  const Camera& camera = parts_.frames[frame].view.camera;
-  if (camera.width <= options_.depth_width_px) return camera;
-  const int height =
-      static_cast<int>(std::lround(1.0 * camera.height * options_.depth_width_px / camera.width));
-  return camera.scaled_to(options_.depth_width_px, std::max(1, height));
+  return narrowed_to(parts_.frames[frame].view.camera, options_.depth_width_px);
 }
 
 Result<FieldView> ThermalScene::seen(std::size_t frame, const Progress& progress) const {

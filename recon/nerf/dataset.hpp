@@ -48,6 +48,10 @@ struct Dataset {
 /// 8-bit BGR (image_io) to the layout TrainingView wants, resized by area averaging if asked.
 cv::Mat rgb_of_bgr8(const cv::Mat& bgr8, cv::Size size = {});
 
+/// A visible frame (as TrainingView::image) brought to the common exposure as training does:
+/// divided by its gains, R, G, B; NaN where the camera clipped what that exposure would have shown.
+void even_out(cv::Mat& image, const Eigen::Array3d& gain);
+
 /// The view at another size: area-averaged image and matching camera.
 TrainingView resized(const TrainingView& view, int width, int height);
 

@@ -21,10 +21,6 @@ struct DetailSource {
   std::function<Result<cv::Mat>()> image;
 };
 
-/// A visible frame (as TrainingView::image) brought to the common exposure as training does:
-/// divided by its gains, R, G, B; NaN where the camera clipped what that exposure would have shown.
-void even_out(cv::Mat& image, const Eigen::Array3d& gain);
-
 struct DetailOptions {
   /// Recorded views that lend a new view their detail, the nearest by direction; 0 = none. More
   /// than three gain nothing where views stand 30 degrees apart.
@@ -63,9 +59,8 @@ class PhotoDetail {
   static Result<PhotoDetail> of(std::vector<DetailSource> sources, const DetailOptions& options);
 
   bool empty() const { return sources_.empty(); }
-  /// Of `count` sources spread evenly over all; of all where there are fewer.
-  std::vector<std::string> spread_names(std::size_t count) const;
-  bool has(const std::string& name) const;
+  /// Of the sources' views, in their order.
+  std::vector<std::string> names() const;
 
   /// Adds to `seen`, which `field` rendered from there; depth and opacity stay. The source called
   /// `except` lends nothing: a recorded view is compared with what the others know. Returns the

@@ -145,6 +145,7 @@ TEST(Examples, HottestKelvinOfARadiometricJpeg) {
   const PlanckConstants planck{21106.77, 0.012545258, 1501, 1, -7340};
   cv::Mat counts(60, 80, CV_16UC1, cv::Scalar(13000));
   counts.at<std::uint16_t>(20, 30) = 16000;
+  counts.at<std::uint16_t>(0, 0) = 65535;  // "that or more": no temperature
   std::ofstream(folder / "photo.jpg", std::ios::binary) << test::flir_jpeg_file(counts, planck);
   const Outcome outcome = run("examples/04_import_radiometric_jpeg", {folder / "photo.jpg"});
   ASSERT_EQ(outcome.status, 0) << outcome.output;

@@ -36,7 +36,7 @@ void composite_backward(int count, const T* dt, const T* weights, const T* trans
 /// Distortion loss (Mip-NeRF 360, eq. 15): sum_ij w_i w_j |s_i - s_j| + 1/3 sum_i w_i^2 ds_i in
 /// O(n); adds scale * gradient to dweights and returns the loss.
 template <class T>
-T distortion(int count, const T* weights, const T* s, const T* ds, T scale, T* dweights) {
+T distortion_loss(int count, const T* weights, const T* s, const T* ds, T scale, T* dweights) {
   T total_w = 0, total_ws = 0;
   for (int i = 0; i < count; ++i) {
     total_w += weights[i];

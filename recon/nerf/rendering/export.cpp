@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <unordered_set>
 
+#include "core/geometry/narrowed.hpp"
 #include "core/option_range.hpp"
 #include "core/system/parallel.hpp"
 #include "core/system/trace.hpp"
@@ -117,13 +118,9 @@ Result<PointCloud> export_point_cloud(const Field& field, const std::vector<Pose
   std::vector<DepthView> rendered;
   for (const PosedView& view : views) {
     ORBITFUSE_TRY(progress.check("export"));
-    const int width = std::min(view.camera.width, options.max_width);
-    const int height =
-        std::max(1, static_cast<int>(std::lround(static_cast<double>(view.camera.height) * width /
-                                                 view.camera.width)));
     DepthView out;
     out.view = view;
-    out.view.camera = view.camera.scaled_to(width, height).without_distortion();
+    out.view.camera = narrowed_to(view.camera, options.max_width).without_distortion();
     ORBITFUSE_ASSIGN(out.image, render(field, out.view.camera, view.cam_from_world,
                                        {.alike = options.alike}, progress));
     rendered.push_back(std::move(out));

@@ -12,6 +12,8 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "core/geometry/lens_fold.hpp"
+#include "core/geometry/narrowed.hpp"
 #include "core/numeric/median.hpp"
 #include "core/option_range.hpp"
 #include "core/system/parallel.hpp"
@@ -97,20 +99,6 @@ cv::Mat confidence_of(const cv::Mat& difference, const cv::Mat& known, cv::Size 
   return result;
 }
 
-/// Squared distance from the axis (normalised) beyond which a bent lens folds points back into the
-/// picture.
-double fold_of(const Camera& camera) {
-  constexpr double none = std::numeric_limits<double>::infinity();
-  // The first zero of the radius' derivative, 1 + 3 k1 r^2 + 5 k2 r^4.
-  const double a = 5 * camera.k2, b = 3 * camera.k1, inside = b * b - 4 * a;
-  if (a == 0) return b < 0 ? -1 / b : none;
-  if (inside < 0) return none;
-  double first = none;
-  for (const double root : {(-b + std::sqrt(inside)) / (2 * a), (-b - std::sqrt(inside)) / (2 * a)})
-    if (root > 0) first = std::min(first, root);
-  return first;
-}
-
 /// The middle of what a view sees; none where it sees nothing.
 std::optional<Eigen::Vector3d> looked_at(const Camera& camera, const Rigid3d& world_from_cam,
                                          const cv::Mat& depth) {
@@ -156,9 +144,7 @@ Result<PhotoDetail> PhotoDetail::of(std::vector<DetailSource> sources,
 }
 
 Camera PhotoDetail::base_of(const Camera& full) const {
-  const int width = std::min(options_.base_width_px, full.width);
-  const double height = static_cast<double>(width) * full.height / full.width;
-  return full.scaled_to(width, std::max(1, static_cast<int>(std::lround(height))));
+  return narrowed_to(full, options_.base_width_px);
 }
 
 /// Renders the field where the source stands, and keeps what the source shows beyond that.
@@ -185,9 +171,10 @@ Status PhotoDetail::prepare(const Field& field, const Progress& progress, Source
   return {};
 }
 
-bool PhotoDetail::has(const std::string& name) const {
-  return std::any_of(sources_.begin(), sources_.end(),
-                     [&](const Source& source) { return source.recorded.view.name == name; });
+std::vector<std::string> PhotoDetail::names() const {
+  std::vector<std::string> names;
+  for (const Source& source : sources_) names.push_back(source.recorded.view.name);
+  return names;
 }
 
 std::size_t PhotoDetail::Source::bytes() const {
@@ -209,22 +196,13 @@ void PhotoDetail::forget_old(const std::vector<Source*>& needed) {
   }
 }
 
-std::vector<std::string> PhotoDetail::spread_names(std::size_t count) const {
-  count = std::min(count, sources_.size());
-  std::vector<std::string> names;
-  for (std::size_t i = 0; i < count; ++i)
-    names.push_back(sources_[i * sources_.size() / count].recorded.view.name);
-  return names;
-}
-
 std::vector<PhotoDetail::Source*> PhotoDetail::nearest(const Eigen::Vector3d& from,
                                                        const Eigen::Vector3d& looked_at,
                                                        const std::string& except) {
   const Eigen::Vector3d direction = (from - looked_at).normalized();
   std::vector<std::pair<double, Source*>> ranked;
   for (Source& source : sources_) {
-    const Eigen::Vector3d other =
-        source.recorded.view.cam_from_world.inverse().translation - looked_at;
+    const Eigen::Vector3d other = camera_center(source.recorded.view.cam_from_world) - looked_at;
     const double cosine = other.normalized().dot(direction);
     const bool twin = !except.empty() && cosine > twin_cosine;
     if (source.recorded.view.name != except && !twin && cosine > 0)
@@ -247,7 +225,7 @@ class PhotoDetail::NewView {
     for (const Source* source : sources) {
       const PosedView& view = source->recorded.view;
       asked_.push_back(
-          {*source, view.camera, view.cam_from_world, view.cam_from_world.inverse().translation,
+          {*source, view.camera, view.cam_from_world, camera_center(view.cam_from_world),
            static_cast<double>(source->depth.cols) / view.camera.width,
            static_cast<double>(source->depth.rows) / view.camera.height, fold_of(view.camera)});
     }

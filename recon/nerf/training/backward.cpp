@@ -140,8 +140,8 @@ void backward(const FieldState& field, const Kernels& kernels, const LossSetting
     const auto at = static_cast<std::size_t>(begin);
     if (settings.distortion_weight > 0)
       gradients.distortion +=
-          distortion(used, &b.weight[at], &b.s[at], &b.ds[at],
-                     settings.distortion_weight * settings.per_ray, &b.dweight[at]);
+          distortion_loss(used, &b.weight[at], &b.s[at], &b.ds[at],
+                          settings.distortion_weight * settings.per_ray, &b.dweight[at]);
     if (target.distance > 0 && target.depth_weight > 0)
       gradients.depth += depth_loss(target, used, &b.t[at], &b.dt[at], &b.weight[at],
                                     settings.per_ray, &b.dweight[at]);

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 
+#include "core/geometry/lens_fold.hpp"
 #include "core/numeric/median.hpp"
 
 namespace orbitfuse::nerf {
@@ -50,7 +51,8 @@ bool sample_at(const cv::Mat& image, const Eigen::Vector2d& pixel, Eigen::Array3
 
 bool seen_from(const TrainingView& view, const Eigen::Vector3d& world, Eigen::Array3f& log_value) {
   const Eigen::Vector3d p = view.cam_from_world * world;
-  return p.z() > 0 && sample_at(view.image, view.camera.project(p), log_value);
+  return p.z() > 0 && lens_holds(view.camera, p) &&
+         sample_at(view.image, view.camera.project(p), log_value);
 }
 
 Sights sights_of_tracks(const Dataset& data, const std::vector<bool>& heldout) {

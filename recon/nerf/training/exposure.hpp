@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "recon/nerf/dataset.hpp"
-#include "recon/nerf/photo_detail.hpp"
 #include "recon/nerf/training/scene.hpp"
 
 namespace orbitfuse::nerf {

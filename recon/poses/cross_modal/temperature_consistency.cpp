@@ -23,7 +23,7 @@ constexpr double settled_share = 0.6;
 /// Of their loop's median support in the visible scene: views that form alone may vouch for.
 constexpr double vouched_share = 0.6;
 /// The same, of views that both scenes leave where they are.
-constexpr double confirmed_share = 0.4;
+constexpr double kept_share = 0.4;
 /// Of the views' median correlation with what the others paint at their places; a view with less is
 /// searched again. A wrong view of `sedan` had .56 of .96, right ones .84 and more unless a wrong
 /// neighbour painted.
@@ -39,8 +39,8 @@ constexpr std::size_t least_painters = 3;
 constexpr double least_support = 1e-9;
 
 /// Whether the place found among the temperatures of settled views confirms the view's.
-ViewVerdict confirmed(const OrbitViews& orbit, const RenderAlignedView& view,
-                      const RenderAlignedView& second, double median_supports) {
+ViewVerdict in_settled_scene(const OrbitViews& orbit, const RenderAlignedView& view,
+                             const RenderAlignedView& second, double median_supports) {
   if (!(share_of_median(second.support(), median_supports) > found_share))
     return {Confidence::dropped, DoubtReason::not_found,
             "its edges are not found among the stations' temperatures"};
@@ -83,7 +83,8 @@ Result<std::vector<std::size_t>> unconfirmed(const OrbitRefinement& visible,
   if (median_of_loop.empty()) median_of_loop = median_supports(orbit, asked, second);
   const auto verdict_of = [&](std::size_t view, const RenderAlignedView& by_form,
                               const RenderAlignedView& by_temperatures) {
-    return confirmed(orbit, by_form, by_temperatures, median_of_loop.at(orbit.stations[view].loop));
+    return in_settled_scene(orbit, by_form, by_temperatures,
+                            median_of_loop.at(orbit.stations[view].loop));
   };
   std::vector<std::size_t> doubtful, still;
   std::vector<RenderAlignedView> seconds;
@@ -210,7 +211,7 @@ Result<SceneRenderer> painted_by_others(const OrbitRefinement& refinement, const
   return painted_by(refinement, alignment, chosen, own_turn_deg);
 }
 
-MoveDecision verdict(const PlaceEvidence& seen) {
+MoveDecision who_places(const PlaceEvidence& seen) {
   const bool found = seen.temperatures_there > settled_share;
   // Two scenes that show nothing of the view agree as easily as two that do: one must know it
   // there.
@@ -221,8 +222,8 @@ MoveDecision verdict(const PlaceEvidence& seen) {
   if (seen.agree && seen.temperatures_there > found_share && seen.form_there > vouched_share)
     return MoveDecision::both;
   // Searched as a whole and found where it was: a weak view, but not a wrong one.
-  if (seen.agree && seen.stays && seen.temperatures_there > confirmed_share &&
-      seen.form_before > confirmed_share)
+  if (seen.agree && seen.stays && seen.temperatures_there > kept_share &&
+      seen.form_before > kept_share)
     return MoveDecision::both;
   // Temperatures know more edges: where they are sure, form alone doesn't pull a view away.
   if (!seen.agree && found) return MoveDecision::temperatures_alone;
@@ -285,7 +286,7 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
                      view.view.name, seen.temperatures_there, seen.form_there, seen.form_before,
                      apart_deg(orbit, view.view.cam_from_world, warm.view.cam_from_world),
                      seen.agree ? "they agree" : "they differ")});
-    switch (verdict(seen)) {
+    switch (who_places(seen)) {
       case MoveDecision::both:
         // Temperatures moved it to where form settles too, but form knew it better before: two
         // opinions that agree on the place and not on which is the better one.

@@ -25,7 +25,7 @@ struct PlaceEvidence {
 /// Whose word places the view. It only moves to a place that temperatures find or
 /// that form knows well enough to vouch for.
 enum class MoveDecision { both, temperatures_alone, form_alone, nobody };
-MoveDecision verdict(const PlaceEvidence& seen);
+MoveDecision who_places(const PlaceEvidence& seen);
 
 /// Of its loop's median support; 0 where the loop has none: shares of nothing say nothing.
 double share_of_median(double support, double median);

@@ -17,7 +17,7 @@ namespace orbitfuse {
 namespace {
 
 /// Views with less than this share of the median support are tried at other elevations.
-constexpr double doubtful_share = 0.85, nudge_deg = 2;
+constexpr double nudged_below_share = 0.85, nudge_deg = 2;
 /// Views with less than this share are searched as wholes.
 constexpr double lost_share = 0.6;
 
@@ -69,8 +69,9 @@ Result<std::vector<std::size_t>> unsettled(const OrbitRefinement& refinement, Fi
   ORBITFUSE_ASSIGN(const Fit judged, refinement.restart(lost, places, {judging_rounds().back()}));
   keep_better(lost, judged, alignment);
   // A restart that found good support is no longer lost.
-  std::erase_if(
-      lost, [&](std::size_t i) { return alignment.views[i].support() > doubtful_share * typical; });
+  std::erase_if(lost, [&](std::size_t i) {
+    return alignment.views[i].support() > nudged_below_share * typical;
+  });
   return lost;
 }
 
@@ -91,7 +92,7 @@ Result<bool> nudge(const OrbitRefinement& refinement, std::size_t first, Fit& al
   for (const double elevation_deg : {nudge_deg, -nudge_deg}) {
     std::vector<std::size_t> weak;
     for (std::size_t i = first; i < alignment.views.size(); ++i)
-      if (alignment.views[i].support() < doubtful_share * typical) weak.push_back(i);
+      if (alignment.views[i].support() < nudged_below_share * typical) weak.push_back(i);
     for (int pass = 0; pass < 2 && !weak.empty(); ++pass) {
       std::vector<PosedView> starts;
       for (const std::size_t i : weak) {

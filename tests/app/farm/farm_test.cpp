@@ -72,7 +72,7 @@ TEST_F(FarmTest, OneSessionsFailureIsNamedAndStopsNoOther) {
   EXPECT_EQ(outcome("b", "second").state, JobState::waiting);
 
   const auto rows = look_at_sessions(out, plan);
-  EXPECT_THAT(to_csv(rows), HasSubstr("\"b\",failed,first,\"visible/003.png: cut off\",0,1,"));
+  EXPECT_THAT(to_csv(rows), HasSubstr("b,failed,first,visible/003.png: cut off,0,1,"));
   EXPECT_THAT(to_html(rows, plan), HasSubstr("2 done, 1 failed"));
 }
 

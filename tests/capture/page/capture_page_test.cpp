@@ -285,6 +285,19 @@ TEST_F(PageTest, PreviewsAndTemperatures) {
   EXPECT_EQ(client().Get("/preview/../state")->status, 404);
 }
 
+TEST_F(PageTest, DeadPixelsOfAReducedPreviewAreNoTemperatures) {
+  cv::Mat counts(960, 1280, CV_16UC1, cv::Scalar(30000));
+  counts.col(1) = 0;  // reduced by half, its mean with column 0 would be 150 K
+  thermal = LatestFrame{Modality::thermal, counts, "t"};
+  serve({});
+  const auto picture = client().Get("/preview/thermal?palette=white-hot&low=280&high=310");
+  ASSERT_EQ(picture->status, 200);
+  const cv::Mat shown = *decode_image(picture->body, "preview");
+  ASSERT_EQ(shown.cols, 640);
+  for (int x = 0; x < 8; ++x)
+    EXPECT_NEAR(shown.at<cv::Vec3b>(20, x)[0], shown.at<cv::Vec3b>(20, 300)[0], 6) << x;
+}
+
 TEST_F(PageTest, TenViewersAreServed) {
   visible =
       LatestFrame{Modality::visible, cv::Mat(300, 400, CV_8UC3, cv::Scalar(10, 200, 30)), "a"};

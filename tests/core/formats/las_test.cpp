@@ -13,7 +13,11 @@ namespace orbitfuse {
 namespace {
 namespace fs = std::filesystem;
 
-fs::path las_file() { return fs::path(::testing::TempDir()) / "orbitfuse_las_test.las"; }
+/// A test's own: ctest runs them side by side.
+fs::path las_file() {
+  const std::string test = ::testing::UnitTest::GetInstance()->current_test_info()->name();
+  return fs::path(::testing::TempDir()) / ("orbitfuse_" + test + ".las");
+}
 
 template <class T>
 T at(const std::string& bytes, std::size_t offset) {

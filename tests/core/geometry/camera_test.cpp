@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
+#include "core/geometry/lens_fold.hpp"
+
 namespace orbitfuse {
 namespace {
 
@@ -61,6 +65,26 @@ TEST(Camera, ScalingKeepsRays) {
   const Camera c = Camera::from_fov(800, 600, 58);
   const Camera half = c.scaled_to(400, 300);
   EXPECT_LT((c.ray_of({200, 100}) - half.ray_of({100, 50})).norm(), 1e-12);
+}
+
+TEST(LensFold, PointsThatTheModelBringsBackAreNotSeen) {
+  Camera camera = Camera::from_fov(640, 480, 60);
+  EXPECT_TRUE(lens_holds(camera, {50, 0, 1})) << "a straight lens never turns back";
+  camera.k1 = -0.2;
+  const double fold = std::sqrt(fold_of(camera));
+  EXPECT_NEAR(fold, std::sqrt(1 / 0.6), 1e-12);
+  const auto radius = [&](double r) { return camera.project({r, 0, 1}).x(); };
+  EXPECT_GT(radius(fold), radius(fold - 0.01));
+  EXPECT_GT(radius(fold), radius(fold + 0.01));
+  const Eigen::Vector3d far_out(2.2, 0.1, 1);  // 66 degrees off the axis, in a view of 30
+  const Eigen::Vector2d pixel = camera.project(far_out);
+  ASSERT_TRUE(pixel.x() > 0 && pixel.x() < 640 && pixel.y() > 0 && pixel.y() < 480);
+  EXPECT_FALSE(lens_holds(camera, far_out));
+  EXPECT_TRUE(lens_holds(camera, {0.5, 0.3, 1}));
+  camera.k2 = 0.01;  // turns back, and out again: the first turn counts
+  EXPECT_NEAR(fold_of(camera), 2.0, 1e-12);
+  camera.k2 = 1;
+  EXPECT_TRUE(std::isinf(fold_of(camera)));
 }
 
 }  // namespace

@@ -78,8 +78,8 @@ TEST(Distortion, IsTheDoubleSumOfEquation15AndItsGradient) {
     return sum;
   };
   std::vector<double> gradient(n);
-  EXPECT_NEAR(distortion<double>(n, w.data(), s.data(), ds.data(), 1.0, gradient.data()), naive(),
-              1e-12);
+  EXPECT_NEAR(distortion_loss<double>(n, w.data(), s.data(), ds.data(), 1.0, gradient.data()),
+              naive(), 1e-12);
   for (std::size_t i = 0; i < n; ++i) {
     const double kept = w[i], h = 1e-6;
     w[i] = kept + h;

@@ -133,31 +133,31 @@ TEST(CorrectByTemperatures, AViewOnTheWrongRibGoesHomeAndTheOthersStay) {
 
 TEST(CorrectByTemperatures, OnlyTemperaturesThatFindAViewMoveIt) {
   // Found there: it goes, with form or without.
-  EXPECT_EQ(verdict({true, 0.8, 0.9, 1.0}), MoveDecision::both);
-  EXPECT_EQ(verdict({false, 0.8, 0.3, 1.0}), MoveDecision::temperatures_alone);
+  EXPECT_EQ(who_places({true, 0.8, 0.9, 1.0}), MoveDecision::both);
+  EXPECT_EQ(who_places({false, 0.8, 0.3, 1.0}), MoveDecision::temperatures_alone);
   // Weakly, but form likes it better there too.
-  EXPECT_EQ(verdict({true, 0.3, 0.9, 0.5}), MoveDecision::both);
+  EXPECT_EQ(who_places({true, 0.3, 0.9, 0.5}), MoveDecision::both);
   // Neither scene knows it there: agreeing on nothing moves nobody.
-  EXPECT_EQ(verdict({true, 0, 0, 0}), MoveDecision::nobody);
-  EXPECT_EQ(verdict({true, 0.03, 0.05, 0.04}), MoveDecision::nobody);
-  EXPECT_EQ(verdict({true, 0.3, 0.59, 0.5}), MoveDecision::nobody);
-  EXPECT_EQ(verdict({true, 0.3, 0.61, 0.5}), MoveDecision::both);
+  EXPECT_EQ(who_places({true, 0, 0, 0}), MoveDecision::nobody);
+  EXPECT_EQ(who_places({true, 0.03, 0.05, 0.04}), MoveDecision::nobody);
+  EXPECT_EQ(who_places({true, 0.3, 0.59, 0.5}), MoveDecision::nobody);
+  EXPECT_EQ(who_places({true, 0.3, 0.61, 0.5}), MoveDecision::both);
   // Searched as a whole and found where it was: weak, but nothing speaks against it.
-  EXPECT_EQ(verdict({true, 0.51, 0.50, 0.47, true}), MoveDecision::both);
-  EXPECT_EQ(verdict({true, 0.51, 0.50, 0.47, false}), MoveDecision::nobody);
-  EXPECT_EQ(verdict({true, 0.2, 0.50, 0.47, true}), MoveDecision::nobody);
+  EXPECT_EQ(who_places({true, 0.51, 0.50, 0.47, true}), MoveDecision::both);
+  EXPECT_EQ(who_places({true, 0.51, 0.50, 0.47, false}), MoveDecision::nobody);
+  EXPECT_EQ(who_places({true, 0.2, 0.50, 0.47, true}), MoveDecision::nobody);
   // Found nowhere; that both scenes agree on a place where neither knows it says nothing.
-  EXPECT_EQ(verdict({true, 0.03, 0.2, 0.7}), MoveDecision::form_alone);
-  EXPECT_EQ(verdict({false, 0.03, 0.2, 0.7}), MoveDecision::form_alone);
+  EXPECT_EQ(who_places({true, 0.03, 0.2, 0.7}), MoveDecision::form_alone);
+  EXPECT_EQ(who_places({false, 0.03, 0.2, 0.7}), MoveDecision::form_alone);
   // Half found elsewhere: the place that form knows better stays, in doubt.
-  EXPECT_EQ(verdict({false, 0.55, 0.2, 0.7}), MoveDecision::form_alone);
-  EXPECT_EQ(verdict({true, 0.58, 0.51, 0.92}), MoveDecision::form_alone);
+  EXPECT_EQ(who_places({false, 0.55, 0.2, 0.7}), MoveDecision::form_alone);
+  EXPECT_EQ(who_places({true, 0.58, 0.51, 0.92}), MoveDecision::form_alone);
   // Half found elsewhere where form knows it better, or known to neither: nobody's word.
-  EXPECT_EQ(verdict({false, 0.55, 0.8, 0.7}), MoveDecision::nobody);
-  EXPECT_EQ(verdict({false, 0.1, 0.2, 0.4}), MoveDecision::nobody);
-  EXPECT_EQ(verdict({}), MoveDecision::nobody);
+  EXPECT_EQ(who_places({false, 0.55, 0.8, 0.7}), MoveDecision::nobody);
+  EXPECT_EQ(who_places({false, 0.1, 0.2, 0.4}), MoveDecision::nobody);
+  EXPECT_EQ(who_places({}), MoveDecision::nobody);
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(verdict({false, nan, nan, nan}), MoveDecision::nobody);
+  EXPECT_EQ(who_places({false, nan, nan, nan}), MoveDecision::nobody);
 }
 
 TEST(CorrectByTemperatures, SharesOfNothingSayNothing) {
