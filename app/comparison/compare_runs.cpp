@@ -8,6 +8,7 @@
 
 #include "app/export/surface_files.hpp"
 #include "app/stages/measurement_scene.hpp"
+#include "core/geometry/narrowed.hpp"
 #include "core/image/image_io.hpp"
 #include "core/image/undistorted.hpp"
 #include "recon/assembly/field_renderer.hpp"
@@ -52,11 +53,7 @@ std::vector<PosedView> small_views(const view::FinishedRun& run) {
   std::vector<PosedView> views;
   for (const view::RecordedView& v : run.views) {
     if (v.modality != Modality::visible) continue;
-    const Camera& c = v.view.camera;
-    const int width = std::min(map_width_px, c.width);
-    views.push_back({v.view.name,
-                     c.scaled_to(width, std::max(2, c.height * width / std::max(1, c.width)))
-                         .without_distortion(),
+    views.push_back({v.view.name, narrowed_to(v.view.camera, map_width_px).without_distortion(),
                      v.view.cam_from_world});
   }
   return views;

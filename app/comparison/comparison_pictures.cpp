@@ -7,6 +7,7 @@
 
 #include "app/stages/rendered_views.hpp"
 #include "core/geometry/kd_tree.hpp"
+#include "core/geometry/narrowed.hpp"
 #include "core/image/image_io.hpp"
 #include "core/image/undistorted.hpp"
 #include "recon/surface/surface.hpp"
@@ -19,9 +20,7 @@ constexpr int width_px = 560;
 constexpr std::size_t most_views = 4;
 
 Camera picture_camera(const Camera& camera) {
-  const int width = std::min(width_px, camera.width);
-  return camera.scaled_to(width, std::max(2, camera.height * width / std::max(1, camera.width)))
-      .without_distortion();
+  return narrowed_to(camera, width_px).without_distortion();
 }
 
 Result<cv::Mat> photo_of(const ComparedRuns& runs, const PosedView& posed, const Camera& camera) {

@@ -14,6 +14,7 @@
 #include "app/stages/recorded_detail.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
+#include "core/geometry/narrowed.hpp"
 #include "core/geometry/pose_error.hpp"
 #include "core/temperature.hpp"
 #include "recon/assembly/training_data.hpp"
@@ -188,9 +189,7 @@ Status add_test_views(Run& run, const Session& session, const GroundTruth& truth
     const TrueTestView& view = truth.test[i];
     progress.report(
         {"eval", static_cast<double>(i), static_cast<double>(truth.test.size()), {}, ""});
-    const int width = std::min(options.max_width_px, view.camera.width);
-    const Camera camera =
-        view.camera.scaled_to(width, view.camera.height * width / view.camera.width);
+    const Camera camera = narrowed_to(view.camera, options.max_width_px);
     const Rigid3d cam_from_visible = rebase(view.cam_from_world, run.truth_from_visible->inverse());
     if (!visible.empty() && !view.visible.empty())
       ORBITFUSE_TRY(compare_visible(visible, view, camera, cam_from_visible, progress, sums));

@@ -15,6 +15,11 @@ namespace {
 constexpr double memory_margin = 1.5, time_margin = 4;
 constexpr double least_memory_mb = 256, least_time_min = 5;
 
+/// Wall seconds on 2 cores, the mean of two sessions (docs/benchmarks/run.md, 2026-11-23).
+const std::map<std::string, double> measured_s = {
+    {"poses_visible", 13}, {"depth", 19},  {"train_visible", 21}, {"poses_thermal", 29},
+    {"train_thermal", 13}, {"render", 17}, {"fuse", 1},           {"metrics", 8}};
+
 }  // namespace
 
 std::map<std::string, StageNeeds> default_needs(const std::vector<std::string>& stages, int cores,
@@ -24,7 +29,9 @@ std::map<std::string, StageNeeds> default_needs(const std::vector<std::string>& 
     StageNeeds& n = needs[stage];
     n.cores = cores;
     n.gpu = on_gpu && (stage.starts_with("train_") || stage == "render");
-    if (stage == "register" || stage == "report") n = {1, 1000, 15, false};
+    if (stage == "register" || stage == "report") n = {1, 1000, 15, false, 1};
+    if (const auto known = measured_s.find(stage); known != measured_s.end())
+      n.usual_s = known->second;
   }
   return needs;
 }
@@ -42,6 +49,7 @@ void learn_needs(const std::filesystem::path& out, const FarmPlan& finished,
     if (wall_s <= 0) continue;
     n.memory_mb = std::max(least_memory_mb, std::ceil(memory_margin * memory_mb));
     n.time_min = std::max(least_time_min, std::ceil(time_margin * wall_s / 60));
+    n.usual_s = wall_s;
   }
 }
 

@@ -6,7 +6,7 @@
 namespace orbitfuse::farm {
 
 /// Before anything was measured here (docs/scaling.md has the measurements): a stage that needs
-/// more is tried again with more.
+/// more is tried again with more, and usual_s of 24 + 24 views only says which stages are short.
 /// `on_gpu`: the run computes on one, so its training and rendering ask for a node that has it.
 std::map<std::string, StageNeeds> default_needs(const std::vector<std::string>& stages, int cores,
                                                 bool on_gpu);

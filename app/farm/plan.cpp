@@ -18,7 +18,8 @@ json to_json(const StageNeeds& needs) {
   return {{"cores", needs.cores},
           {"memory_mb", needs.memory_mb},
           {"time_min", needs.time_min},
-          {"gpu", needs.gpu}};
+          {"gpu", needs.gpu},
+          {"usual_s", needs.usual_s}};
 }
 
 FarmPlan from_json(const json& j) {
@@ -29,13 +30,16 @@ FarmPlan from_json(const json& j) {
   plan.tries = j.at("tries");
   for (const json& s : j.at("sessions")) plan.sessions.push_back({s.at("name"), s.at("folder")});
   for (const auto& [stage, n] : j.at("needs").items())
-    plan.needs[stage] = {n.at("cores"), n.at("memory_mb"), n.at("time_min"), n.at("gpu")};
+    plan.needs[stage] = {n.at("cores"), n.at("memory_mb"), n.at("time_min"), n.at("gpu"),
+                         n.value("usual_s", 0.0)};
   if (!j.contains("slurm")) return plan;
   const json& slurm = j["slurm"];
   plan.on_slurm = true;
-  plan.slurm = {slurm.at("partition"), slurm.at("gpu_partition"), slurm.at("account")};
+  plan.slurm = {slurm.at("partition"), slurm.at("gpu_partition"), slurm.at("account"),
+                slurm.at("least_job_s")};
   for (const json& r : slurm.at("rounds"))
-    plan.rounds.push_back({r.at("first"), r.at("jobs").get<std::vector<std::string>>()});
+    plan.rounds.push_back({r.at("first"), r.at("jobs").get<std::vector<std::string>>(),
+                           r.at("stages").get<std::vector<std::vector<std::string>>>()});
   return plan;
 }
 
@@ -114,9 +118,10 @@ Status write_plan(const fs::path& out, const FarmPlan& plan) {
     j["slurm"] = {{"partition", plan.slurm.partition},
                   {"gpu_partition", plan.slurm.gpu_partition},
                   {"account", plan.slurm.account},
+                  {"least_job_s", plan.slurm.least_job_s},
                   {"rounds", json::array()}};
     for (const SlurmRound& r : plan.rounds)
-      j["slurm"]["rounds"].push_back({{"first", r.first}, {"jobs", r.jobs}});
+      j["slurm"]["rounds"].push_back({{"first", r.first}, {"jobs", r.jobs}, {"stages", r.stages}});
   }
   return write_file_atomic(out / plan_file, j.dump(2) + "\n");
 }

@@ -10,15 +10,16 @@
 
 namespace orbitfuse::farm {
 
-inline constexpr int plan_schema = 1;
+inline constexpr int plan_schema = 2;
 inline constexpr const char* plan_file = "farm.json";
 
 /// What one stage of one session takes; Slurm is asked for it, and the local farm admits by it.
 struct StageNeeds {
   int cores = 2;
   double memory_mb = 2000;
-  double time_min = 60;
-  bool gpu = false;  ///< goes to the GPU partition, where one is named
+  double time_min = 60;  ///< the most it may take
+  bool gpu = false;      ///< goes to the GPU partition, where one is named
+  double usual_s = 0;    ///< wall seconds that it takes as a rule; 0: not known
   bool operator==(const StageNeeds&) const = default;
 };
 
@@ -27,16 +28,20 @@ struct FarmSession {
   std::string folder;  ///< absolute
 };
 
-/// Job arrays submitted together: task i of every array is a stage of session first + i.
+/// Job arrays submitted together: task i of every array is a chain of stages of session first + i.
 struct SlurmRound {
   std::size_t first = 0;
   std::vector<std::string> jobs;  ///< id of each array; the last is the one that gathers
+  std::vector<std::vector<std::string>> stages;  ///< of each array, in their order
 };
 
 struct SlurmOptions {
   std::string partition;      ///< empty: the cluster's default
   std::string gpu_partition;  ///< of stages that use a GPU; empty: as the others
   std::string account;
+  /// Stages follow each other in one job until it is that long: a job of its own costs a stage a
+  /// second of an idle node (docs/scaling.md), 3 % of half a minute.
+  double least_job_s = 30;
   Status validate() const;
 };
 

@@ -57,22 +57,23 @@ std::string index_list(const std::vector<std::size_t>& indices) {
 }
 
 std::vector<std::string> array_words(const FarmPlan& plan, const fs::path& out,
-                                     const std::string& stage, const std::string& indices,
+                                     const StageChain& chain, const std::string& indices,
                                      const std::string& after) {
-  const StageNeeds needs = plan.needs_of(stage);
+  const StageNeeds& needs = chain.needs;
+  const std::string& first = chain.stages.front();
   std::vector<std::string> words = {
       "sbatch",
       "--parsable",
       "--requeue",           // a lost or preempted node: Slurm starts it again, it resumes
       "--open-mode=append",  // the log of its earlier starts stays
       "--signal=B:TERM@60",  // a minute before its time ends: checkpoint
-      "--job-name=orbitfuse-" + stage,
+      "--job-name=orbitfuse-" + first,
       "--array=" + indices,
       fmt::format("--cpus-per-task={}", needs.cores),
       fmt::format("--mem={}M", std::lround(std::ceil(needs.memory_mb))),
       fmt::format("--time={}", std::lround(std::ceil(needs.time_min))),
       "--chdir=" + out.string(),
-      "--output=" + (out / ".farm" / "slurm" / (stage + "-%A_%a.log")).string()};
+      "--output=" + (out / ".farm" / "slurm" / (first + "-%A_%a.log")).string()};
   if (!after.empty()) {
     words.push_back("--dependency=aftercorr:" + after);
     words.push_back("--kill-on-invalid-dep=yes");  // behind a failure nothing waits for ever

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <set>
@@ -54,15 +55,17 @@ Status submit_round(const fs::path& out, const FarmPlan& plan,
                     const Progress& progress) {
   const fs::path scripts = out / ".farm" / "slurm";
   std::string after, all;
-  for (const std::string& stage : plan.stages) {
-    ORBITFUSE_ASSIGN(after, submit_script(array_words(plan, out, stage, index_list(tasks), after),
-                                          scripts / fmt::format("{}-{}.sh", stage, round.first),
-                                          fmt::format("#!/bin/sh\nexec {} farm stage {} {} "
-                                                      "$(({} + SLURM_ARRAY_TASK_ID))\n",
-                                                      shell_word(plan.program),
-                                                      shell_word(out.string()), stage, round.first),
-                                          progress));
+  for (const StageChain& chain : stage_chains(plan)) {
+    const std::string text =
+        fmt::format("#!/bin/sh\nexec {} farm stages {} $(({} + SLURM_ARRAY_TASK_ID)) {}\n",
+                    shell_word(plan.program), shell_word(out.string()), round.first,
+                    fmt::join(chain.stages, " "));
+    ORBITFUSE_ASSIGN(
+        after, submit_script(array_words(plan, out, chain, index_list(tasks), after),
+                             scripts / fmt::format("{}-{}.sh", chain.stages.front(), round.first),
+                             text, progress));
     round.jobs.push_back(after);
+    round.stages.push_back(chain.stages);
     all += (all.empty() ? "" : ":") + after;
   }
   std::vector<std::string> words = {"sbatch",
@@ -82,6 +85,56 @@ Status submit_round(const fs::path& out, const FarmPlan& plan,
   return {};
 }
 
+struct JobClock {
+  std::chrono::steady_clock::time_point began;
+  double limit_s;
+  bool is_late() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count() >
+           limit_s - time_warning_s;
+  }
+};
+
+/// Error, and on record, where Slurm has started this job too often.
+Status not_given_up(const fs::path& out, const FarmPlan& plan, const FarmSession& session,
+                    const std::string& stage, const JobOutcome& before) {
+  // Slurm's own count, of this job alone: a user's `resume` gives all tries anew.
+  const char* restarts = std::getenv("SLURM_RESTART_COUNT");
+  if (restarts == nullptr || std::atoi(restarts) < plan.tries || before.starts == 0) return {};
+  JobOutcome given_up = before;
+  given_up.state = JobState::failed;
+  given_up.cause = fmt::format("interrupted {} times; last on {}", before.starts, before.host);
+  ORBITFUSE_TRY(write_outcome(out, session.name, stage, given_up));
+  return fail(ErrorKind::device, session.name + "/" + stage, given_up.cause,
+              "look at the node; then: orbitfuse farm resume " + out.string());
+}
+
+Result<JobOutcome> run_stage(const fs::path& out, const FarmPlan& plan, const FarmSession& session,
+                             const std::string& stage, const JobClock& clock,
+                             const Progress& progress) {
+  ORBITFUSE_ASSIGN(StageJob job, StageJob::start(plan, out, session, stage));
+  std::optional<JobOutcome> outcome;
+  bool late = false;
+  while (!(outcome = job.poll())) {
+    if (progress.cancelled()) {
+      late = late || clock.is_late();
+      job.stop();
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  if (late && outcome->state == JobState::interrupted)
+    outcome->cause = std::string(out_of_time) + " (Slurm's limit)";
+  ORBITFUSE_TRY(write_outcome(out, session.name, stage, *outcome));
+  return *outcome;
+}
+
+/// Of any session: nothing of the farm's runs now.
+bool was_cut_off(const fs::path& out, const FarmPlan& plan, const std::string& stage) {
+  return std::any_of(plan.sessions.begin(), plan.sessions.end(), [&](const FarmSession& session) {
+    const JobState state = read_outcome(out, session.name, stage).state;
+    return state == JobState::running || state == JobState::interrupted;
+  });
+}
+
 }  // namespace
 
 Status submit(const fs::path& out, FarmPlan& plan, bool failed_too, const Progress& progress) {
@@ -95,7 +148,7 @@ Status submit(const fs::path& out, FarmPlan& plan, bool failed_too, const Progre
     for (std::size_t i = first; i < std::min(first + array_size, plan.sessions.size()); ++i)
       if (is_to_run(out, plan, plan.sessions[i], failed_too)) tasks.push_back(i - first);
     if (tasks.empty()) continue;
-    rounds.push_back({first, {}});
+    rounds.push_back({first, {}, {}});
     Status submitted = submit_round(out, plan, tasks, rounds.back(), progress);
     if (submitted) continue;
     for (const SlurmRound& round : rounds) {
@@ -139,51 +192,43 @@ Status cancel(const fs::path& out, const FarmPlan& plan, const Progress& progres
   return {};
 }
 
-Status run_task(const fs::path& out, const FarmPlan& plan, const std::string& stage,
+Status run_task(const fs::path& out, const FarmPlan& plan, const std::vector<std::string>& stages,
                 std::size_t session, const Progress& progress) {
   const FarmSession& s = plan.sessions.at(session);
-  const JobOutcome before = read_outcome(out, s.name, stage);
-  if (before.state == JobState::done) return {};
-  // Slurm's own count, of this job alone: a user's `resume` gives all tries anew.
-  const char* restarts = std::getenv("SLURM_RESTART_COUNT");
-  if (restarts != nullptr && std::atoi(restarts) >= plan.tries) {
-    JobOutcome given_up = before;
-    given_up.state = JobState::failed;
-    given_up.cause = fmt::format("interrupted {} times; last on {}", before.starts, before.host);
-    ORBITFUSE_TRY(write_outcome(out, s.name, stage, given_up));
-    return fail(ErrorKind::device, s.name + "/" + stage, given_up.cause,
-                "look at the node; then: orbitfuse farm resume " + out.string());
+  double limit_s = 0;
+  for (const std::string& stage : stages) limit_s += 60 * plan.needs_of(stage).time_min;
+  JobClock clock{std::chrono::steady_clock::now(), limit_s};
+  for (const std::string& stage : stages) {
+    const JobOutcome before = read_outcome(out, s.name, stage);
+    if (before.state == JobState::done) continue;
+    ORBITFUSE_TRY(not_given_up(out, plan, s, stage, before));
+    ORBITFUSE_ASSIGN(const JobOutcome outcome, run_stage(out, plan, s, stage, clock, progress));
+    if (outcome.state != JobState::done)
+      return fail(outcome.state == JobState::failed ? ErrorKind::input : ErrorKind::cancelled,
+                  s.name + "/" + stage, outcome.cause, "orbitfuse farm status " + out.string());
+    if (progress.cancelled())
+      return fail(ErrorKind::cancelled, s.name, "stopped after " + stage,
+                  "orbitfuse farm resume " + out.string());
   }
-  ORBITFUSE_ASSIGN(StageJob job, StageJob::start(plan, out, s, stage));
-  std::optional<JobOutcome> outcome;
-  bool late = false;
-  while (!(outcome = job.poll())) {
-    if (progress.cancelled()) {
-      late = late || job.wall_s() > 60 * plan.needs_of(stage).time_min - time_warning_s;
-      job.stop();
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
-  if (late && outcome->state == JobState::interrupted)
-    outcome->cause = std::string(out_of_time) + " (Slurm's limit)";
-  ORBITFUSE_TRY(write_outcome(out, s.name, stage, *outcome));
-  if (outcome->state == JobState::done) return {};
-  return fail(outcome->state == JobState::failed ? ErrorKind::input : ErrorKind::cancelled,
-              s.name + "/" + stage, outcome->cause, "orbitfuse farm status " + out.string());
+  return {};
 }
 
 void raise_needs(const fs::path& out, FarmPlan& plan, const Progress& progress) {
   for (const SlurmRound& round : plan.rounds)
-    for (std::size_t i = 0; i < plan.stages.size() && i < round.jobs.size(); ++i) {
+    for (std::size_t i = 0; i < round.stages.size() && i < round.jobs.size(); ++i) {
       auto states = slurm_output({"sacct", "--noheader", "--parsable2", "--allocations",
                                   "--format=State", "--jobs=" + round.jobs[i]},
                                  progress);
       if (!states)
         states = slurm_output({"scontrol", "--oneliner", "show", "job", round.jobs[i]}, progress);
       if (!states) continue;
-      StageNeeds& needs = plan.needs[plan.stages[i]];
-      if (states->find("OUT_OF_MEMORY") != std::string::npos) needs.memory_mb *= 2;
-      if (states->find("TIMEOUT") != std::string::npos) needs.time_min *= 2;
+      const bool memory = states->find("OUT_OF_MEMORY") != std::string::npos,
+                 time = states->find("TIMEOUT") != std::string::npos;
+      for (const std::string& stage : round.stages[i]) {
+        if (!(memory || time) || !was_cut_off(out, plan, stage)) continue;
+        if (memory) plan.needs[stage].memory_mb *= 2;
+        if (time) plan.needs[stage].time_min *= 2;
+      }
     }
   raise_interrupted(out, plan);
 }

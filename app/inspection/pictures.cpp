@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "app/view/layers.hpp"
+#include "core/geometry/narrowed.hpp"
 #include "core/image/image_io.hpp"
 #include "core/image/undistorted.hpp"
 #include "recon/measurement/measure.hpp"
@@ -32,11 +33,7 @@ const RecordedView* view_named(const FinishedRun& run, const std::string& name) 
 }
 
 Camera picture_camera(const Camera& camera) {
-  const Camera straight = camera.without_distortion();
-  return straight.scaled_to(
-      picture_width_px,
-      std::max(1, static_cast<int>(
-                      std::lround(1.0 * picture_width_px * straight.height / straight.width))));
+  return at_width(camera.without_distortion(), picture_width_px);
 }
 
 /// How finely a view sees a point; 0: not at all, because it is outside or something is before it.
@@ -45,9 +42,7 @@ Result<double> fineness(const RecordedView& view, const Eigen::Vector3d& point,
   const Eigen::Vector3d in_cam = view.view.cam_from_world * point;
   const Camera whole = view.view.camera.without_distortion();
   if (!(in_cam.z() > 0)) return 0;
-  const int width = std::min(whole.width, scene.options().depth_width_px);
-  const Camera camera =
-      whole.scaled_to(width, std::max(1, whole.height * width / std::max(1, whole.width)));
+  const Camera camera = narrowed_to(whole, scene.options().depth_width_px);
   const Eigen::Vector2d pixel = camera.project(in_cam);
   const int x = static_cast<int>(std::floor(pixel.x())),
             y = static_cast<int>(std::floor(pixel.y()));
@@ -63,7 +58,7 @@ Result<double> fineness(const RecordedView& view, const Eigen::Vector3d& point,
   const auto z = static_cast<double>(seen.depth.at<float>(reach_px, reach_px));
   // NaN: the thermal field holds nothing there, so that nothing of it is before the point either.
   if (z < in_cam.z() * (1 - scene.options().depth_tolerance)) return 0;
-  return camera.fx * whole.width / width / in_cam.z();
+  return whole.fx / in_cam.z();
 }
 
 /// The visible view that sees all of the points, and the least of them finest; sure poses come

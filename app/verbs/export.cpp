@@ -19,7 +19,7 @@ struct Options {
   std::string dataset, poses = "recorded", mat;
   std::vector<std::string> files, distance;
   bool whole = false, points = false, known_poses = false;
-  std::optional<int> triangles;
+  std::optional<int> triangles, mat_tags;
 };
 
 Result<std::vector<double>> numbers(const char* option, const std::string& word, std::size_t count,
@@ -97,12 +97,15 @@ Result<std::optional<stages::MetricScale>> scale_of(Context& context, const Opti
   if (told > 1)
     return fail(ErrorKind::usage, "--distance, --mat or --known-poses", "more than one of them",
                 "tell the scale in one way");
+  if (o.mat_tags && o.mat.empty())
+    return fail(ErrorKind::usage, "--mat-tags", "no --mat beside it", "tell its side: --mat 0.6m");
   if (told == 0) return stages::load_metric_scale(o.out, world);
   const auto found = [&]() -> Result<stages::MetricScale> {
     if (o.known_poses) return scale_of_known_poses(run);
     if (!o.mat.empty()) {
       MatDesign design;
       ORBITFUSE_ASSIGN(design.size_m, metres_of("--mat", o.mat));
+      design.tags_per_side = o.mat_tags.value_or(design.tags_per_side);
       return scale_of_mat(run, design, context.progress);
     }
     ORBITFUSE_ASSIGN(const measurement::Place from, place_of(o.distance.at(0)));
@@ -210,6 +213,7 @@ Action add_export(CLI::App& app) {
   app.add_option(
       "--mat", o->mat,
       "Side of the printed mat in the visible views, e.g. 0.6m: the scale is read from it");
+  app.add_option("--mat-tags", o->mat_tags, "Tags along a side of the mat, if not the default");
   app.add_flag("--known-poses", o->known_poses,
                "The poses that the session came with are in metres: the scale is theirs");
   app.add_option("--dataset", o->dataset,

@@ -162,29 +162,32 @@ Status cancel_farm(Context& context, const fs::path& out) {
 Status run_array_task(Context& context, const fs::path& out,
                       const std::vector<std::string>& words) {
   ORBITFUSE_ASSIGN(const FarmPlan plan, read_plan(out));
+  const bool numbered = words.size() > 3 && words[2].size() < 10 && !words[2].empty() &&
+                        words[2].find_first_not_of("0123456789") == std::string::npos &&
+                        std::stoul(words[2]) < plan.sessions.size();
   const bool known =
-      words.size() == 4 && words[3].size() < 10 && !words[3].empty() &&
-      words[3].find_first_not_of("0123456789") == std::string::npos &&
-      std::stoul(words[3]) < plan.sessions.size() &&
-      std::find(plan.stages.begin(), plan.stages.end(), words[2]) != plan.stages.end();
+      numbered && std::all_of(words.begin() + 3, words.end(), [&](const auto& stage) {
+        return std::find(plan.stages.begin(), plan.stages.end(), stage) != plan.stages.end();
+      });
   if (!known)
-    return fail(ErrorKind::usage, "farm stage", "no such stage or session in " + out.string(),
-                "farm stage DIR STAGE NUMBER is what the farm's own jobs call");
-  return run_task(out, plan, words[2], std::stoul(words[3]), context.progress);
+    return fail(ErrorKind::usage, "farm stages", "no such stage or session in " + out.string(),
+                "farm stages DIR NUMBER STAGE... is what the farm's own jobs call");
+  return run_task(out, plan, {words.begin() + 3, words.end()}, std::stoul(words[2]),
+                  context.progress);
 }
 
 Status run_farm(Context& context, const FarmOptions& options) {
   const std::vector<std::string>& words = options.words;
   const std::string first = words.empty() ? "" : words.front();
   const bool is_order = first == "status" || first == "resume" || first == "cancel" ||
-                        first == "gather" || first == "stage";
+                        first == "gather" || first == "stages";
   if (!is_order) return start_farm(context, options);
-  if (words.size() < 2 || (words.size() > 2 && first != "stage"))
+  if (words.size() < 2 || (words.size() > 2 && first != "stages"))
     return fail(ErrorKind::usage, "farm " + first, fmt::format("{} folders", words.size() - 1),
                 "name the farm's folder, one");
   const fs::path out = fs::absolute(words[1]).lexically_normal();
   ORBITFUSE_TRY(answers(out));
-  if (first == "stage") return run_array_task(context, out, words);
+  if (first == "stages") return run_array_task(context, out, words);
   if (first == "cancel") return cancel_farm(context, out);
   if (first != "status") {
     ORBITFUSE_TRY(read_plan(out));

@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "core/geometry/kd_tree.hpp"
+#include "core/numeric/median.hpp"
 #include "core/numeric/random.hpp"
 #include "core/temperature.hpp"
 
@@ -44,10 +45,7 @@ double spacing2(const KdTree& tree, const std::vector<Eigen::Vector3d>& points) 
     double distance2[2];
     if (tree.nearest(points[i], 2, index, distance2) == 2) nearest.push_back(distance2[1]);
   }
-  if (nearest.empty()) return 0;
-  const auto middle = nearest.begin() + static_cast<std::ptrdiff_t>(nearest.size() / 2);
-  std::nth_element(nearest.begin(), middle, nearest.end());
-  return *middle;
+  return median_in(nearest);
 }
 
 template <class Number>

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The metric scale from one distance, told by random pairs of pixels of the recorded visible views:
-//   scale_error RUN TRUE.ply ground_truth.json [--count 200] [--least 1.0]
-// Each pair lies on the object, in one view, at least `--least` metres apart; its distance is the
-// true surface's. The true scale is that of the cameras.
+// The metric scale that a run's pictures give, against that of its true cameras:
+//   scale_error RUN ground_truth.json --mat 2.4 [--tags 9]        the mat on the ground
+//   scale_error RUN ground_truth.json --surface TRUE.ply [--count 200] [--least 1.0]
+// The second: one distance, told by random pairs of pixels of the recorded visible views. Each pair
+// lies on the object, in one view, at least `--least` metres apart; its distance is the true
+// surface's.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -21,16 +23,22 @@ namespace fs = std::filesystem;
 
 struct Options {
   fs::path run, true_mesh, truth;
+  MatDesign mat;
+  bool by_mat = false;
   int count = 200;
   double least_m = 1, most_m = 3;
 };
 
-Status run(const Options& o) {
-  ORBITFUSE_ASSIGN(const GroundTruth truth, read_ground_truth(o.truth));
-  ORBITFUSE_ASSIGN(const Similarity3d fit, truth_from_run(o.run, truth));
+Status score_mat(const Options& o, const view::FinishedRun& run, double true_scale) {
+  ORBITFUSE_ASSIGN(const stages::MetricScale scale, exporting::scale_of_mat(run, o.mat, {}));
+  fmt::print("{}: scale from the mat, {}: {:+.3f} %, stated +- {:.3f} % (one sigma)\n",
+             o.run.filename().string(), scale.how, 100 * (scale.metres_per_unit / true_scale - 1),
+             100 * scale.relative_uncertainty);
+  return {};
+}
+
+Status score_distances(const Options& o, const view::FinishedRun& run, const Similarity3d& fit) {
   ORBITFUSE_ASSIGN(const TriangleMesh mesh, read_mesh(o.true_mesh));
-  ORBITFUSE_ASSIGN(const view::FinishedRun run,
-                   view::load_finished_run(o.run, stages::RunConfig(), {}));
   std::mt19937 random(5);
   std::vector<double> errors;
   int covered = 0, refused = 0;
@@ -79,19 +87,31 @@ Status run(const Options& o) {
   return {};
 }
 
+Status run(const Options& o) {
+  ORBITFUSE_ASSIGN(const GroundTruth truth, read_ground_truth(o.truth));
+  ORBITFUSE_ASSIGN(const Similarity3d fit, truth_from_run(o.run, truth));
+  ORBITFUSE_ASSIGN(const view::FinishedRun run,
+                   view::load_finished_run(o.run, stages::RunConfig(), {}));
+  return o.by_mat ? score_mat(o, run, fit.scale) : score_distances(o, run, fit);
+}
+
 }  // namespace
 }  // namespace orbitfuse
 
 int main(int argc, char** argv) {
-  CLI::App app("The metric scale from one distance against the true one");
+  CLI::App app("The metric scale against the true one");
   orbitfuse::Options options;
   app.add_option("run", options.run, "--out folder of a run")->required();
-  app.add_option("true_mesh", options.true_mesh, "PLY of true_mesh.py")->required();
   app.add_option("truth", options.truth, "ground_truth.json")->required();
+  auto* mat = app.add_option("--mat", options.mat.size_m, "Side of the mat, m");
+  app.add_option("--tags", options.mat.tags_per_side, "Tags a side of it")->capture_default_str();
+  app.add_option("--surface", options.true_mesh, "PLY of true_mesh.py, for one distance")
+      ->excludes(mat);
   app.add_option("--count", options.count, "Pairs")->capture_default_str();
   app.add_option("--least", options.least_m, "Metres between two places")->capture_default_str();
   app.add_option("--most", options.most_m, "Metres from the middle")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
+  options.by_mat = mat->count() > 0;
   const orbitfuse::Status status = orbitfuse::run(options);
   if (status) return 0;
   std::fprintf(stderr, "error: %s\n", status.error().message().c_str());

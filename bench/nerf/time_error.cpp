@@ -10,6 +10,7 @@
 
 #include "bench/nerf/experiment.hpp"
 #include "bench/nerf/scenes.hpp"
+#include "core/geometry/rotation_vector.hpp"
 #include "core/system/clock.hpp"
 #include "core/system/cpu.hpp"
 #include "core/system/parallel.hpp"
@@ -83,8 +84,7 @@ void perturb_poses(nerf::Dataset& data, double sigma_deg) {
   for (nerf::TrainingView& view : data.views) {
     if (view.measure_only) continue;
     const Eigen::Vector3d turn = draw(), shift = draw() * view.cam_from_world.translation.norm();
-    const Rigid3d moved_from_cam{
-        Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized())), shift};
+    const Rigid3d moved_from_cam{turned_by(turn), shift};
     view.cam_from_world = moved_from_cam * view.cam_from_world;
   }
 }

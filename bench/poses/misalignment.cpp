@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "core/geometry/narrowed.hpp"
+
 namespace orbitfuse::scenes {
 namespace {
 
@@ -57,9 +59,7 @@ Result<Misalignment> misalignment(const Scene& scene, const Reconstruction& visi
   const Similarity3d visible_from_truth = truth_from_visible->inverse();
   for (const PosedView& test : scene.test) {
     PosedView small = test;
-    small.camera =
-        test.camera.scaled_to(80, std::max(1, 80 * test.camera.height / test.camera.width))
-            .without_distortion();
+    small.camera = narrowed_to(test.camera, 80).without_distortion();
     small.cam_from_world = rebase(test.cam_from_world, visible_from_truth);
     ORBITFUSE_ASSIGN(const SceneRender seen, renderer(small.camera, small.cam_from_world));
     const Eigen::Vector3d center = camera_center(small.cam_from_world);

@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/registration/oracle.hpp"
+#include "core/numeric/median.hpp"
 #include "core/system/file_io.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/registration/register.hpp"
@@ -31,11 +32,8 @@ struct Arguments {
   bool verbose = false, oracle = false, no_warp = false;
 };
 
-double median(std::vector<double> values) {
-  if (values.empty()) return NAN;
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
-                   values.end());
-  return values[values.size() / 2];
+double median_or_nan(const std::vector<double>& values) {
+  return values.empty() ? NAN : median(values);
 }
 
 double scale_error_percent(const Similarity3d& a, const Similarity3d& b) {
@@ -53,15 +51,15 @@ struct Errors {
     cpu_ms.push_back(1000 * cpu_s);
   }
   std::string text() const {
-    return fmt::format("{:.2f} / {:.2f} / {:.2f}", median(rotation_deg), median(scale_percent),
-                       median(rmse_percent));
+    return fmt::format("{:.2f} / {:.2f} / {:.2f}", median_or_nan(rotation_deg),
+                       median_or_nan(scale_percent), median_or_nan(rmse_percent));
   }
   nlohmann::json json() const {
     return {{"count", rotation_deg.size()},
-            {"rotation_deg_median", median(rotation_deg)},
-            {"scale_percent_median", median(scale_percent)},
-            {"rmse_percent_of_diameter_median", median(rmse_percent)},
-            {"cpu_ms_median", median(cpu_ms)}};
+            {"rotation_deg_median", median_or_nan(rotation_deg)},
+            {"scale_percent_median", median_or_nan(scale_percent)},
+            {"rmse_percent_of_diameter_median", median_or_nan(rmse_percent)},
+            {"cpu_ms_median", median_or_nan(cpu_ms)}};
   }
 };
 
@@ -156,8 +154,9 @@ void print_row(const scenes::Level& level, const Tally& t) {
       "| {} | {}/{} = {:.0f} % ({:.0f}) | {} | {}/{} | {}/{} | {} | {:.0f} ({:.0f}) | {}, {:.0f} |",
       level.name, t.good, t.trials, 100.0 * t.good / std::max(1, t.trials), 100 * level.success_bar,
       clouds, t.flagged_wrong + t.errors, t.trials - t.good, t.flagged_good, t.good, t.right.text(),
-      median(t.cpu_ms), t.cpu_ms.empty() ? 0 : *std::max_element(t.cpu_ms.begin(), t.cpu_ms.end()),
-      t.refined.text(), median(t.refined.cpu_ms));
+      median_or_nan(t.cpu_ms),
+      t.cpu_ms.empty() ? 0 : *std::max_element(t.cpu_ms.begin(), t.cpu_ms.end()), t.refined.text(),
+      median_or_nan(t.refined.cpu_ms));
   for (const auto& [kind, errors] : t.oracles) fmt::print(" {} |", errors.text());
   fmt::print("\n");
   std::fflush(stdout);
@@ -171,7 +170,7 @@ nlohmann::json json_row(const scenes::Level& level, const Tally& t) {
                         {"wrong_flagged", t.flagged_wrong},
                         {"right_flagged", t.flagged_good},
                         {"errors", t.errors},
-                        {"cpu_ms_median", median(t.cpu_ms)},
+                        {"cpu_ms_median", median_or_nan(t.cpu_ms)},
                         {"of_the_right", t.right.json()},
                         {"refinement", t.refined.json()}};
   const char* names[] = {"oracle_all_points", "oracle_common", "oracle_robust_common"};
@@ -248,12 +247,12 @@ int main(int argc, char** argv) {
     print_row(level, total);
     rows.push_back(json_row(level, total));
   }
-  fmt::print("median over all pairs: {:.0f} CPU ms\n", median(all_ms));
+  fmt::print("median over all pairs: {:.0f} CPU ms\n", median_or_nan(all_ms));
   if (arguments.out.empty()) return 0;
   const nlohmann::json report = {
-      {"initialiser", arguments.initialiser}, {"estimate_warp", !arguments.no_warp},
-      {"first_seed", arguments.first_seed},   {"trials_per_cloud", arguments.trials},
-      {"cpu_ms_median", median(all_ms)},      {"levels", rows}};
+      {"initialiser", arguments.initialiser},   {"estimate_warp", !arguments.no_warp},
+      {"first_seed", arguments.first_seed},     {"trials_per_cloud", arguments.trials},
+      {"cpu_ms_median", median_or_nan(all_ms)}, {"levels", rows}};
   if (const Status written = write_file_atomic(arguments.out, report.dump(1) + "\n"); !written) {
     fmt::print(stderr, "{}\n", written.error().message());
     return 1;

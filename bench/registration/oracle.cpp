@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/numeric/median.hpp"
 #include "recon/registration/similarity.hpp"
 
 namespace orbitfuse::scenes {
@@ -21,11 +22,8 @@ std::vector<double> tukey_weights(const Positions& from, const Positions& to,
                                   const Similarity3d& fit) {
   std::vector<double> residuals;
   for (std::size_t i = 0; i < from.size(); ++i) residuals.push_back((fit * from[i] - to[i]).norm());
-  std::vector<double> sorted = residuals;
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
-                   sorted.end());
   // The median length of a three-dimensional normal vector is 1.538 standard deviations.
-  const double bound = 4.685 * sorted[sorted.size() / 2] / 1.538;
+  const double bound = 4.685 * median(residuals) / 1.538;
   for (double& r : residuals) {
     const double u = r / std::max(bound, 1e-12), v = 1 - u * u;
     r = v > 0 ? v * v : 0;

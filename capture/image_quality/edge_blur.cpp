@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "capture/image_quality/image_noise.hpp"
+#include "core/numeric/median.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -23,13 +24,6 @@ constexpr std::ptrdiff_t most = 400;     // edges looked at in a direction
 /// Edges of a direction, to tell its width; small images have few.
 std::size_t enough_in(const cv::Mat& image) {
   return static_cast<std::size_t>(std::clamp((image.rows + image.cols) / 10, 8, 24));
-}
-
-double quantile(std::vector<float>& values, double share) {
-  const auto place =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
 }
 
 struct Signal {

@@ -6,6 +6,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "core/numeric/median.hpp"
+
 namespace orbitfuse {
 
 double white_noise_sigma(const cv::Mat& gray, int stride) {
@@ -17,10 +19,7 @@ double white_noise_sigma(const cv::Mat& gray, int stride) {
       detail.push_back(std::abs(a[x] - a[x + 1] - b[x] + b[x + 1]) / 2);
   }
   if (detail.empty()) return 0;
-  const auto middle = detail.begin() + static_cast<std::ptrdiff_t>(detail.size() / 2);
-  std::nth_element(detail.begin(), middle, detail.end());
-  constexpr double median_of_gaussian = 0.6745;  // of its absolute values
-  return *middle / median_of_gaussian;
+  return sigma_of_median * static_cast<double>(median_in(detail));
 }
 
 cv::Mat without_dead_pixels(const cv::Mat& image) {

@@ -8,6 +8,7 @@
 
 #include "capture/mat/aruco_dictionary.hpp"
 #include "capture/mat/pose_sigma.hpp"
+#include "core/numeric/median.hpp"
 #include "core/option_range.hpp"
 
 namespace orbitfuse {
@@ -31,13 +32,8 @@ cv::Mat gray_of(const cv::Mat& image) {
       }
     }
     if (samples.empty()) return {};
-    const auto percentile = [&](double share) {
-      const auto at = samples.begin() +
-                      static_cast<std::ptrdiff_t>(share * static_cast<double>(samples.size() - 1));
-      std::nth_element(samples.begin(), at, samples.end());
-      return static_cast<double>(*at);
-    };
-    const double low = percentile(0.01), high = std::max(percentile(0.99), low + 1);
+    const double low = quantile(samples, 0.01),
+                 high = std::max<double>(quantile(samples, 0.99), low + 1);
     image.convertTo(gray, CV_8U, 255 / (high - low), -255 * low / (high - low));
   }
   return gray;

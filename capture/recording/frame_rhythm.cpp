@@ -12,6 +12,11 @@ namespace {
 constexpr int settled = 8;      // the first intervals of a stream are irregular
 constexpr double late = 1.75;   // of the usual interval
 constexpr double weight = 0.1;  // a rate that changes with the light is followed in some frames
+
+std::uint64_t frames_of(double seconds, double interval_s) {
+  if (!(seconds > 0)) return 1;
+  return static_cast<std::uint64_t>(std::llround(std::clamp(seconds / interval_s, 1.0, 1e9)));
+}
 }  // namespace
 
 int FrameRhythm::note(std::uint64_t id, std::int64_t stamp_ns) {
@@ -30,13 +35,17 @@ int FrameRhythm::note(std::uint64_t id, std::int64_t stamp_ns) {
   // A pause says nothing about the rate before and after it.
   const double told_s = missing > 0 ? std::min(interval_s, late * interval_s_) : interval_s;
   interval_s_ = known_ == 0 ? interval_s : (1 - weight) * interval_s_ + weight * told_s;
+  shortest_s_ = known_ < settled ? interval_s_ : std::min(shortest_s_, interval_s_);
   ++known_;
   return missing;
 }
 
 std::uint64_t FrameRhythm::frames_in(double seconds) const {
-  if (known_ == 0 || !(seconds > 0)) return 1;
-  return static_cast<std::uint64_t>(std::llround(std::clamp(seconds / interval_s_, 1.0, 1e9)));
+  return known_ > 0 ? frames_of(seconds, interval_s_) : 1;
+}
+
+std::uint64_t FrameRhythm::most_frames_in(double seconds) const {
+  return known_ > 0 ? frames_of(seconds, shortest_s_) : 1;
 }
 
 }  // namespace orbitfuse

@@ -19,6 +19,9 @@ class FrameRhythm {
   bool known() const { return known_ > 0; }
   /// How many frames fit into an outage; at least 1, because the frame that was under way is lost.
   std::uint64_t frames_in(double seconds) const;
+  /// The same at the fastest rate that the stream ever held: a camera or host that was busy when
+  /// the outage began makes frames_in() too few, and this not. At least frames_in().
+  std::uint64_t most_frames_in(double seconds) const;
 
  private:
   struct Seen {
@@ -27,6 +30,7 @@ class FrameRhythm {
   };
   std::optional<Seen> last_;
   double interval_s_ = 0;  ///< smoothed
+  double shortest_s_ = 0;  ///< of interval_s_, since the first intervals
   int known_ = 0;          ///< intervals so far
 };
 

@@ -8,11 +8,17 @@
 
 namespace orbitfuse {
 
-/// The same view at most `width_px` wide, of the same proportions to a pixel.
+/// The same view `width_px` wide, of the same proportions to a pixel, 2 or more high: what is made
+/// of its neighbouring rows stays defined.
+inline Camera at_width(const Camera& camera, int width_px) {
+  const auto height =
+      std::lround(static_cast<double>(camera.height) * width_px / std::max(1, camera.width));
+  return camera.scaled_to(width_px, std::max(2, static_cast<int>(height)));
+}
+
+/// The same, of a view that is wider; otherwise the view itself.
 inline Camera narrowed_to(const Camera& camera, int width_px) {
-  if (camera.width <= width_px) return camera;
-  const auto height = std::lround(static_cast<double>(camera.height) * width_px / camera.width);
-  return camera.scaled_to(width_px, std::max(1, static_cast<int>(height)));
+  return camera.width <= width_px ? camera : at_width(camera, width_px);
 }
 
 }  // namespace orbitfuse

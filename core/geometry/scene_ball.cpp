@@ -1,29 +1,28 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/geometry/scene_ball.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+
+#include "core/geometry/nearest_to_lines.hpp"
 
 namespace orbitfuse {
 
 SceneBall scene_ball(const std::vector<Rigid3d>& cam_from_world,
                      std::vector<Eigen::Vector3d> points) {
   const double n = static_cast<double>(cam_from_world.size());
-  Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d b = Eigen::Vector3d::Zero(), mean = b, forward = b;
+  NearestToLines axes;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero(), forward = mean;
   for (const Rigid3d& pose : cam_from_world) {
     const Eigen::Vector3d c = camera_center(pose),
                           axis = pose.rotation.conjugate() * Eigen::Vector3d::UnitZ();
-    const Eigen::Matrix3d off_axis = Eigen::Matrix3d::Identity() - axis * axis.transpose();
-    a += off_axis;
-    b += off_axis * c;
+    axes.add(c, axis);
     mean += c / n;
     forward += axis;
   }
   SceneBall ball;
-  if (Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(a).eigenvalues()(0) > 1e-3 * n) {
-    ball.center = a.ldlt().solve(b);
+  if (axes.crossing() > 1e-3) {
+    ball.center = axes.point();
   } else if (!points.empty()) {
     const auto middle = points.begin() + static_cast<std::ptrdiff_t>(points.size() / 2);
     for (int i = 0; i < 3; ++i) {

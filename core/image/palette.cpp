@@ -6,6 +6,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "core/numeric/median.hpp"
 #include "core/temperature.hpp"
 
 namespace orbitfuse {
@@ -99,15 +100,8 @@ TemperatureSpan common_span(const std::vector<cv::Mat>& kelvin_images, double lo
   }
   TemperatureSpan span{celsius_zero_k, celsius_zero_k};  // without a sample: any defined span
   if (!samples.empty()) {
-    const auto at = [&](double percentile) {
-      const double rank =
-          std::clamp(percentile, 0.0, 100.0) / 100.0 * static_cast<double>(samples.size() - 1);
-      const auto nth = samples.begin() + static_cast<std::ptrdiff_t>(std::lround(rank));
-      std::nth_element(samples.begin(), nth, samples.end());
-      return static_cast<double>(*nth);
-    };
-    span.low_k = at(low_percentile);
-    span.high_k = at(high_percentile);
+    span.low_k = quantile(samples, std::clamp(low_percentile, 0.0, 100.0) / 100);
+    span.high_k = quantile(samples, std::clamp(high_percentile, 0.0, 100.0) / 100);
   }
   constexpr double min_width_k = 0.5;  // below it a palette would show nothing but noise
   if (span.high_k - span.low_k < min_width_k) {

@@ -7,6 +7,7 @@
 #include "drivers/aravis/aravis_source.hpp"
 #include "drivers/aravis/gvcp_probe.hpp"
 #include "drivers/aravis/link.hpp"
+#include "drivers/aravis/missed_frames.hpp"
 #include "drivers/aravis/teardown.hpp"
 
 namespace orbitfuse::aravis {
@@ -14,31 +15,6 @@ namespace {
 
 double seconds(std::chrono::steady_clock::duration d) {
   return std::chrono::duration<double>(d).count();
-}
-
-struct Missed {
-  std::uint64_t frames = 0;
-  bool by_number = false;  ///< told by the camera's own count, which went on
-};
-
-/// Between two frames of a camera with a break between them. A camera that counts on tells exactly
-/// what it sent meanwhile; one that began anew gives a number that is far off, or a small one.
-Missed missed_between(std::uint16_t last_number, std::uint16_t number, std::uint64_t by_time) {
-  constexpr std::uint64_t half_a_round = 32767;
-  constexpr std::uint16_t first_numbers = 10;
-  if (last_number == 0 || number == 0 || by_time >= half_a_round) return {by_time, false};
-  const auto steps = static_cast<std::uint64_t>(GvspFrameCounter::steps(last_number, number));
-  if (steps == 0) return {by_time, false};
-  const std::uint64_t skipped = steps - 1;
-  // A camera that counts on misses what it did not send while its stream was set up again, a part
-  // of the outage; a new count that happens to follow the old one is further from the time it took.
-  const bool small = number <= first_numbers;
-  const bool began_anew = small && 4 * skipped < 3 * by_time;
-  // The time between the last frames tells the rate badly when camera or host were busy. A number
-  // that no new count begins with may be further off before it counts as another count's.
-  const std::uint64_t most = small ? by_time + by_time / 4 : 2 * by_time;
-  if (began_anew || skipped > most + 2) return {by_time, false};
-  return {skipped, true};
 }
 
 }  // namespace
@@ -97,9 +73,10 @@ Delivery AravisSource::come_back(void* handle, const Arrival& arrival) {
   auto* buffer = static_cast<ArvBuffer*>(handle);
   const auto number = static_cast<std::uint16_t>(arv_buffer_get_frame_id(buffer));
   const double outage_s = seconds(arrival.at - last_came_);
-  const bool timed = rhythm_.known() && last_came_ != Clock::time_point{};
-  const Missed missed =
-      missed_between(last_number_, number, timed ? rhythm_.frames_in(outage_s) - 1 : 0);
+  MissedByTime by_time;
+  if (rhythm_.known() && last_came_ != Clock::time_point{})
+    by_time = {rhythm_.frames_in(outage_s) - 1, rhythm_.most_frames_in(outage_s) - 1};
+  const Missed missed = missed_between(last_number_, number, by_time);
   state_ = State::streaming;
   fruitless_ = 0;
   base_id_ = next_id_ + missed.frames;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/image/image_codec.hpp"
+#include "core/numeric/median.hpp"
 #include "drivers/stills/jpeg_ls.hpp"
 #include "drivers/stills/jpeg_segments.hpp"
 
@@ -154,9 +155,7 @@ void read_camera_info(std::string_view record, FlirImage& image) {
 
 double median_of(const cv::Mat& image) {
   std::vector<std::uint16_t> samples(image.begin<std::uint16_t>(), image.end<std::uint16_t>());
-  auto middle = samples.begin() + static_cast<std::ptrdiff_t>(samples.size() / 2);
-  std::nth_element(samples.begin(), middle, samples.end());
-  return *middle;
+  return median_in(samples);
 }
 
 /// Mean step between neighbours over the spread: noise of a wrong byte order steps everywhere.

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/numeric/median.hpp"
+
 namespace orbitfuse {
 namespace {
 
@@ -35,13 +37,7 @@ HeatScale heat_scale(const std::vector<cv::Mat>& images, const HeatScaleOptions&
     }
   }
   if (samples.empty()) return {0, 0, options.min_width};
-  const auto at = [&](double share) {
-    const auto nth =
-        samples.begin() +
-        static_cast<std::ptrdiff_t>(std::floor(share * static_cast<double>(samples.size() - 1)));
-    std::nth_element(samples.begin(), nth, samples.end());
-    return static_cast<double>(*nth);
-  };
+  const auto at = [&](double share) -> double { return quantile(samples, share); };
   HeatScale scale;
   scale.usual = at(0.5);
   scale.spread = std::min(scale.usual - at(0.25), at(0.75) - scale.usual);

@@ -7,20 +7,16 @@
 #include <utility>
 #include <vector>
 
+#include "core/numeric/median.hpp"
+
 namespace orbitfuse {
 namespace {
 
 /// The values below which a smaller and a larger share of all lie.
 std::pair<float, float> percentiles(const cv::Mat& values, double smaller, double larger) {
   std::vector<float> v(values.begin<float>(), values.end<float>());
-  const auto place = [&](double share) {
-    return v.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(v.size() - 1));
-  };
-  const auto high = place(larger), low = place(smaller);
-  std::nth_element(v.begin(), high, v.end());
-  const float high_value = *high;
-  std::nth_element(v.begin(), low, high);
-  return {*low, high_value};
+  const float high = quantile(v, larger);
+  return {quantile(v, smaller), high};
 }
 
 /// Invalid samples take the image's median: no gradient of their own where they are few.
@@ -31,12 +27,7 @@ cv::Mat filled(const cv::Mat& values) {
   std::vector<float> good;
   for (const float v : cv::Mat_<float>(copy))
     if (std::isfinite(v)) good.push_back(v);
-  float middle = 0;
-  if (!good.empty()) {
-    const auto place = good.begin() + static_cast<std::ptrdiff_t>(good.size() / 2);
-    std::nth_element(good.begin(), place, good.end());
-    middle = *place;
-  }
+  const float middle = median_in(good);
   for (float& v : cv::Mat_<float>(copy))
     if (!std::isfinite(v)) v = middle;
   return copy;
@@ -68,6 +59,16 @@ cv::Mat orientation_field(const cv::Mat& values, double sigma_px) {
       field.at<cv::Vec2f>(y, x) = {strength * (gx * gx - gy * gy), strength * 2 * gx * gy};
     }
   return field;
+}
+
+cv::Mat reduced_to(const cv::Mat& image, const Camera& camera) {
+  cv::Mat reduced;
+  cv::resize(image, reduced, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
+  return reduced;
+}
+
+cv::Mat edges_at(const cv::Mat& image, const Camera& camera) {
+  return orientation_field(reduced_to(image, camera), 1.0);
 }
 
 cv::Mat cell_field(const cv::Mat& field, int columns, int rows) {

@@ -6,6 +6,8 @@
 #include <complex>
 #include <opencv2/core.hpp>
 
+#include "core/geometry/camera.hpp"
+
 // Sign-free gradient orientation: an edge is strength * exp(2i angle of its normal), so that the
 // two sides of an edge may swap brightness between modalities. Of the cues measured on real pairs
 // it was the one that never pointed to a wrong place.
@@ -15,6 +17,12 @@ namespace orbitfuse {
 /// log(1 + |gradient| / noise), scaled so that the strongest percent of pixels is 1: one hot
 /// surface must not outshout all other edges. An image without contrast gives zeros.
 cv::Mat orientation_field(const cv::Mat& values, double sigma_px);
+
+/// The image at that camera's size, by area averaging.
+cv::Mat reduced_to(const cv::Mat& image, const Camera& camera);
+
+/// The field of the image at that camera's size, as renders there are compared with.
+cv::Mat edges_at(const cv::Mat& image, const Camera& camera);
 
 /// The field averaged in square cells, which blurs position and keeps orientation.
 cv::Mat cell_field(const cv::Mat& field, int columns, int rows);

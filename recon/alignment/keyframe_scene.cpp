@@ -10,6 +10,7 @@
 #include <memory>
 #include <numbers>
 
+#include "core/geometry/narrowed.hpp"
 #include "core/system/parallel.hpp"
 
 namespace orbitfuse {
@@ -236,8 +237,7 @@ class KeyframeScene {
 
   /// Renders the scene for a keyframe; `width` is that of the view without its margin.
   Status add(const Camera& camera, const Rigid3d& cam_from_world, int width, double margin_deg) {
-    Camera wide = camera.scaled_to(width, std::max(1, camera.height * width / camera.width))
-                      .without_distortion();
+    Camera wide = at_width(camera, width).without_distortion();
     const int margin = static_cast<int>(std::ceil(margin_deg * degree * wide.fx));
     wide.width += 2 * margin, wide.height += 2 * margin;
     wide.cx += margin, wide.cy += margin;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/image/image_io.hpp"
+#include "core/numeric/median.hpp"
 
 namespace orbitfuse {
 
@@ -33,21 +34,17 @@ Result<cv::Mat> read_luminance(const Session& session, const FrameRecord& frame)
 
 cv::Mat without_glare(const cv::Mat& values) {
   constexpr float ranges = 8;
-  std::vector<float> sorted;
+  std::vector<float> samples;
   for (const float v : cv::Mat_<float>(values))
-    if (std::isfinite(v)) sorted.push_back(v);
-  if (sorted.empty()) return values;
-  const auto quantile = [&](std::size_t quarter) {
-    const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(quarter * (sorted.size() - 1) / 4);
-    std::nth_element(sorted.begin(), at, sorted.end());
-    return *at;
-  };
-  const float median = quantile(2), knee = ranges * (quantile(3) - quantile(1));
-  const float most = *std::max_element(sorted.begin(), sorted.end()) - median;
+    if (std::isfinite(v)) samples.push_back(v);
+  if (samples.empty()) return values;
+  const float middle = quantile(samples, 0.5),
+              knee = ranges * (quantile(samples, 0.75) - quantile(samples, 0.25));
+  const float most = *std::max_element(samples.begin(), samples.end()) - middle;
   if (!(knee > 0) || !(most > knee)) return values;
   cv::Mat calm = values.clone();
   for (float& v : cv::Mat_<float>(calm))
-    if (v - median > knee) v = median + knee * (1 + std::log((v - median) / knee));
+    if (v - middle > knee) v = middle + knee * (1 + std::log((v - middle) / knee));
   return calm;
 }
 

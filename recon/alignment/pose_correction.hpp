@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Geometry>
 #include <array>
 
+#include "core/geometry/rotation_vector.hpp"
 #include "core/geometry/transform.hpp"
 
 // What a solve finds: small changes of poses and of a focal length.
@@ -13,12 +13,7 @@ namespace orbitfuse {
 using PoseCorrection = std::array<double, 6>;
 
 inline Rigid3d rigid_of(const PoseCorrection& c) {
-  const Eigen::Vector3d axis(c[0], c[1], c[2]);
-  const double angle = axis.norm();
-  const Eigen::Quaterniond q = angle > 0
-                                   ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis / angle))
-                                   : Eigen::Quaterniond::Identity();
-  return {q, {c[3], c[4], c[5]}};
+  return {turned_by({c[0], c[1], c[2]}), {c[3], c[4], c[5]}};
 }
 
 /// Ceres residual: the first value of a block, believed to be `mean`, in sigmas.

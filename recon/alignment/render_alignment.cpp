@@ -6,6 +6,7 @@
 #include <map>
 #include <opencv2/imgproc.hpp>
 
+#include "core/geometry/narrowed.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/alignment/edge_field.hpp"
 #include "recon/alignment/patch_matching.hpp"
@@ -54,12 +55,6 @@ void solve_each(const std::vector<ViewMatches>& views, const Camera& camera,
   });
 }
 
-cv::Mat reduced(const cv::Mat& image, const Camera& camera) {
-  cv::Mat small;
-  cv::resize(image, small, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
-  return small;
-}
-
 /// Orientation fields of the images at one width: many starts share an image, and rounds a width.
 class ImageFields {
  public:
@@ -73,7 +68,7 @@ class ImageFields {
     }
     parallel_for(static_cast<int>(missing.size()), [&](int index) {
       const auto& [image, field] = missing[static_cast<std::size_t>(index)];
-      *field = orientation_field(reduced(*image, camera), 1.0);
+      *field = edges_at(*image, camera);
     });
   }
   const cv::Mat& of(const cv::Mat& image) const { return fields_.at(image.data); }
@@ -106,8 +101,7 @@ Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer,
   for (const RenderRound& round : options.rounds) {
     std::vector<ViewMatches> matched(views.size());
     const Camera full = result.views.front().view.camera;
-    const int width = std::min(round.width_px, full.width);
-    Camera camera = full.scaled_to(width, std::max(1, full.height * width / full.width));
+    Camera camera = narrowed_to(full, round.width_px);
     const Camera seen_by = camera.without_distortion();
     std::vector<SceneRender> renders;
     for (std::size_t i = 0; i < views.size(); ++i) {

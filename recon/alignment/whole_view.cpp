@@ -6,6 +6,7 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
+#include "core/geometry/narrowed.hpp"
 #include "recon/alignment/edge_correlation.hpp"
 #include "recon/alignment/edge_field.hpp"
 #include "recon/alignment/patch_matching.hpp"
@@ -60,13 +61,8 @@ Result<double> ascend_correlation(const SceneRenderer& renderer,
                                   const Similarity3d& canonical_from_world, const cv::Mat& image,
                                   PosedView& view, const AscentOptions& options,
                                   const Progress& progress) {
-  const int width = std::min(options.width_px, view.camera.width);
-  const Camera camera =
-      view.camera.scaled_to(width, std::max(1, view.camera.height * width / view.camera.width))
-          .without_distortion();
-  cv::Mat reduced;
-  cv::resize(image, reduced, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
-  const cv::Mat field = orientation_field(reduced, 1.0);
+  const Camera camera = narrowed_to(view.camera, options.width_px).without_distortion();
+  const cv::Mat field = edges_at(image, camera);
   const auto match = [&](const Rigid3d& pose) -> Result<WholeMatch> {
     ORBITFUSE_TRY(progress.check("poses.thermal"));
     ORBITFUSE_ASSIGN(const SceneRender seen, renderer(camera, pose));

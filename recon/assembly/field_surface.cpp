@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/geometry/narrowed.hpp"
 #include "core/option_range.hpp"
 #include "recon/assembly/looked_at.hpp"
 #include "recon/assembly/new_views.hpp"
@@ -29,11 +30,7 @@ Result<RenderedOrbit> rendered(const nerf::Field& field, const std::vector<Posed
                      static_cast<double>(views.size()),
                      {},
                      posed.name});
-    const Camera& camera = posed.camera;
-    const int width = std::min(camera.width, width_px);
-    const int height = std::max(2, static_cast<int>(std::lround(static_cast<double>(camera.height) *
-                                                                width / camera.width)));
-    PosedView view{posed.name, camera.scaled_to(width, height).without_distortion(),
+    PosedView view{posed.name, narrowed_to(posed.camera, width_px).without_distortion(),
                    posed.cam_from_world};
     ORBITFUSE_ASSIGN(
         nerf::RenderedView seen,

@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "core/geometry/narrowed.hpp"
+#include "core/geometry/nearest_to_lines.hpp"
 #include "core/numeric/median.hpp"
 #include "core/option_range.hpp"
 
@@ -34,10 +36,7 @@ Rigid3d look_at(const Eigen::Vector3d& eye, const Eigen::Vector3d& target,
 }
 
 Camera render_camera(const std::vector<PosedView>& posed, int width_px) {
-  const Camera camera = posed[posed.size() / 2].camera.without_distortion();
-  const int height_px =
-      std::max(1, static_cast<int>(std::lround(1.0 * camera.height * width_px / camera.width)));
-  return camera.scaled_to(width_px, height_px);
+  return at_width(posed[posed.size() / 2].camera.without_distortion(), width_px);
 }
 
 NewViews along_orbit(const std::vector<PosedView>& posed, const OrbitGeometry& orbit,
@@ -91,23 +90,17 @@ Result<OrbitGeometry> orbit_geometry(const std::vector<PosedView>& views) {
   if (views.size() < 2)
     return fail(ErrorKind::input, "cameras", fmt::format("{} posed", views.size()),
                 "an orbit needs at least two");
-  // The point nearest to all optical axes: sum (I - d d^T) (p - c) = 0.
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d rhs = Eigen::Vector3d::Zero(), mean_up = Eigen::Vector3d::Zero();
+  NearestToLines axes;
+  Eigen::Vector3d mean_up = Eigen::Vector3d::Zero();
   for (const PosedView& v : views) {
-    const Eigen::Vector3d d = axis(v, 2);
-    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - d * d.transpose();
-    normal += across;
-    rhs += across * camera_center(v.cam_from_world);
+    axes.add(camera_center(v.cam_from_world), axis(v, 2));
     mean_up -= axis(v, 1);
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(normal);
-  if (!(eigen.eigenvalues()[0] > 1e-6 * static_cast<double>(views.size())) || mean_up.norm() < 1e-9)
+  if (!(axes.crossing() > 1e-6) || mean_up.norm() < 1e-9)
     return fail(ErrorKind::input, "cameras", "all look in one direction: their axes meet nowhere",
                 "render along their path: --path path");
   OrbitGeometry orbit;
-  orbit.center = eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
-                 (eigen.eigenvectors().transpose() * rhs);
+  orbit.center = axes.point();
   orbit.up = mean_up.normalized();
 
   std::vector<double> radii, elevations, azimuths;

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "core/geometry/kd_tree.hpp"
+#include "core/geometry/rotation_vector.hpp"
 #include "core/numeric/median.hpp"
 #include "recon/comparison/surface_points.hpp"
 
@@ -68,7 +69,7 @@ std::vector<Pair> pairs_of(const SurfacePoints& after, const KdTree& after_tree,
 double sigma_of(const std::vector<Pair>& pairs) {
   std::vector<double> off;
   for (const Pair& p : pairs) off.push_back(std::abs(p.off()));
-  return 1.4826 * median(std::move(off));
+  return sigma_of_median * median_in(off);
 }
 
 /// One Gauss-Newton step over turn, scale and shift about the pairs' middle; none where they leave
@@ -93,9 +94,8 @@ std::optional<Similarity3d> step(const std::vector<Pair>& pairs, double bound, d
   if (!(spectrum.eigenvalues()[0] > 1e-7 * spectrum.eigenvalues()[6])) return std::nullopt;
   const Vector7 x = normal_matrix.ldlt().solve(right);
   if (!x.allFinite()) return std::nullopt;
-  const Eigen::Vector3d turn = x.head<3>();
   Similarity3d update;
-  if (turn.norm() > 0) update.rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized());
+  update.rotation = turned_by(x.head<3>());
   update.scale = std::exp(x[3]);
   update.translation = middle + unit * x.tail<3>() - update.scale * (update.rotation * middle);
   return update;

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/numeric/median.hpp"
+
 namespace orbitfuse::measurement {
 namespace {
 
@@ -42,7 +44,7 @@ Agreement agreement_of(const std::vector<WeightedReading>& readings,
   for (const auto& [value, weight] : values)
     deviations.emplace_back(std::abs(value - middle), weight);
   // Frames see a place with different samples, whose fixed pattern and vignetting differ.
-  const double sigma = std::max(1.4826 * weighted_median(deviations),
+  const double sigma = std::max(sigma_of_median * weighted_median(deviations),
                                 std::hypot(options.noise_sigma_k, options.common_sigma_k));
   Agreement result;
   double total = 0, rejected = 0;

@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 
+#include "core/geometry/nearest_to_lines.hpp"
 #include "core/numeric/median.hpp"
 
 namespace orbitfuse {
@@ -40,17 +41,12 @@ Eigen::Vector3d look_at_point(const std::vector<PosedView>& views) {
   Eigen::Vector3d point = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   std::vector<double> weight(views.size(), 1.0);
   for (int pass = 0; pass < 10; ++pass) {
-    Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d b = Eigen::Vector3d::Zero();
-    for (std::size_t i = 0; i < views.size(); ++i) {
-      const Eigen::Vector3d d = axis_in_world(views[i], Eigen::Vector3d::UnitZ());
-      const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - d * d.transpose();
-      a += weight[i] * across;
-      b += weight[i] * across * camera_center(views[i].cam_from_world);
-    }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(a);
-    if (!(solver.eigenvalues()(0) > 1e-6 * solver.eigenvalues()(2))) return point;
-    point = a.ldlt().solve(b);
+    NearestToLines axes;
+    for (std::size_t i = 0; i < views.size(); ++i)
+      axes.add(camera_center(views[i].cam_from_world),
+               axis_in_world(views[i], Eigen::Vector3d::UnitZ()), weight[i]);
+    if (!(axes.crossing() > 1e-6)) return point;
+    point = axes.point();
     std::vector<double> distance(views.size());
     for (std::size_t i = 0; i < views.size(); ++i) {
       const Eigen::Vector3d d = axis_in_world(views[i], Eigen::Vector3d::UnitZ());

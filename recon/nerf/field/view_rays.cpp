@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/geometry/rotation_vector.hpp"
+
 namespace orbitfuse::nerf {
 namespace {
 constexpr int spacing_px = 8;
@@ -63,11 +65,7 @@ Eigen::Vector3d ViewRays::in_camera(double x, double y, double distance) const {
 }
 
 void ViewRays::move(const Eigen::Vector3d& shift, const Eigen::Vector3d& turn) {
-  const double angle = turn.norm();
-  const Eigen::Matrix3d rotation = angle > 0
-                                       ? Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix()
-                                       : Eigen::Matrix3d::Identity();
-  world_from_cam_ = world_from_cam_ * rotation.transpose();
+  world_from_cam_ = world_from_cam_ * turned_by(turn).conjugate().toRotationMatrix();
   origin_ -= world_from_cam_ * shift;
 }
 

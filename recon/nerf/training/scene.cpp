@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/geometry/scene_ball.hpp"
+#include "core/numeric/median.hpp"
 #include "core/system/parallel.hpp"
 
 namespace orbitfuse::nerf {
@@ -129,12 +130,7 @@ ValueSpan estimate_span(const Dataset& training) {
       for (int x = 0; x < view.image.cols; x += 4)
         if (const float v = view.image.at<float>(y, x); std::isfinite(v)) samples.push_back(v);
   if (samples.empty()) return {0, 1};
-  const auto at = [&](double q) {
-    const auto i = static_cast<std::ptrdiff_t>(q * static_cast<double>(samples.size() - 1));
-    std::nth_element(samples.begin(), samples.begin() + i, samples.end());
-    return static_cast<double>(samples[static_cast<std::size_t>(i)]);
-  };
-  const double low = at(0.001), high = at(0.999);
+  const double low = quantile(samples, 0.001), high = quantile(samples, 0.999);
   return {low, std::max(high, low + 1.0)};
 }
 

@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/geometry/nearest_to_lines.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/alignment/luminance.hpp"
 
@@ -214,19 +215,14 @@ std::vector<EdgeLine> triangulate_lines(const std::vector<PosedView>& posed,
                                         const std::vector<std::vector<ImageSegment>>& segments,
                                         const EdgeLineOptions& options) {
   std::vector<LineView> views;
-  Eigen::Vector3d focus = Eigen::Vector3d::Zero();
   std::vector<double> distances;
-  {
-    Eigen::Matrix3d m = Eigen::Matrix3d::Identity() * 1e-9;
-    Eigen::Vector3d r = Eigen::Vector3d::Zero();
-    for (const PosedView& p : posed) {
-      const Eigen::Vector3d d = p.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ();
-      const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - d * d.transpose();
-      m += across;
-      r += across * camera_center(p.cam_from_world);
-    }
-    focus = m.ldlt().solve(r);
-  }
+  NearestToLines axes;
+  for (const PosedView& p : posed)
+    axes.add(camera_center(p.cam_from_world),
+             p.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ());
+  // Axes that meet nowhere: any finite distance, the lines that it leaves are checked.
+  const Eigen::Vector3d focus =
+      axes.crossing() > 1e-9 ? axes.point() : Eigen::Vector3d(Eigen::Vector3d::Zero());
   for (std::size_t v = 0; v < posed.size(); ++v) {
     LineView view;
     view.cam_from_world = posed[v].cam_from_world;

@@ -7,6 +7,9 @@
 #include <memory>
 #include <opencv2/imgproc.hpp>
 
+#include "core/geometry/narrowed.hpp"
+#include "recon/alignment/edge_field.hpp"
+
 namespace orbitfuse {
 namespace {
 
@@ -130,14 +133,10 @@ Result<SceneRenderer> painted_scene(const SceneRenderer& renderer,
   const auto painters = std::make_shared<Painters>();
   for (std::size_t i = 0; i < std::min(views.size(), images.size()); ++i) {
     ORBITFUSE_TRY(progress.check("poses.thermal"));
-    const Camera& full = views[i].camera;
-    const int width = std::min(options.width_px, full.width);
     Painter painter;
-    painter.camera =
-        full.scaled_to(width, std::max(1, full.height * width / full.width)).without_distortion();
+    painter.camera = narrowed_to(views[i].camera, options.width_px).without_distortion();
     painter.cam_from_world = views[i].cam_from_world;
-    cv::resize(images[i], painter.image, {painter.camera.width, painter.camera.height}, 0, 0,
-               cv::INTER_AREA);
+    painter.image = reduced_to(images[i], painter.camera);
     ORBITFUSE_ASSIGN(const SceneRender seen, renderer(painter.camera, painter.cam_from_world));
     painter.depth = seen.depth;
     painters->push_back(std::move(painter));
@@ -156,14 +155,9 @@ Result<SceneRenderer> painted_scene(const SceneRenderer& renderer,
 
 Result<std::optional<double>> correlation_with(const SceneRenderer& painted, const cv::Mat& image,
                                                const PosedView& view) {
-  const int width = std::min(correlated_width_px, view.camera.width);
-  const Camera camera =
-      view.camera.scaled_to(width, std::max(1, view.camera.height * width / view.camera.width))
-          .without_distortion();
+  const Camera camera = narrowed_to(view.camera, correlated_width_px).without_distortion();
   ORBITFUSE_ASSIGN(const SceneRender painting, painted(camera, view.cam_from_world));
-  cv::Mat reduced;
-  cv::resize(image, reduced, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
-  return painted_correlation(painting.brightness, reduced);
+  return painted_correlation(painting.brightness, reduced_to(image, camera));
 }
 
 }  // namespace orbitfuse

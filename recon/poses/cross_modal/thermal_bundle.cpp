@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "core/geometry/narrowed.hpp"
 #include "core/image/undistorted.hpp"
 #include "core/numeric/median.hpp"
 #include "core/system/parallel.hpp"
@@ -66,12 +67,8 @@ double radial_reach_px(const BundleRound& round) {
   std::vector<double> radii;
   for (const ThermalTrack& track : round.tracks)
     radii.push_back(round.views.camera.normalized_of(track.sightings.front().pixel).norm());
-  if (radii.empty()) return 0;
   constexpr double most = 0.9;
-  const auto far =
-      radii.begin() + static_cast<std::ptrdiff_t>(most * static_cast<double>(radii.size()));
-  std::nth_element(radii.begin(), far, radii.end());
-  return std::pow(*far, 3) * round.views.camera.fx;
+  return std::pow(quantile(radii, most), 3) * round.views.camera.fx;
 }
 
 /// A patch confirms the view that it was taken from, and each that shows it, where both have it
@@ -112,20 +109,16 @@ std::optional<BundleSolution> solved(const BundleRound& round, const CommonLensP
 Result<BundleRound> prepared(const OrbitRefinement& refinement, const Fit& alignment,
                              const std::vector<std::size_t>& chosen,
                              const ThermalBundleOptions& options, int reach_px) {
-  const Camera& full = alignment.views.front().view.camera;
-  const int width = std::min(options.width_px, full.width);
   BundleRound round;
   ThermalViews& views = round.views;
   views.camera =
-      full.scaled_to(width, std::max(1, full.height * width / full.width)).without_distortion();
+      narrowed_to(alignment.views.front().view.camera, options.width_px).without_distortion();
   std::vector<SceneRender> renders;
   for (std::size_t i = 0; i < alignment.views.size(); ++i) {
     ORBITFUSE_TRY(refinement.progress.check("poses.thermal"));
     views.cam_from_world.push_back(alignment.views[i].view.cam_from_world);
-    cv::Mat image;
-    cv::resize(refinement.orbit.images[i], image, {views.camera.width, views.camera.height}, 0, 0,
-               cv::INTER_AREA);
-    views.images.push_back(straightened(image, views.camera, alignment.radial));
+    views.images.push_back(straightened(reduced_to(refinement.orbit.images[i], views.camera),
+                                        views.camera, alignment.radial));
     ORBITFUSE_ASSIGN(SceneRender render,
                      refinement.renderer(views.camera, views.cam_from_world.back()));
     views.depth.push_back(render.depth);

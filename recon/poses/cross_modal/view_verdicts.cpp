@@ -120,7 +120,6 @@ Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
     off_deg.push_back(seen.azimuth_off_deg);
     if (seen.correlation) correlations.push_back(*seen.correlation);
   }
-  constexpr double sigma_of_median = 1.4826;  // of a normal distribution
   for (ViewEvidence& seen : evidence) {
     seen.azimuth_scatter_deg = sigma_of_median * median(off_deg);
     seen.median_correlation = correlations.empty() ? 0 : median(correlations);

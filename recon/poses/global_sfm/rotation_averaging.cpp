@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/geometry/rotation_vector.hpp"
 #include "core/numeric/median.hpp"
 
 namespace orbitfuse {
@@ -21,11 +22,6 @@ Eigen::Vector3d log_of(Eigen::Quaterniond q) {
   const double sine = q.vec().norm();
   return sine < 1e-12 ? Eigen::Vector3d(2 * q.vec())
                       : Eigen::Vector3d(2 * std::atan2(sine, q.w()) / sine * q.vec());
-}
-Eigen::Quaterniond exp_of(const Eigen::Vector3d& v) {
-  const double angle = v.norm();
-  if (angle < 1e-12) return Eigen::Quaterniond::Identity();
-  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, v / angle));
 }
 
 /// What the pair says less what the rotations say, in the first camera's axes.
@@ -112,7 +108,7 @@ void step(const PairCandidates& candidates,
   const Eigen::VectorXd x = a.ldlt().solve(b);
   for (std::size_t f = 0; f < rotation.size(); ++f)
     rotation[f] =
-        (exp_of(x.segment<3>(3 * static_cast<Eigen::Index>(f))) * rotation[f]).normalized();
+        (turned_by(x.segment<3>(3 * static_cast<Eigen::Index>(f))) * rotation[f]).normalized();
 }
 
 }  // namespace

@@ -10,6 +10,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "core/geometry/narrowed.hpp"
+#include "core/geometry/rotation_vector.hpp"
 #include "core/numeric/median.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/alignment/edge_field.hpp"
@@ -26,7 +28,7 @@ std::size_t at(int index) { return static_cast<std::size_t>(index); }
 Camera thermal_camera(const Camera& lens, double focal_px, int width) {
   Camera camera = lens;
   camera.fx = camera.fy = focal_px;
-  return camera.scaled_to(width, std::max(1, lens.height * width / lens.width));
+  return at_width(camera, width);
 }
 
 /// Edges of an image whose NaN pixels show nothing.
@@ -36,12 +38,6 @@ cv::Mat edges_of(const cv::Mat& image) {
   cv::dilate(blind, blind, {}, {-1, -1}, 4);  // the border of what is shown is no edge
   field.setTo(cv::Scalar::all(0), blind);
   return field;
-}
-
-cv::Mat thermal_edges(const cv::Mat& image, const Camera& camera) {
-  cv::Mat small;
-  cv::resize(image, small, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
-  return orientation_field(small, 1.0);
 }
 
 cv::Mat energy_of(const cv::Mat& field) {
@@ -64,7 +60,7 @@ class ShiftSearch {
       : views_(views), options_(options) {
     const Camera camera = thermal_camera(options.thermal_lens, 1, width);
     for (const RigView& view : views) {
-      thermal_.push_back(thermal_edges(view.thermal, camera));
+      thermal_.push_back(edges_at(view.thermal, camera));
       energy_.push_back(cv::sum(energy_of(thermal_.back()))[0]);
     }
   }
@@ -175,7 +171,7 @@ RoundResult match_round(const std::vector<RigView>& views, const RigEstimate& ri
     for (const Eigen::Vector3d& point : view.points) turned.push_back(turn * point);
     seen.depth = sparse_depth(turned, result.camera);
     result.edges[at(i)] = edges_of(seen.brightness);
-    result.fields[at(i)] = thermal_edges(view.thermal, result.camera);
+    result.fields[at(i)] = edges_at(view.thermal, result.camera);
     result.matches[at(i)] =
         match_patches(seen, result.edges[at(i)], result.camera, result.fields[at(i)],
                       {round.search_px, round.patch_search_px, round.patch_radius_px, 8});
@@ -304,10 +300,7 @@ Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOpt
     double log_focal = 0;
     solve(matched, options, depth, rig, correction, log_focal);
     judge(matched, correction, log_focal, rig);
-    const Eigen::Vector3d turn(correction[0], correction[1], correction[2]);
-    const Eigen::Quaterniond more(turn.norm() > 1e-12
-                                      ? Eigen::AngleAxisd(turn.norm(), turn.normalized())
-                                      : Eigen::AngleAxisd::Identity());
+    const Eigen::Quaterniond more = turned_by({correction[0], correction[1], correction[2]});
     rig.thermal_from_visible.rotation = (more * rig.thermal_from_visible.rotation).normalized();
     rig.thermal_from_visible.translation = {correction[3], correction[4], correction[5]};
     rig.thermal.fx = rig.thermal.fy = rig.thermal.fx * std::exp(log_focal);

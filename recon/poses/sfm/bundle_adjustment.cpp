@@ -11,6 +11,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/numeric/median.hpp"
 #include "recon/alignment/projection.hpp"
 
 namespace orbitfuse {
@@ -312,10 +313,7 @@ void measure(const Reconstruction& model, BundleReport& report) {
     angles.push_back(triangulation_angle_deg(point, model.views));
   }
   report.rms_px = std::sqrt(sum / std::max(report.observations, 1));
-  if (angles.empty()) return;
-  const auto middle = angles.begin() + static_cast<std::ptrdiff_t>(angles.size() / 2);
-  std::nth_element(angles.begin(), middle, angles.end());
-  report.median_triangulation_angle_deg = *middle;
+  report.median_triangulation_angle_deg = median_in(angles);
 }
 
 void store_point_errors(Reconstruction& model) {

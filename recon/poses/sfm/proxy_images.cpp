@@ -9,6 +9,7 @@
 
 #include "core/image/image_io.hpp"
 #include "core/image/palette.hpp"
+#include "core/numeric/median.hpp"
 #include "recon/alignment/luminance.hpp"
 
 namespace orbitfuse {
@@ -22,9 +23,7 @@ void remove_row_offsets(cv::Mat& image) {
   for (int y = 0; y < image.rows; ++y) {
     for (int x = 0; x < image.cols; ++x)
       difference[static_cast<std::size_t>(x)] = image.at<float>(y, x) - smooth.at<float>(y, x);
-    const auto middle = difference.begin() + image.cols / 2;
-    std::nth_element(difference.begin(), middle, difference.end());
-    image.row(y) -= *middle;
+    image.row(y) -= median_in(difference);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <opencv2/calib3d.hpp>
 #include <set>
 
+#include "core/geometry/rotation_vector.hpp"
 #include "core/system/parallel.hpp"
 
 namespace orbitfuse {
@@ -81,13 +82,10 @@ std::optional<Resected> solve(const FeatureGraph& graph, int frame, const Camera
   }
   cv::solvePnPRefineLM(kept_points, kept_plane, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotation,
                        translation);
-  const Eigen::Vector3d turn(rotation.at<double>(0), rotation.at<double>(1),
-                             rotation.at<double>(2));
   Resected result;
   result.inliers = agreed;
   result.pose.rotation =
-      Eigen::AngleAxisd(turn.norm(), turn.norm() > 1e-12 ? Eigen::Vector3d(turn.normalized())
-                                                         : Eigen::Vector3d::UnitX());
+      turned_by({rotation.at<double>(0), rotation.at<double>(1), rotation.at<double>(2)});
   result.pose.translation = {translation.at<double>(0), translation.at<double>(1),
                              translation.at<double>(2)};
   if (!result.pose.is_finite()) return std::nullopt;

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "core/geometry/nearest_to_lines.hpp"
 #include "core/system/parallel.hpp"
 
 namespace orbitfuse {
@@ -67,18 +68,11 @@ std::vector<Features> connected(const FeatureGraph& graph, const PairMatches& ma
   return result;
 }
 
-/// Least squares over all rays: the point nearest to them.
 Eigen::Vector3d nearest_point(const std::vector<Eigen::Vector3d>& centers,
                               const std::vector<Eigen::Vector3d>& directions) {
-  Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d b = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < centers.size(); ++i) {
-    const Eigen::Matrix3d across =
-        Eigen::Matrix3d::Identity() - directions[i] * directions[i].transpose();
-    a += across;
-    b += across * centers[i];
-  }
-  return a.ldlt().solve(b);
+  NearestToLines rays;
+  for (std::size_t i = 0; i < centers.size(); ++i) rays.add(centers[i], directions[i]);
+  return rays.point();
 }
 
 struct Seen {

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <queue>
 
+#include "core/numeric/median.hpp"
 #include "recon/registration/clouds/outlier_filter.hpp"
 #include "recon/registration/clouds/thinning.hpp"
 
@@ -16,12 +17,6 @@ namespace orbitfuse::registration {
 namespace {
 
 constexpr std::size_t fewest_points_of_cloud = 20;
-
-double percentile(std::vector<double> values, double share) {
-  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + at, values.end());
-  return values[static_cast<std::size_t>(at)];
-}
 
 /// Coordinate medians as the centre, 90 % of the points within radius 1: few far points move
 /// neither.
@@ -31,11 +26,11 @@ Similarity3d unit_frame(const Points& points) {
   for (int d = 0; d < 3; ++d) {
     std::transform(points.begin(), points.end(), values.begin(),
                    [d](const auto& p) { return p[d]; });
-    center[d] = percentile(values, 0.5);
+    center[d] = quantile(values, 0.5);
   }
   std::transform(points.begin(), points.end(), values.begin(),
                  [&](const auto& p) { return (p - center).norm(); });
-  double radius = percentile(values, 0.9);
+  double radius = quantile(values, 0.9);
   if (!(radius > 0)) radius = *std::max_element(values.begin(), values.end());
   Similarity3d unit;
   unit.scale = radius > 0 ? 1.0 / radius : 1.0;

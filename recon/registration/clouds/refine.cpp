@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/geometry/rotation_vector.hpp"
+#include "core/numeric/median.hpp"
 #include "recon/registration/clouds/pairs.hpp"
 
 namespace orbitfuse::registration {
@@ -60,11 +62,7 @@ bool enough(const Equations& equations) {
 
 }  // namespace
 
-double robust_sigma(std::vector<double>& sizes) {
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  return 1.4826 * *middle;
-}
+double robust_sigma(std::vector<double>& sizes) { return sigma_of_median * median_in(sizes); }
 
 Vector7 plane_jacobian(const Eigen::Vector3d& lever, const Eigen::Vector3d& normal) {
   Vector7 j;
@@ -74,11 +72,7 @@ Vector7 plane_jacobian(const Eigen::Vector3d& lever, const Eigen::Vector3d& norm
 
 Similarity3d updated(const Similarity3d& target_from_source, const Eigen::Vector3d& center,
                      const Vector7& update) {
-  const Eigen::Vector3d omega = update.head<3>();
-  const double angle = omega.norm();
-  const Eigen::Quaterniond turn = angle > 0
-                                      ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, omega / angle))
-                                      : Eigen::Quaterniond::Identity();
+  const Eigen::Quaterniond turn = turned_by(update.head<3>());
   const double grow = std::exp(update[3]);
   Similarity3d result;
   result.scale = grow * target_from_source.scale;

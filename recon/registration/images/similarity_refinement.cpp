@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "core/geometry/narrowed.hpp"
 #include "recon/alignment/edge_field.hpp"
 #include "recon/alignment/whole_view.hpp"
 #include "recon/registration/images/similarity_round.hpp"
@@ -77,17 +78,11 @@ Result<double> similarity_support(const SceneRenderer& visible, const std::vecto
   for (std::size_t k = 0; k < count; ++k) {
     ORBITFUSE_TRY(progress.check("register"));
     const PosedView& view = thermal[k * thermal.size() / count];
-    const int width = std::min(render_width_px, view.camera.width);
-    const Camera camera =
-        view.camera.scaled_to(width, std::max(1, view.camera.height * width / view.camera.width))
-            .without_distortion();
+    const Camera camera = narrowed_to(view.camera, render_width_px).without_distortion();
     ORBITFUSE_ASSIGN(const SceneRender seen,
                      visible(camera, rebase(view.cam_from_world, visible_from_thermal)));
-    cv::Mat reduced;
-    cv::resize(images[k * thermal.size() / count], reduced, {camera.width, camera.height}, 0, 0,
-               cv::INTER_AREA);
-    const WholeMatch match =
-        match_whole(rendered_edges(seen), orientation_field(reduced, 1.0), reach_px);
+    const cv::Mat field = edges_at(images[k * thermal.size() / count], camera);
+    const WholeMatch match = match_whole(rendered_edges(seen), field, reach_px);
     sum += std::max(0.0, match.correlation);
   }
   return sum / static_cast<double>(count);

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "core/geometry/narrowed.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/alignment/edge_field.hpp"
 
@@ -108,10 +109,7 @@ Result<SimilarityRound> match_scene(const SceneRenderer& visible,
   std::vector<Rigid3d> poses;
   for (const PosedView& view : thermal) {
     ORBITFUSE_TRY(progress.check("register"));
-    const int width = std::min(round.width_px, view.camera.width);
-    cameras.push_back(
-        view.camera.scaled_to(width, std::max(1, view.camera.height * width / view.camera.width))
-            .without_distortion());
+    cameras.push_back(narrowed_to(view.camera, round.width_px).without_distortion());
     poses.push_back(rebase(view.cam_from_world, visible_from_thermal));
     ORBITFUSE_ASSIGN(SceneRender render, visible(cameras.back(), poses.back()));
     renders.push_back(std::move(render));
@@ -120,9 +118,7 @@ Result<SimilarityRound> match_scene(const SceneRenderer& visible,
                                    8};
   parallel_for(static_cast<int>(thermal.size()), [&](int index) {
     const auto i = static_cast<std::size_t>(index);
-    cv::Mat reduced;
-    cv::resize(images[i], reduced, {cameras[i].width, cameras[i].height}, 0, 0, cv::INTER_AREA);
-    const cv::Mat edges = rendered_edges(renders[i]), field = orientation_field(reduced, 1.0);
+    const cv::Mat edges = rendered_edges(renders[i]), field = edges_at(images[i], cameras[i]);
     const Rigid3d world_from_cam = poses[i].inverse();
     for (const PatchMatch& match : match_patches(renders[i], edges, cameras[i], field, matching))
       of_view[i].push_back(

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/numeric/median.hpp"
 #include "core/option_range.hpp"
 #include "recon/registration/images/similarity_round.hpp"
 
@@ -79,9 +80,7 @@ Eigen::Vector3d middle(const std::vector<ScenePatch>& patches) {
   std::vector<double> values(patches.size());
   for (int axis = 0; axis < 3; ++axis) {
     for (std::size_t i = 0; i < patches.size(); ++i) values[i] = patches[i].point[axis];
-    const auto half = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), half, values.end());
-    result[axis] = *half;
+    result[axis] = median_in(values);
   }
   return result;
 }

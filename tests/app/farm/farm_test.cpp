@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
 #include <unistd.h>
+#include <cmath>
 
 #include <algorithm>
 #include <chrono>
@@ -18,6 +20,7 @@
 #include "app/farm/slurm.hpp"
 #include "app/farm/slurm_farm.hpp"
 #include "app/farm/stage_job.hpp"
+#include "app/stages/build_stages.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -172,10 +175,11 @@ TEST_F(FarmTest, AProgramThatIsNotThereIsSaid) {
 TEST_F(FarmTest, ThePlanComesBackAsItWasWrittenAndABrokenOneIsRefused) {
   program("");
   plan.options = {"--set", "render.views=2"};
-  plan.needs["first"] = {4, 8000, 30, true};
+  plan.needs["first"] = {4, 8000, 30, true, 12.5};
   plan.on_slurm = true;
   plan.slurm.partition = "long";
-  plan.rounds = {{1000, {"12", "13"}}};
+  plan.rounds = {{1000, {"12", "13"}, {{"first", "second"}}}};
+  plan.slurm.least_job_s = 7;
   ASSERT_TRUE(write_plan(out, plan));
   const auto read = read_plan(out);
   ASSERT_TRUE(read);
@@ -183,6 +187,8 @@ TEST_F(FarmTest, ThePlanComesBackAsItWasWrittenAndABrokenOneIsRefused) {
   EXPECT_EQ(read->needs, plan.needs);
   EXPECT_EQ(read->slurm.partition, "long");
   EXPECT_EQ(read->rounds.at(0).jobs, plan.rounds.at(0).jobs);
+  EXPECT_EQ(read->rounds.at(0).stages, plan.rounds.at(0).stages);
+  EXPECT_EQ(read->slurm.least_job_s, 7);
   for (const char* text : {"", "[]", "{\"schema\":1", "{\"schema\":1}", "{\"schema\":9}"}) {
     test::put(out / plan_file, text);
     const auto broken = read_plan(out);
@@ -268,17 +274,57 @@ TEST_F(FarmTest, ATaskThatSlurmStartedTooOftenIsGivenUpAndAResumeTriesAnew) {
   ASSERT_TRUE(write_outcome(out, "a", "first", lost));
   {
     const Variables slurm({{"SLURM_RESTART_COUNT", std::to_string(plan.tries)}});
-    EXPECT_FALSE(run_task(out, plan, "first", 0, Progress{}));
+    EXPECT_FALSE(run_task(out, plan, {"first", "second"}, 0, Progress{}));
     EXPECT_EQ(outcome("a", "first").state, JobState::failed);
     EXPECT_EQ(outcome("a", "first").cause, "interrupted 3 times; last on n7");
+    EXPECT_EQ(outcome("a", "second").starts, 0);
   }
-  EXPECT_TRUE(run_task(out, plan, "first", 0, Progress{}));
+  EXPECT_TRUE(run_task(out, plan, {"first", "second"}, 0, Progress{}));
   EXPECT_EQ(outcome("a", "first").state, JobState::done);
+  EXPECT_EQ(outcome("a", "second").starts, 1);
+}
+
+TEST_F(FarmTest, ATaskGoesOnWithItsChainAndNotBeyondAFailure) {
+  program("[ $session$stage = bsecond ] && exit 3\nexit 0\n");
+  plan.stages = {"first", "second", "third"};
+  EXPECT_TRUE(run_task(out, plan, plan.stages, 0, Progress{}));
+  EXPECT_FALSE(run_task(out, plan, plan.stages, 1, Progress{}));
+  EXPECT_EQ(outcome("a", "third").state, JobState::done);
+  EXPECT_EQ(outcome("b", "first").state, JobState::done);
+  EXPECT_EQ(outcome("b", "second").state, JobState::failed);
+  EXPECT_EQ(outcome("b", "third").state, JobState::waiting);
+  // Started again: what is done stays, the rest goes on.
+  program("exit 0\n");
+  EXPECT_TRUE(run_task(out, plan, {"first", "second", "third"}, 1, Progress{}));
+  EXPECT_EQ(outcome("b", "first").starts, 1);
+  EXPECT_EQ(outcome("b", "second").starts, 2);
+}
+
+TEST_F(FarmTest, OfAChainThatSlurmEndedOnlyWhatWasCutOffGetsMore) {
+  program("");
+  fs::create_directories(out);
+  plan.rounds = {{0, {"12", "13"}, {{"first", "second"}}}};
+  plan.needs["first"] = plan.needs["second"] = {1, 1000, 10, false, 5};
+  for (const char* session : {"a", "b", "c"}) {
+    JobOutcome done;
+    done.state = JobState::done;
+    ASSERT_TRUE(write_outcome(out, session, "first", done));
+  }
+  JobOutcome running;  // killed with all that would have recorded it
+  running.state = JobState::running;
+  ASSERT_TRUE(write_outcome(out, "b", "second", running));
+  test::put(temp / "bin/sacct", "#!/bin/sh\necho COMPLETED; echo TIMEOUT\n");
+  fs::permissions(temp / "bin/sacct", fs::perms::owner_all);
+  const Variables slurm({{"PATH", (temp / "bin").string() + ":" + std::string(getenv("PATH"))}});
+  raise_needs(out, plan, Progress{});
+  EXPECT_EQ(plan.needs_of("first").time_min, 10);
+  EXPECT_EQ(plan.needs_of("second").time_min, 20);
+  EXPECT_EQ(plan.needs_of("second").memory_mb, 1000);
 }
 
 TEST_F(FarmTest, JobsOfAnotherUserAndOfADeadSubmissionAreQueuedOnes) {
   fs::create_directories(out);
-  plan.rounds = {{0, {"12", "13"}}};
+  plan.rounds = {{0, {"12", "13"}, {}}};
   test::put(temp / "bin/squeue", "#!/bin/sh\necho '12 /elsewhere\n13 /elsewhere\n14 " +
                                      out.string() + "\n15 " + out.string() + "/x'\n");
   fs::permissions(temp / "bin/squeue", fs::perms::owner_all);
@@ -313,15 +359,59 @@ TEST(Slurm, WordsOfAnArray) {
   EXPECT_EQ(index_list({0, 1, 2, 5, 7, 8}), "0-2,5,7-8");
   EXPECT_EQ(shell_word("it's"), "'it'\\''s'");
   FarmPlan plan;
-  plan.needs["train"] = {4, 3000, 30, true};
+  const StageChain chain{{"train", "render"}, {4, 3000, 30, true, 90}};
   plan.slurm = {"cpu", "gpu", ""};
-  const auto words = array_words(plan, "/farm", "train", "0-2", "17");
+  const auto words = array_words(plan, "/farm", chain, "0-2", "17");
   for (const char* word :
        {"--cpus-per-task=4", "--mem=3000M", "--time=30", "--array=0-2", "--partition=gpu",
         "--dependency=aftercorr:17", "--kill-on-invalid-dep=yes", "--requeue"})
     EXPECT_THAT(words, ::testing::Contains(word));
   plan.slurm.gpu_partition.clear();
-  EXPECT_THAT(array_words(plan, "/farm", "train", "0", ""), ::testing::Contains("--partition=cpu"));
+  EXPECT_THAT(array_words(plan, "/farm", chain, "0", ""), ::testing::Contains("--partition=cpu"));
+}
+
+TEST(StageChains, GoOnUntilTheyAreLongEnough) {
+  FarmPlan plan;
+  plan.slurm.least_job_s = 60;
+  const auto stage = [&](const char* name, StageNeeds needs) {
+    plan.stages.push_back(name);
+    plan.needs[name] = needs;
+  };
+  const auto names = [&] {
+    std::vector<std::vector<std::string>> all;
+    for (const StageChain& chain : stage_chains(plan)) all.push_back(chain.stages);
+    return all;
+  };
+  stage("a", {2, 1000, 10, false, 40});
+  stage("b", {1, 4000, 5, false, 30});
+  stage("c", {2, 2000, 10, false, 55});
+  stage("d", {2, 2000, 10, false, 5});
+  stage("e", {2, 2000, 10, false, 5});
+  using Names = std::vector<std::vector<std::string>>;
+  EXPECT_EQ(names(), (Names{{"a", "b"}, {"c", "d", "e"}})) << "a short rest joins";
+  EXPECT_EQ(stage_chains(plan)[0].needs, (StageNeeds{2, 4000, 15, false, 70}));
+  plan.needs["c"].usual_s = 0;
+  EXPECT_EQ(names(), (Names{{"a", "b"}, {"c", "d", "e"}})) << "unknown counts as long";
+  plan.needs["c"].gpu = true;
+  EXPECT_EQ(names(), (Names{{"a", "b"}, {"c"}, {"d", "e"}}));
+  plan.slurm.least_job_s = 0;
+  EXPECT_EQ(names(), (Names{{"a"}, {"b"}, {"c"}, {"d"}, {"e"}}));
+  plan.slurm.least_job_s = 1e9;
+  plan.needs["c"].gpu = false;
+  plan.needs["c"].usual_s = 55;
+  EXPECT_EQ(names().size(), 1u);
+}
+
+TEST(StageChains, OfADefaultRunLastAMinuteAndMore) {
+  FarmPlan plan;
+  plan.stages = stages::stage_names();
+  plan.needs = default_needs(plan.stages, 2, false);
+  const auto chains = stage_chains(plan);
+  EXPECT_GE(chains.size(), 2u);
+  for (const StageChain& chain : chains) {
+    EXPECT_GE(chain.needs.usual_s, plan.slurm.least_job_s);
+    EXPECT_TRUE(std::isfinite(chain.needs.usual_s)) << "a stage without a measured time";
+  }
 }
 
 TEST(Slurm, NotInstalledIsSaidWithAWayOut) {

@@ -45,19 +45,22 @@ refused "no stage uses a GPU" "$work/car1" --out "$work/refused" --slurm --gpu-p
 [ -z "$(squeue -h)" ] || fail "a refused farm left jobs"
 
 # -- six sessions, one broken; a node dies in the middle of a stage and comes back -------------------
+running_of() { python3 "$here/slurm_farm_check.py" running "$@"; }  # FARM SESSION
 kill_a_node() {  # FARM; prints the session and stage whose stage was interrupted
+  local stage
   while true; do
-    read -r job array task name <<< "$(squeue -h -t R -w n2 -o '%A %F %K %j' | grep -E 'depth|train' | head -1)"
-    if [ -n "${job:-}" ] && [ "$(state_of "$1" "car$((task + 1))" "${name#orbitfuse-}")" = running ]; then
+    read -r job array task <<< "$(squeue -h -t R -w n2 -o '%A %F %K' | head -1)"
+    if [ -n "${job:-}" ] && running_of "$1" "car$((task + 1))" | grep -qE 'depth|train'; then
       kill_node n2 "$job"
-      [ "$(state_of "$1" "car$((task + 1))" "${name#orbitfuse-}")" = running ] && break
-      node n2  # it had ended just then: another one
+      stage=$(running_of "$1" "car$((task + 1))")  # what it was at, and nothing goes on from here
+      [ -n "$stage" ] && break
+      node n2  # it was between two stages: another one
     fi
     sleep 0.1
   done
   while [ "$(squeue -h -j "${array}_$task" -o %T)" = RUNNING ]; do sleep 1; done
   node n2  # Slurm starts the job again after two minutes; made sooner, it forgets the job's end
-  echo "car$((task + 1))/${name#orbitfuse-}"
+  echo "car$((task + 1))/$stage"
 }
 farm=$work/farm
 "$program" farm "$work"/car? --out "$farm" --slurm --stage-cores 1 "${options[@]}"
@@ -109,7 +112,7 @@ echo 0 > "$work/stage_s"
 farm=$work/gathered
 stand_in "$farm" "$work/a" "$work/b" "$work/c"
 # shellcheck disable=SC2046
-scontrol update "JobId=$(squeue -h -n orbitfuse-depth -o %F | sort -u)" TimeLimit=1
+scontrol update "JobId=$(squeue -h -n orbitfuse-poses_visible -o %F | sort -u)" TimeLimit=1
 scontrol update NodeName=n1,n2 State=RESUME
 wait_until_empty
 check gathered "$farm"

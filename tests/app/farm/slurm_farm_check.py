@@ -133,7 +133,8 @@ def check_measured(farm, stage_s, begin):
     work = sum(o["wall_s"] for o in outcomes if o["state"] == "done")
     cost = (SLOTS * wall - work) / len(outcomes)
     print(f"{len(outcomes)} stages of {work / len(outcomes):.2f} s ({stage_s} asked for) in {SLOTS} slots: "
-          f"{wall:.1f} s of wall time; idle {cost:.2f} s a stage, {100 * cost / (work / len(outcomes) + cost):.1f} %")
+          f"{wall:.1f} s of wall time; idle {cost:.2f} s a stage, {100 * cost / (work / len(outcomes) + cost):.1f} %; "
+          f"{len(plan['slurm']['rounds'][0]['jobs']) - 1} jobs a session")
     return [f"{o}" for o in outcomes if o["state"] != "done"]
 
 
@@ -143,13 +144,20 @@ def edit(farm, field, value):
     return []
 
 
+def running(farm, session):
+    """The stage that runs, or nothing."""
+    print(next((s for s in plan_of(pathlib.Path(farm))["stages"]
+                if outcome(pathlib.Path(farm), session, s)["state"] == "running"), ""))
+    return []
+
+
 def state(farm, session, stage):
     print(outcome(pathlib.Path(farm), session, stage)["state"])
     return []
 
 
 ORDERS = {"farm": check_farm, "resumed": check_resumed, "gathered": check_gathered,
-          "measured": check_measured, "edit": edit, "state": state}
+          "measured": check_measured, "edit": edit, "state": state, "running": running}
 failures = ORDERS[sys.argv[1]](*sys.argv[2:])
 print("\n".join(failures), end="\n" if failures else "")
 sys.exit(bool(failures))

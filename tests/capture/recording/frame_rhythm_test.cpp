@@ -73,6 +73,15 @@ TEST(FrameRhythm, APauseChangesNothingOfWhatWasLearnt) {
   EXPECT_NEAR(static_cast<double>(rhythm.frames_in(10)), 100, 5);
 }
 
+TEST(FrameRhythm, ABusyMomentDoesNotHideTheRateThatTheStreamHeld) {
+  FrameRhythm rhythm = settled_at_10_hz(20);
+  std::int64_t stamp = 1000 * ms + 1900 * ms;
+  for (std::uint64_t id = 20; id < 60; ++id) rhythm.note(id, stamp += 160 * ms);
+  EXPECT_NEAR(static_cast<double>(rhythm.frames_in(16)), 100, 2);
+  EXPECT_EQ(rhythm.most_frames_in(16), 160u);
+  EXPECT_EQ(FrameRhythm().most_frames_in(16), 1u);
+}
+
 TEST(FrameRhythm, StampsThatAreNoTimeSayNothing) {
   FrameRhythm rhythm = settled_at_10_hz(20);
   for (const std::int64_t stamp : {std::numeric_limits<std::int64_t>::min(), std::int64_t{-1},
