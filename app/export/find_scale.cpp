@@ -7,13 +7,9 @@
 #include <charconv>
 #include <cmath>
 #include <numbers>
-#include <opencv2/imgproc.hpp>
 #include <optional>
 
-#include "capture/mat/mat_finder.hpp"
 #include "core/geometry/lens_fold.hpp"
-#include "core/image/image_io.hpp"
-#include "core/image/undistorted.hpp"
 #include "core/numeric/median.hpp"
 
 namespace orbitfuse::exporting {
@@ -168,20 +164,6 @@ double residual(const Similarity3d& metres_from_world, const PosePair& pair) {
       .norm();
 }
 
-/// As the finder wants it: a pinhole with its principal point in the middle.
-cv::Mat straight(const cv::Mat& image, const Camera& camera) {
-  Camera middle = camera.without_distortion();
-  middle.fy = middle.fx;
-  middle.cx = camera.width / 2.0;
-  middle.cy = camera.height / 2.0;
-  cv::Mat gray;
-  if (image.channels() == 3)
-    cv::cvtColor(image, gray, cv::COLOR_BGR2GRAY);
-  else
-    gray = image;
-  return undistorted(gray, camera, middle);
-}
-
 }  // namespace
 
 Result<double> metres_of(const std::string& option, const std::string& words) {
@@ -249,34 +231,6 @@ Result<MetricScale> scale_of_cameras(std::vector<PosePair> pairs, const std::str
                     fmt::format("{} cameras, {:.4f} m off", pairs.size(), rms)};
   ORBITFUSE_TRY(scale.validate(source));
   return scale;
-}
-
-Result<MetricScale> scale_of_mat(const view::FinishedRun& run, const MatDesign& design,
-                                 const Progress& progress) {
-  ORBITFUSE_TRY(design.validate());
-  if (!run.session)
-    return fail(ErrorKind::input, "mat", "the session is not where the run read it",
-                "bring it back");
-  std::vector<PosePair> pairs;
-  int looked = 0;
-  for (const view::RecordedView& v : run.views) {
-    if (v.modality != Modality::visible || v.doubt) continue;
-    ORBITFUSE_TRY(progress.check("mat"));
-    ++looked;
-    // A new finder for each: what it would follow from one image to the next is not read.
-    MatFinder finder(design);
-    finder.set_focal_px(Modality::visible, v.view.camera.fx);
-    ORBITFUSE_ASSIGN(const cv::Mat image, read_visible(run.session->folder / v.view.name));
-    if (image.cols != v.view.camera.width || image.rows != v.view.camera.height) continue;
-    const auto sighting = finder.find(straight(image, v.view.camera), Modality::visible);
-    if (sighting && !sighting->followed)
-      pairs.push_back({v.view.cam_from_world, sighting->cam_from_mat, v.view.name});
-  }
-  if (pairs.size() < 3)
-    return fail(ErrorKind::input, "mat",
-                fmt::format("{} of {} visible views show it", pairs.size(), looked),
-                "see that the whole mat lies round the object, or tell one distance: --distance");
-  return scale_of_cameras(std::move(pairs), "mat");
 }
 
 Result<MetricScale> scale_of_known_poses(const view::FinishedRun& run) {

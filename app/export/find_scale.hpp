@@ -5,7 +5,6 @@
 
 #include "app/stages/metric_scale.hpp"
 #include "app/view/finished_run.hpp"
-#include "capture/mat/mat_design.hpp"
 #include "core/geometry/pose_error.hpp"
 #include "recon/measurement/request.hpp"
 
@@ -30,11 +29,6 @@ Result<stages::MetricScale> scale_of_distance(const view::FinishedRun& run,
 /// they are not the same cameras).
 Result<stages::MetricScale> scale_of_cameras(std::vector<PosePair> pairs,
                                              const std::string& source);
-
-/// By the printed mat in the visible frames. Errors: usage (design), input (no session, no visible
-/// views, too few of them show the mat), cancelled.
-Result<stages::MetricScale> scale_of_mat(const view::FinishedRun& run, const MatDesign& design,
-                                         const Progress& progress);
 
 /// By the poses that came with the session, whose unit the user vouches to be metres. Errors: input
 /// (no session, none of its frames has one).

@@ -33,6 +33,15 @@ namespace {
 constexpr const char* kind_names[] = {"usage",   "input",       "device",
                                       "quality", "unavailable", "cancelled"};
 
+/// Hash of all else: what reads a record relies on the types of what it holds.
+constexpr const char* check_key = "check";
+
+bool is_altered(json& record) {
+  const json check = record.at(check_key);
+  record.erase(check_key);
+  return check != content_hash(record.dump());
+}
+
 json outputs_json(const std::vector<OutputFile>& outputs) {
   json list = json::array();
   for (const OutputFile& o : outputs)
@@ -79,11 +88,14 @@ Result<StageRecord> read_stage_record(const fs::path& folder) {
   const fs::path file = folder / stage_record_file;
   ORBITFUSE_ASSIGN(const std::string text, read_file(file));
   try {
-    const json j = nests_too_deep(text) ? json() : json::parse(text);
-    StageRecord r;
-    if (j.at("schema").get<int>() != stage_record_schema)
+    json j = nests_too_deep(text) ? json() : json::parse(text);
+    if (j.at("schema") != stage_record_schema)
       return fail(ErrorKind::input, file.string(), "schema " + j.at("schema").dump(),
                   "run the stage again");
+    if (is_altered(j))
+      return fail(ErrorKind::input, file.string(), "not what the stage wrote: edited, or damaged",
+                  "run the stage again");
+    StageRecord r;
     j.at("stage").get_to(r.stage);
     j.at("version").get_to(r.version);
     j.at("key").get_to(r.key);
@@ -106,7 +118,9 @@ Result<StageRecord> read_stage_record(const fs::path& folder) {
 }
 
 Status write_stage_record(const fs::path& folder, const StageRecord& record) {
-  return write_file_atomic(folder / stage_record_file, to_json(record).dump(2) + "\n");
+  json j = to_json(record);
+  j[check_key] = content_hash(j.dump());
+  return write_file_atomic(folder / stage_record_file, j.dump(2) + "\n");
 }
 
 std::set<std::string> finished_stages(const fs::path& out) {

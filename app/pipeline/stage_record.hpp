@@ -11,7 +11,7 @@
 
 namespace orbitfuse::pipeline {
 
-inline constexpr int stage_record_schema = 1;
+inline constexpr int stage_record_schema = 2;
 inline constexpr const char* stage_record_file = "stage.json";
 
 struct OutputFile {

@@ -7,6 +7,7 @@
 #include "app/cli/verb.hpp"
 #include "app/export/dataset.hpp"
 #include "app/export/find_scale.hpp"
+#include "app/export/mat_scale.hpp"
 #include "app/export/surface_files.hpp"
 
 namespace orbitfuse::cli {

@@ -13,6 +13,7 @@
 #include <random>
 
 #include "app/export/find_scale.hpp"
+#include "app/export/mat_scale.hpp"
 #include "bench/export/true_scene.hpp"
 #include "core/numeric/median.hpp"
 #include "recon/surface/surface.hpp"

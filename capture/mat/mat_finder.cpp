@@ -203,6 +203,7 @@ std::optional<MatSighting> MatFinder::find(const cv::Mat& image, Modality modali
         std::hypot(angle_difference_deg(other[0], angles[0]), other[1] - angles[1]) / 2;
   }
   sighting.followed = followed;
+  if (!followed) sighting.corners = corners;
   if (followed) {
     sighting.position.sigma_deg += followed_sigma_deg;
   } else if (modality == Modality::visible) {

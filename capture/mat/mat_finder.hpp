@@ -28,6 +28,7 @@ struct MatSighting {
   int tags = 0;
   bool followed = false;  ///< not read: by optical flow of the mat, or by odometry on the scene
   double error_px = 0;    ///< root mean square, at the image's own size
+  MatCorners corners;     ///< as read, centres of pixels at whole numbers; of followed ones none
 };
 
 /// Finds the mat in images, given in their order, and says where the camera stands in the mat's

@@ -5,16 +5,14 @@
 
 #include <algorithm>
 
+#include "recon/poses/frame_camera.hpp"
+
 namespace orbitfuse {
 namespace {
 
 std::optional<Camera> known_camera(const Session& session, const FrameRecord& frame) {
   if (frame.camera) return frame.camera;
-  const DeviceInfo* device = session.device(frame.device);
-  if (device == nullptr || !device->lens.calibrated) return std::nullopt;
-  const Camera& camera = *device->lens.calibrated;
-  if (frame.width <= 0 || frame.height <= 0) return camera;
-  return camera.scaled_to(frame.width, frame.height);
+  return calibrated_camera(session, frame.device, frame.width, frame.height);
 }
 
 bool at_one_place(const Reconstruction& model) {

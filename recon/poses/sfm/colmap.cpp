@@ -10,6 +10,7 @@
 #include "core/system/file_io.hpp"
 #include "core/system/parallel.hpp"
 #include "core/system/process.hpp"
+#include "recon/poses/frame_camera.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -19,15 +20,9 @@ namespace fs = std::filesystem;
 /// Where extraction starts: the device's focal prior at the proxy's size, else COLMAP's own guess
 /// of 1.2 times the longer side.
 std::string camera_parameters(const Session& session, const ProxyImage& image) {
-  const DeviceInfo* device = session.device(image.frame->device);
+  const FrameRecord& frame = *image.frame;
   double focal = 1.2 * std::max(image.width, image.height);
-  if (device != nullptr && image.frame->width > 0) {
-    const double scale = static_cast<double>(image.width) / image.frame->width;
-    if (device->lens.calibrated)
-      focal = device->lens.calibrated->fx * scale;
-    else if (device->lens.focal_px)
-      focal = *device->lens.focal_px * scale;
-  }
+  if (frame.width > 0) focal = sfm_prior_camera(session, frame).fx * image.width / frame.width;
   return fmt::format("{},{},{},0", focal, image.width / 2.0, image.height / 2.0);
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "recon/poses/frame_camera.hpp"
 #include "recon/poses/sfm/colmap_database.hpp"
 
 namespace orbitfuse {
@@ -27,18 +28,6 @@ Eigen::Matrix3Xd FeatureGraph::rays(int frame, const Camera& camera) const {
   return result;
 }
 
-Camera prior_camera(const Session& session, const FrameRecord& frame) {
-  Camera camera;
-  camera.width = frame.width, camera.height = frame.height;
-  camera.fx = camera.fy = 1.2 * std::max(frame.width, frame.height);
-  camera.cx = frame.width / 2.0, camera.cy = frame.height / 2.0;
-  const DeviceInfo* device = session.device(frame.device);
-  if (device == nullptr) return camera;
-  if (device->lens.calibrated) return device->lens.calibrated->scaled_to(frame.width, frame.height);
-  if (device->lens.focal_px) camera.fx = camera.fy = *device->lens.focal_px;
-  return camera;
-}
-
 Result<FeatureGraph> read_feature_graph(const std::filesystem::path& database,
                                         const Session& session,
                                         const std::vector<ProxyImage>& images) {
@@ -57,7 +46,7 @@ Result<FeatureGraph> read_feature_graph(const std::filesystem::path& database,
                                 static_cast<double>(sized.height) / image.height);
     graph.pixel_scale = std::max(graph.pixel_scale, scale.x());
     graph.frames.push_back(image.frame);
-    graph.cameras.push_back(prior_camera(session, sized));
+    graph.cameras.push_back(sfm_prior_camera(session, sized));
     graph.pixels.emplace_back(scale.asDiagonal() * keypoints[image.name]);
     graph.descriptors.push_back(std::move(descriptors[image.name]));
   }

@@ -35,10 +35,6 @@ struct FeatureGraph {
   Eigen::Matrix3Xd rays(int frame, const Camera& camera) const;
 };
 
-/// The lens of a frame as its device states it, else the focal length that COLMAP would guess
-/// (1.2 times the longer side).
-Camera prior_camera(const Session& session, const FrameRecord& frame);
-
 /// From COLMAP's database of the proxies.
 Result<FeatureGraph> read_feature_graph(const std::filesystem::path& database,
                                         const Session& session,

@@ -9,6 +9,7 @@
 #include <numbers>
 #include <set>
 
+#include "recon/poses/frame_camera.hpp"
 #include "recon/poses/sfm/bundle_adjustment.hpp"
 #include "recon/poses/sfm/colmap.hpp"
 #include "recon/poses/world_frame.hpp"
@@ -64,14 +65,14 @@ Lenses lens_groups(const Reconstruction& model, const Session& session) {
     result.group.push_back(place->second);
     if (!is_new) continue;
     LensGroup lens;
-    if (const DeviceInfo* info = session.device(device); info != nullptr) {
-      if (info->lens.calibrated) {
-        lens.focal_px = info->lens.calibrated->scaled_to(view.camera.width, view.camera.height).fx;
-        lens.refine_principal_point = lens.refine_distortion = false;
-      } else if (info->lens.focal_px) {
-        lens.focal_px = *info->lens.focal_px;
-        lens.focal_relative_sigma = info->lens.focal_relative_sigma;
-      }
+    const DeviceInfo* info = session.device(device);
+    if (const auto calibrated =
+            calibrated_camera(session, device, view.camera.width, view.camera.height)) {
+      lens.focal_px = calibrated->fx;
+      lens.refine_principal_point = lens.refine_distortion = false;
+    } else if (info != nullptr && info->lens.focal_px) {
+      lens.focal_px = *info->lens.focal_px;
+      lens.focal_relative_sigma = info->lens.focal_relative_sigma;
     }
     // Self-calibration beyond the focal wants a well-covered orbit.
     if (model.views.size() < 10) lens.refine_principal_point = false;
@@ -151,10 +152,10 @@ Result<ModalityPoses> adjust_model(Reconstruction model, const Session& session,
     const FrameRecord* frame = nullptr;
     for (const FrameRecord* f : frames)
       if (f->file == model.views[v].name) frame = f;
-    const DeviceInfo* device = frame == nullptr ? nullptr : session.device(frame->device);
-    if (device != nullptr && device->lens.calibrated && lens.focal_px > 0)
-      model.views[v].camera = device->lens.calibrated->scaled_to(model.views[v].camera.width,
-                                                                 model.views[v].camera.height);
+    Camera& camera = model.views[v].camera;
+    if (frame != nullptr && lens.focal_px > 0)
+      camera =
+          calibrated_camera(session, frame->device, camera.width, camera.height).value_or(camera);
   }
   BundleOptions bundle;
   // Errors scale with the pixels that features were found in, not with the recorded ones.

@@ -119,6 +119,23 @@ TEST_F(RunnerTest, CutDoneMarkRunsAgain) {
   EXPECT_THAT(ran(), ElementsAre("d"));
 }
 
+TEST_F(RunnerTest, EditedDoneMarkIsNamedAndRunsAgain) {
+  run();
+  const fs::path folder = temp.path() / "out/d", mark = folder / "stage.json";
+  std::string text = *read_file(mark);
+  const std::size_t at = text.find("\"wall_s\": ");
+  ASSERT_NE(at, std::string::npos);
+  text.insert(at + 10, "\"four\", \"was\": ");  // still JSON
+  ASSERT_TRUE(write_file_atomic(mark, text));
+  const auto record = read_stage_record(folder);
+  ASSERT_FALSE(record);
+  EXPECT_EQ(record.error().kind, ErrorKind::input);
+  EXPECT_EQ(record.error().where, mark.string());
+  run();
+  EXPECT_THAT(ran(), ElementsAre("d"));
+  EXPECT_TRUE(read_stage_record(folder));
+}
+
 TEST_F(RunnerTest, TargetsBringWhatTheyRead) {
   RunOptions options;
   options.targets = {"c"};

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <random>
 
+#include "recon/poses/frame_camera.hpp"
 #include "recon/poses/sfm/tracks.hpp"
 #include "tests/support/orbit_fixture.hpp"
 
@@ -69,7 +70,7 @@ class FeatureSceneMaker {
     }
     for (const FrameRecord& frame : scene.session.frames) {
       scene.graph.frames.push_back(&frame);
-      scene.graph.cameras.push_back(prior_camera(scene.session, frame));
+      scene.graph.cameras.push_back(sfm_prior_camera(scene.session, frame));
     }
   }
 
