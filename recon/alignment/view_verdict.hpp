@@ -12,7 +12,7 @@ enum class Confidence { sure, doubtful, dropped };
 /// Why a view is not sure.
 enum class DoubtReason {
   none,
-  not_found,                ///< neither form nor temperatures know it anywhere
+  not_found,                ///< neither form nor temperatures know its edges anywhere
   weak_support,             ///< few of its edges are in place, against the other loops' views
   off_its_loop,             ///< far from where its station and its loop have it, or aimed elsewhere
   temperatures_elsewhere,   ///< the other views' temperatures place it elsewhere

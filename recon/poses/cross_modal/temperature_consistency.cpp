@@ -28,6 +28,9 @@ constexpr double kept_share = 0.4;
 /// searched again. A wrong view of `sedan` had .56 of .96, right ones .84 and more unless a wrong
 /// neighbour painted.
 constexpr double asked_correlation_share = 0.75;
+/// Of the same median: an image so much like what the others paint is not far from there, though
+/// few of its edges say so. Gables of a hut, seen from low down, had .98 to 1.01 of it.
+constexpr double like_correlation_share = 0.95;
 /// What form and temperatures say of a view's place are not two places: within reach of the thermal
 /// bundle's search, which decides (a right view of `van` was dropped at 1.1).
 constexpr double close_deg = 2;
@@ -123,6 +126,7 @@ Result<SceneRenderer> painted_by(const OrbitRefinement& refinement, const Fit& a
 struct Contradicted {
   std::vector<std::size_t> views;  ///< whose place the temperatures of the others don't confirm
   SupportOfLoop median_of_loop;    ///< support of a view in the scene that all others paint
+  double median_correlation = 0;   ///< of an image with what all others paint there
 };
 
 Result<Contradicted> contradicted(const OrbitRefinement& refinement, const Fit& alignment) {
@@ -134,7 +138,7 @@ Result<Contradicted> contradicted(const OrbitRefinement& refinement, const Fit& 
                    painted_by(refinement, alignment, all, own_turn_deg));
   const OrbitRefinement painted{renderer, orbit, refinement.progress};
   ORBITFUSE_ASSIGN(const Fit second, painted.restart(all, places, judging_rounds()));
-  Contradicted lost{{}, median_supports(orbit, all, second)};
+  Contradicted lost{{}, median_supports(orbit, all, second), 0};
   std::vector<std::optional<double>> correlations;
   std::vector<double> known;
   for (const std::size_t i : all) {
@@ -143,7 +147,8 @@ Result<Contradicted> contradicted(const OrbitRefinement& refinement, const Fit& 
     correlations.push_back(correlation);
     if (correlation) known.push_back(*correlation);
   }
-  const double asked_below = known.empty() ? -1 : asked_correlation_share * median(known);
+  lost.median_correlation = median(known);
+  const double asked_below = known.empty() ? -1 : asked_correlation_share * lost.median_correlation;
   for (const std::size_t i : all)
     if (second.views[i].support() <
             settled_share * lost.median_of_loop.at(orbit.stations[i].loop) ||
@@ -204,6 +209,29 @@ Result<Fit> best_by_temperatures(const OrbitRefinement& painted,
   return best;
 }
 
+/// A view that neither scene places goes to the one of the two places where its image is most like
+/// what the others paint.
+Status leave_unplaced(const OrbitRefinement& refinement, const SceneRenderer& painted,
+                      const cv::Mat& image, bool agree, const PosedView& by_temperatures,
+                      double median_correlation, RenderAlignedView& view) {
+  ORBITFUSE_ASSIGN(const auto here, correlation_with(painted, image, view.view));
+  ORBITFUSE_ASSIGN(const auto there, correlation_with(painted, image, by_temperatures));
+  const double like_here = share_of_median(here.value_or(0), median_correlation),
+               like_there = share_of_median(there.value_or(0), median_correlation);
+  const double apart =
+      apart_deg(refinement.orbit, view.view.cam_from_world, by_temperatures.cam_from_world);
+  refinement.progress.report(
+      {"poses.thermal", 3, 4, -1,
+       fmt::format("{}: placed by nobody; its image is {:.2f} as much like the others' as usual "
+                   "where it was, {:.2f} where temperatures have it",
+                   view.view.name, like_here, like_there)});
+  view.verdict = verdict_of_unplaced(agree, apart, std::max(like_here, like_there));
+  if (view.verdict.confidence == Confidence::doubtful && like_there > like_here &&
+      like_there >= like_correlation_share)
+    view.view = by_temperatures;
+  return {};
+}
+
 }  // namespace
 
 Result<SceneRenderer> painted_by_others(const OrbitRefinement& refinement, const Fit& alignment,
@@ -231,6 +259,21 @@ MoveDecision who_places(const PlaceEvidence& seen) {
   if (!found && seen.form_before > vouched_share && seen.form_before > seen.form_there)
     return MoveDecision::form_alone;
   return MoveDecision::nobody;
+}
+
+ViewVerdict verdict_of_unplaced(bool agree, double apart_deg, double likeness) {
+  // Too near each other to be two places, or too much like what the others measured to be far off:
+  // patches of other thermal views will tell.
+  const bool left_to_patches =
+      likeness >= like_correlation_share || (!agree && apart_deg < close_deg);
+  const Confidence confidence = left_to_patches ? Confidence::doubtful : Confidence::dropped;
+  if (agree)
+    return {confidence, DoubtReason::not_found,
+            "neither the visible scene nor the other views' temperatures show its edges"};
+  return {confidence, DoubtReason::temperatures_elsewhere,
+          fmt::format("the visible scene and the other views' temperatures place it {:.1f} deg "
+                      "apart",
+                      apart_deg)};
 }
 
 double share_of_median(double support, double median) {
@@ -316,20 +359,10 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
                 "{:.2f} of its loop's median support",
                 seen.temperatures_there, seen.form_before)};
         break;
-      case MoveDecision::nobody: {
-        const double apart = apart_deg(orbit, view.view.cam_from_world, warm.view.cam_from_world);
-        // Too near each other to be two places: patches of other thermal views will tell.
-        const bool close = !seen.agree && apart < close_deg;
-        view.verdict = {
-            close ? Confidence::doubtful : Confidence::dropped,
-            seen.agree ? DoubtReason::not_found : DoubtReason::temperatures_elsewhere,
-            seen.agree
-                ? "neither the visible scene nor the other views' temperatures show its edges"
-                : fmt::format(
-                      "the visible scene and the other views' temperatures place it {:.1f} deg "
-                      "apart",
-                      apart)};
-      }
+      case MoveDecision::nobody:
+        ORBITFUSE_TRY(leave_unplaced(refinement, renderer, orbit.images[lost[c]], seen.agree,
+                                     warm.view, found.median_correlation, view));
+        break;
     }
   }
   return check;

@@ -27,6 +27,11 @@ struct PlaceEvidence {
 enum class MoveDecision { both, temperatures_alone, form_alone, nobody };
 MoveDecision who_places(const PlaceEvidence& seen);
 
+/// Of a view that nobody places: doubtful where patches of other thermal views can still tell (they
+/// make it sure, judged()), else dropped. `likeness`: its image's correlation with what the others
+/// measured at the better of its two places, of the median view's.
+ViewVerdict verdict_of_unplaced(bool agree, double apart_deg, double likeness);
+
 /// Of its loop's median support; 0 where the loop has none: shares of nothing say nothing.
 double share_of_median(double support, double median);
 
@@ -45,8 +50,8 @@ struct TemperatureCheck {
 /// Each view judged by the temperatures of the others. Those that they contradict are searched as
 /// wholes in the scene that the rest paints, and go where both scenes then agree or temperatures
 /// are sure. One that temperatures find nowhere stays where form knows it well, as doubtful; what
-/// neither knows is dropped. Where most are contradicted nobody is left to judge: they stay, as
-/// doubtful.
+/// neither knows is dropped, or doubtful where its image is what the others measured there. Where
+/// most are contradicted nobody is left to judge: they stay, as doubtful.
 Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refinement, Fit& alignment);
 
 /// Every added view, from `first_new` on, confirmed by what the settled ones before it measured;

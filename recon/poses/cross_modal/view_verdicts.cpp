@@ -171,7 +171,8 @@ ViewVerdict judged(const ViewEvidence& seen, const ViewVerdict& before) {
                                 "image correlates with what the other views measured there at "
                                 "{:.2f}, the median view at {:.2f}",
                                 seen.support_share, *seen.correlation, seen.median_correlation));
-  const bool by_painting = before.reason == DoubtReason::temperatures_elsewhere ||
+  const bool by_painting = before.reason == DoubtReason::not_found ||
+                           before.reason == DoubtReason::temperatures_elsewhere ||
                            before.reason == DoubtReason::temperatures_contradict;
   if (by_painting && seen.confirmed_share >= confirming_share) return {};
   return before;

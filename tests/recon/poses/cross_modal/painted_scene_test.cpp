@@ -160,6 +160,20 @@ TEST(CorrectByTemperatures, OnlyTemperaturesThatFindAViewMoveIt) {
   EXPECT_EQ(who_places({false, nan, nan, nan}), MoveDecision::nobody);
 }
 
+TEST(CorrectByTemperatures, WhatNobodyPlacesIsLeftToPatchesOnlyWhereItLooksRight) {
+  const auto confidence = [](bool agree, double apart_deg, double likeness) {
+    return verdict_of_unplaced(agree, apart_deg, likeness).confidence;
+  };
+  EXPECT_EQ(confidence(true, 0.1, 0.98), Confidence::doubtful);
+  EXPECT_EQ(confidence(true, 0.1, 0.90), Confidence::dropped);
+  EXPECT_EQ(confidence(false, 2.7, 0.98), Confidence::doubtful);
+  EXPECT_EQ(confidence(false, 2.7, 0.90), Confidence::dropped);
+  EXPECT_EQ(confidence(false, 1.1, 0.20), Confidence::doubtful) << "not two places";
+  EXPECT_EQ(confidence(false, 2.7, std::numeric_limits<double>::quiet_NaN()), Confidence::dropped);
+  EXPECT_EQ(verdict_of_unplaced(true, 0.1, 0).reason, DoubtReason::not_found);
+  EXPECT_EQ(verdict_of_unplaced(false, 9, 0).reason, DoubtReason::temperatures_elsewhere);
+}
+
 TEST(CorrectByTemperatures, SharesOfNothingSayNothing) {
   EXPECT_DOUBLE_EQ(share_of_median(30, 40), 0.75);
   EXPECT_EQ(share_of_median(0, 0), 0);

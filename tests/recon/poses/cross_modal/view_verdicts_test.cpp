@@ -53,6 +53,7 @@ TEST(ViewVerdicts, WhatSpeaksAgainstAViewIsNamed) {
   EXPECT_FALSE(judged(confirmed, painted).sure());
   confirmed.confirmed_share = 0.9;
   EXPECT_TRUE(judged(confirmed, painted).sure());
+  EXPECT_TRUE(judged(confirmed, {Confidence::doubtful, DoubtReason::not_found, ""}).sure());
   EXPECT_FALSE(judged(confirmed, {Confidence::doubtful, DoubtReason::undecided, ""}).sure());
   confirmed.support_share = 0.2;
   EXPECT_FALSE(judged(confirmed, painted).sure());
