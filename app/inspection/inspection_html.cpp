@@ -90,9 +90,7 @@ std::string priority_words(const std::optional<Comparison>& c) {
 }
 
 std::string headline(const InspectionFinding& f) {
-  if (f.answer.kind == Kind::distance)
-    return f.answer.distance_m ? fmt::format("{:.3f} m", *f.answer.distance_m)
-                               : fmt::format("{:.4f} units of the run", f.answer.distance);
+  if (f.answer.kind == Kind::distance) return measurement::distance_words(f.answer, "±");
   const auto& r = f.reading();
   if (!r.seen()) return "not measured";
   const std::string degrees = celsius_words(r.temperature_k);

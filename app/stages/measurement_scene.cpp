@@ -148,7 +148,10 @@ Result<ThermalScene> load_measurement_scene(const fs::path& out, const Session& 
   ORBITFUSE_ASSIGN(parts.identity, identity_of(context, session));
   ORBITFUSE_ASSIGN(const std::string world, world_identity(out));
   ORBITFUSE_ASSIGN(const auto scale, load_metric_scale(out, world));
-  if (scale) parts.metres_per_unit = scale->metres_per_unit;
+  if (scale) {
+    parts.metres_per_unit = scale->metres_per_unit;
+    parts.scale_relative_sigma = scale->relative_uncertainty;
+  }
   return ThermalScene::make(std::move(parts), options);
 }
 

@@ -76,10 +76,8 @@ std::vector<std::string> other_row(const SavedMeasurement& saved, const Answer& 
     row[2] = std::isfinite(answer.difference_k) ? fmt::format("{:+.2f} K", answer.difference_k)
                                                 : "no frame sees both";
     row[3] = number_words(answer.difference_uncertainty_k, 2);
-  } else if (answer.distance_m) {
-    row[2] = fmt::format("{:.3f} m", *answer.distance_m);
   } else {
-    row[2] = fmt::format("{:.4f} units", answer.distance);
+    row[2] = measurement::distance_words(answer, "±");
   }
   return row;
 }

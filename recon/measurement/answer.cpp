@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/measurement/answer.hpp"
 
+#include <fmt/format.h>
 #include <algorithm>
+
 #include <cmath>
 #include <numbers>
 #include <tuple>
@@ -137,8 +139,17 @@ json to_json(const Answer& answer) {
   if (answer.kind == Kind::distance) {
     j["distance"] = json_of(answer.distance);
     j["distance_m"] = answer.distance_m ? json_of(*answer.distance_m) : json();
+    j["distance_uncertainty_m"] = json_of(answer.distance_uncertainty_m);
   }
   return j;
+}
+
+std::string distance_words(const Answer& answer, const char* plus_minus) {
+  if (!answer.distance_m) return fmt::format("{:.4f} units of the run", answer.distance);
+  if (!std::isfinite(answer.distance_uncertainty_m))
+    return fmt::format("{:.3f} m", *answer.distance_m);
+  return fmt::format("{:.3f} m {} {:.3f}", *answer.distance_m, plus_minus,
+                     answer.distance_uncertainty_m);
 }
 
 }  // namespace orbitfuse::measurement

@@ -210,6 +210,7 @@ Status read(const json& j, const std::string& where, Answer& answer, int depth) 
   double metres = unknown;
   in.number("distance_m", metres);
   if (std::isfinite(metres)) answer.distance_m = metres;
+  in.number("distance_uncertainty_m", answer.distance_uncertainty_m);
   in.each("of", [&](const json& entry, const std::string& at) {
     // A difference has no differences as its parts.
     if (depth > 0) return in.complain("of", "absent");

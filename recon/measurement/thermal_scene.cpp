@@ -39,6 +39,10 @@ Status check_parts(const SceneParts& parts) {
       !(*parts.metres_per_unit > 0 && std::isfinite(*parts.metres_per_unit)))
     return fail(ErrorKind::input, "scale", fmt::format("{} m a unit", *parts.metres_per_unit),
                 "give a length above 0");
+  if (!(parts.scale_relative_sigma >= 0 && std::isfinite(parts.scale_relative_sigma)))
+    return fail(ErrorKind::input, "scale",
+                fmt::format("uncertain by a share of {}", parts.scale_relative_sigma),
+                "must be 0 or above");
   return {};
 }
 

@@ -45,6 +45,7 @@ struct SceneParts {
   std::vector<PosedView>
       orbit;  ///< cameras that say where the object is (recon/assembly/looked_at)
   std::optional<double> metres_per_unit;  ///< none: the run's scale is unknown
+  double scale_relative_sigma = 0;        ///< of metres_per_unit
   std::string identity;                   ///< of poses, fields and session; empty: not known
 };
 
@@ -74,6 +75,7 @@ class ThermalScene {
   const MeasurementOptions& options() const { return options_; }
   const std::string& identity() const { return parts_.identity; }
   std::optional<double> metres_per_unit() const { return parts_.metres_per_unit; }
+  double scale_relative_sigma() const { return parts_.scale_relative_sigma; }
   /// What the cameras of `orbit` went round: the point nearest to their axes and their median
   /// distance from it. None where they look in one direction.
   struct Middle {

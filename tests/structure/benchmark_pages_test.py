@@ -9,7 +9,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / "docs" / "benchmarks"
 WITHOUT_PLOT = {
-    "compare.md": "one pair",
+    "compare.md": "two pairs",
     "export_scale.md": "three rows",
     "capture/faults.md": "cases that hold or don't, without a figure in common",
     "capture/v4l2.md": "the same",

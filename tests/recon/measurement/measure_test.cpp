@@ -459,9 +459,14 @@ TEST(Measure, DifferenceAndDistanceOfTwo) {
   EXPECT_NEAR(unscaled.distance, 0.1, 1e-9);
   EXPECT_FALSE(unscaled.distance_m);
   EXPECT_THAT(unscaled.notes.at(0), HasSubstr("no scale"));
+  EXPECT_EQ(distance_words(unscaled), "0.1000 units of the run");
   parts.metres_per_unit = 2.5;
+  parts.scale_relative_sigma = 0.02;
   const Answer scaled = ask(box_orbit(std::move(parts)), request);
   EXPECT_NEAR(scaled.distance_m.value_or(0), 0.25, 1e-9);
+  EXPECT_NEAR(scaled.distance_uncertainty_m, 1.645 * 0.02 * 0.25, 1e-9);
+  EXPECT_EQ(distance_words(scaled), "0.250 m +- 0.008");
+  EXPECT_NEAR(to_json(scaled).at("distance_uncertainty_m").get<double>(), 0.008225, 1e-6);
 }
 
 TEST(Measure, WhatIsKeptNamesPointsNotPixels) {

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// `orbitfuse export --dataset` on a small run of the real program: what other programs would read.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/formats/colmap_model.hpp"
+#include "core/formats/transforms_json.hpp"
+#include "core/image/image_io.hpp"
+#include "core/system/file_io.hpp"
+#include "tests/app/cli/program.hpp"
+#include "tests/app/cli/session_fixture.hpp"
+#include "tests/app/cli/small_run.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace orbitfuse {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+using testing::HasSubstr;
+
+/// The three layouts of one folder say the same.
+void expect_pairs(const fs::path& folder) {
+  const auto transforms = read_transforms_json(folder / "transforms.json");
+  ASSERT_TRUE(transforms) << transforms.error().message();
+  const auto model = read_colmap_model(folder / "sparse/0", Modality::visible);
+  ASSERT_TRUE(model) << model.error().message();
+  ASSERT_FALSE(transforms->frames.empty());
+  ASSERT_EQ(model->views.size(), transforms->frames.size());
+  const json bounds = json::parse(*read_file(folder / "temperature_bounds.json"));
+  const double low_c = bounds.at("absolute_min_temperature"),
+               high_c = bounds.at("absolute_max_temperature");
+  EXPECT_LT(low_c, high_c);
+  for (std::size_t i = 0; i < transforms->frames.size(); ++i) {
+    const TransformsFrame& frame = transforms->frames[i];
+    const PosedView& view = model->views[i];
+    EXPECT_EQ(fs::path(frame.file_path).filename(), view.name);
+    EXPECT_LT((camera_center(frame.cam_from_world) - camera_center(view.cam_from_world)).norm(),
+              1e-9);
+    EXPECT_NEAR(frame.camera.fx, view.camera.fx, 1e-9);
+    const auto image = read_image(folder / frame.file_path);
+    const auto levels = read_image(folder / frame.thermal_file_path.value_or("none"));
+    const auto kelvin =
+        read_thermal_k(folder / "thermal_kelvin" / fs::path(view.name).replace_extension(".tiff"));
+    ASSERT_TRUE(image && levels && kelvin) << view.name;
+    EXPECT_EQ(image->size(), cv::Size(frame.camera.width, frame.camera.height));
+    ASSERT_EQ(levels->size(), image->size());
+    ASSERT_EQ(kelvin->size(), image->size());
+    // A level is the temperature that it stands for, to half a level and a count.
+    const double step_k = (high_c - low_c) / 255;
+    int known = 0;
+    for (int y = 0; y < kelvin->rows; ++y)
+      for (int x = 0; x < kelvin->cols; ++x) {
+        const double k = static_cast<double>(kelvin->at<float>(y, x));
+        if (!std::isfinite(k)) continue;
+        ++known;
+        const double level = levels->channels() == 3 ? levels->at<cv::Vec3b>(y, x)[0]
+                                                     : levels->at<std::uint8_t>(y, x);
+        ASSERT_NEAR(k - 273.15, low_c + level * step_k, 0.5 * step_k + 0.02);
+      }
+    EXPECT_GT(known, 0);
+  }
+}
+
+TEST(ExportDataset, RecordedAndNewPairsAreReadBackInEveryLayout) {
+  const test::TempFolder temp;
+  const fs::path session = temp / "session", out = temp / "out";
+  write_fixture_session(session);
+  const Outcome run = orbitfuse_program(small_run(session, out));
+  ASSERT_EQ(run.code, 0) << run.err;
+  for (const char* poses : {"recorded", "new"}) {
+    SCOPED_TRACE(poses);
+    const fs::path folder = temp / poses;
+    const std::vector<std::string> words = {"export",        out.string(), "--dataset",
+                                            folder.string(), "--poses",    poses};
+    const Outcome pairs = orbitfuse_program(words);
+    ASSERT_EQ(pairs.code, 0) << pairs.err;
+    expect_pairs(folder);
+    const json about = json::parse(*read_file(folder / "dataset.json"));
+    EXPECT_THAT(about.at("visible").get<std::string>(),
+                HasSubstr(poses == std::string("new") ? "visible field" : "photos"));
+    const Outcome again = orbitfuse_program(words);
+    EXPECT_EQ(again.code, 2) << "it is not overwritten";
+    EXPECT_THAT(again.err, HasSubstr(folder.string()));
+  }
+}
+
+}  // namespace
+}  // namespace orbitfuse
