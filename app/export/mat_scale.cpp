@@ -17,7 +17,7 @@ namespace orbitfuse::exporting {
 namespace {
 using stages::MetricScale;
 
-/// Two views 8 degrees apart; from nearer together a tenth of a pixel moves the place by more than
+/// Two views 6 degrees apart; from nearer together a tenth of a pixel moves the place by more than
 /// the mat is to say.
 constexpr double least_crossing = 0.0025;
 /// Of the mat's side: how far a tag may lie from where it should (bent paper, a wrong pose).

@@ -201,14 +201,14 @@ Status run_task(const fs::path& out, const FarmPlan& plan, const std::vector<std
   for (const std::string& stage : stages) {
     const JobOutcome before = read_outcome(out, s.name, stage);
     if (before.state == JobState::done) continue;
+    if (progress.cancelled())
+      return fail(ErrorKind::cancelled, s.name, "stopped before " + stage,
+                  "orbitfuse farm resume " + out.string());
     ORBITFUSE_TRY(not_given_up(out, plan, s, stage, before));
     ORBITFUSE_ASSIGN(const JobOutcome outcome, run_stage(out, plan, s, stage, clock, progress));
     if (outcome.state != JobState::done)
       return fail(outcome.state == JobState::failed ? ErrorKind::input : ErrorKind::cancelled,
                   s.name + "/" + stage, outcome.cause, "orbitfuse farm status " + out.string());
-    if (progress.cancelled())
-      return fail(ErrorKind::cancelled, s.name, "stopped after " + stage,
-                  "orbitfuse farm resume " + out.string());
   }
   return {};
 }
