@@ -10,19 +10,11 @@ Seed and surroundings stay those of the first visit, so that nothing else change
 views out.
 """
 import json
+import pathlib
 import sys
 
-arguments = sys.argv[sys.argv.index("--") + 1 :]
-
-
-def named(name):
-    return arguments[arguments.index("--" + name) + 1]
-
-
-def replaced_once(text, old, new):
-    if text.count(old) != 1:
-        raise SystemExit(f"{named('renderer')}: expected one '{old}', found {text.count(old)}")
-    return text.replace(old, new)
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from scene_renderer import named, replaced_once, run, source
 
 
 class Change:
@@ -56,18 +48,16 @@ CHANGES = {
 }
 
 change = CHANGES[named("changes")]
-with open(named("renderer")) as file:
-    source = file.read()
-source = replaced_once(
-    source,
+text = replaced_once(
+    source(),
     "exec(compile(open(scene_file).read(),scene_file,'exec'))",
     "box, cyl = altered(box), altered(cyl)\n"
     "M = of_the_day(M)\n"
     "exec(compile(open(scene_file).read(),scene_file,'exec'))\n"
     "CONFIG['sun'] = 140.0; rng.seed(1234)",
 )
-source = replaced_once(source, "vis=orbit(vis_r,C['vis_el'],0.0)", "vis=orbit(vis_r,C['vis_el'],13.0)")
-source = replaced_once(source, "rng.uniform(5,25)", "rng.uniform(30,34)")
+text = replaced_once(text, "vis=orbit(vis_r,C['vis_el'],0.0)", "vis=orbit(vis_r,C['vis_el'],13.0)")
+text = replaced_once(text, "rng.uniform(5,25)", "rng.uniform(30,34)")
 
 
 def altered(primitive):
@@ -89,7 +79,7 @@ def of_the_day(material):
     return make
 
 
-scope = {"__name__": "__main__", "altered": altered, "of_the_day": of_the_day}
-exec(compile(source, named("renderer"), "exec"), scope)
+scope = {"altered": altered, "of_the_day": of_the_day}
+run(text, scope)
 if change.made != {"warmer", "moved"}:
     raise SystemExit(f"{named('scene')}: only {sorted(change.made)} of the changes were found in it")

@@ -7,19 +7,11 @@
 
 The renderer and the scene are run as they are; the mat lies flat round the middle, where the object stands.
 """
+import pathlib
 import sys
 
-arguments = sys.argv[sys.argv.index("--") + 1 :]
-
-
-def named(name):
-    return arguments[arguments.index("--" + name) + 1]
-
-
-def replaced_once(text, old, new):
-    if text.count(old) != 1:
-        raise SystemExit(f"{named('renderer')}: expected one '{old}', found {text.count(old)}")
-    return text.replace(old, new)
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from scene_renderer import named, replaced_once, run, source
 
 
 def lay_mat():
@@ -46,12 +38,10 @@ def with_mat(build):
     return printed
 
 
-with open(named("renderer")) as file:
-    source = file.read()
-source = replaced_once(
-    source,
+text = replaced_once(
+    source(),
     "exec(compile(open(scene_file).read(),scene_file,'exec'))",
     "exec(compile(open(scene_file).read(),scene_file,'exec'))\nlay_mat(); build = with_mat(build)",
 )
-scope = {"__name__": "__main__", "lay_mat": lay_mat, "with_mat": with_mat}
-exec(compile(source, named("renderer"), "exec"), scope)
+scope = {"lay_mat": lay_mat, "with_mat": with_mat}
+run(text, scope)
