@@ -71,12 +71,17 @@ Result<StageOutput> estimate(const StageContext& context, const SessionInput& in
   for (DepthMap& map : found->maps) map.view = views.index[static_cast<std::size_t>(map.view)];
   ORBITFUSE_TRY(save_depth_maps(context.folder, found->maps));
   output.skips = found->report.skips;
-  output.metrics = {
-      {"brief", fmt::format("{:.0f} % of the pixels of {} views confirmed by other views",
-                            100 * found->report.known, images.size())},
-      {"known", found->report.known},
-      {"matched", found->report.matched},
-      {"views_without_neighbours", found->report.views_without}};
+  const depth::OpenSpace& open = found->report.open;
+  std::string brief = fmt::format("{:.0f} % of the pixels of {} views confirmed by other views",
+                                  100 * found->report.known, images.size());
+  if (open.ground + open.sky > 0)
+    brief += fmt::format(", {:.0f} % open ground, {:.0f} % sky", 100 * open.ground, 100 * open.sky);
+  output.metrics = {{"brief", brief},
+                    {"known", found->report.known},
+                    {"open_ground", open.ground},
+                    {"open_sky", open.sky},
+                    {"matched", found->report.matched},
+                    {"views_without_neighbours", found->report.views_without}};
   return output;
 }
 
@@ -85,6 +90,7 @@ Result<StageOutput> estimate(const StageContext& context, const SessionInput& in
 pipeline::Stage depth_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "depth";
+  stage.version = 2;
   stage.needs = {"poses_visible"};
   stage.options = in.config->settings().to_json("depth");
   stage.options["holdout_every"] = in.config->train_visible.options.holdout_every;

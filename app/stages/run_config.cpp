@@ -94,6 +94,9 @@ void add_depth(Settings& settings, depth::DepthOptions& depth) {
   settings.add("depth.agreement", depth.agreement,
                "Relative difference below which two views agree");
   settings.add("depth.min_agreeing", depth.min_agreeing, "Views that must agree with a depth");
+  settings.add("depth.ground", depth.ground,
+               "Open ground and sky, which nothing confirms, get the depth of the plane under the "
+               "object and an infinite one");
 }
 
 void add_render(Settings& settings, RenderConfig& render) {

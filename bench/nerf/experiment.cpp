@@ -141,8 +141,10 @@ Result<double> add_depth(nerf::Dataset& data, const depth::DepthOptions& options
   const UsageClock clock;
   ORBITFUSE_ASSIGN(depth::DenseDepth found, depth::dense_depth(model, images, options, {}));
   const double cpu_s = clock.cpu_s();
-  fmt::print("depth: {:.1f} CPU s, {:.1f} % of the pixels matched, {:.1f} % confirmed\n", cpu_s,
-             100 * found.report.matched, 100 * found.report.known);
+  const depth::DepthReport& report = found.report;
+  fmt::print("depth: {:.1f} CPU s, {:.1f} % of the pixels matched, {:.1f} % confirmed, ", cpu_s,
+             100 * report.matched, 100 * report.known);
+  fmt::print("{:.1f} % ground, {:.1f} % sky\n", 100 * report.open.ground, 100 * report.open.sky);
   for (DepthMap& map : found.maps) {
     map.view = index[static_cast<std::size_t>(map.view)];
     data.depth.push_back(std::move(map));

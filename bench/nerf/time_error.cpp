@@ -193,6 +193,7 @@ int main(int argc, char** argv) {
   app.add_option("--out", a.out, "write the curve as SCENE.json and SCENE.svg here");
   app.add_flag("--depth", a.depth, "dense depth of the training views first");
   app.add_flag("!--no-train", a.train, "stop after the depth");
+  app.add_flag("!--no-ground", a.depth_options.ground, "leave open ground without depth");
   app.add_option("--depth-width", a.depth_options.width_px);
   app.add_option("--depth-coarse", a.depth_options.coarse_iterations);
   app.add_option("--depth-fine", a.depth_options.fine_iterations);

@@ -41,9 +41,10 @@ struct Reconstruction {
 
 /// Dense geometry of one posed view.
 struct DepthMap {
-  int view = 0;        ///< index into the Reconstruction's views
-  Camera camera;       ///< of the map itself: may be smaller than the view's, never distorted
-  cv::Mat depth;       ///< CV_32FC1, z along the optical axis, world units; NaN = unknown
+  int view = 0;   ///< index into the Reconstruction's views
+  Camera camera;  ///< of the map itself: may be smaller than the view's, never distorted
+  cv::Mat depth;  ///< CV_32FC1, z along the optical axis, world units; NaN = unknown, infinite =
+                  ///< the sky
   cv::Mat confidence;  ///< CV_32FC1 in [0, 1]
   cv::Mat normal;      ///< CV_32FC3 in camera axes, towards the camera; may be empty
 };

@@ -24,6 +24,7 @@ Result<ThermalDepth> add_thermal_depth(nerf::Dataset& data, int width_px, int ho
     index.push_back(static_cast<int>(i));
   }
   depth::DepthOptions options;
+  options.ground = false;  // the sky's gray levels may be the ground's
   options.width_px = width_px;
   options.seed = seed;
   auto found = depth::dense_depth(model, images, options, progress);

@@ -11,10 +11,17 @@
 
 namespace orbitfuse::depth {
 
+/// What nothing confirms and ground and sky explain, as shares of all pixels
+/// (ground/extend_ground.hpp).
+struct OpenSpace {
+  double ground = 0, sky = 0;
+};
+
 struct DepthReport {
   double known = 0;       ///< share of all pixels with a confirmed depth
   double matched = 0;     ///< share that matched before other views were asked
   int views_without = 0;  ///< views that have no neighbour to match with
+  OpenSpace open;
   std::vector<Skip> skips;
 };
 
@@ -26,9 +33,9 @@ struct DenseDepth {
 /// Dense depth of posed views by multi-view PatchMatch stereo (Bleyer et al. 2011; Galliani et al.
 /// 2015; Schoenberger et al. 2016), coarse to fine, with a check between views. `images`: one per
 /// view, 8-bit gray or BGR, at its camera's size. The model's points seed the search; without any,
-/// it starts from random planes alone. Same seed, same result, for any number of threads.
-/// Errors: images that don't fit the views (input), no two views that look at one place from
-/// different directions (quality).
+/// it starts from random planes alone. Depth of the open sky is infinite (DepthOptions::ground).
+/// Same seed, same result, for any number of threads. Errors: images that don't fit the views
+/// (input), no two views that look at one place from different directions (quality).
 Result<DenseDepth> dense_depth(const Reconstruction& model, const std::vector<cv::Mat>& images,
                                const DepthOptions& options, const Progress& progress);
 

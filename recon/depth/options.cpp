@@ -17,6 +17,7 @@ Status DepthOptions::validate() const {
   ORBITFUSE_TRY(check("max_cost", max_cost, between(0, 1)));
   ORBITFUSE_TRY(check("agreement", agreement, between(0, 1)));
   ORBITFUSE_TRY(check("agreement_px", agreement_px, above(0)));
+  ORBITFUSE_TRY(check("ground_far", ground_far, from_to(1, 1000)));
   return check("min_agreeing", min_agreeing, from_to(1, neighbours));
 }
 

@@ -23,6 +23,13 @@ struct DepthOptions {
   double agreement = 0.012;   ///< relative depth difference below which two views agree
   double agreement_px = 2.0;  ///< and distance after projecting there and back
   int min_agreeing = 1;       ///< views that must agree with a depth
+  /// Pixels of the open ground that nothing confirms get the depth of the plane under the object,
+  /// those of the sky an infinite one (ground/extend_ground.hpp): far out the lowest views alone
+  /// see either, and fields would stand them up as curtains and fog.
+  bool ground = true;
+  /// How far from the centre it goes at most, in mean distances of the cameras: fields hold matter
+  /// to 16 of them.
+  double ground_far = 12;
   std::uint64_t seed = 1;
 
   Status validate() const;

@@ -52,7 +52,7 @@ const std::map<std::string, Floors> floors_of{
     {"capture", {{"clock", "guide", "image_quality"}, {"recording"}, {"live"}, {"mat", "page"}}},
     {"recon/alignment", {}},
     {"recon/assembly", {}},
-    {"recon/depth", {{"stereo"}}},
+    {"recon/depth", {{"stereo"}, {"ground"}}},
     {"recon/measurement", {}},
     {"recon/comparison", {}},
     {"recon/nerf", {{"kernels"}, {"field"}, {"rendering"}, {"training"}}},

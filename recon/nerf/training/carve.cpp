@@ -14,6 +14,7 @@ struct Votes {
   int seen = 0;   ///< views whose image holds the cell
   int free = 0;   ///< ... in front of a known surface there
   int solid = 0;  ///< ... at a known surface
+  int sky = 0;    ///< ... with nothing but the sky there
 };
 
 Votes vote(const std::vector<const NormalisedView*>& voters, const float x[3],
@@ -25,7 +26,11 @@ Votes vote(const std::vector<const NormalisedView*>& voters, const float x[3],
     if (!view.rays.project(x, px, py, z)) continue;
     ++votes.seen;
     const float known = view.distance.at<float>(static_cast<int>(py), static_cast<int>(px));
-    if (!std::isfinite(known)) continue;
+    if (std::isnan(known)) continue;
+    if (std::isinf(known)) {
+      ++votes.free, ++votes.sky;
+      continue;
+    }
     float distance = 0;
     for (int d = 0; d < 3; ++d) {
       const float offset = x[d] - static_cast<float>(view.rays.origin()[d]);
@@ -94,7 +99,9 @@ double carve(bool dense_depth, const std::vector<NormalisedView>& views,
           continue;
         }
         const Votes votes = vote(voters, center, 0.87f * size);
-        const bool free = options.carve && votes.free >= 2 && votes.free > 2 * votes.solid;
+        const bool sky = votes.sky > 0 && votes.solid == 0;
+        const bool free =
+            options.carve && (sky || (votes.free >= 2 && votes.free > 2 * votes.solid));
         off_here = votes.seen < min_views || free;
       }
   });

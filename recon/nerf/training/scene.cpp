@@ -35,7 +35,7 @@ cv::Mat known_distance(const Dataset& dataset, const Space& space, int index,
         if (!(mx >= 0 && my >= 0 && mx < map.depth.cols && my < map.depth.rows)) continue;
         const float z = map.depth.at<float>(my, mx);
         const float trust = map.confidence.empty() ? 1.0f : map.confidence.at<float>(my, mx);
-        if (!(z > 0) || !std::isfinite(z) || !(trust >= 0.5f)) continue;
+        if (!(z > 0) || !(trust >= 0.5f)) continue;
         out.at<float>(y, x) = z / static_cast<float>(space.radius) / ray.forward;
       }
   }

@@ -10,6 +10,8 @@
 
 #include "core/geometry/scene_ball.hpp"
 #include "core/system/parallel.hpp"
+#include "recon/depth/ground/extend_ground.hpp"
+#include "recon/depth/ground/ground_plane.hpp"
 #include "recon/depth/stereo/consistency.hpp"
 #include "recon/depth/stereo/neighbours.hpp"
 #include "recon/depth/stereo/patch_match.hpp"
@@ -78,6 +80,16 @@ std::vector<SourceView> sources_of(const std::vector<DepthView>& views, std::siz
   return sources;
 }
 
+void add_ground(const std::vector<DepthView>& views, const DepthOptions& options, DenseDepth& out) {
+  const auto ground = find_ground(views, out.maps, options.seed);
+  if (ground)
+    out.report.open =
+        extend_over_ground(views, *ground, static_cast<float>(options.ground_far), out.maps);
+  else
+    out.report.skips.push_back({"depth of open ground and sky", ground.error().found,
+                                "pixels that nothing confirms stay without depth"});
+}
+
 }  // namespace
 
 Result<DenseDepth> dense_depth(const Reconstruction& model, const std::vector<cv::Mat>& images,
@@ -128,10 +140,11 @@ Result<DenseDepth> dense_depth(const Reconstruction& model, const std::vector<cv
     pixels += static_cast<double>(map.depth.total());
     for (const float cost : planes[i].cost) out.report.matched += cost < options.max_cost;
     for (const float z : cv::Mat_<float>(map.depth)) out.report.known += std::isfinite(z);
-    map.depth *= scene.radius;
   }
   out.report.known /= pixels;
   out.report.matched /= pixels;
+  if (options.ground) add_ground(fine, options, out);
+  for (DepthMap& map : out.maps) map.depth *= scene.radius;
   if (out.report.views_without > 0)
     out.report.skips.push_back({"depth of views without neighbours",
                                 fmt::format("{} of {} views", out.report.views_without, count),

@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/depth/ground/extend_ground.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+
+#include "core/numeric/median.hpp"
+#include "core/system/parallel.hpp"
+
+namespace orbitfuse::depth {
+namespace {
+
+/// Nearer to the centre than this lies the object, which is never taken for ground.
+constexpr float least_radius = 1.3f;
+/// A ray that meets the plane at a smaller slope says nothing of where.
+constexpr float min_slope = 1e-4f;
+/// Of the ground's confirmed gray levels; a little more than its texture shows.
+constexpr double low_share = 0.02, high_share = 0.98;
+constexpr int gray_margin = 6;
+/// Something confirmed this much nearer than the plane hides it.
+constexpr float hides = 0.93f;
+/// Width of the neighbourhood in which a confirmed depth speaks for its surroundings, of the width
+/// of a map.
+constexpr double reach_share = 0.02, sky_reach_share = 0.005;
+/// The sky begins this far above the horizon (sine).
+constexpr float sky_slope = 0.005f;
+/// Gray levels by which sky and far ground change over so many pixels of a way; by more, something
+/// else begins.
+constexpr int sky_change = 7, ground_change = 24, edge_px = 4;
+/// As a distance: farther than anything.
+constexpr float nothing = 1e6f;
+/// Of a map's pixels, and by how much depth may change from one to the next.
+constexpr double least_region = 3e-4;
+constexpr float region_step = 0.04f;
+/// As an own match that one view confirms.
+constexpr float confidence = 0.5f;
+
+struct GrayRange {
+  int low = 0, high = -1;
+  bool holds(int gray) const { return gray >= low && gray <= high; }
+};
+
+bool on_ground(const GroundPlane& ground, const Eigen::Vector3f& x) {
+  // Depth errors grow with the distance.
+  return std::abs(ground.height(x)) < 0.02f + 0.01f * x.norm();
+}
+
+/// Gray levels of the confirmed ground, of all views.
+GrayRange ground_levels(const std::vector<DepthView>& views, const std::vector<cv::Mat>& smooth,
+                        const GroundPlane& ground, const std::vector<cv::Mat>& known) {
+  std::vector<int> levels;
+  for (std::size_t i = 0; i < views.size(); ++i)
+    for (int y = 0; y < known[i].rows; y += 2)
+      for (int x = 0; x < known[i].cols; x += 2) {
+        const float z = known[i].at<float>(y, x);
+        if (std::isfinite(z) && on_ground(ground, lifted(views[i], {x + 0.5, y + 0.5}, z)))
+          levels.push_back(smooth[i].at<std::uint8_t>(y, x));
+      }
+  if (levels.empty()) return {};
+  const int low = quantile(levels, low_share), high = quantile(levels, high_share);
+  return {low - gray_margin, high + gray_margin};
+}
+
+/// What any view confirmed that is not the ground, as depths in `view`: the nearest, spread over
+/// its neighbourhood; infinite where there is nothing.
+cv::Mat obstacles(const DepthView& view, const std::vector<std::vector<Eigen::Vector3f>>& raised,
+                  cv::Size size, double share) {
+  cv::Mat nearest(size, CV_32FC1, cv::Scalar(2 * nothing));
+  for (const auto& points : raised)
+    for (const Eigen::Vector3f& x : points) {
+      const Eigen::Vector3f c = view.world_rotation * x + view.translation;
+      if (!(c.z() > 0.02f)) continue;
+      const Eigen::Vector2d at = view.camera.project(c.cast<double>());
+      if (!(at.x() >= 0 && at.y() >= 0 && at.x() < size.width && at.y() < size.height)) continue;
+      float& here = nearest.at<float>(static_cast<int>(at.y()), static_cast<int>(at.x()));
+      here = std::min(here, c.z());
+    }
+  const int reach = std::max(1, static_cast<int>(std::lround(share * size.width)));
+  cv::erode(nearest, nearest,
+            cv::getStructuringElement(cv::MORPH_RECT, {2 * reach + 1, 2 * reach + 1}));
+  return nearest;
+}
+
+/// The map without specks: neighbours of like depth of which there are few, as chance matches along
+/// a horizon are.
+cv::Mat without_specks(const cv::Mat& depth) {
+  const auto at_least = static_cast<std::size_t>(least_region * static_cast<double>(depth.total()));
+  cv::Mat out = depth.clone(), seen = cv::Mat::zeros(depth.size(), CV_8UC1);
+  const cv::Rect all({}, depth.size());
+  std::vector<cv::Point> region;
+  for (int y = 0; y < depth.rows; ++y)
+    for (int x = 0; x < depth.cols; ++x) {
+      if (seen.at<std::uint8_t>(y, x) || !std::isfinite(depth.at<float>(y, x))) continue;
+      region.assign(1, {x, y});
+      seen.at<std::uint8_t>(y, x) = 1;
+      for (std::size_t i = 0; i < region.size(); ++i)
+        for (const cv::Point step : {cv::Point{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
+          const cv::Point here = region[i], next = here + step;
+          if (!all.contains(next) || seen.at<std::uint8_t>(next)) continue;
+          const float a = depth.at<float>(here), b = depth.at<float>(next);
+          if (!(std::abs(a - b) < region_step * a)) continue;
+          seen.at<std::uint8_t>(next) = 1;
+          region.push_back(next);
+        }
+      if (region.size() >= at_least) continue;
+      for (const cv::Point& p : region) out.at<float>(p) = std::numeric_limits<float>::quiet_NaN();
+    }
+  return out;
+}
+
+std::vector<Eigen::Vector3f> raised_points(const DepthView& view, const GroundPlane& ground,
+                                           const cv::Mat& depth) {
+  std::vector<Eigen::Vector3f> out;
+  for (int y = 0; y < depth.rows; y += 2)
+    for (int x = 0; x < depth.cols; x += 2) {
+      const float z = depth.at<float>(y, x);
+      if (!std::isfinite(z)) continue;
+      const Eigen::Vector3f point = lifted(view, {x + 0.5, y + 0.5}, z);
+      if (!on_ground(ground, point)) out.push_back(point);
+    }
+  return out;
+}
+
+class Extension {
+ public:
+  Extension(const DepthView& view, const GroundPlane& ground, GrayRange levels,
+            const cv::Mat& smooth, const cv::Mat& obstacles, const cv::Mat& near_obstacles,
+            const cv::Mat& known)
+      : view_(view),
+        ground_(ground),
+        levels_(levels),
+        smooth_(smooth),
+        obstacles_(obstacles),
+        near_obstacles_(near_obstacles),
+        known_(known),
+        open_(known.size(), CV_8UC1, cv::Scalar(undecided)),
+        clear_(known.size(), CV_8UC1, cv::Scalar(undecided)),
+        nadir_(-(view.world_rotation * ground.normal).cast<double>()) {}
+
+  /// The depth of the pixel on the plane, at most `far` from the centre; infinite in the sky; NaN
+  /// where it is neither.
+  float depth(cv::Point pixel, float far) {
+    const float none = std::numeric_limits<float>::quiet_NaN();
+    const Eigen::Vector3f ray = ray_of(pixel).cast<float>();
+    const Eigen::Vector3f direction = view_.world_rotation.transpose() * ray;
+    const float fall = -direction.dot(ground_.normal);
+    if (-fall > sky_slope * direction.norm() && clear_sky(pixel))
+      return std::numeric_limits<float>::infinity();
+    if (!(fall > min_slope * direction.norm())) return none;
+    const float z = ground_.height(view_.center()) / fall;
+    const Eigen::Vector3f place = view_.center() + z * direction;
+    if (place.norm() < least_radius || obstacles_.at<float>(pixel) < hides * z) return none;
+    if (!open_ground(pixel)) return none;
+    return z * far / std::max(far, place.norm());
+  }
+
+ private:
+  enum : std::uint8_t { undecided = 2 };
+
+  Eigen::Vector3d ray_of(cv::Point pixel) const {
+    return view_.camera.ray_of({pixel.x + 0.5, pixel.y + 0.5});
+  }
+
+  /// One pixel on the ground's way to the camera's foot: towards the image of the nadir.
+  cv::Point step_to_foot(cv::Point pixel) const {
+    const Eigen::Vector3d ray = ray_of(pixel);
+    const double dx = (nadir_.x() - ray.x() * nadir_.z()) * view_.camera.fx;
+    const double dy = (nadir_.y() - ray.y() * nadir_.z()) * view_.camera.fy;
+    const double longest = std::max({std::abs(dx), std::abs(dy), 1e-12});
+    return {static_cast<int>(std::lround(dx / longest)),
+            static_cast<int>(std::lround(dy / longest))};
+  }
+
+  int change_along(cv::Point pixel, cv::Point step) const {
+    const cv::Point ahead = pixel + edge_px * step;
+    const cv::Rect all({}, known_.size());
+    return all.contains(ahead)
+               ? std::abs(smooth_.at<std::uint8_t>(pixel) - smooth_.at<std::uint8_t>(ahead))
+               : 0;
+  }
+
+  enum class Way { blocked, open, goes_on };
+
+  /// Follows a way pixel by pixel until `judge` knows; its end at the border is `at_border`.
+  /// `memory` keeps what was found for all pixels of the way.
+  template <class Judge>
+  bool follow(cv::Mat& memory, cv::Point from, int direction, bool at_border, Judge judge) const {
+    const cv::Rect all({}, known_.size());
+    const auto longest = static_cast<std::size_t>(all.width + all.height);
+    std::vector<cv::Point> way;
+    bool open = at_border;
+    for (cv::Point at = from; all.contains(at) && way.size() < longest;) {
+      if (memory.at<std::uint8_t>(at) != undecided) {
+        open = memory.at<std::uint8_t>(at) != 0;
+        break;
+      }
+      way.push_back(at);
+      const cv::Point step = direction * step_to_foot(at);
+      const Way found = judge(at, step);
+      if (found != Way::goes_on) {
+        open = found == Way::open;
+        break;
+      }
+      at += step;
+    }
+    for (const cv::Point& at : way) memory.at<std::uint8_t>(at) = open ? 1 : 0;
+    return open;
+  }
+
+  /// Whether nothing is confirmed and nothing else begins from here up to the image's border.
+  bool clear_sky(cv::Point pixel) {
+    return follow(clear_, pixel, -1, true, [&](cv::Point at, cv::Point step) {
+      const bool seen =
+          std::isfinite(known_.at<float>(at)) || near_obstacles_.at<float>(at) < nothing;
+      return seen || change_along(at, step) > sky_change ? Way::blocked : Way::goes_on;
+    });
+  }
+
+  /// Whether the first confirmed depth on the way to the foot is the ground's, and all before it
+  /// may be.
+  bool open_ground(cv::Point pixel) {
+    return follow(open_, pixel, 1, false, [&](cv::Point at, cv::Point step) {
+      if (const float z = known_.at<float>(at); std::isfinite(z))
+        return on_ground(ground_, lifted(view_, {at.x + 0.5, at.y + 0.5}, z)) ? Way::open
+                                                                              : Way::blocked;
+      const bool like_ground =
+          levels_.holds(smooth_.at<std::uint8_t>(at)) && change_along(at, step) <= ground_change;
+      return like_ground ? Way::goes_on : Way::blocked;
+    });
+  }
+
+  const DepthView& view_;
+  const GroundPlane& ground_;
+  GrayRange levels_;
+  const cv::Mat &smooth_, &obstacles_, &near_obstacles_;
+  const cv::Mat& known_;
+  cv::Mat open_, clear_;
+  Eigen::Vector3d nadir_;  ///< in camera axes
+};
+
+/// Writes what is found to the map and counts it, in pixels.
+OpenSpace fill(Extension& extension, const cv::Mat& known, const Eigen::Vector3f& normal, float far,
+               DepthMap& map) {
+  OpenSpace filled;
+  map.depth = map.depth.clone();
+  for (int y = 0; y < map.depth.rows; ++y)
+    for (int x = 0; x < map.depth.cols; ++x) {
+      if (std::isfinite(known.at<float>(y, x))) continue;
+      const float z = extension.depth({x, y}, far);
+      if (std::isnan(z)) continue;
+      ++(std::isinf(z) ? filled.sky : filled.ground);
+      map.depth.at<float>(y, x) = z;
+      map.confidence.at<float>(y, x) = confidence;
+      map.normal.at<cv::Vec3f>(y, x) = {normal.x(), normal.y(), normal.z()};
+    }
+  return filled;
+}
+
+}  // namespace
+
+OpenSpace extend_over_ground(const std::vector<DepthView>& views, const GroundPlane& ground,
+                             float far, std::vector<DepthMap>& maps) {
+  const int count = static_cast<int>(views.size());
+  std::vector<cv::Mat> smooth(views.size()), known(views.size());
+  std::vector<std::vector<Eigen::Vector3f>> raised(views.size());
+  parallel_for(count, [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    cv::blur(views[k].gray, smooth[k], {3, 3});
+    known[k] = without_specks(maps[k].depth);
+    raised[k] = raised_points(views[k], ground, known[k]);
+  });
+  const GrayRange levels = ground_levels(views, smooth, ground, known);
+  std::vector<OpenSpace> filled(views.size());
+  parallel_for(count, [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    const DepthView& view = views[k];
+    const cv::Mat hidden = obstacles(view, raised, known[k].size(), reach_share);
+    const cv::Mat near = obstacles(view, raised, known[k].size(), sky_reach_share);
+    Extension extension(view, ground, levels, smooth[k], hidden, near, known[k]);
+    filled[k] = fill(extension, known[k], view.world_rotation * ground.normal, far, maps[k]);
+  });
+  OpenSpace all;
+  double pixels = 0;
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    all.ground += filled[k].ground, all.sky += filled[k].sky;
+    pixels += static_cast<double>(known[k].total());
+  }
+  if (pixels > 0) all.ground /= pixels, all.sky /= pixels;
+  return all;
+}
+
+}  // namespace orbitfuse::depth
