@@ -75,21 +75,19 @@ Result<Photos> photos_of(const view::FinishedRun& run) {
   for (std::size_t i = 0; i < visible.size(); i += step) {
     const PosedView& posed = visible[i]->view;
     ORBITFUSE_ASSIGN(const cv::Mat image, read_visible(run.session->folder / posed.name));
-    if (image.cols != posed.camera.width || image.rows != posed.camera.height) continue;
-    cv::Mat gray;
+    cv::Mat gray, as_float;
     if (image.channels() == 3)
       cv::cvtColor(image, gray, cv::COLOR_BGR2GRAY);
     else
       gray = image;
-    const Camera straight = posed.camera.without_distortion();
-    cv::Mat as_float;
-    undistorted(gray, posed.camera, straight).convertTo(as_float, CV_32F, 1 / 255.0);
-    photos.views.push_back({posed.name, straight, posed.cam_from_world});
+    ORBITFUSE_ASSIGN(const cv::Mat straight, recorded_straight(gray, posed.camera, posed.name));
+    straight.convertTo(as_float, CV_32F, 1 / 255.0);
+    photos.views.push_back({posed.name, posed.camera.without_distortion(), posed.cam_from_world});
     photos.images.push_back(as_float);
   }
   if (photos.views.empty())
-    return fail(ErrorKind::input, run.out.string(), "no visible photo of the size of its camera",
-                "bring the session back as it was");
+    return fail(ErrorKind::input, run.out.string(), "no visible view whose pose is sure",
+                "run it again with more of the visible views");
   return photos;
 }
 

@@ -11,6 +11,7 @@
 #include "app/pipeline/runner.hpp"
 #include "app/stages/artifacts.hpp"
 #include "core/formats/ply.hpp"
+#include "core/geometry/geometry_json.hpp"
 #include "core/image/image_io.hpp"
 #include "core/system/file_io.hpp"
 
@@ -33,12 +34,6 @@ json region_json(const ComparedRuns& runs, const DifferenceRegion& region, int n
           {"middle", place_json(region.middle)},
           {"place", place_json(region.place)},
           {"vertices", region.vertices.size()}};
-}
-
-json matrix_json(const Eigen::Matrix4d& m) {
-  json rows = json::array();
-  for (int r = 0; r < 4; ++r) rows.push_back({m(r, 0), m(r, 1), m(r, 2), m(r, 3)});
-  return rows;
 }
 
 double extent(const ComparedRuns& runs) {

@@ -7,6 +7,7 @@
 
 #include "app/stages/rendered_views.hpp"
 #include "core/geometry/kd_tree.hpp"
+#include "core/geometry/lifted.hpp"
 #include "core/geometry/narrowed.hpp"
 #include "core/image/image_io.hpp"
 #include "core/image/undistorted.hpp"
@@ -25,15 +26,8 @@ Camera picture_camera(const Camera& camera) {
 
 Result<cv::Mat> photo_of(const ComparedRuns& runs, const PosedView& posed, const Camera& camera) {
   ORBITFUSE_ASSIGN(const cv::Mat image, read_visible(runs.after.session->folder / posed.name));
-  if (image.cols != posed.camera.width || image.rows != posed.camera.height)
-    return fail(ErrorKind::input, posed.name, "a photo of another size than its camera",
-                "bring the session back as it was");
-  std::vector<cv::Mat> channels;
-  cv::split(image, channels);
-  for (cv::Mat& channel : channels)
-    channel = undistorted(channel, posed.camera, posed.camera.without_distortion());
-  cv::Mat straight, small;
-  cv::merge(channels, straight);
+  ORBITFUSE_ASSIGN(cv::Mat straight, recorded_straight(image, posed.camera, posed.name));
+  cv::Mat small;
   if (straight.channels() == 1) cv::cvtColor(straight, straight, cv::COLOR_GRAY2BGR);
   cv::resize(straight, small, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
   return small;
@@ -73,12 +67,10 @@ cv::Mat difference_picture(const ComparedRuns& runs, const KdTree& vertices, con
   constexpr double over = 0.7;
   for (int y = 0; y < depth.rows; ++y)
     for (int x = 0; x < depth.cols; ++x) {
-      const auto z = static_cast<double>(depth.at<float>(y, x));
-      if (!std::isfinite(z)) continue;
+      if (!std::isfinite(depth.at<float>(y, x))) continue;
       std::size_t nearest = 0;
       double d2 = 0;
-      vertices.nearest(world_from_cam * (z * view.camera.ray_of({x + 0.5, y + 0.5})), 1, &nearest,
-                       &d2);
+      vertices.nearest(world_from_cam * lifted(depth, view.camera, x, y), 1, &nearest, &d2);
       const bool changed = runs.change[nearest] == SurfaceChange::changed;
       if (!changed && !runs.points[nearest].known()) continue;
       auto& pixel = picture.at<cv::Vec3b>(y, x);

@@ -23,17 +23,7 @@ constexpr std::size_t most_points = 100'000;
 
 Result<cv::Mat> photo(const view::FinishedRun& run, const PosedView& view) {
   ORBITFUSE_ASSIGN(const cv::Mat image, read_visible(run.session->folder / view.name));
-  if (image.cols != view.camera.width || image.rows != view.camera.height)
-    return fail(ErrorKind::input, view.name, "not of its camera's size",
-                "name the session that the run was made of");
-  if (!view.camera.has_distortion()) return image;
-  std::vector<cv::Mat> channels;
-  cv::split(image, channels);
-  for (cv::Mat& channel : channels)
-    channel = undistorted(channel, view.camera, view.camera.without_distortion());
-  cv::Mat straight;
-  cv::merge(channels, straight);
-  return straight;
+  return recorded_straight(image, view.camera, view.name);
 }
 
 /// What the recorded frames add to pictures of the fields, as in the run's own new views.

@@ -3,17 +3,10 @@
 
 #include <fmt/format.h>
 
+#include "core/geometry/geometry_json.hpp"
+
 namespace orbitfuse::exporting {
-namespace {
 using nlohmann::json;
-
-json json_of(const Eigen::Matrix4d& m) {
-  json rows = json::array();
-  for (int r = 0; r < 4; ++r) rows.push_back({m(r, 0), m(r, 1), m(r, 2), m(r, 3)});
-  return rows;
-}
-
-}  // namespace
 
 std::string ExportFrame::words() const {
   if (!scale) return "no scale is known: lengths are in the run's own unit";
@@ -43,7 +36,7 @@ json to_json(const ExportFrame& frame) {
   json j = {{"unit", frame.unit()},
             {"up", "z"},
             {"words", frame.words()},
-            {"world_from_export", json_of(frame.export_from_world.inverse().matrix())}};
+            {"world_from_export", matrix_json(frame.export_from_world.inverse().matrix())}};
   if (frame.scale) j["scale"] = stages::to_json(*frame.scale);
   return j;
 }

@@ -34,12 +34,6 @@ Camera centred(const Camera& camera) {
   return middle;
 }
 
-cv::Mat straight(const cv::Mat& image, const Camera& camera) {
-  cv::Mat gray = image;
-  if (image.channels() == 3) cv::cvtColor(image, gray, cv::COLOR_BGR2GRAY);
-  return undistorted(gray, camera, centred(camera));
-}
-
 /// Where the diagonals cross: blur that draws all four corners inwards leaves it where it is.
 Eigen::Vector2d middle_of(const cv::Point2d* corners) {
   const auto at = [&](int i) { return Eigen::Vector3d(corners[i].x, corners[i].y, 1); };
@@ -116,8 +110,11 @@ Result<MetricScale> scale_of_mat(const view::FinishedRun& run, const MatDesign& 
     MatFinder finder(design);
     finder.set_focal_px(Modality::visible, v.view.camera.fx);
     ORBITFUSE_ASSIGN(const cv::Mat image, read_visible(run.session->folder / v.view.name));
-    if (image.cols != v.view.camera.width || image.rows != v.view.camera.height) continue;
-    const auto sighting = finder.find(straight(image, v.view.camera), Modality::visible);
+    cv::Mat gray = image;
+    if (image.channels() == 3) cv::cvtColor(image, gray, cv::COLOR_BGR2GRAY);
+    const Camera& camera = v.view.camera;
+    ORBITFUSE_ASSIGN(const cv::Mat seen, recorded_as(gray, camera, centred(camera), v.view.name));
+    const auto sighting = finder.find(seen, Modality::visible);
     if (sighting && !sighting->followed) add_rays(sighting->corners, v.view, rays);
   }
   return scale_of_tags(rays, design);

@@ -4,6 +4,7 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
+#include "core/json_fields.hpp"
 #include "core/nested_text.hpp"
 #include "core/system/file_io.hpp"
 
@@ -31,29 +32,26 @@ fs::path records_of(const fs::path& out, const std::string& session) {
 JobOutcome read_outcome(const fs::path& out, const std::string& session, const std::string& stage) {
   const auto text = read_file(outcome_file(out, session, stage), max_settings_bytes);
   if (!text) return {};
-  try {
-    const json j = parse_json(*text);
-    JobOutcome outcome;
-    for (std::size_t i = 0; i < state_names.size(); ++i)
-      if (j.at("state") == state_names[i]) outcome.state = static_cast<JobState>(i);
-    outcome.cause = j.at("cause");
-    outcome.host = j.at("host");
-    outcome.exit_code = j.at("exit_code");
-    outcome.starts = j.at("starts");
-    outcome.cpu_s = j.at("cpu_s");
-    outcome.wall_s = j.at("wall_s");
-    outcome.memory_mb = j.at("memory_mb");
-    return outcome;
-  } catch (const json::exception&) {
+  const json j = parse_json(*text);
+  const JsonFields fields(j, "", {});
+  JobOutcome outcome;
+  std::string state;
+  if (!fields.get_all("state", state, "cause", outcome.cause, "host", outcome.host, "starts",
+                      outcome.starts, "cpu_s", outcome.cpu_s, "wall_s", outcome.wall_s, "memory_mb",
+                      outcome.memory_mb) ||
+      !fields.get_present("exit_code", outcome.exit_code))
     return {};
-  }
+  for (std::size_t i = 0; i < state_names.size(); ++i)
+    if (state == state_names[i]) outcome.state = static_cast<JobState>(i);
+  return outcome;
 }
 
 Status write_outcome(const fs::path& out, const std::string& session, const std::string& stage,
                      const JobOutcome& o) {
-  const json j = {{"schema", 1},      {"state", name(o.state)},   {"cause", o.cause},
-                  {"host", o.host},   {"exit_code", o.exit_code}, {"starts", o.starts},
-                  {"cpu_s", o.cpu_s}, {"wall_s", o.wall_s},       {"memory_mb", o.memory_mb}};
+  const json code = o.exit_code ? json(*o.exit_code) : json();
+  const json j = {{"schema", 1},      {"state", name(o.state)}, {"cause", o.cause},
+                  {"host", o.host},   {"exit_code", code},      {"starts", o.starts},
+                  {"cpu_s", o.cpu_s}, {"wall_s", o.wall_s},     {"memory_mb", o.memory_mb}};
   return write_file_atomic(outcome_file(out, session, stage), j.dump() + "\n");
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,7 +29,7 @@ struct JobOutcome {
   JobState state = JobState::waiting;
   std::string cause;  ///< of failed and interrupted
   std::string host;
-  int exit_code = -1;
+  std::optional<int> exit_code;                 ///< none: it has not ended
   int starts = 0;                               ///< how often the stage's run was started
   double cpu_s = 0, wall_s = 0, memory_mb = 0;  ///< sums of all starts; memory the largest
 };

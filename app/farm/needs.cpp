@@ -29,7 +29,8 @@ std::map<std::string, StageNeeds> default_needs(const std::vector<std::string>& 
     StageNeeds& n = needs[stage];
     n.cores = cores;
     n.gpu = on_gpu && (stage.starts_with("train_") || stage == "render");
-    if (stage == "register" || stage == "report") n = {1, 1000, 15, false, 1};
+    if (stage == "register" || stage == "report")
+      n = {.cores = 1, .memory_mb = 1000, .time_min = 15, .gpu = false, .usual_s = 1};
     if (const auto known = measured_s.find(stage); known != measured_s.end())
       n.usual_s = known->second;
   }

@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/json_fields.hpp"
 #include "core/nested_text.hpp"
 #include "core/system/file_io.hpp"
 
@@ -22,24 +23,45 @@ json to_json(const StageNeeds& needs) {
           {"usual_s", needs.usual_s}};
 }
 
-FarmPlan from_json(const json& j) {
-  FarmPlan plan;
-  plan.program = j.at("program");
-  plan.options = j.at("options").get<std::vector<std::string>>();
-  plan.stages = j.at("stages").get<std::vector<std::string>>();
-  plan.tries = j.at("tries");
-  for (const json& s : j.at("sessions")) plan.sessions.push_back({s.at("name"), s.at("folder")});
-  for (const auto& [stage, n] : j.at("needs").items())
-    plan.needs[stage] = {n.at("cores"), n.at("memory_mb"), n.at("time_min"), n.at("gpu"),
-                         n.value("usual_s", 0.0)};
-  if (!j.contains("slurm")) return plan;
-  const json& slurm = j["slurm"];
+Status read_needs(const JsonFields& fields, FarmPlan& plan) {
+  for (const std::string& stage : fields.keys()) {
+    ORBITFUSE_ASSIGN(const JsonFields told, fields.child(stage.c_str()));
+    StageNeeds& needs = plan.needs[stage];
+    ORBITFUSE_TRY(told.get_all("cores", needs.cores, "memory_mb", needs.memory_mb, "time_min",
+                               needs.time_min, "gpu", needs.gpu));
+    ORBITFUSE_TRY(told.get_present("usual_s", needs.usual_s));
+  }
+  return {};
+}
+
+Status read_slurm(const JsonFields& fields, FarmPlan& plan) {
+  SlurmOptions& slurm = plan.slurm;
+  ORBITFUSE_TRY(fields.get_all("partition", slurm.partition, "gpu_partition", slurm.gpu_partition,
+                               "account", slurm.account, "least_job_s", slurm.least_job_s));
+  ORBITFUSE_ASSIGN(const std::vector<JsonFields> rounds, fields.children("rounds"));
+  for (const JsonFields& told : rounds) {
+    SlurmRound& round = plan.rounds.emplace_back();
+    ORBITFUSE_TRY(told.get_all("first", round.first, "jobs", round.jobs, "stages", round.stages));
+  }
   plan.on_slurm = true;
-  plan.slurm = {slurm.at("partition"), slurm.at("gpu_partition"), slurm.at("account"),
-                slurm.at("least_job_s")};
-  for (const json& r : slurm.at("rounds"))
-    plan.rounds.push_back({r.at("first"), r.at("jobs").get<std::vector<std::string>>(),
-                           r.at("stages").get<std::vector<std::vector<std::string>>>()});
+  return {};
+}
+
+Result<FarmPlan> plan_of(const JsonFields& fields) {
+  FarmPlan plan;
+  ORBITFUSE_TRY(fields.get_all("program", plan.program, "options", plan.options, "stages",
+                               plan.stages, "tries", plan.tries));
+  ORBITFUSE_ASSIGN(const std::vector<JsonFields> sessions, fields.children("sessions"));
+  for (const JsonFields& told : sessions) {
+    FarmSession& session = plan.sessions.emplace_back();
+    ORBITFUSE_TRY(told.get_all("name", session.name, "folder", session.folder));
+  }
+  ORBITFUSE_ASSIGN(const JsonFields needs, fields.child("needs"));
+  ORBITFUSE_TRY(read_needs(needs, plan));
+  if (fields.has("slurm")) {
+    ORBITFUSE_ASSIGN(const JsonFields slurm, fields.child("slurm"));
+    ORBITFUSE_TRY(read_slurm(slurm, plan));
+  }
   return plan;
 }
 
@@ -91,20 +113,17 @@ Result<FarmPlan> read_plan(const fs::path& out) {
                 "start one: orbitfuse farm SESSIONS... --out " + out.string());
   ORBITFUSE_ASSIGN(const std::string text, read_file(file, max_text_bytes));
   const json j = parse_json(text);
-  const auto broken = [&](const std::string& found) {
-    return fail(ErrorKind::input, file.string(), found,
-                "start a new farm in another folder; the sessions' results here stay usable");
-  };
-  if (!j.is_object() || !j.contains("schema")) return broken("not JSON, or cut off");
-  if (j["schema"] != plan_schema)
-    return broken(fmt::format("schema {}, {} expected", j["schema"].dump(), plan_schema));
-  try {
-    FarmPlan plan = from_json(j);
-    if (plan.sessions.empty() || plan.stages.empty()) return broken("no sessions or no stages");
-    return plan;
-  } catch (const json::exception& error) {
-    return broken(error.what());
-  }
+  constexpr const char* remedy =
+      "start a new farm in another folder; the sessions' results here stay usable";
+  const JsonFields fields(j, file.string() + ": ", {ErrorKind::input, remedy});
+  ORBITFUSE_TRY(fields.check_object());
+  int schema = 0;
+  ORBITFUSE_TRY(fields.get("schema", schema));
+  if (schema != plan_schema) return fields.wrong("schema", fmt::format("{}", plan_schema));
+  ORBITFUSE_ASSIGN(FarmPlan plan, plan_of(fields));
+  if (plan.sessions.empty() || plan.stages.empty())
+    return fail(ErrorKind::input, file.string(), "no sessions or no stages", remedy);
+  return plan;
 }
 
 Status write_plan(const fs::path& out, const FarmPlan& plan) {

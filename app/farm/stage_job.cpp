@@ -156,19 +156,20 @@ JobOutcome StageJob::ended(int status, double cpu_s, double memory_mb) const {
                         : fmt::format("died of signal {} ({})", signal, strsignal(signal));
     return outcome;
   }
-  outcome.exit_code = WEXITSTATUS(status);
+  const int code = WEXITSTATUS(status);
+  outcome.exit_code = code;
   const json result = last_line(events_);
-  if (outcome.exit_code == 0) {
+  if (code == 0) {
     outcome.state = JobState::done;
     return outcome;
   }
-  outcome.state = outcome.exit_code == exit_stopped ? JobState::interrupted : JobState::failed;
-  if (outcome.exit_code == exit_cannot_start && result.is_null())
+  outcome.state = code == exit_stopped ? JobState::interrupted : JobState::failed;
+  if (code == exit_cannot_start && result.is_null())
     outcome.cause = "the program is not there; install the same one on every node";
   else if (result.is_object() && result.contains("error"))
     outcome.cause = result["error"].value("message", std::string("no message"));
   else
-    outcome.cause = fmt::format("ended with code {} without a word", outcome.exit_code);
+    outcome.cause = fmt::format("ended with code {} without a word", code);
   return outcome;
 }
 

@@ -4,9 +4,7 @@
 #include <fcntl.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
-#include <ctime>
 #include <set>
 
 #include "app/pipeline/folder_lock.hpp"
@@ -14,6 +12,7 @@
 #include "core/system/clock.hpp"
 #include "core/system/file_io.hpp"
 #include "core/system/trace.hpp"
+#include "core/system/utc_now.hpp"
 
 namespace orbitfuse::pipeline {
 namespace fs = std::filesystem;
@@ -78,32 +77,24 @@ Status replace_folder(const fs::path& from, const fs::path& to) {
   return device_error(to, ec);
 }
 
-std::string utc_now() {
-  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
-  std::tm utc{};
-  gmtime_r(&now, &utc);
-  char text[32];
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
-  return text;
-}
-
 /// Later stages can't do better after these.
 bool stops_everything(ErrorKind kind) {
   return kind == ErrorKind::cancelled || kind == ErrorKind::device || kind == ErrorKind::usage;
 }
 
-/// The first option whose value differs, for "why is this stage running again".
-std::string changed_option(const json& before, const json& now, const std::string& prefix = "") {
+/// The first option whose value differs, for "why is this stage running again"; none: all alike.
+std::optional<std::string> changed_option(const json& before, const json& now,
+                                          const std::string& prefix = "") {
   if (before.is_object() && now.is_object()) {
     for (const auto& [key, value] : now.items()) {
       std::string path = prefix.empty() ? key : prefix + "." + key;
       if (!before.contains(key)) return path;
-      if (std::string inner = changed_option(before.at(key), value, path); !inner.empty())
-        return inner;
+      if (auto inner = changed_option(before.at(key), value, path)) return inner;
     }
-    return before.size() > now.size() ? (prefix.empty() ? "options" : prefix) : "";
+    if (before.size() <= now.size()) return std::nullopt;
+    return prefix.empty() ? "options" : prefix;
   }
-  return before == now ? "" : prefix;
+  return before == now ? std::nullopt : std::optional(prefix);
 }
 
 }  // namespace
@@ -171,21 +162,21 @@ std::optional<EarlierResult> Runner::earlier_result(const Stage& stage, const Ke
   const fs::path folder = options_.out / stage.name;
   const auto record = read_stage_record(folder);
   if (forced(stage) || !record || record->version != stage.version ||
-      record->inputs != key.inputs || !damage(folder, *record).empty())
+      record->inputs != key.inputs || damage(folder, *record))
     return std::nullopt;
   return EarlierResult{folder, record->options, record->output.metrics};
 }
 
-std::string Runner::why_run(const Stage& stage, const Key& key,
-                            const Result<StageRecord>& record) const {
+std::optional<std::string> Runner::why_run(const Stage& stage, const Key& key,
+                                           const Result<StageRecord>& record) const {
   if (forced(stage)) return "--force";
   if (!fs::exists(options_.out / stage.name / stage_record_file)) return "not done yet";
   if (!record) return "its done mark can't be read";
   if (stage.always) return "describes this run";
   if (record->key != key.hash) {
     if (record->version != stage.version) return "the stage's method has a new version";
-    const std::string option = changed_option(record->options, stage.options);
-    if (!option.empty()) return "option " + option + " changed";
+    if (const auto option = changed_option(record->options, stage.options))
+      return "option " + *option + " changed";
     for (const auto& [name, hash] : key.inputs) {
       const auto it = record->inputs.find(name);
       if (it == record->inputs.end() || it->second != hash)
@@ -245,19 +236,18 @@ StageStatus Runner::visit(const Stage& stage) {
   const Key key = key_of(stage);
   const auto record = read_stage_record(options_.out / stage.name);
   if (options_.targets_only && !is_target(stage.name)) {
-    const std::string wrong =
+    const std::optional<std::string> wrong =
         record ? damage(options_.out / stage.name, *record) : "it has not run yet";
-    if (!wrong.empty()) {
+    if (wrong) {
       status.state = StageState::absent;
-      status.why = wrong;
+      status.why = *wrong;
       return status;
     }
   }
   const bool as_it_lies = options_.targets_only && !is_target(stage.name);
-  const std::string why = as_it_lies ? ""
-                          : unknown  ? "a stage it reads will run"
-                                     : why_run(stage, key, record);
-  if (why.empty()) {
+  std::optional<std::string> why;
+  if (!as_it_lies) why = unknown ? "a stage it reads will run" : why_run(stage, key, record);
+  if (!why) {
     status.state = StageState::unchanged;
     status.output = record->output;
     status.cpu_s = record->cpu_s;
@@ -267,11 +257,11 @@ StageStatus Runner::visit(const Stage& stage) {
   }
   if (options_.dry_run) {
     status.state = StageState::planned;
-    status.why = why;
+    status.why = *why;
     outputs_[stage.name] = "planned";
     return status;
   }
-  return execute(stage, key, why);
+  return execute(stage, key, *std::move(why));
 }
 
 StageStatus Runner::execute(const Stage& stage, const Key& key, std::string why) {
@@ -309,7 +299,7 @@ StageStatus Runner::execute(const Stage& stage, const Key& key, std::string why)
     StageRecord record{.stage = stage.name,
                        .key = key.hash,
                        .software_version = software_version(),
-                       .finished_utc = utc_now(),
+                       .finished_utc = utc_now_text(),
                        .version = stage.version,
                        .options = stage.options,
                        .inputs = key.inputs,

@@ -57,7 +57,9 @@ class Runner {
   std::optional<EarlierResult> earlier_result(const Stage& stage, const Key& key) const;
   StageStatus visit(const Stage& stage);
   StageStatus execute(const Stage& stage, const Key& key, std::string why);
-  std::string why_run(const Stage& stage, const Key& key, const Result<StageRecord>& record) const;
+  /// None: what it made still holds.
+  std::optional<std::string> why_run(const Stage& stage, const Key& key,
+                                     const Result<StageRecord>& record) const;
 
   std::vector<Stage> stages_;
   RunOptions options_;

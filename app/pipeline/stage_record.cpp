@@ -148,7 +148,7 @@ Result<std::vector<OutputFile>> list_outputs(const fs::path& folder) {
   return outputs;
 }
 
-std::string damage(const fs::path& folder, const StageRecord& record) {
+std::optional<std::string> damage(const fs::path& folder, const StageRecord& record) {
   const auto found = list_outputs(folder);
   if (!found) return found.error().message();
   for (const OutputFile& want : record.outputs) {
@@ -157,7 +157,7 @@ std::string damage(const fs::path& folder, const StageRecord& record) {
     if (it == found->end()) return want.file + " is missing";
     if (*it != want) return want.file + " was changed";
   }
-  return {};
+  return std::nullopt;
 }
 
 }  // namespace orbitfuse::pipeline

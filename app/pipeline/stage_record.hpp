@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -45,8 +46,8 @@ std::set<std::string> finished_stages(const std::filesystem::path& out);
 
 /// Every file below the folder except the done mark, sorted by name.
 Result<std::vector<OutputFile>> list_outputs(const std::filesystem::path& folder);
-/// The first way in which the folder differs from the record; empty when it is intact.
-std::string damage(const std::filesystem::path& folder, const StageRecord& record);
+/// The first way in which the folder differs from the record; none where it is intact.
+std::optional<std::string> damage(const std::filesystem::path& folder, const StageRecord& record);
 
 nlohmann::json to_json(const Skip& skip);
 nlohmann::json to_json(const Error& error);

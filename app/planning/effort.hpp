@@ -12,6 +12,7 @@ struct Effort {
 
 /// The least of everything: with a weaker visible field the stages behind it take longer than its
 /// training saves (docs/notes/planner.md).
-inline constexpr Effort least_effort{280, 2400, 600, 2};
+inline constexpr Effort least_effort{
+    .depth_width_px = 280, .visible_steps = 2400, .thermal_steps = 600, .scored_views = 2};
 
 }  // namespace orbitfuse::planning

@@ -3,11 +3,9 @@
 
 #include <fmt/format.h>
 
-#include <array>
-
-#include "app/pipeline/stage_record.hpp"
 #include "core/formats/colmap_model.hpp"
 #include "core/formats/transforms_json.hpp"
+#include "core/geometry/geometry_json.hpp"
 #include "core/image/image_io.hpp"
 #include "core/nested_text.hpp"
 #include "core/system/file_io.hpp"
@@ -19,27 +17,12 @@ using nlohmann::json;
 
 namespace {
 
-json camera_json(const Camera& c) {
-  return {{"width", c.width}, {"height", c.height}, {"fx", c.fx},
-          {"fy", c.fy},       {"cx", c.cx},         {"cy", c.cy}};
-}
-
-Camera camera_of_json(const json& j) {
-  Camera c;
-  j.at("width").get_to(c.width);
-  j.at("height").get_to(c.height);
-  j.at("fx").get_to(c.fx);
-  j.at("fy").get_to(c.fy);
-  j.at("cx").get_to(c.cx);
-  j.at("cy").get_to(c.cy);
-  return c;
-}
-
 fs::path depth_file(const fs::path& folder, const DepthMap& map, const char* kind) {
   return folder / fmt::format("{:03}_{}.tiff", map.view, kind);
 }
 
 constexpr const char* normal_kinds[] = {"normal_x", "normal_y", "normal_z"};
+constexpr const char* run_again = "run the stage that writes it again (--force)";
 
 }  // namespace
 
@@ -50,9 +33,18 @@ Status write_json(const fs::path& file, const json& j) {
 Result<json> read_json(const fs::path& file) {
   ORBITFUSE_ASSIGN(const std::string text, read_file(file));
   json j = parse_json(text);
-  if (j.is_discarded())
-    return fail(ErrorKind::input, file.string(), "not JSON", "run the stage that writes it again");
+  if (j.is_discarded()) return fail(ErrorKind::input, file.string(), "not JSON", run_again);
   return j;
+}
+
+JsonFields stage_fields(const json& j, const fs::path& file) {
+  return {j, file.string() + ": ", {ErrorKind::input, run_again}};
+}
+
+JsonFields metric_fields(const pipeline::StageRecord& record, const fs::path& folder) {
+  return {record.output.metrics,
+          (folder / pipeline::stage_record_file).string() + ": metrics.",
+          {ErrorKind::input, run_again}};
 }
 
 pipeline::StageContext context_of_run(const fs::path& out) {
@@ -87,16 +79,40 @@ Result<Reconstruction> load_trained_poses(const pipeline::StageContext& context,
 
 Result<std::map<std::string, std::string>> load_doubts(const fs::path& folder) {
   ORBITFUSE_ASSIGN(const pipeline::StageRecord record, pipeline::read_stage_record(folder));
+  ORBITFUSE_ASSIGN(const std::vector<JsonFields> doubtful,
+                   metric_fields(record, folder).children("doubtful"));
   std::map<std::string, std::string> doubts;
-  const json& metrics = record.output.metrics;
-  if (!metrics.contains("doubtful")) return doubts;
-  const auto is_text = [](const json& entry, const char* key) {
-    return entry.is_object() && entry.contains(key) && entry[key].is_string();
-  };
-  for (const json& entry : metrics["doubtful"])
-    if (is_text(entry, "view"))
-      doubts[entry["view"]] = is_text(entry, "why") ? entry["why"] : json("doubtful");
+  for (const JsonFields& entry : doubtful) {
+    std::string view;
+    ORBITFUSE_TRY(entry.get("view", view));
+    ORBITFUSE_TRY(entry.get("why", doubts[view]));
+  }
   return doubts;
+}
+
+Result<TrainedFrames> load_trained_frames(const fs::path& folder) {
+  ORBITFUSE_ASSIGN(const pipeline::StageRecord record, pipeline::read_stage_record(folder));
+  const JsonFields metrics = metric_fields(record, folder);
+  TrainedFrames frames;
+  ORBITFUSE_TRY(metrics.get_all("heldout", frames.heldout, "width_px", frames.width_px));
+  ORBITFUSE_ASSIGN(const JsonFields gains, metrics.child("image_gains"));
+  for (const std::string& view : gains.keys())
+    ORBITFUSE_TRY(gains.get(view.c_str(), frames.gains[view]));
+  // Runs before 2026-11-23 have an array that names no frames.
+  if (const json* drift = metrics.find("image_offsets_k"); drift != nullptr && drift->is_array())
+    return frames;
+  ORBITFUSE_ASSIGN(const JsonFields offsets, metrics.child("image_offsets_k"));
+  for (const std::string& view : offsets.keys())
+    ORBITFUSE_TRY(offsets.get(view.c_str(), frames.offsets_k[view]));
+  return frames;
+}
+
+Result<FusedImages> load_fused_images(const fs::path& folder) {
+  ORBITFUSE_ASSIGN(const pipeline::StageRecord record, pipeline::read_stage_record(folder));
+  FusedImages fused;
+  ORBITFUSE_TRY(metric_fields(record, folder)
+                    .get_all("methods", fused.methods, "measured_share", fused.measured_share));
+  return fused;
 }
 
 Status save_depth_maps(const fs::path& folder, const std::vector<DepthMap>& maps) {
@@ -108,34 +124,36 @@ Status save_depth_maps(const fs::path& folder, const std::vector<DepthMap>& maps
     if (!map.normal.empty()) cv::split(map.normal, axes);
     for (std::size_t i = 0; i < axes.size(); ++i)
       ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, normal_kinds[i]), axes[i]));
-    list.push_back(
-        {{"view", map.view}, {"camera", camera_json(map.camera)}, {"normal", !map.normal.empty()}});
+    list.push_back({{"view", map.view},
+                    {"camera", pinhole_json(map.camera)},
+                    {"normal", !map.normal.empty()}});
   }
   return write_json(folder / "depth.json", list);
 }
 
 Result<std::vector<DepthMap>> load_depth_maps(const fs::path& folder) {
-  ORBITFUSE_ASSIGN(const json list, read_json(folder / "depth.json"));
+  const fs::path file = folder / "depth.json";
+  ORBITFUSE_ASSIGN(const json list, read_json(file));
+  const json named = {{"maps", list}};
+  ORBITFUSE_ASSIGN(const std::vector<JsonFields> entries,
+                   stage_fields(named, file).children("maps"));
   std::vector<DepthMap> maps;
-  try {
-    for (const json& j : list) {
-      DepthMap map;
-      j.at("view").get_to(map.view);
-      map.camera = camera_of_json(j.at("camera"));
-      ORBITFUSE_ASSIGN(map.depth, read_float_tiff(depth_file(folder, map, "depth")));
-      ORBITFUSE_ASSIGN(map.confidence, read_float_tiff(depth_file(folder, map, "confidence")));
-      if (j.at("normal").get<bool>()) {
-        cv::Mat axes[3];
-        for (int i = 0; i < 3; ++i) {
-          ORBITFUSE_ASSIGN(axes[i], read_float_tiff(depth_file(folder, map, normal_kinds[i])));
-        }
-        cv::merge(axes, 3, map.normal);
+  for (const JsonFields& entry : entries) {
+    DepthMap map;
+    bool has_normal = false;
+    ORBITFUSE_TRY(entry.get_all("view", map.view, "normal", has_normal));
+    ORBITFUSE_ASSIGN(const JsonFields camera, entry.child("camera"));
+    ORBITFUSE_ASSIGN(map.camera, camera_of_json(camera));
+    ORBITFUSE_ASSIGN(map.depth, read_float_tiff(depth_file(folder, map, "depth")));
+    ORBITFUSE_ASSIGN(map.confidence, read_float_tiff(depth_file(folder, map, "confidence")));
+    if (has_normal) {
+      cv::Mat axes[3];
+      for (int i = 0; i < 3; ++i) {
+        ORBITFUSE_ASSIGN(axes[i], read_float_tiff(depth_file(folder, map, normal_kinds[i])));
       }
-      maps.push_back(std::move(map));
+      cv::merge(axes, 3, map.normal);
     }
-  } catch (const json::exception& e) {
-    return fail(ErrorKind::input, (folder / "depth.json").string(), e.what(),
-                "run with --force to make it again");
+    maps.push_back(std::move(map));
   }
   return maps;
 }
@@ -147,17 +165,10 @@ Status save_temperature_bounds(const fs::path& folder, double low_k, double high
                      {"unit", "degrees Celsius"}});
 }
 
-json to_json(const Similarity3d& s) {
-  return {{"scale", s.scale},
-          {"rotation_wxyz", {s.rotation.w(), s.rotation.x(), s.rotation.y(), s.rotation.z()}},
-          {"translation", {s.translation.x(), s.translation.y(), s.translation.z()}}};
-}
-
 namespace {
 
 constexpr const char* pose_frame_file = "poses.json";
 constexpr const char* registration_file = "registration.json";
-constexpr const char* run_again = "run the stage that writes it again (--force)";
 
 }  // namespace
 
@@ -167,11 +178,9 @@ Status save_pose_frame(const fs::path& folder, PoseFrame frame) {
 
 Result<PoseFrame> load_pose_frame(const fs::path& folder) {
   ORBITFUSE_ASSIGN(const json j, read_json(folder / pose_frame_file));
-  const auto shared = j.find("shared_frame");
-  if (shared == j.end() || !shared->is_boolean())
-    return fail(ErrorKind::input, (folder / pose_frame_file).string(),
-                "no shared_frame (true or false) in it", run_again);
-  return shared->get<bool>() ? PoseFrame::visible : PoseFrame::own;
+  bool shared = false;
+  ORBITFUSE_TRY(stage_fields(j, folder / pose_frame_file).get("shared_frame", shared));
+  return shared ? PoseFrame::visible : PoseFrame::own;
 }
 
 Status save_registration(const fs::path& folder, const RegistrationRecord& record) {
@@ -179,26 +188,17 @@ Status save_registration(const fs::path& folder, const RegistrationRecord& recor
                     {{"schema", 1},
                      {"conventions", "x_visible = scale * R * x_thermal + t"},
                      {"how", record.how},
-                     {"visible_from_thermal", to_json(record.visible_from_thermal)}});
+                     {"visible_from_thermal", similarity_json(record.visible_from_thermal)}});
 }
 
 Result<RegistrationRecord> load_registration(const fs::path& folder) {
   ORBITFUSE_ASSIGN(const json j, read_json(folder / registration_file));
-  try {
-    RegistrationRecord record;
-    j.at("how").get_to(record.how);
-    const json& s = j.at("visible_from_thermal");
-    const auto q = s.at("rotation_wxyz").get<std::array<double, 4>>();
-    const auto t = s.at("translation").get<std::array<double, 3>>();
-    Similarity3d& similarity = record.visible_from_thermal;
-    s.at("scale").get_to(similarity.scale);
-    similarity.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
-    similarity.translation = {t[0], t[1], t[2]};
-    if (similarity.is_finite() && similarity.scale > 0) return record;
-  } catch (const json::exception&) {  // reported below
-  }
-  return fail(ErrorKind::input, (folder / registration_file).string(), "no similarity in it",
-              run_again);
+  const JsonFields fields = stage_fields(j, folder / registration_file);
+  RegistrationRecord record;
+  ORBITFUSE_TRY(fields.get("how", record.how));
+  ORBITFUSE_ASSIGN(const JsonFields similarity, fields.child("visible_from_thermal"));
+  ORBITFUSE_ASSIGN(record.visible_from_thermal, similarity_of_json(similarity));
+  return record;
 }
 
 }  // namespace orbitfuse::stages

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -8,8 +9,10 @@
 #include <vector>
 
 #include "app/pipeline/stage.hpp"
+#include "app/pipeline/stage_record.hpp"
 #include "core/geometry/reconstruction.hpp"
 #include "core/geometry/transform.hpp"
+#include "core/json_fields.hpp"
 #include "core/session/session.hpp"
 
 // What stages leave for each other, in formats that other tools read (docs/formats.md).
@@ -49,9 +52,30 @@ Result<std::vector<DepthMap>> load_depth_maps(const std::filesystem::path& folde
 /// temperature_bounds.json as ThermoNeRF reads it (degrees Celsius).
 Status save_temperature_bounds(const std::filesystem::path& folder, double low_k, double high_k);
 
-nlohmann::json to_json(const Similarity3d& a_from_b);
+/// What training says of single frames, and how it saw them.
+struct TrainedFrames {
+  /// R, G, B of a frame against the common exposure; of the others it was steady.
+  std::map<std::string, std::array<double, 3>> gains;
+  std::map<std::string, double> offsets_k;  ///< the camera's drift in a frame; of the others none
+  std::vector<std::string> heldout;         ///< that the field did not learn from
+  int width_px = 0;
+};
+/// `folder`: of the finished training. Errors: input (its record is cut or of another version).
+Result<TrainedFrames> load_trained_frames(const std::filesystem::path& folder);
+
+/// What fusion says of its images.
+struct FusedImages {
+  std::vector<std::string> methods;  ///< one folder each
+  double measured_share = 0;         ///< of all pixels, that have a temperature
+};
+/// As load_trained_frames(), of the finished fusion.
+Result<FusedImages> load_fused_images(const std::filesystem::path& folder);
 
 Status write_json(const std::filesystem::path& file, const nlohmann::json& j);
 Result<nlohmann::json> read_json(const std::filesystem::path& file);
+/// Fields of a file of a stage; errors name both, and say to make the file again.
+JsonFields stage_fields(const nlohmann::json& j, const std::filesystem::path& file);
+/// Of the metrics in a stage's record.
+JsonFields metric_fields(const pipeline::StageRecord& record, const std::filesystem::path& folder);
 
 }  // namespace orbitfuse::stages

@@ -3,6 +3,7 @@
 
 #include "app/stages/artifacts.hpp"
 #include "app/stages/stage_list.hpp"
+#include "core/geometry/seen_by_some.hpp"
 #include "core/image/image_io.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/depth/dense_depth.hpp"
@@ -29,12 +30,7 @@ TrainingViews training_views(const Reconstruction& all, int holdout_every) {
     out.model.views.push_back(all.views[i]);
   }
   for (const SparsePoint& point : all.points) {
-    SparsePoint kept = point;
-    kept.track.clear();
-    for (Observation seen : point.track) {
-      seen.view = place[static_cast<std::size_t>(seen.view)];
-      if (seen.view >= 0) kept.track.push_back(seen);
-    }
+    SparsePoint kept = seen_by_some(point, place);
     if (kept.track.size() > 1) out.model.points.push_back(std::move(kept));
   }
   return out;

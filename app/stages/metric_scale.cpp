@@ -61,21 +61,18 @@ Result<std::optional<MetricScale>> load_metric_scale(const fs::path& out,
   const fs::path file = out / scale_file;
   if (!fs::exists(file, unreadable)) return std::nullopt;
   ORBITFUSE_ASSIGN(const json j, read_json(file));
-  const auto number = [&](const char* key) {
-    return j.is_object() && j.contains(key) && j[key].is_number() ? j[key].get<double>()
-                                                                  : std::nan("");
-  };
-  const auto text = [&](const char* key) {
-    return j.is_object() && j.contains(key) && j[key].is_string() ? j[key].get<std::string>()
-                                                                  : std::string();
-  };
   constexpr const char* remedy = "tell the scale again, or delete the file";
-  if (number("schema") != 1)
-    return fail(ErrorKind::input, file.string(), "not a scale of schema 1", remedy);
-  if (text("world") != content_hash(world))
+  const JsonFields fields(j, file.string() + ": ", {ErrorKind::input, remedy});
+  int schema = 0;
+  std::string of_world;
+  ORBITFUSE_TRY(fields.get_all("schema", schema, "world", of_world));
+  if (schema != 1) return fields.wrong("schema", "1");
+  if (of_world != content_hash(world))
     return fail(ErrorKind::input, file.string(), "a scale of other poses than the run's", remedy);
-  MetricScale scale{number("metres_per_unit"), number("relative_uncertainty"), text("source"),
-                    text("how")};
+  MetricScale scale;
+  ORBITFUSE_TRY(fields.get_all("metres_per_unit", scale.metres_per_unit, "relative_uncertainty",
+                               scale.relative_uncertainty));
+  ORBITFUSE_TRY(fields.get_all("source", scale.source, "how", scale.how));
   ORBITFUSE_TRY(scale.validate(file.string()));
   return scale;
 }

@@ -48,11 +48,9 @@ Status score_field(const StageContext& context, const SessionInput& input,
                    HeldoutKelvin& thermal_k) {
   const std::string train = "train_" + std::string(name(modality));
   if (!context.has(train)) return {};
-  const json* trained = context.metrics_of(train);
-  const auto heldout =
-      trained ? trained->value("heldout", std::vector<std::string>()) : std::vector<std::string>();
+  ORBITFUSE_ASSIGN(const TrainedFrames trained, load_trained_frames(context.of(train)));
+  const std::vector<std::string>& heldout = trained.heldout;
   if (heldout.empty()) return {};
-  const json gains = trained->value("image_gains", json::object());
   ORBITFUSE_ASSIGN(Reconstruction model, load_trained_poses(context, modality));
   model.points.clear();
   std::erase_if(model.views, [&](const PosedView& v) {
@@ -72,8 +70,9 @@ Status score_field(const StageContext& context, const SessionInput& input,
         detail.add(field, view.camera, view.cam_from_world, seen, context.progress, view.name));
     cv::Mat truth = view.image, rendered = seen.color;
     if (modality == Modality::visible) {
-      if (gains.contains(view.name)) {  // the field shows the common exposure, the frame its own
-        const std::array<double, 3> gain = gains.at(view.name);
+      // The field shows the common exposure, the frame its own.
+      if (const auto found = trained.gains.find(view.name); found != trained.gains.end()) {
+        const std::array<double, 3>& gain = found->second;
         cv::multiply(rendered, cv::Scalar(gain[0], gain[1], gain[2]), rendered);
       }
       truth.convertTo(truth, CV_8U, 255);
@@ -95,9 +94,9 @@ Status score_field(const StageContext& context, const SessionInput& input,
 
 /// The fused views, or `scored_views` of them (Table 7). Returns how many are left out.
 Result<std::size_t> score_fused(const StageContext& context, int scored_views, MetricMeans& means) {
-  const json* fused = context.metrics_of("fuse");
-  if (!fused || !context.has("render")) return 0;
-  const auto methods = fused->value("methods", std::vector<std::string>());
+  if (!context.has("fuse") || !context.has("render")) return 0;
+  ORBITFUSE_ASSIGN(const FusedImages fused, load_fused_images(context.of("fuse")));
+  const std::vector<std::string>& methods = fused.methods;
   ORBITFUSE_ASSIGN(const RenderedViews rendered, load_rendered_views(context.of("render")));
   const std::size_t all = rendered.views.size();
   const std::size_t scored =
@@ -122,9 +121,10 @@ Result<std::size_t> score_fused(const StageContext& context, int scored_views, M
 }
 
 /// Share of the fused views that has a temperature; null where nothing was fused.
-json measured_share(const StageContext& context) {
-  const json* fused = context.metrics_of("fuse");
-  return fused ? fused->value("measured_share", json()) : json();
+Result<json> measured_share(const StageContext& context) {
+  if (!context.has("fuse")) return json();
+  ORBITFUSE_ASSIGN(const FusedImages fused, load_fused_images(context.of("fuse")));
+  return fused.measured_share;
 }
 
 Result<StageOutput> score(const StageContext& context, const SessionInput& input,
@@ -151,11 +151,11 @@ Result<StageOutput> score(const StageContext& context, const SessionInput& input
                                  "method"));
   ORBITFUSE_TRY(write_file_atomic(context.folder / "metrics.csv",
                                   MetricMeans::csv_header() + fields.csv() + fused.csv()));
-  ORBITFUSE_TRY(
-      write_json(context.folder / "metrics.json", {{"schema", 1},
-                                                   {"fields", fields.to_json()},
-                                                   {"fused", fused.to_json()},
-                                                   {"measured_share", measured_share(context)}}));
+  ORBITFUSE_ASSIGN(const json share, measured_share(context));
+  ORBITFUSE_TRY(write_json(context.folder / "metrics.json", {{"schema", 1},
+                                                             {"fields", fields.to_json()},
+                                                             {"fused", fused.to_json()},
+                                                             {"measured_share", share}}));
   output.metrics = {
       {"brief", fmt::format("{} fused images, {} held-out views", fused.count(), fields.count())},
       {"tables", tables},

@@ -54,11 +54,7 @@ Result<nerf::PhotoDetail> recorded_detail(const pipeline::StageContext& context,
   const Samples samples = samples_of(session, modality);
   ORBITFUSE_ASSIGN(const Reconstruction model, load_trained_poses(context, modality));
   ORBITFUSE_ASSIGN(const auto doubts, load_doubts(context.of("poses_" + of)));
-  ORBITFUSE_ASSIGN(const pipeline::StageRecord trained,
-                   pipeline::read_stage_record(context.of("train_" + of)));
-  const nlohmann::json& told = trained.output.metrics;
-  const auto gains = told.value("image_gains", nlohmann::json::object());
-  const auto offsets = told.value("image_offsets_k", nlohmann::json::object());
+  ORBITFUSE_ASSIGN(const TrainedFrames trained, load_trained_frames(context.of("train_" + of)));
   std::vector<nerf::DetailSource> sources;
   for (PosedView view : model.views) {
     const std::filesystem::path file = session.folder / view.name;
@@ -67,25 +63,26 @@ Result<nerf::PhotoDetail> recorded_detail(const pipeline::StageContext& context,
     const Camera recorded = view.camera;
     view.camera = narrowed_to(recorded, width_px);
     OwnOfFrame own;
-    own.gain = gains.value(view.name, own.gain);
-    if (offsets.is_object()) own.offset_k = offsets.value(view.name, 0.0);  // an array, once
+    if (const auto gain = trained.gains.find(view.name); gain != trained.gains.end())
+      own.gain = gain->second;
+    if (const auto offset = trained.offsets_k.find(view.name); offset != trained.offsets_k.end())
+      own.offset_k = offset->second;
     sources.push_back({view, [=] { return image_of(file, samples, recorded, view.camera, own); }});
   }
   // What the field learned must not come twice.
   nerf::DetailOptions fitting = options;
-  fitting.base_width_px = std::max(options.base_width_px, told.value("width_px", 0) * 4 / 5);
+  fitting.base_width_px = std::max(options.base_width_px, trained.width_px * 4 / 5);
   return nerf::PhotoDetail::of(std::move(sources), fitting);
 }
 
 Result<nerf::DetailTrial> try_on_recorded(const pipeline::StageContext& context,
                                           DetailedField& shown) {
-  ORBITFUSE_ASSIGN(const pipeline::StageRecord trained,
-                   pipeline::read_stage_record(
-                       context.of("train_" + std::string(name(shown.field.modality())))));
-  const auto heldout = trained.output.metrics.value("heldout", std::vector<std::string>());
+  ORBITFUSE_ASSIGN(
+      const TrainedFrames trained,
+      load_trained_frames(context.of("train_" + std::string(name(shown.field.modality())))));
   const std::vector<std::string> all = shown.detail.names();
   std::vector<std::string> names;
-  for (const std::string& name : heldout)
+  for (const std::string& name : trained.heldout)
     if (std::find(all.begin(), all.end(), name) != all.end()) names.push_back(name);
   if (names.empty()) names = all;
   const std::size_t count = std::min(names.size(), detail_trials);
@@ -102,9 +99,12 @@ Result<nerf::PhotoDetail> detail_of_new_views(const pipeline::StageContext& cont
   if (!context.has("render")) return nerf::PhotoDetail();
   ORBITFUSE_ASSIGN(const pipeline::StageRecord record,
                    pipeline::read_stage_record(context.of("render")));
+  const JsonFields metrics = metric_fields(record, context.of("render"));
+  const std::string key = detail_key(modality);
+  if (!metrics.has(key.c_str())) return nerf::PhotoDetail();  // there was nothing to try
+  ORBITFUSE_ASSIGN(const JsonFields told, metrics.child(key.c_str()));
   nerf::DetailOptions options;
-  options.sources = record.output.metrics.value(detail_key(modality), nlohmann::json::object())
-                        .value("sources", 0);
+  ORBITFUSE_TRY(told.get("sources", options.sources));
   return recorded_detail(context, session, modality, width_px, options);
 }
 

@@ -12,7 +12,8 @@ namespace orbitfuse::stages {
 struct DetailedField {
   nerf::Field field;
   nerf::PhotoDetail detail;
-  double detailed = 0;  ///< shares of the pixels that got detail, summed over the pictures
+  nerf::DetailTrial trial;  ///< of the detail, where it was tried
+  double detailed = 0;      ///< shares of the pixels that got detail, summed over the pictures
 
   bool empty() const { return field.empty(); }
   /// As nerf::render() and PhotoDetail::add().

@@ -5,6 +5,7 @@
 #include "app/stages/registration_json.hpp"
 #include "app/stages/stage_list.hpp"
 #include "core/formats/ply.hpp"
+#include "core/geometry/geometry_json.hpp"
 #include "recon/assembly/field_renderer.hpp"
 #include "recon/assembly/register_fields.hpp"
 #include "recon/assembly/training_data.hpp"
@@ -43,7 +44,7 @@ json image_figures(const SimilarityRefinement& r) {
           {"agreement_after", r.agreement_after},
           {"patches_before", r.matches_before},
           {"patches_after", r.matches_after},
-          {"visible_from_thermal", to_json(r.visible_from_thermal)}};
+          {"visible_from_thermal", similarity_json(r.visible_from_thermal)}};
 }
 
 StageOutput describe(const FieldRegistration& found) {

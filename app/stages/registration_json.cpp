@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "app/stages/artifacts.hpp"
+#include "core/geometry/geometry_json.hpp"
 
 namespace orbitfuse::stages {
 using nlohmann::json;
@@ -11,12 +11,12 @@ using nlohmann::json;
 json to_json(const RegistrationReport& r) {
   json alternatives = json::array();
   for (const RegistrationAlternative& a : r.alternatives)
-    alternatives.push_back({{"target_from_source", to_json(a.target_from_source)},
+    alternatives.push_back({{"target_from_source", similarity_json(a.target_from_source)},
                             {"score", a.score},
                             {"evidence", a.evidence},
                             {"view_score", a.view_score},
                             {"origin", a.origin}});
-  return {{"target_from_source", to_json(r.target_from_source)},
+  return {{"target_from_source", similarity_json(r.target_from_source)},
           {"score", r.score},
           {"evidence", r.evidence},
           {"matching_ratio", r.matching_ratio},

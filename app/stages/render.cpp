@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "app/stages/artifacts.hpp"
 #include "app/stages/recorded_detail.hpp"
@@ -60,7 +61,8 @@ Status load_detail(const StageContext& context, const SessionInput& input,
                                                    detail_width_px(widest), options));
     if (shown.detail.empty()) return {};
     context.progress.report({"render", 0, 1, {}, "detail of the recorded frames"});
-    ORBITFUSE_ASSIGN(const nerf::DetailTrial trial, try_on_recorded(context, shown));
+    ORBITFUSE_ASSIGN(shown.trial, try_on_recorded(context, shown));
+    const nerf::DetailTrial& trial = shown.trial;
     if (!trial.helps()) shown.detail = {};
     output.metrics[detail_key(modality)] = {{"sources", shown.detail.empty() ? 0 : options.sources},
                                             {"views_tried", trial.views},
@@ -82,13 +84,12 @@ Status load_detail(const StageContext& context, const SessionInput& input,
 }
 
 /// ", with detail of recorded frames (2 tried: 16 % nearer)"; empty where there is none.
-std::string words_on_detail(const json& metrics) {
-  for (const Modality modality : {Modality::visible, Modality::thermal}) {
-    const json told = metrics.value(detail_key(modality), json::object());
-    if (told.value("sources", 0) == 0) continue;
-    const double with = told.at("error_with"), without = told.at("error_without");
-    return fmt::format(", with detail of recorded frames ({} tried: {:.0f} % nearer)",
-                       told.at("views_tried").get<int>(), 100 * (1 - with / without));
+std::string words_on_detail(const Fields& fields) {
+  for (const DetailedField* shown : {&fields.visible, &fields.thermal}) {
+    if (shown->detail.empty()) continue;
+    const nerf::DetailTrial& trial = shown->trial;
+    return fmt::format(", with detail of recorded frames ({} tried: {:.0f} % nearer)", trial.views,
+                       100 * (1 - trial.with / trial.without));
   }
   return {};
 }
@@ -179,8 +180,9 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
     ORBITFUSE_TRY(context.progress.check("render"));
     const double done = static_cast<double>(files.size()),
                  total = static_cast<double>(chosen.views.size());
-    context.progress.report(
-        {"render", done, total, done > 0 ? clock.wall_s() / done * (total - done) : -1, view.name});
+    std::optional<double> left_s;
+    if (done > 0) left_s = clock.wall_s() / done * (total - done);
+    context.progress.report({"render", done, total, left_s, view.name});
     ViewFiles f;
     f.name = view.name;
     cv::Mat depth;
@@ -225,12 +227,12 @@ Result<StageOutput> render(const StageContext& context, const SessionInput& inpu
     files.push_back(std::move(f));
   }
 
-  output.metrics["brief"] = fmt::format("{}, {}, {:.2f} s a view{}", chosen.described,
-                                        fields.thermal.empty()   ? "visible"
-                                        : fields.visible.empty() ? "thermal"
-                                                                 : "both modalities",
-                                        clock.wall_s() / static_cast<double>(files.size()),
-                                        words_on_detail(output.metrics));
+  output.metrics["brief"] =
+      fmt::format("{}, {}, {:.2f} s a view{}", chosen.described,
+                  fields.thermal.empty()   ? "visible"
+                  : fields.visible.empty() ? "thermal"
+                                           : "both modalities",
+                  clock.wall_s() / static_cast<double>(files.size()), words_on_detail(fields));
   output.metrics["views"] = files.size();
   for (const DetailedField* shown : {&fields.visible, &fields.thermal})
     if (!shown->detail.empty())

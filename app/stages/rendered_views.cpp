@@ -66,25 +66,24 @@ Status save_rendered_views(const std::filesystem::path& folder, const RenderedVi
 }
 
 Result<RenderedViews> load_rendered_views(const std::filesystem::path& folder) {
-  ORBITFUSE_ASSIGN(const json j, read_json(folder / views_file));
+  const std::filesystem::path file = folder / views_file;
+  ORBITFUSE_ASSIGN(const json j, read_json(file));
+  const JsonFields fields = stage_fields(j, file);
   RenderedViews rendered;
-  try {
-    j.at("thermal_is_gray").get_to(rendered.thermal_is_gray);
-    j.at("span_low").get_to(rendered.span.low_k);
-    j.at("span_high").get_to(rendered.span.high_k);
-    const json& heat = j.at("heat");
-    heat.at("usual").get_to(rendered.heat.usual);
-    heat.at("spread").get_to(rendered.heat.spread);
-    heat.at("hot").get_to(rendered.heat.hot);
-    for (const json& v : j.at("views")) {
-      ViewFiles view;
-      visit_files(
-          view, [&](const char* key, std::string& value) { value = v.value(key, std::string()); });
-      rendered.views.push_back(std::move(view));
-    }
-  } catch (const json::exception& e) {
-    return fail(ErrorKind::input, (folder / views_file).string(), e.what(),
-                "run the render stage again");
+  ORBITFUSE_TRY(fields.get_all("thermal_is_gray", rendered.thermal_is_gray, "span_low",
+                               rendered.span.low_k, "span_high", rendered.span.high_k));
+  ORBITFUSE_ASSIGN(const JsonFields heat, fields.child("heat"));
+  ORBITFUSE_TRY(heat.get_all("usual", rendered.heat.usual, "spread", rendered.heat.spread, "hot",
+                             rendered.heat.hot));
+  ORBITFUSE_ASSIGN(const std::vector<JsonFields> views, fields.children("views"));
+  for (const JsonFields& entry : views) {
+    ViewFiles view;
+    Status read;
+    visit_files(view, [&](const char* key, std::string& value) {
+      if (read) read = entry.get_present(key, value);
+    });
+    ORBITFUSE_TRY(read);
+    rendered.views.push_back(std::move(view));
   }
   return rendered;
 }

@@ -57,7 +57,10 @@ Status add_views(const StageContext& context, const RunConfig& config, report::M
   if (!context.has("render")) return {};
   ORBITFUSE_ASSIGN(const RenderedViews rendered, load_rendered_views(context.of("render")));
   std::vector<std::string> methods;
-  if (const json* fused = context.metrics_of("fuse")) methods = fused->value("methods", methods);
+  if (context.has("fuse")) {
+    ORBITFUSE_ASSIGN(FusedImages fused, load_fused_images(context.of("fuse")));
+    methods = std::move(fused.methods);
+  }
   for (const ViewFiles& files : rendered.views) {
     if (model.views.size() == max_report_views) {
       model.warnings.push_back(fmt::format("The report shows {} of {} views; render/ holds all.",

@@ -63,9 +63,9 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
     ORBITFUSE_ASSIGN(own_depth,
                      add_thermal_depth(data, config.depth_width_px, options.holdout_every,
                                        options.seed, context.progress));
-    if (!own_depth.problem.empty())
+    if (own_depth.problem)
       output.skips.push_back(
-          {"depth of the thermal views", own_depth.problem, "the field learns from images alone"});
+          {"depth of the thermal views", *own_depth.problem, "the field learns from images alone"});
   }
   options.checkpoint = context.folder / "checkpoint.bin";
   options.resume = true;  // where there is a checkpoint: of an interrupted attempt, or to extend

@@ -29,9 +29,38 @@ bool only_longer(const json& then, const json& now, const json& done) {
          (budget_s == 0 || budget_s >= done.value("train_wall_s", 0.0));
 }
 
-/// JSON has no NaN: null.
-double number(const json& j, const char* key) {
-  return j.at(key).is_null() ? std::numeric_limits<double>::quiet_NaN() : j.at(key).get<double>();
+/// JSON has no NaN: there it is null, and stays NaN.
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+Result<nerf::CurvePoint> curve_point_of(const JsonFields& fields) {
+  nerf::CurvePoint p;
+  p.heldout_psnr = p.train_psnr = unknown;
+  ORBITFUSE_TRY(fields.get_all("cpu_s", p.cpu_s, "wall_s", p.wall_s, "step", p.step,
+                               "samples_per_ray", p.samples_per_ray));
+  ORBITFUSE_TRY(fields.get_present("heldout_psnr", p.heldout_psnr, "train_psnr", p.train_psnr));
+  return p;
+}
+
+/// What a finished training says of itself: its curve.json and the metrics in its record.
+Result<nerf::TrainReport> report_of(const std::filesystem::path& folder, const json& metrics) {
+  const std::filesystem::path file = folder / "curve.json";
+  ORBITFUSE_ASSIGN(const json curve, read_json(file));
+  const json named = {{"curve", curve}};
+  ORBITFUSE_ASSIGN(const std::vector<JsonFields> points,
+                   stage_fields(named, file).children("curve"));
+  nerf::TrainReport report;
+  for (const JsonFields& point : points) {
+    ORBITFUSE_ASSIGN(const nerf::CurvePoint read, curve_point_of(point));
+    report.curve.push_back(read);
+  }
+  const JsonFields done(metrics, (folder / pipeline::stage_record_file).string() + ": metrics.",
+                        {ErrorKind::input, "train with --force"});
+  report.best_psnr = unknown;
+  ORBITFUSE_TRY(done.get_present("heldout_psnr_db", report.best_psnr));
+  ORBITFUSE_TRY(done.get_all("best_step", report.best_step, "train_cpu_s", report.cpu_s,
+                             "train_wall_s", report.wall_s, "skipped_steps", report.skipped_steps,
+                             "rays", report.rays, "samples", report.samples));
+  return report;
 }
 
 }  // namespace
@@ -73,23 +102,7 @@ Result<int> extend_training(const pipeline::StageContext& context, const json& o
   if (!only_longer(then, options, done)) return 0;
   auto field = nerf::Field::load(folder / field_file);
   if (!field) return 0;  // of another version
-  ORBITFUSE_ASSIGN(const json curve, read_json(folder / "curve.json"));
-  nerf::TrainReport report;
-  try {
-    for (const json& p : curve)
-      report.curve.push_back({p.at("cpu_s"), p.at("wall_s"), p.at("step"),
-                              number(p, "heldout_psnr"), number(p, "train_psnr"),
-                              p.at("samples_per_ray")});
-    report.best_psnr = number(done, "heldout_psnr_db");
-    done.at("best_step").get_to(report.best_step);
-    done.at("train_cpu_s").get_to(report.cpu_s);
-    done.at("train_wall_s").get_to(report.wall_s);
-    done.at("skipped_steps").get_to(report.skipped_steps);
-    done.at("rays").get_to(report.rays);
-    done.at("samples").get_to(report.samples);
-  } catch (const json::exception& e) {
-    return fail(ErrorKind::input, (folder / "curve.json").string(), e.what(), "train with --force");
-  }
+  ORBITFUSE_ASSIGN(const nerf::TrainReport report, report_of(folder, done));
   const int steps = field->iterations();
   ORBITFUSE_TRY(nerf::save_checkpoint(*std::move(field), report, checkpoint));
   return steps;

@@ -96,9 +96,9 @@ Status inspect_run(Context& context, const fs::path& folder) {
       context.console.warning(record.error().message());
       continue;
     }
-    if (const std::string wrong = pipeline::damage(entry.path(), *record); !wrong.empty()) {
-      context.console.warning(record->stage + ": " + wrong + "; the next run makes it again");
-      damaged.push_back(record->stage + ": " + wrong);
+    if (const auto wrong = pipeline::damage(entry.path(), *record)) {
+      context.console.warning(record->stage + ": " + *wrong + "; the next run makes it again");
+      damaged.push_back(record->stage + ": " + *wrong);
     }
     context.console.data(fmt::format("{:<14} {}  {:>7.1f} s  {}", record->stage,
                                      record->finished_utc, record->wall_s,

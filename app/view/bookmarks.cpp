@@ -5,8 +5,7 @@
 
 #include <algorithm>
 
-#include "app/view/json_fields.hpp"
-#include "core/nested_text.hpp"
+#include "app/view/request_fields.hpp"
 #include "core/system/file_io.hpp"
 #include "core/system/folder_change_lock.hpp"
 
@@ -30,12 +29,11 @@ json to_json(const Bookmark& b) {
 
 Result<Bookmark> bookmark_of(const json& j) {
   Bookmark bookmark;
-  ORBITFUSE_ASSIGN(bookmark.name, text_field(j, "name", longest_name));
-  ORBITFUSE_ASSIGN(const auto position, (number_fields<3>(j, "position")));
-  ORBITFUSE_ASSIGN(const auto target, (number_fields<3>(j, "target")));
-  ORBITFUSE_ASSIGN(bookmark.fov_deg, number_field(j, "fov_deg", 1, 150));
-  bookmark.position = {position[0], position[1], position[2]};
-  bookmark.target = {target[0], target[1], target[2]};
+  const JsonFields fields = request_fields(j);
+  ORBITFUSE_TRY(fields.get_word("name", bookmark.name, longest_name));
+  ORBITFUSE_TRY(fields.get("position", bookmark.position, reachable));
+  ORBITFUSE_TRY(fields.get("target", bookmark.target, reachable));
+  ORBITFUSE_TRY(fields.get("fov_deg", bookmark.fov_deg, from_to(1, 150)));
   if (!((bookmark.position - bookmark.target).norm() > 1e-9))
     return fail(ErrorKind::usage, "target", "where the camera stands", "must be another point");
   return bookmark;

@@ -5,13 +5,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <exception>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 
-#include "app/view/json_fields.hpp"
+#include "app/view/request_fields.hpp"
 #include "app/view/shot_request.hpp"
 #include "core/image/image_io.hpp"
 #include "core/option_range.hpp"
@@ -91,11 +92,11 @@ Status FilmOrder::validate() const {
 
 Result<FilmOrder> film_order_of(const json& j, const FinishedRun& run) {
   FilmOrder order;
-  ORBITFUSE_ASSIGN(const std::string kind, text_field(j, "kind", 8));
-  if (kind != "mp4" && kind != "png")
-    return fail(ErrorKind::usage, "kind", kind, "must be mp4 or png");
+  const JsonFields fields = request_fields(j);
+  std::string kind, layer;
+  ORBITFUSE_TRY(fields.get_all("kind", kind, "layer", layer));
+  if (kind != "mp4" && kind != "png") return fields.wrong("kind", "mp4 or png");
   order.kind = kind == "mp4" ? FilmKind::mp4 : FilmKind::pictures;
-  ORBITFUSE_ASSIGN(const std::string layer, text_field(j, "layer", 8));
   if (layer == "visible" && run.has(Modality::visible))
     order.layer = FilmLayer::visible;
   else if (layer == "thermal" && run.has(Modality::thermal))
@@ -103,22 +104,20 @@ Result<FilmOrder> film_order_of(const json& j, const FinishedRun& run) {
   else if (layer == "fused" && run.has(Modality::visible) && run.has(Modality::thermal))
     order.layer = FilmLayer::fused;
   else
-    return fail(ErrorKind::usage, "layer", layer, "must be a layer that the run has");
-  ORBITFUSE_ASSIGN(order.palette, text_field(j, "palette", 40));
-  ORBITFUSE_ASSIGN(const auto span, (number_fields<2>(j, "span")));
+    return fields.wrong("layer", "a layer that the run has");
+  ORBITFUSE_TRY(fields.get_word("palette", order.palette, 40));
+  std::array<double, 2> span{};
+  ORBITFUSE_TRY(fields.get("span", span, reachable));
   order.span = {span[0], span[1]};
-  ORBITFUSE_ASSIGN(const double width, number_field(j, "width", 64, 1280));
-  ORBITFUSE_ASSIGN(const double height, number_field(j, "height", 64, 1280));
+  double width = 0, height = 0, fps = order.fps;
+  ORBITFUSE_TRY(fields.get("width", width, from_to(64, 1280)));
+  ORBITFUSE_TRY(fields.get("height", height, from_to(64, 1280)));
   // Encoders want even sizes.
   order.width = static_cast<int>(width) / 2 * 2;
   order.height = static_cast<int>(height) / 2 * 2;
-  if (j.contains("seconds_a_view")) {
-    ORBITFUSE_ASSIGN(order.seconds_a_view, number_field(j, "seconds_a_view", 0.1, 60));
-  }
-  if (j.contains("fps")) {
-    ORBITFUSE_ASSIGN(const double fps, number_field(j, "fps", 1, 60));
-    order.fps = static_cast<int>(fps);
-  }
+  ORBITFUSE_TRY(fields.get_present("seconds_a_view", order.seconds_a_view, "fps", fps));
+  if (!(fps >= 1 && fps <= 60)) return fields.wrong("fps", "a number, 1 to 60");
+  order.fps = static_cast<int>(fps);
   ORBITFUSE_TRY(order.validate());
   return order;
 }

@@ -5,35 +5,16 @@
 
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
-#include <vector>
 
 #include "app/view/picture_parts.hpp"
 #include "core/image/image_io.hpp"
+#include "core/image/samples.hpp"
 #include "core/image/undistorted.hpp"
 
 namespace orbitfuse::view {
 namespace {
 
 constexpr int widest_px = 1280;
-
-cv::Mat without_distortion(const cv::Mat& image, const Camera& from) {
-  const Camera to = from.without_distortion();
-  if (!from.has_distortion() || image.cols != from.width || image.rows != from.height) return image;
-  std::vector<cv::Mat> channels;
-  cv::split(image, channels);
-  for (cv::Mat& channel : channels) channel = undistorted(channel, from, to);
-  cv::Mat straight;
-  cv::merge(channels, straight);
-  return straight;
-}
-
-cv::Mat fitted(const cv::Mat& image, int how) {
-  if (image.cols <= widest_px) return image;
-  cv::Mat small;
-  cv::resize(image, small, {widest_px, std::max(1, image.rows * widest_px / image.cols)}, 0, 0,
-             how);
-  return small;
-}
 
 }  // namespace
 
@@ -53,21 +34,24 @@ Result<std::string> photo(const FinishedRun& run, std::size_t index) {
                 "run the session again");
   const auto file = run.session->folder / recorded.view.name;
   PictureParts parts;
-  const Camera& camera = recorded.view.camera;
+  const auto straight = [&](const cv::Mat& image) {
+    return recorded_straight(image, recorded.view.camera, recorded.view.name);
+  };
   if (recorded.modality == Modality::visible) {
-    ORBITFUSE_ASSIGN(const cv::Mat bgr, read_visible(file));  // upright, as its pose is
-    ORBITFUSE_TRY(
-        parts.add_jpeg("visible", fitted(without_distortion(bgr, camera), cv::INTER_AREA), 88));
+    ORBITFUSE_ASSIGN(const cv::Mat recorded_bgr, read_visible(file));  // upright, as its pose is
+    ORBITFUSE_ASSIGN(const cv::Mat bgr, straight(recorded_bgr));
+    ORBITFUSE_TRY(parts.add_jpeg("visible", no_wider(bgr, widest_px, cv::INTER_AREA), 88));
   } else if (run.thermal_is_gray) {
-    ORBITFUSE_ASSIGN(const cv::Mat image, read_image(file));
-    cv::Mat gray = fitted(without_distortion(image, camera), cv::INTER_AREA), levels;
+    ORBITFUSE_ASSIGN(const cv::Mat recorded_image, read_image(file));
+    ORBITFUSE_ASSIGN(const cv::Mat image, straight(recorded_image));
+    cv::Mat gray = no_wider(image, widest_px, cv::INTER_AREA), levels;
     if (gray.channels() == 3) cv::cvtColor(gray, gray, cv::COLOR_BGR2GRAY);
     gray.convertTo(levels, CV_32F);
     parts.add_levels("thermal", levels, true);
   } else {
-    ORBITFUSE_ASSIGN(const cv::Mat kelvin, read_thermal_k(file));
-    parts.add_levels("thermal", fitted(without_distortion(kelvin, camera), cv::INTER_NEAREST),
-                     false);
+    ORBITFUSE_ASSIGN(const cv::Mat recorded_k, read_thermal_k(file));
+    ORBITFUSE_ASSIGN(const cv::Mat kelvin, straight(recorded_k));
+    parts.add_levels("thermal", no_wider(kelvin, widest_px, cv::INTER_NEAREST), false);
   }
   return parts.bytes();
 }

@@ -3,10 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 
-#include "app/view/json_fields.hpp"
+#include "app/view/request_fields.hpp"
 
 namespace orbitfuse::view {
 namespace {
@@ -16,27 +17,22 @@ constexpr double degrees_per_radian = 57.29577951308232;
 /// OpenGL's camera axes from OpenCV's, and back: half a turn round x.
 const Eigen::Quaterniond half_turn_x(0, 1, 0, 0);
 
-tl::unexpected<Error> wrong(const std::string& field, const std::string& found,
-                            const std::string& wanted) {
-  return fail(ErrorKind::usage, field, found, wanted);
-}
-
 Status check_size(int width, int height) {
   if (width < least_shot_px || height < least_shot_px || width > most_shot_pixels / height)
-    return wrong(
-        "width, height", fmt::format("{} x {}", width, height),
+    return fail(
+        ErrorKind::usage, "width, height", fmt::format("{} x {}", width, height),
         fmt::format("must be {} or more, and {} pixels at most", least_shot_px, most_shot_pixels));
   return {};
 }
 
 /// The recorded camera at another width.
-Result<Shot> recorded_shot(const json& j, const FinishedRun& run) {
-  const json& index = j["view"];
-  if (!index.is_number_integer() || index.get<std::int64_t>() < 0 ||
-      index.get<std::int64_t>() >= static_cast<std::int64_t>(run.views.size()))
-    return wrong("view", shown(index), fmt::format("must be below {}", run.views.size()));
-  const PosedView& view = run.views[static_cast<std::size_t>(index.get<std::int64_t>())].view;
-  ORBITFUSE_ASSIGN(const double wide, number_field(j, "width", least_shot_px, 4096));
+Result<Shot> recorded_shot(const JsonFields& fields, const FinishedRun& run) {
+  std::uint64_t index = 0;
+  if (!fields.get("view", index) || index >= run.views.size())
+    return fields.wrong("view", fmt::format("a whole number below {}", run.views.size()));
+  const PosedView& view = run.views[index].view;
+  double wide = 0;
+  ORBITFUSE_TRY(fields.get("width", wide, from_to(least_shot_px, 4096)));
   const int width = static_cast<int>(wide);
   const int height = static_cast<int>(
       std::lround(static_cast<double>(width) * view.camera.height / view.camera.width));
@@ -47,33 +43,38 @@ Result<Shot> recorded_shot(const json& j, const FinishedRun& run) {
 }  // namespace
 
 Result<Shot> shot_of(const json& j, const FinishedRun& run) {
-  if (j.contains("view")) return recorded_shot(j, run);
-  ORBITFUSE_ASSIGN(const auto position, (number_fields<3>(j, "position")));
-  ORBITFUSE_ASSIGN(const auto q, (number_fields<4>(j, "rotation_wxyz")));
-  ORBITFUSE_ASSIGN(const double fov_deg, number_field(j, "fov_deg", 1, 150));
-  ORBITFUSE_ASSIGN(const double wide, number_field(j, "width", least_shot_px, 8192));
-  ORBITFUSE_ASSIGN(const double high, number_field(j, "height", least_shot_px, 8192));
+  const JsonFields fields = request_fields(j);
+  if (j.contains("view")) return recorded_shot(fields, run);
+  Eigen::Vector3d position;
+  std::array<double, 4> q{};
+  double fov_deg = 0, wide = 0, high = 0;
+  ORBITFUSE_TRY(fields.get("position", position, reachable));
+  ORBITFUSE_TRY(fields.get("rotation_wxyz", q));
+  ORBITFUSE_TRY(fields.get("fov_deg", fov_deg, from_to(1, 150)));
+  ORBITFUSE_TRY(fields.get("width", wide, from_to(least_shot_px, 8192)));
+  ORBITFUSE_TRY(fields.get("height", high, from_to(least_shot_px, 8192)));
   const int width = static_cast<int>(wide), height = static_cast<int>(high);
   ORBITFUSE_TRY(check_size(width, height));
   const Eigen::Quaterniond given(q[0], q[1], q[2], q[3]);
   if (!(std::abs(given.norm() - 1) < 1e-3))
-    return wrong("rotation_wxyz", shown(j["rotation_wxyz"]), "must be a unit quaternion");
+    return fields.wrong("rotation_wxyz", "a unit quaternion");
   Shot shot;
   shot.camera = camera_of(fov_deg, width, height);
-  const Rigid3d world_from_cam{(given.normalized() * half_turn_x).normalized(),
-                               {position[0], position[1], position[2]}};
+  const Rigid3d world_from_cam{(given.normalized() * half_turn_x).normalized(), position};
   shot.cam_from_world = world_from_cam.inverse();
   return shot;
 }
 
 Result<ShotRequest> shot_request_of(const json& j, const FinishedRun& run) {
   ShotRequest request;
-  ORBITFUSE_ASSIGN(request.client, text_field(j, "client", 40));
+  const JsonFields fields = request_fields(j);
+  ORBITFUSE_TRY(fields.get_word("client", request.client, 40));
   ORBITFUSE_ASSIGN(request.shot, shot_of(j, run));
-  if (const auto layers = j.find("layers"); layers != j.end()) {
+  if (fields.has("layers")) {
+    std::vector<std::string> layers;
+    ORBITFUSE_TRY(fields.get("layers", layers));
     request.wish = {.visible = false, .thermal = false, .fused = false};
-    if (!layers->is_array()) return wrong("layers", shown(*layers), "must be a list of names");
-    for (const json& layer : *layers) {
+    for (const std::string& layer : layers) {
       if (layer == "visible")
         request.wish.visible = true;
       else if (layer == "thermal")
@@ -81,13 +82,14 @@ Result<ShotRequest> shot_request_of(const json& j, const FinishedRun& run) {
       else if (layer == "fused")
         request.wish.fused = true;
       else
-        return wrong("layers", shown(layer), "must be visible, thermal or fused");
+        return fields.wrong("layers", "a list of visible, thermal and fused");
     }
   }
   for (const auto& [field, to] : {std::pair{"divisor", &request.wish.divisor},
                                   {"thermal_divisor", &request.wish.thermal_divisor}})
-    if (j.contains(field)) {
-      ORBITFUSE_ASSIGN(const double divisor, number_field(j, field, 1, most_divisor));
+    if (fields.has(field)) {
+      double divisor = 1;
+      ORBITFUSE_TRY(fields.get(field, divisor, from_to(1, most_divisor)));
       *to = static_cast<int>(divisor);
     }
   return request;

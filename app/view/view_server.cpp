@@ -5,11 +5,11 @@
 
 #include "app/view/bookmarks.hpp"
 #include "app/view/film.hpp"
-#include "app/view/json_fields.hpp"
 #include "app/view/measuring.hpp"
 #include "app/view/page.hpp"
 #include "app/view/photo.hpp"
 #include "app/view/picture_parts.hpp"
+#include "app/view/request_fields.hpp"
 #include "app/view/scene_json.hpp"
 #include "app/view/shot_request.hpp"
 #include "app/view/surface.hpp"
@@ -100,7 +100,8 @@ struct ViewServer::Impl {
 
   Result<json> drop_bookmark(const WebRequest& request) {
     ORBITFUSE_ASSIGN(const json body, json_body(request.body));
-    ORBITFUSE_ASSIGN(const std::string name, text_field(body, "name", 80));
+    std::string name;
+    ORBITFUSE_TRY(request_fields(body).get_word("name", name, 80));
     ORBITFUSE_TRY(bookmarks.remove(name));
     return list_of_bookmarks();
   }
@@ -108,9 +109,11 @@ struct ViewServer::Impl {
   Result<json> pick(const WebRequest& request) {
     ORBITFUSE_ASSIGN(const json body, json_body(request.body));
     ORBITFUSE_ASSIGN(const Shot shot, shot_of(body, run));
-    ORBITFUSE_ASSIGN(const double u, number_field(body, "u", 0, shot.camera.width));
-    ORBITFUSE_ASSIGN(const double v, number_field(body, "v", 0, shot.camera.height));
-    return measuring.point_at(shot, {u, v}, request.gone);
+    const JsonFields fields = request_fields(body);
+    Eigen::Vector2d pixel;
+    ORBITFUSE_TRY(fields.get("u", pixel.x(), from_to(0, shot.camera.width)));
+    ORBITFUSE_TRY(fields.get("v", pixel.y(), from_to(0, shot.camera.height)));
+    return measuring.point_at(shot, pixel, request.gone);
   }
 
   Result<json> measure(const WebRequest& request, bool keep) {
@@ -120,7 +123,8 @@ struct ViewServer::Impl {
 
   Result<json> drop_measurement(const WebRequest& request) {
     ORBITFUSE_ASSIGN(const json body, json_body(request.body));
-    ORBITFUSE_ASSIGN(const std::string name, text_field(body, "name", request.body.size()));
+    std::string name;
+    ORBITFUSE_TRY(request_fields(body).get_word("name", name, request.body.size()));
     return measuring.remove(name);
   }
 

@@ -15,6 +15,7 @@
 #include "app/export/find_scale.hpp"
 #include "app/export/mat_scale.hpp"
 #include "bench/export/true_scene.hpp"
+#include "core/geometry/lifted.hpp"
 #include "core/numeric/median.hpp"
 #include "recon/surface/surface.hpp"
 
@@ -54,9 +55,7 @@ Status score_distances(const Options& o, const view::FinishedRun& run, const Sim
       const int x = static_cast<int>(random() % static_cast<unsigned>(depth.cols)),
                 y = static_cast<int>(random() % static_cast<unsigned>(depth.rows));
       const Eigen::Vector2d pixel(x + 0.5, y + 0.5);
-      const Eigen::Vector3d p =
-          there.cam_from_world.inverse() *
-          (static_cast<double>(depth.at<float>(y, x)) * there.camera.ray_of(pixel));
+      const Eigen::Vector3d p = there.cam_from_world.inverse() * lifted(depth, there.camera, x, y);
       if (!p.allFinite() || p.z() < 0.05 || p.head<2>().norm() > o.most_m) return std::nullopt;
       return std::pair(v.view.camera.pixel_of(there.camera.normalized_of(pixel)), p);
     };

@@ -14,6 +14,7 @@
 
 #include "app/stages/artifacts.hpp"
 #include "bench/export/true_scene.hpp"
+#include "core/geometry/lifted.hpp"
 #include "core/image/image_io.hpp"
 #include "recon/surface/surface.hpp"
 
@@ -162,9 +163,7 @@ Status run(const Options& o) {
     const cv::Mat depth = mesh_depth(true_mesh, view);
     for (int y = 0; y < depth.rows; y += 3)
       for (int x = 0; x < depth.cols; x += 3) {
-        const auto z = static_cast<double>(depth.at<float>(y, x));
-        const Eigen::Vector3d p =
-            view.cam_from_world.inverse() * (z * view.camera.ray_of({x + 0.5, y + 0.5}));
+        const Eigen::Vector3d p = view.cam_from_world.inverse() * lifted(depth, view.camera, x, y);
         if (box.contains(p)) missing.add(p.z() > o.ground_m, to_surface.distance(p));
       }
     ORBITFUSE_ASSIGN(const cv::Mat kelvin, read_thermal_k(test.thermal));

@@ -14,8 +14,8 @@
 
 #include "app/stages/artifacts.hpp"
 #include "app/stages/measurement_scene.hpp"
+#include "bench/export/true_scene.hpp"
 #include "core/formats/ground_truth.hpp"
-#include "core/geometry/pose_error.hpp"
 #include "core/image/image_io.hpp"
 #include "core/numeric/median.hpp"
 #include "core/system/clock.hpp"
@@ -34,21 +34,6 @@ struct Options {
   unsigned seed = 7;
   MeasurementOptions measurement;
 };
-
-/// The similarity that brings the run's visible cameras nearest to the true ones.
-Result<Similarity3d> truth_from_run(const fs::path& run, const Session& session,
-                                    const GroundTruth& truth) {
-  ORBITFUSE_ASSIGN(const Reconstruction model,
-                   stages::load_poses(run / "poses_visible", Modality::visible));
-  std::vector<PosePair> pairs;
-  for (const PosedView& view : model.views)
-    for (const FrameRecord& frame : session.frames)
-      if (frame.file == view.name)
-        for (const TrueView& known : truth.views.at(Modality::visible))
-          if (fs::path(known.name).filename() == fs::path(frame.source).filename())
-            pairs.push_back({view.cam_from_world, known.cam_from_world});
-  return truth_from_estimate(pairs);
-}
 
 struct Spot {
   std::size_t view;
@@ -73,7 +58,7 @@ Result<Scene> load(const Options& options) {
   ORBITFUSE_ASSIGN(const nlohmann::json run, stages::read_json(options.run / "run.json"));
   ORBITFUSE_ASSIGN(const Session session, open_session(run.at("session").get<std::string>()));
   ORBITFUSE_ASSIGN(const GroundTruth truth, read_ground_truth(options.truth));
-  ORBITFUSE_ASSIGN(const Similarity3d fit, truth_from_run(options.run, session, truth));
+  ORBITFUSE_ASSIGN(const Similarity3d fit, truth_from_run(options.run, truth));
   ORBITFUSE_ASSIGN(ThermalScene scene,
                    stages::load_measurement_scene(options.run, session, options.measurement));
   Scene result{std::move(scene), {}, {}};

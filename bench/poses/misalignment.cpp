@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/geometry/lifted.hpp"
 #include "core/geometry/narrowed.hpp"
 
 namespace orbitfuse::scenes {
@@ -65,8 +66,7 @@ Result<Misalignment> misalignment(const Scene& scene, const Reconstruction& visi
     const Eigen::Vector3d center = camera_center(small.cam_from_world);
     const Rigid3d world_from_cam = small.cam_from_world.inverse();
     const auto at = [&](int x, int y) {
-      return world_from_cam * (static_cast<double>(seen.depth.at<float>(y, x)) *
-                               small.camera.ray_of({x + 0.5, y + 0.5}));
+      return world_from_cam * lifted(seen.depth, small.camera, x, y);
     };
     const Eigen::Vector3d middle = at(small.camera.width / 2, small.camera.height / 2);
     if (!middle.allFinite()) continue;

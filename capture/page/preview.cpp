@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/image/image_codec.hpp"
+#include "core/image/samples.hpp"
 #include "core/image/thermal_counts.hpp"
 
 namespace orbitfuse {
@@ -15,14 +16,6 @@ namespace {
 constexpr std::chrono::milliseconds shortest_life{200};
 constexpr std::size_t most_entries = 16;
 constexpr int widest_px = 640;
-
-cv::Mat reduced(const cv::Mat& image, int how) {
-  if (image.cols <= widest_px) return image;
-  cv::Mat small;
-  cv::resize(image, small, {widest_px, std::max(1, image.rows * widest_px / image.cols)}, 0, 0,
-             how);
-  return small;
-}
 
 }  // namespace
 
@@ -41,9 +34,9 @@ Result<Preview> PreviewCache::get(const LatestFrame& frame, const std::string& p
     ORBITFUSE_ASSIGN(const cv::Mat colours, palette(palette_name));
     const cv::Mat kelvin = kelvin_of_counts({frame.pixels, frame.scale});
     preview.span = span ? *span : common_span({kelvin});
-    picture = colorize(reduced(kelvin, cv::INTER_NEAREST), *preview.span, colours);
+    picture = colorize(no_wider(kelvin, widest_px, cv::INTER_NEAREST), *preview.span, colours);
   } else {
-    picture = reduced(frame.pixels, cv::INTER_AREA);
+    picture = no_wider(frame.pixels, widest_px, cv::INTER_AREA);
   }
   ORBITFUSE_ASSIGN(preview.jpeg, encode_jpeg(picture, 80));
   if (entries_.size() >= most_entries) entries_.clear();

@@ -2,7 +2,6 @@
 #include "capture/recording/session_writer.hpp"
 
 #include <fcntl.h>
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <sys/file.h>
 #include <sys/stat.h>
@@ -25,10 +24,6 @@ namespace orbitfuse {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string utc_now() {
-  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
-}
 
 std::string new_id() {
   std::random_device random;
@@ -78,7 +73,7 @@ Result<std::unique_ptr<SessionWriter>> SessionWriter::create(
   ORBITFUSE_ASSIGN(const int fd, open_manifest(folder, O_CREAT | O_EXCL));
   std::unique_ptr<SessionWriter> writer(new SessionWriter(folder, fd));
   writer->session_.id = new_id();
-  writer->session_.created = utc_now();
+  writer->session_.created = utc_now_text();
   writer->session_.notes = notes;
   Status begun = writer->append_line(manifest_header_line(writer->session_));
   if (begun) begun = sync_folder(folder);
@@ -137,7 +132,7 @@ Status SessionWriter::check_in_place() const {
   if (::stat(file.c_str(), &named) != 0 || named.st_ino != open.st_ino ||
       named.st_dev != open.st_dev)
     return failure("was moved or deleted while it was recorded");
-  if (manifest_bytes_ >= 0 && open.st_size != manifest_bytes_)
+  if (manifest_bytes_ && open.st_size != *manifest_bytes_)
     return failure("was changed by another program while it was recorded");
   return {};
 }

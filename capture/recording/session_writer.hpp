@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include "capture/frame_source.hpp"
@@ -65,7 +66,7 @@ class SessionWriter {
 
   std::filesystem::path folder_;
   int manifest_fd_ = -1;
-  std::int64_t manifest_bytes_ = -1;  ///< that were written; -1: not known yet
+  std::optional<std::int64_t> manifest_bytes_;  ///< that were written; none: not known yet
   std::mutex mutex_;
   Session session_;  ///< devices and identity; frames are not kept
   std::map<std::string, int> next_index_;

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "core/formats/rigid_matrix.hpp"
+#include "core/geometry/geometry_json.hpp"
 #include "core/nested_text.hpp"
 #include "core/system/file_io.hpp"
 
@@ -65,12 +66,6 @@ Result<Camera> read_camera(const Json& frame, const Json& shared, const std::str
   }
   ORBITFUSE_TRY(camera.validate(where));
   return camera;
-}
-
-Json json_of(const Eigen::Matrix4d& m) {
-  Json rows = Json::array();
-  for (int r = 0; r < 4; ++r) rows.push_back({m(r, 0), m(r, 1), m(r, 2), m(r, 3)});
-  return rows;
 }
 
 }  // namespace
@@ -141,7 +136,7 @@ Status write_transforms_json(const std::filesystem::path& file, const Transforms
                 {"p1", c.p1},
                 {"p2", c.p2}};
     if (frame.thermal_file_path) out["thermal_file_path"] = *frame.thermal_file_path;
-    out["transform_matrix"] = json_of(opengl_of_cam_from_world(frame.cam_from_world));
+    out["transform_matrix"] = matrix_json(opengl_of_cam_from_world(frame.cam_from_world));
     frames.push_back(std::move(out));
   }
   root["frames"] = std::move(frames);

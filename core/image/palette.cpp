@@ -6,6 +6,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "core/image/samples.hpp"
 #include "core/numeric/median.hpp"
 #include "core/temperature.hpp"
 
@@ -90,14 +91,7 @@ cv::Mat colorize(const cv::Mat& kelvin, TemperatureSpan span, const cv::Mat& pal
 TemperatureSpan common_span(const std::vector<cv::Mat>& kelvin_images, double low_percentile,
                             double high_percentile) {
   std::vector<float> samples;
-  for (const cv::Mat& image : kelvin_images) {
-    CV_Assert(image.empty() || image.type() == CV_32FC1);
-    for (int y = 0; y < image.rows; ++y) {
-      const float* row = image.ptr<float>(y);
-      std::copy_if(row, row + image.cols, std::back_inserter(samples),
-                   [](float t) { return std::isfinite(t); });
-    }
-  }
+  for (const cv::Mat& image : kelvin_images) append_finite(image, samples);
   TemperatureSpan span{celsius_zero_k, celsius_zero_k};  // without a sample: any defined span
   if (!samples.empty()) {
     span.low_k = quantile(samples, std::clamp(low_percentile, 0.0, 100.0) / 100);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/image/undistorted.hpp"
 
+#include <fmt/format.h>
+
 #include <opencv2/imgproc.hpp>
 
 namespace orbitfuse {
@@ -15,6 +17,27 @@ cv::Mat undistorted(const cv::Mat& image, const Camera& from, const Camera& to) 
     }
   cv::remap(image, out, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
   return out;
+}
+
+Status check_size(const cv::Mat& image, const Camera& camera, const std::string& file) {
+  if (image.cols == camera.width && image.rows == camera.height) return {};
+  return fail(ErrorKind::input, file,
+              fmt::format("{}x{} pixels, its camera has {}x{}", image.cols, image.rows,
+                          camera.width, camera.height),
+              "frames of one camera have one size: bring the session back as the run read it, or "
+              "import it again");
+}
+
+Result<cv::Mat> recorded_as(const cv::Mat& photo, const Camera& from, const Camera& to,
+                            const std::string& file) {
+  ORBITFUSE_TRY(check_size(photo, from, file));
+  return undistorted(photo, from, to);
+}
+
+Result<cv::Mat> recorded_straight(const cv::Mat& photo, const Camera& camera,
+                                  const std::string& file) {
+  ORBITFUSE_TRY(check_size(photo, camera, file));
+  return camera.has_distortion() ? undistorted(photo, camera, camera.without_distortion()) : photo;
 }
 
 cv::Mat straightened(const cv::Mat& image, const Camera& camera, double k1) {

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "core/json_fields.hpp"
 #include "core/session/session.hpp"
 
 // The manifest's lines as JSON; used by session.cpp and the writer functions of session.hpp.
@@ -21,36 +22,21 @@ namespace orbitfuse::manifest {
 
 using Json = nlohmann::json;
 
-/// Typed access to one line; every error names the line and the field.
-class Reader {
- public:
-  Reader(const Json& object, std::string where) : object_(object), where_(std::move(where)) {}
-
-  bool has(const char* key) const { return object_.contains(key) && !object_[key].is_null(); }
-  Result<std::string> text(const char* key) const;
-  std::string text_or(const char* key, const std::string& fallback) const;
-  Result<double> number(const char* key) const;  ///< finite
-  Result<std::int64_t> integer(const char* key) const;
-  Result<std::uint64_t> count(const char* key) const;  ///< integer >= 0
-  bool flag(const char* key) const { return has(key) && object_[key] == true; }
-  Result<Reader> child(const char* key) const;
-  const Json& json() const { return object_; }
-  tl::unexpected<Error> wrong(const char* key, const char* expected) const;
-
- private:
-  const Json& object_;
-  std::string where_;
-};
+/// The fields of one line; `remedy` says what to do about a wrong one.
+inline JsonFields fields_of(const Json& line, const std::string& where,
+                            const char* remedy = "restore the manifest from a backup") {
+  return {line, where + ": ", {ErrorKind::input, remedy}};
+}
 
 /// Of a frame's "radiometry" (radiometry_json.cpp).
 Json json_of_radiometry(const FlirCalibration& calibration);
-Result<FlirCalibration> read_radiometry(const Reader& line);
+Result<FlirCalibration> read_radiometry(const JsonFields& line);
 
-Status read_header(const Reader& line, Session& session);
-Result<DeviceInfo> read_device(const Reader& line);
-Result<FrameRecord> read_frame(const Reader& line);
-Result<GapRecord> read_gap(const Reader& line);
-Result<StreamRecord> read_stream(const Reader& line);
-Result<EventRecord> read_event(const Reader& line);
+Status read_header(const JsonFields& line, Session& session);
+Result<DeviceInfo> read_device(const JsonFields& line);
+Result<FrameRecord> read_frame(const JsonFields& line);
+Result<GapRecord> read_gap(const JsonFields& line);
+Result<StreamRecord> read_stream(const JsonFields& line);
+Result<EventRecord> read_event(const JsonFields& line);
 
 }  // namespace orbitfuse::manifest

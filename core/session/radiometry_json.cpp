@@ -36,18 +36,14 @@ Json json_of_radiometry(const FlirCalibration& calibration) {
   return json;
 }
 
-Result<FlirCalibration> read_radiometry(const Reader& line) {
+Result<FlirCalibration> read_radiometry(const JsonFields& fields) {
   FlirCalibration calibration;
   Status status;
   visit_fields(calibration, [&](const char* key, double& value) {
-    const Result<double> number = line.number(key);
-    if (number)
-      value = *number;
-    else if (status)
-      status = tl::unexpected(number.error());
+    if (status) status = fields.get(key, value);
   });
   ORBITFUSE_TRY(status);
-  ORBITFUSE_TRY(calibration.validate("manifest radiometry"));
+  ORBITFUSE_TRY(calibration.validate(fields.place()));
   return calibration;
 }
 

@@ -21,8 +21,9 @@ using FrameIndex = std::unordered_map<std::string, std::size_t>;  ///< by file
 /// A later frame line about the same file amends the earlier one: the guide chooses stations after
 /// the frames are on disk.
 Status apply(const Json& line, const std::string& where, Session& session, FrameIndex& index) {
-  const manifest::Reader reader(line, where);
-  ORBITFUSE_ASSIGN(const std::string type, reader.text("type"));
+  const JsonFields reader = manifest::fields_of(line, where);
+  std::string type;
+  ORBITFUSE_TRY(reader.get("type", type));
   session.complete = type == "end";
   if (type == "session") return manifest::read_header(reader, session);
   if (type == "device") {
@@ -81,19 +82,17 @@ std::vector<const FrameRecord*> Session::frames_of(Modality modality, bool with_
 
 Status check_readable(const FrameRecord& frame) {
   const Json line = Json::parse(manifest_line(frame));
-  const auto read = manifest::read_frame(
-      manifest::Reader(line, frame.source.empty() ? frame.file : frame.source));
-  if (read) return {};
-  return fail(ErrorKind::input, read.error().where, read.error().found,
-              "correct what is known of this frame");
+  const std::string& where = frame.source.empty() ? frame.file : frame.source;
+  const auto read =
+      manifest::read_frame(manifest::fields_of(line, where, "correct what is known of this frame"));
+  return read.map([](const FrameRecord&) {});
 }
 
 Status check_readable(const DeviceInfo& device) {
   const Json line = Json::parse(manifest_line(device));
-  const auto read = manifest::read_device(manifest::Reader(line, "device " + device.id));
-  if (read) return {};
-  return fail(ErrorKind::input, read.error().where, read.error().found,
-              "correct what is known of this camera");
+  const auto read = manifest::read_device(
+      manifest::fields_of(line, "device " + device.id, "correct what is known of this camera"));
+  return read.map([](const DeviceInfo&) {});
 }
 
 Result<Session> open_session(const std::filesystem::path& folder) {

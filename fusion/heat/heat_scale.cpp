@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/image/samples.hpp"
 #include "core/numeric/median.hpp"
 
 namespace orbitfuse {
@@ -28,14 +29,7 @@ bool HeatScale::is_valid() const {
 
 HeatScale heat_scale(const std::vector<cv::Mat>& images, const HeatScaleOptions& options) {
   std::vector<float> samples;
-  for (const cv::Mat& image : images) {
-    CV_Assert(image.empty() || image.type() == CV_32FC1);
-    for (int y = 0; y < image.rows; ++y) {
-      const float* row = image.ptr<float>(y);
-      std::copy_if(row, row + image.cols, std::back_inserter(samples),
-                   [](float v) { return std::isfinite(v); });
-    }
-  }
+  for (const cv::Mat& image : images) append_finite(image, samples);
   if (samples.empty()) return {0, 0, options.min_width};
   const auto at = [&](double share) -> double { return quantile(samples, share); };
   HeatScale scale;

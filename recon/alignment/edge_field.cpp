@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/image/samples.hpp"
 #include "core/numeric/median.hpp"
 
 namespace orbitfuse {
@@ -25,8 +26,7 @@ cv::Mat filled(const cv::Mat& values) {
   if (std::all_of(copy.begin<float>(), copy.end<float>(), [](float v) { return std::isfinite(v); }))
     return copy;
   std::vector<float> good;
-  for (const float v : cv::Mat_<float>(copy))
-    if (std::isfinite(v)) good.push_back(v);
+  append_finite(copy, good);
   const float middle = median_in(good);
   for (float& v : cv::Mat_<float>(copy))
     if (!std::isfinite(v)) v = middle;

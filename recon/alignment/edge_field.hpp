@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/geometry/camera.hpp"
+#include "core/numeric/bilinear.hpp"
 
 // Sign-free gradient orientation: an edge is strength * exp(2i angle of its normal), so that the
 // two sides of an edge may swap brightness between modalities. Of the cues measured on real pairs
@@ -29,13 +30,11 @@ cv::Mat cell_field(const cv::Mat& field, int columns, int rows);
 
 /// Bilinear; zero outside.
 inline std::complex<float> field_at(const cv::Mat& field, double x, double y) {
-  const float fx = static_cast<float>(x - 0.5), fy = static_cast<float>(y - 0.5);
-  const int x0 = static_cast<int>(std::floor(fx)), y0 = static_cast<int>(std::floor(fy));
-  if (x0 < 0 || y0 < 0 || x0 + 1 >= field.cols || y0 + 1 >= field.rows) return {};
-  const float ax = fx - static_cast<float>(x0), ay = fy - static_cast<float>(y0);
-  const auto* r0 = field.ptr<std::complex<float>>(y0) + x0;
-  const auto* r1 = field.ptr<std::complex<float>>(y0 + 1) + x0;
-  return (r0[0] * (1 - ax) + r0[1] * ax) * (1 - ay) + (r1[0] * (1 - ax) + r1[1] * ax) * ay;
+  const auto place = place_among<float>(field.cols, field.rows, static_cast<float>(x - 0.5),
+                                        static_cast<float>(y - 0.5));
+  if (!place) return {};
+  return blended(*place,
+                 [&](int row, int column) { return field.ptr<std::complex<float>>(row)[column]; });
 }
 
 /// Agreement of an edge with the given normal: strength * cos(2 angle between).

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/image/image_io.hpp"
+#include "core/image/samples.hpp"
 #include "core/numeric/median.hpp"
 
 namespace orbitfuse {
@@ -35,8 +36,7 @@ Result<cv::Mat> read_luminance(const Session& session, const FrameRecord& frame)
 cv::Mat without_glare(const cv::Mat& values) {
   constexpr float ranges = 8;
   std::vector<float> samples;
-  for (const float v : cv::Mat_<float>(values))
-    if (std::isfinite(v)) samples.push_back(v);
+  append_finite(values, samples);
   if (samples.empty()) return values;
   const float middle = quantile(samples, 0.5),
               knee = ranges * (quantile(samples, 0.75) - quantile(samples, 0.25));

@@ -27,9 +27,14 @@ struct RenderRound {
 
 /// From several degrees off to about one, and from there to the end.
 inline std::vector<RenderRound> coarse_rounds() {
-  return {{160, 30, 14, 22}, {160, 12, 10, 16}, {160, 6, 7, 10}};
+  return {{.width_px = 160, .search_px = 30, .patch_search_px = 14, .patch_radius_px = 22},
+          {.width_px = 160, .search_px = 12, .patch_search_px = 10, .patch_radius_px = 16},
+          {.width_px = 160, .search_px = 6, .patch_search_px = 7, .patch_radius_px = 10}};
 }
-inline std::vector<RenderRound> fine_rounds() { return {{320, 6, 7, 12}, {320, 4, 6, 10}}; }
+inline std::vector<RenderRound> fine_rounds() {
+  return {{.width_px = 320, .search_px = 6, .patch_search_px = 7, .patch_radius_px = 12},
+          {.width_px = 320, .search_px = 4, .patch_search_px = 6, .patch_radius_px = 10}};
+}
 
 struct RenderAlignmentOptions {
   std::vector<RenderRound> rounds = coarse_rounds();

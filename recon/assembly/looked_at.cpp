@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/geometry/lifted.hpp"
 #include "recon/assembly/new_views.hpp"
 
 namespace orbitfuse {
@@ -18,8 +19,7 @@ cv::Mat near_part(const ThermalView& seen, const Eigen::Vector3d& center, double
   const Eigen::Vector3d center_in_cam = seen.view.cam_from_world * center;
   for (int y = 0; y < result.rows; ++y)
     for (int x = 0; x < result.cols; ++x) {
-      const double z = static_cast<double>(seen.depth.at<float>(y, x));
-      const Eigen::Vector3d point = z * seen.view.camera.ray_of({x + 0.5, y + 0.5});
+      const Eigen::Vector3d point = lifted(seen.depth, seen.view.camera, x, y);
       // Also where the depth is unknown.
       if (!((point - center_in_cam).norm() <= radius))
         result.at<float>(y, x) = std::numeric_limits<float>::quiet_NaN();

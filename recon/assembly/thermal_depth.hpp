@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "core/progress.hpp"
@@ -9,8 +10,8 @@
 namespace orbitfuse {
 
 struct ThermalDepth {
-  double known = 0;     ///< share of the pixels whose depth another view confirms
-  std::string problem;  ///< why there is none; empty otherwise
+  double known = 0;                    ///< share of the pixels whose depth another view confirms
+  std::optional<std::string> problem;  ///< why there is none
 };
 
 /// Adds depth to a thermal dataset that no visible field lends its geometry: matched between its

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/assembly/training_data.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "core/geometry/narrowed.hpp"
 #include "core/image/image_io.hpp"
+#include "core/image/undistorted.hpp"
 #include "core/system/parallel.hpp"
 #include "core/system/trace.hpp"
 
@@ -46,13 +45,8 @@ Result<nerf::Dataset> training_data(const std::filesystem::path& folder,
       problems[k] = tl::unexpected(image.error());
       return;
     }
-    if (image->cols != view.camera.width || image->rows != view.camera.height) {
-      problems[k] = fail(ErrorKind::input, path.string(),
-                         fmt::format("{}x{} pixels, its camera has {}x{}", image->cols, image->rows,
-                                     view.camera.width, view.camera.height),
-                         "frames of one camera must have one size; import the session again");
-      return;
-    }
+    problems[k] = check_size(*image, view.camera, path.string());
+    if (!problems[k]) return;
     nerf::TrainingView full{view.name, view.camera, view.cam_from_world, *image};
     const Camera narrowed = narrowed_to(view.camera, max_width_px);
     data.views[k] = nerf::resized(full, narrowed.width, narrowed.height);

@@ -11,7 +11,8 @@ Status DepthOptions::validate() const {
   ORBITFUSE_TRY(check("neighbours", neighbours, from_to(1, 16)));
   ORBITFUSE_TRY(check("best_neighbours", best_neighbours, from_to(1, neighbours)));
   ORBITFUSE_TRY(check("max_angle_deg", max_angle_deg, above_up_to(0, 90)));
-  ORBITFUSE_TRY(check("min_angle_deg", min_angle_deg, {0, max_angle_deg, true, false}));
+  ORBITFUSE_TRY(check("min_angle_deg", min_angle_deg,
+                      {.low = 0, .high = max_angle_deg, .high_included = false}));
   ORBITFUSE_TRY(check("coarse_iterations", coarse_iterations, from_to(0, 100)));
   ORBITFUSE_TRY(check("fine_iterations", fine_iterations, from_to(0, 100)));
   ORBITFUSE_TRY(check("max_cost", max_cost, between(0, 1)));

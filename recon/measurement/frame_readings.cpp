@@ -8,22 +8,16 @@
 #include <numbers>
 
 #include "core/geometry/lens_fold.hpp"
+#include "core/numeric/bilinear.hpp"
 
 namespace orbitfuse::measurement {
 namespace {
 
-/// Between the four samples round a pixel; NaN where one of them is, or outside.
+/// Between the four samples round a pixel; NaN where one of them is. Up to the border itself the
+/// outermost sample holds.
 double bilinear(const cv::Mat& image, const Eigen::Vector2d& pixel) {
-  // Up to the border itself the outermost sample holds.
-  const double x = std::clamp(pixel.x() - 0.5, 0.0, image.cols - 1.0);
-  const double y = std::clamp(pixel.y() - 0.5, 0.0, image.rows - 1.0);
-  const int x0 = std::min(static_cast<int>(x), image.cols - 1),
-            y0 = std::min(static_cast<int>(y), image.rows - 1);
-  const int x1 = std::min(x0 + 1, image.cols - 1), y1 = std::min(y0 + 1, image.rows - 1);
-  const double a = x - x0, b = y - y0;
-  const auto at = [&](int j, int i) { return static_cast<double>(image.at<float>(j, i)); };
-  return (1 - b) * ((1 - a) * at(y0, x0) + a * at(y0, x1)) +
-         b * ((1 - a) * at(y1, x0) + a * at(y1, x1));
+  return blended(place_held<double>(image.cols, image.rows, pixel.x() - 0.5, pixel.y() - 0.5),
+                 [&](int j, int i) { return static_cast<double>(image.at<float>(j, i)); });
 }
 
 bool inside(const Eigen::Vector2d& pixel, const Camera& camera) {

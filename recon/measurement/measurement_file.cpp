@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/measurement/measurement_file.hpp"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <ctime>
 #include <set>
 
 #include "core/nested_text.hpp"
 #include "core/system/file_io.hpp"
 #include "core/system/folder_change_lock.hpp"
+#include "core/system/utc_now.hpp"
 
 namespace orbitfuse::measurement {
 namespace {
@@ -177,8 +176,7 @@ Result<Kept> add_measurement(const std::filesystem::path& file, const std::strin
   FolderChangeLock lock;
   ORBITFUSE_TRY(lock.acquire(file.parent_path()));
   ORBITFUSE_ASSIGN(Measurements all, load_measurements(file, identity));
-  if (measurement.created.empty())
-    measurement.created = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+  if (measurement.created.empty()) measurement.created = utc_now_text();
   Kept kept = all.put(std::move(measurement));
   ORBITFUSE_TRY(save_measurements(file, all));
   return kept;

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <fmt/format.h>
+#include <array>
 
-#include <initializer_list>
-
-#include "core/temperature.hpp"
+#include "core/json_fields.hpp"
 #include "recon/measurement/request.hpp"
 
 namespace orbitfuse::measurement {
@@ -12,6 +10,9 @@ using nlohmann::json;
 
 constexpr Kind all_kinds[] = {Kind::spot,    Kind::box,     Kind::line,       Kind::polygon,
                               Kind::hottest, Kind::coldest, Kind::difference, Kind::distance};
+
+/// Of counts; what each takes is its request's to check.
+constexpr OptionRange whole_numbers = from_to(-1e6, 1e6);
 
 json json_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -34,74 +35,7 @@ json json_of(const ObjectParameterOverrides& o) {
   return j;
 }
 
-tl::unexpected<Error> wrong(const std::string& where, const json& found,
-                            const std::string& wanted) {
-  return fail(ErrorKind::usage, where, "found " + found.dump().substr(0, 60), "give " + wanted);
-}
-
-/// Typed access to one table; every error names the field.
-class Table {
- public:
-  Table(const json& table, std::string where) : json_(table), where_(std::move(where)) {}
-
-  Status check_keys(std::initializer_list<const char*> known) const {
-    if (!json_.is_object()) return wrong(where_, json_, "a table");
-    for (const auto& [key, value] : json_.items()) {
-      bool found = false;
-      for (const char* name : known) found = found || key == name;
-      if (!found) return fail(ErrorKind::usage, where_ + "." + key, "unknown", "leave it out");
-    }
-    return {};
-  }
-  bool has(const char* key) const { return json_.contains(key) && !json_.at(key).is_null(); }
-  std::string at(const char* key) const { return where_ + "." + key; }
-  const json& get(const char* key) const { return json_.at(key); }
-
-  Status number(const char* key, double& out) const {
-    if (!has(key)) return fail(ErrorKind::usage, at(key), "missing", "give a number");
-    if (!get(key).is_number()) return wrong(at(key), get(key), "a number");
-    out = get(key).get<double>();
-    return {};
-  }
-  Status optional(const char* key, std::optional<double>& out) const {
-    if (!has(key)) return {};
-    double value = 0;
-    ORBITFUSE_TRY(number(key, value));
-    out = value;
-    return {};
-  }
-  Status integer(const char* key, int& out) const {
-    if (!has(key)) return {};
-    const json& value = get(key);
-    if (!value.is_number_integer() || value > 1'000'000 || value < -1'000'000)
-      return wrong(at(key), value, "a whole number");
-    out = value.get<int>();
-    return {};
-  }
-  Status text(const char* key, std::string& out) const {
-    if (!has(key)) return {};
-    if (!get(key).is_string()) return wrong(at(key), get(key), "a text");
-    out = get(key).get<std::string>();
-    return {};
-  }
-  Status vector(const char* key, Eigen::Vector3d& out) const {
-    if (!has(key)) return fail(ErrorKind::usage, at(key), "missing", "give three numbers");
-    const json& value = get(key);
-    if (!value.is_array() || value.size() != 3) return wrong(at(key), value, "three numbers");
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (!value[i].is_number()) return wrong(at(key), value, "three numbers");
-      out[static_cast<Eigen::Index>(i)] = value[i].get<double>();
-    }
-    return {};
-  }
-
- private:
-  const json& json_;
-  std::string where_;
-};
-
-Result<Place> place_of(const json& j, const std::string& where) {
-  const Table table(j, where);
+Result<Place> place_of(const JsonFields& table) {
   ORBITFUSE_TRY(table.check_keys({"view", "u", "v", "point"}));
   if (table.has("point")) {
     for (const char* key : {"view", "u", "v"})
@@ -109,87 +43,76 @@ Result<Place> place_of(const json& j, const std::string& where) {
         return fail(ErrorKind::usage, table.at(key), "beside a point",
                     "give either a point, or a view with u and v");
     Eigen::Vector3d point;
-    ORBITFUSE_TRY(table.vector("point", point));
+    ORBITFUSE_TRY(table.get("point", point));
     return point;
   }
   PixelPlace place;
-  ORBITFUSE_TRY(table.text("view", place.view));
-  ORBITFUSE_TRY(table.number("u", place.pixel.x()));
-  ORBITFUSE_TRY(table.number("v", place.pixel.y()));
+  ORBITFUSE_TRY(table.get_present("view", place.view));
+  ORBITFUSE_TRY(table.get_all("u", place.pixel.x(), "v", place.pixel.y()));
   return place;
 }
 
-Result<OrientedBox> box_of(const json& j, const std::string& where) {
-  const Table table(j, where);
+Result<OrientedBox> box_of(const JsonFields& table) {
   ORBITFUSE_TRY(table.check_keys({"center", "size", "rotation_wxyz"}));
   OrientedBox box;
-  ORBITFUSE_TRY(table.vector("center", box.center));
-  ORBITFUSE_TRY(table.vector("size", box.size));
-  if (!table.has("rotation_wxyz")) return box;
-  const json& q = table.get("rotation_wxyz");
-  if (!q.is_array() || q.size() != 4) return wrong(table.at("rotation_wxyz"), q, "four numbers");
-  for (const json& value : q)
-    if (!value.is_number()) return wrong(table.at("rotation_wxyz"), q, "four numbers");
-  box.rotation = Eigen::Quaterniond(q[0].get<double>(), q[1].get<double>(), q[2].get<double>(),
-                                    q[3].get<double>());
+  ORBITFUSE_TRY(table.get_all("center", box.center, "size", box.size));
+  std::array<double, 4> q = {1, 0, 0, 0};
+  ORBITFUSE_TRY(table.get_present("rotation_wxyz", q));
+  box.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
   return box;
 }
 
-Result<ObjectParameterOverrides> overrides_of(const json& j, const std::string& where) {
-  const Table table(j, where);
+Result<ObjectParameterOverrides> overrides_of(const JsonFields& table) {
   ORBITFUSE_TRY(table.check_keys(
       {"emissivity", "distance_m", "reflected_k", "atmospheric_k", "relative_humidity"}));
   ObjectParameterOverrides o;
-  ORBITFUSE_TRY(table.optional("emissivity", o.emissivity));
-  ORBITFUSE_TRY(table.optional("distance_m", o.distance_m));
-  ORBITFUSE_TRY(table.optional("reflected_k", o.reflected_temperature_k));
-  ORBITFUSE_TRY(table.optional("atmospheric_k", o.atmospheric_temperature_k));
-  ORBITFUSE_TRY(table.optional("relative_humidity", o.relative_humidity));
+  ORBITFUSE_TRY(table.get_present("emissivity", o.emissivity, "distance_m", o.distance_m,
+                                  "reflected_k", o.reflected_temperature_k, "atmospheric_k",
+                                  o.atmospheric_temperature_k, "relative_humidity",
+                                  o.relative_humidity));
   return o;
 }
 
-Result<Kind> kind_of(const Table& table) {
-  std::string word;
-  ORBITFUSE_TRY(table.text("kind", word));
-  for (const Kind kind : all_kinds)
-    if (name(kind) == word) return kind;
+Result<Kind> kind_of(const JsonFields& table) {
+  const std::string word = table.remark("kind");
   std::string known;
-  for (const Kind kind : all_kinds) known += (known.empty() ? "" : ", ") + std::string(name(kind));
-  return fail(ErrorKind::usage, table.at("kind"), word.empty() ? "missing" : "'" + word + "'",
-              "choose one of " + known);
+  for (const Kind kind : all_kinds) {
+    if (name(kind) == word) return kind;
+    known += (known.empty() ? "" : ", ") + std::string(name(kind));
+  }
+  return table.wrong("kind", "one of " + known);
 }
 
-Result<Request> parse(const json& j, const std::string& where, int depth) {
-  const Table table(j, where);
+Result<Request> parse(const JsonFields& table, int depth) {
   ORBITFUSE_TRY(table.check_keys(
       {"kind", "name", "places", "box", "count", "apart", "profile", "of", "object", "recorded"}));
   Request request;
   ORBITFUSE_ASSIGN(request.kind, kind_of(table));
-  ORBITFUSE_TRY(table.text("name", request.name));
-  for (const char* list : {"places", "of"})
-    if (table.has(list) && !table.get(list).is_array())
-      return wrong(table.at(list), table.get(list), "a list");
-  if (table.has("places"))
-    for (const json& place : table.get("places")) {
-      ORBITFUSE_ASSIGN(Place parsed, place_of(place, table.at("places")));
+  ORBITFUSE_TRY(table.get_present("name", request.name, "apart", request.apart));
+  if (table.has("places")) {
+    ORBITFUSE_ASSIGN(const auto places, table.children("places"));
+    for (const JsonFields& place : places) {
+      ORBITFUSE_ASSIGN(Place parsed, place_of(place));
       request.places.push_back(std::move(parsed));
     }
+  }
   if (table.has("box")) {
-    ORBITFUSE_ASSIGN(request.box, box_of(table.get("box"), table.at("box")));
+    ORBITFUSE_ASSIGN(const JsonFields box, table.child("box"));
+    ORBITFUSE_ASSIGN(request.box, box_of(box));
   }
-  ORBITFUSE_TRY(table.integer("count", request.count));
-  ORBITFUSE_TRY(table.integer("profile", request.profile));
-  if (table.has("apart")) ORBITFUSE_TRY(table.number("apart", request.apart));
-  if (table.has("object")) {
-    ORBITFUSE_ASSIGN(request.object, overrides_of(table.get("object"), table.at("object")));
-  }
-  if (table.has("recorded")) {
-    ORBITFUSE_ASSIGN(request.recorded, overrides_of(table.get("recorded"), table.at("recorded")));
+  if (table.has("count")) ORBITFUSE_TRY(table.get("count", request.count, whole_numbers));
+  if (table.has("profile")) ORBITFUSE_TRY(table.get("profile", request.profile, whole_numbers));
+  for (const auto& [key, overrides] :
+       {std::pair{"object", &request.object}, {"recorded", &request.recorded}}) {
+    if (!table.has(key)) continue;
+    ORBITFUSE_ASSIGN(const JsonFields given, table.child(key));
+    ORBITFUSE_ASSIGN(*overrides, overrides_of(given));
   }
   if (table.has("of")) {
-    if (depth > 0) return wrong(table.at("of"), table.get("of"), "no difference of differences");
-    for (const json& part : table.get("of")) {
-      ORBITFUSE_ASSIGN(Request parsed, parse(part, table.at("of"), depth + 1));
+    if (depth > 0) return table.wrong("of", "left out: a difference has no differences");
+    ORBITFUSE_ASSIGN(const auto parts, table.children("of"));
+    for (const JsonFields& part : parts) {
+      ORBITFUSE_ASSIGN(Request parsed, parse(part, depth + 1));
       request.of.push_back(std::move(parsed));
     }
   }
@@ -220,6 +143,8 @@ json to_json(const Request& request) {
   return j;
 }
 
-Result<Request> request_of_json(const json& j) { return parse(j, "measurement", 0); }
+Result<Request> request_of_json(const json& j) {
+  return parse({j, "measurement.", {.kind = ErrorKind::usage, .remedy = {}}}, 0);
+}
 
 }  // namespace orbitfuse::measurement

@@ -9,6 +9,7 @@
 #include <functional>
 #include <map>
 
+#include "core/geometry/lifted.hpp"
 #include "recon/assembly/looked_at.hpp"
 
 namespace orbitfuse::measurement {
@@ -59,7 +60,7 @@ Result<std::vector<SurfacePoint>> seen_in(const ThermalScene& scene, double cell
         const auto z = static_cast<double>(seen.depth.at<float>(y, x));
         if (!(z > 0) || !std::isfinite(z)) continue;
         SurfacePoint point;
-        point.position = world_from_cam * (z * camera.ray_of({x + 0.5, y + 0.5}));
+        point.position = world_from_cam * lifted(seen.depth, camera, x, y);
         if (!within(point.position)) continue;
         const auto normal = normal_at(seen.depth, camera, x, y, normal_reach);
         if (!normal) continue;  // a lone pixel
@@ -147,7 +148,7 @@ Result<std::vector<SurfacePoint>> polygon_samples(const ThermalScene& scene, con
       const auto normal = normal_at(seen.depth, part, x, y, normal_reach);
       if (!ray.allFinite()) continue;
       SurfacePoint point;
-      point.position = world_from_cam * (z * ray);
+      point.position = world_from_cam * lifted(seen.depth, part, x, y);
       point.normal = world_from_cam.rotation * normal.value_or(-ray.normalized());
       point.field_k = static_cast<double>(seen.temperature_k.at<float>(y, x));
       const double cosine = normal ? std::abs(normal->dot(ray.normalized())) : 1;

@@ -9,7 +9,9 @@
 #include <limits>
 #include <mutex>
 
+#include "core/geometry/lifted.hpp"
 #include "core/geometry/narrowed.hpp"
+#include "core/image/undistorted.hpp"
 #include "core/near_word.hpp"
 #include "recon/assembly/new_views.hpp"
 
@@ -90,7 +92,7 @@ std::optional<Eigen::Vector3d> normal_at(const cv::Mat& depth, const Camera& cam
     for (int i = std::max(0, x - reach); i <= std::min(depth.cols - 1, x + reach); ++i) {
       const auto z = static_cast<double>(depth.at<float>(j, i));
       if (!(std::abs(z - z0) <= same_surface * z0)) continue;  // also NaN
-      const Eigen::Vector3d point = z * camera.ray_of({i + 0.5, j + 0.5});
+      const Eigen::Vector3d point = lifted(depth, camera, i, j);
       if (point.allFinite()) points.push_back(point);
     }
   if (points.size() < 3) return std::nullopt;
@@ -148,11 +150,9 @@ Result<cv::Mat> ThermalScene::image(std::size_t frame) const {
   if (!cached.image.empty()) return cached.image;
   const ThermalFrame& of = parts_.frames[frame];
   ORBITFUSE_ASSIGN(const cv::Mat image, parts_.read_frame(of));
-  if (image.type() != CV_32FC1 || image.cols != of.view.camera.width ||
-      image.rows != of.view.camera.height)
-    return fail(ErrorKind::input, of.view.name,
-                fmt::format("{}x{} pixels, its camera has {}x{}", image.cols, image.rows,
-                            of.view.camera.width, of.view.camera.height),
+  ORBITFUSE_TRY(check_size(image, of.view.camera, of.view.name));
+  if (image.type() != CV_32FC1)
+    return fail(ErrorKind::input, of.view.name, "no temperatures",
                 "run the session again: its frames have changed");
   cached.image = image;
   return image;

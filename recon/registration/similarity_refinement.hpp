@@ -48,7 +48,11 @@ Result<double> similarity_support(const SceneRenderer& visible, const std::vecto
 
 /// From several degrees and a tenth of the distance off.
 inline std::vector<RenderRound> similarity_rounds() {
-  return {{160, 30, 14, 22}, {160, 20, 12, 18}, {160, 8, 8, 12}, {256, 8, 8, 12}, {320, 6, 7, 12}};
+  return {{.width_px = 160, .search_px = 30, .patch_search_px = 14, .patch_radius_px = 22},
+          {.width_px = 160, .search_px = 20, .patch_search_px = 12, .patch_radius_px = 18},
+          {.width_px = 160, .search_px = 8, .patch_search_px = 8, .patch_radius_px = 12},
+          {.width_px = 256, .search_px = 8, .patch_search_px = 8, .patch_radius_px = 12},
+          {.width_px = 320, .search_px = 6, .patch_search_px = 7, .patch_radius_px = 12}};
 }
 
 }  // namespace orbitfuse

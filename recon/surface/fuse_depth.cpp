@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/geometry/lifted.hpp"
+#include "core/numeric/bilinear.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/surface/distance_grid.hpp"
 #include "recon/surface/surface.hpp"
@@ -26,7 +28,7 @@ struct Prepared {
 bool known(float depth) { return std::isfinite(depth) && depth > 0; }
 
 Eigen::Vector3d lifted(const SurfaceView& s, int x, int y) {
-  return static_cast<double>(s.depth.at<float>(y, x)) * s.view.camera.ray_of({x + 0.5, y + 0.5});
+  return orbitfuse::lifted(s.depth, s.view.camera, x, y);
 }
 
 /// Cosine between ray and normal; 0 beside a step, the border or an unknown depth.
@@ -59,16 +61,13 @@ Prepared prepared(const SurfaceView& s, double max_angle_deg) {
 
 /// Between the four pixels round it; nothing where they lie on two surfaces.
 float depth_between(const cv::Mat& depth, float u, float v) {
-  const float x = u - 0.5F, y = v - 0.5F;
-  const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
-  if (x < 0 || y < 0 || x0 + 1 >= depth.cols || y0 + 1 >= depth.rows) return 0;
-  const float* top = depth.ptr<float>(y0) + x0;
-  const float* bottom = depth.ptr<float>(y0 + 1) + x0;
+  const auto place = place_among<float>(depth.cols, depth.rows, u - 0.5F, v - 0.5F);
+  if (!place) return 0;
+  const float* top = depth.ptr<float>(place->y0) + place->x0;
+  const float* bottom = depth.ptr<float>(place->y1) + place->x0;
   const auto [low, high] = std::minmax({top[0], top[1], bottom[0], bottom[1]});
   if (!(low > 0 && high - low < 4 * step_share * low)) return 0;  // NaN too
-  const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);
-  return (1 - fy) * ((1 - fx) * top[0] + fx * top[1]) +
-         fy * ((1 - fx) * bottom[0] + fx * bottom[1]);
+  return blended(*place, [&](int y, int x) { return depth.at<float>(y, x); });
 }
 
 /// One view's word about a voxel: distances along the ray, shortened to the normal's by the cosine.

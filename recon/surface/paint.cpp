@@ -4,6 +4,7 @@
 #include <numbers>
 #include <optional>
 
+#include "core/numeric/bilinear.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/surface/surface.hpp"
 
@@ -19,15 +20,11 @@ constexpr double beside_edge_weight = 0.05;
 std::optional<cv::Vec3f> value_at(const cv::Mat& image, const Eigen::Vector2d& pixel) {
   const double x = pixel.x() - 0.5, y = pixel.y() - 0.5;
   if (!(x >= 0 && y >= 0 && x <= image.cols - 1.0 && y <= image.rows - 1.0)) return std::nullopt;
-  const int x0 = std::min(static_cast<int>(x), image.cols - 2),
-            y0 = std::min(static_cast<int>(y), image.rows - 2);
-  const auto fx = static_cast<float>(x - x0), fy = static_cast<float>(y - y0);
-  const auto at = [&](int row, int column) {
-    if (image.type() == CV_32FC3) return image.at<cv::Vec3f>(row, column);
-    return cv::Vec3f::all(image.at<float>(row, column));
-  };
-  const cv::Vec3f value = (1 - fy) * ((1 - fx) * at(y0, x0) + fx * at(y0, x0 + 1)) +
-                          fy * ((1 - fx) * at(y0 + 1, x0) + fx * at(y0 + 1, x0 + 1));
+  const cv::Vec3f value =
+      blended(place_held<float>(image.cols, image.rows, x, y), [&](int row, int column) {
+        if (image.type() == CV_32FC3) return image.at<cv::Vec3f>(row, column);
+        return cv::Vec3f::all(image.at<float>(row, column));
+      });
   for (int k = 0; k < 3; ++k)
     if (!std::isfinite(value[k])) return std::nullopt;
   return value;

@@ -15,13 +15,14 @@ void FieldState::create(const TrainOptions& with, Modality what, int view_count)
   color.create(widths, with.seed + 2);
   proposals.clear();
   if (with.sampling == Sampling::proposal) {
-    // As in nerfacto: 5 levels of 2 features, 2^17 entries, finest 128 and 256 cells, 16 hidden.
+    // As in nerfacto; the finest of the first has 128 cells, of the second 256.
+    constexpr int levels = 5, features = 2, log2_entries = 17, coarsest = 16, finest = 128;
+    constexpr int inputs = 16, hidden = 16, outputs = 16;
     proposals.resize(2);
-    for (int i = 0; i < 2; ++i) {
-      proposals[static_cast<std::size_t>(i)].grid.create(5, 2, 17, 16, 128 << i,
-                                                         with.seed + 3 + static_cast<unsigned>(i));
-      proposals[static_cast<std::size_t>(i)].mlp.create({16, 16, 16},
-                                                        with.seed + 5 + static_cast<unsigned>(i));
+    for (unsigned i = 0; i < 2; ++i) {
+      proposals[i].grid.create(levels, features, log2_entries, coarsest, finest << i,
+                               with.seed + 3 + i);
+      proposals[i].mlp.create({inputs, hidden, outputs}, with.seed + 5 + i);
     }
   }
   image_offsets.resize(static_cast<std::size_t>((view_count + 7) / 8 * 8));

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/geometry/rotation_vector.hpp"
+#include "core/numeric/bilinear.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
@@ -40,10 +41,12 @@ Eigen::Vector3d ViewRays::through(double px, double py) const {
     const double high = std::min((i + 1) * spacing_px, limit);
     return high > low ? static_cast<float>((p - low) / (high - low)) : 0.0f;
   };
-  const float fx = fraction(px, ix, camera_.width), fy = fraction(py, iy, camera_.height);
-  const Eigen::Vector2f* row = lattice_.data() + iy * lattice_width_ + ix;
-  const Eigen::Vector2f n = (1 - fy) * ((1 - fx) * row[0] + fx * row[1]) +
-                            fy * ((1 - fx) * row[lattice_width_] + fx * row[lattice_width_ + 1]);
+  // Not place_among(): the lattice's last step is as short as the picture leaves it.
+  const BilinearPlace<float> place{
+      ix, iy, ix + 1, iy + 1, fraction(px, ix, camera_.width), fraction(py, iy, camera_.height)};
+  const Eigen::Vector2f n = blended(place, [&](int y, int x) -> const Eigen::Vector2f& {
+    return lattice_[static_cast<std::size_t>(y * lattice_width_ + x)];
+  });
   return {n.x(), n.y(), 1.0};
 }
 

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <unordered_set>
 
+#include "core/geometry/lifted.hpp"
 #include "core/geometry/narrowed.hpp"
 #include "core/option_range.hpp"
 #include "core/system/parallel.hpp"
@@ -23,10 +24,7 @@ struct DepthView {
 };
 
 Eigen::Vector3d lift(const DepthView& from, int x, int y) {
-  const float z = from.image.depth.at<float>(y, x);
-  const Eigen::Vector3d in_cam =
-      from.view.camera.ray_of({x + 0.5, y + 0.5}) * static_cast<double>(z);
-  return from.view.cam_from_world.inverse() * in_cam;
+  return from.view.cam_from_world.inverse() * lifted(from.image.depth, from.view.camera, x, y);
 }
 
 /// Normal by the cross product of central differences; zero beside a depth step or a border.

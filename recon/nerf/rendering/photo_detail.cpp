@@ -13,7 +13,10 @@
 #include <optional>
 
 #include "core/geometry/lens_fold.hpp"
+#include "core/geometry/lifted.hpp"
 #include "core/geometry/narrowed.hpp"
+#include "core/image/undistorted.hpp"
+#include "core/numeric/bilinear.hpp"
 #include "core/numeric/median.hpp"
 #include "core/option_range.hpp"
 #include "core/system/parallel.hpp"
@@ -43,18 +46,18 @@ cv::Mat blurred(const cv::Mat& values, double sigma) {
   return result;
 }
 
-/// The four pixels round a place and their weights; none where the place isn't among pixels'
+/// The four pixels round a place and their weights, apart because each pixel's confidence comes to
+/// its own (blended() sums at once); none where the place isn't among pixels'
 /// centres.
 struct Corners {
   int x, y;
   std::array<float, 4> weight;  ///< (x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)
 };
 std::optional<Corners> corners(const cv::Size& size, const Eigen::Vector2d& pixel) {
-  const double x = pixel.x() - 0.5, y = pixel.y() - 0.5;
-  if (!(x >= 0 && y >= 0 && x < size.width - 1 && y < size.height - 1)) return std::nullopt;
-  const int column = static_cast<int>(x), row = static_cast<int>(y);
-  const auto u = static_cast<float>(x - column), v = static_cast<float>(y - row);
-  return Corners{column, row, {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v}};
+  const auto place = place_among<float>(size.width, size.height, pixel.x() - 0.5, pixel.y() - 0.5);
+  if (!place) return std::nullopt;
+  const float u = place->right, v = place->down;
+  return Corners{place->x0, place->y0, {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v}};
 }
 
 template <class T>
@@ -113,12 +116,8 @@ std::optional<Eigen::Vector3d> looked_at(const Camera& camera, const Rigid3d& wo
 
 Result<cv::Mat> image_of(const DetailSource& source) {
   ORBITFUSE_ASSIGN(cv::Mat image, source.image());
-  const Camera& camera = source.view.camera;
-  if (image.cols == camera.width && image.rows == camera.height) return image;
-  return fail(ErrorKind::input, source.view.name,
-              fmt::format("{}x{} pixels, its camera has {}x{}", image.cols, image.rows,
-                          camera.width, camera.height),
-              "frames of one camera must have one size; import the session again");
+  ORBITFUSE_TRY(check_size(image, source.view.camera, source.view.name));
+  return image;
 }
 
 }  // namespace
@@ -257,9 +256,7 @@ class PhotoDetail::NewView {
   };
 
   float sum(int x, int y, int channels, float* values) const {
-    const float z = depth_.at<float>(y, x);
-    if (!std::isfinite(z)) return 0;
-    const Eigen::Vector3d point = world_from_cam_ * (camera_.ray_of({x + 0.5, y + 0.5}) * z);
+    const Eigen::Vector3d point = world_from_cam_ * lifted(depth_, camera_, x, y);
     if (!point.allFinite()) return 0;
     const Eigen::Vector3d ray = (point - world_from_cam_.translation).normalized();
     float total = 0;

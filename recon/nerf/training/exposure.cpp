@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "core/geometry/lens_fold.hpp"
+#include "core/geometry/lifted.hpp"
 #include "core/numeric/median.hpp"
 
 namespace orbitfuse::nerf {
@@ -97,10 +98,8 @@ void add_sights_of_depth(const Dataset& data, const std::vector<bool>& heldout, 
         std::max(1, static_cast<int>(std::sqrt(static_cast<double>(map.depth.total()) / per_map)));
     for (int y = step / 2; y < map.depth.rows; y += step)
       for (int x = step / 2; x < map.depth.cols; x += step) {
-        const float z = map.depth.at<float>(y, x);
-        if (!std::isfinite(z)) continue;
-        const Eigen::Vector2d at = map.camera.normalized_of({x + 0.5, y + 0.5});
-        Sight sight{world_from_cam * (double{z} * Eigen::Vector3d(at.x(), at.y(), 1)), {}};
+        if (!std::isfinite(map.depth.at<float>(y, x))) continue;
+        Sight sight{world_from_cam * lifted(map.depth, map.camera, x, y), {}};
         for (const DepthMap& other : data.depth) {
           Sample sample{other.view, {}};
           if (trains(other) && sight.samples.size() < most_per_sight &&

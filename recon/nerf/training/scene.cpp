@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/geometry/scene_ball.hpp"
+#include "core/geometry/seen_by_some.hpp"
 #include "core/numeric/median.hpp"
 #include "core/system/parallel.hpp"
 
@@ -98,12 +99,7 @@ Dataset training_part(const Dataset& dataset, const std::vector<bool>& heldout) 
     part.views.push_back(dataset.views[i]);
   }
   for (const SparsePoint& point : dataset.points) {
-    SparsePoint seen = point;
-    seen.track.clear();
-    for (Observation o : point.track) {
-      o.view = place[static_cast<std::size_t>(o.view)];
-      if (o.view >= 0) seen.track.push_back(o);
-    }
+    SparsePoint seen = seen_by_some(point, place);
     if (point.track.empty() || !seen.track.empty()) part.points.push_back(std::move(seen));
   }
   for (DepthMap map : dataset.depth) {

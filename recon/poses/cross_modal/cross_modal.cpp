@@ -41,9 +41,7 @@ constexpr int max_keyframes = 36;
 Result<cv::Mat> straight_luminance(const Session& session, const FrameRecord& frame,
                                    const Camera& lens) {
   ORBITFUSE_ASSIGN(const cv::Mat values, read_luminance(session, frame));
-  cv::Mat image = without_glare(values);
-  if (!lens.has_distortion()) return image;
-  return undistorted(image, lens, lens.without_distortion());
+  return recorded_straight(without_glare(values), lens, frame.file);
 }
 
 /// Thermal stations and what they are looked for in.

@@ -22,9 +22,15 @@ struct FocalGuess {
 constexpr double clearly_better = 1.02;
 
 /// From where a loop predicts a view, several degrees off.
-inline std::vector<RenderRound> wide_rounds() { return {{160, 16, 12, 18}, {160, 8, 8, 12}}; }
+inline std::vector<RenderRound> wide_rounds() {
+  return {{.width_px = 160, .search_px = 16, .patch_search_px = 12, .patch_radius_px = 18},
+          {.width_px = 160, .search_px = 8, .patch_search_px = 8, .patch_radius_px = 12}};
+}
 /// To a fraction of a degree, and where places are compared.
-inline std::vector<RenderRound> judging_rounds() { return {{256, 8, 8, 12}, {256, 5, 6, 10}}; }
+inline std::vector<RenderRound> judging_rounds() {
+  return {{.width_px = 256, .search_px = 8, .patch_search_px = 8, .patch_radius_px = 12},
+          {.width_px = 256, .search_px = 5, .patch_search_px = 6, .patch_radius_px = 10}};
+}
 
 /// Where the stations of the orbit lie, as the better half of its aligned views says.
 struct LoopModel {

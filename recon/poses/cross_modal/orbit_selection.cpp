@@ -15,9 +15,24 @@ namespace orbitfuse {
 namespace {
 
 /// A start and its first correction; what is in place after it is the support.
-std::vector<RenderRound> opening_rounds() { return {{160, 30, 14, 22, 12}, {160, 12, 10, 16, 12}}; }
+std::vector<RenderRound> opening_rounds() {
+  return {{.width_px = 160,
+           .search_px = 30,
+           .patch_search_px = 14,
+           .patch_radius_px = 22,
+           .patch_spacing_px = 12},
+          {.width_px = 160,
+           .search_px = 12,
+           .patch_search_px = 10,
+           .patch_radius_px = 16,
+           .patch_spacing_px = 12}};
+}
 /// Places of one view are compared after one more.
-constexpr RenderRound comparing_round{160, 6, 7, 10, 8};
+constexpr RenderRound comparing_round{.width_px = 160,
+                                      .search_px = 6,
+                                      .patch_search_px = 7,
+                                      .patch_radius_px = 10,
+                                      .patch_spacing_px = 8};
 
 /// Of a view; the others have been seen to be worse.
 constexpr std::size_t compared_starts = 2;

@@ -7,7 +7,9 @@
 #include <memory>
 #include <opencv2/imgproc.hpp>
 
+#include "core/geometry/lifted.hpp"
 #include "core/geometry/narrowed.hpp"
+#include "core/numeric/bilinear.hpp"
 #include "recon/alignment/edge_field.hpp"
 
 namespace orbitfuse {
@@ -22,17 +24,12 @@ float seen_by(const Painter& painter, const Eigen::Vector3d& point, double depth
   const Eigen::Vector3d in_cam = painter.cam_from_world * point;
   const Eigen::Vector2d pixel = painter.camera.project(in_cam);
   const double x = pixel.x() - 0.5, y = pixel.y() - 0.5;
-  if (!(x >= 0 && y >= 0 && x < painter.image.cols - 1 && y < painter.image.rows - 1))
-    return unpainted;
+  const auto place = place_among<float>(painter.image.cols, painter.image.rows, x, y);
+  if (!place) return unpainted;
   const auto depth = static_cast<double>(
       painter.depth.at<float>(static_cast<int>(std::lround(y)), static_cast<int>(std::lround(x))));
   if (!(std::abs(depth - in_cam.z()) < depth_tolerance * in_cam.z())) return unpainted;
-  const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
-  const auto ax = static_cast<float>(x - x0), ay = static_cast<float>(y - y0);
-  const float *upper = painter.image.ptr<float>(y0) + x0,
-              *lower = painter.image.ptr<float>(y0 + 1) + x0;
-  return (upper[0] * (1 - ax) + upper[1] * ax) * (1 - ay) +
-         (lower[0] * (1 - ax) + lower[1] * ax) * ay;
+  return blended(*place, [&](int row, int column) { return painter.image.at<float>(row, column); });
 }
 
 /// The render's depth as points of the world, empty depth as NaN.
@@ -43,9 +40,7 @@ std::vector<Eigen::Vector3d> world_points(const cv::Mat& depth, const Camera& ca
   points.reserve(depth.total());
   for (int y = 0; y < depth.rows; ++y)
     for (int x = 0; x < depth.cols; ++x)
-      points.push_back(world_from_cam *
-                       Eigen::Vector3d(camera.ray_of({x + 0.5, y + 0.5}) *
-                                       static_cast<double>(depth.at<float>(y, x))));
+      points.push_back(world_from_cam * lifted(depth, camera, x, y));
   return points;
 }
 

@@ -26,8 +26,10 @@ struct ThermalBundleOptions {
   double surface_sigma = 0.02;  ///< of the visible field's surface, share of the distance
   /// Poses may be a few pixels off, single ones 6 degrees; the first scale lets go of patches that
   /// confirm any place on their way (a view of `sedan` stayed 2.4 degrees off without it).
-  BundleStep wide{6, 4, 0.3, {2, 0.5}};
-  BundleStep fine{3, 3, 0.2, {0.5}};  ///< to the end: single views jitter by a tenth of a degree
+  BundleStep wide{
+      .reach_px = 6, .max_rounds = 4, .settled_deg = 0.3, .sighting_losses_px = {2, 0.5}};
+  /// To the end: single views jitter by a tenth of a degree.
+  BundleStep fine{.reach_px = 3, .max_rounds = 3, .settled_deg = 0.2, .sighting_losses_px = {0.5}};
   /// A k1 that moves the outer tenth of the patches by less is none: straight lenses of eight
   /// scenes came out with up to 0.3 px, depth being a little off everywhere.
   double least_radial_px = 0.5;

@@ -22,7 +22,10 @@ constexpr double nudged_below_share = 0.85, nudge_deg = 2;
 constexpr double lost_share = 0.6;
 
 /// From a degree or two off, the first without new renders of the field.
-std::vector<RenderRound> approach_rounds() { return {{200, 10, 8, 12}, {256, 6, 7, 10}}; }
+std::vector<RenderRound> approach_rounds() {
+  return {{.width_px = 200, .search_px = 10, .patch_search_px = 8, .patch_radius_px = 12},
+          {.width_px = 256, .search_px = 6, .patch_search_px = 7, .patch_radius_px = 10}};
+}
 
 /// Of the first `count` views, at least one.
 double median_support(const Fit& alignment, std::size_t count) {
@@ -53,8 +56,12 @@ Result<std::vector<std::size_t>> unsettled(const OrbitRefinement& refinement, Fi
   std::vector<PosedView> starts, places;
   for (const std::size_t i : all)
     starts.push_back(predicted(refinement.orbit, alignment, model, i));
-  ORBITFUSE_ASSIGN(const Fit tried,
-                   refinement.restart(all, starts, {{160, 12, 10, 16}, {256, 8, 8, 12}}));
+  ORBITFUSE_ASSIGN(
+      const Fit tried,
+      refinement.restart(
+          all, starts,
+          {{.width_px = 160, .search_px = 12, .patch_search_px = 10, .patch_radius_px = 16},
+           {.width_px = 256, .search_px = 8, .patch_search_px = 8, .patch_radius_px = 12}}));
   const double typical = median_support(alignment, all.size());
   for (const std::size_t i : all) {
     const RenderAlignedView& view = alignment.views[i];

@@ -287,7 +287,11 @@ Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOpt
   const double depth = median_depth(views);
   RoundResult matched;
   constexpr RenderRound rounds[] = {
-      {160, 8, 8, 18}, {160, 5, 7, 14}, {320, 6, 8, 16}, {320, 4, 6, 12}, {320, 3, 5, 10}};
+      {.width_px = 160, .search_px = 8, .patch_search_px = 8, .patch_radius_px = 18},
+      {.width_px = 160, .search_px = 5, .patch_search_px = 7, .patch_radius_px = 14},
+      {.width_px = 320, .search_px = 6, .patch_search_px = 8, .patch_radius_px = 16},
+      {.width_px = 320, .search_px = 4, .patch_search_px = 6, .patch_radius_px = 12},
+      {.width_px = 320, .search_px = 3, .patch_search_px = 5, .patch_radius_px = 10}};
   for (const RenderRound& round : rounds) {
     ORBITFUSE_TRY(progress.check("poses.rig"));
     matched = match_round(views, rig, round);

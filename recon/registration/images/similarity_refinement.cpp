@@ -49,7 +49,8 @@ Result<SimilarityRefinement> refine_similarity(
     current = agreed_similarity(seen.patches, current.inverse()).inverse();
   }
   // Both judged alike: the same last round, without a search of its own.
-  const RenderRound judge{256, 3, 4, 10};
+  const RenderRound judge{
+      .width_px = 256, .search_px = 3, .patch_search_px = 4, .patch_radius_px = 10};
   ORBITFUSE_ASSIGN(const SimilarityRound before,
                    match_scene(visible, images, thermal, visible_from_thermal, judge, progress));
   ORBITFUSE_ASSIGN(const SimilarityRound after,

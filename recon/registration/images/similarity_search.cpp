@@ -20,10 +20,14 @@ constexpr double farthest = 3;
 
 /// From a start to where its basin is known, and on to the basin's floor.
 std::vector<RenderRound> opening_rounds() {
-  return {{search_width_px, 24, 11, 18}, {search_width_px, 16, 10, 15}};
+  return {
+      {.width_px = search_width_px, .search_px = 24, .patch_search_px = 11, .patch_radius_px = 18},
+      {.width_px = search_width_px, .search_px = 16, .patch_search_px = 10, .patch_radius_px = 15}};
 }
-constexpr RenderRound closing_round{search_width_px, 7, 7, 10};
-constexpr RenderRound judging_round{search_width_px, 3, 4, 8};
+constexpr RenderRound closing_round{
+    .width_px = search_width_px, .search_px = 7, .patch_search_px = 7, .patch_radius_px = 10};
+constexpr RenderRound judging_round{
+    .width_px = search_width_px, .search_px = 3, .patch_search_px = 4, .patch_radius_px = 8};
 
 /// A place on its way, and how well the images support it.
 struct Candidate {
@@ -157,7 +161,10 @@ Result<SimilarityRefinement> search_similarity(const SceneRenderer& visible,
        .detail = fmt::format("from the clouds' answer: support {:.0f}, {:.2f} of the patches in "
                              "place, moved by {:.2f} steps",
                              first.support, first.share, moved)});
-  const std::vector<RenderRound> last_rounds{{160, 8, 8, 12}, {256, 8, 8, 12}, {320, 6, 7, 12}};
+  const std::vector<RenderRound> last_rounds{
+      {.width_px = 160, .search_px = 8, .patch_search_px = 8, .patch_radius_px = 12},
+      {.width_px = 256, .search_px = 8, .patch_search_px = 8, .patch_radius_px = 12},
+      {.width_px = 320, .search_px = 6, .patch_search_px = 7, .patch_radius_px = 12}};
   if (options.clouds_decide && first.share >= options.decisive_share && moved < 0.5) {
     ORBITFUSE_ASSIGN(SimilarityRefinement result, finish(first.visible_from_thermal, last_rounds));
     result.skips.push_back(

@@ -7,6 +7,7 @@
 
 #include "recon/nerf/field/field_state.hpp"
 #include "recon/nerf/rendering/march.hpp"
+#include "tests/recon/nerf/random_ray.hpp"
 #include "tests/recon/nerf/toy_scene.hpp"
 
 namespace orbitfuse::nerf {
@@ -295,13 +296,7 @@ TEST(Occupancy, ARayDoesNotDependOnThoseBesideIt) {
   grid.refresh();
   std::vector<DrawnRay> rays(march_lanes);
   for (DrawnRay& drawn : rays) {
-    Eigen::Vector3f direction;
-    for (int d = 0; d < 3; ++d) direction[d] = static_cast<float>(random.gaussian(1));
-    direction.normalize();
-    for (int d = 0; d < 3; ++d) {
-      drawn.ray.origin[d] = random.uniform(-1.0f, 1.0f);
-      drawn.ray.direction[d] = direction[d];
-    }
+    test::draw_ray(random, 1.0f, drawn.ray);
     drawn.far = random.uniform(0.5f, 9.0f);
     drawn.jitter = random.uniform(0.0f, 1.0f);
   }

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "tests/recon/nerf/random_ray.hpp"
+
 namespace orbitfuse::nerf {
 namespace {
 
@@ -81,15 +83,7 @@ TEST(March, SamplesLieWhereADoublePrecisionWalkPutsThem) {
   int samples = 0, off = 0, across = 0;
   for (int group = 0; group < 12; ++group) {
     std::vector<DrawnRay> rays(march_lanes);
-    for (DrawnRay& drawn : rays) {
-      Eigen::Vector3f direction;
-      for (int d = 0; d < 3; ++d) direction[d] = static_cast<float>(random.gaussian(1));
-      direction.normalize();
-      for (int d = 0; d < 3; ++d) {
-        drawn.ray.origin[d] = random.uniform(-1.5f, 1.5f);
-        drawn.ray.direction[d] = direction[d];
-      }
-    }
+    for (DrawnRay& drawn : rays) test::draw_ray(random, 1.5f, drawn.ray);
     std::vector<Marched> out(march_lanes);
     march(grid, settings, rays.data(), march_lanes, out.data());
     for (std::size_t r = 0; r < rays.size(); ++r) {
