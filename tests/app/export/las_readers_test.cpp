@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// LAS in the readers of others, from npm (las_readers/package.json): every point's place, colour and
-// temperature.
+// LAS in the readers of others, from npm (las_readers/package.json): every point's place, colour
+// and temperature.
 #include <gtest/gtest.h>
 
 #include <cmath>
