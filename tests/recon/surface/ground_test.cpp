@@ -84,9 +84,8 @@ TEST(Ground, ThereIsNoneWhereNothingGoesOnBeyondTheObject) {
   add_heights(on_a_slope, 0.5, [](double x, double y) { return 2 * x + 0.1 * y; });
   EXPECT_FALSE(find_ground(on_a_slope, box, Eigen::Vector3d::UnitZ()));
   // A table through whose middle the floor is seen.
-  add_heights(above_a_floor, 1, [](double x, double y) {
-    return std::hypot(x, y) < 0.5 ? -0.6 : 0.0;
-  });
+  add_heights(above_a_floor, 1,
+              [](double x, double y) { return std::hypot(x, y) < 0.5 ? -0.6 : 0.0; });
   EXPECT_FALSE(find_ground(above_a_floor, box, Eigen::Vector3d::UnitZ()));
   EXPECT_FALSE(find_ground({}, box, Eigen::Vector3d::UnitZ()));
 }
