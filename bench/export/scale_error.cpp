@@ -153,8 +153,7 @@ Status score_known_poses(const Options& o, const GroundTruth& truth, view::Finis
 Status run(const Options& o) {
   ORBITFUSE_ASSIGN(const GroundTruth truth, read_ground_truth(o.truth));
   ORBITFUSE_ASSIGN(const Similarity3d fit, truth_from_run(o.run, truth));
-  ORBITFUSE_ASSIGN(view::FinishedRun run,
-                   view::load_finished_run(o.run, stages::RunConfig(), {}));
+  ORBITFUSE_ASSIGN(view::FinishedRun run, view::load_finished_run(o.run, stages::RunConfig(), {}));
   if (o.noise_m >= 0) return score_known_poses(o, truth, run, fit.scale);
   return o.by_mat ? score_mat(o, run, fit.scale) : score_distances(o, run, fit);
 }

@@ -128,9 +128,8 @@ std::optional<GroundPlane> find_ground(const TriangleMesh& mesh, const Eigen::Al
   const double band = band_share * box.sizes().maxCoeff();
   std::optional<GroundPlane> ground = largest_plane(samples, band, up);
   if (!ground) return std::nullopt;
-  const auto below = std::count_if(middles.all.begin(), middles.all.end(), [&](const auto& p) {
-    return ground->above(p) < -3 * band;
-  });
+  const auto below = std::count_if(middles.all.begin(), middles.all.end(),
+                                   [&](const auto& p) { return ground->above(p) < -3 * band; });
   if (static_cast<double>(below) > most_below * static_cast<double>(middles.all.size()))
     return std::nullopt;
   const auto near = in_band(samples, *ground, 3 * band);
