@@ -200,7 +200,8 @@ Result<MetricScale> scale_of_distance(const view::FinishedRun& run, const Place&
   return scale;
 }
 
-Result<MetricScale> scale_of_cameras(std::vector<PosePair> pairs, const std::string& source) {
+Result<MetricScale> scale_of_cameras(std::vector<PosePair> pairs, const std::string& source,
+                                     double place_error_m) {
   ORBITFUSE_ASSIGN(Similarity3d fit, truth_from_estimate(pairs));
   // One wrong camera must not decide: those far off the others' middle are left out once.
   std::vector<double> off;
@@ -227,13 +228,15 @@ Result<MetricScale> scale_of_cameras(std::vector<PosePair> pairs, const std::str
     return fail(ErrorKind::input, source,
                 fmt::format("its cameras are {:.3f} m off the run's", rms),
                 "see whether both are of this session, and doubtful poses in the report");
-  MetricScale scale{fit.scale, std::sqrt(squares / freedom / spread), source,
+  const double variance = std::max(squares / freedom, place_error_m * place_error_m);
+  MetricScale scale{fit.scale, std::sqrt(variance / spread), source,
                     fmt::format("{} cameras, {:.4f} m off", pairs.size(), rms)};
   ORBITFUSE_TRY(scale.validate(source));
   return scale;
 }
 
-Result<MetricScale> scale_of_known_poses(const view::FinishedRun& run) {
+Result<MetricScale> scale_of_known_poses(const view::FinishedRun& run,
+                                         std::optional<double> place_error_m) {
   if (!run.session)
     return fail(ErrorKind::input, "known poses", "the session is not where the run read it",
                 "bring it back");
@@ -246,7 +249,14 @@ Result<MetricScale> scale_of_known_poses(const view::FinishedRun& run) {
     return fail(ErrorKind::input, "known poses",
                 fmt::format("{} of the session's frames have one", pairs.size()),
                 "import them with their poses, or tell one distance: --distance");
-  return scale_of_cameras(std::move(pairs), "known poses");
+  ORBITFUSE_ASSIGN(MetricScale scale,
+                   scale_of_cameras(std::move(pairs), "known poses", place_error_m.value_or(0)));
+  constexpr double rounding = 1e-7;
+  if (!place_error_m && scale.relative_uncertainty < rounding)
+    return fail(ErrorKind::usage, "--known-poses",
+                "the run took them as they are, so that nothing shows how exact they are",
+                "say how far off a camera's place may be: --pose-error 5mm");
+  return scale;
 }
 
 }  // namespace orbitfuse::exporting

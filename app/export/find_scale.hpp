@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "app/stages/metric_scale.hpp"
@@ -25,13 +26,16 @@ Result<stages::MetricScale> scale_of_distance(const view::FinishedRun& run,
                                               const Progress& progress);
 
 /// Cameras whose places are known in metres, truth = metres: the similarity between both sets. Its
-/// uncertainty is that of the fit. Errors: input (fewer than three, on a line, or so far off that
-/// they are not the same cameras).
-Result<stages::MetricScale> scale_of_cameras(std::vector<PosePair> pairs,
-                                             const std::string& source);
+/// uncertainty is what the fit leaves, or what `place_error_m` (of a place along each axis, one
+/// standard deviation) makes of it if that is more. Errors: input (fewer than three, on a line, or
+/// so far off that they are not the same cameras).
+Result<stages::MetricScale> scale_of_cameras(std::vector<PosePair> pairs, const std::string& source,
+                                             double place_error_m = 0);
 
 /// By the poses that came with the session, whose unit the user vouches to be metres. Errors: input
-/// (no session, none of its frames has one).
-Result<stages::MetricScale> scale_of_known_poses(const view::FinishedRun& run);
+/// (no session, none of its frames has one), usage (the run took them as they are, so that no fit
+/// shows how exact they are, and nobody said).
+Result<stages::MetricScale> scale_of_known_poses(const view::FinishedRun& run,
+                                                 std::optional<double> place_error_m);
 
 }  // namespace orbitfuse::exporting

@@ -58,6 +58,7 @@ json sidecar(const view::FinishedRun& run, const FieldSurface& surface, const Tr
   j["vertices"] = mesh.vertices.size();
   j["triangles"] = mesh.triangles.size();
   j["fused_triangles"] = surface.fused_triangles;
+  if (surface.ground) j["ground_left_out"] = true;
   j["vertices_without_color"] = surface.uncolored;
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3d& p : mesh.vertices.positions) box.extend(p);

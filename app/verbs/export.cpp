@@ -17,10 +17,11 @@ using namespace exporting;
 
 struct Options {
   std::string out, crop_box, up, colors = "visible", palette, flavour = "plain";
-  std::string dataset, poses = "recorded", mat;
+  std::string dataset, poses = "recorded", mat, pose_error;
   std::vector<std::string> files, distance;
-  bool whole = false, points = false, known_poses = false;
+  bool whole = false, points = false, known_poses = false, without_ground = false;
   std::optional<int> triangles, mat_tags;
+  std::optional<double> ground_clearance;
 };
 
 Result<std::vector<double>> numbers(const char* option, const std::string& word, std::size_t count,
@@ -47,6 +48,11 @@ Result<SurfaceRequest> request_of(const Options& o) {
   if (o.whole && !o.crop_box.empty())
     return fail(ErrorKind::usage, "--whole", "together with --crop-box", "choose one of them");
   if (o.whole) request.crop = Crop::whole;
+  request.surface.surface.without_ground = o.without_ground;
+  if (o.ground_clearance && !o.without_ground)
+    return fail(ErrorKind::usage, "--ground-clearance", "no --without-ground beside it",
+                "give both, or none");
+  if (o.ground_clearance) request.surface.surface.ground_clearance = *o.ground_clearance;
   if (!o.crop_box.empty()) {
     ORBITFUSE_ASSIGN(const auto v,
                      numbers("--crop-box", o.crop_box, 6,
@@ -100,9 +106,18 @@ Result<std::optional<stages::MetricScale>> scale_of(Context& context, const Opti
                 "tell the scale in one way");
   if (o.mat_tags && o.mat.empty())
     return fail(ErrorKind::usage, "--mat-tags", "no --mat beside it", "tell its side: --mat 0.6m");
+  if (!o.pose_error.empty() && !o.known_poses)
+    return fail(ErrorKind::usage, "--pose-error", "no --known-poses beside it",
+                "give both, or none");
   if (told == 0) return stages::load_metric_scale(o.out, world);
   const auto found = [&]() -> Result<stages::MetricScale> {
-    if (o.known_poses) return scale_of_known_poses(run);
+    if (o.known_poses) {
+      std::optional<double> place_error_m;
+      if (!o.pose_error.empty()) {
+        ORBITFUSE_ASSIGN(place_error_m, metres_of("--pose-error", o.pose_error));
+      }
+      return scale_of_known_poses(run, place_error_m);
+    }
     if (!o.mat.empty()) {
       MatDesign design;
       ORBITFUSE_ASSIGN(design.size_m, metres_of("--mat", o.mat));
@@ -145,6 +160,13 @@ Status export_surface(Context& context, const std::vector<fs::path>& files,
   context.result["vertices"] = surface.mesh.vertices.size();
   context.result["triangles"] = surface.mesh.triangles.size();
   context.result["vertices_without_temperature"] = surface.without_temperature;
+  if (request.surface.surface.without_ground) {
+    context.result["ground_left_out"] = surface.ground.has_value();
+    if (!surface.ground)
+      context.console.warning(
+          "no ground was found, and nothing left out: the object hangs free, or what it stands on "
+          "ends within the box or is not level; --crop-box cuts by hand");
+  }
   context.result["files"] = nlohmann::json::array();
   for (const fs::path& file : files) {
     ORBITFUSE_TRY(write_surface(file, run, surface, frame, how));
@@ -199,6 +221,11 @@ Action add_export(CLI::App& app) {
                  "CX,CY,CZ,SX,SY,SZ: export this box of the run's world, in its unit, instead of "
                  "what the cameras look at");
   app.add_flag("--whole", o->whole, "Export what lies round the object too");
+  app.add_flag("--without-ground", o->without_ground,
+               "Leave out the ground that the object stands on, where there is one");
+  app.add_option("--ground-clearance", o->ground_clearance,
+                 "How far above the ground the object begins, as a share of the box's longest side "
+                 "(default 0.005, more on rough ground)");
   app.add_option("--up", o->up, "X,Y,Z of the run's world that becomes the files' up");
   app.add_option("--colors", o->colors, "Of the vertices: as seen, or a palette's of temperature")
       ->check(CLI::IsMember({"visible", "temperature"}));
@@ -217,6 +244,9 @@ Action add_export(CLI::App& app) {
   app.add_option("--mat-tags", o->mat_tags, "Tags along a side of the mat, if not the default");
   app.add_flag("--known-poses", o->known_poses,
                "The poses that the session came with are in metres: the scale is theirs");
+  app.add_option("--pose-error", o->pose_error,
+                 "How far off the place of a known pose may be along each axis (standard "
+                 "deviation), e.g. 5mm; needed where the run took the poses as they are");
   app.add_option("--dataset", o->dataset,
                  "New folder for aligned visible and thermal pairs, to train other methods");
   app.add_option("--poses", o->poses, "Of the pairs: the visible photos' or new ones (render.*)")

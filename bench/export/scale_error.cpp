@@ -2,9 +2,12 @@
 // The metric scale that a run's pictures give, against that of its true cameras:
 //   scale_error RUN ground_truth.json --mat 2.4 [--tags 9]        the mat on the ground
 //   scale_error RUN ground_truth.json --surface TRUE.ply [--count 200] [--least 1.0]
+//   scale_error RUN ground_truth.json --known-poses 0.02 [--count 200] [--as-they-are]
 // The second: one distance, told by random pairs of pixels of the recorded visible views. Each pair
 // lies on the object, in one view, at least `--least` metres apart; its distance is the true
-// surface's.
+// surface's. The third: poses that came with the session, each true camera off by so many metres
+// (one standard deviation an axis), drawn `--count` times; --as-they-are: the run took them instead
+// of poses of its own, and is told how far off they are.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -16,6 +19,7 @@
 #include "app/export/mat_scale.hpp"
 #include "bench/export/true_scene.hpp"
 #include "core/geometry/lifted.hpp"
+#include "core/geometry/pose_error.hpp"
 #include "core/numeric/median.hpp"
 #include "recon/surface/surface.hpp"
 
@@ -26,7 +30,8 @@ namespace fs = std::filesystem;
 struct Options {
   fs::path run, true_mesh, truth;
   MatDesign mat;
-  bool by_mat = false;
+  bool by_mat = false, as_they_are = false;
+  double noise_m = -1;  ///< of known poses; < 0: they are not asked for
   int count = 200;
   double least_m = 1, most_m = 3;
 };
@@ -87,11 +92,68 @@ Status score_distances(const Options& o, const view::FinishedRun& run, const Sim
   return {};
 }
 
+/// The true cameras, each off by a draw, as the session's poses; where the run took them, as its
+/// own too. Pairs of the given poses with the true ones.
+std::vector<PosePair> give_poses(const Options& o, const GroundTruth& truth, std::mt19937& random,
+                                 view::FinishedRun& run) {
+  std::normal_distribution<double> off(0, o.noise_m);
+  std::vector<PosePair> pairs;
+  for (FrameRecord& frame : run.session->frames) {
+    frame.cam_from_world.reset();
+    const auto views = truth.views.find(frame.modality);
+    if (views == truth.views.end()) continue;
+    for (const TrueView& known : views->second) {
+      if (fs::path(known.name).filename() != fs::path(frame.source).filename()) continue;
+      frame.cam_from_world = known.cam_from_world;
+      if (o.noise_m > 0)
+        frame.cam_from_world->translation +=
+            known.cam_from_world.rotation * Eigen::Vector3d(off(random), off(random), off(random));
+      for (view::RecordedView& v : run.views) {
+        if (v.view.name != frame.file) continue;
+        pairs.push_back({*frame.cam_from_world, known.cam_from_world, frame.file});
+        if (o.as_they_are) v.view.cam_from_world = *frame.cam_from_world;
+      }
+    }
+  }
+  return pairs;
+}
+
+Status score_known_poses(const Options& o, const GroundTruth& truth, view::FinishedRun& run,
+                         double true_scale) {
+  if (!run.session) return fail(ErrorKind::input, o.run.string(), "no session", "bring it back");
+  std::mt19937 random(11);
+  std::vector<double> errors, stated;
+  int covered = 0;
+  const int draws = o.noise_m > 0 ? o.count : 1;
+  for (int i = 0; i < draws; ++i) {
+    const std::vector<PosePair> given = give_poses(o, truth, random, run);
+    if (o.as_they_are) {
+      ORBITFUSE_ASSIGN(const Similarity3d of_given, truth_from_estimate(given));
+      true_scale = of_given.scale;
+    }
+    ORBITFUSE_ASSIGN(const stages::MetricScale scale,
+                     exporting::scale_of_known_poses(
+                         run, o.as_they_are ? std::optional(o.noise_m) : std::nullopt));
+    const double error = std::abs(scale.metres_per_unit / true_scale - 1);
+    covered += error <= 1.645 * scale.relative_uncertainty;
+    errors.push_back(100 * error);
+    stated.push_back(100 * scale.relative_uncertainty);
+  }
+  std::sort(errors.begin(), errors.end());
+  fmt::print(
+      "{}: scale from known poses {} m off an axis{}, {} draws: error median {:.4f} %, 90 % {:.4f} "
+      "%; stated {:.4f} % (one sigma, median); 1.645 sigma covers {:.1f} %\n",
+      o.run.filename().string(), o.noise_m, o.as_they_are ? ", taken as they are" : "",
+      errors.size(), median(errors), errors[errors.size() * 9 / 10], median(stated),
+      100.0 * covered / static_cast<double>(errors.size()));
+  return {};
+}
+
 Status run(const Options& o) {
   ORBITFUSE_ASSIGN(const GroundTruth truth, read_ground_truth(o.truth));
   ORBITFUSE_ASSIGN(const Similarity3d fit, truth_from_run(o.run, truth));
-  ORBITFUSE_ASSIGN(const view::FinishedRun run,
-                   view::load_finished_run(o.run, stages::RunConfig(), {}));
+  ORBITFUSE_ASSIGN(view::FinishedRun run, view::load_finished_run(o.run, stages::RunConfig(), {}));
+  if (o.noise_m >= 0) return score_known_poses(o, truth, run, fit.scale);
   return o.by_mat ? score_mat(o, run, fit.scale) : score_distances(o, run, fit);
 }
 
@@ -107,7 +169,9 @@ int main(int argc, char** argv) {
   app.add_option("--tags", options.mat.tags_per_side, "Tags a side of it")->capture_default_str();
   app.add_option("--surface", options.true_mesh, "PLY of true_mesh.py, for one distance")
       ->excludes(mat);
-  app.add_option("--count", options.count, "Pairs")->capture_default_str();
+  app.add_option("--known-poses", options.noise_m, "Metres that they are off an axis");
+  app.add_flag("--as-they-are", options.as_they_are, "The run took them instead of its own");
+  app.add_option("--count", options.count, "Pairs, or draws")->capture_default_str();
   app.add_option("--least", options.least_m, "Metres between two places")->capture_default_str();
   app.add_option("--most", options.most_m, "Metres from the middle")->capture_default_str();
   CLI11_PARSE(app, argc, argv);

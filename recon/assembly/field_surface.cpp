@@ -85,6 +85,16 @@ Status add_depth_noise(const RenderedOrbit& orbit, double max_angle_deg, FieldSu
   return {};
 }
 
+/// How far above the ground the object begins.
+double clearance_of(const GroundPlane& ground, const SurfaceOptions& options, double side) {
+  return std::max(options.ground_clearance * side, 4 * ground.sigma);
+}
+
+Eigen::Vector3d up_of(const std::vector<PosedView>& views) {
+  const auto orbit = orbit_geometry(views);
+  return orbit ? orbit->up : Eigen::Vector3d::UnitZ();
+}
+
 }  // namespace
 
 Status FieldSurfaceOptions::validate() const {
@@ -121,13 +131,20 @@ Result<FieldSurface> field_surface(const SurfaceFields& fields, const Eigen::Ali
                      rendered(*fields.thermal, fields.thermal_views, fields.world_from_thermal,
                               options.thermal_width_px, options.min_opacity, progress));
   }
-  ORBITFUSE_ASSIGN(const TriangleMesh fused, fuse_depth((has_visible ? visible : thermal).depths,
-                                                        box, options.surface, progress));
+  ORBITFUSE_ASSIGN(TriangleMesh fused, fuse_depth((has_visible ? visible : thermal).depths, box,
+                                                  options.surface, progress));
   FieldSurface result;
   result.fused_triangles = fused.triangles.size();
-  result.mesh =
-      simplified(without_small_pieces(fused, options.surface.least_piece * box.sizes().maxCoeff()),
-                 options.surface.triangles);
+  const double side = box.sizes().maxCoeff();
+  if (options.surface.without_ground) {
+    result.ground =
+        find_ground(fused, box, up_of(has_visible ? fields.visible_views : fields.thermal_views));
+    if (result.ground)
+      fused = without_ground(fused, *result.ground,
+                             clearance_of(*result.ground, options.surface, side));
+  }
+  result.mesh = simplified(without_small_pieces(fused, options.surface.least_piece * side),
+                           options.surface.triangles);
   if (result.mesh.empty())
     return fail(ErrorKind::quality, "surface", "only loose pieces of it in the box",
                 "lower surface.least_piece, or choose a larger box");

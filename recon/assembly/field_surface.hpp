@@ -9,6 +9,7 @@
 #include "core/geometry/triangle_mesh.hpp"
 #include "core/progress.hpp"
 #include "recon/nerf/nerf.hpp"
+#include "recon/surface/ground.hpp"
 #include "recon/surface/options.hpp"
 
 // The surface of a scene from its trained fields: the depth that they show to the recorded cameras
@@ -38,6 +39,7 @@ struct FieldSurface {
   std::size_t uncolored = 0;            ///< vertices that no visible view sees: gray
   std::size_t without_temperature = 0;  ///< vertices that no thermal view sees: NaN
   std::size_t fused_triangles = 0;      ///< before it was simplified
+  std::optional<GroundPlane> ground;    ///< that was left out
   /// How far each view's depth lies from the mesh at each vertex, mean over the views that see it,
   /// in the poses' unit; NaN: none does. Empty unless asked for.
   std::vector<float> depth_noise;

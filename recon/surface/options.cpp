@@ -13,6 +13,7 @@ Status SurfaceOptions::validate() const {
   ORBITFUSE_TRY(check("max_angle_deg", max_angle_deg, from_to(1, 89)));
   ORBITFUSE_TRY(check("least_weight", least_weight, above(0)));
   ORBITFUSE_TRY(check("least_piece", least_piece, from_to(0, 1)));
+  ORBITFUSE_TRY(check("ground_clearance", ground_clearance, from_to(0, 0.5)));
   return check("triangles", triangles, from_to(4, 20'000'000));
 }
 

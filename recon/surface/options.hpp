@@ -19,6 +19,11 @@ struct SurfaceOptions {
   /// Loose pieces smaller than this share of the box's longest side are dropped: floaters of the
   /// field, not parts of the object.
   double least_piece = 0.03;
+  /// The ground that the object stands on is left out, where there is one.
+  bool without_ground = false;
+  /// How far above the ground the object begins, as a share of the box's longest side; more where
+  /// the ground is rougher. Lower, and ground stays; higher, and the object loses its feet.
+  double ground_clearance = 0.005;
   /// Most triangles; meshoptimizer takes away those that change the form least.
   int triangles = 200'000;
 

@@ -79,6 +79,42 @@ TEST(FindScale, CamerasThatSayNothingAreNamed) {
   EXPECT_EQ(scale.error().kind, ErrorKind::input);
 }
 
+/// A run whose cameras are the circle's, and a session that came with poses, off by `noise_m`.
+view::FinishedRun run_with_poses(double noise_m) {
+  view::FinishedRun run;
+  run.session.emplace();
+  for (const PosePair& pair : circle(12, noise_m)) {
+    const std::string file = "visible/" + std::to_string(run.views.size()) + ".jpg";
+    run.views.push_back({});
+    run.views.back().view = {file, Camera::from_fov(64, 48, 50), pair.cam_from_estimate};
+    run.session->frames.push_back({});
+    run.session->frames.back().file = file;
+    run.session->frames.back().cam_from_world = pair.cam_from_truth;
+  }
+  return run;
+}
+
+TEST(FindScale, PosesThatTheRunTookAsTheyAreNeedTheirErrorToBeTold) {
+  const auto fitted = scale_of_known_poses(run_with_poses(0.03), std::nullopt);
+  ASSERT_TRUE(fitted) << fitted.error().message();
+  EXPECT_NEAR(fitted->metres_per_unit, 0.25, 0.25 * 3 * fitted->relative_uncertainty);
+
+  const auto silent = scale_of_known_poses(run_with_poses(0), std::nullopt);
+  ASSERT_FALSE(silent) << "an uncertainty of nothing";
+  EXPECT_EQ(silent.error().kind, ErrorKind::usage);
+  EXPECT_THAT(silent.error().remedy, HasSubstr("--pose-error"));
+
+  // 12 cameras 3 m round a middle: 1 cm an axis over the root of the sum of squares.
+  const auto told = scale_of_known_poses(run_with_poses(0), 0.01);
+  ASSERT_TRUE(told);
+  EXPECT_NEAR(told->metres_per_unit, 0.25, 1e-9);
+  EXPECT_NEAR(told->relative_uncertainty, 0.01 / (3 * std::sqrt(12)),
+              0.1 * told->relative_uncertainty);
+  // What the fit shows counts where it is more.
+  EXPECT_EQ(scale_of_known_poses(run_with_poses(0.03), 0.001)->relative_uncertainty,
+            fitted->relative_uncertainty);
+}
+
 TEST(FindScale, PlacesThatAreNoneAreNamed) {
   view::FinishedRun run;
   run.radius = 1;

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What `orbitfuse farm` says, with which exit code, where there is no Slurm, where Slurm refuses,
+// on a full folder, on a dead mount and beside another farm: named, and nothing is lost.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sched.h>
+#include <sys/mount.h>
+#include <unistd.h>
+
+#include <chrono>
+
+#include "app/farm/farm_lock.hpp"
+#include "tests/app/cli/program.hpp"
+#include "tests/app/cli/session_fixture.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace orbitfuse {
+namespace {
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class RefusedFarm : public ::testing::Test {
+ protected:
+  RefusedFarm() { fs::create_directories(session); }
+
+  /// One of Slurm's commands, as a script. `calls` gets a line a call.
+  void command(const std::string& name, const std::string& body) const {
+    test::put(temp / "bin" / name,
+              "#!/bin/sh\necho " + name + " \"$@\" >> " + calls.string() + "\n" + body);
+    fs::permissions(temp / "bin" / name, fs::perms::owner_all);
+  }
+  /// Only Slurm's commands of this test are on PATH.
+  Outcome farm(std::vector<std::string> words) const {
+    words.insert(words.begin(), "farm");
+    fs::create_directories(temp / "bin");
+    return orbitfuse_program(words, {.environment = {"PATH=" + (temp / "bin").string()}});
+  }
+  Outcome start(std::vector<std::string> more) const {
+    more.insert(more.begin(), {session.string(), "--out", out.string()});
+    return farm(more);
+  }
+
+  const test::TempFolder temp;
+  const fs::path session = temp / "visit", out = temp / "farm", calls = temp / "calls";
+};
+
+TEST_F(RefusedFarm, WithoutSlurmTheFolderStaysFreeForAFarmOfThisMachine) {
+  const Outcome refused = start({"--slurm"});
+  EXPECT_EQ(refused.code, 6) << refused.err;
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("sbatch"), HasSubstr("without --slurm")));
+  EXPECT_FALSE(fs::exists(out / "farm.json"));
+  EXPECT_FALSE(fs::exists(out / "farm.lock"));
+  const Outcome here = start({});
+  EXPECT_EQ(here.code, 5) << here.err;  // an empty session, named
+  EXPECT_THAT(test::get(out / "farm.csv"), HasSubstr("visit,failed,poses_visible,"));
+}
+
+TEST_F(RefusedFarm, APartitionThatSlurmRefusesIsNamedAndTheNextTryIsTaken) {
+  command("sbatch",
+          "for word; do [ \"$word\" = --partition=nowhere ] && { echo 'sbatch: error: invalid "
+          "partition specified: nowhere'; exit 1; }; done\necho 17\n");
+  const Outcome refused = start({"--slurm", "--partition", "nowhere"});
+  EXPECT_EQ(refused.code, 2) << refused.err;
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("invalid partition specified: nowhere"),
+                                 HasSubstr("sinfo lists partitions")));
+  EXPECT_FALSE(fs::exists(out / "farm.json"));
+  EXPECT_EQ(start({"--slurm", "--partition", "day"}).code, 0);
+  EXPECT_THAT(test::get(out / "farm.json"), HasSubstr("\"17\""));
+}
+
+TEST_F(RefusedFarm, ARefusalAfterTheFirstArraysTakesThemBack) {
+  // The number of calls so far, counted without a program that PATH does not hold.
+  command("sbatch", "n=0; while read -r name rest; do [ $name = sbatch ] && n=$((n + 1)); done < " +
+                        calls.string() +
+                        "\n[ $n -lt 3 ] && { echo 2$n; exit 0; }\n"
+                        "echo 'sbatch: error: QOSMaxSubmitJobPerUserLimit'\nexit 1\n");
+  command("scancel", "");
+  const Outcome refused = start({"--slurm"});
+  EXPECT_EQ(refused.code, 2) << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("QOSMaxSubmitJobPerUserLimit"));
+  EXPECT_THAT(test::get(calls), HasSubstr("scancel 21 22\n"));
+  EXPECT_FALSE(fs::exists(out / "farm.json"));
+}
+
+TEST_F(RefusedFarm, ASecondFarmLeavesTheFirstAsItIs) {
+  command("sbatch", "echo 31\n");
+  command("squeue", "echo '31 " + out.string() + "'\n");
+  ASSERT_EQ(start({"--slurm"}).code, 0);
+  const std::string plan = test::get(out / "farm.json");
+  for (const bool on_slurm : {true, false}) {
+    const Outcome second =
+        start(on_slurm ? std::vector<std::string>{"--slurm"} : std::vector<std::string>{});
+    EXPECT_EQ(second.code, 2) << second.err;
+    EXPECT_THAT(second.err, HasSubstr("a farm was started in it before"));
+  }
+  const Outcome resumed = farm({"resume", out.string()});
+  EXPECT_EQ(resumed.code, 2) << resumed.err;
+  EXPECT_THAT(resumed.err, HasSubstr("1 of its jobs still wait or run in Slurm"));
+  {
+    farm::FarmLock held;  // by this process, which is alive
+    ASSERT_TRUE(held.acquire(out));
+    for (const char* order : {"resume", "cancel"}) {
+      const Outcome beside = farm({order, out.string()});
+      EXPECT_EQ(beside.code, 2) << beside.err;
+      EXPECT_THAT(beside.err, HasSubstr(std::to_string(getpid())));
+    }
+  }
+  EXPECT_EQ(test::get(out / "farm.json"), plan);
+}
+
+TEST_F(RefusedFarm, AFullFolderNamesTheFileAndKeepsWhatIsDone) {
+  fs::remove(session);
+  write_fixture_session(session);
+  fs::create_directories(out);
+  // Full before it starts; then with room for the records, but not for the first stage's results.
+  const std::string program = ORBITFUSE_BINARY_DIR "/app/orbitfuse",
+                    farm = " farm " + session.string() + " --out " + out.string() + "/farm";
+  const std::string script = "mount -t tmpfs -o size=600k tmpfs " + out.string() + " || exit 99\n" +
+                             "dd if=/dev/zero of=" + out.string() +
+                             "/others bs=4k 2> /dev/null\n" +  //
+                             program + farm + "\n[ $? = 4 ] || exit 90\n[ ! -e " + out.string() +
+                             "/farm/farm.json ] || exit 91\nrm " + out.string() + "/others\n" +  //
+                             program + farm + "\n[ $? = 5 ] || exit 92\n" +                      //
+                             "cat " + out.string() + "/farm/.farm/visit/*.json\n";
+  const Outcome outcome = run_program({"unshare", "-rm", "sh", "-c", script});
+  if (outcome.code == 99 || outcome.code == 1)
+    GTEST_SKIP() << "this machine allows no private mounts: " << outcome.err;
+  EXPECT_EQ(outcome.code, 0) << outcome.err << outcome.out;
+  EXPECT_THAT(outcome.err,
+              AllOf(HasSubstr("No space left on device"), HasSubstr("free disk space")));
+  EXPECT_THAT(outcome.out,
+              AllOf(HasSubstr("No space left on device"), HasSubstr("\"state\":\"failed\""),
+                    ::testing::Not(HasSubstr("\"starts\":2"))))
+      << "a full folder is no cause to try again";
+}
+
+/// A file system that nobody answers for, as of a server that has gone: FUSE without a program.
+class DeadMount {
+ public:
+  explicit DeadMount(const fs::path& folder) : folder_(folder) {
+    fs::create_directories(folder);
+    // A mount of this process and its children: it ends with them.
+    if (unshare(CLONE_NEWNS) != 0 || mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0)
+      return;
+    device_ = open("/dev/fuse", O_RDWR | O_CLOEXEC);
+    if (device_ < 0) return;
+    const std::string data =
+        "fd=" + std::to_string(device_) + ",rootmode=40000,user_id=0,group_id=0";
+    is_here_ = mount("dead", folder.c_str(), "fuse", MS_NOSUID | MS_NODEV, data.c_str()) == 0;
+  }
+  DeadMount(const DeadMount&) = delete;
+  DeadMount& operator=(const DeadMount&) = delete;
+  ~DeadMount() {
+    if (device_ >= 0) close(device_);  // whoever waits for it is let go
+    if (is_here_) umount2(folder_.c_str(), MNT_DETACH);
+  }
+  bool is_here() const { return is_here_; }
+
+ private:
+  fs::path folder_;
+  int device_ = -1;
+  bool is_here_ = false;
+};
+
+TEST_F(RefusedFarm, ADeadMountIsNamedInsteadOfHangingForEver) {
+  const DeadMount dead(temp / "gone");
+  if (!dead.is_here()) GTEST_SKIP() << "this machine allows no FUSE mounts";
+  const Outcome refused = farm({session.string(), "--out", (temp / "gone/farm").string()});
+  EXPECT_EQ(refused.code, 4) << refused.err;
+  EXPECT_THAT(refused.err, AllOf(HasSubstr((temp / "gone/farm").string()),
+                                 HasSubstr("does not answer"), HasSubstr("nothing was changed")));
+}
+
+}  // namespace
+}  // namespace orbitfuse
