@@ -56,7 +56,7 @@ GrayRange ground_levels(const std::vector<DepthView>& views, const std::vector<c
     for (int y = 0; y < known[i].rows; y += 2)
       for (int x = 0; x < known[i].cols; x += 2) {
         const float z = known[i].at<float>(y, x);
-        if (std::isfinite(z) && on_ground(ground, lifted(views[i], {x + 0.5, y + 0.5}, z)))
+        if (std::isfinite(z) && on_ground(ground, world_of(views[i], {x + 0.5, y + 0.5}, z)))
           levels.push_back(smooth[i].at<std::uint8_t>(y, x));
       }
   if (levels.empty()) return {};
@@ -64,10 +64,10 @@ GrayRange ground_levels(const std::vector<DepthView>& views, const std::vector<c
   return {low - gray_margin, high + gray_margin};
 }
 
-/// What any view confirmed that is not the ground, as depths in `view`: the nearest, spread over
-/// its neighbourhood; infinite where there is nothing.
+/// What any view confirmed that is not the ground, as depths in `view`: the nearest; beyond
+/// `nothing` where there is none.
 cv::Mat obstacles(const DepthView& view, const std::vector<std::vector<Eigen::Vector3f>>& raised,
-                  cv::Size size, double share) {
+                  cv::Size size) {
   cv::Mat nearest(size, CV_32FC1, cv::Scalar(2 * nothing));
   for (const auto& points : raised)
     for (const Eigen::Vector3f& x : points) {
@@ -78,10 +78,16 @@ cv::Mat obstacles(const DepthView& view, const std::vector<std::vector<Eigen::Ve
       float& here = nearest.at<float>(static_cast<int>(at.y()), static_cast<int>(at.x()));
       here = std::min(here, c.z());
     }
-  const int reach = std::max(1, static_cast<int>(std::lround(share * size.width)));
-  cv::erode(nearest, nearest,
-            cv::getStructuringElement(cv::MORPH_RECT, {2 * reach + 1, 2 * reach + 1}));
   return nearest;
+}
+
+/// The nearest of the neighbourhood, so many widths of the map to each side.
+cv::Mat spread(const cv::Mat& nearest, double share) {
+  const int reach = std::max(1, static_cast<int>(std::lround(share * nearest.cols)));
+  cv::Mat out;
+  cv::erode(nearest, out,
+            cv::getStructuringElement(cv::MORPH_RECT, {2 * reach + 1, 2 * reach + 1}));
+  return out;
 }
 
 /// The map without specks: neighbours of like depth of which there are few, as chance matches along
@@ -118,7 +124,7 @@ std::vector<Eigen::Vector3f> raised_points(const DepthView& view, const GroundPl
     for (int x = 0; x < depth.cols; x += 2) {
       const float z = depth.at<float>(y, x);
       if (!std::isfinite(z)) continue;
-      const Eigen::Vector3f point = lifted(view, {x + 0.5, y + 0.5}, z);
+      const Eigen::Vector3f point = world_of(view, {x + 0.5, y + 0.5}, z);
       if (!on_ground(ground, point)) out.push_back(point);
     }
   return out;
@@ -224,8 +230,8 @@ class Extension {
   bool open_ground(cv::Point pixel) {
     return follow(open_, pixel, 1, false, [&](cv::Point at, cv::Point step) {
       if (const float z = known_.at<float>(at); std::isfinite(z))
-        return on_ground(ground_, lifted(view_, {at.x + 0.5, at.y + 0.5}, z)) ? Way::open
-                                                                              : Way::blocked;
+        return on_ground(ground_, world_of(view_, {at.x + 0.5, at.y + 0.5}, z)) ? Way::open
+                                                                                : Way::blocked;
       const bool like_ground =
           levels_.holds(smooth_.at<std::uint8_t>(at)) && change_along(at, step) <= ground_change;
       return like_ground ? Way::goes_on : Way::blocked;
@@ -277,9 +283,10 @@ OpenSpace extend_over_ground(const std::vector<DepthView>& views, const GroundPl
   parallel_for(count, [&](int i) {
     const auto k = static_cast<std::size_t>(i);
     const DepthView& view = views[k];
-    const cv::Mat hidden = obstacles(view, raised, known[k].size(), reach_share);
-    const cv::Mat near = obstacles(view, raised, known[k].size(), sky_reach_share);
-    Extension extension(view, ground, levels, smooth[k], hidden, near, known[k]);
+    const cv::Mat raised_here = obstacles(view, raised, known[k].size());
+    const cv::Mat wide = spread(raised_here, reach_share);
+    const cv::Mat narrow = spread(raised_here, sky_reach_share);
+    Extension extension(view, ground, levels, smooth[k], wide, narrow, known[k]);
     filled[k] = fill(extension, known[k], view.world_rotation * ground.normal, far, maps[k]);
   });
   OpenSpace all;

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/numeric/median.hpp"
 #include "core/numeric/random.hpp"
 
 namespace orbitfuse::depth {
@@ -32,7 +31,7 @@ std::vector<Eigen::Vector3f> confirmed_points(const std::vector<DepthView>& view
     for (int y = 0; y < maps[i].depth.rows; y += sample_step_px)
       for (int x = 0; x < maps[i].depth.cols; x += sample_step_px)
         if (const float z = maps[i].depth.at<float>(y, x); std::isfinite(z))
-          points.push_back(lifted(views[i], {x + 0.5, y + 0.5}, z));
+          points.push_back(world_of(views[i], {x + 0.5, y + 0.5}, z));
   return points;
 }
 
@@ -83,23 +82,11 @@ GroundPlane fitted(const GroundPlane& near, const std::vector<Eigen::Vector3f>& 
   return plane;
 }
 
-float reach_of(const GroundPlane& plane, const std::vector<Eigen::Vector3f>& points) {
-  std::vector<float> distances;
-  for (const Eigen::Vector3f& x : points)
-    if (std::abs(plane.height(x)) < thickness) distances.push_back(x.norm());
-  return quantile(distances, 0.95);
-}
-
 tl::unexpected<Error> no_ground(std::string found) {
   return fail(ErrorKind::quality, "ground", std::move(found), "depth is not extended");
 }
 
 }  // namespace
-
-Eigen::Vector3f lifted(const DepthView& view, const Eigen::Vector2d& pixel, float depth) {
-  const Eigen::Vector3f x = depth * view.camera.ray_of(pixel).cast<float>();
-  return view.world_rotation.transpose() * (x - view.translation);
-}
 
 Result<GroundPlane> find_ground(const std::vector<DepthView>& views,
                                 const std::vector<DepthMap>& maps, std::uint64_t seed) {
@@ -119,7 +106,7 @@ Result<GroundPlane> find_ground(const std::vector<DepthView>& views,
     normal.normalize();
     if (normal.dot(up) < 0) normal = -normal;
     if (!(normal.dot(up) > max_tilt_cos)) continue;
-    const GroundPlane plane{normal, -normal.dot(a), 0};
+    const GroundPlane plane{normal, -normal.dot(a)};
     if (!under_the_cameras(plane, views)) continue;
     const Votes found = votes(plane, points);
     if (found.on > most.on) best = plane, most = found;
@@ -133,7 +120,6 @@ Result<GroundPlane> find_ground(const std::vector<DepthView>& views,
     return no_ground(fmt::format("{:.1f} % of the depths on the largest plane, {:.1f} % below it",
                                  100 * static_cast<double>(most.on) / all,
                                  100 * static_cast<double>(most.below) / all));
-  best.reach = reach_of(best, points);
   return best;
 }
 

@@ -16,13 +16,9 @@ namespace orbitfuse::depth {
 struct GroundPlane {
   Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  ///< away from the ground, towards the cameras
   float offset = 0;
-  float reach = 0;  ///< 95 % of the confirmed ground lies nearer to the centre than this
 
   float height(const Eigen::Vector3f& x) const { return normal.dot(x) + offset; }
 };
-
-/// World position of a confirmed depth.
-Eigen::Vector3f lifted(const DepthView& view, const Eigen::Vector2d& pixel, float depth);
 
 /// The plane under all cameras that most confirmed depths lie on, nothing below it (RANSAC, then
 /// least squares). `maps`: one a view, in the views' unit. Errors: quality (there is none; why).

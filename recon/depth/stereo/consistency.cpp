@@ -9,11 +9,6 @@
 namespace orbitfuse::depth {
 namespace {
 
-Eigen::Vector3f world_of(const DepthView& view, const Eigen::Vector2d& pixel, float depth) {
-  const Eigen::Vector3f x = depth * view.camera.ray_of(pixel).cast<float>();
-  return view.world_rotation.transpose() * (x - view.translation);
-}
-
 struct Seen {
   bool agrees = false;
   bool hides = false;  ///< the point lies clearly in front of what the other view matched well

@@ -44,6 +44,11 @@ DepthView prepare_view(const cv::Mat& image, const Camera& camera, const Rigid3d
   return view;
 }
 
+Eigen::Vector3f world_of(const DepthView& view, const Eigen::Vector2d& pixel, float depth) {
+  const Eigen::Vector3f x = depth * view.camera.ray_of(pixel).cast<float>();
+  return view.world_rotation.transpose() * (x - view.translation);
+}
+
 DepthView halved(const DepthView& view) {
   DepthView out = view;
   const int width = std::max(1, view.gray.cols / 2), height = std::max(1, view.gray.rows / 2);

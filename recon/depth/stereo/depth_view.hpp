@@ -20,6 +20,9 @@ struct DepthView {
   Eigen::Vector3f axis() const { return world_rotation.row(2).transpose(); }
 };
 
+/// Where a pixel of this depth (along the optical axis) lies in the world.
+Eigen::Vector3f world_of(const DepthView& view, const Eigen::Vector2d& pixel, float depth);
+
 inline constexpr int rows_padding = 2;
 
 /// Undistorts and shrinks (area average). `image`: 8-bit gray or BGR of the camera's size.

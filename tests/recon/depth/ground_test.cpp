@@ -189,7 +189,7 @@ TEST(GroundPlane, IsNotARoofWithTheYardBelowIt) {
 TEST(ExtendedGround, ReachesTheHorizonAndLeavesTheSkyOpen) {
   for (const float roll : {0.f, 0.3f, std::numbers::pi_v<float> / 2}) {
     const Yard scene = yard(false, roll);
-    GroundPlane ground{Eigen::Vector3f::UnitZ(), -floor_height, texture_ends};
+    GroundPlane ground{Eigen::Vector3f::UnitZ(), -floor_height};
     std::vector<DepthMap> maps;
     for (const DepthMap& map : scene.maps) {
       maps.push_back(map);
@@ -216,7 +216,7 @@ TEST(ExtendedGround, StopsAtWallsThatNothingConfirms) {
     maps.push_back(map);
     maps.back().depth = map.depth.clone();
   }
-  GroundPlane ground{Eigen::Vector3f::UnitZ(), -floor_height, texture_ends};
+  GroundPlane ground{Eigen::Vector3f::UnitZ(), -floor_height};
   extend_over_ground(scene.views, ground, 12, maps);
   const Count n = count(scene, maps, 12);
   ASSERT_GT(n.others, 1000);
@@ -226,7 +226,7 @@ TEST(ExtendedGround, StopsAtWallsThatNothingConfirms) {
 
 TEST(ExtendedGround, IsTheSameForAnyNumberOfThreads) {
   const Yard scene = yard(true);
-  GroundPlane ground{Eigen::Vector3f::UnitZ(), -floor_height, texture_ends};
+  GroundPlane ground{Eigen::Vector3f::UnitZ(), -floor_height};
   std::vector<cv::Mat> first;
   for (const int threads : {1, 3}) {
     set_thread_count(threads);
@@ -249,7 +249,7 @@ TEST(ExtendedGround, IsTheSameForAnyNumberOfThreads) {
 TEST(ExtendedGround, LeavesMapsWithoutAnyConfirmedGroundAlone) {
   Yard scene = yard();
   for (DepthMap& map : scene.maps) map.depth.setTo(none);
-  GroundPlane ground{Eigen::Vector3f::UnitZ(), -floor_height, texture_ends};
+  GroundPlane ground{Eigen::Vector3f::UnitZ(), -floor_height};
   extend_over_ground(scene.views, ground, 12, scene.maps);
   for (const DepthMap& map : scene.maps)
     for (const float z : cv::Mat_<float>(map.depth)) EXPECT_FALSE(std::isfinite(z));
