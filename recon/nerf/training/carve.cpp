@@ -14,11 +14,12 @@ struct Votes {
   int seen = 0;   ///< views whose image holds the cell
   int free = 0;   ///< ... in front of a known surface there
   int solid = 0;  ///< ... at a known surface
-  int sky = 0;    ///< ... with nothing but the sky there
+  int sky = 0;    ///< ... with nothing but the sky there, of cells beyond the cameras
 };
 
 Votes vote(const std::vector<const NormalisedView*>& voters, const float x[3],
            float half_diagonal) {
+  const bool beyond_the_cameras = x[0] * x[0] + x[1] * x[1] + x[2] * x[2] > 1;
   Votes votes;
   for (const NormalisedView* voter : voters) {
     const NormalisedView& view = *voter;
@@ -28,7 +29,8 @@ Votes vote(const std::vector<const NormalisedView*>& voters, const float x[3],
     const float known = view.distance.at<float>(static_cast<int>(py), static_cast<int>(px));
     if (std::isnan(known)) continue;
     if (std::isinf(known)) {
-      ++votes.free, ++votes.sky;
+      // A white roof before a white sky shows no edge; fog stands farther out than the object.
+      if (beyond_the_cameras) ++votes.free, ++votes.sky;
       continue;
     }
     float distance = 0;
