@@ -104,7 +104,8 @@ struct PoseBundle::Step {
   double predicted = 0;  ///< gain of the linear problem; not positive: no step was found
 };
 
-PoseBundle::PoseBundle(const Camera& camera, std::size_t views) : camera_(camera), matches_(views) {
+PoseBundle::PoseBundle(const Camera& camera, std::size_t views)
+    : camera_(camera), held_(views, false), matches_(views) {
   state_.corrections.resize(views, PoseCorrection{});
 }
 
@@ -203,6 +204,11 @@ struct PoseBundle::Reduced {
 
   static Eigen::Index of_view(std::size_t v) { return static_cast<Eigen::Index>(6 * v); }
   Eigen::Index of_lens() const { return g.size() - 2; }
+  /// So many parameters don't move.
+  void hold(Eigen::Index first, Eigen::Index count) {
+    h.middleRows(first, count).setZero(), h.middleCols(first, count).setZero();
+    h.diagonal().segment(first, count).setOnes(), g.segment(first, count).setZero();
+  }
 };
 
 PoseBundle::Reduced PoseBundle::views_alone(const Linear& linear, double radius) const {
@@ -284,12 +290,10 @@ PoseBundle::Step PoseBundle::step(const Linear& linear, double radius) const {
   Reduced reduced = views_alone(linear, radius);
   const Eigen::VectorXd gradient = reduced.g;
   eliminate_places(linear, radius, reduced);
-  for (std::size_t k = 0; k < 2; ++k) {
-    if (linear.lens_free[k]) continue;
-    const Eigen::Index i = reduced.of_lens() + static_cast<Eigen::Index>(k);
-    reduced.h.row(i).setZero(), reduced.h.col(i).setZero();
-    reduced.h(i, i) = 1, reduced.g(i) = 0;
-  }
+  for (std::size_t v = 0; v < held_.size(); ++v)
+    if (held_[v]) reduced.hold(Reduced::of_view(v), 6);
+  for (std::size_t k = 0; k < 2; ++k)
+    if (!linear.lens_free[k]) reduced.hold(reduced.of_lens() + static_cast<Eigen::Index>(k), 1);
   Step found;
   const Eigen::LLT<Eigen::MatrixXd> factors(reduced.h);  // reads the lower triangle
   if (factors.info() != Eigen::Success) return found;

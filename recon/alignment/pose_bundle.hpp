@@ -48,6 +48,8 @@ class PoseBundle {
   /// A patch of the known scene found in a view; its residual's part of the cost is scaled.
   void add(std::size_t view, const PatchMatch& match, double weight);
   void add(SharedPlace place);
+  /// The view stays where it is; what it shows still holds the others.
+  void hold(std::size_t view) { held_[view] = true; }
 
   /// From where the corrections and the lens are. False where no usable answer is found (a place
   /// behind its camera at the start, nothing finite). Views that nothing holds stay. The same bits
@@ -87,6 +89,7 @@ class PoseBundle {
   State moved(const State& from, const Step& step) const;
 
   Camera camera_;
+  std::vector<bool> held_;                           ///< views
   std::vector<std::vector<WeightedMatch>> matches_;  ///< of each view
   std::vector<SharedPlace> places_;
   State state_;

@@ -189,26 +189,6 @@ Result<std::vector<PosedView>> best_beside(const OrbitRefinement& painted,
   return best;
 }
 
-/// Where temperatures place each view best: from where it is, or searched as a whole.
-Result<Fit> best_by_temperatures(const OrbitRefinement& painted,
-                                 const std::vector<std::size_t>& lost, const Fit& alignment) {
-  std::vector<PosedView> places;
-  for (const std::size_t i : lost) places.push_back(alignment.views[i].view);
-  ORBITFUSE_ASSIGN(const std::vector<PosedView> starts, painted.search(lost, alignment));
-  ORBITFUSE_ASSIGN(Fit best, painted.restart(lost, places, judging_rounds()));
-  ORBITFUSE_ASSIGN(const Fit searched, painted.restart(lost, starts, judging_rounds()));
-  const auto keep_better = [&](const Fit& tried) {
-    for (std::size_t c = 0; c < lost.size(); ++c)
-      if (tried.views[c].support() > clearly_better * best.views[c].support())
-        best.views[c] = tried.views[c];
-  };
-  keep_better(searched);
-  ORBITFUSE_ASSIGN(const std::vector<PosedView> beside, best_beside(painted, lost, alignment));
-  ORBITFUSE_ASSIGN(const Fit tried, painted.restart(lost, beside, judging_rounds()));
-  keep_better(tried);
-  return best;
-}
-
 /// A view that neither scene places goes to the one of the two places where its image is most like
 /// what the others paint.
 Status leave_unplaced(const OrbitRefinement& refinement, const SceneRenderer& painted,
@@ -278,6 +258,25 @@ ViewVerdict verdict_of_unplaced(bool agree, double apart_deg, double likeness) {
 
 double share_of_median(double support, double median) {
   return median > least_support ? support / median : 0;
+}
+
+Result<Fit> best_by_temperatures(const OrbitRefinement& painted,
+                                 const std::vector<std::size_t>& lost, const Fit& alignment) {
+  std::vector<PosedView> places;
+  for (const std::size_t i : lost) places.push_back(alignment.views[i].view);
+  ORBITFUSE_ASSIGN(const std::vector<PosedView> starts, painted.search(lost, alignment));
+  ORBITFUSE_ASSIGN(Fit best, painted.restart(lost, places, judging_rounds()));
+  ORBITFUSE_ASSIGN(const Fit searched, painted.restart(lost, starts, judging_rounds()));
+  const auto keep_better = [&](const Fit& tried) {
+    for (std::size_t c = 0; c < lost.size(); ++c)
+      if (tried.views[c].support() > clearly_better * best.views[c].support())
+        best.views[c] = tried.views[c];
+  };
+  keep_better(searched);
+  ORBITFUSE_ASSIGN(const std::vector<PosedView> beside, best_beside(painted, lost, alignment));
+  ORBITFUSE_ASSIGN(const Fit tried, painted.restart(lost, beside, judging_rounds()));
+  keep_better(tried);
+  return best;
 }
 
 Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refinement,

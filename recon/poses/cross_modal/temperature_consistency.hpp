@@ -40,6 +40,11 @@ double share_of_median(double support, double median);
 Result<SceneRenderer> painted_by_others(const OrbitRefinement& refinement, const Fit& alignment,
                                         const std::vector<std::size_t>& chosen);
 
+/// Where the painted scene places each of the views best: from where it is, from where its loop
+/// predicts it, or searched as a whole.
+Result<Fit> best_by_temperatures(const OrbitRefinement& painted,
+                                 const std::vector<std::size_t>& lost, const Fit& alignment);
+
 struct TemperatureCheck {
   int moved = 0;
   int undecided = 0;  ///< contradicted, where that were most of the views

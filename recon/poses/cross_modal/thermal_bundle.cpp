@@ -28,9 +28,17 @@ constexpr double confirmed_px = 1;
 /// straight.
 constexpr double straight_share = 0.5;
 
+/// Who takes part in a bundle: views that are adjusted, and those in which their patches are looked
+/// for.
+struct BundleRoles {
+  std::vector<std::size_t> adjusted, lenders;
+  bool hold_others = false;  ///< else edges of the visible scene hold them
+};
+
 /// What one solve is made of, at the options' width.
 struct BundleRound {
   ThermalViews views;
+  std::vector<bool> held;  ///< views that stay where they are
   std::vector<ThermalTrack> tracks;
   std::vector<std::vector<PatchMatch>> edges;  ///< of each view, in the visible scene
 };
@@ -47,6 +55,8 @@ struct BundleSolution {
 PoseBundle bundle_of(const BundleRound& round, const ThermalBundleOptions& options) {
   const ThermalViews& views = round.views;
   PoseBundle bundle(views.camera, views.images.size());
+  for (std::size_t v = 0; v < round.held.size(); ++v)
+    if (round.held[v]) bundle.hold(v);
   for (const ThermalTrack& track : round.tracks) {
     SharedPlace place{track.sight, options.surface_sigma * track.distance, {}};
     for (const ThermalSighting& seen : track.sightings) {
@@ -107,9 +117,12 @@ std::optional<BundleSolution> solved(const BundleRound& round, const CommonLensP
 }
 
 Result<BundleRound> prepared(const OrbitRefinement& refinement, const Fit& alignment,
-                             const std::vector<std::size_t>& chosen,
-                             const ThermalBundleOptions& options, int reach_px) {
+                             const BundleRoles& roles, const ThermalBundleOptions& options,
+                             int reach_px) {
   BundleRound round;
+  round.held.assign(alignment.views.size(), roles.hold_others);
+  if (roles.hold_others)
+    for (const std::size_t i : roles.adjusted) round.held[i] = false;
   ThermalViews& views = round.views;
   views.camera =
       narrowed_to(alignment.views.front().view.camera, options.width_px).without_distortion();
@@ -126,11 +139,12 @@ Result<BundleRound> prepared(const OrbitRefinement& refinement, const Fit& align
   }
   ThermalTrackOptions tracks = options.tracks;
   tracks.reach_px = reach_px;
-  round.tracks = thermal_tracks(views, chosen, tracks);
+  round.tracks = thermal_tracks(views, roles.adjusted, roles.lenders, tracks);
   round.edges.resize(renders.size());
   const RenderRound fine = fine_rounds().back();
   parallel_for(static_cast<int>(renders.size()), [&](int index) {
     const auto i = static_cast<std::size_t>(index);
+    if (round.held[i]) return;
     round.edges[i] = match_patches(
         renders[i], rendered_edges(renders[i]), views.camera,
         orientation_field(views.images[i], 1.0),
@@ -139,13 +153,14 @@ Result<BundleRound> prepared(const OrbitRefinement& refinement, const Fit& align
   return round;
 }
 
-/// Views with enough sightings to hold them.
-std::size_t held_views(const BundleRound& round) {
+/// Whether most of the adjusted views have enough sightings to be placed by them.
+bool placed_by_sightings(const BundleRound& round, const std::vector<std::size_t>& adjusted) {
   std::vector<int> sightings(round.views.images.size(), 0);
   for (const ThermalTrack& track : round.tracks)
     for (const ThermalSighting& seen : track.sightings) ++sightings[seen.view];
-  return static_cast<std::size_t>(
-      std::count_if(sightings.begin(), sightings.end(), [](int n) { return n >= least_patches; }));
+  const auto placed = std::count_if(adjusted.begin(), adjusted.end(),
+                                    [&](std::size_t i) { return sightings[i] >= least_patches; });
+  return 2 * static_cast<std::size_t>(placed) >= adjusted.size();
 }
 
 void take(const BundleSolution& solution, const std::vector<std::size_t>& chosen, Fit& alignment) {
@@ -175,15 +190,14 @@ double most_turned_deg(const OrbitViews& orbit, const std::vector<std::size_t>& 
 /// One round from where the views are: by how much it has turned them at most; nothing where
 /// nothing could be solved.
 Result<std::optional<double>> solve_round(const OrbitRefinement& refinement,
-                                          const FocalGuess& prior,
-                                          const std::vector<std::size_t>& chosen,
+                                          const FocalGuess& prior, const BundleRoles& roles,
                                           const BundleStep& step,
                                           const ThermalBundleOptions& options, Fit& bundled) {
   ORBITFUSE_ASSIGN(const BundleRound round,
-                   prepared(refinement, bundled, chosen, options, step.reach_px));
+                   prepared(refinement, bundled, roles, options, step.reach_px));
   const double focal_px = bundled.views.front().view.camera.fx;
   std::optional<BundleSolution> solution;
-  if (2 * held_views(round) >= chosen.size())
+  if (roles.hold_others || placed_by_sightings(round, roles.adjusted))
     solution = solved(round,
                       {{std::log(prior.focal_px / focal_px), prior.relative_sigma},
                        {-bundled.radial, prior.radial_sigma}},
@@ -198,8 +212,8 @@ Result<std::optional<double>> solve_round(const OrbitRefinement& refinement,
     return std::nullopt;
   }
   const Fit before = bundled;
-  take(*solution, chosen, bundled);
-  const double turned_deg = most_turned_deg(refinement.orbit, chosen, before, bundled);
+  take(*solution, roles.adjusted, bundled);
+  const double turned_deg = most_turned_deg(refinement.orbit, roles.adjusted, before, bundled);
   tell(fmt::format(
       ", {:.2f} px; focal length {:+.2f} %, k1 {:+.3f}, {:.2f} px far out, views turned by up to "
       "{:.2f} deg",
@@ -221,12 +235,12 @@ bool reaches_corners(const Fit& bundled) {
 
 /// Rounds of one kind; false where one could not be solved.
 Result<bool> solve_rounds(const OrbitRefinement& refinement, const FocalGuess& prior,
-                          const std::vector<std::size_t>& chosen, const BundleStep& step,
+                          const BundleRoles& roles, const BundleStep& step,
                           const ThermalBundleOptions& options, Fit& bundled) {
   double turned_deg = step.settled_deg;
   for (int i = 0; i < step.max_rounds && turned_deg >= step.settled_deg; ++i) {
     ORBITFUSE_ASSIGN(const std::optional<double> turned,
-                     solve_round(refinement, prior, chosen, step, options, bundled));
+                     solve_round(refinement, prior, roles, step, options, bundled));
     if (!turned) return false;
     turned_deg = *turned;
   }
@@ -245,7 +259,7 @@ Status bundle_thermal(const OrbitRefinement& refinement, const FocalGuess& prior
   Fit bundled = alignment;
   FocalGuess lens = prior;
   const auto solve = [&](const BundleStep& step) {
-    return solve_rounds(refinement, lens, chosen, step, options, bundled);
+    return solve_rounds(refinement, lens, {chosen, chosen, false}, step, options, bundled);
   };
   const auto bends_less = [&](double least_px) {
     return lens.radial_sigma > 0 && bundled.radial_px < least_px;
@@ -262,6 +276,32 @@ Status bundle_thermal(const OrbitRefinement& refinement, const FocalGuess& prior
     if (!again) return {};
   }
   alignment = std::move(bundled);
+  return {};
+}
+
+Status bundle_added(const OrbitRefinement& refinement, const std::vector<std::size_t>& added,
+                    const std::vector<std::size_t>& settled, const ThermalBundleOptions& options,
+                    Fit& alignment) {
+  const TraceSpan span("bundle added views");
+  if (added.empty()) return {};
+  Fit bundled = alignment;
+  // Images are as the settled lens took them already.
+  bundled.radial = bundled.radial_px = 0;
+  const FocalGuess lens{alignment.views.front().view.camera.fx, 0, 0};
+  for (const BundleStep& step : {options.wide, options.fine}) {
+    // Nothing but settled views joins them: each moves by itself, and stops by itself.
+    BundleRoles roles{added, settled, true};
+    for (int i = 0; i < step.max_rounds && !roles.adjusted.empty(); ++i) {
+      const Fit before = bundled;
+      ORBITFUSE_ASSIGN(const std::optional<double> turned,
+                       solve_round(refinement, lens, roles, step, options, bundled));
+      if (!turned) break;
+      std::erase_if(roles.adjusted, [&](std::size_t v) {
+        return most_turned_deg(refinement.orbit, {v}, before, bundled) < step.settled_deg;
+      });
+    }
+  }
+  for (const std::size_t v : added) alignment.views[v] = bundled.views[v];
   return {};
 }
 

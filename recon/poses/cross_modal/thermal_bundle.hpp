@@ -46,4 +46,10 @@ struct ThermalBundleOptions {
 Status bundle_thermal(const OrbitRefinement& refinement, const FocalGuess& prior,
                       const ThermalBundleOptions& options, Fit& alignment);
 
+/// The added views alone, each by its patches found again in the settled ones, which stay where
+/// they are; so does the lens. Each says how many of its patches the settled ones confirm.
+Status bundle_added(const OrbitRefinement& refinement, const std::vector<std::size_t>& added,
+                    const std::vector<std::size_t>& settled, const ThermalBundleOptions& options,
+                    Fit& alignment);
+
 }  // namespace orbitfuse

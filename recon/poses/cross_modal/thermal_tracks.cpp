@@ -155,10 +155,10 @@ std::optional<ThermalSighting> sighting(const ThermalViews& views, std::size_t v
 }
 
 std::vector<std::size_t> neighbours_of(const ThermalViews& views, std::size_t view,
-                                       const std::vector<std::size_t>& chosen,
+                                       const std::vector<std::size_t>& others,
                                        const ThermalTrackOptions& options) {
   std::vector<std::pair<double, std::size_t>> near;
-  for (const std::size_t other : chosen) {
+  for (const std::size_t other : others) {
     const double turn = rotation_angle_deg(views.cam_from_world[view].rotation,
                                            views.cam_from_world[other].rotation);
     if (other != view && turn >= options.min_turn_deg && turn <= options.max_turn_deg)
@@ -237,12 +237,13 @@ std::vector<ThermalTrack> tracks_of(const ThermalViews& views, std::size_t view,
 
 std::vector<ThermalTrack> thermal_tracks(const ThermalViews& views,
                                          const std::vector<std::size_t>& chosen,
+                                         const std::vector<std::size_t>& others,
                                          const ThermalTrackOptions& options) {
   std::vector<std::vector<ThermalTrack>> of_view(chosen.size());
   parallel_for(static_cast<int>(chosen.size()), [&](int index) {
     const auto c = static_cast<std::size_t>(index);
     of_view[c] =
-        tracks_of(views, chosen[c], neighbours_of(views, chosen[c], chosen, options), options);
+        tracks_of(views, chosen[c], neighbours_of(views, chosen[c], others, options), options);
   });
   std::vector<ThermalTrack> all;
   for (std::vector<ThermalTrack>& tracks : of_view)

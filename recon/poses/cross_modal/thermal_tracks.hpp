@@ -48,10 +48,11 @@ struct ThermalTrack {
   std::vector<ThermalSighting> sightings;
 };
 
-/// Tracks of two views or more among the chosen ones; none where images are flat or see nothing of
-/// each other.
+/// Tracks from each of the chosen views to those of `others` that see the same; none where images
+/// are flat or see nothing of each other.
 std::vector<ThermalTrack> thermal_tracks(const ThermalViews& views,
                                          const std::vector<std::size_t>& chosen,
+                                         const std::vector<std::size_t>& others,
                                          const ThermalTrackOptions& options);
 
 }  // namespace orbitfuse

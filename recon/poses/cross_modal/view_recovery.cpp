@@ -10,6 +10,7 @@
 #include "core/numeric/median.hpp"
 #include "core/system/trace.hpp"
 #include "recon/alignment/whole_view.hpp"
+#include "recon/poses/cross_modal/added_views.hpp"
 #include "recon/poses/cross_modal/temperature_consistency.hpp"
 #include "recon/poses/cross_modal/thermal_bundle.hpp"
 
@@ -148,16 +149,17 @@ void straighten(OrbitViews& orbit, const Fit& alignment) {
 
 /// The support that form has where the bundle has put the views. One that it has moved elsewhere,
 /// to where form knows much less of it, is not sure.
-Status judge_bundled(const OrbitRefinement& refinement, const Fit& before, Fit& alignment) {
+Status judge_bundled(const OrbitRefinement& refinement, const std::vector<std::size_t>& bundled,
+                     const Fit& before, Fit& alignment) {
   const TraceSpan span("judge bundle");
-  std::vector<std::size_t> all(alignment.views.size());
-  std::iota(all.begin(), all.end(), std::size_t{0});
+  std::vector<PosedView> places;
+  for (const std::size_t i : bundled) places.push_back(alignment.views[i].view);
   // The round that `before` was measured by: support grows with resolution.
-  ORBITFUSE_ASSIGN(const Fit there,
-                   refinement.restart(all, alignment.poses(), {fine_rounds().back()}));
-  for (const std::size_t i : all) {
+  ORBITFUSE_ASSIGN(const Fit there, refinement.restart(bundled, places, {fine_rounds().back()}));
+  for (std::size_t c = 0; c < bundled.size(); ++c) {
+    const std::size_t i = bundled[c];
     RenderAlignedView& view = alignment.views[i];
-    const RenderAlignedView &form_alone = before.views[i], &here = there.views[i];
+    const RenderAlignedView &form_alone = before.views[i], &here = there.views[c];
     const bool moved =
         !same_place(refinement.orbit, form_alone.view.cam_from_world, view.view.cam_from_world);
     // Within one place, edges beside the temperatures' say no less for it.
@@ -206,7 +208,9 @@ Status refine_orbit(const SceneRenderer& renderer, OrbitViews& orbit, RenderAlig
   const Fit before = alignment;
   ORBITFUSE_TRY(bundle_thermal(refinement, prior, {}, alignment));
   straighten(orbit, alignment);
-  return judge_bundled(refinement, before, alignment);
+  std::vector<std::size_t> all(alignment.views.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  return judge_bundled(refinement, all, before, alignment);
 }
 
 double station_offset_deg(const OrbitViews& orbit, const RenderAlignment& alignment) {
@@ -237,7 +241,10 @@ Status add_views(const SceneRenderer& renderer, const OrbitViews& orbit, std::si
        fmt::format("{} of {} added views searched as a whole", lost.size(), added.size())});
   ORBITFUSE_TRY(search_whole(refinement, lost, fine_rounds(), alignment));
   ORBITFUSE_TRY(nudge(refinement, first_new, alignment));
-  return confirm_by_temperatures(refinement, first_new, alignment);
+  ORBITFUSE_TRY(confirm_by_temperatures(refinement, first_new, alignment));
+  const Fit before = alignment;
+  ORBITFUSE_TRY(settle_by_patches(refinement, first_new, alignment));
+  return judge_bundled(refinement, added, before, alignment);
 }
 
 }  // namespace orbitfuse

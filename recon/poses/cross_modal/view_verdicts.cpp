@@ -67,6 +67,18 @@ double support_of_others(const OrbitViews& orbit, std::size_t stations,
   return other_loop && others.size() >= least_others ? median(others) : 0;
 }
 
+/// confirmed_share of the views from `first` to `end`, by their own median.
+void confirm_among(const Fit& alignment, std::size_t first, std::size_t end,
+                   std::vector<ViewEvidence>& evidence) {
+  std::vector<double> confirmed;
+  for (std::size_t i = first; i < end; ++i)
+    if (const auto patches = alignment.views[i].confirmed_patches) confirmed.push_back(*patches);
+  const double typical = confirmed.empty() ? 0 : median(confirmed);
+  if (typical < least_median_patches) return;
+  for (std::size_t i = first; i < end; ++i)
+    evidence[i].confirmed_share = alignment.views[i].confirmed_patches.value_or(0) / typical;
+}
+
 double median_support(const Fit& alignment) {
   std::vector<double> supports;
   for (const RenderAlignedView& view : alignment.views) supports.push_back(view.support());
@@ -106,14 +118,10 @@ Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
     seen.aim_off = aim_off(orbit, view);
     evidence.push_back(seen);
   }
-  std::vector<double> off_deg, correlations, confirmed;
-  for (const RenderAlignedView& view : alignment.views)
-    if (view.confirmed_patches) confirmed.push_back(*view.confirmed_patches);
-  const double median_patches = confirmed.empty() ? 0 : median(confirmed);
-  for (std::size_t i = 0; i < evidence.size(); ++i)
-    if (median_patches >= least_median_patches)
-      evidence[i].confirmed_share =
-          alignment.views[i].confirmed_patches.value_or(0) / median_patches;
+  // Stations are asked of each other, frames between them of the stations: two medians.
+  confirm_among(alignment, 0, stations, evidence);
+  confirm_among(alignment, stations, evidence.size(), evidence);
+  std::vector<double> off_deg, correlations;
   for (std::size_t i = 0; i < evidence.size(); ++i)
     evidence[i].loop_support_share = support_of_others(orbit, stations, evidence, i);
   for (const ViewEvidence& seen : evidence) {
@@ -179,8 +187,9 @@ ViewVerdict judged(const ViewEvidence& seen, const ViewVerdict& before) {
 }
 
 ViewVerdict judged_between(const ViewEvidence& seen, const ViewVerdict& before) {
-  ViewVerdict verdict = judged(seen, before);
-  if (!verdict.sure() || seen.support_share >= min_between_share) return verdict;
+  const bool confirmed = seen.confirmed_share >= confirming_share;
+  ViewVerdict verdict = judged(seen, confirmed ? ViewVerdict{} : before);
+  if (!verdict.sure() || confirmed || seen.support_share >= min_between_share) return verdict;
   return {Confidence::doubtful, DoubtReason::weak_support,
           fmt::format("its edges have {:.2f} of the median support of all loops, and no station of "
                       "its own says where it is",

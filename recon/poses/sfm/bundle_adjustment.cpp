@@ -235,7 +235,9 @@ class Problem {
     const double offset = options_.principal_point_sigma * camera.width;
     prior.mean = {
         focal, focal * camera.fy / camera.fx, camera.width / 2.0, camera.height / 2.0, 0, 0, 0, 0};
-    prior.sigma = {focal * std::max(sigma, 1e-9), 1, offset, offset, 0.1, 0.1, 0.005, 0.005};
+    const double tangential = options_.tangential_sigma;
+    prior.sigma = {
+        focal * std::max(sigma, 1e-9), 1, offset, offset, 0.1, 0.1, tangential, tangential};
     double* values = parameters_.lens[g].data();
     std::vector<int> held;
     if (lens.focal_px > 0 && sigma == 0) held.insert(held.end(), {0, 1});

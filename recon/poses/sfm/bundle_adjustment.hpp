@@ -30,6 +30,10 @@ struct BundleOptions {
   /// Prior of the principal point about the image centre, share of the width: lenses are off by up
   /// to about a hundredth. Looser, a poorly held scene trades it for a common turn of all cameras.
   double principal_point_sigma = 0.01;
+  /// Prior of the tangential distortion (p1, p2) about none: a lens of today has some 0.0005. What
+  /// it does to an image is what a shifted principal point and a turned camera do, so that a looser
+  /// prior turns all cameras together.
+  double tangential_sigma = 0.0005;
   int max_iterations = 60;
 };
 

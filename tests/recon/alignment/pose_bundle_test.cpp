@@ -94,6 +94,23 @@ TEST(PoseBundle, SharedPlacesLeaveTheSurface) {
   EXPECT_NEAR(bundle.log_focal(), scene.log_focal, 3e-3);  // the surface holds a little
 }
 
+TEST(PoseBundle, HeldViewsStayAndHoldTheOthers) {
+  Scene scene(4);
+  PoseBundle bundle(camera(), 4);
+  scene.log_focal = scene.radial = 0;
+  for (const std::size_t v : {0u, 1u, 2u}) {
+    scene.errors[v] = {};
+    bundle.hold(v);
+  }
+  for (int i = 0; i < 80; ++i) bundle.add(scene.shared(0));
+  for (const double loss_px : {8.0, 1.0}) ASSERT_TRUE(bundle.solve({}, {1, loss_px}, 50));
+  for (const std::size_t v : {0u, 1u, 2u})
+    for (const double value : bundle.corrections()[v]) EXPECT_EQ(value, 0) << v;
+  for (std::size_t k = 0; k < 6; ++k)
+    EXPECT_NEAR(bundle.corrections()[3][k], scene.errors[3][k], 1e-5) << k;
+  EXPECT_EQ(bundle.log_focal(), 0);
+}
+
 /// The same cost by Ceres: sightings' numeric derivatives, no formula of ours but the projection.
 struct Sighting {
   Camera camera;

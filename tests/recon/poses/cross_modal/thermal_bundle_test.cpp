@@ -127,6 +127,41 @@ TEST(ThermalBundle, DroppedViewsLendNothing) {
   EXPECT_LT(ball.center_error(3), 0.03 * 2.5) << "edges alone hold it";
 }
 
+TEST(BundleAdded, AddedViewsComeHomeAndNobodyElseMoves) {
+  Ball ball;
+  const auto put_elsewhere = [&](std::size_t i, double by_deg) {
+    OrbitPose elsewhere;
+    elsewhere.azimuth_deg = 30.0 * static_cast<double>(i) + by_deg;
+    elsewhere.elevation_deg = 20, elsewhere.radius = 2.5;
+    PosedView& wrong = ball.alignment.views[i].view;
+    wrong.cam_from_world = cam_from_world_of(elsewhere, wrong.camera);
+  };
+  put_elsewhere(4, 6);
+  put_elsewhere(8, -4);
+  put_elsewhere(2, 5);                           // nobody asks it to move
+  ball.orbit.images[10] = ball.orbit.images[5];  // of somewhere else
+  ball.alignment.radial = 0.07;                  // images are straightened already
+  const Fit before = ball.alignment;
+  const std::vector<std::size_t> added{4, 8, 10}, settled{0, 1, 3, 5, 6, 7, 9, 11};
+  ASSERT_TRUE(
+      bundle_added({ball.form, ball.orbit, ball.progress}, added, settled, {}, ball.alignment));
+  EXPECT_LT(ball.center_error(4), 0.007 * 2.5);
+  EXPECT_LT(ball.center_error(8), 0.007 * 2.5);
+  const auto confirmed = [&](std::size_t i) {
+    return ball.alignment.views[i].confirmed_patches.value_or(-1);
+  };
+  EXPECT_GT(confirmed(4), 50);
+  EXPECT_LT(confirmed(10), 0.2 * confirmed(8));
+  for (const std::size_t i : {0u, 1u, 2u, 3u, 5u, 6u, 7u, 9u, 11u}) {
+    EXPECT_EQ(ball.alignment.views[i].view.cam_from_world.translation,
+              before.views[i].view.cam_from_world.translation)
+        << i;
+    EXPECT_EQ(confirmed(i), -1) << i;
+  }
+  EXPECT_EQ(ball.alignment.radial, 0.07);
+  EXPECT_EQ(ball.alignment.views[4].view.camera.fx, before.focal_px);
+}
+
 TEST(ThermalBundle, ARendererThatFailsIsPassedOn) {
   Ball ball;
   ball.form = [](const Camera&, const Rigid3d&) -> Result<SceneRender> {

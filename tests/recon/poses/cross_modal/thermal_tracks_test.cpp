@@ -29,7 +29,7 @@ struct Views {
     all.resize(views.images.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
   }
-  std::vector<ThermalTrack> tracks() const { return thermal_tracks(views, all, {}); }
+  std::vector<ThermalTrack> tracks() const { return thermal_tracks(views, all, all, {}); }
 
   double median_px(const std::vector<ThermalTrack>& tracks) const {
     std::vector<double> off;
@@ -120,8 +120,8 @@ TEST(ThermalTracks, NothingToFindGivesNone) {
   Views blind{testing_orbit::Ball(4)};
   for (cv::Mat& depth : blind.views.depth) depth.setTo(std::numeric_limits<float>::quiet_NaN());
   EXPECT_TRUE(blind.tracks().empty());
-  EXPECT_TRUE(thermal_tracks(blind.views, {}, {}).empty());
-  EXPECT_TRUE(thermal_tracks(blind.views, {2}, {}).empty());
+  EXPECT_TRUE(thermal_tracks(blind.views, {}, {}, {}).empty());
+  EXPECT_TRUE(thermal_tracks(blind.views, {2}, {2}, {}).empty());
 }
 
 }  // namespace

@@ -71,6 +71,14 @@ TEST(ViewVerdicts, WhatSpeaksAgainstAViewIsNamed) {
   EXPECT_TRUE(judged(between, {}).sure());
   EXPECT_EQ(judged_between(between, {}).reason, DoubtReason::weak_support);
   EXPECT_TRUE(judged_between(good, {}).sure());
+  // Stations' patches place a frame between them, whatever it was dropped for before they did.
+  const ViewVerdict lost{Confidence::dropped, DoubtReason::not_found, "nowhere"};
+  EXPECT_EQ(judged_between(between, lost).confidence, Confidence::dropped);
+  between.confirmed_share = 0.9;
+  EXPECT_TRUE(judged_between(between, {}).sure());
+  EXPECT_TRUE(judged_between(between, lost).sure());
+  between.correlation = 0.3;
+  EXPECT_EQ(judged_between(between, lost).reason, DoubtReason::temperatures_unlike);
   ViewEvidence loose = good;
   loose.azimuth_off_deg = 15;
   EXPECT_FALSE(judged(loose, {}).sure());
