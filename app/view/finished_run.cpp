@@ -69,11 +69,11 @@ Status load_views(const pipeline::StageContext& context, FinishedRun& run) {
 void load_detail(const pipeline::StageContext& context, FinishedRun& run) {
   for (const Modality modality : {Modality::visible, Modality::thermal}) {
     if (!run.session || !run.has(modality)) continue;
-    auto detail =
-        stages::detail_of_new_views(context, *run.session, modality,
-                                    stages::detail_width_px(picture_width_px));
+    auto detail = stages::detail_of_new_views(context, *run.session, modality,
+                                              stages::detail_width_px(picture_width_px));
     if (detail)
-      (modality == Modality::visible ? run.visible_detail : run.thermal_detail) = *std::move(detail);
+      (modality == Modality::visible ? run.visible_detail : run.thermal_detail) =
+          *std::move(detail);
     else
       run.notes.push_back(fmt::format("pictures are without the detail of the {} frames: {}",
                                       name(modality), detail.error().message()));

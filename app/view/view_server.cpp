@@ -80,7 +80,8 @@ struct ViewServer::Impl {
     ORBITFUSE_ASSIGN(
         const Layers seen,
         layers.render(asked.shot,
-                      {.visible = false, .fused = false, .every_pixel = true, .detail = true}, job));
+                      {.visible = false, .fused = false, .every_pixel = true, .detail = true},
+                      job));
     const double scale = kelvin_per_count_for(std::vector<cv::Mat>{seen.kelvin});
     return encode_thermal_tiff(counts_of_kelvin(seen.kelvin, scale), {scale, 0});
   }

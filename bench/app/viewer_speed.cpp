@@ -3,8 +3,8 @@
 //   viewer_speed RUN [--views 6] [--layer fused] [--rendering]
 // RUN: --out folder of `orbitfuse run`. Chromium draws by software on the same cores. Wall times
 // mean something on an idle machine only; CPU seconds always, so first come those of rendering
-// alone (and no others with --rendering), and how far its pictures are from those whose every
-// pixel is rendered.
+// alone (and no others with --rendering), and how far its pictures are from those of four times as
+// many samples.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -69,8 +69,8 @@ std::vector<view::Shot> shots_of(const view::FinishedRun& run, int views) {
   const std::size_t count = std::min(poses.size(), static_cast<std::size_t>(views));
   std::vector<view::Shot> shots;
   for (std::size_t i = 0; i < count; ++i)
-    shots.push_back({Camera::from_fov(640, 480, page_horizontal_fov_deg),
-                     poses[i * poses.size() / count]});
+    shots.push_back(
+        {Camera::from_fov(640, 480, page_horizontal_fov_deg), poses[i * poses.size() / count]});
   return shots;
 }
 
@@ -81,15 +81,15 @@ void report_rendering(const view::FinishedRun& run, int views) {
     const char* words;
     view::LayerWish wish;
   };
-  const auto step = [](const char* words, int divisor, int thermal_divisor, bool detail) {
+  const bool visible_alone = !run.has(Modality::thermal);  // else the fused one is shown
+  const auto step = [&](const char* words, int divisor, int thermal_divisor, bool detail) {
     return Step{words,
-                {.visible = false,
+                {.visible = visible_alone,
                  .divisor = divisor,
                  .thermal_divisor = thermal_divisor,
                  .detail = detail}};
   };
-  const std::vector<Step> steps = {step("first picture", 8, 8, false),
-                                   step("second", 5, 5, false),
+  const std::vector<Step> steps = {step("first picture", 8, 8, false), step("second", 5, 5, false),
                                    step("full size, coarse temperatures", 1, 5, false),
                                    step("full temperatures", 1, 1, false),
                                    step("detail of recorded frames", 1, 1, true)};
@@ -107,9 +107,10 @@ void report_rendering(const view::FinishedRun& run, int views) {
     }
   }
   if (cpu_s[0].empty()) return;
-  fmt::print("Rendering alone, 640x480, median of {} views, from rest on:\n\n"
-             "| picture | CPU s | wall s | cores |\n|---|---|---|---|\n",
-             cpu_s[0].size());
+  fmt::print(
+      "Rendering alone, 640x480, median of {} views, from rest on:\n\n"
+      "| picture | CPU s | wall s | cores |\n|---|---|---|---|\n",
+      cpu_s[0].size());
   for (std::size_t s = 0; s < steps.size(); ++s) {
     const double cpu = median(cpu_s[s]), wall = median(wall_s[s]);
     fmt::print("| {} | {:.3f} | {:.3f} | {:.2f} |\n", steps[s].words, cpu, wall, cpu / wall);
@@ -117,41 +118,56 @@ void report_rendering(const view::FinishedRun& run, int views) {
   fmt::print("\n");
 }
 
-/// Absolute differences of the values that both have, as shares of `range`.
-void add_differences(const cv::Mat& quick, const cv::Mat& exact, double range,
-                     std::vector<double>& all) {
+/// Absolute differences of the values that both have.
+void add_differences(const cv::Mat& quick, const cv::Mat& exact, std::vector<double>& all) {
   cv::Mat a, b;
   quick.reshape(1).convertTo(a, CV_32F);
   exact.reshape(1).convertTo(b, CV_32F);
   for (int y = 0; y < a.rows; ++y)
     for (int x = 0; x < a.cols; ++x) {
-      const double off = std::abs(a.at<float>(y, x) - b.at<float>(y, x)) / range;
+      const double off = std::abs(a.at<float>(y, x) - b.at<float>(y, x));
       if (std::isfinite(off)) all.push_back(off);
     }
 }
 
-/// Pictures that are waited for against those whose every pixel is rendered.
-void report_differences(const view::FinishedRun& run, int views) {
-  view::LayerRenderer renderer(run);
+/// Pictures that are waited for, and those whose every pixel is rendered, against the same with
+/// four times as many samples a ray.
+Status report_differences(view::FinishedRun& run, int views) {
+  const nerf::RenderOptions usual = run.config.render.visible;
+  nerf::RenderOptions fine = usual;
+  fine.sample_factor = 4;
   view::RenderTurns turns;
-  std::vector<double> visible, thermal;
+  view::RenderTurns::Job job(turns, "bench", nullptr);
+  std::vector<double> visible[2], thermal[2];  // quick, exact
   for (const view::Shot& shot : shots_of(run, views)) {
-    view::RenderTurns::Job job(turns, "bench", nullptr);
-    const auto quick = renderer.render(shot, {.fused = false}, job),
-               exact = renderer.render(shot, {.fused = false, .every_pixel = true}, job);
-    if (!quick || !exact) continue;
-    if (!quick->visible.empty()) add_differences(quick->visible, exact->visible, 1, visible);
-    if (!quick->kelvin.empty()) add_differences(quick->kelvin, exact->kelvin, 1, thermal);
+    const auto shown = [&](const nerf::RenderOptions& quality, bool every_pixel) {
+      run.config.render.visible = quality;
+      auto seen =
+          view::LayerRenderer(run).render(shot, {.fused = false, .every_pixel = every_pixel}, job);
+      run.config.render.visible = usual;
+      return seen;
+    };
+    ORBITFUSE_ASSIGN(const view::Layers truth, shown(fine, true));
+    for (const bool exact : {false, true}) {
+      ORBITFUSE_ASSIGN(const view::Layers seen, shown(usual, exact));
+      if (!seen.visible.empty()) add_differences(seen.visible, truth.visible, visible[exact]);
+      if (!seen.kelvin.empty()) add_differences(seen.kelvin, truth.kelvin, thermal[exact]);
+    }
   }
-  for (auto& [words, all] : {std::pair{"visible, of 255", &visible}, {"thermal, K", &thermal}}) {
-    if (all->empty()) continue;
-    double sum = 0;
-    for (const double off : *all) sum += off;
-    fmt::print("Off what is rendered pixel by pixel ({}): mean {:.3f}, 99 % {:.2f}, 99.9 % {:.2f}\n",
-               words, sum / static_cast<double>(all->size()), quantile(*all, 0.99),
-               quantile(*all, 0.999));
-  }
+  fmt::print("| off four times the samples | mean | 99 % | 99.9 % |\n|---|---|---|---|\n");
+  for (const bool exact : {false, true})
+    for (auto& [words, all] :
+         {std::pair{"visible, of 255", &visible[exact]}, {"thermal, K", &thermal[exact]}}) {
+      if (all->empty()) continue;
+      double sum = 0;
+      for (const double off : *all) sum += off;
+      fmt::print("| {}, {} | {:.3f} | {:.2f} | {:.2f} |\n", words,
+                 exact ? "every pixel" : "as it is waited for",
+                 sum / static_cast<double>(all->size()), quantile(*all, 0.99),
+                 quantile(*all, 0.999));
+    }
   fmt::print("\n");
+  return {};
 }
 
 int report(const std::string& out, int views, const std::string& layer, bool rendering_only) {
@@ -161,7 +177,8 @@ int report(const std::string& out, int views, const std::string& layer, bool ren
     return 3;
   }
   report_rendering(*run, views);
-  report_differences(*run, views);
+  if (const Status told = report_differences(*run, std::min(views, 4)); !told)
+    fmt::print(stderr, "{}\n", told.error().message());
   if (rendering_only) return 0;
   PageOptions options;
   options.port = 0;
@@ -195,7 +212,8 @@ int report(const std::string& out, int views, const std::string& layer, bool ren
   }
   fmt::print(
       "{}, {} threads; {}, layer {}, {} views: median (most)\n\n"
-      "| first picture ms | {}x{} s, coarse temperatures | full temperatures s | with detail s | CPU "
+      "| first picture ms | {}x{} s, coarse temperatures | full temperatures s | with detail s | "
+      "CPU "
       "s of the server | "
       "pictures a second while moving "
       "| of the points |\n|---|---|---|---|---|---|\n",

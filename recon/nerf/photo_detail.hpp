@@ -62,9 +62,9 @@ class PhotoDetail {
   /// Of the sources' views, in their order.
   std::vector<std::string> names() const;
 
-  /// Makes ready one of the sources that a view needs, `depth` its own as the field has it: a render
-  /// at the base width. False: all are, and add() takes no longer than the view's own pixels do.
-  /// Errors: as add().
+  /// Makes ready one of the sources that a view needs, `depth` its own as the field has it: a
+  /// render at the base width. False: all are, and add() takes no longer than the view's own pixels
+  /// do. Errors: as add().
   Result<bool> prepare_one(const Field& field, const Camera& camera, const Rigid3d& cam_from_world,
                            const cv::Mat& depth, const Progress& progress);
 

@@ -28,8 +28,7 @@ bool take_mean(RenderedView& view, int x, int y, const Neighbours& of, float ali
   const int channels = view.color.channels();
   const auto range_of = [&](const cv::Mat& plane, int count, int channel) {
     Range range;
-    for (const auto& [dx, dy] : of)
-      range.add(plane.ptr<float>(y + dy)[(x + dx) * count + channel]);
+    for (const auto& [dx, dy] : of) range.add(plane.ptr<float>(y + dy)[(x + dx) * count + channel]);
     return range;
   };
   std::array<float, 3> color{};

@@ -62,6 +62,10 @@ Status RenderOptions::validate() const {
 namespace {
 
 constexpr float limit_margin = 1.03f;
+/// Of the samples, for a ray that looks where its neighbours ended: most of the way has been looked
+/// at. With all of them such pictures are nearer to finely sampled ones than those whose every
+/// pixel is rendered, and a seventh dearer.
+constexpr double between_share = 0.7;
 constexpr float no_limit = std::numeric_limits<float>::max();
 
 /// How far to look: a little behind the farthest of what one ray of each square of limit_stride
@@ -78,8 +82,8 @@ cv::Mat limits_from(const cv::Mat& ends, cv::Size size) {
   return far;
 }
 
-/// Where on its ray each pixel looks, or where its light faded: from `near` (0: all the way) to `far`
-/// (no_limit: it never ends).
+/// Where on its ray each pixel looks, or where its light faded: from `near` (0: all the way) to
+/// `far` (no_limit: it never ends).
 struct Reach {
   cv::Mat near, far;
 
@@ -103,6 +107,9 @@ class ImageRenderer {
     height_ = (camera.height + stride - 1) / stride;
     march_.surface = static_cast<int>(std::lround(march_.surface * options.sample_factor));
     march_.haze = static_cast<int>(std::lround(march_.haze * options.sample_factor));
+    between_ = march_;
+    between_.surface = static_cast<int>(std::lround(between_share * between_.surface));
+    between_.haze = static_cast<int>(std::lround(between_share * between_.haze));
   }
 
   /// Where each ray has met what stops it; no_limit where nothing did.
@@ -114,7 +121,7 @@ class ImageRenderer {
       block.clear();
       pixels.clear();
       for (int p = begin; p < end; ++p) add(p, 0, no_limit, pixels);
-      place(block);
+      place(block, march_);
       forward(field_, kernels_, limits_, block);
       for (std::size_t r = 0; r < pixels.size(); ++r)
         out.at<float>(pixels[r] / width_, pixels[r] % width_) = end_of(block, r);
@@ -139,7 +146,7 @@ class ImageRenderer {
     std::iota(all.begin(), all.end(), 0);
     Reach look(far.size());
     look.far = far;
-    render(all, look, view);
+    render(all, look, view, nullptr, march_);
     return view;
   }
 
@@ -148,9 +155,9 @@ class ImageRenderer {
   /// look ahead for the others: what they saw was sampled too thinly.
   RenderedView sparse_image(const RenderOptions& options) {
     RenderedView view = empty_view();
-    Reach look(view.depth.size()), met = look;
+    Reach look(view.depth.size()), met(view.depth.size());  // not copies: these share their planes
     const auto looks = [](int x, int y) { return x % limit_stride == 0 && y % limit_stride == 0; };
-    render(pixels_where(looks), look, view, &met);
+    render(pixels_where(looks), look, view, &met, march_);
     look.far = limits_from(every_fourth(met.far), look.far.size());
     const bool wide = options.alike_px == limit_stride;
     const auto even = [](int x, int y) { return x % 2 == 0 && y % 2 == 0; };
@@ -158,7 +165,7 @@ class ImageRenderer {
              if (!inside(x, y, 1) || (wide && looks(x, y))) return true;
              return even(x, y) && (wide ? !inside(x, y, 2) : !looks(x, y) || !inside(x, y, 2));
            }),
-           look, view, &met);
+           look, view, &met, march_);
     Rest rest{options, look, met, view};
     if (wide) {
       complete(rest, diagonal_by_two, 2, [](int x, int y) { return x % 4 == 2 && y % 4 == 2; });
@@ -185,25 +192,29 @@ class ImageRenderer {
   void complete(Rest& rest, const Neighbours& neighbours, int margin, const Chosen& chosen) {
     constexpr int rows_per_block = 8;
     const auto alike = static_cast<float>(rest.options.alike);
-    std::vector<std::vector<int>> unlike(
-        static_cast<std::size_t>((height_ + rows_per_block - 1) / rows_per_block));
+    const auto blocks = static_cast<std::size_t>((height_ + rows_per_block - 1) / rows_per_block);
+    std::vector<std::vector<int>> unlike(blocks), on_something(blocks);
     parallel_blocks(height_, rows_per_block, [&](int begin, int end) {
-      std::vector<int>& own = unlike[static_cast<std::size_t>(begin / rows_per_block)];
+      const auto block = static_cast<std::size_t>(begin / rows_per_block);
       for (int y = begin; y < end; ++y)
         for (int x = 0; x < width_; ++x) {
           if (!inside(x, y, margin) || !chosen(x, y)) continue;
           const int p = y * width_ + x;
-          if (rest.options.between_neighbours) look_between(rest, p, neighbours);
-          if (!take_mean(rest.view, x, y, neighbours, alike)) own.push_back(p);
+          const bool ends = rest.options.between_neighbours && look_between(rest, p, neighbours);
+          if (!take_mean(rest.view, x, y, neighbours, alike))
+            (ends ? on_something : unlike)[block].push_back(p);
         }
     });
-    std::vector<int> all;
-    for (const std::vector<int>& some : unlike) all.insert(all.end(), some.begin(), some.end());
-    render(all, rest.look, rest.view, &rest.met);
+    for (const auto* lists : {&unlike, &on_something}) {
+      std::vector<int> all;
+      for (const std::vector<int>& some : *lists) all.insert(all.end(), some.begin(), some.end());
+      render(all, rest.look, rest.view, &rest.met, lists == &unlike ? march_ : between_);
+    }
   }
 
   /// A ray between four that end on something looks where their light faded, and a little round it.
-  void look_between(Rest& rest, int pixel, const Neighbours& of) const {
+  /// False: they don't.
+  bool look_between(Rest& rest, int pixel, const Neighbours& of) const {
     const int x = pixel % width_, y = pixel / width_;
     float near = no_limit, far = 0;
     for (const auto& [dx, dy] : of) {
@@ -212,14 +223,15 @@ class ImageRenderer {
     }
     rest.met.near.at<float>(y, x) = near;  // stands unless the pixel is rendered
     rest.met.far.at<float>(y, x) = far;
-    if (!(far < no_limit)) return;
+    if (!(far < no_limit)) return false;
     rest.look.near.at<float>(y, x) = near / limit_margin;
     rest.look.far.at<float>(y, x) = far * limit_margin;
+    return true;
   }
 
   /// The listed pixels, each by its own ray; `met`: where their light faded.
-  void render(const std::vector<int>& wanted, const Reach& look, RenderedView& view,
-              Reach* met = nullptr) {
+  void render(const std::vector<int>& wanted, const Reach& look, RenderedView& view, Reach* met,
+              const MarchSettings& march) {
     const int channels = field_.channels();
     const auto at = [&](const cv::Mat& plane, int p) {
       return plane.at<float>(p / width_, p % width_);
@@ -239,7 +251,7 @@ class ImageRenderer {
         else
           for (const int p : again) add(p, 0, no_limit, pixels);
         if (pixels.empty()) continue;
-        place(block);
+        place(block, limited ? march : march_);
         forward(field_, kernels_, limits_, block);
         int row = 0;
         for (std::size_t r = 0; r < pixels.size(); ++r) {
@@ -291,12 +303,12 @@ class ImageRenderer {
     pixels.push_back(pixel);
   }
   /// The samples of all rays that add() noted.
-  void place(RayBlock& block) const {
+  void place(RayBlock& block, const MarchSettings& march) const {
     thread_local ProposalBlock proposals;
     if (proposing_)
-      add_proposed(field_, kernels_, drawn(), {.near = march_.near}, proposals, block);
+      add_proposed(field_, kernels_, drawn(), {.near = march.near}, proposals, block);
     else
-      block.add(field_.occupancy, march_, drawn());
+      block.add(field_.occupancy, march, drawn());
     drawn().clear();
   }
   static std::vector<DrawnRay>& drawn() {
@@ -329,7 +341,7 @@ class ImageRenderer {
   const ViewRays& rays_;
   int stride_, width_ = 0, height_ = 0;
   const Kernels& kernels_;
-  MarchSettings march_;
+  MarchSettings march_, between_;
   ForwardSettings limits_;
   bool proposing_ = field_.options.sampling == Sampling::proposal;
 };

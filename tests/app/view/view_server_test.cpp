@@ -184,10 +184,9 @@ TEST_F(ViewServerTest, DetailOfRecordedFramesIsInTheLastPictures) {
   const auto brighter = [&](Modality modality, double by) {
     std::vector<nerf::DetailSource> sources;
     for (const nerf::TrainingView& view : nerf::test::toy_scene(modality, 6).views)
-      sources.push_back({{view.name, view.camera, view.cam_from_world},
-                         [image = cv::Mat(view.image + cv::Scalar::all(by))] {
-                           return Result<cv::Mat>(image);
-                         }});
+      sources.push_back(
+          {{view.name, view.camera, view.cam_from_world},
+           [image = cv::Mat(view.image + cv::Scalar::all(by))] { return Result<cv::Mat>(image); }});
     nerf::DetailOptions options;
     options.base_width_px = 32;
     options.depth_tolerance = 0.1;  // so small a field is a coarse one
@@ -221,7 +220,8 @@ TEST_F(ViewServerTest, DetailOfRecordedFramesIsInTheLastPictures) {
   EXPECT_LT(cv::norm(detailed->kelvin, kelvin.color, cv::NORM_INF, known), 0.01);
   EXPECT_GT(cv::norm(detailed->visible, plain->visible, cv::NORM_INF), 3);
   EXPECT_GT(cv::norm(detailed->kelvin, plain->kelvin, cv::NORM_INF, known), 0.3);
-  EXPECT_EQ(cv::norm(after->visible, plain->visible, cv::NORM_INF), 0) << "it stays in what is kept";
+  EXPECT_EQ(cv::norm(after->visible, plain->visible, cv::NORM_INF), 0)
+      << "it stays in what is kept";
 }
 
 /// The page's bar under the fused picture is made of these.

@@ -105,7 +105,7 @@ TEST_P(QuickPictures, EveryFourthPixelIsEnoughForAPlainThing) {
 
 INSTANTIATE_TEST_SUITE_P(Modalities, QuickPictures,
                          testing::Values(Modality::visible, Modality::thermal),
-                         [](const auto& info) { return std::string(name(info.param)); });
+                         [](const auto& of) { return std::string(name(of.param)); });
 
 TEST(RenderOptionsCheck, GridsOtherThanTwoAndFourAreNamed) {
   for (const int px : {-4, 0, 1, 3, 8}) {
