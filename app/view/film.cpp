@@ -162,7 +162,8 @@ Result<cv::Mat> FilmMaker::picture(const FilmOrder& order, const Bookmark& from)
   const LayerWish wish{.visible = order.layer == FilmLayer::visible,
                        .thermal = order.layer == FilmLayer::thermal,
                        .fused = order.layer == FilmLayer::fused,
-                       .every_pixel = true};
+                       .every_pixel = true,
+                       .detail = true};
   const Shot shot = shot_of_bookmark(from, run_.up, order.width, order.height);
   // A job a picture: none of them has waited longer than the viewers that came meanwhile. Where too
   // many wait, the film waits until there are fewer.

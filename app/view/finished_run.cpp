@@ -5,6 +5,7 @@
 
 #include "app/stages/artifacts.hpp"
 #include "app/stages/measurement_scene.hpp"
+#include "app/stages/recorded_detail.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
 #include "app/view/surface.hpp"
@@ -15,6 +16,8 @@
 namespace orbitfuse::view {
 namespace fs = std::filesystem;
 namespace {
+
+constexpr int picture_width_px = 640;  ///< of the viewer's
 
 Status load_fields(const pipeline::StageContext& context, FinishedRun& run) {
   if (context.has("train_visible")) {
@@ -60,6 +63,21 @@ Status load_views(const pipeline::StageContext& context, FinishedRun& run) {
     }
   }
   return {};
+}
+
+/// Without it pictures show the fields alone.
+void load_detail(const pipeline::StageContext& context, FinishedRun& run) {
+  for (const Modality modality : {Modality::visible, Modality::thermal}) {
+    if (!run.session || !run.has(modality)) continue;
+    auto detail = stages::detail_of_new_views(context, *run.session, modality,
+                                              stages::detail_width_px(picture_width_px));
+    if (detail)
+      (modality == Modality::visible ? run.visible_detail : run.thermal_detail) =
+          *std::move(detail);
+    else
+      run.notes.push_back(fmt::format("pictures are without the detail of the {} frames: {}",
+                                      name(modality), detail.error().message()));
+  }
 }
 
 /// Round what the camera of the viewer turns.
@@ -149,6 +167,7 @@ Result<FinishedRun> load_finished_run(const fs::path& out, const stages::RunConf
   else
     run.notes.push_back("photos cannot be shown: " + session.error().message());
   ORBITFUSE_TRY(load_views(context, run));
+  load_detail(context, run);
   ORBITFUSE_TRY(load_surface(context, run));
   ORBITFUSE_TRY(progress.check("view"));
   set_orbit(run);

@@ -14,6 +14,7 @@
 #include "fusion/heat/heat_scale.hpp"
 #include "recon/assembly/training_data.hpp"
 #include "recon/nerf/nerf.hpp"
+#include "recon/nerf/photo_detail.hpp"
 
 namespace orbitfuse::view {
 
@@ -31,6 +32,8 @@ struct FinishedRun {
   std::filesystem::path out;
   std::optional<Session> session;  ///< nothing: it is not where the run read it
   nerf::Field visible, thermal;    ///< one may be empty
+  /// What recorded frames lend to pictures, as the run's new views have it.
+  nerf::PhotoDetail visible_detail, thermal_detail;
   Modality frame = Modality::visible;
   Similarity3d frame_from_thermal;
   std::vector<RecordedView> views;
@@ -46,6 +49,7 @@ struct FinishedRun {
   bool has(Modality modality) const {
     return !(modality == Modality::visible ? visible : thermal).empty();
   }
+  bool has_detail() const { return !visible_detail.empty() || !thermal_detail.empty(); }
   Samples samples() const { return thermal_is_gray ? Samples::gray : Samples::kelvin; }
 };
 

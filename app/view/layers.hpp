@@ -28,6 +28,9 @@ struct LayerWish {
   /// Every pixel by its own ray, for what is kept; a picture to look at takes plain ones from their
   /// neighbours.
   bool every_pixel = false;
+  /// With what recorded frames show beyond the fields. The first pictures from a new side take
+  /// longer: the fields are rendered where the frames were recorded.
+  bool detail = false;
 };
 
 /// What a shot shows; a layer that was not wished, or has no field, is empty.
@@ -41,24 +44,30 @@ struct Layers {
 class LayerRenderer {
  public:
   /// The run must outlive it.
-  explicit LayerRenderer(const FinishedRun& run) : run_(run) {}
+  explicit LayerRenderer(const FinishedRun& run)
+      : run_(run), details_{run.visible_detail, run.thermal_detail} {}
 
   /// Errors: as of RenderTurns::Job::turn; input (a pose that cannot be rendered).
   Result<Layers> render(const Shot& shot, const LayerWish& wish, RenderTurns::Job& job);
 
  private:
-  /// One field's picture: colours as bytes, or temperatures.
-  struct Plane {
-    cv::Mat image, opacity;
-  };
-  Result<Plane> plane(Modality modality, const Shot& shot, bool every_pixel, RenderTurns::Job& job);
-  Result<Plane> rendered(Modality modality, const Shot& shot, bool every_pixel,
+  using Plane = nerf::RenderedView;
+  Result<Plane> plane(Modality modality, const Shot& shot, const LayerWish& wish,
+                      RenderTurns::Job& job);
+  Result<Plane> rendered(Modality modality, const Shot& shot, const LayerWish& wish,
                          RenderTurns::Job& job) const;
-  Result<cv::Mat> fused(const Plane& visible, const Plane& thermal) const;
+  Result<Plane> detailed(Modality modality, const Shot& shot, const LayerWish& wish,
+                         RenderTurns::Job& job);
+  Result<cv::Mat> fused(const cv::Mat& visible, const Plane& colors, const Plane& thermal) const;
+  cv::Mat kelvin_of(const Plane& thermal) const;
+  Rigid3d cam_from_field(Modality modality, const Shot& shot) const;
+  const nerf::Field& field_of(Modality modality) const;
 
   const FinishedRun& run_;
-  std::mutex mutex_;
+  std::mutex mutex_;                               ///< of what follows
   std::list<std::pair<std::string, Plane>> kept_;  ///< newest first
+  std::mutex detail_mutex_;
+  nerf::PhotoDetail details_[2];  ///< visible, thermal
 };
 
 }  // namespace orbitfuse::view

@@ -69,6 +69,7 @@ json scene_json(const FinishedRun& run) {
           {"visible", run.has(Modality::visible)},
           {"thermal", run.has(Modality::thermal)},
           {"gray", run.thermal_is_gray},
+          {"detail", run.has_detail()},
           {"span", {run.span.low_k, run.span.high_k}},
           {"heat", heat_json(run)},
           {"center", {c.x(), c.y(), c.z()}},

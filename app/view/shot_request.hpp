@@ -23,8 +23,8 @@ struct ShotRequest {
 /// {"view": index into run.views, "width"}: as that camera saw. Usage error naming the field.
 Result<Shot> shot_of(const nlohmann::json& j, const FinishedRun& run);
 
-/// As above with "client" (1 to 40 characters), and if given "layers", "divisor" and
-/// "thermal_divisor".
+/// As above with "client" (1 to 40 characters), and if given "layers", "divisor", "thermal_divisor"
+/// and "detail".
 Result<ShotRequest> shot_request_of(const nlohmann::json& j, const FinishedRun& run);
 
 /// A pinhole whose axis goes through the middle; `fov_deg` is of the height.

@@ -79,7 +79,9 @@ struct ViewServer::Impl {
     RenderTurns::Job job(turns, asked.client, request.gone);
     ORBITFUSE_ASSIGN(
         const Layers seen,
-        layers.render(asked.shot, {.visible = false, .fused = false, .every_pixel = true}, job));
+        layers.render(asked.shot,
+                      {.visible = false, .fused = false, .every_pixel = true, .detail = true},
+                      job));
     const double scale = kelvin_per_count_for(std::vector<cv::Mat>{seen.kelvin});
     return encode_thermal_tiff(counts_of_kelvin(seen.kelvin, scale), {scale, 0});
   }

@@ -76,6 +76,12 @@ struct RenderOptions {
   /// differ by no more than this share of the value range, and lie on one surface, are their mean
   /// instead of being rendered. 0 = all are rendered.
   double alike = 0;
+  /// With `alike`, pixels between those that are rendered in any case: 2, or 4 where the field has
+  /// nothing finer than three pixels, as a thermal camera's has that sees less than the picture.
+  int alike_px = 2;
+  /// With `alike`: a ray among four that met something looks where they did, and all the way only
+  /// where that doesn't do. What is thinner than two pixels before a near surface can be missed.
+  bool between_neighbours = false;
   Status validate() const;
 };
 

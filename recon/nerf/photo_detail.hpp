@@ -62,6 +62,12 @@ class PhotoDetail {
   /// Of the sources' views, in their order.
   std::vector<std::string> names() const;
 
+  /// Makes ready one of the sources that a view needs, `depth` its own as the field has it: a
+  /// render at the base width. False: all are, and add() takes no longer than the view's own pixels
+  /// do. Errors: as add().
+  Result<bool> prepare_one(const Field& field, const Camera& camera, const Rigid3d& cam_from_world,
+                           const cv::Mat& depth, const Progress& progress);
+
   /// Adds to `seen`, which `field` rendered from there; depth and opacity stay. The source called
   /// `except` lends nothing: a recorded view is compared with what the others know. Returns the
   /// share of the pixels that got detail. Sources within a degree of `except` lend nothing either:

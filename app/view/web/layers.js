@@ -16,8 +16,9 @@ class RestingView {
     this.surface.moving = true; this.surface.behindPicture(false);
     this.drop();
     this.pictures = {}; this.level = -1;
-    clearTimeout(this.timer);
-    this.timer = setTimeout(() => { this.surface.moving = false; this.surface.draw(); this.render(); }, 60);
+    clearTimeout(this.timer); clearTimeout(this.late);
+    // At 30 pictures a second the next move comes sooner than that.
+    this.timer = setTimeout(() => this.render(), 40);
     this.onChange();
   }
 
@@ -41,32 +42,55 @@ class RestingView {
   steps(layers) {
     // Coarse temperatures, which are there by then, come with the full picture; their own detail a step later.
     const two = layers.some(l => l !== "thermal") && layers.includes("thermal");
-    return [[8, 8], [5, 5], ...(two ? [[1, 5]] : []), [1, 1]].map(([divisor, thermal_divisor]) => ({ divisor, thermal_divisor }));
+    const steps = [[8, 8], [5, 5], ...(two ? [[1, 5]] : []), [1, 1]].map(([divisor, thermal_divisor]) => ({ divisor, thermal_divisor }));
+    return this.facts.detail ? [...steps, { divisor: 1, thermal_divisor: 1, detail: true }] : steps;
   }
+
+  /// The surface in full, once nothing is waited for: till then its drawing would take the renderer's time.
+  settled() { this.surface.moving = false; this.surface.draw(); }
 
   async render() {
     this.drop();
     this.finished = false;
     const asking = this.asking = new AbortController(), layers = this.wanted();
-    if (!layers.length) return;
+    if (!layers.length) return this.settled();
     const steps = this.steps(layers), [width, height] = this.size(1);
+    const askFor = step => {
+      const answer = ask("/render", { client: clientName, ...this.surface.shot(width, height), layers, ...step }, asking.signal);
+      answer.catch(() => {});  // told where it is awaited
+      return answer;
+    };
+    let next = askFor(steps[0]);
+    clearTimeout(this.late);
+    this.late = setTimeout(() => this.settled(), 400);
     for (let i = 0; i < steps.length; ++i) {
       try {
-        const answer = await ask("/render", { client: clientName, ...this.surface.shot(width, height), layers, ...steps[i] }, asking.signal);
-        const pictures = await pictureParts(answer);
+        const answer = await next, bytes = await answer.arrayBuffer();
+        // The next is rendered while this one is unpacked and shown.
+        if (i + 1 < steps.length) next = askFor(steps[i + 1]);
+        const pictures = await pictureParts(bytes);
         if (asking.signal.aborted) return;
+        clearTimeout(this.late);
         this.pictures = pictures; this.level = i; this.finished = i + 1 === steps.length;
         this.width = Math.round(width / steps[i].divisor); this.height = Math.round(height / steps[i].divisor);
         $("hint").textContent = "";
         this.paint();
       } catch (error) {
         if (asking.signal.aborted || error.name === "AbortError") return;
-        if (error.status === 503) { await new Promise(done => setTimeout(done, 500)); --i; continue; }
+        if (error.status === 503) {
+          await new Promise(done => setTimeout(done, 500));
+          if (asking.signal.aborted) return;
+          next = askFor(steps[i--]);
+          continue;
+        }
         if (error.status !== 409) $("hint").textContent = error.status ? error.message : "no answer from the viewer: is it still running?";
+        if (steps[i].detail) this.finished = true;  // without it
+        this.settled(); this.onChange();
         return;
       }
     }
     this.asking = null;
+    this.settled();
     this.onChange();
   }
 

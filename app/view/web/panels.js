@@ -84,11 +84,11 @@ class PhotoDialog {
     this.shown = {};
     for (const id of ["photo-recorded", "photo-rendered"]) { $(id).width = view.width; $(id).height = view.height; }
     $("photo-rendered-words").textContent = "rendering from its pose";
-    ask("/photo/" + index, undefined, signal).then(pictureParts).then(p => { this.shown.recorded = p; this.paint(); })
+    ask("/photo/" + index, undefined, signal).then(a => a.arrayBuffer()).then(pictureParts).then(p => { this.shown.recorded = p; this.paint(); })
       .catch(error => { if (!signal.aborted) $("photo-doubt").textContent = error.message; });
     try {
       for (const width of [160, Math.min(640, view.width)]) {
-        this.shown.rendered = await pictureParts(await ask("/render", { client: clientName + "p", view: index, width, layers: [view.modality] }, signal));
+        this.shown.rendered = await pictureParts(await (await ask("/render", { client: clientName + "p", view: index, width, layers: [view.modality] }, signal)).arrayBuffer());
         this.paint();
       }
       $("photo-rendered-words").textContent = "rendered from its pose";

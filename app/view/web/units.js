@@ -25,8 +25,8 @@ const shownTemperature = (k, digits = 1) => Number.isFinite(k) ? fromKelvin(k).t
 const shownDifference = (k, digits = 1) => Number.isFinite(k) ? (gray ? k : unit === "F" ? k * 1.8 : k).toFixed(digits) + (gray ? "" : unit === "F" ? " °F" : " K") : "–";
 
 /// Several pictures in one answer: app/view/picture_parts.hpp.
-async function pictureParts(answer) {
-  const bytes = await answer.arrayBuffer(), length = new DataView(bytes).getUint32(0, true);
+async function pictureParts(bytes) {
+  const length = new DataView(bytes).getUint32(0, true);
   const head = JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, length)));
   const pictures = {};
   let at = 4 + length;

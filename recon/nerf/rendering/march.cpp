@@ -47,7 +47,7 @@ struct alignas(32) Lanes {
 
   void set(int lane, const DrawnRay& given, float near, const Occupancy& occupancy) {
     const float far_edge = static_cast<float>(1 << (occupancy.cascades - 1));
-    t[lane] = near;
+    t[lane] = std::max(near, given.near);
     far[lane] = given.far;
     for (int d = 0; d < 3; ++d) {
       const float o = given.ray.origin[d], along = given.ray.direction[d];

@@ -11,6 +11,7 @@ namespace orbitfuse::nerf {
 
 struct DrawnRay {
   Ray ray;
+  float near = 0;  ///< nothing before it is seen, nor before the march's own
   float far = std::numeric_limits<float>::max();  ///< nothing beyond it is seen
   float jitter = 0.5f;                            ///< 0..1, where in its stratum a sample lies
 };

@@ -298,6 +298,22 @@ class PhotoDetail::NewView {
   std::vector<Asked> asked_;
 };
 
+Result<bool> PhotoDetail::prepare_one(const Field& field, const Camera& camera,
+                                      const Rigid3d& cam_from_world, const cv::Mat& depth,
+                                      const Progress& progress) {
+  const Rigid3d world_from_cam = cam_from_world.inverse();
+  const auto middle = looked_at(camera, world_from_cam, depth);
+  if (!middle) return false;
+  const std::vector<Source*> chosen = nearest(world_from_cam.translation, *middle, {});
+  const auto missing = std::find_if(chosen.begin(), chosen.end(),
+                                    [](const Source* source) { return source->depth.empty(); });
+  if (missing == chosen.end()) return false;
+  ORBITFUSE_TRY(prepare(field, progress, **missing));
+  (*missing)->last_asked = ++asked_;
+  forget_old(chosen);
+  return true;
+}
+
 Result<double> PhotoDetail::add(const Field& field, const Camera& camera,
                                 const Rigid3d& cam_from_world, RenderedView& seen,
                                 const Progress& progress, const std::string& except) {

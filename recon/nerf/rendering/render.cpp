@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -12,6 +11,7 @@
 
 #include "core/option_range.hpp"
 #include "core/system/parallel.hpp"
+#include "recon/nerf/rendering/alike_neighbours.hpp"
 #include "recon/nerf/rendering/proposal.hpp"
 #include "recon/nerf/rendering/ray_block.hpp"
 
@@ -19,6 +19,7 @@ namespace orbitfuse::nerf {
 namespace {
 
 constexpr int rays_per_block = 64;
+constexpr int limit_stride = 4;  // one ray of 16 looks ahead for its neighbours
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 
 struct Output {
@@ -53,13 +54,18 @@ Status RenderOptions::validate() const {
   const OptionCheck check("render");
   ORBITFUSE_TRY(check("stop_transmittance", stop_transmittance, between(0, 0.5)));
   ORBITFUSE_TRY(check("alike", alike, from_to(0, 0.5)));
+  if (alike_px != 2 && alike_px != limit_stride)
+    return fail(ErrorKind::usage, "render.alike_px", std::to_string(alike_px), "must be 2 or 4");
   return check("sample_factor", sample_factor, from_to(0.1, 16));
 }
 
 namespace {
 
-constexpr int limit_stride = 4;  // one ray of 16 looks ahead for its neighbours
 constexpr float limit_margin = 1.03f;
+/// Of the samples, for a ray that looks where its neighbours ended: most of the way has been looked
+/// at. With all of them such pictures are nearer to finely sampled ones than those whose every
+/// pixel is rendered, and a seventh dearer.
+constexpr double between_share = 0.7;
 constexpr float no_limit = std::numeric_limits<float>::max();
 
 /// How far to look: a little behind the farthest of what one ray of each square of limit_stride
@@ -75,6 +81,15 @@ cv::Mat limits_from(const cv::Mat& ends, cv::Size size) {
     }
   return far;
 }
+
+/// Where on its ray each pixel looks, or where its light faded: from `near` (0: all the way) to
+/// `far` (no_limit: it never ends).
+struct Reach {
+  cv::Mat near, far;
+
+  explicit Reach(cv::Size size)
+      : near(cv::Mat::zeros(size, CV_32FC1)), far(size, CV_32FC1, cv::Scalar(no_limit)) {}
+};
 
 /// Renders the pixels of one image, block by block.
 class ImageRenderer {
@@ -92,6 +107,9 @@ class ImageRenderer {
     height_ = (camera.height + stride - 1) / stride;
     march_.surface = static_cast<int>(std::lround(march_.surface * options.sample_factor));
     march_.haze = static_cast<int>(std::lround(march_.haze * options.sample_factor));
+    between_ = march_;
+    between_.surface = static_cast<int>(std::lround(between_share * between_.surface));
+    between_.haze = static_cast<int>(std::lround(between_share * between_.haze));
   }
 
   /// Where each ray has met what stops it; no_limit where nothing did.
@@ -102,8 +120,8 @@ class ImageRenderer {
       thread_local std::vector<int> pixels;
       block.clear();
       pixels.clear();
-      for (int p = begin; p < end; ++p) add(p, no_limit, pixels);
-      place(block);
+      for (int p = begin; p < end; ++p) add(p, 0, no_limit, pixels);
+      place(block, march_);
       forward(field_, kernels_, limits_, block);
       for (std::size_t r = 0; r < pixels.size(); ++r)
         out.at<float>(pixels[r] / width_, pixels[r] % width_) = end_of(block, r);
@@ -126,42 +144,94 @@ class ImageRenderer {
     RenderedView view = empty_view();
     std::vector<int> all(static_cast<std::size_t>(width_ * height_));
     std::iota(all.begin(), all.end(), 0);
-    render(all, far, view);
+    Reach look(far.size());
+    look.far = far;
+    render(all, look, view, nullptr, march_);
     return view;
   }
 
-  /// A quarter of the pixels, and of the rest, in two rounds, those whose neighbours aren't alike;
-  /// these are their mean. So are the pixels that look ahead for the others: what they saw was
-  /// sampled too thinly.
-  RenderedView sparse_image(double alike) {
+  /// Every pixel of a grid `options.alike_px` apart, and of the rest, in rounds that halve the
+  /// distance, those whose neighbours aren't alike; these are their mean. So are the pixels that
+  /// look ahead for the others: what they saw was sampled too thinly.
+  RenderedView sparse_image(const RenderOptions& options) {
     RenderedView view = empty_view();
-    cv::Mat far(height_, width_, CV_32FC1, cv::Scalar(no_limit)), ends = far.clone();
+    Reach look(view.depth.size()), met(view.depth.size());  // not copies: these share their planes
     const auto looks = [](int x, int y) { return x % limit_stride == 0 && y % limit_stride == 0; };
+    render(pixels_where(looks), look, view, &met, march_);
+    look.far = limits_from(every_fourth(met.far), look.far.size());
+    const bool wide = options.alike_px == limit_stride;
     const auto even = [](int x, int y) { return x % 2 == 0 && y % 2 == 0; };
-    render(pixels_where(looks), far, view, &ends);
-    far = limits_from(every_fourth(ends), far.size());
     render(pixels_where([&](int x, int y) {
-             return !inside(x, y, 1) || (even(x, y) && (!looks(x, y) || !inside(x, y, 2)));
+             if (!inside(x, y, 1) || (wide && looks(x, y))) return true;
+             return even(x, y) && (wide ? !inside(x, y, 2) : !looks(x, y) || !inside(x, y, 2));
            }),
-           far, view);
-    const auto most = static_cast<float>(alike);
-    const auto complete = [&](const Neighbours& neighbours, int margin, const auto& chosen) {
-      std::vector<int> unlike;
-      for (const int p :
-           pixels_where([&](int x, int y) { return inside(x, y, margin) && chosen(x, y); }))
-        if (!from_neighbours(view, p, neighbours, most)) unlike.push_back(p);
-      render(unlike, far, view);
-    };
-    complete(beside_by_two, 2, looks);
-    complete(diagonal, 1, [](int x, int y) { return x % 2 == 1 && y % 2 == 1; });
-    complete(beside, 1, [](int x, int y) { return (x + y) % 2 == 1; });
+           look, view, &met, march_);
+    Rest rest{options, look, met, view};
+    if (wide) {
+      complete(rest, diagonal_by_two, 2, [](int x, int y) { return x % 4 == 2 && y % 4 == 2; });
+      complete(rest, beside_by_two, 2,
+               [&](int x, int y) { return even(x, y) && (x + y) % 4 == 2; });
+    } else {
+      complete(rest, beside_by_two, 2, looks);
+    }
+    complete(rest, diagonal, 1, [](int x, int y) { return x % 2 == 1 && y % 2 == 1; });
+    complete(rest, beside, 1, [](int x, int y) { return (x + y) % 2 == 1; });
     return view;
   }
 
  private:
-  /// The listed pixels, each by its own ray; `ends`: as ends(), of these.
-  void render(const std::vector<int>& wanted, const cv::Mat& far, RenderedView& view,
-              cv::Mat* ends = nullptr) {
+  /// What the later rounds of sparse_image() go on with.
+  struct Rest {
+    const RenderOptions& options;
+    Reach& look;
+    Reach& met;
+    RenderedView& view;
+  };
+  /// The chosen pixels: of their neighbours where these are alike, else each by its own ray.
+  template <typename Chosen>
+  void complete(Rest& rest, const Neighbours& neighbours, int margin, const Chosen& chosen) {
+    constexpr int rows_per_block = 8;
+    const auto alike = static_cast<float>(rest.options.alike);
+    const auto blocks = static_cast<std::size_t>((height_ + rows_per_block - 1) / rows_per_block);
+    std::vector<std::vector<int>> unlike(blocks), on_something(blocks);
+    parallel_blocks(height_, rows_per_block, [&](int begin, int end) {
+      const auto block = static_cast<std::size_t>(begin / rows_per_block);
+      for (int y = begin; y < end; ++y)
+        for (int x = 0; x < width_; ++x) {
+          if (!inside(x, y, margin) || !chosen(x, y)) continue;
+          const int p = y * width_ + x;
+          const bool ends = rest.options.between_neighbours && look_between(rest, p, neighbours);
+          if (!take_mean(rest.view, x, y, neighbours, alike))
+            (ends ? on_something : unlike)[block].push_back(p);
+        }
+    });
+    for (const auto* lists : {&unlike, &on_something}) {
+      std::vector<int> all;
+      for (const std::vector<int>& some : *lists) all.insert(all.end(), some.begin(), some.end());
+      render(all, rest.look, rest.view, &rest.met, lists == &unlike ? march_ : between_);
+    }
+  }
+
+  /// A ray between four that end on something looks where their light faded, and a little round it.
+  /// False: they don't.
+  bool look_between(Rest& rest, int pixel, const Neighbours& of) const {
+    const int x = pixel % width_, y = pixel / width_;
+    float near = no_limit, far = 0;
+    for (const auto& [dx, dy] : of) {
+      near = std::min(near, rest.met.near.at<float>(y + dy, x + dx));
+      far = std::max(far, rest.met.far.at<float>(y + dy, x + dx));
+    }
+    rest.met.near.at<float>(y, x) = near;  // stands unless the pixel is rendered
+    rest.met.far.at<float>(y, x) = far;
+    if (!(far < no_limit)) return false;
+    rest.look.near.at<float>(y, x) = near / limit_margin;
+    rest.look.far.at<float>(y, x) = far * limit_margin;
+    return true;
+  }
+
+  /// The listed pixels, each by its own ray; `met`: where their light faded.
+  void render(const std::vector<int>& wanted, const Reach& look, RenderedView& view, Reach* met,
+              const MarchSettings& march) {
     const int channels = field_.channels();
     const auto at = [&](const cv::Mat& plane, int p) {
       return plane.at<float>(p / width_, p % width_);
@@ -176,23 +246,27 @@ class ImageRenderer {
         if (limited)
           for (int i = begin; i < end; ++i) {
             const int p = wanted[static_cast<std::size_t>(i)];
-            add(p, at(far, p), pixels);
+            add(p, at(look.near, p), at(look.far, p), pixels);
           }
         else
-          for (const int p : again) add(p, no_limit, pixels);
+          for (const int p : again) add(p, 0, no_limit, pixels);
         if (pixels.empty()) continue;
-        place(block);
+        place(block, limited ? march : march_);
         forward(field_, kernels_, limits_, block);
         int row = 0;
         for (std::size_t r = 0; r < pixels.size(); ++r) {
-          const int x = pixels[r] % width_, y = pixels[r] / width_;
+          const int p = pixels[r], x = p % width_, y = p / width_;
           write_ray(field_, block, static_cast<int>(r), row,
                     {view.color.ptr<float>(y) + x * channels, view.depth.ptr<float>(y) + x,
                      view.opacity.ptr<float>(y) + x});
           const float stop = end_of(block, r);
-          if (ends != nullptr) ends->at<float>(y, x) = stop;
-          if (limited && at(far, pixels[r]) < no_limit && stop == no_limit)
-            again.push_back(pixels[r]);
+          if (met != nullptr) {
+            met->far.at<float>(y, x) = stop;
+            met->near.at<float>(y, x) = begin_of(block, r);
+          }
+          const bool passed = at(look.far, p) < no_limit && stop == no_limit,
+                     late = at(look.near, p) > 0 && starts_dark(block, r);
+          if (limited && (passed || late)) again.push_back(p);
         }
       }
     });
@@ -218,68 +292,43 @@ class ImageRenderer {
     return coarse;
   }
 
-  using Neighbours = std::array<std::array<int, 2>, 4>;
-  static constexpr Neighbours beside = {{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}},
-                              diagonal = {{{-1, -1}, {1, -1}, {-1, 1}, {1, 1}}},
-                              beside_by_two = {{{-2, 0}, {2, 0}, {0, -2}, {0, 2}}};
-
-  /// The mean of the four neighbours, where nothing tells that there is more to be seen.
-  bool from_neighbours(RenderedView& view, int pixel, const Neighbours& of, float alike) const {
-    constexpr float alike_depth = 0.03F;  // of it; a step from one surface to another is more
-    const int x = pixel % width_, y = pixel / width_;
-    std::array<cv::Point, 4> around;
-    for (std::size_t i = 0; i < 4; ++i) around[i] = {x + of[i][0], y + of[i][1]};
-    const auto mean = [&](const cv::Mat& plane, int channels, int c, auto most, float& out) {
-      float low = std::numeric_limits<float>::max(), high = -low, sum = 0;
-      for (const cv::Point& p : around) {
-        const float value = plane.ptr<float>(p.y)[p.x * channels + c];
-        low = std::min(low, value);
-        high = std::max(high, value);
-        sum += value;
-      }
-      out = 0.25F * sum;
-      return high - low <= most(high) && !std::isnan(sum);
-    };
-    const auto within = [alike](float) { return alike; };
-    const int channels = field_.channels();
-    std::array<float, 3> color{};
-    for (int c = 0; c < channels; ++c)
-      if (!mean(view.color, channels, c, within, color[static_cast<std::size_t>(c)])) return false;
-    float opacity = 0, depth = nan;
-    if (!mean(view.opacity, 1, 0, within, opacity)) return false;
-    const auto is_sky = [&](const cv::Point& p) { return std::isnan(view.depth.at<float>(p)); };
-    if (!std::all_of(around.begin(), around.end(), is_sky) &&
-        !mean(
-            view.depth, 1, 0, [](float z) { return alike_depth * z; }, depth))
-      return false;
-    std::copy_n(color.data(), channels, view.color.ptr<float>(y) + x * channels);
-    view.opacity.at<float>(y, x) = opacity;
-    view.depth.at<float>(y, x) = depth;
-    return true;
-  }
-
-  void add(int pixel, float far, std::vector<int>& pixels) const {
+  void add(int pixel, float near, float far, std::vector<int>& pixels) const {
     const Camera& camera = rays_.camera();
     const int x = pixel % width_ * stride_ + stride_ / 2,
               y = pixel / width_ * stride_ + stride_ / 2;
     Ray ray;
     if (!rays_.ray(std::min(camera.width - 1, x) + 0.5, std::min(camera.height - 1, y) + 0.5, ray))
       return;
-    drawn().push_back({ray, far, 0.5f});
+    drawn().push_back({ray, near, far, 0.5f});
     pixels.push_back(pixel);
   }
   /// The samples of all rays that add() noted.
-  void place(RayBlock& block) const {
+  void place(RayBlock& block, const MarchSettings& march) const {
     thread_local ProposalBlock proposals;
     if (proposing_)
-      add_proposed(field_, kernels_, drawn(), {.near = march_.near}, proposals, block);
+      add_proposed(field_, kernels_, drawn(), {.near = march.near}, proposals, block);
     else
-      block.add(field_.occupancy, march_, drawn());
+      block.add(field_.occupancy, march, drawn());
     drawn().clear();
   }
   static std::vector<DrawnRay>& drawn() {
     thread_local std::vector<DrawnRay> rays;
     return rays;
+  }
+  /// Of ray r: the sample before the first that takes light; 0 where that is the first.
+  static float begin_of(const RayBlock& block, std::size_t r) {
+    constexpr float all_but_nothing = 0.98F;
+    const auto begin = static_cast<std::size_t>(block.first[r]),
+               end = begin + static_cast<std::size_t>(block.used[r]);
+    for (std::size_t i = begin; i < end; ++i)
+      if (block.light[i] < all_but_nothing)
+        return i > begin ? block.t[i - 1] : std::max(0.0F, block.t[i] - block.dt[i]);
+    return 0;
+  }
+  /// Whether ray r is within something from its first sample on: its surface may lie before that.
+  static bool starts_dark(const RayBlock& block, std::size_t r) {
+    constexpr float least_light = 0.8F;
+    return block.used[r] > 0 && block.light[static_cast<std::size_t>(block.first[r])] < least_light;
   }
   /// Of ray r, as ends().
   float end_of(const RayBlock& block, std::size_t r) const {
@@ -292,7 +341,7 @@ class ImageRenderer {
   const ViewRays& rays_;
   int stride_, width_ = 0, height_ = 0;
   const Kernels& kernels_;
-  MarchSettings march_;
+  MarchSettings march_, between_;
   ForwardSettings limits_;
   bool proposing_ = field_.options.sampling == Sampling::proposal;
 };
@@ -304,7 +353,7 @@ RenderedView render_strided(const FieldState& field, const ViewRays& rays, int s
   ImageRenderer renderer(field, rays, stride, options);
   const int width = (rays.camera().width + stride - 1) / stride,
             height = (rays.camera().height + stride - 1) / stride;
-  if (options.alike > 0) return renderer.sparse_image(options.alike);
+  if (options.alike > 0) return renderer.sparse_image(options);
   // Proposal networks know where surfaces are.
   if (!options.look_ahead || field.options.sampling == Sampling::proposal ||
       std::min(width, height) < 8 * limit_stride)

@@ -16,6 +16,9 @@
 #include <httplib.h>
 #pragma GCC diagnostic pop
 
+#include "app/stages/rendered_views.hpp"
+#include "app/view/layers.hpp"
+#include "app/view/scene_json.hpp"
 #include "app/view/shot_request.hpp"
 #include "core/image/image_codec.hpp"
 #include "core/image/image_io.hpp"
@@ -174,6 +177,53 @@ TEST_F(ViewServerTest, PicturesAreTheFieldsOwn) {
   EXPECT_GT(alike, 500);
 }
 
+/// The run's new views have it: the viewer's last pictures, films and radiometric images, too.
+TEST_F(ViewServerTest, DetailOfRecordedFramesIsInTheLastPictures) {
+  FinishedRun run = test::toy_run(folder.path());
+  ASSERT_FALSE(run.has_detail());
+  const auto brighter = [&](Modality modality, double by) {
+    std::vector<nerf::DetailSource> sources;
+    for (const nerf::TrainingView& view : nerf::test::toy_scene(modality, 6).views)
+      sources.push_back(
+          {{view.name, view.camera, view.cam_from_world},
+           [image = cv::Mat(view.image + cv::Scalar::all(by))] { return Result<cv::Mat>(image); }});
+    nerf::DetailOptions options;
+    options.base_width_px = 32;
+    options.depth_tolerance = 0.1;  // so small a field is a coarse one
+    return nerf::PhotoDetail::of(std::move(sources), options).value();
+  };
+  run.visible_detail = brighter(Modality::visible, 0.05);
+  run.thermal_detail = brighter(Modality::thermal, 1);
+  EXPECT_TRUE(run.has_detail());
+  EXPECT_EQ(scene_json(run).at("detail"), true);
+  RenderTurns turns;
+  LayerRenderer layers(run);
+  RenderTurns::Job job(turns, "one", nullptr);
+  const PosedView& view = run.views[0].view;
+  const Shot shot{view.camera.scaled_to(64, 64), view.cam_from_world};
+  const auto plain = layers.render(shot, {.every_pixel = true}, job),
+             detailed = layers.render(shot, {.every_pixel = true, .detail = true}, job),
+             after = layers.render(shot, {.every_pixel = true}, job);
+  ASSERT_TRUE(plain && detailed && after);
+  // As the render stage makes it.
+  const auto own = [&](const nerf::Field& field, const nerf::PhotoDetail& lent) {
+    nerf::PhotoDetail detail = lent;
+    auto seen = nerf::render(field, shot.camera, shot.cam_from_world, run.config.render.visible, {})
+                    .value();
+    EXPECT_GT(detail.add(field, shot.camera, shot.cam_from_world, seen, {}).value(), 0.02);
+    return seen;
+  };
+  const nerf::RenderedView colors = own(run.visible, run.visible_detail),
+                           kelvin = own(run.thermal, run.thermal_detail);
+  EXPECT_LE(cv::norm(detailed->visible, stages::bgr8_of_rgb(colors.color), cv::NORM_INF), 1);
+  const cv::Mat known = detailed->kelvin == detailed->kelvin;
+  EXPECT_LT(cv::norm(detailed->kelvin, kelvin.color, cv::NORM_INF, known), 0.01);
+  EXPECT_GT(cv::norm(detailed->visible, plain->visible, cv::NORM_INF), 3);
+  EXPECT_GT(cv::norm(detailed->kelvin, plain->kelvin, cv::NORM_INF, known), 0.3);
+  EXPECT_EQ(cv::norm(after->visible, plain->visible, cv::NORM_INF), 0)
+      << "it stays in what is kept";
+}
+
 /// The page's bar under the fused picture is made of these.
 TEST_F(ViewServerTest, SceneTellsTheFusedPicturesOwnScale) {
   serve();
@@ -241,6 +291,7 @@ TEST_F(ViewServerTest, HostileRequestsAreNamed) {
       {R"({"layers":"visible"})", "layers"},
       {R"({"layers":["mud"]})", "layers"},
       {R"({"thermal_divisor":0})", "thermal_divisor"},
+      {R"({"detail":1})", "detail"},
       {R"({"view":-1})", "view"},
       {R"({"view":12})", "view"},
       {R"({"view":18446744073709551615})", "view"},

@@ -110,6 +110,25 @@ TEST_P(Detail, OfTheOtherViewsIsNearerToAViewThanTheFieldAlone) {
   }
 }
 
+/// What is made ready piece by piece is what add() makes ready at once.
+TEST_P(Detail, IsTheSamePreparedSourceBySource) {
+  const TrainingView& view = data.views[3];
+  const RenderedView plain = rendered(field, view);
+  RenderedView at_once = rendered(field, view), prepared = rendered(field, view);
+  PhotoDetail first = detail_of(sources_of(data)), second = detail_of(sources_of(data));
+  ASSERT_TRUE(first.add(field, view.camera, view.cam_from_world, at_once, {}));
+  int made = 0;
+  while (made < 10 &&
+         second.prepare_one(field, view.camera, view.cam_from_world, plain.depth, {}).value())
+    ++made;
+  EXPECT_EQ(made, small().sources);
+  ASSERT_TRUE(second.add(field, view.camera, view.cam_from_world, prepared, {}));
+  EXPECT_EQ(cv::norm(at_once.color, prepared.color, cv::NORM_INF), 0);
+  PhotoDetail nothing;
+  EXPECT_FALSE(
+      nothing.prepare_one(field, view.camera, view.cam_from_world, plain.depth, {}).value());
+}
+
 TEST_P(Detail, IsTheSameForAnyThreadCount) {
   const TrainingView& view = data.views[3];
   std::vector<cv::Mat> results;
