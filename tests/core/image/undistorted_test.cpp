@@ -47,9 +47,9 @@ TEST(RecordedStraight, GivesWhatALensWithoutDistortionShows) {
   const cv::Mat photo = noise(CV_8UC3);
   const auto straight = recorded_straight(photo, camera, "visible/3.png");
   ASSERT_TRUE(straight);
-  EXPECT_EQ(cv::norm(*straight, undistorted(photo, camera, camera.without_distortion()),
-                     cv::NORM_INF),
-            0);
+  EXPECT_EQ(
+      cv::norm(*straight, undistorted(photo, camera, camera.without_distortion()), cv::NORM_INF),
+      0);
   const auto same = recorded_straight(photo, camera.without_distortion(), "visible/3.png");
   ASSERT_TRUE(same);
   EXPECT_EQ(same->data, photo.data) << "nothing to do";

@@ -26,8 +26,13 @@ TEST(Bilinear, OfAPlaneIsThePlane) {
 }
 
 TEST(Bilinear, AmongTheCentresEndsBeforeTheLast) {
-  for (const auto& [x, y] : {std::pair{-1e-9, 1.0}, {1.0, -1e-9}, {3.0, 1.0}, {1.0, 2.0},
-                             {nan, 1.0}, {1.0, nan}, {1e300, 1.0}})
+  for (const auto& [x, y] : {std::pair{-1e-9, 1.0},
+                             {1.0, -1e-9},
+                             {3.0, 1.0},
+                             {1.0, 2.0},
+                             {nan, 1.0},
+                             {1.0, nan},
+                             {1e300, 1.0}})
     EXPECT_FALSE(place_among<float>(columns, rows, x, y)) << x << ' ' << y;
   EXPECT_TRUE(place_among<float>(columns, rows, std::nextafter(3.0F, 0.0F), 1.0F));
   EXPECT_FALSE(place_among<float>(1, rows, 0.0F, 0.0F));
