@@ -85,10 +85,7 @@ Result<ShotRequest> shot_request_of(const json& j, const FinishedRun& run) {
         return fields.wrong("layers", "a list of visible, thermal and fused");
     }
   }
-  if (const auto detail = j.find("detail"); detail != j.end()) {
-    if (!detail->is_boolean()) return wrong("detail", shown(*detail), "must be true or false");
-    request.wish.detail = *detail;
-  }
+  if (fields.has("detail")) ORBITFUSE_TRY(fields.get("detail", request.wish.detail));
   for (const auto& [field, to] : {std::pair{"divisor", &request.wish.divisor},
                                   {"thermal_divisor", &request.wish.thermal_divisor}})
     if (fields.has(field)) {

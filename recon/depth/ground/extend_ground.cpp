@@ -29,7 +29,9 @@ constexpr double reach_share = 0.02, sky_reach_share = 0.005;
 constexpr float sky_slope = 0.005f;
 /// Gray levels by which sky and far ground change over so many pixels of a way; by more, something
 /// else begins.
-constexpr int sky_change = 7, ground_change = 24, edge_px = 4;
+constexpr int sky_change = 7, ground_change = 16, edge_px = 4;
+/// Gray levels by which two views may differ in one place, exposure included.
+constexpr int alike = 14;
 /// As a distance: farther than anything.
 constexpr float nothing = 1e6f;
 /// Of a map's pixels, and by how much depth may change from one to the next.
@@ -247,16 +249,55 @@ class Extension {
   Eigen::Vector3d nadir_;  ///< in camera axes
 };
 
+/// What other views show where one view's pixel is thought to see the ground or the sky.
+class Witnesses {
+ public:
+  Witnesses(const std::vector<DepthView>& views, const std::vector<cv::Mat>& smooth,
+            const std::vector<cv::Mat>& obstacles)
+      : views_(views), smooth_(smooth), obstacles_(obstacles) {}
+
+  /// More views that see the same gray level there than another one; what hides it from them counts
+  /// for nothing. A wall that is taken for the ground behind it looks otherwise from the side.
+  bool agree(std::size_t own, cv::Point pixel, float z) const {
+    const DepthView& view = views_[own];
+    const Eigen::Vector3f ray = view.world_rotation.transpose() *
+                                view.camera.ray_of({pixel.x + 0.5, pixel.y + 0.5}).cast<float>();
+    const bool sky = std::isinf(z);
+    const int gray = smooth_[own].at<std::uint8_t>(pixel);
+    int alike_views = 0, others = 0;
+    for (std::size_t k = 0; k < views_.size(); ++k) {
+      if (k == own) continue;
+      const Eigen::Vector3f there =
+          sky ? Eigen::Vector3f(views_[k].world_rotation * ray)
+              : Eigen::Vector3f(views_[k].world_rotation * (view.center() + z * ray) +
+                                views_[k].translation);
+      if (!(there.z() > 1e-3f)) continue;
+      const Eigen::Vector2d at = views_[k].camera.project(there.cast<double>());
+      const cv::Mat& shown = smooth_[k];
+      if (!(at.x() >= 0 && at.y() >= 0 && at.x() < shown.cols && at.y() < shown.rows)) continue;
+      const int x = static_cast<int>(at.x()), y = static_cast<int>(at.y());
+      if (obstacles_[k].at<float>(y, x) < (sky ? nothing : hides * there.z())) continue;
+      const bool like = std::abs(shown.at<std::uint8_t>(y, x) - gray) <= alike;
+      ++(like ? alike_views : others);
+    }
+    return alike_views > others;
+  }
+
+ private:
+  const std::vector<DepthView>& views_;
+  const std::vector<cv::Mat>&smooth_, &obstacles_;
+};
+
 /// Writes what is found to the map and counts it, in pixels.
-OpenSpace fill(Extension& extension, const cv::Mat& known, const Eigen::Vector3f& normal, float far,
-               DepthMap& map) {
+OpenSpace fill(Extension& extension, const Witnesses& witnesses, const cv::Mat& known,
+               const Eigen::Vector3f& normal, float far, std::size_t view, DepthMap& map) {
   OpenSpace filled;
   map.depth = map.depth.clone();
   for (int y = 0; y < map.depth.rows; ++y)
     for (int x = 0; x < map.depth.cols; ++x) {
       if (std::isfinite(known.at<float>(y, x))) continue;
       const float z = extension.depth({x, y}, far);
-      if (std::isnan(z)) continue;
+      if (std::isnan(z) || !witnesses.agree(view, {x, y}, z)) continue;
       ++(std::isinf(z) ? filled.sky : filled.ground);
       map.depth.at<float>(y, x) = z;
       map.confidence.at<float>(y, x) = confidence;
@@ -279,15 +320,20 @@ OpenSpace extend_over_ground(const std::vector<DepthView>& views, const GroundPl
     raised[k] = raised_points(views[k], ground, known[k]);
   });
   const GrayRange levels = ground_levels(views, smooth, ground, known);
+  std::vector<cv::Mat> wide(views.size()), narrow(views.size());
+  parallel_for(count, [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    const cv::Mat here = obstacles(views[k], raised, known[k].size());
+    wide[k] = spread(here, reach_share);
+    narrow[k] = spread(here, sky_reach_share);
+  });
+  const Witnesses witnesses(views, smooth, narrow);
   std::vector<OpenSpace> filled(views.size());
   parallel_for(count, [&](int i) {
     const auto k = static_cast<std::size_t>(i);
-    const DepthView& view = views[k];
-    const cv::Mat raised_here = obstacles(view, raised, known[k].size());
-    const cv::Mat wide = spread(raised_here, reach_share);
-    const cv::Mat narrow = spread(raised_here, sky_reach_share);
-    Extension extension(view, ground, levels, smooth[k], wide, narrow, known[k]);
-    filled[k] = fill(extension, known[k], view.world_rotation * ground.normal, far, maps[k]);
+    Extension extension(views[k], ground, levels, smooth[k], wide[k], narrow[k], known[k]);
+    const Eigen::Vector3f normal = views[k].world_rotation * ground.normal;
+    filled[k] = fill(extension, witnesses, known[k], normal, far, k, maps[k]);
   });
   OpenSpace all;
   double pixels = 0;

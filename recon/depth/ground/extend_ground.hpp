@@ -19,7 +19,8 @@ namespace orbitfuse::depth {
 ///   before them; at most `far` (in scene radii) from the centre, what is farther stands there;
 /// - an infinite one, where they are above the horizon and up to the image's border nothing is
 /// confirmed
-///   and nothing else begins.
+///   and nothing else begins;
+/// and where more of the other views show the same gray level in that place than another one.
 /// Returns the shares of all pixels that got a depth.
 OpenSpace extend_over_ground(const std::vector<DepthView>& views, const GroundPlane& ground,
                              float far, std::vector<DepthMap>& maps);
