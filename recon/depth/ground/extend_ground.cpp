@@ -45,14 +45,14 @@ struct GrayRange {
   bool holds(int gray) const { return gray >= low && gray <= high; }
 };
 
-bool on_ground(const GroundPlane& ground, const Eigen::Vector3f& x) {
+bool on_ground(const OpenGround& ground, const Eigen::Vector3f& x) {
   // Depth errors grow with the distance.
   return std::abs(ground.height(x)) < 0.02f + 0.01f * x.norm();
 }
 
 /// Gray levels of the confirmed ground, of all views.
 GrayRange ground_levels(const std::vector<DepthView>& views, const std::vector<cv::Mat>& smooth,
-                        const GroundPlane& ground, const std::vector<cv::Mat>& known) {
+                        const OpenGround& ground, const std::vector<cv::Mat>& known) {
   std::vector<int> levels;
   for (std::size_t i = 0; i < views.size(); ++i)
     for (int y = 0; y < known[i].rows; y += 2)
@@ -119,7 +119,7 @@ cv::Mat without_specks(const cv::Mat& depth) {
   return out;
 }
 
-std::vector<Eigen::Vector3f> raised_points(const DepthView& view, const GroundPlane& ground,
+std::vector<Eigen::Vector3f> raised_points(const DepthView& view, const OpenGround& ground,
                                            const cv::Mat& depth) {
   std::vector<Eigen::Vector3f> out;
   for (int y = 0; y < depth.rows; y += 2)
@@ -134,7 +134,7 @@ std::vector<Eigen::Vector3f> raised_points(const DepthView& view, const GroundPl
 
 class Extension {
  public:
-  Extension(const DepthView& view, const GroundPlane& ground, GrayRange levels,
+  Extension(const DepthView& view, const OpenGround& ground, GrayRange levels,
             const cv::Mat& smooth, const cv::Mat& obstacles, const cv::Mat& near_obstacles,
             const cv::Mat& known)
       : view_(view),
@@ -241,7 +241,7 @@ class Extension {
   }
 
   const DepthView& view_;
-  const GroundPlane& ground_;
+  const OpenGround& ground_;
   GrayRange levels_;
   const cv::Mat &smooth_, &obstacles_, &near_obstacles_;
   const cv::Mat& known_;
@@ -308,7 +308,7 @@ OpenSpace fill(Extension& extension, const Witnesses& witnesses, const cv::Mat& 
 
 }  // namespace
 
-OpenSpace extend_over_ground(const std::vector<DepthView>& views, const GroundPlane& ground,
+OpenSpace extend_over_ground(const std::vector<DepthView>& views, const OpenGround& ground,
                              float far, std::vector<DepthMap>& maps) {
   const int count = static_cast<int>(views.size());
   std::vector<cv::Mat> smooth(views.size()), known(views.size());

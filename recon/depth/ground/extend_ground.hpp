@@ -22,7 +22,7 @@ namespace orbitfuse::depth {
 ///   and nothing else begins;
 /// and where more of the other views show the same gray level in that place than another one.
 /// Returns the shares of all pixels that got a depth.
-OpenSpace extend_over_ground(const std::vector<DepthView>& views, const GroundPlane& ground,
+OpenSpace extend_over_ground(const std::vector<DepthView>& views, const OpenGround& ground,
                              float far, std::vector<DepthMap>& maps);
 
 }  // namespace orbitfuse::depth

@@ -41,7 +41,7 @@ Eigen::Vector3f mean_up(const std::vector<DepthView>& views) {
   return up.normalized();
 }
 
-bool under_the_cameras(const GroundPlane& plane, const std::vector<DepthView>& views) {
+bool under_the_cameras(const OpenGround& plane, const std::vector<DepthView>& views) {
   return std::all_of(views.begin(), views.end(), [&](const DepthView& view) {
     return plane.height(view.center()) > min_camera_height;
   });
@@ -51,7 +51,7 @@ struct Votes {
   std::size_t on = 0, below = 0;
 };
 
-Votes votes(const GroundPlane& plane, const std::vector<Eigen::Vector3f>& points) {
+Votes votes(const OpenGround& plane, const std::vector<Eigen::Vector3f>& points) {
   Votes out;
   for (const Eigen::Vector3f& x : points) {
     const float h = plane.height(x);
@@ -61,7 +61,7 @@ Votes votes(const GroundPlane& plane, const std::vector<Eigen::Vector3f>& points
   return out;
 }
 
-GroundPlane fitted(const GroundPlane& near, const std::vector<Eigen::Vector3f>& points) {
+OpenGround fitted(const OpenGround& near, const std::vector<Eigen::Vector3f>& points) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
   double count = 0;
@@ -75,7 +75,7 @@ GroundPlane fitted(const GroundPlane& near, const std::vector<Eigen::Vector3f>& 
   const Eigen::Vector3d mean = sum / count;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / count -
                                                             mean * mean.transpose());
-  GroundPlane plane;
+  OpenGround plane;
   plane.normal = axes.eigenvectors().col(0).cast<float>();
   if (plane.normal.dot(near.normal) < 0) plane.normal = -plane.normal;
   plane.offset = -plane.normal.dot(mean.cast<float>());
@@ -88,12 +88,12 @@ tl::unexpected<Error> no_ground(std::string found) {
 
 }  // namespace
 
-Result<GroundPlane> find_ground(const std::vector<DepthView>& views,
-                                const std::vector<DepthMap>& maps, std::uint64_t seed) {
+Result<OpenGround> find_ground(const std::vector<DepthView>& views,
+                               const std::vector<DepthMap>& maps, std::uint64_t seed) {
   const std::vector<Eigen::Vector3f> points = confirmed_points(views, maps);
   if (points.size() < 1000) return no_ground(fmt::format("{} confirmed depths", points.size()));
   const Eigen::Vector3f up = mean_up(views);
-  GroundPlane best;
+  OpenGround best;
   Votes most;
   for (int trial = 0; trial < trials; ++trial) {
     const auto draw = [&](int k) {
@@ -106,7 +106,7 @@ Result<GroundPlane> find_ground(const std::vector<DepthView>& views,
     normal.normalize();
     if (normal.dot(up) < 0) normal = -normal;
     if (!(normal.dot(up) > max_tilt_cos)) continue;
-    const GroundPlane plane{normal, -normal.dot(a)};
+    const OpenGround plane{normal, -normal.dot(a)};
     if (!under_the_cameras(plane, views)) continue;
     const Votes found = votes(plane, points);
     if (found.on > most.on) best = plane, most = found;

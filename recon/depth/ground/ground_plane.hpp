@@ -13,7 +13,7 @@
 namespace orbitfuse::depth {
 
 /// The plain that an object stands on, in units of the scene radius, origin at the scene's centre.
-struct GroundPlane {
+struct OpenGround {
   Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  ///< away from the ground, towards the cameras
   float offset = 0;
 
@@ -22,7 +22,7 @@ struct GroundPlane {
 
 /// The plane under all cameras that most confirmed depths lie on, nothing below it (RANSAC, then
 /// least squares). `maps`: one a view, in the views' unit. Errors: quality (there is none; why).
-Result<GroundPlane> find_ground(const std::vector<DepthView>& views,
-                                const std::vector<DepthMap>& maps, std::uint64_t seed);
+Result<OpenGround> find_ground(const std::vector<DepthView>& views,
+                               const std::vector<DepthMap>& maps, std::uint64_t seed);
 
 }  // namespace orbitfuse::depth

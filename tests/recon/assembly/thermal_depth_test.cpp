@@ -34,7 +34,7 @@ TEST(ThermalDepth, IsFoundInNoisyTemperaturesOfTheViewsThatTrain) {
   const auto found = add_thermal_depth(data, 120, 4, 1, {});  // views 0 and 4 measure
   ASSERT_TRUE(found) << found.error().message();
   EXPECT_GT(found->known, 0.4);
-  EXPECT_EQ(found->problem, "");
+  EXPECT_FALSE(found->problem) << *found->problem;
   ASSERT_EQ(data.depth.size(), 3u);
   EXPECT_TRUE(data.validate());
   double good = 0, all = 0;
@@ -61,7 +61,7 @@ TEST(ThermalDepth, WithoutParallaxThereIsNoneAndTrainingGoesOn) {
   const auto found = add_thermal_depth(data, 120, 0, 1, {});
   ASSERT_TRUE(found) << found.error().message();
   EXPECT_EQ(found->known, 0);
-  EXPECT_NE(found->problem, "");
+  EXPECT_TRUE(found->problem);
   EXPECT_FALSE(data.has_dense_depth());
 }
 
@@ -82,7 +82,7 @@ TEST(ThermalDepth, ImagesTooSmallToMatchAreNoError) {
   for (nerf::TrainingView& view : data.views) view = nerf::resized(view, 16, 12);
   const auto found = add_thermal_depth(data, 260, 0, 1, {});
   ASSERT_TRUE(found) << found.error().message();
-  EXPECT_NE(found->problem, "");
+  EXPECT_TRUE(found->problem);
 }
 
 }  // namespace

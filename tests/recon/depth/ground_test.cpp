@@ -150,7 +150,7 @@ Count count(const Yard& before, const std::vector<DepthMap>& after, float far) {
   return n;
 }
 
-TEST(GroundPlane, IsFoundUnderTheCameras) {
+TEST(OpenGround, IsFoundUnderTheCameras) {
   const Yard scene = yard();
   const auto ground = find_ground(scene.views, scene.maps, 1);
   ASSERT_TRUE(ground) << ground.error().message();
@@ -158,7 +158,7 @@ TEST(GroundPlane, IsFoundUnderTheCameras) {
   EXPECT_NEAR(ground->offset, -floor_height, 0.003f);
 }
 
-TEST(GroundPlane, IsNoneWhereNothingLiesUnderTheCameras) {
+TEST(OpenGround, IsNoneWhereNothingLiesUnderTheCameras) {
   Yard scene = yard();
   for (DepthMap& map : scene.maps) map.depth.setTo(none);
   EXPECT_FALSE(find_ground(scene.views, scene.maps, 1));
@@ -175,7 +175,7 @@ TEST(GroundPlane, IsNoneWhereNothingLiesUnderTheCameras) {
   EXPECT_FALSE(find_ground(scene.views, scene.maps, 1));
 }
 
-TEST(GroundPlane, IsNotARoofWithTheYardBelowIt) {
+TEST(OpenGround, IsNotARoofWithTheYardBelowIt) {
   Yard scene = yard();
   // A third of the ground a hand's breadth lower than the rest: the upper part has much below it.
   for (DepthMap& map : scene.maps)
@@ -190,7 +190,7 @@ TEST(GroundPlane, IsNotARoofWithTheYardBelowIt) {
 TEST(ExtendedGround, ReachesTheHorizonAndLeavesTheSkyOpen) {
   for (const float roll : {0.f, 0.3f, std::numbers::pi_v<float> / 2}) {
     const Yard scene = yard(false, roll);
-    GroundPlane ground{Eigen::Vector3f::UnitZ(), -floor_height};
+    OpenGround ground{Eigen::Vector3f::UnitZ(), -floor_height};
     std::vector<DepthMap> maps;
     for (const DepthMap& map : scene.maps) {
       maps.push_back(map);
@@ -219,7 +219,7 @@ TEST(ExtendedGround, StopsAtWallsThatNothingConfirms) {
     maps.push_back(map);
     maps.back().depth = map.depth.clone();
   }
-  GroundPlane ground{Eigen::Vector3f::UnitZ(), -floor_height};
+  OpenGround ground{Eigen::Vector3f::UnitZ(), -floor_height};
   extend_over_ground(scene.views, ground, 12, maps);
   const Count n = count(scene, maps, 12);
   ASSERT_GT(n.others, 1000);
@@ -229,7 +229,7 @@ TEST(ExtendedGround, StopsAtWallsThatNothingConfirms) {
 
 TEST(ExtendedGround, IsTheSameForAnyNumberOfThreads) {
   const Yard scene = yard(true);
-  GroundPlane ground{Eigen::Vector3f::UnitZ(), -floor_height};
+  OpenGround ground{Eigen::Vector3f::UnitZ(), -floor_height};
   std::vector<cv::Mat> first;
   for (const int threads : {1, 3}) {
     set_thread_count(threads);
@@ -252,7 +252,7 @@ TEST(ExtendedGround, IsTheSameForAnyNumberOfThreads) {
 TEST(ExtendedGround, LeavesMapsWithoutAnyConfirmedGroundAlone) {
   Yard scene = yard();
   for (DepthMap& map : scene.maps) map.depth.setTo(none);
-  GroundPlane ground{Eigen::Vector3f::UnitZ(), -floor_height};
+  OpenGround ground{Eigen::Vector3f::UnitZ(), -floor_height};
   extend_over_ground(scene.views, ground, 12, scene.maps);
   for (const DepthMap& map : scene.maps)
     for (const float z : cv::Mat_<float>(map.depth)) EXPECT_FALSE(std::isfinite(z));

@@ -77,6 +77,11 @@ TEST(ViewVerdicts, WhatSpeaksAgainstAViewIsNamed) {
   between.confirmed_share = 0.9;
   EXPECT_TRUE(judged_between(between, {}).sure());
   EXPECT_TRUE(judged_between(between, lost).sure());
+  // Some patches keep a lost frame, in doubt; nor do all of them where form hardly knows it.
+  between.confirmed_share = 0.74;
+  EXPECT_EQ(judged_between(between, lost).confidence, Confidence::doubtful);
+  between.support_share = 0.38, between.confirmed_share = 0.95;
+  EXPECT_EQ(judged_between(between, lost).confidence, Confidence::doubtful);
   between.correlation = 0.3;
   EXPECT_EQ(judged_between(between, lost).reason, DoubtReason::temperatures_unlike);
   ViewEvidence loose = good;
