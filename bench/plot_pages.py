@@ -359,6 +359,8 @@ PLOTS = {
                                 "dB on test views (higher is better)"),
     "nerf_detail": bar_plot(("scene",), [Bar("field alone", "field alone"), Bar("with detail", "with detail")],
                             "dB on views that were not trained on (higher is better)"),
+    "nerf_open_space": bar_plot(("scene",), [Bar("thermal, MAE", "without"), Bar("thermal, MAE", "with", 1)],
+                                "kelvin off on test views (lower is better)"),
     "nerf_recipes": bar_plot(("scene",), [Bar("nerfacto", "nerfacto"), Bar("nerf-rgb", "nerf-rgb, nerf-ir"), Bar("ours", "ours")],
                              "dB on test views (higher is better)"),
 }
