@@ -18,6 +18,10 @@ constexpr std::size_t least_settled = 3;
 /// Of the median added view's confirmed patches: below, it is looked for elsewhere.
 constexpr double asked_share = 0.5;
 
+/// A view that is found farther from where its form has it than this is in doubt until nearly all
+/// patches settle it (judged_between): plain surfaces confirm a wrong place half as well.
+constexpr double elsewhere_deg = 1;
+
 /// Views with fewer confirmed patches than that.
 std::vector<std::size_t> little_confirmed(const std::vector<std::size_t>& added,
                                           const Fit& alignment) {
@@ -57,13 +61,21 @@ Status settle_by_patches(const OrbitRefinement& refinement, std::size_t first_ne
   for (const std::size_t i : lost) {
     const int before = alignment.views[i].confirmed_patches.value_or(0),
               after = tried.views[i].confirmed_patches.value_or(0);
+    const double moved_deg = apart_deg(refinement.orbit, alignment.views[i].view.cam_from_world,
+                                       tried.views[i].view.cam_from_world);
     refinement.progress.report(
         {"poses.thermal", 3, 4, -1,
          fmt::format("{}: {} patches confirmed, {} where temperatures have it, {:.1f} deg away",
-                     alignment.views[i].view.name, before, after,
-                     apart_deg(refinement.orbit, alignment.views[i].view.cam_from_world,
-                               tried.views[i].view.cam_from_world))});
-    if (after > before) alignment.views[i] = tried.views[i];
+                     alignment.views[i].view.name, before, after, moved_deg)});
+    if (after <= before) continue;
+    alignment.views[i] = tried.views[i];
+    ViewVerdict& verdict = alignment.views[i].verdict;
+    if (moved_deg > elsewhere_deg && verdict.sure())
+      verdict = {
+          Confidence::doubtful, DoubtReason::temperatures_elsewhere,
+          fmt::format("the other views' temperatures have it {:.1f} deg from where its edges "
+                      "do",
+                      moved_deg)};
   }
   return {};
 }
