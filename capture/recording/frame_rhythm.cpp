@@ -11,6 +11,7 @@ namespace orbitfuse {
 namespace {
 constexpr int settled = 8;      // the first intervals of a stream are irregular
 constexpr double late = 1.75;   // of the usual interval
+constexpr double bursts = 10;   // times the mean rate
 constexpr double weight = 0.1;  // a rate that changes with the light is followed in some frames
 
 std::uint64_t frames_of(double seconds, double interval_s) {
@@ -37,15 +38,21 @@ int FrameRhythm::note(std::uint64_t id, std::int64_t stamp_ns) {
   interval_s_ = known_ == 0 ? interval_s : (1 - weight) * interval_s_ + weight * told_s;
   shortest_s_ = known_ < settled ? interval_s_ : std::min(shortest_s_, interval_s_);
   ++known_;
+  all_s_ += told_s * static_cast<double>(steps);
+  all_steps_ += static_cast<double>(steps);
   return missing;
 }
 
+double FrameRhythm::bounded_s(double interval_s) const {
+  return std::max(interval_s, all_s_ / (bursts * all_steps_));
+}
+
 std::uint64_t FrameRhythm::frames_in(double seconds) const {
-  return known_ > 0 ? frames_of(seconds, interval_s_) : 1;
+  return known_ > 0 ? frames_of(seconds, bounded_s(interval_s_)) : 1;
 }
 
 std::uint64_t FrameRhythm::most_frames_in(double seconds) const {
-  return known_ > 0 ? frames_of(seconds, shortest_s_) : 1;
+  return known_ > 0 ? frames_of(seconds, bounded_s(shortest_s_)) : 1;
 }
 
 }  // namespace orbitfuse

@@ -24,6 +24,10 @@ class FrameRhythm {
   std::uint64_t most_frames_in(double seconds) const;
 
  private:
+  /// `interval_s`, or a tenth of the mean one where that is longer: a camera or host that was busy
+  /// sends what it kept back in one burst.
+  double bounded_s(double interval_s) const;
+
   struct Seen {
     std::uint64_t id;
     std::int64_t stamp_ns;
@@ -31,7 +35,9 @@ class FrameRhythm {
   std::optional<Seen> last_;
   double interval_s_ = 0;  ///< smoothed
   double shortest_s_ = 0;  ///< of interval_s_, since the first intervals
-  int known_ = 0;          ///< intervals so far
+  double all_s_ = 0;       ///< of all intervals, and the frames' steps in them
+  double all_steps_ = 0;
+  int known_ = 0;  ///< intervals so far
 };
 
 }  // namespace orbitfuse

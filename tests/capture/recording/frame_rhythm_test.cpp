@@ -82,6 +82,14 @@ TEST(FrameRhythm, ABusyMomentDoesNotHideTheRateThatTheStreamHeld) {
   EXPECT_EQ(FrameRhythm().most_frames_in(16), 1u);
 }
 
+TEST(FrameRhythm, ABurstOfKeptFramesIsNoRate) {
+  FrameRhythm rhythm = settled_at_10_hz(40);
+  std::int64_t stamp = 8000 * ms;
+  for (std::uint64_t id = 40; id < 100; ++id) rhythm.note(id, stamp += 100'000);
+  EXPECT_LE(rhythm.frames_in(13), 4000u) << "130 at the camera's rate, 130,000 at the burst's";
+  EXPECT_LE(rhythm.most_frames_in(13), 4000u);
+}
+
 TEST(FrameRhythm, StampsThatAreNoTimeSayNothing) {
   FrameRhythm rhythm = settled_at_10_hz(20);
   for (const std::int64_t stamp : {std::numeric_limits<std::int64_t>::min(), std::int64_t{-1},
