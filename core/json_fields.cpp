@@ -162,17 +162,19 @@ Status JsonFields::get_word(const char* key, std::string& value, std::size_t lon
 }
 
 Status JsonFields::get(const char* key, double& value, const OptionRange& range) const {
-  double number = 0;
-  const Status read = get(key, number);
-  if (!read || !range.contains(number)) return wrong(key, "a number, " + range.words());
-  value = number;
-  return {};
+  return get_within(key, value, range, "a number, ");
 }
 
 Status JsonFields::get(const char* key, int& value, const OptionRange& range) const {
-  int number = 0;
+  return get_within(key, value, range, "a whole number, ");
+}
+
+template <class T>
+Status JsonFields::get_within(const char* key, T& value, const OptionRange& range,
+                              const char* kind) const {
+  T number{};
   const Status read = get(key, number);
-  if (!read || !range.contains(number)) return wrong(key, "a whole number, " + range.words());
+  if (!read || !range.contains(number)) return wrong(key, kind + range.words());
   value = number;
   return {};
 }

@@ -114,6 +114,8 @@ class JsonFields {
   tl::unexpected<Error> wrong(const char* key, const std::string& expected) const;
 
  private:
+  template <class T>
+  Status get_within(const char* key, T& value, const OptionRange& range, const char* kind) const;
   Status numbers(const char* key, double* values, std::size_t count,
                  const OptionRange& range) const;
 

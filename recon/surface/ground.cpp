@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/surface/ground.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <random>
 #include <vector>
 
 #include "core/numeric/median.hpp"
@@ -44,64 +42,6 @@ Middles middles_of(const TriangleMesh& mesh, const Eigen::Vector3d& up) {
   return result;
 }
 
-std::vector<Eigen::Vector3d> in_band(const std::vector<Eigen::Vector3d>& points,
-                                     const GroundPlane& plane, double band) {
-  std::vector<Eigen::Vector3d> near;
-  for (const Eigen::Vector3d& p : points)
-    if (std::abs(plane.above(p)) <= band) near.push_back(p);
-  return near;
-}
-
-std::optional<GroundPlane> level_plane(const Eigen::Vector3d& normal, const Eigen::Vector3d& point,
-                                       const Eigen::Vector3d& up) {
-  GroundPlane plane;
-  plane.normal = normal.dot(up) < 0 ? -normal : normal;
-  plane.height = plane.normal.dot(point);
-  if (!(plane.normal.dot(up) > cosine(level_deg))) return std::nullopt;
-  return plane;
-}
-
-std::optional<GroundPlane> fitted(const std::vector<Eigen::Vector3d>& points,
-                                  const Eigen::Vector3d& up) {
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& p : points) middle += p;
-  middle /= static_cast<double>(points.size());
-  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
-  for (const Eigen::Vector3d& p : points) scatter += (p - middle) * (p - middle).transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(scatter);
-  return level_plane(axes.eigenvectors().col(0), middle, up);
-}
-
-std::optional<GroundPlane> largest_plane(const std::vector<Eigen::Vector3d>& points, double band,
-                                         const Eigen::Vector3d& up) {
-  if (points.size() < 100) return std::nullopt;
-  std::mt19937 random(1);
-  const auto any = [&] { return points[random() % points.size()]; };
-  std::optional<GroundPlane> best;
-  std::size_t most = 0;
-  for (int i = 0; i < planes_tried; ++i) {
-    const Eigen::Vector3d a = any(), b = any(), c = any();
-    const Eigen::Vector3d normal = (b - a).cross(c - a);
-    if (!(normal.norm() > band * band)) continue;
-    const auto plane = level_plane(normal.normalized(), a, up);
-    if (!plane) continue;
-    const auto count =
-        static_cast<std::size_t>(std::count_if(points.begin(), points.end(), [&](const auto& p) {
-          return std::abs(plane->above(p)) <= band;
-        }));
-    if (count > most) {
-      most = count;
-      best = plane;
-    }
-  }
-  for (int i = 0; i < 3 && best; ++i) {
-    const auto near = in_band(points, *best, band);
-    if (near.size() < 100) return std::nullopt;
-    best = fitted(near, up);
-  }
-  return best;
-}
-
 bool goes_on_all_round(const std::vector<Eigen::Vector3d>& points, const Eigen::AlignedBox3d& box,
                        const Eigen::Vector3d& normal) {
   const Eigen::Vector3d x = normal.unitOrthogonal(), y = normal.cross(x);
@@ -126,17 +66,19 @@ std::optional<GroundPlane> find_ground(const TriangleMesh& mesh, const Eigen::Al
   for (std::size_t i = 0; i < middles.upward.size(); i += step)
     samples.push_back(middles.upward[i]);
   const double band = band_share * box.sizes().maxCoeff();
-  std::optional<GroundPlane> ground = largest_plane(samples, band, up);
-  if (!ground) return std::nullopt;
+  const auto plane = largest_level_plane(
+      samples, up, {.max_tilt_deg = level_deg, .band = band, .trials = planes_tried});
+  if (!plane) return std::nullopt;
+  GroundPlane ground{*plane};
   const auto below = std::count_if(middles.all.begin(), middles.all.end(),
-                                   [&](const auto& p) { return ground->above(p) < -3 * band; });
+                                   [&](const auto& p) { return ground.above(p) < -3 * band; });
   if (static_cast<double>(below) > most_below * static_cast<double>(middles.all.size()))
     return std::nullopt;
-  const auto near = in_band(samples, *ground, 3 * band);
-  if (!goes_on_all_round(near, box, ground->normal)) return std::nullopt;
+  const auto near = in_plane(samples, ground, 3 * band);
+  if (!goes_on_all_round(near, box, ground.normal)) return std::nullopt;
   std::vector<double> off;
-  for (const Eigen::Vector3d& p : near) off.push_back(std::abs(ground->above(p)));
-  ground->sigma = 1.4826 * median(off);
+  for (const Eigen::Vector3d& p : near) off.push_back(std::abs(ground.above(p)));
+  ground.sigma = sigma_of_median * median(off);
   return ground;
 }
 

@@ -4,24 +4,19 @@
 #include <Eigen/Geometry>
 #include <optional>
 
+#include "core/geometry/level_plane.hpp"
 #include "core/geometry/triangle_mesh.hpp"
 
 // What an object stands on, to leave it out of its surface. An object that hangs free, or stands on
 // something that ends within the box (a turntable, a plinth), has none.
 namespace orbitfuse {
 
-/// normal . x = height; the normal points up.
-struct GroundPlane {
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
-  double height = 0;
+struct GroundPlane : LevelPlane {
   double sigma = 0;  ///< how far the ground's own points lie off it, robust
-
-  double above(const Eigen::Vector3d& point) const { return normal.dot(point) - height; }
 };
 
 /// The plane of most of the mesh's upward triangles, within 15 degrees of level, if it goes on to
-/// the box's sides all round and next to nothing lies below it. RANSAC (Fischler and Bolles 1981)
-/// of a fixed seed.
+/// the box's sides all round and next to nothing lies below it.
 std::optional<GroundPlane> find_ground(const TriangleMesh& mesh, const Eigen::AlignedBox3d& box,
                                        const Eigen::Vector3d& up);
 

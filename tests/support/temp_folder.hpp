@@ -24,6 +24,12 @@ inline void put(const std::filesystem::path& file, const std::string& bytes) {
   std::ofstream(file, std::ios::binary) << bytes;
 }
 
+/// A file that can be run.
+inline void put_program(const std::filesystem::path& file, const std::string& script) {
+  put(file, script);
+  std::filesystem::permissions(file, std::filesystem::perms::owner_all);
+}
+
 inline std::string get(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};

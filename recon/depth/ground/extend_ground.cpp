@@ -45,14 +45,14 @@ struct GrayRange {
   bool holds(int gray) const { return gray >= low && gray <= high; }
 };
 
-bool on_ground(const OpenGround& ground, const Eigen::Vector3f& x) {
+bool on_ground(const LevelPlane& ground, const Eigen::Vector3f& x) {
   // Depth errors grow with the distance.
-  return std::abs(ground.height(x)) < 0.02f + 0.01f * x.norm();
+  return std::abs(ground.above(x.cast<double>())) < 0.02 + 0.01 * static_cast<double>(x.norm());
 }
 
 /// Gray levels of the confirmed ground, of all views.
 GrayRange ground_levels(const std::vector<DepthView>& views, const std::vector<cv::Mat>& smooth,
-                        const OpenGround& ground, const std::vector<cv::Mat>& known) {
+                        const LevelPlane& ground, const std::vector<cv::Mat>& known) {
   std::vector<int> levels;
   for (std::size_t i = 0; i < views.size(); ++i)
     for (int y = 0; y < known[i].rows; y += 2)
@@ -119,7 +119,7 @@ cv::Mat without_specks(const cv::Mat& depth) {
   return out;
 }
 
-std::vector<Eigen::Vector3f> raised_points(const DepthView& view, const OpenGround& ground,
+std::vector<Eigen::Vector3f> raised_points(const DepthView& view, const LevelPlane& ground,
                                            const cv::Mat& depth) {
   std::vector<Eigen::Vector3f> out;
   for (int y = 0; y < depth.rows; y += 2)
@@ -134,7 +134,7 @@ std::vector<Eigen::Vector3f> raised_points(const DepthView& view, const OpenGrou
 
 class Extension {
  public:
-  Extension(const DepthView& view, const OpenGround& ground, GrayRange levels,
+  Extension(const DepthView& view, const LevelPlane& ground, GrayRange levels,
             const cv::Mat& smooth, const cv::Mat& obstacles, const cv::Mat& near_obstacles,
             const cv::Mat& known)
       : view_(view),
@@ -146,7 +146,7 @@ class Extension {
         known_(known),
         open_(known.size(), CV_8UC1, cv::Scalar(undecided)),
         clear_(known.size(), CV_8UC1, cv::Scalar(undecided)),
-        nadir_(-(view.world_rotation * ground.normal).cast<double>()) {}
+        nadir_(-(view.world_rotation.cast<double>() * ground.normal)) {}
 
   /// The depth of the pixel on the plane, at most `far` from the centre; infinite in the sky; NaN
   /// where it is neither.
@@ -154,11 +154,11 @@ class Extension {
     const float none = std::numeric_limits<float>::quiet_NaN();
     const Eigen::Vector3f ray = ray_of(pixel).cast<float>();
     const Eigen::Vector3f direction = view_.world_rotation.transpose() * ray;
-    const float fall = -direction.dot(ground_.normal);
+    const float fall = -direction.dot(ground_.normal.cast<float>());
     if (-fall > sky_slope * direction.norm() && clear_sky(pixel))
       return std::numeric_limits<float>::infinity();
     if (!(fall > min_slope * direction.norm())) return none;
-    const float z = ground_.height(view_.center()) / fall;
+    const float z = static_cast<float>(ground_.above(view_.center().cast<double>())) / fall;
     const Eigen::Vector3f place = view_.center() + z * direction;
     if (place.norm() < least_radius || obstacles_.at<float>(pixel) < hides * z) return none;
     if (!open_ground(pixel)) return none;
@@ -241,7 +241,7 @@ class Extension {
   }
 
   const DepthView& view_;
-  const OpenGround& ground_;
+  const LevelPlane& ground_;
   GrayRange levels_;
   const cv::Mat &smooth_, &obstacles_, &near_obstacles_;
   const cv::Mat& known_;
@@ -308,7 +308,7 @@ OpenSpace fill(Extension& extension, const Witnesses& witnesses, const cv::Mat& 
 
 }  // namespace
 
-OpenSpace extend_over_ground(const std::vector<DepthView>& views, const OpenGround& ground,
+OpenSpace extend_over_ground(const std::vector<DepthView>& views, const LevelPlane& ground,
                              float far, std::vector<DepthMap>& maps) {
   const int count = static_cast<int>(views.size());
   std::vector<cv::Mat> smooth(views.size()), known(views.size());
@@ -332,7 +332,7 @@ OpenSpace extend_over_ground(const std::vector<DepthView>& views, const OpenGrou
   parallel_for(count, [&](int i) {
     const auto k = static_cast<std::size_t>(i);
     Extension extension(views[k], ground, levels, smooth[k], wide[k], narrow[k], known[k]);
-    const Eigen::Vector3f normal = views[k].world_rotation * ground.normal;
+    const Eigen::Vector3f normal = views[k].world_rotation * ground.normal.cast<float>();
     filled[k] = fill(extension, witnesses, known[k], normal, far, k, maps[k]);
   });
   OpenSpace all;

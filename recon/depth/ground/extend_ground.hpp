@@ -3,9 +3,9 @@
 
 #include <vector>
 
+#include "core/geometry/level_plane.hpp"
 #include "core/geometry/reconstruction.hpp"
 #include "recon/depth/dense_depth.hpp"
-#include "recon/depth/ground/ground_plane.hpp"
 #include "recon/depth/stereo/depth_view.hpp"
 
 namespace orbitfuse::depth {
@@ -22,7 +22,7 @@ namespace orbitfuse::depth {
 ///   and nothing else begins;
 /// and where more of the other views show the same gray level in that place than another one.
 /// Returns the shares of all pixels that got a depth.
-OpenSpace extend_over_ground(const std::vector<DepthView>& views, const OpenGround& ground,
+OpenSpace extend_over_ground(const std::vector<DepthView>& views, const LevelPlane& ground,
                              float far, std::vector<DepthMap>& maps);
 
 }  // namespace orbitfuse::depth

@@ -35,8 +35,7 @@ using ::testing::Not;
 class FarmTest : public ::testing::Test {
  protected:
   void program(const std::string& body) {
-    test::put(temp / "program", "#!/bin/sh\nsession=$(basename $2)\nstage=$6\n" + body);
-    fs::permissions(temp / "program", fs::perms::owner_all);
+    test::put_program(temp / "program", "#!/bin/sh\nsession=$(basename $2)\nstage=$6\n" + body);
     plan.program = (temp / "program").string();
     plan.stages = {"first", "second"};
     for (const char* name : {"a", "b", "c"}) {
@@ -313,8 +312,7 @@ TEST_F(FarmTest, OfAChainThatSlurmEndedOnlyWhatWasCutOffGetsMore) {
   JobOutcome running;  // killed with all that would have recorded it
   running.state = JobState::running;
   ASSERT_TRUE(write_outcome(out, "b", "second", running));
-  test::put(temp / "bin/sacct", "#!/bin/sh\necho COMPLETED; echo TIMEOUT\n");
-  fs::permissions(temp / "bin/sacct", fs::perms::owner_all);
+  test::put_program(temp / "bin/sacct", "#!/bin/sh\necho COMPLETED; echo TIMEOUT\n");
   const Variables slurm({{"PATH", (temp / "bin").string() + ":" + std::string(getenv("PATH"))}});
   raise_needs(out, plan, Progress{});
   EXPECT_EQ(plan.needs_of("first").time_min, 10);
@@ -325,9 +323,8 @@ TEST_F(FarmTest, OfAChainThatSlurmEndedOnlyWhatWasCutOffGetsMore) {
 TEST_F(FarmTest, JobsOfAnotherUserAndOfADeadSubmissionAreQueuedOnes) {
   fs::create_directories(out);
   plan.rounds = {{0, {"12", "13"}, {}}};
-  test::put(temp / "bin/squeue", "#!/bin/sh\necho '12 /elsewhere\n13 /elsewhere\n14 " +
-                                     out.string() + "\n15 " + out.string() + "/x'\n");
-  fs::permissions(temp / "bin/squeue", fs::perms::owner_all);
+  test::put_program(temp / "bin/squeue", "#!/bin/sh\necho '12 /elsewhere\n13 /elsewhere\n14 " +
+                                             out.string() + "\n15 " + out.string() + "/x'\n");
   const Variables slurm({{"SLURM_JOB_ID", "13"},
                          {"PATH", (temp / "bin").string() + ":" + std::string(getenv("PATH"))}});
   const auto queued = queued_jobs(out, plan, Progress{});

@@ -27,9 +27,8 @@ class RefusedFarm : public ::testing::Test {
 
   /// One of Slurm's commands, as a script. `calls` gets a line a call.
   void command(const std::string& name, const std::string& body) const {
-    test::put(temp / "bin" / name,
-              "#!/bin/sh\necho " + name + " \"$@\" >> " + calls.string() + "\n" + body);
-    fs::permissions(temp / "bin" / name, fs::perms::owner_all);
+    test::put_program(temp / "bin" / name,
+                      "#!/bin/sh\necho " + name + " \"$@\" >> " + calls.string() + "\n" + body);
   }
   /// Only Slurm's commands of this test are on PATH.
   Outcome farm(std::vector<std::string> words) const {

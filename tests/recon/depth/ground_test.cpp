@@ -154,8 +154,8 @@ TEST(OpenGround, IsFoundUnderTheCameras) {
   const Yard scene = yard();
   const auto ground = find_ground(scene.views, scene.maps, 1);
   ASSERT_TRUE(ground) << ground.error().message();
-  EXPECT_GT(ground->normal.z(), 0.9999f);
-  EXPECT_NEAR(ground->offset, -floor_height, 0.003f);
+  EXPECT_GT(ground->normal.z(), 0.9999);
+  EXPECT_NEAR(ground->height, floor_height, 0.003);
 }
 
 TEST(OpenGround, IsNoneWhereNothingLiesUnderTheCameras) {
@@ -183,14 +183,14 @@ TEST(OpenGround, IsNotARoofWithTheYardBelowIt) {
       for (int x = 0; x < 40; ++x) map.depth.at<float>(y, x) *= 1.4f;
   const auto ground = find_ground(scene.views, scene.maps, 1);
   if (ground) {
-    EXPECT_LT(-ground->offset, floor_height - 0.02f);
+    EXPECT_LT(ground->height, floor_height - 0.02f);
   }
 }
 
 TEST(ExtendedGround, ReachesTheHorizonAndLeavesTheSkyOpen) {
   for (const float roll : {0.f, 0.3f, std::numbers::pi_v<float> / 2}) {
     const Yard scene = yard(false, roll);
-    OpenGround ground{Eigen::Vector3f::UnitZ(), -floor_height};
+    const LevelPlane ground{Eigen::Vector3d::UnitZ(), static_cast<double>(floor_height)};
     std::vector<DepthMap> maps;
     for (const DepthMap& map : scene.maps) {
       maps.push_back(map);
@@ -219,7 +219,7 @@ TEST(ExtendedGround, StopsAtWallsThatNothingConfirms) {
     maps.push_back(map);
     maps.back().depth = map.depth.clone();
   }
-  OpenGround ground{Eigen::Vector3f::UnitZ(), -floor_height};
+  const LevelPlane ground{Eigen::Vector3d::UnitZ(), static_cast<double>(floor_height)};
   extend_over_ground(scene.views, ground, 12, maps);
   const Count n = count(scene, maps, 12);
   ASSERT_GT(n.others, 1000);
@@ -229,7 +229,7 @@ TEST(ExtendedGround, StopsAtWallsThatNothingConfirms) {
 
 TEST(ExtendedGround, IsTheSameForAnyNumberOfThreads) {
   const Yard scene = yard(true);
-  OpenGround ground{Eigen::Vector3f::UnitZ(), -floor_height};
+  const LevelPlane ground{Eigen::Vector3d::UnitZ(), static_cast<double>(floor_height)};
   std::vector<cv::Mat> first;
   for (const int threads : {1, 3}) {
     set_thread_count(threads);
@@ -252,7 +252,7 @@ TEST(ExtendedGround, IsTheSameForAnyNumberOfThreads) {
 TEST(ExtendedGround, LeavesMapsWithoutAnyConfirmedGroundAlone) {
   Yard scene = yard();
   for (DepthMap& map : scene.maps) map.depth.setTo(none);
-  OpenGround ground{Eigen::Vector3f::UnitZ(), -floor_height};
+  const LevelPlane ground{Eigen::Vector3d::UnitZ(), static_cast<double>(floor_height)};
   extend_over_ground(scene.views, ground, 12, scene.maps);
   for (const DepthMap& map : scene.maps)
     for (const float z : cv::Mat_<float>(map.depth)) EXPECT_FALSE(std::isfinite(z));
