@@ -37,6 +37,15 @@ std::optional<LevelPlane> fitted(const std::vector<Eigen::Vector3d>& points,
   return level_plane(axes.eigenvectors().col(0), middle, up, max_tilt_deg);
 }
 
+/// Trials after which a plane of more points would have been met, but for one case in ten thousand.
+int trials_for(std::ptrdiff_t most, std::size_t count) {
+  const double share = static_cast<double>(most) / static_cast<double>(count);
+  const double all_three = share * share * share;
+  if (all_three >= 1) return 1;
+  const double needed = std::log(1e-4) / std::log1p(-all_three);
+  return needed < 1e6 ? static_cast<int>(needed) + 1 : 1'000'000;
+}
+
 }  // namespace
 
 std::vector<Eigen::Vector3d> in_plane(const std::vector<Eigen::Vector3d>& points,
@@ -53,7 +62,7 @@ std::optional<LevelPlane> largest_level_plane(const std::vector<Eigen::Vector3d>
   if (points.size() < least_points) return std::nullopt;
   std::optional<LevelPlane> best;
   std::ptrdiff_t most = 0;
-  for (int trial = 0; trial < search.trials; ++trial) {
+  for (int trial = 0; trial < std::min(search.trials, trials_for(most, points.size())); ++trial) {
     const auto draw = [&](int k) {
       return points[random_bits(search.seed, stream, static_cast<std::uint64_t>(3 * trial + k)) %
                     points.size()];

@@ -20,7 +20,7 @@ struct LevelPlane {
 struct LevelPlaneSearch {
   double max_tilt_deg = 15;  ///< between its normal and up
   double band = 0.01;        ///< what counts as in the plane, to either side, in the points' unit
-  int trials = 300;
+  int trials = 300;          ///< at most; fewer where a large plane was met
   std::uint64_t seed = 1;
   /// Which planes may be tried; empty: all.
   std::function<bool(const LevelPlane&)> admissible = {};

@@ -80,11 +80,22 @@ std::vector<SourceView> sources_of(const std::vector<DepthView>& views, std::siz
   return sources;
 }
 
-void add_ground(const std::vector<DepthView>& views, const DepthOptions& options, DenseDepth& out) {
+/// Points of the sparse model that three views agree on, in scene radii.
+std::vector<Eigen::Vector3f> sure_points(const Reconstruction& model, const SceneBall& scene) {
+  constexpr std::size_t least_track = 3;
+  std::vector<Eigen::Vector3f> points;
+  for (const SparsePoint& point : model.points)
+    if (point.track.size() >= least_track)
+      points.emplace_back(((point.position - scene.center) / scene.radius).cast<float>());
+  return points;
+}
+
+void add_ground(const std::vector<DepthView>& views, const std::vector<Eigen::Vector3f>& points,
+                const DepthOptions& options, DenseDepth& out) {
   const auto ground = find_ground(views, out.maps, options.seed);
   if (ground)
-    out.report.open =
-        extend_over_ground(views, *ground, static_cast<float>(options.ground_far), out.maps);
+    out.report.open = extend_over_ground(views, *ground, points,
+                                         static_cast<float>(options.ground_far), out.maps);
   else
     out.report.skips.push_back({"depth of open ground and sky", ground.error().found,
                                 "pixels that nothing confirms stay without depth"});
@@ -143,7 +154,7 @@ Result<DenseDepth> dense_depth(const Reconstruction& model, const std::vector<cv
   }
   out.report.known /= pixels;
   out.report.matched /= pixels;
-  if (options.ground) add_ground(fine, options, out);
+  if (options.ground) add_ground(fine, sure_points(model, scene), options, out);
   for (DepthMap& map : out.maps) map.depth *= scene.radius;
   if (out.report.views_without > 0)
     out.report.skips.push_back({"depth of views without neighbours",

@@ -2,6 +2,7 @@
 #include "recon/nerf/dataset.hpp"
 
 #include <fmt/format.h>
+#include <limits>
 
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
@@ -61,7 +62,7 @@ Status Dataset::validate() const {
 double Dataset::known_depth() const {
   std::int64_t known = 0, all = 0;
   for (const DepthMap& map : depth) {
-    known += cv::countNonZero(map.depth == map.depth);
+    known += cv::countNonZero(cv::abs(map.depth) < std::numeric_limits<float>::infinity());
     all += static_cast<std::int64_t>(map.depth.total());
   }
   return all > 0 ? static_cast<double>(known) / static_cast<double>(all) : 0;

@@ -37,7 +37,7 @@ struct Dataset {
   std::vector<SparsePoint> points;  ///< optional; Observation::view indexes `views`
   std::vector<DepthMap> depth;      ///< optional; DepthMap::view indexes `views`
 
-  double known_depth() const;  ///< share of the depth maps' pixels
+  double known_depth() const;  ///< share of the depth maps' pixels, without open sky
   /// Depth maps know enough of the scene to say where it is empty; below this they are like sparse
   /// points.
   bool has_dense_depth() const { return known_depth() > 0.1; }

@@ -9,6 +9,8 @@
 
 #include "core/numeric/median.hpp"
 #include "core/system/parallel.hpp"
+#include "recon/depth/ground/panorama.hpp"
+#include "recon/depth/ground/witnesses.hpp"
 
 namespace orbitfuse::depth {
 namespace {
@@ -20,20 +22,20 @@ constexpr float min_slope = 1e-4f;
 /// Of the ground's confirmed gray levels; a little more than its texture shows.
 constexpr double low_share = 0.02, high_share = 0.98;
 constexpr int gray_margin = 6;
-/// Something confirmed this much nearer than the plane hides it.
-constexpr float hides = 0.93f;
+/// Cosine between the plane and a confirmed surface that speaks for it: the foot of a wall lies in
+/// the plane too.
+constexpr float level_cosine = 0.6f;
 /// Width of the neighbourhood in which a confirmed depth speaks for its surroundings, of the width
 /// of a map.
 constexpr double reach_share = 0.02, sky_reach_share = 0.005;
 /// The sky begins this far above the horizon (sine).
 constexpr float sky_slope = 0.005f;
+/// And it ends before the ground is as near as this, where plains of some tens of metres end; the
+/// wall of a room goes on.
+constexpr float horizon_reach = 5;
 /// Gray levels by which sky and far ground change over so many pixels of a way; by more, something
 /// else begins.
 constexpr int sky_change = 7, ground_change = 16, edge_px = 4;
-/// Gray levels by which two views may differ in one place, exposure included.
-constexpr int alike = 14;
-/// As a distance: farther than anything.
-constexpr float nothing = 1e6f;
 /// Of a map's pixels, and by how much depth may change from one to the next.
 constexpr double least_region = 3e-4;
 constexpr float region_step = 0.04f;
@@ -136,7 +138,7 @@ class Extension {
  public:
   Extension(const DepthView& view, const LevelPlane& ground, GrayRange levels,
             const cv::Mat& smooth, const cv::Mat& obstacles, const cv::Mat& near_obstacles,
-            const cv::Mat& known)
+            const cv::Mat& known, const cv::Mat& normal, const Panorama& panorama)
       : view_(view),
         ground_(ground),
         levels_(levels),
@@ -144,24 +146,27 @@ class Extension {
         obstacles_(obstacles),
         near_obstacles_(near_obstacles),
         known_(known),
+        normal_(normal),
+        panorama_(panorama),
         open_(known.size(), CV_8UC1, cv::Scalar(undecided)),
         clear_(known.size(), CV_8UC1, cv::Scalar(undecided)),
+        ends_(known.size(), CV_8UC1, cv::Scalar(undecided)),
+        up_(view.world_rotation * ground.normal.cast<float>()),
         nadir_(-(view.world_rotation.cast<double>() * ground.normal)) {}
 
   /// The depth of the pixel on the plane, at most `far` from the centre; infinite in the sky; NaN
   /// where it is neither.
   float depth(cv::Point pixel, float far) {
     const float none = std::numeric_limits<float>::quiet_NaN();
-    const Eigen::Vector3f ray = ray_of(pixel).cast<float>();
-    const Eigen::Vector3f direction = view_.world_rotation.transpose() * ray;
-    const float fall = -direction.dot(ground_.normal.cast<float>());
-    if (-fall > sky_slope * direction.norm() && clear_sky(pixel))
+    const float rise = rise_of(pixel);
+    if (rise > sky_slope && clear_sky(pixel) && ends_about_the_horizon(pixel))
       return std::numeric_limits<float>::infinity();
-    if (!(fall > min_slope * direction.norm())) return none;
-    const float z = static_cast<float>(ground_.above(view_.center().cast<double>())) / fall;
-    const Eigen::Vector3f place = view_.center() + z * direction;
+    if (!(-rise > min_slope)) return none;
+    const Eigen::Vector3f place = place_on_ground(pixel, -rise);
+    const float z = (view_.world_rotation * place + view_.translation).z();
     if (place.norm() < least_radius || obstacles_.at<float>(pixel) < hides * z) return none;
-    if (!open_ground(pixel)) return none;
+    // A body shows its upper edge somewhere above its plain middle.
+    if (!open_ground(pixel) || panorama_.hides(place, hides)) return none;
     return z * far / std::max(far, place.norm());
   }
 
@@ -170,6 +175,17 @@ class Extension {
 
   Eigen::Vector3d ray_of(cv::Point pixel) const {
     return view_.camera.ray_of({pixel.x + 0.5, pixel.y + 0.5});
+  }
+
+  /// Sine of the pixel's ray above the horizon.
+  float rise_of(cv::Point pixel) const { return ray_of(pixel).cast<float>().normalized().dot(up_); }
+
+  /// Where the pixel's ray meets the plane, which it falls towards with that sine.
+  Eigen::Vector3f place_on_ground(cv::Point pixel, float fall) const {
+    const Eigen::Vector3f direction =
+        view_.world_rotation.transpose() * ray_of(pixel).cast<float>().normalized();
+    const auto height = static_cast<float>(ground_.above(view_.center().cast<double>()));
+    return view_.center() + height / fall * direction;
   }
 
   /// One pixel on the ground's way to the camera's foot: towards the image of the nadir.
@@ -218,13 +234,37 @@ class Extension {
     return open;
   }
 
-  /// Whether nothing is confirmed and nothing else begins from here up to the image's border.
+  /// Something is confirmed here, or something else begins.
+  bool begins(cv::Point at, cv::Point step) const {
+    return std::isfinite(known_.at<float>(at)) || near_obstacles_.at<float>(at) < nothing ||
+           change_along(at, step) > sky_change;
+  }
+
+  /// Whether nothing else begins from here up to the image's border.
   bool clear_sky(cv::Point pixel) {
     return follow(clear_, pixel, -1, true, [&](cv::Point at, cv::Point step) {
-      const bool seen =
-          std::isfinite(known_.at<float>(at)) || near_obstacles_.at<float>(at) < nothing;
-      return seen || change_along(at, step) > sky_change ? Way::blocked : Way::goes_on;
+      return begins(at, step) ? Way::blocked : Way::goes_on;
     });
+  }
+
+  /// Whether something else begins on the way down while the ground is far: the sky ends there, and
+  /// a room's plain wall does not.
+  bool ends_about_the_horizon(cv::Point pixel) {
+    return follow(ends_, pixel, 1, false, [&](cv::Point at, cv::Point step) {
+      // What begins does so somewhere up to there.
+      const cv::Point ahead = at + edge_px * step;
+      const float fall = -rise_of(ahead);
+      if (fall > min_slope && place_on_ground(ahead, fall).norm() < horizon_reach)
+        return Way::blocked;
+      return begins(at, step) ? Way::open : Way::goes_on;
+    });
+  }
+
+  /// The confirmed surface is the ground's.
+  bool is_ground(cv::Point at, float z) const {
+    const auto& n = normal_.at<cv::Vec3f>(at);
+    return std::abs(n[0] * up_.x() + n[1] * up_.y() + n[2] * up_.z()) > level_cosine &&
+           on_ground(ground_, world_of(view_, {at.x + 0.5, at.y + 0.5}, z));
   }
 
   /// Whether the first confirmed depth on the way to the foot is the ground's, and all before it
@@ -232,8 +272,7 @@ class Extension {
   bool open_ground(cv::Point pixel) {
     return follow(open_, pixel, 1, false, [&](cv::Point at, cv::Point step) {
       if (const float z = known_.at<float>(at); std::isfinite(z))
-        return on_ground(ground_, world_of(view_, {at.x + 0.5, at.y + 0.5}, z)) ? Way::open
-                                                                                : Way::blocked;
+        return is_ground(at, z) ? Way::open : Way::blocked;
       const bool like_ground =
           levels_.holds(smooth_.at<std::uint8_t>(at)) && change_along(at, step) <= ground_change;
       return like_ground ? Way::goes_on : Way::blocked;
@@ -244,48 +283,11 @@ class Extension {
   const LevelPlane& ground_;
   GrayRange levels_;
   const cv::Mat &smooth_, &obstacles_, &near_obstacles_;
-  const cv::Mat& known_;
-  cv::Mat open_, clear_;
+  const cv::Mat &known_, &normal_;
+  const Panorama& panorama_;
+  cv::Mat open_, clear_, ends_;
+  Eigen::Vector3f up_;     ///< in camera axes
   Eigen::Vector3d nadir_;  ///< in camera axes
-};
-
-/// What other views show where one view's pixel is thought to see the ground or the sky.
-class Witnesses {
- public:
-  Witnesses(const std::vector<DepthView>& views, const std::vector<cv::Mat>& smooth,
-            const std::vector<cv::Mat>& obstacles)
-      : views_(views), smooth_(smooth), obstacles_(obstacles) {}
-
-  /// More views that see the same gray level there than another one; what hides it from them counts
-  /// for nothing. A wall that is taken for the ground behind it looks otherwise from the side.
-  bool agree(std::size_t own, cv::Point pixel, float z) const {
-    const DepthView& view = views_[own];
-    const Eigen::Vector3f ray = view.world_rotation.transpose() *
-                                view.camera.ray_of({pixel.x + 0.5, pixel.y + 0.5}).cast<float>();
-    const bool sky = std::isinf(z);
-    const int gray = smooth_[own].at<std::uint8_t>(pixel);
-    int alike_views = 0, others = 0;
-    for (std::size_t k = 0; k < views_.size(); ++k) {
-      if (k == own) continue;
-      const Eigen::Vector3f there =
-          sky ? Eigen::Vector3f(views_[k].world_rotation * ray)
-              : Eigen::Vector3f(views_[k].world_rotation * (view.center() + z * ray) +
-                                views_[k].translation);
-      if (!(there.z() > 1e-3f)) continue;
-      const Eigen::Vector2d at = views_[k].camera.project(there.cast<double>());
-      const cv::Mat& shown = smooth_[k];
-      if (!(at.x() >= 0 && at.y() >= 0 && at.x() < shown.cols && at.y() < shown.rows)) continue;
-      const int x = static_cast<int>(at.x()), y = static_cast<int>(at.y());
-      if (obstacles_[k].at<float>(y, x) < (sky ? nothing : hides * there.z())) continue;
-      const bool like = std::abs(shown.at<std::uint8_t>(y, x) - gray) <= alike;
-      ++(like ? alike_views : others);
-    }
-    return alike_views > others;
-  }
-
- private:
-  const std::vector<DepthView>& views_;
-  const std::vector<cv::Mat>&smooth_, &obstacles_;
 };
 
 /// Writes what is found to the map and counts it, in pixels.
@@ -309,16 +311,23 @@ OpenSpace fill(Extension& extension, const Witnesses& witnesses, const cv::Mat& 
 }  // namespace
 
 OpenSpace extend_over_ground(const std::vector<DepthView>& views, const LevelPlane& ground,
-                             float far, std::vector<DepthMap>& maps) {
+                             const std::vector<Eigen::Vector3f>& points, float far,
+                             std::vector<DepthMap>& maps) {
   const int count = static_cast<int>(views.size());
   std::vector<cv::Mat> smooth(views.size()), known(views.size());
   std::vector<std::vector<Eigen::Vector3f>> raised(views.size());
   parallel_for(count, [&](int i) {
     const auto k = static_cast<std::size_t>(i);
-    cv::blur(views[k].gray, smooth[k], {3, 3});
+    // What lies outside of the picture in memory is no picture.
+    cv::blur(views[k].gray, smooth[k], {3, 3}, {-1, -1},
+             cv::BORDER_REFLECT_101 | cv::BORDER_ISOLATED);
     known[k] = without_specks(maps[k].depth);
     raised[k] = raised_points(views[k], ground, known[k]);
   });
+  std::vector<Eigen::Vector3f> raised_sparse;
+  for (const Eigen::Vector3f& x : points)
+    if (!on_ground(ground, x)) raised_sparse.push_back(x);
+  raised.push_back(std::move(raised_sparse));
   const GrayRange levels = ground_levels(views, smooth, ground, known);
   std::vector<cv::Mat> wide(views.size()), narrow(views.size());
   parallel_for(count, [&](int i) {
@@ -328,10 +337,14 @@ OpenSpace extend_over_ground(const std::vector<DepthView>& views, const LevelPla
     narrow[k] = spread(here, sky_reach_share);
   });
   const Witnesses witnesses(views, smooth, narrow);
+  std::vector<cv::Mat> normals(views.size());  // as they are before they are written to
+  for (std::size_t k = 0; k < views.size(); ++k) normals[k] = maps[k].normal.clone();
   std::vector<OpenSpace> filled(views.size());
   parallel_for(count, [&](int i) {
     const auto k = static_cast<std::size_t>(i);
-    Extension extension(views[k], ground, levels, smooth[k], wide[k], narrow[k], known[k]);
+    const Panorama panorama(views[k].center(), ground, raised);
+    Extension extension(views[k], ground, levels, smooth[k], wide[k], narrow[k], known[k],
+                        normals[k], panorama);
     const Eigen::Vector3f normal = views[k].world_rotation * ground.normal.cast<float>();
     filled[k] = fill(extension, witnesses, known[k], normal, far, k, maps[k]);
   });

@@ -14,15 +14,17 @@ namespace orbitfuse::depth {
 /// nothing confirms their depth, and a field is free to stand the plain up as a curtain and to fill
 /// the sky with fog. Gives pixels without depth
 /// - the plane's, where they are below the horizon, beyond the cameras, of the ground's gray level,
-/// with
-///   nothing but such ground between them and the camera's foot, and nothing confirmed by any view
-///   before them; at most `far` (in scene radii) from the centre, what is farther stands there;
-/// - an infinite one, where they are above the horizon and up to the image's border nothing is
-/// confirmed
-///   and nothing else begins;
+///   with nothing but such ground between them and the camera's foot, and nothing confirmed by any
+///   view before or above them that is nearer; at most `far` (in scene radii) from the centre, what
+///   is farther stands there;
+/// - an infinite one, where they are above the horizon, nothing is confirmed and nothing else
+/// begins
+///   up to the image's border, and something does about the horizon;
 /// and where more of the other views show the same gray level in that place than another one.
-/// Returns the shares of all pixels that got a depth.
+/// `points`: of the sparse model, in scene radii, confirmed as depths are. Returns the shares of
+/// all pixels that got a depth.
 OpenSpace extend_over_ground(const std::vector<DepthView>& views, const LevelPlane& ground,
-                             float far, std::vector<DepthMap>& maps);
+                             const std::vector<Eigen::Vector3f>& points, float far,
+                             std::vector<DepthMap>& maps);
 
 }  // namespace orbitfuse::depth

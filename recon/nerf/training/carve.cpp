@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
 
 #include "core/system/parallel.hpp"
 #include "recon/nerf/training/plain_background.hpp"
@@ -14,31 +16,56 @@ struct Votes {
   int seen = 0;   ///< views whose image holds the cell
   int free = 0;   ///< ... in front of a known surface there
   int solid = 0;  ///< ... at a known surface
-  int sky = 0;    ///< ... with nothing but the sky there, of cells beyond the cameras
+  int sky = 0;    ///< ... with nothing but the sky there
 };
 
-Votes vote(const std::vector<const NormalisedView*>& voters, const float x[3],
-           float half_diagonal) {
-  const bool beyond_the_cameras = x[0] * x[0] + x[1] * x[1] + x[2] * x[2] > 1;
+struct Voter {
+  const NormalisedView* view;
+  cv::Mat sky_px;  ///< CV_32FC1: pixels from here to what isn't sky; empty where there is no sky
+};
+
+Voter voter_of(const NormalisedView& view) {
+  Voter voter{&view, {}};
+  const cv::Mat sky = view.distance == std::numeric_limits<float>::infinity();
+  if (cv::countNonZero(sky) > 0) cv::distanceTransform(sky, voter.sky_px, cv::DIST_L2, 3);
+  return voter;
+}
+
+/// Whether a view shows nothing but the sky round a point there. A white roof before a white sky
+/// shows no edge: only of what stands farther out than the cameras does its sky speak, as fog does.
+bool open_sky(const Voter& voter, const float x[3], int px, int py, float distance, float radius) {
+  float from_center = 0, of_camera = 0;
+  for (int d = 0; d < 3; ++d) {
+    const auto origin = static_cast<float>(voter.view->rays.origin()[d]);
+    from_center += x[d] * x[d];
+    of_camera += origin * origin;
+  }
+  if (from_center < 1 || distance * distance < 4 * of_camera) return false;
+  const double focal_px = voter.view->rays.camera().fx;
+  return static_cast<double>(voter.sky_px.at<float>(py, px)) >
+         focal_px * static_cast<double>(radius / distance);
+}
+
+Votes vote(const std::vector<Voter>& voters, const float x[3], float half_diagonal) {
   Votes votes;
-  for (const NormalisedView* voter : voters) {
-    const NormalisedView& view = *voter;
+  for (const Voter& voter : voters) {
+    const NormalisedView& view = *voter.view;
     double px, py, z;
     if (!view.rays.project(x, px, py, z)) continue;
     ++votes.seen;
     const float known = view.distance.at<float>(static_cast<int>(py), static_cast<int>(px));
     if (std::isnan(known)) continue;
-    if (std::isinf(known)) {
-      // A white roof before a white sky shows no edge; fog stands farther out than the object.
-      if (beyond_the_cameras) ++votes.free, ++votes.sky;
-      continue;
-    }
     float distance = 0;
     for (int d = 0; d < 3; ++d) {
       const float offset = x[d] - static_cast<float>(view.rays.origin()[d]);
       distance += offset * offset;
     }
     distance = std::sqrt(distance);
+    if (std::isinf(known)) {
+      if (open_sky(voter, x, static_cast<int>(px), static_cast<int>(py), distance, half_diagonal))
+        ++votes.free, ++votes.sky;
+      continue;
+    }
     // The margin covers the cell and 2 % of depth error.
     const float margin = half_diagonal + 0.02f * known;
     if (distance < known - margin) ++votes.free;
@@ -72,11 +99,11 @@ void clear_segment(Occupancy& occupancy, const Ray& ray, float end, float tube) 
 
 double carve(bool dense_depth, const std::vector<NormalisedView>& views,
              const std::vector<bool>& heldout, const TrainOptions& options, Occupancy& occupancy) {
-  std::vector<const NormalisedView*> voters;
+  std::vector<Voter> voters;
   std::vector<Silhouette> silhouettes;
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (heldout[i]) continue;
-    voters.push_back(&views[i]);
+    voters.push_back(voter_of(views[i]));
     if (!views[i].clearance_px.empty())
       silhouettes.push_back({&views[i].rays, &views[i].clearance_px});
   }
@@ -101,7 +128,7 @@ double carve(bool dense_depth, const std::vector<NormalisedView>& views,
           continue;
         }
         const Votes votes = vote(voters, center, 0.87f * size);
-        const bool sky = votes.sky > 0 && votes.solid == 0;
+        const bool sky = votes.sky >= 2 && votes.solid == 0;
         const bool free =
             options.carve && (sky || (votes.free >= 2 && votes.free > 2 * votes.solid));
         off_here = votes.seen < min_views || free;
@@ -115,7 +142,7 @@ double carve(bool dense_depth, const std::vector<NormalisedView>& views,
       Occupancy::put(occupancy.allowed, cell, false);
   }
   if (options.carve && !dense_depth)
-    for (const NormalisedView* view : voters)
+    for (const auto& [view, sky_px] : voters)
       for (const std::int32_t pixel : view->known) {
         const int width = view->rays.camera().width;
         const int x = pixel % width, y = pixel / width;

@@ -21,6 +21,13 @@ constexpr double asked_share = 0.5;
 /// A view that is found farther from where its form has it than this is in doubt until nearly all
 /// patches settle it (judged_between): plain surfaces confirm a wrong place half as well.
 constexpr double elsewhere_deg = 1;
+/// What a frame must gain by moving: plain sides have 3 to 27 patches, and chance moves a few.
+constexpr int least_gain = 12;
+constexpr double least_gain_ratio = 1.5;
+
+bool worth_moving(int before, int after) {
+  return after >= before + least_gain && after >= least_gain_ratio * before;
+}
 
 /// Views with fewer confirmed patches than that.
 std::vector<std::size_t> little_confirmed(const std::vector<std::size_t>& added,
@@ -49,7 +56,9 @@ Status settle_by_patches(const OrbitRefinement& refinement, std::size_t first_ne
   const std::vector<std::size_t> lost = little_confirmed(added, alignment);
   if (lost.empty()) return {};
   for (const std::size_t i : added)
-    if (std::count(lost.begin(), lost.end(), i) == 0) settled.push_back(i);
+    if (std::count(lost.begin(), lost.end(), i) == 0 &&
+        alignment.views[i].verdict.confidence != Confidence::dropped)
+      settled.push_back(i);
   ORBITFUSE_ASSIGN(const SceneRenderer renderer, painted_by_others(refinement, alignment, settled));
   ORBITFUSE_ASSIGN(
       const Fit warm,
@@ -67,7 +76,7 @@ Status settle_by_patches(const OrbitRefinement& refinement, std::size_t first_ne
         {"poses.thermal", 3, 4, -1,
          fmt::format("{}: {} patches confirmed, {} where temperatures have it, {:.1f} deg away",
                      alignment.views[i].view.name, before, after, moved_deg)});
-    if (after <= before) continue;
+    if (!worth_moving(before, after)) continue;
     alignment.views[i] = tried.views[i];
     ViewVerdict& verdict = alignment.views[i].verdict;
     if (moved_deg > elsewhere_deg && verdict.sure())

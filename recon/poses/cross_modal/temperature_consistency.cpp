@@ -15,36 +15,18 @@
 namespace orbitfuse {
 namespace {
 
-/// Of their loop's median support among temperatures. Right places on `container` had 0.7 or more,
-/// wrong ones 0.4 at most.
-constexpr double found_share = 0.5;
-/// Among stations, which see less of each other's scene: below it a station is searched again.
-constexpr double settled_share = 0.6;
-/// Of their loop's median support in the visible scene: views that form alone may vouch for.
-constexpr double vouched_share = 0.6;
-/// The same, of views that both scenes leave where they are.
-constexpr double kept_share = 0.4;
 /// Of the views' median correlation with what the others paint at their places; a view with less is
 /// searched again. A wrong view of `sedan` had .56 of .96, right ones .84 and more unless a wrong
 /// neighbour painted.
 constexpr double asked_correlation_share = 0.75;
-/// Of the same median: an image so much like what the others paint is not far from there, though
-/// few of its edges say so. Gables of a hut, seen from low down, had .98 to 1.01 of it.
-constexpr double like_correlation_share = 0.95;
-/// What form and temperatures say of a view's place are not two places: within reach of the thermal
-/// bundle's search, which decides (a right view of `van` was dropped at 1.1).
-constexpr double close_deg = 2;
 /// Two views turned by less are one station's: its own temperatures confirm any place.
 constexpr double own_turn_deg = 8;
 /// Fewer sure views paint nothing to judge others by.
 constexpr std::size_t least_painters = 3;
-/// Rounding of no support at all.
-constexpr double least_support = 1e-9;
-
 /// Whether the place found among the temperatures of settled views confirms the view's.
 ViewVerdict in_settled_scene(const OrbitViews& orbit, const RenderAlignedView& view,
                              const RenderAlignedView& second, double median_supports) {
-  if (!(share_of_median(second.support(), median_supports) > found_share))
+  if (!(share_of_median(second.support(), median_supports) > found_support_share))
     return {Confidence::dropped, DoubtReason::not_found,
             "its edges are not found among the stations' temperatures"};
   const Rigid3d &by_form = view.view.cam_from_world, &by_temperatures = second.view.cam_from_world;
@@ -151,7 +133,7 @@ Result<Contradicted> contradicted(const OrbitRefinement& refinement, const Fit& 
   const double asked_below = known.empty() ? -1 : asked_correlation_share * lost.median_correlation;
   for (const std::size_t i : all)
     if (second.views[i].support() <
-            settled_share * lost.median_of_loop.at(orbit.stations[i].loop) ||
+            settled_support_share * lost.median_of_loop.at(orbit.stations[i].loop) ||
         !same_place(orbit, places[i].cam_from_world, second.views[i].view.cam_from_world) ||
         correlations[i].value_or(1) < asked_below)
       lost.views.push_back(i);
@@ -217,47 +199,6 @@ Status leave_unplaced(const OrbitRefinement& refinement, const SceneRenderer& pa
 Result<SceneRenderer> painted_by_others(const OrbitRefinement& refinement, const Fit& alignment,
                                         const std::vector<std::size_t>& chosen) {
   return painted_by(refinement, alignment, chosen, own_turn_deg);
-}
-
-MoveDecision who_places(const PlaceEvidence& seen) {
-  const bool found = seen.temperatures_there > settled_share;
-  // Two scenes that show nothing of the view agree as easily as two that do: one must know it
-  // there.
-  const bool better_by_form =
-      seen.form_there > vouched_share && seen.form_there >= seen.form_before;
-  if (seen.agree && (found || better_by_form)) return MoveDecision::both;
-  // Both know it there, temperatures a little less well than most.
-  if (seen.agree && seen.temperatures_there > found_share && seen.form_there > vouched_share)
-    return MoveDecision::both;
-  // Searched as a whole and found where it was: a weak view, but not a wrong one.
-  if (seen.agree && seen.stays && seen.temperatures_there > kept_share &&
-      seen.form_before > kept_share)
-    return MoveDecision::both;
-  // Temperatures know more edges: where they are sure, form alone doesn't pull a view away.
-  if (!seen.agree && found) return MoveDecision::temperatures_alone;
-  // Where they don't find it they don't speak against a place that form knows well, and better.
-  if (!found && seen.form_before > vouched_share && seen.form_before > seen.form_there)
-    return MoveDecision::form_alone;
-  return MoveDecision::nobody;
-}
-
-ViewVerdict verdict_of_unplaced(bool agree, double apart_deg, double likeness) {
-  // Too near each other to be two places, or too much like what the others measured to be far off:
-  // patches of other thermal views will tell.
-  const bool left_to_patches =
-      likeness >= like_correlation_share || (!agree && apart_deg < close_deg);
-  const Confidence confidence = left_to_patches ? Confidence::doubtful : Confidence::dropped;
-  if (agree)
-    return {confidence, DoubtReason::not_found,
-            "neither the visible scene nor the other views' temperatures show its edges"};
-  return {confidence, DoubtReason::temperatures_elsewhere,
-          fmt::format("the visible scene and the other views' temperatures place it {:.1f} deg "
-                      "apart",
-                      apart_deg)};
-}
-
-double share_of_median(double support, double median) {
-  return median > least_support ? support / median : 0;
 }
 
 Result<Fit> best_by_temperatures(const OrbitRefinement& painted,
@@ -328,41 +269,25 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
                      view.view.name, seen.temperatures_there, seen.form_there, seen.form_before,
                      apart_deg(orbit, view.view.cam_from_world, warm.view.cam_from_world),
                      seen.agree ? "they agree" : "they differ")});
-    switch (who_places(seen)) {
-      case MoveDecision::both:
-        // Temperatures moved it to where form settles too, but form knew it better before: two
-        // opinions that agree on the place and not on which is the better one.
-        if (seen.form_there < seen.form_before &&
-            !same_place(orbit, view.view.cam_from_world, form.view.cam_from_world))
-          view.verdict = {
-              Confidence::doubtful, DoubtReason::temperatures_elsewhere,
-              fmt::format(
-                  "the other views' temperatures place it {:.1f} deg away, where the visible "
-                  "scene supports it less: {:.2f} of the median support, {:.2f} before",
-                  apart_deg(orbit, view.view.cam_from_world, form.view.cam_from_world),
-                  seen.form_there, seen.form_before)};
-        view.view = form.view;
-        ++check.moved;
-        break;
-      case MoveDecision::temperatures_alone:
-        check.by_temperatures_alone.emplace_back(lost[c], warm.view.cam_from_world);
-        view.view = warm.view;
-        ++check.moved;
-        break;
-      case MoveDecision::form_alone:
-        view.verdict = {
-            Confidence::doubtful, DoubtReason::temperatures_contradict,
-            fmt::format(
-                "the other views' temperatures contradict its place and don't find it elsewhere "
-                "(at best {:.2f} of the median support); the visible scene alone keeps it, at "
-                "{:.2f} of its loop's median support",
-                seen.temperatures_there, seen.form_before)};
-        break;
-      case MoveDecision::nobody:
-        ORBITFUSE_TRY(leave_unplaced(refinement, renderer, orbit.images[lost[c]], seen.agree,
-                                     warm.view, found.median_correlation, view));
-        break;
+    const MoveDecision decision = who_places(seen);
+    if (decision == MoveDecision::nobody) {
+      ORBITFUSE_TRY(leave_unplaced(refinement, renderer, orbit.images[lost[c]], seen.agree,
+                                   warm.view, found.median_correlation, view));
+      continue;
     }
+    const PosedView& place = decision == MoveDecision::both                 ? form.view
+                             : decision == MoveDecision::temperatures_alone ? warm.view
+                                                                            : view.view;
+    const double moved_deg = apart_deg(orbit, view.view.cam_from_world, place.cam_from_world);
+    if (ViewVerdict verdict =
+            verdict_of_move(decision, seen, moved_deg,
+                            !same_place(orbit, view.view.cam_from_world, place.cam_from_world));
+        !verdict.sure())
+      view.verdict = std::move(verdict);
+    if (decision == MoveDecision::temperatures_alone)
+      check.by_temperatures_alone.emplace_back(lost[c], place.cam_from_world);
+    check.moved += decision == MoveDecision::form_alone ? 0 : 1;
+    view.view = PosedView(place);
   }
   return check;
 }

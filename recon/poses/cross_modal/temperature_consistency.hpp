@@ -5,35 +5,13 @@
 #include <vector>
 
 #include "recon/poses/cross_modal/orbit_refinement.hpp"
+#include "recon/poses/cross_modal/place_evidence.hpp"
 
 // A second opinion on thermal poses: what other thermal views measured, painted on the visible
 // scene's form (painted_scene.hpp). It shows edges that the visible scene lacks, and finds a view
 // that settled on the wrong rib of a repeated form. Internal to recon/poses; errors: the
 // renderer's, cancelled.
 namespace orbitfuse {
-
-/// A view that the others' temperatures contradict, from where they place it best. Supports are
-/// shares of its loop's median one in the same scene.
-struct PlaceEvidence {
-  bool agree = false;             ///< form, started there, stays within a degree
-  double temperatures_there = 0;  ///< among temperatures
-  double form_there = 0;          ///< in the visible scene
-  double form_before = 0;         ///< in the visible scene, where it was
-  bool stays = false;             ///< temperatures place it within a degree of where it was
-};
-
-/// Whose word places the view. It only moves to a place that temperatures find or
-/// that form knows well enough to vouch for.
-enum class MoveDecision { both, temperatures_alone, form_alone, nobody };
-MoveDecision who_places(const PlaceEvidence& seen);
-
-/// Of a view that nobody places: doubtful where patches of other thermal views can still tell (they
-/// make it sure, judged()), else dropped. `likeness`: its image's correlation with what the others
-/// measured at the better of its two places, of the median view's.
-ViewVerdict verdict_of_unplaced(bool agree, double apart_deg, double likeness);
-
-/// Of its loop's median support; 0 where the loop has none: shares of nothing say nothing.
-double share_of_median(double support, double median);
 
 /// The scene that the chosen views paint, for views that are turned far enough not to be one of
 /// them.

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <map>
 
+#include "core/numeric/median.hpp"
+
 namespace orbitfuse {
 namespace {
 
@@ -37,8 +39,15 @@ std::vector<Station> stations_between(const std::vector<PassedStation>& passed,
   const auto walked = [&](const PassedStation& p) {
     return p.station.azimuth_deg + deviation_deg(p, sign, offset_deg);
   };
-  std::map<int, double> begins;  // loop -> degrees walked at its first station
-  for (const PassedStation& p : way) begins.try_emplace(p.station.loop, walked(p));
+  // Loop -> degrees walked where it begins: what its stations deviate in the median, as one alone
+  // may be far off.
+  std::map<int, std::vector<double>> deviations;
+  for (const PassedStation& p : way)
+    deviations[p.station.loop].push_back(deviation_deg(p, sign, offset_deg));
+  std::map<int, double> begins;
+  for (const PassedStation& p : way)
+    begins.try_emplace(p.station.loop,
+                       p.station.azimuth_deg + median(deviations.at(p.station.loop)));
   const std::size_t own_stream = static_cast<std::size_t>(std::count_if(
       tracking.begin(), tracking.end(),
       [&](std::uint64_t s) { return s < way.front().sequence || s > way.back().sequence; }));

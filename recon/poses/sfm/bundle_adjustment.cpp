@@ -280,15 +280,19 @@ class Problem {
   /// Seven degrees of freedom: the first pose, and one coordinate of the farthest centre.
   void fix_gauge() {
     const auto& centers = parameters_.center;
-    if (!problem_.HasParameterBlock(centers[0].data())) return;
-    problem_.SetParameterBlockConstant(parameters_.rotation[0].coeffs().data());
-    problem_.SetParameterBlockConstant(parameters_.center[0].data());
-    std::size_t far = 0;
-    for (std::size_t v = 1; v < centers.size(); ++v)
-      if ((centers[v] - centers[0]).norm() > (centers[far] - centers[0]).norm()) far = v;
-    if (far == 0 || !problem_.HasParameterBlock(centers[far].data())) return;
+    const auto used = [&](std::size_t v) { return problem_.HasParameterBlock(centers[v].data()); };
+    std::size_t first = 0;
+    while (first < centers.size() && !used(first)) ++first;
+    if (first == centers.size()) return;
+    problem_.SetParameterBlockConstant(parameters_.rotation[first].coeffs().data());
+    problem_.SetParameterBlockConstant(parameters_.center[first].data());
+    std::size_t far = first;
+    for (std::size_t v = first + 1; v < centers.size(); ++v)
+      if (used(v) && (centers[v] - centers[first]).norm() > (centers[far] - centers[first]).norm())
+        far = v;
+    if (far == first) return;
     int axis = 0;
-    (centers[far] - centers[0]).cwiseAbs().maxCoeff(&axis);
+    (centers[far] - centers[first]).cwiseAbs().maxCoeff(&axis);
     problem_.SetManifold(parameters_.center[far].data(), new ceres::SubsetManifold(3, {axis}));
   }
 

@@ -173,6 +173,7 @@ Result<ModalityPoses> adjust_model(Reconstruction model, const Session& session,
   poses.gates["median_triangulation_deg"] = report.median_triangulation_angle_deg;
   poses.gates["outlier_ratio"] =
       static_cast<double>(report.outliers) / std::max(report.outliers + report.observations, 1);
+  poses.gates["bundle_converged"] = report.converged ? 1 : 0;
   for (const double sigma : report.focal_relative_sigma)
     if (std::isfinite(sigma))
       poses.gates["focal_sigma_percent"] =

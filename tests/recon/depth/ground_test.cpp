@@ -6,6 +6,7 @@
 #include <cstring>
 #include <limits>
 #include <numbers>
+#include <opencv2/core.hpp>
 
 #include "core/numeric/random.hpp"
 #include "core/system/parallel.hpp"
@@ -27,15 +28,22 @@ struct Shown {
   float from_center = z;  ///< of the place
 };
 
-/// A pillar on a plain, seen from two loops; behind it, if asked for, a plain wall of half the
-/// width.
+enum class Wall {
+  absent,
+  behind,      ///< plain, of half the width, before the sky
+  rim_known,   ///< the same, of the ground's gray, its upper edge confirmed
+  foot_known,  ///< the same, its foot confirmed
+  all_round    ///< a room's, plain and without an end above
+};
+
+/// A pillar on a plain, seen from two loops; behind it, if asked for, a wall.
 struct Yard {
   std::vector<DepthView> views;
   std::vector<DepthMap> maps;
   std::vector<std::vector<Shown>> truth;
 };
 
-Shown looked_at(const Eigen::Vector3f& eye, const Eigen::Vector3f& ray, bool walled) {
+Shown looked_at(const Eigen::Vector3f& eye, const Eigen::Vector3f& ray, Wall wall) {
   Shown shown;
   if (ray.z() < 0) shown = {Shown::ground, (floor_height - eye.z()) / ray.z()};
   // The pillar: a sphere on a stick would do as well.
@@ -45,7 +53,12 @@ Shown looked_at(const Eigen::Vector3f& eye, const Eigen::Vector3f& ray, bool wal
     const float t = (-b - std::sqrt(b * b - a * c)) / a, z = eye.z() + t * ray.z();
     if (t > 0 && z < 0.3f && z > floor_height && t < shown.z) shown = {Shown::pillar, t};
   }
-  if (walled && ray.y() > 0) {
+  if (wall == Wall::all_round)
+    for (const float side : {-2.5f, 2.5f})
+      for (const int axis : {0, 1})
+        if (const float t = (side - eye[axis]) / ray[axis]; t > 0 && t < shown.z)
+          shown = {Shown::wall, t};
+  if (wall != Wall::absent && wall != Wall::all_round && ray.y() > 0) {
     const float t = (4 - eye.y()) / ray.y();
     const Eigen::Vector3f at = eye + t * ray;
     if (t > 0 && t < shown.z && std::abs(at.x()) < 2 && at.z() < 1.2f && at.z() > floor_height)
@@ -54,14 +67,14 @@ Shown looked_at(const Eigen::Vector3f& eye, const Eigen::Vector3f& ray, bool wal
   return shown;
 }
 
-std::uint8_t gray_of(const Shown& shown, const Eigen::Vector3f& at) {
+std::uint8_t gray_of(const Shown& shown, const Eigen::Vector3f& at, Wall wall) {
   switch (shown.what) {
     case Shown::sky:
       return 200;
     case Shown::pillar:
       return 60;
     case Shown::wall:
-      return 170;
+      return wall == Wall::rim_known || wall == Wall::foot_known ? 120 : 170;
     case Shown::ground:
       break;
   }
@@ -69,7 +82,7 @@ std::uint8_t gray_of(const Shown& shown, const Eigen::Vector3f& at) {
   return static_cast<std::uint8_t>(120 + fade * std::sin(9 * at.x()) * std::cos(8 * at.y()));
 }
 
-Yard yard(bool walled = false, float roll = 0) {
+Yard yard(Wall wall = Wall::absent, float roll = 0) {
   Yard out;
   for (int i = 0; i < view_count; ++i) {
     const float azimuth = static_cast<float>(i % 12) * std::numbers::pi_v<float> / 6;
@@ -95,17 +108,24 @@ Yard yard(bool walled = false, float roll = 0) {
     for (int y = 0; y < 90; ++y)
       for (int x = 0; x < 120; ++x) {
         const Eigen::Vector3f ray = axes * view.camera.ray_of({x + 0.5, y + 0.5}).cast<float>();
-        Shown shown = looked_at(eye, ray, walled);
+        Shown shown = looked_at(eye, ray, wall);
         const Eigen::Vector3f at = eye + std::min(shown.z, 1e3f) * ray;
         shown.from_center = at.norm();
-        view.gray.at<std::uint8_t>(y, x) = gray_of(shown, at);
-        const bool confirmed = shown.what == Shown::pillar ||
+        view.gray.at<std::uint8_t>(y, x) = gray_of(shown, at, wall);
+        const bool known_wall =
+            shown.what == Shown::wall && ((wall == Wall::rim_known && at.z() > 1) ||
+                                          (wall == Wall::foot_known && at.z() < -0.1f));
+        const bool confirmed = shown.what == Shown::pillar || known_wall ||
                                (shown.what == Shown::ground && at.head<2>().norm() < texture_ends);
         if (confirmed) {
           const auto bits = random_bits(7, static_cast<std::uint64_t>(i),
                                         static_cast<std::uint64_t>(y * 120 + x));
           map.depth.at<float>(y, x) = shown.z * (1 + 0.002f * (uniform01(bits) - 0.5f));
           map.confidence.at<float>(y, x) = 0.7f;
+          const Eigen::Vector3f normal =
+              view.world_rotation * (shown.what == Shown::ground ? Eigen::Vector3f::UnitZ().eval()
+                                                                 : (-eye.normalized()).eval());
+          map.normal.at<cv::Vec3f>(y, x) = {normal.x(), normal.y(), normal.z()};
         }
         truth.push_back(shown);
       }
@@ -181,15 +201,49 @@ TEST(OpenGround, IsNotARoofWithTheYardBelowIt) {
   for (DepthMap& map : scene.maps)
     for (int y = 0; y < 90; ++y)
       for (int x = 0; x < 40; ++x) map.depth.at<float>(y, x) *= 1.4f;
+  EXPECT_FALSE(find_ground(scene.views, scene.maps, 1));
+}
+
+TEST(OpenGround, IsNotATableThatEndsBeforeTheCameras) {
+  Yard scene = yard();
+  for (std::size_t i = 0; i < scene.maps.size(); ++i)
+    for (int p = 0; p < 90 * 120; ++p)
+      if (const Shown& shown = scene.truth[i][static_cast<std::size_t>(p)];
+          shown.what == Shown::ground && shown.from_center > 0.7f)
+        scene.maps[i].depth.at<float>(p / 120, p % 120) = none;
   const auto ground = find_ground(scene.views, scene.maps, 1);
-  if (ground) {
-    EXPECT_LT(ground->height, floor_height - 0.02f);
+  ASSERT_FALSE(ground);
+  EXPECT_NE(ground.error().found.find("as a table would"), std::string::npos)
+      << ground.error().found;
+}
+
+TEST(OpenGround, IsFoundFromAThirdOfAnOrbitAndFromRolledViews) {
+  Yard scene = yard(Wall::absent, 0.3f);
+  EXPECT_TRUE(find_ground(scene.views, scene.maps, 1));
+  std::vector<DepthView> views;
+  std::vector<DepthMap> maps;
+  for (std::size_t i = 0; i < scene.views.size(); ++i)
+    if (i % 12 < 4) views.push_back(scene.views[i]), maps.push_back(scene.maps[i]);
+  const auto ground = find_ground(views, maps, 1);
+  ASSERT_TRUE(ground) << ground.error().message();
+  EXPECT_NEAR(ground->height, floor_height, 0.003);
+}
+
+TEST(OpenGround, NeedsViewsThatAgreeAboutWhatIsUp) {
+  Yard scene = yard();
+  for (std::size_t i = 0; i < scene.views.size(); i += 2) {
+    // Held upside down: the same rays, other axes.
+    const Eigen::Matrix3f turn = Eigen::Vector3f(-1, -1, 1).asDiagonal();
+    scene.views[i].world_rotation = turn * scene.views[i].world_rotation;
+    scene.views[i].translation = turn * scene.views[i].translation;
+    cv::rotate(scene.maps[i].depth, scene.maps[i].depth, cv::ROTATE_180);
   }
+  EXPECT_FALSE(find_ground(scene.views, scene.maps, 1));
 }
 
 TEST(ExtendedGround, ReachesTheHorizonAndLeavesTheSkyOpen) {
   for (const float roll : {0.f, 0.3f, std::numbers::pi_v<float> / 2}) {
-    const Yard scene = yard(false, roll);
+    const Yard scene = yard(Wall::absent, roll);
     const LevelPlane ground{Eigen::Vector3d::UnitZ(), static_cast<double>(floor_height)};
     std::vector<DepthMap> maps;
     for (const DepthMap& map : scene.maps) {
@@ -198,7 +252,7 @@ TEST(ExtendedGround, ReachesTheHorizonAndLeavesTheSkyOpen) {
       maps.back().confidence = map.confidence.clone();
       maps.back().normal = map.normal.clone();
     }
-    const OpenSpace share = extend_over_ground(scene.views, ground, 12, maps);
+    const OpenSpace share = extend_over_ground(scene.views, ground, {}, 12, maps);
     const Count n = count(scene, maps, 12);
     EXPECT_NEAR(share.ground, n.ground_filled / (view_count * 120.0 * 90), 1e-9);
     EXPECT_NEAR(share.sky, n.sky_filled / (view_count * 120.0 * 90), 1e-9);
@@ -212,23 +266,74 @@ TEST(ExtendedGround, ReachesTheHorizonAndLeavesTheSkyOpen) {
   }
 }
 
-TEST(ExtendedGround, StopsAtWallsThatNothingConfirms) {
-  const Yard scene = yard(true);
+Count extended(const Yard& scene, const std::vector<Eigen::Vector3f>& points = {}) {
   std::vector<DepthMap> maps;
   for (const DepthMap& map : scene.maps) {
     maps.push_back(map);
     maps.back().depth = map.depth.clone();
   }
   const LevelPlane ground{Eigen::Vector3d::UnitZ(), static_cast<double>(floor_height)};
-  extend_over_ground(scene.views, ground, 12, maps);
-  const Count n = count(scene, maps, 12);
+  extend_over_ground(scene.views, ground, points, 12, maps);
+  return count(scene, maps, 12);
+}
+
+TEST(ExtendedGround, StopsAtWallsThatNothingConfirms) {
+  const Count n = extended(yard(Wall::behind));
   ASSERT_GT(n.others, 1000);
   EXPECT_LT(n.others_wrong, 0.005 * n.others);
   EXPECT_EQ(n.ground_wrong, 0);
 }
 
+TEST(ExtendedGround, IsNotABodyOfItsGrayWhoseEdgeIsKnownAboveIt) {
+  const Count n = extended(yard(Wall::rim_known));
+  ASSERT_GT(n.others, 1000);
+  EXPECT_LT(n.others_wrong, 0.015 * n.others);
+}
+
+TEST(ExtendedGround, IsNotAWallOfItsGrayWhoseFootLiesInThePlane) {
+  const Count n = extended(yard(Wall::foot_known));
+  ASSERT_GT(n.others, 1000);
+  EXPECT_LT(n.others_wrong, 0.01 * n.others);
+}
+
+TEST(ExtendedGround, TakesNoWallOfARoomForTheSky) {
+  const Count n = extended(yard(Wall::all_round));
+  ASSERT_GT(n.others, 10000);
+  EXPECT_LT(n.others_wrong, 0.001 * n.others);
+}
+
+TEST(ExtendedGround, LeavesWhatSparsePointsStandBefore) {
+  const Yard scene = yard();
+  const Count open = extended(scene);
+  // A screen of points all round, that no depth map shows.
+  std::vector<Eigen::Vector3f> points;
+  for (int a = 0; a < 720; ++a)
+    for (int z = -15; z < 100; ++z)
+      points.emplace_back(2.5f * std::cos(static_cast<float>(a) * std::numbers::pi_v<float> / 360),
+                          2.5f * std::sin(static_cast<float>(a) * std::numbers::pi_v<float> / 360),
+                          0.02f * static_cast<float>(z));
+  const Count screened = extended(scene, points);
+  EXPECT_GT(open.sky_filled, 1000);
+  EXPECT_LT(screened.sky_filled, open.sky_filled / 20);
+  EXPECT_LT(screened.ground_filled, open.ground_filled);
+}
+
+TEST(ExtendedGround, SeesNoFurtherThanItsImage) {
+  // What lies behind the image in memory (DepthView::gray) is not looked at.
+  const Yard plain = yard();
+  Yard padded = yard();
+  for (DepthView& view : padded.views) {
+    cv::Mat larger(view.gray.rows + 2, view.gray.cols, CV_8UC1, cv::Scalar(0));
+    view.gray.copyTo(larger.rowRange(0, view.gray.rows));
+    view.gray = larger.rowRange(0, view.gray.rows);
+  }
+  const Count n = extended(plain), m = extended(padded);
+  EXPECT_EQ(n.ground_filled, m.ground_filled);
+  EXPECT_EQ(n.sky_filled, m.sky_filled);
+}
+
 TEST(ExtendedGround, IsTheSameForAnyNumberOfThreads) {
-  const Yard scene = yard(true);
+  const Yard scene = yard(Wall::behind);
   const LevelPlane ground{Eigen::Vector3d::UnitZ(), static_cast<double>(floor_height)};
   std::vector<cv::Mat> first;
   for (const int threads : {1, 3}) {
@@ -238,7 +343,7 @@ TEST(ExtendedGround, IsTheSameForAnyNumberOfThreads) {
       maps.push_back(map);
       maps.back().depth = map.depth.clone();
     }
-    extend_over_ground(scene.views, ground, 12, maps);
+    extend_over_ground(scene.views, ground, {}, 12, maps);
     for (std::size_t i = 0; i < maps.size(); ++i) {
       if (threads == 1)
         first.push_back(maps[i].depth.clone());
@@ -253,11 +358,11 @@ TEST(ExtendedGround, LeavesMapsWithoutAnyConfirmedGroundAlone) {
   Yard scene = yard();
   for (DepthMap& map : scene.maps) map.depth.setTo(none);
   const LevelPlane ground{Eigen::Vector3d::UnitZ(), static_cast<double>(floor_height)};
-  extend_over_ground(scene.views, ground, 12, scene.maps);
+  extend_over_ground(scene.views, ground, {}, 12, scene.maps);
   for (const DepthMap& map : scene.maps)
     for (const float z : cv::Mat_<float>(map.depth)) EXPECT_FALSE(std::isfinite(z));
   std::vector<DepthMap> nothing;
-  EXPECT_EQ(extend_over_ground({}, ground, 12, nothing).ground, 0);
+  EXPECT_EQ(extend_over_ground({}, ground, {}, 12, nothing).ground, 0);
 }
 
 }  // namespace

@@ -160,6 +160,18 @@ TEST(CorrectByTemperatures, OnlyTemperaturesThatFindAViewMoveIt) {
   EXPECT_EQ(who_places({false, nan, nan, nan}), MoveDecision::nobody);
 }
 
+TEST(PlaceEvidence, AViewMovedAgainstFormIsNotSure) {
+  const PlaceEvidence apart{false, 0.8, 0.3, 1.0};
+  EXPECT_EQ(verdict_of_move(MoveDecision::temperatures_alone, apart, 3, true).reason,
+            DoubtReason::temperatures_elsewhere);
+  // Where it was all along, or where form knows it better than before, both agree.
+  EXPECT_TRUE(verdict_of_move(MoveDecision::temperatures_alone, apart, 0.2, false).sure());
+  EXPECT_TRUE(verdict_of_move(MoveDecision::both, {true, 0.8, 0.9, 0.5}, 3, true).sure());
+  EXPECT_FALSE(verdict_of_move(MoveDecision::both, {true, 0.8, 0.5, 0.9}, 3, true).sure());
+  EXPECT_EQ(verdict_of_move(MoveDecision::form_alone, {false, 0.1, 0.2, 0.9}, 0, false).reason,
+            DoubtReason::temperatures_contradict);
+}
+
 TEST(CorrectByTemperatures, WhatNobodyPlacesIsLeftToPatchesOnlyWhereItLooksRight) {
   const auto confidence = [](bool agree, double apart_deg, double likeness) {
     return verdict_of_unplaced(agree, apart_deg, likeness).confidence;

@@ -51,6 +51,10 @@ TEST(ViewVerdicts, WhatSpeaksAgainstAViewIsNamed) {
   ViewEvidence confirmed = good;
   confirmed.confirmed_share = 0.39;
   EXPECT_FALSE(judged(confirmed, painted).sure());
+  confirmed.confirmed_share = 0.5;
+  EXPECT_TRUE(judged(confirmed, painted).sure());
+  confirmed.support_share = 0.5;
+  EXPECT_FALSE(judged(confirmed, painted).sure()) << "frames 3 degrees off had 0.74 of the patches";
   confirmed.confirmed_share = 0.9;
   EXPECT_TRUE(judged(confirmed, painted).sure());
   EXPECT_TRUE(judged(confirmed, {Confidence::doubtful, DoubtReason::not_found, ""}).sure());
