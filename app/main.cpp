@@ -25,7 +25,7 @@
 #include "core/system/parallel.hpp"
 #include "core/system/trace.hpp"
 
-// The only place that turns errors into exit codes (docs/cli.md).
+// Where errors become exit codes, by the map of terminal/exit_code.hpp (docs/cli.md).
 namespace orbitfuse {
 namespace {
 

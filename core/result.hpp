@@ -7,7 +7,7 @@
 
 namespace orbitfuse {
 
-/// Why an operation failed; main() alone maps it to an exit code (docs/cli.md).
+/// Why an operation failed; the program maps it to an exit code (app/terminal/exit_code.hpp).
 enum class ErrorKind {
   usage,        ///< an option or configuration value is wrong
   input,        ///< a file or folder is missing, malformed or insufficient
@@ -49,7 +49,8 @@ inline tl::unexpected<Error> fail(ErrorKind kind, std::string where, std::string
     if (!status_) return tl::unexpected(std::forward<decltype(status_)>(status_).error()); \
   } while (false)
 
-/// ORBITFUSE_ASSIGN(auto x, make_x()): x on success, else returns the error.
+/// ORBITFUSE_ASSIGN(auto x, make_x()): x on success, else returns the error. Several statements,
+/// since x outlives them: not under an `if` or `for` without braces.
 #define ORBITFUSE_ASSIGN(declaration, expression)                                  \
   auto ORBITFUSE_CONCAT(result_, __LINE__) = (expression);                         \
   if (!ORBITFUSE_CONCAT(result_, __LINE__))                                        \

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // 03_train_and_render transforms.json steps view.png: a radiance field of posed photos
 // (nerfstudio's format), rendered from the first photo's place.
-#include <cstdlib>
+#include <charconv>
+#include <cstring>
 #include <iostream>
 #include <opencv2/imgproc.hpp>
 #include <orbitfuse/core/formats/transforms_json.hpp>
@@ -31,9 +32,18 @@ of::Status train_and_render(const std::filesystem::path& file, int steps, const 
   cv::cvtColor(rgb8, bgr8, cv::COLOR_RGB2BGR);
   return of::write_png(view_file, bgr8);
 }
+
 int main(int argc, char** argv) {
-  if (argc != 4) return 2;
-  const of::Status done = train_and_render(argv[1], std::atoi(argv[2]), argv[3]);
+  int steps = 0;
+  const auto is_number = [&](const char* text) {
+    const char* end = text + std::strlen(text);
+    return std::from_chars(text, end, steps) == std::from_chars_result{end, std::errc{}};
+  };
+  if (argc != 4 || !is_number(argv[2])) {
+    std::cerr << "usage: 03_train_and_render transforms.json steps view.png\n";
+    return 2;
+  }
+  const of::Status done = train_and_render(argv[1], steps, argv[3]);
   if (!done) std::cerr << done.error().message() << "\n";
   return done ? 0 : 1;
 }

@@ -52,7 +52,9 @@ struct FarmPlan {
   std::vector<FarmSession> sessions;
   std::vector<std::string> stages;  ///< in order; a session's folder admits one run at a time
   std::map<std::string, StageNeeds> needs;
-  int tries = 3;  ///< of a stage that is interrupted: by a lost node, memory, time
+  /// Starts of a stage that is interrupted, over all rounds: by a lost node, memory, time. On this
+  /// machine one that is out of time is not started again before the next `resume`.
+  int tries = 3;
   bool on_slurm = false;
   SlurmOptions slurm;
   std::vector<SlurmRound> rounds;

@@ -42,7 +42,7 @@ struct HeldoutKelvin {
 };
 
 /// Rendered, with the detail of all other recorded views, against recorded, on views that did not
-/// train (seed paper, Table 4).
+/// train (as Table 4 of the paper that fusion/metrics/metrics.hpp names).
 Status score_field(const StageContext& context, const SessionInput& input,
                    const TrainConfig& config, Modality modality, MetricMeans& means,
                    HeldoutKelvin& thermal_k) {

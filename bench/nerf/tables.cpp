@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // nerf_tables --data ../shared/data/orbits --cpu-seconds 60 --out docs/benchmarks
-// The seed paper's Tables 4 to 6 on our scenes: the published recipes and ours at equal time on all
-// cores (budgets are wall time: leave the machine alone meanwhile; CPU seconds are printed), the
-// five metrics with their improvement over NeRFacto in %, and how much sooner ours has each
-// published recipe's PSNR. Depth maps and guide fields count in the time of what uses them.
+// Tables 4 to 6 of the paper that fusion/metrics/metrics.hpp names, on our scenes: the published
+// recipes and ours at equal time on all cores (budgets are wall time: leave the machine alone
+// meanwhile; CPU seconds are printed), the five metrics with their improvement over NeRFacto in %,
+// and how much sooner ours has each published recipe's PSNR. Depth maps and guide fields count in
+// the time of what uses them.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>

@@ -11,12 +11,13 @@
 
 namespace orbitfuse {
 
-/// ASCII or binary PLY vertices: x y z, nx ny nz, red green blue, temperature (kelvin). Other
-/// properties and elements are skipped. Positions that are not finite, or
-/// beyond 1e9, are kept as NaN (callers decide).
+/// ASCII or binary PLY vertices: x y z (any unit), nx ny nz, red green blue, temperature (kelvin).
+/// Other properties and elements are skipped. Positions that are not finite, or beyond 1e9, are
+/// kept as NaN (callers decide). Errors: input (no file, not PLY, cut off, no vertices), which name
+/// the file.
 Result<PointCloud> read_ply(const std::filesystem::path& path);
 
-/// Binary little-endian.
+/// Binary little-endian, positions as doubles; attributes that the cloud has. Errors: device.
 Status write_ply(const std::filesystem::path& path, const PointCloud& cloud);
 
 struct PlyWriteOptions {
@@ -28,8 +29,8 @@ struct PlyWriteOptions {
 };
 
 /// Vertices and faces (vertex_indices), binary little-endian; without triangles a cloud. Errors:
-/// input (a name or comment that would break the header, scalars that are not
-/// one a vertex), device.
+/// input (a name or comment that would break the header, scalars that are not one a vertex),
+/// device.
 Status write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
                  const PlyWriteOptions& options);
 

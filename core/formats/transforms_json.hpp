@@ -15,18 +15,21 @@ struct TransformsFrame {
   std::string file_path;                         ///< as written, relative to the JSON
   std::optional<std::string> thermal_file_path;  ///< ThermoNeRF's aligned pairs
   Camera camera;
-  Rigid3d cam_from_world;
+  Rigid3d cam_from_world;  ///< axes as in Camera: x right, y down, z forward; the file's unit
 };
 
 struct Transforms {
   std::vector<TransformsFrame> frames;
 };
 
-/// nerfstudio / instant-ngp transforms.json: OpenGL camera-to-world; shared or per-frame
-/// intrinsics (fl_x or camera_angle_x). A frame's missing size is an input error naming it.
+/// nerfstudio / instant-ngp transforms.json: OpenGL camera-to-world there, turned to Camera's axes
+/// here; shared or per-frame intrinsics (fl_x or camera_angle_x), pixels. Errors: input, naming
+/// file and frame (no JSON, no frames, no size, no focal length, a fisheye lens or k3, k4, a matrix
+/// that is no rigid pose). Images are not looked at.
 Result<Transforms> read_transforms_json(const std::filesystem::path& file);
 
-/// Writes the views with a `conventions` block.
+/// Writes the views, poses turned back to OpenGL's axes, with a `conventions` block. Errors:
+/// device.
 Status write_transforms_json(const std::filesystem::path& file, const Transforms& transforms);
 
 }  // namespace orbitfuse

@@ -43,8 +43,9 @@ struct Reconstruction {
 struct DepthMap {
   int view = 0;   ///< index into the Reconstruction's views
   Camera camera;  ///< of the map itself: may be smaller than the view's, never distorted
-  cv::Mat depth;  ///< CV_32FC1, z along the optical axis, world units; NaN = unknown, infinite =
-                  ///< the sky
+  /// CV_32FC1, z along the optical axis, world units; NaN = unknown, infinite = the sky (a field's
+  /// nerf::RenderedView has NaN for both).
+  cv::Mat depth;
   cv::Mat confidence;  ///< CV_32FC1 in [0, 1]
   cv::Mat normal;      ///< CV_32FC3 in camera axes, towards the camera; may be empty
 };

@@ -9,7 +9,8 @@
 
 namespace orbitfuse {
 
-/// Sensor calibration of a FLIR camera: S = R1 / (R2 (exp(B / T) - F)) - O.
+/// Sensor calibration of a FLIR camera: S = R1 / (R2 (exp(B / T) - F)) - O, with S and O in counts,
+/// T and B in kelvin, R1 / R2 in counts, F without a unit.
 struct PlanckConstants {
   double r1 = 0, r2 = 0, b = 0, f = 1;
   double o = 0;
@@ -53,14 +54,15 @@ struct FlirCalibration {
   AtmosphereConstants atmosphere;
   ObjectParameters object;
 
-  /// Input error naming the parameter that is not finite or out of range.
+  /// Input error naming the parameter that is not finite or out of range, of the file `where`.
   Status validate(const std::string& where) const;
   bool operator==(const FlirCalibration&) const = default;
 };
 
 /// Radiometric chain of FLIR's tools:
 ///   S = tw (tau (e S_obj + (1 - e) S_refl) + (1 - tau) S_atm) + (1 - tw) S_window,
-/// solved for S_obj, then T = B / ln(R1 / (R2 (S_obj + O)) + F).
+/// solved for S_obj, then T = B / ln(R1 / (R2 (S_obj + O)) + F). Only of a calibration that
+/// validate() accepts: nothing is checked here.
 class FlirThermometer {
  public:
   explicit FlirThermometer(const FlirCalibration& calibration);

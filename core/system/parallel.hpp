@@ -6,7 +6,8 @@
 
 namespace orbitfuse {
 
-/// Threads that parallel_for may use; 0 = all cores. Set once by main() or a test.
+/// Threads that parallel_for may use; 0 = all cores. Of the whole process: set it before
+/// anything runs, in main(), a test or a program that uses the libraries.
 void set_thread_count(int threads);
 int thread_count();
 

@@ -12,6 +12,19 @@
 namespace orbitfuse::aravis {
 namespace {
 
+using namespace std::chrono_literals;
+
+/// An earlier connection blocks for seconds where its camera doesn't answer (teardown.hpp); one
+/// that takes longer than this is told.
+constexpr auto teardown_patience = 5s;
+/// The control channel is asked ten times a second, and two questions in a row without an answer in
+/// time tell that it is mute: within the half second in which silence is told.
+constexpr auto control_patience = 80ms;
+constexpr int mute_after = 2;
+/// The pause between questions, in parts, so that the watch ends soon.
+constexpr auto pause_part = 25ms;
+constexpr int pause_parts = 4;
+
 /// Packets and their resending don't wait for a busy machine, where the system allows that
 /// (RLIMIT_RTPRIO or RLIMIT_NICE); without the right it is as before.
 void prefer_receiving(void* /*data*/, ArvStreamCallbackType type, ArvBuffer* /*buffer*/) {
@@ -40,7 +53,7 @@ std::optional<Format> format_of(ArvPixelFormat format) {
 
 Status AravisSource::open() {
   // An earlier source of this program may have had the same camera, under any of its names.
-  if (!Teardowns::all().wait(address_, std::chrono::seconds(5)))
+  if (!Teardowns::all().wait(address_, teardown_patience))
     return fail(ErrorKind::device, "camera " + options_.camera,
                 "an earlier connection to it is still being closed", "try again in a few seconds");
   auto link = std::make_shared<Link>();
@@ -176,10 +189,10 @@ void AravisSource::watch_control() {
   if (address_.empty()) return;
   control_watch_ = std::jthread([this, address = address_](const std::stop_token& over) {
     for (int unanswered = 0; !over.stop_requested();) {
-      unanswered = answers(address, std::chrono::milliseconds(80)) ? 0 : unanswered + 1;
-      control_mute_ = unanswered >= 2;
-      for (int i = 0; i < 4 && !over.stop_requested(); ++i)
-        std::this_thread::sleep_for(std::chrono::milliseconds(25));
+      unanswered = answers(address, control_patience) ? 0 : unanswered + 1;
+      control_mute_ = unanswered >= mute_after;
+      for (int i = 0; i < pause_parts && !over.stop_requested(); ++i)
+        std::this_thread::sleep_for(pause_part);
     }
   });
 }

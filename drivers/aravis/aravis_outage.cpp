@@ -13,6 +13,16 @@
 namespace orbitfuse::aravis {
 namespace {
 
+using namespace std::chrono_literals;
+
+/// Between looks for a lost camera: little beside the 3 s within which its frames are to come again
+/// (docs/benchmarks/capture/outages.md).
+constexpr auto look_every = 200ms;
+/// A camera that is there answers within milliseconds.
+constexpr auto look_patience = 100ms;
+/// Twice what a frame's missing packets have (frame-retention in open()).
+constexpr auto drain_patience = 600ms;
+
 double seconds(std::chrono::steady_clock::duration d) {
   return std::chrono::duration<double>(d).count();
 }
@@ -30,7 +40,6 @@ void AravisSource::bury_link() {
 }
 
 Delivery AravisSource::lose(const std::string& why) {
-  using namespace std::chrono_literals;
   const bool was_streaming = state_ == State::streaming;
   bury_link();
   state_ = State::away;
@@ -54,11 +63,10 @@ Delivery AravisSource::lose(const std::string& why) {
 
 /// Nothing to tell when it is opened: it is back with its first frame.
 std::optional<Delivery> AravisSource::try_reopen() {
-  using namespace std::chrono_literals;
   if (Clock::now() < next_attempt_) return std::nullopt;
-  next_attempt_ = Clock::now() + 200ms;
+  next_attempt_ = Clock::now() + look_every;
   if (!Teardowns::all().wait(address_, 0ms)) return std::nullopt;
-  if (!answers(address_, 100ms)) return std::nullopt;
+  if (!answers(address_, look_patience)) return std::nullopt;
   if (const Status status = open(); !status) {
     if (!failure_.note(status.error().message())) return std::nullopt;
     return event_delivery(EventKind::reopen_failed, status.error().message());
@@ -90,7 +98,6 @@ Delivery AravisSource::come_back(void* handle, const Arrival& arrival) {
 
 /// What is under way gets the time that its missing packets have; then nothing is left uncounted.
 void AravisSource::drain(std::vector<Delivery>& list) {
-  using namespace std::chrono_literals;
   if (!control_mute_ && !link_->control_lost) {
     arv_camera_stop_acquisition(link_->camera, nullptr);
     link_->stopped = true;
@@ -100,7 +107,7 @@ void AravisSource::drain(std::vector<Delivery>& list) {
     arv_stream_get_n_buffers(link_->stream, &in, &out);
     return in + out < options_.buffers;
   };
-  const auto limit = Clock::now() + 600ms;
+  const auto limit = Clock::now() + drain_patience;
   while (link_) {
     ArvBuffer* buffer = arv_stream_timeout_pop_buffer(link_->stream, 20'000);
     if (!buffer && (!under_way() || Clock::now() > limit)) break;

@@ -34,7 +34,8 @@ struct AravisOptions {
   std::chrono::milliseconds give_up{1000};    ///< and reopened after this long
   std::chrono::milliseconds nuc_settle{500};  ///< frames right after a shutter freeze still drift
   /// After two reopenings without a frame the next one waits this long, then twice as long each
-  /// time up to the most: a camera that is opened again and again may never come up.
+  /// time up to the most: a camera that is opened again and again may never come up. There is no
+  /// last one: it is tried until the recording ends.
   std::chrono::milliseconds patience{2000}, most_patience{10000};
 
   Status validate() const;

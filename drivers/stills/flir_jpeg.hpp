@@ -31,7 +31,9 @@ struct FlirImage {
 bool is_flir_jpeg(std::string_view bytes);
 
 /// Reads the FLIR file inside the JPEG's APP1 segments (layout as published by the ExifTool
-/// project). Any damage is an input error: every offset and length is checked.
+/// project). Any damage is an input error: every offset and length is checked. `where` names the
+/// file in errors. Constants are as the file has them: call calibration.validate() before
+/// FlirThermometer.
 Result<FlirImage> read_flir_jpeg(std::string_view bytes, const std::string& where);
 
 /// A file that begins with a FLIR header: one image (FFF) or a recording (SEQ, and CSQ, which keeps
@@ -39,7 +41,7 @@ Result<FlirImage> read_flir_jpeg(std::string_view bytes, const std::string& wher
 bool is_flir_recording(std::string_view bytes);
 /// Its images, in order; what follows a damaged one is not found.
 std::vector<std::string_view> flir_recording_frames(std::string_view bytes);
-/// One of them.
+/// One of them. `where`, errors and constants as of read_flir_jpeg.
 Result<FlirImage> read_flir_file(std::string_view file, const std::string& where);
 
 }  // namespace orbitfuse

@@ -50,7 +50,8 @@ struct ImportOptions {
   /// with the frames by file name; with no `visible` given, transforms.json lists the images too.
   std::optional<std::filesystem::path> transforms_json;
   std::optional<std::filesystem::path> visible_colmap, thermal_colmap;
-  /// orbits/container/ground_truth.json: K and c2w of both modalities.
+  /// A ground_truth.json, as beside replay_data/car: K and c2w of both modalities
+  /// (docs/formats.md).
   std::optional<std::filesystem::path> ground_truth;
   /// From `ground_truth`: take only what an operator would know: the focal length as a prior to
   /// 3 % and the loops' elevations; never the poses.
@@ -85,13 +86,15 @@ struct ImportReport {
 /// scene is too hot for it (or stay 8-bit grey). A file that can't be read, a copy of another and a
 /// thermal file without temperatures among files that have them is left out with a warning; the
 /// import fails only when nothing is left, and then, or when it is cancelled, leaves nothing
-/// behind. What an import that was killed left in the folder is replaced.
+/// behind. What an import that was killed left in the folder is replaced. Errors: usage (options,
+/// file or folder given twice), input (nothing readable, session folder not empty, poses that can't
+/// be used), device (disk), cancelled; each names the file or field.
 Result<ImportReport> import_session(const ImportOptions& options,
                                     const std::filesystem::path& session_folder,
                                     const Progress& progress = {});
 
 /// What import_session() would do and say, without leaving anything behind: every file is read and
-/// decoded, so that it takes about as long. The report's session is empty.
+/// decoded, so that it takes about as long. The report's session is empty. Errors: the same.
 Result<ImportReport> rehearse_import(const ImportOptions& options,
                                      const std::filesystem::path& session_folder,
                                      const Progress& progress = {});

@@ -5,10 +5,11 @@
 
 namespace orbitfuse::fusion {
 
-/// The default method. Details: per band the source with the larger local energy, chosen softly
-/// so that the choice never flickers, at a strength that keeps part of its contrast to the level it
-/// moves to. Base: by votes of patches on which source holds more. See docs/notes/fusion.md
-/// for what each constant does to the scores.
+/// The default of FusionOptions::method (fuse/fuse.hpp); the default picture of a run's report is
+/// heat's. Details: per band the source with the larger local energy, chosen softly so that the
+/// choice never flickers, at a strength that keeps part of its contrast to the level it moves to.
+/// Base: by votes of patches on which source holds more. See docs/notes/fusion.md for what each
+/// constant does to the scores.
 struct BestOptions {
   int levels = 4;         ///< of the pyramid; fewer where the base would be below 8 px
   double sharpness = 12;  ///< exponent of the amplitude ratio in the weights; larger: harder choice

@@ -23,6 +23,8 @@ std::vector<std::string> fusion_method_names();
 Result<FusionMethod> fusion_method(const std::string& name);  ///< usage error with the known names
 
 struct FusionOptions {
+  /// Of a single pair. A run makes a picture by each of `fuse.methods` and shows the first of them
+  /// first: heat, unless told otherwise.
   FusionMethod method = FusionMethod::best;
   /// The visible image's chroma is kept and its luma fused; off: the result is gray.
   bool color = true;

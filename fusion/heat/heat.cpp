@@ -25,7 +25,8 @@ struct Coloring {
   int hatch_period;
 };
 
-/// Of one pixel; `known` is 0..1.
+/// Of one pixel; `known` is 0..1. The palette is read by the level's share of the way from usual to
+/// hot; its strength is the opacity alone.
 cv::Vec3f colored_pixel(const cv::Vec3f& visible, double level, double known, const Coloring& how) {
   if (!(known > 0)) return visible;
   const double share =

@@ -34,8 +34,10 @@ struct HeatOptions {
 Result<cv::Mat> colored_by_heat(const cv::Mat& visible, const Plane& thermal, const Plane& measured,
                                 const HeatOptions& options);
 
-/// The colour of a strength (0..1) on its own, BGR 0..255: from where the palette leaves black,
-/// which would look like a shadow, to its end.
+/// 256 colours (CV_8UC3, 1x256, BGR) for levels from HeatScale::usual to hot in equal steps: from
+/// where the palette leaves black, which would look like a shadow, to its end. How opaque a level's
+/// colour lies over the visible picture is another matter: HeatScale::strength. Usage error:
+/// unknown palette.
 Result<cv::Mat> heat_colors(const std::string& palette);
 
 /// 0..1 along diagonal stripes, for a pixel where nothing was measured.

@@ -10,10 +10,11 @@ namespace orbitfuse {
 struct HeatScale {
   double usual = 0;   ///< level of the surroundings: up to here nothing is coloured
   double spread = 0;  ///< how far the surroundings scatter round it
-  double hot = 0;     ///< colour at its full strength
+  double hot = 0;     ///< colour at its full strength, the palette's end
 
-  /// 0..1: how unusual a level is. Rises strictly from `usual` to `hot`: a level within the scatter
-  /// of the surroundings counts little, one that stands out counts by its height.
+  /// 0..1: how unusual a level is, i.e. how opaque its colour is. Rises strictly from `usual` to
+  /// `hot`: a level within the scatter of the surroundings counts little, one that stands out
+  /// counts by its height.
   double strength(double level) const;
   bool is_valid() const;  ///< finite, rising, spread not negative
 };

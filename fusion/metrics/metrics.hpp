@@ -10,7 +10,10 @@
 // Image quality, every value by a named definition. The fusion metrics follow the code of VIFB
 // (Zhang, Ye, Xiao, CVPRW 2020) to rounding error, its quirks included, so that numbers can be
 // compared with published ones; where VIFB's own definition is scaled wrongly (PSNR, RMSE) the
-// textbook one is the default and VIFB's is given beside it.
+// textbook one is the default and VIFB's is given beside it. The rendering metrics are those of the
+// paper that the recipes nerf-rgb and nerf-ir follow as well; by title and abstract it is "An
+// Improved NeRF-Based Method for Augmenting, Registering, and Fusing Visible and Infrared Images"
+// (Photonics 2025, 12(9), 842).
 namespace orbitfuse {
 
 struct MetricValue {
@@ -22,7 +25,8 @@ struct MetricValue {
 /// MV SD EN SF AG EI Qabf MI PSNR RMSE SSIM CE Qcb Qcv SCD CC PSNR_vifb RMSE_vifb SSIM_sum halo of
 /// one fused pair. Images: CV_8U or CV_16U (scaled to 0..255), or CV_32F in 0..255; 1 or 3 channels
 /// (a gray source beside a colour fused image is repeated); colour: mean over the channels. All
-/// of one size, at least 16 x 16. Errors name the image ("visible", "thermal", "fused").
+/// of one size, at least 16 x 16. Errors (input: type, channels, samples that are not finite,
+/// sizes) name the image ("visible", "thermal", "fused").
 Result<std::vector<MetricValue>> fusion_metrics(const cv::Mat& visible, const cv::Mat& thermal,
                                                 const cv::Mat& fused);
 
@@ -33,7 +37,7 @@ Result<std::vector<std::vector<MetricValue>>> fusion_metrics(const cv::Mat& visi
                                                              const std::vector<cv::Mat>& fused);
 
 /// SSIM, cosine similarity, mutual information, PSNR, histogram similarity of a rendered view
-/// against the truth (seed paper, Tables 4 to 6). Same image types.
+/// against the truth (Tables 4 to 6 of that paper). Same image types and errors.
 Result<std::vector<MetricValue>> render_metrics(const cv::Mat& truth, const cv::Mat& rendered);
 
 struct TemperatureError {

@@ -13,6 +13,9 @@
 namespace orbitfuse {
 namespace {
 
+/// Of an edge of brightness against one of depth: form shows in both modalities, paint perhaps.
+constexpr float paint_weight = 0.6F;
+
 /// Edge pixels by the row they lie in.
 class PixelRows {
  public:
@@ -106,13 +109,11 @@ cv::Mat rendered_edges(const SceneRender& render) {
     }
   const cv::Mat form = orientation_field(inverse, 1.0),
                 shade = orientation_field(render.brightness, 1.0);
-  // An edge of form shows in both modalities, one of paint perhaps: form counts more.
-  constexpr float paint = 0.6F;
   cv::Mat edges = form.clone();
   for (int y = 0; y < edges.rows; ++y)
     for (int x = 0; x < edges.cols; ++x) {
       auto& f = edges.at<cv::Vec2f>(y, x);
-      const auto s = paint * shade.at<cv::Vec2f>(y, x);
+      const auto s = paint_weight * shade.at<cv::Vec2f>(y, x);
       if (s.dot(s) > f.dot(f)) f = s;
     }
   return edges;

@@ -23,7 +23,8 @@ struct PatchMatchOptions {
   double min_score = 0.35;
 };
 
-/// Edges of brightness and of depth of one render, sign-free (see edge_field.hpp).
+/// Edges of brightness and of depth of one render, sign-free (see edge_field.hpp); those of depth
+/// count more.
 cv::Mat rendered_edges(const SceneRender& render);
 
 /// `edges`: rendered_edges; `field`: orientation_field of the image at the same size.

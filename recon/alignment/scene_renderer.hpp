@@ -14,9 +14,12 @@ namespace orbitfuse {
 
 /// A posed scene as some camera sees it.
 struct SceneRender {
-  cv::Mat brightness;  ///< CV_32FC1
-  cv::Mat depth;       ///< CV_32FC1, along the optical axis; NaN = nothing there
+  /// CV_32FC1 on any scale that all renders of a scene share (a field's: 0..1): only its edges are
+  /// looked at.
+  cv::Mat brightness;
+  cv::Mat depth;  ///< CV_32FC1, along the optical axis, world units; NaN = nothing there
 };
+/// At the camera's size, which has no distortion. Errors are handed on to who asked for alignment.
 using SceneRenderer =
     std::function<Result<SceneRender>(const Camera&, const Rigid3d& cam_from_world)>;
 

@@ -20,8 +20,10 @@ class Field {
   Field(Field&&) noexcept;
   Field& operator=(Field&&) noexcept;
 
-  /// Reads what save() or a training checkpoint wrote. A cut or altered file is an input error.
+  /// Reads what save() or a training checkpoint wrote. Input error: no file, cut or altered, of
+  /// another version of this program.
   static Result<Field> load(const std::filesystem::path& path);
+  /// Atomically, with the optimiser's state. Errors: input (the field is empty), device.
   Status save(const std::filesystem::path& path) const;
 
   bool empty() const { return !state_; }

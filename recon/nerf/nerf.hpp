@@ -61,7 +61,7 @@ Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
 /// Writes a finished run as a checkpoint, from which train() with `resume` and more iterations or
 /// budget extends it. It goes on from the field, i.e. the best step's parameters, with the
 /// optimiser's moments of the last step; a field no better on held-out views doesn't replace that
-/// one.
+/// one. Errors: input (an empty field), device.
 Status save_checkpoint(Field finished, const TrainReport& report,
                        const std::filesystem::path& checkpoint);
 
@@ -85,7 +85,8 @@ struct RenderOptions {
   Status validate() const;
 };
 
-/// A rendered camera. Where opacity is below one half, depth is NaN (sky, background).
+/// A rendered camera. Where opacity is below one half, depth is NaN (sky, background); DepthMap,
+/// which training takes, has infinite depth for known sky and NaN for what is not known.
 struct RenderedView {
   cv::Mat color;    ///< CV_32FC3 R, G, B in 0..1, or CV_32FC1 kelvin
   cv::Mat depth;    ///< CV_32FC1, z along the optical axis, world units

@@ -95,12 +95,16 @@ struct TrainOptions {
   static bool free_to_change(const std::string& key);
 };
 
-/// "fast-visible", "fast-thermal", and as published: "nerfacto", "nerf-rgb", "nerf-ir".
+/// "fast-visible", "fast-thermal", and as published: "nerfacto" (nerfstudio's), "nerf-rgb" and
+/// "nerf-ir" (the paper that fusion/metrics/metrics.hpp names). Usage error for another name, with
+/// the nearest known one.
 Result<TrainOptions> preset(const std::string& name);
 std::vector<std::string> preset_names();
 std::string default_preset(Modality modality);
 
-/// A TOML file: optional `preset = "..."`, then fields by name.
+/// A TOML file: optional `preset = "..."` ("fast-visible" without), then fields by name. Errors:
+/// input (no file, keys of too many parts), usage (no TOML, unknown field or preset, value out of
+/// range).
 Result<TrainOptions> load_options(const std::filesystem::path& toml);
 
 }  // namespace orbitfuse::nerf

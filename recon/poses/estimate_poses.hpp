@@ -15,8 +15,9 @@
 #include "recon/alignment/scene_renderer.hpp"
 #include "recon/alignment/view_verdict.hpp"
 
-// Camera poses of each modality by a ladder of methods; the first attempt whose result passes the
-// gates holds, and the result says which and why.
+// Camera poses of each modality by a ladder of methods, and the result says which attempt holds and
+// why. Thermal views: the first whose result passes the gates. Visible views: of those that pass,
+// the one that poses the most views (estimate/visible_ladder.hpp).
 namespace orbitfuse {
 
 struct PoseOptions {
@@ -97,14 +98,19 @@ struct ThermalPoses : ModalityPoses {
 /// The visible world that thermal views are localised in; images come from the session's paths.
 struct VisibleScene {
   Reconstruction reconstruction;
-  SceneRenderer renderer;  ///< of its trained field; without it no thermal view is placed
+  SceneRenderer renderer;  ///< of its trained field; without it only a rig places thermal views
 };
 
 /// Visible views: known poses, else COLMAP with orbit-limited pairs and ever more relaxed
 /// settings, then bundle adjustment. World frame: z up, origin at the point the cameras look at,
 /// median camera distance 1 (unless poses are known: then theirs).
-/// Errors: input (no or one frame, unreadable file), unavailable (no COLMAP and no known poses),
-/// quality (no attempt held; the message lists each attempt and why), cancelled.
+/// `workdir`: a folder to write in, made where it isn't there; below it "visible" (thermal views:
+/// "thermal") is written over, and holds reduced images, COLMAP's database, models and log
+/// afterwards, of failures too. Nothing reads them again: the caller may remove them. Not touched
+/// where no structure from motion runs.
+/// Errors: usage (options), input (no or one frame, unreadable file), device (`workdir` can't be
+/// written), unavailable (no COLMAP and no known poses), quality (no attempt held; the message
+/// lists each attempt and why), cancelled.
 Result<ModalityPoses> estimate_visible_poses(const Session& session, const PoseOptions& options,
                                              const std::filesystem::path& workdir,
                                              const Progress& progress);

@@ -11,7 +11,9 @@
 #include "core/result.hpp"
 
 // Registration of two clouds of one object by a similarity (scale, R, t). Every length in the
-// options is relative to the target's robust diameter, so that units do not matter.
+// options is relative to the target's robust diameter, so that units do not matter. The paper of
+// registered visible and infrared fields that figures here are compared with is named in
+// fusion/metrics/metrics.hpp.
 namespace orbitfuse {
 
 struct RegistrationOptions {
@@ -59,7 +61,7 @@ struct RegistrationReport {
   double score = 0;           ///< 0..1, geometric mean of both sides' truncated agreement
   double evidence = 0;        ///< 0..score: less where one cloud stands off the other's surface;
                               ///< ranks the placements, has no absolute scale
-  double matching_ratio = 0;  ///< share of source points with a partner (as in the seed paper;
+  double matching_ratio = 0;  ///< share of source points with a partner (as in that paper;
                               ///< one-sided: shrinking maximises it, so never read it alone)
   double rmse = 0;            ///< of matched pairs, target units
   double rmse_percent_of_diameter = 0;
@@ -87,15 +89,17 @@ struct RegistrationReport {
 /// not lead by a tenth decides nothing, and the result stays ambiguous.
 using ViewScore = std::function<double(const Similarity3d& target_from_source)>;
 
-/// Errors (input): fewer than 20 finite points, all points in one place, on one line or plane.
-/// Shapes that leave a direction open (sphere, cylinder) come back ambiguous.
+/// Clouds in any units and frames: x_in_target = target_from_source * x_in_source. Errors: usage
+/// (options), input (fewer than 20 finite points, all points in one place, on one line or plane),
+/// quality (no placement brings the clouds together), cancelled. Shapes that leave a direction open
+/// (sphere, cylinder) come back ambiguous.
 Result<RegistrationReport> register_clouds(const PointCloud& source, const PointCloud& target,
                                            const RegistrationOptions& options,
                                            const Progress& progress,
                                            const ViewScore& view_score = {});
 
 /// Refinement alone, from a start within a few degrees and percent (of the target's diameter).
-/// Errors: register_clouds', and usage for a start that is not finite.
+/// Errors: register_clouds' usage and input, and usage for a start that is not finite.
 Result<RegistrationReport> refine_registration(const PointCloud& source, const PointCloud& target,
                                                const Similarity3d& start,
                                                const RegistrationOptions& options);

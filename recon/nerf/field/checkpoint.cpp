@@ -322,23 +322,9 @@ std::vector<ViewRecord> records_of(const Dataset& dataset, const std::vector<boo
     const Camera& c = view.camera;
     const Eigen::Quaterniond& q = view.cam_from_world.rotation;
     const Eigen::Vector3d& t = view.cam_from_world.translation;
-    const double where[] = {double(c.width),
-                            double(c.height),
-                            c.fx,
-                            c.fy,
-                            c.cx,
-                            c.cy,
-                            c.k1,
-                            c.k2,
-                            c.p1,
-                            c.p2,
-                            q.w(),
-                            q.x(),
-                            q.y(),
-                            q.z(),
-                            t.x(),
-                            t.y(),
-                            t.z()};
+    const double width = c.width, height = c.height;
+    const double where[] = {width, height, c.fx,  c.fy,  c.cx,  c.cy,  c.k1,  c.k2, c.p1,
+                            c.p2,  q.w(),  q.x(), q.y(), q.z(), t.x(), t.y(), t.z()};
     const std::string pixels =
         content_hash({reinterpret_cast<const char*>(image.data), image.total() * image.elemSize()});
     const std::string_view placed(reinterpret_cast<const char*>(where), sizeof where);

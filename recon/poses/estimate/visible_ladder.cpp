@@ -124,8 +124,7 @@ class VisibleLadder {
     if (!best_ && part_) ORBITFUSE_TRY(try_resection(*quick, "resection on part of a model"));
     if (!best_) ORBITFUSE_TRY(spared(add_faint_features(*quick, orbit)));
     if (!best_) ORBITFUSE_TRY(try_mapper(*quick, quick_name_));
-    if (complete()) return answer(quick->pairs());
-    ORBITFUSE_TRY(improve(*quick, all_are_few));
+    if (!complete()) ORBITFUSE_TRY(improve(*quick, all_are_few));
     return answer(quick->pairs());
   }
 
@@ -186,19 +185,13 @@ class VisibleLadder {
   }
 
   bool complete() const { return best_ && missing().empty(); }
-  std::set<std::string> posed() const {
-    std::set<std::string> names;
-    if (best_)
-      for (const PosedView& view : best_->poses.reconstruction.views) names.insert(view.name);
-    return names;
-  }
   std::vector<int> missing() const {
-    const std::set<std::string> names = posed();
+    std::set<std::string> done = featureless_;
+    if (best_)
+      for (const PosedView& view : best_->poses.reconstruction.views) done.insert(view.name);
     std::vector<int> result;
-    for (int f = 0; f < total_; ++f) {
-      const std::string& file = frames_[static_cast<std::size_t>(f)]->file;
-      if (!names.contains(file) && !featureless_.contains(file)) result.push_back(f);
-    }
+    for (int f = 0; f < total_; ++f)
+      if (!done.contains(frames_[static_cast<std::size_t>(f)]->file)) result.push_back(f);
     return result;
   }
 
@@ -388,7 +381,7 @@ class VisibleLadder {
   const int total_;
   std::string quick_name_ = "COLMAP, orbit pairs";
   std::set<std::string> featureless_;
-  bool limited_ = false;
+  bool limited_ = false;  ///< images were reduced or features cut off: full settings find others
   std::optional<JudgedModel> best_;
   std::optional<Reconstruction> part_;  ///< the largest model that was too small
   std::size_t best_step_ = 0;

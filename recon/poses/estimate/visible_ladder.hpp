@@ -6,13 +6,15 @@
 namespace orbitfuse {
 
 /// Structure from motion of visible views. Orbit pairs at reduced size are tried first and stay
-/// where they pose every view. What they leave out is resected on their points, gets the remaining
-/// pairs, then features at full settings, then all pairs at full settings; where COLMAP's mapper
-/// finds no model that the gates believe, the global mapper takes over. Each step runs only where
-/// the ones before left views out, on the features and matches in the database; the believed model
-/// with the most views is the answer.
-/// The ladder of a failure is in `steps` as well as in the error's message.
-/// Errors: input, unavailable (no COLMAP), quality (no attempt held), cancelled.
+/// where they pose every view. While no model is believed: views resected on one that is only too
+/// small, features of faint texture in place of the usual ones, ever more relaxed settings of
+/// COLMAP's mapper, the global mapper. What a believed model leaves out is resected on its points.
+/// Then, with a model or without: the remaining pairs, features at full settings. Each step runs
+/// only where the ones before left views out, on the features and matches in the database. The
+/// answer is the believed model with the most views, not the first; the global mapper's takes the
+/// place of a relaxed one that has no more views and explains fewer matches. The ladder of a
+/// failure is in `steps` as well as in the error's message. Errors: input, unavailable (no COLMAP),
+/// quality (no attempt held), cancelled.
 Result<ModalityPoses> pose_visible_views(const Session& session,
                                          const std::vector<const FrameRecord*>& frames,
                                          const PoseOptions& options,
