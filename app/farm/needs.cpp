@@ -54,6 +54,17 @@ void learn_needs(const std::filesystem::path& out, const FarmPlan& finished,
   }
 }
 
+void raise_learned(const std::filesystem::path& out, FarmPlan& plan) {
+  auto learned = plan.needs;
+  learn_needs(out, plan, learned);
+  for (auto& [stage, n] : plan.needs) {
+    const StageNeeds& seen = learned.at(stage);
+    n.memory_mb = std::max(n.memory_mb, seen.memory_mb);
+    n.time_min = std::max(n.time_min, seen.time_min);
+    n.usual_s = seen.usual_s;
+  }
+}
+
 void raise_interrupted(const std::filesystem::path& out, FarmPlan& plan) {
   for (const std::string& stage : plan.stages) {
     StageNeeds needs = plan.needs_of(stage);

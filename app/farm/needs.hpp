@@ -16,6 +16,9 @@ std::map<std::string, StageNeeds> default_needs(const std::vector<std::string>& 
 void learn_needs(const std::filesystem::path& out, const FarmPlan& finished,
                  std::map<std::string, StageNeeds>& needs);
 
+/// The same for the farm's own stages, which it only raises: an edit of the plan holds.
+void raise_learned(const std::filesystem::path& out, FarmPlan& plan);
+
 /// Raises memory and time of stages that were killed or ran out of time, to twice what they had
 /// taken by then: called again without a new start, it changes nothing.
 void raise_interrupted(const std::filesystem::path& out, FarmPlan& plan);

@@ -134,7 +134,8 @@ Status resume_farm(Context& context, const fs::path& out, const FarmOptions& opt
   ORBITFUSE_TRY(lock.acquire(out));
   ORBITFUSE_ASSIGN(FarmPlan plan, read_plan(out));
   if (!plan.on_slurm) {
-    learn_needs(out, plan, plan.needs);
+    raise_learned(out, plan);
+    raise_interrupted(out, plan);
     return run_here(context, out, plan, options);
   }
   ORBITFUSE_ASSIGN(const auto queued, queued_jobs(out, plan, context.progress));

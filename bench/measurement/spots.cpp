@@ -41,13 +41,6 @@ struct Spot {
   double truth_k;
 };
 
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  return values[std::min(values.size() - 1,
-                         static_cast<std::size_t>(share * static_cast<double>(values.size())))];
-}
-
 struct Scene {
   ThermalScene scene;
   std::vector<PosedView> views;  ///< test cameras in the run's world
@@ -98,7 +91,7 @@ struct Tally {
   int covered = 0, unseen = 0;
 };
 
-void report(const Options& options, const Tally& t, double first_s, double spot_s) {
+void report(const Options& options, Tally t, double first_s, double spot_s) {
   const auto n = static_cast<double>(t.error.size());
   fmt::print(
       "{}: {} spots, {} seen by no frame; error median {:.3f} K, 90 % {:.3f} K; stated covers "

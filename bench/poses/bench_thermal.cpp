@@ -18,6 +18,7 @@
 
 #include "bench/poses/misalignment.hpp"
 #include "core/formats/colmap_model.hpp"
+#include "core/numeric/median.hpp"
 #include "core/system/clock.hpp"
 #include "core/system/cpu.hpp"
 #include "core/system/parallel.hpp"
@@ -148,12 +149,12 @@ Status run(const Arguments& arguments) {
       error.ate_percent, error.ate_median_percent, error.ate_max_percent, error.rotation_mean_deg,
       error.rotation_median_deg, error.rotation_max_deg);
   ORBITFUSE_ASSIGN(
-      const scenes::Misalignment apart,
+      scenes::Misalignment apart,
       scenes::misalignment(scene, seen.reconstruction, poses.reconstruction, seen.renderer));
   fmt::print(
       "rendered pairs of {} test views: median misalignment {:.2f} px at 640 wide, 90 % within "
       "{:.2f} px\n",
-      scene.test.size(), apart.median(), apart.share(0.9));
+      scene.test.size(), median(apart.px), quantile(apart.px, 0.9));
   if (arguments.views)
     for (const ViewError& view : error.each)
       fmt::print("{} centre {:.2f} %, outwards {:+.2f} %, rotation {:.2f} deg\n", view.name,

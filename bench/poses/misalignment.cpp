@@ -84,7 +84,6 @@ Result<Misalignment> misalignment(const Scene& scene, const Reconstruction& visi
           result.px.push_back((*of_thermal - *of_visible).norm() * 640 / small.camera.width);
       }
   }
-  std::sort(result.px.begin(), result.px.end());
   return result;
 }
 

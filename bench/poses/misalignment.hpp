@@ -12,12 +12,7 @@ namespace orbitfuse::scenes {
 /// over the three nearest views is what this modality shows of it. Pixels of a 640 wide image, over
 /// all test views and every rendered pixel with depth.
 struct Misalignment {
-  std::vector<double> px;  ///< ascending
-  double median() const { return px.empty() ? 0 : px[px.size() / 2]; }
-  double share(double quantile) const {
-    return px.empty() ? 0
-                      : px[static_cast<std::size_t>(quantile * static_cast<double>(px.size() - 1))];
-  }
+  std::vector<double> px;
 };
 Result<Misalignment> misalignment(const Scene& scene, const Reconstruction& visible,
                                   const Reconstruction& thermal, const SceneRenderer& renderer);

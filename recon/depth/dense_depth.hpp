@@ -34,8 +34,9 @@ struct DenseDepth {
 /// 2015; Schoenberger et al. 2016), coarse to fine, with a check between views. `images`: one per
 /// view, 8-bit gray or BGR, at its camera's size. The model's points seed the search; without any,
 /// it starts from random planes alone. Depth of the open sky is infinite (DepthOptions::ground).
-/// Same seed, same result, for any number of threads. Errors: images that don't fit the views
-/// (input), no two views that look at one place from different directions (quality).
+/// Same seed, same result, for any number of threads. Errors: an option out of its range (usage),
+/// images that don't fit the views (input), no two views that look at one place from different
+/// directions (quality), cancelled.
 Result<DenseDepth> dense_depth(const Reconstruction& model, const std::vector<cv::Mat>& images,
                                const DepthOptions& options, const Progress& progress);
 

@@ -152,6 +152,23 @@ TEST_F(FarmTest, WhatWasKilledOrLateGetsMoreOnce) {
   }
 }
 
+TEST_F(FarmTest, WhatWasLearnedTakesNothingFromAnEdit) {
+  program("");
+  plan.needs["first"] = {.cores = 1, .memory_mb = 9000, .time_min = 300, .gpu = false};
+  plan.needs["second"] = {.cores = 1, .memory_mb = 100, .time_min = 1, .gpu = false};
+  JobOutcome done;
+  done.state = JobState::done;
+  done.memory_mb = 2000;
+  done.wall_s = 600;
+  for (const char* stage : {"first", "second"}) ASSERT_TRUE(write_outcome(out, "a", stage, done));
+  raise_learned(out, plan);
+  EXPECT_EQ(plan.needs_of("first").memory_mb, 9000);
+  EXPECT_EQ(plan.needs_of("first").time_min, 300);
+  EXPECT_EQ(plan.needs_of("first").usual_s, 600);
+  EXPECT_EQ(plan.needs_of("second").memory_mb, 3000);
+  EXPECT_EQ(plan.needs_of("second").time_min, 40);
+}
+
 TEST(Needs, TrainingAndRenderingAskForAGpuWhereTheRunUsesOne) {
   const std::vector<std::string> stages = {"depth", "train_visible", "render", "report"};
   for (const bool on_gpu : {false, true}) {
