@@ -42,6 +42,10 @@ tl::unexpected<Error> manifest_failure(const fs::path& folder, int error) {
 Result<int> open_manifest(const fs::path& folder, int extra_flags) {
   const fs::path file = folder / "manifest.jsonl";
   const int fd = ::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC | extra_flags, 0644);
+  // Another process took the folder since it was looked at.
+  if (fd < 0 && errno == EEXIST)
+    return fail(ErrorKind::input, folder.string(), "holds a session already",
+                "choose another folder");
   if (fd < 0) return manifest_failure(folder, errno);
   if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
     ::close(fd);

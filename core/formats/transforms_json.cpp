@@ -4,11 +4,14 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "core/formats/rigid_matrix.hpp"
 #include "core/geometry/geometry_json.hpp"
+#include "core/json_fields.hpp"
 #include "core/nested_text.hpp"
 #include "core/system/file_io.hpp"
 
@@ -17,53 +20,98 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// A field of the frame, else of the whole file.
-std::optional<double> number(const Json& frame, const Json& shared, const char* key) {
+/// A field of the frame, else of the whole file; null where it is in neither.
+const Json& field(const Json& frame, const Json& shared, const char* key) {
+  static const Json nothing;
   for (const Json* object : {&frame, &shared}) {
-    if (object->contains(key) && (*object)[key].is_number()) return (*object)[key].get<double>();
+    const auto found = object->find(key);
+    if (found != object->end() && !found->is_null()) return *found;
   }
-  return std::nullopt;
+  return nothing;
+}
+
+/// The numbers of a frame's camera, by key: what is there must be a number, since a passed over
+/// "fl_x": "90" would leave another focal length in its place.
+using Numbers = std::map<std::string, double, std::less<>>;
+
+Result<Numbers> read_numbers(const Json& frame, const Json& shared, const std::string& where) {
+  Numbers numbers;
+  for (const char* key : {"w", "h", "fl_x", "fl_y", "camera_angle_x", "camera_angle_y", "cx", "cy",
+                          "k1", "k2", "k3", "k4", "p1", "p2"}) {
+    const Json& value = field(frame, shared, key);
+    if (value.is_null()) continue;
+    if (!value.is_number())
+      return fail(ErrorKind::input, where, fmt::format("\"{}\": {}", key, shown(value)),
+                  "write a number there, without quotes");
+    numbers.emplace(key, value.get<double>());
+  }
+  return numbers;
+}
+
+std::optional<double> number(const Numbers& numbers, const char* key) {
+  const auto found = numbers.find(key);
+  return found == numbers.end() ? std::nullopt : std::optional(found->second);
+}
+
+/// Lenses that Camera has not are refused by name: taken as a pinhole they bend everything.
+Status check_model(const Json& frame, const Json& shared, const std::string& where) {
+  const Json& fisheye = field(frame, shared, "is_fisheye");
+  if (!fisheye.is_null() && fisheye != Json(false) && fisheye != Json(0))
+    return fail(ErrorKind::input, where, fmt::format("\"is_fisheye\": {}", shown(fisheye)),
+                "undistort the images first");
+  const Json& model = field(frame, shared, "camera_model");
+  if (model.is_null()) return {};
+  for (const char* known : {"SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV"})
+    if (model == Json(known)) return {};
+  return fail(ErrorKind::input, where, fmt::format("\"camera_model\": {}", shown(model)),
+              "PINHOLE, SIMPLE_PINHOLE, RADIAL, SIMPLE_RADIAL and OPENCV are read; undistort the "
+              "images of another lens first");
+}
+
+/// From the focal length in pixels, else from the angle that so many pixels span.
+Result<std::optional<double>> focal_length(const Numbers& numbers, const char* key,
+                                           const char* angle_key, int pixels,
+                                           const std::string& where) {
+  const auto angle = number(numbers, angle_key);
+  if (angle && !(*angle > 0 && *angle < std::numbers::pi))
+    return fail(ErrorKind::input, where, fmt::format("\"{}\": {}", angle_key, *angle),
+                "it is the whole angle of view in radians, above 0 and below 3.14 (degrees times "
+                "0.01745)");
+  auto focal = number(numbers, key);
+  if (!focal && angle) focal = 0.5 * pixels / std::tan(0.5 * *angle);
+  return focal;
 }
 
 Result<Camera> read_camera(const Json& frame, const Json& shared, const std::string& where) {
-  const auto width = number(frame, shared, "w"), height = number(frame, shared, "h");
+  ORBITFUSE_ASSIGN(const Numbers numbers, read_numbers(frame, shared, where));
+  const auto width = number(numbers, "w"), height = number(numbers, "h");
   if (!width || !height || !(*width >= 1) || !(*height >= 1) || *width > 1e6 || *height > 1e6) {
     return fail(ErrorKind::input, where, "no image size (w, h)", "add \"w\" and \"h\" to the file");
   }
   Camera camera;
   camera.width = static_cast<int>(*width);
   camera.height = static_cast<int>(*height);
-  auto fx = number(frame, shared, "fl_x");
-  if (const auto angle = number(frame, shared, "camera_angle_x"); !fx && angle) {
-    fx = 0.5 * camera.width / std::tan(0.5 * *angle);
-  }
-  auto fy = number(frame, shared, "fl_y");
-  if (const auto angle = number(frame, shared, "camera_angle_y"); !fy && angle) {
-    fy = 0.5 * camera.height / std::tan(0.5 * *angle);
-  }
+  ORBITFUSE_ASSIGN(auto fx, focal_length(numbers, "fl_x", "camera_angle_x", camera.width, where));
+  ORBITFUSE_ASSIGN(const auto fy,
+                   focal_length(numbers, "fl_y", "camera_angle_y", camera.height, where));
   if (!fx) fx = fy;
   if (!fx)
     return fail(ErrorKind::input, where, "no focal length", "add \"fl_x\" or \"camera_angle_x\"");
   camera.fx = *fx;
   camera.fy = fy.value_or(*fx);
-  camera.cx = number(frame, shared, "cx").value_or(0.5 * camera.width);
-  camera.cy = number(frame, shared, "cy").value_or(0.5 * camera.height);
-  camera.k1 = number(frame, shared, "k1").value_or(0);
-  camera.k2 = number(frame, shared, "k2").value_or(0);
-  camera.p1 = number(frame, shared, "p1").value_or(0);
-  camera.p2 = number(frame, shared, "p2").value_or(0);
+  camera.cx = number(numbers, "cx").value_or(0.5 * camera.width);
+  camera.cy = number(numbers, "cy").value_or(0.5 * camera.height);
+  camera.k1 = number(numbers, "k1").value_or(0);
+  camera.k2 = number(numbers, "k2").value_or(0);
+  camera.p1 = number(numbers, "p1").value_or(0);
+  camera.p2 = number(numbers, "p2").value_or(0);
   for (const char* key : {"k3", "k4"}) {
-    if (number(frame, shared, key).value_or(0) != 0) {
+    if (number(numbers, key).value_or(0) != 0) {
       return fail(ErrorKind::input, where, fmt::format("distortion {} is not supported", key),
                   "undistort the images or fit k1, k2, p1, p2");
     }
   }
-  const Json& model = frame.contains("camera_model")    ? frame["camera_model"]
-                      : shared.contains("camera_model") ? shared["camera_model"]
-                                                        : Json();
-  if (model.is_string() && model.get<std::string>().find("FISHEYE") != std::string::npos) {
-    return fail(ErrorKind::input, where, "a fisheye camera model", "undistort the images first");
-  }
+  ORBITFUSE_TRY(check_model(frame, shared, where));
   ORBITFUSE_TRY(camera.validate(where));
   return camera;
 }

@@ -24,8 +24,9 @@ struct Transforms {
 
 /// nerfstudio / instant-ngp transforms.json: OpenGL camera-to-world there, turned to Camera's axes
 /// here; shared or per-frame intrinsics (fl_x or camera_angle_x), pixels. Errors: input, naming
-/// file and frame (no JSON, no frames, no size, no focal length, a fisheye lens or k3, k4, a matrix
-/// that is no rigid pose). Images are not looked at.
+/// file and frame (no JSON, no frames, no size, no focal length, text where a number belongs, an
+/// angle that can't be radians, a lens that is no pinhole with k1, k2, p1, p2, a matrix that is no
+/// rigid pose). Images are not looked at.
 Result<Transforms> read_transforms_json(const std::filesystem::path& file);
 
 /// Writes the views, poses turned back to OpenGL's axes, with a `conventions` block. Errors:

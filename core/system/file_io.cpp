@@ -74,7 +74,8 @@ const char* kind_of(mode_t mode) {
 Result<Descriptor> open_regular(const fs::path& path, struct stat& info) {
   Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (file.get() < 0) {
-    return fail(ErrorKind::input, path.string(), std::strerror(errno), "check the path");
+    return fail(ErrorKind::input, path.string(), std::strerror(errno),
+                errno == EACCES ? "check its permissions" : "check the path");
   }
   if (::fstat(file.get(), &info) != 0 || !S_ISREG(info.st_mode)) {
     return fail(ErrorKind::input, path.string(), kind_of(info.st_mode), "check the path");

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <set>
+#include <map>
 #include <string_view>
 
 #include "drivers/stills/video_frames.hpp"
@@ -43,6 +43,38 @@ std::pair<std::size_t, std::size_t> digit_run(const std::string& s, std::size_t 
   while (end < s.size() && is_digit(s[end])) ++end;
   while (at + 1 < end && s[at] == '0') ++at;
   return {at, end};
+}
+
+/// What to do with pictures that are not read. Of a thermal one JPEG would keep no temperatures.
+const char* conversion(Modality modality) {
+  return modality == Modality::thermal
+             ? "convert them to 16-bit TIFF or PNG (100 x kelvin), which keep temperatures"
+             : "convert them to JPEG";
+}
+
+/// A file may be named once. A link to a sibling is no second naming: a camera's program leaves it
+/// beside the files ("latest.jpg").
+Status take_out_links(ImageList& list) {
+  std::vector<fs::path>& files = list.images;
+  std::error_code error;
+  std::stable_partition(files.begin(), files.end(),
+                        [&](const fs::path& file) { return !fs::is_symlink(file, error); });
+  std::map<fs::path, fs::path> seen;  // by the name without links
+  std::vector<fs::path> kept;
+  for (const fs::path& file : files) {
+    const fs::path one_name = fs::weakly_canonical(file, error);
+    const auto [first, is_new] = seen.emplace(error ? file : one_name, file);
+    if (is_new) {
+      kept.push_back(file);
+      continue;
+    }
+    const fs::path& other = first->second;
+    if (file.filename() == other.filename() || file.parent_path() != other.parent_path())
+      return fail(ErrorKind::usage, file.string(), "given twice", "name each folder and file once");
+    list.links.emplace_back(file, other);
+  }
+  files = std::move(kept);
+  return {};
 }
 
 }  // namespace
@@ -98,7 +130,11 @@ Result<ImageList> list_images(Modality modality, const std::vector<fs::path>& pa
       continue;
     }
     fs::directory_iterator folder(path, error);
-    if (error) return fail(ErrorKind::input, path.string(), error.message(), "check the path");
+    if (error) {
+      return fail(
+          ErrorKind::input, path.string(), error.message(),
+          error == std::errc::permission_denied ? "check its permissions" : "check the path");
+    }
     const std::size_t before = files.size(), unread_before = list.unread.size();
     std::vector<fs::path> videos;
     for (const fs::directory_entry& entry : folder) {
@@ -126,16 +162,10 @@ Result<ImageList> list_images(Modality modality, const std::vector<fs::path>& pa
                               list.unread.size() - unread_before,
                               list.unread.back().filename().string())
                 : "no images (jpg, png, tif, bmp, heic) or videos in the folder",
-          other ? "convert them to JPEG" : "give the folder that holds the images themselves");
+          other ? conversion(modality) : "give the folder that holds the images themselves");
     }
   }
-  std::set<fs::path> seen;
-  for (const fs::path& file : files) {
-    std::error_code error;
-    const fs::path one_name = fs::weakly_canonical(file, error);
-    if (!seen.insert(error ? file : one_name).second)
-      return fail(ErrorKind::usage, file.string(), "given twice", "name each folder and file once");
-  }
+  ORBITFUSE_TRY(take_out_links(list));
   std::stable_sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
     return natural_less(a.filename().string(), b.filename().string());
   });

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/modality.hpp"
@@ -19,6 +20,8 @@ struct ImageList {
   /// In a folder that also holds photos: they may be parts of those (Live Photos), so they are
   /// taken only where they are named, or from a folder of videos alone.
   std::vector<std::filesystem::path> videos_among_photos;
+  /// A link beside the file that it leads to ("latest.jpg"), and that file: one image.
+  std::vector<std::pair<std::filesystem::path, std::filesystem::path>> links;
 };
 
 /// Image files named by the paths: files as given, folders without their sub-folders. In natural

@@ -52,12 +52,15 @@ class Importer {
     known_ = std::move(inputs.known);
     total_ = inputs.size();
     ORBITFUSE_TRY(add_visible(inputs.visible, false));
+    ORBITFUSE_TRY(check_some(Modality::visible, inputs.visible.size(), report_.visible));
     ORBITFUSE_TRY(add_visible(inputs.visible_tracking, true));
+    first_failure_.reset();
     ORBITFUSE_TRY(add_thermal(inputs.thermal, false));
+    ORBITFUSE_TRY(check_some(Modality::thermal, inputs.thermal.size(), report_.thermal));
     ORBITFUSE_TRY(add_thermal(inputs.thermal_tracking, true));
     if (report_.visible + report_.thermal + report_.tracking == 0) {
-      return fail(ErrorKind::input, "import",
-                  first_failure_.empty() ? "no readable image" : first_failure_,
+      if (first_failure_) return tl::unexpected(*first_failure_);
+      return fail(ErrorKind::input, "import", "no readable image",
                   "give folders with JPEG, PNG or TIFF images");
     }
     return finish();
@@ -67,8 +70,17 @@ class Importer {
 
  private:
   void pass_over(const Error& error) {
-    if (first_failure_.empty()) first_failure_ = error.message();
+    if (!first_failure_) first_failure_ = error;
     report_.warnings.push_back("left out: " + error.message());
+  }
+
+  /// A modality of which nothing is left was not imported, whatever there is of the other.
+  Status check_some(Modality modality, std::size_t given, int taken) const {
+    if (given == 0 || taken > 0 || !first_failure_) return {};
+    return fail(ErrorKind::input, "import",
+                fmt::format("none of the {} {} images given can be taken; {}: {}", given,
+                            name(modality), first_failure_->where, first_failure_->found),
+                first_failure_->remedy);
   }
 
   Status step() {
@@ -223,11 +235,17 @@ class Importer {
   void apply_known(const KnownView& view, cv::Size size, Frame& frame, DeviceInfo& device) {
     const std::optional<Camera> camera = fitted(view.camera, size);
     if (!camera) {
-      report_.warnings.push_back(fmt::format(
-          "{}: {}x{} does not fit its known camera of {}x{}; pose not used", frame.source,
-          size.width, size.height, view.camera.width, view.camera.height));
+      const bool exchanged = fitted(view.camera, {size.height, size.width}).has_value();
+      Error misfit{ErrorKind::input, frame.source,
+                   fmt::format("{}x{} does not fit its known camera of {}x{}{}", size.width,
+                               size.height, view.camera.width, view.camera.height,
+                               exchanged ? " (w and h are exchanged)" : ""),
+                   "pose not used"};
+      report_.warnings.push_back(misfit.message());
+      if (!first_misfit_) first_misfit_ = std::move(misfit);
       return;
     }
+    ++fitting_;
     if (options_.ground_truth_priors_only) {
       device.lens.focal_px = camera->fx;
       return;
@@ -245,7 +263,35 @@ class Importer {
     if (record.station) ++report_.with_station;
   }
 
+  /// Poses were given so that they are used.
+  Status check_fitting() const {
+    if (!first_misfit_ || fitting_ > 0) return {};
+    return fail(
+        ErrorKind::input, "known poses",
+        fmt::format("not one can be used; {}: {}", first_misfit_->where, first_misfit_->found),
+        "correct the size in the poses' file, or give the poses of these images");
+  }
+
+  void tell_counts() {
+    for (const auto& [modality, stations, frames] :
+         {std::tuple(Modality::visible, &options_.visible_stations, report_.visible),
+          std::tuple(Modality::thermal, &options_.thermal_stations, report_.thermal)}) {
+      // Declared for both, though only one is given.
+      if (!*stations || frames == 0 || frames == station_count(**stations)) continue;
+      report_.warnings.push_back(fmt::format("{}: {} frames, but {} stations declared",
+                                             name(modality), frames, station_count(**stations)));
+    }
+    if (options_.rig && report_.visible != report_.thermal) {
+      const bool none = report_.visible == 0 || report_.thermal == 0;
+      report_.warnings.push_back(fmt::format(
+          "a rig's pairs are declared, but there are {} visible and {} thermal frames: {}",
+          report_.visible, report_.thermal,
+          none ? "no pairs" : "those without a partner of their name or time are no pair"));
+    }
+  }
+
   Status finish() {
+    ORBITFUSE_TRY(check_fitting());
     for (const CameraGroup& group : groups_.all()) {
       if (group.frames > 0 && writer_)
         ORBITFUSE_TRY(
@@ -255,13 +301,7 @@ class Importer {
       if (auto several = groups_.described(modality))
         report_.warnings.push_back(*std::move(several));
     }
-    for (const auto& [modality, stations, frames] :
-         {std::tuple(Modality::visible, &options_.visible_stations, report_.visible),
-          std::tuple(Modality::thermal, &options_.thermal_stations, report_.thermal)}) {
-      if (!*stations || frames == station_count(**stations)) continue;
-      report_.warnings.push_back(fmt::format("{}: {} frames, but {} stations declared",
-                                             name(modality), frames, station_count(**stations)));
-    }
+    tell_counts();
     if (options_.embedded_visible && embedded_ == 0)
       report_.warnings.push_back(
           "no thermal image has a photo embedded: there are no visible frames from them");
@@ -287,7 +327,9 @@ class Importer {
   fs::path paged_file_;  ///< whose pages are being added
   std::string paged_bytes_;
   std::size_t done_ = 0, total_ = 0;
-  std::string first_failure_;
+  std::optional<Error> first_failure_;  ///< of the modality that is being added
+  int fitting_ = 0;                     ///< frames that their known camera fits
+  std::optional<Error> first_misfit_;
   ImportReport report_;
   int embedded_ = 0;  ///< photos found in radiometric JPEGs
 };
@@ -308,10 +350,11 @@ Result<ImportReport> import_session(const ImportOptions& options, const fs::path
   ORBITFUSE_TRY(check_is_new(session_folder));
   MadeFolders made;
   ORBITFUSE_TRY(made.make(session_folder));
-  ImportLeftover leftover(session_folder);
   std::map<std::string, std::string> notes = {{"recorded_by", "import"}};
   if (options.rig) notes["rig"] = "yes";  // recon/poses/rig/rig_pairs.hpp reads it
   ORBITFUSE_ASSIGN(auto writer, SessionWriter::create(session_folder, notes));
+  // Only now the folder is this process's own: another import may have taken it before.
+  ImportLeftover leftover(session_folder);
   Importer importer(options, session_folder, writer.get(), progress);
   ORBITFUSE_TRY(run(importer));
   ImportReport report = importer.take_report();

@@ -85,10 +85,11 @@ struct ImportReport {
 /// for byte; thermal images become 16-bit TIFF of one scale for the session, centikelvin unless the
 /// scene is too hot for it (or stay 8-bit grey). A file that can't be read, a copy of another and a
 /// thermal file without temperatures among files that have them is left out with a warning; the
-/// import fails only when nothing is left, and then, or when it is cancelled, leaves nothing
-/// behind. What an import that was killed left in the folder is replaced. Errors: usage (options,
-/// file or folder given twice), input (nothing readable, session folder not empty, poses that can't
-/// be used), device (disk), cancelled; each names the file or field.
+/// import fails only when nothing of a modality that was given is left, or not one of the poses
+/// given can be used, and then, or when it is cancelled, leaves nothing behind. What an import that
+/// was killed left in the folder is replaced. Errors: usage (options, file or folder given twice),
+/// input (nothing readable, session folder not empty, poses that can't be used), device (disk),
+/// cancelled; each names the file or field.
 Result<ImportReport> import_session(const ImportOptions& options,
                                     const std::filesystem::path& session_folder,
                                     const Progress& progress = {});

@@ -55,9 +55,15 @@ class Gathering {
           "left out: {}: no file (a link to nothing, a pipe or a device)", file.string()));
     }
     for (const fs::path& file : list.unread) {
-      warnings_.push_back(
-          fmt::format("left out: {}: {} files are not read; convert it to JPEG, PNG or TIFF",
-                      file.string(), unread_kind(file)));
+      warnings_.push_back(fmt::format(
+          "left out: {}: {} files are not read; convert it to {}", file.string(), unread_kind(file),
+          modality == Modality::thermal
+              ? "16-bit TIFF or PNG (100 x kelvin), which keep temperatures"
+              : "JPEG, PNG or TIFF"));
+    }
+    for (const auto& [link, file] : list.links) {
+      warnings_.push_back(fmt::format("left out: {}: the same image as {}", link.string(),
+                                      file.filename().string()));
     }
     tell_videos_among_photos(list.videos_among_photos, list.images);
     return std::move(list.images);

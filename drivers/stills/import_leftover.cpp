@@ -35,6 +35,8 @@ ImportLeftover::~ImportLeftover() {
 
 bool is_cut_import(const fs::path& folder) {
   if (!holds_session(folder) || !holds_only_a_session(folder)) return false;
+  // An import that still runs holds its manifest. Asked first: one that ends in between is whole.
+  if (!SessionWriter::try_resume(folder)) return false;
   const auto session = open_session(folder);
   if (!session || session->complete) return false;
   const auto by = session->notes.find("recorded_by");
@@ -42,8 +44,7 @@ bool is_cut_import(const fs::path& folder) {
   const bool gone_on_with =
       std::any_of(session->events.begin(), session->events.end(),
                   [](const EventRecord& event) { return event.kind == "resumed"; });
-  // An import that still runs holds its manifest.
-  return !gone_on_with && SessionWriter::try_resume(folder).has_value();
+  return !gone_on_with;
 }
 
 void remove_cut_import(const fs::path& folder) {

@@ -40,6 +40,9 @@ Status add_transforms(const fs::path& file, std::map<Modality, KnownViews>& know
 Status add_colmap(const fs::path& folder, Modality modality,
                   std::map<Modality, KnownViews>& known) {
   ORBITFUSE_ASSIGN(const Reconstruction model, read_colmap_model(folder, modality));
+  if (model.views.empty())
+    return fail(ErrorKind::input, folder.string(), "no images in the model",
+                "give a model in which images were placed, or none");
   for (const PosedView& view : model.views)
     known[modality].add({view.name, view.camera, view.cam_from_world, {}});
   return {};

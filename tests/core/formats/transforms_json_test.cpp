@@ -103,5 +103,39 @@ TEST(TransformsJson, BadInputNamesFrameAndField) {
   }
 }
 
+TEST(TransformsJson, LensesAnglesAndTextsThatWouldBendThePictureAreRefused) {
+  const TempFolder folder;
+  const auto read = [&](const std::string& shared, const std::string& own = "") {
+    put(folder / "t.json", R"({"w":40,"h":30,)" + shared + R"("frames":[{"file_path":"a",)" + own +
+                               R"("transform_matrix":)" + identity + "}]}");
+    return read_transforms_json(folder / "t.json");
+  };
+  const auto found = [&](const std::string& shared, const std::string& own = "") {
+    const auto t = read(shared, own);
+    return t ? std::string("read") : t.error().message();
+  };
+  const std::string focal = R"("fl_x":50,)";
+  for (const char* model : {"SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV"})
+    EXPECT_EQ(found(focal + R"("camera_model":")" + model + R"(",)"), "read");
+  EXPECT_EQ(found(focal + R"("camera_model":null,"is_fisheye":false,"k1":null,)"), "read");
+  const std::pair<std::string, std::string> shared_cases[] = {
+      {focal + R"("camera_model":"EQUIRECTANGULAR",)", "EQUIRECTANGULAR"},
+      {focal + R"("camera_model":"OPENCV_FISHEYE",)", "OPENCV_FISHEYE"},
+      {focal + R"("camera_model":7,)", "\"camera_model\": 7"},
+      {focal + R"("is_fisheye":true,)", "\"is_fisheye\": true"},
+      {R"("camera_angle_x":57.3,)", "radians"},
+      {R"("camera_angle_x":0,)", "radians"},
+      {focal + R"("camera_angle_y":-0.5,)", "camera_angle_y"},
+      {R"("camera_angle_x":0.8,"fl_x":"90",)", "\"fl_x\": \"90\""},
+      {focal + R"("cy":[15],)", "\"cy\""},
+      {focal + R"("p2":false,)", "\"p2\""}};
+  for (const auto& [text, word] : shared_cases)
+    EXPECT_NE(found(text).find(word), std::string::npos) << found(text);
+  // A frame's own field wins, and is no less looked at.
+  EXPECT_NE(found(focal, R"("is_fisheye":true,)").find("is_fisheye"), std::string::npos);
+  EXPECT_NE(found(focal, R"("w":"40",)").find("\"w\""), std::string::npos);
+  EXPECT_EQ(found(focal + R"("is_fisheye":true,)", R"("is_fisheye":false,)"), "read");
+}
+
 }  // namespace
 }  // namespace orbitfuse

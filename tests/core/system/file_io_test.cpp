@@ -5,6 +5,7 @@
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "tests/support/temp_folder.hpp"
 
@@ -45,6 +46,16 @@ TEST(FileIo, MissingFileAndFolderAreNamed) {
   EXPECT_EQ(missing.error().kind, ErrorKind::input);
   EXPECT_NE(missing.error().message().find("none.txt"), std::string::npos);
   EXPECT_FALSE(read_file(folder.path()));
+}
+
+TEST(FileIo, AFileThatMayNotBeReadIsNoWrongPath) {
+  if (::geteuid() == 0) GTEST_SKIP() << "root reads everything";
+  const TempFolder folder;
+  test::put(folder / "mine.txt", "x");
+  ASSERT_EQ(::chmod((folder / "mine.txt").c_str(), 0), 0);
+  const auto bytes = read_file(folder / "mine.txt");
+  ASSERT_FALSE(bytes);
+  EXPECT_EQ(bytes.error().remedy, "check its permissions");
 }
 
 TEST(FileIo, OnlyRegularFilesOfABoundedSizeAreRead) {

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What an import leaves out, refuses or can't use is said, and is no success where nothing is left.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <optional>
+#include <thread>
+
+#include "core/formats/transforms_json.hpp"
+#include "core/image/image_codec.hpp"
+#include "core/image/image_io.hpp"
+#include "drivers/stills/import.hpp"
+#include "tests/support/made_files.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace orbitfuse {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class LeftOut : public ::testing::Test {
+ protected:
+  void put(const std::string& name, const std::string& bytes) const {
+    fs::create_directories((folder / name).parent_path());
+    std::ofstream(folder / name, std::ios::binary) << bytes;
+  }
+  void put_photo(const std::string& name, std::uint64_t seed) const {
+    cv::Mat image(30, 40, CV_8UC3);
+    cv::RNG(seed + 1).fill(image, cv::RNG::UNIFORM, 0, 255);
+    put(name, *encode_jpeg(image, 90));
+  }
+  void put_counts(const std::string& name, int low, int high, std::uint64_t seed) const {
+    cv::Mat image(30, 40, CV_16UC1);
+    cv::RNG(seed + 1).fill(image, cv::RNG::UNIFORM, low, high);
+    put(name, *encode_tiff(image, ""));
+  }
+  void put_transforms(int width, int height, int frames) const {
+    Transforms transforms;
+    for (int i = 0; i < frames; ++i)
+      transforms.frames.push_back(
+          {"in/" + std::to_string(i) + ".jpg", {}, Camera::from_fov(width, height, 50), {}});
+    ASSERT_TRUE(write_transforms_json(folder / "transforms.json", transforms));
+  }
+  Result<ImportReport> import() const { return import_session(options, folder / "session"); }
+  /// The error's words; empty when there is none.
+  std::string refusal() const {
+    const auto report = import();
+    EXPECT_FALSE(report);
+    return report ? "" : report.error().message();
+  }
+
+  test::TempFolder folder;
+  ImportOptions options;
+};
+
+TEST_F(LeftOut, OfImportsIntoOneFolderOneWinsAndKeepsItsFrames) {
+  for (int i = 0; i < 4; ++i)
+    put_photo("in/" + std::to_string(i) + ".jpg", static_cast<std::uint64_t>(i));
+  options.visible = {folder / "in"};
+  for (int round = 0; round < 10; ++round) {
+    fs::remove_all(folder / "session");
+    std::vector<std::optional<ErrorKind>> failures(6);
+    std::vector<std::thread> imports;
+    for (auto& failure : failures) {
+      imports.emplace_back([&] {
+        if (const auto report = import(); !report) failure = report.error().kind;
+      });
+    }
+    for (std::thread& one : imports) one.join();
+    EXPECT_EQ(std::count(failures.begin(), failures.end(), std::nullopt), 1);
+    EXPECT_EQ(std::count(failures.begin(), failures.end(), ErrorKind::input), 5);
+    const auto session = open_session(folder / "session");
+    ASSERT_TRUE(session) << session.error().message();
+    EXPECT_EQ(session->frames.size(), 4u);
+    for (const FrameRecord& frame : session->frames)
+      EXPECT_TRUE(fs::exists(session->path_of(frame)));
+  }
+}
+
+TEST_F(LeftOut, AModalityOfWhichNothingIsLeftIsNoImport) {
+  put_photo("in/a.jpg", 1);
+  put_photo("text/b.jpg", 2);
+  put("t/0.tif", "no picture");
+  put("t/1.tif", "none either");
+  options.visible = {folder / "in"};
+  options.thermal = {folder / "t"};
+  std::string words = refusal();
+  EXPECT_THAT(words, AllOf(HasSubstr("none of the 2 thermal images"), HasSubstr("0.tif")));
+  EXPECT_FALSE(fs::exists(folder / "session"));
+  put_counts("t/2.tif", 29000, 30000, 1);
+  ASSERT_TRUE(import());
+  fs::remove_all(folder / "session");
+  put("text/b.jpg", "this is no picture");
+  options.visible = {folder / "text"};
+  words = refusal();
+  EXPECT_THAT(words, AllOf(HasSubstr("none of the 1 visible images"), HasSubstr("b.jpg")));
+  EXPECT_THAT(words, Not(HasSubstr("give folders with"))) << "one remedy: the file's own";
+}
+
+TEST_F(LeftOut, PosesOfWhichNoneFitsAreAnError) {
+  for (int i = 0; i < 3; ++i)
+    put_photo("in/" + std::to_string(i) + ".jpg", static_cast<std::uint64_t>(i));
+  options.transforms_json = folder / "transforms.json";
+  put_transforms(30, 40, 3);
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("not one can be used"), HasSubstr("0.jpg"),
+                               HasSubstr("w and h are exchanged")));
+  put_transforms(40, 60, 3);
+  EXPECT_THAT(refusal(), Not(HasSubstr("exchanged")));
+  put_transforms(80, 60, 3);
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->with_pose, 3);
+}
+
+TEST_F(LeftOut, AModelWithoutImagesIsAnError) {
+  put_photo("in/a.jpg", 1);
+  put("model/cameras.txt", "1 PINHOLE 40 30 40 40 20 15\n");
+  put("model/images.txt", "");
+  options.visible = {folder / "in"};
+  options.visible_colmap = folder / "model";
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("model"), HasSubstr("no images")));
+}
+
+TEST_F(LeftOut, ALinkToASiblingIsOneImage) {
+  put_photo("in/b.jpg", 1);
+  fs::create_symlink("b.jpg", folder / "in/a_latest.jpg");
+  options.visible = {folder / "in"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->visible, 1);
+  EXPECT_EQ(report->session.frames.at(0).source, "in/b.jpg") << "the file, not the link";
+  EXPECT_THAT(report->warnings,
+              Contains(AllOf(HasSubstr("a_latest.jpg"), HasSubstr("the same image as b.jpg"))));
+  options.visible = {folder / "in", folder / "in/b.jpg"};
+  fs::remove_all(folder / "session");
+  EXPECT_THAT(refusal(), HasSubstr("given twice"));
+}
+
+TEST_F(LeftOut, ThermalPicturesThatAreNotReadAreNotSentThroughJpeg) {
+  put("t/0.pgm", "P5");
+  put("t/1.jp2", "x");
+  options.thermal = {folder / "t"};
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("16-bit TIFF or PNG"), Not(HasSubstr("to JPEG"))));
+  put_counts("t/2.tif", 29000, 30000, 1);
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_THAT(report->warnings,
+              Contains(AllOf(HasSubstr("0.pgm"), HasSubstr("16-bit TIFF or PNG"))));
+}
+
+TEST_F(LeftOut, StationsOfWhatWasNotGivenAreNoWarningAndARigOfOneCameraIs) {
+  for (int i = 0; i < 12; ++i)
+    put_photo("in/" + std::to_string(i) + ".jpg", static_cast<std::uint64_t>(i));
+  options.visible = {folder / "in"};
+  options.visible_stations = options.thermal_stations = DeclaredStations{};
+  options.rig = true;
+  auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_THAT(report->warnings, Not(Contains(HasSubstr("stations declared"))));
+  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("rig"), HasSubstr("no pairs"))));
+  put_counts("t/0.tif", 29000, 30000, 1);
+  options.thermal = {folder / "t"};
+  fs::remove_all(folder / "session");
+  report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_THAT(report->warnings, Contains(HasSubstr("thermal: 1 frames")));
+  EXPECT_THAT(report->warnings, Contains(HasSubstr("12 visible and 1 thermal frames")));
+}
+
+}  // namespace
+}  // namespace orbitfuse
