@@ -201,6 +201,13 @@ Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_
   };
   ORBITFUSE_TRY(read("scale", tag.scale));
   ORBITFUSE_TRY(read("offset", tag.offset));
+  // 0 is what the samples of this program have for none; another count would be a temperature.
+  if (value.contains("invalid") && !value["invalid"].is_null() && value["invalid"] != 0) {
+    return fail(ErrorKind::input, where,
+                fmt::format("\"invalid\": {}", value["invalid"].dump().substr(0, 40)),
+                "only 0 marks samples without a temperature: set those samples to 0, and write "
+                "\"invalid\": 0");
+  }
   if (!(tag.scale > 0)) {
     return fail(ErrorKind::input, where, fmt::format("\"scale\": {}", tag.scale),
                 "kelvin per count must be > 0");

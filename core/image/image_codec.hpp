@@ -29,7 +29,7 @@ struct ThermalScaleTag {
   double scale = 0.01, offset = 0;
 };
 /// Nothing where the text names no scale (many programs write something into ImageDescription); an
-/// input error where it names one that can't be used.
+/// input error where it names one that can't be used, or another count than 0 as invalid.
 Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_view text,
                                                                     const std::string& where);
 /// A sidecar is there for its scale: without one it is an input error.
@@ -37,8 +37,10 @@ Result<ThermalScaleTag> thermal_scale_of_sidecar(std::string_view text, const st
 
 /// Images of the first one's size in a TIFF; masks and reduced copies don't count. 0: unreadable.
 int tiff_page_count(std::string_view bytes);
-/// 8/16-bit unsigned or 32-bit float samples, one channel or RGB (returned as BGR). Without a page
-/// the file must hold a single one: nobody asked for the first of several.
+/// 8/16-bit unsigned or 32-bit float samples, one channel or RGB (returned as BGR); other colours
+/// (a palette, CMYK, Lab, planes) are refused by name. Without a page the file must hold a single
+/// one: nobody asked for the first of several. Where the ImageDescription names no scale, GDAL's
+/// scale and offset stand in it.
 Result<cv::Mat> decode_tiff(std::string_view bytes, const std::string& where,
                             std::string* image_description = nullptr, std::optional<int> page = {});
 /// CV_16UC1 or CV_32FC1, deflate with the fitting predictor (lossless).

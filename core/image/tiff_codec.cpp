@@ -3,6 +3,8 @@
 #include <tiffio.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <cstdarg>
 #include <cstring>
 #include <memory>
@@ -82,7 +84,7 @@ TiffHandle open(MemoryFile& file, const char* mode) {
 struct Layout {
   std::uint32_t width = 0, height = 0;
   std::uint16_t bits = 1, channels = 1, format = SAMPLEFORMAT_UINT, planar = PLANARCONFIG_CONTIG;
-  std::uint16_t photometric = PHOTOMETRIC_MINISBLACK;
+  std::uint16_t photometric = PHOTOMETRIC_MINISBLACK, compression = COMPRESSION_NONE;
 };
 
 Layout layout_of(TIFF* tiff) {
@@ -94,6 +96,7 @@ Layout layout_of(TIFF* tiff) {
   TIFFGetFieldDefaulted(tiff, TIFFTAG_SAMPLEFORMAT, &l.format);
   TIFFGetFieldDefaulted(tiff, TIFFTAG_PLANARCONFIG, &l.planar);
   TIFFGetField(tiff, TIFFTAG_PHOTOMETRIC, &l.photometric);
+  TIFFGetFieldDefaulted(tiff, TIFFTAG_COMPRESSION, &l.compression);
   return l;
 }
 
@@ -102,6 +105,90 @@ int depth_of(const Layout& l) {
   if (l.format == SAMPLEFORMAT_UINT && l.bits == 16) return CV_16U;
   if (l.format == SAMPLEFORMAT_UINT && l.bits == 8) return CV_8U;
   return -1;
+}
+
+/// Colours that would be taken for others; null: those that are read.
+const char* unread_colors(const Layout& l) {
+  switch (l.photometric) {
+    case PHOTOMETRIC_MINISBLACK:
+    case PHOTOMETRIC_RGB:
+      return nullptr;
+    case PHOTOMETRIC_MINISWHITE:  // of counts nobody knows from where they are to be turned
+      return l.bits == 8 && l.channels == 1 ? nullptr : "0 is white (MINISWHITE)";
+    case PHOTOMETRIC_YCBCR:  // libtiff turns those of JPEG into RGB
+      return l.compression == COMPRESSION_JPEG ? nullptr : "YCbCr without JPEG";
+    case PHOTOMETRIC_PALETTE:
+      return "a palette";
+    case PHOTOMETRIC_SEPARATED:
+      return "CMYK";
+    case PHOTOMETRIC_CIELAB:
+    case PHOTOMETRIC_ICCLAB:
+    case PHOTOMETRIC_ITULAB:
+      return "Lab";
+    case PHOTOMETRIC_MASK:
+      return "a mask";
+    default:
+      return "colours of an unknown kind";
+  }
+}
+
+/// Why it can't be read; empty where it can.
+std::string unread_layout(const Layout& l) {
+  std::string why;
+  if (const char* colors = unread_colors(l)) {
+    why = colors;
+  } else if (l.planar != PLANARCONFIG_CONTIG && l.channels > 1) {
+    why = "each colour in a plane of its own (planar)";
+  } else if (depth_of(l) >= 0 && l.channels >= 1 && l.channels <= 4) {
+    return {};
+  }
+  const char* kind = l.format == SAMPLEFORMAT_INT      ? "signed "
+                     : l.format == SAMPLEFORMAT_IEEEFP ? "float "
+                                                       : "";
+  return fmt::format("TIFF with {}-bit {}samples, {} channels{}{}", l.bits, kind, l.channels,
+                     why.empty() ? "" : ": ", why);
+}
+
+/// GDAL's words of the samples: <Item name="SCALE" sample="0" role="scale">0.04</Item>.
+constexpr std::uint32_t gdal_metadata_tag = 42112;
+
+std::string gdal_metadata(TIFF* tiff) {
+  const TIFFField* field = TIFFFindField(tiff, gdal_metadata_tag, TIFF_ANY);
+  std::uint32_t count = 0;
+  const char* text = nullptr;
+  if (!field || TIFFFieldDataType(field) != TIFF_ASCII || !TIFFFieldPassCount(field) ||
+      TIFFFieldReadCount(field) != TIFF_VARIABLE2)
+    return {};
+  if (!TIFFGetField(tiff, gdal_metadata_tag, &count, &text) || !text) return {};
+  return {text, ::strnlen(text, count)};
+}
+
+/// The number of an item of that role as JSON; text where it is no number, for whoever reads it
+/// names it.
+std::string gdal_number(const std::string& metadata, const std::string& role, const char* missing) {
+  const std::size_t at = metadata.find("role=\"" + role + "\"");
+  const std::size_t begin = at == metadata.npos ? at : metadata.find('>', at);
+  if (begin == metadata.npos) return missing;
+  double number = 0;
+  const char* from = metadata.data() + begin + 1;
+  const char* to = metadata.data() + metadata.size();
+  const auto [end, error] = std::from_chars(from, to, number);
+  if (error != std::errc() || end == to || *end != '<' || !std::isfinite(number))
+    return "\"no number (GDAL's metadata)\"";
+  return fmt::format("{}", number);
+}
+
+/// What the samples mean: the ImageDescription, or GDAL's scale in the words of our own tag.
+std::string description_of(TIFF* tiff) {
+  const char* text = nullptr;
+  std::string description;
+  if (TIFFGetField(tiff, TIFFTAG_IMAGEDESCRIPTION, &text) && text) description = text;
+  const std::string metadata = gdal_metadata(tiff);
+  if (metadata.find("role=\"scale\"") == metadata.npos ||
+      description.find("\"scale\"") != description.npos)
+    return description;
+  return fmt::format(R"({{"scale":{},"offset":{}}})", gdal_number(metadata, "scale", "1"),
+                     gdal_number(metadata, "offset", "0"));
 }
 
 bool read_strips(TIFF* tiff, const Layout& l, cv::Mat& image) {
@@ -182,20 +269,19 @@ Result<cv::Mat> decode_tiff(std::string_view bytes, const std::string& where,
   file.input = bytes;
   const TiffHandle tiff = open(file, "rm");
   if (!tiff) return fail(ErrorKind::input, where, "not a readable TIFF", "copy the file again");
-  const Layout l = layout_of(tiff.get());
+  Layout l = layout_of(tiff.get());
   for (int at = 0; at < page.value_or(0); ++at) {
     if (!next_page(tiff.get(), l))
       return fail(ErrorKind::input, where, fmt::format("no page {}", *page + 1),
                   "copy the file again");
   }
-  const int depth = depth_of(l);
-  if (depth < 0 || l.channels < 1 || l.channels > 4 || l.planar != PLANARCONFIG_CONTIG ||
-      l.photometric == PHOTOMETRIC_PALETTE) {
-    return fail(ErrorKind::input, where,
-                fmt::format("TIFF with {}-bit samples (format {}), {} channels", l.bits, l.format,
-                            l.channels),
+  l = layout_of(tiff.get());  // of the page
+  if (std::string why = unread_layout(l); !why.empty()) {
+    return fail(ErrorKind::input, where, std::move(why),
                 "convert it to 8 or 16-bit unsigned grey or RGB");
   }
+  if (l.photometric == PHOTOMETRIC_YCBCR)
+    TIFFSetField(tiff.get(), TIFFTAG_JPEGCOLORMODE, JPEGCOLORMODE_RGB);
   const long long samples = 1LL * l.width * l.height * l.channels;
   if (l.width == 0 || l.height == 0 || l.width > 65536 || l.height > 65536 ||
       samples > max_image_samples) {
@@ -203,17 +289,17 @@ Result<cv::Mat> decode_tiff(std::string_view bytes, const std::string& where,
                 "the header is damaged; copy the file again");
   }
   if (image_description) {
-    const char* text = nullptr;
-    if (TIFFGetField(tiff.get(), TIFFTAG_IMAGEDESCRIPTION, &text) && text)
-      *image_description = text;
+    if (std::string text = description_of(tiff.get()); !text.empty())
+      *image_description = std::move(text);
   }
   cv::Mat image(static_cast<int>(l.height), static_cast<int>(l.width),
-                CV_MAKETYPE(depth, l.channels));
+                CV_MAKETYPE(depth_of(l), l.channels));
   const bool whole = TIFFIsTiled(tiff.get()) ? read_tiles(tiff.get(), l, image)
                                              : read_strips(tiff.get(), l, image);
   if (!whole || file.tag_is_cut) {
     return fail(ErrorKind::input, where, "truncated or damaged TIFF", "copy the file again");
   }
+  if (l.photometric == PHOTOMETRIC_MINISWHITE) image = 255 - image;
   return to_bgr(image);
 }
 

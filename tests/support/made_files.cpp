@@ -169,6 +169,12 @@ std::string flir_jpeg(const cv::Mat& signal, const FlirCalibration& calibration,
 }
 
 std::string tiff_of_pages(const std::vector<cv::Mat>& pages, const std::string& description) {
+  return tiff_of_pages(pages, TiffWords{description, {}});
+}
+
+std::string tiff_of_pages(const std::vector<cv::Mat>& pages, const TiffWords& words) {
+  const std::string& description = words.description;
+  const auto channels = static_cast<std::uint64_t>(words.channels);
   std::string out("II*\0\0\0\0\0", 8);
   std::size_t link = 4;  // where the offset of the next directory goes
   for (const cv::Mat& page : pages) {
@@ -176,23 +182,29 @@ std::string tiff_of_pages(const std::vector<cv::Mat>& pages, const std::string& 
     out += samples_of(page);
     const std::size_t text_at = out.size();
     out += description + '\0';
-    if (out.size() % 2 == 1) out += '\0';
+    const std::size_t metadata_at = out.size();
+    out += words.gdal_metadata + '\0';
+    const std::size_t bits_at = out.size() + out.size() % 2;
+    const auto bits = static_cast<std::uint64_t>(8 * page.elemSize1());
+    for (std::uint64_t i = 0; i < channels; ++i) put_number(out, bits_at + 2 * i, bits, 2);
     const std::size_t directory = out.size();
     put_number(out, link, directory, 4);
-    const auto bits = static_cast<std::uint64_t>(8 * page.elemSize1());
     struct Entry {
       std::uint64_t tag, type, count, value;
     };
-    std::vector<Entry> entries{{256, 4, 1, static_cast<std::uint64_t>(page.cols)},
+    std::vector<Entry> entries{{256, 4, 1, static_cast<std::uint64_t>(page.cols) / channels},
                                {257, 4, 1, static_cast<std::uint64_t>(page.rows)},
-                               {258, 3, 1, bits},
+                               {258, 3, channels, channels > 2 ? bits_at : bits},
                                {259, 3, 1, 1},
-                               {262, 3, 1, 1}};
+                               {262, 3, 1, static_cast<std::uint64_t>(words.photometric)}};
     if (description.size() > 3) entries.push_back({270, 2, description.size() + 1, text_at});
     entries.push_back({273, 4, 1, pixels_at});
-    entries.push_back({277, 3, 1, 1});
+    entries.push_back({277, 3, 1, channels});
     entries.push_back({278, 4, 1, static_cast<std::uint64_t>(page.rows)});
     entries.push_back({279, 4, 1, page.total() * page.elemSize()});
+    if (words.planar != 1) entries.push_back({284, 3, 1, static_cast<std::uint64_t>(words.planar)});
+    if (words.gdal_metadata.size() > 3)
+      entries.push_back({42112, 2, words.gdal_metadata.size() + 1, metadata_at});
     put_number(out, directory, entries.size(), 2);
     for (std::size_t i = 0; i < entries.size(); ++i) {
       const std::size_t at = directory + 2 + 12 * i;

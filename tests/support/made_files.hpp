@@ -41,7 +41,15 @@ std::string heic(const cv::Mat& image, int orientation = 1, const std::string& e
 /// The TIFF block of an EXIF: orientation, time 2024-05-06 07:08:09, 4.3 mm, 26 mm at 35 mm.
 std::string exif_block(int orientation);
 
-/// An uncompressed little-endian TIFF of several CV_16UC1 or CV_8UC1 pages, with descriptions.
+/// What a TIFF says beside its samples.
+struct TiffWords {
+  std::string description;
+  std::string gdal_metadata;          ///< tag 42112
+  int photometric = 1, channels = 1;  ///< of several channels the page is that much wider
+  int planar = 1;
+};
+/// An uncompressed little-endian TIFF of several CV_16UC1 or CV_8UC1 pages.
+std::string tiff_of_pages(const std::vector<cv::Mat>& pages, const TiffWords& words);
 std::string tiff_of_pages(const std::vector<cv::Mat>& pages, const std::string& description = {});
 
 }  // namespace orbitfuse::made

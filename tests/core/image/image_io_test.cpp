@@ -356,5 +356,17 @@ TEST(ImageIo, FloatTiffKeepsNanAndExtremes) {
   EXPECT_FALSE(read_image(folder / "d.tiff"));
 }
 
+TEST(ImageIo, AnotherCountThanZeroForInvalidIsRefused) {
+  for (const char* text :
+       {R"({"scale":0.01})", R"({"scale":0.01,"invalid":0})", R"({"scale":0.01,"invalid":null})"})
+    EXPECT_TRUE(thermal_scale_of_sidecar(text, "s.json")) << text;
+  for (const char* text :
+       {R"({"scale":0.01,"offset":0,"invalid":30000})", R"({"scale":0.01,"invalid":"none"})"}) {
+    const auto tag = thermal_scale_of_sidecar(text, "s.json");
+    ASSERT_FALSE(tag) << text;
+    EXPECT_NE(tag.error().message().find("\"invalid\""), std::string::npos);
+  }
+}
+
 }  // namespace
 }  // namespace orbitfuse

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// TIFFs whose samples would be taken for others: read as what they are, or refused by name.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/image/image_codec.hpp"
+#include "tests/support/made_files.hpp"
+
+namespace orbitfuse {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+TEST(OddTiff, ColoursThatAreNotReadAreNamed) {
+  const cv::Mat page(6, 12, CV_8UC1, cv::Scalar(40));
+  const struct {
+    int photometric, channels, planar;
+    const char* words;
+  } cases[] = {{5, 4, 1, "CMYK"},  {8, 3, 1, "Lab"},  {2, 3, 2, "planar"},
+               {6, 3, 1, "YCbCr"}, {4, 1, 1, "mask"}, {32803, 1, 1, "unknown kind"}};
+  for (const auto& c : cases) {
+    made::TiffWords words;
+    words.photometric = c.photometric;
+    words.channels = c.channels;
+    words.planar = c.planar;
+    const auto image = decode_tiff(made::tiff_of_pages({page}, words), "odd.tif");
+    ASSERT_FALSE(image) << c.words;
+    EXPECT_THAT(image.error().message(), AllOf(HasSubstr("odd.tif"), HasSubstr(c.words)));
+  }
+  made::TiffWords rgb;
+  rgb.photometric = 2;
+  rgb.channels = 3;
+  const auto image = decode_tiff(made::tiff_of_pages({page}, rgb), "rgb.tif");
+  ASSERT_TRUE(image) << image.error().message();
+  EXPECT_EQ(image->type(), CV_8UC3);
+  EXPECT_EQ(image->cols, 4);
+}
+
+TEST(OddTiff, WhereZeroIsWhiteBytesAreTurnedAndCountsRefused) {
+  made::TiffWords words;
+  words.photometric = 0;
+  const auto turned =
+      decode_tiff(made::tiff_of_pages({cv::Mat(4, 5, CV_8UC1, cv::Scalar(40))}, words), "w.tif");
+  ASSERT_TRUE(turned) << turned.error().message();
+  EXPECT_EQ(turned->at<std::uint8_t>(2, 3), 215);
+  const auto counts =
+      decode_tiff(made::tiff_of_pages({cv::Mat(4, 5, CV_16UC1, cv::Scalar(40))}, words), "w.tif");
+  ASSERT_FALSE(counts);
+  EXPECT_THAT(counts.error().message(), HasSubstr("0 is white"));
+}
+
+TEST(OddTiff, GdalsScaleIsTheTags) {
+  const cv::Mat page(4, 5, CV_16UC1, cv::Scalar(7000));
+  made::TiffWords words;
+  const auto scale = [&]() -> Result<std::optional<ThermalScaleTag>> {
+    std::string description;
+    ORBITFUSE_TRY(decode_tiff(made::tiff_of_pages({page}, words), "g.tif", &description));
+    return thermal_scale_of_description(description, "g.tif");
+  };
+  words.gdal_metadata =
+      "<GDALMetadata>\n  <Item name=\"OFFSET\" sample=\"0\" role=\"offset\">10.5</Item>\n"
+      "  <Item name=\"SCALE\" sample=\"0\" role=\"scale\">0.04</Item>\n</GDALMetadata>\n";
+  auto tag = scale();
+  ASSERT_TRUE(tag && *tag) << (tag ? "no tag" : tag.error().message());
+  EXPECT_EQ((*tag)->scale, 0.04);
+  EXPECT_EQ((*tag)->offset, 10.5);
+  words.description = R"({"scale":0.02,"offset":0})";
+  tag = scale();
+  ASSERT_TRUE(tag && *tag);
+  EXPECT_EQ((*tag)->scale, 0.02) << "the file's own tag wins";
+  words.description = "";
+  words.gdal_metadata = "<Item name=\"SCALE\" role=\"scale\">much</Item>";
+  tag = scale();
+  ASSERT_FALSE(tag);
+  EXPECT_THAT(tag.error().message(), AllOf(HasSubstr("g.tif"), HasSubstr("GDAL")));
+  words.gdal_metadata = "<Item name=\"STATISTICS_MEAN\">7000</Item>";
+  tag = scale();
+  ASSERT_TRUE(tag);
+  EXPECT_FALSE(*tag);
+}
+
+}  // namespace
+}  // namespace orbitfuse
