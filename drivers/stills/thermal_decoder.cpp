@@ -9,6 +9,7 @@
 #include "core/image/exif.hpp"
 #include "core/system/file_io.hpp"
 #include "core/temperature.hpp"
+#include "drivers/stills/float_temperatures.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -59,9 +60,8 @@ tl::unexpected<Error> too_cold(const std::string& where, const CountHistogram& h
       fmt::format(
           "{:g} K per count and an offset of {:g} K make {:.0f} C of its cold part ({:g} K)",
           scale.scale, scale.offset, celsius_from_kelvin(coldest_k), coldest_k),
-      "kelvin = scale * count + offset (an offset of -273.15 makes Celsius): correct its tag or "
-      "sidecar, or "
-      "give --thermal-scale linear with --kelvin-per-count and --kelvin-offset");
+      "kelvin = scale * count + offset: correct its tag or sidecar, or give --thermal-scale linear "
+      "with --kelvin-per-count and --kelvin-offset (counts of 0.01 C need 0.01 and 273.15)");
 }
 
 /// A palette's picture or a photograph; grey that was stored as three channels is none, nor is a
@@ -150,11 +150,20 @@ Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::
     file.bytes = bytes;
     return file;
   }
+  if (file.image.type() == CV_32FC1) {
+    ORBITFUSE_ASSIGN(FloatTemperatures floats, float_temperatures(file.image, where));
+    file.kind = ThermalFile::Kind::samples16;
+    file.image = std::move(floats.counts);
+    file.tag = floats.scale;
+    file.float_unit = floats.unit;
+    return file;
+  }
   if (file.image.type() != CV_16UC1) {
     return fail(
         ErrorKind::input, where,
         fmt::format("{} channels of {} bits", file.image.channels(), 8 * file.image.elemSize1()),
-        "thermal images are 16-bit grey, 8-bit or FLIR radiometric JPEGs");
+        "thermal images are 16-bit grey (100 x kelvin), float grey, 8-bit or FLIR radiometric "
+        "JPEGs");
   }
   file.kind = ThermalFile::Kind::samples16;
   ORBITFUSE_ASSIGN(file.tag, thermal_scale_of_description(description, where));
@@ -168,6 +177,7 @@ Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::
 }
 
 std::optional<ThermalScaleTag> ThermalDecoder::scale_of(const ThermalFile& file) const {
+  if (file.float_unit) return file.tag;  // it has no counts of its own
   switch (options_.thermal_scale) {
     case ThermalScale::linear:
       return ThermalScaleTag{options_.kelvin_per_count, options_.kelvin_offset};
@@ -209,6 +219,8 @@ void ThermalDecoder::observe_jpeg(const FlirImage& image) {
 void ThermalDecoder::observe_samples(const ThermalFile& file, const std::string& where) {
   CountHistogram histogram = histogram_of(file.image);
   histogram.back() = 0;
+  if (file.float_unit) floats_[file.float_unit].push_back(where);
+  samples16_ += file.float_unit == nullptr;
   const auto scale = scale_of(file);
   if (scale) {
     if (!is_plausible(histogram, *scale)) return;  // convert() says so
@@ -247,8 +259,31 @@ void ThermalDecoder::store_no_finer_than(double kelvin_per_count) {
   least_kelvin_per_count_ = std::max(least_kelvin_per_count_, kelvin_per_count);
 }
 
+void ThermalDecoder::tell_guesses(std::vector<std::string>& list) const {
+  for (const auto& [unit, files] : floats_) {
+    list.push_back(
+        fmt::format("{}{}: 32-bit floats, read as {}", files.front(),
+                    files.size() == 1 ? "" : fmt::format(" and {} more", files.size() - 1), unit));
+  }
+  const double median_c = celsius_from_kelvin(kelvin_of(percentile(centikelvin_, 50), {}));
+  if (like_centikelvin_ > 0 && !samples_are_raw_counts() && !(median_c >= -40 && median_c <= 150)) {
+    list.push_back(fmt::format(
+        "no scale given; 16-bit samples are read as centikelvin: median {:.0f} C. If that can't "
+        "be, "
+        "give --thermal-scale linear with --kelvin-per-count and --kelvin-offset, or raw",
+        median_c));
+  }
+  if (options_.thermal_scale != ThermalScale::automatic && samples16_ < files_) {
+    list.push_back(fmt::format(
+        "--thermal-scale is for 16-bit samples and changes nothing in {} of {} thermal files "
+        "(8-bit, 32-bit float or radiometric JPEG)",
+        files_ - samples16_, files_));
+  }
+}
+
 std::vector<std::string> ThermalDecoder::remarks() const {
   std::vector<std::string> list;
+  tell_guesses(list);
   if (kelvin_per_count() > kelvin_per_dn) {
     list.push_back(fmt::format(
         "the hottest sample is {:.0f} C, so thermal files hold {:g} K a count, not {:g}; their "

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <set>
@@ -33,6 +34,7 @@ struct ThermalFile {
   std::optional<FlirImage> flir;
   std::optional<DjiImage> dji;         ///< samples16: never temperatures unless the user says how
   std::optional<ThermalScaleTag> tag;  ///< from the file or its sidecar
+  const char* float_unit = nullptr;    ///< samples16 that were floats: what these were taken for
 };
 
 /// Without a page the file must hold a single image.
@@ -65,7 +67,8 @@ class ThermalDecoder {
   void store_no_finer_than(double kelvin_per_count);
   int files() const { return files_; }
   int radiometric_jpegs() const { return radiometric_jpegs_; }
-  /// What is worth telling of the temperatures: a coarser scale, and a doubtful one.
+  /// What is worth telling of the temperatures: a coarser scale, a doubtful or guessed one, and one
+  /// that was given for nothing.
   std::vector<std::string> remarks() const;
 
   struct Converted {
@@ -84,6 +87,7 @@ class ThermalDecoder {
   std::optional<ThermalScaleTag> scale_of(const ThermalFile& file) const;
   void observe_jpeg(const FlirImage& image);
   void observe_samples(const ThermalFile& file, const std::string& where);
+  void tell_guesses(std::vector<std::string>& list) const;
   Result<Converted> convert_samples(const ThermalFile& file, const std::string& where) const;
   Converted stretched(const cv::Mat& counts) const;
   Result<Converted> stored(const cv::Mat& counts, const std::vector<double>& kelvin,
@@ -91,6 +95,8 @@ class ThermalDecoder {
 
   const ImportOptions& options_;
   int files_ = 0, radiometric_jpegs_ = 0, with_scale_ = 0;
+  int samples16_ = 0;  ///< files that a scale of the user's is for
+  std::map<std::string, std::vector<std::string>> floats_;  ///< files of floats, by their unit
   int dji_ = 0;                           ///< files of DJI drones whose counts nobody gave a scale
   std::set<std::string> dji_parameters_;  ///< what their operators set for temperatures, in words
   int like_centikelvin_ = 0, like_counts_ = 0;  ///< 16-bit files without a scale

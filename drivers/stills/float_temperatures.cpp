@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "drivers/stills/float_temperatures.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "core/image/image_io.hpp"
+#include "core/image/samples.hpp"
+#include "core/temperature.hpp"
+
+namespace orbitfuse {
+namespace {
+
+constexpr float least_median_k = 173.15f;  ///< -100 C: no scene's half is colder
+constexpr float least_median_c = -100;
+/// What the coarsest stored scale holds.
+const double most_k = 65534 * stored_kelvin_per_count.back();
+
+}  // namespace
+
+Result<FloatTemperatures> float_temperatures(const cv::Mat& values, const std::string& where) {
+  CV_Assert(values.type() == CV_32FC1);
+  std::vector<float> samples;
+  append_finite(values, samples);
+  std::erase_if(samples, [](float v) { return !(v > -celsius_zero_k); });
+  const char* remedy = "store 100 x kelvin as 16-bit (0 where there is none)";
+  if (samples.empty())
+    return fail(ErrorKind::input, where, "32-bit floats without one temperature", remedy);
+  const auto middle = samples.begin() + static_cast<std::ptrdiff_t>(samples.size() / 2);
+  std::nth_element(samples.begin(), middle, samples.end());
+  const float median = *middle;
+  const bool is_kelvin = median >= least_median_k;
+  if (median < least_median_c || median > most_k)
+    return fail(
+        ErrorKind::input, where,
+        fmt::format("32-bit floats with a median of {:g}: neither kelvin nor Celsius", median),
+        remedy);
+  FloatTemperatures out;
+  out.unit = is_kelvin ? "kelvin" : "Celsius";
+  const cv::Mat kelvin = is_kelvin ? values : cv::Mat(values + celsius_zero_k);
+  // The last count of a file means "that or more": a step for which it is left free.
+  double hottest_k = 0;
+  for (const float v : samples)
+    hottest_k = std::max(hottest_k, is_kelvin ? v : kelvin_from_celsius(v));
+  out.scale.scale = kelvin_per_count_for(hottest_k * 65535 / 65534);
+  out.counts = counts_of_kelvin(kelvin, out.scale.scale);
+  return out;
+}
+
+}  // namespace orbitfuse

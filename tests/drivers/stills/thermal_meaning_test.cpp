@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What thermal samples were taken for is said where it was guessed, and so is a scale that was
+// given for nothing.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+
+#include "core/image/image_codec.hpp"
+#include "core/image/image_io.hpp"
+#include "drivers/stills/float_temperatures.hpp"
+#include "drivers/stills/import.hpp"
+#include "tests/support/made_files.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace orbitfuse {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class ThermalMeaning : public ::testing::Test {
+ protected:
+  void put(const std::string& name, const std::string& bytes) {
+    fs::create_directories((folder / name).parent_path());
+    std::ofstream(folder / name, std::ios::binary) << bytes;
+    options.thermal = {folder / "in"};
+    fs::remove_all(folder / "session");
+  }
+  static cv::Mat floats(double middle, std::uint64_t seed) {
+    cv::Mat image(30, 40, CV_32FC1);
+    cv::RNG(seed + 1).fill(image, cv::RNG::UNIFORM, middle - 5, middle + 5);
+    return image;
+  }
+  static std::string counts(double middle) {
+    cv::Mat image(30, 40, CV_16UC1);
+    cv::RNG(7).fill(image, cv::RNG::UNIFORM, middle - 200, middle + 200);
+    return *encode_tiff(image, "");
+  }
+  ImportReport import() const {
+    auto report = import_session(options, folder / "session");
+    EXPECT_TRUE(report) << report.error().message();
+    return report ? std::move(*report) : ImportReport{};
+  }
+  cv::Mat kelvin_of(const ImportReport& report, std::size_t frame) const {
+    return *read_thermal_k(report.session.path_of(report.session.frames.at(frame)));
+  }
+
+  test::TempFolder folder;
+  ImportOptions options;
+};
+
+TEST_F(ThermalMeaning, CentikelvinThatCanHardlyBeIsTold) {
+  put("in/a.tiff", counts(18000));  // -93 C
+  EXPECT_THAT(import().warnings,
+              Contains(AllOf(HasSubstr("read as centikelvin: median -9"), HasSubstr("linear"))));
+  put("in/a.tiff", counts(48000));  // 207 C
+  EXPECT_THAT(import().warnings, Contains(HasSubstr("read as centikelvin: median 207 C")));
+  put("in/a.tiff", counts(29500));
+  EXPECT_THAT(import().warnings, Not(Contains(HasSubstr("read as centikelvin"))));
+  put("in/a.tiff", counts(18000));
+  options.thermal_scale = ThermalScale::centikelvin;
+  EXPECT_THAT(import().warnings, Not(Contains(HasSubstr("no scale given")))) << "the user's word";
+}
+
+TEST_F(ThermalMeaning, AScaleThatIsForNothingIsTold) {
+  options.thermal_scale = ThermalScale::linear;
+  options.kelvin_per_count = 0.01;
+  put("in/a.png", *encode_png(cv::Mat(30, 40, CV_8UC1, cv::Scalar(77))));
+  EXPECT_THAT(import().warnings,
+              Contains(AllOf(HasSubstr("--thermal-scale"), HasSubstr("1 of 1 thermal files"))));
+  const FlirCalibration camera = made::flir_calibration();
+  fs::remove(folder / "in/a.png");
+  put("in/b.jpg",
+      made::flir_jpeg(cv::Mat(30, 40, CV_16UC1, cv::Scalar(made::flir_signal(300, camera))),
+                      camera));
+  put("in/c.tiff", counts(29500));
+  EXPECT_THAT(import().warnings, Contains(HasSubstr("1 of 2 thermal files")));
+  fs::remove(folder / "in/b.jpg");
+  put("in/c.tiff", counts(29500));
+  EXPECT_THAT(import().warnings, Not(Contains(HasSubstr("changes nothing"))));
+}
+
+TEST_F(ThermalMeaning, FloatsAreKelvinOrCelsiusAndNanIsDead) {
+  cv::Mat celsius = floats(20, 1);
+  celsius.at<float>(3, 7) = std::numeric_limits<float>::quiet_NaN();
+  celsius.at<float>(4, 7) = -9999;
+  cv::Mat hot = floats(300, 2);
+  hot.at<float>(5, 6) = 900;
+  put("in/c.tiff", *encode_tiff(celsius, ""));
+  put("in/k.tiff", *encode_tiff(hot, ""));
+  put("in/l.tiff", *encode_tiff(floats(301, 3), ""));
+  options.thermal_scale = ThermalScale::centikelvin;  // of counts; they have none
+  const ImportReport report = import();
+  ASSERT_EQ(report.thermal, 3);
+  EXPECT_TRUE(report.has_temperatures);
+  EXPECT_NEAR(kelvin_of(report, 0).at<float>(9, 9), celsius.at<float>(9, 9) + 273.15, 0.021);
+  EXPECT_TRUE(std::isnan(kelvin_of(report, 0).at<float>(3, 7)));
+  EXPECT_TRUE(std::isnan(kelvin_of(report, 0).at<float>(4, 7)));
+  EXPECT_NEAR(kelvin_of(report, 1).at<float>(5, 6), 900, 0.021);
+  EXPECT_NEAR(kelvin_of(report, 2).at<float>(9, 9), floats(301, 3).at<float>(9, 9), 0.021);
+  EXPECT_THAT(report.warnings,
+              Contains(AllOf(HasSubstr("c.tiff: 32-bit floats, read as Celsius"))));
+  EXPECT_THAT(report.warnings,
+              Contains(AllOf(HasSubstr("k.tiff and 1 more"), HasSubstr("read as kelvin"))));
+}
+
+TEST_F(ThermalMeaning, FloatsThatAreNoTemperaturesAreRefused) {
+  for (const double middle : {-180.0, 20000.0}) {
+    const auto refused = float_temperatures(floats(middle, 1), "f.tif");
+    ASSERT_FALSE(refused) << middle;
+    EXPECT_THAT(refused.error().message(), AllOf(HasSubstr("f.tif"), HasSubstr("100 x kelvin")));
+  }
+  EXPECT_FALSE(float_temperatures(
+      cv::Mat(3, 4, CV_32FC1, cv::Scalar(std::numeric_limits<float>::quiet_NaN())), "f.tif"));
+}
+
+}  // namespace
+}  // namespace orbitfuse
