@@ -123,18 +123,24 @@ class Gathering {
     const auto known = inputs_.known.find(modality);
     if (known == inputs_.known.end() || known->second.all().empty()) return {};
     std::size_t images = 0, with_pose = 0;
+    std::string twice;  // the first name that more than one view bears
     for (const auto* files : lists) {
       images += files->size();
-      for (const fs::path& file : *files) with_pose += known->second.find(file) != nullptr;
+      for (const fs::path& file : *files) {
+        with_pose += known->second.find(file) != nullptr;
+        if (twice.empty()) twice = known->second.ambiguity(file);
+      }
     }
     if (images == 0 || with_pose == images) return {};
-    const std::string found = fmt::format("{} of {} images have a pose among the {} given",
-                                          with_pose, images, known->second.all().size());
+    const std::string found =
+        fmt::format("{} of {} images have a pose among the {} given{}{}", with_pose, images,
+                    known->second.all().size(), twice.empty() ? "" : "; ", twice);
     if (with_pose == 0)
       return fail(ErrorKind::input, fmt::format("known poses, {}", name(modality)),
                   fmt::format("{}; the first given is for {}", found,
                               known->second.all().front().file.string()),
-                  "give the poses of these images, or none");
+                  twice.empty() ? "give the poses of these images, or none"
+                                : "give each image a name of its own, in the poses too");
     warnings_.push_back(
         fmt::format("{}: {}; the others are left to the pose stage", name(modality), found));
     return {};

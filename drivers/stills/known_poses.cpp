@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "drivers/stills/known_poses.hpp"
 
+#include <fmt/format.h>
+
 #include "core/formats/colmap_model.hpp"
 #include "core/formats/ground_truth.hpp"
 #include "core/formats/transforms_json.hpp"
@@ -80,6 +82,18 @@ const KnownView* KnownViews::find(const fs::path& file) const {
     return found->second.views == 1 ? &views_[found->second.index] : nullptr;
   }
   return nullptr;
+}
+
+std::string KnownViews::ambiguity(const fs::path& file) const {
+  const auto named = by_name_.find(file.filename().string());
+  if (named == by_name_.end() || named->second.views < 2 || find(file)) return {};
+  constexpr std::size_t most_named = 3;
+  std::vector<std::string> folders;
+  for (const KnownView& view : views_)
+    if (folders.size() < most_named && view.file.filename() == file.filename())
+      folders.push_back(view.file.parent_path().string());
+  return fmt::format("{} is there {} times ({}{})", file.filename().string(), named->second.views,
+                     fmt::join(folders, ", "), named->second.views > 3 ? ", ..." : "");
 }
 
 std::optional<Camera> KnownViews::shared_camera() const {

@@ -29,6 +29,9 @@ class KnownViews {
   void add(KnownView view);
   /// The same file, else the only view with its file name, else with its stem.
   const KnownView* find(const std::filesystem::path& file) const;
+  /// Why a file whose name is there has no view: "000.jpg is there twice (left, right)"; else
+  /// empty.
+  std::string ambiguity(const std::filesystem::path& file) const;
   const std::vector<KnownView>& all() const { return views_; }
   bool empty() const { return views_.empty(); }
   /// Their camera, when all share one.

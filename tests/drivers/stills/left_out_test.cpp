@@ -127,6 +127,23 @@ TEST_F(LeftOut, AModelWithoutImagesIsAnError) {
   EXPECT_THAT(refusal(), AllOf(HasSubstr("model"), HasSubstr("no images")));
 }
 
+TEST_F(LeftOut, ANameThatAModelHasTwiceIsNamed) {
+  for (const char* name : {"in/000.jpg", "in/001.jpg"})
+    put_photo(name, static_cast<std::uint64_t>(name[5]));
+  put("model/cameras.txt", "1 PINHOLE 40 30 40 40 20 15\n");
+  const std::string twice = "1 1 0 0 0 0 0 1 1 left/000.jpg\n\n2 1 0 0 0 0 0 1 1 right/000.jpg\n\n";
+  put("model/images.txt", twice);
+  options.visible = {folder / "in"};
+  options.visible_colmap = folder / "model";
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("000.jpg is there 2 times (left, right)"),
+                               HasSubstr("a name of its own")));
+  put("model/images.txt", twice + "3 1 0 0 0 0 0 1 1 001.jpg\n\n");
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->with_pose, 1);
+  EXPECT_THAT(report->warnings, Contains(HasSubstr("000.jpg is there 2 times")));
+}
+
 TEST_F(LeftOut, ALinkToASiblingIsOneImage) {
   put_photo("in/b.jpg", 1);
   fs::create_symlink("b.jpg", folder / "in/a_latest.jpg");
