@@ -11,6 +11,7 @@
 
 #include "core/formats/rigid_matrix.hpp"
 #include "core/geometry/geometry_json.hpp"
+#include "core/image/image_io.hpp"
 #include "core/json_fields.hpp"
 #include "core/nested_text.hpp"
 #include "core/system/file_io.hpp"
@@ -116,6 +117,22 @@ Result<Camera> read_camera(const Json& frame, const Json& shared, const std::str
   return camera;
 }
 
+/// NeRF's synthetic scenes name no size, nor their images' ".png": all are of the first one's size.
+void take_size_of_image(Json& root, const std::filesystem::path& file) {
+  const Json& first = root["frames"].front();
+  if (root.contains("w") || root.contains("h") || !first.is_object() || first.contains("w") ||
+      first.contains("h") || !first.contains("file_path") || !first["file_path"].is_string())
+    return;
+  const std::string image = (file.parent_path() / first["file_path"].get<std::string>()).string();
+  for (const char* extension : {"", ".png", ".jpg"}) {
+    const Result<cv::Mat> pixels = read_visible(image + extension);
+    if (!pixels) continue;
+    root["w"] = pixels->cols;
+    root["h"] = pixels->rows;
+    return;
+  }
+}
+
 }  // namespace
 
 Result<Transforms> read_transforms_json(const std::filesystem::path& file) {
@@ -142,6 +159,7 @@ Result<Transforms> read_transforms_json(const std::filesystem::path& file) {
     return fail(ErrorKind::input, file.string() + ": frames", "no list of frames",
                 "give a nerfstudio or instant-ngp transforms.json");
   }
+  take_size_of_image(root, file);
   Transforms transforms;
   for (std::size_t i = 0; i < root["frames"].size(); ++i) {
     const Json& frame = root["frames"][i];

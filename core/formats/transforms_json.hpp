@@ -26,7 +26,7 @@ struct Transforms {
 /// here; shared or per-frame intrinsics (fl_x or camera_angle_x), pixels. Errors: input, naming
 /// file and frame (no JSON, no frames, no size, no focal length, text where a number belongs, an
 /// angle that can't be radians, a lens that is no pinhole with k1, k2, p1, p2, a matrix that is no
-/// rigid pose). Images are not looked at.
+/// rigid pose). Of the images only the first is looked at, and only where the file names no size.
 Result<Transforms> read_transforms_json(const std::filesystem::path& file);
 
 /// Writes the views, poses turned back to OpenGL's axes, with a `conventions` block. Errors:

@@ -187,6 +187,14 @@ std::string tiff_of_pages(const std::vector<cv::Mat>& pages, const TiffWords& wo
     const std::size_t bits_at = out.size() + out.size() % 2;
     const auto bits = static_cast<std::uint64_t>(8 * page.elemSize1());
     for (std::uint64_t i = 0; i < channels; ++i) put_number(out, bits_at + 2 * i, bits, 2);
+    // In planes each colour has a strip of its own.
+    const std::uint64_t planes = words.planar == 1 ? 1 : channels;
+    const std::uint64_t plane_bytes = page.total() * page.elemSize() / planes;
+    const std::size_t planes_at = out.size();
+    for (std::uint64_t i = 0; i < planes; ++i) {
+      put_number(out, planes_at + 4 * i, pixels_at + i * plane_bytes, 4);
+      put_number(out, planes_at + 4 * (planes + i), plane_bytes, 4);
+    }
     const std::size_t directory = out.size();
     put_number(out, link, directory, 4);
     struct Entry {
@@ -198,10 +206,10 @@ std::string tiff_of_pages(const std::vector<cv::Mat>& pages, const TiffWords& wo
                                {259, 3, 1, 1},
                                {262, 3, 1, static_cast<std::uint64_t>(words.photometric)}};
     if (description.size() > 3) entries.push_back({270, 2, description.size() + 1, text_at});
-    entries.push_back({273, 4, 1, pixels_at});
+    entries.push_back({273, 4, planes, planes > 1 ? planes_at : pixels_at});
     entries.push_back({277, 3, 1, channels});
     entries.push_back({278, 4, 1, static_cast<std::uint64_t>(page.rows)});
-    entries.push_back({279, 4, 1, page.total() * page.elemSize()});
+    entries.push_back({279, 4, planes, planes > 1 ? planes_at + 4 * planes : plane_bytes});
     if (words.planar != 1) entries.push_back({284, 3, 1, static_cast<std::uint64_t>(words.planar)});
     if (words.gdal_metadata.size() > 3)
       entries.push_back({42112, 2, words.gdal_metadata.size() + 1, metadata_at});

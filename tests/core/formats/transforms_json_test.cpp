@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/image/image_io.hpp"
 #include "core/system/file_io.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -101,6 +102,22 @@ TEST(TransformsJson, BadInputNamesFrameAndField) {
     EXPECT_EQ(t.error().kind, ErrorKind::input);
     EXPECT_NE(t.error().message().find(word), std::string::npos) << t.error().message();
   }
+}
+
+TEST(TransformsJson, ASizeThatIsNotNamedIsTheFirstImages) {
+  const TempFolder folder;
+  std::filesystem::create_directories(folder / "train");
+  ASSERT_TRUE(write_png(folder / "train/r_0.png", cv::Mat(30, 40, CV_8UC3, cv::Scalar(1, 2, 3))));
+  const std::string frame =
+      R"({"file_path":"./train/r_0","transform_matrix":)" + std::string(identity) + "}";
+  put(folder / "t.json",
+      R"({"camera_angle_x":1.5707963267948966,"frames":[)" + frame + "," + frame + "]}");
+  const auto t = read_transforms_json(folder / "t.json");
+  ASSERT_TRUE(t) << t.error().message();
+  ASSERT_EQ(t->frames.size(), 2u);
+  EXPECT_EQ(t->frames[1].camera.width, 40);
+  EXPECT_EQ(t->frames[1].camera.height, 30);
+  EXPECT_NEAR(t->frames[1].camera.fx, 20, 1e-9);
 }
 
 TEST(TransformsJson, LensesAnglesAndTextsThatWouldBendThePictureAreRefused) {
