@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <charconv>
 
 #include "app/config/settings.hpp"
 #include "app/pipeline/runner.hpp"
@@ -42,7 +43,14 @@ void add_common(CLI::App& app, CommonOptions& common) {
       ->check(CLI::Range(0, 1024))
       ->group(group);
   app.add_option("--seed", common.seed, "Seed of everything random")
-      ->check(CLI::NonNegativeNumber)
+      ->check([](const std::string& word) {
+        std::uint64_t seed = 0;
+        const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), seed);
+        return error == std::errc() && end == word.data() + word.size()
+                   ? std::string()
+                   : "'" + word + "' is no whole number from 0 to 2^64 - 1";
+      })
+      ->type_name("UINT")
       ->capture_default_str()
       ->group(group);
   app.add_option("--device", common.device, "Where to compute")

@@ -78,6 +78,14 @@ json sidecar(const view::FinishedRun& run, const FieldSurface& surface, const Tr
   return j;
 }
 
+/// As the system's users write it: A.GLB is a .glb.
+std::string extension_of(const fs::path& file) {
+  std::string extension = file.extension().string();
+  for (char& c : extension)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return extension;
+}
+
 }  // namespace
 
 Result<FieldSurface> surface_of_run(const view::FinishedRun& run, const SurfaceRequest& request,
@@ -97,7 +105,7 @@ Result<FieldSurface> surface_of_run(const view::FinishedRun& run, const SurfaceR
 }
 
 Status check_extension(const fs::path& file) {
-  const std::string extension = file.extension().string();
+  const std::string extension = extension_of(file);
   for (const char* known : {".glb", ".ply", ".obj", ".las"})
     if (extension == known) return {};
   return fail(ErrorKind::usage, "--to", "'" + file.string() + "'",
@@ -112,7 +120,7 @@ Status write_surface(const fs::path& file, const view::FinishedRun& run,
   transform(frame, mesh);
   if (options.colors == VertexColors::temperature)
     ORBITFUSE_TRY(paint_temperatures(run, options.palette, mesh.vertices));
-  const std::string extension = file.extension().string();
+  const std::string extension = extension_of(file);
   if (extension == ".las" || (extension == ".ply" && options.points)) mesh.triangles.clear();
   const json about = sidecar(run, surface, mesh, frame, options);
   const std::vector<std::string> comments = {"unit " + frame.unit() + ", up z; " + frame.words()};

@@ -5,6 +5,8 @@
 
 #include <map>
 
+#include "core/image/exif.hpp"
+#include "core/image/image_codec.hpp"
 #include "core/image/image_io.hpp"
 #include "core/system/file_io.hpp"
 #include "fusion/metrics/metrics.hpp"
@@ -24,7 +26,7 @@ std::map<std::string, fs::path> files_by_stem(const fs::path& folder) {
 Result<std::string> fuse_one(const std::string& stem, const fs::path& visible_file,
                              const fs::path& thermal_file, const fs::path& out,
                              const FusionOptions& options) {
-  ORBITFUSE_ASSIGN(const cv::Mat visible, read_image(visible_file));
+  ORBITFUSE_ASSIGN(const cv::Mat visible, read_photo(visible_file));
   ORBITFUSE_ASSIGN(cv::Mat thermal, read_thermal(thermal_file));
   ORBITFUSE_ASSIGN(const cv::Mat fused, fuse(visible, thermal, {}, options));
   ORBITFUSE_ASSIGN(thermal, gray_of_thermal(thermal, options.span));
@@ -40,9 +42,15 @@ Result<std::string> fuse_one(const std::string& stem, const fs::path& visible_fi
 
 }  // namespace
 
+Result<cv::Mat> read_photo(const fs::path& file) {
+  ORBITFUSE_ASSIGN(const std::string bytes, read_file(file, max_image_bytes));
+  ORBITFUSE_ASSIGN(const cv::Mat image, read_image(file));
+  return apply_orientation(image, read_exif(bytes).orientation);
+}
+
 Result<cv::Mat> read_thermal(const fs::path& file) {
   ORBITFUSE_ASSIGN(const cv::Mat image, read_image(file));
-  return image.type() == CV_16UC1 ? read_thermal_k(file) : Result<cv::Mat>(image);
+  return image.type() == CV_16UC1 ? read_thermal_k(file) : read_photo(file);
 }
 
 Result<cv::Mat> gray_of_thermal(const cv::Mat& thermal,

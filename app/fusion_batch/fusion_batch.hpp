@@ -17,6 +17,9 @@ struct Summary {
   std::vector<std::string> problems;  ///< pairs that could not be fused, and why
 };
 
+/// Any image (core's read_image), upright as its EXIF data say.
+Result<cv::Mat> read_photo(const std::filesystem::path& file);
+
 /// Thermal image of a file: one channel of 16 bits is radiometric and becomes kelvin (NaN =
 /// invalid), anything else stays as stored.
 Result<cv::Mat> read_thermal(const std::filesystem::path& file);

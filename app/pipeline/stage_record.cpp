@@ -132,6 +132,30 @@ std::set<std::string> finished_stages(const fs::path& out) {
   return names;
 }
 
+std::vector<std::string> out_of_date(const fs::path& out, const std::set<std::string>& stages) {
+  std::map<std::string, StageRecord> records;
+  for (const std::string& stage : finished_stages(out))
+    if (auto record = read_stage_record(out / stage)) records.emplace(stage, *std::move(record));
+  std::vector<std::string> late;
+  for (const auto& [stage, record] : records) {
+    if (!stages.contains(stage)) continue;
+    for (const auto& [name, hash] : record.inputs)
+      if (const auto input = records.find(name);
+          input != records.end() && input->second.outputs_hash() != hash)
+        late.push_back(stage + " was made of an earlier " + name);
+  }
+  return late;
+}
+
+bool lies_in_a_stage(const fs::path& out, const fs::path& target) {
+  std::error_code unreadable;
+  const fs::path run = fs::weakly_canonical(out, unreadable),
+                 to = fs::weakly_canonical(target, unreadable);
+  const fs::path inside = to.lexically_relative(run);
+  return !inside.empty() && inside != "." &&
+         finished_stages(out).contains(inside.begin()->string());
+}
+
 Result<std::vector<OutputFile>> list_outputs(const fs::path& folder) {
   std::vector<OutputFile> outputs;
   std::error_code ec;

@@ -49,6 +49,15 @@ Result<std::vector<OutputFile>> list_outputs(const std::filesystem::path& folder
 /// The first way in which the folder differs from the record; none where it is intact.
 std::optional<std::string> damage(const std::filesystem::path& folder, const StageRecord& record);
 
+/// Which of these stages were made of other results than those that lie in the run now, one
+/// sentence a stage: "train_thermal was made of an earlier poses_visible".
+std::vector<std::string> out_of_date(const std::filesystem::path& out,
+                                     const std::set<std::string>& stages);
+
+/// `target`, which a verb is asked to write, lies inside of a finished stage of the run. Its next
+/// run would take that for damage.
+bool lies_in_a_stage(const std::filesystem::path& out, const std::filesystem::path& target);
+
 nlohmann::json to_json(const Skip& skip);
 nlohmann::json to_json(const Error& error);
 

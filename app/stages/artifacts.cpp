@@ -54,6 +54,14 @@ pipeline::StageContext context_of_run(const fs::path& out) {
   return context;
 }
 
+Status check_up_to_date(const fs::path& out) {
+  const std::vector<std::string> late = pipeline::out_of_date(
+      out, {"depth", "train_visible", "poses_thermal", "train_thermal", "register"});
+  if (late.empty()) return {};
+  return fail(ErrorKind::input, out.string(), late.front(),
+              "bring the run up to date: orbitfuse run SESSION --out " + out.string());
+}
+
 Status save_poses(const fs::path& folder, const Reconstruction& model) {
   ORBITFUSE_TRY(write_colmap_model(folder / "model", model, ColmapFormat::binary));
   Transforms transforms;

@@ -21,6 +21,10 @@ namespace orbitfuse::stages {
 /// To read what the finished stages of a run left, outside of any run.
 pipeline::StageContext context_of_run(const std::filesystem::path& out);
 
+/// Whether the fields of a finished run and what they stand on are of one making: a stage can be
+/// run again alone, or a folder be put in. Errors: input (which is older than what).
+Status check_up_to_date(const std::filesystem::path& out);
+
 /// model/ (COLMAP, binary), transforms.json.
 Status save_poses(const std::filesystem::path& folder, const Reconstruction& model);
 Result<Reconstruction> load_poses(const std::filesystem::path& folder, Modality modality);

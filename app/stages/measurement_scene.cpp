@@ -130,6 +130,7 @@ Result<ThermalScene> load_measurement_scene(const fs::path& out, const Session& 
       return fail(ErrorKind::input, out.string(), std::string(stage) + " is not finished in it",
                   "run the session first: orbitfuse run " + session.folder.string() + " --out " +
                       out.string());
+  ORBITFUSE_TRY(check_up_to_date(out));
   // Two fields whose frames nobody could relate have no world in common.
   if (context.has("poses_visible") && !context.has("register"))
     return fail(ErrorKind::input, out.string(), "the two fields are not registered",

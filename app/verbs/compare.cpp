@@ -3,6 +3,7 @@
 
 #include "app/cli/verb.hpp"
 #include "app/comparison/comparison_files.hpp"
+#include "app/pipeline/stage_record.hpp"
 
 namespace orbitfuse::cli {
 namespace {
@@ -45,6 +46,10 @@ Status run(Context& context, const Options& o) {
   for (const std::string& run : {o.before, o.after})
     if (fs::equivalent(run, o.out, unreadable))
       return fail(ErrorKind::usage, "--out", "'" + o.out + "', which is one of the runs",
+                  "name a new folder");
+  for (const std::string& run : {o.before, o.after})
+    if (pipeline::lies_in_a_stage(run, o.out))
+      return fail(ErrorKind::usage, "--out", "'" + o.out + "', inside of a stage of " + run,
                   "name a new folder");
   if (context.common.dry_run) {
     ORBITFUSE_TRY(check_comparable(o.before, o.after, context.config, request, context.progress));

@@ -9,6 +9,7 @@
 #include "app/export/find_scale.hpp"
 #include "app/export/mat_scale.hpp"
 #include "app/export/surface_files.hpp"
+#include "app/pipeline/stage_record.hpp"
 
 namespace orbitfuse::cli {
 namespace {
@@ -179,11 +180,24 @@ Status export_surface(Context& context, const std::vector<fs::path>& files,
   return {};
 }
 
+/// What would be found only after the surface was made.
+Status check_target(const fs::path& out, const fs::path& file) {
+  ORBITFUSE_TRY(check_extension(file));
+  std::error_code unreadable;
+  if (fs::is_directory(file, unreadable))
+    return fail(ErrorKind::usage, "--to", "'" + file.string() + "', which is a folder",
+                "name a file");
+  if (pipeline::lies_in_a_stage(out, file))
+    return fail(ErrorKind::usage, "--to", "'" + file.string() + "', inside of a stage of the run",
+                "write it elsewhere, e.g. to " + (out / "export").string());
+  return {};
+}
+
 Status run(Context& context, const Options& o) {
   std::vector<fs::path> files(o.files.begin(), o.files.end());
   if (files.empty() && o.dataset.empty())
     files.push_back(fs::path(o.out) / "export" / "surface.glb");
-  for (const fs::path& file : files) ORBITFUSE_TRY(check_extension(file));
+  for (const fs::path& file : files) ORBITFUSE_TRY(check_target(o.out, file));
   ORBITFUSE_ASSIGN(const SurfaceRequest request, request_of(o));
   Eigen::Vector3d up = Eigen::Vector3d::Zero();
   if (!o.up.empty()) {

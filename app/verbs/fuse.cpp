@@ -84,7 +84,7 @@ Status write_legend(Context& context, const fs::path& out, const cv::Mat& therma
 
 Status fuse_pair(Context& context, const Options& o, const FusionOptions& options) {
   ORBITFUSE_TRY(check_image_out(o));
-  ORBITFUSE_ASSIGN(const cv::Mat visible, read_image(o.visible));
+  ORBITFUSE_ASSIGN(const cv::Mat visible, batch::read_photo(o.visible));
   ORBITFUSE_ASSIGN(const cv::Mat thermal, batch::read_thermal(o.thermal));
   ORBITFUSE_ASSIGN(const cv::Mat mask, read_optional(o.mask));
   FusionReport said;
@@ -128,7 +128,14 @@ Status fuse_folder(Context& context, const Options& o, const FusionOptions& opti
 }
 
 Status run(Context& context, const Options& o) {
-  if (o.visible.empty() && o.thermal.empty()) return run_stages(context, o.folders, {"fuse"});
+  if (o.visible.empty() && o.thermal.empty()) {
+    // They would be passed over: a run's pictures have masks and colours of their own.
+    for (const auto& [option, given] : {std::pair{"--mask", !o.mask.empty()}, {"--gray", o.gray}})
+      if (given)
+        return fail(ErrorKind::usage, option, "given without --visible and --thermal",
+                    "name the two images, or leave it out");
+    return run_stages(context, o.folders, {"fuse"});
+  }
   for (const auto& [option, value] :
        {std::pair{"--visible", &o.visible}, {"--thermal", &o.thermal}})
     if (value->empty())

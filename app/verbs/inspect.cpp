@@ -105,12 +105,17 @@ Status inspect_run(Context& context, const fs::path& folder) {
                                      record->output.metrics.value("brief", std::string())));
     stages.push_back(to_json(*record));
   }
+  const std::vector<std::string> late =
+      pipeline::out_of_date(folder, pipeline::finished_stages(folder));
+  for (const std::string& stage : late)
+    context.console.warning(stage + "; the next run makes it again");
   const auto run = stages::read_json(folder / "run.json");
   if (!run || !run->is_object()) {
     damaged.push_back("run.json: not JSON, or cut off");
     context.console.warning(damaged.back() + "; run again with the session folder and --out");
   }
-  context.result = {{"out", folder.string()}, {"stages", stages}, {"damaged", damaged}};
+  context.result = {
+      {"out", folder.string()}, {"stages", stages}, {"damaged", damaged}, {"out_of_date", late}};
   if (damaged.empty()) return {};
   return fail(ErrorKind::input, folder.string(), damaged.front(),
               "run again: what is damaged is made anew");

@@ -83,6 +83,9 @@ Status run(Context& context, const Options& options) {
   if (!words.save && !(words.remark + words.component + words.reference).empty())
     return fail(ErrorKind::usage, "--remark, --component or --reference", "without --save",
                 "add --save: they are kept with the measurement");
+  if (!words.name.empty() && words.name == words.reference)
+    return fail(ErrorKind::usage, "--reference", "'" + words.reference + "', its own name",
+                "name another saved measurement");
   ORBITFUSE_ASSIGN(const Session session, session_of(options));
   ORBITFUSE_ASSIGN(const ThermalScene scene, stages::load_measurement_scene(options.out, session));
   const fs::path file = fs::path(options.out) / measurements_file;
@@ -95,6 +98,9 @@ Status run(Context& context, const Options& options) {
   ORBITFUSE_ASSIGN(const auto request, request_of(options.words, scene, known));
   if (!request) {
     if (!saved) return tl::unexpected(saved.error());
+    if (options.words.csv)
+      return fail(ErrorKind::usage, "--csv", "nothing to measure beside it",
+                  "ask for a --point, --pixel, --box ... ; saved ones: --json");
     list(context, known, file.string());
     return {};
   }

@@ -20,11 +20,11 @@ Status score_files(Context& context, const Options& o) {
   for (const auto& [option, value] :
        {std::pair{"--visible", &o.visible}, {"--thermal", &o.thermal}, {"--fused", &o.fused}})
     if (value->empty()) return fail(ErrorKind::usage, option, "not given", "name all three images");
-  ORBITFUSE_ASSIGN(const cv::Mat visible, read_image(o.visible));
+  ORBITFUSE_ASSIGN(const cv::Mat visible, batch::read_photo(o.visible));
   // Radiometric files are scored as the gray image that fusion makes of them.
   ORBITFUSE_ASSIGN(const cv::Mat stored, batch::read_thermal(o.thermal));
   ORBITFUSE_ASSIGN(const cv::Mat thermal, batch::gray_of_thermal(stored, {}));
-  ORBITFUSE_ASSIGN(const cv::Mat fused, read_image(o.fused));
+  ORBITFUSE_ASSIGN(const cv::Mat fused, batch::read_photo(o.fused));
   ORBITFUSE_ASSIGN(const auto values, fusion_metrics(visible, thermal, fused));
   nlohmann::json metrics = nlohmann::json::object(), definitions = metrics;
   for (const MetricValue& v : values) {

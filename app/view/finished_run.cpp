@@ -154,6 +154,7 @@ Result<FinishedRun> load_finished_run(const fs::path& out, const stages::RunConf
   run.out = out;
   run.config = config;
   const pipeline::StageContext context = stages::context_of_run(out);
+  ORBITFUSE_TRY(stages::check_up_to_date(out));
   ORBITFUSE_TRY(load_fields(context, run));
   ORBITFUSE_TRY(progress.check("view"));
   ORBITFUSE_ASSIGN(const auto record, stages::read_json(out / "run.json"));

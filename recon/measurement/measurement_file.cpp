@@ -100,6 +100,10 @@ json to_json(const SavedMeasurement& saved) {
 }
 
 Status check_name(const std::string& name) {
+  if (std::any_of(name.begin(), name.end(),
+                  [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }))
+    return fail(ErrorKind::usage, "the measurement's name", "a line break or control character",
+                "choose one that fits on a line");
   if (name.size() <= longest_name_bytes) return {};
   return fail(ErrorKind::usage, "the measurement's name", fmt::format("{} bytes long", name.size()),
               fmt::format("choose one of up to {} bytes (letters beyond ASCII have two to four)",
