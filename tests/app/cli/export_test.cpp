@@ -84,6 +84,25 @@ TEST(ExportDataset, RecordedAndNewPairsAreReadBackInEveryLayout) {
     EXPECT_EQ(again.code, 2) << "it is not overwritten";
     EXPECT_THAT(again.err, HasSubstr(folder.string()));
   }
+  const auto surface = [&](const fs::path& to) {
+    return orbitfuse_program({"export", out.string(), "--to", to.string(), "--dry-run"});
+  };
+  EXPECT_EQ(surface(temp / "A.GLB").code, 0);
+  const Outcome inside = surface(out / "train_thermal/cloud.ply");
+  EXPECT_EQ(inside.code, 2);
+  EXPECT_THAT(inside.err, HasSubstr("inside of a stage"));
+  fs::create_directory(temp / "folder.ply");
+  EXPECT_EQ(surface(temp / "folder.ply").code, 2);
+  // One stage made anew: what stands on the one before is not mixed with it.
+  const Outcome alone =
+      orbitfuse_program({"run", session.string(), "--out", out.string(), "--stage", "train_visible",
+                         "--set", "train.visible.iterations=320"});
+  ASSERT_EQ(alone.code, 0) << alone.err;
+  const Outcome mixed = surface(temp / "b.glb");
+  EXPECT_EQ(mixed.code, 3);
+  EXPECT_THAT(mixed.err, HasSubstr("was made of an earlier train_visible"));
+  EXPECT_THAT(orbitfuse_program({"inspect", out.string()}).err,
+              HasSubstr("was made of an earlier train_visible"));
 }
 
 }  // namespace

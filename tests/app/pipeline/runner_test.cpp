@@ -6,7 +6,9 @@
 
 #include <atomic>
 #include <fstream>
+#include <set>
 
+#include "app/pipeline/stage_record.hpp"
 #include "core/system/file_io.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -277,6 +279,32 @@ TEST(Runner, AbsentIsNotAFailure) {
   EXPECT_EQ(summary.find("behind")->state, StageState::absent);
   EXPECT_EQ(summary.find("behind")->why, "no thermal frames");
   EXPECT_EQ(summary.find("beside")->state, StageState::ran);
+}
+
+TEST_F(RunnerTest, WhatWasMadeOfEarlierResultsIsNamed) {
+  ASSERT_FALSE(run().error);
+  const fs::path out = temp.path() / "out";
+  const std::set<std::string> all = {"a", "b", "c", "d"};
+  EXPECT_THAT(out_of_date(out, all), ElementsAre());
+  a_option = 17;
+  ASSERT_FALSE(run({.targets = {"a"}}).error);
+  EXPECT_THAT(out_of_date(out, all),
+              ElementsAre("b was made of an earlier a", "d was made of an earlier a"));
+  EXPECT_THAT(out_of_date(out, {"c"}), ElementsAre());
+  ASSERT_FALSE(run().error);
+  EXPECT_THAT(out_of_date(out, all), ElementsAre());
+  EXPECT_THAT(out_of_date(temp.path() / "none", all), ElementsAre());
+}
+
+TEST_F(RunnerTest, AFileInAStageIsToldFromOneBesideIt) {
+  ASSERT_FALSE(run().error);
+  const fs::path out = temp.path() / "out";
+  EXPECT_TRUE(lies_in_a_stage(out, out / "a/new.ply"));
+  EXPECT_TRUE(lies_in_a_stage(out, out / "export/../b/deep/new.ply"));
+  EXPECT_TRUE(lies_in_a_stage(out, out / "c"));
+  EXPECT_FALSE(lies_in_a_stage(out, out / "export/new.ply"));
+  EXPECT_FALSE(lies_in_a_stage(out, out));
+  EXPECT_FALSE(lies_in_a_stage(out, temp.path() / "a/new.ply"));
 }
 
 TEST(Runner, TwoRunsInOneFolderAreRefused) {
