@@ -159,8 +159,8 @@ TEST(SurfaceFiles, PaletteColoursAndGrayForNone) {
 }
 
 TEST(SurfaceFiles, OtherNamesAndDirectionsAreRefused) {
-  for (const char* name : {"a.stl", "a", "", ".glb", "a.GLB"})
-    EXPECT_FALSE(check_extension(name)) << name;
+  for (const char* name : {"a.stl", "a", "", ".glb"}) EXPECT_FALSE(check_extension(name)) << name;
+  EXPECT_TRUE(check_extension("a.GLB"));
   for (const Eigen::Vector3d& up : {Eigen::Vector3d(std::nan(""), 0, 1),
                                     Eigen::Vector3d(1e300, 0, 0), Eigen::Vector3d(1e-30, 0, 0)})
     EXPECT_FALSE(export_frame(up, std::nullopt));

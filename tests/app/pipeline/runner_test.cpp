@@ -287,7 +287,9 @@ TEST_F(RunnerTest, WhatWasMadeOfEarlierResultsIsNamed) {
   const std::set<std::string> all = {"a", "b", "c", "d"};
   EXPECT_THAT(out_of_date(out, all), ElementsAre());
   a_option = 17;
-  ASSERT_FALSE(run({.targets = {"a"}}).error);
+  RunOptions only_a;
+  only_a.targets = {"a"};
+  ASSERT_FALSE(run(only_a).error);
   EXPECT_THAT(out_of_date(out, all),
               ElementsAre("b was made of an earlier a", "d was made of an earlier a"));
   EXPECT_THAT(out_of_date(out, {"c"}), ElementsAre());

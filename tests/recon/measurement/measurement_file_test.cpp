@@ -46,8 +46,9 @@ TEST_F(MeasurementFile, HoldsWhatWasPut) {
   first.reference = "spot 2";
   EXPECT_EQ(add_measurement(file, "run a", first).value().name, "spot 1");
   EXPECT_EQ(add_measurement(file, "run a", spot("")).value().name, "spot 2");
-  EXPECT_EQ(add_measurement(file, "run a", spot("a \"valve\", hot\n")).value().name,
-            "a \"valve\", hot\n");
+  EXPECT_EQ(add_measurement(file, "run a", spot("a \"valve\", hot")).value().name,
+            "a \"valve\", hot");
+  EXPECT_EQ(add_measurement(file, "run a", spot("two\nlines")).error().kind, ErrorKind::usage);
   SavedMeasurement again = spot("spot 1");
   again.answer["reading"]["temperature_k"] = 310;
   again.remark = "tightened";
