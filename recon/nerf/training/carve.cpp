@@ -2,8 +2,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <limits>
-#include <opencv2/imgproc.hpp>
 
 #include "core/system/parallel.hpp"
 #include "recon/nerf/training/plain_background.hpp"
@@ -16,49 +14,31 @@ struct Votes {
   int seen = 0;   ///< views whose image holds the cell
   int free = 0;   ///< ... in front of a known surface there
   int solid = 0;  ///< ... at a known surface
-  int sky = 0;    ///< ... with nothing but the sky there
+  int sky = 0;    ///< ... with nothing but the sky there, of cells beyond the cameras
 };
 
-struct Voter {
-  const NormalisedView* view;
-  cv::Mat sky_px;  ///< CV_32FC1: pixels from here to what isn't sky; empty where there is no sky
-};
-
-Voter voter_of(const NormalisedView& view) {
-  Voter voter{&view, {}};
-  const cv::Mat sky = view.distance == std::numeric_limits<float>::infinity();
-  if (cv::countNonZero(sky) > 0) cv::distanceTransform(sky, voter.sky_px, cv::DIST_L2, 3);
-  return voter;
-}
-
-/// Whether a view shows the sky there and all round. It then sees through the point: one such view
-/// is enough. A white roof before a white sky shows no edge: the sky speaks of what stands farther
-/// out than the cameras only, as fog does. (With the whole cell before the sky, from two views, fog
-/// stays along the horizon: `transformer` .609 K instead of .553.)
-bool open_sky(const Voter& voter, const float x[3], int px, int py) {
-  constexpr float one_pixel = 1.5f;  // and its neighbours
-  return x[0] * x[0] + x[1] * x[1] + x[2] * x[2] > 1 && voter.sky_px.at<float>(py, px) > one_pixel;
-}
-
-Votes vote(const std::vector<Voter>& voters, const float x[3], float half_diagonal) {
+Votes vote(const std::vector<const NormalisedView*>& voters, const float x[3],
+           float half_diagonal) {
+  const bool beyond_the_cameras = x[0] * x[0] + x[1] * x[1] + x[2] * x[2] > 1;
   Votes votes;
-  for (const Voter& voter : voters) {
-    const NormalisedView& view = *voter.view;
+  for (const NormalisedView* voter : voters) {
+    const NormalisedView& view = *voter;
     double px, py, z;
     if (!view.rays.project(x, px, py, z)) continue;
     ++votes.seen;
     const float known = view.distance.at<float>(static_cast<int>(py), static_cast<int>(px));
     if (std::isnan(known)) continue;
+    if (std::isinf(known)) {
+      // A white roof before a white sky shows no edge; fog stands farther out than the object.
+      if (beyond_the_cameras) ++votes.free, ++votes.sky;
+      continue;
+    }
     float distance = 0;
     for (int d = 0; d < 3; ++d) {
       const float offset = x[d] - static_cast<float>(view.rays.origin()[d]);
       distance += offset * offset;
     }
     distance = std::sqrt(distance);
-    if (std::isinf(known)) {
-      if (open_sky(voter, x, static_cast<int>(px), static_cast<int>(py))) ++votes.free, ++votes.sky;
-      continue;
-    }
     // The margin covers the cell and 2 % of depth error.
     const float margin = half_diagonal + 0.02f * known;
     if (distance < known - margin) ++votes.free;
@@ -92,11 +72,11 @@ void clear_segment(Occupancy& occupancy, const Ray& ray, float end, float tube) 
 
 double carve(bool dense_depth, const std::vector<NormalisedView>& views,
              const std::vector<bool>& heldout, const TrainOptions& options, Occupancy& occupancy) {
-  std::vector<Voter> voters;
+  std::vector<const NormalisedView*> voters;
   std::vector<Silhouette> silhouettes;
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (heldout[i]) continue;
-    voters.push_back(voter_of(views[i]));
+    voters.push_back(&views[i]);
     if (!views[i].clearance_px.empty())
       silhouettes.push_back({&views[i].rays, &views[i].clearance_px});
   }
@@ -135,7 +115,7 @@ double carve(bool dense_depth, const std::vector<NormalisedView>& views,
       Occupancy::put(occupancy.allowed, cell, false);
   }
   if (options.carve && !dense_depth)
-    for (const auto& [view, sky_px] : voters)
+    for (const NormalisedView* view : voters)
       for (const std::int32_t pixel : view->known) {
         const int width = view->rays.camera().width;
         const int x = pixel % width, y = pixel / width;

@@ -72,21 +72,6 @@ TEST(Carve, WhatAViewSeesThroughIsEmptyUnlessOthersKnowASurfaceThere) {
   EXPECT_TRUE(allowed(carved(views), 2.5f, 0, 0.3f));
 }
 
-TEST(Carve, LeavesAMastInTheSky) {
-  std::vector<NormalisedView> views = ring(8, sky);
-  const float mast[3] = {-2.5f, 0, 0.3f};
-  for (NormalisedView& view : views) {
-    double x, y, z;
-    if (view.rays.project(mast, x, y, z) && x >= 0 && y >= 0 && x < side && y < side)
-      view.distance(cv::Rect(static_cast<int>(x) - 1, static_cast<int>(y) - 1, 3, 3) &
-                    cv::Rect(0, 0, side, side))
-          .setTo(unknown);
-  }
-  const Occupancy occupancy = carved(views);
-  EXPECT_TRUE(allowed(occupancy, mast[0], mast[1], mast[2]));
-  EXPECT_FALSE(allowed(occupancy, mast[0], mast[1] + 1.2f, mast[2]));
-}
-
 TEST(KnownDepth, IsWhatHasASurface) {
   Dataset data;
   DepthMap map;
