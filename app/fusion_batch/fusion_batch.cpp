@@ -44,7 +44,7 @@ Result<std::string> fuse_one(const std::string& stem, const fs::path& visible_fi
 
 Result<cv::Mat> read_photo(const fs::path& file) {
   ORBITFUSE_ASSIGN(const std::string bytes, read_file(file, max_image_bytes));
-  ORBITFUSE_ASSIGN(const cv::Mat image, read_image(file));
+  ORBITFUSE_ASSIGN(const cv::Mat image, decode_image(bytes, file.string()));
   return apply_orientation(image, read_exif(bytes).orientation);
 }
 

@@ -8,6 +8,7 @@
 
 #include "core/image/image_io.hpp"
 #include "core/image/samples.hpp"
+#include "core/numeric/median.hpp"
 #include "core/temperature.hpp"
 
 namespace orbitfuse {
@@ -28,9 +29,7 @@ Result<FloatTemperatures> float_temperatures(const cv::Mat& values, const std::s
   const char* remedy = "store 100 x kelvin as 16-bit (0 where there is none)";
   if (samples.empty())
     return fail(ErrorKind::input, where, "32-bit floats without one temperature", remedy);
-  const auto middle = samples.begin() + static_cast<std::ptrdiff_t>(samples.size() / 2);
-  std::nth_element(samples.begin(), middle, samples.end());
-  const float median = *middle;
+  const float median = median_in(samples);
   const bool is_kelvin = median >= least_median_k;
   if (median < least_median_c || median > most_k)
     return fail(

@@ -337,14 +337,12 @@ OpenSpace extend_over_ground(const std::vector<DepthView>& views, const LevelPla
     narrow[k] = spread(here, sky_reach_share);
   });
   const Witnesses witnesses(views, smooth, narrow);
-  std::vector<cv::Mat> normals(views.size());  // as they are before they are written to
-  for (std::size_t k = 0; k < views.size(); ++k) normals[k] = maps[k].normal.clone();
   std::vector<OpenSpace> filled(views.size());
   parallel_for(count, [&](int i) {
     const auto k = static_cast<std::size_t>(i);
     const Panorama panorama(views[k].center(), ground, raised);
     Extension extension(views[k], ground, levels, smooth[k], wide[k], narrow[k], known[k],
-                        normals[k], panorama);
+                        maps[k].normal, panorama);
     const Eigen::Vector3f normal = views[k].world_rotation * ground.normal.cast<float>();
     filled[k] = fill(extension, witnesses, known[k], normal, far, k, maps[k]);
   });

@@ -23,6 +23,7 @@ constexpr double asked_correlation_share = 0.75;
 constexpr double own_turn_deg = 8;
 /// Fewer sure views paint nothing to judge others by.
 constexpr std::size_t least_painters = 3;
+
 /// Whether the place found among the temperatures of settled views confirms the view's.
 ViewVerdict in_settled_scene(const OrbitViews& orbit, const RenderAlignedView& view,
                              const RenderAlignedView& second, double median_supports) {
@@ -287,7 +288,7 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
     if (decision == MoveDecision::temperatures_alone)
       check.by_temperatures_alone.emplace_back(lost[c], place.cam_from_world);
     check.moved += decision == MoveDecision::form_alone ? 0 : 1;
-    view.view = PosedView(place);
+    view.view = place;
   }
   return check;
 }

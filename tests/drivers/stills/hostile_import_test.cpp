@@ -15,6 +15,7 @@
 #include "core/image/image_io.hpp"
 #include "drivers/stills/dji_jpeg.hpp"
 #include "drivers/stills/import.hpp"
+#include "tests/drivers/stills/import_files.hpp"
 #include "tests/support/made_files.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -27,17 +28,8 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-class HostileImport : public ::testing::Test {
+class HostileImport : public ImportFiles {
  protected:
-  void put(const std::string& name, const std::string& bytes) const {
-    fs::create_directories((folder / name).parent_path());
-    std::ofstream(folder / name, std::ios::binary) << bytes;
-  }
-  void put_photo(const std::string& name, std::uint64_t seed) const {
-    cv::Mat image(30, 40, CV_8UC3);
-    cv::RNG(seed + 1).fill(image, cv::RNG::UNIFORM, 0, 255);
-    put(name, *encode_jpeg(image, 90));
-  }
   /// Samples around `middle`, different for each seed.
   static cv::Mat counts(double middle, std::uint64_t seed) {
     cv::Mat image(30, 40, CV_16UC1);
@@ -47,13 +39,6 @@ class HostileImport : public ::testing::Test {
   void put_centikelvin(const std::string& name, std::uint64_t seed) const {
     put(name, *encode_tiff(counts(29500, seed), ""));
   }
-  Result<ImportReport> import() const { return import_session(options, folder / "session"); }
-  cv::Mat kelvin_of(const ImportReport& report, std::size_t frame) const {
-    return *read_thermal_k(report.session.path_of(report.session.frames.at(frame)));
-  }
-
-  test::TempFolder folder;
-  ImportOptions options;
 };
 
 TEST_F(HostileImport, GlowingSpotsKeepTheirTemperature) {

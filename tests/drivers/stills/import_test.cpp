@@ -17,6 +17,7 @@
 #include "core/image/image_codec.hpp"
 #include "core/image/image_io.hpp"
 #include "core/system/file_io.hpp"
+#include "tests/drivers/stills/import_files.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -26,22 +27,14 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-class ImportTest : public ::testing::Test {
+class ImportTest : public ImportFiles {
  protected:
-  void put(const std::string& name, const std::string& bytes) const {
-    fs::create_directories((folder / name).parent_path());
-    std::ofstream(folder / name, std::ios::binary) << bytes;
-  }
   void put_photo(const std::string& name) const {
     cv::Mat image(30, 40, CV_8UC3);
     cv::RNG random(std::hash<std::string>{}(name));  // copies are left out
     random.fill(image, cv::RNG::UNIFORM, 0, 255);
     put(name, *encode_jpeg(image, 90));
   }
-  Result<ImportReport> import() const { return import_session(options, folder / "session"); }
-
-  test::TempFolder folder;
-  ImportOptions options;
 };
 
 void append(std::string& to, std::uint32_t value, int bytes) {

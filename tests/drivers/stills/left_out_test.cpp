@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <fstream>
 #include <optional>
 #include <thread>
 
@@ -12,6 +11,7 @@
 #include "core/image/image_codec.hpp"
 #include "core/image/image_io.hpp"
 #include "drivers/stills/import.hpp"
+#include "tests/drivers/stills/import_files.hpp"
 #include "tests/support/made_files.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -24,17 +24,8 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-class LeftOut : public ::testing::Test {
+class LeftOut : public ImportFiles {
  protected:
-  void put(const std::string& name, const std::string& bytes) const {
-    fs::create_directories((folder / name).parent_path());
-    std::ofstream(folder / name, std::ios::binary) << bytes;
-  }
-  void put_photo(const std::string& name, std::uint64_t seed) const {
-    cv::Mat image(30, 40, CV_8UC3);
-    cv::RNG(seed + 1).fill(image, cv::RNG::UNIFORM, 0, 255);
-    put(name, *encode_jpeg(image, 90));
-  }
   void put_counts(const std::string& name, int low, int high, std::uint64_t seed) const {
     cv::Mat image(30, 40, CV_16UC1);
     cv::RNG(seed + 1).fill(image, cv::RNG::UNIFORM, low, high);
@@ -47,16 +38,12 @@ class LeftOut : public ::testing::Test {
           {"in/" + std::to_string(i) + ".jpg", {}, Camera::from_fov(width, height, 50), {}});
     ASSERT_TRUE(write_transforms_json(folder / "transforms.json", transforms));
   }
-  Result<ImportReport> import() const { return import_session(options, folder / "session"); }
   /// The error's words; empty when there is none.
   std::string refusal() const {
     const auto report = import();
     EXPECT_FALSE(report);
     return report ? "" : report.error().message();
   }
-
-  test::TempFolder folder;
-  ImportOptions options;
 };
 
 TEST_F(LeftOut, OfImportsIntoOneFolderOneWinsAndKeepsItsFrames) {

@@ -5,13 +5,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
 #include <limits>
 
 #include "core/image/image_codec.hpp"
 #include "core/image/image_io.hpp"
 #include "drivers/stills/float_temperatures.hpp"
 #include "drivers/stills/import.hpp"
+#include "tests/drivers/stills/import_files.hpp"
 #include "tests/support/made_files.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -24,11 +24,10 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-class ThermalMeaning : public ::testing::Test {
+class ThermalMeaning : public ImportFiles {
  protected:
   void put(const std::string& name, const std::string& bytes) {
-    fs::create_directories((folder / name).parent_path());
-    std::ofstream(folder / name, std::ios::binary) << bytes;
+    ImportFiles::put(name, bytes);
     options.thermal = {folder / "in"};
     fs::remove_all(folder / "session");
   }
@@ -43,16 +42,10 @@ class ThermalMeaning : public ::testing::Test {
     return *encode_tiff(image, "");
   }
   ImportReport import() const {
-    auto report = import_session(options, folder / "session");
+    auto report = ImportFiles::import();
     EXPECT_TRUE(report) << report.error().message();
     return report ? std::move(*report) : ImportReport{};
   }
-  cv::Mat kelvin_of(const ImportReport& report, std::size_t frame) const {
-    return *read_thermal_k(report.session.path_of(report.session.frames.at(frame)));
-  }
-
-  test::TempFolder folder;
-  ImportOptions options;
 };
 
 TEST_F(ThermalMeaning, CentikelvinThatCanHardlyBeIsTold) {
