@@ -4,11 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numeric>
 
 #include "core/system/parallel.hpp"
 #include "recon/poses/global_sfm/center_estimation.hpp"
-#include "recon/poses/sfm/resection.hpp"
+#include "recon/poses/sfm/match_rounds.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -80,90 +79,6 @@ std::vector<RelativePose> chosen_pairs(const FeatureGraph& graph,
   return pairs;
 }
 
-/// The largest set of frames that `edges` connect.
-std::vector<bool> largest_part(int count, const std::vector<ViewPair>& edges) {
-  std::vector<int> part(at(count));
-  std::iota(part.begin(), part.end(), 0);
-  for (bool changed = true; changed;) {
-    changed = false;
-    for (const auto& [a, b] : edges) {
-      const int low = std::min(part[at(a)], part[at(b)]);
-      changed = changed || part[at(a)] != low || part[at(b)] != low;
-      part[at(a)] = part[at(b)] = low;
-    }
-  }
-  std::vector<int> size(at(count), 0);
-  for (const int p : part) ++size[at(p)];
-  const int largest = static_cast<int>(std::max_element(size.begin(), size.end()) - size.begin());
-  std::vector<bool> inside;
-  for (const int p : part) inside.push_back(p == largest);
-  return inside;
-}
-
-/// Frames that hold each other through points: two parts without would have no common scale.
-void keep_connected(const std::vector<FeatureTrack>& tracks, int min_shared, FramePoses& poses) {
-  std::map<ViewPair, int> shared;
-  for (const FeatureTrack& track : tracks)
-    for (std::size_t a = 0; a < track.features.size(); ++a)
-      for (std::size_t b = a + 1; b < track.features.size(); ++b)
-        ++shared[std::minmax(track.features[a].first, track.features[b].first)];
-  std::vector<ViewPair> edges;
-  for (const auto& [pair, count] : shared)
-    if (count >= min_shared) edges.push_back(pair);
-  const std::vector<bool> inside = largest_part(static_cast<int>(poses.size()), edges);
-  for (std::size_t f = 0; f < poses.size(); ++f)
-    if (!inside[f]) poses[f].reset();
-}
-
-/// Matches along the epipolar lines of posed views that look in nearly the same direction: repeated
-/// structure fails Lowe's test against the whole image, not against one line of it.
-void guide(const FeatureGraph& graph, const PosedFrames& posed, double band_px,
-           PairMatches& matches) {
-  constexpr double max_angle_deg = 50;  // beyond, descriptors of one point have little in common
-  std::vector<ViewPair> pairs;
-  for (const ViewPair& pair : exhaustive_pairs(graph.count())) {
-    const auto &a = posed.poses[at(pair.first)], &b = posed.poses[at(pair.second)];
-    if (!a || !b) continue;
-    const double cosine = (a->rotation.conjugate() * Eigen::Vector3d::UnitZ())
-                              .dot(b->rotation.conjugate() * Eigen::Vector3d::UnitZ());
-    if (cosine > std::cos(max_angle_deg * EIGEN_PI / 180)) pairs.push_back(pair);
-  }
-  std::vector<std::vector<FeatureMatch>> found(pairs.size());
-  parallel_for(static_cast<int>(pairs.size()),
-               [&](int p) { found[at(p)] = guided_matches(graph, pairs[at(p)], posed, band_px); });
-  for (std::size_t p = 0; p < pairs.size(); ++p) {
-    // Many fewer than before: the lines are off, not the matches.
-    std::vector<FeatureMatch>& of_pair = matches[pairs[p]];
-    if (2 * found[p].size() >= of_pair.size()) of_pair = std::move(found[p]);
-  }
-}
-
-/// Whether more than the poses speaks for a track: a match of two views that was looked for along
-/// their epipolar lines agrees with any pose they have, so it needs a third view or Lowe's test
-/// against the whole image.
-bool confirmed(const FeatureGraph& graph, const FeatureTrack& track) {
-  if (track.features.size() > 2) return true;
-  const auto& [a, i] = track.features.front();
-  const auto& [b, j] = track.features.back();
-  const auto proposed = graph.proposed.find({a, b});  // features go by frame
-  if (proposed == graph.proposed.end()) return false;
-  const std::vector<FeatureMatch>& matches = proposed->second;
-  return std::find(matches.begin(), matches.end(), FeatureMatch{i, j}) != matches.end();
-}
-
-/// Each frame where the others' points have it.
-void pose_by_others(const FeatureGraph& graph, const PairMatches& matches, PosedFrames& posed) {
-  TrackOptions options;
-  options.max_error_px *= graph.pixel_scale;
-  const std::vector<FeatureTrack> tracks = triangulate_tracks(graph, matches, posed, options);
-  FramePoses moved = posed.poses;
-  parallel_for(graph.count(), [&](int f) {
-    if (!moved[at(f)]) return;
-    if (const auto pose = resect_by_others(graph, tracks, posed, f, {})) moved[at(f)] = pose;
-  });
-  posed.poses = std::move(moved);
-}
-
 /// Averaged rotations and the centres that go with them, of the frames that the pairs connect.
 FramePoses averaged_poses(const AveragedRotations& rotations,
                           const std::vector<Eigen::Vector3d>& centers,
@@ -177,26 +92,6 @@ FramePoses averaged_poses(const AveragedRotations& rotations,
     poses[at(f)] = Rigid3d{q, -(q * centers[at(f)])};
   }
   return poses;
-}
-
-/// Points of the matches, as far as the poses allow `max_error_px` (recorded), adjusted with them.
-Result<Reconstruction> adjusted(const FeatureGraph& graph, const PairMatches& matches,
-                                double max_error_px, int min_shared_points, PosedFrames& posed,
-                                const Adjuster& adjust) {
-  const auto confirmed_tracks = [&] {
-    TrackOptions options;
-    options.max_error_px = max_error_px;
-    std::vector<FeatureTrack> tracks = triangulate_tracks(graph, matches, posed, options);
-    std::erase_if(tracks, [&](const FeatureTrack& track) { return !confirmed(graph, track); });
-    return tracks;
-  };
-  keep_connected(confirmed_tracks(), min_shared_points, posed.poses);
-  Reconstruction model =
-      reconstruction_of(graph, posed, confirmed_tracks(), graph.frames.front()->modality);
-  if (model.views.size() < 2)
-    return fail(ErrorKind::quality, "global mapper", "no two views hold each other",
-                "take views every 30 deg or closer");
-  return adjust(std::move(model));
 }
 
 }  // namespace
@@ -225,9 +120,8 @@ Result<GlobalModel> map_globally(FeatureGraph& graph, const Adjuster& adjust,
     ORBITFUSE_TRY(progress.check("poses.global"));
     const double max_error_px = round_px * graph.pixel_scale;
     const bool guided = round_px <= guided_from_px;
-    if (guided) guide(graph, result.posed, max_error_px, matches);
-    Result<Reconstruction> model =
-        adjusted(graph, matches, max_error_px, options.min_shared_points, result.posed, adjust);
+    if (guided) match_along_lines(graph, result.posed, max_error_px, matches);
+    Result<Reconstruction> model = adjusted(graph, matches, max_error_px, result.posed, adjust);
     if (!model && model.error().kind == ErrorKind::cancelled) return tl::unexpected(model.error());
     if (!model) {
       result.found += "; " + model.error().found;

@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <functional>
 #include <string>
 
 #include "core/progress.hpp"
 #include "recon/poses/global_sfm/rotation_averaging.hpp"
-#include "recon/poses/sfm/tracks.hpp"
+#include "recon/poses/sfm/match_rounds.hpp"
 
 namespace orbitfuse {
-
-/// What bundle adjustment makes of a model: a model of the same frames, or of fewer.
-using Adjuster = std::function<Result<Reconstruction>(Reconstruction)>;
 
 struct GlobalMapperOptions {
   RelativePoseOptions pairs;
@@ -19,8 +15,6 @@ struct GlobalMapperOptions {
   /// Where stations say that the cameras look inwards from an orbit, a pair whose direction leaves
   /// it by more is thrown out: one pillar taken for the next leaves the rotation as it is.
   double max_direction_deg = 35;
-  /// Below this many points in common two frames don't hold each other.
-  int min_shared_points = 15;
 };
 
 struct GlobalModel {

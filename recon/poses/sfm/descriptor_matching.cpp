@@ -33,36 +33,29 @@ bool passes(const Nearest& nearest, const DescriptorMatchOptions& options) {
          (nearest.second < 0 || best < options.max_ratio * angle_rad(nearest.second));
 }
 
-template <class Admits>
-std::vector<FeatureMatch> match_where(const Descriptors& first, const Descriptors& second,
-                                      const DescriptorMatchOptions& options, const Admits& admits) {
-  if (first.rows() == 0 || second.rows() == 0) return {};  // a blank view has none
-  std::vector<Nearest> of_first(static_cast<std::size_t>(first.rows())),
-      of_second(static_cast<std::size_t>(second.rows()));
-  constexpr Eigen::Index block = 64;  // products of a block stay in the cache while they are read
-  Descriptors products;
-  for (Eigen::Index begin = 0; begin < first.rows(); begin += block) {
-    const Eigen::Index rows = std::min(block, first.rows() - begin);
-    products.noalias() = first.middleRows(begin, rows) * second.transpose();
-    for (Eigen::Index r = 0; r < rows; ++r) {
-      Nearest& row = of_first[static_cast<std::size_t>(begin + r)];
-      for (Eigen::Index c = 0; c < second.rows(); ++c) {
-        if (!admits(begin + r, c)) continue;
-        const float product = products(r, c);
-        row.offer(product, static_cast<int>(c));
-        of_second[static_cast<std::size_t>(c)].offer(product, static_cast<int>(begin + r));
-      }
+struct Offers {
+  std::vector<Nearest> of_first, of_second;
+
+  Offers(const Descriptors& first, const Descriptors& second)
+      : of_first(static_cast<std::size_t>(first.rows())),
+        of_second(static_cast<std::size_t>(second.rows())) {}
+
+  void add(Eigen::Index a, Eigen::Index b, float product) {
+    of_first[static_cast<std::size_t>(a)].offer(product, static_cast<int>(b));
+    of_second[static_cast<std::size_t>(b)].offer(product, static_cast<int>(a));
+  }
+
+  std::vector<FeatureMatch> mutual(const DescriptorMatchOptions& options) const {
+    std::vector<FeatureMatch> matches;
+    for (std::size_t i = 0; i < of_first.size(); ++i) {
+      if (!passes(of_first[i], options)) continue;
+      const Nearest& back = of_second[static_cast<std::size_t>(of_first[i].index)];
+      if (back.index == static_cast<int>(i) && passes(back, options))
+        matches.emplace_back(static_cast<int>(i), of_first[i].index);
     }
+    return matches;
   }
-  std::vector<FeatureMatch> matches;
-  for (std::size_t i = 0; i < of_first.size(); ++i) {
-    if (!passes(of_first[i], options)) continue;
-    const Nearest& back = of_second[static_cast<std::size_t>(of_first[i].index)];
-    if (back.index == static_cast<int>(i) && passes(back, options))
-      matches.emplace_back(static_cast<int>(i), of_first[i].index);
-  }
-  return matches;
-}
+};
 
 }  // namespace
 
@@ -73,18 +66,34 @@ double EpipolarBand::distance(Eigen::Index first, Eigen::Index second) const {
 
 std::vector<FeatureMatch> match_descriptors(const Descriptors& first, const Descriptors& second,
                                             const DescriptorMatchOptions& options) {
-  return match_where(first, second, options, [](Eigen::Index, Eigen::Index) { return true; });
+  if (first.rows() == 0 || second.rows() == 0) return {};  // a blank view has none
+  Offers offers(first, second);
+  constexpr Eigen::Index block = 64;  // products of a block stay in the cache while they are read
+  Descriptors products;
+  for (Eigen::Index begin = 0; begin < first.rows(); begin += block) {
+    const Eigen::Index rows = std::min(block, first.rows() - begin);
+    products.noalias() = first.middleRows(begin, rows) * second.transpose();
+    for (Eigen::Index r = 0; r < rows; ++r)
+      for (Eigen::Index c = 0; c < second.rows(); ++c) offers.add(begin + r, c, products(r, c));
+  }
+  return offers.mutual(options);
 }
 
 std::vector<FeatureMatch> match_in_band(const Descriptors& first, const Descriptors& second,
                                         const EpipolarBand& band,
                                         const DescriptorMatchOptions& options) {
-  Eigen::Matrix3Xd lines = band.essential * band.first_rays;
-  for (Eigen::Index i = 0; i < lines.cols(); ++i)
-    lines.col(i) /= std::max(lines.col(i).head<2>().norm(), 1e-12);
-  return match_where(first, second, options, [&](Eigen::Index a, Eigen::Index b) {
-    return std::abs(lines.col(a).dot(band.second_rays.col(b))) <= band.half_width;
-  });
+  if (first.rows() == 0 || second.rows() == 0) return {};
+  Offers offers(first, second);
+  // A band admits about a hundredth of the pairs: only those are multiplied.
+  const Eigen::Matrix<double, Eigen::Dynamic, 3> rays = band.second_rays.transpose();
+  Eigen::VectorXd off(rays.rows());
+  for (Eigen::Index a = 0; a < first.rows(); ++a) {
+    const Eigen::Vector3d line = band.essential * band.first_rays.col(a);
+    off.noalias() = rays * (line / std::max(line.head<2>().norm(), 1e-12));
+    for (Eigen::Index b = 0; b < off.size(); ++b)
+      if (std::abs(off(b)) <= band.half_width) offers.add(a, b, first.row(a).dot(second.row(b)));
+  }
+  return offers.mutual(options);
 }
 
 }  // namespace orbitfuse

@@ -11,39 +11,8 @@
 namespace orbitfuse {
 namespace {
 
+using testing_orbit::described_scene;
 using testing_orbit::FeatureScene;
-using testing_orbit::FeatureSceneMaker;
-
-/// Descriptors of the points (pillars alike), noise added; all matches between neighbours right.
-FeatureScene described_scene() {
-  testing_orbit::FeatureSceneOptions options;
-  options.wrong_pillar = options.false_matches = 0;
-  FeatureScene scene = FeatureSceneMaker(options).make();
-  std::mt19937 rng(3);
-  std::normal_distribution<float> normal(0, 1);
-  const auto random_row = [&] {
-    Eigen::RowVectorXf row(128);
-    for (Eigen::Index c = 0; c < 128; ++c) row(c) = std::abs(normal(rng));
-    return Eigen::RowVectorXf(row.normalized());
-  };
-  std::map<int, Eigen::RowVectorXf> of_point;
-  for (std::size_t v = 0; v < scene.point_of.size(); ++v) {
-    Descriptors& rows = scene.graph.descriptors[v];
-    rows.resize(static_cast<Eigen::Index>(scene.point_of[v].size()), 128);
-    for (std::size_t i = 0; i < scene.point_of[v].size(); ++i) {
-      const int point = scene.point_of[v][i];
-      const int look =
-          point < options.machine_points
-              ? point
-              : options.machine_points + (point - options.machine_points) % options.pillar_points;
-      if (!of_point.contains(look)) of_point[look] = random_row();
-      const Eigen::RowVectorXf noisy = of_point[look] + 0.2f * random_row();
-      rows.row(static_cast<Eigen::Index>(i)) = (512 * noisy.normalized()).array().round();
-    }
-  }
-  scene.graph.verified = scene.graph.proposed;
-  return scene;
-}
 
 PosedFrames posed_but(const FeatureScene& scene, const std::vector<int>& left_out) {
   PosedFrames posed{FramePoses(scene.truth.size()), scene.graph.cameras};
