@@ -42,13 +42,6 @@ constexpr double still_explained = 0.98;
 /// `transformer` lost with 0.68.
 constexpr double more_observations = 1.1;
 
-double observations_a_view(const Reconstruction& model) {
-  std::size_t seen = 0;
-  for (const SparsePoint& point : model.points) seen += point.track.size();
-  return static_cast<double>(seen) /
-         static_cast<double>(std::max<std::size_t>(model.views.size(), 1));
-}
-
 constexpr const char* featureless_why =
     "shows nothing to match (blank, out of focus or overexposed?)";
 
@@ -82,12 +75,12 @@ class VisibleLadder {
     ORBITFUSE_TRY(look_at_features(*quick));
     tell(1, "matches of the orbit's pairs");
     ORBITFUSE_TRY(quick->match(orbit, progress_));
-    ORBITFUSE_TRY(try_settings(*quick, "COLMAP, orbit pairs", mapper_ladder().front()));
+    ORBITFUSE_TRY(try_settings(*quick, quick_name_, mapper_ladder().front()));
     if (!best_ && part_) ORBITFUSE_TRY(try_resection(*quick, "resection on part of a model"));
     if (!best_) ORBITFUSE_TRY(spared(add_faint_features(*quick, orbit)));
     if (!best_) ORBITFUSE_TRY(try_mapper(*quick, quick_name_));
     if (!complete()) ORBITFUSE_TRY(improve(*quick, all_are_few));
-    if (best_) ORBITFUSE_TRY(spared(try_again(*quick)));
+    if (best_) ORBITFUSE_TRY(spared(try_rematching()));
     return answer(quick->pairs());
   }
 
@@ -102,7 +95,7 @@ class VisibleLadder {
     tell(1, "matches of the orbit's pairs");
     ORBITFUSE_TRY(faint.match(orbit, progress_));
     quick = std::move(faint);
-    quick_name_ = "COLMAP, faint features, orbit pairs";
+    quick_name_ = "faint features, orbit pairs";
     return {};
   }
 
@@ -120,7 +113,7 @@ class VisibleLadder {
   /// An attempt that breaks down costs no model that is believed already.
   Status spared(Status done) {
     if (done || !best_ || done.error().kind == ErrorKind::cancelled) return done;
-    steps_.push_back({"a further attempt", false, done.error().message(), 0, total_, 0});
+    steps_.push_back(fallen("a further attempt", done.error().message()));
     return {};
   }
 
@@ -129,7 +122,7 @@ class VisibleLadder {
   }
 
   Result<ModalityPoses> without_features(const Error& error) {
-    steps_.push_back({"COLMAP, orbit pairs", false, error.found, 0, total_, 0});
+    steps_.push_back(fallen("COLMAP, orbit pairs", error.found));
     return none_held(steps_, Modality::visible);
   }
 
@@ -172,30 +165,41 @@ class VisibleLadder {
     return passes_gates(poses, session_, options, why);
   }
 
-  /// Judges a model and keeps it where it is believed and better than the best one.
+  LadderStep fallen(const std::string& attempt, const std::string& why) const {
+    return {.attempt = attempt, .why = why, .total = total_};
+  }
+
+  void record(LadderStep step) {
+    step.seconds = std::chrono::duration<double>(Clock::now() - since_).count();
+    since_ = Clock::now();
+    steps_.push_back(std::move(step));
+  }
+
+  /// Judges a model of the level's features and keeps it where it is believed and better than the
+  /// best one.
   void consider(const std::string& attempt, const std::string& found, Reconstruction model,
-                const PoseOptions& options, const Better& better = more_views) {
-    LadderStep step{attempt, false, found, 0, total_, 0};
+                const FeatureLevel& level, const Better& better = more_views) {
+    LadderStep step = fallen(attempt, found);
     if (model.views.size() < 2) {
       step.why += "; no model";
     } else {
-      Result<JudgedModel> judged = judge_model(std::move(model), session_, frames_, options);
+      Result<JudgedModel> judged =
+          judge_model(std::move(model), session_, frames_, level.options());
       step.why += "; " + (judged ? judged->why : judged.error().found);
       if (judged) step.posed = static_cast<int>(judged->poses.reconstruction.views.size());
       if (judged && judged->believed &&
           (!best_ || better(judged->poses.reconstruction, best_->poses.reconstruction))) {
         best_ = std::move(*judged);
         best_step_ = steps_.size();
+        best_level_ = &level;
       } else if (judged && judged->believed) {
         step.why += "; no better than the model before";
       } else if (judged && (!part_ || more_views(judged->poses.reconstruction, *part_)) &&
-                 only_too_small(*judged, options)) {
+                 only_too_small(*judged, level.options())) {
         part_ = std::move(judged->poses.reconstruction);
       }
     }
-    step.seconds = std::chrono::duration<double>(Clock::now() - since_).count();
-    since_ = Clock::now();
-    steps_.push_back(std::move(step));
+    record(std::move(step));
   }
 
   /// The mapper's default settings, then ever more relaxed ones until a model is believed. A
@@ -213,14 +217,15 @@ class VisibleLadder {
 
   Status try_settings(FeatureLevel& level, const std::string& name,
                       const MapperSettings& settings) {
-    tell(2, name + ", " + settings.name);
+    const std::string attempt = fmt::format("COLMAP, {}, {}", name, settings.name);
+    tell(2, attempt);
     ORBITFUSE_ASSIGN(Reconstruction model, level.map(settings, progress_));
-    consider(name + ", " + settings.name, level.found(), std::move(model), level.options());
+    consider(attempt, level.found(), std::move(model), level);
     return progress_.check("poses.visible");
   }
 
   Status try_global(const FeatureLevel& level, const std::string& name) {
-    const std::string attempt = "global mapper, " + name.substr(name.find(", ") + 2);
+    const std::string attempt = "global mapper, " + name;
     tell(2, attempt);
     ORBITFUSE_ASSIGN(FeatureGraph graph, level.graph());
     // Of matches that two views alone agree on, `sedan`'s relaxed model held .98, that of a walled
@@ -243,7 +248,7 @@ class VisibleLadder {
       return model.views.size() >= best.views.size() &&
              explained_matches(graph, ours) > explained_matches(graph, colmaps);
     };
-    consider(attempt, global.found, std::move(global.model), level.options(), explains_more);
+    consider(attempt, global.found, std::move(global.model), level, explains_more);
     return {};
   }
 
@@ -266,29 +271,32 @@ class VisibleLadder {
       model = reconstruction_of(
           graph, posed, triangulate_tracks(graph, graph.verified, posed, track), Modality::visible);
     }
-    consider(attempt, found, std::move(model), level.options());
+    consider(attempt, found, std::move(model), level);
     return {};
   }
 
-  /// The best model on the matches along its own epipolar lines, where it has few: poses are twice
-  /// as near then.
-  Status try_again(const FeatureLevel& level) {
+  /// The best model on the matches along its own epipolar lines, where it has few.
+  Status try_rematching() {
     const Reconstruction& best = best_->poses.reconstruction;
     const double seen = observations_a_view(best);
     if (seen > plenty_a_view) return {};
-    tell(3, "matches along epipolar lines");
-    ORBITFUSE_ASSIGN(const FeatureGraph graph, level.graph());
-    Reconstruction again = match_again(graph, best);
-    if (observations_a_view(again) < more_observations * seen) return {};
+    const std::string attempt = "matched again along epipolar lines";
+    tell(3, attempt);
+    ORBITFUSE_ASSIGN(const FeatureGraph graph, best_level_->graph());
+    Reconstruction again = rematched(graph, best);
+    ORBITFUSE_TRY(progress_.check("poses.visible"));
     const std::string found =
         fmt::format("{:.0f} observations a view for {:.0f}", observations_a_view(again), seen);
+    if (observations_a_view(again) < more_observations * seen) {
+      record(fallen(attempt, found + "; too little to adjust it for"));
+      return {};
+    }
     const Better no_worse = [&](const Reconstruction& model, const Reconstruction& before) {
       return model.views.size() >= before.views.size() &&
              explained_matches(graph, posed_frames(graph, model)) >=
                  still_explained * explained_matches(graph, posed_frames(graph, before));
     };
-    consider("matched again along epipolar lines", found, std::move(again), level.options(),
-             no_worse);
+    consider(attempt, found, std::move(again), *best_level_, no_worse);
     return {};
   }
 
@@ -308,18 +316,18 @@ class VisibleLadder {
   Status try_more_pairs(FeatureLevel& level) {
     tell(1, "matches of the remaining pairs");
     ORBITFUSE_TRY(level.match(remaining_pairs(), progress_));
-    return map_and_resect(level, "COLMAP, remaining pairs");
+    return map_and_resect(level, "remaining pairs");
   }
 
   Status map_and_resect(FeatureLevel& level, const std::string& name) {
     if (!best_) {
       ORBITFUSE_TRY(try_mapper(level, name));
     } else {
-      tell(2, name);
+      tell(2, "COLMAP, " + name);
       ORBITFUSE_ASSIGN(Reconstruction model, level.map({}, progress_));
-      consider(name, level.found(), std::move(model), level.options());
+      consider("COLMAP, " + name, level.found(), std::move(model), level);
     }
-    if (best_ && !complete()) ORBITFUSE_TRY(try_resection(level, "resection, " + name));
+    if (best_ && !complete()) ORBITFUSE_TRY(try_resection(level, "resection, COLMAP, " + name));
     return {};
   }
 
@@ -327,15 +335,14 @@ class VisibleLadder {
   Status try_full_settings() {
     if (!best_ && total_ > max_exhaustive_views) return {};
     tell(0, "features at full settings");
-    ORBITFUSE_ASSIGN(FeatureLevel full,
-                     FeatureLevel::extract(session_, frames_, at_full_settings(options_),
-                                           workdir_ / "full", progress_));
+    ORBITFUSE_ASSIGN(full_, FeatureLevel::extract(session_, frames_, at_full_settings(options_),
+                                                  workdir_ / "full", progress_));
     std::vector<ViewPair> pairs = remaining_pairs();
     const std::vector<ViewPair> orbit = orbit_pairs(frames_);
     pairs.insert(pairs.end(), orbit.begin(), orbit.end());
     tell(1, "matches at full settings");
-    ORBITFUSE_TRY(full.match(pairs, progress_));
-    return map_and_resect(full, "COLMAP, full settings");
+    ORBITFUSE_TRY(full_->match(pairs, progress_));
+    return map_and_resect(*full_, "full settings");
   }
 
   Result<ModalityPoses> answer(int pairs) {
@@ -364,11 +371,13 @@ class VisibleLadder {
   const Progress& progress_;
   std::vector<LadderStep>& steps_;
   const int total_;
-  std::string quick_name_ = "COLMAP, orbit pairs";
+  std::string quick_name_ = "orbit pairs";
   std::set<std::string> featureless_;
   bool limited_ = false;  ///< images were reduced or features cut off: full settings find others
+  std::optional<FeatureLevel> full_;
   std::optional<JudgedModel> best_;
-  std::optional<Reconstruction> part_;  ///< the largest model that was too small
+  const FeatureLevel* best_level_ = nullptr;  ///< whose features the best model's are
+  std::optional<Reconstruction> part_;        ///< the largest model that was too small
   std::size_t best_step_ = 0;
   Clock::time_point since_ = Clock::now();
 };

@@ -7,12 +7,11 @@
 
 #include "core/system/parallel.hpp"
 #include "recon/poses/global_sfm/center_estimation.hpp"
-#include "recon/poses/sfm/match_rounds.hpp"
+#include "recon/poses/index.hpp"
+#include "recon/poses/sfm/guided_matching.hpp"
 
 namespace orbitfuse {
 namespace {
-
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
 PairCandidates candidates_of(const FeatureGraph& graph, const RelativePoseOptions& options) {
   std::vector<ViewPair> pairs;

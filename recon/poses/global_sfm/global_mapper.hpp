@@ -5,7 +5,7 @@
 
 #include "core/progress.hpp"
 #include "recon/poses/global_sfm/rotation_averaging.hpp"
-#include "recon/poses/sfm/match_rounds.hpp"
+#include "recon/poses/sfm/guided_matching.hpp"
 
 namespace orbitfuse {
 

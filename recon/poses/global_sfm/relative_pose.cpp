@@ -5,11 +5,10 @@
 #include <opencv2/calib3d.hpp>
 
 #include "core/numeric/median.hpp"
+#include "recon/poses/index.hpp"
 
 namespace orbitfuse {
 namespace {
-
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
 struct NormalisedMatches {
   std::vector<cv::Point2d> first, second;

@@ -8,14 +8,13 @@
 
 #include "core/geometry/rotation_vector.hpp"
 #include "core/numeric/median.hpp"
+#include "recon/poses/index.hpp"
 
 namespace orbitfuse {
 namespace {
 
 constexpr double radians = 3.14159265358979323846 / 180.0;
 using Rotations = std::vector<Eigen::Quaterniond>;
-
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
 Eigen::Vector3d log_of(Eigen::Quaterniond q) {
   if (q.w() < 0) q.coeffs() = -q.coeffs();

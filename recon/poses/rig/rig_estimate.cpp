@@ -18,12 +18,11 @@
 #include "recon/alignment/patch_matching.hpp"
 #include "recon/alignment/patch_residual.hpp"
 #include "recon/alignment/render_alignment.hpp"
+#include "recon/poses/index.hpp"
 #include "recon/poses/rig/rig_image.hpp"
 
 namespace orbitfuse {
 namespace {
-
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
 Camera thermal_camera(const Camera& lens, double focal_px, int width) {
   Camera camera = lens;

@@ -59,9 +59,13 @@ struct Offers {
 
 }  // namespace
 
-double EpipolarBand::distance(Eigen::Index first, Eigen::Index second) const {
+Eigen::Vector3d EpipolarBand::line_of(Eigen::Index first) const {
   const Eigen::Vector3d line = essential * first_rays.col(first);
-  return std::abs(line.dot(second_rays.col(second))) / std::max(line.head<2>().norm(), 1e-12);
+  return line / std::max(line.head<2>().norm(), 1e-12);
+}
+
+double EpipolarBand::distance(Eigen::Index first, Eigen::Index second) const {
+  return std::abs(line_of(first).dot(second_rays.col(second)));
 }
 
 std::vector<FeatureMatch> match_descriptors(const Descriptors& first, const Descriptors& second,
@@ -88,8 +92,7 @@ std::vector<FeatureMatch> match_in_band(const Descriptors& first, const Descript
   const Eigen::Matrix<double, Eigen::Dynamic, 3> rays = band.second_rays.transpose();
   Eigen::VectorXd off(rays.rows());
   for (Eigen::Index a = 0; a < first.rows(); ++a) {
-    const Eigen::Vector3d line = band.essential * band.first_rays.col(a);
-    off.noalias() = rays * (line / std::max(line.head<2>().norm(), 1e-12));
+    off.noalias() = rays * band.line_of(a);
     for (Eigen::Index b = 0; b < off.size(); ++b)
       if (std::abs(off(b)) <= band.half_width) offers.add(a, b, first.row(a).dot(second.row(b)));
   }

@@ -25,6 +25,8 @@ struct EpipolarBand {
   Eigen::Matrix3Xd first_rays, second_rays;
   double half_width = 0;  ///< in the second image's normalised plane
 
+  /// The line of a feature of the first image, its normal's length 1.
+  Eigen::Vector3d line_of(Eigen::Index first) const;
   /// Distance of a feature of the second image from the line of one of the first.
   double distance(Eigen::Index first, Eigen::Index second) const;
 };

@@ -8,11 +8,10 @@
 
 #include "core/geometry/rotation_vector.hpp"
 #include "core/system/parallel.hpp"
+#include "recon/poses/index.hpp"
 
 namespace orbitfuse {
 namespace {
-
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
 /// Scene points that a frame's features may show.
 struct Correspondences {

@@ -10,13 +10,12 @@
 
 #include "core/geometry/nearest_to_lines.hpp"
 #include "core/system/parallel.hpp"
+#include "recon/poses/index.hpp"
 
 namespace orbitfuse {
 namespace {
 
 constexpr double degrees = 180.0 / 3.14159265358979323846;
-
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
 /// Sets of features that matches connect.
 class Sets {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/sfm/match_rounds.hpp"
+#include "recon/poses/sfm/guided_matching.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,12 +7,11 @@
 #include <set>
 
 #include "core/system/parallel.hpp"
+#include "recon/poses/index.hpp"
 #include "recon/poses/sfm/resection.hpp"
 
 namespace orbitfuse {
 namespace {
-
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
 /// Frames that hold each other through points: two parts without would have no common scale.
 void keep_connected(const std::vector<FeatureTrack>& tracks, FramePoses& poses) {
@@ -136,7 +135,14 @@ Result<Reconstruction> adjusted(const FeatureGraph& graph, const PairMatches& ma
   return adjust(std::move(model));
 }
 
-Reconstruction match_again(const FeatureGraph& graph, const Reconstruction& model) {
+double observations_a_view(const Reconstruction& model) {
+  std::size_t seen = 0;
+  for (const SparsePoint& point : model.points) seen += point.track.size();
+  return static_cast<double>(seen) /
+         static_cast<double>(std::max<std::size_t>(model.views.size(), 1));
+}
+
+Reconstruction rematched(const FeatureGraph& graph, const Reconstruction& model) {
   const PosedFrames posed = posed_frames(graph, model);
   PairMatches matches = confirmed_matches(graph, posed, again_px * graph.pixel_scale);
   match_along_lines(graph, posed, again_px * graph.pixel_scale, matches);

@@ -33,8 +33,11 @@ void pose_by_others(const FeatureGraph& graph, const PairMatches& matches, Posed
 Result<Reconstruction> adjusted(const FeatureGraph& graph, const PairMatches& matches,
                                 double max_error_px, PosedFrames& posed, const Adjuster& adjust);
 
+/// Of all points together, 0 without a view.
+double observations_a_view(const Reconstruction& model);
+
 /// The model's views, poses and lenses with the points of all matches that its poses find along
 /// their epipolar lines: several times those that two-view geometry held. To be adjusted.
-Reconstruction match_again(const FeatureGraph& graph, const Reconstruction& model);
+Reconstruction rematched(const FeatureGraph& graph, const Reconstruction& model);
 
 }  // namespace orbitfuse
