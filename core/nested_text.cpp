@@ -43,6 +43,19 @@ nlohmann::json parse_json(std::string_view text) {
   return nlohmann::json::parse(text, nullptr, false);
 }
 
+std::string json_fault(std::string_view text) {
+  if (nests_too_deep(text))
+    return fmt::format("lists within lists, more than {} deep", max_nesting);
+  try {
+    if (!nlohmann::json::parse(text).is_discarded()) return {};
+  } catch (const nlohmann::json::exception& error) {
+    // "[json.exception.parse_error.101] parse error at line 3, ...": the place, or the number.
+    const std::string what = error.what();
+    return "not JSON, or cut off: " + what.substr(what.find("] ") + 2);
+  }
+  return {};
+}
+
 Result<std::string> read_toml_text(const std::filesystem::path& file) {
   ORBITFUSE_ASSIGN(std::string text, read_file(file, max_settings_bytes));
   int line = 1, dots = 0;  // since the last sign that ends a key

@@ -20,6 +20,9 @@ bool nests_too_deep(std::string_view json);
 /// Discarded where the text is not JSON, or nests too deep.
 nlohmann::json parse_json(std::string_view text);
 
+/// What keeps text from being read so, and where in it: Python, for one, writes NaN.
+std::string json_fault(std::string_view text);
+
 /// The text of a TOML file of bounded size, for toml::parse, which bounds brackets itself but not
 /// the parts of a dotted key. Input error naming the file and line.
 Result<std::string> read_toml_text(const std::filesystem::path& file);

@@ -3,12 +3,12 @@
 
 #include <fmt/format.h>
 
+#include "app/cli/run_folder.hpp"
 #include "app/pipeline/runner.hpp"
 #include "app/planning/machine_speed.hpp"
 #include "app/planning/run_planner.hpp"
 #include "app/stages/build_stages.hpp"
 #include "core/modality.hpp"
-#include "core/nested_text.hpp"
 #include "core/system/clock.hpp"
 #include "core/system/file_io.hpp"
 
@@ -18,8 +18,6 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 using pipeline::StageState;
 using pipeline::StageStatus;
-
-constexpr const char* run_file = "run.json";
 
 json status_json(const StageStatus& status) {
   json j = {{"stage", status.stage}, {"state", name(status.state)},
@@ -73,87 +71,6 @@ void add_folders(CLI::App& app, StageFolders& folders) {
 
 namespace {
 
-/// run.json of an earlier run's folder; null when there is none.
-Result<json> earlier_run(const std::string& folder) {
-  const fs::path record = fs::path(folder) / run_file;
-  std::error_code unreadable;  // whoever opens the session says why
-  if (folder.empty() || !fs::exists(record, unreadable)) return json();
-  ORBITFUSE_ASSIGN(const std::string text, read_file(record));
-  json run = parse_json(text);
-  if (run.is_discarded())
-    return fail(ErrorKind::input, record.string(), "not JSON, or cut off",
-                "give the session folder and --out");
-  if (!run.is_object() || !run.contains("session") || !run["session"].is_string())
-    return fail(ErrorKind::input, record.string(), "no session named in it",
-                "give the session folder and --out");
-  return run;
-}
-
-}  // namespace
-
-namespace {
-
-/// The session's own folder, or one for its images.
-bool lies_among_frames(const fs::path& out, const fs::path& session) {
-  std::error_code unreadable;  // whoever opens the session says why
-  if (!fs::exists(session / "manifest.jsonl", unreadable)) return false;
-  const fs::path inside = fs::weakly_canonical(out, unreadable)
-                              .lexically_relative(fs::weakly_canonical(session, unreadable));
-  return inside == "." || (!inside.empty() && (*inside.begin() == name(Modality::visible) ||
-                                               *inside.begin() == name(Modality::thermal)));
-}
-
-/// Whether a call that ended like this is gone on with. What made one fail must not make the next
-/// one fail too, which doesn't name it.
-bool keeps_options(ErrorKind kind) {
-  return kind == ErrorKind::cancelled || kind == ErrorKind::quality;
-}
-
-}  // namespace
-
-Result<std::optional<std::uint64_t>> read_earlier_options(const std::string& folder,
-                                                          config::Settings& settings) {
-  ORBITFUSE_ASSIGN(const json run, earlier_run(folder));
-  if (run.is_null()) return std::nullopt;
-  const std::string file = (fs::path(folder) / run_file).string();
-  const auto broken = [&](const char* key, const char* wanted) {
-    return fail(ErrorKind::input, file, fmt::format("{} = {}", key, run[key].dump()),
-                fmt::format("it must be {}; or give the session folder and --out", wanted));
-  };
-  if (run.contains("config")) {
-    if (!run["config"].is_object()) return broken("config", "a table of settings");
-    ORBITFUSE_TRY(settings.read_json(run["config"], file).map_error([](Error error) {
-      error.kind = ErrorKind::input;  // the user didn't write it
-      return error;
-    }));
-  }
-  if (!run.contains("seed")) return std::nullopt;
-  if (!run["seed"].is_number_unsigned()) return broken("seed", "an integer of at least 0");
-  return run["seed"].get<std::uint64_t>();
-}
-
-Status resolve(StageFolders& folders) {
-  if (folders.session.empty())
-    return fail(ErrorKind::usage, "session", "none given",
-                "name a session folder, e.g. replay_data/car");
-  ORBITFUSE_ASSIGN(const json run, earlier_run(folders.session));
-  // run.json and the records of the stages are JSON and name both folders.
-  for (const std::string& folder : {folders.session, folders.out}) {
-    if (!config::is_utf8(folder))
-      return fail(ErrorKind::usage, folder, "its name is not UTF-8", "rename the folder");
-  }
-  if (!run.is_null()) {
-    if (folders.out == StageFolders{}.out) folders.out = folders.session;
-    folders.session = run["session"];
-  }
-  if (lies_among_frames(folders.out, folders.session))
-    return fail(ErrorKind::usage, "--out " + folders.out, "holds the session itself",
-                "choose another folder");
-  return {};
-}
-
-namespace {
-
 /// What run.json says of a plan: the budget, and the user's values of the keys that it sets.
 struct PlannedBefore {
   double budget_s = 0;
@@ -188,6 +105,12 @@ Status take_back_plan(Context& context, const std::string& folder, const Planned
     }
   context.given.insert(before.given.begin(), before.given.end());
   return context.config.validate();
+}
+
+/// Whether a call that ended like this is gone on with. What made one fail must not make the next
+/// one fail too, which doesn't name it.
+bool keeps_options(ErrorKind kind) {
+  return kind == ErrorKind::cancelled || kind == ErrorKind::quality;
 }
 
 /// One call of run_stages() or run_planned().
@@ -225,12 +148,11 @@ Status StagedRun::open(const std::vector<std::string>& targets) {
   ORBITFUSE_ASSIGN(input_, stages::open_session_input(folders_.session, context_.progress));
   for (const std::string& warning : input_.session.warnings) context_.console.warning(warning);
   session_ = fs::absolute(folders_.session).lexically_normal().string();
-  if (const auto earlier = earlier_run(folders_.out);
-      earlier && !earlier->is_null() && (*earlier)["session"] != session_)
+  if (const auto other = other_session(folders_.out, folders_.session))
     context_.console.warning(
         fmt::format("{} holds results of {}: what this run doesn't reach stays that session's; "
                     "give each session an --out of its own",
-                    folders_.out, (*earlier)["session"].get<std::string>()));
+                    folders_.out, *other));
   if (missing_ == Missing::leave_out && pipeline::finished_stages(folders_.out).empty())
     return fail(
         ErrorKind::input, folders_.out, "no finished stage in it",

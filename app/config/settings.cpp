@@ -6,6 +6,7 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
+#include <sstream>
 
 #include "core/near_word.hpp"
 #include "core/nested_text.hpp"
@@ -32,16 +33,45 @@ struct Entry {
   std::string key;
   json value;
   unsigned line = 0;
+  std::string written;  ///< as TOML: dates and NaN are no JSON
 };
 
-void flatten(const toml::table& table, const std::string& prefix, std::vector<Entry>& entries) {
+std::string written_as(const toml::node& node) {
+  if (node.is_table()) return "a table";
+  std::ostringstream text;
+  node.visit([&](const auto& value) { text << value; });
+  return text.str();
+}
+
+/// Tables are walked through, but not those where a value is expected, nor the empty ones, whose
+/// names nothing else would look at.
+void flatten(const toml::table& table, const std::string& prefix,
+             const std::vector<Setting>& settings, std::vector<Entry>& entries) {
   for (const auto& [key, node] : table) {
     const std::string path = prefix + std::string(key.str());
-    if (const toml::table* inner = node.as_table())
-      flatten(*inner, path + ".", entries);
+    const bool is_value = std::any_of(settings.begin(), settings.end(),
+                                      [&](const Setting& s) { return s.key == path; });
+    const toml::table* inner = node.as_table();
+    if (inner && !inner->empty() && !is_value)
+      flatten(*inner, path + ".", settings, entries);
     else
-      entries.push_back({path, json_of(node), static_cast<unsigned>(node.source().begin.line)});
+      entries.push_back(
+          {path, json_of(node), static_cast<unsigned>(node.source().begin.line), written_as(node)});
   }
+}
+
+bool is_table(const std::string& key, const std::vector<Setting>& settings) {
+  return std::any_of(settings.begin(), settings.end(),
+                     [&](const Setting& s) { return s.key.starts_with(key + "."); });
+}
+
+/// "integer" is what a reference lists; a sentence has an article.
+std::string wanted(const Setting& setting, const json& value) {
+  if (setting.type == "integer")
+    return value.is_number_integer() ? "an integer nearer to 0" : "an integer";
+  if (setting.type.starts_with("number")) return "a " + setting.type;
+  if (setting.type == "list") return "a list of texts, e.g. [\"heat\", \"best\"]";
+  return setting.type;
 }
 
 std::string toml_text(const json& value) {
@@ -91,6 +121,12 @@ std::string nearest(const std::string& word, const std::vector<std::string>& kno
 Status Settings::set(const std::string& key, const json& value, const std::string& where) {
   const auto it =
       std::find_if(list_.begin(), list_.end(), [&](const Setting& s) { return s.key == key; });
+  if (it == list_.end() && is_table(key, list_))
+    return fail(ErrorKind::usage, where, fmt::format("{} = {}", key, value.dump()),
+                fmt::format("{} is a table of settings: give one of them, e.g. {}", key,
+                            std::find_if(list_.begin(), list_.end(), [&](const Setting& s) {
+                              return s.key.starts_with(key + ".");
+                            })->key));
   if (it == list_.end()) {
     std::vector<std::string> known;
     for (const Setting& s : list_) known.push_back(s.key);
@@ -99,9 +135,10 @@ Status Settings::set(const std::string& key, const json& value, const std::strin
         ErrorKind::usage, where, "unknown key '" + key + "'",
         guess.empty() ? "config/orbitfuse.toml lists every key" : "did you mean '" + guess + "'?");
   }
-  if (!it->set(value))
+  // An integer beyond the field's range wraps.
+  if (!it->set(value) || (it->type == "integer" && it->get() != value))
     return fail(ErrorKind::usage, where, fmt::format("{} = {}", key, value.dump()),
-                "it must be " + it->type);
+                "it must be " + wanted(*it, value));
   return {};
 }
 
@@ -110,7 +147,7 @@ Status Settings::read_toml(const std::filesystem::path& file) {
   std::vector<Entry> entries;
   try {
     const toml::table table = toml::parse(text, file.string());
-    flatten(table, "", entries);
+    flatten(table, "", list_, entries);
   } catch (const toml::parse_error& e) {
     return fail(ErrorKind::usage, fmt::format("{}:{}", file.string(), e.source().begin.line),
                 std::string(e.description()),
@@ -120,7 +157,12 @@ Status Settings::read_toml(const std::filesystem::path& file) {
   std::stable_partition(entries.begin(), entries.end(),
                         [](const Entry& e) { return e.key.ends_with(".preset"); });
   for (const Entry& e : entries) {
-    ORBITFUSE_TRY(set(e.key, e.value, fmt::format("{}:{}", file.string(), e.line)));
+    if (e.value.is_null() && e.written == "a table" && is_table(e.key, list_)) continue;  // empty
+    const std::string where = fmt::format("{}:{}", file.string(), e.line);
+    ORBITFUSE_TRY(set(e.key, e.value, where).map_error([&](Error error) {
+      if (error.found.starts_with(e.key + " = ")) error.found = e.key + " = " + e.written;
+      return error;
+    }));
     given_.insert(e.key);
   }
   return {};

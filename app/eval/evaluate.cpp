@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <set>
 
 #include "app/eval/image_error.hpp"
 #include "app/pipeline/stage_record.hpp"
@@ -31,18 +33,35 @@ std::string base_name(const FrameRecord& frame) {
   return fs::path(frame.source.empty() ? frame.file : frame.source).filename().string();
 }
 
+/// The truth of one modality's station frames by their names; null where several share a name, in
+/// the session or in the truth: no pose is better than another one's.
+using KnownViews = std::map<std::string, const TrueView*>;
+
+KnownViews known_views(const Session& session, Modality modality,
+                       const std::vector<TrueView>& truth) {
+  KnownViews known;
+  for (const TrueView& view : truth) {
+    const auto [at, fresh] = known.try_emplace(fs::path(view.name).filename().string(), &view);
+    if (!fresh) at->second = nullptr;
+  }
+  std::set<std::string> names;
+  for (const FrameRecord* frame : session.frames_of(modality, false)) {
+    const auto at = known.find(base_name(*frame));
+    if (!names.insert(base_name(*frame)).second && at != known.end()) at->second = nullptr;
+  }
+  return known;
+}
+
 /// Pairs of estimated and true poses of one modality's station frames.
 std::vector<PosePair> match(const Session& session, const Reconstruction& model,
-                            const std::vector<TrueView>& truth) {
+                            const KnownViews& truth) {
   std::vector<PosePair> pairs;
   for (const FrameRecord* frame : session.frames_of(model.modality, false)) {
     const auto posed = std::find_if(model.views.begin(), model.views.end(),
                                     [&](const PosedView& v) { return v.name == frame->file; });
-    const auto known = std::find_if(truth.begin(), truth.end(), [&](const TrueView& v) {
-      return fs::path(v.name).filename() == base_name(*frame);
-    });
-    if (posed != model.views.end() && known != truth.end())
-      pairs.push_back({posed->cam_from_world, known->cam_from_world});
+    const auto known = truth.find(base_name(*frame));
+    if (posed != model.views.end() && known != truth.end() && known->second != nullptr)
+      pairs.push_back({posed->cam_from_world, known->second->cam_from_world});
   }
   return pairs;
 }
@@ -80,7 +99,11 @@ Status add_poses(Run& run, const Session& session, const GroundTruth& truth, Mod
     return {};
   }
   ORBITFUSE_ASSIGN(const Reconstruction model, stages::load_poses(run.out / stage, modality));
-  pairs = match(session, model, views->second);
+  const KnownViews known = known_views(session, modality, views->second);
+  for (const auto& [file, view] : known)
+    if (view == nullptr)
+      run.note(fmt::format("{}: {} is there more than once, and left out", stage, file));
+  pairs = match(session, model, known);
   const auto fit = truth_from_estimate(pairs);
   if (!fit) {
     run.note(stage + ": " + fit.error().message());
@@ -113,7 +136,8 @@ Status add_registration(Run& run, const Session& session, const GroundTruth& tru
   const fs::path trained = run.out / "train_thermal";
   if (!run.done("train_thermal") || !fs::exists(trained / "model")) return {};
   ORBITFUSE_ASSIGN(const Reconstruction model, stages::load_poses(trained, Modality::thermal));
-  const std::vector<PosePair> refined = match(session, model, truth.views.at(Modality::thermal));
+  const std::vector<PosePair> refined = match(
+      session, model, known_views(session, Modality::thermal, truth.views.at(Modality::thermal)));
   run.result["registration_refined"] =
       to_json(pose_error(refined, truth_from_thermal), thermal.size());
   return {};
@@ -124,10 +148,21 @@ struct Sums {
   int visible = 0, thermal = 0;
 };
 
-cv::Mat resized(const cv::Mat& image, const Camera& camera) {
-  cv::Mat result = image;
-  if (image.cols != camera.width)
-    cv::resize(image, result, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
+/// A true view's image at the size of a camera narrowed from its own; of other proportions than
+/// that one it is another camera's.
+Result<cv::Mat> true_image(const fs::path& file, Samples samples, const Camera& own,
+                           const Camera& camera) {
+  ORBITFUSE_ASSIGN(cv::Mat image, field_image(file, samples));
+  const double skew = std::abs(static_cast<double>(image.cols) * own.height -
+                               static_cast<double>(image.rows) * own.width);
+  if (skew > std::max(own.width, own.height))
+    return fail(ErrorKind::input, file.string(),
+                fmt::format("{}x{} pixels", image.cols, image.rows),
+                fmt::format("test.K of the truth is for {}x{}: give those of one camera", own.width,
+                            own.height));
+  if (image.cols == camera.width && image.rows == camera.height) return image;
+  cv::Mat result;
+  cv::resize(image, result, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
   return result;
 }
 
@@ -147,9 +182,10 @@ Status compare_visible(DetailedField& shown, const TrueTestView& view, const Cam
                        const Rigid3d& cam_from_visible, const Progress& progress, Sums& sums) {
   ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
                    shown.render(camera, cam_from_visible, {}, progress));
-  ORBITFUSE_ASSIGN(const cv::Mat truth, field_image(view.visible, Samples::color));
+  ORBITFUSE_ASSIGN(const cv::Mat truth,
+                   true_image(view.visible, Samples::color, view.camera, camera));
   cv::Mat truth8, seen8;
-  resized(truth, camera).convertTo(truth8, CV_8U, 255);
+  truth.convertTo(truth8, CV_8U, 255);
   seen.color.convertTo(seen8, CV_8U, 255);
   sums.visible_psnr += psnr_db(seen8, truth8, 255);
   ++sums.visible;
@@ -160,10 +196,11 @@ Status compare_thermal(DetailedField& shown, const TrueTestView& view, const Cam
                        const Rigid3d& cam_from_thermal, const EvaluateOptions& options,
                        const Progress& progress, Sums& sums) {
   ORBITFUSE_ASSIGN(nerf::RenderedView seen, shown.render(camera, cam_from_thermal, {}, progress));
-  ORBITFUSE_ASSIGN(const cv::Mat truth, field_image(view.thermal, Samples::kelvin));
+  ORBITFUSE_ASSIGN(const cv::Mat truth,
+                   true_image(view.thermal, Samples::kelvin, view.camera, camera));
   seen.color.setTo(std::nanf(""), seen.opacity < options.min_opacity);
-  const ThermalViewError error = thermal_view_error(seen.color, resized(truth, camera),
-                                                    kelvin_from_celsius(options.scene_above_c));
+  const ThermalViewError error =
+      thermal_view_error(seen.color, truth, kelvin_from_celsius(options.scene_above_c));
   if (!std::isfinite(error.mae_k)) return {};
   sums.mae_k += error.mae_k;
   sums.covered += error.covered;

@@ -6,6 +6,7 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
+#include "app/pipeline/out_folder.hpp"
 #include "app/stages/artifacts.hpp"
 #include "app/stages/recorded_detail.hpp"
 #include "core/formats/colmap_model.hpp"
@@ -169,14 +170,22 @@ Status write_pairs(const fs::path& folder, const view::FinishedRun& run, const E
 
 }  // namespace
 
-Result<PairSet> write_dataset(const fs::path& folder, const view::FinishedRun& run,
-                              const ExportFrame& frame, const DatasetOptions& options,
-                              const Progress& progress) {
+Status check_dataset_folder(const fs::path& folder) {
   std::error_code error;
   if (fs::exists(folder, error) &&
       !(fs::is_directory(folder, error) && fs::is_empty(folder, error)))
     return fail(ErrorKind::usage, "--dataset", "'" + folder.string() + "' is there already",
                 "choose a new folder");
+  return pipeline::check_out_folder(folder);
+}
+
+Result<PairSet> write_dataset(const fs::path& given, const view::FinishedRun& run,
+                              const ExportFrame& frame, const DatasetOptions& options,
+                              const Progress& progress) {
+  ORBITFUSE_TRY(check_dataset_folder(given));
+  // Written beside it first, which "pairs/" would put inside.
+  const fs::path folder = given.has_filename() ? given : given.parent_path();
+  std::error_code error;
   if (!run.has(Modality::visible) || !run.has(Modality::thermal))
     return fail(ErrorKind::input, run.out.string(), "not both fields",
                 "pairs need a visible and a thermal orbit that are registered");

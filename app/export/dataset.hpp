@@ -24,6 +24,10 @@ struct PairSet {
   std::string described;
 };
 
+/// What would keep write_dataset() from writing there, found before the work: a folder that is not
+/// empty (usage), or can't be made (as pipeline::check_out_folder).
+Status check_dataset_folder(const std::filesystem::path& folder);
+
 /// Pixel-aligned visible and thermal pairs for training other methods, in one folder that three
 /// kinds of tools read as it is (docs/export.md): transforms.json with images/ and
 /// thermal/ (nerfstudio, ThermoNeRF with temperature_bounds.json), sparse/0 (COLMAP) and

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 
 #include "core/image/exif.hpp"
@@ -15,10 +16,26 @@ namespace orbitfuse::batch {
 namespace {
 namespace fs = std::filesystem;
 
-std::map<std::string, fs::path> files_by_stem(const fs::path& folder) {
+/// No file where several have a stem: they would be written over each other.
+Result<std::map<std::string, fs::path>> files_by_stem(const fs::path& folder,
+                                                      std::vector<std::string>& problems) {
+  std::error_code error, no_file;
+  std::map<std::string, std::vector<fs::path>> all;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    const bool sidecar = at->path().extension() == ".json";  // of a thermal TIFF
+    if (!sidecar && at->is_regular_file(no_file)) all[at->path().stem().string()].push_back(*at);
+  }
+  if (error)
+    return fail(ErrorKind::input, folder.string(), error.message(),
+                "give two folders, or two images");
   std::map<std::string, fs::path> files;
-  for (const auto& entry : fs::directory_iterator(folder))
-    if (entry.is_regular_file()) files[entry.path().stem().string()] = entry.path();
+  for (auto& [stem, list] : all) {
+    std::sort(list.begin(), list.end());
+    files[stem] = list.size() == 1 ? list.front() : fs::path();
+    if (list.size() > 1)
+      problems.push_back(fmt::format("{}: {} is another image of that name; left out",
+                                     list[0].string(), list[1].filename().string()));
+  }
   return files;
 }
 
@@ -53,6 +70,12 @@ Result<cv::Mat> read_thermal(const fs::path& file) {
   return image.type() == CV_16UC1 ? read_thermal_k(file) : read_photo(file);
 }
 
+Error with_file(Error error, const std::map<std::string, std::string>& files) {
+  const auto named = files.find(error.where);
+  if (named != files.end()) error.where += " " + named->second;
+  return error;
+}
+
 Result<cv::Mat> gray_of_thermal(const cv::Mat& thermal,
                                 const std::optional<TemperatureSpan>& span) {
   if (thermal.depth() != CV_32F) return thermal;
@@ -64,13 +87,17 @@ Result<cv::Mat> gray_of_thermal(const cv::Mat& thermal,
 
 Result<Summary> fuse_folder(const fs::path& visible, const fs::path& thermal, const fs::path& out,
                             const FusionOptions& options, const Progress& progress) {
+  std::error_code unreadable;
   for (const fs::path& folder : {visible, thermal})
-    if (!fs::is_directory(folder))
+    if (!fs::is_directory(folder, unreadable))
       return fail(ErrorKind::input, folder.string(), "not a folder",
                   "give two folders, or two images");
-  const auto thermal_files = files_by_stem(thermal);
-  const auto visible_files = files_by_stem(visible);
   Summary summary;
+  ORBITFUSE_ASSIGN(const auto thermal_files, files_by_stem(thermal, summary.problems));
+  ORBITFUSE_ASSIGN(const auto visible_files, files_by_stem(visible, summary.problems));
+  for (const auto& [stem, file] : thermal_files)
+    if (!visible_files.contains(stem))
+      summary.problems.push_back(file.string() + ": no visible image of that name");
   std::string csv = "pair,method,metric,value\n";
   int done = 0;
   for (const auto& [stem, file] : visible_files) {
@@ -78,6 +105,7 @@ Result<Summary> fuse_folder(const fs::path& visible, const fs::path& thermal, co
     progress.report(
         {"fuse", static_cast<double>(done++), static_cast<double>(visible_files.size()), {}, stem});
     const auto partner = thermal_files.find(stem);
+    if (file.empty() || (partner != thermal_files.end() && partner->second.empty())) continue;
     if (partner == thermal_files.end()) {
       summary.problems.push_back(file.string() + ": no thermal image of that name");
       continue;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -28,9 +29,13 @@ Result<cv::Mat> read_thermal(const std::filesystem::path& file);
 /// else as it is.
 Result<cv::Mat> gray_of_thermal(const cv::Mat& thermal, const std::optional<TemperatureSpan>& span);
 
+/// An error of fuse() or fusion_metrics() that names one of the images, with that image's file.
+Error with_file(Error error, const std::map<std::string, std::string>& files);
+
 /// Fuses the images of equal stem in two folders into out/vi, out/ir and out/fused (all PNG, equal
 /// names: the aligned-pairs layout that fusion networks train on) and writes out/metrics.csv. A bad
-/// pair is told and left out. Input error when no pair could be fused.
+/// pair, a stem that several images of a folder share and one without a partner are told and left
+/// out. Input error when no pair could be fused.
 Result<Summary> fuse_folder(const std::filesystem::path& visible,
                             const std::filesystem::path& thermal, const std::filesystem::path& out,
                             const FusionOptions& options, const Progress& progress);

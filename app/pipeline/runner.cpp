@@ -8,6 +8,7 @@
 #include <set>
 
 #include "app/pipeline/folder_lock.hpp"
+#include "app/pipeline/out_folder.hpp"
 #include "core/nested_text.hpp"
 #include "core/system/clock.hpp"
 #include "core/system/file_io.hpp"
@@ -340,13 +341,14 @@ StageStatus Runner::execute(const Stage& stage, const Key& key, std::string why)
 RunSummary Runner::run() {
   RunSummary summary;
   FolderLock lock;
-  if (!options_.dry_run) {
-    Status locked = make_folder(options_.out);
-    if (locked) locked = lock.acquire(options_.out / ".lock");
-    if (!locked) {
-      summary.error = locked.error();
-      return summary;
-    }
+  Status ready = check_out_folder(options_.out);
+  if (ready && !options_.dry_run) {
+    ready = make_folder(options_.out);
+    if (ready) ready = lock.acquire(options_.out / ".lock");
+  }
+  if (!ready) {
+    summary.error = ready.error();
+    return summary;
   }
   for (Stage& stage : stages_) {
     if (!wanted(stage.name)) continue;

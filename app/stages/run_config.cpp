@@ -179,7 +179,12 @@ void add_fuse(Settings& settings, FuseConfig& fuse) {
 Result<std::vector<FusionMethod>> FuseConfig::chosen() const {
   std::vector<FusionMethod> result;
   for (const std::string& name : methods) {
-    ORBITFUSE_ASSIGN(const FusionMethod method, fusion_method(name));
+    ORBITFUSE_ASSIGN(const FusionMethod method, fusion_method(name).map_error([](Error error) {
+      error.where = "fuse.methods";
+      return error;
+    }));
+    if (std::count(result.begin(), result.end(), method) > 0)
+      return fail(ErrorKind::usage, "fuse.methods", "'" + name + "' twice", "name each once");
     result.push_back(method);
   }
   if (result.empty())

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <set>
 
+#include "app/cli/option_pairs.hpp"
 #include "capture/mat/mat_finder.hpp"
 
 namespace orbitfuse::cli {
@@ -86,18 +87,22 @@ Result<recording::Cameras> cameras_of(const CaptureOptions& o) {
     return fail(ErrorKind::input, "--profiles " + o.profiles, "no such folder",
                 "name a folder of camera profiles");
   recording::Cameras cameras;
+  bool any_profile = false;
   for (const Modality modality : {Modality::visible, Modality::thermal}) {
     const std::string& own = modality == Modality::visible ? o.visible : o.thermal;
     const std::string& text = own.empty() ? o.driver : own;
     if (text.empty()) continue;
     ORBITFUSE_ASSIGN(const recording::CameraSpec spec, recording::parse_camera_spec(text));
     ORBITFUSE_TRY(check_watched(spec, o.session));
+    any_profile = any_profile || spec.driver == "aravis";
     ORBITFUSE_TRY(recording::add_cameras(spec, modality, o.profiles, cameras));
   }
   if (cameras.sources.empty()) {
     return fail(ErrorKind::usage, "cameras", "none named",
                 "give --visible, --thermal or --driver (orbitfuse devices lists them)");
   }
+  ORBITFUSE_TRY(
+      check_needs({{"--profiles", !o.profiles.empty(), "a camera of aravis", any_profile}}));
   return cameras;
 }
 

@@ -3,6 +3,7 @@
 
 #include "app/cli/verb.hpp"
 #include "app/comparison/comparison_files.hpp"
+#include "app/pipeline/out_folder.hpp"
 #include "app/pipeline/stage_record.hpp"
 
 namespace orbitfuse::cli {
@@ -51,6 +52,7 @@ Status run(Context& context, const Options& o) {
     if (pipeline::lies_in_a_stage(run, o.out))
       return fail(ErrorKind::usage, "--out", "'" + o.out + "', inside of a stage of " + run,
                   "name a new folder");
+  ORBITFUSE_TRY(pipeline::check_out_folder(o.out));
   if (context.common.dry_run) {
     ORBITFUSE_TRY(check_comparable(o.before, o.after, context.config, request, context.progress));
     context.console.info(

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "app/cli/run_folder.hpp"
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
 #include "app/eval/evaluate.hpp"
@@ -51,8 +52,13 @@ Status run(Context& context, Options& o) {
   ORBITFUSE_TRY(resolve(o.folders));
   ORBITFUSE_ASSIGN(const Session session, open_session(o.folders.session));
   ORBITFUSE_ASSIGN(const GroundTruth truth, read_ground_truth(o.truth));
-  if (!std::filesystem::is_directory(o.folders.out))
+  std::error_code unreadable;
+  if (!std::filesystem::is_directory(o.folders.out, unreadable))
     return fail(ErrorKind::input, o.folders.out, "no such folder", "run the session first");
+  if (const auto other = other_session(o.folders.out, o.folders.session))
+    context.console.warning(
+        fmt::format("{} holds results of {}, not of {}: frames are told by name", o.folders.out,
+                    *other, o.folders.session));
   ORBITFUSE_ASSIGN(const json result,
                    eval::evaluate(o.folders.out, session, truth, o.evaluate, context.progress));
   if (!result.contains("poses_visible") && !result.contains("poses_thermal"))

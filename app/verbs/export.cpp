@@ -3,12 +3,14 @@
 
 #include <charconv>
 
+#include "app/cli/option_pairs.hpp"
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
 #include "app/export/dataset.hpp"
 #include "app/export/find_scale.hpp"
 #include "app/export/mat_scale.hpp"
 #include "app/export/surface_files.hpp"
+#include "app/pipeline/out_folder.hpp"
 #include "app/pipeline/stage_record.hpp"
 
 namespace orbitfuse::cli {
@@ -46,13 +48,8 @@ Result<std::vector<double>> numbers(const char* option, const std::string& word,
 Result<SurfaceRequest> request_of(const Options& o) {
   SurfaceRequest request;
   if (o.triangles) request.surface.surface.triangles = *o.triangles;
-  if (o.whole && !o.crop_box.empty())
-    return fail(ErrorKind::usage, "--whole", "together with --crop-box", "choose one of them");
   if (o.whole) request.crop = Crop::whole;
   request.surface.surface.without_ground = o.without_ground;
-  if (o.ground_clearance && !o.without_ground)
-    return fail(ErrorKind::usage, "--ground-clearance", "no --without-ground beside it",
-                "give both, or none");
   if (o.ground_clearance) request.surface.surface.ground_clearance = *o.ground_clearance;
   if (!o.crop_box.empty()) {
     ORBITFUSE_ASSIGN(const auto v,
@@ -105,11 +102,6 @@ Result<std::optional<stages::MetricScale>> scale_of(Context& context, const Opti
   if (told > 1)
     return fail(ErrorKind::usage, "--distance, --mat or --known-poses", "more than one of them",
                 "tell the scale in one way");
-  if (o.mat_tags && o.mat.empty())
-    return fail(ErrorKind::usage, "--mat-tags", "no --mat beside it", "tell its side: --mat 0.6m");
-  if (!o.pose_error.empty() && !o.known_poses)
-    return fail(ErrorKind::usage, "--pose-error", "no --known-poses beside it",
-                "give both, or none");
   if (told == 0) return stages::load_metric_scale(o.out, world);
   const auto found = [&]() -> Result<stages::MetricScale> {
     if (o.known_poses) {
@@ -190,14 +182,39 @@ Status check_target(const fs::path& out, const fs::path& file) {
   if (pipeline::lies_in_a_stage(out, file))
     return fail(ErrorKind::usage, "--to", "'" + file.string() + "', inside of a stage of the run",
                 "write it elsewhere, e.g. to " + (out / "export").string());
-  return {};
+  return pipeline::check_out_file(file);
+}
+
+/// Options that another one would have passed over in silence.
+Status check_pairs(const Options& o) {
+  const bool surface = o.dataset.empty() || !o.files.empty();
+  const bool ply = std::any_of(o.files.begin(), o.files.end(), [](const std::string& file) {
+    return fs::path(file).extension() == ".ply";
+  });
+  ORBITFUSE_TRY(check_apart({{"--whole", o.whole, "--crop-box", !o.crop_box.empty()}}));
+  return check_needs({
+      {"--ground-clearance", o.ground_clearance.has_value(), "--without-ground", o.without_ground},
+      {"--mat-tags", o.mat_tags.has_value(), "--mat", !o.mat.empty()},
+      {"--pose-error", !o.pose_error.empty(), "--known-poses", o.known_poses},
+      {"--palette", !o.palette.empty(), "--colors temperature", o.colors == "temperature"},
+      {"--flavour", o.flavour != "plain", "a PLY file to write (--to)", ply},
+      {"--points", o.points, "a PLY file to write (--to)", ply},
+      {"--poses", o.poses != "recorded", "--dataset", !o.dataset.empty()},
+      {"--triangles", o.triangles.has_value(), "--to beside --dataset", surface},
+      {"--crop-box", !o.crop_box.empty(), "--to beside --dataset", surface},
+      {"--whole", o.whole, "--to beside --dataset", surface},
+      {"--without-ground", o.without_ground, "--to beside --dataset", surface},
+      {"--colors", o.colors != "visible", "--to beside --dataset", surface},
+  });
 }
 
 Status run(Context& context, const Options& o) {
+  ORBITFUSE_TRY(check_pairs(o));
   std::vector<fs::path> files(o.files.begin(), o.files.end());
   if (files.empty() && o.dataset.empty())
     files.push_back(fs::path(o.out) / "export" / "surface.glb");
   for (const fs::path& file : files) ORBITFUSE_TRY(check_target(o.out, file));
+  if (!o.dataset.empty()) ORBITFUSE_TRY(check_dataset_folder(o.dataset));
   ORBITFUSE_ASSIGN(const SurfaceRequest request, request_of(o));
   Eigen::Vector3d up = Eigen::Vector3d::Zero();
   if (!o.up.empty()) {

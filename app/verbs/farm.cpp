@@ -2,7 +2,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 
+#include "app/cli/option_pairs.hpp"
 #include "app/cli/verb.hpp"
 #include "app/farm/farm_lock.hpp"
 #include "app/farm/folder_probe.hpp"
@@ -25,12 +27,14 @@ struct FarmOptions {
   LocalLimits limits;
   SlurmOptions cluster;
   int stage_cores = 2, tries = 3;
+  std::set<std::string> given;  ///< as they were typed: "--out"
 };
 
 /// Tells how the sessions stand and writes the page; quality error when some did not end well.
 Status conclude(Context& context, const fs::path& out, const FarmPlan& plan, bool ended) {
   const std::vector<SessionOverview> rows = look_at_sessions(out, plan);
-  ORBITFUSE_TRY(write_overview(out, plan, rows));
+  const bool dry = context.common.dry_run;
+  if (!dry) ORBITFUSE_TRY(write_overview(out, plan, rows));
   json sessions = json::array();
   std::size_t done = 0;
   std::string first_bad;
@@ -51,7 +55,7 @@ Status conclude(Context& context, const fs::path& out, const FarmPlan& plan, boo
       first_bad = row.name;
   }
   context.result["sessions"] = sessions;
-  context.result["page"] = (out / "farm.html").string();
+  if (!dry) context.result["page"] = (out / "farm.html").string();
   if (!ended || done == rows.size()) return {};
   return fail(ErrorKind::quality, out.string(),
               fmt::format("{} of {} sessions are not done, {} the first", rows.size() - done,
@@ -128,6 +132,13 @@ Status start_farm(Context& context, const FarmOptions& options) {
   return conclude(context, out, plan, false);
 }
 
+/// What of this machine may be filled says nothing to Slurm.
+Status check_machine(const FarmOptions& o, bool on_slurm) {
+  for (const char* option : {"--workers", "--cores", "--memory"})
+    ORBITFUSE_TRY(check_apart({{option, o.given.contains(option), "--slurm", on_slurm}}));
+  return {};
+}
+
 Status resume_farm(Context& context, const fs::path& out, const FarmOptions& options,
                    bool by_user) {
   FarmLock lock;
@@ -138,6 +149,7 @@ Status resume_farm(Context& context, const fs::path& out, const FarmOptions& opt
     raise_interrupted(out, plan);
     return run_here(context, out, plan, options);
   }
+  ORBITFUSE_TRY(check_machine(options, true));
   ORBITFUSE_ASSIGN(const auto queued, queued_jobs(out, plan, context.progress));
   if (!queued.empty())
     return fail(ErrorKind::usage, out.string(),
@@ -177,25 +189,50 @@ Status run_array_task(Context& context, const fs::path& out,
                   context.progress);
 }
 
+Status check_start(const FarmOptions& o) {
+  for (const char* option : {"--partition", "--gpu-partition", "--account"})
+    ORBITFUSE_TRY(check_needs({{option, o.given.contains(option), "--slurm", o.slurm}}));
+  return check_machine(o, o.slurm);
+}
+
+/// What a farm does was said when it was started; only what this machine spares may change.
+Status check_order(const FarmOptions& o, const std::string& order) {
+  std::set<std::string> unused{"--out",     "--like",   "--slurm",       "--tries",
+                               "--account", "--config", "--stage-cores", "--partition",
+                               "--set",     "--seed",   "--device",      "--gpu-partition"};
+  if (order != "resume") unused.insert({"--workers", "--cores", "--memory"});
+  const std::string words = "farm " + order;
+  for (const std::string& option : o.given) {
+    ORBITFUSE_TRY(check_apart({{option.c_str(), unused.contains(option), words.c_str(), true}}));
+  }
+  return {};
+}
+
 Status run_farm(Context& context, const FarmOptions& options) {
   const std::vector<std::string>& words = options.words;
   const std::string first = words.empty() ? "" : words.front();
   const bool is_order = first == "status" || first == "resume" || first == "cancel" ||
                         first == "gather" || first == "stages";
-  if (!is_order) return start_farm(context, options);
+  if (!is_order) {
+    ORBITFUSE_TRY(check_start(options));
+    return start_farm(context, options);
+  }
   if (words.size() < 2 || (words.size() > 2 && first != "stages"))
     return fail(ErrorKind::usage, "farm " + first, fmt::format("{} folders", words.size() - 1),
                 "name the farm's folder, one");
   const fs::path out = fs::absolute(words[1]).lexically_normal();
   ORBITFUSE_TRY(answers(out));
+  const bool asked = first == "status" || first == "resume" || first == "cancel";
+  if (asked) ORBITFUSE_TRY(check_order(options, first));
+  if (asked && (first == "status" || context.common.dry_run)) {
+    ORBITFUSE_ASSIGN(const FarmPlan plan, read_plan(out));
+    if (first != "status") context.console.info("would " + first + " the farm; so it stands now:");
+    return conclude(context, out, plan, false);
+  }
   if (first == "stages") return run_array_task(context, out, words);
   if (first == "cancel") return cancel_farm(context, out);
-  if (first != "status") {
-    ORBITFUSE_TRY(read_plan(out));
-    return resume_farm(context, out, options, first == "resume");
-  }
-  ORBITFUSE_ASSIGN(const FarmPlan plan, read_plan(out));
-  return conclude(context, out, plan, false);
+  ORBITFUSE_TRY(read_plan(out));
+  return resume_farm(context, out, options, first == "resume");
 }
 
 }  // namespace
@@ -219,7 +256,11 @@ Action add_farm(CLI::App& app) {
   app.add_option("--partition", o->cluster.partition, "Slurm's partition");
   app.add_option("--gpu-partition", o->cluster.gpu_partition, "Of stages that use a GPU");
   app.add_option("--account", o->cluster.account, "Slurm's account");
-  return [o](Context& context) { return run_farm(context, *o); };
+  return [o, &app](Context& context) {
+    for (const CLI::Option* option : app.get_options())
+      if (option->count() > 0) o->given.insert(option->get_name());
+    return run_farm(context, *o);
+  };
 }
 
 }  // namespace orbitfuse::cli

@@ -5,9 +5,11 @@
 
 #include <cctype>
 
+#include "app/cli/option_pairs.hpp"
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
 #include "app/fusion_batch/fusion_batch.hpp"
+#include "app/pipeline/out_folder.hpp"
 #include "core/image/image_io.hpp"
 #include "fusion/heat/legend.hpp"
 
@@ -18,7 +20,7 @@ namespace fs = std::filesystem;
 struct Options {
   StageFolders folders;
   std::string visible, thermal, mask, method = "heat";
-  bool gray = false, out_given = false;
+  bool gray = false, out_given = false, method_given = false;
 };
 
 using ImageWriter = Status (*)(const fs::path&, const cv::Mat&);
@@ -55,7 +57,7 @@ Status check_image_out(const Options& o) {
     if (same_file(o.folders.out, input))
       return fail(ErrorKind::usage, "--out " + o.folders.out, "is an input too",
                   "give another name");
-  return {};
+  return pipeline::check_out_file(o.folders.out);
 }
 
 /// Pairs go to vi/, ir/ and fused/ below --out.
@@ -67,7 +69,7 @@ Status check_folder_out(const Options& o) {
       if (same_file(fs::path(o.folders.out) / part, input))
         return fail(ErrorKind::usage, "--out " + o.folders.out,
                     "would write into the input " + input, "give another folder");
-  return {};
+  return pipeline::check_out_folder(o.folders.out);
 }
 
 /// The bar of what heat's colours stand for, beside the picture: OUT_legend.png.
@@ -88,7 +90,11 @@ Status fuse_pair(Context& context, const Options& o, const FusionOptions& option
   ORBITFUSE_ASSIGN(const cv::Mat thermal, batch::read_thermal(o.thermal));
   ORBITFUSE_ASSIGN(const cv::Mat mask, read_optional(o.mask));
   FusionReport said;
-  ORBITFUSE_ASSIGN(const cv::Mat fused, fuse(visible, thermal, mask, options, &said));
+  ORBITFUSE_ASSIGN(const cv::Mat fused,
+                   fuse(visible, thermal, mask, options, &said).map_error([&](Error error) {
+                     return batch::with_file(
+                         error, {{"visible", o.visible}, {"thermal", o.thermal}, {"mask", o.mask}});
+                   }));
   if (context.common.dry_run) {
     context.console.info("would write " + o.folders.out);
     return {};
@@ -129,21 +135,29 @@ Status fuse_folder(Context& context, const Options& o, const FusionOptions& opti
 
 Status run(Context& context, const Options& o) {
   if (o.visible.empty() && o.thermal.empty()) {
-    // They would be passed over: a run's pictures have masks and colours of their own.
-    for (const auto& [option, given] : {std::pair{"--mask", !o.mask.empty()}, {"--gray", o.gray}})
-      if (given)
-        return fail(ErrorKind::usage, option, "given without --visible and --thermal",
-                    "name the two images, or leave it out");
+    // A run's pictures have methods, masks and colours of their own.
+    constexpr const char* files = "--visible and --thermal";
+    ORBITFUSE_TRY(check_needs({{"--mask", !o.mask.empty(), files, false},
+                               {"--gray", o.gray, files, false},
+                               {"--method", o.method_given, files, false}}));
     return run_stages(context, o.folders, {"fuse"});
   }
   for (const auto& [option, value] :
        {std::pair{"--visible", &o.visible}, {"--thermal", &o.thermal}})
     if (value->empty())
       return fail(ErrorKind::usage, option, "not given", "name both images, or both folders");
+  std::error_code unreadable;  // whoever reads it says why
+  const bool folders = fs::is_directory(o.visible, unreadable);
+  ORBITFUSE_TRY(
+      check_apart({{"session", !o.folders.session.empty(), "--visible and --thermal", true},
+                   {"--mask", !o.mask.empty(), "folders of images", folders}}));
+  if (same_file(o.visible, o.thermal))
+    return fail(ErrorKind::usage, "--thermal " + o.thermal, "is --visible too",
+                "name the thermal one");
   FusionOptions options = context.config.fuse.options;
   ORBITFUSE_ASSIGN(options.method, fusion_method(o.method));
   options.color = !o.gray;
-  if (fs::is_directory(o.visible)) return fuse_folder(context, o, options);
+  if (folders) return fuse_folder(context, o, options);
   return fuse_pair(context, o, options);
 }
 
@@ -162,6 +176,7 @@ Action add_fuse(CLI::App& app) {
   app.add_flag("--gray", options->gray, "Fuse to gray instead of keeping the visible colours");
   return [options, &app](Context& context) {
     options->out_given = app.count("--out") > 0;
+    options->method_given = app.count("--method") > 0;
     return run(context, *options);
   };
 }

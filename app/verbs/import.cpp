@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include "app/cli/option_pairs.hpp"
 #include "app/cli/verb.hpp"
 #include "core/temperature.hpp"
 #include "drivers/stills/import.hpp"
@@ -17,6 +18,7 @@ struct Options {
   std::optional<double> spacing_deg;
   std::optional<int> loops;
   std::vector<double> elevations_deg;
+  bool video_frames_given = false;
 };
 
 const std::vector<std::pair<std::string, ThermalScale>> scales = {
@@ -154,23 +156,28 @@ Status check_common(const CommonOptions& common) {
 
 /// Options that only mean something with another one.
 Status check_alone(const Options& o) {
-  const auto needs = [](const char* option, const char* other) {
-    return fail(ErrorKind::usage, option, std::string("given without ") + other,
-                std::string("give ") + other + " too, or leave it out");
-  };
-  if (!o.spacing_deg && o.loops) return needs("--loops", "--station-spacing-deg");
-  if (!o.spacing_deg && !o.elevations_deg.empty())
-    return needs("--elevations-deg", "--station-spacing-deg");
-  if (o.scale != "linear" && o.kelvin_per_count)
-    return needs("--kelvin-per-count", "--thermal-scale linear");
-  if (o.scale != "linear" && o.kelvin_offset)
-    return needs("--kelvin-offset", "--thermal-scale linear");
-  const bool no_thermal =
-      o.import.thermal.empty() && o.import.thermal_tracking.empty() && !o.import.transforms_json;
-  if (no_thermal && o.scale != "auto") return needs("--thermal-scale", "--thermal");
-  if (o.scale == "linear" && !o.kelvin_per_count)
-    return needs("--thermal-scale linear", "--kelvin-per-count");
-  return {};
+  const ImportOptions& i = o.import;
+  const bool linear = o.scale == "linear", poses_name_images = i.transforms_json.has_value();
+  const bool visible = !i.visible.empty() || !i.visible_tracking.empty() || i.embedded_visible ||
+                       poses_name_images,
+             thermal = !i.thermal.empty() || !i.thermal_tracking.empty() || poses_name_images;
+  return check_needs({
+      {"--loops", o.loops.has_value(), "--station-spacing-deg", o.spacing_deg.has_value()},
+      {"--elevations-deg", !o.elevations_deg.empty(), "--station-spacing-deg",
+       o.spacing_deg.has_value()},
+      {"--kelvin-per-count", o.kelvin_per_count.has_value(), "--thermal-scale linear", linear},
+      {"--kelvin-offset", o.kelvin_offset.has_value(), "--thermal-scale linear", linear},
+      {"--thermal-scale", o.scale != "auto", "--thermal", thermal},
+      {"--thermal-scale linear", linear, "--kelvin-per-count", o.kelvin_per_count.has_value()},
+      {"--embedded-visible", i.embedded_visible, "--thermal", !i.thermal.empty()},
+      {"--priors-only", i.ground_truth_priors_only, "--ground-truth", i.ground_truth.has_value()},
+      {"--visible-colmap", i.visible_colmap.has_value(), "--visible", visible},
+      {"--thermal-colmap", i.thermal_colmap.has_value(), "--thermal", thermal},
+      {"--visible-focal-px", i.visible_focal_px.has_value(), "--visible", visible},
+      {"--thermal-focal-px", i.thermal_focal_px.has_value(), "--thermal", thermal},
+      {"--rig", i.rig, "--visible and --thermal", visible && thermal},
+      {"--video-frames", o.video_frames_given, "--visible", visible},
+  });
 }
 
 Status run(Context& context, Options& o) {
@@ -213,7 +220,10 @@ Action add_import(CLI::App& app) {
   add_sources(app, *options);
   add_poses_known(app, *options);
   add_radiometry(app, *options);
-  return [options](Context& context) { return run(context, *options); };
+  return [options, &app](Context& context) {
+    options->video_frames_given = app.count("--video-frames") > 0;
+    return run(context, *options);
+  };
 }
 
 }  // namespace orbitfuse::cli

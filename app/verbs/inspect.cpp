@@ -6,7 +6,7 @@
 #include <map>
 #include <tuple>
 
-#include "app/cli/run_stages.hpp"
+#include "app/cli/run_folder.hpp"
 #include "app/cli/verb.hpp"
 #include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
@@ -82,6 +82,20 @@ json describe(const Session& session, Modality modality) {
           {"devices", devices}};
 }
 
+/// Results outlive their session; what can't be done without it is worth knowing before.
+void tell_session(Context& context, const fs::path& folder, const std::string& session) {
+  context.console.data("of session " + session);
+  context.result["session"] = session;
+  std::error_code unreadable;
+  const bool there = fs::exists(fs::path(session) / "manifest.jsonl", unreadable);
+  context.result["session_found"] = there;
+  if (there) return;
+  context.console.warning(fmt::format(
+      "its session {} is not there any more: nothing can be measured, evaluated or run "
+      "again; bring it back, or name it where it is now: orbitfuse run SESSION --out {}",
+      session, folder.string()));
+}
+
 Status inspect_run(Context& context, const fs::path& folder) {
   json stages = json::array();
   std::vector<std::string> damaged;
@@ -109,13 +123,16 @@ Status inspect_run(Context& context, const fs::path& folder) {
       pipeline::out_of_date(folder, pipeline::finished_stages(folder));
   for (const std::string& stage : late)
     context.console.warning(stage + "; the next run makes it again");
-  const auto run = stages::read_json(folder / "run.json");
-  if (!run || !run->is_object()) {
-    damaged.push_back("run.json: not JSON, or cut off");
+  const auto run = earlier_run(folder.string());
+  if (!run || run->is_null()) {
+    damaged.push_back(run ? "run.json: missing, so that nothing names the session"
+                          : std::string("run.json: ") + run.error().found);
     context.console.warning(damaged.back() + "; run again with the session folder and --out");
+  } else {
+    tell_session(context, folder, (*run)["session"]);
   }
-  context.result = {
-      {"out", folder.string()}, {"stages", stages}, {"damaged", damaged}, {"out_of_date", late}};
+  context.result.update(
+      {{"out", folder.string()}, {"stages", stages}, {"damaged", damaged}, {"out_of_date", late}});
   if (damaged.empty()) return {};
   return fail(ErrorKind::input, folder.string(), damaged.front(),
               "run again: what is damaged is made anew");
@@ -175,9 +192,10 @@ Action add_inspect(CLI::App& app) {
   app.add_option("folder", *folder, "Session folder, or the --out folder of a run")->required();
   return [folder](Context& context) {
     std::error_code unreadable;  // inspect_session says why
-    return fs::exists(fs::path(*folder) / "run.json", unreadable)
-               ? inspect_run(context, *folder)
-               : inspect_session(context, *folder);
+    const bool run = fs::exists(fs::path(*folder) / run_file, unreadable) ||
+                     (!fs::exists(fs::path(*folder) / "manifest.jsonl", unreadable) &&
+                      !pipeline::finished_stages(*folder).empty());
+    return run ? inspect_run(context, *folder) : inspect_session(context, *folder);
   };
 }
 

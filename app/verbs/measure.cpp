@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
@@ -22,12 +23,13 @@ struct Options {
 
 /// The session that a run's folder names, or the one that was given.
 Result<Session> session_of(const Options& options) {
-  if (!fs::is_directory(options.out))
+  std::error_code unreadable;
+  if (!fs::is_directory(options.out, unreadable))
     return fail(ErrorKind::input, options.out, "no such folder", "name the --out folder of a run");
   StageFolders folders{options.out, options.out};
   if (!options.session.empty()) folders.session = options.session;
   if (options.session.empty()) {
-    if (!fs::exists(fs::path(options.out) / "run.json"))
+    if (!fs::exists(fs::path(options.out) / "run.json", unreadable))
       return fail(ErrorKind::input, options.out, "no run.json in it",
                   "name the --out folder of a run, or give --session too");
     ORBITFUSE_TRY(resolve(folders));
@@ -76,13 +78,22 @@ void tell(Context& context, const Options& options, const std::string& name, con
   if (answer.kind != Kind::distance) context.console.info(std::string("+- ") + uncertainty_words);
 }
 
+/// A slip in the name would show in the report, when nobody can ask again.
+Status check_reference(const std::string& name, const Measurements& saved,
+                       const std::string& file) {
+  if (name.empty() || saved.find(name) != nullptr) return {};
+  std::vector<std::string> names;
+  for (const SavedMeasurement& m : saved.list) names.push_back("'" + m.name + "'");
+  return fail(ErrorKind::usage, "--reference", fmt::format("'{}', which is not in {}", name, file),
+              names.empty() ? "save that measurement first: none is saved"
+                            : fmt::format("name one of {}", fmt::join(names, ", ")));
+}
+
 Status run(Context& context, const Options& options) {
   if (options.words.csv && context.common.json)
     return fail(ErrorKind::usage, "--csv", "together with --json", "choose one of them");
   const MeasureWords& words = options.words;
-  if (!words.save && !(words.remark + words.component + words.reference).empty())
-    return fail(ErrorKind::usage, "--remark, --component or --reference", "without --save",
-                "add --save: they are kept with the measurement");
+  ORBITFUSE_TRY(check_pairs(words));
   if (!words.name.empty() && words.name == words.reference)
     return fail(ErrorKind::usage, "--reference", "'" + words.reference + "', its own name",
                 "name another saved measurement");
@@ -95,6 +106,7 @@ Status run(Context& context, const Options& options) {
   if (!saved) context.console.warning(saved.error().message());
   const Measurements known = saved.value_or(Measurements{});
   for (const std::string& note : known.notes) context.console.warning(note);
+  ORBITFUSE_TRY(check_reference(words.reference, known, file.string()));
   ORBITFUSE_ASSIGN(const auto request, request_of(options.words, scene, known));
   if (!request) {
     if (!saved) return tl::unexpected(saved.error());

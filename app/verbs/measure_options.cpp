@@ -5,6 +5,7 @@
 
 #include <charconv>
 
+#include "app/cli/option_pairs.hpp"
 #include "core/nested_text.hpp"
 #include "core/temperature.hpp"
 
@@ -201,9 +202,9 @@ Result<Request> read(const MeasureWords& words, const std::string& option,
   } else {
     request.kind = words.hottest ? Kind::hottest : Kind::coldest;
     request.count = words.hottest ? *words.hottest : *words.coldest;
-    request.apart = words.apart;
+    request.apart = words.apart.value_or(request.apart);
   }
-  request.profile = words.profile;
+  request.profile = words.profile.value_or(request.profile);
   return request;
 }
 
@@ -233,10 +234,10 @@ void add_measure_options(CLI::App& app, MeasureWords& w) {
   place("--request", w.request, "JSON", "Any of these as JSON (docs/formats.md)");
   app.add_option("--apart", w.apart,
                  "Least distance between hottest or coldest, run's unit; 0: auto")
-      ->capture_default_str()
+      ->default_str("0")
       ->group(kinds);
   app.add_option("--profile", w.profile, "Points along a line")
-      ->capture_default_str()
+      ->default_str(std::to_string(Request{}.profile))
       ->group(kinds);
 
   constexpr const char* radiometry = "Radiometry (after capture; originals stay as they are)";
@@ -259,6 +260,32 @@ void add_measure_options(CLI::App& app, MeasureWords& w) {
       ->group(report);
   app.add_flag("--save", w.save, "Keep it in measurements.json of the run");
   app.add_flag("--csv", w.csv, "CSV on stdout");
+}
+
+Status check_pairs(const MeasureWords& w) {
+  ORBITFUSE_ASSIGN(const std::string question, asked(w));
+  constexpr const char* any = "a measurement such as --point";
+  const bool asks = !question.empty(), distance = question == "--distance";
+  const std::pair<const char*, bool> radiometry[] = {
+      {"--emissivity", w.emissivity.has_value()},
+      {"--reflected-c", w.reflected_c.has_value()},
+      {"--distance-m", w.distance_m.has_value()},
+      {"--air-c", w.air_c.has_value()},
+      {"--humidity", w.humidity_percent.has_value()},
+      {"--recorded-emissivity", w.recorded_emissivity.has_value()},
+      {"--recorded-reflected-c", w.recorded_reflected_c.has_value()}};
+  for (const auto& [option, given] : radiometry) {
+    ORBITFUSE_TRY(check_needs({{option, given, any, asks}}));
+    ORBITFUSE_TRY(check_apart({{option, given, "--distance", distance}}));
+  }
+  return check_needs({{"--apart", w.apart.has_value(), "--hottest or --coldest",
+                       w.hottest.has_value() || w.coldest.has_value()},
+                      {"--profile", w.profile.has_value(), "--line", !w.line.empty()},
+                      {"--name", !w.name.empty(), any, asks},
+                      {"--save", w.save, any, asks},
+                      {"--remark", !w.remark.empty(), "--save", w.save},
+                      {"--component", !w.component.empty(), "--save", w.save},
+                      {"--reference", !w.reference.empty(), "--save", w.save}});
 }
 
 Result<std::optional<Request>> request_of(const MeasureWords& words, const ThermalScene& scene,

@@ -16,8 +16,8 @@ struct MeasureWords {
   std::string pixel, point, box, polygon, request, name;
   std::vector<std::string> line, distance, difference;  ///< two words each
   std::optional<int> hottest, coldest;
-  double apart = 0;
-  int profile = 50;
+  std::optional<double> apart;
+  std::optional<int> profile;
   std::optional<double> emissivity, reflected_c, distance_m, air_c, humidity_percent;
   std::optional<double> recorded_emissivity, recorded_reflected_c;
   std::string remark, component, reference;
@@ -25,6 +25,9 @@ struct MeasureWords {
 };
 
 void add_measure_options(CLI::App& app, MeasureWords& words);
+
+/// Usage error for options that mean nothing beside the others, or without another one.
+Status check_pairs(const MeasureWords& words);
 
 /// The one request among the options; none where none asks for a measurement. Usage error where two
 /// do, or for words that are no place. Names of saved measurements stand for what was asked then.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include "app/cli/option_pairs.hpp"
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
 #include "app/fusion_batch/fusion_batch.hpp"
@@ -13,6 +14,7 @@ namespace {
 struct Options {
   StageFolders folders;
   std::string visible, thermal, fused;
+  bool out_given = false;
   bool on_files() const { return !visible.empty() || !thermal.empty() || !fused.empty(); }
 };
 
@@ -20,12 +22,23 @@ Status score_files(Context& context, const Options& o) {
   for (const auto& [option, value] :
        {std::pair{"--visible", &o.visible}, {"--thermal", &o.thermal}, {"--fused", &o.fused}})
     if (value->empty()) return fail(ErrorKind::usage, option, "not given", "name all three images");
+  constexpr const char* images = "--visible, --thermal and --fused";
+  ORBITFUSE_TRY(check_apart({{"session", !o.folders.session.empty(), images, true},
+                             {"--out", o.out_given, images, true}}));
   ORBITFUSE_ASSIGN(const cv::Mat visible, batch::read_photo(o.visible));
+  std::error_code missing;
+  if (std::filesystem::equivalent(o.visible, o.thermal, missing))
+    return fail(ErrorKind::usage, "--thermal " + o.thermal, "is --visible too",
+                "name the thermal one");
   // Radiometric files are scored as the gray image that fusion makes of them.
   ORBITFUSE_ASSIGN(const cv::Mat stored, batch::read_thermal(o.thermal));
-  ORBITFUSE_ASSIGN(const cv::Mat thermal, batch::gray_of_thermal(stored, {}));
+  const auto named = [&](Error error) {
+    return batch::with_file(std::move(error),
+                            {{"visible", o.visible}, {"thermal", o.thermal}, {"fused", o.fused}});
+  };
+  ORBITFUSE_ASSIGN(const cv::Mat thermal, batch::gray_of_thermal(stored, {}).map_error(named));
   ORBITFUSE_ASSIGN(const cv::Mat fused, batch::read_photo(o.fused));
-  ORBITFUSE_ASSIGN(const auto values, fusion_metrics(visible, thermal, fused));
+  ORBITFUSE_ASSIGN(const auto values, fusion_metrics(visible, thermal, fused).map_error(named));
   nlohmann::json metrics = nlohmann::json::object(), definitions = metrics;
   for (const MetricValue& v : values) {
     context.console.data(fmt::format("{:<10} {:>14.6f}  {}", v.name, v.value, v.definition));
@@ -44,7 +57,8 @@ Action add_metrics(CLI::App& app) {
   app.add_option("--visible", options->visible, "Visible image; then --thermal and --fused too");
   app.add_option("--thermal", options->thermal, "Thermal image of the same size");
   app.add_option("--fused", options->fused, "Fused image of the same size");
-  return [options](Context& context) {
+  return [options, &app](Context& context) {
+    options->out_given = app.count("--out") > 0;
     return options->on_files() ? score_files(context, *options)
                                : run_stages(context, options->folders, {"metrics"});
   };

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "app/cli/option_pairs.hpp"
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
 
@@ -23,7 +24,11 @@ Action add_render(CLI::App& app) {
   app.add_option("--views", options->views, "New cameras (render.views)");
   app.add_option("--width", options->width, "Pixels (render.width_px)");
   return [options](Context& context) -> Status {
-    if (!options->cameras.empty()) context.config.render.cameras = options->cameras;
+    const bool cameras = !options->cameras.empty();
+    ORBITFUSE_TRY(check_apart({{"--path", !options->path.empty(), "--cameras", cameras},
+                               {"--views", options->views.has_value(), "--cameras", cameras},
+                               {"--width", options->width.has_value(), "--cameras", cameras}}));
+    if (cameras) context.config.render.cameras = options->cameras;
     config::Settings settings = context.config.settings();
     if (!options->path.empty()) ORBITFUSE_TRY(settings.apply("render.path=" + options->path));
     if (options->views) context.config.render.path.views = *options->views;

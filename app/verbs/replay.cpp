@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 
 #include "app/cli/verb.hpp"
 #include "app/recording/recording.hpp"
@@ -33,7 +34,31 @@ Result<std::vector<std::unique_ptr<FrameSource>>> sources_of(Context& context,
   return sources;
 }
 
+/// Frames of two sessions in one would be two objects in one, and nothing tells them apart later.
+Status check_goes_on(const Session& session, const std::string& to) {
+  ORBITFUSE_ASSIGN(const Session begun, open_session(to));
+  // Thermal files may have been stored anew at a coarser scale: their time stays.
+  std::set<std::string> hashes;
+  std::set<std::pair<Modality, std::int64_t>> times;
+  for (const FrameRecord& frame : session.frames) {
+    hashes.insert(frame.content_hash);
+    times.emplace(frame.modality, frame.host_time_ns);
+  }
+  const bool known = std::any_of(begun.frames.begin(), begun.frames.end(), [&](const auto& frame) {
+    return (!frame.content_hash.empty() && hashes.contains(frame.content_hash)) ||
+           (frame.host_time_ns != 0 && times.contains({frame.modality, frame.host_time_ns}));
+  });
+  if (known || begun.frames.empty()) return {};
+  return fail(ErrorKind::input, to,
+              fmt::format("holds {} frames, none of them of {}", begun.frames.size(),
+                          session.folder.string()),
+              "replay into a folder of its own, or go on with the replay of this session");
+}
+
 Status run(Context& context, const Options& o) {
+  if (context.common.force)
+    return fail(ErrorKind::usage, "--force", "a session is never overwritten",
+                "leave it out, and replay into another folder or with --resume");
   ORBITFUSE_ASSIGN(const Session session, open_session(o.session));
   for (const std::string& warning : session.warnings) context.console.warning(warning);
   ORBITFUSE_ASSIGN(
@@ -44,6 +69,7 @@ Status run(Context& context, const Options& o) {
   options.resume = context.common.resume;
   options.notes = session.notes;
   ORBITFUSE_TRY(recording::check_folder(options));
+  if (options.resume) ORBITFUSE_TRY(check_goes_on(session, o.to));
   if (context.common.dry_run) {
     context.console.info(fmt::format("would replay {} frames of {} devices into {}",
                                      session.frames.size(), sources.size(), o.to));

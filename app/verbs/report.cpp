@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <optional>
 
+#include "app/cli/option_pairs.hpp"
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
 #include "app/inspection/inspection.hpp"
@@ -51,6 +52,10 @@ Status write_inspection(Context& context, Options options) {
 }
 
 Status report(Context& context, const Options& options) {
+  ORBITFUSE_TRY(check_apart(
+      {{"--inspection", options.inspection.has_value(), "--print-template", options.print_template},
+       {"--pdf", options.pdf, "--print-template", options.print_template},
+       {"session", !options.folders.session.empty(), "--print-template", options.print_template}}));
   if (options.print_template) {
     context.console.data(std::string(inspection::details_template()));
     context.result["template"] = inspection::details_template();

@@ -1,4 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <set>
+
+#include "app/cli/option_pairs.hpp"
 #include "app/cli/run_stages.hpp"
 #include "app/cli/training_limits.hpp"
 #include "app/cli/verb.hpp"
@@ -6,6 +10,15 @@
 #include "core/formats/transforms_json.hpp"
 
 namespace orbitfuse::cli {
+namespace {
+
+/// Whether a run is asked for that ends with some of these stages.
+bool ends_among(const std::vector<std::string>& ends, const std::set<std::string>& stages) {
+  return !ends.empty() && std::all_of(ends.begin(), ends.end(),
+                                      [&](const std::string& end) { return stages.contains(end); });
+}
+
+}  // namespace
 
 Action add_run(CLI::App& app) {
   const auto folders = std::make_shared<StageFolders>();
@@ -26,6 +39,13 @@ Action add_run(CLI::App& app) {
       ->allow_extra_args(false)
       ->check(CLI::IsMember(stages::stage_names()));
   return [folders, cameras, budget, limits, stages_wanted](Context& context) -> Status {
+    const bool trains = !ends_among(*stages_wanted, {"poses_visible", "poses_thermal", "depth"});
+    const bool renders = !ends_among(
+        *stages_wanted,
+        {"poses_visible", "poses_thermal", "depth", "train_visible", "train_thermal", "register"});
+    ORBITFUSE_TRY(check_apart(
+        {{"--target-psnr", limits->target_psnr > 0, "a --stage that trains nothing", !trains},
+         {"--cameras", !cameras->empty(), "a --stage that renders nothing", !renders}}));
     std::optional<double> budget_s;
     if (!budget->empty()) {
       ORBITFUSE_ASSIGN(budget_s, parse_duration(*budget));

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 
 #include "core/formats/rigid_matrix.hpp"
@@ -16,6 +17,7 @@ namespace {
 
 using Json = nlohmann::json;
 
+constexpr std::size_t max_name_bytes = 4096;  // a path's, on Linux
 constexpr const char* described = "docs/formats.md describes the file";
 
 /// The camera's fields lie in "K", with names of their own.
@@ -46,11 +48,18 @@ std::optional<double> optional_degrees(const JsonFields& frame, const char* key)
 Result<std::vector<TrueView>> views_of(const JsonFields& object) {
   ORBITFUSE_TRY(object.check_object());
   ORBITFUSE_ASSIGN(const std::vector<JsonFields> frames, object.children("frames"));
+  if (frames.empty())
+    return fail(ErrorKind::input, object.at("frames"), "an empty list",
+                "list a frame, or leave the modality out");
   ORBITFUSE_ASSIGN(const Camera camera, camera_of(object));
   std::vector<TrueView> views;
+  std::set<std::string> names;
   for (const JsonFields& frame : frames) {
     TrueView view;
-    ORBITFUSE_TRY(frame.get("file", view.name));
+    ORBITFUSE_TRY(frame.get_word("file", view.name, max_name_bytes));
+    if (!names.insert(view.name).second)
+      return fail(ErrorKind::input, frame.at("file"), view.name + ", which is listed before",
+                  "list each frame once");
     view.camera = camera;
     ORBITFUSE_ASSIGN(view.cam_from_world, pose_of(frame));
     view.azimuth_deg = optional_degrees(frame, "az");
@@ -69,8 +78,12 @@ Result<std::vector<TrueTestView>> test_views_of(const JsonFields& object,
     TrueTestView view{{}, {}, camera, {}};
     ORBITFUSE_ASSIGN(view.cam_from_world, pose_of(frame));
     for (const auto& [key, file] :
-         {std::pair{"visible", &view.visible}, {"thermal", &view.thermal}})
-      if (const std::string name = frame.remark(key); !name.empty()) *file = folder / name;
+         {std::pair{"visible", &view.visible}, {"thermal", &view.thermal}}) {
+      if (!frame.has(key)) continue;
+      std::string name;
+      ORBITFUSE_TRY(frame.get_word(key, name, max_name_bytes));
+      *file = folder / name;
+    }
     views.push_back(std::move(view));
   }
   return views;
@@ -80,7 +93,8 @@ Result<Json> read_object(const std::filesystem::path& file) {
   ORBITFUSE_ASSIGN(const std::string text, read_file(file, max_text_bytes));
   Json root = parse_json(text);
   if (root.is_object()) return root;
-  return fail(ErrorKind::input, file.string(), "not a JSON object (cut off?)", described);
+  return fail(ErrorKind::input, file.string(),
+              root.is_discarded() ? json_fault(text) : "not a JSON object", described);
 }
 
 JsonFields fields_of(const Json& root, const std::filesystem::path& file) {

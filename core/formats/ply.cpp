@@ -52,24 +52,16 @@ tl::unexpected<Error> bad(const std::filesystem::path& path, const std::string& 
 }
 
 std::optional<PlyType> type_of(const std::string& name) {
-  static const std::array<std::pair<const char*, PlyType>, 16> types{{{"char", {1, 'i'}},
-                                                                      {"int8", {1, 'i'}},
-                                                                      {"uchar", {1, 'u'}},
-                                                                      {"uint8", {1, 'u'}},
-                                                                      {"short", {2, 'i'}},
-                                                                      {"int16", {2, 'i'}},
-                                                                      {"ushort", {2, 'u'}},
-                                                                      {"uint16", {2, 'u'}},
-                                                                      {"int", {4, 'i'}},
-                                                                      {"int32", {4, 'i'}},
-                                                                      {"uint", {4, 'u'}},
-                                                                      {"uint32", {4, 'u'}},
-                                                                      {"float", {4, 'f'}},
-                                                                      {"float32", {4, 'f'}},
-                                                                      {"double", {8, 'f'}},
-                                                                      {"float64", {8, 'f'}}}};
-  for (const auto& [text, type] : types) {
-    if (name == text) return type;
+  struct Named {
+    const char *of_c, *sized;
+    PlyType type;
+  };
+  static constexpr Named types[] = {
+      {"char", "int8", {1, 'i'}},     {"uchar", "uint8", {1, 'u'}},   {"short", "int16", {2, 'i'}},
+      {"ushort", "uint16", {2, 'u'}}, {"int", "int32", {4, 'i'}},     {"uint", "uint32", {4, 'u'}},
+      {"float", "float32", {4, 'f'}}, {"double", "float64", {8, 'f'}}};
+  for (const Named& named : types) {
+    if (name == named.of_c || name == named.sized) return named.type;
   }
   return std::nullopt;
 }
@@ -105,7 +97,9 @@ Result<Header> parse_header(const std::filesystem::path& path, std::string_view 
         return bad(path, "unknown PLY format \"" + word + "\"");
     } else if (word == "element") {
       Element element;
-      if (!(words >> element.name >> element.count))
+      // Read into it as it is, -1 would be the largest count.
+      if (!(words >> element.name >> word) || word.front() == '-' ||
+          !(std::istringstream(word) >> element.count))
         return bad(path, "unreadable line \"" + line + "\"");
       header.elements.push_back(element);
     } else if (word == "property") {
@@ -120,6 +114,9 @@ Result<Header> parse_header(const std::filesystem::path& path, std::string_view 
       }
       const auto type = type_of(word);
       if (!type || !(words >> property.name)) return bad(path, "unreadable line \"" + line + "\"");
+      for (const Property& other : header.elements.back().properties) {
+        if (other.name == property.name) return bad(path, "two properties " + other.name);
+      }
       property.type = *type;
       header.elements.back().properties.push_back(property);
     } else if (word == "end_header") {

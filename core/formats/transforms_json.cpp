@@ -137,21 +137,9 @@ void take_size_of_image(Json& root, const std::filesystem::path& file) {
 
 Result<Transforms> read_transforms_json(const std::filesystem::path& file) {
   ORBITFUSE_ASSIGN(const std::string text, read_file(file, max_text_bytes));
-  if (nests_too_deep(text)) {
-    return fail(ErrorKind::input, file.string(),
-                fmt::format("lists within lists, more than {} deep", max_nesting),
-                "give a nerfstudio or instant-ngp transforms.json");
-  }
-  Json root;
-  try {
-    root = Json::parse(text);
-  } catch (const Json::exception& error) {
-    // "[json.exception.parse_error.101] parse error at line 3, ...": the place, or the number.
-    const std::string what = error.what();
-    return fail(ErrorKind::input, file.string(),
-                "not JSON, or cut off: " + what.substr(what.find("] ") + 2),
-                "write the file again");
-  }
+  Json root = parse_json(text);
+  if (root.is_discarded())
+    return fail(ErrorKind::input, file.string(), json_fault(text), "write the file again");
   if (!root.is_object()) {
     return fail(ErrorKind::input, file.string(), "not a JSON object", "write the file again");
   }

@@ -122,14 +122,15 @@ class Gathering {
   Status check_known(Modality modality, std::initializer_list<const std::vector<fs::path>*> lists) {
     const auto known = inputs_.known.find(modality);
     if (known == inputs_.known.end() || known->second.all().empty()) return {};
-    std::size_t images = 0, with_pose = 0;
+    std::vector<fs::path> all;
+    for (const auto* files : lists) all.insert(all.end(), files->begin(), files->end());
+    known->second.tell_apart(all);
+    const std::size_t images = all.size();
+    std::size_t with_pose = 0;
     std::string twice;  // the first name that more than one view bears
-    for (const auto* files : lists) {
-      images += files->size();
-      for (const fs::path& file : *files) {
-        with_pose += known->second.find(file) != nullptr;
-        if (twice.empty()) twice = known->second.ambiguity(file);
-      }
+    for (const fs::path& file : all) {
+      with_pose += known->second.find(file) != nullptr;
+      if (twice.empty()) twice = known->second.ambiguity(file);
     }
     if (images == 0 || with_pose == images) return {};
     const std::string found =

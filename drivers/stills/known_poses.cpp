@@ -61,39 +61,84 @@ std::string canonical_name(const fs::path& file) {
   return (unresolved ? fs::absolute(file, unresolved).lexically_normal() : canonical).string();
 }
 
+/// How many parts at the ends of two paths are equal: the name, the folder above it, ...
+std::size_t common_end(const fs::path& image, const fs::path& view) {
+  std::error_code unresolved;
+  const fs::path a = fs::absolute(image, unresolved).lexically_normal(),
+                 b = view.lexically_normal();
+  auto at = a.end(), of = b.end();
+  std::size_t common = 0;
+  while (at != a.begin() && of != b.begin() && *--at == *--of) ++common;
+  return common;
+}
+
+/// Ambiguous: no pose is better than a wrong one.
+template <class Map>
+typename Map::const_iterator only_largest(const Map& values) {
+  auto largest = values.end();
+  bool alone = false;
+  for (auto at = values.begin(); at != values.end(); ++at) {
+    if (largest != values.end() && at->second == largest->second) alone = false;
+    if (largest != values.end() && at->second <= largest->second) continue;
+    largest = at;
+    alone = true;
+  }
+  return alone ? largest : values.end();
+}
+
 }  // namespace
 
 void KnownViews::add(KnownView view) {
   const std::size_t index = views_.size();
   by_file_.emplace(canonical_name(view.file), index);
-  ++by_name_.try_emplace(view.file.filename().string(), Named{index, 0}).first->second.views;
-  ++by_stem_.try_emplace(view.file.stem().string(), Named{index, 0}).first->second.views;
+  by_name_[view.file.filename().string()].push_back(index);
+  by_stem_[view.file.stem().string()].push_back(index);
   views_.push_back(std::move(view));
 }
 
+void KnownViews::tell_apart(const std::vector<fs::path>& images) {
+  std::map<const KnownView*, std::map<std::string, std::size_t>> rivals;
+  for (const fs::path& image : images)
+    if (const KnownView* view = find(image))
+      rivals[view].emplace(canonical_name(image), common_end(image, view->file));
+  for (const auto& [view, of_images] : rivals) {
+    if (of_images.size() < 2) continue;
+    const auto nearest = only_largest(of_images);
+    for (const auto& [image, common] : of_images)
+      if (nearest == of_images.end() || image != nearest->first) without_.insert(image);
+  }
+}
+
 const KnownView* KnownViews::find(const fs::path& file) const {
+  if (without_.contains(canonical_name(file))) return nullptr;
   if (const auto same = by_file_.find(canonical_name(file)); same != by_file_.end())
     return &views_[same->second];
   for (const auto& [names, name] :
        {std::pair{&by_name_, file.filename().string()}, {&by_stem_, file.stem().string()}}) {
     const auto found = names->find(name);
     if (found == names->end()) continue;
-    // Ambiguous: no pose is better than a wrong one.
-    return found->second.views == 1 ? &views_[found->second.index] : nullptr;
+    std::map<std::size_t, std::size_t> common;
+    for (const std::size_t index : found->second)
+      common[index] = common_end(file, views_[index].file);
+    const auto nearest = only_largest(common);
+    return nearest == common.end() ? nullptr : &views_[nearest->first];
   }
   return nullptr;
 }
 
 std::string KnownViews::ambiguity(const fs::path& file) const {
+  if (without_.contains(canonical_name(file)))
+    return fmt::format("{} has the name of another image", file.string());
   const auto named = by_name_.find(file.filename().string());
-  if (named == by_name_.end() || named->second.views < 2 || find(file)) return {};
+  if (named == by_name_.end() || named->second.size() < 2 || find(file)) return {};
   constexpr std::size_t most_named = 3;
   std::vector<std::string> folders;
-  for (const KnownView& view : views_)
-    if (folders.size() < most_named && view.file.filename() == file.filename())
-      folders.push_back(view.file.parent_path().string());
-  return fmt::format("{} is there {} times ({}{})", file.filename().string(), named->second.views,
-                     fmt::join(folders, ", "), named->second.views > 3 ? ", ..." : "");
+  for (const std::size_t index : named->second) {
+    const fs::path folder = views_[index].file.parent_path();
+    if (folders.size() < most_named) folders.push_back(folder.empty() ? "." : folder.string());
+  }
+  return fmt::format("{} is there {} times ({}{})", file.filename().string(), named->second.size(),
+                     fmt::join(folders, ", "), named->second.size() > most_named ? ", ..." : "");
 }
 
 std::optional<Camera> KnownViews::shared_camera() const {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -27,9 +28,13 @@ struct KnownView {
 class KnownViews {
  public:
   void add(KnownView view);
-  /// The same file, else the only view with its file name, else with its stem.
+  /// Of images that would share a view, only the one whose folders are named as the view's are may
+  /// have it, or none of them.
+  void tell_apart(const std::vector<std::filesystem::path>& images);
+  /// The same file, else the view with its file name, else with its stem; of several the one with
+  /// most of the folders above it, if that is one.
   const KnownView* find(const std::filesystem::path& file) const;
-  /// Why a file whose name is there has no view: "000.jpg is there twice (left, right)"; else
+  /// Why a file whose name is there has no view: "000.jpg is there 2 times (left, right)"; else
   /// empty.
   std::string ambiguity(const std::filesystem::path& file) const;
   const std::vector<KnownView>& all() const { return views_; }
@@ -38,13 +43,11 @@ class KnownViews {
   std::optional<Camera> shared_camera() const;
 
  private:
-  struct Named {
-    std::size_t index = 0;  ///< of the first
-    int views = 0;          ///< of that name
-  };
+  using Indices = std::vector<std::size_t>;
   std::vector<KnownView> views_;
   std::unordered_map<std::string, std::size_t> by_file_;
-  std::unordered_map<std::string, Named> by_name_, by_stem_;
+  std::unordered_map<std::string, Indices> by_name_, by_stem_;
+  std::set<std::string> without_;  ///< images that another one took the view from
 };
 
 /// Reads the sources that `options` name, visible and thermal.

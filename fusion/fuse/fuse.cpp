@@ -151,9 +151,11 @@ Result<cv::Mat1b> joint_mask(const cv::Mat& given, const cv::Mat1b& finite, cv::
   cv::Mat1b mask = finite;
   if (!given.empty()) {
     if (given.type() != CV_8UC1 || given.size() != size)
-      return fail(ErrorKind::input, "mask",
-                  fmt::format("{}x{}, type {}", given.cols, given.rows, given.type()),
-                  "must be 8-bit gray of the images' size");
+      return fail(
+          ErrorKind::input, "mask",
+          fmt::format("{}x{}, {} channel{} of {} bits", given.cols, given.rows, given.channels(),
+                      given.channels() == 1 ? "" : "s", 8 * given.elemSize1()),
+          fmt::format("must be {}x{}, 8-bit gray", size.width, size.height));
     mask = given > 0;
     if (!finite.empty()) mask &= finite;
   }

@@ -72,6 +72,27 @@ TEST_F(DryRun, FoldersThatNoSessionCanBeMadeIn) {
   expect_refused({"capture", photos, "--visible", tiny, "--resume"}, 3, photos);
 }
 
+TEST_F(DryRun, FoldersThatNoResultsCanBeWrittenTo) {
+  const std::string file = temp.path() / "file";
+  for (const std::string verb : {"run", "poses"}) {
+    expect_refused({verb, done, "--out", file}, 3, "is no folder; choose another folder");
+    expect_refused({verb, done, "--out", file + "/below"}, 3, "on its way is no folder");
+    expect_refused({verb, done, "--out", temp.path() / "broken"}, 3, "a broken link");
+    expect_refused({verb, done, "--out", "/proc/orbitfuse"}, 4, "/proc/orbitfuse");
+  }
+  expect_refused({"compare", done, photos, "--out", file}, 3, "is no folder");
+  expect_refused({"export", done, "--to", file + "/a.ply"}, 3, "is no folder");
+  expect_refused({"export", done, "--dataset", photos}, 2, "is there already");
+  const std::vector<std::string> pair = {"fuse", "--visible", photos + "/a.png", "--thermal",
+                                         photos + "/b.png"};
+  for (const auto& [out, words] :
+       {std::pair{file + "/f.png", "is no folder"}, {temp.path() / "f.png" / "", "end it in"}}) {
+    std::vector<std::string> line = pair;
+    line.insert(line.end(), {"--out", out});
+    expect_refused(line, words[0] == 'e' ? 2 : 3, words);
+  }
+}
+
 TEST_F(DryRun, CamerasAndGuides) {
   expect_refused({"capture", fresh, "--visible", "v4l2:/dev/video97"}, 4, "plug it in");
   expect_refused({"capture", fresh, "--visible", "stills:" + photos + "/none"}, 3, "none");

@@ -63,6 +63,63 @@ TEST_F(Hostile, FuseWritesWhereItIsToldAndNowhereElse) {
   }
 }
 
+TEST_F(Hostile, OddPairsAreNamedByTheirFiles) {
+  put_pair();
+  ASSERT_TRUE(write_png(path("dot.png"), cv::Mat(1, 1, CV_8UC3, cv::Scalar::all(9))));
+  ASSERT_TRUE(write_png(path("none.png"), cv::Mat(48, 64, CV_16UC1, cv::Scalar(0))));
+  std::ofstream(path("empty.png")).close();
+  fs::create_directory(path("folder"));
+  const auto pair = [&](const std::string& verb, const std::string& visible,
+                        const std::string& thermal, std::vector<std::string> more) {
+    more.insert(more.begin(), {verb, "--visible", path(visible), "--thermal", path(thermal)});
+    return orbitfuse_program(more, {.folder = temp.path()});
+  };
+  const std::vector<std::string> out = {"--out", path("f.png")}, fused = {"--fused", path("v.png")};
+  for (const auto& [verb, more] : {std::pair{"fuse", out}, {"metrics", fused}}) {
+    refused(pair(verb, "v.png", "v.png", more), 2, path("v.png") + ": is --visible too");
+    refused(pair(verb, "v.png", "dot.png", more), 3, path("dot.png") + ": 1x1");
+    refused(pair(verb, "v.png", "none.png", more), 3, path("none.png") + ": no finite sample");
+    refused(pair(verb, "v.png", "empty.png", more), 3, path("empty.png") + ": empty file");
+    refused(pair(verb, "v.png", "folder", more), 3, path("folder"));
+    refused(pair(verb, "folder", "t.png", more), 3, "folder");
+  }
+  refused(pair("fuse", "v.png", "t.png", {"--mask", path("v.png"), "--out", path("f.png")}), 3,
+          path("v.png") + ": 64x48, 3 channels of 8 bits; must be 64x48, 8-bit gray");
+  EXPECT_FALSE(fs::exists(path("f.png")));
+  EXPECT_EQ(fuse({"--out", path("f.png"), "--method", "heat"}).code, 0);
+}
+
+TEST_F(Hostile, NamesThatAreTooLongForTheDiskAreNamed) {
+  put_pair();
+  write_fixture_session(path("s"));
+  const std::string name(300, 'n');
+  refused(orbitfuse_program({"measure", name}), 3, name);
+  refused(orbitfuse_program(
+              {"fuse", "--visible", name, "--thermal", path("t.png"), "--out", path("f.png")}),
+          3, name);
+  std::ofstream(path("truth.json")) << R"({"visible": {"K": {"w": 64, "h": 48, "fx": 60, "fy": 60,
+      "cx": 32, "cy": 24}, "frames": [{"file": "a.jpg", "c2w": [[1,0,0,0],[0,1,0,0],[0,0,1,0]]}]}})";
+  refused(
+      orbitfuse_program({"eval", path("s"), "--out", name, "--ground-truth", path("truth.json")}),
+      3, name);
+}
+
+TEST_F(Hostile, CloudsThatNothingCanBeMadeOfAreNamed) {
+  const auto cloud = [&](const std::string& name, const std::string& point) {
+    std::string text =
+        "ply\nformat ascii 1.0\nelement vertex 30\nproperty float x\n"
+        "property float y\nproperty float z\nend_header\n";
+    for (int i = 0; i < 30; ++i) text += point;
+    std::ofstream(path(name)) << text;
+    return path(name);
+  };
+  const std::string nan = cloud("nan.ply", "nan nan nan\n"), one = cloud("one.ply", "1 2 3\n");
+  const Outcome outcome = orbitfuse_program({"register", "--source", nan, "--target", one});
+  refused(outcome, 3, nan + ": 0 finite points");
+  EXPECT_THAT(outcome.err, HasSubstr(nan + ": 30 of 30 points have no position"));
+  refused(orbitfuse_program({"register", "--source", one, "--target", nan}), 3, one);
+}
+
 TEST_F(Hostile, FoldersOfPairsAreNotWrittenOver) {
   put_pair();
   for (const char* part : {"vi", "ir"}) fs::create_directories(path("pairs") + "/" + part);

@@ -152,6 +152,10 @@ TEST_F(Measure, WhatIsWrongIsNamedWithTheRemedy) {
   expect_refused({"--hottest", "1", "--coldest", "1"}, 2, "together with");
   expect_refused({"--request", "{\"kind\":\"spit\"}"}, 2, "spit");
   expect_refused({"--hottest", "1", "--remark", "warm"}, 2, "without --save");
+  expect_refused({"--hottest", "1", "--save", "--reference", "joint"}, 2, "none is saved");
+  ASSERT_EQ(measure({"--pixel", "000,32,24", "--name", "joint L1", "--save"}).code, 0);
+  expect_refused({"--hottest", "1", "--save", "--reference", "joint"}, 2,
+                 "'joint', which is not in " + file().string() + "; name one of 'joint L1'");
   expect_refused({"--hottest", "1", "--save", "--name", std::string(300, 'n')}, 2, "300 bytes");
 }
 

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <map>
 
+#include "core/image/image_io.hpp"
 #include "core/session/session.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/core/session/session_account.hpp"
@@ -85,6 +86,25 @@ TEST_F(Resumed, ReplayVerbToo) {
       orbitfuse_program({"capture", once, "--driver", "synthetic,size=64x48,spacing=60"}).code, 0);
   make_killed_recording(14);
   resume({"replay", once, "--to", again});
+}
+
+TEST_F(Resumed, AnotherObjectIsNotReplayedIntoABegunSession) {
+  ASSERT_EQ(
+      orbitfuse_program({"capture", once, "--visible", "synthetic,size=64x48,spacing=60"}).code, 0);
+  make_killed_recording(5);
+  cv::Mat image(48, 64, CV_8UC3);
+  cv::randu(image, 0, 255);
+  ASSERT_TRUE(write_png(temp.path() / "photo.png", image));
+  const std::string other = temp.path() / "other";
+  ASSERT_EQ(orbitfuse_program({"import", other, "--visible", temp.path() / "photo.png"}).code, 0);
+  const std::string before = test::get(again + "/manifest.jsonl");
+  const Outcome refused = orbitfuse_program({"replay", other, "--to", again, "--resume"});
+  EXPECT_EQ(refused.code, 3) << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("holds 5 frames, none of them of " + other));
+  const Outcome forced = orbitfuse_program({"replay", once, "--to", again, "--force"});
+  EXPECT_EQ(forced.code, 2) << forced.err;
+  EXPECT_THAT(forced.err, HasSubstr("never overwritten"));
+  EXPECT_TRUE(test::get(again + "/manifest.jsonl") == before);
 }
 
 TEST_F(Resumed, DamagedFramesAreNotSaidToBeThere) {

@@ -69,11 +69,30 @@ TEST_F(SettingsTest, UnknownKeyNamesLineAndSuggestion) {
 }
 
 TEST_F(SettingsTest, WrongTypeSaysWhatItMustBe) {
-  EXPECT_THAT(read("[render]\nviews = 2.5\n").error().message(), HasSubstr("must be integer"));
+  EXPECT_THAT(read("[render]\nviews = 2.5\n").error().message(), HasSubstr("must be an integer"));
   EXPECT_THAT(read("[train]\nkind = 'slow'\n").error().message(),
               HasSubstr("one of fast faithful"));
   EXPECT_THAT(read("[render]\nviews = 99999999999999999999\n").error().message(), HasSubstr(":2"));
   EXPECT_THAT(read("[fusion]\nmethods = [1]\n").error().message(), HasSubstr("list"));
+}
+
+TEST_F(SettingsTest, ListsAndTablesAreNamedAsTheyWereWritten) {
+  const std::tuple<std::string, std::string, std::string> cases[] = {
+      {"[fusion]\nmethods = [1]\n", "config.toml:2: fusion.methods = [ 1 ]",
+       "it must be a list of texts, e.g. [\"heat\", \"best\"]"},
+      {"[fusion]\nmethods = 'heat'\n", "fusion.methods = 'heat'", "a list of texts"},
+      {"[render]\nviews = {a = 1}\n", "render.views = a table", "an integer"},
+      {"[render]\nviews = 2020-01-01\n", "render.views = 2020-01-01", "an integer"},
+      {"[render]\nviews = nan\n", "render.views = nan", "an integer"},
+      {"[render]\nviews = 5000000000\n", "render.views = 5000000000", "an integer nearer to 0"},
+      {"render = 3\n", "render = 3", "render is a table of settings: give one of them"},
+      {"[nonsense]\n", "unknown key 'nonsense'", "lists every key"}};
+  for (const auto& [text, found, wanted] : cases) {
+    const Status status = read(text);
+    ASSERT_FALSE(status) << text;
+    EXPECT_THAT(status.error().message(), testing::AllOf(HasSubstr(found), HasSubstr(wanted)));
+  }
+  EXPECT_TRUE(read("[render]\n[train.visible]\n")) << "nothing in it";
 }
 
 TEST_F(SettingsTest, AnOptionalNumberIsANumberOrAuto) {

@@ -56,6 +56,19 @@ TEST_F(RefusedFarm, WithoutSlurmTheFolderStaysFreeForAFarmOfThisMachine) {
   EXPECT_THAT(test::get(out / "farm.csv"), HasSubstr("visit,failed,poses_visible,"));
 }
 
+TEST_F(RefusedFarm, ADryRunOfAnOrderOnlyTellsHowTheFarmStands) {
+  ASSERT_EQ(start({}).code, 5);
+  const std::string plan = test::get(out / "farm.json");
+  fs::remove(out / "farm.html");
+  for (const char* order : {"resume", "cancel", "status"}) {
+    const Outcome told = farm({order, out.string(), "--dry-run"});
+    EXPECT_EQ(told.code, 0) << told.err;
+    EXPECT_THAT(told.out, HasSubstr("visit"));
+    EXPECT_FALSE(fs::exists(out / "farm.html")) << order;
+    EXPECT_EQ(test::get(out / "farm.json"), plan);
+  }
+}
+
 TEST_F(RefusedFarm, APartitionThatSlurmRefusesIsNamedAndTheNextTryIsTaken) {
   command("sbatch",
           "for word; do [ \"$word\" = --partition=nowhere ] && { echo 'sbatch: error: invalid "

@@ -107,6 +107,19 @@ TEST_F(FusionBatch, BadPairsAreToldAndLeftOut) {
   EXPECT_FALSE(fs::exists(temp.path() / "out/fused/odd.png"));
 }
 
+TEST_F(FusionBatch, ImagesOfOneNameAreNotWrittenOverEachOther) {
+  ASSERT_TRUE(write_jpeg(temp.path() / "v/a.jpg", noise({40, 32}, CV_8UC3, 8)));
+  ASSERT_TRUE(write_png(temp.path() / "t/alone.png", noise({40, 32}, CV_8UC1, 9)));
+  const auto summary = run();
+  ASSERT_TRUE(summary);
+  EXPECT_EQ(summary->fused, 1);
+  EXPECT_FALSE(fs::exists(temp.path() / "out/fused/a.png"));
+  ASSERT_EQ(summary->problems.size(), 2U);
+  EXPECT_NE(summary->problems[0].find("a.jpg: a.png is another image of that name"),
+            std::string::npos);
+  EXPECT_NE(summary->problems[1].find("alone.png: no visible image"), std::string::npos);
+}
+
 TEST_F(FusionBatch, NothingToFuseAndCancellingAreErrors) {
   const auto missing =
       fuse_folder(temp.path() / "v", temp.path() / "nowhere", temp.path() / "out", {}, {});

@@ -70,5 +70,25 @@ TEST(GroundTruth, PosesThatAreNotRigidAndNumbersThatAreNoneAreNamed) {
   }
 }
 
+TEST(GroundTruth, WhatWouldBeTakenForAnotherFrameIsNamed) {
+  const test::TempFolder folder;
+  const std::string pose = R"("c2w": [[1,0,0,0],[0,1,0,0],[0,0,1,0]])",
+                    one = R"({"file": "a.jpg", )" + pose + "}";
+  const auto with = [&](const std::string& frames, const std::string& test = "") {
+    put(folder / "t.json", "{\"visible\": {" + k + ", \"frames\": [" + frames + "]}, \"test\": {" +
+                               k + ", \"frames\": [" + test + "]}}");
+    const auto truth = read_ground_truth(folder / "t.json");
+    return truth ? std::string() : truth.error().message();
+  };
+  EXPECT_EQ(with(one), "");
+  EXPECT_THAT(with(one + ", " + one), AllOf(HasSubstr("visible.frames[1].file"),
+                                            HasSubstr("a.jpg, which is listed before")));
+  EXPECT_THAT(with(R"({"file": "", )" + pose + "}"), HasSubstr("visible.frames[0].file"));
+  EXPECT_THAT(with(""), AllOf(HasSubstr("visible.frames"), HasSubstr("an empty list")));
+  EXPECT_THAT(with(one, R"({"visible": 7, )" + pose + "}"), HasSubstr("test.frames[0].visible"));
+  EXPECT_THAT(with(R"({"file": "a.jpg", "c2w": [[NaN]]})"),
+              AllOf(HasSubstr("t.json"), HasSubstr("line 1"), HasSubstr("[N'")));
+}
+
 }  // namespace
 }  // namespace orbitfuse

@@ -103,6 +103,20 @@ TEST(Ply, CountsLargerThanTheFileTakeNoMemory) {
   }
 }
 
+TEST(Ply, CountsBelowZeroAndPropertiesGivenTwiceAreNamed) {
+  const TempFolder folder;
+  const auto refused = [&](const std::string& count, const std::string& second) {
+    put(folder / "a.ply", "ply\nformat ascii 1.0\nelement vertex " + count +
+                              "\nproperty float x\nproperty float " + second +
+                              "\nproperty float z\nend_header\n1 2 3\n");
+    const auto cloud = read_ply(folder / "a.ply");
+    return cloud ? std::string() : cloud.error().found;
+  };
+  EXPECT_EQ(refused("1", "y"), "");
+  EXPECT_EQ(refused("-1", "y"), "unreadable line \"element vertex -1\"");
+  EXPECT_EQ(refused("1", "x"), "two properties x");
+}
+
 TEST(Ply, WrongTypesAreNamed) {
   const TempFolder folder;
   put(folder / "t.ply",

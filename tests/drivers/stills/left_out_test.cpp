@@ -131,6 +131,42 @@ TEST_F(LeftOut, ANameThatAModelHasTwiceIsNamed) {
   EXPECT_THAT(report->warnings, Contains(HasSubstr("000.jpg is there 2 times")));
 }
 
+TEST_F(LeftOut, ImagesOfOneNameAreToldApartByTheirFoldersOrNotAtAll) {
+  for (const char* name : {"a/000.jpg", "b/000.jpg", "b/001.jpg"})
+    put_photo(name, static_cast<std::uint64_t>(name[0] + name[4]));
+  put("model/cameras.txt", "1 PINHOLE 40 30 40 40 20 15\n");
+  const auto put_model = [&](const std::string& first, const std::string& second) {
+    put("model/images.txt", "1 1 0 0 0 7 0 1 1 " + first + "\n\n2 1 0 0 0 8 0 1 1 " + second +
+                                "\n\n3 1 0 0 0 9 0 1 1 001.jpg\n\n");
+  };
+  options.visible = {folder / "a", folder / "b"};
+  options.visible_colmap = folder / "model";
+  const auto places = [&] {
+    std::map<std::string, double> x;
+    const auto report = import();
+    EXPECT_TRUE(report) << report.error().message();
+    for (const FrameRecord& frame : report->session.frames)
+      x[frame.source] = frame.cam_from_world ? frame.cam_from_world->translation.x() : 0;
+    fs::remove_all(folder / "session");
+    return x;
+  };
+  put_model("b/000.jpg", "a/000.jpg");
+  const auto both = places();
+  ASSERT_EQ(both.size(), 3u);
+  std::vector<double> x;
+  for (const auto& [source, place] : both) x.push_back(place);
+  EXPECT_THAT(x, testing::ElementsAre(8, 7, 9)) << "a/000, b/000, b/001";
+  put_model("a/000.jpg", "c/002.jpg");
+  x.clear();
+  for (const auto& [source, place] : places()) x.push_back(place);
+  EXPECT_THAT(x, testing::ElementsAre(7, 0, 9)) << "b/000 is another image";
+  put_model("000.jpg", "c/002.jpg");
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->with_pose, 1);
+  EXPECT_THAT(report->warnings, Contains(HasSubstr("has the name of another image")));
+}
+
 TEST_F(LeftOut, ALinkToASiblingIsOneImage) {
   put_photo("in/b.jpg", 1);
   fs::create_symlink("b.jpg", folder / "in/a_latest.jpg");

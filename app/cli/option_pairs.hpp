@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <initializer_list>
+#include <string>
+
+#include "core/result.hpp"
+
+namespace orbitfuse::cli {
+
+/// An option, and another that it depends on or has no meaning beside.
+struct OptionPair {
+  const char* option;
+  bool given;
+  const char* other;
+  bool other_given;
+};
+
+/// Usage error for the first option that is given without its other one: it would be passed over in
+/// silence.
+inline Status check_needs(std::initializer_list<OptionPair> pairs) {
+  for (const auto& [option, given, other, other_given] : pairs) {
+    if (given && !other_given)
+      return fail(ErrorKind::usage, option, std::string("given without ") + other,
+                  std::string("give ") + other + " too, or leave it out");
+  }
+  return {};
+}
+
+/// Usage error for the first option that is given beside one that leaves it no meaning.
+inline Status check_apart(std::initializer_list<OptionPair> pairs) {
+  for (const auto& [option, given, other, other_given] : pairs) {
+    if (given && other_given)
+      return fail(ErrorKind::usage, option, std::string("given with ") + other,
+                  "leave one of them out");
+  }
+  return {};
+}
+
+}  // namespace orbitfuse::cli

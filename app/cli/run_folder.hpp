@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "core/result.hpp"
+
+// What the --out folder of an earlier run says of itself.
+namespace orbitfuse::cli {
+
+inline constexpr const char* run_file = "run.json";
+
+/// run.json of an earlier run's folder, which names a session; null when there is none.
+Result<nlohmann::json> earlier_run(const std::string& folder);
+
+/// The session that the results in `out` are of, where it is another than `session`.
+std::optional<std::string> other_session(const std::string& out, const std::string& session);
+
+}  // namespace orbitfuse::cli

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Results whose session or record is gone, and truths that are not of them.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/image/image_io.hpp"
+#include "core/session/session.hpp"
+#include "tests/app/cli/program.hpp"
+#include "tests/app/cli/session_fixture.hpp"
+#include "tests/app/cli/small_run.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace orbitfuse {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+using testing::HasSubstr;
+
+class HostileRun : public testing::Test {
+ protected:
+  HostileRun() { write_fixture_session(session); }
+  void make_poses() const { ASSERT_EQ(on_out("poses", session).code, 0); }
+  Outcome on_out(const std::string& verb, const fs::path& of,
+                 std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {verb, of.string(), "--out", out.string()});
+    return orbitfuse_program(more);
+  }
+  /// The session's own poses as a truth, with these frames named anew.
+  json truth(const std::map<std::size_t, std::string>& renamed = {}) const {
+    json frames = json::array(), k;
+    const Session opened = open_session(session).value();
+    for (const FrameRecord* frame : opened.frames_of(Modality::visible)) {
+      const Camera& c = *frame->camera;
+      k = {{"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx}, {"cy", c.cy}, {"w", c.width}, {"h", c.height}};
+      const Eigen::Matrix3d turn = frame->cam_from_world->rotation.conjugate().toRotationMatrix() *
+                                   Eigen::Vector3d(1, -1, -1).asDiagonal();
+      const Eigen::Vector3d center = camera_center(*frame->cam_from_world);
+      json c2w = json::array();
+      for (int i = 0; i < 3; ++i) c2w.push_back({turn(i, 0), turn(i, 1), turn(i, 2), center[i]});
+      const auto name = renamed.find(frames.size());
+      frames.push_back(
+          {{"file", name == renamed.end() ? frame->file : name->second}, {"c2w", c2w}});
+    }
+    return {{"visible", {{"K", k}, {"frames", frames}}}};
+  }
+  Outcome eval(const json& truth) const {
+    test::put(temp / "truth.json", truth.dump());
+    return on_out("eval", session, {"--ground-truth", (temp / "truth.json").string(), "--json"});
+  }
+
+  const test::TempFolder temp;
+  const fs::path session = temp / "s", out = temp / "o";
+};
+
+TEST_F(HostileRun, ResultsWhoseSessionIsGoneSaySo) {
+  make_poses();
+  fs::rename(session, temp / "moved");
+  const Outcome told = orbitfuse_program({"inspect", out.string(), "--json"});
+  EXPECT_EQ(told.code, 0) << told.err;
+  EXPECT_EQ(told.result().at("session_found"), false);
+  EXPECT_THAT(told.err, HasSubstr("its session " + session.string() + " is not there any more"));
+  const Outcome refused = orbitfuse_program({"poses", out.string()});
+  EXPECT_EQ(refused.code, 3);
+  EXPECT_THAT(refused.err, HasSubstr("name the session where it is now, with --out"));
+  EXPECT_EQ(on_out("poses", temp / "moved").code, 0);
+  EXPECT_EQ(orbitfuse_program({"inspect", out.string(), "--json"}).result().at("session_found"),
+            true);
+}
+
+TEST_F(HostileRun, ResultsWithoutTheirRecordAreNoSession) {
+  make_poses();
+  fs::remove(out / "run.json");
+  const Outcome told = orbitfuse_program({"inspect", out.string(), "--json"});
+  EXPECT_EQ(told.code, 3);
+  EXPECT_THAT(told.err, HasSubstr("run.json: missing"));
+  EXPECT_EQ(told.result().at("stages").size(), 2u);
+  const Outcome refused = orbitfuse_program({"poses", out.string()});
+  EXPECT_EQ(refused.code, 3);
+  EXPECT_THAT(refused.err, HasSubstr("results of a run, but no run.json"));
+  EXPECT_EQ(on_out("poses", session).code, 0);
+  EXPECT_EQ(orbitfuse_program({"inspect", out.string()}).code, 0);
+}
+
+TEST_F(HostileRun, ATruthThatNamesTwoFramesAlikeMeasuresNeither) {
+  make_poses();
+  const Outcome whole = eval(truth());
+  ASSERT_EQ(whole.code, 0) << whole.err;
+  EXPECT_EQ(whole.result().at("poses_visible").at("posed"), 12);
+  const Outcome twice = eval(truth({{3, "elsewhere/000004.png"}}));
+  ASSERT_EQ(twice.code, 0) << twice.err;
+  const json found = twice.result().at("poses_visible");
+  EXPECT_EQ(found.at("posed"), 10);
+  EXPECT_LT(found.at("rotation_max_deg").get<double>(), 0.1);
+  EXPECT_THAT(twice.result().at("notes").dump(), HasSubstr("000004.png is there more than once"));
+}
+
+TEST_F(HostileRun, TestImagesOfAnotherCameraAreNamed) {
+  std::vector<std::string> words = small_run(session, out);
+  words.insert(words.end(), {"--stage", "train_visible"});
+  const Outcome run = orbitfuse_program(words);
+  ASSERT_EQ(run.code, 0) << run.err;
+  json with_test = truth();
+  with_test["test"] = {
+      {"K", with_test["visible"]["K"]},
+      {"frames", {{{"c2w", with_test["visible"]["frames"][0]["c2w"]}, {"visible", "test.png"}}}}};
+  ASSERT_TRUE(write_png(temp / "test.png", cv::Mat(36, 48, CV_8UC3, cv::Scalar::all(99))));
+  EXPECT_EQ(eval(with_test).code, 0) << "the same, smaller";
+  ASSERT_TRUE(write_png(temp / "test.png", cv::Mat(48, 48, CV_8UC3, cv::Scalar::all(99))));
+  const Outcome refused = eval(with_test);
+  EXPECT_EQ(refused.code, 3);
+  EXPECT_THAT(refused.err, HasSubstr("test.png: 48x48 pixels; test.K of the truth is for 96x72"));
+}
+
+}  // namespace
+}  // namespace orbitfuse
