@@ -12,6 +12,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "app/export/viewer_surface.hpp"
 #include "app/view/layers.hpp"
 #include "app/view/view_server.hpp"
 #include "core/numeric/median.hpp"
@@ -38,8 +39,8 @@ constexpr const char* timed_rest = R"((async () => {
     if (!times.own && r.width === size[0] && r.pictures.thermal && r.pictures.thermal.width === size[0]) times.own = now;
     if (r.finished && !times.whole) { times.whole = now; whole(); }
   }));
-  s.stand({ ...p, position: away.applyAxisAngle(up, 0.7).add(new THREE.Vector3(...p.target)).toArray() });
   const begun = performance.now();
+  s.stand({ ...p, position: away.applyAxisAngle(up, 0.7).add(new THREE.Vector3(...p.target)).toArray() });
   await done;
   viewer.onPicture.pop();
   return [times.first - begun, times.full - begun, (times.own || times.whole) - begun, times.whole - begun, size[0], size[1]];
@@ -54,7 +55,8 @@ constexpr const char* timed_turn = R"(new Promise(done => {
     const t = (performance.now() - begun) / 1000;
     if (t > 3) return done([drawn / t, s.share]);
     ++drawn;
-    s.stand({ ...p, position: away.clone().applyAxisAngle(up, t).add(target).toArray() });
+    s.camera.position.copy(away).applyAxisAngle(up, t).add(target);
+    s.controls.update();
     requestAnimationFrame(turn);
   };
   requestAnimationFrame(turn);
@@ -182,7 +184,7 @@ int report(const std::string& out, int views, const std::string& layer, bool ren
   if (rendering_only) return 0;
   PageOptions options;
   options.port = 0;
-  view::ViewServer server(*std::move(run), options);
+  view::ViewServer server(*std::move(run), options, exporting::viewer_surface);
   if (const Status started = server.start(); !started) {
     fmt::print(stderr, "{}\n", started.error().message());
     return 4;
@@ -190,7 +192,7 @@ int report(const std::string& out, int views, const std::string& layer, bool ren
   const test::TempFolder folder;
   test::Browser page(folder.path() / "profile", 1024, 768, false);
   page.open(server.urls().front());
-  const std::string rests = "viewer.surface.points && viewer.rest.finished";
+  const std::string rests = "viewer.surface.mesh && viewer.rest.finished";
   if (!page.becomes(rests)) return 5;
   page.evaluate("document.querySelector('#layers [data-value=" + layer + "]').click()");
   if (!page.becomes(rests)) return 5;
