@@ -170,12 +170,12 @@ class Surface {
     this.asked = true;
     requestAnimationFrame(() => {
       this.asked = false;
-      // The points lie in no order, so that the first of them are spread over the whole.
+      // Points lie in no order, so that the first of them are spread over the whole.
       const share = this.moving ? this.share : 1, begun = performance.now();
       if (this.points && !this.mesh) this.points.geometry.setDrawRange(0, Math.ceil(share * this.facts.surface.points));
       this.material.uniforms.size.value = this.facts.radius * 0.004 / Math.sqrt(share) * this.renderer.domElement.height / Math.tan(this.camera.fov * Math.PI / 360);
       this.renderer.render(this.world, this.camera);
-      if (!this.moving || !this.points) return;
+      if (!this.moving || !this.points || this.mesh) return;
       // A pixel that is read back waits for the picture.
       const gl = this.renderer.getContext();
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));

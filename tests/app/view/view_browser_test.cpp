@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <opencv2/imgcodecs.hpp>
 
+#include "app/export/viewer_surface.hpp"
 #include "app/stages/artifacts.hpp"
 #include "app/stages/measurement_scene.hpp"
 #include "app/view/view_server.hpp"
@@ -49,13 +50,17 @@ class ViewBrowserTest : public ::testing::Test {
     } else {
       fs::copy(made_once(), out, fs::copy_options::recursive);
     }
+    serve(exporting::viewer_surface);
+  }
+
+  void serve(const MeshMaker& make_mesh) {
     auto run = load_finished_run(out, stages::RunConfig(), {});
     ASSERT_TRUE(run) << run.error().message();
     PageOptions options;
     options.port = 0;
     options.token = "browser-token";
     options.require_token = true;
-    server = std::make_unique<ViewServer>(*std::move(run), options);
+    server = std::make_unique<ViewServer>(*std::move(run), options, make_mesh);
     ASSERT_TRUE(server->start());
     url = server->urls().front();
   }
@@ -177,6 +182,81 @@ TEST_F(ViewBrowserTest, LoadsTurnsSwitchesMeasuresSavesAndReloads) {
   EXPECT_TRUE(page.errors().empty()) << page.errors().front();
 }
 
+/// Points until the mesh is made; then the mesh, without a reload, in the colours of every layer.
+TEST_F(ViewBrowserTest, TheMeshComesInThePointsPlace) {
+  std::atomic<bool> held{true};
+  serve([&](const FinishedRun& run, const Progress& progress) {
+    while (held && !progress.cancelled())
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    return exporting::viewer_surface(run, progress);
+  });
+  orbitfuse::test::Browser page(folder.path() / "profile", 1280, 800, false);
+  page.open(url);
+  ASSERT_TRUE(page.becomes("viewer.surface.points")) << page.evaluate("$('hint').textContent");
+  ASSERT_TRUE(page.becomes("$('surface-words').textContent.includes('being made')"));
+  EXPECT_EQ(page.evaluate("viewer.surface.points.visible"), true);
+  EXPECT_EQ(page.evaluate("viewer.surface.meshAt(.5, .5)"), nullptr);
+  held = false;
+  ASSERT_TRUE(page.becomes("viewer.surface.mesh")) << page.evaluate("$('hint').textContent");
+  EXPECT_EQ(page.evaluate("$('surface-words').textContent"), "");
+  EXPECT_EQ(page.evaluate("viewer.surface.points.visible"), false);
+  const auto corners = page.evaluate("viewer.surface.mesh.geometry.index.count").get<int>();
+  EXPECT_GT(corners, 300);
+  EXPECT_LE(corners, 3 * exporting::viewer_triangles);
+  EXPECT_TRUE(fs::exists(out / exporting::viewer_surface_file));
+
+  page.evaluate("$('show-visible').click(); $('show-thermal').click()");
+  const cv::Rect middle(440, 200, 400, 400);
+  const auto moving = [&](const std::string& name) {
+    page.evaluate("viewer.rest.moved(); clearTimeout(viewer.rest.timer); viewer.rest.timer = 0");
+    EXPECT_TRUE(page.becomes("!$('rest').classList.contains('shown')"));
+    page.evaluate("new Promise(done => setTimeout(done, 300))");
+    return kept(name, page.screenshot());
+  };
+  choose(page, "visible");
+  const cv::Mat visible = moving("mesh_visible");
+  EXPECT_GT(lit_share(visible, middle), 0.2);
+  choose(page, "thermal");
+  const cv::Mat thermal = moving("mesh_thermal");
+  EXPECT_GT(difference(visible, thermal, middle), 20);
+  choose(page, "mix");
+  const cv::Mat mix = moving("mesh_mix");
+  EXPECT_GT(difference(mix, visible, middle), 10);
+  EXPECT_GT(difference(mix, thermal, middle), 10);
+  choose(page, "thermal");
+  page.evaluate("$('palette').value = 'rainbow'; $('palette').onchange()");
+  const cv::Mat rainbow = moving("mesh_rainbow");
+  EXPECT_GT(difference(rainbow, thermal, middle), 20);
+  page.evaluate("$('low').value = $('high').value; $('low').oninput()");
+  EXPECT_GT(difference(moving("mesh_span"), rainbow, middle), 20);
+
+  // What is touched is the mesh: nobody is asked where the surface is.
+  page.evaluate("viewer.rest.moved()");
+  ASSERT_TRUE(rests(page));
+  page.evaluate("window.asked = []; window.fetch = (f => (path, ...more) => { asked.push(path); return f(path, ...more); })(fetch)");
+  page.evaluate("document.querySelector('[data-value=spot]').click()");
+  page.press(640, 400);
+  ASSERT_TRUE(page.becomes("viewer.measuring.list.length === 1"))
+      << page.evaluate("$('measure-words').textContent");
+  EXPECT_EQ(page.evaluate("asked.includes('/pick')"), false);
+  EXPECT_GT(page.evaluate("viewer.measuring.list[0].answer.reading.frame_count").get<int>(), 0);
+  EXPECT_EQ(page.evaluate("viewer.measuring.list[0].request.places[0].point"),
+            page.evaluate("viewer.surface.meshAt(.5, .5)"));
+  EXPECT_TRUE(page.errors().empty()) << page.errors().front();
+}
+
+TEST_F(ViewBrowserTest, WithoutAMeshThePointsStayAndItSaysWhy) {
+  serve([](const FinishedRun&, const Progress&) -> Result<std::string> {
+    return fail(ErrorKind::quality, "surface", "only loose pieces", "choose a larger box");
+  });
+  orbitfuse::test::Browser page(folder.path() / "profile", 1280, 800, false);
+  page.open(url);
+  ASSERT_TRUE(page.becomes("$('surface-words').textContent.includes('only loose pieces')"));
+  EXPECT_EQ(page.evaluate("$('surface-words').className"), "warning");
+  EXPECT_EQ(page.evaluate("viewer.surface.points.visible"), true);
+  ASSERT_TRUE(rests(page));
+}
+
 /// A region with corners of one's own, its name and its emissivity; what was saved can go again.
 TEST_F(ViewBrowserTest, PolygonsHaveNamesAndParameters) {
   orbitfuse::test::Browser page(folder.path() / "profile", 1280, 800, false);
@@ -217,10 +297,22 @@ TEST_F(ViewBrowserTest, PolygonsHaveNamesAndParameters) {
   EXPECT_NE(page.evaluate("$('measure-words').textContent").get<std::string>().find("emissivity"),
             std::string::npos);
   page.evaluate("$('emissivity').value = '0.8'; $('recorded-emissivity').value = '0.95'");
+  page.evaluate("$('distance').value = '12'; $('air').value = '5'; $('humidity').value = '120'");
+  page.evaluate("viewer.measuring.again(viewer.measuring.list[0])");
+  EXPECT_NE(page.evaluate("$('measure-words').textContent").get<std::string>().find("humidity"),
+            std::string::npos);
+  page.evaluate("$('humidity').value = '40'");
   page.evaluate("viewer.measuring.again(viewer.measuring.list[0])");
   EXPECT_EQ(page.evaluate("viewer.measuring.list.length"), 1);
   const auto again = page.evaluate("viewer.measuring.list[0]");
   EXPECT_EQ(again.at("request").at("object").at("emissivity"), 0.8);
+  EXPECT_EQ(again.at("request").at("object").at("distance_m"), 12);
+  EXPECT_NEAR(again.at("request").at("object").at("atmospheric_k").get<double>(), 278.15, 1e-9);
+  EXPECT_EQ(again.at("request").at("object").at("relative_humidity"), 0.4);
+  EXPECT_NE(page.evaluate("$('measurements').textContent")
+                .get<std::string>()
+                .find("distance 12 m, air 5.0 °C, humidity 40 %"),
+            std::string::npos);
   EXPECT_EQ(again.at("name"), "lid");
   EXPECT_NE(again.at("answer").at("reading").at("temperature_k"),
             answer.at("reading").at("temperature_k"));
