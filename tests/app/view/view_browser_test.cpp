@@ -207,28 +207,27 @@ TEST_F(ViewBrowserTest, TheMeshComesInThePointsPlace) {
 
   page.evaluate("$('show-visible').click(); $('show-thermal').click()");
   const cv::Rect middle(440, 200, 400, 400);
-  const auto moving = [&](const std::string& name) {
+  // As while the camera moves: nothing is rendered.
+  const auto moving = [&](const std::string& layer, const std::string& name) {
+    page.evaluate("document.querySelector('[data-value=" + layer + "]').click()");
     page.evaluate("viewer.rest.moved(); clearTimeout(viewer.rest.timer); viewer.rest.timer = 0");
     EXPECT_TRUE(page.becomes("!$('rest').classList.contains('shown')"));
     page.evaluate("new Promise(done => setTimeout(done, 300))");
     return kept(name, page.screenshot());
   };
-  choose(page, "visible");
-  const cv::Mat visible = moving("mesh_visible");
+  const cv::Mat visible = moving("visible", "mesh_visible");
   EXPECT_GT(lit_share(visible, middle), 0.2);
-  choose(page, "thermal");
-  const cv::Mat thermal = moving("mesh_thermal");
+  const cv::Mat thermal = moving("thermal", "mesh_thermal");
   EXPECT_GT(difference(visible, thermal, middle), 20);
-  choose(page, "mix");
-  const cv::Mat mix = moving("mesh_mix");
+  const cv::Mat mix = moving("mix", "mesh_mix");
   EXPECT_GT(difference(mix, visible, middle), 10);
   EXPECT_GT(difference(mix, thermal, middle), 10);
-  choose(page, "thermal");
+  moving("thermal", "mesh_thermal");
   page.evaluate("$('palette').value = 'rainbow'; $('palette').onchange()");
-  const cv::Mat rainbow = moving("mesh_rainbow");
+  const cv::Mat rainbow = moving("thermal", "mesh_rainbow");
   EXPECT_GT(difference(rainbow, thermal, middle), 20);
   page.evaluate("$('low').value = $('high').value; $('low').oninput()");
-  EXPECT_GT(difference(moving("mesh_span"), rainbow, middle), 20);
+  EXPECT_GT(difference(moving("thermal", "mesh_span"), rainbow, middle), 20);
 
   // What is touched is the mesh: nobody is asked where the surface is.
   page.evaluate("viewer.rest.moved()");
@@ -297,11 +296,7 @@ TEST_F(ViewBrowserTest, PolygonsHaveNamesAndParameters) {
   EXPECT_NE(page.evaluate("$('measure-words').textContent").get<std::string>().find("emissivity"),
             std::string::npos);
   page.evaluate("$('emissivity').value = '0.8'; $('recorded-emissivity').value = '0.95'");
-  page.evaluate("$('distance').value = '12'; $('air').value = '5'; $('humidity').value = '120'");
-  page.evaluate("viewer.measuring.again(viewer.measuring.list[0])");
-  EXPECT_NE(page.evaluate("$('measure-words').textContent").get<std::string>().find("humidity"),
-            std::string::npos);
-  page.evaluate("$('humidity').value = '40'");
+  page.evaluate("$('distance').value = '12'; $('air').value = '5'; $('humidity').value = '40'");
   page.evaluate("viewer.measuring.again(viewer.measuring.list[0])");
   EXPECT_EQ(page.evaluate("viewer.measuring.list.length"), 1);
   const auto again = page.evaluate("viewer.measuring.list[0]");
