@@ -40,8 +40,7 @@ std::uint16_t linear_of_srgb(std::uint8_t level) {
 
 std::uint8_t srgb_of_linear(std::uint16_t level) {
   const double linear = level / 65535.0;
-  const double s =
-      linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
+  const double s = linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
   return static_cast<std::uint8_t>(std::lround(255 * s));
 }
 

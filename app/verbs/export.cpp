@@ -197,8 +197,7 @@ Status check_target(const fs::path& out, const fs::path& file) {
 
 Status run(Context& context, const Options& o) {
   std::vector<fs::path> files(o.files.begin(), o.files.end());
-  if (files.empty() && o.dataset.empty())
-    files.push_back(fs::path(o.out) / default_surface_file);
+  if (files.empty() && o.dataset.empty()) files.push_back(fs::path(o.out) / default_surface_file);
   for (const fs::path& file : files) ORBITFUSE_TRY(check_target(o.out, file));
   ORBITFUSE_ASSIGN(const SurfaceRequest request, request_of(o));
   Eigen::Vector3d up = Eigen::Vector3d::Zero();

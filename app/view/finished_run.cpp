@@ -3,12 +3,12 @@
 
 #include <fmt/format.h>
 
+#include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
 #include "app/stages/measurement_scene.hpp"
 #include "app/stages/recorded_detail.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
-#include "app/pipeline/stage_record.hpp"
 #include "app/view/surface.hpp"
 #include "core/formats/ply.hpp"
 #include "core/geometry/scene_ball.hpp"

@@ -13,7 +13,8 @@ namespace orbitfuse::view {
 
 /// The viewer of a finished run on a WebServer: one page with all it needs, the run's surface and
 /// cameras, and pictures of both fields from anywhere, rendered on request. What it keeps of the
-/// user's, bookmarks, goes to the run's folder. The surface is points until `make_mesh` has made it.
+/// user's, bookmarks, goes to the run's folder. The surface is points until `make_mesh` has made
+/// it.
 class ViewServer {
  public:
   ViewServer(FinishedRun run, PageOptions options, MeshMaker make_mesh = {});

@@ -6,7 +6,6 @@
 #include <chrono>
 #include <optional>
 
-
 namespace orbitfuse::view {
 namespace {
 

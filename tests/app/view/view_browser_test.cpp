@@ -1,111 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The viewer of a real run in a real browser without a screen: pixels and values are looked at.
-#include <gtest/gtest.h>
-
 #include <cstdlib>
-#include <opencv2/imgcodecs.hpp>
 
-#include "app/export/viewer_surface.hpp"
 #include "app/stages/artifacts.hpp"
 #include "app/stages/measurement_scene.hpp"
-#include "app/view/view_server.hpp"
 #include "core/temperature.hpp"
-#include "tests/app/cli/program.hpp"
-#include "tests/app/cli/session_fixture.hpp"
-#include "tests/support/browser.hpp"
-#include "tests/support/temp_folder.hpp"
+#include "tests/app/view/view_browser_fixture.hpp"
 
 namespace orbitfuse::view {
 namespace {
-namespace fs = std::filesystem;
-
-/// Pixels of a part of the picture that are not of its most frequent colour: something is drawn.
-double lit_share(const cv::Mat& image, const cv::Rect& part) {
-  std::map<std::tuple<int, int, int>, int> counts;
-  const cv::Mat inside = image(part & cv::Rect({}, image.size()));
-  for (int y = 0; y < inside.rows; ++y)
-    for (int x = 0; x < inside.cols; ++x) {
-      const auto p = inside.at<cv::Vec3b>(y, x);
-      ++counts[{p[0] / 8, p[1] / 8, p[2] / 8}];
-    }
-  int most = 0;
-  for (const auto& [color, count] : counts) most = std::max(most, count);
-  return 1 - static_cast<double>(most) / static_cast<double>(inside.total());
-}
-
-double difference(const cv::Mat& a, const cv::Mat& b, const cv::Rect& part) {
-  return cv::norm(a(part), b(part), cv::NORM_L1) / static_cast<double>(part.area());
-}
-
-class ViewBrowserTest : public ::testing::Test {
- protected:
-  void SetUp() override {
-    if (!orbitfuse::test::Browser::is_here()) GTEST_SKIP() << "chromium is not installed";
-    // ORBITFUSE_VIEW_RUN: another finished run to look at, e.g. of a container.
-    if (const char* given = std::getenv("ORBITFUSE_VIEW_RUN")) {
-      out = folder.path() / "copy";
-      fs::copy(given, out, fs::copy_options::recursive);
-      fs::remove(out / "measurements.json");
-      fs::remove(out / "bookmarks.json");
-    } else {
-      fs::copy(made_once(), out, fs::copy_options::recursive);
-    }
-    serve(exporting::viewer_surface);
-  }
-
-  void serve(const MeshMaker& make_mesh) {
-    auto run = load_finished_run(out, stages::RunConfig(), {});
-    ASSERT_TRUE(run) << run.error().message();
-    PageOptions options;
-    options.port = 0;
-    options.token = "browser-token";
-    options.require_token = true;
-    server = std::make_unique<ViewServer>(*std::move(run), options, make_mesh);
-    ASSERT_TRUE(server->start());
-    url = server->urls().front();
-  }
-
-  static fs::path made_once() {
-    static const orbitfuse::test::TempFolder made;
-    if (!fs::exists(made / "out" / "report")) make_run(made.path());
-    return made / "out";
-  }
-
-  static void make_run(const fs::path& in) {
-    const fs::path session = in / "session";
-    write_fixture_session(session);
-    std::vector<std::string> words = {"run", session.string(), "--out", (in / "out").string()};
-    for (const char* set :
-         {"train.visible.iterations=400", "train.thermal.iterations=400",
-          "train.visible.eval_count=0", "train.thermal.eval_count=0",
-          "train.visible.cloud_width_px=96", "train.thermal.cloud_width_px=96",
-          "train.visible.cloud_tolerance=0.2", "train.thermal.cloud_tolerance=0.2",
-          "render.views=2", "render.width_px=64"})
-      words.insert(words.end(), {"--set", set});
-    const Outcome made = orbitfuse_program(words);
-    ASSERT_EQ(made.code, 0) << made.err;
-  }
-
-  /// For a person to look at, where ORBITFUSE_SHOTS names a folder.
-  static cv::Mat kept(const std::string& name, const cv::Mat& shot) {
-    if (const char* to = std::getenv("ORBITFUSE_SHOTS"))
-      cv::imwrite((fs::path(to) / (name + ".png")).string(), shot);
-    return shot;
-  }
-
-  static bool rests(orbitfuse::test::Browser& page) {
-    return page.becomes("viewer.rest.finished && viewer.rest.level >= 2");
-  }
-  static void choose(orbitfuse::test::Browser& page, const std::string& layer) {
-    page.evaluate("document.querySelector('[data-value=" + layer + "]').click()");
-    EXPECT_TRUE(rests(page));
-  }
-
-  orbitfuse::test::TempFolder folder;
-  fs::path out = folder.path() / "out";
-  std::unique_ptr<ViewServer> server;
-  std::string url;
-};
 
 TEST_F(ViewBrowserTest, LoadsTurnsSwitchesMeasuresSavesAndReloads) {
   orbitfuse::test::Browser page(folder.path() / "profile", 1280, 800, false);
@@ -180,80 +83,6 @@ TEST_F(ViewBrowserTest, LoadsTurnsSwitchesMeasuresSavesAndReloads) {
   for (int i = 0; i < 3; ++i)
     EXPECT_NEAR(again["position"][i].get<double>(), pose["position"][i].get<double>(), 1e-6);
   EXPECT_TRUE(page.errors().empty()) << page.errors().front();
-}
-
-/// Points until the mesh is made; then the mesh, without a reload, in the colours of every layer.
-TEST_F(ViewBrowserTest, TheMeshComesInThePointsPlace) {
-  std::atomic<bool> held{true};
-  serve([&](const FinishedRun& run, const Progress& progress) {
-    while (held && !progress.cancelled())
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    return exporting::viewer_surface(run, progress);
-  });
-  orbitfuse::test::Browser page(folder.path() / "profile", 1280, 800, false);
-  page.open(url);
-  ASSERT_TRUE(page.becomes("viewer.surface.points")) << page.evaluate("$('hint').textContent");
-  ASSERT_TRUE(page.becomes("$('surface-words').textContent.includes('being made')"));
-  EXPECT_EQ(page.evaluate("viewer.surface.points.visible"), true);
-  EXPECT_EQ(page.evaluate("viewer.surface.meshAt(.5, .5)"), nullptr);
-  held = false;
-  ASSERT_TRUE(page.becomes("viewer.surface.mesh")) << page.evaluate("$('hint').textContent");
-  EXPECT_EQ(page.evaluate("$('surface-words').textContent"), "");
-  EXPECT_EQ(page.evaluate("viewer.surface.points.visible"), false);
-  const auto corners = page.evaluate("viewer.surface.mesh.geometry.index.count").get<int>();
-  EXPECT_GT(corners, 300);
-  EXPECT_LE(corners, 3 * exporting::viewer_triangles);
-  EXPECT_TRUE(fs::exists(out / exporting::viewer_surface_file));
-
-  page.evaluate("$('show-visible').click(); $('show-thermal').click()");
-  const cv::Rect middle(440, 200, 400, 400);
-  // As while the camera moves: nothing is rendered.
-  const auto moving = [&](const std::string& layer, const std::string& name) {
-    page.evaluate("document.querySelector('[data-value=" + layer + "]').click()");
-    page.evaluate("viewer.rest.moved(); clearTimeout(viewer.rest.timer); viewer.rest.timer = 0");
-    EXPECT_TRUE(page.becomes("!$('rest').classList.contains('shown')"));
-    page.evaluate("new Promise(done => setTimeout(done, 300))");
-    return kept(name, page.screenshot());
-  };
-  const cv::Mat visible = moving("visible", "mesh_visible");
-  EXPECT_GT(lit_share(visible, middle), 0.2);
-  const cv::Mat thermal = moving("thermal", "mesh_thermal");
-  EXPECT_GT(difference(visible, thermal, middle), 20);
-  const cv::Mat mix = moving("mix", "mesh_mix");
-  EXPECT_GT(difference(mix, visible, middle), 10);
-  EXPECT_GT(difference(mix, thermal, middle), 10);
-  moving("thermal", "mesh_thermal");
-  page.evaluate("$('palette').value = 'rainbow'; $('palette').onchange()");
-  const cv::Mat rainbow = moving("thermal", "mesh_rainbow");
-  EXPECT_GT(difference(rainbow, thermal, middle), 20);
-  page.evaluate("$('low').value = $('high').value; $('low').oninput()");
-  EXPECT_GT(difference(moving("thermal", "mesh_span"), rainbow, middle), 20);
-
-  // What is touched is the mesh: nobody is asked where the surface is.
-  page.evaluate("viewer.rest.moved()");
-  ASSERT_TRUE(rests(page));
-  page.evaluate("window.asked = []; window.fetch = (f => (path, ...more) => { asked.push(path); return f(path, ...more); })(fetch)");
-  page.evaluate("document.querySelector('[data-value=spot]').click()");
-  page.press(640, 400);
-  ASSERT_TRUE(page.becomes("viewer.measuring.list.length === 1"))
-      << page.evaluate("$('measure-words').textContent");
-  EXPECT_EQ(page.evaluate("asked.includes('/pick')"), false);
-  EXPECT_GT(page.evaluate("viewer.measuring.list[0].answer.reading.frame_count").get<int>(), 0);
-  EXPECT_EQ(page.evaluate("viewer.measuring.list[0].request.places[0].point"),
-            page.evaluate("viewer.surface.meshAt(.5, .5)"));
-  EXPECT_TRUE(page.errors().empty()) << page.errors().front();
-}
-
-TEST_F(ViewBrowserTest, WithoutAMeshThePointsStayAndItSaysWhy) {
-  serve([](const FinishedRun&, const Progress&) -> Result<std::string> {
-    return fail(ErrorKind::quality, "surface", "only loose pieces", "choose a larger box");
-  });
-  orbitfuse::test::Browser page(folder.path() / "profile", 1280, 800, false);
-  page.open(url);
-  ASSERT_TRUE(page.becomes("$('surface-words').textContent.includes('only loose pieces')"));
-  EXPECT_EQ(page.evaluate("$('surface-words').className"), "warning");
-  EXPECT_EQ(page.evaluate("viewer.surface.points.visible"), true);
-  ASSERT_TRUE(rests(page));
 }
 
 /// A region with corners of one's own, its name and its emissivity; what was saved can go again.
