@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <sstream>
 
 #include "core/system/file_io.hpp"
@@ -35,6 +36,12 @@ std::uint16_t linear_of_srgb(std::uint8_t level) {
   const double s = level / 255.0;
   const double linear = s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);
   return static_cast<std::uint16_t>(std::lround(65535 * linear));
+}
+
+std::uint8_t srgb_of_linear(std::uint16_t level) {
+  const double linear = level / 65535.0;
+  const double s = linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
+  return static_cast<std::uint8_t>(std::lround(255 * s));
 }
 
 template <class Vector>
@@ -121,6 +128,26 @@ tinygltf::Primitive primitive_of(const TriangleMesh& mesh, const std::vector<Ver
   return p;
 }
 
+/// The items of an accessor; none where the file has no such ones.
+template <class Item>
+std::vector<Item> items_of(const tinygltf::Model& model, int accessor, int component, int type) {
+  const auto at = static_cast<std::size_t>(accessor);
+  if (accessor < 0 || at >= model.accessors.size() || model.buffers.empty()) return {};
+  const tinygltf::Accessor& a = model.accessors[at];
+  const auto of = static_cast<std::size_t>(a.bufferView);
+  if (a.componentType != component || a.type != type || a.byteOffset != 0 || a.bufferView < 0 ||
+      of >= model.bufferViews.size())
+    return {};
+  const tinygltf::BufferView& view = model.bufferViews[of];
+  const auto& data = model.buffers[0].data;
+  if (view.buffer != 0 || view.byteStride != 0 || view.byteOffset > data.size() ||
+      view.byteLength > data.size() - view.byteOffset)
+    return {};
+  std::vector<Item> items(view.byteLength / sizeof(Item));
+  std::memcpy(items.data(), data.data() + view.byteOffset, items.size() * sizeof(Item));
+  return items;
+}
+
 }  // namespace
 
 Status write_glb(const std::filesystem::path& path, const TriangleMesh& mesh,
@@ -167,6 +194,46 @@ Status write_glb(const std::filesystem::path& path, const TriangleMesh& mesh,
     return fail(ErrorKind::input, path.string(), "more than a GLB holds (4 GiB)",
                 "ask for fewer --triangles");
   return write_file_atomic(path, bytes.str());
+}
+
+Result<TriangleMesh> read_glb(const std::filesystem::path& path) {
+  const auto wrong = [&](const std::string& found) {
+    return fail(ErrorKind::input, path.string(), found, "export the surface again");
+  };
+  ORBITFUSE_ASSIGN(const std::string bytes, read_file(path));
+  tinygltf::Model model;
+  std::string error, warning;
+  if (!tinygltf::TinyGLTF().LoadBinaryFromMemory(
+          &model, &error, &warning, reinterpret_cast<const unsigned char*>(bytes.data()),
+          static_cast<unsigned>(bytes.size())))
+    return wrong("no GLB, or cut");
+  if (model.meshes.size() != 1 || model.meshes[0].primitives.size() != 1)
+    return wrong("not one surface");
+  const tinygltf::Primitive& p = model.meshes[0].primitives[0];
+  const auto accessor = [&](const char* name) {
+    const auto found = p.attributes.find(name);
+    return found == p.attributes.end() ? -1 : found->second;
+  };
+  TriangleMesh mesh;
+  PointCloud& v = mesh.vertices;
+  for (const auto& x : items_of<std::array<float, 3>>(
+           model, accessor("POSITION"), TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC3))
+    v.positions.emplace_back(x[0], -x[2], x[1]);
+  for (const auto& c : items_of<std::array<std::uint16_t, 4>>(
+           model, accessor("COLOR_0"), TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, TINYGLTF_TYPE_VEC4))
+    v.colors.push_back({srgb_of_linear(c[0]), srgb_of_linear(c[1]), srgb_of_linear(c[2])});
+  for (const float k : items_of<float>(model, accessor("_TEMPERATURE"),
+                                       TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_SCALAR))
+    v.temperatures_k.push_back(k > 0 ? k : std::numeric_limits<float>::quiet_NaN());
+  mesh.triangles = items_of<std::array<std::uint32_t, 3>>(
+      model, p.indices, TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT, TINYGLTF_TYPE_SCALAR);
+  for (const std::size_t count : {v.colors.size(), v.temperatures_k.size()})
+    if (count != 0 && count != v.size()) return wrong("an attribute that is not one a vertex");
+  for (const auto& triangle : mesh.triangles)
+    for (const std::uint32_t corner : triangle)
+      if (corner >= v.size()) return wrong("a triangle with a corner that is none of its vertices");
+  if (mesh.empty()) return wrong("no triangles");
+  return mesh;
 }
 
 }  // namespace orbitfuse::exporting

@@ -18,4 +18,8 @@ namespace orbitfuse::exporting {
 Status write_glb(const std::filesystem::path& path, const TriangleMesh& mesh,
                  const nlohmann::json& extras, const std::vector<VertexScalar>& scalars = {});
 
+/// Positions (z up again), colours, temperatures (NaN = none) and triangles of a file of write_glb.
+/// Errors: input (no such file, cut, or not laid out as write_glb's are).
+Result<TriangleMesh> read_glb(const std::filesystem::path& path);
+
 }  // namespace orbitfuse::exporting

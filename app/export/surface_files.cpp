@@ -11,6 +11,7 @@
 #include "core/formats/obj.hpp"
 #include "core/formats/ply.hpp"
 #include "core/image/palette.hpp"
+#include "core/system/file_io.hpp"
 
 namespace orbitfuse::exporting {
 namespace {
@@ -54,6 +55,7 @@ json sidecar(const view::FinishedRun& run, const FieldSurface& surface, const Tr
              const ExportFrame& frame, const FileOptions& options) {
   json j = to_json(frame);
   j["schema"] = 1;
+  if (!options.made_of.empty()) j["made_of"] = options.made_of;
   j["run"] = fs::absolute(run.out).lexically_normal().string();
   j["vertices"] = mesh.vertices.size();
   j["triangles"] = mesh.triangles.size();
@@ -104,6 +106,22 @@ Result<FieldSurface> surface_of_run(const view::FinishedRun& run, const SurfaceR
   return field_surface(fields, box, options, progress);
 }
 
+std::string surface_key(const view::FinishedRun& run, const SurfaceRequest& request) {
+  if (run.identity.empty()) return {};
+  /// One more whenever surfaces of the same fields come out differently.
+  constexpr int version = 1;
+  const SurfaceOptions& how = request.surface.surface;
+  std::vector<double> box;
+  if (request.crop == Crop::box)
+    for (const Eigen::Vector3d& corner : {request.box.min(), request.box.max()})
+      box.insert(box.end(), corner.begin(), corner.end());
+  json ground;
+  if (how.without_ground) ground = how.ground_clearance;
+  return content_hash(json{version, run.identity, run.config.render.min_opacity,
+                           static_cast<int>(request.crop), box, ground}
+                          .dump());
+}
+
 Status check_extension(const fs::path& file) {
   const std::string extension = extension_of(file);
   for (const char* known : {".glb", ".ply", ".obj", ".las"})
@@ -122,7 +140,7 @@ Status write_surface(const fs::path& file, const view::FinishedRun& run,
     ORBITFUSE_TRY(paint_temperatures(run, options.palette, mesh.vertices));
   const std::string extension = extension_of(file);
   if (extension == ".las" || (extension == ".ply" && options.points)) mesh.triangles.clear();
-  const json about = sidecar(run, surface, mesh, frame, options);
+  json about = sidecar(run, surface, mesh, frame, options);
   const std::vector<std::string> comments = {"unit " + frame.unit() + ", up z; " + frame.words()};
   Status written;
   if (extension == ".glb") {
@@ -139,6 +157,7 @@ Status write_surface(const fs::path& file, const view::FinishedRun& run,
     written = write_las(file, mesh.vertices);
   }
   ORBITFUSE_TRY(written);
+  ORBITFUSE_ASSIGN(about["file_hash"], file_hash(file));
   return stages::write_json(file.string() + ".json", about);
 }
 

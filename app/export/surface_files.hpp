@@ -28,6 +28,10 @@ struct SurfaceRequest {
 Result<FieldSurface> surface_of_run(const view::FinishedRun& run, const SurfaceRequest& request,
                                     const Progress& progress);
 
+/// What a surface is made of and how, apart from how many triangles it is reduced to. Empty where
+/// the run's identity is not known.
+std::string surface_key(const view::FinishedRun& run, const SurfaceRequest& request);
+
 enum class VertexColors { visible, temperature };
 
 struct FileOptions {
@@ -35,7 +39,11 @@ struct FileOptions {
   std::string palette = "inferno";
   std::string temperature_name = "temperature";  ///< of PLY (PlyWriteOptions)
   bool points = false;                           ///< PLY without faces
+  std::string made_of;                           ///< surface_key(), for the sidecar
 };
+
+/// In the run's folder, where none is named.
+inline constexpr const char* default_surface_file = "export/surface.glb";
 
 /// One file in the format of its extension (.glb, .ply, .obj, .las) and FILE.json beside it, which
 /// says the frame and what is missing. Errors: usage (another extension, colours by temperature

@@ -66,8 +66,10 @@ Result<SurfaceRequest> request_of(const Options& o) {
   return request;
 }
 
-Result<FileOptions> file_options(const Options& o, const view::FinishedRun& run) {
+Result<FileOptions> file_options(const Options& o, const view::FinishedRun& run,
+                                 const SurfaceRequest& request) {
   FileOptions files;
+  files.made_of = surface_key(run, request);
   files.points = o.points;
   if (o.colors == "temperature") files.colors = VertexColors::temperature;
   files.palette = o.palette.empty() ? run.config.render.palette : o.palette;
@@ -211,8 +213,7 @@ Status check_pairs(const Options& o) {
 Status run(Context& context, const Options& o) {
   ORBITFUSE_TRY(check_pairs(o));
   std::vector<fs::path> files(o.files.begin(), o.files.end());
-  if (files.empty() && o.dataset.empty())
-    files.push_back(fs::path(o.out) / "export" / "surface.glb");
+  if (files.empty() && o.dataset.empty()) files.push_back(fs::path(o.out) / default_surface_file);
   for (const fs::path& file : files) ORBITFUSE_TRY(check_target(o.out, file));
   if (!o.dataset.empty()) ORBITFUSE_TRY(check_dataset_folder(o.dataset));
   ORBITFUSE_ASSIGN(const SurfaceRequest request, request_of(o));
@@ -224,7 +225,7 @@ Status run(Context& context, const Options& o) {
   }
   ORBITFUSE_ASSIGN(const view::FinishedRun run,
                    view::load_finished_run(o.out, context.config, context.progress));
-  ORBITFUSE_ASSIGN(const FileOptions how, file_options(o, run));
+  ORBITFUSE_ASSIGN(const FileOptions how, file_options(o, run, request));
   for (const std::string& note : run.notes) context.console.warning(note);
   ORBITFUSE_ASSIGN(const auto scale, scale_of(context, o, run));
   ORBITFUSE_ASSIGN(const ExportFrame frame, export_frame(up, scale));

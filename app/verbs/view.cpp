@@ -6,6 +6,7 @@
 
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
+#include "app/export/viewer_surface.hpp"
 
 namespace orbitfuse::cli {
 namespace {
@@ -21,7 +22,8 @@ Status view_run(Context& context, const Options& o) {
                    view::load_finished_run(o.run, context.config, context.progress));
   for (const std::string& note : run.notes) context.console.warning(note);
   context.result = {{"run", o.run}, {"views", run.views.size()}, {"points", run.surface.size()}};
-  view::ViewServer server(std::move(run), page);
+  view::ViewServer server(std::move(run), page,
+                          context.common.dry_run ? view::MeshMaker() : exporting::viewer_surface);
   ORBITFUSE_TRY(server.start());
   if (context.common.dry_run) {
     context.console.info("the run can be shown, and the port is free");

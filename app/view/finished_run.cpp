@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
 #include "app/stages/measurement_scene.hpp"
 #include "app/stages/recorded_detail.hpp"
@@ -11,6 +12,7 @@
 #include "app/view/surface.hpp"
 #include "core/formats/ply.hpp"
 #include "core/geometry/scene_ball.hpp"
+#include "core/system/file_io.hpp"
 #include "recon/assembly/new_views.hpp"
 
 namespace orbitfuse::view {
@@ -18,6 +20,18 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int picture_width_px = 640;  ///< of the viewer's
+
+Result<std::string> identity_of(const pipeline::StageContext& context) {
+  std::string made_of;
+  for (const char* stage :
+       {"poses_visible", "poses_thermal", "train_visible", "train_thermal", "register"}) {
+    if (!context.has(stage)) continue;
+    ORBITFUSE_ASSIGN(const pipeline::StageRecord record,
+                     pipeline::read_stage_record(context.of(stage)));
+    made_of += stage + (" " + record.outputs_hash()) + "\n";
+  }
+  return content_hash(made_of);
+}
 
 Status load_fields(const pipeline::StageContext& context, FinishedRun& run) {
   if (context.has("train_visible")) {
@@ -155,6 +169,7 @@ Result<FinishedRun> load_finished_run(const fs::path& out, const stages::RunConf
   run.config = config;
   const pipeline::StageContext context = stages::context_of_run(out);
   ORBITFUSE_TRY(stages::check_up_to_date(out));
+  ORBITFUSE_ASSIGN(run.identity, identity_of(context));
   ORBITFUSE_TRY(load_fields(context, run));
   ORBITFUSE_TRY(progress.check("view"));
   ORBITFUSE_ASSIGN(const auto record, stages::read_json(out / "run.json"));

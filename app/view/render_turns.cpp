@@ -64,6 +64,11 @@ std::size_t RenderTurns::waiting() const {
   return impl_->waiting.size();
 }
 
+bool RenderTurns::busy() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->taken || !impl_->waiting.empty();
+}
+
 RenderTurns::Turn::~Turn() {
   if (turns_ == nullptr) return;
   const std::lock_guard lock(turns_->impl_->mutex);

@@ -55,6 +55,8 @@ class RenderTurns {
 
   /// How many jobs wait for their turn.
   std::size_t waiting() const;
+  /// A piece is being rendered, or waited for.
+  bool busy() const;
   /// Ends all jobs, and those that come later at once.
   void close();
 

@@ -104,4 +104,18 @@ std::string packed(const PointCloud& surface, double kelvin_per_count) {
   return bytes;
 }
 
+std::string packed(const TriangleMesh& mesh) {
+  float hottest_k = 0;
+  for (const float k : mesh.vertices.temperatures_k) hottest_k = std::max(hottest_k, k);
+  const double kelvin_per_count = kelvin_per_count_for(static_cast<double>(hottest_k));
+  std::string bytes;
+  append(bytes, static_cast<std::uint32_t>(mesh.triangles.size()));
+  append(bytes, static_cast<float>(kelvin_per_count));
+  bytes += packed(mesh.vertices, kelvin_per_count);
+  bytes.resize((bytes.size() + 3) / 4 * 4);
+  for (const auto& triangle : mesh.triangles)
+    for (const std::uint32_t corner : triangle) append(bytes, corner);
+  return bytes;
+}
+
 }  // namespace orbitfuse::view

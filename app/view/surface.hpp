@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "core/geometry/point_cloud.hpp"
+#include "core/geometry/triangle_mesh.hpp"
 
 namespace orbitfuse::view {
 
@@ -19,5 +19,9 @@ PointCloud surface_of(const PointCloud& visible, PointCloud thermal);
 /// none), padding to an even offset, uint16 temperatures[count] (counts of
 /// `kelvin_per_count`, 0 = none).
 std::string packed(const PointCloud& surface, double kelvin_per_count);
+
+/// Likewise: uint32 triangle count, float32 kelvin_per_count, the vertices as above, padding to a
+/// multiple of four, uint32 corners[3 * triangles].
+std::string packed(const TriangleMesh& mesh);
 
 }  // namespace orbitfuse::view

@@ -43,8 +43,10 @@ WebAnswer answer_of(Result<Value> value, Make make) {
 }  // namespace
 
 struct ViewServer::Impl {
-  Impl(FinishedRun r, PageOptions options)
-      : run(std::move(r)), server(std::move(options), site()) {}
+  Impl(FinishedRun r, PageOptions options, MeshMaker make_mesh)
+      : run(std::move(r)),
+        mesh(run, turns, std::move(make_mesh)),
+        server(std::move(options), site()) {}
 
   FinishedRun run;
   RenderTurns turns;
@@ -52,6 +54,7 @@ struct ViewServer::Impl {
   Bookmarks bookmarks{run.out};
   FilmMaker films{run, layers, turns};
   Measuring measuring{run};
+  MeshMaking mesh;
   std::string page = page_html(), scene = shown_json(scene_json(run)),
               surface = packed(run.surface, surface_kelvin_per_count(run));
   WebServer server;
@@ -161,6 +164,12 @@ struct ViewServer::Impl {
            return {200, "application/json", scene};
          }},
         {"/surface", [this](const WebRequest&) { return bytes_answer(surface); }},
+        {"/mesh",
+         [this](const WebRequest&) {
+           return answer_of(mesh.found(), [](const std::shared_ptr<const std::string>& bytes) {
+             return bytes ? bytes_answer(*bytes) : text_answer(202, "it is being made");
+           });
+         }},
         {"/photo/([0-9]{1,6})",
          [this](const WebRequest& request) {
            return answer_of(photo(run, std::stoul(request.parts.at(0))), bytes_answer);
@@ -212,16 +221,21 @@ struct ViewServer::Impl {
   }
 };
 
-ViewServer::ViewServer(FinishedRun run, PageOptions options)
-    : impl_(std::make_unique<Impl>(std::move(run), std::move(options))) {}
+ViewServer::ViewServer(FinishedRun run, PageOptions options, MeshMaker make_mesh)
+    : impl_(std::make_unique<Impl>(std::move(run), std::move(options), std::move(make_mesh))) {}
 
 ViewServer::~ViewServer() { stop(); }
 
-Status ViewServer::start() { return impl_->server.start(); }
+Status ViewServer::start() {
+  ORBITFUSE_TRY(impl_->server.start());
+  impl_->mesh.start();
+  return {};
+}
 
 void ViewServer::stop() {
   impl_->turns.close();
   impl_->films.stop();
+  impl_->mesh.stop();
   impl_->server.stop();
 }
 

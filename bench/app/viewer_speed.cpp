@@ -12,6 +12,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "app/export/viewer_surface.hpp"
 #include "app/view/layers.hpp"
 #include "app/view/view_server.hpp"
 #include "core/numeric/median.hpp"
@@ -38,23 +39,37 @@ constexpr const char* timed_rest = R"((async () => {
     if (!times.own && r.width === size[0] && r.pictures.thermal && r.pictures.thermal.width === size[0]) times.own = now;
     if (r.finished && !times.whole) { times.whole = now; whole(); }
   }));
-  s.stand({ ...p, position: away.applyAxisAngle(up, 0.7).add(new THREE.Vector3(...p.target)).toArray() });
   const begun = performance.now();
+  s.stand({ ...p, position: away.applyAxisAngle(up, 0.7).add(new THREE.Vector3(...p.target)).toArray() });
   await done;
   viewer.onPicture.pop();
   return [times.first - begun, times.full - begun, (times.own || times.whole) - begun, times.whole - begun, size[0], size[1]];
 })())";
 
-/// Pictures a second while the camera turns for three seconds.
+/// The same to the first picture after a drag by the left button, whose release is the rest.
+constexpr const char* armed_for_a_drag = R"((() => {
+  window.dragged = {};
+  $("surface").addEventListener("pointerup", () => { dragged.begun = performance.now(); }, { once: true, capture: true });
+  const seen = () => { if (dragged.begun && !dragged.first && viewer.rest.level >= 0) dragged.first = performance.now(); };
+  viewer.onPicture.push(seen);
+})())";
+constexpr const char* time_of_the_drag = "viewer.onPicture.pop(), dragged.first - dragged.begun";
+
+/// Pictures a second while the camera turns for three seconds, all of them drawn by then.
 constexpr const char* timed_turn = R"(new Promise(done => {
   const s = viewer.surface, p = s.pose(), up = new THREE.Vector3(...viewer.scene.up), target = new THREE.Vector3(...p.target);
   const away = new THREE.Vector3(...p.position).sub(target), begun = performance.now();
   let drawn = 0;
   const turn = () => {
     const t = (performance.now() - begun) / 1000;
-    if (t > 3) return done([drawn / t, s.share]);
+    if (t > 3) {
+      const gl = s.renderer.getContext();
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+      return done([1000 * drawn / (performance.now() - begun)]);
+    }
     ++drawn;
-    s.stand({ ...p, position: away.clone().applyAxisAngle(up, t).add(target).toArray() });
+    s.camera.position.copy(away).applyAxisAngle(up, t).add(target);
+    s.controls.update();
     requestAnimationFrame(turn);
   };
   requestAnimationFrame(turn);
@@ -182,7 +197,7 @@ int report(const std::string& out, int views, const std::string& layer, bool ren
   if (rendering_only) return 0;
   PageOptions options;
   options.port = 0;
-  view::ViewServer server(*std::move(run), options);
+  view::ViewServer server(*std::move(run), options, exporting::viewer_surface);
   if (const Status started = server.start(); !started) {
     fmt::print(stderr, "{}\n", started.error().message());
     return 4;
@@ -190,13 +205,12 @@ int report(const std::string& out, int views, const std::string& layer, bool ren
   const test::TempFolder folder;
   test::Browser page(folder.path() / "profile", 1024, 768, false);
   page.open(server.urls().front());
-  const std::string rests = "viewer.surface.points && viewer.rest.finished";
+  const std::string rests = "viewer.surface.mesh && viewer.rest.finished";
   if (!page.becomes(rests)) return 5;
   page.evaluate("document.querySelector('#layers [data-value=" + layer + "]').click()");
   if (!page.becomes(rests)) return 5;
-  std::vector<double> first, full, own, whole, rate, cpu_s;
+  std::vector<double> first, released, full, own, whole, rate, cpu_s;
   nlohmann::json last;
-  double share = 0;
   for (int i = 0; i < views; ++i) {
     const UsageClock spent;
     last = page.evaluate(timed_rest);
@@ -205,29 +219,28 @@ int report(const std::string& out, int views, const std::string& layer, bool ren
     full.push_back(last[1].get<double>());
     own.push_back(last[2].get<double>());
     whole.push_back(last[3].get<double>());
-    const nlohmann::json turned = page.evaluate(timed_turn);
-    rate.push_back(turned[0].get<double>());
-    share = turned[1].get<double>();
+    page.evaluate(armed_for_a_drag);
+    page.drag(500, 400, 560, 410);
+    if (!page.becomes("dragged.first && viewer.rest.finished")) return 5;
+    released.push_back(page.evaluate(time_of_the_drag).get<double>());
+    rate.push_back(page.evaluate(timed_turn)[0].get<double>());
     if (!page.becomes(rests)) return 5;
   }
   fmt::print(
       "{}, {} threads; {}, layer {}, {} views: median (most)\n\n"
-      "| first picture ms | {}x{} s, coarse temperatures | full temperatures s | with detail s | "
-      "CPU "
-      "s of the server | "
-      "pictures a second while moving "
-      "| of the points |\n|---|---|---|---|---|---|\n",
+      "| first picture ms | after a drag ms | {}x{} s, coarse temperatures | full temperatures s | "
+      "with detail s | CPU s of the server | pictures a second while moving |\n"
+      "|---|---|---|---|---|---|---|\n",
       cpu_description(), thread_count(), out, layer, views, last[4].get<int>(), last[5].get<int>());
   const auto most = [](const std::vector<double>& v) {
     return *std::max_element(v.begin(), v.end());
   };
   fmt::print(
-      "| {:.0f} ({:.0f}) | {:.2f} ({:.2f}) | {:.2f} ({:.2f}) | {:.2f} ({:.2f}) | {:.2f} | {:.0f} "
-      "(least {:.0f}) | "
-      "{:.0f} % |\n",
-      median(first), most(first), median(full) / 1e3, most(full) / 1e3, median(own) / 1e3,
-      most(own) / 1e3, median(whole) / 1e3, most(whole) / 1e3, median(cpu_s), median(rate),
-      *std::min_element(rate.begin(), rate.end()), 100 * share);
+      "| {:.0f} ({:.0f}) | {:.0f} ({:.0f}) | {:.2f} ({:.2f}) | {:.2f} ({:.2f}) | {:.2f} ({:.2f}) | "
+      "{:.2f} | {:.0f} (least {:.0f}) |\n",
+      median(first), most(first), median(released), most(released), median(full) / 1e3,
+      most(full) / 1e3, median(own) / 1e3, most(own) / 1e3, median(whole) / 1e3, most(whole) / 1e3,
+      median(cpu_s), median(rate), *std::min_element(rate.begin(), rate.end()));
   return 0;
 }
 

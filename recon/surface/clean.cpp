@@ -79,10 +79,7 @@ TriangleMesh without_small_pieces(const TriangleMesh& mesh, double least_size) {
 
 TriangleMesh simplified(const TriangleMesh& mesh, int triangles) {
   const auto wanted = static_cast<std::size_t>(triangles);
-  TriangleMesh result;
-  result.vertices.positions = mesh.vertices.positions;
-  result.triangles = mesh.triangles;
-  if (mesh.triangles.size() <= wanted) return result;
+  if (mesh.triangles.size() <= wanted) return mesh;
   std::vector<unsigned> indices;
   for (const Triangle& t : mesh.triangles) indices.insert(indices.end(), t.begin(), t.end());
   std::vector<float> positions;
@@ -93,10 +90,10 @@ TriangleMesh simplified(const TriangleMesh& mesh, int triangles) {
   constexpr float any_error = 1;
   kept.resize(meshopt_simplify(kept.data(), indices.data(), indices.size(), positions.data(),
                                mesh.vertices.size(), 3 * sizeof(float), 3 * wanted, any_error));
-  result.triangles.clear();
+  std::vector<Triangle> left;
   for (std::size_t i = 0; i + 2 < kept.size(); i += 3)
-    result.triangles.push_back({kept[i], kept[i + 1], kept[i + 2]});
-  return compacted(result.vertices, result.triangles);
+    left.push_back({kept[i], kept[i + 1], kept[i + 2]});
+  return compacted(mesh.vertices, left);
 }
 
 std::vector<Eigen::Vector3f> vertex_normals(const TriangleMesh& mesh) {

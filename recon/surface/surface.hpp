@@ -34,7 +34,7 @@ Result<TriangleMesh> fuse_depth(const std::vector<SurfaceView>& views,
 TriangleMesh without_small_pieces(const TriangleMesh& mesh, double least_size);
 
 /// At most about `triangles` triangles (fewer where flat; more where its pieces can't lose any
-/// without falling apart). Positions and triangles only: attributes are painted afterwards.
+/// without falling apart). Vertices that stay keep their place and attributes.
 TriangleMesh simplified(const TriangleMesh& mesh, int triangles);
 
 /// Area-weighted mean of the triangles' normals at each vertex; zero where there is none.

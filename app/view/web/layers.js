@@ -10,8 +10,8 @@ class RestingView {
     this.onChange = () => {};
   }
 
-  /// The camera moves: the surface stands in, and what is being rendered is of no use.
-  moved() {
+  /// The camera moves: the surface stands in, and what is being rendered is of no use. last: nothing more comes of this movement.
+  moved(last) {
     this.canvas.classList.remove("shown");
     this.surface.moving = true; this.surface.behindPicture(false);
     this.drop();
@@ -19,8 +19,12 @@ class RestingView {
     clearTimeout(this.timer); clearTimeout(this.late);
     // At 30 pictures a second the next move comes sooner than that.
     this.timer = setTimeout(() => this.render(), 40);
+    if (last) this.released();
     this.onChange();
   }
+
+  /// What moved the camera has let go of it.
+  released() { if (this.timer) this.render(); }
 
   drop() { if (this.asking) this.asking.abort(); this.asking = null; }
 
@@ -51,6 +55,7 @@ class RestingView {
 
   async render() {
     this.drop();
+    clearTimeout(this.timer); this.timer = 0;
     this.finished = false;
     const asking = this.asking = new AbortController(), layers = this.wanted();
     if (!layers.length) return this.settled();

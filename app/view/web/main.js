@@ -30,7 +30,8 @@ async function begin() {
   };
   const fillSpan = temperaturePanel(scene, () => { surface.style(layer); if (rest.level >= 0) rest.paint(); photo.paint(); showReadout(); });
   cameraPanel(scene, surface, photo);
-  surface.onMove = () => rest.moved();
+  surface.onMove = last => rest.moved(last);
+  for (const end of ["pointerup", "touchend"]) $("surface").addEventListener(end, () => rest.released());
   rest.onChange = () => {
     $("progress").textContent = rest.level >= 0 && !rest.finished ? `${rest.width} × ${rest.height}` : "";
     if (show.auto) { fillSpan(); surface.style(layer); }
@@ -50,6 +51,25 @@ async function begin() {
   viewer.measuring = new Measuring(scene, surface, rest);
   keepingPanel(scene, surface, rest, () => layer);
   if (scene.surface.points) surface.addPoints(await (await ask("/surface")).arrayBuffer());
+  await showMesh(surface);
+}
+
+/// In the points' place, once it is made.
+async function showMesh(surface) {
+  const say = (words, bad) => { $("surface-words").textContent = words; $("surface-words").className = bad ? "warning" : ""; };
+  try {
+    let answer = await ask("/mesh");
+    while (answer.status === 202) {
+      say("The surface is being made; points stand in for it.");
+      await new Promise(done => setTimeout(done, 1000));
+      answer = await ask("/mesh");
+    }
+    surface.addMesh(await answer.arrayBuffer());
+    say("");
+  } catch (error) {
+    say("Points stand in for the surface: " + error.message, true);
+    $("hint").textContent = $("surface-words").textContent;
+  }
 }
 
 function placeDivider() { $("swipe").style.left = 100 * viewer.rest.divider + "%"; }

@@ -67,9 +67,11 @@ class Measuring {
       if (first && Math.hypot(first.x - place.x, first.y - place.y) < 20) { this.finish(); return; }
     }
     try {
-      const found = await askInTurn("/pick", { ...this.surface.shot(width, height), u: place.u * width, v: place.v * height });
+      // Beside the mesh (it ends where the object does), or before it is there, the field says where the surface is.
+      const point = this.surface.meshAt(place.u, place.v)
+        || (await askInTurn("/pick", { ...this.surface.shot(width, height), u: place.u * width, v: place.v * height })).point;
       if (this.tool !== kind) return;
-      this.places.push(found.point);
+      this.places.push(point);
       if (this.places.length < tool.places) { this.say(tool.say[this.places.length]); this.drawMarks(); return; }
       if (!tool.open) { await this.finish(); return; }
       $("close-polygon").hidden = false;
@@ -86,15 +88,16 @@ class Measuring {
       : kind === "difference" ? { kind, of: places.map(p => ({ kind: "spot", places: [p] })) } : { kind, places });
   }
 
-  /// What was typed of the surface and of what the camera was set to; absent: as recorded.
+  /// What was typed of the surface, the way to it and what the camera was set to; absent: as recorded.
   parameters() {
-    const table = (emissivity, reflected) => {
-      const values = {}, number = id => { const text = $(id).value.trim(), value = Number(text); if (text && !Number.isFinite(value)) throw new Error(`${$(id).dataset.words}: '${text}' is no number`); return text ? value : null; };
-      if (number(emissivity) !== null) values.emissivity = number(emissivity);
-      if (number(reflected) !== null) values.reflected_k = toKelvin(number(reflected));
+    const number = id => { const text = $(id).value.trim(), value = Number(text); if (text && !Number.isFinite(value)) throw new Error(`${$(id).dataset.words}: '${text}' is no number`); return text ? value : null; };
+    const table = ids => {
+      const values = {};
+      for (const [key, id, stored] of ids) if (number(id) !== null) values[key] = stored ? stored(number(id)) : number(id);
       return Object.keys(values).length ? values : null;
     };
-    const object = table("emissivity", "reflected"), recorded = table("recorded-emissivity", "recorded-reflected");
+    const object = table([["emissivity", "emissivity"], ["reflected_k", "reflected", toKelvin], ["distance_m", "distance"], ["atmospheric_k", "air", toKelvin], ["relative_humidity", "humidity", percent => percent / 100]]);
+    const recorded = table([["emissivity", "recorded-emissivity"], ["reflected_k", "recorded-reflected", toKelvin]]);
     return { ...(object && { object }), ...(recorded && { recorded }) };
   }
   withParameters(request) {
@@ -170,8 +173,8 @@ class Measuring {
   }
 
   toldWords(request) {
-    const o = (request.of || [request])[0].object || {};
-    return [o.emissivity === undefined ? "" : "emissivity " + o.emissivity, o.reflected_k === undefined ? "" : "reflected " + shownTemperature(o.reflected_k)].filter(Boolean).join(", ");
+    const o = (request.of || [request])[0].object || {}, told = { emissivity: v => "emissivity " + v, reflected_k: v => "reflected " + shownTemperature(v), distance_m: v => `distance ${v} m`, atmospheric_k: v => "air " + shownTemperature(v), relative_humidity: v => `humidity ${+(100 * v).toFixed(1)} %` };
+    return Object.keys(told).filter(key => o[key] !== undefined).map(key => told[key](o[key])).join(", ");
   }
 
   show() {

@@ -1,25 +1,26 @@
 // SPDX-License-Identifier: BSD-3-Clause
 "use strict";
-// The surface as points and the recorded cameras as frusta, by three.js; what stands in while the camera moves.
+// The surface, points until its mesh is there, and the recorded cameras as frusta, by three.js; what stands in while the camera moves.
 const vertexShader = `
 attribute vec3 colour; attribute float kelvin;
-uniform float size, low, high, share, isoLow, isoHigh; uniform int isotherm;
-varying vec3 seen; varying float heat, weight, marked;
+uniform float size;
+varying vec3 seen; varying float known, knownKelvin;
 void main() {
   vec4 p = modelViewMatrix * vec4(position, 1.0);
   gl_Position = projectionMatrix * p;
   gl_PointSize = clamp(size / -p.z, 1.5, 24.0);
-  heat = clamp((kelvin - low) / max(1e-6, high - low), 0.0, 1.0);
-  bool met = isotherm == 1 ? kelvin >= isoLow : isotherm == 2 ? kelvin <= isoHigh : kelvin >= isoLow && kelvin <= isoHigh;
-  seen = colour; weight = share; marked = 0.0;
-  if (isotherm > 0 && share < 1.0 && !met) weight = 0.0;
-  if (isotherm > 0 && share >= 1.0 && met) marked = 1.0;
-  if (kelvin <= 0.0) { weight = 0.0; marked = 0.0; if (share >= 1.0) seen = vec3(dot(colour, vec3(0.15))); }
+  seen = colour; known = kelvin > 0.0 ? 1.0 : 0.0; knownKelvin = kelvin;
 }`;
+// Within a triangle, corners without a temperature (0) don't pull the others' down: their mean is that of the known ones.
 const fragmentShader = `
 uniform sampler2D palette;
-varying vec3 seen; varying float heat, weight, marked;
+uniform highp float low, high, share, isoLow, isoHigh; uniform int isotherm;
+varying vec3 seen; varying highp float known, knownKelvin;
 void main() {
+  if (known < 0.5) { gl_FragColor = vec4(share >= 1.0 ? vec3(dot(seen, vec3(0.15))) : seen, 1.0); return; }
+  highp float kelvin = knownKelvin / known, heat = clamp((kelvin - low) / max(1e-6, high - low), 0.0, 1.0);
+  bool met = isotherm == 1 ? kelvin >= isoLow : isotherm == 2 ? kelvin <= isoHigh : kelvin >= isoLow && kelvin <= isoHigh;
+  float weight = isotherm > 0 && share < 1.0 && !met ? 0.0 : share, marked = isotherm > 0 && share >= 1.0 && met ? 1.0 : 0.0;
   vec4 colour = texture2D(palette, vec2((heat * 255.0 + 0.5) / 256.0, 0.5));
   gl_FragColor = vec4(mix(mix(seen, colour.rgb, weight * colour.a), vec3(0.098, 0.89, 0.784), marked), 1.0);
 }`;
@@ -38,28 +39,52 @@ class Surface {
     this.onMove = () => {};
     this.frusta = { visible: null, thermal: null };
     this.share = 1;  // of the points, drawn while the camera moves
-    this.material = new THREE.ShaderMaterial({ vertexShader, fragmentShader, uniforms: {
+    this.material = new THREE.ShaderMaterial({ vertexShader, fragmentShader, side: THREE.DoubleSide, uniforms: {
       size: { value: 1 }, low: { value: 0 }, high: { value: 1 }, share: { value: 0 }, isoLow: { value: 0 }, isoHigh: { value: 0 }, isotherm: { value: 0 }, palette: { value: null } } });
   }
 
-  /// app/view/surface.hpp has the format.
-  addPoints(bytes) {
-    const data = new DataView(bytes), count = data.getUint32(0, true);
+  /// Vertices as app/view/surface.hpp has them, and where they end.
+  vertices(bytes, at, scale) {
+    const data = new DataView(bytes, at), count = data.getUint32(0, true);
     const low = [4, 8, 12].map(at => data.getFloat32(at, true)), step = [16, 20, 24].map(at => data.getFloat32(at, true));
-    const places = new Uint16Array(bytes, 28, 3 * count), position = new Float32Array(3 * count);
+    const places = new Uint16Array(bytes, at + 28, 3 * count), position = new Float32Array(3 * count);
     for (let i = 0; i < places.length; ++i) position[i] = low[i % 3] + step[i % 3] * places[i];
-    const colour = new Uint8Array(bytes, 28 + 6 * count, 3 * count), after = 28 + 9 * count + (28 + 9 * count) % 2;
+    const colour = new Uint8Array(bytes, at + 28 + 6 * count, 3 * count), after = at + 28 + 9 * count + (28 + 9 * count) % 2;
     const counts = new Uint16Array(bytes, after, count), kelvin = new Float32Array(count);
-    const scale = this.facts.surface.kelvin_per_count;
     for (let i = 0; i < count; ++i) kelvin[i] = counts[i] * scale;
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
     geometry.setAttribute("colour", new THREE.BufferAttribute(colour, 3, true));
     geometry.setAttribute("kelvin", new THREE.BufferAttribute(kelvin, 1));
-    this.points = new THREE.Points(geometry, this.material);
+    return { geometry, end: after + 2 * count };
+  }
+
+  addPoints(bytes) {
+    this.points = new THREE.Points(this.vertices(bytes, 0, this.facts.surface.kelvin_per_count).geometry, this.material);
     this.points.frustumCulled = false;
+    this.points.visible = !this.mesh;
     this.world.add(this.points);
     this.draw();
+  }
+
+  /// In the points' place.
+  addMesh(bytes) {
+    const data = new DataView(bytes), triangles = data.getUint32(0, true), { geometry, end } = this.vertices(bytes, 8, data.getFloat32(4, true));
+    geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(bytes, (end + 3) & ~3, 3 * triangles), 1));
+    this.mesh = new THREE.Mesh(geometry, this.material);
+    this.mesh.frustumCulled = false;
+    this.world.add(this.mesh);
+    if (this.points) this.points.visible = false;
+    this.draw();
+  }
+
+  /// The mesh at a place of the stage given as shares; null where there is none.
+  meshAt(u, v) {
+    if (!this.mesh) return null;
+    const ray = new THREE.Raycaster();
+    ray.setFromCamera({ x: 2 * u - 1, y: 1 - 2 * v }, this.camera);
+    const [hit] = ray.intersectObject(this.mesh);
+    return hit ? hit.point.toArray() : null;
   }
 
   addFrusta() {
@@ -145,12 +170,12 @@ class Surface {
     this.asked = true;
     requestAnimationFrame(() => {
       this.asked = false;
-      // The points lie in no order, so that the first of them are spread over the whole.
+      // Points lie in no order, so that the first of them are spread over the whole.
       const share = this.moving ? this.share : 1, begun = performance.now();
-      if (this.points) this.points.geometry.setDrawRange(0, Math.ceil(share * this.facts.surface.points));
+      if (this.points && !this.mesh) this.points.geometry.setDrawRange(0, Math.ceil(share * this.facts.surface.points));
       this.material.uniforms.size.value = this.facts.radius * 0.004 / Math.sqrt(share) * this.renderer.domElement.height / Math.tan(this.camera.fov * Math.PI / 360);
       this.renderer.render(this.world, this.camera);
-      if (!this.moving || !this.points) return;
+      if (!this.moving || !this.points || this.mesh) return;
       // A pixel that is read back waits for the picture.
       const gl = this.renderer.getContext();
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
@@ -177,7 +202,7 @@ class Surface {
   stand(pose) {
     this.camera.position.fromArray(pose.position); this.controls.target.fromArray(pose.target);
     this.camera.fov = pose.fov_deg; this.camera.updateProjectionMatrix();
-    this.controls.update(); this.draw(); this.onMove();
+    this.controls.update(); this.draw(); this.onMove(true);
   }
 
   /// As a recorded camera looks; its roll is left out, so that turning on stays level.

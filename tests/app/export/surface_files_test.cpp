@@ -74,6 +74,29 @@ TEST(Glb, HoldsTheMeshWithYUpAndKelvin) {
   EXPECT_EQ(numbers<std::uint32_t>(model, p.indices).size(), 12U);
 }
 
+TEST(Glb, ComesBackAsItWasWritten) {
+  const fs::path file = scratch() / "t.glb";
+  const TriangleMesh mesh = tetrahedron();
+  ASSERT_TRUE(write_glb(file, mesh, {}));
+  const auto back = read_glb(file);
+  ASSERT_TRUE(back) << back.error().message();
+  EXPECT_EQ(back->vertices.positions, mesh.vertices.positions);
+  EXPECT_EQ(back->vertices.colors, mesh.vertices.colors);
+  EXPECT_EQ(back->triangles, mesh.triangles);
+  EXPECT_EQ(back->vertices.temperatures_k[1], 310.25F);
+  EXPECT_TRUE(std::isnan(back->vertices.temperatures_k[2]));
+  const std::string whole = *read_file(file);
+  for (const std::size_t size : {std::size_t{0}, std::size_t{11}, whole.size() / 2}) {
+    ASSERT_TRUE(write_file_atomic(file, whole.substr(0, size)));
+    EXPECT_EQ(read_glb(file).error().kind, ErrorKind::input) << size;
+  }
+  std::string stray = whole;
+  stray[stray.size() - 1] = '\x7f';  // of the last corner
+  ASSERT_TRUE(write_file_atomic(file, stray));
+  EXPECT_THAT(read_glb(file).error().message(), HasSubstr("none of its vertices"));
+  EXPECT_FALSE(read_glb(file.parent_path() / "none.glb"));
+}
+
 TEST(Glb, EmptyAndBrokenMeshesAreNamed) {
   const fs::path file = scratch() / "t.glb";
   EXPECT_EQ(write_glb(file, {}, {}).error().kind, ErrorKind::input);

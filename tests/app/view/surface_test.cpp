@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "app/view/surface.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -88,6 +89,29 @@ TEST(Surface, PackedPositionsAndTemperaturesComeBack) {
     std::memcpy(&count, bytes.data() + 28 + 81 + 1 + 2 * i, 2);
     EXPECT_EQ(count, i == 3 ? 0 : static_cast<int>(28000 + 100 * (i % 3)));
   }
+}
+
+TEST(Surface, PackedTrianglesFollowTheirVertices) {
+  TriangleMesh mesh;
+  mesh.vertices = grid(3, 0.5, true);
+  mesh.vertices.temperatures_k[8] = 1500;  // of a coarser scale
+  mesh.triangles = {{0, 1, 3}, {4, 8, 5}};
+  const std::string bytes = packed(mesh);
+  std::uint32_t count = 0;
+  float scale = 0;
+  std::memcpy(&count, bytes.data(), 4);
+  std::memcpy(&scale, bytes.data() + 4, 4);
+  EXPECT_EQ(count, 2U);
+  const std::string vertices = packed(mesh.vertices, static_cast<double>(scale));
+  EXPECT_EQ(bytes.substr(8, vertices.size()), vertices);
+  const std::size_t at = (8 + vertices.size() + 3) / 4 * 4;
+  ASSERT_EQ(bytes.size(), at + 24);
+  std::uint32_t corners[6];
+  std::memcpy(corners, bytes.data() + at, 24);
+  EXPECT_THAT(corners, ::testing::ElementsAre(0, 1, 3, 4, 8, 5));
+  std::uint16_t hottest = 0;
+  std::memcpy(&hottest, bytes.data() + 8 + vertices.size() - 2, 2);
+  EXPECT_NEAR(hottest * static_cast<double>(scale), 1500, 0.04);
 }
 
 TEST(PictureParts, LevelsKeepWhatIsNoneApartFromZero) {

@@ -1,106 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The viewer of a real run in a real browser without a screen: pixels and values are looked at.
-#include <gtest/gtest.h>
-
 #include <cstdlib>
-#include <opencv2/imgcodecs.hpp>
 
 #include "app/stages/artifacts.hpp"
 #include "app/stages/measurement_scene.hpp"
-#include "app/view/view_server.hpp"
 #include "core/temperature.hpp"
-#include "tests/app/cli/program.hpp"
-#include "tests/app/cli/session_fixture.hpp"
-#include "tests/support/browser.hpp"
-#include "tests/support/temp_folder.hpp"
+#include "tests/app/view/view_browser_fixture.hpp"
 
 namespace orbitfuse::view {
 namespace {
-namespace fs = std::filesystem;
-
-/// Pixels of a part of the picture that are not of its most frequent colour: something is drawn.
-double lit_share(const cv::Mat& image, const cv::Rect& part) {
-  std::map<std::tuple<int, int, int>, int> counts;
-  const cv::Mat inside = image(part & cv::Rect({}, image.size()));
-  for (int y = 0; y < inside.rows; ++y)
-    for (int x = 0; x < inside.cols; ++x) {
-      const auto p = inside.at<cv::Vec3b>(y, x);
-      ++counts[{p[0] / 8, p[1] / 8, p[2] / 8}];
-    }
-  int most = 0;
-  for (const auto& [color, count] : counts) most = std::max(most, count);
-  return 1 - static_cast<double>(most) / static_cast<double>(inside.total());
-}
-
-double difference(const cv::Mat& a, const cv::Mat& b, const cv::Rect& part) {
-  return cv::norm(a(part), b(part), cv::NORM_L1) / static_cast<double>(part.area());
-}
-
-class ViewBrowserTest : public ::testing::Test {
- protected:
-  void SetUp() override {
-    if (!orbitfuse::test::Browser::is_here()) GTEST_SKIP() << "chromium is not installed";
-    // ORBITFUSE_VIEW_RUN: another finished run to look at, e.g. of a container.
-    if (const char* given = std::getenv("ORBITFUSE_VIEW_RUN")) {
-      out = folder.path() / "copy";
-      fs::copy(given, out, fs::copy_options::recursive);
-      fs::remove(out / "measurements.json");
-      fs::remove(out / "bookmarks.json");
-    } else {
-      fs::copy(made_once(), out, fs::copy_options::recursive);
-    }
-    auto run = load_finished_run(out, stages::RunConfig(), {});
-    ASSERT_TRUE(run) << run.error().message();
-    PageOptions options;
-    options.port = 0;
-    options.token = "browser-token";
-    options.require_token = true;
-    server = std::make_unique<ViewServer>(*std::move(run), options);
-    ASSERT_TRUE(server->start());
-    url = server->urls().front();
-  }
-
-  static fs::path made_once() {
-    static const orbitfuse::test::TempFolder made;
-    if (!fs::exists(made / "out" / "report")) make_run(made.path());
-    return made / "out";
-  }
-
-  static void make_run(const fs::path& in) {
-    const fs::path session = in / "session";
-    write_fixture_session(session);
-    std::vector<std::string> words = {"run", session.string(), "--out", (in / "out").string()};
-    for (const char* set :
-         {"train.visible.iterations=400", "train.thermal.iterations=400",
-          "train.visible.eval_count=0", "train.thermal.eval_count=0",
-          "train.visible.cloud_width_px=96", "train.thermal.cloud_width_px=96",
-          "train.visible.cloud_tolerance=0.2", "train.thermal.cloud_tolerance=0.2",
-          "render.views=2", "render.width_px=64"})
-      words.insert(words.end(), {"--set", set});
-    const Outcome made = orbitfuse_program(words);
-    ASSERT_EQ(made.code, 0) << made.err;
-  }
-
-  /// For a person to look at, where ORBITFUSE_SHOTS names a folder.
-  static cv::Mat kept(const std::string& name, const cv::Mat& shot) {
-    if (const char* to = std::getenv("ORBITFUSE_SHOTS"))
-      cv::imwrite((fs::path(to) / (name + ".png")).string(), shot);
-    return shot;
-  }
-
-  static bool rests(orbitfuse::test::Browser& page) {
-    return page.becomes("viewer.rest.finished && viewer.rest.level >= 2");
-  }
-  static void choose(orbitfuse::test::Browser& page, const std::string& layer) {
-    page.evaluate("document.querySelector('[data-value=" + layer + "]').click()");
-    EXPECT_TRUE(rests(page));
-  }
-
-  orbitfuse::test::TempFolder folder;
-  fs::path out = folder.path() / "out";
-  std::unique_ptr<ViewServer> server;
-  std::string url;
-};
 
 TEST_F(ViewBrowserTest, LoadsTurnsSwitchesMeasuresSavesAndReloads) {
   orbitfuse::test::Browser page(folder.path() / "profile", 1280, 800, false);
@@ -217,10 +125,18 @@ TEST_F(ViewBrowserTest, PolygonsHaveNamesAndParameters) {
   EXPECT_NE(page.evaluate("$('measure-words').textContent").get<std::string>().find("emissivity"),
             std::string::npos);
   page.evaluate("$('emissivity').value = '0.8'; $('recorded-emissivity').value = '0.95'");
+  page.evaluate("$('distance').value = '12'; $('air').value = '5'; $('humidity').value = '40'");
   page.evaluate("viewer.measuring.again(viewer.measuring.list[0])");
   EXPECT_EQ(page.evaluate("viewer.measuring.list.length"), 1);
   const auto again = page.evaluate("viewer.measuring.list[0]");
   EXPECT_EQ(again.at("request").at("object").at("emissivity"), 0.8);
+  EXPECT_EQ(again.at("request").at("object").at("distance_m"), 12);
+  EXPECT_NEAR(again.at("request").at("object").at("atmospheric_k").get<double>(), 278.15, 1e-9);
+  EXPECT_EQ(again.at("request").at("object").at("relative_humidity"), 0.4);
+  EXPECT_NE(page.evaluate("$('measurements').textContent")
+                .get<std::string>()
+                .find("distance 12 m, air 5.0 °C, humidity 40 %"),
+            std::string::npos);
   EXPECT_EQ(again.at("name"), "lid");
   EXPECT_NE(again.at("answer").at("reading").at("temperature_k"),
             answer.at("reading").at("temperature_k"));

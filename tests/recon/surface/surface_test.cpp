@@ -153,11 +153,17 @@ TEST(Surface, BadBoxesMapsAndPosesAreNamed) {
 TEST(Surface, SimplifiedKeepsItsForm) {
   const auto mesh = fuse_depth(round_the_sphere(), cube(0.4), coarse(), {});
   ASSERT_TRUE(mesh);
-  const TriangleMesh few = simplified(*mesh, 2000);
+  TriangleMesh painted = *mesh;
+  for (const Eigen::Vector3d& p : painted.vertices.positions)
+    painted.vertices.temperatures_k.push_back(static_cast<float>(p.z()));
+  const TriangleMesh few = simplified(painted, 2000);
   EXPECT_LE(few.triangles.size(), 2000U);
   EXPECT_GT(few.triangles.size(), 1500U);
   for (const Eigen::Vector3d& p : few.vertices.positions)
     ASSERT_NEAR(p.norm(), sphere_radius, 0.005);
+  ASSERT_EQ(few.vertices.temperatures_k.size(), few.vertices.size());
+  for (std::size_t i = 0; i < few.vertices.size(); ++i)
+    ASSERT_EQ(few.vertices.temperatures_k[i], static_cast<float>(few.vertices.positions[i].z()));
   EXPECT_EQ(simplified(few, 1'000'000).triangles.size(), few.triangles.size());
   EXPECT_TRUE(simplified({}, 10).empty());
 }
