@@ -106,7 +106,7 @@ Result<TrainedFrames> load_trained_frames(const fs::path& folder) {
   ORBITFUSE_ASSIGN(const JsonFields gains, metrics.child("image_gains"));
   for (const std::string& view : gains.keys())
     ORBITFUSE_TRY(gains.get(view.c_str(), frames.gains[view]));
-  // Runs before 2026-11-23 have an array that names no frames.
+  // Older runs have an array that names no frames.
   if (const json* drift = metrics.find("image_offsets_k"); drift != nullptr && drift->is_array())
     return frames;
   ORBITFUSE_ASSIGN(const JsonFields offsets, metrics.child("image_offsets_k"));

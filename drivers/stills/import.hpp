@@ -29,7 +29,7 @@ enum class ThermalScale {
 struct DeclaredStations {
   double spacing_deg = 30;
   int loops = 1;
-  std::vector<double> elevations_deg;  ///< one per loop; empty = unknown (sigma 90)
+  std::vector<double> elevations_deg;  ///< one per loop; empty = unknown
   double elevation_sigma_deg = 5;      ///< of the elevations given
 };
 

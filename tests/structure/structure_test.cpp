@@ -236,6 +236,11 @@ TEST(Structure, NoTwoHeadersOfANamespaceShareAName) {
   }
 }
 
+TEST(Structure, ExamplesFitOnAScreen) {
+  for (const SourceFile& file : read_sources(root, {"examples"}))
+    EXPECT_LT(std::count(file.text.begin(), file.text.end(), '\n'), 40) << file.path;
+}
+
 TEST(Structure, FunctionsStayUnderAHundredLines) {
   std::vector<std::string> wrong;
   int functions = 0;
