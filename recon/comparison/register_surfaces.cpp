@@ -101,19 +101,38 @@ std::optional<Similarity3d> step(const std::vector<Pair>& pairs, double bound, d
   return update;
 }
 
-/// The lesser share of both surfaces that lies near the other.
-double overlap_of(const SurfacePoints& after, const KdTree& after_tree, const SurfacePoints& before,
-                  const KdTree& before_tree, const Similarity3d& before_from_after, double reach) {
-  const auto share = [](const SurfacePoints& points, const SurfacePoints& others,
-                        const KdTree& tree, const Similarity3d& other_from_own, double distance) {
-    std::size_t near = 0;
-    for (std::size_t i = 0; i < points.size(); ++i)
-      near += distance_to(others, tree, other_from_own * points.positions[i]) <= distance;
-    return static_cast<double>(near) / static_cast<double>(points.size());
-  };
-  return std::min(share(after, before, before_tree, before_from_after, reach),
-                  share(before, after, after_tree, before_from_after.inverse(),
-                        reach / before_from_after.scale));
+/// The way most of a surface faces: up, where it holds the ground.
+Eigen::Vector3d most_faced(const SurfacePoints& points) {
+  constexpr std::size_t tried = 300;
+  const double same_way = std::cos(15 * EIGEN_PI / 180);
+  Eigen::Vector3d best = Eigen::Vector3d::Zero();
+  std::size_t most = 0;
+  const std::size_t step = std::max<std::size_t>(1, points.size() / tried);
+  for (std::size_t t = 0; t < points.size(); t += step) {
+    std::size_t count = 0;
+    for (const Eigen::Vector3d& normal : points.normals)
+      count += normal.dot(points.normals[t]) > same_way;
+    if (count > most) most = count, best = points.normals[t];
+  }
+  return best;
+}
+
+/// Share of the points that lie within `reach` of the others' surface and face the same way. Those
+/// that face as most of their own do count for nothing: level ground lies on any other.
+double share_near(const SurfacePoints& points, const SurfacePoints& others, const KdTree& tree,
+                  const Similarity3d& other_from_own, double reach) {
+  const Eigen::Vector3d ground = most_faced(points);
+  const double as_ground = std::cos(25 * EIGEN_PI / 180);
+  std::size_t near = 0, counted = 0, j = 0;
+  double d2 = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (points.normals[i].dot(ground) > as_ground) continue;
+    ++counted;
+    near += tree.nearest(other_from_own * points.positions[i], 1, &j, &d2) == 1 &&
+            d2 <= reach * reach &&
+            (other_from_own.rotation * points.normals[i]).dot(others.normals[j]) > least_alike;
+  }
+  return counted < fewest_pairs ? 0 : static_cast<double>(near) / static_cast<double>(counted);
 }
 
 PointCloud cloud_of(const SurfacePoints& points) {
@@ -151,8 +170,11 @@ Result<SurfaceRegistration> refine_surfaces(const TriangleMesh& after_mesh,
                   "surfaces on which one can slide along the other", remedy);
     result.before_from_after = *update * result.before_from_after;
   }
-  result.overlap = overlap_of(after, after_tree, before, before_tree, result.before_from_after,
-                              options.overlap_distance * unit);
+  const Similarity3d& moved = result.before_from_after;
+  const double reach = options.overlap_distance * unit;
+  result.overlap =
+      std::min(share_near(after, before, before_tree, moved, reach),
+               share_near(before, after, after_tree, moved.inverse(), reach / moved.scale));
   return result;
 }
 
@@ -170,10 +192,12 @@ Result<SurfaceRegistration> register_surfaces(const TriangleMesh& after, const T
                    refine_surfaces(after, before, clouds.target_from_source, options));
   result.clouds = clouds;
   if (result.overlap < options.least_overlap)
-    return fail(ErrorKind::quality, "the registration",
-                fmt::format("{:.0f} % of the surfaces lie on each other, {:.0f} % are needed",
-                            100 * result.overlap, 100 * options.least_overlap),
-                "compare two runs of one object");
+    return fail(
+        ErrorKind::quality, "the registration",
+        fmt::format(
+            "{:.0f} % of what stands on the ground lies on the other's, {:.0f} % are needed",
+            100 * result.overlap, 100 * options.least_overlap),
+        "compare two runs of one object");
   return result;
 }
 

@@ -13,7 +13,8 @@ struct SurfaceRegistration {
   Similarity3d before_from_after;
   /// Robust sigma of the distance between both surfaces where they hold still, BEFORE's unit.
   double residual = 0;
-  /// Share of each surface's vertices within overlap_distance of the other, the lesser of both.
+  /// Share of each surface's vertices within overlap_distance of the other that face the same way,
+  /// the lesser of both; without those that face as most do, the ground's.
   double overlap = 0;
   RegistrationReport clouds;  ///< the search before the refinement
 };
