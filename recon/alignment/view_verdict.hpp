@@ -21,6 +21,7 @@ enum class DoubtReason {
   temperatures_contradict,  ///< they find it nowhere; form alone keeps it
   undecided,                ///< so many are contradicted that nobody is left to judge
   loop_in_doubt,            ///< most of its loop is in doubt
+  few_common_points,        ///< hardly a point of it is seen by two other views
 };
 
 constexpr std::string_view name(DoubtReason reason) {
@@ -45,6 +46,8 @@ constexpr std::string_view name(DoubtReason reason) {
       return "undecided";
     case DoubtReason::loop_in_doubt:
       return "loop_in_doubt";
+    case DoubtReason::few_common_points:
+      return "few_common_points";
   }
   return "unknown";
 }

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "recon/poses/estimate/feature_level.hpp"
+#include "recon/poses/estimate/weakly_held.hpp"
 #include "recon/poses/global_sfm/global_mapper.hpp"
 #include "recon/poses/sfm/resection.hpp"
 #include "recon/poses/sfm/sfm_ladder.hpp"
@@ -356,6 +357,7 @@ class VisibleLadder {
     ModalityPoses& poses = best_->poses;
     for (DroppedView& view : poses.dropped)
       if (featureless_.contains(view.name)) view.why = fmt::format("it {}", featureless_why);
+    poses.doubtful = weakly_held(poses.reconstruction);
     const auto all = static_cast<int>(exhaustive_pairs(total_).size());
     if (pairs < all)
       poses.skips.push_back({"exhaustive matching", fmt::format("{} of {} pairs held", pairs, all),
