@@ -176,7 +176,10 @@ Status check_dataset_folder(const fs::path& folder) {
       !(fs::is_directory(folder, error) && fs::is_empty(folder, error)))
     return fail(ErrorKind::usage, "--dataset", "'" + folder.string() + "' is there already",
                 "choose a new folder");
-  return pipeline::check_out_folder(folder);
+  ORBITFUSE_TRY(pipeline::check_out_folder(folder));
+  // It is written beside the folder first.
+  const fs::path whole = fs::absolute(folder, error) / "";
+  return pipeline::check_out_folder(whole.parent_path().parent_path());
 }
 
 Result<PairSet> write_dataset(const fs::path& given, const view::FinishedRun& run,

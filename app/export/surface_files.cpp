@@ -80,15 +80,14 @@ json sidecar(const view::FinishedRun& run, const FieldSurface& surface, const Tr
   return j;
 }
 
-/// As the system's users write it: A.GLB is a .glb.
+}  // namespace
+
 std::string extension_of(const fs::path& file) {
   std::string extension = file.extension().string();
   for (char& c : extension)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   return extension;
 }
-
-}  // namespace
 
 Result<FieldSurface> surface_of_run(const view::FinishedRun& run, const SurfaceRequest& request,
                                     const Progress& progress) {

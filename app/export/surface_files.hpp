@@ -52,6 +52,9 @@ Status write_surface(const std::filesystem::path& file, const view::FinishedRun&
                      const FieldSurface& surface, const ExportFrame& frame,
                      const FileOptions& options);
 
+/// In lower case: A.GLB is a .glb.
+std::string extension_of(const std::filesystem::path& file);
+
 /// Before anything takes its time: whether write_surface knows the extension. Errors: usage.
 Status check_extension(const std::filesystem::path& file);
 

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "app/farm/local_farm.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <list>
 #include <thread>
 
@@ -144,9 +147,33 @@ class LocalFarm {
 }  // namespace
 
 Status LocalLimits::validate() const {
-  if (workers >= 0 && cores >= 0 && memory_mb >= 0) return {};
-  return fail(ErrorKind::usage, "--workers, --cores, --memory", "below 0",
-              "0 means what this machine has");
+  for (const auto& [option, value] : {std::pair<const char*, double>("--workers", workers),
+                                      {"--cores", cores},
+                                      {"--memory", memory_mb}})
+    if (!(value >= 0 && std::isfinite(value)))
+      return fail(ErrorKind::usage, option, fmt::format("{}", value),
+                  "choose 0 or more; 0 means what this machine has");
+  return {};
+}
+
+Status check_limits(const fs::path& out, const FarmPlan& plan, const LocalLimits& limits) {
+  for (const FarmSession& session : plan.sessions)
+    for (std::size_t i = next_stage(out, plan, session.name); i < plan.stages.size(); ++i) {
+      const StageNeeds needs = plan.needs_of(plan.stages[i]);
+      const std::string stage = "stage " + plan.stages[i];
+      if (limits.memory_mb > 0 && needs.memory_mb > limits.memory_mb)
+        return fail(
+            ErrorKind::usage, stage,
+            fmt::format("needs {:.0f} MB, --memory is {:g}", needs.memory_mb, limits.memory_mb),
+            "give more, start with --like a farm that needed less, or lower the need in "
+            "the farm's farm.json and resume it");
+      if (limits.cores > 0 && needs.cores > limits.cores)
+        return fail(ErrorKind::usage, stage,
+                    fmt::format("needs {} cores, --cores is {}", needs.cores, limits.cores),
+                    "give more, start with fewer --stage-cores, or lower the need in the farm's "
+                    "farm.json and resume it");
+    }
+  return {};
 }
 
 Status run_local(const fs::path& out, const FarmPlan& plan, const LocalLimits& limits,

@@ -16,6 +16,11 @@ struct LocalLimits {
   Status validate() const;
 };
 
+/// Whether each stage that is not done keeps within the limits that were given; a stage larger than
+/// a machine that nobody limited runs alone. Errors: usage.
+Status check_limits(const std::filesystem::path& out, const FarmPlan& plan,
+                    const LocalLimits& limits);
+
 using OnOutcome =
     std::function<void(const FarmSession&, const std::string& stage, const JobOutcome&)>;
 

@@ -149,8 +149,10 @@ std::vector<std::string> out_of_date(const fs::path& out, const std::set<std::st
 
 bool lies_in_a_stage(const fs::path& out, const fs::path& target) {
   std::error_code unreadable;
-  const fs::path run = fs::weakly_canonical(out, unreadable),
-                 to = fs::weakly_canonical(target, unreadable);
+  const auto whole = [&](const fs::path& path) {  // a name that is not there yet stays relative
+    return fs::weakly_canonical(fs::absolute(path, unreadable), unreadable);
+  };
+  const fs::path run = whole(out), to = whole(target);
   const fs::path inside = to.lexically_relative(run);
   return !inside.empty() && inside != "." &&
          finished_stages(out).contains(inside.begin()->string());

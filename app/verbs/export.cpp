@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <set>
 
 #include "app/cli/option_pairs.hpp"
 #include "app/cli/run_stages.hpp"
@@ -58,11 +59,16 @@ Result<SurfaceRequest> request_of(const Options& o) {
     request.crop = Crop::box;
     const Eigen::Vector3d center(v[0], v[1], v[2]), half(v[3] / 2, v[4] / 2, v[5] / 2);
     if (!(half.minCoeff() > 0))
-      return fail(ErrorKind::usage, "--crop-box", "a side that is no length",
+      return fail(ErrorKind::usage, "--crop-box", "'" + o.crop_box + "', with a side of 0 or less",
                   "give three sides above 0");
     request.box = {center - half, center + half};
   }
-  ORBITFUSE_TRY(request.surface.validate());
+  if (const Status valid = request.surface.validate(); !valid) {
+    Error error = valid.error();
+    if (error.where == "surface.triangles") error.where = "--triangles";
+    if (error.where == "surface.ground_clearance") error.where = "--ground-clearance";
+    return tl::unexpected(error);
+  }
   return request;
 }
 
@@ -174,6 +180,12 @@ Status export_surface(Context& context, const std::vector<fs::path>& files,
   return {};
 }
 
+Status check_outside_stages(const fs::path& out, const char* option, const fs::path& target) {
+  if (!pipeline::lies_in_a_stage(out, target)) return {};
+  return fail(ErrorKind::usage, option, "'" + target.string() + "', inside of a stage of the run",
+              "write it elsewhere, e.g. to " + (out / "export").string());
+}
+
 /// What would be found only after the surface was made.
 Status check_target(const fs::path& out, const fs::path& file) {
   ORBITFUSE_TRY(check_extension(file));
@@ -181,17 +193,36 @@ Status check_target(const fs::path& out, const fs::path& file) {
   if (fs::is_directory(file, unreadable))
     return fail(ErrorKind::usage, "--to", "'" + file.string() + "', which is a folder",
                 "name a file");
-  if (pipeline::lies_in_a_stage(out, file))
-    return fail(ErrorKind::usage, "--to", "'" + file.string() + "', inside of a stage of the run",
-                "write it elsewhere, e.g. to " + (out / "export").string());
+  ORBITFUSE_TRY(check_outside_stages(out, "--to", file));
   return pipeline::check_out_file(file);
+}
+
+/// Likewise of all targets together.
+Status check_targets(const Options& o, const std::vector<fs::path>& files) {
+  std::error_code unreadable;
+  std::set<fs::path> seen;
+  const fs::path dataset =
+      fs::weakly_canonical(fs::absolute(o.dataset, unreadable), unreadable) / "";
+  for (const fs::path& file : files) {
+    ORBITFUSE_TRY(check_target(o.out, file));
+    const fs::path whole = fs::weakly_canonical(fs::absolute(file, unreadable), unreadable);
+    if (!seen.insert(whole).second)
+      return fail(ErrorKind::usage, "--to", "'" + file.string() + "' twice", "name each file once");
+    if (!o.dataset.empty() && whole.string().starts_with(dataset.string()))
+      return fail(ErrorKind::usage, "--to",
+                  "'" + file.string() + "', inside of the new folder of --dataset",
+                  "write it beside that folder");
+  }
+  if (o.dataset.empty()) return {};
+  ORBITFUSE_TRY(check_outside_stages(o.out, "--dataset", o.dataset));
+  return check_dataset_folder(o.dataset);
 }
 
 /// Options that another one would have passed over in silence.
 Status check_pairs(const Options& o) {
   const bool surface = o.dataset.empty() || !o.files.empty();
   const bool ply = std::any_of(o.files.begin(), o.files.end(), [](const std::string& file) {
-    return fs::path(file).extension() == ".ply";
+    return extension_of(file) == ".ply";
   });
   ORBITFUSE_TRY(check_apart({{"--whole", o.whole, "--crop-box", !o.crop_box.empty()}}));
   return check_needs({
@@ -214,14 +245,15 @@ Status run(Context& context, const Options& o) {
   ORBITFUSE_TRY(check_pairs(o));
   std::vector<fs::path> files(o.files.begin(), o.files.end());
   if (files.empty() && o.dataset.empty()) files.push_back(fs::path(o.out) / default_surface_file);
-  for (const fs::path& file : files) ORBITFUSE_TRY(check_target(o.out, file));
-  if (!o.dataset.empty()) ORBITFUSE_TRY(check_dataset_folder(o.dataset));
+  ORBITFUSE_TRY(check_targets(o, files));
   ORBITFUSE_ASSIGN(const SurfaceRequest request, request_of(o));
   Eigen::Vector3d up = Eigen::Vector3d::Zero();
   if (!o.up.empty()) {
     ORBITFUSE_ASSIGN(const auto v, numbers("--up", o.up, 3, "X,Y,Z, e.g. 0,0,1"));
     up = {v[0], v[1], v[2]};
-    if (!(up.norm() > 0)) return fail(ErrorKind::usage, "--up", "no direction", "write X,Y,Z");
+    if (!(up.norm() > 0))
+      return fail(ErrorKind::usage, "--up", "'" + o.up + "', which is no direction",
+                  "write X,Y,Z, e.g. 0,0,1");
   }
   ORBITFUSE_ASSIGN(const view::FinishedRun run,
                    view::load_finished_run(o.out, context.config, context.progress));

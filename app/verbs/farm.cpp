@@ -6,11 +6,13 @@
 
 #include "app/cli/option_pairs.hpp"
 #include "app/cli/verb.hpp"
+#include "app/config/settings.hpp"
 #include "app/farm/farm_lock.hpp"
 #include "app/farm/folder_probe.hpp"
 #include "app/farm/local_farm.hpp"
 #include "app/farm/overview.hpp"
 #include "app/farm/slurm_farm.hpp"
+#include "app/pipeline/out_folder.hpp"
 #include "app/stages/build_stages.hpp"
 
 namespace orbitfuse::cli {
@@ -85,6 +87,30 @@ std::vector<std::string> passed_on(const CommonOptions& common) {
   return words;
 }
 
+Status check_new(const fs::path& out) {
+  std::error_code unreadable;
+  if (!fs::exists(out / plan_file, unreadable)) return {};
+  return fail(ErrorKind::usage, out.string(), "a farm was started in it before",
+              "go on with it: orbitfuse farm resume " + out.string() + "; or another --out");
+}
+
+/// A word that was to be an order, as `stauts`.
+Status check_slip(const std::vector<std::string>& words) {
+  std::error_code unreadable;
+  if (words.size() != 2 || fs::exists(words[0], unreadable)) return {};
+  const std::string meant = config::nearest(words[0], {"status", "resume", "cancel"});
+  if (meant.empty()) return {};
+  return fail(ErrorKind::usage, "farm " + words[0], "no such order and no such folder",
+              "did you mean '" + meant + "'?");
+}
+
+Result<FarmPlan> plan_to_learn_from(const std::string& like) {
+  auto earlier = read_plan(like);
+  if (earlier) return earlier;
+  return fail(earlier.error().kind, "--like", "'" + like + "': " + earlier.error().found,
+              "name the --out folder of an earlier farm, or leave it out");
+}
+
 Status start_farm(Context& context, const FarmOptions& options) {
   ORBITFUSE_TRY(options.limits.validate());
   ORBITFUSE_TRY(options.cluster.validate());
@@ -106,9 +132,12 @@ Status start_farm(Context& context, const FarmOptions& options) {
   plan.slurm = options.cluster;
   plan.needs = default_needs(plan.stages, options.stage_cores, on_gpu);
   if (!options.like.empty()) {
-    ORBITFUSE_ASSIGN(const FarmPlan earlier, read_plan(options.like));
+    ORBITFUSE_ASSIGN(const FarmPlan earlier, plan_to_learn_from(options.like));
     learn_needs(options.like, earlier, plan.needs);
   }
+  ORBITFUSE_TRY(check_new(out));
+  ORBITFUSE_TRY(pipeline::check_out_folder(out));
+  ORBITFUSE_TRY(check_limits(out, plan, options.limits));
   if (context.common.dry_run) {
     for (const FarmSession& session : plan.sessions)
       context.console.data(
@@ -121,9 +150,7 @@ Status start_farm(Context& context, const FarmOptions& options) {
                 "choose a folder you can write to with --out");
   FarmLock lock;
   ORBITFUSE_TRY(lock.acquire(out));
-  if (fs::exists(out / plan_file, ec))
-    return fail(ErrorKind::usage, out.string(), "a farm was started in it before",
-                "go on with it: orbitfuse farm resume " + out.string() + "; or another --out");
+  ORBITFUSE_TRY(check_new(out));  // another may have been faster
   if (!options.slurm) {
     ORBITFUSE_TRY(write_plan(out, plan));
     return run_here(context, out, plan, options);
@@ -147,6 +174,7 @@ Status resume_farm(Context& context, const fs::path& out, const FarmOptions& opt
   if (!plan.on_slurm) {
     raise_learned(out, plan);
     raise_interrupted(out, plan);
+    ORBITFUSE_TRY(check_limits(out, plan, options.limits));
     return run_here(context, out, plan, options);
   }
   ORBITFUSE_TRY(check_machine(options, true));
@@ -215,6 +243,7 @@ Status run_farm(Context& context, const FarmOptions& options) {
                         first == "gather" || first == "stages";
   if (!is_order) {
     ORBITFUSE_TRY(check_start(options));
+    ORBITFUSE_TRY(check_slip(words));
     return start_farm(context, options);
   }
   if (words.size() < 2 || (words.size() > 2 && first != "stages"))
@@ -230,8 +259,8 @@ Status run_farm(Context& context, const FarmOptions& options) {
     return conclude(context, out, plan, false);
   }
   if (first == "stages") return run_array_task(context, out, words);
+  ORBITFUSE_TRY(read_plan(out));  // a lock makes the folder
   if (first == "cancel") return cancel_farm(context, out);
-  ORBITFUSE_TRY(read_plan(out));
   return resume_farm(context, out, options, first == "resume");
 }
 

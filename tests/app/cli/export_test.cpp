@@ -4,12 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <tuple>
 
 #include "core/formats/colmap_model.hpp"
 #include "core/formats/transforms_json.hpp"
 #include "core/image/image_io.hpp"
 #include "core/system/file_io.hpp"
 #include "tests/app/cli/program.hpp"
+#include "tests/app/cli/refusal.hpp"
 #include "tests/app/cli/session_fixture.hpp"
 #include "tests/app/cli/small_run.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -91,6 +93,21 @@ TEST(ExportDataset, RecordedAndNewPairsAreReadBackInEveryLayout) {
   const Outcome inside = surface(out / "train_thermal/cloud.ply");
   EXPECT_EQ(inside.code, 2);
   EXPECT_THAT(inside.err, HasSubstr("inside of a stage"));
+  // What would stop the export at its end stops it before the surface.
+  for (const auto& [option, target, code, said] :
+       {std::tuple("--dataset", out / "fuse/pairs", 2, "inside of a stage"),
+        std::tuple("--dataset", fs::path("/proc/nowhere/pairs"), 4, "/proc/nowhere/pairs"),
+        std::tuple("--to", fs::path("/proc/nowhere/a.glb"), 4, "/proc/nowhere"),
+        std::tuple("--to", session / "manifest.jsonl/a.glb", 3, "no folder")}) {
+    expect_refused({"export", out.string(), option, target.string()}, code, said);
+  }
+  expect_refused(
+      {"export", "..", "--dataset", "pairs"}, 2, "inside of a stage",
+      [&](const auto& words) { return orbitfuse_program(words, {.folder = out / "fuse"}); });
+  EXPECT_EQ(orbitfuse_program({"export", out.string(), "--to", (temp / "A.PLY").string(),
+                               "--points", "--dry-run"})
+                .code,
+            0);
   fs::create_directory(temp / "folder.ply");
   EXPECT_EQ(surface(temp / "folder.ply").code, 2);
   // One stage made anew: what stands on the one before is not mixed with it.

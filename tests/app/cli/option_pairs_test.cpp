@@ -55,8 +55,21 @@ TEST(OptionPairs, Export) {
        {{"--to", "a.glb", "--flavour", "meshlab"}, "--flavour: given without a PLY file"},
        {{"--poses", "new"}, "--poses: given without --dataset"},
        {{"--dataset", "pairs", "--whole"}, "--whole: given without --to beside --dataset"},
+       {{"--dataset", "pairs", "--triangles", "9"},
+        "--triangles: given without --to beside --dataset"},
+       {{"--to", "a.glb", "--to", "./a.glb"}, "--to: './a.glb' twice"},
+       {{"--to", "pairs/a.glb", "--dataset", "pairs"},
+        "--to: 'pairs/a.glb', inside of the new folder of --dataset"},
        {{"--whole", "--crop-box", "0,0,0,1,1,1"}, "--whole: given with --crop-box"},
        {{"--mat-tags", "5"}, "--mat-tags: given without --mat"}});
+}
+
+TEST(OptionPairs, ExportRepeatsTheValueThatIsNone) {
+  expect_all_refused(
+      {"export", "run"},
+      {{{"--crop-box", "0,0,0,-1,1,1"}, "--crop-box: '0,0,0,-1,1,1', with a side of 0 or less"},
+       {{"--up", "0,0,0"}, "--up: '0,0,0', which is no direction"},
+       {{"--triangles", "0"}, "--triangles: 0"}});
 }
 
 TEST(OptionPairs, VerbsOfASessionOrOfFiles) {

@@ -69,6 +69,50 @@ TEST_F(RefusedFarm, ADryRunOfAnOrderOnlyTellsHowTheFarmStands) {
   }
 }
 
+TEST_F(RefusedFarm, ADryRunIsRefusedWhereTheStartWouldBe) {
+  ASSERT_EQ(start({}).code, 5);
+  for (const std::vector<std::string>& more : {std::vector<std::string>{}, {"--dry-run"}}) {
+    const Outcome again = start(more);
+    EXPECT_EQ(again.code, 2) << again.err;
+    EXPECT_THAT(again.err, HasSubstr("a farm was started in it before"));
+  }
+}
+
+TEST_F(RefusedFarm, CancellingWhatIsNoFarmMakesNoFolder) {
+  const Outcome refused = farm({"cancel", out.string()});
+  EXPECT_EQ(refused.code, 3) << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("no farm"));
+  EXPECT_FALSE(fs::exists(out));
+}
+
+TEST_F(RefusedFarm, LimitsBelowWhatAStageNeedsAreNamedBeforeTheStart) {
+  for (const auto& [more, said] : std::vector<std::pair<std::vector<std::string>, const char*>>{
+           {{"--memory", "10"}, "stage poses_visible: needs 2000 MB, --memory is 10; give more"},
+           {{"--cores", "1"}, "stage poses_visible: needs 2 cores, --cores is 1; give more"},
+           {{"--memory", "nan"}, "--memory: nan; choose 0 or more"},
+           {{"--workers", "-1"}, "--workers: -1; choose 0 or more"},
+           {{"--like", (temp / "nothere").string()}, "name the --out folder of an earlier farm"}}) {
+    for (const bool dry : {false, true}) {
+      std::vector<std::string> words = more;
+      if (dry) words.emplace_back("--dry-run");
+      const Outcome refused = start(words);
+      EXPECT_EQ(refused.code, more[0] == "--like" ? 3 : 2) << refused.err;
+      EXPECT_THAT(refused.err, HasSubstr(said));
+      EXPECT_FALSE(fs::exists(out));
+    }
+  }
+  ASSERT_EQ(start({}).code, 5);
+  const Outcome resumed = farm({"resume", out.string(), "--memory", "10"});
+  EXPECT_EQ(resumed.code, 2) << resumed.err;
+  EXPECT_THAT(resumed.err, HasSubstr("--memory is 10"));
+}
+
+TEST_F(RefusedFarm, ASlipInAnOrderIsToldApartFromASession) {
+  const Outcome refused = farm({"stauts", out.string()});
+  EXPECT_EQ(refused.code, 2) << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("did you mean 'status'?"));
+}
+
 TEST_F(RefusedFarm, APartitionThatSlurmRefusesIsNamedAndTheNextTryIsTaken) {
   command("sbatch",
           "for word; do [ \"$word\" = --partition=nowhere ] && { echo 'sbatch: error: invalid "
