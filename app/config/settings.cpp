@@ -60,9 +60,11 @@ void flatten(const toml::table& table, const std::string& prefix,
   }
 }
 
-bool is_table(const std::string& key, const std::vector<Setting>& settings) {
-  return std::any_of(settings.begin(), settings.end(),
-                     [&](const Setting& s) { return s.key.starts_with(key + "."); });
+/// The first setting of a table; null where no table has that name.
+const Setting* first_of(const std::string& table, const std::vector<Setting>& settings) {
+  const auto first = std::find_if(settings.begin(), settings.end(),
+                                  [&](const Setting& s) { return s.key.starts_with(table + "."); });
+  return first == settings.end() ? nullptr : &*first;
 }
 
 /// "integer" is what a reference lists; a sentence has an article.
@@ -121,12 +123,10 @@ std::string nearest(const std::string& word, const std::vector<std::string>& kno
 Status Settings::set(const std::string& key, const json& value, const std::string& where) {
   const auto it =
       std::find_if(list_.begin(), list_.end(), [&](const Setting& s) { return s.key == key; });
-  if (it == list_.end() && is_table(key, list_))
-    return fail(ErrorKind::usage, where, fmt::format("{} = {}", key, value.dump()),
-                fmt::format("{} is a table of settings: give one of them, e.g. {}", key,
-                            std::find_if(list_.begin(), list_.end(), [&](const Setting& s) {
-                              return s.key.starts_with(key + ".");
-                            })->key));
+  if (const Setting* inner = first_of(key, list_); it == list_.end() && inner != nullptr)
+    return fail(
+        ErrorKind::usage, where, fmt::format("{} = {}", key, value.dump()),
+        fmt::format("{} is a table of settings: give one of them, e.g. {}", key, inner->key));
   if (it == list_.end()) {
     std::vector<std::string> known;
     for (const Setting& s : list_) known.push_back(s.key);
@@ -157,7 +157,8 @@ Status Settings::read_toml(const std::filesystem::path& file) {
   std::stable_partition(entries.begin(), entries.end(),
                         [](const Entry& e) { return e.key.ends_with(".preset"); });
   for (const Entry& e : entries) {
-    if (e.value.is_null() && e.written == "a table" && is_table(e.key, list_)) continue;  // empty
+    if (e.value.is_null() && e.written == "a table" && first_of(e.key, list_) != nullptr)
+      continue;  // empty
     const std::string where = fmt::format("{}:{}", file.string(), e.line);
     ORBITFUSE_TRY(set(e.key, e.value, where).map_error([&](Error error) {
       if (error.found.starts_with(e.key + " = ")) error.found = e.key + " = " + e.written;

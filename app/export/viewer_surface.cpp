@@ -8,6 +8,7 @@
 #include "app/export/surface_files.hpp"
 #include "app/stages/artifacts.hpp"
 #include "app/view/surface.hpp"
+#include "core/geometry/geometry_json.hpp"
 #include "core/system/file_io.hpp"
 #include "recon/surface/surface.hpp"
 
@@ -30,19 +31,6 @@ std::optional<std::string> kept_in(const fs::path& file, const std::string& key)
   return bytes;
 }
 
-std::optional<Eigen::Matrix4d> matrix_of(const json& rows) {
-  Eigen::Matrix4d matrix;
-  if (!rows.is_array() || rows.size() != 4) return std::nullopt;
-  for (std::size_t r = 0; r < 4; ++r) {
-    if (!rows[r].is_array() || rows[r].size() != 4) return std::nullopt;
-    for (std::size_t c = 0; c < 4; ++c) {
-      if (!rows[r][c].is_number()) return std::nullopt;
-      matrix(static_cast<int>(r), static_cast<int>(c)) = rows[r][c].get<double>();
-    }
-  }
-  return matrix;
-}
-
 /// The surface of the run's export in the run's world; nothing where that one is another, coarser
 /// or gone.
 std::optional<TriangleMesh> exported(const fs::path& file, const std::string& key) {
@@ -56,7 +44,7 @@ std::optional<TriangleMesh> exported(const fs::path& file, const std::string& ke
   if (!fields.get_all("triangles", triangles, "fused_triangles", fused) ||
       triangles < std::min(fused, viewer_triangles))
     return std::nullopt;
-  const auto world_from_export = matrix_of(about->value("world_from_export", json()));
+  const auto world_from_export = matrix_of_json(about->value("world_from_export", json()));
   auto mesh = read_glb(file);
   if (!world_from_export || !mesh) return std::nullopt;
   for (Eigen::Vector3d& p : mesh->vertices.positions)

@@ -4,8 +4,9 @@
 #include <fmt/format.h>
 
 #include <Eigen/LU>
-
 #include <nlohmann/json.hpp>
+
+#include "core/geometry/geometry_json.hpp"
 
 namespace orbitfuse {
 
@@ -14,16 +15,11 @@ Result<Rigid3d> rigid_of_opengl_json(const nlohmann::json& rows, const std::stri
     return fail(ErrorKind::input, where, found, "give the camera-to-world matrix with OpenGL axes");
   };
   constexpr const char* expected = "not a finite 4x4 (or 3x4) rigid matrix";
-  if (!rows.is_array() || rows.size() < 3 || rows.size() > 4) return broken(expected);
-  Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
-  for (std::size_t r = 0; r < rows.size(); ++r) {
-    if (!rows[r].is_array() || rows[r].size() != 4) return broken(expected);
-    for (std::size_t c = 0; c < 4; ++c) {
-      if (!rows[r][c].is_number()) return broken(expected);
-      m(static_cast<int>(r), static_cast<int>(c)) = rows[r][c].get<double>();
-    }
-  }
-  if (!m.allFinite()) return broken(expected);
+  nlohmann::json four = rows;
+  if (rows.is_array() && rows.size() == 3) four.push_back({0, 0, 0, 1});
+  const auto read = matrix_of_json(four);
+  if (!read || !read->allFinite()) return broken(expected);
+  const Eigen::Matrix4d& m = *read;
   if (m.topRightCorner<3, 1>().cwiseAbs().maxCoeff() > max_coordinate) {
     return broken(
         fmt::format("a position of {:g}", m.topRightCorner<3, 1>().cwiseAbs().maxCoeff()));

@@ -75,4 +75,17 @@ Json matrix_json(const Eigen::Matrix4d& m) {
   return rows;
 }
 
+std::optional<Eigen::Matrix4d> matrix_of_json(const Json& rows) {
+  Eigen::Matrix4d m;
+  if (!rows.is_array() || rows.size() != 4) return std::nullopt;
+  for (std::size_t r = 0; r < 4; ++r) {
+    if (!rows[r].is_array() || rows[r].size() != 4) return std::nullopt;
+    for (std::size_t c = 0; c < 4; ++c) {
+      if (!rows[r][c].is_number()) return std::nullopt;
+      m(static_cast<int>(r), static_cast<int>(c)) = rows[r][c].get<double>();
+    }
+  }
+  return m;
+}
+
 }  // namespace orbitfuse

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 
 #include "core/geometry/camera.hpp"
 #include "core/geometry/transform.hpp"
@@ -29,5 +30,7 @@ Result<Similarity3d> similarity_of_json(const JsonFields& fields);
 
 /// Four rows of four.
 nlohmann::json matrix_json(const Eigen::Matrix4d& matrix);
+/// Nothing where it is not four lists of four numbers; they may be of any size.
+std::optional<Eigen::Matrix4d> matrix_of_json(const nlohmann::json& rows);
 
 }  // namespace orbitfuse

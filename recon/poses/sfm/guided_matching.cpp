@@ -13,8 +13,9 @@
 namespace orbitfuse {
 namespace {
 
-/// Frames that hold each other through points: two parts without would have no common scale.
-void keep_connected(const std::vector<FeatureTrack>& tracks, FramePoses& poses) {
+/// Takes the poses of frames that don't hold the most through points: two parts without would have
+/// no common scale. Whether any lost its own.
+bool keep_connected(const std::vector<FeatureTrack>& tracks, FramePoses& poses) {
   std::map<ViewPair, int> shared;
   for (const FeatureTrack& track : tracks)
     for (std::size_t a = 0; a < track.features.size(); ++a)
@@ -24,8 +25,13 @@ void keep_connected(const std::vector<FeatureTrack>& tracks, FramePoses& poses) 
   for (const auto& [pair, count] : shared)
     if (count >= min_shared_points) edges.push_back(pair);
   const std::vector<bool> inside = largest_part(static_cast<int>(poses.size()), edges);
-  for (std::size_t f = 0; f < poses.size(); ++f)
-    if (!inside[f]) poses[f].reset();
+  bool lost = false;
+  for (std::size_t f = 0; f < poses.size(); ++f) {
+    if (inside[f]) continue;
+    lost = lost || poses[f].has_value();
+    poses[f].reset();
+  }
+  return lost;
 }
 
 /// Whether more than the poses speaks for a track: a match of two views that was looked for along
@@ -125,10 +131,10 @@ void pose_by_others(const FeatureGraph& graph, const PairMatches& matches, Posed
 
 Result<Reconstruction> adjusted(const FeatureGraph& graph, const PairMatches& matches,
                                 double max_error_px, PosedFrames& posed, const Adjuster& adjust) {
-  keep_connected(confirmed_tracks(graph, matches, posed, max_error_px), posed.poses);
-  Reconstruction model =
-      reconstruction_of(graph, posed, confirmed_tracks(graph, matches, posed, max_error_px),
-                        graph.frames.front()->modality);
+  std::vector<FeatureTrack> tracks = confirmed_tracks(graph, matches, posed, max_error_px);
+  if (keep_connected(tracks, posed.poses))
+    tracks = confirmed_tracks(graph, matches, posed, max_error_px);
+  Reconstruction model = reconstruction_of(graph, posed, tracks, graph.frames.front()->modality);
   if (model.views.size() < 2)
     return fail(ErrorKind::quality, "structure from motion", "no two views hold each other",
                 "take views every 30 deg or closer");
