@@ -86,7 +86,8 @@ def draw_registration(page):
 def error_panel(drawing, cells, middles, axis, bottom, asked, label):
     """A row's usual error as a dot and its worst as a ring; a line at what is asked."""
     frame_below(drawing, axis, PANEL_TOP, bottom, label)
-    drawing.line(axis.at(asked), PANEL_TOP, axis.at(asked), bottom, ASKED, dash=True)
+    if asked is not None:
+        drawing.line(axis.at(asked), PANEL_TOP, axis.at(asked), bottom, ASKED, dash=True)
     for cell, y in zip(cells, middles):
         found = numbers(cell)
         if not found:
@@ -258,46 +259,91 @@ def draw_measurement(page):
     return drawing.svg(bottom + 46)
 
 
+def rows_and_asked(table, column, head=None):
+    """The rows but those called "bar", and what is asked of each: by its column `head`, or by the "bar" below it."""
+    if head is not None:
+        return table.rows, [number(row[table.column(head)]) for row in table.rows]
+    rows, asked = [], []
+    for row in table.rows:
+        if row[0] == "bar":
+            asked += [number(row[column])] * (len(rows) - len(asked))
+        else:
+            rows.append(row)
+    return rows, asked + [None] * (len(rows) - len(asked))
+
+
+def draw_asked(drawing, axis, asked, row_height):
+    for r, value in enumerate(asked):
+        if value is not None:
+            y = PANEL_TOP + row_height * r
+            drawing.line(axis.at(value), y, axis.at(value), y + row_height, ASKED, dash=True)
+
+
+def draw_scale(page):
+    """A row a way and a scene: the median error and what 90 % are below, on a logarithmic axis."""
+    table = table_with(page, "by", "scene", "error, median", "error of 90 %")
+    median, most = table.column("error, median"), table.column("error of 90 %")
+    rows, asked = rows_and_asked(table, median)
+    left, row_height = 250, 26
+    drawing, bottom = Drawing(), PANEL_TOP + row_height * len(rows)
+    middles = [PANEL_TOP + row_height * (r + 0.5) for r in range(len(rows))]
+    legend(drawing, left, [("dot", FIRST, "median error"), ("ring", FIRST, "90 % are below"),
+                           ("line", ASKED, "bar of the median")])
+    cells = [f"{abs(number(row[median]))} / {row[most]}" for row in rows]
+    axis = logarithmic([v for cell in cells for v in numbers(cell)], left, WIDTH - 30)
+    for row, y in zip(rows, middles):
+        row_label(drawing, left - 8, y, [f"{row[0]}: {row[1].split(',')[0]}"])
+    error_panel(drawing, cells, middles, axis, bottom, None, "% of the true scale (lower is better), log")
+    draw_asked(drawing, axis, asked, row_height)
+    return drawing.svg(bottom + 46)
+
+
 @dataclass
 class Bar:
     """One bar a row: which figure of which column, and what the legend calls it."""
     head: str
     name: str
-    which: int = 0  # of a cell's numbers
+    which: int = 0  # of a cell's numbers; -1 is the last
 
 
-def draw_bars(page, labels, bars, unit, asked=None):
+def draw_bars(page, labels, bars, unit, asked_head=None):
     """A row a row of the table, named by the columns `labels`: an empty cell means the row's before."""
     table = table_with(page, *labels, *(bar.head for bar in bars))
     at = [table.column(bar.head) for bar in bars]
-    figures = [[value_at(row[i], bar.which) for i, bar in zip(at, bars)] for row in table.rows]
+    rows, asked = rows_and_asked(table, at[0], asked_head)
+    figures = [[value_at(row[i], bar.which) for i, bar in zip(at, bars)] for row in rows]
     left, thick = 230, 13
     row_height = len(bars) * (thick + 1) + 12
-    axis = from_zero([v for row in figures for v in row if v is not None] + [asked or 0], left, WIDTH - 60)
-    drawing, bottom = Drawing(), PANEL_TOP + row_height * len(table.rows)
+    limits = {value for value in asked if value is not None}
+    axis = from_zero([v for row in figures for v in row if v is not None] + [*limits], left, WIDTH - 60)
+    drawing, bottom = Drawing(), PANEL_TOP + row_height * len(rows)
     frame_below(drawing, axis, PANEL_TOP, bottom, unit)
     colors = (FIRST, SECOND, FRAME)
     entries = [("bar", color, bar.name) for color, bar in zip(colors, bars)]
-    if asked is not None:
-        entries.append(("line", ASKED, f"asked: {short(asked)}"))
-        drawing.line(axis.at(asked), PANEL_TOP, axis.at(asked), bottom, ASKED, dash=True)
+    if limits:
+        name = f"asked: {short(*limits)}" if len(limits) == 1 else asked_head or "bar"
+        entries.append(("line", ASKED, name))
     legend(drawing, EDGE, entries)
     names = [""] * len(labels)
-    for r, row in enumerate(table.rows):
+    for r, row in enumerate(rows):
         names = [row[table.column(label)] or before for label, before in zip(labels, names)]
         y = PANEL_TOP + row_height * r + 6
         row_label(drawing, left - 8, y + row_height / 2 - 6, textwrap.wrap(", ".join(names), 36)[:2])
         for k, (value, color) in enumerate(zip(figures[r], colors)):
             if value is None:
                 continue
-            drawing.bar(left, axis.at(value), y + k * (thick + 1), thick, color)
-            drawing.text(axis.at(value) + 5, y + k * (thick + 1) + 11, short(value))
+            end = axis.at(value)
+            drawing.bar(left, end, y + k * (thick + 1), thick, color)
+            if asked[r] is not None and 0 <= axis.at(asked[r]) - end < 40:
+                end = axis.at(asked[r])  # the text stands behind the line
+            drawing.text(end + 5, y + k * (thick + 1) + 11, short(value))
+    draw_asked(drawing, axis, asked, row_height)
     return drawing.svg(bottom + 46)
 
 
 def value_at(cell, which):
     found = numbers(cell)
-    return found[which] if which < len(found) else None
+    return found[which] if -len(found) <= which < len(found) else None
 
 
 def draw_heat(page):
@@ -326,9 +372,9 @@ class Plot:
     rows: str = ""  # a pattern of the first cells of the rows that are drawn; all without one
 
 
-def bar_plot(labels, bars, unit, asked=None):
+def bar_plot(labels, bars, unit, asked_head=None):
     heads = tuple(dict.fromkeys(bar.head for bar in bars))
-    return Plot(lambda page: draw_bars(page, labels, bars, unit, asked), (*labels, *heads), heads)
+    return Plot(lambda page: draw_bars(page, labels, bars, unit, asked_head), (*labels, *heads), heads)
 
 
 POSES = Plot(draw_poses, ("scene", "centres", "rotation", "CPU s"), ("centres", "rotation", "CPU s"))
@@ -347,6 +393,15 @@ PLOTS = {
                      ("Qabf", "Qcb", "Qcv", "SSIM"), rows="reference|bar|ours"),
     "measurement": Plot(draw_measurement, ("scene", "median error", "stated uncertainty covers"),
                         ("median error", "90 % of errors", "stated uncertainty covers"), rows="(?!bar)"),
+    "export": bar_plot(("scene",), [Bar("vertices", "vertices to the true surface"),
+                                    Bar("what test views see", "what test views see to the surface")],
+                       "median distance, % of the extent (lower is better)"),
+    "export_scale": Plot(draw_scale, ("by", "scene", "error, median", "error of 90 %"), ("error, median",),
+                         rows="(?!bar)"),
+    "planner": bar_plot(("scene", "budget"), [Bar("seconds", "expected", -2), Bar("seconds", "came", -1)],
+                        "seconds of a run", "budget"),
+    "view": bar_plot(("what",), [Bar("wall", "median of six views"), Bar("slowest", "the slowest")],
+                     "wall seconds (lower is better)", "bar"),
     "capture/outages": Plot(draw_outages, ("case", "told after", "back after"), ("told after", "back after")),
     "capture/odometry": bar_plot(
         ("walk",), [Bar("worst azimuth error", "worst error"), Bar("stated at the end", "stated at the end")],

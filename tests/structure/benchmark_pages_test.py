@@ -10,16 +10,12 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / "docs" / "benchmarks"
 WITHOUT_PLOT = {
     "compare.md": "two pairs",
-    "export_scale.md": "three rows",
     "capture/faults.md": "cases that hold or don't, without a figure in common",
     "capture/v4l2.md": "the same",
     "fuzzing.md": "runs of a fuzzer measure how fast a parser is",
     "hostile.md": "says what the program answers",
     "run_real.md": "what came of four recordings, without truth",
-    "export.md": "two scenes beside their bars: the table is all that there is to show",
-    "planner.md": "a row a run: whether it came as told is the table",
     "stability.md": "cases that hold or don't",
-    "view.md": "wall times of a shared machine, which a plot would make look surer than they are",
 }
 
 spec = importlib.util.spec_from_file_location("plot_pages", ROOT / "bench" / "plot_pages.py")
