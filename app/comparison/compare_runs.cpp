@@ -124,20 +124,24 @@ Status register_runs(const CompareRequest& request, const Progress& progress, Co
   return {};
 }
 
-std::optional<stages::MetricScale> scaled(std::optional<stages::MetricScale> scale, double by) {
-  if (scale) scale->metres_per_unit *= by;
-  return scale;
-}
-
+/// AFTER's, BEFORE's brought to AFTER's unit, or both as one.
 Status load_scale(ComparedRuns& runs) {
-  const auto of = [](const fs::path& out) -> Result<std::optional<stages::MetricScale>> {
-    ORBITFUSE_ASSIGN(const std::string world, stages::world_identity(out));
-    return stages::load_metric_scale(out, world);
-  };
-  ORBITFUSE_ASSIGN(runs.scale, of(runs.after.out));
-  if (runs.scale) return {};
-  ORBITFUSE_ASSIGN(const auto before, of(runs.before.out));
-  runs.scale = scaled(before, runs.registration.before_from_after.scale);
+  ORBITFUSE_ASSIGN(runs.scale, stages::scale_of_run(runs.after.out));
+  ORBITFUSE_ASSIGN(auto before, stages::scale_of_run(runs.before.out));
+  if (!before) return {};
+  before->metres_per_unit *= runs.registration.before_from_after.scale;
+  if (!runs.scale) {
+    runs.scale = before;
+    return {};
+  }
+  const stages::MetricScale after = *runs.scale;
+  runs.scale = stages::agreed_scale(after, *before);
+  if (!runs.scale)
+    runs.scale_doubt = fmt::format(
+        "the runs' scales contradict each other: a unit after is {:.4f} m by its own ({}), {:.4f} "
+        "m "
+        "by the one before ({}); lengths are in units",
+        after.metres_per_unit, after.source, before->metres_per_unit, before->source);
   return {};
 }
 
@@ -210,7 +214,10 @@ Status check_comparable(const fs::path& before, const fs::path& after,
                         const stages::RunConfig& config, const CompareRequest& request,
                         const Progress& progress) {
   ORBITFUSE_TRY(request.options.validate());
-  for (const fs::path& out : {before, after}) ORBITFUSE_TRY(complete_run(out, config, progress));
+  for (const fs::path& out : {before, after}) {
+    ORBITFUSE_TRY(complete_run(out, config, progress));
+    ORBITFUSE_TRY(stages::scale_of_run(out));
+  }
   return {};
 }
 

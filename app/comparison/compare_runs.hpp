@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "app/stages/metric_scale.hpp"
@@ -39,7 +40,8 @@ struct ComparedRuns {
   std::vector<comparison::DifferenceRegion> came;  ///< of AFTER's surface: not there before
   std::vector<comparison::DifferenceRegion>
       gone;                                  ///< of BEFORE's, middle and place in AFTER's world
-  std::optional<stages::MetricScale> scale;  ///< of AFTER's world, told in either run
+  std::optional<stages::MetricScale> scale;  ///< of AFTER's world, told in either run or both
+  std::string scale_doubt;                   ///< why there is none although both runs have one
   double least_difference_k = 0;             ///< of a finding
 
   /// NaN where it is not known.
@@ -47,7 +49,7 @@ struct ComparedRuns {
 };
 
 /// Whether both folders hold what a comparison needs, without the comparison: whether they show one
-/// object is not asked. Errors: input, as compare_runs.
+/// object is not asked. Errors: input, as compare_runs (a damaged scale among them).
 Status check_comparable(const std::filesystem::path& before, const std::filesystem::path& after,
                         const stages::RunConfig& config, const CompareRequest& request,
                         const Progress& progress);

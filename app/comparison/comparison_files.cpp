@@ -135,6 +135,7 @@ json to_json(const ComparedRuns& runs) {
   j["after"] = fs::absolute(runs.after.out).lexically_normal().string();
   j["unit"] = runs.scale ? "metre" : "scene";
   if (runs.scale) j["scale"] = stages::to_json(*runs.scale);
+  if (!runs.scale_doubt.empty()) j["scale_doubt"] = runs.scale_doubt;
   j["registration"] = {
       {"before_from_after", matrix_json(runs.registration.before_from_after.matrix())},
       {"residual", residual(runs) * metres_per_unit(runs)},

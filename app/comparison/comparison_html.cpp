@@ -42,7 +42,8 @@ std::string facts(const ComparedRuns& runs) {
   html += row("Scale",
               runs.scale ? fmt::format("1 unit is {:.4f} m ± {} ({})", runs.scale->metres_per_unit,
                                        stages::uncertainty_words(*runs.scale), runs.scale->source)
-                         : "no scale is known");
+              : runs.scale_doubt.empty() ? "no scale is known"
+                                         : runs.scale_doubt);
   const SurfaceShares& s = runs.shares;
   html +=
       row("Surface after", fmt::format("{:.1f} % compared, {:.1f} % changed geometry, {:.1f} % not "

@@ -196,6 +196,9 @@ Result<MetricScale> scale_of_distance(const view::FinishedRun& run, const Place&
       std::sqrt(a.variance_along(direction) + b.variance_along(direction)) / length;
   scale.source = "one distance";
   scale.how = fmt::format("{:.4f} units are {:.4f} m", length, metres);
+  if (std::holds_alternative<Eigen::Vector3d>(from) || std::holds_alternative<Eigen::Vector3d>(to))
+    scale.how +=
+        fmt::format("; a typed point counts as {:.4f} units off", point_share * run.radius);
   ORBITFUSE_TRY(scale.validate("--distance"));
   return scale;
 }

@@ -19,7 +19,7 @@ using nlohmann::json;
 
 /// Before the bytes: of what they are made, and their own hash.
 std::string head_of(const std::string& key, std::string_view bytes) {
-  return "orbitfuse view surface 1 " + key + " " + content_hash(bytes) + "\n";
+  return "orbitfuse view surface 2 " + key + " " + content_hash(bytes) + "\n";
 }
 
 std::optional<std::string> kept_in(const fs::path& file, const std::string& key) {
@@ -68,7 +68,8 @@ Result<std::string> viewer_surface(const view::FinishedRun& run, const Progress&
     ORBITFUSE_ASSIGN(FieldSurface made, surface_of_run(run, request, progress));
     mesh = std::move(made.mesh);
   }
-  std::string bytes = view::packed(*mesh);
+  const std::string bytes =
+      view::packed(*mesh) + view::packed(simplified(*mesh, viewer_triangles_moving));
   // A folder that can only be read from is shown all the same, if later.
   if (!key.empty()) static_cast<void>(write_file_atomic(file, head_of(key, bytes) + bytes));
   return bytes;

@@ -9,7 +9,6 @@
 #include <set>
 
 #include "app/pipeline/stage_record.hpp"
-#include "app/stages/metric_scale.hpp"
 #include "core/numeric/percent.hpp"
 #include "core/temperature.hpp"
 
@@ -263,20 +262,6 @@ void add_finding_limits(const std::vector<InspectionFinding>& findings,
   }
 }
 
-/// A scale that can't be read is none: a client's report must not carry metres that nobody vouches
-/// for.
-std::string words_of_scale(const view::FinishedRun& run) {
-  const auto world = stages::world_identity(run.out);
-  const auto scale = world ? stages::load_metric_scale(run.out, *world)
-                           : Result<std::optional<stages::MetricScale>>(std::nullopt);
-  if (!scale || !*scale)
-    return "Lengths are in the unit of the run; it knows no scale in metres and no north.";
-  return fmt::format(
-      "Lengths in metres rest on {}: 1 unit of the run is {:.4f} m, +- {}. No north is "
-      "known.",
-      (*scale)->source, (*scale)->metres_per_unit, stages::uncertainty_words(**scale));
-}
-
 }  // namespace
 
 std::vector<std::string> limits_of(const Session& session, const view::FinishedRun& run,
@@ -292,7 +277,7 @@ std::vector<std::string> limits_of(const Session& session, const view::FinishedR
   limits.emplace_back(
       "Only what the thermal orbit saw was measured. Surfaces that no frame saw, the underside and "
       "what stood hidden, were not inspected.");
-  limits.push_back(words_of_scale(run));
+  limits.emplace_back("No north is known.");
   for (const std::string& note : run.notes) limits.push_back(note + ".");
   return limits;
 }

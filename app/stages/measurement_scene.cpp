@@ -147,8 +147,7 @@ Result<ThermalScene> load_measurement_scene(const fs::path& out, const Session& 
   ORBITFUSE_TRY(add_named_views(context, parts));
   add_unposed(session, parts);
   ORBITFUSE_ASSIGN(parts.identity, identity_of(context, session));
-  ORBITFUSE_ASSIGN(const std::string world, world_identity(out));
-  ORBITFUSE_ASSIGN(const auto scale, load_metric_scale(out, world));
+  ORBITFUSE_ASSIGN(const auto scale, scale_of_run(out));
   if (scale) {
     parts.metres_per_unit = scale->metres_per_unit;
     parts.scale_relative_sigma = scale->relative_uncertainty;

@@ -3,17 +3,25 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
 #include "app/stages/measurement_scene.hpp"
+#include "core/nested_text.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse::stages {
 namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
+
+/// A file that can't be looked at is there: it is named by whoever reads it.
+bool is_there(const fs::path& file) {
+  std::error_code error;
+  return fs::symlink_status(file, error).type() != fs::file_type::not_found;
+}
 }  // namespace
 
 Status MetricScale::validate(const std::string& where) const {
@@ -57,11 +65,15 @@ Status save_metric_scale(const fs::path& out, const std::string& world, const Me
 
 Result<std::optional<MetricScale>> load_metric_scale(const fs::path& out,
                                                      const std::string& world) {
-  std::error_code unreadable;
   const fs::path file = out / scale_file;
-  if (!fs::exists(file, unreadable)) return std::nullopt;
-  ORBITFUSE_ASSIGN(const json j, read_json(file));
-  constexpr const char* remedy = "tell the scale again, or delete the file";
+  if (!is_there(file)) return std::nullopt;
+  const std::string remedy = fmt::format(
+      "tell the scale again (orbitfuse export {} --distance A B LENGTH), or delete the file",
+      out.string());
+  const auto text = read_file(file);
+  if (!text) return fail(ErrorKind::input, file.string(), text.error().found, remedy);
+  const json j = parse_json(*text);
+  if (j.is_discarded()) return fail(ErrorKind::input, file.string(), "not JSON", remedy);
   const JsonFields fields(j, file.string() + ": ", {ErrorKind::input, remedy});
   int schema = 0;
   std::string of_world;
@@ -77,10 +89,40 @@ Result<std::optional<MetricScale>> load_metric_scale(const fs::path& out,
   return scale;
 }
 
+Result<std::optional<MetricScale>> scale_of_run(const fs::path& out) {
+  if (!is_there(out / scale_file)) return std::nullopt;
+  ORBITFUSE_ASSIGN(const std::string world, world_identity(out));
+  return load_metric_scale(out, world);
+}
+
+std::optional<MetricScale> agreed_scale(const MetricScale& a, const MetricScale& b) {
+  constexpr double rounding = 1e-6;  // one that claims to be exact still has digits
+  const double variance_a = std::pow(std::max(a.relative_uncertainty, rounding), 2),
+               variance_b = std::pow(std::max(b.relative_uncertainty, rounding), 2);
+  const double apart = std::log(b.metres_per_unit / a.metres_per_unit);
+  if (!(std::abs(apart) <= 3 * std::sqrt(variance_a + variance_b))) return std::nullopt;
+  const double share_of_b = variance_a / (variance_a + variance_b);
+  return MetricScale{
+      a.metres_per_unit * std::exp(share_of_b * apart),
+      std::sqrt(variance_a * (1 - share_of_b)),
+      a.source == b.source ? a.source : a.source + " and " + b.source,
+      a.how + "; " + b.how,
+  };
+}
+
 std::string uncertainty_words(const MetricScale& scale) {
   constexpr double of_90_percent = 1.645;  // standard deviations
   return fmt::format("{:.1f} % in 90 of 100 cases",
                      100 * of_90_percent * scale.relative_uncertainty);
+}
+
+std::string scale_words(const Result<std::optional<MetricScale>>& scale) {
+  if (!scale)
+    return "lengths are in the unit of the run, for its scale can't be used: " +
+           scale.error().message();
+  if (!*scale) return "lengths are in the unit of the run; no scale in metres is known";
+  return fmt::format("1 unit of the run is {:.4f} m, +- {} ({})", (*scale)->metres_per_unit,
+                     uncertainty_words(**scale), (*scale)->source);
 }
 
 }  // namespace orbitfuse::stages

@@ -32,10 +32,20 @@ Result<std::optional<MetricScale>> load_metric_scale(const std::filesystem::path
                                                      const std::string& world);
 /// Of the run's poses. Errors: input (no finished poses).
 Result<std::string> world_identity(const std::filesystem::path& out);
+/// The scale that stays with a run: load_metric_scale of its own world. Nothing only where there is
+/// no file.
+Result<std::optional<MetricScale>> scale_of_run(const std::filesystem::path& out);
+
+/// Two that were told of one world: their mean by their uncertainties; nothing where they differ by
+/// more than three standard deviations, so that one of them is wrong.
+std::optional<MetricScale> agreed_scale(const MetricScale& a, const MetricScale& b);
 
 nlohmann::json to_json(const MetricScale& scale);
 
 /// "1.6 % in 90 of 100 cases": what every place says that tells a person of the uncertainty.
 std::string uncertainty_words(const MetricScale& scale);
+/// A sentence without its full stop: how long a unit is, that no scale is known, or why the one
+/// that there is can't be used, so that nobody reads metres that nobody vouches for.
+std::string scale_words(const Result<std::optional<MetricScale>>& scale);
 
 }  // namespace orbitfuse::stages

@@ -7,6 +7,7 @@
 
 #include "app/pipeline/runner.hpp"
 #include "app/stages/artifacts.hpp"
+#include "app/stages/metric_scale.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/saved_measurements.hpp"
 #include "core/image/image_io.hpp"
@@ -170,6 +171,18 @@ void add_measurements(const StageContext& context, const SessionInput& input,
     model.warnings.push_back("saved measurements are not shown: " + table.error().message());
 }
 
+/// Told since the run, or not at all.
+void add_scale(const StageContext& context, report::Model& model) {
+  const auto scale = scale_of_run(context.out);
+  if (!scale)
+    model.warnings.push_back(scale_words(scale));
+  else if (*scale)
+    model.headline.emplace_back("a unit of the run, ± " + uncertainty_words(**scale),
+                                fmt::format("{:.4f} m", (*scale)->metres_per_unit));
+  else
+    model.headline.emplace_back("in metres is known", "no scale");
+}
+
 /// Of a run with a budget: what was planned, and what came of it.
 void add_plan(const StageContext& context, report::Model& model) {
   const auto text = read_file(context.out / "plan.json");
@@ -214,6 +227,7 @@ Result<report::Model> report_content(const StageContext& context, const StageInp
   add_metric_tables(context, model);
   add_plan(context, model);
   add_measurements(context, input, model);
+  add_scale(context, model);
   add_notices(context, input, model);
   model.stages = *context.earlier;
   double wall_s = 0;

@@ -23,6 +23,7 @@ void tell(Context& context, const Options& o, const ComparedRuns& runs) {
   if (runs.registration.clouds.ambiguous)
     context.console.warning("geometry leaves several placements: " +
                             runs.registration.clouds.ambiguity);
+  if (!runs.scale_doubt.empty()) context.console.warning(runs.scale_doubt);
   context.console.info(ambient_words(runs));
   int number = 0;
   for (const auto& region : runs.differences)

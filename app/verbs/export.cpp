@@ -105,12 +105,12 @@ Result<measurement::Place> place_of(const std::string& word) {
 /// The scale that was told now, which stays with the run, or the one that the run has.
 Result<std::optional<stages::MetricScale>> scale_of(Context& context, const Options& o,
                                                     const view::FinishedRun& run) {
-  ORBITFUSE_ASSIGN(const std::string world, stages::world_identity(o.out));
   const int told = !o.distance.empty() + !o.mat.empty() + o.known_poses;
   if (told > 1)
     return fail(ErrorKind::usage, "--distance, --mat or --known-poses", "more than one of them",
                 "tell the scale in one way");
-  if (told == 0) return stages::load_metric_scale(o.out, world);
+  if (told == 0) return stages::scale_of_run(o.out);
+  ORBITFUSE_ASSIGN(const std::string world, stages::world_identity(o.out));
   const auto found = [&]() -> Result<stages::MetricScale> {
     if (o.known_poses) {
       std::optional<double> place_error_m;

@@ -10,6 +10,7 @@
 #include "app/cli/verb.hpp"
 #include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
+#include "app/stages/metric_scale.hpp"
 #include "app/stages/session_input.hpp"
 #include "core/session/session.hpp"
 
@@ -131,8 +132,15 @@ Status inspect_run(Context& context, const fs::path& folder) {
   } else {
     tell_session(context, folder, (*run)["session"]);
   }
+  const auto scale = stages::scale_of_run(folder);
+  context.result["scale"] = scale && *scale ? to_json(**scale) : json();
+  if (scale)
+    context.console.data(stages::scale_words(scale));
+  else
+    context.console.warning(stages::scale_words(scale));
   context.result.update(
       {{"out", folder.string()}, {"stages", stages}, {"damaged", damaged}, {"out_of_date", late}});
+  if (damaged.empty() && !scale) return tl::unexpected(scale.error());
   if (damaged.empty()) return {};
   return fail(ErrorKind::input, folder.string(), damaged.front(),
               "run again: what is damaged is made anew");

@@ -38,7 +38,7 @@ class Surface {
     this.controls.addEventListener("change", () => { this.draw(); this.onMove(); });
     this.onMove = () => {};
     this.frusta = { visible: null, thermal: null };
-    this.share = 1;  // of the points, drawn while the camera moves
+    this.share = 1;  // of the surface, drawn while the camera moves
     this.material = new THREE.ShaderMaterial({ vertexShader, fragmentShader, side: THREE.DoubleSide, uniforms: {
       size: { value: 1 }, low: { value: 0 }, high: { value: 1 }, share: { value: 0 }, isoLow: { value: 0 }, isoHigh: { value: 0 }, isotherm: { value: 0 }, palette: { value: null } } });
   }
@@ -67,15 +67,23 @@ class Surface {
     this.draw();
   }
 
-  /// In the points' place.
+  /// In the points' place: the surface, and what of it is drawn on a slow machine while the camera moves.
   addMesh(bytes) {
-    const data = new DataView(bytes), triangles = data.getUint32(0, true), { geometry, end } = this.vertices(bytes, 8, data.getFloat32(4, true));
-    geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(bytes, (end + 3) & ~3, 3 * triangles), 1));
-    this.mesh = new THREE.Mesh(geometry, this.material);
-    this.mesh.frustumCulled = false;
-    this.world.add(this.mesh);
+    const fine = this.meshFrom(bytes, 0);
+    this.mesh = fine.mesh; this.coarse = this.meshFrom(bytes, fine.end).mesh;
+    this.coarse.visible = false;
     if (this.points) this.points.visible = false;
+    this.share = 1;
     this.draw();
+  }
+  meshFrom(bytes, at) {
+    const data = new DataView(bytes, at), triangles = data.getUint32(0, true), { geometry, end } = this.vertices(bytes, at + 8, data.getFloat32(4, true));
+    const corners = at + ((end - at + 3) & ~3);
+    geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(bytes, corners, 3 * triangles), 1));
+    const mesh = new THREE.Mesh(geometry, this.material);
+    mesh.frustumCulled = false;
+    this.world.add(mesh);
+    return { mesh, end: corners + 12 * triangles };
   }
 
   /// The mesh at a place of the stage given as shares; null where there is none.
@@ -172,10 +180,11 @@ class Surface {
       this.asked = false;
       // Points lie in no order, so that the first of them are spread over the whole.
       const share = this.moving ? this.share : 1, begun = performance.now();
-      if (this.points && !this.mesh) this.points.geometry.setDrawRange(0, Math.ceil(share * this.facts.surface.points));
+      if (this.mesh) { this.coarse.visible = share < 1; this.mesh.visible = share === 1; }
+      else if (this.points) this.points.geometry.setDrawRange(0, Math.ceil(share * this.facts.surface.points));
       this.material.uniforms.size.value = this.facts.radius * 0.004 / Math.sqrt(share) * this.renderer.domElement.height / Math.tan(this.camera.fov * Math.PI / 360);
       this.renderer.render(this.world, this.camera);
-      if (!this.moving || !this.points || this.mesh) return;
+      if (!this.moving || !(this.points || this.mesh)) return;
       // A pixel that is read back waits for the picture.
       const gl = this.renderer.getContext();
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
@@ -183,9 +192,13 @@ class Surface {
     });
   }
 
-  /// Fewer points where this machine draws fewer than 30 pictures a second, more where it has time.
+  /// Less of the surface where this machine draws fewer than 30 pictures a second, more where it has time.
   keepPace(taken_ms) {
-    if (taken_ms > 25) this.share = Math.max(0.02, this.share * Math.max(0.3, 20 / taken_ms));
+    if (this.mesh) {
+      const all = this.mesh.geometry.index.count, few = this.coarse.geometry.index.count;
+      if (this.share === 1 && taken_ms > 25) this.share = few / all;
+      else if (this.share < 1 && taken_ms * all / few < 12) this.share = 1;
+    } else if (taken_ms > 25) this.share = Math.max(0.02, this.share * Math.max(0.3, 20 / taken_ms));
     else if (taken_ms < 12) this.share = Math.min(1, this.share * 1.1);
   }
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <tuple>
 
+#include "core/system/file_io.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/app/cli/session_fixture.hpp"
 #include "tests/app/cli/small_run.hpp"
@@ -77,6 +78,45 @@ TEST_F(Compare, ADryRunLooksAtBothRunsAndWritesNothing) {
   EXPECT_THAT(dry.err, HasSubstr("both runs hold what a comparison needs"));
   EXPECT_FALSE(fs::exists(out));
   EXPECT_NE(compare("before", "after_session", {"--out", out.string(), "--dry-run"}).code, 0);
+}
+
+TEST_F(Compare, ScalesOfBothRunsAreOneOrNone) {
+  const std::string before = (*folder / "before").string(), after = (*folder / "after").string();
+  const auto tell = [&](const std::string& run, const std::string& metres) {
+    const Outcome told = orbitfuse_program(
+        {"export", run, "--to", run + ".ply", "--distance", "0,0,0", "0.5,0,0", metres});
+    ASSERT_EQ(told.code, 0) << told.err;
+  };
+  const auto compared = [&](const char* name) {
+    const Outcome done = compare("before", "after", {"--out", (*folder / name).string(), "--json"});
+    EXPECT_EQ(done.code, 0) << done.err;
+    return std::pair(done.result().at("comparison"), done.err);
+  };
+  EXPECT_EQ(compared("no_scale").first.at("unit"), "scene");
+  EXPECT_THAT(orbitfuse_program({"inspect", before}).out, HasSubstr("no scale in metres"));
+  EXPECT_THAT(test::get(fs::path(before) / "report/report.html"), HasSubstr("no scale"));
+
+  tell(before, "1.00m");
+  EXPECT_EQ(compared("one_scale").first.at("unit"), "metre");
+  const Outcome told = orbitfuse_program({"inspect", before, "--json"});
+  EXPECT_EQ(told.code, 0) << told.err;
+  EXPECT_NEAR(told.result().at("scale").at("metres_per_unit").get<double>(), 2, 1e-9);
+  tell(after, "1.00m");
+  EXPECT_THAT(compared("both_scales").first.at("scale").at("how").get<std::string>(),
+              HasSubstr("; 0.5000 units are 1.0000 m"));
+
+  tell(after, "1.50m");
+  const auto [contradicted, said] = compared("two_scales");
+  EXPECT_EQ(contradicted.at("unit"), "scene");
+  EXPECT_THAT(said, HasSubstr("contradict each other"));
+  EXPECT_THAT(test::get(*folder / "two_scales" / "compare.html"), HasSubstr("contradict"));
+
+  ASSERT_TRUE(write_file_atomic(fs::path(before) / "scale.json", "{"));
+  const Outcome dry = compare("before", "after", {"--out", (*folder / "d").string(), "--dry-run"});
+  EXPECT_EQ(dry.code, 3);
+  EXPECT_THAT(dry.err, HasSubstr("--distance A B LENGTH"));
+  EXPECT_EQ(orbitfuse_program({"inspect", before}).code, 3);
+  for (const std::string& run : {before, after}) fs::remove(fs::path(run) / "scale.json");
 }
 
 TEST_F(Compare, WhatCannotBeComparedIsNamedAndNothingIsWritten) {

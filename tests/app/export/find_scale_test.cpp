@@ -154,8 +154,43 @@ TEST(MetricScaleFile, IsOfItsPosesOnly) {
   for (const char* text : {"", "[]", "{}", "{\"schema\":1}", "{\"schema\":2}", "not JSON",
                            "{\"schema\":1,\"world\":5,\"metres_per_unit\":\"x\"}"}) {
     ASSERT_TRUE(write_file_atomic(out / stages::scale_file, text));
-    EXPECT_FALSE(stages::load_metric_scale(out, "world")) << text;
+    const auto damaged = stages::load_metric_scale(out, "world");
+    ASSERT_FALSE(damaged) << text;
+    EXPECT_THAT(damaged.error().message(), HasSubstr("scale.json")) << text;
+    EXPECT_THAT(damaged.error().remedy, HasSubstr("--distance")) << text;
+    EXPECT_THAT(stages::scale_words(damaged), HasSubstr("can't be used")) << text;
   }
+}
+
+TEST(MetricScaleFile, OfARunIsNothingOnlyWhereThereIsNone) {
+  const fs::path out = fs::path(::testing::TempDir()) / "orbitfuse_scale_of_run";
+  fs::remove_all(out);
+  fs::create_directories(out);
+  const auto none = stages::scale_of_run(out);
+  ASSERT_TRUE(none);
+  EXPECT_FALSE(none->has_value());
+  EXPECT_THAT(stages::scale_words(none), HasSubstr("no scale"));
+  ASSERT_TRUE(write_file_atomic(out / stages::scale_file, "{}"));
+  EXPECT_FALSE(stages::scale_of_run(out)) << "there are no poses that it could belong to";
+  fs::remove(out / stages::scale_file);
+  fs::create_symlink("gone.json", out / stages::scale_file);
+  EXPECT_FALSE(stages::scale_of_run(out)) << "a link that leads nowhere";
+}
+
+TEST(MetricScale, TwoThatAgreeAreOneAndTwoThatDoNotAreNone) {
+  const stages::MetricScale by_mat{0.25, 0.002, "mat", "24 cameras"},
+      by_hand{0.251, 0.006, "one distance", "3 units are 0.75 m"};
+  const auto both = stages::agreed_scale(by_mat, by_hand);
+  ASSERT_TRUE(both);
+  // Nine tenths of the weight are the mat's.
+  EXPECT_NEAR(both->metres_per_unit, 0.2501, 1e-5);
+  EXPECT_NEAR(both->relative_uncertainty, 0.002 * std::sqrt(0.9), 1e-6);
+  EXPECT_THAT(both->source, HasSubstr("mat and one distance"));
+  EXPECT_FALSE(stages::agreed_scale(by_mat, {0.26, 0.006, "one distance", ""}));
+  const stages::MetricScale exact{0.25, 0, "known poses", ""};
+  ASSERT_TRUE(stages::agreed_scale(exact, exact));
+  EXPECT_NEAR(stages::agreed_scale(exact, by_hand)->metres_per_unit, 0.25, 1e-6);
+  EXPECT_FALSE(stages::agreed_scale(exact, {0.2501, 0, "known poses", ""}));
 }
 
 }  // namespace

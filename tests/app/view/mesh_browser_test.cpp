@@ -55,6 +55,24 @@ TEST_F(ViewBrowserTest, TheMeshComesInThePointsPlace) {
   page.evaluate("$('low').value = $('high').value; $('low').oninput()");
   EXPECT_GT(difference(moving("thermal", "mesh_span"), rainbow, middle), 20);
 
+  // A machine that draws it slowly turns a coarser one; at rest the whole is drawn.
+  const auto drawn = [&](const std::string& while_moving) {
+    return page.evaluate(
+        "new Promise(done => { const s = viewer.surface; s.moving = " + while_moving +
+        "; s.keepPace = () => {}; s.draw(); requestAnimationFrame(() => requestAnimationFrame(() "
+        "=> "
+        "done([s.mesh.visible, s.coarse.visible]))); })");
+  };
+  EXPECT_EQ(page.evaluate("viewer.surface.keepPace(100), viewer.surface.share < 1 || "
+                          "viewer.surface.mesh.geometry.index.count === "
+                          "viewer.surface.coarse.geometry.index.count"),
+            true);
+  page.evaluate("viewer.surface.share = 0.5");
+  EXPECT_EQ(drawn("true").dump(), "[false,true]");
+  EXPECT_EQ(drawn("false").dump(), "[true,false]");
+  page.evaluate("delete viewer.surface.keepPace; viewer.surface.keepPace(0.1)");
+  EXPECT_EQ(page.evaluate("viewer.surface.share"), 1);
+
   // What is touched is the mesh: nobody is asked where the surface is.
   page.evaluate("viewer.rest.moved()");
   ASSERT_TRUE(rests(page));
