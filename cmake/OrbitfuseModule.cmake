@@ -81,12 +81,14 @@ function(orbitfuse_targets_of variable)
 endfunction()
 
 # orbitfuse_module(recon_poses SRCS a.cpp b.cpp LINK core PRIVATE_LINK Ceres::ceres
-#                  EXPORT poses HEADERS *.hpp)
+#                  EXPORT poses HEADERS a.hpp HEADERS_BEHIND b.hpp)
 # OWN_HEADERS_PRECOMPILED: the target says itself what is precompiled for it.
-# EXPORT: the module is part of the installed package, as OrbitFuse::poses. HEADERS: patterns of its
-# public headers, from the module's folder; all that they include must be public too.
+# EXPORT: the module is part of the installed package, as OrbitFuse::poses. HEADERS: its public
+# headers by name (or pattern, where a folder has no others), from the module's folder: what programs
+# include. HEADERS_BEHIND: what is installed only because those include it. tests/library holds that
+# nothing else is included, and nothing installed in vain.
 function(orbitfuse_module name)
-  cmake_parse_arguments(ARG "OWN_HEADERS_PRECOMPILED" "EXPORT" "SRCS;LINK;PRIVATE_LINK;HEADERS" ${ARGN})
+  cmake_parse_arguments(ARG "OWN_HEADERS_PRECOMPILED" "EXPORT" "SRCS;LINK;PRIVATE_LINK;HEADERS;HEADERS_BEHIND" ${ARGN})
   foreach(dep ${ARG_LINK} ${ARG_PRIVATE_LINK})
     set_property(GLOBAL APPEND PROPERTY ORBITFUSE_LINK_GRAPH "${name} ${dep}")
   endforeach()
@@ -108,11 +110,16 @@ function(orbitfuse_module name)
   if(ARG_EXPORT AND ORBITFUSE_INSTALL)
     set_property(GLOBAL APPEND PROPERTY ORBITFUSE_EXPORTED ${target})
     install(TARGETS ${target} EXPORT OrbitFuse ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library)
-    orbitfuse_install_headers(${ARG_HEADERS})
+    orbitfuse_install_headers(front ${ARG_HEADERS})
+    orbitfuse_install_headers(behind ${ARG_HEADERS_BEHIND})
   endif()
 endfunction()
 
-function(orbitfuse_install_headers)
+# All that is installed, for its test: a line a header, front or behind.
+set(orbitfuse_public_headers ${PROJECT_BINARY_DIR}/public_headers.txt)
+file(WRITE ${orbitfuse_public_headers} "")
+
+function(orbitfuse_install_headers place)
   foreach(pattern ${ARGN})
     file(GLOB headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}
          ${CMAKE_CURRENT_SOURCE_DIR}/${pattern})
@@ -121,6 +128,7 @@ function(orbitfuse_install_headers)
     endif()
     foreach(header ${headers})
       cmake_path(GET header PARENT_PATH folder)
+      file(APPEND ${orbitfuse_public_headers} "${place} ${header}\n")
       install(FILES ${PROJECT_SOURCE_DIR}/${header} COMPONENT library
               DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/orbitfuse/${folder})
     endforeach()

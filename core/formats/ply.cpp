@@ -233,11 +233,11 @@ class VertexLayout {
  public:
   explicit VertexLayout(const Element& element) {
     for (const Property& p : element.properties) {
-      int slot = -1;
+      std::optional<std::size_t> slot;
       for (std::size_t k = 0; k < known_properties.size(); ++k) {
-        if (!p.list_count && p.name == known_properties[k]) slot = static_cast<int>(k);
+        if (!p.list_count && p.name == known_properties[k]) slot = k;
       }
-      if (slot >= 0) present_[static_cast<std::size_t>(slot)] = true;
+      if (slot) present_[*slot] = true;
       slots_.push_back(slot);
     }
     float_colors_ = false;
@@ -251,12 +251,13 @@ class VertexLayout {
     }
     return true;
   }
-  int slot(std::size_t property) const { return slots_[property]; }
+  /// Where in a Vertex a property goes; nothing for one that is not read.
+  std::optional<std::size_t> slot(std::size_t property) const { return slots_[property]; }
   bool float_colors() const { return float_colors_; }
 
  private:
   std::array<bool, known_properties.size()> present_{};
-  std::vector<int> slots_;
+  std::vector<std::optional<std::size_t>> slots_;
   bool float_colors_;
 };
 
@@ -270,7 +271,7 @@ bool read_vertex(Reader& reader, const Element& element, const VertexLayout& lay
       continue;
     }
     if (!reader.next(p.type, value)) return false;
-    if (layout.slot(i) >= 0) vertex.values[static_cast<std::size_t>(layout.slot(i))] = value;
+    if (const auto slot = layout.slot(i)) vertex.values[*slot] = value;
   }
   return true;
 }

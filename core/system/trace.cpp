@@ -5,6 +5,7 @@
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <vector>
 
 #include "core/system/clock.hpp"
@@ -16,7 +17,8 @@ constexpr double same_share_s = 0.002;
 
 struct Event {
   std::string name;
-  double start_s = 0, end_s = 0, cpu_s = -1;  ///< of the whole process; below 0: not measured
+  double start_s = 0, end_s = 0;
+  std::optional<double> cpu_s = {};  ///< of the whole process; of shares not measured
 };
 
 /// One thread's; only that thread writes it.
@@ -104,7 +106,7 @@ std::string trace_json() {
                            {"tid", tid},
                            {"ts", 1e6 * (event.start_s - all.start_s)},
                            {"dur", 1e6 * (event.end_s - event.start_s)}};
-    if (event.cpu_s >= 0) line["args"] = {{"cpu_s", event.cpu_s}};
+    if (event.cpu_s) line["args"] = {{"cpu_s", *event.cpu_s}};
     events.push_back(std::move(line));
   };
   for (std::size_t i = 0; i < all.tracks.size(); ++i) {

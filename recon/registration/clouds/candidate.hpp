@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,9 +14,9 @@ struct Candidate {
   Similarity3d target_from_source;
   double score = 0;      ///< what ranks it: coarse agreement in the search, evidence at the end
   double agreement = 0;  ///< at the end: Agreement::score with the report's bounds
-  std::string origin;
-  double residual_sigma = 0;  ///< of its full refinement; 0: not had yet, or too few pairs
-  bool refined = false;       ///< fully: needs no other
+  std::string origin = {};
+  std::optional<double> residual_sigma = {};  ///< of its full refinement, if that had enough pairs
+  bool refined = false;                       ///< fully: needs no other
 };
 using Candidates = std::vector<Candidate>;
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "recon/registration/clouds/thinning.hpp"
 
@@ -87,11 +88,10 @@ FeaturePoints feature_points(const PreparedCloud& cloud, int wanted) {
   FeaturePoints features;
   const Points coarse = thinned_to(cloud.points, wanted);
   for (const auto& p : coarse) {
-    const int nearest = cloud.nearest(p);
-    if (nearest < 0) continue;
-    const auto at = static_cast<std::size_t>(nearest);
-    features.points.push_back(cloud.points[at]);
-    features.normals.push_back(cloud.normals[at]);
+    const std::optional<std::size_t> nearest = cloud.nearest(p);
+    if (!nearest) continue;
+    features.points.push_back(cloud.points[*nearest]);
+    features.normals.push_back(cloud.normals[*nearest]);
   }
   return features;
 }
@@ -132,13 +132,13 @@ Descriptors describe(const FeaturePoints& cloud, double radius) {
 
 std::vector<Match> mutual_matches(const Descriptors& source, const Descriptors& target, int most) {
   const Eigen::MatrixXf similarity = target.transpose() * source;  // column: one source point
-  std::vector<int> best_source(static_cast<std::size_t>(target.cols()), -1);
+  std::vector<std::optional<Eigen::Index>> best_source(static_cast<std::size_t>(target.cols()));
   Eigen::VectorXf best_value = Eigen::VectorXf::Constant(target.cols(), -1);
   for (Eigen::Index s = 0; s < similarity.cols(); ++s) {
     for (Eigen::Index t = 0; t < similarity.rows(); ++t) {
       if (similarity(t, s) > best_value[t]) {
         best_value[t] = similarity(t, s);
-        best_source[static_cast<std::size_t>(t)] = static_cast<int>(s);
+        best_source[static_cast<std::size_t>(t)] = s;
       }
     }
   }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <numeric>
+#include <optional>
 
 namespace orbitfuse::registration {
 namespace {
@@ -14,6 +15,7 @@ constexpr double scale_slack = 1.22;   // either way: the descriptor radii stand
 constexpr double normal_slack = 0.30;  // of cosines
 constexpr double shortest = 0.25;      // segments below say little about scale or direction
 constexpr double clique_scale_slack = 1.10;
+constexpr int fewest_common = 2;  // with the edge's ends four points: one more than any fit needs
 
 /// A square table of bits.
 class BitRows {
@@ -48,17 +50,18 @@ struct Ends {
   Eigen::Vector3d source, target, source_normal, target_normal;
 };
 
-/// The scale between two segments when they agree; 0 otherwise.
-double agreed_scale(const Ends& a, const Ends& b, double scale) {
+/// The scale between two segments when they agree.
+std::optional<double> agreed_scale(const Ends& a, const Ends& b, double scale) {
   const Eigen::Vector3d u = b.source - a.source, v = b.target - a.target;
   const double lu = u.norm(), lv = v.norm();
-  if (lu < shortest || lv < shortest) return 0;
+  if (lu < shortest || lv < shortest) return std::nullopt;
   const double ratio = lv / lu;
-  if (ratio > scale * scale_slack || ratio * scale_slack < scale) return 0;
+  if (ratio > scale * scale_slack || ratio * scale_slack < scale) return std::nullopt;
   const auto differ = [](double x, double y) { return std::abs(x - y) > normal_slack; };
-  if (differ(a.source_normal.dot(u) / lu, a.target_normal.dot(v) / lv)) return 0;
-  if (differ(b.source_normal.dot(u) / lu, b.target_normal.dot(v) / lv)) return 0;
-  if (differ(a.source_normal.dot(b.source_normal), a.target_normal.dot(b.target_normal))) return 0;
+  if (differ(a.source_normal.dot(u) / lu, a.target_normal.dot(v) / lv)) return std::nullopt;
+  if (differ(b.source_normal.dot(u) / lu, b.target_normal.dot(v) / lv)) return std::nullopt;
+  if (differ(a.source_normal.dot(b.source_normal), a.target_normal.dot(b.target_normal)))
+    return std::nullopt;
   return ratio;
 }
 
@@ -76,7 +79,7 @@ Candidates consensus_candidates(const FeaturePoints& source, const FeaturePoints
   BitRows friends(n);
   for (int i = 0; i < n; ++i) {
     for (int j = i + 1; j < n; ++j) {
-      if (agreed_scale(at(i), at(j), scale) > 0) {
+      if (agreed_scale(at(i), at(j), scale)) {
         friends.set(i, j);
         friends.set(j, i);
       }
@@ -88,13 +91,13 @@ Candidates consensus_candidates(const FeaturePoints& source, const FeaturePoints
   };
   std::vector<Edge> edges;
   for (int i = 0; i < n; ++i) {
-    Edge best{0, i, -1};
+    std::optional<Edge> best;
     for (int j = 0; j < n; ++j) {
       if (!friends.get(i, j)) continue;
       const int common = friends.common(i, j);
-      if (common > best.common) best = {common, i, j};
+      if (!best || common > best->common) best = {common, i, j};
     }
-    if (best.common >= 2) edges.push_back(best);
+    if (best && best->common >= fewest_common) edges.push_back(*best);
   }
   std::stable_sort(edges.begin(), edges.end(),
                    [](const Edge& x, const Edge& y) { return x.common > y.common; });
@@ -105,11 +108,11 @@ Candidates consensus_candidates(const FeaturePoints& source, const FeaturePoints
     if (used.get(edge.a, edge.b)) continue;
     used.set(edge.a, edge.b);
     used.set(edge.b, edge.a);
-    const double edge_scale = agreed_scale(at(edge.a), at(edge.b), scale);
+    const double edge_scale = *agreed_scale(at(edge.a), at(edge.b), scale);  // friends agree
     Points p{at(edge.a).source, at(edge.b).source}, q{at(edge.a).target, at(edge.b).target};
     for (const int i : friends.common_list(edge.a, edge.b)) {
-      const double ra = agreed_scale(at(edge.a), at(i), scale) / edge_scale;
-      const double rb = agreed_scale(at(edge.b), at(i), scale) / edge_scale;
+      const double ra = *agreed_scale(at(edge.a), at(i), scale) / edge_scale;
+      const double rb = *agreed_scale(at(edge.b), at(i), scale) / edge_scale;
       if (std::max({ra, rb, 1 / ra, 1 / rb}) > clique_scale_slack * clique_scale_slack) continue;
       p.push_back(at(i).source);
       q.push_back(at(i).target);
@@ -117,7 +120,7 @@ Candidates consensus_candidates(const FeaturePoints& source, const FeaturePoints
     if (p.size() < 4) continue;
     const Result<RobustSimilarity> fit = robust_umeyama(p, q, 0.12);
     if (!fit) continue;
-    candidates.push_back({fit->target_from_source, 0, 0, "features", 0, false});
+    candidates.push_back({.target_from_source = fit->target_from_source, .origin = "features"});
   }
   return candidates;
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
+
 #include "recon/registration/clouds/prepared_cloud.hpp"
 
 namespace orbitfuse::registration {
@@ -38,13 +40,12 @@ class Pairs {
   bool forward(std::size_t i, Pair& pair) const {
     pair.at = moved(i);
     const Eigen::Vector3d bent = pair.at + displacement_(pair.at);
-    const int found = partner(target_, bent);
-    if (found < 0) return false;
-    const auto j = static_cast<std::size_t>(found);
-    const Eigen::Vector3d d = bent - target_.points[j];
+    const std::optional<std::size_t> j = partner(target_, bent);
+    if (!j) return false;
+    const Eigen::Vector3d d = bent - target_.points[*j];
     if (d.squaredNorm() > bound2_) return false;
-    pair.normal = target_.normals[j];
-    return finish(pair, d, rotation_ * source_.normals[i], target_.trust[j] * source_.trust[i]);
+    pair.normal = target_.normals[*j];
+    return finish(pair, d, rotation_ * source_.normals[i], target_.trust[*j] * source_.trust[i]);
   }
 
   /// The target's point z against the source's plane. The scale's derivative is taken at z, as if
@@ -52,21 +53,20 @@ class Pairs {
   /// cancels.
   bool backward(std::size_t j, Pair& pair) const {
     pair.at = target_.points[j] - displacement_(target_.points[j]);
-    const int found =
+    const std::optional<std::size_t> i =
         partner(source_, inverse_.scale * (rotation_.transpose() * pair.at) + inverse_.translation);
-    if (found < 0) return false;
-    const auto i = static_cast<std::size_t>(found);
-    const Eigen::Vector3d d = moved(i) - pair.at;
+    if (!i) return false;
+    const Eigen::Vector3d d = moved(*i) - pair.at;
     if (d.squaredNorm() > bound2_) return false;
-    pair.normal = rotation_ * source_.normals[i];
-    return finish(pair, d, target_.normals[j], target_.trust[j] * source_.trust[i]);
+    pair.normal = rotation_ * source_.normals[*i];
+    return finish(pair, d, target_.normals[j], target_.trust[j] * source_.trust[*i]);
   }
 
  private:
   Eigen::Vector3d moved(std::size_t i) const {
     return placement_.scale * (rotation_ * source_.points[i]) + placement_.translation;
   }
-  int partner(const PreparedCloud& cloud, const Eigen::Vector3d& x) const {
+  std::optional<std::size_t> partner(const PreparedCloud& cloud, const Eigen::Vector3d& x) const {
     return exact_ ? cloud.nearest(x) : cloud.nearest_table.lookup(x);
   }
   bool finish(Pair& pair, const Eigen::Vector3d& d, const Eigen::Vector3d& other,
@@ -93,6 +93,11 @@ inline double tukey(double residual, double bound) {
   const double u = residual / bound, v = 1 - u * u;
   return v > 0 ? v * v : 0;
 }
+
+/// In standard deviations of the residuals: Tukey's bound of 95 % efficiency.
+inline constexpr double tukey_sigmas = 4.685;
+/// Seven parameters and a few more: what is below is no set of equations.
+inline constexpr std::size_t fewest_pairs = 10;
 
 /// Standard deviation from the median of the sizes, which it reorders.
 double robust_sigma(std::vector<double>& sizes);

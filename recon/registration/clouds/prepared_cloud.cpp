@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/registration/clouds/prepared_cloud.hpp"
-#include "core/geometry/kd_tree.hpp"
 
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <queue>
+#include <tuple>
 
+#include "core/geometry/kd_tree.hpp"
 #include "core/numeric/median.hpp"
 #include "recon/registration/clouds/outlier_filter.hpp"
 #include "recon/registration/clouds/thinning.hpp"
@@ -17,6 +19,7 @@ namespace orbitfuse::registration {
 namespace {
 
 constexpr std::size_t fewest_points_of_cloud = 20;
+static_assert(fewest_points_of_cloud > PreparedCloud::neighbour_count);
 
 /// Coordinate medians as the centre, 90 % of the points within radius 1: few far points move
 /// neither.
@@ -49,17 +52,17 @@ void estimate_normals(PreparedCloud& cloud) {
   for (std::size_t i = 0; i < n; ++i) {
     std::size_t index[k];
     double d2[k];
-    const std::size_t found = tree.nearest(cloud.points[i], std::min(k, n), index, d2);
+    const std::size_t found = tree.nearest(cloud.points[i], k, index, d2);
+    assert(found == k && "no cloud is as small as a neighbourhood");
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
     for (std::size_t j = 0; j < found; ++j) mean += cloud.points[index[j]];
     mean /= static_cast<double>(found);
     Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
-    cloud.neighbours[i].fill(-1);
     for (std::size_t j = 0, slot = 0; j < found; ++j) {
       const Eigen::Vector3d d = cloud.points[index[j]] - mean;
       scatter += d * d.transpose();
       if (index[j] != i && slot < PreparedCloud::neighbour_count) {
-        cloud.neighbours[i][slot++] = static_cast<std::int32_t>(index[j]);
+        cloud.neighbours[i][slot++] = static_cast<std::uint32_t>(index[j]);
       }
     }
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
@@ -75,7 +78,7 @@ void estimate_normals(PreparedCloud& cloud) {
 void orient_normals(PreparedCloud& cloud) {
   struct Edge {
     double cost;
-    int from, to;
+    std::size_t from, to;
     bool operator<(const Edge& other) const {
       return std::tie(cost, to, from) > std::tie(other.cost, other.to, other.from);
     }
@@ -87,12 +90,8 @@ void orient_normals(PreparedCloud& cloud) {
   const auto visit = [&](std::size_t i) {
     done[i] = 1;
     part.push_back(i);
-    for (const std::int32_t j : cloud.neighbours[i]) {
-      if (j < 0) break;
-      const auto to = static_cast<std::size_t>(j);
-      if (!done[to]) {
-        edges.push({1 - std::abs(cloud.normals[i].dot(cloud.normals[to])), static_cast<int>(i), j});
-      }
+    for (const std::uint32_t to : cloud.neighbours[i]) {
+      if (!done[to]) edges.push({1 - std::abs(cloud.normals[i].dot(cloud.normals[to])), i, to});
     }
   };
   for (std::size_t seed = 0; seed < n; ++seed) {
@@ -102,10 +101,10 @@ void orient_normals(PreparedCloud& cloud) {
     while (!edges.empty()) {
       const Edge edge = edges.top();
       edges.pop();
-      const auto to = static_cast<std::size_t>(edge.to), from = static_cast<std::size_t>(edge.from);
-      if (done[to]) continue;
-      if (cloud.normals[to].dot(cloud.normals[from]) < 0) cloud.normals[to] = -cloud.normals[to];
-      visit(to);
+      if (done[edge.to]) continue;
+      Eigen::Vector3d& normal = cloud.normals[edge.to];
+      if (normal.dot(cloud.normals[edge.from]) < 0) normal = -normal;
+      visit(edge.to);
     }
     double outward = 0;
     for (const std::size_t i : part) outward += cloud.normals[i].dot(cloud.points[i]);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 
 #include "core/geometry/point_cloud.hpp"
@@ -22,19 +23,19 @@ struct PreparedCloud {
   /// 0..1, of the normal: the root of its neighbourhood's planarity. Planarity itself would leave
   /// warped surfaces with too few points to average over, none would let outliers pull.
   std::vector<double> trust;
-  std::vector<std::array<std::int32_t, neighbour_count>> neighbours;  ///< -1 where there are fewer
+  std::vector<std::array<std::uint32_t, neighbour_count>> neighbours;
   NearestGrid nearest_table;
   std::size_t dropped_not_finite = 0, dropped_outliers = 0;
 
-  /// Index of the (all but always) nearest point; -1 far outside the cloud's box.
-  int nearest(const Eigen::Vector3d& x) const {
-    int best = nearest_table.lookup(x);
-    if (best < 0) return best;
-    double best_d2 = (points[static_cast<std::size_t>(best)] - x).squaredNorm();
+  /// Index of the (all but always) nearest point; nothing far outside the cloud's box.
+  std::optional<std::size_t> nearest(const Eigen::Vector3d& x) const {
+    const std::optional<std::size_t> found = nearest_table.lookup(x);
+    if (!found) return found;
+    std::size_t best = *found;
+    double best_d2 = (points[best] - x).squaredNorm();
     // The table is exact to a cell; one greedy step to a neighbour makes up for it.
-    for (const std::int32_t j : neighbours[static_cast<std::size_t>(best)]) {
-      if (j < 0) break;
-      const double d2 = (points[static_cast<std::size_t>(j)] - x).squaredNorm();
+    for (const std::uint32_t j : neighbours[*found]) {
+      const double d2 = (points[j] - x).squaredNorm();
       if (d2 < best_d2) {
         best_d2 = d2;
         best = j;

@@ -51,13 +51,16 @@ Equations equations_at(const PreparedCloud& source, const PreparedCloud& target,
   return equations;
 }
 
-/// 4.685 sigma: Tukey's 95 % efficiency; a floor, or exact data would leave no pair.
 double adapted_bound(double sigma, double pair_bound) {
-  return std::clamp(4.685 * sigma, 0.004, pair_bound);
+  constexpr double floor = 0.004;  // or exact data would leave no pair
+  return std::clamp(tukey_sigmas * sigma, floor, pair_bound);
 }
 
+/// Radians, log of the scale, radii: beyond, the partners no longer are what was solved for.
+constexpr double most_update = 0.3;
+
 bool enough(const Equations& equations) {
-  return equations.distances.size() >= 10 && equations.weight > 0;
+  return equations.distances.size() >= fewest_pairs && equations.weight > 0;
 }
 
 }  // namespace
@@ -100,13 +103,13 @@ Refined refine(const PreparedCloud& source, const PreparedCloud& target,
     refined.hessian = equations.sums.topLeftCorner<7, 7>() / equations.weight;
     refined.residual_sigma = sigma;
     refined.pairs = static_cast<int>(equations.distances.size());
-    Matrix7 damped = equations.sums.topLeftCorner<7, 7>();
-    damped.diagonal().array() += 1e-4 * equations.weight;  // open directions stay where they are
-    Vector7 update = -damped.ldlt().solve(equations.sums.col(7).head<7>());
+    Vector7 update = -damped(equations.sums.topLeftCorner<7, 7>(), equations.weight)
+                          .ldlt()
+                          .solve(equations.sums.col(7).head<7>());
     if (!update.allFinite()) break;
     const double longest =
         std::max({update.head<3>().norm(), std::abs(update[3]), update.tail<3>().norm()});
-    if (longest > 0.3) update *= 0.3 / longest;
+    if (longest > most_update) update *= most_update / longest;
     refined.target_from_source =
         updated(refined.target_from_source, placed_center(refined.target_from_source), update);
     if (iteration < options.iterations) bound = std::max(options.end_bound, bound * shrink);

@@ -20,6 +20,12 @@ Similarity3d updated(const Similarity3d& target_from_source, const Eigen::Vector
 /// target point (d r/d omega = (z - c) x n to first order).
 Vector7 plane_jacobian(const Eigen::Vector3d& lever, const Eigen::Vector3d& normal);
 
+/// Normal equations whose open directions stay where they are; `weight`: of all their pairs.
+inline Matrix7 damped(Matrix7 hessian, double weight) {
+  hessian.diagonal().array() += 1e-4 * weight;
+  return hessian;
+}
+
 struct RefineOptions {
   double start_bound = 0.25;  ///< partners further apart (target unit lengths) don't pull, at first
   double end_bound = 0.08;    ///< and at last

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <random>
 
+#include "core/numeric/random.hpp"
 #include "core/system/clock.hpp"
 #include "recon/registration/clouds/ambiguity.hpp"
 #include "recon/registration/clouds/search.hpp"
@@ -17,50 +17,66 @@ namespace orbitfuse {
 namespace registration {
 namespace {
 
-constexpr int all_points = 1 << 30;
-
-/// A disturbed start lies within 2 degrees and percent: bounds begin not much wider than they end.
+/// How far each of a start's seven parameters is disturbed, either way: radians (2 degrees), logs
+/// of the scale, radii. Far enough that the refinement has to find its way back, near enough that
+/// it should.
+constexpr double most_kick = 0.035;
+/// A disturbed start is near: bounds begin not much wider than they end.
 constexpr RefineOptions restart_refinement{
     .start_bound = 0.12, .end_bound = 0.06, .iterations = 6, .polish = 4};
+/// Points of a cloud: a spread needs no more, and there are several restarts.
+constexpr int restart_points = 600;
 /// A given start lies within several degrees and percent.
 constexpr RefineOptions given_start_refinement{
     .start_bound = 0.2, .end_bound = 0.06, .iterations = 10, .polish = 4};
+/// To come near only: the last refinement takes all.
+constexpr int given_start_points = 800;
 /// The answer's, from a start that is already refined.
 constexpr RefineOptions last_refinement{
     .start_bound = 0.10, .end_bound = 0.06, .iterations = 5, .polish = 20};
 
 // Right placements stay above these but for clouds that are mostly outliers.
 constexpr double weak_score = 0.25, weak_evidence = 0.04;
+/// Of the best one's view score, by which it must lead (ViewScore): less decides wrongly more
+/// often, more leaves more to the user. How often on real pairs isn't measured (docs/benchmarks/).
+constexpr double decisive_lead = 0.1;
+/// Of a cloud, in its unit frame.
+constexpr double unit_diameter = 2;
 
 void widen_spread(const Similarity3d& answer, const Similarity3d& other,
                   RegistrationReport& report) {
   const auto widen = [](double& spread, double by) { spread = std::max(spread, by); };
   widen(report.spread_rotation_deg, rotation_angle_deg(other.rotation, answer.rotation));
   widen(report.spread_scale_percent, 100 * std::abs(std::log(other.scale / answer.scale)));
-  widen(report.spread_translation_percent, 50 * (other.translation - answer.translation).norm());
+  widen(report.spread_translation_percent,
+        100 / unit_diameter * (other.translation - answer.translation).norm());
 }
 
 /// Restarts estimate no warp, so that where one was left out the spread says what that changed.
 void measure_spread(const Search& search, const Similarity3d& answer,
                     const Similarity3d& without_warp, RegistrationReport& report) {
   widen_spread(answer, without_warp, report);
-  std::mt19937 random(search.options.seed);
-  std::uniform_real_distribution<double> unit(-1, 1);
   for (int i = 0; i < search.options.restarts; ++i) {
     Vector7 kick;
-    for (int k = 0; k < 7; ++k) kick[k] = 0.035 * unit(random);
+    for (int k = 0; k < kick.size(); ++k) {
+      const double unit = random_uniform(search.options.seed, static_cast<std::uint64_t>(i),
+                                         static_cast<std::uint64_t>(k));
+      kick[k] = most_kick * (2 * unit - 1);
+    }
     const Similarity3d start = updated(without_warp, without_warp.translation, kick);
-    widen_spread(answer, search.refine_with(start, 600, restart_refinement).target_from_source,
+    widen_spread(answer,
+                 search.refine_with(start, restart_points, restart_refinement).target_from_source,
                  report);
   }
 }
 
-/// Whether views prefer the chosen of the first `rivals` by a tenth of its score or more.
+/// Whether views prefer the chosen of the first `rivals` by the decisive lead or more.
 bool stands_out(const std::vector<RegistrationAlternative>& judged, std::size_t chosen,
                 std::size_t rivals) {
   const double best = judged[chosen].view_score;
   for (std::size_t i = 0; i < rivals; ++i) {
-    if (i != chosen && !(judged[i].view_score < best - 0.1 * std::abs(best))) return false;
+    if (i != chosen && !(judged[i].view_score < best - decisive_lead * std::abs(best)))
+      return false;
   }
   return true;
 }
@@ -76,8 +92,8 @@ Similarity3d beside_warp(const Search& search, const Refined& plain, Registratio
   const char* const what = "smooth warp beside the similarity";
   const Unwarped unwarped = refine_beside_warp(search.source, search.target, plain, {});
   report.warp = unwarped.outcome;
-  // Three coordinates; the diameter is 2.
-  report.warp_percent_of_diameter = 100 * std::sqrt(3.0) * unwarped.amplitude / 2;
+  // Of three coordinates together.
+  report.warp_percent_of_diameter = 100 * std::sqrt(3.0) * unwarped.amplitude / unit_diameter;
   switch (unwarped.outcome) {
     case WarpOutcome::not_asked:
     case WarpOutcome::found:
@@ -124,12 +140,12 @@ RegistrationReport reported(const Search& search, const Similarity3d& start) {
       search.agree(best.target_from_source, all_points, search.strict(best.residual_sigma))
           .evidence;
   const MatchFigures matched = match_figures(search.source, search.target, best.target_from_source,
-                                             2 * search.options.inlier_distance);
+                                             unit_diameter * search.options.inlier_distance);
   const MatchFigures near = match_figures(search.source, search.target, best.target_from_source,
-                                          2 * search.options.max_pair_distance);
+                                          unit_diameter * search.options.max_pair_distance);
   report.matching_ratio = matched.source_share;
   report.rmse = matched.rmse * target_from_unit.scale;
-  report.rmse_percent_of_diameter = 100 * matched.rmse / 2;
+  report.rmse_percent_of_diameter = 100 * matched.rmse / unit_diameter;
   report.overlap_source = near.source_share;
   report.overlap_target = near.target_share;
   measure_spread(search, best.target_from_source, plain.target_from_source, report);
@@ -220,7 +236,7 @@ Result<RegistrationReport> refine_registration(const PointCloud& source_cloud,
   const Search search(source, target, options);
   const Similarity3d unit_start = target.unit_from_cloud * start * source.unit_from_cloud.inverse();
   const Similarity3d closer =
-      search.refine_with(unit_start, 800, given_start_refinement).target_from_source;
+      search.refine_with(unit_start, given_start_points, given_start_refinement).target_from_source;
   RegistrationReport report = reported(search, closer);
   report.initialiser = "given start";
   report.cpu_s = cpu_seconds() - started;

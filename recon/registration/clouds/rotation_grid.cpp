@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "recon/registration/clouds/refine.hpp"
 #include "recon/registration/clouds/score.hpp"
@@ -15,7 +16,7 @@ namespace {
 struct Round {
   int points, iterations;
   double start_bound, end_bound;
-  std::size_t keep;
+  std::optional<std::size_t> keep = {};  ///< nothing: what the caller wants at most
 };
 
 }  // namespace
@@ -38,14 +39,14 @@ Candidates grid_candidates(const PreparedCloud& source, const PreparedCloud& tar
   for (const double scale : {1.0, 0.8, 1.25}) {
     if (scale < options.min_scale || scale > options.max_scale) continue;
     for (const auto& rotation : rotation_spiral(scale == 1.0 ? 600 : 300)) {
-      candidates.push_back(
-          {{scale, rotation, Eigen::Vector3d::Zero()}, 0, 0, "rotation grid", 0, false});
+      candidates.push_back({.target_from_source = {scale, rotation, Eigen::Vector3d::Zero()},
+                            .origin = "rotation grid"});
     }
   }
   constexpr Round rounds[] = {
       {.points = 60, .iterations = 3, .start_bound = 0.6, .end_bound = 0.4, .keep = 240},
       {.points = 120, .iterations = 4, .start_bound = 0.4, .end_bound = 0.25, .keep = 60},
-      {.points = 250, .iterations = 5, .start_bound = 0.25, .end_bound = 0.15, .keep = 0}};
+      {.points = 250, .iterations = 5, .start_bound = 0.25, .end_bound = 0.15}};
   for (const Round& round : rounds) {
     const auto source_subset = strided_subset(source.points.size(), round.points);
     const auto target_subset = strided_subset(target.points.size(), round.points);
@@ -67,8 +68,8 @@ Candidates grid_candidates(const PreparedCloud& source, const PreparedCloud& tar
                                         candidate.target_from_source, bounds)
                                   .score;
     }
-    candidates = best_distinct(std::move(candidates),
-                               round.keep ? round.keep : static_cast<std::size_t>(most));
+    candidates =
+        best_distinct(std::move(candidates), round.keep.value_or(static_cast<std::size_t>(most)));
   }
   return candidates;
 }

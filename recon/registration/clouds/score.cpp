@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 namespace orbitfuse::registration {
 namespace {
@@ -24,18 +25,17 @@ Side one_side(const PreparedCloud& from, const PreparedCloud& to, const std::vec
   for (const int i : subset) {
     const auto at = static_cast<std::size_t>(i);
     const Eigen::Vector3d y = linear * from.points[at] + to_from.translation;
-    const int j = to.nearest(y);
-    if (j < 0) continue;
-    const auto partner = static_cast<std::size_t>(j);
-    const Eigen::Vector3d d = y - to.points[partner];
-    const double d2 = d.squaredNorm(), height = std::abs(to.normals[partner].dot(d)),
+    const std::optional<std::size_t> partner = to.nearest(y);
+    if (!partner) continue;
+    const Eigen::Vector3d d = y - to.points[*partner];
+    const double d2 = d.squaredNorm(), height = std::abs(to.normals[*partner].dot(d)),
                  off = height / plane;
     if (d2 < reach2 && off > 1 && height * height > steep_share * steep_share * d2) {
       side.against += std::min(off - 1, 1.0) * (1 - d2 / reach2);
     }
     if (d2 >= pair2) continue;
     const double agree = 1 - std::max(off * off, d2 * d2 / (pair2 * pair2));
-    const double cosine = to.normals[partner].dot(rotation * from.normals[at]);
+    const double cosine = to.normals[*partner].dot(rotation * from.normals[at]);
     if (agree > 0) side.agree += agree * cosine * cosine;
   }
   const double count = std::max<double>(1, static_cast<double>(subset.size()));
@@ -81,9 +81,9 @@ MatchFigures match_figures(const PreparedCloud& source, const PreparedCloud& tar
     double near = 0;
     for (const auto& p : from.points) {
       const Eigen::Vector3d y = to_from * p;
-      const int j = to.nearest(y);
-      if (j < 0) continue;
-      const double d = target_per_to * (y - to.points[static_cast<std::size_t>(j)]).norm();
+      const std::optional<std::size_t> partner = to.nearest(y);
+      if (!partner) continue;
+      const double d = target_per_to * (y - to.points[*partner]).norm();
       if (d > distance) continue;
       near += 1;
       squares += d * d;

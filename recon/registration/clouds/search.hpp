@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <limits>
+
 #include "core/progress.hpp"
 #include "recon/registration/clouds/candidate.hpp"
 #include "recon/registration/clouds/refine.hpp"
 #include "recon/registration/clouds/score.hpp"
 
 namespace orbitfuse::registration {
+
+/// Instead of a number of points: a subset of them all.
+inline constexpr int all_points = std::numeric_limits<int>::max();
 
 /// The two clouds and what the options mean in their unit frames.
 struct Search {

@@ -5,12 +5,14 @@
 #include <cstdint>
 #include <unordered_map>
 
+#include "core/numeric/random.hpp"
+
 namespace orbitfuse::registration {
 namespace {
 
 struct KeyHash {
   std::size_t operator()(std::uint64_t key) const {
-    key *= 0x9E3779B97F4A7C15ull;  // neighbouring cells differ in few bits only
+    key *= split_mix_step;  // neighbouring cells differ in few bits only
     return static_cast<std::size_t>(key ^ (key >> 29));
   }
 };

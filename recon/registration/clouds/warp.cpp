@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <tuple>
 #include <vector>
 
@@ -74,18 +75,17 @@ Equations equations_at(const PreparedCloud& source, const PreparedCloud& target,
   equations.mixed.setZero(unknowns, 8);
   std::vector<Block> blocks(grid.cell_count(), Block::Zero());
   const auto add = [&](const Pair& pair) {
-    const WarpGrid::Place place = grid.place(pair.at);
-    if (place.cell < 0) return;
+    const std::optional<WarpGrid::Place> place = grid.place(pair.at);
+    if (!place) return;
     equations.distances.push_back(std::abs(pair.residual));
     const double w = pair.trust * tukey(pair.residual, plane_bound);
     if (w <= 0) return;
     Eigen::Matrix<double, 32, 1> row;
     for (Index k = 0; k < WarpGrid::cell_corners; ++k)
-      row.segment<3>(3 * k) = place.weights[static_cast<std::size_t>(k)] * pair.normal;
+      row.segment<3>(3 * k) = place->weights[static_cast<std::size_t>(k)] * pair.normal;
     row.segment<7>(24) = plane_jacobian(pair.lever, pair.normal);
-    row[31] = pair.residual - pair.normal.dot(grid.displacement(place));
-    blocks[static_cast<std::size_t>(place.cell)].noalias() +=
-        (w * row).lazyProduct(row.transpose());
+    row[31] = pair.residual - pair.normal.dot(grid.displacement(*place));
+    blocks[place->cell].noalias() += (w * row).lazyProduct(row.transpose());
     equations.weight += w;
   };
   const Pairs pairs(source, target, placement, pair_bound, true, grid);
@@ -96,8 +96,7 @@ Equations equations_at(const PreparedCloud& source, const PreparedCloud& target,
   for (std::size_t j = 0; j < target.points.size(); ++j) {
     if (pairs.backward(j, pair)) add(pair);
   }
-  for (std::size_t c = 0; c < blocks.size(); ++c)
-    scatter(blocks[c], grid.corners(static_cast<int>(c)), equations);
+  for (std::size_t c = 0; c < blocks.size(); ++c) scatter(blocks[c], grid.corners(c), equations);
   return equations;
 }
 
@@ -106,9 +105,7 @@ class Displacements {
  public:
   Displacements(const Equations& equations, double sigma, const Prior& prior)
       : prior_(prior), mixed_(equations.mixed) {
-    Matrix7 damped = equations.similarity.topLeftCorner<7, 7>();
-    damped.diagonal().array() += 1e-4 * equations.weight;  // open directions stay where they are
-    similarity_.compute(damped);
+    similarity_.compute(damped(equations.similarity.topLeftCorner<7, 7>(), equations.weight));
     gradient_ = equations.similarity.col(7).head<7>();
     const auto coupling = mixed_.leftCols<7>();
     const double precision = 1 / (sigma * sigma);
@@ -224,8 +221,8 @@ Unwarped refine_beside_warp(const PreparedCloud& source, const PreparedCloud& ta
   for (int round = 0; round < options.rounds; ++round) {
     sigma = std::max(sigma, options.min_sigma);
     Equations equations = equations_at(source, target, placement, grid, options.pair_bound,
-                                       std::min(4.685 * sigma, options.pair_bound));
-    if (equations.distances.size() < 10 || !(equations.weight > 0))
+                                       std::min(tukey_sigmas * sigma, options.pair_bound));
+    if (equations.distances.size() < fewest_pairs || !(equations.weight > 0))
       return without(round == 0 ? WarpOutcome::too_little : WarpOutcome::diverged);
     const Displacements displacements(equations, sigma, prior);
     if (round == 0 && !displacements.any()) return without(WarpOutcome::none);

@@ -31,46 +31,47 @@ void WarpGrid::build(const Points& points, int fewest_points) {
   }
   count_ = ((high - low) / spacing_).ceil().cast<int>().max(1);
   origin_ = 0.5 * (low + high) - 0.5 * spacing_ * count_.cast<double>();
-  cell_at_.assign(static_cast<std::size_t>(count_.prod()), 0);
+  std::vector<int> points_in(static_cast<std::size_t>(count_.prod()), 0);
   const auto cell_of = [&](const Eigen::Vector3d& p) {
     const Eigen::Array3i c = ((p - origin_).array() / spacing_).floor().cast<int>();
     return static_cast<std::size_t>(flat(c.max(0).min(count_ - 1), count_));
   };
-  for (const auto& p : points) ++cell_at_[cell_of(p)];
+  for (const auto& p : points) ++points_in[cell_of(p)];
 
+  cell_at_.assign(points_in.size(), std::nullopt);
   cells_.clear();
   nodes_.clear();
   const Eigen::Array3i corner_count = count_ + 1;
-  std::vector<int> node_at(static_cast<std::size_t>(corner_count.prod()), -1);
+  std::vector<std::optional<int>> node_at(static_cast<std::size_t>(corner_count.prod()));
   Eigen::Array3i c;
   for (c[2] = 0; c[2] < count_[2]; ++c[2]) {
     for (c[1] = 0; c[1] < count_[1]; ++c[1]) {
       for (c[0] = 0; c[0] < count_[0]; ++c[0]) {
-        int& cell = cell_at_[static_cast<std::size_t>(flat(c, count_))];
-        const bool enough = cell >= fewest_points;
-        cell = enough ? static_cast<int>(cells_.size()) : -1;
-        if (!enough) continue;
+        const auto cell = static_cast<std::size_t>(flat(c, count_));
+        if (points_in[cell] < fewest_points) continue;
+        cell_at_[cell] = cells_.size();
         std::array<int, cell_corners>& corners = cells_.emplace_back();
         for (int k = 0; k < cell_corners; ++k) {
           const Eigen::Array3i at = c + corner_offset(k);
-          int& node = node_at[static_cast<std::size_t>(flat(at, corner_count))];
-          if (node < 0) {
+          std::optional<int>& node = node_at[static_cast<std::size_t>(flat(at, corner_count))];
+          if (!node) {
             node = static_cast<int>(nodes_.size());
             nodes_.push_back(origin_ + spacing_ * at.cast<double>().matrix());
           }
-          corners[static_cast<std::size_t>(k)] = node;
+          corners[static_cast<std::size_t>(k)] = *node;
         }
       }
     }
   }
 }
 
-WarpGrid::Place WarpGrid::place(const Eigen::Vector3d& x) const {
-  Place place;
+std::optional<WarpGrid::Place> WarpGrid::place(const Eigen::Vector3d& x) const {
   const Eigen::Array3d u = (x - origin_).array() / spacing_;
-  if (!((u >= 0).all() && (u <= count_.cast<double>()).all())) return place;
+  if (!((u >= 0).all() && (u <= count_.cast<double>()).all())) return std::nullopt;
   const Eigen::Array3i c = u.cast<int>().min(count_ - 1);
-  place.cell = cell_at_[static_cast<std::size_t>(flat(c, count_))];
+  const std::optional<std::size_t> cell = cell_at_[static_cast<std::size_t>(flat(c, count_))];
+  if (!cell) return std::nullopt;
+  Place place{.cell = *cell, .weights = {}};
   const Eigen::Array3d f = u - c.cast<double>();
   for (int k = 0; k < cell_corners; ++k) {
     const Eigen::Array3i o = corner_offset(k);
@@ -82,7 +83,6 @@ WarpGrid::Place WarpGrid::place(const Eigen::Vector3d& x) const {
 
 Eigen::Vector3d WarpGrid::displacement(const Place& place) const {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  if (place.cell < 0) return sum;
   const auto& nodes = corners(place.cell);
   for (std::size_t k = 0; k < cell_corners; ++k)
     sum += place.weights[k] * displacements_[static_cast<std::size_t>(nodes[k])];

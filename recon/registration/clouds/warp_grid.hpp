@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "recon/registration/similarity.hpp"
@@ -15,24 +16,27 @@ class WarpGrid {
  public:
   static constexpr int cell_corners = 8;
   struct Place {
-    int cell = -1;  ///< -1: outside
+    std::size_t cell;
     std::array<double, cell_corners> weights;
   };
 
   /// The spacing grows until there are no more than `most_nodes` corners.
   WarpGrid(const Points& points, double spacing, int fewest_points, std::size_t most_nodes);
 
-  Place place(const Eigen::Vector3d& x) const;
+  /// Nothing outside of all cells.
+  std::optional<Place> place(const Eigen::Vector3d& x) const;
   /// Corners of a cell, in the order of Place::weights: indices of nodes.
-  const std::array<int, cell_corners>& corners(int cell) const {
-    return cells_[static_cast<std::size_t>(cell)];
-  }
+  const std::array<int, cell_corners>& corners(std::size_t cell) const { return cells_[cell]; }
   std::size_t cell_count() const { return cells_.size(); }
   const Points& nodes() const { return nodes_; }
   double spacing() const { return spacing_; }
 
   Eigen::Vector3d displacement(const Place& place) const;
-  Eigen::Vector3d operator()(const Eigen::Vector3d& x) const { return displacement(place(x)); }
+  /// Zero outside.
+  Eigen::Vector3d operator()(const Eigen::Vector3d& x) const {
+    const std::optional<Place> at = place(x);
+    return at ? displacement(*at) : Eigen::Vector3d(Eigen::Vector3d::Zero());
+  }
   void displace(const Eigen::VectorXd& by_node);  ///< x, y, z of each node in turn
 
  private:
@@ -40,8 +44,8 @@ class WarpGrid {
 
   double spacing_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
-  Eigen::Array3i count_ = Eigen::Array3i::Zero();  ///< cells a side
-  std::vector<int> cell_at_;                       ///< -1 where there are too few points
+  Eigen::Array3i count_ = Eigen::Array3i::Zero();    ///< cells a side
+  std::vector<std::optional<std::size_t>> cell_at_;  ///< nothing where there are too few points
   std::vector<std::array<int, cell_corners>> cells_;
   Points nodes_, displacements_;
 };

@@ -27,15 +27,15 @@ TEST(NearestTable, AgreesWithBruteForceNearTheSurface) {
     const Eigen::Vector3d x = anchor + 0.03 * gaussian3(random);
     double least = 1e9;
     for (const auto& p : cloud->points) least = std::min(least, (p - x).norm());
-    const int found = cloud->nearest(x);
-    ASSERT_GE(found, 0);
-    const double d = (cloud->points[static_cast<std::size_t>(found)] - x).norm();
+    const auto found = cloud->nearest(x);
+    ASSERT_TRUE(found);
+    const double d = (cloud->points[*found] - x).norm();
     exact += d < least + 1e-12;
     EXPECT_LT(d, least + cloud->nearest_table.cell());
   }
   EXPECT_GT(exact, 490);
-  EXPECT_EQ(cloud->nearest({1e3, 0, 0}), -1);
-  EXPECT_EQ(cloud->nearest({1e30, -1e30, 0}), -1);
+  EXPECT_FALSE(cloud->nearest({1e3, 0, 0}));
+  EXPECT_FALSE(cloud->nearest({1e30, -1e30, 0}));
 }
 
 TEST(Prepare, NormalsOfASpherePointOutwards) {
