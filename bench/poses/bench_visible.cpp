@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// bench_visible SCENE... [--focal-error R] [--no-stations] [--colmap | --global] [--views]: poses
-// of the visible views alone, and their error where the truth is known; --views: of each view. A
-// scene is one of shared data's orbits (container, sedan, van, fox, flowerpot, ...), one of its
-// pairs (metu_sunny_scene_7, ...), or the path of a folder rendered like them. --colmap poses with
-// COLMAP's mapper on all pairs at full settings instead, --global by the global mapper on the
-// orbit's pairs alone.
+// bench_visible SCENE... [--focal-error R] [--no-stations] [--no-focal] [--colmap | --global]
+// [--views]: poses of the visible views alone, and their error where the truth is known; --views:
+// of each view. A scene is one of shared data's orbits (container, sedan, van, fox, flowerpot,
+// ...), one of its pairs (metu_sunny_scene_7, ...), or the whole path of a folder like those.
+// --colmap poses with COLMAP's mapper on all pairs at full settings instead, --global by the global
+// mapper on the orbit's pairs alone.
 
 #include <fmt/format.h>
+
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -33,7 +35,7 @@ namespace fs = std::filesystem;
 struct Request {
   std::vector<std::string> scenes;
   double focal_error = 0.03;
-  bool stations = true, colmap = false, global = false, views = false;
+  bool stations = true, focal = true, colmap = false, global = false, views = false;
 };
 
 /// Visible images of a folder, or of its folder visible/, in the order of their names.
@@ -78,6 +80,8 @@ scenes::Scene load(const fs::path& data, const std::string& which, const Request
                 [](const FrameRecord& frame) { return frame.modality != Modality::visible; });
   if (!request.stations)
     for (FrameRecord& frame : scene.session.frames) frame.station.reset();
+  if (!request.focal)
+    for (DeviceInfo& device : scene.session.devices) device.lens.focal_px.reset();
   return scene;
 }
 
@@ -157,6 +161,21 @@ void print_views(const ModalityPoses& poses, const PoseError& error) {
              camera.fx, poses.reconstruction.points.size());
 }
 
+/// Whether the word on each view is right: off means by more than 2 % of the extent or 2 degrees.
+void print_verdicts(const ModalityPoses& poses, const PoseError& error) {
+  int sure_but_off = 0, right_yet_doubted = 0;
+  for (const ViewError& view : error.each) {
+    const bool off = view.center_percent > 2 || view.rotation_deg > 2;
+    const bool doubted = std::any_of(poses.doubtful.begin(), poses.doubtful.end(),
+                                     [&](const DoubtfulView& d) { return d.name == view.name; });
+    sure_but_off += off && !doubted;
+    right_yet_doubted += !off && doubted;
+  }
+  for (const DoubtfulView& view : poses.doubtful)
+    fmt::print("  in doubt {}: {}\n", view.name, view.why);
+  fmt::print("  sure but off: {}; right, yet doubted: {}\n", sure_but_off, right_yet_doubted);
+}
+
 void print(const scenes::Scene& scene, const Result<ModalityPoses>& poses, double cpu_s,
            bool views) {
   if (!poses) {
@@ -178,6 +197,7 @@ void print(const scenes::Scene& scene, const Result<ModalityPoses>& poses, doubl
         "{:.3f} deg",
         error.ate_percent, error.ate_max_percent, error.rotation_mean_deg, error.rotation_max_deg);
   fmt::print("\n");
+  if (error.views > 0) print_verdicts(*poses, error);
   if (views) print_views(*poses, error);
 }
 
@@ -189,6 +209,8 @@ Request parsed(int argc, char** argv) {
       request.focal_error = std::strtod(argv[++i], nullptr);
     else if (word == "--no-stations")
       request.stations = false;
+    else if (word == "--no-focal")
+      request.focal = false;
     else if (word == "--colmap")
       request.colmap = true;
     else if (word == "--global")
@@ -209,7 +231,8 @@ int main(int argc, char** argv) {
   const Request request = parsed(argc, argv);
   if (request.scenes.empty() || !fs::exists(data)) {
     std::fputs(
-        "bench_visible SCENE... [--focal-error R] [--no-stations] [--colmap | --global] [--views]; "
+        "bench_visible SCENE... [--focal-error R] [--no-stations] [--no-focal] [--colmap | "
+        "--global] [--views]; "
         "needs "
         "the shared data (ORBITFUSE_SHARED)\n",
         stderr);

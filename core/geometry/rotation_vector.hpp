@@ -13,4 +13,11 @@ inline Eigen::Quaterniond turned_by(const Eigen::Vector3d& rotation_vector) {
   return Eigen::Quaterniond(Eigen::AngleAxisd(angle, rotation_vector / angle));
 }
 
+/// v x w as a matrix times w.
+inline Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
 }  // namespace orbitfuse

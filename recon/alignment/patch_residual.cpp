@@ -4,18 +4,10 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "core/geometry/rotation_vector.hpp"
 #include "core/numeric/median.hpp"
 
 namespace orbitfuse {
-namespace {
-
-Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
-}  // namespace
 
 CorrectedPose::CorrectedPose(const double* correction)
     : translation(Eigen::Map<const Eigen::Vector3d>(correction + 3)) {

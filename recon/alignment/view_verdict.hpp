@@ -22,6 +22,7 @@ enum class DoubtReason {
   undecided,                ///< so many are contradicted that nobody is left to judge
   loop_in_doubt,            ///< most of its loop is in doubt
   few_common_points,        ///< hardly a point of it is seen by two other views
+  uncertain_place,          ///< its points and their residuals leave it room
 };
 
 constexpr std::string_view name(DoubtReason reason) {
@@ -48,6 +49,8 @@ constexpr std::string_view name(DoubtReason reason) {
       return "loop_in_doubt";
     case DoubtReason::few_common_points:
       return "few_common_points";
+    case DoubtReason::uncertain_place:
+      return "uncertain_place";
   }
   return "unknown";
 }

@@ -82,6 +82,8 @@ class VisibleLadder {
     if (!best_) ORBITFUSE_TRY(try_mapper(*quick, quick_name_));
     if (!complete()) ORBITFUSE_TRY(improve(*quick, all_are_few));
     if (best_) ORBITFUSE_TRY(spared(try_rematching()));
+    if (best_ && !complete() && rematched_)
+      ORBITFUSE_TRY(spared(try_resection(*best_level_, "resection on points matched again")));
     return answer(quick->pairs());
   }
 
@@ -186,6 +188,7 @@ class VisibleLadder {
     } else {
       Result<JudgedModel> judged =
           judge_model(std::move(model), session_, frames_, level.options());
+      const bool contradicted = judged && judged->believed && matches_contradict(level, *judged);
       step.why += "; " + (judged ? judged->why : judged.error().found);
       if (judged) step.posed = static_cast<int>(judged->poses.reconstruction.views.size());
       if (judged && judged->believed &&
@@ -195,12 +198,29 @@ class VisibleLadder {
         best_level_ = &level;
       } else if (judged && judged->believed) {
         step.why += "; no better than the model before";
-      } else if (judged && (!part_ || more_views(judged->poses.reconstruction, *part_)) &&
+      } else if (judged && !contradicted &&
+                 (!part_ || more_views(judged->poses.reconstruction, *part_)) &&
                  only_too_small(*judged, level.options())) {
         part_ = std::move(judged->poses.reconstruction);
       }
     }
     record(std::move(step));
+  }
+
+  /// Whether the level's verified matches speak against the model, which then is not believed: on
+  /// repeated structure a wrong model has small residuals, for it keeps the matches that fit it.
+  bool matches_contradict(const FeatureLevel& level, JudgedModel& judged) const {
+    const auto graph = level.graph();
+    if (!graph) return false;
+    const HeldMatches held =
+        held_matches(*graph, posed_frames(*graph, judged.poses.reconstruction));
+    judged.poses.gates["held_matches"] = held.share;
+    judged.poses.gates["contradicted_pairs"] = held.contradicted;
+    judged.why += fmt::format(", {:.0f} % of the matches of pairs hold", 100 * held.share);
+    if (held.contradicted > 0)
+      judged.why += fmt::format(", those of {} pairs contradict it", held.contradicted);
+    if (held.contradict()) judged.believed = false;
+    return held.contradict();
   }
 
   /// The mapper's default settings, then ever more relaxed ones until a model is believed. A
@@ -233,7 +253,7 @@ class VisibleLadder {
     // yard, with views on a wrong side, .89.
     constexpr double plainly_right = 0.95;
     if (best_ &&
-        held_share(graph, posed_frames(graph, best_->poses.reconstruction)) > plainly_right)
+        held_matches(graph, posed_frames(graph, best_->poses.reconstruction)).share > plainly_right)
       return {};
     const Adjuster adjust = [&](Reconstruction model) -> Result<Reconstruction> {
       ORBITFUSE_ASSIGN(ModalityPoses poses,
@@ -261,7 +281,9 @@ class VisibleLadder {
     const auto without = total_ - static_cast<int>(known.views.size());
     PosedFrames posed = posed_frames(graph, known);
     // The model knows better than two-view geometry which matches hold.
-    for (auto& [pair, matches] : confirmed_matches(graph, posed, 3 * graph.pixel_scale))
+    PairMatches found_again = confirmed_matches(graph, posed, 3 * graph.pixel_scale);
+    if (rematched_) match_along_lines(graph, posed, 3 * graph.pixel_scale, found_again);
+    for (auto& [pair, matches] : found_again)
       if (matches.size() > graph.verified[pair].size()) graph.verified[pair] = matches;
     ORBITFUSE_ASSIGN(const std::vector<int> added, resect(graph, posed, {}, progress_));
     const std::string found = fmt::format("{} of {} views found a place", added.size(), without);
@@ -298,6 +320,7 @@ class VisibleLadder {
                  still_explained * explained_matches(graph, posed_frames(graph, before));
     };
     consider(attempt, found, std::move(again), *best_level_, no_worse);
+    rematched_ = best_step_ + 1 == steps_.size();
     return {};
   }
 
@@ -375,7 +398,8 @@ class VisibleLadder {
   const int total_;
   std::string quick_name_ = "orbit pairs";
   std::set<std::string> featureless_;
-  bool limited_ = false;  ///< images were reduced or features cut off: full settings find others
+  bool rematched_ = false;  ///< the best model's points are those along its epipolar lines
+  bool limited_ = false;    ///< images were reduced or features cut off: full settings find others
   std::optional<FeatureLevel> full_;
   std::optional<JudgedModel> best_;
   const FeatureLevel* best_level_ = nullptr;  ///< whose features the best model's are

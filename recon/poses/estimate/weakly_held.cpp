@@ -3,23 +3,61 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "recon/poses/estimate/center_uncertainty.hpp"
 #include "recon/poses/index.hpp"
 
 namespace orbitfuse {
+namespace {
 
-std::vector<DoubtfulView> weakly_held(const Reconstruction& model, int fewest) {
-  if (model.views.size() < 3) return {};
+/// Of each view's points, those that two other sure views see.
+std::vector<int> points_of_three(const Reconstruction& model, const std::vector<char>& doubted) {
   std::vector<int> common(model.views.size(), 0);
-  for (const SparsePoint& point : model.points)
-    if (point.track.size() > 2)
-      for (const Observation& o : point.track) ++common[at(o.view)];
+  for (const SparsePoint& point : model.points) {
+    const auto sure = std::count_if(point.track.begin(), point.track.end(),
+                                    [&](const Observation& o) { return !doubted[at(o.view)]; });
+    for (const Observation& o : point.track)
+      if (sure - (doubted[at(o.view)] ? 0 : 1) >= 2) ++common[at(o.view)];
+  }
+  return common;
+}
+
+constexpr const char* advice = "take one between it and the next";
+
+}  // namespace
+
+std::vector<DoubtfulView> weakly_held(const Reconstruction& model,
+                                      const WeaklyHeldOptions& options) {
+  if (model.views.size() < 3) return {};
+  std::vector<char> doubted(model.views.size(), 0);
   std::vector<DoubtfulView> views;
-  for (std::size_t v = 0; v < common.size(); ++v)
-    if (common[v] < fewest)
-      views.push_back({model.views[v].name, DoubtReason::few_common_points,
-                       fmt::format("{} of its points are seen by two other views, {} hold a view; "
-                                   "take one between it and the next",
-                                   common[v], fewest)});
+  const auto doubt = [&](std::size_t v, DoubtReason reason, std::string why) {
+    doubted[v] = 1;
+    views.push_back({model.views[v].name, reason, std::move(why)});
+  };
+  const std::vector<double> uncertainty = center_uncertainty(model);
+  for (std::size_t v = 0; v < uncertainty.size(); ++v)
+    if (uncertainty[v] > options.most_uncertain)
+      doubt(v, DoubtReason::uncertain_place,
+            fmt::format("its points leave its place uncertain by {:.1f} % of the orbit, {:.2f} % "
+                        "is trusted; {}",
+                        100 * uncertainty[v], 100 * options.most_uncertain, advice));
+  // The weakest first: what it alone vouched for is counted without it.
+  for (;;) {
+    const std::vector<int> common = points_of_three(model, doubted);
+    std::size_t weakest = common.size();
+    for (std::size_t v = 0; v < common.size(); ++v)
+      if (!doubted[v] && common[v] < options.fewest_points &&
+          (weakest == common.size() || common[v] < common[weakest]))
+        weakest = v;
+    if (weakest == common.size()) break;
+    doubt(weakest, DoubtReason::few_common_points,
+          fmt::format("{} of its points are seen by two other sure views, {} hold a view; {}",
+                      common[weakest], options.fewest_points, advice));
+  }
+  const auto order = [](const DoubtfulView& a, const DoubtfulView& b) { return a.name < b.name; };
+  std::sort(views.begin(), views.end(), order);
   return views;
 }
 

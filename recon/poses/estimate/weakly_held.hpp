@@ -7,13 +7,23 @@
 
 namespace orbitfuse {
 
-/// Views of which fewer than `fewest` points are seen by two others. Points of two views hold how a
-/// pair is turned, but each pair at a scale of its own: what they chain drifts while every residual
-/// is small. None for a model of two views, which has no third to ask.
+struct WeaklyHeldOptions {
+  /// Of a view's points, how many two other views whose poses are sure have to see. Points of two
+  /// views hold how a pair is turned, but each pair at a scale of its own: what they chain drifts
+  /// while every residual is small.
+  int fewest_points = 30;
+  /// Of center_uncertainty().
+  double most_uncertain = 0.0025;
+};
+
+/// Views whose poses the points don't hold well enough to be trusted; none for a model of two,
+/// which has no third to ask. A doubtful view vouches for no other.
 ///
-/// Chosen on ten scenes, whose right views have 76 and more, and a bare hall, where the two that
-/// were 5.0 and 2.4 % of the extent off have 11 and 37. It errs towards doubt: on an orbit left out
-/// of that choice, `van` in three loops, five of 36 right views have 30 to 49.
-std::vector<DoubtfulView> weakly_held(const Reconstruction& model, int fewest = 50);
+/// Both constants were chosen on ten scenes (docs/notes/poses_visible.md): right views have 30
+/// points and more there and are uncertain by 0.18 % at most; of a bare hall, the one of 24 that is
+/// 10.5 % off has 11, its neighbour, 5.3 % off, 28 without it, and the third, 2.6 % off, is
+/// uncertain by 0.35 %.
+std::vector<DoubtfulView> weakly_held(const Reconstruction& model,
+                                      const WeaklyHeldOptions& options = {});
 
 }  // namespace orbitfuse

@@ -182,16 +182,22 @@ int explained_matches(const FeatureGraph& graph, const PosedFrames& posed) {
   return explained;
 }
 
-double held_share(const FeatureGraph& graph, const PosedFrames& posed) {
+HeldMatches held_matches(const FeatureGraph& graph, const PosedFrames& posed) {
+  constexpr std::size_t plenty = 30;  // two-view geometry holds half as many by chance
+  HeldMatches result;
   std::size_t all = 0, held = 0;
   for (const auto& [pair, matches] : graph.verified) {
     if (!posed.poses[at(pair.first)] || !posed.poses[at(pair.second)]) continue;
     const EpipolarBand band =
         epipolar_band(graph, pair, posed, TrackOptions{}.max_error_px * graph.pixel_scale);
+    std::size_t of_pair = 0;
+    for (const auto& [i, j] : matches) of_pair += band.distance(i, j) <= band.half_width;
+    result.contradicted += matches.size() >= plenty && 4 * of_pair < matches.size();
     all += matches.size();
-    for (const auto& [i, j] : matches) held += band.distance(i, j) <= band.half_width;
+    held += of_pair;
   }
-  return all == 0 ? 1 : static_cast<double>(held) / static_cast<double>(all);
+  if (all > 0) result.share = static_cast<double>(held) / static_cast<double>(all);
+  return result;
 }
 
 Reconstruction reconstruction_of(const FeatureGraph& graph, const PosedFrames& posed,
