@@ -53,7 +53,9 @@ Status resolve_config(const CLI::App& verb, cli::Context& context) {
   if (!common.config_file.empty()) ORBITFUSE_TRY(settings.read_toml(common.config_file));
   for (const std::string& assignment : common.overrides) ORBITFUSE_TRY(settings.apply(assignment));
   context.given = settings.given();
-  config.set_seed(verb.count("--seed") > 0 ? common.seed : seed.value_or(common.seed));
+  const CLI::Option* seed_option = verb.get_option_no_throw("--seed");
+  const bool seed_given = seed_option != nullptr && seed_option->count() > 0;
+  config.set_seed(seed_given ? common.seed : seed.value_or(common.seed));
   return config.validate();
 }
 

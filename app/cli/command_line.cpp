@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <charconv>
+#include <optional>
 
 #include "app/config/settings.hpp"
 #include "app/pipeline/runner.hpp"
@@ -25,8 +26,9 @@ class ExampleFirst : public CLI::Formatter {
   }
 };
 
-void add_common(CLI::App& app, CommonOptions& common) {
-  constexpr const char* group = "Common";
+constexpr const char* group = "Common";
+
+void add_config(CLI::App& app, CommonOptions& common) {
   app.add_option("--config", common.config_file, "TOML file; config/orbitfuse.toml lists all keys")
       ->group(group);
   app.add_option("--set", common.overrides, "Override one key, e.g. render.views=12; repeatable")
@@ -35,13 +37,9 @@ void add_common(CLI::App& app, CommonOptions& common) {
       ->group(group);
   app.add_flag("--print-config", common.print_config, "Print the resolved configuration and stop")
       ->group(group);
-  app.add_flag("--json", common.json, "NDJSON events on stdout, the last line a result")
-      ->group(group);
-  app.add_flag("-v,--verbose", common.verbosity, "More messages")->group(group);
-  app.add_flag("-q,--quiet", common.quiet, "Errors only")->group(group);
-  app.add_option("--threads", common.threads, "Worker threads; 0 = all cores")
-      ->check(CLI::Range(0, 1024))
-      ->group(group);
+}
+
+void add_seed(CLI::App& app, CommonOptions& common) {
   app.add_option("--seed", common.seed, "Seed of everything random")
       ->check([](const std::string& word) {
         std::uint64_t seed = 0;
@@ -53,6 +51,19 @@ void add_common(CLI::App& app, CommonOptions& common) {
       ->type_name("UINT")
       ->capture_default_str()
       ->group(group);
+}
+
+void add_common(CLI::App& app, CommonOptions& common, const CommonUse& use) {
+  if (use.config) add_config(app, common);
+  app.add_flag("--json", common.json, "NDJSON events on stdout, the last line a result")
+      ->group(group);
+  CLI::Option* verbose = app.add_flag("-v,--verbose", common.verbosity, "More messages");
+  verbose->group(group);
+  app.add_flag("-q,--quiet", common.quiet, "Errors only")->excludes(verbose)->group(group);
+  app.add_option("--threads", common.threads, "Worker threads; 0 = all cores")
+      ->check(CLI::Range(0, 1024))
+      ->group(group);
+  if (use.seed) add_seed(app, common);
   app.add_option("--device", common.device, "Where to compute")
       ->check(CLI::IsMember({"cpu", "cuda"}))
       ->capture_default_str()
@@ -61,9 +72,24 @@ void add_common(CLI::App& app, CommonOptions& common) {
                  "Write where the time goes, in Chrome's trace format (chrome://tracing, Perfetto)")
       ->type_name("FILE")
       ->group(group);
-  app.add_flag("--force", common.force, "Run again although nothing changed")->group(group);
-  app.add_flag("--resume", common.resume, "Go on where an interrupted run stopped")->group(group);
+  if (use.force)
+    app.add_flag("--force", common.force, "Run again although nothing changed")->group(group);
+  if (use.resume)
+    app.add_flag("--resume", common.resume, "Go on where an interrupted run stopped")->group(group);
   app.add_flag("--dry-run", common.dry_run, "Say what would be done, write nothing")->group(group);
+}
+
+/// An option that other verbs have, and this one no use for.
+std::optional<Error> unoffered(const CommandLine& line, const Verb& verb, const std::string& name) {
+  for (const auto& [option, why, remedy] : verb.unoffered)
+    if (name == option) return Error{ErrorKind::usage, name, why, remedy};
+  for (const auto& [other, action] : line.actions) {
+    const CLI::Option* option = line.app.get_subcommand(other->name)->get_option_no_throw(name);
+    if (option != nullptr && option->get_group() == group)
+      return Error{ErrorKind::usage, name, std::string("means nothing to ") + verb.name,
+                   "leave it out"};
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -78,7 +104,7 @@ CommandLine::CommandLine() : app("Radiance fields of two camera orbits, fused fr
     CLI::App* sub = app.add_subcommand(verb.name, verb.summary);
     sub->footer(verb.example);
     actions.emplace_back(&verb, verb.add(*sub));
-    add_common(*sub, common);
+    add_common(*sub, common, verb.common);
   }
 }
 
@@ -95,10 +121,12 @@ Error usage_error(const CommandLine& line, const CLI::ParseError& error, int arg
   std::vector<std::string> words, known;
   for (int i = 1; i < argc; ++i) words.emplace_back(argv[i]);
   const CLI::App* app = &line.app;
+  const Verb* chosen = nullptr;
   for (const auto& [verb, action] : line.actions) {
-    if (!words.empty() && words.front() == verb->name) app = line.app.get_subcommand(verb->name);
+    if (!words.empty() && words.front() == verb->name) chosen = verb;
     known.emplace_back(verb->name);
   }
+  if (chosen) app = line.app.get_subcommand(chosen->name);
   Error result{ErrorKind::usage,
                {},
                error.what(),
@@ -122,6 +150,7 @@ Error usage_error(const CommandLine& line, const CLI::ParseError& error, int arg
   for (const std::string& word : words) {
     const std::string name = word.substr(0, word.find('='));
     if (name.starts_with("--") && std::find(known.begin(), known.end(), name) == known.end()) {
+      if (const auto refused = unoffered(line, *chosen, name)) return *refused;
       result.found = "unknown option '" + name + "'";
       suggest(name, known);
       break;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <initializer_list>
 #include <string>
 
@@ -34,6 +35,14 @@ inline Status check_apart(std::initializer_list<OptionPair> pairs) {
       return fail(ErrorKind::usage, option, std::string("given with ") + other,
                   "leave one of them out");
   }
+  return {};
+}
+
+/// The same for options of `app` that all mean nothing beside `other`.
+inline Status check_unused(const CLI::App& app, std::initializer_list<const char*> options,
+                           const char* other) {
+  for (const char* option : options)
+    ORBITFUSE_TRY(check_apart({{option, app.count(option) > 0, other, true}}));
   return {};
 }
 

@@ -16,16 +16,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-/// The session's own folder, or one for its images.
-bool lies_among_frames(const fs::path& out, const fs::path& session) {
-  std::error_code unreadable;  // whoever opens the session says why
-  if (!fs::exists(session / "manifest.jsonl", unreadable)) return false;
-  const fs::path inside = fs::weakly_canonical(out, unreadable)
-                              .lexically_relative(fs::weakly_canonical(session, unreadable));
-  return inside == "." || (!inside.empty() && (*inside.begin() == name(Modality::visible) ||
-                                               *inside.begin() == name(Modality::thermal)));
-}
-
 /// Results without run.json are no session, and making one is no remedy.
 Status check_no_lost_record(const std::string& folder) {
   std::error_code unreadable;
@@ -36,11 +26,25 @@ Status check_no_lost_record(const std::string& folder) {
               "name the session, with --out " + folder);
 }
 
+/// Of any verb: not all take a session.
+std::string name_it_again(const std::string& folder) {
+  return "run again, naming the session: orbitfuse run SESSION --out " + folder;
+}
+
 std::string absolute_name(const std::string& folder) {
   return fs::absolute(folder).lexically_normal().string();
 }
 
 }  // namespace
+
+bool lies_among_frames(const fs::path& out, const fs::path& session) {
+  std::error_code unreadable;  // whoever opens the session says why
+  if (!fs::exists(session / "manifest.jsonl", unreadable)) return false;
+  const fs::path inside = fs::weakly_canonical(out, unreadable)
+                              .lexically_relative(fs::weakly_canonical(session, unreadable));
+  return inside == "." || (!inside.empty() && (*inside.begin() == name(Modality::visible) ||
+                                               *inside.begin() == name(Modality::thermal)));
+}
 
 Result<json> earlier_run(const std::string& folder) {
   const fs::path record = fs::path(folder) / run_file;
@@ -49,11 +53,9 @@ Result<json> earlier_run(const std::string& folder) {
   ORBITFUSE_ASSIGN(const std::string text, read_file(record));
   json run = parse_json(text);
   if (run.is_discarded())
-    return fail(ErrorKind::input, record.string(), "not JSON, or cut off",
-                "give the session folder and --out");
+    return fail(ErrorKind::input, record.string(), "not JSON, or cut off", name_it_again(folder));
   if (!run.is_object() || !run.contains("session") || !run["session"].is_string())
-    return fail(ErrorKind::input, record.string(), "no session named in it",
-                "give the session folder and --out");
+    return fail(ErrorKind::input, record.string(), "no session named in it", name_it_again(folder));
   return run;
 }
 
@@ -71,7 +73,7 @@ Result<std::optional<std::uint64_t>> read_earlier_options(const std::string& fol
   const std::string file = (fs::path(folder) / run_file).string();
   const auto broken = [&](const char* key, const char* wanted) {
     return fail(ErrorKind::input, file, fmt::format("{} = {}", key, run[key].dump()),
-                fmt::format("it must be {}; or give the session folder and --out", wanted));
+                fmt::format("it must be {}; or {}", wanted, name_it_again(folder)));
   };
   if (run.contains("config")) {
     if (!run["config"].is_object()) return broken("config", "a table of settings");

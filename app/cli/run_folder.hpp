@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -17,5 +18,9 @@ Result<nlohmann::json> earlier_run(const std::string& folder);
 
 /// The session that the results in `out` are of, where it is another than `session`.
 std::optional<std::string> other_session(const std::string& out, const std::string& session);
+
+/// `out` is the session's own folder, or lies in one for its images: what is written there would be
+/// an image of it.
+bool lies_among_frames(const std::filesystem::path& out, const std::filesystem::path& session);
 
 }  // namespace orbitfuse::cli

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 
 namespace orbitfuse::cli {
 namespace {
@@ -24,6 +25,12 @@ void add_target(CLI::App& app, TrainingLimits& limits) {
   app.add_option("--target-psnr", limits.target_psnr,
                  "Stop training when the held-out views reach it, in dB")
       ->check(CLI::Range(1.0, 100.0))
+      ->check(CLI::Validator(
+          [](const std::string& word) {  // which lies in every range of CLI11's
+            return std::isnan(std::strtod(word.c_str(), nullptr)) ? "'" + word + "' is no number"
+                                                                  : std::string();
+          },
+          ""))
       ->type_name("DB");
 }
 

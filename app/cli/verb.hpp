@@ -16,7 +16,7 @@
 
 namespace orbitfuse::cli {
 
-/// Options that every verb takes.
+/// Options that mean the same to every verb that offers them.
 struct CommonOptions {
   std::string config_file;
   std::vector<std::string> overrides;  ///< --set key=value
@@ -41,12 +41,28 @@ struct Context {
 
 using Action = std::function<Status(Context&)>;
 
+/// Common options that only some verbs have a use for. The others don't offer them: what is taken
+/// and then passed over would be believed to have worked.
+struct CommonUse {
+  bool config = false;  ///< --config, --set, --print-config
+  bool seed = false, force = false, resume = false;
+};
+
+/// Why a verb doesn't offer a common option, where more can be said than that it means nothing.
+struct Unoffered {
+  const char* option;
+  const char* why;
+  const char* remedy;
+};
+
 /// A verb adds its own options to its sub-command and returns what to do when it was chosen.
 struct Verb {
   const char* name;
   const char* summary;
   const char* example;  ///< shown first in the help; runs as written
   Action (*add)(CLI::App& app);
+  CommonUse common;
+  std::vector<Unoffered> unoffered = {};
 };
 
 /// All verbs, in the order of the help.

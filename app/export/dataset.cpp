@@ -2,6 +2,7 @@
 #include "app/export/dataset.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <limits>
 #include <opencv2/imgproc.hpp>
@@ -168,6 +169,17 @@ Status write_pairs(const fs::path& folder, const view::FinishedRun& run, const E
   return stages::write_json(folder / "dataset.json", about);
 }
 
+/// A new folder beside the one to be written: a name that is there already is somebody's own.
+Result<fs::path> make_beside(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(fs::absolute(folder, error).parent_path(), error);
+  for (int n = 0; !error; ++n) {
+    fs::path partial = fmt::format("{}.partial-{}-{}", folder.string(), ::getpid(), n);
+    if (fs::create_directory(partial, error)) return partial;
+  }
+  return fail(ErrorKind::device, folder.string(), error.message(), "see who may write there");
+}
+
 }  // namespace
 
 Status check_dataset_folder(const fs::path& folder) {
@@ -193,8 +205,7 @@ Result<PairSet> write_dataset(const fs::path& given, const view::FinishedRun& ru
     return fail(ErrorKind::input, run.out.string(), "not both fields",
                 "pairs need a visible and a thermal orbit that are registered");
   ORBITFUSE_ASSIGN(const Cameras cameras, cameras_of(run, options));
-  const fs::path partial = folder.string() + ".partial";
-  fs::remove_all(partial, error);
+  ORBITFUSE_ASSIGN(const fs::path partial, make_beside(folder));
   if (const Status written = write_pairs(partial, run, frame, options, cameras, progress);
       !written) {
     fs::remove_all(partial, error);

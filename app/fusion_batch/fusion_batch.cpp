@@ -9,6 +9,7 @@
 #include "core/image/exif.hpp"
 #include "core/image/image_codec.hpp"
 #include "core/image/image_io.hpp"
+#include "core/image/transparency.hpp"
 #include "core/system/file_io.hpp"
 #include "fusion/metrics/metrics.hpp"
 
@@ -42,15 +43,18 @@ Result<std::map<std::string, fs::path>> files_by_stem(const fs::path& folder,
 /// One pair into the layout; its lines of the CSV.
 Result<std::string> fuse_one(const std::string& stem, const fs::path& visible_file,
                              const fs::path& thermal_file, const fs::path& out,
-                             const FusionOptions& options) {
+                             const FusionOptions& options, std::vector<std::string>& remarks) {
   ORBITFUSE_ASSIGN(const cv::Mat visible, read_photo(visible_file));
-  ORBITFUSE_ASSIGN(cv::Mat thermal, read_thermal(thermal_file));
-  ORBITFUSE_ASSIGN(const cv::Mat fused, fuse(visible, thermal, {}, options));
-  ORBITFUSE_ASSIGN(thermal, gray_of_thermal(thermal, options.span));
+  ORBITFUSE_ASSIGN(const cv::Mat stored, read_thermal(thermal_file));
+  ORBITFUSE_ASSIGN(const cv::Mat fused, fuse(visible, stored, {}, options));
+  ORBITFUSE_ASSIGN(const cv::Mat thermal, gray_of_thermal(stored, options.span));
   ORBITFUSE_ASSIGN(const auto values, fusion_metrics(visible, thermal, fused));
   ORBITFUSE_TRY(write_png(out / "vi" / (stem + ".png"), visible));
   ORBITFUSE_TRY(write_png(out / "ir" / (stem + ".png"), thermal));
   ORBITFUSE_TRY(write_png(out / "fused" / (stem + ".png"), fused));
+  for (auto remark : {transparency(visible_file), transparency(thermal_file),
+                      looks_exchanged(visible, stored, visible_file)})
+    if (remark) remarks.push_back(*std::move(remark));
   std::string lines;
   for (const MetricValue& v : values)
     lines += fmt::format("{},{},{},{}\n", stem, name(options.method), v.name, v.value);
@@ -68,6 +72,25 @@ Result<cv::Mat> read_photo(const fs::path& file) {
 Result<cv::Mat> read_thermal(const fs::path& file) {
   ORBITFUSE_ASSIGN(const cv::Mat image, read_image(file));
   return image.type() == CV_16UC1 ? read_thermal_k(file) : read_photo(file);
+}
+
+std::optional<std::string> looks_exchanged(const cv::Mat& visible, const cv::Mat& thermal,
+                                           const fs::path& visible_file) {
+  if (visible.type() != CV_16UC1 || thermal.channels() == 1) return std::nullopt;
+  return visible_file.string() +
+         ": 16-bit grey as the visible image beside a thermal one in colour; if that is a mistake, "
+         "exchange the two";
+}
+
+std::optional<std::string> transparency(const fs::path& file) {
+  const auto bytes = read_file(file, max_image_bytes);
+  const double share = bytes ? transparent_share(*bytes) : 0;
+  if (share == 0) return std::nullopt;
+  return fmt::format(
+      "{}: {:.2g} % of its pixels are transparent; alpha is dropped, and what colour lies behind "
+      "it "
+      "counts as seen: give the image as it was taken",
+      file.string(), 100 * share);
 }
 
 Error with_file(Error error, const std::map<std::string, std::string>& files) {
@@ -110,7 +133,7 @@ Result<Summary> fuse_folder(const fs::path& visible, const fs::path& thermal, co
       summary.problems.push_back(file.string() + ": no thermal image of that name");
       continue;
     }
-    const auto lines = fuse_one(stem, file, partner->second, out, options);
+    const auto lines = fuse_one(stem, file, partner->second, out, options, summary.remarks);
     if (!lines) {
       summary.problems.push_back(stem + ": " + lines.error().message());
       continue;

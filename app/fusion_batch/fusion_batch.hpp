@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@ inline constexpr const char* metrics_file = "metrics.csv";
 struct Summary {
   int fused = 0;
   std::vector<std::string> problems;  ///< pairs that could not be fused, and why
+  std::vector<std::string> remarks;   ///< on images that were fused all the same
 };
 
 /// Any image (core's read_image), upright as its EXIF data say.
@@ -24,6 +26,14 @@ Result<cv::Mat> read_photo(const std::filesystem::path& file);
 /// Thermal image of a file: one channel of 16 bits is radiometric and becomes kelvin (NaN =
 /// invalid), anything else stays as stored.
 Result<cv::Mat> read_thermal(const std::filesystem::path& file);
+
+/// A sentence where the image has transparent pixels, whose alpha is dropped.
+std::optional<std::string> transparency(const std::filesystem::path& file);
+
+/// A sentence where the visible image looks like counts of temperature and the thermal one like a
+/// photo: an industrial camera and a palette's picture do so too.
+std::optional<std::string> looks_exchanged(const cv::Mat& visible, const cv::Mat& thermal,
+                                           const std::filesystem::path& visible_file);
 
 /// The 8-bit image in which it is fused and scored: kelvin over `span` (none: their own), anything
 /// else as it is.

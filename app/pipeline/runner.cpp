@@ -2,6 +2,7 @@
 #include "app/pipeline/runner.hpp"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -72,10 +73,29 @@ Status remove_tree(const fs::path& folder) {
 Status replace_folder(const fs::path& from, const fs::path& to) {
   if (renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_EXCHANGE) == 0)
     return remove_tree(from);
+  // Absent, or a file system that can't exchange. In two steps, for half of a result would lack its
+  // done mark and pass for somebody's own.
+  fs::path old = from;
+  old += ".old";
+  ORBITFUSE_TRY(remove_tree(old));
   std::error_code ec;
-  fs::remove_all(to, ec);  // absent, or a file system that can't exchange
-  if (!ec) fs::rename(from, to, ec);
-  return device_error(to, ec);
+  if (fs::exists(fs::symlink_status(to, ec))) fs::rename(to, old, ec);
+  if (!ec || ec == std::errc::no_such_file_or_directory) fs::rename(from, to, ec);
+  ORBITFUSE_TRY(device_error(to, ec));
+  return remove_tree(old);
+}
+
+/// Whether a stage's result may take this place: what no stage left there may be anything, and
+/// names like "report" and "depth" are common.
+Status check_place(const fs::path& folder) {
+  std::error_code unreadable;
+  if (!fs::exists(fs::symlink_status(folder, unreadable)) ||
+      fs::exists(folder / stage_record_file, unreadable) ||
+      (fs::is_directory(folder, unreadable) && fs::is_empty(folder, unreadable)))
+    return {};
+  return fail(ErrorKind::usage, folder.string(),
+              fmt::format("is there already, and no run left it (no {} in it)", stage_record_file),
+              "choose another --out, or move it away");
 }
 
 /// Later stages can't do better after these.
@@ -135,6 +155,10 @@ bool Runner::is_target(const std::string& stage) const {
 
 bool Runner::wanted(const std::string& stage) const {
   return std::find(closure_.begin(), closure_.end(), stage) != closure_.end();
+}
+
+bool Runner::writes(const std::string& stage) const {
+  return wanted(stage) && (!options_.targets_only || is_target(stage));
 }
 
 Runner::Key Runner::key_of(const Stage& stage) const {
@@ -236,7 +260,8 @@ StageStatus Runner::visit(const Stage& stage) {
 
   const Key key = key_of(stage);
   const auto record = read_stage_record(options_.out / stage.name);
-  if (options_.targets_only && !is_target(stage.name)) {
+  const bool as_it_lies = !writes(stage.name);
+  if (as_it_lies) {
     const std::optional<std::string> wrong =
         record ? damage(options_.out / stage.name, *record) : "it has not run yet";
     if (wrong) {
@@ -245,7 +270,6 @@ StageStatus Runner::visit(const Stage& stage) {
       return status;
     }
   }
-  const bool as_it_lies = options_.targets_only && !is_target(stage.name);
   std::optional<std::string> why;
   if (!as_it_lies) why = unknown ? "a stage it reads will run" : why_run(stage, key, record);
   if (!why) {
@@ -342,6 +366,8 @@ RunSummary Runner::run() {
   RunSummary summary;
   FolderLock lock;
   Status ready = check_out_folder(options_.out);
+  for (const Stage& stage : stages_)
+    if (ready && writes(stage.name)) ready = check_place(options_.out / stage.name);
   if (ready && !options_.dry_run) {
     ready = make_folder(options_.out);
     if (ready) ready = lock.acquire(options_.out / ".lock");

@@ -51,6 +51,8 @@ class Runner {
 
   bool is_target(const std::string& stage) const;
   bool wanted(const std::string& stage) const;
+  /// Wanted, and made where it doesn't hold.
+  bool writes(const std::string& stage) const;
   Key key_of(const Stage& stage) const;
   bool forced(const Stage& stage) const;
   StageContext context(std::filesystem::path folder, bool resume) const;

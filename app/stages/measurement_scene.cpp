@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "app/stages/measurement_scene.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <map>
 #include <memory>
@@ -23,19 +25,6 @@ namespace fs = std::filesystem;
 using measurement::SceneParts;
 using measurement::ThermalFrame;
 using measurement::ThermalScene;
-
-/// Poses of one session's frames tell nothing of another's, even where the files are called alike.
-Status check_session(const pipeline::StageContext& context, const Session& session) {
-  ORBITFUSE_ASSIGN(const pipeline::StageRecord record,
-                   pipeline::read_stage_record(context.of("poses_thermal")));
-  const auto outside = record.inputs.find("outside");
-  if (outside == record.inputs.end()) return {};
-  ORBITFUSE_ASSIGN(const std::string content, modality_content(session, Modality::thermal));
-  if (content == outside->second) return {};
-  return fail(ErrorKind::input, session.folder.string(),
-              "its thermal frames are not those that " + context.out.string() + " was made of",
-              "name the session of that run, or run this one again");
-}
 
 /// The thermal field, its frames, and how both come into the run's world.
 Status add_thermal(const pipeline::StageContext& context, const Session& session,
@@ -108,6 +97,22 @@ Result<std::string> identity_of(const pipeline::StageContext& context, const Ses
 
 }  // namespace
 
+Status check_session_of_run(const pipeline::StageContext& context, const Session& session,
+                            Modality modality) {
+  const std::string stage = "poses_" + std::string(name(modality));
+  if (!context.has(stage)) return {};
+  ORBITFUSE_ASSIGN(const pipeline::StageRecord record,
+                   pipeline::read_stage_record(context.of(stage)));
+  const auto outside = record.inputs.find("outside");
+  if (outside == record.inputs.end()) return {};
+  ORBITFUSE_ASSIGN(const std::string content, modality_content(session, modality));
+  if (content == outside->second) return {};
+  return fail(ErrorKind::input, session.folder.string(),
+              fmt::format("its {} frames are not those that {} was made of", name(modality),
+                          context.out.string()),
+              "name the session of that run, or run this one again");
+}
+
 bool is_in_visible_world(const pipeline::StageContext& context) {
   return context.has("poses_visible") && context.has("register");
 }
@@ -141,7 +146,7 @@ Result<ThermalScene> load_measurement_scene(const fs::path& out, const Session& 
     return fail(ErrorKind::input, session.folder.string(),
                 "its thermal frames are gray levels, no temperatures",
                 "record with a camera that gives temperatures, or import its radiometric files");
-  ORBITFUSE_TRY(check_session(context, session));
+  ORBITFUSE_TRY(check_session_of_run(context, session, Modality::thermal));
   SceneParts parts;
   ORBITFUSE_TRY(add_thermal(context, session, parts));
   ORBITFUSE_TRY(add_named_views(context, parts));

@@ -10,6 +10,12 @@
 
 namespace orbitfuse::stages {
 
+/// Input error where the session's frames of a modality are not those of the run: poses of one
+/// session's frames tell nothing of another's, even where the files are called alike. Every file of
+/// the modality is read.
+Status check_session_of_run(const pipeline::StageContext& context, const Session& session,
+                            Modality modality);
+
 /// Whether a run's world is that of its visible poses, thermal ones being registered with them.
 /// Where it isn't, the world is that of the poses that the run has.
 bool is_in_visible_world(const pipeline::StageContext& context);

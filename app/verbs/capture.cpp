@@ -142,10 +142,6 @@ void account(Context& context, recording::Recording& recording) {
 
 Status run(Context& context, const CaptureOptions& o) {
   ORBITFUSE_TRY(o.validate());
-  if (context.common.force) {
-    return fail(ErrorKind::usage, "--force", "a session is never overwritten",
-                "leave it out, and record into another folder or with --resume");
-  }
   ORBITFUSE_ASSIGN(recording::Cameras cameras, cameras_of(o));
   recording::RecordingOptions options;
   ORBITFUSE_ASSIGN(options.guide, guide_of(o, cameras));

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "app/cli/option_pairs.hpp"
+#include "app/cli/typed_options.hpp"
 #include "capture/mat/mat_finder.hpp"
 
 namespace orbitfuse::cli {
@@ -146,7 +147,9 @@ Result<PositionFinder> finder_of(const CaptureOptions& o, const recording::Camer
   }
   MatDesign design = o.mat == "foil" ? MatDesign::for_thermal(0.6) : MatDesign{};
   if (o.mat_tags) design.tags_per_side = *o.mat_tags;
-  ORBITFUSE_TRY(design.validate());
+  ORBITFUSE_TRY(design.validate().map_error([](Error error) {
+    return as_typed(std::move(error), {{"mat.tags_per_side", "--mat-tags"}});
+  }));
   const auto mat = std::make_shared<MatFinder>(design);
   for (const auto& source : cameras.sources) {
     const DeviceInfo device = source->describe();
@@ -161,7 +164,7 @@ Result<PositionFinder> finder_of(const CaptureOptions& o, const recording::Camer
 }
 
 Result<PageOptions> page_of(const CaptureOptions& o) {
-  return page_options_of("--page", o.page, o.token);
+  return page_options_of("--page", o.page, o.token).map_error(as_typed_page);
 }
 
 void add_capture_options(CLI::App& app, CaptureOptions& options) {

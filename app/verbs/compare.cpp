@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include "app/cli/typed_options.hpp"
 #include "app/cli/verb.hpp"
 #include "app/comparison/comparison_files.hpp"
 #include "app/pipeline/out_folder.hpp"
@@ -39,6 +40,7 @@ void tell(Context& context, const Options& o, const ComparedRuns& runs) {
 }
 
 Status run(Context& context, const Options& o) {
+  ORBITFUSE_TRY(check_typed({{"--triangles", o.triangles, from_to(4, 20'000'000)}}));
   CompareRequest request;
   request.ambient = o.ambient;
   request.triangles = o.triangles;

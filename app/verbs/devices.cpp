@@ -60,7 +60,10 @@ Status run(Context& context, bool keep_watching) {
   }
   if (list.empty())
     context.console.info("no camera found; orbitfuse doctor checks network and USB");
-  if (keep_watching) watch(context, bus ? bus->get() : nullptr, list);
+  if (keep_watching && context.common.dry_run)
+    context.console.info("would go on and tell what is plugged in and out");
+  else if (keep_watching)
+    watch(context, bus ? bus->get() : nullptr, list);
   context.result = {{"devices", devices}};
   return {};
 }

@@ -6,6 +6,7 @@
 
 #include "app/cli/option_pairs.hpp"
 #include "app/cli/run_stages.hpp"
+#include "app/cli/typed_options.hpp"
 #include "app/cli/verb.hpp"
 #include "app/export/dataset.hpp"
 #include "app/export/find_scale.hpp"
@@ -63,12 +64,10 @@ Result<SurfaceRequest> request_of(const Options& o) {
                   "give three sides above 0");
     request.box = {center - half, center + half};
   }
-  if (const Status valid = request.surface.validate(); !valid) {
-    Error error = valid.error();
-    if (error.where == "surface.triangles") error.where = "--triangles";
-    if (error.where == "surface.ground_clearance") error.where = "--ground-clearance";
-    return tl::unexpected(error);
-  }
+  if (const Status valid = request.surface.validate(); !valid)
+    return tl::unexpected(
+        as_typed(valid.error(), {{"surface.triangles", "--triangles"},
+                                 {"surface.ground_clearance", "--ground-clearance"}}));
   return request;
 }
 
@@ -79,7 +78,8 @@ Result<FileOptions> file_options(const Options& o, const view::FinishedRun& run,
   files.points = o.points;
   if (o.colors == "temperature") files.colors = VertexColors::temperature;
   files.palette = o.palette.empty() ? run.config.render.palette : o.palette;
-  ORBITFUSE_TRY(palette(files.palette));
+  if (const auto known = palette(files.palette); !known)
+    return tl::unexpected(as_typed(known.error(), {{"palette", "--palette"}}));
   if (o.flavour == "cloudcompare") files.temperature_name = "scalar_temperature";
   if (o.flavour == "meshlab") files.temperature_name = "quality";
   return files;
@@ -123,7 +123,10 @@ Result<std::optional<stages::MetricScale>> scale_of(Context& context, const Opti
       MatDesign design;
       ORBITFUSE_ASSIGN(design.size_m, metres_of("--mat", o.mat));
       design.tags_per_side = o.mat_tags.value_or(design.tags_per_side);
-      return scale_of_mat(run, design, context.progress);
+      return scale_of_mat(run, design, context.progress).map_error([](Error error) {
+        return as_typed(std::move(error),
+                        {{"mat.size_m", "--mat"}, {"mat.tags_per_side", "--mat-tags"}});
+      });
     }
     ORBITFUSE_ASSIGN(const measurement::Place from, place_of(o.distance.at(0)));
     ORBITFUSE_ASSIGN(const measurement::Place to, place_of(o.distance.at(1)));

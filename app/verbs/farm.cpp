@@ -5,6 +5,7 @@
 #include <set>
 
 #include "app/cli/option_pairs.hpp"
+#include "app/cli/run_folder.hpp"
 #include "app/cli/verb.hpp"
 #include "app/config/settings.hpp"
 #include "app/farm/farm_lock.hpp"
@@ -120,6 +121,10 @@ Status start_farm(Context& context, const FarmOptions& options) {
                 "no stage uses a GPU with --device " + context.common.device, "leave it out");
   for (const std::string& session : options.words) ORBITFUSE_TRY(answers(session));
   ORBITFUSE_TRY(answers(options.out));
+  for (const std::string& session : options.words)
+    if (lies_among_frames(options.out, session))
+      return fail(ErrorKind::usage, "--out " + options.out, "holds the session itself",
+                  "choose another folder");
   FarmPlan plan;
   ORBITFUSE_ASSIGN(plan.sessions, name_sessions(options.words));
   const fs::path out = fs::absolute(options.out).lexically_normal();

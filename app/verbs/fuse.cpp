@@ -45,6 +45,11 @@ bool same_file(const fs::path& a, const fs::path& b) {
   return !a.empty() && !b.empty() && fs::equivalent(a, b, missing);
 }
 
+/// Beside the picture.
+fs::path legend_file(const fs::path& out) {
+  return out.parent_path() / (out.stem().string() + "_legend.png");
+}
+
 /// What to write, told by the name; the user says where, and never onto an input.
 Status check_image_out(const Options& o) {
   if (!o.out_given)
@@ -53,10 +58,16 @@ Status check_image_out(const Options& o) {
   if (!image_writer(o.folders.out))
     return fail(ErrorKind::usage, "--out " + o.folders.out, "no name of a PNG or JPEG",
                 "end it in .png or .jpg");
-  for (const std::string& input : {o.visible, o.thermal, o.mask})
+  const bool legend = o.method == "heat";
+  for (const std::string& input : {o.visible, o.thermal, o.mask}) {
     if (same_file(o.folders.out, input))
       return fail(ErrorKind::usage, "--out " + o.folders.out, "is an input too",
                   "give another name");
+    if (legend && same_file(legend_file(o.folders.out), input))
+      return fail(ErrorKind::usage, "--out " + o.folders.out,
+                  "its legend would be written onto the input " + input, "give another name");
+  }
+  if (legend) ORBITFUSE_TRY(pipeline::check_out_file(legend_file(o.folders.out)));
   return pipeline::check_out_file(o.folders.out);
 }
 
@@ -72,13 +83,13 @@ Status check_folder_out(const Options& o) {
   return pipeline::check_out_folder(o.folders.out);
 }
 
-/// The bar of what heat's colours stand for, beside the picture: OUT_legend.png.
+/// The bar of what heat's colours stand for.
 Status write_legend(Context& context, const fs::path& out, const cv::Mat& thermal,
                     const FusionOptions& options, const FusionReport& said, int width) {
   const auto unit = thermal.depth() == CV_32F ? fusion::HeatUnit::kelvin : fusion::HeatUnit::gray;
   ORBITFUSE_ASSIGN(const cv::Mat legend,
                    fusion::heat_legend({*said.heat, unit, options.heat}, width));
-  const fs::path file = out.parent_path() / (out.stem().string() + "_legend.png");
+  const fs::path file = legend_file(out);
   context.console.detail("what the colours stand for: " + file.string());
   context.result["legend"] = file.string();
   return write_png(file, legend);
@@ -88,7 +99,11 @@ Status fuse_pair(Context& context, const Options& o, const FusionOptions& option
   ORBITFUSE_TRY(check_image_out(o));
   ORBITFUSE_ASSIGN(const cv::Mat visible, batch::read_photo(o.visible));
   ORBITFUSE_ASSIGN(const cv::Mat thermal, batch::read_thermal(o.thermal));
+  if (const auto remark = batch::looks_exchanged(visible, thermal, o.visible))
+    context.console.warning(*remark);
   ORBITFUSE_ASSIGN(const cv::Mat mask, read_optional(o.mask));
+  for (const std::string& file : {o.visible, o.thermal})
+    if (const auto remark = batch::transparency(file)) context.console.warning(*remark);
   FusionReport said;
   ORBITFUSE_ASSIGN(const cv::Mat fused,
                    fuse(visible, thermal, mask, options, &said).map_error([&](Error error) {
@@ -124,7 +139,8 @@ Status fuse_folder(Context& context, const Options& o, const FusionOptions& opti
   ORBITFUSE_ASSIGN(
       const batch::Summary summary,
       batch::fuse_folder(o.visible, o.thermal, o.folders.out, options, context.progress));
-  for (const std::string& problem : summary.problems) context.console.warning(problem);
+  for (const auto* list : {&summary.problems, &summary.remarks})
+    for (const std::string& told : *list) context.console.warning(told);
   context.console.data(fmt::format("{} pairs fused, {} problems; {}", summary.fused,
                                    summary.problems.size(),
                                    (fs::path(o.folders.out) / batch::metrics_file).string()));
@@ -174,9 +190,12 @@ Action add_fuse(CLI::App& app) {
       ->check(CLI::IsMember(fusion_method_names()))
       ->capture_default_str();
   app.add_flag("--gray", options->gray, "Fuse to gray instead of keeping the visible colours");
-  return [options, &app](Context& context) {
+  return [options, &app](Context& context) -> Status {
     options->out_given = app.count("--out") > 0;
     options->method_given = app.count("--method") > 0;
+    if (!options->visible.empty() || !options->thermal.empty())
+      ORBITFUSE_TRY(
+          check_unused(app, {"--force", "--resume", "--seed"}, "--visible and --thermal"));
     return run(context, *options);
   };
 }

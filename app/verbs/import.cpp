@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "app/cli/option_pairs.hpp"
+#include "app/cli/typed_options.hpp"
 #include "app/cli/verb.hpp"
 #include "core/temperature.hpp"
 #include "drivers/stills/import.hpp"
@@ -97,29 +98,21 @@ void add_radiometry(CLI::App& app, Options& o) {
   app.add_option("--humidity", o.humidity_percent, "Relative humidity in percent")->group(group);
 }
 
-/// Checked here in the units of the command line: a message that says 9 where 900 was typed helps
-/// nobody.
 Status check_ranges(const Options& o) {
-  struct Range {
-    const char* option;
-    std::optional<double> value;
-    double low, high;
-  };
-  const Range ranges[] = {{"--humidity", o.humidity_percent, 0, 100},
-                          {"--reflected-c", o.reflected_c, -272, 4700},
-                          {"--air-c", o.air_c, -120, 120},
-                          {"--emissivity", o.import.object.emissivity, 0.01, 1},
-                          {"--distance-m", o.import.object.distance_m, 0, 1e5},
-                          {"--kelvin-offset", o.kelvin_offset, -10000, 10000},
-                          {"--video-frames", o.import.video.max_frames, 2, 5000},
-                          {"--visible-focal-px", o.import.visible_focal_px, 1, 1e6},
-                          {"--thermal-focal-px", o.import.thermal_focal_px, 1, 1e6}};
-  for (const Range& r : ranges) {
-    if (!r.value || (*r.value >= r.low && *r.value <= r.high)) continue;
-    return fail(ErrorKind::usage, r.option, fmt::format("{}", *r.value),
-                fmt::format("must be {} to {}", r.low, r.high));
-  }
-  return {};
+  for (const double elevation : o.elevations_deg)
+    ORBITFUSE_TRY(check_typed({{"--elevations-deg", elevation, from_to(-90, 90)}}));
+  return check_typed({{"--humidity", o.humidity_percent, from_to(0, 100)},
+                      {"--reflected-c", o.reflected_c, from_to(-272, 4700)},
+                      {"--air-c", o.air_c, from_to(-120, 120)},
+                      {"--emissivity", o.import.object.emissivity, from_to(0.01, 1)},
+                      {"--distance-m", o.import.object.distance_m, from_to(0, 1e5)},
+                      {"--station-spacing-deg", o.spacing_deg, from_to(1, 180)},
+                      {"--loops", o.loops, from_to(1, 100)},
+                      {"--kelvin-per-count", o.kelvin_per_count, above_up_to(0, 10)},
+                      {"--kelvin-offset", o.kelvin_offset, from_to(-10000, 10000)},
+                      {"--video-frames", o.import.video.max_frames, from_to(2, 5000)},
+                      {"--visible-focal-px", o.import.visible_focal_px, from_to(1, 1e6)},
+                      {"--thermal-focal-px", o.import.thermal_focal_px, from_to(1, 1e6)}});
 }
 
 /// Temperatures and percentages of the command line in the units of the library.
@@ -138,20 +131,6 @@ void resolve(Options& o) {
     stations.elevations_deg = o.elevations_deg;
     o.import.visible_stations = o.import.thermal_stations = stations;
   }
-}
-
-/// Options of every verb that would mean something else here than the user hopes.
-Status check_common(const CommonOptions& common) {
-  if (common.resume) {
-    return fail(ErrorKind::usage, "--resume", "an import is made at one go",
-                "leave it out; photos are added to a session by "
-                "orbitfuse capture SESSION --resume --visible stills:FOLDER,existing=yes");
-  }
-  if (common.force) {
-    return fail(ErrorKind::usage, "--force", "a session is never overwritten",
-                "leave it out, and import into another folder");
-  }
-  return {};
 }
 
 /// Options that only mean something with another one.
@@ -181,7 +160,6 @@ Status check_alone(const Options& o) {
 }
 
 Status run(Context& context, Options& o) {
-  ORBITFUSE_TRY(check_common(context.common));
   ORBITFUSE_TRY(check_alone(o));
   ORBITFUSE_TRY(check_ranges(o));
   resolve(o);

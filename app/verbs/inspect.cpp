@@ -10,6 +10,7 @@
 #include "app/cli/verb.hpp"
 #include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
+#include "app/stages/measurement_scene.hpp"
 #include "app/stages/metric_scale.hpp"
 #include "app/stages/session_input.hpp"
 #include "core/session/session.hpp"
@@ -83,6 +84,19 @@ json describe(const Session& session, Modality modality) {
           {"devices", devices}};
 }
 
+/// A folder that another session was put into since: its photos are not the run's.
+void tell_exchanged(Context& context, const fs::path& folder, const std::string& session) {
+  const auto opened = open_session(session);
+  for (const Modality modality : {Modality::visible, Modality::thermal}) {
+    const Status same =
+        opened ? stages::check_session_of_run(stages::context_of_run(folder), *opened, modality)
+               : tl::unexpected(opened.error());
+    if (same) continue;
+    context.console.warning(same.error().message());
+    return;
+  }
+}
+
 /// Results outlive their session; what can't be done without it is worth knowing before.
 void tell_session(Context& context, const fs::path& folder, const std::string& session) {
   context.console.data("of session " + session);
@@ -90,7 +104,7 @@ void tell_session(Context& context, const fs::path& folder, const std::string& s
   std::error_code unreadable;
   const bool there = fs::exists(fs::path(session) / "manifest.jsonl", unreadable);
   context.result["session_found"] = there;
-  if (there) return;
+  if (there) return tell_exchanged(context, folder, session);
   context.console.warning(fmt::format(
       "its session {} is not there any more: nothing can be measured, evaluated or run "
       "again; bring it back, or name it where it is now: orbitfuse run SESSION --out {}",

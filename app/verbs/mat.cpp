@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "app/cli/typed_options.hpp"
 #include "app/cli/verb.hpp"
 #include "core/system/file_io.hpp"
 
@@ -57,7 +58,11 @@ Status run(Context& context, const Options& o) {
   MatDesign design = o.thermal ? MatDesign::for_thermal(o.size_m) : MatDesign{};
   design.size_m = o.size_m;
   if (o.tags) design.tags_per_side = *o.tags;
-  ORBITFUSE_ASSIGN(const std::string pdf, mat_pdf(design, o.paper));
+  ORBITFUSE_ASSIGN(const std::string pdf, mat_pdf(design, o.paper).map_error([](Error error) {
+    return as_typed(
+        std::move(error),
+        {{"mat.size_m", "--size-m"}, {"mat.tags_per_side", "--tags"}, {"mat.paper", "--paper"}});
+  }));
   if (context.common.dry_run) {
     context.console.info("would write " + o.out);
     return {};

@@ -6,6 +6,7 @@
 #include <charconv>
 
 #include "app/cli/option_pairs.hpp"
+#include "app/cli/typed_options.hpp"
 #include "core/nested_text.hpp"
 #include "core/temperature.hpp"
 
@@ -154,6 +155,33 @@ void add_parameters(const MeasureWords& words, Request& request) {
     request.recorded.reflected_temperature_k = kelvin(words.recorded_reflected_c);
 }
 
+/// In degrees and percent, as they were typed; the library has kelvin and shares.
+Status check_ranges(const MeasureWords& w) {
+  return check_typed({{"--emissivity", w.emissivity, from_to(0.01, 1)},
+                      {"--reflected-c", w.reflected_c, from_to(-272, 4700)},
+                      {"--distance-m", w.distance_m, from_to(0, 1e5)},
+                      {"--air-c", w.air_c, from_to(-120, 120)},
+                      {"--humidity", w.humidity_percent, from_to(0, 100)},
+                      {"--recorded-emissivity", w.recorded_emissivity, from_to(0.01, 1)},
+                      {"--recorded-reflected-c", w.recorded_reflected_c, from_to(-272, 4700)}});
+}
+
+/// What the library finds wrong with a request, of the option that asks instead of the library's
+/// key: "measure.count" stands in no help.
+Error as_asked(Error error, const std::string& option) {
+  constexpr std::string_view table = "measure.";
+  if (option == "--request" || !error.where.starts_with(table)) return error;
+  error =
+      as_typed(std::move(error), {{"measure.apart", "--apart"}, {"measure.profile", "--profile"}});
+  if (!error.where.starts_with(table)) return error;
+  std::string field = error.where.substr(error.where.rfind('.') + 1);
+  // Of one number, or words that name it already.
+  const bool clear = field == "count" || option.ends_with(field);
+  if (!clear) error.found = field + " " + error.found;
+  error.where = option;
+  return error;
+}
+
 /// The option that asks, of those that were given.
 Result<std::string> asked(const MeasureWords& words) {
   const std::pair<const char*, bool> options[] = {{"--pixel", !words.pixel.empty()},
@@ -294,8 +322,10 @@ Result<std::optional<Request>> request_of(const MeasureWords& words, const Therm
   if (option.empty()) return std::nullopt;
   ORBITFUSE_ASSIGN(Request request, read(words, option, scene, saved));
   if (!words.name.empty()) request.name = words.name;
+  ORBITFUSE_TRY(check_ranges(words));
   add_parameters(words, request);
-  ORBITFUSE_TRY(request.validate());
+  ORBITFUSE_TRY(request.validate().map_error(
+      [&](Error error) { return as_asked(std::move(error), option); }));
   return request;
 }
 

@@ -17,8 +17,9 @@ namespace {
 struct Options {
   StageFolders folders;
   std::string source, target;
-  bool out_given = false;
 };
+
+constexpr const char* clouds = "--source and --target";
 
 Result<PointCloud> read_cloud(Context& context, const std::string& file) {
   ORBITFUSE_ASSIGN(PointCloud cloud, read_ply(file));
@@ -33,8 +34,7 @@ Result<PointCloud> read_cloud(Context& context, const std::string& file) {
 Status register_files(Context& context, const Options& o) {
   for (const auto& [option, value] : {std::pair{"--source", &o.source}, {"--target", &o.target}})
     if (value->empty()) return fail(ErrorKind::usage, option, "not given", "name both clouds");
-  ORBITFUSE_TRY(check_apart({{"session", !o.folders.session.empty(), "--source and --target", true},
-                             {"--out", o.out_given, "--source and --target", true}}));
+  ORBITFUSE_TRY(check_apart({{"session", !o.folders.session.empty(), clouds, true}}));
   ORBITFUSE_ASSIGN(const PointCloud source, read_cloud(context, o.source));
   ORBITFUSE_ASSIGN(const PointCloud target, read_cloud(context, o.target));
   RegistrationOptions options;
@@ -61,11 +61,11 @@ Action add_register(CLI::App& app) {
   add_folders(app, options->folders);
   app.add_option("--source", options->source, "PLY cloud to move; then --target too");
   app.add_option("--target", options->target, "PLY cloud to move it onto");
-  return [options, &app](Context& context) {
-    options->out_given = app.count("--out") > 0;
-    return options->source.empty() && options->target.empty()
-               ? run_stages(context, options->folders, {"register"})
-               : register_files(context, *options);
+  return [options, &app](Context& context) -> Status {
+    if (options->source.empty() && options->target.empty())
+      return run_stages(context, options->folders, {"register"});
+    ORBITFUSE_TRY(check_unused(app, {"--out", "--force", "--resume", "--config", "--set"}, clouds));
+    return register_files(context, *options);
   };
 }
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "app/cli/option_pairs.hpp"
 #include "app/cli/run_stages.hpp"
+#include "app/cli/typed_options.hpp"
 #include "app/cli/verb.hpp"
+#include "core/formats/transforms_json.hpp"
 
 namespace orbitfuse::cli {
 namespace {
@@ -28,12 +30,20 @@ Action add_render(CLI::App& app) {
     ORBITFUSE_TRY(check_apart({{"--path", !options->path.empty(), "--cameras", cameras},
                                {"--views", options->views.has_value(), "--cameras", cameras},
                                {"--width", options->width.has_value(), "--cameras", cameras}}));
-    if (cameras) context.config.render.cameras = options->cameras;
+    if (cameras) {
+      // Read here once, so that a wrong file doesn't cost the training that comes before it.
+      ORBITFUSE_TRY(read_transforms_json(options->cameras));
+      context.config.render.cameras = options->cameras;
+    }
     config::Settings settings = context.config.settings();
     if (!options->path.empty()) ORBITFUSE_TRY(settings.apply("render.path=" + options->path));
     if (options->views) context.config.render.path.views = *options->views;
     if (options->width) context.config.render.path.width_px = *options->width;
-    ORBITFUSE_TRY(context.config.validate());
+    ORBITFUSE_TRY(context.config.validate().map_error([&](Error error) {
+      if (options->views) error = as_typed(error, {{"render.views", "--views"}});
+      if (options->width) error = as_typed(error, {{"render.width_px", "--width"}});
+      return error;
+    }));
     return run_stages(context, options->folders, {"render"});
   };
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <set>
 
+#include "app/cli/run_folder.hpp"
 #include "app/cli/verb.hpp"
 #include "app/recording/recording.hpp"
 
@@ -56,9 +57,6 @@ Status check_goes_on(const Session& session, const std::string& to) {
 }
 
 Status run(Context& context, const Options& o) {
-  if (context.common.force)
-    return fail(ErrorKind::usage, "--force", "a session is never overwritten",
-                "leave it out, and replay into another folder or with --resume");
   ORBITFUSE_ASSIGN(const Session session, open_session(o.session));
   for (const std::string& warning : session.warnings) context.console.warning(warning);
   ORBITFUSE_ASSIGN(
@@ -69,6 +67,9 @@ Status run(Context& context, const Options& o) {
   options.resume = context.common.resume;
   options.notes = session.notes;
   ORBITFUSE_TRY(recording::check_folder(options));
+  if (lies_among_frames(o.to, o.session))
+    return fail(ErrorKind::usage, "--to " + o.to, "lies among the frames of the session itself",
+                "choose another folder");
   if (options.resume) ORBITFUSE_TRY(check_goes_on(session, o.to));
   if (context.common.dry_run) {
     context.console.info(fmt::format("would replay {} frames of {} devices into {}",

@@ -86,7 +86,15 @@ Action add_report(CLI::App& app) {
   app.add_flag("--print-template", options->print_template,
                "Print a file for --inspection, to be filled in")
       ->group(group);
-  return [options](Context& context) { return report(context, *options); };
+  return [options, &app](Context& context) -> Status {
+    if (options->print_template)
+      ORBITFUSE_TRY(check_unused(app,
+                                 {"--out", "--force", "--resume", "--seed", "--config", "--set"},
+                                 "--print-template"));
+    if (options->inspection)
+      ORBITFUSE_TRY(check_unused(app, {"--force", "--resume", "--seed"}, "--inspection"));
+    return report(context, *options);
+  };
 }
 
 }  // namespace orbitfuse::cli

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "app/cli/run_stages.hpp"
+#include "app/cli/typed_options.hpp"
 #include "app/cli/verb.hpp"
 #include "app/export/viewer_surface.hpp"
 
@@ -17,7 +18,8 @@ struct Options {
 
 /// Serves until Ctrl-C, which is how a viewer ends: no error.
 Status view_run(Context& context, const Options& o) {
-  ORBITFUSE_ASSIGN(const PageOptions page, page_options_of("--page", o.page, o.token));
+  ORBITFUSE_ASSIGN(const PageOptions page,
+                   page_options_of("--page", o.page, o.token).map_error(as_typed_page));
   ORBITFUSE_ASSIGN(view::FinishedRun run,
                    view::load_finished_run(o.run, context.config, context.progress));
   for (const std::string& note : run.notes) context.console.warning(note);

@@ -80,6 +80,18 @@ Status load_views(const pipeline::StageContext& context, FinishedRun& run) {
   return {};
 }
 
+/// The session that the run names, if it is there and still the one that the run was made of.
+Result<Session> session_of(const pipeline::StageContext& context, const nlohmann::json& record) {
+  const auto folder = record.find("session");
+  if (folder == record.end() || !folder->is_string())
+    return fail(ErrorKind::input, (context.out / "run.json").string(), "no session named in it",
+                "run again");
+  ORBITFUSE_ASSIGN(Session session, open_session(folder->get<std::string>()));
+  for (const Modality modality : {Modality::visible, Modality::thermal})
+    ORBITFUSE_TRY(stages::check_session_of_run(context, session, modality));
+  return session;
+}
+
 /// Without it pictures show the fields alone.
 void load_detail(const pipeline::StageContext& context, FinishedRun& run) {
   for (const Modality modality : {Modality::visible, Modality::thermal}) {
@@ -174,11 +186,7 @@ Result<FinishedRun> load_finished_run(const fs::path& out, const stages::RunConf
   ORBITFUSE_TRY(load_fields(context, run));
   ORBITFUSE_TRY(progress.check("view"));
   ORBITFUSE_ASSIGN(const auto record, stages::read_json(out / "run.json"));
-  const auto folder = record.find("session");
-  auto session = folder != record.end() && folder->is_string()
-                     ? open_session(folder->get<std::string>())
-                     : Result<Session>(fail(ErrorKind::input, (out / "run.json").string(),
-                                            "no session named in it", "run again"));
+  auto session = session_of(context, record);
   if (session)
     run.session = *std::move(session);
   else

@@ -32,7 +32,7 @@ struct FinishedRun {
   std::filesystem::path out;
   /// Of fields, poses and registration: what was made of others is out of date. Empty: not known.
   std::string identity;
-  std::optional<Session> session;  ///< nothing: it is not where the run read it
+  std::optional<Session> session;  ///< nothing: it is not where the run read it, or another
   nerf::Field visible, thermal;    ///< one may be empty
   /// What recorded frames lend to pictures, as the run's new views have it.
   nerf::PhotoDetail visible_detail, thermal_detail;

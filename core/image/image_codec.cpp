@@ -9,6 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/image/transparency.hpp"
 #include "core/nested_text.hpp"
 
 namespace orbitfuse {
@@ -49,11 +50,8 @@ bool bmp_is_whole(std::string_view bytes) {
          row_bytes * rows <= bytes.size() - pixels_at;
 }
 
-Result<cv::Mat> decode_bmp(std::string_view bytes, const std::string& where) {
-  if (!bmp_is_whole(bytes)) {
-    return fail(ErrorKind::input, where, "truncated, damaged or compressed BMP",
-                "copy the file again, or convert it to PNG");
-  }
+/// As OpenCV decodes it, with a fourth channel where it has one; none where it can't.
+cv::Mat stored_bmp(std::string_view bytes) {
   cv::Mat image;
   try {
     const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8UC1,
@@ -62,6 +60,25 @@ Result<cv::Mat> decode_bmp(std::string_view bytes, const std::string& where) {
   } catch (const cv::Exception&) {
     image.release();
   }
+  return image;
+}
+
+/// The fourth byte of a pixel is alpha only where a header of version 4 on has a mask for it;
+/// others leave it 0.
+double bmp_transparent_share(std::string_view bytes) {
+  if (!bmp_is_whole(bytes) || little_endian(bytes, 14, 4) < 108 ||
+      little_endian(bytes, 30, 4) != 3 || little_endian(bytes, 66, 4) != 0xff000000)
+    return 0;
+  const cv::Mat image = stored_bmp(bytes);
+  return image.type() == CV_8UC4 ? transparent_share(image) : 0;
+}
+
+Result<cv::Mat> decode_bmp(std::string_view bytes, const std::string& where) {
+  if (!bmp_is_whole(bytes)) {
+    return fail(ErrorKind::input, where, "truncated, damaged or compressed BMP",
+                "copy the file again, or convert it to PNG");
+  }
+  cv::Mat image = stored_bmp(bytes);
   if (image.empty() || (image.depth() != CV_8U && image.depth() != CV_16U)) {
     return fail(ErrorKind::input, where, "truncated or damaged image", "copy the file again");
   }
@@ -137,6 +154,26 @@ Result<cv::Mat> decode_image(std::string_view bytes, const std::string& where) {
       ErrorKind::input, where,
       known ? fmt::format("{}, which is not read", known) : "not an image (JPEG, PNG, TIFF or BMP)",
       known ? "convert it to JPEG, PNG or TIFF" : "remove the file or convert it");
+}
+
+double transparent_share(std::string_view bytes, std::optional<int> page) {
+  switch (image_format(bytes)) {
+    case ImageFormat::png:
+      return png_transparent_share(bytes);
+    case ImageFormat::tiff:
+      return tiff_transparent_share(bytes, page);
+    case ImageFormat::bmp:
+      return bmp_transparent_share(bytes);
+    default:
+      return 0;
+  }
+}
+
+double transparent_share(const cv::Mat& image) {
+  cv::Mat alpha;
+  cv::extractChannel(image, alpha, image.channels() - 1);
+  const double opaque = image.depth() == CV_16U ? 65535 : 255;
+  return static_cast<double>(cv::countNonZero(alpha < opaque)) / static_cast<double>(alpha.total());
 }
 
 const char* name_of_other_format(std::string_view bytes) {

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "core/image/image_codec.hpp"
+#include "core/image/transparency.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -51,15 +52,17 @@ void read_bytes(png_structp png, png_bytep to, std::size_t count) {
   reader.at += count;
 }
 
+enum class Alpha { dropped, kept };
+
 /// Plain C style, like read_pixels(): longjmp may not pass over C++ objects.
-bool read_header(PngReader& reader) {
+bool read_header(PngReader& reader, Alpha alpha) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
   png_set_read_fn(reader.png, &reader, read_bytes);
   // Sizes are checked against ours, not libpng's.
   png_set_user_limits(reader.png, 0x7fffffff, 0x7fffffff);
   png_read_info(reader.png, reader.info);
-  png_set_expand(reader.png);  // palettes, and grey of less than 8 bits
-  png_set_strip_alpha(reader.png);
+  png_set_expand(reader.png);  // palettes, transparent colours, grey of less than 8 bits
+  if (alpha == Alpha::dropped) png_set_strip_alpha(reader.png);
   png_set_swap(reader.png);  // samples of 16 bits are big-endian
   png_set_bgr(reader.png);
   png_set_interlace_handling(reader.png);
@@ -74,9 +77,25 @@ bool read_pixels(PngReader& reader, png_bytepp rows) {
   return !reader.damaged;
 }
 
-}  // namespace
+std::uint32_t big_endian(std::string_view bytes) {
+  std::uint32_t value = 0;
+  for (const char c : bytes) value = value << 8 | static_cast<unsigned char>(c);
+  return value;
+}
 
-Result<cv::Mat> decode_png(std::string_view bytes, const std::string& where) {
+/// Pictures that the file plays one after the other (acTL, before the image data); libpng reads the
+/// first of them and says nothing.
+std::uint32_t animation_frames(std::string_view bytes) {
+  for (std::size_t at = 8; at + 16 <= bytes.size();) {
+    const std::string_view kind = bytes.substr(at + 4, 4);
+    if (kind == "acTL") return big_endian(bytes.substr(at + 8, 4));
+    if (kind == "IDAT") break;
+    at += std::size_t{12} + big_endian(bytes.substr(at, 4));
+  }
+  return 0;
+}
+
+Result<cv::Mat> decode(std::string_view bytes, const std::string& where, Alpha alpha) {
   PngReader reader;
   reader.bytes = bytes;
   reader.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reader, on_error, on_warning);
@@ -85,7 +104,7 @@ Result<cv::Mat> decode_png(std::string_view bytes, const std::string& where) {
     return fail(ErrorKind::input, where, fmt::format("truncated or damaged PNG ({})", reader.text),
                 "copy the file again");
   };
-  if (!reader.info || !read_header(reader)) return damaged();
+  if (!reader.info || !read_header(reader, alpha)) return damaged();
   const std::uint64_t width = png_get_image_width(reader.png, reader.info);
   const std::uint64_t height = png_get_image_height(reader.png, reader.info);
   const int channels = png_get_channels(reader.png, reader.info);
@@ -101,6 +120,29 @@ Result<cv::Mat> decode_png(std::string_view bytes, const std::string& where) {
   for (std::size_t y = 0; y < rows.size(); ++y) rows[y] = image.ptr(static_cast<int>(y));
   if (!read_pixels(reader, rows.data())) return damaged();
   return image;
+}
+
+}  // namespace
+
+Result<cv::Mat> decode_png(std::string_view bytes, const std::string& where) {
+  if (const std::uint32_t frames = animation_frames(bytes); frames > 1) {
+    return fail(ErrorKind::input, where,
+                fmt::format("animated PNG of {} frames, one expected", frames),
+                "export the frame that is meant as a PNG of its own");
+  }
+  return decode(bytes, where, Alpha::dropped);
+}
+
+double png_transparent_share(std::string_view bytes) {
+  // Most have none: their header is all that is read.
+  PngReader reader;
+  reader.bytes = bytes;
+  reader.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reader, on_error, on_warning);
+  reader.info = reader.png ? png_create_info_struct(reader.png) : nullptr;
+  if (!reader.info || !read_header(reader, Alpha::kept)) return 0;
+  if (png_get_channels(reader.png, reader.info) % 2 != 0) return 0;
+  const Result<cv::Mat> image = decode(bytes, {}, Alpha::kept);
+  return image ? transparent_share(*image) : 0;
 }
 
 }  // namespace orbitfuse

@@ -9,9 +9,11 @@
 #include <cstring>
 #include <memory>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <vector>
 
 #include "core/image/image_codec.hpp"
+#include "core/image/transparency.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -100,11 +102,12 @@ Layout layout_of(TIFF* tiff) {
   return l;
 }
 
-int depth_of(const Layout& l) {
+/// OpenCV's; nothing for samples that are not read.
+std::optional<int> depth_of(const Layout& l) {
   if (l.format == SAMPLEFORMAT_IEEEFP && l.bits == 32) return CV_32F;
   if (l.format == SAMPLEFORMAT_UINT && l.bits == 16) return CV_16U;
   if (l.format == SAMPLEFORMAT_UINT && l.bits == 8) return CV_8U;
-  return -1;
+  return std::nullopt;
 }
 
 /// Colours that would be taken for others; null: those that are read.
@@ -139,7 +142,7 @@ std::string unread_layout(const Layout& l) {
     why = colors;
   } else if (l.planar != PLANARCONFIG_CONTIG && l.channels > 1) {
     why = "each colour in a plane of its own (planar)";
-  } else if (depth_of(l) >= 0 && l.channels >= 1 && l.channels <= 4) {
+  } else if (depth_of(l) && l.channels >= 1 && l.channels <= 4) {
     return {};
   }
   const char* kind = l.format == SAMPLEFORMAT_INT      ? "signed "
@@ -244,6 +247,58 @@ cv::Mat to_bgr(const cv::Mat& image) {
   return out;
 }
 
+/// Whether the last channel says how much can be seen through; others may be infrared, or anything.
+bool has_alpha(TIFF* tiff) {
+  std::uint16_t count = 0;
+  const std::uint16_t* kinds = nullptr;
+  TIFFGetFieldDefaulted(tiff, TIFFTAG_EXTRASAMPLES, &count, &kinds);
+  return count == 1 && (kinds[0] == EXTRASAMPLE_ASSOCALPHA || kinds[0] == EXTRASAMPLE_UNASSALPHA);
+}
+
+struct StoredPage {
+  Layout layout;
+  cv::Mat samples;  ///< all channels, as they are stored
+};
+
+Result<StoredPage> read_page(std::string_view bytes, const std::string& where,
+                             std::string* image_description, int page) {
+  MemoryFile file;
+  file.input = bytes;
+  const TiffHandle tiff = open(file, "rm");
+  if (!tiff) return fail(ErrorKind::input, where, "not a readable TIFF", "copy the file again");
+  Layout l = layout_of(tiff.get());
+  for (int at = 0; at < page; ++at) {
+    if (!next_page(tiff.get(), l))
+      return fail(ErrorKind::input, where, fmt::format("no page {}", page + 1),
+                  "copy the file again");
+  }
+  l = layout_of(tiff.get());  // of the page
+  if (std::string why = unread_layout(l); !why.empty()) {
+    return fail(ErrorKind::input, where, std::move(why),
+                "convert it to 8 or 16-bit unsigned grey or RGB");
+  }
+  if (l.photometric == PHOTOMETRIC_YCBCR)
+    TIFFSetField(tiff.get(), TIFFTAG_JPEGCOLORMODE, JPEGCOLORMODE_RGB);
+  const long long samples = 1LL * l.width * l.height * l.channels;
+  if (l.width == 0 || l.height == 0 || l.width > 65536 || l.height > 65536 ||
+      samples > max_image_samples) {
+    return fail(ErrorKind::input, where, fmt::format("TIFF of {}x{}", l.width, l.height),
+                "the header is damaged; copy the file again");
+  }
+  if (image_description) {
+    if (std::string text = description_of(tiff.get()); !text.empty())
+      *image_description = std::move(text);
+  }
+  cv::Mat image(static_cast<int>(l.height), static_cast<int>(l.width),
+                CV_MAKETYPE(*depth_of(l), l.channels));
+  const bool whole = TIFFIsTiled(tiff.get()) ? read_tiles(tiff.get(), l, image)
+                                             : read_strips(tiff.get(), l, image);
+  if (!whole || file.tag_is_cut) {
+    return fail(ErrorKind::input, where, "truncated or damaged TIFF", "copy the file again");
+  }
+  return StoredPage{l, image};
+}
+
 }  // namespace
 
 int tiff_page_count(std::string_view bytes) {
@@ -265,42 +320,19 @@ Result<cv::Mat> decode_tiff(std::string_view bytes, const std::string& where,
                   "split it (tiffsplit), or import its pages as thermal frames");
     }
   }
+  ORBITFUSE_ASSIGN(StoredPage stored, read_page(bytes, where, image_description, page.value_or(0)));
+  if (stored.layout.photometric == PHOTOMETRIC_MINISWHITE) stored.samples = 255 - stored.samples;
+  return to_bgr(stored.samples);
+}
+
+double tiff_transparent_share(std::string_view bytes, std::optional<int> page) {
+  // Most have no alpha: their first directory is all that is read.
   MemoryFile file;
   file.input = bytes;
   const TiffHandle tiff = open(file, "rm");
-  if (!tiff) return fail(ErrorKind::input, where, "not a readable TIFF", "copy the file again");
-  Layout l = layout_of(tiff.get());
-  for (int at = 0; at < page.value_or(0); ++at) {
-    if (!next_page(tiff.get(), l))
-      return fail(ErrorKind::input, where, fmt::format("no page {}", *page + 1),
-                  "copy the file again");
-  }
-  l = layout_of(tiff.get());  // of the page
-  if (std::string why = unread_layout(l); !why.empty()) {
-    return fail(ErrorKind::input, where, std::move(why),
-                "convert it to 8 or 16-bit unsigned grey or RGB");
-  }
-  if (l.photometric == PHOTOMETRIC_YCBCR)
-    TIFFSetField(tiff.get(), TIFFTAG_JPEGCOLORMODE, JPEGCOLORMODE_RGB);
-  const long long samples = 1LL * l.width * l.height * l.channels;
-  if (l.width == 0 || l.height == 0 || l.width > 65536 || l.height > 65536 ||
-      samples > max_image_samples) {
-    return fail(ErrorKind::input, where, fmt::format("TIFF of {}x{}", l.width, l.height),
-                "the header is damaged; copy the file again");
-  }
-  if (image_description) {
-    if (std::string text = description_of(tiff.get()); !text.empty())
-      *image_description = std::move(text);
-  }
-  cv::Mat image(static_cast<int>(l.height), static_cast<int>(l.width),
-                CV_MAKETYPE(depth_of(l), l.channels));
-  const bool whole = TIFFIsTiled(tiff.get()) ? read_tiles(tiff.get(), l, image)
-                                             : read_strips(tiff.get(), l, image);
-  if (!whole || file.tag_is_cut) {
-    return fail(ErrorKind::input, where, "truncated or damaged TIFF", "copy the file again");
-  }
-  if (l.photometric == PHOTOMETRIC_MINISWHITE) image = 255 - image;
-  return to_bgr(image);
+  if (!tiff || layout_of(tiff.get()).channels % 2 != 0 || !has_alpha(tiff.get())) return 0;
+  const auto stored = read_page(bytes, {}, nullptr, page.value_or(0));
+  return stored && stored->samples.depth() != CV_32F ? transparent_share(stored->samples) : 0;
 }
 
 Result<std::string> encode_tiff(const cv::Mat& image, const std::string& image_description) {

@@ -2,6 +2,7 @@
 #include "drivers/stills/import.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cmath>
 #include <map>
@@ -187,6 +188,9 @@ class Importer {
 
   Status add_frame(StillPhoto still, const Source& source, bool tracking,
                    const std::optional<DeclaredStations>& stations) {
+    if (still.transparent > 0)
+      transparent_.push_back(
+          fmt::format("{} ({:.2g} %)", source.short_name(), 100 * still.transparent));
     ORBITFUSE_ASSIGN(CameraGroup * group, groups_.of(still, source));
     Frame& frame = still.frame;
     DeviceInfo& device = still.camera;
@@ -263,6 +267,14 @@ class Importer {
     if (record.station) ++report_.with_station;
   }
 
+  void tell_transparent() {
+    if (transparent_.empty()) return;
+    report_.warnings.push_back(fmt::format(
+        "{} images have transparent pixels: {}; alpha is dropped, and what colour lies behind it "
+        "is taken for the scene: import the images as they were taken",
+        transparent_.size(), fmt::join(transparent_, ", ")));
+  }
+
   /// Poses were given so that they are used.
   Status check_fitting() const {
     if (!first_misfit_ || fitting_ > 0) return {};
@@ -302,6 +314,7 @@ class Importer {
         report_.warnings.push_back(*std::move(several));
     }
     tell_counts();
+    tell_transparent();
     if (options_.embedded_visible && embedded_ == 0)
       report_.warnings.push_back(
           "no thermal image has a photo embedded: there are no visible frames from them");
@@ -331,7 +344,8 @@ class Importer {
   int fitting_ = 0;                     ///< frames that their known camera fits
   std::optional<Error> first_misfit_;
   ImportReport report_;
-  int embedded_ = 0;  ///< photos found in radiometric JPEGs
+  std::vector<std::string> transparent_;  ///< names and shares of images with alpha
+  int embedded_ = 0;                      ///< photos found in radiometric JPEGs
 };
 
 Status run(Importer& importer) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/image/exif.hpp"
+#include "core/image/transparency.hpp"
 #include "core/system/file_io.hpp"
 #include "drivers/stills/heif_photo.hpp"
 
@@ -51,7 +52,12 @@ Result<StillPhoto> visible_still(std::string bytes, const std::string& where) {
     ORBITFUSE_ASSIGN(bytes, encode_jpeg(image, as_jpeg_quality));
   } else {
     ORBITFUSE_ASSIGN(image, decode_image(bytes, where));
+    still.transparent = transparent_share(bytes);
   }
+  // Before it counts as a camera of its own.
+  if (image.depth() != CV_8U)
+    return fail(ErrorKind::input, where, "16-bit samples, but photos have 8 bits",
+                "a thermal image? Give it as thermal, or convert it to 8-bit");
   still.size = apply_orientation(image, exif.orientation).size();
   still.frame.extension = extension_of(bytes);
   still.frame.encoded = std::move(bytes);
@@ -87,6 +93,7 @@ Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& 
   frame.kelvin_per_count = converted.kelvin_per_count;
   frame.radiometry = converted.radiometry;
   still.without_temperature = converted.without_temperature;
+  still.transparent = file.transparent;
   still.size = file.image.size();
   if (converted.keep_bytes) {
     frame.encoded = file.bytes;

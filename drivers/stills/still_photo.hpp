@@ -17,6 +17,7 @@ struct StillPhoto {
   std::string lens;             ///< "4.2 mm (35 mm: 26 mm)", "25.0 degrees"; empty when unknown
   cv::Size size;                ///< upright
   int without_temperature = 0;  ///< samples of a thermal image that none stands for
+  double transparent = 0;       ///< share of the pixels whose alpha, which is dropped, says so
 
   std::string key() const;        ///< same key: same camera, lens, image size and kind of samples
   std::string described() const;  ///< the same for people

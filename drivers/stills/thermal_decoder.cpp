@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/image/exif.hpp"
+#include "core/image/transparency.hpp"
 #include "core/system/file_io.hpp"
 #include "core/temperature.hpp"
 #include "drivers/stills/float_temperatures.hpp"
@@ -146,6 +147,7 @@ Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::
     ORBITFUSE_ASSIGN(file.image, decode_image(bytes, where));
   }
   file.taken_ns = read_exif(bytes).taken_ns;
+  file.transparent = transparent_share(bytes, page);
   if (file.image.depth() == CV_8U) {
     file.bytes = bytes;
     return file;

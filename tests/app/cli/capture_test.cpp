@@ -308,7 +308,7 @@ TEST(Capture, MistakesHaveARemedyAndLeaveNothing) {
       {{"--visible", "stills:.", "--guide", "key", "--mat-tags", "7"},
        2,
        "use --guide auto without --turntable"},
-      {{"--visible", "stills:.", "--mat-tags", "0"}, 2, "mat.tags_per_side: 0; choose 2 to 15"},
+      {{"--visible", "stills:.", "--mat-tags", "0"}, 2, "--mat-tags: 0; choose 2 to 15"},
       {{"--driver", tiny, "--guide", "key"},
        2,
        "--guide key: replayed and synthetic frames don't wait for a key"},

@@ -25,8 +25,8 @@ TEST(Cli, HelpBeginsWithAnExampleAndGoesToStdout) {
     EXPECT_EQ(help.code, 0) << verb;
     EXPECT_THAT(help.out, StartsWith("Example:\n  orbitfuse " + verb));
     EXPECT_EQ(help.err, "") << verb;
-    for (const char* common : {"--config", "--json", "--threads", "--seed", "--device", "--force",
-                               "--resume", "--dry-run", "--verbose", "--quiet"})
+    for (const char* common :
+         {"--json", "--threads", "--device", "--dry-run", "--verbose", "--quiet"})
       EXPECT_THAT(help.out, HasSubstr(common)) << verb;
   }
 }

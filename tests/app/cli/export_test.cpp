@@ -73,12 +73,16 @@ TEST(ExportDataset, RecordedAndNewPairsAreReadBackInEveryLayout) {
   ASSERT_EQ(run.code, 0) << run.err;
   for (const char* poses : {"recorded", "new"}) {
     SCOPED_TRACE(poses);
-    const fs::path folder = temp / poses;
+    const fs::path folder = temp / poses, mine = folder.string() + ".partial/notes.txt";
+    ASSERT_TRUE(write_file_atomic(mine, "mine"));
     const std::vector<std::string> words = {"export",        out.string(), "--dataset",
                                             folder.string(), "--poses",    poses};
     const Outcome pairs = orbitfuse_program(words);
     ASSERT_EQ(pairs.code, 0) << pairs.err;
     expect_pairs(folder);
+    EXPECT_EQ(read_file(mine).value_or("gone"), "mine");
+    for (const auto& entry : fs::directory_iterator(temp.path()))
+      EXPECT_EQ(entry.path().string().find(".partial-"), std::string::npos) << "left behind";
     const json about = json::parse(*read_file(folder / "dataset.json"));
     EXPECT_THAT(about.at("visible").get<std::string>(),
                 HasSubstr(poses == std::string("new") ? "visible field" : "photos"));

@@ -67,6 +67,28 @@ TEST_F(HostileRun, ResultsWhoseSessionIsGoneSaySo) {
             true);
 }
 
+/// Another session under the name: its files are called alike, and would be shown as the run's.
+TEST_F(HostileRun, AnotherSessionInItsPlaceIsNotTheRuns) {
+  ASSERT_EQ(orbitfuse_program(small_run(session, out)).code, 0);
+  const std::vector<std::string> words = {"export", out.string(), "--dataset",
+                                          (temp / "pairs").string(), "--dry-run"};
+  EXPECT_EQ(orbitfuse_program(words).err.find("are not those that"), std::string::npos);
+  fs::rename(session, temp / "moved");
+  FixtureOptions smaller;
+  smaller.thermal = 11;
+  write_fixture_session(session, smaller);
+  const std::string said =
+      session.string() + ": its thermal frames are not those that " + out.string() + " was made of";
+  EXPECT_THAT(orbitfuse_program({"inspect", out.string()}).err, HasSubstr(said));
+  EXPECT_THAT(orbitfuse_program({"view", out.string(), "--page", "0", "--dry-run"}).err,
+              HasSubstr("photos cannot be shown: " + said));
+  std::vector<std::string> real = words;
+  real.pop_back();
+  const Outcome pairs = orbitfuse_program(real);
+  EXPECT_EQ(pairs.code, 3);
+  EXPECT_FALSE(fs::exists(temp / "pairs"));
+}
+
 TEST_F(HostileRun, ResultsWithoutTheirRecordAreNoSession) {
   make_poses();
   fs::remove(out / "run.json");

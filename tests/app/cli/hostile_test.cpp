@@ -89,6 +89,103 @@ TEST_F(Hostile, OddPairsAreNamedByTheirFiles) {
   EXPECT_EQ(fuse({"--out", path("f.png"), "--method", "heat"}).code, 0);
 }
 
+TEST_F(Hostile, FuseAndMetricsNameImagesWithTransparentPixels) {
+  put_pair();
+  cv::Mat clear(48, 64, CV_8UC4, cv::Scalar(10, 200, 90, 255));
+  for (const auto& [name, alpha] : {std::pair("opaque.png", 255), std::pair("clear.png", 0)}) {
+    clear.at<cv::Vec4b>(5, 6)[3] = static_cast<std::uint8_t>(alpha);
+    ASSERT_TRUE(write_png(path(name), clear));
+    for (const auto& more : {std::vector<std::string>{"fuse", "--out", path("f.png")},
+                             std::vector<std::string>{"metrics", "--fused", path("v.png")}}) {
+      std::vector<std::string> words = more;
+      words.insert(words.end(), {"--visible", path(name), "--thermal", path("t.png")});
+      const Outcome outcome = orbitfuse_program(words);
+      EXPECT_EQ(outcome.code, 0) << outcome.err;
+      EXPECT_EQ(
+          outcome.err.find("clear.png: 0.033 % of its pixels are transparent") != std::string::npos,
+          alpha == 0)
+          << outcome.err;
+    }
+  }
+}
+
+TEST_F(Hostile, TheLegendOfFuseIsNotWrittenOntoAnInput) {
+  put_pair();
+  fs::copy_file(path("t.png"), path("f_legend.png"));
+  const std::string before = *read_file(path("f_legend.png"));
+  const auto fuse_onto = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"fuse", "--visible", path("v.png"), "--thermal",
+                               path("f_legend.png"), "--out", path("f.png")});
+    return orbitfuse_program(more);
+  };
+  refused(fuse_onto({}), 2, "its legend would be written onto the input " + path("f_legend.png"));
+  EXPECT_EQ(*read_file(path("f_legend.png")), before);
+  EXPECT_EQ(fuse_onto({"--method", "ms-srif"}).code, 0) << "which has no legend";
+  fs::create_directory(path("g_legend.png"));
+  refused(fuse({"--out", path("g.png")}), 3, "g_legend.png");
+  EXPECT_FALSE(fs::exists(path("g.png"))) << "seen before the picture is written";
+}
+
+TEST_F(Hostile, ADryRunOfDevicesEndsByItself) {
+  const Outcome dry = run_program(
+      {"timeout", "20", ORBITFUSE_BINARY_DIR "/app/orbitfuse", "devices", "--watch", "--dry-run"});
+  EXPECT_EQ(dry.code, 0) << dry.err;
+  EXPECT_NE(dry.err.find("would go on"), std::string::npos) << dry.err;
+}
+
+TEST_F(Hostile, AnExchangedPairIsNamed) {
+  put_pair();
+  ASSERT_TRUE(write_png(path("kelvin.png"), cv::Mat(48, 64, CV_16UC1, cv::Scalar(29500))));
+  for (const auto& more : {std::vector<std::string>{"fuse", "--out", path("f.png")},
+                           std::vector<std::string>{"metrics", "--fused", path("v.png")}}) {
+    std::vector<std::string> words = more;
+    words.insert(words.end(), {"--visible", path("kelvin.png"), "--thermal", path("v.png")});
+    const Outcome told = orbitfuse_program(words);
+    EXPECT_EQ(told.code, 0) << told.err;
+    EXPECT_NE(told.err.find(path("kelvin.png") + ": 16-bit grey as the visible image"),
+              std::string::npos)
+        << told.err;
+  }
+}
+
+/// What a library calls it stands in no help.
+TEST_F(Hostile, OptionsOutOfRangeAreNamedAsTheyWereTyped) {
+  put_pair();
+  const std::pair<std::vector<std::string>, std::string> cases[] = {
+      {{"mat", "--out", path("m.pdf"), "--size-m", "0"}, "--size-m: 0; choose 0.05 to 20"},
+      {{"mat", "--out", path("m.pdf"), "--tags", "99"}, "--tags: 99"},
+      {{"mat", "--out", path("m.pdf"), "--paper", "A0"}, "--paper: A0"},
+      {{"view", "run", "--page", "99999"}, "--page: 99999"},
+      {{"view", "run", "--token", "short"}, "--token: shorter"},
+      {{"compare", "a", "b", "--out", path("c"), "--triangles", "3"}, "--triangles: 3; choose 4"},
+      {{"render", "s", "--views", "0"}, "--views: 0; choose 1"},
+      {{"render", "s", "--width", "1"}, "--width: 1; choose 16"},
+      {{"train", "s", "--target-psnr", "nan"}, "--target-psnr: 'nan' is no number"}};
+  for (const auto& [words, said] : cases) {
+    refused(orbitfuse_program(words), 2, said);
+    std::vector<std::string> dry = words;
+    dry.emplace_back("--dry-run");
+    refused(orbitfuse_program(dry), 2, said);
+  }
+  // Read before the training that it would be found after.
+  std::ofstream(path("cameras.json")) << "{}";
+  write_fixture_session(path("s"));
+  refused(orbitfuse_program({"render", path("s"), "--out", path("o"), "--cameras",
+                             path("cameras.json"), "--dry-run"}),
+          3, "cameras.json");
+}
+
+/// Results among the images of a session would be images of it.
+TEST_F(Hostile, FarmsAndReplaysDoNotWriteAmongTheFramesOfTheirSession) {
+  write_fixture_session(path("s"));
+  for (const std::string& out : {path("s"), path("s/visible"), path("s/visible/farm")})
+    refused(orbitfuse_program({"farm", path("s"), "--out", out, "--dry-run"}), 2,
+            "--out " + out + ": holds the session itself");
+  refused(orbitfuse_program({"replay", path("s"), "--to", path("s/visible/copy")}), 2,
+          "--to " + path("s/visible/copy") + ": lies among the frames");
+  EXPECT_FALSE(fs::exists(path("s/visible/copy")));
+}
+
 TEST_F(Hostile, NamesThatAreTooLongForTheDiskAreNamed) {
   put_pair();
   write_fixture_session(path("s"));
@@ -146,9 +243,12 @@ TEST_F(Hostile, EmptyValuesAreNoValues) {
 TEST_F(Hostile, NumbersAreNamedAsTheyWereTyped) {
   put_pair();
   const std::pair<std::vector<std::string>, std::string> cases[] = {
-      {{"--humidity", "900"}, "--humidity: 900; must be 0 to 100"},
+      {{"--humidity", "900"}, "--humidity: 900; choose 0 to 100"},
       {{"--reflected-c", "-300"}, "--reflected-c: -300"},
       {{"--emissivity", "1.5"}, "--emissivity: 1.5"},
+      {{"--station-spacing-deg", "0"}, "--station-spacing-deg: 0; choose 1 to 180"},
+      {{"--station-spacing-deg", "15", "--loops", "0"}, "--loops: 0; choose 1 to 100"},
+      {{"--thermal-scale", "linear", "--kelvin-per-count", "0"}, "--kelvin-per-count: 0;"},
       {{"--thermal-scale", "linear"}, "--kelvin-per-count"},
       {{"--emissivity", "0.9"}, "no radiometric JPEGs"}};
   for (const auto& [options, words] : cases) {

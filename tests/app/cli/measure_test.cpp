@@ -147,8 +147,18 @@ TEST_F(Measure, WhatIsWrongIsNamedWithTheRemedy) {
   expect_refused({"--pixel", "000"}, 2, "VIEW,U,V");
   expect_refused({"--point", "1,2"}, 2, "X,Y,Z");
   expect_refused({"--point", "1,nan,2"}, 2, "point");
-  expect_refused({"--box", "0,0,0,1,0,1"}, 2, "size");
-  expect_refused({"--hottest", "0"}, 2, "count");
+  expect_refused({"--box", "0,0,0,1,0,1"}, 2, "--box: size 0; choose above 0");
+  // By what was typed: the library's keys and units stand in no help.
+  for (const std::string kind : {"--hottest", "--coldest"})
+    for (const std::string count : {"-1", "0", "1000000000", "nan", "1e9"})
+      EXPECT_EQ(measure({kind, count}).err.find("measure."), std::string::npos) << kind << count;
+  expect_refused({"--hottest", "0"}, 2, "--hottest: 0; choose 1 to 100");
+  expect_refused({"--hottest", "nan"}, 2, "--hottest");
+  expect_refused({"--coldest", "-1"}, 2, "--coldest: -1; choose 1 to 100");
+  expect_refused({"--hottest", "1", "--apart", "-1"}, 2, "--apart: -1");
+  expect_refused({"--line", "000,32,24", "001,32,24", "--profile", "1"}, 2, "--profile: 1");
+  expect_refused({"--pixel", "000,32,24", "--air-c", "-300"}, 2, "--air-c: -300");
+  expect_refused({"--pixel", "000,32,24", "--humidity", "900"}, 2, "--humidity: 900");
   expect_refused({"--hottest", "1", "--coldest", "1"}, 2, "together with");
   expect_refused({"--request", "{\"kind\":\"spit\"}"}, 2, "spit");
   expect_refused({"--hottest", "1", "--remark", "warm"}, 2, "without --save");

@@ -102,6 +102,52 @@ TEST(OptionPairs, RunsRendersAndCameras) {
                      {{{"--profiles", "."}, "--profiles: given without a camera of aravis"}});
 }
 
+/// What every verb was offered once, and most passed over.
+TEST(OptionPairs, CommonOptionsOfOtherVerbs) {
+  const std::vector<std::vector<std::string>> no_stages = {
+      {"inspect", "x"}, {"view", "x"},    {"measure", "x"}, {"export", "x"},
+      {"eval", "x"},    {"devices"},      {"farm", "x"},    {"doctor"},
+      {"import", "x"},  {"capture", "x"}, {"replay", "x"},  {"compare", "x", "y"}};
+  for (const auto& verb : no_stages) expect_all_refused(verb, {{{"--force"}, "--force: "}});
+  for (const char* verb : {"measure", "eval", "view"})
+    expect_all_refused({verb},
+                       {{{"--resume"}, std::string("--resume: means nothing to ") + verb},
+                        {{"--seed", "7"}, std::string("--seed: means nothing to ") + verb}});
+  for (const char* verb : {"inspect", "measure", "import"})
+    expect_all_refused(
+        {verb}, {{{"--set", "render.views=3"}, std::string("--set: means nothing to ") + verb},
+                 {{"--config=a.toml"}, std::string("--config: means nothing to ") + verb}});
+  expect_all_refused({"run", "x"}, {{{"-q", "-v"}, "excludes"}});
+}
+
+TEST(OptionPairs, HelpOffersNoCommonOptionThatMeansNothing) {
+  for (const char* verb : {"inspect", "measure", "doctor", "import"}) {
+    const std::string help = orbitfuse_program({verb, "--help"}).out;
+    for (const char* option : {"--force", "--seed", "--config", "--set", "--print-config"})
+      EXPECT_EQ(help.find(std::string(option) + " "), std::string::npos) << verb << " " << option;
+  }
+  for (const char* verb : {"run", "poses", "train", "register", "render", "fuse", "metrics"}) {
+    const std::string help = orbitfuse_program({verb, "--help"}).out;
+    for (const char* option : {"--force", "--resume", "--seed", "--config"})
+      EXPECT_NE(help.find(option), std::string::npos) << verb << " " << option;
+  }
+}
+
+TEST(OptionPairs, OptionsOfStagesBesideFiles) {
+  expect_all_refused({"fuse", "--visible", "a", "--thermal", "b"},
+                     {{{"--force"}, "--force: given with --visible and --thermal"},
+                      {{"--seed", "2"}, "--seed: given with --visible and --thermal"}});
+  expect_all_refused({"metrics", "--visible", "v", "--thermal", "t", "--fused", "f"},
+                     {{{"--resume"}, "--resume: given with --visible"},
+                      {{"--set", "render.views=3"}, "--set: given with --visible"}});
+  expect_all_refused({"register", "--source", "a.ply", "--target", "b.ply"},
+                     {{{"--force"}, "--force: given with --source"}});
+  expect_all_refused({"report", "--print-template"},
+                     {{{"--force"}, "--force: given with --print-template"}});
+  expect_all_refused({"report", "x", "--inspection", "a.toml"},
+                     {{{"--resume"}, "--resume: given with --inspection"}});
+}
+
 TEST(OptionPairs, Farm) {
   expect_all_refused({"farm", "session"},
                      {{{"--account", "a"}, "--account: given without --slurm"},

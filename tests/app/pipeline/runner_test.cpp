@@ -113,6 +113,32 @@ TEST_F(RunnerTest, DamagedOutputRunsAgain) {
   EXPECT_EQ(run().find("c")->why, "text is missing");
 }
 
+/// --out may be any folder of the user's, and "report" a folder of theirs in it.
+TEST_F(RunnerTest, WhatNoStageLeftIsNotReplaced) {
+  const fs::path out = temp.path() / "out";
+  ASSERT_TRUE(write_file_atomic(out / "c/thesis.txt", "mine"));
+  RunOptions options;
+  for (const bool dry : {true, false}) {
+    options.dry_run = dry;
+    const RunSummary refused = run(options);
+    ASSERT_TRUE(refused.error);
+    EXPECT_EQ(refused.error->kind, ErrorKind::usage);
+    EXPECT_THAT(refused.error->message(), HasSubstr((out / "c").string()));
+    EXPECT_TRUE(runs.empty()) << "refused before the work";
+  }
+  EXPECT_EQ(*read_file(out / "c/thesis.txt"), "mine");
+  options.targets = {"d"};
+  EXPECT_FALSE(run(options).error) << "c is not written";
+  EXPECT_EQ(*read_file(out / "c/thesis.txt"), "mine");
+  fs::remove_all(out / "c");
+  ASSERT_TRUE(write_file_atomic(out / "c", "mine"));
+  EXPECT_TRUE(run().error) << "nor a file";
+  EXPECT_EQ(*read_file(out / "c"), "mine");
+  fs::remove(out / "c");
+  fs::create_directory(out / "c");
+  EXPECT_FALSE(run().error) << "an empty folder is nobody's loss";
+}
+
 TEST_F(RunnerTest, CutDoneMarkRunsAgain) {
   run();
   const fs::path mark = temp.path() / "out/d/stage.json";

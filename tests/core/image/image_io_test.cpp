@@ -11,6 +11,7 @@
 
 #include "core/image/exif.hpp"
 #include "core/image/image_codec.hpp"
+#include "core/image/transparency.hpp"
 #include "core/system/file_io.hpp"
 #include "core/temperature.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -158,8 +159,9 @@ TEST(ImageIo, APngOfImpossibleSizeIsRefused) {
   EXPECT_TRUE(image.error().found.find("PNG") != std::string::npos) << image.error().found;
 }
 
-/// A PNG as libpng's own encoder writes it, of any kind; samples are 0, 1, 2 ...
-std::string png_of(int width, int height, int bits, int kind, bool interlaced) {
+/// A PNG as libpng's own encoder writes it, of any kind; samples are 0, 1, 2 ... `clear`: one entry
+/// of a palette, or one grey, is transparent.
+std::string png_of(int width, int height, int bits, int kind, bool interlaced, bool clear = false) {
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
   png_infop info = png_create_info_struct(png);
   std::string out;
@@ -173,6 +175,10 @@ std::string png_of(int width, int height, int bits, int kind, bool interlaced) {
                kind, interlaced ? PNG_INTERLACE_ADAM7 : PNG_INTERLACE_NONE, 0, 0);
   const png_color colors[4] = {{1, 2, 3}, {40, 50, 60}, {70, 80, 90}, {100, 110, 120}};
   if (kind == PNG_COLOR_TYPE_PALETTE) png_set_PLTE(png, info, colors, 4);
+  png_byte alpha[2] = {255, 0};
+  png_color_16 gray{};
+  gray.gray = 10;
+  if (clear) png_set_tRNS(png, info, alpha, 2, &gray);
   png_write_info(png, info);
   const std::size_t row_bytes = png_get_rowbytes(png, info);
   std::vector<std::string> samples(static_cast<std::size_t>(height), std::string(row_bytes, 0));
@@ -207,6 +213,64 @@ TEST(ImageIo, PngsOfEveryKindBecomeWhatTheyShow) {
     const cv::Mat few = *decode_image(png_of(8, 4, 2, PNG_COLOR_TYPE_GRAY, interlaced), "few");
     EXPECT_EQ(few.at<unsigned char>(0, 3), 255);
   }
+}
+
+/// Two pixels, opaque and with `alpha`; `kind`: EXTRASAMPLES of the fourth channel.
+std::string rgba_tiff(char alpha, std::uint16_t kind) {
+  std::string out("II*\0\x08\0\0\0", 8);
+  const auto word = [&](std::uint32_t value, int bytes) {
+    for (int i = 0; i < bytes; ++i) out += static_cast<char>(value >> 8 * i);
+  };
+  constexpr std::uint32_t count = 10, bits_at = 8 + 2 + 12 * count + 4, pixels_at = bits_at + 8;
+  word(count, 2);
+  const std::tuple<std::uint32_t, std::uint32_t, std::uint32_t, std::uint32_t> entries[] = {
+      {256, 3, 1, 2}, {257, 3, 1, 1},         {258, 3, 4, bits_at}, {259, 3, 1, 1},
+      {262, 3, 1, 2}, {273, 4, 1, pixels_at}, {277, 3, 1, 4},       {278, 3, 1, 1},
+      {279, 4, 1, 8}, {338, 3, 1, kind}};
+  for (const auto& [tag, type, values, value] : entries) {
+    word(tag, 2);
+    word(type, 2);
+    word(values, 4);
+    word(value, 4);
+  }
+  word(0, 4);
+  for (int i = 0; i < 4; ++i) word(8, 2);
+  return out + std::string("\x01\x02\x03\xff\x04\x05\x06", 7) + alpha;
+}
+
+TEST(ImageIo, TransparentPixelsOfTiffsAreCountedWhereTheChannelIsAlpha) {
+  EXPECT_EQ(decode_image(rgba_tiff(7, 2), "rgba")->at<cv::Vec3b>(0, 1), cv::Vec3b(6, 5, 4));
+  EXPECT_EQ(transparent_share(rgba_tiff(7, 2)), 0.5);
+  EXPECT_EQ(transparent_share(rgba_tiff(7, 1)), 0.5);
+  EXPECT_EQ(transparent_share(rgba_tiff(7, 0)), 0) << "infrared, say";
+  EXPECT_EQ(transparent_share(rgba_tiff('\xff', 2)), 0);
+}
+
+TEST(ImageIo, TransparentPixelsAreCounted) {
+  for (const bool interlaced : {false, true}) {
+    const auto share = [&](int bits, int kind, bool clear = false) {
+      return transparent_share(png_of(8, 4, bits, kind, interlaced, clear));
+    };
+    EXPECT_EQ(share(8, PNG_COLOR_TYPE_GRAY), 0);
+    EXPECT_EQ(share(8, PNG_COLOR_TYPE_RGB_ALPHA), 1) << "alpha is 3, 7, 11 ...";
+    EXPECT_EQ(share(16, PNG_COLOR_TYPE_GRAY_ALPHA), 1);
+    EXPECT_EQ(share(2, PNG_COLOR_TYPE_PALETTE), 0);
+    EXPECT_EQ(share(2, PNG_COLOR_TYPE_PALETTE, true), 0.25);
+    EXPECT_EQ(share(8, PNG_COLOR_TYPE_GRAY, true), 1 / 32.0);
+  }
+  cv::Mat bgra(4, 8, CV_8UC4, cv::Scalar(1, 2, 3, 255));
+  const auto encoded = [&](const char* extension) {
+    std::vector<unsigned char> bytes;
+    cv::imencode(extension, bgra, bytes);
+    return std::string(bytes.begin(), bytes.end());
+  };
+  for (const char* extension : {".png", ".tiff", ".bmp", ".jpg"})
+    EXPECT_EQ(transparent_share(encoded(extension)), 0) << extension;
+  bgra.at<cv::Vec4b>(0, 0)[3] = 254;
+  EXPECT_EQ(transparent_share(encoded(".png")), 1 / 32.0);
+  EXPECT_EQ(transparent_share(encoded(".tiff")), 0) << "OpenCV's doesn't say that it is alpha";
+  EXPECT_EQ(transparent_share("\x89PNG\r\n\x1A\n"), 0);
+  EXPECT_EQ(transparent_share(""), 0);
 }
 
 TEST(ImageIo, DecodersPrintNothingAndErrorsNameTheFile) {

@@ -41,6 +41,83 @@ class HostileImport : public ImportFiles {
   }
 };
 
+/// A PNG that plays: acTL, with the number of its pictures, before the image data.
+std::string animated(const std::string& png, char frames) {
+  const std::string kind_and_data =
+      std::string("acTL") + std::string(3, '\0') + frames + std::string(4, '\0');
+  const auto word = [](std::uint32_t value) {
+    std::string bytes;
+    for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(value >> shift);
+    return bytes;
+  };
+  std::uint32_t crc = 0xffffffff;
+  for (const char c : kind_and_data) {
+    crc ^= static_cast<unsigned char>(c);
+    for (int bit = 0; bit < 8; ++bit) crc = crc >> 1 ^ (crc & 1 ? 0xedb88320 : 0);
+  }
+  constexpr std::size_t header_end = 33;
+  return png.substr(0, header_end) + word(8) + kind_and_data + word(~crc) + png.substr(header_end);
+}
+
+/// Noise with an alpha of `alpha` in the left half, opaque in the right one.
+std::string half_transparent(int alpha, std::uint64_t seed) {
+  cv::Mat image(30, 40, CV_8UC4);
+  cv::RNG(seed).fill(image, cv::RNG::UNIFORM, 0, 255);
+  for (int y = 0; y < image.rows; ++y)
+    for (int x = 0; x < image.cols; ++x)
+      image.at<cv::Vec4b>(y, x)[3] = static_cast<std::uint8_t>(x < 20 ? alpha : 255);
+  return *encode_png(image);
+}
+
+/// It would be told as a camera of its own, and no focal length that is given would suit both.
+TEST_F(HostileImport, AThermalFileAmongPhotosIsNoSecondCamera) {
+  put_centikelvin("in/0.tiff", 1);
+  put("in/1.png", half_transparent(255, 2));
+  put_photo("in/2.jpg", 3);
+  options.visible = {folder / "in"};
+  options.visible_focal_px = 50;
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->visible, 2);
+  EXPECT_EQ(report->session.devices.size(), 1u);
+  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("left out"), HasSubstr("0.tiff"),
+                                               HasSubstr("Give it as thermal"))));
+  EXPECT_THAT(report->warnings, Not(Contains(HasSubstr("cameras, lenses"))));
+}
+
+TEST_F(HostileImport, AnAnimatedPngIsNoPhoto) {
+  put_photo("in/0.jpg", 1);
+  put("in/1.png", animated(half_transparent(255, 2), 3));
+  put("in/2.png", animated(half_transparent(255, 3), 1));  // a still one that says so
+  options.visible = {folder / "in"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->visible, 2);
+  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("left out"), HasSubstr("1.png"),
+                                               HasSubstr("animated PNG of 3 frames"))));
+  options.visible = {folder / "in/1.png"};
+  const auto alone = import_session(options, folder / "other");
+  ASSERT_FALSE(alone);
+  EXPECT_THAT(alone.error().message(), HasSubstr("animated PNG of 3 frames"));
+}
+
+/// What lies behind a transparent pixel is any colour at all.
+TEST_F(HostileImport, ImagesWithTransparentPixelsAreNamed) {
+  put("in/0.png", half_transparent(255, 1));
+  put("in/1.png", half_transparent(0, 2));
+  put("in/2.png", half_transparent(200, 3));
+  put("thermal/0.png", half_transparent(10, 4));
+  options.visible = {folder / "in"};
+  options.thermal = {folder / "thermal"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->visible, 3);
+  EXPECT_THAT(report->warnings,
+              Contains(AllOf(HasSubstr("3 images have transparent pixels: "),
+                             HasSubstr("in/1.png (50 %), in/2.png (50 %), thermal/0.png (50 %)"))));
+  EXPECT_THAT(report->warnings, Not(Contains(HasSubstr("in/0.png"))));
+}
+
 TEST_F(HostileImport, GlowingSpotsKeepTheirTemperature) {
   cv::Mat hot = counts(29300 / 4, 1);       // 293 K at 0.04 K a count
   hot.at<std::uint16_t>(3, 7) = 1173 * 25;  // 900 C

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <fmt/format.h>
+
+#include <initializer_list>
+#include <optional>
+#include <string>
+
+#include "core/option_range.hpp"
+#include "core/result.hpp"
+
+namespace orbitfuse::cli {
+
+/// A number as it was typed. A library's own check would name its key and unit, which the user
+/// never wrote: 9 where 900 was typed.
+struct TypedNumber {
+  const char* option;
+  std::optional<double> value;  ///< none: not given
+  OptionRange range;            ///< in the unit of the command line
+};
+
+/// Usage error for the first number that lies outside of its range.
+inline Status check_typed(std::initializer_list<TypedNumber> numbers) {
+  for (const auto& [option, value, range] : numbers) {
+    if (!value || range.contains(*value)) continue;
+    return fail(ErrorKind::usage, option, fmt::format("{}", *value), "choose " + range.words());
+  }
+  return {};
+}
+
+/// A key of the library, and the option that sets it.
+struct TypedKey {
+  const char* key;
+  const char* option;
+};
+
+/// The error with the option in the place of the key.
+inline Error as_typed(Error error, std::initializer_list<TypedKey> keys) {
+  for (const auto& [key, option] : keys)
+    if (error.where == key) error.where = option;
+  return error;
+}
+
+/// Of the page that a verb serves (core/http/page_options.hpp).
+inline Error as_typed_page(Error error) {
+  return as_typed(std::move(error), {{"page.port", "--page"}, {"page.token", "--token"}});
+}
+
+}  // namespace orbitfuse::cli
