@@ -138,7 +138,7 @@ Error usage_error(const CommandLine& line, const CLI::ParseError& error, int arg
     if (!guess.empty()) result.remedy = "did you mean '" + guess + "'?";
   };
   if (app == &line.app) {
-    if (!words.empty() && words.front().front() != '-') {
+    if (!words.empty() && !words.front().starts_with('-')) {
       result.found = "unknown verb '" + words.front() + "'";
       suggest(words.front(), known);
     }

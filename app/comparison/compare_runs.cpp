@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
@@ -130,6 +131,10 @@ Status load_scale(ComparedRuns& runs) {
   ORBITFUSE_ASSIGN(auto before, stages::scale_of_run(runs.before.out));
   if (!before) return {};
   before->metres_per_unit *= runs.registration.before_from_after.scale;
+  // How well surfaces hold the ratio of two units (docs/benchmarks/registration.md, with noise and
+  // gaps): BEFORE's scale is no surer than that in AFTER's world.
+  constexpr double registration_sigma = 0.003;
+  before->relative_uncertainty = std::hypot(before->relative_uncertainty, registration_sigma);
   if (!runs.scale) {
     runs.scale = before;
     return {};
@@ -140,7 +145,8 @@ Status load_scale(ComparedRuns& runs) {
     runs.scale_doubt = fmt::format(
         "the runs' scales contradict each other: a unit after is {:.4f} m by its own ({}), {:.4f} "
         "m "
-        "by the one before ({}); lengths are in units",
+        "by the one before ({}); lengths are in units: tell one again (orbitfuse export RUN "
+        "--distance A B LENGTH), or delete the wrong run's scale.json",
         after.metres_per_unit, after.source, before->metres_per_unit, before->source);
   return {};
 }

@@ -87,7 +87,7 @@ std::optional<std::string> transparency(const fs::path& file) {
   const double share = bytes ? transparent_share(*bytes) : 0;
   if (share == 0) return std::nullopt;
   return fmt::format(
-      "{}: {:.2g} % of its pixels are transparent; alpha is dropped, and what colour lies behind "
+      "{}: {:.3g} % of its pixels are transparent; alpha is dropped, and what colour lies behind "
       "it "
       "counts as seen: give the image as it was taken",
       file.string(), 100 * share);

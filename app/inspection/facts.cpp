@@ -9,6 +9,7 @@
 #include <set>
 
 #include "app/pipeline/stage_record.hpp"
+#include "app/stages/metric_scale.hpp"
 #include "core/numeric/percent.hpp"
 #include "core/temperature.hpp"
 
@@ -277,7 +278,7 @@ std::vector<std::string> limits_of(const Session& session, const view::FinishedR
   limits.emplace_back(
       "Only what the thermal orbit saw was measured. Surfaces that no frame saw, the underside and "
       "what stood hidden, were not inspected.");
-  limits.emplace_back("No north is known.");
+  limits.push_back(stages::scale_words(stages::scale_of_run(run.out)) + ". No north is known.");
   for (const std::string& note : run.notes) limits.push_back(note + ".");
   return limits;
 }

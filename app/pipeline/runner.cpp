@@ -73,14 +73,22 @@ Status remove_tree(const fs::path& folder) {
 Status replace_folder(const fs::path& from, const fs::path& to) {
   if (renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_EXCHANGE) == 0)
     return remove_tree(from);
-  // Absent, or a file system that can't exchange. In two steps, for half of a result would lack its
-  // done mark and pass for somebody's own.
+  // Absent, or a file system that can't exchange: in two steps, of which the first is taken back
+  // where the second fails. What an earlier process left between the two is the result.
   fs::path old = from;
   old += ".old";
-  ORBITFUSE_TRY(remove_tree(old));
   std::error_code ec;
-  if (fs::exists(fs::symlink_status(to, ec))) fs::rename(to, old, ec);
-  if (!ec || ec == std::errc::no_such_file_or_directory) fs::rename(from, to, ec);
+  const bool there = fs::exists(fs::symlink_status(to, ec));
+  if (there) {
+    ORBITFUSE_TRY(remove_tree(old));
+    fs::rename(to, old, ec);
+    ORBITFUSE_TRY(device_error(to, ec));
+  }
+  fs::rename(from, to, ec);
+  if (ec && there) {
+    std::error_code back;
+    fs::rename(old, to, back);
+  }
   ORBITFUSE_TRY(device_error(to, ec));
   return remove_tree(old);
 }

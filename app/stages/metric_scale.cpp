@@ -101,11 +101,12 @@ std::optional<MetricScale> agreed_scale(const MetricScale& a, const MetricScale&
                variance_b = std::pow(std::max(b.relative_uncertainty, rounding), 2);
   const double apart = std::log(b.metres_per_unit / a.metres_per_unit);
   if (!(std::abs(apart) <= 3 * std::sqrt(variance_a + variance_b))) return std::nullopt;
+  if (a.source == b.source) return variance_b < variance_a ? b : a;
   const double share_of_b = variance_a / (variance_a + variance_b);
   return MetricScale{
       a.metres_per_unit * std::exp(share_of_b * apart),
       std::sqrt(variance_a * (1 - share_of_b)),
-      a.source == b.source ? a.source : a.source + " and " + b.source,
+      a.source + " and " + b.source,
       a.how + "; " + b.how,
   };
 }

@@ -36,8 +36,9 @@ Result<std::string> world_identity(const std::filesystem::path& out);
 /// no file.
 Result<std::optional<MetricScale>> scale_of_run(const std::filesystem::path& out);
 
-/// Two that were told of one world: their mean by their uncertainties; nothing where they differ by
-/// more than three standard deviations, so that one of them is wrong.
+/// Two that were told of one world: their mean by their uncertainties, or the surer one where both
+/// have one source and so perhaps one error; nothing where they differ by more than three standard
+/// deviations, so that one of them is wrong.
 std::optional<MetricScale> agreed_scale(const MetricScale& a, const MetricScale& b);
 
 nlohmann::json to_json(const MetricScale& scale);

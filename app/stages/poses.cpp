@@ -131,7 +131,7 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   const bool visible = modality == Modality::visible;
   pipeline::Stage stage;
   stage.name = "poses_" + std::string(name(modality));
-  stage.version = 9;
+  stage.version = 10;
   if (!visible) {
     stage.version = 12;
     stage.uses = {"poses_visible"};

@@ -112,7 +112,7 @@ Result<StageOutput> run_register(const StageContext& context, const SessionInput
 pipeline::Stage register_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "register";
-  stage.version = 2;
+  stage.version = 3;  // restarts from the project's own random numbers
   stage.needs = {"poses_visible", "poses_thermal", "train_visible", "train_thermal"};
   stage.options = {{"seed", in.config->seed}};
   stage.run = [in](const StageContext& context) {

@@ -6,7 +6,6 @@
 #include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
 #include "app/stages/measurement_scene.hpp"
-#include "app/stages/metric_scale.hpp"
 #include "app/stages/recorded_detail.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
@@ -196,7 +195,6 @@ Result<FinishedRun> load_finished_run(const fs::path& out, const stages::RunConf
   ORBITFUSE_TRY(load_surface(context, run));
   ORBITFUSE_TRY(progress.check("view"));
   set_orbit(run);
-  run.notes.push_back(stages::scale_words(stages::scale_of_run(out)));
   ORBITFUSE_TRY(load_scales(context, run));
   return run;
 }

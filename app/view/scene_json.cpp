@@ -7,6 +7,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "app/stages/metric_scale.hpp"
 #include "app/view/shot_request.hpp"
 #include "core/temperature.hpp"
 #include "fusion/heat/heat.hpp"
@@ -64,6 +65,8 @@ json scene_json(const FinishedRun& run) {
   for (const std::string& palette_name : palette_names())
     palettes[palette_name] = hex_of(*palette(palette_name));
   const Eigen::Vector3d &c = run.center, &u = run.up;
+  std::vector<std::string> notes = run.notes;
+  notes.push_back(stages::scale_words(stages::scale_of_run(run.out)));
   std::error_code ignored;
   return {{"name", std::filesystem::weakly_canonical(run.out, ignored).string()},
           {"visible", run.has(Modality::visible)},
@@ -83,7 +86,7 @@ json scene_json(const FinishedRun& run) {
           {"views", views},
           {"palettes", palettes},
           {"palette", run.config.render.palette},
-          {"notes", run.notes}};
+          {"notes", notes}};
 }
 
 }  // namespace orbitfuse::view

@@ -190,7 +190,7 @@ class Importer {
                    const std::optional<DeclaredStations>& stations) {
     if (still.transparent > 0)
       transparent_.push_back(
-          fmt::format("{} ({:.2g} %)", source.short_name(), 100 * still.transparent));
+          fmt::format("{} ({:.3g} %)", source.short_name(), 100 * still.transparent));
     ORBITFUSE_ASSIGN(CameraGroup * group, groups_.of(still, source));
     Frame& frame = still.frame;
     DeviceInfo& device = still.camera;

@@ -56,7 +56,9 @@ Result<StillPhoto> visible_still(std::string bytes, const std::string& where) {
   }
   // Before it counts as a camera of its own.
   if (image.depth() != CV_8U)
-    return fail(ErrorKind::input, where, "16-bit samples, but photos have 8 bits",
+    return fail(ErrorKind::input, where,
+                std::string(image.depth() == CV_16U ? "16-bit" : "floating-point") +
+                    " samples, but photos have 8 bits",
                 "a thermal image? Give it as thermal, or convert it to 8-bit");
   still.size = apply_orientation(image, exif.orientation).size();
   still.frame.extension = extension_of(bytes);

@@ -13,7 +13,7 @@ class RestingView {
   /// The camera moves: the surface stands in, and what is being rendered is of no use. last: nothing more comes of this movement.
   moved(last) {
     this.canvas.classList.remove("shown");
-    this.surface.moving = true; this.surface.behindPicture(false);
+    this.surface.moves(); this.surface.behindPicture(false);
     this.drop();
     this.pictures = {}; this.level = -1;
     clearTimeout(this.timer); clearTimeout(this.late);

@@ -192,12 +192,18 @@ class Surface {
     });
   }
 
+  /// A movement begins: one that was drawn quickly is tried in whole again.
+  moves() {
+    if (!this.moving && this.mesh && this.quick) this.share = 1;
+    this.moving = true;
+  }
+
   /// Less of the surface where this machine draws fewer than 30 pictures a second, more where it has time.
   keepPace(taken_ms) {
     if (this.mesh) {
       const all = this.mesh.geometry.index.count, few = this.coarse.geometry.index.count;
       if (this.share === 1 && taken_ms > 25) this.share = few / all;
-      else if (this.share < 1 && taken_ms * all / few < 12) this.share = 1;
+      else if (this.share < 1) this.quick = taken_ms < 12;
     } else if (taken_ms > 25) this.share = Math.max(0.02, this.share * Math.max(0.3, 20 / taken_ms));
     else if (taken_ms < 12) this.share = Math.min(1, this.share * 1.1);
   }

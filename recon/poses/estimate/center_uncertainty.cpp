@@ -42,7 +42,7 @@ class NormalMatrix {
 
   std::vector<double> center_sigmas() const {
     const double mean = matrix_.trace() / static_cast<double>(parameters());
-    if (!(mean > 0) || !std::isfinite(mean)) return held_by_nothing();
+    if (!(mean > 0 && radius_ > 0) || !std::isfinite(mean)) return held_by_nothing();
     const Eigen::MatrixXd gauge = gauge_directions() * std::sqrt(mean);
     // The gauge gets a stiffness of its own, which is taken out of the inverse again; what no point
     // holds has no part in either.
@@ -60,7 +60,8 @@ class NormalMatrix {
       for (Eigen::Index k = row(v) + 3; k < row(v) + 6; ++k)
         variance += inverse(k, k) - gauge.row(k).squaredNorm() / (mean * mean);
       const Residuals& seen = residuals_[v];
-      sigmas.push_back(!held_[v] || seen.number == 0
+      // The difference of what is equal may come out below nothing.
+      sigmas.push_back(!held_[v] || seen.number == 0 || !std::isfinite(variance)
                            ? std::numeric_limits<double>::infinity()
                            : std::sqrt(std::max(0.0, variance) * seen.squares / seen.number));
     }

@@ -211,14 +211,18 @@ class VisibleLadder {
   /// repeated structure a wrong model has small residuals, for it keeps the matches that fit it.
   bool matches_contradict(const FeatureLevel& level, JudgedModel& judged) const {
     const auto graph = level.graph();
-    if (!graph) return false;
+    if (!graph) {
+      judged.why += ", its matches can't be asked: " + graph.error().found;
+      return false;
+    }
     const HeldMatches held =
         held_matches(*graph, posed_frames(*graph, judged.poses.reconstruction));
     judged.poses.gates["held_matches"] = held.share;
-    judged.poses.gates["contradicted_pairs"] = held.contradicted;
+    judged.poses.gates["contradicted_matches"] = held.contradicted_share;
     judged.why += fmt::format(", {:.0f} % of the matches of pairs hold", 100 * held.share);
     if (held.contradicted > 0)
-      judged.why += fmt::format(", those of {} pairs contradict it", held.contradicted);
+      judged.why += fmt::format(", {:.1f} % in {} pairs that contradict it",
+                                100 * held.contradicted_share, held.contradicted);
     if (held.contradict()) judged.believed = false;
     return held.contradict();
   }

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "recon/poses/estimate/center_uncertainty.hpp"
 #include "recon/poses/index.hpp"
@@ -38,10 +39,11 @@ std::vector<DoubtfulView> weakly_held(const Reconstruction& model,
   };
   const std::vector<double> uncertainty = center_uncertainty(model);
   for (std::size_t v = 0; v < uncertainty.size(); ++v)
-    if (uncertainty[v] > options.most_uncertain)
+    // What no point holds is said by its count.
+    if (std::isfinite(uncertainty[v]) && uncertainty[v] > options.most_uncertain)
       doubt(v, DoubtReason::uncertain_place,
-            fmt::format("its points leave its place uncertain by {:.1f} % of the orbit, {:.2f} % "
-                        "is trusted; {}",
+            fmt::format("its points leave its place uncertain by {:.2f} % of the orbit's radius, "
+                        "{:.2f} % is trusted; {}",
                         100 * uncertainty[v], 100 * options.most_uncertain, advice));
   // The weakest first: what it alone vouched for is counted without it.
   for (;;) {

@@ -19,10 +19,10 @@ struct WeaklyHeldOptions {
 /// Views whose poses the points don't hold well enough to be trusted; none for a model of two,
 /// which has no third to ask. A doubtful view vouches for no other.
 ///
-/// Both constants were chosen on ten scenes (docs/notes/poses_visible.md): right views have 30
-/// points and more there and are uncertain by 0.18 % at most; of a bare hall, the one of 24 that is
-/// 10.5 % off has 11, its neighbour, 5.3 % off, 28 without it, and the third, 2.6 % off, is
-/// uncertain by 0.35 %.
+/// Both constants were chosen on eleven scenes (docs/notes/poses_visible.md): right views have 30
+/// points and more there and are uncertain by 0.18 % at most (but for one of the hall's); of a bare
+/// hall, the one of 24 that is 10.5 % off has 11, its neighbour, 5.3 % off, 27 without it, and the
+/// third, 2.6 % off, is uncertain by 0.35 %.
 std::vector<DoubtfulView> weakly_held(const Reconstruction& model,
                                       const WeaklyHeldOptions& options = {});
 

@@ -108,11 +108,14 @@ Candidates consensus_candidates(const FeaturePoints& source, const FeaturePoints
     if (used.get(edge.a, edge.b)) continue;
     used.set(edge.a, edge.b);
     used.set(edge.b, edge.a);
-    const double edge_scale = *agreed_scale(at(edge.a), at(edge.b), scale);  // friends agree
+    const auto edge_scale = agreed_scale(at(edge.a), at(edge.b), scale);
+    if (!edge_scale) continue;
     Points p{at(edge.a).source, at(edge.b).source}, q{at(edge.a).target, at(edge.b).target};
     for (const int i : friends.common_list(edge.a, edge.b)) {
-      const double ra = *agreed_scale(at(edge.a), at(i), scale) / edge_scale;
-      const double rb = *agreed_scale(at(edge.b), at(i), scale) / edge_scale;
+      const auto of_a = agreed_scale(at(edge.a), at(i), scale),
+                 of_b = agreed_scale(at(edge.b), at(i), scale);
+      if (!of_a || !of_b) continue;  // friends but for the last bit
+      const double ra = *of_a / *edge_scale, rb = *of_b / *edge_scale;
       if (std::max({ra, rb, 1 / ra, 1 / rb}) > clique_scale_slack * clique_scale_slack) continue;
       p.push_back(at(i).source);
       q.push_back(at(i).target);

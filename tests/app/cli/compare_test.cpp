@@ -103,12 +103,13 @@ TEST_F(Compare, ScalesOfBothRunsAreOneOrNone) {
   EXPECT_NEAR(told.result().at("scale").at("metres_per_unit").get<double>(), 2, 1e-9);
   tell(after, "1.00m");
   EXPECT_THAT(compared("both_scales").first.at("scale").at("how").get<std::string>(),
-              HasSubstr("; 0.5000 units are 1.0000 m"));
+              HasSubstr("0.5000 units are 1.0000 m"));
 
   tell(after, "1.50m");
   const auto [contradicted, said] = compared("two_scales");
   EXPECT_EQ(contradicted.at("unit"), "scene");
   EXPECT_THAT(said, HasSubstr("contradict each other"));
+  EXPECT_THAT(said, HasSubstr("tell one again"));
   EXPECT_THAT(test::get(*folder / "two_scales" / "compare.html"), HasSubstr("contradict"));
 
   ASSERT_TRUE(write_file_atomic(fs::path(before) / "scale.json", "{"));

@@ -43,10 +43,10 @@ TEST(Interrupt, InEveryStageThenResumedEqualsUnbroken) {
   int interruptions = 0;
   // What each stage prints on its way, in the order of the stages.
   for (const char* sign :
-       {"orbit pairs: features", "orbit pairs: mapping", "\"stage\":\"depth\",\"total\"",
-        "training views", "\"stage\":\"export\"", "alignment with renders",
-        "\"stage\":\"train.thermal\"", "\"stage\":\"register\"", "\"stage\":\"render\",\"total\"",
-        "\"stage\":\"metrics\",\"total\""}) {
+       {"\"stage\":\"poses.visible\"", "matches of the orbit's pairs",
+        "\"stage\":\"depth\",\"total\"", "training views", "\"stage\":\"export\"",
+        "alignment with renders", "\"stage\":\"train.thermal\"", "\"stage\":\"register\"",
+        "\"stage\":\"render\",\"total\"", "\"stage\":\"metrics\",\"total\""}) {
     const Outcome stopped = run_car(temp.path() / "broken", sign);
     if (stopped.code == 0) break;  // the last stages may end before the signal reaches them
     ASSERT_EQ(stopped.code, 130) << sign << '\n' << stopped.err;

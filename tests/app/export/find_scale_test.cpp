@@ -187,6 +187,8 @@ TEST(MetricScale, TwoThatAgreeAreOneAndTwoThatDoNotAreNone) {
   EXPECT_NEAR(both->relative_uncertainty, 0.002 * std::sqrt(0.9), 1e-6);
   EXPECT_THAT(both->source, HasSubstr("mat and one distance"));
   EXPECT_FALSE(stages::agreed_scale(by_mat, {0.26, 0.006, "one distance", ""}));
+  EXPECT_EQ(stages::agreed_scale(by_mat, {0.2502, 0.001, "mat", "again"})->how, "again")
+      << "one mat's own error is in both";
   const stages::MetricScale exact{0.25, 0, "known poses", ""};
   ASSERT_TRUE(stages::agreed_scale(exact, exact));
   EXPECT_NEAR(stages::agreed_scale(exact, by_hand)->metres_per_unit, 0.25, 1e-6);

@@ -70,7 +70,8 @@ TEST_F(ViewBrowserTest, TheMeshComesInThePointsPlace) {
   page.evaluate("viewer.surface.share = 0.5");
   EXPECT_EQ(drawn("true").dump(), "[false,true]");
   EXPECT_EQ(drawn("false").dump(), "[true,false]");
-  page.evaluate("delete viewer.surface.keepPace; viewer.surface.keepPace(0.1)");
+  page.evaluate(
+      "delete viewer.surface.keepPace; viewer.surface.keepPace(0.1), viewer.surface.moves()");
   EXPECT_EQ(page.evaluate("viewer.surface.share"), 1);
 
   // What is touched is the mesh: nobody is asked where the surface is.

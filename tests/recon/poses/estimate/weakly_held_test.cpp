@@ -80,7 +80,7 @@ TEST(WeaklyHeld, AViewThatItsPointsLeaveRoomIsNamed) {
   ASSERT_EQ(weak.size(), 1u);
   EXPECT_EQ(weak[0].name, "view7");
   EXPECT_EQ(weak[0].reason, DoubtReason::uncertain_place);
-  EXPECT_THAT(weak[0].why, HasSubstr("% of the orbit"));
+  EXPECT_THAT(weak[0].why, HasSubstr("% of the orbit's radius"));
 }
 
 TEST(WeaklyHeld, TwoViewsHaveNoThirdToAsk) {
