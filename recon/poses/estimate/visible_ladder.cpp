@@ -378,6 +378,11 @@ class VisibleLadder {
       auto error = none_held(steps_, Modality::visible);
       for (const std::string& file : featureless_)
         error.value().found += fmt::format("; {} {}", file, featureless_why);
+      if (std::none_of(frames_.begin(), frames_.end(),
+                       [](const FrameRecord* frame) { return frame->station.has_value(); }))
+        error.value().remedy +=
+            "; or say how far apart the views were taken, which tells like sides apart: import "
+            "--station-spacing-deg";
       return error;
     }
     steps_[best_step_].held = true;

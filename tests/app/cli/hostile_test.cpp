@@ -101,9 +101,9 @@ TEST_F(Hostile, FuseAndMetricsNameImagesWithTransparentPixels) {
       words.insert(words.end(), {"--visible", path(name), "--thermal", path("t.png")});
       const Outcome outcome = orbitfuse_program(words);
       EXPECT_EQ(outcome.code, 0) << outcome.err;
-      EXPECT_EQ(
-          outcome.err.find("clear.png: 0.033 % of its pixels are transparent") != std::string::npos,
-          alpha == 0)
+      EXPECT_EQ(outcome.err.find("clear.png: 0.0326 % of its pixels are transparent") !=
+                    std::string::npos,
+                alpha == 0)
           << outcome.err;
     }
   }

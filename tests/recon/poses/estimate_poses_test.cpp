@@ -84,6 +84,9 @@ TEST(EstimatePoses, AViewWithoutFeaturesIsNamedAndNeverMatched) {
   EXPECT_EQ(poses.error().kind, ErrorKind::quality) << poses.error().message();
   EXPECT_NE(poses.error().found.find("visible/2.png shows nothing to match"), std::string::npos)
       << poses.error().message();
+  const bool has_stations = session.frames.front().station.has_value();
+  EXPECT_NE(poses.error().remedy.find("--station-spacing-deg") != std::string::npos, has_stations)
+      << poses.error().remedy;
 }
 
 TEST(EstimatePoses, OptionsOutOfRangeAreNamed) {
