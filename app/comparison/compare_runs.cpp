@@ -143,9 +143,9 @@ Status load_scale(ComparedRuns& runs) {
   runs.scale = stages::agreed_scale(after, *before);
   if (!runs.scale)
     runs.scale_doubt = fmt::format(
-        "the runs' scales contradict each other: a unit after is {:.4f} m by its own ({}), {:.4f} "
-        "m "
-        "by the one before ({}); lengths are in units: tell one again (orbitfuse export RUN "
+        "the runs' scales contradict each other: a unit after is {:.4f} m by its own ({}), "
+        "{:.4f} m by the one before ({}); lengths are in units: tell one again (orbitfuse export "
+        "RUN "
         "--distance A B LENGTH), or delete the wrong run's scale.json",
         after.metres_per_unit, after.source, before->metres_per_unit, before->source);
   return {};

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "core/geometry/lens_fold.hpp"
+#include "core/geometry/scene_ball.hpp"
 #include "core/numeric/median.hpp"
 
 namespace orbitfuse::exporting {
@@ -217,17 +218,17 @@ Result<MetricScale> scale_of_cameras(std::vector<PosePair> pairs, const std::str
     ORBITFUSE_ASSIGN(fit, truth_from_estimate(kept));
     pairs = std::move(kept);
   }
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const PosePair& pair : pairs) middle += camera_center(pair.cam_from_truth);
-  middle /= static_cast<double>(pairs.size());
-  double squares = 0, spread = 0;
+  const auto count = static_cast<double>(pairs.size());
+  std::vector<Eigen::Vector3d> centers;
+  double squares = 0;
   for (const PosePair& pair : pairs) {
     squares += std::pow(residual(fit, pair), 2);
-    spread += (camera_center(pair.cam_from_truth) - middle).squaredNorm();
+    centers.push_back(camera_center(pair.cam_from_truth));
   }
-  const double freedom = std::max(1.0, 3.0 * static_cast<double>(pairs.size()) - 7);
-  const double rms = std::sqrt(squares / static_cast<double>(pairs.size()));
-  if (rms > 0.1 * std::sqrt(spread / static_cast<double>(pairs.size())))
+  const double radius = rms_radius(centers), spread = count * radius * radius;
+  const double freedom = std::max(1.0, 3.0 * count - 7);
+  const double rms = std::sqrt(squares / count);
+  if (rms > 0.1 * radius)
     return fail(ErrorKind::input, source,
                 fmt::format("its cameras are {:.3f} m off the run's", rms),
                 "see whether both are of this session, and doubtful poses in the report");

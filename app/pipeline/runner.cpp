@@ -74,7 +74,7 @@ Status replace_folder(const fs::path& from, const fs::path& to) {
   if (renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_EXCHANGE) == 0)
     return remove_tree(from);
   // Absent, or a file system that can't exchange: in two steps, of which the first is taken back
-  // where the second fails. What an earlier process left between the two is the result.
+  // where the second fails.
   fs::path old = from;
   old += ".old";
   std::error_code ec;

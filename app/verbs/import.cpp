@@ -101,11 +101,11 @@ void add_radiometry(CLI::App& app, Options& o) {
 Status check_ranges(const Options& o) {
   for (const double elevation : o.elevations_deg)
     ORBITFUSE_TRY(check_typed({{"--elevations-deg", elevation, from_to(-90, 90)}}));
-  return check_typed({{"--humidity", o.humidity_percent, from_to(0, 100)},
-                      {"--reflected-c", o.reflected_c, from_to(-272, 4700)},
-                      {"--air-c", o.air_c, from_to(-120, 120)},
-                      {"--emissivity", o.import.object.emissivity, from_to(0.01, 1)},
-                      {"--distance-m", o.import.object.distance_m, from_to(0, 1e5)},
+  return check_typed({{"--humidity", o.humidity_percent, humidity_percent_range},
+                      {"--reflected-c", o.reflected_c, reflected_c_range},
+                      {"--air-c", o.air_c, air_c_range},
+                      {"--emissivity", o.import.object.emissivity, emissivity_range},
+                      {"--distance-m", o.import.object.distance_m, distance_m_range},
                       {"--station-spacing-deg", o.spacing_deg, from_to(1, 180)},
                       {"--loops", o.loops, from_to(1, 100)},
                       {"--kelvin-per-count", o.kelvin_per_count, above_up_to(0, 10)},

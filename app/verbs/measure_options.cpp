@@ -157,13 +157,13 @@ void add_parameters(const MeasureWords& words, Request& request) {
 
 /// In degrees and percent, as they were typed; the library has kelvin and shares.
 Status check_ranges(const MeasureWords& w) {
-  return check_typed({{"--emissivity", w.emissivity, from_to(0.01, 1)},
-                      {"--reflected-c", w.reflected_c, from_to(-272, 4700)},
-                      {"--distance-m", w.distance_m, from_to(0, 1e5)},
-                      {"--air-c", w.air_c, from_to(-120, 120)},
-                      {"--humidity", w.humidity_percent, from_to(0, 100)},
-                      {"--recorded-emissivity", w.recorded_emissivity, from_to(0.01, 1)},
-                      {"--recorded-reflected-c", w.recorded_reflected_c, from_to(-272, 4700)}});
+  return check_typed({{"--emissivity", w.emissivity, emissivity_range},
+                      {"--reflected-c", w.reflected_c, reflected_c_range},
+                      {"--distance-m", w.distance_m, distance_m_range},
+                      {"--air-c", w.air_c, air_c_range},
+                      {"--humidity", w.humidity_percent, humidity_percent_range},
+                      {"--recorded-emissivity", w.recorded_emissivity, emissivity_range},
+                      {"--recorded-reflected-c", w.recorded_reflected_c, reflected_c_range}});
 }
 
 /// What the library finds wrong with a request, of the option that asks instead of the library's

@@ -43,4 +43,15 @@ SceneBall scene_ball(const std::vector<Rigid3d>& cam_from_world,
   return ball;
 }
 
+double rms_radius(const std::vector<Eigen::Vector3d>& places) {
+  if (places.empty()) return 0;
+  const auto count = static_cast<double>(places.size());
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& place : places) middle += place;
+  middle /= count;
+  double squares = 0;
+  for (const Eigen::Vector3d& place : places) squares += (place - middle).squaredNorm();
+  return std::sqrt(squares / count);
+}
+
 }  // namespace orbitfuse

@@ -18,4 +18,7 @@ struct SceneBall {
 SceneBall scene_ball(const std::vector<Rigid3d>& cam_from_world,
                      std::vector<Eigen::Vector3d> points);
 
+/// RMS distance of places from their middle; 0 of none.
+double rms_radius(const std::vector<Eigen::Vector3d>& places);
+
 }  // namespace orbitfuse

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "core/geometry/rotation_vector.hpp"
+#include "core/geometry/scene_ball.hpp"
 #include "recon/poses/index.hpp"
 
 namespace orbitfuse {
@@ -32,7 +33,7 @@ class NormalMatrix {
  public:
   explicit NormalMatrix(const Reconstruction& model)
       : model_(model),
-        radius_(rms_radius(model)),
+        radius_(rms_radius(centers_of(model))),
         rotations_(rotations_of(model)),
         matrix_(Eigen::MatrixXd::Zero(parameters(), parameters())),
         held_(model.views.size(), 0),
@@ -69,15 +70,10 @@ class NormalMatrix {
   }
 
  private:
-  static double rms_radius(const Reconstruction& model) {
-    Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-    for (const PosedView& view : model.views) middle += camera_center(view.cam_from_world);
-    const auto count = static_cast<double>(model.views.size());
-    middle /= count;
-    double squares = 0;
-    for (const PosedView& view : model.views)
-      squares += (camera_center(view.cam_from_world) - middle).squaredNorm();
-    return std::sqrt(squares / count);
+  static std::vector<Eigen::Vector3d> centers_of(const Reconstruction& model) {
+    std::vector<Eigen::Vector3d> centers;
+    for (const PosedView& view : model.views) centers.push_back(camera_center(view.cam_from_world));
+    return centers;
   }
   static std::vector<Eigen::Matrix3d> rotations_of(const Reconstruction& model) {
     std::vector<Eigen::Matrix3d> rotations;

@@ -285,9 +285,9 @@ class VisibleLadder {
     const auto without = total_ - static_cast<int>(known.views.size());
     PosedFrames posed = posed_frames(graph, known);
     // The model knows better than two-view geometry which matches hold.
-    PairMatches found_again = confirmed_matches(graph, posed, 3 * graph.pixel_scale);
-    if (rematched_) match_along_lines(graph, posed, 3 * graph.pixel_scale, found_again);
-    for (auto& [pair, matches] : found_again)
+    for (auto& [pair, matches] : rematched_
+                                     ? matches_along_own_lines(graph, posed)
+                                     : confirmed_matches(graph, posed, 3 * graph.pixel_scale))
       if (matches.size() > graph.verified[pair].size()) graph.verified[pair] = matches;
     ORBITFUSE_ASSIGN(const std::vector<int> added, resect(graph, posed, {}, progress_));
     const std::string found = fmt::format("{} of {} views found a place", added.size(), without);

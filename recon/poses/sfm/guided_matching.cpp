@@ -148,12 +148,17 @@ double observations_a_view(const Reconstruction& model) {
          static_cast<double>(std::max<std::size_t>(model.views.size(), 1));
 }
 
-Reconstruction rematched(const FeatureGraph& graph, const Reconstruction& model) {
-  const PosedFrames posed = posed_frames(graph, model);
+PairMatches matches_along_own_lines(const FeatureGraph& graph, const PosedFrames& posed) {
   PairMatches matches = confirmed_matches(graph, posed, again_px * graph.pixel_scale);
   match_along_lines(graph, posed, again_px * graph.pixel_scale, matches);
+  return matches;
+}
+
+Reconstruction rematched(const FeatureGraph& graph, const Reconstruction& model) {
+  const PosedFrames posed = posed_frames(graph, model);
   return reconstruction_of(graph, posed,
-                           confirmed_tracks(graph, matches, posed, again_px * graph.pixel_scale),
+                           confirmed_tracks(graph, matches_along_own_lines(graph, posed), posed,
+                                            again_px * graph.pixel_scale),
                            model.modality);
 }
 

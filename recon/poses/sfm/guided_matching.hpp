@@ -36,6 +36,9 @@ Result<Reconstruction> adjusted(const FeatureGraph& graph, const PairMatches& ma
 /// Of all points together, 0 without a view.
 double observations_a_view(const Reconstruction& model);
 
+/// Of an adjusted model's poses: the matches that they confirm, and those along their lines.
+PairMatches matches_along_own_lines(const FeatureGraph& graph, const PosedFrames& posed);
+
 /// The model's views, poses and lenses with the points of all matches that its poses find along
 /// their epipolar lines: several times those that two-view geometry held. To be adjusted.
 Reconstruction rematched(const FeatureGraph& graph, const Reconstruction& model);

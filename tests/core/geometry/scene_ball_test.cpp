@@ -46,5 +46,12 @@ TEST(SceneBall, OneViewAndEqualViewsHaveARadius) {
   }
 }
 
+TEST(RmsRadius, IsOfTheMiddleWhereverThatIs) {
+  EXPECT_EQ(rms_radius({}), 0);
+  EXPECT_EQ(rms_radius({{5, 6, 7}}), 0);
+  EXPECT_NEAR(rms_radius({{101, 0, 0}, {99, 0, 0}, {100, 2, 0}, {100, -2, 0}}), std::sqrt(2.5),
+              1e-12);
+}
+
 }  // namespace
 }  // namespace orbitfuse

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "core/geometry/pose_error.hpp"
+#include "core/geometry/scene_ball.hpp"
 #include "recon/poses/sfm/bundle_adjustment.hpp"
 #include "tests/support/orbit_fixture.hpp"
 
@@ -43,14 +44,10 @@ Reconstruction orbit(unsigned seed, std::size_t held) {
   return model;
 }
 
-double rms_radius(const Reconstruction& model) {
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const PosedView& v : model.views) middle += camera_center(v.cam_from_world);
-  middle /= static_cast<double>(model.views.size());
-  double squares = 0;
-  for (const PosedView& v : model.views)
-    squares += (camera_center(v.cam_from_world) - middle).squaredNorm();
-  return std::sqrt(squares / static_cast<double>(model.views.size()));
+double radius_of(const Reconstruction& model) {
+  std::vector<Eigen::Vector3d> centers;
+  for (const PosedView& v : model.views) centers.push_back(camera_center(v.cam_from_world));
+  return rms_radius(centers);
 }
 
 TEST(CenterUncertainty, IsWhatBundleAdjustmentOfNoisyPixelsIsOffBy) {
@@ -76,7 +73,7 @@ TEST(CenterUncertainty, IsWhatBundleAdjustmentOfNoisyPixelsIsOffBy) {
       const double off = (*aligned * camera_center(pairs[v].cam_from_estimate) -
                           camera_center(pairs[v].cam_from_truth))
                              .norm() /
-                         rms_radius(model);
+                         radius_of(model);
       (v == 0 ? first_off2 : off2) += off * off;
       (v == 0 ? first_told2 : told2) += told[v] * told[v];
     }
