@@ -13,10 +13,8 @@ constexpr int spacing_px = 8;
 }
 
 ViewRays::ViewRays(const Camera& camera, const Rigid3d& cam_from_world, const Space& space)
-    : camera_(camera),
-      world_from_cam_(cam_from_world.rotation.conjugate().toRotationMatrix()),
-      origin_(space.normalized(camera_center(cam_from_world))),
-      pixel_angle_(static_cast<float>(2.0 / (camera.fx + camera.fy))) {
+    : camera_(camera), pixel_angle_(static_cast<float>(2.0 / (camera.fx + camera.fy))) {
+  place(cam_from_world, space);
   if (!camera.has_distortion()) return;
   lattice_width_ = camera.width / spacing_px + 2;
   const int height = camera.height / spacing_px + 2;
@@ -67,15 +65,19 @@ Eigen::Vector3d ViewRays::in_camera(double x, double y, double distance) const {
   return distance * through(x, y).normalized();
 }
 
-void ViewRays::move(const Eigen::Vector3d& shift, const Eigen::Vector3d& turn) {
-  world_from_cam_ = world_from_cam_ * turned_by(turn).conjugate().toRotationMatrix();
-  origin_ -= world_from_cam_ * shift;
+void ViewRays::place(const Rigid3d& cam_from_world, const Space& space) {
+  world_from_cam_ = cam_from_world.rotation.conjugate().toRotationMatrix();
+  origin_ = space.normalized(camera_center(cam_from_world));
 }
 
-Rigid3d ViewRays::cam_from_world(const Space& space) const {
-  const Eigen::Quaterniond rotation(world_from_cam_.transpose());
-  return {rotation.normalized(),
-          -(rotation.normalized() * (space.center + space.radius * origin_))};
+Rigid3d ViewRays::moved(const Eigen::Vector3d& shift, const Eigen::Vector3d& turn,
+                        const Space& space) const {
+  const Eigen::Matrix3d world_from_cam =
+      world_from_cam_ * turned_by(turn).conjugate().toRotationMatrix();
+  const Eigen::Vector3d origin = origin_ - world_from_cam * shift;
+  const Eigen::Quaterniond rotation =
+      Eigen::Quaterniond(Eigen::Matrix3d(world_from_cam.transpose())).normalized();
+  return {rotation, -(rotation * (space.center + space.radius * origin))};
 }
 
 bool ViewRays::project(const float point[3], double& x, double& y, double& depth) const {

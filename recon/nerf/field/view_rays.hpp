@@ -28,10 +28,12 @@ class ViewRays {
   bool project(const float point[3], double& x, double& y, double& depth) const;
   /// What lies at a distance (normalised units) on that ray, in camera axes from the camera.
   Eigen::Vector3d in_camera(double x, double y, double distance) const;
-  /// The scene seen from here is turned by `turn` (axis times radians) and then shifted, both in
-  /// camera axes.
-  void move(const Eigen::Vector3d& shift, const Eigen::Vector3d& turn);
-  Rigid3d cam_from_world(const Space& space) const;
+  /// Rays of the same camera from elsewhere, equal to those of a new object there.
+  void place(const Rigid3d& cam_from_world, const Space& space);
+  /// Where the camera is when the scene seen from here is turned by `turn` (axis times radians) and
+  /// then shifted, both in camera axes and normalised units.
+  Rigid3d moved(const Eigen::Vector3d& shift, const Eigen::Vector3d& turn,
+                const Space& space) const;
   /// Angle of one pixel, radians.
   float pixel_angle() const { return pixel_angle_; }
   const Camera& camera() const { return camera_; }

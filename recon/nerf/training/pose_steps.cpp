@@ -95,8 +95,9 @@ bool take_step(const PoseSums& sums, const Space& space, RefinedPose& refined, N
   step /=
       std::max({1.0, step.head<3>().norm() / longest_shift, step.tail<3>().norm() / longest_turn});
   moved += step;
-  view.rays.move(step.head<3>(), step.tail<3>());
-  refined.cam_from_world = unmoved(view.rays.cam_from_world(space)).cam_from_world;
+  refined.cam_from_world =
+      unmoved(view.rays.moved(step.head<3>(), step.tail<3>(), space)).cam_from_world;
+  view.rays.place(refined.pose(), space);  // as a resumed training does from its checkpoint
   return true;
 }
 

@@ -3,11 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <limits>
 
 #include "core/numeric/random.hpp"
 #include "tests/recon/nerf/toy_scene.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
@@ -132,7 +134,7 @@ TEST(PoseSteps, ThatNothingSupportsAreNotTaken) {
     RefinedPose refined = unmoved(pose(0, 0));
     EXPECT_FALSE(take_step(sums, {}, refined, view));
     EXPECT_EQ(refined.pose().translation.norm(), 0);
-    EXPECT_EQ(camera_center(view.rays.cam_from_world({})).norm(), 0);
+    EXPECT_EQ(view.rays.origin().norm(), 0);
   };
   expect_none({});
   NormalisedView view = photo_from(pose(0, 0), 0);
@@ -222,6 +224,31 @@ TEST(PoseRefinement, GoesOnWhereACheckpointLeftIt) {
   EXPECT_GT(
       (first->refined_poses.at(moved.name).translation - moved.cam_from_world.translation).norm(),
       1e-5);
+}
+
+TEST(PoseRefinement, BrokenOffAndResumedEndsWhereAnUnbrokenRunEnds) {
+  const orbitfuse::test::TempFolder folder;
+  const Dataset data = shaken_scene(Modality::thermal, 2);
+  TrainOptions options = test::toy_options(Modality::thermal, 160);
+  options.refine_poses = true;
+  Field field;
+  const auto unbroken = train(data, options, {}, field);
+  ASSERT_TRUE(unbroken) << unbroken.error().message();
+
+  options.checkpoint = folder / "poses.bin";
+  std::atomic<bool> cancel = false;
+  Progress progress;
+  progress.cancel = &cancel;
+  progress.report = [&](const ProgressEvent& event) { cancel = event.done >= 80; };
+  ASSERT_FALSE(train(data, options, progress, field));
+  options.resume = true;
+  const auto resumed = train(data, options, {}, field);
+  ASSERT_TRUE(resumed) << resumed.error().message();
+  ASSERT_EQ(resumed->refined_poses.size(), data.views.size());
+  for (const auto& [view, pose] : unbroken->refined_poses) {
+    EXPECT_EQ(pose.translation, resumed->refined_poses.at(view).translation) << view;
+    EXPECT_EQ(pose.rotation.coeffs(), resumed->refined_poses.at(view).rotation.coeffs()) << view;
+  }
 }
 
 }  // namespace
