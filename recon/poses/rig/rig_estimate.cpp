@@ -220,6 +220,7 @@ void judge(const RoundResult& round, const std::array<double, 6>& correction, do
     RigPairFit& fit = rig.pairs[at(i)];
     const PatchFit patches =
         patch_fit(round.matches[at(i)], round.camera, CorrectedPose(correction), log_focal);
+    fit.found = static_cast<int>(round.matches[at(i)].size());
     fit.matches = patches.matches;
     fit.median_px = patches.median_px;
     fit.agreement = edge_agreement(round.edges[at(i)], round.fields[at(i)]);
@@ -227,14 +228,16 @@ void judge(const RoundResult& round, const std::array<double, 6>& correction, do
       if (j != i)
         fit.control += edge_agreement(round.edges[at(i)], round.fields[at(j)]) / (count - 1);
   }
-  double sum = 0, squares = 0;
+  double sum = 0, squares = 0, found = 0, held = 0;
   rig.agreement = rig.control = 0;
   for (const RigPairFit& fit : rig.pairs) {
+    found += fit.found, held += fit.matches;
     rig.agreement += fit.agreement / count;
     rig.control += fit.control / count;
     const double d = fit.agreement - fit.control;
     sum += d, squares += d * d;
   }
+  rig.held_share = found > 0 ? held / found : 0;
   const double mean = sum / count, variance = std::max(squares / count - mean * mean, 1e-9);
   rig.decisiveness = mean / std::sqrt(variance / count);
 }
@@ -258,9 +261,11 @@ std::string RigEstimate::words() const {
   return fmt::format(
       "{} pairs, turned by {:.1f} deg, focal length {:.0f} px; edges agree {:.3f}, in shuffled "
       "pairs "
-      "{:.3f} ({:.1f} standard errors apart), {} patches at {:.2f} px of {}",
+      "{:.3f} ({:.1f} standard errors apart), {} patches ({:.2f} of those found) at {:.2f} px of "
+      "{}",
       pairs.size(), Eigen::AngleAxisd(thermal_from_visible.rotation).angle() * 180 / EIGEN_PI,
-      thermal.fx, agreement, control, decisiveness, matches, median(residuals), judged_width_px);
+      thermal.fx, agreement, control, decisiveness, matches, held_share, median(residuals),
+      judged_width_px);
 }
 
 Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOptions& options,
@@ -308,9 +313,8 @@ Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOpt
     rig.thermal_from_visible.translation = {correction[3], correction[4], correction[5]};
     rig.thermal.fx = rig.thermal.fy = rig.thermal.fx * std::exp(log_focal);
   }
-  if (!(rig.decisiveness >= options.min_decisiveness &&
-        rig.agreement >= options.min_agreement_ratio * rig.control &&
-        rig.agreement >= options.min_agreement && best.score > wrong))
+  if (!(rig.decisiveness >= options.min_decisiveness && rig.held_share >= options.min_held_share &&
+        best.score > wrong))
     return refused(
         fmt::format("{}; correlation of all edges {:.3f}, of shuffled pairs {:.3f} at best",
                     rig.words(), best.score, wrong));

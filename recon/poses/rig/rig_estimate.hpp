@@ -31,17 +31,18 @@ struct RigOptions {
   double baseline_sigma = 0.03;
   /// Pairs in the right order must agree this much better, in standard errors, than wrong ones.
   double min_decisiveness = 3;
-  /// And this many times better, and this well at all. Rigs agree 2.6 to 19 times better and by
-  /// 0.078 to 0.157; shuffled pairs up to 1.75 times and by 0.016; two orbits named by one counter
-  /// up to 2.7 times (`hut`, where wrong pairs agree by next to nothing) and by 0.032
-  /// (`statue`, 1.3 times).
-  double min_agreement_ratio = 2.1, min_agreement = 0.05;
+  /// And of the patches found in their thermal images, this share must lie within 2 px of where one
+  /// transform has them. Rigs: 0.62 to 0.87; pairs that were not shot at once, however much alike
+  /// they look (two orbits that begin 12 degrees apart and are named by one counter agree in their
+  /// edges 2.4 times better than shuffled ones): 0.20 to 0.35, which is chance.
+  double min_held_share = 0.48;
 };
 
 struct RigPairFit {
   double agreement = 0;  ///< of the photo's edges with the thermal image's
   double control = 0;    ///< of the same photo with the thermal images of the other pairs, mean
-  int matches = 0;       ///< patches within 2 px of the rig's answer, at `judged_width_px`
+  int found = 0;         ///< patches of the photo in the thermal image
+  int matches = 0;       ///< of those, within 2 px of the rig's answer, at `judged_width_px`
   double median_px = 0;  ///< their residual
 };
 
@@ -51,11 +52,13 @@ struct RigEstimate {
   std::vector<RigPairFit> pairs;
   double decisiveness = 0;            ///< standard errors between right and wrong pairs
   double agreement = 0, control = 0;  ///< of right pairs and of wrong ones, means
+  double held_share = 0;              ///< matches of all found patches
   static constexpr int judged_width_px = 320;
   std::string words() const;
 };
 
-/// Errors: quality (the pairs agree no better than shuffled ones; too few patches), cancelled.
+/// Errors: quality (the pairs agree no better than shuffled ones; too few patches, or too many that
+/// no one transform explains), cancelled.
 Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOptions& options,
                                  const Progress& progress);
 

@@ -97,22 +97,37 @@ TEST(Rig, ShuffledPairsAreRefused) {
   EXPECT_EQ(rig.error().where, "poses.rig");
 }
 
-TEST(Rig, PairsThatAgreeLittleBetterThanShuffledOnesAreNone) {
+/// The image as from elsewhere: each of its parts is displaced by up to `most_px` of its own.
+cv::Mat torn(const cv::Mat& image, unsigned seed, double most_px) {
+  cv::Mat coarse(5, 6, CV_32FC2);
+  cv::RNG(seed).fill(coarse, cv::RNG::UNIFORM, -most_px, most_px);
+  cv::Mat map;
+  cv::resize(coarse, map, image.size(), 0, 0, cv::INTER_CUBIC);
+  for (int y = 0; y < map.rows; ++y)
+    for (int x = 0; x < map.cols; ++x)
+      map.at<cv::Vec2f>(y, x) += cv::Vec2f(static_cast<float>(x), static_cast<float>(y));
+  cv::Mat result;
+  cv::remap(image, result, map, {}, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  return result;
+}
+
+// Two orbits that begin near each other: their pairs look alike, but no one transform explains
+// them.
+TEST(Rig, PairsThatAgreeMuchBetterThanShuffledOnesButByNoOneTransformAreNone) {
   RigScene scene(6);
+  for (std::size_t i = 0; i < scene.views.size(); ++i)
+    scene.views[i].thermal = torn(scene.views[i].thermal, static_cast<unsigned>(i + 1), 5);
+  const auto refused = estimate_rig(scene.views, scene.options, {});
+  ASSERT_FALSE(refused) << refused->words();
+  EXPECT_EQ(refused.error().kind, ErrorKind::quality);
+  scene.options.min_held_share = 0;
   const auto believed = estimate_rig(scene.views, scene.options, {});
-  ASSERT_TRUE(believed);
-  ASSERT_GT(believed->control, 0);
-  const double ratio = believed->agreement / believed->control;
-  EXPECT_GT(ratio, scene.options.min_agreement_ratio);
-  EXPECT_GT(believed->agreement, scene.options.min_agreement);
-  RigOptions stricter = scene.options, strict = scene.options;
-  stricter.min_agreement_ratio = 1.05 * ratio;
-  strict.min_agreement = 1.05 * believed->agreement;
-  for (const RigOptions& options : {stricter, strict}) {
-    const auto refused = estimate_rig(scene.views, options, {});
-    ASSERT_FALSE(refused);
-    EXPECT_EQ(refused.error().kind, ErrorKind::quality);
-  }
+  ASSERT_TRUE(believed) << believed.error().message();
+  EXPECT_GT(believed->agreement, 2.1 * believed->control) << believed->words();
+  const RigScene right(6);
+  const auto rig = estimate_rig(right.views, right.options, {});
+  ASSERT_TRUE(rig);
+  EXPECT_GT(rig->held_share, 1.2 * right.options.min_held_share) << rig->words();
 }
 
 TEST(Rig, ThreePairsAreTooFew) {
