@@ -9,6 +9,7 @@
 #include <set>
 
 #include "recon/poses/estimate/feature_level.hpp"
+#include "recon/poses/estimate/weakest_joint.hpp"
 #include "recon/poses/estimate/weakly_held.hpp"
 #include "recon/poses/global_sfm/global_mapper.hpp"
 #include "recon/poses/sfm/resection.hpp"
@@ -81,6 +82,7 @@ class VisibleLadder {
     if (!best_) ORBITFUSE_TRY(spared(add_faint_features(*quick, orbit)));
     if (!best_) ORBITFUSE_TRY(try_mapper(*quick, quick_name_));
     if (!complete()) ORBITFUSE_TRY(improve(*quick, all_are_few));
+    if (best_) ORBITFUSE_TRY(spared(try_joining()));
     if (best_) ORBITFUSE_TRY(spared(try_rematching()));
     if (best_ && !complete() && rematched_)
       ORBITFUSE_TRY(spared(try_resection(*best_level_, "resection on points matched again")));
@@ -181,7 +183,7 @@ class VisibleLadder {
   /// Judges a model of the level's features and keeps it where it is believed and better than the
   /// best one.
   void consider(const std::string& attempt, const std::string& found, Reconstruction model,
-                const FeatureLevel& level, const Better& better = more_views) {
+                FeatureLevel& level, const Better& better = more_views) {
     LadderStep step = fallen(attempt, found);
     if (model.views.size() < 2) {
       step.why += "; no model";
@@ -249,7 +251,7 @@ class VisibleLadder {
     return progress_.check("poses.visible");
   }
 
-  Status try_global(const FeatureLevel& level, const std::string& name) {
+  Status try_global(FeatureLevel& level, const std::string& name) {
     const std::string attempt = "global mapper, " + name;
     tell(2, attempt);
     ORBITFUSE_ASSIGN(FeatureGraph graph, level.graph());
@@ -278,7 +280,7 @@ class VisibleLadder {
   }
 
   /// The views left out, on the points of the best model, or of one that is too small to stand.
-  Status try_resection(const FeatureLevel& level, const std::string& attempt) {
+  Status try_resection(FeatureLevel& level, const std::string& attempt) {
     tell(3, attempt);
     ORBITFUSE_ASSIGN(FeatureGraph graph, level.graph());
     const Reconstruction& known = best_ ? best_->poses.reconstruction : *part_;
@@ -299,6 +301,34 @@ class VisibleLadder {
           graph, posed, triangulate_tracks(graph, graph.verified, posed, track), Modality::visible);
     }
     consider(attempt, found, std::move(model), level);
+    return {};
+  }
+
+  /// Two parts of the best model that few points join, on the likeliest pairs across.
+  Status try_joining() {
+    const Reconstruction& best = best_->poses.reconstruction;
+    const Joint joint = weakest_joint(best);
+    if (!joint.loose()) return {};
+    const std::string attempt = "pairs across a loose joint";
+    tell(1, "matches of the " + attempt);
+    ORBITFUSE_ASSIGN(const FeatureGraph graph, best_level_->graph());
+    const std::vector<ViewPair> pairs = likely_pairs_across(graph, best, joint);
+    const std::string found = fmt::format(
+        "{} points, {:.2f} of a view's, join {} views to the rest; {} pairs across look alike",
+        joint.points, joint.share, joint.views_beyond, pairs.size());
+    ORBITFUSE_TRY(progress_.check("poses.visible"));
+    if (pairs.empty()) {
+      record(fallen(attempt, found));
+      return {};
+    }
+    ORBITFUSE_TRY(best_level_->match(pairs, progress_));
+    tell(2, "COLMAP, " + attempt);
+    ORBITFUSE_ASSIGN(Reconstruction model, best_level_->map({}, progress_));
+    const Better joined = [&](const Reconstruction& now, const Reconstruction& before) {
+      return now.views.size() >= before.views.size() && weakest_joint(now).share > joint.share;
+    };
+    consider("COLMAP, " + attempt, found + "; " + best_level_->found(), std::move(model),
+             *best_level_, joined);
     return {};
   }
 
@@ -373,6 +403,22 @@ class VisibleLadder {
     return map_and_resect(*full_, "full settings");
   }
 
+  /// Right in themselves, but not sure where the rest is.
+  static void doubt_beyond(const Joint& joint, ModalityPoses& poses) {
+    if (!joint.loose()) return;
+    for (std::size_t v = 0; v < joint.beyond.size(); ++v) {
+      const std::string& name = poses.reconstruction.views[v].name;
+      if (joint.beyond[v] == 0 || std::any_of(poses.doubtful.begin(), poses.doubtful.end(),
+                                              [&](const auto& d) { return d.name == name; }))
+        continue;
+      poses.doubtful.push_back(
+          {name, DoubtReason::few_common_points,
+           fmt::format("{} points join it and {} more to the other views, too few to say how the "
+                       "two parts lie; take views between them",
+                       joint.points, joint.views_beyond - 1)});
+    }
+  }
+
   Result<ModalityPoses> answer(int pairs) {
     if (!best_) {
       auto error = none_held(steps_, Modality::visible);
@@ -390,6 +436,7 @@ class VisibleLadder {
     for (DroppedView& view : poses.dropped)
       if (featureless_.contains(view.name)) view.why = fmt::format("it {}", featureless_why);
     poses.doubtful = weakly_held(poses.reconstruction);
+    doubt_beyond(weakest_joint(poses.reconstruction), poses);
     const auto all = static_cast<int>(exhaustive_pairs(total_).size());
     if (pairs < all)
       poses.skips.push_back({"exhaustive matching", fmt::format("{} of {} pairs held", pairs, all),
@@ -411,8 +458,8 @@ class VisibleLadder {
   bool limited_ = false;    ///< images were reduced or features cut off: full settings find others
   std::optional<FeatureLevel> full_;
   std::optional<JudgedModel> best_;
-  const FeatureLevel* best_level_ = nullptr;  ///< whose features the best model's are
-  std::optional<Reconstruction> part_;        ///< the largest model that was too small
+  FeatureLevel* best_level_ = nullptr;  ///< whose features the best model's are
+  std::optional<Reconstruction> part_;  ///< the largest model that was too small
   std::size_t best_step_ = 0;
   Clock::time_point since_ = Clock::now();
 };
