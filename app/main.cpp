@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <glog/logging.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -199,6 +200,8 @@ static void set_up_ffmpeg() {
 
 int main(int argc, char** argv) {
   set_up_ffmpeg();
+  // Ceres' remarks belong to no terminal either: what its callers can't use, they say themselves.
+  FLAGS_minloglevel = google::GLOG_FATAL;
   int code = orbitfuse::terminal::exit_internal;
   try {
     code = orbitfuse::run(orbitfuse::words_of(argc, argv));
