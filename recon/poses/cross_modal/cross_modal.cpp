@@ -206,7 +206,10 @@ Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene&
   progress.report({"poses.thermal", 2, 4, {}, "views of the scene"});
   ORBITFUSE_ASSIGN(const SceneRenderer renderer,
                    scene_of(visible, evidence.canonical_from_visible, progress));
-  OrbitViews orbit{evidence.work.images, {}, evidence.canonical_from_visible, false};
+  OrbitViews orbit;
+  orbit.images = evidence.work.images;
+  orbit.canonical_from_world = evidence.canonical_from_visible;
+  orbit.assumed = !declared(evidence.work.frames);
   std::vector<PosedView> blank;
   for (const FrameRecord* frame : evidence.work.frames)
     blank.push_back({frame->file, evidence.work.lens.camera.without_distortion(), {}});

@@ -81,10 +81,13 @@ Result<OrbitFrames> orbit_frames(const std::vector<const FrameRecord*>& frames, 
   return orbit;
 }
 
+bool declared(const std::vector<const FrameRecord*>& stations) {
+  return std::all_of(stations.begin(), stations.end(),
+                     [](const FrameRecord* f) { return f->station.has_value(); });
+}
+
 std::vector<std::vector<Station>> layouts_of(const std::vector<const FrameRecord*>& stations) {
-  const bool declared = std::all_of(stations.begin(), stations.end(),
-                                    [](const FrameRecord* f) { return f->station.has_value(); });
-  if (!declared) return station_layouts(stations.size());
+  if (!declared(stations)) return station_layouts(stations.size());
   std::vector<Station> layout;
   for (const FrameRecord* frame : stations) layout.push_back(*frame->station);
   return {layout};

@@ -15,6 +15,7 @@ struct OrbitViews {
   std::vector<Station> stations;
   Similarity3d canonical_from_world;  ///< z up, origin at the orbit's centre
   bool clockwise = false;
+  bool assumed = false;  ///< nobody told the stations: an even walk in the order of capture
 };
 
 }  // namespace orbitfuse

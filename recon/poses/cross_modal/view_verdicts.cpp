@@ -72,6 +72,18 @@ double support_of_others(const OrbitViews& orbit, std::size_t stations,
   return other_loop && others.size() >= least_others ? median(others) : 0;
 }
 
+/// By how much a station lies behind the one recorded before it, or past the next.
+std::vector<double> steps_back_deg(const OrbitViews& orbit, std::size_t stations,
+                                   const std::vector<double>& azimuth_deg) {
+  std::vector<double> back(azimuth_deg.size(), 0);
+  for (std::size_t i = 1; i < stations; ++i) {
+    const double step = std::remainder(azimuth_deg[i] - azimuth_deg[i - 1], 360);
+    const double behind = orbit.clockwise ? step : -step;
+    for (const std::size_t v : {i - 1, i}) back[v] = std::max(back[v], behind);
+  }
+  return back;
+}
+
 /// confirmed_share of the views from `first` to `end`, by their own median.
 void confirm_among(const Fit& alignment, std::size_t first, std::size_t end,
                    std::vector<ViewEvidence>& evidence) {
@@ -107,6 +119,7 @@ Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
   const double common = radii.empty() ? 1 : median(radii);
   const double median_of_all = median_support(alignment);
   std::vector<ViewEvidence> evidence;
+  std::vector<double> azimuth_deg;
   for (const std::size_t i : all) {
     const PosedView& view = alignment.views[i].view;
     ViewEvidence seen;
@@ -115,13 +128,23 @@ Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
     const OrbitAngles at =
         orbit_angles(camera_center(rebase(view.cam_from_world, orbit.canonical_from_world)));
     const int loop = orbit.stations[i].loop;
+    azimuth_deg.push_back(at.azimuth_deg);
     seen.azimuth_off_deg =
         std::abs(std::remainder(at.azimuth_deg - model.azimuth_deg(orbit, i), 360));
     if (model.elevation_deg.contains(loop))
       seen.elevation_off_deg = std::abs(at.elevation_deg - model.elevation_deg.at(loop));
+    for (const auto& [other, elevation_deg] : model.elevation_deg)
+      if (orbit.assumed)
+        seen.elevation_off_deg =
+            std::min(seen.elevation_off_deg, std::abs(at.elevation_deg - elevation_deg));
     seen.log_distance_off = std::abs(std::log(at.radius / common));
     seen.aim_off = aim_off(orbit, view);
     evidence.push_back(seen);
+  }
+  if (orbit.assumed) {
+    const std::vector<double> back = steps_back_deg(orbit, stations, azimuth_deg);
+    for (std::size_t i = 0; i < std::min(stations, evidence.size()); ++i)
+      evidence[i].azimuth_off_deg = back[i];
   }
   // Stations are asked of each other, frames between them of the stations: two medians.
   confirm_among(alignment, 0, stations, evidence);

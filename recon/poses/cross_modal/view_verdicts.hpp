@@ -18,8 +18,11 @@ struct ViewEvidence {
   /// Of its image with what the other views' temperatures show from there; none where too little
   /// is painted to say.
   std::optional<double> correlation;
-  double azimuth_off_deg = 0, elevation_off_deg = 0;  ///< from where its loop has it
-  double log_distance_off = 0;                        ///< from the common distance of all loops
+  /// From where its loop has it. Where stations were assumed: by how much it steps back behind the
+  /// view before it or past the next one, and from the nearest loop's elevation, since where one
+  /// loop ends is a guess.
+  double azimuth_off_deg = 0, elevation_off_deg = 0;
+  double log_distance_off = 0;  ///< from the common distance of all loops
   double aim_off = 0;  ///< orbit's centre from the principal point, share of the image's width
   double azimuth_scatter_deg = 0;  ///< of all views, robust sigma: how well stations were kept
   double median_correlation = 0;   ///< of all views

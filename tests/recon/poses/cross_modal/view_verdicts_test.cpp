@@ -126,6 +126,50 @@ PosedView at(double azimuth, double elevation, double radius) {
   return {"view", camera, cam_from_world_of(pose, camera)};
 }
 
+/// What is known of twelve views in two loops, six at these azimuths each, taken for an even walk.
+std::vector<ViewEvidence> evidence_of_walk(const std::vector<double>& azimuths_deg, bool assumed) {
+  const SceneRenderer renderer = testing_orbit::box_renderer();
+  OrbitViews orbit;
+  orbit.assumed = assumed;
+  Fit alignment;
+  for (int i = 0; i < 12; ++i) {
+    RenderAlignedView view;
+    view.view = at(azimuths_deg[static_cast<std::size_t>(i % 6)] + i / 6 * 9, i < 6 ? 10 : 32, 2.5);
+    view.matches = 100;
+    orbit.images.push_back(
+        testing_orbit::box_view(view.view.camera, view.view.cam_from_world, true).brightness);
+    Station station;
+    // Nobody said where the first loop ends: its last view is counted to the second.
+    station.loop = i < 5 ? 0 : 1;
+    station.azimuth_deg = 60.0 * i + (i < 6 ? 0 : 9);
+    orbit.stations.push_back(station);
+    alignment.views.push_back(view);
+  }
+  const Progress progress;
+  const auto evidence = evidence_of({renderer, orbit, progress}, 12, alignment);
+  EXPECT_TRUE(evidence) << evidence.error().message();
+  return evidence.value_or(std::vector<ViewEvidence>(12));
+}
+
+TEST(ViewVerdicts, AnUnevenWalkIsNoReasonToDoubtItsViewsWhereStationsWereAssumed) {
+  const auto most_off = [](const std::vector<ViewEvidence>& all, double ViewEvidence::*member) {
+    double most = 0;
+    for (const ViewEvidence& seen : all) most = std::max(most, seen.*member);
+    return most;
+  };
+  const std::vector<double> uneven = {0, 25, 100, 140, 230, 300};
+  const auto told = evidence_of_walk(uneven, false), assumed = evidence_of_walk(uneven, true);
+  EXPECT_GT(most_off(told, &ViewEvidence::azimuth_off_deg), 12);
+  EXPECT_GT(most_off(told, &ViewEvidence::elevation_off_deg), 8);
+  EXPECT_LT(most_off(assumed, &ViewEvidence::azimuth_off_deg), 1);
+  EXPECT_LT(most_off(assumed, &ViewEvidence::elevation_off_deg), 1);
+  // Against the order of capture: the third view behind the second.
+  const auto crossed = evidence_of_walk({0, 100, 25, 140, 230, 300}, true);
+  for (const std::size_t i : {1u, 2u, 7u, 8u})
+    EXPECT_NEAR(crossed[i].azimuth_off_deg, 75, 0.1) << i;
+  for (const std::size_t i : {0u, 3u, 4u, 5u}) EXPECT_LT(crossed[i].azimuth_off_deg, 1) << i;
+}
+
 /// A hypothesis that has the lower loop at the given distance.
 OrbitHypothesis hypothesis(double lower_radius, double lower_elevation) {
   OrbitHypothesis h;
