@@ -37,6 +37,11 @@ double robust_offset_deg(const std::vector<double>& differences) {
 
 }  // namespace
 
+bool all_have_stations(const std::vector<const FrameRecord*>& frames) {
+  return std::all_of(frames.begin(), frames.end(),
+                     [](const FrameRecord* f) { return f->station.has_value(); });
+}
+
 Eigen::Vector3d look_at_point(const std::vector<PosedView>& views) {
   Eigen::Vector3d point = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   std::vector<double> weight(views.size(), 1.0);

@@ -22,6 +22,9 @@ Eigen::Vector3d look_at_point(const std::vector<PosedView>& views);
 /// tripod cameras are level on average. Falls back to the mean up when the x axes are parallel.
 Eigen::Vector3d up_direction(const std::vector<PosedView>& views);
 
+/// Every frame has a station.
+bool all_have_stations(const std::vector<const FrameRecord*>& frames);
+
 /// Azimuth of the first view (or the stations' circular mean offset, where stations exist) becomes
 /// that of the world. Identity for fewer than two views.
 Similarity3d canonical_from_world(const std::vector<PosedView>& views,

@@ -209,7 +209,7 @@ Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene&
   OrbitViews orbit;
   orbit.images = evidence.work.images;
   orbit.canonical_from_world = evidence.canonical_from_visible;
-  orbit.assumed = !declared(evidence.work.frames);
+  orbit.assumed = !all_have_stations(evidence.work.frames);
   std::vector<PosedView> blank;
   for (const FrameRecord* frame : evidence.work.frames)
     blank.push_back({frame->file, evidence.work.lens.camera.without_distortion(), {}});

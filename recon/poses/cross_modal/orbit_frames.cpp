@@ -9,6 +9,7 @@
 
 #include "recon/poses/cross_modal/orbit_search.hpp"
 #include "recon/poses/cross_modal/tracking_views.hpp"
+#include "recon/poses/world_frame.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -81,13 +82,8 @@ Result<OrbitFrames> orbit_frames(const std::vector<const FrameRecord*>& frames, 
   return orbit;
 }
 
-bool declared(const std::vector<const FrameRecord*>& stations) {
-  return std::all_of(stations.begin(), stations.end(),
-                     [](const FrameRecord* f) { return f->station.has_value(); });
-}
-
 std::vector<std::vector<Station>> layouts_of(const std::vector<const FrameRecord*>& stations) {
-  if (!declared(stations)) return station_layouts(stations.size());
+  if (!all_have_stations(stations)) return station_layouts(stations.size());
   std::vector<Station> layout;
   for (const FrameRecord* frame : stations) layout.push_back(*frame->station);
   return {layout};

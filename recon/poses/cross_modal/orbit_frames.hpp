@@ -23,9 +23,6 @@ struct OrbitFrames {
 /// evenly spread. Errors: quality (too few).
 Result<OrbitFrames> orbit_frames(const std::vector<const FrameRecord*>& frames, int limit);
 
-/// All of them have a station of their own.
-bool declared(const std::vector<const FrameRecord*>& stations);
-
 /// The ways the stations may have been taken: as declared, or any even walk in their order.
 std::vector<std::vector<Station>> layouts_of(const std::vector<const FrameRecord*>& stations);
 

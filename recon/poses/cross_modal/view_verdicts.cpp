@@ -84,6 +84,19 @@ std::vector<double> steps_back_deg(const OrbitViews& orbit, std::size_t stations
   return back;
 }
 
+/// From its loop's elevation, or the nearest loop's where stations were assumed; 0 where its loop's
+/// is not known.
+double elevation_off_deg(const OrbitViews& orbit, const LoopModel& model, std::size_t view,
+                         double elevation_deg) {
+  const auto own = model.elevation_deg.find(orbit.stations[view].loop);
+  if (own == model.elevation_deg.end()) return 0;
+  double off_deg = std::abs(elevation_deg - own->second);
+  if (!orbit.assumed) return off_deg;
+  for (const auto& [loop, of_loop_deg] : model.elevation_deg)
+    off_deg = std::min(off_deg, std::abs(elevation_deg - of_loop_deg));
+  return off_deg;
+}
+
 /// confirmed_share of the views from `first` to `end`, by their own median.
 void confirm_among(const Fit& alignment, std::size_t first, std::size_t end,
                    std::vector<ViewEvidence>& evidence) {
@@ -127,16 +140,10 @@ Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
     ORBITFUSE_ASSIGN(seen.correlation, correlation_with(painted, orbit.images[i], view));
     const OrbitAngles at =
         orbit_angles(camera_center(rebase(view.cam_from_world, orbit.canonical_from_world)));
-    const int loop = orbit.stations[i].loop;
     azimuth_deg.push_back(at.azimuth_deg);
     seen.azimuth_off_deg =
         std::abs(std::remainder(at.azimuth_deg - model.azimuth_deg(orbit, i), 360));
-    if (model.elevation_deg.contains(loop))
-      seen.elevation_off_deg = std::abs(at.elevation_deg - model.elevation_deg.at(loop));
-    for (const auto& [other, elevation_deg] : model.elevation_deg)
-      if (orbit.assumed)
-        seen.elevation_off_deg =
-            std::min(seen.elevation_off_deg, std::abs(at.elevation_deg - elevation_deg));
+    seen.elevation_off_deg = elevation_off_deg(orbit, model, i, at.elevation_deg);
     seen.log_distance_off = std::abs(std::log(at.radius / common));
     seen.aim_off = aim_off(orbit, view);
     evidence.push_back(seen);

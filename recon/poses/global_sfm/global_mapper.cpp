@@ -9,6 +9,7 @@
 #include "recon/poses/global_sfm/center_estimation.hpp"
 #include "recon/poses/index.hpp"
 #include "recon/poses/sfm/guided_matching.hpp"
+#include "recon/poses/world_frame.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -23,18 +24,13 @@ PairCandidates candidates_of(const FeatureGraph& graph, const RelativePoseOption
   return candidates;
 }
 
-bool all_have_stations(const FeatureGraph& graph) {
-  return std::all_of(graph.frames.begin(), graph.frames.end(),
-                     [](const FrameRecord* f) { return f->station.has_value(); });
-}
-
 /// Both ways round the object where there are stations: the loop says which.
 AveragedRotations averaged(const FeatureGraph& graph, const PairCandidates& candidates,
                            const RotationOptions& options) {
   const std::vector<double> elevations = loop_elevations_deg(graph.frames, candidates);
   AveragedRotations best =
       average_rotations(candidates, nominal_rotations(graph.frames, elevations, false), options);
-  if (!all_have_stations(graph)) return best;
+  if (!all_have_stations(graph.frames)) return best;
   AveragedRotations other =
       average_rotations(candidates, nominal_rotations(graph.frames, elevations, true), options);
   return other.cost < best.cost ? other : best;
@@ -67,7 +63,7 @@ std::vector<RelativePose> chosen_pairs(const FeatureGraph& graph,
                                        const GlobalMapperOptions& options,
                                        std::vector<Eigen::Vector3d>& centers) {
   std::vector<RelativePose> pairs;
-  if (all_have_stations(graph)) {
+  if (all_have_stations(graph.frames)) {
     centers = estimate_centers(rotations.cam_from_world, {}, {});
     pairs =
         by_direction(rotations.kept, rotations.cam_from_world, centers, options.max_direction_deg);

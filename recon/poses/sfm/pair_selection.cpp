@@ -7,6 +7,8 @@
 #include <set>
 #include <tuple>
 
+#include "recon/poses/world_frame.hpp"
+
 namespace orbitfuse {
 namespace {
 
@@ -44,8 +46,7 @@ std::vector<ViewPair> exhaustive_pairs(int count) {
 std::vector<ViewPair> orbit_pairs(const std::vector<const FrameRecord*>& frames) {
   const int count = static_cast<int>(frames.size());
   if (count <= 8) return exhaustive_pairs(count);
-  const bool stations = std::all_of(frames.begin(), frames.end(),
-                                    [](const FrameRecord* f) { return f->station.has_value(); });
+  const bool stations = all_have_stations(frames);
 
   std::vector<std::tuple<double, int, int>> candidates;
   for (const auto& [i, j] : exhaustive_pairs(count)) {
