@@ -312,11 +312,11 @@ class VisibleLadder {
     const std::string attempt = "pairs across a loose joint";
     tell(1, "matches of the " + attempt);
     ORBITFUSE_ASSIGN(const FeatureGraph graph, best_level_->graph());
-    const std::vector<ViewPair> pairs = likely_pairs_across(graph, best, joint);
+    ORBITFUSE_ASSIGN(const std::vector<ViewPair> pairs,
+                     likely_pairs_across(graph, best, joint, progress_));
     const std::string found = fmt::format(
         "{} points, {:.2f} of a view's, join {} views to the rest; {} pairs across look alike",
         joint.points, joint.share, joint.views_beyond, pairs.size());
-    ORBITFUSE_TRY(progress_.check("poses.visible"));
     if (pairs.empty()) {
       record(fallen(attempt, found));
       return {};
@@ -403,22 +403,6 @@ class VisibleLadder {
     return map_and_resect(*full_, "full settings");
   }
 
-  /// Right in themselves, but not sure where the rest is.
-  static void doubt_beyond(const Joint& joint, ModalityPoses& poses) {
-    if (!joint.loose()) return;
-    for (std::size_t v = 0; v < joint.beyond.size(); ++v) {
-      const std::string& name = poses.reconstruction.views[v].name;
-      if (joint.beyond[v] == 0 || std::any_of(poses.doubtful.begin(), poses.doubtful.end(),
-                                              [&](const auto& d) { return d.name == name; }))
-        continue;
-      poses.doubtful.push_back(
-          {name, DoubtReason::few_common_points,
-           fmt::format("{} points join it and {} more to the other views, too few to say how the "
-                       "two parts lie; take views between them",
-                       joint.points, joint.views_beyond - 1)});
-    }
-  }
-
   Result<ModalityPoses> answer(int pairs) {
     if (!best_) {
       auto error = none_held(steps_, Modality::visible);
@@ -436,7 +420,7 @@ class VisibleLadder {
     for (DroppedView& view : poses.dropped)
       if (featureless_.contains(view.name)) view.why = fmt::format("it {}", featureless_why);
     poses.doubtful = weakly_held(poses.reconstruction);
-    doubt_beyond(weakest_joint(poses.reconstruction), poses);
+    doubt_beyond(weakest_joint(poses.reconstruction), poses.reconstruction, poses.doubtful);
     const auto all = static_cast<int>(exhaustive_pairs(total_).size());
     if (pairs < all)
       poses.skips.push_back({"exhaustive matching", fmt::format("{} of {} pairs held", pairs, all),

@@ -89,6 +89,62 @@ double median_points_a_view(const Tracks& tracks, int count) {
   return std::max(1.0, median(points));
 }
 
+/// Pairs of a view on each side that were not matched yet; of too many, an even sample.
+std::vector<ViewPair> unmatched_across(const FeatureGraph& graph, const Reconstruction& model,
+                                       const Joint& joint) {
+  std::map<std::string, bool> beyond;
+  for (std::size_t v = 0; v < model.views.size(); ++v)
+    beyond[model.views[v].name] = joint.beyond[v] != 0;
+  std::vector<ViewPair> across;
+  for (const ViewPair& pair : exhaustive_pairs(graph.count())) {
+    const auto a = beyond.find(graph.frames[at(pair.first)]->file),
+               b = beyond.find(graph.frames[at(pair.second)]->file);
+    if (a != beyond.end() && b != beyond.end() && a->second != b->second &&
+        !graph.proposed.contains(pair))
+      across.push_back(pair);
+  }
+  if (across.size() <= most_looked_at) return across;
+  std::vector<ViewPair> some;
+  for (std::size_t i = 0; i < most_looked_at; ++i)
+    some.push_back(across[i * across.size() / most_looked_at]);
+  return some;
+}
+
+/// How many features of each pair match by their descriptors alone.
+Result<std::vector<int>> features_alike(const FeatureGraph& graph,
+                                        const std::vector<ViewPair>& pairs,
+                                        const Progress& progress) {
+  std::vector<int> alike(pairs.size(), 0);
+  parallel_for(static_cast<int>(pairs.size()), [&](int i) {
+    if (progress.cancelled()) return;
+    const auto& [a, b] = pairs[at(i)];
+    alike[at(i)] = static_cast<int>(
+        match_descriptors(graph.descriptors[at(a)], graph.descriptors[at(b)]).size());
+  });
+  ORBITFUSE_TRY(progress.check("poses.visible"));
+  return alike;
+}
+
+/// The pairs that are most alike, as long as one of the two views has too few partners.
+std::vector<ViewPair> likeliest(const std::vector<ViewPair>& pairs, const std::vector<int>& alike,
+                                int views) {
+  std::vector<std::size_t> order(pairs.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t x, std::size_t y) { return alike[x] > alike[y]; });
+  std::vector<int> taken(at(views), 0);
+  std::vector<ViewPair> likely;
+  for (const std::size_t i : order) {
+    if (alike[i] < fewest_alike) break;
+    const auto& [a, b] = pairs[i];
+    if (taken[at(a)] >= partners && taken[at(b)] >= partners) continue;
+    ++taken[at(a)], ++taken[at(b)];
+    likely.push_back(pairs[i]);
+  }
+  std::sort(likely.begin(), likely.end());
+  return likely;
+}
+
 }  // namespace
 
 Joint weakest_joint(const Reconstruction& model) {
@@ -111,46 +167,12 @@ Joint weakest_joint(const Reconstruction& model) {
   return joint;
 }
 
-std::vector<ViewPair> likely_pairs_across(const FeatureGraph& graph, const Reconstruction& model,
-                                          const Joint& joint) {
-  std::map<std::string, bool> beyond;
-  for (std::size_t v = 0; v < model.views.size(); ++v)
-    beyond[model.views[v].name] = joint.beyond[v] != 0;
-  std::vector<ViewPair> across;
-  for (const ViewPair& pair : exhaustive_pairs(graph.count())) {
-    const auto a = beyond.find(graph.frames[at(pair.first)]->file),
-               b = beyond.find(graph.frames[at(pair.second)]->file);
-    if (a != beyond.end() && b != beyond.end() && a->second != b->second &&
-        !graph.proposed.contains(pair))
-      across.push_back(pair);
-  }
-  if (across.size() > most_looked_at) {
-    std::vector<ViewPair> some;
-    for (std::size_t i = 0; i < most_looked_at; ++i)
-      some.push_back(across[i * across.size() / most_looked_at]);
-    across = std::move(some);
-  }
-  std::vector<int> alike(across.size(), 0);
-  parallel_for(static_cast<int>(across.size()), [&](int i) {
-    const auto& [a, b] = across[at(i)];
-    alike[at(i)] = static_cast<int>(
-        match_descriptors(graph.descriptors[at(a)], graph.descriptors[at(b)]).size());
-  });
-  std::vector<std::size_t> order(across.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t x, std::size_t y) { return alike[x] > alike[y]; });
-  std::vector<int> taken(at(graph.count()), 0);
-  std::vector<ViewPair> likely;
-  for (const std::size_t i : order) {
-    if (alike[i] < fewest_alike) break;
-    const auto& [a, b] = across[i];
-    if (taken[at(a)] >= partners && taken[at(b)] >= partners) continue;
-    ++taken[at(a)], ++taken[at(b)];
-    likely.push_back(across[i]);
-  }
-  std::sort(likely.begin(), likely.end());
-  return likely;
+Result<std::vector<ViewPair>> likely_pairs_across(const FeatureGraph& graph,
+                                                  const Reconstruction& model, const Joint& joint,
+                                                  const Progress& progress) {
+  const std::vector<ViewPair> across = unmatched_across(graph, model, joint);
+  ORBITFUSE_ASSIGN(const std::vector<int> alike, features_alike(graph, across, progress));
+  return likeliest(across, alike, graph.count());
 }
 
 }  // namespace orbitfuse

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/geometry/reconstruction.hpp"
+#include "core/progress.hpp"
 #include "recon/poses/sfm/feature_graph.hpp"
 
 // A model of two parts that few points join is sure within each part and knows little of how they
@@ -30,8 +31,9 @@ struct Joint {
 Joint weakest_joint(const Reconstruction& model);
 
 /// Pairs across the joint whose features look most alike: of each view its likeliest partners. Few,
-/// because to verify one takes COLMAP half a second.
-std::vector<ViewPair> likely_pairs_across(const FeatureGraph& graph, const Reconstruction& model,
-                                          const Joint& joint);
+/// because to verify one takes COLMAP half a second. Looking takes up to 20 s. Errors: cancelled.
+Result<std::vector<ViewPair>> likely_pairs_across(const FeatureGraph& graph,
+                                                  const Reconstruction& model, const Joint& joint,
+                                                  const Progress& progress);
 
 }  // namespace orbitfuse

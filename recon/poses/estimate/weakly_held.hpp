@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "recon/poses/estimate/weakest_joint.hpp"
 #include "recon/poses/estimate_poses.hpp"
 
 namespace orbitfuse {
@@ -25,5 +26,10 @@ struct WeaklyHeldOptions {
 /// third, 2.6 % off, is uncertain by 0.35 %.
 std::vector<DoubtfulView> weakly_held(const Reconstruction& model,
                                       const WeaklyHeldOptions& options = {});
+
+/// The views beyond a loose joint: right in themselves, but not sure where the rest is. Adds those
+/// that are not in doubt already; nothing where the joint is not loose.
+void doubt_beyond(const Joint& joint, const Reconstruction& model,
+                  std::vector<DoubtfulView>& doubtful);
 
 }  // namespace orbitfuse

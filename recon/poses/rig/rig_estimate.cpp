@@ -284,6 +284,11 @@ Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOpt
     const Place place = search.best_at(focal_px, wrong);
     if (place.score > best.score) best = place;
   }
+  // What can't be told from a shuffled order now is refused however well it is aligned later.
+  if (best.score <= wrong)
+    return refused(
+        fmt::format("{} pairs: correlation of all edges {:.3f}, of shuffled pairs {:.3f} at best",
+                    views.size(), best.score, wrong));
   RigEstimate rig;
   rig.thermal = options.thermal_lens;
   rig.thermal.fx = rig.thermal.fy = best.focal_px;
@@ -313,8 +318,7 @@ Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOpt
     rig.thermal_from_visible.translation = {correction[3], correction[4], correction[5]};
     rig.thermal.fx = rig.thermal.fy = rig.thermal.fx * std::exp(log_focal);
   }
-  if (!(rig.decisiveness >= options.min_decisiveness && rig.held_share >= options.min_held_share &&
-        best.score > wrong))
+  if (!(rig.decisiveness >= options.min_decisiveness && rig.held_share >= options.min_held_share))
     return refused(
         fmt::format("{}; correlation of all edges {:.3f}, of shuffled pairs {:.3f} at best",
                     rig.words(), best.score, wrong));

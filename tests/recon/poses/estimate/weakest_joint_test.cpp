@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <atomic>
 #include <numeric>
 #include <random>
 
@@ -127,9 +128,16 @@ TEST(LikelyPairs, AreThoseAcrossThatWereNotMatchedAndLookAlike) {
   }
   Joint joint;
   joint.beyond = {0, 0, 0, 1, 1, 1};
-  EXPECT_THAT(likely_pairs_across(graph, two.model, joint), ElementsAre(ViewPair(1, 4)));
+  EXPECT_THAT(likely_pairs_across(graph, two.model, joint, {}).value(),
+              ElementsAre(ViewPair(1, 4)));
+  const std::atomic<bool> stop = true;
+  Progress stopping;
+  stopping.cancel = &stop;
+  const auto stopped = likely_pairs_across(graph, two.model, joint, stopping);
+  ASSERT_FALSE(stopped);
+  EXPECT_EQ(stopped.error().kind, ErrorKind::cancelled);
   graph.proposed[{1, 4}] = {};
-  EXPECT_TRUE(likely_pairs_across(graph, two.model, joint).empty());
+  EXPECT_TRUE(likely_pairs_across(graph, two.model, joint, {}).value().empty());
 }
 
 }  // namespace

@@ -83,6 +83,23 @@ TEST(WeaklyHeld, AViewThatItsPointsLeaveRoomIsNamed) {
   EXPECT_THAT(weak[0].why, HasSubstr("% of the orbit's radius"));
 }
 
+TEST(WeaklyHeld, BeyondALooseJointAllAreDoubtedOnce) {
+  const Reconstruction model = chain(5, 200, 60);
+  Joint joint;
+  joint.beyond = {0, 0, 0, 1, 1};
+  joint.views_beyond = 2, joint.points = 7, joint.share = 0.1;
+  std::vector<DoubtfulView> doubtful = {{"4", DoubtReason::uncertain_place, "known before"}};
+  doubt_beyond(joint, model, doubtful);
+  ASSERT_EQ(doubtful.size(), 2u);
+  EXPECT_EQ(doubtful[0].why, "known before");
+  EXPECT_EQ(doubtful[1].name, "3");
+  EXPECT_THAT(doubtful[1].why, HasSubstr("7 points join it and 1 more"));
+  joint.share = 0.3;
+  doubtful.clear();
+  doubt_beyond(joint, model, doubtful);
+  EXPECT_TRUE(doubtful.empty());
+}
+
 TEST(WeaklyHeld, TwoViewsHaveNoThirdToAsk) {
   EXPECT_TRUE(weakly_held(chain(2, 3, 0)).empty());
   EXPECT_TRUE(weakly_held({}).empty());
