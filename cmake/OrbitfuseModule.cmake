@@ -8,7 +8,7 @@ include(GNUInstallDirs)
 
 # How this project compiles its own sources. These hold for this folder and those below, and reach
 # nobody who links the libraries.
-add_compile_options(
+set(orbitfuse_compile_options
   -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wold-style-cast
   $<$<BOOL:${ORBITFUSE_WERROR}>:-Werror>
   # g++ 12 reports these in inlined <string>, fmt and Eigen code that is correct (GCC bug 105329).
@@ -17,6 +17,8 @@ add_compile_options(
   -march=x86-64-v3
   # a*b+c must round alike in every translation unit, or results depend on inlining.
   -ffp-contract=off)
+# nvcc knows none of these (ORBITFUSE_CUDA).
+add_compile_options("$<$<COMPILE_LANGUAGE:C,CXX>:${orbitfuse_compile_options}>")
 
 # What everyone who includes a header needs, users of the installed libraries too.
 add_library(orbitfuse_headers INTERFACE)

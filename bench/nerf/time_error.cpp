@@ -14,6 +14,7 @@
 #include "core/system/clock.hpp"
 #include "core/system/cpu.hpp"
 #include "core/system/parallel.hpp"
+#include "recon/nerf/device/on_device.hpp"
 
 namespace {
 
@@ -26,7 +27,8 @@ struct Arguments {
   int threads = 0;
   double exposure = 0, pose_error_deg = 0;
   bool quick = false, depth = false, train = true;
-  std::string detail;
+  std::string detail, device = "cpu";
+  bool time_kernels = false;
   nerf::DetailOptions detail_options;
   depth::DepthOptions depth_options;
 };
@@ -134,11 +136,30 @@ Status print_detail_errors(const nerf::Field& field, const Arguments& a) {
   return a.images.empty() ? Status{} : bench::write_pictures(field, full, a.images, &detail);
 }
 
+Status use_device(const Arguments& a) {
+  if (a.device == "cpu") return {};
+  try {
+    nerf::device::use(nerf::device::cuda_engine());
+  } catch (const nerf::device::Refused& refused) {
+    return tl::unexpected(nerf::device::error_of(refused));
+  }
+  fmt::print("{}\n", nerf::device::current()->name());
+  if (a.time_kernels) nerf::device::current()->time_kernels();
+  return {};
+}
+
+void print_kernel_times() {
+  for (const nerf::device::KernelTime& kernel : nerf::device::current()->kernel_times())
+    fmt::print("{:18} {:7} launches {:8.2f} us each {:8.1f} ms\n", kernel.name, kernel.launches,
+               1e6 * kernel.seconds / static_cast<double>(kernel.launches), 1e3 * kernel.seconds);
+}
+
 Status run(const Arguments& a) {
   if (!a.detail.empty() && (a.pose_error_deg > 0 || a.exposure > 0))
     return fail(ErrorKind::usage, "--detail", "beside --perturb-poses or --vary-exposure",
                 "its views are as they were recorded; choose one");
   set_thread_count(a.threads);
+  ORBITFUSE_TRY(use_device(a));
   ORBITFUSE_ASSIGN(nerf::Dataset data, bench::load_scene(a.scene, a.data, a.model));
   ORBITFUSE_ASSIGN(nerf::TrainOptions options,
                    nerf::preset(a.preset.empty() ? nerf::default_preset(data.modality) : a.preset));
@@ -168,6 +189,7 @@ Status run(const Arguments& a) {
   ORBITFUSE_ASSIGN(result.report,
                    nerf::train(data, options, {}, field, guide.empty() ? nullptr : &guide));
   print_curve(result.report);
+  if (a.time_kernels && nerf::device::current() != nullptr) print_kernel_times();
   if (!result.report.refined_poses.empty())
     print_pose_errors(true_poses, data, result.report.refined_poses);
   if (!a.out.empty()) ORBITFUSE_TRY(bench::write_curves(a.out, a.scene, {result}));
@@ -215,6 +237,8 @@ int main(int argc, char** argv) {
   app.add_option("--detail-unexplained", a.detail_options.unexplained);
   app.add_flag("--quick", a.quick, "no full-resolution evaluation");
   app.add_option("--threads", a.threads);
+  app.add_option("--device", a.device)->check(CLI::IsMember({"cpu", "cuda"}));
+  app.add_flag("--kernels", a.time_kernels, "time of each kernel of the device, one by one");
   app.add_option("--set", a.set, "training option key=value");
   CLI11_PARSE(app, argc, argv);
   if (const auto status = run(a); !status) {

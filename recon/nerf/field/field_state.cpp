@@ -36,6 +36,7 @@ std::vector<DensityNetwork*> FieldState::density_networks() {
 }
 
 void FieldState::refresh() {
+  device_copy.forget();
   for (DensityNetwork* network : density_networks()) {
     network->grid.refresh_half();
     network->mlp.refresh();

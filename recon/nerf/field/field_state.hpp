@@ -5,8 +5,10 @@
 #include <vector>
 
 #include "core/modality.hpp"
+#include "recon/nerf/field/device_copy.hpp"
 #include "recon/nerf/field/march_settings.hpp"
 #include "recon/nerf/field/network.hpp"
+#include "recon/nerf/field/network_shape.hpp"
 #include "recon/nerf/field/occupancy.hpp"
 #include "recon/nerf/field/refined_pose.hpp"
 #include "recon/nerf/field/space.hpp"
@@ -15,12 +17,6 @@
 #include "recon/nerf/value_span.hpp"
 
 namespace orbitfuse::nerf {
-
-inline constexpr int density_outputs = 16;  ///< log density and 15 features for the colour network
-inline constexpr int color_inputs = 32;     ///< the density network's outputs and 16 harmonics
-inline constexpr int color_outputs = 16;    ///< 3 or 1 used; padded for the kernels
-inline constexpr float log_density_bias = -1.0f;
-inline constexpr float max_log_density = 12.0f;
 
 /// Position to density: a hash encoding and a perceptron with one hidden layer.
 struct DensityNetwork {
@@ -63,6 +59,7 @@ struct FieldState {
   std::vector<ViewRecord> views;  ///< of the dataset
   History history;                ///< empty in a finished field: equal fields are equal files
   Snapshot best;
+  mutable DeviceCopy device_copy;  ///< of these parameters
 
   int channels() const { return modality == Modality::visible ? 3 : 1; }
   void create(const TrainOptions& with, Modality what, int view_count);

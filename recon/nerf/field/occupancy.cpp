@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/system/memory.hpp"
+#include "recon/nerf/field/occupancy_codes.hpp"
 
 namespace orbitfuse::nerf {
 
@@ -50,18 +51,12 @@ void Occupancy::center_of(std::int64_t cell, float x[3]) const {
 
 namespace {
 
-constexpr float codes_per_octave = 14.5f;  // 255 codes reach e^12, the highest density
-
-std::uint8_t code_of(float density) {
-  return static_cast<std::uint8_t>(
-      std::clamp(std::lround(codes_per_octave * std::log2(1 + density)), 0l, 255l));
-}
+std::uint8_t code_of(float density) { return static_cast<std::uint8_t>(code_of_density(density)); }
 
 struct Decoded {
   float density[256];
   Decoded() {
-    for (int i = 0; i < 256; ++i)
-      density[i] = std::exp2(static_cast<float>(i) / codes_per_octave) - 1;
+    for (int i = 0; i < 256; ++i) density[i] = density_of_code(i);
   }
 };
 

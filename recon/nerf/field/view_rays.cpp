@@ -8,22 +8,18 @@
 #include "core/numeric/bilinear.hpp"
 
 namespace orbitfuse::nerf {
-namespace {
-constexpr int spacing_px = 8;
-}
-
 ViewRays::ViewRays(const Camera& camera, const Rigid3d& cam_from_world, const Space& space)
     : camera_(camera), pixel_angle_(static_cast<float>(2.0 / (camera.fx + camera.fy))) {
   place(cam_from_world, space);
   if (!camera.has_distortion()) return;
-  lattice_width_ = camera.width / spacing_px + 2;
-  const int height = camera.height / spacing_px + 2;
+  lattice_width_ = camera.width / lattice_px + 2;
+  const int height = camera.height / lattice_px + 2;
   lattice_.reserve(static_cast<std::size_t>(lattice_width_ * height));
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < lattice_width_; ++x) {
       // Lattice nodes beyond the image border are clamped: outside it the model may not invert.
-      const Eigen::Vector2d pixel(std::min(x * spacing_px, camera.width),
-                                  std::min(y * spacing_px, camera.height));
+      const Eigen::Vector2d pixel(std::min(x * lattice_px, camera.width),
+                                  std::min(y * lattice_px, camera.height));
       lattice_.push_back(camera.normalized_of(pixel).cast<float>());
     }
 }
@@ -31,12 +27,12 @@ ViewRays::ViewRays(const Camera& camera, const Rigid3d& cam_from_world, const Sp
 Eigen::Vector3d ViewRays::through(double px, double py) const {
   if (lattice_.empty())
     return {(px - camera_.cx) / camera_.fx, (py - camera_.cy) / camera_.fy, 1.0};
-  const int ix = std::clamp(static_cast<int>(px) / spacing_px, 0, lattice_width_ - 2);
+  const int ix = std::clamp(static_cast<int>(px) / lattice_px, 0, lattice_width_ - 2);
   const int rows = static_cast<int>(lattice_.size()) / lattice_width_;
-  const int iy = std::clamp(static_cast<int>(py) / spacing_px, 0, rows - 2);
+  const int iy = std::clamp(static_cast<int>(py) / lattice_px, 0, rows - 2);
   const auto fraction = [](double p, int i, int limit) {
-    const double low = std::min(i * spacing_px, limit);
-    const double high = std::min((i + 1) * spacing_px, limit);
+    const double low = std::min(i * lattice_px, limit);
+    const double high = std::min((i + 1) * lattice_px, limit);
     return high > low ? static_cast<float>((p - low) / (high - low)) : 0.0f;
   };
   // Not place_among(): the lattice's last step is as short as the picture leaves it.
@@ -78,6 +74,23 @@ Rigid3d ViewRays::moved(const Eigen::Vector3d& shift, const Eigen::Vector3d& tur
   const Eigen::Quaterniond rotation =
       Eigen::Quaterniond(Eigen::Matrix3d(world_from_cam.transpose())).normalized();
   return {rotation, -(rotation * (space.center + space.radius * origin))};
+}
+
+RayNumbers ViewRays::numbers() const {
+  RayNumbers out{
+      camera_.width, camera_.height, camera_.fx, camera_.fy, camera_.cx, camera_.cy, {}, {}, 0, 0};
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) out.world_from_cam[i][k] = world_from_cam_(i, k);
+    out.origin[i] = origin_[i];
+  }
+  if (lattice_.empty()) return out;
+  out.lattice_columns = lattice_width_;
+  out.lattice_rows = static_cast<int>(lattice_.size()) / lattice_width_;
+  return out;
+}
+
+const float* ViewRays::lattice() const {
+  return lattice_.empty() ? nullptr : lattice_.front().data();
 }
 
 bool ViewRays::project(const float point[3], double& x, double& y, double& depth) const {

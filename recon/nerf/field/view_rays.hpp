@@ -5,15 +5,11 @@
 
 #include "core/geometry/camera.hpp"
 #include "core/geometry/transform.hpp"
+#include "recon/nerf/field/ray.hpp"
+#include "recon/nerf/field/ray_numbers.hpp"
 #include "recon/nerf/field/space.hpp"
 
 namespace orbitfuse::nerf {
-
-struct Ray {
-  float origin[3];     ///< normalised scene space
-  float direction[3];  ///< unit length
-  float forward;       ///< cosine to the optical axis: z depth = distance * forward
-};
 
 /// Rays of one camera. Lens distortion is inverted once on a lattice of pixels and interpolated:
 /// the inverse iterates, and over 8 px it is straight to about 0.01 px.
@@ -38,6 +34,8 @@ class ViewRays {
   float pixel_angle() const { return pixel_angle_; }
   const Camera& camera() const { return camera_; }
   const Eigen::Vector3d& origin() const { return origin_; }
+  RayNumbers numbers() const;
+  const float* lattice() const;  ///< as RayNumbers describes it; null: there is none
 
  private:
   Eigen::Vector3d through(double x, double y) const;  ///< in camera axes, z = 1

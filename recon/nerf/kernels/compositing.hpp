@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "core/host_device.hpp"
+
 // Emission-absorption volume rendering along one ray (Max 1995; Mildenhall et al. 2020, eq. 3) and
 // its exact gradients. Templates, so that tests run them in double.
 namespace orbitfuse::nerf {
@@ -10,7 +12,8 @@ namespace orbitfuse::nerf {
 /// weights[i] = T_i (1 - exp(-sigma_i dt_i)), transmittance[i] = light left after sample i. Stops
 /// when less than `stop` is left and returns the number of samples used.
 template <class T>
-int composite(int count, const T* sigma, const T* dt, T stop, T* weights, T* transmittance) {
+ORBITFUSE_HOST_DEVICE int composite(int count, const T* sigma, const T* dt, T stop, T* weights,
+                                    T* transmittance) {
   T light = 1;
   for (int i = 0; i < count; ++i) {
     const T kept = std::exp(-sigma[i] * dt[i]);
@@ -25,8 +28,9 @@ int composite(int count, const T* sigma, const T* dt, T stop, T* weights, T* tra
 /// dsigma[i] = dt_i (T_{i+1} g_i - sum_{j>i} w_j g_j) for g = dL/dw; `behind` is the same sum over
 /// what the ray meets after these samples (the background: T_end * its g).
 template <class T>
-void composite_backward(int count, const T* dt, const T* weights, const T* transmittance,
-                        const T* dweights, T behind, T* dsigma) {
+ORBITFUSE_HOST_DEVICE void composite_backward(int count, const T* dt, const T* weights,
+                                              const T* transmittance, const T* dweights, T behind,
+                                              T* dsigma) {
   for (int i = count - 1; i >= 0; --i) {
     dsigma[i] = dt[i] * (transmittance[i] * dweights[i] - behind);
     behind += weights[i] * dweights[i];
@@ -36,7 +40,8 @@ void composite_backward(int count, const T* dt, const T* weights, const T* trans
 /// Distortion loss (Mip-NeRF 360, eq. 15): sum_ij w_i w_j |s_i - s_j| + 1/3 sum_i w_i^2 ds_i in
 /// O(n); adds scale * gradient to dweights and returns the loss.
 template <class T>
-T distortion_loss(int count, const T* weights, const T* s, const T* ds, T scale, T* dweights) {
+ORBITFUSE_HOST_DEVICE T distortion_loss(int count, const T* weights, const T* s, const T* ds,
+                                        T scale, T* dweights) {
   T total_w = 0, total_ws = 0;
   for (int i = 0; i < count; ++i) {
     total_w += weights[i];

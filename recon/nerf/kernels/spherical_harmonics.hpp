@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "core/host_device.hpp"
+
 namespace orbitfuse::nerf {
 
 inline constexpr int max_sh = 16;
 
 /// Real spherical harmonics of a unit direction, bands 0..degree-1, zero beyond (16 values).
-inline void spherical_harmonics(int degree, const float d[3], float out[max_sh]) {
+ORBITFUSE_HOST_DEVICE inline void spherical_harmonics(int degree, const float d[3],
+                                                      float out[max_sh]) {
   for (int i = 0; i < max_sh; ++i) out[i] = 0;
   const float x = d[0], y = d[1], z = d[2];
   if (degree < 1) return;

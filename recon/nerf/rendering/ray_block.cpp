@@ -17,10 +17,6 @@ void reserve_floats(std::vector<float>& buffer, std::size_t count) {
 
 }  // namespace
 
-float density_of(float log_density) {
-  return std::exp(std::clamp(log_density + log_density_bias, -20.0f, max_log_density));
-}
-
 void RayBlock::clear() {
   rays.clear();
   first.assign(1, 0);

@@ -58,9 +58,6 @@ void forward(const FieldState& field, const Kernels& kernels, const ForwardSetti
 void ray_value(const FieldState& field, const RayBlock& block, int ray, int& active_begin,
                float* out);
 
-/// sigma = exp(clamped log density).
-float density_of(float log_density);
-
 /// Density at normalised positions (occupancy probes, tests).
 void densities(const DensityNetwork& network, const Kernels& kernels, const float* position,
                int count, float* sigma);

@@ -11,42 +11,15 @@
 
 #include "core/option_range.hpp"
 #include "core/system/parallel.hpp"
+#include "recon/nerf/device/on_device.hpp"
 #include "recon/nerf/rendering/alike_neighbours.hpp"
-#include "recon/nerf/rendering/proposal.hpp"
-#include "recon/nerf/rendering/ray_block.hpp"
+#include "recon/nerf/rendering/trace_rays.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
 
-constexpr int rays_per_block = 64;
 constexpr int limit_stride = 4;  // one ray of 16 looks ahead for its neighbours
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-
-struct Output {
-  float* color;
-  float* depth;
-  float* opacity;
-};
-
-void write_ray(const FieldState& field, const RayBlock& block, int r, int& row, const Output& out) {
-  ray_value(field, block, r, row, out.color);
-  const int begin = block.first[static_cast<std::size_t>(r)];
-  const int used = block.used[static_cast<std::size_t>(r)];
-  // Median depth: where half of the light is gone. It stays on a surface where a mean would float
-  // between two.
-  float depth = nan;
-  for (int i = begin; i < begin + used; ++i)
-    if (block.light[static_cast<std::size_t>(i)] < 0.5f) {
-      const auto k = static_cast<std::size_t>(i);
-      const float before = i > begin ? block.light[k - 1] : 1.0f;
-      const float part = (before - 0.5f) / std::max(1e-6f, before - block.light[k]);
-      depth = block.t[k] + (part - 0.5f) * block.dt[k];
-      break;
-    }
-  *out.depth = depth * block.rays[static_cast<std::size_t>(r)].forward *
-               static_cast<float>(field.space.radius);
-  *out.opacity = used > 0 ? 1 - block.light[static_cast<std::size_t>(begin + used - 1)] : 0.0f;
-}
 
 }  // namespace
 
@@ -99,7 +72,6 @@ class ImageRenderer {
       : field_(field),
         rays_(rays),
         stride_(stride),
-        kernels_(kernels_for(best_isa())),
         march_(field.march_settings()),
         limits_{static_cast<float>(options.stop_transmittance), 1e-4f, false} {
     const Camera& camera = rays.camera();
@@ -115,17 +87,13 @@ class ImageRenderer {
   /// Where each ray has met what stops it; no_limit where nothing did.
   cv::Mat ends() {
     cv::Mat out(height_, width_, CV_32FC1, cv::Scalar(no_limit));
-    parallel_blocks(width_ * height_, rays_per_block, [&](int begin, int end) {
-      thread_local RayBlock block;
-      thread_local std::vector<int> pixels;
-      block.clear();
-      pixels.clear();
-      for (int p = begin; p < end; ++p) add(p, 0, no_limit, pixels);
-      place(block, march_);
-      forward(field_, kernels_, limits_, block);
-      for (std::size_t r = 0; r < pixels.size(); ++r)
-        out.at<float>(pixels[r] / width_, pixels[r] % width_) = end_of(block, r);
-    });
+    std::vector<TracedRay> traced(static_cast<std::size_t>(width_ * height_));
+    trace_rays(
+        field_, limits_, march_, width_ * height_,
+        [&](int p, DrawnRay& ray) { return ray_at(p, 0, no_limit, ray); }, traced.data());
+    for (int p = 0; p < width_ * height_; ++p)
+      if (const TracedRay& ray = traced[static_cast<std::size_t>(p)]; ray.there)
+        out.at<float>(p / width_, p % width_) = ray.end;
     return out;
   }
 
@@ -232,44 +200,50 @@ class ImageRenderer {
   /// The listed pixels, each by its own ray; `met`: where their light faded.
   void render(const std::vector<int>& wanted, const Reach& look, RenderedView& view, Reach* met,
               const MarchSettings& march) {
-    const int channels = field_.channels();
     const auto at = [&](const cv::Mat& plane, int p) {
       return plane.at<float>(p / width_, p % width_);
     };
-    parallel_blocks(static_cast<int>(wanted.size()), rays_per_block, [&](int begin, int end) {
-      thread_local RayBlock block;
-      thread_local std::vector<int> pixels, again;
-      again.clear();
-      for (const bool limited : {true, false}) {
-        block.clear();
-        pixels.clear();
-        if (limited)
-          for (int i = begin; i < end; ++i) {
-            const int p = wanted[static_cast<std::size_t>(i)];
-            add(p, at(look.near, p), at(look.far, p), pixels);
-          }
-        else
-          for (const int p : again) add(p, 0, no_limit, pixels);
-        if (pixels.empty()) continue;
-        place(block, limited ? march : march_);
-        forward(field_, kernels_, limits_, block);
-        int row = 0;
-        for (std::size_t r = 0; r < pixels.size(); ++r) {
-          const int p = pixels[r], x = p % width_, y = p / width_;
-          write_ray(field_, block, static_cast<int>(r), row,
-                    {view.color.ptr<float>(y) + x * channels, view.depth.ptr<float>(y) + x,
-                     view.opacity.ptr<float>(y) + x});
-          const float stop = end_of(block, r);
-          if (met != nullptr) {
-            met->far.at<float>(y, x) = stop;
-            met->near.at<float>(y, x) = begin_of(block, r);
-          }
-          const bool passed = at(look.far, p) < no_limit && stop == no_limit,
-                     late = at(look.near, p) > 0 && starts_dark(block, r);
-          if (limited && (passed || late)) again.push_back(p);
-        }
-      }
-    });
+    std::vector<TracedRay> traced(wanted.size());
+    trace_rays(
+        field_, limits_, march, static_cast<int>(wanted.size()),
+        [&](int i, DrawnRay& ray) {
+          const int p = wanted[static_cast<std::size_t>(i)];
+          return ray_at(p, at(look.near, p), at(look.far, p), ray);
+        },
+        traced.data());
+    write(wanted, traced, view, met);
+    std::vector<int> again;
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+      const TracedRay& ray = traced[i];
+      const bool passed = at(look.far, wanted[i]) < no_limit && ray.end == no_limit,
+                 late = at(look.near, wanted[i]) > 0 && ray.starts_dark;
+      if (ray.there && (passed || late)) again.push_back(wanted[i]);
+    }
+    traced.resize(again.size());
+    trace_rays(
+        field_, limits_, march_, static_cast<int>(again.size()),
+        [&](int i, DrawnRay& ray) {
+          return ray_at(again[static_cast<std::size_t>(i)], 0, no_limit, ray);
+        },
+        traced.data());
+    write(again, traced, view, met);
+  }
+
+  void write(const std::vector<int>& pixels, const std::vector<TracedRay>& traced,
+             RenderedView& view, Reach* met) const {
+    const int channels = field_.channels();
+    const auto radius = static_cast<float>(field_.space.radius);
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      const TracedRay& ray = traced[i];
+      if (!ray.there) continue;
+      const int x = pixels[i] % width_, y = pixels[i] / width_;
+      std::copy_n(ray.value, channels, view.color.ptr<float>(y) + x * channels);
+      view.depth.at<float>(y, x) = ray.distance * ray.forward * radius;
+      view.opacity.at<float>(y, x) = ray.opacity;
+      if (met == nullptr) continue;
+      met->far.at<float>(y, x) = ray.end;
+      met->near.at<float>(y, x) = ray.begin;
+    }
   }
 
   bool inside(int x, int y, int margin) const {
@@ -292,58 +266,20 @@ class ImageRenderer {
     return coarse;
   }
 
-  void add(int pixel, float near, float far, std::vector<int>& pixels) const {
+  bool ray_at(int pixel, float near, float far, DrawnRay& out) const {
     const Camera& camera = rays_.camera();
     const int x = pixel % width_ * stride_ + stride_ / 2,
               y = pixel / width_ * stride_ + stride_ / 2;
-    Ray ray;
-    if (!rays_.ray(std::min(camera.width - 1, x) + 0.5, std::min(camera.height - 1, y) + 0.5, ray))
-      return;
-    drawn().push_back({ray, near, far, 0.5f});
-    pixels.push_back(pixel);
-  }
-  /// The samples of all rays that add() noted.
-  void place(RayBlock& block, const MarchSettings& march) const {
-    thread_local ProposalBlock proposals;
-    if (proposing_)
-      add_proposed(field_, kernels_, drawn(), {.near = march.near}, proposals, block);
-    else
-      block.add(field_.occupancy, march, drawn());
-    drawn().clear();
-  }
-  static std::vector<DrawnRay>& drawn() {
-    thread_local std::vector<DrawnRay> rays;
-    return rays;
-  }
-  /// Of ray r: the sample before the first that takes light; 0 where that is the first.
-  static float begin_of(const RayBlock& block, std::size_t r) {
-    constexpr float all_but_nothing = 0.98F;
-    const auto begin = static_cast<std::size_t>(block.first[r]),
-               end = begin + static_cast<std::size_t>(block.used[r]);
-    for (std::size_t i = begin; i < end; ++i)
-      if (block.light[i] < all_but_nothing)
-        return i > begin ? block.t[i - 1] : std::max(0.0F, block.t[i] - block.dt[i]);
-    return 0;
-  }
-  /// Whether ray r is within something from its first sample on: its surface may lie before that.
-  static bool starts_dark(const RayBlock& block, std::size_t r) {
-    constexpr float least_light = 0.8F;
-    return block.used[r] > 0 && block.light[static_cast<std::size_t>(block.first[r])] < least_light;
-  }
-  /// Of ray r, as ends().
-  float end_of(const RayBlock& block, std::size_t r) const {
-    const auto last = static_cast<std::size_t>(block.first[r] + block.used[r] - 1);
-    if (block.used[r] == 0 || !(block.light[last] < limits_.stop)) return no_limit;
-    return block.t[last] + block.dt[last];
+    out = {{}, near, far, 0.5f};
+    return rays_.ray(std::min(camera.width - 1, x) + 0.5, std::min(camera.height - 1, y) + 0.5,
+                     out.ray);
   }
 
   const FieldState& field_;
   const ViewRays& rays_;
   int stride_, width_ = 0, height_ = 0;
-  const Kernels& kernels_;
   MarchSettings march_, between_;
   ForwardSettings limits_;
-  bool proposing_ = field_.options.sampling == Sampling::proposal;
 };
 
 }  // namespace
@@ -374,8 +310,12 @@ Result<RenderedView> render(const Field& field, const Camera& camera, const Rigi
   if (!cam_from_world.is_finite())
     return fail(ErrorKind::input, "render.pose", "not finite", "give a valid pose");
   const FieldState& state = field.state();
-  RenderedView view =
-      render_strided(state, ViewRays(camera, cam_from_world, state.space), 1, options);
+  RenderedView view;
+  try {
+    view = render_strided(state, ViewRays(camera, cam_from_world, state.space), 1, options);
+  } catch (const device::Refused& refused) {
+    return tl::unexpected(device::error_of(refused));
+  }
   if (state.modality == Modality::thermal)
     view.color = view.color * (state.span.high - state.span.low) + state.span.low;
   return view;

@@ -5,28 +5,13 @@
 #include <cmath>
 
 #include "recon/nerf/kernels/compositing.hpp"
+#include "recon/nerf/kernels/depth_loss.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
 
 void ensure(std::vector<float>& buffer, std::size_t count) {
   if (buffer.size() < count) buffer.resize(count + count / 4);
-}
-
-/// -weight * log(mass near the known distance): draws a ray's mass there (after Deng et al. 2022,
-/// "Depth-supervised NeRF", whose eq. 5 weighs by the same Gaussian).
-double depth_loss(const RayTarget& target, int count, const float* t, const float* dt,
-                  const float* weight, float scale, float* dweight) {
-  const float z = target.distance;
-  const auto kernel = [&](int i) {
-    const float u = (t[i] - z) / (0.01f * z + dt[i]);
-    return u * u < 18.0f ? std::exp(-0.5f * u * u) : 0.0f;
-  };
-  float mass = 0.01f;
-  for (int i = 0; i < count; ++i) mass += weight[i] * kernel(i);
-  const float slope = -target.depth_weight * scale / mass;
-  for (int i = 0; i < count; ++i) dweight[i] += slope * kernel(i);
-  return -target.depth_weight * std::log(mass);
 }
 
 }  // namespace
@@ -143,8 +128,8 @@ void backward(const FieldState& field, const Kernels& kernels, const LossSetting
           distortion_loss(used, &b.weight[at], &b.s[at], &b.ds[at],
                           settings.distortion_weight * settings.per_ray, &b.dweight[at]);
     if (target.distance > 0 && target.depth_weight > 0)
-      gradients.depth += depth_loss(target, used, &b.t[at], &b.dt[at], &b.weight[at],
-                                    settings.per_ray, &b.dweight[at]);
+      gradients.depth += depth_loss({target.distance, target.depth_weight}, used, &b.t[at],
+                                    &b.dt[at], &b.weight[at], settings.per_ray, &b.dweight[at]);
     const auto last = static_cast<std::size_t>(end);
     const float background = b.weight[last] * b.dweight[last];
     composite_backward(used, &b.dt[at], &b.weight[at], &b.light[at], &b.dweight[at], background,

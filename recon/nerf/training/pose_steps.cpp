@@ -6,16 +6,14 @@
 #include <cmath>
 #include <numbers>
 
+#include "recon/nerf/training/pose_row.hpp"
+
 namespace orbitfuse::nerf {
 namespace {
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-constexpr int reach_px =
-    2;  ///< slopes are taken over twice this: errors of that size still pull home
-constexpr double huber =
-    0.05;  ///< of the span; what the scene hides or reflects doesn't count for more
 constexpr double rate = 0.7;  ///< of a step: its rays are few
 constexpr double longest_turn = std::numbers::pi / 180, longest_shift = 0.02;
 
@@ -29,20 +27,13 @@ void PoseSums::add(const PoseSums& other) {
 
 void add_ray(const NormalisedView& view, int x, int y, const float* shown, float distance,
              PoseSums& sums) {
+  constexpr int reach_px = slope_reach_px;
   const cv::Mat& photo = view.target;
   if (x < reach_px || y < reach_px || x >= photo.cols - reach_px || y >= photo.rows - reach_px)
     return;
   const Camera& camera = view.rays.camera();
   const Eigen::Vector3d p = view.rays.in_camera(x + 0.5, y + 0.5, distance);
   if (!(p.z() > 1e-6)) return;
-  // The lens bends motion little; what it does to the slope of a step, the next step makes good.
-  Eigen::Matrix<double, 2, 3> projection;
-  projection << camera.fx / p.z(), 0, -camera.fx * p.x() / (p.z() * p.z()),  //
-      0, camera.fy / p.z(), -camera.fy * p.y() / (p.z() * p.z());
-  Eigen::Matrix3d cross;
-  cross << 0, -p.z(), p.y(), p.z(), 0, -p.x(), -p.y(), p.x(), 0;
-  Eigen::Matrix<double, 2, 6> motion;
-  motion << projection, -projection * cross;
   Eigen::Map<Matrix6> normal(sums.normal.data());
   Eigen::Map<Vector6> right(sums.right.data());
   const int channels = photo.channels();
@@ -51,12 +42,13 @@ void add_ray(const NormalisedView& view, int x, int y, const float* shown, float
   };
   bool said = false;
   for (int c = 0; c < channels; ++c) {
-    const Eigen::RowVector2d slope((at(reach_px, 0, c) - at(-reach_px, 0, c)) / (2 * reach_px),
-                                   (at(0, reach_px, c) - at(0, -reach_px, c)) / (2 * reach_px));
+    const double slope_x = (at(reach_px, 0, c) - at(-reach_px, 0, c)) / (2 * reach_px),
+                 slope_y = (at(0, reach_px, c) - at(0, -reach_px, c)) / (2 * reach_px);
     const double error = shown[c] - at(0, 0, c);
-    if (!slope.allFinite() || !std::isfinite(error)) continue;
-    const double weight = std::min(1.0, huber / std::max(1e-12, std::abs(error)));
-    const Vector6 row = (slope * motion).transpose();
+    if (!std::isfinite(slope_x) || !std::isfinite(slope_y) || !std::isfinite(error)) continue;
+    const double weight = pose_weight(error);
+    Vector6 row;
+    pose_row(camera.fx, camera.fy, p.data(), slope_x, slope_y, row.data());
     said = true;
     normal += weight * row * row.transpose();
     right += weight * error * row;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/system/trace.hpp"
+#include "recon/nerf/device/on_device.hpp"
 #include "recon/nerf/nerf.hpp"
 #include "recon/nerf/training/training_run.hpp"
 
@@ -98,13 +99,15 @@ Result<TrainReport> train(const Dataset& given, const TrainOptions& options,
   TrainReport report;
   ORBITFUSE_ASSIGN(const TrainingData data, split(given, options, report));
   TrainingRun run(data, options, progress, report);
-  {
-    const TraceSpan span("prepare training");
-    ORBITFUSE_TRY(run.prepare(guide));
-  }
-  {
+  try {
+    {
+      const TraceSpan span("prepare training");
+      ORBITFUSE_TRY(run.prepare(guide));
+    }
     const TraceSpan span("training steps");
     ORBITFUSE_TRY(run.loop());
+  } catch (const device::Refused& refused) {
+    return tl::unexpected(device::error_of(refused));
   }
   ORBITFUSE_ASSIGN(out, run.finish());
   return report;

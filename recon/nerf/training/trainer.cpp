@@ -9,20 +9,17 @@
 
 #include "core/numeric/random.hpp"
 #include "core/system/parallel.hpp"
+#include "recon/nerf/device/on_device.hpp"
+#include "recon/nerf/training/draw_rules.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
 
 constexpr int rays_per_block = 32;
 constexpr int shard_count = 16;  ///< of weight gradients; fixed, so sums do not depend on threads
-constexpr int occupancy_every = 16;
-constexpr int occupancy_warmup = 64;
 constexpr int pose_every =
     25;  ///< steps; where views are many, the rays of several such turns make a step
 constexpr double poses_move_until = 0.9;  ///< of the run: the last details are of poses that stay
-constexpr float known_depth_margin = 1.08f;  ///< a wrong depth must be able to move
-
-enum Stream : std::uint64_t { pixel_stream = 1, jitter_stream = 2, probe_stream = 4 };
 
 /// What the learning rates are multiplied by: warm-up, then half a cosine down to 1/100.
 double schedule(int step, double progress) {
@@ -42,12 +39,10 @@ float proposal_anneal(double progress) {
   return static_cast<float>(10 * part / (9 * part + 1));
 }
 
-/// Far from the object before a plain background: the ray meets no cell. Some are drawn all the
-/// same, for the background's colour.
-constexpr int background_every = 16;
+/// Before a plain background: the ray meets no cell.
 bool shows_nothing(const NormalisedView& view, int x, int y) {
-  const int rim_px = std::clamp(view.target.cols / 50, 4, 100);
-  return !view.clearance_px.empty() && view.clearance_px.at<std::uint8_t>(y, x) > rim_px;
+  return !view.clearance_px.empty() &&
+         view.clearance_px.at<std::uint8_t>(y, x) > background_rim_px(view.target.cols);
 }
 
 /// Scatters one level's gradients of a block.
@@ -77,25 +72,23 @@ Trainer::Trainer(FieldState& field, std::vector<NormalisedView>& views,
     field_.rays_per_step =
         proposing() ? std::max(1, field_.options.samples_per_step / field_.options.fine_samples)
                     : 512;
+  if (device::Engine* engine = device::current(); engine != nullptr && !proposing())
+    device_ = device::start(*engine, field, views, heldout);
 }
 
-void Trainer::draw(Block& block, int begin, int end, double progress) {
-  const TrainOptions& o = field_.options;
-  const auto key = [&](int ray) {
-    return static_cast<std::uint64_t>(field_.step) * 1000003u + static_cast<std::uint64_t>(ray);
-  };
-  const float supervision = static_cast<float>(depth_weight(o, progress));
+void Trainer::draw(Block& block, int begin, int end, const device::StepPlan& plan,
+                   double progress) {
+  const float supervision = plan.supervision;
   // Sparse points are few: while they count, a quarter of the rays goes through them.
   const bool sparse = known_ends_.back() > 0 && known_ends_.back() < pixel_ends_.back() / 10;
   block.rays.clear();
   block.targets.clear();
   block.drawn.clear();
-  const MarchSettings settings = field_.march_settings();
   for (int i = begin; i < end; ++i) {
-    for (int attempt = 0; attempt < 8; ++attempt) {
-      const std::uint64_t draw_key = key(i) * 8 + static_cast<unsigned>(attempt);
-      const std::uint64_t bits = random_bits(o.seed, pixel_stream, draw_key);
-      const bool at_known = sparse && supervision > 0 && i % 4 == 0;
+    for (int attempt = 0; attempt < draw_attempts; ++attempt) {
+      const std::uint64_t key = draw_key(plan.step, i, attempt);
+      const std::uint64_t bits = random_bits(plan.seed, pixel_stream, key);
+      const bool at_known = sparse && supervision > 0 && i % known_every == 0;
       const auto& ends = at_known ? known_ends_ : pixel_ends_;
       const auto pick = static_cast<std::int64_t>(bits % static_cast<std::uint64_t>(ends.back()));
       const auto slot =
@@ -123,17 +116,17 @@ void Trainer::draw(Block& block, int begin, int end, double progress) {
         target.depth_weight = supervision;
       }
       block.targets.push_back(target);
-      drawn.jitter = random_uniform(o.seed, jitter_stream, draw_key);
+      drawn.jitter = random_uniform(plan.seed, jitter_stream, key);
       block.drawn.push_back(drawn);
       break;
     }
   }
   if (proposing())
     add_proposed(field_, kernels_, block.drawn,
-                 {.near = settings.near, .anneal = proposal_anneal(progress)}, block.proposals,
+                 {.near = plan.march.near, .anneal = proposal_anneal(progress)}, block.proposals,
                  block.rays);
   else
-    block.rays.add(field_.occupancy, settings, block.drawn);
+    block.rays.add(field_.occupancy, plan.march, block.drawn);
 }
 
 /// As nerfacto: every step at first, every fifth after a sixth of the run.
@@ -142,34 +135,72 @@ bool Trainer::proposals_learn(double progress) const {
   return proposing() && field_.step % every == 0;
 }
 
-bool Trainer::step(double progress) {
+device::StepPlan Trainer::plan(double progress) const {
   const TrainOptions& o = field_.options;
-  const int rays = field_.rays_per_step;
-  const int count = (rays + rays_per_block - 1) / rays_per_block;
+  device::StepPlan plan;
+  plan.step = field_.step;
+  plan.rays = field_.rays_per_step;
+  plan.seed = o.seed;
+  plan.supervision = static_cast<float>(depth_weight(o, progress));
+  plan.posing = o.refine_poses && progress > poses_move_from && progress < poses_move_until;
+  plan.per_ray = 1.0f / static_cast<float>(plan.rays);
+  plan.distortion_weight = static_cast<float>(o.distortion_weight);
+  plan.huber = field_.modality == Modality::thermal ? 0.02f : 0.0f;
+  plan.march = field_.march_settings();
+  AdamStep& adam = plan.grid;
+  const double scheduled = schedule(field_.step, progress);
+  adam.learning_rate = static_cast<float>(o.learning_rate * scheduled);
+  adam.correction1 = static_cast<float>(1.0 / (1 - std::pow(adam.beta1, field_.step + 1)));
+  adam.correction2 = static_cast<float>(1.0 / (1 - std::pow(adam.beta2, field_.step + 1)));
+  plan.network = adam;
+  plan.network.learning_rate = static_cast<float>(o.network_learning_rate * scheduled);
+  plan.network.weight_decay = 1e-6f;
+  plan.with_offsets = o.per_image_offset;
+  plan.offsets = plan.network;
+  plan.offsets.learning_rate *= 0.1f;
+  plan.offsets.weight_decay = 0;
+  return plan;
+}
+
+/// Coarse to fine.
+void Trainer::bring_in_levels(double progress) {
+  const TrainOptions& o = field_.options;
+  if (o.level_anneal_end <= 0) return;
+  const double on = progress / o.level_anneal_end * o.levels;
+  std::vector<float>& weight = field_.main.grid.level_weight;
+  for (std::size_t l = 0; l < weight.size(); ++l)
+    weight[l] = static_cast<float>(std::clamp(on + 2 - static_cast<double>(l), 0.0, 1.0));
+  if (device_) device_->set_level_weight(weight);
+}
+
+bool Trainer::step(double progress) {
+  bring_in_levels(progress);
+  const device::StepPlan todo = plan(progress);
+  const device::StepOutcome done = device_ ? device_->step(todo) : step_here(todo, progress);
+  take_account(done);
+  if (!proposing() && done.finite) update_occupancy(progress);
+  ++field_.step;
+  if (todo.posing) move_views();
+  return done.finite;
+}
+
+device::StepOutcome Trainer::step_here(const device::StepPlan& plan, double progress) {
+  const int count = (plan.rays + rays_per_block - 1) / rays_per_block;
   if (static_cast<int>(blocks_.size()) < count) blocks_.resize(static_cast<std::size_t>(count));
   for (std::size_t b = static_cast<std::size_t>(count); b < blocks_.size(); ++b)
     blocks_[b].rays.clear();
-  if (o.level_anneal_end > 0) {
-    const double on = progress / o.level_anneal_end * o.levels;
-    for (std::size_t l = 0; l < field_.main.grid.levels.size(); ++l)
-      field_.main.grid.level_weight[l] =
-          static_cast<float>(std::clamp(on + 2 - static_cast<double>(l), 0.0, 1.0));
-  }
-  LossSettings loss;
-  loss.per_ray = 1.0f / static_cast<float>(rays);
-  loss.distortion_weight = static_cast<float>(o.distortion_weight);
-  loss.huber = field_.modality == Modality::thermal ? 0.02f : 0.0f;
+  const LossSettings loss{plan.per_ray, plan.distortion_weight, plan.huber};
   const bool with_proposals = proposals_learn(progress);
-  const bool posing = o.refine_poses && progress > poses_move_from && progress < poses_move_until;
   parallel_for(shard_count, [&](int shard) {
     BlockGradients& gradients = shards_[static_cast<std::size_t>(shard)];
     gradients.reset(field_);
     for (int b = shard; b < count; b += shard_count) {
       Block& block = blocks_[static_cast<std::size_t>(b)];
-      draw(block, b * rays_per_block, std::min(rays, (b + 1) * rays_per_block), progress);
+      draw(block, b * rays_per_block, std::min(plan.rays, (b + 1) * rays_per_block), plan,
+           progress);
       forward(field_, kernels_, {}, block.rays);
       backward(field_, kernels_, loss, block.targets, block.rays, gradients, block.grid);
-      if (posing) watch_poses(block, pose_shards_[static_cast<std::size_t>(shard)]);
+      if (plan.posing) watch_poses(block, pose_shards_[static_cast<std::size_t>(shard)]);
       if (with_proposals)
         gradients.interlevel += backward_proposals(field_, kernels_, block.rays, loss.per_ray,
                                                    block.proposals, gradients.proposals);
@@ -179,41 +210,43 @@ bool Trainer::step(double progress) {
     shards_[0].add(shards_[static_cast<std::size_t>(shard)]);
   const BlockGradients& gradients = shards_[0];
 
-  long drawn = 0, samples = 0;
+  device::StepOutcome done;
   for (int b = 0; b < count; ++b) {
     const RayBlock& block = blocks_[static_cast<std::size_t>(b)].rays;
-    drawn += static_cast<long>(block.rays.size());
-    samples += block.samples();
+    done.rays += static_cast<long>(block.rays.size());
+    done.samples += block.samples();
   }
-  rays_ += drawn;
-  samples_ += samples;
-  const bool finite = gradients.all_parts_finite();
-  if (finite && drawn > 0) {
-    AdamStep adam;
-    const double scheduled = schedule(field_.step, progress);
-    adam.learning_rate = static_cast<float>(o.learning_rate * scheduled);
-    adam.correction1 = static_cast<float>(1.0 / (1 - std::pow(adam.beta1, field_.step + 1)));
-    adam.correction2 = static_cast<float>(1.0 / (1 - std::pow(adam.beta2, field_.step + 1)));
-    AdamStep network = adam;
-    network.learning_rate = static_cast<float>(o.network_learning_rate * scheduled);
-    network.weight_decay = 1e-6f;
-    apply(adam, network, gradients, with_proposals);
-    const double mse =
-        gradients.squared_error / static_cast<double>(std::max(1l, gradients.channels));
+  done.channels = gradients.channels;
+  done.squared_error = gradients.squared_error;
+  done.finite = gradients.all_parts_finite();
+  if (done.finite && done.rays > 0) apply(plan, gradients, with_proposals);
+  field_.device_copy.forget();
+  return done;
+}
+
+/// Of a step: the running error, and how many rays the next one gets.
+void Trainer::take_account(const device::StepOutcome& done) {
+  rays_ += done.rays;
+  samples_ += done.samples;
+  if (done.finite && done.rays > 0) {
+    const double mse = done.squared_error / static_cast<double>(std::max(1l, done.channels));
     const double psnr = -10 * std::log10(std::max(mse, 1e-12));
     field_.train_psnr = field_.step == 0 ? psnr : 0.98 * field_.train_psnr + 0.02 * psnr;
   }
-  const double per_ray = static_cast<double>(samples) / static_cast<double>(std::max(1l, drawn));
+  const double per_ray =
+      static_cast<double>(done.samples) / static_cast<double>(std::max(1l, done.rays));
   field_.samples_per_ray =
       field_.step == 0 ? per_ray : 0.9 * field_.samples_per_ray + 0.1 * per_ray;
-  if (!proposing()) {
+  if (!proposing())
     field_.rays_per_step = std::clamp(
-        static_cast<int>(o.samples_per_step / std::max(1.0, field_.samples_per_ray)), 128, 16384);
-    if (finite) update_occupancy(progress);
-  }
-  ++field_.step;
-  if (posing) move_views();
-  return finite;
+        static_cast<int>(field_.options.samples_per_step / std::max(1.0, field_.samples_per_ray)),
+        128, 16384);
+}
+
+void Trainer::settle() {
+  if (!device_) return;
+  device::take_back(device_->fetch(), field_);
+  collect_pose_sums();
 }
 
 /// By how much each ray's picture differs, and at what distance it saw what it shows.
@@ -237,29 +270,44 @@ void Trainer::watch_poses(const Block& block, std::vector<PoseSums>& sums) const
   }
 }
 
-void Trainer::move_views() {
+/// What the views' rays have said since the last call joins what is pending.
+void Trainer::collect_pose_sums() {
+  if (!field_.options.refine_poses) return;
+  const std::vector<device::ViewSums> noted =
+      device_ ? device_->take_pose_sums() : std::vector<device::ViewSums>();
   for (const int index : training_) {
     const auto view = static_cast<std::size_t>(index);
-    RefinedPose& refined = field_.refined_poses[view];
+    PoseSums& pending = field_.refined_poses[view].pending;
+    if (device_ && noted[view].rays > 0) pending.add(device::sums_of(noted[view]));
     for (std::vector<PoseSums>& shard : pose_shards_) {
-      if (shard[view].rays > 0) refined.pending.add(shard[view]);
+      if (shard[view].rays > 0) pending.add(shard[view]);
       shard[view] = {};
-    }
-    if (field_.step % pose_every == 0 && refined.pending.rays >= fewest_pose_rays) {
-      take_step(refined.pending, field_.space, refined, views_[view]);
-      refined.pending = {};
     }
   }
 }
 
-void Trainer::apply(const AdamStep& grid_step, const AdamStep& network_step,
-                    const BlockGradients& gradients, bool with_proposals) {
+void Trainer::move_views() {
+  const bool due = field_.step % pose_every == 0;
+  if (!device_ || due) collect_pose_sums();
+  if (!due) return;
+  for (const int index : training_) {
+    const auto view = static_cast<std::size_t>(index);
+    RefinedPose& refined = field_.refined_poses[view];
+    if (refined.pending.rays < fewest_pose_rays) continue;
+    take_step(refined.pending, field_.space, refined, views_[view]);
+    refined.pending = {};
+    if (device_) device_->place(index, views_[view].rays.numbers());
+  }
+}
+
+void Trainer::apply(const device::StepPlan& plan, const BlockGradients& gradients,
+                    bool with_proposals) {
   // Nothing is written by two of these. Finer levels are larger, and the grids take the longest.
   std::vector<std::function<void()>> tasks;
   const auto update_grid = [&](HashEncoding& grid, const auto& gradient_of) {
     for (std::size_t index = grid.levels.size(); index-- > 0;) {
       if (grid.level_weight[index] <= 0) continue;
-      tasks.emplace_back([this, &grid, &grid_step, gradient_of, index] {
+      tasks.emplace_back([this, &grid, &plan, gradient_of, index] {
         const GridLevel& level = grid.levels[index];
         const GridTable::Level table = grid.table.level(grid.levels, index);
         for (const Block& block : blocks_) {
@@ -270,7 +318,7 @@ void Trainer::apply(const AdamStep& grid_step, const AdamStep& network_step,
                                             static_cast<std::size_t>(grid.features));
         }
         // At once, while the lines are in the cache.
-        kernels_.adam_lines(grid_step, table.words, table.touched, table.lines,
+        kernels_.adam_lines(plan.grid, table.words, table.touched, table.lines,
                             grid.half.data() + level.offset);
       });
     }
@@ -285,11 +333,11 @@ void Trainer::apply(const AdamStep& grid_step, const AdamStep& network_step,
                            level.grid.data()};
     });
   if (!proposing()) tasks.emplace_back([this] { record_densities(); });
-  tasks.emplace_back([&] { apply_to_networks(network_step, gradients, with_proposals); });
+  tasks.emplace_back([&] { apply_to_networks(plan, gradients, with_proposals); });
   parallel_tasks(tasks);
 }
 
-void Trainer::apply_to_networks(const AdamStep& network_step, const BlockGradients& gradients,
+void Trainer::apply_to_networks(const device::StepPlan& plan, const BlockGradients& gradients,
                                 bool with_proposals) {
   const auto update = [&](Parameters& p, const std::vector<float>& grad, const AdamStep& step) {
     std::copy(grad.begin(), grad.end(), p.grad.begin());
@@ -297,18 +345,15 @@ void Trainer::apply_to_networks(const AdamStep& network_step, const BlockGradien
                   p.second.data(), p.grad.data());
   };
   const auto update_network = [&](Mlp& network, const std::vector<float>& grad) {
-    update(network.weights, grad, network_step);
+    update(network.weights, grad, plan.network);
     network.refresh();
   };
   update_network(field_.main.mlp, gradients.mlp);
   update_network(field_.color, gradients.color);
   for (std::size_t k = 0; with_proposals && k < field_.proposals.size(); ++k)
     update_network(field_.proposals[k].mlp, gradients.proposals[k]);
-  if (field_.options.per_image_offset) {
-    AdamStep slow = network_step;
-    slow.learning_rate *= 0.1f;
-    slow.weight_decay = 0;
-    update(field_.image_offsets, gradients.offsets, slow);
+  if (plan.with_offsets) {
+    update(field_.image_offsets, gradients.offsets, plan.offsets);
     // The mean offset is the scene's temperature, not drift.
     double mean = 0;
     for (const int v : training_) mean += field_.image_offsets.value[static_cast<std::size_t>(v)];
@@ -316,54 +361,6 @@ void Trainer::apply_to_networks(const AdamStep& network_step, const BlockGradien
     for (const int v : training_)
       field_.image_offsets.value[static_cast<std::size_t>(v)] -= static_cast<float>(mean);
   }
-}
-
-void Trainer::record_densities() {
-  for (const Block& block : blocks_) {
-    const RayBlock& b = block.rays;
-    for (std::size_t r = 0; r < b.rays.size(); ++r)
-      for (int i = b.first[r]; i < b.first[r] + b.used[r]; ++i) {
-        const auto k = static_cast<std::size_t>(i);
-        const float before = i > b.first[r] ? b.light[k - 1] : 1.0f;
-        field_.occupancy.record(&b.position[3 * k], before * b.sigma[k]);
-      }
-  }
-}
-
-void Trainer::update_occupancy(double progress) {
-  if (field_.step < occupancy_warmup || field_.step % occupancy_every != 0) return;
-  // Relaxed late, so that nothing thin is lost once geometry has settled.
-  const double threshold = field_.options.occupancy_threshold * (progress < 0.6 ? 1.0 : 0.3);
-  probe_cells();
-  field_.occupancy.update(0.95f, static_cast<float>(threshold));
-}
-
-/// Brings cells back: neighbours of occupied cells whose density is above the threshold.
-void Trainer::probe_cells() {
-  Occupancy& grid = field_.occupancy;
-  constexpr int probes = 4096;
-  std::vector<float> position, sigma(probes);
-  const auto cells = static_cast<std::uint64_t>(grid.cell_count());
-  for (int i = 0; i < probes * 16 && static_cast<int>(position.size()) < 3 * probes; ++i) {
-    const std::uint64_t bits = random_bits(
-        field_.options.seed, probe_stream,
-        static_cast<std::uint64_t>(field_.step) * probes * 16 + static_cast<unsigned>(i));
-    const auto cell = static_cast<std::int64_t>(bits % cells);
-    if (!Occupancy::test(grid.on, cell)) continue;
-    float x[3];
-    grid.center_of(cell, x);
-    const int cascade = static_cast<int>(cell / (grid.cell_count() / grid.cascades));
-    for (int d = 0; d < 3; ++d)
-      x[d] += grid.cell_size(cascade) * 3.0f *
-              (uniform01(random_bits(bits, 7, static_cast<unsigned>(d))) - 0.5f);
-    const int at = Occupancy::cascade_of(x);
-    if (at >= grid.cascades || Occupancy::test(grid.on, grid.cell_of(at, x))) continue;
-    position.insert(position.end(), x, x + 3);
-  }
-  const int count = static_cast<int>(position.size() / 3);
-  densities(field_.main, kernels_, position.data(), count, sigma.data());
-  for (int i = 0; i < count; ++i)
-    grid.record(&position[static_cast<std::size_t>(3 * i)], sigma[static_cast<std::size_t>(i)]);
 }
 
 }  // namespace orbitfuse::nerf

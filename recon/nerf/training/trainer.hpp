@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "recon/nerf/device/engine.hpp"
 #include "recon/nerf/field/field_state.hpp"
 #include "recon/nerf/rendering/proposal.hpp"
 #include "recon/nerf/training/backward.hpp"
@@ -12,7 +13,9 @@
 
 namespace orbitfuse::nerf {
 
-/// The optimisation loop's one turn: draw rays, march, forward, backward, scatter, Adam.
+/// The optimisation loop's one turn: draw rays, march, forward, backward, scatter, Adam. Where a
+/// device is in use (recon/nerf/device) and can, it makes the turn; then the field's parameters
+/// here are those of the last settle(). Its functions throw device::Refused.
 class Trainer {
  public:
   /// `heldout[i]` views are never drawn from.
@@ -23,6 +26,9 @@ class Trainer {
   /// One step; `progress` in [0, 1] is the place in the schedule. False: a gradient was not
   /// finite, nothing was changed.
   bool step(double progress);
+
+  /// Brings the field's parameters, occupancy and pending pose sums up to date.
+  void settle();
 
   long rays() const { return rays_; }
   long samples() const { return samples_; }
@@ -36,17 +42,21 @@ class Trainer {
     std::vector<DrawnRay> drawn;
   };
 
-  void draw(Block& block, int begin, int end, double progress);
+  void draw(Block& block, int begin, int end, const device::StepPlan& plan, double progress);
   bool proposing() const { return field_.options.sampling == Sampling::proposal; }
   bool proposals_learn(double progress) const;
-  void apply(const AdamStep& grid_step, const AdamStep& network_step,
-             const BlockGradients& gradients, bool with_proposals);
-  void apply_to_networks(const AdamStep& network_step, const BlockGradients& gradients,
+  device::StepPlan plan(double progress) const;
+  void bring_in_levels(double progress);
+  device::StepOutcome step_here(const device::StepPlan& plan, double progress);
+  void take_account(const device::StepOutcome& outcome);
+  void apply(const device::StepPlan& plan, const BlockGradients& gradients, bool with_proposals);
+  void apply_to_networks(const device::StepPlan& plan, const BlockGradients& gradients,
                          bool with_proposals);
   void record_densities();
   void update_occupancy(double progress);
   void probe_cells();
   void watch_poses(const Block& block, std::vector<PoseSums>& sums) const;
+  void collect_pose_sums();
   void move_views();
 
   FieldState& field_;
@@ -58,6 +68,7 @@ class Trainer {
   std::vector<Block> blocks_;
   std::vector<BlockGradients> shards_;
   std::vector<std::vector<PoseSums>> pose_shards_;  ///< [shard][view] of one step (refine_poses)
+  std::unique_ptr<device::Steps> device_;           ///< null: the processor
   long rays_ = 0, samples_ = 0;
 };
 

@@ -180,6 +180,7 @@ void TrainingRun::pause() {
 
 Status TrainingRun::save() {
   if (options_.checkpoint.empty()) return {};
+  trainer_->settle();
   last_saved_ = wall_seconds();
   return save_state(*state_, options_.checkpoint);
 }
@@ -194,6 +195,7 @@ void TrainingRun::tell(double fraction, double wall_s) const {
 double TrainingRun::evaluate(double fraction) {
   const TraceSpan span("held-out views");
   pause();
+  if (data_.measuring()) trainer_->settle();
   const double psnr = heldout_psnr(*state_, views_, data_.heldout,
                                    options_.refine_poses && fraction > poses_move_from);
   state_->history.curve.push_back({watch_.cpu_s, watch_.wall_s, state_->step, psnr,
@@ -260,6 +262,7 @@ Status TrainingRun::loop() {
       watch_.go_on();
     }
   }
+  trainer_->settle();
   pause();
   const int skipped = state_->history.skipped_steps;
   if (skipped > 0 && trainer_->rays() > 0 && skipped == state_->step)

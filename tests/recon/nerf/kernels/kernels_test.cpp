@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Every instruction set's kernels against double-precision references.
+// Every instruction set's and device's kernels against double-precision references.
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -9,6 +9,7 @@
 #include "core/numeric/random.hpp"
 #include "recon/nerf/field/network.hpp"
 #include "recon/nerf/kernels/spherical_harmonics.hpp"
+#include "tests/recon/nerf/device/machines.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
@@ -53,14 +54,18 @@ std::vector<double> encode_reference(const HashEncoding& grid, std::size_t l, co
   return out;
 }
 
-class KernelsTest : public ::testing::TestWithParam<Isa> {
+class KernelsTest : public ::testing::TestWithParam<std::string> {
  protected:
   void SetUp() override {
-    if (GetParam() > best_isa()) GTEST_SKIP() << "this processor has no " << name(GetParam());
+    kernels_ = test::kernels_named(GetParam());
+    if (!kernels_) GTEST_SKIP() << "no " << GetParam() << " here";
   }
-  const Kernels& kernels() const { return kernels_for(GetParam()); }
+  const Kernels& kernels() const { return *kernels_; }
   /// Relative to the largest magnitude: fp32 rounding, or bf16's 8 bits of mantissa.
   double tolerance() const { return kernels().isa >= Isa::avx512bf16 ? 1e-2 : 2e-6; }
+
+ private:
+  std::optional<Kernels> kernels_;
 };
 
 TEST_P(KernelsTest, EncodingIsTrilinearAndHashedAsPublished) {
@@ -220,9 +225,11 @@ TEST_P(KernelsTest, AdamOfLinesIsThatOfListsWhereALineIsTouched) {
   EXPECT_EQ(touched, std::vector<std::uint64_t>(touched.size()));
 }
 
-INSTANTIATE_TEST_SUITE_P(EveryIsa, KernelsTest,
-                         ::testing::Values(Isa::avx2, Isa::avx512, Isa::avx512bf16, Isa::amx),
-                         [](const auto& instance) { return std::string(name(instance.param)); });
+INSTANTIATE_TEST_SUITE_P(EveryMachine, KernelsTest,
+                         ::testing::Values(name(Isa::avx2), name(Isa::avx512),
+                                           name(Isa::avx512bf16), name(Isa::amx), "emulated",
+                                           "cuda"),
+                         [](const auto& instance) { return std::string(instance.param); });
 
 // Orthonormal on the sphere: the quadrature of Y_i Y_j over many directions is the identity.
 TEST(SphericalHarmonics, AreOrthonormal) {

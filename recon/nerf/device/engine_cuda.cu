@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#define ORBITFUSE_ENGINE cuda
+#include "recon/nerf/device/as_kernels.hpp"
+#include "recon/nerf/device/tracing.hpp"
+#include "recon/nerf/device/training_steps.hpp"
+
+namespace orbitfuse::nerf::device {
+namespace {
+
+class CudaEngine final : public Engine {
+ public:
+  CudaEngine() {
+    int count = 0;
+    cuda::check(cudaGetDeviceCount(&count));
+    if (count == 0) throw Refused{"no CUDA device"};
+    cudaDeviceProp properties;
+    cuda::check(cudaGetDeviceProperties(&properties, 0));
+    name_ = properties.name;
+  }
+  std::string name() const override { return name_; }
+  std::unique_ptr<Steps> steps(const FieldNumbers& field,
+                               const std::vector<Photo>& photos) override {
+    return std::make_unique<cuda::TrainingSteps>(field, photos);
+  }
+  std::unique_ptr<Tracer> tracer(const FieldNumbers& field) override {
+    return std::make_unique<cuda::FieldTracer>(field);
+  }
+  Kernels kernels() const override { return cuda::as_kernels(); }
+  void time_kernels() override { cuda::launch_times().wanted = true; }
+  std::vector<KernelTime> kernel_times() const override { return cuda::launch_times().all(); }
+
+ private:
+  std::string name_;
+};
+
+}  // namespace
+
+std::unique_ptr<Engine> cuda_engine() { return std::make_unique<CudaEngine>(); }
+
+}  // namespace orbitfuse::nerf::device

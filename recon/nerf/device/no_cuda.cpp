@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// In place of engine_cuda.cu.
+#include "recon/nerf/device/engine.hpp"
+
+namespace orbitfuse::nerf::device {
+
+std::unique_ptr<Engine> cuda_engine() {
+  throw Refused{"this build computes on the processor only (configure with -DORBITFUSE_CUDA=ON)"};
+}
+
+}  // namespace orbitfuse::nerf::device

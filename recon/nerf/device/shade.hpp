@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "recon/nerf/device/engine.hpp"
+#include "recon/nerf/device/march.hpp"
+#include "recon/nerf/field/network_shape.hpp"
+#include "recon/nerf/kernels/compositing.hpp"
+#include "recon/nerf/kernels/spherical_harmonics.hpp"
+
+// From densities to what rays show, as forward() and ray_value() of ray_block.hpp. All samples have
+// a density here: what lies behind the one that stops a ray costs less than finding out.
+namespace orbitfuse::nerf::ORBITFUSE_ENGINE {
+
+/// Along the rays, and of each ray.
+struct Light {
+  float *sigma, *weight, *left;  ///< left: transmittance after the sample
+  int* used;                     ///< per ray: samples before it went dark
+  int* colored;                  ///< per ray: samples that get a colour, the background among them
+};
+
+/// How many samples the processor would have looked at: it goes by rounds of so many.
+constexpr int samples_per_round = 8;
+
+struct Composite {
+  const DeviceRay* rays;
+  Samples samples;
+  Rows density;
+  float stop, min_weight;
+  Light light;
+
+  ORBITFUSE_HOST_DEVICE void operator()(int r) const {
+    light.colored[r] = light.used[r] = 0;
+    if (!rays[r].there) return;
+    const int begin = samples.first[r], end = samples.first[r + 1] - 1;  // end: the background
+    for (int i = begin; i < end; ++i) light.sigma[i] = density_of(density(0, i));
+    const int used = composite(end - begin, light.sigma + begin, samples.dt + begin, stop,
+                               light.weight + begin, light.left + begin);
+    int colored = 0;
+    for (int i = begin; i < begin + used; ++i) colored += light.weight[i] >= min_weight;
+    light.weight[end] = used > 0 ? light.left[begin + used - 1] : 1.0f;
+    light.used[r] = used;
+    light.colored[r] = colored + (light.weight[end] >= min_weight);
+  }
+};
+
+struct ListColored {
+  const DeviceRay* rays;
+  Samples samples;
+  Light light;
+  float min_weight;
+  const int* first_row;
+  int *sample_of, *ray_of;  ///< of each row
+
+  ORBITFUSE_HOST_DEVICE void operator()(int r) const {
+    if (!rays[r].there) return;
+    const int begin = samples.first[r], end = samples.first[r + 1] - 1;
+    int row = first_row[r];
+    const auto list = [&](int sample) {
+      if (light.weight[sample] < min_weight) return;
+      sample_of[row] = sample;
+      ray_of[row++] = r;
+    };
+    for (int i = begin; i < begin + light.used[r]; ++i) list(i);
+    list(end);
+  }
+};
+
+struct ColorInput {
+  const DeviceRay* rays;
+  Rows density;
+  const int *sample_of, *ray_of, *counted;
+  int sh_degree;
+  Rows in;  ///< color_inputs
+
+  ORBITFUSE_HOST_DEVICE void operator()(int row) const {
+    if (row >= *counted) return;
+    for (int k = 0; k < density_outputs; ++k) in(k, row) = density(k, sample_of[row]);
+    float harmonics[max_sh];
+    spherical_harmonics(sh_degree, rays[ray_of[row]].ray.direction, harmonics);
+    for (int k = 0; k < max_sh; ++k) in(density_outputs + k, row) = harmonics[k];
+  }
+};
+
+/// What a colour network's output means.
+struct Shade {
+  int channels;
+  bool bounded;  ///< colours are; temperatures are not: beyond the span there may be a hotter spot
+  ORBITFUSE_HOST_DEVICE float value(float raw) const {
+    return bounded ? 1.0f / (1.0f + expf(-raw)) : 0.5f + raw;
+  }
+  ORBITFUSE_HOST_DEVICE float slope(float value) const {
+    return bounded ? value * (1 - value) : 1.0f;
+  }
+};
+
+/// Sum of weight * value over a ray's coloured samples.
+ORBITFUSE_HOST_DEVICE inline void ray_value(const Shade& shade, Rows color, const float* weight,
+                                            const int* sample_of, int begin, int end,
+                                            float out[3]) {
+  for (int c = 0; c < 3; ++c) out[c] = 0;
+  for (int row = begin; row < end; ++row)
+    for (int c = 0; c < shade.channels; ++c)
+      out[c] += weight[sample_of[row]] * shade.value(color(c, row));
+}
+
+/// As ImageRenderer writes a ray.
+struct ReadRays {
+  const DeviceRay* rays;
+  Samples samples;
+  Light light;
+  Rows color;
+  Shade shade;
+  const int *first_row, *sample_of;
+  float stop, no_distance, no_limit;
+  TracedRay* out;
+
+  ORBITFUSE_HOST_DEVICE void operator()(int r) const {
+    TracedRay& ray = out[r];
+    ray = {{0, 0, 0}, no_distance, 0, 0, no_limit, rays[r].ray.forward, false, rays[r].there};
+    if (!ray.there) return;
+    ray_value(shade, color, light.weight, sample_of, first_row[r], first_row[r + 1], ray.value);
+    const int begin = samples.first[r], end = begin + light.used[r];
+    if (end == begin) return;
+    constexpr float all_but_nothing = 0.98f, least_light = 0.8f;
+    bool fading = false, half_gone = false;
+    for (int i = begin; i < end && !half_gone; ++i) {
+      const float before = i > begin ? light.left[i - 1] : 1.0f, after = light.left[i];
+      if (!fading && after < all_but_nothing) {
+        fading = true;
+        ray.begin = i > begin ? samples.t[i - 1] : fmaxf(0.0f, samples.t[i] - samples.dt[i]);
+      }
+      if (after < 0.5f) {
+        half_gone = true;
+        const float part = (before - 0.5f) / fmaxf(1e-6f, before - after);
+        ray.distance = samples.t[i] + (part - 0.5f) * samples.dt[i];
+      }
+    }
+    const float last = light.left[end - 1];
+    ray.opacity = 1 - last;
+    ray.starts_dark = light.left[begin] < least_light;
+    if (last < stop) ray.end = samples.t[end - 1] + samples.dt[end - 1];
+  }
+};
+
+}  // namespace orbitfuse::nerf::ORBITFUSE_ENGINE

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <limits>
+
+#include "recon/nerf/device/field_store.hpp"
+
+namespace orbitfuse::nerf::ORBITFUSE_ENGINE {
+
+constexpr int rays_per_batch = 1 << 15;  ///< about 1 GB of activations at 24 samples a ray
+
+class FieldTracer final : public device::Tracer {
+ public:
+  explicit FieldTracer(const device::FieldNumbers& field) : field_(field) {}
+
+  void trace(const device::TraceRequest* wanted, int count, const device::TraceSettings& settings,
+             TracedRay* out) override {
+    for (int begin = 0; begin < count; begin += rays_per_batch) {
+      const int n = count - begin < rays_per_batch ? count - begin : rays_per_batch;
+      rays_.clear();
+      for (int i = begin; i < begin + n; ++i) {
+        DeviceRay ray{};
+        ray.ray = wanted[i].ray;
+        ray.near = wanted[i].near;
+        ray.far = wanted[i].far;
+        ray.jitter = 0.5f;
+        ray.there = wanted[i].there;
+        rays_.push_back(ray);
+      }
+      pass_.rays.upload(rays_);
+      pass_.run(field_, n, settings.march, settings.stop, settings.min_weight);
+      traced_.need(static_cast<std::size_t>(n));
+      launch(n, ReadRays{pass_.rays.data(), pass_.samples, pass_.light,
+                         pass_.color.out(field_.color.layers), field_.shade, pass_.first_row.data(),
+                         pass_.sample_of.data(), settings.stop,
+                         std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::max(),
+                         traced_.data()});
+      copy_from(out + begin, traced_.data(), static_cast<std::size_t>(n) * sizeof(TracedRay));
+    }
+  }
+
+ private:
+  FieldStore field_;
+  ForwardPass pass_;
+  std::vector<DeviceRay> rays_;
+  Buffer<TracedRay> traced_;
+};
+
+}  // namespace orbitfuse::nerf::ORBITFUSE_ENGINE

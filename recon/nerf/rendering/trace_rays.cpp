@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/nerf/rendering/trace_rays.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "core/system/parallel.hpp"
+#include "recon/nerf/device/on_device.hpp"
+#include "recon/nerf/rendering/proposal.hpp"
+
+namespace orbitfuse::nerf {
+namespace {
+
+constexpr int rays_per_block = 64;
+
+/// Ray r of a block, whose rows begin at `row`.
+TracedRay read_ray(const FieldState& field, const RayBlock& block, std::size_t r, float stop,
+                   int& row) {
+  TracedRay out{{0, 0, 0},
+                std::numeric_limits<float>::quiet_NaN(),
+                0,
+                0,
+                std::numeric_limits<float>::max(),
+                block.rays[r].forward,
+                false,
+                true};
+  ray_value(field, block, static_cast<int>(r), row, out.value);
+  const auto begin = static_cast<std::size_t>(block.first[r]),
+             end = begin + static_cast<std::size_t>(block.used[r]);
+  if (end == begin) return out;
+  const auto fades_below = [&](float light) {
+    std::size_t i = begin;
+    while (i < end && !(block.light[i] < light)) ++i;
+    return i;
+  };
+  constexpr float all_but_nothing = 0.98F, least_light = 0.8F;
+  if (const std::size_t i = fades_below(all_but_nothing); i < end)
+    out.begin = i > begin ? block.t[i - 1] : std::max(0.0F, block.t[i] - block.dt[i]);
+  // Median depth stays on a surface where a mean would float between two.
+  if (const std::size_t i = fades_below(0.5F); i < end) {
+    const float before = i > begin ? block.light[i - 1] : 1.0F;
+    const float part = (before - 0.5F) / std::max(1e-6F, before - block.light[i]);
+    out.distance = block.t[i] + (part - 0.5F) * block.dt[i];
+  }
+  const float left = block.light[end - 1];
+  out.opacity = 1 - left;
+  out.starts_dark = block.light[begin] < least_light;
+  if (left < stop) out.end = block.t[end - 1] + block.dt[end - 1];
+  return out;
+}
+
+void trace_on_processor(const FieldState& field, const ForwardSettings& limits,
+                        const MarchSettings& march, int count, const RayOf& ray_of,
+                        TracedRay* out) {
+  const Kernels& kernels = kernels_for(best_isa());
+  parallel_blocks(count, rays_per_block, [&](int begin, int end) {
+    thread_local RayBlock block;
+    thread_local ProposalBlock proposals;
+    thread_local std::vector<DrawnRay> drawn;
+    thread_local std::vector<int> index;
+    block.clear();
+    drawn.clear();
+    index.clear();
+    for (int i = begin; i < end; ++i) {
+      out[i].there = false;
+      DrawnRay ray;
+      if (!ray_of(i, ray)) continue;
+      drawn.push_back(ray);
+      index.push_back(i);
+    }
+    if (drawn.empty()) return;
+    if (field.options.sampling == Sampling::proposal)
+      add_proposed(field, kernels, drawn, {.near = march.near}, proposals, block);
+    else
+      block.add(field.occupancy, march, drawn);
+    forward(field, kernels, limits, block);
+    int row = 0;
+    for (std::size_t r = 0; r < index.size(); ++r)
+      out[index[r]] = read_ray(field, block, r, limits.stop, row);
+  });
+}
+
+void trace_on_device(device::Engine& engine, const FieldState& field, const ForwardSettings& limits,
+                     const MarchSettings& march, int count, const RayOf& ray_of, TracedRay* out) {
+  std::vector<device::TraceRequest> rays(static_cast<std::size_t>(count));
+  parallel_blocks(count, rays_per_block, [&](int begin, int end) {
+    for (int i = begin; i < end; ++i) {
+      DrawnRay ray;
+      const bool there = ray_of(i, ray);
+      rays[static_cast<std::size_t>(i)] = {ray.ray, ray.near, ray.far, there};
+    }
+  });
+  field.device_copy.with(
+      [&] { return engine.tracer(device::numbers_of(field)); },
+      [&](device::Tracer& tracer) {
+        tracer.trace(rays.data(), count, {march, limits.stop, limits.min_weight}, out);
+      });
+}
+
+}  // namespace
+
+void trace_rays(const FieldState& field, const ForwardSettings& limits, const MarchSettings& march,
+                int count, const RayOf& ray_of, TracedRay* out) {
+  device::Engine* engine = device::current();
+  if (engine != nullptr && field.options.sampling == Sampling::occupancy)
+    trace_on_device(*engine, field, limits, march, count, ray_of, out);
+  else
+    trace_on_processor(field, limits, march, count, ray_of, out);
+}
+
+}  // namespace orbitfuse::nerf

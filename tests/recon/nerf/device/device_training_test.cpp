@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Whole trainings on a device: as good as the processor's, repeatable, resumable.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+
+#include "core/geometry/rotation_vector.hpp"
+#include "core/system/file_io.hpp"
+#include "recon/nerf/training/measure.hpp"
+#include "tests/recon/nerf/device/machines.hpp"
+#include "tests/recon/nerf/toy_scene.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace orbitfuse::nerf {
+namespace {
+
+class DeviceTraining : public ::testing::TestWithParam<std::string> {
+ protected:
+  void SetUp() override {
+    auto engine = test::engine_named(GetParam());
+    if (!engine) GTEST_SKIP() << "no " << GetParam() << " here";
+  }
+  test::InUse in_use() const { return test::InUse(test::engine_named(GetParam())); }
+};
+
+TrainOptions small_options(Modality modality, int iterations) {
+  TrainOptions options = test::toy_options(modality, iterations);
+  options.samples_per_step = 2048;
+  options.hidden = options.color_hidden = 16;
+  return options;
+}
+
+Dataset measured_scene(Modality modality) {
+  Dataset data = test::toy_scene(modality, 9);
+  data.depth = test::toy_depth(data);
+  data.views[0].measure_only = true;
+  return data;
+}
+
+std::string bytes_of(const Field& field, const orbitfuse::test::TempFolder& folder) {
+  const auto file = folder / "field.bin";
+  EXPECT_TRUE(field.save(file));
+  return read_file(file).value();
+}
+
+// One training of another rounding ends a few tenths of a decibel elsewhere; the mean of some
+// doesn't.
+TEST_P(DeviceTraining, IsAsGoodAsTheProcessors) {
+  constexpr int seeds = 3;
+  for (const Modality modality : {Modality::visible, Modality::thermal}) {
+    SCOPED_TRACE(name(modality));
+    const Dataset data = measured_scene(modality);
+    double reference_db = 0, device_db = 0;
+    for (int seed = 1; seed <= seeds; ++seed) {
+      TrainOptions options = small_options(modality, 160);
+      options.seed = static_cast<std::uint64_t>(seed);
+      Field here, there;
+      const auto reference = train(data, options, {}, here);
+      ASSERT_TRUE(reference);
+      const auto used = in_use();
+      const auto report = train(data, options, {}, there);
+      ASSERT_TRUE(report);
+      reference_db += reference->best_psnr / seeds;
+      device_db += report->best_psnr / seeds;
+      EXPECT_NEAR(report->samples_per_ray(), reference->samples_per_ray(), 1.0);
+      const double on = here.state().occupancy.fraction_on();
+      EXPECT_NEAR(there.state().occupancy.fraction_on(), on, 0.2 * on);
+    }
+    EXPECT_GT(reference_db, 14);
+    EXPECT_NEAR(device_db, reference_db, 0.4);
+  }
+}
+
+TEST_P(DeviceTraining, TwiceAndBrokenOffGivesTheSameBytes) {
+  const orbitfuse::test::TempFolder folder;
+  const Dataset data = measured_scene(Modality::thermal);
+  TrainOptions options = small_options(Modality::thermal, 120);
+  options.eval_count = 6;
+  const auto used = in_use();
+  Field once, again, resumed;
+  ASSERT_TRUE(train(data, options, {}, once));
+  ASSERT_TRUE(train(data, options, {}, again));
+  const std::string bytes = bytes_of(once, folder);
+  EXPECT_TRUE(bytes == bytes_of(again, folder));
+
+  options.checkpoint = folder / "checkpoint.bin";
+  std::atomic<bool> cancel = false;
+  Progress progress;
+  progress.cancel = &cancel;
+  progress.report = [&](const ProgressEvent& event) { cancel = event.done >= 60; };
+  ASSERT_FALSE(train(data, options, progress, resumed));
+  options.resume = true;
+  ASSERT_TRUE(train(data, options, {}, resumed));
+  EXPECT_TRUE(bytes == bytes_of(resumed, folder));
+}
+
+TEST_P(DeviceTraining, ACheckpointGoesOnOnTheProcessor) {
+  const orbitfuse::test::TempFolder folder;
+  const Dataset data = measured_scene(Modality::visible);
+  TrainOptions options = small_options(Modality::visible, 120);
+  options.checkpoint = folder / "checkpoint.bin";
+  std::atomic<bool> cancel = false;
+  Progress progress;
+  progress.cancel = &cancel;
+  progress.report = [&](const ProgressEvent& event) { cancel = event.done >= 60; };
+  Field field;
+  {
+    const auto used = in_use();
+    ASSERT_FALSE(train(data, options, progress, field));
+  }
+  options.resume = true;
+  const auto report = train(data, options, {}, field);
+  ASSERT_TRUE(report);
+  EXPECT_EQ(report->iterations, 120);
+  EXPECT_GT(report->best_psnr, 14);
+}
+
+TEST_P(DeviceTraining, PosesMoveAsOnTheProcessor) {
+  Dataset data = measured_scene(Modality::thermal);
+  const Eigen::Vector3d turn(0, 0.01, 0.005);
+  data.views[2].cam_from_world =
+      Rigid3d{turned_by(turn), {0.01, 0, 0}} * data.views[2].cam_from_world;
+  TrainOptions options = small_options(Modality::thermal, 240);
+  options.samples_per_step = 8192;
+  ASSERT_TRUE(options.refine_poses);
+  const auto moved = [&](std::map<std::string, Rigid3d>& poses) {
+    Field field;
+    const auto report = train(data, options, {}, field);
+    ASSERT_TRUE(report);
+    poses = report->refined_poses;
+  };
+  std::map<std::string, Rigid3d> here, there;
+  moved(here);
+  {
+    const auto used = in_use();
+    moved(there);
+  }
+  double largest = 0;
+  for (const TrainingView& view : data.views) {
+    if (view.measure_only) continue;
+    const Rigid3d &a = here.at(view.name), &b = there.at(view.name);
+    largest = std::max(largest, rotation_angle_deg(a.rotation, view.cam_from_world.rotation));
+    EXPECT_LT(rotation_angle_deg(a.rotation, b.rotation), 0.1) << view.name;
+    EXPECT_LT((camera_center(a) - camera_center(b)).norm(), 0.005) << view.name;
+  }
+  EXPECT_GT(largest, 0.1);
+}
+
+INSTANTIATE_TEST_SUITE_P(Every, DeviceTraining, ::testing::Values("emulated", "cuda"),
+                         [](const auto& instance) { return std::string(instance.param); });
+
+TEST(DeviceTrainingOfProposals, StaysOnTheProcessor) {
+  const test::InUse used(device::emulated_engine());
+  TrainOptions options = small_options(Modality::visible, 4);
+  options.sampling = Sampling::proposal;
+  options.fine_samples = 8;
+  Field field;
+  ASSERT_TRUE(train(measured_scene(Modality::visible), options, {}, field));
+  const Dataset data = measured_scene(Modality::visible);
+  EXPECT_TRUE(render(field, data.views[0].camera, data.views[0].cam_from_world, {}, {}));
+}
+
+}  // namespace
+}  // namespace orbitfuse::nerf
