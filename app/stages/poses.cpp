@@ -131,7 +131,7 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   const bool visible = modality == Modality::visible;
   pipeline::Stage stage;
   stage.name = "poses_" + std::string(name(modality));
-  stage.version = 11;
+  stage.version = 12;
   if (!visible) {
     stage.version = 14;
     stage.uses = {"poses_visible"};

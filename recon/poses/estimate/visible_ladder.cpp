@@ -12,6 +12,7 @@
 #include "recon/poses/estimate/weakest_joint.hpp"
 #include "recon/poses/estimate/weakly_held.hpp"
 #include "recon/poses/global_sfm/global_mapper.hpp"
+#include "recon/poses/sfm/held_matches.hpp"
 #include "recon/poses/sfm/resection.hpp"
 #include "recon/poses/sfm/sfm_ladder.hpp"
 
@@ -28,8 +29,10 @@ constexpr int full_features = 8192;
 /// two walled scenes the global mapper's answer went from 0.22 and 0.64 % of the extent to 0.07 and
 /// 0.05.
 constexpr double faint_peak_threshold = 0.0025;
-/// Without any model all pairs at full settings take a CPU second each: up to this many views.
+/// Without any model all pairs at full settings take a CPU second each, others a fifth of one: up
+/// to this many views, of more as many pairs as these have.
 constexpr int max_exhaustive_views = 60;
+constexpr std::size_t most_pairs = max_exhaustive_views * (max_exhaustive_views - 1) / 2;
 
 /// Share of the views from which on a model that can't stand alone is worth completing.
 constexpr double part_of_a_model = 0.5;
@@ -225,6 +228,8 @@ class VisibleLadder {
     if (held.contradicted > 0)
       judged.why += fmt::format(", {:.1f} % in {} pairs that contradict it",
                                 100 * held.contradicted_share, held.contradicted);
+    if (held.outvoted > 0)
+      judged.why += fmt::format(", {} pairs that do are outvoted", held.outvoted);
     if (held.contradict()) judged.believed = false;
     return held.contradict();
   }
@@ -236,7 +241,9 @@ class VisibleLadder {
     bool relaxed = false;
     for (const MapperSettings& settings : mapper_ladder()) {
       ORBITFUSE_TRY(try_settings(level, name, settings));
-      if (best_) break;
+      // Relaxed settings place views that are left out: what speaks against a model of all views is
+      // none of that.
+      if (best_ || steps_.back().posed == total_) break;
       relaxed = true;
     }
     return best_ && !relaxed ? Status{} : spared(try_global(level, name));
@@ -358,10 +365,10 @@ class VisibleLadder {
     return {};
   }
 
-  /// Pairs of the views left out, and of those next to them in the recording; all of them while
-  /// there is no model.
+  /// Pairs of the views left out, and of those next to them in the recording; while there is no
+  /// model all of them, or the nearest of too many.
   std::vector<ViewPair> remaining_pairs() const {
-    if (!best_) return exhaustive_pairs(total_);
+    if (!best_) return nearest_pairs(frames_, most_pairs);
     std::set<int> wanted;
     for (const int f : missing())
       for (const int near : {f - 1, f, f + 1}) wanted.insert((near + total_) % total_);

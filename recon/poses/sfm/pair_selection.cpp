@@ -46,6 +46,12 @@ std::vector<ViewPair> exhaustive_pairs(int count) {
 std::vector<ViewPair> orbit_pairs(const std::vector<const FrameRecord*>& frames) {
   const int count = static_cast<int>(frames.size());
   if (count <= 8) return exhaustive_pairs(count);
+  return nearest_pairs(frames, static_cast<std::size_t>(count * (count - 1) / 10));
+}
+
+std::vector<ViewPair> nearest_pairs(const std::vector<const FrameRecord*>& frames,
+                                    std::size_t most) {
+  const int count = static_cast<int>(frames.size());
   const bool stations = all_have_stations(frames);
 
   std::vector<std::tuple<double, int, int>> candidates;
@@ -58,7 +64,6 @@ std::vector<ViewPair> orbit_pairs(const std::vector<const FrameRecord*>& frames)
   }
   std::sort(candidates.begin(), candidates.end());
 
-  const auto budget = static_cast<std::size_t>(count * (count - 1) / 10);
   std::set<ViewPair> chosen;
   std::vector<int> partners(static_cast<std::size_t>(count), 0);
   const auto take = [&](int i, int j) {
@@ -66,12 +71,12 @@ std::vector<ViewPair> orbit_pairs(const std::vector<const FrameRecord*>& frames)
     ++partners[static_cast<std::size_t>(i)];
     ++partners[static_cast<std::size_t>(j)];
   };
-  // Two partners for every view first, so that the budget can't starve a lonely one.
+  // Two partners for every view first, so that the limit can't starve a lonely one.
   for (const auto& [distance, i, j] : candidates)
     if (partners[static_cast<std::size_t>(i)] < 2 || partners[static_cast<std::size_t>(j)] < 2)
-      if (chosen.size() < budget) take(i, j);
+      if (chosen.size() < most) take(i, j);
   for (const auto& [distance, i, j] : candidates) {
-    if (chosen.size() >= budget) break;
+    if (chosen.size() >= most) break;
     take(i, j);
   }
   return {chosen.begin(), chosen.end()};

@@ -19,4 +19,8 @@ std::vector<ViewPair> exhaustive_pairs(int count);
 /// Every view keeps at least two partners.
 std::vector<ViewPair> orbit_pairs(const std::vector<const FrameRecord*>& frames);
 
+/// The `most` of all pairs that come first in that order.
+std::vector<ViewPair> nearest_pairs(const std::vector<const FrameRecord*>& frames,
+                                    std::size_t most);
+
 }  // namespace orbitfuse

@@ -182,29 +182,6 @@ int explained_matches(const FeatureGraph& graph, const PosedFrames& posed) {
   return explained;
 }
 
-HeldMatches held_matches(const FeatureGraph& graph, const PosedFrames& posed) {
-  constexpr std::size_t plenty = 30;  // two-view geometry holds half as many by chance
-  HeldMatches result;
-  std::size_t all = 0, held = 0, in_contradicted = 0;
-  for (const auto& [pair, matches] : graph.verified) {
-    if (!posed.poses[at(pair.first)] || !posed.poses[at(pair.second)]) continue;
-    const EpipolarBand band =
-        epipolar_band(graph, pair, posed, TrackOptions{}.max_error_px * graph.pixel_scale);
-    std::size_t of_pair = 0;
-    for (const auto& [i, j] : matches) of_pair += band.distance(i, j) <= band.half_width;
-    if (matches.size() >= plenty && 4 * of_pair < matches.size()) {
-      ++result.contradicted;
-      in_contradicted += matches.size();
-    }
-    all += matches.size();
-    held += of_pair;
-  }
-  if (all == 0) return result;
-  result.share = static_cast<double>(held) / static_cast<double>(all);
-  result.contradicted_share = static_cast<double>(in_contradicted) / static_cast<double>(all);
-  return result;
-}
-
 Reconstruction reconstruction_of(const FeatureGraph& graph, const PosedFrames& posed,
                                  const std::vector<FeatureTrack>& tracks, Modality modality) {
   Reconstruction model;

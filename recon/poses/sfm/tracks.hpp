@@ -43,20 +43,6 @@ std::optional<Eigen::Vector3d> meet(const Rigid3d& first, const Eigen::Vector3d&
 /// How many of `graph.proposed` the poses can mean, as tracks: features but one of each.
 int explained_matches(const FeatureGraph& graph, const PosedFrames& posed);
 
-/// What the matches that two-view geometry held say of the poses of the frames that they join.
-struct HeldMatches {
-  double share = 1;      ///< of all of them, those that the poses hold
-  int contradicted = 0;  ///< pairs of 30 and more of which the poses hold less than a quarter
-  double contradicted_share = 0;  ///< of all matches, those of such pairs
-
-  /// Too many speak against the poses. Right models of twelve scenes, with and without stations,
-  /// have 0.01 of their matches in such pairs at most; wrong ones, of repeated pillars, of trees
-  /// and of a focal length told 15 % too long, 0.024 and more (docs/notes/poses_visible.md). One
-  /// pair alone may be chance.
-  bool contradict() const { return contradicted >= 2 && contradicted_share > 0.015; }
-};
-HeldMatches held_matches(const FeatureGraph& graph, const PosedFrames& posed);
-
 /// Frames and tracks as views and points; frames without a pose are left out.
 Reconstruction reconstruction_of(const FeatureGraph& graph, const PosedFrames& posed,
                                  const std::vector<FeatureTrack>& tracks, Modality modality);

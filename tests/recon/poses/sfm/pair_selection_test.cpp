@@ -76,6 +76,18 @@ TEST(OrbitPairs, StationsGiveNeighboursTheClosureAndTheOtherLoop) {
   EXPECT_FALSE(has({0, 6}));
 }
 
+TEST(OrbitPairs, OfTooManyTheNearestAreTaken) {
+  const auto frames = two_loops(12, false);
+  const auto few = nearest_pairs(pointers(frames), 48), all = nearest_pairs(pointers(frames), 1000);
+  EXPECT_EQ(few.size(), 48u);
+  EXPECT_EQ(all, exhaustive_pairs(24));
+  for (int f = 0; f < 24; ++f) {  // the two before and after it, round the end
+    const ViewPair next = std::minmax(f, (f + 1) % 24), second = std::minmax(f, (f + 2) % 24);
+    EXPECT_EQ(std::count(few.begin(), few.end(), next), 1) << f;
+    EXPECT_EQ(std::count(few.begin(), few.end(), second), 1) << f;
+  }
+}
+
 TEST(OrbitPairs, FewViewsAreMatchedExhaustively) {
   const auto frames = two_loops(4, true);
   EXPECT_EQ(orbit_pairs(pointers(frames)), exhaustive_pairs(8));

@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "recon/poses/sfm/held_matches.hpp"
 #include "tests/recon/poses/feature_scene.hpp"
 
 namespace orbitfuse {
@@ -124,6 +125,32 @@ TEST(Tracks, MatchesContradictAnOrbitThatIsTornApart) {
   const HeldMatches held = held_matches(scene.graph, torn);
   EXPECT_TRUE(held.contradict()) << held.share << " " << held.contradicted;
   EXPECT_GT(held.share, 0.5) << "most neighbours are in one quarter";
+}
+
+/// Of each frame with the one four on, 40 matches that mean nothing: a ring's marks, one for
+/// another.
+void add_repeated_pattern(FeatureScene& scene) {
+  for (int f = 0; f + 4 < scene.graph.count(); ++f) {
+    std::vector<FeatureMatch>& matches = scene.graph.verified[{f, f + 4}];
+    matches.clear();
+    const auto features = static_cast<int>(scene.graph.pixels[static_cast<std::size_t>(f)].cols()),
+               there = static_cast<int>(scene.graph.pixels[static_cast<std::size_t>(f + 4)].cols());
+    for (int i = 0; i < 40; ++i) matches.emplace_back(i * features / 40, (17 * i + 5) % there);
+  }
+}
+
+TEST(Tracks, ARepeatedPatternIsOutvotedByTheMatchesThatJoinItsFrames) {
+  FeatureScene scene = described_scene();
+  add_repeated_pattern(scene);
+  const PosedFrames right = posed_but(scene, {});
+  const HeldMatches held = held_matches(scene.graph, right);
+  EXPECT_GT(held.outvoted, 10);
+  EXPECT_FALSE(held.contradict()) << held.contradicted << " " << held.contradicted_share;
+  // A frame that nothing but its own matches places has nobody to vote for it.
+  PosedFrames astray = right;
+  const Eigen::Quaterniond aside(Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()));
+  astray.poses[5] = *right.poses[5] * Rigid3d{aside, Eigen::Vector3d::Zero()};
+  EXPECT_TRUE(held_matches(scene.graph, astray).contradict());
 }
 
 TEST(Tracks, TheRightPosesExplainMoreMatchesThanFoldedOnes) {
