@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
 #include <glog/logging.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
@@ -25,6 +26,7 @@
 #include "core/system/memory.hpp"
 #include "core/system/parallel.hpp"
 #include "core/system/trace.hpp"
+#include "recon/nerf/compute_device.hpp"
 
 // Where errors become exit codes, by the map of terminal/exit_code.hpp (docs/cli.md).
 namespace orbitfuse {
@@ -60,12 +62,14 @@ Status resolve_config(const CLI::App& verb, cli::Context& context) {
   return config.validate();
 }
 
-Status check_machine(const cli::CommonOptions& common) {
-  ORBITFUSE_TRY(check_isa_wish());
-  if (common.device == "cuda")
-    return fail(ErrorKind::unavailable, "--device cuda", "this build computes on the CPU only",
-                "use --device cpu");
-  return {};
+/// A farm's jobs run elsewhere: what this machine has says nothing of theirs.
+void choose_device(const cli::CommonOptions& common, const std::string& verb, Console& console) {
+  if (common.device != "cuda" || verb == "farm") return;
+  const auto name = nerf::use_cuda();
+  if (name)
+    console.info(fmt::format("fields are computed on {}", *name));
+  else
+    console.warning(fmt::format("--device cuda: {}; the processor computes", name.error().found));
 }
 
 int finish(const std::string& verb, Console& console, const Status& status, nlohmann::json body) {
@@ -173,13 +177,14 @@ int run(const std::vector<const char*>& words) {
 
   const CLI::App& given = *line.app.get_subcommand(verb->name);
   Status status = check_no_empty_values(given);
-  if (status) status = check_machine(line.common);
+  if (status) status = check_isa_wish();
   if (status) status = resolve_config(given, context);
   if (status && line.common.print_config) {
     console.data(config.settings().to_toml());
     context.result = {{"config", config.settings().to_json()}};
   } else if (status) {
     const std::string no_file;
+    choose_device(line.common, verb->name, console);
     status = traced(line.common.dry_run ? no_file : line.common.trace_file, verb->name,
                     [&] { return action(context); });
   }

@@ -15,6 +15,7 @@
 #include "app/farm/slurm_farm.hpp"
 #include "app/pipeline/out_folder.hpp"
 #include "app/stages/build_stages.hpp"
+#include "recon/nerf/compute_device.hpp"
 
 namespace orbitfuse::cli {
 namespace {
@@ -119,6 +120,10 @@ Status start_farm(Context& context, const FarmOptions& options) {
   if (!options.cluster.gpu_partition.empty() && !on_gpu)
     return fail(ErrorKind::usage, "--gpu-partition",
                 "no stage uses a GPU with --device " + context.common.device, "leave it out");
+  if (on_gpu && !nerf::built_with_cuda())
+    return fail(ErrorKind::unavailable, "--device cuda",
+                "this build computes on the processor only",
+                "configure it with -DORBITFUSE_CUDA=ON, or use --device cpu");
   for (const std::string& session : options.words) ORBITFUSE_TRY(answers(session));
   ORBITFUSE_TRY(answers(options.out));
   for (const std::string& session : options.words)

@@ -14,6 +14,7 @@
 #include "core/system/clock.hpp"
 #include "core/system/cpu.hpp"
 #include "core/system/parallel.hpp"
+#include "recon/nerf/compute_device.hpp"
 #include "recon/nerf/device/on_device.hpp"
 
 namespace {
@@ -138,12 +139,8 @@ Status print_detail_errors(const nerf::Field& field, const Arguments& a) {
 
 Status use_device(const Arguments& a) {
   if (a.device == "cpu") return {};
-  try {
-    nerf::device::use(nerf::device::cuda_engine());
-  } catch (const nerf::device::Refused& refused) {
-    return tl::unexpected(nerf::device::error_of(refused));
-  }
-  fmt::print("{}\n", nerf::device::current()->name());
+  ORBITFUSE_ASSIGN(const std::string name, nerf::use_cuda());
+  fmt::print("{}\n", name);
   if (a.time_kernels) nerf::device::current()->time_kernels();
   return {};
 }

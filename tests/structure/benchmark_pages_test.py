@@ -12,6 +12,7 @@ WITHOUT_PLOT = {
     "compare.md": "two pairs",
     "capture/faults.md": "cases that hold or don't, without a figure in common",
     "capture/v4l2.md": "the same",
+    "cuda.md": "two machines side by side, six rows",
     "fuzzing.md": "runs of a fuzzer measure how fast a parser is",
     "hostile.md": "says what the program answers",
     "run_real.md": "what came of four recordings, without truth",

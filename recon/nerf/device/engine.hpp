@@ -137,8 +137,6 @@ class Engine {
   virtual std::vector<KernelTime> kernel_times() const = 0;
 };
 
-/// The same source run by the processor in single file: slow, for tests.
-std::unique_ptr<Engine> emulated_engine();
 /// The first CUDA device. Throws Refused: there is none, or it can't be used.
 std::unique_ptr<Engine> cuda_engine();
 

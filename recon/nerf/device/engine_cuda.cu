@@ -38,3 +38,8 @@ class CudaEngine final : public Engine {
 std::unique_ptr<Engine> cuda_engine() { return std::make_unique<CudaEngine>(); }
 
 }  // namespace orbitfuse::nerf::device
+
+namespace orbitfuse::nerf {
+bool built_with_cuda();  // compute_device.hpp, which is not C++17
+bool built_with_cuda() { return true; }
+}  // namespace orbitfuse::nerf

@@ -7,7 +7,6 @@
 #include "recon/nerf/device/layers.hpp"
 #include "recon/nerf/device/loss.hpp"
 #include "recon/nerf/device/occupancy.hpp"
-#include "recon/nerf/field/occupancy_codes.hpp"
 
 // A field in a device's memory, and what its rays show there.
 namespace orbitfuse::nerf::ORBITFUSE_ENGINE {
@@ -67,7 +66,6 @@ struct FieldStore {
   int resolution, cascades;
   Buffer<std::uint64_t> on, any, plain;
   Buffer<std::uint8_t> look;
-  Buffer<float> code_density;
 
   explicit FieldStore(const device::FieldNumbers& from)
       : width(from.width),
@@ -93,15 +91,9 @@ struct FieldStore {
     any.upload(from.any);
     plain.upload(from.plain);
     look.upload(from.look);
-    std::vector<float> decoded(256);
-    for (int code = 0; code < 256; ++code)
-      decoded[static_cast<std::size_t>(code)] = density_of_code(code);
-    code_density.upload(decoded);
   }
 
-  Cells cells() const {
-    return {resolution, cascades, look.data(), any.data(), plain.data(), code_density.data()};
-  }
+  Cells cells() const { return {resolution, cascades, look.data(), any.data(), plain.data()}; }
 };
 
 /// A perceptron's outputs and, if they are asked for, its hidden layers' too.
@@ -178,12 +170,17 @@ class ForwardPass {
     const int wanted = settings.surface + most_haze;
     const int per_ray = 1 + (wanted < most_ray_samples ? wanted : most_ray_samples);
     const auto n = static_cast<std::size_t>(count);
+    const int slots = field.resolution;  // no piece of piece_begin() crosses more cells
+    segments_.need(n * static_cast<std::size_t>(ray_pieces * slots));
+    piece_counts_.need(n * ray_pieces);
+    piece_sums_.need(n * ray_pieces);
     need(field, n, n * static_cast<std::size_t>(per_ray));
     sample_count = {first_.data() + count, count * per_ray};
-    launch(count,
-           CountSamples{field.cells(), settings, rays.data(), spread_.data(), counts_.data()});
+    const Stretches found{count, slots, segments_.data(), piece_counts_.data(), piece_sums_.data()};
+    launch(count * ray_pieces, WalkPieces{field.cells(), settings, rays.data(), found});
+    launch(count, CountSamples{settings, rays.data(), found, spread_.data(), counts_.data()});
     scan_.run(counts_.data(), count, first_.data());
-    launch(count, PlaceSamples{field.cells(), settings, rays.data(), spread_.data(), samples});
+    launch(count, PlaceSamples{rays.data(), found, spread_.data(), samples});
   }
 
   void need(const FieldStore& field, std::size_t count, std::size_t bound) {
@@ -214,6 +211,8 @@ class ForwardPass {
   }
 
   Scan scan_;
+  Buffer<Segment> segments_, piece_sums_;
+  Buffer<int> piece_counts_;
   Buffer<Spread> spread_;
   Buffer<int> counts_, first_, used_, colored_;
   Buffer<float> along_, position_, features_, color_in_;

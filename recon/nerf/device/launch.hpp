@@ -3,8 +3,8 @@
 
 // One source for two machines. nvcc makes a kernel of each functor; g++ makes a loop of it, by
 // which tests see every line of what a device runs without having one. Part of an engine: included
-// by engine_cuda.cu and engine_emulated.cpp alone, each with its own ORBITFUSE_ENGINE, so that the
-// linker doesn't take one's for the other's. C++17: nvcc of Debian 12 knows no more.
+// by engine_cuda.cu and the tests' emulated_engine.cpp alone, each with its own ORBITFUSE_ENGINE,
+// so that the linker doesn't take one's for the other's. C++17: nvcc of Debian 12 knows no more.
 #include <cxxabi.h>
 
 #include <cstddef>
@@ -186,10 +186,11 @@ class Buffer {
   std::size_t size_ = 0;
 };
 
-/// first[i] = sum of counts before i, for i in [0, count].
+/// first[i] = sum of counts before i, for i in [0, count]; counts[count] is set to 0.
 class Scan {
  public:
-  void run(const int* counts, int count, int* first) {
+  void run(int* counts, int count, int* first) {
+    fill_bytes(counts + count, 0, sizeof(int));
 #ifdef __CUDACC__
     std::size_t bytes = 0;
     check(cub::DeviceScan::ExclusiveSum(nullptr, bytes, counts, first, count + 1));

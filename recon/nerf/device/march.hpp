@@ -4,9 +4,11 @@
 #include "recon/nerf/device/rays.hpp"
 #include "recon/nerf/field/contraction.hpp"
 #include "recon/nerf/field/march_settings.hpp"
+#include "recon/nerf/field/occupancy_codes.hpp"
 
-// Samples along rays on a device, as march() places them. A thread walks its ray twice, once to
-// count and once to place: what lies along it would not fit into a thread's memory.
+// Samples along rays on a device, as march() places them. A ray's next cell depends on its last,
+// and a step's rays are few: each ray's way is walked in pieces, side by side, which note the
+// occupied stretches; then each ray shares out its samples.
 namespace orbitfuse::nerf::ORBITFUSE_ENGINE {
 
 /// Occupancy as marching reads it.
@@ -14,16 +16,14 @@ struct Cells {
   int resolution, cascades;
   const std::uint8_t* look;
   const std::uint64_t *any, *plain;
-  const float* densities;  ///< of codes
 };
 
-constexpr int most_segments = 4096;  // a diagonal through all cascades of 256 cells needs 2300
+constexpr int most_steps = 8 * 4096;  // a diagonal through all cascades of 256 cells needs 2300
 constexpr int most_ray_samples = 256;
 
-/// The stretch of a ray inside one occupied cell, or through cells of which nothing is known.
-struct Segment {
-  float begin, length, surface, haze;
-  bool plain;
+/// The stretch of a ray inside one occupied cell, or a block of cells of which nothing is known.
+struct alignas(16) Segment {
+  float begin, length, surface, haze;  ///< surface 0: nothing is known of it
 };
 
 ORBITFUSE_HOST_DEVICE inline bool bit_of(const std::uint64_t* bits, long at) {
@@ -41,11 +41,15 @@ ORBITFUSE_HOST_DEVICE inline int cascade_of(const float x[3]) {
   return far == far ? (exponent > 0 ? exponent : 0) : 129;
 }
 
-/// Occupied stretches of one ray, nearest first.
+/// One ray's way through the cells, a step at a time. Rays that stand side by side take their steps
+/// together: a loop inside a step would make all wait for the longest.
 class CellWalk {
  public:
   ORBITFUSE_HOST_DEVICE CellWalk(const Cells& cells, const DeviceRay& given, float near)
-      : cells_(cells), t_(near > given.near ? near : given.near), far_(given.far) {
+      : cells_(cells),
+        half_(0.5f * static_cast<float>(cells.resolution)),
+        t_(near > given.near ? near : given.near),
+        far_(given.far) {
     const float far_edge = static_cast<float>(1 << (cells.cascades - 1));
     for (int d = 0; d < 3; ++d) {
       const float o = given.ray.origin[d], along = given.ray.direction[d];
@@ -59,72 +63,145 @@ class CellWalk {
       if (!(o * along < 0)) far_ = 0;
       t_ = fmaxf(t_, gap * fabsf(inverse_[d]) * 1.0001f);
     }
-    pending_there_ = stretch(pending_);
+    border_ = t_;
   }
 
-  /// False: there is none left.
-  ORBITFUSE_HOST_DEVICE bool next(Segment& out) {
-    if (!pending_there_ || count_ == most_segments) return false;
-    out = pending_;
-    while ((pending_there_ = stretch(pending_))) {
-      if (!(pending_.plain && out.plain && pending_.begin <= out.begin + out.length + 1e-5f)) break;
-      out.length += pending_.length;
-      out.haze += pending_.haze;
+  /// Where what comes next begins: a little before it is entered.
+  ORBITFUSE_HOST_DEVICE float border() const { return border_; }
+  /// Goes on from the first border behind `t`.
+  ORBITFUSE_HOST_DEVICE void leap(float t) {
+    t_ = border_ = t;
+    Segment passed;
+    bool occupied;
+    step(passed, occupied);
+  }
+
+  /// Crosses a cell, or an empty or plain block. False: the way has ended. `occupied`: `out` says
+  /// what was crossed.
+  ORBITFUSE_HOST_DEVICE bool step(Segment& out, bool& occupied) {
+    float x[3];
+    for (int d = 0; d < 3; ++d) x[d] = origin_[d] + t_ * direction_[d];
+    const int cascade = cascade_of(x);
+    if (!(t_ < far_) || cascade >= cells_.cascades || ++steps_ > most_steps) return false;
+    const float per_cell = half_ * power_of_two(-cascade);  // cells a normalised unit
+    const int blocks = cells_.resolution >> 2;
+    int block = cascade, cell = 0;
+    for (int d = 2; d >= 0; --d) {
+      const int i = bounded(static_cast<int>(x[d] * per_cell + half_), cells_.resolution - 1);
+      block = block * blocks + (i >> 2);
+      cell = cell << 2 | (i & 3);
     }
-    ++count_;
+    // Read together: one doesn't wait for the other.
+    const int look = cells_.look[static_cast<long>(block) * 64 + cell];
+    const bool any = bit_of(cells_.any, block), plain = bit_of(cells_.plain, block);
+    const bool by_cell = any && !plain;
+    const float size = 1.0f / per_cell;
+    const float begin = t_, stride = by_cell ? 1.0f : 4.0f;
+    const float exit = way_out(x, per_cell / stride, stride * size);
+    const float length = exit + size * 1e-3f;  // across the border in spite of rounding
+    border_ = t_ + exit;
+    t_ += length;
+    occupied = look != 0;
+    if (!occupied) return true;
+    // depth / (1 + depth) stands for 1 - exp(-depth): only relative sizes matter here.
+    const float depth = length * density_of_code(look - 1);
+    out = {begin, length, depth / (1 + depth), length * per_cell};
     return true;
   }
 
  private:
-  /// Crosses blocks cell by cell, empty and plain ones in one step, up to the next that is on.
-  ORBITFUSE_HOST_DEVICE bool stretch(Segment& out) {
-    const float half = 0.5f * static_cast<float>(cells_.resolution);
-    const int blocks = cells_.resolution / 4;
-    for (; steps_ < 8 * most_segments; ++steps_) {
-      float x[3];
-      for (int d = 0; d < 3; ++d) x[d] = origin_[d] + t_ * direction_[d];
-      const int cascade = cascade_of(x);
-      if (!(t_ < far_) || cascade >= cells_.cascades) return false;
-      const float doublings = static_cast<float>(1 << cascade);
-      const float size = 2.0f * doublings / static_cast<float>(cells_.resolution),
-                  scale = half / doublings;
-      long block = cascade;
-      int cell = 0;
-      for (int d = 2; d >= 0; --d) {
-        const int i = bounded(static_cast<int>(x[d] * scale + half), cells_.resolution - 1);
-        block = block * blocks + (i >> 2);
-        cell = cell << 2 | (i & 3);
-      }
-      const bool any = bit_of(cells_.any, block), by_cell = any && !bit_of(cells_.plain, block);
-      const float begin = t_, length = way_out(x, by_cell ? size : 4 * size, size);
-      t_ += length;
-      if (!any) continue;
-      const int look = cells_.look[block * 64 + cell];
-      if (look == 0) continue;
-      // depth / (1 + depth) stands for 1 - exp(-depth): only relative sizes matter here.
-      const float depth = length * cells_.densities[look - 1];
-      out = {begin, length, depth / (1 + depth), length / size, look == 1};
-      ++steps_;
-      return true;
-    }
-    return false;
+  ORBITFUSE_HOST_DEVICE static float power_of_two(int exponent) {
+    const std::uint32_t bits = static_cast<std::uint32_t>(127 + exponent) << 23;
+    float value;
+    memcpy(&value, &bits, sizeof(value));
+    return value;
   }
-
-  ORBITFUSE_HOST_DEVICE float way_out(const float x[3], float step, float size) const {
-    const float per_step = 1.0f / step;
+  ORBITFUSE_HOST_DEVICE float way_out(const float x[3], float per_step, float step) const {
     float exit = 3.402823466e38f;
     for (int d = 0; d < 3; ++d) {
       const float edge = (floorf(x[d] * per_step) + (inverse_[d] > 0 ? 1.0f : 0.0f)) * step;
       exit = fminf(exit, (edge - x[d]) * inverse_[d]);
     }
-    return fmaxf(exit, 0.0f) + size * 1e-3f;  // across the border in spite of rounding
+    return fmaxf(exit, 0.0f);
   }
 
   const Cells& cells_;
-  float origin_[3], direction_[3], inverse_[3], t_, far_;
-  Segment pending_;
-  bool pending_there_;
-  int count_ = 0, steps_ = 0;
+  float half_, origin_[3], direction_[3], inverse_[3], t_, border_, far_;
+  int steps_ = 0;
+};
+
+constexpr int ray_pieces = 16, near_pieces = 12;
+
+/// Where a ray's piece begins: most share the way to the far side of the unit ball, where cells are
+/// smallest.
+ORBITFUSE_HOST_DEVICE inline float piece_begin(const Ray& ray, int piece) {
+  const float* o = ray.origin;
+  const float inner = sqrtf(o[0] * o[0] + o[1] * o[1] + o[2] * o[2]) + 1.0f;
+  if (piece >= ray_pieces) return 3.402823466e38f;
+  if (piece <= near_pieces) return inner * static_cast<float>(piece) / near_pieces;
+  const int beyond = piece - near_pieces;  // 1.5, 4, 10
+  return inner + (beyond == 1 ? 1.5f : beyond == 2 ? 4.0f : 10.0f);
+}
+
+/// Occupied stretches of all rays' pieces: slot s of piece p of ray r is at [(p * slots + s) * rays
+/// + r].
+struct Stretches {
+  int rays, slots;
+  Segment* segment;
+  int* count;    ///< [piece][ray]
+  Segment* sum;  ///< [piece][ray]: of surface and haze
+  ORBITFUSE_HOST_DEVICE Segment& at(int piece, int slot, int ray) const {
+    return segment[(static_cast<long>(piece) * slots + slot) * rays + ray];
+  }
+};
+
+/// Where nothing is known, samples lie evenly, of whatever size the cells are.
+ORBITFUSE_HOST_DEVICE inline bool joined(Segment& held, const Segment& next) {
+  const bool plain = held.surface == 0 && next.surface == 0;
+  if (!plain || next.begin > held.begin + held.length + 1e-5f) return false;
+  held.length += next.length;
+  held.haze += next.haze;
+  return true;
+}
+
+struct WalkPieces {
+  Cells cells;
+  MarchSettings settings;
+  const DeviceRay* rays;
+  Stretches found;
+
+  ORBITFUSE_HOST_DEVICE void operator()(int i) const {
+    const int r = i % found.rays, piece = i / found.rays;
+    int count = 0;
+    Segment held = {}, sum = {};
+    if (rays[r].there) {
+      const float begin = piece_begin(rays[r].ray, piece),
+                  end = piece_begin(rays[r].ray, piece + 1);
+      CellWalk walk(cells, rays[r], settings.near);
+      // A stretch belongs to the piece that it begins in.
+      if (begin > walk.border()) walk.leap(begin);
+      Segment now;
+      bool occupied = false;
+      while (walk.border() < end && walk.step(now, occupied)) {
+        if (!occupied) continue;
+        sum.surface += now.surface;
+        sum.haze += now.haze;
+        if (count > 0 && joined(held, now)) continue;
+        if (count == found.slots) {  // more than there is room for: the last takes it all
+          held.length = now.begin + now.length - held.begin;
+          held.surface += now.surface;
+          held.haze += now.haze;
+          continue;
+        }
+        if (count > 0) found.at(piece, count - 1, r) = held;
+        held = now;
+        ++count;
+      }
+    }
+    if (count > 0) found.at(piece, count - 1, r) = held;
+    found.count[i] = count;
+    found.sum[i] = sum;
+  }
 };
 
 /// How a ray's samples are spread.
@@ -134,9 +211,9 @@ struct Spread {
 };
 
 struct CountSamples {
-  Cells cells;
   MarchSettings settings;
   const DeviceRay* rays;
+  Stretches found;
   Spread* spread;
   int* counts;  ///< with one for the background
 
@@ -146,15 +223,11 @@ struct CountSamples {
     if (!rays[r].there) return;
     counts[r] = 1;
     float surface = 0, haze = 0;
-    CellWalk walk(cells, rays[r], settings.near);
-    Segment segment;
-    bool any = false;
-    while (walk.next(segment)) {
-      surface += segment.surface;
-      haze += segment.haze;
-      any = true;
+    for (int piece = 0; piece < ray_pieces; ++piece) {
+      surface += found.sum[piece * found.rays + r].surface;
+      haze += found.sum[piece * found.rays + r].haze;
     }
-    if (!any) return;
+    if (!(haze > 0)) return;
     const float most_haze = settings.haze > 2 ? static_cast<float>(settings.haze) : 2.0f;
     const float for_surface = static_cast<float>(settings.surface) * fminf(1.0f, surface);
     const float for_haze = fminf(fmaxf(haze, 2.0f), most_haze);
@@ -175,9 +248,8 @@ struct Samples {
 
 /// Inverse transform sampling of a ray's segments.
 struct PlaceSamples {
-  Cells cells;
-  MarchSettings settings;
   const DeviceRay* rays;
+  Stretches found;
   const Spread* spread;
   Samples samples;
 
@@ -186,7 +258,7 @@ struct PlaceSamples {
     if (!given.there) return;
     const Spread& how = spread[r];
     int at = samples.first[r];
-    if (how.count > 0) place(given, how, at);
+    if (how.count > 0) place(r, how, at);
     at += how.count;
     const float infinity[3] = {0.5f + 0.5f * given.ray.direction[0],
                                0.5f + 0.5f * given.ray.direction[1],
@@ -195,38 +267,66 @@ struct PlaceSamples {
   }
 
  private:
-  ORBITFUSE_HOST_DEVICE void place(const DeviceRay& given, const Spread& how, int at) const {
-    CellWalk walk(cells, given, settings.near);
-    Segment now, next;
-    if (!walk.next(now)) return;
-    bool more = walk.next(next);
-    float mass_before = 0, length_before = 0, edge = 0;
+  /// Where the running sum of what samples are shared out by reaches a sample's middle, and its
+  /// end.
+  struct Running {
+    float mass = 0, length = 0;  ///< before the segment
+    float edge = 0;              ///< occupied length up to the last sample's end
+    float t = 0;                 ///< of the sample whose end comes next
+    int passed = 0;              ///< middles and ends
+  };
+
+  ORBITFUSE_HOST_DEVICE void place(int r, const Spread& how, int at) const {
+    Segment held = {};
+    Running running;
+    bool holds = false;
     const auto mass_of = [&](const Segment& s) {
       return s.surface * how.surface_share + s.haze * how.haze_share;
     };
-    const auto part_at = [&](float mass) {  // of the segment that holds this mass
-      float own = mass_of(now);
-      while (more && mass_before + own < mass) {
-        mass_before += own;
-        length_before += now.length;
-        now = next;
-        more = walk.next(next);
-        own = mass_of(now);
+    for (int piece = 0; piece < ray_pieces; ++piece) {
+      const int slots = found.count[piece * found.rays + r];
+      Segment next = slots > 0 ? found.at(piece, 0, r) : Segment{};
+      for (int slot = 0; slot < slots && running.passed < 2 * how.count; ++slot) {
+        const Segment now = next;
+        if (slot + 1 < slots) next = found.at(piece, slot + 1, r);  // on its way meanwhile
+        if (holds && joined(held, now)) continue;
+        if (holds) {
+          const float own = mass_of(held);
+          pass(rays[r], how, at, held, own, running.mass + own, running);
+          running.mass += own;
+          running.length += held.length;
+        }
+        held = now;
+        holds = true;
       }
-      return fminf(fmaxf((mass - mass_before) / fmaxf(own, 1e-12f), 0.0f), 1.0f);
-    };
+    }
+    // What rounding has left over belongs to the last.
+    pass(rays[r], how, at, held, mass_of(held), 3.402823466e38f, running);
+  }
+
+  /// All middles and ends up to a mass, which lie in this segment.
+  ORBITFUSE_HOST_DEVICE void pass(const DeviceRay& given, const Spread& how, int at,
+                                  const Segment& in, float own, float up_to,
+                                  Running& running) const {
     const float shift =
         0.5f * (given.jitter - 0.5f);  // samples keep to the middle half of their stratum
-    for (int k = 0; k < how.count; ++k) {
-      const float middle = part_at((static_cast<float>(k) + 0.5f + shift) * how.per_sample);
-      const float t = now.begin + middle * now.length;
-      const float end = part_at(static_cast<float>(k + 1) * how.per_sample);
-      const float behind = length_before + end * now.length;
+    for (; running.passed < 2 * how.count; ++running.passed) {
+      const int k = running.passed / 2;
+      const bool middle = running.passed % 2 == 0;
+      const float place = static_cast<float>(k) + (middle ? 0.5f + shift : 1.0f);
+      const float mass = place * how.per_sample;
+      if (mass > up_to) return;
+      const float part = fminf(fmaxf((mass - running.mass) / fmaxf(own, 1e-12f), 0.0f), 1.0f);
+      if (middle) {
+        running.t = in.begin + part * in.length;
+        continue;
+      }
+      const float behind = running.length + part * in.length;
       float x[3], contracted[3];
-      for (int d = 0; d < 3; ++d) x[d] = given.ray.origin[d] + t * given.ray.direction[d];
+      for (int d = 0; d < 3; ++d) x[d] = given.ray.origin[d] + running.t * given.ray.direction[d];
       contract01(x, contracted);
-      put(at + k, t, fmaxf(0.0f, behind - edge), contracted);
-      edge = behind;
+      put(at + k, running.t, fmaxf(0.0f, behind - running.edge), contracted);
+      running.edge = behind;
     }
   }
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cassert>
 
+#include "recon/nerf/compute_device.hpp"
+
 namespace orbitfuse::nerf::device {
 namespace {
 
@@ -117,3 +119,20 @@ Error error_of(const Refused& refused) {
 }
 
 }  // namespace orbitfuse::nerf::device
+
+namespace orbitfuse::nerf {
+
+Result<std::string> use_cuda() {
+  try {
+    device::use(device::cuda_engine());
+  } catch (const device::Refused& refused) {
+    return tl::unexpected(device::error_of(refused));
+  }
+  return device::current()->name();
+}
+
+std::string device_name() {
+  return device::current() != nullptr ? device::current()->name() : std::string();
+}
+
+}  // namespace orbitfuse::nerf

@@ -7,7 +7,7 @@
 
 namespace orbitfuse::nerf::ORBITFUSE_ENGINE {
 
-constexpr int rays_per_batch = 1 << 15;  ///< about 1 GB of activations at 24 samples a ray
+constexpr int rays_per_batch = 1 << 14;  ///< about 1 GB of stretches and activations
 
 class FieldTracer final : public device::Tracer {
  public:

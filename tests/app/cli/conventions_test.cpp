@@ -7,6 +7,7 @@
 #include <regex>
 
 #include "core/system/file_io.hpp"
+#include "recon/nerf/compute_device.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -73,10 +74,13 @@ TEST(Cli, UsageErrorsKeepTheJsonContract) {
   EXPECT_EQ(result.at("schema"), 1);
 }
 
-TEST(Cli, CudaIsUnavailable) {
+TEST(Cli, WithoutACudaDeviceTheProcessorComputesAndSaysSo) {
   const Outcome outcome = orbitfuse_program({"doctor", "--device", "cuda"});
-  EXPECT_EQ(outcome.code, 6);
-  EXPECT_THAT(outcome.err, HasSubstr("--device cpu"));
+  EXPECT_EQ(outcome.code, orbitfuse_program({"doctor"}).code);
+  if (!nerf::use_cuda()) {
+    EXPECT_THAT(outcome.err, HasSubstr("--device cuda: "));
+    EXPECT_THAT(outcome.err, HasSubstr("the processor computes"));
+  }
 }
 
 TEST(Cli, ConfigMistakesNameFileLineAndKey) {

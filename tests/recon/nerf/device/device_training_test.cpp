@@ -151,7 +151,7 @@ INSTANTIATE_TEST_SUITE_P(Every, DeviceTraining, ::testing::Values("emulated", "c
                          [](const auto& instance) { return std::string(instance.param); });
 
 TEST(DeviceTrainingOfProposals, StaysOnTheProcessor) {
-  const test::InUse used(device::emulated_engine());
+  const test::InUse used(test::emulated_engine());
   TrainOptions options = small_options(Modality::visible, 4);
   options.sampling = Sampling::proposal;
   options.fine_samples = 8;

@@ -11,10 +11,13 @@
 // on the processor, so that every line of it is tested where there is no GPU.
 namespace orbitfuse::nerf::test {
 
+/// The devices' source run by the processor in single file: slow.
+std::unique_ptr<device::Engine> emulated_engine();
+
 /// Null: it isn't here.
 inline std::unique_ptr<device::Engine> engine_named(const std::string& name) {
   try {
-    return name == "cuda" ? device::cuda_engine() : device::emulated_engine();
+    return name == "cuda" ? device::cuda_engine() : emulated_engine();
   } catch (const device::Refused&) {
     return nullptr;
   }

@@ -4,9 +4,12 @@
 #include "recon/nerf/device/as_kernels.hpp"
 #include "recon/nerf/device/tracing.hpp"
 #include "recon/nerf/device/training_steps.hpp"
+#include "tests/recon/nerf/device/machines.hpp"
 
-namespace orbitfuse::nerf::device {
+namespace orbitfuse::nerf {
 namespace {
+
+using namespace device;
 
 class EmulatedEngine final : public Engine {
  public:
@@ -25,6 +28,6 @@ class EmulatedEngine final : public Engine {
 
 }  // namespace
 
-std::unique_ptr<Engine> emulated_engine() { return std::make_unique<EmulatedEngine>(); }
+std::unique_ptr<Engine> test::emulated_engine() { return std::make_unique<EmulatedEngine>(); }
 
-}  // namespace orbitfuse::nerf::device
+}  // namespace orbitfuse::nerf
