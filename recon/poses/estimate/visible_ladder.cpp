@@ -9,6 +9,7 @@
 #include <set>
 
 #include "recon/poses/estimate/feature_level.hpp"
+#include "recon/poses/estimate/placed_elsewhere.hpp"
 #include "recon/poses/estimate/weakest_joint.hpp"
 #include "recon/poses/estimate/weakly_held.hpp"
 #include "recon/poses/global_sfm/global_mapper.hpp"
@@ -410,6 +411,17 @@ class VisibleLadder {
     return map_and_resect(*full_, "full settings");
   }
 
+  Status doubt_placed_elsewhere(ModalityPoses& poses) const {
+    ORBITFUSE_ASSIGN(const FeatureGraph graph, best_level_->graph());
+    ORBITFUSE_ASSIGN(const std::vector<DoubtfulView> elsewhere,
+                     placed_elsewhere(graph, poses.reconstruction, progress_));
+    for (const DoubtfulView& view : elsewhere)
+      if (std::none_of(poses.doubtful.begin(), poses.doubtful.end(),
+                       [&](const DoubtfulView& known) { return known.name == view.name; }))
+        poses.doubtful.push_back(view);
+    return {};
+  }
+
   Result<ModalityPoses> answer(int pairs) {
     if (!best_) {
       auto error = none_held(steps_, Modality::visible);
@@ -428,6 +440,7 @@ class VisibleLadder {
       if (featureless_.contains(view.name)) view.why = fmt::format("it {}", featureless_why);
     poses.doubtful = weakly_held(poses.reconstruction);
     doubt_beyond(weakest_joint(poses.reconstruction), poses.reconstruction, poses.doubtful);
+    ORBITFUSE_TRY(spared(doubt_placed_elsewhere(poses)));
     const auto all = static_cast<int>(exhaustive_pairs(total_).size());
     if (pairs < all)
       poses.skips.push_back({"exhaustive matching", fmt::format("{} of {} pairs held", pairs, all),

@@ -160,10 +160,10 @@ Result<std::vector<int>> resect(FeatureGraph& graph, PosedFrames& posed,
   return added;
 }
 
-std::optional<Rigid3d> resect_by_others(const FeatureGraph& graph,
-                                        const std::vector<FeatureTrack>& all_tracks,
-                                        const PosedFrames& posed, int frame,
-                                        const ResectionOptions& options) {
+std::optional<OtherPlace> place_by_others(const FeatureGraph& graph,
+                                          const std::vector<FeatureTrack>& all_tracks,
+                                          const PosedFrames& posed, int frame,
+                                          const ResectionOptions& options) {
   const std::vector<FeatureTrack> tracks = without_frame(graph, posed, all_tracks, frame);
   const Camera& camera = posed.cameras[at(frame)];
   const auto miss_px = [&](const Rigid3d& pose, int feature, int t) {
@@ -181,14 +181,22 @@ std::optional<Rigid3d> resect_by_others(const FeatureGraph& graph,
   }
   const auto found = solve(graph, frame, camera, near, tracks, options);
   if (!found) return std::nullopt;
-  int agree_there = 0, agree_here = 0;
+  OtherPlace place{found->pose, 0, 0};
   for (std::size_t i = 0; i < near.feature.size(); ++i) {
     const double limit_px = options.max_error_px * graph.pixel_scale;
-    agree_there += miss_px(found->pose, near.feature[i], near.track[i]) <= limit_px;
-    agree_here += miss_px(here, near.feature[i], near.track[i]) <= limit_px;
+    place.agree_there += miss_px(found->pose, near.feature[i], near.track[i]) <= limit_px;
+    place.agree_here += miss_px(here, near.feature[i], near.track[i]) <= limit_px;
   }
-  if (agree_there < agree_here) return std::nullopt;
-  return found->pose;
+  return place;
+}
+
+std::optional<Rigid3d> resect_by_others(const FeatureGraph& graph,
+                                        const std::vector<FeatureTrack>& all_tracks,
+                                        const PosedFrames& posed, int frame,
+                                        const ResectionOptions& options) {
+  const auto place = place_by_others(graph, all_tracks, posed, frame, options);
+  if (!place || place->agree_there < place->agree_here) return std::nullopt;
+  return place->pose;
 }
 
 }  // namespace orbitfuse

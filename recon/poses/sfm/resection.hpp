@@ -25,6 +25,17 @@ struct ResectionOptions {
 Result<std::vector<int>> resect(FeatureGraph& graph, PosedFrames& posed,
                                 const ResectionOptions& options, const Progress& progress);
 
+/// Where the other frames' points have a frame, by its exact matches within a twentieth of the
+/// width of where they should be, and how many of those agree there and where it is now.
+struct OtherPlace {
+  Rigid3d pose;
+  int agree_there = 0, agree_here = 0;
+};
+std::optional<OtherPlace> place_by_others(const FeatureGraph& graph,
+                                          const std::vector<FeatureTrack>& tracks,
+                                          const PosedFrames& posed, int frame,
+                                          const ResectionOptions& options);
+
 /// Where a posed frame stands by the others' share in `tracks`, near where it stands now (points
 /// that it misses by more than a twentieth of the width aren't asked): matches found along its own
 /// epipolar lines hold a frame where it is, right or not, and these don't. nullopt where nothing is

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/estimate/placed_elsewhere.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "core/geometry/scene_ball.hpp"
+#include "core/system/parallel.hpp"
+#include "recon/poses/index.hpp"
+#include "recon/poses/sfm/resection.hpp"
+
+namespace orbitfuse {
+namespace {
+
+/// Of each frame's verified matches with posed ones, the share that the poses hold; 1 without any.
+std::vector<double> held_shares(const FeatureGraph& graph, const PosedFrames& posed,
+                                double max_error_px) {
+  std::vector<double> all(at(graph.count()), 0), held = all;
+  for (const auto& [pair, matches] : graph.verified) {
+    const auto [a, b] = pair;
+    if (!posed.poses[at(a)] || !posed.poses[at(b)]) continue;
+    const EpipolarBand band = epipolar_band(graph, pair, posed, max_error_px);
+    const auto agree = std::count_if(matches.begin(), matches.end(), [&](const FeatureMatch& m) {
+      return band.distance(m.first, m.second) <= band.half_width;
+    });
+    for (const int f : {a, b}) {
+      all[at(f)] += static_cast<double>(matches.size());
+      held[at(f)] += static_cast<double>(agree);
+    }
+  }
+  for (std::size_t f = 0; f < all.size(); ++f) held[f] = all[f] > 0 ? held[f] / all[f] : 1;
+  return held;
+}
+
+double orbit_radius(const Reconstruction& model) {
+  std::vector<Eigen::Vector3d> centers;
+  for (const PosedView& view : model.views) centers.push_back(camera_center(view.cam_from_world));
+  return rms_radius(centers);
+}
+
+}  // namespace
+
+Result<std::vector<DoubtfulView>> placed_elsewhere(const FeatureGraph& graph,
+                                                   const Reconstruction& model,
+                                                   const Progress& progress,
+                                                   const PlacedElsewhereOptions& options) {
+  const PosedFrames posed = posed_frames(graph, model);
+  TrackOptions track;
+  track.max_error_px *= graph.pixel_scale;
+  const std::vector<double> held = held_shares(graph, posed, track.max_error_px);
+  std::vector<int> asked;
+  for (int f = 0; f < graph.count(); ++f)
+    if (posed.poses[at(f)] && held[at(f)] < options.plainly_held) asked.push_back(f);
+  std::vector<DoubtfulView> views;
+  const double radius = orbit_radius(model);
+  if (asked.empty() || !(radius > 0)) return views;
+  const std::vector<FeatureTrack> tracks =
+      triangulate_tracks(graph, confirmed_matches(graph, posed, track.max_error_px), posed, track);
+  std::vector<std::optional<OtherPlace>> places(asked.size());
+  parallel_for(static_cast<int>(asked.size()), [&](int i) {
+    if (progress.cancelled()) return;
+    places[at(i)] = place_by_others(graph, tracks, posed, asked[at(i)], {});
+  });
+  ORBITFUSE_TRY(progress.check("poses.visible"));
+  for (std::size_t i = 0; i < asked.size(); ++i) {
+    if (!places[i]) continue;
+    const auto& [pose, there, here] = *places[i];
+    const double shift =
+        (camera_center(pose) - camera_center(*posed.poses[at(asked[i])])).norm() / radius;
+    if (shift < options.least_shift ||
+        there - here <= options.more_sigmas * std::sqrt(std::max(here, 1)))
+      continue;
+    views.push_back({graph.frames[at(asked[i])]->file, DoubtReason::neighbours_elsewhere,
+                     fmt::format("the other views' points place it {:.1f} % of the orbit's radius "
+                                 "aside, where {} of its matches agree, here {}; take one between "
+                                 "it and the next",
+                                 100 * shift, there, here)});
+  }
+  return views;
+}
+
+}  // namespace orbitfuse

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "core/progress.hpp"
+#include "recon/poses/estimate_poses.hpp"
+#include "recon/poses/sfm/feature_graph.hpp"
+
+namespace orbitfuse {
+
+struct PlacedElsewhereOptions {
+  /// Of a view's verified matches, the share from which on its pose needs no asking.
+  double plainly_held = 0.85;
+  /// Of the orbit's radius: what is nearer is no other place.
+  double least_shift = 0.01;
+  /// By how many standard deviations of a count more of its matches must agree there than here.
+  double more_sigmas = 3;
+};
+
+/// Views that the other views' points place elsewhere. What was found along a view's own epipolar
+/// lines agrees with it wherever it stands, so its residuals are small in a wrong place too; its
+/// exact matches with points that the others alone hold are not of its making. Asked are the views
+/// that hold few of their verified matches, which right ones do too (docs/notes/poses_visible.md).
+/// A view of whose matches fewer than twenty show such points is not named. Errors: cancelled.
+Result<std::vector<DoubtfulView>> placed_elsewhere(const FeatureGraph& graph,
+                                                   const Reconstruction& model,
+                                                   const Progress& progress,
+                                                   const PlacedElsewhereOptions& options = {});
+
+}  // namespace orbitfuse
