@@ -127,15 +127,15 @@ TEST(Tracks, MatchesContradictAnOrbitThatIsTornApart) {
   EXPECT_GT(held.share, 0.5) << "most neighbours are in one quarter";
 }
 
-/// Of each frame with the one four on, 40 matches that mean nothing: a ring's marks, one for
-/// another.
+/// Of each frame of a loop with the one four on, 30 matches that mean nothing: a ring's marks, one
+/// for another.
 void add_repeated_pattern(FeatureScene& scene) {
-  for (int f = 0; f + 4 < scene.graph.count(); ++f) {
+  for (int f = 0; f + 4 < 12; ++f) {
     std::vector<FeatureMatch>& matches = scene.graph.verified[{f, f + 4}];
     matches.clear();
     const auto features = static_cast<int>(scene.graph.pixels[static_cast<std::size_t>(f)].cols()),
                there = static_cast<int>(scene.graph.pixels[static_cast<std::size_t>(f + 4)].cols());
-    for (int i = 0; i < 40; ++i) matches.emplace_back(i * features / 40, (17 * i + 5) % there);
+    for (int i = 0; i < 30; ++i) matches.emplace_back(i * features / 30, (17 * i + 5) % there);
   }
 }
 
@@ -144,8 +144,8 @@ TEST(Tracks, ARepeatedPatternIsOutvotedByTheMatchesThatJoinItsFrames) {
   add_repeated_pattern(scene);
   const PosedFrames right = posed_but(scene, {});
   const HeldMatches held = held_matches(scene.graph, right);
-  EXPECT_GT(held.outvoted, 10);
-  EXPECT_FALSE(held.contradict()) << held.contradicted << " " << held.contradicted_share;
+  EXPECT_EQ(held.outvoted, 8);
+  EXPECT_EQ(held.contradicted, 0);
   // A frame that nothing but its own matches places has nobody to vote for it.
   PosedFrames astray = right;
   const Eigen::Quaterniond aside(Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()));
