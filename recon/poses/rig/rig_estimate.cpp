@@ -285,7 +285,7 @@ Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOpt
     if (place.score > best.score) best = place;
   }
   // What can't be told from a shuffled order now is refused however well it is aligned later.
-  if (best.score <= wrong)
+  if (!(best.score >= options.min_search_lead * wrong))
     return refused(
         fmt::format("{} pairs: correlation of all edges {:.3f}, of shuffled pairs {:.3f} at best",
                     views.size(), best.score, wrong));

@@ -95,6 +95,9 @@ TEST(Rig, ShuffledPairsAreRefused) {
   ASSERT_FALSE(rig) << rig->words();
   EXPECT_EQ(rig.error().kind, ErrorKind::quality);
   EXPECT_EQ(rig.error().where, "poses.rig");
+  // At once: nothing was aligned that could have words.
+  EXPECT_NE(rig.error().found.find("correlation of all edges"), std::string::npos);
+  EXPECT_EQ(rig.error().found.find("patches"), std::string::npos) << rig.error().found;
 }
 
 /// The image as from elsewhere: each of its parts is displaced by up to `most_px` of its own.
