@@ -30,7 +30,8 @@ struct RigOptions {
   /// The cameras' distance as a share of the scene's, one standard deviation: they share a housing.
   double baseline_sigma = 0.03;
   /// All edges at the best shift must agree this many times better than in a shuffled order, or the
-  /// rest is not tried: rigs 2.1 to 6.9 times, pairs that were not shot at once 0.7 to 1.1.
+  /// rest is not tried: rigs 2.1 to 6.9 times, pairs that were not shot at once 0.7 to 1.1 (1.5
+  /// once).
   double min_search_lead = 1.2;
   /// Pairs in the right order must agree this much better, in standard errors, than wrong ones.
   double min_decisiveness = 3;
