@@ -62,9 +62,13 @@ Status resolve_config(const CLI::App& verb, cli::Context& context) {
   return config.validate();
 }
 
-/// A farm's jobs run elsewhere: what this machine has says nothing of theirs.
-void choose_device(const cli::CommonOptions& common, const std::string& verb, Console& console) {
-  if (common.device != "cuda" || verb == "farm") return;
+/// For verbs that may train or render, and for the doctor. A farm's jobs run elsewhere: what this
+/// machine has says nothing of theirs.
+void choose_device(const cli::CommonOptions& common, const cli::Verb& verb, Console& console) {
+  const std::string name_of_verb = verb.name;
+  const bool may_compute = verb.common.config || name_of_verb == "measure";
+  if (common.device != "cuda" || name_of_verb == "farm" || common.dry_run) return;
+  if (!may_compute && name_of_verb != "doctor") return;
   const auto name = nerf::use_cuda();
   if (name)
     console.info(fmt::format("fields are computed on {}", *name));
@@ -184,7 +188,7 @@ int run(const std::vector<const char*>& words) {
     context.result = {{"config", config.settings().to_json()}};
   } else if (status) {
     const std::string no_file;
-    choose_device(line.common, verb->name, console);
+    choose_device(line.common, *verb, console);
     status = traced(line.common.dry_run ? no_file : line.common.trace_file, verb->name,
                     [&] { return action(context); });
   }

@@ -18,7 +18,6 @@
 #include "core/system/parallel.hpp"
 #include "core/temperature.hpp"
 #include "recon/assembly/training_data.hpp"
-#include "recon/nerf/compute_device.hpp"
 
 namespace orbitfuse::stages {
 namespace {
@@ -218,10 +217,9 @@ Result<report::Model> report_content(const StageContext& context, const StageInp
   report::Model model;
   const std::string folder = input.session.folder.lexically_normal().filename().string();
   model.title = folder.empty() ? input.session.id : folder;
-  const std::string device = nerf::device_name();
-  model.subtitle = fmt::format("Session {}, recorded {}. Computed on {}, {} threads{}.",
-                               input.session.id, input.session.created, cpu_description(),
-                               thread_count(), device.empty() ? "" : ", fields on " + device);
+  model.subtitle =
+      fmt::format("Session {}, recorded {}. Computed on {}, {} threads.", input.session.id,
+                  input.session.created, cpu_description(), thread_count());
   ORBITFUSE_TRY(add_views(context, *in.config, model));
   add_poses(context, input, model);
   add_registration(context, model);

@@ -102,6 +102,7 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
     output.warnings.push_back(
         fmt::format("{} training steps dropped: a gradient was not finite", report.skipped_steps));
   output.metrics = metrics_json(report);
+  if (!report.device.empty()) output.metrics["device"] = report.device;
   if (own_depth.known > 0) output.metrics["own_depth_known"] = own_depth.known;
   output.metrics["cloud_points"] = cloud ? cloud->size() : 0;
   output.metrics["width_px"] = data.views.empty() ? 0 : data.views[0].camera.width;
@@ -115,7 +116,7 @@ pipeline::Stage train_stage(const StageInputs& in, Modality modality) {
   const bool visible = modality == Modality::visible;
   pipeline::Stage stage;
   stage.name = "train_" + modality_name;
-  stage.version = 3;
+  stage.version = 4;
   stage.needs = {"poses_" + modality_name};
   stage.uses = {visible ? "depth" : "train_visible"};
   stage.options = in.config->settings().to_json("train." + modality_name);

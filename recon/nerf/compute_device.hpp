@@ -17,7 +17,4 @@ bool built_with_cuda();
 /// unavailable (this build or machine has none); the processor goes on computing.
 Result<std::string> use_cuda();
 
-/// The device that computes fields; empty: the processor.
-std::string device_name();
-
 }  // namespace orbitfuse::nerf

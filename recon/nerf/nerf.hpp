@@ -33,7 +33,8 @@ struct TrainReport : History {
   /// steady.
   std::map<std::string, std::array<double, 3>> image_gains;
   std::map<std::string, Rigid3d>
-      refined_poses;  ///< cam_from_world by view, as training left it (refine_poses)
+      refined_poses;   ///< cam_from_world by view, as training left it (refine_poses)
+  std::string device;  ///< that made the steps; empty: the processor
   std::vector<Skip> skips;
   std::vector<std::string> warnings;  ///< views that were dropped, a target that was missed
 

@@ -55,7 +55,7 @@ const std::map<std::string, Floors> floors_of{
     {"recon/depth", {{"stereo"}, {"ground"}}},
     {"recon/measurement", {}},
     {"recon/comparison", {}},
-    {"recon/nerf", {{"kernels"}, {"field"}, {"rendering"}, {"training"}}},
+    {"recon/nerf", {{"kernels"}, {"field"}, {"device"}, {"rendering"}, {"training"}}},
     {"recon/poses", {{"sfm"}, {"cross_modal", "global_sfm"}, {"rig"}, {"estimate"}}},
     {"recon/registration", {{"clouds", "images"}}},
     {"recon/surface", {}},

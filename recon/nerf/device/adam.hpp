@@ -7,6 +7,8 @@
 // Adam on a device (as Kernels::adam). None moves where the step's gradients are not all finite.
 namespace orbitfuse::nerf::ORBITFUSE_ENGINE {
 
+constexpr float no_limit = 3e38f;  ///< of numbers that aren't kept in half precision
+
 struct Moments {
   float *value, *first, *second;
 };
@@ -63,7 +65,6 @@ struct AdamNetwork {
 
   ORBITFUSE_HOST_DEVICE void operator()(int i) const {
     if (*finite == 0) return;
-    constexpr float no_limit = 3e38f;
     const float value = adam_step(step, at, i, gradient[i], no_limit);
     int l = 0;
     while (l + 1 < layers.count && i >= layers.layer[l + 1].offset) ++l;
@@ -73,28 +74,35 @@ struct AdamNetwork {
   }
 };
 
-/// One thread: views are few.
+/// A thread a view.
 struct AdamOffsets {
   AdamStep step;
   Moments at;
   long long* gradient;  ///< cleared
-  const int* training;
-  int training_count, count;
+  const int* trains;
+  long long* sum;  ///< of the training views' offsets afterwards
   const int* finite;
 
-  ORBITFUSE_HOST_DEVICE void operator()(int) const {
-    for (int i = 0; i < count; ++i) {
-      const float sum = value_of(gradient[i]);
-      gradient[i] = 0;
-      constexpr float no_limit = 3e38f;
-      if (*finite != 0) adam_step(step, at, i, sum, no_limit);
-    }
+  ORBITFUSE_HOST_DEVICE void operator()(int i) const {
+    const float raw = value_of(gradient[i]);
+    gradient[i] = 0;
     if (*finite == 0) return;
-    // The mean offset is the scene's temperature, not drift.
-    double mean = 0;
-    for (int k = 0; k < training_count; ++k) mean += at.value[training[k]];
-    mean /= training_count;
-    for (int k = 0; k < training_count; ++k) at.value[training[k]] -= static_cast<float>(mean);
+    adam_step(step, at, i, raw, no_limit);
+    if (trains[i] != 0) add_to(sum, fixed_of(at.value[i]));
+  }
+};
+
+/// The mean offset is the scene's temperature, not drift.
+struct CenterOffsets {
+  Moments at;
+  const int* trains;
+  const long long* sum;
+  int training_count;
+  const int* finite;
+
+  ORBITFUSE_HOST_DEVICE void operator()(int i) const {
+    if (*finite != 0 && trains[i] != 0)
+      at.value[i] -= value_of(*sum) / static_cast<float>(training_count);
   }
 };
 

@@ -144,7 +144,6 @@ inline void adam_numbers(const AdamStep& step, std::int64_t count, float* parame
                          float* second, float* grad) {
   const auto copy = [&](const float* from) { return std::vector<float>(from, from + count); };
   const Buffer<float> value(copy(parameter)), m(copy(first)), v(copy(second)), g(copy(grad));
-  constexpr float no_limit = 3e38f;
   launch(static_cast<int>(count),
          AdamNumbers{step, {value.data(), m.data(), v.data()}, g.data(), no_limit});
   const auto bytes = static_cast<std::size_t>(count) * sizeof(float);

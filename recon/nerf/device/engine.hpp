@@ -9,8 +9,8 @@
 #include "recon/nerf/field/march_settings.hpp"
 #include "recon/nerf/field/ray.hpp"
 #include "recon/nerf/field/ray_numbers.hpp"
+#include "recon/nerf/field/traced_ray.hpp"
 #include "recon/nerf/kernels/kernels.hpp"
-#include "recon/nerf/rendering/traced_ray.hpp"
 
 // What a device does for a field: its training steps, and what rays show. Plain numbers and C++17,
 // because nvcc reads this. Fields with Sampling::proposal stay on the processor.

@@ -4,6 +4,13 @@
 #include "recon/nerf/device/tracing.hpp"
 #include "recon/nerf/device/training_steps.hpp"
 
+namespace orbitfuse::nerf::cuda {
+struct SetOne {
+  float* number;
+  ORBITFUSE_HOST_DEVICE void operator()(int) const { *number = 1; }
+};
+}  // namespace orbitfuse::nerf::cuda
+
 namespace orbitfuse::nerf::device {
 namespace {
 
@@ -16,6 +23,11 @@ class CudaEngine final : public Engine {
     cudaDeviceProp properties;
     cuda::check(cudaGetDeviceProperties(&properties, 0));
     name_ = properties.name;
+    // Whether this build has code for it, and it has memory, shows only here.
+    cuda::Buffer<float> number;
+    number.zeros(1);
+    cuda::launch(1, cuda::SetOne{number.data()});
+    if (number.download(1).front() != 1) throw Refused{name_ + " doesn't compute"};
   }
   std::string name() const override { return name_; }
   std::unique_ptr<Steps> steps(const FieldNumbers& field,

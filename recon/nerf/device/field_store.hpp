@@ -139,7 +139,7 @@ inline void encode(const FieldStore& field, Rows position01, SampleCount samples
 class ForwardPass {
  public:
   Buffer<DeviceRay> rays;
-  Samples samples;
+  RaySamples samples;
   SampleCount sample_count, row_count;  ///< rows: samples with a colour
   Rows features, color_in;
   Activations density, color;
@@ -168,9 +168,9 @@ class ForwardPass {
   void place(const FieldStore& field, int count, const MarchSettings& settings) {
     const int most_haze = settings.haze > 2 ? settings.haze : 2;
     const int wanted = settings.surface + most_haze;
-    const int per_ray = 1 + (wanted < most_ray_samples ? wanted : most_ray_samples);
+    const int per_ray = 1 + (wanted < max_ray_samples ? wanted : max_ray_samples);
     const auto n = static_cast<std::size_t>(count);
-    const int slots = field.resolution;  // no piece of piece_begin() crosses more cells
+    const int slots = field.resolution;  // as piece_begin() says
     segments_.need(n * static_cast<std::size_t>(ray_pieces * slots));
     piece_counts_.need(n * ray_pieces);
     piece_sums_.need(n * ray_pieces);
@@ -191,16 +191,16 @@ class ForwardPass {
     used_.need(count);
     colored_.need(count + 1);
     if (bound > static_cast<std::size_t>(stride)) {
-      stride = static_cast<long>((bound + bound / 4 + 31) / 32 * 32);
-      const auto wide = static_cast<std::size_t>(stride);
+      const std::size_t wide = (bound + bound / 4 + 31) / 32 * 32;
       along_.need(7 * wide);
       position_.need(3 * wide);
       sample_of.need(wide);
       ray_of.need(wide);
       features_.zeros(static_cast<std::size_t>(field.width) * wide);  // padding stays 0
       color_in_.need(color_inputs * wide);
-      density.need(field.density.layers, stride);
-      color.need(field.color.layers, stride);
+      density.need(field.density.layers, static_cast<long>(wide));
+      color.need(field.color.layers, static_cast<long>(wide));
+      stride = static_cast<long>(wide);  // last: whatever was refused is asked for again
     }
     float* along = along_.data();
     const auto part = [&](int i) { return along + i * stride; };

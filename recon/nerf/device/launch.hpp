@@ -65,7 +65,9 @@ inline LaunchTimes& launch_times() {
 #ifdef __CUDACC__
 
 inline void check(cudaError_t status) {
-  if (status != cudaSuccess) throw device::Refused{cudaGetErrorString(status)};
+  if (status == cudaSuccess) return;
+  cudaGetLastError();  // or the next launch would be taken for failed, too
+  throw device::Refused{cudaGetErrorString(status)};
 }
 inline void* allocate(std::size_t bytes) {
   void* memory = nullptr;
@@ -129,10 +131,11 @@ inline void fill_bytes(void* device, int byte, std::size_t bytes) {
   if (bytes > 0) std::memset(device, byte, bytes);
 }
 
-/// work(i) for i in [0, count), in order.
+/// work(i) for i in [0, count), from the last to the first: no thread may count on another's having
+/// been before it.
 template <class Work>
 void launch(int count, const Work& work) {
-  for (int i = 0; i < count; ++i) work(i);
+  for (int i = count - 1; i >= 0; --i) work(i);
 }
 
 #endif
@@ -157,9 +160,10 @@ class Buffer {
 
   T* data() const { return data_; }
   std::size_t size() const { return size_; }
+  /// What grows again gets a quarter more than it asks for.
   void need(std::size_t count) {
     if (count <= size_) return;
-    const std::size_t roomy = count + count / 4;
+    const std::size_t roomy = size_ > 0 ? count + count / 4 : count;
     if (data_ != nullptr) release(data_);
     data_ = nullptr;
     size_ = 0;
@@ -208,9 +212,10 @@ class Scan {
 // ---- sums that don't depend on the order in which threads add --------------------------------
 
 /// Parts of 2^-44: gradients of a mean over rays are far below 1, and Adam makes steps of the
-/// smallest. A part beyond 128 counts as 128; 4096 of these fit.
+/// smallest. A part beyond 8 counts as 8; 65,535 of these fit, more than a step's samples that meet
+/// one entry.
 constexpr double fixed_unit = 1.0 / (1ull << 44);
-constexpr float largest_part = 128.0f;
+constexpr float largest_part = 8.0f;
 
 ORBITFUSE_HOST_DEVICE inline void add_to(long long* sum, long long part) {
 #ifdef __CUDA_ARCH__

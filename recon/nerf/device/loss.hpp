@@ -2,8 +2,8 @@
 #pragma once
 
 #include "recon/nerf/device/shade.hpp"
+#include "recon/nerf/field/pose_row.hpp"
 #include "recon/nerf/kernels/depth_loss.hpp"
-#include "recon/nerf/training/pose_row.hpp"
 
 // The loss and its gradients along rays, as backward.cpp.
 namespace orbitfuse::nerf::ORBITFUSE_ENGINE {
@@ -12,7 +12,11 @@ struct LossNumbers {
   float per_ray, distortion_weight, huber;
 };
 
-/// Of a step; sums in fixed_unit.
+/// Of squared errors: a field that runs away must not wrap their sum.
+constexpr double error_unit = 1.0 / (1 << 20);
+constexpr float largest_error = 1e6f;
+
+/// Of a step; squared_error in error_unit.
 struct StepSums {
   long long squared_error, channels, rays, samples;
 };
@@ -25,7 +29,7 @@ struct StepState {
 
 struct RayLoss {
   const DeviceRay* rays;
-  Samples samples;
+  RaySamples samples;
   Light light;
   Rows color;
   Shade shade;
@@ -77,7 +81,8 @@ struct RayLoss {
       sum += dvalue[c];
     }
     if (!is_finite(squared)) state->finite = 0;
-    add_to(&state->sums.squared_error, fixed_of(squared));
+    const float bounded = squared < largest_error ? squared : largest_error;
+    add_to(&state->sums.squared_error, static_cast<long long>(bounded / error_unit));
     add_to(&state->sums.channels, shade.channels);
     add_to(doffset + ray.view, fixed_of(sum));
   }
@@ -144,7 +149,7 @@ constexpr double pose_unit = 1.0 / (1 << 20);
 struct WatchPoses {
   Photos photos;
   const DeviceRay* rays;
-  Samples samples;
+  RaySamples samples;
   Light light;
   Rows color;
   Shade shade;
@@ -161,7 +166,7 @@ struct WatchPoses {
       opacity += light.weight[i];
       distance += light.weight[i] * samples.t[i];
     }
-    if (opacity < 0.5f) return;
+    if (opacity < seen_opacity) return;
     float shown[3];
     ray_value(shade, color, light.weight, sample_of, first_row[r], first_row[r + 1], shown);
     add(ray, distance / opacity, shown);
@@ -204,7 +209,8 @@ struct WatchPoses {
     if (said) add_to(to + pose_numbers - 1, 1);
   }
   ORBITFUSE_HOST_DEVICE static long long rounded(double value) {
-    constexpr double most = 1e12;  // a ray that says more is beside itself, and sums must not wrap
+    // A ray that says more is beside itself; 400,000 of these fit, the most that 25 steps draw.
+    constexpr double most = 2e7;
     const double upper = value < most ? value : most, held = upper > -most ? upper : -most;
     return static_cast<long long>(held / pose_unit);
   }

@@ -5,6 +5,7 @@
 #include "recon/nerf/field/contraction.hpp"
 #include "recon/nerf/field/march_settings.hpp"
 #include "recon/nerf/field/occupancy_codes.hpp"
+#include "recon/nerf/field/traced_ray.hpp"
 
 // Samples along rays on a device, as march() places them. A ray's next cell depends on its last,
 // and a step's rays are few: each ray's way is walked in pieces, side by side, which note the
@@ -18,8 +19,7 @@ struct Cells {
   const std::uint64_t *any, *plain;
 };
 
-constexpr int most_steps = 8 * 4096;  // a diagonal through all cascades of 256 cells needs 2300
-constexpr int most_ray_samples = 256;
+constexpr int most_steps = 8 * 4096;  // of a walk that gets nowhere; a diagonal needs 2300
 
 /// The stretch of a ray inside one occupied cell, or a block of cells of which nothing is known.
 struct alignas(16) Segment {
@@ -117,7 +117,7 @@ class CellWalk {
     return value;
   }
   ORBITFUSE_HOST_DEVICE float way_out(const float x[3], float per_step, float step) const {
-    float exit = 3.402823466e38f;
+    float exit = no_end;
     for (int d = 0; d < 3; ++d) {
       const float edge = (floorf(x[d] * per_step) + (inverse_[d] > 0 ? 1.0f : 0.0f)) * step;
       exit = fminf(exit, (edge - x[d]) * inverse_[d]);
@@ -130,17 +130,24 @@ class CellWalk {
   int steps_ = 0;
 };
 
-constexpr int ray_pieces = 16, near_pieces = 12;
+/// A ray's pieces: 12 share the way through the innermost cube, where cells are smallest, and each
+/// of the cubes round it has one before and one behind.
+constexpr int near_pieces = 12, outer_pieces = 4, ray_pieces = near_pieces + 2 * outer_pieces;
 
-/// Where a ray's piece begins: most share the way to the far side of the unit ball, where cells are
-/// smallest.
+/// Where a piece begins. At a distance u from the point nearest to the centre along a central ray a
+/// cell is no smaller than u / sqrt(3) says: no piece crosses more than 0.8 * resolution cells.
 ORBITFUSE_HOST_DEVICE inline float piece_begin(const Ray& ray, int piece) {
+  constexpr float reach = 1.8f;  // a little over sqrt(3): beyond it no point is in the cube
   const float* o = ray.origin;
-  const float inner = sqrtf(o[0] * o[0] + o[1] * o[1] + o[2] * o[2]) + 1.0f;
-  if (piece >= ray_pieces) return 3.402823466e38f;
-  if (piece <= near_pieces) return inner * static_cast<float>(piece) / near_pieces;
-  const int beyond = piece - near_pieces;  // 1.5, 4, 10
-  return inner + (beyond == 1 ? 1.5f : beyond == 2 ? 4.0f : 10.0f);
+  const float middle = sqrtf(o[0] * o[0] + o[1] * o[1] + o[2] * o[2]);
+  const auto doubled = [&](int times) { return reach * static_cast<float>(1 << times); };
+  if (piece == 0) return 0;
+  if (piece < outer_pieces) return middle - doubled(outer_pieces - piece);
+  const int near = piece - outer_pieces;
+  if (near <= near_pieces)
+    return middle + reach * (2.0f * static_cast<float>(near) / near_pieces - 1.0f);
+  const int beyond = near - near_pieces;
+  return beyond < outer_pieces ? middle + doubled(beyond) : no_end;
 }
 
 /// Occupied stretches of all rays' pieces: slot s of piece p of ray r is at [(p * slots + s) * rays
@@ -232,7 +239,7 @@ struct CountSamples {
     const float for_surface = static_cast<float>(settings.surface) * fminf(1.0f, surface);
     const float for_haze = fminf(fmaxf(haze, 2.0f), most_haze);
     const int wanted = static_cast<int>(ceilf(for_surface + for_haze));
-    const int count = wanted < most_ray_samples ? wanted : most_ray_samples;
+    const int count = wanted < max_ray_samples ? wanted : max_ray_samples;
     spread[r] = {count, surface > 0 ? for_surface / surface : 0.0f, for_haze / haze,
                  (for_surface + for_haze) / static_cast<float>(count)};
     counts[r] = count + 1;
@@ -240,7 +247,7 @@ struct CountSamples {
 };
 
 /// Samples of all rays, ray after ray; the last of each is the background: the point at infinity.
-struct Samples {
+struct RaySamples {
   const int* first;        ///< of each ray, and behind the last
   float *t, *dt, *s, *ds;  ///< s = t / (1 + t), in which the distortion loss counts
   Rows position01;
@@ -251,7 +258,7 @@ struct PlaceSamples {
   const DeviceRay* rays;
   Stretches found;
   const Spread* spread;
-  Samples samples;
+  RaySamples samples;
 
   ORBITFUSE_HOST_DEVICE void operator()(int r) const {
     const DeviceRay& given = rays[r];
@@ -301,7 +308,7 @@ struct PlaceSamples {
       }
     }
     // What rounding has left over belongs to the last.
-    pass(rays[r], how, at, held, mass_of(held), 3.402823466e38f, running);
+    pass(rays[r], how, at, held, mass_of(held), no_end, running);
   }
 
   /// All middles and ends up to a mass, which lie in this segment.

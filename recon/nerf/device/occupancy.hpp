@@ -13,6 +13,7 @@ struct CellStore {
   const std::uint64_t* allowed;
   float *density, *window;
   std::uint8_t* look;
+  const float* code_least;  ///< CodeThresholds
 
   ORBITFUSE_HOST_DEVICE float size_of(int cascade) const {
     return 2.0f * static_cast<float>(1 << cascade) / static_cast<float>(resolution);
@@ -49,12 +50,13 @@ struct CellStore {
 /// The density that light sees along the step's rays.
 struct RecordRays {
   const DeviceRay* rays;
-  Samples samples;
+  RaySamples samples;
   Light light;
   CellStore cells;
+  const int* finite;  ///< else nothing changes
 
   ORBITFUSE_HOST_DEVICE void operator()(int r) const {
-    if (!rays[r].there) return;
+    if (!rays[r].there || *finite == 0) return;
     const int begin = samples.first[r];
     const Ray& ray = rays[r].ray;
     for (int i = begin; i < begin + light.used[r]; ++i) {
@@ -176,7 +178,7 @@ struct SwitchCells {
       const long cell = first + k;
       const std::uint64_t bit = std::uint64_t{1} << k;
       const float density = cells.density[cell];
-      const int code = density > 0 ? code_of_density(density) : 0;
+      const int code = code_by(cells.code_least, density);
       coded = coded || code > 0;
       if (cells.window[cell] < 0) continue;
       cells.window[cell] = -1;

@@ -2,7 +2,6 @@
 #include "recon/nerf/device/on_device.hpp"
 
 #include <algorithm>
-#include <cassert>
 
 #include "recon/nerf/compute_device.hpp"
 
@@ -33,7 +32,7 @@ std::vector<LayerShape> shapes_of(const Mlp& network) {
 Engine* current() { return engine_in_use().get(); }
 void use(std::unique_ptr<Engine> engine) { engine_in_use() = std::move(engine); }
 
-FieldNumbers numbers_of(const FieldState& field) {
+FieldNumbers shown_numbers(const FieldState& field) {
   FieldNumbers out;
   out.channels = field.channels();
   out.bounded = field.modality == Modality::visible;
@@ -45,19 +44,29 @@ FieldNumbers numbers_of(const FieldState& field) {
   out.width = grid.width;
   out.density_layers = shapes_of(field.main.mlp);
   out.color_layers = shapes_of(field.color);
-  out.table = {grid.table.values(), grid.table.part(&GridLine::first),
-               grid.table.part(&GridLine::second)};
-  out.density = numbers_of(field.main.mlp.weights);
-  out.color = numbers_of(field.color.weights);
-  out.offsets = numbers_of(field.image_offsets);
+  out.table.value = grid.table.values();
+  out.density.value = field.main.mlp.weights.value;
+  out.color.value = field.color.weights.value;
   const Occupancy& cells = field.occupancy;
   out.resolution = cells.resolution;
   out.cascades = cells.cascades;
   out.on = cells.on;
-  out.allowed = cells.allowed;
   out.any = cells.any;
   out.plain = cells.plain;
   out.look = cells.look;
+  return out;
+}
+
+FieldNumbers all_numbers(const FieldState& field) {
+  FieldNumbers out = shown_numbers(field);
+  const GridTable& table = field.main.grid.table;
+  out.table.first = table.part(&GridLine::first);
+  out.table.second = table.part(&GridLine::second);
+  out.density = numbers_of(field.main.mlp.weights);
+  out.color = numbers_of(field.color.weights);
+  out.offsets = numbers_of(field.image_offsets);
+  const Occupancy& cells = field.occupancy;
+  out.allowed = cells.allowed;
   out.cell_density = cells.density;
   out.window = cells.window;
   return out;
@@ -80,30 +89,6 @@ void take_back(FieldNumbers numbers, FieldState& field) {
     if (cells.window[cell] >= 0) cells.visited.push_back(static_cast<std::int64_t>(cell));
   cells.refresh();
   field.refresh();
-}
-
-std::unique_ptr<Steps> start(Engine& engine, const FieldState& field,
-                             const std::vector<NormalisedView>& views,
-                             const std::vector<bool>& heldout) {
-  std::vector<Photo> photos;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    const NormalisedView& view = views[i];
-    assert(view.target.isContinuous() && view.distance.isContinuous());
-    Photo photo;
-    photo.rays = view.rays.numbers();
-    photo.lattice = view.rays.lattice();
-    photo.target = view.target.ptr<float>();
-    photo.distance = view.distance.ptr<float>();
-    photo.known = view.known.data();
-    photo.known_count = static_cast<std::int64_t>(view.known.size());
-    if (!view.clearance_px.empty()) {
-      assert(view.clearance_px.isContinuous());
-      photo.clearance_px = view.clearance_px.ptr<std::uint8_t>();
-    }
-    photo.trains = !heldout[i];
-    photos.push_back(photo);
-  }
-  return engine.steps(numbers_of(field), photos);
 }
 
 PoseSums sums_of(const ViewSums& sums) {
@@ -129,10 +114,6 @@ Result<std::string> use_cuda() {
     return tl::unexpected(device::error_of(refused));
   }
   return device::current()->name();
-}
-
-std::string device_name() {
-  return device::current() != nullptr ? device::current()->name() : std::string();
 }
 
 }  // namespace orbitfuse::nerf

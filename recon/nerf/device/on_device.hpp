@@ -8,9 +8,8 @@
 #include "recon/nerf/device/engine.hpp"
 #include "recon/nerf/field/device_copy.hpp"
 #include "recon/nerf/field/field_state.hpp"
-#include "recon/nerf/training/scene.hpp"
 
-// Between what the processor holds (Eigen, OpenCV, GridTable) and a device's plain numbers.
+// Between what the processor holds (Eigen, GridTable) and a device's plain numbers.
 namespace orbitfuse::nerf::device {
 
 /// What computes in place of the processor, of the whole process; null: nothing does.
@@ -19,13 +18,12 @@ Engine* current();
 /// set_thread_count().
 void use(std::unique_ptr<Engine> engine);
 
-FieldNumbers numbers_of(const FieldState& field);
+/// What rendering takes of a field.
+FieldNumbers shown_numbers(const FieldState& field);
+/// With what only training needs: moments, offsets, the cells' densities.
+FieldNumbers all_numbers(const FieldState& field);
 /// Parameters, moments and occupancy; derived layouts follow.
 void take_back(FieldNumbers numbers, FieldState& field);
-
-std::unique_ptr<Steps> start(Engine& engine, const FieldState& field,
-                             const std::vector<NormalisedView>& views,
-                             const std::vector<bool>& heldout);
 
 PoseSums sums_of(const ViewSums& sums);
 

@@ -3,9 +3,10 @@
 
 #include "core/numeric/random.hpp"
 #include "recon/nerf/device/launch.hpp"
+#include "recon/nerf/field/draw_rules.hpp"
 #include "recon/nerf/field/ray.hpp"
 #include "recon/nerf/field/ray_numbers.hpp"
-#include "recon/nerf/training/draw_rules.hpp"
+#include "recon/nerf/field/traced_ray.hpp"
 
 // A step's rays, drawn on the device as Trainer::draw() draws them.
 namespace orbitfuse::nerf::ORBITFUSE_ENGINE {
@@ -141,10 +142,9 @@ struct DrawRays {
     for (int c = 0; c < photos.channels; ++c) out.value[c] = stored[c];
     const float distance = photos.distance[view.pixel + pixel];
     const bool known = is_finite(distance);
-    constexpr float no_limit = 3.402823466e38f;
     out.near = 0;
     // What lies behind a known surface isn't seen. Sparse points are too few to gain from it.
-    out.far = known && !sparse ? distance * known_depth_margin : no_limit;
+    out.far = known && !sparse ? distance * known_depth_margin : no_end;
     out.distance = known ? distance : 0.0f;
     out.depth_weight = known ? supervision : 0.0f;
     return true;

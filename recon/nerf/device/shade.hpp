@@ -18,12 +18,9 @@ struct Light {
   int* colored;                  ///< per ray: samples that get a colour, the background among them
 };
 
-/// How many samples the processor would have looked at: it goes by rounds of so many.
-constexpr int samples_per_round = 8;
-
 struct Composite {
   const DeviceRay* rays;
-  Samples samples;
+  RaySamples samples;
   Rows density;
   float stop, min_weight;
   Light light;
@@ -45,7 +42,7 @@ struct Composite {
 
 struct ListColored {
   const DeviceRay* rays;
-  Samples samples;
+  RaySamples samples;
   Light light;
   float min_weight;
   const int* first_row;
@@ -106,39 +103,21 @@ ORBITFUSE_HOST_DEVICE inline void ray_value(const Shade& shade, Rows color, cons
 /// As ImageRenderer writes a ray.
 struct ReadRays {
   const DeviceRay* rays;
-  Samples samples;
+  RaySamples samples;
   Light light;
   Rows color;
   Shade shade;
   const int *first_row, *sample_of;
-  float stop, no_distance, no_limit;
+  float stop, no_distance;
   TracedRay* out;
 
   ORBITFUSE_HOST_DEVICE void operator()(int r) const {
     TracedRay& ray = out[r];
-    ray = {{0, 0, 0}, no_distance, 0, 0, no_limit, rays[r].ray.forward, false, rays[r].there};
+    ray = {{0, 0, 0}, no_distance, 0, 0, no_end, rays[r].ray.forward, false, rays[r].there};
     if (!ray.there) return;
     ray_value(shade, color, light.weight, sample_of, first_row[r], first_row[r + 1], ray.value);
-    const int begin = samples.first[r], end = begin + light.used[r];
-    if (end == begin) return;
-    constexpr float all_but_nothing = 0.98f, least_light = 0.8f;
-    bool fading = false, half_gone = false;
-    for (int i = begin; i < end && !half_gone; ++i) {
-      const float before = i > begin ? light.left[i - 1] : 1.0f, after = light.left[i];
-      if (!fading && after < all_but_nothing) {
-        fading = true;
-        ray.begin = i > begin ? samples.t[i - 1] : fmaxf(0.0f, samples.t[i] - samples.dt[i]);
-      }
-      if (after < 0.5f) {
-        half_gone = true;
-        const float part = (before - 0.5f) / fmaxf(1e-6f, before - after);
-        ray.distance = samples.t[i] + (part - 0.5f) * samples.dt[i];
-      }
-    }
-    const float last = light.left[end - 1];
-    ray.opacity = 1 - last;
-    ray.starts_dark = light.left[begin] < least_light;
-    if (last < stop) ray.end = samples.t[end - 1] + samples.dt[end - 1];
+    const int begin = samples.first[r];
+    read_light(light.used[r], samples.t + begin, samples.dt + begin, light.left + begin, stop, ray);
   }
 };
 

@@ -7,7 +7,7 @@
 
 namespace orbitfuse::nerf::ORBITFUSE_ENGINE {
 
-constexpr int rays_per_batch = 1 << 14;  ///< about 1 GB of stretches and activations
+constexpr int rays_per_batch = 1 << 13;  ///< 0.6 GB of stretches and activations
 
 class FieldTracer final : public device::Tracer {
  public:
@@ -33,8 +33,7 @@ class FieldTracer final : public device::Tracer {
       launch(n, ReadRays{pass_.rays.data(), pass_.samples, pass_.light,
                          pass_.color.out(field_.color.layers), field_.shade, pass_.first_row.data(),
                          pass_.sample_of.data(), settings.stop,
-                         std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::max(),
-                         traced_.data()});
+                         std::numeric_limits<float>::quiet_NaN(), traced_.data()});
       copy_from(out + begin, traced_.data(), static_cast<std::size_t>(n) * sizeof(TracedRay));
     }
   }

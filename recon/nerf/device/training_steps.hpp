@@ -9,7 +9,8 @@ namespace orbitfuse::nerf::ORBITFUSE_ENGINE {
 /// All photos in one array a kind.
 class PhotoStore {
  public:
-  PhotoStore(const std::vector<device::Photo>& photos, int channels) : channels_(channels) {
+  PhotoStore(const std::vector<device::Photo>& photos, int channels, std::size_t offsets)
+      : channels_(channels) {
     std::vector<float> target, distance, lattice;
     std::vector<std::int32_t> known;
     std::vector<std::uint8_t> clearance;
@@ -36,7 +37,7 @@ class PhotoStore {
       }
       views_.push_back(view);
     }
-    sparse = known_pixels > 0 && known_pixels < pixels / 10;
+    sparse = points_are_sparse(known_pixels, pixels);
     training_count = static_cast<int>(training.size());
     target_.upload(target);
     distance_.upload(distance);
@@ -44,6 +45,9 @@ class PhotoStore {
     known_.upload(known);
     clearance_.upload(clearance);
     training_.upload(training);
+    std::vector<int> trains(offsets);
+    for (const int view : training) trains[static_cast<std::size_t>(view)] = 1;
+    trains_.upload(trains);
     pixel_ends_.upload(pixel_ends);
     known_ends_.upload(known_ends);
     view_.upload(views_);
@@ -60,7 +64,7 @@ class PhotoStore {
             known_.data(), clearance_.data(), channels_};
   }
   int count() const { return static_cast<int>(views_.size()); }
-  const int* training() const { return training_.data(); }
+  const int* trains() const { return trains_.data(); }  ///< [view, padded as the offsets]
   DrawRays draw(const device::StepPlan& plan, DeviceRay* rays) {
     return {photos(),           training_.data(),
             pixel_ends_.data(), known_ends_.data(),
@@ -80,14 +84,14 @@ class PhotoStore {
   Buffer<float> target_, distance_, lattice_;
   Buffer<std::int32_t> known_;
   Buffer<std::uint8_t> clearance_;
-  Buffer<int> training_;
+  Buffer<int> training_, trains_;
   Buffer<long long> pixel_ends_, known_ends_;
 };
 
 class TrainingSteps final : public device::Steps {
  public:
   TrainingSteps(const device::FieldNumbers& field, const std::vector<device::Photo>& photos)
-      : field_(field), photos_(photos, field.channels) {
+      : field_(field), photos_(photos, field.channels, field.offsets.value.size()) {
     table_.upload(field.table);
     offsets_.upload(field.offsets);
     allowed_.upload(field.allowed);
@@ -109,6 +113,8 @@ class TrainingSteps final : public device::Steps {
     partial_.need(widest * weight_chunks);
     state_.need(1);
     visits_.need(1);
+    offset_sum_.need(1);
+    code_least_.upload(code_thresholds().least, 256);
   }
 
   device::StepOutcome step(const device::StepPlan& plan) override {
@@ -117,8 +123,7 @@ class TrainingSteps final : public device::Steps {
     state_.upload(&fresh, 1);
     pass_.rays.need(static_cast<std::size_t>(plan.rays));
     launch(plan.rays, photos_.draw(plan, pass_.rays.data()));
-    constexpr float stop = 1e-4f, min_weight = 1e-4f;  // as ForwardSettings
-    pass_.run(field_, plan.rays, plan.march, stop, min_weight);
+    pass_.run(field_, plan.rays, plan.march, training_stop, training_min_weight);
     backward(plan);
     if (plan.posing)
       launch(plan.rays,
@@ -126,11 +131,12 @@ class TrainingSteps final : public device::Steps {
                         pass_.color.out(field_.color.layers), field_.shade, pass_.first_row.data(),
                         pass_.sample_of.data(), offsets_.value.data(), pose_sums_.data()});
     move(plan);
-    launch(plan.rays, RecordRays{pass_.rays.data(), pass_.samples, pass_.light, cells()});
+    launch(plan.rays, RecordRays{pass_.rays.data(), pass_.samples, pass_.light, cells(),
+                                 &state_.data()->finite});
     const StepState state = state_.download(1).front();
     return {static_cast<long>(state.sums.rays), static_cast<long>(state.sums.samples),
             static_cast<long>(state.sums.channels),
-            static_cast<double>(state.sums.squared_error) * fixed_unit, state.finite != 0};
+            static_cast<double>(state.sums.squared_error) * error_unit, state.finite != 0};
   }
 
   void set_level_weight(const std::vector<float>& weight) override {
@@ -182,9 +188,9 @@ class TrainingSteps final : public device::Steps {
     return field_.resolution * field_.resolution * field_.resolution * field_.cascades;
   }
   CellStore cells() const {
-    return {field_.resolution,    field_.cascades,     field_.on.data(),
-            field_.any.data(),    field_.plain.data(), allowed_.data(),
-            cell_density_.data(), window_.data(),      field_.look.data()};
+    return {field_.resolution,   field_.cascades,   field_.on.data(),     field_.any.data(),
+            field_.plain.data(), allowed_.data(),   cell_density_.data(), window_.data(),
+            field_.look.data(),  code_least_.data()};
   }
 
   void backward(const device::StepPlan& plan) {
@@ -269,10 +275,13 @@ class TrainingSteps final : public device::Steps {
     };
     network(field_.density, density_gradient_);
     network(field_.color, color_gradient_);
-    if (plan.with_offsets)
-      launch(1, AdamOffsets{plan.offsets, offsets_.moments(), offset_gradient_.data(),
-                            photos_.training(), photos_.training_count,
-                            static_cast<int>(offsets_.count), finite});
+    if (!plan.with_offsets) return;
+    const int views = static_cast<int>(offsets_.count);
+    fill_bytes(offset_sum_.data(), 0, sizeof(long long));
+    launch(views, AdamOffsets{plan.offsets, offsets_.moments(), offset_gradient_.data(),
+                              photos_.trains(), offset_sum_.data(), finite});
+    launch(views, CenterOffsets{offsets_.moments(), photos_.trains(), offset_sum_.data(),
+                                photos_.training_count, finite});
   }
 
   void probe(int step, std::uint64_t seed) {
@@ -303,8 +312,8 @@ class TrainingSteps final : public device::Steps {
   ForwardPass pass_;
   NumberStore table_, offsets_;
   Buffer<std::uint64_t> allowed_;
-  Buffer<float> cell_density_, window_;
-  Buffer<long long> table_gradient_, offset_gradient_, pose_sums_;
+  Buffer<float> cell_density_, window_, code_least_;
+  Buffer<long long> table_gradient_, offset_gradient_, offset_sum_, pose_sums_;
   Buffer<float> density_gradient_, color_gradient_, partial_;
   Buffer<float> along_, dcolor_, ddensity_, dlayer_[2];
   Buffer<StepState> state_;

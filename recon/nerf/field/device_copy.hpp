@@ -33,7 +33,12 @@ class DeviceCopy {
   void with(const Make& make, const Act& act) {
     const std::lock_guard lock(mutex_);
     if (!tracer_) tracer_ = make();
-    act(*tracer_);
+    try {
+      act(*tracer_);
+    } catch (...) {
+      tracer_.reset();  // what it could not do, it may have left half done
+      throw;
+    }
   }
 
  private:

@@ -11,4 +11,12 @@ struct MarchSettings {
   int haze = 24;
 };
 
+inline constexpr int max_ray_samples = 256;
+inline constexpr int samples_per_round =
+    8;  ///< of a ray, looked at before asking whether it goes on
+
+/// What is left out of a picture that trains.
+inline constexpr float training_stop = 1e-4f;        ///< transmittance that ends a ray
+inline constexpr float training_min_weight = 1e-4f;  ///< samples that contribute less get no colour
+
 }  // namespace orbitfuse::nerf

@@ -16,7 +16,6 @@ struct DrawnRay {
   float jitter = 0.5f;                            ///< 0..1, where in its stratum a sample lies
 };
 
-inline constexpr int max_ray_samples = 256;
 inline constexpr int march_lanes = 8;
 
 /// Samples along a ray: t (midpoints) and dt (the occupied length each stands for).

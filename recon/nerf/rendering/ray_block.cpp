@@ -63,8 +63,6 @@ void RayBlock::add(const Occupancy& occupancy, const MarchSettings& settings,
 
 namespace {
 
-constexpr int samples_per_round = 8;
-
 /// Encodes and evaluates the samples in b.round behind the `done` evaluated before them.
 void evaluate_round(const FieldState& field, const Kernels& kernels, RayBlock& b, int done) {
   const int count = static_cast<int>(b.round.size());

@@ -43,9 +43,9 @@ struct RayBlock {
 };
 
 struct ForwardSettings {
-  float stop = 1e-4f;        ///< transmittance below which a ray is finished
-  float min_weight = 1e-4f;  ///< samples that contribute less get no colour
-  bool gradients = true;     ///< keep what backward() reads
+  float stop = training_stop;              ///< transmittance below which a ray is finished
+  float min_weight = training_min_weight;  ///< samples that contribute less get no colour
+  bool gradients = true;                   ///< keep what backward() reads
 };
 
 /// Density, weights and colours of a block. Rays are followed front to back; samples behind what

@@ -200,6 +200,18 @@ class ImageRenderer {
   /// The listed pixels, each by its own ray; `met`: where their light faded.
   void render(const std::vector<int>& wanted, const Reach& look, RenderedView& view, Reach* met,
               const MarchSettings& march) {
+    constexpr std::size_t at_once = 1 << 17;  // what their rays show is held until it is written
+    std::vector<int> strip;
+    for (std::size_t begin = 0; begin < wanted.size(); begin += at_once) {
+      const std::size_t end = std::min(wanted.size(), begin + at_once);
+      strip.assign(wanted.begin() + static_cast<std::ptrdiff_t>(begin),
+                   wanted.begin() + static_cast<std::ptrdiff_t>(end));
+      render_strip(strip, look, view, met, march);
+    }
+  }
+
+  void render_strip(const std::vector<int>& wanted, const Reach& look, RenderedView& view,
+                    Reach* met, const MarchSettings& march) {
     const auto at = [&](const cv::Mat& plane, int p) {
       return plane.at<float>(p / width_, p % width_);
     };
@@ -215,11 +227,10 @@ class ImageRenderer {
     std::vector<int> again;
     for (std::size_t i = 0; i < wanted.size(); ++i) {
       const TracedRay& ray = traced[i];
-      const bool passed = at(look.far, wanted[i]) < no_limit && ray.end == no_limit,
-                 late = at(look.near, wanted[i]) > 0 && ray.starts_dark;
+      const bool passed = ray.end == no_limit && at(look.far, wanted[i]) < no_limit,
+                 late = ray.starts_dark && at(look.near, wanted[i]) > 0;
       if (ray.there && (passed || late)) again.push_back(wanted[i]);
     }
-    traced.resize(again.size());
     trace_rays(
         field_, limits_, march_, static_cast<int>(again.size()),
         [&](int i, DrawnRay& ray) {
@@ -233,17 +244,21 @@ class ImageRenderer {
              RenderedView& view, Reach* met) const {
     const int channels = field_.channels();
     const auto radius = static_cast<float>(field_.space.radius);
-    for (std::size_t i = 0; i < pixels.size(); ++i) {
-      const TracedRay& ray = traced[i];
-      if (!ray.there) continue;
-      const int x = pixels[i] % width_, y = pixels[i] / width_;
-      std::copy_n(ray.value, channels, view.color.ptr<float>(y) + x * channels);
-      view.depth.at<float>(y, x) = ray.distance * ray.forward * radius;
-      view.opacity.at<float>(y, x) = ray.opacity;
-      if (met == nullptr) continue;
-      met->far.at<float>(y, x) = ray.end;
-      met->near.at<float>(y, x) = ray.begin;
-    }
+    constexpr int block = 4096;
+    parallel_blocks(static_cast<int>(pixels.size()), block, [&](int begin, int end) {
+      for (int i = begin; i < end; ++i) {
+        const TracedRay& ray = traced[static_cast<std::size_t>(i)];
+        if (!ray.there) continue;
+        const int pixel = pixels[static_cast<std::size_t>(i)];
+        const int x = pixel % width_, y = pixel / width_;
+        std::copy_n(ray.value, channels, view.color.ptr<float>(y) + x * channels);
+        view.depth.at<float>(y, x) = ray.distance * ray.forward * radius;
+        view.opacity.at<float>(y, x) = ray.opacity;
+        if (met == nullptr) continue;
+        met->far.at<float>(y, x) = ray.end;
+        met->near.at<float>(y, x) = ray.begin;
+      }
+    });
   }
 
   bool inside(int x, int y, int margin) const {

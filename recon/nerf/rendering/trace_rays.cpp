@@ -16,36 +16,13 @@ constexpr int rays_per_block = 64;
 /// Ray r of a block, whose rows begin at `row`.
 TracedRay read_ray(const FieldState& field, const RayBlock& block, std::size_t r, float stop,
                    int& row) {
-  TracedRay out{{0, 0, 0},
-                std::numeric_limits<float>::quiet_NaN(),
-                0,
-                0,
-                std::numeric_limits<float>::max(),
-                block.rays[r].forward,
-                false,
-                true};
+  TracedRay out{};
+  out.distance = std::numeric_limits<float>::quiet_NaN();
+  out.forward = block.rays[r].forward;
+  out.there = true;
   ray_value(field, block, static_cast<int>(r), row, out.value);
-  const auto begin = static_cast<std::size_t>(block.first[r]),
-             end = begin + static_cast<std::size_t>(block.used[r]);
-  if (end == begin) return out;
-  const auto fades_below = [&](float light) {
-    std::size_t i = begin;
-    while (i < end && !(block.light[i] < light)) ++i;
-    return i;
-  };
-  constexpr float all_but_nothing = 0.98F, least_light = 0.8F;
-  if (const std::size_t i = fades_below(all_but_nothing); i < end)
-    out.begin = i > begin ? block.t[i - 1] : std::max(0.0F, block.t[i] - block.dt[i]);
-  // Median depth stays on a surface where a mean would float between two.
-  if (const std::size_t i = fades_below(0.5F); i < end) {
-    const float before = i > begin ? block.light[i - 1] : 1.0F;
-    const float part = (before - 0.5F) / std::max(1e-6F, before - block.light[i]);
-    out.distance = block.t[i] + (part - 0.5F) * block.dt[i];
-  }
-  const float left = block.light[end - 1];
-  out.opacity = 1 - left;
-  out.starts_dark = block.light[begin] < least_light;
-  if (left < stop) out.end = block.t[end - 1] + block.dt[end - 1];
+  const auto begin = static_cast<std::size_t>(block.first[r]);
+  read_light(block.used[r], &block.t[begin], &block.dt[begin], &block.light[begin], stop, out);
   return out;
 }
 
@@ -91,7 +68,7 @@ void trace_on_device(device::Engine& engine, const FieldState& field, const Forw
     }
   });
   field.device_copy.with(
-      [&] { return engine.tracer(device::numbers_of(field)); },
+      [&] { return engine.tracer(device::shown_numbers(field)); },
       [&](device::Tracer& tracer) {
         tracer.trace(rays.data(), count, {march, limits.stop, limits.min_weight}, out);
       });
@@ -101,6 +78,7 @@ void trace_on_device(device::Engine& engine, const FieldState& field, const Forw
 
 void trace_rays(const FieldState& field, const ForwardSettings& limits, const MarchSettings& march,
                 int count, const RayOf& ray_of, TracedRay* out) {
+  if (count == 0) return;
   device::Engine* engine = device::current();
   if (engine != nullptr && field.options.sampling == Sampling::occupancy)
     trace_on_device(*engine, field, limits, march, count, ray_of, out);

@@ -3,8 +3,8 @@
 
 #include <functional>
 
+#include "recon/nerf/field/traced_ray.hpp"
 #include "recon/nerf/rendering/ray_block.hpp"
-#include "recon/nerf/rendering/traced_ray.hpp"
 
 namespace orbitfuse::nerf {
 

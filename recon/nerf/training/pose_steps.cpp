@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "recon/nerf/training/pose_row.hpp"
+#include "recon/nerf/field/pose_row.hpp"
 
 namespace orbitfuse::nerf {
 namespace {

@@ -2,6 +2,7 @@
 #include "recon/nerf/training/trainer.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -10,7 +11,8 @@
 #include "core/numeric/random.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/nerf/device/on_device.hpp"
-#include "recon/nerf/training/draw_rules.hpp"
+#include "recon/nerf/field/draw_rules.hpp"
+#include "recon/nerf/field/pose_row.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
@@ -51,6 +53,31 @@ struct LevelGradient {
   const float *position01, *gradient;
 };
 
+/// The device's copy of the field and its views. Pointers are read at once.
+std::unique_ptr<device::Steps> start_on(device::Engine& engine, const FieldState& field,
+                                        const std::vector<NormalisedView>& views,
+                                        const std::vector<bool>& heldout) {
+  std::vector<device::Photo> photos;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const NormalisedView& view = views[i];
+    assert(view.target.isContinuous() && view.distance.isContinuous());
+    device::Photo photo;
+    photo.rays = view.rays.numbers();
+    photo.lattice = view.rays.lattice();
+    photo.target = view.target.ptr<float>();
+    photo.distance = view.distance.ptr<float>();
+    photo.known = view.known.data();
+    photo.known_count = static_cast<std::int64_t>(view.known.size());
+    if (!view.clearance_px.empty()) {
+      assert(view.clearance_px.isContinuous());
+      photo.clearance_px = view.clearance_px.ptr<std::uint8_t>();
+    }
+    photo.trains = !heldout[i];
+    photos.push_back(photo);
+  }
+  return engine.steps(device::all_numbers(field), photos);
+}
+
 }  // namespace
 
 Trainer::Trainer(FieldState& field, std::vector<NormalisedView>& views,
@@ -73,14 +100,14 @@ Trainer::Trainer(FieldState& field, std::vector<NormalisedView>& views,
         proposing() ? std::max(1, field_.options.samples_per_step / field_.options.fine_samples)
                     : 512;
   if (device::Engine* engine = device::current(); engine != nullptr && !proposing())
-    device_ = device::start(*engine, field, views, heldout);
+    device_ = start_on(*engine, field, views, heldout);
 }
 
 void Trainer::draw(Block& block, int begin, int end, const device::StepPlan& plan,
                    double progress) {
   const float supervision = plan.supervision;
   // Sparse points are few: while they count, a quarter of the rays goes through them.
-  const bool sparse = known_ends_.back() > 0 && known_ends_.back() < pixel_ends_.back() / 10;
+  const bool sparse = points_are_sparse(known_ends_.back(), pixel_ends_.back());
   block.rays.clear();
   block.targets.clear();
   block.drawn.clear();
@@ -262,7 +289,7 @@ void Trainer::watch_poses(const Block& block, std::vector<PoseSums>& sums) const
       opacity += b.weight[i];
       distance += b.weight[i] * b.t[i];
     }
-    if (opacity < 0.5f) continue;
+    if (opacity < seen_opacity) continue;
     const RayTarget& target = block.targets[r];
     const auto view = static_cast<std::size_t>(target.view);
     for (int c = 0; c < field_.channels(); ++c) value[c] += field_.image_offsets.value[view];

@@ -27,6 +27,7 @@ class Trainer {
   /// finite, nothing was changed.
   bool step(double progress);
 
+  bool on_device() const { return device_ != nullptr; }
   /// Brings the field's parameters, occupancy and pending pose sums up to date.
   void settle();
 

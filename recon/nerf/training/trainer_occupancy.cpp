@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/numeric/random.hpp"
-#include "recon/nerf/training/draw_rules.hpp"
+#include "recon/nerf/field/draw_rules.hpp"
 #include "recon/nerf/training/trainer.hpp"
 
 namespace orbitfuse::nerf {

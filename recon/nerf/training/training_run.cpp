@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "core/system/trace.hpp"
+#include "recon/nerf/device/on_device.hpp"
 #include "recon/nerf/field/checkpoint.hpp"
 #include "recon/nerf/training/exposure.hpp"
 #include "recon/nerf/training/measure.hpp"
@@ -155,7 +156,15 @@ Status TrainingRun::prepare(const Field* guide) {
   ORBITFUSE_TRY(create_or_resume());
   ORBITFUSE_TRY(start_geometry(guide));
   prepare_views_of_run();
-  trainer_.emplace(*state_, views_, data_.heldout);
+  try {
+    trainer_.emplace(*state_, views_, data_.heldout);
+    if (trainer_->on_device()) report_.device = device::current()->name();
+  } catch (const device::Refused& refused) {
+    report_.warnings.push_back(fmt::format("{} refused the field ({}): the processor trains it",
+                                           device::current()->name(), refused.what));
+    device::use(nullptr);
+    trainer_.emplace(*state_, views_, data_.heldout);
+  }
   const History& history = state_->history;
   watch_.cpu_s += history.cpu_s;
   watch_.wall_s += history.wall_s;
@@ -194,8 +203,8 @@ void TrainingRun::tell(double fraction, double wall_s) const {
 /// The curve's next point, and the best field so far. Returns the held-out PSNR.
 double TrainingRun::evaluate(double fraction) {
   const TraceSpan span("held-out views");
-  pause();
   if (data_.measuring()) trainer_->settle();
+  pause();
   const double psnr = heldout_psnr(*state_, views_, data_.heldout,
                                    options_.refine_poses && fraction > poses_move_from);
   state_->history.curve.push_back({watch_.cpu_s, watch_.wall_s, state_->step, psnr,
@@ -273,6 +282,12 @@ Status TrainingRun::loop() {
     return fail(ErrorKind::usage, "nerf.budget_s",
                 fmt::format("{} s were over before the first step", options_.budget_s),
                 "allow more time");
+  return save();
+}
+
+Status TrainingRun::rescue() {
+  if (!trainer_) return {};
+  pause();
   return save();
 }
 

@@ -55,6 +55,8 @@ class TrainingRun {
   Status prepare(const Field* guide);
   /// Steps until something ends them; report.stop says what.
   Status loop();
+  /// After a device has refused to go on: writes the checkpoint, if it still gives back the field.
+  Status rescue();
   /// The best parameters, and the report.
   Result<Field> finish();
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/numeric/random.hpp"
 #include "recon/nerf/rendering/trace_rays.hpp"
 #include "recon/nerf/training/trainer.hpp"
 #include "tests/recon/nerf/device/machines.hpp"
@@ -82,7 +83,21 @@ TEST_P(DeviceTest, OneStepHasTheProcessorsGradients) {
       options.color_layers = with_depth ? 2 : 1;
       options.features_per_level = with_depth ? 4 : 2;
       options.level_anneal_end = with_depth ? 0 : 0.5;
-      const Dataset data = test::toy_scene(modality, 6);
+      Dataset data = test::toy_scene(modality, 6);
+      if (!with_depth) {  // a lens that bends, and a few points of SfM
+        for (TrainingView& view : data.views) view.camera.k1 = -0.1;
+        for (int i = 0; i < 60; ++i) {
+          SparsePoint point;
+          point.position = {0.4 * std::cos(0.1 * i), 0.4 * std::sin(0.1 * i), 0.01 * (i % 7)};
+          for (int view = 0; view < 6; ++view) {
+            const TrainingView& seen = data.views[static_cast<std::size_t>(view)];
+            const Eigen::Vector3d p =
+                seen.cam_from_world.rotation * point.position + seen.cam_from_world.translation;
+            point.track.push_back({view, seen.camera.project(p)});
+          }
+          data.points.push_back(point);
+        }
+      }
       Scene here(options, data, with_depth);
       const auto used = in_use();
       Scene there(options, data, with_depth);
@@ -180,7 +195,8 @@ TEST_P(DeviceTest, NothingMovesWhereAGradientIsNotFinite) {
   Scene scene(small_options(Modality::visible, 20), data);
   ASSERT_TRUE(scene.run(0, 3, 20));
   const std::vector<float> before = scene.field.main.grid.table.values(),
-                           network = scene.field.color.weights.value;
+                           network = scene.field.color.weights.value,
+                           window = scene.field.occupancy.window;
   // An infinite target that begins with a finite channel.
   for (NormalisedView& view : scene.views)
     for (int y = 0; y < view.target.rows; ++y)
@@ -192,6 +208,53 @@ TEST_P(DeviceTest, NothingMovesWhereAGradientIsNotFinite) {
   scene.trainer->settle();
   EXPECT_EQ(scene.field.main.grid.table.values(), before);
   EXPECT_EQ(scene.field.color.weights.value, network);
+  EXPECT_EQ(scene.field.occupancy.window, window);
+}
+
+// Long ways through cells that all hold something: as many stretches as a ray can have.
+TEST_P(DeviceTest, RaysFromAnywhereCrossFullCellsAsTheProcessors) {
+  Scene scene(small_options(Modality::visible, 20), test::toy_scene(Modality::visible, 4));
+  ASSERT_TRUE(scene.run(0, 20, 20));
+  Occupancy& cells = scene.field.occupancy;
+  for (std::size_t i = 0; i < cells.density.size(); ++i)
+    cells.density[i] = 0.1f + 3 * random_uniform(4, 3, i);
+  cells.on.assign(cells.on.size(), ~std::uint64_t{0});
+  cells.refresh();
+  scene.field.refresh();
+  constexpr int count = 400;
+  const auto ray_of = [](int i, DrawnRay& out) {
+    const auto u = [i](std::uint64_t part) {
+      return 2 * random_uniform(5, part, static_cast<unsigned>(i)) - 1;
+    };
+    const float away = i % 3 == 0 ? 0.5f : i % 3 == 1 ? 4.0f : 60.0f;
+    float length = 0;
+    for (unsigned d = 0; d < 3; ++d) {
+      out.ray.origin[d] = away * u(d);
+      out.ray.direction[d] = 0.3f * u(3 + d) - out.ray.origin[d];
+      length += out.ray.direction[d] * out.ray.direction[d];
+    }
+    for (float& d : out.ray.direction) d /= std::sqrt(length);
+    out.ray.forward = 1;
+    out.near = 0;
+    out.far = std::numeric_limits<float>::max();
+    out.jitter = 0.5f;
+    return true;
+  };
+  const auto trace = [&] {
+    std::vector<TracedRay> out(count);
+    trace_rays(scene.field, {1e-3f, 1e-4f, false}, {.near = 0.1f, .surface = 100, .haze = 100},
+               count, ray_of, out.data());
+    return out;
+  };
+  const auto here = trace();
+  const auto used = in_use();
+  const auto there = trace();
+  double worst = 0;
+  for (int i = 0; i < count; ++i)
+    for (int c = 0; c < 3; ++c)
+      worst = std::max(worst, std::abs(double{here[static_cast<std::size_t>(i)].value[c]} -
+                                       there[static_cast<std::size_t>(i)].value[c]));
+  EXPECT_LT(worst, 0.01);
 }
 
 INSTANTIATE_TEST_SUITE_P(Every, DeviceTest, ::testing::Values("emulated", "cuda"),

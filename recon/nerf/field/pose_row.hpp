@@ -10,6 +10,8 @@ namespace orbitfuse::nerf {
 inline constexpr int slope_reach_px =
     2;  ///< slopes are taken over twice this: errors of that size still pull home
 
+inline constexpr float seen_opacity = 0.5f;  ///< from which on a ray has seen something
+
 /// How a pixel's value changes with its camera's motion (shift, turn), in camera axes: the photo's
 /// slope there times the projection's of the point p. The lens bends motion little; what it does to
 /// the slope of a step, the next step makes good.

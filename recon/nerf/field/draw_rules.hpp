@@ -20,6 +20,11 @@ inline constexpr int known_every = 4;
 inline constexpr int occupancy_probes = 4096;  ///< cells beside occupied ones, looked at each time
 inline constexpr int probe_attempts = 16;  ///< times as many draws, most of which are no such cell
 
+/// Known distances that are few are points of SfM: a tenth of the pixels is more than these are.
+inline bool points_are_sparse(std::int64_t known, std::int64_t pixels) {
+  return known > 0 && known < pixels / 10;
+}
+
 ORBITFUSE_HOST_DEVICE inline std::uint64_t draw_key(int step, int ray, int attempt) {
   const std::uint64_t key =
       static_cast<std::uint64_t>(step) * 1000003u + static_cast<std::uint64_t>(ray);
