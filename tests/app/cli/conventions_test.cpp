@@ -7,7 +7,6 @@
 #include <regex>
 
 #include "core/system/file_io.hpp"
-#include "recon/nerf/compute_device.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -77,11 +76,8 @@ TEST(Cli, UsageErrorsKeepTheJsonContract) {
 TEST(Cli, WithoutACudaDeviceTheProcessorComputesAndSaysSo) {
   const Outcome outcome = orbitfuse_program({"doctor", "--device", "cuda"});
   EXPECT_EQ(outcome.code, orbitfuse_program({"doctor"}).code);
-  EXPECT_THAT(outcome.err, testing::AnyOf(HasSubstr("the processor computes"),
+  EXPECT_THAT(outcome.err, testing::AnyOf(HasSubstr("; the processor computes"),
                                           HasSubstr("fields are computed on ")));
-  if (!nerf::built_with_cuda()) {
-    EXPECT_THAT(outcome.err, HasSubstr("-DORBITFUSE_CUDA=ON"));
-  }
 }
 
 TEST(Cli, ConfigMistakesNameFileLineAndKey) {
