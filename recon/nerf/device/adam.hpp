@@ -45,10 +45,7 @@ struct AdamTable {
   }
 };
 
-struct DenseLayer {
-  int inputs, outputs;
-  long offset;  ///< of its weights among the network's
-};
+using device::DenseLayer;
 constexpr int most_layers = 3;
 struct Layers {
   DenseLayer layer[most_layers];

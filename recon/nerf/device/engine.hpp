@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "recon/nerf/field/march_settings.hpp"
+#include "recon/nerf/field/pose_sums.hpp"
 #include "recon/nerf/field/ray.hpp"
 #include "recon/nerf/field/ray_numbers.hpp"
 #include "recon/nerf/field/traced_ray.hpp"
@@ -16,13 +17,21 @@
 // because nvcc reads this. Fields with Sampling::proposal stay on the processor.
 namespace orbitfuse::nerf::device {
 
-struct LayerShape {
-  int inputs, outputs;
-};
-
 /// Trainable numbers with Adam's moments; of the hash table, a perceptron or the views' offsets.
 struct Numbers {
   std::vector<float> value, first, second;
+};
+
+struct DenseLayer {
+  int inputs, outputs;
+  long offset;  ///< of its weights among the network's
+};
+
+/// A perceptron (Mlp).
+struct NetworkNumbers {
+  std::vector<DenseLayer> layers;
+  Numbers weights;
+  std::vector<float> transposed;
 };
 
 /// A field as a device takes it and gives it back.
@@ -33,8 +42,9 @@ struct FieldNumbers {
   std::vector<GridLevel> levels;
   std::vector<float> level_weight;
   int features = 4, width = 32;
-  std::vector<LayerShape> density_layers, color_layers;
-  Numbers table, density, color, offsets;
+  std::vector<std::uint16_t> half;  ///< the table as rendering reads it
+  NetworkNumbers density, color;
+  Numbers table, offsets;
   int resolution = 0, cascades = 0;  ///< of the occupancy, whose arrays follow (Occupancy)
   std::vector<std::uint64_t> on, allowed, any, plain;
   std::vector<std::uint8_t> look;
@@ -71,12 +81,6 @@ struct StepOutcome {
   bool finite = true;
 };
 
-/// PoseSums of a view.
-struct ViewSums {
-  double normal[36] = {}, right[6] = {};
-  std::int64_t rays = 0;
-};
-
 /// A field in training. Every function throws Refused.
 class Steps {
  public:
@@ -86,7 +90,7 @@ class Steps {
   /// Looks at cells beside occupied ones, then Occupancy::update().
   virtual void update_occupancy(int step, std::uint64_t seed, float decay, float threshold) = 0;
   /// What the views' rays have said since the last call; one a view.
-  virtual std::vector<ViewSums> take_pose_sums() = 0;
+  virtual std::vector<PoseSums> take_pose_sums() = 0;
   virtual void place(int view, const RayNumbers& rays) = 0;
   /// Parameters, moments and what occupancy goes by (on, cell_density, window), as they are now.
   virtual FieldNumbers fetch() = 0;

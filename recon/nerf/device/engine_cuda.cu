@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #define ORBITFUSE_ENGINE cuda
-#include "recon/nerf/device/as_kernels.hpp"
-#include "recon/nerf/device/tracing.hpp"
-#include "recon/nerf/device/training_steps.hpp"
+#include "recon/nerf/device/whole_engine.hpp"
 
 namespace orbitfuse::nerf::cuda {
 struct SetOne {
@@ -14,7 +12,7 @@ struct SetOne {
 namespace orbitfuse::nerf::device {
 namespace {
 
-class CudaEngine final : public Engine {
+class CudaEngine final : public cuda::WholeEngine {
  public:
   CudaEngine() {
     int count = 0;
@@ -30,16 +28,6 @@ class CudaEngine final : public Engine {
     if (number.download(1).front() != 1) throw Refused{name_ + " doesn't compute"};
   }
   std::string name() const override { return name_; }
-  std::unique_ptr<Steps> steps(const FieldNumbers& field,
-                               const std::vector<Photo>& photos) override {
-    return std::make_unique<cuda::TrainingSteps>(field, photos);
-  }
-  std::unique_ptr<Tracer> tracer(const FieldNumbers& field) override {
-    return std::make_unique<cuda::FieldTracer>(field);
-  }
-  Kernels kernels() const override { return cuda::as_kernels(); }
-  void time_kernels() override { cuda::launch_times().wanted = true; }
-  std::vector<KernelTime> kernel_times() const override { return cuda::launch_times().all(); }
 
  private:
   std::string name_;

@@ -35,20 +35,11 @@ struct NetworkStore {
   Buffer<float> transposed;
   Layers layers;
 
-  void upload(const device::Numbers& from, const std::vector<device::LayerShape>& shapes) {
-    numbers.upload(from);
+  void upload(const device::NetworkNumbers& from) {
+    numbers.upload(from.weights);
+    transposed.upload(from.transposed);
     layers.count = 0;
-    long offset = 0;
-    std::vector<float> turned(from.value.size());
-    for (const device::LayerShape& shape : shapes) {
-      layers.layer[layers.count++] = {shape.inputs, shape.outputs, offset};
-      for (int i = 0; i < shape.inputs; ++i)
-        for (int o = 0; o < shape.outputs; ++o)
-          turned[static_cast<std::size_t>(offset + o * shape.inputs + i)] =
-              from.value[static_cast<std::size_t>(offset + i * shape.outputs + o)];
-      offset += static_cast<long>(shape.inputs) * shape.outputs;
-    }
-    transposed.upload(turned);
+    for (const DenseLayer& layer : from.layers) layers.layer[layers.count++] = layer;
   }
   const float* weights(int layer) const {
     return numbers.value.data() + layers.layer[layer].offset;
@@ -79,14 +70,9 @@ struct FieldStore {
       levels.level[l] = from.levels[l];
       levels.weight[l] = from.level_weight[l];
     }
-    std::vector<std::uint16_t> table(from.table.value.size());
-    for (std::size_t i = 0; i < table.size(); ++i) {
-      const float v = from.table.value[i];
-      table[i] = half_of(v < max_half ? (v > -max_half ? v : -max_half) : max_half);
-    }
-    half.upload(table);
-    density.upload(from.density, from.density_layers);
-    color.upload(from.color, from.color_layers);
+    half.upload(from.half);
+    density.upload(from.density);
+    color.upload(from.color);
     on.upload(from.on);
     any.upload(from.any);
     plain.upload(from.plain);
@@ -163,6 +149,10 @@ class ForwardPass {
                                        row_count.counted, field.sh_degree, color_in});
     apply(field.color, color_in, row_count, color);
   }
+  ShownRays shown(const FieldStore& field) const {
+    return {rays.data(), samples,          light,           color.out(field.color.layers),
+            field.shade, first_row.data(), sample_of.data()};
+  }
 
  private:
   void place(const FieldStore& field, int count, const MarchSettings& settings) {
@@ -213,7 +203,7 @@ class ForwardPass {
   Scan scan_;
   Buffer<Segment> segments_, piece_sums_;
   Buffer<int> piece_counts_;
-  Buffer<Spread> spread_;
+  Buffer<SampleSpread> spread_;
   Buffer<int> counts_, first_, used_, colored_;
   Buffer<float> along_, position_, features_, color_in_;
 };

@@ -28,12 +28,7 @@ struct StepState {
 };
 
 struct RayLoss {
-  const DeviceRay* rays;
-  RaySamples samples;
-  Light light;
-  Rows color;
-  Shade shade;
-  const int *first_row, *sample_of;
+  ShownRays shown;
   LossNumbers loss;
   const float* offset;      ///< per view
   float *dweight, *dsigma;  ///< along the rays
@@ -42,8 +37,10 @@ struct RayLoss {
   StepState* state;
 
   ORBITFUSE_HOST_DEVICE void operator()(int r) const {
-    const DeviceRay& ray = rays[r];
+    const DeviceRay& ray = shown.rays[r];
     if (!ray.there) return;
+    const RaySamples& samples = shown.samples;
+    const Light& light = shown.light;
     const int begin = samples.first[r], end = samples.first[r + 1] - 1, used = light.used[r];
     for (int i = begin; i <= end; ++i) dweight[i] = dsigma[i] = 0;
     float dvalue[3];
@@ -70,31 +67,32 @@ struct RayLoss {
   /// dL/d(what the ray shows).
   ORBITFUSE_HOST_DEVICE void pull(int r, const DeviceRay& ray, float dvalue[3]) const {
     float value[3];
-    ray_value(shade, color, light.weight, sample_of, first_row[r], first_row[r + 1], value);
+    shown.value(r, value);
     float squared = 0, sum = 0;
-    for (int c = 0; c < shade.channels; ++c) {
+    for (int c = 0; c < shown.shade.channels; ++c) {
       const float error = value[c] + offset[ray.view] - ray.value[c];
       squared += error * error;
       const float upper = error < loss.huber ? error : loss.huber;
       const float bent = loss.huber > 0 ? (upper > -loss.huber ? upper : -loss.huber) : error;
-      dvalue[c] = 2 * bent * loss.per_ray / static_cast<float>(shade.channels);
+      dvalue[c] = 2 * bent * loss.per_ray / static_cast<float>(shown.shade.channels);
       sum += dvalue[c];
     }
     if (!is_finite(squared)) state->finite = 0;
     const float bounded = squared < largest_error ? squared : largest_error;
     add_to(&state->sums.squared_error, static_cast<long long>(bounded / error_unit));
-    add_to(&state->sums.channels, shade.channels);
+    add_to(&state->sums.channels, shown.shade.channels);
     add_to(doffset + ray.view, fixed_of(sum));
   }
 
   ORBITFUSE_HOST_DEVICE void color_gradients(int r, const float dvalue[3]) const {
-    for (int row = first_row[r]; row < first_row[r + 1]; ++row) {
-      const int sample = sample_of[row];
+    const float* weight = shown.light.weight;
+    for (int row = shown.first_row[r]; row < shown.first_row[r + 1]; ++row) {
+      const int sample = shown.sample_of[row];
       float g = 0;
-      for (int c = 0; c < shade.channels; ++c) {
-        const float v = shade.value(color(c, row));
+      for (int c = 0; c < shown.shade.channels; ++c) {
+        const float v = shown.shade.value(shown.color(c, row));
         g += dvalue[c] * v;
-        dcolor(c, row) = light.weight[sample] * dvalue[c] * shade.slope(v);
+        dcolor(c, row) = weight[sample] * dvalue[c] * shown.shade.slope(v);
       }
       dweight[sample] = g;
     }
@@ -103,8 +101,10 @@ struct RayLoss {
   /// A sample without a colour counts as showing what lies behind it, so that it is neither wanted
   /// nor unwanted.
   ORBITFUSE_HOST_DEVICE void pass_on(int r) const {
-    const int begin = samples.first[r], first = first_row[r];
-    int row = first_row[r + 1] - 1;
+    const Light& light = shown.light;
+    const int* sample_of = shown.sample_of;
+    const int begin = shown.samples.first[r], first = shown.first_row[r];
+    int row = shown.first_row[r + 1] - 1;
     float behind = 0;
     for (int i = begin + light.used[r] - 1; i >= begin; --i) {
       for (; row >= first && sample_of[row] > i; --row)
@@ -148,32 +148,28 @@ constexpr double pose_unit = 1.0 / (1 << 20);
 /// As Trainer::watch_poses() and add_ray().
 struct WatchPoses {
   Photos photos;
-  const DeviceRay* rays;
-  RaySamples samples;
-  Light light;
-  Rows color;
-  Shade shade;
-  const int *first_row, *sample_of;
+  ShownRays shown;
   const float* offset;
   long long* sums;  ///< [view][pose_numbers]
 
   ORBITFUSE_HOST_DEVICE void operator()(int r) const {
-    const DeviceRay& ray = rays[r];
+    const DeviceRay& ray = shown.rays[r];
     if (!ray.there) return;
-    const int begin = samples.first[r];
+    const Light& light = shown.light;
+    const int begin = shown.samples.first[r];
     float opacity = 0, distance = 0;
     for (int i = begin; i < begin + light.used[r]; ++i) {
       opacity += light.weight[i];
-      distance += light.weight[i] * samples.t[i];
+      distance += light.weight[i] * shown.samples.t[i];
     }
     if (opacity < seen_opacity) return;
-    float shown[3];
-    ray_value(shade, color, light.weight, sample_of, first_row[r], first_row[r + 1], shown);
-    add(ray, distance / opacity, shown);
+    float value[3];
+    shown.value(r, value);
+    add(ray, distance / opacity, value);
   }
 
  private:
-  ORBITFUSE_HOST_DEVICE void add(const DeviceRay& ray, float distance, const float* shown) const {
+  ORBITFUSE_HOST_DEVICE void add(const DeviceRay& ray, float distance, const float* value) const {
     constexpr int reach = slope_reach_px;
     const TrainingPhoto& view = photos.view[ray.view];
     const RayNumbers& numbers = view.rays;
@@ -194,7 +190,7 @@ struct WatchPoses {
     for (int c = 0; c < photos.channels; ++c) {
       const double slope_x = (at(reach, 0, c) - at(-reach, 0, c)) / (2 * reach),
                    slope_y = (at(0, reach, c) - at(0, -reach, c)) / (2 * reach);
-      const double error = static_cast<double>(shown[c] + offset[ray.view]) - at(0, 0, c);
+      const double error = static_cast<double>(value[c] + offset[ray.view]) - at(0, 0, c);
       const double all = slope_x + slope_y + error;
       if (!(all - all == 0)) continue;
       double row[6];

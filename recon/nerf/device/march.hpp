@@ -41,6 +41,24 @@ ORBITFUSE_HOST_DEVICE inline int cascade_of(const float x[3]) {
   return far == far ? (exponent > 0 ? exponent : 0) : 129;
 }
 
+/// As Occupancy stores cells: in blocks of 4x4x4.
+struct CellAddress {
+  int block, cell;
+  ORBITFUSE_HOST_DEVICE long index() const { return static_cast<long>(block) * 64 + cell; }
+};
+/// `per_cell`: cells of this cascade a normalised unit.
+ORBITFUSE_HOST_DEVICE inline CellAddress address_of(int resolution, int cascade, float per_cell,
+                                                    const float x[3]) {
+  const float half = 0.5f * static_cast<float>(resolution);
+  CellAddress at{cascade, 0};
+  for (int d = 2; d >= 0; --d) {
+    const int i = bounded(static_cast<int>(x[d] * per_cell + half), resolution - 1);
+    at.block = at.block * (resolution >> 2) + (i >> 2);
+    at.cell = at.cell << 2 | (i & 3);
+  }
+  return at;
+}
+
 /// One ray's way through the cells, a step at a time. Rays that stand side by side take their steps
 /// together: a loop inside a step would make all wait for the longest.
 class CellWalk {
@@ -84,16 +102,10 @@ class CellWalk {
     const int cascade = cascade_of(x);
     if (!(t_ < far_) || cascade >= cells_.cascades || ++steps_ > most_steps) return false;
     const float per_cell = half_ * power_of_two(-cascade);  // cells a normalised unit
-    const int blocks = cells_.resolution >> 2;
-    int block = cascade, cell = 0;
-    for (int d = 2; d >= 0; --d) {
-      const int i = bounded(static_cast<int>(x[d] * per_cell + half_), cells_.resolution - 1);
-      block = block * blocks + (i >> 2);
-      cell = cell << 2 | (i & 3);
-    }
+    const CellAddress at = address_of(cells_.resolution, cascade, per_cell, x);
     // Read together: one doesn't wait for the other.
-    const int look = cells_.look[static_cast<long>(block) * 64 + cell];
-    const bool any = bit_of(cells_.any, block), plain = bit_of(cells_.plain, block);
+    const int look = cells_.look[at.index()];
+    const bool any = bit_of(cells_.any, at.block), plain = bit_of(cells_.plain, at.block);
     const bool by_cell = any && !plain;
     const float size = 1.0f / per_cell;
     const float begin = t_, stride = by_cell ? 1.0f : 4.0f;
@@ -211,17 +223,11 @@ struct WalkPieces {
   }
 };
 
-/// How a ray's samples are spread.
-struct Spread {
-  int count;
-  float surface_share, haze_share, per_sample;
-};
-
 struct CountSamples {
   MarchSettings settings;
   const DeviceRay* rays;
   Stretches found;
-  Spread* spread;
+  SampleSpread* spread;
   int* counts;  ///< with one for the background
 
   ORBITFUSE_HOST_DEVICE void operator()(int r) const {
@@ -235,14 +241,8 @@ struct CountSamples {
       haze += found.sum[piece * found.rays + r].haze;
     }
     if (!(haze > 0)) return;
-    const float most_haze = settings.haze > 2 ? static_cast<float>(settings.haze) : 2.0f;
-    const float for_surface = static_cast<float>(settings.surface) * fminf(1.0f, surface);
-    const float for_haze = fminf(fmaxf(haze, 2.0f), most_haze);
-    const int wanted = static_cast<int>(ceilf(for_surface + for_haze));
-    const int count = wanted < max_ray_samples ? wanted : max_ray_samples;
-    spread[r] = {count, surface > 0 ? for_surface / surface : 0.0f, for_haze / haze,
-                 (for_surface + for_haze) / static_cast<float>(count)};
-    counts[r] = count + 1;
+    spread[r] = spread_of(surface, haze, settings);
+    counts[r] = spread[r].count + 1;
   }
 };
 
@@ -257,13 +257,13 @@ struct RaySamples {
 struct PlaceSamples {
   const DeviceRay* rays;
   Stretches found;
-  const Spread* spread;
+  const SampleSpread* spread;
   RaySamples samples;
 
   ORBITFUSE_HOST_DEVICE void operator()(int r) const {
     const DeviceRay& given = rays[r];
     if (!given.there) return;
-    const Spread& how = spread[r];
+    const SampleSpread& how = spread[r];
     int at = samples.first[r];
     if (how.count > 0) place(r, how, at);
     at += how.count;
@@ -283,7 +283,7 @@ struct PlaceSamples {
     int passed = 0;              ///< middles and ends
   };
 
-  ORBITFUSE_HOST_DEVICE void place(int r, const Spread& how, int at) const {
+  ORBITFUSE_HOST_DEVICE void place(int r, const SampleSpread& how, int at) const {
     Segment held = {};
     Running running;
     bool holds = false;
@@ -312,7 +312,7 @@ struct PlaceSamples {
   }
 
   /// All middles and ends up to a mass, which lie in this segment.
-  ORBITFUSE_HOST_DEVICE void pass(const DeviceRay& given, const Spread& how, int at,
+  ORBITFUSE_HOST_DEVICE void pass(const DeviceRay& given, const SampleSpread& how, int at,
                                   const Segment& in, float own, float up_to,
                                   Running& running) const {
     const float shift =

@@ -19,16 +19,8 @@ struct CellStore {
     return 2.0f * static_cast<float>(1 << cascade) / static_cast<float>(resolution);
   }
   ORBITFUSE_HOST_DEVICE long cell_of(int cascade, const float x[3]) const {
-    const float half = 0.5f * static_cast<float>(resolution),
-                scale = half / static_cast<float>(1 << cascade);
-    long block = cascade;
-    int cell = 0;
-    for (int d = 2; d >= 0; --d) {
-      const int i = bounded(static_cast<int>(x[d] * scale + half), resolution - 1);
-      block = block * (resolution / 4) + (i >> 2);
-      cell = cell << 2 | (i & 3);
-    }
-    return block * 64 + cell;
+    const float per_cell = 0.5f * static_cast<float>(resolution) / static_cast<float>(1 << cascade);
+    return address_of(resolution, cascade, per_cell, x).index();
   }
   ORBITFUSE_HOST_DEVICE void center_of(long at, float x[3]) const {
     const int blocks = resolution / 4;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/nerf/device/on_device.hpp"
 
-#include <algorithm>
+#include <utility>
 
 #include "recon/nerf/compute_device.hpp"
 
@@ -13,18 +13,24 @@ std::unique_ptr<Engine>& engine_in_use() {
   return engine;
 }
 
-Numbers numbers_of(const Parameters& set) { return {set.value, set.first, set.second}; }
-
 void take_back(Numbers&& numbers, Parameters& set) {
   set.value = std::move(numbers.value);
   set.first = std::move(numbers.first);
   set.second = std::move(numbers.second);
 }
 
-std::vector<LayerShape> shapes_of(const Mlp& network) {
-  std::vector<LayerShape> shapes;
-  for (const Mlp::Layer& layer : network.layers) shapes.push_back({layer.in, layer.out});
-  return shapes;
+NetworkNumbers weights_of(const Mlp& network) {
+  NetworkNumbers out;
+  for (const Mlp::Layer& layer : network.layers)
+    out.layers.push_back({layer.in, layer.out, static_cast<long>(layer.offset)});
+  out.weights.value = network.weights.value;
+  out.transposed = network.transposed;
+  return out;
+}
+
+void add_moments(const Parameters& set, Numbers& to) {
+  to.first = set.first;
+  to.second = set.second;
 }
 
 }  // namespace
@@ -42,11 +48,9 @@ FieldNumbers shown_numbers(const FieldState& field) {
   out.level_weight = grid.level_weight;
   out.features = grid.features;
   out.width = grid.width;
-  out.density_layers = shapes_of(field.main.mlp);
-  out.color_layers = shapes_of(field.color);
-  out.table.value = grid.table.values();
-  out.density.value = field.main.mlp.weights.value;
-  out.color.value = field.color.weights.value;
+  out.half = grid.half;
+  out.density = weights_of(field.main.mlp);
+  out.color = weights_of(field.color);
   const Occupancy& cells = field.occupancy;
   out.resolution = cells.resolution;
   out.cascades = cells.cascades;
@@ -60,11 +64,11 @@ FieldNumbers shown_numbers(const FieldState& field) {
 FieldNumbers all_numbers(const FieldState& field) {
   FieldNumbers out = shown_numbers(field);
   const GridTable& table = field.main.grid.table;
-  out.table.first = table.part(&GridLine::first);
-  out.table.second = table.part(&GridLine::second);
-  out.density = numbers_of(field.main.mlp.weights);
-  out.color = numbers_of(field.color.weights);
-  out.offsets = numbers_of(field.image_offsets);
+  out.table = {table.values(), table.part(&GridLine::first), table.part(&GridLine::second)};
+  add_moments(field.main.mlp.weights, out.density.weights);
+  add_moments(field.color.weights, out.color.weights);
+  const Parameters& offsets = field.image_offsets;
+  out.offsets = {offsets.value, offsets.first, offsets.second};
   const Occupancy& cells = field.occupancy;
   out.allowed = cells.allowed;
   out.cell_density = cells.density;
@@ -77,8 +81,8 @@ void take_back(FieldNumbers numbers, FieldState& field) {
   table.set_values(numbers.table.value);
   table.set_part(&GridLine::first, numbers.table.first);
   table.set_part(&GridLine::second, numbers.table.second);
-  take_back(std::move(numbers.density), field.main.mlp.weights);
-  take_back(std::move(numbers.color), field.color.weights);
+  take_back(std::move(numbers.density.weights), field.main.mlp.weights);
+  take_back(std::move(numbers.color.weights), field.color.weights);
   take_back(std::move(numbers.offsets), field.image_offsets);
   Occupancy& cells = field.occupancy;
   cells.on = std::move(numbers.on);
@@ -89,14 +93,6 @@ void take_back(FieldNumbers numbers, FieldState& field) {
     if (cells.window[cell] >= 0) cells.visited.push_back(static_cast<std::int64_t>(cell));
   cells.refresh();
   field.refresh();
-}
-
-PoseSums sums_of(const ViewSums& sums) {
-  PoseSums out;
-  std::copy(std::begin(sums.normal), std::end(sums.normal), out.normal.begin());
-  std::copy(std::begin(sums.right), std::end(sums.right), out.right.begin());
-  out.rays = sums.rays;
-  return out;
 }
 
 Error error_of(const Refused& refused) {

@@ -25,8 +25,6 @@ FieldNumbers all_numbers(const FieldState& field);
 /// Parameters, moments and occupancy; derived layouts follow.
 void take_back(FieldNumbers numbers, FieldState& field);
 
-PoseSums sums_of(const ViewSums& sums);
-
 Error error_of(const Refused& refused);
 
 }  // namespace orbitfuse::nerf::device

@@ -90,34 +90,39 @@ struct Shade {
   }
 };
 
-/// Sum of weight * value over a ray's coloured samples.
-ORBITFUSE_HOST_DEVICE inline void ray_value(const Shade& shade, Rows color, const float* weight,
-                                            const int* sample_of, int begin, int end,
-                                            float out[3]) {
-  for (int c = 0; c < 3; ++c) out[c] = 0;
-  for (int row = begin; row < end; ++row)
-    for (int c = 0; c < shade.channels; ++c)
-      out[c] += weight[sample_of[row]] * shade.value(color(c, row));
-}
-
-/// As ImageRenderer writes a ray.
-struct ReadRays {
+/// Rays that a field has been asked about.
+struct ShownRays {
   const DeviceRay* rays;
   RaySamples samples;
   Light light;
   Rows color;
   Shade shade;
   const int *first_row, *sample_of;
+
+  /// Sum of weight * value over a ray's coloured samples.
+  ORBITFUSE_HOST_DEVICE void value(int r, float out[3]) const {
+    for (int c = 0; c < 3; ++c) out[c] = 0;
+    for (int row = first_row[r]; row < first_row[r + 1]; ++row)
+      for (int c = 0; c < shade.channels; ++c)
+        out[c] += light.weight[sample_of[row]] * shade.value(color(c, row));
+  }
+};
+
+/// As ImageRenderer writes a ray.
+struct ReadRays {
+  ShownRays shown;
   float stop, no_distance;
   TracedRay* out;
 
   ORBITFUSE_HOST_DEVICE void operator()(int r) const {
+    const DeviceRay& given = shown.rays[r];
     TracedRay& ray = out[r];
-    ray = {{0, 0, 0}, no_distance, 0, 0, no_end, rays[r].ray.forward, false, rays[r].there};
+    ray = {{0, 0, 0}, no_distance, 0, 0, no_end, given.ray.forward, false, given.there};
     if (!ray.there) return;
-    ray_value(shade, color, light.weight, sample_of, first_row[r], first_row[r + 1], ray.value);
-    const int begin = samples.first[r];
-    read_light(light.used[r], samples.t + begin, samples.dt + begin, light.left + begin, stop, ray);
+    shown.value(r, ray.value);
+    const int begin = shown.samples.first[r];
+    read_light(shown.light.used[r], shown.samples.t + begin, shown.samples.dt + begin,
+               shown.light.left + begin, stop, ray);
   }
 };
 

@@ -30,9 +30,7 @@ class FieldTracer final : public device::Tracer {
       pass_.rays.upload(rays_);
       pass_.run(field_, n, settings.march, settings.stop, settings.min_weight);
       traced_.need(static_cast<std::size_t>(n));
-      launch(n, ReadRays{pass_.rays.data(), pass_.samples, pass_.light,
-                         pass_.color.out(field_.color.layers), field_.shade, pass_.first_row.data(),
-                         pass_.sample_of.data(), settings.stop,
+      launch(n, ReadRays{pass_.shown(field_), settings.stop,
                          std::numeric_limits<float>::quiet_NaN(), traced_.data()});
       copy_from(out + begin, traced_.data(), static_cast<std::size_t>(n) * sizeof(TracedRay));
     }

@@ -126,10 +126,8 @@ class TrainingSteps final : public device::Steps {
     pass_.run(field_, plan.rays, plan.march, training_stop, training_min_weight);
     backward(plan);
     if (plan.posing)
-      launch(plan.rays,
-             WatchPoses{photos_.photos(), pass_.rays.data(), pass_.samples, pass_.light,
-                        pass_.color.out(field_.color.layers), field_.shade, pass_.first_row.data(),
-                        pass_.sample_of.data(), offsets_.value.data(), pose_sums_.data()});
+      launch(plan.rays, WatchPoses{photos_.photos(), pass_.shown(field_), offsets_.value.data(),
+                                   pose_sums_.data()});
     move(plan);
     launch(plan.rays, RecordRays{pass_.rays.data(), pass_.samples, pass_.light, cells(),
                                  &state_.data()->finite});
@@ -151,15 +149,15 @@ class TrainingSteps final : public device::Steps {
     launch(cell_count() / 64, SwitchCells{cells(), threshold, visits_.data()});
   }
 
-  std::vector<device::ViewSums> take_pose_sums() override {
+  std::vector<PoseSums> take_pose_sums() override {
     const auto count = static_cast<std::size_t>(photos_.count());
     const std::vector<long long> sums = pose_sums_.download(count * pose_numbers);
     pose_sums_.zeros(count * pose_numbers);
-    std::vector<device::ViewSums> out(count);
+    std::vector<PoseSums> out(count);
     for (std::size_t view = 0; view < count; ++view) {
       const long long* from = &sums[view * pose_numbers];
-      for (int a = 0; a < 6; ++a)
-        for (int b = a; b < 6; ++b)
+      for (std::size_t a = 0; a < 6; ++a)
+        for (std::size_t b = a; b < 6; ++b)
           out[view].normal[6 * a + b] = out[view].normal[6 * b + a] =
               static_cast<double>(*from++) * pose_unit;
       for (double& r : out[view].right) r = static_cast<double>(*from++) * pose_unit;
@@ -173,8 +171,8 @@ class TrainingSteps final : public device::Steps {
   device::FieldNumbers fetch() override {
     device::FieldNumbers out;
     table_.download(out.table);
-    field_.density.numbers.download(out.density);
-    field_.color.numbers.download(out.color);
+    field_.density.numbers.download(out.density.weights);
+    field_.color.numbers.download(out.color.weights);
     offsets_.download(out.offsets);
     const auto count = static_cast<std::size_t>(cell_count());
     out.on = field_.on.download(count / 64);
@@ -202,13 +200,7 @@ class TrainingSteps final : public device::Steps {
     ddensity_.need(density_outputs * stride);
     const Rows dcolor{dcolor_.data(), pass_.stride}, ddensity{ddensity_.data(), pass_.stride};
     float *dweight = along_.data(), *dsigma = dweight + stride;
-    launch(plan.rays, RayLoss{pass_.rays.data(),
-                              pass_.samples,
-                              pass_.light,
-                              pass_.color.out(field_.color.layers),
-                              field_.shade,
-                              pass_.first_row.data(),
-                              pass_.sample_of.data(),
+    launch(plan.rays, RayLoss{pass_.shown(field_),
                               {plan.per_ray, plan.distortion_weight, plan.huber},
                               offsets_.value.data(),
                               dweight,

@@ -198,18 +198,13 @@ void place_samples(const Segments& found, const MarchSettings& settings, float j
     surface += segments[i].surface;
     haze += segments[i].haze;
   }
-  const float for_surface = static_cast<float>(settings.surface) * std::min(1.0f, surface);
-  const float for_haze = std::clamp(haze, 2.0f, std::max(2.0f, static_cast<float>(settings.haze)));
-  const int count = std::min(max_ray_samples, static_cast<int>(std::ceil(for_surface + for_haze)));
-  const float surface_share = surface > 0 ? for_surface / surface : 0.0f,
-              haze_share = for_haze / haze;
+  const SampleSpread spread = spread_of(surface, haze, settings);
 
-  // Inverse transform sampling: `mass` runs to for_surface + for_haze in steps of one sample.
-  const float per_sample = (for_surface + for_haze) / static_cast<float>(count);
+  // Inverse transform sampling: `mass` runs in steps of one sample over what all stretches get.
   int cell = 0;
   float mass_before = 0, length_before = 0;
   const auto density_of_cell = [&](int i) {
-    return segments[i].surface * surface_share + segments[i].haze * haze_share;
+    return segments[i].surface * spread.surface_share + segments[i].haze * spread.haze_share;
   };
   const auto advance = [&](float mass) {  // occupied length and distance at this mass
     float own = density_of_cell(cell);
@@ -224,13 +219,13 @@ void place_samples(const Segments& found, const MarchSettings& settings, float j
   };
   float edge = 0;
   const float shift = 0.5f * (jitter - 0.5f);  // samples keep to the middle half of their stratum
-  for (int k = 0; k < count; ++k) {
-    out.t[k] = advance((static_cast<float>(k) + 0.5f + shift) * per_sample).second;
-    const float next = advance(static_cast<float>(k + 1) * per_sample).first;
+  for (int k = 0; k < spread.count; ++k) {
+    out.t[k] = advance((static_cast<float>(k) + 0.5f + shift) * spread.per_sample).second;
+    const float next = advance(static_cast<float>(k + 1) * spread.per_sample).first;
     out.dt[k] = std::max(0.0f, next - edge);
     edge = next;
   }
-  out.count = count;
+  out.count = spread.count;
 }
 
 }  // namespace

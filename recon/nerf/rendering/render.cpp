@@ -39,7 +39,7 @@ constexpr float limit_margin = 1.03f;
 /// at. With all of them such pictures are nearer to finely sampled ones than those whose every
 /// pixel is rendered, and a seventh dearer.
 constexpr double between_share = 0.7;
-constexpr float no_limit = std::numeric_limits<float>::max();
+constexpr float no_limit = no_end;
 
 /// How far to look: a little behind the farthest of what one ray of each square of limit_stride
 /// pixels and its neighbours met.

@@ -107,11 +107,7 @@ Result<TrainReport> train(const Dataset& given, const TrainOptions& options,
     const TraceSpan span("training steps");
     ORBITFUSE_TRY(run.loop());
   } catch (const device::Refused& refused) {
-    try {
-      ORBITFUSE_TRY(run.rescue());
-    } catch (const device::Refused&) {
-      // Steps since the last checkpoint are lost.
-    }
+    ORBITFUSE_TRY(run.rescue());
     return tl::unexpected(device::error_of(refused));
   }
   ORBITFUSE_ASSIGN(out, run.finish());

@@ -203,6 +203,7 @@ void Trainer::bring_in_levels(double progress) {
 bool Trainer::step(double progress) {
   bring_in_levels(progress);
   const device::StepPlan todo = plan(progress);
+  behind_ = device_ != nullptr;
   const device::StepOutcome done = device_ ? device_->step(todo) : step_here(todo, progress);
   take_account(done);
   if (!proposing() && done.finite) update_occupancy(progress);
@@ -271,7 +272,8 @@ void Trainer::take_account(const device::StepOutcome& done) {
 }
 
 void Trainer::settle() {
-  if (!device_) return;
+  if (!behind_) return;
+  behind_ = false;
   device::take_back(device_->fetch(), field_);
   collect_pose_sums();
 }
@@ -300,12 +302,11 @@ void Trainer::watch_poses(const Block& block, std::vector<PoseSums>& sums) const
 /// What the views' rays have said since the last call joins what is pending.
 void Trainer::collect_pose_sums() {
   if (!field_.options.refine_poses) return;
-  const std::vector<device::ViewSums> noted =
-      device_ ? device_->take_pose_sums() : std::vector<device::ViewSums>();
+  const std::vector<PoseSums> noted = device_ ? device_->take_pose_sums() : std::vector<PoseSums>();
   for (const int index : training_) {
     const auto view = static_cast<std::size_t>(index);
     PoseSums& pending = field_.refined_poses[view].pending;
-    if (device_ && noted[view].rays > 0) pending.add(device::sums_of(noted[view]));
+    if (device_ && noted[view].rays > 0) pending.add(noted[view]);
     for (std::vector<PoseSums>& shard : pose_shards_) {
       if (shard[view].rays > 0) pending.add(shard[view]);
       shard[view] = {};

@@ -70,6 +70,7 @@ class Trainer {
   std::vector<BlockGradients> shards_;
   std::vector<std::vector<PoseSums>> pose_shards_;  ///< [shard][view] of one step (refine_poses)
   std::unique_ptr<device::Steps> device_;           ///< null: the processor
+  bool behind_ = false;  ///< field_ is: the device has made steps since the last settle()
   long rays_ = 0, samples_ = 0;
 };
 

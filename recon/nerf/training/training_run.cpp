@@ -288,7 +288,11 @@ Status TrainingRun::loop() {
 Status TrainingRun::rescue() {
   if (!trainer_) return {};
   pause();
-  return save();
+  try {
+    return save();
+  } catch (const device::Refused&) {
+    return {};  // steps since the last checkpoint are lost
+  }
 }
 
 Result<Field> TrainingRun::finish() {
