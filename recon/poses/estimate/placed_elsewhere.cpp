@@ -10,27 +10,20 @@
 #include "core/geometry/scene_ball.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/poses/index.hpp"
+#include "recon/poses/sfm/held_matches.hpp"
 #include "recon/poses/sfm/resection.hpp"
 
 namespace orbitfuse {
 namespace {
 
 /// Of each frame's verified matches with posed ones, the share that the poses hold; 1 without any.
-std::vector<double> held_shares(const FeatureGraph& graph, const PosedFrames& posed,
-                                double max_error_px) {
+std::vector<double> held_shares(const FeatureGraph& graph, const PosedFrames& posed) {
   std::vector<double> all(at(graph.count()), 0), held = all;
-  for (const auto& [pair, matches] : graph.verified) {
-    const auto [a, b] = pair;
-    if (!posed.poses[at(a)] || !posed.poses[at(b)]) continue;
-    const EpipolarBand band = epipolar_band(graph, pair, posed, max_error_px);
-    const auto agree = std::count_if(matches.begin(), matches.end(), [&](const FeatureMatch& m) {
-      return band.distance(m.first, m.second) <= band.half_width;
-    });
-    for (const int f : {a, b}) {
-      all[at(f)] += static_cast<double>(matches.size());
-      held[at(f)] += static_cast<double>(agree);
+  for (const PairVote& vote : votes_of(graph, posed))
+    for (const int f : {vote.pair.first, vote.pair.second}) {
+      all[at(f)] += static_cast<double>(vote.matches);
+      held[at(f)] += static_cast<double>(vote.held);
     }
-  }
   for (std::size_t f = 0; f < all.size(); ++f) held[f] = all[f] > 0 ? held[f] / all[f] : 1;
   return held;
 }
@@ -50,7 +43,7 @@ Result<std::vector<DoubtfulView>> placed_elsewhere(const FeatureGraph& graph,
   const PosedFrames posed = posed_frames(graph, model);
   TrackOptions track;
   track.max_error_px *= graph.pixel_scale;
-  const std::vector<double> held = held_shares(graph, posed, track.max_error_px);
+  const std::vector<double> held = held_shares(graph, posed);
   std::vector<int> asked;
   for (int f = 0; f < graph.count(); ++f)
     if (posed.poses[at(f)] && held[at(f)] < options.plainly_held) asked.push_back(f);

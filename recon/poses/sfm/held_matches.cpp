@@ -54,12 +54,11 @@ int matches_joining(Bonds left, int from, int to, int enough) {
   return joined;
 }
 
-struct PairVote {
-  ViewPair pair;
-  std::size_t matches = 0, held = 0;
+bool contradicts(const PairVote& vote) {
+  return vote.matches >= plenty && 4 * vote.held < vote.matches;
+}
 
-  bool contradicts() const { return matches >= plenty && 4 * held < matches; }
-};
+}  // namespace
 
 std::vector<PairVote> votes_of(const FeatureGraph& graph, const PosedFrames& posed) {
   std::vector<PairVote> votes;
@@ -74,8 +73,6 @@ std::vector<PairVote> votes_of(const FeatureGraph& graph, const PosedFrames& pos
   return votes;
 }
 
-}  // namespace
-
 HeldMatches held_matches(const FeatureGraph& graph, const PosedFrames& posed) {
   HeldMatches result;
   const std::vector<PairVote> votes = votes_of(graph, posed);
@@ -89,7 +86,7 @@ HeldMatches held_matches(const FeatureGraph& graph, const PosedFrames& posed) {
   }
   if (all == 0) return result;
   for (const PairVote& vote : votes) {
-    if (!vote.contradicts()) continue;
+    if (!contradicts(vote)) continue;
     const auto against = static_cast<double>(vote.matches - vote.held);
     const int enough = static_cast<int>(against / outweighs) + 1;
     if (matches_joining(bonds, vote.pair.first, vote.pair.second, enough) >= enough) {

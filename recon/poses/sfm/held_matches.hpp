@@ -1,9 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <vector>
+
 #include "recon/poses/sfm/tracks.hpp"
 
 namespace orbitfuse {
+
+/// What a pair's verified matches say of the poses of its frames.
+struct PairVote {
+  ViewPair pair;
+  std::size_t matches = 0, held = 0;
+};
+/// Of all pairs whose frames both have a pose.
+std::vector<PairVote> votes_of(const FeatureGraph& graph, const PosedFrames& posed);
 
 /// What the matches that two-view geometry held say of the poses of the frames that they join.
 struct HeldMatches {
