@@ -62,13 +62,9 @@ Status resolve_config(const CLI::App& verb, cli::Context& context) {
   return config.validate();
 }
 
-/// For verbs that may train or render, and for the doctor. A farm's jobs run elsewhere: what this
-/// machine has says nothing of theirs.
+/// Not for a farm: its jobs run elsewhere, and what this machine has says nothing of theirs.
 void choose_device(const cli::CommonOptions& common, const cli::Verb& verb, Console& console) {
-  const std::string name_of_verb = verb.name;
-  const bool may_compute = verb.common.config || name_of_verb == "measure";
-  if (common.device != "cuda" || name_of_verb == "farm" || common.dry_run) return;
-  if (!may_compute && name_of_verb != "doctor") return;
+  if (common.device != "cuda" || !verb.common.fields || common.dry_run) return;
   const auto name = nerf::use_cuda();
   if (name)
     console.info(fmt::format("fields are computed on {}", *name));

@@ -46,6 +46,7 @@ using Action = std::function<Status(Context&)>;
 struct CommonUse {
   bool config = false;  ///< --config, --set, --print-config
   bool seed = false, force = false, resume = false;
+  bool fields = false;  ///< trains or renders, or tells whether it could, where --device says
 };
 
 /// Why a verb doesn't offer a common option, where more can be said than that it means nothing.

@@ -4,8 +4,9 @@
 namespace orbitfuse::cli {
 namespace {
 
-constexpr CommonUse of_stages{.config = true, .seed = true, .force = true, .resume = true};
-constexpr CommonUse of_results{.config = true};  // of a finished run, or of files
+constexpr CommonUse of_stages{
+    .config = true, .seed = true, .force = true, .resume = true, .fields = true};
+constexpr CommonUse of_results{.config = true, .fields = true};  // of a finished run, or of files
 constexpr CommonUse of_recordings{.resume = true};
 constexpr CommonUse none;
 
@@ -51,7 +52,7 @@ const std::vector<Verb>& verbs() {
       {"view", "Walk round the result of a run in a browser", "orbitfuse view out/", add_view,
        of_results},
       {"measure", "Say how hot something is in a finished run, and how sure that is",
-       "orbitfuse measure out/ --hottest 3", add_measure, none},
+       "orbitfuse measure out/ --hottest 3", add_measure, CommonUse{.fields = true}},
       {"export", "Write the surface of a finished run for other programs: GLB, PLY, OBJ, LAS",
        "orbitfuse export out/ --to van.glb", add_export, of_results},
       {"compare", "Say what became warmer, colder or moved between two runs of one object",
@@ -77,7 +78,7 @@ const std::vector<Verb>& verbs() {
        "orbitfuse farm sessions/* --out results/", add_farm,
        CommonUse{.config = true, .seed = true}},
       {"doctor", "Check this machine for what OrbitFuse needs", "orbitfuse doctor", add_doctor,
-       none},
+       CommonUse{.fields = true}},
   };
   return list;
 }

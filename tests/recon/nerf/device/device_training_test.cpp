@@ -2,7 +2,6 @@
 // Whole trainings on a device: as good as the processor's, repeatable, resumable.
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <cmath>
 
 #include "core/geometry/rotation_vector.hpp"
@@ -85,11 +84,8 @@ TEST_P(DeviceTraining, TwiceAndBrokenOffGivesTheSameBytes) {
   EXPECT_TRUE(bytes == bytes_of(again, folder));
 
   options.checkpoint = folder / "checkpoint.bin";
-  std::atomic<bool> cancel = false;
-  Progress progress;
-  progress.cancel = &cancel;
-  progress.report = [&](const ProgressEvent& event) { cancel = event.done >= 60; };
-  ASSERT_FALSE(train(data, options, progress, resumed));
+  test::StopAt stop(60);
+  ASSERT_FALSE(train(data, options, stop.progress, resumed));
   options.resume = true;
   ASSERT_TRUE(train(data, options, {}, resumed));
   EXPECT_TRUE(bytes == bytes_of(resumed, folder));
@@ -100,14 +96,11 @@ TEST_P(DeviceTraining, ACheckpointGoesOnOnTheProcessor) {
   const Dataset data = measured_scene(Modality::visible);
   TrainOptions options = small_options(Modality::visible, 120);
   options.checkpoint = folder / "checkpoint.bin";
-  std::atomic<bool> cancel = false;
-  Progress progress;
-  progress.cancel = &cancel;
-  progress.report = [&](const ProgressEvent& event) { cancel = event.done >= 60; };
+  test::StopAt stop(60);
   Field field;
   {
     const auto used = in_use();
-    ASSERT_FALSE(train(data, options, progress, field));
+    ASSERT_FALSE(train(data, options, stop.progress, field));
   }
   const auto left = Field::load(options.checkpoint);
   ASSERT_TRUE(left);

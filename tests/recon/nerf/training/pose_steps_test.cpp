@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -236,11 +235,8 @@ TEST(PoseRefinement, BrokenOffAndResumedEndsWhereAnUnbrokenRunEnds) {
   ASSERT_TRUE(unbroken) << unbroken.error().message();
 
   options.checkpoint = folder / "poses.bin";
-  std::atomic<bool> cancel = false;
-  Progress progress;
-  progress.cancel = &cancel;
-  progress.report = [&](const ProgressEvent& event) { cancel = event.done >= 80; };
-  ASSERT_FALSE(train(data, options, progress, field));
+  test::StopAt stop(80);
+  ASSERT_FALSE(train(data, options, stop.progress, field));
   options.resume = true;
   const auto resumed = train(data, options, {}, field);
   ASSERT_TRUE(resumed) << resumed.error().message();

@@ -2,8 +2,6 @@
 // Runs that go on: after an interruption, and beyond their end.
 #include <gtest/gtest.h>
 
-#include <atomic>
-
 #include "core/system/file_io.hpp"
 #include "recon/nerf/field/checkpoint.hpp"
 #include "recon/nerf/field/field_state.hpp"
@@ -53,11 +51,8 @@ TEST(Resume, KeepsTheCurveAndTheCounts) {
   ASSERT_TRUE(whole);
 
   options.checkpoint = folder / "checkpoint.bin";
-  std::atomic<bool> cancel = false;
-  Progress progress;
-  progress.cancel = &cancel;
-  progress.report = [&](const ProgressEvent& event) { cancel = event.done >= 100; };
-  ASSERT_FALSE(train(data, options, progress, field));
+  test::StopAt stop(100);
+  ASSERT_FALSE(train(data, options, stop.progress, field));
   auto broken_off = Field::load(options.checkpoint);
   ASSERT_TRUE(broken_off);
   EXPECT_GE(broken_off->state().history.curve.size(), 5u);
