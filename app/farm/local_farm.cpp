@@ -39,6 +39,7 @@ class LocalFarm {
     cores_ = limits.cores > 0 ? limits.cores : machine.cores;
     memory_mb_ = limits.memory_mb > 0 ? limits.memory_mb : 0.9 * machine.memory_mb;
     workers_ = limits.workers > 0 ? limits.workers : cores_;
+    gpu_jobs_ = limits.gpu_jobs;
     for (std::size_t i = 0; i < roads_.size(); ++i) {
       roads_[i].next = next_stage(out, plan, plan.sessions[i].name);
       roads_[i].ended = roads_[i].next == plan.stages.size();
@@ -73,14 +74,15 @@ class LocalFarm {
   /// A stage larger than the machine runs alone: it may do with less than was reckoned.
   bool fits(const StageNeeds& needs) const {
     if (running_.empty()) return true;
-    int cores = needs.cores;
+    int cores = needs.cores, gpu_jobs = needs.gpu ? 1 : 0;
     double memory_mb = needs.memory_mb;
     for (const Worker& worker : running_) {
       cores += worker.needs.cores;
       memory_mb += worker.needs.memory_mb;
+      gpu_jobs += needs.gpu && worker.needs.gpu ? 1 : 0;
     }
     return static_cast<int>(running_.size()) < workers_ && cores <= cores_ &&
-           memory_mb <= memory_mb_;
+           memory_mb <= memory_mb_ && gpu_jobs <= gpu_jobs_;
   }
 
   Status start_all() {
@@ -140,7 +142,7 @@ class LocalFarm {
   const OnOutcome& on_outcome_;
   std::vector<Road> roads_;
   std::list<Worker> running_;
-  int cores_ = 1, workers_ = 1;
+  int cores_ = 1, workers_ = 1, gpu_jobs_ = 1;
   double memory_mb_ = 0;
 };
 
@@ -153,6 +155,8 @@ Status LocalLimits::validate() const {
     if (!(value >= 0 && std::isfinite(value)))
       return fail(ErrorKind::usage, option, fmt::format("{}", value),
                   "choose 0 or more; 0 means what this machine has");
+  if (gpu_jobs < 1)
+    return fail(ErrorKind::usage, "--gpu-jobs", fmt::format("{}", gpu_jobs), "choose 1 or more");
   return {};
 }
 

@@ -13,6 +13,9 @@ struct LocalLimits {
   int workers = 0;       ///< stages at a time at most; 0: as many as cores and memory admit
   int cores = 0;         ///< 0: all of this machine
   double memory_mb = 0;  ///< 0: what is free now, less a tenth
+  /// Stages at a time that compute on the GPU. Each takes the first one, most of whose memory a
+  /// training of default size may need.
+  int gpu_jobs = 1;
   Status validate() const;
 };
 

@@ -117,9 +117,10 @@ Status start_farm(Context& context, const FarmOptions& options) {
   ORBITFUSE_TRY(options.limits.validate());
   ORBITFUSE_TRY(options.cluster.validate());
   const bool on_gpu = context.common.device == "cuda";
-  if (!options.cluster.gpu_partition.empty() && !on_gpu)
-    return fail(ErrorKind::usage, "--gpu-partition",
-                "no stage uses a GPU with --device " + context.common.device, "leave it out");
+  for (const char* option : {"--gpu-partition", "--gpu-jobs"})
+    if (options.given.contains(option) && !on_gpu)
+      return fail(ErrorKind::usage, option,
+                  "no stage uses a GPU with --device " + context.common.device, "leave it out");
   if (on_gpu && !nerf::built_with_cuda())
     return fail(ErrorKind::unavailable, "--device cuda",
                 "this build computes on the processor only",
@@ -171,7 +172,7 @@ Status start_farm(Context& context, const FarmOptions& options) {
 
 /// What of this machine may be filled says nothing to Slurm.
 Status check_machine(const FarmOptions& o, bool on_slurm) {
-  for (const char* option : {"--workers", "--cores", "--memory"})
+  for (const char* option : {"--workers", "--cores", "--memory", "--gpu-jobs"})
     ORBITFUSE_TRY(check_apart({{option, o.given.contains(option), "--slurm", on_slurm}}));
   return {};
 }
@@ -238,7 +239,7 @@ Status check_order(const FarmOptions& o, const std::string& order) {
   std::set<std::string> unused{"--out",     "--like",   "--slurm",       "--tries",
                                "--account", "--config", "--stage-cores", "--partition",
                                "--set",     "--seed",   "--device",      "--gpu-partition"};
-  if (order != "resume") unused.insert({"--workers", "--cores", "--memory"});
+  if (order != "resume") unused.insert({"--workers", "--cores", "--memory", "--gpu-jobs"});
   const std::string words = "farm " + order;
   for (const std::string& option : o.given) {
     ORBITFUSE_TRY(check_apart({{option.c_str(), unused.contains(option), words.c_str(), true}}));
@@ -284,6 +285,8 @@ Action add_farm(CLI::App& app) {
   app.add_option("--workers", o->limits.workers, "Stages at a time here; 0 = as many as fit");
   app.add_option("--cores", o->limits.cores, "Cores to fill here; 0 = all");
   app.add_option("--memory", o->limits.memory_mb, "Memory to fill here, MB; 0 = what is free");
+  app.add_option("--gpu-jobs", o->limits.gpu_jobs, "Stages at a time that use the GPU here")
+      ->capture_default_str();
   app.add_option("--stage-cores", o->stage_cores, "Cores of a stage")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();

@@ -119,6 +119,32 @@ TEST_F(FarmTest, StagesAtATimeAreBoundedByCoresAndMemory) {
   EXPECT_EQ(most(), 1);
 }
 
+TEST_F(FarmTest, OneStageAtATimeTakesTheGpuUnlessMoreAreAllowedOthersRunBeside) {
+  // A line when each begins and ends: "stage +", "stage -".
+  const fs::path log = temp / "log";
+  program("echo $stage + >> " + log.string() + "; sleep 0.2; echo $stage - >> " + log.string() +
+          "\n");
+  for (const std::string& stage : plan.stages) plan.needs[stage] = {1, 100, 60, false};
+  plan.needs["second"].gpu = true;
+  std::map<std::string, int> most;
+  const auto count = [&](int gpu_jobs) {
+    most.clear();
+    fs::remove(log);
+    fs::remove_all(out);
+    ASSERT_TRUE(run({.workers = 3, .cores = 8, .memory_mb = 9000, .gpu_jobs = gpu_jobs}));
+    std::map<std::string, int> now;
+    std::ifstream lines(log);
+    for (std::string stage, sign; lines >> stage >> sign;)
+      most[stage] = std::max(most[stage], now[stage] += sign == "+" ? 1 : -1);
+  };
+  count(1);
+  EXPECT_EQ(most["first"], 3);
+  EXPECT_EQ(most["second"], 1);
+  count(2);
+  EXPECT_EQ(most["second"], 2);
+  EXPECT_THAT(LocalLimits{.gpu_jobs = 0}.validate().error().message(), HasSubstr("--gpu-jobs"));
+}
+
 TEST_F(FarmTest, RecordsThatCantBeWrittenStopTheFarmAndAreNamed) {
   program("exit 0\n");
   test::put(out / ".farm/b", "no folder");

@@ -107,6 +107,18 @@ TEST_F(RefusedFarm, LimitsBelowWhatAStageNeedsAreNamedBeforeTheStart) {
   EXPECT_THAT(resumed.err, HasSubstr("--memory is 10"));
 }
 
+TEST_F(RefusedFarm, JobsOfAGpuNeedADeviceAndThisMachine) {
+  for (const auto& [more, said] : std::vector<std::pair<std::vector<std::string>, const char*>>{
+           {{"--gpu-jobs", "2"}, "--gpu-jobs: no stage uses a GPU with --device cpu"},
+           {{"--gpu-jobs", "0", "--device", "cuda"}, "--gpu-jobs: 0; choose 1 or more"},
+           {{"--gpu-jobs", "2", "--device", "cuda", "--slurm"}, "--slurm"}}) {
+    const Outcome refused = start(more);
+    EXPECT_EQ(refused.code, 2) << refused.err;
+    EXPECT_THAT(refused.err, HasSubstr(said));
+    EXPECT_FALSE(fs::exists(out));
+  }
+}
+
 TEST_F(RefusedFarm, ASlipInAnOrderIsToldApartFromASession) {
   const Outcome refused = farm({"stauts", out.string()});
   EXPECT_EQ(refused.code, 2) << refused.err;
