@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What is exported, in other people's programs: three.js in a browser, Blender, CloudCompare.
+// What is exported, in other people's programs: three.js in a browser, Blender, CloudCompare,
+// MeshLab.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -165,6 +166,49 @@ TEST(OtherTools, CloudCompareReadsTheScalar) {
     ASSERT_NEAR(std::stod(x), cloud.vertices.positions[row].x(), 1e-6);
   }
   EXPECT_EQ(row, cloud.vertices.size());
+}
+
+/// MeshLab's own script drops what is colder than 300 K by `q`, its scalar of a vertex: what is
+/// left and what is written again shows that it read the temperatures as such.
+TEST(OtherTools, MeshLabReadsTheQuality) {
+  if (!has_program("meshlabserver") || !has_program("xvfb-run"))
+    GTEST_SKIP() << "meshlab and xvfb are not installed";
+  const orbitfuse::test::TempFolder folder;
+  const TriangleMesh mesh = hill();
+  ASSERT_TRUE(write_ply(folder.path() / "hill.ply", mesh, {"quality", {}}));
+  ASSERT_TRUE(write_file_atomic(
+      folder.path() / "warm.mlx",
+      "<!DOCTYPE FilterScript><FilterScript><filter name=\"Conditional Vertex Selection\">"
+      "<Param type=\"RichString\" name=\"condSelect\" value=\"(q &lt; 300)\"/></filter>"
+      "<filter name=\"Delete Selected Vertices\"/></FilterScript>"));
+  // Without a screen it needs OpenGL, from Mesa and a virtual one.
+  const std::string command =
+      "cd " + folder.path().string() +
+      " && LIBGL_ALWAYS_SOFTWARE=1 xvfb-run -a -s '-screen 0 640x480x24' meshlabserver -i hill.ply "
+      "-s warm.mlx -o out.ply -m vq > log 2>&1";
+  ASSERT_EQ(std::system(command.c_str()), 0) << read_file(folder.path() / "log").value_or("");
+  std::string written = read_file(folder.path() / "out.ply").value_or("");
+  const std::string scalar = "property float quality";
+  const std::size_t at = written.find(scalar);
+  ASSERT_NE(at, std::string::npos) << read_file(folder.path() / "log").value_or("");
+  written.replace(at, scalar.size(), "property float temperature");
+  ASSERT_TRUE(write_file_atomic(folder.path() / "ours.ply", written));
+  const auto read = read_ply(folder.path() / "ours.ply");
+  ASSERT_TRUE(read) << read.error().message();
+  std::size_t row = 0;
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    const float wanted = mesh.vertices.temperatures_k[i];
+    if (wanted < 300) continue;
+    ASSERT_LT(row, read->size());
+    ASSERT_LT((read->positions[row] - mesh.vertices.positions[i]).norm(), 1e-6) << i;
+    if (std::isnan(wanted))
+      EXPECT_TRUE(std::isnan(read->temperatures_k[row]));
+    else
+      ASSERT_EQ(read->temperatures_k[row], wanted) << i;
+    ++row;
+  }
+  EXPECT_EQ(row, read->size());
+  EXPECT_LT(row, mesh.vertices.size());
 }
 
 }  // namespace
