@@ -24,10 +24,10 @@ inline constexpr std::int64_t latest_stamp_ns = std::int64_t{1} << 62;
 /// CV_8UC3 BGR or CV_8UC1 for visible, CV_16UC1 counts of temperature (0 = invalid) or CV_8UC1 for
 /// thermal.
 struct Frame {
-  std::uint64_t id = 0;             ///< the device's own count, unwrapped; a gap = lost frames
-  std::int64_t host_time_ns = 0;    ///< UTC epoch at arrival; 0 = unknown
-  std::int64_t device_time_ns = 0;  ///< device clock; 0 = unknown
-  std::string encoded, extension;   ///< extension with its dot, e.g. ".jpg"
+  std::uint64_t id = 0;  ///< the device's own count, unwrapped; a gap = lost frames
+  std::optional<std::int64_t> host_time_ns;    ///< UTC epoch at arrival; absent: unknown
+  std::optional<std::int64_t> device_time_ns;  ///< device clock; absent: unknown
+  std::string encoded, extension;              ///< extension with its dot, e.g. ".jpg"
   cv::Mat pixels;
   double kelvin_per_count = 0.01;  ///< of 16-bit thermal pixels; coarser where the scene is hotter
                                    ///< than 382 C (core/temperature.hpp)

@@ -31,9 +31,9 @@ std::vector<Finding> check_network(const Machine& machine);
 /// What a GigE Vision camera says of itself to anyone who asks.
 struct CameraLink {
   std::string name, address;
-  int packet_bytes = 0;     ///< of its stream packets; 0: it didn't say
-  bool controlled = false;  ///< by some program
-  bool answers = true;      ///< questions to its control port
+  std::optional<int> packet_bytes = {};  ///< of its stream packets; absent: it didn't say
+  bool controlled = false;               ///< by some program
+  bool answers = true;                   ///< questions to its control port
 };
 /// Its packets against the MTU of the interface in its subnet, and whether it is free.
 Finding check_camera(const Machine& machine, const CameraLink& camera);

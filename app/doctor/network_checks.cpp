@@ -102,8 +102,8 @@ Finding check_camera(const Machine& machine, const CameraLink& camera) {
       mtu = number_of(machine.root / "sys/class/net" / name / "mtu").value_or(0);
     }
   }
-  if (camera.packet_bytes > 0)
-    finding.found += fmt::format(", packets of {} bytes", camera.packet_bytes);
+  if (camera.packet_bytes)
+    finding.found += fmt::format(", packets of {} bytes", *camera.packet_bytes);
   if (mtu > 0) finding.found += fmt::format(" over an MTU of {}", mtu);
   if (!in_subnet) {
     finding.found += ", no interface in its subnet";
@@ -113,11 +113,11 @@ Finding check_camera(const Machine& machine, const CameraLink& camera) {
   } else if (camera.controlled) {
     finding.found += ", controlled by a program";
     finding.remedy = "close the program that has it, or it can't be recorded";
-  } else if (mtu > 0 && camera.packet_bytes > mtu) {
+  } else if (mtu > 0 && camera.packet_bytes && *camera.packet_bytes > mtu) {
     finding.remedy = fmt::format(
         "packets larger than the MTU don't arrive: raise the MTU to {}, or set GevSCPSPacketSize "
         "to {} in its profile",
-        camera.packet_bytes, mtu);
+        *camera.packet_bytes, mtu);
   } else if (!camera.answers) {
     finding.found += ", does not answer";
     finding.remedy =

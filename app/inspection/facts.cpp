@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 
 #include "app/pipeline/stage_record.hpp"
@@ -33,18 +34,18 @@ std::string utc(std::int64_t ns) {
 
 /// "2026-11-22 10:03:12 to 10:09:44 UTC, 24 frames"
 std::string orbit_time(const Session& session, Modality modality) {
-  std::int64_t first = 0, last = 0;
+  std::optional<std::int64_t> first, last;
   std::size_t with_time = 0, of_files = 0;
   const auto frames = session.frames_of(modality);
   for (const FrameRecord* frame : frames) {
-    if (frame->host_time_ns <= 0) continue;
-    first = with_time == 0 ? frame->host_time_ns : std::min(first, frame->host_time_ns);
-    last = std::max(last, frame->host_time_ns);
+    if (!frame->host_time_ns) continue;
+    first = std::min(first.value_or(*frame->host_time_ns), *frame->host_time_ns);
+    last = std::max(last.value_or(*frame->host_time_ns), *frame->host_time_ns);
     ++with_time;
     of_files += frame->has_flag(FrameFlag::file_time);
   }
-  if (with_time == 0) return {};
-  const std::string begin = utc(first), end = utc(last);
+  if (!first || !last) return {};
+  const std::string begin = utc(*first), end = utc(*last);
   std::string text = begin;
   if (end != begin)
     text += " to " + (end.substr(0, 10) == begin.substr(0, 10) ? end.substr(11) : end);

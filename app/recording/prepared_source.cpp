@@ -62,9 +62,9 @@ void PreparedSource::drop_before(std::int64_t all_run_ns) {
   for (bool over = false; !over && undecided.size() < longest_queue;) {
     Result<Delivery> delivery = source_->next(std::chrono::milliseconds(0));
     if (delivery && delivery->kind == Delivery::Kind::timeout) break;
-    const bool stale = delivery && delivery->kind == Delivery::Kind::frame &&
-                       delivery->frame.host_time_ns >= started_ns_ &&
-                       delivery->frame.host_time_ns < all_run_ns;
+    const bool stale =
+        delivery && delivery->kind == Delivery::Kind::frame && delivery->frame.host_time_ns &&
+        *delivery->frame.host_time_ns >= started_ns_ && *delivery->frame.host_time_ns < all_run_ns;
     if (stale) {
       const auto rejected = [](const auto& d) { return d && d->kind == Delivery::Kind::rejected; };
       dropped += 1 + static_cast<std::uint64_t>(std::erase_if(undecided, rejected));

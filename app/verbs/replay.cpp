@@ -43,11 +43,11 @@ Status check_goes_on(const Session& session, const std::string& to) {
   std::set<std::pair<Modality, std::int64_t>> times;
   for (const FrameRecord& frame : session.frames) {
     hashes.insert(frame.content_hash);
-    times.emplace(frame.modality, frame.host_time_ns);
+    if (frame.host_time_ns) times.emplace(frame.modality, *frame.host_time_ns);
   }
   const bool known = std::any_of(begun.frames.begin(), begun.frames.end(), [&](const auto& frame) {
     return (!frame.content_hash.empty() && hashes.contains(frame.content_hash)) ||
-           (frame.host_time_ns != 0 && times.contains({frame.modality, frame.host_time_ns}));
+           (frame.host_time_ns && times.contains({frame.modality, *frame.host_time_ns}));
   });
   if (known || begun.frames.empty()) return {};
   return fail(ErrorKind::input, to,

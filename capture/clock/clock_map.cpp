@@ -30,14 +30,17 @@ void ClockMap::begin_segment(std::int64_t device_ns, std::int64_t arrival_ns) {
   residual_rms_s_ = 0;
 }
 
-ClockMap::Stamp ClockMap::add(std::int64_t device_ns, std::int64_t arrival_ns) {
+ClockMap::Stamp ClockMap::add(std::optional<std::int64_t> device_stamp_ns,
+                              std::int64_t arrival_ns) {
   Stamp stamp;
   const auto finish = [&](std::int64_t host_ns) {
     last_host_ns_ = std::max(host_ns, last_host_ns_ + 1);
     stamp.host_time_ns = last_host_ns_;
     return stamp;
   };
-  if (device_ns <= 0 || device_ns > latest_stamp_ns) return finish(arrival_ns);
+  if (!device_stamp_ns || *device_stamp_ns <= 0 || *device_stamp_ns > latest_stamp_ns)
+    return finish(arrival_ns);
+  const std::int64_t device_ns = *device_stamp_ns;
   if (samples_.empty()) begin_segment(device_ns, arrival_ns);
 
   const double device_s = static_cast<double>(device_ns - device_origin_ns_) * ns;

@@ -26,9 +26,9 @@ class ClockMap {
     std::int64_t host_time_ns = 0;     ///< when the frame was taken, host clock, strictly rising
     std::optional<std::string> event;  ///< "clock jumped by -3.200 s"
   };
-  /// One frame: its device stamp (0, negative or beyond 146 years = it has none) and the host time
-  /// at arrival.
-  Stamp add(std::int64_t device_ns, std::int64_t arrival_ns);
+  /// One frame: its device stamp, if it has one (cameras send 0 for none, and what is negative or
+  /// beyond 146 years is no stamp either), and the host time at arrival.
+  Stamp add(std::optional<std::int64_t> device_stamp_ns, std::int64_t arrival_ns);
 
   double drift_ppm() const { return (rate_ - 1.0) * 1e6; }
   /// Host minus device time at the latest frame.

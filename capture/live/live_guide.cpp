@@ -31,6 +31,13 @@ std::optional<cv::Mat> read_back(const std::filesystem::path& file) {
   return apply_orientation(*image, read_exif(*bytes).orientation);
 }
 
+/// Nothing where one of the moments is unknown.
+std::optional<double> seconds_between(std::optional<std::int64_t> from_ns,
+                                      std::optional<std::int64_t> to_ns) {
+  if (!from_ns || !to_ns) return std::nullopt;
+  return 1e-9 * static_cast<double>(*to_ns - *from_ns);
+}
+
 void note_edges(FrameRecord& frame, const cv::Mat& image) {
   if (frame.quality && !frame.quality->edge_blur) frame.quality->edge_blur = measure_edges(image);
 }
@@ -210,8 +217,9 @@ void LiveGuide::judge_announced(Camera& camera, const FrameRecord& frame) {
     camera.announced.reset();
 }
 
-void LiveGuide::set_position(Camera& camera, OrbitPosition position, std::int64_t time_ns) {
-  const double seconds = 1e-9 * static_cast<double>(time_ns - camera.position_time_ns);
+void LiveGuide::set_position(Camera& camera, OrbitPosition position,
+                             std::optional<std::int64_t> time_ns) {
+  const double seconds = seconds_between(camera.position_time_ns, time_ns).value_or(0);
   if (camera.position && seconds > 0 && seconds <= options_.unseen_after_s) {
     const double across = angle_difference_deg(position.azimuth_deg, camera.position->azimuth_deg);
     position.speed_deg_s =
@@ -303,8 +311,9 @@ void LiveGuide::find_mat_in_frames() {
       lock.lock();
       if (seen) {
         set_position(camera, *seen, frame.host_time_ns);
-      } else if (1e-9 * static_cast<double>(frame.host_time_ns - camera.position_time_ns) >
-                 options_.unseen_after_s) {
+      } else if (frame.host_time_ns && seconds_between(camera.position_time_ns, frame.host_time_ns)
+                                               .value_or(std::numeric_limits<double>::infinity()) >
+                                           options_.unseen_after_s) {
         camera.position.reset();
       }
       judge(camera, frame, seen ? camera.position : std::nullopt);

@@ -107,7 +107,7 @@ class LiveGuide {
     LiveCamera shown;
     SharpnessReference sharpness;
     std::optional<OrbitPosition> position;
-    std::int64_t position_time_ns = 0;
+    std::optional<std::int64_t> position_time_ns;  ///< of the frame that it was seen in
     std::unique_ptr<PositionPolicy> policy;
     bool stations_come = false;   ///< with its frames, whatever was expected
     std::optional<Look> waiting;  ///< newest frame of a video not looked at yet
@@ -127,7 +127,7 @@ class LiveGuide {
   void judge_between_neighbours(Camera& camera, const Look& look);
   bool needs_image(const FrameRecord& frame);
   void judge_announced(Camera& camera, const FrameRecord& frame);
-  void set_position(Camera& camera, OrbitPosition position, std::int64_t time_ns);
+  void set_position(Camera& camera, OrbitPosition position, std::optional<std::int64_t> time_ns);
 
   SessionWriter& writer_;
   LiveGuideOptions options_;

@@ -86,8 +86,11 @@ class TurntableSteps final : public PositionPolicy {
       const double azimuth_deg = table_.photo(view_);
       return OrbitPosition{azimuth_deg, loop_of(table_.turn(view_, azimuth_deg)), 0, 0};
     }
-    const std::int64_t taken_ns = photo.has_flag(FrameFlag::file_time) ? 0 : photo.host_time_ns;
-    if (const std::optional<int> key = table_.key_before(taken_ns)) return at_count(*key);
+    // When a file was written is no time that a photo was taken at.
+    if (photo.host_time_ns && !photo.has_flag(FrameFlag::file_time)) {
+      if (const std::optional<int> key = table_.key_before(*photo.host_time_ns))
+        return at_count(*key);
+    }
     OrbitPosition somewhere = at_count(table_.keys());
     somewhere.sigma_deg = 180;  // it may be from any station
     return somewhere;

@@ -44,7 +44,6 @@ std::optional<int> Turntable::key_before(std::int64_t photo_ns) const {
     return static_cast<int>(std::upper_bound(key_times_ns_.begin(), key_times_ns_.end(), time_ns) -
                             key_times_ns_.begin());
   };
-  if (photo_ns <= 0) return std::nullopt;
   const int key = count_until(photo_ns);
   const std::int64_t latest_ns = photo_ns % second_ns == 0 ? photo_ns + second_ns - 1 : photo_ns;
   if (key == 0 || count_until(latest_ns) != key) return std::nullopt;
@@ -66,11 +65,11 @@ std::size_t Turntable::turn(TableView& view, double azimuth_deg) const {
 }
 
 std::size_t Turntable::turn_at_key(TableView& view, int key) const {
-  if (view.key == 0) {
+  if (!view.key) {
     view.key = key;
     return turn(view, azimuth_deg(key));
   }
-  view.turned_deg += (key - view.key) * std::abs(step_deg_);
+  view.turned_deg += (key - *view.key) * std::abs(step_deg_);
   view.key = key;
   if (view.turned_deg < 0) {
     view.turned_deg = 0;

@@ -17,7 +17,7 @@ struct TableView {
   bool counts_photos = false;       ///< its photos began before the first key
   std::optional<double> start_deg;  ///< azimuth at which its first turn began
   double turned_deg = 0;            ///< since then, never negative
-  int key = 0;                      ///< the key at which turned_deg held; 0: none
+  std::optional<int> key;           ///< at which turned_deg held
 };
 
 /// The angle of a turntable from what its operator does: one count for all cameras. Azimuths are
@@ -33,8 +33,8 @@ class Turntable {
   int key(std::int64_t time_ns);
   /// A photo of a camera whose photos began without keys: a step each, however late they arrive.
   double photo(TableView& view) const { return azimuth_deg(++view.photos); }
-  /// The key before a photo that was taken at `photo_ns`, however late it arrives; nullopt when its
-  /// time is unknown (0), before the first key, or too coarse to tell (whole seconds, as EXIF has).
+  /// The key before a photo that was taken at `photo_ns`, however late it arrives; nullopt when
+  /// that is before the first key, or too coarse to tell (whole seconds, as EXIF has).
   std::optional<int> key_before(std::int64_t photo_ns) const;
   double azimuth_deg(int count) const;
   /// `view` saw the table at `station`; the next key or photo is a step further.

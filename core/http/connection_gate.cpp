@@ -54,9 +54,9 @@ std::string lower(std::string text) {
 
 }  // namespace
 
-std::size_t request_size(const std::string& begun) {
+std::optional<std::size_t> request_size(const std::string& begun) {
   const std::size_t end = begun.find("\r\n\r\n");
-  if (end == std::string::npos) return 0;
+  if (end == std::string::npos) return std::nullopt;
   const std::string head = lower(begun.substr(0, end));
   const std::string key = "\r\ncontent-length:";
   const std::size_t at = head.find(key);
@@ -162,10 +162,10 @@ struct ConnectionGate::Impl {
     if (count == 0) return false;
     if (c.state == Connection::State::leaving) return true;
     c.request.append(bytes.data(), static_cast<std::size_t>(count));
-    const std::size_t size = request_size(c.request);
-    if (std::max(size, c.request.size()) > limits.request_bytes) {
+    const std::optional<std::size_t> size = request_size(c.request);
+    if (std::max(size.value_or(0), c.request.size()) > limits.request_bytes) {
       say(c, "HTTP/1.1 413 Payload Too Large\r\nConnection: close\r\nContent-Length: 0\r\n\r\n");
-    } else if (size > 0 && c.request.size() >= size) {
+    } else if (size && c.request.size() >= *size) {
       hand_on(key, c);
     }
     return true;

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 namespace orbitfuse {
@@ -43,7 +44,7 @@ class ConnectionGate {
   std::unique_ptr<Impl> impl_;
 };
 
-/// How many bytes the request that begins like this has; 0: its head is not complete yet.
-std::size_t request_size(const std::string& begun);
+/// How many bytes the request that begins like this has; nothing while its head is not complete.
+std::optional<std::size_t> request_size(const std::string& begun);
 
 }  // namespace orbitfuse

@@ -35,8 +35,9 @@ Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_
 /// A sidecar is there for its scale: without one it is an input error.
 Result<ThermalScaleTag> thermal_scale_of_sidecar(std::string_view text, const std::string& where);
 
-/// Images of the first one's size in a TIFF; masks and reduced copies don't count. 0: unreadable.
-int tiff_page_count(std::string_view bytes);
+/// Images of the first one's size in a TIFF; masks and reduced copies don't count. Nothing
+/// where it can't be read.
+std::optional<int> tiff_page_count(std::string_view bytes);
 /// 8/16-bit unsigned or 32-bit float samples, one channel or RGB (returned as BGR); other colours
 /// (a palette, CMYK, Lab, planes) are refused by name. Without a page the file must hold a single
 /// one: nobody asked for the first of several. Where the ImageDescription names no scale, GDAL's

@@ -301,11 +301,11 @@ Result<StoredPage> read_page(std::string_view bytes, const std::string& where,
 
 }  // namespace
 
-int tiff_page_count(std::string_view bytes) {
+std::optional<int> tiff_page_count(std::string_view bytes) {
   MemoryFile file;
   file.input = bytes;
   const TiffHandle tiff = open(file, "rm");
-  if (!tiff) return 0;
+  if (!tiff) return std::nullopt;
   const Layout first = layout_of(tiff.get());
   int pages = 1;
   while (pages < max_pages && next_page(tiff.get(), first)) ++pages;
@@ -315,7 +315,7 @@ int tiff_page_count(std::string_view bytes) {
 Result<cv::Mat> decode_tiff(std::string_view bytes, const std::string& where,
                             std::string* image_description, std::optional<int> page) {
   if (!page) {
-    if (const int pages = tiff_page_count(bytes); pages > 1) {
+    if (const int pages = tiff_page_count(bytes).value_or(1); pages > 1) {
       return fail(ErrorKind::input, where, fmt::format("TIFF of {} pages, one expected", pages),
                   "split it (tiffsplit), or import its pages as thermal frames");
     }

@@ -69,6 +69,15 @@ Result<Station> read_station(const JsonFields& line) {
   return s;
 }
 
+/// In a manifest a time is a number, and this one says that it is unknown.
+constexpr std::int64_t no_time = 0;
+
+Status read_time(const JsonFields& line, const char* field, std::optional<std::int64_t>& time_ns) {
+  ORBITFUSE_TRY(line.get(field, time_ns));
+  if (time_ns == no_time) time_ns.reset();
+  return {};
+}
+
 /// A path that stays inside the session: a manifest from elsewhere must not reach other files.
 bool is_inside(const std::filesystem::path& file) {
   if (file.empty() || file.is_absolute()) return false;
@@ -159,8 +168,9 @@ Result<FrameRecord> read_frame(const JsonFields& line) {
   if (!is_inside(frame.file)) return line.wrong("file", "a path inside the session folder");
   ORBITFUSE_TRY(line.get("width", frame.width, small_count));
   ORBITFUSE_TRY(line.get("height", frame.height, small_count));
-  ORBITFUSE_TRY(line.get_all("sequence", frame.sequence, "host_time_ns", frame.host_time_ns,
-                             "device_time_ns", frame.device_time_ns));
+  ORBITFUSE_TRY(line.get_all("sequence", frame.sequence));
+  ORBITFUSE_TRY(read_time(line, "host_time_ns", frame.host_time_ns));
+  ORBITFUSE_TRY(read_time(line, "device_time_ns", frame.device_time_ns));
   frame.tracking = line.marked("tracking");
   frame.thermal_is_gray = line.marked("thermal_is_gray");
   frame.content_hash = line.remark("content_hash");
@@ -226,8 +236,8 @@ std::string manifest_line(const FrameRecord& frame) {
                {"width", frame.width},
                {"height", frame.height},
                {"sequence", frame.sequence},
-               {"host_time_ns", frame.host_time_ns},
-               {"device_time_ns", frame.device_time_ns},
+               {"host_time_ns", frame.host_time_ns.value_or(manifest::no_time)},
+               {"device_time_ns", frame.device_time_ns.value_or(manifest::no_time)},
                {"content_hash", frame.content_hash}};
   if (frame.station) json["station"] = manifest::json_of(*frame.station);
   if (frame.tracking) json["tracking"] = true;

@@ -67,17 +67,17 @@ struct FrameRecord {
   std::string device;
   std::string file;  ///< relative to the session folder
   int width = 0, height = 0;
-  std::uint64_t sequence = 0;             ///< position in its device's stream, gaps = lost frames
-  std::int64_t host_time_ns = 0;          ///< UTC epoch; 0 = unknown
-  std::int64_t device_time_ns = 0;        ///< device clock; 0 = unknown
-  std::optional<Station> station;         ///< absent on tracking frames without guidance
-  bool tracking = false;                  ///< recorded between stations
-  bool thermal_is_gray = false;           ///< 8-bit thermal: intensities, no temperatures
-  std::vector<std::string> flags;         ///< name(FrameFlag); later versions may know more
-  std::string content_hash;               ///< of the file's bytes
-  std::optional<Rigid3d> cam_from_world;  ///< known pose; all of a session share one world
-  std::optional<Camera> camera;           ///< known intrinsics of this frame
-  std::string source;                     ///< imported frames: "folder/name" of the original file
+  std::uint64_t sequence = 0;  ///< position in its device's stream, gaps = lost frames
+  std::optional<std::int64_t> host_time_ns;    ///< UTC epoch; absent: unknown
+  std::optional<std::int64_t> device_time_ns;  ///< device clock; absent: unknown
+  std::optional<Station> station;              ///< absent on tracking frames without guidance
+  bool tracking = false;                       ///< recorded between stations
+  bool thermal_is_gray = false;                ///< 8-bit thermal: intensities, no temperatures
+  std::vector<std::string> flags;              ///< name(FrameFlag); later versions may know more
+  std::string content_hash;                    ///< of the file's bytes
+  std::optional<Rigid3d> cam_from_world;       ///< known pose; all of a session share one world
+  std::optional<Camera> camera;                ///< known intrinsics of this frame
+  std::string source;  ///< imported frames: "folder/name" of the original file
   std::optional<FrameQuality> quality;
   /// By what the sensor's signal became the stored temperatures; absent: the file says nothing.
   std::optional<FlirCalibration> radiometry;

@@ -67,9 +67,9 @@ TraceSpan::TraceSpan(std::string_view name, std::string_view detail) {
 }
 
 TraceSpan::~TraceSpan() {
-  if (start_s_ < 0) return;
+  if (!start_s_) return;
   own_track().spans.push_back(
-      {std::move(name_), start_s_, wall_seconds(), cpu_seconds() - cpu_start_s_});
+      {std::move(name_), *start_s_, wall_seconds(), cpu_seconds() - cpu_start_s_});
 }
 
 TraceShare::TraceShare() {
@@ -80,12 +80,12 @@ TraceShare::~TraceShare() {
   if (!tracing()) return;
   Track& track = own_track();
   if (track.open_shares > 0) --track.open_shares;
-  if (start_s_ < 0) return;
+  if (!start_s_) return;
   const double now_s = wall_seconds();
-  if (!track.shares.empty() && start_s_ - track.shares.back().end_s < same_share_s)
+  if (!track.shares.empty() && *start_s_ - track.shares.back().end_s < same_share_s)
     track.shares.back().end_s = now_s;
   else
-    track.shares.push_back({"parallel work", start_s_, now_s});
+    track.shares.push_back({"parallel work", *start_s_, now_s});
 }
 
 std::string trace_json() {

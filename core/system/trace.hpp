@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -24,7 +25,8 @@ class TraceSpan {
 
  private:
   std::string name_;
-  double start_s_ = -1, cpu_start_s_ = 0;
+  std::optional<double> start_s_;  ///< absent: nobody traces
+  double cpu_start_s_ = 0;
 };
 
 /// A thread's share of parallel work. Shares less than 2 ms apart become one span, so that a
@@ -37,7 +39,7 @@ class TraceShare {
   TraceShare& operator=(const TraceShare&) = delete;
 
  private:
-  double start_s_ = -1;
+  std::optional<double> start_s_;  ///< absent: nobody traces, or a share within a share
 };
 
 /// All spans so far: {"traceEvents": [...]}. While no thread adds any.

@@ -184,7 +184,8 @@ Delivery AravisSource::inspect(void* handle, const Arrival& arrival) {
 
   delivery.kind = Delivery::Kind::frame;
   Frame& frame = delivery.frame;
-  frame.device_time_ns = static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer));
+  if (const auto stamp_ns = static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer)))
+    frame.device_time_ns = stamp_ns;
   const ClockMap::Stamp stamp = clock_.add(frame.device_time_ns, arrival.utc_ns);
   frame.host_time_ns = stamp.host_time_ns;
   if (stamp.event) pending_.push_back(event_delivery(EventKind::clock, *stamp.event));

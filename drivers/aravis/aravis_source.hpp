@@ -129,8 +129,8 @@ class AravisSource final : public FrameSource {
   ClockMap clock_;
   RawCounts raw_counts_;
   FreezeWatch freeze_;
-  std::uint16_t last_number_ = 0;  ///< the camera's, of the last frame
-  LastingFailure failure_;         ///< to reopen
+  std::optional<std::uint16_t> last_number_;  ///< the camera's, of the last frame
+  LastingFailure failure_;                    ///< to reopen
   std::uint64_t base_id_ = 0, next_id_ = 0, mismatches_ = 0;
   FrameRhythm rhythm_;  ///< tells how many frames an outage cost
   int duplicates_in_a_row_ = 0;

@@ -7,13 +7,13 @@
 
 namespace orbitfuse::aravis {
 
-Missed missed_between(std::uint16_t last_number, std::uint16_t number,
+Missed missed_between(std::optional<std::uint16_t> last_number, std::uint16_t number,
                       const MissedByTime& by_time) {
   constexpr std::uint64_t half_a_round = 32767;
   constexpr std::uint16_t first_numbers = 10;
   const std::uint64_t usual = by_time.usual;
-  if (last_number == 0 || number == 0 || usual >= half_a_round) return {usual, false};
-  const auto steps = static_cast<std::uint64_t>(GvspFrameCounter::steps(last_number, number));
+  if (!last_number || number == 0 || usual >= half_a_round) return {usual, false};
+  const auto steps = static_cast<std::uint64_t>(GvspFrameCounter::steps(*last_number, number));
   if (steps == 0) return {usual, false};
   const std::uint64_t skipped = steps - 1;
   // A camera that counts on misses what it did not send while its stream was set up again, a part

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 namespace orbitfuse::aravis {
 
@@ -17,8 +18,10 @@ struct Missed {
 };
 
 /// Frames lost between two of a camera with a break between them, by the 16-bit GVSP block ids of
-/// both (0: none yet). A camera that counts on tells exactly what it sent meanwhile; one that began
-/// anew gives a number that is far off, or a small one: then the time tells.
-Missed missed_between(std::uint16_t last_number, std::uint16_t number, const MissedByTime& by_time);
+/// both (absent: no frame yet; 0 is never sent). A camera that counts on tells exactly what it sent
+/// meanwhile; one that began anew gives a number that is far off, or a small one: then the time
+/// tells.
+Missed missed_between(std::optional<std::uint16_t> last_number, std::uint16_t number,
+                      const MissedByTime& by_time);
 
 }  // namespace orbitfuse::aravis

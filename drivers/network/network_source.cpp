@@ -151,7 +151,7 @@ Delivery NetworkSource::frame_of(FeedItem item) {
   next_id_ += static_cast<std::uint64_t>(item.skipped);
   frame.id = next_id_++;
   last_frame_ = item.at;
-  frame.host_time_ns = clock_.add(0, item.utc_ns).host_time_ns;
+  frame.host_time_ns = clock_.add({}, item.utc_ns).host_time_ns;
   frame.extension = ".jpg";
   if (item.jpeg.empty()) {
     Result<std::string> encoded = encode_jpeg(item.image, jpeg_quality);

@@ -47,7 +47,7 @@ class ReplaySource : public FrameSource {
   /// Goes on after the last frame that the earlier recording has, in that recording's count.
   bool resume(const DeviceInfo&, const std::vector<FrameRecord>& frames,
               std::uint64_t next_id) override {
-    std::map<std::pair<std::string, std::int64_t>, std::uint64_t> recorded;
+    std::map<std::pair<std::string, std::optional<std::int64_t>>, std::uint64_t> recorded;
     for (const FrameRecord& frame : frames)
       recorded[{frame.content_hash, frame.host_time_ns}] = frame.sequence;
     const auto sequence_of = [&](const FrameRecord& record) -> const std::uint64_t* {
@@ -91,9 +91,10 @@ class ReplaySource : public FrameSource {
  private:
   /// False when the frame's moment is further away than the timeout.
   bool wait_for(const FrameRecord& record, std::chrono::milliseconds timeout) {
-    if (speed_ == ReplaySpeed::full || record.host_time_ns == 0) return true;
-    const auto due = started_ + std::chrono::nanoseconds(std::max<std::int64_t>(
-                                    0, record.host_time_ns - records_[first_].host_time_ns));
+    const std::optional<std::int64_t> begun_ns = records_[first_].host_time_ns;
+    if (speed_ == ReplaySpeed::full || !record.host_time_ns || !begun_ns) return true;
+    const auto due = started_ + std::chrono::nanoseconds(
+                                    std::max<std::int64_t>(0, *record.host_time_ns - *begun_ns));
     const auto deadline = Clock::now() + timeout;
     std::this_thread::sleep_until(std::min(due, deadline));
     return due <= deadline;

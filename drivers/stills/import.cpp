@@ -196,7 +196,7 @@ class Importer {
     DeviceInfo& device = still.camera;
     frame.source = source.short_name();
     frame.tracking = tracking;
-    frame.host_time_ns = source.taken_ns.value_or(0);
+    frame.host_time_ns = source.taken_ns;
     const KnownViews& known = known_[device.modality];
     const KnownView* view = known.find(source.file);
     if (view) apply_known(*view, still.size, frame, device);

@@ -63,7 +63,7 @@ Result<StillPhoto> visible_still(std::string bytes, const std::string& where) {
   still.size = apply_orientation(image, exif.orientation).size();
   still.frame.extension = extension_of(bytes);
   still.frame.encoded = std::move(bytes);
-  still.frame.host_time_ns = exif.taken_ns.value_or(0);
+  still.frame.host_time_ns = exif.taken_ns;
   still.camera.modality = Modality::visible;
   still.camera.driver = "stills";
   still.camera.model = exif.make.empty() ? exif.model : exif.make + " " + exif.model;
@@ -108,7 +108,7 @@ Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& 
     frame.flag(FrameFlag::raw_counts);
     frame.original = file.image;
   }
-  frame.host_time_ns = file.taken_ns.value_or(0);
+  frame.host_time_ns = file.taken_ns;
   still.camera.modality = Modality::thermal;
   still.camera.driver = "stills";
   if (file.dji) {

@@ -106,7 +106,7 @@ Result<ThermalFile> read_thermal_file(const std::filesystem::path& path, std::op
 int thermal_page_count(std::string_view bytes) {
   if (is_flir_recording(bytes))
     return std::max(1, static_cast<int>(flir_recording_frames(bytes).size()));
-  return image_format(bytes) == ImageFormat::tiff ? std::max(1, tiff_page_count(bytes)) : 1;
+  return image_format(bytes) == ImageFormat::tiff ? tiff_page_count(bytes).value_or(1) : 1;
 }
 
 namespace {

@@ -72,13 +72,15 @@ class Reader {
     if (clockwise_deg_ == 270) cv::rotate(image, image, cv::ROTATE_90_COUNTERCLOCKWISE);
     return image.type() == CV_8UC3;
   }
-  std::int64_t time_ns() const {
+  std::optional<std::int64_t> time_ns() const {
     const double ms = capture_.get(cv::CAP_PROP_POS_MSEC);
-    return ms > 0 && ms < 1e9 ? std::llround(ms * 1e6) : 0;
+    if (!(ms > 0 && ms < 1e9)) return std::nullopt;
+    return std::llround(ms * 1e6);
   }
-  std::int64_t announced() const {
+  std::optional<std::int64_t> announced() const {
     const double count = capture_.get(cv::CAP_PROP_FRAME_COUNT);
-    return count > 0 && count < 1e9 ? std::llround(count) : 0;
+    if (!(count > 0 && count < 1e9)) return std::nullopt;
+    return std::llround(count);
   }
 
  private:
@@ -175,9 +177,9 @@ std::string VideoAccount::words() const {
   if (other_size > 0) text += fmt::format(", {} of another size", other_size);
   if (cut_off) text += "; the video goes on, the rest is not looked at: cut it to the orbit";
   // Containers count a frame more or less.
-  if (!cut_off && announced > frames + std::max<std::int64_t>(2, announced / 50))
+  if (!cut_off && announced && *announced > frames + std::max<std::int64_t>(2, *announced / 50))
     text += fmt::format("; {} more are announced and can't be read: it is cut off or damaged",
-                        announced - frames);
+                        *announced - frames);
   if (not_read_again > 0)
     text += fmt::format("; {} of the sharpest could not be read a second time: copy it again",
                         not_read_again);

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,8 +28,8 @@ struct VideoOptions {
 
 /// What became of every frame of a video.
 struct VideoAccount {
-  std::int64_t frames = 0;     ///< decoded and looked at
-  std::int64_t announced = 0;  ///< by the file; 0: it does not say
+  std::int64_t frames = 0;                ///< decoded and looked at
+  std::optional<std::int64_t> announced;  ///< by the file; absent: it does not say
   std::int64_t taken = 0;
   std::int64_t blurred = 0, featureless = 0;  ///< sharpest of their stretch, and yet
   std::int64_t other_size = 0;                ///< than the first
@@ -46,9 +47,10 @@ struct VideoAccount {
 };
 
 struct VideoFrame {
-  std::int64_t index = 0;    ///< in the video, from 0
-  std::int64_t time_ns = 0;  ///< since its beginning, by the video's own stamps; 0: unknown
-  cv::Mat image;             ///< CV_8UC3, turned as the video says
+  std::int64_t index = 0;  ///< in the video, from 0
+  /// Since its beginning, by the video's own stamps.
+  std::optional<std::int64_t> time_ns;
+  cv::Mat image;  ///< CV_8UC3, turned as the video says
 };
 
 /// Whether the name or the bytes at the beginning are those of a video that is read (MP4, MOV, MKV,

@@ -192,7 +192,7 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
     return event_delivery(EventKind::duplicate, name + ": the same image came before");
   }
   delivery.frame = std::move(still->frame);
-  if (delivery.frame.host_time_ns == 0) {
+  if (!delivery.frame.host_time_ns) {
     delivery.frame.host_time_ns = written_ns(attempt.file);
     delivery.frame.flag(FrameFlag::file_time);  // of copying, perhaps
   }

@@ -71,7 +71,7 @@ class WatchSource final : public FrameSource {
   std::string camera_key_;  ///< of the first photo; empty before
   std::deque<Attempt> queue_;
   std::set<std::string> seen_hashes_;
-  std::set<std::pair<std::string, std::int64_t>>
+  std::set<std::pair<std::string, std::optional<std::int64_t>>>
       seen_files_;        ///< of an earlier recording: name, time
   bool resumed_ = false;  ///< info_ is the session's word
   std::uint64_t next_id_ = 0;

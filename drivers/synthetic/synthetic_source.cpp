@@ -76,7 +76,7 @@ class SyntheticSource : public FrameSource {
     Frame& frame = delivery.frame;
     frame.id = ids_.give(next_);
     frame.device_time_ns = device_time_ns(exposure);
-    frame.host_time_ns = visible_start_ns + frame.device_time_ns +
+    frame.host_time_ns = visible_start_ns + device_time_ns(exposure) +
                          (modality_ == Modality::thermal ? thermal_delay_ns : 0);
     frame.tracking = exposure.tracking;
     if (!exposure.tracking) frame.station = exposure.nominal;
@@ -94,7 +94,8 @@ class SyntheticSource : public FrameSource {
   }
 
   bool is_of(const FrameRecord& f, const synthetic::Exposure& exposure) const {
-    if (f.device_time_ns != device_time_ns(exposure) || f.width != camera_.width ||
+    // The first exposure is at 0, which a manifest can't tell from no time.
+    if (f.device_time_ns.value_or(0) != device_time_ns(exposure) || f.width != camera_.width ||
         f.height != camera_.height)
       return false;
     return exposure.tracking ||

@@ -44,7 +44,7 @@ std::vector<V4l2Source::Lock> V4l2Source::locks() const {
 /// A camera that was switched off comes back with other values: the first ones hold.
 Status V4l2Source::apply_controls() {
   adapting_ = false;
-  adapting_since_ns_ = 0;
+  adapting_since_ns_.reset();
   for (const Lock& control : locks()) {
     const auto kept = locked_.find(control.value_control);
     if (control.value) {

@@ -193,7 +193,7 @@ Result<Delivery> V4l2Source::dequeue() {
       std::chrono::nanoseconds(stamp_ns > 0 ? stamp_ns : system_->now_ns(CLOCK_MONOTONIC))};
   Delivery delivery = delivery_of(buffer.index, buffer.bytesused, buffer.flags, taken_at);
   delivery.frame.id = id;
-  delivery.frame.device_time_ns = stamp_ns;
+  if (stamp_ns != 0) delivery.frame.device_time_ns = stamp_ns;
   const std::int64_t monotonic_ns = system_->now_ns(CLOCK_MONOTONIC);
   std::int64_t arrival_ns = system_->now_ns(CLOCK_REALTIME);
   const bool monotonic =
@@ -206,8 +206,8 @@ Result<Delivery> V4l2Source::dequeue() {
   if (stamp.event) tell(EventKind::clock, *stamp.event);
   watch_rhythm(id, stamp_ns > 0 ? stamp_ns : monotonic_ns);
   if (adapting_ && delivery.kind == Delivery::Kind::frame) {
-    if (adapting_since_ns_ == 0) adapting_since_ns_ = monotonic_ns;
-    if (monotonic_ns - adapting_since_ns_ >= std::chrono::nanoseconds(options_.adapt).count())
+    if (!adapting_since_ns_) adapting_since_ns_ = monotonic_ns;
+    if (monotonic_ns - *adapting_since_ns_ >= std::chrono::nanoseconds(options_.adapt).count())
       lock_adapted();
   }
   if (ioctl(VIDIOC_QBUF, &buffer) < 0)

@@ -127,10 +127,10 @@ class V4l2Source final : public FrameSource {
   Clock::time_point last_frame_{}, last_attempt_{}, lost_at_{};
   std::uint64_t next_id_ = 0, base_id_ = 0;
   int stalls_in_a_row_ = 0, empty_at_start_ = 0;
-  LastingFailure failure_;               ///< to reopen
-  std::map<std::uint32_t, int> locked_;  ///< controls and the values they were locked at
-  bool adapting_ = false;                ///< some are automatic still
-  std::int64_t adapting_since_ns_ = 0;   ///< monotonic; 0: no frame yet
+  LastingFailure failure_;                         ///< to reopen
+  std::map<std::uint32_t, int> locked_;            ///< controls and the values they were locked at
+  bool adapting_ = false;                          ///< some are automatic still
+  std::optional<std::int64_t> adapting_since_ns_;  ///< monotonic; absent: no frame yet
   FrameRhythm rhythm_;
   int late_frames_ = 0;
   Clock::time_point last_late_event_{};

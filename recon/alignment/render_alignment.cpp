@@ -95,7 +95,7 @@ Result<RenderAlignment> align_with_renders(const SceneRenderer& renderer,
   for (const PosedView& view : views) result.views.push_back({view, 0, 0, 0, {}, {}});
   if (views.empty()) return result;
   double focal = views.front().camera.fx;
-  const double prior_focal = options.prior_focal_px > 0 ? options.prior_focal_px : focal;
+  const double prior_focal = options.prior_focal_px.value_or(focal);
   const double aspect = views.front().camera.fy / focal;  // of a pixel
   ImageFields fields;
   for (const RenderRound& round : options.rounds) {

@@ -39,8 +39,8 @@ inline std::vector<RenderRound> fine_rounds() {
 struct RenderAlignmentOptions {
   std::vector<RenderRound> rounds = coarse_rounds();
   double focal_relative_sigma = 0.03;  ///< 0: the lens is settled, each view is solved alone
-  /// Of the prior, at the images' size; 0: the focal length that the first view comes with.
-  double prior_focal_px = 0;
+  /// Of the prior, at the images' size; absent: the focal length that the first view comes with.
+  std::optional<double> prior_focal_px = {};
 };
 
 struct RenderAlignedView {

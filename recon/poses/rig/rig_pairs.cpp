@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <map>
 
 namespace orbitfuse {
@@ -34,13 +35,15 @@ RigPairs by_name(const Frames& visible, const Frames& thermal) {
   return result;
 }
 
-const FrameRecord* nearest_in_time(const Frames& frames, const FrameRecord& to) {
+const FrameRecord* nearest_in_time(const Frames& frames, std::int64_t time_ns) {
   const FrameRecord* best = nullptr;
+  std::int64_t least = std::numeric_limits<std::int64_t>::max();
   for (const FrameRecord* frame : frames) {
-    if (frame->host_time_ns == 0) continue;
-    const auto apart = std::abs(frame->host_time_ns - to.host_time_ns);
-    if (apart > one_second_ns) continue;
-    if (best == nullptr || apart < std::abs(best->host_time_ns - to.host_time_ns)) best = frame;
+    if (!frame->host_time_ns) continue;
+    const auto apart = std::abs(*frame->host_time_ns - time_ns);
+    if (apart > one_second_ns || apart >= least) continue;
+    least = apart;
+    best = frame;
   }
   return best;
 }
@@ -48,9 +51,9 @@ const FrameRecord* nearest_in_time(const Frames& frames, const FrameRecord& to) 
 RigPairs by_time(const Frames& visible, const Frames& thermal) {
   RigPairs result{{}, "times within a second"};
   for (const FrameRecord* frame : thermal) {
-    if (frame->host_time_ns == 0) continue;
-    const FrameRecord* partner = nearest_in_time(visible, *frame);
-    if (partner != nullptr && nearest_in_time(thermal, *partner) == frame)
+    if (!frame->host_time_ns) continue;
+    const FrameRecord* partner = nearest_in_time(visible, *frame->host_time_ns);
+    if (partner != nullptr && nearest_in_time(thermal, *partner->host_time_ns) == frame)
       result.pairs.emplace_back(partner, frame);
   }
   return result;

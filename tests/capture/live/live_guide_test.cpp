@@ -366,7 +366,7 @@ TEST_F(LiveGuideTest, PhotosWhoseTimeDoesNotTellTheirKeyAreRefused) {
   for (int i = 0; i < 3; ++i) guide.operator_at_station(at_ns(10 * i + 0.5));
   const auto judged = [&](double time_s, const char* flag) {
     FrameRecord photo = record(15, time_s);
-    if (time_s < -100) photo.host_time_ns = 0;
+    if (time_s < -100) photo.host_time_ns.reset();
     photo.flags = {"still", flag};
     guide.add(photo);
     return guide.cameras()[0].refusal;

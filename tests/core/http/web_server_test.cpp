@@ -33,7 +33,7 @@ TEST(ReachableHosts, WildcardsBecomeAddressesToType) {
 }
 
 TEST(RequestSize, IsHeadAndBody) {
-  EXPECT_EQ(request_size("GET / HTTP/1.1\r\nHost: x\r\n"), 0u);
+  EXPECT_EQ(request_size("GET / HTTP/1.1\r\nHost: x\r\n"), std::nullopt);
   EXPECT_EQ(request_size("GET / HTTP/1.1\r\n\r\n"), 18u);
   EXPECT_EQ(request_size("POST / HTTP/1.1\r\ncontent-LENGTH: 7\r\n\r\nabc"), 38u + 7u);
   EXPECT_GT(request_size("POST / HTTP/1.1\r\nContent-Length: 99999999999999999999\r\n\r\n"),

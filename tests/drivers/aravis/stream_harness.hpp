@@ -80,13 +80,14 @@ inline Tally drain(AravisSource& source, std::chrono::milliseconds limit,
       if (!number || shift != tally.shift.value_or(shift)) ++tally.wrong_bits;
       if (number) tally.shift = shift;
       if (tally.first_device_ns == 0) {
-        tally.first_device_ns = frame.device_time_ns;
+        tally.first_device_ns = frame.device_time_ns.value_or(0);
         tally.first_frame_id = frame.id;
       }
-      tally.last_device_ns = frame.device_time_ns;
+      tally.last_device_ns = frame.device_time_ns.value_or(0);
       tally.last_frame_id = frame.id;
-      if (delivery->frame.host_time_ns <= tally.last_host_ns) ++tally.not_rising;
-      tally.last_host_ns = delivery->frame.host_time_ns;
+      const std::int64_t host_ns = frame.host_time_ns.value_or(0);
+      if (host_ns <= tally.last_host_ns) ++tally.not_rising;
+      tally.last_host_ns = host_ns;
     } else if (delivery->kind == Delivery::Kind::rejected) {
       ++tally.rejected;
     } else if (delivery->kind == Delivery::Kind::event) {

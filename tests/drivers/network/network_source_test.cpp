@@ -106,7 +106,7 @@ struct Came {
     next_id = d.frame.id + 1;
     if (d.kind != Delivery::Kind::frame) return;
     rising = rising && d.frame.host_time_ns > last_ns;
-    last_ns = d.frame.host_time_ns;
+    last_ns = d.frame.host_time_ns.value_or(0);
     frames.push_back(d.frame);
   }
 };

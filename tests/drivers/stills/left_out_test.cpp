@@ -13,16 +13,13 @@
 #include "drivers/stills/import.hpp"
 #include "tests/drivers/stills/import_files.hpp"
 #include "tests/support/made_files.hpp"
+#include "tests/support/says.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::AllOf;
-using ::testing::Contains;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 class LeftOut : public ImportFiles {
  protected:
@@ -78,7 +75,7 @@ TEST_F(LeftOut, AModalityOfWhichNothingIsLeftIsNoImport) {
   options.visible = {folder / "in"};
   options.thermal = {folder / "t"};
   std::string words = refusal();
-  EXPECT_THAT(words, AllOf(HasSubstr("none of the 2 thermal images"), HasSubstr("0.tif")));
+  EXPECT_THAT(words, test::says("none of the 2 thermal images", "0.tif"));
   EXPECT_FALSE(fs::exists(folder / "session"));
   put_counts("t/2.tif", 29000, 30000, 1);
   ASSERT_TRUE(import());
@@ -86,8 +83,8 @@ TEST_F(LeftOut, AModalityOfWhichNothingIsLeftIsNoImport) {
   put("text/b.jpg", "this is no picture");
   options.visible = {folder / "text"};
   words = refusal();
-  EXPECT_THAT(words, AllOf(HasSubstr("none of the 1 visible images"), HasSubstr("b.jpg")));
-  EXPECT_THAT(words, Not(HasSubstr("give folders with"))) << "one remedy: the file's own";
+  EXPECT_THAT(words, test::says("none of the 1 visible images", "b.jpg"));
+  EXPECT_THAT(words, test::says_not("give folders with")) << "one remedy: the file's own";
 }
 
 TEST_F(LeftOut, PosesOfWhichNoneFitsAreAnError) {
@@ -95,10 +92,9 @@ TEST_F(LeftOut, PosesOfWhichNoneFitsAreAnError) {
     put_photo("in/" + std::to_string(i) + ".jpg", static_cast<std::uint64_t>(i));
   options.transforms_json = folder / "transforms.json";
   put_transforms(30, 40, 3);
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("not one can be used"), HasSubstr("0.jpg"),
-                               HasSubstr("w and h are exchanged")));
+  EXPECT_THAT(refusal(), test::says("not one can be used", "0.jpg", "w and h are exchanged"));
   put_transforms(40, 60, 3);
-  EXPECT_THAT(refusal(), Not(HasSubstr("exchanged")));
+  EXPECT_THAT(refusal(), test::says_not("exchanged"));
   put_transforms(80, 60, 3);
   const auto report = import();
   ASSERT_TRUE(report) << report.error().message();
@@ -111,7 +107,7 @@ TEST_F(LeftOut, AModelWithoutImagesIsAnError) {
   put("model/images.txt", "");
   options.visible = {folder / "in"};
   options.visible_colmap = folder / "model";
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("model"), HasSubstr("no images")));
+  EXPECT_THAT(refusal(), test::says("model", "no images"));
 }
 
 TEST_F(LeftOut, ANameThatAModelHasTwiceIsNamed) {
@@ -122,13 +118,12 @@ TEST_F(LeftOut, ANameThatAModelHasTwiceIsNamed) {
   put("model/images.txt", twice);
   options.visible = {folder / "in"};
   options.visible_colmap = folder / "model";
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("000.jpg is there 2 times (left, right)"),
-                               HasSubstr("a name of its own")));
+  EXPECT_THAT(refusal(), test::says("000.jpg is there 2 times (left, right)", "a name of its own"));
   put("model/images.txt", twice + "3 1 0 0 0 0 0 1 1 001.jpg\n\n");
   const auto report = import();
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_EQ(report->with_pose, 1);
-  EXPECT_THAT(report->warnings, Contains(HasSubstr("000.jpg is there 2 times")));
+  EXPECT_THAT(report->warnings, test::one_says("000.jpg is there 2 times"));
 }
 
 TEST_F(LeftOut, ImagesOfOneNameAreToldApartByTheirFoldersOrNotAtAll) {
@@ -164,7 +159,7 @@ TEST_F(LeftOut, ImagesOfOneNameAreToldApartByTheirFoldersOrNotAtAll) {
   const auto report = import();
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_EQ(report->with_pose, 1);
-  EXPECT_THAT(report->warnings, Contains(HasSubstr("has the name of another image")));
+  EXPECT_THAT(report->warnings, test::one_says("has the name of another image"));
 }
 
 TEST_F(LeftOut, ALinkToASiblingIsOneImage) {
@@ -175,23 +170,23 @@ TEST_F(LeftOut, ALinkToASiblingIsOneImage) {
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_EQ(report->visible, 1);
   EXPECT_EQ(report->session.frames.at(0).source, "in/b.jpg") << "the file, not the link";
-  EXPECT_THAT(report->warnings,
-              Contains(AllOf(HasSubstr("a_latest.jpg"), HasSubstr("the same image as b.jpg"))));
+  EXPECT_THAT(report->warnings, test::one_says("a_latest.jpg", "the same image as b.jpg"));
   options.visible = {folder / "in", folder / "in/b.jpg"};
   fs::remove_all(folder / "session");
-  EXPECT_THAT(refusal(), HasSubstr("given twice"));
+  EXPECT_THAT(refusal(), test::says("given twice"));
 }
 
 TEST_F(LeftOut, ThermalPicturesThatAreNotReadAreNotSentThroughJpeg) {
   put("t/0.pgm", "P5");
   put("t/1.jp2", "x");
   options.thermal = {folder / "t"};
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("16-bit TIFF or PNG"), Not(HasSubstr("to JPEG"))));
+  const std::string one_kind = refusal();
+  EXPECT_THAT(one_kind, test::says("16-bit TIFF or PNG"));
+  EXPECT_THAT(one_kind, test::says_not("to JPEG"));
   put_counts("t/2.tif", 29000, 30000, 1);
   const auto report = import();
   ASSERT_TRUE(report) << report.error().message();
-  EXPECT_THAT(report->warnings,
-              Contains(AllOf(HasSubstr("0.pgm"), HasSubstr("16-bit TIFF or PNG"))));
+  EXPECT_THAT(report->warnings, test::one_says("0.pgm", "16-bit TIFF or PNG"));
 }
 
 TEST_F(LeftOut, StationsOfWhatWasNotGivenAreNoWarningAndARigOfOneCameraIs) {
@@ -202,15 +197,15 @@ TEST_F(LeftOut, StationsOfWhatWasNotGivenAreNoWarningAndARigOfOneCameraIs) {
   options.rig = true;
   auto report = import();
   ASSERT_TRUE(report) << report.error().message();
-  EXPECT_THAT(report->warnings, Not(Contains(HasSubstr("stations declared"))));
-  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("rig"), HasSubstr("no pairs"))));
+  EXPECT_THAT(report->warnings, test::none_says("stations declared"));
+  EXPECT_THAT(report->warnings, test::one_says("rig", "no pairs"));
   put_counts("t/0.tif", 29000, 30000, 1);
   options.thermal = {folder / "t"};
   fs::remove_all(folder / "session");
   report = import();
   ASSERT_TRUE(report) << report.error().message();
-  EXPECT_THAT(report->warnings, Contains(HasSubstr("thermal: 1 frames")));
-  EXPECT_THAT(report->warnings, Contains(HasSubstr("12 visible and 1 thermal frames")));
+  EXPECT_THAT(report->warnings, test::one_says("thermal: 1 frames"));
+  EXPECT_THAT(report->warnings, test::one_says("12 visible and 1 thermal frames"));
 }
 
 }  // namespace

@@ -13,16 +13,13 @@
 #include "drivers/stills/import.hpp"
 #include "tests/drivers/stills/import_files.hpp"
 #include "tests/support/made_files.hpp"
+#include "tests/support/says.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::AllOf;
-using ::testing::Contains;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 class ThermalMeaning : public ImportFiles {
  protected:
@@ -50,33 +47,31 @@ class ThermalMeaning : public ImportFiles {
 
 TEST_F(ThermalMeaning, CentikelvinThatCanHardlyBeIsTold) {
   put("in/a.tiff", counts(18000));  // -93 C
-  EXPECT_THAT(import().warnings,
-              Contains(AllOf(HasSubstr("read as centikelvin: median -9"), HasSubstr("linear"))));
+  EXPECT_THAT(import().warnings, test::one_says("read as centikelvin: median -9", "linear"));
   put("in/a.tiff", counts(48000));  // 207 C
-  EXPECT_THAT(import().warnings, Contains(HasSubstr("read as centikelvin: median 207 C")));
+  EXPECT_THAT(import().warnings, test::one_says("read as centikelvin: median 207 C"));
   put("in/a.tiff", counts(29500));
-  EXPECT_THAT(import().warnings, Not(Contains(HasSubstr("read as centikelvin"))));
+  EXPECT_THAT(import().warnings, test::none_says("read as centikelvin"));
   put("in/a.tiff", counts(18000));
   options.thermal_scale = ThermalScale::centikelvin;
-  EXPECT_THAT(import().warnings, Not(Contains(HasSubstr("no scale given")))) << "the user's word";
+  EXPECT_THAT(import().warnings, test::none_says("no scale given")) << "the user's word";
 }
 
 TEST_F(ThermalMeaning, AScaleThatIsForNothingIsTold) {
   options.thermal_scale = ThermalScale::linear;
   options.kelvin_per_count = 0.01;
   put("in/a.png", *encode_png(cv::Mat(30, 40, CV_8UC1, cv::Scalar(77))));
-  EXPECT_THAT(import().warnings,
-              Contains(AllOf(HasSubstr("--thermal-scale"), HasSubstr("1 of 1 thermal files"))));
+  EXPECT_THAT(import().warnings, test::one_says("--thermal-scale", "1 of 1 thermal files"));
   const FlirCalibration camera = made::flir_calibration();
   fs::remove(folder / "in/a.png");
   put("in/b.jpg",
       made::flir_jpeg(cv::Mat(30, 40, CV_16UC1, cv::Scalar(made::flir_signal(300, camera))),
                       camera));
   put("in/c.tiff", counts(29500));
-  EXPECT_THAT(import().warnings, Contains(HasSubstr("1 of 2 thermal files")));
+  EXPECT_THAT(import().warnings, test::one_says("1 of 2 thermal files"));
   fs::remove(folder / "in/b.jpg");
   put("in/c.tiff", counts(29500));
-  EXPECT_THAT(import().warnings, Not(Contains(HasSubstr("changes nothing"))));
+  EXPECT_THAT(import().warnings, test::none_says("changes nothing"));
 }
 
 TEST_F(ThermalMeaning, FloatsAreKelvinOrCelsiusAndNanIsDead) {
@@ -97,17 +92,15 @@ TEST_F(ThermalMeaning, FloatsAreKelvinOrCelsiusAndNanIsDead) {
   EXPECT_TRUE(std::isnan(kelvin_of(report, 0).at<float>(4, 7)));
   EXPECT_NEAR(kelvin_of(report, 1).at<float>(5, 6), 900, 0.021);
   EXPECT_NEAR(kelvin_of(report, 2).at<float>(9, 9), floats(301, 3).at<float>(9, 9), 0.021);
-  EXPECT_THAT(report.warnings,
-              Contains(AllOf(HasSubstr("c.tiff: 32-bit floats, read as Celsius"))));
-  EXPECT_THAT(report.warnings,
-              Contains(AllOf(HasSubstr("k.tiff and 1 more"), HasSubstr("read as kelvin"))));
+  EXPECT_THAT(report.warnings, test::one_says("c.tiff: 32-bit floats, read as Celsius"));
+  EXPECT_THAT(report.warnings, test::one_says("k.tiff and 1 more", "read as kelvin"));
 }
 
 TEST_F(ThermalMeaning, FloatsThatAreNoTemperaturesAreRefused) {
   for (const double middle : {-180.0, 20000.0}) {
     const auto refused = float_temperatures(floats(middle, 1), "f.tif");
     ASSERT_FALSE(refused) << middle;
-    EXPECT_THAT(refused.error().message(), AllOf(HasSubstr("f.tif"), HasSubstr("100 x kelvin")));
+    EXPECT_THAT(refused.error().message(), test::says("f.tif", "100 x kelvin"));
   }
   EXPECT_FALSE(float_temperatures(
       cv::Mat(3, 4, CV_32FC1, cv::Scalar(std::numeric_limits<float>::quiet_NaN())), "f.tif"));

@@ -498,7 +498,7 @@ TEST_F(V4l2SourceTest, HostTimesRiseWhenTheClockIsSetBackAndTheStepIsTold) {
       delivery = deliver(source);
     }
     EXPECT_GT(delivery.frame.host_time_ns, before) << i;
-    before = delivery.frame.host_time_ns;
+    before = delivery.frame.host_time_ns.value();
   }
   EXPECT_TRUE(told);
 }

@@ -177,7 +177,7 @@ TEST(RigPairs, EqualTimesArePairs) {
   EXPECT_EQ(rig.pairs.size(), 5u);
   EXPECT_EQ(rig.found_by, "times within a second");
   for (FrameRecord& frame : session.frames)
-    if (frame.modality == Modality::thermal) frame.host_time_ns += 5'000'000'000;
+    if (frame.modality == Modality::thermal) *frame.host_time_ns += 5'000'000'000;
   EXPECT_TRUE(find_rig_pairs(session).pairs.empty());
 }
 
