@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "bench/exit_status.hpp"
 #include "capture/mat/mat_design.hpp"
 #include "core/image/image_io.hpp"
 
@@ -47,8 +48,5 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(64, 16384))
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  const orbitfuse::Status status = orbitfuse::run(options);
-  if (status) return 0;
-  std::fprintf(stderr, "error: %s\n", status.error().message().c_str());
-  return 1;
+  return orbitfuse::exit_status(orbitfuse::run(options));
 }

@@ -17,6 +17,7 @@
 
 #include "app/export/find_scale.hpp"
 #include "app/export/mat_scale.hpp"
+#include "bench/exit_status.hpp"
 #include "bench/export/true_scene.hpp"
 #include "core/geometry/lifted.hpp"
 #include "core/geometry/pose_error.hpp"
@@ -176,8 +177,5 @@ int main(int argc, char** argv) {
   app.add_option("--most", options.most_m, "Metres from the middle")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   options.by_mat = mat->count() > 0;
-  const orbitfuse::Status status = orbitfuse::run(options);
-  if (status) return 0;
-  std::fprintf(stderr, "error: %s\n", status.error().message().c_str());
-  return 1;
+  return orbitfuse::exit_status(orbitfuse::run(options));
 }

@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/stages/artifacts.hpp"
+#include "bench/exit_status.hpp"
 #include "bench/export/true_scene.hpp"
 #include "core/geometry/lifted.hpp"
 #include "core/image/image_io.hpp"
@@ -207,8 +208,5 @@ int main(int argc, char** argv) {
   app.add_option("--ground", options.ground_m, "What lies higher is the object, metres")
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  const orbitfuse::Status status = orbitfuse::run(options);
-  if (status) return 0;
-  std::fprintf(stderr, "error: %s\n", status.error().message().c_str());
-  return 1;
+  return orbitfuse::exit_status(orbitfuse::run(options));
 }

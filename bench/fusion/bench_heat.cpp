@@ -13,6 +13,7 @@
 
 #include "app/stages/artifacts.hpp"
 #include "app/stages/rendered_views.hpp"
+#include "bench/exit_status.hpp"
 #include "core/formats/transforms_json.hpp"
 #include "core/image/image_io.hpp"
 #include "core/numeric/median.hpp"
@@ -159,9 +160,6 @@ int main(int argc, char** argv) {
       "| scene | views | warmer pixels, all views as one | median view | worst view | all pixels, "
       "median view | worst view | of them warmer |\n|---|---|---|---|---|---|---|---|\n");
   for (const std::string& run : runs)
-    if (const auto done = orbitfuse::report(run); !done) {
-      std::fprintf(stderr, "error: %s\n", done.error().message().c_str());
-      return 1;
-    }
+    if (const int failed = orbitfuse::exit_status(orbitfuse::report(run))) return failed;
   return 0;
 }

@@ -14,6 +14,7 @@
 
 #include "app/stages/artifacts.hpp"
 #include "app/stages/measurement_scene.hpp"
+#include "bench/exit_status.hpp"
 #include "bench/export/true_scene.hpp"
 #include "core/formats/ground_truth.hpp"
 #include "core/image/image_io.hpp"
@@ -169,8 +170,5 @@ int main(int argc, char** argv) {
   app.add_option("--max-angle", options.measurement.max_angle_deg, "To the normal, degrees")
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  const orbitfuse::Status status = orbitfuse::run(options);
-  if (status) return 0;
-  std::fprintf(stderr, "error: %s\n", status.error().message().c_str());
-  return 1;
+  return orbitfuse::exit_status(orbitfuse::run(options));
 }
