@@ -124,7 +124,8 @@ void move_world(Reconstruction& model, const Similarity3d& new_from_old) {
   for (SparsePoint& point : model.points) point.position = new_from_old * point.position;
 }
 
-StationFit fit_stations(const std::vector<PosedView>& views, const Session& session) {
+std::optional<StationFit> fit_stations(const std::vector<PosedView>& views,
+                                       const Session& session) {
   std::map<std::string, const FrameRecord*> by_name;
   for (const FrameRecord& frame : session.frames) by_name[frame.file] = &frame;
   const Similarity3d canonical = canonical_from_world(views, {});
@@ -141,8 +142,8 @@ StationFit fit_stations(const std::vector<PosedView>& views, const Session& sess
     // Without a sigma only the origin is unknown (core/session/session.hpp); it is fitted here.
     sigma.push_back(found->second->station->azimuth_sigma_deg.value_or(nominal_sigma_deg));
   }
+  if (azimuth.size() < 3) return std::nullopt;
   StationFit best;
-  if (azimuth.size() < 3) return best;
   best.median_residual_deg = std::numeric_limits<double>::infinity();
   for (const double sign : {1.0, -1.0}) {
     std::vector<double> difference, residual;

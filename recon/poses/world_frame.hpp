@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -51,9 +52,9 @@ struct StationFit {
   /// miscounted by one, or any azimuth of a view from high above, is not.
   std::vector<std::string> folded;
 };
-/// nullopt-like: views = 0 when fewer than three views have stations. Azimuths are the views' in
-/// their own canonical frame, so nothing of the world has to be right.
-StationFit fit_stations(const std::vector<PosedView>& views, const Session& session);
+/// Nothing when fewer than three views have stations. Azimuths are the views' in their own
+/// canonical frame, so nothing of the world has to be right.
+std::optional<StationFit> fit_stations(const std::vector<PosedView>& views, const Session& session);
 
 /// How the posed views follow each other in the order they were recorded in. A camera carried round
 /// neither leaps across its orbit between two frames nor turns back all the time; a model that

@@ -4,11 +4,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
-#include <functional>
+#include <optional>
 #include <set>
+#include <utility>
 
 #include "recon/poses/estimate/feature_level.hpp"
+#include "recon/poses/estimate/model_selection.hpp"
 #include "recon/poses/estimate/placed_elsewhere.hpp"
 #include "recon/poses/estimate/weakest_joint.hpp"
 #include "recon/poses/estimate/weakly_held.hpp"
@@ -21,7 +22,6 @@ namespace orbitfuse {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 
 /// COLMAP's own limits, for what the quick way left out.
 constexpr int full_image_side_px = 3200;
@@ -34,9 +34,6 @@ constexpr double faint_peak_threshold = 0.0025;
 /// to this many views, of more as many pairs as these have.
 constexpr int max_exhaustive_views = 60;
 constexpr std::size_t most_pairs = max_exhaustive_views * (max_exhaustive_views - 1) / 2;
-
-/// Share of the views from which on a model that can't stand alone is worth completing.
-constexpr double part_of_a_model = 0.5;
 
 /// Observations a view from which on more of them move it little: `hut` (832) came from .029 to
 /// .017 % of the extent, `sedan` (809) from .026 to .035; `container` has 186, `fox` 1256.
@@ -57,6 +54,8 @@ PoseOptions at_full_settings(PoseOptions options) {
   return options;
 }
 
+using Better = ModelSelection::Better;
+
 class VisibleLadder {
  public:
   VisibleLadder(const Session& session, const std::vector<const FrameRecord*>& frames,
@@ -68,6 +67,7 @@ class VisibleLadder {
         workdir_(workdir),
         progress_(progress),
         steps_(steps),
+        selection_(session, frames, steps),
         total_(static_cast<int>(frames.size())) {}
 
   Result<ModalityPoses> run() {
@@ -82,14 +82,16 @@ class VisibleLadder {
     tell(1, "matches of the orbit's pairs");
     ORBITFUSE_TRY(quick->match(orbit, progress_));
     ORBITFUSE_TRY(try_settings(*quick, quick_name_, mapper_ladder().front()));
-    if (!best_ && part_) ORBITFUSE_TRY(try_resection(*quick, "resection on part of a model"));
-    if (!best_) ORBITFUSE_TRY(spared(add_faint_features(*quick, orbit)));
-    if (!best_) ORBITFUSE_TRY(try_mapper(*quick, quick_name_));
+    if (!selection_.has_best() && selection_.part())
+      ORBITFUSE_TRY(try_resection(*quick, "resection on part of a model"));
+    if (!selection_.has_best()) ORBITFUSE_TRY(spared(add_faint_features(*quick, orbit)));
+    if (!selection_.has_best()) ORBITFUSE_TRY(try_mapper(*quick, quick_name_));
     if (!complete()) ORBITFUSE_TRY(improve(*quick, all_are_few));
-    if (best_) ORBITFUSE_TRY(spared(try_joining()));
-    if (best_) ORBITFUSE_TRY(spared(try_rematching()));
-    if (best_ && !complete() && rematched_)
-      ORBITFUSE_TRY(spared(try_resection(*best_level_, "resection on points matched again")));
+    if (selection_.has_best()) ORBITFUSE_TRY(spared(try_joining()));
+    if (selection_.has_best()) ORBITFUSE_TRY(spared(try_rematching()));
+    if (selection_.has_best() && !complete() && rematched_)
+      ORBITFUSE_TRY(
+          spared(try_resection(selection_.best_level(), "resection on points matched again")));
     return answer(quick->pairs());
   }
 
@@ -111,7 +113,8 @@ class VisibleLadder {
   /// What further attempts add.
   Status improve(FeatureLevel& quick, bool all_are_few) {
     const auto attempted = [&]() -> Status {
-      if (best_) ORBITFUSE_TRY(try_resection(quick, "resection on the quick model"));
+      if (selection_.has_best())
+        ORBITFUSE_TRY(try_resection(quick, "resection on the quick model"));
       if (!complete() && !all_are_few) ORBITFUSE_TRY(try_more_pairs(quick));
       if (!complete() && limited_) ORBITFUSE_TRY(try_full_settings());
       return {};
@@ -121,8 +124,8 @@ class VisibleLadder {
 
   /// An attempt that breaks down costs no model that is believed already.
   Status spared(Status done) {
-    if (done || !best_ || done.error().kind == ErrorKind::cancelled) return done;
-    steps_.push_back(fallen("a further attempt", done.error().message()));
+    if (done || !selection_.has_best() || done.error().kind == ErrorKind::cancelled) return done;
+    selection_.note_fallen("a further attempt", done.error().message());
     return {};
   }
 
@@ -131,7 +134,7 @@ class VisibleLadder {
   }
 
   Result<ModalityPoses> without_features(const Error& error) {
-    steps_.push_back(fallen("COLMAP, orbit pairs", error.found));
+    selection_.note_fallen("COLMAP, orbit pairs", error.found);
     return none_held(steps_, Modality::visible);
   }
 
@@ -149,90 +152,15 @@ class VisibleLadder {
     return {};
   }
 
-  bool complete() const { return best_ && missing().empty(); }
+  bool complete() const { return selection_.has_best() && missing().empty(); }
   std::vector<int> missing() const {
     std::set<std::string> done = featureless_;
-    if (best_)
-      for (const PosedView& view : best_->poses.reconstruction.views) done.insert(view.name);
+    if (selection_.has_best())
+      for (const PosedView& view : selection_.best().views) done.insert(view.name);
     std::vector<int> result;
     for (int f = 0; f < total_; ++f)
       if (!done.contains(frames_[static_cast<std::size_t>(f)]->file)) result.push_back(f);
     return result;
-  }
-
-  using Better = std::function<bool(const Reconstruction& model, const Reconstruction& best)>;
-
-  static bool more_views(const Reconstruction& model, const Reconstruction& best) {
-    return model.views.size() > best.views.size();
-  }
-
-  /// Nothing else speaks against the model: its views agree with their stations and the matches.
-  bool only_too_small(const JudgedModel& judged, PoseOptions options) const {
-    options.min_posed_ratio = part_of_a_model;
-    ModalityPoses poses = judged.poses;
-    std::string why;
-    return passes_gates(poses, session_, options, why);
-  }
-
-  LadderStep fallen(const std::string& attempt, const std::string& why) const {
-    return {.attempt = attempt, .why = why, .total = total_};
-  }
-
-  void record(LadderStep step) {
-    step.seconds = std::chrono::duration<double>(Clock::now() - since_).count();
-    since_ = Clock::now();
-    steps_.push_back(std::move(step));
-  }
-
-  /// Judges a model of the level's features and keeps it where it is believed and better than the
-  /// best one.
-  void consider(const std::string& attempt, const std::string& found, Reconstruction model,
-                FeatureLevel& level, const Better& better = more_views) {
-    LadderStep step = fallen(attempt, found);
-    if (model.views.size() < 2) {
-      step.why += "; no model";
-    } else {
-      Result<JudgedModel> judged =
-          judge_model(std::move(model), session_, frames_, level.options());
-      const bool contradicted = judged && judged->believed && matches_contradict(level, *judged);
-      step.why += "; " + (judged ? judged->why : judged.error().found);
-      if (judged) step.posed = static_cast<int>(judged->poses.reconstruction.views.size());
-      if (judged && judged->believed &&
-          (!best_ || better(judged->poses.reconstruction, best_->poses.reconstruction))) {
-        best_ = std::move(*judged);
-        best_step_ = steps_.size();
-        best_level_ = &level;
-      } else if (judged && judged->believed) {
-        step.why += "; no better than the model before";
-      } else if (judged && !contradicted &&
-                 (!part_ || more_views(judged->poses.reconstruction, *part_)) &&
-                 only_too_small(*judged, level.options())) {
-        part_ = std::move(judged->poses.reconstruction);
-      }
-    }
-    record(std::move(step));
-  }
-
-  /// Whether the level's verified matches speak against the model, which then is not believed: on
-  /// repeated structure a wrong model has small residuals, for it keeps the matches that fit it.
-  bool matches_contradict(const FeatureLevel& level, JudgedModel& judged) const {
-    const auto graph = level.graph();
-    if (!graph) {
-      judged.why += ", its matches can't be asked: " + graph.error().found;
-      return false;
-    }
-    const HeldMatches held =
-        held_matches(*graph, posed_frames(*graph, judged.poses.reconstruction));
-    judged.poses.gates["held_matches"] = held.share;
-    judged.poses.gates["contradicted_matches"] = held.contradicted_share;
-    judged.why += fmt::format(", {:.0f} % of the matches of pairs hold", 100 * held.share);
-    if (held.contradicted > 0)
-      judged.why += fmt::format(", {:.1f} % in {} pairs that contradict it",
-                                100 * held.contradicted_share, held.contradicted);
-    if (held.outvoted > 0)
-      judged.why += fmt::format(", {} pairs that do are outvoted", held.outvoted);
-    if (held.contradict()) judged.believed = false;
-    return held.contradict();
   }
 
   /// The mapper's default settings, then ever more relaxed ones until a model is believed. A
@@ -244,10 +172,10 @@ class VisibleLadder {
       ORBITFUSE_TRY(try_settings(level, name, settings));
       // Relaxed settings place views that are left out: what speaks against a model of all views is
       // none of that.
-      if (best_ || steps_.back().posed == total_) break;
+      if (selection_.has_best() || steps_.back().posed == total_) break;
       relaxed = true;
     }
-    return best_ && !relaxed ? Status{} : spared(try_global(level, name));
+    return selection_.has_best() && !relaxed ? Status{} : spared(try_global(level, name));
   }
 
   Status try_settings(FeatureLevel& level, const std::string& name,
@@ -255,7 +183,7 @@ class VisibleLadder {
     const std::string attempt = fmt::format("COLMAP, {}, {}", name, settings.name);
     tell(2, attempt);
     ORBITFUSE_ASSIGN(Reconstruction model, level.map(settings, progress_));
-    consider(attempt, level.found(), std::move(model), level);
+    selection_.consider(attempt, level.found(), std::move(model), level);
     return progress_.check("poses.visible");
   }
 
@@ -266,8 +194,8 @@ class VisibleLadder {
     // Of matches that two views alone agree on, `sedan`'s relaxed model held .98, that of a walled
     // yard, with views on a wrong side, .89.
     constexpr double plainly_right = 0.95;
-    if (best_ &&
-        held_matches(graph, posed_frames(graph, best_->poses.reconstruction)).share > plainly_right)
+    if (selection_.has_best() &&
+        held_matches(graph, posed_frames(graph, selection_.best())).share > plainly_right)
       return {};
     const Adjuster adjust = [&](Reconstruction model) -> Result<Reconstruction> {
       ORBITFUSE_ASSIGN(ModalityPoses poses,
@@ -283,7 +211,7 @@ class VisibleLadder {
       return model.views.size() >= best.views.size() &&
              explained_matches(graph, ours) > explained_matches(graph, colmaps);
     };
-    consider(attempt, global.found, std::move(global.model), level, explains_more);
+    selection_.consider(attempt, global.found, std::move(global.model), level, explains_more);
     return {};
   }
 
@@ -291,7 +219,7 @@ class VisibleLadder {
   Status try_resection(FeatureLevel& level, const std::string& attempt) {
     tell(3, attempt);
     ORBITFUSE_ASSIGN(FeatureGraph graph, level.graph());
-    const Reconstruction& known = best_ ? best_->poses.reconstruction : *part_;
+    const Reconstruction& known = selection_.has_best() ? selection_.best() : *selection_.part();
     const auto without = total_ - static_cast<int>(known.views.size());
     PosedFrames posed = posed_frames(graph, known);
     // The model knows better than two-view geometry which matches hold.
@@ -308,52 +236,52 @@ class VisibleLadder {
       model = reconstruction_of(
           graph, posed, triangulate_tracks(graph, graph.verified, posed, track), Modality::visible);
     }
-    consider(attempt, found, std::move(model), level);
+    selection_.consider(attempt, found, std::move(model), level);
     return {};
   }
 
   /// Two parts of the best model that few points join, on the likeliest pairs across.
   Status try_joining() {
-    const Reconstruction& best = best_->poses.reconstruction;
+    const Reconstruction& best = selection_.best();
     const Joint joint = weakest_joint(best);
     if (!joint.loose()) return {};
     const std::string attempt = "pairs across a loose joint";
     tell(1, "matches of the " + attempt);
-    ORBITFUSE_ASSIGN(const FeatureGraph graph, best_level_->graph());
+    ORBITFUSE_ASSIGN(const FeatureGraph graph, selection_.best_level().graph());
     ORBITFUSE_ASSIGN(const std::vector<ViewPair> pairs,
                      likely_pairs_across(graph, best, joint, progress_));
     const std::string found = fmt::format(
         "{} points, {:.2f} of a view's, join {} views to the rest; {} pairs across look alike",
         joint.points, joint.share, joint.views_beyond, pairs.size());
     if (pairs.empty()) {
-      record(fallen(attempt, found));
+      selection_.note_fallen(attempt, found);
       return {};
     }
-    ORBITFUSE_TRY(best_level_->match(pairs, progress_));
+    ORBITFUSE_TRY(selection_.best_level().match(pairs, progress_));
     tell(2, "COLMAP, " + attempt);
-    ORBITFUSE_ASSIGN(Reconstruction model, best_level_->map({}, progress_));
+    ORBITFUSE_ASSIGN(Reconstruction model, selection_.best_level().map({}, progress_));
     const Better joined = [&](const Reconstruction& now, const Reconstruction& before) {
       return now.views.size() >= before.views.size() && weakest_joint(now).share > joint.share;
     };
-    consider("COLMAP, " + attempt, found + "; " + best_level_->found(), std::move(model),
-             *best_level_, joined);
+    selection_.consider("COLMAP, " + attempt, found + "; " + selection_.best_level().found(),
+                        std::move(model), selection_.best_level(), joined);
     return {};
   }
 
   /// The best model on the matches along its own epipolar lines, where it has few.
   Status try_rematching() {
-    const Reconstruction& best = best_->poses.reconstruction;
+    const Reconstruction& best = selection_.best();
     const double seen = observations_a_view(best);
     if (seen > plenty_a_view) return {};
     const std::string attempt = "matched again along epipolar lines";
     tell(3, attempt);
-    ORBITFUSE_ASSIGN(const FeatureGraph graph, best_level_->graph());
+    ORBITFUSE_ASSIGN(const FeatureGraph graph, selection_.best_level().graph());
     Reconstruction again = rematched(graph, best);
     ORBITFUSE_TRY(progress_.check("poses.visible"));
     const std::string found =
         fmt::format("{:.0f} observations a view for {:.0f}", observations_a_view(again), seen);
     if (observations_a_view(again) < more_observations * seen) {
-      record(fallen(attempt, found + "; too little to adjust it for"));
+      selection_.note_fallen(attempt, found + "; too little to adjust it for");
       return {};
     }
     const Better no_worse = [&](const Reconstruction& model, const Reconstruction& before) {
@@ -361,15 +289,15 @@ class VisibleLadder {
              explained_matches(graph, posed_frames(graph, model)) >=
                  still_explained * explained_matches(graph, posed_frames(graph, before));
     };
-    consider(attempt, found, std::move(again), *best_level_, no_worse);
-    rematched_ = best_step_ + 1 == steps_.size();
+    rematched_ =
+        selection_.consider(attempt, found, std::move(again), selection_.best_level(), no_worse);
     return {};
   }
 
   /// Pairs of the views left out, and of those next to them in the recording; while there is no
   /// model all of them, or the nearest of too many.
   std::vector<ViewPair> remaining_pairs() const {
-    if (!best_) return nearest_pairs(frames_, most_pairs);
+    if (!selection_.has_best()) return nearest_pairs(frames_, most_pairs);
     std::set<int> wanted;
     for (const int f : missing())
       for (const int near : {f - 1, f, f + 1}) wanted.insert((near + total_) % total_);
@@ -386,20 +314,21 @@ class VisibleLadder {
   }
 
   Status map_and_resect(FeatureLevel& level, const std::string& name) {
-    if (!best_) {
+    if (!selection_.has_best()) {
       ORBITFUSE_TRY(try_mapper(level, name));
     } else {
       tell(2, "COLMAP, " + name);
       ORBITFUSE_ASSIGN(Reconstruction model, level.map({}, progress_));
-      consider("COLMAP, " + name, level.found(), std::move(model), level);
+      selection_.consider("COLMAP, " + name, level.found(), std::move(model), level);
     }
-    if (best_ && !complete()) ORBITFUSE_TRY(try_resection(level, "resection, COLMAP, " + name));
+    if (selection_.has_best() && !complete())
+      ORBITFUSE_TRY(try_resection(level, "resection, COLMAP, " + name));
     return {};
   }
 
   /// As COLMAP would do by default, but for pairs of views that are posed already.
   Status try_full_settings() {
-    if (!best_ && total_ > max_exhaustive_views) return {};
+    if (!selection_.has_best() && total_ > max_exhaustive_views) return {};
     tell(0, "features at full settings");
     ORBITFUSE_ASSIGN(full_, FeatureLevel::extract(session_, frames_, at_full_settings(options_),
                                                   workdir_ / "full", progress_));
@@ -412,18 +341,15 @@ class VisibleLadder {
   }
 
   Status doubt_placed_elsewhere(ModalityPoses& poses) const {
-    ORBITFUSE_ASSIGN(const FeatureGraph graph, best_level_->graph());
+    ORBITFUSE_ASSIGN(const FeatureGraph graph, selection_.best_level().graph());
     ORBITFUSE_ASSIGN(const std::vector<DoubtfulView> elsewhere,
                      placed_elsewhere(graph, poses.reconstruction, progress_));
-    for (const DoubtfulView& view : elsewhere)
-      if (std::none_of(poses.doubtful.begin(), poses.doubtful.end(),
-                       [&](const DoubtfulView& known) { return known.name == view.name; }))
-        poses.doubtful.push_back(view);
+    for (const DoubtfulView& view : elsewhere) add_doubt(view, poses.doubtful);
     return {};
   }
 
   Result<ModalityPoses> answer(int pairs) {
-    if (!best_) {
+    if (!selection_.has_best()) {
       auto error = none_held(steps_, Modality::visible);
       for (const std::string& file : featureless_)
         error.value().found += fmt::format("; {} {}", file, featureless_why);
@@ -434,8 +360,7 @@ class VisibleLadder {
             "--station-spacing-deg";
       return error;
     }
-    steps_[best_step_].held = true;
-    ModalityPoses& poses = best_->poses;
+    ModalityPoses& poses = selection_.settle();
     for (DroppedView& view : poses.dropped)
       if (featureless_.contains(view.name)) view.why = fmt::format("it {}", featureless_why);
     poses.doubtful = weakly_held(poses.reconstruction);
@@ -455,17 +380,13 @@ class VisibleLadder {
   const fs::path workdir_;
   const Progress& progress_;
   std::vector<LadderStep>& steps_;
+  ModelSelection selection_;
   const int total_;
   std::string quick_name_ = "orbit pairs";
   std::set<std::string> featureless_;
   bool rematched_ = false;  ///< the best model's points are those along its epipolar lines
   bool limited_ = false;    ///< images were reduced or features cut off: full settings find others
   std::optional<FeatureLevel> full_;
-  std::optional<JudgedModel> best_;
-  FeatureLevel* best_level_ = nullptr;  ///< whose features the best model's are
-  std::optional<Reconstruction> part_;  ///< the largest model that was too small
-  std::size_t best_step_ = 0;
-  Clock::time_point since_ = Clock::now();
 };
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "recon/poses/estimate/center_uncertainty.hpp"
 #include "recon/poses/index.hpp"
@@ -63,19 +64,21 @@ std::vector<DoubtfulView> weakly_held(const Reconstruction& model,
   return views;
 }
 
+void add_doubt(DoubtfulView view, std::vector<DoubtfulView>& doubtful) {
+  const auto is_it = [&](const DoubtfulView& known) { return known.name == view.name; };
+  if (std::none_of(doubtful.begin(), doubtful.end(), is_it)) doubtful.push_back(std::move(view));
+}
+
 void doubt_beyond(const Joint& joint, const Reconstruction& model,
                   std::vector<DoubtfulView>& doubtful) {
   if (!joint.loose()) return;
   for (std::size_t v = 0; v < joint.beyond.size(); ++v) {
-    const std::string& name = model.views[v].name;
-    if (joint.beyond[v] == 0 || std::any_of(doubtful.begin(), doubtful.end(),
-                                            [&](const auto& d) { return d.name == name; }))
-      continue;
-    doubtful.push_back(
-        {name, DoubtReason::few_common_points,
-         fmt::format("{} points join it and {} more to the other views, too few to say how the "
-                     "two parts lie; take views between them",
-                     joint.points, joint.views_beyond - 1)});
+    if (joint.beyond[v] == 0) continue;
+    add_doubt({model.views[v].name, DoubtReason::few_common_points,
+               fmt::format("{} points join it and {} more to the other views, too few to say how "
+                           "the two parts lie; take views between them",
+                           joint.points, joint.views_beyond - 1)},
+              doubtful);
   }
 }
 

@@ -230,8 +230,8 @@ class Problem {
   void add_prior(std::size_t g, const Camera& camera) {
     const LensGroup& lens = lenses_[g];
     LensPriorResidual prior;
-    const double focal = lens.focal_px > 0 ? lens.focal_px : camera.fx;
-    const double sigma = lens.focal_px > 0 ? lens.focal_relative_sigma : 0.5;
+    const double focal = lens.focal_px.value_or(camera.fx);
+    const double sigma = lens.focal_px ? lens.focal_relative_sigma : 0.5;
     const double offset = options_.principal_point_sigma * camera.width;
     prior.mean = {
         focal, focal * camera.fy / camera.fx, camera.width / 2.0, camera.height / 2.0, 0, 0, 0, 0};
@@ -240,7 +240,7 @@ class Problem {
         focal * std::max(sigma, 1e-9), 1, offset, offset, 0.1, 0.1, tangential, tangential};
     double* values = parameters_.lens[g].data();
     std::vector<int> held;
-    if (lens.focal_px > 0 && sigma == 0) held.insert(held.end(), {0, 1});
+    if (lens.focal_px && sigma == 0) held.insert(held.end(), {0, 1});
     if (!lens.refine_principal_point) held.insert(held.end(), {2, 3});
     if (!lens.refine_distortion) held.insert(held.end(), {4, 5, 6, 7});
     problem_.AddParameterBlock(values, 8);
@@ -365,7 +365,7 @@ Result<BundleReport> adjust_bundle(Reconstruction& model, const std::vector<int>
   for (std::size_t g = 0; g < lenses.size(); ++g) {
     report.focal_relative_sigma.push_back(of_focal.focal_relative_sigma(g));
     const double sigma = report.focal_relative_sigma.back();
-    const double prior = lenses[g].focal_px > 0 ? lenses[g].focal_relative_sigma : 0.5;
+    const double prior = lenses[g].focal_px ? lenses[g].focal_relative_sigma : 0.5;
     if (std::isfinite(sigma) && sigma > 0.7 * prior)
       report.warnings.push_back(
           fmt::format("the images say little about the focal length of lens {}: it is known to "

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,10 +11,10 @@
 
 namespace orbitfuse {
 
-/// What is known of a lens before the adjustment; sigma 0 holds the value.
+/// What is known of a lens before the adjustment.
 struct LensGroup {
-  double focal_px = 0;              ///< prior mean; 0 = none
-  double focal_relative_sigma = 0;  ///< of the prior; 0 with focal_px > 0: held
+  std::optional<double> focal_px;   ///< mean of the prior, if there is one
+  double focal_relative_sigma = 0;  ///< of the prior; 0: its focal length is held
   bool refine_principal_point = true;
   bool refine_distortion = true;
 };

@@ -122,16 +122,16 @@ Status drop_folded(const Session& session, const std::vector<const FrameRecord*>
   const std::size_t all = poses.reconstruction.views.size();
   std::set<std::string> folded;
   for (;;) {
-    const StationFit fit = fit_stations(poses.reconstruction.views, session);
-    if (fit.folded.empty()) break;
-    folded.insert(fit.folded.begin(), fit.folded.end());
+    const std::optional<StationFit> fit = fit_stations(poses.reconstruction.views, session);
+    if (!fit || fit->folded.empty()) break;
+    folded.insert(fit->folded.begin(), fit->folded.end());
     if (static_cast<double>(folded.size()) > max_contradicting * static_cast<double>(all))
       return fail(ErrorKind::quality, "poses",
                   fmt::format("{} of {} views look from another side than their stations",
                               folded.size(), all),
                   "check the stations, or import without them");
     ORBITFUSE_ASSIGN(
-        poses, adjust_model(without(poses.reconstruction, fit.folded), session, frames, options));
+        poses, adjust_model(without(poses.reconstruction, fit->folded), session, frames, options));
   }
   for (DroppedView& view : poses.dropped)
     if (folded.contains(view.name))
@@ -153,7 +153,7 @@ Result<ModalityPoses> adjust_model(Reconstruction model, const Session& session,
     for (const FrameRecord* f : frames)
       if (f->file == model.views[v].name) frame = f;
     Camera& camera = model.views[v].camera;
-    if (frame != nullptr && lens.focal_px > 0)
+    if (frame != nullptr && lens.focal_px)
       camera =
           calibrated_camera(session, frame->device, camera.width, camera.height).value_or(camera);
   }
@@ -209,16 +209,15 @@ bool passes_gates(ModalityPoses& poses, const Session& session, const PoseOption
                      poses.gates["median_triangulation_deg"]);
   good = good && rms <= options.max_reprojection_rms_px;
 
-  const StationFit fit = fit_stations(poses.reconstruction.views, session);
-  if (fit.views >= 3) {
+  if (const auto fit = fit_stations(poses.reconstruction.views, session)) {
     // Chord of the median residual, in radii.
-    const double residual = 2 * std::sin(fit.median_residual_deg / 2 * std::numbers::pi / 180.0);
-    const double outliers = static_cast<double>(fit.outliers) / fit.views;
-    poses.gates["station_residual_deg"] = fit.median_residual_deg;
+    const double residual = 2 * std::sin(fit->median_residual_deg / 2 * std::numbers::pi / 180.0);
+    const double outliers = static_cast<double>(fit->outliers) / fit->views;
+    poses.gates["station_residual_deg"] = fit->median_residual_deg;
     poses.gates["station_outlier_ratio"] = outliers;
     why += fmt::format(", {:.1f} deg from the stations in the median, {} of {} contradict them{}",
-                       fit.median_residual_deg, fit.outliers, fit.views,
-                       fit.mirrored ? " (which run the other way round)" : "");
+                       fit->median_residual_deg, fit->outliers, fit->views,
+                       fit->mirrored ? " (which run the other way round)" : "");
     good = good && residual <= options.max_station_residual && outliers <= max_contradicting;
   }
   const CaptureOrder order = capture_order(poses.reconstruction.views, session);

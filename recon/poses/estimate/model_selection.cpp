@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/estimate/model_selection.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "recon/poses/sfm/held_matches.hpp"
+
+namespace orbitfuse {
+namespace {
+
+/// Share of the views from which on a model that can't stand alone is worth completing.
+constexpr double part_of_a_model = 0.5;
+
+}  // namespace
+
+bool ModelSelection::consider(const std::string& attempt, const std::string& found,
+                              Reconstruction model, FeatureLevel& level, const Better& better) {
+  LadderStep step = fallen(attempt, found);
+  bool taken = false;
+  if (model.views.size() < 2) {
+    step.why += "; no model";
+  } else {
+    Result<JudgedModel> judged = judge_model(std::move(model), session_, frames_, level.options());
+    const bool contradicted = judged && judged->believed && matches_contradict(level, *judged);
+    step.why += "; " + (judged ? judged->why : judged.error().found);
+    if (judged) step.posed = static_cast<int>(judged->poses.reconstruction.views.size());
+    if (judged && judged->believed && (!best_ || better(judged->poses.reconstruction, best()))) {
+      best_ = std::move(*judged);
+      best_step_ = steps_.size();
+      best_level_ = &level;
+      taken = true;
+    } else if (judged && judged->believed) {
+      step.why += "; no better than the model before";
+    } else if (judged && !contradicted &&
+               (!part_ || more_views(judged->poses.reconstruction, *part_)) &&
+               only_too_small(*judged, level.options())) {
+      part_ = std::move(judged->poses.reconstruction);
+    }
+  }
+  record(std::move(step));
+  return taken;
+}
+
+void ModelSelection::note_fallen(const std::string& attempt, const std::string& why) {
+  record(fallen(attempt, why));
+}
+
+ModalityPoses& ModelSelection::settle() {
+  steps_[best_step_].held = true;
+  return best_->poses;
+}
+
+/// Its views agree with their stations and the matches.
+bool ModelSelection::only_too_small(const JudgedModel& judged, PoseOptions options) const {
+  options.min_posed_ratio = part_of_a_model;
+  ModalityPoses poses = judged.poses;
+  std::string why;
+  return passes_gates(poses, session_, options, why);
+}
+
+/// Whether the level's verified matches speak against the model, which then is not believed: on
+/// repeated structure a wrong model has small residuals, for it keeps the matches that fit it.
+bool ModelSelection::matches_contradict(const FeatureLevel& level, JudgedModel& judged) {
+  const auto graph = level.graph();
+  if (!graph) {
+    judged.why += ", its matches can't be asked: " + graph.error().found;
+    return false;
+  }
+  const HeldMatches held = held_matches(*graph, posed_frames(*graph, judged.poses.reconstruction));
+  judged.poses.gates["held_matches"] = held.share;
+  judged.poses.gates["contradicted_matches"] = held.contradicted_share;
+  judged.why += fmt::format(", {:.0f} % of the matches of pairs hold", 100 * held.share);
+  if (held.contradicted > 0)
+    judged.why += fmt::format(", {:.1f} % in {} pairs that contradict it",
+                              100 * held.contradicted_share, held.contradicted);
+  if (held.outvoted > 0)
+    judged.why += fmt::format(", {} pairs that do are outvoted", held.outvoted);
+  if (held.contradict()) judged.believed = false;
+  return held.contradict();
+}
+
+LadderStep ModelSelection::fallen(const std::string& attempt, const std::string& why) const {
+  return {.attempt = attempt, .why = why, .total = static_cast<int>(frames_.size())};
+}
+
+void ModelSelection::record(LadderStep step) {
+  step.seconds = std::chrono::duration<double>(Clock::now() - since_).count();
+  since_ = Clock::now();
+  steps_.push_back(std::move(step));
+}
+
+}  // namespace orbitfuse
