@@ -107,7 +107,7 @@ Result<TrainReport> train(const Dataset& given, const TrainOptions& options,
     const TraceSpan span("training steps");
     ORBITFUSE_TRY(run.loop());
   } catch (const device::Refused& refused) {
-    ORBITFUSE_TRY(run.rescue());
+    ORBITFUSE_TRY(run.save_after_refusal());
     return tl::unexpected(device::error_of(refused));
   }
   ORBITFUSE_ASSIGN(out, run.finish());

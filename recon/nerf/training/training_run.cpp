@@ -285,7 +285,7 @@ Status TrainingRun::loop() {
   return save();
 }
 
-Status TrainingRun::rescue() {
+Status TrainingRun::save_after_refusal() {
   if (!trainer_) return {};
   pause();
   try {

@@ -56,7 +56,7 @@ class TrainingRun {
   /// Steps until something ends them; report.stop says what.
   Status loop();
   /// After a device has refused to go on: writes the checkpoint, if it still gives back the field.
-  Status rescue();
+  Status save_after_refusal();
   /// The best parameters, and the report.
   Result<Field> finish();
 
