@@ -77,7 +77,10 @@ class VisibleLadder {
     Result<FeatureLevel> quick =
         FeatureLevel::extract(session_, frames_, options_, workdir_ / "quick", progress_);
     if (!quick && quick.error().kind != ErrorKind::quality) return tl::unexpected(quick.error());
-    if (!quick) return without_features(quick.error());
+    if (!quick) {
+      selection_.note_fallen("COLMAP, orbit pairs", quick.error().found);
+      return none_held(steps_, Modality::visible);
+    }
     ORBITFUSE_TRY(look_at_features(*quick));
     tell(1, "matches of the orbit's pairs");
     ORBITFUSE_TRY(quick->match(orbit, progress_));
@@ -131,11 +134,6 @@ class VisibleLadder {
 
   void tell(double done, const std::string& what) const {
     progress_.report({"poses.visible", done, 4, {}, what});
-  }
-
-  Result<ModalityPoses> without_features(const Error& error) {
-    selection_.note_fallen("COLMAP, orbit pairs", error.found);
-    return none_held(steps_, Modality::visible);
   }
 
   /// Frames in which nothing can be matched can't be posed: no step is taken for them. Where

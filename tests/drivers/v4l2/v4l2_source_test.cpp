@@ -40,6 +40,15 @@ class V4l2SourceTest : public testing::Test {
     ADD_FAILURE() << "nothing came";
     return {};
   }
+  void unplug(V4l2Source& source) {
+    system->plugged = false;
+    EXPECT_EQ(deliver(source).reason, "disconnected");
+  }
+  void unplug_after_a_frame(V4l2Source& source) {
+    shoot(0);
+    EXPECT_EQ(deliver(source).kind, Kind::frame);
+    unplug(source);
+  }
 
   void note_resets() {
     options.reset_port = [this](const std::string& port) -> Status {
@@ -153,8 +162,7 @@ TEST_F(V4l2SourceTest, EveryOutageCostsItsTimeInIds) {
   std::uint64_t last = 0;
   for (int i = 0; i < 20; ++i) last = deliver(source).frame.id;
   const auto outage = [&](std::chrono::milliseconds away) {
-    system->plugged = false;
-    EXPECT_EQ(deliver(source).reason, "disconnected");
+    unplug(source);
     std::this_thread::sleep_for(away);
     system->plugged = true;
     EXPECT_EQ(deliver(source).reason, "reconnected");
@@ -182,8 +190,7 @@ TEST_F(V4l2SourceTest, EveryOutageCostsItsTimeInIds) {
 TEST_F(V4l2SourceTest, BackButRefusedIsToldOnceWithItsReason) {
   V4l2Source source(options, system);
   ASSERT_TRUE(source.start());
-  system->plugged = false;
-  EXPECT_EQ(deliver(source).reason, "disconnected");
+  unplug(source);
   system->stream_on_error = ENOSPC;
   system->plugged = true;
   const Delivery refused = deliver(source);
@@ -225,10 +232,7 @@ TEST_F(V4l2SourceTest, FrozenThermalFramesAreFlagged) {
 TEST_F(V4l2SourceTest, UnpluggedAndBackUnderAnotherNode) {
   V4l2Source source(options, system);
   ASSERT_TRUE(source.start());
-  shoot(0);
-  deliver(source);
-  system->plugged = false;
-  EXPECT_EQ(deliver(source).reason, "disconnected");
+  unplug_after_a_frame(source);
   EXPECT_EQ(system->open_descriptors, 0);
   EXPECT_EQ(system->mapped, 0);
   EXPECT_EQ(source.next(1ms)->kind, Kind::timeout);
@@ -249,12 +253,6 @@ class V4l2TwinTest : public V4l2SourceTest {
     second.path = "/dev/video3";
     second.usb_path = "2-1";
   }
-  void unplug(V4l2Source& source) {
-    shoot(0);
-    EXPECT_EQ(deliver(source).kind, Kind::frame);
-    system->plugged = false;
-    EXPECT_EQ(deliver(source).reason, "disconnected");
-  }
   void plug(const VideoSystem::Node& node) {
     system->camera = node;
     system->plugged = true;
@@ -265,7 +263,7 @@ class V4l2TwinTest : public V4l2SourceTest {
 TEST_F(V4l2TwinTest, OneOfTheSameSerialElsewhereIsTakenButToldAndGivenUpForTheFirst) {
   V4l2Source source(options, system);
   ASSERT_TRUE(source.start());
-  unplug(source);
+  unplug_after_a_frame(source);
   plug(second);
   EXPECT_EQ(deliver(source).reason, "reconnected");
   const Delivery moved = deliver(source);
@@ -297,7 +295,7 @@ TEST_F(V4l2TwinTest, ATwinThatWasThereAllAlongIsNeverTaken) {
   V4l2Source source(options, system);
   ASSERT_TRUE(source.start());
   system->others = {second};  // while ours streams
-  unplug(source);
+  unplug_after_a_frame(source);
   EXPECT_EQ(deliver(source).reason, "look-alike");
   for (int i = 0; i < 20; ++i) EXPECT_EQ(source.next(1ms)->kind, Kind::timeout);
   EXPECT_EQ(system->last_opened, first.path);
@@ -313,7 +311,7 @@ TEST_F(V4l2TwinTest, WithoutASerialOnlyThePortCounts) {
   second.serial.clear();
   V4l2Source source(options, system);
   ASSERT_TRUE(source.start());
-  unplug(source);
+  unplug_after_a_frame(source);
   plug(second);
   const Delivery told = deliver(source);
   EXPECT_EQ(told.reason, "look-alike");
@@ -338,8 +336,7 @@ TEST_F(V4l2SourceTest, DescribesItselfToOtherThreadsWhileItReopens) {
     }
   });
   for (int i = 0; i < 50; ++i) {
-    system->plugged = false;
-    EXPECT_EQ(deliver(source).reason, "disconnected");
+    unplug(source);
     system->plugged = true;
     EXPECT_EQ(deliver(source).reason, "reconnected");
   }
@@ -430,8 +427,7 @@ TEST_F(V4l2SourceTest, ControlsAreLockedOnceTheCameraHasAdaptedAndHoldAfterReplu
   EXPECT_EQ(deliver(source).kind, Kind::frame);
   EXPECT_EQ(system->controls[V4L2_CID_EXPOSURE_AUTO], V4L2_EXPOSURE_MANUAL);
   EXPECT_EQ(system->controls[V4L2_CID_EXPOSURE_ABSOLUTE], 312);
-  system->plugged = false;
-  EXPECT_EQ(deliver(source).reason, "disconnected");
+  unplug(source);
   system->controls = switched_on;
   system->plugged = true;
   EXPECT_EQ(deliver(source).reason, "reconnected");
@@ -457,10 +453,7 @@ TEST_F(V4l2SourceTest, ComesBackWithItsSizeOrNotAtAll) {
   options.stall = 10s;
   V4l2Source source(options, system);
   ASSERT_TRUE(source.start());
-  shoot(0);
-  deliver(source);
-  system->plugged = false;
-  EXPECT_EQ(deliver(source).reason, "disconnected");
+  unplug_after_a_frame(source);
   system->width = 4;
   system->plugged = true;
   const Delivery refused = deliver(source);
@@ -552,8 +545,7 @@ TEST_F(V4l2SourceTest, AnOutageAtTheEndIsCountedByTime) {
     system->shots.back().stamp_us = 1'000'000 + 10'000 * i;  // 100 Hz
   }
   for (int i = 0; i < 20; ++i) EXPECT_EQ(deliver(source).kind, Kind::frame);
-  system->plugged = false;
-  EXPECT_EQ(deliver(source).reason, "disconnected");
+  unplug(source);
   const auto gone = std::chrono::steady_clock::now();
   while (std::chrono::steady_clock::now() - gone < 200ms) source.next(1ms);
   const std::vector<Delivery> end = source.unfinished();
