@@ -16,11 +16,12 @@ using nlohmann::json;
 namespace {
 
 json to_json(const StageNeeds& needs) {
-  return {{"cores", needs.cores},
-          {"memory_mb", needs.memory_mb},
-          {"time_min", needs.time_min},
-          {"gpu", needs.gpu},
-          {"usual_s", needs.usual_s}};
+  json j = {{"cores", needs.cores},
+            {"memory_mb", needs.memory_mb},
+            {"time_min", needs.time_min},
+            {"gpu", needs.gpu}};
+  if (needs.usual_s) j["usual_s"] = *needs.usual_s;
+  return j;
 }
 
 Status read_needs(const JsonFields& fields, FarmPlan& plan) {
@@ -30,6 +31,7 @@ Status read_needs(const JsonFields& fields, FarmPlan& plan) {
     ORBITFUSE_TRY(told.get_all("cores", needs.cores, "memory_mb", needs.memory_mb, "time_min",
                                needs.time_min, "gpu", needs.gpu));
     ORBITFUSE_TRY(told.get_present("usual_s", needs.usual_s));
+    if (needs.usual_s == 0.0) needs.usual_s.reset();  // earlier versions wrote 0 for not known
   }
   return {};
 }

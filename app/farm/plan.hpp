@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,9 +18,9 @@ inline constexpr const char* plan_file = "farm.json";
 struct StageNeeds {
   int cores = 2;
   double memory_mb = 2000;
-  double time_min = 60;  ///< the most it may take
-  bool gpu = false;      ///< goes to the GPU partition, where one is named
-  double usual_s = 0;    ///< wall seconds that it takes as a rule; 0: not known
+  double time_min = 60;                ///< the most it may take
+  bool gpu = false;                    ///< goes to the GPU partition, where one is named
+  std::optional<double> usual_s = {};  ///< wall seconds that it takes as a rule, where known
   bool operator==(const StageNeeds&) const = default;
 };
 

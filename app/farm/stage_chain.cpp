@@ -2,7 +2,6 @@
 #include "app/farm/stage_chain.hpp"
 
 #include <algorithm>
-#include <limits>
 
 namespace orbitfuse::farm {
 namespace {
@@ -12,7 +11,15 @@ void append(StageChain& chain, const StageChain& more) {
   chain.needs.cores = std::max(chain.needs.cores, more.needs.cores);
   chain.needs.memory_mb = std::max(chain.needs.memory_mb, more.needs.memory_mb);
   chain.needs.time_min += more.needs.time_min;
-  chain.needs.usual_s += more.needs.usual_s;
+  if (chain.needs.usual_s && more.needs.usual_s)
+    *chain.needs.usual_s += *more.needs.usual_s;
+  else
+    chain.needs.usual_s.reset();
+}
+
+/// What nobody has timed counts as long.
+bool is_short(const StageChain& chain, double enough_s) {
+  return chain.needs.usual_s && *chain.needs.usual_s < enough_s;
 }
 
 }  // namespace
@@ -22,15 +29,14 @@ std::vector<StageChain> stage_chains(const FarmPlan& plan) {
   std::vector<StageChain> chains;
   for (const std::string& stage : plan.stages) {
     StageChain next{{stage}, plan.needs_of(stage)};
-    if (!(next.needs.usual_s > 0)) next.needs.usual_s = std::numeric_limits<double>::infinity();
-    if (!chains.empty() && chains.back().needs.usual_s < enough_s &&
+    if (!chains.empty() && is_short(chains.back(), enough_s) &&
         chains.back().needs.gpu == next.needs.gpu)
       append(chains.back(), next);
     else
       chains.push_back(std::move(next));
   }
   for (std::size_t i = chains.size(); i-- > 1;)
-    if (chains[i].needs.usual_s < enough_s && chains[i].needs.gpu == chains[i - 1].needs.gpu) {
+    if (is_short(chains[i], enough_s) && chains[i].needs.gpu == chains[i - 1].needs.gpu) {
       append(chains[i - 1], chains[i]);
       chains.erase(chains.begin() + static_cast<std::ptrdiff_t>(i));
     }
