@@ -95,6 +95,21 @@ TEST_F(SessionTest, EveryFieldComesBack) {
   EXPECT_EQ(s->frames_of(Modality::thermal).size(), 1u);
 }
 
+TEST_F(SessionTest, TimesThatNobodyKnowsAreAbsent) {
+  FrameRecord undated = full_frame();
+  undated.host_time_ns.reset();
+  undated.device_time_ns.reset();
+  const std::string line = manifest_line(undated), known = manifest_line(full_frame());
+  EXPECT_NE(line.find("\"host_time_ns\":0,"), std::string::npos) << "as earlier versions had it";
+  std::string text = manifest();
+  text.replace(text.find(known), known.size(), line);
+  const auto s = open(text);
+  ASSERT_TRUE(s) << s.error().message();
+  EXPECT_FALSE(s->frames.at(0).host_time_ns);
+  EXPECT_FALSE(s->frames.at(0).device_time_ns);
+  EXPECT_EQ(manifest_line(s->frames.at(0)), line);
+}
+
 TEST_F(SessionTest, CutAnywhereOpensAsIncompleteOrNamesTheLine) {
   const std::string text = manifest();
   const std::size_t header_end = text.find('\n');
