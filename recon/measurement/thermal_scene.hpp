@@ -88,13 +88,13 @@ class ThermalScene {
   Result<const PosedView*> view(const std::string& name) const;
   bool has_view(const std::string& name) const;
 
-  /// Kelvin of a frame. Errors: read_frame's, input (not of the camera's size).
+  /// CV_32FC1 kelvin of a frame. Errors: read_frame's, input (not of the camera's size).
   Result<cv::Mat> image(std::size_t frame) const;
   /// The field from a frame, options().depth_width_px wide, camera reduced_camera(frame).
   Result<FieldView> seen(std::size_t frame, const Progress& progress) const;
   Camera reduced_camera(std::size_t frame) const;
 
-  /// The field from any camera.
+  /// The field from any camera. Errors of both: those of SceneParts::field.
   Result<FieldView> render(const Camera& camera, const Rigid3d& cam_from_world,
                            const Progress& progress) const {
     return parts_.field(camera, cam_from_world, progress);
@@ -113,11 +113,11 @@ class ThermalScene {
   std::unique_ptr<std::vector<Cached>> cached_;
 };
 
-/// SurfacePoint::variation_k of a pixel in a rendered view.
+/// SurfacePoint::variation_k of a pixel in a rendered view (CV_32FC1, NaN = nothing there).
 double variation_at(const cv::Mat& temperature_k, int x, int y, int reach);
 
 /// Unit normal, in the camera's axes and towards it, of the plane through the depths round a pixel
-/// of a map; none where fewer than three lie on one surface.
+/// of a map (CV_32FC1); none where fewer than three lie on one surface.
 std::optional<Eigen::Vector3d> normal_at(const cv::Mat& depth, const Camera& camera, int x, int y,
                                          int reach);
 

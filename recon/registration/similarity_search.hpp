@@ -32,7 +32,7 @@ struct SimilaritySearchOptions {
 };
 
 /// refine_similarity from the best of several starts; from the clouds' answer alone where that is
-/// decisive (then named in `skips`). Errors: usage, those of refine_similarity.
+/// decisive (then named in `skips`). `images` as there. Errors: usage, those of refine_similarity.
 Result<SimilarityRefinement> search_similarity(const SceneRenderer& visible,
                                                const std::vector<cv::Mat>& images,
                                                const std::vector<PosedView>& thermal,
