@@ -16,8 +16,8 @@
 #include "core/image/image_io.hpp"
 #include "fusion/metrics/metrics.hpp"
 #include "tests/library/flir_jpeg_file.hpp"
-#include "tests/recon/nerf/toy_scene.hpp"
 #include "tests/support/cloud_scenes.hpp"
+#include "tests/support/toy_scene.hpp"
 
 namespace orbitfuse {
 namespace {

@@ -11,8 +11,8 @@
 #include "app/recording/recording.hpp"
 #include "capture/mat/mat_finder.hpp"
 #include "capture/page/capture_page.hpp"
-#include "tests/capture/mat/rendered_mat.hpp"
 #include "tests/support/gev_simulator.hpp"
+#include "tests/support/rendered_mat.hpp"
 #include "tests/support/temp_folder.hpp"
 
 // Last: its <resolv.h> defines a macro _res that Eigen trips over.

@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "app/view/finished_run.hpp"
-#include "tests/recon/nerf/toy_scene.hpp"
+#include "tests/support/toy_scene.hpp"
 
 namespace orbitfuse::view::test {
 

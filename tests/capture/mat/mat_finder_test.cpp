@@ -5,7 +5,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "tests/capture/mat/rendered_mat.hpp"
+#include "tests/support/rendered_mat.hpp"
 
 namespace orbitfuse {
 namespace {

@@ -10,7 +10,7 @@
 #include "capture/image_quality/frame_quality.hpp"
 #include "capture/live/sharpness_reference.hpp"
 #include "capture/mat/mat_finder.hpp"
-#include "tests/capture/mat/rendered_mat.hpp"
+#include "tests/support/rendered_mat.hpp"
 
 namespace orbitfuse {
 namespace {

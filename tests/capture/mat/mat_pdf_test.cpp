@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "capture/mat/mat_finder.hpp"
-#include "tests/capture/mat/rendered_mat.hpp"
+#include "tests/support/rendered_mat.hpp"
 
 namespace orbitfuse {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "capture/mat/mat_finder.hpp"
 #include "core/system/clock.hpp"
-#include "tests/capture/mat/rendered_mat.hpp"
 #include "tests/capture/mat/rendered_room.hpp"
+#include "tests/support/rendered_mat.hpp"
 
 namespace orbitfuse {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <limits>
 
-#include "tests/recon/depth/patterned_floor.hpp"
+#include "tests/support/patterned_floor.hpp"
 
 namespace orbitfuse {
 namespace {

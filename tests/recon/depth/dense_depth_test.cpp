@@ -8,7 +8,7 @@
 #include <cstring>
 
 #include "core/system/parallel.hpp"
-#include "tests/recon/depth/patterned_floor.hpp"
+#include "tests/support/patterned_floor.hpp"
 
 namespace orbitfuse::depth {
 namespace {

@@ -8,7 +8,7 @@
 #include "recon/nerf/field/field_state.hpp"
 #include "recon/nerf/rendering/march.hpp"
 #include "tests/recon/nerf/random_ray.hpp"
-#include "tests/recon/nerf/toy_scene.hpp"
+#include "tests/support/toy_scene.hpp"
 
 namespace orbitfuse::nerf {
 namespace {

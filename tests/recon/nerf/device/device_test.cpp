@@ -10,7 +10,7 @@
 #include "recon/nerf/training/trainer.hpp"
 #include "tests/recon/nerf/device/machines.hpp"
 #include "tests/recon/nerf/random_ray.hpp"
-#include "tests/recon/nerf/toy_scene.hpp"
+#include "tests/support/toy_scene.hpp"
 
 namespace orbitfuse::nerf {
 namespace {

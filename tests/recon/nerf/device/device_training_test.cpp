@@ -8,8 +8,8 @@
 #include "core/system/file_io.hpp"
 #include "recon/nerf/training/measure.hpp"
 #include "tests/recon/nerf/device/machines.hpp"
-#include "tests/recon/nerf/toy_scene.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/support/toy_scene.hpp"
 
 namespace orbitfuse::nerf {
 namespace {

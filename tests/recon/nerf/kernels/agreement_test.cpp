@@ -17,7 +17,7 @@
 #include "recon/nerf/training/measure.hpp"
 #include "recon/nerf/training/trainer.hpp"
 #include "tests/recon/nerf/kernels/emulated_amx.hpp"
-#include "tests/recon/nerf/toy_scene.hpp"
+#include "tests/support/toy_scene.hpp"
 
 namespace orbitfuse::nerf {
 namespace {

@@ -7,7 +7,7 @@
 #include <limits>
 #include <opencv2/core.hpp>
 
-#include "tests/recon/nerf/toy_scene.hpp"
+#include "tests/support/toy_scene.hpp"
 
 namespace orbitfuse::nerf {
 namespace {

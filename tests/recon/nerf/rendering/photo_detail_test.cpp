@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/system/parallel.hpp"
-#include "tests/recon/nerf/toy_scene.hpp"
+#include "tests/support/toy_scene.hpp"
 
 namespace orbitfuse::nerf {
 namespace {

@@ -11,7 +11,7 @@
 #include "recon/nerf/kernels/compositing.hpp"
 #include "recon/nerf/kernels/interlevel.hpp"
 #include "tests/recon/nerf/slope.hpp"
-#include "tests/recon/nerf/toy_scene.hpp"
+#include "tests/support/toy_scene.hpp"
 
 namespace orbitfuse::nerf {
 namespace {

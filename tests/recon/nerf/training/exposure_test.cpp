@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "tests/recon/nerf/toy_scene.hpp"
+#include "tests/support/toy_scene.hpp"
 
 namespace orbitfuse::nerf {
 namespace {

@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "recon/nerf/training/scene.hpp"
-#include "tests/recon/nerf/toy_scene.hpp"
+#include "tests/support/toy_scene.hpp"
 
 namespace orbitfuse::nerf {
 namespace {

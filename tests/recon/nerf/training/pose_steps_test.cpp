@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "core/numeric/random.hpp"
-#include "tests/recon/nerf/toy_scene.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/support/toy_scene.hpp"
 
 namespace orbitfuse::nerf {
 namespace {

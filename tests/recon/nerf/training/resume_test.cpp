@@ -6,8 +6,8 @@
 #include "recon/nerf/field/checkpoint.hpp"
 #include "recon/nerf/field/field_state.hpp"
 #include "recon/nerf/training/measure.hpp"
-#include "tests/recon/nerf/toy_scene.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/support/toy_scene.hpp"
 
 namespace orbitfuse::nerf {
 namespace {

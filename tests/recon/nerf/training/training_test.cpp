@@ -5,8 +5,8 @@
 
 #include "core/system/parallel.hpp"
 #include "recon/nerf/field/field_state.hpp"
-#include "tests/recon/nerf/toy_scene.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/support/toy_scene.hpp"
 
 namespace orbitfuse::nerf {
 namespace {

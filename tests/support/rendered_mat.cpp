@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tests/capture/mat/rendered_mat.hpp"
+#include "tests/support/rendered_mat.hpp"
 
 #include <cmath>
 #include <numbers>

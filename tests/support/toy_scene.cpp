@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tests/recon/nerf/toy_scene.hpp"
+#include "tests/support/toy_scene.hpp"
 
 #include <fmt/format.h>
 
