@@ -43,9 +43,10 @@ struct HeldoutKelvin {
 
 /// Rendered, with the detail of all other recorded views, against recorded, on views that did not
 /// train (as Table 4 of the paper that fusion/metrics/metrics.hpp names).
-Status score_field(const StageContext& context, const SessionInput& input,
-                   const TrainConfig& config, Modality modality, MetricMeans& means,
-                   HeldoutKelvin& thermal_k) {
+Status score_field(const StageContext& context, const StageInputs& in, Modality modality,
+                   MetricMeans& means, HeldoutKelvin& thermal_k) {
+  const SessionInput& input = *in.session;
+  const TrainConfig& config = in.config->train(modality);
   const std::string train = "train_" + std::string(name(modality));
   if (!context.has(train)) return {};
   ORBITFUSE_ASSIGN(const TrainedFrames trained, load_trained_frames(context.of(train)));
@@ -61,7 +62,8 @@ Status score_field(const StageContext& context, const SessionInput& input,
                                  config.max_width_px, context.progress));
   ORBITFUSE_ASSIGN(const nerf::Field field, nerf::Field::load(context.of(train) / field_file));
   ORBITFUSE_ASSIGN(nerf::PhotoDetail detail,
-                   detail_of_new_views(context, input.session, modality, config.max_width_px));
+                   detail_of_new_views(context, input.session, modality, config.max_width_px,
+                                       in.where_frames_stand));
   for (const nerf::TrainingView& view : data.views) {
     ORBITFUSE_ASSIGN(nerf::RenderedView seen,
                      nerf::render(field, view.camera, view.cam_from_world, {}, context.progress));
@@ -127,28 +129,27 @@ Result<json> measured_share(const StageContext& context) {
   return fused.measured_share;
 }
 
-Result<StageOutput> score(const StageContext& context, const SessionInput& input,
-                          const RunConfig& config) {
+Result<StageOutput> score(const StageContext& context, const StageInputs& in) {
+  const MetricsConfig& config = in.config->metrics;
   MetricMeans fields, fused;
   HeldoutKelvin thermal_k;
   for (const Modality modality : {Modality::visible, Modality::thermal})
-    ORBITFUSE_TRY(score_field(context, input, config.train(modality), modality, fields, thermal_k));
-  ORBITFUSE_ASSIGN(const std::size_t unscored,
-                   score_fused(context, config.metrics.scored_views, fused));
+    ORBITFUSE_TRY(score_field(context, in, modality, fields, thermal_k));
+  ORBITFUSE_ASSIGN(const std::size_t unscored, score_fused(context, config.scored_views, fused));
   StageOutput output;
   if (unscored > 0)
     output.skips.push_back({fmt::format("fusion metrics of {} new views", unscored),
-                            fmt::format("metrics.scored_views = {}", config.metrics.scored_views),
+                            fmt::format("metrics.scored_views = {}", config.scored_views),
                             "the means are of the others"});
   auto tables = json::array();
   if (!fields.empty())
     tables.push_back(fields.table("Rendered views against held-out frames", "field"));
   if (!fused.empty())
-    tables.push_back(fused.table(unscored > 0
-                                     ? fmt::format("Fused views, mean over {} of the new cameras",
-                                                   config.metrics.scored_views)
-                                     : "Fused views, mean over the new cameras",
-                                 "method"));
+    tables.push_back(fused.table(
+        unscored > 0
+            ? fmt::format("Fused views, mean over {} of the new cameras", config.scored_views)
+            : "Fused views, mean over the new cameras",
+        "method"));
   ORBITFUSE_TRY(write_file_atomic(context.folder / "metrics.csv",
                                   MetricMeans::csv_header() + fields.csv() + fused.csv()));
   ORBITFUSE_ASSIGN(const json share, measured_share(context));
@@ -181,7 +182,7 @@ pipeline::Stage metrics_stage(const StageInputs& in) {
     if (context.has("train_visible") || context.has("train_thermal")) return std::nullopt;
     return "no field was trained";
   };
-  stage.run = [in](const StageContext& context) { return score(context, *in.session, *in.config); };
+  stage.run = [in](const StageContext& context) { return score(context, in); };
   return stage;
 }
 

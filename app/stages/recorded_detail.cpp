@@ -48,7 +48,8 @@ Result<nerf::RenderedView> DetailedField::render(const Camera& camera,
 
 Result<nerf::PhotoDetail> recorded_detail(const pipeline::StageContext& context,
                                           const Session& session, Modality modality, int width_px,
-                                          const nerf::DetailOptions& options) {
+                                          const nerf::DetailOptions& options,
+                                          std::shared_ptr<nerf::KeptRenders> kept) {
   if (options.sources == 0) return nerf::PhotoDetail();
   const std::string of(name(modality));
   const Samples samples = samples_of(session, modality);
@@ -67,12 +68,13 @@ Result<nerf::PhotoDetail> recorded_detail(const pipeline::StageContext& context,
       own.gain = gain->second;
     if (const auto offset = trained.offsets_k.find(view.name); offset != trained.offsets_k.end())
       own.offset_k = offset->second;
-    sources.push_back({view, [=] { return image_of(file, samples, recorded, view.camera, own); }});
+    sources.push_back(
+        {view, [=] { return image_of(file, samples, recorded, view.camera, own); }, recorded});
   }
   // What the field learned must not come twice.
   nerf::DetailOptions fitting = options;
   fitting.base_width_px = std::max(options.base_width_px, trained.width_px * 4 / 5);
-  return nerf::PhotoDetail::of(std::move(sources), fitting);
+  return nerf::PhotoDetail::of(std::move(sources), fitting, std::move(kept));
 }
 
 Result<nerf::DetailTrial> try_on_recorded(const pipeline::StageContext& context,
@@ -95,7 +97,8 @@ std::string detail_key(Modality modality) { return std::string(name(modality)) +
 
 Result<nerf::PhotoDetail> detail_of_new_views(const pipeline::StageContext& context,
                                               const Session& session, Modality modality,
-                                              int width_px) {
+                                              int width_px,
+                                              std::shared_ptr<nerf::KeptRenders> kept) {
   if (!context.has("render")) return nerf::PhotoDetail();
   ORBITFUSE_ASSIGN(const pipeline::StageRecord record,
                    pipeline::read_stage_record(context.of("render")));
@@ -105,7 +108,7 @@ Result<nerf::PhotoDetail> detail_of_new_views(const pipeline::StageContext& cont
   ORBITFUSE_ASSIGN(const JsonFields told, metrics.child(key.c_str()));
   nerf::DetailOptions options;
   ORBITFUSE_TRY(told.get("sources", options.sources));
-  return recorded_detail(context, session, modality, width_px, options);
+  return recorded_detail(context, session, modality, width_px, options, std::move(kept));
 }
 
 }  // namespace orbitfuse::stages

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <memory>
+
 #include "app/pipeline/stage.hpp"
 #include "core/session/session.hpp"
 #include "recon/assembly/training_data.hpp"
@@ -30,7 +32,8 @@ constexpr int detail_width_px(int picture_width_px) { return picture_width_px * 
 /// stage's record is cut), usage (options).
 Result<nerf::PhotoDetail> recorded_detail(const pipeline::StageContext& context,
                                           const Session& session, Modality modality, int width_px,
-                                          const nerf::DetailOptions& options);
+                                          const nerf::DetailOptions& options,
+                                          std::shared_ptr<nerf::KeptRenders> kept = nullptr);
 
 /// Recorded views that detail is tried on: each takes a render, and its neighbours'.
 inline constexpr std::size_t detail_trials = 3;
@@ -43,7 +46,8 @@ Result<nerf::DetailTrial> try_on_recorded(const pipeline::StageContext& context,
 /// recorded_detail() as the run's new views got it; none where they got none.
 Result<nerf::PhotoDetail> detail_of_new_views(const pipeline::StageContext& context,
                                               const Session& session, Modality modality,
-                                              int width_px);
+                                              int width_px,
+                                              std::shared_ptr<nerf::KeptRenders> kept = nullptr);
 
 /// Where the render stage says what became of a modality's detail.
 std::string detail_key(Modality modality);

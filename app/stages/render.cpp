@@ -49,16 +49,17 @@ Result<Fields> load_fields(const StageContext& context) {
   return fields;
 }
 
-Status load_detail(const StageContext& context, const SessionInput& input,
-                   const nerf::DetailOptions& options, const NewViews& views, Fields& fields,
-                   StageOutput& output) {
+Status load_detail(const StageContext& context, const StageInputs& in, const NewViews& views,
+                   Fields& fields, StageOutput& output) {
+  const nerf::DetailOptions& options = in.config->render.detail;
   int widest = 0;
   for (const PosedView& view : views.views) widest = std::max(widest, view.camera.width);
   const auto load = [&](DetailedField& shown) -> Status {
     if (shown.empty()) return {};
     const Modality modality = shown.field.modality();
-    ORBITFUSE_ASSIGN(shown.detail, recorded_detail(context, input.session, modality,
-                                                   detail_width_px(widest), options));
+    ORBITFUSE_ASSIGN(shown.detail,
+                     recorded_detail(context, in.session->session, modality,
+                                     detail_width_px(widest), options, in.where_frames_stand));
     if (shown.detail.empty()) return {};
     context.progress.report({"render", 0, 1, {}, "detail of the recorded frames"});
     ORBITFUSE_ASSIGN(shown.trial, try_on_recorded(context, shown));
@@ -161,14 +162,14 @@ Status write_temperatures(const StageContext& context, const std::vector<Thermal
   return save_temperature_bounds(context.folder, rendered.span.low_k, rendered.span.high_k);
 }
 
-Result<StageOutput> render(const StageContext& context, const SessionInput& input,
-                           const RenderConfig& config) {
+Result<StageOutput> render(const StageContext& context, const StageInputs& in) {
+  const RenderConfig& config = in.config->render;
   ORBITFUSE_ASSIGN(Fields fields, load_fields(context));
   const Modality frame = fields.visible.empty() ? Modality::thermal : Modality::visible;
   ORBITFUSE_ASSIGN(const NewViews chosen, choose_views(context, config, frame));
   StageOutput output;
-  ORBITFUSE_TRY(load_detail(context, input, config.detail, chosen, fields, output));
-  const bool gray = !input.has_temperatures();
+  ORBITFUSE_TRY(load_detail(context, in, chosen, fields, output));
+  const bool gray = !in.session->has_temperatures();
   const Similarity3d thermal_from_visible = fields.visible_from_thermal.inverse();
 
   const UsageClock clock;
@@ -265,9 +266,7 @@ pipeline::Stage render_stage(const StageInputs& in) {
     if (context.has("train_visible") || context.has("train_thermal")) return std::nullopt;
     return "no field was trained";
   };
-  stage.run = [in](const StageContext& context) {
-    return render(context, *in.session, in.config->render);
-  };
+  stage.run = [in](const StageContext& context) { return render(context, in); };
   return stage;
 }
 

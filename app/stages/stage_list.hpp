@@ -6,6 +6,7 @@
 #include "app/pipeline/stage.hpp"
 #include "app/stages/run_config.hpp"
 #include "app/stages/session_input.hpp"
+#include "recon/nerf/photo_detail.hpp"
 
 // One function a stage, one file each; build_stages.cpp puts them in order.
 namespace orbitfuse::stages {
@@ -17,6 +18,8 @@ inline constexpr const char* cloud_file = "cloud.ply";  ///< absent when no poin
 struct StageInputs {
   std::shared_ptr<const SessionInput> session;
   std::shared_ptr<RunConfig> config;
+  /// Made once, for new views and held-out ones.
+  std::shared_ptr<nerf::KeptRenders> where_frames_stand = std::make_shared<nerf::KeptRenders>();
 };
 
 pipeline::Stage poses_stage(const StageInputs& in, Modality modality);

@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <map>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
@@ -14,11 +16,28 @@
 
 namespace orbitfuse::nerf {
 
-/// A recorded view that may lend detail. `image`: as TrainingView::image, of the camera's size; it
-/// is read when a new view first asks for it.
+/// A recorded view that may lend detail. `image`: as TrainingView::image, of the view's camera's
+/// size; it is read when a new view first asks for it.
 struct DetailSource {
   PosedView view;
   std::function<Result<cv::Mat>()> image;
+  /// The frame's own, of which the view's is a smaller one: whatever the view's size, the field is
+  /// rendered by the same camera where it stands.
+  Camera recorded = view.camera;
+};
+
+/// What a field shows where its sources stand, by their names: for several details of one field,
+/// which may differ in the width of what they read. Those that no longer fit in `most_bytes` are
+/// rendered each time.
+struct KeptRenders {
+  struct Kept {
+    Camera camera;
+    Rigid3d cam_from_world;
+    RenderedView seen;
+  };
+  std::size_t most_bytes = std::size_t{1} << 28;
+  std::size_t bytes = 0;
+  std::map<std::string, Kept> by_name = {};
 };
 
 struct DetailOptions {
@@ -56,8 +75,10 @@ class PhotoDetail {
  public:
   /// No sources: add() does nothing. All calls of one object are for one field.
   PhotoDetail() = default;
-  /// Sources and field share one world frame. Errors: usage (options).
-  static Result<PhotoDetail> of(std::vector<DetailSource> sources, const DetailOptions& options);
+  /// Sources and field share one world frame. `kept`: of the same field; asked first, and added to.
+  /// Errors: usage (options).
+  static Result<PhotoDetail> of(std::vector<DetailSource> sources, const DetailOptions& options,
+                                std::shared_ptr<KeptRenders> kept = nullptr);
 
   bool empty() const { return sources_.empty(); }
   /// Of the sources' views, in their order.
@@ -97,12 +118,15 @@ class PhotoDetail {
 
   std::vector<Source*> nearest(const Eigen::Vector3d& from, const Eigen::Vector3d& looked_at,
                                const std::string& except);
-  Camera base_of(const Camera& full) const;
+  Camera base_of(const DetailSource& source) const;
+  Result<RenderedView> render_base(const Field& field, const DetailSource& source,
+                                   const Progress& progress) const;
   Status prepare(const Field& field, const Progress& progress, Source& source) const;
   void forget_old(const std::vector<Source*>& needed);
 
   DetailOptions options_;
   std::vector<Source> sources_;
+  std::shared_ptr<KeptRenders> kept_;
   long asked_ = 0;
 };
 

@@ -27,8 +27,8 @@ namespace orbitfuse::nerf {
 namespace {
 
 constexpr float levels = 32767;  ///< a difference of the whole value range
-/// RenderOptions::alike where sources stand: 0.01 dB worse than without, a fifth faster.
-constexpr double base_alike = 0.01;
+/// Where sources stand: 0.01 dB worse than every pixel all the way, a fifth faster.
+const RenderOptions for_sources = {.alike = 0.01};
 /// Pixels at a picture's edge where a source's say grows to its full, as a share of the width: its
 /// end isn't seen in the new view then.
 constexpr double border = 0.03;
@@ -114,6 +114,10 @@ std::optional<Eigen::Vector3d> looked_at(const Camera& camera, const Rigid3d& wo
   return world_from_cam * (camera.ray_of({0.5 * camera.width, 0.5 * camera.height}) * median(seen));
 }
 
+bool same(const Rigid3d& a, const Rigid3d& b) {
+  return a.rotation.coeffs() == b.rotation.coeffs() && a.translation == b.translation;
+}
+
 Result<cv::Mat> image_of(const DetailSource& source) {
   ORBITFUSE_ASSIGN(cv::Mat image, source.image());
   ORBITFUSE_TRY(check_size(image, source.view.camera, source.view.name));
@@ -132,28 +136,50 @@ Status DetailOptions::validate() const {
   return check("unexplained", unexplained, above_up_to(0, 1));
 }
 
-Result<PhotoDetail> PhotoDetail::of(std::vector<DetailSource> sources,
-                                    const DetailOptions& options) {
+Result<PhotoDetail> PhotoDetail::of(std::vector<DetailSource> sources, const DetailOptions& options,
+                                    std::shared_ptr<KeptRenders> kept) {
   ORBITFUSE_TRY(options.validate());
   PhotoDetail detail;
+  detail.kept_ = std::move(kept);
   detail.options_ = options;
   if (options.sources == 0) return detail;
   for (DetailSource& source : sources) detail.sources_.push_back({std::move(source), {}, {}, {}});
   return detail;
 }
 
-Camera PhotoDetail::base_of(const Camera& full) const {
-  return narrowed_to(full, options_.base_width_px);
+Camera PhotoDetail::base_of(const DetailSource& source) const {
+  return narrowed_to(source.recorded, std::min(options_.base_width_px, source.view.camera.width));
+}
+
+Result<RenderedView> PhotoDetail::render_base(const Field& field, const DetailSource& source,
+                                              const Progress& progress) const {
+  const PosedView& view = source.view;
+  const Camera camera = base_of(source);
+  if (kept_)
+    if (const auto known = kept_->by_name.find(view.name);
+        known != kept_->by_name.end() && known->second.camera == camera &&
+        same(known->second.cam_from_world, view.cam_from_world))
+      return known->second.seen;
+  ORBITFUSE_ASSIGN(RenderedView base,
+                   render(field, camera, view.cam_from_world, for_sources, progress));
+  if (kept_) {
+    const std::size_t bytes =
+        (base.color.total() * base.color.channels() + base.depth.total() + base.opacity.total()) *
+        sizeof(float);
+    if (kept_->bytes + bytes <= kept_->most_bytes &&
+        kept_->by_name.try_emplace(view.name, KeptRenders::Kept{camera, view.cam_from_world, base})
+            .second)
+      kept_->bytes += bytes;
+  }
+  return base;
 }
 
 /// Renders the field where the source stands, and keeps what the source shows beyond that.
 Status PhotoDetail::prepare(const Field& field, const Progress& progress, Source& source) const {
   if (!source.depth.empty()) return {};
   const TraceSpan span("detail of a view");
-  const PosedView& view = source.recorded.view;
   ORBITFUSE_ASSIGN(const cv::Mat image, image_of(source.recorded));
-  ORBITFUSE_ASSIGN(const RenderedView base, render(field, base_of(view.camera), view.cam_from_world,
-                                                   {.alike = base_alike}, progress));
+  ORBITFUSE_ASSIGN(const RenderedView base, render_base(field, source.recorded, progress));
   cv::Mat shown;
   cv::resize(base.color, shown, image.size(), 0, 0, cv::INTER_CUBIC);
   const ValueSpan range = field.state().span;
@@ -361,7 +387,7 @@ Result<DetailTrial> PhotoDetail::try_on(const Field& field, const std::vector<st
     if (std::find(names.begin(), names.end(), view.name) == names.end()) continue;
     ORBITFUSE_ASSIGN(cv::Mat recorded, image_of(source.recorded));
     // Finer than the base: what only the sources show is tried too.
-    const Camera base = base_of(view.camera);
+    const Camera base = base_of(source.recorded);
     const Camera camera = view.camera.width > 2 * base.width
                               ? base.scaled_to(2 * base.width, 2 * base.height)
                               : view.camera;

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <opencv2/imgproc.hpp>
 
 #include "core/system/parallel.hpp"
@@ -127,6 +128,47 @@ TEST_P(Detail, IsTheSamePreparedSourceBySource) {
   PhotoDetail nothing;
   EXPECT_FALSE(
       nothing.prepare_one(field, view.camera, view.cam_from_world, plain.depth, {}).value());
+}
+
+/// Read half as wide by a second detail, sources stand where they stood: their renders are asked
+/// for, and nothing comes out otherwise. Those of other cameras, or poses, are not.
+TEST_P(Detail, OfOneFieldTakesRendersThatAnotherMade) {
+  const TrainingView& view = data.views[3];
+  const RenderedView plain = rendered(field, view);
+  const auto half_as_wide = [&] {
+    std::vector<DetailSource> sources = sources_of(data);
+    for (DetailSource& source : sources) {
+      source.recorded = source.view.camera;
+      source.view.camera = source.view.camera.scaled_to(pixels / 2, pixels / 2);
+      source.image = [read = source.image]() -> Result<cv::Mat> {
+        cv::Mat small;
+        cv::resize(*read(), small, {pixels / 2, pixels / 2}, 0, 0, cv::INTER_AREA);
+        return small;
+      };
+    }
+    return sources;
+  };
+  const auto shown = [&](std::vector<DetailSource> sources, std::shared_ptr<KeptRenders> kept) {
+    auto detail = PhotoDetail::of(std::move(sources), small(), std::move(kept));
+    RenderedView seen = {plain.color.clone(), plain.depth, plain.opacity};
+    EXPECT_TRUE(detail->add(field, view.camera, view.cam_from_world, seen, {}, view.name));
+    return seen.color;
+  };
+  const auto kept = std::make_shared<KeptRenders>();
+  shown(sources_of(data), kept);
+  EXPECT_EQ(kept->by_name.size(), static_cast<std::size_t>(small().sources));
+  EXPECT_GT(kept->bytes, std::size_t{0});
+  const cv::Mat alone = shown(half_as_wide(), nullptr), shared = shown(half_as_wide(), kept);
+  EXPECT_EQ(cv::norm(alone, shared, cv::NORM_INF), 0);
+  // A marked render comes back: it was asked for.
+  for (auto& [name, render] : kept->by_name) render.seen.color += 1;
+  EXPECT_GT(cv::norm(alone, shown(half_as_wide(), kept), cv::NORM_INF), 0);
+  for (auto& [name, render] : kept->by_name) render.cam_from_world.translation.x() += 1e-3;
+  EXPECT_EQ(cv::norm(alone, shown(half_as_wide(), kept), cv::NORM_INF), 0);
+
+  const auto narrow = std::make_shared<KeptRenders>(KeptRenders{.most_bytes = 1});
+  EXPECT_EQ(cv::norm(alone, shown(half_as_wide(), narrow), cv::NORM_INF), 0);
+  EXPECT_TRUE(narrow->by_name.empty());
 }
 
 TEST_P(Detail, IsTheSameForAnyThreadCount) {
