@@ -131,10 +131,15 @@ Status load_scale(ComparedRuns& runs) {
   ORBITFUSE_ASSIGN(auto before, stages::scale_of_run(runs.before.out));
   if (!before) return {};
   before->metres_per_unit *= runs.registration.before_from_after.scale;
-  // How well surfaces hold the ratio of two units (docs/benchmarks/registration.md, with noise and
-  // gaps): BEFORE's scale is no surer than that in AFTER's world.
-  constexpr double registration_sigma = 0.003;
-  before->relative_uncertainty = std::hypot(before->relative_uncertainty, registration_sigma);
+  // In AFTER's world BEFORE's scale is no surer than the ratio of both units.
+  before->relative_uncertainty =
+      std::hypot(before->relative_uncertainty, runs.registration.scale_sigma);
+  if (!(before->relative_uncertainty < 1)) {
+    if (!runs.scale)
+      runs.scale_doubt =
+          "BEFORE has one, but the surfaces don't hold how large its unit is in AFTER's world";
+    return {};
+  }
   if (!runs.scale) {
     runs.scale = before;
     return {};
@@ -180,6 +185,8 @@ Status compare_surfaces(const CompareRequest& request, const Progress& progress,
   ORBITFUSE_ASSIGN(const auto gone,
                    comparison::surface_change(before, after, before_from_after.inverse(),
                                               request.options, progress));
+  const auto came = comparison::changed_regions(*after.mesh, runs.change, request.options);
+  comparison::add_feet(*after.mesh, came, request.options, runs.change);
   runs.came = comparison::changed_regions(*after.mesh, runs.change, request.options);
   runs.gone = comparison::changed_regions(*before.mesh, gone, request.options);
   for (comparison::DifferenceRegion& region : runs.gone) {

@@ -141,6 +141,7 @@ json to_json(const ComparedRuns& runs) {
       {"residual", residual(runs) * metres_per_unit(runs)},
       {"residual_share_of_extent", residual(runs) / extent(runs)},
       {"overlap", runs.registration.overlap},
+      {"scale_sigma", runs.registration.scale_sigma},  // a share; null: not known
       {"photo_support", runs.support},
       {"ambiguous", runs.registration.clouds.ambiguous},
       {"clouds", runs.registration.clouds.brief()}};

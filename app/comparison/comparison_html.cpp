@@ -32,8 +32,10 @@ std::string facts(const ComparedRuns& runs) {
   html += row("Before", session_words(runs.before)) + row("After", session_words(runs.after));
   html += row("Registration",
               fmt::format("unchanged surfaces lie {} apart; {:.0f} % of them within 1 % of the "
-                          "extent; photos explained to {:.2f}{}",
-                          residual_words(runs), 100 * runs.registration.overlap, runs.support,
+                          "extent; the size of one in the other is held to ± {:.2f} % (one sigma); "
+                          "photos explained to {:.2f}{}",
+                          residual_words(runs), 100 * runs.registration.overlap,
+                          100 * runs.registration.scale_sigma, runs.support,
                           runs.registration.clouds.ambiguous
                               ? "; geometry alone leaves several placements: see that the pictures "
                                 "before and after match"

@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "app/comparison/compare_runs.hpp"
+#include "bench/exit_status.hpp"
 #include "bench/export/true_scene.hpp"
 #include "core/numeric/median.hpp"
 
@@ -99,6 +100,10 @@ Status run(const Options& o) {
       1000 * median(off), 1000 * runs.registration.residual * truth_from_before.scale,
       runs.registration.overlap, runs.support,
       runs.registration.clouds.ambiguous ? ", ambiguous" : "");
+  const double true_ratio = truth_from_after.scale / truth_from_before.scale;
+  fmt::print("registration: scale {:+.3f} % off, stated +- {:.3f} % (one sigma)\n",
+             100 * (runs.registration.before_from_after.scale / true_ratio - 1),
+             100 * runs.registration.scale_sigma);
   score(o, runs, truth_from_after);
   return {};
 }
@@ -118,8 +123,5 @@ int main(int argc, char** argv) {
   app.add_option("--by", o.by_k, "Kelvin")->capture_default_str();
   app.add_flag("--ambient", o.ambient, "Take out what the days differ by");
   CLI11_PARSE(app, argc, argv);
-  const orbitfuse::Status status = orbitfuse::run(o);
-  if (status) return 0;
-  std::fprintf(stderr, "error: %s\n", status.error().message().c_str());
-  return 1;
+  return orbitfuse::exit_status(orbitfuse::run(o));
 }

@@ -6,6 +6,7 @@
 #include <map>
 #include <numeric>
 
+#include "recon/comparison/surface_points.hpp"
 #include "recon/measurement/estimate.hpp"
 
 namespace orbitfuse::comparison {
@@ -101,6 +102,24 @@ std::vector<DifferenceRegion> changed_regions(const TriangleMesh& surface,
   std::sort(regions.begin(), regions.end(),
             [](const auto& a, const auto& b) { return a.area > b.area; });
   return regions;
+}
+
+void add_feet(const TriangleMesh& surface, const std::vector<DifferenceRegion>& changed,
+              const ComparisonOptions& options, std::vector<SurfaceChange>& change) {
+  std::vector<Eigen::Vector3d> came;
+  for (const DifferenceRegion& region : changed)
+    for (const std::size_t i : region.vertices) came.push_back(surface.vertices.positions[i]);
+  if (came.empty()) return;
+  const KdTree tree(came);
+  const double reach = options.foot_reach * diagonal(surface_points(surface));
+  for (std::size_t i = 0; i < std::min(change.size(), surface.vertices.size()); ++i) {
+    const Eigen::Vector3d& p = surface.vertices.positions[i];
+    std::size_t nearest = 0;
+    double d2 = 0;
+    if (change[i] == SurfaceChange::same && p.allFinite() &&
+        tree.nearest(p, 1, &nearest, &d2) == 1 && d2 <= reach * reach)
+      change[i] = SurfaceChange::changed;
+  }
 }
 
 }  // namespace orbitfuse::comparison

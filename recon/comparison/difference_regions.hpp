@@ -28,4 +28,9 @@ std::vector<DifferenceRegion> changed_regions(const TriangleMesh& surface,
                                               const std::vector<SurfaceChange>& change,
                                               const ComparisonOptions& options);
 
+/// So near to where a part came, the foot of it can't be told from the surface that it stands on:
+/// what is the same within `options.foot_reach` of a region counts as changed.
+void add_feet(const TriangleMesh& surface, const std::vector<DifferenceRegion>& changed,
+              const ComparisonOptions& options, std::vector<SurfaceChange>& change);
+
 }  // namespace orbitfuse::comparison

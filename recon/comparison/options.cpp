@@ -12,6 +12,7 @@ Status ComparisonOptions::validate() const {
   ORBITFUSE_TRY(check("least_support", least_support, from_to(0, 1)));
   ORBITFUSE_TRY(check("change_sigmas", change_sigmas, above_up_to(0, 100)));
   ORBITFUSE_TRY(check("least_change", least_change, above_up_to(0, 1)));
+  ORBITFUSE_TRY(check("foot_reach", foot_reach, from_to(0, 0.1)));
   ORBITFUSE_TRY(check("least_views", least_views, from_to(1, 1000)));
   ORBITFUSE_TRY(check("max_angle_deg", max_angle_deg, between(0, 90)));
   ORBITFUSE_TRY(check("least_difference_k", least_difference_k, above_up_to(0, 1000)));

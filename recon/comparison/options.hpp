@@ -17,7 +17,10 @@ struct ComparisonOptions {
   double least_support = 0.2;
   /// A surface has moved that lies farther from the other than this many times both depths' noise,
   double change_sigmas = 3;
-  double least_change = 0.006;    ///< and at least this far: a mesh is no finer.
+  double least_change = 0.006;  ///< and at least this far: a mesh is no finer.
+  /// What lies so near to a region that came is part of it: its foot is nearer to what it stands on
+  /// than least_change, and its rim shares pixels with it.
+  double foot_reach = 0.009;
   int least_views = 2;            ///< that must see through a place where the surface is gone
   double max_angle_deg = 75;      ///< of a view to the surface: a flatter one says little of depth
   double least_difference_k = 1;  ///< smaller ones are no finding

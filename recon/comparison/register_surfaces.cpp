@@ -6,7 +6,10 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <optional>
 
 #include "core/geometry/kd_tree.hpp"
@@ -72,21 +75,31 @@ double sigma_of(const std::vector<Pair>& pairs) {
   return sigma_of_median * median_in(off);
 }
 
+Eigen::Vector3d middle_of(const std::vector<Pair>& pairs) {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Pair& p : pairs) middle += p.moved;
+  return middle / static_cast<double>(pairs.size());
+}
+
+/// How a pair's distance changes with turn, scale and shift about the middle, in `unit`.
+Vector7 slope(const Pair& p, const Eigen::Vector3d& middle, double unit) {
+  const Eigen::Vector3d lever = (p.moved - middle) / unit;
+  Vector7 j;
+  j << lever.cross(p.normal), lever.dot(p.normal), p.normal;
+  return j;
+}
+
 /// One Gauss-Newton step over turn, scale and shift about the pairs' middle; none where they leave
 /// a direction open.
 std::optional<Similarity3d> step(const std::vector<Pair>& pairs, double bound, double unit) {
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const Pair& p : pairs) middle += p.moved;
-  middle /= static_cast<double>(pairs.size());
+  const Eigen::Vector3d middle = middle_of(pairs);
   Matrix7 normal_matrix = Matrix7::Zero();
   Vector7 right = Vector7::Zero();
   for (const Pair& p : pairs) {
     const double off = p.off() / unit, share = p.off() / bound;
     if (!(std::abs(share) < 1)) continue;
     const double weight = std::pow(1 - share * share, 2);
-    const Eigen::Vector3d lever = (p.moved - middle) / unit;
-    Vector7 j;
-    j << lever.cross(p.normal), lever.dot(p.normal), p.normal;
+    const Vector7 j = slope(p, middle, unit);
     normal_matrix += weight * j * j.transpose();
     right -= weight * off * j;
   }
@@ -99,6 +112,42 @@ std::optional<Similarity3d> step(const std::vector<Pair>& pairs, double bound, d
   update.scale = std::exp(x[3]);
   update.translation = middle + unit * x.tail<3>() - update.scale * (update.rotation * middle);
   return update;
+}
+
+/// One standard deviation of the scale at the end of the steps: the sandwich estimate over blocks
+/// of space of that side. A field's depth is off alike over a whole wall, so that a block says one
+/// thing, however many vertices it has.
+double scale_sigma(const std::vector<Pair>& pairs, double bound, double unit, double block) {
+  const Eigen::Vector3d middle = middle_of(pairs);
+  Matrix7 curvature = Matrix7::Zero();
+  std::map<std::array<long, 3>, Vector7> pulls;
+  for (const Pair& p : pairs) {
+    const double share = p.off() / bound, rest = 1 - share * share;
+    if (!(rest > 0)) continue;
+    const Vector7 j = slope(p, middle, unit);
+    curvature += rest * (1 - 5 * share * share) * j * j.transpose();  // Tukey's second derivative
+    const Eigen::Vector3d at = (p.moved - middle) / block;
+    const std::array cell{std::lround(at.x()), std::lround(at.y()), std::lround(at.z())};
+    pulls.try_emplace(cell, Vector7::Zero()).first->second += rest * rest * p.off() / unit * j;
+  }
+  const auto blocks = static_cast<double>(pulls.size());
+  Matrix7 spread = Matrix7::Zero();
+  for (const auto& [cell, pull] : pulls) spread += pull * pull.transpose();
+  const Eigen::LDLT<Matrix7> solver(curvature);
+  const Vector7 of_scale = solver.solve(Vector7::Unit(3));
+  // The fit takes up as many of the blocks' contradictions as it has unknowns.
+  const double freedom = std::max(1.0, blocks - 7);
+  const double variance = blocks / freedom * of_scale.dot(spread * of_scale);
+  return solver.isPositive() && std::isfinite(variance) ? std::sqrt(variance)
+                                                        : std::numeric_limits<double>::infinity();
+}
+
+/// How far errors are shared is not known: the largest over blocks of several sizes.
+double scale_sigma(const std::vector<Pair>& pairs, double bound, double unit) {
+  double sigma = 0;
+  for (const double block : {0.05, 0.1, 0.2, 0.3})
+    sigma = std::max(sigma, scale_sigma(pairs, bound, unit, block * unit));
+  return sigma;
 }
 
 /// The way most of a surface faces: up, where it holds the ground.
@@ -169,6 +218,8 @@ Result<SurfaceRegistration> refine_surfaces(const TriangleMesh& after_mesh,
       return fail(ErrorKind::input, "the registration",
                   "surfaces on which one can slide along the other", remedy);
     result.before_from_after = *update * result.before_from_after;
+    if (round == rounds - 1)
+      result.scale_sigma = scale_sigma(pairs, std::max(tukey * result.residual, 1e-6 * unit), unit);
   }
   const Similarity3d& moved = result.before_from_after;
   const double reach = options.overlap_distance * unit;

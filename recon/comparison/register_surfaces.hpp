@@ -16,6 +16,10 @@ struct SurfaceRegistration {
   /// Share of each surface's vertices within overlap_distance of the other that face the same way,
   /// the lesser of both; without those that face as most do, the ground's.
   double overlap = 0;
+  /// One standard deviation of before_from_after.scale, as a share of it: from what the places that
+  /// hold still contradict each other by. Errors that whole walls share count once, not once a
+  /// vertex.
+  double scale_sigma = 0;
   RegistrationReport clouds;  ///< the search before the refinement
 };
 

@@ -82,5 +82,38 @@ TEST(ChangedRegions, LargestFirst) {
   EXPECT_TRUE(changed_regions(mesh, {}, {}).empty());
 }
 
+TEST(ChangedRegions, TheFootOfWhatCameBelongsToIt) {
+  const TriangleMesh mesh = test::yard({test::house, test::crate}, 0.02);
+  // The crate came: its lowest 4 cm are as near to the ground as what is the same may be.
+  const auto of_crate = [](const Eigen::Vector3d& p) {
+    return p.x() > test::crate.x - 0.001 && p.x() < test::crate.x + test::crate.width + 0.001 &&
+           p.y() > test::crate.y - 0.001 && p.y() < test::crate.y + test::crate.depth + 0.001;
+  };
+  std::vector<SurfaceChange> change(mesh.vertices.size(), SurfaceChange::same);
+  for (std::size_t i = 0; i < change.size(); ++i)
+    if (of_crate(mesh.vertices.positions[i]) && mesh.vertices.positions[i].z() > 0.045)
+      change[i] = SurfaceChange::changed;
+  ComparisonOptions options;
+  options.least_region_area = 1e-3;
+  change[0] = SurfaceChange::changed;  // a single vertex has no foot
+  const auto came = changed_regions(mesh, change, options);
+  ASSERT_EQ(came.size(), 5U);  // faces share no vertices
+  add_feet(mesh, came, options, change);
+  int foot = 0, elsewhere = 0;
+  for (std::size_t i = 1; i < change.size(); ++i) {
+    const Eigen::Vector3d& p = mesh.vertices.positions[i];
+    if (of_crate(p) && p.z() > 0.001) {
+      ++foot;
+      EXPECT_EQ(change[i], SurfaceChange::changed) << p.transpose();
+    } else if (!of_crate(p)) {
+      elsewhere += change[i] == SurfaceChange::changed &&
+                   (p.head<2>() - Eigen::Vector2d(-0.8, 1.4)).cwiseAbs().maxCoeff() > 0.26;
+    }
+  }
+  EXPECT_GT(foot, 100);
+  EXPECT_EQ(elsewhere, 0);
+  add_feet(mesh, {}, options, change);  // nothing came: nothing to do
+}
+
 }  // namespace
 }  // namespace orbitfuse::comparison

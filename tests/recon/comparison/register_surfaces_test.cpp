@@ -4,7 +4,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <limits>
+#include <map>
+#include <random>
 
 #include "tests/recon/comparison/yard.hpp"
 
@@ -62,6 +66,50 @@ TEST(RegisterSurfaces, GroundThatTwoObjectsShareMakesThemNotOne) {
   const auto found = refine_surfaces(test::yard({wider, elsewhere}), one, {}, {});
   ASSERT_TRUE(found) << found.error().message();
   EXPECT_LT(found->overlap, ComparisonOptions{}.least_overlap);
+}
+
+/// The yard with each of its faces' depth off: by what it shares with its neighbourhood, as a
+/// field's depth is, and by what it does not.
+TriangleMesh measured(const TriangleMesh& surface, double shared, double own,
+                      std::mt19937& random) {
+  std::normal_distribution<double> normal(0, 1);
+  std::map<std::array<long, 4>, double> of_block;
+  TriangleMesh mesh = surface;
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    Eigen::Vector3d& p = mesh.vertices.positions[i];
+    const Eigen::Vector3d n = mesh.vertices.normals[i].cast<double>();
+    const long way = std::lround(n.x() + 3 * n.y() + 9 * n.z());
+    const auto [block, is_new] = of_block.try_emplace(
+        {way, std::lround(p.x() / 0.5), std::lround(p.y() / 0.5), std::lround(p.z() / 0.5)}, 0.0);
+    if (is_new) block->second = shared * normal(random);
+    p += (block->second + own * normal(random)) * n;
+  }
+  return mesh;
+}
+
+TEST(RegisterSurfaces, TheScalesSigmaHoldsForNoiseThatNeighboursShareOrNot) {
+  const TriangleMesh surface = test::yard({house, shed, crate}, 0.06);
+  double stated_alone = 0;
+  for (const double shared : {0.0, 0.006}) {
+    std::mt19937 random(3);
+    double squares = 0, stated = 0;
+    constexpr int draws = 40;
+    for (int i = 0; i < draws; ++i) {
+      const auto found = refine_surfaces(measured(surface, shared, 0.006, random),
+                                         measured(surface, shared, 0.006, random), {}, {});
+      ASSERT_TRUE(found) << found.error().message();
+      squares += std::pow(std::log(found->before_from_after.scale), 2) / draws;
+      stated += found->scale_sigma / draws;
+    }
+    RecordProperty("off", std::to_string(std::sqrt(squares)));
+    // 40 draws tell a standard deviation to 11 %.
+    EXPECT_GT(stated, 0.6 * std::sqrt(squares)) << shared;
+    EXPECT_LT(stated, 1.7 * std::sqrt(squares)) << shared;
+    if (shared == 0)
+      stated_alone = stated;
+    else
+      EXPECT_GT(stated, 2 * stated_alone);
+  }
 }
 
 TEST(RegisterSurfaces, FlatGroundAloneCanSlide) {
