@@ -12,6 +12,7 @@
 #include "core/geometry/lens_fold.hpp"
 #include "core/geometry/scene_ball.hpp"
 #include "core/numeric/median.hpp"
+#include "recon/assembly/field_surface.hpp"
 
 namespace orbitfuse::exporting {
 namespace {
@@ -54,10 +55,12 @@ Result<std::optional<SeenDepth>> depth_at(const view::FinishedRun& run, const Po
   small.cx = side / 2.0 - small.fx * normalized.x();
   small.cy = side / 2.0 - small.fy * normalized.y();
   const bool visible = run.has(Modality::visible);
+  nerf::RenderOptions how;
+  how.surface_light = FieldSurfaceOptions().surface_light;  // on the surface that is exported
   const Similarity3d field_from_frame = visible ? Similarity3d() : run.frame_from_thermal.inverse();
   ORBITFUSE_ASSIGN(const nerf::RenderedView seen,
                    nerf::render(visible ? run.visible : run.thermal, small,
-                                rebase(view.cam_from_world, field_from_frame), {}, progress));
+                                rebase(view.cam_from_world, field_from_frame), how, progress));
   std::vector<double> depths;
   for (int y = half - 1; y <= half + 1; ++y)
     for (int x = half - 1; x <= half + 1; ++x)
@@ -73,7 +76,7 @@ Result<std::optional<SeenDepth>> depth_at(const view::FinishedRun& run, const Po
   return found;
 }
 
-/// What other recorded views' depths say of a point of the surface, from near the same side: where
+/// What other recorded views' depths say of a point of the surface, nearest views first: where
 /// a field puts glass, gloss or plain paint at another depth from each side, one view alone does
 /// not tell.
 struct OtherViews {
@@ -83,8 +86,8 @@ struct OtherViews {
 };
 Result<OtherViews> other_views(const view::FinishedRun& run, const view::RecordedView& self,
                                const Eigen::Vector3d& point, const Progress& progress) {
-  constexpr double most_turn_deg = 50, hidden_share = 0.1;
-  constexpr std::size_t enough = 6;
+  constexpr double most_turn_deg = 80, hidden_share = 0.1;
+  constexpr std::size_t enough = 12;
   const Eigen::Vector3d from = (camera_center(self.view.cam_from_world) - point).normalized();
   std::vector<std::pair<double, const view::RecordedView*>> others;
   for (const view::RecordedView& v : run.views) {

@@ -108,7 +108,7 @@ Result<FieldSurface> surface_of_run(const view::FinishedRun& run, const SurfaceR
 std::string surface_key(const view::FinishedRun& run, const SurfaceRequest& request) {
   if (run.identity.empty()) return {};
   /// One more whenever surfaces of the same fields come out differently.
-  constexpr int version = 1;
+  constexpr int version = 2;
   const SurfaceOptions& how = request.surface.surface;
   std::vector<double> box;
   if (request.crop == Crop::box)

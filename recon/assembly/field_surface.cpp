@@ -21,8 +21,10 @@ struct RenderedOrbit {
 /// A field as its own cameras see it, in the world.
 Result<RenderedOrbit> rendered(const nerf::Field& field, const std::vector<PosedView>& views,
                                const Similarity3d& world_from_field, int width_px,
-                               double min_opacity, const Progress& progress) {
+                               const FieldSurfaceOptions& options, const Progress& progress) {
   RenderedOrbit result;
+  nerf::RenderOptions how;
+  how.surface_light = options.surface_light;
   for (const PosedView& posed : views) {
     ORBITFUSE_TRY(progress.check("export"));
     progress.report({"export",
@@ -35,9 +37,10 @@ Result<RenderedOrbit> rendered(const nerf::Field& field, const std::vector<Posed
     ORBITFUSE_ASSIGN(
         nerf::RenderedView seen,
         nerf::render(field, view.camera, rebase(view.cam_from_world, world_from_field.inverse()),
-                     {}, progress));
-    seen.color.setTo(cv::Scalar::all(std::numeric_limits<double>::quiet_NaN()),
-                     seen.opacity < min_opacity);
+                     how, progress));
+    const cv::Scalar nothing = cv::Scalar::all(std::numeric_limits<double>::quiet_NaN());
+    seen.color.setTo(nothing, seen.opacity < options.min_opacity);
+    seen.depth.setTo(nothing, seen.opacity < options.min_opacity);
     result.depths.push_back({view, seen.depth * world_from_field.scale});
     result.pictures.push_back({std::move(view), seen.color});
   }
@@ -102,6 +105,7 @@ Status FieldSurfaceOptions::validate() const {
   ORBITFUSE_TRY(check("visible_width_px", visible_width_px, from_to(16, 8192)));
   ORBITFUSE_TRY(check("thermal_width_px", thermal_width_px, from_to(16, 8192)));
   ORBITFUSE_TRY(check("min_opacity", min_opacity, from_to(0.0, 1.0)));
+  ORBITFUSE_TRY(check("surface_light", surface_light, from_to(0.5, 0.95)));
   return surface.validate();
 }
 
@@ -124,12 +128,12 @@ Result<FieldSurface> field_surface(const SurfaceFields& fields, const Eigen::Ali
   RenderedOrbit visible, thermal;
   if (has_visible) {
     ORBITFUSE_ASSIGN(visible, rendered(*fields.visible, fields.visible_views, {},
-                                       options.visible_width_px, options.min_opacity, progress));
+                                       options.visible_width_px, options, progress));
   }
   if (has_thermal) {
     ORBITFUSE_ASSIGN(thermal,
                      rendered(*fields.thermal, fields.thermal_views, fields.world_from_thermal,
-                              options.thermal_width_px, options.min_opacity, progress));
+                              options.thermal_width_px, options, progress));
   }
   ORBITFUSE_ASSIGN(TriangleMesh fused, fuse_depth((has_visible ? visible : thermal).depths, box,
                                                   options.surface, progress));

@@ -30,6 +30,9 @@ struct FieldSurfaceOptions {
   /// Of the pictures and depth maps that fields render: about a voxel a pixel.
   int visible_width_px = 400, thermal_width_px = 320;
   double min_opacity = 0.5;  ///< below it a ray met too little for its value to be a surface's
+  /// nerf::RenderOptions::surface_light of the depth: chosen on two scenes, held out on a third
+  /// (docs/notes/export.md).
+  double surface_light = 0.7;
   bool depth_noise = false;  ///< FieldSurface::depth_noise is wanted
   Status validate() const;
 };

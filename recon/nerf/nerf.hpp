@@ -83,10 +83,14 @@ struct RenderOptions {
   /// With `alike`: a ray among four that met something looks where they did, and all the way only
   /// where that doesn't do. What is thinner than two pixels before a near surface can be missed.
   bool between_neighbours = false;
+  /// RenderedView::depth is where so much of a ray's light is left. A smooth surface of little
+  /// detail is learned as a ramp of density that begins before it: its middle lies behind.
+  double surface_light = 0.5;
   Status validate() const;
 };
 
-/// A rendered camera. Where opacity is below one half, depth is NaN (sky, background); DepthMap,
+/// A rendered camera. Where more than RenderOptions::surface_light (one half) of the light is left,
+/// depth is NaN (sky, background); DepthMap,
 /// which training takes, has infinite depth for known sky and NaN for what is not known.
 struct RenderedView {
   cv::Mat color;    ///< CV_32FC3 R, G, B in 0..1, or CV_32FC1 kelvin

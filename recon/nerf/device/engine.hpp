@@ -104,7 +104,7 @@ struct TraceRequest {
 
 struct TraceSettings {
   MarchSettings march;
-  float stop, min_weight;
+  float stop, min_weight, surface_light;
 };
 
 /// A finished field. Throws Refused.

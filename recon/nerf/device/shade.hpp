@@ -111,7 +111,7 @@ struct ShownRays {
 /// As ImageRenderer writes a ray.
 struct ReadRays {
   ShownRays shown;
-  float stop, no_distance;
+  float stop, surface_light, no_distance;
   TracedRay* out;
 
   ORBITFUSE_HOST_DEVICE void operator()(int r) const {
@@ -122,7 +122,7 @@ struct ReadRays {
     shown.value(r, ray.value);
     const int begin = shown.samples.first[r];
     read_light(shown.light.used[r], shown.samples.t + begin, shown.samples.dt + begin,
-               shown.light.left + begin, stop, ray);
+               shown.light.left + begin, stop, surface_light, ray);
   }
 };
 

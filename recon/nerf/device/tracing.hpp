@@ -30,7 +30,7 @@ class FieldTracer final : public device::Tracer {
       pass_.rays.upload(rays_);
       pass_.run(field_, n, settings.march, settings.stop, settings.min_weight);
       traced_.need(static_cast<std::size_t>(n));
-      launch(n, ReadRays{pass_.shown(field_), settings.stop,
+      launch(n, ReadRays{pass_.shown(field_), settings.stop, settings.surface_light,
                          std::numeric_limits<float>::quiet_NaN(), traced_.data()});
       copy_from(out + begin, traced_.data(), static_cast<std::size_t>(n) * sizeof(TracedRay));
     }

@@ -8,7 +8,8 @@ namespace orbitfuse::nerf {
 /// What a ray showed. Distances along it, in normalised units.
 struct TracedRay {
   float value[3];    ///< in units of the span
-  float distance;    ///< median: where half of the light is gone; NaN: it isn't
+  float distance;    ///< where as much light is left as makes a surface (half: the median); NaN:
+                     ///< more is left all the way
   float opacity;     ///< 0..1
   float begin, end;  ///< where light fades: the sample before it does, and behind what stops the
                      ///< ray; `end` is the largest float where nothing does
@@ -21,10 +22,12 @@ inline constexpr float no_end =
     3.402823466e38f;  ///< of a ray that nothing stops: the largest float
 
 /// What light's way along a ray says: `count` samples at t, each dt long, `left` of the light
-/// behind them. Value, forward and there are the caller's.
+/// behind them. The surface lies where `surface_light` is left. Value, forward and there are the
+/// caller's.
 ORBITFUSE_HOST_DEVICE inline void read_light(int count, const float* t, const float* dt,
-                                             const float* left, float stop, TracedRay& out) {
-  constexpr float all_but_nothing = 0.98f, half = 0.5f, least_light = 0.8f;
+                                             const float* left, float stop, float surface_light,
+                                             TracedRay& out) {
+  constexpr float all_but_nothing = 0.98f, least_light = 0.8f;
   out.opacity = 0;
   out.begin = 0;
   out.end = no_end;
@@ -36,12 +39,12 @@ ORBITFUSE_HOST_DEVICE inline void read_light(int count, const float* t, const fl
     const float start = t[fading] - dt[fading];
     out.begin = fading > 0 ? t[fading - 1] : start > 0 ? start : 0.0f;
   }
-  // Median depth stays on a surface where a mean would float between two.
-  while (dark < count && !(left[dark] < half)) ++dark;
+  // A quantile stays on a surface where a mean would float between two.
+  while (dark < count && !(left[dark] < surface_light)) ++dark;
   if (dark < count) {
     const float before = dark > 0 ? left[dark - 1] : 1.0f, lost = before - left[dark];
-    const float part = (before - half) / (lost > 1e-6f ? lost : 1e-6f);
-    out.distance = t[dark] + (part - half) * dt[dark];
+    const float part = (before - surface_light) / (lost > 1e-6f ? lost : 1e-6f);
+    out.distance = t[dark] + (part - 0.5f) * dt[dark];
   }
   out.opacity = 1 - left[count - 1];
   out.starts_dark = left[0] < least_light;

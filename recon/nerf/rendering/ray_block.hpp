@@ -46,6 +46,7 @@ struct ForwardSettings {
   float stop = training_stop;              ///< transmittance below which a ray is finished
   float min_weight = training_min_weight;  ///< samples that contribute less get no colour
   bool gradients = true;                   ///< keep what backward() reads
+  float surface_light = 0.5f;              ///< TracedRay::distance: where so much light is left
 };
 
 /// Density, weights and colours of a block. Rays are followed front to back; samples behind what

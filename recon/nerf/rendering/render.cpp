@@ -27,6 +27,7 @@ Status RenderOptions::validate() const {
   const OptionCheck check("render");
   ORBITFUSE_TRY(check("stop_transmittance", stop_transmittance, between(0, 0.5)));
   ORBITFUSE_TRY(check("alike", alike, from_to(0, 0.5)));
+  ORBITFUSE_TRY(check("surface_light", surface_light, from_to(0.5, 0.95)));
   if (alike_px != 2 && alike_px != limit_stride)
     return fail(ErrorKind::usage, "render.alike_px", std::to_string(alike_px), "must be 2 or 4");
   return check("sample_factor", sample_factor, from_to(0.1, 16));
@@ -73,7 +74,8 @@ class ImageRenderer {
         rays_(rays),
         stride_(stride),
         march_(field.march_settings()),
-        limits_{static_cast<float>(options.stop_transmittance), 1e-4f, false} {
+        limits_{static_cast<float>(options.stop_transmittance), 1e-4f, false,
+                static_cast<float>(options.surface_light)} {
     const Camera& camera = rays.camera();
     width_ = (camera.width + stride - 1) / stride;
     height_ = (camera.height + stride - 1) / stride;

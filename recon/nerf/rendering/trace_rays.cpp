@@ -14,15 +14,16 @@ namespace {
 constexpr int rays_per_block = 64;
 
 /// Ray r of a block, whose rows begin at `row`.
-TracedRay read_ray(const FieldState& field, const RayBlock& block, std::size_t r, float stop,
-                   int& row) {
+TracedRay read_ray(const FieldState& field, const RayBlock& block, std::size_t r,
+                   const ForwardSettings& limits, int& row) {
   TracedRay out{};
   out.distance = std::numeric_limits<float>::quiet_NaN();
   out.forward = block.rays[r].forward;
   out.there = true;
   ray_value(field, block, static_cast<int>(r), row, out.value);
   const auto begin = static_cast<std::size_t>(block.first[r]);
-  read_light(block.used[r], &block.t[begin], &block.dt[begin], &block.light[begin], stop, out);
+  read_light(block.used[r], &block.t[begin], &block.dt[begin], &block.light[begin], limits.stop,
+             limits.surface_light, out);
   return out;
 }
 
@@ -53,7 +54,7 @@ void trace_on_processor(const FieldState& field, const ForwardSettings& limits,
     forward(field, kernels, limits, block);
     int row = 0;
     for (std::size_t r = 0; r < index.size(); ++r)
-      out[index[r]] = read_ray(field, block, r, limits.stop, row);
+      out[index[r]] = read_ray(field, block, r, limits, row);
   });
 }
 
@@ -67,11 +68,12 @@ void trace_on_device(device::Engine& engine, const FieldState& field, const Forw
       rays[static_cast<std::size_t>(i)] = {ray.ray, ray.near, ray.far, there};
     }
   });
-  field.device_copy.with(
-      [&] { return engine.tracer(device::shown_numbers(field)); },
-      [&](device::Tracer& tracer) {
-        tracer.trace(rays.data(), count, {march, limits.stop, limits.min_weight}, out);
-      });
+  field.device_copy.with([&] { return engine.tracer(device::shown_numbers(field)); },
+                         [&](device::Tracer& tracer) {
+                           tracer.trace(
+                               rays.data(), count,
+                               {march, limits.stop, limits.min_weight, limits.surface_light}, out);
+                         });
 }
 
 }  // namespace

@@ -103,6 +103,15 @@ TEST_P(QuickPictures, EveryFourthPixelIsEnoughForAPlainThing) {
   EXPECT_LE(own(quick), own(every_second));
 }
 
+TEST_P(QuickPictures, WhereMoreLightIsLeftTheSurfaceIsNearer) {
+  const RenderedView middle = shown({}), before = shown({.surface_light = 0.8});
+  EXPECT_EQ(cv::norm(before.color, middle.color, cv::NORM_INF), 0) << "it is the depth's alone";
+  const cv::Mat known = middle.depth == middle.depth;
+  ASSERT_GT(cv::countNonZero(known), pixels);
+  EXPECT_EQ(cv::countNonZero(known & ~(before.depth <= middle.depth)), 0);
+  EXPECT_GT(cv::countNonZero(known & (before.depth < middle.depth)), cv::countNonZero(known) / 2);
+}
+
 INSTANTIATE_TEST_SUITE_P(Modalities, QuickPictures,
                          testing::Values(Modality::visible, Modality::thermal),
                          [](const auto& of) { return std::string(name(of.param)); });
@@ -114,6 +123,16 @@ TEST(RenderOptionsCheck, GridsOtherThanTwoAndFourAreNamed) {
     const Status checked = options.validate();
     ASSERT_FALSE(checked) << px;
     EXPECT_EQ(checked.error().where, "render.alike_px");
+  }
+}
+
+TEST(RenderOptionsCheck, ASurfaceOfTooMuchOrTooLittleLightIsNamed) {
+  for (const double light : {0.0, 0.3, 0.99, 1.0, std::nan("")}) {
+    RenderOptions options;
+    options.surface_light = light;
+    const Status checked = options.validate();
+    ASSERT_FALSE(checked) << light;
+    EXPECT_EQ(checked.error().where, "render.surface_light");
   }
 }
 
