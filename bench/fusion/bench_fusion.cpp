@@ -6,6 +6,7 @@
 // bench_fusion --speed : wall and CPU time of methods and metrics, for the best instructions and
 // AVX2. bench_fusion --skipping : what each method skips on each pair, and what that loses.
 // bench_fusion --cross : constants of `best` chosen on half of the pairs, scored on the others.
+// bench_fusion --halo : what keeps `best` from halos, chosen by cross-validation; made scenes.
 // bench_fusion --out DIR : with the first two also DIR/fusion.json and DIR/curves/fusion_knobs.svg.
 #include <fmt/format.h>
 
@@ -35,7 +36,8 @@ int main(int argc, char** argv) {
   fmt::print("{}, {} threads used\n\n", cpu_description(), thread_count());
   if (mode == "--skipping") return bench::skipping(folder);
   if (mode == "--cross") return bench::cross_check(folder);
+  if (mode == "--halo") return bench::halos(folder);
   if (mode.empty() || mode == "--methods") return bench::sweep(folder, mode.empty(), out);
-  fmt::print(stderr, "{}: unknown; one of --methods, --speed, --skipping, --cross\n", mode);
+  fmt::print(stderr, "{}: unknown; one of --methods, --speed, --skipping, --cross, --halo\n", mode);
   return 2;
 }

@@ -23,4 +23,8 @@ int skipping(const std::filesystem::path& folder);
 /// `best` with its constants chosen on half of the pairs, scored on the others, and the reverse.
 int cross_check(const std::filesystem::path& folder);
 
+/// What keeps `best` from halos (fusion/best/halo_rule.hpp): its constants chosen by
+/// cross-validation, and the halo of scenes made by code.
+int halos(const std::filesystem::path& folder);
+
 }  // namespace orbitfuse::bench

@@ -2,6 +2,7 @@
 #include "fusion/best/band_mix.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <opencv2/core/hal/hal.hpp>
 #include <vector>
 
@@ -18,8 +19,8 @@ float above_dark(float level) { return std::max(0.0F, level) + darkest_level; }
 
 }  // namespace
 
-Plane mix_band(const BandSource& visible, const BandSource& thermal, const Plane& level,
-               const BandMix& rule) {
+Plane mix_band(const BandSource& visible, const BandSource& thermal, const Plane& common,
+               const Plane& level, const Plane& visible_share, const BandMix& rule) {
   Plane fused(level.size());
   parallel_blocks(level.rows, 32, [&](int begin, int end) {
     const int n = level.cols;
@@ -27,12 +28,18 @@ Plane mix_band(const BandSource& visible, const BandSource& thermal, const Plane
     for (int y = begin; y < end; ++y) {
       const float *ev = visible.energy[y], *et = thermal.energy[y], *bv = visible.band[y],
                   *bt = thermal.band[y];
-      const float *lv = visible.level[y], *lt = thermal.level[y], *lf = level[y];
+      const float *lv = visible.level[y], *lt = thermal.level[y], *lf = level[y],
+                  *b = visible_share[y], *c = common[y];
       float *p = power.data(), *out = fused[y];
       // (E_t / E_v)^exponent, by logarithms: a whole row at a time is many times faster than pow.
       for (int x = 0; x < n; ++x) p[x] = (et[x] + nothing) / (ev[x] + nothing);
       cv::hal::log32f(p, p, n);
-      for (int x = 0; x < n; ++x) p[x] = std::clamp(rule.exponent * p[x], -80.0F, 80.0F);
+      for (int x = 0; x < n; ++x) {
+        const float strengths = std::sqrt(ev[x]) * std::sqrt(et[x]) + nothing;
+        const float opposite = std::clamp(-c[x] / strengths, 0.0F, 1.0F);
+        const float pull = rule.base_pull + rule.opposite_pull * opposite;
+        p[x] = std::clamp(rule.exponent * p[x] - pull * (2 * b[x] - 1), -80.0F, 80.0F);
+      }
       cv::hal::exp32f(p, p, n);
       for (int x = 0; x < n; ++x) {
         const float w = 1 / (1 + p[x]), band = bt[x] + w * (bv[x] - bt[x]);

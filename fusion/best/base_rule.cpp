@@ -2,9 +2,11 @@
 #include "fusion/best/base_rule.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "core/system/parallel.hpp"
+#include "fusion/best/plain_regions.hpp"
 #include "fusion/pyramid/patch_dct.hpp"
 
 namespace orbitfuse::fusion {
@@ -17,9 +19,18 @@ float activity(const Plane& image, int x, int y, float brightness_weight) {
   return patch.structure + brightness_weight * std::max(0.0F, patch.sum);
 }
 
+/// Weights that agree within plain regions; what decides is where the levels are far apart.
+Plane coherent(const Plane& share, const Plane& visible, const Plane& thermal, float coherence) {
+  constexpr float apart = 64, least_own = 0.05F;  // gray levels
+  const Plane gap = cv::abs(visible - thermal) / apart;
+  const Plane own = cv::min(gap.mul(gap), 1.0F) + least_own;
+  return within_regions(share, own, visible, thermal,
+                        {.strength = coherence, .edge = 20, .sweeps = 200});
+}
+
 }  // namespace
 
-Plane fuse_base(const Plane& visible, const Plane& thermal, const BaseRule& rule) {
+FusedBase fuse_base(const Plane& visible, const Plane& thermal, const BaseRule& rule) {
   // A vote lies at its patch's last sample; outside there are no patches and no votes.
   Plane votes = Plane::zeros(visible.size()), patches = Plane::zeros(visible.size());
   const int rows = visible.rows - side + 1, columns = visible.cols - side + 1;
@@ -38,8 +49,11 @@ Plane fuse_base(const Plane& visible, const Plane& thermal, const BaseRule& rule
     cv::boxFilter(plane, sums, CV_32F, {side, side}, {0, 0}, false, cv::BORDER_CONSTANT);
     return sums;
   };
-  const Plane weight = sums_of(votes) / sums_of(patches);
-  return thermal + weight.mul(visible - thermal);
+  Plane weight = sums_of(votes) / sums_of(patches);
+  if (rule.coherence > 0) weight = coherent(weight, visible, thermal, rule.coherence);
+  if (rule.decision > 0)
+    for (float& w : weight) w = 1 / (1 + std::exp(-2 * rule.decision * (w - 0.5F + rule.lean)));
+  return {thermal + weight.mul(visible - thermal), weight};
 }
 
 }  // namespace orbitfuse::fusion

@@ -8,6 +8,9 @@
 #include "core/system/parallel.hpp"
 #include "fusion/best/band_mix.hpp"
 #include "fusion/best/base_rule.hpp"
+#include "fusion/best/halo_rule.hpp"
+#include "fusion/best/settle_levels.hpp"
+#include "fusion/best/small_things.hpp"
 #include "fusion/pyramid/bands.hpp"
 #include "fusion/pyramid/pyramid.hpp"
 
@@ -34,11 +37,40 @@ Source source_of(const Plane& image, int levels) {
   return source;
 }
 
-Plane energy_of(const Plane& band, int radius) {
+Plane local_mean_of_product(const Plane& a, const Plane& b, int radius) {
   const int window = 2 * radius + 1;
-  Plane energy;
-  cv::GaussianBlur(band.mul(band), energy, {window, window}, 0, 0, cv::BORDER_REFLECT_101);
-  return energy;
+  Plane mean;
+  cv::GaussianBlur(a.mul(b), mean, {window, window}, 0, 0, cv::BORDER_REFLECT_101);
+  return mean;
+}
+
+/// A share of the picture for each band, finest first.
+std::vector<Plane> in_bands(const Plane& share, std::size_t bands) {
+  std::vector<Plane> all;
+  for (std::size_t i = 0; i < bands; ++i) {
+    Plane reduced = share;
+    if (i > 0) cv::pyrDown(all.back(), reduced);
+    all.push_back(reduced);
+  }
+  return all;
+}
+
+/// What is small and stands out in one source, and how far the base's choice of the visible source
+/// holds there.
+struct SmallThings {
+  Plane heat, marks;                   ///< hot things; things of the visible image that aren't hot
+  std::vector<Plane> not_hot, marked;  ///< of each band
+};
+
+SmallThings small_things(const Plane& visible, const Plane& thermal, const HaloRule& rule,
+                         std::size_t bands) {
+  SmallThings things;
+  things.heat = small_heat(thermal, rule.least_heat);
+  const Plane not_hot = 1 - things.heat;
+  things.marks = small_marks(visible, rule.least_mark).mul(not_hot);
+  things.not_hot = in_bands(not_hot, bands);
+  things.marked = in_bands(things.marks, bands);
+  return things;
 }
 
 }  // namespace
@@ -55,6 +87,11 @@ Status BestOptions::validate() const {
 
 Result<Plane> fuse_best(const Plane& visible, const Plane& thermal, const BestOptions& options,
                         BestReport* report) {
+  return fuse_best(visible, thermal, options, HaloRule{}, report);
+}
+
+Result<Plane> fuse_best(const Plane& visible, const Plane& thermal, const BestOptions& options,
+                        const HaloRule& halo, BestReport* report) {
   ORBITFUSE_TRY(options.validate());
   ORBITFUSE_TRY(check_pair(visible, thermal));
   BestReport own;
@@ -75,23 +112,33 @@ Result<Plane> fuse_best(const Plane& visible, const Plane& thermal, const BestOp
     skip.push_back(silent(v.bands[i].band, t.bands[i].band));
     if (skip[i]) said.levels_skipped += 1.0 / levels;
   }
-  parallel_for(2, [&](int k) {
-    Source& source = sources[static_cast<std::size_t>(k)];
-    for (std::size_t i = 0; i < source.bands.size(); ++i)
-      if (!skip[i])
-        source.bands[i].energy = energy_of(source.bands[i].band, options.energy_radius_px);
+  std::vector<Plane> common(v.bands.size());
+  SmallThings small;
+  parallel_for(4, [&](int k) {
+    if (k == 3) small = small_things(visible, thermal, halo, v.bands.size());
+    for (std::size_t i = 0; k < 3 && i < v.bands.size(); ++i) {
+      if (skip[i]) continue;
+      const Plane &a = (k == 1 ? t : v).bands[i].band, &b = (k == 0 ? v : t).bands[i].band;
+      Plane& target = k == 0 ? v.bands[i].energy : k == 1 ? t.bands[i].energy : common[i];
+      target = local_mean_of_product(a, b, options.energy_radius_px);
+    }
   });
-  Plane fused = fuse_base(v.base, t.base,
-                          {static_cast<float>(options.visible_preference),
-                           static_cast<float>(options.brightness_weight)});
+  auto [fused, weight] = fuse_base(
+      v.base, t.base,
+      {static_cast<float>(options.visible_preference),
+       static_cast<float>(options.brightness_weight), halo.coherence, halo.decision, halo.lean});
   const BandMix rule{static_cast<float>(options.sharpness / 2),
-                     static_cast<float>(options.contrast_kept)};
+                     static_cast<float>(options.contrast_kept), halo.pull, halo.opposite};
   for (std::size_t i = v.bands.size(); i-- > 0;) {
-    Plane level;
+    Plane level, wide;
     cv::pyrUp(fused, level, v.bands[i].band.size());
-    fused = skip[i] ? level : mix_band(v.bands[i], t.bands[i], level, rule);
+    cv::pyrUp(weight, wide, v.bands[i].band.size());
+    weight = wide;
+    fused = skip[i] ? level
+                    : mix_band(v.bands[i], t.bands[i], common[i], level,
+                               cv::max(weight.mul(small.not_hot[i]), small.marked[i]), rule);
   }
-  return fused;
+  return halo.settled ? settle_levels(fused, visible, thermal, small.heat, small.marks) : fused;
 }
 
 }  // namespace orbitfuse::fusion

@@ -8,14 +8,15 @@ namespace orbitfuse::fusion {
 /// The default of FusionOptions::method (fuse/fuse.hpp); the default picture of a run's report is
 /// heat's. Details: per band the source with the larger local energy, chosen softly so that the
 /// choice never flickers, at a strength that keeps part of its contrast to the level it moves to.
-/// Base: by votes of patches on which source holds more. See docs/notes/fusion.md for what each
-/// constant does to the scores.
+/// Base: by votes of patches on which source holds more, agreed within plain regions, so that no
+/// level near an edge is neither source's (a halo); small hot things and small marks of the visible
+/// image are kept. See docs/notes/fusion.md for what each constant does to the scores.
 struct BestOptions {
   int levels = 4;         ///< of the pyramid; fewer where the base would be below 8 px
   double sharpness = 12;  ///< exponent of the amplitude ratio in the weights; larger: harder choice
   int energy_radius_px = 5;  ///< of the window over which energies are averaged
   /// Share of the way to constant contrast that a detail's strength goes when its level changes.
-  double contrast_kept = 0.5;
+  double contrast_kept = 0.2;
   /// Gray levels of activity that the visible source has for free in the base: where neither source
   /// holds structure people expect the visible level (a bright sky, not a cold one).
   double visible_preference = 2;

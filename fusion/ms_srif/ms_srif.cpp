@@ -32,6 +32,14 @@ struct Tally {
   long atoms = 0;
 };
 
+/// What a patch says beside its structure, in the sum of its samples: gray levels that the visible
+/// source has for free (where neither holds structure people expect its level), and the share of a
+/// mean that counts (lamps and hot bodies are bright without structure). The values are those of
+/// `best` (best/best.hpp), which weren't chosen by this method's scores.
+constexpr float visible_preference = 2, brightness_weight = 0.02F;
+
+float of_level(float mean) { return patch_size * brightness_weight * std::max(0.0F, mean); }
+
 /// Work space of one thread.
 struct Coder {
   Coder(const MsSrifOptions& options, const Dictionary& dictionary_)
@@ -46,7 +54,8 @@ struct Coder {
     omp.solve(t, stop, code_t);
     tally.flat += code_v.atoms.empty() + code_t.atoms.empty();
     tally.atoms += static_cast<long>(code_v.atoms.size() + code_t.atoms.size());
-    const float activity_v = code_v.l1(), activity_t = code_t.l1();
+    const float activity_v = code_v.l1() + of_level(mean_v) + patch_size * visible_preference,
+                activity_t = code_t.l1() + of_level(mean_t);
     // Two flat patches have no winner; their mean level doesn't flicker between the sources.
     const float mean = activity_v > activity_t   ? mean_v
                        : activity_t > activity_v ? mean_t
@@ -61,8 +70,9 @@ struct Coder {
     const float mean_v = cut(visible, x, y, v), mean_t = cut(thermal, x, y, t);
     tally.patches += 2;
     if (certain_ratio > 0) {
-      const float a = patch_activity(visible, x, y).structure,
-                  b = patch_activity(thermal, x, y).structure;
+      const float a = patch_activity(visible, x, y).structure + of_level(mean_v) +
+                      patch_size * visible_preference,
+                  b = patch_activity(thermal, x, y).structure + of_level(mean_t);
       if (std::max(a, b) > certain_ratio * std::min(a, b)) {
         fused = a > b ? v.array() + mean_v : t.array() + mean_t;
         tally.certain += 2;

@@ -5,7 +5,9 @@
 #include "fusion/pyramid/image_pair.hpp"
 
 // MS-SRIF: Laplacian pyramid whose base is fused by sparse representation (Liu, Liu, Wang 2015, "A
-// general framework for image fusion based on multi-scale transform and sparse representation").
+// general framework for image fusion based on multi-scale transform and sparse representation"). A
+// patch's activity counts its level, too, a little, and the visible source's more: else a dark sky
+// or a plain wall of either source is as likely to be taken as the other.
 namespace orbitfuse::fusion {
 
 struct MsSrifOptions {
@@ -16,7 +18,7 @@ struct MsSrifOptions {
       0.1;  ///< gray levels RMS at which a patch counts as coded; flat patches end here
   /// A patch is coded when this share of its norm is left: textured patches need no finer code to
   /// be compared. 0 = the reference's stop. See docs/notes/fusion.md.
-  double relative_residual = 0.01;
+  double relative_residual = 0.03;
   /// No code is sought where the structure of one patch (L1 norm of its DCT) is this many times the
   /// other's: the codes would agree, and the winner itself is what its code comes close to. 0 =
   /// off.

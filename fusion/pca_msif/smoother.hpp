@@ -15,7 +15,7 @@ double largest_stable_step(Stencil stencil);
 
 struct SmootherOptions {
   /// T, of the size time_step; more moves more structure into the detail layer; the paper has 15.
-  int iterations = 40;
+  int iterations = 60;
   double time_step = 0.9;  ///< dt
   /// Cycles of fast explicit diffusion that reach the time iterations * time_step in far fewer
   /// steps; conductivities are taken once a cycle. 0 = the paper's plain steps.

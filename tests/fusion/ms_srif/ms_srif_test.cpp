@@ -105,9 +105,10 @@ TEST(Ksvd, ErrorFallsAndSeedsRepeat) {
   EXPECT_FALSE(train_ksvd(patches.leftCols(10), options, [](int, double) {}));
 }
 
-/// One quarter textured in the visible image, noise of 5 gray levels in the right half of both.
+/// One quarter textured in the visible image, noise of 5 gray levels in the right half of both; of
+/// levels that say as much.
 std::pair<Plane, Plane> part_textured() {
-  Plane v(64, 64, 50.0F), t(64, 64, 60.0F);
+  Plane v(64, 64, 50.0F), t(64, 64, 150.0F);
   for (int y = 0; y < 20; ++y)
     for (int x = 0; x < 20; ++x) v(y, x) = static_cast<float>((x + y) % 7) * 20;
   cv::RNG random(3);
@@ -129,6 +130,15 @@ TEST(MsSrif, SkippedPatchesAreReported) {
   EXPECT_FALSE(report.skipped);
   ASSERT_TRUE(fuse_ms_srif(v, v, {}, &report));
   EXPECT_TRUE(report.skipped);
+}
+
+/// Where neither source has structure: the visible level, but not below something bright and hot.
+TEST(MsSrif, PlainGroundHasTheVisibleLevelAndHotBodiesTheirs) {
+  Plane v(96, 96, 120.0F), t(96, 96, 20.0F);
+  v(5, 5) = 121;
+  EXPECT_NEAR(fuse_ms_srif(v, t, {}).value()(60, 60), 120, 1);
+  const Plane dark(96, 96, 20.0F), hot(96, 96, 250.0F);
+  EXPECT_NEAR(fuse_ms_srif(dark, hot, {}).value()(60, 60), 250, 1);
 }
 
 TEST(MsSrif, SkippingChangesNothingWherePatchesAreCertain) {
