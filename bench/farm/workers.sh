@@ -9,6 +9,8 @@ session=$(realpath "$2")
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 stage_s=${STAGE_S:-1.5}
+# Of farm.json, as the program has it: a plan of an older one is refused.
+schema=$(sed -n 's/.*plan_schema = \([0-9]*\).*/\1/p' "$(dirname "$0")/../../app/farm/plan.hpp")
 printf '#!/bin/sh\nexec sleep %s\n' "$stage_s" > "$work/stand_in"
 chmod +x "$work/stand_in"
 for i in 1 2 3 4; do mkdir -p "$work/s$i"; done
@@ -20,12 +22,14 @@ measure() {  # WORKERS WORDS...: wall time from outside, the stages' own from th
 import json, pathlib, subprocess, sys, time
 workers, farm, *words = sys.argv[1:]
 begin = time.monotonic()
-code = subprocess.run(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode
+ran = subprocess.run(words, capture_output=True, text=True)
 wall = time.monotonic() - begin
+if ran.returncode != 0:
+    sys.exit(f"code {ran.returncode}: {ran.stderr}")
 records = [json.loads(f.read_text()) for f in pathlib.Path(farm, ".farm").glob("*/*.json")]
 stages, cpu = sum(r["wall_s"] for r in records), sum(r["cpu_s"] for r in records)
 idle = (int(workers) * wall - stages) / len(records)
-print(f"{workers} workers: code {code}, {len(records)} stages, wall {wall:.1f} s, stages {stages:.1f} s, "
+print(f"{workers} workers: {len(records)} stages, wall {wall:.1f} s, stages {stages:.1f} s, "
       f"CPU {cpu:.1f} s, a worker's time between stages {1000 * idle:.0f} ms a stage "
       f"({100 * (1 - stages / (int(workers) * wall)):.1f} %)")
 PY
@@ -35,11 +39,11 @@ echo "-- stages that wait $stage_s s"
 for n in 1 2 4; do
   farm=$work/waiting$n
   mkdir -p "$farm/.farm"
-  python3 - "$farm" "$work" << 'PY'
+  python3 - "$farm" "$work" "$schema" << 'PY'
 import json, sys
-farm, work = sys.argv[1:]
+farm, work, schema = sys.argv[1:]
 stages = [f"stage{i}" for i in range(10)]
-json.dump({"schema": 1, "program": f"{work}/stand_in", "options": [], "stages": stages, "tries": 3,
+json.dump({"schema": int(schema), "program": f"{work}/stand_in", "options": [], "stages": stages, "tries": 3,
            "sessions": [{"name": f"s{i}", "folder": f"{work}/s{i}"} for i in range(1, 5)],
            "needs": {s: {"cores": 1, "memory_mb": 10, "time_min": 5, "gpu": False} for s in stages}},
           open(f"{farm}/farm.json", "w"))
