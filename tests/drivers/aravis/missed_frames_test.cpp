@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <optional>
+
 namespace orbitfuse::aravis {
 namespace {
 
@@ -16,10 +19,11 @@ void expect_counted_on(std::uint16_t last, std::uint16_t number, const MissedByT
   EXPECT_EQ(missed.frames, frames) << last << " " << number;
 }
 
-void expect_began_anew(std::uint16_t last, std::uint16_t number, const MissedByTime& by_time) {
+void expect_began_anew(std::optional<std::uint16_t> last, std::uint16_t number,
+                       const MissedByTime& by_time) {
   const Missed missed = missed_between(last, number, by_time);
-  EXPECT_FALSE(missed.by_number) << last << " " << number;
-  EXPECT_EQ(missed.frames, by_time.usual) << last << " " << number;
+  EXPECT_FALSE(missed.by_number) << last.value_or(0) << " " << number;
+  EXPECT_EQ(missed.frames, by_time.usual) << last.value_or(0) << " " << number;
 }
 
 TEST(MissedFrames, ACountThatGoesOnTellsExactly) {
@@ -51,7 +55,7 @@ TEST(MissedFrames, ABurstIsNoRate) {
 }
 
 TEST(MissedFrames, WithoutNumbersTheTimeTells) {
-  expect_began_anew(0, 100, two_seconds);
+  expect_began_anew(std::nullopt, 100, two_seconds);
   expect_began_anew(100, 0, two_seconds);
   expect_began_anew(100, 100, two_seconds);
   expect_began_anew(100, 200, {40'000, 40'000});  // half a round: the same number may be the next's
