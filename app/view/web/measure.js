@@ -44,13 +44,19 @@ class Measuring {
   take(kind) {
     const tool = measureTools[kind];
     this.places = [];
-    if (!tool.places) { this.tool = null; this.markTool(null); this.measure({ kind, count: 3 }); return; }
+    if (!tool.places) { this.tool = null; this.markTool(null); this.hottestOrColdest(kind); return; }
     this.tool = this.tool === kind ? null : kind;
     this.markTool(this.tool);
     this.say(this.tool ? tool.say[0] : "");
     $("close-polygon").hidden = true;
     if (this.tool && innerWidth < 600) { $("panel").hidden = true; $("menu").setAttribute("aria-expanded", false); this.say(tool.say[0]); }
     this.drawMarks();
+  }
+
+  hottestOrColdest(kind) {
+    const text = $("spot-count").value.trim(), count = Number(text);
+    if (!Number.isInteger(count) || count < 1) { this.say(`places: '${text}' is no number of places`, true); return; }
+    this.measure({ kind, count });
   }
 
   /// True when a tool is in hand: the touch was its.
@@ -164,6 +170,25 @@ class Measuring {
     const range = reading.points > 1 ? ` (${shownTemperature(reading.min_k)} to ${shownTemperature(reading.max_k)})` : "";
     return `${shownTemperature(reading.temperature_k)}${reading.uncertainty_k === null ? "" : " ± " + shownDifference(reading.uncertainty_k)}${range} · ${frames} frame${frames === 1 ? "" : "s"} · ${field}`;
   }
+  /// What stands behind a temperature: every frame that sees the place, each a touch away.
+  frames(reading) {
+    const box = element("details"), list = element("div"), count = reading.frames.length;
+    const parts = [`spread between them ${shownDifference(reading.spread_k, 2)}`, `seen ${reading.angle_deg === null ? "–" : reading.angle_deg.toFixed(0) + "°"} from the normal`];
+    if (reading.points > 1) parts.unshift(`over ${reading.points} points standard deviation ${shownDifference(reading.standard_deviation_k, 2)}`);
+    box.append(element("summary", count === 1 ? "The frame" : `The ${count} frames`), element("p", parts.join(", ")), list);
+    box.ontoggle = () => {
+      if (!box.open || list.childElementCount) return;
+      for (const line of reading.frames) {
+        const item = element("div", undefined, "item"), words = element("div", `${shownTemperature(line.mean_k)} · ${line.angle_deg === null ? "–" : line.angle_deg.toFixed(0) + "°"}`, "words");
+        const remarks = [line.used ? "" : "left out: too far from the others", line.doubtful ? "pose in doubt" : ""].filter(Boolean).join(", ");
+        if (remarks) words.append(element("small", remarks));
+        const index = this.facts.views.findIndex(v => v.name === line.frame);
+        item.append(words, index < 0 ? element("span", line.frame) : button(line.frame.split("/").pop(), () => viewer.photo.open(index)));
+        list.append(item);
+      }
+    };
+    return box;
+  }
   words(m) {
     const a = m.answer;
     if (a.kind === "difference") return `${shownDifference(a.difference_k)}${a.uncertainty_k === null ? "" : " ± " + shownDifference(a.uncertainty_k)}`;
@@ -185,6 +210,8 @@ class Measuring {
       if (this.toldWords(m.request)) words.append(element("small", this.toldWords(m.request)));
       for (const note of m.answer.notes || []) words.append(element("small", note));
       if (m.answer.profile) words.append(this.profile(m.answer.profile));
+      for (const reading of [m.answer.reading, ...(m.answer.spots || []), ...(m.answer.of || []).map(part => part.reading)])
+        if (reading && reading.frames && reading.frames.length) words.append(this.frames(reading));
       if (!m.name) {
         const label = element("input");
         label.placeholder = "name"; label.maxLength = 200; label.value = m.label; label.setAttribute("aria-label", `name of measurement ${index + 1}`);
