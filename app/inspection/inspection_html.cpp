@@ -209,12 +209,15 @@ std::string when(const std::string& iso) {
   return iso.substr(0, 10) + " " + iso.substr(11, 5) + " UTC";
 }
 
+std::string capitalized(std::string words) {
+  if (!words.empty() && words.front() >= 'a' && words.front() <= 'z')
+    words.front() = static_cast<char>(words.front() - 32);
+  return words;
+}
+
 /// A note of a measurement begins small and has no end.
-std::string sentence(std::string note) {
-  if (note.empty()) return note;
-  if (note.front() >= 'a' && note.front() <= 'z')
-    note.front() = static_cast<char>(note.front() - 32);
-  return note + ".";
+std::string sentence(const std::string& note) {
+  return note.empty() ? note : capitalized(note) + ".";
 }
 
 std::string finding_block(const ShownFinding& shown) {
@@ -266,7 +269,8 @@ std::string finding_blocks(const InspectionModel& model) {
 
 std::string limits(const std::vector<std::string>& sentences) {
   std::string html = "<ul>\n";
-  for (const std::string& sentence : sentences) html += "<li>" + escape(sentence) + "</li>\n";
+  for (const std::string& sentence : sentences)
+    html += "<li>" + escape(capitalized(sentence)) + "</li>\n";
   return html + "</ul>\n";
 }
 

@@ -93,6 +93,8 @@ TEST(InspectionHtml, WhatIsKnownIsSaidAndWhatIsNotSaysSo) {
     EXPECT_THAT(html, HasSubstr(said));
   for (const char* beyond : {"<script", "http://", "https://"})
     EXPECT_THAT(html, Not(HasSubstr(beyond))) << "opens offline, and runs nothing";
+  for (char small = 'a'; small <= 'z'; ++small)
+    EXPECT_THAT(html, Not(HasSubstr(std::string("<li>") + small))) << "sentences of the limits";
 }
 
 TEST(InspectionHtml, NamesFromOutsideAreNoHtml) {
