@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # What a farm on this machine costs and gains with 1, 2 and 4 workers: four sessions of stages that
 # only wait (the farm alone: no processor is in the way), then of a short run of a real session.
-#   workers.sh ORBITFUSE SESSION
+#   [WORKERS="1 2 4"] [STAGE_S=1.5] workers.sh ORBITFUSE SESSION
 set -euo pipefail
 program=$(realpath "$1")
 session=$(realpath "$2")
@@ -36,7 +36,7 @@ PY
 }
 
 echo "-- stages that wait $stage_s s"
-for n in 1 2 4; do
+for n in ${WORKERS:-1 2 4}; do
   farm=$work/waiting$n
   mkdir -p "$farm/.farm"
   python3 - "$farm" "$work" "$schema" << 'PY'
@@ -54,7 +54,7 @@ done
 echo "-- a short run of $(basename "$session")"
 . "$(dirname "$0")/../../tests/app/farm/short_run.sh"
 import_cars "$program" "$session" "$work" 4
-for n in 1 2 4; do
+for n in ${WORKERS:-1 2 4}; do
   measure $n "$work/run$n" "$program" farm "$work"/car? --out "$work/run$n" --workers $n --cores 4 \
     --stage-cores 1 "${options[@]}"
 done
