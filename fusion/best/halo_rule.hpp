@@ -16,7 +16,7 @@ struct HaloRule {
   float opposite = 8;      ///< BandMix::opposite_pull
   float least_heat =
       1.5F;  ///< standard deviations of the thermal image, of small_heat(); 0: nothing counts
-  float least_mark = 96;  ///< gray levels, of small_marks(); 0: nothing counts
+  float least_mark = 64;  ///< gray levels, of small_marks(); 0: nothing counts
   bool settled = true;    ///< settle_levels()
 
   static HaloRule none() { return {0, 0, 0, 0, 0, 0, 0, false}; }

@@ -55,6 +55,16 @@ TEST(BestHalo, AMarkOfTheVisibleImageStays) {
     }
 }
 
+/// Also where something hot makes the thermal image's the plain ground.
+TEST(BestHalo, AMarkBesideSomethingHotStandsOut) {
+  cv::Mat1f visible(120, 160, 82.0F), thermal(120, 160, 40.0F);
+  visible(cv::Rect(20, 40, 30, 30)) = 220;
+  cv::circle(thermal, {120, 60}, 15, 230, cv::FILLED);
+  const Plane fused = fuse_best(Plane(visible), Plane(thermal), {}).value();
+  EXPECT_GT(cv::mean(fused(cv::Rect(25, 45, 20, 20)))[0], 120);
+  EXPECT_GT(cv::mean(fused(cv::Rect(112, 52, 16, 16)))[0], 200);
+}
+
 /// Few levels above its surroundings, but far above what varies there.
 TEST(BestHalo, APersonInADimThermalImageStaysBrighter) {
   cv::Mat1f visible(240, 320, 50.0F), thermal(240, 320, 90.0F);
