@@ -133,7 +133,7 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   stage.name = "poses_" + std::string(name(modality));
   stage.version = 12;
   if (!visible) {
-    stage.version = 14;
+    stage.version = 15;
     stage.uses = {"poses_visible"};
     // Thermal views are aligned with renders of the visible field; known poses need none.
     if (!in.config->poses.use_known_poses || !all_posed(in.session->session))

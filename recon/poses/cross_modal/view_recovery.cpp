@@ -11,6 +11,7 @@
 #include "core/system/trace.hpp"
 #include "recon/alignment/whole_view.hpp"
 #include "recon/poses/cross_modal/added_views.hpp"
+#include "recon/poses/cross_modal/places_beside.hpp"
 #include "recon/poses/cross_modal/temperature_consistency.hpp"
 #include "recon/poses/cross_modal/thermal_bundle.hpp"
 
@@ -210,7 +211,9 @@ Status refine_orbit(const SceneRenderer& renderer, OrbitViews& orbit, RenderAlig
   straighten(orbit, alignment);
   std::vector<std::size_t> all(alignment.views.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
-  return judge_bundled(refinement, all, before, alignment);
+  ORBITFUSE_TRY(judge_bundled(refinement, all, before, alignment));
+  ORBITFUSE_TRY(try_places_beside(refinement, alignment));
+  return {};
 }
 
 double station_offset_deg(const OrbitViews& orbit, const RenderAlignment& alignment) {

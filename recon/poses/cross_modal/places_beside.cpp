@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/cross_modal/places_beside.hpp"
+
+#include <fmt/format.h>
+
+#include <optional>
+
+#include "core/system/trace.hpp"
+#include "recon/alignment/whole_view.hpp"
+#include "recon/poses/cross_modal/painted_scene.hpp"
+#include "recon/poses/cross_modal/temperature_consistency.hpp"
+#include "recon/poses/cross_modal/thermal_bundle.hpp"
+
+namespace orbitfuse {
+namespace {
+
+/// About the object: a right view is less like what the others measured from each of these, unless
+/// it sees little (docs/notes/poses.md).
+constexpr double step_deg = 1.5;
+constexpr double steps[][2] = {{1, 0}, {-1, 0}, {0, 1},  {0, -1},
+                               {1, 1}, {1, -1}, {-1, 1}, {-1, -1}};
+/// By how much more alike the image must be, of what it is short of 1: a step aside to be tried,
+/// and a place to be taken.
+constexpr double tried_gain = 0.1, taken_gain = 0.25;
+
+/// Fewer views paint nothing to compare with.
+constexpr std::size_t least_painters = 3;
+
+struct Beside {
+  std::size_t view;
+  double like;  ///< correlation at its place
+  PosedView start;
+};
+
+Result<std::vector<Beside>> candidates(const OrbitRefinement& refinement,
+                                       const SceneRenderer& painted, const Fit& alignment) {
+  const OrbitViews& orbit = refinement.orbit;
+  std::vector<Beside> found;
+  for (std::size_t i = 0; i < alignment.views.size(); ++i) {
+    if (alignment.views[i].verdict.confidence == Confidence::dropped) continue;
+    ORBITFUSE_TRY(refinement.progress.check("poses.thermal"));
+    const PosedView& view = alignment.views[i].view;
+    ORBITFUSE_ASSIGN(const auto here, correlation_with(painted, orbit.images[i], view));
+    if (!here) continue;
+    double best = *here + tried_gain * (1 - *here);
+    std::optional<Beside> better;
+    for (const auto& [azimuth, elevation] : steps) {
+      PosedView there = view;
+      there.cam_from_world = moved(view.cam_from_world, orbit.canonical_from_world,
+                                   {step_deg * azimuth, step_deg * elevation, 0});
+      ORBITFUSE_ASSIGN(const auto like, correlation_with(painted, orbit.images[i], there));
+      if (!like || *like <= best) continue;
+      best = *like;
+      better = Beside{i, *here, there};
+    }
+    if (better) found.push_back(std::move(*better));
+  }
+  return found;
+}
+
+/// Each bundled from its start as if it were one view more, which its own self doesn't hold: they
+/// are turned too little against each other.
+Result<std::vector<PosedView>> bundled_anew(const OrbitRefinement& refinement,
+                                            const std::vector<Beside>& tried,
+                                            const Fit& alignment) {
+  OrbitViews orbit = refinement.orbit;
+  Fit wider = alignment;
+  std::vector<std::size_t> added, settled;
+  for (std::size_t i = 0; i < alignment.views.size(); ++i)
+    if (alignment.views[i].verdict.confidence != Confidence::dropped) settled.push_back(i);
+  for (const Beside& one : tried) {
+    added.push_back(wider.views.size());
+    orbit.images.push_back(orbit.images[one.view]);
+    orbit.stations.push_back(orbit.stations[one.view]);
+    wider.views.push_back(alignment.views[one.view]);
+    wider.views.back().view = one.start;
+  }
+  ORBITFUSE_TRY(
+      bundle_added({refinement.renderer, orbit, refinement.progress}, added, settled, {}, wider));
+  std::vector<PosedView> places;
+  for (const std::size_t i : added) places.push_back(wider.views[i].view);
+  return places;
+}
+
+}  // namespace
+
+Result<int> try_places_beside(const OrbitRefinement& refinement, Fit& alignment) {
+  const TraceSpan span("places beside");
+  const OrbitViews& orbit = refinement.orbit;
+  std::vector<std::size_t> all;
+  for (std::size_t i = 0; i < alignment.views.size(); ++i)
+    if (alignment.views[i].verdict.confidence != Confidence::dropped) all.push_back(i);
+  if (all.size() < least_painters) return 0;
+  ORBITFUSE_ASSIGN(const SceneRenderer painted, painted_by_others(refinement, alignment, all));
+  ORBITFUSE_ASSIGN(const std::vector<Beside> tried, candidates(refinement, painted, alignment));
+  if (tried.empty()) return 0;
+  ORBITFUSE_ASSIGN(const std::vector<PosedView> places, bundled_anew(refinement, tried, alignment));
+  std::vector<std::size_t> chosen;
+  std::vector<PosedView> before;
+  for (const Beside& one : tried) {
+    chosen.push_back(one.view);
+    before.push_back(alignment.views[one.view].view);
+  }
+  // Compared after the same last round.
+  const std::vector<RenderRound> last = {fine_rounds().back()};
+  ORBITFUSE_ASSIGN(const Fit here, refinement.restart(chosen, before, last));
+  ORBITFUSE_ASSIGN(const Fit there, refinement.restart(chosen, places, last));
+  int went = 0;
+  for (std::size_t c = 0; c < tried.size(); ++c) {
+    const Beside& one = tried[c];
+    ORBITFUSE_ASSIGN(const auto like, correlation_with(painted, orbit.images[one.view], places[c]));
+    const RenderAlignedView &was = here.views[c], &now = there.views[c];
+    const bool taken =
+        like && *like > one.like + taken_gain * (1 - one.like) && now.support() >= was.support();
+    refinement.progress.report(
+        {"poses.thermal", 3, 4, -1,
+         fmt::format(
+             "{}: bundled anew from beside, {:.2f} deg away: its image {:.3f} like the "
+             "others' ({:.3f} before), form's support {:.1f} ({:.1f}){}",
+             places[c].name, apart_deg(orbit, before[c].cam_from_world, places[c].cam_from_world),
+             like.value_or(0), one.like, now.support(), was.support(), taken ? ": taken" : "")});
+    if (!taken) continue;
+    ++went;
+    RenderAlignedView& view = alignment.views[one.view];
+    view.view = places[c];
+    view.agreement = now.agreement, view.matches = now.matches, view.median_px = now.median_px;
+  }
+  return went;
+}
+
+}  // namespace orbitfuse

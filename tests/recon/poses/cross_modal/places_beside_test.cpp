@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/cross_modal/places_beside.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "tests/support/thermal_ball.hpp"
+
+namespace orbitfuse {
+namespace {
+
+using testing_orbit::Ball;
+
+void put_beside(Ball& ball, std::size_t i, double azimuth_deg, double elevation_deg) {
+  OrbitPose beside;
+  beside.azimuth_deg = 30.0 * static_cast<double>(i) + azimuth_deg;
+  beside.elevation_deg = (i % 2 == 0 ? 20 : 32) + elevation_deg, beside.radius = 2.5;
+  PosedView& view = ball.alignment.views[i].view;
+  view.cam_from_world = cam_from_world_of(beside, view.camera);
+}
+
+Result<int> tried(Ball& ball) {
+  return try_places_beside({ball.form, ball.orbit, ball.progress}, ball.alignment);
+}
+
+TEST(PlacesBeside, AViewComesHomeAndNobodyElseMoves) {
+  Ball ball;
+  put_beside(ball, 4, 1.4, 0);
+  put_beside(ball, 7, 0, -1.4);
+  const Fit before = ball.alignment;
+  const auto went = tried(ball);
+  ASSERT_TRUE(went) << went.error().message();
+  EXPECT_EQ(*went, 2);
+  for (const std::size_t i : {4u, 7u}) EXPECT_LT(ball.center_error(i), 0.007 * 2.5) << i;
+  for (const std::size_t i : {0u, 1u, 2u, 3u, 5u, 6u, 8u, 9u, 10u, 11u})
+    EXPECT_EQ(ball.alignment.views[i].view.cam_from_world.translation,
+              before.views[i].view.cam_from_world.translation)
+        << i;
+}
+
+TEST(PlacesBeside, RightViewsAndDroppedOnesStay) {
+  Ball ball;
+  put_beside(ball, 4, 1.4, 0);
+  ball.alignment.views[4].verdict = {Confidence::dropped, DoubtReason::not_found, ""};
+  const Fit before = ball.alignment;
+  EXPECT_EQ(tried(ball).value(), 0);
+  for (std::size_t i = 0; i < before.views.size(); ++i)
+    EXPECT_EQ(ball.alignment.views[i].view.cam_from_world.translation,
+              before.views[i].view.cam_from_world.translation)
+        << i;
+}
+
+TEST(PlacesBeside, WithoutAnythingToCompareNothingMoves) {
+  for (const float value : {0.0F, std::numeric_limits<float>::quiet_NaN(), 1e30F}) {
+    Ball ball(6);
+    for (cv::Mat& image : ball.orbit.images) image.setTo(value);
+    EXPECT_EQ(tried(ball).value(), 0) << value;
+  }
+  for (const int few : {0, 1, 2}) {
+    Ball ball(few);
+    EXPECT_EQ(tried(ball).value(), 0) << few;
+  }
+}
+
+TEST(PlacesBeside, ARendererThatFailsIsPassedOn) {
+  Ball ball;
+  ball.form = [](const Camera&, const Rigid3d&) -> Result<SceneRender> {
+    return fail(ErrorKind::input, "field", "cut", "train again");
+  };
+  const auto went = tried(ball);
+  ASSERT_FALSE(went);
+  EXPECT_EQ(went.error().where, "field");
+}
+
+}  // namespace
+}  // namespace orbitfuse
