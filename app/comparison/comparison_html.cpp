@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "app/comparison/comparison_files.hpp"
 #include "app/pipeline/runner.hpp"
 #include "app/report/html.hpp"
@@ -27,15 +29,20 @@ std::string session_words(const view::FinishedRun& run) {
                      run.session ? run.session->folder.string() : "not found");
 }
 
+std::string held_words(double scale_sigma) {
+  if (!std::isfinite(scale_sigma)) return "held by nothing";
+  return fmt::format("held to ± {:.2f} % (one sigma)", 100 * scale_sigma);
+}
+
 std::string facts(const ComparedRuns& runs) {
   std::string html = "<table class=\"facts\"><tbody>\n";
   html += row("Before", session_words(runs.before)) + row("After", session_words(runs.after));
   html += row("Registration",
               fmt::format("unchanged surfaces lie {} apart; {:.0f} % of them within 1 % of the "
-                          "extent; the size of one in the other is held to ± {:.2f} % (one sigma); "
+                          "extent; the size of one in the other is {}; "
                           "photos explained to {:.2f}{}",
                           residual_words(runs), 100 * runs.registration.overlap,
-                          100 * runs.registration.scale_sigma, runs.support,
+                          held_words(runs.registration.scale_sigma), runs.support,
                           runs.registration.clouds.ambiguous
                               ? "; geometry alone leaves several placements: see that the pictures "
                                 "before and after match"

@@ -64,7 +64,8 @@ Result<std::optional<SeenDepth>> depth_at(const view::FinishedRun& run, const Po
   std::vector<double> depths;
   for (int y = half - 1; y <= half + 1; ++y)
     for (int x = half - 1; x <= half + 1; ++x)
-      if (const float z = seen.depth.at<float>(y, x); std::isfinite(z))
+      if (const float z = seen.depth.at<float>(y, x);
+          std::isfinite(z) && seen.opacity.at<float>(y, x) >= FieldSurfaceOptions().min_opacity)
         depths.push_back(static_cast<double>(z) / field_from_frame.scale);
   if (depths.size() < 5) return std::nullopt;
   SeenDepth found;

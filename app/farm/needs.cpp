@@ -20,6 +20,12 @@ const std::map<std::string, double> measured_s = {
     {"poses_visible", 13}, {"depth", 19},  {"train_visible", 21}, {"poses_thermal", 29},
     {"train_thermal", 13}, {"render", 17}, {"fuse", 1},           {"metrics", 8}};
 
+/// Whatever renders a field holds it on the device while it runs.
+bool renders_fields(const std::string& stage) {
+  return stage.starts_with("train_") || stage == "poses_thermal" || stage == "render" ||
+         stage == "metrics";
+}
+
 }  // namespace
 
 std::map<std::string, StageNeeds> default_needs(const std::vector<std::string>& stages, int cores,
@@ -28,7 +34,7 @@ std::map<std::string, StageNeeds> default_needs(const std::vector<std::string>& 
   for (const std::string& stage : stages) {
     StageNeeds& n = needs[stage];
     n.cores = cores;
-    n.gpu = on_gpu && (stage.starts_with("train_") || stage == "render");
+    n.gpu = on_gpu && renders_fields(stage);
     if (stage == "register" || stage == "report")
       n = {.cores = 1, .memory_mb = 1000, .time_min = 15, .gpu = false, .usual_s = 1};
     if (const auto known = measured_s.find(stage); known != measured_s.end())

@@ -38,7 +38,7 @@ std::string orbit_time(const Session& session, Modality modality) {
   std::size_t with_time = 0, of_files = 0;
   const auto frames = session.frames_of(modality);
   for (const FrameRecord* frame : frames) {
-    if (!frame->host_time_ns) continue;
+    if (frame->host_time_ns.value_or(0) <= 0) continue;  // no frame is from before 1970
     first = std::min(first.value_or(*frame->host_time_ns), *frame->host_time_ns);
     last = std::max(last.value_or(*frame->host_time_ns), *frame->host_time_ns);
     ++with_time;

@@ -182,7 +182,11 @@ pipeline::Stage metrics_stage(const StageInputs& in) {
     if (context.has("train_visible") || context.has("train_thermal")) return std::nullopt;
     return "no field was trained";
   };
-  stage.run = [in](const StageContext& context) { return score(context, in); };
+  stage.run = [in](const StageContext& context) {
+    auto scored = score(context, in);
+    *in.where_frames_stand = {};  // nobody asks for them after this
+    return scored;
+  };
   return stage;
 }
 

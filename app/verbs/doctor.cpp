@@ -48,7 +48,9 @@ doctor::CameraLink link_of(const aravis::FoundCamera& camera) {
   const auto packet_size = ask(aravis::GvcpRegister::packet_size);
   // Only GigE cameras have an address and that port.
   return {camera.model + " " + camera.serial, camera.address,
-          packet_size ? std::optional(static_cast<int>(*packet_size & 0xffff)) : std::nullopt,
+          (packet_size.value_or(0) & 0xffff) != 0
+              ? std::optional(static_cast<int>(*packet_size & 0xffff))
+              : std::nullopt,  // 0: it doesn't say
           ask(aravis::GvcpRegister::control_privilege).value_or(0) != 0,
           packet_size.has_value() || camera.address.empty()};
 }

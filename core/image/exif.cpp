@@ -53,7 +53,8 @@ std::optional<std::int64_t> epoch_ns(const std::string& date, const std::string&
     fraction_ns += (c - '0') * unit;
     unit /= 10;
   }
-  return seconds * 1'000'000'000LL + fraction_ns;
+  const std::int64_t ns = seconds * 1'000'000'000LL + fraction_ns;
+  return ns > 0 ? std::optional(ns) : std::nullopt;  // 1970 is a clock that nobody has set
 }
 
 }  // namespace

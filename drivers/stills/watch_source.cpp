@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <ctime>
+#include <optional>
 #include <utility>
 
 #include "core/system/file_io.hpp"
@@ -25,10 +26,10 @@ bool has_image_name(Modality modality, const fs::path& file) {
   return has_image_extension(modality, file) && unread_kind(file) != "FLIR recording";
 }
 
-std::int64_t written_ns(const fs::path& file) {
+std::optional<std::int64_t> written_ns(const fs::path& file) {
   std::error_code error;
   const auto written = fs::last_write_time(file, error);
-  if (error) return 0;
+  if (error) return std::nullopt;
   const auto utc = std::chrono::file_clock::to_sys(written);
   return std::chrono::duration_cast<std::chrono::nanoseconds>(utc.time_since_epoch()).count();
 }

@@ -56,7 +56,7 @@ struct Coder {
     tally.atoms += static_cast<long>(code_v.atoms.size() + code_t.atoms.size());
     const float activity_v = code_v.l1() + of_level(mean_v) + patch_size * visible_preference,
                 activity_t = code_t.l1() + of_level(mean_t);
-    // Two flat patches have no winner; their mean level doesn't flicker between the sources.
+    // Where both count alike there is no winner.
     const float mean = activity_v > activity_t   ? mean_v
                        : activity_t > activity_v ? mean_t
                                                  : (mean_v + mean_t) / 2;

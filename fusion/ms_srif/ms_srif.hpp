@@ -19,9 +19,9 @@ struct MsSrifOptions {
   /// A patch is coded when this share of its norm is left: textured patches need no finer code to
   /// be compared. 0 = the reference's stop. See docs/notes/fusion.md.
   double relative_residual = 0.03;
-  /// No code is sought where the structure of one patch (L1 norm of its DCT) is this many times the
-  /// other's: the codes would agree, and the winner itself is what its code comes close to. 0 =
-  /// off.
+  /// No code is sought where one patch, its structure (L1 norm of its DCT) and its level, counts
+  /// this many times as much as the other: the codes would agree, and the winner itself is what its
+  /// code comes close to. 0 = off.
   double certain_ratio = 1.5;
 
   Status validate() const;  ///< usage error naming the field

@@ -22,6 +22,7 @@
 #include "core/system/parallel.hpp"
 #include "core/system/trace.hpp"
 #include "recon/nerf/field/field_state.hpp"
+#include "recon/nerf/rendering/detail_confidence.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
@@ -29,22 +30,12 @@ namespace {
 constexpr float levels = 32767;  ///< a difference of the whole value range
 /// Where sources stand: 0.01 dB worse than every pixel all the way, a fifth faster.
 const RenderOptions for_sources = {.alike = 0.01};
-/// Pixels at a picture's edge where a source's say grows to its full, as a share of the width: its
-/// end isn't seen in the new view then.
-constexpr double border = 0.03;
-/// Neighbourhoods, as shares of the width: of what a source shows differently, and over which
-/// detail ends where no source sees on.
-constexpr double local_mean = 0.01, feather = 0.005;
+/// Over which share of the width detail ends where no source sees on.
+constexpr double feather = 0.005;
 /// A view's twins, as bursts and brackets have them.
 const double twin_cosine = std::cos(std::numbers::pi / 180);
 /// Of prepared sources; the least recently asked go first.
 constexpr std::size_t kept_bytes = std::size_t{1} << 30;
-
-cv::Mat blurred(const cv::Mat& values, double sigma) {
-  cv::Mat result;
-  cv::GaussianBlur(values, result, {}, std::max(0.5, sigma));
-  return result;
-}
 
 /// The four pixels round a place and their weights, apart because each pixel's confidence comes to
 /// its own (blended() sums at once); none where the place isn't among pixels'
@@ -68,38 +59,6 @@ float at(const cv::Mat& plane, const Corners& c, int channels = 1, int channel =
          c.weight[1] * static_cast<float>(upper[channels]) +
          c.weight[2] * static_cast<float>(lower[0]) +
          c.weight[3] * static_cast<float>(lower[channels]);
-}
-
-/// Mean difference over a neighbourhood, the largest of the channels; found at the base's size.
-cv::Mat local_difference(const cv::Mat& difference, const cv::Mat& known, cv::Size base) {
-  cv::Mat small, share;
-  cv::resize(difference, small, base, 0, 0, cv::INTER_AREA);
-  cv::resize(known, share, base, 0, 0, cv::INTER_AREA);
-  const double sigma = local_mean * base.width;
-  const cv::Mat sum = blurred(small, sigma), weight = blurred(share, sigma);
-  std::vector<cv::Mat> planes;
-  cv::split(cv::abs(sum), planes);
-  for (std::size_t c = 1; c < planes.size(); ++c) planes[0] = cv::max(planes[0], planes[c]);
-  cv::Mat mean = planes[0] / cv::max(weight, 1e-3), result;
-  cv::resize(mean, result, difference.size(), 0, 0, cv::INTER_LINEAR);
-  return result;
-}
-
-/// How much of each pixel's difference is detail of what the field shows: 0..255.
-cv::Mat confidence_of(const cv::Mat& difference, const cv::Mat& known, cv::Size base,
-                      double unexplained) {
-  const cv::Mat local = local_difference(difference, known, base);
-  cv::Mat result(difference.size(), CV_8U);
-  for (int y = 0; y < result.rows; ++y)
-    for (int x = 0; x < result.cols; ++x) {
-      const double off = local.at<float>(y, x) / unexplained;
-      const int inside =
-          std::min(std::min(x, result.cols - 1 - x), std::min(y, result.rows - 1 - y));
-      const double ramp = std::min(1.0, inside / std::max(1.0, border * result.cols));
-      result.at<uchar>(y, x) =
-          cv::saturate_cast<uchar>(255 * known.at<float>(y, x) * ramp * std::exp(-off * off));
-    }
-  return result;
 }
 
 /// The middle of what a view sees; none where it sees nothing.

@@ -23,6 +23,8 @@ constexpr double steps[][2] = {{1, 0}, {-1, 0}, {0, 1},  {0, -1},
 /// and a place to be taken.
 constexpr double tried_gain = 0.1, taken_gain = 0.25;
 
+/// Beyond, it is no place beside but another one, which is asked of all that is known elsewhere.
+constexpr double farthest_deg = 2 * step_deg;
 /// Fewer views paint nothing to compare with.
 constexpr std::size_t least_painters = 3;
 
@@ -60,9 +62,9 @@ Result<std::vector<Beside>> candidates(const OrbitRefinement& refinement,
 
 /// Each bundled from its start as if it were one view more, which its own self doesn't hold: they
 /// are turned too little against each other.
-Result<std::vector<PosedView>> bundled_anew(const OrbitRefinement& refinement,
-                                            const std::vector<Beside>& tried,
-                                            const Fit& alignment) {
+Result<std::vector<RenderAlignedView>> bundled_anew(const OrbitRefinement& refinement,
+                                                    const std::vector<Beside>& tried,
+                                                    const Fit& alignment) {
   OrbitViews orbit = refinement.orbit;
   Fit wider = alignment;
   std::vector<std::size_t> added, settled;
@@ -77,9 +79,8 @@ Result<std::vector<PosedView>> bundled_anew(const OrbitRefinement& refinement,
   }
   ORBITFUSE_TRY(
       bundle_added({refinement.renderer, orbit, refinement.progress}, added, settled, {}, wider));
-  std::vector<PosedView> places;
-  for (const std::size_t i : added) places.push_back(wider.views[i].view);
-  return places;
+  return std::vector<RenderAlignedView>(
+      wider.views.end() - static_cast<std::ptrdiff_t>(added.size()), wider.views.end());
 }
 
 }  // namespace
@@ -94,12 +95,14 @@ Result<int> try_places_beside(const OrbitRefinement& refinement, Fit& alignment)
   ORBITFUSE_ASSIGN(const SceneRenderer painted, painted_by_others(refinement, alignment, all));
   ORBITFUSE_ASSIGN(const std::vector<Beside> tried, candidates(refinement, painted, alignment));
   if (tried.empty()) return 0;
-  ORBITFUSE_ASSIGN(const std::vector<PosedView> places, bundled_anew(refinement, tried, alignment));
+  ORBITFUSE_ASSIGN(const std::vector<RenderAlignedView> bundled,
+                   bundled_anew(refinement, tried, alignment));
   std::vector<std::size_t> chosen;
-  std::vector<PosedView> before;
-  for (const Beside& one : tried) {
-    chosen.push_back(one.view);
-    before.push_back(alignment.views[one.view].view);
+  std::vector<PosedView> before, places;
+  for (std::size_t c = 0; c < tried.size(); ++c) {
+    chosen.push_back(tried[c].view);
+    before.push_back(alignment.views[tried[c].view].view);
+    places.push_back(bundled[c].view);
   }
   // Compared after the same last round.
   const std::vector<RenderRound> last = {fine_rounds().back()};
@@ -110,19 +113,23 @@ Result<int> try_places_beside(const OrbitRefinement& refinement, Fit& alignment)
     const Beside& one = tried[c];
     ORBITFUSE_ASSIGN(const auto like, correlation_with(painted, orbit.images[one.view], places[c]));
     const RenderAlignedView &was = here.views[c], &now = there.views[c];
-    const bool taken =
-        like && *like > one.like + taken_gain * (1 - one.like) && now.support() >= was.support();
+    const Rigid3d &from = before[c].cam_from_world, &to = places[c].cam_from_world;
+    const double far_deg = apart_deg(orbit, from, to);
+    // Form must say so of that place, not of one that it comes back to.
+    const bool held = same_place(orbit, now.view.cam_from_world, to);
+    const bool taken = like && *like > one.like + taken_gain * (1 - one.like) && held &&
+                       now.support() >= was.support() && far_deg <= farthest_deg;
     refinement.progress.report(
         {"poses.thermal", 3, 4, -1,
-         fmt::format(
-             "{}: bundled anew from beside, {:.2f} deg away: its image {:.3f} like the "
-             "others' ({:.3f} before), form's support {:.1f} ({:.1f}){}",
-             places[c].name, apart_deg(orbit, before[c].cam_from_world, places[c].cam_from_world),
-             like.value_or(0), one.like, now.support(), was.support(), taken ? ": taken" : "")});
+         fmt::format("{}: bundled anew from beside, {:.2f} deg away: its image {:.3f} like the "
+                     "others' ({:.3f} before), form's support {:.1f} ({:.1f}){}",
+                     places[c].name, far_deg, like.value_or(0), one.like, now.support(),
+                     was.support(), taken ? ": taken" : "")});
     if (!taken) continue;
     ++went;
     RenderAlignedView& view = alignment.views[one.view];
     view.view = places[c];
+    view.confirmed_patches = bundled[c].confirmed_patches;
     view.agreement = now.agreement, view.matches = now.matches, view.median_px = now.median_px;
   }
   return went;

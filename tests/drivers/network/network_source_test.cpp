@@ -300,6 +300,7 @@ TEST_F(NetworkTest, WhatNobodyTookBeforeAnOutageIsCountedOnce) {
   NetworkSource source(options(phone.url()));
   ASSERT_TRUE(source.start());
   while (phone.number < 150) std::this_thread::sleep_for(5ms);  // over 100 of them not taken
+  std::this_thread::sleep_for(500ms);  // what is on the line when it is hung up is not read
   phone.hang_up = true;
   while (phone.connections < 2) std::this_thread::sleep_for(5ms);
   Came came = drain(source, [](const Came& c) { return c.has("reconnected") && c.gaps > 0; });

@@ -59,6 +59,14 @@ TEST_F(HeifPhoto, IsReadUprightInEveryOrientation) {
   }
 }
 
+TEST_F(HeifPhoto, OfAClockThatNobodySetHasNoTime) {
+  std::string exif = made::exif_block(1);
+  exif.replace(exif.find("2024:05:06 07:08:09"), 19, "1970:01:01 00:00:00");
+  const ExifInfo read = heif_exif(made::heic(quarters(), 1, exif));
+  EXPECT_EQ(read.focal_35mm, 26);
+  EXPECT_FALSE(read.taken_ns);
+}
+
 TEST_F(HeifPhoto, IsImportedAsAnUprightJpegWithFocalLengthAndTime) {
   test::put(folder / "in/IMG_1.HEIC", made::heic(quarters(), 6, made::exif_block(6)));
   test::put(folder / "in/IMG_2.heic", made::heic(quarters({128, 96}), 1));

@@ -51,6 +51,20 @@ TEST(PlacesBeside, RightViewsAndDroppedOnesStay) {
         << i;
 }
 
+TEST(PlacesBeside, WhereFormSaysLessNobodyGoes) {
+  Ball ball;
+  put_beside(ball, 4, 1.4, 0);
+  const Eigen::Vector3d home = camera_center(ball.truth[4].cam_from_world);
+  ball.form = [home](const Camera& camera, const Rigid3d& pose) -> Result<SceneRender> {
+    SceneRender seen = testing_orbit::ball_view(camera, pose, false);
+    if ((camera_center(pose) - home).norm() < 0.03) seen.brightness.setTo(1);
+    return seen;
+  };
+  const Rigid3d before = ball.alignment.views[4].view.cam_from_world;
+  EXPECT_EQ(tried(ball).value(), 0);
+  EXPECT_EQ(ball.alignment.views[4].view.cam_from_world.translation, before.translation);
+}
+
 TEST(PlacesBeside, WithoutAnythingToCompareNothingMoves) {
   for (const float value : {0.0F, std::numeric_limits<float>::quiet_NaN(), 1e30F}) {
     Ball ball(6);
