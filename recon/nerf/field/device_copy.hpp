@@ -17,8 +17,8 @@ class DeviceCopy {
   DeviceCopy() = default;
   DeviceCopy(const DeviceCopy&) {}
   DeviceCopy(DeviceCopy&& other) noexcept : tracer_(std::move(other.tracer_)) {}
-  DeviceCopy& operator=(const DeviceCopy&) {
-    forget();
+  DeviceCopy& operator=(const DeviceCopy& other) {
+    if (this != &other) forget();
     return *this;
   }
   DeviceCopy& operator=(DeviceCopy&& other) noexcept {
