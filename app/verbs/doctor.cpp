@@ -46,11 +46,10 @@ doctor::CameraLink link_of(const aravis::FoundCamera& camera) {
     return aravis::read_register(camera.address, address, std::chrono::milliseconds(200));
   };
   const auto packet_size = ask(aravis::GvcpRegister::packet_size);
+  const int packet_bytes = static_cast<int>(packet_size.value_or(0) & 0xffff);  // 0: it doesn't say
   // Only GigE cameras have an address and that port.
   return {camera.model + " " + camera.serial, camera.address,
-          (packet_size.value_or(0) & 0xffff) != 0
-              ? std::optional(static_cast<int>(*packet_size & 0xffff))
-              : std::nullopt,  // 0: it doesn't say
+          packet_bytes != 0 ? std::optional(packet_bytes) : std::nullopt,
           ask(aravis::GvcpRegister::control_privilege).value_or(0) != 0,
           packet_size.has_value() || camera.address.empty()};
 }

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "fusion/best/quartered.hpp"
+
 namespace orbitfuse::fusion {
 namespace {
 

@@ -38,7 +38,13 @@ struct Tally {
 /// `best` (best/best.hpp), which weren't chosen by this method's scores.
 constexpr float visible_preference = 2, brightness_weight = 0.02F;
 
-float of_level(float mean) { return patch_size * brightness_weight * std::max(0.0F, mean); }
+/// What decides a patch, by its structure and mean.
+float activity_of_thermal(float structure, float mean) {
+  return structure + patch_size * brightness_weight * std::max(0.0F, mean);
+}
+float activity_of_visible(float structure, float mean) {
+  return activity_of_thermal(structure, mean) + patch_size * visible_preference;
+}
 
 /// Work space of one thread.
 struct Coder {
@@ -54,8 +60,8 @@ struct Coder {
     omp.solve(t, stop, code_t);
     tally.flat += code_v.atoms.empty() + code_t.atoms.empty();
     tally.atoms += static_cast<long>(code_v.atoms.size() + code_t.atoms.size());
-    const float activity_v = code_v.l1() + of_level(mean_v) + patch_size * visible_preference,
-                activity_t = code_t.l1() + of_level(mean_t);
+    const float activity_v = activity_of_visible(code_v.l1(), mean_v),
+                activity_t = activity_of_thermal(code_t.l1(), mean_t);
     // Where both count alike there is no winner.
     const float mean = activity_v > activity_t   ? mean_v
                        : activity_t > activity_v ? mean_t
@@ -70,9 +76,8 @@ struct Coder {
     const float mean_v = cut(visible, x, y, v), mean_t = cut(thermal, x, y, t);
     tally.patches += 2;
     if (certain_ratio > 0) {
-      const float a = patch_activity(visible, x, y).structure + of_level(mean_v) +
-                      patch_size * visible_preference,
-                  b = patch_activity(thermal, x, y).structure + of_level(mean_t);
+      const float a = activity_of_visible(patch_activity(visible, x, y).structure, mean_v),
+                  b = activity_of_thermal(patch_activity(thermal, x, y).structure, mean_t);
       if (std::max(a, b) > certain_ratio * std::min(a, b)) {
         fused = a > b ? v.array() + mean_v : t.array() + mean_t;
         tally.certain += 2;

@@ -49,6 +49,13 @@ std::size_t lender(const OrbitViews& orbit, const RenderAlignment& alignment, st
 
 }  // namespace
 
+std::vector<std::size_t> not_dropped(const Fit& alignment) {
+  std::vector<std::size_t> kept;
+  for (std::size_t i = 0; i < alignment.views.size(); ++i)
+    if (alignment.views[i].verdict.confidence != Confidence::dropped) kept.push_back(i);
+  return kept;
+}
+
 LoopModel loop_model(const OrbitViews& orbit, const RenderAlignment& alignment) {
   std::map<int, std::vector<std::size_t>> loops;
   for (std::size_t i = 0; i < orbit.stations.size(); ++i)

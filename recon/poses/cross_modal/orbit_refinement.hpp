@@ -41,6 +41,9 @@ struct LoopModel {
   double azimuth_deg(const OrbitViews& orbit, std::size_t view) const;
 };
 
+/// The views that are kept, sure or doubtful.
+std::vector<std::size_t> not_dropped(const Fit& alignment);
+
 LoopModel loop_model(const OrbitViews& orbit, const Fit& alignment);
 
 /// The view's place as its loop predicts it; where no view of the loop is posed, its own.

@@ -25,8 +25,6 @@ constexpr double tried_gain = 0.1, taken_gain = 0.25;
 
 /// Beyond, it is no place beside but another one, which is asked of all that is known elsewhere.
 constexpr double farthest_deg = 2 * step_deg;
-/// Fewer views paint nothing to compare with.
-constexpr std::size_t least_painters = 3;
 
 struct Beside {
   std::size_t view;
@@ -35,11 +33,11 @@ struct Beside {
 };
 
 Result<std::vector<Beside>> candidates(const OrbitRefinement& refinement,
-                                       const SceneRenderer& painted, const Fit& alignment) {
+                                       const SceneRenderer& painted,
+                                       const std::vector<std::size_t>& kept, const Fit& alignment) {
   const OrbitViews& orbit = refinement.orbit;
   std::vector<Beside> found;
-  for (std::size_t i = 0; i < alignment.views.size(); ++i) {
-    if (alignment.views[i].verdict.confidence == Confidence::dropped) continue;
+  for (const std::size_t i : kept) {
     ORBITFUSE_TRY(refinement.progress.check("poses.thermal"));
     const PosedView& view = alignment.views[i].view;
     ORBITFUSE_ASSIGN(const auto here, correlation_with(painted, orbit.images[i], view));
@@ -64,12 +62,11 @@ Result<std::vector<Beside>> candidates(const OrbitRefinement& refinement,
 /// are turned too little against each other.
 Result<std::vector<RenderAlignedView>> bundled_anew(const OrbitRefinement& refinement,
                                                     const std::vector<Beside>& tried,
+                                                    const std::vector<std::size_t>& kept,
                                                     const Fit& alignment) {
   OrbitViews orbit = refinement.orbit;
   Fit wider = alignment;
-  std::vector<std::size_t> added, settled;
-  for (std::size_t i = 0; i < alignment.views.size(); ++i)
-    if (alignment.views[i].verdict.confidence != Confidence::dropped) settled.push_back(i);
+  std::vector<std::size_t> added;
   for (const Beside& one : tried) {
     added.push_back(wider.views.size());
     orbit.images.push_back(orbit.images[one.view]);
@@ -78,7 +75,7 @@ Result<std::vector<RenderAlignedView>> bundled_anew(const OrbitRefinement& refin
     wider.views.back().view = one.start;
   }
   ORBITFUSE_TRY(
-      bundle_added({refinement.renderer, orbit, refinement.progress}, added, settled, {}, wider));
+      bundle_added({refinement.renderer, orbit, refinement.progress}, added, kept, {}, wider));
   return std::vector<RenderAlignedView>(
       wider.views.end() - static_cast<std::ptrdiff_t>(added.size()), wider.views.end());
 }
@@ -88,15 +85,14 @@ Result<std::vector<RenderAlignedView>> bundled_anew(const OrbitRefinement& refin
 Result<int> try_places_beside(const OrbitRefinement& refinement, Fit& alignment) {
   const TraceSpan span("places beside");
   const OrbitViews& orbit = refinement.orbit;
-  std::vector<std::size_t> all;
-  for (std::size_t i = 0; i < alignment.views.size(); ++i)
-    if (alignment.views[i].verdict.confidence != Confidence::dropped) all.push_back(i);
-  if (all.size() < least_painters) return 0;
-  ORBITFUSE_ASSIGN(const SceneRenderer painted, painted_by_others(refinement, alignment, all));
-  ORBITFUSE_ASSIGN(const std::vector<Beside> tried, candidates(refinement, painted, alignment));
+  const std::vector<std::size_t> kept = not_dropped(alignment);
+  if (kept.size() < least_painters) return 0;
+  ORBITFUSE_ASSIGN(const SceneRenderer painted, painted_by_others(refinement, alignment, kept));
+  ORBITFUSE_ASSIGN(const std::vector<Beside> tried,
+                   candidates(refinement, painted, kept, alignment));
   if (tried.empty()) return 0;
   ORBITFUSE_ASSIGN(const std::vector<RenderAlignedView> bundled,
-                   bundled_anew(refinement, tried, alignment));
+                   bundled_anew(refinement, tried, kept, alignment));
   std::vector<std::size_t> chosen;
   std::vector<PosedView> before, places;
   for (std::size_t c = 0; c < tried.size(); ++c) {

@@ -21,8 +21,6 @@ namespace {
 constexpr double asked_correlation_share = 0.75;
 /// Two views turned by less are one station's: its own temperatures confirm any place.
 constexpr double own_turn_deg = 8;
-/// Fewer sure views paint nothing to judge others by.
-constexpr std::size_t least_painters = 3;
 
 /// Whether the place found among the temperatures of settled views confirms the view's.
 ViewVerdict in_settled_scene(const OrbitViews& orbit, const RenderAlignedView& view,

@@ -13,6 +13,9 @@
 // renderer's, cancelled.
 namespace orbitfuse {
 
+/// Fewer views paint nothing to judge others by.
+inline constexpr std::size_t least_painters = 3;
+
 /// The scene that the chosen views paint, for views that are turned far enough not to be one of
 /// them.
 Result<SceneRenderer> painted_by_others(const OrbitRefinement& refinement, const Fit& alignment,

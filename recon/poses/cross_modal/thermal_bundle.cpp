@@ -252,9 +252,7 @@ Result<bool> solve_rounds(const OrbitRefinement& refinement, const FocalGuess& p
 Status bundle_thermal(const OrbitRefinement& refinement, const FocalGuess& prior,
                       const ThermalBundleOptions& options, Fit& alignment) {
   const TraceSpan span("thermal bundle");
-  std::vector<std::size_t> chosen;
-  for (std::size_t i = 0; i < alignment.views.size(); ++i)
-    if (alignment.views[i].verdict.confidence != Confidence::dropped) chosen.push_back(i);
+  const std::vector<std::size_t> chosen = not_dropped(alignment);
   if (chosen.empty()) return {};
   Fit bundled = alignment;
   FocalGuess lens = prior;

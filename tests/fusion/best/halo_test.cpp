@@ -113,7 +113,7 @@ TEST(PlainRegions, ExtremeSourcesGiveFiniteValues) {
   for (const float level : {0.0F, 1e-20F, 1e15F}) {
     Plane v(9, 7, 0.0F);
     v(4, 3) = level;
-    EXPECT_TRUE(cv::checkRange(within_regions(v * 0 + 1, v * 0 + 1, v, v, {2, 6, 10}))) << level;
+    EXPECT_TRUE(cv::checkRange(within_regions(v, v * 0 + 1, v, v, {2, 6, 10}))) << level;
   }
 }
 
