@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "app/pipeline/runner.hpp"
 
-#include <fcntl.h>
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <cstdio>
 #include <set>
 
 #include "app/pipeline/folder_lock.hpp"
 #include "app/pipeline/out_folder.hpp"
+#include "app/pipeline/result_folder.hpp"
 #include "core/nested_text.hpp"
 #include "core/system/clock.hpp"
 #include "core/system/file_io.hpp"
@@ -49,61 +46,6 @@ Status write_attempt(const fs::path& file, const Attempt& attempt) {
   return write_file_atomic(
       file,
       json{{"key", attempt.key}, {"cpu_s", attempt.cpu_s}, {"wall_s", attempt.wall_s}}.dump());
-}
-
-Status device_error(const fs::path& path, const std::error_code& ec) {
-  if (!ec) return {};
-  return fail(ErrorKind::device, path.string(), ec.message(),
-              "check permissions and free space, then run again with --resume");
-}
-
-Status make_folder(const fs::path& folder) {
-  std::error_code ec;
-  fs::create_directories(folder, ec);
-  return device_error(folder, ec);
-}
-
-Status remove_tree(const fs::path& folder) {
-  std::error_code ec;
-  fs::remove_all(folder, ec);
-  return device_error(folder, ec);
-}
-
-/// Puts `from` in the place of `to`: one exchange, so that a crash leaves the old or the new.
-Status replace_folder(const fs::path& from, const fs::path& to) {
-  if (renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_EXCHANGE) == 0)
-    return remove_tree(from);
-  // Absent, or a file system that can't exchange: in two steps, of which the first is taken back
-  // where the second fails.
-  fs::path old = from;
-  old += ".old";
-  std::error_code ec;
-  const bool there = fs::exists(fs::symlink_status(to, ec));
-  if (there) {
-    ORBITFUSE_TRY(remove_tree(old));
-    fs::rename(to, old, ec);
-    ORBITFUSE_TRY(device_error(to, ec));
-  }
-  fs::rename(from, to, ec);
-  if (ec && there) {
-    std::error_code back;
-    fs::rename(old, to, back);
-  }
-  ORBITFUSE_TRY(device_error(to, ec));
-  return remove_tree(old);
-}
-
-/// Whether a stage's result may take this place: what no stage left there may be anything, and
-/// names like "report" and "depth" are common.
-Status check_place(const fs::path& folder) {
-  std::error_code unreadable;
-  if (!fs::exists(fs::symlink_status(folder, unreadable)) ||
-      fs::exists(folder / stage_record_file, unreadable) ||
-      (fs::is_directory(folder, unreadable) && fs::is_empty(folder, unreadable)))
-    return {};
-  return fail(ErrorKind::usage, folder.string(),
-              fmt::format("is there already, and no run left it (no {} in it)", stage_record_file),
-              "choose another --out, or move it away");
 }
 
 /// Later stages can't do better after these.
@@ -185,11 +127,7 @@ Runner::Key Runner::key_of(const Stage& stage) const {
   return key;
 }
 
-bool Runner::forced(const Stage& stage) const {
-  return options_.force &&
-         (options_.targets.empty() ||
-          std::count(options_.targets.begin(), options_.targets.end(), stage.name) > 0);
-}
+bool Runner::forced(const Stage& stage) const { return options_.force && is_target(stage.name); }
 
 std::optional<EarlierResult> Runner::earlier_result(const Stage& stage, const Key& key) const {
   const fs::path folder = options_.out / stage.name;
