@@ -106,7 +106,7 @@ Result<Plane> fuse_best(const Plane& visible, const Plane& thermal, const BestOp
   parallel_for(2, [&](int i) {
     sources[static_cast<std::size_t>(i)] = source_of(i == 0 ? visible : thermal, levels);
   });
-  auto& [v, t] = sources;
+  Source &v = sources[0], &t = sources[1];
   std::vector<bool> skip;
   for (std::size_t i = 0; i < v.bands.size(); ++i) {
     skip.push_back(silent(v.bands[i].band, t.bands[i].band));
