@@ -170,7 +170,10 @@ class ForwardPass {
     launch(count * ray_pieces, WalkPieces{field.cells(), settings, rays.data(), found});
     launch(count, CountSamples{settings, rays.data(), found, spread_.data(), counts_.data()});
     scan_.run(counts_.data(), count, first_.data());
-    launch(count, PlaceSamples{rays.data(), found, spread_.data(), samples});
+    launch(count * ray_pieces,
+           PlaceSamples{rays.data(), found, spread_.data(), samples, before_end_.data()});
+    launch(count * per_ray,
+           FinishSamples{rays.data(), spread_.data(), before_end_.data(), per_ray, samples});
   }
 
   void need(const FieldStore& field, std::size_t count, std::size_t bound) {
@@ -184,6 +187,7 @@ class ForwardPass {
       const std::size_t wide = (bound + bound / 4 + 31) / 32 * 32;
       along_.need(7 * wide);
       position_.need(3 * wide);
+      before_end_.need(wide);
       sample_of.need(wide);
       ray_of.need(wide);
       features_.zeros(static_cast<std::size_t>(field.width) * wide);  // padding stays 0
@@ -201,11 +205,12 @@ class ForwardPass {
   }
 
   Scan scan_;
-  Buffer<Segment> segments_, piece_sums_;
+  Buffer<Segment> segments_;
+  Buffer<PieceSum> piece_sums_;
   Buffer<int> piece_counts_;
   Buffer<SampleSpread> spread_;
   Buffer<int> counts_, first_, used_, colored_;
-  Buffer<float> along_, position_, features_, color_in_;
+  Buffer<float> along_, position_, before_end_, features_, color_in_;
 };
 
 }  // namespace orbitfuse::nerf::ORBITFUSE_ENGINE

@@ -9,7 +9,7 @@
 
 // Samples along rays on a device, as march() places them. A ray's next cell depends on its last,
 // and a step's rays are few: each ray's way is walked in pieces, side by side, which note the
-// occupied stretches; then each ray shares out its samples.
+// occupied stretches; each ray shares out its samples among its pieces, and these place them.
 namespace orbitfuse::nerf::ORBITFUSE_ENGINE {
 
 /// Occupancy as marching reads it.
@@ -162,13 +162,25 @@ ORBITFUSE_HOST_DEVICE inline float piece_begin(const Ray& ray, int piece) {
   return beyond < outer_pieces ? middle + doubled(beyond) : no_end;
 }
 
+/// What samples are shared out by: each stretch gets as many as its mass says.
+ORBITFUSE_HOST_DEVICE inline float mass_of(const SampleSpread& how, float surface, float haze) {
+  return surface * how.surface_share + haze * how.haze_share;
+}
+
+/// What a ray's piece holds, and what lies before it.
+struct PieceSum {
+  float surface, haze, length;
+  float mass_before, length_before;
+  float mass_end;  ///< samples up to it are this piece's
+};
+
 /// Occupied stretches of all rays' pieces: slot s of piece p of ray r is at [(p * slots + s) * rays
 /// + r].
 struct Stretches {
   int rays, slots;
   Segment* segment;
-  int* count;    ///< [piece][ray]
-  Segment* sum;  ///< [piece][ray]: of surface and haze
+  int* count;     ///< [piece][ray]
+  PieceSum* sum;  ///< [piece][ray]
   ORBITFUSE_HOST_DEVICE Segment& at(int piece, int slot, int ray) const {
     return segment[(static_cast<long>(piece) * slots + slot) * rays + ray];
   }
@@ -192,7 +204,12 @@ struct WalkPieces {
   ORBITFUSE_HOST_DEVICE void operator()(int i) const {
     const int r = i % found.rays, piece = i / found.rays;
     int count = 0;
-    Segment held = {}, sum = {};
+    Segment held = {};
+    PieceSum sum = {};
+    const auto keep = [&] {
+      found.at(piece, count - 1, r) = held;
+      sum.length += held.length;
+    };
     if (rays[r].there) {
       const float begin = piece_begin(rays[r].ray, piece),
                   end = piece_begin(rays[r].ray, piece + 1);
@@ -212,17 +229,18 @@ struct WalkPieces {
           held.haze += now.haze;
           continue;
         }
-        if (count > 0) found.at(piece, count - 1, r) = held;
+        if (count > 0) keep();
         held = now;
         ++count;
       }
     }
-    if (count > 0) found.at(piece, count - 1, r) = held;
+    if (count > 0) keep();
     found.count[i] = count;
     found.sum[i] = sum;
   }
 };
 
+/// How many samples each ray gets, and which of them lie in which of its pieces.
 struct CountSamples {
   MarchSettings settings;
   const DeviceRay* rays;
@@ -235,14 +253,62 @@ struct CountSamples {
     counts[r] = 0;
     if (!rays[r].there) return;
     counts[r] = 1;
+    join_pieces(r);
     float surface = 0, haze = 0;
     for (int piece = 0; piece < ray_pieces; ++piece) {
-      surface += found.sum[piece * found.rays + r].surface;
-      haze += found.sum[piece * found.rays + r].haze;
+      surface += sum(piece, r).surface;
+      haze += sum(piece, r).haze;
     }
     if (!(haze > 0)) return;
     spread[r] = spread_of(surface, haze, settings);
     counts[r] = spread[r].count + 1;
+    share_out(r, spread[r]);
+  }
+
+ private:
+  ORBITFUSE_HOST_DEVICE PieceSum& sum(int piece, int r) const {
+    return found.sum[piece * found.rays + r];
+  }
+
+  /// A stretch of which nothing is known may go on in the next pieces: it is its first piece's.
+  ORBITFUSE_HOST_DEVICE void join_pieces(int r) const {
+    int holder = -1;
+    Segment held = {};
+    for (int piece = 0; piece < ray_pieces; ++piece) {
+      int& count = found.count[piece * found.rays + r];
+      if (count == 0) continue;
+      Segment& first = found.at(piece, 0, r);
+      if (holder >= 0 && joined(held, first)) {
+        found.at(holder, found.count[holder * found.rays + r] - 1, r) = held;
+        sum(holder, r).haze += first.haze;
+        sum(holder, r).length += first.length;
+        if (count == 1) {
+          count = 0;
+          sum(piece, r) = {};
+          continue;
+        }
+        sum(piece, r).haze -= first.haze;
+        sum(piece, r).length -= first.length;
+        first.haze = first.length = 0;
+      }
+      holder = piece;
+      held = found.at(piece, count - 1, r);
+    }
+  }
+
+  ORBITFUSE_HOST_DEVICE void share_out(int r, const SampleSpread& how) const {
+    float mass = 0, length = 0;
+    int last = 0;
+    for (int piece = 0; piece < ray_pieces; ++piece) {
+      PieceSum& own = sum(piece, r);
+      own.mass_before = mass;
+      own.length_before = length;
+      mass += mass_of(how, own.surface, own.haze);
+      length += own.length;
+      own.mass_end = mass;
+      if (found.count[piece * found.rays + r] > 0) last = piece;
+    }
+    sum(last, r).mass_end = no_end;  // what rounding has left over
   }
 };
 
@@ -253,90 +319,79 @@ struct RaySamples {
   Rows position01;
 };
 
-/// Inverse transform sampling of a ray's segments.
+/// Inverse transform sampling, of each piece's stretches for itself: where the running mass reaches
+/// a sample's middle, and how much occupied length lies before its end.
 struct PlaceSamples {
   const DeviceRay* rays;
   Stretches found;
   const SampleSpread* spread;
+  RaySamples samples;  ///< t
+  float* length_before_end;
+
+  ORBITFUSE_HOST_DEVICE void operator()(int i) const {
+    const int r = i % found.rays, piece = i / found.rays, slots = found.count[i];
+    const SampleSpread how = spread[r];
+    if (slots == 0 || how.count == 0) return;
+    const PieceSum sum = found.sum[i];
+    // Samples keep to the middle half of their stratum.
+    const float middle = 0.5f + 0.5f * (rays[r].jitter - 0.5f);
+    const auto mass_at = [&](int mark) {  // middles and ends in turn
+      return (static_cast<float>(mark / 2) + (mark % 2 == 0 ? middle : 1.0f)) * how.per_sample;
+    };
+    int mark = 2 * static_cast<int>(sum.mass_before / how.per_sample) - 2;
+    if (mark < 0) mark = 0;
+    while (mark < 2 * how.count && mass_at(mark) <= sum.mass_before) ++mark;
+
+    const int at = samples.first[r];
+    float mass = sum.mass_before, length = sum.length_before;
+    Segment next = found.at(piece, 0, r);
+    for (int slot = 0; slot < slots && mark < 2 * how.count; ++slot) {
+      const Segment now = next;
+      if (slot + 1 < slots) next = found.at(piece, slot + 1, r);  // on its way meanwhile
+      const float own = mass_of(how, now.surface, now.haze);
+      const float end = slot + 1 < slots ? fminf(mass + own, sum.mass_end) : sum.mass_end;
+      for (; mark < 2 * how.count; ++mark) {
+        const float wanted = mass_at(mark);
+        if (wanted > end) break;
+        const float part = fminf(fmaxf((wanted - mass) / fmaxf(own, 1e-12f), 0.0f), 1.0f);
+        if (mark % 2 == 0)
+          samples.t[at + mark / 2] = now.begin + part * now.length;
+        else
+          length_before_end[at + mark / 2] = length + part * now.length;
+      }
+      mass += own;
+      length += now.length;
+    }
+  }
+};
+
+/// What else follows from where a sample lies; sample k of ray r is i = r * per_ray + k.
+struct FinishSamples {
+  const DeviceRay* rays;
+  const SampleSpread* spread;
+  const float* length_before_end;
+  int per_ray;
   RaySamples samples;
 
-  ORBITFUSE_HOST_DEVICE void operator()(int r) const {
-    const DeviceRay& given = rays[r];
-    if (!given.there) return;
-    const SampleSpread& how = spread[r];
-    int at = samples.first[r];
-    if (how.count > 0) place(r, how, at);
-    at += how.count;
-    const float infinity[3] = {0.5f + 0.5f * given.ray.direction[0],
-                               0.5f + 0.5f * given.ray.direction[1],
-                               0.5f + 0.5f * given.ray.direction[2]};
-    put(at, 1e6f, 0, infinity);
+  ORBITFUSE_HOST_DEVICE void operator()(int i) const {
+    const int r = i / per_ray, k = i % per_ray;
+    if (!rays[r].there || k > spread[r].count) return;
+    const Ray& ray = rays[r].ray;
+    const int at = samples.first[r] + k;
+    if (k == spread[r].count) {
+      const float infinity[3] = {0.5f + 0.5f * ray.direction[0], 0.5f + 0.5f * ray.direction[1],
+                                 0.5f + 0.5f * ray.direction[2]};
+      put(at, 1e6f, 0, infinity);
+      return;
+    }
+    const float t = samples.t[at], before = k > 0 ? length_before_end[at - 1] : 0.0f;
+    float x[3], contracted[3];
+    for (int d = 0; d < 3; ++d) x[d] = ray.origin[d] + t * ray.direction[d];
+    contract01(x, contracted);
+    put(at, t, fmaxf(0.0f, length_before_end[at] - before), contracted);
   }
 
  private:
-  /// Where the running sum of what samples are shared out by reaches a sample's middle, and its
-  /// end.
-  struct Running {
-    float mass = 0, length = 0;  ///< before the segment
-    float edge = 0;              ///< occupied length up to the last sample's end
-    float t = 0;                 ///< of the sample whose end comes next
-    int passed = 0;              ///< middles and ends
-  };
-
-  ORBITFUSE_HOST_DEVICE void place(int r, const SampleSpread& how, int at) const {
-    Segment held = {};
-    Running running;
-    bool holds = false;
-    const auto mass_of = [&](const Segment& s) {
-      return s.surface * how.surface_share + s.haze * how.haze_share;
-    };
-    for (int piece = 0; piece < ray_pieces; ++piece) {
-      const int slots = found.count[piece * found.rays + r];
-      Segment next = slots > 0 ? found.at(piece, 0, r) : Segment{};
-      for (int slot = 0; slot < slots && running.passed < 2 * how.count; ++slot) {
-        const Segment now = next;
-        if (slot + 1 < slots) next = found.at(piece, slot + 1, r);  // on its way meanwhile
-        if (holds && joined(held, now)) continue;
-        if (holds) {
-          const float own = mass_of(held);
-          pass(rays[r], how, at, held, own, running.mass + own, running);
-          running.mass += own;
-          running.length += held.length;
-        }
-        held = now;
-        holds = true;
-      }
-    }
-    // What rounding has left over belongs to the last.
-    pass(rays[r], how, at, held, mass_of(held), no_end, running);
-  }
-
-  /// All middles and ends up to a mass, which lie in this segment.
-  ORBITFUSE_HOST_DEVICE void pass(const DeviceRay& given, const SampleSpread& how, int at,
-                                  const Segment& in, float own, float up_to,
-                                  Running& running) const {
-    const float shift =
-        0.5f * (given.jitter - 0.5f);  // samples keep to the middle half of their stratum
-    for (; running.passed < 2 * how.count; ++running.passed) {
-      const int k = running.passed / 2;
-      const bool middle = running.passed % 2 == 0;
-      const float place = static_cast<float>(k) + (middle ? 0.5f + shift : 1.0f);
-      const float mass = place * how.per_sample;
-      if (mass > up_to) return;
-      const float part = fminf(fmaxf((mass - running.mass) / fmaxf(own, 1e-12f), 0.0f), 1.0f);
-      if (middle) {
-        running.t = in.begin + part * in.length;
-        continue;
-      }
-      const float behind = running.length + part * in.length;
-      float x[3], contracted[3];
-      for (int d = 0; d < 3; ++d) x[d] = given.ray.origin[d] + running.t * given.ray.direction[d];
-      contract01(x, contracted);
-      put(at + k, running.t, fmaxf(0.0f, behind - running.edge), contracted);
-      running.edge = behind;
-    }
-  }
-
   ORBITFUSE_HOST_DEVICE void put(int at, float t, float dt, const float contracted[3]) const {
     const float inverse = 1.0f / (1.0f + t);
     samples.t[at] = t;
