@@ -152,7 +152,8 @@ Result<Transforms> read_transforms_json(const std::filesystem::path& file) {
   for (std::size_t i = 0; i < root["frames"].size(); ++i) {
     const Json& frame = root["frames"][i];
     const std::string where = fmt::format("{}: frames[{}]", file.string(), i);
-    if (!frame.is_object() || !frame.contains("file_path") || !frame["file_path"].is_string()) {
+    if (!frame.is_object() || !frame.contains("file_path") || !frame["file_path"].is_string() ||
+        frame["file_path"].get_ref<const std::string&>().empty()) {
       return fail(ErrorKind::input, where, "no file_path", "name the frame's image");
     }
     TransformsFrame out;

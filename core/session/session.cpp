@@ -118,6 +118,10 @@ Result<Session> open_session(const std::filesystem::path& folder) {
     const std::string_view line(text.data() + at, (is_last ? text.size() : end) - at);
     const std::string where = fmt::format("{}:{}", file.string(), number);
     const Json json = parse_json(line);
+    if (const auto twice = json.is_discarded() ? repeated_key(line) : std::nullopt)
+      return fail(ErrorKind::input, where,
+                  fmt::format("the key \"{}\" twice in one object", twice->key),
+                  "restore the manifest from a backup");
     if (json.is_discarded() && is_last && number > 1) {
       session.complete = false;
       session.warnings.push_back(where +

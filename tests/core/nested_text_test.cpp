@@ -37,6 +37,33 @@ TEST(NestedText, BracketsInStringsAndBesideEachOtherAreNoLevels) {
   EXPECT_TRUE(parse_json("]]]]").is_discarded());
 }
 
+/// Which of the two is meant nobody knows.
+TEST(NestedText, AKeyThatAnObjectHasTwiceIsNamedWithItsLine) {
+  const auto fault = [](const std::string& text) {
+    EXPECT_TRUE(parse_json(text).is_discarded()) << text;
+    return json_fault(text);
+  };
+  const auto twice = [](const std::string& key, int line) {
+    return "the key \"" + key + "\" twice in one object, the second time in line " +
+           std::to_string(line);
+  };
+  EXPECT_EQ(fault(R"({"a":1,"a":1})"), twice("a", 1));
+  EXPECT_EQ(fault("{\"a\": [\n {\"b\": \"a\",\n\n\"c\": {}, \"b\"\n : 2}]}"), twice("b", 4));
+  EXPECT_EQ(fault(R"({"":{"x":1},"b":[{},{}],"":0})"), twice("", 1));
+  EXPECT_EQ(fault(R"({"a":1,"\u0061":2})"), twice("a", 1)) << "the same key, written otherwise";
+  EXPECT_EQ(fault(R"({"\"{":1,"x":"}","\"{":2})"), twice("\"{", 1));
+  for (const char* text :
+       {R"({"a":{"a":1},"b":{"a":"a"},"c":["a","a"]})", R"([{"a":1},{"a":1}])", R"("a")",
+        R"({"a":"a","b":"a","A":1,"a ":{}})", R"({"\\":1,"\"":2,"\u005c\"":3})", "{}", "[[],[]]"})
+    EXPECT_TRUE(!parse_json(text).is_discarded() && json_fault(text).empty()) << text;
+  // Manifests have thousands of lines, transforms.json thousands of frames.
+  std::string many = "{";
+  for (int i = 0; i < 200'000; ++i) many += "\"" + std::to_string(i) + "\":{\"a\":1,\"b\":[]},\n";
+  EXPECT_EQ(parse_json(many + "\"\":0}").size(), 200'001u);
+  EXPECT_EQ(fault(many + "\"77\":0}"), twice("77", 200'001));
+  EXPECT_NE(json_fault("{\"a\":1,\"a\":").find("not JSON"), std::string::npos) << "cut off";
+}
+
 TEST(NestedText, KeysOfManyPartsAreNamedWithTheirLine) {
   const test::TempFolder folder;
   const auto read = [&](const std::string& text) {

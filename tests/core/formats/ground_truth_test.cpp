@@ -38,6 +38,17 @@ TEST(GroundTruth, IsReadWithTestViewsAndElevations) {
   EXPECT_TRUE(truth->test[0].thermal.empty());
 }
 
+TEST(GroundTruth, AKeyThatIsThereTwiceIsNamed) {
+  const test::TempFolder folder;
+  std::string text = truth_with("[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]");
+  text.insert(text.find("\"el\""), "\"el\": 30,\n");
+  put(folder / "t.json", text);
+  const auto truth = read_ground_truth(folder / "t.json");
+  ASSERT_FALSE(truth);
+  EXPECT_THAT(truth.error().message(),
+              AllOf(HasSubstr("t.json"), HasSubstr("key \"el\" twice"), HasSubstr("line 2")));
+}
+
 TEST(GroundTruth, PosesThatAreNotRigidAndNumbersThatAreNoneAreNamed) {
   const test::TempFolder folder;
   const std::pair<std::string, std::string> cases[] = {

@@ -136,6 +136,19 @@ TEST_F(SessionTest, DamageInTheMiddleNamesTheLine) {
   EXPECT_NE(s.error().where.find("manifest.jsonl:2"), std::string::npos) << s.error().where;
 }
 
+TEST_F(SessionTest, AKeyThatALineHasTwiceIsNamed) {
+  std::string text = manifest();
+  text.insert(text.rfind("\"width\":640"), "\"width\":64,");
+  const auto session = open(text);
+  ASSERT_FALSE(session);
+  EXPECT_EQ(session.error().kind, ErrorKind::input);
+  EXPECT_NE(session.error().where.find("manifest.jsonl:3"), std::string::npos);
+  EXPECT_EQ(session.error().found, "the key \"width\" twice in one object");
+  const auto cut = open(text.substr(0, text.find("\n{\"count\"")));  // of a last line too
+  ASSERT_FALSE(cut);
+  EXPECT_EQ(cut.error().found, session.error().found);
+}
+
 TEST_F(SessionTest, WrongTypesNameTheField) {
   const std::pair<const char*, const char*> edits[] = {
       {"\"width\":640", "\"width\":\"640\""},
