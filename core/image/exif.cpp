@@ -11,6 +11,9 @@
 namespace orbitfuse {
 namespace {
 
+/// Of lenses for photos, from circular fisheyes to telescopes.
+constexpr double shortest_35mm = 4, longest_35mm = 5000;
+
 std::string text_of(const Exiv2::ExifData& data, const char* key) {
   const auto it = data.findKey(Exiv2::ExifKey(key));
   if (it == data.end()) return {};
@@ -29,24 +32,31 @@ std::optional<double> number_of(const Exiv2::ExifData& data, const char* key) {
   return std::isfinite(value) ? std::optional(value) : std::nullopt;
 }
 
-/// "2021:06:30 10:20:30", ".123" digits and "+02:00" to UTC nanoseconds.
+/// "+02:00" in seconds; nothing for what no place on earth has.
+std::optional<std::int64_t> offset_s(const std::string& offset) {
+  char sign = 0;
+  unsigned hours = 0, minutes = 0;
+  if (std::sscanf(offset.c_str(), "%c%2u:%2u", &sign, &hours, &minutes) != 3 ||
+      (sign != '+' && sign != '-') || hours > 14 || minutes > 59)
+    return std::nullopt;
+  const std::int64_t seconds = hours * 3600LL + minutes * 60LL;
+  return sign == '+' ? seconds : -seconds;
+}
+
+/// "2021:06:30 10:20:30", ".123" digits and the offset to UTC nanoseconds.
 std::optional<std::int64_t> epoch_ns(const std::string& date, const std::string& subsec,
-                                     const std::string& offset) {
+                                     std::int64_t offset) {
   int y, mo, d, h, mi, s;
   if (std::sscanf(date.c_str(), "%d:%d:%d %d:%d:%d", &y, &mo, &d, &h, &mi, &s) != 6)
     return std::nullopt;
   const std::chrono::year_month_day day{std::chrono::year(y),
                                         std::chrono::month(static_cast<unsigned>(mo)),
                                         std::chrono::day(static_cast<unsigned>(d))};
-  if (!day.ok() || y < 1970 || y > 2200 || h > 23 || mi > 59 || s > 60) return std::nullopt;
+  if (!day.ok() || y < 1970 || y > 2100 || h < 0 || h > 23 || mi < 0 || mi > 59 || s < 0 || s > 60)
+    return std::nullopt;
   std::int64_t seconds =
       std::chrono::sys_days(day).time_since_epoch().count() * 86400LL + h * 3600LL + mi * 60LL + s;
-  char sign = 0;
-  int oh = 0, om = 0;
-  if (std::sscanf(offset.c_str(), "%c%d:%d", &sign, &oh, &om) == 3 &&
-      (sign == '+' || sign == '-')) {
-    seconds -= (sign == '+' ? 1 : -1) * (oh * 3600LL + om * 60LL);
-  }
+  seconds -= offset;
   std::int64_t fraction_ns = 0, unit = 100'000'000;
   for (char c : subsec) {
     if (!std::isdigit(static_cast<unsigned char>(c)) || unit == 0) break;
@@ -81,14 +91,16 @@ ExifInfo read_exif(std::string_view bytes) {
     info.focal_mm = number_of(data, "Exif.Photo.FocalLength");
     info.focal_35mm = number_of(data, "Exif.Photo.FocalLengthIn35mmFilm");
     if (info.focal_mm && *info.focal_mm <= 0) info.focal_mm.reset();
-    if (info.focal_35mm && *info.focal_35mm <= 0) info.focal_35mm.reset();
+    // A number of no lens (65535: unknown) would be believed as the focal length.
+    if (info.focal_35mm && !(*info.focal_35mm >= shortest_35mm && *info.focal_35mm <= longest_35mm))
+      info.focal_35mm.reset();
     info.make = text_of(data, "Exif.Image.Make");
     info.model = text_of(data, "Exif.Image.Model");
     info.serial = text_of(data, "Exif.Photo.BodySerialNumber");
-    const std::string offset = text_of(data, "Exif.Photo.OffsetTimeOriginal");
+    const auto offset = offset_s(text_of(data, "Exif.Photo.OffsetTimeOriginal"));
     info.taken_ns = epoch_ns(text_of(data, "Exif.Photo.DateTimeOriginal"),
-                             text_of(data, "Exif.Photo.SubSecTimeOriginal"), offset);
-    info.taken_has_offset = !offset.empty();
+                             text_of(data, "Exif.Photo.SubSecTimeOriginal"), offset.value_or(0));
+    info.taken_has_offset = offset.has_value();
   } catch (const std::exception&) {
     // No or broken metadata: what was read so far stands.
   }

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <vector>
 
 #include "core/image/image_io.hpp"
@@ -39,12 +40,18 @@ Result<FloatTemperatures> float_temperatures(const cv::Mat& values, const std::s
   FloatTemperatures out;
   out.unit = is_kelvin ? "kelvin" : "Celsius";
   const cv::Mat kelvin = is_kelvin ? values : cv::Mat(values + celsius_zero_k);
-  // The last count of a file means "that or more": a step for which it is left free.
+  // What no scale holds (1e30, a program's word for none) must not coarsen it for the others.
   double hottest_k = 0;
-  for (const float v : samples)
-    hottest_k = std::max(hottest_k, is_kelvin ? v : kelvin_from_celsius(v));
+  for (const float v : samples) {
+    const double k = is_kelvin ? v : kelvin_from_celsius(v);
+    if (k <= most_k) hottest_k = std::max(hottest_k, k);
+  }
+  // The last count of a file means "that or more": a step for which it is left free.
   out.scale.scale = kelvin_per_count_for(hottest_k * 65535 / 65534);
   out.counts = counts_of_kelvin(kelvin, out.scale.scale);
+  cv::Mat finite;  // infinity is no temperature, as NaN is
+  cv::inRange(kelvin, most_k, std::numeric_limits<float>::max(), finite);
+  out.counts.setTo(65535, finite);
   return out;
 }
 

@@ -11,7 +11,7 @@ namespace orbitfuse {
 
 /// Temperatures that a file holds as 32-bit floats, as counts that a session can store.
 struct FloatTemperatures {
-  cv::Mat counts;  ///< CV_16UC1, 0: no temperature
+  cv::Mat counts;  ///< CV_16UC1, 0: no temperature, 65535: one that no scale holds
   ThermalScaleTag scale;
   const char* unit = "";  ///< "kelvin" or "Celsius": which the numbers were taken for
 };

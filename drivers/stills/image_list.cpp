@@ -24,18 +24,21 @@ std::string extension_of(const fs::path& path) {
   return extension;
 }
 
+constexpr const char* table = "table";  ///< of temperatures; beside photos it is anything
+
 struct UnreadFormat {
   const char* kind;
   std::string_view extensions;  ///< each between dots
 };
 /// What phones, cameras and their software leave beside JPEGs.
-constexpr std::array<UnreadFormat, 6> unread_formats{
+constexpr std::array<UnreadFormat, 7> unread_formats{
     {{"HEIC", ".heic.heif.hif."},
      {"raw photo", ".dng.cr2.cr3.nef.nrw.arw.orf.rw2.raf.pef.srw."},
      {"video", ".mp4.mov.avi.mkv.m4v.mpg.mpeg.wmv.webm.mts.3gp."},
      {"FLIR recording", ".seq.csq.fff.ats.sfmov.ptw.ravi."},
      {"web image", ".webp.avif.gif.jxl."},
-     {"image", ".jp2.j2k.exr.hdr.psd.tga.pgm.ppm.pnm.is2.irg.bmt."}}};
+     {"image", ".jp2.j2k.exr.hdr.psd.tga.pgm.ppm.pnm.is2.irg.bmt.mpo."},
+     {table, ".csv."}}};
 
 /// End of the digit run at `at` and its start without leading zeros.
 std::pair<std::size_t, std::size_t> digit_run(const std::string& s, std::size_t at) {
@@ -43,6 +46,19 @@ std::pair<std::size_t, std::size_t> digit_run(const std::string& s, std::size_t 
   while (end < s.size() && is_digit(s[end])) ++end;
   while (at + 1 < end && s[at] == '0') ++at;
   return {at, end};
+}
+
+/// A Mac leaves "._IMG_1.jpg" beside IMG_1.jpg on cards and sticks: no image, and as one in front
+/// of all others it would shift the stations of those.
+bool is_of_mac(const fs::path& file) { return file.filename().string().starts_with("._"); }
+
+bool holds_images(Modality modality, const fs::path& folder) {
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error))
+    if (entry.is_regular_file(error) && !is_of_mac(entry.path()) &&
+        has_image_extension(modality, entry.path()))
+      return true;
+  return false;
 }
 
 /// What to do with pictures that are not read. Of a thermal one JPEG would keep no temperatures.
@@ -80,7 +96,8 @@ Status take_out_links(ImageList& list) {
 }  // namespace
 
 bool has_image_extension(Modality modality, const fs::path& path) {
-  constexpr std::array<std::string_view, 6> both{".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp"};
+  constexpr std::array<std::string_view, 8> both{".jpg", ".jpeg", ".jpe",  ".jfif",
+                                                 ".png", ".tif",  ".tiff", ".bmp"};
   constexpr std::array<std::string_view, 3> photos{".heic", ".heif", ".hif"},
       recordings{".seq", ".csq", ".fff"};
   const auto is_one_of = [extension = extension_of(path)](const auto& list) {
@@ -138,16 +155,19 @@ Result<ImageList> list_images(Modality modality, const std::vector<fs::path>& pa
     const std::size_t before = files.size(), unread_before = list.unread.size();
     std::vector<fs::path> videos;
     for (const fs::directory_entry& entry : folder) {
+      const bool is_folder = entry.is_directory(error);
+      if (is_folder && holds_images(modality, entry.path())) list.folders.push_back(entry.path());
+      if (is_folder || is_of_mac(entry.path())) continue;
       if (!entry.is_regular_file(error)) {
-        if (!entry.is_directory(error) && has_image_extension(modality, entry.path()))
-          list.no_files.push_back(entry.path());
+        if (has_image_extension(modality, entry.path())) list.no_files.push_back(entry.path());
         continue;
       }
       if (has_image_extension(modality, entry.path()))
         files.push_back(entry.path());
       else if (modality == Modality::visible && has_video_extension(entry.path()))
         videos.push_back(entry.path());
-      else if (!unread_kind(entry.path()).empty())
+      else if (const std::string kind = unread_kind(entry.path());
+               !kind.empty() && (kind != table || modality == Modality::thermal))
         list.unread.push_back(entry.path());
     }
     // Phones leave a clip of seconds beside each photo: among photos a video is taken for one.

@@ -20,13 +20,16 @@ struct ImageList {
   /// In a folder that also holds photos: they may be parts of those (Live Photos), so they are
   /// taken only where they are named, or from a folder of videos alone.
   std::vector<std::filesystem::path> videos_among_photos;
+  /// Folders in a given one that hold images too: nothing looks into them.
+  std::vector<std::filesystem::path> folders;
   /// A link beside the file that it leads to ("latest.jpg"), and that file: one image.
   std::vector<std::pair<std::filesystem::path, std::filesystem::path>> links;
 };
 
 /// Image files named by the paths: files as given, folders without their sub-folders. In natural
-/// name order ("9.jpg" before "10.jpg"). FLIR recordings are thermal images,
-/// videos and HEIC visible ones. Input error when a path is missing or has no images.
+/// name order ("9.jpg" before "10.jpg"), without those that a Mac leaves ("._9.jpg"). FLIR
+/// recordings are thermal images, videos and HEIC visible ones. Input error when a path is missing
+/// or has no images.
 Result<ImageList> list_images(Modality modality, const std::vector<std::filesystem::path>& paths);
 
 /// By its name's ending: ".jpg" in any case of letters, ".heic" for photos, ".seq" for thermal.

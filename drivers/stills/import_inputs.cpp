@@ -54,6 +54,13 @@ class Gathering {
       warnings_.push_back(fmt::format(
           "left out: {}: no file (a link to nothing, a pipe or a device)", file.string()));
     }
+    if (!list.folders.empty())
+      warnings_.push_back(fmt::format(
+          "left out: the images in {}{}: folders in folders are not looked into; name "
+          "those that are of this orbit",
+          list.folders.front().string(),
+          list.folders.size() == 1 ? ""
+                                   : fmt::format(" and {} more folders", list.folders.size() - 1)));
     for (const fs::path& file : list.unread) {
       warnings_.push_back(fmt::format(
           "left out: {}: {} files are not read; convert it to {}", file.string(), unread_kind(file),
