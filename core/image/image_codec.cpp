@@ -224,6 +224,10 @@ cv::Mat apply_orientation(const cv::Mat& image, int orientation) {
 Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_view text,
                                                                     const std::string& where) {
   const auto value = parse_json(text);
+  // Passed over, its counts would be taken for others.
+  if (value.is_discarded() && text.find("\"scale\"") != text.npos && repeated_key(text))
+    return fail(ErrorKind::input, where, json_fault(text),
+                "correct the text that has its \"scale\" (the sidecar, or ImageDescription)");
   if (!value.is_object() || !value.contains("scale")) return std::nullopt;
   ThermalScaleTag tag;
   const auto read = [&](const char* key, double& number) -> Status {
@@ -244,6 +248,14 @@ Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_
                 fmt::format("\"invalid\": {}", value["invalid"].dump().substr(0, 40)),
                 "only 0 marks samples without a temperature: set those samples to 0, and write "
                 "\"invalid\": 0");
+  }
+  // Celsius would be off by 273 and look like a temperature all the same.
+  if (const auto unit = value.find("unit"); unit != value.end() && unit->is_string()) {
+    const auto name = unit->get<std::string>();
+    if (name != "kelvin" && name != "Kelvin" && name != "K")
+      return fail(ErrorKind::input, where, fmt::format("\"unit\": {}", unit->dump().substr(0, 40)),
+                  "only kelvin = scale * count + offset is read (of Celsius add 273.15 to the "
+                  "offset): write \"unit\": \"kelvin\"");
   }
   if (!(tag.scale > 0)) {
     return fail(ErrorKind::input, where, fmt::format("\"scale\": {}", tag.scale),

@@ -29,15 +29,19 @@ struct ThermalScaleTag {
   double scale = 0.01, offset = 0;
 };
 /// Nothing where the text names no scale (many programs write something into ImageDescription); an
-/// input error where it names one that can't be used, or another count than 0 as invalid.
+/// input error where it names one that can't be used, has a key twice, or names another count than
+/// 0 as invalid.
 Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_view text,
                                                                     const std::string& where);
 /// A sidecar is there for its scale: without one it is an input error.
 Result<ThermalScaleTag> thermal_scale_of_sidecar(std::string_view text, const std::string& where);
 
-/// Images of the first one's size in a TIFF; masks and reduced copies don't count. Nothing
-/// where it can't be read.
+/// Images of the first one's size and samples in a TIFF; masks and reduced copies don't count.
+/// Nothing where it can't be read.
 std::optional<int> tiff_page_count(std::string_view bytes);
+/// A sentence on pages of another size or kind of samples, which decode_tiff() does not read; empty
+/// where there is none. No tag says whether they are previews or another camera's images.
+std::string other_tiff_pages(std::string_view bytes);
 /// 8/16-bit unsigned or 32-bit float samples, one channel or RGB (returned as BGR); other colours
 /// (a palette, CMYK, Lab, planes) are refused by name. Without a page the file must hold a single
 /// one: nobody asked for the first of several. Where the ImageDescription names no scale, GDAL's

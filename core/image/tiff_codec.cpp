@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <tiffio.h>
 
 #include <algorithm>
@@ -226,16 +227,31 @@ bool read_tiles(TIFF* tiff, const Layout& l, cv::Mat& image) {
   return true;
 }
 
-/// Advances to the next image of the first one's layout that is no mask or reduced copy of another.
+/// A mask, or a reduced copy of another image.
+bool is_copy(TIFF* tiff) {
+  std::uint32_t kind = 0;
+  TIFFGetFieldDefaulted(tiff, TIFFTAG_SUBFILETYPE, &kind);
+  return (kind & (FILETYPE_REDUCEDIMAGE | FILETYPE_MASK)) != 0;
+}
+
+bool alike(const Layout& a, const Layout& b) {
+  return a.width == b.width && a.height == b.height && a.bits == b.bits &&
+         a.channels == b.channels && a.format == b.format;
+}
+
+/// To the first image: some programs put a reduced copy before it. Of copies alone the first.
+void to_first_page(TIFF* tiff) {
+  while (is_copy(tiff))
+    if (TIFFReadDirectory(tiff) != 1) {
+      TIFFSetDirectory(tiff, 0);
+      return;
+    }
+}
+
+/// Advances to the next image of the first one's layout.
 bool next_page(TIFF* tiff, const Layout& first) {
-  while (TIFFReadDirectory(tiff) == 1) {
-    std::uint32_t kind = 0;
-    TIFFGetFieldDefaulted(tiff, TIFFTAG_SUBFILETYPE, &kind);
-    const Layout l = layout_of(tiff);
-    const bool alike = l.width == first.width && l.height == first.height && l.bits == first.bits &&
-                       l.channels == first.channels && l.format == first.format;
-    if (alike && (kind & (FILETYPE_REDUCEDIMAGE | FILETYPE_MASK)) == 0) return true;
-  }
+  while (TIFFReadDirectory(tiff) == 1)
+    if (alike(layout_of(tiff), first) && !is_copy(tiff)) return true;
   return false;
 }
 
@@ -266,6 +282,7 @@ Result<StoredPage> read_page(std::string_view bytes, const std::string& where,
   file.input = bytes;
   const TiffHandle tiff = open(file, "rm");
   if (!tiff) return fail(ErrorKind::input, where, "not a readable TIFF", "copy the file again");
+  to_first_page(tiff.get());
   Layout l = layout_of(tiff.get());
   for (int at = 0; at < page; ++at) {
     if (!next_page(tiff.get(), l))
@@ -306,10 +323,38 @@ std::optional<int> tiff_page_count(std::string_view bytes) {
   file.input = bytes;
   const TiffHandle tiff = open(file, "rm");
   if (!tiff) return std::nullopt;
+  to_first_page(tiff.get());
   const Layout first = layout_of(tiff.get());
   int pages = 1;
   while (pages < max_pages && next_page(tiff.get(), first)) ++pages;
   return pages;
+}
+
+std::string other_tiff_pages(std::string_view bytes) {
+  MemoryFile file;
+  file.input = bytes;
+  const TiffHandle tiff = open(file, "rm");
+  if (!tiff) return {};
+  to_first_page(tiff.get());
+  const Layout first = layout_of(tiff.get());
+  constexpr std::size_t named = 3;
+  std::vector<std::string> others;
+  std::size_t count = 0;
+  // The number is the directory's, by which other programs know it too.
+  for (int page = TIFFCurrentDirectory(tiff.get()) + 2;
+       page <= max_pages && TIFFReadDirectory(tiff.get()) == 1; ++page) {
+    const Layout l = layout_of(tiff.get());
+    if (is_copy(tiff.get()) || alike(l, first)) continue;
+    if (++count <= named)
+      others.push_back(fmt::format("{} ({}x{}, {}-bit{})", page, l.width, l.height, l.bits,
+                                   l.channels > 1 ? fmt::format(", {} channels", l.channels) : ""));
+  }
+  if (others.empty()) return {};
+  return fmt::format(
+      "page{} {}{}, of another size or kind than the first: previews, or another camera's images; "
+      "split the file (tiffsplit) to use them",
+      count > 1 ? "s" : "", fmt::join(others, ", "),
+      count > named ? fmt::format(" and {} more", count - named) : "");
 }
 
 Result<cv::Mat> decode_tiff(std::string_view bytes, const std::string& where,
@@ -326,10 +371,11 @@ Result<cv::Mat> decode_tiff(std::string_view bytes, const std::string& where,
 }
 
 double tiff_transparent_share(std::string_view bytes, std::optional<int> page) {
-  // Most have no alpha: their first directory is all that is read.
+  // Most have no alpha: their first image's directory is all that is read.
   MemoryFile file;
   file.input = bytes;
   const TiffHandle tiff = open(file, "rm");
+  if (tiff) to_first_page(tiff.get());
   if (!tiff || layout_of(tiff.get()).channels % 2 != 0 || !has_alpha(tiff.get())) return 0;
   const auto stored = read_page(bytes, {}, nullptr, page.value_or(0));
   return stored && stored->samples.depth() != CV_32F ? transparent_share(stored->samples) : 0;

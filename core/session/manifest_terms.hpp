@@ -32,6 +32,7 @@ enum class EventKind {
   nuc_failed,
   raw_counts,
   clipped,
+  transparent,
   scale,
   clock,
   stale,
@@ -44,12 +45,13 @@ enum class EventKind {
 
 /// What a frame line says of its frame, beside its values.
 enum class FrameFlag {
-  nuc,         ///< taken during or right after a shutter correction
-  still,       ///< a photo, taken on purpose
-  file_time,   ///< a photo without a time of its own
-  other_port,  ///< from a camera of the same serial in another USB port
-  raw_counts,  ///< a picture of counts of unknown scale
-  clipped,     ///< some of its samples were at the end of the camera's scale, and are dead pixels
+  nuc,          ///< taken during or right after a shutter correction
+  still,        ///< a photo, taken on purpose
+  file_time,    ///< a photo without a time of its own
+  other_port,   ///< from a camera of the same serial in another USB port
+  raw_counts,   ///< a picture of counts of unknown scale
+  clipped,      ///< some of its samples were at the end of the camera's scale, and are dead pixels
+  transparent,  ///< some of the file's pixels were, and show what lay behind them
 };
 
 template <class Term>
@@ -58,7 +60,7 @@ struct NamedTerm {
   std::string_view name;
 };
 
-inline constexpr std::array<NamedTerm<EventKind>, 29> event_kinds{{
+inline constexpr std::array<NamedTerm<EventKind>, 30> event_kinds{{
     {EventKind::resumed, "resumed"},
     {EventKind::ignored, "ignored"},
     {EventKind::duplicate, "duplicate"},
@@ -80,6 +82,7 @@ inline constexpr std::array<NamedTerm<EventKind>, 29> event_kinds{{
     {EventKind::nuc_failed, "nuc-failed"},
     {EventKind::raw_counts, "raw-counts"},
     {EventKind::clipped, "clipped"},
+    {EventKind::transparent, "transparent"},
     {EventKind::scale, "scale"},
     {EventKind::clock, "clock"},
     {EventKind::stale, "stale"},
@@ -90,13 +93,14 @@ inline constexpr std::array<NamedTerm<EventKind>, 29> event_kinds{{
     {EventKind::stream_error, "stream-error"},
 }};
 
-inline constexpr std::array<NamedTerm<FrameFlag>, 6> frame_flags{{
+inline constexpr std::array<NamedTerm<FrameFlag>, 7> frame_flags{{
     {FrameFlag::nuc, "nuc"},
     {FrameFlag::still, "still"},
     {FrameFlag::file_time, "file-time"},
     {FrameFlag::other_port, "other-port"},
     {FrameFlag::raw_counts, "raw-counts"},
     {FrameFlag::clipped, "clipped"},
+    {FrameFlag::transparent, "transparent"},
 }};
 
 /// The tables are in the order of their enums: a test holds them to it.

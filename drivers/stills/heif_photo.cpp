@@ -7,9 +7,11 @@
 #include <array>
 #include <cstddef>
 #include <memory>
+#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "core/image/image_codec.hpp"
+#include "core/image/transparency.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -71,7 +73,7 @@ bool is_heif(std::string_view bytes) {
   return false;
 }
 
-Result<cv::Mat> decode_heif(std::string_view bytes, const std::string& where) {
+Result<cv::Mat> decode_heif(std::string_view bytes, const std::string& where, double* transparent) {
   ORBITFUSE_ASSIGN(const Photo photo, open(bytes, where));
   const int width = heif_image_handle_get_width(photo.handle.get()),
             height = heif_image_handle_get_height(photo.handle.get());
@@ -82,9 +84,12 @@ Result<cv::Mat> decode_heif(std::string_view bytes, const std::string& where) {
   const DecodingOptions options(heif_decoding_options_alloc());
   options->convert_hdr_to_8bit = 1;
   options->strict_decoding = 1;
+  const bool has_alpha = heif_image_handle_has_alpha_channel(photo.handle.get()) != 0;
+  const int channels = has_alpha ? 4 : 3;
   heif_image* decoded = nullptr;
-  const heif_error error = heif_decode_image(photo.handle.get(), &decoded, heif_colorspace_RGB,
-                                             heif_chroma_interleaved_RGB, options.get());
+  const heif_error error = heif_decode_image(
+      photo.handle.get(), &decoded, heif_colorspace_RGB,
+      has_alpha ? heif_chroma_interleaved_RGBA : heif_chroma_interleaved_RGB, options.get());
   const Image image(decoded);
   if (error.code != heif_error_Ok) return damaged(where, error);
   int stride = 0;
@@ -92,7 +97,7 @@ Result<cv::Mat> decode_heif(std::string_view bytes, const std::string& where) {
       heif_image_get_plane_readonly(decoded, heif_channel_interleaved, &stride);
   const int columns = heif_image_get_width(decoded, heif_channel_interleaved),
             rows = heif_image_get_height(decoded, heif_channel_interleaved);
-  if (!plane || columns <= 0 || rows <= 0 || stride < 3 * columns) {
+  if (!plane || columns <= 0 || rows <= 0 || stride < channels * columns) {
     return fail(ErrorKind::input, where, "HEIC without a picture", "copy the file again");
   }
   // What a file says and what its stream holds are two things: a kilobyte may unfold to gigabytes.
@@ -100,12 +105,11 @@ Result<cv::Mat> decode_heif(std::string_view bytes, const std::string& where) {
     return fail(ErrorKind::input, where,
                 fmt::format("HEIC of {}x{} that holds {}x{}", width, height, columns, rows),
                 "copy the file again");
-  cv::Mat bgr(rows, columns, CV_8UC3);
-  for (int y = 0; y < rows; ++y) {
-    const std::uint8_t* from = plane + static_cast<std::ptrdiff_t>(y) * stride;
-    auto* to = bgr.ptr<cv::Vec3b>(y);
-    for (int x = 0; x < columns; ++x, from += 3) to[x] = {from[2], from[1], from[0]};
-  }
+  const cv::Mat stored(rows, columns, CV_8UC(channels), const_cast<std::uint8_t*>(plane),
+                       static_cast<std::size_t>(stride));
+  if (transparent) *transparent = has_alpha ? transparent_share(stored) : 0;
+  cv::Mat bgr;
+  cv::cvtColor(stored, bgr, has_alpha ? cv::COLOR_RGBA2BGR : cv::COLOR_RGB2BGR);
   return bgr;
 }
 

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <tuple>
@@ -137,6 +138,7 @@ class Importer {
       pass_over(still.error());
       return {};
     }
+    tell_other_pages(still->other_pages, source);
     return add_frame(std::move(*still), source, tracking, stations);
   }
 
@@ -148,6 +150,7 @@ class Importer {
         pass_over(file.error());
         continue;
       }
+      tell_other_pages(file->other_pages, source);
       Result<StillPhoto> still = thermal_still(*file, decoder_, source.where());
       if (!still) {
         pass_over(still.error());
@@ -175,6 +178,12 @@ class Importer {
     return thermal_file(paged_bytes_, source.file, source.page);
   }
 
+  void tell_other_pages(const std::string& pages, Source source) {
+    source.pages = 1;  // it is the file's matter
+    if (!pages.empty())
+      report_.warnings.push_back(fmt::format("left out: {}: {}", source.short_name(), pages));
+  }
+
   void tell_lost_samples(StillPhoto& still, const Source& source) {
     if (still.without_temperature == 0) return;
     still.frame.flag(FrameFlag::clipped);
@@ -191,6 +200,7 @@ class Importer {
     if (still.transparent > 0)
       transparent_.push_back(
           fmt::format("{} ({:.3g} %)", source.short_name(), 100 * still.transparent));
+    if (still.transparent > 0) still.frame.flag(FrameFlag::transparent);
     ORBITFUSE_ASSIGN(CameraGroup * group, groups_.of(still, source));
     Frame& frame = still.frame;
     DeviceInfo& device = still.camera;
@@ -269,10 +279,14 @@ class Importer {
 
   void tell_transparent() {
     if (transparent_.empty()) return;
+    constexpr std::size_t named = 3;
+    const std::size_t count = transparent_.size();
+    transparent_.resize(std::min(count, named));
     report_.warnings.push_back(fmt::format(
-        "{} images have transparent pixels: {}; alpha is dropped, and what colour lies behind it "
+        "{} images have transparent pixels: {}{}; alpha is dropped, and what colour lies behind it "
         "is taken for the scene: import the images as they were taken",
-        transparent_.size(), fmt::join(transparent_, ", ")));
+        count, fmt::join(transparent_, ", "),
+        count > named ? fmt::format(" and {} more", count - named) : ""));
   }
 
   /// Poses were given so that they are used.

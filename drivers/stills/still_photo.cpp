@@ -48,11 +48,12 @@ Result<StillPhoto> visible_still(std::string bytes, const std::string& where) {
   const ExifInfo exif = exif_of_photo(bytes);
   cv::Mat image;
   if (is_heif(bytes)) {
-    ORBITFUSE_ASSIGN(image, decode_heif(bytes, where));
+    ORBITFUSE_ASSIGN(image, decode_heif(bytes, where, &still.transparent));
     ORBITFUSE_ASSIGN(bytes, encode_jpeg(image, as_jpeg_quality));
   } else {
     ORBITFUSE_ASSIGN(image, decode_image(bytes, where));
     still.transparent = transparent_share(bytes);
+    if (image_format(bytes) == ImageFormat::tiff) still.other_pages = other_tiff_pages(bytes);
   }
   // Before it counts as a camera of its own.
   if (image.depth() != CV_8U)
@@ -96,6 +97,7 @@ Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& 
   frame.radiometry = converted.radiometry;
   still.without_temperature = converted.without_temperature;
   still.transparent = file.transparent;
+  still.other_pages = file.other_pages;
   still.size = file.image.size();
   if (converted.keep_bytes) {
     frame.encoded = file.bytes;

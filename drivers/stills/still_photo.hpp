@@ -18,6 +18,7 @@ struct StillPhoto {
   cv::Size size;                ///< upright
   int without_temperature = 0;  ///< samples of a thermal image that none stands for
   double transparent = 0;       ///< share of the pixels whose alpha, which is dropped, says so
+  std::string other_pages;      ///< of its TIFF that no frame is made of, in words
 
   std::string key() const;        ///< same key: same camera, lens, image size and kind of samples
   std::string described() const;  ///< the same for people

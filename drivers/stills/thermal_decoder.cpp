@@ -53,6 +53,15 @@ bool is_plausible(const CountHistogram& histogram, ThermalScaleTag scale) {
   return kelvin_of(percentile(histogram, 5), scale) >= coldest_plausible_k;
 }
 
+tl::unexpected<Error> too_cold_floats(const ThermalFile& file, const std::string& where,
+                                      const CountHistogram& histogram) {
+  return fail(
+      ErrorKind::input, where,
+      fmt::format("32-bit floats, read as {}: their cold part would be {:.0f} C", file.float_unit,
+                  celsius_from_kelvin(kelvin_of(percentile(histogram, 5), *file.tag))),
+      "store 100 x kelvin as 16-bit, or NaN where there is no temperature");
+}
+
 tl::unexpected<Error> too_cold(const std::string& where, const CountHistogram& histogram,
                                ThermalScaleTag scale) {
   const double coldest_k = kelvin_of(percentile(histogram, 5), scale);
@@ -143,6 +152,7 @@ Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::
     file.image = file.dji->counts;
   } else if (image_format(bytes) == ImageFormat::tiff) {
     ORBITFUSE_ASSIGN(file.image, decode_tiff(bytes, where, &description, page));
+    if (page.value_or(0) == 0) file.other_pages = other_tiff_pages(bytes);
   } else {
     ORBITFUSE_ASSIGN(file.image, decode_image(bytes, where));
   }
@@ -351,7 +361,9 @@ Result<ThermalDecoder::Converted> ThermalDecoder::convert_samples(const ThermalF
                                                                   const std::string& where) const {
   std::optional<ThermalScaleTag> scale = scale_of(file);
   const CountHistogram histogram = histogram_of(file.image);
-  if (scale && !is_plausible(histogram, *scale)) return too_cold(where, histogram, *scale);
+  if (scale && !is_plausible(histogram, *scale))
+    return file.float_unit ? too_cold_floats(file, where, histogram)
+                           : too_cold(where, histogram, *scale);
   if (!scale && !has_temperatures()) return stretched(file.image);
   if (!scale && (file.dji || samples_are_raw_counts() || !is_plausible(histogram, {}))) {
     return fail(ErrorKind::input, where,

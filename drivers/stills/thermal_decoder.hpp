@@ -35,6 +35,7 @@ struct ThermalFile {
   std::optional<DjiImage> dji;         ///< samples16: never temperatures unless the user says how
   std::optional<ThermalScaleTag> tag;  ///< from the file or its sidecar
   double transparent = 0;              ///< as of StillPhoto
+  std::string other_pages;             ///< likewise; of the first page
   const char* float_unit = nullptr;    ///< samples16 that were floats: what these were taken for
 };
 

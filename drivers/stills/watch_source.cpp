@@ -131,7 +131,11 @@ void WatchSource::stop() { reader_->watch.close(); }
 Result<Delivery> WatchSource::next(std::chrono::milliseconds timeout) {
   const auto deadline = Clock::now() + timeout;
   while (true) {
-    if (pending_) return *std::exchange(pending_, std::nullopt);
+    if (!pending_.empty()) {
+      Delivery delivery = std::move(pending_.front());
+      pending_.pop_front();
+      return delivery;
+    }
     const auto due = std::find_if(queue_.begin(), queue_.end(),
                                   [](const Attempt& a) { return a.next_try <= Clock::now(); });
     if (due != queue_.end()) {
@@ -225,18 +229,36 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
   }
   delivery.kind = Delivery::Kind::frame;
   delivery.frame.flag(FrameFlag::still);
-  if (still->without_temperature > 0) {
-    delivery.frame.flag(FrameFlag::clipped);
+  tell(*still, name, delivery.frame);
+  return delivery;
+}
+
+void WatchSource::tell(const StillPhoto& still, const std::string& name, Frame& frame) {
+  if (still.without_temperature > 0) {
+    frame.flag(FrameFlag::clipped);
     if (!std::exchange(clipped_told_, true)) {
-      pending_ = event_delivery(
+      pending_.push_back(event_delivery(
           EventKind::clipped,
           fmt::format("{}: {} samples without a temperature, or hotter than {:.0f} C: dead pixels, "
                       "here and in all frames with the flag clipped",
-                      name, still->without_temperature,
-                      celsius_from_kelvin(65535 * delivery.frame.kelvin_per_count)));
+                      name, still.without_temperature,
+                      celsius_from_kelvin(65535 * frame.kelvin_per_count))));
     }
   }
-  return delivery;
+  if (still.transparent > 0) {
+    frame.flag(FrameFlag::transparent);
+    if (!std::exchange(transparent_told_, true)) {
+      pending_.push_back(event_delivery(
+          EventKind::transparent,
+          fmt::format("{}: {:.3g} % of its pixels are transparent; alpha is dropped, and what "
+                      "colour lies behind it is taken for the scene, here and in all frames with "
+                      "the flag transparent: send the images as they were taken",
+                      name, 100 * still.transparent)));
+    }
+  }
+  if (!still.other_pages.empty())
+    pending_.push_back(
+        event_delivery(EventKind::ignored, fmt::format("{}: {}", name, still.other_pages)));
 }
 
 }  // namespace orbitfuse

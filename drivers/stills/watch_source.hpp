@@ -16,6 +16,8 @@
 
 namespace orbitfuse {
 
+struct StillPhoto;
+
 struct WatchOptions {
   std::filesystem::path folder;        ///< where photos appear: a card, a tether, a phone's sync
   std::string device_id = "visible0";  ///< key in the session
@@ -63,6 +65,8 @@ class WatchSource final : public FrameSource {
   };
   Delivery rejection(const std::string& name, const std::string& why);
   std::optional<Delivery> take(Attempt attempt);
+  /// Flags the frame of a file, and tells what of the file is not as it looks.
+  void tell(const StillPhoto& still, const std::string& name, Frame& frame);
 
   WatchOptions options_;
   std::unique_ptr<Reader> reader_;
@@ -75,8 +79,8 @@ class WatchSource final : public FrameSource {
       seen_files_;        ///< of an earlier recording: name, time
   bool resumed_ = false;  ///< info_ is the session's word
   std::uint64_t next_id_ = 0;
-  bool gone_told_ = false, clipped_told_ = false;
-  std::optional<Delivery> pending_;  ///< goes before the next photo
+  bool gone_told_ = false, clipped_told_ = false, transparent_told_ = false;
+  std::deque<Delivery> pending_;  ///< goes before the next photo
 };
 
 }  // namespace orbitfuse

@@ -200,11 +200,14 @@ std::string tiff_of_pages(const std::vector<cv::Mat>& pages, const TiffWords& wo
     struct Entry {
       std::uint64_t tag, type, count, value;
     };
-    std::vector<Entry> entries{{256, 4, 1, static_cast<std::uint64_t>(page.cols) / channels},
-                               {257, 4, 1, static_cast<std::uint64_t>(page.rows)},
-                               {258, 3, channels, channels > 2 ? bits_at : bits},
-                               {259, 3, 1, 1},
-                               {262, 3, 1, static_cast<std::uint64_t>(words.photometric)}};
+    std::vector<Entry> entries;
+    if (words.subfile_of_first != 0 && link == 4)
+      entries.push_back({254, 4, 1, static_cast<std::uint64_t>(words.subfile_of_first)});
+    entries.insert(entries.end(), {{256, 4, 1, static_cast<std::uint64_t>(page.cols) / channels},
+                                   {257, 4, 1, static_cast<std::uint64_t>(page.rows)},
+                                   {258, 3, channels, channels > 2 ? bits_at : bits},
+                                   {259, 3, 1, 1},
+                                   {262, 3, 1, static_cast<std::uint64_t>(words.photometric)}});
     if (description.size() > 3) entries.push_back({270, 2, description.size() + 1, text_at});
     entries.push_back({273, 4, planes, planes > 1 ? planes_at : pixels_at});
     entries.push_back({277, 3, 1, channels});
@@ -284,15 +287,18 @@ std::string heic(const cv::Mat& image, int orientation, const std::string& exif)
       heif_error_Ok) {
     heif_encoder_set_lossy_quality(encoder, 95);
     heif_image* picture = nullptr;
-    heif_image_create(image.cols, image.rows, heif_colorspace_RGB, heif_chroma_interleaved_RGB,
+    const int channels = image.channels();
+    heif_image_create(image.cols, image.rows, heif_colorspace_RGB,
+                      channels == 4 ? heif_chroma_interleaved_RGBA : heif_chroma_interleaved_RGB,
                       &picture);
-    heif_image_add_plane(picture, heif_channel_interleaved, image.cols, image.rows, 24);
+    heif_image_add_plane(picture, heif_channel_interleaved, image.cols, image.rows, 8 * channels);
     int stride = 0;
     std::uint8_t* plane = heif_image_get_plane(picture, heif_channel_interleaved, &stride);
     for (int y = 0; y < image.rows; ++y) {
       for (int x = 0; x < image.cols; ++x) {
-        for (int c = 0; c < 3; ++c)
-          plane[y * stride + 3 * x + c] = image.at<cv::Vec3b>(y, x)[2 - c];
+        const std::uint8_t* pixel = image.ptr(y) + channels * x;
+        for (int c = 0; c < channels; ++c)
+          plane[y * stride + channels * x + c] = pixel[c < 3 ? 2 - c : c];
       }
     }
     heif_encoding_options* options = heif_encoding_options_alloc();

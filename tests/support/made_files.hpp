@@ -35,8 +35,9 @@ std::string flir_file(const cv::Mat& signal, const FlirCalibration& calibration,
 /// have them, DJI as maker.
 std::string dji_jpeg(const cv::Mat& counts, bool with_parameters = true);
 
-/// A HEIC photo of CV_8UC3 that is shown turned as EXIF's `orientation` says, by the file's own
-/// rotation and mirroring; `exif`: a TIFF block, or empty. Empty when this machine has no encoder.
+/// A HEIC photo of CV_8UC3, or of CV_8UC4 with alpha, that is shown turned as EXIF's `orientation`
+/// says, by the file's own rotation and mirroring; `exif`: a TIFF block, or empty. Empty when this
+/// machine has no encoder.
 std::string heic(const cv::Mat& image, int orientation = 1, const std::string& exif = {});
 /// The TIFF block of an EXIF: orientation, time 2024-05-06 07:08:09, 4.3 mm, 26 mm at 35 mm.
 std::string exif_block(int orientation);
@@ -47,6 +48,7 @@ struct TiffWords {
   std::string gdal_metadata;          ///< tag 42112
   int photometric = 1, channels = 1;  ///< of several channels the page is that much wider
   int planar = 1;
+  int subfile_of_first = 0;  ///< 1: the first page is a reduced copy of another
 };
 /// An uncompressed little-endian TIFF of several CV_16UC1 or CV_8UC1 pages.
 std::string tiff_of_pages(const std::vector<cv::Mat>& pages, const TiffWords& words);

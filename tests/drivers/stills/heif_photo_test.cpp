@@ -19,6 +19,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 /// Four colours, so that every turn and mirror image differs.
 cv::Mat quarters(cv::Size size = {96, 64}) {
@@ -107,6 +108,25 @@ TEST_F(HeifPhoto, WhatIsCutOrDamagedIsNamed) {
   EXPECT_EQ(report->visible, 1);
   for (const char* name : {"cut.heic", "not.heic"})
     EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("left out"), HasSubstr(name))));
+}
+
+/// As of PNG, TIFF and BMP: the photo is stored as JPEG, which has none.
+TEST_F(HeifPhoto, TransparentPixelsAreNamed) {
+  cv::Mat image;
+  cv::cvtColor(quarters(), image, cv::COLOR_BGR2BGRA);
+  test::put(folder / "in/opaque.heic", made::heic(image));
+  image(cv::Rect(0, 0, 48, 64)).setTo(cv::Scalar(40, 90, 120, 0));
+  test::put(folder / "in/half.heic", made::heic(image));
+  ImportOptions options;
+  options.visible = {folder / "in"};
+  const auto report = import_session(options, folder / "session");
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->visible, 2);
+  EXPECT_THAT(report->warnings, Contains(AllOf(HasSubstr("transparent pixels: in/half.heic (5"),
+                                               Not(HasSubstr("opaque.heic")))));
+  const auto stored = read_visible(report->session.path_of(report->session.frames.at(0)));
+  ASSERT_TRUE(stored) << stored.error().message();
+  EXPECT_EQ(stored->type(), CV_8UC3);
 }
 
 TEST(HeifPhotoBytes, NothingAndOtherBrandsAreNone) {

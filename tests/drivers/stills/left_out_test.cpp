@@ -208,5 +208,98 @@ TEST_F(LeftOut, StationsOfWhatWasNotGivenAreNoWarningAndARigOfOneCameraIs) {
   EXPECT_THAT(report->warnings, test::one_says("12 visible and 1 thermal frames"));
 }
 
+/// They may be previews, which no tag calls so, or another camera's images.
+TEST_F(LeftOut, PagesOfAnotherSizeOrKindAreNamed) {
+  const auto page = [](int width, int type, std::uint64_t seed) {
+    cv::Mat image(30, width, type);
+    cv::RNG(seed).fill(image, cv::RNG::UNIFORM, type == CV_8UC1 ? 0 : 29300,
+                       type == CV_8UC1 ? 255 : 29700);
+    return image;
+  };
+  const auto counts = [&](std::uint64_t seed) { return page(40, CV_16UC1, seed); };
+  put("t/0.tif",
+      made::tiff_of_pages({counts(1), page(20, CV_16UC1, 2), counts(3), page(40, CV_8UC1, 4)},
+                          R"({"scale":0.01})"));
+  put("t/1.tif", made::tiff_of_pages({counts(5), counts(6)}, R"({"scale":0.01})"));
+  put("in/2.tif", made::tiff_of_pages({page(40, CV_8UC1, 7), page(80, CV_8UC1, 8)}));
+  std::vector<cv::Mat> many{page(40, CV_8UC1, 9)};
+  for (int width = 50; width < 70; ++width) many.push_back(page(width, CV_8UC1, 10));
+  put("in/3.tif", made::tiff_of_pages(many));
+  options.visible = {folder / "in"};
+  options.thermal = {folder / "t"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->thermal, 4);
+  EXPECT_EQ(report->visible, 2);
+  EXPECT_THAT(report->warnings,
+              test::one_says("left out: ", "t/0.tif: pages 2 (20x30, 16-bit), 4 (40x30, 8-bit), "));
+  EXPECT_THAT(report->warnings, test::one_says("in/2.tif: page 2 (80x30, 8-bit), "));
+  EXPECT_THAT(report->warnings,
+              test::one_says("in/3.tif: pages 2 (50x30, 8-bit), 3 (51x30, 8-bit), 4 (52x30, 8-bit) "
+                             "and 17 more, "));
+  EXPECT_THAT(report->warnings, test::none_says("t/1.tif"));
+}
+
+/// Hundreds of names are no message.
+TEST_F(LeftOut, OfManyImagesWithTransparentPixelsTheFirstAreNamed) {
+  for (int i = 10; i < 30; ++i) {
+    cv::Mat image(30, 40, CV_8UC4);
+    cv::RNG(static_cast<std::uint64_t>(i)).fill(image, cv::RNG::UNIFORM, 0, 255);
+    put("in/" + std::to_string(i) + ".png", *encode_png(image));
+  }
+  options.visible = {folder / "in"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->visible, 20);
+  EXPECT_THAT(report->warnings, test::one_says("20 images have transparent pixels: ", "in/10.png (",
+                                               "in/12.png (", " %) and 17 more; alpha"));
+  EXPECT_THAT(report->warnings, test::none_says("in/13.png"));
+}
+
+/// Which of the two is meant nobody knows.
+TEST_F(LeftOut, ASidecarWithAKeyTwiceIsNamed) {
+  for (const char* name : {"t/0.tif", "t/1.tif"}) put_counts(name, 29000, 30000, name[2]);
+  put("t/1.tif.json", "{\"scale\": 0.01,\n \"scale\": 0.04}");
+  cv::Mat image(30, 40, CV_16UC1, cv::Scalar(29500));
+  put("t/2.tif", made::tiff_of_pages({image}, R"({"scale":0.01,"offset":0,"offset":273.15})"));
+  options.thermal = {folder / "t"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->thermal, 1);
+  EXPECT_THAT(report->warnings,
+              test::one_says("left out", "1.tif.json", "key \"scale\" twice", "line 2"));
+  EXPECT_THAT(report->warnings, test::one_says("left out", "2.tif", "key \"offset\" twice"));
+}
+
+/// As cameras, computers and programs leave them.
+TEST_F(LeftOut, WhatLiesBesideAndBelowTheImagesIsNamedOrNotTakenForOne) {
+  put_photo("in/a.jpg", 1);
+  put_photo("in/b.JPE", 2);
+  put_photo("in/c.jfif", 3);
+  put("in/._a.jpg", "of a Mac");
+  put("in/d.mpo", "x");
+  put("in/log.csv", "x");
+  put_photo("in/more/d.jpg", 4);
+  put_photo("in/small/e.jpg", 5);
+  put("in/empty/._f.jpg", "x");
+  put_counts("t/0.tif", 29000, 30000, 1);
+  put("t/1.csv", "25.0,25.1");
+  options.visible = {folder / "in"};
+  options.thermal = {folder / "t"};
+  options.visible_stations = DeclaredStations{};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->visible, 3);
+  EXPECT_EQ(report->session.frames_of(Modality::visible)[0]->station->index, 0);
+  EXPECT_THAT(report->warnings, test::one_says("left out: the images in", "and 1 more folders"));
+  EXPECT_THAT(report->warnings, test::one_says("left out", "d.mpo"));
+  EXPECT_THAT(report->warnings, test::one_says("left out", "1.csv: table files", "16-bit TIFF"));
+  for (const char* silent : {"._a.jpg", "log.csv", "empty"})
+    EXPECT_THAT(report->warnings, test::none_says(silent));
+  fs::remove(folder / "t/0.tif");
+  fs::remove_all(folder / "session");
+  EXPECT_THAT(refusal(), test::says("1 of another format (1.csv)", "16-bit TIFF"));
+}
+
 }  // namespace
 }  // namespace orbitfuse

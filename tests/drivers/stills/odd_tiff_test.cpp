@@ -80,5 +80,20 @@ TEST(OddTiff, GdalsScaleIsTheTags) {
   EXPECT_FALSE(*tag);
 }
 
+/// Programs put a small picture of the image before it.
+TEST(OddTiff, AReducedCopyInFrontIsNotTheImage) {
+  const cv::Mat copy(3, 4, CV_8UC1, cv::Scalar(1)), image(6, 8, CV_16UC1, cv::Scalar(7000));
+  made::TiffWords words;
+  words.subfile_of_first = 1;
+  const std::string bytes = made::tiff_of_pages({copy, image}, words);
+  const auto read = decode_tiff(bytes, "p.tif");
+  ASSERT_TRUE(read) << read.error().message();
+  EXPECT_EQ(cv::norm(*read, image, cv::NORM_INF), 0);
+  EXPECT_EQ(tiff_page_count(bytes), 1);
+  const auto alone = decode_tiff(made::tiff_of_pages({copy}, words), "p.tif");
+  ASSERT_TRUE(alone) << alone.error().message();
+  EXPECT_EQ(alone->cols, 4) << "all there is";
+}
+
 }  // namespace
 }  // namespace orbitfuse

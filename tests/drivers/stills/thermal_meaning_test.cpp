@@ -96,6 +96,46 @@ TEST_F(ThermalMeaning, FloatsAreKelvinOrCelsiusAndNanIsDead) {
   EXPECT_THAT(report.warnings, test::one_says("k.tiff and 1 more", "read as kelvin"));
 }
 
+/// 1e30 is some programs' word for none. The others keep their hundredths of a kelvin.
+TEST_F(ThermalMeaning, FloatsThatNoScaleHoldsAreDeadAndTold) {
+  cv::Mat kelvin = floats(300, 1);
+  kelvin(cv::Rect(0, 0, 5, 2)).setTo(1e30f);
+  kelvin.at<float>(9, 8) = std::numeric_limits<float>::infinity();
+  put("in/k.tiff", *encode_tiff(kelvin, ""));
+  const ImportReport report = import();
+  EXPECT_THAT(report.warnings, test::one_says("k.tiff: 10 of 1200 samples have no temperature"));
+  EXPECT_TRUE(std::isnan(kelvin_of(report, 0).at<float>(1, 4)));
+  EXPECT_TRUE(std::isnan(kelvin_of(report, 0).at<float>(9, 8)));
+  EXPECT_NEAR(kelvin_of(report, 0).at<float>(9, 9), kelvin.at<float>(9, 9), 0.0101);
+}
+
+TEST_F(ThermalMeaning, FloatsThatWouldBeTooColdAreRefusedByTheirUnit) {
+  cv::Mat celsius = floats(20, 1);
+  celsius(cv::Rect(0, 0, 40, 18)).setTo(3000);  // more than half
+  put("in/a.tiff", *encode_tiff(celsius, ""));
+  put("in/b.tiff", *encode_tiff(floats(300, 2), ""));
+  EXPECT_THAT(import().warnings,
+              test::one_says("left out", "a.tiff: 32-bit floats, read as kelvin", "-25"));
+}
+
+/// Read as kelvin they would be off by 273, and look like temperatures all the same.
+TEST_F(ThermalMeaning, AScaleInAnotherUnitIsRefused) {
+  put("in/a.tiff", counts(29500));
+  cv::Mat other(30, 40, CV_16UC1);
+  cv::RNG(8).fill(other, cv::RNG::UNIFORM, 7000, 7400);
+  put("in/b.tiff", *encode_tiff(other, R"({"scale":0.04,"unit":"celsius"})"));
+  other.at<std::uint16_t>(0, 0) = 1;
+  put("in/c.tiff", *encode_tiff(other, ""));
+  put("in/c.tiff.json", R"({"scale":0.04,"offset":0,"unit":"degrees C"})");
+  other.at<std::uint16_t>(0, 0) = 2;
+  put("in/d.tiff", *encode_tiff(other, R"({"scale":0.04,"unit":"K"})"));
+  const ImportReport report = import();
+  EXPECT_EQ(report.thermal, 2);
+  EXPECT_THAT(report.warnings,
+              test::one_says("left out", "b.tiff: \"unit\": \"celsius\"", "273.15"));
+  EXPECT_THAT(report.warnings, test::one_says("left out", "c.tiff.json: \"unit\""));
+}
+
 TEST_F(ThermalMeaning, FloatsThatAreNoTemperaturesAreRefused) {
   for (const double middle : {-180.0, 20000.0}) {
     const auto refused = float_temperatures(floats(middle, 1), "f.tif");

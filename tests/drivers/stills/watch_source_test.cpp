@@ -77,6 +77,51 @@ TEST_F(WatchTest, NewPhotosComeByteForByteAndOldOnesStay) {
   EXPECT_EQ(soon(source).frame.id, 1u);
 }
 
+TEST_F(WatchTest, TransparentPixelsAreTold) {
+  cv::Mat image(30, 40, CV_8UC4);
+  cv::RNG(3).fill(image, cv::RNG::UNIFORM, 0, 255);
+  cv::Mat alpha(image.size(), CV_8UC1, cv::Scalar(255));
+  const auto png = [&] {
+    cv::mixChannels(alpha, image, {0, 3});
+    image.at<cv::Vec4b>(0, 0)[0] ^= 1;  // another photo
+    return *encode_png(image);
+  };
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  put("1.png", png());
+  EXPECT_EQ(soon(source).kind, Delivery::Kind::frame);
+  EXPECT_TRUE(quiet(source)) << "wholly opaque";
+  alpha(cv::Rect(0, 0, 20, 30)).setTo(0);
+  put("2.png", png());
+  const Delivery photo = soon(source), told = soon(source);
+  ASSERT_EQ(photo.kind, Delivery::Kind::frame) << photo.reason;
+  EXPECT_THAT(photo.frame.flags, ::testing::Contains("transparent"));
+  EXPECT_EQ(told.reason, "transparent");
+  EXPECT_THAT(told.detail, HasSubstr("2.png: 50 % of its pixels"));
+  put("3.png", png());
+  const Delivery next = soon(source);
+  EXPECT_THAT(next.frame.flags, ::testing::Contains("transparent"));
+  EXPECT_TRUE(quiet(source)) << "the flag tells of the others";
+}
+
+/// A preview, or another camera's image: which one a frame is to be made of is the user's word.
+TEST_F(WatchTest, PagesOfAnotherSizeAreTold) {
+  options.modality = Modality::thermal;
+  const auto counts = [](int width) {
+    cv::Mat image(30, width, CV_16UC1);
+    cv::RNG(static_cast<std::uint64_t>(width)).fill(image, cv::RNG::UNIFORM, 29300, 29700);
+    return image;
+  };
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  put("1.tiff", made::tiff_of_pages({counts(40), counts(20)}, R"({"scale":0.01})"));
+  const Delivery photo = soon(source), told = soon(source);
+  ASSERT_EQ(photo.kind, Delivery::Kind::frame) << photo.reason;
+  EXPECT_EQ(photo.frame.pixels.cols, 40);
+  EXPECT_EQ(told.reason, "ignored");
+  EXPECT_THAT(told.detail, HasSubstr("1.tiff: page 2 (20x30, 16-bit)"));
+}
+
 TEST_F(WatchTest, HotThermalPhotosTakeACoarserScaleForGoodAndTellDeadPixels) {
   options.modality = Modality::thermal;
   const FlirCalibration camera = made::flir_calibration();
