@@ -59,9 +59,10 @@ Result<Reconstruction> join(const Records& records, const std::filesystem::path&
   model.modality = modality;
   std::unordered_map<std::uint32_t, Camera> cameras;
   for (const CameraRecord& record : records.cameras) {
-    ORBITFUSE_ASSIGN(const Camera camera,
-                     camera_of(record, fmt::format("{}: camera {}", folder.string(), record.id)));
-    cameras.emplace(record.id, camera);
+    const std::string where = fmt::format("{}: camera {}", folder.string(), record.id);
+    ORBITFUSE_ASSIGN(const Camera camera, camera_of(record, where));
+    if (!cameras.emplace(record.id, camera).second)
+      return fail(ErrorKind::input, where, "is there twice", "export the model again");
   }
   // COLMAP writes images in hash order; names make the order reproducible.
   std::vector<const ImageRecord*> images;
@@ -95,7 +96,10 @@ Result<Reconstruction> join(const Records& records, const std::filesystem::path&
     }
     Rigid3d pose = image->cam_from_world;
     pose.rotation.normalize();
-    view_of_image.emplace(image->id, model.views.size());
+    if (!view_of_image.emplace(image->id, model.views.size()).second)
+      return fail(ErrorKind::input, where,
+                  fmt::format("has the number {} of another image", image->id),
+                  "export the model again");
     model.views.push_back({image->name, camera->second, pose});
   }
   for (const PointRecord& record : records.points) {

@@ -4,7 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
+#include <system_error>
 #include <unordered_map>
+#include <utility>
 
 #include "core/nested_text.hpp"
 #include "core/session/manifest_json.hpp"
@@ -50,13 +53,24 @@ Status apply(const Json& line, const std::string& where, Session& session, Frame
   return {};
 }
 
-void drop_missing_files(Session& session) {
+Status drop_missing_files(Session& session) {
+  // A file that can't be asked may be there: a session without it would be a guess.
+  std::optional<Error> unknown;
   std::erase_if(session.frames, [&](const FrameRecord& frame) {
-    std::error_code ignored;
-    if (std::filesystem::is_regular_file(session.path_of(frame), ignored)) return false;
+    std::error_code error;
+    const std::filesystem::path file = session.path_of(frame);
+    if (std::filesystem::is_regular_file(file, error)) return false;
+    if (error == std::errc::permission_denied || error == std::errc::io_error) {
+      if (!unknown)
+        unknown = Error{ErrorKind::input, file.string(), error.message(),
+                        "check its permissions, and those of its folder"};
+      return false;
+    }
     session.warnings.push_back(frame.file + ": listed in the manifest, but the file is missing");
     return true;
   });
+  if (unknown) return tl::unexpected(*std::move(unknown));
+  return {};
 }
 
 }  // namespace
@@ -159,7 +173,7 @@ Result<Session> open_session(const std::filesystem::path& folder) {
                   "restore the manifest from a backup");
     }
   }
-  drop_missing_files(session);
+  ORBITFUSE_TRY(drop_missing_files(session));
   if (!session.complete)
     session.warnings.push_back("the session was not closed: it may be incomplete");
   return session;

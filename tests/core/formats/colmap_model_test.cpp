@@ -117,6 +117,25 @@ TEST(ColmapText, UnknownModelAndDanglingIdsAreNamed) {
   EXPECT_FALSE(read_colmap_model(folder / "none", Modality::visible));
 }
 
+/// Which of the two lenses is meant nobody knows, nor whose observations a point's are.
+TEST(ColmapText, NumbersThatAreThereTwiceAreNamed) {
+  const TempFolder folder;
+  const std::string camera = "1 PINHOLE 10 20 5 5 4 9\n", image = "1 1 0 0 0 1 2 3 1 ";
+  const auto fault = [&](const std::string& cameras, const std::string& images) {
+    put(folder / "m/cameras.txt", cameras);
+    put(folder / "m/images.txt", images);
+    const auto model = read_colmap_model(folder / "m", Modality::visible);
+    return model ? "" : model.error().message();
+  };
+  EXPECT_EQ(fault(camera, image + "a.jpg\n\n"), "");
+  EXPECT_NE(fault(camera + "1 PINHOLE 10 20 9 9 4 9\n", image + "a.jpg\n\n")
+                .find("camera 1: is there twice"),
+            std::string::npos);
+  EXPECT_NE(fault(camera, image + "a.jpg\n\n" + image + "b.jpg\n\n")
+                .find("image \"b.jpg\": has the number 1 of another image"),
+            std::string::npos);
+}
+
 TEST(ColmapBinary, HugeCountsTakeNoMemory) {
   const TempFolder folder;
   ASSERT_TRUE(write_colmap_model(folder / "m", small_model(), ColmapFormat::binary));

@@ -4,6 +4,8 @@
 #include "core/session/manifest_json.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "tests/support/temp_folder.hpp"
 
@@ -147,6 +149,16 @@ TEST_F(SessionTest, AKeyThatALineHasTwiceIsNamed) {
   const auto cut = open(text.substr(0, text.find("\n{\"count\"")));  // of a last line too
   ASSERT_FALSE(cut);
   EXPECT_EQ(cut.error().found, session.error().found);
+}
+
+TEST_F(SessionTest, FramesThatMayNotBeLookedAtAreNotMissing) {
+  if (::geteuid() == 0) GTEST_SKIP() << "root reads everything";
+  ASSERT_EQ(::chmod((folder / "thermal").c_str(), 0), 0);
+  const auto session = open(manifest());
+  ASSERT_EQ(::chmod((folder / "thermal").c_str(), 0700), 0);
+  ASSERT_FALSE(session);
+  EXPECT_EQ(session.error().where, (folder / "thermal/000000.tiff").string());
+  EXPECT_EQ(session.error().found, "Permission denied");
 }
 
 TEST_F(SessionTest, WrongTypesNameTheField) {
