@@ -5,9 +5,11 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "app/pipeline/stage_record.hpp"
+#include "core/system/file_io.hpp"
 
 namespace orbitfuse::pipeline {
 namespace fs = std::filesystem;
@@ -18,6 +20,19 @@ Status device_error(const fs::path& path, const std::error_code& ec) {
   if (!ec) return {};
   return fail(ErrorKind::device, path.string(), ec.message(),
               "check permissions and free space, then run again with --resume");
+}
+
+constexpr const char* failed_mark = "failed.json";
+
+/// What has no mark in it is the user's own.
+Status check_place(const fs::path& folder, const char* mark, const char* remedy) {
+  std::error_code unreadable;
+  if (!fs::exists(fs::symlink_status(folder, unreadable)) ||
+      fs::exists(folder / mark, unreadable) ||
+      (fs::is_directory(folder, unreadable) && fs::is_empty(folder, unreadable)))
+    return {};
+  return fail(ErrorKind::usage, folder.string(),
+              fmt::format("is there already, and no run left it (no {} in it)", mark), remedy);
 }
 
 }  // namespace
@@ -57,15 +72,25 @@ Status replace_folder(const fs::path& from, const fs::path& to) {
   return remove_tree(old);
 }
 
-Status check_place(const fs::path& folder) {
-  std::error_code unreadable;
-  if (!fs::exists(fs::symlink_status(folder, unreadable)) ||
-      fs::exists(folder / stage_record_file, unreadable) ||
-      (fs::is_directory(folder, unreadable) && fs::is_empty(folder, unreadable)))
-    return {};
-  return fail(ErrorKind::usage, folder.string(),
-              fmt::format("is there already, and no run left it (no {} in it)", stage_record_file),
-              "choose another --out, or move it away");
+fs::path failed_folder(const fs::path& out, const std::string& stage) {
+  return out / (stage + ".failed");
+}
+
+Status check_places(const fs::path& out, const std::string& stage) {
+  ORBITFUSE_TRY(
+      check_place(out / stage, stage_record_file, "choose another --out, or move it away"));
+  return check_place(failed_folder(out, stage), failed_mark,
+                     "choose another --out, move it away, or delete it if an earlier version of "
+                     "this program left it: those put no such mark there");
+}
+
+void keep_failed(const fs::path& from, const fs::path& out, const std::string& stage,
+                 const Error& error) {
+  const nlohmann::json why = {
+      {"stage", stage}, {"error", error.message()}, {"orbitfuse", ORBITFUSE_VERSION}};
+  const std::string text = why.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  if (write_file_atomic(from / failed_mark, text))
+    (void)replace_folder(from, failed_folder(out, stage));
 }
 
 }  // namespace orbitfuse::pipeline

@@ -281,7 +281,7 @@ StageStatus Runner::execute(const Stage& stage, const Key& key, std::string why)
     ORBITFUSE_ASSIGN(record.outputs, list_outputs(folder));
     ORBITFUSE_TRY(write_stage_record(folder, record));
     ORBITFUSE_TRY(replace_folder(folder, options_.out / stage.name));
-    ORBITFUSE_TRY(remove_tree(options_.out / (stage.name + ".failed")));
+    ORBITFUSE_TRY(remove_tree(failed_folder(options_.out, stage.name)));
     ORBITFUSE_TRY(remove_tree(attempt_path));
     outputs_[stage.name] = record.outputs_hash();
     return {};
@@ -301,7 +301,7 @@ StageStatus Runner::execute(const Stage& stage, const Key& key, std::string why)
     (void)write_attempt(attempt_path, attempt);
   } else {
     if (status.error->kind == ErrorKind::quality)
-      (void)replace_folder(folder, options_.out / (stage.name + ".failed"));
+      keep_failed(folder, options_.out, stage.name, *status.error);
     (void)remove_tree(folder);
     (void)remove_tree(attempt_path);
   }
@@ -313,7 +313,7 @@ RunSummary Runner::run() {
   FolderLock lock;
   Status ready = check_out_folder(options_.out);
   for (const Stage& stage : stages_)
-    if (ready && writes(stage.name)) ready = check_place(options_.out / stage.name);
+    if (ready && writes(stage.name)) ready = check_places(options_.out, stage.name);
   if (ready && !options_.dry_run) {
     ready = make_folder(options_.out);
     if (ready) ready = lock.acquire(options_.out / ".lock");

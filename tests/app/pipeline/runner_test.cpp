@@ -139,6 +139,32 @@ TEST_F(RunnerTest, WhatNoStageLeftIsNotReplaced) {
   EXPECT_FALSE(run().error) << "an empty folder is nobody's loss";
 }
 
+/// Nor is a folder of theirs that is called as a failed stage's.
+TEST_F(RunnerTest, WhatNoFailureLeftIsNotRemoved) {
+  const fs::path out = temp.path() / "out";
+  ASSERT_TRUE(write_file_atomic(out / "b.failed/notes.txt", "mine"));
+  RunOptions options;
+  for (const bool dry : {true, false}) {
+    options.dry_run = dry;
+    const RunSummary refused = run(options);
+    ASSERT_TRUE(refused.error);
+    EXPECT_EQ(refused.error->kind, ErrorKind::usage);
+    EXPECT_THAT(refused.error->message(), HasSubstr((out / "b.failed").string()));
+    EXPECT_TRUE(runs.empty()) << "refused before the work";
+  }
+  fail_in["b"] = {ErrorKind::quality, "b", "too few", "more"};
+  run();
+  EXPECT_EQ(*read_file(out / "b.failed/notes.txt"), "mine");
+  options.targets = {"d"};
+  EXPECT_FALSE(run(options).error) << "b is not written";
+  fs::remove_all(out / "b.failed");
+  fs::create_directory(out / "b.failed");
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(run().error->kind, ErrorKind::quality);
+  fail_in.clear();
+  EXPECT_FALSE(run().error) << "what a failure left makes way";
+  EXPECT_FALSE(fs::exists(out / "b.failed"));
+}
+
 TEST_F(RunnerTest, CutDoneMarkRunsAgain) {
   run();
   const fs::path mark = temp.path() / "out/d/stage.json";
