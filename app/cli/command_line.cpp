@@ -42,11 +42,11 @@ void add_config(CLI::App& app, CommonOptions& common) {
 void add_seed(CLI::App& app, CommonOptions& common) {
   app.add_option("--seed", common.seed, "Seed of everything random")
       ->check([](const std::string& word) {
-        std::uint64_t seed = 0;
+        std::uint32_t seed = 0;  // the most that all methods take
         const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), seed);
         return error == std::errc() && end == word.data() + word.size()
                    ? std::string()
-                   : "'" + word + "' is no whole number from 0 to 2^64 - 1";
+                   : "'" + word + "' is no whole number from 0 to 2^32 - 1";
       })
       ->type_name("UINT")
       ->capture_default_str()

@@ -53,7 +53,7 @@ Result<json> earlier_run(const std::string& folder) {
   ORBITFUSE_ASSIGN(const std::string text, read_file(record));
   json run = parse_json(text);
   if (run.is_discarded())
-    return fail(ErrorKind::input, record.string(), "not JSON, or cut off", name_it_again(folder));
+    return fail(ErrorKind::input, record.string(), json_fault(text), name_it_again(folder));
   if (!run.is_object() || !run.contains("session") || !run["session"].is_string())
     return fail(ErrorKind::input, record.string(), "no session named in it", name_it_again(folder));
   return run;

@@ -52,9 +52,10 @@ Result<std::string> fuse_one(const std::string& stem, const fs::path& visible_fi
   ORBITFUSE_TRY(write_png(out / "vi" / (stem + ".png"), visible));
   ORBITFUSE_TRY(write_png(out / "ir" / (stem + ".png"), thermal));
   ORBITFUSE_TRY(write_png(out / "fused" / (stem + ".png"), fused));
-  for (auto remark : {transparency(visible_file), transparency(thermal_file),
-                      looks_exchanged(visible, stored, visible_file)})
-    if (remark) remarks.push_back(*std::move(remark));
+  for (const fs::path& file : {visible_file, thermal_file})
+    for (std::string& remark : unused_parts(file)) remarks.push_back(std::move(remark));
+  if (auto remark = looks_exchanged(visible, stored, visible_file))
+    remarks.push_back(*std::move(remark));
   std::string lines;
   for (const MetricValue& v : values)
     lines += fmt::format("{},{},{},{}\n", stem, name(options.method), v.name, v.value);
@@ -82,15 +83,19 @@ std::optional<std::string> looks_exchanged(const cv::Mat& visible, const cv::Mat
          "exchange the two";
 }
 
-std::optional<std::string> transparency(const fs::path& file) {
+std::vector<std::string> unused_parts(const fs::path& file) {
+  std::vector<std::string> list;
   const auto bytes = read_file(file, max_image_bytes);
-  const double share = bytes ? transparent_share(*bytes) : 0;
-  if (share == 0) return std::nullopt;
-  return fmt::format(
-      "{}: {:.3g} % of its pixels are transparent; alpha is dropped, and what colour lies behind "
-      "it "
-      "counts as seen: give the image as it was taken",
-      file.string(), 100 * share);
+  if (!bytes) return list;  // whoever decodes it says why
+  if (const double share = transparent_share(*bytes); share > 0)
+    list.push_back(fmt::format(
+        "{}: {:.3g} % of its pixels are transparent; alpha is dropped, and what colour lies behind "
+        "it counts as seen: give the image as it was taken",
+        file.string(), 100 * share));
+  const bool tiff = image_format(*bytes) == ImageFormat::tiff;
+  if (const std::string pages = tiff ? other_tiff_pages(*bytes) : ""; !pages.empty())
+    list.push_back(fmt::format("left out: {}: {}", file.string(), pages));
+  return list;
 }
 
 Error with_file(Error error, const std::map<std::string, std::string>& files) {

@@ -27,8 +27,8 @@ Result<cv::Mat> read_photo(const std::filesystem::path& file);
 /// invalid), anything else stays as stored.
 Result<cv::Mat> read_thermal(const std::filesystem::path& file);
 
-/// A sentence where the image has transparent pixels, whose alpha is dropped.
-std::optional<std::string> transparency(const std::filesystem::path& file);
+/// Sentences on what of an image's file is not used: alpha, pages of another size.
+std::vector<std::string> unused_parts(const std::filesystem::path& file);
 
 /// A sentence where the visible image looks like counts of temperature and the thermal one like a
 /// photo: an industrial camera and a palette's picture do so too.

@@ -33,7 +33,7 @@ Status write_json(const fs::path& file, const json& j) {
 Result<json> read_json(const fs::path& file) {
   ORBITFUSE_ASSIGN(const std::string text, read_file(file));
   json j = parse_json(text);
-  if (j.is_discarded()) return fail(ErrorKind::input, file.string(), "not JSON", run_again);
+  if (j.is_discarded()) return fail(ErrorKind::input, file.string(), json_fault(text), run_again);
   return j;
 }
 

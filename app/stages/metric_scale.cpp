@@ -73,7 +73,7 @@ Result<std::optional<MetricScale>> load_metric_scale(const fs::path& out,
   const auto text = read_file(file);
   if (!text) return fail(ErrorKind::input, file.string(), text.error().found, remedy);
   const json j = parse_json(*text);
-  if (j.is_discarded()) return fail(ErrorKind::input, file.string(), "not JSON", remedy);
+  if (j.is_discarded()) return fail(ErrorKind::input, file.string(), json_fault(*text), remedy);
   const JsonFields fields(j, file.string() + ": ", {ErrorKind::input, remedy});
   int schema = 0;
   std::string of_world;

@@ -103,13 +103,13 @@ Status fuse_pair(Context& context, const Options& o, const FusionOptions& option
     context.console.warning(*remark);
   ORBITFUSE_ASSIGN(const cv::Mat mask, read_optional(o.mask));
   for (const std::string& file : {o.visible, o.thermal})
-    if (const auto remark = batch::transparency(file)) context.console.warning(*remark);
+    for (const std::string& remark : batch::unused_parts(file)) context.console.warning(remark);
   FusionReport said;
-  ORBITFUSE_ASSIGN(const cv::Mat fused,
-                   fuse(visible, thermal, mask, options, &said).map_error([&](Error error) {
-                     return batch::with_file(
-                         error, {{"visible", o.visible}, {"thermal", o.thermal}, {"mask", o.mask}});
-                   }));
+  ORBITFUSE_ASSIGN(
+      const cv::Mat fused, fuse(visible, thermal, mask, options, &said).map_error([&](Error error) {
+        return batch::with_file(std::move(error),
+                                {{"visible", o.visible}, {"thermal", o.thermal}, {"mask", o.mask}});
+      }));
   if (context.common.dry_run) {
     context.console.info("would write " + o.folders.out);
     return {};

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "app/cli/option_pairs.hpp"
 #include "app/cli/typed_options.hpp"
 #include "app/cli/verb.hpp"
@@ -101,6 +103,11 @@ void add_radiometry(CLI::App& app, Options& o) {
 Status check_ranges(const Options& o) {
   for (const double elevation : o.elevations_deg)
     ORBITFUSE_TRY(check_typed({{"--elevations-deg", elevation, from_to(-90, 90)}}));
+  const std::size_t loops = static_cast<std::size_t>(std::max(1, o.loops.value_or(1)));
+  if (!o.elevations_deg.empty() && o.elevations_deg.size() != loops)
+    return fail(ErrorKind::usage, "--elevations-deg",
+                fmt::format("{} given, for {} loops", o.elevations_deg.size(), loops),
+                "give one for each of --loops, or none");
   return check_typed({{"--humidity", o.humidity_percent, humidity_percent_range},
                       {"--reflected-c", o.reflected_c, reflected_c_range},
                       {"--air-c", o.air_c, air_c_range},

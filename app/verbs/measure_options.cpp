@@ -133,7 +133,7 @@ Result<Request> box_of(const std::string& word) {
 Result<Request> json_request(const std::string& text) {
   const nlohmann::json j = parse_json(text);
   if (j.is_discarded())
-    return fail(ErrorKind::usage, "--request", "not JSON", "docs/formats.md has the form");
+    return fail(ErrorKind::usage, "--request", json_fault(text), "docs/formats.md has the form");
   return measurement::request_of_json(j);
 }
 

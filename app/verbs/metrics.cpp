@@ -41,7 +41,7 @@ Status score_files(Context& context, const Options& o) {
   ORBITFUSE_ASSIGN(const cv::Mat fused, batch::read_photo(o.fused));
   ORBITFUSE_ASSIGN(const auto values, fusion_metrics(visible, thermal, fused).map_error(named));
   for (const std::string& file : {o.visible, o.thermal, o.fused})
-    if (const auto remark = batch::transparency(file)) context.console.warning(*remark);
+    for (const std::string& remark : batch::unused_parts(file)) context.console.warning(remark);
   nlohmann::json metrics = nlohmann::json::object(), definitions = metrics;
   for (const MetricValue& v : values) {
     context.console.data(fmt::format("{:<10} {:>14.6f}  {}", v.name, v.value, v.definition));

@@ -49,8 +49,9 @@ Result<std::vector<Bookmark>> Bookmarks::list() const {
                 "mend it, or move it away and keep the views again");
   };
   const json j = parse_json(text);
+  if (j.is_discarded()) return damaged(json_fault(text));
   if (!j.is_object() || !j.contains("bookmarks") || !j["bookmarks"].is_array())
-    return damaged("not JSON, or no bookmarks in it");
+    return damaged("no bookmarks in it");
   if (j.value("schema", json()) != schema) return damaged("of another version");
   for (const json& entry : j["bookmarks"]) {
     const Result<Bookmark> bookmark = bookmark_of(entry);

@@ -13,6 +13,7 @@ bool asks_for_operator(EventKind kind) {
     case EventKind::reopen_failed:
     case EventKind::setting_lost:
     case EventKind::nothing_new:
+    case EventKind::transparent:
       return true;
     default:
       return false;

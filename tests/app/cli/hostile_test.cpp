@@ -13,6 +13,7 @@
 #include "core/system/file_io.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/app/cli/session_fixture.hpp"
+#include "tests/support/made_files.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
@@ -109,6 +110,23 @@ TEST_F(Hostile, FuseAndMetricsNameImagesWithTransparentPixels) {
   }
 }
 
+/// A preview that no tag calls so, or what is meant.
+TEST_F(Hostile, FuseAndMetricsNamePagesThatTheyLeaveOut) {
+  put_pair();
+  cv::Mat large(48, 64, CV_8UC1), small(24, 32, CV_8UC1);
+  cv::randu(large, 0, 255);
+  cv::randu(small, 0, 255);
+  ASSERT_TRUE(write_file_atomic(path("p.tif"), made::tiff_of_pages({large, small})));
+  for (const auto& more : {std::vector<std::string>{"fuse", "--out", path("f.png")},
+                           std::vector<std::string>{"metrics", "--fused", path("v.png")}}) {
+    std::vector<std::string> words = more;
+    words.insert(words.end(), {"--visible", path("v.png"), "--thermal", path("p.tif")});
+    const Outcome outcome = orbitfuse_program(words);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr("p.tif: page 2 (32x24, 8-bit)"));
+  }
+}
+
 TEST_F(Hostile, TheLegendOfFuseIsNotWrittenOntoAnInput) {
   put_pair();
   fs::copy_file(path("t.png"), path("f_legend.png"));
@@ -160,6 +178,9 @@ TEST_F(Hostile, OptionsOutOfRangeAreNamedAsTheyWereTyped) {
       {{"compare", "a", "b", "--out", path("c"), "--triangles", "3"}, "--triangles: 3; choose 4"},
       {{"render", "s", "--views", "0"}, "--views: 0; choose 1"},
       {{"render", "s", "--width", "1"}, "--width: 1; choose 16"},
+      {{"register", "s", "--seed", "4294967296"},
+       "--seed: '4294967296' is no whole number from 0 to 2^32 - 1"},
+      {{"train", "s", "--seed", "-1"}, "--seed: '-1' is no whole number"},
       {{"train", "s", "--target-psnr", "nan"}, "--target-psnr: 'nan' is no number"}};
   for (const auto& [words, said] : cases) {
     refused(orbitfuse_program(words), 2, said);
@@ -248,6 +269,8 @@ TEST_F(Hostile, NumbersAreNamedAsTheyWereTyped) {
       {{"--emissivity", "1.5"}, "--emissivity: 1.5"},
       {{"--station-spacing-deg", "0"}, "--station-spacing-deg: 0; choose 1 to 180"},
       {{"--station-spacing-deg", "15", "--loops", "0"}, "--loops: 0; choose 1 to 100"},
+      {{"--station-spacing-deg", "15", "--loops", "2", "--elevations-deg", "10"},
+       "--elevations-deg: 1 given, for 2 loops"},
       {{"--thermal-scale", "linear", "--kelvin-per-count", "0"}, "--kelvin-per-count: 0;"},
       {{"--thermal-scale", "linear"}, "--kelvin-per-count"},
       {{"--emissivity", "0.9"}, "no radiometric JPEGs"}};

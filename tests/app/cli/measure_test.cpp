@@ -161,6 +161,7 @@ TEST_F(Measure, WhatIsWrongIsNamedWithTheRemedy) {
   expect_refused({"--pixel", "000,32,24", "--humidity", "900"}, 2, "--humidity: 900");
   expect_refused({"--hottest", "1", "--coldest", "1"}, 2, "together with");
   expect_refused({"--request", "{\"kind\":\"spit\"}"}, 2, "spit");
+  expect_refused({"--request", R"({"kind":"spot","kind":"line"})"}, 2, "key \"kind\" twice");
   expect_refused({"--hottest", "1", "--remark", "warm"}, 2, "without --save");
   expect_refused({"--hottest", "1", "--save", "--reference", "joint"}, 2, "none is saved");
   ASSERT_EQ(measure({"--pixel", "000,32,24", "--name", "joint L1", "--save"}).code, 0);

@@ -62,6 +62,14 @@ TEST(StreamWatch, AnOutageAtTheEndStopsGrowingThere) {
   EXPECT_EQ(watch.away()->seconds, at_the_end_s);
 }
 
+/// They were taken, so no count tells of them.
+TEST(StreamWatch, PhotosWithTransparentPixelsAreForTheOperator) {
+  StreamWatch watch;
+  watch.note(event_delivery(EventKind::transparent, "a.png: 50 % of its pixels"));
+  EXPECT_EQ(told(watch).notice, "a.png: 50 % of its pixels");
+  EXPECT_FALSE(watch.away());
+}
+
 TEST(StreamWatch, OfWhatWasPassedOverTheLastThreeAreNamed) {
   StreamWatch watch;
   for (const char* file : {"a", "b", "c", "d"})
