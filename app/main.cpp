@@ -169,7 +169,8 @@ int run(const std::vector<const char*>& words) {
   set_thread_count(line.common.threads);
   keep_freed_memory();
 
-  const auto& [verb, action] = line.chosen();
+  const cli::Verb* verb = line.chosen().first;
+  const cli::Action& action = line.chosen().second;
   stages::RunConfig config;
   cli::Context context{line.common, config, console, {}, {}, {}};
   context.progress.report = [&console](const ProgressEvent& event) { console.progress(event); };

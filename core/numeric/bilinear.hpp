@@ -52,8 +52,8 @@ template <class Weight, class At>
 auto blended(const BilinearPlace<Weight>& place, const At& at) {
   using Value = std::decay_t<decltype(at(0, 0))>;
   const auto& [x0, y0, x1, y1, right, down] = place;
-  const Value value = (1 - down) * ((1 - right) * at(y0, x0) + right * at(y0, x1)) +
-                      down * ((1 - right) * at(y1, x0) + right * at(y1, x1));
+  Value value = (1 - down) * ((1 - right) * at(y0, x0) + right * at(y0, x1)) +
+                down * ((1 - right) * at(y1, x0) + right * at(y1, x1));
   return value;
 }
 
