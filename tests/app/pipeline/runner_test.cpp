@@ -50,6 +50,19 @@ class RunnerTest : public testing::Test {
     return runner.run();
   }
 
+  /// In a dry run as in a real one, before the work, for what lies at `place`.
+  void expect_refused(const fs::path& place) {
+    RunOptions options;
+    for (const bool dry : {true, false}) {
+      options.dry_run = dry;
+      const RunSummary refused = run(options);
+      ASSERT_TRUE(refused.error);
+      EXPECT_EQ(refused.error->kind, ErrorKind::usage);
+      EXPECT_THAT(refused.error->message(), HasSubstr(place.string()));
+      EXPECT_TRUE(runs.empty()) << "refused before the work";
+    }
+  }
+
   std::vector<std::string> ran() const {
     std::vector<std::string> names;
     for (const auto& [name, count] : runs) names.push_back(name);
@@ -117,16 +130,9 @@ TEST_F(RunnerTest, DamagedOutputRunsAgain) {
 TEST_F(RunnerTest, WhatNoStageLeftIsNotReplaced) {
   const fs::path out = temp.path() / "out";
   ASSERT_TRUE(write_file_atomic(out / "c/thesis.txt", "mine"));
-  RunOptions options;
-  for (const bool dry : {true, false}) {
-    options.dry_run = dry;
-    const RunSummary refused = run(options);
-    ASSERT_TRUE(refused.error);
-    EXPECT_EQ(refused.error->kind, ErrorKind::usage);
-    EXPECT_THAT(refused.error->message(), HasSubstr((out / "c").string()));
-    EXPECT_TRUE(runs.empty()) << "refused before the work";
-  }
+  expect_refused(out / "c");
   EXPECT_EQ(*read_file(out / "c/thesis.txt"), "mine");
+  RunOptions options;
   options.targets = {"d"};
   EXPECT_FALSE(run(options).error) << "c is not written";
   EXPECT_EQ(*read_file(out / "c/thesis.txt"), "mine");
@@ -143,18 +149,11 @@ TEST_F(RunnerTest, WhatNoStageLeftIsNotReplaced) {
 TEST_F(RunnerTest, WhatNoFailureLeftIsNotRemoved) {
   const fs::path out = temp.path() / "out";
   ASSERT_TRUE(write_file_atomic(out / "b.failed/notes.txt", "mine"));
-  RunOptions options;
-  for (const bool dry : {true, false}) {
-    options.dry_run = dry;
-    const RunSummary refused = run(options);
-    ASSERT_TRUE(refused.error);
-    EXPECT_EQ(refused.error->kind, ErrorKind::usage);
-    EXPECT_THAT(refused.error->message(), HasSubstr((out / "b.failed").string()));
-    EXPECT_TRUE(runs.empty()) << "refused before the work";
-  }
+  expect_refused(out / "b.failed");
   fail_in["b"] = {ErrorKind::quality, "b", "too few", "more"};
   run();
   EXPECT_EQ(*read_file(out / "b.failed/notes.txt"), "mine");
+  RunOptions options;
   options.targets = {"d"};
   EXPECT_FALSE(run(options).error) << "b is not written";
   fs::remove_all(out / "b.failed");
