@@ -26,7 +26,7 @@ constexpr double visible_checks_s = 0.5, thermal_checks_s = 1.1;  // of held-out
 constexpr double new_view_mpx_s = 3.35;                           // both fields
 constexpr double lent_view_s = 0.17;   // a recorded view that lends detail
 constexpr double fused_mpx_s = 0.115;  // a method
-constexpr double scored_mpx_s = 0.545, heldout_view_s = 0.25;
+constexpr double scored_mpx_s = 0.4, heldout_view_s = 0.25;
 constexpr int heldout_every = 12;
 constexpr double report_s = 0.5;
 constexpr double thermal_depth_view_s = 0.19;  // without photos: matched at 260 pixels
@@ -66,8 +66,9 @@ double stage_s(const std::string& stage, const SceneFacts& facts, const Effort& 
   if (stage == "metrics") {
     const int scored =
         effort.scored_views > 0 ? std::min(effort.scored_views, facts.new_views) : facts.new_views;
-    const double heldout = (heldout_view_s + facts.detail_sources * lent_view_s) *
-                           (std::ceil(photos / heldout_every) + std::ceil(thermal / heldout_every));
+    // What recorded views lend to held-out ones was rendered for the new views already.
+    const double heldout =
+        heldout_view_s * (std::ceil(photos / heldout_every) + std::ceil(thermal / heldout_every));
     return heldout + (both ? scored * facts.new_view_mpx * facts.fusion_methods * scored_mpx_s : 0);
   }
   if (photos > 0) {
