@@ -10,8 +10,7 @@ struct Effort {
   int scored_views = 0;  ///< new views whose fused pictures are measured; 0: all
 };
 
-/// The least of everything: with a weaker visible field the stages behind it take longer than its
-/// training saves (docs/notes/planner.md).
+/// The least of each (docs/notes/planner.md); what ends soonest may have a longer visible training.
 inline constexpr Effort least_effort{
     .depth_width_px = 280, .visible_steps = 2400, .thermal_steps = 600, .scored_views = 2};
 

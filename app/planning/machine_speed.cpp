@@ -59,7 +59,10 @@ double measured_slowness() {
       step_s =
           std::min(step_s, (to.wall_s - from.wall_s) / static_cast<double>(to.step - from.step));
   }
-  return step_s > 0 && std::isfinite(step_s) ? step_s / reference_step_s : 1;
+  if (!(step_s > 0) || !std::isfinite(step_s)) return 1;
+  // Networks' tiles are half of what tells processors apart (a step takes an EPYC 1.6 times the
+  // reference's, a stage 1.0 to 1.5, docs/notes/planner.md), and half a second may be a bad moment.
+  return std::sqrt(step_s / reference_step_s);
 }
 
 }  // namespace orbitfuse::planning

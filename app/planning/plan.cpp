@@ -33,6 +33,13 @@ int steps_for(double time_s, double step_s, int least, int most) {
   return static_cast<int>(std::clamp(time_s / step_s, 1.0 * least, 1.0 * most));
 }
 
+/// Lengths of the visible training, from the least to the most, i = 0..lengths.
+int visible_steps_at(int i) {
+  return static_cast<int>(std::lround(
+      least_effort.visible_steps * std::pow(1.0 * most_visible_steps / least_effort.visible_steps,
+                                            static_cast<double>(i) / lengths)));
+}
+
 struct Search {
   const SceneFacts& facts;
   const std::vector<std::string>& stages;
@@ -62,11 +69,7 @@ struct Search {
     const bool visible = trains(Modality::visible) && !settled.visible_steps,
                thermal = trains(Modality::thermal) && !settled.thermal_steps;
     for (int i = 0; i <= (visible ? lengths : 0); ++i) {
-      if (visible)
-        effort.visible_steps = static_cast<int>(
-            std::lround(least_effort.visible_steps *
-                        std::pow(1.0 * most_visible_steps / least_effort.visible_steps,
-                                 static_cast<double>(i) / lengths)));
+      if (visible) effort.visible_steps = visible_steps_at(i);
       if (thermal) {
         effort.thermal_steps = 0;
         const double left_s = available_s - seconds(facts, stages, slowness, effort);
@@ -75,6 +78,19 @@ struct Search {
       }
       consider(effort);
     }
+  }
+
+  /// The soonest end there is: with a weak visible field the stages behind it can take longer than
+  /// its training saves.
+  Effort soonest(Effort least) const {
+    if (!trains(Modality::visible) || settled.visible_steps) return least;
+    Effort best_one = least;
+    for (int i = 0; i <= lengths; ++i) {
+      least.visible_steps = visible_steps_at(i);
+      if (seconds(facts, stages, slowness, least) < seconds(facts, stages, slowness, best_one))
+        best_one = least;
+    }
+    return best_one;
   }
 };
 
@@ -100,8 +116,8 @@ Plan make_plan(const SceneFacts& facts, const std::vector<std::string>& stages,
       search.divide(effort);
     }
   if (!std::isfinite(search.best_loss)) {
-    search.best.effort = least;
-    search.best.expected_s = seconds(facts, stages, slowness, least);
+    search.best.effort = search.soonest(least);
+    search.best.expected_s = seconds(facts, stages, slowness, search.best.effort);
     search.best.fits = false;
   } else {
     const double spare_s = available_s - search.best.expected_s;

@@ -103,12 +103,18 @@ TEST(Plan, UsesWhatThereIsAndNoMore) {
   }
 }
 
-TEST(Plan, TooLittleTimeIsSaidAndGetsTheLeast) {
+TEST(Plan, TooLittleTimeIsSaidAndGetsWhatEndsSoonest) {
+  const SceneFacts facts = usual_orbit();
   for (const double available_s : {10.0, 0.0, -5.0, -std::numeric_limits<double>::infinity()}) {
-    const Plan plan = make_plan(usual_orbit(), stages::stage_names(), {}, 1, available_s);
+    const Plan plan = make_plan(facts, stages::stage_names(), {}, 1, available_s);
     EXPECT_FALSE(plan.fits);
-    EXPECT_EQ(plan.effort.visible_steps, least_effort.visible_steps);
+    EXPECT_EQ(plan.effort.thermal_steps, least_effort.thermal_steps);
     EXPECT_EQ(plan.effort.depth_width_px, least_effort.depth_width_px);
+    Effort other = least_effort;
+    for (other.visible_steps = least_effort.visible_steps; other.visible_steps < 10'000;
+         other.visible_steps += 100)
+      EXPECT_LE(plan.expected_s, needed_s(facts, other) + 0.05) << other.visible_steps;
+    EXPECT_LT(plan.expected_s, needed_s(facts, least_effort)) << "fog costs more than it saves";
     EXPECT_GT(plan.expected_s, available_s);
   }
 }
