@@ -15,6 +15,9 @@ namespace {
 constexpr int views = 4, warm_up_steps = 60, steps = 240;
 /// Of a step on noise, where stage_s() was measured.
 constexpr double reference_step_s = 2.7e-3;
+/// Networks' tiles (AMX) are half of what tells processors apart: a step takes an EPYC 1.6 times
+/// the reference's, a stage 1.0 to 1.5 (docs/notes/planner.md). More than that is the machine.
+constexpr double most_of_tiles = 2;
 
 /// Cameras round a ball of noise.
 nerf::Dataset noise() {
@@ -42,6 +45,11 @@ nerf::Dataset noise() {
 
 }  // namespace
 
+double stage_slowness(double step_slowness) {
+  const double bounded = std::clamp(step_slowness, 1 / most_of_tiles, most_of_tiles);
+  return std::sqrt(bounded) * step_slowness / bounded;
+}
+
 double measured_slowness() {
   auto options = nerf::preset(nerf::default_preset(Modality::visible));
   if (!options) return 1;
@@ -60,9 +68,7 @@ double measured_slowness() {
           std::min(step_s, (to.wall_s - from.wall_s) / static_cast<double>(to.step - from.step));
   }
   if (!(step_s > 0) || !std::isfinite(step_s)) return 1;
-  // Networks' tiles are half of what tells processors apart (a step takes an EPYC 1.6 times the
-  // reference's, a stage 1.0 to 1.5, docs/notes/planner.md), and half a second may be a bad moment.
-  return std::sqrt(step_s / reference_step_s);
+  return stage_slowness(step_s / reference_step_s);
 }
 
 }  // namespace orbitfuse::planning

@@ -8,4 +8,8 @@ namespace orbitfuse::planning {
 /// 1 if that can't be told.
 double measured_slowness();
 
+/// Of a whole stage, from that of a training step, both 1 for the reference: they go together, but
+/// for what a processor's tiles give networks alone.
+double stage_slowness(double step_slowness);
+
 }  // namespace orbitfuse::planning

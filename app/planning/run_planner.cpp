@@ -166,7 +166,7 @@ std::string RunPlanner::decide(const std::string& stage, const std::vector<Stage
     if (!plan.fits && first_.fits && !warned_) {
       warned_ = true;
       warning = fmt::format(
-          "--budget: {} and what follows take about {:.0f} s with the least of everything; the run "
+          "--budget: {} and what follows take about {:.0f} s with what ends soonest; the run "
           "will end after about {:.0f} s, not {:.0f} s",
           stage, plan.expected_s, input_.elapsed_s() + plan.expected_s, input_.budget_s);
     }

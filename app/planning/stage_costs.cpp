@@ -66,7 +66,8 @@ double stage_s(const std::string& stage, const SceneFacts& facts, const Effort& 
   if (stage == "metrics") {
     const int scored =
         effort.scored_views > 0 ? std::min(effort.scored_views, facts.new_views) : facts.new_views;
-    // What recorded views lend to held-out ones was rendered for the new views already.
+    // What recorded views lend to held-out ones was rendered for the new views already (not where
+    // a run goes on behind them: some seconds that no plan knows of).
     const double heldout =
         heldout_view_s * (std::ceil(photos / heldout_every) + std::ceil(thermal / heldout_every));
     return heldout + (both ? scored * facts.new_view_mpx * facts.fusion_methods * scored_mpx_s : 0);

@@ -60,10 +60,12 @@ Status drop_missing_files(Session& session) {
     std::error_code error;
     const std::filesystem::path file = session.path_of(frame);
     if (std::filesystem::is_regular_file(file, error)) return false;
-    if (error == std::errc::permission_denied || error == std::errc::io_error) {
+    const bool missing = !error || error == std::errc::no_such_file_or_directory ||
+                         error == std::errc::not_a_directory;
+    if (!missing) {
       if (!unknown)
         unknown = Error{ErrorKind::input, file.string(), error.message(),
-                        "check its permissions, and those of its folder"};
+                        "check its permissions, those of its folder, and that its disk is there"};
       return false;
     }
     session.warnings.push_back(frame.file + ": listed in the manifest, but the file is missing");

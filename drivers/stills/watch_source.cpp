@@ -101,7 +101,8 @@ Delivery WatchSource::rejection(const std::string& name, const std::string& why)
 
 /// Whoever took these photos thinks that they are in the session.
 std::vector<Delivery> WatchSource::unfinished() {
-  std::vector<Delivery> list;
+  std::vector<Delivery> list(pending_.begin(), pending_.end());
+  pending_.clear();
   const auto unread = [&](const fs::path& file) {
     std::error_code error;
     const bool empty = fs::file_size(file, error) == 0 && !error;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "app/planning/plan.hpp"
+#include "app/planning/machine_speed.hpp"
 
 #include <gtest/gtest.h>
 
@@ -117,6 +118,15 @@ TEST(Plan, TooLittleTimeIsSaidAndGetsWhatEndsSoonest) {
     EXPECT_LT(plan.expected_s, needed_s(facts, least_effort)) << "fog costs more than it saves";
     EXPECT_GT(plan.expected_s, available_s);
   }
+}
+
+TEST(StageSlowness, GrowsWithAStepsAndLessAboutTheReference) {
+  EXPECT_DOUBLE_EQ(stage_slowness(1), 1);
+  EXPECT_NEAR(stage_slowness(1.59), 1.26, 0.01);
+  EXPECT_NEAR(stage_slowness(8) / stage_slowness(4), 2, 1e-9) << "a slow machine is slow in all";
+  EXPECT_NEAR(stage_slowness(0.1) / stage_slowness(0.2), 0.5, 1e-9);
+  for (double step = 0.1; step < 10; step *= 1.01)
+    EXPECT_LT(stage_slowness(step), stage_slowness(1.01 * step)) << step;
 }
 
 TEST(Plan, EndlessTimeIsNotSpent) {

@@ -161,6 +161,14 @@ TEST_F(SessionTest, FramesThatMayNotBeLookedAtAreNotMissing) {
   EXPECT_EQ(session.error().found, "Permission denied");
 }
 
+TEST_F(SessionTest, FramesThatCannotBeAskedForAreNotMissing) {
+  std::filesystem::remove_all(folder / "thermal");
+  std::filesystem::create_directory_symlink("thermal", folder / "thermal");
+  const auto session = open(manifest());
+  ASSERT_FALSE(session);
+  EXPECT_EQ(session.error().where, (folder / "thermal/000000.tiff").string());
+}
+
 TEST_F(SessionTest, WrongTypesNameTheField) {
   const std::pair<const char*, const char*> edits[] = {
       {"\"width\":640", "\"width\":\"640\""},

@@ -122,6 +122,19 @@ TEST_F(WatchTest, PagesOfAnotherSizeAreTold) {
   EXPECT_THAT(told.detail, HasSubstr("1.tiff: page 2 (20x30, 16-bit)"));
 }
 
+TEST_F(WatchTest, WhatIsToldOfTheLastFileIsNotLostWhenTheRecordingEnds) {
+  options.modality = Modality::thermal;
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  const cv::Mat1w large(30, 40, 29500), small(30, 20, 29500);
+  put("1.tiff", made::tiff_of_pages({large, small}, R"({"scale":0.01})"));
+  ASSERT_EQ(soon(source).kind, Delivery::Kind::frame);
+  const std::vector<Delivery> rest = source.unfinished();
+  ASSERT_EQ(rest.size(), 1u);
+  EXPECT_THAT(rest[0].detail, HasSubstr("1.tiff: page 2"));
+  EXPECT_TRUE(source.unfinished().empty());
+}
+
 TEST_F(WatchTest, HotThermalPhotosTakeACoarserScaleForGoodAndTellDeadPixels) {
   options.modality = Modality::thermal;
   const FlirCalibration camera = made::flir_calibration();
