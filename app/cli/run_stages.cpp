@@ -201,8 +201,8 @@ Status StagedRun::plan(double budget_s) {
   context_.console.info(fmt::format("plan for {:.0f} s: {}", budget_s, planner_->described()));
   if (!planner_->first().fits)
     context_.console.warning(fmt::format(
-        "--budget: {:.0f} s are too few for this session on this machine; with the least of "
-        "everything it takes about {:.0f} s, and that is done",
+        "--budget: {:.0f} s are too few for this session on this machine; what ends soonest "
+        "takes about {:.0f} s, and that is done",
         budget_s, planner_->first_total_s()));
   if (const std::string remark = planner_->remark(); !remark.empty()) context_.console.info(remark);
   return {};

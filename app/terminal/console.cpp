@@ -17,6 +17,9 @@ namespace {
 constexpr auto redraw_interval = std::chrono::milliseconds(100);
 constexpr int bar_width = 24;
 
+/// A reader that has left (`2>&1 | head`) ends no run: results are on disk, the exit code tells.
+void to_stderr(const std::string& text) { std::fputs(text.c_str(), stderr); }
+
 std::string bar_line(const ProgressEvent& e) {
   const double share = e.total > 0 ? std::clamp(e.done / e.total, 0.0, 1.0) : 0.0;
   const int filled = static_cast<int>(std::lround(share * bar_width));
@@ -89,9 +92,9 @@ void Console::message(const char* label, const char* color, const std::string& t
   const std::lock_guard lock(mutex_);
   clear_bar();
   if (options_.color && *color)
-    fmt::print(stderr, "{}{}\033[0m{}\n", color, label, printable(text));
+    to_stderr(fmt::format("{}{}\033[0m{}\n", color, label, printable(text)));
   else
-    fmt::print(stderr, "{}{}\n", label, printable(text));
+    to_stderr(fmt::format("{}{}\n", label, printable(text)));
 }
 
 void Console::info(const std::string& text) {
@@ -124,7 +127,7 @@ void Console::progress(const ProgressEvent& e) {
     if (!e.detail.empty()) j["detail"] = e.detail;
     write_stdout(line_of(j));
   } else if (options_.terminal && options_.verbosity >= 0) {
-    fmt::print(stderr, "\r\033[K{}", printable(bar_line(e)));
+    to_stderr(fmt::format("\r\033[K{}", printable(bar_line(e))));
     std::fflush(stderr);
     bar_drawn_ = true;
   }

@@ -291,6 +291,10 @@ TEST_F(Hostile, OutputThatNobodyGetsIsNoSuccess) {
   EXPECT_EQ(shell(program + " --help > /dev/full").code, 4);
   // Who stops reading has what he wanted.
   EXPECT_EQ(shell("{ " + program + " inspect " + path("s") + "; echo $? >&2; } | true").err, "0\n");
+  const std::string dry_run = program + " run " + path("s") + " --dry-run --out " + path("o");
+  const int code = shell(dry_run).code;
+  shell("{ sleep 0.2; " + dry_run + " 2>&1; echo $? > " + path("code") + "; } | true");
+  EXPECT_EQ(shell("cat " + path("code")).out, std::to_string(code) + "\n");
 }
 
 TEST_F(Hostile, NamesDoNotReachTheTerminalAsCommands) {
