@@ -18,4 +18,7 @@ const std::string_view ${symbol}(reinterpret_cast<const char*>(bytes), sizeof by
 }
 " @ONLY)
   target_sources(orbitfuse_${target} PRIVATE ${source})
+  # All of them call their bytes alike, and they include next to nothing.
+  set_property(SOURCE ${source} PROPERTY SKIP_UNITY_BUILD_INCLUSION ON)
+  set_property(SOURCE ${source} PROPERTY SKIP_PRECOMPILE_HEADERS ON)
 endfunction()

@@ -1,9 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # One folder, one target, links stated. Headers are included from the repository root
 # (#include "core/result.hpp"); users of the libraries write <orbitfuse/core/result.hpp>.
-if(with_tests)
-  include(GoogleTest)
-endif()
 include(GNUInstallDirs)
 
 # How this project compiles its own sources. These hold for this folder and those below, and reach
@@ -47,13 +44,15 @@ if(ORBITFUSE_INSTALL)
   install(TARGETS orbitfuse_headers EXPORT OrbitFuse COMPONENT library)
 endif()
 
-# Much of a source's compile time is reading Eigen, OpenCV and the standard library. One precompiled
-# header for all modules saves a quarter of that of a source like session.cpp; off, because a compiler
-# cache saves more, keys such headers less well, and sources compiled as they stand show includes that
-# are missing.
+# Half of the time that a source takes is reading headers that the next one reads again. One
+# precompiled header for all modules, and one for the tests, saves most of that. A compiler cache saves
+# more and keys such headers less well: with one cmake/build.sh leaves this off.
 option(ORBITFUSE_PRECOMPILE "Precompile the headers that most sources include" OFF)
-set(orbitfuse_common_headers <Eigen/Core> <Eigen/Geometry> <opencv2/core.hpp> <tl/expected.hpp>
-  <fmt/format.h> <algorithm> <cmath> <filesystem> <functional> <map> <optional> <string> <vector>)
+set(orbitfuse_common_headers <Eigen/Core> <Eigen/Geometry> <fmt/format.h> <nlohmann/json.hpp>
+  <opencv2/core.hpp> <opencv2/imgproc.hpp> <tl/expected.hpp>
+  <algorithm> <array> <atomic> <chrono> <cmath> <condition_variable> <filesystem> <fstream>
+  <functional> <map> <memory> <mutex> <numeric> <optional> <random> <set> <sstream> <string>
+  <thread> <tuple> <unordered_map> <variant> <vector>)
 
 function(orbitfuse_precompile target)
   if(NOT ORBITFUSE_PRECOMPILE)
@@ -63,6 +62,23 @@ function(orbitfuse_precompile target)
     target_precompile_headers(${target} PRIVATE ${orbitfuse_common_headers})
   else()
     target_precompile_headers(${target} REUSE_FROM orbitfuse_core)
+  endif()
+endfunction()
+
+# Sources compiled ten at a time read their headers once, and share what templates they instantiate.
+# After a change of one file that takes longer, and includes that a file leaves out don't show. So the
+# preset release (the README's and the CI's) has it; dev and the sanitizers do not.
+option(ORBITFUSE_UNITY "Compile a target's sources some at a time" OFF)
+
+if(ORBITFUSE_UNITY)
+  # A class whose members are of an anonymous namespace: an error in a header, and right in a source,
+  # which g++ cannot tell from a header here.
+  add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-Wno-subobject-linkage>)
+endif()
+
+function(orbitfuse_unity target)
+  if(ORBITFUSE_UNITY)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
   endif()
 endfunction()
 
@@ -102,6 +118,7 @@ function(orbitfuse_module name)
   if(NOT ARG_OWN_HEADERS_PRECOMPILED)
     orbitfuse_precompile(${target})
   endif()
+  orbitfuse_unity(${target})
   if(PROJECT_IS_TOP_LEVEL)
     add_library(${name} ALIAS ${target})
   endif()
@@ -146,22 +163,87 @@ function(orbitfuse_isa_sources name isa)
   target_sources(orbitfuse_${name} PRIVATE ${ARGN})
   set_property(SOURCE ${ARGN} APPEND PROPERTY COMPILE_OPTIONS ${flags_${isa}})
   set_property(SOURCE ${ARGN} PROPERTY SKIP_PRECOMPILE_HEADERS ON)
+  set_property(SOURCE ${ARGN} PROPERTY SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
 
-# orbitfuse_test(core_test SRCS x_test.cpp LINK core [LABEL fast|slow] [LOCK resource])
+# ctest runs a process for each suite: a process for each test took a fifth of the time of all to load
+# OpenCV's 270 libraries, and made what a suite prepares for its tests once for each. Skipped is a
+# suite of which a test was skipped and none failed.
+function(orbitfuse_discover_suites program)
+  set(file ${CMAKE_CURRENT_BINARY_DIR}/${program}_suites.cmake)
+  list(JOIN ARGN " " properties)
+  add_custom_command(TARGET ${program} POST_BUILD BYPRODUCTS ${file}
+    COMMAND ${CMAKE_COMMAND} -DPROGRAM=$<TARGET_FILE:${program}> -DNAME=${program} -DFILE=${file}
+      "-DPROPERTIES=${properties}" -P ${PROJECT_SOURCE_DIR}/cmake/list_suites.cmake VERBATIM)
+  set(included ${CMAKE_CURRENT_BINARY_DIR}/${program}_tests.cmake)
+  file(WRITE ${included} "if(EXISTS \"${file}\")\n  include(\"${file}\")\nelse()\n"
+    "  add_test(${program}_is_not_built ${program}_is_not_built)\nendif()\n")
+  set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${included})
+endfunction()
+
+# What most tests include, precompiled once for each way that they are compiled.
+set(orbitfuse_test_headers ${orbitfuse_common_headers} <gmock/gmock.h> <gtest/gtest.h>)
+
+function(orbitfuse_precompile_test name optimised)
+  if(NOT ORBITFUSE_PRECOMPILE)
+    return()
+  endif()
+  set(headers orbitfuse_test_headers)
+  if(optimised)
+    set(headers orbitfuse_optimised_test_headers)
+  endif()
+  if(NOT TARGET ${headers})
+    file(WRITE ${PROJECT_BINARY_DIR}/${headers}.cpp "")
+    add_library(${headers} OBJECT ${PROJECT_BINARY_DIR}/${headers}.cpp)
+    target_link_libraries(${headers} PRIVATE orbitfuse_core GTest::gtest GTest::gmock)
+    target_precompile_headers(${headers} PRIVATE ${orbitfuse_test_headers})
+    orbitfuse_optimise_test(${headers} ${optimised})
+  endif()
+  target_precompile_headers(${name} REUSE_FROM ${headers})
+endfunction()
+
+# Most tests call the product and compare: half of what compiling them took beside the headers was
+# optimising that.
+function(orbitfuse_optimise_test name optimised)
+  if(optimised)
+    target_compile_options(${name} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O2>)
+  else()
+    target_compile_options(${name} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1>)
+  endif()
+endfunction()
+
+# orbitfuse_test(core_test SRCS x_test.cpp LINK core [LABEL fast|slow] [LOCK resource] [COST seconds]
+#                [OPTIMISED] [WHOLE])
 # fast: the README's test command; slow: has its own command (tests/run.sh --slow). The label ends in
-# the program's name, so that `ctest -L core_test` runs one program's tests.
+# the program's name, so that `ctest -L core_test` runs one program's tests. COST: ctest begins with
+# the longest. OPTIMISED: they compute much themselves. WHOLE: all suites
+# in one process, for they share what was made for them.
 function(orbitfuse_test name)
-  cmake_parse_arguments(ARG "" "LABEL;LOCK" "SRCS;LINK" ${ARGN})
+  cmake_parse_arguments(ARG "OPTIMISED;WHOLE" "LABEL;LOCK;COST" "SRCS;LINK" ${ARGN})
   if(NOT ARG_LABEL)
     set(ARG_LABEL fast)
   endif()
   orbitfuse_targets_of(links ${ARG_LINK})
   add_executable(${name} ${ARG_SRCS})
+  orbitfuse_unity(${name})
+  orbitfuse_optimise_test(${name} ${ARG_OPTIMISED})
+  orbitfuse_precompile_test(${name} ${ARG_OPTIMISED})
   target_link_libraries(${name} PRIVATE ${links} GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE
     ORBITFUSE_SOURCE_DIR="${PROJECT_SOURCE_DIR}" ORBITFUSE_BINARY_DIR="${PROJECT_BINARY_DIR}")
-  gtest_discover_tests(${name} PROPERTIES LABELS ${ARG_LABEL}:${name} RESOURCE_LOCK "${ARG_LOCK}" DISCOVERY_TIMEOUT 60)
+  set(properties LABELS ${ARG_LABEL}:${name})
+  if(ARG_LOCK)
+    list(APPEND properties RESOURCE_LOCK ${ARG_LOCK})
+  endif()
+  if(ARG_COST)
+    list(APPEND properties COST ${ARG_COST})
+  endif()
+  if(ARG_WHOLE)
+    add_test(NAME ${name} COMMAND ${name})
+    set_tests_properties(${name} PROPERTIES ${properties})
+  else()
+    orbitfuse_discover_suites(${name} ${properties})
+  endif()
 endfunction()
 
 function(orbitfuse_write_link_graph file)

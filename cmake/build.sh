@@ -4,9 +4,10 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-launcher=()
+launcher=(-DORBITFUSE_PRECOMPILE=ON)
 if command -v ccache > /dev/null; then
-  launcher=(-DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
+  launcher=(-DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache
+            -DORBITFUSE_PRECOMPILE=OFF)
 fi
 cmake --preset release "${launcher[@]}"
 cmake --build --preset release "$@"

@@ -12,4 +12,5 @@ case "${1:-}" in
 esac
 cmake/install_packages.sh
 cmake/build.sh
-ctest --preset "$preset" --parallel "$(nproc)"
+# One more than there are processors: some wait for what a camera or a peer does not do in time.
+ctest --preset "$preset" --parallel "$(($(nproc) + 1))"

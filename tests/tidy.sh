@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # clang-tidy with .clang-tidy over the product's sources, or over those whose path holds a word given:
 #   tests/tidy.sh [word...]
-# It reads the compile commands of build/release; flags that only GCC knows are dropped.
+# It reads the compile commands of build/dev (cmake --preset dev; those of release are of ten sources at a
+# time); flags that only GCC knows are dropped.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-commands=build/release/compile_commands.json
-[ -f "$commands" ] || { echo "$commands is missing: run cmake --preset release" >&2; exit 2; }
+commands=build/dev/compile_commands.json
+[ -f "$commands" ] || { echo "$commands is missing: run cmake --preset dev" >&2; exit 2; }
 tidy=$(command -v clang-tidy-14 || command -v clang-tidy) || {
   echo "clang-tidy is missing: apt-get install clang-tidy-14" >&2
   exit 2

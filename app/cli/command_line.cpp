@@ -26,17 +26,17 @@ class ExampleFirst : public CLI::Formatter {
   }
 };
 
-constexpr const char* group = "Common";
+constexpr const char* common_group = "Common";
 
 void add_config(CLI::App& app, CommonOptions& common) {
   app.add_option("--config", common.config_file, "TOML file; config/orbitfuse.toml lists all keys")
-      ->group(group);
+      ->group(common_group);
   app.add_option("--set", common.overrides, "Override one key, e.g. render.views=12; repeatable")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false)
-      ->group(group);
+      ->group(common_group);
   app.add_flag("--print-config", common.print_config, "Print the resolved configuration and stop")
-      ->group(group);
+      ->group(common_group);
 }
 
 void add_seed(CLI::App& app, CommonOptions& common) {
@@ -50,33 +50,36 @@ void add_seed(CLI::App& app, CommonOptions& common) {
       })
       ->type_name("UINT")
       ->capture_default_str()
-      ->group(group);
+      ->group(common_group);
 }
 
 void add_common(CLI::App& app, CommonOptions& common, const CommonUse& use) {
   if (use.config) add_config(app, common);
   app.add_flag("--json", common.json, "NDJSON events on stdout, the last line a result")
-      ->group(group);
+      ->group(common_group);
   CLI::Option* verbose = app.add_flag("-v,--verbose", common.verbosity, "More messages");
-  verbose->group(group);
-  app.add_flag("-q,--quiet", common.quiet, "Errors only")->excludes(verbose)->group(group);
+  verbose->group(common_group);
+  app.add_flag("-q,--quiet", common.quiet, "Errors only")->excludes(verbose)->group(common_group);
   app.add_option("--threads", common.threads, "Worker threads; 0 = all cores")
       ->check(CLI::Range(0, 1024))
-      ->group(group);
+      ->group(common_group);
   if (use.seed) add_seed(app, common);
   app.add_option("--device", common.device, "Where to compute")
       ->check(CLI::IsMember({"cpu", "cuda"}))
       ->capture_default_str()
-      ->group(group);
+      ->group(common_group);
   app.add_option("--trace", common.trace_file,
                  "Write where the time goes, in Chrome's trace format (chrome://tracing, Perfetto)")
       ->type_name("FILE")
-      ->group(group);
+      ->group(common_group);
   if (use.force)
-    app.add_flag("--force", common.force, "Run again although nothing changed")->group(group);
+    app.add_flag("--force", common.force, "Run again although nothing changed")
+        ->group(common_group);
   if (use.resume)
-    app.add_flag("--resume", common.resume, "Go on where an interrupted run stopped")->group(group);
-  app.add_flag("--dry-run", common.dry_run, "Say what would be done, write nothing")->group(group);
+    app.add_flag("--resume", common.resume, "Go on where an interrupted run stopped")
+        ->group(common_group);
+  app.add_flag("--dry-run", common.dry_run, "Say what would be done, write nothing")
+      ->group(common_group);
 }
 
 /// An option that other verbs have, and this one no use for.
@@ -85,7 +88,7 @@ std::optional<Error> unoffered(const CommandLine& line, const Verb& verb, const 
     if (name == option) return Error{ErrorKind::usage, name, why, remedy};
   for (const auto& [other, action] : line.actions) {
     const CLI::Option* option = line.app.get_subcommand(other->name)->get_option_no_throw(name);
-    if (option != nullptr && option->get_group() == group)
+    if (option != nullptr && option->get_group() == common_group)
       return Error{ErrorKind::usage, name, std::string("means nothing to ") + verb.name,
                    "leave it out"};
   }

@@ -123,7 +123,7 @@ class LocalFarm {
     const FarmSession& session = plan_.sessions[worker.session];
     const std::string stage = plan_.stages[road.next];
     road.busy = false;
-    if (worker.late) outcome.cause = std::string(out_of_time) + "; raise its time in farm.json";
+    if (worker.late) outcome.cause = fmt::format("{}; raise its time in farm.json", out_of_time);
     if (outcome.state == JobState::done) {
       ++road.next;
       road.memory_factor = 1;

@@ -24,7 +24,7 @@ using measurement::ThermalScene;
 using view::FinishedRun;
 using view::RecordedView;
 
-constexpr int picture_width_px = 560;  // three of them on a page's width
+constexpr int view_width_px = 560;  // three of them on a page's width
 
 const RecordedView* view_named(const FinishedRun& run, const std::string& name) {
   const auto at = std::find_if(run.views.begin(), run.views.end(),
@@ -33,7 +33,7 @@ const RecordedView* view_named(const FinishedRun& run, const std::string& name) 
 }
 
 Camera picture_camera(const Camera& camera) {
-  return at_width(camera.without_distortion(), picture_width_px);
+  return at_width(camera.without_distortion(), view_width_px);
 }
 
 /// How finely a view sees a point; 0: not at all, because it is outside or something is before it.

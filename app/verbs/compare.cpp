@@ -12,13 +12,13 @@ namespace {
 namespace fs = std::filesystem;
 using namespace comparing;
 
-struct Options {
+struct CompareArguments {
   std::string before, after, out;
   bool ambient = false;
   int triangles = CompareRequest().triangles;
 };
 
-void tell(Context& context, const Options& o, const ComparedRuns& runs) {
+void tell(Context& context, const CompareArguments& o, const ComparedRuns& runs) {
   context.console.info(
       fmt::format("registered: unchanged surfaces lie {} apart", residual_words(runs)));
   if (runs.registration.clouds.ambiguous)
@@ -39,7 +39,7 @@ void tell(Context& context, const Options& o, const ComparedRuns& runs) {
   context.console.info((fs::path(o.out) / "compare.html").string());
 }
 
-Status run(Context& context, const Options& o) {
+Status run(Context& context, const CompareArguments& o) {
   ORBITFUSE_TRY(check_typed({{"--triangles", o.triangles, from_to(4, 20'000'000)}}));
   CompareRequest request;
   request.ambient = o.ambient;
@@ -75,7 +75,7 @@ Status run(Context& context, const Options& o) {
 }  // namespace
 
 Action add_compare(CLI::App& app) {
-  const auto o = std::make_shared<Options>();
+  const auto o = std::make_shared<CompareArguments>();
   app.add_option("before", o->before, "The --out folder of the earlier run")->required();
   app.add_option("after", o->after, "The --out folder of the later run, of the same object")
       ->required();

@@ -11,7 +11,7 @@ namespace orbitfuse::cli {
 namespace {
 using nlohmann::json;
 
-struct Options {
+struct EvalArguments {
   StageFolders folders;
   std::string truth;
   eval::EvaluateOptions evaluate;
@@ -48,7 +48,7 @@ void print(terminal::Console& console, const json& result) {
   for (const json& note : result["notes"]) console.info("note: " + note.get<std::string>());
 }
 
-Status run(Context& context, Options& o) {
+Status run(Context& context, EvalArguments& o) {
   ORBITFUSE_TRY(resolve(o.folders));
   ORBITFUSE_ASSIGN(const Session session, open_session(o.folders.session));
   ORBITFUSE_ASSIGN(const GroundTruth truth, read_ground_truth(o.truth));
@@ -74,7 +74,7 @@ Status run(Context& context, Options& o) {
 }  // namespace
 
 Action add_eval(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<EvalArguments>();
   add_folders(app, options->folders);
   app.add_option("--ground-truth", options->truth, "Exact poses and test views (docs/formats.md)")
       ->required();

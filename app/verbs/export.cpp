@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace exporting;
 
-struct Options {
+struct ExportArguments {
   std::string out, crop_box, up, colors = "visible", palette, flavour = "plain";
   std::string dataset, poses = "recorded", mat, pose_error;
   std::vector<std::string> files, distance;
@@ -47,7 +47,7 @@ Result<std::vector<double>> numbers(const char* option, const std::string& word,
   return values;
 }
 
-Result<SurfaceRequest> request_of(const Options& o) {
+Result<SurfaceRequest> request_of(const ExportArguments& o) {
   SurfaceRequest request;
   if (o.triangles) request.surface.surface.triangles = *o.triangles;
   if (o.whole) request.crop = Crop::whole;
@@ -71,7 +71,7 @@ Result<SurfaceRequest> request_of(const Options& o) {
   return request;
 }
 
-Result<FileOptions> file_options(const Options& o, const view::FinishedRun& run,
+Result<FileOptions> file_options(const ExportArguments& o, const view::FinishedRun& run,
                                  const SurfaceRequest& request) {
   FileOptions files;
   files.made_of = surface_key(run, request);
@@ -103,7 +103,7 @@ Result<measurement::Place> place_of(const std::string& word) {
 }
 
 /// The scale that was told now, which stays with the run, or the one that the run has.
-Result<std::optional<stages::MetricScale>> scale_of(Context& context, const Options& o,
+Result<std::optional<stages::MetricScale>> scale_of(Context& context, const ExportArguments& o,
                                                     const view::FinishedRun& run) {
   const int told = !o.distance.empty() + !o.mat.empty() + o.known_poses;
   if (told > 1)
@@ -144,7 +144,7 @@ Result<std::optional<stages::MetricScale>> scale_of(Context& context, const Opti
   return scale;
 }
 
-Status export_dataset(Context& context, const Options& o, const view::FinishedRun& run,
+Status export_dataset(Context& context, const ExportArguments& o, const view::FinishedRun& run,
                       const ExportFrame& frame) {
   DatasetOptions options;
   options.path = context.config.render.path;
@@ -201,7 +201,7 @@ Status check_target(const fs::path& out, const fs::path& file) {
 }
 
 /// Likewise of all targets together.
-Status check_targets(const Options& o, const std::vector<fs::path>& files) {
+Status check_targets(const ExportArguments& o, const std::vector<fs::path>& files) {
   std::error_code unreadable;
   std::set<fs::path> seen;
   const fs::path dataset =
@@ -222,7 +222,7 @@ Status check_targets(const Options& o, const std::vector<fs::path>& files) {
 }
 
 /// Options that another one would have passed over in silence.
-Status check_pairs(const Options& o) {
+Status check_pairs(const ExportArguments& o) {
   const bool surface = o.dataset.empty() || !o.files.empty();
   const bool ply = std::any_of(o.files.begin(), o.files.end(), [](const std::string& file) {
     return extension_of(file) == ".ply";
@@ -244,7 +244,7 @@ Status check_pairs(const Options& o) {
   });
 }
 
-Status run(Context& context, const Options& o) {
+Status run(Context& context, const ExportArguments& o) {
   ORBITFUSE_TRY(check_pairs(o));
   std::vector<fs::path> files(o.files.begin(), o.files.end());
   if (files.empty() && o.dataset.empty()) files.push_back(fs::path(o.out) / default_surface_file);
@@ -278,7 +278,7 @@ Status run(Context& context, const Options& o) {
 }  // namespace
 
 Action add_export(CLI::App& app) {
-  const auto o = std::make_shared<Options>();
+  const auto o = std::make_shared<ExportArguments>();
   app.add_option("out", o->out, "The --out folder of a finished run")->required();
   app.add_option("--to", o->files,
                  "File to write, .glb, .ply, .obj or .las; may be given again (default: "

@@ -17,7 +17,7 @@ namespace orbitfuse::cli {
 namespace {
 namespace fs = std::filesystem;
 
-struct Options {
+struct FuseArguments {
   StageFolders folders;
   std::string visible, thermal, mask, method = "heat";
   bool gray = false, out_given = false, method_given = false;
@@ -51,7 +51,7 @@ fs::path legend_file(const fs::path& out) {
 }
 
 /// What to write, told by the name; the user says where, and never onto an input.
-Status check_image_out(const Options& o) {
+Status check_image_out(const FuseArguments& o) {
   if (!o.out_given)
     return fail(ErrorKind::usage, "--out", "not given",
                 "name the image to write, e.g. --out fused.png");
@@ -72,7 +72,7 @@ Status check_image_out(const Options& o) {
 }
 
 /// Pairs go to vi/, ir/ and fused/ below --out.
-Status check_folder_out(const Options& o) {
+Status check_folder_out(const FuseArguments& o) {
   if (!o.out_given)
     return fail(ErrorKind::usage, "--out", "not given", "name the folder for the fused pairs");
   for (const std::string& input : {o.visible, o.thermal})
@@ -95,7 +95,7 @@ Status write_legend(Context& context, const fs::path& out, const cv::Mat& therma
   return write_png(file, legend);
 }
 
-Status fuse_pair(Context& context, const Options& o, const FusionOptions& options) {
+Status fuse_pair(Context& context, const FuseArguments& o, const FusionOptions& options) {
   ORBITFUSE_TRY(check_image_out(o));
   ORBITFUSE_ASSIGN(const cv::Mat visible, batch::read_photo(o.visible));
   ORBITFUSE_ASSIGN(const cv::Mat thermal, batch::read_thermal(o.thermal));
@@ -130,7 +130,7 @@ Status fuse_pair(Context& context, const Options& o, const FusionOptions& option
   return {};
 }
 
-Status fuse_folder(Context& context, const Options& o, const FusionOptions& options) {
+Status fuse_folder(Context& context, const FuseArguments& o, const FusionOptions& options) {
   ORBITFUSE_TRY(check_folder_out(o));
   if (context.common.dry_run) {
     context.console.info("would write fused pairs below " + o.folders.out);
@@ -149,7 +149,7 @@ Status fuse_folder(Context& context, const Options& o, const FusionOptions& opti
   return {};
 }
 
-Status run(Context& context, const Options& o) {
+Status run(Context& context, const FuseArguments& o) {
   if (o.visible.empty() && o.thermal.empty()) {
     // A run's pictures have methods, masks and colours of their own.
     constexpr const char* files = "--visible and --thermal";
@@ -180,7 +180,7 @@ Status run(Context& context, const Options& o) {
 }  // namespace
 
 Action add_fuse(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<FuseArguments>();
   add_folders(app, options->folders);
   app.add_option("--visible", options->visible, "Visible image, or a folder of them");
   app.add_option("--thermal", options->thermal,

@@ -12,7 +12,7 @@
 namespace orbitfuse::cli {
 namespace {
 
-struct Options {
+struct ImportArguments {
   std::string session;
   ImportOptions import;
   std::string scale = "auto";
@@ -31,7 +31,7 @@ const std::vector<std::pair<std::string, ThermalScale>> scales = {
     {"raw", ThermalScale::raw_counts},
 };
 
-void add_sources(CLI::App& app, Options& o) {
+void add_sources(CLI::App& app, ImportArguments& o) {
   constexpr const char* group = "Sources";
   app.add_option("--visible", o.import.visible,
                  "Photos (JPEG, PNG, TIFF, HEIC) and videos of an orbit: folders or files")
@@ -55,7 +55,7 @@ void add_sources(CLI::App& app, Options& o) {
       ->group(group);
 }
 
-void add_poses_known(CLI::App& app, Options& o) {
+void add_poses_known(CLI::App& app, ImportArguments& o) {
   constexpr const char* group = "Known poses and stations";
   app.add_option("--transforms", o.import.transforms_json, "nerfstudio transforms.json")
       ->group(group);
@@ -80,7 +80,7 @@ void add_poses_known(CLI::App& app, Options& o) {
       ->group(group);
 }
 
-void add_radiometry(CLI::App& app, Options& o) {
+void add_radiometry(CLI::App& app, ImportArguments& o) {
   constexpr const char* group = "Radiometry";
   std::vector<std::string> words;
   for (const auto& [word, scale] : scales) words.push_back(word);
@@ -100,7 +100,7 @@ void add_radiometry(CLI::App& app, Options& o) {
   app.add_option("--humidity", o.humidity_percent, "Relative humidity in percent")->group(group);
 }
 
-Status check_ranges(const Options& o) {
+Status check_ranges(const ImportArguments& o) {
   for (const double elevation : o.elevations_deg)
     ORBITFUSE_TRY(check_typed({{"--elevations-deg", elevation, from_to(-90, 90)}}));
   const std::size_t loops = static_cast<std::size_t>(std::max(1, o.loops.value_or(1)));
@@ -123,7 +123,7 @@ Status check_ranges(const Options& o) {
 }
 
 /// Temperatures and percentages of the command line in the units of the library.
-void resolve(Options& o) {
+void resolve(ImportArguments& o) {
   for (const auto& [word, scale] : scales)
     if (word == o.scale) o.import.thermal_scale = scale;
   if (o.kelvin_per_count) o.import.kelvin_per_count = *o.kelvin_per_count;
@@ -141,7 +141,7 @@ void resolve(Options& o) {
 }
 
 /// Options that only mean something with another one.
-Status check_alone(const Options& o) {
+Status check_alone(const ImportArguments& o) {
   const ImportOptions& i = o.import;
   const bool linear = o.scale == "linear", poses_name_images = i.transforms_json.has_value();
   const bool visible = !i.visible.empty() || !i.visible_tracking.empty() || i.embedded_visible ||
@@ -166,7 +166,7 @@ Status check_alone(const Options& o) {
   });
 }
 
-Status run(Context& context, Options& o) {
+Status run(Context& context, ImportArguments& o) {
   ORBITFUSE_TRY(check_alone(o));
   ORBITFUSE_TRY(check_ranges(o));
   resolve(o);
@@ -200,7 +200,7 @@ Status run(Context& context, Options& o) {
 }  // namespace
 
 Action add_import(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ImportArguments>();
   app.add_option("session", options->session, "New session folder")->required();
   add_sources(app, *options);
   add_poses_known(app, *options);

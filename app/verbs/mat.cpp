@@ -18,7 +18,7 @@
 namespace orbitfuse::cli {
 namespace {
 
-struct Options {
+struct MatArguments {
   std::string out, paper = "A4";
   double size_m = 0.6;
   std::optional<int> tags;
@@ -53,7 +53,7 @@ Status check_out(const std::string& out, bool force) {
   return {};
 }
 
-Status run(Context& context, const Options& o) {
+Status run(Context& context, const MatArguments& o) {
   ORBITFUSE_TRY(check_out(o.out, context.common.force));
   MatDesign design = o.thermal ? MatDesign::for_thermal(o.size_m) : MatDesign{};
   design.size_m = o.size_m;
@@ -85,7 +85,7 @@ Status run(Context& context, const Options& o) {
 }  // namespace
 
 Action add_mat(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<MatArguments>();
   app.add_option("--out", options->out,
                  "PDF to write; one that exists is overwritten only with --force")
       ->required();

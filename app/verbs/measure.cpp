@@ -16,13 +16,13 @@ namespace fs = std::filesystem;
 using namespace measurement;
 using nlohmann::json;
 
-struct Options {
+struct MeasureArguments {
   std::string out, session;
   MeasureWords words;
 };
 
 /// The session that a run's folder names, or the one that was given.
-Result<Session> session_of(const Options& options) {
+Result<Session> session_of(const MeasureArguments& options) {
   std::error_code unreadable;
   if (!fs::is_directory(options.out, unreadable))
     return fail(ErrorKind::input, options.out, "no such folder", "name the --out folder of a run");
@@ -67,7 +67,8 @@ void list(Context& context, const Measurements& saved, const std::string& file) 
                          "; ask for one, e.g. --hottest 3 (--help lists the kinds)");
 }
 
-void tell(Context& context, const Options& options, const std::string& name, const Answer& answer) {
+void tell(Context& context, const MeasureArguments& options, const std::string& name,
+          const Answer& answer) {
   if (options.words.csv) {
     context.console.data(csv_header());
     for (const std::string& row : csv_rows(name, answer)) context.console.data(row);
@@ -89,7 +90,7 @@ Status check_reference(const std::string& name, const Measurements& saved,
                             : fmt::format("name one of {}", fmt::join(names, ", ")));
 }
 
-Status run(Context& context, const Options& options) {
+Status run(Context& context, const MeasureArguments& options) {
   if (options.words.csv && context.common.json)
     return fail(ErrorKind::usage, "--csv", "together with --json", "choose one of them");
   const MeasureWords& words = options.words;
@@ -144,7 +145,7 @@ Status run(Context& context, const Options& options) {
 }  // namespace
 
 Action add_measure(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<MeasureArguments>();
   app.add_option("out", options->out, "The --out folder of a finished run")->required();
   app.add_option("--session", options->session, "Where the session is, if it was moved");
   add_measure_options(app, options->words);

@@ -38,36 +38,36 @@ std::optional<double> number(const std::string& text) {
   return value;
 }
 
-tl::unexpected<Error> wrong(const std::string& option, const std::string& word,
-                            const std::string& form) {
+tl::unexpected<Error> wrong_word(const std::string& option, const std::string& word,
+                                 const std::string& form) {
   return fail(ErrorKind::usage, option, "'" + word + "'", "write " + form);
 }
 
-Result<std::vector<double>> numbers(const std::string& option, const std::string& word,
-                                    const std::vector<std::size_t>& counts,
-                                    const std::string& form) {
+Result<std::vector<double>> numbers_of(const std::string& option, const std::string& word,
+                                       const std::vector<std::size_t>& counts,
+                                       const std::string& form) {
   std::vector<double> values;
   for (const std::string& part : split(word)) {
     const auto value = number(part);
-    if (!value) return wrong(option, word, form);
+    if (!value) return wrong_word(option, word, form);
     values.push_back(*value);
   }
   for (const std::size_t count : counts)
     if (values.size() == count) return values;
-  return wrong(option, word, form);
+  return wrong_word(option, word, form);
 }
 
 Result<Place> pixel_of(const std::string& option, const std::string& word) {
   constexpr const char* form = "VIEW,U,V, e.g. thermal/000003.tiff,320.5,240.5";
   const std::vector<std::string> parts = split(word);
-  if (parts.size() != 3 || parts[0].empty()) return wrong(option, word, form);
+  if (parts.size() != 3 || parts[0].empty()) return wrong_word(option, word, form);
   const auto u = number(parts[1]), v = number(parts[2]);
-  if (!u || !v) return wrong(option, word, form);
+  if (!u || !v) return wrong_word(option, word, form);
   return PixelPlace{parts[0], {*u, *v}};
 }
 
 Result<Place> point_of(const std::string& option, const std::string& word) {
-  ORBITFUSE_ASSIGN(const auto v, numbers(option, word, {3}, "X,Y,Z, e.g. 0.1,-0.2,0.05"));
+  ORBITFUSE_ASSIGN(const auto v, numbers_of(option, word, {3}, "X,Y,Z, e.g. 0.1,-0.2,0.05"));
   return Eigen::Vector3d(v[0], v[1], v[2]);
 }
 
@@ -82,7 +82,7 @@ Result<Request> spot_or_saved(const std::string& option, const std::string& word
   Request request;
   const std::vector<std::string> parts = split(word);
   if (parts.size() != 3)
-    return wrong(option, word, "VIEW,U,V, or X,Y,Z, or the name of a saved measurement");
+    return wrong_word(option, word, "VIEW,U,V, or X,Y,Z, or the name of a saved measurement");
   // "000" is the name of a rendered view before it is a number.
   const bool pixel = scene.has_view(parts[0]) || !number(parts[0]);
   ORBITFUSE_ASSIGN(Place place, pixel ? pixel_of(option, word) : point_of(option, word));
@@ -106,12 +106,12 @@ Result<std::vector<Place>> two_places(const std::string& option,
 Result<Request> polygon_of(const std::string& word) {
   constexpr const char* form = "VIEW,U,V,U,V,U,V with three corners or more";
   const std::vector<std::string> parts = split(word);
-  if (parts.size() < 7 || parts.size() % 2 == 0) return wrong("--polygon", word, form);
+  if (parts.size() < 7 || parts.size() % 2 == 0) return wrong_word("--polygon", word, form);
   Request request;
   request.kind = Kind::polygon;
   for (std::size_t i = 1; i + 1 < parts.size(); i += 2) {
     const auto u = number(parts[i]), v = number(parts[i + 1]);
-    if (!u || !v) return wrong("--polygon", word, form);
+    if (!u || !v) return wrong_word("--polygon", word, form);
     request.places.push_back(PixelPlace{parts[0], {*u, *v}});
   }
   return request;
@@ -120,8 +120,8 @@ Result<Request> polygon_of(const std::string& word) {
 Result<Request> box_of(const std::string& word) {
   ORBITFUSE_ASSIGN(
       const auto v,
-      numbers("--box", word, {6, 10},
-              "CX,CY,CZ,SX,SY,SZ (middle and sides), and QW,QX,QY,QZ if it is turned"));
+      numbers_of("--box", word, {6, 10},
+                 "CX,CY,CZ,SX,SY,SZ (middle and sides), and QW,QX,QY,QZ if it is turned"));
   Request request;
   request.kind = Kind::box;
   request.box.center = {v[0], v[1], v[2]};

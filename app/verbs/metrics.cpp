@@ -11,7 +11,7 @@
 namespace orbitfuse::cli {
 namespace {
 
-struct Options {
+struct MetricsArguments {
   StageFolders folders;
   std::string visible, thermal, fused;
   bool on_files() const { return !visible.empty() || !thermal.empty() || !fused.empty(); }
@@ -19,7 +19,7 @@ struct Options {
 
 constexpr const char* images = "--visible, --thermal and --fused";
 
-Status score_files(Context& context, const Options& o) {
+Status score_files(Context& context, const MetricsArguments& o) {
   for (const auto& [option, value] :
        {std::pair{"--visible", &o.visible}, {"--thermal", &o.thermal}, {"--fused", &o.fused}})
     if (value->empty()) return fail(ErrorKind::usage, option, "not given", "name all three images");
@@ -55,7 +55,7 @@ Status score_files(Context& context, const Options& o) {
 }  // namespace
 
 Action add_metrics(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<MetricsArguments>();
   add_folders(app, options->folders);
   app.add_option("--visible", options->visible, "Visible image; then --thermal and --fused too");
   app.add_option("--thermal", options->thermal, "Thermal image of the same size");

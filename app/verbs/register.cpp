@@ -14,7 +14,7 @@
 namespace orbitfuse::cli {
 namespace {
 
-struct Options {
+struct RegisterArguments {
   StageFolders folders;
   std::string source, target;
 };
@@ -31,7 +31,7 @@ Result<PointCloud> read_cloud(Context& context, const std::string& file) {
   return cloud;
 }
 
-Status register_files(Context& context, const Options& o) {
+Status register_files(Context& context, const RegisterArguments& o) {
   for (const auto& [option, value] : {std::pair{"--source", &o.source}, {"--target", &o.target}})
     if (value->empty()) return fail(ErrorKind::usage, option, "not given", "name both clouds");
   ORBITFUSE_TRY(check_apart({{"session", !o.folders.session.empty(), clouds, true}}));
@@ -57,7 +57,7 @@ Status register_files(Context& context, const Options& o) {
 }  // namespace
 
 Action add_register(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RegisterArguments>();
   add_folders(app, options->folders);
   app.add_option("--source", options->source, "PLY cloud to move; then --target too");
   app.add_option("--target", options->target, "PLY cloud to move it onto");

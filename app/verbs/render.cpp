@@ -8,7 +8,7 @@
 namespace orbitfuse::cli {
 namespace {
 
-struct Options {
+struct RenderArguments {
   StageFolders folders;
   std::string cameras, path;
   std::optional<int> views, width;
@@ -17,7 +17,7 @@ struct Options {
 }  // namespace
 
 Action add_render(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RenderArguments>();
   add_folders(app, options->folders);
   app.add_option("--cameras", options->cameras,
                  "transforms.json with the views, in the visible frame");

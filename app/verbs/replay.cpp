@@ -13,7 +13,7 @@
 namespace orbitfuse::cli {
 namespace {
 
-struct Options {
+struct ReplayArguments {
   std::string session, to, speed = "full";
 };
 
@@ -56,7 +56,7 @@ Status check_goes_on(const Session& session, const std::string& to) {
               "replay into a folder of its own, or go on with the replay of this session");
 }
 
-Status run(Context& context, const Options& o) {
+Status run(Context& context, const ReplayArguments& o) {
   ORBITFUSE_ASSIGN(const Session session, open_session(o.session));
   for (const std::string& warning : session.warnings) context.console.warning(warning);
   ORBITFUSE_ASSIGN(
@@ -99,7 +99,7 @@ Status run(Context& context, const Options& o) {
 }  // namespace
 
 Action add_replay(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ReplayArguments>();
   app.add_option("session", options->session, "Recorded session")->required();
   app.add_option("--to", options->to, "Session folder: new, or with --resume one to go on with")
       ->required();

@@ -12,13 +12,13 @@ namespace orbitfuse::cli {
 namespace {
 namespace fs = std::filesystem;
 
-struct Options {
+struct ReportArguments {
   StageFolders folders;
   std::optional<std::string> inspection;
   bool pdf = false, print_template = false;
 };
 
-Status write_inspection(Context& context, Options options) {
+Status write_inspection(Context& context, ReportArguments options) {
   if (options.pdf) ORBITFUSE_TRY(inspection::find_browser());
   ORBITFUSE_TRY(resolve(options.folders));
   const fs::path out = options.folders.out;
@@ -51,7 +51,7 @@ Status write_inspection(Context& context, Options options) {
   return {};
 }
 
-Status report(Context& context, const Options& options) {
+Status report(Context& context, const ReportArguments& options) {
   ORBITFUSE_TRY(check_apart(
       {{"--inspection", options.inspection.has_value(), "--print-template", options.print_template},
        {"--pdf", options.pdf, "--print-template", options.print_template},
@@ -74,7 +74,7 @@ Status report(Context& context, const Options& options) {
 }  // namespace
 
 Action add_report(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ReportArguments>();
   add_folders(app, options->folders);
   constexpr const char* group = "For a client (docs/inspection.md)";
   app.add_option("--inspection", options->inspection,

@@ -12,12 +12,12 @@
 namespace orbitfuse::cli {
 namespace {
 
-struct Options {
+struct ViewArguments {
   std::string run, page = "8471", token;
 };
 
 /// Serves until Ctrl-C, which is how a viewer ends: no error.
-Status view_run(Context& context, const Options& o) {
+Status view_run(Context& context, const ViewArguments& o) {
   ORBITFUSE_ASSIGN(const PageOptions page,
                    page_options_of("--page", o.page, o.token).map_error(as_typed_page));
   ORBITFUSE_ASSIGN(view::FinishedRun run,
@@ -43,7 +43,7 @@ Status view_run(Context& context, const Options& o) {
 }  // namespace
 
 Action add_view(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ViewArguments>();
   app.add_option("run", options->run, "The --out folder of a finished run")->required();
   app.add_option("--page", options->page,
                  "Serve the viewer at PORT or HOST:PORT; beyond this machine it needs a token")

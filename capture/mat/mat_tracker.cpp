@@ -8,7 +8,7 @@ namespace {
 
 constexpr int most_steps = 8;  // two seconds at the guide's four looks
 constexpr std::size_t fewest_corners = 16;
-constexpr float most_disagreement_px = 1.0f;
+constexpr float most_tag_disagreement_px = 1.0f;
 
 }  // namespace
 
@@ -33,7 +33,7 @@ std::optional<MatCorners> MatTracker::follow(const cv::Mat& gray) {
     for (std::size_t i = tag; i < tag + 4; ++i) {
       const cv::Point2f off = back[i] - start[i];
       good = good && forth_good[i] && back_good[i] &&
-             off.dot(off) <= most_disagreement_px * most_disagreement_px;
+             off.dot(off) <= most_tag_disagreement_px * most_tag_disagreement_px;
     }
     if (!good) continue;
     for (std::size_t i = tag; i < tag + 4; ++i) {

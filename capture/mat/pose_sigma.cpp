@@ -8,11 +8,11 @@
 #include <opencv2/calib3d.hpp>
 
 #include "capture/guide/coverage.hpp"
+#include "core/numeric/angle_units.hpp"
 
 namespace orbitfuse {
 
 static constexpr double unknown = std::numeric_limits<double>::infinity();
-static constexpr double deg = 180 / std::numbers::pi;
 
 PoseVector pose_of(const cv::Mat& r, const cv::Mat& t) {
   PoseVector pose;
@@ -35,8 +35,8 @@ Eigen::Vector2d angles_of(const PoseVector& pose) { return angles_of(rigid_of(po
 
 Eigen::Vector2d angles_of(const Rigid3d& cam_from_mat) {
   const Eigen::Vector3d eye = camera_center(cam_from_mat);
-  return {std::atan2(eye.y(), eye.x()) * deg,
-          std::atan2(eye.z(), std::hypot(eye.x(), eye.y())) * deg};
+  return {std::atan2(eye.y(), eye.x()) * degrees_per_radian,
+          std::atan2(eye.z(), std::hypot(eye.x(), eye.y())) * degrees_per_radian};
 }
 
 double reprojection_rms_px(const MatCorners& corners, const cv::Matx33d& k, const cv::Mat& r,

@@ -10,6 +10,7 @@
 
 #include "capture/guide/coverage.hpp"
 #include "capture/mat/pose_sigma.hpp"
+#include "core/numeric/angle_units.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -27,7 +28,6 @@ constexpr std::size_t enough_read_landmarks = 40;
 constexpr int most_misses = 8;  // two seconds at the guide's four looks
 /// Beyond the drift that was measured (docs/benchmarks/capture/faults.md).
 constexpr double drift_share = 0.03;
-constexpr double deg = 180 / std::numbers::pi;
 
 Eigen::Vector3d ray_of(cv::Point2f px, double focal_px, cv::Point2d centre) {
   return Eigen::Vector3d((px.x - centre.x) / focal_px, (px.y - centre.y) / focal_px, 1)
@@ -98,9 +98,10 @@ void SceneOdometry::settle(const View& view, std::vector<Track> tracks, const Ri
     const Eigen::Vector3d ray = ray_of(track.px, view.focal_px, view.centre);
     const Eigen::Vector3d first = ray_of(track.first_px, view.focal_px, view.centre);
     const double parallax =
-        deg * std::acos(std::clamp((track.first_cam_from_mat.rotation.conjugate() * first)
-                                       .dot(cam_from_mat.rotation.conjugate() * ray),
-                                   -1.0, 1.0));
+        degrees_per_radian *
+        std::acos(std::clamp((track.first_cam_from_mat.rotation.conjugate() * first)
+                                 .dot(cam_from_mat.rotation.conjugate() * ray),
+                             -1.0, 1.0));
     // A landmark from poses that the mat gave is not spoilt by later, less sure ones.
     const bool better = !track.point_m || (sure == track.read && parallax > track.parallax_deg);
     const double fewest_deg = sure ? first_parallax_deg : first_unsure_parallax_deg;
@@ -213,7 +214,7 @@ std::optional<SceneOdometry::Sighting> SceneOdometry::follow(const cv::Mat& gray
   const Rigid3d cam_from_mat = rigid_of(pose);
   const Eigen::Vector3d from = camera_center(*pose_), to = camera_center(cam_from_mat);
   const double step_deg =
-      deg * std::acos(std::clamp(from.normalized().dot(to.normalized()), -1.0, 1.0));
+      degrees_per_radian * std::acos(std::clamp(from.normalized().dot(to.normalized()), -1.0, 1.0));
   Sighting sighting;
   sighting.cam_from_mat = cam_from_mat;
   sighting.landmarks = static_cast<int>(agreed.image.size());
@@ -221,7 +222,7 @@ std::optional<SceneOdometry::Sighting> SceneOdometry::follow(const cv::Mat& gray
   sighting.error_px = error_px / view.scale;
   // The same error on the sphere is more of azimuth the higher the camera is.
   way_deg_ += step_deg;
-  const double high = std::max(0.2, std::cos(angles_of(cam_from_mat)[1] / deg));
+  const double high = std::max(0.2, std::cos(angles_of(cam_from_mat)[1] / degrees_per_radian));
   sighting.sigma_deg = read_sigma_deg_ +
                        direction_sigma_deg(agreed, k, rotation, translation, error_px) +
                        drift_share * way_deg_ / high;

@@ -59,7 +59,7 @@ tl::unexpected<Error> cut(const std::filesystem::path& file, const char* what,
               fmt::format("truncated or damaged at {} {}", what, index), "export the model again");
 }
 
-Result<std::vector<CameraRecord>> read_cameras(const std::filesystem::path& file) {
+Result<std::vector<CameraRecord>> read_binary_cameras(const std::filesystem::path& file) {
   ORBITFUSE_ASSIGN(const std::string bytes, read_file(file));
   ByteReader in(bytes);
   std::vector<CameraRecord> cameras;
@@ -81,7 +81,7 @@ Result<std::vector<CameraRecord>> read_cameras(const std::filesystem::path& file
   return cameras;
 }
 
-Result<std::vector<ImageRecord>> read_images(const std::filesystem::path& file) {
+Result<std::vector<ImageRecord>> read_binary_images(const std::filesystem::path& file) {
   ORBITFUSE_ASSIGN(const std::string bytes, read_file(file));
   ByteReader in(bytes);
   std::vector<ImageRecord> images;
@@ -110,7 +110,7 @@ Result<std::vector<ImageRecord>> read_images(const std::filesystem::path& file) 
   return images;
 }
 
-Result<std::vector<PointRecord>> read_points(const std::filesystem::path& file) {
+Result<std::vector<PointRecord>> read_binary_points(const std::filesystem::path& file) {
   std::vector<PointRecord> points;
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) return points;  // poses without points are useful
@@ -139,9 +139,9 @@ Result<std::vector<PointRecord>> read_points(const std::filesystem::path& file) 
 
 Result<Records> read_binary(const std::filesystem::path& folder) {
   Records records;
-  ORBITFUSE_ASSIGN(records.cameras, read_cameras(folder / "cameras.bin"));
-  ORBITFUSE_ASSIGN(records.images, read_images(folder / "images.bin"));
-  ORBITFUSE_ASSIGN(records.points, read_points(folder / "points3D.bin"));
+  ORBITFUSE_ASSIGN(records.cameras, read_binary_cameras(folder / "cameras.bin"));
+  ORBITFUSE_ASSIGN(records.images, read_binary_images(folder / "images.bin"));
+  ORBITFUSE_ASSIGN(records.points, read_binary_points(folder / "points3D.bin"));
   return records;
 }
 

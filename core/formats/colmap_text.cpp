@@ -36,7 +36,7 @@ tl::unexpected<Error> unreadable(const std::filesystem::path& file, int line) {
 
 bool blank(const std::string& line) { return line.find_first_not_of(" \t") == std::string::npos; }
 
-Result<std::vector<CameraRecord>> read_cameras(const std::filesystem::path& file) {
+Result<std::vector<CameraRecord>> read_text_cameras(const std::filesystem::path& file) {
   ORBITFUSE_ASSIGN(std::string text, read_file(file));
   Lines lines(std::move(text));
   std::vector<CameraRecord> cameras;
@@ -59,7 +59,7 @@ Result<std::vector<CameraRecord>> read_cameras(const std::filesystem::path& file
   return cameras;
 }
 
-Result<std::vector<ImageRecord>> read_images(const std::filesystem::path& file) {
+Result<std::vector<ImageRecord>> read_text_images(const std::filesystem::path& file) {
   ORBITFUSE_ASSIGN(std::string text, read_file(file));
   Lines lines(std::move(text));
   std::vector<ImageRecord> images;
@@ -89,7 +89,7 @@ Result<std::vector<ImageRecord>> read_images(const std::filesystem::path& file) 
   return images;
 }
 
-Result<std::vector<PointRecord>> read_points(const std::filesystem::path& file) {
+Result<std::vector<PointRecord>> read_text_points(const std::filesystem::path& file) {
   std::vector<PointRecord> points;
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) return points;
@@ -120,9 +120,9 @@ Result<std::vector<PointRecord>> read_points(const std::filesystem::path& file) 
 
 Result<Records> read_text(const std::filesystem::path& folder) {
   Records records;
-  ORBITFUSE_ASSIGN(records.cameras, read_cameras(folder / "cameras.txt"));
-  ORBITFUSE_ASSIGN(records.images, read_images(folder / "images.txt"));
-  ORBITFUSE_ASSIGN(records.points, read_points(folder / "points3D.txt"));
+  ORBITFUSE_ASSIGN(records.cameras, read_text_cameras(folder / "cameras.txt"));
+  ORBITFUSE_ASSIGN(records.images, read_text_images(folder / "images.txt"));
+  ORBITFUSE_ASSIGN(records.points, read_text_points(folder / "points3D.txt"));
   return records;
 }
 

@@ -33,7 +33,7 @@ double step_of(const Eigen::AlignedBox3d& box) {
   return step;
 }
 
-struct Layout {
+struct LasLayout {
   Eigen::AlignedBox3d box;
   double step = 1e-6;
   std::uint64_t points = 0;
@@ -43,7 +43,7 @@ struct Layout {
   }
 };
 
-std::string header(const Layout& layout) {
+std::string header(const LasLayout& layout) {
   std::string out = "LASF";
   append_bytes(out, std::uint16_t{0});       // file source
   append_bytes(out, std::uint16_t{1 << 4});  // formats 6 and more: a coordinate system is WKT
@@ -92,7 +92,7 @@ std::string temperature_record() {
 }  // namespace
 
 Status write_las(const std::filesystem::path& path, const PointCloud& cloud) {
-  Layout layout;
+  LasLayout layout;
   for (const Eigen::Vector3d& p : cloud.positions) {
     if (!p.allFinite() || (p.array().abs() > 1e12).any())
       return fail(ErrorKind::input, path.string(), "a point that is not finite",

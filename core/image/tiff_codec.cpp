@@ -84,14 +84,14 @@ TiffHandle open(MemoryFile& file, const char* mode) {
           &TIFFClose};
 }
 
-struct Layout {
+struct TiffLayout {
   std::uint32_t width = 0, height = 0;
   std::uint16_t bits = 1, channels = 1, format = SAMPLEFORMAT_UINT, planar = PLANARCONFIG_CONTIG;
   std::uint16_t photometric = PHOTOMETRIC_MINISBLACK, compression = COMPRESSION_NONE;
 };
 
-Layout layout_of(TIFF* tiff) {
-  Layout l;
+TiffLayout layout_of(TIFF* tiff) {
+  TiffLayout l;
   TIFFGetField(tiff, TIFFTAG_IMAGEWIDTH, &l.width);
   TIFFGetField(tiff, TIFFTAG_IMAGELENGTH, &l.height);
   TIFFGetFieldDefaulted(tiff, TIFFTAG_BITSPERSAMPLE, &l.bits);
@@ -104,7 +104,7 @@ Layout layout_of(TIFF* tiff) {
 }
 
 /// OpenCV's; nothing for samples that are not read.
-std::optional<int> depth_of(const Layout& l) {
+std::optional<int> depth_of(const TiffLayout& l) {
   if (l.format == SAMPLEFORMAT_IEEEFP && l.bits == 32) return CV_32F;
   if (l.format == SAMPLEFORMAT_UINT && l.bits == 16) return CV_16U;
   if (l.format == SAMPLEFORMAT_UINT && l.bits == 8) return CV_8U;
@@ -112,7 +112,7 @@ std::optional<int> depth_of(const Layout& l) {
 }
 
 /// Colours that would be taken for others; null: those that are read.
-const char* unread_colors(const Layout& l) {
+const char* unread_colors(const TiffLayout& l) {
   switch (l.photometric) {
     case PHOTOMETRIC_MINISBLACK:
     case PHOTOMETRIC_RGB:
@@ -137,7 +137,7 @@ const char* unread_colors(const Layout& l) {
 }
 
 /// Why it can't be read; empty where it can.
-std::string unread_layout(const Layout& l) {
+std::string unread_layout(const TiffLayout& l) {
   std::string why;
   if (const char* colors = unread_colors(l)) {
     why = colors;
@@ -195,7 +195,7 @@ std::string description_of(TIFF* tiff) {
                      gdal_number(metadata, "offset", "0"));
 }
 
-bool read_strips(TIFF* tiff, const Layout& l, cv::Mat& image) {
+bool read_strips(TIFF* tiff, const TiffLayout& l, cv::Mat& image) {
   const auto row_bytes = static_cast<std::size_t>(l.width) * image.elemSize();
   if (static_cast<std::size_t>(TIFFScanlineSize(tiff)) != row_bytes) return false;
   for (std::uint32_t y = 0; y < l.height; ++y) {
@@ -204,7 +204,7 @@ bool read_strips(TIFF* tiff, const Layout& l, cv::Mat& image) {
   return true;
 }
 
-bool read_tiles(TIFF* tiff, const Layout& l, cv::Mat& image) {
+bool read_tiles(TIFF* tiff, const TiffLayout& l, cv::Mat& image) {
   std::uint32_t tile_w = 0, tile_h = 0;
   TIFFGetField(tiff, TIFFTAG_TILEWIDTH, &tile_w);
   TIFFGetField(tiff, TIFFTAG_TILELENGTH, &tile_h);
@@ -234,7 +234,7 @@ bool is_copy(TIFF* tiff) {
   return (kind & (FILETYPE_REDUCEDIMAGE | FILETYPE_MASK)) != 0;
 }
 
-bool alike(const Layout& a, const Layout& b) {
+bool alike(const TiffLayout& a, const TiffLayout& b) {
   return a.width == b.width && a.height == b.height && a.bits == b.bits &&
          a.channels == b.channels && a.format == b.format;
 }
@@ -249,7 +249,7 @@ void to_first_page(TIFF* tiff) {
 }
 
 /// Advances to the next image of the first one's layout.
-bool next_page(TIFF* tiff, const Layout& first) {
+bool next_page(TIFF* tiff, const TiffLayout& first) {
   while (TIFFReadDirectory(tiff) == 1)
     if (alike(layout_of(tiff), first) && !is_copy(tiff)) return true;
   return false;
@@ -272,7 +272,7 @@ bool has_alpha(TIFF* tiff) {
 }
 
 struct StoredPage {
-  Layout layout;
+  TiffLayout layout;
   cv::Mat samples;  ///< all channels, as they are stored
 };
 
@@ -283,7 +283,7 @@ Result<StoredPage> read_page(std::string_view bytes, const std::string& where,
   const TiffHandle tiff = open(file, "rm");
   if (!tiff) return fail(ErrorKind::input, where, "not a readable TIFF", "copy the file again");
   to_first_page(tiff.get());
-  Layout l = layout_of(tiff.get());
+  TiffLayout l = layout_of(tiff.get());
   for (int at = 0; at < page; ++at) {
     if (!next_page(tiff.get(), l))
       return fail(ErrorKind::input, where, fmt::format("no page {}", page + 1),
@@ -324,7 +324,7 @@ std::optional<int> tiff_page_count(std::string_view bytes) {
   const TiffHandle tiff = open(file, "rm");
   if (!tiff) return std::nullopt;
   to_first_page(tiff.get());
-  const Layout first = layout_of(tiff.get());
+  const TiffLayout first = layout_of(tiff.get());
   int pages = 1;
   while (pages < max_pages && next_page(tiff.get(), first)) ++pages;
   return pages;
@@ -336,14 +336,14 @@ std::string other_tiff_pages(std::string_view bytes) {
   const TiffHandle tiff = open(file, "rm");
   if (!tiff) return {};
   to_first_page(tiff.get());
-  const Layout first = layout_of(tiff.get());
+  const TiffLayout first = layout_of(tiff.get());
   constexpr std::size_t named = 3;
   std::vector<std::string> others;
   std::size_t count = 0;
   // The number is the directory's, by which other programs know it too.
   for (int page = TIFFCurrentDirectory(tiff.get()) + 2;
        page <= max_pages && TIFFReadDirectory(tiff.get()) == 1; ++page) {
-    const Layout l = layout_of(tiff.get());
+    const TiffLayout l = layout_of(tiff.get());
     if (is_copy(tiff.get()) || alike(l, first)) continue;
     if (++count <= named)
       others.push_back(fmt::format("{} ({}x{}, {}-bit{})", page, l.width, l.height, l.bits,

@@ -20,7 +20,7 @@ constexpr double full_frame_diagonal_mm = 43.2666;
 /// ten times as large.
 constexpr int as_jpeg_quality = 97;
 
-std::string extension_of(const std::string& bytes) {
+std::string extension_of_bytes(const std::string& bytes) {
   switch (image_format(bytes)) {
     case ImageFormat::jpeg:
       return ".jpg";
@@ -62,7 +62,7 @@ Result<StillPhoto> visible_still(std::string bytes, const std::string& where) {
                     " samples, but photos have 8 bits",
                 "a thermal image? Give it as thermal, or convert it to 8-bit");
   still.size = apply_orientation(image, exif.orientation).size();
-  still.frame.extension = extension_of(bytes);
+  still.frame.extension = extension_of_bytes(bytes);
   still.frame.encoded = std::move(bytes);
   still.frame.host_time_ns = exif.taken_ns;
   still.camera.modality = Modality::visible;
@@ -101,7 +101,7 @@ Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& 
   still.size = file.image.size();
   if (converted.keep_bytes) {
     frame.encoded = file.bytes;
-    frame.extension = extension_of(file.bytes);
+    frame.extension = extension_of_bytes(file.bytes);
   } else {
     frame.pixels = frame.thermal_is_gray ? converted.gray : converted.counts;
     still.size = frame.pixels.size();

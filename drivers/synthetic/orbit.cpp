@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/numeric/angle_units.hpp"
 #include "drivers/synthetic/noise.hpp"
 #include "drivers/synthetic/stations.hpp"
 
@@ -78,7 +79,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double deg = std::numbers::pi / 180;
 /// What the operator aims at: the middle of the car.
 const Vector3d aim_point(-0.1, 0, 0.62);
 
@@ -89,13 +89,14 @@ Rigid3d look_at(const Vector3d& center, const Vector3d& target, double roll_deg)
   Eigen::Matrix3d world_from_cam;
   world_from_cam << right, forward.cross(right), forward;
   const Eigen::Quaterniond rotation =
-      (Eigen::Quaterniond(world_from_cam) * Eigen::AngleAxisd(roll_deg * deg, Vector3d::UnitZ()))
+      (Eigen::Quaterniond(world_from_cam) *
+       Eigen::AngleAxisd(roll_deg * radians_per_degree, Vector3d::UnitZ()))
           .normalized();
   return Rigid3d{rotation, center}.inverse();
 }
 
 Vector3d on_orbit(double azimuth_deg, double elevation_deg, double distance) {
-  const double a = azimuth_deg * deg, e = elevation_deg * deg;
+  const double a = azimuth_deg * radians_per_degree, e = elevation_deg * radians_per_degree;
   return aim_point +
          distance * Vector3d(std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e));
 }
@@ -106,7 +107,7 @@ Rigid3d jittered_pose(const OrbitOptions& o, Random& random, Exposure& exposure)
   const double distance =
       o.distance_m * (1 + std::clamp(o.distance_jitter * random.gaussian(), -0.2, 0.2));
   const Vector3d center = on_orbit(exposure.azimuth_deg, exposure.elevation_deg, distance);
-  const double aim_m = distance * std::tan(o.aim_jitter_deg * deg);
+  const double aim_m = distance * std::tan(o.aim_jitter_deg * radians_per_degree);
   const Vector3d target =
       aim_point + aim_m * Vector3d(random.gaussian(), random.gaussian(), 0.5 * random.gaussian());
   return look_at(center, target, o.roll_jitter_deg * random.gaussian());

@@ -12,7 +12,7 @@
 namespace orbitfuse::fusion {
 namespace {
 
-constexpr int side = 8, samples = side * side;
+constexpr int patch_side = 8, samples = patch_side * patch_side;
 
 float activity(const Plane& image, int x, int y, float brightness_weight) {
   const PatchActivity patch = patch_activity(image, x, y);
@@ -33,20 +33,21 @@ Plane coherent(const Plane& share, const Plane& visible, const Plane& thermal, f
 FusedBase fuse_base(const Plane& visible, const Plane& thermal, const BaseRule& rule) {
   // A vote lies at its patch's last sample; outside there are no patches and no votes.
   Plane votes = Plane::zeros(visible.size()), patches = Plane::zeros(visible.size());
-  const int rows = visible.rows - side + 1, columns = visible.cols - side + 1;
+  const int rows = visible.rows - patch_side + 1, columns = visible.cols - patch_side + 1;
   parallel_blocks(rows, 4, [&](int begin, int end) {
     for (int y = begin; y < end; ++y)
       for (int x = 0; x < columns; ++x) {
         const float v =
             activity(visible, x, y, rule.brightness_weight) + samples * rule.visible_preference;
         const float t = activity(thermal, x, y, rule.brightness_weight);
-        votes(y + side - 1, x + side - 1) = v > t ? 1.0F : v < t ? 0.0F : 0.5F;
-        patches(y + side - 1, x + side - 1) = 1;
+        votes(y + patch_side - 1, x + patch_side - 1) = v > t ? 1.0F : v < t ? 0.0F : 0.5F;
+        patches(y + patch_side - 1, x + patch_side - 1) = 1;
       }
   });
   const auto sums_of = [](const Plane& plane) {
     Plane sums;
-    cv::boxFilter(plane, sums, CV_32F, {side, side}, {0, 0}, false, cv::BORDER_CONSTANT);
+    cv::boxFilter(plane, sums, CV_32F, {patch_side, patch_side}, {0, 0}, false,
+                  cv::BORDER_CONSTANT);
     return sums;
   };
   Plane weight = sums_of(votes) / sums_of(patches);

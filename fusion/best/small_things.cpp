@@ -9,14 +9,14 @@
 namespace orbitfuse::fusion {
 namespace {
 
-constexpr int side = 15;  // of a quarter of the size: 60 px
+constexpr int opening_side = 15;  // of a quarter of the size: 60 px
 // Gray levels of heat: below, a camera's noise and fixed pattern; above, nothing is in doubt.
 constexpr float fewest_levels = 8, most_levels = 64;
 
 /// White or black top-hat: how far a small thing stands out.
 Plane standing_out(const Plane& image, cv::MorphTypes operation) {
   Plane result;
-  cv::morphologyEx(image, result, operation, cv::Mat::ones(side, side, CV_8U));
+  cv::morphologyEx(image, result, operation, cv::Mat::ones(opening_side, opening_side, CV_8U));
   return result;
 }
 

@@ -11,12 +11,12 @@
 #include <numbers>
 
 #include "core/geometry/narrowed.hpp"
+#include "core/numeric/angle_units.hpp"
 #include "core/system/parallel.hpp"
 
 namespace orbitfuse {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
 constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
 /// Where a keyframe shows nothing it is drawn this many orbit radii away, so that what lies before
 /// it keeps its outline.
@@ -238,7 +238,7 @@ class KeyframeScene {
   /// Renders the scene for a keyframe; `width` is that of the view without its margin.
   Status add(const Camera& camera, const Rigid3d& cam_from_world, int width, double margin_deg) {
     Camera wide = at_width(camera, width).without_distortion();
-    const int margin = static_cast<int>(std::ceil(margin_deg * degree * wide.fx));
+    const int margin = static_cast<int>(std::ceil(margin_deg * radians_per_degree * wide.fx));
     wide.width += 2 * margin, wide.height += 2 * margin;
     wide.cx += margin, wide.cy += margin;
     ORBITFUSE_ASSIGN(SceneRender seen, renderer_(wide, cam_from_world));
@@ -268,7 +268,7 @@ class KeyframeScene {
 
   double apart_deg(const Rigid3d& a, const Rigid3d& b) const {
     const Eigen::Vector3d to_a = camera_center(a) - center_, to_b = camera_center(b) - center_;
-    return std::atan2(to_a.cross(to_b).norm(), to_a.dot(to_b)) / degree;
+    return std::atan2(to_a.cross(to_b).norm(), to_a.dot(to_b)) / radians_per_degree;
   }
 
   std::vector<const Keyframe*> nearest(const Rigid3d& cam_from_world) const {

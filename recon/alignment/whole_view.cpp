@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/geometry/narrowed.hpp"
+#include "core/numeric/angle_units.hpp"
 #include "recon/alignment/edge_correlation.hpp"
 #include "recon/alignment/edge_field.hpp"
 #include "recon/alignment/patch_matching.hpp"
@@ -14,10 +15,9 @@
 namespace orbitfuse {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
-
 Rigid3d turn(double degrees, const Eigen::Vector3d& axis) {
-  return {Eigen::Quaterniond(Eigen::AngleAxisd(degrees * degree, axis)), Eigen::Vector3d::Zero()};
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(degrees * radians_per_degree, axis)),
+          Eigen::Vector3d::Zero()};
 }
 
 /// The camera turned so that what it showed at the principal point moves by the shift.

@@ -10,13 +10,13 @@
 
 #include "core/geometry/narrowed.hpp"
 #include "core/geometry/nearest_to_lines.hpp"
+#include "core/numeric/angle_units.hpp"
 #include "core/numeric/median.hpp"
 #include "core/option_range.hpp"
 
 namespace orbitfuse {
 namespace {
 
-constexpr double deg = std::numbers::pi / 180;
 /// Below this share of the circle a full orbit would show sides that no camera saw.
 constexpr double orbit_span_deg = 270;
 
@@ -41,20 +41,20 @@ Camera render_camera(const std::vector<PosedView>& posed, int width_px) {
 
 NewViews along_orbit(const std::vector<PosedView>& posed, const OrbitGeometry& orbit,
                      const NewViewOptions& options) {
-  const double elevation = options.elevation_deg.value_or(orbit.elevation_deg) * deg;
+  const double elevation = options.elevation_deg.value_or(orbit.elevation_deg) * radians_per_degree;
   const double radius = orbit.radius * options.radius_scale;
   const Eigen::Vector3d side = orbit.up.cross(orbit.first);
   NewViews result;
   for (int i = 0; i < options.views; ++i) {
-    const double azimuth = (options.azimuth_deg + 360.0 * i / options.views) * deg;
+    const double azimuth = (options.azimuth_deg + 360.0 * i / options.views) * radians_per_degree;
     const Eigen::Vector3d out =
         std::cos(elevation) * (std::cos(azimuth) * orbit.first + std::sin(azimuth) * side) +
         std::sin(elevation) * orbit.up;
     result.views.push_back({fmt::format("{:03}", i), render_camera(posed, options.width_px),
                             look_at(orbit.center + radius * out, orbit.center, orbit.up)});
   }
-  result.described =
-      fmt::format("orbit of {} views, elevation {:.0f}°", options.views, elevation / deg);
+  result.described = fmt::format("orbit of {} views, elevation {:.0f}°", options.views,
+                                 elevation / radians_per_degree);
   return result;
 }
 
@@ -110,9 +110,9 @@ Result<OrbitGeometry> orbit_geometry(const std::vector<PosedView>& views) {
     const Eigen::Vector3d flat = out - height * orbit.up;
     if (azimuths.empty()) orbit.first = flat.normalized();
     radii.push_back(out.norm());
-    elevations.push_back(std::atan2(height, flat.norm()) / deg);
+    elevations.push_back(std::atan2(height, flat.norm()) / radians_per_degree);
     azimuths.push_back(std::atan2(flat.dot(orbit.up.cross(orbit.first)), flat.dot(orbit.first)) /
-                       deg);
+                       radians_per_degree);
   }
   orbit.radius = median(radii);
   orbit.elevation_deg = median(elevations);

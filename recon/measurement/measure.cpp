@@ -17,7 +17,6 @@
 namespace orbitfuse::measurement {
 namespace {
 
-constexpr int normal_reach = 2;
 constexpr double default_apart = 0.1;  // of the object's reach
 
 std::string words(const Eigen::Vector3d& p) {

@@ -14,15 +14,15 @@ constexpr Kind all_kinds[] = {Kind::spot,    Kind::box,     Kind::line,       Ki
 /// Of counts; what each takes is its request's to check.
 constexpr OptionRange whole_numbers = from_to(-1e6, 1e6);
 
-json json_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+json as_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-json json_of(const Place& place) {
+json as_json(const Place& place) {
   if (const auto* pixel = std::get_if<PixelPlace>(&place))
     return {{"view", pixel->view}, {"u", pixel->pixel.x()}, {"v", pixel->pixel.y()}};
-  return {{"point", json_of(std::get<Eigen::Vector3d>(place))}};
+  return {{"point", as_json(std::get<Eigen::Vector3d>(place))}};
 }
 
-json json_of(const ObjectParameterOverrides& o) {
+json as_json(const ObjectParameterOverrides& o) {
   json j = json::object();
   const auto put = [&](const char* key, const std::optional<double>& value) {
     if (value) j[key] = *value;
@@ -125,11 +125,11 @@ Result<Request> parse(const JsonFields& table, int depth) {
 json to_json(const Request& request) {
   json j = {{"kind", name(request.kind)}};
   if (!request.name.empty()) j["name"] = request.name;
-  for (const Place& place : request.places) j["places"].push_back(json_of(place));
+  for (const Place& place : request.places) j["places"].push_back(as_json(place));
   if (request.kind == Kind::box) {
     const Eigen::Quaterniond& q = request.box.rotation;
-    j["box"] = {{"center", json_of(request.box.center)},
-                {"size", json_of(request.box.size)},
+    j["box"] = {{"center", as_json(request.box.center)},
+                {"size", as_json(request.box.size)},
                 {"rotation_wxyz", {q.w(), q.x(), q.y(), q.z()}}};
   }
   if (request.kind == Kind::hottest || request.kind == Kind::coldest) {
@@ -138,8 +138,8 @@ json to_json(const Request& request) {
   }
   if (request.kind == Kind::line) j["profile"] = request.profile;
   for (const Request& part : request.of) j["of"].push_back(to_json(part));
-  if (request.object.any()) j["object"] = json_of(request.object);
-  if (request.recorded.any()) j["recorded"] = json_of(request.recorded);
+  if (request.object.any()) j["object"] = as_json(request.object);
+  if (request.recorded.any()) j["recorded"] = as_json(request.recorded);
   return j;
 }
 

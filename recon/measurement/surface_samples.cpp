@@ -16,7 +16,6 @@ namespace orbitfuse::measurement {
 namespace {
 
 constexpr int box_cells = 32, object_cells = 150, polygon_rays = 64;
-constexpr int normal_reach = 2;
 
 /// One point a cell: the one that is seen from nearest by.
 class Grid {

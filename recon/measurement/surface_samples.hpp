@@ -9,6 +9,8 @@
 // Points of the surface that stand for a region.
 namespace orbitfuse::measurement {
 
+constexpr int normal_reach = 2;  ///< pixels beside a point of a depth map that its normal is of
+
 /// Within a box: what thermal frames see of the surface, one point a cell of a grid over the box of
 /// at most 32 cells along its longest side. Empty: no frame sees a surface in it.
 Result<std::vector<SurfacePoint>> box_samples(const ThermalScene& scene, const OrientedBox& box,

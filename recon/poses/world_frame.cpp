@@ -8,12 +8,11 @@
 #include <map>
 
 #include "core/geometry/nearest_to_lines.hpp"
+#include "core/numeric/angle_units.hpp"
 #include "core/numeric/median.hpp"
 
 namespace orbitfuse {
 namespace {
-
-constexpr double degrees = 180.0 / 3.14159265358979323846;
 
 /// Of a station's azimuth, where its origin alone is unknown.
 constexpr double nominal_sigma_deg = 8;
@@ -80,8 +79,8 @@ Eigen::Vector3d up_direction(const std::vector<PosedView>& views) {
 }
 
 OrbitAngles orbit_angles(const Eigen::Vector3d& center) {
-  return {std::atan2(center.y(), center.x()) * degrees,
-          std::atan2(center.z(), center.head<2>().norm()) * degrees, center.norm()};
+  return {std::atan2(center.y(), center.x()) * degrees_per_radian,
+          std::atan2(center.z(), center.head<2>().norm()) * degrees_per_radian, center.norm()};
 }
 
 Similarity3d canonical_from_world(const std::vector<PosedView>& views,
@@ -114,7 +113,8 @@ Similarity3d canonical_from_world(const std::vector<PosedView>& views,
   }
   const double turn = offsets.size() >= 3 ? robust_offset_deg(offsets) : first_azimuth;
   const Eigen::Quaterniond rotation =
-      Eigen::Quaterniond(Eigen::AngleAxisd(-turn / degrees, Eigen::Vector3d::UnitZ())) * z_up;
+      Eigen::Quaterniond(Eigen::AngleAxisd(-turn / degrees_per_radian, Eigen::Vector3d::UnitZ())) *
+      z_up;
   return {1.0 / scale, rotation.normalized(), -(rotation * origin) / scale};
 }
 
@@ -137,7 +137,7 @@ std::optional<StationFit> fit_stations(const std::vector<PosedView>& views,
     const OrbitAngles angles = orbit_angles(canonical * camera_center(view.cam_from_world));
     names.push_back(view.name);
     azimuth.push_back(angles.azimuth_deg);
-    across.push_back(std::cos(angles.elevation_deg / degrees));
+    across.push_back(std::cos(angles.elevation_deg / degrees_per_radian));
     station.push_back(found->second->station->azimuth_deg);
     // Without a sigma only the origin is unknown (core/session/session.hpp); it is fitted here.
     sigma.push_back(found->second->station->azimuth_sigma_deg.value_or(nominal_sigma_deg));

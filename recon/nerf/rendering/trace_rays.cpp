@@ -11,7 +11,7 @@
 namespace orbitfuse::nerf {
 namespace {
 
-constexpr int rays_per_block = 64;
+constexpr int traced_per_block = 64;
 
 /// Ray r of a block, whose rows begin at `row`.
 TracedRay read_ray(const FieldState& field, const RayBlock& block, std::size_t r,
@@ -31,7 +31,7 @@ void trace_on_processor(const FieldState& field, const ForwardSettings& limits,
                         const MarchSettings& march, int count, const RayOf& ray_of,
                         TracedRay* out) {
   const Kernels& kernels = kernels_for(best_isa());
-  parallel_blocks(count, rays_per_block, [&](int begin, int end) {
+  parallel_blocks(count, traced_per_block, [&](int begin, int end) {
     thread_local RayBlock block;
     thread_local ProposalBlock proposals;
     thread_local std::vector<DrawnRay> drawn;
@@ -61,7 +61,7 @@ void trace_on_processor(const FieldState& field, const ForwardSettings& limits,
 void trace_on_device(device::Engine& engine, const FieldState& field, const ForwardSettings& limits,
                      const MarchSettings& march, int count, const RayOf& ray_of, TracedRay* out) {
   std::vector<device::TraceRequest> rays(static_cast<std::size_t>(count));
-  parallel_blocks(count, rays_per_block, [&](int begin, int end) {
+  parallel_blocks(count, traced_per_block, [&](int begin, int end) {
     for (int i = begin; i < end; ++i) {
       DrawnRay ray;
       const bool there = ray_of(i, ray);

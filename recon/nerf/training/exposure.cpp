@@ -19,7 +19,7 @@ constexpr float slight = 0.03f;  ///< gain that isn't worth losing highlights fo
 constexpr int enough_per_view = 50;
 constexpr std::size_t most_per_sight = 24;
 constexpr double usual = 0.03;  ///< residual of log samples: their noise and shading
-constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
+constexpr float unknown_light = std::numeric_limits<float>::quiet_NaN();
 
 struct Sample {
   int view;
@@ -45,7 +45,7 @@ bool sample_at(const cv::Mat& image, const Eigen::Vector2d& pixel, Eigen::Array3
     for (int dx = -1; dx <= 1; ++dx) sum += image.at<cv::Vec3f>(y + dy, x + dx);
   for (int c = 0; c < 3; ++c) {
     const float mean = sum[c] / 9;
-    log_value[c] = mean > darkest && mean < brightest ? std::log(mean) : unknown;
+    log_value[c] = mean > darkest && mean < brightest ? std::log(mean) : unknown_light;
   }
   return true;
 }
@@ -141,7 +141,8 @@ struct ChannelFit {
 
 /// Points are eliminated, so each turn solves a system of the views alone.
 ChannelFit fit_channel(const Sights& sights, std::size_t views, int channel) {
-  ChannelFit fit{std::vector<int>(views, -1), {}, std::vector<double>(sights.size(), unknown)};
+  ChannelFit fit{
+      std::vector<int>(views, -1), {}, std::vector<double>(sights.size(), unknown_light)};
   const std::vector<int> support = support_of(sights, views, channel);
   int size = 0;
   for (std::size_t i = 0; i < views; ++i)
@@ -216,7 +217,7 @@ std::vector<int> nearest_views(const Dataset& data, const std::vector<bool>& hel
 Exposure estimate_exposure(const Dataset& data, const std::vector<bool>& heldout) {
   Exposure exposure;
   const std::size_t views = data.views.size();
-  exposure.log_gain.assign(views, Eigen::Array3d::Constant(unknown));
+  exposure.log_gain.assign(views, Eigen::Array3d::Constant(unknown_light));
   Sights sights = sights_of_tracks(data, heldout);
   if (too_few(sights, heldout)) add_sights_of_depth(data, heldout, sights);
   exposure.points = static_cast<int>(sights.size());
@@ -269,7 +270,7 @@ void even_out(cv::Mat& image, const Eigen::Array3d& gain) {
         lost = lost || (rgb[c] >= brightest && factor[c] < 1 - slight);
         rgb[c] = std::min(1.0f, rgb[c] * factor[c]);
       }
-      if (lost) rgb = cv::Vec3f::all(unknown);
+      if (lost) rgb = cv::Vec3f::all(unknown_light);
     }
 }
 

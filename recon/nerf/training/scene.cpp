@@ -14,13 +14,13 @@
 namespace orbitfuse::nerf {
 namespace {
 
-constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
+constexpr float unknown_depth = std::numeric_limits<float>::quiet_NaN();
 
 /// Dense maps first, then sparse points where no map has a value.
 cv::Mat known_distance(const Dataset& dataset, const Space& space, int index,
                        const ViewRays& rays) {
   const Camera& camera = rays.camera();
-  cv::Mat out(camera.height, camera.width, CV_32FC1, cv::Scalar(unknown));
+  cv::Mat out(camera.height, camera.width, CV_32FC1, cv::Scalar(unknown_depth));
   for (const DepthMap& map : dataset.depth) {
     if (map.view != index) continue;
     const Rigid3d& pose = dataset.views[static_cast<std::size_t>(index)].cam_from_world;

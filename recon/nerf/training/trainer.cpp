@@ -17,7 +17,7 @@
 namespace orbitfuse::nerf {
 namespace {
 
-constexpr int rays_per_block = 32;
+constexpr int trained_per_block = 32;
 constexpr int shard_count = 16;  ///< of weight gradients; fixed, so sums do not depend on threads
 constexpr int pose_every =
     25;  ///< steps; where views are many, the rays of several such turns make a step
@@ -213,7 +213,7 @@ bool Trainer::step(double progress) {
 }
 
 device::StepOutcome Trainer::step_here(const device::StepPlan& plan, double progress) {
-  const int count = (plan.rays + rays_per_block - 1) / rays_per_block;
+  const int count = (plan.rays + trained_per_block - 1) / trained_per_block;
   if (static_cast<int>(blocks_.size()) < count) blocks_.resize(static_cast<std::size_t>(count));
   for (std::size_t b = static_cast<std::size_t>(count); b < blocks_.size(); ++b)
     blocks_[b].rays.clear();
@@ -224,7 +224,7 @@ device::StepOutcome Trainer::step_here(const device::StepPlan& plan, double prog
     gradients.reset(field_);
     for (int b = shard; b < count; b += shard_count) {
       Block& block = blocks_[static_cast<std::size_t>(b)];
-      draw(block, b * rays_per_block, std::min(plan.rays, (b + 1) * rays_per_block), plan,
+      draw(block, b * trained_per_block, std::min(plan.rays, (b + 1) * trained_per_block), plan,
            progress);
       forward(field_, kernels_, {}, block.rays);
       backward(field_, kernels_, loss, block.targets, block.rays, gradients, block.grid);

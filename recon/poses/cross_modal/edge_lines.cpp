@@ -10,13 +10,12 @@
 #include <utility>
 
 #include "core/geometry/nearest_to_lines.hpp"
+#include "core/numeric/angle_units.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/alignment/luminance.hpp"
 
 namespace orbitfuse {
 namespace {
-
-constexpr double radians = 3.14159265358979323846 / 180.0;
 
 /// First ends of eight segments side by side; of those that aren't there or have no direction, far
 /// away.
@@ -69,7 +68,7 @@ int matching_segment(const LineView& view, const Eigen::Vector3d& a, const Eigen
   const double length = (pb - pa).norm();
   if (length * view.focal_px < 6) return -1;
   const Eigen::Vector2d along = (pb - pa) / length;
-  const double max_sine = std::sin(options.max_angle_deg * radians);
+  const double max_sine = std::sin(options.max_angle_deg * radians_per_degree);
   int best = -1;
   double best_distance = options.max_distance_px / view.focal_px;
   const auto try_segment = [&](std::size_t s) {
@@ -108,7 +107,8 @@ std::vector<int> neighbours(const std::vector<LineView>& views, int index,
   const Eigen::Vector3d own = (views[static_cast<std::size_t>(index)].center - focus).normalized();
   for (std::size_t j = 0; j < views.size(); ++j) {
     const double angle =
-        std::acos(std::clamp(own.dot((views[j].center - focus).normalized()), -1.0, 1.0)) / radians;
+        std::acos(std::clamp(own.dot((views[j].center - focus).normalized()), -1.0, 1.0)) /
+        radians_per_degree;
     if (static_cast<int>(j) != index && angle > 3 && angle < max_angle_deg)
       by_angle.emplace_back(angle, static_cast<int>(j));
   }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/numeric/angle_units.hpp"
 #include "core/numeric/median.hpp"
 #include "core/system/trace.hpp"
 #include "recon/alignment/whole_view.hpp"
@@ -14,7 +15,6 @@
 namespace orbitfuse {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
 constexpr double same_pose_deg = 1;
 /// Views of a loop that say where it starts.
 constexpr std::size_t min_own_offset = 3;
@@ -63,7 +63,7 @@ LoopModel loop_model(const OrbitViews& orbit, const RenderAlignment& alignment) 
   LoopModel model;
   std::vector<double> sines, cosines;
   const auto direction_deg = [](const std::vector<double>& s, const std::vector<double>& c) {
-    return std::atan2(median(s), median(c)) / degree;
+    return std::atan2(median(s), median(c)) / radians_per_degree;
   };
   for (auto& [loop, members] : loops) {
     std::sort(members.begin(), members.end(), [&](std::size_t a, std::size_t b) {
@@ -76,7 +76,7 @@ LoopModel loop_model(const OrbitViews& orbit, const RenderAlignment& alignment) 
       const OrbitAngles at = angles_of(orbit, alignment.views[i].view.cam_from_world);
       elevations.push_back(at.elevation_deg);
       radii.push_back(at.radius);
-      const double turn = (at.azimuth_deg - nominal_deg(orbit, i)) * degree;
+      const double turn = (at.azimuth_deg - nominal_deg(orbit, i)) * radians_per_degree;
       sines.push_back(std::sin(turn));
       cosines.push_back(std::cos(turn));
     }
@@ -113,7 +113,7 @@ PosedView predicted(const OrbitViews& orbit, const Fit& alignment, const LoopMod
 double apart_deg(const OrbitViews& orbit, const Rigid3d& a, const Rigid3d& b) {
   const Eigen::Vector3d ca = camera_center(rebase(a, orbit.canonical_from_world));
   const Eigen::Vector3d cb = camera_center(rebase(b, orbit.canonical_from_world));
-  return std::max((ca - cb).norm() / ca.norm() / degree,
+  return std::max((ca - cb).norm() / ca.norm() / radians_per_degree,
                   rotation_angle_deg(a.rotation, b.rotation));
 }
 

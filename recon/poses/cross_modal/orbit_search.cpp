@@ -6,13 +6,12 @@
 #include <cmath>
 #include <map>
 
+#include "core/numeric/angle_units.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/alignment/edge_field.hpp"
 
 namespace orbitfuse {
 namespace {
-
-constexpr double radians = 3.14159265358979323846 / 180.0;
 
 cv::Mat rendered_cells(const LineModel& lines, const Camera& camera, const Rigid3d& cam_from_world,
                        int columns, int rows) {
@@ -218,7 +217,8 @@ std::vector<OrbitPose> start_poses(const OrbitTable& table, std::size_t view,
 }  // namespace
 
 Rigid3d cam_from_world_of(const OrbitPose& pose, const Camera& camera) {
-  const double a = pose.azimuth_deg * radians, e = pose.elevation_deg * radians;
+  const double a = pose.azimuth_deg * radians_per_degree,
+               e = pose.elevation_deg * radians_per_degree;
   const Eigen::Vector3d out(std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e));
   const Eigen::Vector3d right(-std::sin(a), std::cos(a), 0);
   Eigen::Matrix3d rotation;  // rows: camera axes in the world
@@ -228,7 +228,7 @@ Rigid3d cam_from_world_of(const OrbitPose& pose, const Camera& camera) {
   const Eigen::Matrix3d aim =
       (Eigen::AngleAxisd(std::atan2(pose.shift_x_px, camera.fx), Eigen::Vector3d::UnitY()) *
        Eigen::AngleAxisd(-std::atan2(pose.shift_y_px, camera.fy), Eigen::Vector3d::UnitX()) *
-       Eigen::AngleAxisd(pose.roll_deg * radians, Eigen::Vector3d::UnitZ()))
+       Eigen::AngleAxisd(pose.roll_deg * radians_per_degree, Eigen::Vector3d::UnitZ()))
           .toRotationMatrix();
   const Eigen::Quaterniond q(Eigen::Matrix3d(aim * rotation));
   return {q.normalized(), -(q.normalized() * (pose.radius * out))};

@@ -7,13 +7,13 @@
 #include <limits>
 
 #include "core/geometry/rotation_vector.hpp"
+#include "core/numeric/angle_units.hpp"
 #include "core/numeric/median.hpp"
 #include "recon/poses/index.hpp"
 
 namespace orbitfuse {
 namespace {
 
-constexpr double radians = 3.14159265358979323846 / 180.0;
 using Rotations = std::vector<Eigen::Quaterniond>;
 
 Eigen::Vector3d log_of(Eigen::Quaterniond q) {
@@ -82,8 +82,8 @@ void step(const PairCandidates& candidates,
   // A little of the identity holds what no pair reaches, and the gauge.
   Eigen::MatrixXd a = 1e-3 * Eigen::MatrixXd::Identity(size, size);
   Eigen::VectorXd b = Eigen::VectorXd::Zero(size);
-  const double pair_weight = 1 / std::pow(options.pair_sigma_deg * radians, 2),
-               prior_weight = 1 / std::pow(options.prior_sigma_deg * radians, 2);
+  const double pair_weight = 1 / std::pow(options.pair_sigma_deg * radians_per_degree, 2),
+               prior_weight = 1 / std::pow(options.prior_sigma_deg * radians_per_degree, 2);
   for (const auto& of_pair : candidates) {
     const RelativePose* pair = best_candidate(of_pair, rotation);
     if (pair == nullptr) continue;
@@ -119,8 +119,8 @@ std::vector<std::optional<Eigen::Quaterniond>> nominal_rotations(
   for (const FrameRecord* frame : frames) {
     result.emplace_back();
     if (!frame->station) continue;
-    const double azimuth = (clockwise ? -1 : 1) * frame->station->azimuth_deg * radians;
-    const double elevation = elevations_deg[at(frame->station->loop)] * radians;
+    const double azimuth = (clockwise ? -1 : 1) * frame->station->azimuth_deg * radians_per_degree;
+    const double elevation = elevations_deg[at(frame->station->loop)] * radians_per_degree;
     const Eigen::Vector3d forward(-std::cos(elevation) * std::cos(azimuth),
                                   -std::cos(elevation) * std::sin(azimuth), -std::sin(elevation));
     Eigen::Matrix3d world_from_cam;
@@ -152,12 +152,14 @@ std::vector<double> loop_elevations_deg(const std::vector<const FrameRecord*>& f
         if (!a || !b || a->loop != loop || b->loop != loop) continue;
         Eigen::Vector3d turn = log_of(pose.second_from_first.rotation);
         const double expected =
-            std::abs(std::remainder(a->azimuth_deg - b->azimuth_deg, 360.0)) * radians;
-        if (std::abs(turn.norm() - expected) > 0.3 * expected || turn.norm() < 5 * radians)
+            std::abs(std::remainder(a->azimuth_deg - b->azimuth_deg, 360.0)) * radians_per_degree;
+        if (std::abs(turn.norm() - expected) > 0.3 * expected ||
+            turn.norm() < 5 * radians_per_degree)
           continue;
         turn.normalize();
         if (turn.y() > 0) turn = -turn;  // up is against y in the camera
-        if (std::abs(turn.x()) < 0.3) seen.push_back(std::atan2(-turn.z(), -turn.y()) / radians);
+        if (std::abs(turn.x()) < 0.3)
+          seen.push_back(std::atan2(-turn.z(), -turn.y()) / radians_per_degree);
       }
     if (!declared.empty())
       result[at(loop)] = median(declared);
@@ -186,20 +188,20 @@ AveragedRotations average_rotations(const PairCandidates& candidates,
     const double done = static_cast<double>(pass) / (passes - 1);
     const double scale =
         options.first_scale_deg * std::pow(options.last_scale_deg / options.first_scale_deg, done);
-    step(candidates, used, options, scale * radians, result.cam_from_world);
+    step(candidates, used, options, scale * radians_per_degree, result.cam_from_world);
   }
   result.placed.assign(at(count), false);
   for (const auto& of_pair : candidates) {
     const RelativePose* pair = best_candidate(of_pair, result.cam_from_world);
     if (pair == nullptr) continue;
-    const double miss = residual(*pair, result.cam_from_world).norm() / radians;
+    const double miss = residual(*pair, result.cam_from_world).norm() / radians_per_degree;
     const double square = std::pow(miss / options.last_scale_deg, 2);
     result.cost += square / (1 + square);
     if (miss > options.max_pair_residual_deg) continue;
     result.kept.emplace_back();
     for (const RelativePose& candidate : of_pair)
       if (residual(candidate, result.cam_from_world).norm() <=
-          options.max_pair_residual_deg * radians)
+          options.max_pair_residual_deg * radians_per_degree)
         result.kept.back().push_back(candidate);
     result.placed[at(pair->first)] = result.placed[at(pair->second)] = true;
   }

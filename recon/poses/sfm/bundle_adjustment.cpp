@@ -11,13 +11,12 @@
 #include <limits>
 #include <utility>
 
+#include "core/numeric/angle_units.hpp"
 #include "core/numeric/median.hpp"
 #include "recon/alignment/projection.hpp"
 
 namespace orbitfuse {
 namespace {
-
-constexpr double degrees = 180.0 / 3.14159265358979323846;
 
 /// The unknowns, as Ceres wants them: plain arrays that stay put.
 struct Parameters {
@@ -73,7 +72,7 @@ double triangulation_angle_deg(const SparsePoint& point, const std::vector<Posed
   for (std::size_t i = 0; i < rays.size(); ++i)
     for (std::size_t j = i + 1; j < rays.size(); ++j)
       widest = std::max(widest, std::atan2(rays[i].cross(rays[j]).norm(), rays[i].dot(rays[j])));
-  return widest * degrees;
+  return widest * degrees_per_radian;
 }
 
 double reprojection_error_px(const PosedView& view, const Eigen::Vector3d& x,

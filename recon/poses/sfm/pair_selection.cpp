@@ -7,24 +7,23 @@
 #include <set>
 #include <tuple>
 
+#include "core/numeric/angle_units.hpp"
 #include "recon/poses/world_frame.hpp"
 
 namespace orbitfuse {
 namespace {
 
-constexpr double radians = 3.14159265358979323846 / 180.0;
-
 /// Degrees between the directions of two stations; a loop apart costs a little more than its
 /// angle, since a change of elevation foreshortens most surfaces.
 double station_distance_deg(const Station& a, const Station& b) {
   const auto direction = [](const Station& s) {
-    const double azimuth = s.azimuth_deg * radians;
-    const double elevation = std::clamp(s.elevation_deg, -89.0, 89.0) * radians;
+    const double azimuth = s.azimuth_deg * radians_per_degree;
+    const double elevation = std::clamp(s.elevation_deg, -89.0, 89.0) * radians_per_degree;
     return Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth),
                            std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
   };
   const double cosine = std::clamp(direction(a).dot(direction(b)), -1.0, 1.0);
-  return std::acos(cosine) / radians + 10.0 * std::abs(a.loop - b.loop);
+  return std::acos(cosine) / radians_per_degree + 10.0 * std::abs(a.loop - b.loop);
 }
 
 /// Steps in capture order: 0 to neighbours, more to far ones; strides 7, 10, 14, ... serve orbits

@@ -9,13 +9,12 @@
 #include <tuple>
 
 #include "core/geometry/nearest_to_lines.hpp"
+#include "core/numeric/angle_units.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/poses/index.hpp"
 
 namespace orbitfuse {
 namespace {
-
-constexpr double degrees = 180.0 / 3.14159265358979323846;
 
 /// Sets of features that matches connect.
 class Sets {
@@ -137,7 +136,8 @@ std::optional<Eigen::Vector3d> meet(const Rigid3d& first, const Eigen::Vector3d&
   const Rigid3d w1 = first.inverse(), w2 = second.inverse();
   const Eigen::Vector3d d1 = (w1.rotation * first_ray).normalized(),
                         d2 = (w2.rotation * second_ray).normalized();
-  if (std::atan2(d1.cross(d2).norm(), d1.dot(d2)) * degrees < min_angle_deg) return std::nullopt;
+  if (std::atan2(d1.cross(d2).norm(), d1.dot(d2)) * degrees_per_radian < min_angle_deg)
+    return std::nullopt;
   const Eigen::Vector3d point = nearest_point({w1.translation, w2.translation}, {d1, d2});
   if (!point.allFinite() || (first * point).z() <= 0 || (second * point).z() <= 0)
     return std::nullopt;

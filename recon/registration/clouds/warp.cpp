@@ -42,7 +42,7 @@ struct Prior {
 
 /// Normal equations of residual = y + J u + n . d, with u the similarity's update, d the nodes'
 /// displacements and y the residual without them.
-struct Equations {
+struct WarpEquations {
   Matrix nodes;  ///< d against d
   Matrix mixed;  ///< d against (u, y)
   Eigen::Matrix<double, 8, 8> similarity = Eigen::Matrix<double, 8, 8>::Zero();  ///< (u, y)
@@ -54,7 +54,7 @@ struct Equations {
 using Block = Eigen::Matrix<double, 32, 32>;
 
 void scatter(const Block& block, const std::array<int, WarpGrid::cell_corners>& corners,
-             Equations& equations) {
+             WarpEquations& equations) {
   for (Index a = 0; a < WarpGrid::cell_corners; ++a) {
     const Index to = 3 * corners[static_cast<std::size_t>(a)];
     equations.mixed.middleRows<3>(to) += block.block<3, 8>(3 * a, 24);
@@ -66,10 +66,10 @@ void scatter(const Block& block, const std::array<int, WarpGrid::cell_corners>& 
   equations.similarity += block.bottomRightCorner<8, 8>();
 }
 
-Equations equations_at(const PreparedCloud& source, const PreparedCloud& target,
-                       const Similarity3d& placement, const WarpGrid& grid, double pair_bound,
-                       double plane_bound) {
-  Equations equations;
+WarpEquations equations_at(const PreparedCloud& source, const PreparedCloud& target,
+                           const Similarity3d& placement, const WarpGrid& grid, double pair_bound,
+                           double plane_bound) {
+  WarpEquations equations;
   const auto unknowns = 3 * static_cast<Index>(grid.nodes().size());
   equations.nodes.setZero(unknowns, unknowns);
   equations.mixed.setZero(unknowns, 8);
@@ -103,7 +103,7 @@ Equations equations_at(const PreparedCloud& source, const PreparedCloud& target,
 /// The displacements' own equations, the similarity eliminated; in units of the noise.
 class Displacements {
  public:
-  Displacements(const Equations& equations, double sigma, const Prior& prior)
+  Displacements(const WarpEquations& equations, double sigma, const Prior& prior)
       : prior_(prior), mixed_(equations.mixed) {
     similarity_.compute(damped(equations.similarity.topLeftCorner<7, 7>(), equations.weight));
     gradient_ = equations.similarity.col(7).head<7>();
@@ -220,8 +220,8 @@ Unwarped refine_beside_warp(const PreparedCloud& source, const PreparedCloud& ta
   double sigma = start.residual_sigma;
   for (int round = 0; round < options.rounds; ++round) {
     sigma = std::max(sigma, options.min_sigma);
-    Equations equations = equations_at(source, target, placement, grid, options.pair_bound,
-                                       std::min(tukey_sigmas * sigma, options.pair_bound));
+    WarpEquations equations = equations_at(source, target, placement, grid, options.pair_bound,
+                                           std::min(tukey_sigmas * sigma, options.pair_bound));
     if (equations.distances.size() < fewest_pairs || !(equations.weight > 0))
       return without(round == 0 ? WarpOutcome::too_little : WarpOutcome::diverged);
     const Displacements displacements(equations, sigma, prior);

@@ -30,7 +30,7 @@ constexpr RenderRound judging_round{
     .width_px = search_width_px, .search_px = 3, .patch_search_px = 4, .patch_radius_px = 8};
 
 /// A place on its way, and how well the images support it.
-struct Candidate {
+struct ImageCandidate {
   Similarity3d visible_from_thermal;
   double support = 0;                    ///< agreement of edges times patches in place
   double share = 0;                      ///< of the patches, in place
@@ -45,7 +45,7 @@ struct Evidence {
 };
 
 /// Moves by one round; false where the images show too little.
-Result<bool> step(const Evidence& seen, const RenderRound& round, Candidate& candidate) {
+Result<bool> step(const Evidence& seen, const RenderRound& round, ImageCandidate& candidate) {
   ORBITFUSE_ASSIGN(SimilarityRound found,
                    match_scene(seen.visible, seen.images, seen.thermal,
                                candidate.visible_from_thermal, round, seen.progress));
@@ -63,7 +63,7 @@ Result<bool> step(const Evidence& seen, const RenderRound& round, Candidate& can
   return moved.is_finite() && moved.scale > 0;
 }
 
-Status open(const Evidence& seen, Candidate& candidate) {
+Status open(const Evidence& seen, ImageCandidate& candidate) {
   for (const RenderRound& round : opening_rounds()) {
     ORBITFUSE_ASSIGN(const bool moves, step(seen, round, candidate));
     if (!moves) break;
@@ -71,7 +71,7 @@ Status open(const Evidence& seen, Candidate& candidate) {
   return {};
 }
 
-Status close(const Evidence& seen, Candidate& candidate) {
+Status close(const Evidence& seen, ImageCandidate& candidate) {
   if (!(candidate.support > 0)) return {};
   for (const RenderRound& round : {closing_round, judging_round})
     ORBITFUSE_TRY(step(seen, round, candidate));
@@ -96,10 +96,10 @@ Similarity3d about(const Eigen::Vector3d& center, double turn_deg, const Eigen::
   return {growth, turn, center - growth * (turn * center)};
 }
 
-std::vector<Candidate> starts_round(const Similarity3d& visible_from_thermal,
-                                    const Eigen::Vector3d& center,
-                                    const SimilaritySearchOptions& options) {
-  std::vector<Candidate> starts;
+std::vector<ImageCandidate> starts_round(const Similarity3d& visible_from_thermal,
+                                         const Eigen::Vector3d& center,
+                                         const SimilaritySearchOptions& options) {
+  std::vector<ImageCandidate> starts;
   for (const double sign : {-1.0, 1.0}) {
     for (int axis = 0; axis < 3; ++axis)
       starts.push_back({about(center, sign * options.turn_deg, Eigen::Vector3d::Unit(axis), 1) *
@@ -149,10 +149,10 @@ Result<SimilarityRefinement> search_similarity(const SceneRenderer& visible,
     seen.images.push_back(images[k * thermal.size() / count]);
     seen.thermal.push_back(thermal[k * thermal.size() / count]);
   }
-  Candidate first{visible_from_thermal};
+  ImageCandidate first{visible_from_thermal};
   ORBITFUSE_TRY(open(seen, first));
   if (!(first.support > 0)) return finish(visible_from_thermal, similarity_rounds());
-  std::vector<Candidate> candidates =
+  std::vector<ImageCandidate> candidates =
       starts_round(visible_from_thermal, middle(first.patches), options);
   ORBITFUSE_TRY(close(seen, first));
   const double moved = steps_between(first.visible_from_thermal, visible_from_thermal, options);
@@ -175,21 +175,23 @@ Result<SimilarityRefinement> search_similarity(const SceneRenderer& visible,
          fmt::format("{} starts not tried", candidates.size())});
     return result;
   }
-  for (Candidate& candidate : candidates) {
+  for (ImageCandidate& candidate : candidates) {
     ORBITFUSE_TRY(open(seen, candidate));
     progress.report(
         {.stage = "register", .detail = fmt::format("start: support {:.0f}", candidate.support)});
   }
   const int starts = 1 + static_cast<int>(candidates.size());
   // Clutter can draw a start to where the clouds don't meet at all.
-  const auto lost = [&](const Candidate& candidate) {
+  const auto lost = [&](const ImageCandidate& candidate) {
     return steps_between(candidate.visible_from_thermal, visible_from_thermal, options) > farthest;
   };
-  const auto better = [](const Candidate& a, const Candidate& b) { return a.support > b.support; };
+  const auto better = [](const ImageCandidate& a, const ImageCandidate& b) {
+    return a.support > b.support;
+  };
   std::erase_if(candidates, lost);
   std::stable_sort(candidates.begin(), candidates.end(), better);
   candidates.resize(std::min(candidates.size(), static_cast<std::size_t>(options.finalists)));
-  for (Candidate& candidate : candidates) {
+  for (ImageCandidate& candidate : candidates) {
     ORBITFUSE_TRY(close(seen, candidate));
     progress.report({.stage = "register",
                      .detail = fmt::format("finalist: support {:.0f}, {:.2f} in place",
@@ -198,7 +200,7 @@ Result<SimilarityRefinement> search_similarity(const SceneRenderer& visible,
   candidates.push_back(std::move(first));
   std::erase_if(candidates, lost);
   if (candidates.empty()) candidates.push_back({visible_from_thermal});
-  const Candidate& best = *std::min_element(candidates.begin(), candidates.end(), better);
+  const ImageCandidate& best = *std::min_element(candidates.begin(), candidates.end(), better);
   ORBITFUSE_ASSIGN(SimilarityRefinement result, finish(best.visible_from_thermal, last_rounds));
   result.starts = starts;
   return result;

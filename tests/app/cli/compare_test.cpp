@@ -9,7 +9,6 @@
 
 #include "core/system/file_io.hpp"
 #include "tests/app/cli/program.hpp"
-#include "tests/app/cli/session_fixture.hpp"
 #include "tests/app/cli/small_run.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -26,14 +25,9 @@ class Compare : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder = std::make_unique<test::TempFolder>();
-    for (const char* name : {"before", "after"}) {
-      FixtureOptions options;
-      if (std::string(name) == "after") options.warmer_k = warmer_k;
-      write_fixture_session(*folder / (name + std::string("_session")), options);
-      const Outcome run =
-          orbitfuse_program(small_run(*folder / (name + std::string("_session")), *folder / name));
-      ASSERT_EQ(run.code, 0) << run.err;
-    }
+    copy_results(made_run(), *folder / "before");
+    copy_results(made_run(warmer_k), *folder / "after");
+    fs::copy(made_run(warmer_k).session, *folder / "after_session", fs::copy_options::recursive);
   }
   static void TearDownTestSuite() { folder.reset(); }
 

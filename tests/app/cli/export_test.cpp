@@ -12,7 +12,6 @@
 #include "core/system/file_io.hpp"
 #include "tests/app/cli/program.hpp"
 #include "tests/app/cli/refusal.hpp"
-#include "tests/app/cli/session_fixture.hpp"
 #include "tests/app/cli/small_run.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -67,10 +66,8 @@ void expect_pairs(const fs::path& folder) {
 
 TEST(ExportDataset, RecordedAndNewPairsAreReadBackInEveryLayout) {
   const test::TempFolder temp;
-  const fs::path session = temp / "session", out = temp / "out";
-  write_fixture_session(session);
-  const Outcome run = orbitfuse_program(small_run(session, out));
-  ASSERT_EQ(run.code, 0) << run.err;
+  const fs::path session = made_run().session, out = temp / "out";
+  copy_results(made_run(), out);
   for (const char* poses : {"recorded", "new"}) {
     SCOPED_TRACE(poses);
     const fs::path folder = temp / poses, mine = folder.string() + ".partial/notes.txt";

@@ -6,7 +6,6 @@
 #include <memory>
 
 #include "tests/app/cli/program.hpp"
-#include "tests/app/cli/session_fixture.hpp"
 #include "tests/app/cli/small_run.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -21,9 +20,7 @@ class Inspection : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder = std::make_unique<test::TempFolder>();
-    write_fixture_session(*folder / "session");
-    const Outcome run = orbitfuse_program(small_run(*folder / "session", out()));
-    ASSERT_EQ(run.code, 0) << run.err;
+    copy_results(made_run(), out());
   }
   static void TearDownTestSuite() { folder.reset(); }
 

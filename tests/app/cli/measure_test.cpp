@@ -20,19 +20,17 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 using testing::HasSubstr;
 
-/// One run for all tests: they read it, and each removes what it saved.
+/// One copy of a run for all tests: they read it, and each removes what it saved.
 class Measure : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder = std::make_unique<test::TempFolder>();
-    write_fixture_session(session());
-    const Outcome run = orbitfuse_program(small_run(session(), out()));
-    ASSERT_EQ(run.code, 0) << run.err;
+    copy_results(made_run(), out());
   }
   static void TearDownTestSuite() { folder.reset(); }
   void SetUp() override { fs::remove(file()); }
 
-  static fs::path session() { return *folder / "session"; }
+  static fs::path session() { return made_run().session; }
   static fs::path out() { return *folder / "out"; }
   static fs::path file() { return out() / "measurements.json"; }
   static Outcome measure(std::vector<std::string> more) {

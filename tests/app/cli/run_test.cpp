@@ -27,10 +27,10 @@ class Run : public testing::Test {
     std::vector<std::string> words = {verb, session.string(), "--out", out.string(), "--json"};
     for (const char* set :
          {"train.visible.iterations=200", "train.thermal.iterations=200",
-          "train.visible.eval_count=0", "train.thermal.eval_count=0",
-          "train.visible.cloud_width_px=32", "train.thermal.cloud_width_px=32",
-          "train.visible.cloud_tolerance=0.2", "train.thermal.cloud_tolerance=0.2",
-          "render.views=2", "render.width_px=64"}) {
+          "train.visible.eval_count=0", "train.thermal.eval_count=0", "train.visible.log2_table=13",
+          "train.thermal.log2_table=13", "train.visible.cloud_width_px=32",
+          "train.thermal.cloud_width_px=32", "train.visible.cloud_tolerance=0.2",
+          "train.thermal.cloud_tolerance=0.2", "render.views=2", "render.width_px=64"}) {
       words.insert(words.end(), {"--set", set});
     }
     words.insert(words.end(), more.begin(), more.end());

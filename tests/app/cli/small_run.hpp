@@ -7,15 +7,20 @@
 
 namespace orbitfuse {
 
-/// Words of the program that make a small run of a session in seconds, to measure in.
-inline std::vector<std::string> small_run(const std::filesystem::path& session,
-                                          const std::filesystem::path& out) {
-  std::vector<std::string> words = {"run", session.string(), "--out", out.string()};
-  for (const char* set : {"train.visible.iterations=300", "train.thermal.iterations=300",
-                          "train.visible.eval_count=0", "train.thermal.eval_count=0",
-                          "render.views=2", "render.width_px=64", "fuse.methods=[\"heat\"]"})
-    words.insert(words.end(), {"--set", set});
-  return words;
-}
+/// Words of the program that make a small run of a session in seconds, to measure in. Small tables:
+/// the session has few pixels, and whatever reads the fields reads them whole.
+std::vector<std::string> small_run(const std::filesystem::path& session,
+                                   const std::filesystem::path& out);
+
+struct MadeRun {
+  std::filesystem::path session, out;
+};
+
+/// A small run of the fixture's session, the object warmer by so much. It is made when the program
+/// first asks for it, stays until the program ends, and is not to be written to.
+const MadeRun& made_run(double warmer_k = 0);
+
+/// A copy of its results, to write to.
+void copy_results(const MadeRun& run, const std::filesystem::path& to);
 
 }  // namespace orbitfuse

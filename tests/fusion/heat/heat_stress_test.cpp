@@ -5,22 +5,15 @@
 #include <limits>
 
 #include "core/system/parallel.hpp"
-#include "fusion/fuse/fuse.hpp"
 #include "tests/fusion/fuse/images.hpp"
+#include "tests/fusion/heat/by_heat.hpp"
 
 namespace orbitfuse {
 namespace {
 using namespace testing;
 
-constexpr float nan = std::numeric_limits<float>::quiet_NaN(),
-                infinite = std::numeric_limits<float>::infinity(),
+constexpr float infinite = std::numeric_limits<float>::infinity(),
                 largest = std::numeric_limits<float>::max();
-
-FusionOptions by_heat() {
-  FusionOptions options;
-  options.method = FusionMethod::heat;
-  return options;
-}
 
 TEST(HeatStress, AwkwardPairsGiveAPicture) {
   const cv::Size size(64, 48);

@@ -3,18 +3,15 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <opencv2/imgproc.hpp>
 
-#include "fusion/fuse/fuse.hpp"
 #include "fusion/heat/legend.hpp"
 #include "tests/fusion/fuse/images.hpp"
+#include "tests/fusion/heat/by_heat.hpp"
 
 namespace orbitfuse {
 namespace {
 using namespace testing;
-
-constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 
 /// A yard of 20 degrees with a sky of -30, a house of 30 and a bolt of 70 on it, all in kelvin.
 cv::Mat1f yard(cv::Size size) {
@@ -32,12 +29,6 @@ cv::Mat3b picture(cv::Size size, std::uint64_t seed = 3) {
   cv::RNG random(seed);
   random.fill(image, cv::RNG::UNIFORM, 60, 200);
   return image;
-}
-
-FusionOptions by_heat() {
-  FusionOptions options;
-  options.method = FusionMethod::heat;
-  return options;
 }
 
 TEST(HeatScale, TheSurroundingsAreUsualAndTheBoltIsHot) {

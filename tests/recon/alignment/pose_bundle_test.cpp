@@ -13,7 +13,7 @@
 namespace orbitfuse {
 namespace {
 
-Camera camera() {
+Camera small_camera() {
   Camera c;
   c.width = 320, c.height = 240;
   c.fx = c.fy = 300, c.cx = 160, c.cy = 120;
@@ -42,7 +42,7 @@ struct Scene {
 
   /// Where the true camera sees a place.
   Eigen::Vector2d seen(std::size_t view, const Eigen::Vector3d& world) const {
-    return corrected_pixel(camera(), CorrectedPose(errors[view]), log_focal, radial,
+    return corrected_pixel(small_camera(), CorrectedPose(errors[view]), log_focal, radial,
                            guessed[view] * world)
         ->pixel;
   }
@@ -69,7 +69,7 @@ constexpr CommonLensPrior free_lens{{0, 0.1}, {0, 0.5}};
 
 TEST(PoseBundle, FindsCorrectionsAndLensOfExactPatches) {
   Scene scene(3);
-  PoseBundle bundle(camera(), 3);
+  PoseBundle bundle(small_camera(), 3);
   for (std::size_t v = 0; v < 3; ++v)
     for (int i = 0; i < 60; ++i) bundle.add(v, scene.match(v), 0.8);
   for (const double loss_px : {8.0, 1.0})
@@ -83,7 +83,7 @@ TEST(PoseBundle, FindsCorrectionsAndLensOfExactPatches) {
 
 TEST(PoseBundle, SharedPlacesLeaveTheSurface) {
   Scene scene(4);
-  PoseBundle bundle(camera(), 4);
+  PoseBundle bundle(small_camera(), 4);
   for (std::size_t v = 0; v < 4; ++v)
     for (int i = 0; i < 30; ++i) bundle.add(v, scene.match(v), 1);
   for (int i = 0; i < 80; ++i) bundle.add(scene.shared(0.02));
@@ -96,7 +96,7 @@ TEST(PoseBundle, SharedPlacesLeaveTheSurface) {
 
 TEST(PoseBundle, HeldViewsStayAndHoldTheOthers) {
   Scene scene(4);
-  PoseBundle bundle(camera(), 4);
+  PoseBundle bundle(small_camera(), 4);
   scene.log_focal = scene.radial = 0;
   for (const std::size_t v : {0u, 1u, 2u}) {
     scene.errors[v] = {};
@@ -146,7 +146,7 @@ struct Near {
 TEST(PoseBundle, FindsWhatCeresFinds) {
   constexpr std::size_t views = 5;
   Scene scene(views);
-  PoseBundle bundle(camera(), views);
+  PoseBundle bundle(small_camera(), views);
   std::vector<PoseCorrection> corrections(views, PoseCorrection{});
   double lens[2] = {0, 0};
   std::vector<std::array<double, 3>> offsets(120, {0, 0, 0});
@@ -158,7 +158,7 @@ TEST(PoseBundle, FindsWhatCeresFinds) {
       if (scene.any(scene.rng) > 0.8) seen.pixel.y() += 8;  // a wrong one
       problem.AddResidualBlock(
           new ceres::NumericDiffCostFunction<Sighting, ceres::CENTRAL, 2, 6, 2, 3>(
-              new Sighting{camera(), seen}),
+              new Sighting{small_camera(), seen}),
           new ceres::CauchyLoss(0.7), corrections[seen.view].data(), lens, offset.data());
     }
     problem.AddResidualBlock(new ceres::NumericDiffCostFunction<Hold, ceres::CENTRAL, 1, 3>(
@@ -175,7 +175,7 @@ TEST(PoseBundle, FindsWhatCeresFinds) {
     static double nowhere[3] = {0, 0, 0};
     problem.AddResidualBlock(
         new ceres::NumericDiffCostFunction<Sighting, ceres::CENTRAL, 2, 6, 2, 3>(
-            new Sighting{camera(), seen}),
+            new Sighting{small_camera(), seen}),
         new ceres::ScaledLoss(new ceres::CauchyLoss(1), 0.3, ceres::TAKE_OWNERSHIP),
         corrections[0].data(), lens, nowhere);
     problem.SetParameterBlockConstant(nowhere);
@@ -200,7 +200,7 @@ TEST(PoseBundle, FindsWhatCeresFinds) {
 
 TEST(PoseBundle, ALensThatStaysStays) {
   Scene scene(2);
-  PoseBundle bundle(camera(), 2);
+  PoseBundle bundle(small_camera(), 2);
   for (int i = 0; i < 30; ++i) bundle.add(1, scene.match(1), 1);
   ASSERT_TRUE(bundle.solve({}, {}, 30));
   EXPECT_EQ(bundle.log_focal(), 0);
@@ -210,7 +210,7 @@ TEST(PoseBundle, ALensThatStaysStays) {
 }
 
 TEST(PoseBundle, NothingSeenMovesNothing) {
-  PoseBundle none(camera(), 0), blind(camera(), 3);
+  PoseBundle none(small_camera(), 0), blind(small_camera(), 3);
   EXPECT_TRUE(none.solve(free_lens, {}, 10));
   EXPECT_TRUE(blind.solve(free_lens, {}, 10));
   for (const PoseCorrection& correction : blind.corrections())
@@ -222,13 +222,13 @@ TEST(PoseBundle, NoAnswerFromBehindTheCameraOrFromNoNumber) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   for (const Eigen::Vector3d& point :
        {Eigen::Vector3d(0, 0, -1), Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(nan, 0, 2)}) {
-    PoseBundle bundle(camera(), 1);
+    PoseBundle bundle(small_camera(), 1);
     PatchMatch match = scene.match(0);
     match.point = point;
     bundle.add(0, match, 1);
     EXPECT_FALSE(bundle.solve(free_lens, {}, 10));
   }
-  PoseBundle bundle(camera(), 1);
+  PoseBundle bundle(small_camera(), 1);
   PatchMatch match = scene.match(0);
   match.seen.x() = nan;
   bundle.add(0, match, 1);
@@ -238,7 +238,7 @@ TEST(PoseBundle, NoAnswerFromBehindTheCameraOrFromNoNumber) {
 TEST(PoseBundle, OnePatchAndHugeValuesEndInNumbers) {
   Scene scene(1);
   for (const double size : {1e-6, 1.0, 1e6}) {
-    PoseBundle bundle(camera(), 1);
+    PoseBundle bundle(small_camera(), 1);
     PatchMatch match = scene.match(0);
     match.point *= size, match.seen *= size;
     bundle.add(0, match, 1);
@@ -254,7 +254,7 @@ TEST(PoseBundle, TheSameBitsForAnyNumberOfThreads) {
   for (const int threads : {1, 4}) {
     set_thread_count(threads);
     Scene scene(6);
-    PoseBundle bundle(camera(), 6);
+    PoseBundle bundle(small_camera(), 6);
     for (std::size_t v = 0; v < 6; ++v) bundle.add(v, scene.match(v), 1);
     for (int i = 0; i < 50; ++i) bundle.add(scene.shared(0.02));
     EXPECT_TRUE(bundle.solve(free_lens, {1, 1}, 20));

@@ -10,13 +10,13 @@
 namespace orbitfuse {
 namespace {
 
-const Eigen::Vector3d target(1, 2, 3);
+const Eigen::Vector3d aim(1, 2, 3);
 constexpr double radius = 5;
 
 PosedView looking_in(double azimuth_deg) {
   const double a = azimuth_deg * std::numbers::pi / 180;
-  const Eigen::Vector3d eye = target + radius * Eigen::Vector3d(std::cos(a), std::sin(a), 0.3);
-  const Eigen::Vector3d z = (target - eye).normalized(),
+  const Eigen::Vector3d eye = aim + radius * Eigen::Vector3d(std::cos(a), std::sin(a), 0.3);
+  const Eigen::Vector3d z = (aim - eye).normalized(),
                         x = z.cross(Eigen::Vector3d::UnitZ()).normalized();
   Eigen::Matrix3d r;
   r << x.transpose(), z.cross(x).transpose(), z.transpose();

@@ -16,12 +16,6 @@ using namespace testing_box;
 using nlohmann::json;
 using testing::HasSubstr;
 
-Answer ask(const ThermalScene& scene, const Request& request) {
-  auto answer = measure(scene, request, {});
-  EXPECT_TRUE(answer) << answer.error().message();
-  return answer ? *std::move(answer) : Answer{};
-}
-
 /// Of the frames that see the point: the one whose pixels are finest on its surface.
 std::string finest(const ThermalScene& scene, const Answer& answer) {
   std::string name;

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <memory>
 
+#include "recon/measurement/measure.hpp"
 #include "recon/measurement/thermal_scene.hpp"
 #include "tests/support/box_scene.hpp"
 #include "tests/support/orbit_fixture.hpp"
@@ -55,6 +56,12 @@ inline Request spot_at(const Eigen::Vector3d& point) {
   Request request;
   request.places = {point};
   return request;
+}
+
+inline Answer ask(const ThermalScene& scene, const Request& request) {
+  auto answer = measure(scene, request, {});
+  EXPECT_TRUE(answer) << answer.error().message();
+  return answer ? *std::move(answer) : Answer{};
 }
 
 }  // namespace orbitfuse::measurement::testing_box

@@ -19,12 +19,6 @@ namespace {
 using namespace testing_box;
 using testing::HasSubstr;
 
-Answer ask(const ThermalScene& scene, const Request& request) {
-  auto answer = measure(scene, request, {});
-  EXPECT_TRUE(answer) << answer.error().message();
-  return answer ? *std::move(answer) : Answer{};
-}
-
 std::set<std::string> frames_of(const TemperatureReading& reading) {
   std::set<std::string> names;
   for (const FrameLine& line : reading.frames) names.insert(line.frame);

@@ -23,7 +23,7 @@ class DeviceTraining : public ::testing::TestWithParam<std::string> {
   test::InUse in_use() const { return test::InUse(test::engine_named(GetParam())); }
 };
 
-TrainOptions small_options(Modality modality, int iterations) {
+TrainOptions smaller_options(Modality modality, int iterations) {
   TrainOptions options = test::toy_options(modality, iterations);
   options.samples_per_step = 2048;
   options.hidden = options.color_hidden = 16;
@@ -52,7 +52,7 @@ TEST_P(DeviceTraining, IsAsGoodAsTheProcessors) {
     const Dataset data = measured_scene(modality);
     double reference_db = 0, device_db = 0;
     for (int seed = 1; seed <= seeds; ++seed) {
-      TrainOptions options = small_options(modality, 160);
+      TrainOptions options = smaller_options(modality, 160);
       options.seed = static_cast<std::uint64_t>(seed);
       Field here, there;
       const auto reference = train(data, options, {}, here);
@@ -74,7 +74,7 @@ TEST_P(DeviceTraining, IsAsGoodAsTheProcessors) {
 TEST_P(DeviceTraining, TwiceAndBrokenOffGivesTheSameBytes) {
   const orbitfuse::test::TempFolder folder;
   const Dataset data = measured_scene(Modality::thermal);
-  TrainOptions options = small_options(Modality::thermal, 120);
+  TrainOptions options = smaller_options(Modality::thermal, 120);
   options.eval_count = 6;
   const auto used = in_use();
   Field once, again, resumed;
@@ -94,7 +94,7 @@ TEST_P(DeviceTraining, TwiceAndBrokenOffGivesTheSameBytes) {
 TEST_P(DeviceTraining, ACheckpointGoesOnOnTheProcessor) {
   const orbitfuse::test::TempFolder folder;
   const Dataset data = measured_scene(Modality::visible);
-  TrainOptions options = small_options(Modality::visible, 120);
+  TrainOptions options = smaller_options(Modality::visible, 120);
   options.checkpoint = folder / "checkpoint.bin";
   test::StopAt stop(60);
   Field field;
@@ -121,7 +121,7 @@ TEST_P(DeviceTraining, PosesMoveAsOnTheProcessor) {
   const Eigen::Vector3d turn(0, 0.01, 0.005);
   data.views[2].cam_from_world =
       Rigid3d{turned_by(turn), {0.01, 0, 0}} * data.views[2].cam_from_world;
-  TrainOptions options = small_options(Modality::thermal, 240);
+  TrainOptions options = smaller_options(Modality::thermal, 240);
   options.samples_per_step = 8192;
   ASSERT_TRUE(options.refine_poses);
   const auto moved = [&](std::map<std::string, Rigid3d>& poses) {
@@ -170,7 +170,7 @@ TEST(DeviceThatRefuses, LeavesTheTrainingToTheProcessorAndSaysSo) {
   const test::InUse used(std::make_unique<FullEngine>());
   Field field;
   const auto report =
-      train(measured_scene(Modality::visible), small_options(Modality::visible, 4), {}, field);
+      train(measured_scene(Modality::visible), smaller_options(Modality::visible, 4), {}, field);
   ASSERT_TRUE(report);
   ASSERT_EQ(report->warnings.size(), 1u);
   EXPECT_NE(report->warnings[0].find("out of memory"), std::string::npos);
@@ -180,7 +180,7 @@ TEST(DeviceThatRefuses, LeavesTheTrainingToTheProcessorAndSaysSo) {
 TEST(DeviceThatRefuses, FailsARenderingWithAnErrorThatNamesTheWayOut) {
   Field field;
   const Dataset data = measured_scene(Modality::visible);
-  ASSERT_TRUE(train(data, small_options(Modality::visible, 4), {}, field));
+  ASSERT_TRUE(train(data, smaller_options(Modality::visible, 4), {}, field));
   const test::InUse used(std::make_unique<FullEngine>());
   const auto view = render(field, data.views[0].camera, data.views[0].cam_from_world, {}, {});
   ASSERT_FALSE(view);
@@ -190,7 +190,7 @@ TEST(DeviceThatRefuses, FailsARenderingWithAnErrorThatNamesTheWayOut) {
 
 TEST(DeviceTrainingOfProposals, StaysOnTheProcessor) {
   const test::InUse used(std::make_unique<FullEngine>());
-  TrainOptions options = small_options(Modality::visible, 4);
+  TrainOptions options = smaller_options(Modality::visible, 4);
   options.sampling = Sampling::proposal;
   options.fine_samples = 8;
   Field field;

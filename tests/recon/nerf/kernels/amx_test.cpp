@@ -25,7 +25,7 @@ using test::emulated_amx;
 using test::TileMachine;
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
-constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+constexpr float quiet_nan = std::numeric_limits<float>::quiet_NaN();
 
 std::vector<float> noise(std::size_t count, std::uint64_t seed) {
   std::vector<float> out(count);
@@ -79,7 +79,7 @@ TEST(TileMachine, DenormalsAreZeroAndNansAreNot) {
   EXPECT_EQ(dot({smallest, 0}, {0.5f, 0}, smallest), smallest);
   EXPECT_EQ(bf16_of(smallest / 2), 0);
   EXPECT_EQ(bf16_of(-smallest / 2), 0x8000);
-  EXPECT_TRUE(std::isnan(dot({nan, 0}, {0, 0}, 0)));
+  EXPECT_TRUE(std::isnan(dot({quiet_nan, 0}, {0, 0}, 0)));
   EXPECT_TRUE(std::isnan(dot({infinity, 0}, {0, 0}, 0)));
   EXPECT_EQ(dot({infinity, 0}, {-2, 0}, 5), -infinity);
   EXPECT_TRUE(std::isnan(dot({infinity, infinity}, {1, -1}, 0)));
@@ -249,7 +249,7 @@ TEST(AmxLayers, DifferFromAvx512OnlyInTheOrderOfTheirSums) {
 }
 
 TEST(AmxLayers, WhatIsNotFiniteStaysInItsRowAndColumn) {
-  for (const float bad : {nan, infinity, -infinity}) {
+  for (const float bad : {quiet_nan, infinity, -infinity}) {
     const int rows = 45, hit = 37, column = 5;
     const Case clean(32, 64, rows);
     Case c = clean;

@@ -10,7 +10,7 @@
 namespace orbitfuse::nerf {
 namespace {
 
-constexpr int view_count = 12;
+constexpr int exposed_views = 12;
 
 Eigen::Array3d log_gain_of(std::size_t view) {
   const double a = static_cast<double>(view);
@@ -20,7 +20,7 @@ Eigen::Array3d log_gain_of(std::size_t view) {
 
 /// Each view stored with a gain of its own, clipped as cameras clip.
 Dataset varied_scene() {
-  Dataset data = test::toy_scene(Modality::visible, view_count, 1, 64);
+  Dataset data = test::toy_scene(Modality::visible, exposed_views, 1, 64);
   data.depth = test::toy_depth(data);
   for (std::size_t i = 0; i < data.views.size(); ++i) {
     data.views[i].image = data.views[i].image.clone();
@@ -31,7 +31,7 @@ Dataset varied_scene() {
   return data;
 }
 
-std::vector<bool> none_heldout() { return std::vector<bool>(view_count, false); }
+std::vector<bool> none_heldout() { return std::vector<bool>(exposed_views, false); }
 
 /// Largest difference from what was put in, both with mean zero over `heldout`'s others.
 double worst_error(const Exposure& exposure, const std::vector<bool>& heldout) {
@@ -65,7 +65,7 @@ TEST(Exposure, OfAQuarterOfWrongMatchesIsStillFound) {
     SparsePoint point;
     const Eigen::Vector3d normal(r * std::cos(a), r * std::sin(a), z);
     point.position = 0.4 * normal;
-    for (int v = 0; v < view_count; ++v) {
+    for (int v = 0; v < exposed_views; ++v) {
       const TrainingView& view = data.views[static_cast<std::size_t>(v)];
       const Eigen::Vector3d center = camera_center(view.cam_from_world);
       if ((center - point.position).normalized().dot(normal) < 0.3) continue;
@@ -94,7 +94,7 @@ TEST(Exposure, OfHeldOutViewsIsFoundAndHasNoSay) {
 }
 
 TEST(Exposure, ThatIsSteadyIsLeftAlone) {
-  Dataset data = test::toy_scene(Modality::visible, view_count, 1, 64);
+  Dataset data = test::toy_scene(Modality::visible, exposed_views, 1, 64);
   data.depth = test::toy_depth(data);
   const Exposure exposure = estimate_exposure(data, none_heldout());
   EXPECT_FALSE(exposure.varies());
@@ -106,7 +106,7 @@ TEST(Exposure, OfAViewWithAFewWrongMatchesIsOne) {
   data.depth.pop_back();
   for (int p = 0; p < 3; ++p)  // all that ties the last view to another
     data.points.push_back(
-        {{0, 0, 0.4}, {}, 0, {{view_count - 1, {20.0 + p, 30}}, {2, {40, 30.0 + p}}}});
+        {{0, 0, 0.4}, {}, 0, {{exposed_views - 1, {20.0 + p, 30}}, {2, {40, 30.0 + p}}}});
   const Exposure exposure = estimate_exposure(data, none_heldout());
   EXPECT_TRUE((exposure.log_gain.back() == 0).all()) << exposure.log_gain.back().transpose();
   EXPECT_TRUE(exposure.varies());
@@ -141,14 +141,14 @@ TEST(Exposure, OfViewsWithNothingInCommonIsOne) {
 }
 
 TEST(Exposure, EvenedOutIsThatOfEveryViewAndLeavesOutWhatWasClipped) {
-  const Dataset plain = test::toy_scene(Modality::visible, view_count, 1, 64),
+  const Dataset plain = test::toy_scene(Modality::visible, exposed_views, 1, 64),
                 varied = varied_scene();
   std::vector<NormalisedView> views = prepare_views(varied, {}, {});
   Exposure exposure;
-  for (std::size_t i = 0; i < view_count; ++i) exposure.log_gain.push_back(log_gain_of(i));
+  for (std::size_t i = 0; i < exposed_views; ++i) exposure.log_gain.push_back(log_gain_of(i));
   even_out(exposure, views);
   int unknown = 0;
-  for (std::size_t i = 0; i < view_count; ++i)
+  for (std::size_t i = 0; i < exposed_views; ++i)
     for (int y = 0; y < 64; ++y)
       for (int x = 0; x < 64; ++x) {
         const auto& seen = views[i].target.at<cv::Vec3f>(y, x);
@@ -169,7 +169,7 @@ TEST(Exposure, EvenedOutIsThatOfEveryViewAndLeavesOutWhatWasClipped) {
 TEST(Exposure, OfACameraOnAutomaticCostsLittle) {
   const auto psnr_with = [](bool even) {
     Dataset data = varied_scene();
-    for (TrainingView& truth : test::toy_scene(Modality::visible, view_count, 1, 64).views) {
+    for (TrainingView& truth : test::toy_scene(Modality::visible, exposed_views, 1, 64).views) {
       truth.name = "true_" + truth.name;
       truth.measure_only = true;
       data.views.push_back(truth);

@@ -12,7 +12,7 @@
 namespace orbitfuse::nerf {
 namespace {
 
-std::vector<double> noise(std::size_t count, std::uint64_t seed) {
+std::vector<double> random_values(std::size_t count, std::uint64_t seed) {
   std::vector<double> out(count);
   for (std::size_t i = 0; i < count; ++i) out[i] = random_uniform(seed, 98, i);
   return out;
@@ -20,8 +20,8 @@ std::vector<double> noise(std::size_t count, std::uint64_t seed) {
 
 TEST(Compositing, DensityGradientMatchesDifferencesInDouble) {
   const int n = 24;
-  auto sigma = noise(n, 1), dt = noise(n, 2);
-  const auto g = noise(n, 3);
+  auto sigma = random_values(n, 1), dt = random_values(n, 2);
+  const auto g = random_values(n, 3);
   const double behind_value = 0.7;
   std::vector<double> w(n), light(n), gradient(n);
   const auto loss = [&] {
@@ -67,7 +67,7 @@ TEST(Compositing, WeightsAndTransmittanceSumToOneAtEveryScale) {
 
 TEST(Distortion, IsTheDoubleSumOfEquation15AndItsGradient) {
   const int n = 17;
-  auto w = noise(n, 5), s = noise(n, 6), ds = noise(n, 7);
+  auto w = random_values(n, 5), s = random_values(n, 6), ds = random_values(n, 7);
   std::sort(s.begin(), s.end());
   const auto naive = [&] {
     double sum = 0;

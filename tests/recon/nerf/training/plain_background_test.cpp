@@ -12,19 +12,20 @@
 namespace orbitfuse::nerf {
 namespace {
 
-constexpr int view_count = 12, pixels = 64;
+constexpr int view_count = 12, scene_pixels = 64;
 const cv::Vec3f toy_background(0.1F, 0.2F, 0.3F);
 
-Dataset scene(double scale = 1) {
-  return test::toy_scene(Modality::visible, view_count, scale, pixels);
+Dataset plain_scene(double scale = 1) {
+  return test::toy_scene(Modality::visible, view_count, scale, scene_pixels);
 }
 
 TEST(PlainBackground, IsWhatReachesInFromTheBorder) {
-  Dataset data = scene();
+  Dataset data = plain_scene();
   // A patch of its colour in the middle of the ball is the ball's.
   for (TrainingView& view : data.views) {
     view.image = view.image.clone();
-    cv::circle(view.image, {pixels / 2, pixels / 2}, 3, cv::Scalar(toy_background), cv::FILLED);
+    cv::circle(view.image, {scene_pixels / 2, scene_pixels / 2}, 3, cv::Scalar(toy_background),
+               cv::FILLED);
   }
   const auto background = find_plain_background(data);
   ASSERT_TRUE(background);
@@ -32,13 +33,13 @@ TEST(PlainBackground, IsWhatReachesInFromTheBorder) {
   for (std::size_t i = 0; i < data.views.size(); ++i) {
     const cv::Mat& clear = background->clearance_px[i];
     ASSERT_EQ(clear.size(), data.views[i].image.size());
-    EXPECT_EQ(clear.at<std::uint8_t>(pixels / 2, pixels / 2), 0);
+    EXPECT_EQ(clear.at<std::uint8_t>(scene_pixels / 2, scene_pixels / 2), 0);
     EXPECT_GT(clear.at<std::uint8_t>(0, 0), 8);
   }
 }
 
 TEST(PlainBackground, IsNotFoundInNoiseNorInTemperaturesNorInTwoViews) {
-  Dataset noisy = scene();
+  Dataset noisy = plain_scene();
   cv::RNG random(3);
   for (TrainingView& view : noisy.views) {
     cv::Mat noise(view.image.size(), view.image.type());
@@ -105,9 +106,9 @@ TEST(PlainBackground, OneViewThatLostTheObjectDoesNotCarveItAway) {
 }
 
 TEST(PlainBackground, EmptyScenesAndThoseThatGoOnKeepTheirSpace) {
-  Dataset empty = scene();
+  Dataset empty = plain_scene();
   for (TrainingView& view : empty.views)
-    view.image = cv::Mat(pixels, pixels, CV_32FC3, cv::Scalar(toy_background));
+    view.image = cv::Mat(scene_pixels, scene_pixels, CV_32FC3, cv::Scalar(toy_background));
   const auto background = find_plain_background(empty);
   ASSERT_TRUE(background);
   EXPECT_DOUBLE_EQ(background->share, 1);
@@ -115,7 +116,7 @@ TEST(PlainBackground, EmptyScenesAndThoseThatGoOnKeepTheirSpace) {
   EXPECT_DOUBLE_EQ(fit_to_silhouettes(*background, empty, given).radius, given.radius);
 
   // Three views side by side leave a cone behind the ball.
-  Dataset narrow = test::toy_scene(Modality::visible, 120, 1, pixels);
+  Dataset narrow = test::toy_scene(Modality::visible, 120, 1, scene_pixels);
   narrow.views.resize(3);
   const Space wide{Eigen::Vector3d::Zero(), 1.0};
   EXPECT_DOUBLE_EQ(fit_to_silhouettes(*find_plain_background(narrow), narrow, wide).radius, 1.0);
