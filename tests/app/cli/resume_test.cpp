@@ -65,7 +65,7 @@ class Resumed : public ::testing::Test {
 TEST_F(Resumed, SyntheticWalkGoesOnAfterCtrlC) {
   // Long enough that the word is seen and the signal comes while it walks, on a busy machine too:
   // with 12 small frames it was over between two looks.
-  const std::vector<std::string> camera = {"--visible", "synthetic,size=120x90,spacing=10"};
+  const std::vector<std::string> camera = {"--visible", "synthetic,size=80x60,spacing=10"};
   ASSERT_EQ(orbitfuse_program({"capture", once, camera[0], camera[1]}).code, 0);
   const Outcome cut = orbitfuse_program({"capture", again, camera[0], camera[1], "-v"},
                                         {.interrupt_after = "visible 1"});
