@@ -231,7 +231,9 @@ function(orbitfuse_test name)
     target_compile_options(${name} PRIVATE -Wno-shadow)
   endif()
   orbitfuse_optimise_test(${name} ${ARG_OPTIMISED})
-  orbitfuse_precompile_test(${name} ${ARG_OPTIMISED})
+  if(ARG_LINK)  # what is precompiled wants the core's include folders
+    orbitfuse_precompile_test(${name} ${ARG_OPTIMISED})
+  endif()
   target_link_libraries(${name} PRIVATE ${links} GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE
     ORBITFUSE_SOURCE_DIR="${PROJECT_SOURCE_DIR}" ORBITFUSE_BINARY_DIR="${PROJECT_BINARY_DIR}")
