@@ -76,8 +76,12 @@ if(ORBITFUSE_UNITY)
   add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-Wno-subobject-linkage>)
 endif()
 
+# Not what links Ceres: Debian's is built for SSE2 without this project's Eigen defines, and with
+# sources together the linker took one side's allocating functions for the other's: adjusting bundles
+# freed twice.
 function(orbitfuse_unity target)
-  if(ORBITFUSE_UNITY)
+  get_target_property(links ${target} LINK_LIBRARIES)
+  if(ORBITFUSE_UNITY AND NOT "Ceres::ceres" IN_LIST links)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
   endif()
 endfunction()
@@ -203,8 +207,7 @@ function(orbitfuse_precompile_test name optimised)
 endfunction()
 
 # Most tests call the product and compare: half of what compiling them took beside the headers was
-# optimising that. Tests of recon/ keep the product's -O3: at -O2 the tests of bundle adjustment freed
-# twice, where Eigen's functions of Ceres (Debian's, for SSE2) and of the tests meet in one program.
+# optimising that. Tests of recon/ and fusion/ compute much themselves and keep -O3.
 function(orbitfuse_optimise_test name optimised)
   if(NOT optimised)
     target_compile_options(${name} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1>)
@@ -224,6 +227,7 @@ function(orbitfuse_test name)
   endif()
   orbitfuse_targets_of(links ${ARG_LINK})
   add_executable(${name} ${ARG_SRCS})
+  target_link_libraries(${name} PRIVATE ${links} GTest::gtest GTest::gmock GTest::gtest_main)
   orbitfuse_unity(${name})
   if(ORBITFUSE_UNITY)
     # Local names that another source has in its anonymous namespace; the presets without tell the rest.
@@ -233,7 +237,6 @@ function(orbitfuse_test name)
   if(ARG_LINK)  # what is precompiled wants the core's include folders
     orbitfuse_precompile_test(${name} ${ARG_OPTIMISED})
   endif()
-  target_link_libraries(${name} PRIVATE ${links} GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE
     ORBITFUSE_SOURCE_DIR="${PROJECT_SOURCE_DIR}" ORBITFUSE_BINARY_DIR="${PROJECT_BINARY_DIR}")
   set(properties LABELS ${ARG_LABEL}:${name})
