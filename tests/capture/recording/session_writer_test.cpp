@@ -142,6 +142,35 @@ TEST(SessionWriter, ResumeAfterACrashContinuesAndOverwritesNothing) {
   EXPECT_EQ(session->events[0].kind, "resumed");
 }
 
+/// An editor's blank lines would lie between lines then, where they are damage; and a line that
+/// lacks only its end was read.
+TEST(SessionWriter, ResumeBehindBlankLinesOrWithoutTheLastLinesEndLosesNothing) {
+  for (const std::string behind : {"\n\n", "  \r\n", "no end", " "}) {
+    const TempFolder folder;
+    {
+      auto writer = *SessionWriter::create(folder / "s");
+      ASSERT_TRUE(writer->add_device(thermal_device()));
+      ASSERT_TRUE(writer->append("thermal0", thermal_frame(0)));
+    }
+    std::string text = test::get(folder / "s/manifest.jsonl");
+    if (behind == "no end")
+      text.pop_back();
+    else
+      text += behind;
+    test::put(folder / "s/manifest.jsonl", text);
+    {
+      auto writer = SessionWriter::resume(folder / "s");
+      ASSERT_TRUE(writer) << writer.error().message();
+      ASSERT_TRUE((*writer)->append("thermal0", thermal_frame(7)));
+      ASSERT_TRUE((*writer)->close());
+    }
+    const auto session = open_session(folder / "s");
+    ASSERT_TRUE(session) << '"' << behind << "\": " << session.error().message();
+    EXPECT_TRUE(session->complete);
+    EXPECT_EQ(session->frames.size(), 2u) << '"' << behind << '"';
+  }
+}
+
 TEST(SessionWriter, FullDiskKeepsEveryAcknowledgedFrame) {
   const TempFolder folder;
   auto writer = *SessionWriter::create(folder / "s");
