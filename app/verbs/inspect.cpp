@@ -10,6 +10,7 @@
 #include "app/cli/verb.hpp"
 #include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
+#include "app/stages/build_stages.hpp"
 #include "app/stages/measurement_scene.hpp"
 #include "app/stages/metric_scale.hpp"
 #include "app/stages/session_input.hpp"
@@ -111,6 +112,26 @@ void tell_session(Context& context, const fs::path& folder, const std::string& s
       session, folder.string()));
 }
 
+/// What lies in the place of a stage's result without being one: no verb reads it, and a run
+/// refuses to replace it.
+void tell_without_record(Context& context, const fs::path& folder) {
+  json names = json::array();
+  for (const std::string& stage : stages::stage_names()) {
+    std::error_code unreadable;
+    const fs::path place = folder / stage;
+    if (!fs::exists(fs::symlink_status(place, unreadable)) ||
+        fs::exists(place / pipeline::stage_record_file, unreadable) ||
+        fs::is_empty(place, unreadable))
+      continue;
+    names.push_back(stage);
+    context.console.warning(fmt::format(
+        "{}: there, but without a record ({}): nothing uses it, and the next run refuses to "
+        "replace it; move it away, and run again",
+        stage, pipeline::stage_record_file));
+  }
+  context.result["without_record"] = names;
+}
+
 Status inspect_run(Context& context, const fs::path& folder) {
   json stages = json::array();
   std::vector<std::string> damaged;
@@ -134,6 +155,7 @@ Status inspect_run(Context& context, const fs::path& folder) {
                                      record->output.metrics.value("brief", std::string())));
     stages.push_back(to_json(*record));
   }
+  tell_without_record(context, folder);
   const std::vector<std::string> late =
       pipeline::out_of_date(folder, pipeline::finished_stages(folder));
   for (const std::string& stage : late)

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "core/image/image_io.hpp"
 #include "core/session/session.hpp"
 #include "tests/app/cli/program.hpp"
@@ -101,6 +103,49 @@ TEST_F(HostileRun, ResultsWithoutTheirRecordAreNoSession) {
   EXPECT_THAT(refused.err, HasSubstr("results of a run, but no run.json"));
   EXPECT_EQ(on_out("poses", session).code, 0);
   EXPECT_EQ(orbitfuse_program({"inspect", out.string()}).code, 0);
+}
+
+TEST_F(HostileRun, AStagesFolderWithoutItsRecordIsToldByInspect) {
+  make_poses();
+  fs::remove(out / "poses_visible/stage.json");
+  test::put(out / "render/mine.txt", "a folder of the user's own");
+  fs::create_directories(out / "depth");  // empty: the next run takes it
+  const Outcome told = orbitfuse_program({"inspect", out.string(), "--json"});
+  EXPECT_EQ(told.code, 0) << told.err;
+  EXPECT_EQ(told.result().at("without_record"), json({"poses_visible", "render"}));
+  EXPECT_THAT(told.err, HasSubstr("poses_visible: there, but without a record (stage.json)"));
+}
+
+/// The other run would take what is new in its stage for damage, and delete it when it is made
+/// anew.
+TEST_F(HostileRun, NothingIsWrittenIntoAStageOfAnyRun) {
+  make_poses();
+  const fs::path stage = out / "poses_visible", into = stage / "new";
+  const std::string photo = (session / "visible/000000.png").string(),
+                    frame = (session / "thermal/000000.tiff").string();
+  const auto files = [&] {
+    std::set<fs::path> all;
+    for (const auto& entry : fs::recursive_directory_iterator(stage)) all.insert(entry.path());
+    return all;
+  };
+  const auto before = files();
+  fs::create_directory_symlink(stage, temp / "link");
+  const std::vector<std::vector<std::string>> calls = {
+      {"render", session.string(), "--out", into.string()},
+      {"render", session.string(), "--out", stage.string()},
+      {"poses", session.string(), "--out", (temp / "link/deep/down").string(), "--dry-run"},
+      {"fuse", "--visible", photo, "--thermal", frame, "--out", (stage / "f.png").string()},
+      {"farm", session.string(), "--out", into.string()},
+      {"replay", session.string(), "--to", into.string()},
+      {"import", into.string(), "--visible", photo},
+      {"import", into.string(), "--visible", photo, "--dry-run"},
+      {"capture", into.string(), "--driver", "synthetic"}};
+  for (const auto& words : calls) {
+    const Outcome refused = orbitfuse_program(words);
+    EXPECT_EQ(refused.code, 2) << words[0] << ": " << refused.err;
+    EXPECT_THAT(refused.err, HasSubstr("the result of a run's stage")) << words[0];
+  }
+  EXPECT_EQ(files(), before);
 }
 
 TEST_F(HostileRun, ATruthThatNamesTwoFramesAlikeMeasuresNeither) {
