@@ -9,7 +9,7 @@
 namespace orbitfuse {
 namespace {
 
-constexpr int lanes = 8;
+constexpr int polar_lanes = 8;
 
 /// arctan of [0, 1] in turns, by an odd polynomial whose largest error is smallest: 4e-8 turns.
 __m256 octant_turns(__m256 ratio) {
@@ -42,17 +42,17 @@ void to_polar(const float* by_x, const float* by_y, float* length, float* turns)
 
 /// exp(-d^2 / (2 sigma^2)) of the samples from -reach to reach about a place `offset` samples away;
 /// behind them zeros for a vector's rest.
-std::vector<float> weights(int reach, double offset, double sigma) {
+std::vector<float> gaussian_weights(int reach, double offset, double sigma) {
   std::vector<float> list;
   for (int i = -reach; i <= reach; ++i) {
     const double d = i - offset;
     list.push_back(static_cast<float>(std::exp(-d * d / (2 * sigma * sigma))));
   }
-  list.resize(list.size() + lanes);
+  list.resize(list.size() + polar_lanes);
   return list;
 }
 
-constexpr int cells = 4, directions = 8;
+constexpr int descriptor_cells = 4, descriptor_turns = 8;
 constexpr double cell_sigmas = 3;  ///< side of a cell in standard deviations of the peak's blur
 
 /// Cells with a frame about them, so that no sample asks whether it is inside, by direction, row
@@ -76,9 +76,9 @@ class CellHistogram {
                  above = _mm256_sub_ps(weights, below), later = _mm256_sub_ps(turns, whole_turns);
     const __m256 above_later = _mm256_mul_ps(above, later),
                  below_later = _mm256_mul_ps(below, later);
-    alignas(32) std::array<int, lanes> place;
-    alignas(32) std::array<float, lanes> share_right;
-    alignas(32) std::array<std::array<float, lanes>, 4> share;
+    alignas(32) std::array<int, polar_lanes> place;
+    alignas(32) std::array<float, polar_lanes> share_right;
+    alignas(32) std::array<std::array<float, polar_lanes>, 4> share;
     _mm256_store_si256(reinterpret_cast<__m256i*>(place.data()), places);
     _mm256_store_ps(share_right.data(), right);
     _mm256_store_ps(share[0].data(), _mm256_sub_ps(above, above_later));
@@ -100,22 +100,22 @@ class CellHistogram {
   std::array<float, 128> inner() const {
     std::array<float, 128> values;
     auto value = values.begin();
-    for (int row = frame; row < frame + cells; ++row)
-      for (int column = frame; column < frame + cells; ++column)
-        for (int turn = 0; turn < directions; ++turn)
-          *value++ = at(turn, row, column) + (turn == 0 ? at(directions, row, column) : 0.0f);
+    for (int row = frame; row < frame + descriptor_cells; ++row)
+      for (int column = frame; column < frame + descriptor_cells; ++column)
+        for (int turn = 0; turn < descriptor_turns; ++turn)
+          *value++ = at(turn, row, column) + (turn == 0 ? at(descriptor_turns, row, column) : 0.0f);
     return values;
   }
 
  private:
-  static constexpr int side = cells + 4, plane = side * side;
+  static constexpr int side = descriptor_cells + 4, plane = side * side;
   static constexpr std::array<int, 4> corner = {0, side, plane, plane + side};
 
   float at(int turn, int row, int column) const {
     return sums_[static_cast<std::size_t>(turn * plane + row * side + column)];
   }
 
-  std::array<float, (directions + 1) * plane> sums_{};
+  std::array<float, (descriptor_turns + 1) * plane> sums_{};
 };
 
 void scale_to_unit(std::array<float, 128>& values) {
@@ -130,8 +130,8 @@ void scale_to_unit(std::array<float, 128>& values) {
 
 Gradients gradients(const cv::Mat& level) {
   const int width = level.cols, height = level.rows;
-  const int padded =
-      (width + 2 * lanes - 1) / lanes * lanes;  // a vector may begin at the last sample
+  const int padded = (width + 2 * polar_lanes - 1) / polar_lanes *
+                     polar_lanes;  // a vector may begin at the last sample
   Gradients result{cv::Mat(height, padded, CV_32F, cv::Scalar(0)),
                    cv::Mat(height, padded, CV_32F, cv::Scalar(0))};
   std::vector<float> by_x(static_cast<std::size_t>(padded)), by_y(by_x);
@@ -145,7 +145,7 @@ Gradients gradients(const cv::Mat& level) {
     by_x[0] = row[std::min(1, width - 1)] - row[0];
     by_x[static_cast<std::size_t>(width - 1)] = row[width - 1] - row[std::max(width - 2, 0)];
     for (int x = 0; x < width; ++x) by_y[static_cast<std::size_t>(x)] = per_row * (down[x] - up[x]);
-    for (int x = 0; x < width; x += lanes)
+    for (int x = 0; x < width; x += polar_lanes)
       to_polar(&by_x[static_cast<std::size_t>(x)], &by_y[static_cast<std::size_t>(x)],
                result.length.ptr<float>(y) + x, result.turns.ptr<float>(y) + x);
   }
@@ -161,8 +161,8 @@ std::vector<float> dominant_turns(const Gradients& gradients, const ScaleExtremu
   const int reach = std::max(static_cast<int>(3 * sigma), 1);
   const int width = gradients.length.cols, height = gradients.length.rows;
   const int cx = static_cast<int>(at.x + 0.5), cy = static_cast<int>(at.y + 0.5);
-  const std::vector<float> by_x = weights(reach, at.x - cx, sigma),
-                           by_y = weights(reach, at.y - cy, sigma);
+  const std::vector<float> by_x = gaussian_weights(reach, at.x - cx, sigma),
+                           by_y = gaussian_weights(reach, at.y - cy, sigma);
   // A bin before the first and one behind the last, which are the last and the first.
   std::array<float, bins + 2> open{};
   for (int y = std::max(cy - reach, 0); y <= std::min(cy + reach, height - 1); ++y) {
@@ -210,14 +210,14 @@ std::array<float, 128> descriptor(const Gradients& gradients, const ScaleExtremu
   const double angle = 2 * std::numbers::pi * turns;
   const auto cosine = static_cast<float>(std::cos(angle) / cell),
              sine = static_cast<float>(std::sin(angle) / cell);
-  const int reach = static_cast<int>(std::numbers::sqrt2 * cell * (cells + 1) / 2 + 0.5);
+  const int reach = static_cast<int>(std::numbers::sqrt2 * cell * (descriptor_cells + 1) / 2 + 0.5);
   const int cx = static_cast<int>(at.x + 0.5), cy = static_cast<int>(at.y + 0.5);
   // Gaussian of half the descriptor's side, Lowe's window.
-  const std::vector<float> by_x = weights(reach, at.x - cx, cell * cells / 2),
-                           by_y = weights(reach, at.y - cy, cell * cells / 2);
+  const std::vector<float> by_x = gaussian_weights(reach, at.x - cx, cell * descriptor_cells / 2),
+                           by_y = gaussian_weights(reach, at.y - cy, cell * descriptor_cells / 2);
   // From the peak to the centre of the frame's first cell.
-  const __m256 to_first = _mm256_set1_ps(CellHistogram::frame + 0.5f * (cells - 1));
-  const __m256 rim = _mm256_set1_ps(0.5f * (cells + 1)), sign = _mm256_set1_ps(-0.0f);
+  const __m256 to_first = _mm256_set1_ps(CellHistogram::frame + 0.5f * (descriptor_cells - 1));
+  const __m256 rim = _mm256_set1_ps(0.5f * (descriptor_cells + 1)), sign = _mm256_set1_ps(-0.0f);
   const __m256 along = _mm256_set1_ps(cosine), across = _mm256_set1_ps(sine);
   const __m256 lane = _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7);
   CellHistogram histogram;
@@ -227,7 +227,7 @@ std::array<float, 128> descriptor(const Gradients& gradients, const ScaleExtremu
     const float *length = gradients.length.ptr<float>(y), *turn = gradients.turns.ptr<float>(y);
     const __m256 row_weight = _mm256_set1_ps(by_y[static_cast<std::size_t>(y - cy + reach)]);
     const __m256 dy = _mm256_set1_ps(static_cast<float>(y - at.y));
-    for (int x = left; x <= right; x += lanes) {
+    for (int x = left; x <= right; x += polar_lanes) {
       const __m256 dx = _mm256_add_ps(_mm256_set1_ps(static_cast<float>(x - at.x)), lane);
       const __m256 column = _mm256_fmadd_ps(along, dx, _mm256_mul_ps(across, dy)),
                    row = _mm256_fmsub_ps(along, dy, _mm256_mul_ps(across, dx));
@@ -235,7 +235,7 @@ std::array<float, 128> descriptor(const Gradients& gradients, const ScaleExtremu
           _mm256_max_ps(_mm256_andnot_ps(sign, column), _mm256_andnot_ps(sign, row));
       unsigned inside =
           static_cast<unsigned>(_mm256_movemask_ps(_mm256_cmp_ps(farther, rim, _CMP_LT_OQ)));
-      if (right - x + 1 < lanes) inside &= (1u << (right - x + 1)) - 1;
+      if (right - x + 1 < polar_lanes) inside &= (1u << (right - x + 1)) - 1;
       if (inside == 0) continue;
       const __m256 weight = _mm256_mul_ps(
           _mm256_mul_ps(row_weight,
@@ -244,8 +244,8 @@ std::array<float, 128> descriptor(const Gradients& gradients, const ScaleExtremu
       __m256 relative = _mm256_sub_ps(_mm256_loadu_ps(turn + x), _mm256_set1_ps(turns));
       relative = _mm256_sub_ps(relative, _mm256_floor_ps(relative));
       // Just below a whole turn rounds to one, which has a ninth direction to go to, but no tenth.
-      const __m256 direction = _mm256_min_ps(_mm256_mul_ps(relative, _mm256_set1_ps(directions)),
-                                             _mm256_set1_ps(7.999999f));
+      const __m256 direction = _mm256_min_ps(
+          _mm256_mul_ps(relative, _mm256_set1_ps(descriptor_turns)), _mm256_set1_ps(7.999999f));
       histogram.add(_mm256_add_ps(column, to_first), _mm256_add_ps(row, to_first), direction,
                     weight, inside);
     }

@@ -8,14 +8,14 @@
 namespace orbitfuse {
 namespace {
 
-constexpr int lanes = 8;
+constexpr int blur_lanes = 8;
 constexpr double camera_blur = 0.5;  ///< of an image as it comes, in its pixels (Lowe, 3.3)
-const double step = std::pow(2.0, 1.0 / scales_per_octave);
+const double level_step = std::pow(2.0, 1.0 / scales_per_octave);
 
 /// Rows end in room for two vectors, so that kernels need no tails, nor when they look one sample
 /// ahead.
 cv::Mat padded_image(int width, int height) {
-  const int stride = (width + 2 * lanes - 1) / lanes * lanes;
+  const int stride = (width + 2 * blur_lanes - 1) / blur_lanes * blur_lanes;
   cv::Mat image(height, stride, CV_32F);
   image.colRange(width, stride).setTo(0);
   return image.colRange(0, width);
@@ -42,20 +42,21 @@ void convolve(const std::vector<float>& kernel, const float* centre, const Befor
   const int sides = static_cast<int>(kernel.size());
   int x = 0;
   const auto blocks = [&]<int vectors>() {
-    for (; x + (vectors - 1) * lanes < width; x += vectors * lanes) {
+    for (; x + (vectors - 1) * blur_lanes < width; x += vectors * blur_lanes) {
       __m256 sum[vectors];
       const __m256 first = _mm256_set1_ps(kernel[0]);
       for (int v = 0; v < vectors; ++v)
-        sum[v] = _mm256_mul_ps(first, _mm256_loadu_ps(centre + x + v * lanes));
+        sum[v] = _mm256_mul_ps(first, _mm256_loadu_ps(centre + x + v * blur_lanes));
       for (int k = 1; k < sides; ++k) {
         const __m256 weight = _mm256_set1_ps(kernel[static_cast<std::size_t>(k)]);
         const float *a = before(k) + x, *b = after(k) + x;
         for (int v = 0; v < vectors; ++v)
-          sum[v] = _mm256_fmadd_ps(
-              weight, _mm256_add_ps(_mm256_loadu_ps(a + v * lanes), _mm256_loadu_ps(b + v * lanes)),
-              sum[v]);
+          sum[v] = _mm256_fmadd_ps(weight,
+                                   _mm256_add_ps(_mm256_loadu_ps(a + v * blur_lanes),
+                                                 _mm256_loadu_ps(b + v * blur_lanes)),
+                                   sum[v]);
       }
-      for (int v = 0; v < vectors; ++v) _mm256_storeu_ps(out + x + v * lanes, sum[v]);
+      for (int v = 0; v < vectors; ++v) _mm256_storeu_ps(out + x + v * blur_lanes, sum[v]);
     }
   };
   blocks.template operator()<4>();
@@ -87,26 +88,29 @@ cv::Mat doubled(const cv::Mat& image) {
 
 /// Levels above the first: each adds what is missing to its own blur.
 void add_levels(Octave& octave) {
-  const double added = std::sqrt(1 - 1 / (step * step));
+  const double added = std::sqrt(1 - 1 / (level_step * level_step));
   for (int scale = 0; scale <= scales_per_octave + 1; ++scale)
     octave.levels.push_back(blurred(octave.levels.back(), added * Octave::sigma(scale)));
 }
 
 }  // namespace
 
-double Octave::sigma(double scale) { return 1.6 * step * std::pow(2.0, scale / scales_per_octave); }
+double Octave::sigma(double scale) {
+  return 1.6 * level_step * std::pow(2.0, scale / scales_per_octave);
+}
 
 cv::Mat blurred(const cv::Mat& image, double sigma) {
   const std::vector<float> kernel = half_gaussian(sigma);
   const int reach = static_cast<int>(kernel.size()) - 1, last = image.rows - 1;
   cv::Mat source = image;
-  if (image.step1() < static_cast<std::size_t>((image.cols + lanes - 1) / lanes * lanes)) {
+  if (image.step1() <
+      static_cast<std::size_t>((image.cols + blur_lanes - 1) / blur_lanes * blur_lanes)) {
     source = padded_image(image.cols, image.rows);
     image.copyTo(source);
   }
   cv::Mat result = padded_image(image.cols, image.rows);
   // One row down the columns, then along itself while it is in the cache.
-  std::vector<float> row(static_cast<std::size_t>(image.cols + 2 * reach + 4 * lanes));
+  std::vector<float> row(static_cast<std::size_t>(image.cols + 2 * reach + 4 * blur_lanes));
   float* const centre = row.data() + reach;
   for (int y = 0; y < image.rows; ++y) {
     const auto above = [&](int k) { return source.ptr<float>(std::max(y - k, 0)); };

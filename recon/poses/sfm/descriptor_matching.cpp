@@ -9,7 +9,7 @@
 namespace orbitfuse {
 namespace {
 
-constexpr Eigen::Index lanes = 8;
+constexpr Eigen::Index products_at_once = 8;
 
 double angle_rad(float product) {
   return std::acos(std::clamp(product / (512.0 * 512.0), 0.0, 1.0));
@@ -22,7 +22,7 @@ struct Nearest {
   std::vector<int> index;
 
   explicit Nearest(Eigen::Index features)
-      : best(static_cast<std::size_t>(features + lanes), -1.0F),
+      : best(static_cast<std::size_t>(features + products_at_once), -1.0F),
         second(best),
         index(best.size(), -1) {}
 
@@ -74,9 +74,9 @@ struct Offers {
     const __m256i row = _mm256_set1_epi32(static_cast<int>(a));
     Best of_row{_mm256_set1_ps(-1), _mm256_set1_ps(-1), _mm256_set1_epi32(-1)};
     __m256i column = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-    for (Eigen::Index c = 0; c < count; c += lanes) {
+    for (Eigen::Index c = 0; c < count; c += products_at_once) {
       __m256 product = _mm256_loadu_ps(products + c);
-      if (count - c < lanes)  // what lies behind the last is no offer
+      if (count - c < products_at_once)  // what lies behind the last is no offer
         product = _mm256_blendv_ps(_mm256_set1_ps(-1), product,
                                    _mm256_castsi256_ps(_mm256_cmpgt_epi32(
                                        _mm256_set1_epi32(static_cast<int>(count)), column)));
@@ -89,7 +89,7 @@ struct Offers {
       _mm256_storeu_ps(&of_second.best[at], of_column.best);
       _mm256_storeu_ps(&of_second.second[at], of_column.second);
       _mm256_storeu_si256(index, of_column.index);
-      column = _mm256_add_epi32(column, _mm256_set1_epi32(lanes));
+      column = _mm256_add_epi32(column, _mm256_set1_epi32(products_at_once));
     }
     merge(of_row, a);
   }
@@ -109,8 +109,8 @@ struct Offers {
  private:
   /// The lanes' answers: of equal ones the lower index.
   void merge(const Best& of_row, Eigen::Index a) {
-    std::array<float, lanes> best, second;
-    std::array<int, lanes> index;
+    std::array<float, products_at_once> best, second;
+    std::array<int, products_at_once> index;
     _mm256_storeu_ps(best.data(), of_row.best);
     _mm256_storeu_ps(second.data(), of_row.second);
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(index.data()), of_row.index);
@@ -143,7 +143,7 @@ std::vector<FeatureMatch> match_descriptors(const Descriptors& first, const Desc
   if (first.rows() == 0 || second.rows() == 0) return {};  // a blank view has none
   Offers offers(first, second);
   constexpr Eigen::Index block = 64;  // products of a block stay in the cache while they are read
-  const Eigen::Index stride = second.rows() + lanes;
+  const Eigen::Index stride = second.rows() + products_at_once;
   Descriptors products(block, stride);
   for (Eigen::Index begin = 0; begin < first.rows(); begin += block) {
     const Eigen::Index rows = std::min(block, first.rows() - begin);
