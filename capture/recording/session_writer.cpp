@@ -39,6 +39,11 @@ tl::unexpected<Error> manifest_failure(const fs::path& folder, int error) {
                   : "check the folder and its permissions");
 }
 
+void remove_manifest(const fs::path& folder) {
+  std::error_code ignored;
+  fs::remove(folder / "manifest.jsonl", ignored);
+}
+
 /// Opens the manifest and takes it for this process: two recorders in one session would mix lines.
 Result<int> open_manifest(const fs::path& folder, int extra_flags) {
   const fs::path file = folder / "manifest.jsonl";
@@ -48,12 +53,16 @@ Result<int> open_manifest(const fs::path& folder, int extra_flags) {
     return fail(ErrorKind::input, folder.string(), "holds a session already",
                 "choose another folder");
   if (fd < 0) return manifest_failure(folder, errno);
-  if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
-    ::close(fd);
+  if (::flock(fd, LOCK_EX | LOCK_NB) == 0) return fd;
+  const int error = errno;
+  ::close(fd);
+  if (error == EWOULDBLOCK)
     return fail(ErrorKind::device, file.string(), "another process is recording into this session",
                 "stop it, or record into another folder");
-  }
-  return fd;
+  if (extra_flags & O_EXCL) remove_manifest(folder);  // ours, and nobody else could take it
+  return fail(ErrorKind::device, file.string(),
+              std::string("cannot be locked: ") + std::strerror(error),
+              "record to a disk that knows locks (some network disks don't), and copy it there");
 }
 
 /// What was behind the last line that counts would stand between lines, where it is damage. A line
@@ -70,11 +79,6 @@ Status end_at_a_whole_line(int fd, const fs::path& folder) {
     return manifest_failure(folder, errno);
   if (whole && !ended && ::write(fd, "\n", 1) != 1) return manifest_failure(folder, errno);
   return {};
-}
-
-void remove_manifest(const fs::path& folder) {
-  std::error_code ignored;
-  fs::remove(folder / "manifest.jsonl", ignored);
 }
 
 }  // namespace

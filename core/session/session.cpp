@@ -173,8 +173,10 @@ Result<Session> open_session(const std::filesystem::path& folder) {
     at = end + 1;
   }
   if (session.id.empty()) {
-    return fail(ErrorKind::input, file.string(), "empty manifest",
-                "record or import the session again");
+    return fail(
+        ErrorKind::input, file.string(), "empty manifest",
+        "restore it from a backup, or import the images beside it, if there are any, into a "
+        "new folder");
   }
   for (const FrameRecord& frame : session.frames) {
     const DeviceInfo* device = session.device(frame.device);

@@ -14,6 +14,7 @@
 #include "core/image/image_io.hpp"
 #include "core/system/file_io.hpp"
 #include "tests/capture/scripted_source.hpp"
+#include "tests/support/refused_locks.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
@@ -107,6 +108,42 @@ TEST(SessionWriter, TwoWritersCannotShareASession) {
   const auto second = SessionWriter::resume(folder / "s");
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().kind, ErrorKind::device);
+}
+
+/// Some network disks: nobody else records, and nothing may stay that keeps the next try out.
+TEST(SessionWriter, ADiskWithoutLocksIsNoOtherRecorder) {
+  const TempFolder folder;
+  {
+    const test::NoLocks no_locks;
+    const auto writer = SessionWriter::create(folder / "s");
+    ASSERT_FALSE(writer);
+    EXPECT_EQ(writer.error().kind, ErrorKind::device);
+    EXPECT_EQ(writer.error().found, "cannot be locked: No locks available");
+    EXPECT_FALSE(std::filesystem::exists(folder / "s"));
+  }
+  ASSERT_TRUE(SessionWriter::create(folder / "s"));
+  const test::NoLocks no_locks;
+  const auto resumed = SessionWriter::resume(folder / "s");
+  ASSERT_FALSE(resumed);
+  EXPECT_EQ(resumed.error().found, "cannot be locked: No locks available");
+  EXPECT_TRUE(open_session(folder / "s")) << "what was there stays";
+}
+
+/// It is no session to go on with, and "holds a session already" would be a dead end.
+TEST(SessionWriter, AManifestWithoutOneWholeLineIsNamed) {
+  for (const char* text : {"", "{\"created\":\"2026-11-26T1"}) {
+    const TempFolder folder;
+    test::put(folder / "s/manifest.jsonl", text);
+    std::filesystem::create_directories(folder / "s/visible");
+    const auto writer = SessionWriter::create(folder / "s");
+    ASSERT_FALSE(writer);
+    EXPECT_THAT(writer.error().message(), ::testing::HasSubstr("killed as it began; delete its"));
+    test::put(folder / "s/visible/000000.jpg", "a frame");
+    EXPECT_EQ(SessionWriter::create(folder / "s").error().found, "holds a session already");
+    EXPECT_THAT(open_session(folder / "s").error().message(),
+                ::testing::AnyOf(::testing::HasSubstr("import the images beside it"),
+                                 ::testing::HasSubstr("not a JSON object")));
+  }
 }
 
 TEST(SessionWriter, ResumeAfterACrashContinuesAndOverwritesNothing) {

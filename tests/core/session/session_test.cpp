@@ -296,7 +296,7 @@ TEST_F(SessionTest, ManyMissingImagesAreOneWarning) {
   FrameRecord frame = full_frame();
   for (int i = 1; i <= 300; ++i) {
     frame.file = fmt::format("thermal/{:06}.tiff", i);
-    frame.sequence += 1;
+    frame.sequence -= 1;
     text.insert(text.find("{\"count\""), manifest_line(frame) + "\n");
   }
   const auto s = open(text);
