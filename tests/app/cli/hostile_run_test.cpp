@@ -91,6 +91,40 @@ TEST_F(HostileRun, AnotherSessionInItsPlaceIsNotTheRuns) {
   EXPECT_FALSE(fs::exists(temp / "pairs"));
 }
 
+/// A whole field, and not this run's: its colours would be shown as temperatures.
+TEST_F(HostileRun, AFieldThatNoStageOfTheRunWroteIsNotItsOwn) {
+  ASSERT_EQ(orbitfuse_program(small_run(session, out)).code, 0);
+  fs::copy_file(out / "train_visible/field.bin", out / "train_thermal/field.bin",
+                fs::copy_options::overwrite_existing);
+  const std::string to = (temp / "x.ply").string();
+  const std::vector<std::vector<std::string>> calls = {
+      {"measure", out.string(), "--hottest", "1"},
+      {"export", out.string(), "--to", to, "--dry-run"},
+      {"view", out.string(), "--page", "0"}};
+  for (const auto& words : calls) {
+    const Outcome refused = orbitfuse_program(words);
+    EXPECT_EQ(refused.code, 3) << words[0];
+    EXPECT_THAT(refused.err, HasSubstr("train_thermal: field.bin was changed; restore it"));
+  }
+}
+
+/// It would be refused by the next call; `inspect` passed it.
+TEST_F(HostileRun, OptionsOfARunThatCannotBeUsedAreToldByInspect) {
+  make_poses();
+  json run = json::parse(test::get(out / "run.json"));
+  run["seed"] = -1;
+  test::put(out / "run.json", run.dump());
+  const Outcome told = orbitfuse_program({"inspect", out.string(), "--json"});
+  EXPECT_EQ(told.code, 3);
+  EXPECT_THAT(told.err, HasSubstr("run.json: seed = -1"));
+  test::put(out / "render.failed/failed.json", R"({"error":"render: too dark"})");
+  test::put(out / "fuse.failed/mine.txt", "a folder of the user's own");
+  const Outcome failed = orbitfuse_program({"inspect", out.string(), "--json"});
+  EXPECT_EQ(failed.result().at("failed"), json({{"fuse", "?"}, {"render", "render: too dark"}}));
+  EXPECT_THAT(failed.err, HasSubstr("render failed: render: too dark"));
+  EXPECT_THAT(failed.err, HasSubstr("fuse.failed: there, but no run left it"));
+}
+
 TEST_F(HostileRun, ResultsWithoutTheirRecordAreNoSession) {
   make_poses();
   fs::remove(out / "run.json");
@@ -114,6 +148,11 @@ TEST_F(HostileRun, AStagesFolderWithoutItsRecordIsToldByInspect) {
   EXPECT_EQ(told.code, 0) << told.err;
   EXPECT_EQ(told.result().at("without_record"), json({"poses_visible", "render"}));
   EXPECT_THAT(told.err, HasSubstr("poses_visible: there, but without a record (stage.json)"));
+  // As without the right to look into it, which a superuser always has.
+  fs::create_symlink("fuse", out / "fuse");
+  const Outcome unknown = orbitfuse_program({"inspect", out.string(), "--json"});
+  EXPECT_EQ(unknown.code, 3);
+  EXPECT_THAT(unknown.err, HasSubstr("fuse/stage.json: Too many levels of symbolic links"));
 }
 
 /// The other run would take what is new in its stage for damage, and delete it when it is made
