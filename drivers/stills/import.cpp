@@ -172,7 +172,9 @@ class Importer {
       ORBITFUSE_ASSIGN(paged_bytes_, read_file(source.file, max_image_bytes));
       paged_file_ = source.file;
     }
-    return thermal_file(paged_bytes_, source.file, source.page);
+    Result<ThermalFile> page = thermal_file(paged_bytes_, source.file, source.page);
+    if (!page && page.error().where == source.file.string()) page.error().where = source.where();
+    return page;
   }
 
   void tell_other_pages(const std::string& pages, Source source) {

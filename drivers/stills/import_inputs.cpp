@@ -29,6 +29,8 @@ class Gathering {
     ORBITFUSE_ASSIGN(const auto thermal, thermal_sources());
     ORBITFUSE_ASSIGN(const auto thermal_tracking,
                      listed(Modality::thermal, options_.thermal_tracking));
+    ORBITFUSE_TRY(check_given_once(visible, visible_tracking));
+    ORBITFUSE_TRY(check_given_once(thermal, thermal_tracking));
     ORBITFUSE_TRY(check_known(Modality::visible, {&visible, &visible_tracking}));
     ORBITFUSE_TRY(check_known(Modality::thermal, {&thermal, &thermal_tracking}));
     ORBITFUSE_TRY(check_stations_of(visible));
@@ -97,6 +99,20 @@ class Gathering {
   Result<std::vector<fs::path>> thermal_sources() {
     if (!options_.thermal.empty()) return listed(Modality::thermal, options_.thermal);
     return files_of_transforms(Modality::thermal);
+  }
+
+  /// A frame is of the orbit or of the way between its stations: as a copy of itself it would be
+  /// left out without a word on which of the two was meant.
+  static Status check_given_once(const std::vector<fs::path>& orbit,
+                                 const std::vector<fs::path>& tracking) {
+    std::error_code unresolved;
+    std::set<fs::path> names;
+    for (const fs::path& file : orbit) names.insert(fs::weakly_canonical(file, unresolved));
+    for (const fs::path& file : tracking)
+      if (names.contains(fs::weakly_canonical(file, unresolved)))
+        return fail(ErrorKind::usage, file.string(), "given twice, once as a tracking frame",
+                    "name each folder and file once");
+    return {};
   }
 
   /// Photos are copied as they are; HEIC grows as JPEG.

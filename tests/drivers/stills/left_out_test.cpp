@@ -101,6 +101,20 @@ TEST_F(LeftOut, PosesOfWhichNoneFitsAreAnError) {
   EXPECT_EQ(report->with_pose, 3);
 }
 
+TEST_F(LeftOut, AFolderOfFramesAndOfTrackingFramesIsGivenTwice) {
+  put_photo("in/a.jpg", 1);
+  put_counts("t/0.tif", 29000, 30000, 1);
+  options.visible = {folder / "in"};
+  options.visible_tracking = {folder / "in/../in"};
+  EXPECT_THAT(refusal(), test::says("a.jpg", "given twice, once as a tracking frame"));
+  options.visible_tracking.clear();
+  options.thermal = {folder / "t"};
+  options.thermal_tracking = {folder / "t/0.tif"};
+  EXPECT_THAT(refusal(), test::says("0.tif", "given twice"));
+  options.thermal_tracking.clear();
+  EXPECT_TRUE(import());
+}
+
 TEST_F(LeftOut, AModelWithoutImagesIsAnError) {
   put_photo("in/a.jpg", 1);
   put("model/cameras.txt", "1 PINHOLE 40 30 40 40 20 15\n");
