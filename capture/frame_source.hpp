@@ -59,6 +59,7 @@ struct Delivery {
   EventKind event{};   ///< kind event
   std::string reason;  ///< of an event its name
   std::string detail;
+  bool kept = false;  ///< of an event `ignored`: only a part of the file is, the frame came
 };
 
 inline Delivery event_delivery(EventKind kind, std::string detail) {

@@ -10,7 +10,7 @@ configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/OrbitFuseConfig.cmake.
 # Before 1.0 a minor version may change interfaces.
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/OrbitFuseConfigVersion.cmake
   COMPATIBILITY SameMinorVersion)
-install(FILES ${PROJECT_BINARY_DIR}/OrbitFuseConfig.cmake
+install(FILES ${PROJECT_SOURCE_DIR}/cmake/SharedCeres.cmake ${PROJECT_BINARY_DIR}/OrbitFuseConfig.cmake
   ${PROJECT_BINARY_DIR}/OrbitFuseConfigVersion.cmake
   DESTINATION ${package_folder} COMPONENT library)
 install(FILES ${PROJECT_SOURCE_DIR}/packaging/copyright

@@ -12,6 +12,8 @@ set(orbitfuse_compile_options
   -Wno-stringop-overflow -Wno-restrict -Wno-array-bounds
   # AVX2 is the baseline; kernels that want more are dispatched at run time (orbitfuse_isa_sources).
   -march=x86-64-v3
+  # Shared libraries keep their own copies of what they have in common with us (SharedCeres.cmake).
+  -fvisibility=hidden
   # a*b+c must round alike in every translation unit, or results depend on inlining.
   -ffp-contract=off)
 # nvcc knows none of these (ORBITFUSE_CUDA).
@@ -76,12 +78,8 @@ if(ORBITFUSE_UNITY)
   add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-Wno-subobject-linkage>)
 endif()
 
-# Not what links Ceres: Debian's is built for SSE2 without this project's Eigen defines, and with
-# sources together the linker took one side's allocating functions for the other's: adjusting bundles
-# freed twice.
 function(orbitfuse_unity target)
-  get_target_property(links ${target} LINK_LIBRARIES)
-  if(ORBITFUSE_UNITY AND NOT "Ceres::ceres" IN_LIST links)
+  if(ORBITFUSE_UNITY)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
   endif()
 endfunction()

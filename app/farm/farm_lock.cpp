@@ -77,6 +77,14 @@ FarmLock::~FarmLock() {
   if (!file_.empty()) fs::remove(file_, ignored);
 }
 
+bool FarmLock::is_free(const fs::path& out) {
+  std::error_code unreadable;
+  const fs::path file = out / "farm.lock";
+  if (!fs::exists(file, unreadable)) return !unreadable;
+  const json holder = holder_of(file);
+  return holder.is_object() && is_dead(holder);
+}
+
 Status FarmLock::acquire(const fs::path& out) {
   const fs::path file = out / "farm.lock";
   const fs::path mine = out / fmt::format(".farm.lock.{}.{}", host_name(), getpid());

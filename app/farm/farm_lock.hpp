@@ -20,6 +20,8 @@ class FarmLock {
   ~FarmLock();
   /// Usage error naming the holder while it may be alive; on another host nobody here can know.
   Status acquire(const std::filesystem::path& out);
+  /// Nobody works in the farm: no lock, or of one who died here. On another host nobody can know.
+  static bool is_free(const std::filesystem::path& out);
 
  private:
   std::filesystem::path file_;  ///< empty: not held

@@ -72,7 +72,10 @@ Result<cv::Mat> read_photo(const fs::path& file) {
 
 Result<cv::Mat> read_thermal(const fs::path& file) {
   ORBITFUSE_ASSIGN(const cv::Mat image, read_image(file));
-  return image.type() == CV_16UC1 ? read_thermal_k(file) : read_photo(file);
+  if (image.type() != CV_16UC1) return read_photo(file);
+  ORBITFUSE_ASSIGN(const cv::Mat kelvin, read_thermal_k(file));
+  ORBITFUSE_ASSIGN(const std::string bytes, read_file(file, max_image_bytes));
+  return apply_orientation(kelvin, read_exif(bytes).orientation);
 }
 
 std::optional<std::string> looks_exchanged(const cv::Mat& visible, const cv::Mat& thermal,

@@ -19,11 +19,14 @@ Status FolderLock::acquire(const std::filesystem::path& file) {
   if (descriptor_ < 0)
     return fail(ErrorKind::device, file.parent_path().string(), std::strerror(errno),
                 "choose a folder you can write to with --out");
-  if (flock(descriptor_, LOCK_EX | LOCK_NB) != 0)
+  if (flock(descriptor_, LOCK_EX | LOCK_NB) == 0) return {};
+  if (errno == EWOULDBLOCK)
     return fail(ErrorKind::usage, file.parent_path().string(),
                 "another orbitfuse is writing to this folder",
                 "wait for it or choose another folder with --out");
-  return {};
+  return fail(ErrorKind::device, file.string(),
+              std::string("cannot be locked: ") + std::strerror(errno),
+              "choose a folder on a disk that knows locks with --out (some network disks don't)");
 }
 
 }  // namespace orbitfuse::pipeline

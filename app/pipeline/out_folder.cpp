@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "app/pipeline/out_folder.hpp"
 
+#include <fmt/format.h>
 #include <stdlib.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <string>
 #include <system_error>
+
+#include "app/pipeline/stage_record.hpp"
 
 namespace orbitfuse::pipeline {
 namespace {
@@ -29,7 +32,23 @@ Status try_in(const fs::path& existing, const fs::path& folder) {
 
 }  // namespace
 
+Status check_outside_stages(const fs::path& target) {
+  std::error_code unreadable;  // whoever writes there says why
+  // A name that is not there yet stays relative.
+  fs::path part = fs::weakly_canonical(fs::absolute(target, unreadable), unreadable);
+  for (; part.has_relative_path(); part = part.parent_path()) {
+    if (!fs::exists(part / stage_record_file, unreadable)) continue;
+    const auto record = read_stage_record(part);
+    if (!record || record->stage != part.filename()) continue;  // some other program's file
+    return fail(ErrorKind::usage, target.string(),
+                fmt::format("inside of {}, the result of a run's stage", part.string()),
+                "choose a folder outside: the next run would take what is new there for damage");
+  }
+  return {};
+}
+
 Status check_out_folder(const fs::path& folder) {
+  ORBITFUSE_TRY(check_outside_stages(folder));
   std::error_code error;
   fs::path part = fs::absolute(folder, error);
   if (!part.has_filename()) part = part.parent_path();

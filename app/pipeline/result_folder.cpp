@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "app/pipeline/stage_record.hpp"
+#include "core/nested_text.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse::pipeline {
@@ -27,8 +28,10 @@ constexpr const char* failed_mark = "failed.json";
 /// What has no mark in it is the user's own.
 Status check_place(const fs::path& folder, const char* mark, const char* remedy) {
   std::error_code unreadable;
-  if (!fs::exists(fs::symlink_status(folder, unreadable)) ||
-      fs::exists(folder / mark, unreadable) ||
+  if (!fs::exists(fs::symlink_status(folder, unreadable))) return {};
+  const fs::file_type there = fs::status(folder / mark, unreadable).type();
+  if (there == fs::file_type::none) return device_error(folder, unreadable);
+  if (there != fs::file_type::not_found ||
       (fs::is_directory(folder, unreadable) && fs::is_empty(folder, unreadable)))
     return {};
   return fail(ErrorKind::usage, folder.string(),
@@ -74,6 +77,16 @@ Status replace_folder(const fs::path& from, const fs::path& to) {
 
 fs::path failed_folder(const fs::path& out, const std::string& stage) {
   return out / (stage + ".failed");
+}
+
+std::string why_failed(const fs::path& out, const std::string& stage) {
+  std::error_code unreadable;
+  const fs::path folder = failed_folder(out, stage);
+  if (!fs::exists(fs::symlink_status(folder, unreadable))) return {};
+  const auto text = read_file(folder / failed_mark, max_settings_bytes);
+  const auto why = text ? parse_json(*text) : nlohmann::json();
+  const auto error = why.is_object() ? why.find("error") : why.end();
+  return error != why.end() && error->is_string() ? error->get<std::string>() : "?";
 }
 
 Status check_places(const fs::path& out, const std::string& stage) {

@@ -123,12 +123,27 @@ Status write_stage_record(const fs::path& folder, const StageRecord& record) {
   return write_file_atomic(folder / stage_record_file, j.dump(2) + "\n");
 }
 
+namespace {
+
+/// Not "lost+found", nor ".cache".
+bool is_like_a_stage(const std::string& name) {
+  return std::all_of(name.begin(), name.end(),
+                     [](char c) { return c == '_' || (c >= 'a' && c <= 'z'); });
+}
+
+}  // namespace
+
 std::set<std::string> finished_stages(const fs::path& out) {
   std::set<std::string> names;
   std::error_code unreadable;
-  for (const auto& entry : fs::directory_iterator(out, unreadable))
-    if (fs::exists(entry.path() / stage_record_file, unreadable))
-      names.insert(entry.path().filename().string());
+  for (const auto& entry : fs::directory_iterator(out, unreadable)) {
+    const std::string name = entry.path().filename().string();
+    const fs::file_type mark = fs::status(entry.path() / stage_record_file, unreadable).type();
+    // One that may not be looked at can be there: whoever reads it says why it can't be.
+    const bool unknown = mark == fs::file_type::none && is_like_a_stage(name);
+    if (unknown || (mark != fs::file_type::none && mark != fs::file_type::not_found))
+      names.insert(name);
+  }
   return names;
 }
 

@@ -73,7 +73,7 @@ Status check_folder(const RecordingOptions& options) {
   Status status = options.resume ? SessionWriter::try_resume(options.session)
                                  : SessionWriter::try_create(options.session);
   if (!status && !options.resume && status.error().kind == ErrorKind::input &&
-      holds_session(options.session))
+      open_session(options.session))
     status.error().remedy += ", or go on with it: --resume";
   ORBITFUSE_TRY(status);
   return check_free_space(options.session, options.min_free_bytes);

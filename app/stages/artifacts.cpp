@@ -62,6 +62,20 @@ Status check_up_to_date(const fs::path& out) {
               "bring the run up to date: orbitfuse run SESSION --out " + out.string());
 }
 
+Status check_as_written(const pipeline::StageContext& context) {
+  for (const char* stage :
+       {"poses_visible", "train_visible", "poses_thermal", "train_thermal", "register"}) {
+    if (!context.has(stage)) continue;
+    ORBITFUSE_ASSIGN(const pipeline::StageRecord record,
+                     pipeline::read_stage_record(context.of(stage)));
+    if (const auto wrong = pipeline::damage(context.of(stage), record))
+      return fail(
+          ErrorKind::input, context.of(stage).string(), *wrong,
+          "restore it, or make it again: orbitfuse run SESSION --out " + context.out.string());
+  }
+  return {};
+}
+
 Status save_poses(const fs::path& folder, const Reconstruction& model) {
   ORBITFUSE_TRY(write_colmap_model(folder / "model", model, ColmapFormat::binary));
   Transforms transforms;

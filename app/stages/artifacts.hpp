@@ -25,6 +25,10 @@ pipeline::StageContext context_of_run(const std::filesystem::path& out);
 /// run again alone, or a folder be put in. Errors: input (which is older than what).
 Status check_up_to_date(const std::filesystem::path& out);
 
+/// Whether poses and fields lie there as their stages wrote them: another run's field is whole too,
+/// and would be shown as this run's temperatures. Errors: input (which file).
+Status check_as_written(const pipeline::StageContext& context);
+
 /// model/ (COLMAP, binary), transforms.json.
 Status save_poses(const std::filesystem::path& folder, const Reconstruction& model);
 Result<Reconstruction> load_poses(const std::filesystem::path& folder, Modality modality);

@@ -149,6 +149,7 @@ Result<ThermalScene> load_measurement_scene(const fs::path& out, const Session& 
   ORBITFUSE_TRY(check_session_of_run(context, session, Modality::thermal));
   SceneParts parts;
   ORBITFUSE_TRY(add_thermal(context, session, parts));
+  ORBITFUSE_TRY(check_as_written(context));
   ORBITFUSE_TRY(add_named_views(context, parts));
   add_unposed(session, parts);
   ORBITFUSE_ASSIGN(parts.identity, identity_of(context, session));

@@ -5,7 +5,8 @@
 
 namespace orbitfuse::terminal {
 
-/// Set by SIGINT and SIGTERM; a second signal ends the process at once with code 130.
+/// Set by SIGINT, SIGTERM and, unless it is ignored (nohup), SIGHUP; a second signal ends the
+/// process at once with code 130.
 const std::atomic<bool>& interrupt_flag();
 void install_interrupt_handler();
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include "app/pipeline/out_folder.hpp"
 #include "app/recording/rehearsal.hpp"
 #include "app/verbs/capture_options.hpp"
 #include "app/verbs/capture_teller.hpp"
@@ -142,6 +143,7 @@ void account(Context& context, recording::Recording& recording) {
 
 Status run(Context& context, const CaptureOptions& o) {
   ORBITFUSE_TRY(o.validate());
+  ORBITFUSE_TRY(pipeline::check_outside_stages(o.session));
   ORBITFUSE_ASSIGN(recording::Cameras cameras, cameras_of(o));
   recording::RecordingOptions options;
   ORBITFUSE_ASSIGN(options.guide, guide_of(o, cameras));

@@ -247,6 +247,19 @@ Status check_order(const FarmOptions& o, const std::string& order) {
   return {};
 }
 
+/// A farm that was killed, or lost its power, said nothing more of what it ran.
+void tell_dead(Context& context, const fs::path& out, const FarmPlan& plan) {
+  if (plan.on_slurm || !FarmLock::is_free(out)) return;
+  const auto rows = look_at_sessions(out, plan);
+  if (std::none_of(rows.begin(), rows.end(),
+                   [](const SessionOverview& row) { return row.state == JobState::running; }))
+    return;
+  context.console.warning(fmt::format(
+      "no farm works in {} any more: what is running in the table has stopped with it; go on with: "
+      "orbitfuse farm resume {}",
+      out.string(), out.string()));
+}
+
 Status run_farm(Context& context, const FarmOptions& options) {
   const std::vector<std::string>& words = options.words;
   const std::string first = words.empty() ? "" : words.front();
@@ -267,6 +280,7 @@ Status run_farm(Context& context, const FarmOptions& options) {
   if (asked && (first == "status" || context.common.dry_run)) {
     ORBITFUSE_ASSIGN(const FarmPlan plan, read_plan(out));
     if (first != "status") context.console.info("would " + first + " the farm; so it stands now:");
+    tell_dead(context, out, plan);
     return conclude(context, out, plan, false);
   }
   if (first == "stages") return run_array_task(context, out, words);

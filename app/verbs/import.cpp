@@ -6,6 +6,7 @@
 #include "app/cli/option_pairs.hpp"
 #include "app/cli/typed_options.hpp"
 #include "app/cli/verb.hpp"
+#include "app/pipeline/out_folder.hpp"
 #include "core/temperature.hpp"
 #include "drivers/stills/import.hpp"
 
@@ -169,6 +170,7 @@ Status check_alone(const ImportArguments& o) {
 Status run(Context& context, ImportArguments& o) {
   ORBITFUSE_TRY(check_alone(o));
   ORBITFUSE_TRY(check_ranges(o));
+  ORBITFUSE_TRY(pipeline::check_outside_stages(o.session));
   resolve(o);
   const bool dry = context.common.dry_run;
   ORBITFUSE_ASSIGN(const ImportReport report,

@@ -4,12 +4,16 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <tuple>
 
 #include "app/cli/run_folder.hpp"
+#include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
+#include "app/pipeline/result_folder.hpp"
 #include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
+#include "app/stages/build_stages.hpp"
 #include "app/stages/measurement_scene.hpp"
 #include "app/stages/metric_scale.hpp"
 #include "app/stages/session_input.hpp"
@@ -111,21 +115,66 @@ void tell_session(Context& context, const fs::path& folder, const std::string& s
       session, folder.string()));
 }
 
+/// What lies in the place of a stage's result without being one: no verb reads it, and a run
+/// refuses to replace it.
+void tell_without_record(Context& context, const fs::path& folder,
+                         const std::set<std::string>& finished) {
+  json names = json::array();
+  for (const std::string& stage : stages::stage_names()) {
+    std::error_code unreadable;
+    const fs::path place = folder / stage;
+    if (!fs::exists(fs::symlink_status(place, unreadable)) || finished.contains(stage) ||
+        (fs::is_directory(place, unreadable) && fs::is_empty(place, unreadable)))
+      continue;
+    names.push_back(stage);
+    context.console.warning(fmt::format(
+        "{}: there, but without a record ({}): nothing uses it, and the next run refuses to "
+        "replace it; move it away, and run again",
+        stage, pipeline::stage_record_file));
+  }
+  context.result["without_record"] = names;
+}
+
+/// Stages that missed their gate; why is in no other place that a user looks at.
+void tell_failed(Context& context, const fs::path& folder) {
+  context.result["failed"] = json::object();
+  for (const std::string& stage : stages::stage_names()) {
+    const std::string why = pipeline::why_failed(folder, stage);
+    if (why.empty()) continue;
+    context.result["failed"][stage] = why;
+    context.console.warning(
+        why == "?" ? fmt::format("{}.failed: there, but no run left it: the next run refuses to "
+                                 "replace it; move it away",
+                                 stage)
+                   : fmt::format("{} failed: {}", stage, why));
+  }
+}
+
+/// What run.json keeps for the next call, which would refuse it.
+std::optional<std::string> unusable_options(const Context& context, const fs::path& folder) {
+  stages::RunConfig config = context.config;
+  config::Settings settings = config.settings();
+  const auto options = read_earlier_options(folder.string(), settings);
+  if (options) return std::nullopt;
+  return options.error().where + ": " + options.error().found;
+}
+
 Status inspect_run(Context& context, const fs::path& folder) {
   json stages = json::array();
   std::vector<std::string> damaged;
   std::error_code error;
-  const fs::directory_iterator entries(folder, error);
+  const fs::directory_iterator readable(folder, error);
   if (error)
     return fail(ErrorKind::input, folder.string(), error.message(), "check the permissions");
-  for (const auto& entry : entries) {
-    if (!fs::exists(entry.path() / pipeline::stage_record_file, error)) continue;
-    const auto record = pipeline::read_stage_record(entry.path());
+  const std::set<std::string> finished = pipeline::finished_stages(folder);
+  for (const std::string& stage : finished) {
+    const auto record = pipeline::read_stage_record(folder / stage);
     if (!record) {
       context.console.warning(record.error().message());
+      damaged.push_back(stage + ": " + record.error().found);
       continue;
     }
-    if (const auto wrong = pipeline::damage(entry.path(), *record)) {
+    if (const auto wrong = pipeline::damage(folder / stage, *record)) {
       context.console.warning(record->stage + ": " + *wrong + "; the next run makes it again");
       damaged.push_back(record->stage + ": " + *wrong);
     }
@@ -134,8 +183,9 @@ Status inspect_run(Context& context, const fs::path& folder) {
                                      record->output.metrics.value("brief", std::string())));
     stages.push_back(to_json(*record));
   }
-  const std::vector<std::string> late =
-      pipeline::out_of_date(folder, pipeline::finished_stages(folder));
+  tell_without_record(context, folder, finished);
+  tell_failed(context, folder);
+  const std::vector<std::string> late = pipeline::out_of_date(folder, finished);
   for (const std::string& stage : late)
     context.console.warning(stage + "; the next run makes it again");
   const auto run = earlier_run(folder.string());
@@ -145,6 +195,10 @@ Status inspect_run(Context& context, const fs::path& folder) {
     context.console.warning(damaged.back() + "; run again with the session folder and --out");
   } else {
     tell_session(context, folder, (*run)["session"]);
+    if (const auto wrong = unusable_options(context, folder)) {
+      damaged.push_back(*wrong);
+      context.console.warning(*wrong + "; run again with the session folder and --out");
+    }
   }
   const auto scale = stages::scale_of_run(folder);
   context.result["scale"] = scale && *scale ? to_json(**scale) : json();

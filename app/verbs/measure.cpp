@@ -26,6 +26,8 @@ Result<Session> session_of(const MeasureArguments& options) {
   std::error_code unreadable;
   if (!fs::is_directory(options.out, unreadable))
     return fail(ErrorKind::input, options.out, "no such folder", "name the --out folder of a run");
+  if (!fs::exists(fs::path(options.out) / "run.json", unreadable) && unreadable)
+    return fail(ErrorKind::input, options.out, unreadable.message(), "check its permissions");
   StageFolders folders{options.out, options.out};
   if (!options.session.empty()) folders.session = options.session;
   if (options.session.empty()) {

@@ -8,6 +8,7 @@
 
 #include "app/cli/run_folder.hpp"
 #include "app/cli/verb.hpp"
+#include "app/pipeline/out_folder.hpp"
 #include "app/recording/recording.hpp"
 
 namespace orbitfuse::cli {
@@ -67,6 +68,7 @@ Status run(Context& context, const ReplayArguments& o) {
   options.resume = context.common.resume;
   options.notes = session.notes;
   ORBITFUSE_TRY(recording::check_folder(options));
+  ORBITFUSE_TRY(pipeline::check_outside_stages(o.to));
   if (lies_among_frames(o.to, o.session))
     return fail(ErrorKind::usage, "--to " + o.to, "lies among the frames of the session itself",
                 "choose another folder");

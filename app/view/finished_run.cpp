@@ -174,8 +174,10 @@ Result<FinishedRun> load_finished_run(const fs::path& out, const stages::RunConf
                                       const Progress& progress) {
   std::error_code unreadable;
   if (!fs::exists(out / "run.json", unreadable))
-    return fail(ErrorKind::input, out.string(), "no finished run in it (no run.json)",
-                "name the --out folder of orbitfuse run");
+    return unreadable
+               ? fail(ErrorKind::input, out.string(), unreadable.message(), "check its permissions")
+               : fail(ErrorKind::input, out.string(), "no finished run in it (no run.json)",
+                      "name the --out folder of orbitfuse run");
   FinishedRun run;
   run.out = out;
   run.config = config;
@@ -183,6 +185,7 @@ Result<FinishedRun> load_finished_run(const fs::path& out, const stages::RunConf
   ORBITFUSE_TRY(stages::check_up_to_date(out));
   ORBITFUSE_ASSIGN(run.identity, identity_of(context));
   ORBITFUSE_TRY(load_fields(context, run));
+  ORBITFUSE_TRY(stages::check_as_written(context));
   ORBITFUSE_TRY(progress.check("view"));
   ORBITFUSE_ASSIGN(const auto record, stages::read_json(out / "run.json"));
   auto session = session_of(context, record);

@@ -5,6 +5,8 @@
 
 #include <cerrno>
 
+#include "core/system/file_io.hpp"
+
 namespace orbitfuse {
 namespace {
 
@@ -36,6 +38,15 @@ tl::unexpected<Error> cannot_make(const fs::path& folder, const std::error_code&
 
 std::string mebibytes(std::uint64_t bytes) {
   return fmt::format("{:.0f} MiB", static_cast<double>(bytes) / (1 << 20));
+}
+
+/// What a recording or import leaves that is killed as it begins: not even the header's line.
+bool holds_only_a_begun_manifest(const fs::path& folder) {
+  std::error_code error;
+  for (const char* images : {"visible", "thermal"})
+    if (fs::exists(folder / images, error) && !fs::is_empty(folder / images, error)) return false;
+  const auto text = read_file(folder / "manifest.jsonl", 65536);
+  return text && text->find('\n') == text->npos;
 }
 
 }  // namespace
@@ -75,6 +86,11 @@ Status check_is_new(const fs::path& folder) {
   const bool empty = fs::is_empty(folder, error);
   if (error) return cannot_make(folder, error);
   if (empty) return {};
+  if (holds_only_a_begun_manifest(folder))
+    return fail(ErrorKind::input, folder.string(),
+                "holds a manifest without one whole line, and no frames: of a recording or import "
+                "that was killed as it began",
+                "delete its manifest.jsonl if none begins there now, or choose another folder");
   return fail(ErrorKind::input, folder.string(),
               holds_session(folder) ? "holds a session already" : "is not an empty folder", remedy);
 }

@@ -16,6 +16,7 @@
 #include "capture/recording/frame_encoding.hpp"
 #include "capture/recording/session_folder.hpp"
 #include "core/image/image_codec.hpp"
+#include "core/nested_text.hpp"
 #include "core/session/manifest_json.hpp"
 #include "core/system/file_io.hpp"
 #include "core/system/utc_now.hpp"
@@ -38,6 +39,11 @@ tl::unexpected<Error> manifest_failure(const fs::path& folder, int error) {
                   : "check the folder and its permissions");
 }
 
+void remove_manifest(const fs::path& folder) {
+  std::error_code ignored;
+  fs::remove(folder / "manifest.jsonl", ignored);
+}
+
 /// Opens the manifest and takes it for this process: two recorders in one session would mix lines.
 Result<int> open_manifest(const fs::path& folder, int extra_flags) {
   const fs::path file = folder / "manifest.jsonl";
@@ -47,17 +53,32 @@ Result<int> open_manifest(const fs::path& folder, int extra_flags) {
     return fail(ErrorKind::input, folder.string(), "holds a session already",
                 "choose another folder");
   if (fd < 0) return manifest_failure(folder, errno);
-  if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
-    ::close(fd);
+  if (::flock(fd, LOCK_EX | LOCK_NB) == 0) return fd;
+  const int error = errno;
+  ::close(fd);
+  if (error == EWOULDBLOCK)
     return fail(ErrorKind::device, file.string(), "another process is recording into this session",
                 "stop it, or record into another folder");
-  }
-  return fd;
+  if (extra_flags & O_EXCL) remove_manifest(folder);  // ours, and nobody else could take it
+  return fail(ErrorKind::device, file.string(),
+              std::string("cannot be locked: ") + std::strerror(error),
+              "record to a disk that knows locks (some network disks don't), and copy it there");
 }
 
-void remove_manifest(const fs::path& folder) {
-  std::error_code ignored;
-  fs::remove(folder / "manifest.jsonl", ignored);
+/// What was behind the last line that counts would stand between lines, where it is damage. A line
+/// cut by a crash belongs to a frame that was never acknowledged: it goes. One that only lacks its
+/// end was read, and stays.
+Status end_at_a_whole_line(int fd, const fs::path& folder) {
+  ORBITFUSE_ASSIGN(const std::string text, read_file(folder / "manifest.jsonl"));
+  std::size_t end = manifest::end_of_lines(text);
+  const std::size_t last = text.rfind('\n', end - 1) + 1;
+  const bool ended = last == end;
+  const bool whole = ended || !parse_json(std::string_view(text).substr(last)).is_discarded();
+  if (!whole) end = last;
+  if (end < text.size() && ::ftruncate(fd, static_cast<off_t>(end)) != 0)
+    return manifest_failure(folder, errno);
+  if (whole && !ended && ::write(fd, "\n", 1) != 1) return manifest_failure(folder, errno);
+  return {};
 }
 
 }  // namespace
@@ -110,12 +131,7 @@ Result<std::unique_ptr<SessionWriter>> SessionWriter::resume(const fs::path& fol
   ORBITFUSE_ASSIGN(Session session, open_session(folder));
   ORBITFUSE_ASSIGN(const int fd, open_manifest(folder, 0));
   std::unique_ptr<SessionWriter> writer(new SessionWriter(folder, fd));
-  // A line cut by a crash belongs to a frame that was never acknowledged: it goes.
-  ORBITFUSE_ASSIGN(const std::string text, read_file(folder / "manifest.jsonl"));
-  if (!text.empty() && text.back() != '\n' &&
-      ::ftruncate(fd, static_cast<off_t>(text.rfind('\n') + 1)) != 0) {
-    return manifest_failure(folder, errno);
-  }
+  ORBITFUSE_TRY(end_at_a_whole_line(fd, folder));
   session.frames.clear();
   writer->session_ = std::move(session);
   ORBITFUSE_TRY(

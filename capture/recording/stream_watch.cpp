@@ -44,6 +44,10 @@ void StreamWatch::note(const Delivery& delivery) {
   switch (delivery.event) {
     case EventKind::ignored:
     case EventKind::duplicate: {
+      if (delivery.kept) {  // it is in the count of frames
+        notice_ = delivery.detail;
+        break;
+      }
       constexpr std::size_t shown = 3;
       ++passed_over_;
       if (passed_over_last_.size() == shown) passed_over_last_.erase(passed_over_last_.begin());

@@ -221,11 +221,25 @@ cv::Mat apply_orientation(const cv::Mat& image, int orientation) {
   }
 }
 
+namespace {
+
+/// Whether text that is no JSON was to be that of a scale: cut off, perhaps before the number.
+/// Other programs write anything into an ImageDescription.
+bool is_of_a_scale(std::string_view text) {
+  const std::size_t begin = text.find_first_not_of(" \t\r\n");
+  if (begin == text.npos || text[begin] != '{') return false;
+  for (const std::string_view word : {"\"scale", "\"temperature\"", "\"kelvin\""})
+    if (text.find(word) != text.npos) return true;
+  return false;
+}
+
+}  // namespace
+
 Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_view text,
                                                                     const std::string& where) {
   const auto value = parse_json(text);
   // Passed over, its counts would be taken for others.
-  if (value.is_discarded() && text.find("\"scale\"") != text.npos && repeated_key(text))
+  if (value.is_discarded() && is_of_a_scale(text))
     return fail(ErrorKind::input, where, json_fault(text),
                 "correct the text that has its \"scale\" (the sidecar, or ImageDescription)");
   if (!value.is_object() || !value.contains("scale")) return std::nullopt;

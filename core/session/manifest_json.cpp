@@ -125,6 +125,13 @@ std::string line_of(const Json& json) {
 
 }  // namespace
 
+std::size_t end_of_lines(std::string_view manifest) {
+  const std::size_t last = manifest.find_last_not_of(" \t\r\n");
+  if (last == manifest.npos) return 0;
+  const std::size_t end = manifest.find('\n', last);
+  return end == manifest.npos ? manifest.size() : end + 1;
+}
+
 Status read_header(const JsonFields& line, Session& session) {
   std::uint64_t format = 0;
   ORBITFUSE_TRY(line.get("format", format));

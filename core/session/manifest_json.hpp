@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "core/json_fields.hpp"
 #include "core/session/session.hpp"
@@ -27,6 +28,10 @@ inline JsonFields fields_of(const Json& line, const std::string& where,
                             const char* remedy = "restore the manifest from a backup") {
   return {line, where + ": ", {ErrorKind::input, remedy}};
 }
+
+/// Where a manifest's lines end: what comes behind is blank. A last line that nothing ends is in
+/// it.
+std::size_t end_of_lines(std::string_view manifest);
 
 /// Of a frame's "radiometry" (radiometry_json.cpp).
 Json json_of_radiometry(const FlirCalibration& calibration);

@@ -2,6 +2,7 @@
 #include "core/session/session.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <optional>
@@ -56,6 +57,7 @@ Status apply(const Json& line, const std::string& where, Session& session, Frame
 Status drop_missing_files(Session& session) {
   // A file that can't be asked may be there: a session without it would be a guess.
   std::optional<Error> unknown;
+  std::vector<std::string> missing_files;
   std::erase_if(session.frames, [&](const FrameRecord& frame) {
     std::error_code error;
     const std::filesystem::path file = session.path_of(frame);
@@ -68,10 +70,21 @@ Status drop_missing_files(Session& session) {
                         "check its permissions, those of its folder, and that its disk is there"};
       return false;
     }
-    session.warnings.push_back(frame.file + ": listed in the manifest, but the file is missing");
+    missing_files.push_back(frame.file);
     return true;
   });
   if (unknown) return tl::unexpected(*std::move(unknown));
+  constexpr std::size_t most_named = 3;  // a folder that was deleted is one sentence
+  const std::size_t count = missing_files.size();
+  if (count > most_named) {
+    missing_files.resize(most_named);
+    session.warnings.push_back(
+        fmt::format("{} files are listed in the manifest, but missing: {} and {} more", count,
+                    fmt::join(missing_files, ", "), count - most_named));
+    return {};
+  }
+  for (const std::string& file : missing_files)
+    session.warnings.push_back(file + ": listed in the manifest, but the file is missing");
   return {};
 }
 
@@ -123,7 +136,9 @@ Result<Session> open_session(const std::filesystem::path& folder) {
     return fail(ErrorKind::input, folder.string(), "no manifest.jsonl, so not a session",
                 "make one with: orbitfuse import");
   }
-  ORBITFUSE_ASSIGN(const std::string text, read_file(file));
+  ORBITFUSE_ASSIGN(std::string text, read_file(file));
+  // Editors and tools leave blank lines behind the last one; between lines they are damage.
+  text.resize(manifest::end_of_lines(text));
   Session session;
   session.folder = folder;
   FrameIndex index;
@@ -158,8 +173,10 @@ Result<Session> open_session(const std::filesystem::path& folder) {
     at = end + 1;
   }
   if (session.id.empty()) {
-    return fail(ErrorKind::input, file.string(), "empty manifest",
-                "record or import the session again");
+    return fail(
+        ErrorKind::input, file.string(), "empty manifest",
+        "restore it from a backup, or import the images beside it, if there are any, into a "
+        "new folder");
   }
   for (const FrameRecord& frame : session.frames) {
     const DeviceInfo* device = session.device(frame.device);

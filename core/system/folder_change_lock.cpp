@@ -23,6 +23,10 @@ Status FolderChangeLock::acquire(const std::filesystem::path& folder) {
   while (descriptor_ >= 0 && (locked = flock(descriptor_, LOCK_EX)) != 0 && errno == EINTR) {
   }
   if (locked == 0) return {};
+  if (descriptor_ >= 0)
+    return fail(ErrorKind::device, named.string(),
+                std::string("cannot be locked: ") + std::strerror(errno),
+                "copy it to a disk that knows locks (some network disks don't)");
   return fail(ErrorKind::device, named.string(), std::strerror(errno),
               "give a folder that can be written to");
 }

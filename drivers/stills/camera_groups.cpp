@@ -39,16 +39,19 @@ std::string CameraGroups::next_device_id(Modality modality) const {
 }
 
 std::optional<std::string> CameraGroups::described(Modality modality) const {
+  constexpr std::size_t most_named = 6;
   std::vector<std::string> list;
+  std::size_t count = 0;
   for (const CameraGroup& group : groups_) {
-    if (group.modality == modality)
+    if (group.modality == modality && ++count <= most_named)
       list.push_back(fmt::format("{} from {} ({})", group.id, group.first_file, group.described));
   }
-  if (list.size() < 2) return std::nullopt;
+  if (count < 2) return std::nullopt;
+  if (count > most_named) list.push_back(fmt::format("and {} more", count - most_named));
   return fmt::format(
       "{}: {} cameras, lenses or image sizes, each calibrated on its own: {}; leave out what is "
       "not of this orbit",
-      name(modality), list.size(), fmt::join(list, "; "));
+      name(modality), count, fmt::join(list, "; "));
 }
 
 }  // namespace orbitfuse

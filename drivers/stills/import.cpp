@@ -5,7 +5,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <tuple>
 
@@ -18,7 +17,9 @@
 #include "drivers/stills/declared_stations.hpp"
 #include "drivers/stills/import_inputs.hpp"
 #include "drivers/stills/import_leftover.hpp"
+#include "drivers/stills/known_fit.hpp"
 #include "drivers/stills/known_poses.hpp"
+#include "drivers/stills/remarks.hpp"
 #include "drivers/stills/sources.hpp"
 #include "drivers/stills/still_photo.hpp"
 #include "drivers/stills/thermal_decoder.hpp"
@@ -27,14 +28,6 @@ namespace orbitfuse {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// The camera of a source at the image's own size; nothing when the shapes differ.
-std::optional<Camera> fitted(const Camera& camera, cv::Size size) {
-  if (camera.width == size.width && camera.height == size.height) return camera;
-  const double aspect = static_cast<double>(camera.width) / camera.height;
-  if (std::abs(aspect * size.height / size.width - 1) > 0.01) return std::nullopt;
-  return camera.scaled_to(size.width, size.height);
-}
 
 class Importer {
  public:
@@ -46,11 +39,11 @@ class Importer {
         writer_(writer),
         progress_(progress),
         decoder_(options),
-        groups_(options) {}
+        groups_(options),
+        known_fit_(options, remarks_) {}
 
   Status run() {
-    ORBITFUSE_ASSIGN(ImportInputs inputs,
-                     gather_inputs(options_, folder_, decoder_, report_.warnings));
+    ORBITFUSE_ASSIGN(ImportInputs inputs, gather_inputs(options_, folder_, decoder_, remarks_));
     known_ = std::move(inputs.known);
     total_ = inputs.size();
     ORBITFUSE_TRY(add_visible(inputs.visible, false));
@@ -68,12 +61,15 @@ class Importer {
     return finish();
   }
 
-  ImportReport take_report() { return std::move(report_); }
+  ImportReport take_report() {
+    report_.warnings = remarks_.sentences();
+    return std::move(report_);
+  }
 
  private:
   void pass_over(const Error& error) {
     if (!first_failure_) first_failure_ = error;
-    report_.warnings.push_back("left out: " + error.message());
+    remarks_.left_out(error);
   }
 
   /// A modality of which nothing is left was not imported, whatever there is of the other.
@@ -126,14 +122,14 @@ class Importer {
       pass_over({ErrorKind::input, source.file.string(), account->words(),
                  "film more slowly, in more light"});
     } else {
-      report_.warnings.push_back(source.short_name() + ": " + account->words());
+      remarks_.add_of_file("", source.short_name(), account->words());
     }
     return {};
   }
 
   Status add_visible_frame(std::string bytes, const Source& source, bool tracking,
-                           const std::optional<DeclaredStations>& stations) {
-    Result<StillPhoto> still = visible_still(std::move(bytes), source.where());
+                           const std::optional<DeclaredStations>& stations, int held = 1) {
+    Result<StillPhoto> still = visible_still(std::move(bytes), source.where(), held);
     if (!still) {
       pass_over(still.error());
       return {};
@@ -157,12 +153,13 @@ class Importer {
         continue;
       }
       tell_lost_samples(*still, source);
+      tell_turn(*still, source);
       report_.has_temperatures = report_.has_temperatures || !still->frame.thermal_is_gray;
       ORBITFUSE_TRY(add_frame(std::move(*still), source, tracking, options_.thermal_stations));
       if (options_.embedded_visible && file->flir && !file->flir->embedded_visible.empty()) {
         ++embedded_;
         ORBITFUSE_TRY(add_visible_frame(file->flir->embedded_visible, source, tracking,
-                                        options_.thermal_stations));
+                                        options_.thermal_stations, file->orientation));
       }
     }
     return {};
@@ -175,24 +172,37 @@ class Importer {
       ORBITFUSE_ASSIGN(paged_bytes_, read_file(source.file, max_image_bytes));
       paged_file_ = source.file;
     }
-    return thermal_file(paged_bytes_, source.file, source.page);
+    Result<ThermalFile> page = thermal_file(paged_bytes_, source.file, source.page);
+    if (!page && page.error().where == source.file.string()) page.error().where = source.where();
+    return page;
   }
 
   void tell_other_pages(const std::string& pages, Source source) {
     source.pages = 1;  // it is the file's matter
-    if (!pages.empty())
-      report_.warnings.push_back(fmt::format("left out: {}: {}", source.short_name(), pages));
+    if (!pages.empty()) remarks_.left_out(source.short_name(), pages);
+  }
+
+  void tell_turn(const StillPhoto& still, const Source& source) {
+    if (still.orientation != 1)
+      remarks_.add_of_file(
+          "", source.short_name(),
+          fmt::format("turned upright, as its EXIF says (orientation {})", still.orientation));
+    if (still.lies_across)
+      remarks_.add_of_file("", source.short_name(),
+                           "its temperatures lie across its picture (one is upright, the other "
+                           "not), and no tag says which way: they stay as the sensor has them");
   }
 
   void tell_lost_samples(StillPhoto& still, const Source& source) {
     if (still.without_temperature == 0) return;
     still.frame.flag(FrameFlag::clipped);
-    report_.warnings.push_back(fmt::format(
-        "{}: {} of {} samples have no temperature that can be stored (above 0 K, at "
-        "most {:.0f} C, and not at an end of the camera's range or counts, which mean that or "
-        "hotter, or colder): dead pixels",
-        source.short_name(), still.without_temperature, still.size.width * still.size.height,
-        celsius_from_kelvin(65535 * still.frame.kelvin_per_count)));
+    remarks_.add_of_file(
+        "", source.short_name(),
+        fmt::format("{} of {} samples have no temperature that can be stored (above 0 K, at "
+                    "most {:.0f} C, and not at an end of the camera's range or counts, which mean "
+                    "that or hotter, or colder): dead pixels",
+                    still.without_temperature, still.size.width * still.size.height,
+                    celsius_from_kelvin(65535 * still.frame.kelvin_per_count)));
   }
 
   Status add_frame(StillPhoto still, const Source& source, bool tracking,
@@ -209,10 +219,7 @@ class Importer {
     frame.host_time_ns = source.taken_ns;
     const KnownViews& known = known_[device.modality];
     const KnownView* view = known.find(source.file);
-    if (view) apply_known(*view, still.size, frame, device);
-    if (known.shared_camera() && !options_.ground_truth_priors_only) {
-      device.lens.calibrated = fitted(*known.shared_camera(), still.size);
-    }
+    known_fit_.apply(known, view, still.size, frame, device);
     if (stations && !frame.tracking) {
       const bool priors = options_.ground_truth_priors_only && view;
       frame.station =
@@ -246,28 +253,6 @@ class Importer {
     return record;
   }
 
-  void apply_known(const KnownView& view, cv::Size size, Frame& frame, DeviceInfo& device) {
-    const std::optional<Camera> camera = fitted(view.camera, size);
-    if (!camera) {
-      const bool exchanged = fitted(view.camera, {size.height, size.width}).has_value();
-      Error misfit{ErrorKind::input, frame.source,
-                   fmt::format("{}x{} does not fit its known camera of {}x{}{}", size.width,
-                               size.height, view.camera.width, view.camera.height,
-                               exchanged ? " (w and h are exchanged)" : ""),
-                   "pose not used"};
-      report_.warnings.push_back(misfit.message());
-      if (!first_misfit_) first_misfit_ = std::move(misfit);
-      return;
-    }
-    ++fitting_;
-    if (options_.ground_truth_priors_only) {
-      device.lens.focal_px = camera->fx;
-      return;
-    }
-    frame.camera = camera;
-    frame.cam_from_world = view.cam_from_world;
-  }
-
   void count(const FrameRecord& record) {
     int& counter = record.tracking                        ? report_.tracking
                    : record.modality == Modality::visible ? report_.visible
@@ -282,20 +267,11 @@ class Importer {
     constexpr std::size_t named = 3;
     const std::size_t count = transparent_.size();
     transparent_.resize(std::min(count, named));
-    report_.warnings.push_back(fmt::format(
+    remarks_.add(fmt::format(
         "{} images have transparent pixels: {}{}; alpha is dropped, and what colour lies behind it "
         "is taken for the scene: import the images as they were taken",
         count, fmt::join(transparent_, ", "),
         count > named ? fmt::format(" and {} more", count - named) : ""));
-  }
-
-  /// Poses were given so that they are used.
-  Status check_fitting() const {
-    if (!first_misfit_ || fitting_ > 0) return {};
-    return fail(
-        ErrorKind::input, "known poses",
-        fmt::format("not one can be used; {}: {}", first_misfit_->where, first_misfit_->found),
-        "correct the size in the poses' file, or give the poses of these images");
   }
 
   void tell_counts() {
@@ -304,12 +280,12 @@ class Importer {
           std::tuple(Modality::thermal, &options_.thermal_stations, report_.thermal)}) {
       // Declared for both, though only one is given.
       if (!*stations || frames == 0 || frames == station_count(**stations)) continue;
-      report_.warnings.push_back(fmt::format("{}: {} frames, but {} stations declared",
-                                             name(modality), frames, station_count(**stations)));
+      remarks_.add(fmt::format("{}: {} frames, but {} stations declared", name(modality), frames,
+                               station_count(**stations)));
     }
     if (options_.rig && report_.visible != report_.thermal) {
       const bool none = report_.visible == 0 || report_.thermal == 0;
-      report_.warnings.push_back(fmt::format(
+      remarks_.add(fmt::format(
           "a rig's pairs are declared, but there are {} visible and {} thermal frames: {}",
           report_.visible, report_.thermal,
           none ? "no pairs" : "those without a partner of their name or time are no pair"));
@@ -317,27 +293,25 @@ class Importer {
   }
 
   Status finish() {
-    ORBITFUSE_TRY(check_fitting());
+    ORBITFUSE_TRY(known_fit_.check());
     for (const CameraGroup& group : groups_.all()) {
       if (group.frames > 0 && writer_)
         ORBITFUSE_TRY(
             writer_->append(StreamRecord{group.id, 0, group.frames - 1, group.frames, 0}));
     }
     for (const Modality modality : {Modality::visible, Modality::thermal}) {
-      if (auto several = groups_.described(modality))
-        report_.warnings.push_back(*std::move(several));
+      if (auto several = groups_.described(modality)) remarks_.add(*std::move(several));
     }
     tell_counts();
     tell_transparent();
     if (options_.embedded_visible && embedded_ == 0)
-      report_.warnings.push_back(
-          "no thermal image has a photo embedded: there are no visible frames from them");
+      remarks_.add("no thermal image has a photo embedded: there are no visible frames from them");
     if (report_.has_temperatures) {
       report_.kelvin_per_count = decoder_.kelvin_per_count();
     }
-    for (std::string& remark : decoder_.remarks()) report_.warnings.push_back(std::move(remark));
+    for (std::string& remark : decoder_.remarks()) remarks_.add(std::move(remark));
     if (decoder_.samples_are_raw_counts() && !decoder_.has_temperatures()) {
-      report_.warnings.push_back(
+      remarks_.add(
           "thermal samples are raw counts without a known scale: kept as grey intensities, "
           "no temperatures (give their scale if you know it)");
     }
@@ -351,12 +325,12 @@ class Importer {
   ThermalDecoder decoder_;
   std::map<Modality, KnownViews> known_;
   CameraGroups groups_;
+  Remarks remarks_;
+  KnownFit known_fit_;
   fs::path paged_file_;  ///< whose pages are being added
   std::string paged_bytes_;
   std::size_t done_ = 0, total_ = 0;
   std::optional<Error> first_failure_;  ///< of the modality that is being added
-  int fitting_ = 0;                     ///< frames that their known camera fits
-  std::optional<Error> first_misfit_;
   ImportReport report_;
   std::vector<std::string> transparent_;  ///< names and shares of images with alpha
   int embedded_ = 0;                      ///< photos found in radiometric JPEGs

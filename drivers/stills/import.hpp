@@ -77,8 +77,10 @@ struct ImportReport {
   int visible = 0, thermal = 0, tracking = 0;
   int with_pose = 0, with_station = 0;
   bool has_temperatures = false;
-  double kelvin_per_count = 0.01;     ///< in which temperatures are stored
-  std::vector<std::string> warnings;  ///< files passed over and why, priors missing, ...
+  double kelvin_per_count = 0.01;  ///< in which temperatures are stored
+  /// Files passed over and why, priors missing ...: what is said of more than three files is one
+  /// sentence with their number and the first names.
+  std::vector<std::string> warnings;
 };
 
 /// Imports into a new session folder (which must not exist or be empty). Photos are copied byte

@@ -18,8 +18,8 @@ namespace fs = std::filesystem;
 class Gathering {
  public:
   Gathering(const ImportOptions& options, const fs::path& folder, ThermalDecoder& decoder,
-            std::vector<std::string>& warnings)
-      : options_(options), folder_(folder), decoder_(decoder), warnings_(warnings) {}
+            Remarks& remarks)
+      : options_(options), folder_(folder), decoder_(decoder), remarks_(remarks) {}
 
   Result<ImportInputs> run() {
     ORBITFUSE_ASSIGN(inputs_.known, read_known_poses(options_));
@@ -29,6 +29,8 @@ class Gathering {
     ORBITFUSE_ASSIGN(const auto thermal, thermal_sources());
     ORBITFUSE_ASSIGN(const auto thermal_tracking,
                      listed(Modality::thermal, options_.thermal_tracking));
+    ORBITFUSE_TRY(check_given_once(visible, visible_tracking));
+    ORBITFUSE_TRY(check_given_once(thermal, thermal_tracking));
     ORBITFUSE_TRY(check_known(Modality::visible, {&visible, &visible_tracking}));
     ORBITFUSE_TRY(check_known(Modality::thermal, {&thermal, &thermal_tracking}));
     ORBITFUSE_TRY(check_stations_of(visible));
@@ -51,26 +53,25 @@ class Gathering {
     if (paths.empty()) return std::vector<fs::path>{};
     ORBITFUSE_ASSIGN(ImageList list, list_images(modality, paths));
     for (const fs::path& file : list.no_files) {
-      warnings_.push_back(fmt::format(
-          "left out: {}: no file (a link to nothing, a pipe or a device)", file.string()));
+      remarks_.left_out(file.string(), "no file (a link to nothing, a pipe or a device)");
     }
     if (!list.folders.empty())
-      warnings_.push_back(fmt::format(
+      remarks_.add(fmt::format(
           "left out: the images in {}{}: folders in folders are not looked into; name "
           "those that are of this orbit",
           list.folders.front().string(),
           list.folders.size() == 1 ? ""
                                    : fmt::format(" and {} more folders", list.folders.size() - 1)));
     for (const fs::path& file : list.unread) {
-      warnings_.push_back(fmt::format(
-          "left out: {}: {} files are not read; convert it to {}", file.string(), unread_kind(file),
-          modality == Modality::thermal
-              ? "16-bit TIFF or PNG (100 x kelvin), which keep temperatures"
-              : "JPEG, PNG or TIFF"));
+      remarks_.left_out(
+          file.string(),
+          fmt::format("{} files are not read; convert it to {}", unread_kind(file),
+                      modality == Modality::thermal
+                          ? "16-bit TIFF or PNG (100 x kelvin), which keep temperatures"
+                          : "JPEG, PNG or TIFF"));
     }
     for (const auto& [link, file] : list.links) {
-      warnings_.push_back(fmt::format("left out: {}: the same image as {}", link.string(),
-                                      file.filename().string()));
+      remarks_.left_out(link.string(), "the same image as " + file.filename().string(), "a link");
     }
     tell_videos_among_photos(list.videos_among_photos, list.images);
     return std::move(list.images);
@@ -83,7 +84,7 @@ class Gathering {
     for (const fs::path& video : videos)
       if (!named.count(video)) names.push_back(video.filename().string());
     if (names.empty()) return;
-    warnings_.push_back(
+    remarks_.add(
         fmt::format("left out: {}: {} among photos ({}{}): perhaps parts of those (Live Photos); "
                     "name a video itself to take it",
                     videos.front().parent_path().string(),
@@ -98,6 +99,20 @@ class Gathering {
   Result<std::vector<fs::path>> thermal_sources() {
     if (!options_.thermal.empty()) return listed(Modality::thermal, options_.thermal);
     return files_of_transforms(Modality::thermal);
+  }
+
+  /// A frame is of the orbit or of the way between its stations: as a copy of itself it would be
+  /// left out without a word on which of the two was meant.
+  static Status check_given_once(const std::vector<fs::path>& orbit,
+                                 const std::vector<fs::path>& tracking) {
+    std::error_code unresolved;
+    std::set<fs::path> names;
+    for (const fs::path& file : orbit) names.insert(fs::weakly_canonical(file, unresolved));
+    for (const fs::path& file : tracking)
+      if (names.contains(fs::weakly_canonical(file, unresolved)))
+        return fail(ErrorKind::usage, file.string(), "given twice, once as a tracking frame",
+                    "name each folder and file once");
+    return {};
   }
 
   /// Photos are copied as they are; HEIC grows as JPEG.
@@ -149,7 +164,7 @@ class Gathering {
                               known->second.all().front().file.string()),
                   twice.empty() ? "give the poses of these images, or none"
                                 : "give each image a name of its own, in the poses too");
-    warnings_.push_back(
+    remarks_.add(
         fmt::format("{}: {}; the others are left to the pose stage", name(modality), found));
     return {};
   }
@@ -188,7 +203,7 @@ class Gathering {
   void take_out_copies(Modality modality, std::initializer_list<std::vector<Source>*> lists) {
     CopyFilter filter(inputs_.known[modality]);
     for (std::vector<Source>* sources : lists) {
-      for (std::string& told : filter.take_out(*sources)) warnings_.push_back(std::move(told));
+      filter.take_out(*sources, remarks_);
     }
   }
 
@@ -205,22 +220,22 @@ class Gathering {
       return fail(ErrorKind::usage, "import.object", found,
                   "their temperatures can't be corrected: leave it out");
     }
-    warnings_.push_back(found + ": their temperatures stay as they are");
+    remarks_.add(found + ": their temperatures stay as they are");
     return {};
   }
 
   const ImportOptions& options_;
   const fs::path& folder_;
   ThermalDecoder& decoder_;
-  std::vector<std::string>& warnings_;
+  Remarks& remarks_;
   ImportInputs inputs_;
 };
 
 }  // namespace
 
 Result<ImportInputs> gather_inputs(const ImportOptions& options, const fs::path& folder,
-                                   ThermalDecoder& decoder, std::vector<std::string>& warnings) {
-  return Gathering(options, folder, decoder, warnings).run();
+                                   ThermalDecoder& decoder, Remarks& remarks) {
+  return Gathering(options, folder, decoder, remarks).run();
 }
 
 }  // namespace orbitfuse

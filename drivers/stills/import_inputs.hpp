@@ -11,6 +11,7 @@
 #include "core/result.hpp"
 #include "drivers/stills/import.hpp"
 #include "drivers/stills/known_poses.hpp"
+#include "drivers/stills/remarks.hpp"
 #include "drivers/stills/sources.hpp"
 #include "drivers/stills/thermal_decoder.hpp"
 
@@ -28,11 +29,11 @@ struct ImportInputs {
 
 /// Lists what `options` name, before anything is stored, and checks that it fits together and into
 /// `folder`'s disk. `decoder` is shown every thermal file: what their samples mean is decided for
-/// all of them. `warnings` takes a sentence for each thing left out.
+/// all of them. `remarks` takes what is left out.
 /// Errors: input (nothing there, poses of other images), usage (options that these files can't
 /// have), device (no room).
 Result<ImportInputs> gather_inputs(const ImportOptions& options,
                                    const std::filesystem::path& folder, ThermalDecoder& decoder,
-                                   std::vector<std::string>& warnings);
+                                   Remarks& remarks);
 
 }  // namespace orbitfuse

@@ -53,8 +53,7 @@ std::vector<Source> in_capture_order(std::vector<Source> sources) {
   return sources;
 }
 
-std::vector<std::string> CopyFilter::take_out(std::vector<Source>& sources) {
-  std::vector<std::string> told;
+void CopyFilter::take_out(std::vector<Source>& sources, Remarks& remarks) {
   std::erase_if(sources, [&](const Source& source) {
     if (source.hash.empty()) return false;
     const auto [first, is_new] =
@@ -62,11 +61,10 @@ std::vector<std::string> CopyFilter::take_out(std::vector<Source>& sources) {
     if (is_new) return false;
     const KnownView* own = known_.find(source.file);
     if (own && own->cam_from_world && own != known_.find(first->second.file)) return false;
-    told.push_back(fmt::format("left out: {}: the same image as {}", source.short_name(),
-                               first->second.short_name()));
+    remarks.left_out(source.short_name(), "the same image as " + first->second.short_name(),
+                     "a copy");
     return true;
   });
-  return told;
 }
 
 }  // namespace orbitfuse

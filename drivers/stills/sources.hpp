@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "drivers/stills/known_poses.hpp"
+#include "drivers/stills/remarks.hpp"
 
 namespace orbitfuse {
 
@@ -39,8 +40,8 @@ std::vector<Source> in_capture_order(std::vector<Source> sources);
 class CopyFilter {
  public:
   explicit CopyFilter(const KnownViews& known) : known_(known) {}
-  /// Takes copies out of `sources`; returns a sentence for each.
-  std::vector<std::string> take_out(std::vector<Source>& sources);
+  /// Takes copies out of `sources`, and says so.
+  void take_out(std::vector<Source>& sources, Remarks& remarks);
 
  private:
   const KnownViews& known_;

@@ -43,7 +43,7 @@ ExifInfo exif_of_photo(std::string_view bytes) {
   return is_heif(bytes) ? heif_exif(bytes) : read_exif(bytes);
 }
 
-Result<StillPhoto> visible_still(std::string bytes, const std::string& where) {
+Result<StillPhoto> visible_still(std::string bytes, const std::string& where, int held) {
   StillPhoto still;
   const ExifInfo exif = exif_of_photo(bytes);
   cv::Mat image;
@@ -61,6 +61,10 @@ Result<StillPhoto> visible_still(std::string bytes, const std::string& where) {
                 std::string(image.depth() == CV_16U ? "16-bit" : "floating-point") +
                     " samples, but photos have 8 bits",
                 "a thermal image? Give it as thermal, or convert it to 8-bit");
+  if (held != 1 && exif.orientation == 1) {
+    image = apply_orientation(image, held);
+    ORBITFUSE_ASSIGN(bytes, encode_jpeg(image, as_jpeg_quality));
+  }
   still.size = apply_orientation(image, exif.orientation).size();
   still.frame.extension = extension_of_bytes(bytes);
   still.frame.encoded = std::move(bytes);
@@ -98,6 +102,8 @@ Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& 
   still.without_temperature = converted.without_temperature;
   still.transparent = file.transparent;
   still.other_pages = file.other_pages;
+  still.orientation = file.orientation;
+  still.lies_across = file.lies_across;
   still.size = file.image.size();
   if (converted.keep_bytes) {
     frame.encoded = file.bytes;
@@ -125,7 +131,10 @@ Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& 
     still.camera.model = file.flir->camera_model;
     still.camera.serial = file.flir->camera_serial;
     if (const auto fov = file.flir->horizontal_fov_deg) {
-      still.camera.lens.focal_px = Camera::from_fov(still.size.width, still.size.height, *fov).fx;
+      // Of the sensor, which a turn by 90 degrees stood on its side.
+      const bool on_side = file.orientation >= 5;
+      const int across = on_side ? still.size.height : still.size.width;
+      still.camera.lens.focal_px = Camera::from_fov(across, across, *fov).fx;
       still.lens = fmt::format("{:.1f} degrees", *fov);
     }
   }

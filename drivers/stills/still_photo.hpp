@@ -19,6 +19,8 @@ struct StillPhoto {
   int without_temperature = 0;  ///< samples of a thermal image that none stands for
   double transparent = 0;       ///< share of the pixels whose alpha, which is dropped, says so
   std::string other_pages;      ///< of its TIFF that no frame is made of, in words
+  int orientation = 1;          ///< as of ThermalFile
+  bool lies_across = false;     ///< likewise
 
   std::string key() const;        ///< same key: same camera, lens, image size and kind of samples
   std::string described() const;  ///< the same for people
@@ -31,7 +33,9 @@ double focal_px_of_35mm(double focal_35mm, cv::Size size);
 ExifInfo exif_of_photo(std::string_view bytes);
 
 /// The bytes of a photo (JPEG, PNG, TIFF, HEIC). Input error naming `where` when they don't decode.
-Result<StillPhoto> visible_still(std::string bytes, const std::string& where);
+/// `held`: how the camera was held (EXIF orientation) where the file that it lies in says so and
+/// the photo itself doesn't: it is stored turned then, as JPEG.
+Result<StillPhoto> visible_still(std::string bytes, const std::string& where, int held = 1);
 /// A frame of a video (CV_8UC3, upright), which is stored as JPEG.
 Result<StillPhoto> still_of_video(const cv::Mat& image);
 /// A thermal image turned into counts of temperature, or kept as it is when it is 8-bit; counts

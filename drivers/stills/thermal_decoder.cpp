@@ -6,11 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/image/exif.hpp"
-#include "core/image/transparency.hpp"
-#include "core/system/file_io.hpp"
 #include "core/temperature.hpp"
-#include "drivers/stills/float_temperatures.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -106,87 +102,6 @@ std::string words_of(const std::optional<DjiParameters>& set) {
 }
 
 }  // namespace
-
-Result<ThermalFile> read_thermal_file(const std::filesystem::path& path, std::optional<int> page) {
-  ORBITFUSE_ASSIGN(const std::string bytes, read_file(path, max_image_bytes));
-  return thermal_file(bytes, path, page);
-}
-
-int thermal_page_count(std::string_view bytes) {
-  if (is_flir_recording(bytes))
-    return std::max(1, static_cast<int>(flir_recording_frames(bytes).size()));
-  return image_format(bytes) == ImageFormat::tiff ? tiff_page_count(bytes).value_or(1) : 1;
-}
-
-namespace {
-
-Result<FlirImage> recorded_image(std::string_view bytes, const std::string& where,
-                                 std::optional<int> page) {
-  const auto frames = flir_recording_frames(bytes);
-  if (!page && frames.size() > 1) {
-    return fail(ErrorKind::input, where,
-                fmt::format("a recording of {} images, one expected", frames.size()),
-                "import it: every image becomes a frame");
-  }
-  const auto index = static_cast<std::size_t>(page.value_or(0));
-  return read_flir_file(index < frames.size() ? frames[index] : bytes, where);
-}
-
-}  // namespace
-
-Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::path& path,
-                                 std::optional<int> page) {
-  ThermalFile file;
-  const std::string where = path.string();
-  const bool recording = is_flir_recording(bytes);
-  if (recording || is_flir_jpeg(bytes)) {
-    file.kind = ThermalFile::Kind::radiometric_jpeg;
-    ORBITFUSE_ASSIGN(file.flir,
-                     recording ? recorded_image(bytes, where, page) : read_flir_jpeg(bytes, where));
-    file.taken_ns = file.flir->taken_ns;
-    return file;
-  }
-  std::string description;
-  if (is_dji_thermal(bytes)) {
-    ORBITFUSE_ASSIGN(file.dji, read_dji_thermal(bytes, where));
-    file.image = file.dji->counts;
-  } else if (image_format(bytes) == ImageFormat::tiff) {
-    ORBITFUSE_ASSIGN(file.image, decode_tiff(bytes, where, &description, page));
-    if (page.value_or(0) == 0) file.other_pages = other_tiff_pages(bytes);
-  } else {
-    ORBITFUSE_ASSIGN(file.image, decode_image(bytes, where));
-  }
-  file.taken_ns = read_exif(bytes).taken_ns;
-  file.transparent = transparent_share(bytes, page);
-  if (file.image.depth() == CV_8U) {
-    file.bytes = bytes;
-    return file;
-  }
-  if (file.image.type() == CV_32FC1) {
-    ORBITFUSE_ASSIGN(FloatTemperatures floats, float_temperatures(file.image, where));
-    file.kind = ThermalFile::Kind::samples16;
-    file.image = std::move(floats.counts);
-    file.tag = floats.scale;
-    file.float_unit = floats.unit;
-    return file;
-  }
-  if (file.image.type() != CV_16UC1) {
-    return fail(
-        ErrorKind::input, where,
-        fmt::format("{} channels of {} bits", file.image.channels(), 8 * file.image.elemSize1()),
-        "thermal images are 16-bit grey (100 x kelvin), float grey, 8-bit or FLIR radiometric "
-        "JPEGs");
-  }
-  file.kind = ThermalFile::Kind::samples16;
-  ORBITFUSE_ASSIGN(file.tag, thermal_scale_of_description(description, where));
-  const std::filesystem::path sidecar = where + ".json";  // also of a DJI file: the user's word
-  std::error_code ignored;
-  if (!file.tag && std::filesystem::exists(sidecar, ignored)) {
-    ORBITFUSE_ASSIGN(const std::string text, read_file(sidecar, max_settings_bytes));
-    ORBITFUSE_ASSIGN(file.tag, thermal_scale_of_sidecar(text, sidecar.string()));
-  }
-  return file;
-}
 
 std::optional<ThermalScaleTag> ThermalDecoder::scale_of(const ThermalFile& file) const {
   if (file.float_unit) return file.tag;  // it has no counts of its own

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <filesystem>
 #include <map>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -11,42 +9,12 @@
 #include <string>
 #include <vector>
 
-#include "core/image/image_codec.hpp"
 #include "core/result.hpp"
 #include "core/temperature.hpp"
-#include "drivers/stills/dji_jpeg.hpp"
-#include "drivers/stills/flir_jpeg.hpp"
 #include "drivers/stills/import.hpp"
+#include "drivers/stills/thermal_file.hpp"
 
 namespace orbitfuse {
-
-/// One thermal file, before the session-wide decision what its samples mean.
-struct ThermalFile {
-  enum class Kind {
-    radiometric_jpeg,
-    samples16,
-    gray8
-  };  ///< the first: any image of a FLIR camera
-  Kind kind = Kind::gray8;
-  std::string bytes;  ///< gray8: the file
-  std::optional<std::int64_t> taken_ns;
-  cv::Mat image;  ///< samples16: CV_16UC1; gray8: CV_8U
-  std::optional<FlirImage> flir;
-  std::optional<DjiImage> dji;         ///< samples16: never temperatures unless the user says how
-  std::optional<ThermalScaleTag> tag;  ///< from the file or its sidecar
-  double transparent = 0;              ///< as of StillPhoto
-  std::string other_pages;             ///< likewise; of the first page
-  const char* float_unit = nullptr;    ///< samples16 that were floats: what these were taken for
-};
-
-/// Without a page the file must hold a single image.
-Result<ThermalFile> read_thermal_file(const std::filesystem::path& file,
-                                      std::optional<int> page = {});
-/// The same of bytes that were read from `file`.
-Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::path& file,
-                                 std::optional<int> page = {});
-/// Images in the bytes: pages of a TIFF, frames of a FLIR recording; at least 1.
-int thermal_page_count(std::string_view bytes);
 
 /// How often each count occurs.
 using CountHistogram = std::vector<std::uint64_t>;

@@ -237,29 +237,29 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
 void WatchSource::tell(const StillPhoto& still, const std::string& name, Frame& frame) {
   if (still.without_temperature > 0) {
     frame.flag(FrameFlag::clipped);
-    if (!std::exchange(clipped_told_, true)) {
-      pending_.push_back(event_delivery(
-          EventKind::clipped,
-          fmt::format("{}: {} samples without a temperature, or hotter than {:.0f} C: dead pixels, "
-                      "here and in all frames with the flag clipped",
-                      name, still.without_temperature,
-                      celsius_from_kelvin(65535 * frame.kelvin_per_count))));
-    }
+    tell_once(EventKind::clipped,
+              fmt::format("{}: {} samples without a temperature, or hotter than {:.0f} C: dead "
+                          "pixels, here and in all frames with the flag clipped",
+                          name, still.without_temperature,
+                          celsius_from_kelvin(65535 * frame.kelvin_per_count)));
   }
   if (still.transparent > 0) {
     frame.flag(FrameFlag::transparent);
-    if (!std::exchange(transparent_told_, true)) {
-      pending_.push_back(event_delivery(
-          EventKind::transparent,
-          fmt::format("{}: {:.3g} % of its pixels are transparent; alpha is dropped, and what "
-                      "colour lies behind it is taken for the scene, here and in all frames with "
-                      "the flag transparent: send the images as they were taken",
-                      name, 100 * still.transparent)));
-    }
+    tell_once(EventKind::transparent,
+              fmt::format("{}: {:.3g} % of its pixels are transparent; alpha is dropped, and what "
+                          "colour lies behind it is taken for the scene, here and in all frames "
+                          "with the flag transparent: send the images as they were taken",
+                          name, 100 * still.transparent));
   }
   if (!still.other_pages.empty())
-    pending_.push_back(
-        event_delivery(EventKind::ignored, fmt::format("{}: {}", name, still.other_pages)));
+    tell_once(EventKind::ignored,
+              fmt::format("{}: {} (told of the first such file)", name, still.other_pages), true);
+}
+
+void WatchSource::tell_once(EventKind kind, std::string words, bool kept) {
+  if (!told_.insert(kind).second) return;
+  pending_.push_back(event_delivery(kind, std::move(words)));
+  pending_.back().kept = kept;
 }
 
 }  // namespace orbitfuse

@@ -67,6 +67,8 @@ class WatchSource final : public FrameSource {
   std::optional<Delivery> take(Attempt attempt);
   /// Flags the frame of a file, and tells what of the file is not as it looks.
   void tell(const StillPhoto& still, const std::string& name, Frame& frame);
+  /// Of the first file of a matter; a folder of one program's files has it in each.
+  void tell_once(EventKind kind, std::string words, bool kept = false);
 
   WatchOptions options_;
   std::unique_ptr<Reader> reader_;
@@ -79,7 +81,8 @@ class WatchSource final : public FrameSource {
       seen_files_;        ///< of an earlier recording: name, time
   bool resumed_ = false;  ///< info_ is the session's word
   std::uint64_t next_id_ = 0;
-  bool gone_told_ = false, clipped_told_ = false, transparent_told_ = false;
+  bool gone_told_ = false;
+  std::set<EventKind> told_;
   std::deque<Delivery> pending_;  ///< goes before the next photo
 };
 

@@ -5,13 +5,12 @@
 #include <cmath>
 
 #include "core/system/parallel.hpp"
+#include "fusion/metrics/lanes.hpp"
 
 namespace orbitfuse::metrics {
 namespace {
 
-/// Four samples at any address; arithmetic on them is AVX2's.
-using Lanes = double __attribute__((vector_size(32), aligned(8), may_alias));
-constexpr int lanes = 4, unroll = 4, chunk = lanes * unroll;
+constexpr int unroll = 4, chunk = lanes * unroll;
 
 const Lanes& at(const double* p) { return *reinterpret_cast<const Lanes*>(p); }
 

@@ -33,6 +33,7 @@ Result<std::vector<Plane>> planes_of(const cv::Mat& image, const std::string& na
   std::vector<cv::Mat> channels;
   cv::split(samples, channels);
   std::vector<Plane> planes(channels.begin(), channels.end());
+  if (image.depth() != CV_32F && image.depth() != CV_64F) return planes;  // always finite
   for (const Plane& plane : planes) {
     if (!cv::checkRange(plane)) {
       return fail(ErrorKind::input, name, "samples that are not finite", "mask or fill them first");

@@ -6,6 +6,7 @@
 
 #include "core/system/parallel.hpp"
 #include "fusion/metrics/blur.hpp"
+#include "fusion/metrics/lanes.hpp"
 #include "fusion/metrics/measures.hpp"
 
 namespace orbitfuse::metrics {
@@ -20,12 +21,15 @@ Plane windowed(const Plane& plane) {
   return Plane(blurred(plane, half)(cv::Rect(5, 5, plane.cols - 10, plane.rows - 10)));
 }
 
-double preserved(double g, double a, double g_fused, double a_fused) {
+/// Edge strength and direction that are kept, each through its sigmoid, of four pixels.
+Lanes preserved(Lanes g, Lanes a, Lanes g_fused, Lanes a_fused) {
   // VIFB's code puts the fused strength itself where both strengths are equal.
-  const double strength = g > g_fused ? g_fused / g : g == g_fused ? g_fused : g / g_fused;
-  const double direction = 1 - std::abs(a - a_fused) / (std::numbers::pi / 2);
-  return 0.9994 / (1 + std::exp(-15 * (strength - 0.5))) *
-         (0.9879 / (1 + std::exp(-22 * (direction - 0.8))));
+  const Lanes larger = g > g_fused ? g : g_fused, smaller = g > g_fused ? g_fused : g;
+  const Lanes strength = g == g_fused ? g_fused : smaller / larger;
+  const Lanes apart = a > a_fused ? a - a_fused : a_fused - a;
+  const Lanes direction = 1 - apart / (std::numbers::pi / 2);
+  return 0.9994 * 0.9879 /
+         ((1 + exp_of(-15 * (strength - 0.5))) * (1 + exp_of(-22 * (direction - 0.8))));
 }
 
 double similarity(const Plane& a, const WindowMoments& of_a, const Plane& b,
@@ -69,11 +73,13 @@ Edges::Edges(const Plane& plane) : strength(plane.size()), angle(plane.size()) {
   cv::Sobel(plane, gy, CV_64F, 0, 1, 3, 1, 0, cv::BORDER_CONSTANT);
   parallel_blocks(plane.rows, 16, [&](int begin, int end) {
     for (int y = begin; y < end; ++y) {
-      for (int x = 0; x < plane.cols; ++x) {
-        const double dx = -gx(y, x), dy = gy(y, x);  // VIFB's signs: they matter where gx == 0
-        strength(y, x) = std::sqrt(dx * dx + dy * dy);
-        angle(y, x) = dx == 0 ? std::numbers::pi / 2 : std::atan(dy / dx);
-      }
+      // VIFB's signs: they matter where gx == 0.
+      for_lanes(plane.cols, [&](int x, int count) {
+        const Lanes dx = -load(gx[y] + x, count), dy = load(gy[y] + x, count);
+        store(sqrt_of(dx * dx + dy * dy), strength[y] + x, count);
+        const Lanes across = Lanes{} + std::numbers::pi / 2;
+        store(dx == 0.0 ? across : atan_of(dy / dx), angle[y] + x, count);
+      });
     }
   });
 }
@@ -84,19 +90,21 @@ double EdgeTransfer::of(const Plane& fused) const {
       in_fused(kept.size());
   parallel_blocks(fused.rows, 16, [&](int begin, int end) {
     for (int y = begin; y < end; ++y) {
-      double row_kept = 0, row_total = 0, row_fused = 0;
-      for (int x = 0; x < fused.cols; ++x) {
-        const double gv = v.strength(y, x), gi = i.strength(y, x), gf = f.strength(y, x),
-                     af = f.angle(y, x);
-        if (gv > 0) row_kept += gv * preserved(gv, v.angle(y, x), gf, af);
-        if (gi > 0) row_kept += gi * preserved(gi, i.angle(y, x), gf, af);
-        row_total += gv + gi;
+      Lanes row_kept{}, row_total{}, row_fused{};
+      for_lanes(fused.cols, [&](int x, int count) {
+        const Lanes gf = load(f.strength[y] + x, count), af = load(f.angle[y] + x, count);
+        for (const Edges* source : {&v, &i}) {
+          const Lanes g = load(source->strength[y] + x, count),
+                      a = load(source->angle[y] + x, count);
+          row_kept += g > 0.0 ? g * preserved(g, a, gf, af) : Lanes{};
+          row_total += g;
+        }
         row_fused += gf;
-      }
+      });
       const auto r = static_cast<std::size_t>(y);
-      kept[r] = row_kept;
-      total[r] = row_total;
-      in_fused[r] = row_fused;
+      kept[r] = sum_of(row_kept);
+      total[r] = sum_of(row_total);
+      in_fused[r] = sum_of(row_fused);
     }
   });
   double sum = 0, weight = 0, edges = 0;

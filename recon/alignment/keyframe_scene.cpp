@@ -35,31 +35,49 @@ struct Vertex {
   float x = 0, y = 0, z = -1, value = 0;
 };
 
+/// Rows are cleared when something is drawn on them first: a band of a keyframe covers few.
 struct Canvas {
   cv::Mat1f depth, brightness;
+  std::vector<std::uint8_t> begun;
+
   explicit Canvas(const Camera& camera)
-      : depth(camera.height, camera.width, std::numeric_limits<float>::infinity()),
-        brightness(camera.height, camera.width, nothing) {}
+      : depth(camera.height, camera.width),
+        brightness(camera.height, camera.width),
+        begun(static_cast<std::size_t>(camera.height), 0) {}
+
+  void begin_row(int y) {
+    std::uint8_t& has_begun = begun[static_cast<std::size_t>(y)];
+    if (has_begun != 0) return;
+    has_begun = 1;
+    std::fill_n(depth[y], depth.cols, std::numeric_limits<float>::infinity());
+    std::fill_n(brightness[y], brightness.cols, nothing);
+  }
 };
 
 float cross(const Vertex& a, const Vertex& b, float x, float y) {
   return (b.x - a.x) * (y - a.y) - (b.y - a.y) * (x - a.x);
 }
 
-/// Front faces only: a surface says nothing about what it looks like from behind.
-void draw_triangle(const Vertex& a, const Vertex& b, const Vertex& c, Canvas& canvas) {
-  const float area = cross(a, b, c.x, c.y);
-  if (!(area > 1e-9F)) return;
-  // Clamped before they become integers: a vertex near the camera's plane is anywhere.
-  const auto pixel = [](float at, int count) {
+/// Pixels whose centres lie from `low` to `high`, of `count`; none where the last is before the
+/// first. Clamped before they become integers: a vertex near the camera's plane is anywhere.
+std::pair<int, int> pixels_between(float low, float high, int count) {
+  const auto pixel = [&](float at) {
     return static_cast<int>(std::clamp(at, -1.0F, static_cast<float>(count)));
   };
-  const int w = canvas.depth.cols, h = canvas.depth.rows;
-  const int x0 = std::max(0, pixel(std::ceil(std::min({a.x, b.x, c.x}) - 0.5F), w));
-  const int x1 = std::min(w - 1, pixel(std::floor(std::max({a.x, b.x, c.x}) - 0.5F), w));
-  const int y0 = std::max(0, pixel(std::ceil(std::min({a.y, b.y, c.y}) - 0.5F), h));
-  const int y1 = std::min(h - 1, pixel(std::floor(std::max({a.y, b.y, c.y}) - 0.5F), h));
-  for (int y = y0; y <= y1; ++y)
+  return {std::max(0, pixel(std::ceil(low - 0.5F))),
+          std::min(count - 1, pixel(std::floor(high - 0.5F)))};
+}
+
+/// Front faces only: a surface says nothing about what it looks like from behind.
+void draw_triangle(const Vertex& a, const Vertex& b, const Vertex& c, Canvas& canvas) {
+  const auto [x0, x1] =
+      pixels_between(std::min({a.x, b.x, c.x}), std::max({a.x, b.x, c.x}), canvas.depth.cols);
+  const auto [y0, y1] =
+      pixels_between(std::min({a.y, b.y, c.y}), std::max({a.y, b.y, c.y}), canvas.depth.rows);
+  const float area = cross(a, b, c.x, c.y);
+  if (x0 > x1 || y0 > y1 || !(area > 1e-9F)) return;
+  for (int y = y0; y <= y1; ++y) {
+    canvas.begin_row(y);
     for (int x = x0; x <= x1; ++x) {
       const float px = static_cast<float>(x) + 0.5F, py = static_cast<float>(y) + 0.5F;
       const float wa = cross(b, c, px, py), wb = cross(c, a, px, py), wc = cross(a, b, px, py);
@@ -70,6 +88,7 @@ void draw_triangle(const Vertex& a, const Vertex& b, const Vertex& c, Canvas& ca
       nearest = z;
       canvas.brightness(y, x) = (wa * a.value + wb * b.value + wc * c.value) / area;
     }
+  }
 }
 
 /// From a keyframe's camera to the pixels of the one that it is drawn for.
@@ -101,6 +120,13 @@ class Projection {
 void draw_square(const std::array<Vertex, 4>& corners, Canvas& canvas) {
   const auto& [a, b, c, d] = corners;
   if (a.z <= 0 || b.z <= 0 || c.z <= 0 || d.z <= 0) return;
+  // Of keyframes finer than the canvas most squares lie between its pixels' centres.
+  const auto [x0, x1] = pixels_between(std::min({a.x, b.x, c.x, d.x}),
+                                       std::max({a.x, b.x, c.x, d.x}), canvas.depth.cols);
+  if (x0 > x1) return;
+  const auto [y0, y1] = pixels_between(std::min({a.y, b.y, c.y, d.y}),
+                                       std::max({a.y, b.y, c.y, d.y}), canvas.depth.rows);
+  if (y0 > y1) return;
   draw_triangle(a, b, d, canvas);
   draw_triangle(a, d, c, canvas);
 }
@@ -179,10 +205,14 @@ Canvas drawn_band(const Keyframe& key, int band, const Camera& camera,
 
 /// What of `other` lies before what is drawn, nearer than `share` of its depth.
 void draw_over(const Canvas& other, float share, Canvas& canvas) {
-  float *z = canvas.depth.ptr<float>(), *value = canvas.brightness.ptr<float>();
-  const float *other_z = other.depth.ptr<float>(), *other_value = other.brightness.ptr<float>();
-  for (std::size_t p = 0; p < canvas.depth.total(); ++p)
-    if (other_z[p] < share * z[p]) z[p] = other_z[p], value[p] = other_value[p];
+  for (int y = 0; y < canvas.depth.rows; ++y) {
+    if (other.begun[static_cast<std::size_t>(y)] == 0) continue;
+    canvas.begin_row(y);
+    float *z = canvas.depth[y], *value = canvas.brightness[y];
+    const float *other_z = other.depth[y], *other_value = other.brightness[y];
+    for (int x = 0; x < canvas.depth.cols; ++x)
+      if (other_z[x] < share * z[x]) z[x] = other_z[x], value[x] = other_value[x];
+  }
 }
 
 /// Each keyframe's surface.
@@ -200,6 +230,7 @@ std::vector<Canvas> drawn(const std::vector<const Keyframe*>& keys, const Camera
     layers.push_back(std::move(all[k * bands]));
     for (std::size_t band = 1; band < bands; ++band)
       draw_over(all[k * bands + band], 1, layers.back());
+    for (int y = 0; y < camera.height; ++y) layers.back().begin_row(y);
   }
   return layers;
 }

@@ -150,7 +150,8 @@ Result<Measurements> load_measurements(const std::filesystem::path& file,
   if (!std::filesystem::exists(file, unreadable) && !unreadable) return result;
   ORBITFUSE_ASSIGN(const std::string text, read_file(file, max_text_bytes));
   const json j = parse_json(text);
-  if (j.is_discarded() || !j.is_object()) return damaged(file, "not JSON, or cut off");
+  if (!j.is_object())
+    return damaged(file, j.is_discarded() ? json_fault(text) : "not a JSON object");
   if (!j.contains("schema") || j["schema"] != measurement_schema)
     return damaged(file, fmt::format("schema {}, this program writes {}",
                                      j.contains("schema") ? j["schema"].dump() : "missing",

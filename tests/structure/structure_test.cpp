@@ -56,7 +56,7 @@ const std::map<std::string, Floors> floors_of{
     {"recon/measurement", {}},
     {"recon/comparison", {}},
     {"recon/nerf", {{"kernels"}, {"field"}, {"device"}, {"rendering"}, {"training"}}},
-    {"recon/poses", {{"sfm"}, {"cross_modal", "global_sfm"}, {"rig"}, {"estimate"}}},
+    {"recon/poses", {{"features"}, {"sfm"}, {"cross_modal", "global_sfm"}, {"rig"}, {"estimate"}}},
     {"recon/registration", {{"clouds", "images"}}},
     {"recon/surface", {}},
     {"fusion",

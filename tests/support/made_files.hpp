@@ -48,6 +48,7 @@ struct TiffWords {
   std::string gdal_metadata;          ///< tag 42112
   int photometric = 1, channels = 1;  ///< of several channels the page is that much wider
   int planar = 1;
+  int orientation = 0;       ///< tag 274; 0: none
   int subfile_of_first = 0;  ///< 1: the first page is a reduced copy of another
 };
 /// An uncompressed little-endian TIFF of several CV_16UC1 or CV_8UC1 pages.

@@ -3,8 +3,9 @@
 
 // One source for two machines. nvcc makes a kernel of each functor; g++ makes a loop of it, by
 // which tests see every line of what a device runs without having one. Part of an engine: included
-// by engine_cuda.cu and the tests' emulated_engine.cpp alone, each with its own ORBITFUSE_ENGINE,
-// so that the linker doesn't take one's for the other's. C++17: nvcc of Debian 12 knows no more.
+// by engine_cuda.cu, the tests' emulated_engine.cpp and march_pieces_test.cpp alone, each with its
+// own ORBITFUSE_ENGINE, so that the linker doesn't take one's for the other's. C++17: nvcc of
+// Debian 12 knows no more.
 #include <cxxabi.h>
 
 #include <cstddef>

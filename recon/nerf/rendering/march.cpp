@@ -27,16 +27,15 @@ struct Segments {
   int count = 0;
   Segment list[max_segments];
 
-  void add(float begin, float length, float cells, int code) {
+  /// `plain`: nothing is known of it; `cells`: how many it crosses.
+  void add(float begin, float length, float surface, float cells, bool plain) {
     Segment* last = count > 0 ? &list[count - 1] : nullptr;
-    if (code == 0 && last && last->plain && begin <= last->begin + last->length + 1e-5f) {
+    if (plain && last && last->plain && begin <= last->begin + last->length + 1e-5f) {
       last->length += length;
       last->haze += cells;
       return;
     }
-    // depth / (1 + depth) stands for 1 - exp(-depth): only relative sizes matter here.
-    const float depth = length * densities_of_codes()[code];
-    list[count++] = {begin, length, depth / (1 + depth), cells, code == 0};
+    if (count < max_segments) list[count++] = {begin, length, surface, cells, plain};
   }
 };
 
@@ -82,8 +81,9 @@ __m256i bit_of(const std::vector<std::uint64_t>& words, __m256i index) {
 struct Walk {
   struct alignas(32) Turn {
     float begin[march_lanes], length[march_lanes], size[march_lanes];
-    std::int32_t cell[march_lanes];  ///< -1: nothing there
-    std::int32_t code[march_lanes];  ///< of what is on; -1: off
+    std::int32_t cell[march_lanes];                  ///< -1: nothing there
+    float surface[march_lanes], cells[march_lanes];  ///< of what is on
+    int on, known;  ///< a bit a lane: a cell is on; its density is known
   };
   int count = 0;
   std::vector<Turn> turns = std::vector<Turn>(512);  ///< grows to what rays need
@@ -95,7 +95,9 @@ void walk_through(const Occupancy& grid, const Lanes& lanes, Walk& walk) {
   const __m256 half_resolution = _mm256_set1_ps(0.5f * static_cast<float>(grid.resolution));
   const __m256 cell_per_cube = _mm256_set1_ps(grid.cell_size(0));
   const __m256i top = _mm256_set1_epi32(grid.resolution - 1),
-                blocks = _mm256_set1_epi32(grid.resolution / 4);
+                blocks = _mm256_set1_epi32(grid.resolution / 4),
+                per_layer = _mm256_mullo_epi32(blocks, blocks),
+                per_level = _mm256_mullo_epi32(per_layer, blocks), one = _mm256_set1_epi32(1);
   const __m256i three = _mm256_set1_epi32(3), bias = _mm256_set1_epi32(127);
   const __m256 far = _mm256_load_ps(lanes.far), sign = _mm256_set1_ps(-0.0f);
   __m256 t = _mm256_load_ps(lanes.t);
@@ -122,29 +124,36 @@ void walk_through(const Occupancy& grid, const Lanes& lanes, Walk& walk) {
         cell_per_cube, _mm256_castsi256_ps(_mm256_slli_epi32(_mm256_add_epi32(level, bias), 23)));
     const __m256 scale = _mm256_mul_ps(
         half_resolution, _mm256_castsi256_ps(_mm256_slli_epi32(_mm256_sub_epi32(bias, level), 23)));
-    __m256i block = level, cell = _mm256_setzero_si256();
+    __m256i cell = _mm256_setzero_si256(), places[3];
+    // Both ways out, of the cell and of its block, are known before it is which of them is taken.
+    __m256 cell_exit = _mm256_set1_ps(std::numeric_limits<float>::max()), block_exit = cell_exit;
     for (int d = 2; d >= 0; --d) {
       const __m256i i = _mm256_min_epi32(
           _mm256_max_epi32(
               _mm256_cvttps_epi32(_mm256_add_ps(_mm256_mul_ps(x[d], scale), half_resolution)),
               _mm256_setzero_si256()),
           top);
-      block = _mm256_add_epi32(_mm256_mullo_epi32(block, blocks), _mm256_srli_epi32(i, 2));
+      places[d] = _mm256_srli_epi32(i, 2);
       cell = _mm256_or_si256(_mm256_slli_epi32(cell, 2), _mm256_and_si256(i, three));
+      const __m256 inverse = _mm256_load_ps(lanes.inverse[d]);
+      const __m256i forward =
+          _mm256_andnot_si256(_mm256_srai_epi32(_mm256_castps_si256(inverse), 31), one);
+      const auto way_out = [&](__m256i edge) {
+        const __m256 at =
+            _mm256_mul_ps(_mm256_sub_ps(_mm256_cvtepi32_ps(edge), half_resolution), size);
+        return _mm256_mul_ps(_mm256_sub_ps(at, x[d]), inverse);
+      };
+      cell_exit = _mm256_min_ps(cell_exit, way_out(_mm256_add_epi32(i, forward)));
+      block_exit = _mm256_min_ps(
+          block_exit, way_out(_mm256_slli_epi32(_mm256_add_epi32(places[d], forward), 2)));
     }
+    const __m256i block =
+        _mm256_add_epi32(_mm256_add_epi32(_mm256_mullo_epi32(level, per_level),
+                                          _mm256_mullo_epi32(places[2], per_layer)),
+                         _mm256_add_epi32(_mm256_mullo_epi32(places[1], blocks), places[0]));
     const __m256i any = bit_of(grid.any, block), plain = bit_of(grid.plain, block);
     const __m256 by_cell = _mm256_castsi256_ps(_mm256_andnot_si256(plain, any));
-    const __m256 step = _mm256_blendv_ps(_mm256_mul_ps(size, _mm256_set1_ps(4)), size, by_cell);
-    const __m256 per_step = _mm256_div_ps(_mm256_set1_ps(1), step);
-    __m256 exit = _mm256_set1_ps(std::numeric_limits<float>::max());
-    for (int d = 0; d < 3; ++d) {
-      const __m256 inverse = _mm256_load_ps(lanes.inverse[d]);
-      const __m256 forward =
-          _mm256_and_ps(_mm256_cmp_ps(inverse, _mm256_setzero_ps(), _CMP_GT_OQ), _mm256_set1_ps(1));
-      const __m256 edge = _mm256_mul_ps(
-          _mm256_add_ps(_mm256_floor_ps(_mm256_mul_ps(x[d], per_step)), forward), step);
-      exit = _mm256_min_ps(exit, _mm256_mul_ps(_mm256_sub_ps(edge, x[d]), inverse));
-    }
+    __m256 exit = _mm256_blendv_ps(block_exit, cell_exit, by_cell);
     // Across the border in spite of rounding.
     exit = _mm256_add_ps(_mm256_max_ps(exit, _mm256_setzero_ps()),
                          _mm256_mul_ps(size, _mm256_set1_ps(1e-3f)));
@@ -165,6 +174,8 @@ void walk_through(const Occupancy& grid, const Lanes& lanes, Walk& walk) {
 
 /// What the cells hold. No cell waits for another one's memory.
 void look_up_cells(const Occupancy& grid, Walk& walk) {
+  const float* const densities = densities_of_codes();
+  const __m256 one = _mm256_set1_ps(1);
   for (int k = 0; k < walk.count; ++k) {
     Walk::Turn& turn = walk.turns[static_cast<std::size_t>(k)];
     const __m256i cell = _mm256_load_si256(reinterpret_cast<const __m256i*>(turn.cell));
@@ -172,18 +183,36 @@ void look_up_cells(const Occupancy& grid, Walk& walk) {
     const __m256i four = gather(grid.look, _mm256_srli_epi32(cell, 2), there);
     const __m256i shift = _mm256_slli_epi32(_mm256_and_si256(cell, _mm256_set1_epi32(3)), 3);
     const __m256i look = _mm256_and_si256(_mm256_srlv_epi32(four, shift), _mm256_set1_epi32(255));
-    store(turn.code, _mm256_sub_epi32(look, _mm256_set1_epi32(1)));
+    const auto bits = [](__m256i mask) { return _mm256_movemask_ps(_mm256_castsi256_ps(mask)); };
+    const __m256i known = _mm256_cmpgt_epi32(look, _mm256_set1_epi32(1));
+    turn.on = bits(_mm256_cmpgt_epi32(look, _mm256_setzero_si256()));
+    turn.known = bits(known);
+    if (turn.on == 0) continue;
+    const __m256 length = _mm256_load_ps(turn.length);
+    _mm256_store_ps(turn.cells, _mm256_div_ps(length, _mm256_load_ps(turn.size)));
+    __m256 surface = _mm256_setzero_ps();
+    if (turn.known != 0) {
+      const __m256 density = _mm256_mask_i32gather_ps(_mm256_setzero_ps(), densities,
+                                                      _mm256_sub_epi32(look, _mm256_set1_epi32(1)),
+                                                      _mm256_castsi256_ps(known), 4);
+      // depth / (1 + depth) stands for 1 - exp(-depth): only relative sizes matter here.
+      const __m256 depth = _mm256_mul_ps(length, density);
+      surface = _mm256_div_ps(depth, _mm256_add_ps(one, depth));
+    }
+    _mm256_store_ps(turn.surface, surface);
   }
 }
 
-/// One ray's occupied cells.
-void collect(const Walk& walk, int lane, Segments& out) {
-  out.count = 0;
-  for (int k = 0; k < walk.count && out.count < max_segments; ++k) {
+/// The rays' occupied cells.
+void collect(const Walk& walk, Segments* out) {
+  for (int lane = 0; lane < march_lanes; ++lane) out[lane].count = 0;
+  for (int k = 0; k < walk.count; ++k) {
     const Walk::Turn& turn = walk.turns[static_cast<std::size_t>(k)];
-    if (turn.code[lane] >= 0)
-      out.add(turn.begin[lane], turn.length[lane], turn.length[lane] / turn.size[lane],
-              turn.code[lane]);
+    for (auto on = static_cast<unsigned>(turn.on); on != 0; on &= on - 1) {
+      const int lane = __builtin_ctz(on);
+      out[lane].add(turn.begin[lane], turn.length[lane], turn.surface[lane], turn.cells[lane],
+                    (turn.known >> lane & 1) == 0);
+    }
   }
 }
 
@@ -201,27 +230,28 @@ void place_samples(const Segments& found, const MarchSettings& settings, float j
   const SampleSpread spread = spread_of(surface, haze, settings);
 
   // Inverse transform sampling: `mass` runs in steps of one sample over what all stretches get.
-  int cell = 0;
-  float mass_before = 0, length_before = 0;
-  const auto density_of_cell = [&](int i) {
-    return segments[i].surface * spread.surface_share + segments[i].haze * spread.haze_share;
+  const auto mass_of = [&](const Segment& s) {
+    return s.surface * spread.surface_share + s.haze * spread.haze_share;
   };
-  const auto advance = [&](float mass) {  // occupied length and distance at this mass
-    float own = density_of_cell(cell);
-    while (cell + 1 < cells && mass_before + own < mass) {
+  const Segment *at = segments, *const last = segments + cells - 1;
+  float own = mass_of(*at), per_mass = 1 / std::max(own, 1e-12f);
+  float mass_before = 0, length_before = 0;
+  const auto part_at = [&](float mass) {  // of the cell in which this mass is reached
+    while (at != last && mass_before + own < mass) {
       mass_before += own;
-      length_before += segments[cell].length;
-      own = density_of_cell(++cell);
+      length_before += at->length;
+      own = mass_of(*++at);
+      per_mass = 1 / std::max(own, 1e-12f);
     }
-    const Segment& s = segments[cell];
-    const float part = std::clamp((mass - mass_before) / std::max(own, 1e-12f), 0.0f, 1.0f);
-    return std::pair{length_before + part * s.length, s.begin + part * s.length};
+    return std::clamp((mass - mass_before) * per_mass, 0.0f, 1.0f);
   };
   float edge = 0;
   const float shift = 0.5f * (jitter - 0.5f);  // samples keep to the middle half of their stratum
   for (int k = 0; k < spread.count; ++k) {
-    out.t[k] = advance((static_cast<float>(k) + 0.5f + shift) * spread.per_sample).second;
-    const float next = advance(static_cast<float>(k + 1) * spread.per_sample).first;
+    const float middle = part_at((static_cast<float>(k) + 0.5f + shift) * spread.per_sample);
+    out.t[k] = at->begin + middle * at->length;
+    const float whole = part_at(static_cast<float>(k + 1) * spread.per_sample);
+    const float next = length_before + whole * at->length;
     out.dt[k] = std::max(0.0f, next - edge);
     edge = next;
   }
@@ -234,14 +264,14 @@ void march(const Occupancy& occupancy, const MarchSettings& settings, const Draw
            int count, Marched* out) {
   assert(count >= 0 && count <= march_lanes);
   thread_local Walk walk;
-  thread_local Segments segments;
+  thread_local Segments segments[march_lanes];
   Lanes lanes;
   for (int i = 0; i < count; ++i) lanes.set(i, rays[i], settings.near, occupancy);
   walk_through(occupancy, lanes, walk);
   look_up_cells(occupancy, walk);
+  collect(walk, segments);
   for (int i = 0; i < count; ++i) {
-    collect(walk, i, segments);
-    place_samples(segments, settings, rays[i].jitter, out[i]);
+    place_samples(segments[i], settings, rays[i].jitter, out[i]);
   }
 }
 

@@ -7,9 +7,11 @@
 #include <tuple>
 
 #include "core/formats/colmap_model.hpp"
+#include "core/image/image_io.hpp"
 #include "core/system/file_io.hpp"
 #include "core/system/parallel.hpp"
 #include "core/system/process.hpp"
+#include "core/system/trace.hpp"
 #include "recon/poses/frame_camera.hpp"
 
 namespace orbitfuse {
@@ -72,16 +74,19 @@ std::vector<MapperSettings> mapper_ladder() {
 
 namespace {
 
-/// The end of COLMAP's log for a message: the log itself goes with the stage's folder.
-std::string last_words(const fs::path& log) {
-  constexpr std::size_t enough = 300;
-  const auto text = read_file(log);
-  if (!text) return "";
-  const std::size_t end = text->find_last_not_of(" \r\n");
-  if (end == std::string::npos) return "";
-  const std::size_t line = text->find_last_of('\n', end) + 1;
-  const std::size_t begin = std::max(line, end + 1 > enough ? end + 1 - enough : 0);
-  return "; COLMAP's last words: " + text->substr(begin, end + 1 - begin);
+/// Adds the end of COLMAP's log to an error: the log itself goes with the stage's folder.
+auto with_last_words(const fs::path& folder) {
+  return [log = folder / "colmap.log"](Error error) {
+    constexpr std::size_t enough = 300;
+    const auto text = read_file(log);
+    if (!text) return error;
+    const std::size_t end = text->find_last_not_of(" \r\n");
+    if (end == std::string::npos) return error;
+    const std::size_t line = text->find_last_of('\n', end) + 1;
+    const std::size_t begin = std::max(line, end + 1 > enough ? end + 1 - enough : 0);
+    error.found += "; COLMAP's last words: " + text->substr(begin, end + 1 - begin);
+    return error;
+  };
 }
 
 }  // namespace
@@ -122,41 +127,66 @@ std::vector<std::string> ColmapProject::seed_and(const std::string& verb) const 
           database_.string()};
 }
 
-Result<DatabaseCounts> ColmapProject::extract(const Session& session,
-                                              const std::vector<ProxyImage>& images,
-                                              const Progress& progress) {
+Status ColmapProject::enter_images(const Session& session, const std::vector<ProxyImage>& images,
+                                   const Progress& progress) {
+  const fs::path lists = folder_ / "no_features";
+  std::error_code error;
+  fs::create_directories(lists, error);  // what comes of it, the first file shows
   std::map<std::tuple<std::string, int, int>, std::vector<const ProxyImage*>> groups;
-  for (const ProxyImage& image : images)
+  for (const ProxyImage& image : images) {
     groups[{image.frame->device, image.width, image.height}].push_back(&image);
+    ORBITFUSE_TRY(write_file_atomic(lists / (image.name + ".txt"), "0 128\n"));
+  }
   int group_number = 0;
   for (const auto& [key, members] : groups) {
     std::string list;
     for (const ProxyImage* image : members) list += image->name + "\n";
     const fs::path list_file = folder_ / fmt::format("images_{}.txt", group_number++);
     ORBITFUSE_TRY(write_file_atomic(list_file, list));
-    std::vector<std::string> arguments = seed_and("feature_extractor");
+    std::vector<std::string> arguments = seed_and("feature_importer");
     arguments.insert(
         arguments.end(),
         {"--image_path", image_folder_.string(), "--image_list_path", list_file.string(),
-         "--ImageReader.camera_model", "SIMPLE_RADIAL", "--ImageReader.single_camera", "1",
-         "--ImageReader.camera_params", camera_parameters(session, *members.front()),
-         "--SiftExtraction.use_gpu", "0", "--SiftExtraction.num_threads",
-         fmt::format("{}", options_.threads), "--SiftExtraction.max_num_features",
-         fmt::format("{}", options_.max_features), "--SiftExtraction.peak_threshold",
-         fmt::format("{}", options_.peak_threshold)});
+         "--import_path", lists.string(), "--ImageReader.camera_model", "SIMPLE_RADIAL",
+         "--ImageReader.single_camera", "1", "--ImageReader.camera_params",
+         camera_parameters(session, *members.front())});
     ORBITFUSE_TRY(run(std::move(arguments), progress));
   }
-  const auto with_last_words = [this](Error error) {
-    error.found += last_words(folder_ / "colmap.log");
-    return error;
-  };
-  ORBITFUSE_TRY(number_images_by_name(database_).map_error(with_last_words));
+  return number_images_by_name(database_).map_error(with_last_words(folder_));
+}
+
+Result<std::map<std::string, SiftFeatures>> ColmapProject::find_features(
+    const std::vector<ProxyImage>& images, const Progress& progress) const {
+  SiftOptions sift;
+  sift.max_features = options_.max_features;
+  sift.peak_threshold = options_.peak_threshold;
+  std::vector<Result<SiftFeatures>> found(images.size());
+  parallel_for(static_cast<int>(images.size()), [&](int i) {
+    const auto at = static_cast<std::size_t>(i);
+    const TraceSpan span("sift", images[at].name);
+    if (progress.cancelled()) return;
+    found[at] = read_image(image_folder_ / images[at].name).map([&](const cv::Mat& gray) {
+      return sift_features(gray, sift);
+    });
+  });
+  ORBITFUSE_TRY(progress.check("poses.features"));
+  std::map<std::string, SiftFeatures> features;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    ORBITFUSE_ASSIGN(features[images[i].name], std::move(found[i]));
+  }
+  return features;
+}
+
+Result<DatabaseCounts> ColmapProject::extract(const Session& session,
+                                              const std::vector<ProxyImage>& images,
+                                              const Progress& progress) {
+  ORBITFUSE_TRY(enter_images(session, images, progress));
+  ORBITFUSE_ASSIGN(const auto features, find_features(images, progress));
+  ORBITFUSE_TRY(write_features(database_, features).map_error(with_last_words(folder_)));
   ORBITFUSE_ASSIGN(const DatabaseCounts counts,
-                   count_database(database_).map_error(with_last_words));
+                   count_database(database_).map_error(with_last_words(folder_)));
   if (counts.images_with_features == 0)
-    return fail(ErrorKind::quality, "COLMAP",
-                fmt::format("no features in {} images{}", images.size(),
-                            last_words(folder_ / "colmap.log")),
+    return fail(ErrorKind::quality, "SIFT", fmt::format("no features in {} images", images.size()),
                 "check that the images are sharp and show more than one flat surface");
   return counts;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -12,8 +13,9 @@
 #include "recon/poses/sfm/pair_selection.hpp"
 #include "recon/poses/sfm/proxy_images.hpp"
 
-// COLMAP's command line as a structure-from-motion engine. Its exit status is never believed (3.8
-// exits 0 on an empty folder): what it did is counted in its database and in its models.
+// COLMAP's command line as a structure-from-motion engine, given features of our own. Its exit
+// status is never believed (3.8 exits 0 on an empty folder): what it did is counted in its database
+// and in its models.
 namespace orbitfuse {
 
 /// How hard the mapper tries; each level of the ladder lowers the thresholds.
@@ -62,6 +64,12 @@ class ColmapProject {
   const std::filesystem::path& database() const { return database_; }
 
  private:
+  /// A camera a device and size, and images by the order of their names, without features: COLMAP
+  /// writes its own tables, whose columns differ by version.
+  Status enter_images(const Session& session, const std::vector<ProxyImage>& images,
+                      const Progress& progress);
+  Result<std::map<std::string, SiftFeatures>> find_features(const std::vector<ProxyImage>& images,
+                                                            const Progress& progress) const;
   Status run(std::vector<std::string> arguments, const Progress& progress) const;
   std::vector<std::string> seed_and(const std::string& verb) const;
 

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <sqlite3.h>
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -15,6 +17,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int sift_bytes = 128;
+
+/// A statement and what it is given; freed with it.
+using Statement = std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)>;
 
 class Database {
  public:
@@ -29,14 +34,26 @@ class Database {
 
   /// Calls `row` for each row of the answer.
   Status query(const char* sql, const std::function<void(sqlite3_stmt*)>& row) const {
-    sqlite3_stmt* statement = nullptr;
-    int status = sqlite3_prepare_v2(handle_.get(), sql, -1, &statement, nullptr);
-    if (status == SQLITE_OK)
-      while ((status = sqlite3_step(statement)) == SQLITE_ROW) row(statement);
-    sqlite3_finalize(statement);
-    if (status == SQLITE_DONE) return {};
-    return fail(ErrorKind::input, path_.string(),
-                fmt::format("not a COLMAP database ({})", sqlite3_errmsg(handle_.get())),
+    return run(
+        sql, [](sqlite3_stmt*) {}, row);
+  }
+
+  /// One row of a table of features, by the image's name; absent rows are an error.
+  Status set_rows(const char* table, const std::string& name, std::size_t rows, int cols,
+                  const void* data, std::size_t bytes) const {
+    const std::string sql = fmt::format(
+        "UPDATE {} SET rows = ?, cols = ?, data = ? "
+        "WHERE image_id = (SELECT image_id FROM images WHERE name = ?)",
+        table);
+    const auto bind = [&](sqlite3_stmt* statement) {
+      sqlite3_bind_int64(statement, 1, static_cast<sqlite3_int64>(rows));
+      sqlite3_bind_int(statement, 2, cols);
+      sqlite3_bind_blob64(statement, 3, data, bytes, SQLITE_STATIC);
+      sqlite3_bind_text(statement, 4, name.c_str(), -1, SQLITE_STATIC);
+    };
+    ORBITFUSE_TRY(run(sql.c_str(), bind, [](sqlite3_stmt*) {}));
+    if (sqlite3_changes(handle_.get()) == 1) return {};
+    return fail(ErrorKind::input, path_.string(), fmt::format("no row of {} for {}", table, name),
                 "delete it and run the pose stage again");
   }
 
@@ -49,6 +66,21 @@ class Database {
  private:
   Database(sqlite3* handle, fs::path path)
       : handle_(handle, sqlite3_close), path_(std::move(path)) {}
+
+  Status run(const char* sql, const std::function<void(sqlite3_stmt*)>& bind,
+             const std::function<void(sqlite3_stmt*)>& row) const {
+    sqlite3_stmt* prepared = nullptr;
+    int status = sqlite3_prepare_v2(handle_.get(), sql, -1, &prepared, nullptr);
+    const Statement statement(prepared, sqlite3_finalize);
+    if (status == SQLITE_OK) {
+      bind(prepared);
+      while ((status = sqlite3_step(prepared)) == SQLITE_ROW) row(prepared);
+    }
+    if (status == SQLITE_DONE) return {};
+    return fail(ErrorKind::input, path_.string(),
+                fmt::format("not a COLMAP database ({})", sqlite3_errmsg(handle_.get())),
+                "delete it and run the pose stage again");
+  }
 
   std::unique_ptr<sqlite3, int (*)(sqlite3*)> handle_;
   fs::path path_;
@@ -92,6 +124,27 @@ Status number_images_by_name(const fs::path& path) {
     ORBITFUSE_TRY(execute(fmt::format("UPDATE {} SET image_id = image_id - 1000000000", table)));
   }
   return execute("COMMIT");
+}
+
+Status write_features(const fs::path& path, const std::map<std::string, SiftFeatures>& features) {
+  ORBITFUSE_ASSIGN(const Database database, Database::open(path, SQLITE_OPEN_READWRITE));
+  // COLMAP's keypoint: its place, and the matrix that takes the unit circle to its own.
+  using Row = std::array<float, 6>;
+  ORBITFUSE_TRY(database.query("BEGIN", [](sqlite3_stmt*) {}));
+  for (const auto& [name, image] : features) {
+    if (image.keypoints.empty()) continue;
+    std::vector<Row> rows;
+    for (const SiftKeypoint& point : image.keypoints) {
+      const float along = point.scale_px * std::cos(point.orientation_rad),
+                  across = point.scale_px * std::sin(point.orientation_rad);
+      rows.push_back({point.x, point.y, along, -across, across, along});
+    }
+    ORBITFUSE_TRY(database.set_rows("keypoints", name, rows.size(), 6, rows.data(),
+                                    rows.size() * sizeof(Row)));
+    ORBITFUSE_TRY(database.set_rows("descriptors", name, rows.size(), sift_bytes,
+                                    image.descriptors.data(), rows.size() * sift_bytes));
+  }
+  return database.query("COMMIT", [](sqlite3_stmt*) {});
 }
 
 Result<std::map<std::string, Descriptors>> read_descriptors(const fs::path& path) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/result.hpp"
+#include "recon/poses/features/sift.hpp"
 #include "recon/poses/sfm/descriptor_matching.hpp"
 
 namespace orbitfuse {
@@ -25,6 +26,11 @@ Result<DatabaseCounts> count_database(const std::filesystem::path& database);
 /// Numbers the images in the order of their names. COLMAP numbers them as its threads finish, and
 /// the mapper's choices depend on the numbers. Only before matching: pairs carry numbers too.
 Status number_images_by_name(const std::filesystem::path& database);
+
+/// By image name, of images that the database has with no features yet (COLMAP's feature_importer,
+/// given empty lists). Input error naming an image that it has not.
+Status write_features(const std::filesystem::path& database,
+                      const std::map<std::string, SiftFeatures>& features);
 
 /// By image name; images without features have no rows.
 Result<std::map<std::string, Descriptors>> read_descriptors(const std::filesystem::path& database);

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "core/image/image_io.hpp"
 #include "core/session/session.hpp"
 #include "tests/app/cli/program.hpp"
@@ -89,6 +91,40 @@ TEST_F(HostileRun, AnotherSessionInItsPlaceIsNotTheRuns) {
   EXPECT_FALSE(fs::exists(temp / "pairs"));
 }
 
+/// A whole field, and not this run's: its colours would be shown as temperatures.
+TEST_F(HostileRun, AFieldThatNoStageOfTheRunWroteIsNotItsOwn) {
+  ASSERT_EQ(orbitfuse_program(small_run(session, out)).code, 0);
+  fs::copy_file(out / "train_visible/field.bin", out / "train_thermal/field.bin",
+                fs::copy_options::overwrite_existing);
+  const std::string to = (temp / "x.ply").string();
+  const std::vector<std::vector<std::string>> calls = {
+      {"measure", out.string(), "--hottest", "1"},
+      {"export", out.string(), "--to", to, "--dry-run"},
+      {"view", out.string(), "--page", "0"}};
+  for (const auto& words : calls) {
+    const Outcome refused = orbitfuse_program(words);
+    EXPECT_EQ(refused.code, 3) << words[0];
+    EXPECT_THAT(refused.err, HasSubstr("train_thermal: field.bin was changed; restore it"));
+  }
+}
+
+/// It would be refused by the next call; `inspect` passed it.
+TEST_F(HostileRun, OptionsOfARunThatCannotBeUsedAreToldByInspect) {
+  make_poses();
+  json run = json::parse(test::get(out / "run.json"));
+  run["seed"] = -1;
+  test::put(out / "run.json", run.dump());
+  const Outcome told = orbitfuse_program({"inspect", out.string(), "--json"});
+  EXPECT_EQ(told.code, 3);
+  EXPECT_THAT(told.err, HasSubstr("run.json: seed = -1"));
+  test::put(out / "render.failed/failed.json", R"({"error":"render: too dark"})");
+  test::put(out / "fuse.failed/mine.txt", "a folder of the user's own");
+  const Outcome failed = orbitfuse_program({"inspect", out.string(), "--json"});
+  EXPECT_EQ(failed.result().at("failed"), json({{"fuse", "?"}, {"render", "render: too dark"}}));
+  EXPECT_THAT(failed.err, HasSubstr("render failed: render: too dark"));
+  EXPECT_THAT(failed.err, HasSubstr("fuse.failed: there, but no run left it"));
+}
+
 TEST_F(HostileRun, ResultsWithoutTheirRecordAreNoSession) {
   make_poses();
   fs::remove(out / "run.json");
@@ -101,6 +137,54 @@ TEST_F(HostileRun, ResultsWithoutTheirRecordAreNoSession) {
   EXPECT_THAT(refused.err, HasSubstr("results of a run, but no run.json"));
   EXPECT_EQ(on_out("poses", session).code, 0);
   EXPECT_EQ(orbitfuse_program({"inspect", out.string()}).code, 0);
+}
+
+TEST_F(HostileRun, AStagesFolderWithoutItsRecordIsToldByInspect) {
+  make_poses();
+  fs::remove(out / "poses_visible/stage.json");
+  test::put(out / "render/mine.txt", "a folder of the user's own");
+  fs::create_directories(out / "depth");  // empty: the next run takes it
+  const Outcome told = orbitfuse_program({"inspect", out.string(), "--json"});
+  EXPECT_EQ(told.code, 0) << told.err;
+  EXPECT_EQ(told.result().at("without_record"), json({"poses_visible", "render"}));
+  EXPECT_THAT(told.err, HasSubstr("poses_visible: there, but without a record (stage.json)"));
+  // As without the right to look into it, which a superuser always has.
+  fs::create_symlink("fuse", out / "fuse");
+  const Outcome unknown = orbitfuse_program({"inspect", out.string(), "--json"});
+  EXPECT_EQ(unknown.code, 3);
+  EXPECT_THAT(unknown.err, HasSubstr("fuse/stage.json: Too many levels of symbolic links"));
+}
+
+/// The other run would take what is new in its stage for damage, and delete it when it is made
+/// anew.
+TEST_F(HostileRun, NothingIsWrittenIntoAStageOfAnyRun) {
+  make_poses();
+  const fs::path stage = out / "poses_visible", into = stage / "new";
+  const std::string photo = (session / "visible/000000.png").string(),
+                    frame = (session / "thermal/000000.tiff").string();
+  const auto files = [&] {
+    std::set<fs::path> all;
+    for (const auto& entry : fs::recursive_directory_iterator(stage)) all.insert(entry.path());
+    return all;
+  };
+  const auto before = files();
+  fs::create_directory_symlink(stage, temp / "link");
+  const std::vector<std::vector<std::string>> calls = {
+      {"render", session.string(), "--out", into.string()},
+      {"render", session.string(), "--out", stage.string()},
+      {"poses", session.string(), "--out", (temp / "link/deep/down").string(), "--dry-run"},
+      {"fuse", "--visible", photo, "--thermal", frame, "--out", (stage / "f.png").string()},
+      {"farm", session.string(), "--out", into.string()},
+      {"replay", session.string(), "--to", into.string()},
+      {"import", into.string(), "--visible", photo},
+      {"import", into.string(), "--visible", photo, "--dry-run"},
+      {"capture", into.string(), "--driver", "synthetic"}};
+  for (const auto& words : calls) {
+    const Outcome refused = orbitfuse_program(words);
+    EXPECT_EQ(refused.code, 2) << words[0] << ": " << refused.err;
+    EXPECT_THAT(refused.err, HasSubstr("the result of a run's stage")) << words[0];
+  }
+  EXPECT_EQ(files(), before);
 }
 
 TEST_F(HostileRun, ATruthThatNamesTwoFramesAlikeMeasuresNeither) {

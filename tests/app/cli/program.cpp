@@ -54,7 +54,7 @@ Outcome run_program(const std::vector<std::string>& command, const RunOptions& o
   while (waitpid(child, &status, interrupted ? 0 : WNOHANG) == 0) {
     const std::string text = read_file(err).value_or("") + read_file(out).value_or("");
     if (!interrupted && text.find(options.interrupt_after) != std::string::npos) {
-      kill(child, SIGINT);
+      kill(child, options.signal);
       interrupted = true;
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(5));

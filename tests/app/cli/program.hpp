@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <csignal>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -21,8 +22,9 @@ struct Outcome {
 struct RunOptions {
   std::vector<std::string> environment = {};  ///< "NAME=value", on top of the present one
   std::filesystem::path folder = ".";
-  /// Sends SIGINT once this text has appeared on stderr or stdout; empty = never.
+  /// Sends the signal once this text has appeared on stderr or stdout; empty = never.
   std::string interrupt_after = {};
+  int signal = SIGINT;
 };
 
 /// Runs the built `orbitfuse` with the arguments.

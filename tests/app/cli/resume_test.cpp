@@ -74,6 +74,26 @@ TEST_F(Resumed, SyntheticWalkGoesOnAfterCtrlC) {
   resume({"capture", again, camera[0], camera[1]});
 }
 
+/// ssh that breaks off, or a terminal that is closed: the recording ends as it does by Ctrl-C, and
+/// under nohup it goes on.
+TEST_F(Resumed, ATerminalThatGoesAwayEndsARecordingProperly) {
+  const auto walk = [&](const std::string& spacing) {
+    return std::vector<std::string>{
+        ORBITFUSE_BINARY_DIR "/app/orbitfuse",       "capture", again, "--visible",
+        "synthetic,size=240x180,spacing=" + spacing, "-v"};
+  };
+  const RunOptions hangup{.interrupt_after = "visible 1", .signal = SIGHUP};
+  const Outcome cut = run_program(walk("10"), hangup);
+  ASSERT_EQ(cut.code, 130) << cut.err << cut.out;
+  EXPECT_THAT(cut.err, HasSubstr("with --resume goes on"));
+  std::filesystem::remove_all(again);
+  std::vector<std::string> words = walk("60");
+  words.insert(words.begin(), "nohup");
+  const Outcome whole = run_program(words, hangup);
+  EXPECT_EQ(whole.code, 0) << whole.err;
+  EXPECT_TRUE(open_session(again)->complete);
+}
+
 TEST_F(Resumed, ReplayedSessionGoesOn) {
   ASSERT_EQ(
       orbitfuse_program({"capture", once, "--driver", "synthetic,size=64x48,spacing=60"}).code, 0);

@@ -69,6 +69,20 @@ TEST_F(RefusedFarm, ADryRunOfAnOrderOnlyTellsHowTheFarmStands) {
   }
 }
 
+/// Killed, or without power: its records say "running" for ever.
+TEST_F(RefusedFarm, AFarmThatDiedIsNotSaidToRun) {
+  ASSERT_EQ(start({}).code, 5);
+  const fs::path record = out / ".farm/visit/poses_visible.json";
+  nlohmann::json outcome = nlohmann::json::parse(test::get(record));
+  outcome["state"] = "running";
+  test::put(record, outcome.dump());
+  const Outcome dead = farm({"status", out.string()});
+  EXPECT_THAT(dead.err, AllOf(HasSubstr("no farm works in"), HasSubstr("farm resume")));
+  outcome["state"] = "failed";
+  test::put(record, outcome.dump());
+  EXPECT_THAT(farm({"status", out.string()}).err, testing::Not(HasSubstr("no farm works in")));
+}
+
 TEST_F(RefusedFarm, ADryRunIsRefusedWhereTheStartWouldBe) {
   ASSERT_EQ(start({}).code, 5);
   for (const std::vector<std::string>& more : {std::vector<std::string>{}, {"--dry-run"}}) {

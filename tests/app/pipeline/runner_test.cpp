@@ -8,8 +8,11 @@
 #include <fstream>
 #include <set>
 
+#include "app/pipeline/folder_lock.hpp"
 #include "app/pipeline/stage_record.hpp"
 #include "core/system/file_io.hpp"
+#include "core/system/folder_change_lock.hpp"
+#include "tests/support/refused_locks.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse::pipeline {
@@ -358,6 +361,33 @@ TEST_F(RunnerTest, AFileInAStageIsToldFromOneBesideIt) {
   EXPECT_FALSE(lies_in_a_stage(out, out / "export/new.ply"));
   EXPECT_FALSE(lies_in_a_stage(out, out));
   EXPECT_FALSE(lies_in_a_stage(out, temp.path() / "a/new.ply"));
+}
+
+/// As where the right to look into it is missing: a run without that stage would be a guess.
+TEST(Runner, AStageThatMayNotBeLookedIntoIsNoMissingOne) {
+  const test::TempFolder temp;
+  fs::create_symlink("depth", temp / "depth");
+  fs::create_directory(temp / "render");
+  fs::create_symlink("lost+found", temp / "lost+found");
+  EXPECT_THAT(finished_stages(temp.path()), ElementsAre("depth"));
+  EXPECT_THAT(read_stage_record(temp / "depth").error().message(), HasSubstr("symbolic links"));
+  Runner runner({Stage{.name = "depth"}}, {.out = temp.path()}, {});
+  const RunSummary summary = runner.run();
+  ASSERT_TRUE(summary.error);
+  EXPECT_EQ(summary.error->kind, ErrorKind::device);
+  EXPECT_THAT(summary.error->message(), HasSubstr("symbolic links"));
+}
+
+TEST(Runner, ADiskWithoutLocksIsNoOtherRun) {
+  const test::TempFolder temp;
+  const test::NoLocks no_locks;
+  FolderLock lock;
+  const Status status = lock.acquire(temp / ".lock");
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().kind, ErrorKind::device);
+  EXPECT_EQ(status.error().found, "cannot be locked: No locks available");
+  FolderChangeLock change;
+  EXPECT_EQ(change.acquire(temp.path()).error().found, "cannot be locked: No locks available");
 }
 
 TEST(Runner, TwoRunsInOneFolderAreRefused) {

@@ -14,6 +14,7 @@
 #include "core/image/image_io.hpp"
 #include "core/system/file_io.hpp"
 #include "tests/capture/scripted_source.hpp"
+#include "tests/support/refused_locks.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
@@ -109,6 +110,42 @@ TEST(SessionWriter, TwoWritersCannotShareASession) {
   EXPECT_EQ(second.error().kind, ErrorKind::device);
 }
 
+/// Some network disks: nobody else records, and nothing may stay that keeps the next try out.
+TEST(SessionWriter, ADiskWithoutLocksIsNoOtherRecorder) {
+  const TempFolder folder;
+  {
+    const test::NoLocks no_locks;
+    const auto writer = SessionWriter::create(folder / "s");
+    ASSERT_FALSE(writer);
+    EXPECT_EQ(writer.error().kind, ErrorKind::device);
+    EXPECT_EQ(writer.error().found, "cannot be locked: No locks available");
+    EXPECT_FALSE(std::filesystem::exists(folder / "s"));
+  }
+  ASSERT_TRUE(SessionWriter::create(folder / "s"));
+  const test::NoLocks no_locks;
+  const auto resumed = SessionWriter::resume(folder / "s");
+  ASSERT_FALSE(resumed);
+  EXPECT_EQ(resumed.error().found, "cannot be locked: No locks available");
+  EXPECT_TRUE(open_session(folder / "s")) << "what was there stays";
+}
+
+/// It is no session to go on with, and "holds a session already" would be a dead end.
+TEST(SessionWriter, AManifestWithoutOneWholeLineIsNamed) {
+  for (const char* text : {"", "{\"created\":\"2026-11-26T1"}) {
+    const TempFolder folder;
+    test::put(folder / "s/manifest.jsonl", text);
+    std::filesystem::create_directories(folder / "s/visible");
+    const auto writer = SessionWriter::create(folder / "s");
+    ASSERT_FALSE(writer);
+    EXPECT_THAT(writer.error().message(), ::testing::HasSubstr("killed as it began; delete its"));
+    test::put(folder / "s/visible/000000.jpg", "a frame");
+    EXPECT_EQ(SessionWriter::create(folder / "s").error().found, "holds a session already");
+    EXPECT_THAT(open_session(folder / "s").error().message(),
+                ::testing::AnyOf(::testing::HasSubstr("import the images beside it"),
+                                 ::testing::HasSubstr("not a JSON object")));
+  }
+}
+
 TEST(SessionWriter, ResumeAfterACrashContinuesAndOverwritesNothing) {
   const TempFolder folder;
   {
@@ -140,6 +177,35 @@ TEST(SessionWriter, ResumeAfterACrashContinuesAndOverwritesNothing) {
   EXPECT_EQ(session->devices.size(), 1u);
   ASSERT_EQ(session->events.size(), 1u);
   EXPECT_EQ(session->events[0].kind, "resumed");
+}
+
+/// An editor's blank lines would lie between lines then, where they are damage; and a line that
+/// lacks only its end was read.
+TEST(SessionWriter, ResumeBehindBlankLinesOrWithoutTheLastLinesEndLosesNothing) {
+  for (const std::string behind : {"\n\n", "  \r\n", "no end", " "}) {
+    const TempFolder folder;
+    {
+      auto writer = *SessionWriter::create(folder / "s");
+      ASSERT_TRUE(writer->add_device(thermal_device()));
+      ASSERT_TRUE(writer->append("thermal0", thermal_frame(0)));
+    }
+    std::string text = test::get(folder / "s/manifest.jsonl");
+    if (behind == "no end")
+      text.pop_back();
+    else
+      text += behind;
+    test::put(folder / "s/manifest.jsonl", text);
+    {
+      auto writer = SessionWriter::resume(folder / "s");
+      ASSERT_TRUE(writer) << writer.error().message();
+      ASSERT_TRUE((*writer)->append("thermal0", thermal_frame(7)));
+      ASSERT_TRUE((*writer)->close());
+    }
+    const auto session = open_session(folder / "s");
+    ASSERT_TRUE(session) << '"' << behind << "\": " << session.error().message();
+    EXPECT_TRUE(session->complete);
+    EXPECT_EQ(session->frames.size(), 2u) << '"' << behind << '"';
+  }
 }
 
 TEST(SessionWriter, FullDiskKeepsEveryAcknowledgedFrame) {

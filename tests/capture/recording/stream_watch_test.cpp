@@ -70,6 +70,16 @@ TEST(StreamWatch, PhotosWithTransparentPixelsAreForTheOperator) {
   EXPECT_FALSE(watch.away());
 }
 
+/// A TIFF with a preview behind its image.
+TEST(StreamWatch, AFileOfWhichOnlyAPartIsLeftOutIsNotPassedOver) {
+  StreamWatch watch;
+  Delivery part = event_delivery(EventKind::ignored, "a.tif: page 2 (80x60, 8-bit)");
+  part.kept = true;
+  watch.note(part);
+  EXPECT_EQ(told(watch).passed_over, 0u);
+  EXPECT_EQ(told(watch).notice, "a.tif: page 2 (80x60, 8-bit)");
+}
+
 TEST(StreamWatch, OfWhatWasPassedOverTheLastThreeAreNamed) {
   StreamWatch watch;
   for (const char* file : {"a", "b", "c", "d"})

@@ -3,6 +3,7 @@
 
 #include "core/session/manifest_json.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -138,6 +139,32 @@ TEST_F(SessionTest, DamageInTheMiddleNamesTheLine) {
   EXPECT_NE(s.error().where.find("manifest.jsonl:2"), std::string::npos) << s.error().where;
 }
 
+TEST_F(SessionTest, BlankLinesBehindTheLastAreNoDamage) {
+  const std::string text = manifest();
+  for (const std::string blank : {"\n", "\n\n\n", "\r\n", " \n\t\r\n", "   "}) {
+    const auto s = open(text + blank);
+    ASSERT_TRUE(s) << s.error().message();
+    EXPECT_TRUE(s->complete);
+    EXPECT_EQ(s->frames.size(), 1u);
+    EXPECT_TRUE(s->warnings.empty());
+  }
+  std::string of_windows;
+  for (const char c : text) of_windows += c == '\n' ? "\r\n" : std::string(1, c);
+  const auto s = open(of_windows + "\r\n\r\n");
+  ASSERT_TRUE(s) << s.error().message();
+  EXPECT_TRUE(s->complete);
+  // Between lines something was cut out; a line that is cut is no blank one.
+  std::string hole = text;
+  hole.insert(hole.find('\n') + 1, "\n");
+  const auto damaged = open(hole);
+  ASSERT_FALSE(damaged);
+  EXPECT_NE(damaged.error().where.find("manifest.jsonl:2"), std::string::npos);
+  const auto cut = open(text + "{\"type\":\"fra\n\n");
+  ASSERT_FALSE(cut);
+  EXPECT_NE(cut.error().where.find("manifest.jsonl:8"), std::string::npos) << cut.error().where;
+  EXPECT_FALSE(open("\n\n"));
+}
+
 TEST_F(SessionTest, AKeyThatALineHasTwiceIsNamed) {
   std::string text = manifest();
   text.insert(text.rfind("\"width\":640"), "\"width\":64,");
@@ -262,6 +289,22 @@ TEST_F(SessionTest, MissingImageIsAWarningAndTheFrameGoes) {
   EXPECT_TRUE(s->frames.empty());
   ASSERT_EQ(s->warnings.size(), 1u);
   EXPECT_NE(s->warnings[0].find("thermal/000000.tiff"), std::string::npos);
+}
+
+TEST_F(SessionTest, ManyMissingImagesAreOneWarning) {
+  std::string text = manifest();
+  FrameRecord frame = full_frame();
+  for (int i = 1; i <= 300; ++i) {
+    frame.file = fmt::format("thermal/{:06}.tiff", i);
+    frame.sequence -= 1;
+    text.insert(text.find("{\"count\""), manifest_line(frame) + "\n");
+  }
+  const auto s = open(text);
+  ASSERT_TRUE(s) << s.error().message();
+  EXPECT_EQ(s->frames.size(), 1u);
+  ASSERT_EQ(s->warnings.size(), 1u);
+  EXPECT_NE(s->warnings[0].find("300 files are listed"), std::string::npos);
+  EXPECT_NE(s->warnings[0].find("and 297 more"), std::string::npos) << s->warnings[0];
 }
 
 TEST_F(SessionTest, UnknownLinesAreSkippedAndNewerFormatsRefused) {

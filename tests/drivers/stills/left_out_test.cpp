@@ -101,6 +101,20 @@ TEST_F(LeftOut, PosesOfWhichNoneFitsAreAnError) {
   EXPECT_EQ(report->with_pose, 3);
 }
 
+TEST_F(LeftOut, AFolderOfFramesAndOfTrackingFramesIsGivenTwice) {
+  put_photo("in/a.jpg", 1);
+  put_counts("t/0.tif", 29000, 30000, 1);
+  options.visible = {folder / "in"};
+  options.visible_tracking = {folder / "in/../in"};
+  EXPECT_THAT(refusal(), test::says("a.jpg", "given twice, once as a tracking frame"));
+  options.visible_tracking.clear();
+  options.thermal = {folder / "t"};
+  options.thermal_tracking = {folder / "t/0.tif"};
+  EXPECT_THAT(refusal(), test::says("0.tif", "given twice"));
+  options.thermal_tracking.clear();
+  EXPECT_TRUE(import());
+}
+
 TEST_F(LeftOut, AModelWithoutImagesIsAnError) {
   put_photo("in/a.jpg", 1);
   put("model/cameras.txt", "1 PINHOLE 40 30 40 40 20 15\n");
@@ -238,6 +252,38 @@ TEST_F(LeftOut, PagesOfAnotherSizeOrKindAreNamed) {
               test::one_says("in/3.tif: pages 2 (50x30, 8-bit), 3 (51x30, 8-bit), 4 (52x30, 8-bit) "
                              "and 17 more, "));
   EXPECT_THAT(report->warnings, test::none_says("t/1.tif"));
+}
+
+/// A camera's program that puts a preview into each of its files; raw photos beside each JPEG.
+TEST_F(LeftOut, WhatIsTheSameOfManyFilesIsToldOnce) {
+  cv::Mat preview(15, 20, CV_8UC1, cv::Scalar(7)), image(30, 40, CV_16UC1);
+  for (int i = 0; i < 40; ++i) {
+    const std::string number = std::to_string(100 + i);
+    cv::RNG(static_cast<std::uint64_t>(i) + 1).fill(image, cv::RNG::UNIFORM, 29300, 29700);
+    image.at<std::uint16_t>(0, 0) = 65535;
+    if (i % 2) image.at<std::uint16_t>(0, 1) = 65535;
+    put("t/" + number + ".tif", made::tiff_of_pages({image, preview}, R"({"scale":0.01})"));
+    put("t/copy" + number + ".tif", made::tiff_of_pages({image, preview}, R"({"scale":0.01})"));
+    put("t/cut" + number + ".tif", "II*" + std::string(static_cast<std::size_t>(i), 'x'));
+    put_photo("in/" + number + ".jpg", static_cast<std::uint64_t>(i));
+    put("in/" + number + ".dng", "raw");
+    fs::create_symlink(folder / "nothing", folder / ("in/" + number + "x.jpg"));
+  }
+  put("in/one.webp", "x");
+  options.visible = {folder / "in"};
+  options.thermal = {folder / "t"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->thermal, 40);
+  EXPECT_EQ(report->visible, 40);
+  for (const char* words :
+       {"t/102.tif and 37 more): page 2 (20x15, 8-bit)", "and 37 more): the same image as",
+        "cut102.tif and 37 more): ", "t/102.tif and 37 more): 1 of 1200 samples",
+        "102.dng and 37 more): raw photo files", "and 37 more): no file"})
+    EXPECT_THAT(report->warnings, test::one_says("40 files (", words));
+  EXPECT_THAT(report->warnings, test::one_says("1 of 1200 samples", "of the others likewise"));
+  EXPECT_THAT(report->warnings, test::one_says("left out: ", "one.webp: web image files"));
+  EXPECT_LT(report->warnings.size(), 10u);
 }
 
 /// Hundreds of names are no message.

@@ -80,6 +80,58 @@ TEST(OddTiff, GdalsScaleIsTheTags) {
   EXPECT_FALSE(*tag);
 }
 
+/// libtiff reads the header's bytes as the first samples.
+TEST(OddTiff, AStripThatBeginsInTheHeaderIsNamed) {
+  const cv::Mat page(6, 8, CV_16UC1, cv::Scalar(29500));
+  const std::string whole = made::tiff_of_pages({page});
+  const std::string strip_offsets("\x11\x01\x04\x00\x01\x00\x00\x00", 8);
+  const std::size_t entry = whole.find(strip_offsets);
+  ASSERT_NE(entry, whole.npos);
+  for (const char at : {0, 4, 7}) {
+    std::string bytes = whole;
+    bytes.replace(entry + 8, 4, std::string(1, at) + std::string(3, '\0'));
+    const auto image = decode_tiff(bytes, "h.tif");
+    ASSERT_FALSE(image) << int{at};
+    EXPECT_THAT(image.error().message(),
+                AllOf(HasSubstr("h.tif"),
+                      HasSubstr("strip 1 of its samples begins at byte " + std::to_string(at))));
+  }
+  EXPECT_TRUE(decode_tiff(whole, "h.tif"));
+}
+
+/// Passed over, the counts would be looked at instead, and raw ones taken for centikelvin.
+TEST(OddTiff, AScaleThatIsCutOffIsNamed) {
+  const std::string whole =
+      R"({"quantity":"temperature","unit":"kelvin","scale":0.04,"offset":10})";
+  for (const std::size_t keep : {27ul, 40ul, 51ul, 56ul, whole.size() - 1}) {
+    const auto tag = thermal_scale_of_description(whole.substr(0, keep), "c.tif");
+    ASSERT_FALSE(tag) << whole.substr(0, keep);
+    EXPECT_THAT(tag.error().message(), AllOf(HasSubstr("c.tif"), HasSubstr("cut off")));
+  }
+  const auto nan = thermal_scale_of_description(R"({"scale":0.04,"min":NaN})", "c.tif");
+  ASSERT_FALSE(nan) << "Python writes NaN, which is no JSON";
+  // What other programs write there is none of it.
+  for (const char* words :
+       {"", "ImageJ=1.53t", "{camera 7}", "a \"scale\" of 3", R"({"shape":[2]})"}) {
+    const auto tag = thermal_scale_of_description(words, "c.tif");
+    ASSERT_TRUE(tag) << words;
+    EXPECT_FALSE(*tag) << words;
+  }
+  made::TiffWords words;
+  const std::string metadata =
+      "<GDALMetadata>\n  <Item name=\"SCALE\" sample=\"0\" role=\"scale\">0.04</Item>\n"
+      "  <Item name=\"OFFSET\" sample=\"0\" role=\"offset\">10.5</Item>\n</GDALMetadata>\n";
+  for (const std::size_t keep : {30ul, 62ul, 90ul, 140ul}) {
+    words.gdal_metadata = metadata.substr(0, keep);
+    std::string description;
+    ASSERT_TRUE(decode_tiff(made::tiff_of_pages({cv::Mat(4, 5, CV_16UC1, cv::Scalar(7000))}, words),
+                            "g.tif", &description));
+    const auto tag = thermal_scale_of_description(description, "g.tif");
+    ASSERT_FALSE(tag) << words.gdal_metadata;
+    EXPECT_THAT(tag.error().message(), AllOf(HasSubstr("g.tif"), HasSubstr("GDAL")));
+  }
+}
+
 /// Programs put a small picture of the image before it.
 TEST(OddTiff, AReducedCopyInFrontIsNotTheImage) {
   const cv::Mat copy(3, 4, CV_8UC1, cv::Scalar(1)), image(6, 8, CV_16UC1, cv::Scalar(7000));

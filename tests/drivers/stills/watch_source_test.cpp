@@ -120,6 +120,13 @@ TEST_F(WatchTest, PagesOfAnotherSizeAreTold) {
   EXPECT_EQ(photo.frame.pixels.cols, 40);
   EXPECT_EQ(told.reason, "ignored");
   EXPECT_THAT(told.detail, HasSubstr("1.tiff: page 2 (20x30, 16-bit)"));
+  EXPECT_TRUE(told.kept) << "no file was passed over";
+  // A camera's program writes them all alike: once is enough.
+  put("2.tiff", made::tiff_of_pages({counts(40) + 1, counts(20)}, R"({"scale":0.01})"));
+  const Delivery second = soon(source);
+  ASSERT_EQ(second.kind, Delivery::Kind::frame) << second.reason;
+  put("3.tiff", made::tiff_of_pages({counts(40) + 2, counts(20)}, R"({"scale":0.01})"));
+  EXPECT_EQ(soon(source).kind, Delivery::Kind::frame);
 }
 
 TEST_F(WatchTest, WhatIsToldOfTheLastFileIsNotLostWhenTheRecordingEnds) {

@@ -121,7 +121,10 @@ TEST_F(MeasurementFile, DamageIsNamedAndNothingIsLost) {
   ASSERT_TRUE(add_measurement(file, "run a", spot("one")));
   const std::string whole = test::get(file);
   expect_refused("", "not JSON");
-  expect_refused("[]", "not JSON");
+  expect_refused("[]", "not a JSON object");
+  expect_refused("{\"schema\":1,\n\"run\":\"a\",\n\"run\":\"b\"}",
+                 "the key \"run\" twice in one object, the second time in line 3");
+  expect_refused("{\"schema\":1,\n\"run\":", "cut off: parse error at line 2");
   expect_refused(whole.substr(0, whole.size() / 2), "cut off");
   json j = json::parse(whole);
   j["schema"] = 99;
