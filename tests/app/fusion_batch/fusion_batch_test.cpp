@@ -11,6 +11,7 @@
 
 #include "core/image/image_io.hpp"
 #include "fusion/metrics/metrics.hpp"
+#include "tests/support/made_files.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse::batch {
@@ -131,6 +132,22 @@ TEST_F(FusionBatch, NothingToFuseAndCancellingAreErrors) {
   Progress progress;
   progress.cancel = &stop;
   EXPECT_FALSE(run(progress));
+}
+
+/// As an import turns it, and as the photo beside it is.
+TEST_F(FusionBatch, ThermalImagesAreTurnedAsTheirTagSays) {
+  const test::TempFolder own;
+  cv::Mat counts(30, 40, CV_16UC1, cv::Scalar(29000));
+  counts(cv::Rect(0, 0, 10, 10)) += 2000;
+  made::TiffWords words;
+  words.description = R"({"scale":0.01})";
+  words.orientation = 6;
+  test::put(own / "t.tif", made::tiff_of_pages({counts}, words));
+  const auto kelvin = read_thermal(own / "t.tif");
+  ASSERT_TRUE(kelvin) << kelvin.error().message();
+  ASSERT_EQ(kelvin->size(), cv::Size(30, 40));
+  EXPECT_NEAR(kelvin->at<float>(5, 25), 310, 0.01);
+  EXPECT_NEAR(kelvin->at<float>(5, 5), 290, 0.01);
 }
 
 }  // namespace
