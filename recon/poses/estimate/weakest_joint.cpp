@@ -19,7 +19,7 @@ constexpr int fewest_on_a_side = 3, most_views = 1000, modes = 3;
 /// Pairs across that are looked at: each takes 50 ms at 3000 features a view.
 constexpr std::size_t most_looked_at = 800;
 /// Of a view, for the joint to be held by many.
-constexpr int partners = 3;
+constexpr int partners_per_view = 3;
 /// Fewer are chance.
 constexpr int fewest_alike = 20;
 
@@ -137,7 +137,7 @@ std::vector<ViewPair> likeliest(const std::vector<ViewPair>& pairs, const std::v
   for (const std::size_t i : order) {
     if (alike[i] < fewest_alike) break;
     const auto& [a, b] = pairs[i];
-    if (taken[at(a)] >= partners && taken[at(b)] >= partners) continue;
+    if (taken[at(a)] >= partners_per_view && taken[at(b)] >= partners_per_view) continue;
     ++taken[at(a)], ++taken[at(b)];
     likely.push_back(pairs[i]);
   }
