@@ -164,11 +164,11 @@ TEST_F(LeftOut, ImagesOfOneNameAreToldApartByTheirFoldersOrNotAtAll) {
   ASSERT_EQ(both.size(), 3u);
   std::vector<double> x;
   for (const auto& [source, place] : both) x.push_back(place);
-  EXPECT_THAT(x, testing::ElementsAre(8, 7, 9)) << "a/000, b/000, b/001";
+  EXPECT_THAT(x, ::testing::ElementsAre(8, 7, 9)) << "a/000, b/000, b/001";
   put_model("a/000.jpg", "c/002.jpg");
   x.clear();
   for (const auto& [source, place] : places()) x.push_back(place);
-  EXPECT_THAT(x, testing::ElementsAre(7, 0, 9)) << "b/000 is another image";
+  EXPECT_THAT(x, ::testing::ElementsAre(7, 0, 9)) << "b/000 is another image";
   put_model("000.jpg", "c/002.jpg");
   const auto report = import();
   ASSERT_TRUE(report) << report.error().message();
