@@ -12,8 +12,6 @@ set(orbitfuse_compile_options
   -Wno-stringop-overflow -Wno-restrict -Wno-array-bounds
   # AVX2 is the baseline; kernels that want more are dispatched at run time (orbitfuse_isa_sources).
   -march=x86-64-v3
-  # Shared libraries keep their own copies of what they have in common with us (SharedCeres.cmake).
-  -fvisibility=hidden
   # a*b+c must round alike in every translation unit, or results depend on inlining.
   -ffp-contract=off)
 # nvcc knows none of these (ORBITFUSE_CUDA).

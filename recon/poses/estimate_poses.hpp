@@ -27,8 +27,6 @@ struct PoseOptions {
   bool use_known_poses = true;
   /// Thermal frames recorded between stations tie neighbouring stations together.
   bool use_tracking_frames = true;
-  /// 0 = all cores.
-  int threads = 0;
   std::uint64_t seed = 1;
   /// Longest image side given to COLMAP. Features grow with the area and matching with their
   /// square; 800 px poses an orbit of 24 views to 0.03 % of its extent

@@ -9,7 +9,6 @@ Status PoseOptions::validate() const {
   const OptionCheck check("poses");
   if (colmap.empty())
     return fail(ErrorKind::usage, "poses.colmap", "empty", "give COLMAP's command, e.g. colmap");
-  ORBITFUSE_TRY(check("threads", threads, from_to(0, 1024)));
   ORBITFUSE_TRY(check("max_image_side_px", max_image_side_px, from_to(100, 20000)));
   ORBITFUSE_TRY(check("max_features", max_features, from_to(100, 100000)));
   ORBITFUSE_TRY(check("min_posed_ratio", min_posed_ratio, from_to(0.0, 1.0)));

@@ -10,7 +10,7 @@
 
 // Scale-invariant features (D. Lowe, Distinctive Image Features from Scale-Invariant Keypoints,
 // IJCV 2004) with the choices of COLMAP's extraction on a CPU, so that its mapper finds what it was
-// tuned on: the same extrema, orientations and descriptors to rounding, in a seventh of its time.
+// tuned on: the same extrema, orientations and descriptors to rounding.
 // docs/notes/poses_visible.md tells what other features did to the mapper.
 namespace orbitfuse {
 

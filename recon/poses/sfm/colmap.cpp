@@ -100,7 +100,6 @@ Result<ColmapProject> ColmapProject::create(const fs::path& folder, const fs::pa
     return fail(ErrorKind::device, folder.string(), error.message(), "check the disk and rights");
   ColmapProject project;
   project.options_ = options;
-  if (project.options_.threads == 0) project.options_.threads = thread_count();
   project.folder_ = folder;
   project.image_folder_ = image_folder;
   project.database_ = folder / "database.db";

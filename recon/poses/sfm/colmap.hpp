@@ -35,7 +35,6 @@ std::vector<MapperSettings> mapper_ladder();
 
 struct ColmapOptions {
   std::string command = "colmap";
-  int threads = 0;
   std::uint64_t seed = 1;
   int max_features = 3000;
   double peak_threshold = 0.02 / 3;  ///< SIFT contrast; lower finds more on dim thermal images

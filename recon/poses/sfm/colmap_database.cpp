@@ -38,7 +38,7 @@ class Database {
         sql, [](sqlite3_stmt*) {}, row);
   }
 
-  /// One row of a table of features, by the image's name; absent rows are an error.
+  /// A row of a table of features, by the image's name, where there is one.
   Status set_rows(const char* table, const std::string& name, std::size_t rows, int cols,
                   const void* data, std::size_t bytes) const {
     const std::string sql = fmt::format(
@@ -51,10 +51,7 @@ class Database {
       sqlite3_bind_blob64(statement, 3, data, bytes, SQLITE_STATIC);
       sqlite3_bind_text(statement, 4, name.c_str(), -1, SQLITE_STATIC);
     };
-    ORBITFUSE_TRY(run(sql.c_str(), bind, [](sqlite3_stmt*) {}));
-    if (sqlite3_changes(handle_.get()) == 1) return {};
-    return fail(ErrorKind::input, path_.string(), fmt::format("no row of {} for {}", table, name),
-                "delete it and run the pose stage again");
+    return run(sql.c_str(), bind, [](sqlite3_stmt*) {});
   }
 
   Result<double> number(const char* sql) const {

@@ -28,7 +28,7 @@ Result<DatabaseCounts> count_database(const std::filesystem::path& database);
 Status number_images_by_name(const std::filesystem::path& database);
 
 /// By image name, of images that the database has with no features yet (COLMAP's feature_importer,
-/// given empty lists). Input error naming an image that it has not.
+/// given empty lists). Images that it has not, COLMAP could not read: they stay without features.
 Status write_features(const std::filesystem::path& database,
                       const std::map<std::string, SiftFeatures>& features);
 

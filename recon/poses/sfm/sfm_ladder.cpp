@@ -261,7 +261,7 @@ Result<ModalityPoses> structure_from_motion(const Session& session,
     tell(0, "features");
     ORBITFUSE_ASSIGN(const std::vector<ProxyImage> images,
                      write_proxies(session, frames, attempt.proxies, folder / "images", progress));
-    ColmapOptions engine{options.colmap, options.threads, options.seed, options.max_features,
+    ColmapOptions engine{options.colmap, options.seed, options.max_features,
                          attempt.peak_threshold};
     ORBITFUSE_ASSIGN(ColmapProject project,
                      ColmapProject::create(folder / "colmap", folder / "images", engine));

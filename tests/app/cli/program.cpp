@@ -49,17 +49,19 @@ Outcome run_program(const std::vector<std::string>& command, const RunOptions& o
     execvp(argv[0], argv.data());
     _exit(127);
   }
+  Outcome outcome;
   int status = 0;
   bool interrupted = options.interrupt_after.empty();
   while (waitpid(child, &status, interrupted ? 0 : WNOHANG) == 0) {
     const std::string text = read_file(err).value_or("") + read_file(out).value_or("");
     if (!interrupted && text.find(options.interrupt_after) != std::string::npos) {
-      kill(child, options.signal);
+      outcome.signalled = true;
+      for (int i = 0; i < options.signals; ++i)
+        if (kill(child, options.signal) != 0) outcome.signalled = false;
       interrupted = true;
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  Outcome outcome;
   outcome.code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   outcome.out = read_file(out).value_or("");
   outcome.err = read_file(err).value_or("");

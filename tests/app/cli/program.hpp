@@ -13,6 +13,7 @@ namespace orbitfuse {
 struct Outcome {
   int code = -1;
   std::string out, err;
+  bool signalled = false;  ///< by interrupt_after, while it ran
   /// The last line of --json output.
   nlohmann::json result() const;
   /// Every line of --json output.
@@ -25,6 +26,7 @@ struct RunOptions {
   /// Sends the signal once this text has appeared on stderr or stdout; empty = never.
   std::string interrupt_after = {};
   int signal = SIGINT;
+  int signals = 1;  ///< at once, as a terminal that goes away sends two
 };
 
 /// Runs the built `orbitfuse` with the arguments.

@@ -65,7 +65,7 @@ class Resumed : public ::testing::Test {
 TEST_F(Resumed, SyntheticWalkGoesOnAfterCtrlC) {
   // Long enough that the word is seen and the signal comes while it walks, on a busy machine too:
   // with 12 small frames it was over between two looks.
-  const std::vector<std::string> camera = {"--visible", "synthetic,size=80x60,spacing=10"};
+  const std::vector<std::string> camera = {"--visible", "synthetic,size=240x180,spacing=10"};
   ASSERT_EQ(orbitfuse_program({"capture", once, camera[0], camera[1]}).code, 0);
   const Outcome cut = orbitfuse_program({"capture", again, camera[0], camera[1], "-v"},
                                         {.interrupt_after = "visible 1"});
@@ -82,7 +82,7 @@ TEST_F(Resumed, ATerminalThatGoesAwayEndsARecordingProperly) {
         ORBITFUSE_BINARY_DIR "/app/orbitfuse",       "capture", again, "--visible",
         "synthetic,size=240x180,spacing=" + spacing, "-v"};
   };
-  const RunOptions hangup{.interrupt_after = "visible 1", .signal = SIGHUP};
+  const RunOptions hangup{.interrupt_after = "visible 1", .signal = SIGHUP, .signals = 2};
   const Outcome cut = run_program(walk("10"), hangup);
   ASSERT_EQ(cut.code, 130) << cut.err << cut.out;
   EXPECT_THAT(cut.err, HasSubstr("with --resume goes on"));
@@ -90,6 +90,7 @@ TEST_F(Resumed, ATerminalThatGoesAwayEndsARecordingProperly) {
   std::vector<std::string> words = walk("60");
   words.insert(words.begin(), "nohup");
   const Outcome whole = run_program(words, hangup);
+  EXPECT_TRUE(whole.signalled) << whole.err;
   EXPECT_EQ(whole.code, 0) << whole.err;
   EXPECT_TRUE(open_session(again)->complete);
 }

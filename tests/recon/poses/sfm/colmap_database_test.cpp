@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 #include <sqlite3.h>
+#include <fstream>
 
 #include "tests/support/temp_folder.hpp"
 
@@ -58,6 +59,29 @@ TEST(ColmapDatabase, ImagesAreNumberedByNameAndKeepTheirFeatures) {
       &order, nullptr);
   sqlite3_close(handle);
   EXPECT_EQ(order, "a.pngb.pngc.png");
+}
+
+TEST(ColmapDatabase, FeaturesAreWrittenForTheImagesThatItHas) {
+  const test::TempFolder folder;
+  make_database(folder / "db");
+  SiftFeatures found;
+  found.keypoints = {{1.5F, 2.5F, 3.0F, 0.5F}, {8.0F, 9.0F, 1.0F, 0.0F}};
+  found.descriptors.resize(2, 128);
+  found.descriptors.row(0).setConstant(7);
+  found.descriptors.row(1).setConstant(9);
+  // COLMAP could not read "z.png"; nothing was found in "a.png".
+  const Status written =
+      write_features(folder / "db", {{"c.png", found}, {"z.png", found}, {"a.png", {}}});
+  ASSERT_TRUE(written) << written.error().message();
+  const auto descriptors = read_descriptors(folder / "db");
+  const auto keypoints = read_keypoints(folder / "db");
+  ASSERT_TRUE(descriptors && keypoints);
+  EXPECT_EQ(descriptors->size(), 3u);
+  EXPECT_EQ(descriptors->at("c.png"), found.descriptors.cast<float>());
+  EXPECT_EQ(keypoints->at("c.png"), (Eigen::Matrix2d() << 1.5, 8, 2.5, 9).finished());
+  EXPECT_EQ(descriptors->at("a.png").rows(), 0);
+  std::ofstream(folder / "other") << "no database";
+  EXPECT_FALSE(write_features(folder / "other", {{"c.png", found}}));
 }
 
 TEST(ColmapDatabase, OtherFilesAreNamed) {

@@ -64,7 +64,6 @@ Result<Reconstruction> colmap_model(const Session& session,
   ProxyOptions proxies;
   proxies.clahe = proxies.destripe = true;
   ColmapOptions engine;
-  engine.threads = 1;
   engine.peak_threshold /= 3;
   ORBITFUSE_ASSIGN(const std::vector<ProxyImage> images,
                    write_proxies(session, frames, proxies, folder / "images", {}));
