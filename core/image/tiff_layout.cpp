@@ -50,6 +50,13 @@ std::string gdal_metadata(TIFF* tiff) {
   return {text, ::strnlen(text, count)};
 }
 
+/// Of an element without content ("<GDALMetadata/>") there is no end tag.
+bool is_cut(const std::string& metadata) {
+  const std::size_t first_end = metadata.find('>');
+  if (first_end == metadata.npos) return true;
+  return metadata[first_end - 1] != '/' && metadata.find("</GDALMetadata") == metadata.npos;
+}
+
 constexpr const char* no_number = "\"no number (GDAL's metadata)\"";
 
 /// The number of an item of that role as JSON; text where it is no number, for whoever reads it
@@ -145,7 +152,7 @@ std::string description_of(TIFF* tiff) {
   const std::string metadata = gdal_metadata(tiff);
   if (description.find("\"scale\"") != description.npos) return description;
   // Whether a scale or an offset stood in the rest nobody knows.
-  if (metadata.starts_with("<GDALMetadata") && metadata.find("</GDALMetadata") == metadata.npos)
+  if (metadata.starts_with("<GDALMetadata") && is_cut(metadata))
     return R"({"scale":"GDAL's metadata, cut off"})";
   if (metadata.find("role=\"scale\"") == metadata.npos) return description;
   return fmt::format(R"({{"scale":{},"offset":{}}})", gdal_number(metadata, "scale", "1"),

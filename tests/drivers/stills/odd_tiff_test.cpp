@@ -74,10 +74,13 @@ TEST(OddTiff, GdalsScaleIsTheTags) {
   tag = scale();
   ASSERT_FALSE(tag);
   EXPECT_THAT(tag.error().message(), AllOf(HasSubstr("g.tif"), HasSubstr("GDAL")));
-  words.gdal_metadata = "<Item name=\"STATISTICS_MEAN\">7000</Item>";
-  tag = scale();
-  ASSERT_TRUE(tag);
-  EXPECT_FALSE(*tag);
+  for (const char* without_scale :
+       {"<Item name=\"STATISTICS_MEAN\">7000</Item>", "<GDALMetadata/>", "<GDALMetadata />\n"}) {
+    words.gdal_metadata = without_scale;
+    tag = scale();
+    ASSERT_TRUE(tag) << without_scale << tag.error().message();
+    EXPECT_FALSE(*tag) << without_scale;
+  }
 }
 
 /// libtiff reads the header's bytes as the first samples.
