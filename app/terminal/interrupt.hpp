@@ -5,8 +5,9 @@
 
 namespace orbitfuse::terminal {
 
-/// Set by SIGINT, SIGTERM and, unless it is ignored (nohup), SIGHUP; a second signal ends the
-/// process at once with code 130.
+/// Set by SIGINT, SIGTERM and, unless it is ignored (nohup), SIGHUP. One that comes more than a
+/// second later ends the process at once with code 130; before, it is taken for the same wish: a
+/// shell that goes away sends SIGHUP twice within a millisecond.
 const std::atomic<bool>& interrupt_flag();
 void install_interrupt_handler();
 
