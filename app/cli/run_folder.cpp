@@ -7,6 +7,7 @@
 
 #include "app/cli/run_stages.hpp"
 #include "app/pipeline/stage_record.hpp"
+#include "app/stages/build_stages.hpp"
 #include "core/modality.hpp"
 #include "core/nested_text.hpp"
 #include "core/system/file_io.hpp"
@@ -20,7 +21,7 @@ using nlohmann::json;
 Status check_no_lost_record(const std::string& folder) {
   std::error_code unreadable;
   if (fs::exists(fs::path(folder) / "manifest.jsonl", unreadable) ||
-      pipeline::finished_stages(folder).empty())
+      pipeline::finished_stages(folder, stages::stage_names()).empty())
     return {};
   return fail(ErrorKind::input, folder, "results of a run, but no run.json that names its session",
               "name the session, with --out " + folder);

@@ -153,7 +153,8 @@ Status StagedRun::open(const std::vector<std::string>& targets) {
         fmt::format("{} holds results of {}: what this run doesn't reach stays that session's; "
                     "give each session an --out of its own",
                     folders_.out, *other));
-  if (missing_ == Missing::leave_out && pipeline::finished_stages(folders_.out).empty())
+  if (missing_ == Missing::leave_out &&
+      pipeline::finished_stages(folders_.out, stages::stage_names()).empty())
     return fail(
         ErrorKind::input, folders_.out, "no finished stage in it",
         "run the session first: orbitfuse run " + folders_.session + " --out " + folders_.out);

@@ -123,24 +123,17 @@ Status write_stage_record(const fs::path& folder, const StageRecord& record) {
   return write_file_atomic(folder / stage_record_file, j.dump(2) + "\n");
 }
 
-namespace {
-
-/// Not "lost+found", nor ".cache".
-bool is_like_a_stage(const std::string& name) {
-  return std::all_of(name.begin(), name.end(),
-                     [](char c) { return c == '_' || (c >= 'a' && c <= 'z'); });
-}
-
-}  // namespace
-
-std::set<std::string> finished_stages(const fs::path& out) {
+std::set<std::string> finished_stages(const fs::path& out,
+                                      const std::vector<std::string>& stage_names) {
   std::set<std::string> names;
   std::error_code unreadable;
   for (const auto& entry : fs::directory_iterator(out, unreadable)) {
     const std::string name = entry.path().filename().string();
     const fs::file_type mark = fs::status(entry.path() / stage_record_file, unreadable).type();
     // One that may not be looked at can be there: whoever reads it says why it can't be.
-    const bool unknown = mark == fs::file_type::none && is_like_a_stage(name);
+    const bool unknown =
+        mark == fs::file_type::none &&
+        std::find(stage_names.begin(), stage_names.end(), name) != stage_names.end();
     if (unknown || (mark != fs::file_type::none && mark != fs::file_type::not_found))
       names.insert(name);
   }
@@ -149,7 +142,7 @@ std::set<std::string> finished_stages(const fs::path& out) {
 
 std::vector<std::string> out_of_date(const fs::path& out, const std::set<std::string>& stages) {
   std::map<std::string, StageRecord> records;
-  for (const std::string& stage : finished_stages(out))
+  for (const std::string& stage : finished_stages(out, {}))  // whose records can be read
     if (auto record = read_stage_record(out / stage)) records.emplace(stage, *std::move(record));
   std::vector<std::string> late;
   for (const auto& [stage, record] : records) {
@@ -170,7 +163,7 @@ bool lies_in_a_stage(const fs::path& out, const fs::path& target) {
   const fs::path run = whole(out), to = whole(target);
   const fs::path inside = to.lexically_relative(run);
   return !inside.empty() && inside != "." &&
-         finished_stages(out).contains(inside.begin()->string());
+         finished_stages(out, {}).contains(inside.begin()->string());
 }
 
 Result<std::vector<OutputFile>> list_outputs(const fs::path& folder) {

@@ -41,9 +41,11 @@ Result<StageRecord> read_stage_record(const std::filesystem::path& folder);
 Status write_stage_record(const std::filesystem::path& folder, const StageRecord& record);
 
 /// Folders of a run that have a done mark, as they lie there: files may be damaged or out of date.
-/// None where the run's folder can't be read; a stage's folder that can't be is taken for one that
-/// has its mark, so that it is named where it is needed.
-std::set<std::string> finished_stages(const std::filesystem::path& out);
+/// None where the run's folder can't be read; a folder that can't be, of the name of one of these
+/// stages, is taken for one that has its mark, so that it is named where it is needed. Others
+/// ("backup") are the user's.
+std::set<std::string> finished_stages(const std::filesystem::path& out,
+                                      const std::vector<std::string>& stage_names);
 
 /// Every file below the folder except the done mark, sorted by name.
 Result<std::vector<OutputFile>> list_outputs(const std::filesystem::path& folder);

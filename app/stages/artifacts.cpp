@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "app/stages/build_stages.hpp"
 #include "core/formats/colmap_model.hpp"
 #include "core/formats/transforms_json.hpp"
 #include "core/geometry/geometry_json.hpp"
@@ -50,7 +51,7 @@ JsonFields metric_fields(const pipeline::StageRecord& record, const fs::path& fo
 pipeline::StageContext context_of_run(const fs::path& out) {
   pipeline::StageContext context;
   context.out = out;
-  context.finished = pipeline::finished_stages(out);
+  context.finished = pipeline::finished_stages(out, stage_names());
   return context;
 }
 

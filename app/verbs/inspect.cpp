@@ -166,7 +166,7 @@ Status inspect_run(Context& context, const fs::path& folder) {
   const fs::directory_iterator readable(folder, error);
   if (error)
     return fail(ErrorKind::input, folder.string(), error.message(), "check the permissions");
-  const std::set<std::string> finished = pipeline::finished_stages(folder);
+  const std::set<std::string> finished = pipeline::finished_stages(folder, stages::stage_names());
   for (const std::string& stage : finished) {
     const auto record = pipeline::read_stage_record(folder / stage);
     if (!record) {
@@ -270,7 +270,7 @@ Action add_inspect(CLI::App& app) {
     std::error_code unreadable;  // inspect_session says why
     const bool run = fs::exists(fs::path(*folder) / run_file, unreadable) ||
                      (!fs::exists(fs::path(*folder) / "manifest.jsonl", unreadable) &&
-                      !pipeline::finished_stages(*folder).empty());
+                      !pipeline::finished_stages(*folder, stages::stage_names()).empty());
     return run ? inspect_run(context, *folder) : inspect_session(context, *folder);
   };
 }
