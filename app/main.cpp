@@ -19,6 +19,7 @@
 
 #include "app/cli/command_line.hpp"
 #include "app/cli/run_stages.hpp"
+#include "app/pipeline/out_folder.hpp"
 #include "app/terminal/exit_code.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/system/file_io.hpp"
@@ -119,6 +120,7 @@ Status traced(const std::string& file, const char* verb, const std::function<Sta
       std::filesystem::is_directory(file, unreadable))
     return fail(ErrorKind::usage, "--trace " + file, "no file in a folder that can be written to",
                 "name a file in a folder that exists");
+  ORBITFUSE_TRY(pipeline::check_outside_stages(file));
   start_trace();
   Status status;
   {

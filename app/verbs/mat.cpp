@@ -13,6 +13,7 @@
 
 #include "app/cli/typed_options.hpp"
 #include "app/cli/verb.hpp"
+#include "app/pipeline/out_folder.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse::cli {
@@ -37,6 +38,7 @@ Status check_out(const std::string& out, bool force) {
   if (!std::filesystem::is_directory(folder, error))
     return fail(ErrorKind::input, folder.string(), "no such folder",
                 "make it first, or choose another");
+  ORBITFUSE_TRY(pipeline::check_outside_stages(file));
   const auto status = std::filesystem::status(file, error);
   if (status.type() == std::filesystem::file_type::not_found) {
     if (::faccessat(AT_FDCWD, folder.c_str(), W_OK | X_OK, AT_EACCESS) == 0) return {};

@@ -67,8 +67,8 @@ Status run(Context& context, const ReplayArguments& o) {
   options.session = o.to;
   options.resume = context.common.resume;
   options.notes = session.notes;
+  ORBITFUSE_TRY(pipeline::check_outside_stages(o.to));  // before the next one makes the folder
   ORBITFUSE_TRY(recording::check_folder(options));
-  ORBITFUSE_TRY(pipeline::check_outside_stages(o.to));
   if (lies_among_frames(o.to, o.session))
     return fail(ErrorKind::usage, "--to " + o.to, "lies among the frames of the session itself",
                 "choose another folder");

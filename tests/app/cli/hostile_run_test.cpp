@@ -144,6 +144,8 @@ TEST_F(HostileRun, AStagesFolderWithoutItsRecordIsToldByInspect) {
   fs::remove(out / "poses_visible/stage.json");
   test::put(out / "render/mine.txt", "a folder of the user's own");
   fs::create_directories(out / "depth");  // empty: the next run takes it
+  // Not to be looked into, but of no stage's name.
+  fs::create_symlink("backup", out / "backup");
   const Outcome told = orbitfuse_program({"inspect", out.string(), "--json"});
   EXPECT_EQ(told.code, 0) << told.err;
   EXPECT_EQ(told.result().at("without_record"), json({"poses_visible", "render"}));
@@ -178,7 +180,9 @@ TEST_F(HostileRun, NothingIsWrittenIntoAStageOfAnyRun) {
       {"replay", session.string(), "--to", into.string()},
       {"import", into.string(), "--visible", photo},
       {"import", into.string(), "--visible", photo, "--dry-run"},
-      {"capture", into.string(), "--driver", "synthetic"}};
+      {"capture", into.string(), "--driver", "synthetic"},
+      {"mat", "--out", (stage / "mat.pdf").string()},
+      {"inspect", session.string(), "--trace", (stage / "trace.json").string()}};
   for (const auto& words : calls) {
     const Outcome refused = orbitfuse_program(words);
     EXPECT_EQ(refused.code, 2) << words[0] << ": " << refused.err;
