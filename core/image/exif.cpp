@@ -8,6 +8,8 @@
 #include <exiv2/exiv2.hpp>
 #include <mutex>
 
+#include "core/image/image_codec.hpp"
+
 namespace orbitfuse {
 namespace {
 
@@ -88,6 +90,9 @@ ExifInfo read_exif(std::string_view bytes) {
     const Exiv2::ExifData& data = image->exifData();
     const double orientation = number_of(data, "Exif.Image.Orientation").value_or(1);
     if (orientation >= 1 && orientation <= 8) info.orientation = static_cast<int>(orientation);
+    // Exiv2's is the first directory's, which may be that of a preview.
+    if (type == Exiv2::ImageType::tiff)
+      info.orientation = tiff_orientation(bytes).value_or(info.orientation);
     info.focal_mm = number_of(data, "Exif.Photo.FocalLength");
     info.focal_35mm = number_of(data, "Exif.Photo.FocalLengthIn35mmFilm");
     if (info.focal_mm && *info.focal_mm <= 0) info.focal_mm.reset();

@@ -42,6 +42,9 @@ std::optional<int> tiff_page_count(std::string_view bytes);
 /// A sentence on pages of another size or kind of samples, which decode_tiff() does not read; empty
 /// where there is none. No tag says whether they are previews or another camera's images.
 std::string other_tiff_pages(std::string_view bytes);
+/// How the page (none: the first) that decode_tiff() reads is to be turned, 1..8: a copy in front
+/// of it has a tag of its own. Nothing where it can't be read.
+std::optional<int> tiff_orientation(std::string_view bytes, std::optional<int> page = {});
 /// 8/16-bit unsigned or 32-bit float samples, one channel or RGB (returned as BGR); other colours
 /// (a palette, CMYK, Lab, planes) are refused by name. Without a page the file must hold a single
 /// one: nobody asked for the first of several. Where the ImageDescription names no scale, GDAL's

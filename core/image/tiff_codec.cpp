@@ -137,6 +137,20 @@ std::optional<int> tiff_page_count(std::string_view bytes) {
   return pages;
 }
 
+std::optional<int> tiff_orientation(std::string_view bytes, std::optional<int> page) {
+  TiffMemory file;
+  file.input = bytes;
+  const TiffHandle tiff = open_tiff(file);
+  if (!tiff) return std::nullopt;
+  to_first_page(tiff.get());
+  const TiffLayout first = layout_of(tiff.get());
+  for (int at = 0; at < page.value_or(0); ++at)
+    if (!next_page(tiff.get(), first)) return std::nullopt;
+  std::uint16_t orientation = ORIENTATION_TOPLEFT;
+  TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_ORIENTATION, &orientation);
+  return orientation >= 1 && orientation <= 8 ? orientation : 1;
+}
+
 std::string other_tiff_pages(std::string_view bytes) {
   TiffMemory file;
   file.input = bytes;

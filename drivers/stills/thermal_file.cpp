@@ -81,12 +81,14 @@ Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::
   const ExifInfo exif = read_exif(bytes);
   file.taken_ns = exif.taken_ns;
   file.orientation = exif.orientation;
-  file.image = apply_orientation(file.image, exif.orientation);
+  if (page && image_format(bytes) == ImageFormat::tiff)
+    file.orientation = tiff_orientation(bytes, page).value_or(1);
+  file.image = apply_orientation(file.image, file.orientation);
   file.transparent = transparent_share(bytes, page);
   if (file.image.depth() == CV_8U) {
     file.bytes = bytes;
     // Whoever reads thermal frames takes them as they are stored.
-    if (exif.orientation != 1) {
+    if (file.orientation != 1) {
       ORBITFUSE_ASSIGN(file.bytes, encode_png(file.image));
     }
     return file;

@@ -210,8 +210,9 @@ std::string tiff_of_pages(const std::vector<cv::Mat>& pages, const TiffWords& wo
                                    {262, 3, 1, static_cast<std::uint64_t>(words.photometric)}});
     if (description.size() > 3) entries.push_back({270, 2, description.size() + 1, text_at});
     entries.push_back({273, 4, planes, planes > 1 ? planes_at : pixels_at});
-    if (words.orientation != 0)
-      entries.push_back({274, 3, 1, static_cast<std::uint64_t>(words.orientation)});
+    const bool is_other = link == 4 && words.orientation_of_first != 0;
+    if (const int way = is_other ? words.orientation_of_first : words.orientation; way != 0)
+      entries.push_back({274, 3, 1, static_cast<std::uint64_t>(way)});
     entries.push_back({277, 3, 1, channels});
     entries.push_back({278, 4, 1, static_cast<std::uint64_t>(page.rows)});
     entries.push_back({279, 4, planes, planes > 1 ? planes_at + 4 * planes : plane_bytes});

@@ -48,8 +48,9 @@ struct TiffWords {
   std::string gdal_metadata;          ///< tag 42112
   int photometric = 1, channels = 1;  ///< of several channels the page is that much wider
   int planar = 1;
-  int orientation = 0;       ///< tag 274; 0: none
-  int subfile_of_first = 0;  ///< 1: the first page is a reduced copy of another
+  int orientation = 0;           ///< tag 274; 0: none
+  int orientation_of_first = 0;  ///< likewise, of the first page alone; 0: as the others
+  int subfile_of_first = 0;      ///< 1: the first page is a reduced copy of another
 };
 /// An uncompressed little-endian TIFF of several CV_16UC1 or CV_8UC1 pages.
 std::string tiff_of_pages(const std::vector<cv::Mat>& pages, const TiffWords& words);

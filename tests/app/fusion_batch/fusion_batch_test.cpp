@@ -148,6 +148,11 @@ TEST_F(FusionBatch, ThermalImagesAreTurnedAsTheirTagSays) {
   ASSERT_EQ(kelvin->size(), cv::Size(30, 40));
   EXPECT_NEAR(kelvin->at<float>(5, 25), 310, 0.01);
   EXPECT_NEAR(kelvin->at<float>(5, 5), 290, 0.01);
+  // Not as that of a preview in front of it does.
+  words.subfile_of_first = words.orientation_of_first = 1;
+  const cv::Mat preview(3, 4, CV_8UC1, cv::Scalar(1));
+  test::put(own / "p.tif", made::tiff_of_pages({preview, counts}, words));
+  EXPECT_EQ(read_thermal(own / "p.tif")->size(), cv::Size(30, 40));
 }
 
 }  // namespace
