@@ -14,6 +14,7 @@ bool asks_for_operator(EventKind kind) {
     case EventKind::setting_lost:
     case EventKind::nothing_new:
     case EventKind::transparent:
+    case EventKind::held:
       return true;
     default:
       return false;

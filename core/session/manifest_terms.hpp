@@ -33,6 +33,7 @@ enum class EventKind {
   raw_counts,
   clipped,
   transparent,
+  held,
   scale,
   clock,
   stale,
@@ -60,7 +61,7 @@ struct NamedTerm {
   std::string_view name;
 };
 
-inline constexpr std::array<NamedTerm<EventKind>, 30> event_kinds{{
+inline constexpr std::array<NamedTerm<EventKind>, 31> event_kinds{{
     {EventKind::resumed, "resumed"},
     {EventKind::ignored, "ignored"},
     {EventKind::duplicate, "duplicate"},
@@ -83,6 +84,7 @@ inline constexpr std::array<NamedTerm<EventKind>, 30> event_kinds{{
     {EventKind::raw_counts, "raw-counts"},
     {EventKind::clipped, "clipped"},
     {EventKind::transparent, "transparent"},
+    {EventKind::held, "held"},
     {EventKind::scale, "scale"},
     {EventKind::clock, "clock"},
     {EventKind::stale, "stale"},

@@ -16,8 +16,8 @@ Result<CameraGroup*> CameraGroups::of(StillPhoto& still, const Source& source) {
   const std::string key = still.key();
   for (CameraGroup& group : groups_) {
     if (group.modality != modality) continue;
-    if (group.key == key) return &group;
-    if (focal) {
+    if (group.key == key && group.size == still.size) return &group;
+    if (focal && group.key != key) {
       return fail(
           ErrorKind::input, source.short_name(),
           fmt::format("is of {}, but {} of {}", still.described(), group.first_file,
@@ -27,7 +27,7 @@ Result<CameraGroup*> CameraGroups::of(StillPhoto& still, const Source& source) {
                       *focal));
     }
   }
-  groups_.push_back({modality, key, still.described(), source.short_name(), {}, 0});
+  groups_.push_back({modality, key, still.size, still.described(), source.short_name(), {}, 0});
   return &groups_.back();
 }
 

@@ -18,7 +18,9 @@ namespace orbitfuse {
 /// Photos of one camera, lens and size share a device, so that they may share intrinsics.
 struct CameraGroup {
   Modality modality = Modality::visible;
-  std::string key, described, first_file;
+  std::string key;
+  cv::Size size = {};  ///< upright: intrinsics that are known fit one way of holding
+  std::string described, first_file;
   std::string id;  ///< of the device; empty until it has a frame
   std::uint64_t frames = 0;
 };

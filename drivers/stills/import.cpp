@@ -128,13 +128,18 @@ class Importer {
   }
 
   Status add_visible_frame(std::string bytes, const Source& source, bool tracking,
-                           const std::optional<DeclaredStations>& stations, int held = 1) {
-    Result<StillPhoto> still = visible_still(std::move(bytes), source.where(), held);
+                           const std::optional<DeclaredStations>& stations,
+                           const ThermalFile* inside = nullptr) {
+    Result<StillPhoto> still = visible_still(std::move(bytes), source.where(), inside);
     if (!still) {
       pass_over(still.error());
       return {};
     }
     tell_other_pages(still->other_pages, source);
+    if (still->lies_across)
+      remarks_.add_of_file("", source.short_name(),
+                           "its photo lies across its temperatures as the sensor has them (one is "
+                           "upright, the other not): it is left as it is stored");
     return add_frame(std::move(*still), source, tracking, stations);
   }
 
@@ -159,7 +164,7 @@ class Importer {
       if (options_.embedded_visible && file->flir && !file->flir->embedded_visible.empty()) {
         ++embedded_;
         ORBITFUSE_TRY(add_visible_frame(file->flir->embedded_visible, source, tracking,
-                                        options_.thermal_stations, file->orientation));
+                                        options_.thermal_stations, &*file));
       }
     }
     return {};

@@ -33,6 +33,20 @@ std::string extension_of_bytes(const std::string& bytes) {
   }
 }
 
+bool is_on_its_side(int orientation) { return orientation >= 5; }
+
+cv::Size turned(cv::Size size, int orientation) {
+  return is_on_its_side(orientation) ? cv::Size(size.height, size.width) : size;
+}
+
+/// Of a photo, as it is stored, and the samples beside it, as the sensor had them.
+bool lies_across(cv::Size photo, const ThermalFile& file) {
+  if (!file.flir) return false;
+  const cv::Size samples = turned(file.flir->signal.size(), file.orientation);
+  const auto shape = [](cv::Size s) { return (s.height > s.width) - (s.height < s.width); };
+  return shape(photo) * shape(samples) < 0;  // neither is square
+}
+
 }  // namespace
 
 double focal_px_of_35mm(double focal_35mm, cv::Size size) {
@@ -43,7 +57,8 @@ ExifInfo exif_of_photo(std::string_view bytes) {
   return is_heif(bytes) ? heif_exif(bytes) : read_exif(bytes);
 }
 
-Result<StillPhoto> visible_still(std::string bytes, const std::string& where, int held) {
+Result<StillPhoto> visible_still(std::string bytes, const std::string& where,
+                                 const ThermalFile* inside) {
   StillPhoto still;
   const ExifInfo exif = exif_of_photo(bytes);
   cv::Mat image;
@@ -61,9 +76,12 @@ Result<StillPhoto> visible_still(std::string bytes, const std::string& where, in
                 std::string(image.depth() == CV_16U ? "16-bit" : "floating-point") +
                     " samples, but photos have 8 bits",
                 "a thermal image? Give it as thermal, or convert it to 8-bit");
-  if (held != 1 && exif.orientation == 1) {
-    image = apply_orientation(image, held);
-    ORBITFUSE_ASSIGN(bytes, encode_jpeg(image, as_jpeg_quality));
+  if (inside && inside->orientation != 1 && exif.orientation == 1) {
+    still.lies_across = lies_across(image.size(), *inside);
+    if (!still.lies_across) {
+      image = apply_orientation(image, inside->orientation);
+      ORBITFUSE_ASSIGN(bytes, encode_jpeg(image, as_jpeg_quality));
+    }
   }
   still.size = apply_orientation(image, exif.orientation).size();
   still.frame.extension = extension_of_bytes(bytes);
@@ -132,8 +150,7 @@ Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& 
     still.camera.serial = file.flir->camera_serial;
     if (const auto fov = file.flir->horizontal_fov_deg) {
       // Of the sensor, which a turn by 90 degrees stood on its side.
-      const bool on_side = file.orientation >= 5;
-      const int across = on_side ? still.size.height : still.size.width;
+      const int across = turned(still.size, file.orientation).width;
       still.camera.lens.focal_px = Camera::from_fov(across, across, *fov).fx;
       still.lens = fmt::format("{:.1f} degrees", *fov);
     }
@@ -153,8 +170,9 @@ Result<StillPhoto> read_thermal_still(const std::filesystem::path& path, Thermal
 }
 
 std::string StillPhoto::key() const {
-  return fmt::format("{}|{}|{}|{}x{}|{}", camera.model, camera.serial, lens, size.width,
-                     size.height, frame.thermal_is_gray);
+  const cv::Size sensor = turned(size, orientation);
+  return fmt::format("{}|{}|{}|{}x{}|{}", camera.model, camera.serial, lens, sensor.width,
+                     sensor.height, frame.thermal_is_gray);
 }
 
 std::string StillPhoto::described() const {

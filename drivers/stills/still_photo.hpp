@@ -20,9 +20,11 @@ struct StillPhoto {
   double transparent = 0;       ///< share of the pixels whose alpha, which is dropped, says so
   std::string other_pages;      ///< of its TIFF that no frame is made of, in words
   int orientation = 1;          ///< as of ThermalFile
-  bool lies_across = false;     ///< likewise
+  bool lies_across = false;     ///< likewise; of a photo: beside the samples of its file
 
-  std::string key() const;        ///< same key: same camera, lens, image size and kind of samples
+  /// Same key: same camera, lens, image size and kind of samples; of thermal images the size that
+  /// the sensor has, however it was held.
+  std::string key() const;
   std::string described() const;  ///< the same for people
 };
 
@@ -33,9 +35,11 @@ double focal_px_of_35mm(double focal_35mm, cv::Size size);
 ExifInfo exif_of_photo(std::string_view bytes);
 
 /// The bytes of a photo (JPEG, PNG, TIFF, HEIC). Input error naming `where` when they don't decode.
-/// `held`: how the camera was held (EXIF orientation) where the file that it lies in says so and
-/// the photo itself doesn't: it is stored turned then, as JPEG.
-Result<StillPhoto> visible_still(std::string bytes, const std::string& where, int held = 1);
+/// `inside`: the radiometric JPEG that it lies in. How the camera was held is said there where the
+/// photo itself doesn't: it is stored turned then, as JPEG, but left as it is (`lies_across`) where
+/// it stands upright beside broad samples, or the reverse: the camera turned it already, perhaps.
+Result<StillPhoto> visible_still(std::string bytes, const std::string& where,
+                                 const ThermalFile* inside = nullptr);
 /// A frame of a video (CV_8UC3, upright), which is stored as JPEG.
 Result<StillPhoto> still_of_video(const cv::Mat& image);
 /// A thermal image turned into counts of temperature, or kept as it is when it is 8-bit; counts

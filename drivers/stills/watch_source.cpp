@@ -251,9 +251,24 @@ void WatchSource::tell(const StillPhoto& still, const std::string& name, Frame& 
                           "with the flag transparent: send the images as they were taken",
                           name, 100 * still.transparent));
   }
+  tell_once_how_held(still, name);
   if (!still.other_pages.empty())
     tell_once(EventKind::ignored,
               fmt::format("{}: {} (told of the first such file)", name, still.other_pages), true);
+}
+
+void WatchSource::tell_once_how_held(const StillPhoto& still, const std::string& name) {
+  if (still.orientation == 1 && !still.lies_across) return;
+  if (!told_held_.insert(still.lies_across).second) return;
+  pending_.push_back(event_delivery(
+      EventKind::held,
+      name +
+          (still.lies_across
+               ? ": its temperatures lie across its picture (one is upright, the other not), "
+                 "and no tag says which way: they stay as the sensor has them"
+               : fmt::format(": turned upright, as its EXIF says (orientation {})",
+                             still.orientation)) +
+          " (told of the first such file)"));
 }
 
 void WatchSource::tell_once(EventKind kind, std::string words, bool kept) {

@@ -69,6 +69,7 @@ class WatchSource final : public FrameSource {
   void tell(const StillPhoto& still, const std::string& name, Frame& frame);
   /// Of the first file of a matter; a folder of one program's files has it in each.
   void tell_once(EventKind kind, std::string words, bool kept = false);
+  void tell_once_how_held(const StillPhoto& still, const std::string& name);
 
   WatchOptions options_;
   std::unique_ptr<Reader> reader_;
@@ -83,6 +84,7 @@ class WatchSource final : public FrameSource {
   std::uint64_t next_id_ = 0;
   bool gone_told_ = false;
   std::set<EventKind> told_;
+  std::set<bool> told_held_;      ///< whether it lay across
   std::deque<Delivery> pending_;  ///< goes before the next photo
 };
 

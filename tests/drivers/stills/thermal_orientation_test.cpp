@@ -4,7 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <opencv2/imgproc.hpp>
+#include <tuple>
 
+#include "capture/recording/session_writer.hpp"
+#include "core/image/exif.hpp"
+#include "core/session/session.hpp"
+#include "drivers/stills/thermal_file.hpp"
+#include "drivers/stills/watch_source.hpp"
 #include "tests/drivers/stills/import_files.hpp"
 #include "tests/support/made_files.hpp"
 #include "tests/support/says.hpp"
@@ -139,6 +145,95 @@ TEST_F(ThermalOrientation, TiffsAndGreyPicturesComeUpright) {
   cv::Mat first;
   cv::extractChannel(*stored, first, 0);
   EXPECT_GT(first.at<std::uint8_t>(5, 25), 200);
+}
+
+/// The tag of the page that is read counts, not that of a preview in front of it.
+TEST_F(ThermalOrientation, APreviewInFrontDoesNotSayHowTheImageIsHeld) {
+  const cv::Mat preview(3, 4, CV_8UC1, cv::Scalar(1));
+  made::TiffWords words;
+  words.description = R"({"scale":0.01})";
+  words.subfile_of_first = 1;
+  for (const auto& [of_preview, of_image, size] :
+       {std::tuple(1, 6, cv::Size(30, 40)), std::tuple(6, 1, cv::Size(40, 30))}) {
+    words.orientation_of_first = of_preview;
+    words.orientation = of_image;
+    const std::string bytes = made::tiff_of_pages({preview, counts(1)}, words);
+    put("t/a.tif", bytes);
+    const auto file = read_thermal_file(folder / "t/a.tif");
+    ASSERT_TRUE(file) << file.error().message();
+    EXPECT_EQ(file->image.size(), size);
+    EXPECT_EQ(file->orientation, of_image);
+    EXPECT_EQ(read_exif(bytes).orientation, of_image);
+  }
+}
+
+/// Cameras turn their photo and not what lies beside it.
+TEST_F(ThermalOrientation, AnEmbeddedPhotoThatStandsUprightAlreadyIsNotTurned) {
+  const cv::Mat photo(80, 60, CV_8UC3, cv::Scalar(40, 90, 40));
+  put_flir("t/a.jpg", 6, 1, *encode_jpeg(photo, 95));
+  options.thermal = {folder / "t"};
+  options.embedded_visible = true;
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  const auto frames = report->session.frames_of(Modality::visible);
+  ASSERT_EQ(frames.size(), 1u);
+  EXPECT_EQ(cv::Size(frames[0]->width, frames[0]->height), cv::Size(60, 80));
+  EXPECT_EQ(kelvin_of(*report, 0).size(), cv::Size(30, 40));
+  EXPECT_THAT(report->warnings, test::one_says("t/a.jpg", "its photo lies across"));
+}
+
+/// Held both ways it is one camera: its focal length is true of both, and each size is posed alone.
+TEST_F(ThermalOrientation, OneCameraHeldBothWaysMayHaveOneFocalLength) {
+  put_flir("t/a.jpg", 1, 1);
+  put_flir("t/b.jpg", 6, 2);
+  options.thermal = {folder / "t"};
+  options.thermal_focal_px = 70;
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->thermal, 2);
+  ASSERT_EQ(report->session.devices.size(), 2u);
+  for (const DeviceInfo& device : report->session.devices) EXPECT_EQ(device.lens.focal_px, 70);
+}
+
+/// In a watched folder it is one device; its frames are recorded upright, and posed by size.
+TEST_F(ThermalOrientation, AWatchedCameraMayBeHeldBothWays) {
+  WatchOptions watched;
+  watched.folder = folder / "t";
+  watched.modality = Modality::thermal;
+  watched.settle = watched.rescan = std::chrono::milliseconds(20);
+  std::filesystem::create_directories(watched.folder);
+  WatchSource source(watched);
+  ASSERT_TRUE(source.start());
+  const auto soon = [&] {
+    auto delivery = source.next(std::chrono::seconds(10));
+    EXPECT_TRUE(delivery);
+    return delivery ? std::move(*delivery) : Delivery{};
+  };
+  put_flir("t/a.jpg", 1, 1);
+  const Delivery broad = soon();
+  ASSERT_EQ(broad.kind, Delivery::Kind::frame) << broad.reason;
+  put_flir("t/b.jpg", 6, 2);
+  const Delivery upright = soon(), told = soon();
+  ASSERT_EQ(upright.kind, Delivery::Kind::frame) << upright.reason;
+  EXPECT_EQ(told.event, EventKind::held);
+  EXPECT_THAT(told.detail, testing::HasSubstr("b.jpg: turned upright"));
+  put_flir("t/c.jpg", 6, 3);
+  EXPECT_EQ(soon().kind, Delivery::Kind::frame);
+  EXPECT_EQ(source.next(std::chrono::milliseconds(200))->kind, Delivery::Kind::timeout)
+      << "told once";
+
+  const auto writer = SessionWriter::create(folder / "session", {});
+  ASSERT_TRUE(writer) << writer.error().message();
+  const DeviceInfo device = source.describe();
+  ASSERT_TRUE((*writer)->add_device(device));
+  for (const Delivery* one : {&broad, &upright})
+    ASSERT_TRUE((*writer)->append(device.id, one->frame));
+  ASSERT_TRUE((*writer)->close());
+  const auto session = open_session(folder / "session");
+  ASSERT_TRUE(session) << session.error().message();
+  ASSERT_EQ(session->frames.size(), 2u);
+  EXPECT_EQ(session->frames[0].width, 40);
+  EXPECT_EQ(session->frames[1].width, 30);
 }
 
 /// Of many one sentence.
