@@ -216,7 +216,7 @@ TEST_F(ThermalOrientation, AWatchedCameraMayBeHeldBothWays) {
   const Delivery upright = soon(), told = soon();
   ASSERT_EQ(upright.kind, Delivery::Kind::frame) << upright.reason;
   EXPECT_EQ(told.event, EventKind::held);
-  EXPECT_THAT(told.detail, testing::HasSubstr("b.jpg: turned upright"));
+  EXPECT_THAT(told.detail, ::testing::HasSubstr("b.jpg: turned upright"));
   put_flir("t/c.jpg", 6, 3);
   EXPECT_EQ(soon().kind, Delivery::Kind::frame);
   EXPECT_EQ(source.next(std::chrono::milliseconds(200))->kind, Delivery::Kind::timeout)
