@@ -12,8 +12,7 @@ Result<FeatureLevel> FeatureLevel::extract(const Session& session,
                                            const Progress& progress, double peak_threshold) {
   ProxyOptions proxies;
   proxies.max_side_px = options.max_image_side_px;
-  ColmapOptions engine{options.colmap, options.seed, options.max_features,
-                       peak_threshold};
+  ColmapOptions engine{options.colmap, options.seed, options.max_features, peak_threshold};
   FeatureLevel level(session, options);
   ORBITFUSE_ASSIGN(level.images_,
                    write_proxies(session, frames, proxies, folder / "images", progress));
