@@ -14,7 +14,7 @@ namespace {
 // Seconds on two cores of an Intel Xeon (Sapphire Rapids), from the traces of whole runs
 // (`run --trace`, docs/notes/planner.md).
 constexpr double start_s = 0.3, known_poses_s = 0.5;
-constexpr double visible_pose_s = 0.55;  // a view: features of 800 pixels, matching, mapping
+constexpr double visible_pose_s = 0.3;  // a view: features of 800 pixels, matching, mapping
 /// A view: search, renders, temperatures. 0.9 to 1.4 by scene; what is wrong is made good later, by
 /// the thermal training and the scores.
 constexpr double thermal_pose_s = 1.15;
