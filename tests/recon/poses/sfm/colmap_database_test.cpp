@@ -69,9 +69,9 @@ TEST(ColmapDatabase, FeaturesAreWrittenForTheImagesThatItHas) {
   found.descriptors.resize(2, 128);
   found.descriptors.row(0).setConstant(7);
   found.descriptors.row(1).setConstant(9);
-  // COLMAP could not read "z.png"; nothing was found in "a.png".
-  const Status written =
-      write_features(folder / "db", {{"c.png", found}, {"z.png", found}, {"a.png", {}}});
+  // COLMAP could not read "z.png"; nothing was found in "b.png".
+  const Status written = write_features(
+      folder / "db", {{"a.png", found}, {"c.png", found}, {"z.png", found}, {"b.png", {}}});
   ASSERT_TRUE(written) << written.error().message();
   const auto descriptors = read_descriptors(folder / "db");
   const auto keypoints = read_keypoints(folder / "db");
@@ -79,7 +79,8 @@ TEST(ColmapDatabase, FeaturesAreWrittenForTheImagesThatItHas) {
   EXPECT_EQ(descriptors->size(), 3u);
   EXPECT_EQ(descriptors->at("c.png"), found.descriptors.cast<float>());
   EXPECT_EQ(keypoints->at("c.png"), (Eigen::Matrix2d() << 1.5, 8, 2.5, 9).finished());
-  EXPECT_EQ(descriptors->at("a.png").rows(), 0);
+  EXPECT_EQ(descriptors->at("b.png").rows(), 0);
+  EXPECT_EQ(keypoints->at("a.png"), keypoints->at("c.png"));
   std::ofstream(folder / "other") << "no database";
   EXPECT_FALSE(write_features(folder / "other", {{"c.png", found}}));
 }
