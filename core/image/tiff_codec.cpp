@@ -66,6 +66,36 @@ bool next_page(TIFF* tiff, const TiffLayout& first) {
   return false;
 }
 
+/// A TIFF in memory, at its first image until it is moved on.
+class TiffPages {
+ public:
+  explicit TiffPages(std::string_view bytes) {
+    file_.input = bytes;
+    tiff_ = open_tiff(file_);
+    if (!tiff_) return;
+    to_first_page(get());
+    first_ = layout_of(get());
+  }
+
+  explicit operator bool() const { return tiff_ != nullptr; }
+  TIFF* get() const { return tiff_.get(); }
+  const TiffLayout& first() const { return first_; }
+  bool tag_is_cut() const { return file_.tag_is_cut; }
+
+  bool next() { return next_page(get(), first_); }
+  /// From the first.
+  bool go_to(int page) {
+    for (int at = 0; at < page; ++at)
+      if (!next()) return false;
+    return true;
+  }
+
+ private:
+  TiffMemory file_;
+  TiffHandle tiff_{nullptr, &TIFFClose};  // reads file_, so it goes first
+  TiffLayout first_;
+};
+
 cv::Mat to_bgr(const cv::Mat& image) {
   cv::Mat out = image;
   if (image.channels() == 3) cv::cvtColor(image, out, cv::COLOR_RGB2BGR);
@@ -81,18 +111,12 @@ struct StoredPage {
 
 Result<StoredPage> read_page(std::string_view bytes, const std::string& where,
                              std::string* image_description, int page) {
-  TiffMemory file;
-  file.input = bytes;
-  const TiffHandle tiff = open_tiff(file);
+  TiffPages tiff(bytes);
   if (!tiff) return fail(ErrorKind::input, where, "not a readable TIFF", "copy the file again");
-  to_first_page(tiff.get());
-  TiffLayout l = layout_of(tiff.get());
-  for (int at = 0; at < page; ++at) {
-    if (!next_page(tiff.get(), l))
-      return fail(ErrorKind::input, where, fmt::format("no page {}", page + 1),
-                  "copy the file again");
-  }
-  l = layout_of(tiff.get());  // of the page
+  if (!tiff.go_to(page))
+    return fail(ErrorKind::input, where, fmt::format("no page {}", page + 1),
+                "copy the file again");
+  const TiffLayout l = layout_of(tiff.get());
   if (std::string why = unread_layout(l); !why.empty()) {
     return fail(ErrorKind::input, where, std::move(why),
                 "convert it to 8 or 16-bit unsigned grey or RGB");
@@ -117,7 +141,7 @@ Result<StoredPage> read_page(std::string_view bytes, const std::string& where,
                 CV_MAKETYPE(*depth_of(l), l.channels));
   const bool whole = TIFFIsTiled(tiff.get()) ? read_tiles(tiff.get(), l, image)
                                              : read_strips(tiff.get(), l, image);
-  if (!whole || file.tag_is_cut) {
+  if (!whole || tiff.tag_is_cut()) {
     return fail(ErrorKind::input, where, "truncated or damaged TIFF", "copy the file again");
   }
   return StoredPage{l, image};
@@ -126,38 +150,24 @@ Result<StoredPage> read_page(std::string_view bytes, const std::string& where,
 }  // namespace
 
 std::optional<int> tiff_page_count(std::string_view bytes) {
-  TiffMemory file;
-  file.input = bytes;
-  const TiffHandle tiff = open_tiff(file);
+  TiffPages tiff(bytes);
   if (!tiff) return std::nullopt;
-  to_first_page(tiff.get());
-  const TiffLayout first = layout_of(tiff.get());
   int pages = 1;
-  while (pages < max_pages && next_page(tiff.get(), first)) ++pages;
+  while (pages < max_pages && tiff.next()) ++pages;
   return pages;
 }
 
 std::optional<int> tiff_orientation(std::string_view bytes, std::optional<int> page) {
-  TiffMemory file;
-  file.input = bytes;
-  const TiffHandle tiff = open_tiff(file);
-  if (!tiff) return std::nullopt;
-  to_first_page(tiff.get());
-  const TiffLayout first = layout_of(tiff.get());
-  for (int at = 0; at < page.value_or(0); ++at)
-    if (!next_page(tiff.get(), first)) return std::nullopt;
+  TiffPages tiff(bytes);
+  if (!tiff || !tiff.go_to(page.value_or(0))) return std::nullopt;
   std::uint16_t orientation = ORIENTATION_TOPLEFT;
   TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_ORIENTATION, &orientation);
   return orientation >= 1 && orientation <= 8 ? orientation : 1;
 }
 
 std::string other_tiff_pages(std::string_view bytes) {
-  TiffMemory file;
-  file.input = bytes;
-  const TiffHandle tiff = open_tiff(file);
+  const TiffPages tiff(bytes);
   if (!tiff) return {};
-  to_first_page(tiff.get());
-  const TiffLayout first = layout_of(tiff.get());
   constexpr std::size_t named = 3;
   std::vector<std::string> others;
   std::size_t count = 0;
@@ -165,7 +175,7 @@ std::string other_tiff_pages(std::string_view bytes) {
   for (int page = TIFFCurrentDirectory(tiff.get()) + 2;
        page <= max_pages && TIFFReadDirectory(tiff.get()) == 1; ++page) {
     const TiffLayout l = layout_of(tiff.get());
-    if (is_copy(tiff.get()) || alike(l, first)) continue;
+    if (is_copy(tiff.get()) || alike(l, tiff.first())) continue;
     if (++count <= named)
       others.push_back(fmt::format("{} ({}x{}, {}-bit{})", page, l.width, l.height, l.bits,
                                    l.channels > 1 ? fmt::format(", {} channels", l.channels) : ""));
@@ -193,11 +203,8 @@ Result<cv::Mat> decode_tiff(std::string_view bytes, const std::string& where,
 
 double tiff_transparent_share(std::string_view bytes, std::optional<int> page) {
   // Most have no alpha: their first image's directory is all that is read.
-  TiffMemory file;
-  file.input = bytes;
-  const TiffHandle tiff = open_tiff(file);
-  if (tiff) to_first_page(tiff.get());
-  if (!tiff || layout_of(tiff.get()).channels % 2 != 0 || !has_alpha(tiff.get())) return 0;
+  const TiffPages tiff(bytes);
+  if (!tiff || tiff.first().channels % 2 != 0 || !has_alpha(tiff.get())) return 0;
   const auto stored = read_page(bytes, {}, nullptr, page.value_or(0));
   return stored && stored->samples.depth() != CV_32F ? transparent_share(stored->samples) : 0;
 }
