@@ -256,7 +256,7 @@ Result<StageOutput> render(const StageContext& context, const StageInputs& in) {
 pipeline::Stage render_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "render";
-  stage.version = 4;  // samples are placed to rounding only where they were
+  stage.version = 4;  // samples lie where they did but for rounding
   stage.uses = {"poses_visible", "poses_thermal", "train_visible", "train_thermal", "register"};
   stage.options = in.config->settings().to_json("render");
   stage.options["cameras"] = in.config->render.cameras;

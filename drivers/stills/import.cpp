@@ -158,7 +158,8 @@ class Importer {
         continue;
       }
       tell_lost_samples(*still, source);
-      tell_turn(*still, source);
+      if (const std::string how = still->how_held(); !how.empty())
+        remarks_.add_of_file("", source.short_name(), how);
       report_.has_temperatures = report_.has_temperatures || !still->frame.thermal_is_gray;
       ORBITFUSE_TRY(add_frame(std::move(*still), source, tracking, options_.thermal_stations));
       if (options_.embedded_visible && file->flir && !file->flir->embedded_visible.empty()) {
@@ -185,17 +186,6 @@ class Importer {
   void tell_other_pages(const std::string& pages, Source source) {
     source.pages = 1;  // it is the file's matter
     if (!pages.empty()) remarks_.left_out(source.short_name(), pages);
-  }
-
-  void tell_turn(const StillPhoto& still, const Source& source) {
-    if (still.orientation != 1)
-      remarks_.add_of_file(
-          "", source.short_name(),
-          fmt::format("turned upright, as its EXIF says (orientation {})", still.orientation));
-    if (still.lies_across)
-      remarks_.add_of_file("", source.short_name(),
-                           "its temperatures lie across its picture (one is upright, the other "
-                           "not), and no tag says which way: they stay as the sensor has them");
   }
 
   void tell_lost_samples(StillPhoto& still, const Source& source) {

@@ -169,6 +169,15 @@ Result<StillPhoto> read_thermal_still(const std::filesystem::path& path, Thermal
   return thermal_still(file, decoder, path.string());
 }
 
+std::string StillPhoto::how_held() const {
+  if (lies_across)
+    return "its temperatures lie across its picture (one is upright, the other not), and no tag "
+           "says which way: they stay as the sensor has them";
+  return orientation == 1
+             ? ""
+             : fmt::format("turned upright, as its EXIF says (orientation {})", orientation);
+}
+
 std::string StillPhoto::key() const {
   const cv::Size sensor = turned(size, orientation);
   return fmt::format("{}|{}|{}|{}x{}|{}", camera.model, camera.serial, lens, sensor.width,

@@ -24,6 +24,8 @@ struct StillPhoto {
 
   /// Same key: same camera, lens, image size and kind of samples; of thermal images the size that
   /// the sensor has, however it was held.
+  /// How a thermal image is held, in words, where that is not as it is stored; else empty.
+  std::string how_held() const;
   std::string key() const;
   std::string described() const;  ///< the same for people
 };

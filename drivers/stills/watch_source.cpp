@@ -237,7 +237,7 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
 void WatchSource::tell(const StillPhoto& still, const std::string& name, Frame& frame) {
   if (still.without_temperature > 0) {
     frame.flag(FrameFlag::clipped);
-    tell_once(EventKind::clipped,
+    tell_once("clipped", EventKind::clipped,
               fmt::format("{}: {} samples without a temperature, or hotter than {:.0f} C: dead "
                           "pixels, here and in all frames with the flag clipped",
                           name, still.without_temperature,
@@ -245,34 +245,22 @@ void WatchSource::tell(const StillPhoto& still, const std::string& name, Frame& 
   }
   if (still.transparent > 0) {
     frame.flag(FrameFlag::transparent);
-    tell_once(EventKind::transparent,
+    tell_once("transparent", EventKind::transparent,
               fmt::format("{}: {:.3g} % of its pixels are transparent; alpha is dropped, and what "
                           "colour lies behind it is taken for the scene, here and in all frames "
                           "with the flag transparent: send the images as they were taken",
                           name, 100 * still.transparent));
   }
-  tell_once_how_held(still, name);
+  if (const std::string how = still.how_held(); !how.empty())
+    tell_once(still.lies_across ? "across" : "turned", EventKind::held,
+              fmt::format("{}: {} (told of the first such file)", name, how));
   if (!still.other_pages.empty())
-    tell_once(EventKind::ignored,
+    tell_once("pages", EventKind::ignored,
               fmt::format("{}: {} (told of the first such file)", name, still.other_pages), true);
 }
 
-void WatchSource::tell_once_how_held(const StillPhoto& still, const std::string& name) {
-  if (still.orientation == 1 && !still.lies_across) return;
-  if (!told_held_.insert(still.lies_across).second) return;
-  pending_.push_back(event_delivery(
-      EventKind::held,
-      name +
-          (still.lies_across
-               ? ": its temperatures lie across its picture (one is upright, the other not), "
-                 "and no tag says which way: they stay as the sensor has them"
-               : fmt::format(": turned upright, as its EXIF says (orientation {})",
-                             still.orientation)) +
-          " (told of the first such file)"));
-}
-
-void WatchSource::tell_once(EventKind kind, std::string words, bool kept) {
-  if (!told_.insert(kind).second) return;
+void WatchSource::tell_once(const char* matter, EventKind kind, std::string words, bool kept) {
+  if (!told_.insert(matter).second) return;
   pending_.push_back(event_delivery(kind, std::move(words)));
   pending_.back().kept = kept;
 }

@@ -68,8 +68,7 @@ class WatchSource final : public FrameSource {
   /// Flags the frame of a file, and tells what of the file is not as it looks.
   void tell(const StillPhoto& still, const std::string& name, Frame& frame);
   /// Of the first file of a matter; a folder of one program's files has it in each.
-  void tell_once(EventKind kind, std::string words, bool kept = false);
-  void tell_once_how_held(const StillPhoto& still, const std::string& name);
+  void tell_once(const char* matter, EventKind kind, std::string words, bool kept = false);
 
   WatchOptions options_;
   std::unique_ptr<Reader> reader_;
@@ -83,8 +82,7 @@ class WatchSource final : public FrameSource {
   bool resumed_ = false;  ///< info_ is the session's word
   std::uint64_t next_id_ = 0;
   bool gone_told_ = false;
-  std::set<EventKind> told_;
-  std::set<bool> told_held_;      ///< whether it lay across
+  std::set<std::string> told_;    ///< matters
   std::deque<Delivery> pending_;  ///< goes before the next photo
 };
 

@@ -159,6 +159,7 @@ Result<std::map<std::string, SiftFeatures>> ColmapProject::find_features(
   SiftOptions sift;
   sift.max_features = options_.max_features;
   sift.peak_threshold = options_.peak_threshold;
+  ORBITFUSE_TRY(sift.validate());
   std::vector<Result<SiftFeatures>> found(images.size());
   parallel_for(static_cast<int>(images.size()), [&](int i) {
     const auto at = static_cast<std::size_t>(i);
