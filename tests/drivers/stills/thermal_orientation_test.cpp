@@ -44,6 +44,13 @@ class ThermalOrientation : public ImportFiles {
     put(name,
         with_exif(made::flir_jpeg(signal, camera, made::FlirPixels::raw, photo), orientation));
   }
+  /// Of one radiometric JPEG of orientation 6, with its photo.
+  Result<ImportReport> import_held_on_its_side(const cv::Mat& photo) {
+    put_flir("t/a.jpg", 6, 1, *encode_jpeg(photo, 95));
+    options.thermal = {folder / "t"};
+    options.embedded_visible = true;
+    return import();
+  }
   static cv::Point2d warm_place(const cv::Mat& kelvin) {
     cv::Mat warm = kelvin > 300;
     const cv::Moments m = cv::moments(warm, true);
@@ -102,10 +109,7 @@ TEST_F(ThermalOrientation, SamplesAcrossTheirPictureStayAndAreTold) {
 TEST_F(ThermalOrientation, TheEmbeddedPhotoIsTurnedWithIt) {
   cv::Mat photo(60, 80, CV_8UC3, cv::Scalar(40, 40, 40));
   photo(cv::Rect(0, 0, 20, 20)).setTo(cv::Scalar(250, 250, 250));
-  put_flir("t/a.jpg", 6, 1, *encode_jpeg(photo, 95));
-  options.thermal = {folder / "t"};
-  options.embedded_visible = true;
-  const auto report = import();
+  const auto report = import_held_on_its_side(photo);
   ASSERT_TRUE(report) << report.error().message();
   const auto frames = report->session.frames_of(Modality::visible);
   ASSERT_EQ(frames.size(), 1u);
@@ -170,10 +174,7 @@ TEST_F(ThermalOrientation, APreviewInFrontDoesNotSayHowTheImageIsHeld) {
 /// Cameras turn their photo and not what lies beside it.
 TEST_F(ThermalOrientation, AnEmbeddedPhotoThatStandsUprightAlreadyIsNotTurned) {
   const cv::Mat photo(80, 60, CV_8UC3, cv::Scalar(40, 90, 40));
-  put_flir("t/a.jpg", 6, 1, *encode_jpeg(photo, 95));
-  options.thermal = {folder / "t"};
-  options.embedded_visible = true;
-  const auto report = import();
+  const auto report = import_held_on_its_side(photo);
   ASSERT_TRUE(report) << report.error().message();
   const auto frames = report->session.frames_of(Modality::visible);
   ASSERT_EQ(frames.size(), 1u);

@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 
 #include "recon/nerf/rendering/march.hpp"
+#include "tests/recon/nerf/mixed_grid.hpp"
 #include "tests/recon/nerf/random_ray.hpp"
 
 namespace orbitfuse::nerf {
@@ -106,17 +107,8 @@ Compared compare_rays(const Occupancy& grid, int rays) {
 }
 
 TEST(MarchPieces, AMixOfEmptyPlainAndKnownBlocksIsPlacedAsByTheProcessor) {
-  Occupancy grid = empty_grid();
   cv::RNG random(21);
-  for (std::size_t block = 0; block < grid.on.size(); ++block) {
-    const int kind = random.uniform(0, 3);  // empty, nothing known, holes and densities
-    grid.on[block] = kind == 0 ? 0 : ~std::uint64_t{0};
-    for (std::size_t cell = 64 * block; kind == 2 && cell < 64 * (block + 1); ++cell) {
-      grid.density[cell] = random.uniform(0.0f, 8.0f);
-      Occupancy::put(grid.on, static_cast<std::int64_t>(cell), random.uniform(0, 2) == 1);
-    }
-  }
-  grid.refresh();
+  const Occupancy grid = test::mixed_grid(resolution, cascades, random);
   const Compared all = compare_rays(grid, 60);
   EXPECT_GT(all.samples, 5000);
   EXPECT_LT(all.off, all.samples / 50);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "tests/recon/nerf/mixed_grid.hpp"
 #include "tests/recon/nerf/random_ray.hpp"
 
 namespace orbitfuse::nerf {
@@ -67,18 +68,8 @@ double distance_at(const std::vector<Stretch>& cells, const MarchSettings& setti
 }
 
 TEST(March, SamplesLieWhereADoublePrecisionWalkPutsThem) {
-  Occupancy grid;
-  grid.create(32, 5);
   cv::RNG random(21);
-  for (std::size_t block = 0; block < grid.on.size(); ++block) {
-    const int kind = random.uniform(0, 3);  // empty, nothing known, holes and densities
-    grid.on[block] = kind == 0 ? 0 : ~std::uint64_t{0};
-    for (std::size_t cell = 64 * block; kind == 2 && cell < 64 * (block + 1); ++cell) {
-      grid.density[cell] = random.uniform(0.0f, 8.0f);
-      Occupancy::put(grid.on, static_cast<std::int64_t>(cell), random.uniform(0, 2) == 1);
-    }
-  }
-  grid.refresh();
+  const Occupancy grid = test::mixed_grid(32, 5, random);
   const MarchSettings settings;
   int samples = 0, off = 0, across = 0;
   for (int group = 0; group < 12; ++group) {
