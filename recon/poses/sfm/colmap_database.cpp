@@ -29,7 +29,7 @@ class Database {
     Database database(handle, path);
     if (status == SQLITE_OK) return database;
     return fail(ErrorKind::input, path.string(), "no COLMAP database",
-                "COLMAP wrote none: see whether it runs by hand (colmap feature_extractor -h)");
+                "COLMAP wrote none: see whether it runs by hand (colmap feature_importer -h)");
   }
 
   /// Calls `row` for each row of the answer.
