@@ -67,6 +67,38 @@ std::optional<std::string> other_session(const std::string& out, const std::stri
   return of == absolute_name(session) ? std::nullopt : std::optional(of);
 }
 
+std::optional<std::string> other_results(const std::string& out,
+                                         const stages::SessionInput& input) {
+  const Session& session = input.session;
+  const auto other = other_session(out, session.folder.string());
+  std::error_code gone;
+  if (!other || fs::equivalent(*other, session.folder, gone) || is_of(*earlier_run(out), session))
+    return std::nullopt;
+  const auto finished = pipeline::finished_stages(out, stages::stage_names());
+  if (finished.empty()) return std::nullopt;
+  // A run of an earlier version, which noted no id; or the same files, imported again.
+  int alike = 0;
+  for (const auto& [modality, content] : input.content) {
+    const std::string stage = "poses_" + std::string(name(modality));
+    if (!finished.contains(stage)) continue;
+    const auto record = pipeline::read_stage_record(fs::path(out) / stage);
+    if (!record) return other;
+    const auto outside = record->inputs.find("outside");
+    if (outside == record->inputs.end() || outside->second != content) return other;
+    ++alike;
+  }
+  return alike > 0 ? std::nullopt : other;
+}
+
+bool is_of(const json& run, const Session& session) {
+  if (!run.is_object()) return false;
+  const auto same = [&](const char* key, const std::string& mine) {
+    const auto found = run.find(key);
+    return found != run.end() && !mine.empty() && *found == mine;
+  };
+  return same("session", absolute_name(session.folder.string())) || same("session_id", session.id);
+}
+
 Result<std::optional<std::uint64_t>> read_earlier_options(const std::string& folder,
                                                           config::Settings& settings) {
   ORBITFUSE_ASSIGN(const json run, earlier_run(folder));

@@ -126,6 +126,7 @@ class StagedRun {
   Status run(bool whole);
 
  private:
+  Status look_for_other_results();
   void before_stage(pipeline::Stage& stage, const std::vector<StageStatus>& finished);
   Status record(const pipeline::RunSummary& summary, const json& list);
   void warn_of_overrun() const;
@@ -139,6 +140,7 @@ class StagedRun {
   std::string session_;
   pipeline::RunOptions options_;
   std::unique_ptr<planning::RunPlanner> planner_;
+  bool replaces_ = false;  ///< another session's results
   double budget_s_ = 0;
   json planned_;  ///< for run.json; null: there is no plan
 };
@@ -148,11 +150,7 @@ Status StagedRun::open(const std::vector<std::string>& targets) {
   ORBITFUSE_ASSIGN(input_, stages::open_session_input(folders_.session, context_.progress));
   for (const std::string& warning : input_.session.warnings) context_.console.warning(warning);
   session_ = fs::absolute(folders_.session).lexically_normal().string();
-  if (const auto other = other_session(folders_.out, folders_.session))
-    context_.console.warning(
-        fmt::format("{} holds results of {}: what this run doesn't reach stays that session's; "
-                    "give each session an --out of its own",
-                    folders_.out, *other));
+  ORBITFUSE_TRY(look_for_other_results());
   if (missing_ == Missing::leave_out &&
       pipeline::finished_stages(folders_.out, stages::stage_names()).empty())
     return fail(
@@ -163,7 +161,28 @@ Status StagedRun::open(const std::vector<std::string>& targets) {
               .force = context_.common.force,
               .resume = context_.common.resume,
               .dry_run = context_.common.dry_run,
+              .replace_all = replaces_,
               .targets_only = missing_ == Missing::leave_out};
+  return {};
+}
+
+/// Stages that this call doesn't reach would stay the other session's, and later verbs take results
+/// as they lie: nothing is mixed.
+Status StagedRun::look_for_other_results() {
+  const auto other = other_results(folders_.out, input_);
+  if (!other) return {};
+  const std::string found = fmt::format("holds results of another session, {}", *other);
+  if (missing_ == Missing::leave_out)
+    return fail(ErrorKind::usage, "--out " + folders_.out, found,
+                "leave the session out: the folder of its results is enough");
+  if (!context_.common.force)
+    return fail(ErrorKind::usage, "--out " + folders_.out, found,
+                "give this session an --out of its own, or replace those results with --force");
+  replaces_ = true;
+  const auto stages = pipeline::finished_stages(folders_.out, stages::stage_names());
+  context_.console.warning(fmt::format("--force: {} {}, which {} first: {}", folders_.out, found,
+                                       context_.common.dry_run ? "would be removed" : "are removed",
+                                       fmt::join(stages, ", ")));
   return {};
 }
 
@@ -223,6 +242,7 @@ Status StagedRun::record(const pipeline::RunSummary& summary, const json& list) 
   if (options_.dry_run || summary.stages.empty()) return {};
   json run = {{"schema", 1},
               {"session", session_},
+              {"session_id", input_.session.id},
               {"orbitfuse", pipeline::software_version()},
               {"config", context_.config.settings().to_json()},
               {"seed", context_.config.seed},
@@ -230,8 +250,7 @@ Status StagedRun::record(const pipeline::RunSummary& summary, const json& list) 
   if (!planned_.is_null()) run["planned"] = planned_;
   if (summary.error && !keeps_options(summary.error->kind)) {
     const json before = earlier_run(folders_.out).value_or(json());
-    const bool known =
-        before.is_object() && before.contains("session") && before["session"] == session_;
+    const bool known = is_of(before, input_.session);
     for (const char* key : {"config", "seed", "planned"}) {
       if (known && before.contains(key))
         run[key] = before[key];
@@ -255,7 +274,7 @@ Status StagedRun::run(bool whole) {
   runner.before_stage = [&](pipeline::Stage& stage, const std::vector<StageStatus>& finished) {
     if (planner_) return before_stage(stage, finished);
     std::error_code ignored;  // a plan of an earlier run tells nothing of this one
-    if (whole && finished.empty() && !options_.dry_run)
+    if ((whole || replaces_) && finished.empty() && !options_.dry_run)
       fs::remove(fs::path(folders_.out) / planning::plan_file, ignored);
   };
   runner.on_status = [&](const StageStatus& status) {
@@ -264,7 +283,8 @@ Status StagedRun::run(bool whole) {
     event["event"] = "stage";
     context_.console.event(event);
   };
-  if (!whole && !planner_) {  // the plan of the run whose results these are stays known
+  if (!whole && !planner_ &&
+      !replaces_) {  // the plan of the run whose results these are stays known
     PlannedBefore before = planned_before(folders_.out);
     const json values = planning::planned_values(context_.config);
     for (const auto& [key, value] : values.items())

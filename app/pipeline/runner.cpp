@@ -308,6 +308,15 @@ StageStatus Runner::execute(const Stage& stage, const Key& key, std::string why)
   return status;
 }
 
+Status Runner::remove_all() const {
+  for (const Stage& stage : stages_) ORBITFUSE_TRY(check_places(options_.out, stage.name));
+  for (const Stage& stage : stages_) {
+    ORBITFUSE_TRY(remove_tree(options_.out / stage.name));
+    ORBITFUSE_TRY(remove_tree(failed_folder(options_.out, stage.name)));
+  }
+  return remove_tree(options_.out / ".partial");
+}
+
 RunSummary Runner::run() {
   RunSummary summary;
   FolderLock lock;
@@ -317,6 +326,7 @@ RunSummary Runner::run() {
   if (ready && !options_.dry_run) {
     ready = make_folder(options_.out);
     if (ready) ready = lock.acquire(options_.out / ".lock");
+    if (ready && options_.replace_all) ready = remove_all();
   }
   if (!ready) {
     summary.error = ready.error();

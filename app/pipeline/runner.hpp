@@ -16,8 +16,11 @@ struct RunOptions {
   std::filesystem::path out;              ///< holds one folder a stage
   std::vector<std::string> targets = {};  ///< stages wanted, with all they read; empty = all
   bool force = false;                     ///< run the targets although they are unchanged
-  bool resume = false;        ///< go on from an interrupted attempt where its key matches
-  bool dry_run = false;       ///< say what would run, write nothing
+  bool resume = false;   ///< go on from an interrupted attempt where its key matches
+  bool dry_run = false;  ///< say what would run, write nothing
+  /// What lies in `out` is of other inputs: every stage's folder there is removed before the first
+  /// one runs.
+  bool replace_all = false;
   bool targets_only = false;  ///< what the targets read is taken as it lies there, never run
 };
 
@@ -57,6 +60,7 @@ class Runner {
   bool forced(const Stage& stage) const;
   StageContext context(std::filesystem::path folder, bool resume) const;
   std::optional<EarlierResult> earlier_result(const Stage& stage, const Key& key) const;
+  Status remove_all() const;
   StageStatus visit(const Stage& stage);
   StageStatus execute(const Stage& stage, const Key& key, std::string why);
   /// None: what it made still holds.

@@ -206,13 +206,54 @@ TEST_F(Run, DryRunWritesNothing) {
   EXPECT_THAT(told.out + told.err, HasSubstr("would run"));
 }
 
-TEST_F(Run, FolderOfAnotherSessionsResultsIsWarnedOf) {
+TEST_F(Run, ResultsOfAnotherSessionAreKeptUnlessForcedAndThenGoWhole) {
   write_fixture_session(session);
-  fs::create_directories(out);
+  ASSERT_EQ(run({}, {}, "poses").code, 0);
+  const fs::path first = session, record = out / "poses_visible" / "stage.json";
+  const std::string before = *read_file(record);
+
+  FixtureOptions visible_only;
+  visible_only.thermal = 0;
+  session = temp.path() / "other";
+  write_fixture_session(session, visible_only);
+  for (const char* verb : {"run", "poses", "report"})
+    for (const bool dry : {false, true}) {
+      const Outcome refused =
+          run(dry ? std::vector<std::string>{"--dry-run"} : std::vector<std::string>{}, {}, verb);
+      EXPECT_EQ(refused.code, 2) << verb << refused.err;
+      EXPECT_THAT(refused.err, HasSubstr("holds results of another session, " + first.string()));
+    }
+  EXPECT_EQ(*read_file(record), before);
+
+  const Outcome forced = run({"--force"}, {}, "poses");
+  EXPECT_EQ(forced.code, 0) << forced.err;
+  EXPECT_THAT(forced.out, HasSubstr("are removed first: poses_thermal, poses_visible"));
+  EXPECT_FALSE(fs::exists(out / "poses_thermal")) << "would be taken for this session's";
+  EXPECT_EQ(states(run({}, {}, "poses")).at("poses_visible"), "unchanged");
+}
+
+TEST_F(Run, ASessionThatMovedOrWasCopiedGoesOn) {
+  write_fixture_session(session);
+  ASSERT_EQ(run({}, {}, "poses").code, 0);
+  const fs::path first = session;
+  session = temp.path() / "copy";
+  fs::copy(first, session, fs::copy_options::recursive);
+  const Outcome copied = run({}, {}, "poses");
+  EXPECT_EQ(copied.code, 0) << copied.err;
+  EXPECT_EQ(states(copied).at("poses_thermal"), "unchanged");
+
+  // Of a version that noted no id: by what the stages were made of.
+  json old = json::parse(*read_file(out / "run.json"));
+  old.erase("session_id");
+  old["session"] = (temp.path() / "gone").string();
+  std::ofstream(out / "run.json") << old.dump();
+  EXPECT_EQ(run({}, {}, "poses").code, 0);
+
+  // No result is at stake.
+  fs::create_directories(temp.path() / "empty");
+  out = temp.path() / "empty";
   std::ofstream(out / "run.json") << R"({"schema": 1, "session": "/elsewhere/car", "stages": []})";
-  const Outcome outcome = run({"--dry-run"});
-  EXPECT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_THAT(outcome.out + outcome.err, HasSubstr("/elsewhere/car"));
+  EXPECT_EQ(run({"--dry-run"}).code, 0);
 }
 
 TEST_F(Run, GivenCamerasAreRenderedAsGiven) {

@@ -83,6 +83,21 @@ class RunnerTest : public testing::Test {
   std::atomic<bool> cancel{false};
 };
 
+TEST_F(RunnerTest, ResultsOfOtherInputsAreReplacedWhole) {
+  ASSERT_FALSE(run().error);
+  session = "another";
+  RunOptions options;
+  options.targets = {"b"};
+  options.replace_all = options.dry_run = true;
+  run(options);
+  EXPECT_TRUE(fs::exists(temp.path() / "out" / "d")) << "a dry run";
+  options.dry_run = false;
+  EXPECT_FALSE(run(options).error);
+  EXPECT_THAT(ran(), ElementsAre("a", "b"));
+  EXPECT_FALSE(fs::exists(temp.path() / "out" / "c"));
+  EXPECT_FALSE(fs::exists(temp.path() / "out" / "d")) << "of the other inputs";
+}
+
 TEST_F(RunnerTest, SecondRunIsUnchanged) {
   ASSERT_FALSE(run().error);
   EXPECT_THAT(ran(), ElementsAre("a", "b", "c", "d"));
