@@ -67,6 +67,8 @@ bool has_reading(Kind kind) {
 
 }  // namespace
 
+std::string place_words(std::size_t index) { return fmt::format("place {}: ", index + 1); }
+
 double TemperatureReading::doubtful_share() const {
   double share = 0;
   for (const FrameLine& line : frames) share += line.doubtful ? line.weight : 0;

@@ -63,6 +63,7 @@ struct TemperatureReading {
 struct PlacedReading {
   Eigen::Vector3d position, normal;
   TemperatureReading reading;
+  std::vector<std::string> notes = {};  ///< of this place alone; Answer::notes has them too
 };
 
 /// Object parameters behind an answer's temperatures.
@@ -94,9 +95,14 @@ struct Answer {
   std::optional<double> distance_m;  ///< where the run's scale is known
   /// What the scale alone leaves open in 90 of 100 cases; where the places lie is not in it.
   double distance_uncertainty_m = unknown;
-  UsedParameters radiometry;       ///< of a difference: in its parts
-  std::vector<std::string> notes;  ///< what the reader must know: nothing seen, assumptions
+  UsedParameters radiometry;  ///< of a difference: in its parts
+  /// What the reader must know: nothing seen, assumptions. Those of one of several places begin
+  /// with place_words().
+  std::vector<std::string> notes;
 };
+
+/// "place 2: ", of the second of several.
+std::string place_words(std::size_t index);
 
 nlohmann::json to_json(const Answer& answer);
 /// "1.204 m +- 0.012", or "0.8812 units of the run" where it knows no metres.

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "core/numeric/percent.hpp"
+#include "core/temperature.hpp"
 #include "recon/assembly/looked_at.hpp"
 #include "recon/measurement/frame_readings.hpp"
 #include "recon/measurement/region.hpp"
@@ -82,23 +83,55 @@ void say_unseen(const TemperatureReading& reading, std::vector<std::string>& not
                   std::isfinite(reading.field_k) ? ", the field's own is a guess" : ""));
 }
 
-/// What stands behind a reading and is less than it seems. `whose` names it among several.
-void say_weak(const TemperatureReading& reading, std::vector<std::string>& notes,
-              const std::string& whose = "") {
+/// Frames or field that differ by more than "+-" makes one expect, of a spot: a number with a wide
+/// "+-" is read as one that is merely rough. Of a region its points differ anyway.
+void say_apart(const TemperatureReading& reading, std::vector<std::string>& notes) {
+  constexpr double wide = 3;       // times what is assumed for the camera alone
+  constexpr double decides = 0.9;  // of the weight
+  if (reading.points != 1) return;
+  double low = HUGE_VAL, high = -HUGE_VAL, most = 0;
+  bool two_camps = !reading.outliers.empty();  // is told
+  for (const FrameLine& line : reading.frames) {
+    two_camps = two_camps && line.used;
+    if (!line.used) continue;
+    low = std::min(low, line.mean_k);
+    high = std::max(high, line.mean_k);
+    most = std::max(most, line.weight);
+  }
+  const bool unsure = reading.uncertainty_k > wide * reading.assumed_k;
+  const bool frames_apart = unsure && !two_camps && high - low > reading.uncertainty_k;
+  const bool field_apart =
+      std::abs(reading.field_k - reading.temperature_k) > reading.uncertainty_k;  // NaN: false
+  if (!frames_apart && !field_apart) return;
+  std::string text;
+  if (frames_apart)
+    text = fmt::format("its frames are far apart ({:.1f} to {:.1f} C)", celsius_from_kelvin(low),
+                       celsius_from_kelvin(high));
+  if (field_apart)
+    text += fmt::format("{}the field has {:.1f} C, farther off than +- {:.1f}",
+                        text.empty() ? "" : ", ", celsius_from_kelvin(reading.field_k),
+                        reading.uncertainty_k);
+  if (most > decides && reading.frames.size() > 1)
+    text += fmt::format(", and one frame decides ({} of the weight)", percent(most));
+  notes.push_back(text + ": the place is small, at an edge or seen from the side");
+}
+
+/// What stands behind a reading and is less than it seems.
+void say_weak(const TemperatureReading& reading, std::vector<std::string>& notes) {
   if (!reading.seen()) return;
   const int unseen = reading.points - reading.seen_points;
   if (unseen > 0)
-    notes.push_back(fmt::format("{}no thermal frame sees {} of {} points ({} of the area)", whose,
-                                unseen, reading.points, percent(1 - reading.seen_share)));
-  if (!reading.outliers.empty()) notes.push_back(whose + reading.outliers);
+    notes.push_back(fmt::format("no thermal frame sees {} of {} points ({} of the area)", unseen,
+                                reading.points, percent(1 - reading.seen_share)));
+  if (!reading.outliers.empty()) notes.push_back(reading.outliers);
+  say_apart(reading, notes);
   const auto doubtful = std::count_if(reading.frames.begin(), reading.frames.end(),
                                       [](const FrameLine& line) { return line.doubtful; });
   if (doubtful == static_cast<long>(reading.frames.size()))
-    notes.push_back(whose + "only frames with doubtful poses see it");
+    notes.emplace_back("only frames with doubtful poses see it");
   else if (doubtful > 0)
-    notes.push_back(fmt::format("{}{} of {} frames have doubtful poses, {} of the weight", whose,
-                                doubtful, reading.frames.size(),
-                                percent(reading.doubtful_share())));
+    notes.push_back(fmt::format("{} of {} frames have doubtful poses, {} of the weight", doubtful,
+                                reading.frames.size(), percent(reading.doubtful_share())));
 }
 
 void say(const TemperatureReading& reading, std::vector<std::string>& notes) {
@@ -244,8 +277,11 @@ Result<Answer> measure_extremes(const ThermalScene& scene, const Request& reques
     answer.notes.push_back(
         fmt::format("{} of {} found: no more places {:.3g} apart that two thermal frames see alike",
                     answer.spots.size(), request.count, apart));
-  for (std::size_t i = 0; i < answer.spots.size(); ++i)
-    say_weak(answer.spots[i].reading, answer.notes, fmt::format("place {}: ", i + 1));
+  for (std::size_t i = 0; i < answer.spots.size(); ++i) {
+    PlacedReading& spot = answer.spots[i];
+    say_weak(spot.reading, spot.notes);
+    for (const std::string& note : spot.notes) answer.notes.push_back(place_words(i) + note);
+  }
   return answer;
 }
 

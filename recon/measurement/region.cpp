@@ -38,16 +38,24 @@ std::string span_of(double low_k, double high_k) {
 std::string outliers_of(const PointReadings& readings, const Agreement& agreement) {
   if (agreement.all_near()) return {};
   double low[2] = {HUGE_VAL, HUGE_VAL}, high[2] = {-HUGE_VAL, -HUGE_VAL};
+  std::vector<std::pair<double, double>> kept;
   int far = 0;
   for (std::size_t i = 0; i < readings.frames.size(); ++i) {
     const std::size_t near = agreement.near[i] ? 1 : 0;
     low[near] = std::min(low[near], readings.frames[i].temperature_k);
     high[near] = std::max(high[near], readings.frames[i].temperature_k);
     far += near == 0;
+    if (near == 1) kept.emplace_back(readings.frames[i].temperature_k, readings.frames[i].weight);
   }
-  return fmt::format("{} of {} frames {}: {} against {}", far, readings.frames.size(),
-                     agreement.two_camps ? "contradict the others" : "left out",
-                     span_of(low[0], high[0]), span_of(low[1], high[1]));
+  const std::string text = fmt::format(
+      "{} of {} frames {}: {} against ", far, readings.frames.size(),
+      agreement.two_camps ? "contradict the others" : "left out", span_of(low[0], high[0]));
+  if (kept.empty() || low[1] > high[0] || high[1] < low[0]) return text + span_of(low[1], high[1]);
+  // Both spans would read as a contradiction.
+  return text + fmt::format(
+                    "{:.1f} C in the middle of the others; such as are as far off and count "
+                    "see an edge there, and show either side of it",
+                    celsius_from_kelvin(weighted_median(std::move(kept))));
 }
 
 /// Marks the frames that are left out and takes their weight. There is a reading.

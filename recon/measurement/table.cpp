@@ -51,6 +51,18 @@ std::string joined(const std::vector<std::string>& notes) {
   return text;
 }
 
+/// Of one of several places: its own, and what is said of the whole answer.
+std::string notes_of(const Answer& answer, std::size_t spot) {
+  std::vector<std::string> notes = answer.spots[spot].notes;
+  for (const std::string& note : answer.notes) {
+    bool of_a_place = false;
+    for (std::size_t i = 0; i < answer.spots.size(); ++i)
+      of_a_place = of_a_place || note.starts_with(place_words(i));
+    if (!of_a_place) notes.push_back(note);
+  }
+  return joined(notes);
+}
+
 }  // namespace
 
 std::string csv_header() {
@@ -77,7 +89,7 @@ std::vector<std::string> csv_rows(const std::string& name, const Answer& answer)
                              .position = answer.spots[i].position,
                              .reading = &answer.spots[i].reading,
                              .emissivity = row.emissivity,
-                             .note = row.note}));
+                             .note = notes_of(answer, i)}));
       return rows;
     case Kind::difference:
       row.difference_k = answer.difference_k;

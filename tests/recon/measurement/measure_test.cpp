@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
+#include <map>
 #include <opencv2/imgproc.hpp>
 #include <set>
 #include <thread>
@@ -272,6 +274,64 @@ TEST(Measure, APolygonOfAnUnseenSideSaysHowMuch) {
   ASSERT_TRUE(answer.reading.seen());
   EXPECT_LT(answer.reading.seen_share, 0.9);
   EXPECT_THAT(joined(answer.notes), HasSubstr("no thermal frame sees"));
+}
+
+/// The frames' pictures, changed round where they show the end's middle: what a frame adds there,
+/// and how much that grows with each pixel.
+SceneParts frames_with(const std::function<std::pair<double, double>(std::size_t)>& change) {
+  const Eigen::Vector3d place(0.4, 0.02, 0.01);
+  const Answer all = ask(box_orbit(), spot_at(place));
+  std::map<std::string, std::pair<double, double>> changes;
+  for (std::size_t i = 0; i < all.reading.frames.size(); ++i)
+    changes[all.reading.frames[i].frame] = change(i);
+  SceneParts parts = box_parts();
+  parts.read_frame = [=, read = parts.read_frame](const ThermalFrame& frame) -> Result<cv::Mat> {
+    ORBITFUSE_ASSIGN(cv::Mat image, read(frame));
+    const auto found = changes.find(frame.view.name);
+    if (found == changes.end()) return image;
+    const auto [offset_k, k_per_px] = found->second;
+    const Eigen::Vector2d p = frame.view.camera.project(frame.view.cam_from_world * place);
+    for (int y = 0; y < image.rows; ++y)
+      for (int x = 0; x < image.cols; ++x)
+        if (std::abs(x + 0.5 - p.x()) < 6 && std::abs(y + 0.5 - p.y()) < 6)
+          image.at<float>(y, x) += static_cast<float>(offset_k + k_per_px * (x + 0.5 - p.x()));
+    return image;
+  };
+  return parts;
+}
+
+TEST(Measure, FramesFarApartAreToldInWordsToo) {
+  const ThermalScene scene = box_orbit(
+      frames_with([](std::size_t i) { return std::pair(i % 2 == 0 ? -40.0 : 40.0, 40.0); }));
+  const Answer answer = ask(scene, spot_at({0.4, 0.02, 0.01}));
+  EXPECT_GT(answer.reading.uncertainty_k, 10);
+  ASSERT_EQ(answer.notes.size(), 1u) << joined(answer.notes);
+  EXPECT_THAT(answer.notes[0], HasSubstr("its frames are far apart (-13.2 to 66.9 C)"));
+  EXPECT_THAT(answer.notes[0], HasSubstr("the place is small, at an edge or seen from the side"));
+  EXPECT_THAT(csv_rows("x", answer).at(0), HasSubstr("its frames are far apart"));
+}
+
+TEST(Measure, WhyAFrameIsLeftOutDoesNotContradictOneThatIsUsed) {
+  // As far off as the first and farther, but steep: an error of its pose explains it.
+  const ThermalScene scene = box_orbit(frames_with([](std::size_t i) {
+    return i == 0 ? std::pair(20.0, 0.0) : i == 1 ? std::pair(40.0, 40.0) : std::pair(0.0, 0.0);
+  }));
+  const Answer answer = ask(scene, spot_at({0.4, 0.02, 0.01}));
+  EXPECT_FALSE(answer.reading.frames.at(0).used);
+  EXPECT_TRUE(answer.reading.frames.at(1).used);
+  EXPECT_THAT(joined(answer.notes), HasSubstr("left out: 46.9 C against 26.9 C in the middle of"));
+}
+
+TEST(Measure, ARowOfATableHasItsOwnNotesOnly) {
+  Answer answer;
+  answer.kind = Kind::hottest;
+  answer.spots.resize(2);
+  answer.spots[0].notes = {"of the first"};
+  answer.notes = {"of all", place_words(0) + "of the first"};
+  const auto rows = csv_rows("warm", answer);
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_THAT(rows[0], HasSubstr("of the first; of all"));
+  EXPECT_THAT(rows[1], AllOf(HasSubstr("of all"), Not(HasSubstr("first"))));
 }
 
 TEST(Measure, ASmallHotSpotIsTheHottest) {
