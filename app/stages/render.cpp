@@ -16,6 +16,7 @@
 #include "core/system/clock.hpp"
 #include "core/system/file_io.hpp"
 #include "core/system/trace.hpp"
+#include "fusion/heat/heat.hpp"
 #include "recon/assembly/looked_at.hpp"
 #include "recon/nerf/nerf.hpp"
 
@@ -138,6 +139,7 @@ Status choose_scales(const StageContext& context, Modality frame,
   const HeatScaleOptions how = heat_scale_options(rendered.samples());
   rendered.heat = heat_scale(within_orbit(seen, posed.views, surroundings_reach), how);
   rendered.heat.hot = std::max(object.high_k, rendered.heat.usual + how.min_width);
+  rendered.heat = within_levels(rendered.heat, how);
   rendered.span = rendered.thermal_is_gray ? TemperatureSpan{0, 255} : object;
   return {};
 }
@@ -155,8 +157,9 @@ Status write_temperatures(const StageContext& context, const std::vector<Thermal
       ORBITFUSE_TRY(
           write_thermal_tiff(context.folder / files[i].thermal, kelvin[i], kelvin_per_count));
     files[i].palette = "palette/" + files[i].name + ".png";
-    ORBITFUSE_TRY(
-        write_png(context.folder / files[i].palette, colorize(kelvin[i], rendered.span, colors)));
+    cv::Mat painted = colorize(kelvin[i], rendered.span, colors);
+    fusion::hatch_unmeasured(painted, kelvin[i]);
+    ORBITFUSE_TRY(write_png(context.folder / files[i].palette, painted));
   }
   if (rendered.thermal_is_gray) return {};
   return save_temperature_bounds(context.folder, rendered.span.low_k, rendered.span.high_k);
@@ -256,7 +259,7 @@ Result<StageOutput> render(const StageContext& context, const StageInputs& in) {
 pipeline::Stage render_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "render";
-  stage.version = 4;  // samples lie where they did but for rounding
+  stage.version = 5;  // palettes hatch what was not measured; gray levels end at 255
   stage.uses = {"poses_visible", "poses_thermal", "train_visible", "train_thermal", "register"};
   stage.options = in.config->settings().to_json("render");
   stage.options["cameras"] = in.config->render.cameras;

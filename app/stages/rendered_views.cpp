@@ -35,9 +35,7 @@ cv::Mat bgr8_of_rgb(const cv::Mat& rgb) {
 }
 
 HeatScaleOptions heat_scale_options(Samples samples) {
-  HeatScaleOptions options;
-  if (samples == Samples::gray) options.min_width = min_heat_gray_levels;
-  return options;
+  return samples == Samples::gray ? HeatScaleOptions::of_gray_levels() : HeatScaleOptions{};
 }
 
 Status save_rendered_views(const std::filesystem::path& folder, const RenderedViews& rendered) {
@@ -49,20 +47,23 @@ Status save_rendered_views(const std::filesystem::path& folder, const RenderedVi
     });
     views.push_back(std::move(j));
   }
-  return write_json(folder / views_file,
-                    {{"schema", 1},
-                     {"conventions",
-                      "thermal: 16-bit, kelvin = scale * count as the tag says (0.01 below 382 C); "
-                      "depth: along the optical axis, "
-                      "units of the visible reconstruction; poses in transforms.json"},
-                     {"thermal_is_gray", rendered.thermal_is_gray},
-                     {"span_low", rendered.span.low_k},
-                     {"span_high", rendered.span.high_k},
-                     {"heat",
-                      {{"usual", rendered.heat.usual},
-                       {"spread", rendered.heat.spread},
-                       {"hot", rendered.heat.hot}}},
-                     {"views", views}});
+  return write_json(
+      folder / views_file,
+      {{"schema", 1},
+       {"conventions", std::string(rendered.thermal_is_gray
+                                       ? "thermal: 8-bit gray levels, no temperatures; "
+                                       : "thermal: 16-bit, kelvin = scale * count as the tag says "
+                                         "(0.01 below 382 C); ") +
+                           "depth: along the optical axis, "
+                           "units of the visible reconstruction; poses in transforms.json"},
+       {"thermal_is_gray", rendered.thermal_is_gray},
+       {"span_low", rendered.span.low_k},
+       {"span_high", rendered.span.high_k},
+       {"heat",
+        {{"usual", rendered.heat.usual},
+         {"spread", rendered.heat.spread},
+         {"hot", rendered.heat.hot}}},
+       {"views", views}});
 }
 
 Result<RenderedViews> load_rendered_views(const std::filesystem::path& folder) {

@@ -177,9 +177,10 @@ Status export_surface(Context& context, const std::vector<fs::path>& files,
     context.result["files"].push_back(file.string());
     context.console.data(file.string());
   }
-  context.console.info(fmt::format("{} triangles, {} vertices, {} of them without temperature",
+  context.console.info(fmt::format("{} triangles, {} vertices, {} of them without {}",
                                    surface.mesh.triangles.size(), surface.mesh.vertices.size(),
-                                   surface.without_temperature));
+                                   surface.without_temperature,
+                                   run.thermal_is_gray ? "infrared level" : "temperature"));
   return {};
 }
 

@@ -11,6 +11,7 @@
 #include "app/view/shot_request.hpp"
 #include "core/temperature.hpp"
 #include "fusion/heat/heat.hpp"
+#include "fusion/heat/legend.hpp"
 
 namespace orbitfuse::view {
 namespace {
@@ -27,7 +28,8 @@ std::string hex_of(const cv::Mat& colors_bgr) {
 }
 
 /// The heat picture's scale: colours, and 256 times how strongly each is laid over the visible one,
-/// "ss" of 255, both from the usual level to the hot one.
+/// "ss" of 255, both from the usual level to the hot one; and what comes of both over mid gray, for
+/// its bar.
 json heat_json(const FinishedRun& run) {
   const fusion::HeatOptions& how = run.config.fuse.options.heat;
   std::string strengths;
@@ -38,7 +40,8 @@ json heat_json(const FinishedRun& run) {
   return {{"usual", run.heat.usual},
           {"hot", run.heat.hot},
           {"colors", hex_of(fusion::heat_colors(how.palette).value())},
-          {"strengths", strengths}};
+          {"strengths", strengths},
+          {"ramp", hex_of(fusion::heat_ramp({run.heat, {}, how}, 256).value())}};
 }
 
 }  // namespace

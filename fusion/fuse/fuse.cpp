@@ -136,9 +136,8 @@ Result<cv::Mat> by_heat(const cv::Mat& visible, const Plane& levels, const cv::M
   if (!chosen.scale) {
     Plane seen = levels.clone();
     if (!valid.empty()) seen.setTo(std::numeric_limits<float>::quiet_NaN(), ~valid);
-    HeatScaleOptions how;
-    if (gray_levels) how.min_width = min_heat_gray_levels;
-    chosen.scale = heat_scale({seen}, how);
+    chosen.scale =
+        heat_scale({seen}, gray_levels ? HeatScaleOptions::of_gray_levels() : HeatScaleOptions{});
   }
   said.heat = chosen.scale;
   cv::Mat bgr = options.color ? visible : cv::Mat(luma(visible));

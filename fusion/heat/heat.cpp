@@ -39,6 +39,8 @@ cv::Vec3f colored_pixel(const cv::Vec3f& visible, double level, double known, co
   return visible + weight * (color - visible);
 }
 
+int hatch_period_of(int width) { return std::max(8, width / 50); }
+
 /// Darker and brighter stripes, so that they show on black and on white.
 cv::Vec3f hatched(const cv::Vec3f& pixel, int x, int y, double unknown, const Coloring& how) {
   const double luma = (pixel[0] + pixel[1] + pixel[2]) / 3;
@@ -49,6 +51,18 @@ cv::Vec3f hatched(const cv::Vec3f& pixel, int x, int y, double unknown, const Co
 }  // namespace
 
 bool on_hatching(int x, int y, int period) { return (x + y) % period < std::max(1, period / 6); }
+
+void hatch_unmeasured(cv::Mat& painted_bgr, const cv::Mat& levels) {
+  CV_Assert(painted_bgr.type() == CV_8UC3 && levels.type() == CV_32FC1 &&
+            levels.size() == painted_bgr.size());
+  constexpr std::uint8_t plain = 128, stripe = 96;
+  const int period = hatch_period_of(painted_bgr.cols);
+  for (int y = 0; y < levels.rows; ++y)
+    for (int x = 0; x < levels.cols; ++x)
+      if (!std::isfinite(levels.at<float>(y, x)))
+        painted_bgr.at<cv::Vec3b>(y, x) =
+            cv::Vec3b::all(on_hatching(x, y, period) ? stripe : plain);
+}
 
 Status HeatOptions::validate() const {
   ORBITFUSE_TRY(orbitfuse::palette(palette));
@@ -83,7 +97,7 @@ Result<cv::Mat> colored_by_heat(const cv::Mat& visible, const Plane& thermal, co
     return measured.empty() ? 1.0 : static_cast<double>(measured(y, x));
   };
   Coloring how{
-      {}, {}, options.opacity, options.shading, options.hatching, std::max(8, visible.cols / 50)};
+      {}, {}, options.opacity, options.shading, options.hatching, hatch_period_of(visible.cols)};
   if (options.scale) {
     how.scale = *options.scale;
   } else {

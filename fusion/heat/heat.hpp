@@ -43,4 +43,8 @@ Result<cv::Mat> heat_colors(const std::string& palette);
 /// 0..1 along diagonal stripes, for a pixel where nothing was measured.
 bool on_hatching(int x, int y, int period);
 
+/// Gray stripes over a palette's picture (CV_8UC3) wherever `levels` (CV_32FC1) hold no number:
+/// black would be the palette's coldest colour.
+void hatch_unmeasured(cv::Mat& painted_bgr, const cv::Mat& levels);
+
 }  // namespace orbitfuse::fusion

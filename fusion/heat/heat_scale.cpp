@@ -27,6 +27,11 @@ bool HeatScale::is_valid() const {
          spread >= 0 && std::isfinite(spread);
 }
 
+HeatScale within_levels(HeatScale scale, const HeatScaleOptions& options) {
+  scale.hot = std::max(std::min(scale.hot, options.highest), scale.usual + options.min_width);
+  return scale;
+}
+
 HeatScale heat_scale(const std::vector<cv::Mat>& images, const HeatScaleOptions& options) {
   std::vector<float> samples;
   for (const cv::Mat& image : images) append_finite(image, samples);
@@ -36,6 +41,7 @@ HeatScale heat_scale(const std::vector<cv::Mat>& images, const HeatScaleOptions&
   scale.usual = at(0.5);
   scale.spread = std::min(scale.usual - at(0.25), at(0.75) - scale.usual);
   scale.hot = std::max(at(1 - options.hotter_share), scale.usual + options.min_width);
+  scale = within_levels(scale, options);
   // Levels so large that a double can't tell them from their neighbour `min_width` away.
   if (!(scale.hot > scale.usual)) scale.hot = std::nextafter(scale.usual, 1e300);
   return scale;

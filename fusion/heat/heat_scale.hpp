@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <limits>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -25,10 +26,16 @@ struct HeatScaleOptions {
   double hotter_share = 1e-4;
   /// Least `hot` - `usual`, in the image's unit: below it colour would show nothing but noise.
   double min_width = 2;
+  /// The highest level that a sample can have; a field's may be higher.
+  double highest = std::numeric_limits<double>::infinity();
+
+  /// For 8-bit images, whose noise is some gray levels.
+  static HeatScaleOptions of_gray_levels() { return {.min_width = 16, .highest = 255}; }
 };
 
-/// `min_width` for 8-bit images, whose noise is some gray levels.
-inline constexpr double min_heat_gray_levels = 16;
+/// A scale whose `hot` is at most the options' highest level, unless it were less than their
+/// `min_width` wide then: noise on what is bright everywhere is nothing hot.
+HeatScale within_levels(HeatScale scale, const HeatScaleOptions& options);
 
 /// One scale for all images of a scene (CV_32FC1, NaN and infinite = nothing measured): `usual` is
 /// their median, `spread` the smaller distance to a quartile (the larger one reaches into the sky

@@ -14,6 +14,8 @@ namespace {
 constexpr int font = cv::FONT_HERSHEY_SIMPLEX;
 const cv::Scalar mid_gray = cv::Scalar::all(150);
 
+constexpr const char* explanation = "colour: warmer than what is usual here; hatched: not measured";
+
 /// Sizes that follow the strip's width, so that it reads the same under any picture.
 struct Layout {
   int width, margin, bar_height, height, swatch;
@@ -26,7 +28,7 @@ struct Layout {
         height(0),
         swatch(total / 5),
         font_scale(std::max(0.2, total / 1400.0)) {
-    height = 2 * margin + bar_height + text_height();
+    height = 2 * margin + bar_height + 2 * text_height();
   }
   int text_height() const { return static_cast<int>(30 * font_scale) + 2; }
   int bar_width() const { return std::max(1, width - 3 * margin - swatch); }
@@ -35,8 +37,9 @@ struct Layout {
 void write(cv::Mat& strip, const std::string& text, cv::Point center_top, const Layout& layout) {
   int baseline = 0;
   const cv::Size size = cv::getTextSize(text, font, layout.font_scale, 1, &baseline);
+  const int most = layout.width - layout.margin - size.width;
   const int x =
-      std::clamp(center_top.x - size.width / 2, 0, std::max(0, layout.width - size.width));
+      std::clamp(center_top.x - size.width / 2, layout.margin, std::max(layout.margin, most));
   cv::putText(strip, text, {x, center_top.y + size.height + 2}, font, layout.font_scale,
               cv::Scalar::all(32), 1, cv::LINE_AA);
 }
@@ -84,11 +87,12 @@ Result<cv::Mat> heat_legend(const HeatLegend& legend, int width) {
   constexpr int ticks = 5;
   for (int i = 0; i < ticks; ++i)
     write(strip,
-          (i == 0 ? "usual " : "") +
+          (i == 0 ? "usual: " : "") +
               label(legend.scale.usual + (legend.scale.hot - legend.scale.usual) * i / (ticks - 1),
                     legend.unit, i + 1 == ticks),
           {place.x + (bar - 1) * i / (ticks - 1), below}, layout);
   write(strip, "not measured", {place.x + place.width - layout.swatch / 2, below}, layout);
+  write(strip, explanation, {0, below + layout.text_height()}, layout);
   return strip;
 }
 

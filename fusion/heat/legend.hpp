@@ -24,8 +24,8 @@ struct HeatLegend {
 Result<cv::Mat> heat_ramp(const HeatLegend& legend, int width);
 
 /// A strip of `width` pixels (CV_8UC3) to put under a picture: the colours over mid gray from the
-/// usual level to the hot one with ticks, and the hatching of "not measured". Usage errors:
-/// options.
+/// usual level to the hot one with ticks, the hatching of "not measured", and a sentence that says
+/// so. Usage errors: options.
 Result<cv::Mat> heat_legend(const HeatLegend& legend, int width);
 
 /// The picture (CV_8UC3) with the legend of its width below.

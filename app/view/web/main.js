@@ -6,7 +6,7 @@ async function begin() {
   const scene = await (await ask("/scene")).json();
   viewer.scene = scene; gray = scene.gray;
   document.title = scene.name.split("/").pop() + " · OrbitFuse view";
-  readPalettes(scene.palettes); viewer.heatColours = bytesOf(scene.heat.colors); viewer.heatStrengths = bytesOf(scene.heat.strengths); show.palette = scene.palette; [show.low, show.high] = scene.span;
+  readPalettes(scene.palettes); viewer.heatColours = bytesOf(scene.heat.colors); viewer.heatStrengths = bytesOf(scene.heat.strengths); viewer.heatRamp = bytesOf(scene.heat.ramp); show.palette = scene.palette; [show.low, show.high] = scene.span;
   if (localStorage.getItem("unit")) $("unit").value = unit = localStorage.getItem("unit");
   $("run-words").textContent = [scene.name, `${scene.surface.points} surface points`, ...scene.notes].join(" · ");
 

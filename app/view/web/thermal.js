@@ -10,7 +10,7 @@ function readPalettes(hex) { for (const [name, text] of Object.entries(hex)) pal
 /// The scale of a layer's colours: the fused picture has the run's own, whatever is chosen for the others.
 function scaleOf(layer) {
   const heat = viewer.scene.heat;
-  if (layer === "fused") return { low: heat.usual, high: heat.hot, colours: viewer.heatColours, strengths: viewer.heatStrengths, marks: false };
+  if (layer === "fused") return { low: heat.usual, high: heat.hot, colours: viewer.heatColours, strengths: viewer.heatStrengths, bar: viewer.heatRamp, marks: false };
   return layer === "visible" || !layer ? null : { low: show.low, high: show.high, colours: palettes[show.palette], marks: true };
 }
 /// Of the first layer on the stage that shows temperatures; null where none does.
@@ -60,7 +60,8 @@ function drawLegend() {
   const scale = shownScale();
   $("legend").hidden = !scale;
   if (!scale) return;
-  const context = $("bar").getContext("2d"), image = context.createImageData(256, 1), { low, high, colours, marks } = scale;
+  const context = $("bar").getContext("2d"), image = context.createImageData(256, 1), { low, high, marks } = scale;
+  const colours = scale.bar || scale.colours;  // as they lie over the picture
   for (let i = 0; i < 256; ++i) {
     const k = low + (high - low) * i / 255;
     image.data.set(marks && meetsIsotherm(k) ? [...isothermColour, 255] : [colours[3 * i], colours[3 * i + 1], colours[3 * i + 2], 255], 4 * i);

@@ -244,6 +244,12 @@ TEST_F(ViewServerTest, SceneTellsTheFusedPicturesOwnScale) {
   EXPECT_EQ(strengths.substr(0, 2), "00");
   const double most = stages::RunConfig().fuse.options.heat.opacity;
   EXPECT_NEAR(std::stoi(strengths.substr(510), nullptr, 16), 255 * most, 2);
+  // The bar begins, as the picture does, with what lies below.
+  const std::string ramp = heat.at("ramp");
+  ASSERT_EQ(ramp.size(), 6u * 256);
+  EXPECT_EQ(ramp.substr(0, 2), ramp.substr(2, 2));
+  EXPECT_EQ(ramp.substr(0, 2), ramp.substr(4, 2));
+  EXPECT_NE(ramp.substr(6 * 255, 2), ramp.substr(6 * 255 + 4, 2));
 }
 
 TEST_F(ViewServerTest, AFolderWhoseNameIsNoUtf8IsShown) {

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <opencv2/imgproc.hpp>
+#include <set>
 
 #include "fusion/heat/legend.hpp"
 #include "tests/fusion/fuse/images.hpp"
@@ -135,6 +137,44 @@ TEST(Heat, HolesFadeAndAreHatched) {
   options.heat.hatching = 0;
   const cv::Mat3b plain = fuse(v, kelvin, {}, options).value();
   EXPECT_EQ(cv::norm(plain.row(10), v.row(10), cv::NORM_INF), 0);
+}
+
+TEST(Heat, GrayLevelsEndWhereSamplesDo) {
+  const HeatScaleOptions gray = HeatScaleOptions::of_gray_levels();
+  EXPECT_EQ(within_levels({89, 23, 263}, gray).hot, 255);
+  EXPECT_EQ(within_levels({89, 23, 263}, gray).usual, 89);
+  const HeatScale bright = heat_scale({cv::Mat(4, 4, CV_32FC1, cv::Scalar(252))}, gray);
+  EXPECT_EQ(bright.usual, 252);
+  EXPECT_EQ(bright.hot, 268) << "or noise would be coloured";
+  EXPECT_EQ(within_levels({290, 1, 400}, {}).hot, 400);
+}
+
+TEST(Heat, WhatWasNotMeasuredIsGrayStripesOnAPalette) {
+  cv::Mat levels(20, 20, CV_32FC1, cv::Scalar(300));
+  levels.rowRange(0, 10).setTo(std::numeric_limits<float>::quiet_NaN());
+  cv::Mat3b painted(20, 20, cv::Vec3b(1, 2, 3));
+  fusion::hatch_unmeasured(painted, levels);
+  std::set<int> grays;
+  for (int y = 0; y < 10; ++y)
+    for (int x = 0; x < 20; ++x) {
+      const cv::Vec3b& p = painted(y, x);
+      EXPECT_TRUE(p[0] == p[1] && p[1] == p[2]);
+      grays.insert(p[0]);
+    }
+  EXPECT_EQ(grays.size(), 2u);
+  EXPECT_EQ(painted(15, 5), cv::Vec3b(1, 2, 3));
+}
+
+TEST(Heat, LegendKeepsItsWordsOffTheEdges) {
+  const fusion::HeatLegend legend{{292, 0.5, 335}, fusion::HeatUnit::kelvin, {}};
+  for (const int width : {640, 1280}) {
+    const cv::Mat strip = fusion::heat_legend(legend, width).value();
+    for (const int x : {0, width - width / 80})
+      EXPECT_EQ(
+          cv::norm(strip.colRange(x, x + width / 80),
+                   cv::Mat(strip.rows, width / 80, CV_8UC3, cv::Scalar::all(255)), cv::NORM_INF),
+          0);
+  }
 }
 
 TEST(Heat, LegendHasThePicturesWidthAndItsColours) {
