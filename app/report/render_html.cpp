@@ -89,9 +89,10 @@ std::string temperature_bar(const Model& model) {
                             : std::string("Scale of gray levels"),
       stops, ticks,
       model.has_temperature
-          ? "One span for all views. Point at an infrared or fused image to read its temperature."
+          ? "One span for all views. Point at an infrared or fused image to read its temperature. "
+            "Hatched gray: nothing was measured."
           : "The thermal frames hold gray levels, not temperatures: import radiometric files for "
-            "°C.");
+            "°C. Hatched gray: nothing was measured.");
 }
 
 /// The colours of the heat pictures over mid gray, as they strengthen.
@@ -302,9 +303,10 @@ std::string to_html(const Model& model) {
         "</summary><pre>{}</pre></details></section>\n",
         escape(model.configuration));
   html += fmt::format(
-      "</main>\n<footer>OrbitFuse {} · {}</footer>\n<script type=\"application/json\" "
+      "</main>\n<footer>OrbitFuse {} · this report was made {}</footer>\n<script "
+      "type=\"application/json\" "
       "id=\"views\">{}</script>\n<script>\n{}</script>\n</body></html>\n",
-      escape(model.software), escape(model.created), escape_json(views.dump()), report_js);
+      escape(model.software), escape(model.made), escape_json(views.dump()), report_js);
   return html;
 }
 

@@ -69,7 +69,7 @@ struct Model {
   Table measurements;  ///< saved in the run's folder; no rows: none
   std::vector<pipeline::StageStatus> stages;
   std::vector<std::string> warnings;
-  std::string software, created, configuration;  ///< configuration: resolved, as TOML or JSON
+  std::string software, made, configuration;  ///< configuration: resolved, as TOML or JSON
 };
 
 /// One HTML page that needs no other file and no network.

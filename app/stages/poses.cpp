@@ -23,6 +23,7 @@ json ladder_json(const std::vector<LadderStep>& ladder) {
   for (const LadderStep& step : ladder)
     list.push_back({{"attempt", step.attempt},
                     {"held", step.held},
+                    {"bettered", step.bettered},
                     {"why", step.why},
                     {"posed", step.posed},
                     {"total", step.total},
@@ -53,8 +54,8 @@ StageOutput describe(const ModalityPoses& poses, PoseFrame frame) {
   output.skips = poses.skips;
   const std::string doubts =
       poses.doubtful.empty() ? "" : fmt::format(", {} of them doubtful", poses.doubtful.size());
-  output.metrics = {{"brief", fmt::format("{} of {} views posed by {}{}", posed, poses.frame_count,
-                                          held_attempt(poses), doubts)},
+  output.metrics = {{"brief", fmt::format("{} of {} views posed{} ({})", posed, poses.frame_count,
+                                          doubts, held_attempt(poses))},
                     {"posed", posed},
                     {"total", poses.frame_count},
                     {"attempt", held_attempt(poses)},

@@ -16,6 +16,7 @@
 #include "core/system/cpu.hpp"
 #include "core/system/file_io.hpp"
 #include "core/system/parallel.hpp"
+#include "core/system/utc_now.hpp"
 #include "core/temperature.hpp"
 #include "recon/assembly/training_data.hpp"
 
@@ -92,6 +93,13 @@ std::string advice(const report::PosesSummary& poses) {
                "object give thermal views more to hold on to.";
 }
 
+/// A good model that a later attempt bettered did not fail.
+std::string outcome_of(const json& attempt) {
+  if (attempt.value("held", false)) return "held";
+  if (attempt.value("bettered", false)) return "good, and bettered by a later attempt";
+  return "did not hold";
+}
+
 void add_poses(const StageContext& context, const SessionInput& input, report::Model& model) {
   for (const Modality modality : {Modality::visible, Modality::thermal}) {
     const bool visible = modality == Modality::visible;
@@ -103,9 +111,8 @@ void add_poses(const StageContext& context, const SessionInput& input, report::M
       poses.posed = m->value("posed", 0);
       poses.total = m->value("total", poses.total);
       for (const json& attempt : m->value("ladder", json::array()))
-        poses.ladder.push_back({attempt.value("attempt", ""),
-                                attempt.value("held", false) ? "held" : "did not hold",
-                                attempt.value("why", "")});
+        poses.ladder.push_back(
+            {attempt.value("attempt", ""), outcome_of(attempt), attempt.value("why", "")});
     }
     poses.advice = advice(poses);
     model.headline.emplace_back(fmt::format("{} views posed", name(modality)),
@@ -239,7 +246,8 @@ Result<report::Model> report_content(const StageContext& context, const StageInp
         fmt::format("{:.0f} to {:.0f} °C", celsius_from_kelvin(model.span.low_k),
                     celsius_from_kelvin(model.span.high_k)));
   if (const json* fused = context.metrics_of("fuse"); fused && fused->contains("measured_share"))
-    model.headline.emplace_back("of the new views has a temperature",
+    model.headline.emplace_back(input.has_temperatures() ? "of the new views has a temperature"
+                                                         : "of the new views is seen by infrared",
                                 percent(fused->at("measured_share").get<double>()));
   model.headline.emplace_back("run time", fmt::format("{:.0f} s", wall_s));
   model.warnings.insert(model.warnings.end(), input.session.warnings.begin(),
@@ -248,7 +256,7 @@ Result<report::Model> report_content(const StageContext& context, const StageInp
     for (const std::string& warning : s.output.warnings)
       model.warnings.push_back(s.stage + ": " + warning);
   model.software = pipeline::software_version();
-  model.created = input.session.created;
+  model.made = utc_now_text();
   model.configuration = in.config->settings().to_toml();
   return model;
 }

@@ -27,6 +27,7 @@ bool ModelSelection::consider(const std::string& attempt, const std::string& fou
     step.why += "; " + (judged ? judged->why : judged.error().found);
     if (judged) step.posed = static_cast<int>(judged->poses.reconstruction.views.size());
     if (judged && judged->believed && (!best_ || better(judged->poses.reconstruction, best()))) {
+      if (best_) steps_[best_step_].bettered = true;
       best_ = std::move(*judged);
       best_step_ = steps_.size();
       best_level_ = &level;

@@ -27,6 +27,7 @@ TEST(Html, Base64KnownVectors) {  // RFC 4648, section 10
 Model full_model() {
   Model m;
   m.title = "container <1>";
+  m.made = "2026-11-26T22:11:55Z";
   m.subtitle = "test";
   m.headline = {{"visible views posed", "24 of 24"}};
   m.span = {273.15, 323.15};
@@ -64,7 +65,7 @@ TEST(Report, ShowsEverythingItIsGiven) {
        {"container &lt;1&gt;", "24 of 24", "0.0 °C", "50.0 °C", "20 of 24 views", "no initial pair",
         "record more", "Xydeas &amp; Petrovic", "0.65", "12.5 s", "saved 200 s", "12 of 24 posed",
         "one &lt;warning&gt;", "id=\"swipe\"", "kelvin_per_count", "Saved measurements",
-        "valve &lt;1&gt;", "mean &lt;of&gt; frames"})
+        "valve &lt;1&gt;", "mean &lt;of&gt; frames", "this report was made 2026-11-26T22:11:55Z"})
     EXPECT_THAT(html, HasSubstr(text));
 }
 
