@@ -32,9 +32,12 @@ void transform(const ExportFrame& frame, TriangleMesh& mesh) {
   for (Eigen::Vector3f& n : mesh.vertices.normals) n = rotation * n;
 }
 
-json to_json(const ExportFrame& frame) {
+json to_json(const ExportFrame& frame, FileAxes axes) {
+  Eigen::Matrix4d export_from_file = Eigen::Matrix4d::Identity();
+  if (axes == FileAxes::y_up) export_from_file.block<2, 2>(1, 1) << 0, -1, 1, 0;
   json j = {{"unit", frame.unit()},
-            {"up", "z"},
+            {"up", axes == FileAxes::y_up ? "y" : "z"},
+            {"export_from_file", matrix_json(export_from_file)},
             {"words", frame.words()},
             {"world_from_export", matrix_json(frame.export_from_world.inverse().matrix())}};
   if (frame.scale) j["scale"] = stages::to_json(*frame.scale);

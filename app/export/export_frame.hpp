@@ -29,7 +29,11 @@ Result<ExportFrame> export_frame(const Eigen::Vector3d& up,
 
 void transform(const ExportFrame& frame, TriangleMesh& mesh);
 
-/// What every sidecar says of its frame: unit, up, uncertainty, `world_from_export` (4x4).
-nlohmann::json to_json(const ExportFrame& frame);
+/// Axes of a file's coordinates against those of the frame. glTF: y is up.
+enum class FileAxes { z_up, y_up };
+
+/// What every sidecar says of its frame: unit, uncertainty, `world_from_export` (4x4), and of the
+/// file's own coordinates `up` and `export_from_file` (4x4).
+nlohmann::json to_json(const ExportFrame& frame, FileAxes axes = FileAxes::z_up);
 
 }  // namespace orbitfuse::exporting

@@ -52,8 +52,8 @@ Status paint_temperatures(const view::FinishedRun& run, const std::string& name,
 }
 
 json sidecar(const view::FinishedRun& run, const FieldSurface& surface, const TriangleMesh& mesh,
-             const ExportFrame& frame, const FileOptions& options) {
-  json j = to_json(frame);
+             const ExportFrame& frame, FileAxes axes, const FileOptions& options) {
+  json j = to_json(frame, axes);
   j["schema"] = 1;
   if (!options.made_of.empty()) j["made_of"] = options.made_of;
   j["run"] = fs::absolute(run.out).lexically_normal().string();
@@ -139,14 +139,14 @@ Status write_surface(const fs::path& file, const view::FinishedRun& run,
     ORBITFUSE_TRY(paint_temperatures(run, options.palette, mesh.vertices));
   const std::string extension = extension_of(file);
   if (extension == ".las" || (extension == ".ply" && options.points)) mesh.triangles.clear();
-  json about = sidecar(run, surface, mesh, frame, options);
+  const FileAxes axes = extension == ".glb" ? FileAxes::y_up : FileAxes::z_up;
+  json about = sidecar(run, surface, mesh, frame, axes, options);
   const std::vector<std::string> comments = {"unit " + frame.unit() + ", up z; " + frame.words()};
   Status written;
   if (extension == ".glb") {
     json extras = about;
-    extras["up"] = "y";
     extras["temperature_none"] = 0;
-    extras.erase("world_from_export");  // of the sidecar's frame, whose z is up
+    extras.erase("world_from_export");  // a program may have turned what it read
     written = write_glb(file, mesh, extras);
   } else if (extension == ".ply") {
     written = write_ply(file, mesh, {options.temperature_name, comments});

@@ -11,6 +11,7 @@
 #include "app/export/glb.hpp"
 #include "app/stages/artifacts.hpp"
 #include "core/formats/ply.hpp"
+#include "core/geometry/geometry_json.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse::exporting {
@@ -140,6 +141,28 @@ TEST(SurfaceFiles, EachFormatIsWrittenWithItsFrame) {
   EXPECT_NEAR((cloud->normals[1] - Eigen::Vector3f(0, 0, 1)).norm(), 0, 1e-6);
   EXPECT_EQ(cloud->temperatures_k[0], 300.5F);
   EXPECT_TRUE(std::isnan(cloud->temperatures_k[2]));
+}
+
+/// The first vertex but one as a program reads it, through the matrices of the sidecar.
+TEST(SurfaceFiles, ASidecarTellsTheFilesOwnAxes) {
+  const fs::path folder = scratch();
+  const Exported e = exported();
+  const auto frame =
+      export_frame(Eigen::Vector3d::UnitX(), stages::MetricScale{2, 0.01, "one distance", ""});
+  ASSERT_TRUE(frame);
+  for (const char* name : {"a.glb", "a.ply"}) {
+    const bool glb = std::string(name) == "a.glb";
+    ASSERT_TRUE(write_surface(folder / name, e.run, e.surface, *frame, {}));
+    const auto about = stages::read_json(folder / (std::string(name) + ".json"));
+    ASSERT_TRUE(about);
+    EXPECT_EQ(about->at("up"), glb ? "y" : "z");
+    const auto export_from_file = matrix_of_json(about->at("export_from_file"));
+    const auto world_from_export = matrix_of_json(about->at("world_from_export"));
+    ASSERT_TRUE(export_from_file && world_from_export);
+    const Eigen::Vector3d in_file = glb ? Eigen::Vector3d(0, 2, 0) : Eigen::Vector3d(0, 0, 2);
+    const Eigen::Vector4d world = *world_from_export * *export_from_file * in_file.homogeneous();
+    EXPECT_NEAR((world.head<3>() - e.surface.mesh.vertices.positions[1]).norm(), 0, 1e-9) << name;
+  }
 }
 
 TEST(SurfaceFiles, WithoutScaleThatIsSaid) {
