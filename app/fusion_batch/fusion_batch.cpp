@@ -7,6 +7,7 @@
 #include <map>
 
 #include "core/image/exif.hpp"
+#include "core/image/has_colors.hpp"
 #include "core/image/image_codec.hpp"
 #include "core/image/image_io.hpp"
 #include "core/image/transparency.hpp"
@@ -43,7 +44,8 @@ Result<std::map<std::string, fs::path>> files_by_stem(const fs::path& folder,
 /// One pair into the layout; its lines of the CSV.
 Result<std::string> fuse_one(const std::string& stem, const fs::path& visible_file,
                              const fs::path& thermal_file, const fs::path& out,
-                             const FusionOptions& options, std::vector<std::string>& remarks) {
+                             const FusionOptions& options, std::vector<std::string>& remarks,
+                             std::vector<fs::path>& colored) {
   ORBITFUSE_ASSIGN(const cv::Mat visible, read_photo(visible_file));
   ORBITFUSE_ASSIGN(const cv::Mat stored, read_thermal(thermal_file));
   ORBITFUSE_ASSIGN(const cv::Mat fused, fuse(visible, stored, {}, options));
@@ -56,6 +58,7 @@ Result<std::string> fuse_one(const std::string& stem, const fs::path& visible_fi
     for (std::string& remark : unused_parts(file)) remarks.push_back(std::move(remark));
   if (auto remark = looks_exchanged(visible, stored, visible_file))
     remarks.push_back(*std::move(remark));
+  if (has_colors(stored)) colored.push_back(thermal_file);
   std::string lines;
   for (const MetricValue& v : values)
     lines += fmt::format("{},{},{},{}\n", stem, name(options.method), v.name, v.value);
@@ -84,6 +87,19 @@ std::optional<std::string> looks_exchanged(const cv::Mat& visible, const cv::Mat
   return visible_file.string() +
          ": 16-bit grey as the visible image beside a thermal one in colour; if that is a mistake, "
          "exchange the two";
+}
+
+std::optional<std::string> in_colors(std::size_t count, const fs::path& first) {
+  if (count == 0) return std::nullopt;
+  return fmt::format(
+      "{}{}: in colour, so a palette's picture or a photograph: the colours of a palette are no "
+      "temperatures, only their brightness is used; give the camera's radiometric files, or gray "
+      "levels",
+      first.string(), count == 1 ? "" : fmt::format(" and {} more thermal images", count - 1));
+}
+
+std::optional<std::string> in_colors(const cv::Mat& thermal, const fs::path& file) {
+  return in_colors(has_colors(thermal) ? 1 : 0, file);
 }
 
 std::vector<std::string> unused_parts(const fs::path& file) {
@@ -129,6 +145,7 @@ Result<Summary> fuse_folder(const fs::path& visible, const fs::path& thermal, co
   for (const auto& [stem, file] : thermal_files)
     if (!visible_files.contains(stem))
       summary.problems.push_back(file.string() + ": no visible image of that name");
+  std::vector<fs::path> colored;
   std::string csv = "pair,method,metric,value\n";
   int done = 0;
   for (const auto& [stem, file] : visible_files) {
@@ -141,7 +158,8 @@ Result<Summary> fuse_folder(const fs::path& visible, const fs::path& thermal, co
       summary.problems.push_back(file.string() + ": no thermal image of that name");
       continue;
     }
-    const auto lines = fuse_one(stem, file, partner->second, out, options, summary.remarks);
+    const auto lines =
+        fuse_one(stem, file, partner->second, out, options, summary.remarks, colored);
     if (!lines) {
       summary.problems.push_back(stem + ": " + lines.error().message());
       continue;
@@ -149,6 +167,8 @@ Result<Summary> fuse_folder(const fs::path& visible, const fs::path& thermal, co
     csv += *lines;
     ++summary.fused;
   }
+  if (auto remark = in_colors(colored.size(), colored.empty() ? "" : colored.front()))
+    summary.remarks.push_back(*std::move(remark));
   if (summary.fused == 0)
     return fail(ErrorKind::input, visible.string(),
                 summary.problems.empty() ? "no images"

@@ -35,6 +35,11 @@ std::vector<std::string> unused_parts(const std::filesystem::path& file);
 std::optional<std::string> looks_exchanged(const cv::Mat& visible, const cv::Mat& thermal,
                                            const std::filesystem::path& visible_file);
 
+/// A sentence where thermal images are in colour, of which `first` is the first; none for 0.
+std::optional<std::string> in_colors(std::size_t count, const std::filesystem::path& first);
+/// The same of one image as it was read.
+std::optional<std::string> in_colors(const cv::Mat& thermal, const std::filesystem::path& file);
+
 /// The 8-bit image in which it is fused and scored: kelvin over `span` (none: their own), anything
 /// else as it is.
 Result<cv::Mat> gray_of_thermal(const cv::Mat& thermal, const std::optional<TemperatureSpan>& span);

@@ -101,6 +101,7 @@ Status fuse_pair(Context& context, const FuseArguments& o, const FusionOptions& 
   ORBITFUSE_ASSIGN(const cv::Mat thermal, batch::read_thermal(o.thermal));
   if (const auto remark = batch::looks_exchanged(visible, thermal, o.visible))
     context.console.warning(*remark);
+  if (const auto remark = batch::in_colors(thermal, o.thermal)) context.console.warning(*remark);
   ORBITFUSE_ASSIGN(const cv::Mat mask, read_optional(o.mask));
   for (const std::string& file : {o.visible, o.thermal})
     for (const std::string& remark : batch::unused_parts(file)) context.console.warning(remark);
@@ -156,6 +157,10 @@ Status run(Context& context, const FuseArguments& o) {
     ORBITFUSE_TRY(check_needs({{"--mask", !o.mask.empty(), files, false},
                                {"--gray", o.gray, files, false},
                                {"--method", o.method_given, files, false}}));
+    std::error_code no_file;
+    if (fs::is_regular_file(o.folders.session, no_file))
+      return fail(ErrorKind::usage, o.folders.session, "a file, where a session is named",
+                  "name images by options: --visible FILE --thermal FILE --out FUSED.png");
     return run_stages(context, o.folders, {"fuse"});
   }
   for (const auto& [option, value] :

@@ -33,6 +33,7 @@ Status score_files(Context& context, const MetricsArguments& o) {
   ORBITFUSE_ASSIGN(const cv::Mat stored, batch::read_thermal(o.thermal));
   if (const auto remark = batch::looks_exchanged(visible, stored, o.visible))
     context.console.warning(*remark);
+  if (const auto remark = batch::in_colors(stored, o.thermal)) context.console.warning(*remark);
   const auto named = [&](Error error) {
     return batch::with_file(std::move(error),
                             {{"visible", o.visible}, {"thermal", o.thermal}, {"fused", o.fused}});

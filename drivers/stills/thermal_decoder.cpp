@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/image/has_colors.hpp"
 #include "core/temperature.hpp"
 
 namespace orbitfuse {
@@ -68,23 +69,6 @@ tl::unexpected<Error> too_cold(const std::string& where, const CountHistogram& h
           scale.scale, scale.offset, celsius_from_kelvin(coldest_k), coldest_k),
       "kelvin = scale * count + offset: correct its tag or sidecar, or give --thermal-scale linear "
       "with --kelvin-per-count and --kelvin-offset (counts of 0.01 C need 0.01 and 273.15)");
-}
-
-/// A palette's picture or a photograph; grey that was stored as three channels is none, nor is a
-/// maker's small coloured mark in it.
-bool has_colors(const cv::Mat& image) {
-  if (image.channels() < 3) return false;
-  constexpr int clear_of_compression = 24;  // levels
-  constexpr double least_share = 0.02;
-  std::size_t colored = 0;
-  for (int y = 0; y < image.rows; ++y) {
-    const std::uint8_t* row = image.ptr<std::uint8_t>(y);
-    for (int x = 0; x < image.cols; ++x, row += image.channels()) {
-      const auto [low, high] = std::minmax({row[0], row[1], row[2]});
-      colored += high - low > clear_of_compression;
-    }
-  }
-  return static_cast<double>(colored) > least_share * static_cast<double>(image.total());
 }
 
 constexpr const char* by_themselves =

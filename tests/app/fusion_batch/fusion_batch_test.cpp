@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cmath>
 #include <fstream>
+#include <opencv2/imgproc.hpp>
 #include <sstream>
 
 #include "core/image/image_io.hpp"
@@ -53,6 +54,22 @@ class FusionBatch : public ::testing::Test {
   }
   test::TempFolder temp;
 };
+
+TEST_F(FusionBatch, ThermalPicturesInColoursAreToldOnce) {
+  cv::Mat gray3;
+  cv::cvtColor(noise({40, 32}, CV_8UC1, 2), gray3, cv::COLOR_GRAY2BGR);
+  ASSERT_TRUE(write_png(temp.path() / "t/a.png", gray3));
+  EXPECT_TRUE(run()->remarks.empty()) << "gray, stored as three channels";
+  fs::remove(temp.path() / "t/b.tiff");
+  for (const char* name : {"a", "b"})
+    ASSERT_TRUE(
+        write_png(temp.path() / "t" / (std::string(name) + ".png"), noise({40, 32}, CV_8UC3, 4)));
+  const auto told = run();
+  ASSERT_TRUE(told);
+  ASSERT_EQ(told->remarks.size(), 1u);
+  EXPECT_NE(told->remarks[0].find("a.png and 1 more thermal images: in colour"), std::string::npos)
+      << told->remarks[0];
+}
 
 TEST_F(FusionBatch, WritesTheLayoutAndTheScores) {
   int reports = 0;
