@@ -95,6 +95,40 @@ std::optional<Error> unoffered(const CommandLine& line, const Verb& verb, const 
   return std::nullopt;
 }
 
+/// The example of the verb's help that is shown first.
+std::string example_of(const Verb& verb) {
+  const std::string example = verb.example;
+  return example.substr(0, example.find('\n'));
+}
+
+/// What CLI11 says in words of its own: a missing value or folder, a word that no option takes.
+void tell_plainly(const CLI::App& app, const Verb& verb, const CLI::ParseError& error,
+                  Error& result) {
+  if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr &&
+      app.get_option_no_throw("--visible") != nullptr) {
+    result.remedy =
+        "images are named by options: --visible and --thermal, e.g. " + example_of(verb);
+    return;
+  }
+  if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) {
+    for (const CLI::Option* option : app.get_options()) {
+      if (!option->get_positional() || !option->get_required() || option->count() > 0) continue;
+      result.where = option->get_name(true);
+      result.found = "not given: " + option->get_description();
+      result.remedy = "write it without an option before it, e.g. " + example_of(verb);
+      return;
+    }
+  }
+  if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr) {
+    const std::string option = result.found.substr(0, result.found.find(':'));
+    const CLI::Option* known = app.get_option_no_throw(option);
+    if (known == nullptr || known->count() > 0) return;
+    result.where = option;
+    result.found = "given without a value";
+    result.remedy = "write " + option + " " + known->get_type_name();
+  }
+}
+
 }  // namespace
 
 CommandLine::CommandLine() : app("Radiance fields of two camera orbits, fused from any view") {
@@ -147,6 +181,7 @@ Error usage_error(const CommandLine& line, const CLI::ParseError& error, int arg
     }
     return result;
   }
+  tell_plainly(*app, *chosen, error, result);
   known.clear();
   for (const CLI::Option* option : app->get_options())
     for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
@@ -154,7 +189,9 @@ Error usage_error(const CommandLine& line, const CLI::ParseError& error, int arg
     const std::string name = word.substr(0, word.find('='));
     if (name.starts_with("--") && std::find(known.begin(), known.end(), name) == known.end()) {
       if (const auto refused = unoffered(line, *chosen, name)) return *refused;
+      result.where.clear();
       result.found = "unknown option '" + name + "'";
+      result.remedy = "orbitfuse " + app->get_name() + " --help lists the options";
       suggest(name, known);
       break;
     }

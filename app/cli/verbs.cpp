@@ -10,6 +10,7 @@ constexpr CommonUse of_results{.config = true, .fields = true};  // of a finishe
 constexpr CommonUse of_recordings{.resume = true};
 constexpr CommonUse none;
 
+constexpr const char* run_first = "the run's folder is given without an option";
 constexpr const char* kept = "a session is never overwritten";
 
 }  // namespace
@@ -49,12 +50,24 @@ const std::vector<Verb>& verbs() {
        "  orbitfuse report --print-template > inspection.toml\n"
        "  orbitfuse report out/ --inspection inspection.toml --pdf",
        add_report, of_stages},
-      {"view", "Walk round the result of a run in a browser", "orbitfuse view out/", add_view,
-       of_results},
-      {"measure", "Say how hot something is in a finished run, and how sure that is",
-       "orbitfuse measure out/ --hottest 3", add_measure, CommonUse{.fields = true}},
-      {"export", "Write the surface of a finished run for other programs: GLB, PLY, OBJ, LAS",
-       "orbitfuse export out/ --to van.glb", add_export, of_results},
+      {"view",
+       "Walk round the result of a run in a browser",
+       "orbitfuse view out/",
+       add_view,
+       of_results,
+       {{"--out", run_first, "write orbitfuse view OUT"}}},
+      {"measure",
+       "Say how hot something is in a finished run, and how sure that is",
+       "orbitfuse measure out/ --hottest 3",
+       add_measure,
+       CommonUse{.fields = true},
+       {{"--out", run_first, "write orbitfuse measure OUT --hottest 3"}}},
+      {"export",
+       "Write the surface of a finished run for other programs: GLB, PLY, OBJ, LAS",
+       "orbitfuse export out/ --to van.glb",
+       add_export,
+       of_results,
+       {{"--out", run_first, "write orbitfuse export OUT; the file to write is --to"}}},
       {"compare", "Say what became warmer, colder or moved between two runs of one object",
        "orbitfuse compare before/ after/ --out difference/", add_compare, of_results},
       {"eval", "Measure a run against ground truth",

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 
 namespace orbitfuse::recording {
 namespace {
@@ -19,6 +20,15 @@ const std::map<std::string, std::vector<std::string>> drivers{
     {"stills", {"existing", "gray"}},
     {"replay", {"speed"}},
     {"synthetic", {"size", "spacing"}}};
+
+/// What was meant by a device, an address or a folder without the driver before it; empty: unknown.
+std::string with_driver(const std::string& text) {
+  std::error_code unreadable;
+  if (text.starts_with("/dev/video")) return "v4l2:" + text;
+  for (const char* scheme : {"rtsp://", "http://", "https://"})
+    if (text.starts_with(scheme)) return "network:" + text;
+  return std::filesystem::is_directory(text, unreadable) ? "stills:" + text : "";
+}
 
 tl::unexpected<Error> wrong(const std::string& spec, std::string found, std::string remedy) {
   return fail(ErrorKind::usage, "camera \"" + spec + "\"", std::move(found), std::move(remedy));
@@ -51,8 +61,11 @@ Result<CameraSpec> parse_camera_spec(const std::string& text) {
   if (known == drivers.end()) {
     std::vector<std::string> names;
     for (const auto& entry : drivers) names.push_back(entry.first);
-    return wrong(text, "unknown driver \"" + spec.driver + "\"",
-                 fmt::format("use one of {}", fmt::join(names, ", ")));
+    const std::string meant = with_driver(text);
+    return wrong(text,
+                 meant.empty() ? "unknown driver \"" + spec.driver + "\"" : "no driver before it",
+                 meant.empty() ? fmt::format("use one of {}", fmt::join(names, ", "))
+                               : "did you mean '" + meant + "'?");
   }
   while (comma != std::string::npos) {
     const std::size_t next = text.find(',', comma + 1);

@@ -46,7 +46,8 @@ Status run(Context& context, const CompareArguments& o) {
   request.triangles = o.triangles;
   std::error_code unreadable;
   if (fs::equivalent(o.before, o.after, unreadable))
-    return fail(ErrorKind::usage, "AFTER", "the run that BEFORE is", "name two runs");
+    return fail(ErrorKind::usage, o.after, "the two runs are the same",
+                "name the --out folders of two runs of the object, the earlier one first");
   for (const std::string& run : {o.before, o.after})
     if (fs::equivalent(run, o.out, unreadable))
       return fail(ErrorKind::usage, "--out", "'" + o.out + "', which is one of the runs",

@@ -92,6 +92,16 @@ Status check_reference(const std::string& name, const Measurements& saved,
                             : fmt::format("name one of {}", fmt::join(names, ", ")));
 }
 
+/// The library asks for what the camera was set to; here that is an option.
+Error without_recorded(Error error, const MeasureWords& words) {
+  if (error.kind == ErrorKind::usage && asks_radiometry(words) && !words.recorded_emissivity &&
+      error.remedy.find("recorded emissivity") != std::string::npos)
+    error.remedy =
+        "say what the camera was set to: --recorded-emissivity, and --recorded-reflected-c if it "
+        "was not 20 C; or import the camera's radiometric JPEGs";
+  return error;
+}
+
 Status run(Context& context, const MeasureArguments& options) {
   if (options.words.csv && context.common.json)
     return fail(ErrorKind::usage, "--csv", "together with --json", "choose one of them");
@@ -120,7 +130,10 @@ Status run(Context& context, const MeasureArguments& options) {
     return {};
   }
   if (words.save) ORBITFUSE_TRY(check_name(request->name));  // before it takes its time
-  ORBITFUSE_ASSIGN(const Answer answer, measure(scene, *request, context.progress));
+  ORBITFUSE_ASSIGN(const Answer answer,
+                   measure(scene, *request, context.progress).map_error([&](Error error) {
+                     return without_recorded(std::move(error), words);
+                   }));
   std::string name = request->name;
   if (options.words.save && context.common.dry_run) {
     context.console.info("would be saved in " + file.string());

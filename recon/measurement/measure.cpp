@@ -87,6 +87,7 @@ void say_unseen(const TemperatureReading& reading, std::vector<std::string>& not
 /// "+-" is read as one that is merely rough. Of a region its points differ anyway.
 void say_apart(const TemperatureReading& reading, std::vector<std::string>& notes) {
   constexpr double wide = 3;       // times what is assumed for the camera alone
+  constexpr double far = 1.5;      // times the uncertainty
   constexpr double decides = 0.9;  // of the weight
   if (reading.points != 1) return;
   double low = HUGE_VAL, high = -HUGE_VAL, most = 0;
@@ -99,7 +100,9 @@ void say_apart(const TemperatureReading& reading, std::vector<std::string>& note
     most = std::max(most, line.weight);
   }
   const bool unsure = reading.uncertainty_k > wide * reading.assumed_k;
-  const bool frames_apart = unsure && !two_camps && high - low > reading.uncertainty_k;
+  const bool frames_apart = unsure && !two_camps &&
+                            std::max(high - reading.temperature_k, reading.temperature_k - low) >
+                                far * reading.uncertainty_k;
   const bool field_apart =
       std::abs(reading.field_k - reading.temperature_k) > reading.uncertainty_k;  // NaN: false
   if (!frames_apart && !field_apart) return;

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/formats/csv.hpp"
@@ -131,13 +132,31 @@ std::string described(const TemperatureReading& r) {
     text += fmt::format("; field {:.2f}", celsius_from_kelvin(r.field_k));
   text += fmt::format("; seen {:.0f} deg from the normal)", r.angle_deg);
   const FrameLine* best = r.best();
-  return text + fmt::format(", best seen at {},{:.1f},{:.1f};", best->frame, best->pixel.x(),
+  return text + fmt::format(", best seen at {},{:.1f},{:.1f}", best->frame, best->pixel.x(),
                             best->pixel.y());
 }
 
+namespace {
+
+/// Some points of a profile, from its start to its end.
+std::string described(const std::vector<ProfilePoint>& profile) {
+  constexpr std::size_t most = 9;
+  const std::size_t shown = std::min(most, profile.size());
+  std::string text = "profile in C:";
+  for (std::size_t i = 0; i < shown; ++i) {
+    const auto& at = profile[shown < 2 ? 0 : i * (profile.size() - 1) / (shown - 1)].at;
+    const bool seen = at && at->reading.seen();
+    text += seen ? fmt::format(" {:.1f}", celsius_from_kelvin(at->reading.temperature_k)) : " -";
+  }
+  return text + fmt::format(" ({} of its {} points; all with where they lie: --csv or --json)",
+                            shown, profile.size());
+}
+
+}  // namespace
+
 std::vector<std::string> described(const Answer& answer) {
   const auto at = [](const Eigen::Vector3d& p) {
-    return fmt::format(" at {:.4f},{:.4f},{:.4f}", p.x(), p.y(), p.z());
+    return fmt::format("; at {:.4f},{:.4f},{:.4f}", p.x(), p.y(), p.z());
   };
   std::vector<std::string> lines;
   switch (answer.kind) {
@@ -159,6 +178,7 @@ std::vector<std::string> described(const Answer& answer) {
       break;
     default:
       lines.push_back(described(answer.reading) + (answer.position ? at(*answer.position) : ""));
+      if (!answer.profile.empty()) lines.push_back(described(answer.profile));
   }
   if (!answer.radiometry.words.empty()) lines.push_back(answer.radiometry.words);
   for (const std::string& note : answer.notes) lines.push_back("note: " + note);

@@ -63,6 +63,24 @@ TEST(Cli, SlipsGetASuggestionAndExitCode2) {
   EXPECT_EQ(orbitfuse_program({"run", "x", "--seed", "-1"}).code, 2);
 }
 
+TEST(Cli, WhatIsMissingOrMisplacedIsSaidPlainly) {
+  const std::vector<std::pair<std::vector<std::string>, const char*>> slips = {
+      {{"export", "--out", "x"}, "--out: the run's folder is given without an option"},
+      {{"measure", "--out", "x"}, "write orbitfuse measure OUT"},
+      {{"export"}, "out: not given: The --out folder of a finished run"},
+      {{"export"}, "e.g. orbitfuse export out/ --to van.glb"},
+      {{"fuse", "a.jpg", "b.jpg"}, "images are named by options: --visible and --thermal"},
+      {{"import", "s", "photos"}, "images are named by options: --visible and --thermal"},
+      {{"measure", "x", "--hottest"}, "--hottest: given without a value; write --hottest N"},
+      {{"capture", "s", "--visible", "/dev/video0", "--dry-run"},
+       "did you mean 'v4l2:/dev/video0'?"}};
+  for (const auto& [words, said] : slips) {
+    const Outcome outcome = orbitfuse_program(words);
+    EXPECT_EQ(outcome.code, 2) << said;
+    EXPECT_THAT(outcome.err, HasSubstr(said));
+  }
+}
+
 TEST(Cli, UsageErrorsKeepTheJsonContract) {
   const Outcome outcome = orbitfuse_program({"run", "x", "--nonsense", "--json"});
   EXPECT_EQ(outcome.code, 2);

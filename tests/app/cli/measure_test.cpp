@@ -170,6 +170,8 @@ TEST_F(Measure, WhatIsWrongIsNamedWithTheRemedy) {
 
 TEST_F(Measure, ASessionWithoutRadiometryRefusesAnEmissivityByName) {
   expect_refused({"--pixel", "000,32,24", "--emissivity", "0.6"}, 2, "thermal/000000.tiff");
+  EXPECT_THAT(measure({"--pixel", "000,32,24", "--emissivity", "0.6"}).err,
+              HasSubstr("--recorded-emissivity"));
   const Outcome told =
       measure({"--pixel", "000,32,24", "--emissivity", "0.6", "--recorded-emissivity", "1"});
   EXPECT_EQ(told.code, 0) << told.err;
