@@ -177,6 +177,7 @@ Status run(Context& context, ImportArguments& o) {
                    dry ? rehearse_import(o.import, o.session, context.progress)
                        : import_session(o.import, o.session, context.progress));
   for (const std::string& warning : report.warnings) context.console.warning(warning);
+  for (const std::string& note : report.notes) context.console.info("note: " + note);
   context.console.data(
       fmt::format("{}{}: {} visible and {} thermal frames{}, {} tracking frames, {} with a pose, "
                   "{} with a station",
@@ -194,7 +195,8 @@ Status run(Context& context, ImportArguments& o) {
                     {"with_station", report.with_station},
                     {"has_temperatures", report.has_temperatures},
                     {"kelvin_per_count", report.kelvin_per_count},
-                    {"warnings", report.warnings}};
+                    {"warnings", report.warnings},
+                    {"notes", report.notes}};
   if (dry) context.result["dry_run"] = true;
   return {};
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "drivers/stills/declared_stations.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -15,6 +17,28 @@ int stations_per_loop(const DeclaredStations& declared) {
 
 int station_count(const DeclaredStations& declared) {
   return declared.loops * stations_per_loop(declared);
+}
+
+std::string rest_words(const DeclaredStations& declared, int frames) {
+  const int count = station_count(declared), per_loop = stations_per_loop(declared);
+  if (frames <= count) return {};
+  const int loops = (frames + per_loop - 1) / per_loop;
+  return fmt::format(
+      ": from frame {} on they are taken for {} that begin{} at 0 degrees again; if they are of "
+      "the "
+      "same loop give their true spacing, else --loops {}",
+      count + 1, loops - declared.loops == 1 ? "a further loop" : "further loops",
+      loops - declared.loops == 1 ? "s" : "", loops);
+}
+
+std::string gap_words(const DeclaredStations& declared) {
+  const int per_loop = stations_per_loop(declared);
+  const double last = 360 - (per_loop - 1) * declared.spacing_deg;
+  if (std::abs(last - declared.spacing_deg) < 1e-6 * per_loop) return {};
+  return fmt::format(
+      "{:g} degrees don't divide the circle: of {} stations a loop the last is {:.3g} degrees from "
+      "the first",
+      declared.spacing_deg, per_loop, last);
 }
 
 Station station_at(const DeclaredStations& declared, int position,

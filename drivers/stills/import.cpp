@@ -222,6 +222,8 @@ class Importer {
     }
     if (group->id.empty()) {
       group->id = device.id = groups_.next_device_id(device.modality);
+      if (device.modality == Modality::thermal && !device.lens.focal_px && !frame.camera)
+        thermal_lens_unknown_ = true;
       if (writer_) ORBITFUSE_TRY(writer_->add_device(device));
     }
     frame.id = group->frames;
@@ -275,9 +277,14 @@ class Importer {
           std::tuple(Modality::thermal, &options_.thermal_stations, report_.thermal)}) {
       // Declared for both, though only one is given.
       if (!*stations || frames == 0 || frames == station_count(**stations)) continue;
-      remarks_.add(fmt::format("{}: {} frames, but {} stations declared", name(modality), frames,
-                               station_count(**stations)));
+      remarks_.add(fmt::format("{}: {} frames, but {} stations declared{}", name(modality), frames,
+                               station_count(**stations), rest_words(**stations, frames)));
     }
+    for (const auto* stations : {&options_.visible_stations, &options_.thermal_stations})
+      if (const std::string gap = *stations ? gap_words(**stations) : ""; !gap.empty()) {
+        remarks_.add(gap);
+        break;  // declared for both
+      }
     if (options_.rig && report_.visible != report_.thermal) {
       const bool none = report_.visible == 0 || report_.thermal == 0;
       remarks_.add(fmt::format(
@@ -301,6 +308,11 @@ class Importer {
     tell_transparent();
     if (options_.embedded_visible && embedded_ == 0)
       remarks_.add("no thermal image has a photo embedded: there are no visible frames from them");
+    if (thermal_lens_unknown_)
+      report_.notes.emplace_back(
+          "the thermal files don't tell their focal length: a run begins with an assumed one; if "
+          "you know it, import with --thermal-focal-px (image width in pixels / 2 / tan(half the "
+          "horizontal field of view))");
     if (report_.has_temperatures) {
       report_.kelvin_per_count = decoder_.kelvin_per_count();
     }
@@ -328,7 +340,8 @@ class Importer {
   std::optional<Error> first_failure_;  ///< of the modality that is being added
   ImportReport report_;
   std::vector<std::string> transparent_;  ///< names and shares of images with alpha
-  int embedded_ = 0;                      ///< photos found in radiometric JPEGs
+  bool thermal_lens_unknown_ = false;
+  int embedded_ = 0;  ///< photos found in radiometric JPEGs
 };
 
 Status run(Importer& importer) {

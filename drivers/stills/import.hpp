@@ -81,6 +81,7 @@ struct ImportReport {
   /// Files passed over and why, priors missing ...: what is said of more than three files is one
   /// sentence with their number and the first names.
   std::vector<std::string> warnings;
+  std::vector<std::string> notes;  ///< what a run will have to assume, and how to tell it
 };
 
 /// Imports into a new session folder (which must not exist or be empty). Photos are copied byte

@@ -203,6 +203,35 @@ TEST_F(LeftOut, ThermalPicturesThatAreNotReadAreNotSentThroughJpeg) {
   EXPECT_THAT(report->warnings, test::one_says("0.pgm", "16-bit TIFF or PNG"));
 }
 
+TEST_F(LeftOut, FramesBeyondTheDeclaredStationsAreSaidToBeAnotherLoop) {
+  for (int i = 0; i < 24; ++i)
+    put_photo("in/" + std::to_string(i) + ".jpg", static_cast<std::uint64_t>(i));
+  options.visible = {folder / "in"};
+  options.visible_stations.emplace().spacing_deg = 25;
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_THAT(report->warnings,
+              test::one_says("24 frames, but 14 stations declared",
+                             "from frame 15 on they are taken for a further loop"));
+  EXPECT_THAT(report->warnings, test::one_says("25 degrees don't divide the circle",
+                                               "the last is 35 degrees from the first"));
+  EXPECT_EQ(report->session.frames.at(14).station->loop, 1);
+  EXPECT_EQ(report->session.frames.at(14).station->azimuth_deg, 0);
+  EXPECT_TRUE(report->notes.empty());
+}
+
+TEST_F(LeftOut, AThermalLensThatNothingTellsIsNotedOnce) {
+  for (const char* name : {"t/0.tif", "t/1.tif"}) put_counts(name, 29000, 30000, name[2]);
+  options.thermal = {folder / "t"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  ASSERT_EQ(report->notes.size(), 1u);
+  EXPECT_NE(report->notes[0].find("--thermal-focal-px"), std::string::npos);
+  std::filesystem::remove_all(folder / "session");
+  options.thermal_focal_px = 500;
+  EXPECT_TRUE(import()->notes.empty());
+}
+
 TEST_F(LeftOut, StationsOfWhatWasNotGivenAreNoWarningAndARigOfOneCameraIs) {
   for (int i = 0; i < 12; ++i)
     put_photo("in/" + std::to_string(i) + ".jpg", static_cast<std::uint64_t>(i));
