@@ -180,9 +180,9 @@ Status StagedRun::look_for_other_results() {
                 "give this session an --out of its own, or replace those results with --force");
   replaces_ = true;
   const auto stages = pipeline::finished_stages(folders_.out, stages::stage_names());
-  context_.console.warning(fmt::format("--force: {} {}, which {} first: {}", folders_.out, found,
-                                       context_.common.dry_run ? "would be removed" : "are removed",
-                                       fmt::join(stages, ", ")));
+  context_.console.warning(fmt::format(
+      "--force: {} {}; its results there {} first: {}", folders_.out, found,
+      context_.common.dry_run ? "would be removed" : "are removed", fmt::join(stages, ", ")));
   return {};
 }
 

@@ -118,7 +118,7 @@ TEST_F(Compare, WhatCannotBeComparedIsNamedAndNothingIsWritten) {
   const fs::path out = *folder / "refused";
   const std::string before = (*folder / "before").string();
   for (const auto& [after, into, code, said] :
-       {std::tuple("before", out, 2, "name two runs"),
+       {std::tuple("before", out, 2, "the two runs are the same"),
         std::tuple("after", *folder / "after", 2, "which is one of the runs"),
         std::tuple("after_session", out, 3, "after_session"), std::tuple("none", out, 3, "none")}) {
     const Outcome refused = compare("before", after, {"--out", into.string()});
