@@ -134,7 +134,7 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   stage.name = "poses_" + std::string(name(modality));
   stage.version = 13;
   if (!visible) {
-    stage.version = 16;
+    stage.version = 17;
     stage.uses = {"poses_visible"};
     // Thermal views are aligned with renders of the visible field; known poses need none.
     if (!in.config->poses.use_known_poses || !all_posed(in.session->session))

@@ -123,17 +123,17 @@ int main(int argc, char** argv) {
   for (int i = 1; i < argc; ++i) {
     fmt::print("{}\n", argv[i]);
     auto pairs = read(data / "orbits" / argv[i]);
-    if (!pairs) {
-      fmt::print("  {}\n", pairs.error().message());
-      continue;
+    if (pairs) {
+      print("focal length 5 % too long", *pairs, 0.05, 0.05);
+      print("focal length unknown", *pairs, 0.3, 0.3);
+      const cv::Mat first = pairs->views.front().thermal;
+      for (std::size_t v = 0; v + 1 < pairs->views.size(); ++v)
+        pairs->views[v].thermal = pairs->views[v + 1].thermal;
+      pairs->views.back().thermal = first;
+      print("shuffled", *pairs, 0.05, 0.05);
+    } else {
+      fmt::print("  no rig: {}\n", pairs.error().message());
     }
-    print("focal length 5 % too long", *pairs, 0.05, 0.05);
-    print("focal length unknown", *pairs, 0.3, 0.3);
-    const cv::Mat first = pairs->views.front().thermal;
-    for (std::size_t v = 0; v + 1 < pairs->views.size(); ++v)
-      pairs->views[v].thermal = pairs->views[v + 1].thermal;
-    pairs->views.back().thermal = first;
-    print("shuffled", *pairs, 0.05, 0.05);
     if (const auto orbits = orbits_as_pairs(data / "orbits" / argv[i]))
       print("two orbits by one counter", *orbits, 0.03, 0.03);
     else

@@ -48,17 +48,18 @@ std::optional<CorrectedPixel> corrected_pixel(const Camera& camera, const Correc
 }
 
 std::optional<Eigen::Vector2d> patch_residual(const PatchMatch& match, const Camera& camera,
-                                              const CorrectedPose& correction, double log_focal) {
-  const auto seen = corrected_pixel(camera, correction, log_focal, 0, match.point);
+                                              const CorrectedPose& correction, double log_focal,
+                                              double radial) {
+  const auto seen = corrected_pixel(camera, correction, log_focal, radial, match.point);
   if (!seen) return std::nullopt;
   return match.sqrt_weight * (seen->pixel - match.seen);
 }
 
 PatchFit patch_fit(const std::vector<PatchMatch>& matches, const Camera& camera,
-                   const CorrectedPose& correction, double log_focal) {
+                   const CorrectedPose& correction, double log_focal, double radial) {
   std::vector<double> distances;
   for (const PatchMatch& match : matches) {
-    const auto residual = patch_residual(match, camera, correction, log_focal);
+    const auto residual = patch_residual(match, camera, correction, log_focal, radial);
     if (residual && residual->norm() < 2) distances.push_back(residual->norm());
   }
   return {static_cast<int>(distances.size()), median(distances)};
@@ -66,8 +67,8 @@ PatchFit patch_fit(const std::vector<PatchMatch>& matches, const Camera& camera,
 
 bool PatchCost::Evaluate(const double* const* parameters, double* residuals,
                          double** jacobians) const {
-  const auto seen =
-      corrected_pixel(camera_, CorrectedPose(parameters[0]), *parameters[1], 0, match_.point);
+  const auto seen = corrected_pixel(camera_, CorrectedPose(parameters[0]), *parameters[1],
+                                    *parameters[2], match_.point);
   if (!seen) return false;
   const Eigen::Matrix2d& weight = match_.sqrt_weight;
   Eigen::Map<Eigen::Vector2d> values(residuals);
@@ -80,6 +81,10 @@ bool PatchCost::Evaluate(const double* const* parameters, double* residuals,
   if (jacobians[1] != nullptr) {
     Eigen::Map<Eigen::Vector2d> to(jacobians[1]);
     to = weight * seen->by_log_focal;
+  }
+  if (jacobians[2] != nullptr) {
+    Eigen::Map<Eigen::Vector2d> to(jacobians[2]);
+    to = weight * seen->by_radial;
   }
   return true;
 }

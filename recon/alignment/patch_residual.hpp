@@ -42,10 +42,11 @@ std::optional<CorrectedPixel> corrected_pixel(const Camera& camera, const Correc
                                               double log_focal, double radial,
                                               const Eigen::Vector3d& point);
 
-/// Weighted pixels from where a correction of the pose and of the focal length puts a patch to
-/// where it was found; none behind the camera.
+/// Weighted pixels from where a correction of the pose and of the lens puts a patch to where it was
+/// found; none behind the camera.
 std::optional<Eigen::Vector2d> patch_residual(const PatchMatch& match, const Camera& camera,
-                                              const CorrectedPose& correction, double log_focal);
+                                              const CorrectedPose& correction, double log_focal,
+                                              double radial = 0);
 
 /// How well patches agree on a correction.
 struct PatchFit {
@@ -53,10 +54,10 @@ struct PatchFit {
   double median_px = 0;  ///< their residual; 0 of none
 };
 PatchFit patch_fit(const std::vector<PatchMatch>& matches, const Camera& camera,
-                   const CorrectedPose& correction, double log_focal);
+                   const CorrectedPose& correction, double log_focal, double radial = 0);
 
-/// Ceres cost of `patch_residual`: correction, log_focal.
-class PatchCost final : public ceres::SizedCostFunction<2, 6, 1> {
+/// Ceres cost of `patch_residual`: correction, log_focal, radial.
+class PatchCost final : public ceres::SizedCostFunction<2, 6, 1, 1> {
  public:
   PatchCost(const PatchMatch& match, const Camera& camera) : match_(match), camera_(camera) {}
   bool Evaluate(const double* const* parameters, double* residuals,

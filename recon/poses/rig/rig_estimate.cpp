@@ -12,6 +12,7 @@
 
 #include "core/geometry/narrowed.hpp"
 #include "core/geometry/rotation_vector.hpp"
+#include "core/image/undistorted.hpp"
 #include "core/numeric/median.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/alignment/edge_field.hpp"
@@ -28,6 +29,11 @@ Camera thermal_camera(const Camera& lens, double focal_px, int width) {
   Camera camera = lens;
   camera.fx = camera.fy = focal_px;
   return at_width(camera, width);
+}
+
+/// As a lens without distortion would have seen it.
+cv::Mat straight(const cv::Mat& thermal, const Camera& lens) {
+  return lens.has_distortion() ? undistorted(thermal, lens, lens.without_distortion()) : thermal;
 }
 
 /// Edges of an image whose NaN pixels show nothing.
@@ -57,16 +63,17 @@ class ShiftSearch {
  public:
   ShiftSearch(const std::vector<RigView>& views, const RigOptions& options)
       : views_(views), options_(options) {
-    const Camera camera = thermal_camera(options.thermal_lens, 1, width);
+    const Camera& lens = options.thermal_lens;
+    const Camera camera = thermal_camera(lens, 1, width).without_distortion();
     for (const RigView& view : views) {
-      thermal_.push_back(edges_at(view.thermal, camera));
+      thermal_.push_back(edges_at(straight(view.thermal, lens), camera));
       energy_.push_back(cv::sum(energy_of(thermal_.back()))[0]);
     }
   }
 
   /// The best place at one focal length, for right pairs and (into `wrong`) for shuffled ones.
   Place best_at(double focal_px, double& wrong) const {
-    Camera wide = thermal_camera(options_.thermal_lens, focal_px, width);
+    Camera wide = thermal_camera(options_.thermal_lens, focal_px, width).without_distortion();
     wide.width += 2 * margin, wide.height += 2 * margin;
     wide.cx += margin, wide.cy += margin;
     const int controls = std::min<int>(3, static_cast<int>(views_.size()) - 1);
@@ -136,13 +143,20 @@ std::vector<double> focal_lengths(const RigOptions& options) {
   return list;
 }
 
+/// What a round changes of the rig as it was before: its pose and the thermal lens.
+struct RigStep {
+  std::array<double, 6> pose{};
+  double log_focal = 0, radial = 0;
+};
+
 struct RigPrior {
-  double shift_sigma, log_focal_mean, log_focal_sigma;
+  double shift_sigma, log_focal_mean, log_focal_sigma, radial_mean, radial_sigma;
 
   template <class T>
-  bool operator()(const T* rig, const T* log_focal, T* residual) const {
-    for (int i = 0; i < 3; ++i) residual[i] = rig[3 + i] / T(shift_sigma);
+  bool operator()(const T* pose, const T* log_focal, const T* radial, T* residual) const {
+    for (int i = 0; i < 3; ++i) residual[i] = pose[3 + i] / T(shift_sigma);
     residual[3] = (log_focal[0] - T(log_focal_mean)) / T(log_focal_sigma);
+    residual[4] = (radial[0] - T(radial_mean)) / T(radial_sigma);
     return true;
   }
 };
@@ -170,7 +184,7 @@ RoundResult match_round(const std::vector<RigView>& views, const RigEstimate& ri
     for (const Eigen::Vector3d& point : view.points) turned.push_back(turn * point);
     seen.depth = sparse_depth(turned, result.camera);
     result.edges[at(i)] = edges_of(seen.brightness);
-    result.fields[at(i)] = edges_at(view.thermal, result.camera);
+    result.fields[at(i)] = edges_at(straight(view.thermal, rig.thermal), result.camera);
     result.matches[at(i)] =
         match_patches(seen, result.edges[at(i)], result.camera, result.fields[at(i)],
                       {round.search_px, round.patch_search_px, round.patch_radius_px, 8});
@@ -179,15 +193,10 @@ RoundResult match_round(const std::vector<RigView>& views, const RigEstimate& ri
 }
 
 /// The rig and the lens from all pairs' patches, the robust scale lowered step by step.
-void solve(const RoundResult& round, const RigOptions& options, double depth, RigEstimate& rig,
-           std::array<double, 6>& correction, double& log_focal) {
-  correction = {0,
-                0,
-                0,
-                rig.thermal_from_visible.translation.x(),
-                rig.thermal_from_visible.translation.y(),
-                rig.thermal_from_visible.translation.z()};
-  log_focal = 0;
+RigStep solve(const RoundResult& round, const RigOptions& options, double depth,
+              const RigEstimate& rig, bool bends) {
+  RigStep step;
+  for (int i = 0; i < 3; ++i) step.pose[at(3 + i)] = rig.thermal_from_visible.translation[i];
   const bool searched = options.focal_relative_sigma > options.search_from;
   for (const double scale_px : {8.0, 4.0, 2.0, 1.0}) {
     ceres::Problem problem;
@@ -196,12 +205,15 @@ void solve(const RoundResult& round, const RigOptions& options, double depth, Ri
         problem.AddResidualBlock(new PatchCost(match, round.camera),
                                  new ceres::ScaledLoss(new ceres::CauchyLoss(scale_px), match.score,
                                                        ceres::TAKE_OWNERSHIP),
-                                 correction.data(), &log_focal);
+                                 step.pose.data(), &step.log_focal, &step.radial);
     const double mean = searched ? 0 : std::log(options.thermal_lens.fx / rig.thermal.fx);
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<RigPrior, 4, 6, 1>(new RigPrior{
-                                 options.baseline_sigma * depth, mean,
-                                 std::max(1e-4, searched ? 0.1 : options.focal_relative_sigma)}),
-                             nullptr, correction.data(), &log_focal);
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<RigPrior, 5, 6, 1, 1>(new RigPrior{
+            options.baseline_sigma * depth, mean,
+            std::max(1e-4, searched ? 0.1 : options.focal_relative_sigma),
+            options.thermal_lens.k1 - rig.thermal.k1, std::max(1e-4, options.radial_sigma)}),
+        nullptr, step.pose.data(), &step.log_focal, &step.radial);
+    if (!bends) problem.SetParameterBlockConstant(&step.radial);
     ceres::Solver::Options solver;
     solver.linear_solver_type = ceres::DENSE_QR;
     solver.num_threads = 1;  // more sum in any order
@@ -210,34 +222,88 @@ void solve(const RoundResult& round, const RigOptions& options, double depth, Ri
     ceres::Solver::Summary summary;
     ceres::Solve(solver, &problem, &summary);
   }
+  return step;
 }
 
-void judge(const RoundResult& round, const std::array<double, 6>& correction, double log_focal,
-           RigEstimate& rig) {
+int held_patches(const RoundResult& round, const RigStep& step) {
+  int held = 0;
+  for (const auto& matches : round.matches)
+    held += patch_fit(matches, round.camera, CorrectedPose(step.pose), step.log_focal, step.radial)
+                .matches;
+  return held;
+}
+
+/// The lens bends only where that holds clearly more patches: k1 is little held by what is near the
+/// middle of the images, and a wrong one misplaces their corners.
+RigStep best_step(const RoundResult& round, const RigOptions& options, double depth,
+                  const RigEstimate& rig) {
+  constexpr double clearly_more = 1.03;
+  const RigStep straight = solve(round, options, depth, rig, false),
+                bent = solve(round, options, depth, rig, true);
+  return held_patches(round, bent) > clearly_more * held_patches(round, straight) ? bent : straight;
+}
+
+/// Of the quarters of an image that have some patches, how many are there and how many lie
+/// elsewhere than the rig has them: a common shift of 2 px or more explains a quarter more of their
+/// patches.
+void judge_quarters(const std::vector<PatchMatch>& matches, const Camera& camera,
+                    const RigStep& step, RigPairFit& fit) {
+  constexpr std::size_t fewest = 12;
+  constexpr int reach_px = 6;
+  const CorrectedPose pose(step.pose);
+  using Residual = std::pair<Eigen::Vector2d, Eigen::Matrix2d>;
+  std::array<std::vector<Residual>, 4> quarters;
+  for (const PatchMatch& match : matches) {
+    const auto residual = patch_residual(match, camera, pose, step.log_focal, step.radial);
+    const std::size_t quarter = (match.seen.x() > camera.width / 2.0 ? 1U : 0U) +
+                                (match.seen.y() > camera.height / 2.0 ? 2U : 0U);
+    if (residual) quarters[quarter].emplace_back(*residual, match.sqrt_weight);
+  }
+  fit.quarters = fit.quarters_elsewhere = 0;
+  for (const std::vector<Residual>& patches : quarters) {
+    if (patches.size() < fewest) continue;
+    const auto held = [&](const Eigen::Vector2d& shift) {
+      return std::count_if(patches.begin(), patches.end(), [&](const Residual& one) {
+        return (one.first - one.second * shift).norm() < 2;
+      });
+    };
+    std::ptrdiff_t best = 0;
+    for (int y = -reach_px; y <= reach_px; ++y)
+      for (int x = -reach_px; x <= reach_px; ++x)
+        if (x * x + y * y >= 4) best = std::max(best, held({x, y}));
+    ++fit.quarters;
+    if (4 * best > 5 * held({0, 0})) ++fit.quarters_elsewhere;
+  }
+}
+
+void judge(const RoundResult& round, const RigStep& step, RigEstimate& rig) {
   const int count = static_cast<int>(round.edges.size());
   rig.pairs.assign(at(count), {});
   for (int i = 0; i < count; ++i) {
     RigPairFit& fit = rig.pairs[at(i)];
-    const PatchFit patches =
-        patch_fit(round.matches[at(i)], round.camera, CorrectedPose(correction), log_focal);
+    const PatchFit patches = patch_fit(round.matches[at(i)], round.camera, CorrectedPose(step.pose),
+                                       step.log_focal, step.radial);
     fit.found = static_cast<int>(round.matches[at(i)].size());
     fit.matches = patches.matches;
     fit.median_px = patches.median_px;
+    judge_quarters(round.matches[at(i)], round.camera, step, fit);
     fit.agreement = edge_agreement(round.edges[at(i)], round.fields[at(i)]);
     for (int j = 0; j < count; ++j)
       if (j != i)
         fit.control += edge_agreement(round.edges[at(i)], round.fields[at(j)]) / (count - 1);
   }
-  double sum = 0, squares = 0, found = 0, held = 0;
+  double sum = 0, squares = 0, found = 0, held = 0, quarters = 0, elsewhere = 0;
   rig.agreement = rig.control = 0;
   for (const RigPairFit& fit : rig.pairs) {
     found += fit.found, held += fit.matches;
+    quarters += fit.quarters, elsewhere += fit.quarters_elsewhere;
     rig.agreement += fit.agreement / count;
     rig.control += fit.control / count;
     const double d = fit.agreement - fit.control;
     sum += d, squares += d * d;
   }
   rig.held_share = found > 0 ? held / found : 0;
+  rig.elsewhere_share = quarters > 0 ? elsewhere / quarters : 1;
   const double mean = sum / count, variance = std::max(squares / count - mean * mean, 1e-9);
   rig.decisiveness = mean / std::sqrt(variance / count);
 }
@@ -259,13 +325,12 @@ std::string RigEstimate::words() const {
     matches += fit.matches;
   }
   return fmt::format(
-      "{} pairs, turned by {:.1f} deg, focal length {:.0f} px; edges agree {:.3f}, in shuffled "
-      "pairs "
-      "{:.3f} ({:.1f} standard errors apart), {} patches ({:.2f} of those found) at {:.2f} px of "
-      "{}",
+      "{} pairs, turned by {:.1f} deg, focal length {:.0f} px, k1 {:.2f}; edges agree {:.3f}, in "
+      "shuffled pairs {:.3f} ({:.1f} standard errors apart), {} patches ({:.2f} of those found) at "
+      "{:.2f} px of {}, {:.2f} of the images' quarters lie elsewhere",
       pairs.size(), Eigen::AngleAxisd(thermal_from_visible.rotation).angle() * 180 / EIGEN_PI,
-      thermal.fx, agreement, control, decisiveness, matches, held_share, median(residuals),
-      judged_width_px);
+      thermal.fx, thermal.k1, agreement, control, decisiveness, matches, held_share,
+      median(residuals), judged_width_px, elsewhere_share);
 }
 
 Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOptions& options,
@@ -309,16 +374,17 @@ Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOpt
     if (patches < 12 * views.size() / 2)
       return refused(fmt::format("{} patches of {} photos are found in the thermal images", patches,
                                  views.size()));
-    std::array<double, 6> correction{};
-    double log_focal = 0;
-    solve(matched, options, depth, rig, correction, log_focal);
-    judge(matched, correction, log_focal, rig);
-    const Eigen::Quaterniond more = turned_by({correction[0], correction[1], correction[2]});
+    const RigStep step = best_step(matched, options, depth, rig);
+    judge(matched, step, rig);
+    const auto& pose = step.pose;
+    const Eigen::Quaterniond more = turned_by({pose[0], pose[1], pose[2]});
     rig.thermal_from_visible.rotation = (more * rig.thermal_from_visible.rotation).normalized();
-    rig.thermal_from_visible.translation = {correction[3], correction[4], correction[5]};
-    rig.thermal.fx = rig.thermal.fy = rig.thermal.fx * std::exp(log_focal);
+    rig.thermal_from_visible.translation = {pose[3], pose[4], pose[5]};
+    rig.thermal.fx = rig.thermal.fy = rig.thermal.fx * std::exp(step.log_focal);
+    rig.thermal.k1 += step.radial;
   }
-  if (!(rig.decisiveness >= options.min_decisiveness && rig.held_share >= options.min_held_share))
+  if (!(rig.decisiveness >= options.min_decisiveness && rig.held_share >= options.min_held_share &&
+        rig.elsewhere_share <= options.max_elsewhere_share))
     return refused(
         fmt::format("{}; correlation of all edges {:.3f}, of shuffled pairs {:.3f} at best",
                     rig.words(), best.score, wrong));

@@ -18,20 +18,74 @@ std::string stem_of(const FrameRecord& frame) {
   return std::filesystem::path(frame.source.empty() ? frame.file : frame.source).stem().string();
 }
 
-RigPairs by_name(const Frames& visible, const Frames& thermal) {
-  std::map<std::string, const FrameRecord*> by_stem;
+std::vector<std::string> stems_of(const Frames& frames) {
+  std::vector<std::string> stems;
+  for (const FrameRecord* frame : frames) stems.push_back(stem_of(*frame));
+  return stems;
+}
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+/// How many characters all names begin with that end at a digit and hold none: a camera's word.
+std::size_t shared_word(const std::vector<std::string>& names) {
+  if (names.empty()) return 0;
+  std::size_t length = 0;
+  while (length < names.front().size() && !is_digit(names.front()[length])) ++length;
+  const auto begins_alike = [&](const std::string& name) {
+    return name.size() > length && is_digit(name[length]) &&
+           name.compare(0, length, names.front(), 0, length) == 0;
+  };
+  return std::all_of(names.begin(), names.end(), begins_alike) ? length : 0;
+}
+
+/// Without the words round their numbers that a folder's names have in common: "DJI_0042_T" is
+/// 0042.
+std::vector<std::string> without_words(std::vector<std::string> names) {
+  for (int end = 0; end < 2; ++end) {
+    const std::size_t length = shared_word(names);
+    for (std::string& name : names) {
+      name.erase(0, length);
+      std::reverse(name.begin(), name.end());
+    }
+  }
+  return names;
+}
+
+RigPairs by_name(const Frames& visible, const std::vector<std::string>& visible_names,
+                 const Frames& thermal, const std::vector<std::string>& thermal_names) {
+  std::map<std::string, const FrameRecord*> named;
   std::map<std::string, int> uses;
-  for (const FrameRecord* frame : visible) {
-    by_stem[stem_of(*frame)] = frame;
-    ++uses[stem_of(*frame)];
+  for (std::size_t i = 0; i < visible.size(); ++i) {
+    named[visible_names[i]] = visible[i];
+    ++uses[visible_names[i]];
   }
-  RigPairs result{{}, "equal file names"};
-  for (const FrameRecord* frame : thermal) {
-    const auto found = by_stem.find(stem_of(*frame));
+  RigPairs result;
+  for (std::size_t i = 0; i < thermal.size(); ++i) {
+    const auto found = named.find(thermal_names[i]);
     // Two photos of one name leave open which of them is meant.
-    if (found != by_stem.end() && uses[found->first] == 1)
-      result.pairs.emplace_back(found->second, frame);
+    if (found != named.end() && uses[found->first] == 1)
+      result.pairs.emplace_back(found->second, thermal[i]);
   }
+  return result;
+}
+
+RigPairs by_equal_name(const Frames& visible, const Frames& thermal) {
+  RigPairs result = by_name(visible, stems_of(visible), thermal, stems_of(thermal));
+  result.found_by = "equal file names";
+  return result;
+}
+
+/// Cameras of two sensors write a word beside the number or time ("-visible", "_T"). Numbers of a
+/// few digits are any camera's counter, and say nothing unless `declared`.
+RigPairs by_number(const Frames& visible, const Frames& thermal, bool declared) {
+  constexpr std::ptrdiff_t digits_of_a_time = 6;
+  std::vector<std::string> numbers = without_words(stems_of(thermal));
+  const auto is_time = [](const std::string& name) {
+    return std::count_if(name.begin(), name.end(), is_digit) >= digits_of_a_time;
+  };
+  if (!declared && !std::all_of(numbers.begin(), numbers.end(), is_time)) return {};
+  RigPairs result = by_name(visible, without_words(stems_of(visible)), thermal, numbers);
+  result.found_by = "file names alike but for a word";
   return result;
 }
 
@@ -70,8 +124,12 @@ RigPairs find_rig_pairs(const Session& session) {
                                     [](const FrameRecord* f) { return f->station.has_value(); });
   if (stations && !declared) return {};
   constexpr std::size_t fewest = 4;
-  for (RigPairs found : {by_name(visible, thermal), by_time(visible, thermal)})
-    if (found.pairs.size() >= fewest && 5 * found.pairs.size() >= 4 * thermal.size()) return found;
+  for (RigPairs found : {by_equal_name(visible, thermal), by_number(visible, thermal, declared),
+                         by_time(visible, thermal)})
+    if (found.pairs.size() >= fewest && 5 * found.pairs.size() >= 4 * thermal.size()) {
+      found.declared = declared;
+      return found;
+    }
   return {};
 }
 

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <array>
 #include <opencv2/imgproc.hpp>
 #include <random>
 
+#include "core/image/undistorted.hpp"
 #include "recon/poses/rig/rig_estimate.hpp"
 #include "recon/poses/rig/rig_image.hpp"
 #include "recon/poses/rig/rig_pairs.hpp"
@@ -124,6 +126,7 @@ TEST(Rig, PairsThatAgreeMuchBetterThanShuffledOnesButByNoOneTransformAreNone) {
   ASSERT_FALSE(refused) << refused->words();
   EXPECT_EQ(refused.error().kind, ErrorKind::quality);
   scene.options.min_held_share = 0;
+  scene.options.max_elsewhere_share = 1;
   const auto believed = estimate_rig(scene.views, scene.options, {});
   ASSERT_TRUE(believed) << believed.error().message();
   EXPECT_GT(believed->agreement, 2.1 * believed->control) << believed->words();
@@ -131,6 +134,41 @@ TEST(Rig, PairsThatAgreeMuchBetterThanShuffledOnesButByNoOneTransformAreNone) {
   const auto rig = estimate_rig(right.views, right.options, {});
   ASSERT_TRUE(rig);
   EXPECT_GT(rig->held_share, 1.2 * right.options.min_held_share) << rig->words();
+}
+
+TEST(Rig, QuartersOfARigLieWhereItHasThemAndThoseOfTornPairsElsewhere) {
+  const RigScene right(6);
+  const auto rig = estimate_rig(right.views, right.options, {});
+  ASSERT_TRUE(rig);
+  EXPECT_LT(rig->elsewhere_share, 0.1) << rig->words();
+  RigScene scene(6);
+  for (std::size_t i = 0; i < scene.views.size(); ++i)
+    scene.views[i].thermal = torn(scene.views[i].thermal, static_cast<unsigned>(i + 1), 5);
+  scene.options.min_held_share = declared_held_share;  // as if somebody had said that it is one
+  const auto believed = estimate_rig(scene.views, scene.options, {});
+  ASSERT_TRUE(believed) << believed.error().message();
+  EXPECT_GT(believed->elsewhere_share, 0.3) << believed->words();
+  int doubted = 0;
+  for (const RigPairFit& fit : believed->pairs)
+    doubted += 2 * fit.quarters_elsewhere >= fit.quarters;
+  EXPECT_GE(doubted, 3) << believed->words();
+}
+
+// At the corners of these images such a lens bends by a twentieth of the way from the middle.
+TEST(Rig, AThermalLensThatBendsIsFound) {
+  RigScene scene(6);
+  Camera bent = scene.thermal;
+  bent.k1 = -0.3;
+  for (RigView& view : scene.views) view.thermal = undistorted(view.thermal, scene.thermal, bent);
+  const auto rig = estimate_rig(scene.views, scene.options, {});
+  ASSERT_TRUE(rig) << rig.error().message();
+  EXPECT_NEAR(rig->thermal.k1, -0.3, 0.06) << rig->words();
+  const Eigen::Vector3d corner(3, 2, 10);
+  EXPECT_LT((rig->thermal.project(rig->thermal_from_visible * corner) -
+             bent.project(scene.thermal_from_visible * corner))
+                .norm(),
+            1.0)
+      << rig->words();
 }
 
 TEST(Rig, ThreePairsAreTooFew) {
@@ -162,6 +200,46 @@ TEST(RigPairs, EqualNamesArePairs) {
     EXPECT_EQ(photo->modality, Modality::visible);
     EXPECT_EQ(photo->file.substr(8), thermal->file.substr(8));
   }
+}
+
+/// The names of two folders' files, by the number or time in them.
+Session named_session(const std::string& before, const std::string& visible_word,
+                      const std::string& thermal_word, const std::string& stamp, int count) {
+  Session session = paired_session(count);
+  for (std::size_t i = 0; i < session.frames.size(); ++i) {
+    FrameRecord& frame = session.frames[i];
+    const std::string number = std::to_string(10 + i % static_cast<std::size_t>(count));
+    frame.source = frame.modality == Modality::visible
+                       ? "v/" + before + stamp + number + visible_word + ".jpg"
+                       : "t/" + before + stamp + number + thermal_word + ".png";
+  }
+  return session;
+}
+
+TEST(RigPairs, NamesThatDifferInAWordAboutATimeArePairs) {
+  for (const auto& [before, visible, thermal] : {std::array<std::string, 3>{"", "-visible", ""},
+                                                 {"DJI_", "_W", "_T"},
+                                                 {"", "_rgb", " ir"}}) {
+    const RigPairs rig = find_rig_pairs(named_session(before, visible, thermal, "10-50-42-9", 5));
+    EXPECT_EQ(rig.pairs.size(), 5u) << visible << thermal;
+    EXPECT_EQ(rig.found_by, "file names alike but for a word");
+    for (const auto& [photo, frame] : rig.pairs)
+      EXPECT_EQ(photo->file.substr(8), frame->file.substr(8));
+  }
+}
+
+TEST(RigPairs, ShortNumbersBesideOtherWordsAreAnyCamerasCounterUnlessDeclaredARig) {
+  Session session = named_session("", "_IMG", "_FLIR", "00", 5);
+  EXPECT_TRUE(find_rig_pairs(session).pairs.empty());
+  session.notes[rig_note] = "yes";
+  EXPECT_EQ(find_rig_pairs(session).pairs.size(), 5u);
+}
+
+TEST(RigPairs, NumbersOfOtherTimesAreNoPairs) {
+  Session session = named_session("", "_v", "_t", "10-50-42-9", 5);
+  for (FrameRecord& frame : session.frames)
+    if (frame.modality == Modality::thermal) frame.source.insert(2, "1");
+  EXPECT_TRUE(find_rig_pairs(session).pairs.empty());
 }
 
 TEST(RigPairs, EqualTimesArePairs) {
