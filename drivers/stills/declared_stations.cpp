@@ -34,7 +34,8 @@ std::string rest_words(const DeclaredStations& declared, int frames) {
 std::string gap_words(const DeclaredStations& declared) {
   const int per_loop = stations_per_loop(declared);
   const double last = 360 - (per_loop - 1) * declared.spacing_deg;
-  if (std::abs(last - declared.spacing_deg) < 1e-6 * per_loop) return {};
+  constexpr double rounded = 0.01;  // of the spacing, as in 51.4286 for a seventh
+  if (std::abs(last - declared.spacing_deg) < rounded * declared.spacing_deg) return {};
   return fmt::format(
       "{:g} degrees don't divide the circle: of {} stations a loop the last is {:.3g} degrees from "
       "the first",

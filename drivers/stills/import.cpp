@@ -280,8 +280,10 @@ class Importer {
       remarks_.add(fmt::format("{}: {} frames, but {} stations declared{}", name(modality), frames,
                                station_count(**stations), rest_words(**stations, frames)));
     }
-    for (const auto* stations : {&options_.visible_stations, &options_.thermal_stations})
-      if (const std::string gap = *stations ? gap_words(**stations) : ""; !gap.empty()) {
+    for (const auto& [stations, frames] : {std::pair(&options_.visible_stations, report_.visible),
+                                           std::pair(&options_.thermal_stations, report_.thermal)})
+      if (const std::string gap = *stations && frames > 0 ? gap_words(**stations) : "";
+          !gap.empty()) {
         remarks_.add(gap);
         break;  // declared for both
       }

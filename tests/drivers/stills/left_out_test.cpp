@@ -220,6 +220,17 @@ TEST_F(LeftOut, FramesBeyondTheDeclaredStationsAreSaidToBeAnotherLoop) {
   EXPECT_TRUE(report->notes.empty());
 }
 
+TEST_F(LeftOut, ARoundedSpacingLeavesNoGapNorDoesOneWithoutFrames) {
+  for (int i = 0; i < 7; ++i)
+    put_photo("in/" + std::to_string(i) + ".jpg", static_cast<std::uint64_t>(i));
+  options.visible = {folder / "in"};
+  options.visible_stations.emplace().spacing_deg = 51.4286;
+  options.thermal_stations.emplace().spacing_deg = 25;
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_THAT(report->warnings, test::none_says("divide the circle"));
+}
+
 TEST_F(LeftOut, AThermalLensThatNothingTellsIsNotedOnce) {
   for (const char* name : {"t/0.tif", "t/1.tif"}) put_counts(name, 29000, 30000, name[2]);
   options.thermal = {folder / "t"};
