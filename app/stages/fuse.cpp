@@ -123,7 +123,7 @@ Result<StageOutput> fuse_views(const StageContext& context, const RunConfig& con
 pipeline::Stage fuse_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "fuse";
-  stage.version = 3;
+  stage.version = 4;
   stage.needs = {"render"};
   stage.options = in.config->settings().to_json("fuse");
   stage.options["min_opacity"] = in.config->render.min_opacity;

@@ -20,6 +20,7 @@ constexpr const char* explanation = "colour: warmer than what is usual here; hat
 struct Layout {
   int width, margin, bar_height, height, swatch;
   double font_scale;
+  bool explained;  ///< the explanation is readable at this width
 
   explicit Layout(int total)
       : width(total),
@@ -27,16 +28,20 @@ struct Layout {
         bar_height(std::max(4, total / 36)),
         height(0),
         swatch(total / 5),
-        font_scale(std::max(0.2, total / 1400.0)) {
-    height = 2 * margin + bar_height + 2 * text_height();
+        font_scale(std::max(0.2, total / 1400.0)),
+        explained(text_size(explanation).width <= width - 2 * margin) {
+    height = 2 * margin + bar_height + (explained ? 2 : 1) * text_height();
+  }
+  cv::Size text_size(const std::string& text) const {
+    int baseline = 0;
+    return cv::getTextSize(text, font, font_scale, 1, &baseline);
   }
   int text_height() const { return static_cast<int>(30 * font_scale) + 2; }
   int bar_width() const { return std::max(1, width - 3 * margin - swatch); }
 };
 
 void write(cv::Mat& strip, const std::string& text, cv::Point center_top, const Layout& layout) {
-  int baseline = 0;
-  const cv::Size size = cv::getTextSize(text, font, layout.font_scale, 1, &baseline);
+  const cv::Size size = layout.text_size(text);
   const int most = layout.width - layout.margin - size.width;
   const int x =
       std::clamp(center_top.x - size.width / 2, layout.margin, std::max(layout.margin, most));
@@ -92,7 +97,7 @@ Result<cv::Mat> heat_legend(const HeatLegend& legend, int width) {
                     legend.unit, i + 1 == ticks),
           {place.x + (bar - 1) * i / (ticks - 1), below}, layout);
   write(strip, "not measured", {place.x + place.width - layout.swatch / 2, below}, layout);
-  write(strip, explanation, {0, below + layout.text_height()}, layout);
+  if (layout.explained) write(strip, explanation, {0, below + layout.text_height()}, layout);
   return strip;
 }
 

@@ -177,6 +177,16 @@ TEST(Heat, LegendKeepsItsWordsOffTheEdges) {
   }
 }
 
+/// Cut off it would say something else.
+TEST(Heat, ANarrowLegendHasNoSentence) {
+  const fusion::HeatLegend legend{{292, 0.5, 335}, fusion::HeatUnit::kelvin, {}};
+  const cv::Mat narrow = fusion::heat_legend(legend, 160).value();
+  EXPECT_EQ(cv::norm(narrow.col(159), cv::Mat(narrow.rows, 1, CV_8UC3, cv::Scalar::all(255)),
+                     cv::NORM_INF),
+            0);
+  EXPECT_LT(narrow.rows + 4, fusion::heat_legend(legend, 300).value().rows) << "a row of text less";
+}
+
 TEST(Heat, LegendHasThePicturesWidthAndItsColours) {
   fusion::HeatLegend legend{{290, 0.5, 330}, fusion::HeatUnit::kelvin, {}};
   for (const int width : {1, 16, 320, 1280}) {
