@@ -54,7 +54,7 @@ Status paint_temperatures(const view::FinishedRun& run, const std::string& name,
 json sidecar(const view::FinishedRun& run, const FieldSurface& surface, const TriangleMesh& mesh,
              const ExportFrame& frame, FileAxes axes, const FileOptions& options) {
   json j = to_json(frame, axes);
-  j["schema"] = 1;
+  j["schema"] = 2;  // 1: `up` of the frame, z of every file
   if (!options.made_of.empty()) j["made_of"] = options.made_of;
   j["run"] = fs::absolute(run.out).lexically_normal().string();
   j["vertices"] = mesh.vertices.size();
@@ -146,7 +146,8 @@ Status write_surface(const fs::path& file, const view::FinishedRun& run,
   if (extension == ".glb") {
     json extras = about;
     extras["temperature_none"] = 0;
-    extras.erase("world_from_export");  // a program may have turned what it read
+    // A program may have turned what it read.
+    for (const char* key : {"world_from_export", "export_from_file"}) extras.erase(key);
     written = write_glb(file, mesh, extras);
   } else if (extension == ".ply") {
     written = write_ply(file, mesh, {options.temperature_name, comments});

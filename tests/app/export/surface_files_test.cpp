@@ -155,7 +155,11 @@ TEST(SurfaceFiles, ASidecarTellsTheFilesOwnAxes) {
     ASSERT_TRUE(write_surface(folder / name, e.run, e.surface, *frame, {}));
     const auto about = stages::read_json(folder / (std::string(name) + ".json"));
     ASSERT_TRUE(about);
+    EXPECT_EQ(about->at("schema"), 2);
     EXPECT_EQ(about->at("up"), glb ? "y" : "z");
+    const std::string bytes = *read_file(folder / name);
+    for (const char* key : {"world_from_export", "export_from_file"})
+      EXPECT_EQ(bytes.find(key), std::string::npos) << name << ": turned once read, they would lie";
     const auto export_from_file = matrix_of_json(about->at("export_from_file"));
     const auto world_from_export = matrix_of_json(about->at("world_from_export"));
     ASSERT_TRUE(export_from_file && world_from_export);
