@@ -310,11 +310,16 @@ StageStatus Runner::execute(const Stage& stage, const Key& key, std::string why)
 
 Status Runner::remove_all() const {
   for (const Stage& stage : stages_) ORBITFUSE_TRY(check_places(options_.out, stage.name));
-  for (const Stage& stage : stages_) {
-    ORBITFUSE_TRY(remove_tree(options_.out / stage.name));
-    ORBITFUSE_TRY(remove_tree(failed_folder(options_.out, stage.name)));
+  // Killed in between, what is left must not pass for these inputs' nor be named after the others.
+  for (const std::string& file : options_.replaced_files)
+    ORBITFUSE_TRY(remove_tree(options_.out / file));
+  ORBITFUSE_TRY(remove_tree(options_.out / ".partial"));
+  // Poses, by which inputs are told, are the first stages: they go last.
+  for (auto stage = stages_.rbegin(); stage != stages_.rend(); ++stage) {
+    ORBITFUSE_TRY(remove_tree(failed_folder(options_.out, stage->name)));
+    ORBITFUSE_TRY(remove_tree(options_.out / stage->name));
   }
-  return remove_tree(options_.out / ".partial");
+  return {};
 }
 
 RunSummary Runner::run() {

@@ -18,9 +18,10 @@ struct RunOptions {
   bool force = false;                     ///< run the targets although they are unchanged
   bool resume = false;   ///< go on from an interrupted attempt where its key matches
   bool dry_run = false;  ///< say what would run, write nothing
-  /// What lies in `out` is of other inputs: every stage's folder there is removed before the first
-  /// one runs.
+  /// What lies in `out` is of other inputs: `replaced_files` there, which tell of it, and then
+  /// every stage's folder are removed before the first one runs.
   bool replace_all = false;
+  std::vector<std::string> replaced_files = {};
   bool targets_only = false;  ///< what the targets read is taken as it lies there, never run
 };
 

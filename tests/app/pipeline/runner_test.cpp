@@ -98,6 +98,25 @@ TEST_F(RunnerTest, ResultsOfOtherInputsAreReplacedWhole) {
   EXPECT_FALSE(fs::exists(temp.path() / "out" / "d")) << "of the other inputs";
 }
 
+TEST_F(RunnerTest, WhatTellsOfReplacedResultsGoesBeforeThem) {
+  ASSERT_FALSE(run().error);
+  const fs::path out = temp.path() / "out";
+  for (const char* file : {"run.json", "mine.json"})
+    ASSERT_TRUE(write_file_atomic(out / file, "{}"));
+  session = "another";
+  RunOptions options;
+  options.replaced_files = {"run.json", "none.json"};
+  EXPECT_FALSE(run(options).error);
+  EXPECT_TRUE(fs::exists(out / "run.json")) << "nothing is replaced";
+  options.replace_all = true;
+  fail_in["a"] = {ErrorKind::device, "a", "stopped", ""};
+  session = "a third";
+  EXPECT_TRUE(run(options).error);
+  EXPECT_FALSE(fs::exists(out / "run.json")) << "before the first stage has run";
+  EXPECT_FALSE(fs::exists(out / "a"));
+  EXPECT_TRUE(fs::exists(out / "mine.json"));
+}
+
 TEST_F(RunnerTest, SecondRunIsUnchanged) {
   ASSERT_FALSE(run().error);
   EXPECT_THAT(ran(), ElementsAre("a", "b", "c", "d"));
