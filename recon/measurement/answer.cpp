@@ -58,6 +58,7 @@ json json_of(const PlacedReading& spot) {
   json j = json_of(spot.reading);
   j["point"] = json_of(spot.position);
   j["normal"] = json_of(spot.normal);
+  j["notes"] = spot.notes;
   return j;
 }
 

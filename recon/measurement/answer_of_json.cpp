@@ -49,6 +49,7 @@ Status read(const JsonFields& in, PlacedReading& spot) {
   ORBITFUSE_ASSIGN(const auto normal, point_at(in, "normal"));
   spot.position = position.value_or(Eigen::Vector3d::Constant(unknown));
   spot.normal = normal.value_or(Eigen::Vector3d::Zero());
+  ORBITFUSE_TRY(in.get_present("notes", spot.notes));
   return read(in, spot.reading);
 }
 

@@ -52,10 +52,20 @@ std::string outliers_of(const PointReadings& readings, const Agreement& agreemen
       agreement.two_camps ? "contradict the others" : "left out", span_of(low[0], high[0]));
   if (kept.empty() || low[1] > high[0] || high[1] < low[0]) return text + span_of(low[1], high[1]);
   // Both spans would read as a contradiction.
-  return text + fmt::format(
-                    "{:.1f} C in the middle of the others; such as are as far off and count "
-                    "see an edge there, and show either side of it",
-                    celsius_from_kelvin(weighted_median(std::move(kept))));
+  const double middle = weighted_median(kept);
+  double counted = 0, least = HUGE_VAL;  // kelvin from there
+  for (std::size_t i = 0; i < readings.frames.size(); ++i) {
+    const double off = std::abs(readings.frames[i].temperature_k - middle);
+    if (agreement.near[i])
+      counted = std::max(counted, off);
+    else
+      least = std::min(least, off);
+  }
+  return text + fmt::format("{:.1f} C in the middle of the others{}", celsius_from_kelvin(middle),
+                            counted >= least && !agreement.two_camps
+                                ? "; such as are as far off and count see an edge there, and show "
+                                  "either side of it"
+                                : "");
 }
 
 /// Marks the frames that are left out and takes their weight. There is a reading.

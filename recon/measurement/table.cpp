@@ -58,7 +58,8 @@ std::string notes_of(const Answer& answer, std::size_t spot) {
   for (const std::string& note : answer.notes) {
     bool of_a_place = false;
     for (std::size_t i = 0; i < answer.spots.size(); ++i)
-      of_a_place = of_a_place || note.starts_with(place_words(i));
+      for (const std::string& own : answer.spots[i].notes)
+        of_a_place = of_a_place || note == place_words(i) + own;
     if (!of_a_place) notes.push_back(note);
   }
   return joined(notes);

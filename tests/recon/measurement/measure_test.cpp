@@ -321,6 +321,16 @@ TEST(Measure, WhyAFrameIsLeftOutDoesNotContradictOneThatIsUsed) {
   EXPECT_FALSE(answer.reading.frames.at(0).used);
   EXPECT_TRUE(answer.reading.frames.at(1).used);
   EXPECT_THAT(joined(answer.notes), HasSubstr("left out: 46.9 C against 26.9 C in the middle of"));
+  EXPECT_THAT(joined(answer.notes), HasSubstr("as far off and count see an edge there"));
+}
+
+TEST(Measure, NoEdgeIsToldWhereNoCountedFrameIsFarOff) {
+  const ThermalScene scene = box_orbit(frames_with([](std::size_t i) {
+    return std::pair(i == 0 ? -7.0 : i == 1 ? 8.0 : 0.0, 0.0);
+  }));
+  const Answer answer = ask(scene, spot_at({0.4, 0.02, 0.01}));
+  EXPECT_THAT(joined(answer.notes), HasSubstr("26.9 C in the middle of the others"));
+  EXPECT_THAT(joined(answer.notes), Not(HasSubstr("see an edge")));
 }
 
 TEST(Measure, ARowOfATableHasItsOwnNotesOnly) {
@@ -328,11 +338,15 @@ TEST(Measure, ARowOfATableHasItsOwnNotesOnly) {
   answer.kind = Kind::hottest;
   answer.spots.resize(2);
   answer.spots[0].notes = {"of the first"};
-  answer.notes = {"of all", place_words(0) + "of the first"};
+  answer.notes = {"of all", place_words(0) + "of the first", place_words(1) + "of the camera"};
   const auto rows = csv_rows("warm", answer);
   ASSERT_EQ(rows.size(), 2u);
   EXPECT_THAT(rows[0], HasSubstr("of the first; of all"));
   EXPECT_THAT(rows[1], AllOf(HasSubstr("of all"), Not(HasSubstr("first"))));
+  for (const std::string& row : rows) EXPECT_THAT(row, HasSubstr("of the camera"));  // no place's
+  const auto read = answer_of_json(to_json(answer));
+  ASSERT_TRUE(read) << read.error().message();
+  EXPECT_EQ(csv_rows("warm", *read), rows);
 }
 
 TEST(Measure, ASmallHotSpotIsTheHottest) {
