@@ -73,7 +73,10 @@ void add_common(CLI::App& app, CommonOptions& common, const CommonUse& use) {
       ->type_name("FILE")
       ->group(common_group);
   if (use.force)
-    app.add_flag("--force", common.force, "Run again although nothing changed")
+    app.add_flag("--force", common.force,
+                 use.resume ? "Run again although nothing changed; results of another session in "
+                              "--out are removed"
+                            : "Write over what --out names")
         ->group(common_group);
   if (use.resume)
     app.add_flag("--resume", common.resume, "Go on where an interrupted run stopped")

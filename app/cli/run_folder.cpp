@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <set>
 
 #include "app/cli/run_stages.hpp"
 #include "app/pipeline/stage_record.hpp"
@@ -36,6 +37,28 @@ std::string absolute_name(const std::string& folder) {
   return fs::absolute(folder).lexically_normal().string();
 }
 
+enum class Alike { yes, no, unknown };
+
+/// Whether the poses in `out` were made of a session's frames, by their own records.
+Alike made_of_same(const fs::path& out, const std::set<std::string>& finished,
+                   const ContentOf& content_of) {
+  bool known = false, unread = false;
+  for (const Modality modality : {Modality::visible, Modality::thermal}) {
+    const std::string stage = "poses_" + std::string(name(modality));
+    if (!finished.contains(stage)) continue;
+    const auto record = pipeline::read_stage_record(out / stage);
+    const std::string content = record ? content_of(modality) : std::string();
+    if (content.empty()) {
+      unread = true;
+      continue;
+    }
+    const auto outside = record->inputs.find("outside");
+    if (outside == record->inputs.end() || outside->second != content) return Alike::no;
+    known = true;
+  }
+  return known && !unread ? Alike::yes : Alike::unknown;
+}
+
 }  // namespace
 
 bool lies_among_frames(const fs::path& out, const fs::path& session) {
@@ -60,34 +83,24 @@ Result<json> earlier_run(const std::string& folder) {
   return run;
 }
 
-std::optional<std::string> other_session(const std::string& out, const std::string& session) {
+std::optional<std::string> other_results(const std::string& out, const Session& session,
+                                         const ContentOf& content_of) {
   const auto run = earlier_run(out);
-  if (!run || run->is_null()) return std::nullopt;
-  const auto of = (*run)["session"].get<std::string>();
-  return of == absolute_name(session) ? std::nullopt : std::optional(of);
-}
-
-std::optional<std::string> other_results(const std::string& out,
-                                         const stages::SessionInput& input) {
-  const Session& session = input.session;
-  const auto other = other_session(out, session.folder.string());
+  const bool told = run && !run->is_null();
   std::error_code gone;
-  if (!other || fs::equivalent(*other, session.folder, gone) || is_of(*earlier_run(out), session))
+  if (told && (is_of(*run, session) ||
+               fs::equivalent((*run)["session"].get<std::string>(), session.folder, gone)))
     return std::nullopt;
   const auto finished = pipeline::finished_stages(out, stages::stage_names());
   if (finished.empty()) return std::nullopt;
-  // A run of an earlier version, which noted no id; or the same files, imported again.
-  int alike = 0;
-  for (const auto& [modality, content] : input.content) {
-    const std::string stage = "poses_" + std::string(name(modality));
-    if (!finished.contains(stage)) continue;
-    const auto record = pipeline::read_stage_record(fs::path(out) / stage);
-    if (!record) return other;
-    const auto outside = record->inputs.find("outside");
-    if (outside == record->inputs.end() || outside->second != content) return other;
-    ++alike;
-  }
-  return alike > 0 ? std::nullopt : other;
+  // A run of an earlier version, which noted no id; the same files, imported again; or run.json is
+  // lost or damaged.
+  const Alike alike = made_of_same(out, finished, content_of);
+  if (alike == Alike::no || (told && alike == Alike::unknown))
+    return told ? "holds results of another session, " + (*run)["session"].get<std::string>()
+                : "holds results of other frames than this session's, and no run.json that names "
+                  "theirs";
+  return std::nullopt;
 }
 
 bool is_of(const json& run, const Session& session) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -18,12 +19,15 @@ inline constexpr const char* run_file = "run.json";
 /// run.json of an earlier run's folder, which names a session; null when there is none.
 Result<nlohmann::json> earlier_run(const std::string& folder);
 
-/// The session that the results in `out` are of, where it is another than `session`.
-std::optional<std::string> other_session(const std::string& out, const std::string& session);
+/// Hash of a modality's frames and devices in a session (stages::SessionInput::content); empty:
+/// not to be had.
+using ContentOf = std::function<std::string(Modality)>;
 
-/// The same where stages are finished there and the sessions differ, not their folders alone: one
-/// that was moved or copied since, or imported again from the same files, is none other.
-std::optional<std::string> other_results(const std::string& out, const stages::SessionInput& input);
+/// Where stages are finished in `out` of another session: "holds results of another session, ...".
+/// One that was moved or copied since, or imported again from the same files, is none other; where
+/// no run.json tells, what its poses were made of does.
+std::optional<std::string> other_results(const std::string& out, const Session& session,
+                                         const ContentOf& content_of);
 
 /// run.json tells of this session, by its folder or its id.
 bool is_of(const nlohmann::json& run, const Session& session);

@@ -3,7 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <set>
+
 #include "app/cli/run_folder.hpp"
+#include "app/pipeline/result_folder.hpp"
 #include "app/pipeline/runner.hpp"
 #include "app/planning/machine_speed.hpp"
 #include "app/planning/run_planner.hpp"
@@ -162,27 +165,59 @@ Status StagedRun::open(const std::vector<std::string>& targets) {
               .resume = context_.common.resume,
               .dry_run = context_.common.dry_run,
               .replace_all = replaces_,
+              .replaced_files = {run_file, planning::plan_file},
               .targets_only = missing_ == Missing::leave_out};
   return {};
+}
+
+/// What --force removes of another session's results, and what else lies among them.
+struct Replaced {
+  std::vector<std::string> removed;
+  std::string kept;
+};
+
+Replaced replaced_in(const fs::path& out) {
+  const auto finished = pipeline::finished_stages(out, stages::stage_names());
+  std::set<std::string> own = {".partial", ".lock", run_file, planning::plan_file};
+  Replaced result;
+  for (const std::string& stage : stages::stage_names()) {
+    own.insert({stage, pipeline::failed_folder({}, stage).string()});
+    if (finished.contains(stage)) result.removed.push_back(stage);
+  }
+  std::set<std::string> kept;
+  std::error_code unreadable;
+  for (const auto& entry : fs::directory_iterator(out, unreadable))
+    if (const std::string file = entry.path().filename().string(); !own.contains(file))
+      kept.insert(file);
+  constexpr std::size_t named = 5;
+  std::size_t count = 0;
+  for (const std::string& file : kept)
+    if (++count <= named) result.kept += (count > 1 ? ", " : "") + file;
+  if (kept.size() > named) result.kept += fmt::format(" and {} more", kept.size() - named);
+  return result;
 }
 
 /// Stages that this call doesn't reach would stay the other session's, and later verbs take results
 /// as they lie: nothing is mixed.
 Status StagedRun::look_for_other_results() {
-  const auto other = other_results(folders_.out, input_);
-  if (!other) return {};
-  const std::string found = fmt::format("holds results of another session, {}", *other);
+  const auto found = other_results(folders_.out, input_.session, [&](Modality modality) {
+    const auto content = input_.content.find(modality);
+    return content == input_.content.end() ? std::string() : content->second;
+  });
+  if (!found) return {};
   if (missing_ == Missing::leave_out)
-    return fail(ErrorKind::usage, "--out " + folders_.out, found,
+    return fail(ErrorKind::usage, "--out " + folders_.out, *found,
                 "leave the session out: the folder of its results is enough");
   if (!context_.common.force)
-    return fail(ErrorKind::usage, "--out " + folders_.out, found,
+    return fail(ErrorKind::usage, "--out " + folders_.out, *found,
                 "give this session an --out of its own, or replace those results with --force");
   replaces_ = true;
-  const auto stages = pipeline::finished_stages(folders_.out, stages::stage_names());
+  const Replaced there = replaced_in(folders_.out);
   context_.console.warning(fmt::format(
-      "--force: {} {}; its results there {} first: {}", folders_.out, found,
-      context_.common.dry_run ? "would be removed" : "are removed", fmt::join(stages, ", ")));
+      "--force: {} {}; its results there {} first: {}{}", folders_.out, *found,
+      context_.common.dry_run ? "would be removed" : "are removed", fmt::join(there.removed, ", "),
+      there.kept.empty() ? std::string()
+                         : fmt::format("; what else lies there stays: {}", there.kept)));
   return {};
 }
 
@@ -274,7 +309,7 @@ Status StagedRun::run(bool whole) {
   runner.before_stage = [&](pipeline::Stage& stage, const std::vector<StageStatus>& finished) {
     if (planner_) return before_stage(stage, finished);
     std::error_code ignored;  // a plan of an earlier run tells nothing of this one
-    if ((whole || replaces_) && finished.empty() && !options_.dry_run)
+    if (whole && finished.empty() && !options_.dry_run)
       fs::remove(fs::path(folders_.out) / planning::plan_file, ignored);
   };
   runner.on_status = [&](const StageStatus& status) {

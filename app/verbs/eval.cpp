@@ -6,6 +6,7 @@
 #include "app/cli/run_stages.hpp"
 #include "app/cli/verb.hpp"
 #include "app/eval/evaluate.hpp"
+#include "app/stages/session_input.hpp"
 
 namespace orbitfuse::cli {
 namespace {
@@ -55,10 +56,11 @@ Status run(Context& context, EvalArguments& o) {
   std::error_code unreadable;
   if (!std::filesystem::is_directory(o.folders.out, unreadable))
     return fail(ErrorKind::input, o.folders.out, "no such folder", "run the session first");
-  if (const auto other = other_session(o.folders.out, o.folders.session))
-    context.console.warning(
-        fmt::format("{} holds results of {}, not of {}: frames are told by name", o.folders.out,
-                    *other, o.folders.session));
+  const auto other = other_results(o.folders.out, session, [&](Modality modality) {
+    return stages::modality_content(session, modality).value_or(std::string());
+  });
+  if (other)
+    context.console.warning(fmt::format("{} {}: frames are told by name", o.folders.out, *other));
   ORBITFUSE_ASSIGN(const json result,
                    eval::evaluate(o.folders.out, session, truth, o.evaluate, context.progress));
   if (!result.contains("poses_visible") && !result.contains("poses_thermal"))

@@ -225,9 +225,25 @@ TEST_F(Run, ResultsOfAnotherSessionAreKeptUnlessForcedAndThenGoWhole) {
     }
   EXPECT_EQ(*read_file(record), before);
 
+  // Without run.json, or with one that can't be read, what the poses were made of tells.
+  const std::string told = *read_file(out / "run.json");
+  fs::remove(out / "run.json");
+  const Outcome lost = run({}, {}, "poses");
+  EXPECT_EQ(lost.code, 2) << lost.err;
+  EXPECT_THAT(lost.err, HasSubstr("holds results of other frames than this session's"));
+  std::ofstream(out / "run.json") << "{";
+  EXPECT_EQ(run({}, {}, "poses").code, 2);
+  EXPECT_EQ(*read_file(record), before);
+  ASSERT_TRUE(write_file_atomic(out / "run.json", told));
+
+  fs::create_directories(out / "mine");
+  for (const char* file : {"mine/stage.json", "measurements.json"})
+    ASSERT_TRUE(write_file_atomic(out / file, "{}"));
   const Outcome forced = run({"--force"}, {}, "poses");
   EXPECT_EQ(forced.code, 0) << forced.err;
-  EXPECT_THAT(forced.out, HasSubstr("are removed first: poses_thermal, poses_visible"));
+  EXPECT_THAT(forced.out, HasSubstr("are removed first: poses_visible, poses_thermal; what else "
+                                    "lies there stays: measurements.json, mine"));
+  EXPECT_TRUE(fs::exists(out / "mine/stage.json"));
   EXPECT_FALSE(fs::exists(out / "poses_thermal")) << "would be taken for this session's";
   EXPECT_EQ(states(run({}, {}, "poses")).at("poses_visible"), "unchanged");
 }
@@ -241,6 +257,18 @@ TEST_F(Run, ASessionThatMovedOrWasCopiedGoesOn) {
   const Outcome copied = run({}, {}, "poses");
   EXPECT_EQ(copied.code, 0) << copied.err;
   EXPECT_EQ(states(copied).at("poses_thermal"), "unchanged");
+  const fs::path truth = temp.path() / "truth.json";
+  ASSERT_TRUE(write_file_atomic(truth, R"({"visible": {"K": {"w": 64, "h": 48, "fx": 60, "fy": 60,
+      "cx": 32, "cy": 24}, "frames": [{"file": "of/another/scene.jpg",
+      "c2w": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]}})"));
+  const auto eval = [&](const fs::path& of) {
+    return orbitfuse_program(
+        {"eval", of.string(), "--out", out.string(), "--ground-truth", truth.string()});
+  };
+  EXPECT_THAT(eval(first).err, testing::Not(HasSubstr("holds results of")));
+  const fs::path other = temp.path() / "other";
+  write_fixture_session(other, {.thermal = 0});
+  EXPECT_THAT(eval(other).err, HasSubstr("holds results of another session, " + session.string()));
 
   // Of a version that noted no id: by what the stages were made of.
   json old = json::parse(*read_file(out / "run.json"));
