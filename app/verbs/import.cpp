@@ -52,7 +52,7 @@ void add_sources(CLI::App& app, ImportArguments& o) {
                "Also take the photos embedded in radiometric JPEGs")
       ->group(group);
   app.add_flag("--rig", o.import.rig,
-               "Images of equal name or time were shot at once by one device")
+               "Images of equal name (but for a word) or time were shot at once by one device")
       ->group(group);
 }
 

@@ -122,4 +122,8 @@ Result<ThermalPoses> estimate_thermal_poses(const Session& session, const Visibl
                                             const std::filesystem::path& workdir,
                                             const Progress& progress);
 
+/// How thermal frames are paired with photos that one device shot at once, as far as the answer of
+/// estimate_thermal_poses() depends on it: "40 pairs by equal file names, declared"; "": no rig.
+std::string described_rig(const Session& session);
+
 }  // namespace orbitfuse

@@ -59,4 +59,11 @@ Result<ThermalPoses> estimate_thermal_poses(const Session& session, const Visibl
   return ThermalPoses{std::move(poses), false};
 }
 
+std::string described_rig(const Session& session) {
+  const RigPairs rig = find_rig_pairs(session);
+  if (rig.pairs.empty()) return {};
+  return fmt::format("{} pairs by {}{}", rig.pairs.size(), rig.found_by,
+                     rig.declared ? ", declared" : "");
+}
+
 }  // namespace orbitfuse

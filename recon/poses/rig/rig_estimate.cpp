@@ -9,7 +9,9 @@
 #include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
+#include "core/geometry/lens_fold.hpp"
 #include "core/geometry/narrowed.hpp"
 #include "core/geometry/rotation_vector.hpp"
 #include "core/image/undistorted.hpp"
@@ -194,9 +196,10 @@ RoundResult match_round(const std::vector<RigView>& views, const RigEstimate& ri
 
 /// The rig and the lens from all pairs' patches, the robust scale lowered step by step.
 RigStep solve(const RoundResult& round, const RigOptions& options, double depth,
-              const RigEstimate& rig, bool bends) {
+              const RigEstimate& rig, bool bent) {
   RigStep step;
   for (int i = 0; i < 3; ++i) step.pose[at(3 + i)] = rig.thermal_from_visible.translation[i];
+  if (!bent) step.radial = options.thermal_lens.k1 - rig.thermal.k1;
   const bool searched = options.focal_relative_sigma > options.search_from;
   for (const double scale_px : {8.0, 4.0, 2.0, 1.0}) {
     ceres::Problem problem;
@@ -213,7 +216,7 @@ RigStep solve(const RoundResult& round, const RigOptions& options, double depth,
             std::max(1e-4, searched ? 0.1 : options.focal_relative_sigma),
             options.thermal_lens.k1 - rig.thermal.k1, std::max(1e-4, options.radial_sigma)}),
         nullptr, step.pose.data(), &step.log_focal, &step.radial);
-    if (!bends) problem.SetParameterBlockConstant(&step.radial);
+    if (!bent) problem.SetParameterBlockConstant(&step.radial);  // at the lens' own
     ceres::Solver::Options solver;
     solver.linear_solver_type = ceres::DENSE_QR;
     solver.num_threads = 1;  // more sum in any order
@@ -233,14 +236,20 @@ int held_patches(const RoundResult& round, const RigStep& step) {
   return held;
 }
 
-/// The lens bends only where that holds clearly more patches: k1 is little held by what is near the
-/// middle of the images, and a wrong one misplaces their corners.
-RigStep best_step(const RoundResult& round, const RigOptions& options, double depth,
-                  const RigEstimate& rig) {
+/// Whether the lens bends beside what is known of it: where that holds clearly more patches, and
+/// shows the whole image. k1 is little held by what is near the middle of the images, and a wrong
+/// one misplaces their corners.
+bool bends(const RoundResult& round, const RigOptions& options, double depth,
+           const RigEstimate& rig) {
   constexpr double clearly_more = 1.03;
   const RigStep straight = solve(round, options, depth, rig, false),
                 bent = solve(round, options, depth, rig, true);
-  return held_patches(round, bent) > clearly_more * held_patches(round, straight) ? bent : straight;
+  Camera lens = rig.thermal;
+  lens.k1 += bent.radial;
+  const double focal_px = lens.fx * std::exp(bent.log_focal),
+               corner = std::hypot(lens.width, lens.height) / 2 / focal_px;
+  return corner * corner < fold_of(lens) &&
+         held_patches(round, bent) > clearly_more * held_patches(round, straight);
 }
 
 /// Of the quarters of an image that have some patches, how many are there and how many lie
@@ -272,7 +281,9 @@ void judge_quarters(const std::vector<PatchMatch>& matches, const Camera& camera
       for (int x = -reach_px; x <= reach_px; ++x)
         if (x * x + y * y >= 4) best = std::max(best, held({x, y}));
     ++fit.quarters;
-    if (4 * best > 5 * held({0, 0})) ++fit.quarters_elsewhere;
+    // Of so many shifts one holds some patches of noise.
+    if (2 * static_cast<std::size_t>(best) >= fewest && 4 * best > 5 * held({0, 0}))
+      ++fit.quarters_elsewhere;
   }
 }
 
@@ -303,7 +314,7 @@ void judge(const RoundResult& round, const RigStep& step, RigEstimate& rig) {
     sum += d, squares += d * d;
   }
   rig.held_share = found > 0 ? held / found : 0;
-  rig.elsewhere_share = quarters > 0 ? elsewhere / quarters : 1;
+  rig.elsewhere_share = quarters > 0 ? elsewhere / quarters : 0;
   const double mean = sum / count, variance = std::max(squares / count - mean * mean, 1e-9);
   rig.decisiveness = mean / std::sqrt(variance / count);
 }
@@ -360,6 +371,7 @@ Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOpt
   rig.thermal_from_visible.rotation = best.thermal_from_visible;
   const double depth = median_depth(views);
   RoundResult matched;
+  std::optional<bool> bent;
   constexpr RenderRound rounds[] = {
       {.width_px = 160, .search_px = 8, .patch_search_px = 8, .patch_radius_px = 18},
       {.width_px = 160, .search_px = 5, .patch_search_px = 7, .patch_radius_px = 14},
@@ -374,7 +386,10 @@ Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOpt
     if (patches < 12 * views.size() / 2)
       return refused(fmt::format("{} patches of {} photos are found in the thermal images", patches,
                                  views.size()));
-    const RigStep step = best_step(matched, options, depth, rig);
+    // Asked once, when the pose is nearly right and all of the image can be matched.
+    if (!bent && round.width_px == RigEstimate::judged_width_px)
+      bent = bends(matched, options, depth, rig);
+    const RigStep step = solve(matched, options, depth, rig, bent.value_or(false));
     judge(matched, step, rig);
     const auto& pose = step.pose;
     const Eigen::Quaterniond more = turned_by({pose[0], pose[1], pose[2]});
@@ -383,12 +398,14 @@ Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOpt
     rig.thermal.fx = rig.thermal.fy = rig.thermal.fx * std::exp(step.log_focal);
     rig.thermal.k1 += step.radial;
   }
-  if (!(rig.decisiveness >= options.min_decisiveness && rig.held_share >= options.min_held_share &&
-        rig.elsewhere_share <= options.max_elsewhere_share))
-    return refused(
-        fmt::format("{}; correlation of all edges {:.3f}, of shuffled pairs {:.3f} at best",
-                    rig.words(), best.score, wrong));
-  return rig;
+  const bool agrees = rig.decisiveness >= options.min_decisiveness &&
+                      rig.elsewhere_share <= options.max_elsewhere_share;
+  if (agrees && rig.held_share >= options.min_held_share) return rig;
+  const bool would_do = agrees && rig.held_share >= declared_held_share;
+  return refused(fmt::format(
+      "{}; correlation of all edges {:.3f}, of shuffled pairs {:.3f} at best{}", rig.words(),
+      best.score, wrong,
+      would_do ? " (if the two cameras are fixed to each other, say so: import --rig)" : ""));
 }
 
 }  // namespace orbitfuse

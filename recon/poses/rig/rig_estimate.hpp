@@ -46,7 +46,8 @@ struct RigOptions {
   /// edges 2.4 times better than shuffled ones): 0.20 to 0.38, which is chance.
   double min_held_share = 0.48;
   /// Of the images' quarters that have some patches, at most this share may lie elsewhere by them.
-  /// Rigs 0 to 0.06, `arco` 0.45, shuffled pairs and orbits in a counter's order 0.55 to 0.95.
+  /// Ten rendered rigs 0 to 0.06, the real `arco` 0.45 (it alone chose this and
+  /// declared_held_share: one scene), shuffled pairs and orbits in a counter's order 0.55 to 0.95.
   double max_elsewhere_share = 0.5;
 };
 
@@ -58,6 +59,9 @@ struct RigPairFit {
   double median_px = 0;  ///< their residual
   /// Of its image, with enough patches; those whose own say that they lie elsewhere.
   int quarters = 0, quarters_elsewhere = 0;
+  bool lies_elsewhere() const {
+    return quarters_elsewhere >= 2 && 2 * quarters_elsewhere >= quarters;
+  }
 };
 
 struct RigEstimate {
@@ -67,7 +71,7 @@ struct RigEstimate {
   double decisiveness = 0;            ///< standard errors between right and wrong pairs
   double agreement = 0, control = 0;  ///< of right pairs and of wrong ones, means
   double held_share = 0;              ///< matches of all found patches
-  double elsewhere_share = 1;         ///< of all quarters, those that lie elsewhere
+  double elsewhere_share = 0;         ///< of all quarters, those that lie elsewhere; 0 of none
   static constexpr int judged_width_px = 320;
   std::string words() const;
 };

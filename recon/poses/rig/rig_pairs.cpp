@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <limits>
 #include <map>
 
@@ -75,15 +76,27 @@ RigPairs by_equal_name(const Frames& visible, const Frames& thermal) {
   return result;
 }
 
-/// Cameras of two sensors write a word beside the number or time ("-visible", "_T"). Numbers of a
-/// few digits are any camera's counter, and say nothing unless `declared`.
-RigPairs by_number(const Frames& visible, const Frames& thermal, bool declared) {
-  constexpr std::ptrdiff_t digits_of_a_time = 6;
-  std::vector<std::string> numbers = without_words(stems_of(thermal));
-  const auto is_time = [](const std::string& name) {
-    return std::count_if(name.begin(), name.end(), is_digit) >= digits_of_a_time;
-  };
-  if (!declared && !std::all_of(numbers.begin(), numbers.end(), is_time)) return {};
+/// Whether numbers are times rather than a counter's, with or without a date before it: these lie
+/// as close to each other as there are files.
+bool are_times(const std::vector<std::string>& names) {
+  constexpr std::size_t fewest_digits = 6;
+  constexpr double apart = 100;  // a file, on average
+  double least = std::numeric_limits<double>::infinity(), most = -least;
+  for (const std::string& name : names) {
+    std::string digits;
+    std::copy_if(name.begin(), name.end(), std::back_inserter(digits), is_digit);
+    if (digits.size() < fewest_digits) return false;
+    double value = 0;
+    for (const char digit : digits) value = 10 * value + (digit - '0');
+    least = std::min(least, value), most = std::max(most, value);
+  }
+  return most - least >= apart * static_cast<double>(names.size());
+}
+
+/// Cameras of two sensors write a word beside the time or number ("-visible", "_T").
+RigPairs by_number(const Frames& visible, const Frames& thermal, bool times) {
+  const std::vector<std::string> numbers = without_words(stems_of(thermal));
+  if (times != are_times(numbers)) return {};
   RigPairs result = by_name(visible, without_words(stems_of(visible)), thermal, numbers);
   result.found_by = "file names alike but for a word";
   return result;
@@ -123,12 +136,15 @@ RigPairs find_rig_pairs(const Session& session) {
   const bool stations = std::any_of(thermal.begin(), thermal.end(),
                                     [](const FrameRecord* f) { return f->station.has_value(); });
   if (stations && !declared) return {};
+  std::vector<RigPairs> ways{by_equal_name(visible, thermal), by_number(visible, thermal, true),
+                             by_time(visible, thermal)};
+  // Two cameras' counters agree by chance, until one of them misses a shot.
+  if (declared) ways.push_back(by_number(visible, thermal, false));
   constexpr std::size_t fewest = 4;
-  for (RigPairs found : {by_equal_name(visible, thermal), by_number(visible, thermal, declared),
-                         by_time(visible, thermal)})
+  for (RigPairs& found : ways)
     if (found.pairs.size() >= fewest && 5 * found.pairs.size() >= 4 * thermal.size()) {
       found.declared = declared;
-      return found;
+      return std::move(found);
     }
   return {};
 }

@@ -21,8 +21,9 @@ struct RigPairs {
 inline constexpr const char* rig_note = "rig";
 
 /// Pairs by the names of the files that frames came from (an embedded photo bears its thermal
-/// file's), else by names that differ in a word about a time or number, else by times within a
-/// second, where four fifths of the thermal frames have a partner.
+/// file's), else by names that differ in a word about a time, else by times within a second, where
+/// four fifths of the thermal frames have a partner; of a declared rig at last by a counter that
+/// words stand about.
 /// Without the note, stations of the thermal frames' own say that they were shot apart: no pairs.
 RigPairs find_rig_pairs(const Session& session);
 

@@ -76,8 +76,6 @@ Result<ThermalPoses> pose_by_rig(const Session& session, const Reconstruction& v
   step.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (!found) {
     step.why = found.error().found;
-    if (!rig.declared)
-      step.why += " (if the two cameras are fixed to each other, say so: import --rig)";
     if (found.error().kind == ErrorKind::quality) steps.push_back(step);
     return tl::unexpected(found.error());
   }
@@ -91,12 +89,15 @@ Result<ThermalPoses> pose_by_rig(const Session& session, const Reconstruction& v
           {gathered.views[i].name, DoubtReason::weak_support,
            fmt::format("its edges agree with its photo's by {:.3f}, other pairs' by {:.3f}",
                        fit.agreement, fit.control)});
-    else if (fit.quarters_elsewhere >= 2 && 2 * fit.quarters_elsewhere >= fit.quarters)
+    else if (fit.lies_elsewhere())
       result.doubtful.push_back(
           {gathered.views[i].name, DoubtReason::weak_support,
            fmt::format("in {} of {} quarters of its image the edges lie elsewhere than one "
                        "transform for all pairs has them",
                        fit.quarters_elsewhere, fit.quarters)});
+    else if (rig.declared && fit.quarters == 0)
+      result.doubtful.push_back({gathered.views[i].name, DoubtReason::weak_support,
+                                 "both cameras see too little in common for it to be judged"});
   }
   for (const FrameRecord* frame : frames)
     if (std::none_of(rig.pairs.begin(), rig.pairs.end(),

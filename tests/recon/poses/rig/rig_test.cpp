@@ -6,6 +6,7 @@
 #include <random>
 
 #include "core/image/undistorted.hpp"
+#include "recon/poses/estimate_poses.hpp"
 #include "recon/poses/rig/rig_estimate.hpp"
 #include "recon/poses/rig/rig_image.hpp"
 #include "recon/poses/rig/rig_pairs.hpp"
@@ -82,6 +83,7 @@ TEST(Rig, OneTransformAndLensAreFoundFromAllPairs) {
     ASSERT_TRUE(rig) << rig.error().message();
     EXPECT_LT(misplacement_px(*rig, scene), 0.5) << rig->words();
     EXPECT_NEAR(rig->thermal.fx / scene.thermal.fx, 1, 0.015) << rig->words();
+    EXPECT_EQ(rig->thermal.k1, 0) << rig->words();
     EXPECT_LT(rig->thermal_from_visible.rotation.angularDistance(scene.thermal_from_visible), 0.01)
         << rig->words();
   }
@@ -149,8 +151,7 @@ TEST(Rig, QuartersOfARigLieWhereItHasThemAndThoseOfTornPairsElsewhere) {
   ASSERT_TRUE(believed) << believed.error().message();
   EXPECT_GT(believed->elsewhere_share, 0.3) << believed->words();
   int doubted = 0;
-  for (const RigPairFit& fit : believed->pairs)
-    doubted += 2 * fit.quarters_elsewhere >= fit.quarters;
+  for (const RigPairFit& fit : believed->pairs) doubted += fit.lies_elsewhere() ? 1 : 0;
   EXPECT_GE(doubted, 3) << believed->words();
 }
 
@@ -204,11 +205,13 @@ TEST(RigPairs, EqualNamesArePairs) {
 
 /// The names of two folders' files, by the number or time in them.
 Session named_session(const std::string& before, const std::string& visible_word,
-                      const std::string& thermal_word, const std::string& stamp, int count) {
-  Session session = paired_session(count);
+                      const std::string& thermal_word, const std::string& stamp,
+                      std::size_t apart) {
+  constexpr std::size_t count = 5;
+  Session session = paired_session(static_cast<int>(count));
   for (std::size_t i = 0; i < session.frames.size(); ++i) {
     FrameRecord& frame = session.frames[i];
-    const std::string number = std::to_string(10 + i % static_cast<std::size_t>(count));
+    const std::string number = std::to_string(100 + apart * (i % count));
     frame.source = frame.modality == Modality::visible
                        ? "v/" + before + stamp + number + visible_word + ".jpg"
                        : "t/" + before + stamp + number + thermal_word + ".png";
@@ -220,7 +223,7 @@ TEST(RigPairs, NamesThatDifferInAWordAboutATimeArePairs) {
   for (const auto& [before, visible, thermal] : {std::array<std::string, 3>{"", "-visible", ""},
                                                  {"DJI_", "_W", "_T"},
                                                  {"", "_rgb", " ir"}}) {
-    const RigPairs rig = find_rig_pairs(named_session(before, visible, thermal, "10-50-42-9", 5));
+    const RigPairs rig = find_rig_pairs(named_session(before, visible, thermal, "10-50-4", 137));
     EXPECT_EQ(rig.pairs.size(), 5u) << visible << thermal;
     EXPECT_EQ(rig.found_by, "file names alike but for a word");
     for (const auto& [photo, frame] : rig.pairs)
@@ -229,14 +232,36 @@ TEST(RigPairs, NamesThatDifferInAWordAboutATimeArePairs) {
 }
 
 TEST(RigPairs, ShortNumbersBesideOtherWordsAreAnyCamerasCounterUnlessDeclaredARig) {
-  Session session = named_session("", "_IMG", "_FLIR", "00", 5);
+  Session session = named_session("", "_IMG", "_FLIR", "00", 1);
   EXPECT_TRUE(find_rig_pairs(session).pairs.empty());
+  EXPECT_EQ(described_rig(session), "");
   session.notes[rig_note] = "yes";
   EXPECT_EQ(find_rig_pairs(session).pairs.size(), 5u);
+  EXPECT_EQ(described_rig(session), "5 pairs by file names alike but for a word, declared");
+}
+
+TEST(RigPairs, CountersWithZerosOrADateBeforeThemAreNoTimes) {
+  for (const std::string before : {"0000", "20240601_0"})
+    EXPECT_TRUE(find_rig_pairs(named_session("", "_v", "_t", before, 1)).pairs.empty()) << before;
+}
+
+// The thermal camera missed a shot: from there on its counter is one behind.
+TEST(RigPairs, TimesCountMoreThanCountersOfADeclaredRig) {
+  Session session = named_session("", "_IMG", "_FLIR", "00", 1);
+  for (std::size_t i = 0; i < session.frames.size(); ++i) {
+    const bool thermal = session.frames[i].modality == Modality::thermal;
+    session.frames[i].host_time_ns =
+        20'000'000'000 * static_cast<std::int64_t>(i % 5 + (thermal ? 1 : 0));
+  }
+  session.notes[rig_note] = "yes";
+  const RigPairs rig = find_rig_pairs(session);
+  EXPECT_EQ(rig.found_by, "times within a second");
+  for (const auto& [photo, thermal] : rig.pairs)
+    EXPECT_EQ(photo->host_time_ns, thermal->host_time_ns);
 }
 
 TEST(RigPairs, NumbersOfOtherTimesAreNoPairs) {
-  Session session = named_session("", "_v", "_t", "10-50-42-9", 5);
+  Session session = named_session("", "_v", "_t", "10-50-4", 137);
   for (FrameRecord& frame : session.frames)
     if (frame.modality == Modality::thermal) frame.source.insert(2, "1");
   EXPECT_TRUE(find_rig_pairs(session).pairs.empty());
