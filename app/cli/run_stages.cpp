@@ -184,16 +184,16 @@ Replaced replaced_in(const fs::path& out) {
     own.insert({stage, pipeline::failed_folder({}, stage).string()});
     if (finished.contains(stage)) result.removed.push_back(stage);
   }
-  std::set<std::string> kept;
+  std::set<std::string> others;
   std::error_code unreadable;
   for (const auto& entry : fs::directory_iterator(out, unreadable))
     if (const std::string file = entry.path().filename().string(); !own.contains(file))
-      kept.insert(file);
+      others.insert(file);
   constexpr std::size_t named = 5;
   std::size_t count = 0;
-  for (const std::string& file : kept)
+  for (const std::string& file : others)
     if (++count <= named) result.kept += (count > 1 ? ", " : "") + file;
-  if (kept.size() > named) result.kept += fmt::format(" and {} more", kept.size() - named);
+  if (others.size() > named) result.kept += fmt::format(" and {} more", others.size() - named);
   return result;
 }
 
