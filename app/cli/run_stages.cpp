@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <set>
 
 #include "app/cli/run_folder.hpp"
@@ -11,6 +12,7 @@
 #include "app/planning/machine_speed.hpp"
 #include "app/planning/run_planner.hpp"
 #include "app/stages/build_stages.hpp"
+#include "core/first_names.hpp"
 #include "core/modality.hpp"
 #include "core/system/clock.hpp"
 #include "core/system/file_io.hpp"
@@ -184,16 +186,13 @@ Replaced replaced_in(const fs::path& out) {
     own.insert({stage, pipeline::failed_folder({}, stage).string()});
     if (finished.contains(stage)) result.removed.push_back(stage);
   }
-  std::set<std::string> others;
+  std::vector<std::string> others;
   std::error_code unreadable;
   for (const auto& entry : fs::directory_iterator(out, unreadable))
     if (const std::string file = entry.path().filename().string(); !own.contains(file))
-      others.insert(file);
-  constexpr std::size_t named = 5;
-  std::size_t count = 0;
-  for (const std::string& file : others)
-    if (++count <= named) result.kept += (count > 1 ? ", " : "") + file;
-  if (others.size() > named) result.kept += fmt::format(" and {} more", others.size() - named);
+      others.push_back(file);
+  std::sort(others.begin(), others.end());
+  result.kept = first_names(others, 5);
   return result;
 }
 

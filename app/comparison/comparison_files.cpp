@@ -76,11 +76,9 @@ Status write_surfaces(const fs::path& folder, const ComparedRuns& runs) {
   difference.name = "_DIFFERENCE";
   uncertainty.name = "_UNCERTAINTY";
   change.name = "_CHANGE";
-  json extras = to_json(frame, exporting::FileAxes::y_up);
+  json extras = exporting::glb_extras(to_json(frame, exporting::FileAxes::y_up));
   extras["change"] = legend;
   extras["span_k"] = span_k;
-  // Of the frame whose z is up.
-  for (const char* key : {"world_from_export", "export_from_file"}) extras.erase(key);
   return exporting::write_glb(folder / "difference.glb", mesh, extras,
                               {difference, uncertainty, change});
 }

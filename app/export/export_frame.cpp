@@ -44,4 +44,9 @@ json to_json(const ExportFrame& frame, FileAxes axes) {
   return j;
 }
 
+json glb_extras(json sidecar) {
+  for (const char* key : {"world_from_export", "export_from_file"}) sidecar.erase(key);
+  return sidecar;
+}
+
 }  // namespace orbitfuse::exporting

@@ -36,4 +36,8 @@ enum class FileAxes { z_up, y_up };
 /// file's own coordinates `up` and `export_from_file` (4x4).
 nlohmann::json to_json(const ExportFrame& frame, FileAxes axes = FileAxes::z_up);
 
+/// A sidecar's text for the inside of a GLB: without its matrices, since a program may have turned
+/// what it read.
+nlohmann::json glb_extras(nlohmann::json sidecar);
+
 }  // namespace orbitfuse::exporting

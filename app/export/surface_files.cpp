@@ -144,10 +144,8 @@ Status write_surface(const fs::path& file, const view::FinishedRun& run,
   const std::vector<std::string> comments = {"unit " + frame.unit() + ", up z; " + frame.words()};
   Status written;
   if (extension == ".glb") {
-    json extras = about;
+    json extras = glb_extras(about);
     extras["temperature_none"] = 0;
-    // A program may have turned what it read.
-    for (const char* key : {"world_from_export", "export_from_file"}) extras.erase(key);
     written = write_glb(file, mesh, extras);
   } else if (extension == ".ply") {
     written = write_ply(file, mesh, {options.temperature_name, comments});

@@ -143,8 +143,9 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   stage.options = in.config->settings().to_json("poses");
   stage.options["seed"] = in.config->seed;
   // Names and times of photos, and what the user said of the cameras, are in no frame's content.
-  if (const std::string rig = described_rig(in.session->session); !visible && !rig.empty())
-    stage.options["rig"] = rig;
+  if (!visible)
+    if (const std::string rig = described_rig(in.session->session); !rig.empty())
+      stage.options["rig"] = rig;
   stage.inputs_hash = in.session->content.at(modality);
   stage.absent = [in, modality](const StageContext&) -> std::optional<std::string> {
     if (in.session->has(modality)) return std::nullopt;

@@ -138,7 +138,7 @@ Status choose_scales(const StageContext& context, Modality frame,
   const TemperatureSpan object = object_span(seen, posed.views);
   const HeatScaleOptions how = heat_scale_options(rendered.samples());
   rendered.heat = heat_scale(within_orbit(seen, posed.views, surroundings_reach), how);
-  rendered.heat.hot = std::max(object.high_k, rendered.heat.usual + how.min_width);
+  rendered.heat.hot = object.high_k;
   rendered.heat = within_levels(rendered.heat, how);
   rendered.span = rendered.thermal_is_gray ? TemperatureSpan{0, 255} : object;
   return {};

@@ -8,6 +8,7 @@
 #include "app/verbs/measure_options.hpp"
 #include "core/temperature.hpp"
 #include "recon/measurement/measure.hpp"
+#include "recon/measurement/reradiometry.hpp"
 #include "recon/measurement/table.hpp"
 
 namespace orbitfuse::cli {
@@ -93,9 +94,8 @@ Status check_reference(const std::string& name, const Measurements& saved,
 }
 
 /// The library asks for what the camera was set to; here that is an option.
-Error without_recorded(Error error, const MeasureWords& words) {
-  if (error.kind == ErrorKind::usage && asks_radiometry(words) && !words.recorded_emissivity &&
-      error.remedy.find("recorded emissivity") != std::string::npos)
+Error without_recorded(Error error) {
+  if (error.where == recorded_unknown)
     error.remedy =
         "say what the camera was set to: --recorded-emissivity, and --recorded-reflected-c if it "
         "was not 20 C; or import the camera's radiometric JPEGs";
@@ -131,9 +131,7 @@ Status run(Context& context, const MeasureArguments& options) {
   }
   if (words.save) ORBITFUSE_TRY(check_name(request->name));  // before it takes its time
   ORBITFUSE_ASSIGN(const Answer answer,
-                   measure(scene, *request, context.progress).map_error([&](Error error) {
-                     return without_recorded(std::move(error), words);
-                   }));
+                   measure(scene, *request, context.progress).map_error(without_recorded));
   std::string name = request->name;
   if (options.words.save && context.common.dry_run) {
     context.console.info("would be saved in " + file.string());

@@ -290,10 +290,6 @@ void add_measure_options(CLI::App& app, MeasureWords& w) {
   app.add_flag("--csv", w.csv, "CSV on stdout");
 }
 
-bool asks_radiometry(const MeasureWords& w) {
-  return w.emissivity || w.reflected_c || w.distance_m || w.air_c || w.humidity_percent;
-}
-
 Status check_pairs(const MeasureWords& w) {
   ORBITFUSE_ASSIGN(const std::string question, asked(w));
   constexpr const char* any = "a measurement such as --point";

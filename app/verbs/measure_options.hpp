@@ -26,9 +26,6 @@ struct MeasureWords {
 
 void add_measure_options(CLI::App& app, MeasureWords& words);
 
-/// Other object parameters than the recorded ones are asked for.
-bool asks_radiometry(const MeasureWords& words);
-
 /// Usage error for options that mean nothing beside the others, or without another one.
 Status check_pairs(const MeasureWords& words);
 

@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/first_names.hpp"
 #include "core/image/image_codec.hpp"
 #include "core/image/tiff_file.hpp"
 #include "core/image/tiff_layout.hpp"
@@ -168,24 +169,20 @@ std::optional<int> tiff_orientation(std::string_view bytes, std::optional<int> p
 std::string other_tiff_pages(std::string_view bytes) {
   const TiffPages tiff(bytes);
   if (!tiff) return {};
-  constexpr std::size_t named = 3;
   std::vector<std::string> others;
-  std::size_t count = 0;
   // The number is the directory's, by which other programs know it too.
   for (int page = TIFFCurrentDirectory(tiff.get()) + 2;
        page <= max_pages && TIFFReadDirectory(tiff.get()) == 1; ++page) {
     const TiffLayout l = layout_of(tiff.get());
     if (is_copy(tiff.get()) || alike(l, tiff.first())) continue;
-    if (++count <= named)
-      others.push_back(fmt::format("{} ({}x{}, {}-bit{})", page, l.width, l.height, l.bits,
-                                   l.channels > 1 ? fmt::format(", {} channels", l.channels) : ""));
+    others.push_back(fmt::format("{} ({}x{}, {}-bit{})", page, l.width, l.height, l.bits,
+                                 l.channels > 1 ? fmt::format(", {} channels", l.channels) : ""));
   }
   if (others.empty()) return {};
   return fmt::format(
-      "page{} {}{}, of another size or kind than the first: previews, or another camera's images; "
+      "page{} {}, of another size or kind than the first: previews, or another camera's images; "
       "split the file (tiffsplit) to use them",
-      count > 1 ? "s" : "", fmt::join(others, ", "),
-      count > named ? fmt::format(" and {} more", count - named) : "");
+      others.size() > 1 ? "s" : "", first_names(others, 3));
 }
 
 Result<cv::Mat> decode_tiff(std::string_view bytes, const std::string& where,

@@ -37,7 +37,11 @@ Result<cv::Mat> recorded_as(const cv::Mat& photo, const Camera& from, const Came
 Result<cv::Mat> recorded_straight(const cv::Mat& photo, const Camera& camera,
                                   const std::string& file) {
   ORBITFUSE_TRY(check_size(photo, camera, file));
-  return camera.has_distortion() ? undistorted(photo, camera, camera.without_distortion()) : photo;
+  return straightened(photo, camera);
+}
+
+cv::Mat straightened(const cv::Mat& image, const Camera& camera) {
+  return camera.has_distortion() ? undistorted(image, camera, camera.without_distortion()) : image;
 }
 
 cv::Mat straightened(const cv::Mat& image, const Camera& camera, double k1) {

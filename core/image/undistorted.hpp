@@ -20,11 +20,13 @@ Status check_size(const cv::Mat& image, const Camera& camera, const std::string&
 /// A recorded photo as `to` would have taken it; the error of check_size().
 Result<cv::Mat> recorded_as(const cv::Mat& photo, const Camera& from, const Camera& to,
                             const std::string& file);
-/// A recorded photo without its lens' distortion: itself where there is none.
+/// An image as its camera would have taken it without distortion: itself where there is none.
+cv::Mat straightened(const cv::Mat& image, const Camera& camera);
+/// The same of a recorded photo; the error of check_size().
 Result<cv::Mat> recorded_straight(const cv::Mat& photo, const Camera& camera,
                                   const std::string& file);
 
-/// The same of an image whose lens has this k1 (Brown) beside what `camera` says, at the camera's
+/// An image whose lens has this k1 (Brown) beside what `camera` says, at the camera's
 /// size; the image itself where it has none.
 cv::Mat straightened(const cv::Mat& image, const Camera& camera, double k1);
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/session/session.hpp"
+#include "core/first_names.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -75,12 +76,10 @@ Status drop_missing_files(Session& session) {
   });
   if (unknown) return tl::unexpected(*std::move(unknown));
   constexpr std::size_t most_named = 3;  // a folder that was deleted is one sentence
-  const std::size_t count = missing_files.size();
-  if (count > most_named) {
-    missing_files.resize(most_named);
-    session.warnings.push_back(
-        fmt::format("{} files are listed in the manifest, but missing: {} and {} more", count,
-                    fmt::join(missing_files, ", "), count - most_named));
+  if (missing_files.size() > most_named) {
+    session.warnings.push_back(fmt::format("{} files are listed in the manifest, but missing: {}",
+                                           missing_files.size(),
+                                           first_names(missing_files, most_named)));
     return {};
   }
   for (const std::string& file : missing_files)

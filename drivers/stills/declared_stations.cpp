@@ -25,8 +25,7 @@ std::string rest_words(const DeclaredStations& declared, int frames) {
   const int loops = (frames + per_loop - 1) / per_loop;
   return fmt::format(
       ": from frame {} on they are taken for {} that begin{} at 0 degrees again; if they are of "
-      "the "
-      "same loop give their true spacing, else --loops {}",
+      "the same loop give their true spacing, else --loops {}",
       count + 1, loops - declared.loops == 1 ? "a further loop" : "further loops",
       loops - declared.loops == 1 ? "s" : "", loops);
 }

@@ -11,6 +11,7 @@
 #include "capture/recording/frame_encoding.hpp"
 #include "capture/recording/session_folder.hpp"
 #include "capture/recording/session_writer.hpp"
+#include "core/first_names.hpp"
 #include "core/system/file_io.hpp"
 #include "core/temperature.hpp"
 #include "drivers/stills/camera_groups.hpp"
@@ -261,14 +262,10 @@ class Importer {
 
   void tell_transparent() {
     if (transparent_.empty()) return;
-    constexpr std::size_t named = 3;
-    const std::size_t count = transparent_.size();
-    transparent_.resize(std::min(count, named));
     remarks_.add(fmt::format(
-        "{} images have transparent pixels: {}{}; alpha is dropped, and what colour lies behind it "
+        "{} images have transparent pixels: {}; alpha is dropped, and what colour lies behind it "
         "is taken for the scene: import the images as they were taken",
-        count, fmt::join(transparent_, ", "),
-        count > named ? fmt::format(" and {} more", count - named) : ""));
+        transparent_.size(), first_names(transparent_, 3)));
   }
 
   void tell_counts() {

@@ -22,10 +22,10 @@ struct StillPhoto {
   int orientation = 1;          ///< as of ThermalFile
   bool lies_across = false;     ///< likewise; of a photo: beside the samples of its file
 
-  /// Same key: same camera, lens, image size and kind of samples; of thermal images the size that
-  /// the sensor has, however it was held.
   /// How a thermal image is held, in words, where that is not as it is stored; else empty.
   std::string how_held() const;
+  /// Same key: same camera, lens, image size and kind of samples; of thermal images the size that
+  /// the sensor has, however it was held.
   std::string key() const;
   std::string described() const;  ///< the same for people
 };

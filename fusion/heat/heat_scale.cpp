@@ -40,7 +40,7 @@ HeatScale heat_scale(const std::vector<cv::Mat>& images, const HeatScaleOptions&
   HeatScale scale;
   scale.usual = at(0.5);
   scale.spread = std::min(scale.usual - at(0.25), at(0.75) - scale.usual);
-  scale.hot = std::max(at(1 - options.hotter_share), scale.usual + options.min_width);
+  scale.hot = at(1 - options.hotter_share);
   scale = within_levels(scale, options);
   // Levels so large that a double can't tell them from their neighbour `min_width` away.
   if (!(scale.hot > scale.usual)) scale.hot = std::nextafter(scale.usual, 1e300);

@@ -22,7 +22,7 @@ Result<FlirCalibration> recorded_with(const ThermalFrame& frame,
                                       const ObjectParameterOverrides& said) {
   if (frame.radiometry) return *frame.radiometry;
   if (!said.emissivity)
-    return fail(ErrorKind::usage, "emissivity, reflected temperature, distance or air",
+    return fail(ErrorKind::usage, recorded_unknown,
                 frame.view.name + " holds temperatures, and not what they were made with",
                 "say what the camera was set to (recorded emissivity, and the reflected "
                 "temperature if it was not 20 C); or import the camera's radiometric JPEGs");

@@ -10,6 +10,10 @@
 
 namespace orbitfuse::measurement {
 
+/// Error::where of a usage error: what the frames were recorded with has to be said.
+inline constexpr const char* recorded_unknown =
+    "emissivity, reflected temperature, distance or air";
+
 /// Temperatures as they would be had the camera been told other object parameters: back to the
 /// sensor's signal by what the frame was converted with, and from it again with what is said now.
 /// The stored frames stay as they are. Within 0.02 K of a conversion of the raw counts (frames hold

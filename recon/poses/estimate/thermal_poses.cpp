@@ -29,7 +29,13 @@ Result<ThermalPoses> estimate_thermal_poses(const Session& session, const Visibl
                 "record or import more views");
   std::vector<LadderStep> steps;
   if (visible != nullptr) {
-    if (const RigPairs rig = find_rig_pairs(session); !rig.pairs.empty()) {
+    const RigPairs rig = find_rig_pairs(session);
+    if (rig.declared && rig.pairs.empty())
+      steps.push_back({"rig", false,
+                       "the session says that its cameras are one rig, but neither names nor times "
+                       "pair four fifths of the thermal frames with photos",
+                       0, static_cast<int>(frames.size()), 0});
+    if (!rig.pairs.empty()) {
       auto by_rig = pose_by_rig(session, visible->reconstruction, rig, progress, steps);
       if (!by_rig && by_rig.error().kind != ErrorKind::quality) return by_rig;
       if (by_rig) {

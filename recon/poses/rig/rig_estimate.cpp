@@ -33,11 +33,6 @@ Camera thermal_camera(const Camera& lens, double focal_px, int width) {
   return at_width(camera, width);
 }
 
-/// As a lens without distortion would have seen it.
-cv::Mat straight(const cv::Mat& thermal, const Camera& lens) {
-  return lens.has_distortion() ? undistorted(thermal, lens, lens.without_distortion()) : thermal;
-}
-
 /// Edges of an image whose NaN pixels show nothing.
 cv::Mat edges_of(const cv::Mat& image) {
   cv::Mat field = orientation_field(image, 1.0);
@@ -68,7 +63,7 @@ class ShiftSearch {
     const Camera& lens = options.thermal_lens;
     const Camera camera = thermal_camera(lens, 1, width).without_distortion();
     for (const RigView& view : views) {
-      thermal_.push_back(edges_at(straight(view.thermal, lens), camera));
+      thermal_.push_back(edges_at(straightened(view.thermal, lens), camera));
       energy_.push_back(cv::sum(energy_of(thermal_.back()))[0]);
     }
   }
@@ -186,7 +181,7 @@ RoundResult match_round(const std::vector<RigView>& views, const RigEstimate& ri
     for (const Eigen::Vector3d& point : view.points) turned.push_back(turn * point);
     seen.depth = sparse_depth(turned, result.camera);
     result.edges[at(i)] = edges_of(seen.brightness);
-    result.fields[at(i)] = edges_at(straight(view.thermal, rig.thermal), result.camera);
+    result.fields[at(i)] = edges_at(straightened(view.thermal, rig.thermal), result.camera);
     result.matches[at(i)] =
         match_patches(seen, result.edges[at(i)], result.camera, result.fields[at(i)],
                       {round.search_px, round.patch_search_px, round.patch_radius_px, 8});
@@ -239,11 +234,9 @@ int held_patches(const RoundResult& round, const RigStep& step) {
 /// Whether the lens bends beside what is known of it: where that holds clearly more patches, and
 /// shows the whole image. k1 is little held by what is near the middle of the images, and a wrong
 /// one misplaces their corners.
-bool bends(const RoundResult& round, const RigOptions& options, double depth,
-           const RigEstimate& rig) {
+bool bends(const RoundResult& round, const RigEstimate& rig, const RigStep& straight,
+           const RigStep& bent) {
   constexpr double clearly_more = 1.03;
-  const RigStep straight = solve(round, options, depth, rig, false),
-                bent = solve(round, options, depth, rig, true);
   Camera lens = rig.thermal;
   lens.k1 += bent.radial;
   const double focal_px = lens.fx * std::exp(bent.log_focal),
@@ -371,6 +364,7 @@ Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOpt
   rig.thermal_from_visible.rotation = best.thermal_from_visible;
   const double depth = median_depth(views);
   RoundResult matched;
+  RigStep step;
   std::optional<bool> bent;
   constexpr RenderRound rounds[] = {
       {.width_px = 160, .search_px = 8, .patch_search_px = 8, .patch_radius_px = 18},
@@ -386,11 +380,13 @@ Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOpt
     if (patches < 12 * views.size() / 2)
       return refused(fmt::format("{} patches of {} photos are found in the thermal images", patches,
                                  views.size()));
+    step = solve(matched, options, depth, rig, bent.value_or(false));
     // Asked once, when the pose is nearly right and all of the image can be matched.
-    if (!bent && round.width_px == RigEstimate::judged_width_px)
-      bent = bends(matched, options, depth, rig);
-    const RigStep step = solve(matched, options, depth, rig, bent.value_or(false));
-    judge(matched, step, rig);
+    if (!bent && round.width_px == RigEstimate::judged_width_px) {
+      const RigStep other = solve(matched, options, depth, rig, true);
+      bent = bends(matched, rig, step, other);
+      if (*bent) step = other;
+    }
     const auto& pose = step.pose;
     const Eigen::Quaterniond more = turned_by({pose[0], pose[1], pose[2]});
     rig.thermal_from_visible.rotation = (more * rig.thermal_from_visible.rotation).normalized();
@@ -398,6 +394,7 @@ Result<RigEstimate> estimate_rig(const std::vector<RigView>& views, const RigOpt
     rig.thermal.fx = rig.thermal.fy = rig.thermal.fx * std::exp(step.log_focal);
     rig.thermal.k1 += step.radial;
   }
+  judge(matched, step, rig);
   const bool agrees = rig.decisiveness >= options.min_decisiveness &&
                       rig.elsewhere_share <= options.max_elsewhere_share;
   if (agrees && rig.held_share >= options.min_held_share) return rig;

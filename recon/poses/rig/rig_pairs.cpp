@@ -7,6 +7,7 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <optional>
 
 namespace orbitfuse {
 namespace {
@@ -27,25 +28,33 @@ std::vector<std::string> stems_of(const Frames& frames) {
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-/// How many characters all names begin with that end at a digit and hold none: a camera's word.
-std::size_t shared_word(const std::vector<std::string>& names) {
-  if (names.empty()) return 0;
-  std::size_t length = 0;
-  while (length < names.front().size() && !is_digit(names.front()[length])) ++length;
-  const auto begins_alike = [&](const std::string& name) {
-    return name.size() > length && is_digit(name[length]) &&
-           name.compare(0, length, names.front(), 0, length) == 0;
-  };
-  return std::all_of(names.begin(), names.end(), begins_alike) ? length : 0;
+/// Of `all`, as many as are taken for all: a folder may hold a file of another name.
+bool are_most(std::size_t some, std::size_t all) { return 5 * some >= 4 * all; }
+
+/// What a name begins with before its first digit; none where it has no digit.
+std::optional<std::string> word_before_number(const std::string& name) {
+  const auto digit = std::find_if(name.begin(), name.end(), is_digit);
+  if (digit == name.end()) return std::nullopt;
+  return std::string(name.begin(), digit);
+}
+
+/// The word before the number that most names begin with: a camera's.
+std::string camera_word(const std::vector<std::string>& names) {
+  std::map<std::string, std::size_t> uses;
+  for (const std::string& name : names)
+    if (const auto word = word_before_number(name)) ++uses[*word];
+  for (const auto& [word, count] : uses)
+    if (are_most(count, names.size())) return word;
+  return {};
 }
 
 /// Without the words round their numbers that a folder's names have in common: "DJI_0042_T" is
 /// 0042.
 std::vector<std::string> without_words(std::vector<std::string> names) {
   for (int end = 0; end < 2; ++end) {
-    const std::size_t length = shared_word(names);
+    const std::string word = camera_word(names);
     for (std::string& name : names) {
-      name.erase(0, length);
+      if (word_before_number(name) == word) name.erase(0, word.size());
       std::reverse(name.begin(), name.end());
     }
   }
@@ -82,15 +91,17 @@ bool are_times(const std::vector<std::string>& names) {
   constexpr std::size_t fewest_digits = 6;
   constexpr double apart = 100;  // a file, on average
   double least = std::numeric_limits<double>::infinity(), most = -least;
+  std::size_t numbers = 0;
   for (const std::string& name : names) {
     std::string digits;
     std::copy_if(name.begin(), name.end(), std::back_inserter(digits), is_digit);
-    if (digits.size() < fewest_digits) return false;
+    if (digits.size() < fewest_digits) continue;
+    ++numbers;
     double value = 0;
     for (const char digit : digits) value = 10 * value + (digit - '0');
     least = std::min(least, value), most = std::max(most, value);
   }
-  return most - least >= apart * static_cast<double>(names.size());
+  return are_most(numbers, names.size()) && most - least >= apart * static_cast<double>(numbers);
 }
 
 /// Cameras of two sensors write a word beside the time or number ("-visible", "_T").
@@ -142,11 +153,13 @@ RigPairs find_rig_pairs(const Session& session) {
   if (declared) ways.push_back(by_number(visible, thermal, false));
   constexpr std::size_t fewest = 4;
   for (RigPairs& found : ways)
-    if (found.pairs.size() >= fewest && 5 * found.pairs.size() >= 4 * thermal.size()) {
+    if (found.pairs.size() >= fewest && are_most(found.pairs.size(), thermal.size())) {
       found.declared = declared;
       return std::move(found);
     }
-  return {};
+  RigPairs none;
+  none.declared = declared;
+  return none;
 }
 
 }  // namespace orbitfuse

@@ -14,7 +14,7 @@ struct RigPairs {
   std::vector<std::pair<const FrameRecord*, const FrameRecord*>> pairs;  ///< visible, thermal
   /// "equal file names", "file names alike but for a word", "times within a second"
   std::string found_by;
-  bool declared = false;  ///< by the user
+  bool declared = false;  ///< by the user, though there may be no pairs
 };
 
 /// The session's note that says whether its cameras are one rig ("yes"); import --rig writes it.

@@ -240,6 +240,27 @@ TEST(RigPairs, ShortNumbersBesideOtherWordsAreAnyCamerasCounterUnlessDeclaredARi
   EXPECT_EQ(described_rig(session), "5 pairs by file names alike but for a word, declared");
 }
 
+TEST(RigPairs, OneFileOfAnotherNameUnpairsNoOther) {
+  for (const char* odd : {"t/preview.png", "t/preview 9.png", "t/12.png"}) {
+    Session session = named_session("", "-visible", "_T", "10-50-4", 137);
+    session.frames.back().source = odd;
+    const RigPairs rig = find_rig_pairs(session);
+    EXPECT_EQ(rig.pairs.size(), 4u) << odd;
+    for (const auto& [photo, frame] : rig.pairs)
+      EXPECT_EQ(photo->file.substr(8), frame->file.substr(8));
+  }
+}
+
+TEST(RigPairs, ADeclaredRigWithoutPairsSaysSo) {
+  Session session = named_session("", "_v", "_t", "10-50-4", 137);
+  for (FrameRecord& frame : session.frames)
+    if (frame.modality == Modality::thermal) frame.source.insert(2, "1");
+  EXPECT_FALSE(find_rig_pairs(session).declared);
+  session.notes[rig_note] = "yes";
+  EXPECT_TRUE(find_rig_pairs(session).declared);
+  EXPECT_TRUE(find_rig_pairs(session).pairs.empty());
+}
+
 TEST(RigPairs, CountersWithZerosOrADateBeforeThemAreNoTimes) {
   for (const std::string before : {"0000", "20240601_0"})
     EXPECT_TRUE(find_rig_pairs(named_session("", "_v", "_t", before, 1)).pairs.empty()) << before;
