@@ -8,9 +8,9 @@ namespace orbitfuse::planning {
 using nlohmann::json;
 
 bool Choices::made_for(const std::string& stage) const {
-  if (stage == "depth") return depth_width_px.has_value();
   if (stage == "train_visible") return visible_s.has_value();
   if (stage == "train_thermal") return thermal_s.has_value();
+  if (stage == "render") return detail_sources.has_value();
   return stage == "metrics" && scored_views.has_value();
 }
 
@@ -20,9 +20,9 @@ void apply(const Choices& choices, stages::RunConfig& config) {
     options.budget_s = *time_s;
     options.iterations = stages::unlimited_steps;
   };
-  if (choices.depth_width_px) config.depth.width_px = *choices.depth_width_px;
   limit(choices.visible_s, config.train_visible.options);
   limit(choices.thermal_s, config.train_thermal.options);
+  if (choices.detail_sources) config.render.detail.sources = *choices.detail_sources;
   if (choices.scored_views) config.metrics.scored_views = *choices.scored_views;
 }
 
@@ -31,9 +31,9 @@ json to_json(const Choices& choices) {
   const auto add = [&](const char* key, const auto& choice) {
     if (choice) values[key] = *choice;
   };
-  add("depth.width_px", choices.depth_width_px);
   add("train.visible.budget_s", choices.visible_s);
   add("train.thermal.budget_s", choices.thermal_s);
+  add("render.detail_sources", choices.detail_sources);
   add("metrics.scored_views", choices.scored_views);
   return values;
 }
@@ -49,9 +49,9 @@ Choices choices_of(const json& values) {
     const bool fits = value && *value >= 0 && *value <= 1e6;  // and isn't NaN
     return fits ? std::optional(static_cast<int>(*value)) : std::nullopt;
   };
-  choices.depth_width_px = whole("depth.width_px");
   choices.visible_s = number("train.visible.budget_s");
   choices.thermal_s = number("train.thermal.budget_s");
+  choices.detail_sources = whole("render.detail_sources");
   choices.scored_views = whole("metrics.scored_views");
   stages::RunConfig tried;
   apply(choices, tried);

@@ -11,8 +11,8 @@ namespace orbitfuse::planning {
 
 /// What a planner has settled of a run, one choice a stage; absent: not yet, or the user's.
 struct Choices {
-  std::optional<int> depth_width_px = {};                ///< depth
   std::optional<double> visible_s = {}, thermal_s = {};  ///< train_visible, train_thermal
+  std::optional<int> detail_sources = {};                ///< render
   std::optional<int> scored_views = {};                  ///< metrics
 
   bool made_for(const std::string& stage) const;
@@ -26,9 +26,9 @@ nlohmann::json to_json(const Choices& choices);
 Choices choices_of(const nlohmann::json& values);
 
 /// Keys of the configuration that a plan may set.
-inline constexpr const char* planned_keys[] = {"depth.width_px",         "train.visible.iterations",
-                                               "train.visible.budget_s", "train.thermal.iterations",
-                                               "train.thermal.budget_s", "metrics.scored_views"};
+inline constexpr const char* planned_keys[] = {"train.visible.iterations", "train.visible.budget_s",
+                                               "train.thermal.iterations", "train.thermal.budget_s",
+                                               "render.detail_sources",    "metrics.scored_views"};
 
 /// Their values, by key.
 nlohmann::json planned_values(stages::RunConfig& config);

@@ -33,12 +33,13 @@ constexpr Point visible_gain_db[] = {{1200, -2.35}, {2400, -1.02}, {4800, 0},
 constexpr Point thermal_log_error[] = {{600, 0.31}, {1200, 0.11}, {2400, 0}, {3000, -0.01}};
 /// What a weaker visible field costs the thermal one: its geometry, and the poses found with it.
 constexpr Point thermal_log_error_of_guide[] = {{1200, 0.13}, {4800, 0}};
-constexpr double coarse_depth_db = -0.19, coarse_depth_log_k = 0.07;
+/// New views without the recorded ones' detail, which fields' own errors don't have: means of seven
+/// scenes (docs/benchmarks/nerf_detail.md).
+constexpr double no_detail_db = -1.38, no_detail_log_k = 0.13;
 
-// Thermal views may lose their places by either (`car`: two of 24): a risk, which a plan keeps away
-// from while anything else fits, but no error to expect. Log errors as above, chosen, not measured.
+// Thermal views may lose their places by it: a risk, which a plan keeps away from while anything
+// else fits, but no error to expect. Log errors as above, chosen, not measured.
 constexpr Point risk_of_weak_guide[] = {{1200, 0.12}, {2400, 0.05}, {4800, 0}};
-constexpr double risk_of_coarse_depth = 0.18;
 
 /// A little beyond what is known of the scenes it was fitted to, 24.6 to 29.5.
 constexpr double least_smooth_db = 23, most_smooth_db = 33;
@@ -48,24 +49,16 @@ constexpr double usual_mae_k = 1.05, mae_spread_k = 0.35;
 
 double log_k(const SceneFacts& facts, const Effort& effort) {
   double value = at(thermal_log_error, effort.thermal_steps);
-  if (facts.visible_views > 0) {
-    value += at(thermal_log_error_of_guide, effort.visible_steps);
-    if (effort.depth_width_px < 400) value += coarse_depth_log_k;
-  }
+  if (facts.visible_views > 0) value += at(thermal_log_error_of_guide, effort.visible_steps);
   return value;
 }
 
 double risk(const SceneFacts& facts, const Effort& effort) {
   if (facts.visible_views == 0 || facts.thermal_views == 0) return 0;
-  return at(risk_of_weak_guide, effort.visible_steps) +
-         (effort.depth_width_px < 400 ? risk_of_coarse_depth : 0);
+  return at(risk_of_weak_guide, effort.visible_steps);
 }
 
-double gain_db(const Effort& effort) {
-  double value = at(visible_gain_db, effort.visible_steps);
-  if (effort.depth_width_px < 400) value += coarse_depth_db;
-  return value;
-}
+double gain_db(const Effort& effort) { return at(visible_gain_db, effort.visible_steps); }
 
 }  // namespace
 
@@ -80,8 +73,10 @@ ExpectedErrors expected_errors(const SceneFacts& facts, const Effort& effort) {
 }
 
 double loss(const SceneFacts& facts, const Effort& effort) {
-  const double visible = -gain_db(effort) / 20 * std::log(10.0),
-               thermal = log_k(facts, effort) + risk(facts, effort);
+  const bool detailed = effort.detail || facts.detail_sources == 0;
+  const double lent_db = detailed ? 0 : no_detail_db, lent_log_k = detailed ? 0 : no_detail_log_k;
+  const double visible = -(gain_db(effort) + lent_db) / 20 * std::log(10.0),
+               thermal = log_k(facts, effort) + lent_log_k + risk(facts, effort);
   const double fields = facts.visible_views == 0   ? thermal
                         : facts.thermal_views == 0 ? visible
                                                    : (visible + thermal) / 2;

@@ -23,9 +23,9 @@ double seconds(const SceneFacts& facts, const std::vector<std::string>& stages, 
   return slowness * sum;
 }
 
-template <class List>
-std::vector<int> choices(const std::optional<int>& settled, const List& all) {
-  return settled ? std::vector<int>{*settled} : std::vector<int>(all);
+template <class Value>
+std::vector<Value> choices(const std::optional<Value>& settled, const std::vector<Value>& all) {
+  return settled ? std::vector<Value>{*settled} : all;
 }
 
 /// Steps that `time_s` pays for, within what makes sense.
@@ -99,20 +99,19 @@ struct Search {
 Plan make_plan(const SceneFacts& facts, const std::vector<std::string>& stages,
                const Settled& settled, double slowness, double available_s) {
   Effort least = least_effort;
-  least.depth_width_px = settled.depth_width_px.value_or(least.depth_width_px);
   least.visible_steps = settled.visible_steps.value_or(least.visible_steps);
   least.thermal_steps = settled.thermal_steps.value_or(least.thermal_steps);
+  least.detail = settled.detail.value_or(least.detail);
   least.scored_views = settled.scored_views.value_or(least.scored_views);
 
   Search search{facts, stages, settled, slowness, available_s, {}};
   const Effort usual;
   Effort effort = least;
-  using Widths = std::initializer_list<int>;
   for (const int scored :
-       choices(settled.scored_views, Widths{usual.scored_views, least.scored_views}))
-    for (const int depth : choices(settled.depth_width_px, Widths{400, 280})) {
+       choices(settled.scored_views, {usual.scored_views, least_effort.scored_views}))
+    for (const bool detail : choices(settled.detail, {true, false})) {
       effort.scored_views = scored;
-      effort.depth_width_px = depth;
+      effort.detail = detail;
       search.divide(effort);
     }
   if (!std::isfinite(search.best_loss)) {

@@ -12,7 +12,8 @@ namespace orbitfuse::planning {
 
 /// What of an effort is settled: by the user, or because its stage is over. Absent: free.
 struct Settled {
-  std::optional<int> depth_width_px = {}, visible_steps = {}, thermal_steps = {}, scored_views = {};
+  std::optional<int> visible_steps = {}, thermal_steps = {}, scored_views = {};
+  std::optional<bool> detail = {};
 };
 
 /// The choice for the stages still to come.

@@ -15,7 +15,7 @@ using nlohmann::json;
 using pipeline::StageState;
 using pipeline::StageStatus;
 
-constexpr int schema = 2;
+constexpr int schema = 3;
 /// The measured slowness counts like so many seconds of finished stages.
 constexpr double probe_weight_s = 6;
 /// Kept back for what no stage's figure has: a slow disk, a busy neighbour.
@@ -29,9 +29,9 @@ const StageStatus* find(const std::vector<StageStatus>& finished, const std::str
 }
 
 json to_json(const Plan& plan) {
-  return {{"depth_width_px", plan.effort.depth_width_px},
-          {"visible_steps", plan.effort.visible_steps},
+  return {{"visible_steps", plan.effort.visible_steps},
           {"thermal_steps", plan.effort.thermal_steps},
+          {"detail", plan.effort.detail},
           {"scored_views", plan.effort.scored_views},
           {"expected_s", plan.expected_s},
           {"fits", plan.fits},
@@ -41,9 +41,9 @@ json to_json(const Plan& plan) {
 std::optional<Plan> plan_of(const json& values) {
   try {
     Plan plan;
-    values.at("depth_width_px").get_to(plan.effort.depth_width_px);
     values.at("visible_steps").get_to(plan.effort.visible_steps);
     values.at("thermal_steps").get_to(plan.effort.thermal_steps);
+    values.at("detail").get_to(plan.effort.detail);
     values.at("scored_views").get_to(plan.effort.scored_views);
     values.at("expected_s").get_to(plan.expected_s);
     values.at("fits").get_to(plan.fits);
@@ -100,9 +100,9 @@ void RunPlanner::settle_what_the_user_set() {
     const double in_time = options.budget_s > 0 ? options.budget_s / (step_s * slowness_) : 1e9;
     return static_cast<int>(std::min<double>(options.iterations, in_time));
   };
-  if (users_.contains("depth.width_px")) settled_.depth_width_px = config_.depth.width_px;
   settled_.visible_steps = steps("train.visible", config_.train_visible.options, visible_step_s());
   settled_.thermal_steps = steps("train.thermal", config_.train_thermal.options, thermal_step_s());
+  if (users_.contains("render.detail_sources")) settled_.detail = true;
   if (users_.contains("metrics.scored_views")) settled_.scored_views = config_.metrics.scored_views;
 }
 
@@ -126,7 +126,7 @@ double RunPlanner::slowness_after(const std::vector<StageStatus>& finished) cons
   for (const char* stage : {"depth", "render"})
     if (const StageStatus* status = ran(stage)) {
       Effort done;
-      done.depth_width_px = config_.depth.width_px;
+      done.detail = settled_.detail.value_or(done.detail);
       done.visible_steps = settled_.visible_steps.value_or(done.visible_steps);
       expected_s += stage_s(stage, input_.facts, done);
       took_s += status->wall_s;
@@ -149,11 +149,12 @@ void RunPlanner::choose(const std::string& stage, const Effort& effort) {
   const auto time_s = [&](int steps, double step_s) {
     return std::max(0.01, std::round(100 * steps * step_s * slowness_) / 100);
   };
-  if (stage == "depth" && !settled_.depth_width_px) choices_.depth_width_px = effort.depth_width_px;
   if (stage == "train_visible" && !settled_.visible_steps)
     choices_.visible_s = time_s(effort.visible_steps, visible_step_s());
   if (stage == "train_thermal" && !settled_.thermal_steps)
     choices_.thermal_s = time_s(effort.thermal_steps, thermal_step_s());
+  if (stage == "render" && !settled_.detail)
+    choices_.detail_sources = effort.detail ? config_.render.detail.sources : 0;
   if (stage == "metrics" && !settled_.scored_views) choices_.scored_views = effort.scored_views;
 }
 
@@ -173,7 +174,7 @@ std::string RunPlanner::decide(const std::string& stage, const std::vector<Stage
   }
   apply(choices_, config_);
   // What is decided is settled for the stages behind it.
-  if (choices_.depth_width_px) settled_.depth_width_px = choices_.depth_width_px;
+  if (choices_.detail_sources) settled_.detail = *choices_.detail_sources > 0;
   const auto steps = [&](double time_s, double step_s) {
     return static_cast<int>(time_s / (step_s * slowness_));
   };
@@ -190,12 +191,12 @@ std::string RunPlanner::described() const {
     parts.push_back(
         fmt::format("{} field {:.0f} s ({} steps)", name, steps * step_s * input_.slowness, steps));
   };
-  if (comes("depth") && facts.visible_views > 1)
-    parts.push_back(fmt::format("depth at {} px", effort.depth_width_px));
   const bool visible = comes("train_visible") && facts.visible_views > 0,
              thermal = comes("train_thermal") && facts.thermal_views > 0;
   if (visible) field("visible", effort.visible_steps, visible_step_s());
   if (thermal) field("thermal", effort.thermal_steps, thermal_step_s());
+  if (comes("render") && facts.detail_sources > 0 && !effort.detail)
+    parts.emplace_back("new views without the recorded frames' detail");
   if (comes("metrics") && effort.scored_views > 0 && effort.scored_views < facts.new_views)
     parts.push_back(
         fmt::format("fusion scored on {} of {} views", effort.scored_views, facts.new_views));

@@ -72,6 +72,7 @@ nlohmann::json to_json(const SceneFacts& facts) {
           {"thermal_measured", facts.thermal_measured},
           {"visible_height_by_width", facts.visible_height_by_width},
           {"thermal_height_by_width", facts.thermal_height_by_width},
+          {"depth_width_px", facts.depth_width_px},
           {"new_views", facts.new_views},
           {"new_view_mpx", facts.new_view_mpx},
           {"detail_sources", facts.detail_sources},
@@ -89,6 +90,7 @@ Result<SceneFacts> look_at(const stages::SessionInput& input, const stages::RunC
   facts.thermal_posed = config.poses.use_known_poses && all_posed(thermal);
   facts.visible_height_by_width = height_by_width(photos, facts.visible_height_by_width);
   facts.thermal_height_by_width = height_by_width(thermal, facts.thermal_height_by_width);
+  facts.depth_width_px = config.depth.width_px;
   facts.visible_measured =
       facts.visible_views > 0 && config.train_visible.options.holdout_every > 0;
   facts.thermal_measured = facts.thermal_views > 0 && input.has_temperatures() &&

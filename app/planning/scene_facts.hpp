@@ -15,6 +15,7 @@ struct SceneFacts {
   /// Frames are held out, of the thermal ones their temperatures.
   bool visible_measured = true, thermal_measured = true;
   double visible_height_by_width = 0.75, thermal_height_by_width = 0.8;
+  int depth_width_px = 280;  ///< of the visible views' depth maps
   int new_views = 8;
   double new_view_mpx = 0.3;  ///< mean
   int detail_sources = 4;     ///< recorded views that lend a new one detail

@@ -12,21 +12,22 @@ namespace orbitfuse::planning {
 namespace {
 
 // Seconds on two cores of an Intel Xeon (Sapphire Rapids), from the traces of whole runs
-// (`run --trace`, docs/notes/planner.md).
+// (`run --trace`, docs/notes/planner.md); poses, new views and scores from eight scenes on an AMD
+// EPYC, 2026-11-27, by its slowness of 1.26.
 constexpr double start_s = 0.3, known_poses_s = 0.5;
-constexpr double visible_pose_s = 0.3;  // a view: features of 800 pixels, matching, mapping
-/// A view: search, renders, temperatures. 0.9 to 1.4 by scene; what is wrong is made good later, by
-/// the thermal training and the scores.
-constexpr double thermal_pose_s = 1.15;
+constexpr double visible_pose_s = 0.5;  // a view: features, matching, mapping; 0.3 to 0.9 by scene
+/// A view: search, renders, temperatures. 0.8 to 1.05 by scene; what is wrong is made good later,
+/// by the thermal training and the scores.
+constexpr double thermal_pose_s = 0.95;
 constexpr double depth_view_s = 0.62;  // of 400 x 300 pixels
 constexpr double visible_step = 2.85e-3, thermal_step = 3.5e-3;
 constexpr double visible_view_s = 0.12;  // its image, its exposure, its part of the cloud
 constexpr double thermal_view_s = 0.06;
 constexpr double visible_checks_s = 0.5, thermal_checks_s = 1.1;  // of held-out views
-constexpr double new_view_mpx_s = 3.35;                           // both fields
-constexpr double lent_view_s = 0.17;   // a recorded view that lends detail
+constexpr double new_view_mpx_s = 3.0;                            // both fields
+constexpr double lent_view_s = 0.14;   // a recorded view that lends detail
 constexpr double fused_mpx_s = 0.115;  // a method
-constexpr double scored_mpx_s = 0.4, heldout_view_s = 0.25;
+constexpr double scored_mpx_s = 0.34, heldout_view_s = 0.25;
 constexpr int heldout_every = 12;
 constexpr double report_s = 0.5;
 constexpr double thermal_depth_view_s = 0.19;  // without photos: matched at 260 pixels
@@ -55,7 +56,8 @@ double stage_s(const std::string& stage, const SceneFacts& facts, const Effort& 
   if (stage == "report") return report_s;
   if (stage == "register") return both && facts.visible_posed && facts.thermal_posed ? clouds_s : 0;
   if (stage == "render") {
-    const double asked = (facts.new_views + 1.0 * stages::detail_trials) * facts.detail_sources;
+    const int sources = effort.detail ? facts.detail_sources : 0;
+    const double asked = (facts.new_views + 1.0 * stages::detail_trials) * sources;
     const double lent = std::min(asked, photos) + std::min(asked, thermal);
     return start_s + (facts.new_views * facts.new_view_mpx * new_view_mpx_s * (both ? 1 : 0.5) +
                       lent * lent_view_s) *
@@ -77,7 +79,7 @@ double stage_s(const std::string& stage, const SceneFacts& facts, const Effort& 
       return facts.visible_posed ? known_poses_s : start_s + photos * visible_pose_s;
     if (stage == "depth")
       return start_s + photos * depth_view_s * facts.visible_height_by_width / 0.75 *
-                           std::pow(effort.depth_width_px / 400.0, depth_power);
+                           std::pow(facts.depth_width_px / 400.0, depth_power);
     if (stage == "train_visible")
       return start_s + photos * visible_view_s + visible_checks_s +
              effort.visible_steps * visible_step;

@@ -9,8 +9,9 @@ namespace orbitfuse::depth {
 
 struct DepthOptions {
   /// Width of the depth maps (4:3; other formats get as many pixels). Geometry is smoother than
-  /// texture: beyond this it costs more than it gives.
-  int width_px = 400;
+  /// texture: 400 pixels cost twice the time, and fields and thermal poses are no better for it
+  /// (docs/notes/planner.md).
+  int width_px = 280;
   int neighbours = 5;  ///< views each view is matched with
   /// Of these, the best so many count: the others may be occluded. Orbits of 30 degrees rarely show
   /// a surface well in more.

@@ -90,12 +90,12 @@ TEST_F(Run, ABudgetIsPlannedSpentAndTold) {
   };
   const Outcome tried = planned({"--budget", "12s", "--dry-run"});
   ASSERT_EQ(tried.code, 0) << tried.err;
-  EXPECT_THAT(tried.err, HasSubstr("plan for 12 s: depth at "));
+  EXPECT_THAT(tried.err, HasSubstr("plan for 12 s: visible field "));
   EXPECT_FALSE(fs::exists(out)) << "nothing is written";
 
   const Outcome first = planned({"--budget", "12s"});
   ASSERT_EQ(first.code, 0) << first.err;
-  EXPECT_THAT(first.err, HasSubstr("plan for 12 s: depth at "));
+  EXPECT_THAT(first.err, HasSubstr("plan for 12 s: visible field "));
   EXPECT_NE(read_file(out / "report/report.html")->find("Plan and outcome"), std::string::npos);
   const json plan = json::parse(*read_file(out / "plan.json"));
   const auto option = [&](const char* stage, const char* key) {
@@ -103,7 +103,7 @@ TEST_F(Run, ABudgetIsPlannedSpentAndTold) {
   };
   EXPECT_EQ(option("train_visible", "budget_s"), plan["choices"]["train.visible.budget_s"]);
   EXPECT_GT(option("train_visible", "budget_s"), 0);
-  EXPECT_EQ(option("depth", "width_px"), plan["choices"]["depth.width_px"]);
+  EXPECT_EQ(option("metrics", "scored_views"), plan["choices"]["metrics.scored_views"]);
   // Whole runs of other options are no part of this plan; the same budget is.
   const Outcome again = planned({"--budget", "12s", "--json"});
   ASSERT_EQ(again.code, 0) << again.err;
@@ -118,18 +118,20 @@ TEST_F(Run, ABudgetIsPlannedSpentAndTold) {
     EXPECT_EQ(state, stage == "report" ? "ran" : "unchanged") << stage;
   // What is damaged there is named there.
   json record = json::parse(*read_file(out / "run.json"));
-  record["planned"]["users"]["depth.width_px"] = "wide";
+  record["planned"]["users"]["metrics.scored_views"] = "many";
   fs::create_directories(temp.path() / "damaged");
   std::ofstream(temp.path() / "damaged/run.json") << record;
   const Outcome damaged_users =
       orbitfuse_program({"run", (temp.path() / "damaged").string(), "--dry-run"});
   EXPECT_EQ(damaged_users.code, 3);
-  EXPECT_THAT(damaged_users.err, HasSubstr("damaged/run.json: depth.width_px = \"wide\""));
+  EXPECT_THAT(damaged_users.err, HasSubstr("damaged/run.json: metrics.scored_views = \"many\""));
   const Outcome longer = orbitfuse_program({"run", out.string(), "--budget", "14s", "--dry-run"});
-  EXPECT_THAT(longer.err, HasSubstr("plan for 14 s: depth at ")) << "another, not the one before";
+  EXPECT_THAT(longer.err, HasSubstr("plan for 14 s: visible field "))
+      << "another, not the one before";
   // What the user gives stays, though the earlier plan had another choice.
-  const Outcome given = planned({"--budget", "12s", "--dry-run", "--set", "depth.width_px=320"});
-  EXPECT_THAT(given.err, HasSubstr("plan for 12 s: depth at 320 px"));
+  const Outcome given =
+      planned({"--budget", "12s", "--dry-run", "--set", "train.visible.iterations=777"});
+  EXPECT_THAT(given.err, HasSubstr("(777 steps)"));
 
   const Outcome other_recipe =
       planned({"--budget", "12s", "--dry-run", "--set", "train.visible.preset=nerfacto"});

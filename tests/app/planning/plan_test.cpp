@@ -27,13 +27,16 @@ double needed_s(const SceneFacts& facts, const Effort& effort) {
 TEST(StageCosts, MoreOfAnythingTakesLonger) {
   const SceneFacts facts = usual_orbit();
   const double usual = needed_s(facts, {});
-  for (const Effort& more : {Effort{.depth_width_px = 500}, Effort{.visible_steps = 6000},
-                             Effort{.thermal_steps = 3000}})
+  for (const Effort& more : {Effort{.visible_steps = 6000}, Effort{.thermal_steps = 3000}})
     EXPECT_GT(needed_s(facts, more), usual);
   EXPECT_LT(needed_s(facts, {.scored_views = 2}), usual);
+  EXPECT_LT(needed_s(facts, {.detail = false}), usual);
   SceneFacts larger = facts;
   larger.visible_views = 40;
   EXPECT_GT(needed_s(larger, {}), usual);
+  SceneFacts finer = facts;
+  finer.depth_width_px = 400;
+  EXPECT_GT(needed_s(finer, {}), usual);
   larger.visible_posed = larger.thermal_posed = true;
   EXPECT_LT(needed_s(larger, {}), usual) << "poses that are known cost nothing";
 }
@@ -110,7 +113,6 @@ TEST(Plan, TooLittleTimeIsSaidAndGetsWhatEndsSoonest) {
     const Plan plan = make_plan(facts, stages::stage_names(), {}, 1, available_s);
     EXPECT_FALSE(plan.fits);
     EXPECT_EQ(plan.effort.thermal_steps, least_effort.thermal_steps);
-    EXPECT_EQ(plan.effort.depth_width_px, least_effort.depth_width_px);
     Effort other = least_effort;
     for (other.visible_steps = least_effort.visible_steps; other.visible_steps < 10'000;
          other.visible_steps += 100)
@@ -136,11 +138,32 @@ TEST(Plan, EndlessTimeIsNotSpent) {
   EXPECT_LT(plan.expected_s, 1000);
 }
 
+TEST(Plan, DetailGoesWhereTimeIsShortAndComesBackWithIt) {
+  const SceneFacts facts = usual_orbit();
+  const double least_s = make_plan(facts, stages::stage_names(), {}, 1, 0).expected_s;
+  const Plan tight = make_plan(facts, stages::stage_names(), {}, 1, least_s + 1);
+  EXPECT_TRUE(tight.fits);
+  EXPECT_FALSE(tight.effort.detail);
+  EXPECT_TRUE(make_plan(facts, stages::stage_names(), {}, 1, needed_s(facts, {})).effort.detail);
+  const Plan kept = make_plan(facts, stages::stage_names(), {.detail = true}, 1, 0);
+  EXPECT_TRUE(kept.effort.detail);
+  EXPECT_GT(kept.expected_s, least_s);
+}
+
+TEST(ErrorCurves, WhereNoFrameLendsDetailNoneIsMissed) {
+  SceneFacts facts = usual_orbit();
+  EXPECT_GT(loss(facts, {.detail = false}), loss(facts, {}));
+  EXPECT_DOUBLE_EQ(expected_errors(facts, {.detail = false}).thermal_mae_k,
+                   expected_errors(facts, {}).thermal_mae_k)
+      << "what is told is the fields'";
+  facts.detail_sources = 0;
+  EXPECT_DOUBLE_EQ(loss(facts, {.detail = false}), loss(facts, {}));
+}
+
 TEST(Plan, WhatIsSettledStays) {
-  const Settled settled{.depth_width_px = 300, .visible_steps = 1234, .scored_views = 0};
+  const Settled settled{.visible_steps = 1234, .scored_views = 0};
   for (const double available_s : {20.0, 120.0, 300.0}) {
     const Plan plan = make_plan(usual_orbit(), stages::stage_names(), settled, 1, available_s);
-    EXPECT_EQ(plan.effort.depth_width_px, 300);
     EXPECT_EQ(plan.effort.visible_steps, 1234);
     EXPECT_EQ(plan.effort.scored_views, 0);
   }

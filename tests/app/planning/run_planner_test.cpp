@@ -139,9 +139,9 @@ TEST_F(RunPlannerTest, AnExtendedTrainingTellsTheMachineByItsSteps) {
 }
 
 TEST_F(RunPlannerTest, WhatTheUserSetStays) {
-  config.depth.width_px = 320;
   config.train_visible.options.iterations = 1000;
   config.train_thermal.options.budget_s = 30;
+  config.render.detail.sources = 3;
   config.metrics.scored_views = 5;
   const json before = settings();
   RunPlanner by = planner(60);
@@ -151,7 +151,7 @@ TEST_F(RunPlannerTest, WhatTheUserSetStays) {
 
 TEST_F(RunPlannerTest, WhatTheUserGaveStaysThoughItIsTheDefault) {
   PlannerInput with = input(60);
-  with.given = {"depth.width_px", "train.visible.iterations", "train.thermal.iterations",
+  with.given = {"train.visible.iterations", "train.thermal.iterations", "render.detail_sources",
                 "metrics.scored_views"};
   const json before = settings();
   RunPlanner by = planner(std::move(with));
@@ -191,8 +191,8 @@ TEST_F(RunPlannerTest, WhatAPlanDependsOnMakesAnother) {
   EXPECT_FALSE(follows([](PlannerInput& with) { with.afresh = true; }));
   EXPECT_FALSE(follows([](PlannerInput& with) { with.facts.new_views = 200; }));
   EXPECT_FALSE(follows([](PlannerInput& with) { with.stages.pop_back(); }));
-  EXPECT_FALSE(follows([](PlannerInput& with) { with.given = {"depth.width_px"}; }));
-  EXPECT_FALSE(follows([&](PlannerInput&) { config.depth.width_px = 320; }));
+  EXPECT_FALSE(follows([](PlannerInput& with) { with.given = {"metrics.scored_views"}; }));
+  EXPECT_FALSE(follows([&](PlannerInput&) { config.render.detail.sources = 2; }));
 }
 
 TEST_F(RunPlannerTest, ADamagedPlanIsNoPlan) {
@@ -202,10 +202,11 @@ TEST_F(RunPlannerTest, ADamagedPlanIsNoPlan) {
   }
   const json good = parse_json(*read_file(temp / plan_file));
   std::vector<std::string> texts = {"", "{", "[]", "null", R"({"made_for": 3})"};
-  for (const json& choices : {json(7), json{{"depth.width_px", "x"}}, json{{"depth.width_px", -4}},
-                              json{{"depth.width_px", 1e300}}, json{{"train.visible.budget_s", -3}},
-                              json{{"train.visible.budget_s", {{"a", 1}}}},
-                              json{{"poses.colmap", "/bin/sh"}}, json{{"a~b", 1}}}) {
+  for (const json& choices :
+       {json(7), json{{"metrics.scored_views", "x"}}, json{{"metrics.scored_views", -4}},
+        json{{"metrics.scored_views", 1e300}}, json{{"train.visible.budget_s", -3}},
+        json{{"train.visible.budget_s", {{"a", 1}}}}, json{{"poses.colmap", "/bin/sh"}},
+        json{{"a~b", 1}}}) {
     json bad = good;
     bad["choices"] = choices;
     texts.push_back(bad.dump());
