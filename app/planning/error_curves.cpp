@@ -37,8 +37,8 @@ constexpr Point thermal_log_error_of_guide[] = {{1200, 0.13}, {4800, 0}};
 /// scenes (docs/benchmarks/nerf_detail.md).
 constexpr double no_detail_db = -1.38, no_detail_log_k = 0.13;
 
-// Thermal views may lose their places by it: a risk, which a plan keeps away from while anything
-// else fits, but no error to expect. Log errors as above, chosen, not measured.
+// Thermal views may lose their places in a weak visible field: a risk, which a plan keeps away from
+// while anything else fits, but no error to expect. Log errors as above, chosen, not measured.
 constexpr Point risk_of_weak_guide[] = {{1200, 0.12}, {2400, 0.05}, {4800, 0}};
 
 /// A little beyond what is known of the scenes it was fitted to, 24.6 to 29.5.

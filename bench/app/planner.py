@@ -33,7 +33,7 @@ SWEEP = {
     "visible 19200": ("train_visible", ["train.visible.iterations=19200"]),
     "visible 38400": ("train_visible", ["train.visible.iterations=38400"]),
     "depth 200": ("train_thermal", ["depth.width_px=200"]),
-    "depth 280": ("train_thermal", ["depth.width_px=280"]),
+    "depth 400": ("train_thermal", ["depth.width_px=400"]),
 }
 FIRST_CHANGED = {"thermal": "train_thermal", "visible": "train_visible", "depth": "depth"}
 STAGES = ["poses_visible", "depth", "train_visible", "poses_thermal", "train_thermal", "register",
