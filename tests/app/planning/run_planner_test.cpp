@@ -192,6 +192,7 @@ TEST_F(RunPlannerTest, WhatAPlanDependsOnMakesAnother) {
   EXPECT_FALSE(follows([](PlannerInput& with) { with.facts.new_views = 200; }));
   EXPECT_FALSE(follows([](PlannerInput& with) { with.stages.pop_back(); }));
   EXPECT_FALSE(follows([](PlannerInput& with) { with.given = {"metrics.scored_views"}; }));
+  EXPECT_FALSE(follows([](PlannerInput& with) { with.facts.depth_width_px = 320; }));
   EXPECT_FALSE(follows([&](PlannerInput&) { config.render.detail.sources = 2; }));
 }
 
@@ -204,9 +205,9 @@ TEST_F(RunPlannerTest, ADamagedPlanIsNoPlan) {
   std::vector<std::string> texts = {"", "{", "[]", "null", R"({"made_for": 3})"};
   for (const json& choices :
        {json(7), json{{"metrics.scored_views", "x"}}, json{{"metrics.scored_views", -4}},
-        json{{"metrics.scored_views", 1e300}}, json{{"train.visible.budget_s", -3}},
-        json{{"train.visible.budget_s", {{"a", 1}}}}, json{{"poses.colmap", "/bin/sh"}},
-        json{{"a~b", 1}}}) {
+        json{{"metrics.scored_views", 1e300}}, json{{"render.detail_sources", -1}},
+        json{{"train.visible.budget_s", -3}}, json{{"train.visible.budget_s", {{"a", 1}}}},
+        json{{"poses.colmap", "/bin/sh"}}, json{{"a~b", 1}}}) {
     json bad = good;
     bad["choices"] = choices;
     texts.push_back(bad.dump());
