@@ -132,9 +132,9 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   const bool visible = modality == Modality::visible;
   pipeline::Stage stage;
   stage.name = "poses_" + std::string(name(modality));
-  stage.version = 13;
+  stage.version = 14;
   if (!visible) {
-    stage.version = 17;
+    stage.version = 18;
     stage.uses = {"poses_visible"};
     // Thermal views are aligned with renders of the visible field; known poses need none.
     if (!in.config->poses.use_known_poses || !all_posed(in.session->session))

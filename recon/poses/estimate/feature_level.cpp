@@ -3,6 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "core/image/image_io.hpp"
+
 namespace orbitfuse {
 
 Result<FeatureLevel> FeatureLevel::extract(const Session& session,
@@ -14,6 +18,7 @@ Result<FeatureLevel> FeatureLevel::extract(const Session& session,
   proxies.max_side_px = options.max_image_side_px;
   ColmapOptions engine{options.colmap, options.seed, options.max_features, peak_threshold};
   FeatureLevel level(session, options);
+  level.folder_ = folder / "images";
   ORBITFUSE_ASSIGN(level.images_,
                    write_proxies(session, frames, proxies, folder / "images", progress));
   ORBITFUSE_ASSIGN(level.project_,
@@ -29,6 +34,22 @@ Status FeatureLevel::match(const std::vector<ViewPair>& pairs, const Progress& p
   if (fresh.empty()) return {};
   ORBITFUSE_ASSIGN(counts_, project_.match(images_, fresh, progress));
   return {};
+}
+
+Result<std::vector<cv::Mat>> FeatureLevel::images(const Reconstruction& model) const {
+  std::vector<cv::Mat> images;
+  for (const PosedView& view : model.views) {
+    const auto of_view = std::find_if(images_.begin(), images_.end(), [&](const ProxyImage& image) {
+      return image.frame->file == view.name;
+    });
+    if (of_view == images_.end())
+      return fail(ErrorKind::input, view.name, "a view without features",
+                  "give a model of the frames that features were found in");
+    ORBITFUSE_ASSIGN(const cv::Mat gray, read_image(folder_ / of_view->name));
+    images.emplace_back();
+    gray.convertTo(images.back(), CV_32F);
+  }
+  return images;
 }
 
 std::string FeatureLevel::found() const {

@@ -32,6 +32,9 @@ class FeatureLevel {
     return read_feature_graph(project_.database(), *session_, images_);
   }
 
+  /// What features were found in, of a model's views: CV_32FC1, 0 to 255.
+  Result<std::vector<cv::Mat>> images(const Reconstruction& model) const;
+
   const PoseOptions& options() const { return options_; }
   std::string found() const;  ///< figures, in words
   int pairs() const { return static_cast<int>(matched_.size()); }
@@ -42,6 +45,7 @@ class FeatureLevel {
 
   const Session* session_;
   PoseOptions options_;
+  std::filesystem::path folder_;
   std::vector<ProxyImage> images_;
   ColmapProject project_;
   DatabaseCounts counts_;

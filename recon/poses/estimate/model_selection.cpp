@@ -16,13 +16,15 @@ constexpr double part_of_a_model = 0.5;
 }  // namespace
 
 bool ModelSelection::consider(const std::string& attempt, const std::string& found,
-                              Reconstruction model, FeatureLevel& level, const Better& better) {
+                              Reconstruction model, FeatureLevel& level, const Better& better,
+                              const BundleOptions& bundle) {
   LadderStep step = fallen(attempt, found);
   bool taken = false;
   if (model.views.size() < 2) {
     step.why += "; no model";
   } else {
-    Result<JudgedModel> judged = judge_model(std::move(model), session_, frames_, level.options());
+    Result<JudgedModel> judged =
+        judge_model(std::move(model), session_, frames_, level.options(), bundle);
     const bool contradicted = judged && judged->believed && matches_contradict(level, *judged);
     step.why += "; " + (judged ? judged->why : judged.error().found);
     if (judged) step.posed = static_cast<int>(judged->poses.reconstruction.views.size());

@@ -31,7 +31,8 @@ class ModelSelection {
   /// Judges a model of the level's features and keeps it where it is believed and better than the
   /// best one: true then. The level has to stay where it is.
   bool consider(const std::string& attempt, const std::string& found, Reconstruction model,
-                FeatureLevel& level, const Better& better = more_views);
+                FeatureLevel& level, const Better& better = more_views,
+                const BundleOptions& bundle = {});
   /// An attempt that made no model.
   void note_fallen(const std::string& attempt, const std::string& why);
 

@@ -14,6 +14,7 @@
 #include "recon/poses/estimate/weakest_joint.hpp"
 #include "recon/poses/estimate/weakly_held.hpp"
 #include "recon/poses/global_sfm/global_mapper.hpp"
+#include "recon/poses/patches/aligned_tracks.hpp"
 #include "recon/poses/sfm/held_matches.hpp"
 #include "recon/poses/sfm/resection.hpp"
 #include "recon/poses/sfm/sfm_ladder.hpp"
@@ -44,6 +45,15 @@ constexpr double still_explained = 0.98;
 /// Of the observations before, what makes it worth an adjustment: `van` gains with 1.19 of them,
 /// `transformer` lost with 0.68.
 constexpr double more_observations = 1.1;
+
+/// From here on alignment gave nothing for its time: `fox`, 1256 a view, .037 and .042 % without
+/// and with it, 85 s; `hut`, 832 a view, .029 and .005.
+constexpr double enough_a_view = 1000;
+/// Of the observations, what must be aligned: `transformer` (.55) went from .052 to .013 % of the
+/// extent, `pump_yard` (.31) from .068 to .120.
+constexpr double least_aligned = 0.5;
+/// Patches lie within a tenth of a pixel, descriptors' centres within a half.
+const BundleOptions aligned_bundle{.loss_scale_px = 0.3, .max_error_px = 1.5};
 
 constexpr const char* featureless_why =
     "shows nothing to match (blank, out of focus or overexposed?)";
@@ -91,10 +101,14 @@ class VisibleLadder {
     if (!selection_.has_best()) ORBITFUSE_TRY(try_mapper(*quick, quick_name_));
     if (!complete()) ORBITFUSE_TRY(improve(*quick, all_are_few));
     if (selection_.has_best()) ORBITFUSE_TRY(spared(try_joining()));
-    if (selection_.has_best()) ORBITFUSE_TRY(spared(try_rematching()));
-    if (selection_.has_best() && !complete() && rematched_)
-      ORBITFUSE_TRY(
-          spared(try_resection(selection_.best_level(), "resection on points matched again")));
+    if (selection_.has_best() && !complete()) {
+      ORBITFUSE_TRY(spared(try_rematching()));
+      if (rematched_)
+        ORBITFUSE_TRY(
+            spared(try_resection(selection_.best_level(), "resection on points matched again")));
+    }
+    if (selection_.has_best()) ORBITFUSE_TRY(spared(try_alignment()));
+    if (selection_.has_best() && !aligned_) ORBITFUSE_TRY(spared(try_rematching()));
     return answer(quick->pairs());
   }
 
@@ -268,27 +282,66 @@ class VisibleLadder {
 
   /// The best model on the matches along its own epipolar lines, where it has few.
   Status try_rematching() {
-    const Reconstruction& best = selection_.best();
-    const double seen = observations_a_view(best);
-    if (seen > plenty_a_view) return {};
     const std::string attempt = "matched again along epipolar lines";
     tell(3, attempt);
     ORBITFUSE_ASSIGN(const FeatureGraph graph, selection_.best_level().graph());
-    Reconstruction again = rematched(graph, best);
+    std::string found;
+    std::optional<Reconstruction> again = matched_again(graph, found);
     ORBITFUSE_TRY(progress_.check("poses.visible"));
-    const std::string found =
-        fmt::format("{:.0f} observations a view for {:.0f}", observations_a_view(again), seen);
-    if (observations_a_view(again) < more_observations * seen) {
-      selection_.note_fallen(attempt, found + "; too little to adjust it for");
-      return {};
-    }
-    const Better no_worse = [&](const Reconstruction& model, const Reconstruction& before) {
+    if (again)
+      rematched_ = selection_.consider(attempt, found, std::move(*again), selection_.best_level(),
+                                       explains_as_much(graph));
+    else if (!found.empty())
+      selection_.note_fallen(attempt, found);
+    return {};
+  }
+
+  /// With the points along its own epipolar lines, where that makes many more of few; not adjusted.
+  std::optional<Reconstruction> matched_again(const FeatureGraph& graph, std::string& found) const {
+    const double seen = observations_a_view(selection_.best());
+    if (rematched_ || seen > plenty_a_view) return {};
+    Reconstruction again = rematched(graph, selection_.best());
+    found = fmt::format("{:.0f} observations a view for {:.0f}", observations_a_view(again), seen);
+    if (observations_a_view(again) >= more_observations * seen) return again;
+    found += "; too little to take them";
+    return {};
+  }
+
+  /// As many views, on as good as all of the matches.
+  static Better explains_as_much(const FeatureGraph& graph) {
+    return [&graph](const Reconstruction& model, const Reconstruction& before) {
       return model.views.size() >= before.views.size() &&
              explained_matches(graph, posed_frames(graph, model)) >=
                  still_explained * explained_matches(graph, posed_frames(graph, before));
     };
-    rematched_ =
-        selection_.consider(attempt, found, std::move(again), selection_.best_level(), no_worse);
+  }
+
+  /// The best model on observations that the images themselves place, where that is most of them.
+  Status try_alignment() {
+    const std::string attempt = "patches aligned";
+    tell(3, attempt);
+    if (const double seen = observations_a_view(selection_.best()); seen > enough_a_view) {
+      selection_.note_fallen(attempt, fmt::format("{:.0f} observations a view are enough", seen));
+      return {};
+    }
+    FeatureLevel& level = selection_.best_level();
+    ORBITFUSE_ASSIGN(const FeatureGraph graph, level.graph());
+    std::string found;
+    const std::optional<Reconstruction> again = matched_again(graph, found);
+    const Reconstruction& start = again ? *again : selection_.best();
+    ORBITFUSE_ASSIGN(const std::vector<cv::Mat> images, level.images(start));
+    TrackAlignment aligned = align_tracks(start, images, {});
+    ORBITFUSE_TRY(progress_.check("poses.visible"));
+    found += fmt::format("{}{} moved by {:.2f} px, {} left out, {} more found",
+                         found.empty() ? "" : "; ", aligned.aligned, aligned.rms_shift_px,
+                         aligned.left_out, aligned.added);
+    if (aligned.aligned < least_aligned * (aligned.aligned + aligned.left_out)) {
+      selection_.note_fallen(attempt, found + "; too few to hold the views by them");
+      return {};
+    }
+    aligned_ = selection_.consider(again ? "matched again, " + attempt : attempt, found,
+                                   std::move(aligned.model), level, explains_as_much(graph),
+                                   aligned_bundle);
     return {};
   }
 
@@ -382,6 +435,7 @@ class VisibleLadder {
   const int total_;
   std::string quick_name_ = "orbit pairs";
   std::set<std::string> featureless_;
+  bool aligned_ = false;    ///< the best model's observations are placed by the images
   bool rematched_ = false;  ///< the best model's points are those along its epipolar lines
   bool limited_ = false;    ///< images were reduced or features cut off: full settings find others
   std::optional<FeatureLevel> full_;

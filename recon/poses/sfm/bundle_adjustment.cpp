@@ -174,13 +174,13 @@ class Problem {
     fix_gauge();
   }
 
-  ceres::Solver::Summary solve() {
+  ceres::Solver::Summary solve(double function_tolerance) {
     ceres::Solver::Options solver;
     solver.linear_solver_type =
         model_.views.size() > 200 ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;
     solver.num_threads = 1;  // more sum in any order; these problems are small
     solver.max_num_iterations = options_.max_iterations;
-    solver.function_tolerance = 1e-8;
+    solver.function_tolerance = function_tolerance;
     solver.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;
     ceres::Solve(solver, &problem_, &summary);
@@ -343,12 +343,17 @@ Result<BundleReport> adjust_bundle(Reconstruction& model, const std::vector<int>
 
   // The start may be far off (a focal wrong by 30 %), so the first passes keep wide misses: the
   // robust loss deals with them, and only what still misses at the end is an outlier.
-  const std::array<double, 3> keep_px = {1e3, 8 * options.max_error_px, options.max_error_px};
-  for (const double max_error_px : keep_px) {
+  // What one pass leaves to do the next one does.
+  struct Pass {
+    double max_error_px, function_tolerance;
+  };
+  const std::array<Pass, 3> passes = {
+      {{1e3, 1e-5}, {8 * options.max_error_px, 1e-5}, {options.max_error_px, 1e-8}}};
+  for (const auto& [max_error_px, function_tolerance] : passes) {
     report.outliers += prune(work, groups, options, max_error_px, report.dropped_views);
     ORBITFUSE_TRY(check_support(work, report.dropped_views));
     Problem problem(work, groups, lenses, options, work.points.size());
-    const ceres::Solver::Summary summary = problem.solve();
+    const ceres::Solver::Summary summary = problem.solve(function_tolerance);
     if (!summary.IsSolutionUsable())
       return fail(ErrorKind::quality, "bundle adjustment", summary.message,
                   "the views contradict each other; see the dropped views and match settings");

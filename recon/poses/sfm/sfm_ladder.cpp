@@ -118,7 +118,7 @@ Reconstruction without(const Reconstruction& model, const std::vector<std::strin
 
 /// Views folded onto another side of a near-symmetric scene leave a model, and are named.
 Status drop_folded(const Session& session, const std::vector<const FrameRecord*>& frames,
-                   const PoseOptions& options, ModalityPoses& poses) {
+                   const PoseOptions& options, const BundleOptions& bundle, ModalityPoses& poses) {
   const std::size_t all = poses.reconstruction.views.size();
   std::set<std::string> folded;
   for (;;) {
@@ -130,8 +130,8 @@ Status drop_folded(const Session& session, const std::vector<const FrameRecord*>
                   fmt::format("{} of {} views look from another side than their stations",
                               folded.size(), all),
                   "check the stations, or import without them");
-    ORBITFUSE_ASSIGN(
-        poses, adjust_model(without(poses.reconstruction, fit->folded), session, frames, options));
+    ORBITFUSE_ASSIGN(poses, adjust_model(without(poses.reconstruction, fit->folded), session,
+                                         frames, options, bundle));
   }
   for (DroppedView& view : poses.dropped)
     if (folded.contains(view.name))
@@ -145,7 +145,7 @@ Status drop_folded(const Session& session, const std::vector<const FrameRecord*>
 
 Result<ModalityPoses> adjust_model(Reconstruction model, const Session& session,
                                    const std::vector<const FrameRecord*>& frames,
-                                   const PoseOptions& options) {
+                                   const PoseOptions& options, BundleOptions bundle) {
   const Lenses lenses = lens_groups(model, session);
   for (std::size_t v = 0; v < model.views.size(); ++v) {
     const LensGroup& lens = lenses.lenses[static_cast<std::size_t>(lenses.group[v])];
@@ -157,7 +157,6 @@ Result<ModalityPoses> adjust_model(Reconstruction model, const Session& session,
       camera =
           calibrated_camera(session, frame->device, camera.width, camera.height).value_or(camera);
   }
-  BundleOptions bundle;
   // Errors scale with the pixels that features were found in, not with the recorded ones.
   const double proxy_scale =
       std::max(1.0, std::max(model.views[0].camera.width, model.views[0].camera.height) /
@@ -234,10 +233,10 @@ bool passes_gates(ModalityPoses& poses, const Session& session, const PoseOption
 
 Result<JudgedModel> judge_model(Reconstruction model, const Session& session,
                                 const std::vector<const FrameRecord*>& frames,
-                                const PoseOptions& options) {
+                                const PoseOptions& options, BundleOptions bundle) {
   JudgedModel judged;
-  ORBITFUSE_ASSIGN(judged.poses, adjust_model(std::move(model), session, frames, options));
-  ORBITFUSE_TRY(drop_folded(session, frames, options, judged.poses));
+  ORBITFUSE_ASSIGN(judged.poses, adjust_model(std::move(model), session, frames, options, bundle));
+  ORBITFUSE_TRY(drop_folded(session, frames, options, bundle, judged.poses));
   judged.believed = passes_gates(judged.poses, session, options, judged.why);
   return judged;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "recon/poses/estimate_poses.hpp"
+#include "recon/poses/sfm/bundle_adjustment.hpp"
 
 namespace orbitfuse {
 
@@ -24,18 +25,18 @@ struct JudgedModel {
   std::string why;  ///< the figures behind the verdict
 };
 
-/// Bundle adjustment with the session's lenses, in the canonical world. Errors: those of
-/// adjust_bundle.
+/// Bundle adjustment with the session's lenses, in the canonical world; `bundle` is in pixels of
+/// the images that features were found in. Errors: those of adjust_bundle.
 Result<ModalityPoses> adjust_model(Reconstruction model, const Session& session,
                                    const std::vector<const FrameRecord*>& frames,
-                                   const PoseOptions& options);
+                                   const PoseOptions& options, BundleOptions bundle = {});
 
 /// How the ladder judges each model, which may come from elsewhere too: adjusted, without
 /// the views that it folded onto another side than their stations', then the gates. `frames` are
 /// all that could have been posed. Errors: those of adjust_bundle; quality (too many folded).
 Result<JudgedModel> judge_model(Reconstruction model, const Session& session,
                                 const std::vector<const FrameRecord*>& frames,
-                                const PoseOptions& options);
+                                const PoseOptions& options, BundleOptions bundle = {});
 
 /// The error of a ladder of which no attempt held.
 tl::unexpected<Error> none_held(const std::vector<LadderStep>& steps, Modality modality);

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/patches/aligned_tracks.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+
+#include "core/system/parallel.hpp"
+
+namespace orbitfuse {
+namespace {
+
+/// A wall z = 0 whose grey level is smooth, waves of some 15 px, and has no direction or period.
+double wall(double x, double y) {
+  x *= 8, y *= 8;
+  return 128 + 40 * std::sin(9.1 * x + 2.3 * std::sin(5.7 * y)) +
+         40 * std::cos(8.3 * y + 1.9 * std::sin(6.1 * x)) + 20 * std::sin(17.3 * x - 13.9 * y);
+}
+
+/// A camera on an arc about the origin, `azimuth_deg` off the wall's normal.
+PosedView view_at(double azimuth_deg) {
+  const double azimuth = azimuth_deg * std::numbers::pi / 180;
+  const Eigen::Vector3d centre(2 * std::sin(azimuth), 0, -2 * std::cos(azimuth));
+  const Eigen::Quaterniond rotation(
+      Eigen::AngleAxisd(azimuth, Eigen::Vector3d::UnitY()).toRotationMatrix());
+  PosedView view;
+  view.name = std::to_string(azimuth_deg);
+  view.camera = Camera::from_fov(320, 240, 50);
+  view.cam_from_world = {rotation, -(rotation * centre)};
+  return view;
+}
+
+cv::Mat picture_of(const PosedView& view, double gain = 1, double offset = 0) {
+  const Rigid3d world_from_cam = view.cam_from_world.inverse();
+  cv::Mat image(view.camera.height, view.camera.width, CV_32F);
+  for (int y = 0; y < image.rows; ++y)
+    for (int x = 0; x < image.cols; ++x) {
+      const Eigen::Vector3d ray = world_from_cam.rotation * view.camera.ray_of({x + 0.5, y + 0.5});
+      const Eigen::Vector3d p =
+          world_from_cam.translation - world_from_cam.translation.z() / ray.z() * ray;
+      image.at<float>(y, x) = static_cast<float>(gain * wall(p.x(), p.y()) + offset);
+    }
+  return image;
+}
+
+struct WallScene {
+  Reconstruction model;
+  std::vector<cv::Mat> images;  ///< the first brighter and of more contrast than the others
+
+  /// Points seen by the first two of the views, by the second half a pixel off.
+  explicit WallScene(const std::vector<double>& azimuths_deg) {
+    for (const double azimuth : azimuths_deg) {
+      model.views.push_back(view_at(azimuth));
+      images.push_back(picture_of(model.views.back(), 0.7, 30));
+    }
+    images[0] = picture_of(model.views[0]);
+    cv::RNG random(7);
+    for (int i = 0; i < 200; ++i) {
+      SparsePoint point;
+      point.position = {random.uniform(-0.6, 0.6), random.uniform(-0.5, 0.5), 0};
+      const Eigen::Vector2d noise(random.gaussian(0.5), random.gaussian(0.5));
+      point.track = {{0, exact(point, 0)}, {1, exact(point, 1) + noise}};
+      model.points.push_back(point);
+    }
+  }
+
+  Eigen::Vector2d exact(const SparsePoint& point, int view) const {
+    const PosedView& posed = model.views[static_cast<std::size_t>(view)];
+    return posed.camera.project(posed.cam_from_world * point.position);
+  }
+  /// How far what a track shows in `view` is from what it shows in the first view, on the wall.
+  double rms_px(const Reconstruction& of, int view) const {
+    double sum = 0;
+    int count = 0;
+    for (const SparsePoint& point : of.points)
+      for (const Observation& first : point.track)
+        for (const Observation& seen : point.track) {
+          if (first.view != 0 || seen.view != view) continue;
+          const PosedView& posed = model.views[0];
+          const Rigid3d world_from_cam = posed.cam_from_world.inverse();
+          const Eigen::Vector3d ray = world_from_cam.rotation * posed.camera.ray_of(first.pixel);
+          SparsePoint shown;
+          shown.position =
+              world_from_cam.translation - world_from_cam.translation.z() / ray.z() * ray;
+          sum += (seen.pixel - exact(shown, view)).squaredNorm(), ++count;
+        }
+    return count == 0 ? std::nan("") : std::sqrt(sum / count);
+  }
+};
+
+TEST(AlignedTracks, ObservationsComeToWhereTheSurfaceIs) {
+  const WallScene scene({0, 25});
+  EXPECT_GT(scene.rms_px(scene.model, 1), 0.6);
+  const TrackAlignment aligned = align_tracks(scene.model, scene.images, {});
+  EXPECT_GT(aligned.aligned, 150);
+  EXPECT_EQ(aligned.added, 0);
+  EXPECT_LT(scene.rms_px(aligned.model, 1), 0.05);
+  EXPECT_NEAR(aligned.rms_shift_px, 0.7, 0.15);
+}
+
+TEST(AlignedTracks, AViewThatNoFeatureJoinedIsFoundWithinReach) {
+  const WallScene scene({0, 25, -30, 70});
+  const TrackAlignment aligned = align_tracks(scene.model, scene.images, {});
+  int third = 0, fourth = 0;
+  for (const SparsePoint& point : aligned.model.points)
+    for (const Observation& seen : point.track) third += seen.view == 2, fourth += seen.view == 3;
+  EXPECT_GT(third, 100);
+  EXPECT_LT(scene.rms_px(aligned.model, 2), 0.08);
+  EXPECT_LT(fourth, third / 3) << "few points have it within 45 degrees of their reference";
+}
+
+TEST(AlignedTracks, AnotherSurfaceIsNoPlaceOfTheTrack) {
+  WallScene scene({0, 25});
+  cv::RNG noise(3);
+  noise.fill(scene.images[1], cv::RNG::UNIFORM, 0, 255);
+  TrackAlignmentOptions options;
+  options.min_aligned_a_view = 0;
+  const TrackAlignment aligned = align_tracks(scene.model, scene.images, options);
+  EXPECT_EQ(aligned.aligned, 0);
+  EXPECT_EQ(aligned.left_out, 200);
+  EXPECT_TRUE(aligned.model.points.empty());
+}
+
+TEST(AlignedTracks, AViewThatWouldLoseItsHoldKeepsWhatItHad) {
+  WallScene scene({0, 25});
+  scene.images[1].setTo(128);
+  const TrackAlignment aligned = align_tracks(scene.model, scene.images, {});
+  EXPECT_EQ(aligned.aligned, 0);
+  ASSERT_EQ(aligned.model.points.size(), 200u);
+  EXPECT_EQ(aligned.model.points[5].track[1].pixel, scene.model.points[5].track[1].pixel);
+}
+
+TEST(AlignedTracks, NeitherNaNNorNothingIsAPlace) {
+  WallScene scene({0, 25});
+  scene.images[0].setTo(std::numeric_limits<float>::quiet_NaN());
+  TrackAlignmentOptions options;
+  options.min_aligned_a_view = 0;
+  EXPECT_TRUE(align_tracks(scene.model, scene.images, options).model.points.empty());
+  const Reconstruction none;
+  EXPECT_TRUE(align_tracks(none, {}, options).model.points.empty());
+}
+
+TEST(AlignedTracks, SmallerImagesGiveRecordedPixels) {
+  WallScene scene({0, 25});
+  for (cv::Mat& image : scene.images) cv::resize(image, image, {}, 0.5, 0.5, cv::INTER_AREA);
+  const TrackAlignment aligned = align_tracks(scene.model, scene.images, {});
+  EXPECT_GT(aligned.aligned, 50);
+  EXPECT_LT(scene.rms_px(aligned.model, 1), 0.15);
+}
+
+TEST(AlignedTracks, TheSameOnAnyNumberOfThreads) {
+  const WallScene scene({0, 25, -30});
+  const int before = thread_count();
+  set_thread_count(1);
+  const TrackAlignment one = align_tracks(scene.model, scene.images, {});
+  set_thread_count(4);
+  const TrackAlignment four = align_tracks(scene.model, scene.images, {});
+  set_thread_count(before);
+  ASSERT_EQ(one.model.points.size(), four.model.points.size());
+  for (std::size_t i = 0; i < one.model.points.size(); ++i) {
+    ASSERT_EQ(one.model.points[i].track.size(), four.model.points[i].track.size());
+    for (std::size_t k = 0; k < one.model.points[i].track.size(); ++k)
+      EXPECT_EQ(one.model.points[i].track[k].pixel, four.model.points[i].track[k].pixel);
+  }
+}
+
+TEST(PatchTemplate, NothingHoldsAConstantOrAnEdge) {
+  cv::Mat constant(40, 40, CV_32F, cv::Scalar(1e6)), edge(40, 40, CV_32F, cv::Scalar(0));
+  edge.colRange(20, 40).setTo(255);
+  EXPECT_FALSE(PatchTemplate::at(constant, {20, 20}, {}));
+  EXPECT_FALSE(PatchTemplate::at(edge, {20, 20}, {}));
+  EXPECT_FALSE(PatchTemplate::at(edge, {2, 20}, {})) << "it leaves the image";
+  EXPECT_FALSE(PatchTemplate::at(edge, {std::nan(""), 20}, {}));
+}
+
+TEST(PatchTemplate, ScaleOfTheValuesChangesNothing) {
+  const PosedView view = view_at(0);
+  for (const double scale : {1e-6, 1.0, 1e6}) {
+    const cv::Mat image = picture_of(view, scale);
+    const auto patch = PatchTemplate::at(image, {160, 120}, {});
+    ASSERT_TRUE(patch) << scale;
+    const auto found = patch->align(image, {{160.7, 119.4}, Eigen::Matrix2d::Identity()});
+    ASSERT_TRUE(found) << scale;
+    EXPECT_LT((found->place.centre - Eigen::Vector2d(160, 120)).norm(), 0.02) << scale;
+    EXPECT_GT(found->correlation, 0.999) << scale;
+    EXPECT_LT(found->sigma_px, 0.02) << scale;
+  }
+}
+
+}  // namespace
+}  // namespace orbitfuse
