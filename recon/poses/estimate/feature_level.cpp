@@ -18,11 +18,11 @@ Result<FeatureLevel> FeatureLevel::extract(const Session& session,
   proxies.max_side_px = options.max_image_side_px;
   ColmapOptions engine{options.colmap, options.seed, options.max_features, peak_threshold};
   FeatureLevel level(session, options);
-  level.folder_ = folder / "images";
+  level.images_folder_ = folder / "images";
   ORBITFUSE_ASSIGN(level.images_,
-                   write_proxies(session, frames, proxies, folder / "images", progress));
+                   write_proxies(session, frames, proxies, level.images_folder_, progress));
   ORBITFUSE_ASSIGN(level.project_,
-                   ColmapProject::create(folder / "colmap", folder / "images", engine));
+                   ColmapProject::create(folder / "colmap", level.images_folder_, engine));
   ORBITFUSE_ASSIGN(level.counts_, level.project_.extract(session, level.images_, progress));
   return level;
 }
@@ -45,7 +45,7 @@ Result<std::vector<cv::Mat>> FeatureLevel::images(const Reconstruction& model) c
     if (of_view == images_.end())
       return fail(ErrorKind::input, view.name, "a view without features",
                   "give a model of the frames that features were found in");
-    ORBITFUSE_ASSIGN(const cv::Mat gray, read_image(folder_ / of_view->name));
+    ORBITFUSE_ASSIGN(const cv::Mat gray, read_image(images_folder_ / of_view->name));
     images.emplace_back();
     gray.convertTo(images.back(), CV_32F);
   }

@@ -45,7 +45,7 @@ class FeatureLevel {
 
   const Session* session_;
   PoseOptions options_;
-  std::filesystem::path folder_;
+  std::filesystem::path images_folder_;
   std::vector<ProxyImage> images_;
   ColmapProject project_;
   DatabaseCounts counts_;

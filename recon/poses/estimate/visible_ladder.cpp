@@ -108,7 +108,6 @@ class VisibleLadder {
             spared(try_resection(selection_.best_level(), "resection on points matched again")));
     }
     if (selection_.has_best()) ORBITFUSE_TRY(spared(try_alignment()));
-    if (selection_.has_best() && !aligned_) ORBITFUSE_TRY(spared(try_rematching()));
     return answer(quick->pairs());
   }
 
@@ -280,31 +279,38 @@ class VisibleLadder {
     return {};
   }
 
-  /// The best model on the matches along its own epipolar lines, where it has few.
+  /// A model on the matches along its own epipolar lines, not adjusted.
+  struct Rematched {
+    std::optional<Reconstruction> model;  ///< where that makes many more observations of few
+    std::string found;                    ///< figures, in words; none where it was not looked for
+  };
+
+  Rematched rematched_best(const FeatureGraph& graph) const {
+    const double seen = observations_a_view(selection_.best());
+    if (rematched_ || seen > plenty_a_view) return {};
+    Rematched again{rematched(graph, selection_.best()), {}};
+    const double now = observations_a_view(*again.model);
+    again.found = fmt::format("{:.0f} observations a view for {:.0f}", now, seen);
+    if (now >= more_observations * seen) return again;
+    return {std::nullopt, again.found + "; too little to take them"};
+  }
+
   Status try_rematching() {
-    const std::string attempt = "matched again along epipolar lines";
-    tell(3, attempt);
+    tell(3, "matches along epipolar lines");
     ORBITFUSE_ASSIGN(const FeatureGraph graph, selection_.best_level().graph());
-    std::string found;
-    std::optional<Reconstruction> again = matched_again(graph, found);
+    Rematched again = rematched_best(graph);
     ORBITFUSE_TRY(progress_.check("poses.visible"));
-    if (again)
-      rematched_ = selection_.consider(attempt, found, std::move(*again), selection_.best_level(),
-                                       explains_as_much(graph));
-    else if (!found.empty())
-      selection_.note_fallen(attempt, found);
+    adjust_rematched(std::move(again), graph);
     return {};
   }
 
-  /// With the points along its own epipolar lines, where that makes many more of few; not adjusted.
-  std::optional<Reconstruction> matched_again(const FeatureGraph& graph, std::string& found) const {
-    const double seen = observations_a_view(selection_.best());
-    if (rematched_ || seen > plenty_a_view) return {};
-    Reconstruction again = rematched(graph, selection_.best());
-    found = fmt::format("{:.0f} observations a view for {:.0f}", observations_a_view(again), seen);
-    if (observations_a_view(again) >= more_observations * seen) return again;
-    found += "; too little to take them";
-    return {};
+  void adjust_rematched(Rematched again, const FeatureGraph& graph) {
+    const std::string attempt = "matched again along epipolar lines";
+    if (again.model)
+      rematched_ = selection_.consider(attempt, again.found, std::move(*again.model),
+                                       selection_.best_level(), explains_as_much(graph));
+    else if (!again.found.empty())
+      selection_.note_fallen(attempt, again.found);
   }
 
   /// As many views, on as good as all of the matches.
@@ -316,7 +322,8 @@ class VisibleLadder {
     };
   }
 
-  /// The best model on observations that the images themselves place, where that is most of them.
+  /// The best model on observations that the images themselves place, where that is most of them;
+  /// else on the matches along its own epipolar lines.
   Status try_alignment() {
     const std::string attempt = "patches aligned";
     tell(3, attempt);
@@ -326,22 +333,23 @@ class VisibleLadder {
     }
     FeatureLevel& level = selection_.best_level();
     ORBITFUSE_ASSIGN(const FeatureGraph graph, level.graph());
-    std::string found;
-    const std::optional<Reconstruction> again = matched_again(graph, found);
-    const Reconstruction& start = again ? *again : selection_.best();
+    Rematched again = rematched_best(graph);
+    const Reconstruction& start = again.model ? *again.model : selection_.best();
     ORBITFUSE_ASSIGN(const std::vector<cv::Mat> images, level.images(start));
     TrackAlignment aligned = align_tracks(start, images, {});
     ORBITFUSE_TRY(progress_.check("poses.visible"));
-    found += fmt::format("{}{} moved by {:.2f} px, {} left out, {} more found",
-                         found.empty() ? "" : "; ", aligned.aligned, aligned.rms_shift_px,
-                         aligned.left_out, aligned.added);
-    if (aligned.aligned < least_aligned * (aligned.aligned + aligned.left_out)) {
+    const std::string found =
+        fmt::format("{}{}{} moved by {:.2f} px, {} left out, {} more found", again.found,
+                    again.found.empty() ? "" : "; ", aligned.aligned, aligned.rms_shift_px,
+                    aligned.left_out, aligned.added);
+    bool held = false;
+    if (aligned.aligned < least_aligned * (aligned.aligned + aligned.left_out))
       selection_.note_fallen(attempt, found + "; too few to hold the views by them");
-      return {};
-    }
-    aligned_ = selection_.consider(again ? "matched again, " + attempt : attempt, found,
-                                   std::move(aligned.model), level, explains_as_much(graph),
-                                   aligned_bundle);
+    else
+      held = selection_.consider(again.model ? "matched again, " + attempt : attempt, found,
+                                 std::move(aligned.model), level, explains_as_much(graph),
+                                 aligned_bundle);
+    if (!held) adjust_rematched(std::move(again), graph);
     return {};
   }
 
@@ -435,7 +443,6 @@ class VisibleLadder {
   const int total_;
   std::string quick_name_ = "orbit pairs";
   std::set<std::string> featureless_;
-  bool aligned_ = false;    ///< the best model's observations are placed by the images
   bool rematched_ = false;  ///< the best model's points are those along its epipolar lines
   bool limited_ = false;    ///< images were reduced or features cut off: full settings find others
   std::optional<FeatureLevel> full_;

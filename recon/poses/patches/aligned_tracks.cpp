@@ -36,6 +36,7 @@ class Aligner {
 
   PointAlignment align(const SparsePoint& point) const {
     PointAlignment result;
+    if (point.track.empty()) return result;
     const Observation reference = most_central(point);
     const auto patch =
         PatchTemplate::at(images_[at(reference.view)], in_image(reference), options_.patch);

@@ -139,6 +139,9 @@ TEST(AlignedTracks, NeitherNaNNorNothingIsAPlace) {
   TrackAlignmentOptions options;
   options.min_aligned_a_view = 0;
   EXPECT_TRUE(align_tracks(scene.model, scene.images, options).model.points.empty());
+  scene.model.points.resize(1);
+  scene.model.points[0].track.clear();
+  EXPECT_TRUE(align_tracks(scene.model, scene.images, options).model.points.empty());
   const Reconstruction none;
   EXPECT_TRUE(align_tracks(none, {}, options).model.points.empty());
 }
