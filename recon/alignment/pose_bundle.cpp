@@ -9,6 +9,7 @@
 
 #include "core/system/parallel.hpp"
 #include "recon/alignment/patch_residual.hpp"
+#include "recon/alignment/trust_region.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -18,23 +19,6 @@ using Matrix8d = Eigen::Matrix<double, 8, 8>;
 
 /// Places are summed in so many parts, whatever the number of threads.
 constexpr std::size_t parts = 8;
-/// The trust region as Ceres has it: first radius, least share of the predicted gain.
-constexpr double first_radius = 1e4, least_gain = 1e-3;
-constexpr double least_radius = 1e-32, most_damping = 1e32, least_damping = 1e-6;
-/// Enough: the cost falls, or the parameters move, by no more of themselves.
-constexpr double cost_tolerance = 1e-6, parameter_tolerance = 1e-8;
-
-/// Cauchy's loss of a squared residual and the root of its slope, by which the linear problem
-/// weighs it.
-struct Cauchy {
-  double cost, root;
-  Cauchy(double squared, double scale) {
-    const double b = scale * scale, sum = 1 + squared / b;
-    cost = b * std::log(sum);
-    root = 1 / std::sqrt(sum);
-  }
-};
-
 /// Two residuals, by a view's correction, the lens (log_focal, radial) and a place's offset.
 struct LinearPair {
   Eigen::Matrix<double, 2, 6> by_correction;
@@ -71,13 +55,6 @@ struct ViewPart {
   void add(const ViewPart& other) { h += other.h, g += other.g; }
 };
 
-/// Levenberg's and Marquardt's damping of a diagonal entry, in the scale of the Jacobian's columns.
-double damping(double diagonal, double radius) {
-  const double column = 1 + std::sqrt(diagonal);
-  return std::clamp(diagonal / (column * column), least_damping, most_damping) * column * column /
-         radius;
-}
-
 std::size_t first_of(std::size_t part, std::size_t count) { return count * part / parts; }
 
 }  // namespace
@@ -102,6 +79,7 @@ struct PoseBundle::Step {
   Eigen::VectorXd shared;  ///< six of each view, two of the lens
   std::vector<Eigen::Vector3d> offsets;
   double predicted = 0;  ///< gain of the linear problem; not positive: no step was found
+  double squared_length = 0;
 };
 
 PoseBundle::PoseBundle(const Camera& camera, std::size_t views)
@@ -315,6 +293,8 @@ PoseBundle::Step PoseBundle::step(const Linear& linear, double radius) const {
     twice +=
         -place.g.dot(found.offsets[i]) + found.offsets[i].cwiseAbs2().dot(reduced.place_damping[i]);
   }
+  found.squared_length = found.shared.squaredNorm();
+  for (const Eigen::Vector3d& offset : found.offsets) found.squared_length += offset.squaredNorm();
   found.predicted = std::isfinite(twice) ? twice / 2 : 0;
   return found;
 }
@@ -330,43 +310,32 @@ PoseBundle::State PoseBundle::moved(const State& from, const Step& step) const {
   return to;
 }
 
+/// One solve, as minimise() wants it.
+struct PoseBundle::Problem {
+  using State = PoseBundle::State;
+  using Linear = PoseBundle::Linear;
+  using Step = PoseBundle::Step;
+  const PoseBundle& bundle;
+  const CommonLensPrior& lens;
+  const PoseBundleLosses& losses;
+
+  bool linearise(const State& at, Linear& linear) const {
+    return bundle.linearise(at, lens, losses, linear);
+  }
+  Step step(const Linear& linear, double radius) const { return bundle.step(linear, radius); }
+  State moved(const State& from, const Step& by) const { return bundle.moved(from, by); }
+  double squared_norm(const State& at) const {
+    double sum = at.lens[0] * at.lens[0] + at.lens[1] * at.lens[1];
+    for (const PoseCorrection& c : at.corrections)
+      for (const double value : c) sum += value * value;
+    for (const Eigen::Vector3d& offset : at.offsets) sum += offset.squaredNorm();
+    return sum;
+  }
+};
+
 bool PoseBundle::solve(const CommonLensPrior& lens, const PoseBundleLosses& losses,
                        int max_iterations) {
-  Linear linear, tried;
-  if (!linearise(state_, lens, losses, linear)) return false;
-  const auto squared_norm = [](const State& s) {
-    double sum = s.lens[0] * s.lens[0] + s.lens[1] * s.lens[1];
-    for (const PoseCorrection& c : s.corrections)
-      for (const double value : c) sum += value * value;
-    for (const Eigen::Vector3d& offset : s.offsets) sum += offset.squaredNorm();
-    return sum;
-  };
-  double radius = first_radius, shrink = 2;
-  for (int iteration = 0; iteration < max_iterations && radius > least_radius; ++iteration) {
-    const Step next = step(linear, radius);
-    if (next.predicted > 0) {
-      double length = next.shared.squaredNorm();
-      for (const Eigen::Vector3d& offset : next.offsets) length += offset.squaredNorm();
-      if (std::sqrt(length) <=
-          parameter_tolerance * (std::sqrt(squared_norm(state_)) + parameter_tolerance))
-        break;
-      State there = moved(state_, next);
-      const bool usable = linearise(there, lens, losses, tried);
-      const double gain = usable ? (linear.cost - tried.cost) / next.predicted : 0;
-      if (gain > least_gain) {
-        const double fall = linear.cost - tried.cost, before = linear.cost;
-        state_ = std::move(there);
-        std::swap(linear, tried);
-        radius = std::min(radius / std::max(1.0 / 3, 1 - std::pow(2 * gain - 1, 3)), 1e16);
-        shrink = 2;
-        if (fall <= cost_tolerance * before) break;
-        continue;
-      }
-    }
-    radius /= shrink;
-    shrink *= 2;
-  }
-  return true;
+  return minimise(Problem{*this, lens, losses}, state_, {.max_iterations = max_iterations}).usable;
 }
 
 std::vector<std::vector<double>> PoseBundle::sighting_residuals_px() const {

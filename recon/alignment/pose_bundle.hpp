@@ -78,6 +78,7 @@ class PoseBundle {
   struct Linear;
   struct Reduced;
   struct Step;
+  struct Problem;
 
   bool linearise(const State& at, const CommonLensPrior& lens, const PoseBundleLosses& losses,
                  Linear& linear) const;

@@ -11,10 +11,10 @@
 #include "recon/poses/estimate/feature_level.hpp"
 #include "recon/poses/estimate/model_selection.hpp"
 #include "recon/poses/estimate/placed_elsewhere.hpp"
+#include "recon/poses/estimate/refined_tracks.hpp"
 #include "recon/poses/estimate/weakest_joint.hpp"
 #include "recon/poses/estimate/weakly_held.hpp"
 #include "recon/poses/global_sfm/global_mapper.hpp"
-#include "recon/poses/patches/aligned_tracks.hpp"
 #include "recon/poses/sfm/held_matches.hpp"
 #include "recon/poses/sfm/resection.hpp"
 #include "recon/poses/sfm/sfm_ladder.hpp"
@@ -35,25 +35,6 @@ constexpr double faint_peak_threshold = 0.0025;
 /// to this many views, of more as many pairs as these have.
 constexpr int max_exhaustive_views = 60;
 constexpr std::size_t most_pairs = max_exhaustive_views * (max_exhaustive_views - 1) / 2;
-
-/// Observations a view from which on more of them move it little: `hut` (832) came from .029 to
-/// .017 % of the extent, `sedan` (809) from .026 to .035; `container` has 186, `fox` 1256.
-constexpr double plenty_a_view = 800;
-/// Of the matches that the model before explained, what one that is matched again must explain: the
-/// two stand for the same features, and one that slid off would lose more.
-constexpr double still_explained = 0.98;
-/// Of the observations before, what makes it worth an adjustment: `van` gains with 1.19 of them,
-/// `transformer` lost with 0.68.
-constexpr double more_observations = 1.1;
-
-/// From here on alignment gave nothing for its time: `fox`, 1256 a view, .037 and .042 % without
-/// and with it, 85 s; `hut`, 832 a view, .029 and .005.
-constexpr double enough_a_view = 1000;
-/// Of the observations, what must be aligned: `transformer` (.55) went from .052 to .013 % of the
-/// extent, `pump_yard` (.31) from .068 to .120.
-constexpr double least_aligned = 0.5;
-/// Patches lie within a tenth of a pixel, descriptors' centres within a half.
-const BundleOptions aligned_bundle{.loss_scale_px = 0.3, .max_error_px = 1.5};
 
 constexpr const char* featureless_why =
     "shows nothing to match (blank, out of focus or overexposed?)";
@@ -279,32 +260,16 @@ class VisibleLadder {
     return {};
   }
 
-  /// A model on the matches along its own epipolar lines, not adjusted.
-  struct Rematched {
-    std::optional<Reconstruction> model;  ///< where that makes many more observations of few
-    std::string found;                    ///< figures, in words; none where it was not looked for
-  };
-
-  Rematched rematched_best(const FeatureGraph& graph) const {
-    const double seen = observations_a_view(selection_.best());
-    if (rematched_ || seen > plenty_a_view) return {};
-    Rematched again{rematched(graph, selection_.best()), {}};
-    const double now = observations_a_view(*again.model);
-    again.found = fmt::format("{:.0f} observations a view for {:.0f}", now, seen);
-    if (now >= more_observations * seen) return again;
-    return {std::nullopt, again.found + "; too little to take them"};
-  }
-
   Status try_rematching() {
     tell(3, "matches along epipolar lines");
     ORBITFUSE_ASSIGN(const FeatureGraph graph, selection_.best_level().graph());
-    Rematched again = rematched_best(graph);
+    RefinedTracks again = rematched_model(graph, selection_.best());
     ORBITFUSE_TRY(progress_.check("poses.visible"));
     adjust_rematched(std::move(again), graph);
     return {};
   }
 
-  void adjust_rematched(Rematched again, const FeatureGraph& graph) {
+  void adjust_rematched(RefinedTracks again, const FeatureGraph& graph) {
     const std::string attempt = "matched again along epipolar lines";
     if (again.model)
       rematched_ = selection_.consider(attempt, again.found, std::move(*again.model),
@@ -313,44 +278,43 @@ class VisibleLadder {
       selection_.note_fallen(attempt, again.found);
   }
 
-  /// As many views, on as good as all of the matches.
-  static Better explains_as_much(const FeatureGraph& graph) {
-    return [&graph](const Reconstruction& model, const Reconstruction& before) {
-      return model.views.size() >= before.views.size() &&
-             explained_matches(graph, posed_frames(graph, model)) >=
-                 still_explained * explained_matches(graph, posed_frames(graph, before));
-    };
-  }
-
   /// The best model on observations that the images themselves place, where that is most of them;
   /// else on the matches along its own epipolar lines.
   Status try_alignment() {
     const std::string attempt = "patches aligned";
     tell(3, attempt);
-    if (const double seen = observations_a_view(selection_.best()); seen > enough_a_view) {
-      selection_.note_fallen(attempt, fmt::format("{:.0f} observations a view are enough", seen));
-      return {};
-    }
-    FeatureLevel& level = selection_.best_level();
-    ORBITFUSE_ASSIGN(const FeatureGraph graph, level.graph());
-    Rematched again = rematched_best(graph);
-    const Reconstruction& start = again.model ? *again.model : selection_.best();
-    ORBITFUSE_ASSIGN(const std::vector<cv::Mat> images, level.images(start));
-    TrackAlignment aligned = align_tracks(start, images, {});
-    ORBITFUSE_TRY(progress_.check("poses.visible"));
-    const std::string found =
-        fmt::format("{}{}{} moved by {:.2f} px, {} left out, {} more found", again.found,
-                    again.found.empty() ? "" : "; ", aligned.aligned, aligned.rms_shift_px,
-                    aligned.left_out, aligned.added);
-    bool held = false;
-    if (aligned.aligned < least_aligned * (aligned.aligned + aligned.left_out))
-      selection_.note_fallen(attempt, found + "; too few to hold the views by them");
-    else
-      held = selection_.consider(again.model ? "matched again, " + attempt : attempt, found,
-                                 std::move(aligned.model), level, explains_as_much(graph),
-                                 aligned_bundle);
+    ORBITFUSE_ASSIGN(const FeatureGraph graph, selection_.best_level().graph());
+    RefinedTracks again = rematched_ ? RefinedTracks{} : rematched_model(graph, selection_.best());
+    ORBITFUSE_ASSIGN(const bool held, try_alignment_of(again, attempt, graph));
     if (!held) adjust_rematched(std::move(again), graph);
     return {};
+  }
+
+  /// False where the model stays as it was. Errors: cancelled.
+  Result<bool> try_alignment_of(const RefinedTracks& again, const std::string& attempt,
+                                const FeatureGraph& graph) {
+    if (const double seen = observations_a_view(selection_.best()); seen > enough_a_view) {
+      selection_.note_fallen(attempt, fmt::format("{:.0f} observations a view are enough", seen));
+      return false;
+    }
+    FeatureLevel& level = selection_.best_level();
+    const Reconstruction& start = again.model ? *again.model : selection_.best();
+    const auto images = level.images(start);
+    if (!images) {
+      selection_.note_fallen(attempt, images.error().message());
+      return false;
+    }
+    ORBITFUSE_ASSIGN(RefinedTracks aligned, aligned_model(start, *images, progress_));
+    if (!again.found.empty()) aligned.found = again.found + "; " + aligned.found;
+    if (!aligned.model) {
+      selection_.note_fallen(attempt, aligned.found);
+      return false;
+    }
+    const Better better = [&](const Reconstruction& model, const Reconstruction& before) {
+      return explains_as_much(graph)(model, before) && holds_all_views(model);
+    };
+    return selection_.consider(again.model ? "matched again, " + attempt : attempt, aligned.found,
+                               std::move(*aligned.model), level, better, aligned_bundle());
   }
 
   /// Pairs of the views left out, and of those next to them in the recording; while there is no

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/poses/patches/aligned_tracks.hpp"
 
+#include <Eigen/SVD>
 #include <algorithm>
+#include <cassert>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <utility>
 
 #include "core/numeric/angle_units.hpp"
+#include "core/option_range.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/poses/index.hpp"
 
@@ -57,7 +61,8 @@ class Aligner {
       result.squared_shifts += (*found - start).squaredNorm();
       result.aligned.push_back(recorded(seen.view, *found));
     }
-    add_views(point, reference, *patch, result);
+    // Where no feature of the track speaks for the patch, the model's own poses alone would.
+    if (result.aligned.size() > 1) add_views(point, reference, *patch, result);
     return result;
   }
 
@@ -67,16 +72,29 @@ class Aligner {
                  PointAlignment& result) const {
     const double least_cosine = std::cos(options_.max_added_angle_deg * radians_per_degree);
     const Eigen::Vector3d towards = direction(point, reference.view);
+    std::vector<std::pair<double, int>> near;
     for (int v = 0; v < static_cast<int>(cameras_.size()); ++v) {
       const bool known = std::any_of(point.track.begin(), point.track.end(),
                                      [&](const Observation& seen) { return seen.view == v; });
-      if (known || towards.dot(direction(point, v)) < least_cosine) continue;
-      const Eigen::Vector2d start = projected(point.position, v) - pixel_centre;
-      if (!start.allFinite()) continue;
-      const auto found = find(point, reference, patch, v, start, options_.min_added_correlation,
-                              options_.max_added_shift_px);
+      const double cosine = towards.dot(direction(point, v));
+      if (!known && cosine >= least_cosine && shows(v, point.position))
+        near.emplace_back(-cosine, v);
+    }
+    std::sort(near.begin(), near.end());
+    near.resize(std::min(near.size(), static_cast<std::size_t>(options_.max_added_views)));
+    for (const auto& [nearness, v] : near) {
+      const auto found =
+          find(point, reference, patch, v, projected(point.position, v) - pixel_centre,
+               options_.min_added_correlation, options_.max_added_shift_px);
       if (found) result.added.push_back(recorded(v, *found));
     }
+  }
+
+  bool shows(int view, const Eigen::Vector3d& position) const {
+    const Eigen::Vector2d pixel = projected(position, view);
+    const Camera& camera = cameras_[at(view)];
+    return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < camera.width &&
+           pixel.y() < camera.height;  // not where it is NaN: behind the camera
   }
 
   Eigen::Vector2d in_image(const Observation& seen) const {
@@ -135,12 +153,17 @@ class Aligner {
                                       const Eigen::Vector2d& start, double min_correlation,
                                       double max_shift_px) const {
     const PatchPlace place{start, linear_between(point, reference, view)};
-    if (!place.linear.allFinite()) return {};
+    if (!place.linear.allFinite() || !magnifies_little(place.linear)) return {};
     const auto found = patch.align(images_[at(view)], place);
     if (!found || found->correlation < min_correlation || found->sigma_px > options_.max_sigma_px ||
         (found->place.centre - start).norm() > max_shift_px)
       return {};
     return found->place.centre;
+  }
+
+  bool magnifies_little(const Eigen::Matrix2d& linear) const {
+    const Eigen::Vector2d by = linear.jacobiSvd().singularValues();
+    return by(0) <= options_.max_magnification && by(1) * options_.max_magnification >= 1;
   }
 
   const Reconstruction& model_;
@@ -150,30 +173,60 @@ class Aligner {
   std::vector<Rigid3d> world_from_cam_;
 };
 
-/// Views that aligned observations alone would hold too weakly.
+/// Views that what was found again of their own features would hold too weakly.
 std::vector<bool> short_of_observations(const std::vector<PointAlignment>& points,
                                         std::size_t views, int least) {
   std::vector<int> count(views, 0);
-  for (const PointAlignment& point : points) {
-    if (point.aligned.size() + point.added.size() < 2) continue;
-    for (const auto* group : {&point.aligned, &point.added})
-      for (const Observation& seen : *group) ++count[at(seen.view)];
-  }
+  for (const PointAlignment& point : points)
+    if (point.aligned.size() > 1)
+      for (const Observation& seen : point.aligned) ++count[at(seen.view)];
   std::vector<bool> few;
   for (const int seen : count) few.push_back(seen < least);
   return few;
 }
 
+/// What was found, and of the rest what views with too few observations need.
+std::vector<Observation> track_of(const PointAlignment& aligned, const std::vector<bool>& few) {
+  std::vector<Observation> track = aligned.aligned;
+  track.insert(track.end(), aligned.added.begin(), aligned.added.end());
+  const auto needed = [&](const Observation& left) { return few[at(left.view)]; };
+  std::copy_if(aligned.left.begin(), aligned.left.end(), std::back_inserter(track), needed);
+  const bool helps_a_view = std::any_of(aligned.left.begin(), aligned.left.end(), needed);
+  // One of a weak view's features means nothing without another of its track.
+  for (const Observation& left : aligned.left)
+    if (helps_a_view && !needed(left) && track.size() < 2) track.push_back(left);
+  return track;
+}
+
 }  // namespace
 
-TrackAlignment align_tracks(const Reconstruction& model, const std::vector<cv::Mat>& images,
-                            const TrackAlignmentOptions& options) {
+Status TrackAlignmentOptions::validate() const {
+  ORBITFUSE_TRY(patch.validate());
+  const OptionCheck check("track_alignment");
+  ORBITFUSE_TRY(check("min_correlation", min_correlation, from_to(0, 1)));
+  ORBITFUSE_TRY(check("max_shift_px", max_shift_px, above_up_to(0, 100)));
+  ORBITFUSE_TRY(check("max_sigma_px", max_sigma_px, above_up_to(0, 10)));
+  ORBITFUSE_TRY(check("max_magnification", max_magnification, from_to(1, 8)));
+  ORBITFUSE_TRY(check("min_added_correlation", min_added_correlation, from_to(0, 1)));
+  ORBITFUSE_TRY(check("max_added_shift_px", max_added_shift_px, above_up_to(0, 100)));
+  ORBITFUSE_TRY(check("max_added_angle_deg", max_added_angle_deg, from_to(0, 90)));
+  ORBITFUSE_TRY(check("max_added_views", max_added_views, from_to(0, 1e6)));
+  return check("min_aligned_a_view", min_aligned_a_view, from_to(0, 1e6));
+}
+
+Result<TrackAlignment> align_tracks(const Reconstruction& model, const std::vector<cv::Mat>& images,
+                                    const TrackAlignmentOptions& options,
+                                    const Progress& progress) {
+  ORBITFUSE_TRY(options.validate());
+  assert(images.size() == model.views.size());
   const Aligner aligner(model, images, options);
   std::vector<PointAlignment> points(model.points.size());
   constexpr int block = 64;
   parallel_blocks(static_cast<int>(points.size()), block, [&](int begin, int end) {
-    for (int i = begin; i < end; ++i) points[at(i)] = aligner.align(model.points[at(i)]);
+    for (int i = begin; i < end && !progress.cancelled(); ++i)
+      points[at(i)] = aligner.align(model.points[at(i)]);
   });
+  ORBITFUSE_TRY(progress.check("alignment of patches"));
   const std::vector<bool> few =
       short_of_observations(points, model.views.size(), options.min_aligned_a_view);
   TrackAlignment result;
@@ -181,22 +234,22 @@ TrackAlignment align_tracks(const Reconstruction& model, const std::vector<cv::M
   result.model.views = model.views;
   double squares = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    PointAlignment& aligned = points[i];
-    result.aligned += std::max(static_cast<int>(aligned.aligned.size()) - 1, 0);
+    const PointAlignment& aligned = points[i];
+    const bool compared = !aligned.aligned.empty();
+    result.aligned += static_cast<int>(aligned.aligned.size()) - (compared ? 1 : 0);
     result.added += static_cast<int>(aligned.added.size());
+    if (!aligned.left.empty())
+      result.unaligned += static_cast<int>(aligned.left.size()) - (compared ? 0 : 1);
     squares += aligned.squared_shifts;
     SparsePoint point = model.points[i];
-    point.track = std::move(aligned.aligned);
-    point.track.insert(point.track.end(), aligned.added.begin(), aligned.added.end());
-    const bool helps_a_view = std::any_of(aligned.left.begin(), aligned.left.end(),
-                                          [&](const Observation& o) { return few[at(o.view)]; });
-    // One of a weak view's features means nothing without another of its track.
-    for (const Observation& left : aligned.left)
-      if (few[at(left.view)] || (helps_a_view && point.track.size() < 2))
-        point.track.push_back(left);
-      else
-        ++result.left_out;
-    if (point.track.size() >= 2) result.model.points.push_back(std::move(point));
+    point.track = track_of(aligned, few);
+    if (point.track.size() < 2) point.track.clear();
+    result.left_out += static_cast<int>(
+        std::count_if(aligned.left.begin(), aligned.left.end(), [&](const Observation& left) {
+          return std::none_of(point.track.begin(), point.track.end(),
+                              [&](const Observation& kept) { return kept.view == left.view; });
+        }));
+    if (!point.track.empty()) result.model.points.push_back(std::move(point));
   }
   result.rms_shift_px = std::sqrt(squares / std::max(result.aligned, 1));
   return result;

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "core/numeric/bilinear.hpp"
+#include "core/option_range.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -42,6 +43,15 @@ double larger_eigenvalue(const Eigen::Matrix2d& symmetric) {
 }
 
 }  // namespace
+
+Status PatchOptions::validate() const {
+  const OptionCheck check("patch");
+  ORBITFUSE_TRY(check("radius_px", radius_px, from_to(1, 64)));
+  ORBITFUSE_TRY(check("window_sigma_px", window_sigma_px, above_up_to(0, 64)));
+  ORBITFUSE_TRY(check("max_iterations", max_iterations, from_to(1, 1000)));
+  ORBITFUSE_TRY(check("converged_px", converged_px, above_up_to(0, 1)));
+  return check("affine_damping", affine_damping, from_to(0, 1));
+}
 
 PatchTemplate::PatchTemplate(const PatchOptions& options) : options_(options) {
   const int radius = options.radius_px, side = 2 * radius + 1;
@@ -93,17 +103,18 @@ bool PatchTemplate::set_gradient(const Eigen::Matrix2Xd& gradient) {
   constexpr double least_share = 1e-6;
   if (!std::isfinite(more) || less <= least_share * more) return false;
   const double rim = options_.radius_px;
-  normal.diagonal().tail<4>().array() += options_.stiffness * rim * rim * shifts.trace();
+  normal.diagonal().tail<4>().array() += options_.affine_damping * rim * rim * shifts.trace();
   inverse_normal_ = normal.ldlt().solve(Normal::Identity());
   return inverse_normal_.allFinite();
 }
 
-double PatchTemplate::sigma_px(double correlation) const {
+double PatchTemplate::sigma_px(const AlignedPatch& patch) const {
   // Of two normalized patches; interpolation alone leaves as much.
   constexpr double least_unexplained = 1e-3;
-  const double unexplained = std::max(2 - 2 * correlation, least_unexplained);
+  const double unexplained = std::max(2 - 2 * patch.correlation, least_unexplained);
   const double independent_samples = 1 / weights_.squaredNorm();
-  const Eigen::Matrix2d shifts = inverse_normal_.topLeftCorner<2, 2>();
+  const Eigen::Matrix2d shifts =
+      patch.place.linear * inverse_normal_.topLeftCorner<2, 2>() * patch.place.linear.transpose();
   return std::sqrt(larger_eigenvalue(shifts) * unexplained / independent_samples);
 }
 
@@ -124,7 +135,7 @@ std::optional<AlignedPatch> PatchTemplate::align(const cv::Mat& image,
     const Eigen::Vector2d shift = patch.place.linear * step.head<2>();
     patch.place.centre -= shift;
     if (shift.norm() < options_.converged_px) {
-      patch.sigma_px = sigma_px(patch.correlation);
+      patch.sigma_px = sigma_px(patch);
       return patch;
     }
   }

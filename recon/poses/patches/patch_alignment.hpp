@@ -5,6 +5,8 @@
 #include <opencv2/core.hpp>
 #include <optional>
 
+#include "core/result.hpp"
+
 // Where a small piece of one image lies in another, to a tenth of a pixel: descriptors find the
 // same surface, but their centres scatter by half a pixel between views that look 30 degrees apart.
 // Inverse compositional alignment by an affine warp (S. Baker and I. Matthews, Lucas-Kanade 20
@@ -22,15 +24,18 @@ struct PatchOptions {
   double window_sigma_px = 4.5;  ///< of a sample's weight, by its distance from the centre
   int max_iterations = 20;
   double converged_px = 0.005;
-  /// What a change of the affine part costs at a pixel of the rim, as a share of what a shift does:
-  /// little texture would turn and shear the patch instead of moving it.
-  double stiffness = 0.015;
+  /// Levenberg's damping of the affine part, at a pixel of the rim, as a share of what a shift
+  /// costs: where little texture holds it, a step would turn and shear the patch out of reach.
+  double affine_damping = 0.015;
+
+  Status validate() const;
 };
 
 struct AlignedPatch {
   PatchPlace place;
   double correlation = 0;  ///< -1 to 1, weighted, brightness and contrast free
-  double sigma_px = 0;     ///< of the centre along its worse direction, by what is left unexplained
+  /// Of the centre along its worse direction, in this image's pixels, by what is left unexplained.
+  double sigma_px = 0;
 };
 
 /// A patch of one image, to be found in others. Images are CV_32FC1, of any scale; NaN is unknown.
@@ -40,7 +45,8 @@ class PatchTemplate {
   static std::optional<PatchTemplate> at(const cv::Mat& image, const Eigen::Vector2d& centre,
                                          const PatchOptions& options);
 
-  /// From near its place there. None where it leaves the image, meets a NaN or comes to no rest.
+  /// From near its place there. None where it leaves the image, meets a NaN or its centre comes to
+  /// no rest.
   std::optional<AlignedPatch> align(const cv::Mat& image, const PatchPlace& start) const;
 
  private:
@@ -52,7 +58,7 @@ class PatchTemplate {
   explicit PatchTemplate(const PatchOptions& options);
   /// False where nothing holds the patch in a direction.
   bool set_gradient(const Eigen::Matrix2Xd& gradient);
-  double sigma_px(double correlation) const;
+  double sigma_px(const AlignedPatch& patch) const;
 
   PatchOptions options_;
   Eigen::Matrix2Xd steps_;   ///< of the samples from the centre

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/poses/sfm/bundle_adjustment.hpp"
 
-#include <ceres/ceres.h>
-
 #include <fmt/format.h>
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -14,52 +12,15 @@
 #include "core/numeric/angle_units.hpp"
 #include "core/numeric/median.hpp"
 #include "recon/alignment/projection.hpp"
+#include "recon/poses/sfm/bundle_solver.hpp"
 
 namespace orbitfuse {
 namespace {
 
-/// The unknowns, as Ceres wants them: plain arrays that stay put.
-struct Parameters {
-  std::vector<Eigen::Quaterniond> rotation;
-  std::vector<Eigen::Vector3d> center;
-  std::vector<Intrinsics> lens;
-  std::vector<Eigen::Vector3d> point;
-};
-
-struct Reprojection {
-  Eigen::Vector2d pixel;
-
-  template <class T>
-  bool operator()(const T* rotation, const T* center, const T* lens, const T* point,
-                  T* residual) const {
-    const Eigen::Map<const Eigen::Quaternion<T>> q(rotation);
-    const Eigen::Map<const Eigen::Matrix<T, 3, 1>> c(center), x(point);
-    const Eigen::Matrix<T, 3, 1> x_in_cam = q * (x - c);
-    if (x_in_cam.z() <= T(1e-9)) {  // behind: a large, finite push back
-      residual[0] = residual[1] = T(1e3);
-      return true;
-    }
-    const Eigen::Matrix<T, 2, 1> p = project(x_in_cam, lens);
-    residual[0] = p.x() - T(pixel.x());
-    residual[1] = p.y() - T(pixel.y());
-    return true;
-  }
-};
-
-/// Square pixels, centred axis, little distortion, and the focal prior, each in its own sigma.
-struct LensPriorResidual {
-  Intrinsics mean;
-  Intrinsics sigma;
-  double aspect_sigma = 0.002;
-
-  template <class T>
-  bool operator()(const T* lens, T* residual) const {
-    for (int i = 0; i < 8; ++i)
-      residual[i] =
-          (lens[i] - T(mean[static_cast<std::size_t>(i)])) / T(sigma[static_cast<std::size_t>(i)]);
-    residual[1] = (lens[1] / lens[0] - T(mean[1] / mean[0])) / T(aspect_sigma);
-    return true;
-  }
+/// What belongs to a view beside its pose.
+struct OfView {
+  int lens = 0;
+  double unit_px = 1;  ///< as in BundleOptions
 };
 
 double triangulation_angle_deg(const SparsePoint& point, const std::vector<PosedView>& views) {
@@ -82,11 +43,15 @@ double reprojection_error_px(const PosedView& view, const Eigen::Vector3d& x,
 }
 
 Status check_input(const Reconstruction& model, const std::vector<int>& group,
-                   const std::vector<LensGroup>& lenses) {
+                   const std::vector<LensGroup>& lenses, const BundleOptions& options) {
   const auto bad = [](const std::string& found) {
     return fail(ErrorKind::input, "bundle adjustment", found, "check the model that was read");
   };
   if (group.size() != model.views.size()) return bad("views and lens groups differ in number");
+  if (!options.unit_px.empty() && options.unit_px.size() != model.views.size())
+    return bad("views and their units differ in number");
+  for (const double unit_px : options.unit_px)
+    if (!(unit_px > 0)) return bad(fmt::format("a unit of {} pixels", unit_px));
   for (std::size_t v = 0; v < model.views.size(); ++v) {
     if (group[v] < 0 || group[v] >= static_cast<int>(lenses.size()))
       return bad(
@@ -104,7 +69,7 @@ Status check_input(const Reconstruction& model, const std::vector<int>& group,
 
 /// Drops observations that miss, points without parallax, then views without support.
 /// Returns the observations dropped. Names of views that lost their support are appended.
-int prune(Reconstruction& model, std::vector<int>& group, const BundleOptions& options,
+int prune(Reconstruction& model, std::vector<OfView>& of_views, const BundleOptions& options,
           double max_error_px, std::vector<std::string>& dropped) {
   int outliers = 0;
   while (true) {
@@ -113,8 +78,9 @@ int prune(Reconstruction& model, std::vector<int>& group, const BundleOptions& o
     for (SparsePoint& point : model.points) {
       const auto before = point.track.size();
       std::erase_if(point.track, [&](const Observation& o) {
-        return !(reprojection_error_px(model.views[static_cast<std::size_t>(o.view)],
-                                       point.position, o.pixel) <= max_error_px);
+        const auto v = static_cast<std::size_t>(o.view);
+        return !(reprojection_error_px(model.views[v], point.position, o.pixel) <=
+                 max_error_px * of_views[v].unit_px);
       });
       outliers += static_cast<int>(before - point.track.size());
       if (point.track.size() < 2 || !point.position.allFinite()) continue;
@@ -127,7 +93,7 @@ int prune(Reconstruction& model, std::vector<int>& group, const BundleOptions& o
 
     std::vector<int> new_index(model.views.size(), -1);
     std::vector<PosedView> views;
-    std::vector<int> groups;
+    std::vector<OfView> kept_of;
     for (std::size_t v = 0; v < model.views.size(); ++v) {
       if (support[v] < options.min_observations) {
         dropped.push_back(model.views[v].name);
@@ -135,11 +101,11 @@ int prune(Reconstruction& model, std::vector<int>& group, const BundleOptions& o
       }
       new_index[v] = static_cast<int>(views.size());
       views.push_back(std::move(model.views[v]));
-      groups.push_back(group[v]);
+      kept_of.push_back(of_views[v]);
     }
     const bool stable = views.size() == new_index.size();
     model.views = std::move(views);
-    group = std::move(groups);
+    of_views = std::move(kept_of);
     for (SparsePoint& point : model.points) {
       std::erase_if(point.track, [&](const Observation& o) {
         return new_index[static_cast<std::size_t>(o.view)] < 0;
@@ -158,160 +124,88 @@ Status check_support(const Reconstruction& model, const std::vector<std::string>
               "move the camera round the object between views; turning on the spot gives no depth");
 }
 
-class Problem {
- public:
-  Problem(const Reconstruction& model, const std::vector<int>& group,
-          const std::vector<LensGroup>& lenses, const BundleOptions& options,
-          std::size_t max_points)
-      : model_(model), group_(group), lenses_(lenses), options_(options) {
-    for (const PosedView& view : model.views) {
-      parameters_.rotation.push_back(view.cam_from_world.rotation.normalized());
-      parameters_.center.push_back(camera_center(view.cam_from_world));
-    }
-    for (const SparsePoint& point : model.points) parameters_.point.push_back(point.position);
-    add_lenses();
-    add_observations(max_points);
-    fix_gauge();
+LensBelief belief_of(const LensGroup& lens, const Camera& camera, const BundleOptions& options) {
+  const double focal = lens.focal_px.value_or(camera.fx);
+  const double sigma = lens.focal_px ? lens.focal_relative_sigma : 0.5;
+  const double offset = options.principal_point_sigma * camera.width;
+  const double tangential = options.tangential_sigma;
+  LensBelief belief;
+  belief.mean = {
+      focal, focal * camera.fy / camera.fx, camera.width / 2.0, camera.height / 2.0, 0, 0, 0, 0};
+  belief.sigma = {
+      focal * std::max(sigma, 1e-9), 1, offset, offset, 0.1, 0.1, tangential, tangential};
+  const bool focal_held = lens.focal_px && sigma == 0;
+  const bool axis_held = !lens.refine_principal_point, straight = !lens.refine_distortion;
+  belief.held = {focal_held, focal_held, axis_held, axis_held,
+                 straight,   straight,   straight,  straight};
+  return belief;
+}
+
+/// Seven degrees of freedom: the first pose, and one coordinate of the farthest centre.
+void fix_gauge(BundleSolver& solver) {
+  const std::vector<Eigen::Vector3d>& centers = solver.state().center;
+  solver.hold_rotation(0);
+  for (int axis = 0; axis < 3; ++axis) solver.hold_center(0, axis);
+  std::size_t far = 0;
+  for (std::size_t v = 1; v < centers.size(); ++v)
+    if ((centers[v] - centers[0]).norm() > (centers[far] - centers[0]).norm()) far = v;
+  if (far == 0) return;
+  int axis = 0;
+  (centers[far] - centers[0]).cwiseAbs().maxCoeff(&axis);
+  solver.hold_center(far, axis);
+}
+
+BundleSolver solver_of(const Reconstruction& model, const std::vector<OfView>& of_views,
+                       const std::vector<LensGroup>& lenses, const BundleOptions& options) {
+  BundleSolver::State start;
+  std::vector<int> lens_of;
+  std::vector<LensBelief> beliefs(lenses.size());
+  for (LensBelief& unused : beliefs) unused.held.fill(true);
+  start.lens.resize(lenses.size());
+  for (std::size_t v = model.views.size(); v-- > 0;) {  // of a lens, its first view's
+    const auto lens = static_cast<std::size_t>(of_views[v].lens);
+    start.lens[lens] = intrinsics_of(model.views[v].camera);
+    beliefs[lens] = belief_of(lenses[lens], model.views[v].camera, options);
   }
-
-  ceres::Solver::Summary solve(double function_tolerance) {
-    ceres::Solver::Options solver;
-    solver.linear_solver_type =
-        model_.views.size() > 200 ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;
-    solver.num_threads = 1;  // more sum in any order; these problems are small
-    solver.max_num_iterations = options_.max_iterations;
-    solver.function_tolerance = function_tolerance;
-    solver.logging_type = ceres::SILENT;
-    ceres::Solver::Summary summary;
-    ceres::Solve(solver, &problem_, &summary);
-    return summary;
+  for (std::size_t v = 0; v < model.views.size(); ++v) {
+    lens_of.push_back(of_views[v].lens);
+    start.rotation.push_back(model.views[v].cam_from_world.rotation.normalized());
+    start.center.push_back(camera_center(model.views[v].cam_from_world));
   }
-
-  void write_to(Reconstruction& model) const {
-    for (std::size_t v = 0; v < model.views.size(); ++v) {
-      PosedView& view = model.views[v];
-      const Eigen::Quaterniond q = parameters_.rotation[v].normalized();
-      view.cam_from_world = {q, -(q * parameters_.center[v])};
-      store(parameters_.lens[static_cast<std::size_t>(group_[v])], view.camera);
-    }
-    for (std::size_t i = 0; i < model.points.size(); ++i)
-      model.points[i].position = parameters_.point[i];
+  std::vector<SeenPoint> seen;
+  for (const SparsePoint& point : model.points) {
+    for (const Observation& o : point.track)
+      seen.push_back({o.view, static_cast<int>(start.point.size()), o.pixel,
+                      of_views[static_cast<std::size_t>(o.view)].unit_px});
+    start.point.push_back(point.position);
   }
+  BundleSolver solver(std::move(start), std::move(lens_of), std::move(beliefs), std::move(seen),
+                      options.loss_scale_px);
+  fix_gauge(solver);
+  return solver;
+}
 
-  double focal_relative_sigma(std::size_t g) {
-    const double none = std::numeric_limits<double>::quiet_NaN();
-    double* lens = parameters_.lens[g].data();
-    if (!used_[g] || problem_.IsParameterBlockConstant(lens)) return none;
-    ceres::Covariance::Options settings;
-    settings.num_threads = 1;
-    ceres::Covariance covariance(settings);
-    const std::vector<std::pair<const double*, const double*>> blocks = {{lens, lens}};
-    if (!covariance.Compute(blocks, &problem_)) return none;
-    std::array<double, 64> block{};
-    covariance.GetCovarianceBlock(lens, lens, block.data());
-    return std::sqrt(block[0]) / lens[0];
+void write_to(const BundleSolver::State& state, const std::vector<OfView>& of_views,
+              Reconstruction& model) {
+  for (std::size_t v = 0; v < model.views.size(); ++v) {
+    PosedView& view = model.views[v];
+    const Eigen::Quaterniond& q = state.rotation[v];
+    view.cam_from_world = {q, -(q * state.center[v])};
+    store(state.lens[static_cast<std::size_t>(of_views[v].lens)], view.camera);
   }
+  for (std::size_t i = 0; i < model.points.size(); ++i) model.points[i].position = state.point[i];
+}
 
- private:
-  void add_lenses() {
-    used_.assign(lenses_.size(), false);
-    parameters_.lens.resize(lenses_.size());
-    for (std::size_t v = 0; v < model_.views.size(); ++v) {
-      const auto g = static_cast<std::size_t>(group_[v]);
-      if (used_[g]) continue;
-      used_[g] = true;
-      const Camera& camera = model_.views[v].camera;
-      parameters_.lens[g] = intrinsics_of(camera);
-      add_prior(g, camera);
-    }
-  }
-
-  void add_prior(std::size_t g, const Camera& camera) {
-    const LensGroup& lens = lenses_[g];
-    LensPriorResidual prior;
-    const double focal = lens.focal_px.value_or(camera.fx);
-    const double sigma = lens.focal_px ? lens.focal_relative_sigma : 0.5;
-    const double offset = options_.principal_point_sigma * camera.width;
-    prior.mean = {
-        focal, focal * camera.fy / camera.fx, camera.width / 2.0, camera.height / 2.0, 0, 0, 0, 0};
-    const double tangential = options_.tangential_sigma;
-    prior.sigma = {
-        focal * std::max(sigma, 1e-9), 1, offset, offset, 0.1, 0.1, tangential, tangential};
-    double* values = parameters_.lens[g].data();
-    std::vector<int> held;
-    if (lens.focal_px && sigma == 0) held.insert(held.end(), {0, 1});
-    if (!lens.refine_principal_point) held.insert(held.end(), {2, 3});
-    if (!lens.refine_distortion) held.insert(held.end(), {4, 5, 6, 7});
-    problem_.AddParameterBlock(values, 8);
-    if (held.size() == 8) {
-      problem_.SetParameterBlockConstant(values);
-      return;
-    }
-    if (!held.empty()) problem_.SetManifold(values, new ceres::SubsetManifold(8, held));
-    problem_.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<LensPriorResidual, 8, 8>(new LensPriorResidual(prior)),
-        nullptr, values);
-  }
-
-  void add_observations(std::size_t max_points) {
-    std::vector<std::size_t> order(model_.points.size());
-    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-      return model_.points[a].track.size() > model_.points[b].track.size();
-    });
-    order.resize(std::min(order.size(), max_points));
-    for (const std::size_t i : order)
-      for (const Observation& o : model_.points[i].track) {
-        const auto v = static_cast<std::size_t>(o.view);
-        problem_.AddResidualBlock(
-            new ceres::AutoDiffCostFunction<Reprojection, 2, 4, 3, 8, 3>(new Reprojection{o.pixel}),
-            new ceres::CauchyLoss(options_.loss_scale_px), parameters_.rotation[v].coeffs().data(),
-            parameters_.center[v].data(),
-            parameters_.lens[static_cast<std::size_t>(group_[v])].data(),
-            parameters_.point[i].data());
-      }
-    for (std::size_t v = 0; v < model_.views.size(); ++v)
-      if (problem_.HasParameterBlock(parameters_.rotation[v].coeffs().data()))
-        problem_.SetManifold(parameters_.rotation[v].coeffs().data(),
-                             new ceres::EigenQuaternionManifold);
-  }
-
-  /// Seven degrees of freedom: the first pose, and one coordinate of the farthest centre.
-  void fix_gauge() {
-    const auto& centers = parameters_.center;
-    const auto used = [&](std::size_t v) { return problem_.HasParameterBlock(centers[v].data()); };
-    std::size_t first = 0;
-    while (first < centers.size() && !used(first)) ++first;
-    if (first == centers.size()) return;
-    problem_.SetParameterBlockConstant(parameters_.rotation[first].coeffs().data());
-    problem_.SetParameterBlockConstant(parameters_.center[first].data());
-    std::size_t far = first;
-    for (std::size_t v = first + 1; v < centers.size(); ++v)
-      if (used(v) && (centers[v] - centers[first]).norm() > (centers[far] - centers[first]).norm())
-        far = v;
-    if (far == first) return;
-    int axis = 0;
-    (centers[far] - centers[first]).cwiseAbs().maxCoeff(&axis);
-    problem_.SetManifold(parameters_.center[far].data(), new ceres::SubsetManifold(3, {axis}));
-  }
-
-  const Reconstruction& model_;
-  const std::vector<int>& group_;
-  const std::vector<LensGroup>& lenses_;
-  const BundleOptions& options_;
-  Parameters parameters_;
-  std::vector<bool> used_;
-  ceres::Problem problem_;
-};
-
-void measure(const Reconstruction& model, BundleReport& report) {
+void measure(const Reconstruction& model, const std::vector<OfView>& of_views,
+             BundleReport& report) {
   double sum = 0;
   std::vector<double> angles;
   report.observations = 0;
   for (const SparsePoint& point : model.points) {
     for (const Observation& o : point.track) {
-      const double e = reprojection_error_px(model.views[static_cast<std::size_t>(o.view)],
-                                             point.position, o.pixel);
+      const auto v = static_cast<std::size_t>(o.view);
+      const double e =
+          reprojection_error_px(model.views[v], point.position, o.pixel) / of_views[v].unit_px;
       sum += e * e;
       ++report.observations;
     }
@@ -336,39 +230,42 @@ void store_point_errors(Reconstruction& model) {
 Result<BundleReport> adjust_bundle(Reconstruction& model, const std::vector<int>& group,
                                    const std::vector<LensGroup>& lenses,
                                    const BundleOptions& options) {
-  ORBITFUSE_TRY(check_input(model, group, lenses));
+  ORBITFUSE_TRY(check_input(model, group, lenses, options));
   Reconstruction work = model;
-  std::vector<int> groups = group;
+  std::vector<OfView> of_views;
+  for (std::size_t v = 0; v < group.size(); ++v)
+    of_views.push_back({group[v], options.unit_px.empty() ? 1 : options.unit_px[v]});
   BundleReport report;
 
   // The start may be far off (a focal wrong by 30 %), so the first passes keep wide misses: the
   // robust loss deals with them, and only what still misses at the end is an outlier.
   // What one pass leaves to do the next one does.
   struct Pass {
-    double max_error_px, function_tolerance;
+    double max_error_px, cost_tolerance;
   };
   const std::array<Pass, 3> passes = {
       {{1e3, 1e-5}, {8 * options.max_error_px, 1e-5}, {options.max_error_px, 1e-8}}};
-  for (const auto& [max_error_px, function_tolerance] : passes) {
-    report.outliers += prune(work, groups, options, max_error_px, report.dropped_views);
+  for (const auto& [max_error_px, cost_tolerance] : passes) {
+    report.outliers += prune(work, of_views, options, max_error_px, report.dropped_views);
     ORBITFUSE_TRY(check_support(work, report.dropped_views));
-    Problem problem(work, groups, lenses, options, work.points.size());
-    const ceres::Solver::Summary summary = problem.solve(function_tolerance);
-    if (!summary.IsSolutionUsable())
-      return fail(ErrorKind::quality, "bundle adjustment", summary.message,
+    BundleSolver solver = solver_of(work, of_views, lenses, options);
+    const BundleSolver::End end = solver.solve(options.max_iterations, cost_tolerance);
+    if (!end.usable)
+      return fail(ErrorKind::quality, "bundle adjustment", "residuals of the start are not finite",
                   "the views contradict each other; see the dropped views and match settings");
-    report.converged = summary.termination_type == ceres::CONVERGENCE;
-    problem.write_to(work);
+    report.converged = end.converged;
+    write_to(solver.state(), of_views, work);
   }
-  report.outliers += prune(work, groups, options, options.max_error_px, report.dropped_views);
+  report.outliers += prune(work, of_views, options, options.max_error_px, report.dropped_views);
   ORBITFUSE_TRY(check_support(work, report.dropped_views));
   for (const PosedView& view : work.views) ORBITFUSE_TRY(view.camera.validate(view.name));
 
-  // The longest tracks decide the focal; all of them would make the covariance the dearest step.
-  Problem of_focal(work, groups, lenses, options, 1500);
+  const BundleSolver at_the_end = solver_of(work, of_views, lenses, options);
   for (std::size_t g = 0; g < lenses.size(); ++g) {
-    report.focal_relative_sigma.push_back(of_focal.focal_relative_sigma(g));
-    const double sigma = report.focal_relative_sigma.back();
+    const std::optional<double> sigma_px = at_the_end.focal_sigma(g);
+    const double sigma = sigma_px ? *sigma_px / at_the_end.state().lens[g][0]
+                                  : std::numeric_limits<double>::quiet_NaN();
+    report.focal_relative_sigma.push_back(sigma);
     const double prior = lenses[g].focal_px ? lenses[g].focal_relative_sigma : 0.5;
     if (std::isfinite(sigma) && sigma > 0.7 * prior)
       report.warnings.push_back(
@@ -376,7 +273,7 @@ Result<BundleReport> adjust_bundle(Reconstruction& model, const std::vector<int>
                       "{:.1f} %, mostly from its prior",
                       g, 100 * sigma));
   }
-  measure(work, report);
+  measure(work, of_views, report);
   store_point_errors(work);
   model = std::move(work);
   return report;

@@ -35,11 +35,14 @@ struct BundleOptions {
   /// it does to an image is what a shifted principal point and a turned camera do, so that a looser
   /// prior turns all cameras together.
   double tangential_sigma = 0.0005;
+  /// Of each view, how many of its pixels count as one of those above: photos of several sizes are
+  /// searched at like ones. Empty: one.
+  std::vector<double> unit_px = {};
   int max_iterations = 60;
 };
 
 struct BundleReport {
-  double rms_px = 0;  ///< over kept observations
+  double rms_px = 0;  ///< over kept observations, of their views' units
   int observations = 0, outliers = 0;
   bool converged = false;
   double median_triangulation_angle_deg = 0;
@@ -50,11 +53,12 @@ struct BundleReport {
   std::vector<std::string> warnings;
 };
 
-/// Robust bundle adjustment in Ceres: views of a group share their intrinsics (group[v] indexes
+/// Robust bundle adjustment: views of a group share their intrinsics (group[v] indexes
 /// `lenses`), points and poses are free, the gauge is fixed by the first view and the distance to
-/// the farthest other. Drops outliers and unsupported views from `model`.
-/// Errors: input (sizes or values that make no sense), quality (no parallax: pure rotation; fewer
-/// than two supported views; no convergence to finite values). `model` is unchanged on error.
+/// the farthest other. The same for any number of threads. Drops outliers and unsupported views
+/// from `model`. Errors: input (sizes or values that make no sense), quality (no parallax: pure
+/// rotation; fewer than two supported views; no convergence to finite values). `model` is unchanged
+/// on error.
 Result<BundleReport> adjust_bundle(Reconstruction& model, const std::vector<int>& group,
                                    const std::vector<LensGroup>& lenses,
                                    const BundleOptions& options);

@@ -158,9 +158,13 @@ Result<ModalityPoses> adjust_model(Reconstruction model, const Session& session,
           calibrated_camera(session, frame->device, camera.width, camera.height).value_or(camera);
   }
   // Errors scale with the pixels that features were found in, not with the recorded ones.
-  const double proxy_scale =
-      std::max(1.0, std::max(model.views[0].camera.width, model.views[0].camera.height) /
-                        static_cast<double>(options.max_image_side_px));
+  const auto scale_of = [&](const Camera& camera) {
+    return std::max(1.0, std::max(camera.width, camera.height) /
+                             static_cast<double>(options.max_image_side_px));
+  };
+  const double proxy_scale = scale_of(model.views[0].camera);
+  for (const PosedView& view : model.views)
+    bundle.unit_px.push_back(scale_of(view.camera) / proxy_scale);
   bundle.loss_scale_px *= proxy_scale;
   bundle.max_error_px *= proxy_scale;
   ORBITFUSE_ASSIGN(const BundleReport report,
