@@ -15,7 +15,8 @@ namespace {
 // (`run --trace`, docs/notes/planner.md); poses, new views and scores from eight scenes on an AMD
 // EPYC, 2026-11-27, by its slowness of 1.26.
 constexpr double start_s = 0.3, known_poses_s = 0.5;
-constexpr double visible_pose_s = 0.5;  // a view: features, matching, mapping; 0.3 to 0.9 by scene
+constexpr double visible_pose_s =
+    0.3;  // a view: features, matching, mapping; 0.15 to 0.45 by scene
 /// A view: search, renders, temperatures. 0.8 to 1.05 by scene; what is wrong is made good later,
 /// by the thermal training and the scores.
 constexpr double thermal_pose_s = 0.95;

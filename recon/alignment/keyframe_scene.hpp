@@ -28,8 +28,9 @@ struct KeyframeOptions {
 };
 
 /// Renders of `renderer` reused for cameras near by. Keyframes at `views` (may be empty) come
-/// first; `center` is what the cameras look at. `renderer` must outlive the result, which must not
-/// be called from two threads at once. Errors: the renderer's, cancelled.
+/// first; `center` is what the cameras look at. `renderer` must outlive the result, which may be
+/// called from two threads at once up to `coarse_width_px` alone: wider renders add keyframes.
+/// Errors: the renderer's, cancelled.
 Result<SceneRenderer> keyframe_scene(const SceneRenderer& renderer,
                                      const std::vector<PosedView>& views,
                                      const Eigen::Vector3d& center, const KeyframeOptions& options,

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "recon/nerf/device/engine.hpp"
@@ -55,6 +58,7 @@ class Trainer {
                          bool with_proposals);
   void record_densities();
   void update_occupancy(double progress);
+  std::optional<std::array<float, 3>> beside_occupied(std::uint64_t draw) const;
   void probe_cells();
   void watch_poses(const Block& block, std::vector<PoseSums>& sums) const;
   void collect_pose_sums();

@@ -8,6 +8,7 @@
 
 #include "core/numeric/angle_units.hpp"
 #include "core/numeric/median.hpp"
+#include "core/system/parallel.hpp"
 #include "core/system/trace.hpp"
 #include "recon/alignment/whole_view.hpp"
 #include "recon/poses/world_frame.hpp"
@@ -153,11 +154,15 @@ Result<std::vector<PosedView>> OrbitRefinement::search(const std::vector<std::si
   const TraceSpan span("search whole views");
   const LoopModel model = loop_model(orbit, alignment);
   std::vector<PosedView> found;
-  for (const std::size_t i : chosen) {
-    found.push_back(predicted(orbit, alignment, model, i));
-    ORBITFUSE_TRY(ascend_correlation(renderer, orbit.canonical_from_world, orbit.images[i],
-                                     found.back(), {}, progress));
-  }
+  for (const std::size_t i : chosen) found.push_back(predicted(orbit, alignment, model, i));
+  std::vector<Status> done(found.size());
+  parallel_for(static_cast<int>(found.size()), [&](int index) {
+    const auto k = static_cast<std::size_t>(index);
+    const auto ascended = ascend_correlation(renderer, orbit.canonical_from_world,
+                                             orbit.images[chosen[k]], found[k], {}, progress);
+    if (!ascended) done[k] = tl::unexpected(ascended.error());
+  });
+  for (const Status& one : done) ORBITFUSE_TRY(one);
   return found;
 }
 

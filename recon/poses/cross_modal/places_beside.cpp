@@ -5,6 +5,7 @@
 
 #include <optional>
 
+#include "core/system/parallel.hpp"
 #include "core/system/trace.hpp"
 #include "recon/alignment/whole_view.hpp"
 #include "recon/poses/cross_modal/painted_scene.hpp"
@@ -32,28 +33,38 @@ struct Beside {
   PosedView start;
 };
 
+/// The place beside a view's that is most alike, where one is clearly more so than its own.
+Result<std::optional<Beside>> best_beside(const OrbitViews& orbit, const SceneRenderer& painted,
+                                          std::size_t i, const PosedView& view) {
+  ORBITFUSE_ASSIGN(const auto here, correlation_with(painted, orbit.images[i], view));
+  std::optional<Beside> better;
+  if (!here) return better;
+  double best = *here + tried_gain * (1 - *here);
+  for (const auto& [azimuth, elevation] : steps) {
+    PosedView there = view;
+    there.cam_from_world = moved(view.cam_from_world, orbit.canonical_from_world,
+                                 {step_deg * azimuth, step_deg * elevation, 0});
+    ORBITFUSE_ASSIGN(const auto like, correlation_with(painted, orbit.images[i], there));
+    if (!like || *like <= best) continue;
+    best = *like;
+    better = Beside{i, *here, there};
+  }
+  return better;
+}
+
 Result<std::vector<Beside>> candidates(const OrbitRefinement& refinement,
                                        const SceneRenderer& painted,
                                        const std::vector<std::size_t>& kept, const Fit& alignment) {
-  const OrbitViews& orbit = refinement.orbit;
+  std::vector<Result<std::optional<Beside>>> looked(kept.size());
+  parallel_for(static_cast<int>(kept.size()), [&](int index) {
+    const auto k = static_cast<std::size_t>(index);
+    looked[k] = best_beside(refinement.orbit, painted, kept[k], alignment.views[kept[k]].view);
+  });
+  ORBITFUSE_TRY(refinement.progress.check("poses.thermal"));
   std::vector<Beside> found;
-  for (const std::size_t i : kept) {
-    ORBITFUSE_TRY(refinement.progress.check("poses.thermal"));
-    const PosedView& view = alignment.views[i].view;
-    ORBITFUSE_ASSIGN(const auto here, correlation_with(painted, orbit.images[i], view));
-    if (!here) continue;
-    double best = *here + tried_gain * (1 - *here);
-    std::optional<Beside> better;
-    for (const auto& [azimuth, elevation] : steps) {
-      PosedView there = view;
-      there.cam_from_world = moved(view.cam_from_world, orbit.canonical_from_world,
-                                   {step_deg * azimuth, step_deg * elevation, 0});
-      ORBITFUSE_ASSIGN(const auto like, correlation_with(painted, orbit.images[i], there));
-      if (!like || *like <= best) continue;
-      best = *like;
-      better = Beside{i, *here, there};
-    }
-    if (better) found.push_back(std::move(*better));
+  for (Result<std::optional<Beside>>& one : looked) {
+    if (!one) return tl::unexpected(one.error());
+    if (*one) found.push_back(std::move(**one));
   }
   return found;
 }
