@@ -16,10 +16,6 @@
 // again. Not adjusted yet; docs/notes/poses_visible.md has the figures of the constants.
 namespace orbitfuse {
 
-/// Observations a view from where on alignment gave nothing for its time: `fox`, 1256 a view, .037
-/// and .042 % without and with it, 85 s; `hut`, 832 a view, .034 and .005.
-inline constexpr double enough_a_view = 1000;
-
 struct RefinedTracks {
   std::optional<Reconstruction> model;  ///< none where it is not worth an adjustment
   std::string found;                    ///< figures, in words; none where it was not looked for

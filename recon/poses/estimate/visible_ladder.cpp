@@ -293,10 +293,6 @@ class VisibleLadder {
   /// False where the model stays as it was. Errors: cancelled.
   Result<bool> try_alignment_of(const RefinedTracks& again, const std::string& attempt,
                                 const FeatureGraph& graph) {
-    if (const double seen = observations_a_view(selection_.best()); seen > enough_a_view) {
-      selection_.note_fallen(attempt, fmt::format("{:.0f} observations a view are enough", seen));
-      return false;
-    }
     FeatureLevel& level = selection_.best_level();
     const Reconstruction& start = again.model ? *again.model : selection_.best();
     const auto images = level.images(start);

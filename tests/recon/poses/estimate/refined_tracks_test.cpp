@@ -41,7 +41,7 @@ TEST(RefinedTracks, AModelWithDoubtfulViewsIsNotAligned) {
 }
 
 TEST(RefinedTracks, TooManyObservationsAreLeftAlone) {
-  const Reconstruction model = seen_cube(two_loops(), 3000, 0.3);
+  const Reconstruction model = seen_cube(two_loops(), 9000, 0.3);
   const auto refined = aligned_model(model, {}, {});
   ASSERT_TRUE(refined);
   EXPECT_FALSE(refined->model);
