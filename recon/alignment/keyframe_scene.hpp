@@ -29,7 +29,8 @@ struct KeyframeOptions {
 
 /// Renders of `renderer` reused for cameras near by. Keyframes at `views` (may be empty) come
 /// first; `center` is what the cameras look at. `renderer` must outlive the result, which may be
-/// called from two threads at once up to `coarse_width_px` alone: wider renders add keyframes.
+/// called from two threads at once up to `coarse_width_px` alone, and only where there are views:
+/// other renders add keyframes.
 /// Errors: the renderer's, cancelled.
 Result<SceneRenderer> keyframe_scene(const SceneRenderer& renderer,
                                      const std::vector<PosedView>& views,

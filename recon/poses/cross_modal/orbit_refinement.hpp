@@ -55,7 +55,9 @@ double apart_deg(const OrbitViews& orbit, const Rigid3d& a, const Rigid3d& b);
 /// Within a degree: a restart that ends there confirms the view's pose.
 bool same_place(const OrbitViews& orbit, const Rigid3d& a, const Rigid3d& b);
 
-/// Restarts of views of one orbit in one scene. Errors: the renderer's, cancelled.
+/// Restarts of views of one orbit in one scene. The renderer is asked for several coarse views at
+/// once (KeyframeOptions::coarse_width_px), finer ones one by one. Errors: the renderer's,
+/// cancelled.
 struct OrbitRefinement {
   const SceneRenderer& renderer;
   const OrbitViews& orbit;

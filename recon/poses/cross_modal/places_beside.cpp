@@ -57,6 +57,7 @@ Result<std::vector<Beside>> candidates(const OrbitRefinement& refinement,
                                        const std::vector<std::size_t>& kept, const Fit& alignment) {
   std::vector<Result<std::optional<Beside>>> looked(kept.size());
   parallel_for(static_cast<int>(kept.size()), [&](int index) {
+    if (refinement.progress.cancelled()) return;
     const auto k = static_cast<std::size_t>(index);
     looked[k] = best_beside(refinement.orbit, painted, kept[k], alignment.views[kept[k]].view);
   });

@@ -191,7 +191,8 @@ std::vector<Observation> track_of(const PointAlignment& aligned, const std::vect
   track.insert(track.end(), aligned.added.begin(), aligned.added.end());
   const auto needed = [&](const Observation& left) { return few[at(left.view)]; };
   std::copy_if(aligned.left.begin(), aligned.left.end(), std::back_inserter(track), needed);
-  const bool helps_a_view = std::any_of(aligned.left.begin(), aligned.left.end(), needed);
+  const bool helps_a_view = std::any_of(aligned.left.begin(), aligned.left.end(), needed) ||
+                            (!aligned.aligned.empty() && needed(aligned.aligned.front()));
   // One of a weak view's features means nothing without another of its track.
   for (const Observation& left : aligned.left)
     if (helps_a_view && !needed(left) && track.size() < 2) track.push_back(left);

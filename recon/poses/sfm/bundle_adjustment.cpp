@@ -51,7 +51,8 @@ Status check_input(const Reconstruction& model, const std::vector<int>& group,
   if (!options.unit_px.empty() && options.unit_px.size() != model.views.size())
     return bad("views and their units differ in number");
   for (const double unit_px : options.unit_px)
-    if (!(unit_px > 0)) return bad(fmt::format("a unit of {} pixels", unit_px));
+    if (!(unit_px > 0 && std::isfinite(unit_px)))
+      return bad(fmt::format("a unit of {} pixels", unit_px));
   for (std::size_t v = 0; v < model.views.size(); ++v) {
     if (group[v] < 0 || group[v] >= static_cast<int>(lenses.size()))
       return bad(
@@ -166,6 +167,7 @@ BundleSolver solver_of(const Reconstruction& model, const std::vector<OfView>& o
     const auto lens = static_cast<std::size_t>(of_views[v].lens);
     start.lens[lens] = intrinsics_of(model.views[v].camera);
     beliefs[lens] = belief_of(lenses[lens], model.views[v].camera, options);
+    if (beliefs[lens].held[0]) std::copy_n(beliefs[lens].mean.begin(), 2, start.lens[lens].begin());
   }
   for (std::size_t v = 0; v < model.views.size(); ++v) {
     lens_of.push_back(of_views[v].lens);

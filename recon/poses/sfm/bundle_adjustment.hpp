@@ -47,7 +47,7 @@ struct BundleReport {
   bool converged = false;
   double median_triangulation_angle_deg = 0;
   /// One standard deviation of each group's focal from the covariance, share of the focal; NaN
-  /// when it was held or the normal equations are singular (then the focal went back to its prior).
+  /// when it was held, no view has it or the normal equations are singular.
   std::vector<double> focal_relative_sigma;
   std::vector<std::string> dropped_views;
   std::vector<std::string> warnings;

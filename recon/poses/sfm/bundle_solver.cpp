@@ -5,9 +5,11 @@
 #include <Eigen/LU>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <utility>
 
+#include "core/geometry/rotation_vector.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/alignment/trust_region.hpp"
 
@@ -21,10 +23,11 @@ using NodeVector = Eigen::Matrix<double, node_size, 1>;
 using ByNode = Eigen::Matrix<double, 2, node_size>;
 using NodeByPoint = Eigen::Matrix<double, node_size, 3>;
 
-/// From here on the reduced equations are solved sparsely where few pairs of nodes see a point:
-/// with many, as when all look at one object, the factors fill up.
-constexpr std::size_t many_views = 400;
+/// Of the pairs of nodes, how many may see a point for the equations to be solved sparsely: with
+/// many, as when all look at one object, the factors fill up.
 constexpr double few_pairs = 0.25;
+/// A pivot that is less of its diagonal is what rounding left of nothing.
+constexpr double least_pivot = 1e-13;
 
 /// A residual and its derivatives, weighted.
 struct LinearSeen {
@@ -32,12 +35,6 @@ struct LinearSeen {
   Eigen::Matrix<double, 2, 3> by_point;
   Eigen::Vector2d residual;
 };
-
-Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& x) {
-  Eigen::Matrix3d m;
-  m << 0, -x.z(), x.y(), x.z(), 0, -x.x(), -x.y(), x.x(), 0;
-  return m;
-}
 
 /// project() and its derivatives; a point behind the camera has none, and a large residual.
 LinearSeen linear_seen(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& center,
@@ -73,15 +70,18 @@ LinearSeen linear_seen(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& c
   return out;
 }
 
-/// The prior's residuals and derivatives.
+/// The prior's residuals and derivatives, of what is not held: a held value that is not its mean
+/// would drown all else.
 void linear_belief(const LensBelief& belief, const Intrinsics& lens, Block& by_lens,
                    NodeVector& residual) {
-  by_lens.setZero();
+  by_lens.setZero(), residual.setZero();
   for (std::size_t k = 0; k < lens.size(); ++k) {
     const auto i = static_cast<Eigen::Index>(k);
+    if (belief.held[k]) continue;
     by_lens(i, i) = 1 / belief.sigma[k];
     residual(i) = (lens[k] - belief.mean[k]) / belief.sigma[k];
   }
+  if (belief.held[1]) return;
   residual(1) = (lens[1] / lens[0] - belief.mean[1] / belief.mean[0]) / belief.aspect_sigma;
   by_lens(1, 1) = 1 / (lens[0] * belief.aspect_sigma);
   by_lens(1, 0) = -lens[1] / (lens[0] * lens[0] * belief.aspect_sigma);
@@ -94,13 +94,16 @@ bool all_held(const std::vector<bool>& held) {
 }  // namespace
 
 BundleSolver::BundleSolver(State start, std::vector<int> lens_of, std::vector<LensBelief> beliefs,
-                           std::vector<SeenPoint> seen, double loss_scale)
+                           std::vector<SeenPoint> seen, double loss_scale, std::size_t dense_up_to)
     : state_(std::move(start)),
       lens_of_(std::move(lens_of)),
       beliefs_(std::move(beliefs)),
       seen_(std::move(seen)),
       loss_scale_(loss_scale),
-      parts_(state_.center.size() > many_views ? 2 : 8) {
+      dense_up_to_(dense_up_to),
+      parts_(state_.center.size() > dense_up_to ? 2 : 8) {
+  assert(std::is_sorted(seen_.begin(), seen_.end(),
+                        [](const SeenPoint& a, const SeenPoint& b) { return a.point < b.point; }));
   const std::size_t views = state_.center.size(), nodes = views + state_.lens.size();
   first_seen_.assign(state_.point.size() + 1, seen_.size());
   for (std::size_t s = seen_.size(); s-- > 0;)
@@ -290,9 +293,9 @@ struct BundleSolver::Problem {
   }
 
   /// `equations`' lower triangle times the answer is `right`; held unknowns are 0. Empty where the
-  /// equations are singular.
+  /// equations are singular, or a pivot less than that of its diagonal (not asked where sparse).
   std::vector<NodeVector> solved(const std::vector<Block>& equations,
-                                 const std::vector<NodeVector>& right) const {
+                                 const std::vector<NodeVector>& right, double least = 0) const {
     const auto size = static_cast<Eigen::Index>(node_size * nodes());
     const auto first = [](std::size_t node) { return static_cast<Eigen::Index>(node_size * node); };
     Eigen::VectorXd b(size);
@@ -316,11 +319,14 @@ struct BundleSolver::Problem {
     };
     Eigen::VectorXd x;
     const auto pairs = static_cast<double>(nodes() * nodes()) / 2;
-    if (views() <= many_views || of.blocks_ > few_pairs * pairs) {
+    if (views() <= of.dense_up_to_ || of.blocks_ > few_pairs * pairs) {
       Eigen::MatrixXd a = Eigen::MatrixXd::Zero(size, size);
       each([&](Eigen::Index i, Eigen::Index k, double value) { a(i, k) = value; });
+      const Eigen::VectorXd diagonal = a.diagonal();
       const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factors(a);  // reads the lower triangle
       if (factors.info() != Eigen::Success) return {};
+      const Eigen::ArrayXd pivots = a.diagonal().array().square();
+      if (!(pivots >= least * diagonal.array()).all()) return {};
       x = factors.solve(b);
     } else {
       std::vector<Eigen::Triplet<double>> entries;
@@ -379,11 +385,7 @@ struct BundleSolver::Problem {
     State to = from;
     for (std::size_t v = 0; v < views(); ++v) {
       const Eigen::Vector3d turn = by.nodes[v].head<3>();
-      const double angle = turn.norm();
-      if (angle > 0)
-        to.rotation[v] =
-            (Eigen::Quaterniond(Eigen::AngleAxisd(angle, turn / angle)) * to.rotation[v])
-                .normalized();
+      to.rotation[v] = (turned_by(turn) * to.rotation[v]).normalized();
       to.center[v] += by.nodes[v].segment<3>(3);
     }
     for (std::size_t i = 0; i < to.lens.size(); ++i)
@@ -421,7 +423,7 @@ std::optional<double> BundleSolver::focal_sigma(std::size_t lens) const {
   const Problem::Reduced equations = problem.reduced(linear, undamped);
   std::vector<NodeVector> unit(problem.nodes(), NodeVector::Zero());
   unit[node](0) = 1;
-  const std::vector<NodeVector> column = problem.solved(equations.blocks, unit);
+  const std::vector<NodeVector> column = problem.solved(equations.blocks, unit, least_pivot);
   if (column.empty() || !(column[node](0) > 0)) return std::nullopt;
   return std::sqrt(column[node](0));
 }

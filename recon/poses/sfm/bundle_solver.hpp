@@ -37,9 +37,10 @@ class BundleSolver {
     std::vector<Eigen::Vector3d> point;
   };
 
-  /// `lens_of[v]` indexes the lenses; `seen` is in the order of its points.
+  /// `lens_of[v]` indexes the lenses; `seen` is in the order of its points. Of more views than
+  /// `dense_up_to` the equations are solved sparsely where they are sparse.
   BundleSolver(State start, std::vector<int> lens_of, std::vector<LensBelief> beliefs,
-               std::vector<SeenPoint> seen, double loss_scale);
+               std::vector<SeenPoint> seen, double loss_scale, std::size_t dense_up_to = 400);
 
   void hold_rotation(std::size_t view);
   void hold_center(std::size_t view, int axis);
@@ -66,6 +67,7 @@ class BundleSolver {
   std::vector<std::size_t> first_seen_;  ///< of each point, and the end
   std::vector<std::vector<bool>> held_;  ///< of each node: views, then lenses
   double loss_scale_;
+  std::size_t dense_up_to_;
   std::size_t parts_;  ///< sums are made of, whatever the number of threads
   /// Of a pair of nodes, the larger first, the place of its block; -1: no point joins them.
   std::vector<int> block_at_;

@@ -162,7 +162,9 @@ Result<ModalityPoses> adjust_model(Reconstruction model, const Session& session,
     return std::max(1.0, std::max(camera.width, camera.height) /
                              static_cast<double>(options.max_image_side_px));
   };
-  const double proxy_scale = scale_of(model.views[0].camera);
+  double proxy_scale = 1;
+  for (const PosedView& view : model.views)
+    proxy_scale = std::max(proxy_scale, scale_of(view.camera));
   for (const PosedView& view : model.views)
     bundle.unit_px.push_back(scale_of(view.camera) / proxy_scale);
   bundle.loss_scale_px *= proxy_scale;

@@ -155,6 +155,20 @@ TEST(AlignedTracks, WhatIsKeptForAWeakViewCountsAsNotFound) {
   EXPECT_EQ(aligned.share(), 0);
 }
 
+TEST(AlignedTracks, AWeakViewKeepsTracksThatWouldHaveBeenComparedWithIt) {
+  // The middle one of three shows something else; the outer two have tracks of their own.
+  WallScene scene({-20, 20, 0});
+  for (std::size_t i = 0; i < 100; ++i) {
+    SparsePoint& point = scene.model.points[i];
+    point.track.push_back({2, scene.exact(point, 2)});
+  }
+  cv::RNG noise(5);
+  noise.fill(scene.images[2], cv::RNG::UNIFORM, 0, 255);
+  const TrackAlignment aligned = align_tracks(scene.model, scene.images, {}, {}).value();
+  EXPECT_GT(aligned.aligned, 80);
+  EXPECT_GE(seen_by(aligned.model, 2), 95);
+}
+
 TEST(AlignedTracks, OptionsOutOfRangeAndCtrlCAreErrors) {
   const WallScene scene({0, 25});
   TrackAlignmentOptions options;
@@ -237,7 +251,7 @@ TEST(PatchTemplate, NothingHoldsAConstantOrAnEdge) {
 TEST(PatchTemplate, SigmaIsInPixelsOfTheImageItIsFoundIn) {
   const PosedView view = view_at(0);
   const cv::Mat image = picture_of(view);
-  cv::Mat larger, noisy;
+  cv::Mat larger;
   cv::resize(image, larger, {}, 2, 2, cv::INTER_CUBIC);
   const auto patch = PatchTemplate::at(image, {160, 120}, {});
   ASSERT_TRUE(patch);

@@ -123,6 +123,40 @@ TEST(BundleAdjustment, SizesThatDisagreeAreAnInputError) {
   EXPECT_EQ(report.error().kind, ErrorKind::input);
 }
 
+TEST(BundleAdjustment, PhotosOfSeveralSizesAreJudgedByTheirOwnPixels) {
+  // Every second photo at three times the size, its noise and misses as well: by the first one's
+  // pixels all of its observations would be outliers.
+  const auto truth = two_loops();
+  std::vector<PosedView> views = truth;
+  for (std::size_t v = 0; v < views.size(); v += 2)
+    views[v].camera = views[v].camera.scaled_to(1920, 1440);
+  Reconstruction model = seen_cube(truth, 200, 0.5);
+  model.views = views;
+  for (SparsePoint& point : model.points)
+    for (Observation& o : point.track)
+      if (o.view % 2 == 0) o.pixel *= 3;
+  disturb(model, 0.5, 0.01);
+  BundleOptions options;
+  options.loss_scale_px = 0.5, options.max_error_px = 1.4;
+  std::vector<int> group;
+  for (std::size_t v = 0; v < views.size(); ++v) group.push_back(v % 2 == 0 ? 1 : 0);
+  const std::vector<LensGroup> lenses = {held, {1800, 0, false, false}};
+  Reconstruction alike = model;
+  const auto by_one_size = adjust_bundle(alike, group, lenses, options);
+  for (std::size_t v = 0; v < views.size(); ++v) options.unit_px.push_back(v % 2 == 0 ? 3 : 1);
+  const auto report = adjust_bundle(model, group, lenses, options);
+  ASSERT_TRUE(report && by_one_size);
+  EXPECT_LT(report->outliers, by_one_size->outliers / 4);
+  EXPECT_LT(report->rms_px, 0.8);
+  EXPECT_LT(worst_rotation_deg(model, truth), 0.15);
+  for (const double nonsense : {0.0, -1.0, std::nan(""), HUGE_VAL}) {
+    options.unit_px[3] = nonsense;
+    EXPECT_EQ(adjust_bundle(model, group, lenses, options).error().kind, ErrorKind::input);
+  }
+  options.unit_px.pop_back();
+  EXPECT_EQ(adjust_bundle(model, group, lenses, options).error().kind, ErrorKind::input);
+}
+
 TEST(BundleAdjustment, NotANumberIsAnError) {
   Reconstruction model = seen_cube(two_loops(), 50, 0.3);
   model.points[0].position.x() = std::nan("");

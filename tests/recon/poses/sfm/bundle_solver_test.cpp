@@ -63,8 +63,9 @@ struct Scene {
     }
   }
 
-  BundleSolver solver() const {
-    BundleSolver made(start, std::vector<int>(start.center.size(), 0), {belief()}, seen, loss_px);
+  BundleSolver solver(std::size_t dense_up_to = 400) const {
+    BundleSolver made(start, std::vector<int>(start.center.size(), 0), {belief()}, seen, loss_px,
+                      dense_up_to);
     made.hold_rotation(0);
     for (int axis = 0; axis < 3; ++axis) made.hold_center(0, axis), made.hold_center(far, axis);
     return made;
@@ -171,24 +172,69 @@ TEST(BundleSolver, TheSameBitsForAnyNumberOfThreads) {
   }
 }
 
-TEST(BundleSolver, HundredsOfViewsAreSolvedSparsely) {
+TEST(BundleSolver, SparseAndDenseEquationsHaveOneAnswer) {
   std::vector<PosedView> views;
-  for (int i = 0; i < 420; ++i) {
+  constexpr int count = 60, side = 8;
+  for (int i = 0; i < count; ++i) {
     OrbitPose pose;
-    pose.azimuth_deg = 360.0 * i / 420, pose.elevation_deg = i % 2 == 0 ? 14 : 34, pose.radius = 4;
+    pose.azimuth_deg = 360.0 * i / count, pose.elevation_deg = i % 2 == 0 ? 14 : 34;
+    pose.radius = 4;
     const Camera camera = testing_orbit::camera();
     views.push_back({std::to_string(i), camera, cam_from_world_of(pose, camera)});
   }
-  Scene scene(views, 180, 0);
-  // A point is seen by those of one side, a tenth of them.
+  Scene scene(views, 300, 0);
+  // A point is seen by those of one side alone, so that few pairs of views see one.
   std::erase_if(scene.seen, [](const SeenPoint& seen) {
-    return (seen.view + 420 - 7 * seen.point % 420) % 420 >= 42;
+    return (seen.view + 7 * count - 7 * seen.point % count) % count >= side;
   });
-  BundleSolver solver = scene.solver();
-  ASSERT_TRUE(solver.solve(60, 1e-10).usable);
+  BundleSolver dense = scene.solver(count), sparse = scene.solver(0);
+  ASSERT_TRUE(dense.solve(100, 1e-14).usable);
+  ASSERT_TRUE(sparse.solve(100, 1e-14).usable);
+  double moved = 0;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    EXPECT_LT((dense.state().center[v] - sparse.state().center[v]).norm(), 1e-6) << v;
+    moved = std::max(moved, (dense.state().center[v] - scene.start.center[v]).norm());
+  }
+  EXPECT_GT(moved, 0.01);
+  EXPECT_NEAR(*dense.focal_sigma(0), *sparse.focal_sigma(0), 1e-6);
+}
+
+TEST(BundleSolver, TwoLensesAndAPointThatNobodySees) {
+  Scene scene(testing_orbit::two_loops(), 120, 0);
+  std::vector<int> lens_of(24, 0);
+  for (std::size_t v = 12; v < 24; ++v) lens_of[v] = 1;
+  scene.start.lens.push_back(scene.start.lens[0]);
+  scene.start.point.insert(scene.start.point.begin() + 5, Eigen::Vector3d(0.1, 0.2, 0.3));
+  for (SeenPoint& seen : scene.seen) seen.point += seen.point >= 5 ? 1 : 0;
+  LensBelief straight = belief();  // of the second: only its focal length is free
+  for (std::size_t k = 2; k < 8; ++k) straight.held[k] = true;
+  BundleSolver solver(scene.start, lens_of, {belief(), straight}, scene.seen, loss_px);
+  ASSERT_TRUE(solver.solve(100, 1e-12).usable);
   EXPECT_NEAR(solver.state().lens[0][0], bent_lens[0], 6);
-  for (std::size_t v = 0; v < views.size(); ++v)
-    EXPECT_LT((solver.state().center[v] - camera_center(views[v].cam_from_world)).norm(), 0.1);
+  EXPECT_NE(solver.state().lens[1][0], scene.start.lens[1][0]);
+  for (std::size_t k = 2; k < 8; ++k)
+    EXPECT_EQ(solver.state().lens[1][k], scene.start.lens[1][k]) << k;
+  EXPECT_EQ(solver.state().point[5], scene.start.point[5]);
+  EXPECT_FALSE(solver.focal_sigma(0)) << "nothing holds the world: the equations are singular";
+  solver.hold_rotation(0);
+  for (int axis = 0; axis < 3; ++axis)
+    solver.hold_center(0, axis), solver.hold_center(scene.far, axis);
+  EXPECT_TRUE(solver.focal_sigma(0) && solver.focal_sigma(1));
+}
+
+TEST(BundleSolver, AHeldValueThatIsNotItsMeanDrownsNothing) {
+  Scene scene(testing_orbit::two_loops(), 120, 0);
+  LensBelief exact = belief();
+  exact.held[0] = exact.held[1] = true;
+  exact.mean[0] = exact.mean[1] = 500, exact.sigma[0] = 1e-7;
+  BundleSolver solver(scene.start, std::vector<int>(24, 0), {exact}, scene.seen, loss_px);
+  solver.hold_rotation(0);
+  for (int axis = 0; axis < 3; ++axis)
+    solver.hold_center(0, axis), solver.hold_center(scene.far, axis);
+  ASSERT_TRUE(solver.solve(60, 1e-8).usable);
+  EXPECT_EQ(solver.state().lens[0][0], 600);
+  EXPECT_NE(solver.state().lens[0][4], 0) << "its distortion is free";
+  EXPECT_LT(solver.state().lens[0][4], -0.04);
 }
 
 TEST(BundleSolver, WhatIsHeldStays) {
