@@ -21,7 +21,7 @@ struct TrackAlignmentOptions {
   double max_shift_px = 2;       ///< beyond, it is another place that looks alike
   double max_sigma_px = 0.15;    ///< a vaguer place is worse than none
   /// Of a step in the reference's image, seen in the other one: beyond, samples skip pixels.
-  double max_magnification = 2;
+  double max_magnification = 4;
   /// Of views that no descriptor joined to the track: nothing but the images speaks for them.
   double min_added_correlation = 0.9;
   double max_added_shift_px = 1.5;
