@@ -150,8 +150,26 @@ class StagedRun {
   json planned_;  ///< for run.json; null: there is no plan
 };
 
+/// Files of a run's names where no run has been are the user's own: nothing is written over them.
+Status check_records(const fs::path& out) {
+  std::error_code unreadable;
+  for (const char* left : {".partial", ".lock"})
+    if (fs::exists(out / left, unreadable)) return {};
+  const auto run = earlier_run(out.string());
+  if ((run && !run->is_null()) || !pipeline::finished_stages(out, stages::stage_names()).empty())
+    return {};
+  for (const char* file : {run_file, planning::plan_file})
+    if (fs::exists(fs::symlink_status(out / file, unreadable)))
+      return fail(ErrorKind::usage, (out / file).string(),
+                  "is there already, and no run left it (it names no session, and there are no "
+                  "results beside it)",
+                  "choose another --out, or move it away");
+  return {};
+}
+
 Status StagedRun::open(const std::vector<std::string>& targets) {
   ORBITFUSE_TRY(resolve(folders_));
+  ORBITFUSE_TRY(check_records(folders_.out));
   ORBITFUSE_ASSIGN(input_, stages::open_session_input(folders_.session, context_.progress));
   for (const std::string& warning : input_.session.warnings) context_.console.warning(warning);
   session_ = fs::absolute(folders_.session).lexically_normal().string();

@@ -108,6 +108,22 @@ TEST_F(HostileRun, AFieldThatNoStageOfTheRunWroteIsNotItsOwn) {
   }
 }
 
+/// A training's own run.json was written over, also where nothing could be run.
+TEST_F(HostileRun, RecordsThatNoRunLeftAreTheUsersOwn) {
+  for (const char* file : {"run.json", "plan.json"}) {
+    const std::string mine = R"({"my": "training config"})";
+    test::put(out / file, mine);
+    for (const std::string more : {"--dry-run", "--force"}) {
+      const Outcome refused =
+          orbitfuse_program({"run", session.string(), "--out", out.string(), more});
+      EXPECT_EQ(refused.code, 2) << file << more;
+      EXPECT_THAT(refused.err, HasSubstr(std::string(file) + ": is there already"));
+    }
+    EXPECT_EQ(test::get(out / file), mine);
+    fs::remove(out / file);
+  }
+}
+
 /// It would be refused by the next call; `inspect` passed it.
 TEST_F(HostileRun, OptionsOfARunThatCannotBeUsedAreToldByInspect) {
   make_poses();
