@@ -19,6 +19,7 @@ using Matrix8d = Eigen::Matrix<double, 8, 8>;
 
 /// Places are summed in so many parts, whatever the number of threads.
 constexpr std::size_t parts = 8;
+
 /// Two residuals, by a view's correction, the lens (log_focal, radial) and a place's offset.
 struct LinearPair {
   Eigen::Matrix<double, 2, 6> by_correction;

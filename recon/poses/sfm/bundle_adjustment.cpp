@@ -251,7 +251,7 @@ Result<BundleReport> adjust_bundle(Reconstruction& model, const std::vector<int>
     report.outliers += prune(work, of_views, options, max_error_px, report.dropped_views);
     ORBITFUSE_TRY(check_support(work, report.dropped_views));
     BundleSolver solver = solver_of(work, of_views, lenses, options);
-    const BundleSolver::End end = solver.solve(options.max_iterations, cost_tolerance);
+    const TrustRegionEnd end = solver.solve(options.max_iterations, cost_tolerance);
     if (!end.usable)
       return fail(ErrorKind::quality, "bundle adjustment", "residuals of the start are not finite",
                   "the views contradict each other; see the dropped views and match settings");
@@ -263,10 +263,10 @@ Result<BundleReport> adjust_bundle(Reconstruction& model, const std::vector<int>
   for (const PosedView& view : work.views) ORBITFUSE_TRY(view.camera.validate(view.name));
 
   const BundleSolver at_the_end = solver_of(work, of_views, lenses, options);
+  const std::vector<std::optional<double>> sigmas_px = at_the_end.focal_sigmas();
   for (std::size_t g = 0; g < lenses.size(); ++g) {
-    const std::optional<double> sigma_px = at_the_end.focal_sigma(g);
-    const double sigma = sigma_px ? *sigma_px / at_the_end.state().lens[g][0]
-                                  : std::numeric_limits<double>::quiet_NaN();
+    const double sigma = sigmas_px[g] ? *sigmas_px[g] / at_the_end.state().lens[g][0]
+                                      : std::numeric_limits<double>::quiet_NaN();
     report.focal_relative_sigma.push_back(sigma);
     const double prior = lenses[g].focal_px ? lenses[g].focal_relative_sigma : 0.5;
     if (std::isfinite(sigma) && sigma > 0.7 * prior)

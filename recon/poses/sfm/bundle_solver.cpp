@@ -7,11 +7,11 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <set>
 #include <utility>
 
 #include "core/geometry/rotation_vector.hpp"
 #include "core/system/parallel.hpp"
-#include "recon/alignment/trust_region.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -405,27 +405,29 @@ struct BundleSolver::Problem {
   }
 };
 
-BundleSolver::End BundleSolver::solve(int max_iterations, double cost_tolerance) {
-  const TrustRegionEnd end = minimise(
-      Problem{*this}, state_, {.max_iterations = max_iterations, .cost_tolerance = cost_tolerance});
-  return {end.usable, end.converged};
+TrustRegionEnd BundleSolver::solve(int max_iterations, double cost_tolerance) {
+  return minimise(Problem{*this}, state_,
+                  {.max_iterations = max_iterations, .cost_tolerance = cost_tolerance});
 }
 
-std::optional<double> BundleSolver::focal_sigma(std::size_t lens) const {
+std::vector<std::optional<double>> BundleSolver::focal_sigmas() const {
+  std::vector<std::optional<double>> sigmas(state_.lens.size());
   const Problem problem{*this};
-  const std::size_t node = problem.views() + lens;
-  const bool used = std::any_of(seen_.begin(), seen_.end(), [&](const SeenPoint& seen) {
-    return lens_of_[static_cast<std::size_t>(seen.view)] == static_cast<int>(lens);
-  });
   Problem::Linear linear;
-  if (!used || held_[node][0] || !problem.linearise(state_, linear)) return std::nullopt;
+  if (!problem.linearise(state_, linear)) return sigmas;
   constexpr double undamped = 1e16;
   const Problem::Reduced equations = problem.reduced(linear, undamped);
-  std::vector<NodeVector> unit(problem.nodes(), NodeVector::Zero());
-  unit[node](0) = 1;
-  const std::vector<NodeVector> column = problem.solved(equations.blocks, unit, least_pivot);
-  if (column.empty() || !(column[node](0) > 0)) return std::nullopt;
-  return std::sqrt(column[node](0));
+  std::set<int> used;
+  for (const SeenPoint& seen : seen_) used.insert(lens_of_[static_cast<std::size_t>(seen.view)]);
+  for (std::size_t lens = 0; lens < sigmas.size(); ++lens) {
+    const std::size_t node = problem.views() + lens;
+    if (!used.contains(static_cast<int>(lens)) || held_[node][0]) continue;
+    std::vector<NodeVector> unit(problem.nodes(), NodeVector::Zero());
+    unit[node](0) = 1;
+    const std::vector<NodeVector> column = problem.solved(equations.blocks, unit, least_pivot);
+    if (!column.empty() && column[node](0) > 0) sigmas[lens] = std::sqrt(column[node](0));
+  }
+  return sigmas;
 }
 
 }  // namespace orbitfuse

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "recon/alignment/projection.hpp"
+#include "recon/alignment/trust_region.hpp"
 
 // The least squares of bundle adjustment: poses, lenses and points from where points were seen.
 // Points are eliminated (Triggs et al., Bundle adjustment - a modern synthesis, 2000); what is left
@@ -45,17 +46,14 @@ class BundleSolver {
   void hold_rotation(std::size_t view);
   void hold_center(std::size_t view, int axis);
 
-  struct End {
-    bool usable = false, converged = false;
-  };
   /// From where the state is. The same bits for any number of threads.
-  End solve(int max_iterations, double cost_tolerance);
+  TrustRegionEnd solve(int max_iterations, double cost_tolerance);
 
   const State& state() const { return state_; }
 
-  /// One standard deviation of fx, all else being as uncertain as it is; none where fx is held, no
-  /// view has the lens, or the normal equations are singular.
-  std::optional<double> focal_sigma(std::size_t lens) const;
+  /// One standard deviation of each lens' fx, all else being as uncertain as it is; none where fx
+  /// is held, no view has the lens, or the normal equations are singular.
+  std::vector<std::optional<double>> focal_sigmas() const;
 
  private:
   struct Problem;

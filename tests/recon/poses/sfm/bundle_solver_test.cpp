@@ -150,8 +150,8 @@ TEST(BundleSolver, FindsWhatCeresFinds) {
   for (std::size_t p = 0; p < wanted.point.size(); ++p)
     EXPECT_LT((found.point[p] - wanted.point[p]).norm(), 1e-4) << p;
   EXPECT_NEAR(found.lens[0][0], bent_lens[0], 3);
-  ASSERT_TRUE(solver.focal_sigma(0));
-  EXPECT_NEAR(*solver.focal_sigma(0), focal_sigma, 0.02 * focal_sigma);
+  ASSERT_TRUE(solver.focal_sigmas()[0]);
+  EXPECT_NEAR(*solver.focal_sigmas()[0], focal_sigma, 0.02 * focal_sigma);
 }
 
 TEST(BundleSolver, TheSameBitsForAnyNumberOfThreads) {
@@ -196,7 +196,7 @@ TEST(BundleSolver, SparseAndDenseEquationsHaveOneAnswer) {
     moved = std::max(moved, (dense.state().center[v] - scene.start.center[v]).norm());
   }
   EXPECT_GT(moved, 0.01);
-  EXPECT_NEAR(*dense.focal_sigma(0), *sparse.focal_sigma(0), 1e-6);
+  EXPECT_NEAR(*dense.focal_sigmas()[0], *sparse.focal_sigmas()[0], 1e-6);
 }
 
 TEST(BundleSolver, TwoLensesAndAPointThatNobodySees) {
@@ -215,11 +215,11 @@ TEST(BundleSolver, TwoLensesAndAPointThatNobodySees) {
   for (std::size_t k = 2; k < 8; ++k)
     EXPECT_EQ(solver.state().lens[1][k], scene.start.lens[1][k]) << k;
   EXPECT_EQ(solver.state().point[5], scene.start.point[5]);
-  EXPECT_FALSE(solver.focal_sigma(0)) << "nothing holds the world: the equations are singular";
+  EXPECT_FALSE(solver.focal_sigmas()[0]) << "nothing holds the world: the equations are singular";
   solver.hold_rotation(0);
   for (int axis = 0; axis < 3; ++axis)
     solver.hold_center(0, axis), solver.hold_center(scene.far, axis);
-  EXPECT_TRUE(solver.focal_sigma(0) && solver.focal_sigma(1));
+  EXPECT_TRUE(solver.focal_sigmas()[0] && solver.focal_sigmas()[1]);
 }
 
 TEST(BundleSolver, AHeldValueThatIsNotItsMeanDrownsNothing) {
@@ -250,7 +250,7 @@ TEST(BundleSolver, WhatIsHeldStays) {
   EXPECT_EQ(solver.state().lens, scene.start.lens);
   for (std::size_t v = 0; v < 24; ++v)
     EXPECT_EQ(solver.state().center[v], scene.start.center[v]) << v;
-  EXPECT_FALSE(solver.focal_sigma(0));
+  EXPECT_FALSE(solver.focal_sigmas()[0]);
 }
 
 TEST(BundleSolver, WhatMakesNoSenseIsNoAnswer) {
